@@ -27,7 +27,7 @@ from proxytune.search import Goal, Trial, Values, from_unit, to_unit
 from proxytune.search.likelihood import fit_outputs
 from proxytune.seeds import TARGET_OFFSET
 from proxytune.space import Space
-from proxytune.study import Study, open_study, plan
+from proxytune.study import Study, open_study, plan_episodes
 from proxytune.usefulness import prpv_of_means
 
 Array = NDArray[np.float64]
@@ -281,7 +281,7 @@ def sobol(dimensions: int, count: int, seed: int) -> Array:
 
 def simulated_means(study: Study, values: Values, seed: int) -> Array:
     """Every agent's mean metrics at a θ, shape (agents × metrics,)."""
-    planned = plan(study.settings, study.settings.space.theta(values), seed)
+    planned = plan_episodes(study.settings, study.settings.space.theta(values), seed)
     with running(study.family, planned, study.settings.jobs) as outcomes:
         found = {(o.episode.agent, o.episode.start): o.metrics for o in outcomes if o.metrics}
     table = ScoreTable.from_episodes({(e.agent, e.start): found[e.agent, e.start] for e in planned})

@@ -29,9 +29,9 @@ from proxytune.errors import InputError, StoreError
 from proxytune.report import write_text
 from proxytune.report.writing import save
 from proxytune.running import Bars, working
-from proxytune.search import NAMES as STUDY_ENGINES, Engine, engine_code
+from proxytune.search import ENGINE_NAMES as STUDY_ENGINES, Engine, engine_code
 from proxytune.storage import Store, locked
-from proxytune.study import StudyRun, StudySettings, adopt, most_preflight_episodes, open_study
+from proxytune.study import StudyRun, StudySettings, most_preflight_episodes, open_study
 
 STAND_INS: dict[str, Objective] = {"analytic": Analytic(), "ranking": Ranking(), "calibrated": Calibrated()}
 BUDGET, INITIAL = 40, 10
@@ -106,7 +106,6 @@ def objective_of(arguments: argparse.Namespace, output: Path, engines: int) -> I
     episodes = per_run * arguments.seeds * engines
     print(f"compare: at most {episodes} episodes, {per_run} in each run", file=sys.stderr)
     with Store.open(output) as store, bars:
-        adopt(study, store)
         yield Arena(_on_study(arguments, StudyRun(study, store, WithinRun(bars))), budget, initial, 1, bars)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from problems import Objective
 
 from proxytune.identity import meaning_of
-from proxytune.search import Knowledge, Trial, Values, code_of, fit_surrogate, learn
+from proxytune.search import Knowledge, Trial, Values, code_of, fit_surrogate, learn_theta
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def judge(objective: Objective, visited: Sequence[Values], seed: int, *, by_outp
     """
     trials = [Trial(values, objective.score(values, seed), objective.outcome(values, seed)) for values in visited]
     goal = objective.goal(seed)
-    known = None if goal is None else learn(objective.space, trials, goal, seed)
+    known = None if goal is None else learn_theta(objective.space, trials, goal, seed)
     answer = known.answer if known and by_outputs else fit_surrogate(objective.space, trials).incumbent()[0]
     return Judgement(
         regrets=_regrets(objective, visited, seed),
@@ -118,7 +118,7 @@ def _read(known: Knowledge, truth: Values | None) -> Reading:
 def judging_code() -> str:
     """A digest of the code of this judgement: with other code, a run is to be judged again."""
     here = Path(__file__).resolve()
-    return f"{meaning_of([here], here.parent)[:12]} {code_of(learn.__module__, fit_surrogate.__module__)}"
+    return f"{meaning_of([here], here.parent)[:12]} {code_of(learn_theta.__module__, fit_surrogate.__module__)}"
 
 
 def judgement_from(document: Mapping[str, Any]) -> Judgement:

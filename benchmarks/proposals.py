@@ -26,10 +26,10 @@ from proxytune.search import Surrogate, Trial, fit_surrogate, from_unit, unit_ar
 from proxytune.search.engine import design_point
 from proxytune.search.likelihood import fit_outputs
 from proxytune.search.outcomes import composed_scores
-from proxytune.search.surrogate import AMPLITUDE, LENGTH_SCALE, NOISE, GaussianProcess, highest, most_probable
+from proxytune.search.surrogate import AMPLITUDE, LENGTH_SCALE, NOISE, GaussianProcess, maximise_gain, most_probable
 from proxytune.seeds import proposal_seed
 from proxytune.storage import Store
-from proxytune.study import StudyRun, as_stored, goal_of, open_study
+from proxytune.study import StudyRun, goal_of, open_study, stored_run
 from proxytune.usefulness import bootstrap_means, compare, prpv_of_means
 
 BUDGET, INITIAL = 40, 10
@@ -72,7 +72,7 @@ def improvement(search, model=None):
     model = model or search.surrogate()
     _, incumbent = model.incumbent()
     gain = lambda points: gaussian_ei(points, model.model, y_opt=incumbent, xi=0.0)  # noqa: E731
-    return highest(gain, search.unit, search.draw)[0]
+    return maximise_gain(gain, search.unit, search.draw)[0]
 
 
 def lower_bound(search):
@@ -83,7 +83,7 @@ def lower_bound(search):
         mean, deviation = model.predict(points)
         return 1.96 * deviation - mean
 
-    return highest(gain, search.unit, search.draw)[0]
+    return maximise_gain(gain, search.unit, search.draw)[0]
 
 
 def exploit_at_the_end(search):
@@ -91,7 +91,7 @@ def exploit_at_the_end(search):
     if len(search.trials) < BUDGET - 8:
         return improvement(search)
     model = search.surrogate()
-    return highest(lambda points: -model.mean(points), search.unit, search.draw)[0]
+    return maximise_gain(lambda points: -model.mean(points), search.unit, search.draw)[0]
 
 
 def near_the_incumbent_at_the_end(search):
@@ -131,7 +131,7 @@ def knowledge_gradient(search):
         after = np.mean([(means + shifts * z).min(axis=0) for z in QUANTILES], axis=0)
         return means.min(axis=0) - after
 
-    return highest(gain, visited, search.draw)[0]
+    return maximise_gain(gain, visited, search.draw)[0]
 
 
 def _whitened(regressor, points):
@@ -230,7 +230,7 @@ def predict_held_out(folder):
     """Print how well either model predicts the trials of a finished study that it was not told of."""
     opened = open_study(folder)
     with Store.read(opened.settings.folder) as store:
-        study = as_stored(opened, store)
+        study = stored_run(opened, store).study
         trials = [StudyRun(study, store).search_trial(trial) for trial in store.trials() if trial.prpv is not None]
         goal = goal_of(StudyRun(study, store))
     space = study.settings.space

@@ -13,10 +13,10 @@ import numpy as np
 from study_problems import MIDDLE, lacking_families
 
 from proxytune.running import Bars
-from proxytune.search import Trial, from_unit, learn, unit_points
+from proxytune.search import Trial, from_unit, learn_theta, unit_points
 from proxytune.seeds import TARGET_OFFSET
 from proxytune.storage import Store
-from proxytune.study import StudyRun, goal_of, open_study, outputs_of, plan, run_preflight, table
+from proxytune.study import StudyRun, goal_of, open_study, outputs_of, plan_episodes, run_preflight, score_table
 
 STUDY = Path(__file__).resolve().parent / "truths"
 DESIGN_SEED, TRUTH_SEED = 5, 77
@@ -24,7 +24,7 @@ DESIGN_SEED, TRUTH_SEED = 5, 77
 
 def driven(study, store, watcher, values, seed):
     """The episodes of a θ under a seed."""
-    planned = plan(study.settings, study.settings.space.theta(values), seed)
+    planned = plan_episodes(study.settings, study.settings.space.theta(values), seed)
     StudyRun(study, store, watcher).outcomes(planned, f"seed {seed}")
     return list(StudyRun(study, store).known(planned).values())
 
@@ -32,8 +32,8 @@ def driven(study, store, watcher, values, seed):
 def known_of(study, store, watcher, trials, values, family, seed):
     """What the trials say of a target that is measured at a θ."""
     there = replace(study, family=family, identity=family.identity)
-    target = table(driven(there, store, watcher, values, seed)).select(study.target.metrics)
-    return learn(study.settings.space, trials, goal_of(StudyRun(replace(study, target=target), store)), seed)
+    target = score_table(driven(there, store, watcher, values, seed)).select(study.target.metrics)
+    return learn_theta(study.settings.space, trials, goal_of(StudyRun(replace(study, target=target), store)), seed)
 
 
 def told(name, found, truths):

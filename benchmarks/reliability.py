@@ -33,10 +33,9 @@ import launched
 import processes
 
 from proxytune.errors import ProxytuneError
-from proxytune.search import NAMES
+from proxytune.search import ENGINE_NAMES
 from proxytune.storage import Store
-from proxytune.study import Study, StudyRun, open_study, result_of
-from proxytune.study.run import as_stored
+from proxytune.study import Study, open_study, result_of, stored_run
 
 KILLS = 4
 TABLES = ("facts", "trials", "episodes", "instances")
@@ -44,7 +43,7 @@ TABLES = ("facts", "trials", "episodes", "instances")
 
 def survive_kills(count: int, home: Path) -> str:
     """Kill studies of every engine, and compare what they come to."""
-    cases = list(itertools.product([engine for engine in NAMES if engine != "tpe"], "12", range(count)))
+    cases = list(itertools.product([engine for engine in ENGINE_NAMES if engine != "tpe"], "12", range(count)))
     equal, kills = 0, 0
     with launched.launching() as launcher:
         for engine, jobs, number in cases:
@@ -108,7 +107,7 @@ def cut_off(path: Path, rng: random.Random) -> None:
 def contents(folder: Path, study: Study) -> Any:
     """All that a command reads of a study.db, its scores worked out anew."""
     with Store.read(folder) as store:
-        known = StudyRun(as_stored(study, store), store)
+        known = stored_run(study, store)
         result_of(known)
         outcomes = [dict(store.outcomes(known.study.identity, trial.theta)) for trial in store.trials()]
         return store.facts(), store.trials(), store.sweeps(), outcomes, store.seconds()

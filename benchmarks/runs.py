@@ -15,7 +15,7 @@ from problems import Objective
 
 from proxytune.arrays import Floats
 from proxytune.errors import RunError, StoreError
-from proxytune.search import Engine, Propose, Search, Trial, Values, make_proposer
+from proxytune.search import BatchPoints, Engine, Search, Trial, Values, make_proposer
 
 RESAMPLES = 4000
 LEVELS = (2.5, 97.5)
@@ -107,7 +107,7 @@ class Visits:
         """Why no further point is visited; empty while one is."""
         return "the budget is spent" if len(self._trials) >= self._key.budget else ""
 
-    def evaluate(self, batch: range, propose: Propose) -> None:
+    def evaluate(self, batch: range, propose: BatchPoints) -> None:
         """Score the next point."""
         begun = time.perf_counter()
         points = propose()

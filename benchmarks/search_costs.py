@@ -12,7 +12,7 @@ from problems import BOX, Analytic
 
 from proxytune.domain import Outcome, make_episode
 from proxytune.scores import Metric
-from proxytune.search import Goal, Trial, learn, make_proposer, to_unit
+from proxytune.search import Goal, Trial, learn_theta, make_proposer, to_unit
 from proxytune.search.engine import design_point
 from proxytune.seeds import episode_seed
 from proxytune.storage import Store, TrialRecord
@@ -76,7 +76,7 @@ def test_what_is_known_of_theta_at_25_100_and_400_trials(count, capsys):
     """Region, misfit, what PRPV cannot tell apart and who tells what: once, when a study is summed up."""
     trials, goal = trials_with_outputs(count), agents()[1]
     begun = time.process_time()
-    found = learn(BOX, trials, goal)
+    found = learn_theta(BOX, trials, goal)
     share, fits, as_good = found.posterior.share, found.misfit.fits, found.as_good[0]
     seconds = time.process_time() - begun
     with capsys.disabled():

@@ -21,10 +21,10 @@ from proxytune.study import (
     goal_of,
     load_family,
     outputs_of,
-    plan,
+    plan_episodes,
     run_preflight,
+    score_table,
     study_facts,
-    table,
 )
 from proxytune.usefulness import assess
 
@@ -79,7 +79,7 @@ class StudyObjective:
         """Every agent's mean metrics; None where an agent has no episode that worked."""
         run, theta = self._seeded(seed), self.space.theta(values)
         run.evaluate(theta, f"seed {seed}")
-        return outputs_of(run.study, run.known(plan(run.settings, theta, seed)).values())
+        return outputs_of(run.study, run.known(plan_episodes(run.settings, theta, seed)).values())
 
     def goal(self, seed: int) -> Goal:
         """The target's mean metrics, noise by this seed's pre-flight, and what the study makes small."""
@@ -227,12 +227,14 @@ class TruthObjective:
         study = self.run.study
         family = self.lacking[seed % len(self.lacking)] if self.lacking else study.family
         place = self.run.of(replace(study, family=family, identity=family.identity))
-        planned = plan(study.settings, self.space.theta(self.truth(seed)), target_seed(seed))
+        planned = plan_episodes(study.settings, self.space.theta(self.truth(seed)), target_seed(seed))
         outcomes = place.outcomes(planned, f"target of seed {seed}")
         for outcome in outcomes.values():
             if outcome.failure:
                 raise EpisodeError(f"target of seed {seed}: {failure_of(outcome)}")
-        return table(list(outcomes.values())).select(list(dict.fromkeys([*study.target.metrics, *family.metrics])))
+        return score_table(list(outcomes.values())).select(
+            list(dict.fromkeys([*study.target.metrics, *family.metrics]))
+        )
 
 
 def lacking_families(study: Study, models: Sequence[Path]) -> tuple[DomainFamily, ...]:

@@ -1,10 +1,9 @@
-"""What code means: a digest that comments, layout and docstrings do not change.
+"""Names of values, of code and of versions: a digest under which something is kept, or found to have changed.
 
-Python is digested by its syntax without strings that stand alone, TOML by its values, anything else by its bytes, and
-so is what cannot be parsed. The walk over a syntax tree is our own, since `ast.dump` differs between versions of
-Python. Docstrings are left out even where code reads them when it runs.
-
-Versions of the packages that results depend on, and what has changed of them, in words.
+Code is digested by what it means, so that comments, layout and docstrings do not change it: Python by its syntax
+without strings that stand alone, TOML by its values, anything else by its bytes, and so is what cannot be parsed. The
+walk over a syntax tree is our own, since `ast.dump` differs between versions of Python. Docstrings are left out even
+where code reads them when it runs.
 """
 
 import ast
@@ -23,6 +22,12 @@ LEFT_OUT = ("kind", "type_comment")
 """Fields of a syntax tree without a meaning: the u of u"…", and comments."""
 NOT_A_PACKAGE = ("study.toml", "pyvenv.cfg")
 """A folder with one of these is another study, or an environment."""
+
+
+def digest(*values: object, length: int = 16) -> str:
+    """A short name of plain values: of a single text by its bytes, of others by what `repr` shows of them together."""
+    text = values[0] if len(values) == 1 and isinstance(values[0], str) else repr(values)
+    return hashlib.sha256(text.encode()).hexdigest()[:length]
 
 
 def meaning_of(paths: Iterable[Path], root: Path) -> str:

@@ -1,5 +1,8 @@
 """The names of our code under which episodes are kept; code that plays the same episodes to the last bit has one name.
 
+So have engines that propose the same θ, and shipped learners that learn the same: an entry each, of what
+`proxytune.search.engine_code` and `proxytune.learning.learner_identity` digest.
+
 Any change in what the rooms of a family mean makes every episode of that family another one, unless it is stated here
 that it does not. tests/test_lineage.py fails after such a change, and says the new digest. Then,
 
@@ -36,8 +39,23 @@ SAME_CODE = {
         "f5b9c2c9586c29cd4dc2d6e27f44fd2731ecc2d27bf96a80c745aecd5a3ddb50",
         "efd8ee20ccef978bc76d2d8a4347a02b439e79a2e68d2dd89f86ca5ae1a37343",
     ),
+    "engine outcomes": ("94c0ba12f9bf", "169c7ef2065e"),
+    "engine composite": ("82865583b592", "169c7ef2065e"),
+    "engine gp": ("231c6791b2b7", "1dae7f006157"),
+    "engine random": ("0faabd65d4d9", "40019bb841cc"),
+    "engine sobol": ("225f0b0407fb", "40019bb841cc"),
+    "engine tpe": ("7bbfc93f55ba", "5004f0c9a482"),
+    "design": ("3695c894b9c7", "40019bb841cc"),
+    "learner proxytune.learning.cloning": (
+        "ceb19d953492d57f248e919c7553724e5616f3b383452117639093a35b2ce432",
+        "e908368ec773370848637b0baa8b8544376386b4d32f31359ee98a12fd69dde0",
+    ),
+    "learner proxytune.learning.ridge": (
+        "b5ef33d580b8d175c71c0342ddd985ac6c735556a54e619cc2a0a6ff0940e750",
+        "b08d0547406f9c356c7a33a177609b4b91d11e09b7c8f6ab8caaf611de84e269",
+    ),
 }
-"""For each family, what code means that plays the same episodes, the oldest first: that one names them all."""
+"""For each family, engine and learner, what code means that does the same, the oldest first, which names them all."""
 
 
 @functools.lru_cache
@@ -49,5 +67,10 @@ def code_meaning(family: str) -> str:
 
 def code_name(family: str) -> str:
     """The name of the code of a family's rooms: that of the oldest which plays the same episodes as today's."""
-    code, same = code_meaning(family), SAME_CODE[family]
+    return named(family, code_meaning(family))
+
+
+def named(entry: str, code: str) -> str:
+    """The name of code: that of the oldest in an entry of SAME_CODE, if this is one of them, else its own."""
+    same = SAME_CODE.get(entry, ())
     return same[0] if code in same else code

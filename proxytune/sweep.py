@@ -1,13 +1,12 @@
-"""Usefulness along one parameter of the domain family, the others held.
+"""Usefulness along one parameter of the domain family, the others held, as at the study's answer (`best_theta`).
 
-The answer of a study that has been run: what a sweep holds the other parameters at.
-POD as a domain family of its own: the same commands in proxy and target, and how unlike the two answer.
-A sweep's curve as one series per measure, each with its interval and direction.
-What a curve shows: where a measure is best, and whether it gets worse on both sides of where it was held.
+`run_sweep` simulates what is missing of a sweep's points, and `curve_of` makes a `SweepCurve` of them. POD is simulated
+as a domain family of its own, `Discrepancy`: the same commands in proxy and target, and how unlike the two answer.
+`series_of` takes a curve apart into one series per measure, each with its interval and direction; `shape_of` says where
+a measure is best, and whether it gets worse on both sides of where it was held.
 """
 
 import functools
-import hashlib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -18,11 +17,11 @@ import numpy as np
 
 from proxytune.domain import DomainFamily, Episode
 from proxytune.errors import InputError, SettingsError
-from proxytune.identity import meaning_of
+from proxytune.identity import digest
 from proxytune.settings import nearest
 from proxytune.space import Interval, Parameter, Theta
 from proxytune.storage import Store, SweepRecord, is_begun
-from proxytune.study import LEARNING, Evaluation, Study, StudyRun, load_family, plan, result_of, stored_run
+from proxytune.study import LEARNING, Evaluation, Study, StudyRun, load_family, plan_episodes, result_of, stored_run
 from proxytune.usefulness import (
     ALL,
     MEASURES,
@@ -39,7 +38,7 @@ from proxytune.usefulness import (
 
 
 def has_answer(study: Study) -> bool:
-    """Whether a trial of the study's search by predictivity is finished; a search for PLV has its answer elsewhere."""
+    """Tell whether a trial of a search by predictivity is finished; a search for PLV has its answer elsewhere."""
     if study.settings.objective == LEARNING or not is_begun(study.settings.home):
         return False
     with Store.read(study.settings.home) as store:
@@ -66,11 +65,13 @@ def best_theta(study: Study, option: str = "--at") -> Theta:
 COMMANDS = 100
 """At most so many commands are replayed, 5 s at 20 Hz: later, two domains are far apart whatever their difference."""
 
+REPLAYED = "f1b2d6a3eda6bd6409dcf09bb3bf65753aad6648d68c23ac343b313fa66dcbc8"
+"""Names how replays are compared: what is kept of them is found by it. Change it where they are compared otherwise."""
 METRICS = {"pod_pose": "m", "pod_image": "of full scale"}
 
 
 class Observed(Protocol):
-    """What commands lead to: poses (ticks + 1, 3), the start first; pictures (steps, rows, columns, channels)."""
+    """The answer to commands: poses (ticks + 1, 3), the start first; pictures (steps, rows, columns, channels)."""
 
     @property
     def poses(self) -> Any: ...  # noqa: D102 - described above
@@ -107,8 +108,7 @@ class Discrepancy:
     @property
     def identity(self) -> str:
         """A digest of both families and of how they are compared."""
-        parts = [self.proxy.identity, self.target.identity, meaning_of([Path(__file__)], Path(__file__).parent)]
-        return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
+        return digest(repr([self.proxy.identity, self.target.identity, REPLAYED]))
 
     @property
     def metrics(self) -> Mapping[str, str]:
@@ -213,7 +213,7 @@ class SweepPoint:
 
 
 @dataclass(frozen=True)
-class Curve:
+class SweepCurve:
     """Usefulness along one parameter.
 
     Attributes:
@@ -239,7 +239,7 @@ class Curve:
 
 
 def sweep_interval(study: Study, parameter: str) -> Interval:
-    """Where a parameter is swept: over the study's box, or over all it may be where the study does not search it.
+    """The interval of a sweep: the study's box, or all that a parameter may be where the study does not search it.
 
     Raises:
         InputError: If the family has no such parameter.
@@ -293,7 +293,7 @@ def run_sweep(run: StudyRun, sweep: SweepRecord, discrepancy: Study | None = Non
         what = f"{sweep.parameter} {number} of {len(sweep.points)}"
         scored = run.evaluate(_theta(sweep, value), what)
         if replays is not None:
-            planned = plan(replays.settings, _theta(sweep, value), replays.settings.seed)
+            planned = plan_episodes(replays.settings, _theta(sweep, value), replays.settings.seed)
             replays.outcomes(planned, f"POD, {what}")
         came = "failed" if scored.prpv is None else f"PRPV {scored.prpv:g}"
         run.watcher.finished(f"{what}, at {value:g}: {came}")
@@ -301,14 +301,14 @@ def run_sweep(run: StudyRun, sweep: SweepRecord, discrepancy: Study | None = Non
         run.spent += replays.spent
 
 
-def curve_of(run: StudyRun, sweep: SweepRecord) -> Curve | None:
+def curve_of(run: StudyRun, sweep: SweepRecord) -> SweepCurve | None:
     """The curve of a sweep from what has been simulated; None if an episode is still missing."""
     points = [point for value in sweep.points if (point := _point(run, sweep, value))]
     if len(points) < len(sweep.points):
         return None
     unit = run.study.family.parameters[sweep.parameter].unit
     metrics = tuple(metric.name for metric in run.settings.metrics)
-    return Curve(sweep.parameter, unit, sweep.base, metrics, tuple(points), bool(sweep.replays))
+    return SweepCurve(sweep.parameter, unit, sweep.base, metrics, tuple(points), bool(sweep.replays))
 
 
 def pod_mean(values: Sequence[float], *, seed: int = 0) -> PodMean:
@@ -320,7 +320,7 @@ def pod_mean(values: Sequence[float], *, seed: int = 0) -> PodMean:
     return PodMean(float(found.mean()), central_interval(found[draws].mean(axis=1)), len(found))
 
 
-def all_curves(run: StudyRun) -> Sequence[Curve]:
+def all_curves(run: StudyRun) -> Sequence[SweepCurve]:
     """The curves of every sweep that has been finished, the last one last, each in the domain family of then."""
     study = run.study
     known = [(identity, sweep) for identity, sweep in run.store.sweeps() if sweep.parameter in study.family.parameters]
@@ -347,7 +347,7 @@ def _point(run: StudyRun, sweep: SweepRecord, value: float) -> SweepPoint | None
 def _pod(run: StudyRun, sweep: SweepRecord, value: float) -> dict[str, PodMean] | None:
     # Its first agent's commands are replayed, as discrepancy_study has it.
     replayed = replace(run.settings, agents=run.settings.agents[:1])
-    planned = plan(replayed, _theta(sweep, value), replayed.seed)
+    planned = plan_episodes(replayed, _theta(sweep, value), replayed.seed)
     known = run.store.outcomes(sweep.replays, _theta(sweep, value))
     if not all(episode in known for episode in planned):
         return None
@@ -359,7 +359,7 @@ UNKNOWN = Measured(None, None)
 
 
 @dataclass(frozen=True)
-class Estimate:
+class SweepEstimate:
     """A measure at one value of the parameter; None where it is undefined or has no interval."""
 
     value: float
@@ -379,7 +379,7 @@ class Series:
 
     measure: Measure
     metric: str
-    estimates: tuple[Estimate, ...]
+    estimates: tuple[SweepEstimate, ...]
 
     @property
     def key(self) -> str:
@@ -397,32 +397,22 @@ class Series:
         return not self.measure.lower_is_better
 
 
-def series_of(curve: Curve) -> tuple[Series, ...]:
+def series_of(curve: SweepCurve) -> tuple[Series, ...]:
     """Every measure of a curve; POD only where it was asked for."""
-    on_scores = [one for measure in MEASURES for one in _of_measure(curve, measure)]
-    pods = [_of_pod(curve, measure) for measure in PODS] if curve.has_pod else []
-    return (*on_scores, *pods)
 
+    def along(measure: Measure, metric: str, found: Sequence[Measured]) -> Series:
+        pairs = zip(curve.points, found, strict=True)
+        return Series(measure, metric, tuple(SweepEstimate(point.value, *one) for point, one in pairs))
 
-def _of_measure(curve: Curve, measure: Measure) -> list[Series]:
-    """One series, or one per metric."""
-    found = [measure.measured(point.assessment) if point.assessment else {} for point in curve.points]
-    metrics = curve.metrics if measure.per_metric else (ALL,)
-    return [_series(curve, measure, metric, [one.get(metric, UNKNOWN) for one in found]) for metric in metrics]
-
-
-def _of_pod(curve: Curve, measure: Measure) -> Series:
-    return _series(curve, measure, ALL, [_pod_mean(point, measure) for point in curve.points])
-
-
-def _pod_mean(point: SweepPoint, measure: Measure) -> Measured:
-    found = point.pod.get(measure.key)
-    return Measured(found.value, found.interval) if found else UNKNOWN
-
-
-def _series(curve: Curve, measure: Measure, metric: str, found: list[Measured]) -> Series:
-    pairs = zip(curve.points, found, strict=True)
-    return Series(measure, metric, tuple(Estimate(point.value, *one) for point, one in pairs))
+    series = []
+    for measure in MEASURES:
+        found = [measure.measured(point.assessment) if point.assessment else {} for point in curve.points]
+        metrics = curve.metrics if measure.per_metric else (ALL,)
+        series += [along(measure, metric, [one.get(metric, UNKNOWN) for one in found]) for metric in metrics]
+    for measure in PODS if curve.has_pod else ():
+        pods = [point.pod.get(measure.key) for point in curve.points]
+        series.append(along(measure, ALL, [Measured(one.value, one.interval) if one else UNKNOWN for one in pods]))
+    return tuple(series)
 
 
 Side = Literal["worsens", "flat", "turns", "unknown", "unseen"]
@@ -463,7 +453,7 @@ class Shape:
 
     @property
     def monotone(self) -> bool | None:
-        """Whether it worsens on every side that was seen, without a turn; None where that cannot be told."""
+        """True if it worsens on every side that was seen, without a turn; None where that cannot be told."""
         seen = {self.below, self.above} - {"unseen"}
         if seen & {"flat", "turns"}:
             return False
@@ -494,7 +484,7 @@ def shape_of(series: Series, held: float | None) -> Shape:
     return Shape(tuple(cost.value for cost in best), sign * least + 0.0, near, held, *sides)
 
 
-def describe(series: Series, held: float | None) -> str:
+def describe_shape(series: Series, held: float | None) -> str:
     """The shape in one line."""
     shape = shape_of(series, held)
     if shape.score is None:
@@ -517,7 +507,7 @@ def _listed(chosen: Sequence[float], series: Series) -> str:
     return ", ".join(f"{value:.4g}" for value in chosen)
 
 
-def _cost(estimate: Estimate, sign: float) -> _Cost | None:
+def _cost(estimate: SweepEstimate, sign: float) -> _Cost | None:
     if estimate.score is None:
         return None
     cost = sign * estimate.score
@@ -528,7 +518,7 @@ def _cost(estimate: Estimate, sign: float) -> _Cost | None:
 
 
 def _side(costs: Sequence[_Cost], held: float | None, direction: int) -> Side:
-    """What happens outwards of the held value; the points come in outward order."""
+    """The course outwards of the held value; the points come in outward order."""
     if held is None or not any(cost.value == held for cost in costs):
         return "unseen"
     path = [cost for cost in costs if direction * (cost.value - held) >= 0]

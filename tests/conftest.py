@@ -111,11 +111,11 @@ def finished_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A finished study, run once."""
     from proxytune.search import make_proposer
     from proxytune.storage import Store
-    from proxytune.study import StudyRun, open_study, run_study
+    from proxytune.study import StudyRun, open_study, run_trials
 
     folder = study_maker(tmp_path_factory.mktemp("finished"))()
     with Store.open(folder) as store:
-        run_study(StudyRun(open_study(folder), store), make_proposer("gp", 5))
+        run_trials(StudyRun(open_study(folder), store), make_proposer("gp", 5))
     return folder
 
 

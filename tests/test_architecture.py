@@ -62,7 +62,6 @@ SHORT = {
     "driving/agent",  # a protocol
     "learning/learner",  # a protocol
     "driving/texels",  # a protocol, and which of two ways is taken
-    "lineage",  # names of code
 }
 """Modules below 60 lines: protocols and types; doors (`__init__`) and commands, one module each, go without saying."""
 
@@ -85,7 +84,9 @@ def test_a_room_is_entered_by_its_door(path):
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom) and str(node.module).startswith("proxytune."):
             parts = str(node.module).split(".")
-            assert parts[1] in (here, "cli") or len(parts) == 2, f"import this from proxytune.{parts[1]}: {ast.unparse(node)}"
+            assert parts[1] in (here, "cli") or len(parts) == 2, (
+                f"import this from proxytune.{parts[1]}: {ast.unparse(node)}"
+            )
 
 
 @pytest.mark.parametrize("door", sorted(PACKAGE.glob("*/__init__.pyi")), ids=lambda door: door.parent.name)

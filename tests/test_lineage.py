@@ -10,6 +10,11 @@ from toy_families import PENDULUM
 from proxytune import lineage
 from proxytune.driving import LaneFollowing, shipped_map
 from proxytune.environments.family import gymnasium_family
+from proxytune.learning import learner_identity
+from proxytune.learning.cloning import BehaviourCloning
+from proxytune.learning.ridge import RandomFeatures
+from proxytune.search import ENGINE_NAMES, code_of, engine_code, engine_of
+from proxytune.search.engine import AfterDesign
 from proxytune.settings import Section
 
 MODULES = {
@@ -51,6 +56,22 @@ def test_code_that_means_something_else_is_decided_upon(family):
     )
     code = lineage.code_meaning(family)
     assert code in lineage.SAME_CODE[family], f"code of {family} means {code}; {hint}"
+
+
+@pytest.mark.parametrize("name", ENGINE_NAMES)
+def test_code_that_proposes_is_decided_upon(name):
+    code = code_of(AfterDesign.__module__, engine_of(name).make.__module__)
+    entry = f"engine {name}"
+    assert code in lineage.SAME_CODE[entry], f"append {code} to SAME_CODE['{entry}'] if all proposals are the same"
+    assert engine_code(name) == lineage.SAME_CODE[entry][0]
+
+
+@pytest.mark.parametrize("learner", [BehaviourCloning, RandomFeatures])
+def test_code_that_learns_is_decided_upon(learner, monkeypatch):
+    codes, entry = [], f"learner {learner.__module__}"
+    monkeypatch.setattr("proxytune.learning.lessons.named", lambda _, code: codes.append(code) or code)
+    learner_identity(learner())
+    assert codes[0] in lineage.SAME_CODE[entry], f"append {codes[0]} to SAME_CODE['{entry}'] if it learns the same"
 
 
 @pytest.mark.parametrize(("family", "module"), ONE_OF_EACH)

@@ -15,12 +15,12 @@ from proxytune.study import StudyRun, open_study
 from proxytune.sweep import (
     COMMANDS,
     METRICS,
-    Estimate,
     Series,
+    SweepEstimate,
     all_curves,
     check_base,
     curve_of,
-    describe,
+    describe_shape,
     discrepancy_study,
     plan_sweep,
     pod_mean,
@@ -317,7 +317,9 @@ def test_a_base_that_the_family_cannot_take_is_refused(make_study, base, expecte
 
 def series(scores, spread=0.0, higher=False):
     found = [
-        Estimate(float(place), score, None if score is None or spread is None else (score - spread, score + spread))
+        SweepEstimate(
+            float(place), score, None if score is None or spread is None else (score - spread, score + spread)
+        )
         for place, score in enumerate(scores)
     ]
     measure = replace(PRPV, better="higher" if higher else "lower")
@@ -373,7 +375,7 @@ def test_undefined_points_are_passed_over():
     assert (shape.best, shape.monotone) == ((2.0,), True)
     empty = series([None, None])
     assert shape_of(empty, 0.0).best == ()
-    assert describe(empty, 0.0) == "PRPV: undefined at every point"
+    assert describe_shape(empty, 0.0) == "PRPV: undefined at every point"
 
 
 def test_ties_for_the_best_are_all_named():
@@ -381,11 +383,11 @@ def test_ties_for_the_best_are_all_named():
 
 
 def test_the_line_says_where_it_is_lowest_and_what_each_side_does():
-    line = describe(series([9.0, 4.0, 1.0, 6.0, 3.0]), 2.0)
+    line = describe_shape(series([9.0, 4.0, 1.0, 6.0, 3.0]), 2.0)
     assert line.startswith("PRPV: lowest (1) at 2; not worse beyond noise: 2; from 2 downwards it worsens")
     assert "upwards it turns" in line
-    assert "from" not in describe(series([9.0, 4.0, 1.0]), None)
-    assert "not worse beyond noise: 0, 2" in describe(series([1.0, 5.0, 1.0]), None)
+    assert "from" not in describe_shape(series([9.0, 4.0, 1.0]), None)
+    assert "not worse beyond noise: 0, 2" in describe_shape(series([1.0, 5.0, 1.0]), None)
 
 
 @settings(derandomize=True, max_examples=50)

@@ -30,9 +30,9 @@ from proxytune.report import (
 from proxytune.running import Bars, Silent, Watcher
 from proxytune.space import Theta
 from proxytune.storage import Store, locked
-from proxytune.study import Study, StudyRun, StudySettings, adopt, open_study
+from proxytune.study import Study, StudyRun, StudySettings, open_study
 from proxytune.sweep import (
-    Curve,
+    SweepCurve,
     best_theta,
     check_base,
     curve_of,
@@ -71,7 +71,7 @@ class SweepReport:
     """
 
     settings: StudySettings
-    curves: tuple[Curve, ...]
+    curves: tuple[SweepCurve, ...]
     chosen: str
     theta: Theta
     episodes: int
@@ -162,7 +162,6 @@ def run_sweep(
     total = sum(len(sweep.points) for sweep in sweeps) * per_point * study.settings.starts
     folder = study.settings.home
     with locked(folder), Store.open(folder) as store:
-        adopt(study, store)
         with _watching(progress, total) as watcher:
             run = StudyRun(study, store, watcher)
             for sweep in sweeps:
@@ -253,7 +252,6 @@ def teach(path: str | Path, *, progress: bool = False) -> TeachReport:
     check_proxies(settings, setup)
     proxies = setup.settings.proxies
     with locked(settings.home), Store.open(settings.home) as store:
-        adopt(study, store)
         examinations = count_examinations(setup.settings, len(proxies) + 1)
         with _watching(progress, examinations, "points of learning curves") as bars:
             experiment = run_experiment(settings, setup, bars)

@@ -33,7 +33,7 @@ from proxytune.study import (
     read_lessons,
     read_study_settings,
     save_lessons,
-    tuned,
+    tuned_family,
     with_spending,
 )
 from proxytune.teaching import classrooms, teach_families
@@ -212,7 +212,7 @@ def _tune(name: str, study: Study, teller: Teller, retry_failed: bool) -> StudyR
 def _tuned(report: StudyReport) -> TunedFamily:
     study = report.result.study
     with Store.read(study.settings.home) as store:
-        return tuned(StudyRun(study, store), report.result)
+        return tuned_family(StudyRun(study, store), report.result)
 
 
 def _teach(

@@ -20,7 +20,7 @@ from proxytune.report import (
     write_study_report,
 )
 from proxytune.running import Bars, Silent, Watcher
-from proxytune.search import History, make_proposer, optimize_result
+from proxytune.search import History, optimize_result
 from proxytune.storage import Store, locked
 from proxytune.study import (
     LEARNING,
@@ -30,21 +30,14 @@ from proxytune.study import (
     StudyResult,
     StudyRun,
     StudySettings,
-    check_facts,
-    goal_of,
     history_of,
     most_confirmation_episodes,
     most_preflight_episodes,
-    note_search,
+    open_read_only,
     open_study,
-    open_to_look,
     read_study_settings,
     result_of,
-    retry_failed,
-    run_confirmation,
-    run_preflight,
-    run_study as run_trials,
-    stored_run,
+    run_stages,
     with_spending,
 )
 
@@ -188,10 +181,7 @@ def run_opened(
             store.forget_failures()
         with watching as watcher:
             under_way = StudyRun(study, store, watcher)
-            _prepare(under_way, warn)
-            # The proposer allows for the noise that the pre-flight measured.
-            run_trials(under_way, make_proposer(study.engine, settings.initial, goal_of(under_way)))
-            run_confirmation(under_way)
+            run_stages(under_way, warn)
         return StudyReport(result_of(under_way), under_way.spent)
 
 
@@ -208,21 +198,10 @@ def read_study(path: str | Path) -> StudyReport:
     settings = read_study_settings(Path(path))
     settings.check_single()
     with Store.read(settings.home) as store:
-        return StudyReport(result_of(stored_run(open_to_look(settings, store), store)), Spent())
+        return StudyReport(result_of(open_read_only(settings, store)), Spent())
 
 
 def most_episodes(settings: StudySettings) -> int:
     """How many episodes a study takes at most, from pre-flight to confirmation."""
     trials = settings.budget * len(settings.agents) * settings.starts
     return trials + most_preflight_episodes(settings) + most_confirmation_episodes(settings)
-
-
-def _prepare(under_way: StudyRun, warn: Callable[[str], None]) -> None:
-    """Run the pre-flight and warn at once of parameters without effect, so that the user can stop the study."""
-    check_facts(under_way)
-    retry_failed(under_way)
-    if line := note_search(under_way.study, under_way.store):
-        warn(line)
-    learnt = run_preflight(under_way)
-    for warning in learnt.warnings if learnt and under_way.spent.episodes else ():
-        warn(warning)

@@ -50,7 +50,7 @@ from proxytune.running import Bars, Silent
 from proxytune.scores import ScoreTable, write_scores
 from proxytune.search import History, write_optuna, write_skopt
 from proxytune.seeds import target_seed
-from proxytune.study import bare_family, measure as measure_scores, read_study_settings
+from proxytune.study import bare_family, measure_agents, read_study_settings
 
 TRIALS: Mapping[str, Callable[[History, Path], None]] = {"optuna": write_optuna, "skopt": write_skopt}
 """Formats that take the trials of a study, not what was found."""
@@ -184,7 +184,7 @@ def measure(
         raise InputError(f"--model {path}: no such file; check the path")
     episodes = len(settings.agents) * settings.starts * repeats
     with Bars(episodes) if progress else nullcontext(Silent()) as watcher:
-        return Measurement(measure_scores(settings, path, own, watcher, repeats), path, own, repeats)
+        return Measurement(measure_agents(settings, path, own, watcher, repeats), path, own, repeats)
 
 
 @dataclass(frozen=True, repr=False)

@@ -10,7 +10,7 @@ from proxytune.cli.terminal import Answer
 from proxytune.driving import AGENTS, METRICS, lane_length, load_agent, map_names, read_robot, robot_names, shipped_map
 from proxytune.effects import DECLARED, SHIPPED
 from proxytune.extensions import plugins
-from proxytune.search import ENGINES, NAMES, engine_of, installed
+from proxytune.search import ENGINE_NAMES, ENGINES, engine_of, is_installed
 from proxytune.study import measure_of
 from proxytune.usefulness import MEASURES, PODS
 
@@ -80,14 +80,14 @@ def _metrics() -> list[Row]:
 
 
 def _engines() -> list[Row]:
-    own = [engine_of(name) for name in plugins("engine", NAMES)]
+    own = [engine_of(name) for name in plugins("engine", ENGINE_NAMES)]
     return [
         {
             "name": engine.name,
             "label": engine.label,
             "learns_from": engine.learns_from,
             "of_studies": "yes" if engine.in_studies else "",
-            "install": "" if installed(engine) or not engine.needs else f"proxytune[{engine.needs.extra}]",
+            "install": "" if is_installed(engine) or not engine.needs else f"proxytune[{engine.needs.extra}]",
             "what_it_proposes": engine.summary,
         }
         for engine in (*ENGINES, *own)

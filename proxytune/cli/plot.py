@@ -30,14 +30,13 @@ from proxytune.study import (
     StudyResult,
     StudyRun,
     StudySettings,
-    open_to_look,
+    open_read_only,
     read_study_settings,
     rescored,
     result_of,
-    stored_run,
     with_metrics,
 )
-from proxytune.sweep import Curve, all_curves
+from proxytune.sweep import SweepCurve, all_curves
 
 RESCORED = "rescored"
 
@@ -66,10 +65,10 @@ def run(arguments: argparse.Namespace) -> Answer:
         return redraw_families(settings)
     settings.check_single()
     with Store.read(settings.home) as store:
-        study = open_to_look(settings, store)
-        result, curves = _read(stored_run(study, store), metrics)
+        run = open_read_only(settings, store)
+        result, curves = _read(run, metrics)
     folder = _folder(settings.home, metrics)
-    figures = draw_curves(curves, folder / "figures", study.truth)
+    figures = draw_curves(curves, folder / "figures", run.study.truth)
     shown = result.study.settings if result else settings
     pages = [str(page) for page in _pages(shown, curves, folder / "figures", typed(arguments))]
     document: dict[str, Any] = {}
@@ -87,14 +86,14 @@ def run(arguments: argparse.Namespace) -> Answer:
     )
 
 
-def _pages(settings: StudySettings, curves: Sequence[Curve], folder: Path, command: str) -> Iterator[Path]:
+def _pages(settings: StudySettings, curves: Sequence[SweepCurve], folder: Path, command: str) -> Iterator[Path]:
     """Write a page of all sweeps that hold the others at the same values."""
     drawn = list({curve_name(curve): curve for curve in curves}.values())
     for alike in held_alike(drawn):
         yield write_sweep_page(settings, alike, folder, held_values(alike[0].base), command)
 
 
-def _read(run: StudyRun, metrics: Sequence[Metric]) -> tuple[StudyResult | None, Sequence[Curve]]:
+def _read(run: StudyRun, metrics: Sequence[Metric]) -> tuple[StudyResult | None, Sequence[SweepCurve]]:
     """The study's result, if it has any trial or no sweep either, and its curves."""
     curves = all_curves(run.of(with_metrics(run.study, metrics)) if metrics else run)
     if curves and not run.store.trials(run.study.objective.name):

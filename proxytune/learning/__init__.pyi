@@ -1,4 +1,4 @@
-from .curve_model import POSTERIOR_DRAWS as POSTERIOR_DRAWS, Curve as Curve, places as places
+from .curve_model import POSTERIOR_DRAWS as POSTERIOR_DRAWS, LearningCurve as LearningCurve, doublings as doublings
 from .learner import Learner as Learner, Weights as Weights, policy_of as policy_of
 from .lessons import (
     Arrays as Arrays,
@@ -6,29 +6,29 @@ from .lessons import (
     Costs as Costs,
     Distribution as Distribution,
     collect_samples as collect_samples,
-    describe as describe,
-    digest as digest,
-    examine as examine,
+    describe_distribution as describe_distribution,
+    examine_policy as examine_policy,
+    facts_digest as facts_digest,
     learner_identity as learner_identity,
     mix_samples as mix_samples,
 )
 from .plv import (
     LEVELS as LEVELS,
+    AdaptiveDesign as AdaptiveDesign,
     Convergence as Convergence,
-    Estimate as Estimate,
     Examination as Examination,
+    ExaminationScores as ExaminationScores,
+    LearningEstimate as LearningEstimate,
     SampleNeeds as SampleNeeds,
-    Scores as Scores,
-    Spending as Spending,
-    Teaching as Teaching,
+    TeachingValue as TeachingValue,
     curves_of as curves_of,
-    difference as difference,
-    estimate as estimate,
+    estimate_figure as estimate_figure,
     first_examinations as first_examinations,
     mean_score as mean_score,
+    more_needed as more_needed,
     next_examinations as next_examinations,
     sample_needs as sample_needs,
-    teaching as teaching,
+    teaching_value as teaching_value,
 )
 from .settings import (
     EXPERT as EXPERT,

@@ -1,6 +1,6 @@
 """Behaviour cloning: a small network from a small picture to the expert's command.
 
-What learners see of a camera's picture: its grey values, averaged over cells.
+Learners see a camera's picture as grey values, averaged over cells (`grey_cells`).
 """
 
 import functools

@@ -1,10 +1,14 @@
 """A Gaussian process over learning curves: what the examinations of all proxies and repetitions say of each mean curve.
 
-A score is the mean curve of its proxy, plus what this repetition's target samples do to every learner, plus what they
-do to this one, plus noise. The last three are larger where scores differ more, as they do where a curve rises.
+A learning curve is the scores of a learner in the target, by number of target samples x (as doublings) and repetition
+r. The score of proxy p is the mean curve f_p(x), plus what this repetition's target samples do to every learner, plus
+what they do to this one, plus noise:
 
-Learning curves: the scores of a learner in the target, by number of target samples and repetition.
-The posterior of learning curves: draws of all mean curves together, bounded, and rising where the data allow it.
+    y = f_p(x) + s(x) · (g_r(x) + h_pr(x) + ε),    f_p = level + a Gaussian process (Matérn 5/2), alike for g_r and h_pr
+
+with a spread s that is larger where scores differ more, as they do where a curve rises. `draw_curves` draws all mean
+curves together from their posterior, bounded, and rising where the data allow it; `crossing` is the number of target
+samples from which on a draw stays converged, η.
 """
 
 import itertools
@@ -22,7 +26,7 @@ from proxytune.errors import InputError
 
 
 @dataclass(frozen=True)
-class Curve:
+class LearningCurve:
     """A learning curve: scores in the target by number of target samples.
 
     Attributes:
@@ -51,7 +55,7 @@ class Curve:
 
     @property
     def repetitions(self) -> int:
-        """How many repetitions have an examination."""
+        """The number of repetitions that have an examination."""
         return int(np.isfinite(self.scores).any(axis=1).sum())
 
 
@@ -82,7 +86,7 @@ ROUNDS = 2
 
 
 @dataclass(frozen=True)
-class Marks:
+class Examined:
     """Examinations, one per row.
 
     Attributes:
@@ -99,21 +103,21 @@ class Marks:
 
     @cached_property
     def same(self) -> NDArray[np.bool_]:
-        """Whether two are of one curve (examinations, examinations)."""
+        """True where two are of one curve (examinations, examinations)."""
         return np.asarray(self.curve[:, None] == self.curve)
 
     @cached_property
     def together(self) -> NDArray[np.bool_]:
-        """Whether two are of one repetition."""
+        """True where two are of one repetition."""
         return np.asarray(self.repetition[:, None] == self.repetition)
 
     @cached_property
     def apart(self) -> Floats:
-        """How many doublings two are apart."""
+        """The number of doublings that two are apart."""
         return np.asarray(np.abs(self.place[:, None] - self.place))
 
 
-def places(counts: Floats, first: float) -> Floats:
+def doublings(counts: Floats, first: float) -> Floats:
     """Numbers of target samples as doublings: 0 for none, 1 for the first count, nearly one more for each twofold."""
     return np.asarray(np.log2(1.0 + np.asarray(counts, dtype=float) / first))
 
@@ -134,7 +138,7 @@ class CurveModel:
         unit: Their standard deviation.
     """
 
-    marks: Marks
+    marks: Examined
     values: Mapping[str, float]
     centre: float
     unit: float
@@ -152,11 +156,10 @@ class CurveModel:
         """Variance of one more examination's score about the mean curve, at these places."""
         values = self.values
         one = values["shared"] ** 2 + values["own"] ** 2 + values["noise"] ** 2
-        relative = _spread(self.marks, self._residuals(), curve, place) ** 2
+        scaled = (self.marks.score - self.centre) / self.unit
+        residuals = _residuals(self.marks, values, scaled, self._weights)
+        relative = _spread(self.marks, residuals, curve, place) ** 2
         return np.asarray(self.unit**2 * one * relative)
-
-    def _residuals(self) -> Floats:
-        return _residuals(self.marks, self.values, (self.marks.score - self.centre) / self.unit, self._weights)
 
     def _means_covariance(
         self, curve: NDArray[np.intp], place: Floats, other: NDArray[np.intp], there: Floats
@@ -164,14 +167,25 @@ class CurveModel:
         return _means(self.values, curve[:, None] == other, np.abs(place[:, None] - there))
 
 
-def fit_curve_model(marks: Marks) -> CurveModel:
+def fit_curve_model(marks: Examined) -> CurveModel:
     """Fit the process to examinations by its most probable hyperparameters: a pure function of them."""
     centre, unit = float(marks.score.mean()), float(marks.score.std()) or 1.0
     scaled = (marks.score - centre) / unit
     spread, start = np.ones(len(scaled)), np.log([median for median, _ in PRIORS.values()])
+    # One repetition does not tell what it does to a learner from the learner's mean curve
+    held = REPEATED if len(np.unique(marks.repetition)) == 1 else ()
+    far = {name: 0.0 if name in held else FARTHEST * width for name, (_, width) in PRIORS.items()}
+    bounds = [(np.log(median) - far[name], np.log(median) + far[name]) for name, (median, _) in PRIORS.items()]
     for _ in range(1 + ROUNDS):
         given = (marks, scaled, spread)
-        found = minimize(_misfit, start, args=given, method="L-BFGS-B", bounds=_bounds(marks), options={"maxiter": 40})
+        found = minimize(
+            _negative_log_posterior,
+            start,
+            args=given,
+            method="L-BFGS-B",
+            bounds=bounds,
+            options={"maxiter": 40},
+        )
         start, values = found.x, _named(found.x)
         factor = cho_factor(_covariance(marks, values, spread), lower=True)
         weights = cho_solve(factor, scaled)
@@ -179,19 +193,11 @@ def fit_curve_model(marks: Marks) -> CurveModel:
     return CurveModel(marks, values, centre, unit, factor, weights)
 
 
-def _bounds(marks: Marks) -> list[tuple[float, float]]:
-    """How small and how large the logarithm of each hyperparameter may be."""
-    # One repetition does not tell what it does to a learner from the learner's mean curve
-    held = REPEATED if len(np.unique(marks.repetition)) == 1 else ()
-    far = {name: 0.0 if name in held else FARTHEST * width for name, (_, width) in PRIORS.items()}
-    return [(np.log(median) - far[name], np.log(median) + far[name]) for name, (median, _) in PRIORS.items()]
-
-
 def _named(logarithms: Floats) -> dict[str, float]:
     return dict(zip(PRIORS, np.exp(logarithms).tolist(), strict=True))
 
 
-def _misfit(logarithms: Floats, marks: Marks, scaled: Floats, spread: Floats) -> float:
+def _negative_log_posterior(logarithms: Floats, marks: Examined, scaled: Floats, spread: Floats) -> float:
     """Negative logarithm of the posterior of the hyperparameters, up to a constant."""
     factor = cho_factor(_covariance(marks, _named(logarithms), spread), lower=True)
     medians, widths = np.array(list(PRIORS.values())).T
@@ -199,7 +205,7 @@ def _misfit(logarithms: Floats, marks: Marks, scaled: Floats, spread: Floats) ->
     return float(0.5 * scaled @ cho_solve(factor, scaled) + np.sum(np.log(np.diag(factor[0]))) + prior)
 
 
-def _covariance(marks: Marks, values: Mapping[str, float], spread: Floats) -> Floats:
+def _covariance(marks: Examined, values: Mapping[str, float], spread: Floats) -> Floats:
     drift = _matern(marks.apart, values["drift"]) * marks.together
     about = drift * (values["shared"] ** 2 + values["own"] ** 2 * marks.same) + values["noise"] ** 2 * np.eye(
         len(spread)
@@ -219,13 +225,13 @@ def _matern(apart: Floats, length: float) -> Floats:
     return np.asarray((1.0 + scaled + scaled**2 / 3.0) * np.exp(-scaled))
 
 
-def _residuals(marks: Marks, values: Mapping[str, float], scaled: Floats, weights: Floats) -> Floats:
-    """What the mean curves leave of the scores, scaled."""
+def _residuals(marks: Examined, values: Mapping[str, float], scaled: Floats, weights: Floats) -> Floats:
+    """The residuals of the scores about the mean curves, scaled."""
     return np.asarray(scaled - _means(values, marks.same, marks.apart) @ weights)
 
 
-def _spread(marks: Marks, residuals: Floats, curve: NDArray[np.intp], place: Floats) -> Floats:
-    """How much scores differ at these places, relative to all: what is left nearby, drawn towards that of all."""
+def _spread(marks: Examined, residuals: Floats, curve: NDArray[np.intp], place: Floats) -> Floats:
+    """The spread of scores at these places, relative to all: what is left nearby, drawn towards that of all."""
     pooled = float(np.mean(residuals**2)) or 1.0
     near = np.exp(-0.5 * ((place[:, None] - marks.place) / NEAR) ** 2) * (curve[:, None] == marks.curve)
     local = (POOLED * pooled + near @ residuals**2) / (POOLED + near.sum(axis=1))
@@ -241,7 +247,7 @@ DOUBT = 2.5
 
 
 @dataclass(frozen=True)
-class Draws:
+class CurveDraws:
     """Mean curves drawn from their posterior, all proxies' together.
 
     Attributes:
@@ -260,8 +266,8 @@ class Draws:
 
 
 def draw_curves(
-    curves: Mapping[str, Curve], bounds: tuple[float, float], draws: int = POSTERIOR_DRAWS, seed: int = 0
-) -> Draws:
+    curves: Mapping[str, LearningCurve], bounds: tuple[float, float], draws: int = POSTERIOR_DRAWS, seed: int = 0
+) -> CurveDraws:
     """Draw the mean curves that the examinations allow: a pure function of these.
 
     Args:
@@ -272,12 +278,15 @@ def draw_curves(
     """
     first = float(min(curve.counts[1] for curve in curves.values()))
     last = max(curve.counts[-1] for curve in curves.values())
-    place = np.linspace(0.0, end := float(places(np.array(last), first)), 1 + round(STEPS * end))
+    place = np.linspace(0.0, end := float(doublings(np.array(last), first)), 1 + round(STEPS * end))
     model = fit_curve_model(_marks(curves, first))
     which = np.repeat(np.arange(len(curves)), len(place))
     mean, covariance = model.mean_curves(which, np.tile(place, len(curves)))
     normal = np.random.default_rng(seed).standard_normal((draws, len(mean)))
-    drawn = np.clip(mean + normal @ _root(covariance).T, *bounds).reshape(draws, len(curves), -1)
+    # A matrix whose product with its transpose is the covariance, even one that rounding has made indefinite
+    values, vectors = np.linalg.eigh(covariance)
+    root = np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
+    drawn = np.clip(mean + normal @ root.T, *bounds).reshape(draws, len(curves), -1)
     rising = {
         name: _may_rise_only(mean[which == number], covariance[np.ix_(which == number, which == number)])
         for number, name in enumerate(curves)
@@ -290,28 +299,22 @@ def draw_curves(
     for name, curve in curves.items():
         if not np.isfinite(curve.scores[:, 0]).any():
             scores[name][:, place < 1.0 - 1e-9] = np.nan
-    return Draws(counts_at(place, first), scores, rising, model, first)
+    return CurveDraws(counts_at(place, first), scores, rising, model, first)
 
 
-def _marks(curves: Mapping[str, Curve], first: float) -> Marks:
+def _marks(curves: Mapping[str, LearningCurve], first: float) -> Examined:
     rows = []
     for number, curve in enumerate(curves.values()):
-        at = places(np.array(curve.counts), first)
+        at = doublings(np.array(curve.counts), first)
         rows += [
             (number, repetition, at[place], curve.scores[repetition, place]) for repetition, place in curve.examined
         ]
     number, repetition, place, score = np.array(rows).T
-    return Marks(number.astype(np.intp), repetition.astype(np.intp), place, score)
-
-
-def _root(covariance: Floats) -> Floats:
-    """A matrix whose product with its transpose is a covariance, even one that rounding has made indefinite."""
-    values, vectors = np.linalg.eigh(covariance)
-    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
+    return Examined(number.astype(np.intp), repetition.astype(np.intp), place, score)
 
 
 def _may_rise_only(mean: Floats, covariance: Floats) -> bool:
-    """Whether the greatest fall of the mean is within doubt."""
+    """Tell whether the greatest fall of the mean is within doubt."""
     fall = np.triu(mean[:, None] - mean)
     early, late = np.unravel_index(np.argmax(fall), fall.shape)
     variance = covariance[early, early] + covariance[late, late] - 2.0 * covariance[early, late]

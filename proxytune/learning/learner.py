@@ -1,4 +1,4 @@
-"""What a learner is: from demonstrations to weights, and from weights and an observation to a command."""
+"""The protocol of a learner: from demonstrations to weights, and from weights and an observation to a command."""
 
 import functools
 from collections.abc import Callable, Mapping
@@ -54,6 +54,6 @@ class Taught:
 
 
 def policy_of(learner: Learner, weights: Weights) -> Policy:
-    """What a learner does with its weights: for many observations at once too, where it can."""
+    """The policy that a learner's weights make: for many observations at once too, where it can."""
     act, act_many = functools.partial(learner.act, weights), getattr(learner, "act_many", None)
     return act if act_many is None else Taught(act, functools.partial(act_many, weights))

@@ -1,13 +1,11 @@
-"""Lessons: θ drawn from p(θ) for each, and the expert's samples of many, whether it drives itself or a learner does.
+"""Lessons and examinations: samples of an expert from θ drawn from p(θ), a policy's scores, and what is kept of both.
 
-Arrays kept on disk by what determines them: made once, found again after any interruption.
-Examinations: what a policy scores in several episodes.
-Rehearsal: what a proxy taught is gone over again beside the target's samples, so that it is not forgotten.
-What target samples cost: those that the expert's driving gives, those that the learner's own gives, and labels.
-Which learner it was: a digest under which what it has learnt is kept.
+`collect_samples` has the expert drive, or a learner whose states the expert labels; `mix_samples` rehearses what a
+proxy taught beside the target's samples; `examine_policy` scores a policy. `Cache` keeps arrays on disk by all that
+determines them: made once, found again after any interruption; `learner_identity` is one of these facts. `Costs` are
+those of a target sample, by which PLV becomes a price.
 """
 
-import hashlib
 import inspect
 import json
 import math
@@ -24,9 +22,10 @@ from proxytune.arrays import Floats
 from proxytune.domain import Classroom, Demonstration, Episode, OnPolicyClassroom, Policy, make_episode
 from proxytune.errors import EpisodeError, LearnerError, StoreError
 from proxytune.files import draft_of
-from proxytune.identity import meaning_of
+from proxytune.identity import digest, meaning_of
 from proxytune.learning.learner import Learner
 from proxytune.learning.plv import general_plv
+from proxytune.lineage import named
 from proxytune.seeds import lesson_seeds
 from proxytune.settings import Section
 from proxytune.space import Theta
@@ -67,7 +66,7 @@ class Distribution:
 
     @property
     def fixed(self) -> bool:
-        """Whether it is one θ."""
+        """True if it is one θ."""
         return all(low == high for low, high in self.bounds.values())
 
 
@@ -98,19 +97,19 @@ def collect_samples(
     found = asked = lessons = 0
     least = LEAST_SHARE if policy is None else LEAST_LABELLED
     while found < count:
-        samples, wanted = _teach(classroom, _lesson(classroom, where, seed, lessons), lesson_s, policy)
+        drawn = lesson_seeds(seed, lessons)
+        start = drawn.start % classroom.starts
+        episode = make_episode(where.draw(drawn.theta), agent=EXPERT, start=start, seed=drawn.episode)
+        if policy is None:
+            samples, wanted = classroom.demonstrate(episode, lesson_s)
+        else:
+            samples, wanted = cast(OnPolicyClassroom, classroom).guide(episode, policy, lesson_s)
         observations.append(samples.observations)
         commands.append(samples.commands)
         found, asked, lessons = found + len(samples.commands), asked + wanted, lessons + 1
         if found < least * asked and (lessons >= TRIED or found >= count):
-            raise LearnerError(_complaint(policy, found / asked, lessons, describe(where)))
+            raise LearnerError(_complaint(policy, found / asked, lessons, describe_distribution(where)))
     return Demonstration(np.concatenate(observations)[:count], np.concatenate(commands)[:count])
-
-
-def _teach(classroom: Classroom, episode: Episode, lesson_s: float, policy: Policy | None) -> tuple[Demonstration, int]:
-    if policy is None:
-        return classroom.demonstrate(episode, lesson_s)
-    return cast(OnPolicyClassroom, classroom).guide(episode, policy, lesson_s)
 
 
 def _complaint(policy: Policy | None, share: float, lessons: int, where: str) -> str:
@@ -125,13 +124,7 @@ def _complaint(policy: Policy | None, share: float, lessons: int, where: str) ->
     )
 
 
-def _lesson(classroom: Classroom, where: Distribution, seed: int, number: int) -> Episode:
-    drawn = lesson_seeds(seed, number)
-    start = drawn.start % classroom.starts
-    return make_episode(where.draw(drawn.theta), agent=EXPERT, start=start, seed=drawn.episode)
-
-
-def describe(where: Distribution) -> str:
+def describe_distribution(where: Distribution) -> str:
     """p(θ) in words."""
     spans = [
         f"{name} = {low:.3g}" if low == high else f"{name} in [{low:.3g}, {high:.3g}]"
@@ -174,17 +167,17 @@ class Cache:
         return _read(path)
 
     def path(self, kind: str, facts: Mapping[str, Any]) -> Path:
-        """Where the arrays of these facts are, or would be."""
-        return self.folder / f"{kind}-{digest(facts)}.npz"
+        """The file where the arrays of these facts are, or would be."""
+        return self.folder / f"{kind}-{facts_digest(facts)}.npz"
 
     def has(self, kind: str, facts: Mapping[str, Any]) -> bool:
-        """Whether they are there."""
+        """Tell whether they are there."""
         return self.path(kind, facts).exists()
 
 
-def digest(facts: Mapping[str, Any]) -> str:
+def facts_digest(facts: Mapping[str, Any]) -> str:
     """A short name for facts, the same whatever their order."""
-    return hashlib.sha256(_text(facts).encode()).hexdigest()[:20]
+    return digest(_text(facts), length=20)
 
 
 def _text(facts: Mapping[str, Any]) -> str:
@@ -209,7 +202,7 @@ def _read(path: Path) -> Arrays:
         raise StoreError(f"{path}: is damaged ({problem}); delete it, and run again to make it anew") from None
 
 
-def examine(classroom: Classroom, episodes: Sequence[Episode], policy: Policy) -> list[float]:
+def examine_policy(classroom: Classroom, episodes: Sequence[Episode], policy: Policy) -> list[float]:
     """The score of a policy in each episode, all at once where the classroom can do that.
 
     Raises:
@@ -253,7 +246,7 @@ KEYS = ("off_policy", "on_policy", "label")
 
 @dataclass(frozen=True)
 class Costs:
-    """What one target sample costs, in any one unit.
+    """The costs of one target sample, in any one unit.
 
     Attributes:
         off_policy: One that the expert's driving gives.
@@ -301,15 +294,15 @@ def cost_saved(costs: Costs, *, without: tuple[Floats, Floats], with_proxy: tupl
         without: On-policy and off-policy samples needed without the proxy, as `split_samples` has them.
         with_proxy: The same with it.
     """
+
+    def with_a_price(samples: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+        """Samples without those that cost nothing, of which there may be infinitely many."""
+        on, off = (np.where(price > 0.0, count, 0.0) for price, count in zip(costs.per_sample, samples, strict=True))
+        return on, off
+
     cost_on, cost_off = costs.per_sample
-    paid, paid_with = _with_a_price(costs, without), _with_a_price(costs, with_proxy)
+    paid, paid_with = with_a_price(without), with_a_price(with_proxy)
     return general_plv(without=paid, with_proxy=paid_with, cost_on=cost_on, cost_off=cost_off)  # eq. (6)
-
-
-def _with_a_price(costs: Costs, samples: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
-    """Samples without those that cost nothing, of which there may be infinitely many."""
-    on, off = (np.where(price > 0.0, count, 0.0) for price, count in zip(costs.per_sample, samples, strict=True))
-    return on, off
 
 
 def learner_identity(learner: Learner) -> str:
@@ -322,4 +315,4 @@ def learner_identity(learner: Learner) -> str:
     taken = {getattr(value, "__module__", None) for value in vars(module).values()}
     files = {Path(file) for name in taken if (file := getattr(sys.modules.get(str(name)), "__file__", None))}
     code = meaning_of({source, *(file for file in files if file.parent == source.parent)}, source.parent)
-    return hashlib.sha256(code.encode() + repr(learner).encode()).hexdigest()[:16]
+    return digest(named(f"learner {type(learner).__module__}", code) + repr(learner))

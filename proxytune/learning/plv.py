@@ -1,7 +1,13 @@
 """Proxy learning value: how many target samples a proxy saves (Courchesne et al. 2021, equations 5 and 6).
 
-Where the next examinations tell most about PLV: a pure function of the scores that are known.
-What others published of proxies of the same names, to stand beside what is measured here.
+With η the target samples that a learner needs to converge, without a proxy (∅) and after the proxy S,
+
+    PLV(S) = η(∅) − η(S)                                                                                     (eq. 5)
+
+`sample_needs` gives η draw by draw from the posterior of all learning curves (curve_model.py), and `teaching_value`
+PLV, factor and reduction with their 95 % intervals. Where examinations are chosen (`AdaptiveDesign`), the next ones are
+those that are expected to take most from the variance of PLV: a pure function of the scores that are known. `Published`
+is what others found of proxies of the same names, to stand beside what is measured here.
 """
 
 from collections import Counter
@@ -13,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.arrays import Floats
-from proxytune.learning.curve_model import POSTERIOR_DRAWS, Curve, Draws, crossing, draw_curves, places
+from proxytune.learning.curve_model import POSTERIOR_DRAWS, CurveDraws, LearningCurve, crossing, doublings, draw_curves
 from proxytune.settings import Section
 
 LEVELS = (0.025, 0.975)
@@ -24,7 +30,7 @@ Samples = TypeVar("Samples", float, Floats)
 
 @dataclass(frozen=True)
 class Convergence:
-    """When a learner counts as having converged in the target.
+    """The rule by which a learner counts as having converged in the target.
 
     Attributes:
         level: The score it has to reach: what it converges to without a proxy, unless stated otherwise.
@@ -41,7 +47,7 @@ class Convergence:
 
 
 @dataclass(frozen=True)
-class Estimate:
+class LearningEstimate:
     """A figure with its 95 % interval; None where it was not reached, or where the interval's end was not."""
 
     value: float | None
@@ -50,18 +56,18 @@ class Estimate:
 
     @property
     def above_zero(self) -> bool:
-        """Whether its whole interval lies above 0; how far above may be unknown."""
+        """True if its whole interval lies above 0; how far above may be unknown."""
         return self.low is not None and self.low > 0.0
 
     @property
     def at_most_zero(self) -> bool:
-        """Whether no part of its interval lies above 0."""
+        """True if no part of its interval lies above 0."""
         return self.high is not None and self.high <= 0.0
 
 
 @dataclass(frozen=True)
-class Teaching:
-    """What a proxy is worth as a teacher.
+class TeachingValue:
+    """The worth of a proxy as a teacher.
 
     Attributes:
         without: Target samples needed without it, η(∅).
@@ -71,16 +77,16 @@ class Teaching:
         reduction: PLV as a share of η(∅).
     """
 
-    without: Estimate
-    needed: Estimate
-    plv: Estimate
-    factor: Estimate
-    reduction: Estimate
+    without: LearningEstimate
+    needed: LearningEstimate
+    plv: LearningEstimate
+    factor: LearningEstimate
+    reduction: LearningEstimate
 
 
 @dataclass(frozen=True)
 class SampleNeeds:
-    """How many target samples each learner needs, draw by draw from the posterior of the learning curves.
+    """The target samples that each learner needs, draw by draw from the posterior of the learning curves.
 
     Attributes:
         curves: The scores that the examinations gave, by name.
@@ -91,15 +97,15 @@ class SampleNeeds:
         needed: η by name (draws,); infinite where it is not reached up to the largest count.
     """
 
-    curves: Mapping[str, Curve]
-    draws: Draws
+    curves: Mapping[str, LearningCurve]
+    draws: CurveDraws
     when: Convergence
     gain: float | None
     needed: Mapping[str, Floats]
 
     @property
     def settled(self) -> bool:
-        """Whether the learner without a proxy converges: over the last doubling it gains no more than the tolerance."""
+        """True if the learner without a proxy converges: over the last doubling it gains no more than the tolerance."""
         return self.gain is not None and self.gain <= self.when.tolerance
 
     @property
@@ -132,7 +138,7 @@ def general_plv(
 
 
 def sample_needs(
-    curves: Mapping[str, Curve],
+    curves: Mapping[str, LearningCurve],
     *,
     none: str,
     best_score: float,
@@ -140,7 +146,7 @@ def sample_needs(
     level: float | None = None,
     draws: int = POSTERIOR_DRAWS,
 ) -> SampleNeeds:
-    """How many target samples each learner needs, from the posterior of all learning curves together.
+    """Infer the target samples that each learner needs, from the posterior of all learning curves together.
 
     Args:
         curves: Scores by name of the learning curve.
@@ -150,18 +156,21 @@ def sample_needs(
         level: The score that counts as converged; None for what the learner without a proxy comes to.
         draws: How many draws.
     """
-    drawn = draw_curves(curves, _bounds(curves, best_score), draws)
+    # A family's own scores may lie beyond those of one that drives.
+    scores = np.concatenate([curve.scores[np.isfinite(curve.scores)] for curve in curves.values()])
+    bounds = float(min(-best_score, scores.min())), float(max(best_score, scores.max()))
+    drawn = draw_curves(curves, bounds, draws)
     alone = drawn.scores[none]
     levels = alone[:, -1] if level is None else np.full(len(alone), level)
     needed = {
-        name: crossing(drawn.counts, scores, levels - tolerance, drawn.first) for name, scores in drawn.scores.items()
+        name: crossing(drawn.counts, drawn.scores[name], levels - tolerance, drawn.first) for name in drawn.scores
     }
     when = Convergence(float(levels.mean()) if level is None else level, tolerance)
     return SampleNeeds(curves, drawn, when, _last_gain(drawn, alone), needed)
 
 
-def _last_gain(drawn: Draws, alone: Floats) -> float | None:
-    """What the learner without a proxy gains over the last doubling of samples; None if it begins within that."""
+def _last_gain(drawn: CurveDraws, alone: Floats) -> float | None:
+    """The gain of the learner without a proxy over the last doubling of samples; None if it begins within that."""
     if 2.0 * drawn.first > drawn.counts[-1] * (1.0 + ROUNDING):
         return None
     # Where the first count is half the last one, the place drawn next to it may lie before anything is learnt
@@ -169,39 +178,35 @@ def _last_gain(drawn: Draws, alone: Floats) -> float | None:
     return float(alone[:, -1].mean() - alone[:, half].mean())
 
 
-def _bounds(curves: Mapping[str, Curve], best_score: float) -> tuple[float, float]:
-    """Lowest and highest score there can be; a family's own scores may lie beyond those of one that drives."""
-    scores = np.concatenate([curve.scores[np.isfinite(curve.scores)] for curve in curves.values()])
-    return float(min(-best_score, scores.min())), float(max(best_score, scores.max()))
-
-
-def teaching(needs: SampleNeeds, *, none: str, proxy: str) -> Teaching:
-    """What a proxy is worth as a teacher, with 95 % intervals.
+def teaching_value(needs: SampleNeeds, *, none: str, proxy: str) -> TeachingValue:
+    """The worth of a proxy as a teacher, with 95 % intervals.
 
     Where convergence is not reached, η is known to lie beyond the largest count: ends that this leaves open are None.
     """
-    return Teaching(
+    return TeachingValue(
         without=samples_needed(needs, none),
         needed=samples_needed(needs, proxy),
-        plv=difference(needs, more=none, less=proxy),
-        factor=estimate(lambda alone, taught: alone / taught, needs, more=none, less=proxy),
-        reduction=estimate(lambda alone, taught: 1.0 - taught / alone, needs, more=none, less=proxy),
+        plv=more_needed(needs, more=none, less=proxy),
+        factor=estimate_figure(lambda alone, taught: alone / taught, needs, more=none, less=proxy),
+        reduction=estimate_figure(lambda alone, taught: 1.0 - taught / alone, needs, more=none, less=proxy),
     )
 
 
-def samples_needed(needs: SampleNeeds, name: str) -> Estimate:
-    """How many target samples a learner needs, with its 95 % interval; None beyond the largest count."""
+def samples_needed(needs: SampleNeeds, name: str) -> LearningEstimate:
+    """The target samples that a learner needs, with its 95 % interval; None beyond the largest count."""
     needed = needs.needed[name]
     least = np.minimum(needed, needs.last)
     return _ends(least=least, middle=needed, most=needed)
 
 
-def difference(needs: SampleNeeds, *, more: str, less: str) -> Estimate:
-    """How many more target samples one learner needs than another, with its 95 % interval."""
-    return estimate(lambda one, other: plv(without=one, with_proxy=other), needs, more=more, less=less)
+def more_needed(needs: SampleNeeds, *, more: str, less: str) -> LearningEstimate:
+    """The target samples that one learner needs more than another, with the 95 % interval."""
+    return estimate_figure(lambda one, other: plv(without=one, with_proxy=other), needs, more=more, less=less)
 
 
-def estimate(figure: Callable[[Floats, Floats], Floats], needs: SampleNeeds, *, more: str, less: str) -> Estimate:
+def estimate_figure(
+    figure: Callable[[Floats, Floats], Floats], needs: SampleNeeds, *, more: str, less: str
+) -> LearningEstimate:
     """A figure of what two learners need, with the ends of its 95 % interval that unreached η leave possible.
 
     Args:
@@ -220,16 +225,16 @@ def estimate(figure: Callable[[Floats, Floats], Floats], needs: SampleNeeds, *, 
     return _ends(least=least, middle=np.where(reached, known, -np.inf), most=most)
 
 
-def mean_score(needs: SampleNeeds, name: str, place: int) -> Estimate:
+def mean_score(needs: SampleNeeds, name: str, place: int) -> LearningEstimate:
     """The mean score of a learner at a place of the drawn curves; None before anything can have been learnt."""
     scores = needs.draws.scores[name][:, place]
-    return Estimate(*(_finite(float(end)) for end in (scores.mean(), *np.quantile(scores, LEVELS))))
+    return LearningEstimate(*(_finite(float(end)) for end in (scores.mean(), *np.quantile(scores, LEVELS))))
 
 
-def _ends(*, least: Floats, middle: Floats, most: Floats) -> Estimate:
+def _ends(*, least: Floats, middle: Floats, most: Floats) -> LearningEstimate:
     """The median of a figure, and its 95 % interval from the least and the most that it may be in each draw."""
     ends = (_quantile(middle, 0.5), _quantile(least, LEVELS[0]), _quantile(most, LEVELS[1]))
-    return Estimate(*(_finite(end) for end in ends))
+    return LearningEstimate(*(_finite(end) for end in ends))
 
 
 def _quantile(values: Floats, level: float) -> float:
@@ -258,12 +263,12 @@ class Examination(NamedTuple):
     samples: int
 
 
-Scores = Mapping[Examination, float]
+ExaminationScores = Mapping[Examination, float]
 
 
 @dataclass(frozen=True)
-class Spending:
-    """How examinations are spent.
+class AdaptiveDesign:
+    """The adaptive design of examinations.
 
     Attributes:
         none: The name of the learner without a proxy, which knows nothing before its first target sample.
@@ -280,7 +285,7 @@ class Spending:
 
 @dataclass(frozen=True)
 class _Cells:
-    """Where somebody may be examined: curve by number and name, count, and drawn mean scores (draws, cells)."""
+    """Places for an examination: curve by number and name, count, and drawn mean scores (draws, cells)."""
 
     number: NDArray[np.intp]
     name: tuple[str, ...]
@@ -288,37 +293,37 @@ class _Cells:
     drawn: Floats
 
 
-def curves_of(counts: Sequence[int], scores: Scores) -> dict[str, Curve]:
+def curves_of(counts: Sequence[int], scores: ExaminationScores) -> dict[str, LearningCurve]:
     """Scores as learning curves, by name, each over the grid of counts and what was examined between these."""
     return {name: _curve(counts, name, scores) for name in dict.fromkeys(one.curve for one in scores)}
 
 
-def _curve(counts: Sequence[int], name: str, scores: Scores) -> Curve:
+def _curve(counts: Sequence[int], name: str, scores: ExaminationScores) -> LearningCurve:
     own = [one for one in scores if one.curve == name]
     all_counts = sorted({*counts, *(one.samples for one in own)})
     table = np.full((1 + max(one.repetition for one in own), len(all_counts)), np.nan)
     for one in own:
         table[one.repetition, all_counts.index(one.samples)] = scores[one]
-    return Curve(tuple(all_counts), table)
+    return LearningCurve(tuple(all_counts), table)
 
 
-def first_examinations(names: Sequence[str], spending: Spending) -> list[Examination]:
-    """What is examined before anything is known: counts from the first to the last, in two repetitions."""
+def first_examinations(names: Sequence[str], design: AdaptiveDesign) -> list[Examination]:
+    """The examinations before anything is known: counts from the first to the last, in two repetitions."""
+
+    def spread(first: int) -> list[int]:
+        """Counts spread over the grid from the place of the first one to the last."""
+        places = np.linspace(first, len(design.counts) - 1, FIRST_COUNTS).round().astype(int)
+        return [design.counts[place] for place in sorted(set(places.tolist()))]
+
     return [
         Examination(name, repetition, count)
-        for repetition in range(min(FIRST_REPETITIONS, spending.repetitions))
+        for repetition in range(min(FIRST_REPETITIONS, design.repetitions))
         for name in names
-        for count in _spread_counts(spending.counts, first=int(name == spending.none))
+        for count in spread(first=int(name == design.none))
     ]
 
 
-def _spread_counts(counts: tuple[int, ...], first: int) -> list[int]:
-    """Counts spread over the grid from the place of the first one to the last."""
-    places_ = np.linspace(first, len(counts) - 1, FIRST_COUNTS).round().astype(int)
-    return [counts[place] for place in sorted(set(places_.tolist()))]
-
-
-def next_examinations(needs: SampleNeeds, names: Sequence[str], spending: Spending) -> list[Examination]:
+def next_examinations(needs: SampleNeeds, names: Sequence[str], design: AdaptiveDesign) -> list[Examination]:
     """Choose the examinations that are expected to take most from the variance of all proxies' PLV, one by one.
 
     What a score would tell is taken from how the drawn mean curve there goes with the drawn PLVs, as in linear
@@ -328,25 +333,29 @@ def next_examinations(needs: SampleNeeds, names: Sequence[str], spending: Spendi
         needs: What the scores known so far say.
         names: The curves that may be examined. PLV is that of the proxies among them; without one, it is how many
             samples are needed without a proxy that is to be known.
-        spending: How examinations are spent.
+        design: How examinations are spent.
 
     Returns:
         A batch of them; fewer where every repetition of every count has been examined.
     """
-    cells, wanted = _cells(needs, names, spending), _finite_plv(needs, names, spending.none)
+    cells = _cells(needs, names, design)
+    # What is not reached is taken as some way beyond the grid.
+    needed = {name: np.minimum(samples, BEYOND * needs.last) for name, samples in needs.needed.items()}
+    alone = needed[design.none]
+    wanted = np.column_stack([alone - needed[name] for name in names if name != design.none] or [alone])
     targets = wanted.shape[1]
     joint = np.cov(np.column_stack((wanted, cells.drawn)), rowvar=False)
-    noise = needs.draws.model.noise_at(cells.number, places(cells.count.astype(float), needs.draws.first))
+    noise = needs.draws.model.noise_at(cells.number, doublings(cells.count.astype(float), needs.draws.first))
     done = {
         Examination(name, int(repetition), curve.counts[place])
         for name, curve in needs.curves.items()
         for repetition, place in curve.examined
     }
     chosen: list[Examination] = []
-    while len(chosen) < spending.batch:
+    while len(chosen) < design.batch:
         tells = np.sum(joint[:targets, targets:] ** 2, axis=0) / (np.diag(joint)[targets:] + noise)
         ordered = np.argsort(-tells, kind="stable").tolist()
-        free = ((cell, _next_of(cells, cell, done, spending)) for cell in ordered)
+        free = ((cell, _next_of(cells, cell, done, design)) for cell in ordered)
         best, examination = next(((cell, one) for cell, one in free if one), (0, None))
         if examination is None:
             break
@@ -357,38 +366,31 @@ def next_examinations(needs: SampleNeeds, names: Sequence[str], spending: Spendi
     return chosen
 
 
-def _cells(needs: SampleNeeds, names: Collection[str], spending: Spending) -> _Cells:
+def _cells(needs: SampleNeeds, names: Collection[str], design: AdaptiveDesign) -> _Cells:
     """Every place of the drawn curves at which somebody may be examined."""
     counts, scores = needs.draws.counts.round().astype(int), needs.draws.scores
     open_ = {
         counts[place]: place
         # Of places of one count the last one: before the first count a learner without a proxy is not drawn
         for place in (*range(0, len(counts) - 1, APART), len(counts) - 1)
-        if not place or counts[place] >= spending.counts[1]
+        if not place or counts[place] >= design.counts[1]
     }
     cells = [
         (number, name, place)
         for number, name in enumerate(needs.curves)
         for count, place in open_.items()
-        if name in names and (count or name != spending.none) and np.isfinite(scores[name][0, place])
+        if name in names and (count or name != design.none) and np.isfinite(scores[name][0, place])
     ]
     drawn = np.column_stack([scores[name][:, place] for _, name, place in cells])
     at = np.array([place for _, _, place in cells])
     return _Cells(np.array([number for number, _, _ in cells]), tuple(name for _, name, _ in cells), counts[at], drawn)
 
 
-def _finite_plv(needs: SampleNeeds, names: Sequence[str], none: str) -> Floats:
-    """PLV of every proxy in every draw (draws, proxies), what is not reached taken as some way beyond the grid."""
-    needed = {name: np.minimum(samples, BEYOND * needs.last) for name, samples in needs.needed.items()}
-    proxies = [name for name in names if name != none]
-    return np.column_stack([needed[none] - needed[name] for name in proxies] or [needed[none]])
-
-
-def _next_of(cells: _Cells, cell: int, done: Collection[Examination], spending: Spending) -> Examination | None:
+def _next_of(cells: _Cells, cell: int, done: Collection[Examination], design: AdaptiveDesign) -> Examination | None:
     """The examination here in the repetition in which this learner has been examined least; None if all are done."""
     name, count = cells.name[cell], int(cells.count[cell])
     often = Counter(one.repetition for one in done if one.curve == name)
-    possible = (Examination(name, number, count) for number in range(spending.repetitions))
+    possible = (Examination(name, number, count) for number in range(design.repetitions))
     free = [one for one in possible if one not in done]
     return min(free, key=lambda one: (often[one.repetition], one.repetition), default=None)
 

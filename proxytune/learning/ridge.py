@@ -48,7 +48,11 @@ class RandomFeatures:
         """
         if not len(samples.commands):
             raise LearnerError("there is no sample to learn from; collect some, or do not train")
-        before = start or self._nothing(samples, seed)
+        before: Weights = start or {
+            "seed": np.array(seed),
+            "centre": samples.commands.mean(axis=0),
+            "slopes": np.zeros((self.features, samples.commands.shape[1])),
+        }
         seen = self._waves(before, samples.observations)
         if before["slopes"].shape != (seen.shape[1], samples.commands.shape[1]):
             raise LearnerError(
@@ -65,22 +69,17 @@ class RandomFeatures:
         command: Floats = weights["centre"] + self._waves(weights, observation[None])[0] @ weights["slopes"]
         return np.clip(command, -1.0, 1.0)
 
-    def _nothing(self, samples: Demonstration, seed: int) -> Weights:
-        """Weights that answer every picture with the mean command."""
-        slopes = np.zeros((self.features, samples.commands.shape[1]))
-        return {"seed": np.array(seed), "centre": samples.commands.mean(axis=0), "slopes": slopes}
-
     def _waves(self, weights: Weights, pictures: NDArray[np.uint8]) -> Floats:
         """Random features (n, features) of pictures, always the same for the same weights."""
         cells = grey_cells(pictures, top=self.top, rows=self.rows, columns=self.columns)
         gamma = 0.5 / (cells.shape[1] * self.reach**2)
-        directions, phases = _draw_waves(cells.shape[1], self.features, gamma, int(weights["seed"]))
+        directions, phases = _fourier_features(cells.shape[1], self.features, gamma, int(weights["seed"]))
         waves: Floats = np.sqrt(2.0 / self.features) * np.cos(cells @ directions + phases)
         return waves
 
 
 @functools.lru_cache(maxsize=8)
-def _draw_waves(cells: int, features: int, gamma: float, seed: int) -> tuple[Floats, Floats]:
+def _fourier_features(cells: int, features: int, gamma: float, seed: int) -> tuple[Floats, Floats]:
     """Directions (cells, features) and phases (features,) of the waves that approximate a Gaussian kernel."""
     sampler = RBFSampler(gamma=gamma, n_components=features, random_state=seed).fit(np.zeros((1, cells)))
     return sampler.random_weights_, sampler.random_offset_

@@ -1,4 +1,4 @@
-"""What the [teaching] table of a study.toml says, read strictly."""
+"""The settings of the [teaching] table of a study.toml, read strictly: every complaint has file, key and a remedy."""
 
 import itertools
 import math
@@ -30,7 +30,7 @@ NONE = "none"
 
 @dataclass(frozen=True)
 class TeachingSettings:
-    """How a proxy's worth as a teacher is measured.
+    """The way in which a proxy's worth as a teacher is measured.
 
     Attributes:
         target: The target's model.toml, in which the learners are fine-tuned and examined.
@@ -77,7 +77,7 @@ class TeachingSettings:
 
     @property
     def later_keys(self) -> Mapping[str, Any]:
-        """What is taught otherwise than before there were keys for it, by key."""
+        """The settings that differ from what was taught before there were keys for them, by key."""
         values = {name: getattr(self, name) for name in LATER}
         return {name: value for name, value in values.items() if value != getattr(TeachingSettings, name)}
 
@@ -116,7 +116,10 @@ def read_teaching(section: Section) -> TeachingSettings | None:
         lesson_s=section.number("lesson_s", 5.0, low=0.1, high=3600.0),
         level=section.number("level") if "level" in section.values else None,
         tolerance=section.number("tolerance", 5.0, low=0.0),
-        examinations=_examinations(section),
+        # No fewer than are made before any is chosen
+        examinations=section.whole("examinations", low=FIRST_COUNTS * FIRST_REPETITIONS, high=1_000_000)
+        if "examinations" in section.values
+        else None,
         budget=section.whole("budget", 12, low=1, high=100_000),
         narrow=_flag(section, "narrow"),
         widths=_widths(section.section("width")),
@@ -142,13 +145,6 @@ def _grid(section: Section) -> tuple[int, ...]:
     if len(counts) < 2 or any(later <= earlier for earlier, later in itertools.pairwise(counts)):
         raise section.error(key, f"must rise, over two numbers at least, got {counts}")
     return tuple(counts)
-
-
-def _examinations(section: Section) -> int | None:
-    """How many examinations a curve takes; no fewer than are made before any is chosen."""
-    if "examinations" not in section.values:
-        return None
-    return section.whole("examinations", low=FIRST_COUNTS * FIRST_REPETITIONS, high=1_000_000)
 
 
 def _flag(section: Section, key: str) -> bool:

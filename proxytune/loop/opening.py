@@ -36,10 +36,10 @@ from proxytune.study import (
     bare_family,
     failure_of,
     load_family,
-    plan,
+    plan_episodes,
     read_study_settings,
     read_target,
-    table,
+    score_table,
 )
 from proxytune.usefulness import Assessment, assess, floor_of_repeats
 
@@ -146,7 +146,7 @@ def drive_held_out(study: Study, settings: StudySettings, theta: Theta, watcher:
     seeds = [fresh_seed(settings.seed, repetition) for repetition in (1, 2)]
     with locked(study.settings.folder), Store.open(study.settings.folder) as store:
         run = StudyRun(held, store, watcher)
-        once, again = (_scores(run, plan(settings, theta, seed)) for seed in seeds)
+        once, again = (_scores(run, plan_episodes(settings, theta, seed)) for seed in seeds)
     floor = floor_of_repeats(domain=once, again=again, metrics=settings.metrics)
     return HeldOut(assess(proxy=once, target=held.target, metrics=settings.metrics, floor=floor), run.spent.episodes)
 
@@ -154,7 +154,7 @@ def drive_held_out(study: Study, settings: StudySettings, theta: Theta, watcher:
 def _scores(run: StudyRun, planned: list[Episode]) -> ScoreTable:
     outcomes = list(run.outcomes(planned, "held-out agents").values())
     _check_worked(outcomes)
-    return table(outcomes)
+    return score_table(outcomes)
 
 
 def _check_worked(outcomes: list[Outcome]) -> None:

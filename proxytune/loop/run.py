@@ -75,7 +75,7 @@ from proxytune.running import Silent, Watcher
 from proxytune.scores import write_scores
 from proxytune.seeds import target_seed
 from proxytune.storage import locked
-from proxytune.study import FILE_NAME, Study, StudySettings, as_document, code_of, measure, open_study
+from proxytune.study import FILE_NAME, Study, StudySettings, measure_agents, open_study, settings_document, user_code
 from proxytune.usefulness import Assessment
 
 STEPS = {
@@ -161,7 +161,7 @@ class _Closing:
     def _measure(self, settings: StudySettings, output: Path) -> None:
         assert self.loop.twin is not None
         with self.teller.episodes(len(settings.agents) * settings.starts) as watcher:
-            scores = measure(settings, self.loop.twin, target_seed(settings.seed), watcher)
+            scores = measure_agents(settings, self.loop.twin, target_seed(settings.seed), watcher)
         self.episodes += len(settings.agents) * settings.starts
         write_scores(scores, output)
 
@@ -183,7 +183,7 @@ class _Closing:
         if loop.log is not None:
             self._begin("log", "given")
         robot = digest_of_files(robot_home(loop.robot, self.settings.folder))
-        made_by = (robot, code_of(self.settings), versions_of(["proxytune"]))
+        made_by = (robot, user_code(self.settings), versions_of(["proxytune"]))
         inputs = digest("diagnosis", seen, declared_names(loop), self.settings.seed, made_by)
         do = partial(diagnose_target, loop, log, home, self.teller)
         self._keep("diagnosis", inputs, home / "diagnosis.json", do)
@@ -194,7 +194,7 @@ class _Closing:
         loop, folder, wanted = self.loop, self.loop.home / "log", wanted_of(self.loop)
         assert loop.twin is not None
         twin, domain = loop.twin.read_text(encoding="utf-8"), self.settings.domain.values
-        inputs = digest("log", twin, domain, vars(wanted), code_of(self.settings), versions_of(["proxytune"]))
+        inputs = digest("log", twin, domain, vars(wanted), user_code(self.settings), versions_of(["proxytune"]))
         do = partial(record_log, self.settings, loop.twin, folder, wanted, lambda line: None)
         self._keep("log", inputs, folder / "log.toml", do)
         return folder, inputs
@@ -257,7 +257,7 @@ class _Closing:
 
     def _agents(self, names: tuple[str, ...]) -> list[Any]:
         """What scores of a domain depend on besides its model."""
-        settings, code = self.settings, code_of(held_out_settings(self.settings, names))
+        settings, code = self.settings, user_code(held_out_settings(self.settings, names))
         return [names, dict(settings.aliases), settings.starts, settings.seed, dict(settings.domain.values), code]
 
 
@@ -423,7 +423,9 @@ def foot_of_loop(closed: Closed, command: str, date: str) -> Foot:
         command: The command that makes the page, as typed in a shell.
         date: When it was written.
     """
-    values = {key: value for key, value in as_document(closed.loop.settings).items() if value not in (None, {}, [])}
+    values = {
+        key: value for key, value in settings_document(closed.loop.settings).items() if value not in (None, {}, [])
+    }
     settings = tuple((key, _text(value)) for key, value in values.items() if key != "path")
     return Foot(command, settings, tuple(versions_of(PACKAGES).items()), date)
 

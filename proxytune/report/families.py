@@ -21,7 +21,7 @@ from proxytune.report.text import file_texts, group_texts, note_texts, section_t
 from proxytune.report.view import Paragraphs, Picture, Table, View, columns_of
 from proxytune.report.wording import fixed, listed, short, span, with_span
 from proxytune.report.writing import save_figure
-from proxytune.study import Choice, ComparedFamilies, Lesson, TunedFamily, as_document
+from proxytune.study import BestFamilies, ComparedFamilies, Lesson, TunedFamily, settings_document
 from proxytune.usefulness import Assessment, Difference
 
 Row = tuple[str, ...]
@@ -305,11 +305,11 @@ def families_document(compared: ComparedFamilies) -> dict[str, Any]:
             for one in compared.families
         },
         "differences": differences_document(compared.selection),
-        "settings": dict(as_document(compared.settings)),
+        "settings": dict(settings_document(compared.settings)),
     }
 
 
-def _choice_document(choice: Choice) -> dict[str, Any]:
+def _choice_document(choice: BestFamilies) -> dict[str, Any]:
     return {"family": choice.best, "cannot_be_told_from": list(choice.alike)}
 
 
@@ -372,7 +372,7 @@ class Panel(NamedTuple):
 
     title: str
     values: Mapping[str, Spread | None]
-    choice: Choice
+    choice: BestFamilies
     ratios: bool = False
 
 

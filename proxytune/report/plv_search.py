@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 from rich.console import Group
 from rich.text import Text
 
-from proxytune.learning import Distribution, describe
+from proxytune.learning import Distribution, describe_distribution
 from proxytune.report.figure_style import BLUE, COLUMN, VERMILLION, LineName, dress, legend_below, name_lines
 from proxytune.report.html import write_page
 from proxytune.report.study.page import study_foot
@@ -29,7 +29,7 @@ from proxytune.report.text import file_texts, group_texts, table_text
 from proxytune.report.view import Paragraphs, Picture, Table, View, columns_of
 from proxytune.report.wording import listed, short
 from proxytune.report.writing import save_figure
-from proxytune.study import as_document
+from proxytune.study import settings_document
 from proxytune.teaching import Experiment, PlvStudy, PlvTrial, best_teacher, plv_or_worst, saves_more, why_unknown
 
 MORE_PROXIES = "raise teaching.budget, or widen [parameters], so that other proxies are tried"
@@ -54,8 +54,8 @@ def plv_answer(study: PlvStudy) -> str:
     if plv.above_zero or plv.at_most_zero:
         judged = "it saves target samples" if plv.above_zero else "it saves none"
     sentences = [
-        f"After {len(study.trials)} proxies tried, {best.name} ({describe(best.proxy)}) has the highest PLV (proxy "
-        f"learning value): {count(plv, UNKNOWN)} target samples saved; {judged}.",
+        f"After {len(study.trials)} proxies tried, {best.name} ({describe_distribution(best.proxy)}) has the highest "
+        f"PLV (proxy learning value): {count(plv, UNKNOWN)} target samples saved; {judged}.",
         f"It saves more than {listed(behind)}." if behind else "",
         f"That it saves more than {listed(alike)} is not shown." if alike else "",
     ]
@@ -71,7 +71,7 @@ def plv_next_step(study: PlvStudy) -> str:
     if best.worth.plv.at_most_zero:
         return f"train without a proxy, or {MORE_PROXIES}."
     if best.worth.plv.above_zero:
-        return f"train in {best.name}: {describe(best.proxy)}, then on target samples."
+        return f"train in {best.name}: {describe_distribution(best.proxy)}, then on target samples."
     return (
         f"{say_more_of_it(study.confirmed)}, which narrows the intervals, or teaching.budget, which tries more proxies."
     )
@@ -163,7 +163,7 @@ def plv_document(study: PlvStudy) -> dict[str, Any]:
         "narrowed_by_prpv": study.narrowed,
         "stopped": study.stopped,
         "convergence": {"level": study.when.level, "threshold": study.when.threshold},
-        "settings": dict(as_document(study.settings)),
+        "settings": dict(settings_document(study.settings)),
     }
 
 

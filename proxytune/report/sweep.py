@@ -22,7 +22,7 @@ from proxytune.report.view import Paragraphs, Part, Picture, Table, View, column
 from proxytune.report.writing import save_figure, write_text
 from proxytune.space import Theta
 from proxytune.study import StudySettings
-from proxytune.sweep import METRICS, Curve, Series, SweepPoint, describe, series_of, shape_of
+from proxytune.sweep import METRICS, Series, SweepCurve, SweepPoint, describe_shape, series_of, shape_of
 from proxytune.usefulness import MEASURES, PRPV
 
 OF_PRPV = ("prpv", "prpv_interval", "prpv_normalised", "expected_prpv")
@@ -51,7 +51,7 @@ BARS = (
 )
 
 
-def curve_name(curve: Curve) -> str:
+def curve_name(curve: SweepCurve) -> str:
     """A file name for the curve: its parameter, a mark of what is held, and whether POD is in it.
 
     The mark is left out where the others are nominal; the curve's JSON has what is held.
@@ -66,12 +66,12 @@ def held_mark(base: Theta) -> str:
     return sha256(json.dumps(values).encode()).hexdigest()[:6]
 
 
-def held_texts(curve: Curve) -> list[str]:
+def held_texts(curve: SweepCurve) -> list[str]:
     """Values that the curve's other parameters are held at, as texts; those nominal are not named."""
     return [f"{name}={value:g}" for name, value in sorted(curve.base.items()) if name != curve.parameter]
 
 
-def curve_document(curve: Curve) -> dict[str, Any]:
+def curve_document(curve: SweepCurve) -> dict[str, Any]:
     """The curve as plain JSON; None where an agent has no episode that worked."""
     assessed = [point.assessment for point in curve.points if point.assessment is not None]
     levels = score_document(assessed[0]) if assessed else {}
@@ -90,7 +90,7 @@ def curve_document(curve: Curve) -> dict[str, Any]:
     }
 
 
-def curve_csv(curve: Curve) -> str:
+def curve_csv(curve: SweepCurve) -> str:
     """The curve as CSV, one row per value and per measure three columns: score, and the ends of its interval.
 
     Cells are empty where there is no score or no interval.
@@ -107,7 +107,7 @@ def curve_csv(curve: Curve) -> str:
     return text.getvalue()
 
 
-def sweep_text(curves: Sequence[Curve], episodes: int, files: Sequence[Path], held: str) -> Group:
+def sweep_text(curves: Sequence[SweepCurve], episodes: int, files: Sequence[Path], held: str) -> Group:
     """Curves as `sweep` prints them: the paper's measures, then the others, and what each shows.
 
     Args:
@@ -127,7 +127,7 @@ def sweep_text(curves: Sequence[Curve], episodes: int, files: Sequence[Path], he
     return group_texts(*parts, "\n".join(lines), held)
 
 
-def curve_tables(curve: Curve) -> tuple[Table, Table]:
+def curve_tables(curve: SweepCurve) -> tuple[Table, Table]:
     """The scores by value: the paper's measures, with what they show, then the others; intervals are in the files."""
     series = series_of(curve)
     sides = [one for one in series if one.measure.in_paper], [one for one in series if not one.measure.in_paper]
@@ -143,13 +143,13 @@ def curve_tables(curve: Curve) -> tuple[Table, Table]:
     return Table(first, columns[0], tuple(rows[0]), lines), Table(second, columns[1], tuple(rows[1]))
 
 
-def curve_lines(curve: Curve) -> list[str]:
+def curve_lines(curve: SweepCurve) -> list[str]:
     """Say what the curve shows, a line per measure: where it is best, and whether it worsens on both sides."""
     held_at = curve.base.get(curve.parameter)
-    return [f"{curve.parameter}: {describe(series, held_at)}" for series in series_of(curve)]
+    return [f"{curve.parameter}: {describe_shape(series, held_at)}" for series in series_of(curve)]
 
 
-def say_failures(curves: Sequence[Curve]) -> list[str]:
+def say_failures(curves: Sequence[SweepCurve]) -> list[str]:
     """Say why points have no score, in one line each."""
     return [
         f"{curve.parameter} {point.value:g}: {point.evaluation.failure}"
@@ -195,7 +195,7 @@ def _cell(series: Series, row: int) -> str:
     return f"{text} ({one.interval[0]:.0f} to {one.interval[1]:.0f})"
 
 
-def sweep_view(study: str, curves: Sequence[Curve], figures: Mapping[str, bytes], held: str) -> View:
+def sweep_view(study: str, curves: Sequence[SweepCurve], figures: Mapping[str, bytes], held: str) -> View:
     """Curves: the figures of all, then of each its figure and tables.
 
     Args:
@@ -222,7 +222,7 @@ def sweep_view(study: str, curves: Sequence[Curve], figures: Mapping[str, bytes]
     return View(f"{study}: usefulness along {names}", f"{answer} {held}.", _next_step(curves), tuple(parts))
 
 
-def _lowest(curve: Curve) -> str:
+def _lowest(curve: SweepCurve) -> str:
     """Say where PRPV is lowest, and which other values these episodes leave open."""
     prpv = series_of(curve)[0]
     shape = shape_of(prpv, curve.base.get(curve.parameter))
@@ -234,14 +234,14 @@ def _lowest(curve: Curve) -> str:
     return f"{curve.parameter}: {prpv.name} is lowest ({shape.score:.3g}) at {best}, and {beyond}"
 
 
-def _next_step(curves: Sequence[Curve]) -> str:
+def _next_step(curves: Sequence[SweepCurve]) -> str:
     flat = [one.parameter for one in curves if len(shape_of(series_of(one)[0], None).near_best) == len(one.points)]
     if flat:
         return f"raise starts, or add agents whose scores change with {' or '.join(flat)}: noise hides a difference."
     return "search all parameters at once with `python -m proxytune study`."
 
 
-def figures_of_sweep(curves: Sequence[Curve], truth: Theta | None) -> dict[str, Figure]:
+def figures_of_sweep(curves: Sequence[SweepCurve], truth: Theta | None) -> dict[str, Figure]:
     """One figure per curve, and two of all curves with the same values of the others, by name."""
     figures = {curve_name(curve): panels_figure(curve, truth) for curve in curves}
     for alike in held_alike(curves):
@@ -249,7 +249,7 @@ def figures_of_sweep(curves: Sequence[Curve], truth: Theta | None) -> dict[str, 
     return figures
 
 
-def draw_curves(curves: Sequence[Curve], folder: Path, truth: Theta | None) -> list[Path]:
+def draw_curves(curves: Sequence[SweepCurve], folder: Path, truth: Theta | None) -> list[Path]:
     """Draw the figures of a sweep; return their paths."""
     figures = figures_of_sweep(curves, truth)
     for name, figure in figures.items():
@@ -257,7 +257,7 @@ def draw_curves(curves: Sequence[Curve], folder: Path, truth: Theta | None) -> l
     return [folder / f"{name}.png" for name in figures]
 
 
-def write_curves(curves: Sequence[Curve], folder: Path) -> list[Path]:
+def write_curves(curves: Sequence[SweepCurve], folder: Path) -> list[Path]:
     """Write each curve as CSV and as JSON; return the paths."""
     written = []
     for curve in curves:
@@ -268,7 +268,9 @@ def write_curves(curves: Sequence[Curve], folder: Path) -> list[Path]:
     return written
 
 
-def write_sweep_page(settings: StudySettings, curves: Sequence[Curve], folder: Path, held: str, command: str) -> Path:
+def write_sweep_page(
+    settings: StudySettings, curves: Sequence[SweepCurve], folder: Path, held: str, command: str
+) -> Path:
     """Write the page of curves that hold the same values beside their figures; return its path.
 
     Args:
@@ -286,10 +288,10 @@ def write_sweep_page(settings: StudySettings, curves: Sequence[Curve], folder: P
     return path
 
 
-def held_alike(curves: Sequence[Curve]) -> list[list[Curve]]:
+def held_alike(curves: Sequence[SweepCurve]) -> list[list[SweepCurve]]:
     """Curves by what they hold the others at."""
 
-    def base(curve: Curve) -> list[tuple[str, float]]:
+    def base(curve: SweepCurve) -> list[tuple[str, float]]:
         return sorted(curve.base.items())
 
     return [list(members) for _, members in groupby(sorted(curves, key=base), key=base)]
@@ -301,14 +303,14 @@ def held_values(base: Theta, whose: str = "") -> str:
     return f"the others are held at {whose}{values}" if values else "the others are nominal"
 
 
-def _figures_together(alike: Sequence[Curve], truth: Theta | None) -> dict[str, Figure]:
+def _figures_together(alike: Sequence[SweepCurve], truth: Theta | None) -> dict[str, Figure]:
     """The figures of several parameters, by name."""
     last = list({curve.parameter: curve for curve in alike}.values())
     names = _names_together(alike)
     return dict(zip(names, (sweep_figure(last, truth), bars_figure(last)), strict=True)) if names else {}
 
 
-def _names_together(alike: Sequence[Curve]) -> list[str]:
+def _names_together(alike: Sequence[SweepCurve]) -> list[str]:
     """Names of the figures of several parameters; none where there is one parameter."""
     if len({curve.parameter for curve in alike}) < 2:
         return []

@@ -25,7 +25,7 @@ from proxytune.report.figure_style import (
 )
 from proxytune.report.wording import short, with_unit
 from proxytune.space import Theta
-from proxytune.sweep import Curve, Series, SweepPoint, series_of
+from proxytune.sweep import Series, SweepCurve, SweepPoint, series_of
 from proxytune.usefulness import POD_IMAGE, POD_POSE, PPV, PRPV, SRCC, Assessment, Measure
 
 COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE)
@@ -35,7 +35,7 @@ HEIGHT, BELOW = 1.2, 0.4
 """Heights of a row of panels, and of all below them [inch]."""
 
 
-def sweep_figure(curves: Sequence[Curve], truth: Theta | None = None) -> Figure:
+def sweep_figure(curves: Sequence[SweepCurve], truth: Theta | None = None) -> Figure:
     """Draw PRPV beside PPV, one row per parameter, bootstrap intervals as bands; lower is better in both.
 
     A dashed green line with its band is the noise floor, or the target's halves where there is no better, a dotted one
@@ -59,7 +59,7 @@ def sweep_figure(curves: Sequence[Curve], truth: Theta | None = None) -> Figure:
     return figure
 
 
-def panels_figure(curve: Curve, truth: Theta | None = None) -> Figure:
+def panels_figure(curve: SweepCurve, truth: Theta | None = None) -> Figure:
     """Draw PRPV, PPV, SRCC and, where it was asked for, POD along one parameter, as the paper's figure does.
 
     Bands are 95 % bootstrap intervals; the dashed vertical line is where the parameter is held when others are swept,
@@ -101,7 +101,7 @@ CHARACTERS = 50
 """That fit across the figure."""
 
 
-def bars_figure(curves: Sequence[Curve]) -> Figure:
+def bars_figure(curves: Sequence[SweepCurve]) -> Figure:
     """Draw PRPV at three values of each parameter, its bootstrap interval, and the noise floor by its kind.
 
     The values are where the parameter is held, and the grid points nearest to a third of its range below and above;
@@ -130,7 +130,7 @@ def bars_figure(curves: Sequence[Curve]) -> Figure:
     return figure
 
 
-def bar_points(curve: Curve) -> tuple[list[int], int]:
+def bar_points(curve: SweepCurve) -> tuple[list[int], int]:
     """Points of a curve that stand for low, held and high, fewer where the held value is at an end; and the held one.
 
     The held value is the middle of the range where none was given.
@@ -213,7 +213,7 @@ def draw_levels(axes: Axes, found: Sequence[Assessment]) -> None:
     axes.axhline(chance, color="0.45", linewidth=1.0, linestyle=":", label="chance")
 
 
-def mark_values(axes: Axes, curve: Curve, truth: Theta | None) -> None:
+def mark_values(axes: Axes, curve: SweepCurve, truth: Theta | None) -> None:
     """A line where the parameter is held when others are swept, a triangle at the top at the target's own value."""
     if curve.parameter in curve.base:
         axes.axvline(curve.base[curve.parameter], color="0.35", linewidth=0.9, linestyle=(0, (5, 2)), label=HELD)
@@ -236,6 +236,6 @@ def axis_of(measure: Measure) -> str:
     return with_unit(measure.name, measure.unit)
 
 
-def label_of(curve: Curve) -> str:
+def label_of(curve: SweepCurve) -> str:
     """Name of a curve's parameter on an axis."""
     return curve.label.replace("_", " ")

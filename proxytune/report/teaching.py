@@ -12,19 +12,19 @@ from matplotlib.figure import Figure
 from rich.console import Group
 
 from proxytune.arrays import Floats
-from proxytune.learning import LEVELS, NONE, Costs, Curve, Distribution, Estimate, places
+from proxytune.learning import LEVELS, NONE, Costs, Distribution, LearningCurve, LearningEstimate, doublings
 from proxytune.report.figure_style import BLUE, COLUMN, GREY, dress, legend_below
 from proxytune.report.html import write_page
 from proxytune.report.text import file_texts, group_texts, table_text
 from proxytune.report.view import Foot, Paragraphs, Part, Picture, Table, View, columns_of
 from proxytune.report.wording import fixed, listed, short, span
 from proxytune.report.writing import save_figure
-from proxytune.study import as_document
+from proxytune.study import settings_document
 from proxytune.teaching import (
-    Agreement,
     Experiment,
     Observations,
     Predictivity,
+    RankAgreement,
     TeacherResult,
     observe,
     teaching_settings,
@@ -158,13 +158,13 @@ def _convergence_notes(experiment: Experiment) -> list[str]:
     return notes
 
 
-def count(figure: Estimate, missing: str = NOT_REACHED) -> str:
+def count(figure: LearningEstimate, missing: str = NOT_REACHED) -> str:
     """A number of samples with its interval; without a number, why it is missing."""
     # Large numbers to the ten: no more is known of them.
     return _with_ends(figure, missing, lambda value: fixed(value, 0 if abs(value) < 100.0 else -1))
 
 
-def _with_ends(figure: Estimate, missing: str, write: Callable[[float], str]) -> str:
+def _with_ends(figure: LearningEstimate, missing: str, write: Callable[[float], str]) -> str:
     """A figure with its interval; an end that the grid does not tell is left open."""
     value = missing if figure.value is None else write(figure.value)
     if figure.low is None:
@@ -173,7 +173,7 @@ def _with_ends(figure: Estimate, missing: str, write: Callable[[float], str]) ->
     return f"{value} ({low} or more)" if figure.high is None else f"{value} ({low} to {write(figure.high)})"
 
 
-def one_decimal(figure: Estimate) -> str:
+def one_decimal(figure: LearningEstimate) -> str:
     """A score, empty where there is none."""
     return "" if figure.value is None else fixed(figure.value, 1)
 
@@ -187,7 +187,7 @@ def observation_lines(found: Observations | None, experiment: Experiment) -> tup
     return (*first, f"{SECOND}: {_second(found)}.")
 
 
-def _first(found: Agreement, starts: Mapping[str, str]) -> str:
+def _first(found: RankAgreement, starts: Mapping[str, str]) -> str:
     pairs = [
         f"{ahead} saves more than {behind} though it starts lower ({starts[ahead]} for {starts[behind]})"
         for ahead, behind in found.reversed
@@ -204,7 +204,7 @@ def _second(found: Observations) -> str:
     return shown if found.prpv is None else f"{shown}; {_tau(found.prpv, 'PRPV')}"
 
 
-def _tau(found: Agreement, figure: str) -> str:
+def _tau(found: RankAgreement, figure: str) -> str:
     """Kendall's τ with its interval, and what it says."""
     interval = f"{fixed(found.low, 2)} to {fixed(found.high, 2)}"
     if found.low > 0.0:
@@ -279,11 +279,11 @@ def teach_document(experiment: Experiment, prpv: Predictivities) -> dict[str, An
             "prpv": _agreement_document(found.prpv if found else None),
         },
         "saves_though_it_predicts_by_chance": list(found.poor_predictors) if found else [],
-        "settings": {**as_document(experiment.settings), "teaching": _settings_document(experiment)},
+        "settings": {**settings_document(experiment.settings), "teaching": _settings_document(experiment)},
     }
 
 
-def _agreement_document(found: Agreement | None) -> dict[str, Any] | None:
+def _agreement_document(found: RankAgreement | None) -> dict[str, Any] | None:
     """Agreement of a ranking with that by PLV."""
     if found is None:
         return None
@@ -312,12 +312,12 @@ def distribution_document(proxy: Distribution) -> dict[str, Any]:
     return {name: low if low == high else [low, high] for name, (low, high) in proxy.bounds.items()}
 
 
-def estimate_document(figure: Estimate | None) -> dict[str, Any] | None:
+def estimate_document(figure: LearningEstimate | None) -> dict[str, Any] | None:
     """A figure with its interval; None where it was not to be had."""
     return None if figure is None else {"value": figure.value, "interval": [figure.low, figure.high]}
 
 
-def _curve_document(curve: Curve) -> dict[str, Any]:
+def _curve_document(curve: LearningCurve) -> dict[str, Any]:
     scores = [[None if score != score else score for score in row] for row in curve.scores.tolist()]
     return {"target_samples": list(curve.counts), "scores": scores, "examinations": len(curve.examined)}
 
@@ -389,7 +389,7 @@ def _draw_panel(axes: Axes, experiment: Experiment, lesson: TeacherResult) -> No
 
 def _places(experiment: Experiment, counts: Floats) -> Floats:
     """Places of counts on the axis: as doublings, none at 0."""
-    return places(counts, experiment.needs.draws.first)
+    return doublings(counts, experiment.needs.draws.first)
 
 
 def _draw_curve(axes: Axes, experiment: Experiment, name: str, look: _Look) -> None:
@@ -403,7 +403,7 @@ def _draw_curve(axes: Axes, experiment: Experiment, name: str, look: _Look) -> N
     axes.plot(places_, curve.scores[tuple(examined.T)], look.mark, color=look.colour, markersize=2, alpha=0.35)
 
 
-def _draw_bar(axes: Axes, experiment: Experiment, needed: Estimate, look: _Look, height: float) -> None:
+def _draw_bar(axes: Axes, experiment: Experiment, needed: LearningEstimate, look: _Look, height: float) -> None:
     """The interval of the samples needed, a little off the line of convergence so that two bars stay apart."""
     if needed.low is None:
         return

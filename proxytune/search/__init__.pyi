@@ -10,12 +10,12 @@ from .knowledge import (
     Information as Information,
     Knowledge as Knowledge,
     importances as importances,
-    learn as learn,
+    learn_theta as learn_theta,
 )
 from .loop import (
+    BatchPoints as BatchPoints,
     Compose as Compose,
     Goal as Goal,
-    Propose as Propose,
     Proposer as Proposer,
     Search as Search,
     Trial as Trial,
@@ -34,13 +34,13 @@ from .optuna_bridge import (
 from .outcomes import expected_gain as expected_gain
 from .registry import (
     DEFAULT_ENGINE as DEFAULT_ENGINE,
+    ENGINE_NAMES as ENGINE_NAMES,
     ENGINES as ENGINES,
-    NAMES as NAMES,
     SCORE_ENGINE as SCORE_ENGINE,
     code_of as code_of,
     engine_code as engine_code,
     engine_of as engine_of,
-    installed as installed,
+    is_installed as is_installed,
     make_proposer as make_proposer,
     why_not as why_not,
     why_not_engine as why_not_engine,

@@ -1,10 +1,9 @@
-"""What an engine says of itself: nothing else in the package knows one engine from another.
+"""Engines: what each says of itself (`Engine`), the design that all share, and the two that learn nothing.
 
-Points that fill the search box evenly: scrambled Sobol sequences.
-The quasi-random design that all engines share, and what comes after it.
-A proposer that is not ours: what it does wrong is told in one line, before a trial is wasted on it.
-Points drawn evenly and independently: what every search has to beat.
-The quasi-random design gone on with: it fills the box evenly and learns nothing.
+Nothing else in the package knows one engine from another. The first trials are a quasi-random design, a scrambled Sobol
+sequence that fills the box evenly (`design_point`); after it comes the engine's own proposer (`AfterDesign`). What a
+proposer that is not ours does wrong is told in one line, before a trial is wasted on it (`CheckedProposer`). The engine
+`random` draws points evenly and independently, which every search has to beat; `sobol` goes on with the design.
 """
 
 import math
@@ -38,7 +37,7 @@ class Library(NamedTuple):
 
 
 class Look(NamedTuple):
-    """How an engine is drawn where several are compared.
+    """The line by which an engine is drawn where several are compared.
 
     Attributes:
         colour: A colour as Matplotlib has it.
@@ -131,7 +130,7 @@ class AfterDesign:
 
 
 @dataclass(frozen=True)
-class Outside:
+class CheckedProposer:
     """A proposer whose points are checked.
 
     Attributes:
@@ -170,7 +169,7 @@ def outside_proposer(engine: Engine, goal: Goal | None) -> Proposer:
         line = f"engine '{engine.name}' cannot be made: {describe(problem)}; it is made of a Goal"
         raise ExtensionError(f"{line} if it learns from outputs, of nothing if from scores") from problem
     require(made, ("propose",), name=engine.name, kind="engine")
-    return Outside(engine.name, made)
+    return CheckedProposer(engine.name, made)
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,8 @@
-"""What a search has learnt of θ from every output of its trials: the answer, the region, and whether the model fits.
+"""Knowledge of θ, learnt from every output of a search's trials: the answer, its region, and whether the model fits.
 
-Which agents tell what of θ, and what stands between them and a sharper answer.
-How much each parameter matters to the score over the whole search box, as the surrogate has it.
+`Knowledge` puts together the likelihood of the target's outputs (likelihood.py), the posterior of θ and the misfit
+(posterior.py). `information_of` says which agents tell what of a parameter, and what stands between them and a sharper
+answer; `importances` how much each parameter matters to the score over the whole search box, as the surrogate has it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -29,7 +30,7 @@ Limit = Literal["trials", "starts"]
 
 @dataclass(frozen=True)
 class Information:
-    """What the outputs tell of one parameter where θ is most probable.
+    """Information of the outputs on one parameter where θ is most probable.
 
     Attributes:
         name: The parameter.
@@ -46,7 +47,7 @@ class Information:
 
 
 def information_of(likelihood: Likelihood, point: Floats) -> tuple[Information, ...]:
-    """What each output tells of each parameter at a point of the unit cube: squared slope over variance.
+    """Information of each output on each parameter at a point of the unit cube: squared slope over variance.
 
     That is Fisher's information of a normal output; what outputs tell together is not counted twice by taking shares.
     """
@@ -65,7 +66,7 @@ def information_of(likelihood: Likelihood, point: Floats) -> tuple[Information, 
 
 
 def _slopes(likelihood: Likelihood, point: Floats) -> Floats:
-    """How each output changes with each parameter, per width of the box, shape (parameters, outputs)."""
+    """The derivative of each output by each parameter, per width of the box, shape (parameters, outputs)."""
     steps = STEP * np.eye(len(point))
     ends = np.clip(np.concatenate([point + steps, point - steps]), 0.0, 1.0)
     mean, _ = likelihood.model.predict(ends)
@@ -90,7 +91,7 @@ UPPER = 97.5
 
 @dataclass(frozen=True, eq=False)
 class Knowledge:
-    """What finished trials say of θ; everything is a function of them, the goal and the seed.
+    """All that finished trials say of θ; everything is a function of them, the goal and the seed.
 
     Attributes:
         model: Of every output.
@@ -111,12 +112,12 @@ class Knowledge:
 
     @cached_property
     def likelihood(self) -> Likelihood:
-        """How well any θ explains the target's outputs."""
+        """The likelihood by which any θ explains the target's outputs."""
         return Likelihood(self.model, self.goal)
 
     @cached_property
     def left_out(self) -> LeftOut:
-        """What the trials say of each other."""
+        """The trials as predicted by each other."""
         return leave_out(self.model, self.trials, self.goal, self.seed)
 
     def log(self, points: Floats) -> Floats:
@@ -150,7 +151,7 @@ class Knowledge:
         return tuple((names[i], names[j], value) for i, j, value in self.posterior.trades)
 
     def holds(self, values: Values) -> bool:
-        """Whether a θ of the box is in the 95 % region."""
+        """Tell whether a θ of the box is in the 95 % region."""
         return bool(self.log(to_unit(self.space, values)[None])[0] >= self.posterior.threshold)
 
     def scores(self, points: Sequence[Values]) -> tuple[Floats, Floats]:
@@ -203,16 +204,16 @@ class Knowledge:
 
     @cached_property
     def misfit(self) -> Misfit:
-        """Whether any θ explains the target."""
+        """The test of whether any θ explains the target."""
         return misfit_of(self.likelihood, self.posterior, self.left_out)
 
     @cached_property
     def information(self) -> tuple[Information, ...]:
-        """Which agents and metrics tell what of each parameter, in the order of the box."""
+        """Information of agents and metrics on each parameter, in the order of the box."""
         return information_of(self.likelihood, self.posterior.mode)
 
 
-def learn(space: Space, trials: Sequence[Trial], goal: Goal, seed: int = 0) -> Knowledge:
+def learn_theta(space: Space, trials: Sequence[Trial], goal: Goal, seed: int = 0) -> Knowledge:
     """Learn what finished trials say of θ; same trials in any order, same knowledge.
 
     Raises:

@@ -1,16 +1,20 @@
-"""How well a θ explains the target's outputs: a tempered Student likelihood over the search box.
+"""The likelihood of θ: how well it explains the target's outputs, given Gaussian processes of every output.
+
+An output is an agent's mean of a metric. PRPV is a count and jumps; the metrics that it compares change smoothly with
+θ. Each output has a Gaussian process of its own, all with one kernel (Matérn 5/2, a length scale per parameter, one
+share of noise for what no smooth function follows), fitted to the trials that have every output. How far an output's
+predictions are off when trials are left out one at a time scales its variance, so an output that the kernel does not
+suit is trusted less.
+
+With y_k the target's outputs, m_k(θ) and v_k(θ) the predicted mean and variance (roughness and placement noise
+included), z_k = (y_k − m_k) / √v_k, and Student's distribution of ν = 4 degrees of freedom,
+
+    log L(θ) = −(1/κ) Σ_k [ (ν + 1)/2 · log(1 + z_k²/ν) + ½ log v_k ]
 
 Outputs of one trial go up and down together (an agent that crashes early drives less far), and so do their errors.
 Taken for independent they would promise far too much: on simulated targets whose θ was known, a 95 % region then held
-it in 3 to 6 of 12 cases. The log likelihood is therefore divided by κ, which follows from how errors of
-left-out trials correlate: with p outputs that are all one, κ is p.
-
-Gaussian processes of what a score is computed from: every agent's mean metrics, over the search box.
-
-PRPV is a count and jumps; the metrics that it compares change smoothly with θ. Each output has a Gaussian process of
-its own, all with one kernel (Matérn 5/2, a length scale per parameter, one share of noise for what no smooth function
-follows), fitted to the trials that have every output. How far an output's predictions are off when trials are left out
-one at a time scales its variance, so an output that the kernel does not suit is trusted less.
+it in 3 to 6 of 12 cases. The log likelihood is therefore tempered by κ, which follows from how errors of left-out
+trials correlate: with p outputs that are all one, κ is p.
 """
 
 import warnings
@@ -75,7 +79,7 @@ class OutputGroup:
 
     @cached_property
     def inflation(self) -> Floats:
-        """What the kernel's variance of each output is to be multiplied by."""
+        """The factor by which the kernel's variance of each output is to be multiplied."""
         return np.asarray((PRIOR_TRIALS + (self.left_out**2).sum(axis=0)) / (PRIOR_TRIALS + len(self.visited)))
 
 
@@ -99,7 +103,7 @@ class OutputModel:
 
     @property
     def outputs(self) -> int:
-        """How many outputs there are; those in no group do not change, or are known too seldom."""
+        """The number of outputs; those in no group do not change, or are known too seldom."""
         return len(self.constant)
 
     @property
@@ -109,7 +113,7 @@ class OutputModel:
 
     @cached_property
     def modelled(self) -> Rows:
-        """Which outputs are modelled, in rising order."""
+        """The outputs that are modelled, in rising order."""
         return np.sort(np.concatenate([np.empty(0, dtype=np.intp), *(group.columns for group in self.groups)]))
 
     def predict(self, points: Floats) -> tuple[Floats, Floats]:
@@ -257,11 +261,11 @@ class Likelihood:
 
     @cached_property
     def kappa(self) -> float:
-        """What the log likelihood is divided by, at least 1."""
+        """The divisor of the log likelihood, at least 1."""
         return temper(self.model.left_out[:, self.columns])
 
     def standardised(self, points: Floats) -> tuple[Floats, Floats]:
-        """How far the target is from what is predicted at points (n, parameters), and the variance of that.
+        """The distance of the target from what is predicted at points (n, parameters), and the variance of that.
 
         Returns:
             Two arrays (n, columns): the distance in standard deviations, and the variance in the outputs' units.

@@ -1,10 +1,9 @@
 """The one search loop: propose a batch, have it evaluated, go on until something says stop.
 
-What proposes the next θ: a pure function of the space, the finished trials, the seed and the size of a batch.
-
-Which trials are proposed together follows from their numbers alone, and so does what a batch is proposed from: the
-trials before it. Neither the budget nor the moment at which a search was stopped has a say in it.
-What a search is after: the outputs that the target has, how well they are known, and the score composed of them.
+A `Proposer` chooses the next θ as a pure function of the box, the finished trials and the seed; an `Evaluator` scores
+it and remembers; `Search.run` is the loop. Which trials are proposed together follows from their numbers alone, and so
+does what a batch is proposed from: the trials before it (`batch_at`). Neither the budget nor the moment at which a
+search was stopped has a say in it. A `Goal` is the target as an engine sees it that learns from every output.
 """
 
 from collections.abc import Callable, Sequence
@@ -52,7 +51,7 @@ class Proposer(Protocol):
 
 
 def batch_at(index: int, size: int, initial: int) -> range:
-    """Which trials, counted from 0, are proposed together with this one.
+    """The trials, counted from 0, that are proposed together with this one.
 
     The design makes batches of its own, the last of which may be short; those of the engine begin after it.
 
@@ -90,29 +89,29 @@ def with_failures_as_worst(trials: Sequence[Trial]) -> list[Trial]:
     return [trial if keep else replace(trial, score=score, outcome=outcome) for trial, keep in pairs]
 
 
-Propose = Callable[[], tuple[Values, ...]]
+BatchPoints = Callable[[], tuple[Values, ...]]
 """The points of a batch, worked out when asked for: an evaluator that has them already need not ask."""
 
 
 class Evaluator(Protocol):
-    """What a search is made on: it scores points, and remembers what was scored."""
+    """The evaluator of a search: it scores points, and remembers what was scored."""
 
     def trials(self) -> Sequence[Trial]:
         """The finished trials, in order."""
         ...
 
     def ended(self) -> str:
-        """Why the search goes no further, in one phrase; empty while it does."""
+        """The reason why the search goes no further, in one phrase; empty while it does."""
         ...
 
-    def evaluate(self, batch: range, propose: Propose) -> None:
+    def evaluate(self, batch: range, propose: BatchPoints) -> None:
         """Score what is left of a batch of trials, counted from 0; `propose` gives the points of all of it."""
         ...
 
 
 @dataclass(frozen=True)
 class Search:
-    """What proposals are a function of, apart from the finished trials.
+    """All that proposals are a function of, apart from the finished trials.
 
     Attributes:
         space: The box.
@@ -140,10 +139,8 @@ class Search:
             finished = evaluator.trials()
             batch = batch_at(len(finished), self.batch, self.initial)
             batch = range(batch.start, min(batch.stop, self.budget))
-            evaluator.evaluate(batch, partial(self._propose, finished[: batch.start], len(batch)))
-
-    def _propose(self, before: Sequence[Trial], count: int) -> tuple[Values, ...]:
-        return propose_batch(self.proposer, self.space, before, self.seed, count)
+            before, count = finished[: batch.start], len(batch)
+            evaluator.evaluate(batch, partial(propose_batch, self.proposer, self.space, before, self.seed, count))
 
 
 @dataclass(frozen=True, eq=False)

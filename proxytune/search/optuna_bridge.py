@@ -1,6 +1,7 @@
-"""The trials of a search as other optimisers keep them: an Optuna storage, scikit-optimize's OptimizeResult.
+"""The bridge to other optimisers: Optuna's tree-structured Parzen estimator as an engine, and trials as they keep them.
 
-Optuna's tree-structured Parzen estimator, where Optuna is installed.
+The engine `tpe` is there where Optuna is installed. A `History` is written as an Optuna storage (`write_optuna`) or as
+scikit-optimize's OptimizeResult (`write_skopt`).
 """
 
 import warnings
@@ -38,7 +39,7 @@ class TreeParzen:
 
 
 def suggested(optuna: Any, sampler: Any, space: Space, trials: Sequence[Trial]) -> Values:
-    """What a sampler of Optuna suggests after these trials; pending ones are running to it."""
+    """The suggestion of a sampler of Optuna after these trials; pending ones are running to it."""
     box = {i.name: optuna.distributions.FloatDistribution(i.low, i.high) for i in space.intervals}
     study = optuna.create_study(sampler=sampler, direction="minimize")
     for trial in trials:
@@ -93,7 +94,7 @@ class PastTrial:
 
 @dataclass(frozen=True)
 class History:
-    """What a search has tried.
+    """The trials of a search.
 
     Attributes:
         name: What the search is called.

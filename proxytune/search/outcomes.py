@@ -1,10 +1,9 @@
-"""Bayesian optimisation of a composite score: expected improvement of PRPV composed of modelled outputs.
+"""The engines that learn from every output of a trial, not from PRPV alone: `composite` and `outcomes`.
 
-The engine `outcomes`: it learns from every output of a trial, not from PRPV alone.
-
-In turn it draws θ from what is known of it, and looks where the score composed of the outputs is expected to improve
-most. Draws find the θ that made the target and escape what a greedy search sticks to; expected improvement keeps PRPV
-the goal where the proxy cannot be like the target whatever θ is.
+`composite` is Bayesian optimisation of a composite score: the θ whose PRPV, composed of modelled outputs, is expected
+to improve most. `outcomes` does that in turn with drawing θ from what is known of it. Draws find the θ that made the
+target and escape what a greedy search sticks to; expected improvement keeps PRPV the goal where the proxy cannot be
+like the target whatever θ is.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,7 +17,7 @@ from proxytune.search.engine import Engine, Look, from_unit
 from proxytune.search.likelihood import Likelihood, OutputModel, fit_outputs
 from proxytune.search.loop import Goal, Trial, Values
 from proxytune.search.posterior import posterior_of
-from proxytune.search.surrogate import highest, unit_array
+from proxytune.search.surrogate import maximise_gain, unit_array
 from proxytune.seeds import proposal_seed
 from proxytune.space import Space
 
@@ -57,12 +56,12 @@ def most_improving(space: Space, trials: Sequence[Trial], goal: Goal, seed: int)
         RunError: If no trial has an outcome.
     """
     with threadpool_limits(limits=1):
-        model = _believed(fit_outputs(space, trials), trials)
+        model = _with_pending(fit_outputs(space, trials), trials)
         return from_unit(space, _most_improving(model, trials, goal, seed)[0])
 
 
-def _believed(model: OutputModel, trials: Sequence[Trial]) -> OutputModel:
-    """The model as if every pending trial had come out as expected, so that it is worth no second look."""
+def _with_pending(model: OutputModel, trials: Sequence[Trial]) -> OutputModel:
+    """The model as a kriging believer has it: pending trials take their posterior mean, and need no second look."""
     pending = [trial for trial in trials if trial.pending]
     if not pending or not model.groups:
         return model
@@ -89,7 +88,7 @@ def _most_improving(model: OutputModel, trials: Sequence[Trial], goal: Goal, see
     scores = composed_scores(model, goal, seed)
     incumbent = float(scores(model.visited).mean(axis=0).min())
     taken = unit_array(model.space, [trial.values for trial in trials])
-    return highest(lambda points: np.maximum(0.0, incumbent - scores(points)).mean(axis=0), taken, seed)
+    return maximise_gain(lambda points: np.maximum(0.0, incumbent - scores(points)).mean(axis=0), taken, seed)
 
 
 def composed_scores(model: OutputModel, goal: Goal, seed: int) -> Callable[[Floats], Floats]:

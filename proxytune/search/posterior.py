@@ -1,11 +1,10 @@
-"""What is known of θ: the posterior over the search box, and the 95 % region that is compatible with the target.
+"""The posterior of θ over the search box, its 95 % credible region, and a test whether any θ explains the target.
 
-Every trial left out in turn and taken for a target: what a search would say of it, where the truth is known.
-
-The trials are from the proxy itself, so each of them, given the noise of a target, is a target that the proxy can
-make. How far it is from what the others predict at its most probable θ says how far a target may be; how often the
-region that the others give holds its θ says how wide a region has to be. Nothing is assumed of how outputs correlate.
-Can the proxy be like the target at all? How far the target is from the model, against trials left out.
+Both are calibrated by leaving each trial out in turn and taking it for a target (`leave_out`): what a search would say
+of it, where the truth is known. The trials are from the proxy itself, so each of them, given the noise of a target, is
+a target that the proxy can make. How often the region that the others give holds its θ says how wide a region has to
+be. How far it is from what the others predict at its most probable θ says how far a target may be (`misfit_of`).
+Nothing is assumed of how outputs correlate.
 """
 
 from collections.abc import Callable, Sequence
@@ -64,7 +63,7 @@ class Posterior:
 
     @cached_property
     def inside(self) -> Floats:
-        """Which points are in the region, as truth values."""
+        """The points that are in the region, as truth values."""
         return np.asarray(self.density >= self.threshold)
 
     @property
@@ -86,11 +85,17 @@ class Posterior:
     def intervals(self) -> Floats:
         """The central 95 % of every parameter, shape (parameters, 2)."""
         tails = ((1.0 - CREDIBLE_LEVEL) / 2.0, (1.0 + CREDIBLE_LEVEL) / 2.0)
-        return np.array([_quantiles(column, self.weights, tails) for column in self.points.T])
+
+        def quantiles(values: Floats) -> list[float]:
+            order = np.argsort(values, kind="stable")
+            reached = np.searchsorted(np.cumsum(self.weights[order]), tails)
+            return [float(values[order[min(row, len(values) - 1)]]) for row in reached]
+
+        return np.array([quantiles(column) for column in self.points.T])
 
     @cached_property
     def unidentified(self) -> Floats:
-        """Which parameters are not identified, as truth values."""
+        """The parameters that are not identified, as truth values."""
         return np.asarray(np.diff(self.intervals, axis=1)[:, 0] > UNIDENTIFIED)
 
     @property
@@ -139,12 +144,6 @@ def _what_counts(points: Floats, density: Floats, width: Floats) -> tuple[Floats
     return near.min(axis=0) - reach, near.max(axis=0) + reach
 
 
-def _quantiles(values: Floats, weights: Floats, shares: tuple[float, float]) -> list[float]:
-    order = np.argsort(values, kind="stable")
-    reached = np.searchsorted(np.cumsum(weights[order]), shares)
-    return [float(values[order[min(row, len(values) - 1)]]) for row in reached]
-
-
 MOST = 24
 """So many trials at most are left out, spread evenly over the box."""
 FEWEST = 6
@@ -162,7 +161,7 @@ Of 46 searches of five engines for nine truths, regions held the truth in 40 wit
 
 @dataclass(frozen=True, eq=False)
 class LeftOut:
-    """What trials that were left out say.
+    """Trials that were left out, each as a target whose θ is known.
 
     Attributes:
         deviances: Mean deviance of each one's outputs at its most probable θ, shape (trials,).
@@ -174,12 +173,12 @@ class LeftOut:
 
     @property
     def enough(self) -> bool:
-        """Whether there are enough of them to say anything."""
+        """True if there are enough of them to say anything."""
         return len(self.deviances) >= FEWEST
 
     @property
     def widening(self) -> float:
-        """By what to divide the log density besides, so that 95 % regions hold as many targets as they should."""
+        """The further divisor of the log density, so that 95 % regions hold as many targets as they should."""
         if not self.enough:
             return MARGIN
         held = (self.above <= CREDIBLE_LEVEL).mean(axis=0)
@@ -201,7 +200,7 @@ def leave_out(model: OutputModel, trials: Sequence[Trial], goal: Goal, seed: int
     normal = np.random.default_rng(seed).standard_normal((len(known), len(goal.values)))
     places = np.unique(np.linspace(0, max(0, len(whole) - 1), MOST).round().astype(int)).tolist()
     rows = [whole[place] for place in places] if len(whole) >= FEWEST else []
-    found = [_one(model, known, goal, row, normal[row]) for row in rows]
+    found = [_left_out(model, known, goal, row, normal[row]) for row in rows]
     told = [one for one in found if one is not None]
     return LeftOut(np.array([one[0] for one in told]), np.array([one[1] for one in told]).reshape(-1, len(WIDENINGS)))
 
@@ -212,7 +211,7 @@ def least_deviance(likelihood: Likelihood, posterior: Posterior) -> float:
     return float(deviance(distance).mean())
 
 
-def _one(
+def _left_out(
     model: OutputModel, known: Sequence[Trial], goal: Goal, row: int, normal: Floats
 ) -> tuple[float, list[float]] | None:
     others = fit_outputs(model.space, [*known[:row], *known[row + 1 :]], model.kernel)
@@ -222,12 +221,11 @@ def _one(
         return None
     posterior = posterior_of(likelihood.log, len(model.space.intervals), DEVIANCE_POINTS)
     own = float(likelihood.log(to_unit(model.space, known[row].values)[None])[0])
-    return least_deviance(likelihood, posterior), [_above(posterior, own, widening) for widening in WIDENINGS]
-
-
-def _above(posterior: Posterior, own: float, widening: float) -> float:
-    weights = np.exp((posterior.density - posterior.density.max()) / widening)
-    return float(weights[posterior.density > own].sum() / weights.sum())
+    above = []
+    for widening in WIDENINGS:
+        weights = np.exp((posterior.density - posterior.density.max()) / widening)
+        above.append(float(weights[posterior.density > own].sum() / weights.sum()))
+    return least_deviance(likelihood, posterior), above
 
 
 SIGNIFICANCE = 0.05
@@ -237,7 +235,7 @@ LEAST = 1e-12
 
 @dataclass(frozen=True)
 class Misfit:
-    """Whether some θ explains the target's outputs.
+    """The test of whether some θ explains the target's outputs.
 
     Attributes:
         deviance: Mean deviance of the target's outputs at its best θ; None where no output tells of θ.
@@ -251,7 +249,7 @@ class Misfit:
 
     @property
     def fits(self) -> bool | None:
-        """Whether the proxy may have made the target; None where that cannot be told."""
+        """True if the proxy may have made the target; None where that cannot be told."""
         return None if self.p_value is None else self.p_value >= SIGNIFICANCE
 
 

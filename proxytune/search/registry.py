@@ -1,6 +1,7 @@
-"""The engines by name.
+"""The engines by name, and a digest of the code that the proposals of each depend on.
 
-Which code something depends on: with code of another meaning, a finished run may not be what would be run today.
+With code of another digest the next trials of a study may not be those that it would have had: that is told, unless
+proxytune/lineage.py states that the code proposes the same.
 """
 
 import ast
@@ -14,6 +15,7 @@ from pathlib import Path
 from proxytune.errors import ExtensionError, InputError
 from proxytune.extensions import load, plugins
 from proxytune.identity import meaning_of
+from proxytune.lineage import named
 from proxytune.search.engine import RANDOM, SOBOL, AfterDesign, Engine, outside_proposer
 from proxytune.search.loop import Goal, Proposer
 from proxytune.search.optuna_bridge import TREE_PARZEN
@@ -61,7 +63,7 @@ ENGINES: tuple[Engine, ...] = (
 )
 """A new engine is a module of its own and a line here; each says all about itself (engine.py)."""
 
-NAMES = tuple(engine.name for engine in ENGINES)
+ENGINE_NAMES = tuple(engine.name for engine in ENGINES)
 """What a study may name."""
 DEFAULT_ENGINE = OUTCOMES.name
 SCORE_ENGINE = GAUSSIAN_PROCESS.name
@@ -80,7 +82,9 @@ def engine_of(name: str, beside: Path | None = None) -> Engine:
     """
     shipped = {engine.name: engine for engine in ENGINES}
     if name not in shipped and ":" not in name and name not in plugins("engine", shipped):
-        raise InputError(f"unknown engine '{name}' (your own is written module:attribute); {nearest(name, NAMES)}")
+        raise InputError(
+            f"unknown engine '{name}' (your own is written module:attribute); {nearest(name, ENGINE_NAMES)}"
+        )
     engine = load(name, kind="engine", beside=beside, shipped=shipped)
     if not isinstance(engine, Engine):
         kind = type(engine).__name__
@@ -104,7 +108,7 @@ def why_not(name: str, *, composed: bool, beside: Path | None = None) -> str:
 
 def why_not_engine(engine: Engine, *, composed: bool) -> str:
     """The same of an engine at hand."""
-    if engine.needs and not installed(engine):
+    if engine.needs and not is_installed(engine):
         modules, library, extra = engine.needs
         verb = "are" if len(modules) > 1 else "is"
         remedy = f"pip install 'proxytune[{extra}]', or use another engine"
@@ -115,7 +119,7 @@ def why_not_engine(engine: Engine, *, composed: bool) -> str:
     return ""
 
 
-def installed(engine: Engine) -> bool:
+def is_installed(engine: Engine) -> bool:
     """Whether the library that an engine needs is there."""
     return engine.needs is None or all(find_spec(module) for module in engine.needs.modules)
 
@@ -135,7 +139,7 @@ def make_proposer(engine: str | Engine, initial: int, goal: Goal | None = None) 
     reason = why_not_engine(engine, composed=goal is not None)
     if reason:
         raise InputError(reason)
-    if engine.name not in NAMES:
+    if engine.name not in ENGINE_NAMES:
         return AfterDesign(outside_proposer(engine, goal), initial)
     return AfterDesign(engine.make(goal) if engine.learns_from == "outputs" else engine.make(), initial)
 
@@ -144,7 +148,7 @@ def engine_code(engine: str | Engine) -> str:
     """A digest of the code that an engine's proposals depend on."""
     engine = engine_of(engine) if isinstance(engine, str) else engine
     code = code_of(AfterDesign.__module__, engine.make.__module__)
-    if engine.name in NAMES:
-        return code
+    if engine.name in ENGINE_NAMES:
+        return named(f"engine {engine.name}", code)
     source = Path(inspect.getfile(engine.make))
-    return f"{code} {meaning_of([source], source.parent)[:12]}"
+    return f"{named('design', code)} {meaning_of([source], source.parent)[:12]}"

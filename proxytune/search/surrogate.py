@@ -1,9 +1,9 @@
-"""A Gaussian process of the score over the search box: what the finished trials say of every θ.
+"""A Gaussian process of the score over the search box, and the engine `gp`: Bayesian optimisation by it.
 
-Bayesian optimisation: expected improvement over a Gaussian process of the finished trials.
-
-Of a pending trial it believes the posterior mean given the finished ones (Ginsbourger, Le Riche and Carraro, Kriging is
-well-suited to parallelize optimization, 2010): nothing is left to be learnt there, so the next proposal goes elsewhere.
+`Surrogate` is what the finished trials say of the score at every θ. The engine proposes where it expects to improve
+most. Of a pending trial it believes the posterior mean given the finished ones (Ginsbourger, Le Riche and Carraro,
+Kriging is well-suited to parallelize optimization, 2010): nothing is left to be learnt there, so the next proposal goes
+elsewhere.
 """
 
 import warnings
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Prior:
-    """What is held of a hyperparameter before any trial: log-normal, and within bounds.
+    """The prior of a hyperparameter before any trial: log-normal, and within bounds.
 
     A few dozen steps of an integer score say little about seven hyperparameters. Fitted to the data alone they jump
     from bound to bound with every trial, between all noise and none; with a prior, predictions of held-out trials are
@@ -146,19 +146,19 @@ def prior_kernel(dimensions: int) -> "ConstantKernel":
 
 
 def most_probable(
-    misfit: Callable[[Floats], tuple[float, Floats]], start: Floats, bounds: Floats
+    negative_log_likelihood: Callable[[Floats], tuple[float, Floats]], start: Floats, bounds: Floats
 ) -> tuple[Floats, float]:
     """The hyperparameters' logarithms of highest posterior density, as the regressor's optimiser.
 
     Args:
-        misfit: Negative log marginal likelihood and its gradient.
+        negative_log_likelihood: The marginal one, and its gradient.
         start: The priors' medians, in the kernel's order: amplitude, length scales, noise.
         bounds: Shape (hyperparameters, 2).
     """
     spread = np.array([AMPLITUDE.spread, *[LENGTH_SCALE.spread] * (len(start) - 2), NOISE.spread])
 
     def improbable(logarithms: Floats) -> tuple[float, Floats]:
-        value, gradient = misfit(logarithms)
+        value, gradient = negative_log_likelihood(logarithms)
         distance = (logarithms - start) / spread
         return value + 0.5 * float(distance @ distance), gradient + distance / spread
 
@@ -189,7 +189,9 @@ class GaussianProcess:
             RunError: If no trial has a score.
         """
         with threadpool_limits(limits=1):
-            return from_unit(space, _most_promising(_believing(space, trials), proposal_seed(seed, len(trials)))[0])
+            return from_unit(
+                space, _most_promising(_fit_with_pending(space, trials), proposal_seed(seed, len(trials)))[0]
+            )
 
 
 def expected_improvement(space: Space, trials: Sequence[Trial], seed: int) -> tuple[float, float]:
@@ -204,8 +206,8 @@ def expected_improvement(space: Space, trials: Sequence[Trial], seed: int) -> tu
     return gain, surrogate.noise_deviation
 
 
-def _believing(space: Space, trials: Sequence[Trial]) -> Surrogate:
-    """The surrogate of the trials, a pending one taken for one that scored what is expected of it."""
+def _fit_with_pending(space: Space, trials: Sequence[Trial]) -> Surrogate:
+    """The surrogate as a kriging believer has it: a pending trial takes its posterior mean for a score."""
     surrogate = fit_surrogate(space, trials)
     pending = [trial for trial in trials if trial.pending]
     if not pending:
@@ -222,10 +224,10 @@ def _most_promising(surrogate: Surrogate, seed: int) -> tuple[Floats, float]:
 
     _, incumbent = surrogate.incumbent()
     visited = unit_array(surrogate.space, [trial.values for trial in surrogate.visited])
-    return highest(lambda points: gaussian_ei(points, surrogate.model, y_opt=incumbent, xi=0.0), visited, seed)
+    return maximise_gain(lambda points: gaussian_ei(points, surrogate.model, y_opt=incumbent, xi=0.0), visited, seed)
 
 
-def highest(gain: Callable[[Floats], Floats], visited: Floats, seed: int) -> tuple[Floats, float]:
+def maximise_gain(gain: Callable[[Floats], Floats], visited: Floats, seed: int) -> tuple[Floats, float]:
     """The unvisited point of the unit cube that promises the highest gain, and that: a Sobol cloud, then closer looks.
 
     Args:
@@ -234,19 +236,19 @@ def highest(gain: Callable[[Floats], Floats], visited: Floats, seed: int) -> tup
         seed: Seeds the clouds.
     """
     dimensions = visited.shape[1]
-    points = _new(unit_points(dimensions, CLOUD, seed), visited)
+    points = _unvisited(unit_points(dimensions, CLOUD, seed), visited)
     gains = gain(points)
     offsets = 2.0 * unit_points(dimensions, CLOUD // 16, seed + 1) - 1.0
     for width in WIDTHS:
         leaders = points[np.argsort(-gains, kind="stable")[:REFINED]]
         around = np.clip(leaders[:, None, :] + width * offsets, 0.0, 1.0).reshape(-1, dimensions)
-        points = np.concatenate([leaders, _new(around, visited)])
+        points = np.concatenate([leaders, _unvisited(around, visited)])
         gains = gain(points)
     best = int(np.argmax(gains))
     return points[best], float(gains[best])
 
 
-def _new(points: Floats, visited: Floats) -> Floats:
+def _unvisited(points: Floats, visited: Floats) -> Floats:
     """The points that are not the same as a visited one."""
     distances = np.abs(points[:, None, :] - visited[None, :, :]).max(axis=2)
     return np.asarray(points[distances.min(axis=1) > SAME / len(visited)])

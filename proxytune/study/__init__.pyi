@@ -1,19 +1,24 @@
-from .facts import adopt as adopt, note_search as note_search, open_to_look as open_to_look
+from .facts import (
+    check_facts as check_facts,
+    open_read_only as open_read_only,
+    stored_run as stored_run,
+    study_facts as study_facts,
+)
 from .families import (
-    Choice as Choice,
+    BestFamilies as BestFamilies,
     ComparedFamilies as ComparedFamilies,
     Lesson as Lesson,
     TunedFamily as TunedFamily,
-    best_teacher as best_teacher,
+    best_teaching_family as best_teaching_family,
     read_lessons as read_lessons,
     save_lessons as save_lessons,
-    tuned as tuned,
+    tuned_family as tuned_family,
 )
 from .family import (
     bare_family as bare_family,
     check_bounds as check_bounds,
-    code_of as code_of,
     load_family as load_family,
+    user_code as user_code,
 )
 from .opening import (
     PRPV as PRPV,
@@ -22,39 +27,36 @@ from .opening import (
     open_settings as open_settings,
     open_study as open_study,
     read_target as read_target,
-    study_facts as study_facts,
 )
 from .preflight import (
     Preflight as Preflight,
     most_preflight_episodes as most_preflight_episodes,
     run_preflight as run_preflight,
 )
-from .pruning import goal_of as goal_of, nothing_to_gain as nothing_to_gain, out_of_time as out_of_time
 from .result import (
     Best as Best,
-    Confirmation as Confirmation,
     StudyResult as StudyResult,
     history_of as history_of,
-    most_confirmation_episodes as most_confirmation_episodes,
+    rescored as rescored,
     result_of as result_of,
-    run_confirmation as run_confirmation,
+    with_metrics as with_metrics,
 )
 from .run import (
-    as_stored as as_stored,
-    check_facts as check_facts,
-    rescored as rescored,
-    retry_failed as retry_failed,
-    run_study as run_study,
-    stored_run as stored_run,
-    with_metrics as with_metrics,
+    Confirmation as Confirmation,
+    goal_of as goal_of,
+    most_confirmation_episodes as most_confirmation_episodes,
+    nothing_to_gain as nothing_to_gain,
+    out_of_time as out_of_time,
+    run_stages as run_stages,
+    run_trials as run_trials,
 )
 from .settings import (
     FILE_NAME as FILE_NAME,
     LEARNING as LEARNING,
     MADE as MADE,
     StudySettings as StudySettings,
-    as_document as as_document,
     read_study_settings as read_study_settings,
+    settings_document as settings_document,
     study_around as study_around,
 )
 from .single_episode import (
@@ -72,12 +74,12 @@ from .study_run import (
     Evaluation as Evaluation,
     Spent as Spent,
     StudyRun as StudyRun,
+    evaluate_outcomes as evaluate_outcomes,
     failure_of as failure_of,
-    measure as measure,
+    measure_agents as measure_agents,
     outputs_of as outputs_of,
-    plan as plan,
-    score as score,
+    plan_episodes as plan_episodes,
+    score_table as score_table,
     score_trials as score_trials,
-    table as table,
     with_spending as with_spending,
 )

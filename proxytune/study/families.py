@@ -1,6 +1,7 @@
 """Several tuned domain families beside one another: what each predicts, teaches and costs.
 
-The lessons of several families as a file, so that they can be shown again without running any code.
+`tuned_family` is one of them, `ComparedFamilies` holds all. What each is worth as a teacher is kept in a file
+(`save_lessons`, `read_lessons`), so that it can be shown again without running any code.
 """
 
 import json
@@ -8,23 +9,23 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
 from proxytune.arrays import Floats
 from proxytune.errors import StoreError
 from proxytune.files import draft_of
-from proxytune.learning import Estimate
+from proxytune.learning import LearningEstimate
 from proxytune.scores import ScoreTable
 from proxytune.seeds import fresh_seed
 from proxytune.settings import is_finite
 from proxytune.space import Theta
 from proxytune.storage import FAMILIES
-from proxytune.study.pruning import seconds_of
 from proxytune.study.result import StudyResult
+from proxytune.study.run import seconds_of
 from proxytune.study.settings import StudySettings
-from proxytune.study.study_run import StudyRun, plan
+from proxytune.study.study_run import StudyRun, plan_episodes
 from proxytune.usefulness import Assessment, Selection, interval, select_proxy
 
 RESAMPLES = 1000
@@ -53,13 +54,13 @@ class TunedFamily:
 
     @property
     def fresh(self) -> Assessment | None:
-        """How useful it is there in fresh episodes; None while these are not driven, or where an agent fails in all."""
+        """Its usefulness there in fresh episodes; None while these are not driven, or where an agent fails in all."""
         return self.result.confirmation.answer.assessment if self.result.confirmation else None
 
 
 @dataclass(frozen=True)
 class Lesson:
-    """What a family at its best θ is worth as a teacher.
+    """The worth of a family at its best θ as a teacher.
 
     Attributes:
         theta: The best θ that taught.
@@ -72,15 +73,15 @@ class Lesson:
 
     theta: Theta
     zero_shot: float | None = None
-    needed: Estimate | None = None
-    plv: Estimate | None = None
-    more: Estimate | None = None
+    needed: LearningEstimate | None = None
+    plv: LearningEstimate | None = None
+    more: LearningEstimate | None = None
     failure: str = ""
 
 
 @dataclass(frozen=True)
-class Choice:
-    """Which family is best at something.
+class BestFamilies:
+    """The family that is best at something.
 
     Attributes:
         best: Its name; None where that is not known.
@@ -118,36 +119,43 @@ class ComparedFamilies:
         return select_proxy(proxies=tables, target=target, metrics=self.settings.metrics)
 
     @property
-    def predicts(self) -> Choice:
-        """Which predicts best: the lowest PRPV in fresh episodes."""
+    def predicts(self) -> BestFamilies:
+        """The one that predicts best: the lowest PRPV in fresh episodes."""
         if self.selection is None:
-            return Choice()
+            return BestFamilies()
         best, *others = [name for name, _ in self.selection.ranking]
         worse = {one.worse for one in self.selection.differences if one.better == best and one.beyond_noise}
-        return Choice(best, tuple(name for name in others if name not in worse))
+        return BestFamilies(best, tuple(name for name in others if name not in worse))
 
     @property
-    def teaches(self) -> Choice:
-        """Which teaches best: the highest PLV."""
-        best = best_teacher(self.lessons)
+    def teaches(self) -> BestFamilies:
+        """The one that teaches best: the highest PLV."""
+
+        def may_be_as_good(one: Lesson) -> bool:
+            # Not where it is shown that more samples are needed after it: if they never suffice, that is shown too.
+            if one.more is None or one.needed is None or one.needed.low is None:
+                return False
+            return one.more.low is None or one.more.low <= 0.0
+
+        best = best_teaching_family(self.lessons)
         if best is None:
-            return Choice()
-        others = [name for name, one in self.lessons.items() if name != best and _may_be_as_good(one)]
-        return Choice(best, tuple(others))
+            return BestFamilies()
+        others = [name for name, one in self.lessons.items() if name != best and may_be_as_good(one)]
+        return BestFamilies(best, tuple(others))
 
     @property
-    def cheapest(self) -> Choice:
-        """Whose episodes take the shortest."""
+    def cheapest(self) -> BestFamilies:
+        """The one whose episodes take the shortest."""
         best = min(self.families, key=lambda one: float(np.mean(one.episode_seconds))).name
         alike = [name for name, (_, low, _) in self.times_cheapest(best).items() if name != best and low <= 1.0]
-        return Choice(best, tuple(alike))
+        return BestFamilies(best, tuple(alike))
 
     def seconds_per_episode(self) -> dict[str, tuple[float, float, float]]:
         """Mean seconds of an episode of each family, and the ends of its 95 % interval."""
-        return {one.name: _with_ends(means, one.episode_seconds) for one, means in self._resampled()}
+        return {one.name: (float(np.mean(one.episode_seconds)), *interval(means)) for one, means in self._resampled()}
 
     def times_cheapest(self, cheapest: str) -> dict[str, tuple[float, float, float]]:
-        """How many times longer an episode of each takes than one of this family, with 95 % intervals, paired."""
+        """The ratio of each one's mean seconds of an episode to this family's, with 95 % intervals, paired."""
         base, resampled = next((one, means) for one, means in self._resampled() if one.name == cheapest)
         shortest = float(np.mean(base.episode_seconds))
         return {
@@ -157,43 +165,29 @@ class ComparedFamilies:
 
     def _resampled(self) -> list[tuple[TunedFamily, Floats]]:
         """Each family with the means of its episodes' seconds when episodes are drawn, alike in all."""
-        return [(one, _resampled_means(one.episode_seconds)) for one in self.families]
+
+        def means(seconds: Sequence[float]) -> Floats:
+            count = len(seconds)
+            drawn = np.random.default_rng(0).multinomial(count, np.full(count, 1 / count), size=RESAMPLES)
+            return np.asarray(drawn @ np.array(seconds) / count)
+
+        return [(one, means(one.episode_seconds)) for one in self.families]
 
 
-def tuned(run: StudyRun, result: StudyResult) -> TunedFamily:
+def tuned_family(run: StudyRun, result: StudyResult) -> TunedFamily:
     """A family's study as it stands, with what its episodes cost."""
     settings = run.settings
-    planned = [one for seed in _seeds(settings) for one in plan(settings, result.best.trial.theta, seed)]
+    # The search's own and the fresh ones
+    seeds = [settings.seed, *(fresh_seed(settings.seed, number) for number in range(1, settings.confirm + 1))]
+    planned = [one for seed in seeds for one in plan_episodes(settings, result.best.trial.theta, seed)]
     seconds = tuple(outcome.seconds for outcome in run.known(planned).values())
     return TunedFamily(settings.family_name, result, seconds_of(run, result.trials), seconds)
 
 
-def best_teacher(lessons: Mapping[str, Lesson]) -> str | None:
+def best_teaching_family(lessons: Mapping[str, Lesson]) -> str | None:
     """The family of highest PLV; None where none is known."""
     known = {name: one.plv.value for name, one in lessons.items() if one.plv and one.plv.value is not None}
     return max(known, key=known.__getitem__) if known else None
-
-
-def _may_be_as_good(lesson: Lesson) -> bool:
-    """Whether it is not shown that more samples are needed after it: where they never suffice, that is shown too."""
-    if lesson.more is None or lesson.needed is None or lesson.needed.low is None:
-        return False
-    return lesson.more.low is None or lesson.more.low <= 0.0
-
-
-def _seeds(settings: StudySettings) -> list[int]:
-    """The search's own and the fresh ones."""
-    return [settings.seed, *(fresh_seed(settings.seed, number) for number in range(1, settings.confirm + 1))]
-
-
-def _resampled_means(seconds: Sequence[float]) -> Floats:
-    count = len(seconds)
-    drawn = np.random.default_rng(0).multinomial(count, np.full(count, 1 / count), size=RESAMPLES)
-    return np.asarray(drawn @ np.array(seconds) / count)
-
-
-def _with_ends(means: Floats, seconds: Sequence[float]) -> tuple[float, float, float]:
-    return (float(np.mean(seconds)), *interval(means))
 
 
 ESTIMATES = ("needed", "plv", "more")
@@ -215,7 +209,7 @@ def save_lessons(settings: StudySettings, lessons: Mapping[str, Lesson]) -> None
 
 
 def read_lessons(settings: StudySettings) -> dict[str, Lesson]:
-    """What was written; none where nothing was.
+    """The lessons that were written; none where nothing was.
 
     Raises:
         StoreError: If the file is none that we wrote.
@@ -230,23 +224,18 @@ def read_lessons(settings: StudySettings) -> dict[str, Lesson]:
 
 
 def _lesson(kept: Mapping[str, Any]) -> Lesson:
-    estimates = {name: None if kept[name] is None else _estimate(**kept[name]) for name in ESTIMATES}
-    theta = {str(name): _number(value) for name, value in kept["theta"].items()}
-    return Lesson(theta, _or_none(kept["zero_shot"]), failure=str(kept["failure"]), **estimates)
+    def number(value: Any) -> float:
+        if type(value) not in (int, float) or not is_finite(value):
+            raise ValueError("not a number")
+        return float(value)
 
+    def estimate(value: Any, low: Any, high: Any) -> LearningEstimate:
+        return LearningEstimate(*(None if one is None else number(one) for one in (value, low, high)))
 
-def _estimate(value: object, low: object, high: object) -> Estimate:
-    return Estimate(_or_none(value), _or_none(low), _or_none(high))
-
-
-def _or_none(value: object) -> float | None:
-    return None if value is None else _number(value)
-
-
-def _number(value: object) -> float:
-    if type(value) not in (int, float) or not is_finite(cast(float, value)):
-        raise ValueError("not a number")
-    return float(cast(float, value))
+    estimates = {name: None if kept[name] is None else estimate(**kept[name]) for name in ESTIMATES}
+    theta = {str(name): number(value) for name, value in kept["theta"].items()}
+    zero_shot = None if kept["zero_shot"] is None else number(kept["zero_shot"])
+    return Lesson(theta, zero_shot, failure=str(kept["failure"]), **estimates)
 
 
 def _file(settings: StudySettings) -> Path:

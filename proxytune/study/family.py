@@ -1,14 +1,14 @@
 """The domain family that a study names, loaded and checked.
 
-A domain family that is not proxytune's own, as a study asks it: guarded, and by the study's names of agents.
-What the code means that a user brings to a study: its failures are remembered until it changes.
+`load_family` gives proxytune's own as they are, and any other behind a guard (`UserFamily`): what a member of it raises
+is one line, and agents have the study's names. `user_code` digests the code that a user brings to a study, since
+failures are remembered until it changes.
 """
 
 import functools
-import hashlib
 import inspect
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from numbers import Integral
 from pathlib import Path
@@ -17,7 +17,7 @@ from typing import Any, TypeVar, cast
 from proxytune.domain import DomainFamily, Episode
 from proxytune.errors import ExtensionError, InputError, ProxytuneError
 from proxytune.extensions import ask, describe, is_users, load, place_of
-from proxytune.identity import meaning_of, modules_beside
+from proxytune.identity import digest, meaning_of, modules_beside
 from proxytune.settings import nearest
 from proxytune.space import Parameter
 from proxytune.study.settings import StudySettings
@@ -56,19 +56,18 @@ class UserFamily:
         if value is MISSING:
             raise AttributeError(f"{self.name} has no '{member}'")
         if self.aliases and member in ON_EPISODES:
-            return functools.partial(self._on_episode, value)
-        return functools.partial(self._on_several, value) if self.aliases and member in ON_SEVERAL else value
+            return lambda episode, *rest, **named: value(self._loaded_in(episode), *rest, **named)
+        if self.aliases and member in ON_SEVERAL:
+            return lambda episodes, *rest, **named: value([*map(self._loaded_in, episodes)], *rest, **named)
+        return value
 
     @property
     def identity(self) -> str:
         """The family's; other agents behind the same names make it another."""
-        return self._named(self._text("identity"))
-
-    @property
-    def earlier_identities(self) -> tuple[str, ...]:
-        """The family's, if it has any."""
-        earlier = ask(f"earlier_identities of {self.name}", lambda: self._member("earlier_identities"))
-        return () if earlier is MISSING else tuple(map(self._named, earlier))
+        identity = ask(f"identity of {self.name}", lambda: self.family.identity)
+        if not isinstance(identity, str):
+            raise ExtensionError(f"identity of {self.name} must be text, got {type(identity).__name__}")
+        return digest(identity, sorted(self.aliases)) if self.aliases else identity
 
     def check_agent(self, name: str) -> None:
         """Refuse an agent that the family cannot run.
@@ -85,31 +84,15 @@ class UserFamily:
             return getattr(self.family, member)
         return MISSING
 
-    def _text(self, member: str) -> str:
-        value = ask(f"{member} of {self.name}", functools.partial(getattr, self.family, member))
-        if not isinstance(value, str):
-            raise ExtensionError(f"{member} of {self.name} must be text, got {type(value).__name__}")
-        return value
-
     def _loaded(self, agent: str) -> str:
         return dict(self.aliases).get(agent, agent)
-
-    def _named(self, identity: str) -> str:
-        text = repr((identity, sorted(self.aliases))).encode()
-        return hashlib.sha256(text).hexdigest()[:16] if self.aliases else identity
-
-    def _on_episode(self, method: Callable[..., Any], episode: Episode, *rest: Any, **named: Any) -> Any:
-        return method(self._loaded_in(episode), *rest, **named)
-
-    def _on_several(self, method: Callable[..., Any], episodes: Sequence[Episode], *rest: Any, **named: Any) -> Any:
-        return method([self._loaded_in(episode) for episode in episodes], *rest, **named)
 
     def _loaded_in(self, episode: Episode) -> Episode:
         return replace(episode, agent=self._loaded(episode.agent))
 
 
 def has_member(family: Any, member: str) -> bool:
-    """Whether there is such a member, be it a property that raises."""
+    """Tell whether there is such a member, be it a property that raises."""
     return inspect.getattr_static(family, member, MISSING) is not MISSING or hasattr(family, member)
 
 
@@ -172,7 +155,7 @@ def _check_signature(settings: StudySettings, factory: Any, model: Path | None) 
 
 
 def _asked(settings: StudySettings, what: str, ask: Callable[[], Value]) -> Value:
-    """What a user's code answers; one line of what it raises instead."""
+    """The answer of a user's code; one line of what it raises instead."""
     try:
         return ask()
     except ProxytuneError:
@@ -247,18 +230,15 @@ def check_bounds(
         raise settings.error(key, f"must lie within [{known.low:g}, {known.high:g}], got {given}")
 
 
-def code_of(settings: StudySettings) -> str:
+def user_code(settings: StudySettings) -> str:
     """A digest of the modules in a study's folder, and of installed ones that its family and its agents come from.
 
     Modules that these import in turn are not looked at where they lie elsewhere.
     """
     names = {name.partition(":")[0] for name in (settings.family, *settings.loaded_agents) if ":" in name}
-    installed = [_meaning_of_installed(name) for name in sorted(names) if not name.startswith("proxytune.")]
-    own = meaning_of(modules_beside(settings.folder), settings.folder)
-    return hashlib.sha256(repr((own, installed)).encode()).hexdigest()[:16]
-
-
-def _meaning_of_installed(name: str) -> str:
-    """What an imported module means; empty where it has no file, or lies in the study's folder."""
-    file = getattr(sys.modules.get(name), "__file__", None)
-    return meaning_of([Path(file)], Path(file).parent) if file and Path(file).is_file() else ""
+    files = [
+        getattr(sys.modules.get(name), "__file__", None) for name in sorted(names) if not name.startswith("proxytune.")
+    ]
+    # A module may have no file.
+    installed = [meaning_of([Path(f)], Path(f).parent) if f and Path(f).is_file() else "" for f in files]
+    return digest(meaning_of(modules_beside(settings.folder), settings.folder), installed)

@@ -1,16 +1,15 @@
-"""A study ready to run: its settings, its domain family, and the target's scores.
+"""A study ready to run: its settings, its domain family, the target's scores, its objective and its engine.
 
-The target's scores as a study compares them, from one file or several.
-What a study makes small or large: a measure of how far proxy and target agree on the agents.
+`open_study` puts together a `Study`, all that a trial is a function of apart from θ. The target's scores come from one
+file or several: agents without any are left out (`with_scores`), and so are episodes from other starts where the
+study's own are all there (`read_target`). The objective is a measure of how far proxy and target agree on the agents'
+mean scores, PRPV unless study.toml says otherwise; what others bring as a measure is tried before any episode is run.
 """
 
-import hashlib
-import json
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -19,12 +18,11 @@ from proxytune.domain import DomainFamily
 from proxytune.effects import Catalogue, read_model
 from proxytune.errors import ExtensionError, InputError, ScoresError
 from proxytune.extensions import ask, load, plugins
-from proxytune.identity import version_changes
 from proxytune.scores import Metric, ScoreTable, read_scores
-from proxytune.search import GAUSSIAN_PROCESS, NAMES, Engine, engine_of, why_not_engine
+from proxytune.search import ENGINE_NAMES, GAUSSIAN_PROCESS, Engine, engine_of, why_not_engine
 from proxytune.settings import nearest
 from proxytune.space import Theta
-from proxytune.study.family import code_of, load_family
+from proxytune.study.family import load_family, user_code
 from proxytune.study.settings import LEARNING, StudySettings, read_study_settings, unnoticed
 from proxytune.usefulness import MEASURES, Measure, compare, start_of, starts_of
 
@@ -64,8 +62,18 @@ def read_target(settings: StudySettings, family: DomainFamily) -> tuple[ScoreTab
     Raises:
         InputError: If the table lacks a metric, or has a value that is not finite.
     """
+
+    def has_in_full(metric: str) -> bool:
+        try:
+            _read(settings, [metric])
+        except ScoresError:
+            return False
+        return True
+
     compared = [metric.name for metric in settings.metrics]
-    table = _read(settings, [*compared, *_others(settings, family, compared)])
+    # What a search can learn from at no cost
+    others = [name for name in family.metrics if name not in compared and has_in_full(name)]
+    table = _read(settings, [*compared, *others])
     chosen = table.arrange(agents=settings.agents)
     driven = [label for column, label in enumerate(chosen.episodes) if chosen.driven[:, column].any()]
     wanted = {str(start) for start in range(settings.starts)}
@@ -78,19 +86,6 @@ def read_target(settings: StudySettings, family: DomainFamily) -> tuple[ScoreTab
         "are left out; raise starts to use them, or label episodes otherwise if they are no starts"
     )
     return chosen.arrange(agents=settings.agents, episodes=own), (line,) if beyond else ()
-
-
-def _others(settings: StudySettings, family: DomainFamily, compared: Sequence[str]) -> list[str]:
-    """The metrics beside those compared that the table has in full: what a search can learn from at no cost."""
-    return [name for name in family.metrics if name not in compared and _in_full(settings, name)]
-
-
-def _in_full(settings: StudySettings, metric: str) -> bool:
-    try:
-        _read(settings, [metric])
-    except ScoresError:
-        return False
-    return True
 
 
 def _read(settings: StudySettings, metrics: Iterable[str]) -> ScoreTable:
@@ -119,7 +114,7 @@ class Objective:
 
     @property
     def sign(self) -> float:
-        """What turns the measure into something to be made small, and back."""
+        """The factor that makes the measure something to be made small, and back."""
         return -1.0 if self.maximise else 1.0
 
     def measure(self, *, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -> dict[str, float | None]:
@@ -179,12 +174,17 @@ def _as_objective(name: str, measure: Measure) -> Objective:
         raise ExtensionError(
             f"measure '{name}' is no single number of mean scores: it needs on_means, without per_metric"
         )
-    of_means = measure.on_means if measure in MEASURES else _outside(name, measure.on_means)
+    of_means = measure.on_means
+    if measure not in MEASURES:
+        of_means = _CheckedMeasure(name, measure.on_means)
+        # Tried as a search calls it: several proxies against one target, before any episode is run.
+        means = np.random.default_rng(0).uniform(1.0, 2.0, TRIED)
+        of_means(means, means[0], [Metric("one"), Metric("other", "min")])
     return Objective(name, measure.name, not measure.lower_is_better, of_means)
 
 
 @dataclass(frozen=True)
-class _Outside:
+class _CheckedMeasure:
     """A measure of mean scores that is not ours: what it does wrong is told in one line."""
 
     name: str
@@ -201,26 +201,14 @@ class _Outside:
         return values
 
 
-def _outside(name: str, on_means: OfMeans) -> OfMeans:
-    """The measure, tried as a search calls it: several proxies against one target, before any episode is run."""
-    checked = _Outside(name, on_means)
-    means = np.random.default_rng(0).uniform(1.0, 2.0, TRIED)
-    checked(means, means[0], [Metric("one"), Metric("other", "min")])
-    return checked
-
-
 KEPT = {one.key: _as_objective(one.key, one) for one in MEASURES if one.on_means is not None and not one.per_metric}
 """PRPV and PPV: what may be an objective by name, and is kept with every trial."""
 PRPV = KEPT["prpv"]
 
 
-UNSAID = {"batch": 1, "engine": "gp"}
-"""What a study.db that names none of these was run with."""
-
-
 @dataclass(frozen=True)
 class Study:
-    """What a trial is a function of, apart from θ.
+    """All that a trial is a function of, apart from θ.
 
     Attributes:
         settings: What study.toml says.
@@ -266,7 +254,7 @@ def open_settings(settings: StudySettings) -> Study:
     known, left_out = with_scores(settings)
     target, unused = read_target(known, family)
     cautions, objective = (*left_out, *unused, *unnoticed(settings.folder)), objective_of(settings)
-    truth, engine, code = _truth(settings, family), _engine(settings), code_of(settings)
+    truth, engine, code = _truth(settings, family), _engine(settings), user_code(settings)
     return Study(known, family, target, family.identity, truth, cautions, objective, engine, code)
 
 
@@ -281,7 +269,7 @@ def _engine(settings: StudySettings) -> Engine:
     except InputError as problem:
         raise settings.error("engine", str(problem)) from None
     if not engine.in_studies:
-        raise settings.error("engine", f"'{engine.name}' is for `compare` only; {nearest(engine.name, NAMES)}")
+        raise settings.error("engine", f"'{engine.name}' is for `compare` only; {nearest(engine.name, ENGINE_NAMES)}")
     reason = why_not_engine(engine, composed=settings.objective != LEARNING)
     if reason:
         raise settings.error("engine", reason)
@@ -297,70 +285,3 @@ def _truth(settings: StudySettings, family: DomainFamily) -> Theta | None:
     own = getattr(family, "truth", None)
     known = own(settings.truth) if own else read_model(settings.truth, Catalogue(settings.folder.resolve())).theta
     return {name: known[name] for name in settings.space.names if name in known}
-
-
-def study_facts(study: Study) -> dict[str, Any]:
-    """All that a finished trial depends on, by its name in study.toml: if one changes, trials lose their meaning.
-
-    Budget, rules to stop, jobs and what to do on failure are not among them. The proxy's model is: the family's
-    identity covers it, and the versions of what simulates, which are here to be told. The engine `gp` goes without
-    saying, as it did when there was no other, and so do batches of one trial. An engine that learns from every output
-    depends on the whole of the target's table, and on the pre-flight's noise.
-    """
-    settings = study.settings
-    named: dict[str, Any] = {"batch": settings.batch, "engine": settings.engine}
-    said = {key: value for key, value in named.items() if value != UNSAID[key]}
-    compared = [metric.name for metric in settings.metrics]
-    learns = study.engine.learns_from == "outputs"
-    if learns:
-        said["preflight"] = settings.preflight
-    versions = getattr(study.family, "versions", None)
-    if versions:
-        said["versions"] = dict(versions)
-    return {
-        "family": settings.family,
-        "target": _table_digest(study.target if learns else study.target.select(compared)),
-        "objective": settings.objective,
-        "metrics": sorted(str(metric) for metric in settings.metrics),
-        "agents": sorted(settings.agents),
-        "starts": settings.starts,
-        "initial": settings.initial,
-        "seed": settings.seed,
-        **said,
-        "cut_off": settings.cut_off,
-        **{f"agents.{name}": settings.aliases[name] for name in settings.agents if name in settings.aliases},
-        **{f"parameters.{i.name}": [i.low, i.high] for i in settings.space.intervals},
-        **{f"domain.{key}": json.dumps(value, default=str) for key, value in settings.domain.values.items()},
-        "identity": study.identity,
-    }
-
-
-def changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
-    """Which facts differ, each as one phrase for the user."""
-    keys = [key for key in {**after, **before} if before.get(key) != after.get(key)]
-    # Other agents or metrics make it another part of the target's table, and what the family is told makes it another.
-    # Another engine may learn from another part of it, and from the pre-flight.
-    implied = {"target"} if {"agents", "metrics", "engine", "starts"} & set(keys) else set()
-    implied |= {"preflight"} if "engine" in keys else set()
-    told = any(key == "family" or key.startswith(("domain.", "agents.")) for key in keys)
-    named = [key for key in keys if key not in implied | {"identity", "versions"}]
-    both = "versions" in before and "versions" in after and not told
-    versions = version_changes(before["versions"], after["versions"]) if both else []
-    other = ["the domain family (its code, its robot or the proxy's model)"]
-    unnamed = "identity" in keys and not (told or versions)
-    return [*(_change(key, before.get(key), after.get(key)) for key in named), *versions, *(other if unnamed else ())]
-
-
-def _change(key: str, before: Any, after: Any) -> str:
-    if key == "target":
-        return "target (its contents)"
-    before = UNSAID.get(key) if before is None else before
-    shown = [("nothing" if value is None else json.dumps(value)) for value in (before, after)]
-    return f"{key} (was {shown[0]})" if max(map(len, shown)) < 60 else key
-
-
-def _table_digest(table: ScoreTable) -> str:
-    """A digest that the order of agents, episodes and metrics does not change."""
-    inner = table.select(sorted(table.metrics)).arrange(agents=sorted(table.agents), episodes=sorted(table.episodes))
-    text = json.dumps([inner.agents, inner.episodes, inner.metrics, inner.values.tolist()])
-    return hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -1,4 +1,4 @@
-"""Before a study: does each parameter of its box move the metrics beyond noise?
+"""Before a study: does each parameter move the metrics, does each agent do the same again, and how large is noise?
 
 The domain instance in the centre of the box is the base. Each parameter is moved to either end of its box, the others
 held, under the same seeds (common random numbers): a parameter that does nothing then changes no episode by a hair.
@@ -6,21 +6,17 @@ What noise does is told by driving the base again under other seeds, one for eac
 one-sided Wilcoxon signed-rank test asks over agents and starts whether |change by the parameter| is larger than |change
 by noise|; were the parameter one more source of noise, either would be the larger as often as the other. P-values are
 multiplied by the number of tests (Bonferroni: metrics × ends × looks). A parameter that the first half of the starts
-already shows to matter is left out of the second look.
-
-What moving one parameter from the centre of the box to its ends does, against what placement noise does.
-Before a study: does an agent do the same again?
+already shows to matter is left out of the second look. Where every episode fails alike there is nothing to search: the
+study stops and says of what.
 
 What a trial comes to must not depend on which process drove which episode before. So one episode of each agent is
-driven twice more, by one process, one after the other: an agent that draws from what no episode seeds, or remembers
-earlier episodes, comes to other scores.
-Where every episode fails alike there is nothing to search: the study stops and says of what.
-How far chance alone puts proxy and target apart at the same θ: what a search has to forgive.
+driven twice more, by one process, one after the other (`check_repeatable`): an agent that draws from what no episode
+seeds, or remembers earlier episodes, comes to other scores.
 
-Both sides drive from the same starts, so it is the placement noise that differs, not the starts. The pre-flight has
-driven the centre of the box under two placements, from which follows the variance of a difference of two episodes.
-Without shared starts, or without a pre-flight, there is the spread between episodes only, which is far larger: starts
-differ more than placements.
+`noise_of` says how far chance alone puts proxy and target apart at the same θ, which a search has to forgive. Both
+sides drive from the same starts, so it is the placement noise that differs, not the starts. The base has been driven
+under two placements, from which follows the variance of a difference of two episodes. Without shared starts, or without
+a pre-flight, there is the spread between episodes only, which is far larger: starts differ more than placements.
 """
 
 import functools
@@ -55,7 +51,7 @@ LOOKS = 2
 
 @dataclass(frozen=True)
 class Movement:
-    """What moving one parameter across its box does to the metrics.
+    """The effect on the metrics of moving one parameter across its box.
 
     Attributes:
         interval: The parameter and its box.
@@ -77,12 +73,12 @@ class Movement:
 
     @property
     def moves(self) -> bool:
-        """Whether the parameter changes a metric beyond noise."""
+        """True if the parameter changes a metric beyond noise."""
         return self.p_value < LEVEL
 
     @property
     def warning(self) -> str:
-        """What is wrong with the parameter and what to do, in one line; empty if nothing is."""
+        """The problem of the parameter and what to do, in one line; empty if there is none."""
         if self.moves:
             return ""
         name, box = self.interval.name, f"[{self.interval.low:g}, {self.interval.high:g}]"
@@ -96,15 +92,22 @@ class Movement:
 
 
 def judge(interval: Interval, names: Sequence[str], values: Floats) -> Movement:
-    """What the test that tells most says of a parameter.
+    """Test a parameter, by the metric and the end that tell most.
 
     Args:
         interval: The parameter.
         names: The metrics.
         values: Shape (agents × places, 4, metrics): the base again, the base, the lower and the upper end.
     """
+
+    def likely(changes: Floats, noise: Floats) -> float:
+        """The p-value of the signed ranks of |change| − |noise|, were neither the larger."""
+        apart = changes - noise
+        # Left to itself scipy permutes where there are ties, which takes more than a second a test.
+        return float(wilcoxon(apart, alternative="greater", method="approx").pvalue) if apart.any() else 1.0
+
     changes = np.abs(values[:, [0, 2, 3]] - values[:, [1]])
-    tests = [(_larger(changes[:, end, m], changes[:, 0, m]), end, m) for end in (1, 2) for m in range(len(names))]
+    tests = [(likely(changes[:, end, m], changes[:, 0, m]), end, m) for end in (1, 2) for m in range(len(names))]
     p_value, end, m = min(tests)
     middle = np.median(changes[:, [0, end], m], axis=0) if len(changes) else (0.0, 0.0)
     return Movement(
@@ -118,24 +121,11 @@ def judge(interval: Interval, names: Sequence[str], values: Floats) -> Movement:
     )
 
 
-def _larger(changes: Floats, noise: Floats) -> float:
-    """How likely the signed ranks of |change| − |noise| are if neither is the larger."""
-    apart = changes - noise
-    # Left to itself scipy permutes where there are ties, which takes more than a second a test.
-    return float(wilcoxon(apart, alternative="greater", method="approx").pvalue) if apart.any() else 1.0
-
-
-FACT = "not_repeatable"
-"""What study.db keeps of it: a line for each such agent, in their order."""
+NOT_REPEATABLE = "not_repeatable"
+"""The fact in study.db: a line for each agent that scores otherwise in the same episode, in their order."""
 REMEDY = "draw from random or numpy.random, which each episode seeds, and keep nothing from one episode to the next"
-Scores = Mapping[str, float] | None
-
-
-class Twice(NamedTuple):
-    """What an episode came to when it was driven twice more; None where it failed."""
-
-    episode: Episode
-    scores: tuple[Scores, ...]
+Again = tuple[Episode, tuple[Mapping[str, float] | None, ...]]
+"""An episode with its scores when it was driven twice more; None where it failed."""
 
 
 def check_repeatable(run: StudyRun, episodes: Sequence[Episode]) -> None:
@@ -148,7 +138,7 @@ def check_repeatable(run: StudyRun, episodes: Sequence[Episode]) -> None:
     Raises:
         RunError: If the machine fails.
     """
-    if FACT in run.store.facts():
+    if NOT_REPEATABLE in run.store.facts():
         return
     known = {one: outcome.metrics for one, outcome in run.known(episodes).items() if outcome.metrics is not None}
     run.watcher.begin("pre-flight: each agent twice", 0)
@@ -157,24 +147,23 @@ def check_repeatable(run: StudyRun, episodes: Sequence[Episode]) -> None:
         timeout_s = watch.timeout_s and 2.0 * watch.timeout_s
         rescue = Rescue(_lost, timeout_s, watch.suspect, watch.begins)
         with working(drive, list(known), run.settings.jobs, rescue=rescue) as driven:
-            others = {one.episode.agent for one in driven if any(scores != known[one.episode] for scores in one.scores)}
+            others = {one.agent for one, again in driven if any(scores != known[one] for scores in again)}
     told = [agent for agent in run.settings.agents if agent in others]
-    run.store.save_fact(
-        FACT, [f"pre-flight: agent '{agent}' scores otherwise in the same episode; {REMEDY}" for agent in told]
-    )
+    lines = [f"pre-flight: agent '{agent}' scores otherwise in the same episode; {REMEDY}" for agent in told]
+    run.store.save_fact(NOT_REPEATABLE, lines)
 
 
 def not_repeatable(store: Store) -> tuple[str, ...]:
     """One line for each agent that came to other scores; none where that was not looked at."""
-    return tuple(store.facts().get(FACT, ()))
+    return tuple(store.facts().get(NOT_REPEATABLE, ()))
 
 
-def _drive_twice(family: DomainFamily, needed: Sequence[str], episode: Episode) -> Twice:
-    return Twice(episode, tuple(run_episode(family, episode, needed).metrics for _ in range(2)))
+def _drive_twice(family: DomainFamily, needed: Sequence[str], episode: Episode) -> Again:
+    return episode, tuple(run_episode(family, episode, needed).metrics for _ in range(2))
 
 
-def _lost(episode: Episode, end: WorkerExit) -> Twice:
-    return Twice(episode, (None,))
+def _lost(episode: Episode, end: WorkerExit) -> Again:
+    return episode, (None,)
 
 
 def check_some_work(outcomes: Collection[Outcome], where: str) -> None:
@@ -187,17 +176,17 @@ def check_some_work(outcomes: Collection[Outcome], where: str) -> None:
     Raises:
         RunError: With the first failure.
     """
+
+    def kind(failed: Outcome) -> str:
+        """The failure, whichever the agent and whatever the numbers."""
+        return re.sub(r"\d+", "", failed.failure.replace(f"'{failed.episode.agent}'", ""))
+
     failures = [outcome for outcome in outcomes if outcome.metrics is None]
-    if failures and len(failures) == len(outcomes) and len(set(map(_kind, failures))) == 1:
+    if failures and len(failures) == len(outcomes) and len(set(map(kind, failures))) == 1:
         raise RunError(
             f"{failures[0].failure}; every agent fails so, in all {len(failures)} episodes of {where}: correct it and "
             "run the same command again"
         )
-
-
-def _kind(failed: Outcome) -> str:
-    """What failed, whichever the agent and whatever the numbers."""
-    return re.sub(r"\d+", "", failed.failure.replace(f"'{failed.episode.agent}'", ""))
 
 
 PAIRS = 24
@@ -205,7 +194,7 @@ PAIRS = 24
 
 
 class Place(NamedTuple):
-    """Where every agent drives from: the start, and which time from there."""
+    """The start that every agent drives from, and which time from there."""
 
     start: int
     turn: int
@@ -213,7 +202,7 @@ class Place(NamedTuple):
 
 @dataclass(frozen=True)
 class Preflight:
-    """What a study has learnt of its parameters before its first trial.
+    """The knowledge of a study of its parameters before its first trial.
 
     Attributes:
         base: The domain instance from which they were moved.
@@ -290,13 +279,9 @@ def _preflight(run: StudyRun, simulate: Callable[[int, Sequence[Episode]], None]
         movements |= {i.name: _movement(run.study, look, i, known) for i in undecided}
         undecided = tuple(i for i in undecided if not movements[i.name].moves)
     moved = tuple(movements[name] for name in settings.space.names)
-    return Preflight(_base(settings), moved, len(driven), _failure(driven), not_repeatable(run.store))
-
-
-def _failure(driven: Mapping[Episode, Outcome]) -> str:
-    """What the first episode failed of, if none succeeded."""
     failures = [outcome.failure for outcome in driven.values() if outcome.metrics is None]
-    return failures[0] if failures and len(failures) == len(driven) else ""
+    failure = failures[0] if failures and len(failures) == len(driven) else ""
+    return Preflight(_base(settings), moved, len(driven), failure, not_repeatable(run.store))
 
 
 def placement_pairs(run: StudyRun) -> Floats:
@@ -311,7 +296,7 @@ def placement_pairs(run: StudyRun) -> Floats:
     found = np.full((len(_places(settings, LOOKS - 1)), 2, *study.target.means.shape), np.nan)
     for row, place in enumerate(_places(settings, LOOKS - 1)):
         for column, agent in enumerate(settings.agents):
-            both = (_episode(settings, _base(settings), agent, place), _again(settings, agent, place))
+            both = (_episode(settings, _base(settings), agent, place), _base_again(settings, agent, place))
             for side, episode in enumerate(both):
                 metrics = known[episode].metrics if episode in known else None
                 if metrics is not None:
@@ -320,18 +305,18 @@ def placement_pairs(run: StudyRun) -> Floats:
 
 
 def most_preflight_episodes(settings: StudySettings) -> int:
-    """How many episodes a pre-flight takes at most."""
+    """The number of episodes that a pre-flight takes at most."""
     return sum(_most(settings, look) for look in range(LOOKS)) if settings.preflight else 0
 
 
 def _most(settings: StudySettings, look: int) -> int:
-    """How many episodes a look takes that the one before did not, if no parameter is decided."""
+    """The number of episodes that a look takes and the one before did not, if no parameter is decided."""
     instances = 2 + 2 * len(settings.space.intervals)
     return (len(_places(settings, look)) - len(_places(settings, look - 1))) * len(settings.agents) * instances
 
 
 def _places(settings: StudySettings, look: int) -> list[Place]:
-    """Where agents drive from up to this look: the study's starts in turn, until there are pairs enough."""
+    """The places that agents drive from up to this look: the study's starts in turn, until there are pairs enough."""
     half = max(1, ceil(PAIRS / LOOKS / len(settings.agents)))
     return [Place(k % settings.starts, k // settings.starts) for k in range(half * (look + 1))]
 
@@ -351,7 +336,7 @@ def _plan(settings: StudySettings, places: Sequence[Place], undecided: Sequence[
         for place in places
         for agent in settings.agents
         for episode in (
-            _again(settings, agent, place),
+            _base_again(settings, agent, place),
             *(_episode(settings, theta, agent, place) for theta in instances),
         )
     ]
@@ -361,8 +346,8 @@ def _episode(settings: StudySettings, theta: Theta, agent: str, place: Place) ->
     return make_episode(theta, agent=agent, start=place.start, seed=preflight_seed(settings.seed, *place))
 
 
-def _again(settings: StudySettings, agent: str, place: Place) -> Episode:
-    """The base under a seed of its own: agents that shared it would share one draw of the noise."""
+def _base_again(settings: StudySettings, agent: str, place: Place) -> Episode:
+    """The base with a new seed, to measure the noise: agents that shared it would share one draw of it."""
     seed = preflight_noise_seed(settings.seed, *place, sorted(settings.agents).index(agent))
     return make_episode(_base(settings), agent=agent, start=place.start, seed=seed)
 
@@ -373,7 +358,7 @@ def _movement(study: Study, look: int, interval: Interval, known: Mapping[Episod
     base = _base(settings)
     instances = [base, *({**base, interval.name: end} for end in (interval.low, interval.high))]
     driven = [
-        [known[_again(settings, agent, place)], *(known[_episode(settings, t, agent, place)] for t in instances)]
+        [known[_base_again(settings, agent, place)], *(known[_episode(settings, t, agent, place)] for t in instances)]
         for place in _places(settings, look)
         for agent in settings.agents
     ]
@@ -386,12 +371,12 @@ def _movement(study: Study, look: int, interval: Interval, known: Mapping[Episod
 PRIOR_PAIRS = 2
 """An agent's own pairs are few, so the median over the agents counts as so many more."""
 
-UNKNOWN = 0.1
+UNKNOWN_NOISE = 0.1
 """Where nothing tells: standard deviation of a mean, as a share of the spread over agents."""
 
 
 @dataclass(frozen=True, eq=False)
-class Noise:
+class NoiseVariance:
     """Chance between the mean scores of proxy and target at the same θ.
 
     Attributes:
@@ -404,36 +389,34 @@ class Noise:
     caution: str = ""
 
 
-def noise_of(run: StudyRun) -> Noise:
-    """What is known of noise before the first trial; a function of the pre-flight and the target's table."""
+def noise_of(run: StudyRun) -> NoiseVariance:
+    """Estimate noise before the first trial; a function of the pre-flight and the target's table."""
     study = run.study
     driven = study.settings.starts
     measured = np.maximum(1, study.target.counts)[:, None]
     pairs = placement_pairs(run)
     if shares_starts(study) and pairs.size:
-        return Noise(_shrunk((pairs[:, 0] - pairs[:, 1]) ** 2) / 2.0 * (1.0 / driven + 1.0 / measured))
+        return NoiseVariance(_shrunk((pairs[:, 0] - pairs[:, 1]) ** 2) / 2.0 * (1.0 / driven + 1.0 / measured))
     remedy = "to know θ better, measure the target from the study's own starts and leave the pre-flight on"
     if study.target.counts.min() >= 2:
-        between = _shrunk(np.moveaxis(_apart(study.target.values), 1, 0))
+        values = study.target.values
+        count = np.sum(~np.isnan(values), axis=1, keepdims=True)
+        # Squared distances of an agent's episodes from its mean, scaled so that their mean is the variance
+        apart = np.asarray((values - np.nanmean(values, axis=1, keepdims=True)) ** 2 * (count / (count - 1)))
+        between = _shrunk(np.moveaxis(apart, 1, 0))
         caution = f"noise is estimated from the spread between the target's episodes, which is too large; {remedy}"
-        return Noise(between * (1.0 / driven + 1.0 / measured), caution)
-    spread = np.ptp(study.target.means, axis=0) * UNKNOWN
-    caution = f"noise is unknown and assumed to be {UNKNOWN:.0%} of the spread between agents; {remedy}"
-    return Noise(np.broadcast_to(spread**2, study.target.means.shape), caution)
+        return NoiseVariance(between * (1.0 / driven + 1.0 / measured), caution)
+    spread = np.ptp(study.target.means, axis=0) * UNKNOWN_NOISE
+    caution = f"noise is unknown and assumed to be {UNKNOWN_NOISE:.0%} of the spread between agents; {remedy}"
+    return NoiseVariance(np.broadcast_to(spread**2, study.target.means.shape), caution)
 
 
 def shares_starts(study: Study) -> bool:
-    """Whether the target was driven from the study's own starts, each as often, by every agent."""
+    """True if the target was driven from the study's own starts, each as often, by every agent."""
     starts = [start_of(label) for label in study.target.episodes]
     wanted = {str(start) for start in range(study.settings.starts)}
     each = {start: starts.count(start) for start in starts}
     return study.target.complete and set(each) == wanted and len(set(each.values())) == 1
-
-
-def _apart(values: Floats) -> Floats:
-    """Squared distances of an agent's episodes from its mean, scaled so that their mean is the variance."""
-    count = np.sum(~np.isnan(values), axis=1, keepdims=True)
-    return np.asarray((values - np.nanmean(values, axis=1, keepdims=True)) ** 2 * (count / (count - 1)))
 
 
 def _shrunk(squares: Floats) -> Floats:

@@ -1,32 +1,124 @@
-"""The search of a study: its trials proposed, simulated and scored, until the budget is spent or a rule says stop.
+"""A study from its first trial to its answer: what it is after, its trials, when it ends, and fresh episodes.
 
-A study scored anew by other metrics or tolerances, from the episodes it has; nothing is simulated.
-Trials with failed episodes, once the code that failed has been corrected.
+`run_stages` is the whole of it. The pre-flight (preflight.py) tells the noise, from which follows what the search is
+after (`goal_of`). `run_trials` leaves the order of things to the one search loop, `proxytune.search.Search`: that asks
+`StudyTrials` for the finished trials, for a reason to end, and to evaluate a batch of θ. Their episodes are simulated
+by `StudyRun`, all of them or until a trial is pruned (pruning.py), and come to PRPV in `evaluate_outcomes`. A study
+ends with its budget or before (`stopped`): a function of what is stored, so that nothing need be remembered.
+
+Then the answer is driven again in fresh episodes, together with those that are nearly as good. All trials share the
+placement noise of the study's seed, so the θ that the search likes best also suits that noise. The finalists (the
+visited θ of lowest expected PRPV given all trials, the one that explains the target's outputs best, and others not more
+than a standard deviation of a fresh score's noise behind) get episodes under seeds that the search has not seen. The
+answer is the finalist whose expected PRPV and fresh scores are lowest on average; what fresh episodes say of it beside
+the search's own is how much of that was luck. They tell the noise floor too: what the same domain scores against itself
+from the same starts. No trial depends on any of this.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
-from proxytune.errors import InputError, RunError, SettingsError, StoreError
-from proxytune.scores import Metric
-from proxytune.search import Propose, Proposer, Search, Trial
-from proxytune.settings import nearest
-from proxytune.storage import State, Store, TrialRecord
-from proxytune.study.facts import CODE, DESCRIBED, SEARCH, adopt, describe, differ
-from proxytune.study.opening import Objective, Study, changes, read_target, study_facts
-from proxytune.study.preflight import FACT as NOT_REPEATABLE, check_some_work
-from proxytune.study.pruning import Cut, by_other_metrics, reference, run_or_cut, stopped
-from proxytune.study.result import StudyResult, result_of
-from proxytune.study.settings import LEARNING
-from proxytune.study.study_run import Evaluation, StudyRun, plan
+import numpy as np
 
-OTHERS = (LEARNING, SEARCH, DESCRIBED, NOT_REPEATABLE)
-"""Facts that trials do not depend on: of a search for learning value, which code proposed what, looks, and agents."""
+from proxytune.domain import Episode, Outcome
+from proxytune.errors import RunError
+from proxytune.scores import ScoreTable
+from proxytune.search import (
+    BatchPoints,
+    Goal,
+    Knowledge,
+    Proposer,
+    Search,
+    Trial,
+    batch_at,
+    expected_gain,
+    expected_improvement,
+    learn_theta,
+    make_proposer,
+)
+from proxytune.seeds import fresh_seed
+from proxytune.storage import State, TrialRecord
+from proxytune.study.facts import check_facts, note_search
+from proxytune.study.opening import Objective, Study
+from proxytune.study.preflight import check_some_work, noise_of, run_preflight
+from proxytune.study.pruning import Pruned, pruning_rule, run_or_prune
+from proxytune.study.settings import StopRules, StudySettings
+from proxytune.study.study_run import (
+    Evaluation,
+    StudyRun,
+    compose_of,
+    evaluate_outcomes,
+    in_common,
+    plan_episodes,
+    score_table,
+    score_trials,
+)
+from proxytune.usefulness import Assessment, assess, floor_of_repeats
+
+MOST_FINALISTS = 3
+"""At most so many θ are driven again."""
 
 
-def run_study(run: StudyRun, proposer: Proposer) -> None:
-    """Run a study to the end of its budget, or until a rule stops it, from wherever it was left.
+def run_stages(run: StudyRun, warn: Callable[[str], None]) -> None:
+    """Run a study to its end, from wherever it was left: pre-flight, trials, fresh episodes.
+
+    Args:
+        run: The study.
+        warn: Hears, before the first trial, of another search than before and of parameters without effect.
+
+    Raises:
+        InputError, RunError: As `run_trials`.
+    """
+    check_facts(run)
+    retry_failed(run)
+    if line := note_search(run.study, run.store):
+        warn(line)
+    learnt = run_preflight(run)
+    for warning in learnt.warnings if learnt and run.spent.episodes else ():
+        warn(warning)
+    # The proposer allows for the noise that the pre-flight measured.
+    run_trials(run, make_proposer(run.study.engine, run.settings.initial, goal_of(run)))
+    run_confirmation(run)
+
+
+def retry_failed(run: StudyRun) -> None:
+    """Drive failed episodes of ended trials again where the user's code has changed since, and score these trials anew.
+
+    Such a trial is driven in full, also if it was pruned before. θ of later trials stay what they are.
+
+    Raises:
+        EpisodeError: If an episode fails and the study is to stop then.
+    """
+    for trial in run.finished_trials():
+        if trial.failed_episodes:
+            known = run.known(run.episodes_of(trial))
+            failed = [episode for episode, outcome in known.items() if outcome.metrics is None]
+            # Where fewer have failed than the trial says, they were tried again before this process.
+            if len(failed) != trial.failed_episodes or any(episode in run.corrected for episode in failed):
+                planned = plan_episodes(run.settings, trial.theta, run.settings.seed)
+                run.outcomes(planned, f"trial {trial.number} again")
+                run.save_trials(record(trial.number, run.evaluation_of(trial)))
+
+
+def goal_of(run: StudyRun) -> Goal:
+    """The target as the study's search is after it; a function of the pre-flight and the target's table."""
+    table = run.study.target
+    outputs = tuple((agent, metric) for agent in table.agents for metric in table.metrics)
+    return Goal(outputs, table.means.ravel(), noise_of(run).variance.ravel(), compose_of(run.study))
+
+
+def knowledge_of(run: StudyRun, done: Iterable[TrialRecord]) -> Knowledge:
+    """All that finished trials say of θ.
+
+    Raises:
+        RunError: If no trial has an outcome, or the store lacks episodes of one.
+    """
+    trials = [run.search_trial(trial) for trial in done]
+    return learn_theta(run.settings.space, trials, goal_of(run), run.settings.seed)
+
+
+def run_trials(run: StudyRun, proposer: Proposer) -> None:
+    """Run a study's trials to the end of its budget, or until a rule stops it, from wherever it was left.
 
     The next batch is a function of the seed and the trials before it alone, and an episode that has been simulated is
     never simulated again: a study stopped at any moment goes on as if it had not been.
@@ -39,18 +131,14 @@ def run_study(run: StudyRun, proposer: Proposer) -> None:
         StoreError: If the database cannot be written.
     """
     check_facts(run)
-    _drive_lost(run)
     settings = run.settings
-    search = Search(settings.space, proposer, settings.seed, settings.budget, settings.initial, settings.batch)
-    search.run(StudyTrials(run))
-
-
-def _drive_lost(run: StudyRun) -> None:
-    """Drive again the episodes of ended trials that a damaged study.db has lost."""
     for trial in run.finished_trials():
         planned = run.episodes_of(trial)
+        # A damaged study.db may have lost some of its episodes.
         if len(run.known(planned)) < len(planned):
             run.outcomes(planned, f"trial {trial.number} again")
+    search = Search(settings.space, proposer, settings.seed, settings.budget, settings.initial, settings.batch)
+    search.run(StudyTrials(run))
 
 
 class StudyTrials:
@@ -65,7 +153,7 @@ class StudyTrials:
         return [self._run.search_trial(trial) for trial in self._done]
 
     def ended(self) -> str:
-        """Why the study runs no further; empty while it does.
+        """The reason why the study runs no further; empty while it does.
 
         Raises:
             RunError: If nothing has worked: more of the same would only burn time.
@@ -76,25 +164,29 @@ class StudyTrials:
             raise RunError(f"all {len(self._done)} trials failed; the first: {self._done[0].failure}")
         return why
 
-    def evaluate(self, batch: range, propose: Propose) -> None:
+    def evaluate(self, batch: range, propose: BatchPoints) -> None:
         """Simulate what is left of a batch, all its trials together, and keep how they ended."""
-        trials = self._open(batch, propose)
-        what = _name_trials(trials, self._run.settings.budget)
-        against = reference(self._run, self._done[: batch.start])
-        if against is None:
-            outcomes = self._run.outcomes([one for trial in trials for one in self._run.episodes_of(trial)], what)
+        run, trials = self._run, self._open(batch, propose)
+        first, last, budget = trials[0].number, trials[-1].number, run.settings.budget
+        what = f"trial {first} of {budget}" if first == last else f"trials {first} to {last} of {budget}"
+        rule = pruning_rule(run, self._done[: batch.start])
+        if rule is None:
+            outcomes = run.outcomes([one for trial in trials for one in run.episodes_of(trial)], what)
             if not self._done:
                 check_some_work(outcomes.values(), what)
-            cuts: list[Cut | None] = [None] * len(trials)
+            ended = [record(trial.number, run.evaluation_of(trial)) for trial in trials]
         else:
-            cuts = run_or_cut(self._run, trials, against, what)
-        ended = [_end(self._run, trial, cut) for trial, cut in zip(trials, cuts, strict=True)]
-        self._run.save_trials(*ended)
+            pruned = run_or_prune(run, trials, rule, what)
+            ended = [
+                record(trial.number, run.evaluation_of(trial)) if one is None else record_pruned(run, trial, one)
+                for trial, one in zip(trials, pruned, strict=True)
+            ]
+        run.save_trials(*ended)
         self._done += ended
         self._tell(ended)
 
-    def _open(self, batch: range, propose: Propose) -> list[TrialRecord]:
-        """What is left of a batch: open trials in the store, or else proposed, and in the store from now on."""
+    def _open(self, batch: range, propose: BatchPoints) -> list[TrialRecord]:
+        """The trials that are left of a batch: open in the store, or else proposed, and in the store from now on."""
         done = len(self._done)
         trials = [trial for trial in self._run.open_trials() if done < trial.number <= batch.stop]
         if len(trials) < batch.stop - done:
@@ -111,90 +203,14 @@ class StudyTrials:
             watcher.best(objective.sign * min(scores))
         best = f", best so far {objective.sign * min(scores):g}" if scores else ""
         for trial in ended:
-            came = came_to(trial, objective)
-            watcher.finished(f"trial {trial.number} of {settings.budget}: {came}{best}")
-
-
-def _name_trials(trials: Sequence[TrialRecord], budget: int) -> str:
-    """Which trials these are, in one phrase."""
-    first, last = trials[0].number, trials[-1].number
-    return f"trial {first} of {budget}" if first == last else f"trials {first} to {last} of {budget}"
+            watcher.finished(f"trial {trial.number} of {settings.budget}: {came_to(trial, objective)}{best}")
 
 
 def came_to(trial: TrialRecord, objective: Objective) -> str:
-    """What became of a trial, in one phrase."""
+    """The end of a trial, in one phrase."""
     if trial.state == "cut":
         return f"stopped early, {objective.label} at least {trial.bound:g}"
     return "failed" if trial.score is None else f"{objective.label} {objective.sign * trial.score:g}"
-
-
-def _end(run: StudyRun, trial: TrialRecord, cut: Cut | None) -> TrialRecord:
-    """A trial as its episodes, all or those up to the cut, leave it."""
-    if cut is None:
-        return record(trial.number, run.evaluation_of(trial))
-    ended = replace(trial, state="cut", decided=cut.decided, bound=cut.bound, score=cut.estimate)
-    outcomes = run.known(run.episodes_of(ended)).values()
-    return replace(ended, failed_episodes=sum(outcome.metrics is None for outcome in outcomes))
-
-
-def check_facts(run: StudyRun) -> None:
-    """See to it that what is in the store was made by this very study, or by earlier code that does the same.
-
-    Raises:
-        SettingsError: If there are finished trials and what they depend on has changed.
-    """
-    study, store = run.study, run.store
-    adopt(study, store)
-    before, after = _facts_before(store), study_facts(study)
-    if before == after:
-        describe(study, store)
-        return
-    if set(store.searches()) - {LEARNING}:
-        raise _changed(study, store, before)
-    others = {key: value for key, value in store.facts().items() if key in OTHERS}
-    store.begin({**after, **others}, study.objective.name)
-    describe(study, store)
-
-
-def stored_run(study: Study, store: Store) -> StudyRun:
-    """What is to be seen of a study: its run, of which nothing is simulated.
-
-    Raises:
-        SettingsError: If anything that the finished trials depend on has changed, apart from code.
-    """
-    return StudyRun(as_stored(study, store), store)
-
-
-def as_stored(study: Study, store: Store) -> Study:
-    """The study as its trials were run: with the domain family of then, where its code has changed since.
-
-    Raises:
-        SettingsError: If anything else that the finished trials depend on has changed.
-    """
-    before = _facts_before(store)
-    then = replace(study, identity=before.get("identity", study.identity))
-    after = study_facts(then)
-    if before and differ(before, after):
-        raise _changed(then, store, {**before, **{key: after[key] for key in CODE if key in after}})
-    return then
-
-
-def _facts_before(store: Store) -> dict[str, Any]:
-    """The facts stored with the trials."""
-    before = {key: value for key, value in store.facts().items() if key not in OTHERS}
-    if not isinstance(before.get("versions", {}), dict):
-        raise StoreError(f"{store.path}: 'versions' is not as proxytune writes it; restore a copy, or move it away")
-    return before
-
-
-def _changed(study: Study, store: Store, before: Mapping[str, Any]) -> SettingsError:
-    settings = study.settings
-    where = f"{settings.path}: {settings.family_name and f'families.{settings.family_name}: '}"
-    database = store.path if settings.family_name else store.path.name
-    return SettingsError(
-        f"{where}changed since the first trial: {', '.join(changes(before, study_facts(study)))}; "
-        f"put it back, or move {database} away to start again"
-    )
 
 
 def record(number: int, evaluation: Evaluation) -> TrialRecord:
@@ -205,56 +221,203 @@ def record(number: int, evaluation: Evaluation) -> TrialRecord:
     return TrialRecord(number, evaluation.theta, state, score, measures, failed, evaluation.failure)
 
 
-def with_metrics(study: Study, metrics: Sequence[Metric]) -> Study:
-    """The study with its agents compared by these metrics instead.
+def record_pruned(run: StudyRun, trial: TrialRecord, pruned: Pruned) -> TrialRecord:
+    """A pruned trial as the store keeps it, from the episodes of the agents decided before."""
+    ended = replace(trial, state="cut", decided=pruned.decided, bound=pruned.bound, score=pruned.estimate)
+    outcomes = run.known(run.episodes_of(ended)).values()
+    return replace(ended, failed_episodes=sum(outcome.metrics is None for outcome in outcomes))
 
-    Raises:
-        InputError: If the domain family or the target's table lacks one, or one is named twice.
+
+def stopped(run: StudyRun, done: Sequence[TrialRecord]) -> str:
+    """The reason why a study with these finished trials runs no further, in one phrase; empty while it goes on.
+
+    Only finished trials and the time of their own episodes count, never the clock of this process: a study that was
+    stopped stays so when it is run again, and without the rule it goes on to the trials it would have had anyway. Rules
+    are asked where a batch has ended: a budget that cut one short has no say in what they would have said of the whole.
     """
-    names = [metric.name for metric in metrics]
-    for name in names:
-        if name not in study.family.metrics:
-            raise InputError(f"--metric {name}: no such metric; {nearest(name, study.family.metrics)}")
-        if names.count(name) > 1:
-            raise InputError(f"--metric {name}: is given twice; give each metric once")
-    settings = replace(study.settings, metrics=tuple(metrics))
-    return replace(study, settings=settings, target=read_target(settings, study.family)[0])
+    settings, rules = run.settings, run.settings.stop
+    if len(done) >= settings.budget:
+        kept = f"; all {len(done)} that are finished count" if len(done) > settings.budget else ""
+        return f"the budget of {settings.budget} trials is spent{kept}"
+    if batch_at(len(done), settings.batch, settings.initial).start < len(done):
+        return ""
+    if rules.wall_time_s is not None and (late := out_of_time(seconds_of(run, done), rules)):
+        return late
+    scored = len(done) >= settings.initial and any(trial.state == "finished" for trial in done)
+    if rules.no_improvement is None or not scored:
+        return ""
+    return nothing_to_gain(run.study.objective.label, _gain(run, done), rules)
 
 
-def rescored(run: StudyRun, metrics: Sequence[Metric]) -> StudyResult:
-    """The result that the study's trials give by these metrics; they remain those that its own metrics led to.
+def seconds_of(run: StudyRun, done: Sequence[TrialRecord]) -> float:
+    """Seconds that the episodes of finished trials have taken, all runs together, divided by the processes [s]."""
+    settings = run.settings
+    seeds = {episode.seed for episode in plan_episodes(settings, {}, settings.seed)}
+    return run.store.seconds_of_trials(run.study.objective.name, len(done), seeds) / settings.jobs
 
-    Raises:
-        InputError: If a metric cannot be used.
-        RunError: If no trial has a score, or episodes are missing.
+
+def out_of_time(seconds: float, rules: StopRules) -> str:
+    """The phrase where so many seconds are more than the rules allow; empty where they are not."""
+    if rules.wall_time_s is None or seconds < rules.wall_time_s:
+        return ""
+    return (
+        f"episodes took {seconds:.3g} s and stop.wall_time_s is {rules.wall_time_s:g}; raise or remove it to continue"
+    )
+
+
+def nothing_to_gain(label: str, gain_and_noise: tuple[float, float], rules: StopRules) -> str:
+    """The phrase where the most that any θ is expected to improve an objective is too little; else empty."""
+    gain, noise = gain_and_noise
+    if rules.no_improvement is None or gain >= rules.no_improvement * noise:
+        return ""
+    return (
+        f"no θ is expected to improve {label} by more than {gain:.2g}; its noise is {noise:.2g} and"
+        f" stop.no_improvement is {rules.no_improvement:g}; lower or remove it to continue"
+    )
+
+
+def _gain(run: StudyRun, done: Sequence[TrialRecord]) -> tuple[float, float]:
+    """The most that any θ is expected to improve the objective, and its noise, as the study's engine sees it."""
+    settings = run.settings
+    if run.study.engine.learns_from == "outputs":
+        trials = [run.search_trial(trial) for trial in done]
+        return expected_gain(settings.space, trials, goal_of(run), settings.seed)
+    return expected_improvement(settings.space, score_trials(settings.space, done), settings.seed)
+
+
+@dataclass(frozen=True)
+class Finalist:
+    """A visited θ that has been driven again.
+
+    Attributes:
+        trial: The trial that visited it.
+        scores: The study's cost in each fresh repetition of it; None where an agent has no episode that worked.
+        assessment: How useful the proxy is there, over all fresh episodes; None if an agent has none that worked.
     """
-    own, other = run.finished_trials(), run.of(with_metrics(run.study, metrics))
-    trials = [_rescored(other, trial) for trial in own]
-    return replace(result_of(other, trials), stopped=stopped(run, own))
+
+    trial: TrialRecord
+    scores: tuple[float | None, ...]
+    assessment: Assessment | None
+
+    @property
+    def optimism(self) -> float | None:
+        """The trial's luck: how much better it scored than its fresh repetitions do on average."""
+        known = [one for one in self.scores if one is not None]
+        return float(np.mean(known)) - self.trial.score if known and self.trial.score is not None else None
 
 
-def _rescored(other: StudyRun, trial: TrialRecord) -> TrialRecord:
-    if trial.state == "cut":
-        return by_other_metrics(other, trial)
-    return record(trial.number, other.evaluation_of(trial))
+@dataclass(frozen=True)
+class Confirmation:
+    """The answer of fresh episodes.
+
+    Attributes:
+        answer: The finalist whose expected PRPV and fresh scores are lowest on average.
+        candidates: All that were driven again, the search's own favourite first.
+        episodes: How many fresh episodes each was driven in.
+    """
+
+    answer: Finalist
+    candidates: tuple[Finalist, ...]
+    episodes: int
 
 
-def retry_failed(run: StudyRun) -> None:
-    """Drive failed episodes of ended trials again where the user's code has changed since, and score these trials anew.
-
-    Such a trial is driven in full, also if it was cut off before. θ of later trials stay what they are.
+def run_confirmation(run: StudyRun) -> None:
+    """Simulate what is missing of the fresh episodes of a study that has come to its end.
 
     Raises:
         EpisodeError: If an episode fails and the study is to stop then.
+        RunError: If no trial has a score.
     """
-    for trial in run.finished_trials():
-        if trial.failed_episodes and _has_changed(run, trial):
-            run.outcomes(plan(run.settings, trial.theta, run.settings.seed), f"trial {trial.number} again")
-            run.save_trials(record(trial.number, run.evaluation_of(trial)))
+    settings, trials = run.settings, run.finished_trials()
+    if not settings.confirm or not stopped(run, trials):
+        return
+    chosen = finalists(trials, knowledge_of(run, trials))
+    known = most_confirmation_episodes(settings) - len(chosen) * _episodes_per_finalist(settings)
+    run.watcher.begin("fresh episodes", known)
+    for number, trial in enumerate(chosen, start=1):
+        what = f"fresh episodes {number} of {len(chosen)}"
+        run.outcomes([episode for repetition in _repetitions(settings, trial) for episode in repetition], what)
+        run.watcher.finished(what)
 
 
-def _has_changed(run: StudyRun, trial: TrialRecord) -> bool:
-    """Whether episodes are to be tried again, or were before this process and are not in the trial yet."""
-    known = run.known(run.episodes_of(trial))
-    failed = [episode for episode, outcome in known.items() if outcome.metrics is None]
-    return len(failed) != trial.failed_episodes or any(episode in run.corrected for episode in failed)
+def confirmation_of(run: StudyRun, trials: Sequence[TrialRecord], learnt: Knowledge) -> Confirmation | None:
+    """The answer of the fresh episodes of these trials; None if it is off, or an episode is still missing.
+
+    Args:
+        run: The study.
+        trials: Finished trials, one of them with a score.
+        learnt: What they say of θ.
+    """
+    if not run.settings.confirm:
+        return None
+    driven = [_driven_again(run, trial) for trial in finalists(trials, learnt)]
+    known = tuple(one for one in driven if one is not None)
+    if len(known) < len(driven):
+        return None
+    # Each has as many fresh episodes, so what fresh noise does to all of them alike favours none.
+    expected = [learnt.expected[learnt.space.values(one.trial.theta)] for one in known]
+    scores = [[mean, *(s for s in one.scores if s is not None)] for mean, one in zip(expected, known, strict=True)]
+    answer = known[int(np.argmin([np.mean(each) for each in scores]))]
+    return Confirmation(answer, known, _episodes_per_finalist(run.settings))
+
+
+def finalists(trials: Sequence[TrialRecord], learnt: Knowledge) -> list[TrialRecord]:
+    """The trials that are driven again, that of lowest expected PRPV first: a function of what was finished alone.
+
+    Args:
+        trials: Finished trials, one of them with a score.
+        learnt: What they say of θ.
+    """
+    # Of a pruned trial it is certain that it is none of the best.
+    scored = {learnt.space.values(trial.theta): trial for trial in trials if trial.state == "finished"}
+    expected = {values: mean for values, mean in learnt.expected.items() if values in scored}
+    best = min(expected, key=expected.__getitem__)
+    noise = float(learnt.fresh_scores(best).std())
+    near = [values for values, mean in expected.items() if mean - expected[best] <= noise]
+    likeliest = learnt.likeliest_of(list(expected))
+    return [scored[values] for values in dict.fromkeys([near[0], likeliest, *near[1:]])][:MOST_FINALISTS]
+
+
+def _episodes_per_finalist(settings: StudySettings) -> int:
+    return settings.confirm * len(settings.agents) * settings.starts
+
+
+def most_confirmation_episodes(settings: StudySettings) -> int:
+    """The number of episodes that a confirmation takes at most."""
+    return MOST_FINALISTS * _episodes_per_finalist(settings)
+
+
+def _repetitions(settings: StudySettings, trial: TrialRecord) -> list[list[Episode]]:
+    """The episodes of each fresh repetition of a trial."""
+    seeds = [fresh_seed(settings.seed, repetition) for repetition in range(1, settings.confirm + 1)]
+    return [plan_episodes(settings, trial.theta, seed) for seed in seeds]
+
+
+def _driven_again(run: StudyRun, trial: TrialRecord) -> Finalist | None:
+    repetitions = []
+    for planned in _repetitions(run.settings, trial):
+        known = run.known(planned)
+        if len(known) < len(planned):
+            return None
+        repetitions.append(list(known.values()))
+    scores = tuple(evaluate_outcomes(run.study, trial.theta, outcomes).score for outcomes in repetitions)
+    own = list(run.known(plan_episodes(run.settings, trial.theta, run.settings.seed)).values())
+    return Finalist(trial, scores, _assessed(run.study, own, repetitions))
+
+
+def _assessed(study: Study, own: list[Outcome], runs: Sequence[Sequence[Outcome]]) -> Assessment | None:
+    """All fresh episodes as one table; of several repetitions, each start is another episode every time.
+
+    The noise floor is what the domain's own trial scores against them.
+    """
+    scored: dict[tuple[str, str], Mapping[str, float]] = {}
+    for repetition, outcomes in enumerate(runs):
+        for one in outcomes:
+            label = f"{one.episode.start}/{repetition}" if len(runs) > 1 else str(one.episode.start)
+            if one.metrics is not None:
+                scored[one.episode.agent, label] = one.metrics
+    if {agent for agent, _ in scored} != set(study.settings.agents):
+        return None
+    proxy, metrics = ScoreTable.from_episodes(in_common(scored)), study.settings.metrics
+    floor = floor_of_repeats(domain=score_table(own), again=proxy, metrics=metrics)
+    return assess(proxy=proxy, target=study.target, metrics=metrics, floor=floor)

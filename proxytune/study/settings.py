@@ -1,9 +1,8 @@
-"""What study.toml says, read strictly.
+"""The settings of a study.toml, read strictly: every complaint has the file, the key and a remedy.
 
-What a study.toml compares: metrics, agents, and the files of the target's scores.
-Rules that end a study before its budget is spent, as study.toml gives them.
-Files beside a study that its agents may read, and whose changes nobody notices.
-The table [families] of a study.toml: each of them is the same study of another simulator.
+`read_study_settings` gives `StudySettings`. Where there is a table [families], each of them is the same study of
+another simulator, with settings of its own. `unnoticed` names files of weights beside a study that its agents may read,
+and whose changes nobody notices.
 """
 
 import re
@@ -23,7 +22,7 @@ from proxytune.storage import FAMILIES
 
 
 def metrics_of(read: Section) -> tuple[Metric, ...]:
-    """How agents are compared."""
+    """The metrics that agents are compared by."""
     try:
         metrics = tuple(Metric.parse(text) for text in read.texts("metrics"))
     except InputError as problem:
@@ -63,7 +62,7 @@ def texts_of(table: Section) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class StopRules:
-    """When a study ends before its budget is spent; None where a rule is not asked for.
+    """The rules that end a study before its budget is spent; None where one is not asked for.
 
     Attributes:
         wall_time_s: After the trial with which its episodes have taken so long [s], all runs together.
@@ -100,20 +99,10 @@ def positive(table: Section, key: str) -> float | None:
 
 
 SUFFIXES = (
-    ".ckpt",
-    ".h5",
-    ".joblib",
-    ".keras",
-    ".npy",
-    ".npz",
-    ".onnx",
-    ".pickle",
-    ".pkl",
-    ".pt",
-    ".pth",
-    ".safetensors",
+    ".ckpt", ".h5", ".joblib", ".keras", ".npy", ".npz", ".onnx", ".pickle", ".pkl", ".pt", ".pth", ".safetensors",
     ".tflite",
-)
+)  # fmt: skip
+"""Of files with weights."""
 MADE = ("families", "figures", "loop", "rescored", "teaching")
 """Folders that running a study makes."""
 NAMED = 3
@@ -164,7 +153,9 @@ def family_tables(read: Section, family: str, name: str) -> dict[str, Section]:
         return {}
     tables = read.section(FAMILIES)
     for one in tables.values:
-        _check_name(tables, one)
+        if not NAME.fullmatch(one):
+            told = "is the name of a folder too; use up to 64 letters, digits, - and _, no other sign"
+            raise tables.error(one, told)
     if len(tables.values) < FEWEST:
         told = f"comparing takes at least two families, got {len(tables.values)}"
         raise read.error(FAMILIES, f"{told}; add one, as in [families.planar]")
@@ -172,11 +163,6 @@ def family_tables(read: Section, family: str, name: str) -> dict[str, Section]:
     if len(set(lower)) < len(lower):
         raise read.error(FAMILIES, "two names differ in nothing but capitals, as folders' names cannot everywhere")
     return {one: _overlaid(read, tables.section(one), family, f"{name}_{one}") for one in tables.values}
-
-
-def _check_name(tables: Section, name: str) -> None:
-    if not NAME.fullmatch(name):
-        raise tables.error(name, "is the name of a folder too; use up to 64 letters, digits, - and _, no other sign")
 
 
 def _overlaid(read: Section, table: Section, family: str, name: str) -> Section:
@@ -277,7 +263,7 @@ class StudySettings:
 
     @property
     def loaded_agents(self) -> tuple[str, ...]:
-        """What is loaded for each agent."""
+        """The name by which each agent is loaded."""
         return tuple(self.aliases.get(agent, agent) for agent in self.agents)
 
     @property
@@ -341,7 +327,7 @@ def _settings(read: Section) -> StudySettings:
     read.only(KEYS)
     if read.whole("format", low=1) > FORMAT:
         raise read.error("format", f"this proxytune reads up to {FORMAT}; install a newer one")
-    targets = tuple(read.file("target", name) for name in targets_of(read))
+    targets, objective = tuple(read.file("target", name) for name in targets_of(read)), read.text("objective", "prpv")
     return StudySettings(
         path=path,
         name=read.text("name", path.absolute().parent.name),
@@ -349,14 +335,15 @@ def _settings(read: Section) -> StudySettings:
         proxy=read.file("proxy") if "proxy" in read.values else None,
         target=targets[0],
         truth=read.file("truth") if "truth" in read.values else None,
-        objective=read.text("objective", "prpv"),
+        objective=objective,
         metrics=metrics_of(read),
         agents=agents_of(read),
         starts=read.whole("starts", low=1),
         budget=read.whole("budget", low=1, high=100_000),
         initial=read.whole("initial", 8, low=1, high=100_000),
         batch=read.whole("batch", 1, low=1, high=100_000),
-        engine=read.text("engine", _default_engine(read)),
+        # Of learning value nothing is known but the score.
+        engine=read.text("engine", SCORE_ENGINE if objective == LEARNING else DEFAULT_ENGINE),
         seed=read.whole("seed", 1),
         jobs=read.whole("jobs", 1, low=1, high=1024),
         stop_on_failure=read.text("on_failure", "continue", choices=("continue", "stop")) == "stop",
@@ -374,18 +361,13 @@ def _settings(read: Section) -> StudySettings:
     )
 
 
-def _default_engine(read: Section) -> str:
-    """Of learning value nothing is known but the score."""
-    return SCORE_ENGINE if read.text("objective", "prpv") == LEARNING else DEFAULT_ENGINE
-
-
 def _space(parameters: Section) -> Space:
     if not parameters.values:
         raise Section(parameters.path, "", {}).error("parameters", "is missing; write NAME = [low, high] in it")
     return Space(tuple(Interval(name, *parameters.bounds(name)) for name in sorted(parameters.values)))
 
 
-def as_document(settings: StudySettings) -> Mapping[str, Any]:
+def settings_document(settings: StudySettings) -> Mapping[str, Any]:
     """The settings as plain texts and numbers, for reports."""
     return {
         "path": str(settings.path),

@@ -1,9 +1,9 @@
-"""A study under way: what it needs of its domain family is simulated once, kept in the store, and remembered.
+"""A study under way: from θ to episodes, outcomes and PRPV; what it needs is simulated once and kept in the store.
 
-Scoring one domain instance: all agents from all starts, compared with the target.
-A study as a search sees it: its trials' scores, and each agent's mean of every metric that both sides have.
-A study with another budget or other jobs than its study.toml says: its trials do not depend on either.
-Scoring a study's agents in one fixed domain: how a twin's target.csv is made.
+A domain instance is scored by every agent from every start (`plan_episodes`), compared with the target
+(`evaluate_outcomes`). `StudyRun` is asked for outcomes or an evaluation and simulates what is missing. A search sees a
+trial's score, and each agent's mean of every metric that both sides have (`outputs_of`), from which the score is
+composed (`compose_of`). `measure_agents` scores the agents in one fixed domain: how a twin's target.csv is made.
 """
 
 from collections import Counter
@@ -32,7 +32,7 @@ from proxytune.usefulness import dominance
 
 @dataclass(frozen=True)
 class Evaluation:
-    """How useful a domain instance is.
+    """The usefulness of a domain instance.
 
     Attributes:
         theta: The instance.
@@ -59,7 +59,7 @@ class Evaluation:
         return self.measures.get("prpv")
 
 
-def plan(settings: StudySettings, theta: Theta, seed: int) -> list[Episode]:
+def plan_episodes(settings: StudySettings, theta: Theta, seed: int) -> list[Episode]:
     """The episodes that score a domain instance: every agent from every start."""
     instance, seeds = instance_of(theta), [episode_seed(seed, start) for start in range(settings.starts)]
     return [Episode(instance, agent, start, own) for agent in settings.agents for start, own in enumerate(seeds)]
@@ -78,7 +78,7 @@ def with_metrics_needed(outcome: Outcome, needed: Sequence[str]) -> Outcome:
 
 @dataclass(frozen=True)
 class Spent:
-    """What a run has cost: episodes simulated, their time summed over all processes, and how many of them in vain."""
+    """The cost of a run: episodes simulated, their time summed over all processes, and how many of them in vain."""
 
     episodes: int = 0
     seconds: float = 0.0
@@ -93,7 +93,7 @@ def longest_first(episodes: Sequence[Episode], seconds: Mapping[tuple[str, int],
     return sorted(episodes, key=lambda episode: -seconds.get((episode.agent, episode.start), float("inf")))
 
 
-def score(study: Study, theta: Theta, outcomes: Sequence[Outcome]) -> Evaluation:
+def evaluate_outcomes(study: Study, theta: Theta, outcomes: Sequence[Outcome]) -> Evaluation:
     """Compare the outcomes of a domain instance's episodes with the target; a pure function.
 
     Each agent is scored over its own episodes that worked. A failed episode has no score, so none is made up for it;
@@ -105,7 +105,7 @@ def score(study: Study, theta: Theta, outcomes: Sequence[Outcome]) -> Evaluation
         if failed.episode.agent not in worked:
             reason = f"agent '{failed.episode.agent}' failed from every start, first with: {failed.failure}"
             return Evaluation(theta, None, {}, None, failures, reason)
-    proxy, objective = table(outcomes), study.objective
+    proxy, objective = score_table(outcomes), study.objective
     measures = objective.measure(proxy=proxy, target=study.target, metrics=study.settings.metrics)
     value = measures[objective.name]
     reason = "" if value is not None else f"{objective.label} is undefined here"
@@ -123,7 +123,7 @@ def disagreement_of(study: Study, proxy: ScoreTable, agents: Sequence[str]) -> F
     return np.abs(ranked[0] - ranked[1])
 
 
-def table(outcomes: Sequence[Outcome]) -> ScoreTable:
+def score_table(outcomes: Sequence[Outcome]) -> ScoreTable:
     """The scores of the episodes that worked, labelled by their start, in the metrics that all of them have."""
     worked = {(one.episode.agent, str(one.episode.start)): one.metrics for one in outcomes if one.metrics is not None}
     return ScoreTable.from_episodes(in_common(worked))
@@ -136,7 +136,7 @@ def in_common(scored: Mapping[tuple[str, str], Mapping[str, float]]) -> dict[tup
 
 
 def failure_of(outcome: Outcome) -> str:
-    """Which episode failed and why, in one phrase."""
+    """Name the episode that failed, and why, in one phrase."""
     episode = outcome.episode
     return f"agent '{episode.agent}' failed from start {episode.start}: {outcome.failure}"
 
@@ -170,7 +170,7 @@ def _means(study: Study, outcomes: Collection[Outcome]) -> Floats:
 
 
 def compose_of(study: Study) -> Compose:
-    """What the study makes small, of outputs against the study's target."""
+    """The function of outputs that the study makes small, against its target."""
     metrics, table, objective = study.settings.metrics, study.target, study.objective
     compared = table.means[:, : len(metrics)]
 
@@ -182,7 +182,7 @@ def compose_of(study: Study) -> Compose:
 
 
 Enough = Callable[[Instance, Mapping[Episode, Outcome]], bool]
-"""Whether the outcomes so far are enough of a domain instance, so that no more of its episodes begin."""
+"""True if the outcomes so far are enough of a domain instance, so that no more of its episodes begin."""
 
 
 class StudyRun:
@@ -203,7 +203,7 @@ class StudyRun:
 
     @property
     def settings(self) -> StudySettings:
-        """What study.toml says."""
+        """The settings of study.toml."""
         return self.study.settings
 
     def of(self, study: Study) -> "StudyRun":
@@ -223,7 +223,7 @@ class StudyRun:
         self.store.save_trial(self.study.identity, *trials, objective=self.study.objective.name)
 
     def known(self, planned: Sequence[Episode]) -> dict[Episode, Outcome]:
-        """What became of those of the episodes that have been simulated."""
+        """The outcomes of those of the episodes that have been simulated."""
         known: dict[Episode, Outcome] = {}
         for theta in dict.fromkeys(episode.theta for episode in planned):
             known |= self.store.outcomes(self.study.identity, dict(theta))
@@ -231,7 +231,7 @@ class StudyRun:
         return {e: with_metrics_needed(known[e], needed) for e in planned if e in known}
 
     def outcomes(self, planned: Sequence[Episode], what: str, enough: Enough | None = None) -> dict[Episode, Outcome]:
-        """What becomes of episodes; those not simulated yet are simulated now.
+        """The outcomes of episodes; those not simulated yet are simulated now.
 
         A failed episode counts as known where failures do not stop the study and the code that failed is still the
         same; else it is tried again, since something is expected to have been corrected. Where it is asked whether what
@@ -241,7 +241,8 @@ class StudyRun:
         Raises:
             EpisodeError: If an episode fails and the study is to stop then.
         """
-        known = {e: one for e, one in self.known(planned).items() if not (one.failure and self._is_tried_again(e))}
+        again = self.settings.stop_on_failure
+        known = {e: o for e, o in self.known(planned).items() if not (o.failure and (again or e in self.corrected))}
         missing = [episode for episode in planned if episode not in known]
         self.watcher.begin(what, len(planned) - len(missing))
         if missing:
@@ -253,9 +254,6 @@ class StudyRun:
         """The episodes that failed in code that has changed since, and have not been tried again."""
         return self.store.failed_in_other_code(self.study.identity, self.study.code)
 
-    def _is_tried_again(self, failed: Episode) -> bool:
-        return self.settings.stop_on_failure or failed in self.corrected
-
     def _simulate(
         self,
         planned: Sequence[Episode],
@@ -265,7 +263,11 @@ class StudyRun:
     ) -> None:
         """Simulate what is missing, and add it to what is known."""
         ended = {theta for theta in {episode.theta for episode in planned} if enough and enough(theta, known)}
-        order = self._order(planned, missing, by_agent=enough is not None)
+        order = longest_first(missing, self.store.seconds())
+        if enough:
+            # Agent by agent as planned, and only within an agent the longest first
+            place = {agent: number for number, agent in enumerate(dict.fromkeys(one.agent for one in planned))}
+            order.sort(key=lambda episode: place[episode.agent])
         family, needed = self.study.family, needed_metrics(self.settings, self.study.family)
         with (
             self.watched() as watch,
@@ -280,7 +282,7 @@ class StudyRun:
 
     @contextmanager
     def watched(self) -> Iterator[Watch]:
-        """How episodes are watched: one that ends this process is known to the next, and its agent is isolated then."""
+        """Watch episodes: one that ends this process is known to the next, and its agent is isolated then."""
         store, identity = self.store, self.study.identity
         left, agents = store.under_way(identity), store.agents_that_failed(ENDED, ENDLESS)
         begins, waits = partial(store.begin_episode, identity), self.watcher.waiting
@@ -288,12 +290,6 @@ class StudyRun:
             yield Watch(self.settings.episode_timeout_s, lambda one: one in left or one.agent in agents, begins, waits)
         finally:
             store.end_episodes()
-
-    def _order(self, planned: Sequence[Episode], missing: Sequence[Episode], *, by_agent: bool) -> list[Episode]:
-        """The longest first; or agent by agent as planned, and only within an agent the longest first."""
-        order = longest_first(missing, self.store.seconds())
-        place = {agent: number for number, agent in enumerate(dict.fromkeys(episode.agent for episode in planned))}
-        return sorted(order, key=lambda episode: place[episode.agent]) if by_agent else order
 
     def _keep(self, outcome: Outcome) -> None:
         self.store.save_outcome(self.study.identity, outcome, self.study.code)
@@ -309,7 +305,7 @@ class StudyRun:
         Raises:
             EpisodeError: If an episode fails and the study is to stop then.
         """
-        self.outcomes(plan(self.settings, theta, self.settings.seed), what)
+        self.outcomes(plan_episodes(self.settings, theta, self.settings.seed), what)
         evaluation = self.evaluation(theta)
         assert evaluation is not None
         return evaluation
@@ -318,11 +314,11 @@ class StudyRun:
         """The score of a domain instance; None if an episode of it has not been simulated."""
         key = instance_of(theta)
         if key not in self._evaluations:
-            planned = plan(self.settings, theta, self.settings.seed)
+            planned = plan_episodes(self.settings, theta, self.settings.seed)
             known = self.known(planned)
             if len(known) < len(planned):
                 return None
-            self._evaluations[key] = score(self.study, theta, list(known.values()))
+            self._evaluations[key] = evaluate_outcomes(self.study, theta, list(known.values()))
         return self._evaluations[key]
 
     def evaluation_of(self, trial: TrialRecord) -> Evaluation:
@@ -337,12 +333,12 @@ class StudyRun:
         return evaluation
 
     def episodes_of(self, trial: TrialRecord) -> list[Episode]:
-        """The episodes that a trial stands on: all, or those of the agents decided before it was cut off."""
-        planned = plan(self.settings, trial.theta, self.settings.seed)
+        """The episodes that a trial stands on: all, or those of the agents decided before it was pruned."""
+        planned = plan_episodes(self.settings, trial.theta, self.settings.seed)
         return [episode for episode in planned if not trial.decided or episode.agent in trial.decided]
 
     def search_trial(self, trial: TrialRecord) -> Trial:
-        """A finished trial as the search sees it; of one that was cut off, the outputs of the agents driven until then.
+        """A finished trial as the search sees it; of one that was pruned, the outputs of the agents driven until then.
 
         Of these the store may happen to have more: other processes had begun them.
 
@@ -385,7 +381,7 @@ def with_spending(study: Study, *, budget: int | None = None, jobs: int | None =
     return replace(study, settings=spending)
 
 
-def measure(settings: StudySettings, model: Path, seed: int, watcher: Watcher, repeats: int = 1) -> ScoreTable:
+def measure_agents(settings: StudySettings, model: Path, seed: int, watcher: Watcher, repeats: int = 1) -> ScoreTable:
     """Score the study's agents over its starts in the domain that a model describes.
 
     Every metric of the family is kept that all episodes have. Rows are in the order of the study's agents and starts,
@@ -397,21 +393,18 @@ def measure(settings: StudySettings, model: Path, seed: int, watcher: Watcher, r
         EpisodeError: If any episode fails: a target has no holes.
     """
     family = load_family(settings, model)
-    labels = _labelled(settings, seed, repeats)
+    runs = [plan_episodes(settings, {}, fresh_seed(seed, repeat)) for repeat in range(repeats)]
+    # By agent, then start, then repeat
+    labels = {
+        episode: f"{episode.start}/{repeat}" if repeats > 1 else str(episode.start)
+        for alike in zip(*runs, strict=True)
+        for repeat, episode in enumerate(alike)
+    }
     watcher.begin(f"measuring {model.name}", 0)
-    metrics = _drive(family, settings, list(labels), watcher)
-    scored = {(episode.agent, label): metrics[episode] for episode, label in labels.items()}
-    return ScoreTable.from_episodes(in_common(scored))
-
-
-def _drive(
-    family: DomainFamily, settings: StudySettings, episodes: list[Episode], watcher: Watcher
-) -> dict[Episode, Mapping[str, float]]:
-    """The metrics of every episode; an agent's last one is told."""
-    needed, left = needed_metrics(settings, family), Counter(episode.agent for episode in episodes)
+    needed, left = needed_metrics(settings, family), Counter(episode.agent for episode in labels)
     metrics: dict[Episode, Mapping[str, float]] = {}
     watch = Watch(settings.episode_timeout_s, waits=watcher.waiting)
-    with running(family, longest_first(episodes, {}), settings.jobs, needed=needed, watch=watch) as outcomes:
+    with running(family, longest_first(list(labels), {}), settings.jobs, needed=needed, watch=watch) as outcomes:
         for outcome in outcomes:
             if outcome.metrics is None:
                 raise EpisodeError(failure_of(outcome))
@@ -421,14 +414,5 @@ def _drive(
             left[agent] -= 1
             if not left[agent]:
                 watcher.finished(f"agent {agent} measured")
-    return metrics
-
-
-def _labelled(settings: StudySettings, seed: int, repeats: int) -> dict[Episode, str]:
-    """Every episode with its label: by agent, then start, then repeat."""
-    runs = [plan(settings, {}, fresh_seed(seed, repeat)) for repeat in range(repeats)]
-    return {
-        episode: f"{episode.start}/{repeat}" if repeats > 1 else str(episode.start)
-        for alike in zip(*runs, strict=True)
-        for repeat, episode in enumerate(alike)
-    }
+    scored = {(episode.agent, label): metrics[episode] for episode, label in labels.items()}
+    return ScoreTable.from_episodes(in_common(scored))

@@ -1,9 +1,9 @@
 from .examining import count_examinations as count_examinations
 from .experiment import (
-    Agreement as Agreement,
     Experiment as Experiment,
     Observations as Observations,
     Predictivity as Predictivity,
+    RankAgreement as RankAgreement,
     TeacherResult as TeacherResult,
     check_proxies as check_proxies,
     classrooms as classrooms,

@@ -1,9 +1,8 @@
 """The examinations of a learning experiment: all of a grid, or those that tell most, batch by batch.
 
 A batch is a pure function of the scores of the batches before it, and every score is cached by all that determines it:
-an experiment that is stopped at any moment goes on where it was, to the same scores.
-
-The points of learning curves, made by several processes; one that hangs or ends with its process is named.
+an experiment that is stopped at any moment goes on where it was, to the same scores. Points of learning curves are made
+by several processes (`prepare_points`, `score_points`); one that hangs or ends with its process is named.
 """
 
 import functools
@@ -21,12 +20,12 @@ from proxytune.learning import (
     LEARNER,
     NONE,
     POSTERIOR_DRAWS,
-    Curve,
+    AdaptiveDesign,
     Distribution,
     Examination,
+    ExaminationScores,
+    LearningCurve,
     SampleNeeds,
-    Scores,
-    Spending,
     TeachingSettings,
     curves_of,
     first_examinations,
@@ -34,13 +33,13 @@ from proxytune.learning import (
     sample_needs,
 )
 from proxytune.running import OVERRUN, IsolatedWorker, Rescue, TracedTask, Watcher, WorkerExit, working
-from proxytune.teaching.points import TOGETHER, Point, TeachingSetup
+from proxytune.teaching.points import TOGETHER, CurvePoint, TeachingSetup
 
 TRACES = ".under_way"
 """The folder, beside what is kept, where points keep what they do; it is there meanwhile only."""
 
 
-def prepare_points(setup: TeachingSetup, points: Sequence[Point], jobs: int) -> None:
+def prepare_points(setup: TeachingSetup, points: Sequence[CurvePoint], jobs: int) -> None:
     """Make what these points share with others.
 
     Raises:
@@ -53,7 +52,7 @@ def prepare_points(setup: TeachingSetup, points: Sequence[Point], jobs: int) -> 
             pass
 
 
-def prepare_shared(setup: TeachingSetup, points: Sequence[Point], jobs: int) -> None:
+def prepare_shared(setup: TeachingSetup, points: Sequence[CurvePoint], jobs: int) -> None:
     """Make what several points share before they are scored, so that no two processes make the same.
 
     Raises:
@@ -63,8 +62,8 @@ def prepare_shared(setup: TeachingSetup, points: Sequence[Point], jobs: int) -> 
 
 
 def score_points(
-    setup: TeachingSetup, points: Sequence[Point], jobs: int
-) -> AbstractContextManager[Iterator[tuple[Point, float]]]:
+    setup: TeachingSetup, points: Sequence[CurvePoint], jobs: int
+) -> AbstractContextManager[Iterator[tuple[CurvePoint, float]]]:
     """Score the points in parallel, each yielded as soon as it is there.
 
     Those that take longest begin first: otherwise one of them, begun last, would keep one process busy alone.
@@ -76,18 +75,18 @@ def score_points(
     return _spread(setup, functools.partial(_score, setup.score), ordered, jobs)
 
 
-def _score(score: Callable[[Point], float], point: Point) -> tuple[Point, float]:
+def _score(score: Callable[[CurvePoint], float], point: CurvePoint) -> tuple[CurvePoint, float]:
     return point, score(point)
 
 
 @contextmanager
 def _spread(
-    setup: TeachingSetup, work: Callable[[Point], Any], points: Sequence[Point], jobs: int
+    setup: TeachingSetup, work: Callable[[CurvePoint], Any], points: Sequence[CurvePoint], jobs: int
 ) -> Iterator[Iterator[Any]]:
     """Do the points, in processes that a limit may end where there is one."""
     with _traces(setup.cache.folder / TRACES) as folder:
         traced = TracedTask(work, folder)
-        rescue = Rescue[Point, Any](_Loss(setup.timeout_s, traced), isolated=setup.timeout_s is not None)
+        rescue = Rescue[CurvePoint, Any](_Loss(setup.timeout_s, traced), isolated=setup.timeout_s is not None)
         with working(traced, points, jobs, rescue=rescue) as done:
             yield done
 
@@ -106,12 +105,12 @@ def _traces(folder: Path) -> Iterator[Path]:
 
 @dataclass(frozen=True)
 class _Loss:
-    """What becomes of a point that has ended its process."""
+    """The handling of a point that has ended its process."""
 
     timeout_s: float | None
     traced: TracedTask
 
-    def __call__(self, point: Point, end: WorkerExit) -> Any:
+    def __call__(self, point: CurvePoint, end: WorkerExit) -> Any:
         """Make it once more where that tells which episode it is, or say of what it ended.
 
         Raises:
@@ -123,7 +122,7 @@ class _Loss:
                 return isolated.do(point, functools.partial(self._refuse, point))
         return self._refuse(point, end)
 
-    def _refuse(self, point: Point, end: WorkerExit) -> NoReturn:
+    def _refuse(self, point: CurvePoint, end: WorkerExit) -> NoReturn:
         what = f"{point.name}: {self.traced.last(point) or 'a point of a learning curve'}"
         if end.how == OVERRUN and self.timeout_s is not None:
             limit = f"{what} took longer than {self.timeout_s:g} s; correct the learner or the domain family"
@@ -132,31 +131,28 @@ class _Loss:
         raise RunError(f"{what} ended its process ({end.how}{why}); correct that, and run again to continue")
 
 
-def _shared(settings: TeachingSettings, points: Sequence[Point]) -> list[Point]:
+def _shared(settings: TeachingSettings, points: Sequence[CurvePoint]) -> list[CurvePoint]:
     """Points whose preparation makes all that these share.
 
     Where the learner drives in the target, its samples are shared by the points of one learning curve and repetition;
     where the expert does, by all points of a repetition.
     """
+
+    def first_of_each(points: Sequence[CurvePoint]) -> list[CurvePoint]:
+        """The first point of each learning curve and repetition."""
+        first: list[tuple[CurvePoint, CurvePoint]] = []
+        for point in points:
+            kind = replace(point, count=0)
+            if kind not in [known for known, _ in first]:
+                first.append((kind, point))
+        return [point for _, point in first]
+
     if settings.target_lessons == LEARNER:
-        falling = sorted(points, key=lambda point: -point.count)
-        return _first_of_each(falling, lambda point: replace(point, count=0))
+        return first_of_each(sorted(points, key=lambda point: -point.count))
     last = settings.target_samples[-1]
     repetitions = sorted({point.repetition for point in points})
-    targets = [Point("the target", None, repetition, last) for repetition in repetitions]
-    taught = [replace(point, count=0) for point in points if point.proxy is not None]
-    return targets + _first_of_each(taught, lambda point: point)
-
-
-def _first_of_each(points: Sequence[Point], kind: Callable[[Point], Point]) -> list[Point]:
-    """The first point of each kind."""
-    kinds: list[Point] = []
-    first = []
-    for point in points:
-        if kind(point) not in kinds:
-            kinds.append(kind(point))
-            first.append(point)
-    return first
+    targets = [CurvePoint("the target", None, repetition, last) for repetition in repetitions]
+    return targets + first_of_each([replace(point, count=0) for point in points if point.proxy is not None])
 
 
 BATCH = 12
@@ -170,7 +166,7 @@ def examine_curves(
     proxies: Mapping[str, Distribution | None],
     jobs: int,
     watcher: Watcher,
-    known: Scores | None = None,
+    known: ExaminationScores | None = None,
 ) -> dict[Examination, float]:
     """Examine learners of these proxies; what is cached is not made again.
 
@@ -186,36 +182,33 @@ def examine_curves(
     """
     taught, scores = setup.settings, dict(known or {})
     if taught.examinations is None:
-        return {**scores, **_examine(setup, proxies, _whole_grid(taught, proxies), jobs, watcher)}
+        grid = [
+            Examination(name, repetition, count)
+            for name in proxies
+            for repetition in range(taught.seeds)
+            for count in taught.target_samples
+        ]
+        return {**scores, **_examine(setup, proxies, grid, jobs, watcher)}
     wanted = len(scores) + count_examinations(taught, len(proxies))
-    spending = Spending(NONE, taught.target_samples, taught.seeds, BATCH)
-    batch = first_examinations(list(proxies), spending)
+    design = AdaptiveDesign(NONE, taught.target_samples, taught.seeds, BATCH)
+    batch = first_examinations(list(proxies), design)
     while batch and len(scores) < wanted:
         scores |= _examine(setup, proxies, batch[: wanted - len(scores)], jobs, watcher)
         if len(scores) < wanted:
             needs = needs_of(setup, curves_of(taught.target_samples, scores), DRAWS)
-            batch = next_examinations(needs, list(proxies), spending)
+            batch = next_examinations(needs, list(proxies), design)
     return scores
 
 
 def count_examinations(taught: TeachingSettings, curves: int) -> int:
-    """How many examinations this many learning curves take."""
+    """The number of examinations that this many learning curves take."""
     return curves * (taught.examinations or taught.seeds * len(taught.target_samples))
 
 
-def needs_of(setup: TeachingSetup, curves: Mapping[str, Curve], draws: int = POSTERIOR_DRAWS) -> SampleNeeds:
-    """How many target samples each learner needs, by what [teaching] says of convergence."""
+def needs_of(setup: TeachingSetup, curves: Mapping[str, LearningCurve], draws: int = POSTERIOR_DRAWS) -> SampleNeeds:
+    """The target samples that each learner needs, by what [teaching] says of convergence."""
     taught, best = setup.settings, setup.target.best_score
     return sample_needs(curves, none=NONE, best_score=best, tolerance=taught.tolerance, level=taught.level, draws=draws)
-
-
-def _whole_grid(taught: TeachingSettings, names: Mapping[str, Distribution | None]) -> list[Examination]:
-    return [
-        Examination(name, repetition, count)
-        for name in names
-        for repetition in range(taught.seeds)
-        for count in taught.target_samples
-    ]
 
 
 def _examine(
@@ -225,7 +218,7 @@ def _examine(
     jobs: int,
     watcher: Watcher,
 ) -> dict[Examination, float]:
-    points = {one: Point(one.curve, proxies[one.curve], one.repetition, one.samples) for one in batch}
+    points = {one: CurvePoint(one.curve, proxies[one.curve], one.repetition, one.samples) for one in batch}
     missing = [point for point in points.values() if not setup.is_cached(point)]
     watcher.begin("demonstrations", len(points) - len(missing))
     prepare_shared(setup, missing, jobs)
@@ -233,11 +226,7 @@ def _examine(
     with score_points(setup, missing, jobs) as scored:
         for point, score in scored:
             watcher.episode()
-            watcher.finished(_came_to(point, score))
+            came = "nothing learnt yet" if np.isnan(score) else f"score {score:.3g}"
+            where = f"{point.name}, repetition {point.repetition + 1}, {point.count} target samples"
+            watcher.finished(f"{where}: {came}")
     return {one: setup.score(point) for one, point in points.items()}
-
-
-def _came_to(point: Point, score: float) -> str:
-    """What became of a point of a learning curve, in one line."""
-    came = "nothing learnt yet" if np.isnan(score) else f"score {score:.3g}"
-    return f"{point.name}, repetition {point.repetition + 1}, {point.count} target samples: {came}"

@@ -1,9 +1,9 @@
 """The learning experiment: learning curves with and without each proxy, and what each is worth as a teacher.
 
-What each of several families is worth as a teacher: all at their best θ, for one target and one learner.
-Whether one figure ranks proxies as another does: Kendall's τ with its interval, from draws of both.
-How well each proxy of a learning experiment predicts: PRPV beside PLV, since the one does not tell the other.
-The paper's two observations, held against a learning experiment: what zero-shot scores and PRPV tell of PLV.
+`run_experiment` teaches a learner in every proxy of [teaching], and `teach_families` in each of several families at its
+best θ, for one target and one learner. `predictivity` says how well each proxy predicts: PRPV beside PLV, since the one
+does not tell the other. `observe` holds the paper's two observations against an experiment: what zero-shot scores and
+PRPV tell of PLV, by Kendall's τ of their rankings with its interval, from draws of both.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -15,7 +15,7 @@ from typing import cast
 import numpy as np
 
 from proxytune.arrays import Floats
-from proxytune.domain import Classroom, Episode
+from proxytune.domain import Classroom
 from proxytune.errors import InputError, LearnerError
 from proxytune.extensions import make
 from proxytune.learning import (
@@ -26,23 +26,32 @@ from proxytune.learning import (
     POSTERIOR_DRAWS,
     Cache,
     Convergence,
-    Curve,
     Distribution,
-    Estimate,
     Learner,
+    LearningCurve,
+    LearningEstimate,
     SampleNeeds,
-    Teaching,
     TeachingSettings,
+    TeachingValue,
     curves_of,
-    difference,
-    estimate,
+    estimate_figure,
     learner_identity,
     mean_score,
-    teaching,
+    more_needed,
+    teaching_value,
 )
 from proxytune.running import Watcher
 from proxytune.space import Theta
-from proxytune.study import Lesson, StudyRun, StudySettings, best_teacher, check_bounds, load_family, plan, score
+from proxytune.study import (
+    Lesson,
+    StudyRun,
+    StudySettings,
+    best_teaching_family,
+    check_bounds,
+    evaluate_outcomes,
+    load_family,
+    plan_episodes,
+)
 from proxytune.teaching.examining import count_examinations, examine_curves, needs_of
 from proxytune.teaching.points import TeachingSetup
 from proxytune.usefulness import (
@@ -62,7 +71,7 @@ CACHE = "teaching"
 
 @dataclass(frozen=True)
 class TeacherResult:
-    """What one proxy has come to as a teacher.
+    """The result of one proxy as a teacher.
 
     Attributes:
         name: What it is called.
@@ -75,10 +84,10 @@ class TeacherResult:
 
     name: str
     proxy: Distribution
-    curve: Curve
-    zero_shot: Estimate
-    worth: Teaching | None
-    cost: Estimate | None
+    curve: LearningCurve
+    zero_shot: LearningEstimate
+    worth: TeachingValue | None
+    cost: LearningEstimate | None
 
 
 @dataclass(frozen=True)
@@ -98,18 +107,18 @@ class Experiment:
     teachers: tuple[TeacherResult, ...]
 
     @property
-    def without(self) -> Curve:
+    def without(self) -> LearningCurve:
         """The learning curve without a proxy."""
         return self.needs.curves[NONE]
 
     @property
     def when(self) -> Convergence:
-        """When a learner counts as converged."""
+        """The rule by which a learner counts as converged."""
         return self.needs.when
 
     @property
     def settled(self) -> bool:
-        """Whether the learner without a proxy converges."""
+        """True if the learner without a proxy converges."""
         return self.needs.settled
 
 
@@ -157,7 +166,7 @@ def run_experiment(settings: StudySettings, setup: TeachingSetup, watcher: Watch
     return judge_curves(settings, setup, curves_of(setup.settings.target_samples, scores))
 
 
-def judge_curves(settings: StudySettings, setup: TeachingSetup, curves: Mapping[str, Curve]) -> Experiment:
+def judge_curves(settings: StudySettings, setup: TeachingSetup, curves: Mapping[str, LearningCurve]) -> Experiment:
     """Judge each proxy by the learning curves: a pure function of them and of what counts as converged."""
     needs = needs_of(setup, curves)
     teachers = [_teacher(setup.settings, needs, name, proxy) for name, proxy in setup.settings.proxies.items()]
@@ -168,17 +177,12 @@ def _teacher(taught: TeachingSettings, needs: SampleNeeds, name: str, proxy: Dis
     zero_shot, curve = mean_score(needs, name, 0), needs.curves[name]
     if not needs.settled:
         return TeacherResult(name, proxy, curve, zero_shot, None, None)
-    worth = teaching(needs, none=NONE, proxy=name)
-    return TeacherResult(name, proxy, curve, zero_shot, worth, _cost_saved(taught, needs, name))
-
-
-def _cost_saved(taught: TeachingSettings, needs: SampleNeeds, name: str) -> Estimate:
-    """PLV in cost (eq. 6)."""
-
-    def saved(without: Floats, needed: Floats) -> Floats:
-        return taught.cost_saved(without=without, needed=needed)
-
-    return estimate(saved, needs, more=NONE, less=name)
+    worth = teaching_value(needs, none=NONE, proxy=name)
+    # PLV in cost (eq. 6)
+    cost = estimate_figure(
+        lambda without, needed: taught.cost_saved(without=without, needed=needed), needs, more=NONE, less=name
+    )
+    return TeacherResult(name, proxy, curve, zero_shot, worth, cost)
 
 
 def check_proxies(settings: StudySettings, setup: TeachingSetup) -> None:
@@ -265,33 +269,29 @@ def teach_families(
         there = replace(setup, proxy=room)
         try:
             with watching(count_examinations(setup.settings, 1)) as watcher:
-                scores |= examine_curves(there, {name: _fixed(thetas[name])}, settings.jobs, watcher, alone)
+                proxy = Distribution({one: (value, value) for one, value in sorted(thetas[name].items())})
+                scores |= examine_curves(there, {name: proxy}, settings.jobs, watcher, alone)
         except LearnerError as problem:
             failed[name] = problem
     if len(failed) == len(rooms):
         raise next(iter(failed.values()))
     needs = needs_of(setup, curves_of(setup.settings.target_samples, scores))
     lessons = {name: _lesson(needs, name, thetas[name]) for name in rooms if name not in failed}
-    best = best_teacher(lessons)
+    best = best_teaching_family(lessons)
     if best is not None:
         lessons = {
-            name: lesson if name == best else replace(lesson, more=difference(needs, more=name, less=best))
+            name: lesson if name == best else replace(lesson, more=more_needed(needs, more=name, less=best))
             for name, lesson in lessons.items()
         }
     lessons |= {name: Lesson(thetas[name], failure=str(problem)) for name, problem in failed.items()}
     return {name: lessons[name] for name in thetas if name in lessons}
 
 
-def _fixed(theta: Theta) -> Distribution:
-    """One θ as a distribution."""
-    return Distribution({parameter: (value, value) for parameter, value in sorted(theta.items())})
-
-
 def _lesson(needs: SampleNeeds, name: str, theta: Theta) -> Lesson:
     zero_shot = mean_score(needs, name, 0).value or 0.0
     if not needs.settled:
         return Lesson(theta, zero_shot)
-    worth = teaching(needs, none=NONE, proxy=name)
+    worth = teaching_value(needs, none=NONE, proxy=name)
     return Lesson(theta, zero_shot, worth.needed, worth.plv)
 
 
@@ -300,8 +300,8 @@ SURE = 0.95
 
 
 @dataclass(frozen=True)
-class Agreement:
-    """How far two rankings of the same proxies agree.
+class RankAgreement:
+    """The agreement of two rankings of the same proxies.
 
     Attributes:
         tau: Kendall's τ, the median over draws: 1 the same ranking, −1 its reverse.
@@ -319,7 +319,7 @@ class Agreement:
     proxies: int
 
 
-def agreement(names: Sequence[str], first: Floats, second: Floats) -> Agreement:
+def agreement(names: Sequence[str], first: Floats, second: Floats) -> RankAgreement:
     """Compare two rankings, each from draws (draws, proxies) in which more is better; ties count for neither order."""
     one, other = _orders(first), _orders(second)
     above, below = np.triu_indices(len(names), 1)
@@ -329,7 +329,7 @@ def agreement(names: Sequence[str], first: Floats, second: Floats) -> Agreement:
     ahead = np.argwhere(contrary & (_sure(other) > 0))
     low, middle, high = np.quantile(taus, (LEVELS[0], 0.5, LEVELS[1]))
     named = tuple((names[better], names[worse]) for better, worse in ahead)
-    return Agreement(float(middle), float(low), float(high), named, len(names))
+    return RankAgreement(float(middle), float(low), float(high), named, len(names))
 
 
 def _orders(values: Floats) -> Floats:
@@ -348,7 +348,7 @@ def _sure(orders: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Predictivity:
-    """How well a proxy predicts.
+    """The predictivity of a proxy.
 
     Attributes:
         prpv: PRPV of its episodes as they are.
@@ -382,9 +382,11 @@ def predictivity(run: StudyRun, proxies: Mapping[str, Distribution]) -> dict[str
 
 
 def _predictivity(run: StudyRun, name: str, proxy: Distribution) -> Predictivity | None:
-    study, planned = run.study, _planned(run, proxy)
+    study, settings = run.study, run.settings
+    drawn = [plan_episodes(settings, proxy.draw(start), settings.seed) for start in range(settings.starts)]
+    planned = [episode for start, each in enumerate(drawn) for episode in each if episode.start == start]
     found = run.outcomes(planned, f"agents in {name}")
-    evaluation = score(study, proxy.centre, [found[episode] for episode in planned])
+    evaluation = evaluate_outcomes(study, proxy.centre, [found[episode] for episode in planned])
     if evaluation.proxy is None or evaluation.prpv is None:
         return None
     inputs = compare(proxy=evaluation.proxy, target=study.target, metrics=study.settings.metrics)
@@ -396,16 +398,9 @@ def _predictivity(run: StudyRun, name: str, proxy: Distribution) -> Predictivity
     return Predictivity(evaluation.prpv, by_chance, resampled)
 
 
-def _planned(run: StudyRun, proxy: Distribution) -> list[Episode]:
-    """Every agent from every start, θ drawn for each start where it is not fixed."""
-    settings = run.settings
-    drawn = [plan(settings, proxy.draw(start), settings.seed) for start in range(settings.starts)]
-    return [episode for start, planned in enumerate(drawn) for episode in planned if episode.start == start]
-
-
 @dataclass(frozen=True)
 class Observations:
-    """What a learning experiment says of the paper's two observations.
+    """The paper's two observations, as a learning experiment has them.
 
     Attributes:
         zero_shot: Whether proxies rank by zero-shot score (first) as they do by PLV (second); None of a single one.
@@ -413,8 +408,8 @@ class Observations:
         poor_predictors: Proxies that save samples though their PRPV is such as chance gives.
     """
 
-    zero_shot: Agreement | None
-    prpv: Agreement | None
+    zero_shot: RankAgreement | None
+    prpv: RankAgreement | None
     poor_predictors: tuple[str, ...]
 
 
@@ -433,29 +428,20 @@ def observe(experiment: Experiment, prpv: Mapping[str, Predictivity | None]) -> 
     return Observations(
         zero_shot=_agreement(experiment, starts),
         prpv=_agreement(experiment, lowest),
-        poor_predictors=tuple(one.name for one in experiment.teachers if _saves(one) and _by_chance(prpv, one.name)),
+        poor_predictors=tuple(
+            one.name
+            for one in experiment.teachers
+            if one.worth and one.worth.plv.above_zero and (known := prpv.get(one.name)) and known.chance.explains
+        ),
     )
 
 
-def _agreement(experiment: Experiment, figures: Mapping[str, Floats]) -> Agreement | None:
-    """How proxies rank by a figure of which more is better, its draws by name, and by PLV; None of fewer than two."""
-    names = list(figures)
+def _agreement(experiment: Experiment, figures: Mapping[str, Floats]) -> RankAgreement | None:
+    """Compare how proxies rank by a figure (draws by name, more is better) and by PLV; None of fewer than two."""
+    names, needed = list(figures), experiment.needs.needed
     if len(names) < 2:
         return None
-    return agreement(names, np.column_stack(list(figures.values())), _plv(experiment, names))
-
-
-def _plv(experiment: Experiment, names: Sequence[str]) -> Floats:
-    """PLV of each proxy in every draw (draws, proxies); what is not reached is the worst there is."""
-    needed = experiment.needs.needed
+    # A PLV that is not reached is the worst there is.
     alone = np.minimum(needed[NONE], experiment.needs.last)
-    return np.column_stack([alone - needed[name] for name in names])
-
-
-def _saves(teacher: TeacherResult) -> bool:
-    return teacher.worth is not None and teacher.worth.plv.above_zero
-
-
-def _by_chance(prpv: Mapping[str, Predictivity | None], name: str) -> bool:
-    known = prpv.get(name)
-    return known is not None and known.chance.explains
+    plv = np.column_stack([alone - needed[name] for name in names])
+    return agreement(names, np.column_stack(list(figures.values())), plv)

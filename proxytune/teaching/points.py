@@ -1,8 +1,10 @@
 """The pieces of a learning experiment, each cached by all that determines it: samples, weights, scores.
 
-Trainings, lessons and examinations run code that is not ours: what it raises is named, and what hangs is ended.
-Learning in one domain: its lessons' samples, and the weights they lead to, each cached by what determines it.
-The box that is searched for learning value: centre and width of each parameter's distribution p(θ).
+A `CurvePoint` is one point of a learning curve; `TeachingSetup` scores it. Its learner goes through one or two stages
+(`Stage`): the lessons of a proxy, if one teaches, and those of the target; each has samples and the weights they lead
+to. Trainings, lessons and examinations run code that is not ours: what it raises is named, and what hangs is ended
+(`Supervised`). `search_space` is the box that is searched for learning value: centre and width of each parameter's
+distribution p(θ).
 """
 
 import functools
@@ -26,8 +28,8 @@ from proxytune.learning import (
     TeachingSettings,
     Weights,
     collect_samples,
-    digest,
-    examine,
+    examine_policy,
+    facts_digest,
     mix_samples,
     policy_of,
 )
@@ -37,7 +39,7 @@ from proxytune.space import Interval, Space, Theta
 from proxytune.study import StudySettings
 
 TOGETHER = " and the others beside it"
-"""How it is named what several episodes do at once: which of them fails is not known then."""
+"""Ends the name of what several episodes do at once: which of them fails is not known then."""
 
 
 @contextmanager
@@ -155,7 +157,7 @@ class Lessons:
 
     @property
     def on_policy(self) -> bool:
-        """Whether the learner drives."""
+        """True if the learner drives."""
         return self.by == LEARNER
 
     @property
@@ -191,7 +193,7 @@ class Lessons:
 
 @dataclass(frozen=True)
 class Stage:
-    """What a trainee learns in one domain, after what it has learnt in another.
+    """A stage of learning: what a trainee learns in one domain, after what it has learnt in another.
 
     Facts of what comes before enter those of what comes after as their digest: each key is short and complete.
 
@@ -215,8 +217,8 @@ class Stage:
         return {
             "learner": self.trainee.identity,
             "seed": self.trainee.seed,
-            "start": digest(start) if start else None,
-            "samples": digest(self.round_facts(self.lessons.rounds(count)[-1])),
+            "start": facts_digest(start) if start else None,
+            "samples": facts_digest(self.round_facts(self.lessons.rounds(count)[-1])),
             "count": count,
             **({"rehearsal": self.rehearsal} if self.before and self.rehearsal else {}),
         }
@@ -242,22 +244,18 @@ class Stage:
     def round_facts(self, number: int) -> dict[str, Any]:
         """All that determines a round's samples: the policy that drives stands for the rounds before."""
         policy = self.weights_facts(self.lessons.begin(number)) if self.lessons.on_policy else None
-        return {**self.lessons.facts(number), **({"policy": digest(policy)} if policy else {})}
+        return {**self.lessons.facts(number), **({"policy": facts_digest(policy)} if policy else {})}
 
     def collect(self, number: int) -> Demonstration:
         """The samples of a round."""
 
         def make() -> Arrays:
-            policy = self._policy(number)
+            weights = self.weights(self.lessons.begin(number)) if self.lessons.on_policy else None
+            policy = None if weights is None else policy_of(self.trainee.learner, weights)
             with watching("a lesson"):
                 return self.lessons.collect(number, policy)._asdict()
 
         return Demonstration(**self.trainee.cache.get("samples", self.round_facts(number), make))
-
-    def _policy(self, number: int) -> Policy | None:
-        """Who drives in a round; None for the expert."""
-        weights = self.weights(self.lessons.begin(number)) if self.lessons.on_policy else None
-        return None if weights is None else policy_of(self.trainee.learner, weights)
 
     def _train(self, count: int) -> Weights:
         samples = self.samples(count)
@@ -281,7 +279,7 @@ PROXY_ROUNDS = 4
 
 
 @dataclass(frozen=True)
-class Point:
+class CurvePoint:
     """One point of a learning curve under one seed.
 
     Attributes:
@@ -328,7 +326,7 @@ class TeachingSetup:
         """Identities of the proxy's and the target's domain family, read once: reading digests the user's modules."""
         return self.proxy.identity, self.target.identity
 
-    def score(self, point: Point) -> float:
+    def score(self, point: CurvePoint) -> float:
         """Mean score in the target over all starts; NaN where nothing has been learnt, so nothing can drive.
 
         Raises:
@@ -339,7 +337,7 @@ class TeachingSetup:
             found = self.cache.get("exam", self.exam_facts(point), lambda: self._examine(point))
             return float(np.mean(found["scores"]))
 
-    def prepare(self, point: Point) -> None:
+    def prepare(self, point: CurvePoint) -> None:
         """Make what a point shares with others: what the proxy alone has taught, and the target's samples."""
         with _name_proxy_in_errors(point), threadpool_limits(limits=1):
             stage = self._stage(point)
@@ -347,22 +345,22 @@ class TeachingSetup:
             for number in stage.lessons.rounds(point.count):
                 stage.collect(number)
 
-    def is_cached(self, point: Point) -> bool:
-        """Whether the point's scores are in the cache."""
+    def is_cached(self, point: CurvePoint) -> bool:
+        """Tell whether the point's scores are in the cache."""
         return self.cache.has("exam", self.exam_facts(point))
 
-    def exam_facts(self, point: Point) -> dict[str, Any]:
+    def exam_facts(self, point: CurvePoint) -> dict[str, Any]:
         """All that determines a point's scores: what is missing here would return stale scores."""
         weights = self._stage(point).weights_facts(point.count)
         return {
             "target": self.identities[1],
             "starts": self.starts,
             "seed": exam_seed(self.seed, 0),
-            "weights": digest(weights) if weights else None,
+            "weights": facts_digest(weights) if weights else None,
         }
 
-    def _stage(self, point: Point) -> Stage:
-        """What a point's learner learns in the target, after its proxy if it has one."""
+    def _stage(self, point: CurvePoint) -> Stage:
+        """The stage in which a point's learner learns in the target, after its proxy if it has one."""
         trainee = Trainee(self.learner, self.learner_identity, point.repetition, self.cache)
         in_proxy = None if point.proxy is None else self._proxy_lessons(point.proxy, point.repetition)
         before = None if in_proxy is None else Stage(trainee, in_proxy)
@@ -380,7 +378,7 @@ class TeachingSetup:
         room = cast(OnPolicyClassroom, Supervised(self.target, "target", self.timeout_s))
         return Lessons(room, self.identities[1], nominal, seed, self.settings.lesson_s, ends, by)
 
-    def _examine(self, point: Point) -> Arrays:
+    def _examine(self, point: CurvePoint) -> Arrays:
         weights = self._stage(point).weights(point.count)
         if weights is None:
             return {"scores": np.full(self.starts, np.nan)}
@@ -388,11 +386,11 @@ class TeachingSetup:
         episodes = [make_episode({}, agent=PUPIL, start=start, seed=seed) for start, seed in enumerate(seeds)]
         room, policy = Supervised(self.target, "target", self.timeout_s), policy_of(self.learner, weights)
         with watching("an examination"):
-            return {"scores": np.array(examine(cast(Classroom, room), episodes, policy))}
+            return {"scores": np.array(examine_policy(cast(Classroom, room), episodes, policy))}
 
 
 @contextmanager
-def _name_proxy_in_errors(point: Point) -> Iterator[None]:
+def _name_proxy_in_errors(point: CurvePoint) -> Iterator[None]:
     """Put the proxy's name in front of an error."""
     try:
         yield

@@ -1,13 +1,12 @@
 """A search for the proxy of highest learning value: θ, or p(θ) by the centre and width of each parameter.
 
-A proposal is a pure function of seed and finished trials, trials are kept in study.db and trained points in a cache
-(see `Cache`): a study that is stopped at any moment goes on where it was.
+`PlvSearch.run` leaves the order of things to the one search loop, `proxytune.search.Search`, whose trials are
+`ProxyTrials`. A proposal is a pure function of seed and finished trials, trials are kept in study.db and trained points
+in a cache (`Cache`): a study that is stopped at any moment goes on where it was.
 
-The finalists of a search by PLV, taught anew: the best p(θ), the best single θ, all of the box, and PRPV's choice.
-
-The highest of many uncertain PLVs is partly luck; what the finalists are worth is told by lessons, learners and
-examinations that the search has not used.
-Why PLV is not known, and what to do about it: what the learner without a proxy does not show.
+The highest of many uncertain PLVs is partly luck. So the finalists (the best p(θ), the best single θ, all of the box,
+and PRPV's choice) are taught anew: what they are worth is told by lessons, learners and examinations that the search
+has not used. Where PLV is not known, `why_unknown` says what the learner without a proxy does not show.
 """
 
 import json
@@ -23,21 +22,21 @@ from proxytune.errors import LearnerError, RunError
 from proxytune.learning import (
     NONE,
     Convergence,
-    Curve,
     Distribution,
-    Estimate,
+    ExaminationScores,
+    LearningCurve,
+    LearningEstimate,
     SampleNeeds,
-    Scores,
-    Teaching,
     TeachingSettings,
+    TeachingValue,
     curves_of,
-    difference,
     mean_score,
-    teaching,
+    more_needed,
+    teaching_value,
 )
 from proxytune.running import Watcher
 from proxytune.search import (
-    Propose,
+    BatchPoints,
     Proposer,
     Search,
     Surrogate,
@@ -55,7 +54,7 @@ from proxytune.storage import Store, TrialRecord
 from proxytune.study import StudySettings, nothing_to_gain, out_of_time, score_trials
 from proxytune.teaching.examining import count_examinations, examine_curves, needs_of, prepare_points
 from proxytune.teaching.experiment import Experiment, TeacherResult, judge_curves, teaching_settings
-from proxytune.teaching.points import WIDTH, Point, TeachingSetup, distribution
+from proxytune.teaching.points import WIDTH, CurvePoint, TeachingSetup, distribution
 
 BEST, SINGLE, BOX, BY_PRPV = "best p(θ)", "best single θ", "all of the box", "lowest PRPV"
 CLOUD = 4096
@@ -64,8 +63,8 @@ CLOSER = 2
 
 
 @dataclass(frozen=True)
-class Confirmation:
-    """What the finalists are worth under fresh seeds.
+class TaughtFinalists:
+    """The finalists of a search, taught anew under fresh seeds.
 
     Attributes:
         experiment: Those that can teach, and the learner without a proxy.
@@ -92,9 +91,11 @@ def finalists(
         return {}
     surrogate = fit_surrogate(space, with_failures_as_worst(trials))
     widths = np.array([name.endswith(WIDTH) for name in space.names])
-    points = _points(surrogate, settings.seed)
-    single = np.where(widths, 0.0, points)
-    named = {SINGLE: distribution(setup, _without_width(_lowest(surrogate, single)))}
+    # The best is looked for in a cloud over the unit cube, and at the points tried.
+    tried = unit_array(space, [trial.values for trial in surrogate.visited])
+    points = np.concatenate((tried, unit_points(tried.shape[1], CLOUD, proposal_seed(settings.seed, len(tried)))))
+    single = _lowest(surrogate, np.where(widths, 0.0, points))
+    named = {SINGLE: distribution(setup, {name: one for name, one in single.items() if not name.endswith(WIDTH)})}
     if widths.any():
         whole = {box.name: (box.low, box.high) for box in settings.space.intervals}
         named = {BEST: distribution(setup, _lowest(surrogate, points)), **named, BOX: Distribution(whole)}
@@ -109,13 +110,13 @@ def most_examinations(taught: TeachingSettings) -> int:
 
 
 def _closer(taught: TeachingSettings) -> TeachingSettings:
-    """How finalists are examined."""
+    """The settings by which finalists are examined."""
     return replace(taught, examinations=taught.examinations and CLOSER * taught.examinations)
 
 
-def confirm(
+def teach_finalists(
     settings: StudySettings, setup: TeachingSetup, named: Mapping[str, Distribution], watcher: Watcher
-) -> Confirmation:
+) -> TaughtFinalists:
     """Teach the finalists and the learner without a proxy under fresh seeds."""
     taught = _closer(setup.settings)
     fresh = replace(setup, seed=fresh_seed(setup.seed, 1), settings=taught)
@@ -123,13 +124,13 @@ def confirm(
     able = {name: proxy for name, proxy in named.items() if name not in unable}
     fresh = replace(fresh, settings=replace(taught, proxies=able))
     scores = examine_curves(fresh, {NONE: None, **able}, settings.jobs, watcher)
-    return Confirmation(judge_curves(settings, fresh, curves_of(taught.target_samples, scores)), unable)
+    return TaughtFinalists(judge_curves(settings, fresh, curves_of(taught.target_samples, scores)), unable)
 
 
 def _why_unable(setup: TeachingSetup, name: str, proxy: Distribution) -> str:
-    """Why a proxy cannot teach, empty if it can: nobody has driven in it before, and its expert may leave the road."""
+    """The reason why a proxy cannot teach, empty if it can: nobody has driven in it before."""
     try:
-        prepare_points(setup, [Point(name, proxy, 0, 0)], jobs=1)
+        prepare_points(setup, [CurvePoint(name, proxy, 0, 0)], jobs=1)
     except LearnerError as problem:
         return str(problem)
     return ""
@@ -146,16 +147,9 @@ def _plv(one: TeacherResult) -> float:
     return -np.inf if value is None else value
 
 
-def saves_more(experiment: Experiment, name: str, other: str) -> Estimate:
-    """How many target samples one proxy saves more than another: what the other needs less what the one needs."""
-    return difference(experiment.needs, more=other, less=name)
-
-
-def _points(surrogate: Surrogate, seed: int) -> Floats:
-    """Where the best is looked for: a cloud over the unit cube, and the points tried."""
-    tried = unit_array(surrogate.space, [trial.values for trial in surrogate.visited])
-    cloud = unit_points(tried.shape[1], CLOUD, proposal_seed(seed, len(tried)))
-    return np.concatenate((tried, cloud))
+def saves_more(experiment: Experiment, name: str, other: str) -> LearningEstimate:
+    """The target samples that one proxy saves more than another: what the other needs less what the one needs."""
+    return more_needed(experiment.needs, more=other, less=name)
 
 
 def _lowest(surrogate: Surrogate, points: Floats) -> Theta:
@@ -163,15 +157,11 @@ def _lowest(surrogate: Surrogate, points: Floats) -> Theta:
     return surrogate.space.theta(from_unit(surrogate.space, points[int(np.argmin(surrogate.mean(points)))]))
 
 
-def _without_width(theta: Theta) -> Theta:
-    return {name: value for name, value in theta.items() if not name.endswith(WIDTH)}
-
-
 RAISE = "raise teaching.target_samples"
 
 
-class Unknown(NamedTuple):
-    """Why PLV is not known.
+class PlvUnknown(NamedTuple):
+    """The reason why PLV is not known.
 
     Attributes:
         reason: Half a sentence.
@@ -182,20 +172,20 @@ class Unknown(NamedTuple):
     remedy: str
 
 
-def why_unknown(needs: SampleNeeds) -> Unknown | None:
-    """Why nothing is known of PLV, or no more than a bound; None where it is known."""
+def why_unknown(needs: SampleNeeds) -> PlvUnknown | None:
+    """The reason why nothing is known of PLV, or no more than a bound; None where it is known."""
     last, tolerance = f"{needs.last:g}", f"{needs.when.tolerance:g}"
     if needs.gain is None:
         reason = f"teaching.target_samples has no number from 1 to half of {last} that would show a rise towards it"
-        return Unknown(reason, f"add numbers between 0 and {last} to teaching.target_samples")
+        return PlvUnknown(reason, f"add numbers between 0 and {last} to teaching.target_samples")
     if not needs.settled:
         reason = (
             f"without a proxy the score still rises by more than {tolerance} over the last doubling to {last} samples"
         )
-        return Unknown(reason, RAISE)
+        return PlvUnknown(reason, RAISE)
     if not np.isfinite(np.median(needs.needed[NONE])):
         reason = f"without a proxy the score does not come to {needs.when.threshold:g} within {last} samples"
-        return Unknown(reason, f"lower teaching.level, or {RAISE}")
+        return PlvUnknown(reason, f"lower teaching.level, or {RAISE}")
     return None
 
 
@@ -218,14 +208,14 @@ class PlvTrial:
     number: int
     theta: Theta
     proxy: Distribution
-    curve: Curve
-    worth: Teaching
-    zero_shot: Estimate
+    curve: LearningCurve
+    worth: TeachingValue
+    zero_shot: LearningEstimate
 
 
 @dataclass(frozen=True)
 class PlvStudy:
-    """What a study of learning value has found.
+    """The result of a study of learning value.
 
     Attributes:
         settings: Of the study.
@@ -240,7 +230,7 @@ class PlvStudy:
 
     settings: StudySettings
     space: Space
-    without: Curve
+    without: LearningCurve
     when: Convergence
     trials: tuple[PlvTrial, ...]
     stopped: str
@@ -249,7 +239,7 @@ class PlvStudy:
 
     @property
     def narrowed(self) -> bool:
-        """Whether PRPV has narrowed the box first."""
+        """True if PRPV has narrowed the box first."""
         return teaching_settings(self.settings).narrow
 
     @property
@@ -298,12 +288,15 @@ class PlvSearch:
         needs = needs_of(self.setup, curves_of(taught.target_samples, alone))
         if unknown := why_unknown(needs):
             raise RunError(f"{settings.path}: {unknown.reason}, so PLV is not known; {unknown.remedy}")
-        self._check_facts()
+        # Trials that were made under other facts are begun afresh; what was taught is kept, so little is lost.
+        stored = self.store.facts()
+        if stored.get(OBJECTIVE) != self.facts():
+            self.store.begin({**stored, OBJECTIVE: self.facts()}, OBJECTIVE)
         tried = ProxyTrials(self, alone)
         self.watcher.begin("learning", count_examinations(taught, tried.done))
         Search(self.space, proposer, settings.seed, taught.budget, settings.initial, settings.batch).run(tried)
         named = finalists(self.setup, settings, self.space, tried.trials(), by_prpv)
-        last = confirm(settings, self.setup, named, self.watcher)
+        last = teach_finalists(settings, self.setup, named, self.watcher)
         trials, ended = tuple(tried.tried()), tried.ended()
         return PlvStudy(
             settings, self.space, needs.curves[NONE], needs.when, trials, ended, last.experiment, last.unable
@@ -322,23 +315,17 @@ class PlvSearch:
             "box": {box.name: [box.low, box.high] for box in self.space.intervals},
         }
 
-    def _check_facts(self) -> None:
-        """Begin afresh where trials were made under other facts; what was taught is kept, so little is lost."""
-        facts = self.store.facts()
-        if facts.get(OBJECTIVE) != self.facts():
-            self.store.begin({**facts, OBJECTIVE: self.facts()}, OBJECTIVE)
-
 
 class ProxyTrials:
     """The proxies tried, as the search loop evaluates them."""
 
-    def __init__(self, search: PlvSearch, alone: Scores) -> None:
+    def __init__(self, search: PlvSearch, alone: ExaminationScores) -> None:
         self._search, self._alone = search, alone
         self._records = [trial for trial in search.store.trials(OBJECTIVE) if trial.state != "open"]
 
     @property
     def done(self) -> int:
-        """How many have been tried."""
+        """The number of proxies that have been tried."""
         return len(self._records)
 
     def trials(self) -> Sequence[Trial]:
@@ -346,7 +333,7 @@ class ProxyTrials:
         return score_trials(self._search.space, self._records)
 
     def ended(self) -> str:
-        """Why no further proxy is tried; empty while one is."""
+        """The reason why no further proxy is tried; empty while one is."""
         search, done = self._search, self._records
         if len(done) >= search.setup.settings.budget:
             return f"the budget of {search.setup.settings.budget} proxies is spent"
@@ -358,15 +345,15 @@ class ProxyTrials:
             return ""
         return nothing_to_gain("PLV", expected_improvement(search.space, self.trials(), search.settings.seed), rules)
 
-    def evaluate(self, batch: range, propose: Propose) -> None:
+    def evaluate(self, batch: range, propose: BatchPoints) -> None:
         """Teach from what is left of a batch of proxies, all together, and keep what each was worth."""
         begun = time.perf_counter()
         points = list(zip(batch, propose(), strict=True))[len(self._records) - batch.start :]
         thetas = {number + 1: self._search.space.theta(values) for number, values in points}
-        made = self._tried(thetas)
+        made = [self._try(number, theta) for number, theta in thetas.items()]
         seconds = (time.perf_counter() - begun) / len(made)
         records = [_record(trial, seconds) for trial in made]
-        self._search.store.save_trial(self._identity, *records, objective=OBJECTIVE)
+        self._search.store.save_trial(self._search.setup.identities[0], *records, objective=OBJECTIVE)
         self._records += records
         for record in records:
             came = "not converged" if record.score is None else f"PLV {-record.score:g}"
@@ -374,14 +361,7 @@ class ProxyTrials:
 
     def tried(self) -> list[PlvTrial]:
         """Every proxy tried, in order, with its learning curve."""
-        return self._tried({record.number: record.theta for record in self._records})
-
-    @property
-    def _identity(self) -> str:
-        return self._search.setup.identities[0]
-
-    def _tried(self, thetas: Mapping[int, Theta]) -> list[PlvTrial]:
-        return [self._try(number, theta) for number, theta in thetas.items()]
+        return [self._try(record.number, record.theta) for record in self._records]
 
     def _try(self, number: int, theta: Theta) -> PlvTrial:
         """Teach from one proxy: what that comes to depends on no other trial."""
@@ -389,7 +369,7 @@ class ProxyTrials:
         setup, proxy = search.setup, distribution(search.setup, theta)
         scores = examine_curves(setup, {name: proxy}, search.settings.jobs, search.watcher, self._alone)
         needs = needs_of(setup, curves_of(setup.settings.target_samples, scores))
-        worth = teaching(needs, none=NONE, proxy=name)
+        worth = teaching_value(needs, none=NONE, proxy=name)
         return PlvTrial(number, theta, proxy, needs.curves[name], worth, mean_score(needs, name, 0))
 
 

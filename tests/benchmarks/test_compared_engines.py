@@ -5,7 +5,7 @@ from compared_engines import NAMES, PEERS, engine_of, why_not
 from steps import search, steps
 
 from proxytune.errors import InputError
-from proxytune.search import NAMES as STUDY_ENGINES, engine_code, make_proposer
+from proxytune.search import ENGINE_NAMES as STUDY_ENGINES, engine_code, make_proposer
 from proxytune.testing import check_engine
 
 pytestmark = pytest.mark.slow

@@ -22,7 +22,7 @@ from runs import (
     summarise,
 )
 
-from proxytune.search import Trial, engine_of, fit_surrogate, from_unit, learn, unit_points
+from proxytune.search import Trial, engine_of, fit_surrogate, from_unit, learn_theta, unit_points
 from proxytune.search.engine import design_point
 
 OBJECTIVE = Calibrated()
@@ -41,7 +41,7 @@ def trials():
 
 
 def test_the_answer_of_an_engine_that_learns_from_outputs_is_what_a_study_would_report(judged, trials):
-    known = learn(OBJECTIVE.space, trials, OBJECTIVE.goal(SEED), SEED)
+    known = learn_theta(OBJECTIVE.space, trials, OBJECTIVE.goal(SEED), SEED)
     assert judged.answer == known.answer
     assert judged.answer_score == OBJECTIVE.fresh_score(known.answer, SEED)
 
@@ -53,7 +53,7 @@ def test_that_of_any_other_engine_is_where_the_model_of_the_score_is_lowest(judg
 
 
 def test_the_reading_says_whether_region_and_intervals_hold_the_truth(judged, trials):
-    known, truth = learn(OBJECTIVE.space, trials, OBJECTIVE.goal(SEED), SEED), OBJECTIVE.truth(SEED)
+    known, truth = learn_theta(OBJECTIVE.space, trials, OBJECTIVE.goal(SEED), SEED), OBJECTIVE.truth(SEED)
     assert judged.reading.holds == known.holds(truth)
     assert judged.reading.share == known.posterior.share
     held = {

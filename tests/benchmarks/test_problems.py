@@ -15,7 +15,7 @@ from proxytune.search import from_unit, to_unit
 from proxytune.search.engine import design_point
 from proxytune.seeds import fresh_seed, target_seed
 from proxytune.storage import Store
-from proxytune.study import StudyRun, measure, open_study, plan
+from proxytune.study import StudyRun, measure_agents, open_study, plan_episodes
 from proxytune.usefulness import prpv_of_means
 from proxytune.usefulness.pairs import prpv
 
@@ -84,7 +84,7 @@ def test_the_target_is_what_measure_makes_of_the_truth_under_seeds_that_the_stud
     objective = opened()
     theta = objective.space.theta(objective.truth(2))
     truth = model(tmp_path, "".join(f"{name} = {value!r}\n" for name, value in theta.items()))
-    expected = measure(objective.run.study.settings, truth, target_seed(2), Silent())
+    expected = measure_agents(objective.run.study.settings, truth, target_seed(2), Silent())
     goal = objective.goal(2)
     assert np.array_equal(
         goal.values.reshape(expected.means.shape), expected.select(objective.run.study.target.metrics).means
@@ -193,7 +193,7 @@ def test_targets_are_driven_from_the_studys_starts(opened):
     objective.score(point(objective), 1)
     theta = objective.space.theta(objective.truth(1))
     driven = objective.run.store.outcomes(objective.run.study.identity, theta)
-    assert set(driven) == set(plan(objective.run.study.settings, theta, target_seed(1)))
+    assert set(driven) == set(plan_episodes(objective.run.study.settings, theta, target_seed(1)))
 
 
 SEEDS = st.integers(0, 1000)

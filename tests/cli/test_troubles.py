@@ -15,7 +15,7 @@ from proxytune.cli.main import main
 from proxytune.search import make_proposer
 from proxytune.storage import Store
 from proxytune.storage.database import FORMAT
-from proxytune.study import StudyRun, open_study, run_study
+from proxytune.study import StudyRun, open_study, run_trials
 
 slow = pytest.mark.slow
 DAMAGED = r"is damaged \([^)]+\); restore a copy, or keep what is whole: python -m proxytune repair \S+"
@@ -26,7 +26,7 @@ def interrupted_after(folder, count):
     study = open_study(folder)
     with Store.open(folder) as store, pytest.raises(KeyboardInterrupt):
         study_run = StudyRun(study, store, Stopping(count))
-        run_study(study_run, make_proposer("gp", study.settings.initial))
+        run_trials(study_run, make_proposer("gp", study.settings.initial))
 
 
 @pytest.fixture
@@ -138,7 +138,7 @@ def test_a_write_ahead_log_cut_off_by_a_crash_costs_only_what_was_cut_off(make_s
     with Store.open(folder) as store:
         with pytest.raises(KeyboardInterrupt):
             study_run = StudyRun(study, store, Stopping(60))
-            run_study(study_run, make_proposer("gp", 5))
+            run_trials(study_run, make_proposer("gp", 5))
         for name in ("study.db", "study.db-wal"):
             shutil.copy(folder / name, crashed / name)
     log = crashed / "study.db-wal"
@@ -147,7 +147,7 @@ def test_a_write_ahead_log_cut_off_by_a_crash_costs_only_what_was_cut_off(make_s
     assert (kept > 0) == (share > 0)
     with Store.open(crashed) as store:
         study_run = StudyRun(open_study(crashed), store)
-        run_study(study_run, make_proposer("gp", 5))
+        run_trials(study_run, make_proposer("gp", 5))
         spent = study_run.spent
     assert spent.episodes == 7 * 18 - kept
     assert (trials(crashed), episodes(crashed)) == (trials(finished), episodes(finished))

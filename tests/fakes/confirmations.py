@@ -8,7 +8,7 @@ import numpy as np
 from proxytune.search import Information
 from proxytune.search.posterior import Misfit, posterior_of
 from proxytune.study import Confirmation
-from proxytune.study.result import Candidate
+from proxytune.study.run import Finalist
 
 FITS, LACKS, UNTOLD = Misfit(1.0, 1.1, 0.4), Misfit(9.0, 1.1, 0.002), Misfit(1.0, None, None)
 AGENTS = (("agent4", 0.46), ("agent0", 0.3), ("agent1", 0.2), ("agent2", 0.04))
@@ -49,6 +49,6 @@ def confirmed(result, score=12, ends=(8.0, 20.0), **floor):
     noise = replace(own.noise_floor, **floor)
     fresh = replace(own, prpv=replace(own.prpv, value=score), prpv_interval=inner, noise_floor=noise)
     # What else a candidate has is of no matter to a report.
-    fields = dict.fromkeys(Candidate.__dataclass_fields__, ())
-    answer = Candidate(**{**fields, "trial": result.best.trial, "scores": (score,), "assessment": fresh})
+    fields = dict.fromkeys(Finalist.__dataclass_fields__, ())
+    answer = Finalist(**{**fields, "trial": result.best.trial, "scores": (score,), "assessment": fresh})
     return replace(result, confirmation=Confirmation(answer, (answer,), 18))

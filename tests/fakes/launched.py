@@ -11,7 +11,7 @@ from processes import ENVIRONMENT, FAKES, episodes, trials
 
 from proxytune.search import make_proposer
 from proxytune.storage import Store
-from proxytune.study import StudyRun, goal_of, open_study, run_study
+from proxytune.study import StudyRun, goal_of, open_study, run_trials
 
 
 class Launched:
@@ -53,5 +53,5 @@ def never_stopped(make_study, **changes):
     with Store.open(folder) as store:
         proposer = make_proposer(study.settings.engine, study.settings.initial, goal_of(StudyRun(study, store)))
         study_run = StudyRun(study, store)
-        run_study(study_run, proposer)
+        run_trials(study_run, proposer)
     return trials(folder), episodes(folder)

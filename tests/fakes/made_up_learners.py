@@ -6,7 +6,7 @@ that rise, for all learners and for each of its own, so scores are neither Gauss
 
 import numpy as np
 
-from proxytune.learning import Curve
+from proxytune.learning import LearningCurve
 
 GRID = (0, 50, 100, 200, 400, 800, 1600, 3200)
 STARTS, BEST, NONE, TOLERANCE = 10, 60.0, "none", 5.0
@@ -48,7 +48,9 @@ class MadeUpLearners:
     def curves(self, repetitions):
         """All examinations of the grid."""
         return {
-            name: Curve(GRID, np.array([[self.score(name, row, n) for n in GRID] for row in range(repetitions)]))
+            name: LearningCurve(
+                GRID, np.array([[self.score(name, row, n) for n in GRID] for row in range(repetitions)])
+            )
             for name in self.names
         }
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 from types import SimpleNamespace
 
-from proxytune.learning import Estimate
+from proxytune.learning import LearningEstimate
 from proxytune.scores import Metric, ScoreTable
 from proxytune.study import ComparedFamilies, Lesson
 from proxytune.usefulness import assess
@@ -42,4 +42,10 @@ def compared(*families, lessons=None):
 
 def lesson(plv, more=None, needed=(100.0, 80.0, 120.0)):
     """What a family is worth as a teacher, known to 10 samples."""
-    return Lesson({}, 1.0, Estimate(*needed), Estimate(plv, plv - 10.0, plv + 10.0), more and Estimate(*more))
+    return Lesson(
+        {},
+        1.0,
+        LearningEstimate(*needed),
+        LearningEstimate(plv, plv - 10.0, plv + 10.0),
+        more and LearningEstimate(*more),
+    )

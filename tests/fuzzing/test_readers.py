@@ -40,8 +40,7 @@ from proxytune.loop.episodes import pictures_file, read_pictures
 from proxytune.loop.opening import Kept
 from proxytune.scores import read_scores
 from proxytune.storage import Store
-from proxytune.study import StudyRun, open_study, read_lessons, read_study_settings, result_of
-from proxytune.study.run import as_stored
+from proxytune.study import open_study, read_lessons, read_study_settings, result_of, stored_run
 
 MODEL = """\
 format = 1
@@ -126,7 +125,7 @@ def read_arrays(home: Path) -> object:
 def read_study(home: Path) -> object:
     study = open_study(home)
     with Store.read(home) as store:
-        return result_of(StudyRun(as_stored(study, store), store))
+        return result_of(stored_run(study, store))
 
 
 def write_note(home: Path, finished: Path) -> None:

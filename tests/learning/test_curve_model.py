@@ -12,16 +12,16 @@ from made_up_learners import BEST, GRID, NONE, TOLERANCE, MadeUpLearners
 
 from proxytune.errors import InputError
 from proxytune.learning import (
-    Curve,
-    Spending,
+    AdaptiveDesign,
+    LearningCurve,
     curves_of,
+    doublings,
     first_examinations,
     next_examinations,
-    places,
     sample_needs,
-    teaching,
+    teaching_value,
 )
-from proxytune.learning.curve_model import Marks, counts_at, crossing, draw_curves, fit_curve_model
+from proxytune.learning.curve_model import Examined, counts_at, crossing, draw_curves, fit_curve_model
 
 REPETITIONS = 8
 CLASSROOMS = 50
@@ -35,7 +35,7 @@ def needs_of(curves, draws=2000):
 
 def spend(learners, examinations):
     """The curves after so many examinations that were chosen."""
-    spending, scores = Spending(NONE, GRID, REPETITIONS, 12), {}
+    spending, scores = AdaptiveDesign(NONE, GRID, REPETITIONS, 12), {}
     batch = first_examinations(learners.names, spending)
     while True:
         for one in batch[: examinations - len(scores)]:
@@ -51,7 +51,7 @@ def judged(learners, curves):
     needs, alone = needs_of(curves), learners.needed(NONE)
     found = []
     for name in learners.names[1:]:
-        plv = teaching(needs, none=NONE, proxy=name).plv
+        plv = teaching_value(needs, none=NONE, proxy=name).plv
         low, high = -np.inf if plv.low is None else plv.low, np.inf if plv.high is None else plv.high
         truth = alone - learners.needed(name)
         # Where η is not reached, PLV is known to lie below what the largest count leaves.
@@ -99,14 +99,14 @@ def marks(noise, curves=2, seed=0):
     rows = [(c, r, p) for c in range(curves) for r in range(CURVE_MODEL_REPETITIONS) for p in range(len(AT))]
     curve, repetition, place = np.array(rows).T
     mean = np.where(curve == 0, 10.0 + 40.0 / (1.0 + np.exp(-2.0 * (AT[place] - 2.5))), 30.0)
-    return Marks(curve, repetition, AT[place], mean + np.asarray(noise)[place] * generator.normal(size=len(rows)))
+    return Examined(curve, repetition, AT[place], mean + np.asarray(noise)[place] * generator.normal(size=len(rows)))
 
 
 def test_no_samples_the_first_count_and_each_doubling_are_about_one_apart_and_turn_back_into_counts():
     counts = np.array([0.0, 50.0, 100.0, 3200.0])
-    assert places(counts, 50.0)[:2].tolist() == [0.0, 1.0]
-    assert places(np.array([3200.0, 6400.0]), 50.0) == pytest.approx([6.02, 7.01], abs=0.01)
-    assert counts_at(places(counts, 50.0), 50.0) == pytest.approx(counts)
+    assert doublings(counts, 50.0)[:2].tolist() == [0.0, 1.0]
+    assert doublings(np.array([3200.0, 6400.0]), 50.0) == pytest.approx([6.02, 7.01], abs=0.01)
+    assert counts_at(doublings(counts, 50.0), 50.0) == pytest.approx(counts)
 
 
 def test_the_mean_curves_are_where_the_scores_are_and_surer_there_than_between_curves():
@@ -128,7 +128,7 @@ def test_what_a_repetition_does_to_every_learner_is_no_noise_that_more_curves_av
     generator = np.random.default_rng(3)
     plain = marks(np.full(6, 0.5), curves=2)
     together = plain.score + 6.0 * generator.normal(size=6)[plain.repetition]
-    moved = Marks(plain.curve, plain.repetition, plain.place, together)
+    moved = Examined(plain.curve, plain.repetition, plain.place, together)
     models = [fit_curve_model(one) for one in (plain, moved)]
     before, after = (float(one.mean_curves(np.array([1]), np.array([2.5]))[1][0, 0]) for one in models)
     assert np.sqrt(after) > 1.5 > np.sqrt(before)
@@ -137,7 +137,7 @@ def test_what_a_repetition_does_to_every_learner_is_no_noise_that_more_curves_av
 @pytest.mark.parametrize("score", [0.0, 60.0])
 def test_scores_that_are_all_the_same_are_fitted_without_complaint(score):
     rows = marks(np.zeros(6))
-    model = fit_curve_model(Marks(rows.curve, rows.repetition, rows.place, np.full(len(rows.score), score)))
+    model = fit_curve_model(Examined(rows.curve, rows.repetition, rows.place, np.full(len(rows.score), score)))
     mean, covariance = model.mean_curves(np.array([0, 1]), np.array([1.0, 2.5]))
     assert mean == pytest.approx([score, score])
     assert np.isfinite(covariance).all()
@@ -153,7 +153,7 @@ def test_one_repetition_leaves_the_mean_curves_near_their_scores():
         ]
     )
     curve, at = np.indices(scores.shape).reshape(2, -1)
-    model = fit_curve_model(Marks(curve, np.zeros(scores.size, dtype=int), at.astype(float), scores.ravel()))
+    model = fit_curve_model(Examined(curve, np.zeros(scores.size, dtype=int), at.astype(float), scores.ravel()))
     means, covariance = model.mean_curves(np.array([1, 2]), np.array([1.0, 1.0]))
     assert means[0] - means[1] > 20.0
     assert np.sqrt(np.diag(covariance)).min() > 2.0
@@ -173,11 +173,11 @@ NAN = np.nan
 )
 def test_a_curve_that_is_none_is_refused(counts, scores, says):
     with pytest.raises(InputError, match=says):
-        Curve(counts, scores)
+        LearningCurve(counts, scores)
 
 
 def test_examinations_and_the_repetitions_that_have_one_are_counted():
-    curve = Curve((0, 100, 200), np.array([[NAN, 1.0, NAN], [NAN, NAN, NAN], [2.0, 3.0, NAN]]))
+    curve = LearningCurve((0, 100, 200), np.array([[NAN, 1.0, NAN], [NAN, NAN, NAN], [2.0, 3.0, NAN]]))
     assert curve.examined.tolist() == [[0, 1], [2, 0], [2, 1]]
     assert curve.repetitions == 2
 
@@ -188,7 +188,7 @@ COUNTS = np.array([0.0, 100.0, 200.0, 400.0])
 
 def curve(*means, wobble=1.0, seeds=6):
     noise = wobble * np.random.default_rng(2).normal(size=(seeds, len(POSTERIOR_GRID)))
-    return Curve(POSTERIOR_GRID, np.array(means, dtype=float) + noise)
+    return LearningCurve(POSTERIOR_GRID, np.array(means, dtype=float) + noise)
 
 
 def crossed(*scores, threshold=45.0):

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from proxytune.learning import (
-    Curve,
+    AdaptiveDesign,
     Examination,
-    Spending,
-    difference,
+    LearningCurve,
     first_examinations,
     mean_score,
+    more_needed,
     next_examinations,
     sample_needs,
-    teaching,
+    teaching_value,
 )
 from proxytune.learning.plv import general_plv, plv
 
@@ -24,7 +24,7 @@ GRID = (0, 100, 200, 400, 800)
 
 def curve(*means, seeds=6, wobble=0.5):
     noise = wobble * np.random.default_rng(1).normal(size=(seeds, len(GRID)))
-    return Curve(GRID, np.tile(np.array(means, dtype=float), (seeds, 1)) + noise)
+    return LearningCurve(GRID, np.tile(np.array(means, dtype=float), (seeds, 1)) + noise)
 
 
 WITHOUT = curve(np.nan, 10, 20, 50, 50)
@@ -35,7 +35,7 @@ def judged(level=None, **curves):
 
 
 def worth(proxy, level=None):
-    return teaching(judged(proxy=proxy, level=level), none="none", proxy="proxy")
+    return teaching_value(judged(proxy=proxy, level=level), none="none", proxy="proxy")
 
 
 def test_a_proxy_that_helps_has_a_plv_above_zero_and_one_that_harms_below():
@@ -81,21 +81,21 @@ def test_a_learner_counts_as_settled_where_the_last_doubling_gains_no_more_than_
 
 
 def test_a_grid_whose_first_count_is_beyond_half_its_last_tells_no_gain():
-    alone = Curve((0, 500, 800), np.array([[np.nan, 50.0, 50.0], [np.nan, 49.0, 51.0]]))
+    alone = LearningCurve((0, 500, 800), np.array([[np.nan, 50.0, 50.0], [np.nan, 49.0, 51.0]]))
     needs = sample_needs({"none": alone}, none="none", best_score=60.0, tolerance=5.0)
     assert (needs.gain, needs.settled) == (None, False)
 
 
 @pytest.mark.parametrize("grid", [(0, 400, 800), (0, 3, 6), (0, 50, 100)])
 def test_a_grid_that_begins_at_half_its_last_tells_the_gain(grid):
-    alone = Curve(grid, np.array([[np.nan, 20.0, 50.0], [np.nan, 19.0, 51.0], [np.nan, 21.0, 50.5]]))
+    alone = LearningCurve(grid, np.array([[np.nan, 20.0, 50.0], [np.nan, 19.0, 51.0], [np.nan, 21.0, 50.5]]))
     needs = sample_needs({"none": alone}, none="none", best_score=60.0, tolerance=5.0)
     assert 20.0 < needs.gain < 35.0
 
 
 def test_what_is_needed_without_a_proxy_does_not_depend_on_which_proxy_it_is_held_against():
     needs = judged(good=curve(20, 48, 50, 50, 50), never=curve(0, 0, 0, 0, 0))
-    good, never = (teaching(needs, none="none", proxy=name) for name in ("good", "never"))
+    good, never = (teaching_value(needs, none="none", proxy=name) for name in ("good", "never"))
     assert good.without == never.without
     assert good.without.low > 200.0
 
@@ -110,7 +110,7 @@ def test_scores_beyond_the_best_and_its_negative_are_no_other_scores():
     lower = {"none": curve(np.nan, -900, -600, -200, -190), "proxy": curve(-500, -200, -190, -190, -190)}
     needs = sample_needs(lower, none="none", best_score=0.0, tolerance=20.0)
     assert -195.0 < needs.when.level < -185.0
-    assert 200.0 < teaching(needs, none="none", proxy="proxy").without.value < 800.0
+    assert 200.0 < teaching_value(needs, none="none", proxy="proxy").without.value < 800.0
 
 
 def test_intervals_are_wider_where_seeds_differ_more():
@@ -123,9 +123,9 @@ def test_intervals_are_wider_where_seeds_differ_more():
 
 def test_two_proxies_are_compared_by_what_the_one_needs_more_than_the_other():
     needs = judged(good=curve(20, 48, 50, 50, 50), poor=curve(0, 10, 20, 48, 50))
-    more = difference(needs, more="poor", less="good")
+    more = more_needed(needs, more="poor", less="good")
     assert 0.0 < more.low < more.value < more.high
-    assert difference(needs, more="good", less="good").value == 0.0
+    assert more_needed(needs, more="good", less="good").value == 0.0
 
 
 def test_the_mean_score_before_any_target_sample_has_an_interval_and_without_a_proxy_there_is_none():
@@ -147,7 +147,7 @@ def test_general_plv_with_unit_costs_and_an_expert_only_is_plv():
 
 
 SPENDING_GRID = (0, 100, 200, 400, 800, 1600)
-SPENDING = Spending("none", SPENDING_GRID, 6, 12)
+SPENDING = AdaptiveDesign("none", SPENDING_GRID, 6, 12)
 KNOWN = (SPENDING_GRID.index(100), SPENDING_GRID.index(400), SPENDING_GRID.index(1600))
 
 
@@ -155,7 +155,7 @@ def curve_of_spending(*means, wobble=2.0, seeds=2, known=(0, *KNOWN)):
     scores = np.full((seeds, len(SPENDING_GRID)), np.nan)
     noise = wobble * np.random.default_rng(1).normal(size=scores.shape)
     scores[:, known] = (np.array(means, dtype=float) + noise)[:, known]
-    return Curve(SPENDING_GRID, scores)
+    return LearningCurve(SPENDING_GRID, scores)
 
 
 CURVES = {
@@ -212,9 +212,12 @@ def test_the_same_scores_choose_the_same_examinations():
 @pytest.mark.parametrize("first", [1, 2, 7])
 def test_a_grid_from_few_samples_on_has_no_place_twice_and_none_before_the_first(first):
     grid = (0, first, 8, 64, 512)
-    spending = Spending("none", grid, 4, 12)
+    spending = AdaptiveDesign("none", grid, 4, 12)
     scores = np.array([[np.nan, 1.0, 5.0, 30.0, 50.0], [np.nan, 3.0, 9.0, 35.0, 49.0]])
-    curves = {"none": Curve(grid, scores), "proxy": Curve(grid, np.where(np.isnan(scores), 0.0, scores + 1.0))}
+    curves = {
+        "none": LearningCurve(grid, scores),
+        "proxy": LearningCurve(grid, np.where(np.isnan(scores), 0.0, scores + 1.0)),
+    }
     found = sample_needs(curves, none="none", best_score=60.0, tolerance=5.0, draws=300)
     chosen = next_examinations(found, list(curves), spending)
     assert len(set(chosen)) == len(chosen) == spending.batch
@@ -223,7 +226,7 @@ def test_a_grid_from_few_samples_on_has_no_place_twice_and_none_before_the_first
 
 
 def test_where_every_repetition_of_every_count_is_done_fewer_or_none_are_left():
-    one_repetition = Spending("none", SPENDING_GRID, 2, 500)
+    one_repetition = AdaptiveDesign("none", SPENDING_GRID, 2, 500)
     chosen = next_examinations(needs(), list(CURVES), one_repetition)
     assert 0 < len(chosen) < 500
     assert {one.repetition for one in chosen} == {0, 1}

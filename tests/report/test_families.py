@@ -6,7 +6,7 @@ import pytest
 from matplotlib.text import Text
 from several_tuned import compared, family, lesson
 
-from proxytune.learning import Estimate
+from proxytune.learning import LearningEstimate
 from proxytune.report.families import families_answer, families_figure, families_next_step
 from proxytune.report.figure_style import COLUMN
 from proxytune.study import Lesson
@@ -103,7 +103,7 @@ def test_the_figure_has_a_panel_per_use_and_tells_best_alike_and_worse_apart():
 
 
 def test_an_interval_of_which_one_end_is_not_known_is_drawn_to_the_other():
-    lessons = {"a": lesson(-20.0), "b": replace(lesson(-30.0), plv=Estimate(-30.0, None, 5.0))}
+    lessons = {"a": lesson(-20.0), "b": replace(lesson(-30.0), plv=LearningEstimate(-30.0, None, 5.0))}
     plv = families_figure(compared(family("a"), family("b"), lessons=lessons)).axes[1]
     assert [-30.0, 5.0] in [list(line.get_xdata()) for line in plv.lines]
 

@@ -17,7 +17,7 @@ from proxytune.report.study.figures import (
 from proxytune.report.study.page import study_view
 from proxytune.report.study.tables import search_table
 from proxytune.report.wording import span
-from proxytune.search import Importance, Trial, learn
+from proxytune.search import Importance, Trial, learn_theta
 from proxytune.storage import Store, TrialRecord
 from proxytune.study import StudyRun, open_study, result_of
 
@@ -226,7 +226,7 @@ def test_one_parameter_alone_can_be_drawn(learnt):
     study = replace(learnt.study, settings=replace(settings, space=space))
     trials = [Trial((one.theta["delay"],), one.prpv, (one.theta["delay"], 1.0)) for one in learnt.trials]
     goal = replace(learnt.knowledge.goal, outputs=(("a", "b"), ("c", "d")), values=np.ones(2), noise=np.ones(2))
-    alone = replace(learnt, study=study, knowledge=learn(space, trials, goal))
+    alone = replace(learnt, study=study, knowledge=learn_theta(space, trials, goal))
     assert len(profiles_figure(alone).axes) == 1
     axes = evaluations_figure(alone).axes[0]
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("delay [s]", "PRPV [ordered pairs]")

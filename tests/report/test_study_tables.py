@@ -24,7 +24,7 @@ from proxytune.report.study.tables import (
 from proxytune.search import make_proposer
 from proxytune.space import Interval
 from proxytune.storage import Store
-from proxytune.study import Preflight, StudyRun, open_study, result_of, run_study
+from proxytune.study import Preflight, StudyRun, open_study, result_of, run_trials
 from proxytune.study.preflight import Movement
 
 
@@ -236,7 +236,7 @@ def test_failed_episodes_are_told_with_the_first_of_them(make_study):
     folder = make_study(domain={"faults": '["agent3:1:raises"]'}, budget="6")
     with Store.open(folder) as store:
         study_run = StudyRun(open_study(folder), store)
-        run_study(study_run, make_proposer("gp", 5))
+        run_trials(study_run, make_proposer("gp", 5))
         result = result_of(StudyRun(open_study(folder), store))
     table = search_table(result)
     head, first = row_of(table, "failed"), table.rows[table.rows.index(row_of(table, "failed")) + 1]

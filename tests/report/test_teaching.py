@@ -6,7 +6,14 @@ from types import MappingProxyType, SimpleNamespace
 import numpy as np
 import pytest
 
-from proxytune.learning import Costs, Curve, Distribution, Estimate as EffectSize, Teaching, sample_needs
+from proxytune.learning import (
+    Costs,
+    Distribution,
+    LearningCurve,
+    LearningEstimate,
+    TeachingValue,
+    sample_needs,
+)
 from proxytune.learning.plv import Published
 from proxytune.report.plv_search import plv_answer, plv_next_step
 from proxytune.report.teaching import (
@@ -20,7 +27,7 @@ from proxytune.report.teaching import (
 from proxytune.report.view import Column, foot_of
 from proxytune.teaching import Experiment, TeacherResult
 
-NOTHING = EffectSize(None, None, None)
+NOTHING = LearningEstimate(None, None, None)
 COUNTS = (0, 50, 100, 200, 400)
 EVIL = "<script>alert(1)</script>"
 
@@ -31,24 +38,26 @@ COSTS = Costs()
 
 
 def lesson(name, plv):
-    worth = Teaching(EffectSize(400, 200, 400), EffectSize(100, 50, 400), plv, NOTHING, NOTHING)
+    worth = TeachingValue(LearningEstimate(400, 200, 400), LearningEstimate(100, 50, 400), plv, NOTHING, NOTHING)
     scores = np.linspace(10.0, 50.0, 5) + np.arange(3)[:, None]
-    cost = EffectSize(*(None if end is None else 2.5 * end for end in (plv.value, plv.low, plv.high)))
-    return TeacherResult(name, Distribution({}), Curve(COUNTS, scores), EffectSize(10.0, 8.0, 12.0), worth, cost)
+    cost = LearningEstimate(*(None if end is None else 2.5 * end for end in (plv.value, plv.low, plv.high)))
+    return TeacherResult(
+        name, Distribution({}), LearningCurve(COUNTS, scores), LearningEstimate(10.0, 8.0, 12.0), worth, cost
+    )
 
 
 LESSONS = (
-    lesson("sure", EffectSize(300, 100, 350)),
-    lesson("harmful", EffectSize(None, None, 0)),
-    lesson("wide", EffectSize(300, -100, 400)),
-    lesson("reaching", EffectSize(200, None, 400)),
-    lesson("far", EffectSize(None, 120, None)),
-    lesson(EVIL, EffectSize(0, 0, 0)),
+    lesson("sure", LearningEstimate(300, 100, 350)),
+    lesson("harmful", LearningEstimate(None, None, 0)),
+    lesson("wide", LearningEstimate(300, -100, 400)),
+    lesson("reaching", LearningEstimate(200, None, 400)),
+    lesson("far", LearningEstimate(None, 120, None)),
+    lesson(EVIL, LearningEstimate(0, 0, 0)),
 )
 
 
 def experiment(lessons=LESSONS, gain=1.0, published=NOBODY, examinations=None, costs=COSTS):
-    without = Curve(COUNTS, np.array([[np.nan, 5.0, 20.0, 40.0, 50.0]] * 3))
+    without = LearningCurve(COUNTS, np.array([[np.nan, 5.0, 20.0, 40.0, 50.0]] * 3))
     curves = {"none": without, **{one.name: one.curve for one in lessons}}
     needs = sample_needs(curves, none="none", best_score=60.0, tolerance=5.0, level=50.0, draws=60)
     taught = {"published": published, "published_in": "a paper", "examinations": examinations, "costs": costs}
@@ -116,9 +125,17 @@ def test_plv_in_cost_is_a_column_where_costs_are_stated_and_only_there():
 @pytest.mark.parametrize(
     ("plv", "judged", "step"),
     [
-        (EffectSize(84, 33, 180), "it saves target samples.", "train in proxy: nominal θ, then on target samples."),
-        (EffectSize(-84, -180, -33), "it saves none.", "train without a proxy, or raise teaching.budget"),
-        (EffectSize(10, -20, 30), "that it saves any is not shown: the interval holds 0.", "raise teaching.seeds"),
+        (
+            LearningEstimate(84, 33, 180),
+            "it saves target samples.",
+            "train in proxy: nominal θ, then on target samples.",
+        ),
+        (LearningEstimate(-84, -180, -33), "it saves none.", "train without a proxy, or raise teaching.budget"),
+        (
+            LearningEstimate(10, -20, 30),
+            "that it saves any is not shown: the interval holds 0.",
+            "raise teaching.seeds",
+        ),
     ],
 )
 def test_a_search_by_plv_says_of_its_best_finalist_what_the_interval_allows(plv, judged, step):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from steps import SPACE, goal
 
-from proxytune.search import Trial, fit_surrogate, from_unit, importances, learn, to_unit
+from proxytune.search import Trial, fit_surrogate, from_unit, importances, learn_theta, to_unit
 from proxytune.search.engine import design_point
 from proxytune.space import Interval, Space
 
@@ -99,7 +99,7 @@ def known(seed, count=14, lost=()):
     points = [design_point(SPACE, index, seed) for index in range(count)]
     told = [outputs(values, 50 * seed + row) for row, values in enumerate(points)]
     trials = [Trial(v, float(compose(o)), tuple(o.tolist())) for v, o in zip(points, told, strict=True)]
-    return learn(SPACE, trials, goal(compose, target, 2 * 0.02**2), seed)
+    return learn_theta(SPACE, trials, goal(compose, target, 2 * 0.02**2), seed)
 
 
 @pytest.mark.slow
@@ -150,7 +150,7 @@ def test_few_trials_limit_what_is_told_and_with_many_it_is_noise():
 
 def test_the_order_of_trials_changes_nothing():
     one = known(5)
-    other = learn(SPACE, one.trials[::-1], one.goal, one.seed)
+    other = learn_theta(SPACE, one.trials[::-1], one.goal, one.seed)
     assert other.intervals == one.intervals
     assert other.misfit == one.misfit
     assert other.as_good == one.as_good

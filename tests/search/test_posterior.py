@@ -10,7 +10,7 @@ from hypothesis import given, settings, strategies as st
 from scipy.stats import chi2
 from steps import SPACE, goal, whole
 
-from proxytune.search import Trial, from_unit, learn, to_unit
+from proxytune.search import Trial, from_unit, learn_theta, to_unit
 from proxytune.search.engine import design_point
 from proxytune.search.likelihood import fit_outputs
 from proxytune.search.posterior import FEWEST, MARGIN, WIDENINGS, LeftOut, leave_out, posterior_of
@@ -94,7 +94,7 @@ def p_value(seed, shift):
     values = from_unit(SPACE, np.random.default_rng(seed).uniform(0.2, 0.8, 2))
     target = outputs(values, 10_000 + seed) + shift * np.resize([1.0, -1.0, 0.0], 12)
     told = trials_of_misfit(seed)
-    return learn(SPACE, told, goal(whole, target, SPREAD**2), seed).misfit.p_value
+    return learn_theta(SPACE, told, goal(whole, target, SPREAD**2), seed).misfit.p_value
 
 
 @pytest.mark.slow
@@ -112,19 +112,19 @@ def test_targets_beyond_it_are_found():
 def test_the_same_trials_in_any_order_give_the_same_verdict():
     told = trials_of_misfit(1)
     target = goal(whole, outputs((0.1, 0.1), 5), SPREAD**2)
-    assert learn(SPACE, told, target, 1).misfit == learn(SPACE, told[::-1], target, 1).misfit
+    assert learn_theta(SPACE, told, target, 1).misfit == learn_theta(SPACE, told[::-1], target, 1).misfit
 
 
 @pytest.mark.parametrize("count", [4, 5])
 def test_with_too_few_trials_nothing_is_said(count):
     told = trials_of_misfit(1, count)
-    found = learn(SPACE, told, goal(whole, outputs((0.1, 0.1), 5))).misfit
+    found = learn_theta(SPACE, told, goal(whole, outputs((0.1, 0.1), 5))).misfit
     assert (found.p_value, found.fits) == (None, None)
 
 
 def test_where_no_output_changes_nothing_is_said():
     told = [Trial(design_point(SPACE, index, 1), 1.0, (7.0,)) for index in range(8)]
-    assert learn(SPACE, told, goal(whole, (3.0,))).misfit.fits is None
+    assert learn_theta(SPACE, told, goal(whole, (3.0,))).misfit.fits is None
 
 
 def normal(centre, widths, correlation=0.0):

@@ -3,12 +3,12 @@
 import pytest
 from several_tuned import compared, family, lesson
 
-from proxytune.study import Choice, Lesson
+from proxytune.study import BestFamilies, Lesson
 
 
 def test_the_lowest_fresh_prpv_predicts_best_and_a_higher_one_beyond_noise_is_worse():
     found = compared(family("bad", 3), family("good", 0), family("middle", 1))
-    assert found.predicts == Choice("good", ())
+    assert found.predicts == BestFamilies("good", ())
     assert {(one.better, one.worse, one.value) for one in found.selection.differences} == {
         ("good", "middle", 2),
         ("good", "bad", 6),
@@ -23,14 +23,14 @@ def test_a_family_whose_difference_may_be_noise_cannot_be_told_from_the_best():
 
 
 def test_a_family_without_fresh_episodes_is_left_out():
-    assert compared(family("none", fresh=False), family("one", 2)).predicts == Choice("one", ())
-    assert compared(family("none", fresh=False), family("nor", fresh=False)).predicts == Choice()
+    assert compared(family("none", fresh=False), family("one", 2)).predicts == BestFamilies("one", ())
+    assert compared(family("none", fresh=False), family("nor", fresh=False)).predicts == BestFamilies()
 
 
 def test_the_cheapest_is_told_apart_episode_by_episode():
     hard, easy = (10.0, 1.0, 5.0, 0.1), (20.0, 2.0, 10.0, 0.2)
     found = compared(family("double", seconds=easy), family("single", seconds=hard), family("as long", seconds=hard))
-    assert found.cheapest == Choice("single", ("as long",))
+    assert found.cheapest == BestFamilies("single", ("as long",))
     # Intervals overlap by far, since episodes differ; of the same episodes the ratio is exact.
     (_, low, high), (_, other, _) = (found.seconds_per_episode()[name] for name in ("single", "double"))
     assert other < high
@@ -46,9 +46,9 @@ def test_the_highest_plv_teaches_best_and_more_samples_beyond_noise_are_worse():
         "never": lesson(-100.0, (None, None, None), needed=(None, None, None)),
         "cannot": Lesson({}, failure="the expert cannot drive here"),
     }
-    assert compared(family("best"), lessons=lessons).teaches == Choice("best", ("near",))
+    assert compared(family("best"), lessons=lessons).teaches == BestFamilies("best", ("near",))
 
 
 def test_without_a_known_plv_nobody_teaches_best():
-    assert compared(family("a"), lessons={"a": Lesson({}, 1.0)}).teaches == Choice()
-    assert compared(family("a")).teaches == Choice()
+    assert compared(family("a"), lessons={"a": Lesson({}, 1.0)}).teaches == BestFamilies()
+    assert compared(family("a")).teaches == BestFamilies()

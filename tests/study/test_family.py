@@ -144,14 +144,13 @@ TABLE = "{ " + ", ".join(f'a{number} = "agent{number}"' for number in range(6)) 
 
 class Faulty(Wobbly):
     versions = property(lambda self: 1 / 0)
-    earlier_identities = property(lambda self: self.gone)
     identity = property(lambda self: self.theta.gone)
 
     def check_agent(self, name):
         raise OSError("no weights")
 
 
-@pytest.mark.parametrize("member", ["versions", "earlier_identities", "identity"])
+@pytest.mark.parametrize("member", ["versions", "identity"])
 def test_what_a_member_raises_whenever_it_is_asked_is_one_line_with_its_name_and_place(member):
     family = UserFamily(Faulty(), "sim:make")
     expected = rf"{member} of sim:make raised .*Error: .*\(test_family.py, line \d+\); correct it"
@@ -169,7 +168,6 @@ def test_what_the_check_of_an_agent_raises_is_one_line():
 def test_a_member_that_is_not_there_is_not_there():
     family = UserFamily(Wobbly(), "sim:make")
     assert not hasattr(family, "versions")
-    assert family.earlier_identities == ()
     assert (family.identity, family.starts) == (Wobbly().identity, 5)
 
 

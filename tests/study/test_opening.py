@@ -10,8 +10,9 @@ from proxytune.errors import InputError, SettingsError
 from proxytune.report.study.tables import usefulness_table
 from proxytune.search import make_proposer
 from proxytune.storage import Store
-from proxytune.study import PRPV, StudyRun, goal_of, open_study, result_of, run_confirmation, run_study, study_facts
-from proxytune.study.opening import changes
+from proxytune.study import PRPV, StudyRun, goal_of, open_study, result_of, run_trials, study_facts
+from proxytune.study.facts import changes
+from proxytune.study.run import run_confirmation
 
 OWN = """
 import numpy as np
@@ -29,7 +30,7 @@ def run(folder, engine):
     study = open_study(folder)
     with Store.open(folder) as store:
         study_run = StudyRun(study, store)
-        run_study(study_run, make_proposer(engine, study.settings.initial, goal_of(study_run)))
+        run_trials(study_run, make_proposer(engine, study.settings.initial, goal_of(study_run)))
         return study_run, result_of(study_run)
 
 

@@ -21,7 +21,7 @@ from proxytune.running import run_episode
 from proxytune.search import make_proposer
 from proxytune.space import Interval
 from proxytune.storage import Store
-from proxytune.study import StudyRun, goal_of, most_preflight_episodes, open_study, result_of, run_preflight, run_study
+from proxytune.study import StudyRun, goal_of, most_preflight_episodes, open_study, result_of, run_preflight, run_trials
 from proxytune.study.preflight import (
     LEVEL,
     LOOKS,
@@ -242,7 +242,7 @@ def test_the_trials_are_those_of_a_study_without_it(make_study, finished):
     for one in (folder, finished):
         with Store.open(one) as store:
             study_run = StudyRun(open_study(one), store)
-            run_study(study_run, make_proposer("gp", 5))
+            run_trials(study_run, make_proposer("gp", 5))
             trials.append(store.trials())
     assert trials[0] == trials[1]
 

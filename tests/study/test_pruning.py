@@ -15,8 +15,9 @@ from proxytune.running import Silent
 from proxytune.scores import Metric
 from proxytune.search import make_proposer
 from proxytune.storage import Store, TrialRecord
-from proxytune.study import StudyRun, goal_of, open_study, rescored, result_of, run_study, score_trials
-from proxytune.study.pruning import reference, spared, stopped
+from proxytune.study import StudyRun, goal_of, open_study, rescored, result_of, run_trials, score_trials
+from proxytune.study.pruning import pruning_rule, spared
+from proxytune.study.run import stopped
 from proxytune.study.settings import StopRules
 
 BUDGET, ALL = 14, 8 * 3
@@ -48,7 +49,7 @@ def run(folder, watcher=None, **changes):
     study = replace(study, settings=replace(study.settings, **changes))
     with Store.open(folder) as store:
         study_run = StudyRun(study, store, watcher or Silent())
-        run_study(study_run, make_proposer("gp", study.settings.initial))
+        run_trials(study_run, make_proposer("gp", study.settings.initial))
         spent = study_run.spent
         return spent, store.trials(), result_of(StudyRun(study, store))
 
@@ -68,7 +69,7 @@ def test_a_trial_that_was_cut_off_would_have_scored_no_less_than_its_bound_and_a
     with Store.open(found.study.settings.folder) as store:
         for trial in trials:
             if trial.state == "cut":
-                limit = reference(StudyRun(found.study, store), trials[: trial.number - 1]).limit
+                limit = pruning_rule(StudyRun(found.study, store), trials[: trial.number - 1]).limit
                 StudyRun(found.study, store).evaluate(trial.theta, "")
                 score = StudyRun(found.study, store).evaluation(trial.theta).prpv
                 assert score >= trial.bound > limit
@@ -147,8 +148,8 @@ def test_the_order_of_agents_in_the_settings_does_not_matter(cutting, done):
 def test_the_agents_that_tell_most_come_first_and_the_limit_is_a_noise_above_the_incumbent(done):
     _, trials, found = done
     with Store.open(found.study.settings.folder) as store:
-        against = reference(StudyRun(found.study, store), trials)
-        assert reference(StudyRun(found.study, store), trials[:4]) is None
+        against = pruning_rule(StudyRun(found.study, store), trials)
+        assert pruning_rule(StudyRun(found.study, store), trials[:4]) is None
     rows = against.disagreement
     assert sorted(against.order) == sorted(found.study.settings.agents)
     assert rows[0, 1] == rows.max()
@@ -198,7 +199,7 @@ def test_an_engine_that_learns_from_outputs_has_its_trials_cut_off_too(cutting):
     study = open_study(folder)
     with Store.open(folder) as store:
         study_run = StudyRun(study, store)
-        run_study(study_run, make_proposer("outcomes", 5, goal_of(StudyRun(study, store))))
+        run_trials(study_run, make_proposer("outcomes", 5, goal_of(StudyRun(study, store))))
         assert "cut" in {trial.state for trial in store.trials()}
 
 
@@ -235,7 +236,7 @@ def run_of_stopping(study):
     """The trials, and why there are no more."""
     with Store.open(study.settings.folder) as store:
         study_run = StudyRun(study, store)
-        run_study(study_run, make_proposer("gp", study.settings.initial))
+        run_trials(study_run, make_proposer("gp", study.settings.initial))
         return store.trials(), stopped(StudyRun(study, store), store.trials())
 
 

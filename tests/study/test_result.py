@@ -23,15 +23,12 @@ from proxytune.study import (
     history_of,
     most_confirmation_episodes,
     open_study,
-    plan,
-    result as confirmation,
+    plan_episodes,
     result_of,
-    run_confirmation,
-    run_study,
-    table,
+    run_trials,
+    score_table,
 )
-from proxytune.study.pruning import knowledge_of
-from proxytune.study.result import CANDIDATES, candidates, confirmation_of
+from proxytune.study.run import MOST_FINALISTS, confirmation_of, finalists, knowledge_of, run_confirmation
 from proxytune.study.settings import StopRules
 from proxytune.usefulness import assess
 from proxytune.usefulness.pairs import prpv
@@ -64,7 +61,7 @@ def test_the_answer_is_told_with_its_score_on_episodes_that_the_search_has_not_s
     assert answer.optimism == answer.scores[0] - answer.trial.prpv
     with Store.read(finished) as store:
         known = store.outcomes(found.study.identity, answer.trial.theta)
-    seen = plan(found.study.settings, answer.trial.theta, found.study.settings.seed)
+    seen = plan_episodes(found.study.settings, answer.trial.theta, found.study.settings.seed)
     assert len(set(known) - set(seen)) == ONE
     assert {e.seed for e in set(known) - set(seen)}.isdisjoint(e.seed for e in seen)
 
@@ -81,19 +78,19 @@ def test_candidates_are_the_lowest_expected_scores_within_the_noise_with_the_lik
     with Store.read(finished) as store:
         trials = store.trials()
         known = knowledge_of(StudyRun(study, store), trials)
-    chosen = [study.settings.space.values(trial.theta) for trial in candidates(trials, known)]
+    chosen = [study.settings.space.values(trial.theta) for trial in finalists(trials, known)]
     ranked = list(known.expected)
     noise = known.fresh_scores(ranked[0]).std()
     near = [values for values in ranked if known.expected[values] - known.expected[ranked[0]] <= noise]
     assert chosen[0] == known.answer == ranked[0]
     assert set(chosen) <= {*near, known.likeliest_of(ranked)}
     assert known.likeliest_of(ranked) in chosen
-    assert len(chosen) == min(CANDIDATES, len({*near, known.likeliest_of(ranked)}))
+    assert len(chosen) == min(MOST_FINALISTS, len({*near, known.likeliest_of(ranked)}))
 
 
 def plant(study, store, trial, shift):
     """Fresh episodes of this trial in which the agents rank as on the target, or the other way round."""
-    for episode in plan(study.settings, trial.theta, fresh_seed(study.settings.seed, 1)):
+    for episode in plan_episodes(study.settings, trial.theta, fresh_seed(study.settings.seed, 1)):
         row = study.target.agents.index(episode.agent)
         metrics = dict(zip(study.target.metrics, (shift * study.target.means[row]).tolist(), strict=True))
         store.save_outcome(study.identity, Outcome(episode, metrics, "", 0.0))
@@ -103,8 +100,8 @@ def test_a_favourite_that_was_lucky_gives_way_to_a_rival_that_fresh_episodes_con
     study = opened(finished)
     with Store.open(finished) as store:
         trials = store.trials()
-        chosen = sorted(trials, key=lambda trial: trial.prpv)[:CANDIDATES]
-        monkeypatch.setattr(confirmation, "candidates", lambda *_: chosen)
+        chosen = sorted(trials, key=lambda trial: trial.prpv)[:MOST_FINALISTS]
+        monkeypatch.setattr("proxytune.study.run.finalists", lambda *_: chosen)
         lucky, *rivals = chosen
         plant(study, store, lucky, -1.0)
         for rival in rivals:
@@ -120,9 +117,9 @@ def test_the_noise_floor_is_what_the_answer_s_own_trial_scores_against_its_fresh
     answer, study = found.confirmation.answer, found.study
     with Store.read(finished) as store:
         known = store.outcomes(study.identity, answer.trial.theta).values()
-    seeds = {episode.seed for episode in plan(study.settings, answer.trial.theta, study.settings.seed)}
+    seeds = {episode.seed for episode in plan_episodes(study.settings, answer.trial.theta, study.settings.seed)}
     own, fresh = ([o for o in known if (o.episode.seed in seeds) is mine] for mine in (True, False))
-    floor = prpv(proxy=table(fresh), target=table(own), metrics=study.settings.metrics).value
+    floor = prpv(proxy=score_table(fresh), target=score_table(own), metrics=study.settings.metrics).value
     assert (found.floor.kind, found.floor.value) == ("same starts", floor)
 
 
@@ -136,7 +133,7 @@ def test_trials_do_not_depend_on_it(finished, make_study):
     for study in (longer, other):
         with Store.open(study.settings.folder) as store:
             study_run = StudyRun(study, store)
-            run_study(study_run, make_proposer("gp", 5))
+            run_trials(study_run, make_proposer("gp", 5))
             trials.append(store.trials())
     assert trials[0] == trials[1]
     assert trials[0][:7] == before
@@ -160,7 +157,7 @@ def test_interrupted_anywhere_it_comes_to_the_same_answer(finished, jobs):
 def test_what_need_not_be_run_is_taken_off_the_bar(finished):
     watcher = Stopping()
     spent, found = confirmed(finished, watcher)
-    assert spent.episodes + watcher.off == most_confirmation_episodes(found.study.settings) == CANDIDATES * ONE
+    assert spent.episodes + watcher.off == most_confirmation_episodes(found.study.settings) == MOST_FINALISTS * ONE
 
 
 def test_every_repetition_has_episodes_and_a_score_of_its_own(finished):
@@ -177,7 +174,7 @@ def test_it_waits_for_the_end_of_the_study_which_a_rule_may_bring(make_study, fi
     study = opened(folder, stop=StopRules(no_improvement=1e9))
     with Store.open(folder) as store:
         study_run = StudyRun(study, store)
-        run_study(study_run, make_proposer("gp", 5))
+        run_trials(study_run, make_proposer("gp", 5))
         assert len(store.trials()) == 5
     assert confirmed(folder, stop=StopRules(no_improvement=1e9))[0].episodes >= ONE
 
@@ -201,8 +198,8 @@ def test_the_time_of_fresh_episodes_does_not_count_for_the_rule_to_stop(finished
 def test_an_agent_that_fails_in_all_fresh_episodes_leaves_the_answer_without_a_score(finished):
     study = opened(finished)
     with Store.open(finished) as store:
-        for trial in candidates(store.trials(), knowledge_of(StudyRun(study, store), store.trials())):
-            for episode in plan(study.settings, trial.theta, fresh_seed(study.settings.seed, 1)):
+        for trial in finalists(store.trials(), knowledge_of(StudyRun(study, store), store.trials())):
+            for episode in plan_episodes(study.settings, trial.theta, fresh_seed(study.settings.seed, 1)):
                 if episode.agent == "agent3":
                     store.save_outcome(study.identity, Outcome(episode, None, "it fell", 0.0))
     _, found = confirmed(finished)
@@ -259,7 +256,7 @@ def test_perfect_is_only_what_neither_prpv_nor_any_other_output_tells_from_the_t
 ):
     study = opened(finished)
     with Store.open(finished) as store:
-        for trial in candidates(store.trials(), knowledge_of(StudyRun(study, store), store.trials())):
+        for trial in finalists(store.trials(), knowledge_of(StudyRun(study, store), store.trials())):
             plant(study, store, trial, 1.0)
         found = result_of(StudyRun(study, store))
     monkeypatch.setattr(type(found.knowledge), "holds", lambda *_: inside)
@@ -306,7 +303,7 @@ def run(folder):
     study = open_study(folder)
     with Store.open(folder) as store:
         study_run = StudyRun(study, store)
-        run_study(study_run, make_proposer("gp", study.settings.initial))
+        run_trials(study_run, make_proposer("gp", study.settings.initial))
     return result_of_result(folder)
 
 

@@ -11,7 +11,7 @@ from launched import Launched, launching, never_stopped
 from processes import besides_progress, episodes, finished_episodes, start, trials, wait_for
 
 from proxytune.cli.main import COMMANDS, main
-from proxytune.search import NAMES
+from proxytune.search import ENGINE_NAMES
 
 PER_TRIAL = 18
 EPISODES = 7 * PER_TRIAL
@@ -65,7 +65,7 @@ def stopped_and_resumed(folder, launcher, signals, random):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", ["1", "2"])
-@pytest.mark.parametrize("engine", NAMES)
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
 def test_a_study_stopped_at_any_moment_gives_the_trials_of_one_that_was_not(make_study, launcher, engine, jobs):
     """To the last bit, with every engine, one job and two, by Ctrl-C, SIGTERM and `kill -9`."""
     if engine == "tpe":
@@ -73,7 +73,7 @@ def test_a_study_stopped_at_any_moment_gives_the_trials_of_one_that_was_not(make
     changes = {"engine": f'"{engine}"', "initial": "3"}
     whole = never_stopped(make_study, **changes)
     folder = make_study("stopped", domain=DOMAIN, jobs=jobs, **changes)
-    random = np.random.default_rng([NAMES.index(engine), int(jobs)])
+    random = np.random.default_rng([ENGINE_NAMES.index(engine), int(jobs)])
     signals = random.permutation([signal.SIGINT, signal.SIGTERM, signal.SIGKILL, signal.SIGKILL]).tolist()
     assert stopped_and_resumed(folder, launcher, signals, random) > 0
     assert (trials(folder), episodes(folder)) == whole
@@ -205,7 +205,7 @@ def test_pre_flight_cut_trials_and_confirmation_survive_being_stopped(make_study
 
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", ["1", "2"])
-@pytest.mark.parametrize("engine", [name for name in ("gp", "outcomes") if name in NAMES])
+@pytest.mark.parametrize("engine", [name for name in ("gp", "outcomes") if name in ENGINE_NAMES])
 def test_a_study_killed_within_batches_gives_the_trials_of_one_that_was_not(make_study, launcher, engine, jobs, capsys):
     """To the last bit, with trials cut off and the answer confirmed, by `kill -9` alone."""
     phases = {"initial": "4", "budget": "12", "cut_off": "true", "confirm": "1"}

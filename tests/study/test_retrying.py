@@ -8,7 +8,8 @@ from stopping import Stopping
 from proxytune.api.study import run_study
 from proxytune.errors import RunError
 from proxytune.storage import Store
-from proxytune.study import StudyRun, open_study, retry_failed
+from proxytune.study import StudyRun, open_study
+from proxytune.study.run import retry_failed
 
 FAMILY = """
 from wobbly import Wobbly, wobbly

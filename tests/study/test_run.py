@@ -17,11 +17,12 @@ from proxytune.study import (
     open_study,
     rescored,
     result_of,
-    run_study,
+    run_trials,
     score_trials,
+    stored_run,
     with_metrics,
 )
-from proxytune.study.run import as_stored, came_to
+from proxytune.study.run import came_to
 from proxytune.study.settings import StopRules
 
 COARSE = (Metric.parse("distance:max:20%"), Metric.parse("survival_time:max"))
@@ -111,7 +112,7 @@ def run(folder, **changes):
     study = replace(study, settings=replace(study.settings, **changes))
     with Store.open(folder) as store:
         study_run = StudyRun(study, store)
-        run_study(study_run, make_proposer("gp", study.settings.initial))
+        run_trials(study_run, make_proposer("gp", study.settings.initial))
         spent = study_run.spent
         return spent.episodes, store.trials()
 
@@ -150,7 +151,7 @@ def test_an_interrupted_study_loses_no_finished_episode_and_goes_on_to_the_same_
     for episodes in (5, 40, 40):
         with Store.open(folder) as store, pytest.raises(KeyboardInterrupt):
             study_run = StudyRun(study, store, Stopping(episodes))
-            run_study(study_run, make_proposer("gp", 5))
+            run_trials(study_run, make_proposer("gp", 5))
     with sqlite3.connect(folder / "study.db") as plain:
         assert plain.execute("SELECT count(*) FROM episodes").fetchone() == (85,)
     episodes, trials = run(folder, jobs=jobs)
@@ -239,14 +240,14 @@ def test_changed_code_of_the_family_is_refused_but_its_old_result_can_still_be_l
     with Store.open(finished) as store:
         with pytest.raises(SettingsError, match="the domain family"):
             check_facts(StudyRun(newer, store))
-        assert as_stored(newer, store).identity == open_study(finished).identity
+        assert stored_run(newer, store).study.identity == open_study(finished).identity
         assert store.trials() == trials
 
 
 def test_looking_at_an_edited_study_is_refused(finished, make_study):
     make_study(seed="3")
     with Store.read(finished) as store, pytest.raises(SettingsError, match=r"seed \(was 1\)"):
-        as_stored(open_study(finished), store)
+        stored_run(open_study(finished), store)
 
 
 def test_budget_jobs_name_and_what_failures_do_may_change(finished, make_study):
@@ -260,7 +261,7 @@ def test_before_the_first_finished_trial_everything_may_change(make_study):
     study = open_study(folder)
     with Store.open(folder) as store, pytest.raises(KeyboardInterrupt):
         study_run = StudyRun(study, store, Stopping(4))
-        run_study(study_run, make_proposer("gp", 5))
+        run_trials(study_run, make_proposer("gp", 5))
     make_study(seed="2")
     assert len(run(folder)[1]) == 7
 
@@ -274,15 +275,15 @@ def test_with_every_engine_an_interrupted_study_goes_on_to_the_same_trials(make_
     whole, stopped_one = (open_study(folder) for folder in folders)
     with Store.open(folders[0]) as store:
         study_run = StudyRun(whole, store)
-        run_study(study_run, make_proposer(engine, 5, goal_of(StudyRun(whole, store))))
+        run_trials(study_run, make_proposer(engine, 5, goal_of(StudyRun(whole, store))))
         expected = store.trials()
     for episodes in (30, 70):
         with Store.open(folders[1]) as store, pytest.raises(KeyboardInterrupt):
             study_run = StudyRun(stopped_one, store, Stopping(episodes))
-            run_study(study_run, make_proposer(engine, 5, goal_of(StudyRun(whole, store))))
+            run_trials(study_run, make_proposer(engine, 5, goal_of(StudyRun(whole, store))))
     with Store.open(folders[1]) as store:
         study_run = StudyRun(stopped_one, store)
-        run_study(study_run, make_proposer(engine, 5, goal_of(StudyRun(whole, store))))
+        run_trials(study_run, make_proposer(engine, 5, goal_of(StudyRun(whole, store))))
         assert store.trials() == expected
     assert len(expected) == 7
 
@@ -312,7 +313,7 @@ def test_every_trial_is_told_with_its_score_and_the_best_so_far(make_study):
     study = open_study(make_study())
     with Store.open(study.settings.folder) as store:
         under_way = StudyRun(study, store, telling)
-        run_study(under_way, make_proposer("gp", 5))
+        run_trials(under_way, make_proposer("gp", 5))
         scores = [trial.score for trial in under_way.finished_trials()]
     assert telling.lines == [
         f"trial {number} of 7: PRPV {score:g}, best so far {min(scores[:number]):g}"

@@ -4,7 +4,7 @@ import pytest
 from several import make_several
 
 from proxytune.errors import SettingsError
-from proxytune.study import as_document, open_settings, open_study, read_study_settings
+from proxytune.study import open_settings, open_study, read_study_settings, settings_document
 from proxytune.study.settings import DEFAULT_FAMILY, StopRules, unnoticed
 
 OTHER = '[families.own]\n[families.other]\nfamily = "schoolroom:schoolroom"\n[families.other.domain]\nblocked = 0.1\n'
@@ -152,9 +152,9 @@ def test_what_is_written_is_what_is_read(make_study):
     assert [str(metric) for metric in settings.metrics] == ["distance:max", "survival_time:max"]
     assert settings.target == settings.folder / "target.csv"
     assert settings.proxy == settings.folder / "m.toml"
-    assert as_document(settings)["batch"] == settings.batch == 9, "more than the budget is fine"
-    assert as_document(settings)["on_failure"] == "stop"
-    assert as_document(settings)["preflight"] is settings.preflight is False
+    assert settings_document(settings)["batch"] == settings.batch == 9, "more than the budget is fine"
+    assert settings_document(settings)["on_failure"] == "stop"
+    assert settings_document(settings)["preflight"] is settings.preflight is False
     assert settings.stop == StopRules()
 
 
@@ -178,12 +178,12 @@ def test_rules_to_stop_are_read_each_on_its_own(make_study):
     assert settings.stop == StopRules(wall_time_s=60.0)
     settings = read_study_settings(make_study(stop="{ no_improvement = 0.2 }"))
     assert settings.stop == StopRules(no_improvement=0.2)
-    assert as_document(settings)["stop"] == {"no_improvement": 0.2}
+    assert settings_document(settings)["stop"] == {"no_improvement": 0.2}
 
 
 @pytest.mark.parametrize("engine", ["gp", "composite", "random", "sobol", "tpe"])
 def test_a_study_names_its_engine(make_study, engine):
-    assert as_document(read_study_settings(make_study(engine=f'"{engine}"')))["engine"] == engine
+    assert settings_document(read_study_settings(make_study(engine=f'"{engine}"')))["engine"] == engine
 
 
 def test_the_box_does_not_depend_on_the_order_of_its_lines(make_study):

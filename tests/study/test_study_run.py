@@ -17,22 +17,23 @@ from telling import Telling
 from proxytune.domain import Outcome
 from proxytune.errors import EpisodeError, InputError, SettingsError
 from proxytune.running import Silent
-from proxytune.search import NAMES, make_proposer, propose_batch
+from proxytune.search import ENGINE_NAMES, make_proposer, propose_batch
 from proxytune.seeds import episode_seed
 from proxytune.storage import Store, TrialRecord
 from proxytune.study import (
     StudyRun,
+    evaluate_outcomes,
     goal_of,
-    measure,
+    measure_agents,
     open_study,
-    plan,
+    plan_episodes,
     read_study_settings,
-    run_study,
-    score,
+    run_trials,
     study_facts,
     with_spending,
 )
-from proxytune.study.pruning import reference, stopped
+from proxytune.study.pruning import pruning_rule
+from proxytune.study.run import stopped
 from proxytune.study.settings import StopRules
 from proxytune.study.study_run import longest_first
 from proxytune.usefulness.noise import noise_floor
@@ -55,7 +56,7 @@ def run(folder, watcher=None, **changes):
     with Store.open(folder) as store:
         proposer = make_proposer(study.settings.engine, study.settings.initial, goal_of(StudyRun(study, store)))
         study_run = StudyRun(study, store, watcher or Silent())
-        run_study(study_run, proposer)
+        run_trials(study_run, proposer)
         return study_run.spent, store.trials()
 
 
@@ -95,7 +96,7 @@ def test_each_trial_of_a_batch_is_held_against_the_trials_before_the_batch_by_it
     with Store.open(folder) as store:
         for trial in (trial for trial in trials if trial.state == "cut"):
             base = 5 + (trial.number - 6) // BATCH * BATCH
-            against = reference(StudyRun(study, store), trials[:base])
+            against = pruning_rule(StudyRun(study, store), trials[:base])
             assert trial.decided == against.order[: len(trial.decided)]
             StudyRun(study, store).evaluate(trial.theta, "")
             assert StudyRun(study, store).evaluation(trial.theta).prpv >= trial.bound > against.limit
@@ -133,7 +134,7 @@ def test_interrupted_within_batches_it_goes_on_to_the_same_trials_and_runs_no_ep
     assert len(stored_episodes(folder)) == spent.episodes + run_before
 
 
-@pytest.mark.parametrize("engine", NAMES)
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
 def test_with_every_engine_an_interrupted_batch_goes_on_to_the_same_trials(make_study, engine):
     if engine == "tpe":
         pytest.importorskip("optuna")
@@ -212,7 +213,7 @@ def simulated(folder, theta=THETA):
 
 def test_every_agent_drives_from_every_start_under_common_random_numbers(make_study):
     study = open_study(make_study())
-    here, there = (plan(study.settings, theta, 1) for theta in (THETA, {"trim": 0.2, "delay": 0.0}))
+    here, there = (plan_episodes(study.settings, theta, 1) for theta in (THETA, {"trim": 0.2, "delay": 0.0}))
     assert {(e.agent, e.start) for e in here} == {(a, s) for a in study.settings.agents for s in range(3)}
     assert [(e.agent, e.start, e.seed) for e in here] == [(e.agent, e.start, e.seed) for e in there]
     assert {e.seed for e in here if e.start == 2} == {episode_seed(1, 2)}
@@ -283,7 +284,7 @@ def test_where_they_do_not_a_failure_is_final(make_study, tmp_path):
 
 
 def test_the_longest_episodes_begin_first_and_unknown_ones_before_them(make_study):
-    planned = plan(open_study(make_study()).settings, THETA, 1)[:3]
+    planned = plan_episodes(open_study(make_study()).settings, THETA, 1)[:3]
     seconds = {(planned[0].agent, planned[0].start): 1.0, (planned[2].agent, planned[2].start): 2.0}
     assert longest_first(planned, seconds) == [planned[1], planned[2], planned[0]]
 
@@ -291,15 +292,15 @@ def test_the_longest_episodes_begin_first_and_unknown_ones_before_them(make_stud
 def test_scoring_does_not_depend_on_the_order_of_the_outcomes(make_study):
     folder = make_study()
     study = open_study(folder)
-    outcomes = [Outcome(e, study.family.run(e), "", 0.0) for e in plan(study.settings, THETA, 1)]
-    forth, back = score(study, THETA, outcomes), score(study, THETA, outcomes[::-1])
+    outcomes = [Outcome(e, study.family.run(e), "", 0.0) for e in plan_episodes(study.settings, THETA, 1)]
+    forth, back = evaluate_outcomes(study, THETA, outcomes), evaluate_outcomes(study, THETA, outcomes[::-1])
     assert (forth.prpv, forth.measures["ppv"]) == (back.prpv, pytest.approx(back.measures["ppv"], abs=1e-12))
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_after_enough_no_further_episode_begins_and_those_under_way_are_kept(make_study, jobs):
     study = open_study(make_study(jobs=str(jobs)))
-    planned = plan(study.settings, THETA, 1)
+    planned = plan_episodes(study.settings, THETA, 1)
     with Store.open(study.settings.folder) as store:
         study_run = StudyRun(study, store)
         known = study_run.outcomes(planned, "", lambda _, known: len(known) >= 5)
@@ -315,7 +316,7 @@ def test_after_enough_no_further_episode_begins_and_those_under_way_are_kept(mak
 def test_where_it_may_be_enough_agents_are_driven_in_their_order(make_study, tmp_path):
     journal = tmp_path / "journal"
     study = open_study(make_study(domain={"journal": f'"{journal}"'}))
-    planned = plan(study.settings, THETA, 1)[::-1]
+    planned = plan_episodes(study.settings, THETA, 1)[::-1]
     with Store.open(study.settings.folder) as store:
         StudyRun(study, store).evaluate({"trim": 0.0, "delay": 0.0}, "")  # tells which episodes take longest
         journal.unlink()
@@ -327,7 +328,7 @@ def test_where_it_may_be_enough_agents_are_driven_in_their_order(make_study, tmp
 def test_where_one_instance_has_enough_the_others_go_on_and_agents_begin_in_all_of_them(make_study, tmp_path):
     journal = tmp_path / "journal"
     study = open_study(make_study(domain={"journal": f'"{journal}"'}))
-    plans = [plan(study.settings, {"trim": trim, "delay": 0.1}, 1) for trim in (0.0, 0.1, 0.2)]
+    plans = [plan_episodes(study.settings, {"trim": trim, "delay": 0.1}, 1) for trim in (0.0, 0.1, 0.2)]
     planned, short = [episode for one in plans for episode in one], plans[1][0].theta
 
     def enough(instance, known):
@@ -345,7 +346,7 @@ def test_where_one_instance_has_enough_the_others_go_on_and_agents_begin_in_all_
 def test_where_failures_stop_the_study_an_old_failure_is_not_enough(make_study):
     folder = make_study(domain={"faults": '["agent3:1:raises"]'})
     study = open_study(folder)
-    planned = plan(study.settings, THETA, 1)
+    planned = plan_episodes(study.settings, THETA, 1)
     with Store.open(folder) as store:
         StudyRun(study, store).outcomes(planned, "")
         stopping = replace(study, settings=replace(study.settings, stop_on_failure=True))
@@ -362,7 +363,7 @@ def model(tmp_path):
 
 def test_a_table_has_every_agent_start_and_metric_in_the_study_s_order(make_study, model):
     settings = read_study_settings(make_study(metrics='["distance:max"]'))
-    table = measure(settings, model, 1001, Silent())
+    table = measure_agents(settings, model, 1001, Silent())
     assert table.agents == settings.agents
     assert table.episodes == ("0", "1", "2")
     assert table.metrics == ("distance", "survival_time")
@@ -371,37 +372,37 @@ def test_a_table_has_every_agent_start_and_metric_in_the_study_s_order(make_stud
 
 def test_every_agent_is_told_of_once_it_is_measured(make_study, model):
     watcher = Telling()
-    measure(read_study_settings(make_study(agents='["agent1", "agent0"]')), model, 1001, watcher)
+    measure_agents(read_study_settings(make_study(agents='["agent1", "agent0"]')), model, 1001, watcher)
     assert sorted(watcher.lines) == ["agent agent0 measured", "agent agent1 measured"]
 
 
 def test_the_number_of_jobs_changes_nothing_and_the_seed_and_the_model_do(make_study, model):
     lingering = {"faults": '["agent0:0:lingers"]'}
     one, two = (read_study_settings(make_study(f"jobs{jobs}", jobs=jobs, domain=lingering)) for jobs in ("1", "2"))
-    table = measure(one, model, 1001, Silent())
-    same = measure(two, model, 1001, Silent())
+    table = measure_agents(one, model, 1001, Silent())
+    same = measure_agents(two, model, 1001, Silent())
     assert (same.agents, same.episodes) == (table.agents, table.episodes)
     assert (same.values == table.values).all()
-    assert (measure(one, model, 1002, Silent()).values != table.values).all()
+    assert (measure_agents(one, model, 1002, Silent()).values != table.values).all()
     model.write_text("trim = 0.1\n")
-    assert (measure(one, model, 1001, Silent()).values != table.values).any()
+    assert (measure_agents(one, model, 1001, Silent()).values != table.values).any()
 
 
 def test_repeats_have_noise_of_their_own_and_the_first_is_what_one_alone_would_be(make_study, model):
     settings = read_study_settings(make_study())
-    once, thrice = measure(settings, model, 1001, Silent()), measure(settings, model, 1001, Silent(), 3)
+    once, thrice = measure_agents(settings, model, 1001, Silent()), measure_agents(settings, model, 1001, Silent(), 3)
     assert thrice.episodes == ("0/0", "0/1", "0/2", "1/0", "1/1", "1/2", "2/0", "2/1", "2/2")
     assert thrice.complete
     assert (thrice.values[:, ::3] == once.values).all()
     for agent in thrice.values:
         assert len(np.unique(agent[:, 0])) == 9
-    again = measure(settings, model, 1001, Silent(), 3)
+    again = measure_agents(settings, model, 1001, Silent(), 3)
     assert (again.values == thrice.values).all()
 
 
 def test_a_target_of_repeats_has_a_floor_of_the_same_starts(make_study, model):
     settings = read_study_settings(make_study())
-    once, twice = (measure(settings, model, 1001, Silent(), repeats) for repeats in (1, 2))
+    once, twice = (measure_agents(settings, model, 1001, Silent(), repeats) for repeats in (1, 2))
     assert noise_floor(target=twice, metrics=settings.metrics).kind == "same starts"
     assert noise_floor(target=once, metrics=settings.metrics).kind == "halves"
 
@@ -409,13 +410,13 @@ def test_a_target_of_repeats_has_a_floor_of_the_same_starts(make_study, model):
 def test_the_study_needs_no_target_yet(make_study, model):
     folder = make_study()
     (folder / "target.csv").unlink()
-    assert measure(read_study_settings(folder), model, 1, Silent()).complete
+    assert measure_agents(read_study_settings(folder), model, 1, Silent()).complete
 
 
 def test_a_failing_episode_leaves_no_table(make_study, model):
     settings = read_study_settings(make_study(domain={"faults": '["agent3:1:raises"]'}))
     with pytest.raises(EpisodeError, match="agent 'agent3' failed from start 1"):
-        measure(settings, model, 1, Silent())
+        measure_agents(settings, model, 1, Silent())
 
 
 def test_a_trial_s_outcome_composes_to_its_prpv(finished):
@@ -437,7 +438,7 @@ def test_an_outcome_has_the_study_s_metrics_in_their_order_and_the_target_s_agen
     study = open_study(folder)
     with Store.open(folder) as store:
         study_run = StudyRun(study, store)
-        run_study(study_run, make_proposer("sobol", 5))
+        run_trials(study_run, make_proposer("sobol", 5))
         told = [StudyRun(study, store).search_trial(trial) for trial in store.trials()]
         composed = goal_of(StudyRun(study, store)).compose(np.array([trial.outcome for trial in told]))
     assert np.array_equal(composed, [trial.score for trial in told])

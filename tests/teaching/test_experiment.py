@@ -17,11 +17,11 @@ from taught import GRID, TEACHING, make_taught
 from telling import Telling
 
 from proxytune.errors import EpisodeError, InputError, LearnerError, SettingsError
-from proxytune.learning import Costs, Curve, Distribution, difference, mean_score, sample_needs, teaching
+from proxytune.learning import Costs, Distribution, LearningCurve, mean_score, more_needed, sample_needs, teaching_value
 from proxytune.report.teaching import observation_lines
 from proxytune.running import Silent
 from proxytune.storage import Store
-from proxytune.study import StudyRun, adopt, open_study, read_study_settings
+from proxytune.study import StudyRun, open_study, read_study_settings
 from proxytune.teaching import (
     Experiment,
     TeacherResult,
@@ -271,7 +271,7 @@ def test_a_family_is_worth_what_teach_says_of_its_best_theta(taught):
     right, far = lessons["right"], lessons["far"]
     assert (right.theta, right.more) == (RIGHT, None)
     assert right.plv.value > far.plv.value
-    assert far.more == difference(experiment.needs, more="far", less="right")
+    assert far.more == more_needed(experiment.needs, more="far", less="right")
 
 
 @pytest.mark.slow
@@ -321,7 +321,7 @@ MEANS = {
 
 
 def curve(means):
-    return Curve(
+    return LearningCurve(
         OBSERVATIONS_GRID, np.array(means) + 0.5 * np.random.default_rng(1).normal(size=(5, len(OBSERVATIONS_GRID)))
     )
 
@@ -337,7 +337,7 @@ def experiment(settled=True, names=()):
             Distribution(MappingProxyType({})),
             needs.curves[name],
             mean_score(needs, name, 0),
-            teaching(needs, none="none", proxy=name),
+            teaching_value(needs, none="none", proxy=name),
             None,
         )
         for name in names or list(MEANS)[1:]
@@ -399,7 +399,6 @@ WIDE = Distribution(MappingProxyType({"trim": (-0.3, 0.3)}))
 def found(make_study):
     study = open_study(make_taught(make_study))
     with Store.open(study.settings.folder) as store:
-        adopt(study, store)
         run = StudyRun(study, store)
         return study, predictivity(run, {"true": TRUE, "wide": WIDE}), run
 
@@ -416,7 +415,6 @@ def test_each_proxy_has_a_prpv_with_an_interval_that_holds_it_and_the_right_one_
 def test_a_proxy_that_draws_theta_draws_it_for_every_start_the_same_for_all_agents(make_study):
     study = open_study(make_taught(make_study))
     with Store.open(study.settings.folder) as store:
-        adopt(study, store)
         driven = []
         run = StudyRun(study, store)
         run.outcomes = lambda planned, what, plain=run.outcomes: driven.extend(planned) or plain(planned, what)

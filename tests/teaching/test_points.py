@@ -18,12 +18,12 @@ from wobbly import Wobbly
 
 from proxytune.cli.terminal import signals_as_interruptions
 from proxytune.errors import EpisodeError, LearnerError, RunError, SettingsError
-from proxytune.learning import Cache, Distribution, TeachingSettings, digest
+from proxytune.learning import Cache, Distribution, TeachingSettings, facts_digest
 from proxytune.running import Silent
 from proxytune.study import read_study_settings
 from proxytune.teaching import load_setup, run_experiment
 from proxytune.teaching.examining import prepare_points, score_points
-from proxytune.teaching.points import Point, TeachingSetup, equal_rounds
+from proxytune.teaching.points import CurvePoint, TeachingSetup, equal_rounds
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ CHANGES = {
 @pytest.mark.parametrize("count", [0, 20])
 @pytest.mark.parametrize("change", CHANGES)
 def test_a_used_cache_gives_what_an_empty_one_gives(tmp_path, change, count):
-    point = Point("near", PROXY, 0, count)
+    point = CurvePoint("near", PROXY, 0, count)
     before = setup(tmp_path / "used").score(point)
     fresh = setup(tmp_path / "empty", **CHANGES[change]).score(point)
     assert fresh != before
@@ -57,7 +57,7 @@ def test_a_used_cache_gives_what_an_empty_one_gives(tmp_path, change, count):
 
 @pytest.mark.parametrize("change", [change for change in CHANGES if "proxy" not in change])
 def test_without_a_proxy_a_used_cache_gives_what_an_empty_one_gives(tmp_path, change):
-    point = Point("none", None, 0, 20)
+    point = CurvePoint("none", None, 0, 20)
     before = setup(tmp_path / "used").score(point)
     fresh = setup(tmp_path / "empty", **CHANGES[change]).score(point)
     assert fresh != before
@@ -67,11 +67,11 @@ def test_without_a_proxy_a_used_cache_gives_what_an_empty_one_gives(tmp_path, ch
 def test_what_a_proxy_taught_is_shared_by_all_points_after_it(tmp_path):
     one = setup(tmp_path)
     for count in (0, 20, 40):
-        one.score(Point("near", PROXY, 0, count))
+        one.score(CurvePoint("near", PROXY, 0, count))
     assert len(list(tmp_path.glob("weights-*.npz"))) == 3
     assert len(list(tmp_path.glob("samples-*.npz"))) == 2
-    assert one.is_cached(Point("renamed", PROXY, 0, 40))
-    assert not one.is_cached(Point("near", PROXY, 1, 40))
+    assert one.is_cached(CurvePoint("renamed", PROXY, 0, 40))
+    assert not one.is_cached(CurvePoint("near", PROXY, 1, 40))
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Noting(Matrix):
 
 def test_a_fine_tuning_goes_over_the_proxys_samples_again_beside_the_targets(tmp_path):
     plain, rehearsing = Noting(), Noting()
-    point = Point("near", PROXY, 0, 20)
+    point = CurvePoint("near", PROXY, 0, 20)
     setup(tmp_path / "plain", learner=plain).score(point)
     setup(tmp_path / "rehearsing", learner=rehearsing, rehearsal=0.6).score(point)
     taught, target = plain.trained[0].commands.tolist(), plain.trained[1].commands.tolist()
@@ -100,7 +100,11 @@ def test_a_fine_tuning_goes_over_the_proxys_samples_again_beside_the_targets(tmp
 
 def test_rehearsal_changes_fine_tunings_after_a_proxy_and_nothing_else(tmp_path):
     plain, rehearsing = setup(tmp_path), setup(tmp_path, rehearsal=0.6)
-    tuned, taught, alone = Point("near", PROXY, 0, 20), Point("near", PROXY, 0, 0), Point("none", None, 0, 20)
+    tuned, taught, alone = (
+        CurvePoint("near", PROXY, 0, 20),
+        CurvePoint("near", PROXY, 0, 0),
+        CurvePoint("none", None, 0, 20),
+    )
     assert plain.exam_facts(tuned) != rehearsing.exam_facts(tuned)
     assert plain.exam_facts(tuned) != setup(tmp_path, rehearsal=0.5).exam_facts(tuned)
     for point in (taught, alone):
@@ -113,15 +117,15 @@ def test_rehearsal_changes_fine_tunings_after_a_proxy_and_nothing_else(tmp_path)
 
 # The names that files had then
 KEPT = {
-    "ff67f18fe321ea72a41a": Point("near", PROXY, 0, 20),
-    "454406ad67f24dd8d50c": Point("none", None, 0, 20),
-    "bfde94b57c9b6b4fe41f": Point("near", PROXY, 0, 0),
+    "ff67f18fe321ea72a41a": CurvePoint("near", PROXY, 0, 20),
+    "454406ad67f24dd8d50c": CurvePoint("none", None, 0, 20),
+    "bfde94b57c9b6b4fe41f": CurvePoint("near", PROXY, 0, 0),
 }
 
 
 @pytest.mark.parametrize("name", KEPT)
 def test_what_was_kept_before_there_was_rehearsal_is_found_again(tmp_path, name):
-    assert digest(setup(tmp_path).exam_facts(KEPT[name])) == name
+    assert facts_digest(setup(tmp_path).exam_facts(KEPT[name])) == name
 
 
 GRID = (0, 20, 40, 80, 160, 320, 640)
@@ -160,7 +164,7 @@ def setup_of_stages(folder, **changes):
 
 def mean_scores(made, proxy):
     """Of four repetitions, at each count of the grid."""
-    points = [[Point("near", proxy, repetition, count) for count in GRID] for repetition in range(4)]
+    points = [[CurvePoint("near", proxy, repetition, count) for count in GRID] for repetition in range(4)]
     return np.mean([[made.score(point) for point in row] for row in points], axis=0)
 
 
@@ -182,7 +186,7 @@ def test_a_proxy_teaches_better_where_the_learner_drives_in_it(tmp_path):
 
 
 def samples(made, count, proxy=None):
-    return made._stage(Point("near", proxy, 0, count)).samples(count)
+    return made._stage(CurvePoint("near", proxy, 0, count)).samples(count)
 
 
 @pytest.mark.parametrize("by", ["expert", "learner"])
@@ -198,8 +202,8 @@ def test_more_samples_begin_with_the_same_ones_whatever_the_count(tmp_path, by, 
 
 def test_no_samples_are_those_of_no_round(tmp_path):
     made = setup_of_stages(tmp_path, target_lessons="learner")
-    assert np.isnan(made.score(Point("none", None, 0, 0)))
-    assert made.score(Point("near", NEAR, 0, 0)) > 0.0
+    assert np.isnan(made.score(CurvePoint("none", None, 0, 0)))
+    assert made.score(CurvePoint("near", NEAR, 0, 0)) > 0.0
     assert not any(line.startswith("guided") for line in (tmp_path / "journal").read_text().splitlines())
 
 
@@ -222,21 +226,23 @@ def test_each_round_has_lessons_of_its_own(tmp_path):
 
 def test_a_round_is_another_by_another_learner_proxy_or_repetition_and_not_by_what_comes_after_it(tmp_path):
     made = setup_of_stages(tmp_path, target_lessons="learner")
-    facts = made._stage(Point("near", NEAR, 0, 0)).round_facts(2)
+    facts = made._stage(CurvePoint("near", NEAR, 0, 0)).round_facts(2)
     others = [
-        replace(made, learner_identity="others")._stage(Point("near", NEAR, 0, 0)),
-        made._stage(Point("far", Distribution({"trim": (0.2, 0.2)}), 0, 0)),
-        made._stage(Point("near", NEAR, 1, 0)),
-        made._stage(Point("none", None, 0, 0)),
-        setup_of_stages(tmp_path, target_lessons="learner", rehearsal=0.5)._stage(Point("near", NEAR, 0, 0)),
-        setup_of_stages(tmp_path, target_lessons="learner", proxy_lessons="learner")._stage(Point("near", NEAR, 0, 0)),
+        replace(made, learner_identity="others")._stage(CurvePoint("near", NEAR, 0, 0)),
+        made._stage(CurvePoint("far", Distribution({"trim": (0.2, 0.2)}), 0, 0)),
+        made._stage(CurvePoint("near", NEAR, 1, 0)),
+        made._stage(CurvePoint("none", None, 0, 0)),
+        setup_of_stages(tmp_path, target_lessons="learner", rehearsal=0.5)._stage(CurvePoint("near", NEAR, 0, 0)),
+        setup_of_stages(tmp_path, target_lessons="learner", proxy_lessons="learner")._stage(
+            CurvePoint("near", NEAR, 0, 0)
+        ),
         setup_of_stages(tmp_path, target_lessons="learner", target_samples=(0, 20, 60, 80))._stage(
-            Point("near", NEAR, 0, 0)
+            CurvePoint("near", NEAR, 0, 0)
         ),
     ]
     assert all(other.round_facts(2) != facts for other in others)
     longer = setup_of_stages(tmp_path, target_lessons="learner", target_samples=(*GRID, 2000))
-    assert longer._stage(Point("near", NEAR, 0, 0)).round_facts(2) == facts
+    assert longer._stage(CurvePoint("near", NEAR, 0, 0)).round_facts(2) == facts
 
 
 @pytest.mark.parametrize(
@@ -304,8 +310,8 @@ def test_a_family_that_cannot_guide_is_refused_where_the_learner_is_to_drive(mak
     )
 
 
-POINT = Point("near", PROXY, 0, 20)
-ALONE = Point("none", None, 0, 20)
+POINT = CurvePoint("near", PROXY, 0, 20)
+ALONE = CurvePoint("none", None, 0, 20)
 LESSON = r"near: the expert's lesson in the proxy at trim = 0\.1\d+, start \d"
 EXAM = "none: the learner's examination in the target at start 2"
 
@@ -409,7 +415,7 @@ def test_examinations_that_hang_only_side_by_side_come_to_the_same_one_after_the
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_a_limit_that_nothing_overruns_changes_no_score_and_is_none_for_trainings(tmp_path, jobs):
-    points = [Point("near", PROXY, 0, count) for count in (0, 20, 40)]
+    points = [CurvePoint("near", PROXY, 0, count) for count in (0, 20, 40)]
     whole = make(setup(tmp_path / "whole"), points, jobs=1)
     slow = setup(tmp_path / "slow", learner=trains("lingers"), timeout_s=1.0)
     found = make(slow, points, jobs)

@@ -20,7 +20,7 @@ from proxytune.study import read_study_settings
 from proxytune.teaching import PlvSearch, best_teacher, load_setup, most_examinations, saves_more, search_space
 from proxytune.teaching.examining import examine_curves
 from proxytune.teaching.points import distribution
-from proxytune.teaching.search import BEST, BOX, BY_PRPV, OBJECTIVE, SINGLE, confirm, finalists
+from proxytune.teaching.search import BEST, BOX, BY_PRPV, OBJECTIVE, SINGLE, finalists, teach_finalists
 
 BOX_KEYS = {"parameters": {"trim": "[-0.3, 0.3]"}}
 WIDTH = "[teaching.width]\ntrim = [0.0, 0.4]\n"
@@ -76,7 +76,7 @@ def test_finalists_are_taught_with_lessons_and_examinations_that_the_search_has_
     }
     examine_curves(setup, {NONE: None, **named}, 1, Silent())
     before = set(journal.read_text().splitlines())
-    found = confirm(settings, setup, named, Silent()).experiment
+    found = teach_finalists(settings, setup, named, Silent()).experiment
     after = journal.read_text().splitlines()[len(before) :]
     assert not before & {line for line in after if line.startswith("exam")} - before
     assert best_teacher(found).name == "right"
@@ -98,7 +98,7 @@ def test_a_finalist_whose_expert_cannot_drive_is_left_out_with_the_reason(make_s
     settings = read_study_settings(folder)
     setup = load_setup(settings)
     other = load_setup(read_study_settings(make_taught(make_study, called="blocked", domain={"blocked": "0.9"})))
-    found = confirm(
+    found = teach_finalists(
         settings, replace(setup, proxy=other.proxy), {"right": Distribution({"trim": (0.12, 0.12)})}, Silent()
     )
     assert found.experiment.teachers == ()

@@ -8,7 +8,7 @@ from proxytune.report.study.sentence import study_sentence
 from proxytune.report.wording import Ends
 from proxytune.search import Knowledge
 from proxytune.storage import TrialRecord
-from proxytune.study import PRPV, Confirmation, Preflight, StudyResult, as_document
+from proxytune.study import PRPV, Confirmation, Preflight, StudyResult, settings_document
 
 
 def study_document(result: StudyResult) -> dict[str, Any]:
@@ -27,11 +27,11 @@ def study_document(result: StudyResult) -> dict[str, Any]:
         },
         "preflight": _preflight(result.preflight),
         "stopped": result.stopped or None,
-        "cut_off": {"trials": len(result.cut), "episodes": result.spared[0], "seconds": result.spared[1]},
+        "cut_off": {"trials": len(result.pruned), "episodes": result.spared[0], "seconds": result.spared[1]},
         "trials": [_trial(trial) for trial in result.trials],
         "failures": list(result.failures),
         "target": _target(result),
-        "settings": dict(as_document(result.study.settings)),
+        "settings": dict(settings_document(result.study.settings)),
     }
 
 

@@ -183,9 +183,9 @@ def search_table(result: StudyResult, spent: str = "") -> Table:
         warnings = [line.removeprefix("pre-flight: ") for line in result.preflight.warnings]
         every = ["every parameter changes some metric beyond noise"]
         rows += [("pre-flight", line) for line in warnings or every]
-    if result.cut:
+    if result.pruned:
         episodes, seconds = result.spared
-        trials = f"{len(result.cut)} trial{'' if len(result.cut) == 1 else 's'} that could not be the best"
+        trials = f"{len(result.pruned)} trial{'' if len(result.pruned) == 1 else 's'} that could not be the best"
         rows.append(("stopped early", f"{trials}; saved {episodes} episodes ({seconds:.3g} s)"))
     ordered = sorted(result.importances, key=lambda one: -one.share)
     shares = [f"{one.name} {one.share:.2f} ({one.interval[0]:.2f} to {one.interval[1]:.2f})" for one in ordered]

@@ -345,7 +345,7 @@ def test_a_mistake_in_log_toml_is_one_line_with_file_and_key(folder_of_reading, 
 
 def test_a_folder_that_is_no_log_is_told_what_is_missing(folder_of_reading, tmp_path):
     home = folder_of_reading()
-    assert complaint(tmp_path / "none") == ": no such folder_of_reading; check the path"
+    assert complaint(tmp_path / "none") == ": no such folder; check the path"
     assert complaint(home / "samples.csv") == ": is a file; give the folder_of_reading that it lies in"
     (home / "samples.csv").unlink()
     assert complaint(home).startswith("/samples.csv: no such file")

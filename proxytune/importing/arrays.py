@@ -1,7 +1,7 @@
 """Arrays in an .npz file: those of gym-duckietown's simulator, or any that a column map names.
 
-Arrays of an .npz file as columns of one length.
-Frames in an array: which one holds them, and the pictures of a drive.
+All arrays as long as the times become columns of one table, which is then read as any other; one of four dimensions may
+hold the frames.
 """
 
 from collections.abc import Mapping
@@ -21,11 +21,11 @@ from proxytune.importing.columns import (
     check_fields,
     choose_columns,
     column_values,
-    command_kind,
     commands_by_drive,
     described,
     poses_by_drive,
     usual_names,
+    with_commands,
 )
 from proxytune.importing.source import Channel, Drive, Pictures, Source, Wanted
 from proxytune.importing.text import COMMAND_FIELDS, POSE, Table
@@ -83,19 +83,15 @@ def as_table(path: Path, arrays: Arrays, times: str) -> Table:
     return Table(path, pd.DataFrame(columns, index=range(1, count + 1)), "row")
 
 
-def shapes(arrays: Arrays) -> str:
-    """The arrays and their shapes, for a complaint."""
-    return ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
-
-
 def _times(path: Path, arrays: Arrays, stated: str) -> str:
     if stated:
         names = [name for name in (stated, stated.rpartition(":")[0]) if name in arrays]
     else:
         names = usual_names("time", list(arrays))
     if len(names) != 1 or arrays[names[0]].ndim != 1:
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
         raise LogError(
-            f"{path}: which array (N,) holds the times is not clear; its arrays are: {shapes(arrays)}; "
+            f"{path}: which array (N,) holds the times is not clear; its arrays are: {shapes}; "
             "say it, as in --columns time=timestamps:s"
         )
     return names[0]
@@ -164,7 +160,7 @@ ANGLES = ("angles", "cur_angle")
 
 
 def is_arrays(path: Path) -> bool:
-    """Whether this is a file of numpy's: .npz, or .npy, which is refused with a reason."""
+    """True for a file of numpy's: .npz, or .npy, which is refused with a reason."""
     if not path.is_file():
         return False
     with path.open("rb") as file:
@@ -226,15 +222,12 @@ def _gym_duckietown(table: Table, arrays: Arrays, wanted: Wanted) -> tuple[Table
     pair = COMMANDS.get(wanted.kind or "duty", ())
     if f"{actions}[1]" in table.names:
         stated |= {field: f"{actions}[{place}]" for place, field in enumerate(pair)}
-    return table, stated, [_gym_note(positions, y, bool(top))]
-
-
-def _gym_note(positions: str, y: str, measured: bool) -> str:
-    origin = "bottom" if measured else "top"
-    return (
-        f"{positions} are in gym-duckietown's frame (x right, y up, z down the map): here x is {positions}[0], "
-        f"y is {y}, z is {positions}[1], so that the origin is the map's {origin} left corner; headings stay"
+    note = (
+        f"{positions} are in gym-duckietown's frame (x right, y up, z down the map): here x is {positions}[0], y is "
+        f"{y}, z is {positions}[1], so that the origin is the map's {'bottom' if top else 'top'} left corner; "
+        "headings stay"
     )
+    return table, stated, [note]
 
 
 def _columns(table: Table, stated: Mapping[str, str], wanted: Wanted) -> tuple[Columns, str]:
@@ -242,11 +235,7 @@ def _columns(table: Table, stated: Mapping[str, str], wanted: Wanted) -> tuple[C
     none = "none" in (wanted.commands, wanted.kind)
     fields = ("time", "episode", *POSE, *(() if none else COMMAND_FIELDS))
     columns = choose_columns(table, {field: entry for field, entry in stated.items() if field in fields}, fields)
-    if none:
-        return columns, "none"
-    kind = command_kind(columns, wanted.kind, table)
-    unused = set(COMMAND_FIELDS) - set(COMMANDS[kind])
-    return {field: column for field, column in columns.items() if field not in unused}, kind
+    return (columns, "none") if none else with_commands(columns, wanted.kind, table)
 
 
 def _drives(table: Table, columns: Columns, kind: str, frames: NDArray[np.uint8] | None) -> list[Drive]:
@@ -265,11 +254,10 @@ def _other_channels(table: Table, arrays: Arrays, frames: str) -> list[Channel]:
     """Arrays that are no columns: frames, and those left out."""
     columns = {name.split("[")[0] for name in table.names}
     others = {name: array for name, array in arrays.items() if name not in columns}
+    out = "left out: not one number, or short row of numbers, for each time"
     return [
-        Channel(name, f"{array.dtype} {array.shape}", len(array) if array.ndim else 1, _role(name, frames))
+        Channel(
+            name, f"{array.dtype} {array.shape}", len(array) if array.ndim else 1, "frames" if name == frames else out
+        )
         for name, array in others.items()
     ]
-
-
-def _role(name: str, frames: str) -> str:
-    return "frames" if name == frames else "left out: not one number, or short row of numbers, for each time"

@@ -1,7 +1,6 @@
-"""Bags on disk: which they are, what topics they hold, and their messages one after the other.
+"""Bags on disk: their topics, and the messages of commands and poses as rows of numbers with times.
 
-Whose times count: those in the messages' headers, or those of the bag.
-Messages of commands and poses as rows of numbers.
+Times are those in the messages' headers or, where these hold none or the user asks for it, when the bag received them.
 """
 
 import itertools
@@ -68,7 +67,7 @@ class Bag:
 
     @property
     def defines_types(self) -> bool:
-        """Whether the bag says what its messages look like."""
+        """True if the bag says what its messages look like."""
         return any(connection.msgdef.format.name != "NONE" for connection in self.reader.connections)
 
     def messages(self, topic: str) -> Iterator[tuple[int, Any]]:
@@ -91,7 +90,7 @@ class Bag:
 
 
 def is_bag(path: Path) -> bool:
-    """Whether a path is a ROS bag, or a folder of several."""
+    """True if a path is a ROS bag, or a folder of several."""
     return bool(_bags_in(path))
 
 
@@ -124,7 +123,7 @@ def open_bag(path: Path) -> Iterator[Bag]:
 
 
 def form_of(path: Path) -> str:
-    """What a bag is, as in "ROS 2 bag (mcap)"."""
+    """Name of a bag's form, as in "ROS 2 bag (mcap)"."""
     if path.suffix == ROS1 and path.is_file():
         return "ROS 1 bag"
     files = [path] if path.is_file() else path.glob("*")
@@ -138,15 +137,12 @@ def _open_reader(path: Path) -> Any:
     except ModuleNotFoundError:
         raise LogError(f'{path}: reading bags needs rosbags; pip install "proxytune[ros]"') from None
     with _complaints(path, "cannot be read as a bag"):
-        reader = AnyReader(_paths(path), default_typestore=get_typestore(Stores.ROS2_HUMBLE))
+        # The library would take a ROS 2 folder named run.bag for a file of ROS 1.
+        inside = path.suffix == ROS1 and path.is_dir()
+        paths = sorted(file for file in path.glob("*") if file.suffix in ROS2) if inside else [path]
+        reader = AnyReader(paths, default_typestore=get_typestore(Stores.ROS2_HUMBLE))
         reader.open()
     return reader
-
-
-def _paths(path: Path) -> list[Path]:
-    """What the library opens: it would take a ROS 2 folder named run.bag for a file of ROS 1."""
-    inside = path.suffix == ROS1 and path.is_dir()
-    return sorted(file for file in path.glob("*") if file.suffix in ROS2) if inside else [path]
 
 
 @contextmanager
@@ -197,7 +193,7 @@ DRIFT_S = 0.02
 
 @dataclass(frozen=True)
 class Stamps:
-    """When the messages of a topic were made and received.
+    """Times at which the messages of a topic were made and received.
 
     Attributes:
         header: Stamps in their headers (N,) [ns], or None for a type without a header.
@@ -243,9 +239,10 @@ def choose_times(stamps: Stamps, wanted: str, where: str) -> tuple[Floats, tuple
 
 
 def _clock_notes(header: Floats, received: Floats, where: str) -> tuple[str, ...]:
-    """How far the headers' clock and the bag's are apart."""
+    """Tell how far the headers' clock and the bag's are apart, and how much that changes over the drive."""
     late = received - header
-    apart, drift = float(np.median(late)), _drift(late)
+    tenth = max(1, len(late) // 10)
+    apart, drift = float(np.median(late)), float(np.median(late[:tenth]) - np.median(late[-tenth:]))
     notes = []
     if apart > APART_S:
         reason = "messages took that long, or the clocks differ"
@@ -260,12 +257,6 @@ def _clock_notes(header: Floats, received: Floats, where: str) -> tuple[str, ...
             f"The clock of the headers of {where} drifts by {1e3 * drift:+.0f} ms against the bag's over the drive."
         )
     return tuple(notes)
-
-
-def _drift(late: Floats) -> float:
-    """By how much the lateness changes from the first tenth of the messages to the last [s], in the median."""
-    tenth = max(1, len(late) // 10)
-    return float(np.median(late[:tenth]) - np.median(late[-tenth:]))
 
 
 Row = tuple[float, ...]
@@ -285,7 +276,15 @@ def collect(bag: Bag, topic: str, row_of: Callable[[Any], Row], *, finite: bool 
     """
     headers, receives, rows = [], [], []
     for number, (receive_ns, message) in enumerate(bag.messages(topic), start=1):
-        rows.append(_row(message, row_of, f"{bag.path}: {topic}, message {number}", finite=finite))
+        where = f"{bag.path}: {topic}, message {number}"
+        try:
+            row = row_of(message)
+        except LogError as problem:
+            raise LogError(f"{where}: {problem}") from None
+        if finite and not all(map(math.isfinite, row)):
+            values = ", ".join(f"{value:g}" for value in row)
+            raise LogError(f"{where}: holds a number that is not finite ({values}); leave such messages out of the bag")
+        rows.append(row)
         receives.append(receive_ns)
         headers.append(header_ns(message))
     if not rows:
@@ -333,7 +332,7 @@ def whole(values: list[Any]) -> Whole:
 
 
 def frame_of(message: Any) -> str:
-    """Which frame a pose is of, and in which, as in "map>base_link"."""
+    """The frame in which a pose is, and the one whose it is, as in "map>base_link"."""
     return f"{message.header.frame_id.lstrip('/')}>{getattr(message, 'child_frame_id', '').lstrip('/')}".rstrip(">")
 
 
@@ -361,10 +360,6 @@ def _twist(message: Any) -> Row:
     return (twist.linear.x, twist.angular.z)
 
 
-def _wheels(message: Any) -> Row:
-    return (message.vel_left, message.vel_right)
-
-
 def _array(message: Any) -> Row:
     if len(message.data) != 2:
         raise LogError(f"has {len(message.data)} elements, not a left and a right one; name another by --commands")
@@ -383,19 +378,8 @@ def _joints(message: Any) -> Row:
 COMMANDS: Mapping[str, Callable[[Any], Row]] = {
     "Twist": _twist,
     "TwistStamped": _twist,
-    "WheelsCmdStamped": _wheels,
+    "WheelsCmdStamped": lambda message: (message.vel_left, message.vel_right),
     "Float32MultiArray": _array,
     "Float64MultiArray": _array,
     "JointState": _joints,
 }
-
-
-def _row(message: Any, row_of: Callable[[Any], Row], where: str, *, finite: bool) -> Row:
-    try:
-        row = row_of(message)
-    except LogError as problem:
-        raise LogError(f"{where}: {problem}") from None
-    if finite and not all(map(math.isfinite, row)):
-        values = ", ".join(f"{value:g}" for value in row)
-        raise LogError(f"{where}: holds a number that is not finite ({values}); leave such messages out of the bag")
-    return row

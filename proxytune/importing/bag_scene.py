@@ -1,10 +1,5 @@
-"""Transforms of a bag: which frames move against which, and the chain between two.
+"""Scene of a bag: frames that move against each other, the chain between two, and pictures as red, green and blue."""
 
-Pictures of a camera's topic as arrays of red, green and blue.
-"""
-
-import struct
-import zlib
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -21,6 +16,7 @@ from proxytune.arrays import Floats
 from proxytune.errors import LogError
 from proxytune.importing.bag import Bag, Stamps, choose_times, collect, frame_of, header_ns, open_bag, pose_of, whole
 from proxytune.importing.source import Pictures
+from proxytune.logs import BROKEN
 
 WORLDS = ("map", "world", "odom")
 ROBOTS = ("base_link", "base_footprint")
@@ -31,7 +27,7 @@ Row = tuple[int, int, tuple[float, ...]]
 
 @dataclass(frozen=True)
 class Transform:
-    """How a frame stands in its parent, over time.
+    """Place and turn of a frame in its parent, over time.
 
     Attributes:
         name: Parent and child, as in "odom>base_link".
@@ -45,7 +41,7 @@ class Transform:
 
     @property
     def moves(self) -> bool:
-        """Whether it ever changes."""
+        """True if it ever changes."""
         return bool((self.values != self.values[0]).any())
 
 
@@ -66,7 +62,12 @@ def read_transforms(bag: Bag, topics: tuple[str, ...]) -> dict[str, Transform]:
                 if topic.endswith("tf_static"):
                     rows[frame_of(each)].clear()
                 rows[frame_of(each)].append((header_ns(each) or 0, receive_ns, pose_of(each)))
-    return {name: _transform(name, some) for name, some in rows.items()}
+    transforms = {}
+    for name, some in rows.items():
+        header, receive, values = zip(*some, strict=True)
+        stamps = Stamps(whole(list(header)), whole(list(receive)))
+        transforms[name] = Transform(name, stamps, np.array(values, dtype=np.float64))
+    return transforms
 
 
 def choose_transform(transforms: dict[str, Transform], where: str) -> str:
@@ -98,11 +99,6 @@ def chain_of(transforms: dict[str, Transform], name: str, where: str) -> list[Tr
     if not any(transform.moves for transform in chain):
         raise LogError(f"{where}: {name} never moves; {_remedy(transforms)}")
     return chain
-
-
-def _transform(name: str, rows: list[Row]) -> Transform:
-    header, receive = (whole([row[column] for row in rows]) for column in (0, 1))
-    return Transform(name, Stamps(header, receive), np.array([values for _, _, values in rows], dtype=np.float64))
 
 
 def _pairs(transforms: dict[str, Transform], parent: str, child: str) -> list[str]:
@@ -145,9 +141,6 @@ ENCODINGS: Mapping[str, tuple[int, tuple[int, int, int]]] = {
 }
 """Bytes of a pixel, and which of them are red, green and blue."""
 
-BROKEN = (OSError, SyntaxError, ValueError, EOFError, struct.error, zlib.error, Image.DecompressionBombError)
-"""What Pillow raises at pictures that are cut off or damaged."""
-
 
 def read_pictures(bag: Bag, topic: str, stamps: str) -> tuple[Pictures, tuple[str, ...]]:
     """The pictures of a topic, and what there is to say of their times.
@@ -183,7 +176,13 @@ def picture_of(message: Any) -> Picture:
     Raises:
         LogError: If its encoding is not known, or it is damaged.
     """
-    return _plain(message) if hasattr(message, "encoding") else _compressed(message)
+    if not hasattr(message, "encoding"):
+        return _compressed(message)
+    _check(message)
+    channels, order = ENCODINGS[message.encoding]
+    rows = np.asarray(message.data, dtype=np.uint8)[: message.step * message.height].reshape(message.height, -1)
+    pixels = rows[:, : channels * message.width].reshape(message.height, message.width, channels)
+    return np.ascontiguousarray(pixels[:, :, order])
 
 
 def _check(message: Any) -> tuple[float, ...]:
@@ -200,14 +199,6 @@ def _check(message: Any) -> tuple[float, ...]:
         size = f"{message.width} × {message.height} pixels in rows of {message.step} bytes"
         raise LogError(f"{len(message.data)} bytes do not hold {size}; record it again, or take --pictures none")
     return ()
-
-
-def _plain(message: Any) -> Picture:
-    _check(message)
-    channels, order = ENCODINGS[message.encoding]
-    rows = np.asarray(message.data, dtype=np.uint8)[: message.step * message.height].reshape(message.height, -1)
-    pixels = rows[:, : channels * message.width].reshape(message.height, message.width, channels)
-    return np.ascontiguousarray(pixels[:, :, order])
 
 
 def _compressed(message: Any) -> Picture:

@@ -1,8 +1,7 @@
-"""What is wrong, or worth knowing, about the stamps and poses of a drive; what can be mended is.
+"""Checks of the stamps, poses and units of a drive; what can be mended is.
 
-Units that cannot be: a robot that drives at hundreds of metres a second is measured in millimetres.
-Orientations as headings: quaternions of any length, checked.
-When a robot answers its commands, by cross-correlation: two clocks show before anything is fitted.
+A robot that drives at hundreds of metres a second is measured in millimetres. Quaternions may have any length but none.
+The lag of a robot's turning behind its commands, by cross-correlation, shows two clocks before anything is fitted.
 """
 
 import math
@@ -69,7 +68,12 @@ def _check_commands(commands: Commands, poses: Poses, about: str) -> None:
         return
     if most > FASTEST_M_S:
         raise LogError(f"{about}: asks for {most:.3g} m/s; state the unit of its commands (--columns v=cmd_lin:mm/s)")
-    asked, driven = _commanded_way(commands, poses.times[-1]), _driven_way(poses)
+    lasts: Floats = np.clip(np.diff(np.append(commands.times, max(poses.times[-1], commands.times[-1]))), 0.0, 1.0)
+    asked = float((np.abs(commands.values[:, 0]) * lasts).sum())
+    # The way driven is taken along chords of CHORD_S.
+    grid = np.arange(poses.times[0], poses.times[-1], CHORD_S)
+    x, y = (np.interp(grid, poses.times, column) for column in poses.places[:, :2].T)
+    driven = float(np.hypot(np.diff(x), np.diff(y)).sum())
     if min(asked, driven) > MOVED_M / APART and max(asked, driven) > max(MOVED_M, APART * min(asked, driven)):
         raise LogError(
             f"{about}: the poses say that it drove {driven:.3g} m where its commands say {asked:.3g} m; state the "
@@ -85,18 +89,6 @@ def _usual_speed(poses: Poses) -> float:
         return 0.0
     chords = poses.places[later[here], :2] - poses.places[here, :2]
     return float(np.percentile(np.hypot(*chords.T) / (poses.times[later[here]] - poses.times[here]), 90))
-
-
-def _driven_way(poses: Poses) -> float:
-    """The way along chords of CHORD_S [m]."""
-    grid = np.arange(poses.times[0], poses.times[-1], CHORD_S)
-    x, y = (np.interp(grid, poses.times, column) for column in poses.places[:, :2].T)
-    return float(np.hypot(np.diff(x), np.diff(y)).sum())
-
-
-def _commanded_way(commands: Commands, end: float) -> float:
-    lasts: Floats = np.clip(np.diff(np.append(commands.times, max(end, commands.times[-1]))), 0.0, 1.0)
-    return float((np.abs(commands.values[:, 0]) * lasts).sum())
 
 
 LEAST_NORM = 1e-3
@@ -127,13 +119,13 @@ def headings_and_tilts(quaternions: Floats, where: str) -> tuple[Floats, Floats]
 
 
 def no_rotation(quaternions: Floats) -> NDArray[np.bool_]:
-    """Which quaternions are not finite or of length zero (N,)."""
+    """True for quaternions that are not finite or of length zero (N,)."""
     norms = np.linalg.norm(quaternions, axis=1)
     return np.asarray(~(np.isfinite(norms) & (norms > LEAST_NORM)))
 
 
 def complaint(quaternions: Floats, wrong: NDArray[np.bool_], where: str) -> LogError:
-    """What is wrong with the first of them."""
+    """The complaint about the first of those that are wrong."""
     number = int(np.argmax(wrong))
     values = ", ".join(f"{value:g}" for value in quaternions[number])
     return LogError(
@@ -171,24 +163,16 @@ def checked_drive(drive: Drive, where: str, offset_s: float = 0.0) -> tuple[Driv
     _check_upright(poses, about)
     commands = drive.commands
     if commands is not None:
-        commands, more = _ordered_commands(commands, about)
+        # Of several commands with one stamp, the last is the one that was held.
+        kept, more = _order(commands.times, "commands", about, last=True)
+        commands = replace(commands, times=commands.times[kept], values=commands.values[kept])
         notes += more
         _check_overlap(commands.times + offset_s, poses.times, about)
     return replace(drive, poses=poses, commands=commands), [f"drive {drive.name}: {note}" for note in notes]
 
 
 def _ordered_poses(poses: Poses, about: str) -> tuple[Poses, list[str]]:
-    """Poses by time, the first of several with one stamp."""
-    poses, lacking = _whole_poses(poses, about)
-    kept, notes = _order(poses.times, "poses", about, last=False)
-    notes = lacking + notes
-    if len(kept) < 2:
-        raise LogError(f"{about}: only {len(kept)} of its poses have a time of their own; a drive needs two or more")
-    return poses.only(kept), notes
-
-
-def _whole_poses(poses: Poses, about: str) -> tuple[Poses, list[str]]:
-    """Poses without those that lack a number or an orientation."""
+    """Poses by time, the first of several with one stamp, without those that lack a number or an orientation."""
     parts = (poses.times, poses.places, poses.headings, poses.tilts)
     whole = np.asarray(np.isfinite(np.column_stack(parts)).all(axis=1))
     lacking = int((~whole).sum())
@@ -196,14 +180,13 @@ def _whole_poses(poses: Poses, about: str) -> tuple[Poses, list[str]]:
         number = int(np.argmin(whole)) + 1
         what = f"{lacking} of its {len(whole)} poses, first number {number}, are no pose"
         raise LogError(f"{about}: {what}; record it again")
-    notes = [f"{lacking} poses without a place or an orientation were left out"] if lacking else []
-    return poses.only(whole), notes
-
-
-def _ordered_commands(commands: Commands, about: str) -> tuple[Commands, list[str]]:
-    """Commands by time, the last of several with one stamp: it is the one that was held."""
-    kept, notes = _order(commands.times, "commands", about, last=True)
-    return replace(commands, times=commands.times[kept], values=commands.values[kept]), notes
+    poses = poses.only(whole)
+    kept, notes = _order(poses.times, "poses", about, last=False)
+    if lacking:
+        notes = [f"{lacking} poses without a place or an orientation were left out", *notes]
+    if len(kept) < 2:
+        raise LogError(f"{about}: only {len(kept)} of its poses have a time of their own; a drive needs two or more")
+    return poses.only(kept), notes
 
 
 def _order(times: Floats, what: str, about: str, *, last: bool) -> tuple[np.ndarray, list[str]]:
@@ -271,7 +254,7 @@ SMOOTH_S = 0.1
 
 @dataclass(frozen=True)
 class Reaction:
-    """How commanded and measured turning fit together in a drive.
+    """Lag and correlation of commanded and measured turning in a drive.
 
     Attributes:
         lag_s: By how much the measured turning follows the commanded one [s]; below 0 it comes before.

@@ -1,7 +1,7 @@
-"""Which column of a table is what: as a map says, else by its name.
+"""Columns of a table taken for what a map says, else by their names, and their rows as commands and poses, by drive.
 
-Units of columns: those stated, those that a column's name ends in, and whether its values fit.
-Commands and poses of a table's rows, drive by drive.
+A unit is the one stated, else the one that a column's name ends in, else the package's; values that speak against a
+unit that nobody stated are refused.
 """
 
 import re
@@ -15,7 +15,7 @@ from proxytune.arrays import Floats
 from proxytune.errors import LogError
 from proxytune.importing.checks import headings_and_tilts
 from proxytune.importing.source import Channel, Commands, Poses
-from proxytune.importing.text import EXAMPLE, PLACE, POSE, QUANTITIES, QUATERNION, USUAL, Table
+from proxytune.importing.text import COMMAND_FIELDS, EXAMPLE, PLACE, POSE, QUANTITIES, QUATERNION, USUAL, Table
 from proxytune.logs import COMMANDS
 from proxytune.settings import nearest
 
@@ -36,30 +36,17 @@ class Unit:
 
 
 UNITS = {
-    unit.name: unit
-    for unit in (
-        Unit("s", "time", 1.0),
-        Unit("ms", "time", 1e-3),
-        Unit("us", "time", 1e-6),
-        Unit("ns", "time", 1e-9),
-        Unit("m", "length", 1.0),
-        Unit("cm", "length", 1e-2),
-        Unit("mm", "length", 1e-3),
-        Unit("km", "length", 1e3),
-        Unit("rad", "angle", 1.0),
-        Unit("deg", "angle", np.pi / 180.0),
-        Unit("m/s", "speed", 1.0),
-        Unit("cm/s", "speed", 1e-2),
-        Unit("mm/s", "speed", 1e-3),
-        Unit("km/h", "speed", 1.0 / 3.6),
-        Unit("rad/s", "turning speed", 1.0),
-        Unit("deg/s", "turning speed", np.pi / 180.0),
-        Unit("rpm", "turning speed", np.pi / 30.0),
-        Unit("duty", "duty", 1.0),
-        Unit("percent", "duty", 1e-2),
-        Unit("pwm255", "duty", 1.0 / 255.0),
-        Unit("number", "number", 1.0),
-    )
+    name: Unit(name, quantity, factor)
+    for quantity, units in {
+        "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
+        "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "km": 1e3},
+        "angle": {"rad": 1.0, "deg": np.pi / 180.0},
+        "speed": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "km/h": 1.0 / 3.6},
+        "turning speed": {"rad/s": 1.0, "deg/s": np.pi / 180.0, "rpm": np.pi / 30.0},
+        "duty": {"duty": 1.0, "percent": 1e-2, "pwm255": 1.0 / 255.0},
+        "number": {"number": 1.0},
+    }.items()
+    for name, factor in units.items()
 }
 """Every unit by its name; the first of each quantity is the package's own."""
 
@@ -137,7 +124,7 @@ def epoch_unit(values: Floats) -> Unit | None:
 
 
 def contradiction(unit: Unit, values: Floats) -> str:
-    """What speaks against a unit that nobody stated, or nothing.
+    """The reason against a unit that nobody stated, or "".
 
     Args:
         unit: The unit assumed.
@@ -227,13 +214,20 @@ def choose_columns(table: Table, stated: Mapping[str, str], fields: Sequence[str
     if "heading" in chosen:
         fields = [field for field in fields if field not in QUATERNION]
     taken = {column.name for column in chosen.values()}
-    for field in fields:
-        column = None if field in chosen else _usual(table, field, taken)
-        if column:
-            chosen[field] = column
+    for field in (field for field in fields if field not in chosen):
+        names = [name for name in usual_names(field, table.names) if name not in taken]
+        if len(names) > 1:
+            either = " or ".join(f"'{name}'" for name in names)
+            raise LogError(f"{table.path}: {field} may be {either}; say which, as in --columns {field}={names[0]}")
+        if names:
+            chosen[field] = _by_ending(field, names[0])
     if set(QUATERNION) <= set(chosen) and "heading" not in stated:
         chosen.pop("heading", None)
-    return {field: _of_an_epoch(table, column) for field, column in chosen.items()}
+    time = chosen.get("time")
+    if time and time.known_by == "assumed":
+        unit = epoch_unit(table.numbers(time.name))
+        chosen["time"] = replace(time, unit=unit, known_by="by its size") if unit else time
+    return chosen
 
 
 def check_fields(stated: Mapping[str, str], where: str) -> None:
@@ -271,8 +265,8 @@ def missing(table: Table, fields: Sequence[str]) -> LogError:
     )
 
 
-def command_kind(columns: Columns, kind: str, table: Table) -> str:
-    """The kind of the commands that a table holds.
+def with_commands(columns: Columns, kind: str, table: Table) -> tuple[Columns, str]:
+    """The columns without those of other commands than the table's, and the kind of these.
 
     Args:
         columns: The columns that were found.
@@ -289,24 +283,20 @@ def command_kind(columns: Columns, kind: str, table: Table) -> str:
         either = " or ".join(kinds)
         raise LogError(f"{table.path}: its commands may be {either}; choose one, as in --kind {kinds[0]}")
     if kinds:
-        return kinds[0]
+        unused = set(COMMAND_FIELDS) - set(COMMANDS[kinds[0]])
+        return {field: column for field, column in columns.items() if field not in unused}, kinds[0]
     pairs = [COMMANDS[kind]] if kind in COMMANDS else [pair for pair in COMMANDS.values() if set(pair) & set(columns)]
     lacking = [field for pair in pairs for field in pair if field not in columns]
     raise missing(table, lacking or ["commands (v and omega, or left and right)"])
 
 
-def holds_commands(columns: Columns) -> bool:
-    """Whether there is a column of any kind of command."""
-    return any(set(pair) & set(columns) for pair in COMMANDS.values())
-
-
 def named_in(table: Table, entry: str) -> bool:
-    """Whether an entry of a column map names a column of a table."""
+    """True if an entry of a column map names a column of a table."""
     return entry in table.names or entry.rpartition(":")[0] in table.names
 
 
 def described(columns: Columns) -> str:
-    """What was taken for what."""
+    """The fields with the columns taken for them."""
     return ", ".join(str(column) for column in columns.values())
 
 
@@ -321,31 +311,12 @@ def _stated(table: Table, field: str, entry: str) -> Column:
     name, unit = split_unit(entry, QUANTITIES[field], table.names, where)
     if name not in table.names:
         raise LogError(f"{where}: has no column '{name}'; {nearest(name, table.names)}")
-    if unit:
-        return Column(field, name, unit, "stated")
-    return _by_ending(field, name)
+    return Column(field, name, unit, "stated") if unit else _by_ending(field, name)
 
 
 def _by_ending(field: str, name: str) -> Column:
     _, unit = split_ending(name, QUANTITIES[field])
     return Column(field, name, unit or own_unit(QUANTITIES[field]), "by its name" if unit else "assumed")
-
-
-def _usual(table: Table, field: str, taken: set[str]) -> Column | None:
-    """The one column whose name is usual for a field."""
-    names = [name for name in usual_names(field, table.names) if name not in taken]
-    if len(names) > 1:
-        either = " or ".join(f"'{name}'" for name in names)
-        raise LogError(f"{table.path}: {field} may be {either}; say which, as in --columns {field}={names[0]}")
-    return _by_ending(field, names[0]) if names else None
-
-
-def _of_an_epoch(table: Table, column: Column) -> Column:
-    """Stamps whose unit nobody gave, taken for those since 1970 where they are too large for seconds."""
-    if column.field != "time" or column.known_by != "assumed":
-        return column
-    unit = epoch_unit(table.numbers(column.name))
-    return replace(column, unit=unit, known_by="by its size") if unit else column
 
 
 def summed(parts: Sequence[Sequence[Channel]]) -> tuple[Channel, ...]:

@@ -1,8 +1,6 @@
-"""Opening a log, whatever form it comes in.
+"""Opening a log, whatever form it comes in: the form is told by what is in it.
 
-A drive in numbers: how long, how often measured, what dropped out, and when it answers its commands.
-Reading whatever a user has: the form is told by what is in it.
-A source written as a log's folder: whole, or not at all.
+A source is read, checked, put in numbers drive by drive, and written as a log's folder: whole, or not at all.
 """
 
 import shutil
@@ -23,7 +21,7 @@ from proxytune.errors import InputError, LogError, RunError
 from proxytune.importing.arrays import is_arrays, read_arrays
 from proxytune.importing.bag import is_bag
 from proxytune.importing.checks import check_units, checked_drive, reaction_of
-from proxytune.importing.source import Commands, Drive, Facts, Pictures, Poses, Source, Survey, Wanted
+from proxytune.importing.source import Drive, Facts, Pictures, Source, Survey, Wanted
 from proxytune.importing.tables import is_csv_tables, is_mrclam, is_tum, read_csv_tables, read_mrclam, read_tum
 from proxytune.importing.topics import read_bag
 from proxytune.logs import COMMANDS, Log, read_log
@@ -38,13 +36,14 @@ def survey(drive: Drive) -> Survey:
     steps = np.diff(times)
     usual = float(np.median(steps))
     gaps = steps[steps > max(GAP_S, 3.0 * usual)]
+    missing = float(np.maximum(np.rint(steps / usual) - 1.0, 0.0)[steps <= GAP_S].sum())
     answer = reaction_of(drive)
     return Survey(
         name=drive.name,
         seconds=float(times[-1] - times[0]),
         poses=len(times),
         poses_hz=1.0 / usual,
-        lost=_lost(steps, usual),
+        lost=missing / (missing + len(steps) + 1),
         gaps=len(gaps),
         longest_gap_s=float(gaps.max(initial=0.0)),
         jitter_s=float(steps[steps < 1.5 * usual].std()),
@@ -54,13 +53,8 @@ def survey(drive: Drive) -> Survey:
     )
 
 
-def _lost(steps: Floats, usual: float) -> float:
-    missing = float(np.maximum(np.rint(steps / usual) - 1.0, 0.0)[steps <= GAP_S].sum())
-    return missing / (missing + len(steps) + 1)
-
-
 def clock_notes(drives: Sequence[Survey]) -> list[str]:
-    """What the lags say of the clocks of commands and poses, in a sentence."""
+    """Tell what the lags say of the clocks of commands and poses, in a sentence."""
     lags = [(one.lag_s, one.name) for one in drives if one.lag_s is not None]
     early = [pair for pair in lags if pair[0] < 0.0]
     if early:
@@ -98,7 +92,7 @@ KNOWN = "a ROS bag (.bag, .db3, .mcap or a folder of them), CSV, TUM or MRCLAM f
 
 
 def read_source(path: Path, wanted: Wanted, offset_s: float = 0.0) -> Source:
-    """What a source holds: its drives with stamps in order, and notes on what was taken and what is odd.
+    """Read a source: its drives with stamps in order, and notes on what was taken and what is odd.
 
     Args:
         path: The source.
@@ -115,11 +109,10 @@ def read_source(path: Path, wanted: Wanted, offset_s: float = 0.0) -> Source:
         raise LogError(f"{path}: is a device or a pipe; copy what it gives into a file, and give that")
     for form in FORMS:
         if form.recognise(path):
-            return _checked(form.read(path, wanted), path, offset_s)
-    raise LogError(f"{path}: is no recording that is known; give {KNOWN}")
-
-
-def _checked(source: Source, path: Path, offset_s: float) -> Source:
+            source = form.read(path, wanted)
+            break
+    else:
+        raise LogError(f"{path}: is no recording that is known; give {KNOWN}")
     drives, notes = [], list(source.notes)
     for drive in source.drives:
         one, found = checked_drive(drive, str(path), offset_s)
@@ -170,11 +163,17 @@ def fill_log(folder: Path, source: Source, facts: Facts, name: str, origin: str)
         name: What the log is called.
         origin: Where it came from, for log.toml.
     """
-    _write_table(folder / "samples.csv", [_samples(drive.name, drive.poses) for drive in source.drives])
-    commands = [_commands(drive.name, drive.commands) for drive in source.drives if drive.commands is not None]
-    if commands:
-        _write_table(folder / "commands.csv", commands)
-    pictures = [drive for drive in source.drives if drive.pictures is not None]
+    samples, commands = [], []
+    for drive in source.drives:
+        poses = (drive.poses.times, drive.poses.places[:, :2], np.unwrap(drive.poses.headings))
+        samples.append(_named(drive.name, poses, ("time", "x", "y", "heading")))
+        if drive.commands is not None:
+            issued = (drive.commands.times, drive.commands.values)
+            commands.append(_named(drive.name, issued, ("time", *COMMANDS[drive.commands.kind])))
+    for name_of_file, tables in (("samples.csv", samples), ("commands.csv", commands)):
+        if tables:
+            pd.concat(tables).to_csv(folder / name_of_file, index=False, lineterminator="\n")
+    pictures = [(drive.name, drive.pictures) for drive in source.drives if drive.pictures is not None]
     if pictures:
         _write_pictures(folder, pictures)
     text = _description(source, name, facts, origin, with_pictures=bool(pictures))
@@ -222,39 +221,21 @@ def writable(folder: Path) -> Iterator[None]:
         raise RunError(f"{folder}: cannot be written ({problem.strerror}); make room, or give another folder") from None
 
 
-def _samples(name: str, poses: Poses) -> pd.DataFrame:
-    columns = np.column_stack((poses.times, poses.places[:, :2], np.unwrap(poses.headings)))
-    return _named(name, columns, ("time", "x", "y", "heading"))
-
-
-def _commands(name: str, commands: Commands) -> pd.DataFrame:
-    return _named(name, np.column_stack((commands.times, commands.values)), ("time", *COMMANDS[commands.kind]))
-
-
-def _named(name: str, columns: np.ndarray, names: tuple[str, ...]) -> pd.DataFrame:
-    table = pd.DataFrame(columns, columns=list(names))
-    table.insert(0, "episode", name)
+def _named(episode: str, columns: tuple[Floats, ...], names: tuple[str, ...]) -> pd.DataFrame:
+    table = pd.DataFrame(np.column_stack(columns), columns=list(names))
+    table.insert(0, "episode", episode)
     return table
 
 
-def _write_table(path: Path, tables: list[pd.DataFrame]) -> None:
-    pd.concat(tables).to_csv(path, index=False, lineterminator="\n")
-
-
-def _write_pictures(folder: Path, drives: list[Drive]) -> None:
+def _write_pictures(folder: Path, drives: list[tuple[str, Pictures]]) -> None:
     """Every picture by its number, one in memory at a time, and frames.csv."""
     (folder / "frames").mkdir()
     rows: list[tuple[int, str, float]] = []
-    for drive in drives:
-        for time, picture in _timed(drive.pictures):
+    for name, pictures in drives:
+        for time, picture in zip(pictures.times.tolist(), pictures.read(), strict=True):
             Image.fromarray(picture).save(folder / (PICTURES % len(rows)))
-            rows.append((len(rows), drive.name, time))
+            rows.append((len(rows), name, time))
     pd.DataFrame(rows, columns=["frame", "episode", "time"]).to_csv(folder / "frames.csv", index=False)
-
-
-def _timed(pictures: Pictures | None) -> Iterator[tuple[float, np.ndarray]]:
-    if pictures is not None:
-        yield from zip(pictures.times.tolist(), pictures.read(), strict=True)
 
 
 def _description(source: Source, name: str, facts: Facts, origin: str, *, with_pictures: bool) -> str:

@@ -1,7 +1,6 @@
-"""What every importer makes of a source: drives with commands, poses and pictures, each at times of their own.
+"""The contract of importers: what a user asks for (Wanted), what every importer returns (Source), and further Facts.
 
-What a user asks of an import, where the source alone does not say.
-What a log.toml is to say besides what the source holds.
+A source has drives with commands, poses and pictures, each at times of their own.
 """
 
 import math
@@ -133,13 +132,13 @@ class Survey:
 
     @property
     def facts(self) -> dict[str, Any]:
-        """What a JSON document says of it."""
+        """The statements of a JSON document on it."""
         return asdict(self)
 
 
 @dataclass(frozen=True)
 class Source:
-    """What an importer found.
+    """The findings of an importer.
 
     Attributes:
         form: What the source is, as in "ROS 2 bag (mcap)".
@@ -157,17 +156,14 @@ class Source:
 
     @property
     def facts(self) -> dict[str, Any]:
-        """What a JSON document says of it."""
+        """The statements of a JSON document on it."""
         channels = [{"name": c.name, "type": c.kind, "count": c.count, "role": c.role} for c in self.channels]
         return {"form": self.form, "channels": channels, "notes": list(self.notes)}
 
 
-NOTHING: Mapping[str, str] = MappingProxyType({})
-
-
 @dataclass(frozen=True)
 class Wanted:
-    """What to take from a source; whatever is left empty is chosen by what there is.
+    """Choices of what to take from a source; whatever is left empty is chosen by what there is.
 
     Attributes:
         commands: Topic of the commands; "none" for a log without them.
@@ -183,16 +179,13 @@ class Wanted:
     poses: str = ""
     frames: str = ""
     stamps: str = "header"
-    columns: Mapping[str, str] = field(default_factory=lambda: NOTHING)
+    columns: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     kind: str = ""
-
-
-NONE: Mapping[str, float] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
 class Facts:
-    """What only the user knows of a source.
+    """Statements that only the user can make of a source.
 
     Attributes:
         robot: Name of the robot; empty: the log's own name.
@@ -202,7 +195,7 @@ class Facts:
     """
 
     robot: str = ""
-    figures: Mapping[str, float] = field(default_factory=lambda: NONE)
+    figures: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     road: str = ""
     clock_offset: str = ""
 

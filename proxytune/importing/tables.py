@@ -1,11 +1,11 @@
-"""CSV files: poses and commands in one table, or in two that are joined by time.
+"""Text files of poses and commands: CSV tables, TUM trajectories and those of the UTIAS MRCLAM data set.
 
-Commands in a file of their own: which file, what is in it, and which drive each command belongs to.
-The UTIAS MRCLAM data set's own files: velocity commands and motion capture of several robots.
+Commands may be in a file of their own; each then belongs to the drive that it names, or during which it was issued.
+A TUM trajectory has stamp, place and quaternion in each line, as SLAM and motion capture tools write them. MRCLAM has
+velocity commands and motion capture of several robots:
 
 K. Y. K. Leung, Y. Halpern, T. D. Barfoot, H. H. T. Liu: The UTIAS multi-robot cooperative localization and mapping
 dataset. International Journal of Robotics Research 30 (8), 2011.
-TUM trajectories: stamp, place and quaternion in each line, as SLAM and motion capture tools write them.
 """
 
 import itertools
@@ -22,15 +22,14 @@ from proxytune.importing.columns import (
     channels_of,
     check_fields,
     choose_columns,
-    command_kind,
     commands_by_drive,
     described,
-    holds_commands,
     named_in,
     own_columns,
     pose_fields,
     poses_by_drive,
     summed,
+    with_commands,
 )
 from proxytune.importing.source import Channel, Commands, Drive, Source, Wanted
 from proxytune.importing.text import (
@@ -53,7 +52,7 @@ COMMAND_SUFFIXES = (".csv", ".tsv", ".txt")
 
 @dataclass(frozen=True)
 class CommandFile:
-    """What a file of commands holds.
+    """The contents of a file of commands.
 
     Attributes:
         path: The file.
@@ -69,7 +68,7 @@ class CommandFile:
 
 
 def is_named_as_commands(path: Path) -> bool:
-    """Whether a file's name says that it holds commands: commands.csv, cmd_vel.csv, run1_commands.csv and so on."""
+    """True if a file's name says that it holds commands: commands.csv, cmd_vel.csv, run1_commands.csv and so on."""
     return path.suffix.lower() in COMMAND_SUFFIXES and any(
         path.stem == stem or path.stem.endswith(f"_{stem}") for stem in STEMS
     )
@@ -107,8 +106,8 @@ def read_commands(path: Path, wanted: Wanted) -> CommandFile:
     stated = {
         field: entry for field, entry in wanted.columns.items() if field in COMMAND_FIELDS or named_in(table, entry)
     }
-    columns = choose_columns(table, stated, ("time", "episode", *COMMAND_FIELDS))
-    kind = command_kind(columns, wanted.kind, table)
+    found = choose_columns(table, stated, ("time", "episode", *COMMAND_FIELDS))
+    columns, kind = with_commands(found, wanted.kind, table)
     used = {field: columns[field] for field in ("time", "episode", *COMMANDS[kind]) if field in columns}
     commands = commands_by_drive(table, used, kind)
     channels = tuple(replace(c, name=f"{path.name}: {c.name}") for c in channels_of(table, used))
@@ -135,14 +134,13 @@ def share_commands(file: CommandFile, drives: Sequence[Drive], labels: Sequence[
     for name in file.commands:
         if name not in known:
             raise LogError(f"{file.path}: drive '{name}' has no poses; {nearest(name, known)}")
-    return [_by_name(file, drive, label) for drive, label in zip(drives, labels, strict=True)]
-
-
-def _by_name(file: CommandFile, drive: Drive, label: str) -> Drive:
-    commands = file.commands.get(drive.name) or file.commands.get(label)
-    if commands is None:
-        raise LogError(f"{file.path}: has no commands for drive '{drive.name}'; add them, or leave its poses out")
-    return replace(drive, commands=commands)
+    shared = []
+    for drive, label in zip(drives, labels, strict=True):
+        commands = file.commands.get(drive.name) or file.commands.get(label)
+        if commands is None:
+            raise LogError(f"{file.path}: has no commands for drive '{drive.name}'; add them, or leave its poses out")
+        shared.append(replace(drive, commands=commands))
+    return shared
 
 
 def _by_time(file: CommandFile, drives: Sequence[Drive]) -> list[Drive]:
@@ -175,7 +173,7 @@ SUFFIXES = (".csv", ".tsv")
 
 @dataclass(frozen=True)
 class Recording:
-    """What one file of poses holds.
+    """The contents of one file of poses.
 
     Attributes:
         drives: Its drives.
@@ -193,7 +191,7 @@ class Recording:
 
 
 def is_csv_tables(path: Path) -> bool:
-    """Whether this is a table of text with named columns, or a folder of CSV files."""
+    """True for a table of text with named columns, or a folder of CSV files."""
     if path.is_dir():
         return any(file.suffix.lower() in SUFFIXES for file in path.iterdir())
     if path.suffix.lower() in SUFFIXES:
@@ -216,11 +214,8 @@ def read_csv_tables(path: Path, wanted: Wanted) -> Source:
     check_fields(wanted.columns, str(path))
     files = _files(path, wanted)
     recordings = [_read_recording(file, wanted, alone=len(files) == 1) for file in files]
-    drives, channels, notes = (
-        [],
-        list(summed([recording.channels for recording in recordings])),
-        [recording.note for recording in recordings],
-    )
+    drives, notes = [], [recording.note for recording in recordings]
+    channels = list(summed([recording.channels for recording in recordings]))
     for apart in dict.fromkeys(recording.apart for recording in recordings):
         mine = [recording for recording in recordings if recording.apart == apart]
         group = [drive for recording in mine for drive in recording.drives]
@@ -272,17 +267,16 @@ def _columns(table: Table, wanted: Wanted, apart: Path | None) -> tuple[Columns,
         if field in fields and not (apart and field in COMMAND_FIELDS and not named_in(table, entry))
     }
     columns = choose_columns(table, stated, fields)
-    if not own or (apart and not holds_commands(columns)):
+    found = set(COMMAND_FIELDS) & set(columns)
+    if not own or (apart and not found):
         return {field: column for field, column in columns.items() if field not in COMMAND_FIELDS}, "none"
-    if not holds_commands(columns):
+    if not found:
         pose_fields(table, columns)
         raise LogError(
             f"{table.path}: no column of commands found; its columns are: {', '.join(table.names)}; say which they are "
             f"({EXAMPLE}), name their file (--commands FILE), or leave them out (--commands none)"
         )
-    kind = command_kind(columns, wanted.kind, table)
-    unused = set(COMMAND_FIELDS) - set(COMMANDS[kind])
-    return {field: column for field, column in columns.items() if field not in unused}, kind
+    return with_commands(columns, wanted.kind, table)
 
 
 MRCLAM_COMMANDS = ("time", "v", "omega")
@@ -291,7 +285,7 @@ FILE = re.compile(r"(Robot\d+)_(Odometry|Groundtruth)\.dat")
 
 
 def is_mrclam(path: Path) -> bool:
-    """Whether this is a file such as Robot1_Odometry.dat or Robot1_Groundtruth.dat, or a folder with some."""
+    """True for a file such as Robot1_Odometry.dat or Robot1_Groundtruth.dat, or a folder with some."""
     return bool(FILE.fullmatch(path.name)) if path.is_file() else bool(_robots(path))
 
 
@@ -350,7 +344,7 @@ COLUMNS = ("time", *PLACE, *QUATERNION)
 
 
 def is_tum(path: Path) -> bool:
-    """Whether this is a text file of eight numbers a line, or named .tum; or a folder of such named files."""
+    """True for a text file of eight numbers a line, or named .tum; or a folder of such named files."""
     if path.is_dir():
         return any(_trajectory_files(path))
     if path.suffix.lower() == ".tum":

@@ -1,7 +1,7 @@
-"""Text files as tables: separators, decimal commas, comments and the names of the columns.
+"""Text files as tables: separators, decimal commas, comments, and the names that columns usually have.
 
-Tables of others: named columns, each cell text or a number, every complaint with file, line and column.
-What a table's column may mean: the package's names, and those that others usually give.
+Each cell is text or a number; every complaint names file, line and column. `pandas.read_csv(sep=None)` cannot do it: it
+takes "score" for two columns cut at s and a row too long for one with an index, and refuses blanks of several widths.
 """
 
 import codecs
@@ -61,7 +61,7 @@ class Table:
         return texts.to_numpy(dtype=np.str_)
 
     def filled(self, column: str) -> int:
-        """How many cells of a column are not empty."""
+        """Number of cells of a column that are not empty."""
         cells = self.cells[column]
         return len(cells) - int((cells.isna() | cells.isin(EMPTY)).sum())
 
@@ -135,7 +135,7 @@ def first_rows(path: Path, count: int = 4) -> list[list[str]]:
 
 
 def is_number(cell: str) -> bool:
-    """Whether a cell holds a number, with a decimal point or comma."""
+    """True if a cell holds a number, with a decimal point or comma."""
     try:
         float(cell.replace(",", "."))
     except ValueError:
@@ -193,7 +193,7 @@ def _names(path: Path, number: int, cells: list[str]) -> list[str]:
 
 
 def _separator(line: str) -> str:
-    """What separates the cells of a line; nothing stands for blanks."""
+    """The separator of the cells of a line; "" stands for blanks."""
     return next((mark for mark in (";", "\t", ",") if mark in line), "")
 
 

@@ -1,16 +1,14 @@
 """A bag, or a folder of bags, as drives with commands, poses and pictures.
 
-What a log needs of a bag, and how topics for it are told apart.
-Which topic of a bag is taken for what, and why.
-Poses out of a chain of transforms: composed, and interpolated where they come at different times.
+A topic is taken by its type, its name and its number of messages, unless the user names it. Poses may come out of a
+chain of transforms: composed, and interpolated where these come at different times.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
 from proxytune.arrays import Floats
@@ -56,11 +54,11 @@ class Role:
     asked: tuple[str, ...] = ()
 
     def can_be(self, topic: Topic) -> bool:
-        """Whether a topic has messages that can be read as this."""
+        """True if a topic has messages that can be read as this."""
         return topic.count > 0 and topic.known and not topic.lacking and short(topic.kind) in self.ranks
 
     def is_offered(self, topic: Topic) -> bool:
-        """Whether a topic may be taken without being named."""
+        """True if a topic may be taken without being named."""
         named_otherwise = any(part in topic.name.lower() for part in self.never)
         return self.can_be(topic) and not named_otherwise and short(topic.kind) not in self.asked
 
@@ -72,7 +70,7 @@ class Role:
         return differs, by_name, self.ranks[short(topic.kind)], -topic.count, topic.name
 
     def why_not(self, topic: Topic) -> str:
-        """Why a topic is not taken."""
+        """The reason why a topic is not taken."""
         if not topic.count:
             return "it has no messages"
         if topic.lacking:
@@ -94,14 +92,8 @@ COMMAND_ROLE = Role(
 POSE_ROLE = Role(
     "poses",
     "--poses",
-    {
-        "PoseStamped": 0,
-        "TransformStamped": 0,
-        "PoseWithCovarianceStamped": 1,
-        "Odometry": 2,
-        "TFMessage": 3,
-        "tfMessage": 3,
-    },
+    {"PoseStamped": 0, "TransformStamped": 0, "PoseWithCovarianceStamped": 1, "Odometry": 2}
+    | {"TFMessage": 3, "tfMessage": 3},
     first=("mocap", "vicon", "vrpn", "optitrack", "qualisys", "ground_truth"),
     never=("goal", "target", "setpoint", "initialpose", "cmd", "command", "tf_static"),
 )
@@ -115,7 +107,7 @@ def short(kind: str) -> str:
 
 @dataclass(frozen=True)
 class Choice:
-    """What is taken from a bag.
+    """The topics that are taken from a bag.
 
     Attributes:
         commands: Topic of the commands, or None.
@@ -133,7 +125,7 @@ class Choice:
 
     @property
     def of_transforms(self) -> bool:
-        """Whether poses come of transforms."""
+        """True if poses come of transforms."""
         return self.poses.kind in TRANSFORMS
 
 
@@ -164,15 +156,26 @@ def choose(topics: tuple[Topic, ...], wanted: Wanted, where: str) -> Choice:
     return Choice(commands, kind, poses, transform, pictures)
 
 
+def roles_of(choice: Choice) -> tuple[tuple[Role, Topic | None], ...]:
+    """The topic taken in each role."""
+    return (COMMAND_ROLE, choice.commands), (POSE_ROLE, choice.poses), (PICTURE_ROLE, choice.pictures)
+
+
 def channels_of(topics: tuple[Topic, ...], choice: Choice) -> tuple[Channel, ...]:
     """Every topic with what it is taken for, or why it is left out."""
     return tuple(Channel(topic.name, topic.kind, topic.count, _part(topic, choice)) for topic in topics)
 
 
 def notes_of(topics: tuple[Topic, ...], choice: Choice) -> tuple[str, ...]:
-    """What was taken and what else could have been, a sentence each."""
-    taken = ((COMMAND_ROLE, choice.commands), (POSE_ROLE, choice.poses), (PICTURE_ROLE, choice.pictures))
-    return tuple(_note(role, topic, topics) for role, topic in taken if topic is not None)
+    """Tell what was taken and what else could have been, a sentence each."""
+    notes = []
+    for role, topic in roles_of(choice):
+        if topic is not None:
+            others = [other.name for other in topics if role.is_offered(other) and other != topic]
+            also = f"; {', '.join(others)} could be as well ({role.option})" if others else ""
+            what = f"{topic.count} messages of {topic.name} ({short(topic.kind)}){also}"
+            notes.append(f"{role.name.capitalize()} are {what}.")
+    return tuple(notes)
 
 
 def _command_role(wanted: Wanted) -> Role:
@@ -214,14 +217,8 @@ def _nothing(role: Role, topics: tuple[Topic, ...], where: str) -> str:
     return f"{where}: no topic has {role.name}, which are messages of type {', '.join(role.ranks)}; record one"
 
 
-def _note(role: Role, topic: Topic, topics: tuple[Topic, ...]) -> str:
-    others = [other.name for other in topics if role.is_offered(other) and other != topic]
-    also = f"; {', '.join(others)} could be as well ({role.option})" if others else ""
-    return f"{role.name.capitalize()} are {topic.count} messages of {topic.name} ({short(topic.kind)}){also}."
-
-
 def _part(topic: Topic, choice: Choice) -> str:
-    roles = ((COMMAND_ROLE, choice.commands), (POSE_ROLE, choice.poses), (PICTURE_ROLE, choice.pictures))
+    roles = roles_of(choice)
     for role, taken in roles:
         if topic == taken:
             return role.name
@@ -254,7 +251,8 @@ def read_chain(transforms: dict[str, Transform], name: str, stamps: str, where: 
     choices = {each.name: choose_times(each.stamps, stamps, each.name) for each in chain if each.moves}
     times = {moving: of_it for moving, (of_it, _) in choices.items()}
     most = max(times.values(), key=len)
-    common = most[_covered(most, times.values())]
+    first, last = max(other.min() for other in times.values()), min(other.max() for other in times.values())
+    common = most[(most >= first) & (most <= last)]
     if not len(common):
         raise LogError(f"{where}: the transforms of {name} share no time; name another pair by --poses")
     place, turn = np.zeros((len(common), 3)), Rotation.identity(1)
@@ -263,7 +261,10 @@ def read_chain(transforms: dict[str, Transform], name: str, stamps: str, where: 
         place, turn = place + turn.apply(step), turn * rotation
     said = (note for _, notes in choices.values() for note in notes)
     poses = Poses(common, place, *headings_and_tilts(turn.as_quat(), f"{where}: {name}"))
-    return poses, (_chain_note(name, chain, len(most) - len(common)), *said)
+    parent, _, child = name.partition(">")
+    names, left_out = ", ".join(transform.name for transform in chain), len(most) - len(common)
+    outside = f"; {left_out} outside of what all of them cover are left out" if left_out else ""
+    return poses, (f"Poses of {child} in {parent} are composed of {names}{outside}.", *said)
 
 
 def _check(transform: Transform, where: str) -> None:
@@ -275,20 +276,6 @@ def _check(transform: Transform, where: str) -> None:
     wrong = no_rotation(transform.values[:, 3:])
     if wrong.any():
         raise complaint(transform.values[:, 3:], wrong, f"{where}: transform {transform.name}")
-
-
-def _chain_note(name: str, chain: list[Transform], left_out: int) -> str:
-    parent, _, child = name.partition(">")
-    names = ", ".join(transform.name for transform in chain)
-    outside = f"; {left_out} outside of what all of them cover are left out" if left_out else ""
-    return f"Poses of {child} in {parent} are composed of {names}{outside}."
-
-
-def _covered(times: Floats, others: Collection[Floats]) -> NDArray[np.bool_]:
-    """Which times lie within all others."""
-    first, last = max(other.min() for other in others), min(other.max() for other in others)
-    covered: NDArray[np.bool_] = (times >= first) & (times <= last)
-    return covered
 
 
 def _at(values: Floats, times: Floats | None, wanted: Floats) -> tuple[Floats, Rotation]:
@@ -306,9 +293,6 @@ def _at(values: Floats, times: Floats | None, wanted: Floats) -> tuple[Floats, R
     return places, Slerp(stamps, rotations)(wanted) if len(stamps) > 1 else rotations
 
 
-Notes = tuple[str, ...]
-
-
 def read_bag(path: Path, wanted: Wanted) -> Source:
     """Read a ROS bag, or a folder of bags with a drive each, of the same topics.
 
@@ -323,14 +307,19 @@ def read_bag(path: Path, wanted: Wanted) -> Source:
     topics, notes = _list(path, bags)
     choice = choose(topics, wanted, f"{path}")
     if choice.of_transforms and not choice.transform:
-        choice = _with_transform(choice, next(iter(bags.values())), wanted)
+        first = next(iter(bags.values()))
+        with open_bag(first) as opened:
+            transforms = read_transforms(opened, _transform_topics(opened))
+        choice = replace(choice, transform=choose_transform(transforms, f"{first}: {choice.poses.name}"))
     drives = []
     notes = [*notes_of(topics, choice), *notes]
     for name, bag in bags.items():
         drive, said = _read_drive(name, bag, choice, wanted)
         drives.append(drive)
         notes += said if len(bags) == 1 else [f"{name}: {note}" for note in said]
-    return Source(_form(bags), tuple(drives), channels_of(topics, choice), tuple(dict.fromkeys(notes)))
+    forms = sorted({form_of(bag) for bag in bags.values()})
+    form = forms[0] if len(bags) == 1 else f"{len(bags)} bags: {', '.join(forms)}"
+    return Source(form, tuple(drives), channels_of(topics, choice), tuple(dict.fromkeys(notes)))
 
 
 def _list(path: Path, bags: dict[str, Path]) -> tuple[tuple[Topic, ...], list[str]]:
@@ -356,13 +345,6 @@ def _merge(topics: list[Topic], bags: int) -> Topic:
     return Topic(one.name, kind, sum(topic.count for topic in topics), known, lacking)
 
 
-def _with_transform(choice: Choice, path: Path, wanted: Wanted) -> Choice:
-    """The choice with the transform that the first bag's pose is."""
-    with open_bag(path) as bag:
-        transforms = read_transforms(bag, _transform_topics(bag))
-        return replace(choice, transform=choose_transform(transforms, f"{path}: {choice.poses.name}"))
-
-
 def _read_drive(name: str, path: Path, choice: Choice, wanted: Wanted) -> tuple[Drive, list[str]]:
     """One bag as a drive, and what there is to say of it."""
     commands, pictures = None, None
@@ -371,7 +353,11 @@ def _read_drive(name: str, path: Path, choice: Choice, wanted: Wanted) -> tuple[
         if choice.commands is not None:
             commands, notes = read_commands(bag, choice.commands.name, choice.kind, wanted.stamps)
             said += notes
-        poses, notes = _read_poses(bag, choice, wanted)
+        if choice.of_transforms:
+            transforms, where = read_transforms(bag, _transform_topics(bag)), f"{bag.path}: {choice.poses.name}"
+            poses, notes = read_chain(transforms, choice.transform, wanted.stamps, where)
+        else:
+            poses, notes = read_poses(bag, choice.poses.name, wanted.stamps)
         said += notes
         if choice.pictures is not None:
             pictures, notes = read_pictures(bag, choice.pictures.name, wanted.stamps)
@@ -379,17 +365,5 @@ def _read_drive(name: str, path: Path, choice: Choice, wanted: Wanted) -> tuple[
     return Drive(name, commands, poses, pictures), said
 
 
-def _read_poses(bag: Bag, choice: Choice, wanted: Wanted) -> tuple[Poses, Notes]:
-    if not choice.of_transforms:
-        return read_poses(bag, choice.poses.name, wanted.stamps)
-    transforms = read_transforms(bag, _transform_topics(bag))
-    return read_chain(transforms, choice.transform, wanted.stamps, f"{bag.path}: {choice.poses.name}")
-
-
 def _transform_topics(bag: Bag) -> tuple[str, ...]:
     return tuple(topic.name for topic in bag.topics if topic.kind in TRANSFORMS and topic.known)
-
-
-def _form(bags: dict[str, Path]) -> str:
-    forms = sorted({form_of(bag) for bag in bags.values()})
-    return forms[0] if len(bags) == 1 else f"{len(bags)} bags: {', '.join(forms)}"

@@ -1,4 +1,4 @@
-from .frames import read_pictures as read_pictures
+from .frames import BROKEN as BROKEN, read_pictures as read_pictures
 from .log import (
     COMMANDS as COMMANDS,
     GEOMETRY as GEOMETRY,

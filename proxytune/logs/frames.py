@@ -1,7 +1,4 @@
-"""A log's camera: what log.toml states of it, and where and when each picture was taken.
-
-The pictures of a log's camera, small enough to hold many of them.
-"""
+"""A log's camera: what log.toml states of it, where and when each picture was taken, and the pictures, made small."""
 
 import re
 import struct
@@ -33,7 +30,7 @@ MOST_FRAMES = 2**53
 
 
 class Camera(NamedTuple):
-    """What log.toml states.
+    """The camera that log.toml states.
 
     Attributes:
         pattern: Where the pictures lie, as "frames/%06d.png".
@@ -46,16 +43,12 @@ class Camera(NamedTuple):
     stated: Frames
 
 
-class Instants(NamedTuple):
-    """Numbers of pictures, the drive of each, and its time [s] on the poses' clock, all (N,)."""
-
-    numbers: Whole
-    drives: Whole
-    times: Floats
+Instants = tuple[Whole, Whole, Floats]
+"""Numbers of pictures, the drive of each, and its time [s] on the poses' clock, all (N,)."""
 
 
 def read_camera(settings: Section) -> Camera | None:
-    """What log.toml states of its pictures, or None where it has none.
+    """Read what log.toml states of its pictures; None where it states nothing.
 
     Raises:
         SettingsError: If a key is missing, unknown or impossible.
@@ -63,8 +56,16 @@ def read_camera(settings: Section) -> Camera | None:
     if not {"camera", "frames"} & set(settings.keys()):
         return None
     table = settings.section("camera")
-    _check_keys(settings, table)
-    pattern = _pattern(settings if "frames" in settings else table)
+    if "frames" in settings and "frames" in table:
+        raise settings.error("frames", "is stated in [camera] too; take this one out")
+    if "map" in table:
+        raise table.error("map", "belongs above the line [camera]; move it there")
+    table.only(KEYS)
+    section = settings if "frames" in settings else table
+    pattern = section.text("frames")
+    if not PATTERN.fullmatch(pattern):
+        rule = "must have the picture's number once, as %d or %06d, and end in .png, .jpg or .jpeg"
+        raise section.error("frames", f"{rule}, got '{pattern}'")
     poses = table.section("poses")
     poses.only(("position_m", "heading_deg"))
     stated = Frames(
@@ -79,22 +80,6 @@ def read_camera(settings: Section) -> Camera | None:
         fixed_exposure=table.text("exposure", "auto", choices=("auto", "fixed")) == "fixed",
     )
     return Camera(pattern, "frames" in table, stated)
-
-
-def _check_keys(settings: Section, table: Section) -> None:
-    if "frames" in settings and "frames" in table:
-        raise settings.error("frames", "is stated in [camera] too; take this one out")
-    if "map" in table:
-        raise table.error("map", "belongs above the line [camera]; move it there")
-    table.only(KEYS)
-
-
-def _pattern(section: Section) -> str:
-    pattern = section.text("frames")
-    if not PATTERN.fullmatch(pattern):
-        rule = "must have the picture's number once, as %d or %06d, and end in .png, .jpg or .jpeg"
-        raise section.error("frames", f"{rule}, got '{pattern}'")
-    return pattern
 
 
 def _road(settings: Section) -> str:
@@ -137,14 +122,15 @@ def read_frames(
     """
     listed = (folder / LISTED).exists()
     taken = _read_instants(folder / LISTED, samples, episodes) if listed else _per_row(samples, rate_hz, episodes)
-    paths = tuple(folder / (camera.pattern % number) for number in taken.numbers.tolist())
+    numbers, drives, times = taken
+    paths = tuple(folder / (camera.pattern % number) for number in numbers.tolist())
     missing = [path for path in paths if not path.is_file()]
     if len(missing) == len(paths) and not (camera.own_table or listed):
         return None
     if missing:
         counts = f"no such picture, {len(missing)} of {len(paths)} are missing"
         raise LogError(f"{missing[0]}: {counts}; add them, or name those that there are in {LISTED}")
-    return replace(camera.stated, paths=paths, drives=taken.drives, times=taken.times)
+    return replace(camera.stated, paths=paths, drives=drives, times=times)
 
 
 def _per_row(samples: Rows, rate_hz: float, episodes: Sequence[LogEpisode]) -> Instants:
@@ -156,7 +142,7 @@ def _per_row(samples: Rows, rate_hz: float, episodes: Sequence[LogEpisode]) -> I
     if rate_hz:
         places, _ = places_on_grid(samples, rate_hz)
         times = np.concatenate([episode.times for episode in episodes])[places[measured]]
-    return Instants(measured, samples.episode[measured], times)
+    return measured, samples.episode[measured], times
 
 
 def _read_instants(path: Path, samples: Rows, episodes: Sequence[LogEpisode]) -> Instants:
@@ -166,7 +152,12 @@ def _read_instants(path: Path, samples: Rows, episodes: Sequence[LogEpisode]) ->
     _check_numbers(rows)
     order = {name: number for number, name in enumerate(samples.names)}
     drives = np.array([order[name] for name in rows.names])[rows.episode]
-    times, spans = rows.values["time"], np.array([_span(episode) for episode in episodes])
+    times, spans = rows.values["time"], np.full((len(episodes), 2), np.nan)
+    for span, episode in zip(spans, episodes, strict=True):
+        on_grid = episode.times[np.isfinite(episode.poses[:, 0])]
+        measured = on_grid if episode.measured is None else episode.measured.times
+        if len(measured):
+            span[:] = measured[0], measured[-1]
     begins, ends = spans[drives].T
     within = (times >= begins - 1e-9) & (times <= ends + 1e-9)
     if not within.any():
@@ -177,14 +168,7 @@ def _read_instants(path: Path, samples: Rows, episodes: Sequence[LogEpisode]) ->
             "write both in seconds of one clock"
         )
         raise rows.error(0, "time", problem)
-    return Instants(rows.values["frame"].astype(np.int64)[within], drives[within], times[within])
-
-
-def _span(episode: LogEpisode) -> tuple[float, float]:
-    """Times of the first and the last measured pose [s], NaN where there is none."""
-    on_grid = episode.times[np.isfinite(episode.poses[:, 0])]
-    times = on_grid if episode.measured is None else episode.measured.times
-    return (float(times[0]), float(times[-1])) if len(times) else (np.nan, np.nan)
+    return rows.values["frame"].astype(np.int64)[within], drives[within], times[within]
 
 
 def _check_numbers(rows: Rows) -> None:
@@ -241,7 +225,9 @@ def _read_picture(path: Path, columns: int) -> tuple[Pictures, tuple[int, int]]:
             size = image.size
             if image.mode.startswith(("I", "F")):
                 raise LogError(f"{path}: has more than 8 bits a pixel; save it with 8 bits for each colour")
-            wanted = _size_within(size, columns)
+            (width, height), wanted = size, size
+            if width > columns:
+                wanted = columns, max(1, round(height * columns / width))
             image.draft(None, (2 * wanted[0], 2 * wanted[1]))  # Half of what a JPEG averages is left to the box
             whole = image.convert("RGB")
     except FileNotFoundError:
@@ -250,9 +236,3 @@ def _read_picture(path: Path, columns: int) -> tuple[Pictures, tuple[int, int]]:
         raise LogError(f"{path}: is not a whole PNG or JPEG picture; save it again or leave its frame out") from None
     small = whole if whole.size == wanted else whole.resize(wanted, Image.Resampling.BOX)
     return np.asarray(small), size
-
-
-def _size_within(size: tuple[int, int], columns: int) -> tuple[int, int]:
-    """Width and height, at most so many columns wide."""
-    width, height = size
-    return size if width <= columns else (columns, max(1, round(height * columns / width)))

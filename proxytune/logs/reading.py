@@ -1,7 +1,4 @@
-"""Reading a log's folder, strictly.
-
-What log.toml says of a log, with every complaint about it at once.
-"""
+"""Reading a log's folder, strictly: log.toml with every complaint at once, then samples, commands and frames."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -30,7 +27,7 @@ Value = TypeVar("Value")
 
 
 class Description(NamedTuple):
-    """What log.toml says.
+    """The statements of log.toml.
 
     Attributes:
         name: What the log is called.
@@ -74,41 +71,32 @@ def read_description(settings: Section) -> Description:
     for key in (key for key in TEXTS if key not in ("name", "robot")):
         read(lambda key=key: settings.text(key, ""), "")  # type: ignore[misc]
     stated = {name: key for key, name in GEOMETRY.items() if key in settings}
+    geometry = {
+        name: read(lambda key=key: settings.number(key, low=1e-4, high=1e4), 1.0)  # type: ignore[misc]
+        for name, key in stated.items()
+    }
     offset = settings.get("clock_offset_s")
     description = Description(
         name=read(lambda: settings.text("name", settings.path.resolve().parent.name), ""),
         robot=read(lambda: settings.text("robot"), ""),
         command=read(lambda: settings.text("command", choices=COMMANDS), ""),
-        rate_hz=read(lambda: _rate(settings), 0.0),
-        geometry={name: read(lambda key=key: _figure(settings, key), 1.0) for name, key in stated.items()},  # type: ignore[misc]
+        rate_hz=read(lambda: settings.number("rate_hz", low=0.01, high=10000.0) if "rate_hz" in settings else 0.0, 0.0),
+        geometry=geometry,
         clock_offset_s=None if offset in (None, FIT) else read(lambda: _offset(settings), None),
         fit_clock_offset=offset == FIT,
         camera=read(lambda: read_camera(settings), None),
     )
     if wrong:
-        raise LogError(f"{settings.path}: {_listed(wrong)}")
+        different = list(dict.fromkeys(wrong))
+        numbered = "; ".join(f"({number}) {problem}" for number, problem in enumerate(different, start=1))
+        raise LogError(f"{settings.path}: {numbered if len(different) > 1 else different[0]}")
     return description
-
-
-def _rate(settings: Section) -> float:
-    return settings.number("rate_hz", low=0.01, high=10000.0) if "rate_hz" in settings else 0.0
-
-
-def _figure(settings: Section, key: str) -> float:
-    return settings.number(key, low=1e-4, high=1e4)
 
 
 def _offset(settings: Section) -> float:
     if isinstance(settings["clock_offset_s"], str):
         raise settings.error("clock_offset_s", f'must be seconds, or "{FIT}", got {settings["clock_offset_s"]!r}')
     return settings.number("clock_offset_s", low=-FURTHEST_S, high=FURTHEST_S)
-
-
-def _listed(wrong: list[str]) -> str:
-    different = list(dict.fromkeys(wrong))
-    if len(different) == 1:
-        return different[0]
-    return "; ".join(f"({number}) {problem}" for number, problem in enumerate(different, start=1))
 
 
 LARGEST_DUTY = 1.0 + 1e-6
@@ -177,8 +165,12 @@ def _read_samples(path: Path, command: str, *, apart: bool) -> Rows:
     why = "samples beside a commands.csv" if apart else f"commands of kind '{command}'"
     samples = read_rows(path, Layout((*columns, *POSE), WHEELS, (*POSE, *WHEELS), 2, why))
     for together in (POSE, WHEELS):
-        if together[0] in samples.values:
-            _check_whole(samples, together)
+        empty = np.isnan(samples.columns(together)) if together[0] in samples.values else np.empty((0, len(together)))
+        half = empty.any(axis=1) & ~empty.all(axis=1)
+        if half.any():
+            row = int(np.argmax(half))
+            column, those = together[int(np.argmax(empty[row]))], ", ".join(together)
+            raise samples.error(row, column, f"is empty, but not all of {those}; fill it in or empty them all")
     if not apart:
         _check_duties(samples, command)
     return samples
@@ -226,12 +218,3 @@ def _check_duties(rows: Rows, command: str) -> None:
             row = int(np.argmax(over))
             problem = f"a duty must be between -1 and 1, got {rows.values[name][row]:g}; divide by full duty"
             raise rows.error(row, name, problem)
-
-
-def _check_whole(samples: Rows, names: tuple[str, ...]) -> None:
-    empty = np.isnan(samples.columns(names))
-    half = empty.any(axis=1) & ~empty.all(axis=1)
-    if half.any():
-        row = int(np.argmax(half))
-        column = names[int(np.argmax(empty[row]))]
-        raise samples.error(row, column, f"is empty, but not all of {', '.join(names)}; fill it in or empty them all")

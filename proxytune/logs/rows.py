@@ -1,6 +1,6 @@
 """Rows of samples.csv, commands.csv and frames.csv: read strictly, every complaint with file, line and column.
 
-The cells of a CSV file, some rows at a time: as texts they take ten times the memory of the numbers they are.
+Cells are read some rows at a time: as texts they take ten times the memory of the numbers that they are.
 """
 
 import csv
@@ -27,12 +27,7 @@ CHARACTERS = 1_000_000
 
 
 class Block(NamedTuple):
-    """Rows one after another.
-
-    Attributes:
-        lines: Line of each in the file.
-        cells: Its cells.
-    """
+    """Rows one after another: the line of each in the file, and its cells."""
 
     lines: tuple[int, ...]
     cells: tuple[list[str], ...]
@@ -48,12 +43,8 @@ def read_cells(path: Path) -> tuple[list[str], Iterator[Block]]:
     _, header = next(rows, (0, []))
     if not header:
         raise LogError(f"{path}: is empty; its first line must name the columns, episode and time first")
-    return [cell.strip() for cell in header], _blocks(rows)
-
-
-def _blocks(rows: Iterator[tuple[int, list[str]]]) -> Iterator[Block]:
-    while some := list(itertools.islice(rows, AT_ONCE)):
-        yield Block(*zip(*some, strict=True))
+    blocks = iter(lambda: list(itertools.islice(rows, AT_ONCE)), [])
+    return [cell.strip() for cell in header], (Block(*zip(*some, strict=True)) for some in blocks)
 
 
 def _rows(path: Path) -> Iterator[tuple[int, list[str]]]:
@@ -108,7 +99,7 @@ class Rows:
 
     @property
     def follows(self) -> NDArray[np.bool_]:
-        """Whether each row from the second on is of the same episode as the one before (N − 1,)."""
+        """True for each row from the second on that is of the same episode as the one before (N − 1,)."""
         return np.asarray(np.diff(self.episode) == 0)
 
     def columns(self, names: tuple[str, ...]) -> Floats:
@@ -122,7 +113,7 @@ class Rows:
 
 @dataclass(frozen=True)
 class Layout:
-    """What a table of rows must hold.
+    """The columns and rows that a table must hold.
 
     Attributes:
         needed: Its columns besides `episode` and `time`.

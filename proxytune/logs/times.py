@@ -1,17 +1,13 @@
-"""Drives whose poses have times of their own: jittered, with gaps, at whatever rate.
+"""Rows made drives on a regular grid of times, headings in radians without jumps by whole turns.
 
-A replay goes on in regular steps. Each pose is therefore moved to the nearest free step along the motion measured round
-it: by a step at most, some milliseconds, over which that motion is as good as straight. The poses as they were
-measured, and their times, are kept beside it.
-
-The grid of times that samples lie on.
-Headings: in radians, without jumps by whole turns.
-Drives whose poses lie on a regular grid of times, as log.toml's `rate_hz` says.
+Where log.toml states `rate_hz`, rows lie on that grid. Else poses have times of their own: jittered, with gaps, at
+whatever rate. A replay goes on in regular steps; each pose is therefore moved to the nearest free step along the motion
+measured round it: by a step at most, some milliseconds, over which that motion is as good as straight. The poses as
+they were measured, and their times, are kept beside it.
 """
 
 import math
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import numpy as np
 
@@ -28,7 +24,7 @@ SPARSEST = 10
 
 
 def places_on_grid(samples: Rows, rate_hz: float) -> tuple[Whole, Whole]:
-    """Where each row lies on all grids laid end to end (N,), and where each episode's grid ends (E,).
+    """Place of each row on all grids laid end to end (N,), and where each episode's grid ends (E,).
 
     Raises:
         LogError: If rows lie off the grid.
@@ -90,7 +86,7 @@ def check_headings(samples: Rows, command: str, rate_hz: float) -> None:
 
 
 def _fits_as_degrees(samples: Rows, rate_hz: float, *, beyond: bool) -> bool:
-    """Whether course over ground and heading keep together with the heading in degrees only.
+    """True if course over ground and heading keep together with the heading in degrees only.
 
     Angles are doubled, so that a robot may go backwards, and longer ways weigh more. Where headings go beyond a turn
     of radians, a course that hardly varies is told by its direction too.
@@ -173,14 +169,6 @@ REACH_S = 0.1
 """The motion round a pose is taken from so long before it to so long after."""
 
 
-class _Drive(NamedTuple):
-    """The rows of one drive: times (N,), poses (N, 3), wheel speeds (N, 2) or None."""
-
-    times: Floats
-    poses: Floats
-    wheels: Floats | None
-
-
 def usual_rate(samples: Rows) -> float:
     """Measured poses a second, drop-outs and gaps apart.
 
@@ -219,10 +207,17 @@ def episodes_at_own_times(
     episodes = []
     for index, name in enumerate(samples.names):
         own = slice(firsts[index], firsts[index + 1])
-        times = samples.values["time"][own]
-        drive = _Drive(times, placed[own], None if wheels is None else wheels[own])
+        times, posed = samples.values["time"][own], placed[own]
+        steps = (times - times[0]) * rate_hz
+        known, rows = _free_steps(steps, np.flatnonzero(np.isfinite(posed[:, 0])))
+        length = int(max(np.rint(steps[-1]), rows.max(initial=0))) + 1
+        grid = times[0] + np.arange(length) / rate_hz
+        measured = Measured(times[known], posed[known], rows)
+        poses = np.full((length, 3), np.nan)
+        poses[rows] = moved(measured, grid[rows])
+        speeds = None if wheels is None else _held(wheels[own], np.rint(steps), length)
         when, given = issued.get(name, (times, commands[own]))
-        episodes.append(_episode(name, drive, given, when, rate_hz))
+        episodes.append(LogEpisode(name, grid, given, poses, speeds, when, measured))
     return tuple(episodes), rate_hz
 
 
@@ -237,17 +232,6 @@ def _check_density(samples: Rows, usual: float) -> None:
             f"of {gaps[longest]:g} s before this one; write seconds, or split the episode at its gaps"
         )
         raise samples.error(longest + 1, "time", problem)
-
-
-def _episode(name: str, drive: _Drive, commands: Floats, issued: Floats, rate_hz: float) -> LogEpisode:
-    steps = (drive.times - drive.times[0]) * rate_hz
-    known, rows = _free_steps(steps, np.flatnonzero(np.isfinite(drive.poses[:, 0])))
-    length = int(max(np.rint(steps[-1]), rows.max(initial=0))) + 1
-    grid = drive.times[0] + np.arange(length) / rate_hz
-    measured = Measured(drive.times[known], drive.poses[known], rows)
-    poses = np.full((length, 3), np.nan)
-    poses[rows] = moved(measured, grid[rows])
-    return LogEpisode(name, grid, commands, poses, _held(drive, np.rint(steps), length), issued, measured)
 
 
 def _free_steps(steps: Floats, known: Whole) -> tuple[Whole, Whole]:
@@ -276,12 +260,10 @@ def moved(measured: Measured, times: Floats) -> Floats:
     return np.asarray(out[np.maximum.accumulate(np.where(repeats, 0, here))])
 
 
-def _held(drive: _Drive, steps: Floats, length: int) -> Floats | None:
+def _held(wheels: Floats, steps: Floats, length: int) -> Floats:
     """Measured wheel speeds at every step, the last measured one held."""
-    if drive.wheels is None:
-        return None
-    known = np.flatnonzero(np.isfinite(drive.wheels).all(axis=1))
+    known = np.flatnonzero(np.isfinite(wheels).all(axis=1))
     if not len(known):
         return np.full((length, 2), np.nan)
     newest = np.searchsorted(steps[known], np.arange(length), side="right") - 1
-    return np.asarray(drive.wheels[known[np.maximum(newest, 0)]])
+    return np.asarray(wheels[known[np.maximum(newest, 0)]])

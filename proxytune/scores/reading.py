@@ -1,6 +1,7 @@
-"""Score tables as CSV files.
+"""Score tables as CSV files: columns by commas, semicolons or tabs, with decimal points or commas.
 
-The cells of a score table's file: by commas, semicolons or tabs, with decimal points or commas.
+`pandas.read_csv(sep=None)` cannot do it: it cuts a single column "score" at s, fills short rows in silence, and with
+`decimal=","` takes 2.5 beside 1,5 for granted, where one of the two may separate thousands.
 """
 
 import csv
@@ -26,7 +27,7 @@ Columns = Mapping[str, str]
 
 @dataclass(frozen=True)
 class Cells:
-    """What stands in a file.
+    """The cells of a file.
 
     Attributes:
         path: The file.
@@ -90,7 +91,9 @@ def read_cells(path: Path, metrics: Sequence[str], columns: Columns | None = Non
     separator = _separator(text)
     rows = _rows(path, text, separator)
     named = _first(path, rows)
-    header = _renamed(path, named, columns or {})
+    ours = {theirs: name for name, theirs in (columns or {}).items() if theirs in named}
+    # Another column that has such a name is out of the way.
+    header = [ours.get(name, f"{name} of the file" if name in ours.values() else name) for name in named]
     _check_header(path, header, metrics)
     lines, cells = _columns(path, rows, header, {*LABELS, *metrics})
     found = Cells(path, named, header, lines, cells)
@@ -127,7 +130,7 @@ def _text(path: Path) -> str:
 
 
 def _separator(text: str) -> str:
-    """What separates the columns that the first line names; a comma where nothing does."""
+    """The separator of the columns that the first line names; a comma where there is none."""
     first = next((line for line in text.splitlines() if line.strip()), "")
     return max(SEPARATORS, key=first.count)
 
@@ -174,12 +177,6 @@ def _no_csv(path: Path) -> ScoresError:
     return ScoresError(f"{path}: is not a CSV file; save it as comma-separated text (UTF-8)")
 
 
-def _renamed(path: Path, header: Sequence[str], columns: Columns) -> list[str]:
-    """The columns by their names here; another column that has such a name is out of the way."""
-    ours = {theirs: name for name, theirs in columns.items() if theirs in header}
-    return [ours.get(name, f"{name} of the file" if name in ours.values() else name) for name in header]
-
-
 def _check_header(path: Path, header: Sequence[str], metrics: Sequence[str]) -> None:
     found = f"columns found: {', '.join(header)[:60]}"
     if "agent" not in header:
@@ -196,7 +193,7 @@ def _check_header(path: Path, header: Sequence[str], metrics: Sequence[str]) -> 
 
 
 def _decimal(found: Cells, metrics: Sequence[str]) -> str:
-    """What the numbers of a file have before their fractions.
+    """The decimal sign of a file's numbers.
 
     Raises:
         ScoresError: If some have a comma and some a point: one of them may separate thousands.
@@ -259,7 +256,9 @@ def read_domains(path: Files, metrics: Iterable[str], columns: Columns | None = 
     names = tuple(metrics)
     files = [read_cells(file, names, columns) for file in _files(path)]
     _check_alike(files)
-    _check_columns(files, columns or {})
+    for name, theirs in (columns or {}).items():
+        if not any(theirs in cells.named for cells in files):
+            raise ScoresError(f"{files[0].path}: no column '{theirs}' for '{name}'; {nearest(theirs, files[0].named)}")
     bare = next((cells for cells in files if not cells.lines), None)
     if bare:
         raise ScoresError(f"{bare.path}: has no rows; add one per agent and episode")
@@ -288,13 +287,6 @@ def _check_alike(files: Sequence[Cells]) -> None:
         other = next((one for one in files if label in one.header), None)
         if other and label not in cells.header:
             raise ScoresError(f"{cells.path}: has no column '{label}', which {other.path} has; add it")
-
-
-def _check_columns(files: Sequence[Cells], columns: Columns) -> None:
-    """Refuse a column map of which a name is in no file."""
-    for name, theirs in columns.items():
-        if not any(theirs in cells.named for cells in files):
-            raise ScoresError(f"{files[0].path}: no column '{theirs}' for '{name}'; {nearest(theirs, files[0].named)}")
 
 
 def _check_single(files: Sequence[Cells], rows: Sequence[Row]) -> None:

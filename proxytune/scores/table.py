@@ -1,7 +1,4 @@
-"""A score table: how well each agent did, episode by episode.
-
-A metric: one figure of merit, and when two agents differ in it.
-"""
+"""A score table: how well each agent did, episode by episode; and its metrics: when two agents differ in one."""
 
 import math
 import re
@@ -89,7 +86,7 @@ class Metric:
 
 
 def varies(columns: Floats) -> NDArray[np.bool_]:
-    """Whether agents differ in a metric by more than rounding: one value per agent on the last axis but one."""
+    """True if agents differ in a metric by more than rounding: one value per agent on the last axis but one."""
     largest = np.abs(columns).max(axis=-2)
     return np.asarray(np.ptp(columns, axis=-2) > ROUNDING * largest, dtype=np.bool_)
 
@@ -103,7 +100,7 @@ MOST_CELLS = 10**8
 
 @dataclass(frozen=True, eq=False)
 class ScoreTable:
-    """What every agent scored in every episode of one domain.
+    """The scores of every agent in every episode of one domain.
 
     Attributes:
         agents: Names, one per row.
@@ -156,7 +153,7 @@ class ScoreTable:
 
     @cached_property
     def driven(self) -> NDArray[np.bool_]:
-        """Which agent drove which episode, shape (agents, episodes)."""
+        """True where an agent drove an episode, shape (agents, episodes)."""
         return ~np.isnan(self.values[:, :, 0])
 
     @cached_property
@@ -171,11 +168,11 @@ class ScoreTable:
 
     @property
     def complete(self) -> bool:
-        """Whether every agent drove every episode, so that episodes are paired across agents."""
+        """True if every agent drove every episode, so that episodes are paired across agents."""
         return bool(self.driven.all())
 
     def unpaired(self) -> "ScoreTable":
-        """The same scores with a number of its own for each agent's every episode, so that no start is shared.
+        """Give the same scores with a number of its own for each agent's every episode, so that no start is shared.
 
         Raises:
             ScoresError: If that table would fill the memory.
@@ -187,7 +184,7 @@ class ScoreTable:
         return ScoreTable(self.agents, labels, self.metrics, values)
 
     def select(self, metrics: Iterable[str]) -> "ScoreTable":
-        """The same table with these metrics only, in this order.
+        """Give the same table with these metrics only, in this order.
 
         Raises:
             ScoresError: If a metric is unknown; the nearest name is given.
@@ -202,7 +199,7 @@ class ScoreTable:
         return ScoreTable(self.agents, self.episodes, names, self.values[:, :, columns])
 
     def arrange(self, *, agents: Sequence[str], episodes: Sequence[str] | None = None) -> "ScoreTable":
-        """The same table with its agents, and its episodes if given, in this order; names must be known."""
+        """Give the same table with its agents, and its episodes if given, in this order; names must be known."""
         labels = self.episodes if episodes is None else tuple(episodes)
         if tuple(agents) == self.agents and labels == self.episodes:
             return self

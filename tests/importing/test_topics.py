@@ -122,11 +122,7 @@ def test_joints_are_commands_only_where_they_are_named():
         ([DRIVE[0]], {}, "run.bag: no topic has poses, which are messages of type PoseStamped"),
         ([DRIVE[0], ("/goal", "Pose", 1)], {}, "no topic is plainly poses; name one of /goal by --poses"),
         (DRIVE, {"commands": "/cmd_val"}, "no topic '/cmd_val'; did you mean '/cmd_vel'?"),
-        (
-            DRIVE,
-            {"poses": "/cmd_vel"},
-            "/cmd_vel cannot be poses: geometry_msgs/msg/Twist is none of PoseStamped",
-        ),
+        (DRIVE, {"poses": "/cmd_vel"}, "/cmd_vel cannot be poses: geometry_msgs/msg/Twist is none of PoseStamped"),
         (DRIVE, {"poses": "map>base_link"}, "no topic has poses, which are messages of type TFMessage"),
         ([*DRIVE, ("/c", "Twist", 0)], {"commands": "/c"}, "/c cannot be commands: it has no messages"),
         ([("/w", "Array", 9), DRIVE[1]], {}, "/w does not say what its two numbers are; add --kind duty"),
@@ -232,8 +228,7 @@ def test_transforms_at_no_common_time_are_told(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("row", "words"),
-    [((np.nan, 0.0, 0.0), "number 3 is not finite"), ((0.0,) * 7, "orientation 3 is the quaternion")],
+    ("row", "words"), [((np.nan, 0.0, 0.0), "number 3 is not finite"), ((0.0,) * 7, "orientation 3 is the quaternion")]
 )
 def test_a_bad_transform_is_told_by_name_and_number(tmp_path, row, words):
     rows = [*circle()[:2], row]

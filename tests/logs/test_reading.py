@@ -346,11 +346,7 @@ def test_a_mistake_in_log_toml_is_one_line_with_file_and_key(folder_of_reading, 
 def test_a_folder_that_is_no_log_is_told_what_is_missing(folder_of_reading, tmp_path):
     home = folder_of_reading()
     assert complaint(tmp_path / "none") == ": no such folder; check the path"
-<<<<<<< HEAD
     assert complaint(home / "samples.csv") == ": is a file; give the folder that it lies in"
-=======
-    assert complaint(home / "samples.csv") == ": is a file; give the folder_of_reading that it lies in"
->>>>>>> 50e8e4064d84f396e6f1cdbbc2a0ad7d1aee2858
     (home / "samples.csv").unlink()
     assert complaint(home).startswith("/samples.csv: no such file")
     (home / "samples.csv").mkdir()

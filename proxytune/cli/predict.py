@@ -15,8 +15,9 @@ from proxytune.driving import Robot, robot_from_geometry, robot_names
 from proxytune.effects import Catalogue, Model, read_model
 from proxytune.errors import InputError
 from proxytune.importing import open_log
-from proxytune.logs import GEOMETRY, Log
+from proxytune.logs import Log
 from proxytune.report import write_picture, write_text
+from proxytune.settings import GEOMETRY
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

@@ -1,7 +1,6 @@
 from .frames import read_pictures as read_pictures
 from .log import (
     COMMANDS as COMMANDS,
-    GEOMETRY as GEOMETRY,
     Frames as Frames,
     Log as Log,
     LogEpisode as LogEpisode,

@@ -1,10 +1,8 @@
-"""Agents by name: those shipped, plug-ins, and a user's own as `module:attribute`.
+"""Agents: controllers that see only the camera's picture and know only the robot's nominal figures.
 
-From a picture to where the lane lies: colour segmentation and projection by the nominal camera.
-Agents that see the lane, each its own way, and steer for its centre.
-Agents that go by the picture itself, without a notion of where the floor lies.
-Agents around agents: the same driver, slower to react, smoother, leaning to one side, or wary of a smeared view.
-Agents: controllers that see only the camera's picture and know only the nominal camera.
+Some segment the markings by colour, project them on the floor and steer for the lane's centre; some go by the picture
+itself. Around any of them others react later, smooth, lean to one side, or slow down where the view is smeared.
+`load_agent` finds an agent by name: one of `AGENTS`, a plug-in, or a user's own as `module:attribute`.
 """
 
 import functools
@@ -115,8 +113,8 @@ HALF_LANE_M = 0.128
 _NONE: Pixels = np.empty(0, dtype=np.intp)
 
 
-class Sight(NamedTuple):
-    """What a pilot remembers: the eye, the robot's figures that turn a twist into duties, and the last lane seen."""
+class PilotMemory(NamedTuple):
+    """Memory of a pilot: the eye, the robot's figures that turn a twist into duties, and the last lane seen."""
 
     eye: Eye
     full_speed: float
@@ -124,8 +122,8 @@ class Sight(NamedTuple):
     lane: Lane
 
 
-def _begin(robot: Robot, reach_m: float) -> Sight:
-    return Sight(
+def _begin(robot: Robot, reach_m: float) -> PilotMemory:
+    return PilotMemory(
         open_eye(robot, reach_m=reach_m),
         robot.figures["full_speed"],
         robot.figures["effective_baseline"],
@@ -163,11 +161,11 @@ class LanePilot:
     contrast: float = 60.0
     brightness: float = 150.0
 
-    def begin(self, robot: Robot) -> Sight:
+    def begin(self, robot: Robot) -> PilotMemory:
         """Nothing seen yet."""
         return _begin(robot, self.reach_m)
 
-    def act(self, picture: Picture, memory: Sight) -> tuple[Command, Sight]:
+    def act(self, picture: Picture, memory: PilotMemory) -> tuple[Command, PilotMemory]:
         """Steer for the lane; where none is seen, as the last time."""
         eye = memory.eye
         yellow = _NONE if self.markings == "white" else yellow_pixels(picture, eye, contrast=self.contrast)
@@ -175,7 +173,7 @@ class LanePilot:
         lane = fit_lane(eye, yellow=yellow, white=white, half_lane_m=HALF_LANE_M) or memory.lane
         yaw_rate = self.offset_gain * lane.offset + self.slope_gain * lane.slope
         command = duties(self.speed, yaw_rate, full_speed=memory.full_speed, baseline=memory.baseline)
-        return command, Sight(eye, memory.full_speed, memory.baseline, lane)
+        return command, PilotMemory(eye, memory.full_speed, memory.baseline, lane)
 
 
 @dataclass(frozen=True)
@@ -192,11 +190,11 @@ class PursuitPilot:
     look_ahead_m: float
     caution: float = 0.0
 
-    def begin(self, robot: Robot) -> Sight:
+    def begin(self, robot: Robot) -> PilotMemory:
         """Nothing seen yet."""
         return _begin(robot, 1.6 * self.look_ahead_m)
 
-    def act(self, picture: Picture, memory: Sight) -> tuple[Command, Sight]:
+    def act(self, picture: Picture, memory: PilotMemory) -> tuple[Command, PilotMemory]:
         """Drive the arc through the point pursued."""
         eye = memory.eye
         yellow, white = yellow_pixels(picture, eye), white_pixels(picture, eye)
@@ -205,7 +203,7 @@ class PursuitPilot:
         curvature = 2.0 * left / (self.look_ahead_m**2 + left**2)
         speed = self.speed / (1.0 + self.caution * abs(curvature) * self.look_ahead_m)
         command = duties(speed, speed * curvature, full_speed=memory.full_speed, baseline=memory.baseline)
-        return command, Sight(eye, memory.full_speed, memory.baseline, lane)
+        return command, PilotMemory(eye, memory.full_speed, memory.baseline, lane)
 
 
 class Wiring(NamedTuple):
@@ -400,9 +398,6 @@ AGENTS: Mapping[str, Agent] = MappingProxyType(
     }
 )
 """The agents that travel with the package, by name."""
-
-__all__ = ["AGENTS", "Agent", "Braitenberg", "Command", "EdgePilot", "Laggy", "LanePilot", "Leaning", "Picture"]
-__all__ += ["PursuitPilot", "Smoothed", "Wary"]
 
 
 NEEDS = ("begin", "act")

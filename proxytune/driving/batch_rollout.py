@@ -1,4 +1,7 @@
-"""Robots of one domain instance that drive side by side, step by step: each as it does by itself, to the bit."""
+"""Episodes of one domain instance as one batch, step by step: each goes as it does by itself, to the bit.
+
+Our effects filter a batch as they filter one robot, unless they draw at random; others get a drivetrain for each robot.
+"""
 
 import itertools
 from collections.abc import Iterator, Sequence
@@ -12,8 +15,8 @@ from proxytune.driving.agent import Command, Picture
 from proxytune.driving.cameras import View
 from proxytune.driving.episode import TICK_HZ, Course, Fleet, Instance, ask, check_command
 from proxytune.driving.expert import Pupil
-from proxytune.driving.plants import Drivetrain, Progress
-from proxytune.effects import CATALOGUE, Effect, Learnt, Setting, Signal
+from proxytune.driving.plants import Drivetrain, DrivetrainState
+from proxytune.effects import CATALOGUE, Effect, FilterContext, Learnt, Signal
 from proxytune.errors import EpisodeError
 
 AT_ONCE = 16
@@ -23,7 +26,7 @@ _OURS = frozenset((*CATALOGUE.values(), Learnt))
 
 
 @dataclass(frozen=True)
-class Apart:
+class UnbatchedDrivetrain:
     """A drivetrain for each robot by itself.
 
     Attributes:
@@ -34,29 +37,29 @@ class Apart:
     one: Drivetrain
     seeds: tuple[int, ...]
 
-    def begin(self, setting: Setting) -> list[Progress]:
-        """Each robot's memory, from a setting of arrays (robots, …)."""
-        parts = zip(self.seeds, setting.rest, setting.headings, setting.places, strict=True)
+    def begin(self, context: FilterContext) -> list[DrivetrainState]:
+        """Each robot's memory, from a context of arrays (robots, …)."""
+        parts = zip(self.seeds, context.rest, context.headings, context.places, strict=True)
         return [
-            self.one.begin(replace(setting, seed=seed, rest=rest, headings=headings, places=places))
+            self.one.begin(replace(context, seed=seed, rest=rest, headings=headings, places=places))
             for seed, rest, headings, places in parts
         ]
 
-    def apply(self, signal: Signal, memory: list[Progress]) -> tuple[Signal, list[Progress]]:
+    def apply(self, signal: Signal, memory: list[DrivetrainState]) -> tuple[Signal, list[DrivetrainState]]:
         """The twists (robots, time, 3) that the next duties (robots, time, 2) lead to."""
         twists, kept = zip(*(self.one.apply(*part) for part in zip(signal, memory, strict=True)), strict=True)
         return np.stack(twists), list(kept)
 
 
-def side_by_side(drivetrain: Drivetrain, seeds: tuple[int, ...]) -> Drivetrain | Apart:
+def batched_drivetrain(drivetrain: Drivetrain, seeds: tuple[int, ...]) -> Drivetrain | UnbatchedDrivetrain:
     """A drivetrain over a leading axis of robots, each with a seed of its own."""
     chains = (drivetrain.command, drivetrain.actuation, drivetrain.motion)
     alike = all(_same_in_batches(effect) for chain in chains for effect in chain.effects)
-    return drivetrain if alike else Apart(drivetrain, seeds)
+    return drivetrain if alike else UnbatchedDrivetrain(drivetrain, seeds)
 
 
 def _same_in_batches(effect: Effect) -> bool:
-    """Whether it does to each robot of a batch, to the bit, what it does to a single one: ours do, unless they draw."""
+    """Tell whether it does to each robot of a batch, to the bit, what it does to one: ours do, unless they draw."""
     return type(effect) in _OURS and (effect.trace is None or effect.trace.draws is None)
 
 
@@ -106,11 +109,11 @@ class _Rollouts:
         starts, seeds = np.stack([course.start for course in courses]), tuple(course.seed for course in courses)
         self._hold = round(TICK_HZ / figures["control_rate"])
         self._commands = np.zeros((len(courses), 2))
-        self._drivetrain = side_by_side(instance.drivetrain, seeds)
-        resting = Setting(TICK_HZ, np.zeros((len(courses), 2)), figures, 0, starts[:, 2:], starts[:, None, :2])
+        self._drivetrain = batched_drivetrain(instance.drivetrain, seeds)
+        resting = FilterContext(TICK_HZ, np.zeros((len(courses), 2)), figures, 0, starts[:, 2:], starts[:, None, :2])
         self._memory: Any = self._drivetrain.begin(resting)
-        settings = [Setting(TICK_HZ, one.start, figures, one.seed) for one in courses]
-        self._views = [View(instance.camera, instance.image, setting) for setting in settings]
+        settings = [FilterContext(TICK_HZ, one.start, figures, one.seed) for one in courses]
+        self._views = [View(instance.camera, instance.image, context) for context in settings]
         self.under_way = list(range(len(courses)))
         self.new_pictures = True
         self.poses = [[start[None]] for start in starts]
@@ -134,10 +137,8 @@ class _Rollouts:
             self.poses[robot].append(driven)
             self._views[robot].pass_by(driven)
         self.new_pictures = self.pictures[0] is not before
-        self.under_way = [robot for robot, driven, hit in moved if not (hit or self._left(robot, driven[-1]))]
-
-    def _left(self, robot: int, pose: Signal) -> bool:
-        return self._courses[robot].ended(float(pose[0]), float(pose[1]))
+        ended = [hit or self._courses[robot].ended(*driven[-1, :2].tolist()) for robot, driven, hit in moved]
+        self.under_way = [robot for robot, over in zip(self.under_way, ended, strict=True) if not over]
 
 
 def answers(policy: Policy, pictures: Sequence[Picture], time_s: float) -> Sequence[Command] | Signal:

@@ -1,12 +1,10 @@
-"""One episode: an agent drives a plant through the effects of a domain instance until time or luck runs out.
+"""One episode: a driver, a plant and a camera behind the effects of a domain instance, until time or luck runs out.
 
-The lane-following task: where an episode starts, and what a drive is worth.
-
-An episode ends when the axle's middle leaves the map, when the robot hits something, or when its time is over. The
-lane of a pose is the one whose direction agrees with its heading (right-hand traffic); a robot is in it
-while it is at most half a lane width from its centre line. So whoever drives the wrong way is in neither lane.
-Driving recorded commands without an agent or a camera, and measuring the poses.
-Plants by their names: one robot, or several side by side.
+`drive` asks a driver for commands; `Rollout` is the same one command at a time. `follow` drives recorded commands
+without a camera. An episode ends when the axle's middle leaves the map, when the robot hits something, or when its time
+is over. It is worth what `score_trajectory` says: the lane of a pose is the one whose direction agrees with its heading
+(right-hand traffic), and a robot is in it while it is at most half a lane width from its centre line, so whoever drives
+the wrong way is in neither lane. `driving_score` is that of the paper's learning experiment.
 """
 
 import math
@@ -23,11 +21,11 @@ from proxytune.driving.agent import Command, Picture
 from proxytune.driving.bullet import BulletPlant
 from proxytune.driving.cameras import View
 from proxytune.driving.lane import LanePose, lane_length, lane_pose
-from proxytune.driving.optics import Camera
+from proxytune.driving.optics import Renderer
 from proxytune.driving.plants import Drivetrain, PlanarFleet, PlanarPlant, Plant
 from proxytune.driving.road import Road
 from proxytune.driving.robot import Robot
-from proxytune.effects import Chain, Setting, Signal
+from proxytune.effects import Chain, FilterContext, Signal
 from proxytune.errors import EpisodeError
 from proxytune.seeds import placement_generator
 
@@ -49,13 +47,13 @@ class Instance:
 
     robot: Robot
     drivetrain: Drivetrain
-    camera: Camera
+    camera: Renderer
     image: Chain
     measurement: Chain
 
 
 class Sight(NamedTuple):
-    """What an expert sees, who need not make do with the picture.
+    """Sight of an expert, who need not make do with the picture.
 
     Attributes:
         picture: The newest picture.
@@ -79,7 +77,7 @@ class Driver(Protocol):
 
 
 class Drive(NamedTuple):
-    """What an episode leaves behind.
+    """Record of an episode.
 
     Attributes:
         poses: Start, then the pose after every tick, (ticks + 1, 3): x [m], y [m], heading [rad].
@@ -105,7 +103,7 @@ class Drive(NamedTuple):
 
 @dataclass(frozen=True)
 class Course:
-    """What an episode starts from and how it ends.
+    """Start and end of an episode.
 
     Attributes:
         start: Starting pose (3,): x [m], y [m], heading [rad].
@@ -133,8 +131,9 @@ class Rollout:
         figures = instance.robot.figures
         self._drivetrain, self._plant, self._course = instance.drivetrain, plant, course
         self._hold = round(TICK_HZ / figures["control_rate"])
-        self._memory = instance.drivetrain.begin(_setting(figures, course))
-        self._view = View(instance.camera, instance.image, Setting(TICK_HZ, course.start, figures, course.seed))
+        resting = FilterContext(TICK_HZ, np.zeros(2), figures, course.seed, course.start[2:], course.start[None, :2])
+        self._memory = instance.drivetrain.begin(resting)
+        self._view = View(instance.camera, instance.image, FilterContext(TICK_HZ, course.start, figures, course.seed))
         self.steps = round(course.seconds * figures["control_rate"])
         self.poses: Signal = course.start[None]
         self.crashed = False
@@ -146,7 +145,7 @@ class Rollout:
 
     @property
     def ended(self) -> bool:
-        """Whether the robot has crashed or left the course."""
+        """Tell whether the robot has crashed or left the course."""
         return self.crashed or self._course.ended(float(self.poses[-1, 0]), float(self.poses[-1, 1]))
 
     def step(self, command: Command) -> None:
@@ -194,15 +193,10 @@ def drive(
     return Drive(np.concatenate(poses), np.array(commands), rollout.crashed, remembered)
 
 
-def _setting(figures: Mapping[str, float], course: Course) -> Setting:
-    """The start of an episode, from rest."""
-    return Setting(TICK_HZ, np.zeros(2), figures, course.seed, course.start[2:], course.start[None, :2])
-
-
 def measured(instance: Instance, poses: Signal, seed: int) -> Signal:
     """Poses from the start on, one per tick, (ticks + 1, 3), as the measurement effects show them."""
-    setting = Setting(TICK_HZ, poses[0], instance.robot.figures, seed)
-    return instance.measurement.apply(poses, instance.measurement.begin(setting))[0]
+    context = FilterContext(TICK_HZ, poses[0], instance.robot.figures, seed)
+    return instance.measurement.apply(poses, instance.measurement.begin(context))[0]
 
 
 def _begin(driver: Driver, robot: Robot) -> Any:
@@ -384,7 +378,7 @@ def follow(instance: Instance, plant: Plant, start: Signal, duties: Signal, seed
     figures = instance.robot.figures
     hold = round(TICK_HZ / figures["control_rate"])
     train = instance.drivetrain
-    memory = train.begin(Setting(TICK_HZ, np.zeros(2), figures, seed, start[2:], start[None, :2]))
+    memory = train.begin(FilterContext(TICK_HZ, np.zeros(2), figures, seed, start[2:], start[None, :2]))
     poses = [start[None]]
     for command in duties[:-1]:
         twists, memory = train.apply(np.repeat(command[None], hold, axis=0), memory)

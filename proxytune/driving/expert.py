@@ -1,7 +1,6 @@
-"""The expert that learners imitate: pure pursuit of the lane's centre line, on the robot's true pose.
+"""Drivers besides agents: the expert that learners imitate, and those that replay or do what was learnt.
 
-An agent that plays recorded commands and keeps what it sees: the same drive in another domain.
-An agent that does what a policy has learnt, and remembers nothing.
+The expert is pure pursuit of the lane's centre line on the robot's true pose.
 """
 
 from dataclasses import dataclass
@@ -24,8 +23,8 @@ MEMORY = 0.9
 """Share of the disturbance of one control step that is left in the next: it lasts for half a second."""
 
 
-class Shown(NamedTuple):
-    """What a lesson has shown so far.
+class LessonMemory(NamedTuple):
+    """Memory of what a lesson has shown so far.
 
     Attributes:
         figures: The robot's nominal full speed [m/s] and effective baseline [m].
@@ -43,7 +42,7 @@ class Shown(NamedTuple):
 
     @property
     def samples(self) -> Demonstration:
-        """What is worth imitating: steps off the road are not."""
+        """Samples worth imitating: steps off the road are not."""
         kept = np.array(self.on_road)
         return Demonstration(np.stack(self.pictures)[kept], np.stack(self.commands)[kept])
 
@@ -71,11 +70,11 @@ class Expert:
     disturbance: float
     seed: int
 
-    def begin(self, robot: Robot) -> Shown:
+    def begin(self, robot: Robot) -> LessonMemory:
         """Nothing shown yet."""
-        return Shown((robot.figures["full_speed"], robot.figures["effective_baseline"]), 0.0, (), (), ())
+        return LessonMemory((robot.figures["full_speed"], robot.figures["effective_baseline"]), 0.0, (), (), ())
 
-    def act(self, sight: Sight, memory: Shown) -> tuple[Command, Shown]:
+    def act(self, sight: Sight, memory: LessonMemory) -> tuple[Command, LessonMemory]:
         """Steer for the point pursued, disturbed."""
         command, on_road = self._command(sight.pose, *memory.figures)
         drawn = expert_generator(self.seed, len(memory.commands)).standard_normal()
@@ -110,11 +109,11 @@ class Guide:
     expert: Expert
     policy: Policy
 
-    def begin(self, robot: Robot) -> Shown:
+    def begin(self, robot: Robot) -> LessonMemory:
         """Nothing shown yet."""
         return self.expert.begin(robot)
 
-    def act(self, sight: Sight, memory: Shown) -> tuple[Command, Shown]:
+    def act(self, sight: Sight, memory: LessonMemory) -> tuple[Command, LessonMemory]:
         """The policy's command, and the expert's in memory."""
         return self.policy(sight.picture), self.expert.act(sight, memory)[1]
 
@@ -129,15 +128,15 @@ def lesson_driver(road: Road, robot: Robot, seed: int, policy: Policy | None) ->
     return expert if policy is None else Guide(expert, policy)
 
 
-class Seen(NamedTuple):
-    """How many commands have been played, and the picture before each."""
+class Played(NamedTuple):
+    """Number of commands played, and the picture before each."""
 
     played: int
     pictures: tuple[Picture, ...]
 
 
 class Observation(NamedTuple):
-    """What recorded commands lead to.
+    """Poses and pictures that recorded commands lead to.
 
     Attributes:
         poses: Start, then the pose after every tick, (ticks + 1, 3): x [m], y [m], heading [rad].
@@ -154,14 +153,14 @@ class Playback:
 
     commands: NDArray[np.float64]
 
-    def begin(self, robot: Robot) -> Seen:
+    def begin(self, robot: Robot) -> Played:
         """Nothing played yet."""
-        return Seen(0, ())
+        return Played(0, ())
 
-    def act(self, picture: Picture, memory: Seen) -> tuple[Command, Seen]:
+    def act(self, picture: Picture, memory: Played) -> tuple[Command, Played]:
         """The next command."""
         command = self.commands[min(memory.played, len(self.commands) - 1)]
-        return command, Seen(memory.played + 1, (*memory.pictures, picture))
+        return command, Played(memory.played + 1, (*memory.pictures, picture))
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,6 @@
-"""The lane-following family as a study's `[domain]` table describes it.
+"""Lane following as a domain family: a robot on a map, its plant, camera and effects, as a `[domain]` table has them.
 
-The name under which a family's episodes are kept: a digest of all but the episode that determines a result.
-A robot's camera once effects have set its figures, and the effects on its pictures.
-Pictures of another size than the robot's agents are given.
-The ways to draw what a camera sees, by name.
-The lane-following domain family: a robot on a map, its plant, camera and effects.
+A family's episodes are kept under its `identity`: a digest of all that determines a result but the episode itself.
 """
 
 import functools
@@ -44,7 +40,7 @@ from proxytune.driving.episode import (
 from proxytune.driving.expert import Observation, Playback, Pupil, lesson_driver
 from proxytune.driving.lane import off_map
 from proxytune.driving.maps import chosen_map
-from proxytune.driving.optics import Camera, CameraFigures
+from proxytune.driving.optics import CameraFigures, Renderer
 from proxytune.driving.plants import Plant, check_body, drivetrain
 from proxytune.driving.road import Road
 from proxytune.driving.road_picture import Floor, draw_floor
@@ -53,7 +49,7 @@ from proxytune.effects import (
     Catalogue,
     Chain,
     Effect,
-    Setting,
+    FilterContext,
     Signal,
     Stage,
     effects_from,
@@ -102,18 +98,18 @@ def mounted_camera(robot: Robot, effects: Iterable[Effect]) -> CameraFigures:
     figures = robot.camera_figures()
     nominal = figures.channels()
     mounting = stage_chain(effects, Stage.CAMERA)
-    memory = mounting.begin(Setting(_RATE_HZ, nominal, robot.figures))
+    memory = mounting.begin(FilterContext(_RATE_HZ, nominal, robot.figures))
     return figures.with_channels(mounting.apply(nominal[None], memory)[0][0])
 
 
 def image_chain(effects: Iterable[Effect], figures: Mapping[str, float]) -> Chain:
     """The image effects that change a picture, given the nominal figures: neutral ones would only cost time."""
     chain = stage_chain(effects, Stage.IMAGE)
-    return Chain(tuple(effect for effect in chain.effects if not _is_neutral(effect, figures)))
 
+    def vanishes(effect: Effect) -> bool:
+        return all(getattr(effect, one.name, None) == one.neutral_value(figures) for one in effect.parameters)
 
-def _is_neutral(effect: Effect, figures: Mapping[str, float]) -> bool:
-    return all(getattr(effect, one.name, None) == one.neutral_value(figures) for one in effect.parameters)
+    return Chain(tuple(effect for effect in chain.effects if not vanishes(effect)))
 
 
 def with_columns(robot: Robot, least: int) -> Robot:
@@ -132,7 +128,7 @@ def with_columns(robot: Robot, least: int) -> Robot:
 CAMERAS = ("ground_plane", "renderer")
 
 
-def camera_over(floor: Floor, mounted: CameraFigures, kind: str) -> Camera:
+def camera_over(floor: Floor, mounted: CameraFigures, kind: str) -> Renderer:
     """A camera of one of CAMERAS over a floor."""
     return GroundPlaneCamera(mounted, floor) if kind == "ground_plane" else BulletCamera(mounted, floor)
 
@@ -187,7 +183,7 @@ class LaneFollowing:
 
     @property
     def starts(self) -> int:
-        """How many starting poses the map has."""
+        """Number of starting poses of the map."""
         return len(self.map.starts)
 
     def check_agent(self, name: str) -> None:
@@ -223,6 +219,16 @@ class LaneFollowing:
             EpisodeError: With the time at which the agent failed.
         """
         return self._drive(episode, load_agent(episode.agent, self.folder), self.course(episode, self.seconds))
+
+    @property
+    def command_unit(self) -> str:
+        """The unit of a command: wheels are given duties."""
+        return "duty"
+
+    @property
+    def road_to_draw(self) -> Road:
+        """The road that a figure draws the robot's way on."""
+        return self.map
 
     @property
     def best_score(self) -> float:
@@ -263,7 +269,7 @@ class LaneFollowing:
         return score(self._drive(episode, Pupil(policy), self.course(episode, self.seconds)).poses)
 
     def examine_together(self, episodes: Sequence[Episode], policy: Policy) -> list[float]:
-        """What `examine` says of each of several episodes, to the bit: those of one θ are driven side by side.
+        """Score several episodes as `examine` does, to the bit: those of one θ are driven side by side.
 
         Raises:
             EpisodeError: As `examine` does, for the first episode that fails; SettingsError likewise.
@@ -302,7 +308,7 @@ class LaneFollowing:
         return Observation(driven.poses, np.stack(driven.memory.pictures))
 
     def course(self, episode: Episode, seconds: float) -> Course:
-        """Where an episode starts, and its end: after some time [s], or off the map."""
+        """Start of an episode, and its end: after some time [s], or off the map."""
         noise = {"position_noise_m": self.position_noise_m, "heading_noise_deg": self.heading_noise_deg}
         start = np.asarray(start_pose(self.map, episode.start, seed=episode.seed, **noise))
         return Course(start, seconds, episode.seed, functools.partial(off_map, self.map))

@@ -1,11 +1,10 @@
-"""What a plant is: the thing that moves.
+"""Plants: what moves, from the motion that wheels ask for to poses.
 
-From duties to the motion that the wheels ask of the body: the part that both plants share.
-What a URDF says of a robot that drives on two wheels: where they are, how large, and how heavy it is.
-The planar plant: kinematics over whole arrays of time, exact for twists that hold over a tick.
+`Drivetrain` makes twists of duties, and both plants share it. The planar plant is kinematics over whole arrays of time,
+exact for twists that hold over a tick. What a URDF says of a robot on two wheels is read here too: the bullet plant
+drives it.
 """
 
-import math
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -17,8 +16,9 @@ from typing import NamedTuple, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from proxytune.driving.optics import rotation
 from proxytune.driving.robot import Robot
-from proxytune.effects import CHANNELS, Chain, Effect, Memory, Setting, Signal, Stage, stage_chain
+from proxytune.effects import CHANNELS, Chain, Effect, FilterContext, Memory, Signal, Stage, stage_chain
 from proxytune.errors import SettingsError
 
 
@@ -41,8 +41,8 @@ class Plant(Protocol):
     ) -> None: ...
 
 
-class Progress(NamedTuple):
-    """What the three stages remember."""
+class DrivetrainState(NamedTuple):
+    """Memories of the three stages."""
 
     command: Memory
     actuation: Memory
@@ -62,21 +62,21 @@ class Drivetrain:
     actuation: Chain
     motion: Chain
 
-    def begin(self, setting: Setting) -> Progress:
-        """As if the resting command of `setting` had been given for ever."""
-        still = np.zeros((*np.shape(setting.rest)[:-1], len(CHANNELS[Stage.MOTION])))
-        return Progress(
-            self.command.begin(setting),
-            self.actuation.begin(setting),
-            self.motion.begin(replace(setting, rest=still)),
+    def begin(self, context: FilterContext) -> DrivetrainState:
+        """Begin as if the resting command of `context` had been given for ever."""
+        still = np.zeros((*np.shape(context.rest)[:-1], len(CHANNELS[Stage.MOTION])))
+        return DrivetrainState(
+            self.command.begin(context),
+            self.actuation.begin(context),
+            self.motion.begin(replace(context, rest=still)),
         )
 
-    def apply(self, signal: Signal, memory: Progress) -> tuple[Signal, Progress]:
+    def apply(self, signal: Signal, memory: DrivetrainState) -> tuple[Signal, DrivetrainState]:
         """The twists that the next chunk of duties leads to."""
         arrived, command = self.command.apply(signal, memory.command)
         wheels, actuation = self.actuation.apply(np.minimum(np.maximum(arrived, -1.0), 1.0), memory.actuation)
         twists, motion = self.motion.apply(self.ideal(wheels), memory.motion)
-        return twists, Progress(command, actuation, motion)
+        return twists, DrivetrainState(command, actuation, motion)
 
     def ideal(self, wheels: Signal) -> Signal:
         """The twists that wheel speeds (…, time, 2) ask for, nothing slipping."""
@@ -164,7 +164,7 @@ def parse_urdf(path: Path) -> ET.Element:
 
 
 def read_body(root: ET.Element, path: Path) -> Body:
-    """What a URDF says of its wheels, mass and camera.
+    """Read a URDF's wheels, mass and camera.
 
     Raises:
         SettingsError: If its two driven wheels cannot be told, or a number in it is none.
@@ -196,12 +196,9 @@ def _read_body(root: ET.Element, path: Path) -> Body:
         remedy = f"call the two driven joints {' and '.join(AXLES)}"
         raise SettingsError(f"{path}: the axles must be two continuous joints, left and right; found {found}; {remedy}")
     masses = (float(mass.get("value", 0.0)) for mass in root.findall("link/inertial/mass"))
-    camera = next((name for name in _links(root) if "camera" in name and "optical" not in name), None)
+    names = (link.get("name", "") for link in root.iter("link"))
+    camera = next((name for name in names if "camera" in name and "optical" not in name), None)
     return Body(pair[0], pair[1], sum(masses), link_pose(root, camera) if camera else None)
-
-
-def _links(root: ET.Element) -> list[str]:
-    return [link.get("name", "") for link in root.iter("link")]
 
 
 def links_called(root: ET.Element, name: str) -> list[ET.Element]:
@@ -229,12 +226,8 @@ def origin_of(element: ET.Element) -> NDArray[np.float64]:
     """The transform (4, 4) of an element's <origin>, roll first, then pitch, then yaw."""
     origin = element.find("origin")
     xyz, rpy = ((origin.get(key, "0 0 0") if origin is not None else "0 0 0").split() for key in ("xyz", "rpy"))
-    roll, pitch, yaw = (float(angle) for angle in rpy)
-    about_x = np.array([[1, 0, 0], [0, math.cos(roll), -math.sin(roll)], [0, math.sin(roll), math.cos(roll)]])
-    about_y = np.array([[math.cos(pitch), 0, math.sin(pitch)], [0, 1, 0], [-math.sin(pitch), 0, math.cos(pitch)]])
-    about_z = np.array([[math.cos(yaw), -math.sin(yaw), 0], [math.sin(yaw), math.cos(yaw), 0], [0, 0, 1]])
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = about_z @ about_y @ about_x, [float(value) for value in xyz]
+    pose, (roll, pitch, yaw) = np.eye(4), (float(angle) for angle in rpy)
+    pose[:3, :3], pose[:3, 3] = rotation(roll, pitch, yaw), [float(value) for value in xyz]
     return pose
 
 
@@ -250,15 +243,11 @@ def check_body(robot: Robot) -> None:
         if wheel.joint != name or wheel.axis[1] < 0.0:
             said = f"joint '{wheel.joint}' must be called {name}"
             raise SettingsError(f"{path.name}: {said}, and its axis must point to the left (0 1 0)")
-    for figure, value in _figures(body):
+    radii = [wheel.radius_m for wheel in (body.left, body.right) if wheel.radius_m is not None]
+    for figure, value in (*(("wheel_radius", radius) for radius in radii), ("wheel_distance", body.wheel_distance)):
         if abs(value - robot.figures[figure]) > AGREES * robot.figures[figure]:
             said = f"has the {figure} {value:g} m, robot.toml says {robot.figures[figure]:g} m"
             raise SettingsError(f"{path.name}: {said}; correct the one that is wrong")
-
-
-def _figures(body: Body) -> Iterator[tuple[str, float]]:
-    yield from (("wheel_radius", wheel.radius_m) for wheel in (body.left, body.right) if wheel.radius_m is not None)
-    yield "wheel_distance", body.wheel_distance
 
 
 def _wheel(root: ET.Element, joint: ET.Element) -> Wheel:
@@ -272,7 +261,7 @@ def _wheel(root: ET.Element, joint: ET.Element) -> Wheel:
 
 
 def _radius(root: ET.Element, link: str) -> float | None:
-    """Of what the wheel collides as, else of what it looks like."""
+    """Radius of what the wheel collides as, else of what it looks like."""
     shapes = (f"{part}/geometry/{shape}" for part in ("collision", "visual") for shape in ("sphere", "cylinder"))
     for shape in shapes:
         for element in links_called(root, link):

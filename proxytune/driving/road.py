@@ -1,6 +1,7 @@
-"""What a road consists of: straights and arcs, one after the other, counter-clockwise round the map.
+"""A map as its file states it: the road's segments, its lanes and markings, and where robots are put down.
 
-A map: the road's segments, its lanes and markings, and where robots are put down; in metres from its corner.
+The road's centre line is straights and arcs, one after the other, counter-clockwise round the map; lengths are in
+metres from the map's corner. Names and fields of `Road` and its parts count in a family's identity.
 """
 
 import math
@@ -36,7 +37,7 @@ Segment = Straight | Arc
 
 
 @dataclass(frozen=True)
-class Section:
+class RoadSection:
     """A straight with the bend that ends it; either may have no length.
 
     Attributes:
@@ -50,21 +51,21 @@ class Section:
     turn: float
 
 
-def sections(segments: tuple[Segment, ...]) -> Iterator[Section]:
+def road_sections(segments: tuple[Segment, ...]) -> Iterator[RoadSection]:
     """The same road by sections; straights after the last arc are a section without a bend."""
     lengths: list[float] = []
     for segment in segments:
         if isinstance(segment, Straight):
             lengths.append(segment.length)
         else:
-            yield Section(math.fsum(lengths), segment.radius, math.radians(segment.turn_deg))
+            yield RoadSection(math.fsum(lengths), segment.radius, math.radians(segment.turn_deg))
             lengths = []
     if lengths:
-        yield Section(math.fsum(lengths), 0.0, 0.0)
+        yield RoadSection(math.fsum(lengths), 0.0, 0.0)
 
 
-def repeats_of(lap: tuple[Section, ...]) -> int:
-    """How many times a lap repeats its first sections: 4 on a square loop, 1 where it never does."""
+def repeats_of(lap: tuple[RoadSection, ...]) -> int:
+    """Number of times that a lap repeats its first sections: 4 on a square loop, 1 where it never does."""
     count = len(lap)
     return next(n for n in range(count, 0, -1) if count % n == 0 and lap[: count // n] * n == lap)
 
@@ -79,16 +80,15 @@ def tightened(segment: Segment, radius: float | None) -> tuple[Segment, ...]:
 
 def length(segments: tuple[Segment, ...]) -> float:
     """Length of the centre line [m]."""
-    return math.fsum(s.length if isinstance(s, Straight) else _arc_length(s) for s in segments)
-
-
-def _arc_length(arc: Arc) -> float:
-    return arc.radius * math.radians(abs(arc.turn_deg))
+    return math.fsum(
+        part.length if isinstance(part, Straight) else part.radius * math.radians(abs(part.turn_deg))
+        for part in segments
+    )
 
 
 @dataclass(frozen=True)
 class Paint:
-    """How a road is marked.
+    """Markings of a road.
 
     Attributes:
         white_width: Width of the solid white edge lines [m].

@@ -1,6 +1,7 @@
-"""Every effect there is, in the order in which the signal meets them, and effects from named values.
+"""Every effect by name, in the order in which the signal meets them, and effects from values of θ.
 
-An effect from outside, found through the one door and checked: it is what it claims to be, or is refused by name.
+A user's own effect and a plug-in's come through `outside_effect`, which refuses whatever is not what an effect must be;
+`problems` tries it on a short signal. Whoever wants effects of θ asks a `Catalogue`, which knows whose folder counts.
 """
 
 import inspect
@@ -32,9 +33,9 @@ from proxytune.effects.effect import (
     SIGNALS,
     Cue,
     Effect,
+    FilterContext,
     Form,
     Means,
-    Setting,
     Stage,
     Trace,
     WheelCurve,
@@ -83,7 +84,7 @@ def outside_effect(name: str, folder: Path | None) -> type[Effect]:
 
 
 def problems(kind: Any) -> Iterator[str]:
-    """What is wrong with an effect that has all MEMBERS, the first thing first.
+    """Problems of an effect that has all MEMBERS, the first thing first.
 
     Take the first alone: what follows supposes that nothing before is wrong.
     """
@@ -136,7 +137,7 @@ def _wrong_form(kind: Any, form: Form) -> Iterator[str]:
 
 
 def _wrong_figure(shown: Any) -> Iterator[str]:
-    """What a figure of the effect could not be drawn for."""
+    """Reasons why no figure of the effect could be drawn."""
     if not isinstance(shown, WheelCurve | Means):
         yield f"is to be shown by {shown!r}; give its trace a WheelCurve, or Means with panels"
     if not isinstance(shown, Means):
@@ -161,12 +162,13 @@ def _wrong_filter(kind: Any) -> Iterator[str]:
     """Try it on a short signal, in the middle of its range, at both ends, and where it is to change nothing."""
     tried = [[one.low + share * (one.high - one.low) for one in kind.parameters] for share in (0.5, 0.0, 1.0)]
     neutral = [one.neutral for one in kind.parameters]
-    signal = _signal(kind.stage)
+    signal, nominal = _signal(kind.stage), defaultdict[str, float](lambda: 1.0)
     for values in (*tried, neutral):
         if any(isinstance(value, str) for value in values):
             continue
         try:
-            answer = _filtered(kind, values, signal)
+            effect = kind(*values)
+            answer = effect.apply(signal, effect.begin(FilterContext(RATE_HZ, signal[:, 0], nominal)))
         except Exception as problem:
             yield f"raised {describe(problem)} at {values}; correct its begin and apply"
             return
@@ -189,57 +191,16 @@ def _signal(stage: Stage) -> Any:
     return np.sin(np.arange(TICKS * channels, dtype=float)).reshape(1, TICKS, channels)
 
 
-def _filtered(kind: Any, values: list[float], signal: Any) -> Any:
-    nominal: Mapping[str, float] = defaultdict(lambda: 1.0)
-    effect = kind(*values)
-    return effect.apply(signal, effect.begin(Setting(RATE_HZ, signal[:, 0], nominal)))
-
-
 _ALL: tuple[type[Effect], ...] = (
-    DelayJitter,
-    DroppedCommands,
-    CommandQuantisation,
-    Delay,
-    SlewRate,
-    DriverMap,
-    DeadBand,
-    Stiction,
-    Saturation,
-    Trim,
-    WheelGain,
-    BatterySag,
-    ThermalFade,
-    MotorLag,
-    Backlash,
-    WheelRipple,
-    YawScrub,
-    Understeer,
-    YawLag,
-    TurnSlip,
-    LateralSlip,
-    CrossCoupling,
-    FloorSlope,
-    SlipperyPatch,
-    MarkerOffset,
-    HeadingOffset,
-    CameraPitch,
-    CameraRoll,
-    CameraYaw,
-    CameraHeight,
-    CameraForward,
-    FieldOfView,
-    LensDistortion,
-    LensCentre,
+    DelayJitter, DroppedCommands, CommandQuantisation, Delay,
+    SlewRate, DriverMap, DeadBand, Stiction, Saturation, Trim, WheelGain, BatterySag, ThermalFade, MotorLag, Backlash,
+    WheelRipple, YawScrub, Understeer, YawLag, TurnSlip, LateralSlip, CrossCoupling, FloorSlope, SlipperyPatch,
+    MarkerOffset, HeadingOffset,
+    CameraPitch, CameraRoll, CameraYaw, CameraHeight, CameraForward, FieldOfView, LensDistortion, LensCentre,
     PixelAspect,
     # Mixtures of pictures commute; blur is exact on 8-bit pictures alone, so it comes first
-    Blur,
-    RollingShutter,
-    CameraLatency,
-    Defocus,
-    Vignetting,
-    Exposure,
-    ImageNoise,
-)
+    Blur, RollingShutter, CameraLatency, Defocus, Vignetting, Exposure, ImageNoise,
+)  # fmt: skip
 
 CATALOGUE: Mapping[str, type[Effect]] = MappingProxyType({effect.name: effect for effect in _ALL})
 
@@ -316,7 +277,7 @@ class Catalogue:
         return theta_names(self.effect(name), name)
 
     def knows(self, name: str) -> bool:
-        """Whether an effect of this name is shipped, a plug-in, or written as a user's own is."""
+        """Tell whether an effect of this name is shipped, a plug-in, or written as a user's own is."""
         return ":" in name or name in self.names
 
 

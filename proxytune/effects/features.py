@@ -1,7 +1,7 @@
-"""What a learnt effect looks at: groups of causal features of the motion that is asked for.
+"""Causal features of the motion that is asked for, in groups: what curves of unnamed motion are fitted over.
 
-Functions of the motion that is asked for, of which learnt curves are made: each 0 where the robot stands.
-What a signal was like before: low-passes of it, and how far a wheel has rolled since it last turned.
+`AskedMotion` is that motion with its past. A group of `GROUPS` names the signal, and for each channel of the body or of
+a wheel the basis functions over it, each 0 where the robot stands. The filters that make the past come last.
 """
 
 from collections.abc import Callable, Mapping
@@ -18,7 +18,7 @@ Knot = float | tuple[float, float]
 Knots = tuple[Knot, ...]
 
 
-class Asked(NamedTuple):
+class AskedMotion(NamedTuple):
     """The motion asked for, held within what was seen, and its past, (…, time) where nothing else is said.
 
     Attributes:
@@ -61,7 +61,7 @@ def hats(signal: Signal, knots: Knots) -> Signal:
     return np.stack([np.interp(signal, corners, row) for row in rows], axis=-1)
 
 
-def grid(asked: Asked, knots: Knots) -> Signal:
+def grid(asked: AskedMotion, knots: Knots) -> Signal:
     """Products of hats over speed and yaw rate (…, knots), 0 where both are 0."""
     pairs = np.asarray(knots, dtype=float)
     parts = []
@@ -72,73 +72,73 @@ def grid(asked: Asked, knots: Knots) -> Signal:
     return np.asarray(parts[0] * parts[1])
 
 
-def sign(asked: Asked, wheel: int) -> Signal:
-    """Which way a wheel turns: from −1 to 1, 0 where it stands (…, time, 1)."""
+def sign(asked: AskedMotion, wheel: int) -> Signal:
+    """Sign of a wheel's speed: from −1 to 1, 0 where it stands (…, time, 1)."""
     return np.asarray(np.clip(asked.wheels[wheel][..., None] / REST_SPEED, -1.0, 1.0))
 
 
-def moving(asked: Asked) -> Signal:
+def moving(asked: AskedMotion) -> Signal:
     """1 while the robot moves, 0 where it stands (…, time)."""
     return np.minimum(1.0, np.abs(asked.forward) / REST_SPEED)
 
 
-def backwards(asked: Asked, knots: Knots) -> Signal:
-    """Whether the robot moves backwards, for a knot of −1."""
+def backwards(asked: AskedMotion, knots: Knots) -> Signal:
+    """Indicator of moving backwards, for a knot of −1."""
     return hats(np.clip(asked.forward / REST_SPEED, -1.0, 1.0), knots)
 
 
-def level(asked: Asked, knots: Knots, wheel: int) -> Signal:
+def level(asked: AskedMotion, knots: Knots, wheel: int) -> Signal:
     """A wheel's speed as it is, whatever the knots."""
     return np.asarray(asked.wheels[wheel][..., None] * np.ones(len(knots)))
 
 
-def slowing(asked: Asked, knots: Knots, wheel: int) -> Signal:
+def slowing(asked: AskedMotion, knots: Knots, wheel: int) -> Signal:
     """The bands of a wheel that is slower than it has been of late, 0 while it speeds up."""
     bands = asked.bands[wheel]
     slow = asked.wheels[wheel][..., None] - np.cumsum(bands, axis=-1)
     return np.where(bands * slow < 0.0, bands, 0.0)
 
 
-def stopping(asked: Asked, knots: Knots, wheel: int) -> Signal:
+def stopping(asked: AskedMotion, knots: Knots, wheel: int) -> Signal:
     """The bands of a wheel that is to stand and was moving of late."""
     bands = asked.bands[wheel]
     speed = asked.wheels[wheel][..., None]
     return np.where(np.abs(speed) < STANDS * np.abs(speed - np.cumsum(bands, axis=-1)), bands, 0.0)
 
 
-def started(asked: Asked, knots: Knots, wheel: int) -> Signal:
+def started(asked: AskedMotion, knots: Knots, wheel: int) -> Signal:
     """1 when a wheel starts to move, fading with time."""
     return np.asarray(np.exp(-asked.started[wheel][..., None] / np.asarray(knots)))
 
 
-def played(asked: Asked, knots: Knots, wheel: int) -> Signal:
+def played(asked: AskedMotion, knots: Knots, wheel: int) -> Signal:
     """By how much a wheel lags behind within its play, while it moves."""
     speed = asked.wheels[wheel][..., None]
     return np.asarray((asked.played[wheel] - speed) * np.abs(sign(asked, wheel)))
 
 
-def after_reversal(asked: Asked, knots: Knots, wheel: int) -> Signal:
+def after_reversal(asked: AskedMotion, knots: Knots, wheel: int) -> Signal:
     """A wheel's speed, fading with the way since it last turned the other way."""
     way = np.abs(asked.rolled[wheel])[..., None]
     return np.asarray(asked.wheels[wheel][..., None] * np.exp(-way / np.asarray(knots)))
 
 
-def body_after_reversal(asked: Asked, knots: Knots) -> Signal:
+def body_after_reversal(asked: AskedMotion, knots: Knots) -> Signal:
     """The forward speed, fading with the way since the robot last drove the other way."""
     return np.asarray(asked.forward[..., None] * np.exp(-np.abs(asked.rolled[2])[..., None] / np.asarray(knots)))
 
 
-def waves(wave: Callable[[Signal], Signal]) -> Callable[[Asked, Knots], Signal]:
+def waves(wave: Callable[[Signal], Signal]) -> Callable[[AskedMotion, Knots], Signal]:
     """Harmonics of the heading while the robot moves."""
     return lambda a, k: wave(a.heading[..., None] * np.asarray(k)) * moving(a)[..., None]
 
 
 class Channel(NamedTuple):
-    """Where a group's curves go: to the body's `forward`, `sideways` or `yaw`, or to the `left` or `right` wheel."""
+    """Target of a group's curves: to the body's `forward`, `sideways` or `yaw`, or to the `left` or `right` wheel."""
 
     to: str
     unit: str
-    basis: Callable[[Asked, Knots], Signal]
+    basis: Callable[[AskedMotion, Knots], Signal]
 
 
 class Group(NamedTuple):
@@ -157,7 +157,7 @@ class Group(NamedTuple):
     low: float | None = None
 
 
-def _of_wheels(unit: str, basis: Callable[[Asked, Knots, int], Signal]) -> dict[str, Channel]:
+def _of_wheels(unit: str, basis: Callable[[AskedMotion, Knots, int], Signal]) -> dict[str, Channel]:
     """One channel a wheel."""
     return {
         "left": Channel("left", unit, lambda a, k: basis(a, k, 0)),
@@ -310,7 +310,7 @@ def rings(change: Signal, before: Signal, frequencies_hz: Knots, rate_hz: float)
 
 
 def play(signal: Signal, before: Signal, halves: Knots) -> Signal:
-    """What is dragged along by a signal (…, time) through plays of these half widths (…, time, widths)."""
+    """Value dragged along by a signal (…, time) through plays of these half widths (…, time, widths)."""
     out, now = np.empty((*signal.shape, len(halves))), before
     half = np.asarray(halves)
     for step in range(signal.shape[-1] if len(halves) else 0):
@@ -321,7 +321,7 @@ def play(signal: Signal, before: Signal, halves: Knots) -> Signal:
 
 
 def moved_since(speed: Signal, before: Signal, rest_speed: float, rate_hz: float) -> Signal:
-    """How long ago a wheel last stood [s] (…, time), 0 while it does.
+    """Time since a wheel last stood [s] (…, time), 0 while it does.
 
     Args:
         speed: Its speed (…, time).
@@ -335,7 +335,7 @@ def moved_since(speed: Signal, before: Signal, rest_speed: float, rate_hz: float
 
 
 def rolled_since(speed: Signal, before: Signal, rate_hz: float) -> Signal:
-    """How far a wheel has rolled since it last turned the other way [m] (…, time), negative backwards.
+    """Way that a wheel has rolled since it last turned the other way [m] (…, time), negative backwards.
 
     Args:
         speed: Its speed [m/s] (…, time).

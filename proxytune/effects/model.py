@@ -1,7 +1,4 @@
-"""A domain instance as a file: robot, plant, and the effects with their values.
-
-Effects in a row: what one stage of a domain instance does to its signal.
-"""
+"""A domain instance as model.toml: robot, plant and effects with their values; and a stage's effects as one chain."""
 
 import math
 import zlib
@@ -12,17 +9,16 @@ from pathlib import Path
 import numpy as np
 
 from proxytune.effects.catalogue import CATALOGUE, PARAMETERS, SHIPPED, Catalogue, effect_of
-from proxytune.effects.effect import Effect, Memory, Recalling, Setting, Signal, Stage
+from proxytune.effects.effect import Effect, FilterContext, Memory, Recalling, Signal, Stage
 from proxytune.effects.learnt import Learnt, is_learnt, learnt_text, read_learnt
 from proxytune.errors import ExtensionError
-from proxytune.logs import GEOMETRY
-from proxytune.settings import Section, nearest, read_settings
+from proxytune.settings import GEOMETRY, Section, nearest, read_settings
 from proxytune.space import Parameter
 
 
 @dataclass(frozen=True)
 class Model:
-    """What model.toml says.
+    """Content of a model.toml.
 
     Attributes:
         robot: Name of the robot.
@@ -54,12 +50,10 @@ def read_model(path: Path, catalogue: Catalogue = SHIPPED) -> Model:
     settings.whole("format", 1, low=1, high=1)
     plant = settings.text("plant") if "plant" in settings.values else None
     theta, intervals = read_effects(settings.section("effects"), catalogue)
-    return Model(settings.text("robot"), plant, theta, intervals, _read_geometry(settings.section("geometry")))
-
-
-def _read_geometry(section: Section) -> dict[str, float]:
-    section.only(GEOMETRY)
-    return {figure: section.number(key, low=0.0) for key, figure in GEOMETRY.items() if key in section.values}
+    stated = settings.section("geometry")
+    stated.only(GEOMETRY)
+    geometry = {figure: stated.number(key, low=0.0) for key, figure in GEOMETRY.items() if key in stated.values}
+    return Model(settings.text("robot"), plant, theta, intervals, geometry)
 
 
 def model_text(model: Model, comments: Iterable[str] = (), catalogue: Catalogue = SHIPPED) -> str:
@@ -159,29 +153,31 @@ class Chain:
 
     effects: tuple[Effect, ...]
 
-    def begin(self, setting: Setting) -> tuple[Memory, ...]:
+    def begin(self, context: FilterContext) -> tuple[Memory, ...]:
         """Every effect's memory, each with a seed of its own."""
         memories = []
         for effect in self.effects:
-            own = replace(setting, seed=zlib.crc32(effect.name.encode(), setting.seed))
+            own = replace(context, seed=zlib.crc32(effect.name.encode(), context.seed))
             memories.append(effect.begin(own))
         return tuple(memories)
 
-    def begin_amid(self, setting: Setting, whole: Setting, signal: Signal, row: Signal, sample: Signal) -> Memory:
+    def begin_amid(
+        self, context: FilterContext, whole: FilterContext, signal: Signal, row: Signal, sample: Signal
+    ) -> Memory:
         """The memories of windows that begin amid longer signals: what came before counts where an effect recalls it.
 
         Args:
-            setting: Of the windows (W, …).
+            context: Of the windows (W, …).
             whole: Of the longer signals.
             signal: Those signals from their start on (rows, time, channels).
             row: The row of each window (W,).
             sample: The sample of its row at which each window begins (W,).
         """
-        memories = list(self.begin(setting))
+        memories = list(self.begin(context))
         recalling = [number for number, effect in enumerate(self.effects) if isinstance(effect, Recalling)]
         for number, effect in enumerate(self.effects[: max(recalling, default=-1) + 1]):
             if isinstance(effect, Recalling):
-                memories[number] = effect.recall(setting, signal, row, sample)
+                memories[number] = effect.recall(context, signal, row, sample)
             signal, _ = effect.apply(signal, effect.begin(whole))
         return tuple(memories)
 

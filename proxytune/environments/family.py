@@ -1,8 +1,7 @@
 """Any Gymnasium environment as a domain family: its own parameters and our effects are θ.
 
-A policy that was trained elsewhere, as an agent of a study.
-Agents of an environment by name: a function, what has `predict`, or one of the two that need no code.
-One episode of an environment: an agent acts through effects until the environment or the time ends it.
+An agent is a function, what has `predict`, or one of two that need no code. One episode: it acts through effects until
+the environment or the time ends it. `agent_of` goes the other way: a policy trained elsewhere drives our robot.
 """
 
 import hashlib
@@ -30,15 +29,15 @@ from proxytune.settings import Section, nearest
 from proxytune.space import Theta
 
 
-class Policy(Protocol):
-    """What has learnt to act, as stable-baselines3's algorithms and policies."""
+class Predictor(Protocol):
+    """Anything that has learnt to act, as stable-baselines3's algorithms and policies."""
 
     def predict(self, observation: Any, *, deterministic: bool) -> Any:
         """The action for an observation, or the action and a state, which it is given back as `state=`."""
         ...
 
 
-def ask_policy(policy: Policy, observation: Any, state: Any, *, deterministic: bool = True) -> tuple[Any, Any]:
+def ask_policy(policy: Predictor, observation: Any, state: Any, *, deterministic: bool = True) -> tuple[Any, Any]:
     """A policy's action, and its state for the next observation, None where it has none."""
     known = {} if state is None else {"state": state}
     answer = policy.predict(observation, deterministic=deterministic, **known)
@@ -54,7 +53,7 @@ class PolicyAgent:
         deterministic: Whether it takes its likeliest action; one that draws would make episodes differ at one seed.
     """
 
-    policy: Policy
+    policy: Predictor
     deterministic: bool = True
 
     def begin(self, robot: Robot) -> None:
@@ -66,7 +65,7 @@ class PolicyAgent:
         return np.clip(np.asarray(action, dtype=float), -1.0, 1.0), memory
 
 
-def agent_of(policy: Policy, *, deterministic: bool = True) -> PolicyAgent:
+def agent_of(policy: Predictor, *, deterministic: bool = True) -> PolicyAgent:
     """An agent for studies of anything with `predict(observation, deterministic=…) -> (action, state)`.
 
     Args:
@@ -102,7 +101,7 @@ BUILT_IN: Mapping[str, Callable[[Any, int], Act]] = MappingProxyType({"random": 
 
 @dataclass
 class Predicting:
-    """What has `predict`, as the policies of stable-baselines3 do; a state that it answers with is handed back."""
+    """Anything with `predict`, as the policies of stable-baselines3 do; a state that it answers with is handed back."""
 
     policy: Any
     state: Any = None
@@ -174,7 +173,7 @@ Infos = list[Mapping[str, Any]]
 FOLDS: Mapping[str, Any] = {"sum": np.sum, "mean": np.mean, "max": np.max, "min": np.min}
 
 
-class Wrapped:
+class WrappedEnvironment:
     """An environment behind effects, in the midst of an episode."""
 
     def __init__(self, environment: Any, actuators: Actuators, sensors: Sensors) -> None:
@@ -202,7 +201,7 @@ class Wrapped:
         return self._sensors.show(seen), bool(terminated or truncated)
 
 
-def play(wrapped: Wrapped, act: Act, first: Any, space: Any, steps: int) -> None:
+def play(wrapped: WrappedEnvironment, act: Act, first: Any, space: Any, steps: int) -> None:
     """Let an agent act from its first observation on, for so many steps at most.
 
     Raises:
@@ -215,7 +214,7 @@ def play(wrapped: Wrapped, act: Act, first: Any, space: Any, steps: int) -> None
             return
 
 
-def score(wrapped: Wrapped, metrics: tuple[EpisodeMetric, ...]) -> dict[str, float]:
+def score(wrapped: WrappedEnvironment, metrics: tuple[EpisodeMetric, ...]) -> dict[str, float]:
     """The metrics of an episode that is over.
 
     Raises:
@@ -240,9 +239,9 @@ def _of_info(infos: Infos, metric: EpisodeMetric) -> float:
 
 def wrap(
     environment: Any, effects: tuple[Effect, ...], spaces: Spaces, state: tuple[int, ...] | None, seed: int
-) -> Wrapped:
+) -> WrappedEnvironment:
     """An environment behind the effects of a domain instance."""
-    return Wrapped(environment, Actuators(effects, spaces, seed), Sensors(effects, spaces, state, seed))
+    return WrappedEnvironment(environment, Actuators(effects, spaces, seed), Sensors(effects, spaces, state, seed))
 
 
 STARTS = 1000
@@ -298,7 +297,7 @@ class GymnasiumFamily:
 
     @property
     def starts(self) -> int:
-        """How many initial states are numbered."""
+        """Number of initial states."""
         return STARTS
 
     def truth(self, model: Path) -> Theta:

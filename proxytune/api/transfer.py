@@ -32,7 +32,8 @@ from proxytune.importing import (
     source_without_unnamed_pictures,
     write_log,
 )
-from proxytune.logs import GEOMETRY, Log
+from proxytune.logs import Log
+from proxytune.settings import GEOMETRY
 from proxytune.report import (
     FORMATS,
     ExportLine,

@@ -1,1 +1,1 @@
-from .family import PolicyAgent as PolicyAgent, agent_of as agent_of
+from .family import agent_of as agent_of

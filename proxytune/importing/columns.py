@@ -332,37 +332,17 @@ LEAST_EXTENT_M = 0.01
 """A drive that stays within this, in a unit that nobody stated, is taken for one in another unit."""
 
 
-@dataclass(frozen=True)
-class Labelled:
-    """Rows of a table that hold something, M of them.
-
-    Attributes:
-        times: Their stamps (M,) [s].
-        values: What they hold (M, fields).
-        labels: The drive that each belongs to (M,); "" where the table names none.
-    """
-
-    times: Floats
-    values: Floats
-    labels: NDArray[np.str_]
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The drives in order of their first rows."""
-        return tuple(dict.fromkeys(str(label) for label in self.labels))
-
-
 def commands_by_drive(table: Table, columns: Columns, kind: str) -> dict[str, Commands]:
     """The commands of each drive that a table names; of "" where it names none.
 
     Raises:
         LogError: If a cell is no number, or half of a command is empty.
     """
-    rows = _filled_rows(table, columns, COMMANDS[kind])
+    times, values, labels = _filled_rows(table, columns, COMMANDS[kind])
     drives = {}
-    for name in rows.names:
-        mine = rows.labels == name
-        drives[name] = Commands(kind, rows.times[mine], rows.values[mine])
+    for name in dict.fromkeys(map(str, labels)):
+        mine = labels == name
+        drives[name] = Commands(kind, times[mine], values[mine])
         _check_clock(drives[name].times, f"{_where(table, name)}: commands")
     if not drives:
         raise LogError(f"{table.path}: has columns of commands, but no row with one; fill them, or take them out")
@@ -391,19 +371,19 @@ def poses_by_drive(table: Table, columns: Columns) -> dict[str, Poses]:
         LogError: If a column is missing, a cell is no number, part of a pose is empty, or a drive has no two poses.
     """
     fields = pose_fields(table, columns)
-    rows = _filled_rows(table, columns, fields)
-    if not len(rows.times):
+    times, values, labels = _filled_rows(table, columns, fields)
+    if not len(times):
         raise LogError(f"{table.path}: has no row with a pose; give the file that the poses were written to")
-    by_field = dict(zip(fields, rows.values.T, strict=True))
-    places = np.stack([by_field.get(axis, np.zeros(len(rows.times))) for axis in PLACE], axis=1)
+    by_field = dict(zip(fields, values.T, strict=True))
+    places = np.stack([by_field.get(axis, np.zeros(len(times))) for axis in PLACE], axis=1)
     _check_extent(table, columns, places)
-    headings, tilts = by_field.get("heading"), np.zeros(len(rows.times))
+    headings, tilts = by_field.get("heading"), np.zeros(len(times))
     if headings is None:
-        headings, tilts = headings_and_tilts(rows.values[:, -4:], str(table.path))
-    poses = Poses(rows.times, places, headings, tilts)
+        headings, tilts = headings_and_tilts(values[:, -4:], str(table.path))
+    poses = Poses(times, places, headings, tilts)
     drives = {}
-    for name in rows.names:
-        mine = rows.labels == name
+    for name in dict.fromkeys(map(str, labels)):
+        mine = labels == name
         if mine.sum() < 2:
             raise LogError(f"{_where(table, name)}: has a single pose; a drive needs two or more")
         drives[name] = poses.only(mine)
@@ -411,8 +391,8 @@ def poses_by_drive(table: Table, columns: Columns) -> dict[str, Poses]:
     return drives
 
 
-def _filled_rows(table: Table, columns: Columns, fields: Sequence[str]) -> Labelled:
-    """The rows in which some fields are given, all of them or none."""
+def _filled_rows(table: Table, columns: Columns, fields: Sequence[str]) -> tuple[Floats, Floats, NDArray[np.str_]]:
+    """Times, values (M, fields) and drives of the rows in which some fields are given, all of them or none."""
     if "time" not in columns:
         raise missing(table, ["time"])
     times = column_values(table, columns["time"])
@@ -424,7 +404,7 @@ def _filled_rows(table: Table, columns: Columns, fields: Sequence[str]) -> Label
             others = ", ".join(name for name in ("time", *fields) if name != field)
             raise table.error(row, columns[field].name, f"is empty beside {others}; fill it, or empty those too")
     labels = table.labels(columns["episode"].name) if "episode" in columns else np.full(len(times), "")
-    return Labelled(times[rows], values[rows], labels[rows])
+    return times[rows], values[rows], labels[rows]
 
 
 def _check_clock(times: Floats, where: str) -> None:

@@ -297,8 +297,14 @@ def _check_single(files: Sequence[Cells], rows: Sequence[Row]) -> None:
     places = ((cells, line) for cells in files for line in cells.lines)
     for (cells, line), row in zip(places, rows, strict=True):
         if row in known:
-            where = f", once in {known[row]}" if known[row] != cells.path else ""
-            raise ScoresError(f"{cells.path}: line {line}: {_duplicate(cells, row, where)}")
+            domain, agent, episode = row
+            where = f" in domain '{domain}'" if "domain" in cells.header else ""
+            where += f", once in {known[row]}" if known[row] != cells.path else ""
+            problem = f"agent '{agent}' has episode '{episode}' twice{where}; number the episodes"
+            if "episode" not in cells.header:
+                remedy = "add a column 'episode', or give its name: --columns episode=NAME"
+                problem = f"agent '{agent}' is there twice{where}; {remedy}"
+            raise ScoresError(f"{cells.path}: line {line}: {problem}")
         known[row] = cells.path
 
 
@@ -320,12 +326,3 @@ def write_scores(table: ScoreTable, path: Path) -> None:
             draft.write_text(text.getvalue(), encoding="utf-8", newline="")
     except OSError as problem:
         raise ScoresError(f"{path}: cannot be written ({problem.strerror})") from None
-
-
-def _duplicate(cells: Cells, row: Row, before: str) -> str:
-    domain, agent, episode = row
-    where = f" in domain '{domain}'{before}" if "domain" in cells.header else before
-    if "episode" in cells.header:
-        return f"agent '{agent}' has episode '{episode}' twice{where}; number the episodes"
-    remedy = "add a column 'episode', or give its name: --columns episode=NAME"
-    return f"agent '{agent}' is there twice{where}; {remedy}"

@@ -33,7 +33,6 @@ from proxytune.importing import (
     write_log,
 )
 from proxytune.logs import Log
-from proxytune.settings import GEOMETRY
 from proxytune.report import (
     FORMATS,
     ExportLine,
@@ -51,6 +50,7 @@ from proxytune.running import Bars, Silent
 from proxytune.scores import ScoreTable, write_scores
 from proxytune.search import History, write_optuna, write_skopt
 from proxytune.seeds import target_seed
+from proxytune.settings import GEOMETRY
 from proxytune.study import bare_family, measure_agents, read_study_settings
 
 TRIALS: Mapping[str, Callable[[History, Path], None]] = {"optuna": write_optuna, "skopt": write_skopt}

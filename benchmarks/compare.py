@@ -11,12 +11,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from calibrated import Calibrated
-from compare_report import compare_document, compare_figure, compare_lines, compare_page, compare_tables
+from compare_report import compare_document, compare_figure, compare_lines, compare_tables, compare_view
 from compared_engines import NAMES, engine_of, why_not
 from judgement import judging_code
 from problems import Analytic, Objective, Ranking
-from proxytune.report.page.foot import foot_of
-from proxytune.report.page.rendering import html_of
 from rich.console import Group
 from rich.text import Text
 from runs import EngineSummary, Run, RunKey, append_run, finished_run, read_runs, summarise
@@ -26,8 +24,7 @@ from proxytune.cli.main import add_shared_options, run_command
 from proxytune.cli.options import configure_cluster, on_its_cluster, study_folder
 from proxytune.cli.terminal import Answer
 from proxytune.errors import InputError, StoreError
-from proxytune.report import write_text
-from proxytune.report.writing import save
+from proxytune.report import foot_of, save_figure, table_text, write_page, write_text
 from proxytune.running import Bars, working
 from proxytune.search import ENGINE_NAMES as STUDY_ENGINES, Engine, engine_code
 from proxytune.storage import Store, locked
@@ -216,13 +213,13 @@ def _answer(
     command: str,
 ) -> Answer:
     budget, figure = grouped[0][0].key.budget, output / "compare.png"
-    save(compare_figure(grouped, objective.tolerance), figure)
+    save_figure(compare_figure(grouped, objective.tolerance), figure)
     document = compare_document(objective.name, summaries, budget, objective.tolerance)
     write_text(output / "compare.json", json.dumps(document, indent=2, allow_nan=False) + "\n")
     page, foot = output / "report.html", foot_of(command, [("budget", str(budget))])
-    write_text(page, html_of(compare_page(objective.name, summaries, budget, figure.read_bytes(), foot)))
+    write_page(page, compare_view(objective.name, summaries, budget, figure.read_bytes()), foot)
     lines = [*compare_lines(summaries), f"figure: {figure}", f"report: {page}"]
-    tables = compare_tables(objective.name, summaries, budget)
+    tables = map(table_text, compare_tables(objective.name, summaries, budget))
     return Answer(
         {**document, "figures": [str(figure)], "report": str(page)}, Group(*tables, *(Text(line) for line in lines))
     )

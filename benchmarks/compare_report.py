@@ -10,15 +10,26 @@ from compared_engines import ENGINES, engine_of
 from matplotlib.axes import Axes
 from matplotlib.colors import is_color_like
 from matplotlib.figure import Figure
-from proxytune.report.line_names import LineName, name_lines
-from proxytune.report.page.parts import Foot, Page, Picture, Table, Words
-from proxytune.report.page.tables import terminal_tables
-from proxytune.report.style import BLUE, COLUMN, GREEN, LIGHT_BLUE, ORANGE, PURPLE, VERMILLION, dress
-from rich import table as rich_table
-from rich.console import Group
 from runs import EngineSummary, Estimate, Region, Run, median_curve
 
 from proxytune.errors import InputError
+from proxytune.report import (
+    BLUE,
+    COLUMN,
+    GREEN,
+    LIGHT_BLUE,
+    ORANGE,
+    PURPLE,
+    VERMILLION,
+    LineName,
+    Paragraphs,
+    Picture,
+    Table,
+    View,
+    columns_of,
+    dress,
+    name_lines,
+)
 from proxytune.search import Look
 
 LINES = {"solid": "-", "dashed": (0, (4, 1.5)), "dotted": (0, (1, 1)), "dashdot": (0, (5, 1, 1, 1))}
@@ -53,8 +64,8 @@ def compare_document(name: str, summaries: Sequence[EngineSummary], budget: int,
     }
 
 
-def compare_tables(name: str, summaries: Sequence[EngineSummary], budget: int) -> list[rich_table.Table]:
-    """The comparison for the terminal, the first engine first: how good, how soon, and what is known of θ."""
+def compare_tables(name: str, summaries: Sequence[EngineSummary], budget: int) -> list[Table]:
+    """The comparison as tables, the first engine first: how good, how soon, and what is known of θ."""
     first = summaries[0]
     good = _table(
         f"{name}: the answer after {budget} evaluations, {first.seeds} seeds",
@@ -103,14 +114,8 @@ def _region(region: Region | None, seeds: int) -> tuple[str, ...]:
     return _of(region.covered, seeds), with_interval(region.share, ".1%"), held, _of(region.misfits, seeds)
 
 
-def _table(title: str, columns: Sequence[str], rows: Sequence[tuple[str, ...]]) -> rich_table.Table:
-    table = rich_table.Table(box=None, pad_edge=False, title=title, title_justify="left")
-    table.add_column("engine", overflow="fold")
-    for column in columns:
-        table.add_column(column, justify="right", overflow="fold")
-    for row in rows:
-        table.add_row(*row)
-    return table
+def _table(title: str, columns: Sequence[str], rows: Sequence[tuple[str, ...]]) -> Table:
+    return Table(title, columns_of(("engine",), columns), tuple(rows))
 
 
 def compare_lines(summaries: Sequence[EngineSummary]) -> list[str]:
@@ -211,7 +216,7 @@ def _range(engines: Sequence[Sequence[Run]], tolerance: float) -> tuple[float, f
     return low - 0.04 * (high - low) if low < 0.0 else 0.0, high + 0.04 * (high - low)
 
 
-def compare_page(name: str, summaries: Sequence[EngineSummary], budget: int, figure: bytes, foot: Foot) -> Page:
+def compare_view(name: str, summaries: Sequence[EngineSummary], budget: int, figure: bytes) -> View:
     """A comparison as a page: what the terminal shows, and the figure.
 
     Args:
@@ -219,14 +224,13 @@ def compare_page(name: str, summaries: Sequence[EngineSummary], budget: int, fig
         summaries: One per engine; the others are compared with the first.
         budget: Evaluations per run.
         figure: The PNG.
-        foot: The page's.
     """
     *verdicts, how = compare_lines(summaries)
     picture = Picture("How fast each engine comes near the optimum", figure, CAPTION)
-    tables = terminal_tables(Group(*compare_tables(name, summaries, budget)))
-    parts: list[Picture | Table | Words] = [picture, *tables, Words("How to read the tables", (f"{how}.",))]
+    tables = compare_tables(name, summaries, budget)
+    parts: list[Picture | Table | Paragraphs] = [picture, *tables, Paragraphs("How to read the tables", (f"{how}.",))]
     answer = _answer(summaries, verdicts, budget)
-    return Page(f"Search engines on {name}", answer, _next_step(summaries), tuple(parts), foot)
+    return View(f"Search engines on {name}", answer, _next_step(summaries), tuple(parts))
 
 
 def _answer(summaries: Sequence[EngineSummary], verdicts: Sequence[str], budget: int) -> str:

@@ -38,10 +38,16 @@ from .families import (
 from .figure_style import (
     BLUE as BLUE,
     COLUMN as COLUMN,
+    GREEN as GREEN,
     GREY as GREY,
+    LIGHT_BLUE as LIGHT_BLUE,
     LIGHT_GREY as LIGHT_GREY,
+    ORANGE as ORANGE,
+    PURPLE as PURPLE,
     VERMILLION as VERMILLION,
+    LineName as LineName,
     dress as dress,
+    name_lines as name_lines,
 )
 from .html import fragment_html as fragment_html, frame_html as frame_html, write_page as write_page
 from .plv_search import plv_document as plv_document, plv_text as plv_text, write_plv_report as write_plv_report

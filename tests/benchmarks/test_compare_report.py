@@ -12,19 +12,19 @@ from compare_report import (
     compare_document,
     compare_figure,
     compare_lines,
-    compare_page,
     compare_tables,
+    compare_view,
     looks_of,
     verdict,
 )
 from compared_engines import ENGINES, NAMES
 from judgement import Judgement, Reading
 from PIL import Image
-from proxytune.report.page.foot import foot_of
-from proxytune.report.page.rendering import html_of
 from rich.console import Console
 from runs import Estimate, Run, RunKey, summarise
 
+from proxytune.report import foot_of, table_text
+from proxytune.report.html import page_html
 from proxytune.search import Engine, Look
 from proxytune.search.engine import Sobol
 
@@ -92,7 +92,7 @@ def test_the_tables_tell_how_good_how_soon_and_what_is_known():
     text = io.StringIO()
     console = Console(file=text, width=160)
     for table in compare_tables("truths", [summarise(group, engines[0], 1.0) for group in engines], 2):
-        console.print(table)
+        console.print(table_text(table))
     told = text.getvalue()
     for expected in (
         "7.0 (5.0 to 9.0)",
@@ -136,24 +136,24 @@ def page_of(*grouped, tolerance=1.0):
     image = BytesIO()
     Image.fromarray(np.zeros((4, 4, 3), np.uint8)).save(image, format="png")
     summaries = [summarise(one, grouped[0], tolerance) for one in grouped]
-    return compare_page("<script>", summaries, 3, image.getvalue(), foot_of("compare"))
+    return compare_view("<script>", summaries, 3, image.getvalue())
 
 
 def test_the_answer_is_what_the_terminal_says_of_each_engine():
     page = page_of(GP, SOBOL)
-    assert page.answer.startswith("gp needs significantly fewer evaluations than sobol")
-    assert page.following == "keep gp."
-    assert 'set engine = "gp" in study.toml' in page_of(SOBOL, GP).following
+    assert page.sentence.startswith("gp needs significantly fewer evaluations than sobol")
+    assert page.next_step == "keep gp."
+    assert 'set engine = "gp" in study.toml' in page_of(SOBOL, GP).next_step
 
 
 def test_where_no_engine_reached_the_floor_nothing_is_said_of_which_is_sooner():
     page = page_of(SOBOL, runs("gp", [9.0, 9.0, 9.0], [8.0, 8.0, 8.0]))
-    assert page.answer.startswith("No engine reached the noise floor in 3 evaluations")
-    assert "significantly" not in page.answer
-    assert "raise --budget" in page.following
+    assert page.sentence.startswith("No engine reached the noise floor in 3 evaluations")
+    assert "significantly" not in page.sentence
+    assert "raise --budget" in page.next_step
 
 
 def test_names_are_not_taken_for_markup_and_every_table_is_there():
-    text = html_of(page_of(GP, SOBOL))
+    text = page_html(page_of(GP, SOBOL), foot_of("compare"))
     assert "<script" not in text
     assert text.count("<table>") == 2

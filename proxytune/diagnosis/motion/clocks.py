@@ -135,7 +135,11 @@ def read_clocks(log: Log, robot: Robot, like: Clocks | None = None) -> Clocks:
     latency = likeliest_latency(np.concatenate([part for e, part in enumerate(own) if e not in others]), latencies)
     assumed = like.left_s if like else max(robot.theta.get("delay", 0.0), ASSUMED_DELAY_S)
     unlike = like is not None and abs(latency.value - assumed) > max(LEAST_APART_S, SURE * latency.deviation)
-    taken = log.fit_clock_offset or unlike or (apart and _is_impossible(latency))
+    half = 1.96 * latency.deviation
+    early = latency.value + half < 0.0 and latency.value < -EARLIEST_S
+    # No delay accounts for such a latency.
+    impossible = early or latency.value - half > PARAMETERS["delay"].high
+    taken = log.fit_clock_offset or unlike or (apart and impossible)
     later = np.full(len(own), assumed - latency.value if taken else 0.0)
     for e, one in others.items():
         later[e] -= one.value - common
@@ -177,13 +181,6 @@ def _reach(drives: Drives) -> float:
 def _offset(latency: Latency, besides: float) -> Offset:
     middle, half = latency.value - besides, min(1.96 * latency.deviation, FURTHEST_S)
     return Offset(middle, (middle - half, middle + half))
-
-
-def _is_impossible(latency: Latency) -> bool:
-    """Tell whether no delay accounts for this latency."""
-    half = 1.96 * latency.deviation
-    early = latency.value + half < 0.0 and latency.value < -EARLIEST_S
-    return early or latency.value - half > PARAMETERS["delay"].high
 
 
 def _reaction(drives: Drives, speeds: Speeds) -> tuple[Reaction, bool]:
@@ -282,16 +279,11 @@ def _piece(episode: LogEpisode, begin: int, stop: int) -> LogEpisode:
         issued, commands = issued[chosen], episode.commands[chosen]
     wheels: Floats | None = None if episode.wheels is None else episode.wheels[begin:stop]
     name = f"{episode.name} from {times[0]:.0f} s"
-    poses, measured = episode.poses[begin:stop], _cut(episode.measured, begin, stop)
-    return LogEpisode(name, times, commands, poses, wheels, issued, measured)
-
-
-def _cut(measured: Measured | None, begin: int, stop: int) -> Measured | None:
-    """The poses at times of their own whose nearest rows are kept."""
-    if measured is None:
-        return None
-    own = (measured.rows >= begin) & (measured.rows < stop)
-    return Measured(measured.times[own], measured.poses[own], measured.rows[own] - begin)
+    measured = episode.measured
+    if measured is not None:
+        own = (measured.rows >= begin) & (measured.rows < stop)
+        measured = Measured(measured.times[own], measured.poses[own], measured.rows[own] - begin)
+    return LogEpisode(name, times, commands, episode.poses[begin:stop], wheels, issued, measured)
 
 
 MOST = 6000

@@ -209,7 +209,12 @@ def choose_groups(given: Sums, groups: Mapping[str, Whole], rules: Rules) -> Cho
     (losses,) = _held_out_losses(given, *_penalise(groups, [pulls], mean))
     while True:
         tried = {name: _try_group(given, groups, pulls, name, mean) for name in groups if name not in pulls}
-        paying = {name: found for name, found in tried.items() if _pays(losses, found[1], rules)}
+        paying = {}
+        for name, found in tried.items():
+            gain = losses - found[1]
+            spread = float(gain.std(ddof=1)) * np.sqrt(len(gain))
+            if gain.sum() > rules.group_share * losses.sum() and gain.sum() > rules.group_t * spread:
+                paying[name] = found
         if not paying:
             break
         best = min(paying, key=lambda name: float(paying[name][1].sum()))
@@ -235,12 +240,6 @@ def _try_group(
         if worse.sum() <= np.sqrt(len(worse)) * worse.std(ddof=1):
             return ridge, losses
     return ridges[-1], found[-1]
-
-
-def _pays(before: Floats, after: Floats, rules: Rules) -> bool:
-    gain = before - after
-    spread = float(gain.std(ddof=1)) * np.sqrt(len(gain))
-    return bool(gain.sum() > rules.group_share * before.sum() and gain.sum() > rules.group_t * spread)
 
 
 def _penalise(

@@ -284,13 +284,13 @@ def measured_paths(drives: Drives, theta: Theta, poses: Floats) -> Floats:
 
 def increments(drives: Drives, theta: Theta) -> Floats:
     """The motion between the measured poses (N, 3): forward, left [m], turn [rad], in the body frame; read only."""
-    return drives.replays.get(tuple(theta.items()), lambda: _increments(drives, theta))
 
+    def make() -> Floats:
+        made = increments_along(drives, paths(drives, theta))
+        made.setflags(write=False)
+        return made
 
-def _increments(drives: Drives, theta: Theta) -> Floats:
-    made = increments_along(drives, paths(drives, theta))
-    made.setflags(write=False)
-    return made
+    return drives.replays.get(tuple(theta.items()), make)
 
 
 def increments_along(drives: Drives, walked: Floats) -> Floats:

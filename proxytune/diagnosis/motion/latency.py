@@ -305,7 +305,8 @@ def stretches(log: Log, blocks: Blocks, latencies: Floats) -> tuple[list[tuple[f
     """The longest stretch of each drive without a jump of its clock [s after its beginning], and all jumps."""
     kept: list[tuple[float, float]] = []
     jumps: list[Jump] = []
-    usual = _usual([blocks.squares[blocks.episode == e] for e in range(len(log.episodes))], latencies)
+    judged = _judged([blocks.squares[blocks.episode == e] for e in range(len(log.episodes))], latencies)
+    usual = _median(list(judged.values())) if len(judged) > 1 else None
     for e, episode in enumerate(log.episodes):
         own = np.flatnonzero(blocks.episode == e)
         found = _all_jumps(blocks.squares[own], latencies, usual)
@@ -403,12 +404,6 @@ def _judged(own: Sequence[Floats], latencies: Floats) -> dict[int, Latency]:
     """The latency of every drive that is long enough to have one."""
     judged = {e: likeliest_latency(squares, latencies) for e, squares in enumerate(own) if len(squares) >= 2 * SIDE}
     return {e: one for e, one in judged.items() if np.isfinite(one.deviation)}
-
-
-def _usual(own: Sequence[Floats], latencies: Floats) -> float | None:
-    """The latency that most drives have [s], if there are two at least."""
-    judged = list(_judged(own, latencies).values())
-    return _median(judged) if len(judged) > 1 else None
 
 
 def _median(latencies: Sequence[Latency]) -> float:

@@ -429,60 +429,41 @@ def slopes_of(drives: Drives, theta: Theta, offered: Learnt) -> Slopes:
     measured = measured_motion(drives, windows)
     way = float(np.median(np.hypot(measured[:, 0], measured[:, 1])))
     features = window_features(drives, named, offered, begin, length)
-    lever = _lever(twists, walked, 1.0 / drives.tick_hz)
-    parts = [_pose_slopes(lever, basis, unit, (window, tick - 1)) for basis, unit in features]
-    turn = walked[window, 0, 2]
-    columns = _turn_frames(np.concatenate(parts, axis=-1), -turn)
+    changes = _pose_slopes(twists, walked, features, (window, tick - 1), 1.0 / drives.tick_hz)
+    # Seen from the frame in which each window's tracked place begins.
+    cosine, sine = (part[:, None] for part in cosine_and_sine(-walked[window, 0, 2]))
+    x = cosine * changes[:, 0] - sine * changes[:, 1]
+    y = sine * changes[:, 0] + cosine * changes[:, 1]
+    columns = np.stack((x, y, changes[:, 2]), axis=1)
     scale = np.array((1.0, 1.0, way))
     return Slopes((measured - predicted) * scale, columns * scale[:, None], drives.block[begin[window]])
 
 
-class _Lever(NamedTuple):
-    """The effect of a twist in one tick on the places that come after, as complex numbers (W, length).
+def _pose_slopes(
+    twists: Floats, walked: Floats, features: Sequence[tuple[Floats, Floats]], at: tuple[Whole, Whole], tick_s: float
+) -> Floats:
+    """Change of compared poses (M, 3, weights) per weight of the curves, to first order; places as complex numbers.
 
-    Attributes:
-        along: The way of forward motion at 1 m/s within the tick [m].
-        about: How far a turn at 1 rad/s within the tick moves places, less what the next says [m].
-        after: How far a turn by 1 rad moves the tracked place after the tick, seen from the origin [m].
+    Args:
+        twists: Those of the windows (W, length, 3).
+        walked: The tracked places along them (W, length + 1, 3).
+        features: What each weight of a curve adds in each tick (W, length, knots), and its unit, a twist (3,).
+        at: Window and tick after which each pose is compared, (M,) each.
         tick_s: Length of a tick [s].
     """
-
-    along: Floats
-    about: Floats
-    after: Floats
-    tick_s: float
-
-
-def _lever(twists: Floats, walked: Floats, tick_s: float) -> _Lever:
-    """The lever of twists (W, length, 3), along which the tracked places (W, length + 1, 3) are."""
     poses = integrate_twists(twists, tick_s)
     cosine, sine = cosine_and_sine(poses[:, 1:, 2] - twists[..., 2] * (tick_s / 2.0))
     axle = 0.5 * (poses[:, 1:] + poses[:, :-1])
-    about = (axle[..., 1] - 1j * axle[..., 0]) * tick_s
-    return _Lever((cosine + 1j * sine) * tick_s, about, 1j * walked[:, 1:, 0] - walked[:, 1:, 1], tick_s)
-
-
-def _pose_slopes(lever: _Lever, basis: Floats, unit: Floats, at: tuple[Whole, Whole]) -> Floats:
-    """Change of compared poses (M, 3, knots) per weight of a curve, to first order.
-
-    Args:
-        lever: That of the windows.
-        basis: What each weight adds in each tick (W, length, knots), in this unit.
-        unit: The unit, a twist (3,).
-        at: Window and tick after which each pose is compared, (M,) each.
-    """
-    place = (unit[0] + 1j * unit[1]) * lever.along + unit[2] * lever.about
-    turned = np.cumsum(basis, axis=1)[at] * (unit[2] * lever.tick_s)
-    moved = np.cumsum(place[..., None] * basis, axis=1)[at] + lever.after[at][:, None] * turned
-    return np.stack((moved.real, moved.imag, turned), axis=1)
-
-
-def _turn_frames(changes: Floats, angle: Floats) -> Floats:
-    """Changes of poses (M, 3, knots) seen from frames turned by minus an angle (M,)."""
-    cosine, sine = (part[:, None] for part in cosine_and_sine(angle))
-    x = cosine * changes[:, 0] - sine * changes[:, 1]
-    y = sine * changes[:, 0] + cosine * changes[:, 1]
-    return np.stack((x, y, changes[:, 2]), axis=1)
+    # The way of 1 m/s within a tick; how far a turn of 1 rad/s in it moves places, less what a turn after it moves.
+    along, about = (cosine + 1j * sine) * tick_s, (axle[..., 1] - 1j * axle[..., 0]) * tick_s
+    after = 1j * walked[:, 1:, 0] - walked[:, 1:, 1]
+    parts = []
+    for basis, unit in features:
+        place = (unit[0] + 1j * unit[1]) * along + unit[2] * about
+        turned = np.cumsum(basis, axis=1)[at] * (unit[2] * tick_s)
+        moved = np.cumsum(place[..., None] * basis, axis=1)[at] + after[at][:, None] * turned
+        parts.append(np.stack((moved.real, moved.imag, turned), axis=1))
+    return np.concatenate(parts, axis=-1)
 
 
 FEWEST = 20

@@ -153,7 +153,12 @@ def with_dense_probes(base: Fit, forms: Sequence[Candidate]) -> list[Candidate]:
     answer = np.linalg.pinv(part.slopes.T @ weighted, hermitian=True) @ weighted.T
     for form in dense:
         trace = kinds[form.effect]
-        offers = _sizes(form, robot) if trace is not None and trace.stepwise else _places(part.drives, form)
+        if trace is not None and trace.stepwise:
+            high = span(form.free[0], robot)[1]
+            sizes = np.geomspace(SMALLEST_SHARE * high, high, SIZES).tolist()
+            offers = [(size, *form.neutral[1:]) for size in sizes]
+        else:
+            offers = _places(part.drives, form)
         gains = []
         for values in offers:
             theta = theta_at({**part.theta, **form.fixed}, form.free, np.array(values))
@@ -164,12 +169,6 @@ def with_dense_probes(base: Fit, forms: Sequence[Candidate]) -> list[Candidate]:
             gains.append(-step * gradient - 0.5 * step**2 * hessian)
         best[form.effect] = (offers[int(np.argmax(gains))],) if gains and max(gains) > 0.0 else ()
     return [replace(form, probes=(*form.probes, *best.get(form.effect, ()))) for form in forms]
-
-
-def _sizes(form: Candidate, robot: Robot) -> list[tuple[float, ...]]:
-    """Sizes of a step, its other coordinates where the model has them."""
-    high = span(form.free[0], robot)[1]
-    return [(size, *form.neutral[1:]) for size in np.geomspace(SMALLEST_SHARE * high, high, SIZES).tolist()]
 
 
 def _places(drives: Drives, form: Candidate) -> list[tuple[float, ...]]:

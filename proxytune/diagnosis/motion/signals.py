@@ -239,17 +239,16 @@ def _heading(motion: _Motion) -> _Signal:
 
 def _position(motion: _Motion) -> _Signal:
     places = motion.drives.places
-    columns = np.concatenate([_patches(places[..., axis]) for axis in range(2)], axis=-1)
+    parts = []
+    for signal in (places[..., 0], places[..., 1]):
+        # Hats a patch apart over the whole range of the coordinate, the first left out.
+        low, high = float(signal.min()), float(signal.max())
+        corners = np.linspace(low, high, int(np.clip(np.ceil((high - low) / PATCH_M), 1, MOST_PATCHES)) + 1)
+        parts.append(np.stack([np.interp(signal, corners, row) for row in np.eye(len(corners))[1:]], axis=-1))
+    columns = np.concatenate(parts, axis=-1)
     forward, yaw = columns * motion.forward[..., None], columns * motion.yaw[..., None]
     twists = _twists(forward, yaw=np.concatenate((yaw, columns * np.abs(motion.forward)[..., None]), axis=-1))
     return _Signal(Cue.POSITION, places[..., 0], "m", twists)
-
-
-def _patches(signal: Floats) -> Floats:
-    """Hats a patch apart over the whole range of a coordinate [m], the first left out (…, columns)."""
-    low, high = float(signal.min()), float(signal.max())
-    corners = np.linspace(low, high, int(np.clip(np.ceil((high - low) / PATCH_M), 1, MOST_PATCHES)) + 1)
-    return np.stack([np.interp(signal, corners, row) for row in np.eye(len(corners))[1:]], axis=-1)
 
 
 def _wheel_angle(motion: _Motion, side: int, name: Cue) -> _Signal:

@@ -53,7 +53,7 @@ FOOT = 0.15
 """An edge ends where it is less steep than this share of its steepest."""
 
 FAINT = 0.35
-"""MovingEdges that the model draws with less than this share of the measured steepness are not the same ones."""
+"""Edges that the model draws with less than this share of the measured steepness are not the same ones."""
 
 MOST = 12000
 """Edge points that are enough."""
@@ -71,7 +71,7 @@ ROUGH = 0.06
 """What widths of profiles half a pixel apart are wrong by, besides their scatter [pixel²]."""
 
 SLOW = 5.0
-"""MovingEdges that all move alike to this tell nothing of blur [pixel/s]."""
+"""Edges that all move alike to this tell nothing of blur [pixel/s]."""
 
 WIDEST = (0.06, 0.01)
 """Intervals of blur [s] and defocus that still tell something."""
@@ -306,7 +306,7 @@ def _variance(values: Floats) -> float:
 
 
 SHARP_PX = 2.0
-"""MovingEdges that lie farther from the map's are not those that the model draws."""
+"""Edges that lie farther from the map's are not those that the model draws."""
 
 HORIZON_ROWS = 3
 """So many rows beneath the horizon are left out: what a pixel covers there is a metre long."""
@@ -357,18 +357,25 @@ NARROW = 0.12
 
 def look_at(gathered: Gathered, fit: CameraFit) -> Appearance:
     """Fit the look of a log's pictures to a fitted camera's."""
-    every = np.arange(fit.views.count)
-    drawn = draw_pictures(fit.views, fit.state, {}, every)
-    floor = floor_pixels(fit)
-    light = fit_light(gathered.pictures, drawn, floor, gathered.frames.fixed_exposure)
-    sharpness = fit_sharpness(
-        gathered.pictures,
-        _sharp_edges(fit),
-        lambda blur, defocus: light.shine(draw_pictures(fit.views, fit.state, _soft(blur, defocus), every)),
-    )
-    grain = fit_grain(gathered.pictures, drawn, floor)
-    soft = draw_pictures(fit.views, fit.state, _soft(sharpness.blur.value, sharpness.defocus.value), every)
-    return Appearance(light, grain, sharpness, find_blemishes(gathered.pictures, soft, floor, light))
+    views, state, pictures = fit.views, fit.state, gathered.pictures
+    every = np.arange(views.count)
+
+    def soft(blur_s: float, defocus: float) -> NDArray[Any]:
+        values = {BLUR: blur_s, "defocus": defocus}
+        theta = {name: PARAMETERS[name].clipped(float(value)) for name, value in values.items()}
+        return draw_pictures(views, state, theta, every)
+
+    drawn, floor = draw_pictures(views, state, {}, every), floor_pixels(fit)
+    light = fit_light(pictures, drawn, floor, gathered.frames.fixed_exposure)
+    there, edges = project(views, state), views.edges
+    same = there.valid & (np.abs(there.residual) < SHARP_PX)
+    speed = np.abs((pose_slopes(there) * there.rates).sum(axis=1))
+    place = np.stack((edges.column, edges.row), axis=-1)
+    moving = MovingEdges(edges.frame[same], place[same], edges.normal[same], speed[same])
+    sharpness = fit_sharpness(pictures, moving, lambda blur, defocus: light.shine(soft(blur, defocus)))
+    blurred = soft(sharpness.blur.value, sharpness.defocus.value)
+    grain, blemishes = fit_grain(pictures, drawn, floor), find_blemishes(pictures, blurred, floor, light)
+    return Appearance(light, grain, sharpness, blemishes)
 
 
 def floor_pixels(fit: CameraFit) -> NDArray[np.bool_]:
@@ -385,32 +392,15 @@ def changes(look: Appearance) -> tuple[str, ...]:
     Exposure is told where every paint says the same of it: else the paint may be another than the map declares. Noise
     is told by its size: no floor's texture is so strong everywhere.
     """
-    names = [name for name in look.figures if _matters(name, look.figures[name])]
-    exposure = [name for name in look.figures if name.startswith("exposure.")]
-    intervals = [look.figures[name].interval for name in exposure]
-    if any((high - low) / 2.0 > NARROW for low, high in intervals):
+    names = []
+    for name, figure in look.figures.items():
+        parameter, (low, high) = PARAMETERS[name], figure.interval
+        neutral = parameter.neutral_value({})
+        sure = name == NOISE or not low <= neutral <= high
+        possible = parameter.low <= figure.value <= parameter.high
+        if sure and possible and abs(figure.value - neutral) >= LEAST[name]:
+            names.append(name)
+    exposure = {name: one.interval for name, one in look.figures.items() if name.startswith("exposure.")}
+    if any((high - low) / 2.0 > NARROW for low, high in exposure.values()):
         names = [name for name in names if name not in exposure]
     return tuple(dict.fromkeys(effect_of(name) for name in names))
-
-
-def _matters(name: str, figure: Fitted) -> bool:
-    """Tell whether a figure differs from its neutral value beyond doubt, by enough, and to where a camera's can be."""
-    parameter, (low, high) = PARAMETERS[name], figure.interval
-    neutral = parameter.neutral_value({})
-    sure = name == NOISE or not low <= neutral <= high
-    possible = parameter.low <= figure.value <= parameter.high
-    return sure and possible and abs(figure.value - neutral) >= LEAST[name]
-
-
-def _soft(blur_s: float, defocus: float) -> dict[str, float]:
-    values = {BLUR: blur_s, "defocus": defocus}
-    return {name: PARAMETERS[name].clipped(float(value)) for name, value in values.items()}
-
-
-def _sharp_edges(fit: CameraFit) -> MovingEdges:
-    """The edges that the model has too, with how fast each moves through the picture."""
-    there, edges = project(fit.views, fit.state), fit.views.edges
-    speed = (pose_slopes(there) * there.rates).sum(axis=1)
-    same = there.valid & (np.abs(there.residual) < SHARP_PX)
-    place = np.stack((edges.column, edges.row), axis=-1)
-    return MovingEdges(edges.frame[same], place[same], edges.normal[same], np.abs(speed[same]))

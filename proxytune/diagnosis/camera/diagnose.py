@@ -5,7 +5,7 @@ well, their size on frames kept aside, and how the pictures look. `conclude` giv
 how the map was laid, as the fit has it.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -22,7 +22,6 @@ from proxytune.diagnosis.camera.error import (
     Weighed,
     compare_brightness,
     estimate_of,
-    interval_of,
     weigh_effects,
 )
 from proxytune.diagnosis.camera.fitting import CameraFit
@@ -41,7 +40,7 @@ from proxytune.diagnosis.camera.selection import (
 from proxytune.driving import LINES, Robot
 from proxytune.effects import DECLARED, PARAMETERS, Catalogue, Stage, effect_of
 from proxytune.errors import LogError
-from proxytune.logs import Frames, Log
+from proxytune.logs import Log
 
 SURE = 3.0
 """A line is told to lie beside its place from so many standard deviations on."""
@@ -55,20 +54,17 @@ def describe_map(fit: CameraFit) -> LaidMap:
     offsets = zip(("x_m", "y_m", "heading_deg"), fit.state.offset * degrees, fit.offset_sd * degrees, strict=True)
     offset = {name: estimate_of(value, sd, name.rpartition("_")[-1]) for name, value, sd in offsets}
     stretches = fit.views.markings.stretches
-    first = Tape(stretches).size - len(WIDTHS)
-    widths = zip(WIDTHS, fit.state.tape[first:], fit.tape_sd[first:], strict=True)
-    return LaidMap(offset, _lines(fit, stretches), {name: estimate_of(value, sd, "m") for name, value, sd in widths})
-
-
-def _lines(fit: CameraFit, stretches: int) -> tuple[LaidLine, ...]:
     tape, lines = Tape(stretches), []
+    first = tape.size - len(WIDTHS)
+    widths = zip(WIDTHS, fit.state.tape[first:], fit.tape_sd[first:], strict=True)
     for stretch in range(stretches):
         for number, name in enumerate(LINES):
             place = tape.shift(np.array(stretch), np.array(number))
             value, sd = float(fit.state.tape[place]), float(fit.tape_sd[place])
             if abs(value) > SURE * sd:
-                lines.append(LaidLine(name, stretch, value, interval_of(value, sd)))
-    return tuple(sorted(lines, key=lambda line: -abs(line.right_m)))
+                lines.append(LaidLine(name, stretch, value, estimate_of(value, sd, "m").interval))
+    lines.sort(key=lambda line: -abs(line.right_m))
+    return LaidMap(offset, tuple(lines), {name: estimate_of(value, sd, "m") for name, value, sd in widths})
 
 
 def conclude(
@@ -140,18 +136,13 @@ def _compare_look(
     changed = tuple(effect for effect in changes(look) if effect not in declared)
     looks = (look_values(look, tuned), look_values(look, (*tuned, *_names(look, changed))))
     grey, ratios = compare_brightness(gathered, named, looks, seed)
-    added = (effect for effect in changed if effect != "exposure" or ratios[effect] >= MATERIAL)
-    texture = {} if look.grain.noise.identified else {"image_noise": ("texture of the floor",)}
-    return grey, tuple(
-        CameraEffect(
-            effect,
-            _names(look, (effect,)),
-            None,
-            ratios[effect] if effect != "image_noise" else None,
-            texture.get(effect, ()),
-        )
-        for effect in added
-    )
+    texture = () if look.grain.noise.identified else ("texture of the floor",)
+    added = []
+    for effect in changed:
+        if effect != "exposure" or ratios[effect] >= MATERIAL:
+            size, rivals = (None, texture) if effect == "image_noise" else (ratios[effect], ())
+            added.append(CameraEffect(effect, _names(look, (effect,)), None, size, rivals))
+    return grey, tuple(added)
 
 
 def look_values(look: Appearance, names: Sequence[str]) -> dict[str, float]:
@@ -219,23 +210,17 @@ def diagnose_camera(
     report("reading frames")
     gathered = gather_views(log, log.frames, robot)
     report("fitting the camera")
-    names, fixed = _parameters(gathered, log.frames)
+    views, readout_s = gathered.views, log.frames.readout_s
+    fixed = {} if readout_s is None else {READOUT: readout_s}
+    names = [name for name in views.optics.mounting if not (log.frames.rectified and name == DISTORTION)]
+    names += [name for name in MOVING if views.tracks.moving and name not in fixed]
     unknown = log.frames.position_m is None or log.frames.heading_deg is None
-    full = fit_everything(gathered.views, names, fixed, learn_scatter=unknown)
+    full = fit_everything(views, names, fixed, learn_scatter=unknown)
     notes = check_match(log.name, full)
     report("looking for what the camera lacks")
-    named = select_camera_effects(full, [effect for effect in declared if effect in effects_of(names)])
+    named = select_camera_effects(full, [effect for effect in declared if effect in effects_of(tuple(names))])
     report("testing on frames kept aside")
     weighed = weigh_effects(named, seed)
     report("looking at brightness and sharpness")
     look = look_at(gathered, weighed.named.model)
     return conclude(gathered, weighed, look, tuple(declared), (*gathered.notes, *notes), seed)
-
-
-def _parameters(gathered: Gathered, frames: Frames) -> tuple[tuple[str, ...], Mapping[str, float]]:
-    """Parameters of the camera that may differ from neutral, and values that the log states."""
-    views = gathered.views
-    names = [name for name in views.optics.mounting if not (frames.rectified and name == DISTORTION)]
-    fixed = {} if frames.readout_s is None else {READOUT: frames.readout_s}
-    names += [name for name in MOVING if views.tracks.moving and name not in fixed]
-    return tuple(names), fixed

@@ -66,25 +66,23 @@ class Edges(NamedTuple):
 def find_edges(pictures: NDArray[np.uint8]) -> Edges:
     """Find the edges of markings in pictures (N, rows, columns, 3), red, green, blue; sorted by picture."""
     maps = [_colour_maps(picture) for picture in pictures]
-    parts = [_edges_of(number, white, one) for number, pair in enumerate(maps) for white, one in pair]
+    parts = [_edges_of(number, white, pair[not white]) for number, pair in enumerate(maps) for white in (True, False)]
     return Edges._make(np.concatenate(field) for field in zip(*parts, strict=True))
 
 
-def _colour_maps(picture: NDArray[np.uint8]) -> tuple[tuple[bool, Floats], tuple[bool, Floats]]:
+def _colour_maps(picture: NDArray[np.uint8]) -> tuple[Floats, Floats]:
     """Whiteness and yellowness of each pixel, from 0 to 1; NaN where there is sky."""
     colours = picture.astype(np.float32)
     red, green, blue = colours[..., 0], colours[..., 1], colours[..., 2]
     sky = binary_dilation(blue > red + SKY, iterations=SKY_MARGIN)
     least = colours.min(axis=-1)
-    ground = ~sky
-    if not ground.any():
-        ground = np.ones_like(sky)
+    ground = np.ones_like(sky) if sky.all() else ~sky
     dark = float(np.median(colours[ground].mean(axis=-1)))
     span = max(float(np.percentile(least[ground], 99.0)) - dark, 1.0)
     # No upper end: where a bright marking is clipped, its edges move outwards
     white = np.maximum((least - dark) / span, 0.0)
     yellow = np.maximum((np.minimum(red, green) - blue) / (YELLOW * span), 0.0)
-    return (True, np.where(sky, np.nan, white)), (False, np.where(sky, np.nan, yellow))
+    return np.where(sky, np.nan, white), np.where(sky, np.nan, yellow)
 
 
 def _edges_of(number: int, white: bool, share: Floats) -> Edges:
@@ -431,8 +429,9 @@ def gather_views(log: Log, frames: Frames, robot: Robot) -> Gathered:
         raise LogError(f"{log.name}: frames: {problem}: drive nearer to the lines, or check the map")
     edges = edges.only(np.arange(len(edges.row)) % EVERY == 0)
     optics = Optics(robot, *pictures.shape[1:3])
-    position_m = tracks.share * _stated(frames.position_m, ASSUMED_M)
-    heading_rad = tracks.share * np.radians(_stated(frames.heading_deg, ASSUMED_DEG))
+    position_m = tracks.share * (ASSUMED_M if frames.position_m is None else frames.position_m)
+    heading_deg = ASSUMED_DEG if frames.heading_deg is None else frames.heading_deg
+    heading_rad = tracks.share * np.radians(heading_deg)
     views = Views(edges, tracks, Markings(road), optics, position_m, float(heading_rad), road.paint.tape_m)
     count, every = len(numbers), len(frames.paths)
     notes = [f"{count} of {every} frames are used, evenly spread: more tell no more"] if count < every else []
@@ -455,7 +454,3 @@ def in_rgb(pictures: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], bool]:
     yellow, cyan = ((np.minimum(green, one) - other > COLOURED).mean() for one, other in ((red, blue), (blue, red)))
     swapped = bool(cyan > LEAST_COLOURED and cyan > FAR_MORE * yellow)
     return (np.ascontiguousarray(pictures[..., ::-1]) if swapped else pictures), swapped
-
-
-def _stated(value: float | None, otherwise: float) -> float:
-    return otherwise if value is None else value

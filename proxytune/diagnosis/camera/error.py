@@ -7,7 +7,6 @@ it; `weigh_effects` drops effects whose size is below MATERIAL. `CameraDiagnosis
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -213,24 +212,13 @@ class CameraDiagnosis:
     gathered: Gathered
 
 
-def interval_of(value: float, sd: float) -> tuple[float, float]:
-    """The 95 % interval of a value with this standard deviation."""
-    return float(value - TWO_SIDED * sd), float(value + TWO_SIDED * sd)
-
-
 def estimate_of(value: float, sd: float, unit: str) -> Estimate:
-    """A value with this standard deviation as an estimate."""
-    return Estimate(float(value), interval_of(value, sd), unit)
+    """A value with this standard deviation as an estimate with its 95 % interval."""
+    return Estimate(float(value), (float(value - TWO_SIDED * sd), float(value + TWO_SIDED * sd)), unit)
 
 
 Look = Mapping[str, float]
 """Values of effects on pictures, by name in θ."""
-
-
-def displacement_ratio(views: Views, residuals: tuple[Floats, Floats], seed: int) -> float:
-    """The error without an effect over the error with it, from residuals of both on unseen frames (n,) [pixel]."""
-    without, with_it = pixel_errors(views, residuals, seed)
-    return without.value / max(with_it.value, 1e-9)
 
 
 def compare_brightness(
@@ -315,33 +303,28 @@ class Weighed:
     dropped: tuple[str, ...]
 
 
-class _Tested(NamedTuple):
-    """A fit with its residuals on frames that it is not made from (n,) [pixel]."""
-
-    fit: CameraFit
-    residuals: Floats
-
-
 def weigh_effects(named: CameraSelection, seed: int) -> Weighed:
     """Weigh every effect that was named, and fit the camera again without those of no matter."""
+
+    def tested(fit: CameraFit) -> tuple[CameraFit, Floats]:
+        return fit, unseen_residuals(fit.views, fit.state, fit.names)
+
+    def without(effects: Sequence[str]) -> tuple[CameraFit, Floats]:
+        return tested(fit_set(named.full, [one for one in effects_of(named.model.names) if one not in effects]))
+
     views, cost = named.full.views, cost_of(named.model)
-    declared, model, full = (_test(fit) for fit in (named.declared, named.model, named.full))
-    without = {effect: _test(_fit_without(named, (effect,))) for effect in named.effects}
-    nats = {effect: cost_of(one.fit) - cost for effect, one in without.items()}
-    pairs = {effect: (one.residuals, model.residuals) for effect, one in without.items()}
-    ratios = {effect: displacement_ratio(views, pair, seed) for effect, pair in pairs.items()}
+    model, residuals = tested(named.model)
+    others = {effect: without((effect,)) for effect in named.effects}
+    nats = {effect: cost_of(fit) - cost for effect, (fit, _) in others.items()}
+    ratios = {}
+    for effect, (_, left) in others.items():
+        lacking, complete = pixel_errors(views, (left, residuals), seed)
+        ratios[effect] = lacking.value / max(complete.value, 1e-9)
     dropped = tuple(effect for effect in named.effects if ratios[effect] < MATERIAL)
     kept = tuple(effect for effect in named.effects if effect not in dropped)
     if dropped:
-        model = without[dropped[0]] if len(dropped) == 1 else _test(_fit_without(named, dropped))
-    before, after, floor = pixel_errors(views, (declared.residuals, model.residuals, full.residuals), seed)
+        model, residuals = others[dropped[0]] if len(dropped) == 1 else without(dropped)
+    declared, full = tested(named.declared)[1], tested(named.full)[1]
+    before, after, floor = pixel_errors(views, (declared, residuals, full), seed)
     pixels = Comparison(before, after, floor if floor.value < after.value else after, "px")
-    return Weighed(replace(named, model=model.fit, effects=kept), named.model, pixels, ratios, nats, dropped)
-
-
-def _test(fit: CameraFit) -> _Tested:
-    return _Tested(fit, unseen_residuals(fit.views, fit.state, fit.names))
-
-
-def _fit_without(named: CameraSelection, effects: Sequence[str]) -> CameraFit:
-    return fit_set(named.full, [one for one in effects_of(named.model.names) if one not in effects])
+    return Weighed(replace(named, model=model, effects=kept), named.model, pixels, ratios, nats, dropped)

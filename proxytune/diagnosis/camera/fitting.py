@@ -7,7 +7,7 @@ A − B C⁻¹ Bᵀ (`Normal.marginal`, `eliminate`). What fits add to tracked p
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -127,7 +127,15 @@ class Normal(NamedTuple):
         weighted = self.columns * self.weight[:, None]
         matrix, right = weighted.T @ self.columns, weighted.T @ self.residual
         count = len(corrections)
-        blocks, cross, pulls = self._by_frame(frame, count)
+        first = np.searchsorted(frame, np.arange(count + 1))
+        # Each pose's block, its part with the common columns, and its right side
+        blocks, cross = np.zeros((count, 3, 3)), np.zeros((count, 3, self.columns.shape[1]))
+        pulls = np.zeros((count, 3))
+        for number in range(count):
+            own = slice(first[number], first[number + 1])
+            slopes = self.poses[own] * self.weight[own, None]
+            blocks[number], cross[number] = slopes.T @ self.poses[own], slopes.T @ self.columns[own]
+            pulls[number] = slopes.T @ self.residual[own]
         blocks[:, (0, 1, 2), (0, 1, 2)] += 1.0 / scatter**2
         pulls += corrections / scatter**2
         inverse = np.asarray(np.linalg.inv(blocks), dtype=float)
@@ -137,18 +145,6 @@ class Normal(NamedTuple):
         matrix -= flat.T @ coupling.reshape(3 * count, self.columns.shape[1])
         right -= flat.T @ own_step.ravel()
         return Marginal(matrix, right, inverse, coupling, own_step)
-
-    def _by_frame(self, frame: NDArray[np.intp], count: int) -> tuple[Floats, Floats, Floats]:
-        """Each pose's block (count, 3, 3), its part with the common columns (count, 3, columns) and right side."""
-        first = np.searchsorted(frame, np.arange(count + 1))
-        blocks, cross = np.zeros((count, 3, 3)), np.zeros((count, 3, self.columns.shape[1]))
-        pulls = np.zeros((count, 3))
-        for number in range(count):
-            own = slice(first[number], first[number + 1])
-            slopes = self.poses[own] * self.weight[own, None]
-            blocks[number], cross[number] = slopes.T @ self.poses[own], slopes.T @ self.columns[own]
-            pulls[number] = slopes.T @ self.residual[own]
-        return blocks, cross, pulls
 
 
 SCALE_PX = 1.0
@@ -191,15 +187,6 @@ class CameraFit:
         return np.sqrt(np.diag(np.linalg.inv(self.information + np.diag(_precisions(self.views, self.names)))))
 
 
-class _Step(NamedTuple):
-    """A linear step with all that it came from: the columns are camera, map, tape."""
-
-    common: Floats
-    poses: Floats
-    matrix: Floats
-    pose_sd: Floats
-
-
 def fit_camera(
     views: Views,
     state: State,
@@ -216,24 +203,29 @@ def fit_camera(
         scales_px: The loss' scale in each step, large ones first where the beginning is far off [pixel].
         frames: Which frames count (N,); all if not given.
     """
-    names = tuple(names)
+    names, first, optics = tuple(names), len(names), views.optics
+    camera_precision = _precisions(views, names)
+    precision = np.concatenate((camera_precision, MAP_SCATTER**-2.0, views.tape_scatter**-2.0))
     for scale in scales_px:
         there = project(views, state)
-        step = _solve(views, state, names, there, count_points(views, there, scale, frames))
-        state = _moved(views, state, names, step)
-    return _fit_of(views, names, state, step)
-
-
-def _solve(views: Views, state: State, names: tuple[str, ...], there: Projection, points: Counted) -> _Step:
-    columns = common_slopes(views, state, there, names)[points.rows]
-    matrix, right, inverse, coupling, own = eliminate_poses(views, state, there, points, columns)
-    precision = np.concatenate((_precisions(views, names), MAP_SCATTER**-2.0, views.tape_scatter**-2.0))
-    off = np.array([state.theta[name] - views.optics.neutral(name) for name in names])
-    pull = precision * np.concatenate((off, state.offset, state.tape))
-    matrix[np.diag_indices_from(matrix)] += precision
-    common = np.asarray(-np.linalg.solve(matrix, right + pull), dtype=float)
-    poses = -own - np.einsum("fij,j->fi", coupling, common)
-    return _Step(common, poses, matrix, np.sqrt(np.diagonal(inverse, axis1=1, axis2=2)))
+        points = count_points(views, there, scale, frames)
+        columns = common_slopes(views, state, there, names)[points.rows]
+        matrix, right, inverse, coupling, own = eliminate_poses(views, state, there, points, columns)
+        off = np.array([state.theta[name] - optics.neutral(name) for name in names])
+        pull = precision * np.concatenate((off, state.offset, state.tape))
+        matrix[np.diag_indices_from(matrix)] += precision
+        common = np.asarray(-np.linalg.solve(matrix, right + pull), dtype=float)
+        theta = dict(state.theta)
+        for name, by in zip(names, common, strict=False):
+            most = LARGEST_STEP * optics.spread(name)
+            theta[name] = optics.clipped(name, theta[name] + float(np.clip(by, -most, most)))
+        offset, tape = state.offset + common[first : first + 3], state.tape + common[first + 3 :]
+        state = State(theta, tape, offset, state.poses + (-own - np.einsum("fij,j->fi", coupling, common)))
+    across = matrix[:first, first:]
+    information = eliminate(matrix[:first, :first], across, matrix[first:, first:], across.T)
+    sd = np.sqrt(np.diag(np.linalg.inv(matrix)))[first:]
+    pose_sd = np.sqrt(np.diagonal(inverse, axis1=1, axis2=2))
+    return CameraFit(views, names, state, information - np.diag(camera_precision), sd[3:], sd[:3], pose_sd)
 
 
 def common_slopes(views: Views, state: State, there: Projection, names: tuple[str, ...]) -> Floats:
@@ -250,27 +242,6 @@ def common_slopes(views: Views, state: State, there: Projection, names: tuple[st
 
 def _precisions(views: Views, names: tuple[str, ...]) -> Floats:
     return np.array([views.optics.spread(name) ** -2.0 for name in names])
-
-
-def _moved(views: Views, state: State, names: tuple[str, ...], step: _Step) -> State:
-    theta = dict(state.theta)
-    for name, by in zip(names, step.common, strict=False):
-        most = LARGEST_STEP * views.optics.spread(name)
-        theta[name] = views.optics.clipped(name, theta[name] + float(np.clip(by, -most, most)))
-    first = len(names)
-    offset, tape = state.offset + step.common[first : first + 3], state.tape + step.common[first + 3 :]
-    return replace(state, theta=theta, offset=offset, tape=tape, poses=state.poses + step.poses)
-
-
-def _fit_of(views: Views, names: tuple[str, ...], state: State, step: _Step) -> CameraFit:
-    camera, rest = slice(len(names)), slice(len(names), None)
-    matrix = step.matrix
-    across = matrix[camera, rest]
-    information = eliminate(matrix[camera, camera], across, matrix[rest, rest], across.T)
-    sd = np.sqrt(np.diag(np.linalg.inv(matrix)))[len(names) :]
-    return CameraFit(
-        views, names, state, information - np.diag(_precisions(views, names)), sd[3:], sd[:3], step.pose_sd
-    )
 
 
 PASSES = 4

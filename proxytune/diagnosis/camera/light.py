@@ -134,7 +134,15 @@ def fit_light(
         gain, gamma, vignetting = (Fitted(*figure, False) for figure in zip((1.0, 1.0, 0.0), RANGES, strict=True))
         return Light(gain, gamma, vignetting, np.ones(len(measured)))
     best, gains = _fit(means, fixed_exposure)
-    half = _half_intervals(means, best, lambda kept: _fit(kept, fixed_exposure)[0], len(measured))
+    run, paints = means.frame * BLOCKS // len(measured), np.unique(means.paint)
+    half = jackknife(lambda one: _fit(means.without(run == one), fixed_exposure)[0], np.unique(run))
+    if len(paints) < len(PAINTS):
+        half[:2] = np.inf
+    else:
+        by_paint = jackknife(lambda one: _fit(means.without(means.paint == one), fixed_exposure)[0], paints)
+        half[:2] = np.hypot(half, by_paint)[:2]
+    # What is seen of vignetting is its product with gamma
+    half[2] = np.hypot(half[2], abs(best[2]) * min(half[1] / best[1], UNKNOWN))
     levels = np.ones(len(measured))
     levels[: len(gains)] = gains
     figures = []
@@ -143,19 +151,6 @@ def fit_light(
         figures.append(Fitted(float(value), interval, bool(wide < widest)))
     gain, gamma, vignetting = figures
     return Light(gain, gamma, vignetting, levels)
-
-
-def _half_intervals(means: "_Means", best: Floats, fit: Callable[["_Means"], Floats], frames: int) -> Floats:
-    """Half of the intervals (3,), without runs of frames in turn and, for gain and gamma, without paints."""
-    run, paints = means.frame * BLOCKS // frames, np.unique(means.paint)
-    half = jackknife(lambda one: fit(means.without(run == one)), np.unique(run))
-    if len(paints) < len(PAINTS):
-        half[:2] = np.inf
-    else:
-        half[:2] = np.hypot(half, jackknife(lambda one: fit(means.without(means.paint == one)), paints))[:2]
-    # What is seen of vignetting is its product with gamma
-    half[2] = np.hypot(half[2], abs(best[2]) * min(half[1] / best[1], UNKNOWN))
-    return half
 
 
 def jackknife(fit: Callable[[int], Floats], parts: NDArray[np.intp]) -> Floats:
@@ -223,7 +218,13 @@ def _fit(means: _Means, fixed_exposure: bool) -> tuple[Floats, Floats]:
         inner = slope - _mean_by(level, slope, weight, 9)[level]
         step = float((weight * inner * left).sum() / max((weight * inner * inner).sum(), 1e-12))
         vignetting = float(np.clip(vignetting + step, *RANGES[2]))
-        log_gain, gamma = _exposure(paint, np.unique(level))
+        # Gain and gamma make the declared paints the levels of those that are in the frames
+        levels = paint[np.unique(level)]
+        declared = np.log(PAINTS / 255.0).ravel()[np.unique(level)]
+        gamma = 1.0  # Asphalt alone tells none: its channels are too alike
+        if np.ptp(declared) >= 0.5:
+            gamma = float(np.clip(np.polyfit(declared, levels, 1)[0], *RANGES[1]))
+        log_gain = float((levels - gamma * declared).mean())
         spread = 1.5 * 1.4826 * np.median(np.abs(left)) + 1e-6
         weight = means.weight * np.asarray(np.minimum(1.0, spread / np.maximum(np.abs(left), 1e-9)))
     return np.array([np.clip(np.exp(log_gain), *RANGES[0]), gamma, vignetting]), np.exp(gains)
@@ -233,15 +234,6 @@ def _mean_by(key: NDArray[np.intp], values: Floats, weight: Floats, count: int) 
     """Weighted means by key (count,), 0 where there is none."""
     sums = np.bincount(key, weight, count)
     return np.asarray(np.bincount(key, weight * values, count) / np.where(sums > 0.0, sums, 1.0))
-
-
-def _exposure(paint: Floats, seen: NDArray[np.intp]) -> tuple[float, float]:
-    """Logarithm of the gain, and gamma, that make the declared paints the levels of those that are in the frames."""
-    declared = np.log(PAINTS / 255.0).ravel()[seen]
-    if np.ptp(declared) < 0.5:  # Asphalt alone: its channels are too alike
-        return float((paint[seen] - declared).mean()), 1.0
-    gamma = float(np.clip(np.polyfit(declared, paint[seen], 1)[0], *RANGES[1]))
-    return float((paint[seen] - gamma * declared).mean()), gamma
 
 
 Singles = NDArray[np.float32]
@@ -328,22 +320,23 @@ def find_blemishes(
     left = _against_usual(contrast)
     hidden = (left + SURE * error < HIDDEN) & (_against_usual(variation) < SUBDUED)
     for third in np.array_split(np.arange(len(measured)), PARTS):
-        hidden &= ~_follows(measured[third], predicted[third], floor, light.only(third))
+        own, _, spread = _contrast(measured[third], predicted[third], floor, light.only(third), FEWEST_FRAMES // PARTS)
+        with np.errstate(invalid="ignore"):  # What these frames do not show is NaN, and stays
+            hidden &= ~((_against_usual(own) > HIDDEN) | (_against_usual(spread) > HIDDEN))
     parts, _ = label(hidden, structure=np.ones((3, 3)))
-    blemishes = [
-        _blemish(parts == number, place, left, floor.shape)
-        for number, place in enumerate(find_objects(parts), start=1)
-        if (parts == number).sum() >= SMALLEST
-    ]
+    blemishes = []
+    for number, place in enumerate(find_objects(parts), start=1):
+        part = parts == number
+        if part.sum() < SMALLEST:
+            continue
+        rows, columns = (
+            (max(0, side.start * STEP - 1), min(size - 1, (side.stop - 1) * STEP + 1))
+            for side, size in zip(place, floor.shape, strict=True)
+        )
+        share = float(min(1.0, part.sum() * STEP**2 / floor.size))
+        blemishes.append(Blemish(columns, rows, max(0.0, float(np.median(left[part]))), share))
     blemishes.sort(key=lambda blemish: -blemish.share)
     return tuple(blemishes) if blemishes and blemishes[0].share >= LEAST_SHARE else ()
-
-
-def _follows(measured: Pictures, predicted: NDArray[Any], floor: NDArray[np.bool_], light: Light) -> NDArray[np.bool_]:
-    """Windows whose brightness follows what is drawn in some of the frames; not where these do not show it."""
-    contrast, _, variation = _contrast(measured, predicted, floor, light, FEWEST_FRAMES // PARTS)
-    with np.errstate(invalid="ignore"):
-        return np.asarray((_against_usual(contrast) > HIDDEN) | (_against_usual(variation) > HIDDEN))
 
 
 def _against_usual(contrast: Singles) -> Singles:
@@ -353,18 +346,6 @@ def _against_usual(contrast: Singles) -> Singles:
     filled = np.where(np.isfinite(contrast), contrast, np.nanmedian(contrast))
     usual = median_filter(filled, AROUND, mode="nearest")
     return np.asarray(contrast / np.maximum(usual, 0.5), dtype=np.float32)
-
-
-def _blemish(
-    part: NDArray[np.bool_], place: tuple[slice, ...], contrast: NDArray[Any], shape: tuple[int, ...]
-) -> Blemish:
-    """Measure a connected part of the windows' middles in pixels."""
-    ends = [
-        (max(0, side.start * STEP - 1), min(size - 1, (side.stop - 1) * STEP + 1))
-        for side, size in zip(place, shape, strict=True)
-    ]
-    share = min(1.0, part.sum() * STEP**2 / (shape[0] * shape[1]))
-    return Blemish(ends[1], ends[0], max(0.0, float(np.median(contrast[part]))), float(share))
 
 
 def _contrast(

@@ -7,7 +7,7 @@ effect on camera and picture.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -129,7 +129,7 @@ def pose_slopes(there: Projection) -> Floats:
 
 def map_slopes(views: Views, state: State, there: Projection) -> Floats:
     """Slopes by the whole map's x, y and heading about its middle (n, 3)."""
-    from_middle = there.place - state.offset[:2] - _middle(views)
+    from_middle = there.place - state.offset[:2] - np.array(views.markings.road.size) / 2.0
     turning = there.slope[:, 0] * from_middle[:, 1] - there.slope[:, 1] * from_middle[:, 0]
     return np.column_stack((-there.slope, turning))
 
@@ -175,23 +175,16 @@ def _turned(vectors: Floats, angle: Floats | float) -> Floats:
     return np.stack((cos * x - sin * y, sin * x + cos * y), axis=-1)
 
 
-def _middle(views: Views) -> Floats:
-    return np.array(views.markings.road.size) / 2.0
-
-
 def _marks(views: Views, places: Floats, offset: Floats) -> Marks:
     """The nearest markings of each point's colour, on a map that lies `offset` off."""
-    middle = _middle(views)
+    middle, white = np.array(views.markings.road.size) / 2.0, views.edges.white
     own = _turned(places - offset[:2] - middle, -offset[2]) + middle
-    white = views.edges.white
-    pair = (views.markings.white(own[white]), views.markings.yellow(own[~white]))
-    return Marks._make(_merged(white, one, other) for one, other in zip(*pair, strict=True))
-
-
-def _merged(white: NDArray[np.bool_], one: NDArray[Any], other: NDArray[Any]) -> NDArray[Any]:
-    both = np.empty((len(white), *one.shape[1:]), dtype=one.dtype)
-    both[white], both[~white] = one, other
-    return both
+    merged = []
+    for one, other in zip(views.markings.white(own[white]), views.markings.yellow(own[~white]), strict=True):
+        both = np.empty((len(white), *one.shape[1:]), dtype=one.dtype)
+        both[white], both[~white] = one, other
+        merged.append(both)
+    return Marks._make(merged)
 
 
 Pictures = NDArray[np.float32]
@@ -221,11 +214,17 @@ def draw_pictures(views: Views, state: State, theta: Mapping[str, float], frames
     poses, rates = (each[frames] for each in views.tracks.at(state.theta.get(LATENCY, 0.0)))
     poses = poses + state.poses[frames]
     readout, blur = (theta.get(READOUT, state.theta.get(READOUT, 0.0)), theta.get(BLUR, 0.0))
-    if not np.any(rates) or readout == 0.0:
-        return _develop(views, theta, _exposed(camera, poses, rates, blur))
-    instants = (np.arange(SHOTS) / (SHOTS - 1) - 0.5) * readout
-    shots = np.stack([_exposed(camera, poses + late * rates, rates, blur) for late in instants])
-    return _develop(views, theta, _by_rows(shots))
+    if np.any(rates) and readout != 0.0:
+        instants = (np.arange(SHOTS) / (SHOTS - 1) - 0.5) * readout
+        shots = np.stack([_exposed(camera, poses + late * rates, rates, blur) for late in instants])
+        # Each row is of the instant at which it is read out
+        row = np.arange(shots.shape[2])
+        when = (row + 0.5) / len(row) * (SHOTS - 1)
+        first = np.clip(np.floor(when).astype(int), 0, SHOTS - 2)
+        share = (when - first)[:, None, None, None].astype(np.float32)
+        mixed = (1.0 - share) * shots[first, :, row] + share * shots[first + 1, :, row]
+        return _develop(views, theta, np.moveaxis(mixed, 0, 1))
+    return _develop(views, theta, _exposed(camera, poses, rates, blur))
 
 
 def _exposed(camera: GroundPlaneCamera, poses: Floats, rates: Floats, blur_s: float) -> Pictures:
@@ -236,17 +235,6 @@ def _exposed(camera: GroundPlaneCamera, poses: Floats, rates: Floats, blur_s: fl
     for late in ((np.arange(SHOTS) + 0.5) / SHOTS - 0.5) * blur_s:
         total = total + camera.render(poses + late * rates).astype(np.float32)
     return np.asarray(total / SHOTS, dtype=np.float32)
-
-
-def _by_rows(shots: Pictures) -> Pictures:
-    """Each row from the instant at which it is read out, of shots (SHOTS, n, rows, columns, 3)."""
-    rows = shots.shape[2]
-    when = (np.arange(rows) + 0.5) / rows * (SHOTS - 1)
-    first = np.clip(np.floor(when).astype(int), 0, SHOTS - 2)
-    share = (when - first)[:, None, None, None].astype(np.float32)
-    row = np.arange(rows)
-    mixed = (1.0 - share) * shots[first, :, row] + share * shots[first + 1, :, row]
-    return np.asarray(np.moveaxis(mixed, 0, 1))
 
 
 def _develop(views: Views, theta: Mapping[str, float], pictures: Pictures) -> Pictures:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.arrays import Floats
-from proxytune.diagnosis.camera.edges import LATENCY, MAP_SCATTER, MOVING, READOUT, Edges, Views, effects_of
+from proxytune.diagnosis.camera.edges import LATENCY, MAP_SCATTER, MOVING, READOUT, Views, effects_of
 from proxytune.diagnosis.camera.fitting import (
     EVIDENCE,
     PASSES,
@@ -64,22 +64,19 @@ def rank_subsets(full: CameraFit, declared: Sequence[str], size: int) -> list[Su
     values, and cheap enough for every set.
     """
     others = [effect for effect in effects_of(full.names) if effect not in declared]
-    sets = [Subset(chosen, _loss(full, (*declared, *chosen))) for chosen in combinations(others, size)]
+    off = np.array([full.theta[name] - full.views.optics.neutral(name) for name in full.names])
+    sets = []
+    for chosen in combinations(others, size):
+        kept = np.array([effect_of(name) in (*declared, *chosen) for name in full.names])
+        if kept.all():
+            sets.append(Subset(chosen, 0.0))
+            continue
+        left = full.information[np.ix_(~kept, ~kept)]
+        if kept.any():
+            across, inner = full.information[np.ix_(~kept, kept)], full.information[np.ix_(kept, kept)]
+            left = eliminate(left, across, inner + 1e-9 * np.diag(np.diag(inner)), across.T)
+        sets.append(Subset(chosen, float(0.5 * off[~kept] @ left @ off[~kept])))
     return sorted(sets, key=lambda one: one.loss)
-
-
-def _loss(full: CameraFit, effects: Sequence[str]) -> float:
-    """The loss if only these effects' parameters may differ from their neutral values [nats]."""
-    kept = np.array([effect_of(name) in effects for name in full.names])
-    if kept.all():
-        return 0.0
-    off = np.array([full.theta[name] - full.views.optics.neutral(name) for name in full.names])[~kept]
-    matrix = full.information
-    across, inner = matrix[np.ix_(~kept, kept)], matrix[np.ix_(kept, kept)]
-    left = matrix[np.ix_(~kept, ~kept)]
-    if kept.any():
-        left = eliminate(left, across, inner + 1e-9 * np.diag(np.diag(inner)), across.T)
-    return float(0.5 * off @ left @ off)
 
 
 FIRST = ("camera_pitch", "camera_roll", "camera_yaw", "camera_height", "field_of_view", "camera_latency")
@@ -236,21 +233,20 @@ def fit_residual_field(fit: CameraFit) -> ResidualField:
     systems = [_system(fit, there, half) for half in halves]
     ridge = np.eye(len(systems[0][1])) / FIELD_PX**2
     fields = [np.asarray(-np.linalg.solve(matrix + ridge, right), dtype=float) for matrix, right, _ in systems]
-    gains = []
-    for (matrix, right, _), field in zip(systems, fields[::-1], strict=True):
-        gains.append(float(-(right @ field + 0.5 * field @ matrix @ field)))
+    pairs = zip(systems, fields[::-1], strict=True)
+    nats = sum(float(-(right @ field + 0.5 * field @ matrix @ field)) for (matrix, right, _), field in pairs)
     cost = sum(system[2] for system in systems)
     field = np.mean(fields, axis=0).reshape(2, -1).T
-    moved = _terms(*_places(fit.views))[there.valid] @ field
+    moved = _terms_of(fit.views)[there.valid] @ field
     rms = float(np.sqrt((moved**2).sum(axis=1).mean())) if len(moved) else 0.0
-    return ResidualField(float(sum(gains)), float(sum(gains) / max(cost, 1e-9)), rms, field)
+    return ResidualField(float(nats), float(nats / max(cost, 1e-9)), rms, field)
 
 
 def _system(fit: CameraFit, there: Projection, half: NDArray[np.bool_]) -> tuple[Floats, Floats, float]:
     """Normal equations of the field on some frames, all else eliminated, and those frames' cost [nats]."""
     views, names = fit.views, fit.names
     points = count_points(views, there, SCALE_PX, half)
-    terms, normal = _terms(*_places(views))[points.rows], views.edges.normal[points.rows]
+    terms, normal = _terms_of(views)[points.rows], views.edges.normal[points.rows]
     field = np.concatenate((normal[:, :1] * terms, normal[:, 1:] * terms), axis=1)
     columns = np.concatenate((field, common_slopes(views, fit.state, there, names)[points.rows]), axis=1)
     matrix, right, *_ = eliminate_poses(views, fit.state, there, points, columns)
@@ -266,10 +262,10 @@ def _system(fit: CameraFit, there: Projection, half: NDArray[np.bool_]) -> tuple
     )
 
 
-def _places(views: Views) -> tuple[Floats, Floats]:
-    """Places of the edge points from −1 to 1 across and down the picture."""
-    optics = views.optics
-    return 2.0 * views.edges.column / optics.columns - 1.0, 2.0 * views.edges.row / optics.rows - 1.0
+def _terms_of(views: Views) -> Floats:
+    """The terms at every edge point, whose places go from −1 to 1 across and down the picture."""
+    optics, edges = views.optics, views.edges
+    return _terms(2.0 * edges.column / optics.columns - 1.0, 2.0 * edges.row / optics.rows - 1.0)
 
 
 def _terms(right: Floats, down: Floats) -> Floats:
@@ -328,28 +324,26 @@ def _share_if(views: Views, change: Callable[[Views], Views]) -> float:
     return matched_share(fit_camera(changed, start, [name for name in FIRST if name in optics.mounting], FAR))
 
 
-def _turned_pictures(right: bool, down: bool) -> Callable[[Views], Views]:
-    """Pictures mirrored left to right, top to bottom, or both."""
+def _turned_pictures(right: float, down: float) -> Callable[[Views], Views]:
+    """Mirror pictures left to right where `right` is −1, top to bottom where `down` is."""
 
     def turn(views: Views) -> Views:
         edges, optics = views.edges, views.optics
-        column = optics.columns - edges.column if right else edges.column
-        row = optics.rows - edges.row if down else edges.row
-        signs = np.array((-1.0 if right else 1.0, -1.0 if down else 1.0))
-        return replace(views, edges=Edges(edges.frame, edges.white, column, row, edges.normal * signs))
+        column = optics.columns - edges.column if right < 0.0 else edges.column
+        row = optics.rows - edges.row if down < 0.0 else edges.row
+        return replace(views, edges=edges._replace(column=column, row=row, normal=edges.normal * (right, down)))
 
     return turn
 
 
-def _posed(change: Callable[[np.ndarray], np.ndarray]) -> Callable[[Views], Views]:
-    """Poses written another way."""
+def _posed(change: Callable[[Floats], Floats]) -> Callable[[Views], Views]:
     return lambda views: replace(views, tracks=replace(views.tracks, poses=change(views.tracks.poses)))
 
 
 MISTAKES: Mapping[str, Callable[[Views], Views]] = MappingProxyType(
     {
-        "the pictures are mirrored": _turned_pictures(True, False),
-        "the pictures are upside down": _turned_pictures(True, True),
+        "the pictures are mirrored": _turned_pictures(-1.0, 1.0),
+        "the pictures are upside down": _turned_pictures(-1.0, -1.0),
         "heading is clockwise": _posed(lambda poses: poses * (1.0, 1.0, -1.0)),
         "headings are in degrees": _posed(lambda poses: poses * (1.0, 1.0, np.radians(1.0))),
         "x and y are swapped": _posed(lambda poses: poses[:, (1, 0, 2)]),
@@ -375,9 +369,7 @@ def hidden_effects(full: CameraFit, model: Sequence[str]) -> tuple[str, ...]:
     """
     hidden = [] if full.views.tracks.moving else list(MOVING)
     kept = [name for name in full.names if effect_of(name) in model]
-    for name in full.names:
-        if name in kept:
-            continue
+    for name in (one for one in full.names if one not in kept):
         # The standard deviation of a parameter that is free beside those kept, against its nearest probe.
         chosen = [full.names.index(one) for one in (*kept, name)]
         matrix = full.information[np.ix_(chosen, chosen)]

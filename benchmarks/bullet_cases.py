@@ -10,7 +10,7 @@ from hidden_cases import LEVELS, Array, Case, disturbed, measured
 from manoeuvres import RATE_HZ, make_drives
 
 from proxytune.driving import BulletPlant, drivetrain, read_robot
-from proxytune.effects import Setting, effects_from
+from proxytune.effects import FilterContext, effects_from
 from proxytune.logs import Log, LogEpisode
 
 TICKS_PER_ROW = 3
@@ -56,7 +56,7 @@ def _twists(case: BulletCase, duties: Array) -> Array:
     robot = read_robot("duckiebot")
     theta = {**robot.theta, "trim": case.trim, "delay": case.delay}
     train = drivetrain(robot, effects_from(theta, robot.figures))
-    memory = train.begin(Setting(TICK_HZ, np.zeros((len(duties), 2)), robot.figures))
+    memory = train.begin(FilterContext(TICK_HZ, np.zeros((len(duties), 2)), robot.figures))
     twists, _ = train.apply(np.repeat(duties[:, :-1], TICKS_PER_ROW, axis=1), memory)
     return _left_wheel(twists, case.changes.get("left_wheel", 1.0), robot.figures["wheel_distance"])
 

@@ -25,7 +25,7 @@ from proxytune.driving import (
 from proxytune.driving.cameras import View
 from proxytune.driving.plants import PlanarPlant, integrate
 from proxytune.driving.texels import by_numba
-from proxytune.effects import Setting, effects_from
+from proxytune.effects import FilterContext, effects_from
 from proxytune.settings import Section
 
 ROBOT = read_robot("duckiebot")
@@ -36,7 +36,7 @@ CAREFUL = make_episode({}, agent="steady", start=1, seed=0)
 def twists():
     train = drivetrain(ROBOT, effects_from(ROBOT.theta, ROBOT.figures))
     duties = np.tile((0.33, 0.36), (MINUTE, 1))
-    return train.apply(duties, train.begin(Setting(TICK_HZ, np.zeros(2), ROBOT.figures)))[0]
+    return train.apply(duties, train.begin(FilterContext(TICK_HZ, np.zeros(2), ROBOT.figures)))[0]
 
 
 def family(folder: Path, plant: str):
@@ -106,7 +106,7 @@ def test_effects_on_commands_and_motion(benchmark, driven):
     train, held = driven[0].drivetrain, [np.repeat(command[None], 3, axis=0) for command in driven[1].commands]
 
     def apply():
-        memory = train.begin(Setting(TICK_HZ, np.zeros(2), ROBOT.figures))
+        memory = train.begin(FilterContext(TICK_HZ, np.zeros(2), ROBOT.figures))
         for duties in held:
             _, memory = train.apply(duties, memory)
 
@@ -132,7 +132,7 @@ def test_pictures(benchmark, driven, monkeypatch, by):
     instance, steps = driven[0], driven[1].poses[1:].reshape(-1, 3, 3)
 
     def see():
-        view = View(instance.camera, instance.image, Setting(TICK_HZ, driven[1].poses[0], ROBOT.figures))
+        view = View(instance.camera, instance.image, FilterContext(TICK_HZ, driven[1].poses[0], ROBOT.figures))
         for poses in steps:
             view.pass_by(poses)
 

@@ -121,7 +121,11 @@ class Recording(NamedTuple):
 
 
 class Recorder(DomainFamily, Protocol):
-    """A domain family whose episodes can be looked at: `proxytune.drive` shows more of it than scores."""
+    """A domain family whose episodes can be looked at: `proxytune.drive` shows more of it than scores.
+
+    It may say what commands are given in, `command_unit`, and where robots drive on one of proxytune's roads name that,
+    `road_to_draw`: a figure then draws their ways on it.
+    """
 
     def record(self, episode: Episode) -> Recording:
         """Simulate one episode as `run` does, and keep poses and commands.

@@ -9,6 +9,7 @@ import tomllib
 from collections.abc import ItemsView, Iterable, Iterator, KeysView, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from proxytune.errors import SettingsError
@@ -17,6 +18,11 @@ PIPES = ("/dev/stdin", "/dev/fd/", "/proc/self/fd/")
 """Where a shell puts what another command prints."""
 MOST_DOTS = 100
 """In one key: the time to read a dotted key grows with the square of its parts."""
+
+GEOMETRY: Mapping[str, str] = MappingProxyType(
+    {"wheel_radius_m": "wheel_radius", "baseline_m": "effective_baseline", "full_speed_m_s": "full_speed"}
+)
+"""Keys of log.toml and model.toml for a robot's figures, and what its robot.toml calls these."""
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

@@ -115,3 +115,23 @@ def test_the_package_imports_nothing_of_the_benchmarks():
     assert "compare" in benchmarks
     for path in MODULES:
         assert not benchmarks & {name.split(".")[0] for name in imports(path)}, path
+
+
+def rooms_loaded_with(room):
+    """The rooms that a room imports, and those that these import."""
+    found, waiting = set(), [room]
+    while waiting:
+        here = waiting.pop()
+        names = [name for path in MODULES if room_of(path) == here for name in imports(path)]
+        new = {name.split(".")[1] for name in names if name.startswith("proxytune.")} - found - {room}
+        found |= new
+        waiting += new
+    return found
+
+
+@pytest.mark.parametrize(
+    ("room", "kept_out"),
+    [("effects", {"logs", "domain"}), ("driving", {"logs", "study", "environments"}), ("study", {"driving"})],
+)
+def test_a_room_loads_nothing_that_it_has_no_use_for(room, kept_out):
+    assert not rooms_loaded_with(room) & kept_out

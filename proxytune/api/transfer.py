@@ -32,7 +32,7 @@ from proxytune.importing import (
     source_without_unnamed_pictures,
     write_log,
 )
-from proxytune.logs import GEOMETRY, Log
+from proxytune.logs import Log
 from proxytune.report import (
     FORMATS,
     ExportLine,
@@ -50,6 +50,7 @@ from proxytune.running import Bars, Silent
 from proxytune.scores import ScoreTable, write_scores
 from proxytune.search import History, write_optuna, write_skopt
 from proxytune.seeds import target_seed
+from proxytune.settings import GEOMETRY
 from proxytune.study import bare_family, measure_agents, read_study_settings
 
 TRIALS: Mapping[str, Callable[[History, Path], None]] = {"optuna": write_optuna, "skopt": write_skopt}

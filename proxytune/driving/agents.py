@@ -115,7 +115,7 @@ HALF_LANE_M = 0.128
 _NONE: Pixels = np.empty(0, dtype=np.intp)
 
 
-class Sight(NamedTuple):
+class PilotMemory(NamedTuple):
     """What a pilot remembers: the eye, the robot's figures that turn a twist into duties, and the last lane seen."""
 
     eye: Eye
@@ -124,8 +124,8 @@ class Sight(NamedTuple):
     lane: Lane
 
 
-def _begin(robot: Robot, reach_m: float) -> Sight:
-    return Sight(
+def _begin(robot: Robot, reach_m: float) -> PilotMemory:
+    return PilotMemory(
         open_eye(robot, reach_m=reach_m),
         robot.figures["full_speed"],
         robot.figures["effective_baseline"],
@@ -163,11 +163,11 @@ class LanePilot:
     contrast: float = 60.0
     brightness: float = 150.0
 
-    def begin(self, robot: Robot) -> Sight:
+    def begin(self, robot: Robot) -> PilotMemory:
         """Nothing seen yet."""
         return _begin(robot, self.reach_m)
 
-    def act(self, picture: Picture, memory: Sight) -> tuple[Command, Sight]:
+    def act(self, picture: Picture, memory: PilotMemory) -> tuple[Command, PilotMemory]:
         """Steer for the lane; where none is seen, as the last time."""
         eye = memory.eye
         yellow = _NONE if self.markings == "white" else yellow_pixels(picture, eye, contrast=self.contrast)
@@ -175,7 +175,7 @@ class LanePilot:
         lane = fit_lane(eye, yellow=yellow, white=white, half_lane_m=HALF_LANE_M) or memory.lane
         yaw_rate = self.offset_gain * lane.offset + self.slope_gain * lane.slope
         command = duties(self.speed, yaw_rate, full_speed=memory.full_speed, baseline=memory.baseline)
-        return command, Sight(eye, memory.full_speed, memory.baseline, lane)
+        return command, PilotMemory(eye, memory.full_speed, memory.baseline, lane)
 
 
 @dataclass(frozen=True)
@@ -192,11 +192,11 @@ class PursuitPilot:
     look_ahead_m: float
     caution: float = 0.0
 
-    def begin(self, robot: Robot) -> Sight:
+    def begin(self, robot: Robot) -> PilotMemory:
         """Nothing seen yet."""
         return _begin(robot, 1.6 * self.look_ahead_m)
 
-    def act(self, picture: Picture, memory: Sight) -> tuple[Command, Sight]:
+    def act(self, picture: Picture, memory: PilotMemory) -> tuple[Command, PilotMemory]:
         """Drive the arc through the point pursued."""
         eye = memory.eye
         yellow, white = yellow_pixels(picture, eye), white_pixels(picture, eye)
@@ -205,7 +205,7 @@ class PursuitPilot:
         curvature = 2.0 * left / (self.look_ahead_m**2 + left**2)
         speed = self.speed / (1.0 + self.caution * abs(curvature) * self.look_ahead_m)
         command = duties(speed, speed * curvature, full_speed=memory.full_speed, baseline=memory.baseline)
-        return command, Sight(eye, memory.full_speed, memory.baseline, lane)
+        return command, PilotMemory(eye, memory.full_speed, memory.baseline, lane)
 
 
 class Wiring(NamedTuple):

@@ -12,8 +12,8 @@ from proxytune.driving.agent import Command, Picture
 from proxytune.driving.cameras import View
 from proxytune.driving.episode import TICK_HZ, Course, Fleet, Instance, ask, check_command
 from proxytune.driving.expert import Pupil
-from proxytune.driving.plants import Drivetrain, Progress
-from proxytune.effects import CATALOGUE, Effect, Learnt, Setting, Signal
+from proxytune.driving.plants import Drivetrain, DrivetrainState
+from proxytune.effects import CATALOGUE, Effect, FilterContext, Learnt, Signal
 from proxytune.errors import EpisodeError
 
 AT_ONCE = 16
@@ -23,7 +23,7 @@ _OURS = frozenset((*CATALOGUE.values(), Learnt))
 
 
 @dataclass(frozen=True)
-class Apart:
+class UnbatchedDrivetrain:
     """A drivetrain for each robot by itself.
 
     Attributes:
@@ -34,25 +34,25 @@ class Apart:
     one: Drivetrain
     seeds: tuple[int, ...]
 
-    def begin(self, setting: Setting) -> list[Progress]:
-        """Each robot's memory, from a setting of arrays (robots, …)."""
-        parts = zip(self.seeds, setting.rest, setting.headings, setting.places, strict=True)
+    def begin(self, context: FilterContext) -> list[DrivetrainState]:
+        """Each robot's memory, from a context of arrays (robots, …)."""
+        parts = zip(self.seeds, context.rest, context.headings, context.places, strict=True)
         return [
-            self.one.begin(replace(setting, seed=seed, rest=rest, headings=headings, places=places))
+            self.one.begin(replace(context, seed=seed, rest=rest, headings=headings, places=places))
             for seed, rest, headings, places in parts
         ]
 
-    def apply(self, signal: Signal, memory: list[Progress]) -> tuple[Signal, list[Progress]]:
+    def apply(self, signal: Signal, memory: list[DrivetrainState]) -> tuple[Signal, list[DrivetrainState]]:
         """The twists (robots, time, 3) that the next duties (robots, time, 2) lead to."""
         twists, kept = zip(*(self.one.apply(*part) for part in zip(signal, memory, strict=True)), strict=True)
         return np.stack(twists), list(kept)
 
 
-def side_by_side(drivetrain: Drivetrain, seeds: tuple[int, ...]) -> Drivetrain | Apart:
+def batched_drivetrain(drivetrain: Drivetrain, seeds: tuple[int, ...]) -> Drivetrain | UnbatchedDrivetrain:
     """A drivetrain over a leading axis of robots, each with a seed of its own."""
     chains = (drivetrain.command, drivetrain.actuation, drivetrain.motion)
     alike = all(_same_in_batches(effect) for chain in chains for effect in chain.effects)
-    return drivetrain if alike else Apart(drivetrain, seeds)
+    return drivetrain if alike else UnbatchedDrivetrain(drivetrain, seeds)
 
 
 def _same_in_batches(effect: Effect) -> bool:
@@ -106,11 +106,11 @@ class _Rollouts:
         starts, seeds = np.stack([course.start for course in courses]), tuple(course.seed for course in courses)
         self._hold = round(TICK_HZ / figures["control_rate"])
         self._commands = np.zeros((len(courses), 2))
-        self._drivetrain = side_by_side(instance.drivetrain, seeds)
-        resting = Setting(TICK_HZ, np.zeros((len(courses), 2)), figures, 0, starts[:, 2:], starts[:, None, :2])
+        self._drivetrain = batched_drivetrain(instance.drivetrain, seeds)
+        resting = FilterContext(TICK_HZ, np.zeros((len(courses), 2)), figures, 0, starts[:, 2:], starts[:, None, :2])
         self._memory: Any = self._drivetrain.begin(resting)
-        settings = [Setting(TICK_HZ, one.start, figures, one.seed) for one in courses]
-        self._views = [View(instance.camera, instance.image, setting) for setting in settings]
+        settings = [FilterContext(TICK_HZ, one.start, figures, one.seed) for one in courses]
+        self._views = [View(instance.camera, instance.image, context) for context in settings]
         self.under_way = list(range(len(courses)))
         self.new_pictures = True
         self.poses = [[start[None]] for start in starts]

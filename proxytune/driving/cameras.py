@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from proxytune.driving.agent import Picture
-from proxytune.driving.optics import SKY, Camera, CameraFigures, floor_hits, ground_points
-from proxytune.driving.plain_texels import Table, keep_colours
+from proxytune.driving.optics import SKY, CameraFigures, Renderer, floor_hits, ground_points
+from proxytune.driving.plain_texels import TexelTable, keep_colours
 from proxytune.driving.road_picture import Floor
 from proxytune.driving.texels import fastest
-from proxytune.effects import Chain, Setting, Signal
+from proxytune.effects import Chain, FilterContext, Signal
 
 
 class GroundPlaneCamera:
@@ -63,7 +63,7 @@ class GroundPlaneCamera:
         return pictures
 
 
-def _tabulate(figures: CameraFigures, floor: Floor) -> tuple[int, Table]:
+def _tabulate(figures: CameraFigures, floor: Floor) -> tuple[int, TexelTable]:
     """How many pixels are sky before the first that sees floor, and where each from that one on looks."""
     copies, points = _copies(floor), ground_points(figures).reshape(-1, 2)
     on_floor = np.isfinite(points[:, 0])
@@ -73,7 +73,7 @@ def _tabulate(figures: CameraFigures, floor: Floor) -> tuple[int, Table]:
     scale = copies.per_metre[copy]
     plane = np.stack((points[:, 0] * scale, points[:, 1] * scale, scale))
     # Those above the horizon stay at the last texel, the sky
-    return sky, Table(
+    return sky, TexelTable(
         plane=np.where(on_floor, plane, 0.0).astype(np.float32),
         last=np.where(on_floor, copies.sides[copy] - 1, 0).astype(np.float32),
         first=np.where(on_floor, copies.firsts[copy], copies.texels.size - 1).astype(np.int32),
@@ -142,7 +142,7 @@ class _Film(Protocol):
 class _Averaged:
     """Each picture is a weighted mean of what the camera saw at the last ticks, which is all that blur does."""
 
-    def __init__(self, camera: Camera, weights: Signal, start: Signal) -> None:
+    def __init__(self, camera: Renderer, weights: Signal, start: Signal) -> None:
         self._glimpse = getattr(camera, "glimpse", camera.render)
         self._mean = getattr(camera, "mean", mean_picture)
         self._weights = weights
@@ -159,10 +159,10 @@ class _Averaged:
 class _Developed:
     """Image effects are done to every picture, one after another."""
 
-    def __init__(self, camera: Camera, effects: Chain, setting: Setting) -> None:
+    def __init__(self, camera: Renderer, effects: Chain, context: FilterContext) -> None:
         self._camera, self._effects = camera, effects
-        still = camera.render(setting.rest[None]).reshape(-1)
-        self._memory = effects.begin(replace(setting, rest=still))
+        still = camera.render(context.rest[None]).reshape(-1)
+        self._memory = effects.begin(replace(context, rest=still))
 
     def expose(self, poses: Signal) -> Picture:
         """The picture after some more poses."""
@@ -180,15 +180,15 @@ class View:
         picture: That picture, (rows, columns, 3).
     """
 
-    def __init__(self, camera: Camera, effects: Chain, setting: Setting) -> None:
-        """Take the first picture; `setting` is that of poses, and its rest where the robot stood before them, (3,)."""
-        weights = effects.mean_weights(setting.rate_hz)
+    def __init__(self, camera: Renderer, effects: Chain, context: FilterContext) -> None:
+        """Take the first picture; `context` is that of poses, and its rest where the robot stood before them, (3,)."""
+        weights = effects.mean_weights(context.rate_hz)
         self._film: _Film = (
-            _Developed(camera, effects, setting) if weights is None else _Averaged(camera, weights, setting.rest)
+            _Developed(camera, effects, context) if weights is None else _Averaged(camera, weights, context.rest)
         )
-        self._every = round(setting.rate_hz / setting.nominal["camera_rate"])
+        self._every = round(context.rate_hz / context.nominal["camera_rate"])
         self._waiting = np.empty((0, 3))
-        self.picture = self._film.expose(setting.rest[None])
+        self.picture = self._film.expose(context.rest[None])
 
     def pass_by(self, poses: Signal) -> None:
         """Let the shutter see the poses of the next ticks."""

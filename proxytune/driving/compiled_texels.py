@@ -6,7 +6,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.driving.plain_texels import Colours, Glimpses, Places, Table
+from proxytune.driving.plain_texels import Colours, Glimpses, Places, TexelTable
 
 if vars(numba.config)["DISABLE_JIT"]:
     raise ImportError("NUMBA_DISABLE_JIT is set: uncompiled, these loops take a thousand times as long")
@@ -15,7 +15,7 @@ if vars(numba.config)["DISABLE_JIT"]:
 _compiled: dict[str, Any] = {"nopython": True, "nogil": True, "cache": True, "error_model": "numpy"}
 
 
-def look_up(table: Table, places: Places) -> Glimpses:
+def look_up(table: TexelTable, places: Places) -> Glimpses:
     """The texels (n, pixels) that pixels show from these places; what is beyond the floor shows its edge."""
     glimpses = np.empty((len(places), len(table.last)), dtype=np.uint32)
     _look_up(places, table.plane, table.last, table.first, table.side, table.texels, glimpses)

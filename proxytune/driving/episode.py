@@ -23,11 +23,11 @@ from proxytune.driving.agent import Command, Picture
 from proxytune.driving.bullet import BulletPlant
 from proxytune.driving.cameras import View
 from proxytune.driving.lane import LanePose, lane_length, lane_pose
-from proxytune.driving.optics import Camera
+from proxytune.driving.optics import Renderer
 from proxytune.driving.plants import Drivetrain, PlanarFleet, PlanarPlant, Plant
 from proxytune.driving.road import Road
 from proxytune.driving.robot import Robot
-from proxytune.effects import Chain, Setting, Signal
+from proxytune.effects import Chain, FilterContext, Signal
 from proxytune.errors import EpisodeError
 from proxytune.seeds import placement_generator
 
@@ -49,7 +49,7 @@ class Instance:
 
     robot: Robot
     drivetrain: Drivetrain
-    camera: Camera
+    camera: Renderer
     image: Chain
     measurement: Chain
 
@@ -133,8 +133,8 @@ class Rollout:
         figures = instance.robot.figures
         self._drivetrain, self._plant, self._course = instance.drivetrain, plant, course
         self._hold = round(TICK_HZ / figures["control_rate"])
-        self._memory = instance.drivetrain.begin(_setting(figures, course))
-        self._view = View(instance.camera, instance.image, Setting(TICK_HZ, course.start, figures, course.seed))
+        self._memory = instance.drivetrain.begin(_context(figures, course))
+        self._view = View(instance.camera, instance.image, FilterContext(TICK_HZ, course.start, figures, course.seed))
         self.steps = round(course.seconds * figures["control_rate"])
         self.poses: Signal = course.start[None]
         self.crashed = False
@@ -194,15 +194,15 @@ def drive(
     return Drive(np.concatenate(poses), np.array(commands), rollout.crashed, remembered)
 
 
-def _setting(figures: Mapping[str, float], course: Course) -> Setting:
+def _context(figures: Mapping[str, float], course: Course) -> FilterContext:
     """The start of an episode, from rest."""
-    return Setting(TICK_HZ, np.zeros(2), figures, course.seed, course.start[2:], course.start[None, :2])
+    return FilterContext(TICK_HZ, np.zeros(2), figures, course.seed, course.start[2:], course.start[None, :2])
 
 
 def measured(instance: Instance, poses: Signal, seed: int) -> Signal:
     """Poses from the start on, one per tick, (ticks + 1, 3), as the measurement effects show them."""
-    setting = Setting(TICK_HZ, poses[0], instance.robot.figures, seed)
-    return instance.measurement.apply(poses, instance.measurement.begin(setting))[0]
+    context = FilterContext(TICK_HZ, poses[0], instance.robot.figures, seed)
+    return instance.measurement.apply(poses, instance.measurement.begin(context))[0]
 
 
 def _begin(driver: Driver, robot: Robot) -> Any:
@@ -384,7 +384,7 @@ def follow(instance: Instance, plant: Plant, start: Signal, duties: Signal, seed
     figures = instance.robot.figures
     hold = round(TICK_HZ / figures["control_rate"])
     train = instance.drivetrain
-    memory = train.begin(Setting(TICK_HZ, np.zeros(2), figures, seed, start[2:], start[None, :2]))
+    memory = train.begin(FilterContext(TICK_HZ, np.zeros(2), figures, seed, start[2:], start[None, :2]))
     poses = [start[None]]
     for command in duties[:-1]:
         twists, memory = train.apply(np.repeat(command[None], hold, axis=0), memory)

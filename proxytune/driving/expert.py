@@ -24,7 +24,7 @@ MEMORY = 0.9
 """Share of the disturbance of one control step that is left in the next: it lasts for half a second."""
 
 
-class Shown(NamedTuple):
+class LessonMemory(NamedTuple):
     """What a lesson has shown so far.
 
     Attributes:
@@ -71,11 +71,11 @@ class Expert:
     disturbance: float
     seed: int
 
-    def begin(self, robot: Robot) -> Shown:
+    def begin(self, robot: Robot) -> LessonMemory:
         """Nothing shown yet."""
-        return Shown((robot.figures["full_speed"], robot.figures["effective_baseline"]), 0.0, (), (), ())
+        return LessonMemory((robot.figures["full_speed"], robot.figures["effective_baseline"]), 0.0, (), (), ())
 
-    def act(self, sight: Sight, memory: Shown) -> tuple[Command, Shown]:
+    def act(self, sight: Sight, memory: LessonMemory) -> tuple[Command, LessonMemory]:
         """Steer for the point pursued, disturbed."""
         command, on_road = self._command(sight.pose, *memory.figures)
         drawn = expert_generator(self.seed, len(memory.commands)).standard_normal()
@@ -110,11 +110,11 @@ class Guide:
     expert: Expert
     policy: Policy
 
-    def begin(self, robot: Robot) -> Shown:
+    def begin(self, robot: Robot) -> LessonMemory:
         """Nothing shown yet."""
         return self.expert.begin(robot)
 
-    def act(self, sight: Sight, memory: Shown) -> tuple[Command, Shown]:
+    def act(self, sight: Sight, memory: LessonMemory) -> tuple[Command, LessonMemory]:
         """The policy's command, and the expert's in memory."""
         return self.policy(sight.picture), self.expert.act(sight, memory)[1]
 
@@ -129,7 +129,7 @@ def lesson_driver(road: Road, robot: Robot, seed: int, policy: Policy | None) ->
     return expert if policy is None else Guide(expert, policy)
 
 
-class Seen(NamedTuple):
+class Played(NamedTuple):
     """How many commands have been played, and the picture before each."""
 
     played: int
@@ -154,14 +154,14 @@ class Playback:
 
     commands: NDArray[np.float64]
 
-    def begin(self, robot: Robot) -> Seen:
+    def begin(self, robot: Robot) -> Played:
         """Nothing played yet."""
-        return Seen(0, ())
+        return Played(0, ())
 
-    def act(self, picture: Picture, memory: Seen) -> tuple[Command, Seen]:
+    def act(self, picture: Picture, memory: Played) -> tuple[Command, Played]:
         """The next command."""
         command = self.commands[min(memory.played, len(self.commands) - 1)]
-        return command, Seen(memory.played + 1, (*memory.pictures, picture))
+        return command, Played(memory.played + 1, (*memory.pictures, picture))
 
 
 @dataclass(frozen=True)

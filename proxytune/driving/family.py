@@ -44,7 +44,7 @@ from proxytune.driving.episode import (
 from proxytune.driving.expert import Observation, Playback, Pupil, lesson_driver
 from proxytune.driving.lane import off_map
 from proxytune.driving.maps import chosen_map
-from proxytune.driving.optics import Camera, CameraFigures
+from proxytune.driving.optics import CameraFigures, Renderer
 from proxytune.driving.plants import Plant, check_body, drivetrain
 from proxytune.driving.road import Road
 from proxytune.driving.road_picture import Floor, draw_floor
@@ -53,7 +53,7 @@ from proxytune.effects import (
     Catalogue,
     Chain,
     Effect,
-    Setting,
+    FilterContext,
     Signal,
     Stage,
     effects_from,
@@ -102,7 +102,7 @@ def mounted_camera(robot: Robot, effects: Iterable[Effect]) -> CameraFigures:
     figures = robot.camera_figures()
     nominal = figures.channels()
     mounting = stage_chain(effects, Stage.CAMERA)
-    memory = mounting.begin(Setting(_RATE_HZ, nominal, robot.figures))
+    memory = mounting.begin(FilterContext(_RATE_HZ, nominal, robot.figures))
     return figures.with_channels(mounting.apply(nominal[None], memory)[0][0])
 
 
@@ -132,7 +132,7 @@ def with_columns(robot: Robot, least: int) -> Robot:
 CAMERAS = ("ground_plane", "renderer")
 
 
-def camera_over(floor: Floor, mounted: CameraFigures, kind: str) -> Camera:
+def camera_over(floor: Floor, mounted: CameraFigures, kind: str) -> Renderer:
     """A camera of one of CAMERAS over a floor."""
     return GroundPlaneCamera(mounted, floor) if kind == "ground_plane" else BulletCamera(mounted, floor)
 
@@ -223,6 +223,16 @@ class LaneFollowing:
             EpisodeError: With the time at which the agent failed.
         """
         return self._drive(episode, load_agent(episode.agent, self.folder), self.course(episode, self.seconds))
+
+    @property
+    def command_unit(self) -> str:
+        """The unit of a command: wheels are given duties."""
+        return "duty"
+
+    @property
+    def road_to_draw(self) -> Road:
+        """The road that a figure draws the robot's way on."""
+        return self.map
 
     @property
     def best_score(self) -> float:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from proxytune.arrays import Floats
-from proxytune.driving.road import Road, Section, Segment, repeats_of, sections
+from proxytune.driving.road import Road, RoadSection, Segment, repeats_of, road_sections
 
 Begin = tuple[float, float, float]
 
@@ -23,7 +23,7 @@ PICOMETRE = 12
 """Decimals to which a layout is rounded [m]: figures that are written in decimals stay what was written."""
 
 
-class Layout(NamedTuple):
+class RoadLayout(NamedTuple):
     """The sections of a road in their order, one in each entry of the arrays.
 
     Attributes:
@@ -62,14 +62,14 @@ class Layout(NamedTuple):
 
 
 @functools.lru_cache
-def lay_out(begin: Begin, segments: tuple[Segment, ...]) -> Layout:
+def lay_out(begin: Begin, segments: tuple[Segment, ...]) -> RoadLayout:
     """Lay a closed road's segments out.
 
     Args:
         begin: Where the first segment begins: x [m], y [m], heading [deg].
         segments: Of the whole lap.
     """
-    lap = tuple(sections(segments))
+    lap = tuple(road_sections(segments))
     repeats = repeats_of(lap)
     starts = corners(begin, segments)[:-1]
     origin = np.round(starts[:: len(lap) // repeats].mean(axis=0), PICOMETRE)
@@ -77,12 +77,12 @@ def lay_out(begin: Begin, segments: tuple[Segment, ...]) -> Layout:
     figures = np.array(rows).T
     across, side = unit(figures[0]), figures[1]
     along = side[:, None] * np.stack((-across[:, 1], across[:, 0]), axis=-1)
-    return Layout._make((*figures, across, along, origin, repeats))
+    return RoadLayout._make((*figures, across, along, origin, repeats))
 
 
 def corners(begin: Begin, segments: tuple[Segment, ...]) -> Floats:
     """Where each section begins and the last one ends, (sections + 1, 2) [m]."""
-    lap, places = tuple(sections(segments)), [np.array(begin[:2])]
+    lap, places = tuple(road_sections(segments)), [np.array(begin[:2])]
     for number, section in enumerate(lap):
         here = math.radians(begin[2]) + _turn(lap[:number])
         left = math.copysign(section.radius, section.turn)
@@ -96,7 +96,7 @@ def unit(angle: ArrayLike) -> Floats:
     return np.round(np.stack((np.cos(angle), np.sin(angle)), axis=-1), 15) + 0.0
 
 
-def _place(begin: Begin, lap: tuple[Section, ...], number: int, start: Floats) -> tuple[float, ...]:
+def _place(begin: Begin, lap: tuple[RoadSection, ...], number: int, start: Floats) -> tuple[float, ...]:
     """The fields from `normal` to `last` of a section that starts there, as seen from the origin [m]."""
     section = lap[number]
     side = math.copysign(1.0, section.turn)
@@ -108,7 +108,7 @@ def _place(begin: Begin, lap: tuple[Section, ...], number: int, start: Floats) -
     return normal, side, section.radius, abs(section.turn), pivot, first, last
 
 
-def _before(lap: tuple[Section, ...], number: int) -> tuple[float, ...]:
+def _before(lap: tuple[RoadSection, ...], number: int) -> tuple[float, ...]:
     """The fields from `straights` on of a section."""
     earlier, bend = lap[:number], (lap[number].radius, lap[number].turn > 0.0)
     others = [section for section in earlier if (section.radius, section.turn > 0.0) != bend]
@@ -117,7 +117,7 @@ def _before(lap: tuple[Section, ...], number: int) -> tuple[float, ...]:
     return math.fsum(section.straight for section in earlier), abs(_turn(alike)), arcs, _turn(others)
 
 
-def _turn(part: tuple[Section, ...] | list[Section]) -> float:
+def _turn(part: tuple[RoadSection, ...] | list[RoadSection]) -> float:
     return math.fsum(section.turn for section in part)
 
 
@@ -127,7 +127,7 @@ BEYOND = 1e-12
 """A point beyond a section's end counts as so much farther away [m]: rounding must not take it for the next one's."""
 
 
-class Nearest(NamedTuple):
+class NearestPoints(NamedTuple):
     """The nearest points of the centre line, each field of shape (…).
 
     Attributes:
@@ -145,7 +145,7 @@ class Nearest(NamedTuple):
     outside: Floats
 
 
-def find_nearest(layout: Layout, positions: Floats) -> Nearest:
+def find_nearest(layout: RoadLayout, positions: Floats) -> NearestPoints:
     """Find the centre line's nearest points.
 
     Args:
@@ -160,10 +160,10 @@ def find_nearest(layout: Layout, positions: Floats) -> Nearest:
     normal = np.where(view.in_bend, direction, layout.normal[section])
     turned = layout.side[section] * (normal - layout.normal[section])
     turned -= 2.0 * np.pi * np.rint(turned / (2.0 * np.pi))
-    return Nearest(section, view.straight, turned, normal, view.outside)
+    return NearestPoints(section, view.straight, turned, normal, view.outside)
 
 
-def way_round(layout: Layout, section: Numbers, straight: Floats, turned: Floats, offset: Floats) -> Floats:
+def way_round(layout: RoadLayout, section: Numbers, straight: Floats, turned: Floats, offset: Floats) -> Floats:
     """How far round the map a point of a line beside the centre line lies, counter-clockwise [m].
 
     Args:
@@ -178,7 +178,7 @@ def way_round(layout: Layout, section: Numbers, straight: Floats, turned: Floats
     return edges + others + bend_radius(layout, section, offset) * (layout.turned[section] + turned)
 
 
-def bend_radius(layout: Layout, section: Numbers, offset: Floats) -> Floats:
+def bend_radius(layout: RoadLayout, section: Numbers, offset: Floats) -> Floats:
     """Radius of a section's bend on a line so far right of the centre line [m]."""
     return layout.radius[section] + layout.side[section] * offset
 
@@ -201,7 +201,7 @@ class _View(NamedTuple):
     outside: Floats
 
 
-def _view(layout: Layout, section: Numbers, places: Floats) -> _View:
+def _view(layout: RoadLayout, section: Numbers, places: Floats) -> _View:
     """See places (…, 2), relative to the origin [m], from one section each or from all."""
     x, y = places[..., 0], places[..., 1]
     across, along = layout.across[section], layout.along[section]
@@ -214,7 +214,7 @@ def _view(layout: Layout, section: Numbers, places: Floats) -> _View:
     return _View(out, straight, past, in_bend, outside)
 
 
-def _nearest_section(layout: Layout, places: Floats) -> Numbers:
+def _nearest_section(layout: RoadLayout, places: Floats) -> Numbers:
     """Number of the nearest section; among equally near ones the one whose straight runs most north and south."""
     order = np.argsort(-np.abs(layout.across[:, 0]), kind="stable")
     view = _view(layout, order, places[..., None, :])
@@ -313,7 +313,7 @@ def _offset(road: Road, counter_clockwise: Flags | bool) -> Floats:
     return np.where(counter_clockwise, road.lane_offset, -road.lane_offset)
 
 
-def _way_to_end(layout: Layout, section: int, offset: Floats) -> Floats:
+def _way_to_end(layout: RoadLayout, section: int, offset: Floats) -> Floats:
     """How far round the map a section ends, counter-clockwise [m]."""
     number = np.asarray(section)
     return way_round(layout, number, layout.last[number], layout.turn[number], offset)

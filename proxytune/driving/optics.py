@@ -74,7 +74,7 @@ class CameraFigures:
         return replace(self, **dict(zip(CAMERA_CHANNELS, np.asarray(values, dtype=float).tolist(), strict=True)))
 
 
-class Camera(Protocol):
+class Renderer(Protocol):
     """A camera on a robot."""
 
     def render(self, poses: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:

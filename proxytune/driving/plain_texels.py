@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-class Table(NamedTuple):
+class TexelTable(NamedTuple):
     """For each of a camera's pixels, a point in the robot's frame and a square of texels that shows it.
 
     Attributes:
@@ -37,7 +37,7 @@ Colours = NDArray[np.uint8]
 """Red, green, blue of pixels, (pixels, 3)."""
 
 
-def look_up(table: Table, places: Places) -> Glimpses:
+def look_up(table: TexelTable, places: Places) -> Glimpses:
     """The texels (n, pixels) that pixels show from these places; what is beyond the floor shows its edge."""
     column, row = _look(table, places)
     row *= table.side
@@ -60,7 +60,7 @@ def keep_colours(levels: NDArray[np.uint8], colours: NDArray[np.uint8]) -> None:
         colours[..., colour] = levels[..., colour]
 
 
-def _look(table: Table, places: Places) -> NDArray[np.int32]:
+def _look(table: TexelTable, places: Places) -> NDArray[np.int32]:
     """Column and row (2, n, pixels) of each pixel's texel in its square."""
     cos, sin, x, y = places.T
     # Not a matrix product: BLAS rounds differently from processor to processor, and so would the pictures

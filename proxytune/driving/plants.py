@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.driving.robot import Robot
-from proxytune.effects import CHANNELS, Chain, Effect, Memory, Setting, Signal, Stage, stage_chain
+from proxytune.effects import CHANNELS, Chain, Effect, FilterContext, Memory, Signal, Stage, stage_chain
 from proxytune.errors import SettingsError
 
 
@@ -41,7 +41,7 @@ class Plant(Protocol):
     ) -> None: ...
 
 
-class Progress(NamedTuple):
+class DrivetrainState(NamedTuple):
     """What the three stages remember."""
 
     command: Memory
@@ -62,21 +62,21 @@ class Drivetrain:
     actuation: Chain
     motion: Chain
 
-    def begin(self, setting: Setting) -> Progress:
-        """As if the resting command of `setting` had been given for ever."""
-        still = np.zeros((*np.shape(setting.rest)[:-1], len(CHANNELS[Stage.MOTION])))
-        return Progress(
-            self.command.begin(setting),
-            self.actuation.begin(setting),
-            self.motion.begin(replace(setting, rest=still)),
+    def begin(self, context: FilterContext) -> DrivetrainState:
+        """As if the resting command of `context` had been given for ever."""
+        still = np.zeros((*np.shape(context.rest)[:-1], len(CHANNELS[Stage.MOTION])))
+        return DrivetrainState(
+            self.command.begin(context),
+            self.actuation.begin(context),
+            self.motion.begin(replace(context, rest=still)),
         )
 
-    def apply(self, signal: Signal, memory: Progress) -> tuple[Signal, Progress]:
+    def apply(self, signal: Signal, memory: DrivetrainState) -> tuple[Signal, DrivetrainState]:
         """The twists that the next chunk of duties leads to."""
         arrived, command = self.command.apply(signal, memory.command)
         wheels, actuation = self.actuation.apply(np.minimum(np.maximum(arrived, -1.0), 1.0), memory.actuation)
         twists, motion = self.motion.apply(self.ideal(wheels), memory.motion)
-        return twists, Progress(command, actuation, motion)
+        return twists, DrivetrainState(command, actuation, motion)
 
     def ideal(self, wheels: Signal) -> Signal:
         """The twists that wheel speeds (…, time, 2) ask for, nothing slipping."""

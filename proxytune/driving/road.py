@@ -36,7 +36,7 @@ Segment = Straight | Arc
 
 
 @dataclass(frozen=True)
-class Section:
+class RoadSection:
     """A straight with the bend that ends it; either may have no length.
 
     Attributes:
@@ -50,20 +50,20 @@ class Section:
     turn: float
 
 
-def sections(segments: tuple[Segment, ...]) -> Iterator[Section]:
+def road_sections(segments: tuple[Segment, ...]) -> Iterator[RoadSection]:
     """The same road by sections; straights after the last arc are a section without a bend."""
     lengths: list[float] = []
     for segment in segments:
         if isinstance(segment, Straight):
             lengths.append(segment.length)
         else:
-            yield Section(math.fsum(lengths), segment.radius, math.radians(segment.turn_deg))
+            yield RoadSection(math.fsum(lengths), segment.radius, math.radians(segment.turn_deg))
             lengths = []
     if lengths:
-        yield Section(math.fsum(lengths), 0.0, 0.0)
+        yield RoadSection(math.fsum(lengths), 0.0, 0.0)
 
 
-def repeats_of(lap: tuple[Section, ...]) -> int:
+def repeats_of(lap: tuple[RoadSection, ...]) -> int:
     """How many times a lap repeats its first sections: 4 on a square loop, 1 where it never does."""
     count = len(lap)
     return next(n for n in range(count, 0, -1) if count % n == 0 and lap[: count // n] * n == lap)

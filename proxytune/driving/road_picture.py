@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.arrays import Floats
-from proxytune.driving.lane import Layout, find_nearest, lay_out, unit, way_round
+from proxytune.driving.lane import RoadLayout, find_nearest, lay_out, unit, way_round
 from proxytune.driving.road import Paint, Road, Segment, Straight, length, tightened
 
 PIXELS_PER_METRE = 400
@@ -158,7 +158,7 @@ class Markings:
         stretches = painted(road)
         self.road = road
         self.stretches = len(stretches)
-        self._layout: Layout = lay_out(road.begin, tuple(part for stretch in stretches for part in stretch))
+        self._layout: RoadLayout = lay_out(road.begin, tuple(part for stretch in stretches for part in stretch))
         self._sizes = np.array([length(stretch) for stretch in stretches])
         self._ends = np.cumsum(self._sizes)
         pairs = zip(road.segments, self._sizes, strict=True)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.driving import plain_texels as plain
-from proxytune.driving.plain_texels import Colours, Glimpses, Places, Table, keep_colours
+from proxytune.driving.plain_texels import Colours, Glimpses, Places, TexelTable, keep_colours
 
 PAYS_OFF = 20_000
 """So often is NumPy used before Numba, which takes half a second to load: by then it would have saved as much."""
@@ -22,7 +22,7 @@ _uses = itertools.count()
 class Lookup(Protocol):
     """A way to look up texels: each gives the same, to the bit."""
 
-    def look_up(self, table: Table, places: Places) -> Glimpses:
+    def look_up(self, table: TexelTable, places: Places) -> Glimpses:
         """The texels (n, pixels) that pixels show from these places; what is beyond the floor shows its edge."""
         ...
 
@@ -46,4 +46,4 @@ def by_numba() -> Lookup:
     return compiled
 
 
-__all__ = ["Lookup", "Table", "fastest", "keep_colours"]
+__all__ = ["Lookup", "TexelTable", "fastest", "keep_colours"]

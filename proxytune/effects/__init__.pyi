@@ -16,12 +16,12 @@ from .effect import (
     Cue as Cue,
     Draws as Draws,
     Effect as Effect,
+    FilterContext as FilterContext,
     Form as Form,
     Lateness as Lateness,
     Means as Means,
     Memory as Memory,
     Panel as Panel,
-    Setting as Setting,
     Signal as Signal,
     Stage as Stage,
     Trace as Trace,
@@ -30,9 +30,9 @@ from .effect import (
 from .features import GROUPS as GROUPS, HEADING as HEADING, LEVEL as LEVEL, Knots as Knots
 from .image import Blur as Blur, RollingShutter as RollingShutter
 from .learnt import (
-    Curve as Curve,
+    FittedRange as FittedRange,
     Learnt as Learnt,
-    Seen as Seen,
+    LearntCurve as LearntCurve,
     is_learnt as is_learnt,
     learnt_effect as learnt_effect,
     learnt_theta as learnt_theta,

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from proxytune.effects.effect import CHANNELS, Setting, Signal, Stage, Trace
+from proxytune.effects.effect import CHANNELS, Signal, Stage, Trace, remember_nothing
 from proxytune.space import Parameter
 
 
@@ -27,20 +27,12 @@ class CameraPitch:
     name: ClassVar[str] = "camera_pitch"
     stage: ClassVar[Stage] = Stage.CAMERA
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="camera_pitch",
-            unit="deg",
-            low=0.0,
-            high=45.0,
-            neutral="camera_pitch",
-            probes=(10.0, 15.0, 17.0, 21.0, 24.0, 30.0),
-            source="39 camera mounts: 21.9° ± 2.7°; box of the paper 3° to 35°",
-        ),
-    )
+        Parameter(name="camera_pitch", unit="deg", low=0.0, high=45.0, neutral="camera_pitch",
+                  probes=(10.0, 15.0, 17.0, 21.0, 24.0, 30.0),
+                  source="39 camera mounts: 21.9° ± 2.7°; box of the paper 3° to 35°"),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = None
-
-    def begin(self, setting: Setting) -> None:
-        """Nothing to remember."""
+    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Set the pitch [deg], downwards positive."""
@@ -55,20 +47,11 @@ class CameraRoll:
     name: ClassVar[str] = "camera_roll"
     stage: ClassVar[Stage] = Stage.CAMERA
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="camera_roll",
-            unit="deg",
-            low=-10.0,
-            high=10.0,
-            neutral=0.0,
-            probes=(-5.0, -2.0, 2.0, 5.0),
-            source="a camera mount's play",
-        ),
-    )
+        Parameter(name="camera_roll", unit="deg", low=-10.0, high=10.0, neutral=0.0, probes=(-5.0, -2.0, 2.0, 5.0),
+                  source="a camera mount's play"),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = None
-
-    def begin(self, setting: Setting) -> None:
-        """Nothing to remember."""
+    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Set the roll [deg], clockwise in the driver's view positive."""
@@ -83,20 +66,11 @@ class CameraYaw:
     name: ClassVar[str] = "camera_yaw"
     stage: ClassVar[Stage] = Stage.CAMERA
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="camera_yaw",
-            unit="deg",
-            low=-15.0,
-            high=15.0,
-            neutral=0.0,
-            probes=(-8.0, -4.0, 4.0, 8.0),
-            source="a camera mount's play",
-        ),
-    )
+        Parameter(name="camera_yaw", unit="deg", low=-15.0, high=15.0, neutral=0.0, probes=(-8.0, -4.0, 4.0, 8.0),
+                  source="a camera mount's play"),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = None
-
-    def begin(self, setting: Setting) -> None:
-        """Nothing to remember."""
+    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Set the yaw [deg], to the left positive."""
@@ -111,20 +85,11 @@ class CameraHeight:
     name: ClassVar[str] = "camera_height"
     stage: ClassVar[Stage] = Stage.CAMERA
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="camera_height",
-            unit="m",
-            low=0.05,
-            high=0.20,
-            neutral="camera_height",
-            probes=(0.08, 0.095, 0.115, 0.13),
-            source="39 camera mounts: 0.112 ± 0.008 m",
-        ),
-    )
+        Parameter(name="camera_height", unit="m", low=0.05, high=0.20, neutral="camera_height",
+                  probes=(0.08, 0.095, 0.115, 0.13), source="39 camera mounts: 0.112 ± 0.008 m"),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = None
-
-    def begin(self, setting: Setting) -> None:
-        """Nothing to remember."""
+    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Set the height above the floor [m]."""
@@ -143,20 +108,12 @@ class CameraForward:
     name: ClassVar[str] = "camera_forward"
     stage: ClassVar[Stage] = Stage.CAMERA
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="camera_forward",
-            unit="m",
-            low=-0.1,
-            high=0.2,
-            neutral="camera_forward",
-            probes=(0.0, 0.03, 0.1, 0.15),
-            source="gym-duckietown: 0.066 m; bounds take in lenses behind the axle and on long noses",
-        ),
-    )
+        Parameter(name="camera_forward", unit="m", low=-0.1, high=0.2, neutral="camera_forward",
+                  probes=(0.0, 0.03, 0.1, 0.15),
+                  source="gym-duckietown: 0.066 m; bounds take in lenses behind the axle and on long noses"),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = None
-
-    def begin(self, setting: Setting) -> None:
-        """Nothing to remember."""
+    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Set how far the lens is ahead of the axle [m]."""
@@ -171,20 +128,11 @@ class FieldOfView:
     name: ClassVar[str] = "field_of_view"
     stage: ClassVar[Stage] = Stage.CAMERA
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="field_of_view",
-            unit="deg",
-            low=50.0,
-            high=100.0,
-            neutral="field_of_view",
-            probes=(65.0, 70.0, 80.0, 90.0),
-            source="lenses on the market",
-        ),
-    )
+        Parameter(name="field_of_view", unit="deg", low=50.0, high=100.0, neutral="field_of_view",
+                  probes=(65.0, 70.0, 80.0, 90.0), source="lenses on the market"),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = None
-
-    def begin(self, setting: Setting) -> None:
-        """Nothing to remember."""
+    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Set the vertical field of view [deg]."""
@@ -199,20 +147,11 @@ class LensDistortion:
     name: ClassVar[str] = "lens_distortion"
     stage: ClassVar[Stage] = Stage.CAMERA
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="k1",
-            unit="",
-            low=-0.4,
-            high=0.2,
-            neutral=0.0,
-            probes=(-0.3, -0.2, -0.1, 0.1),
-            source="Duckiebot calibrations: k1 about −0.27",
-        ),
-    )
+        Parameter(name="k1", unit="", low=-0.4, high=0.2, neutral=0.0, probes=(-0.3, -0.2, -0.1, 0.1),
+                  source="Duckiebot calibrations: k1 about −0.27"),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = None
-
-    def begin(self, setting: Setting) -> None:
-        """Nothing to remember."""
+    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Set k1."""
@@ -232,21 +171,12 @@ class LensCentre:
     name: ClassVar[str] = "lens_centre"
     stage: ClassVar[Stage] = Stage.CAMERA
     parameters: ClassVar[tuple[Parameter, ...]] = tuple(
-        Parameter(
-            name=name,
-            unit="",
-            low=-0.25,
-            high=0.25,
-            neutral=0.0,
-            probes=(-0.1, -0.04, 0.04, 0.1),
-            source="calibrations: some hundredths of the picture's height; cropped pictures more",
-        )
+        Parameter(name=name, unit="", low=-0.25, high=0.25, neutral=0.0, probes=(-0.1, -0.04, 0.04, 0.1),
+                  source="calibrations: some hundredths of the picture's height; cropped pictures more")
         for name in ("right", "down")
-    )
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = None
-
-    def begin(self, setting: Setting) -> None:
-        """Nothing to remember."""
+    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Set where the axis meets the picture, from its middle, as shares of the picture's height."""
@@ -261,20 +191,11 @@ class PixelAspect:
     name: ClassVar[str] = "pixel_aspect"
     stage: ClassVar[Stage] = Stage.CAMERA
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="aspect",
-            unit="",
-            low=0.7,
-            high=1.4,
-            neutral=1.0,
-            probes=(0.8, 0.95, 1.05, 1.25),
-            source="sensors: 1 within 0.01; pictures squeezed from 16:9 to 4:3 or stretched back: 0.75 and 1.33",
-        ),
-    )
+        Parameter(name="aspect", unit="", low=0.7, high=1.4, neutral=1.0, probes=(0.8, 0.95, 1.05, 1.25),
+                  source="sensors: 1 within 0.01; pictures squeezed from 16:9 to 4:3 or stretched back: 0.75 and 1.33"),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = None
-
-    def begin(self, setting: Setting) -> None:
-        """Nothing to remember."""
+    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Set how much wider than they are things look."""

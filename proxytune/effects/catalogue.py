@@ -32,9 +32,9 @@ from proxytune.effects.effect import (
     SIGNALS,
     Cue,
     Effect,
+    FilterContext,
     Form,
     Means,
-    Setting,
     Stage,
     Trace,
     WheelCurve,
@@ -192,7 +192,7 @@ def _signal(stage: Stage) -> Any:
 def _filtered(kind: Any, values: list[float], signal: Any) -> Any:
     nominal: Mapping[str, float] = defaultdict(lambda: 1.0)
     effect = kind(*values)
-    return effect.apply(signal, effect.begin(Setting(RATE_HZ, signal[:, 0], nominal)))
+    return effect.apply(signal, effect.begin(FilterContext(RATE_HZ, signal[:, 0], nominal)))
 
 
 _ALL: tuple[type[Effect], ...] = (

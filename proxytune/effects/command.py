@@ -11,12 +11,22 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.effects.effect import Cue, Draws, Lateness, Setting, Signal, Stage, Trace, WheelCurve
+from proxytune.effects.effect import (
+    Cue,
+    Draws,
+    FilterContext,
+    Lateness,
+    Signal,
+    Stage,
+    Trace,
+    WheelCurve,
+    remember_nothing,
+)
 from proxytune.seeds import message_generator
 from proxytune.space import Parameter
 
 
-class History(NamedTuple):
+class DelayLine(NamedTuple):
     """The newest past samples, and the delay as whole samples and a fraction of one."""
 
     samples: Signal
@@ -35,31 +45,24 @@ class Delay:
     name: ClassVar[str] = "delay"
     stage: ClassVar[Stage] = Stage.COMMAND
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="delay",
-            unit="s",
-            low=0.0,
-            high=0.6,
-            neutral=0.0,
-            probes=(0.02, 0.04, 0.08, 0.15, 0.3),
-            source="Duckiebot image-to-motor latency about 0.14 s; box of the paper 0 to 0.30 s",
-        ),
-    )
+        Parameter(name="delay", unit="s", low=0.0, high=0.6, neutral=0.0, probes=(0.02, 0.04, 0.08, 0.15, 0.3),
+                  source="Duckiebot image-to-motor latency about 0.14 s; box of the paper 0 to 0.30 s"),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(cues=(Cue.TRANSIENTS,), shown=WheelCurve.STEP)
 
-    def begin(self, setting: Setting) -> History:
+    def begin(self, context: FilterContext) -> DelayLine:
         """As if the robot had been at rest for ever."""
-        samples = self.delay * setting.rate_hz
+        samples = self.delay * context.rate_hz
         whole = int(np.floor(samples + 1e-9))
-        rest = np.asarray(setting.rest, dtype=float)[..., None, :]
-        return History(np.repeat(rest, whole + 1, axis=-2), max(0.0, samples - whole))
+        rest = np.asarray(context.rest, dtype=float)[..., None, :]
+        return DelayLine(np.repeat(rest, whole + 1, axis=-2), max(0.0, samples - whole))
 
-    def apply(self, signal: Signal, memory: History) -> tuple[Signal, History]:
+    def apply(self, signal: Signal, memory: DelayLine) -> tuple[Signal, DelayLine]:
         """Interpolate between the two samples that the delay falls between."""
         length = signal.shape[-2]
         joined = np.concatenate((memory.samples, signal), axis=-2)
         late = (1.0 - memory.fraction) * joined[..., 1 : length + 1, :] + memory.fraction * joined[..., :length, :]
-        return late, History(joined[..., length:, :], memory.fraction)
+        return late, DelayLine(joined[..., length:, :], memory.fraction)
 
 
 @dataclass(frozen=True)
@@ -70,20 +73,11 @@ class CommandQuantisation:
     name: ClassVar[str] = "command_quantisation"
     stage: ClassVar[Stage] = Stage.COMMAND
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="step",
-            unit="duty",
-            low=0.0,
-            high=0.5,
-            neutral=0.0,
-            probes=(0.02, 0.05, 0.1, 0.2, 0.4),
-            source="8 bits: 0.008; drivers with a few speed levels: 0.1 to 0.3",
-        ),
-    )
+        Parameter(name="step", unit="duty", low=0.0, high=0.5, neutral=0.0, probes=(0.02, 0.05, 0.1, 0.2, 0.4),
+                  source="8 bits: 0.008; drivers with a few speed levels: 0.1 to 0.3"),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(cues=(Cue.WHEEL_COMMAND,), shown=WheelCurve.STEADY, stepwise=True)
-
-    def begin(self, setting: Setting) -> None:
-        """Nothing to remember."""
+    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Round each sample, halves to the even multiple."""
@@ -128,9 +122,9 @@ class Messages:
         return np.concatenate(blocks)[low - begin : high - begin]
 
 
-def messages(setting: Setting) -> Messages:
+def messages(context: FilterContext) -> Messages:
     """One message per control step of the robot."""
-    return Messages(setting.nominal["control_rate"] / setting.rate_hz, setting.seed)
+    return Messages(context.nominal["control_rate"] / context.rate_hz, context.seed)
 
 
 MOST_LOST = 4
@@ -150,7 +144,7 @@ def _lost(probability: float, rate_hz: float) -> Lateness:
     return Lateness(mean / rate_hz, number - mean, np.log1p(-probability) + number * np.log(probability))
 
 
-class Mailbox(NamedTuple):
+class JitterState(NamedTuple):
     """The number of the next sample, the newest past samples, and the greatest extra delay [samples]."""
 
     next: int
@@ -159,7 +153,7 @@ class Mailbox(NamedTuple):
     messages: Messages
 
 
-class Arrivals(NamedTuple):
+class HoldIntervals(NamedTuple):
     """Stretches of time with one message in force: first sample it counts in, how long it lasts, whence its value."""
 
     firsts: NDArray[np.int64]
@@ -179,27 +173,20 @@ class DelayJitter:
     name: ClassVar[str] = "delay_jitter"
     stage: ClassVar[Stage] = Stage.COMMAND
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="spread",
-            unit="s",
-            low=0.0,
-            high=0.3,
-            neutral=0.0,
-            probes=(0.02, 0.04, 0.08, 0.15, 0.3),
-            source="wireless links: tens of milliseconds, now and then some tenths of a second",
-        ),
-    )
+        Parameter(name="spread", unit="s", low=0.0, high=0.3, neutral=0.0, probes=(0.02, 0.04, 0.08, 0.15, 0.3),
+                  source="wireless links: tens of milliseconds, now and then some tenths of a second"),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.TRANSIENTS,), shown=WheelCurve.STEP, draws=Draws(_jittered, (2e-3, 0.3))
     )
 
-    def begin(self, setting: Setting) -> Mailbox:
+    def begin(self, context: FilterContext) -> JitterState:
         """As if the robot had been at rest for ever."""
-        spread = self.spread * setting.rate_hz
-        rest = np.asarray(setting.rest, dtype=float)[..., None, :]
-        return Mailbox(0, np.repeat(rest, math.ceil(spread), axis=-2), spread, messages(setting))
+        spread = self.spread * context.rate_hz
+        rest = np.asarray(context.rest, dtype=float)[..., None, :]
+        return JitterState(0, np.repeat(rest, math.ceil(spread), axis=-2), spread, messages(context))
 
-    def apply(self, signal: Signal, memory: Mailbox) -> tuple[Signal, Mailbox]:
+    def apply(self, signal: Signal, memory: JitterState) -> tuple[Signal, JitterState]:
         """The mean over each sample of the commands in force."""
         length, past = signal.shape[-2], memory.samples.shape[-2]
         joined = np.concatenate((memory.samples, signal), axis=-2)
@@ -209,7 +196,7 @@ class DelayJitter:
         return arrived, memory._replace(next=memory.next + length, samples=joined[..., length:, :])
 
 
-def _arrivals(memory: Mailbox, length: int) -> Arrivals:
+def _arrivals(memory: JitterState, length: int) -> HoldIntervals:
     """What is in force when, over the next samples; the same for all members of a batch."""
     begin, end, sent = memory.next, memory.next + length, memory.messages
     late = math.ceil((memory.spread + 1.0) * sent.per_sample) + 1
@@ -224,10 +211,10 @@ def _arrivals(memory: Mailbox, length: int) -> Arrivals:
     # A message's own samples pass as they are, for the delay before may have blended two messages in one sample
     lasts = np.concatenate(([starts[0] - 1], starts[1:] - 1))[np.searchsorted(times, edges[:-1], side="right")]
     sources = np.minimum(np.floor(edges[:-1]).astype(np.int64), lasts)
-    return Arrivals(np.searchsorted(edges[:-1], np.arange(begin, end)), np.diff(edges), sources)
+    return HoldIntervals(np.searchsorted(edges[:-1], np.arange(begin, end)), np.diff(edges), sources)
 
 
-class Held(NamedTuple):
+class LastReceived(NamedTuple):
     """The number of the next sample, and the newest sample that was received."""
 
     next: int
@@ -243,25 +230,18 @@ class DroppedCommands:
     name: ClassVar[str] = "dropped_commands"
     stage: ClassVar[Stage] = Stage.COMMAND
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="probability",
-            unit="",
-            low=0.0,
-            high=0.9,
-            neutral=0.0,
-            probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.7),
-            source="wireless links: some in a hundred, in bad places half",
-        ),
-    )
+        Parameter(name="probability", unit="", low=0.0, high=0.9, neutral=0.0, probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.7),
+                  source="wireless links: some in a hundred, in bad places half"),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.TRANSIENTS,), shown=WheelCurve.STEP, draws=Draws(_lost, (1e-3, 0.6))
     )
 
-    def begin(self, setting: Setting) -> Held:
+    def begin(self, context: FilterContext) -> LastReceived:
         """At rest until the first command arrives."""
-        return Held(0, np.asarray(setting.rest, dtype=float)[..., None, :], messages(setting))
+        return LastReceived(0, np.asarray(context.rest, dtype=float)[..., None, :], messages(context))
 
-    def apply(self, signal: Signal, memory: Held) -> tuple[Signal, Held]:
+    def apply(self, signal: Signal, memory: LastReceived) -> tuple[Signal, LastReceived]:
         """Hold the last sample of the last message that was received."""
         numbers = memory.messages.numbers(np.arange(memory.next, memory.next + signal.shape[-2]))
         received = memory.messages.draws(int(numbers[0]), int(numbers[-1]) + 1) >= self.probability

@@ -2,7 +2,7 @@
 
 The trace that an effect leaves in measured motion: what a diagnosis goes by to find it, fit it and draw it.
 First-order lags: what follows a signal with a time constant, exactly for a signal that holds over each sample.
-Values that are known beforehand, sample by sample, and beyond them those that a rate leads to.
+Dead reckoning: values known beforehand, sample by sample, and beyond them those that a rate leads to.
 """
 
 from collections.abc import Callable, Mapping
@@ -190,7 +190,7 @@ CHANNELS: Mapping[Stage, tuple[str, ...]] = {
 
 
 @dataclass(frozen=True)
-class Setting:
+class FilterContext:
     """What a filter is told before the first sample.
 
     Attributes:
@@ -224,7 +224,7 @@ class Effect(Protocol):
     parameters: ClassVar[tuple[Parameter, ...]]
     trace: ClassVar[Trace | None]
 
-    def begin(self, setting: Setting) -> Memory:
+    def begin(self, context: FilterContext) -> Memory:
         """The memory before the first sample."""
         ...
 
@@ -233,11 +233,15 @@ class Effect(Protocol):
         ...
 
 
+def remember_nothing(effect: object, context: FilterContext) -> None:
+    """The `begin` of an effect without memory, which does to each sample the same."""
+
+
 @runtime_checkable
 class Recalling(Protocol):
     """An effect for which it matters what came before a window that begins amid a drive."""
 
-    def recall(self, setting: Setting, signal: Signal, row: Signal, sample: Signal) -> Memory:
+    def recall(self, context: FilterContext, signal: Signal, row: Signal, sample: Signal) -> Memory:
         """The memory as of a sample (W,) of a row (W,) of longer signals (rows, time, channels)."""
         ...
 
@@ -246,51 +250,48 @@ FEW = 8
 """Up to so many samples, a control step, a loop over them is faster than to set up a filter."""
 
 
-class Lag(NamedTuple):
-    """How much of a step is left after one sample, and on average over it."""
+class LowPassState(NamedTuple):
+    """A first-order low-pass under way.
 
+    Attributes:
+        value: What follows the signal, at the end of the last sample (…, channels).
+        remainder: How much of a step is left after one sample.
+        mean_remainder: How much of it is left on average over that sample.
+    """
+
+    value: Signal
     remainder: float
     mean_remainder: float
 
 
-def lag_of(samples: float) -> Lag:
-    """The lag of a time constant that lasts so many samples."""
-    if samples == 0.0:
-        return Lag(0.0, 0.0)
-    remainder = float(np.exp(-1.0 / samples))
-    return Lag(remainder, samples * (1.0 - remainder))
+def low_pass_at(value: Signal, samples: float) -> LowPassState:
+    """A low-pass with a time constant of so many samples, at a value (…, channels)."""
+    remainder = float(np.exp(-1.0 / samples)) if samples else 0.0
+    return LowPassState(value, remainder, samples * (1.0 - remainder))
 
 
-def follow(signal: Signal, value: Signal, lag: Lag) -> tuple[Signal, Signal]:
-    """What follows a signal (…, time, channels) from a value (…, channels) on.
+def low_pass(signal: Signal, state: LowPassState) -> tuple[Signal, LowPassState]:
+    """Follow a signal (…, time, channels) with a first-order lag, exactly for one that holds over each sample.
 
     Returns:
-        Its mean over each sample (…, time, channels), and its value after the last one (…, channels).
+        The mean over each sample of what follows (…, time, channels), and the state after the last one.
     """
-    start = value[..., None, :]
-    few = signal.ndim == 2 and len(signal) <= FEW
-    ends = _ends_of_few(signal, value, lag) if few else _ends(signal, start, lag)
+    value, remainder, mean_remainder = state
+    start, gain = value[..., None, :], 1.0 - remainder
+    if signal.ndim == 2 and len(signal) <= FEW:
+        # As `lfilter` does it, operation by operation
+        kept, rows = [remainder * before for before in value.tolist()], []
+        for sample in signal.tolist():
+            rows.append([rest + gain * new for rest, new in zip(kept, sample, strict=True)])
+            kept = [0.0 * new + remainder * end for new, end in zip(sample, rows[-1], strict=True)]
+        ends = np.array(rows)
+    else:
+        ends = lfilter([gain], [1.0, -remainder], signal, axis=-2, zi=remainder * start)[0]
     starts = np.concatenate((start, ends[..., :-1, :]), axis=-2)
-    return signal + lag.mean_remainder * (starts - signal), ends[..., -1, :]
+    return signal + mean_remainder * (starts - signal), state._replace(value=ends[..., -1, :])
 
 
-def _ends(signal: Signal, start: Signal, lag: Lag) -> Signal:
-    """What follows a signal from a value (…, 1, channels) on, at the end of each sample."""
-    ends: Signal = lfilter([1.0 - lag.remainder], [1.0, -lag.remainder], signal, axis=-2, zi=lag.remainder * start)[0]
-    return ends
-
-
-def _ends_of_few(signal: Signal, value: Signal, lag: Lag) -> Signal:
-    """The same of a signal (time, channels), in the filter's own arithmetic."""
-    gain, remainder = 1.0 - lag.remainder, lag.remainder
-    kept, ends = [remainder * before for before in value.tolist()], []
-    for sample in signal.tolist():
-        ends.append([rest + gain * new for rest, new in zip(kept, sample, strict=True)])
-        kept = [0.0 * new + remainder * end for new, end in zip(sample, ends[-1], strict=True)]
-    return np.array(ends)
-
-
-class Known(NamedTuple):
+class DeadReckoning(NamedTuple):
     """Values known beforehand (…, n), number of the next sample, its value (…, 1), and samples per second."""
 
     values: Signal
@@ -299,15 +300,15 @@ class Known(NamedTuple):
     rate_hz: float
 
 
-def beforehand(values: Signal, setting: Setting) -> Known:
+def start_reckoning(values: Signal, context: FilterContext) -> DeadReckoning:
     """Values known beforehand (…, n) for every member of the batch that the setting's rest (…, channels) is of."""
     known = np.asarray(values, dtype=float)
-    shape = np.broadcast_shapes(known.shape[:-1], np.shape(setting.rest)[:-1])
+    shape = np.broadcast_shapes(known.shape[:-1], np.shape(context.rest)[:-1])
     known = np.broadcast_to(known, (*shape, known.shape[-1]))
-    return Known(known, 0, known[..., :1], setting.rate_hz)
+    return DeadReckoning(known, 0, known[..., :1], context.rate_hz)
 
 
-def values_along(rates: Signal, memory: Known) -> tuple[Signal, Known]:
+def reckon(rates: Signal, memory: DeadReckoning) -> tuple[Signal, DeadReckoning]:
     """Values at the start of each sample (…, time): known ones, and beyond them those that the rates lead to."""
     length = rates.shape[-1]
     known = memory.values[..., memory.next : memory.next + length]

@@ -18,7 +18,7 @@ Knot = float | tuple[float, float]
 Knots = tuple[Knot, ...]
 
 
-class Asked(NamedTuple):
+class AskedMotion(NamedTuple):
     """The motion asked for, held within what was seen, and its past, (…, time) where nothing else is said.
 
     Attributes:
@@ -61,7 +61,7 @@ def hats(signal: Signal, knots: Knots) -> Signal:
     return np.stack([np.interp(signal, corners, row) for row in rows], axis=-1)
 
 
-def grid(asked: Asked, knots: Knots) -> Signal:
+def grid(asked: AskedMotion, knots: Knots) -> Signal:
     """Products of hats over speed and yaw rate (…, knots), 0 where both are 0."""
     pairs = np.asarray(knots, dtype=float)
     parts = []
@@ -72,63 +72,63 @@ def grid(asked: Asked, knots: Knots) -> Signal:
     return np.asarray(parts[0] * parts[1])
 
 
-def sign(asked: Asked, wheel: int) -> Signal:
+def sign(asked: AskedMotion, wheel: int) -> Signal:
     """Which way a wheel turns: from −1 to 1, 0 where it stands (…, time, 1)."""
     return np.asarray(np.clip(asked.wheels[wheel][..., None] / REST_SPEED, -1.0, 1.0))
 
 
-def moving(asked: Asked) -> Signal:
+def moving(asked: AskedMotion) -> Signal:
     """1 while the robot moves, 0 where it stands (…, time)."""
     return np.minimum(1.0, np.abs(asked.forward) / REST_SPEED)
 
 
-def backwards(asked: Asked, knots: Knots) -> Signal:
+def backwards(asked: AskedMotion, knots: Knots) -> Signal:
     """Whether the robot moves backwards, for a knot of −1."""
     return hats(np.clip(asked.forward / REST_SPEED, -1.0, 1.0), knots)
 
 
-def level(asked: Asked, knots: Knots, wheel: int) -> Signal:
+def level(asked: AskedMotion, knots: Knots, wheel: int) -> Signal:
     """A wheel's speed as it is, whatever the knots."""
     return np.asarray(asked.wheels[wheel][..., None] * np.ones(len(knots)))
 
 
-def slowing(asked: Asked, knots: Knots, wheel: int) -> Signal:
+def slowing(asked: AskedMotion, knots: Knots, wheel: int) -> Signal:
     """The bands of a wheel that is slower than it has been of late, 0 while it speeds up."""
     bands = asked.bands[wheel]
     slow = asked.wheels[wheel][..., None] - np.cumsum(bands, axis=-1)
     return np.where(bands * slow < 0.0, bands, 0.0)
 
 
-def stopping(asked: Asked, knots: Knots, wheel: int) -> Signal:
+def stopping(asked: AskedMotion, knots: Knots, wheel: int) -> Signal:
     """The bands of a wheel that is to stand and was moving of late."""
     bands = asked.bands[wheel]
     speed = asked.wheels[wheel][..., None]
     return np.where(np.abs(speed) < STANDS * np.abs(speed - np.cumsum(bands, axis=-1)), bands, 0.0)
 
 
-def started(asked: Asked, knots: Knots, wheel: int) -> Signal:
+def started(asked: AskedMotion, knots: Knots, wheel: int) -> Signal:
     """1 when a wheel starts to move, fading with time."""
     return np.asarray(np.exp(-asked.started[wheel][..., None] / np.asarray(knots)))
 
 
-def played(asked: Asked, knots: Knots, wheel: int) -> Signal:
+def played(asked: AskedMotion, knots: Knots, wheel: int) -> Signal:
     """By how much a wheel lags behind within its play, while it moves."""
     speed = asked.wheels[wheel][..., None]
     return np.asarray((asked.played[wheel] - speed) * np.abs(sign(asked, wheel)))
 
 
-def after_reversal(asked: Asked, knots: Knots, wheel: int) -> Signal:
+def after_reversal(asked: AskedMotion, knots: Knots, wheel: int) -> Signal:
     """A wheel's speed, fading with the way since it last turned the other way."""
     way = np.abs(asked.rolled[wheel])[..., None]
     return np.asarray(asked.wheels[wheel][..., None] * np.exp(-way / np.asarray(knots)))
 
 
-def body_after_reversal(asked: Asked, knots: Knots) -> Signal:
+def body_after_reversal(asked: AskedMotion, knots: Knots) -> Signal:
     """The forward speed, fading with the way since the robot last drove the other way."""
     return np.asarray(asked.forward[..., None] * np.exp(-np.abs(asked.rolled[2])[..., None] / np.asarray(knots)))
 
 
-def waves(wave: Callable[[Signal], Signal]) -> Callable[[Asked, Knots], Signal]:
+def waves(wave: Callable[[Signal], Signal]) -> Callable[[AskedMotion, Knots], Signal]:
     """Harmonics of the heading while the robot moves."""
     return lambda a, k: wave(a.heading[..., None] * np.asarray(k)) * moving(a)[..., None]
 
@@ -138,7 +138,7 @@ class Channel(NamedTuple):
 
     to: str
     unit: str
-    basis: Callable[[Asked, Knots], Signal]
+    basis: Callable[[AskedMotion, Knots], Signal]
 
 
 class Group(NamedTuple):
@@ -157,7 +157,7 @@ class Group(NamedTuple):
     low: float | None = None
 
 
-def _of_wheels(unit: str, basis: Callable[[Asked, Knots, int], Signal]) -> dict[str, Channel]:
+def _of_wheels(unit: str, basis: Callable[[AskedMotion, Knots, int], Signal]) -> dict[str, Channel]:
     """One channel a wheel."""
     return {
         "left": Channel("left", unit, lambda a, k: basis(a, k, 0)),

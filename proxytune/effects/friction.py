@@ -12,17 +12,17 @@ from numpy.typing import NDArray
 
 from proxytune.effects.effect import (
     Cue,
+    DeadReckoning,
+    FilterContext,
     Form,
-    Known,
     Means,
     Panel,
-    Setting,
     Signal,
     Stage,
     Trace,
     WheelCurve,
-    beforehand,
-    values_along,
+    reckon,
+    start_reckoning,
 )
 from proxytune.effects.motors import IMBALANCE, per_wheel, wheel_forms
 from proxytune.space import Parameter
@@ -37,22 +37,15 @@ class DeadBand:
     name: ClassVar[str] = "dead_band"
     stage: ClassVar[Stage] = Stage.ACTUATION
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="width",
-            unit="duty",
-            low=0.0,
-            high=0.5,
-            neutral=0.0,
-            probes=(0.02, 0.04, 0.08, 0.15, 0.3),
-            source="friction of small gear motors: 0.05 to 0.2 of full duty",
-        ),
+        Parameter(name="width", unit="duty", low=0.0, high=0.5, neutral=0.0, probes=(0.02, 0.04, 0.08, 0.15, 0.3),
+                  source="friction of small gear motors: 0.05 to 0.2 of full duty"),
         IMBALANCE,
-    )
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.WHEEL_COMMAND,), shown=WheelCurve.STEADY, forms=wheel_forms("width")
     )
 
-    def begin(self, setting: Setting) -> Signal:
+    def begin(self, context: FilterContext) -> Signal:
         """The width on each wheel (2,)."""
         return per_wheel(self.width, self.imbalance)
 
@@ -61,7 +54,7 @@ class DeadBand:
         return signal - np.clip(signal, -memory, memory), memory
 
 
-class Grip(NamedTuple):
+class StictionState(NamedTuple):
     """At which duties each wheel breaks away, stops and turns the other way at once (2,), and whether wheels move."""
 
     breakaway: Signal
@@ -86,37 +79,18 @@ class Stiction:
     name: ClassVar[str] = "stiction"
     stage: ClassVar[Stage] = Stage.ACTUATION
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="breakaway",
-            unit="duty",
-            low=0.0,
-            high=0.6,
-            neutral=0.0,
-            probes=(0.03, 0.06, 0.12, 0.2, 0.3, 0.45),
-            source="small gear motors start at 0.1 to 0.3 of full duty",
-        ),
+        Parameter(name="breakaway", unit="duty", low=0.0, high=0.6, neutral=0.0,
+                  probes=(0.03, 0.06, 0.12, 0.2, 0.3, 0.45),
+                  source="small gear motors start at 0.1 to 0.3 of full duty"),
         IMBALANCE,
-        Parameter(
-            name="release",
-            unit="",
-            low=0.0,
-            high=1.0,
-            neutral=0.5,
-            probes=(0.2, 0.35, 0.65, 0.8, 0.9, 1.0),
-            source="rolling friction by sticking friction: about half, nearly all where a driver cuts small duties",
-            shape=True,
-        ),
-        Parameter(
-            name="reversal",
-            unit="",
-            low=0.0,
-            high=1.0,
-            neutral=1.0,
-            probes=(0.0, 0.25, 0.5, 0.75),
-            source="1: friction catches a slow wheel as it passes rest; 0: a wheel with momentum runs through",
-            shape=True,
-        ),
-    )
+        Parameter(name="release", unit="", low=0.0, high=1.0, neutral=0.5, probes=(0.2, 0.35, 0.65, 0.8, 0.9, 1.0),
+                  source="rolling friction by sticking friction: "
+                         "about half, nearly all where a driver cuts small duties",
+                  shape=True),
+        Parameter(name="reversal", unit="", low=0.0, high=1.0, neutral=1.0, probes=(0.0, 0.25, 0.5, 0.75),
+                  source="1: friction catches a slow wheel as it passes rest; 0: a wheel with momentum runs through",
+                  shape=True),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.WHEEL_COMMAND, Cue.REVERSAL),
         shown=WheelCurve.STEADY,
@@ -127,14 +101,14 @@ class Stiction:
         stepwise=True,
     )
 
-    def begin(self, setting: Setting) -> Grip:
+    def begin(self, context: FilterContext) -> StictionState:
         """A wheel moves from the start if its resting duty keeps a moving wheel going."""
         breakaway = per_wheel(self.breakaway, self.imbalance)
-        rest = np.asarray(setting.rest, dtype=float)[..., None, :]
+        rest = np.asarray(context.rest, dtype=float)[..., None, :]
         stop = self.release * breakaway
-        return Grip(breakaway, stop, stop + self.reversal * (breakaway - stop), rest, np.abs(rest) >= stop)
+        return StictionState(breakaway, stop, stop + self.reversal * (breakaway - stop), rest, np.abs(rest) >= stop)
 
-    def apply(self, signal: Signal, memory: Grip) -> tuple[Signal, Grip]:
+    def apply(self, signal: Signal, memory: StictionState) -> tuple[Signal, StictionState]:
         """A Schmitt trigger on each wheel's duty."""
         size = np.abs(signal)
         before = np.concatenate((memory.sample, signal[..., :-1, :]), axis=-2)
@@ -152,7 +126,7 @@ def _latest(on: NDArray[np.bool_], off: NDArray[np.bool_], first: NDArray[np.boo
     return np.asarray(np.maximum.accumulate(events, axis=-2) % 2 == 1)
 
 
-class Play(NamedTuple):
+class BacklashState(NamedTuple):
     """Half the play of each wheel (2,), and how far each gear is ahead of the middle of it (…, 1, 2).
 
     Both in samples at full speed.
@@ -171,28 +145,21 @@ class Backlash:
     name: ClassVar[str] = "backlash"
     stage: ClassVar[Stage] = Stage.ACTUATION
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="gap",
-            unit="rad",
-            low=0.0,
-            high=1.5,
-            neutral=0.0,
-            probes=(0.05, 0.1, 0.2, 0.4, 0.8, 1.5),
-            source="plastic gearboxes: some degrees, worn ones some tens",
-        ),
+        Parameter(name="gap", unit="rad", low=0.0, high=1.5, neutral=0.0, probes=(0.05, 0.1, 0.2, 0.4, 0.8, 1.5),
+                  source="plastic gearboxes: some degrees, worn ones some tens"),
         IMBALANCE,
-    )
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.REVERSAL, Cue.TRANSIENTS), shown=WheelCurve.REVERSAL, forms=wheel_forms("gap")
     )
 
-    def begin(self, setting: Setting) -> Play:
+    def begin(self, context: FilterContext) -> BacklashState:
         """In the middle of the play."""
-        full_speed = setting.nominal["full_speed"] / setting.nominal["wheel_radius"]
-        half = per_wheel(self.gap, self.imbalance) / 2.0 * (setting.rate_hz / full_speed)
-        return Play(half, np.zeros_like(np.asarray(setting.rest, dtype=float))[..., None, :])
+        full_speed = context.nominal["full_speed"] / context.nominal["wheel_radius"]
+        half = per_wheel(self.gap, self.imbalance) / 2.0 * (context.rate_hz / full_speed)
+        return BacklashState(half, np.zeros_like(np.asarray(context.rest, dtype=float))[..., None, :])
 
-    def apply(self, signal: Signal, memory: Play) -> tuple[Signal, Play]:
+    def apply(self, signal: Signal, memory: BacklashState) -> tuple[Signal, BacklashState]:
         """The wheel's angle stays while it is within the gear's angle ± half the gap."""
         gear = memory.ahead + np.cumsum(signal, axis=-2)
         ahead = gear - _taken_along(gear, memory.half)
@@ -231,10 +198,10 @@ def _blocks(angles: Signal) -> Signal:
     return np.ascontiguousarray(np.moveaxis(cut, -2, 0))
 
 
-class Rolling(NamedTuple):
+class RippleState(NamedTuple):
     """The angle of each wheel as known beforehand, half the distance between them [m], and their radius [m]."""
 
-    angles: tuple[Known, Known]
+    angles: tuple[DeadReckoning, DeadReckoning]
     half: float
     radius: float
 
@@ -253,18 +220,12 @@ class WheelRipple:
     name: ClassVar[str] = "wheel_ripple"
     stage: ClassVar[Stage] = Stage.MOTION
     parameters: ClassVar[tuple[Parameter, ...]] = tuple(
-        Parameter(
-            name=f"{side}_{part}",
-            unit="",
-            low=-0.6,
-            high=0.6,
-            neutral=0.0,
-            probes=(-0.3, -0.1, -0.03, 0.03, 0.1, 0.3),
-            source="a hub some tenths of a millimetre to some millimetres off the middle of a small wheel",
-        )
+        Parameter(name=f"{side}_{part}", unit="", low=-0.6, high=0.6, neutral=0.0,
+                  probes=(-0.3, -0.1, -0.03, 0.03, 0.1, 0.3),
+                  source="a hub some tenths of a millimetre to some millimetres off the middle of a small wheel")
         for side in ("left", "right")
         for part in ("sine", "cosine")
-    )
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.LEFT_ANGLE, Cue.RIGHT_ANGLE),
         shown=Means(
@@ -276,20 +237,20 @@ class WheelRipple:
         ),
     )
 
-    def begin(self, setting: Setting) -> Rolling:
+    def begin(self, context: FilterContext) -> RippleState:
         """With the angles that are known beforehand."""
-        angles = np.asarray(setting.angles, dtype=float)
-        left, right = (beforehand(angles[..., side], setting) for side in (0, 1))
-        return Rolling((left, right), setting.nominal["effective_baseline"] / 2.0, setting.nominal["wheel_radius"])
+        angles = np.asarray(context.angles, dtype=float)
+        left, right = (start_reckoning(angles[..., side], context) for side in (0, 1))
+        return RippleState((left, right), context.nominal["effective_baseline"] / 2.0, context.nominal["wheel_radius"])
 
-    def apply(self, signal: Signal, memory: Rolling) -> tuple[Signal, Rolling]:
+    def apply(self, signal: Signal, memory: RippleState) -> tuple[Signal, RippleState]:
         """Add what each wheel gains or loses, by its angle in the middle of each sample."""
         forward, sideways, yaw = np.moveaxis(signal, -1, 0)
         parts = ((self.left_sine, self.left_cosine), (self.right_sine, self.right_cosine))
         extra, after = [], []
         for side, (sine, cosine), known in zip((-1.0, 1.0), parts, memory.angles, strict=True):
             speed = forward + side * memory.half * yaw
-            angles, later = values_along(speed / memory.radius, known)
+            angles, later = reckon(speed / memory.radius, known)
             middle = angles + speed / (2.0 * memory.radius * known.rate_hz)
             extra.append(speed * (sine * np.sin(middle) + cosine * np.cos(middle)))
             after.append(later)

@@ -12,17 +12,17 @@ from numpy.typing import NDArray
 from scipy.ndimage import correlate1d
 from scipy.special import ive
 
-from proxytune.effects.effect import Setting, Signal, Stage, Trace
+from proxytune.effects.effect import FilterContext, Signal, Stage, Trace, remember_nothing
 from proxytune.seeds import picture_generator
 from proxytune.space import Parameter
 
 
-def _size(setting: Setting) -> tuple[int, int]:
+def _size(context: FilterContext) -> tuple[int, int]:
     """Rows and columns of the pictures."""
-    return int(setting.nominal["camera_rows"]), int(setting.nominal["camera_columns"])
+    return int(context.nominal["camera_rows"]), int(context.nominal["camera_columns"])
 
 
-class Softness(NamedTuple):
+class PointSpread(NamedTuple):
     """Rows and columns of the pictures, and how a point spreads along either."""
 
     rows: int
@@ -41,24 +41,18 @@ class Defocus:
     name: ClassVar[str] = "defocus"
     stage: ClassVar[Stage] = Stage.IMAGE
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="deviation",
-            unit="",
-            low=0.0,
-            high=0.05,
-            neutral=0.0,
-            probes=(0.005, 0.01, 0.02, 0.04),
-            source="standard deviation as a share of the picture's height: 1 to 5 pixels of 480 on well-kept cameras",
-        ),
-    )
+        Parameter(name="deviation", unit="", low=0.0, high=0.05, neutral=0.0, probes=(0.005, 0.01, 0.02, 0.04),
+                  source="standard deviation as a share of the picture's height: "
+                         "1 to 5 pixels of 480 on well-kept cameras"),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = None
 
-    def begin(self, setting: Setting) -> Softness:
+    def begin(self, context: FilterContext) -> PointSpread:
         """The spot's width in pixels of this picture."""
-        rows, columns = _size(setting)
-        return Softness(rows, columns, _gaussian(self.deviation * rows))
+        rows, columns = _size(context)
+        return PointSpread(rows, columns, _gaussian(self.deviation * rows))
 
-    def apply(self, signal: Signal, memory: Softness) -> tuple[Signal, Softness]:
+    def apply(self, signal: Signal, memory: PointSpread) -> tuple[Signal, PointSpread]:
         """Spread every point; beyond its edges the picture goes on as it ends."""
         soft = signal.reshape(*signal.shape[:-1], memory.rows, memory.columns, 3)
         for axis in (-3, -2):
@@ -84,21 +78,14 @@ class Vignetting:
     name: ClassVar[str] = "vignetting"
     stage: ClassVar[Stage] = Stage.IMAGE
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="strength",
-            unit="",
-            low=0.0,
-            high=0.9,
-            neutral=0.0,
-            probes=(0.1, 0.2, 0.4, 0.7),
-            source="the cos⁴ law: 0.5 in corners 33° off the axis, 0.85 in those of a Duckiebot, 52° off",
-        ),
-    )
+        Parameter(name="strength", unit="", low=0.0, high=0.9, neutral=0.0, probes=(0.1, 0.2, 0.4, 0.7),
+                  source="the cos⁴ law: 0.5 in corners 33° off the axis, 0.85 in those of a Duckiebot, 52° off"),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = None
 
-    def begin(self, setting: Setting) -> Signal:
+    def begin(self, context: FilterContext) -> Signal:
         """The factor of every pixel and colour (channels,)."""
-        rows, columns = _size(setting)
+        rows, columns = _size(context)
         down, right = np.mgrid[:rows, :columns] + 0.5 - np.reshape([rows / 2.0, columns / 2.0], (2, 1, 1))
         share = 4.0 * (down**2 + right**2) / (rows**2 + columns**2)
         return np.repeat(1.0 - self.strength * share, 3).astype(np.float32)
@@ -121,29 +108,13 @@ class Exposure:
     name: ClassVar[str] = "exposure"
     stage: ClassVar[Stage] = Stage.IMAGE
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="gain",
-            unit="",
-            low=0.2,
-            high=4.0,
-            neutral=1.0,
-            probes=(0.5, 0.8, 1.25, 2.0),
-            source="about two stops to either side",
-        ),
-        Parameter(
-            name="gamma",
-            unit="",
-            low=0.3,
-            high=3.0,
-            neutral=1.0,
-            probes=(0.45, 0.75, 1.3, 2.2),
-            source="a sensor's linear pictures against encoded ones (sRGB): 2.2, or 1/2.2 the other way",
-        ),
-    )
+        Parameter(name="gain", unit="", low=0.2, high=4.0, neutral=1.0, probes=(0.5, 0.8, 1.25, 2.0),
+                  source="about two stops to either side"),
+        Parameter(name="gamma", unit="", low=0.3, high=3.0, neutral=1.0, probes=(0.45, 0.75, 1.3, 2.2),
+                  source="a sensor's linear pictures against encoded ones (sRGB): 2.2, or 1/2.2 the other way"),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = None
-
-    def begin(self, setting: Setting) -> None:
-        """Nothing to remember."""
+    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Brighten or darken; the picture is clipped only once it is complete."""
@@ -154,7 +125,7 @@ class Exposure:
         return (255.0 * self.gain * bright).astype(np.float32), None
 
 
-class Draw(NamedTuple):
+class NoiseState(NamedTuple):
     """The number of the next picture, and the seed of the noise."""
 
     next: int
@@ -172,23 +143,16 @@ class ImageNoise:
     name: ClassVar[str] = "image_noise"
     stage: ClassVar[Stage] = Stage.IMAGE
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="deviation",
-            unit="grey levels",
-            low=0.0,
-            high=40.0,
-            neutral=0.0,
-            probes=(2.0, 5.0, 10.0, 20.0),
-            source="standard deviation, of 255: small sensors 1 to 5 by daylight, 10 to 30 in a dim room",
-        ),
-    )
+        Parameter(name="deviation", unit="grey levels", low=0.0, high=40.0, neutral=0.0, probes=(2.0, 5.0, 10.0, 20.0),
+                  source="standard deviation, of 255: small sensors 1 to 5 by daylight, 10 to 30 in a dim room"),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = None
 
-    def begin(self, setting: Setting) -> Draw:
+    def begin(self, context: FilterContext) -> NoiseState:
         """No picture drawn yet."""
-        return Draw(0, setting.seed)
+        return NoiseState(0, context.seed)
 
-    def apply(self, signal: Signal, memory: Draw) -> tuple[Signal, Draw]:
+    def apply(self, signal: Signal, memory: NoiseState) -> tuple[Signal, NoiseState]:
         """Add each picture's own noise; the same to all members of a batch."""
         channels, end = signal.shape[-1], memory.next + signal.shape[-2]
         generators = (picture_generator(memory.seed, number) for number in range(memory.next, end))
@@ -196,14 +160,14 @@ class ImageNoise:
         return signal + self.deviation * drawn, memory._replace(next=end)
 
 
-class Exposed(NamedTuple):
+class ShutterWindow(NamedTuple):
     """The newest past pictures, and the weight of each picture in the window, the newest last."""
 
     pictures: Signal
     weights: Signal
 
 
-class Late(NamedTuple):
+class DelayedPictures(NamedTuple):
     """The newest past pictures, and how old each of their equal parts, from above, is: whole samples and a fraction."""
 
     pictures: Signal
@@ -224,24 +188,17 @@ class Blur:
     name: ClassVar[str] = "blur"
     stage: ClassVar[Stage] = Stage.IMAGE
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="blur",
-            unit="s",
-            low=0.0,
-            high=0.2,
-            neutral=0.0,
-            probes=(0.0125, 0.025, 0.05, 0.1),
-            source="box of the paper 0 to 0.10 s",
-        ),
-    )
+        Parameter(name="blur", unit="s", low=0.0, high=0.2, neutral=0.0, probes=(0.0125, 0.025, 0.05, 0.1),
+                  source="box of the paper 0 to 0.10 s"),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = None
 
-    def begin(self, setting: Setting) -> Exposed:
+    def begin(self, context: FilterContext) -> ShutterWindow:
         """As if the robot had stood before the first picture for ever."""
-        weights = _window(self.blur * setting.rate_hz)
-        return Exposed(_still(setting, weights.size - 1), weights)
+        weights = _window(self.blur * context.rate_hz)
+        return ShutterWindow(_still(context, weights.size - 1), weights)
 
-    def apply(self, signal: Signal, memory: Exposed) -> tuple[Signal, Exposed]:
+    def apply(self, signal: Signal, memory: ShutterWindow) -> tuple[Signal, ShutterWindow]:
         """Average over the window that ends with each picture."""
         length, past = signal.shape[-2], memory.weights.size - 1
         joined = np.concatenate((memory.pictures, signal), axis=-2)
@@ -268,24 +225,17 @@ class RollingShutter:
     name: ClassVar[str] = "rolling_shutter"
     stage: ClassVar[Stage] = Stage.IMAGE
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="readout",
-            unit="s",
-            low=0.0,
-            high=0.1,
-            neutral=0.0,
-            probes=(0.01, 0.02, 0.033, 0.06),
-            source="CMOS sensors: up to the time between two frames, 0.033 s at 30 Hz, 0.067 s at 15 Hz",
-        ),
-    )
+        Parameter(name="readout", unit="s", low=0.0, high=0.1, neutral=0.0, probes=(0.01, 0.02, 0.033, 0.06),
+                  source="CMOS sensors: up to the time between two frames, 0.033 s at 30 Hz, 0.067 s at 15 Hz"),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = None
 
-    def begin(self, setting: Setting) -> Late:
+    def begin(self, context: FilterContext) -> DelayedPictures:
         """As if the robot had stood before the first picture for ever."""
-        rows = int(setting.nominal["camera_rows"])
-        return _late(self.readout * setting.rate_hz * (1.0 - (np.arange(rows) + 0.5) / rows), setting)
+        rows = int(context.nominal["camera_rows"])
+        return _late(self.readout * context.rate_hz * (1.0 - (np.arange(rows) + 0.5) / rows), context)
 
-    def apply(self, signal: Signal, memory: Late) -> tuple[Signal, Late]:
+    def apply(self, signal: Signal, memory: DelayedPictures) -> tuple[Signal, DelayedPictures]:
         """Show each row as old as it is."""
         return _show(signal, memory)
 
@@ -302,41 +252,34 @@ class CameraLatency:
     name: ClassVar[str] = "camera_latency"
     stage: ClassVar[Stage] = Stage.IMAGE
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="camera_latency",
-            unit="s",
-            low=0.0,
-            high=0.5,
-            neutral=0.0,
-            probes=(0.03, 0.06, 0.1, 0.2),
-            source="USB cameras 0.03 to 0.1 s; over a wireless link some tenths of a second",
-        ),
-    )
+        Parameter(name="camera_latency", unit="s", low=0.0, high=0.5, neutral=0.0, probes=(0.03, 0.06, 0.1, 0.2),
+                  source="USB cameras 0.03 to 0.1 s; over a wireless link some tenths of a second"),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = None
 
-    def begin(self, setting: Setting) -> Late:
+    def begin(self, context: FilterContext) -> DelayedPictures:
         """As if the robot had stood before the first picture for ever."""
-        return _late(np.array([self.camera_latency * setting.rate_hz]), setting)
+        return _late(np.array([self.camera_latency * context.rate_hz]), context)
 
-    def apply(self, signal: Signal, memory: Late) -> tuple[Signal, Late]:
+    def apply(self, signal: Signal, memory: DelayedPictures) -> tuple[Signal, DelayedPictures]:
         """Show each picture as old as it is."""
         return _show(signal, memory)
 
 
-def _still(setting: Setting, count: int) -> Signal:
+def _still(context: FilterContext, count: int) -> Signal:
     """So many pictures of what was there before time zero."""
-    rest = np.asarray(setting.rest, dtype=np.float32)[..., None, :]
+    rest = np.asarray(context.rest, dtype=np.float32)[..., None, :]
     return np.repeat(rest, count, axis=-2)
 
 
-def _late(samples: Signal, setting: Setting) -> Late:
+def _late(samples: Signal, context: FilterContext) -> DelayedPictures:
     """The memory before the first picture of parts that are so many samples old."""
     whole = np.floor(samples + 1e-9).astype(np.int64)
     fraction = np.maximum(0.0, samples - whole).astype(np.float32)
-    return Late(_still(setting, int(whole.max()) + 1), whole, fraction)
+    return DelayedPictures(_still(context, int(whole.max()) + 1), whole, fraction)
 
 
-def _show(signal: Signal, memory: Late) -> tuple[Signal, Late]:
+def _show(signal: Signal, memory: DelayedPictures) -> tuple[Signal, DelayedPictures]:
     """Mix, for each part, the two pictures that its age falls between."""
     length, past, parts = signal.shape[-2], memory.pictures.shape[-2], memory.whole.size
     joined = np.concatenate((memory.pictures, signal), axis=-2)

@@ -10,11 +10,11 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from proxytune.effects.effect import Known, Setting, Signal, Stage, Trace, beforehand, values_along
+from proxytune.effects.effect import DeadReckoning, FilterContext, Signal, Stage, Trace, reckon, start_reckoning
 from proxytune.effects.features import (
     GROUPS,
     HEADING,
-    Asked,
+    AskedMotion,
     Group,
     Knot,
     Knots,
@@ -30,7 +30,7 @@ from proxytune.settings import Section, nearest
 from proxytune.space import Parameter, Theta
 
 
-class Curve(NamedTuple):
+class LearntCurve(NamedTuple):
     """One channel of one group: a weight for each of its knots, in their order."""
 
     group: str
@@ -39,14 +39,14 @@ class Curve(NamedTuple):
     weights: tuple[float, ...]
 
 
-class Seen(NamedTuple):
+class FittedRange(NamedTuple):
     """The speeds [m/s] and yaw rates [rad/s] that the fit saw: what is asked for beyond them counts as the last."""
 
     forward: tuple[float, float]
     yaw: tuple[float, float]
 
 
-class Past(NamedTuple):
+class LearntState(NamedTuple):
     """What has been so far: arrays of the batch's shape, and low-passes with their time constants last.
 
     Attributes:
@@ -75,7 +75,7 @@ class Past(NamedTuple):
     last: Signal
     ring: Signal
     dragged: Signal
-    bearing: Known
+    bearing: DeadReckoning
     rate_hz: float
     baseline: float
     full_speed: float
@@ -88,21 +88,21 @@ class Learnt:
     It vanishes where the robot stands, and beyond what the fit saw it is what it is at the edge.
     """
 
-    seen: Seen
-    curves: tuple[Curve, ...]
+    seen: FittedRange
+    curves: tuple[LearntCurve, ...]
     name: ClassVar[str] = "learnt"
     stage: ClassVar[Stage] = Stage.MOTION
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     trace: ClassVar[Trace | None] = None
 
-    def begin(self, setting: Setting) -> Past:
+    def begin(self, context: FilterContext) -> LearntState:
         """At rest, unused."""
-        batch = np.shape(setting.rest)[:-1]
+        batch = np.shape(context.rest)[:-1]
         slow = np.zeros((2, *batch, len(self._constants("transients"))))
         load = np.zeros((*batch, len(self._constants("load"))))
-        nominal = setting.nominal
-        figures = (setting.rate_hz, nominal["effective_baseline"], nominal["full_speed"])
-        return Past(
+        nominal = context.nominal
+        figures = (context.rate_hz, nominal["effective_baseline"], nominal["full_speed"])
+        return LearntState(
             np.zeros(batch),
             np.zeros(batch),
             slow,
@@ -112,11 +112,11 @@ class Learnt:
             np.zeros((2, *batch)),
             np.zeros((2, *batch, len(self._constants("ringing"))), dtype=complex),
             np.zeros((2, *batch, len(self._constants("play")))),
-            beforehand(setting.headings, setting),
+            start_reckoning(context.headings, context),
             *figures,
         )
 
-    def apply(self, signal: Signal, memory: Past) -> tuple[Signal, Past]:
+    def apply(self, signal: Signal, memory: LearntState) -> tuple[Signal, LearntState]:
         """Add what the curves say."""
         asked, after = self._asked(signal, memory)
         moved = signal + self._added(asked, memory.baseline, of_heading=False)
@@ -125,17 +125,17 @@ class Learnt:
             after = after._replace(bearing=onwards)
         return moved, after
 
-    def _bent(self, moved: Signal, asked: Asked, memory: Past) -> tuple[Signal, Known]:
+    def _bent(self, moved: Signal, asked: AskedMotion, memory: LearntState) -> tuple[Signal, DeadReckoning]:
         """The motion with what depends on the heading: sample by sample where that leads to another heading."""
         bearing, length = memory.bearing, moved.shape[-2]
         at_once = bearing.values.shape[-1] - bearing.next >= length or not self._turns_by_heading
         out = []
         for begin in range(0, length, length if at_once else 1):
             here = slice(begin, length if at_once else begin + 1)
-            course, _ = values_along(moved[..., here, 2], bearing)
+            course, _ = reckon(moved[..., here, 2], bearing)
             there = asked._replace(forward=asked.forward[..., here], yaw=asked.yaw[..., here], heading=course)
             out.append(moved[..., here, :] + self._added(there, memory.baseline, of_heading=True))
-            _, bearing = values_along(out[-1][..., 2], bearing)
+            _, bearing = reckon(out[-1][..., 2], bearing)
         return np.concatenate(out, axis=-2), bearing
 
     @property
@@ -144,16 +144,16 @@ class Learnt:
             curve.group == HEADING and GROUPS[HEADING].channels[curve.channel].to == "yaw" for curve in self.curves
         )
 
-    def recall(self, setting: Setting, signal: Signal, row: Signal, sample: Signal) -> Past:
+    def recall(self, context: FilterContext, signal: Signal, row: Signal, sample: Signal) -> LearntState:
         """The memory as of given samples of longer signals: the past of windows that begin amid drives.
 
         Args:
-            setting: Of the windows (W, …).
+            context: Of the windows (W, …).
             signal: What was asked for from the start on (rows, time, 3).
             row: The row of each window (W,).
             sample: The sample of its row at which each window begins (W,).
         """
-        whole = self.begin(Setting(setting.rate_hz, np.zeros((len(signal), 3)), setting.nominal))
+        whole = self.begin(FilterContext(context.rate_hz, np.zeros((len(signal), 3)), context.nominal))
         asked, _ = self._asked(signal, whole)
 
         def before(values: Signal) -> Signal:
@@ -162,8 +162,8 @@ class Learnt:
         slow = [
             wheel[..., None] - np.cumsum(band, axis=-1) for wheel, band in zip(asked.wheels, asked.bands, strict=True)
         ]
-        return self.begin(setting)._replace(
-            seconds=sample / setting.rate_hz,
+        return self.begin(context)._replace(
+            seconds=sample / context.rate_hz,
             use=before(asked.use),
             slow=np.stack([before(one) for one in slow]),
             load=before(asked.loads),
@@ -174,18 +174,18 @@ class Learnt:
             dragged=np.stack([before(one) for one in asked.played]),
         )
 
-    def features(self, signal: Signal, memory: Past) -> list[tuple[Signal, Signal]]:
+    def features(self, signal: Signal, memory: LearntState) -> list[tuple[Signal, Signal]]:
         """What each weight adds, curve by curve: its features (…, time, knots) and the twist of one unit (3,).
 
         The heading is taken from what is known beforehand and from the twist that is asked for.
         """
         asked, _ = self._asked(signal, memory)
-        course, _ = values_along(signal[..., 2], memory.bearing)
+        course, _ = reckon(signal[..., 2], memory.bearing)
         asked = asked._replace(heading=course)
         channels = [(curve, GROUPS[curve.group].channels[curve.channel]) for curve in self.curves]
         return [(one.basis(asked, curve.knots), _direction(one.to, memory.baseline)) for curve, one in channels]
 
-    def _added(self, asked: Asked, baseline: float, *, of_heading: bool) -> Signal:
+    def _added(self, asked: AskedMotion, baseline: float, *, of_heading: bool) -> Signal:
         added = np.zeros((*asked.forward.shape, 3))
         for curve in self.curves:
             if (curve.group == HEADING) == of_heading:
@@ -198,7 +198,7 @@ class Learnt:
         """The knots of a group, none where the effect has no such group."""
         return next((curve.knots for curve in self.curves if curve.group == group), ())
 
-    def _asked(self, signal: Signal, past: Past) -> tuple[Asked, Past]:
+    def _asked(self, signal: Signal, past: LearntState) -> tuple[AskedMotion, LearntState]:
         """What is asked for and its past, and the past of the next chunk; no heading yet."""
         forward, yaw = np.clip(signal[..., 0], *self.seen.forward), np.clip(signal[..., 2], *self.seen.yaw)
         turn = yaw * (past.baseline / 2.0)
@@ -216,7 +216,7 @@ class Learnt:
         played = play(wheels, past.dragged, self._constants("play"))
         after = past._replace(seconds=seconds[..., -1], use=use[..., -1], slow=slow[..., -1, :], load=load[..., -1, :])
         of_wheels = (bands, load, rolled, started, ringing, played)
-        asked = Asked(forward, yaw, wheels, seconds, use, np.zeros_like(yaw), *of_wheels)
+        asked = AskedMotion(forward, yaw, wheels, seconds, use, np.zeros_like(yaw), *of_wheels)
         after = after._replace(rolled=rolled[..., -1], started=started[..., -1], last=wheels[..., -1])
         return asked, after._replace(ring=ringing[..., -1, :], dragged=played[..., -1, :])
 
@@ -245,7 +245,7 @@ def is_learnt(name: str) -> bool:
 def learnt_theta(effect: Learnt) -> dict[str, float]:
     """The values of a learnt effect by their names in θ: `learnt.GROUP.CHANNEL@KNOT`."""
     theta = {}
-    for channel, bounds in zip(Seen._fields, effect.seen, strict=True):
+    for channel, bounds in zip(FittedRange._fields, effect.seen, strict=True):
         for end, value in zip(("low", "high"), bounds, strict=True):
             theta[f"{Learnt.name}.{RANGE}.{channel}@{end}"] = float(value)
     for curve in effect.curves:
@@ -271,16 +271,16 @@ def learnt_effect(theta: Theta) -> Learnt | None:
             bounds[f"{channel}@{knot}"] = value
         else:
             found.setdefault((group, channel), {})[_knot(name, knot)] = value
-    ends = [bounds.get(f"{channel}@{end}", math.nan) for channel in Seen._fields for end in ("low", "high")]
+    ends = [bounds.get(f"{channel}@{end}", math.nan) for channel in FittedRange._fields for end in ("low", "high")]
     curves = [
-        Curve(group, channel, tuple(sorted(values)), tuple(values[knot] for knot in sorted(values)))
+        LearntCurve(group, channel, tuple(sorted(values)), tuple(values[knot] for knot in sorted(values)))
         for (group, channel), values in found.items()
     ]
 
     def problem(where: str, what: str) -> SettingsError:
         return SettingsError(f"{Learnt.name}.{where}: {what}")
 
-    return _checked(Seen((ends[0], ends[1]), (ends[2], ends[3])), curves, problem)
+    return _checked(FittedRange((ends[0], ends[1]), (ends[2], ends[3])), curves, problem)
 
 
 def read_learnt(section: Section) -> dict[str, float]:
@@ -293,13 +293,13 @@ def read_learnt(section: Section) -> dict[str, float]:
     if not section.values:
         return {}
     ranges = section.section(RANGE)
-    ranges.only(Seen._fields)
-    seen = Seen(ranges.bounds("forward"), ranges.bounds("yaw"))
+    ranges.only(FittedRange._fields)
+    seen = FittedRange(ranges.bounds("forward"), ranges.bounds("yaw"))
     curves = [curve for group in section.values if group != RANGE for curve in _read_group(section, group)]
     return learnt_theta(_checked(seen, curves, section.error))
 
 
-def _read_group(section: Section, name: str) -> list[Curve]:
+def _read_group(section: Section, name: str) -> list[LearntCurve]:
     table = section.section(name)
     table.only(("knots", *GROUPS[name].channels))
     knots = tuple(_read_knot(table, value) for value in _list(table, "knots"))
@@ -309,7 +309,7 @@ def _read_group(section: Section, name: str) -> list[Curve]:
             weights = [_number(table, channel, value) for value in _list(table, channel)]
             if len(weights) != len(knots):
                 raise table.error(channel, f"must have one weight for each of {len(knots)} knots, got {len(weights)}")
-            curves.append(Curve(name, channel, knots, tuple(weights)))
+            curves.append(LearntCurve(name, channel, knots, tuple(weights)))
     if not curves:
         raise table.error("knots", f"is alone; add weights for {' or '.join(GROUPS[name].channels)}")
     return curves
@@ -334,9 +334,9 @@ def _read_knot(table: Section, value: object) -> Knot:
     return _number(table, "knots", value)
 
 
-def _checked(seen: Seen, curves: list[Curve], problem: Callable[[str, str], SettingsError]) -> Learnt:
+def _checked(seen: FittedRange, curves: list[LearntCurve], problem: Callable[[str, str], SettingsError]) -> Learnt:
     """The effect, if its values make one."""
-    for channel, (low, high) in zip(Seen._fields, seen, strict=True):
+    for channel, (low, high) in zip(FittedRange._fields, seen, strict=True):
         if not (math.isfinite(low) and math.isfinite(high) and low <= 0.0 <= high):
             raise problem(
                 f"{RANGE}.{channel}", f"must be finite with 0 in it, got [{low:g}, {high:g}]; state what was seen"
@@ -355,7 +355,7 @@ def _checked(seen: Seen, curves: list[Curve], problem: Callable[[str, str], Sett
     return Learnt(seen, tuple(sorted(curves, key=lambda curve: places.index((curve.group, curve.channel)))))
 
 
-def _check_knots(curve: Curve, where: str, group: Group, problem: Callable[[str, str], SettingsError]) -> None:
+def _check_knots(curve: LearntCurve, where: str, group: Group, problem: Callable[[str, str], SettingsError]) -> None:
     pairs = group.unit.count(",") == 1
     for knot in curve.knots:
         values = knot if isinstance(knot, tuple) else (knot,)
@@ -378,7 +378,8 @@ def learnt_text(theta: Theta) -> str:
         return ""
     lines = [f"\n# {LABEL}", f"[effects.{Learnt.name}.{RANGE}]"]
     lines += [
-        f"{channel} = [{low!r}, {high!r}]" for channel, (low, high) in zip(Seen._fields, effect.seen, strict=True)
+        f"{channel} = [{low!r}, {high!r}]"
+        for channel, (low, high) in zip(FittedRange._fields, effect.seen, strict=True)
     ]
     for group in dict.fromkeys(curve.group for curve in effect.curves):
         curves = [curve for curve in effect.curves if curve.group == group]
@@ -400,7 +401,7 @@ def _parts(name: str) -> tuple[str, str, str]:
     words = head.split(".")
     channels: Mapping[str, object] = {}
     if len(words) == 3 and (words[1] in GROUPS or words[1] == RANGE):
-        channels = GROUPS[words[1]].channels if words[1] in GROUPS else {**dict.fromkeys(Seen._fields)}
+        channels = GROUPS[words[1]].channels if words[1] in GROUPS else {**dict.fromkeys(FittedRange._fields)}
     if len(words) != 3 or words[2] not in channels or not knot:
         known = [f"{Learnt.name}.{group}.{channel}@KNOT" for group, one in GROUPS.items() for channel in one.channels]
         raise SettingsError(f"{name}: no group of the learnt effect has this name; {nearest(name, known)}")

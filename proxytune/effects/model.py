@@ -12,11 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from proxytune.effects.catalogue import CATALOGUE, PARAMETERS, SHIPPED, Catalogue, effect_of
-from proxytune.effects.effect import Effect, Memory, Recalling, Setting, Signal, Stage
+from proxytune.effects.effect import Effect, FilterContext, Memory, Recalling, Signal, Stage
 from proxytune.effects.learnt import Learnt, is_learnt, learnt_text, read_learnt
 from proxytune.errors import ExtensionError
-from proxytune.logs import GEOMETRY
-from proxytune.settings import Section, nearest, read_settings
+from proxytune.settings import GEOMETRY, Section, nearest, read_settings
 from proxytune.space import Parameter
 
 
@@ -159,29 +158,31 @@ class Chain:
 
     effects: tuple[Effect, ...]
 
-    def begin(self, setting: Setting) -> tuple[Memory, ...]:
+    def begin(self, context: FilterContext) -> tuple[Memory, ...]:
         """Every effect's memory, each with a seed of its own."""
         memories = []
         for effect in self.effects:
-            own = replace(setting, seed=zlib.crc32(effect.name.encode(), setting.seed))
+            own = replace(context, seed=zlib.crc32(effect.name.encode(), context.seed))
             memories.append(effect.begin(own))
         return tuple(memories)
 
-    def begin_amid(self, setting: Setting, whole: Setting, signal: Signal, row: Signal, sample: Signal) -> Memory:
+    def begin_amid(
+        self, context: FilterContext, whole: FilterContext, signal: Signal, row: Signal, sample: Signal
+    ) -> Memory:
         """The memories of windows that begin amid longer signals: what came before counts where an effect recalls it.
 
         Args:
-            setting: Of the windows (W, …).
+            context: Of the windows (W, …).
             whole: Of the longer signals.
             signal: Those signals from their start on (rows, time, channels).
             row: The row of each window (W,).
             sample: The sample of its row at which each window begins (W,).
         """
-        memories = list(self.begin(setting))
+        memories = list(self.begin(context))
         recalling = [number for number, effect in enumerate(self.effects) if isinstance(effect, Recalling)]
         for number, effect in enumerate(self.effects[: max(recalling, default=-1) + 1]):
             if isinstance(effect, Recalling):
-                memories[number] = effect.recall(setting, signal, row, sample)
+                memories[number] = effect.recall(context, signal, row, sample)
             signal, _ = effect.apply(signal, effect.begin(whole))
         return tuple(memories)
 

@@ -13,18 +13,19 @@ import numpy as np
 from proxytune.effects.effect import (
     TURN,
     Cue,
-    Known,
-    Lag,
+    DeadReckoning,
+    FilterContext,
+    LowPassState,
     Means,
     Panel,
-    Setting,
     Signal,
     Stage,
     Trace,
-    beforehand,
-    follow,
-    lag_of,
-    values_along,
+    low_pass,
+    low_pass_at,
+    reckon,
+    remember_nothing,
+    start_reckoning,
 )
 from proxytune.space import Parameter
 
@@ -41,23 +42,18 @@ class YawScrub:
     name: ClassVar[str] = "yaw_scrub"
     stage: ClassVar[Stage] = Stage.MOTION
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="baseline",
-            unit="m",
-            low=0.03,
-            high=3.0,
-            neutral="effective_baseline",
-            probes=(0.05, 0.08, 0.12, 0.2, 0.3, 0.5, 1.0),
-            source="wheel distance on hard tyres to a few times it with scrub: 0.16 m instead of 0.10 m on a Duckiebot",
-        ),
-    )
+        Parameter(name="baseline", unit="m", low=0.03, high=3.0, neutral="effective_baseline",
+                  probes=(0.05, 0.08, 0.12, 0.2, 0.3, 0.5, 1.0),
+                  source="wheel distance on hard tyres to a few times it with scrub: "
+                         "0.16 m instead of 0.10 m on a Duckiebot"),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.TURN_RATE, Cue.COMMAND_DIFFERENCE), shown=Means(Cue.TURN_RATE, (Panel("turn", TURN, "turn"),))
     )
 
-    def begin(self, setting: Setting) -> float:
+    def begin(self, context: FilterContext) -> float:
         """The factor on the yaw rate."""
-        return setting.nominal["effective_baseline"] / self.baseline
+        return context.nominal["effective_baseline"] / self.baseline
 
     def apply(self, signal: Signal, memory: float) -> tuple[Signal, float]:
         """Scale the yaw rate."""
@@ -72,23 +68,14 @@ class TurnSlip:
     name: ClassVar[str] = "turn_slip"
     stage: ClassVar[Stage] = Stage.MOTION
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="loss",
-            unit="s/rad",
-            low=0.0,
-            high=1.5,
-            neutral=0.0,
-            probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8),
-            source="tyres in a bend: some hundredths of the speed at 1 rad/s, tracks up to half",
-        ),
-    )
+        Parameter(name="loss", unit="s/rad", low=0.0, high=1.5, neutral=0.0, probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8),
+                  source="tyres in a bend: some hundredths of the speed at 1 rad/s, tracks up to half"),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.TURN_RATE, Cue.COMMAND_DIFFERENCE),
         shown=Means(Cue.TURN_RATE, (Panel("turn", TURN, "forward", share=True),)),
     )
-
-    def begin(self, setting: Setting) -> None:
-        """Nothing to remember."""
+    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Slow the robot down in bends, at most to a stop."""
@@ -104,23 +91,15 @@ class LateralSlip:
     name: ClassVar[str] = "lateral_slip"
     stage: ClassVar[Stage] = Stage.MOTION
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="slip",
-            unit="s",
-            low=-0.5,
-            high=0.5,
-            neutral=0.0,
-            probes=(-0.2, -0.08, -0.03, 0.03, 0.08, 0.2),
-            source="slip angle of some degrees at 1 rad/s; a pose that is not measured at the axle looks the same",
-        ),
-    )
+        Parameter(name="slip", unit="s", low=-0.5, high=0.5, neutral=0.0, probes=(-0.2, -0.08, -0.03, 0.03, 0.08, 0.2),
+                  source="slip angle of some degrees at 1 rad/s; a pose that is not measured at the axle looks the "
+                         "same"),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.TURN_RATE,),
         shown=Means(Cue.TURN_RATE, (Panel("bend", "forward speed times turn rate [m/s²]", "sideways"),)),
     )
-
-    def begin(self, setting: Setting) -> None:
-        """Nothing to remember."""
+    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Slide to the right in a bend to the left."""
@@ -140,32 +119,18 @@ class CrossCoupling:
     name: ClassVar[str] = "cross_coupling"
     stage: ClassVar[Stage] = Stage.MOTION
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="forward",
-            unit="m·s/rad²",
-            low=-0.2,
-            high=0.2,
-            neutral=0.0,
-            probes=(-0.03, -0.01, -0.003, 0.003, 0.01, 0.03),
-            source="a centre of turning some millimetres to centimetres off the middle of the axle",
-        ),
-        Parameter(
-            name="turn",
-            unit="rad/m",
-            low=-2.0,
-            high=2.0,
-            neutral=0.0,
-            probes=(-0.6, -0.2, -0.06, 0.06, 0.2, 0.6),
-            source="a dragging caster or a tyre that pulls: some degrees to tens of degrees a metre",
-        ),
-    )
+        Parameter(name="forward", unit="m·s/rad²", low=-0.2, high=0.2, neutral=0.0,
+                  probes=(-0.03, -0.01, -0.003, 0.003, 0.01, 0.03),
+                  source="a centre of turning some millimetres to centimetres off the middle of the axle"),
+        Parameter(name="turn", unit="rad/m", low=-2.0, high=2.0, neutral=0.0,
+                  probes=(-0.6, -0.2, -0.06, 0.06, 0.2, 0.6),
+                  source="a dragging caster or a tyre that pulls: some degrees to tens of degrees a metre"),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.TURN_RATE, Cue.DIRECTION, Cue.COMMAND_DIFFERENCE),
         shown=Means(Cue.TURN_RATE, (Panel("turn", TURN, "forward"), Panel("forward", "forward speed [m/s]", "turn"))),
     )
-
-    def begin(self, setting: Setting) -> None:
-        """Nothing to remember."""
+    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Add to each what comes of the other."""
@@ -182,35 +147,19 @@ class Understeer:
     name: ClassVar[str] = "understeer"
     stage: ClassVar[Stage] = Stage.MOTION
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="gain",
-            unit="s/m",
-            low=0.0,
-            high=5.0,
-            neutral=0.0,
-            probes=(0.03, 0.1, 0.3, 0.8, 2.0),
-            source="tyres that slip sideways: some tenths of the turn at 1 m/s, small robots more",
-        ),
-    )
+        Parameter(name="gain", unit="s/m", low=0.0, high=5.0, neutral=0.0, probes=(0.03, 0.1, 0.3, 0.8, 2.0),
+                  source="tyres that slip sideways: some tenths of the turn at 1 m/s, small robots more"),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.TURN_RATE, Cue.COMMAND_DIFFERENCE),
         shown=Means(Cue.TURN_RATE, (Panel("forward", "forward speed [m/s]", "turn", share=True),)),
     )
-
-    def begin(self, setting: Setting) -> None:
-        """Nothing to remember."""
+    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Scale the yaw rate."""
         turned = signal[..., 2] / (1.0 + self.gain * np.abs(signal[..., 0]))
         return np.stack((signal[..., 0], signal[..., 1], turned), axis=-1), None
-
-
-class Turning(NamedTuple):
-    """The yaw rate at the end of the last sample (…, 1), and how it follows."""
-
-    yaw: Signal
-    lag: Lag
 
 
 @dataclass(frozen=True)
@@ -221,28 +170,22 @@ class YawLag:
     name: ClassVar[str] = "yaw_lag"
     stage: ClassVar[Stage] = Stage.MOTION
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="time_constant",
-            unit="s",
-            low=0.0,
-            high=1.0,
-            neutral=0.0,
-            probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8),
-            source="a body that has to be turned on tyres that give: some hundredths to tenths of a second",
-        ),
-    )
+        Parameter(name="time_constant", unit="s", low=0.0, high=1.0, neutral=0.0,
+                  probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8),
+                  source="a body that has to be turned on tyres that give: some hundredths to tenths of a second"),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.TRANSIENTS, Cue.TURN_RATE), shown=Means(Cue.TURN_RATE, (Panel("turn", TURN, "turn"),))
     )
 
-    def begin(self, setting: Setting) -> Turning:
+    def begin(self, context: FilterContext) -> LowPassState:
         """The resting yaw rate has been reached."""
-        return Turning(np.asarray(setting.rest, dtype=float)[..., 2:], lag_of(self.time_constant * setting.rate_hz))
+        return low_pass_at(np.asarray(context.rest, dtype=float)[..., 2:], self.time_constant * context.rate_hz)
 
-    def apply(self, signal: Signal, memory: Turning) -> tuple[Signal, Turning]:
+    def apply(self, signal: Signal, memory: LowPassState) -> tuple[Signal, LowPassState]:
         """The mean yaw rate over each sample."""
-        late, yaw = follow(signal[..., 2:], memory.yaw, memory.lag)
-        return np.concatenate((signal[..., :2], late), axis=-1), memory._replace(yaw=yaw)
+        late, after = low_pass(signal[..., 2:], memory)
+        return np.concatenate((signal[..., :2], late), axis=-1), after
 
 
 REST_SPEED = 0.02
@@ -267,28 +210,15 @@ class FloorSlope:
     stage: ClassVar[Stage] = Stage.MOTION
     parameters: ClassVar[tuple[Parameter, ...]] = (
         *(
-            Parameter(
-                name=axis,
-                unit="m/s",
-                low=-0.3,
-                high=0.3,
-                neutral=0.0,
-                probes=(-0.1, -0.04, -0.015, 0.015, 0.04, 0.1),
-                source="speed that a small robot loses on a floor some degrees from level",
-            )
+            Parameter(name=axis, unit="m/s", low=-0.3, high=0.3, neutral=0.0,
+                      probes=(-0.1, -0.04, -0.015, 0.015, 0.04, 0.1),
+                      source="speed that a small robot loses on a floor some degrees from level")
             for axis in ("x", "y")
         ),
-        Parameter(
-            name="push",
-            unit="",
-            low=0.0,
-            high=2.0,
-            neutral=0.0,
-            probes=(0.25, 0.5, 1.0, 1.0, 0.5, 0.25),
-            source="0 for tyres that hold sideways, 1 for a robot that slides as easily across as along",
-            shape=True,
-        ),
-    )
+        Parameter(name="push", unit="", low=0.0, high=2.0, neutral=0.0, probes=(0.25, 0.5, 1.0, 1.0, 0.5, 0.25),
+                  source="0 for tyres that hold sideways, 1 for a robot that slides as easily across as along",
+                  shape=True),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.HEADING,),
         shown=Means(
@@ -296,14 +226,14 @@ class FloorSlope:
         ),
     )
 
-    def begin(self, setting: Setting) -> Known:
+    def begin(self, context: FilterContext) -> DeadReckoning:
         """With the headings that are known beforehand."""
-        return beforehand(setting.headings, setting)
+        return start_reckoning(context.headings, context)
 
-    def apply(self, signal: Signal, memory: Known) -> tuple[Signal, Known]:
+    def apply(self, signal: Signal, memory: DeadReckoning) -> tuple[Signal, DeadReckoning]:
         """Slow the robot down by the slope along its heading at the start of each sample."""
         forward, sideways, yaw = np.moveaxis(signal, -1, 0)
-        headings, after = values_along(yaw, memory)
+        headings, after = reckon(yaw, memory)
         cosine, sine = np.cos(headings), np.sin(headings)
         moving = np.minimum(1.0, np.abs(forward) / REST_SPEED)
         slowed = forward - (self.x * cosine + self.y * sine) * moving
@@ -311,7 +241,7 @@ class FloorSlope:
         return np.stack((slowed, pushed, yaw), axis=-1), after
 
 
-class Walk(NamedTuple):
+class PoseReckoning(NamedTuple):
     """Poses known beforehand (…, n, 3), number of the next sample, the pose at its start (…, 3), samples per second."""
 
     known: Signal
@@ -334,55 +264,33 @@ class SlipperyPatch:
     name: ClassVar[str] = "slippery_patch"
     stage: ClassVar[Stage] = Stage.MOTION
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="loss",
-            unit="",
-            low=0.0,
-            high=0.9,
-            neutral=0.0,
-            probes=(0.05, 0.1, 0.2, 0.4),
-            source="carpet, dust and wet floors: some hundredths to half of the motion",
-        ),
+        Parameter(name="loss", unit="", low=0.0, high=0.9, neutral=0.0, probes=(0.05, 0.1, 0.2, 0.4),
+                  source="carpet, dust and wet floors: some hundredths to half of the motion"),
         *(
-            Parameter(
-                name=axis,
-                unit="m",
-                low=-20.0,
-                high=20.0,
-                neutral=0.0,
-                probes=(-1.0, -0.5, 0.5, 1.0),
-                source="where the robot drives; a diagnosis looks over all places that were driven through",
-                shape=True,
-            )
+            Parameter(name=axis, unit="m", low=-20.0, high=20.0, neutral=0.0, probes=(-1.0, -0.5, 0.5, 1.0),
+                      source="where the robot drives; a diagnosis looks over all places that were driven through",
+                      shape=True)
             for axis in ("x", "y")
         ),
-        Parameter(
-            name="radius",
-            unit="m",
-            low=0.1,
-            high=5.0,
-            neutral=0.5,
-            probes=(0.3, 0.8, 1.5, 2.5),
-            source="from a puddle to a carpet",
-            shape=True,
-        ),
-    )
+        Parameter(name="radius", unit="m", low=0.1, high=5.0, neutral=0.5, probes=(0.3, 0.8, 1.5, 2.5),
+                  source="from a puddle to a carpet", shape=True),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.POSITION,),
         shown=Means(Cue.POSITION, tuple(Panel(axis, f"{axis} [m]", "forward", share=True) for axis in ("x", "y"))),
         placed=True,
     )
 
-    def begin(self, setting: Setting) -> Walk:
+    def begin(self, context: FilterContext) -> PoseReckoning:
         """With the poses that are known beforehand."""
-        places, headings = np.asarray(setting.places, dtype=float), np.asarray(setting.headings, dtype=float)
+        places, headings = np.asarray(context.places, dtype=float), np.asarray(context.headings, dtype=float)
         count = min(places.shape[-2], headings.shape[-1])
-        shape = np.broadcast_shapes(places.shape[:-2], headings.shape[:-1], np.shape(setting.rest)[:-1])
+        shape = np.broadcast_shapes(places.shape[:-2], headings.shape[:-1], np.shape(context.rest)[:-1])
         parts = (places[..., :count, 0], places[..., :count, 1], headings[..., :count])
         known = np.stack([np.broadcast_to(part, (*shape, count)) for part in parts], axis=-1)
-        return Walk(known, 0, known[..., 0, :], setting.rate_hz)
+        return PoseReckoning(known, 0, known[..., 0, :], context.rate_hz)
 
-    def apply(self, signal: Signal, memory: Walk) -> tuple[Signal, Walk]:
+    def apply(self, signal: Signal, memory: PoseReckoning) -> tuple[Signal, PoseReckoning]:
         """Scale the motion by where the robot is at the start of each sample."""
         length = signal.shape[-2]
         known = memory.known[..., memory.next : memory.next + length, :]
@@ -420,24 +328,16 @@ class MarkerOffset:
     name: ClassVar[str] = "marker_offset"
     stage: ClassVar[Stage] = Stage.MEASUREMENT
     parameters: ClassVar[tuple[Parameter, ...]] = tuple(
-        Parameter(
-            name=direction,
-            unit="m",
-            low=-0.3,
-            high=0.3,
-            neutral=0.0,
-            probes=(-0.1, -0.04, -0.015, 0.015, 0.04, 0.1),
-            source="a marker is anywhere on the robot: up to half its length",
-        )
+        Parameter(name=direction, unit="m", low=-0.3, high=0.3, neutral=0.0,
+                  probes=(-0.1, -0.04, -0.015, 0.015, 0.04, 0.1),
+                  source="a marker is anywhere on the robot: up to half its length")
         for direction in ("forward", "left")
-    )
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.TURN_RATE,),
         shown=Means(Cue.TURN_RATE, (Panel("turn", TURN, "forward"), Panel("turn", TURN, "sideways"))),
     )
-
-    def begin(self, setting: Setting) -> None:
-        """Nothing to remember."""
+    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Move each pose to the tracked point."""
@@ -456,22 +356,14 @@ class HeadingOffset:
     name: ClassVar[str] = "heading_offset"
     stage: ClassVar[Stage] = Stage.MEASUREMENT
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="angle",
-            unit="deg",
-            low=-45.0,
-            high=45.0,
-            neutral=0.0,
-            probes=(-20.0, -8.0, -3.0, 3.0, 8.0, 20.0),
-            source="a marker stuck on by hand: some degrees; more where its axes are another's",
-        ),
-    )
+        Parameter(name="angle", unit="deg", low=-45.0, high=45.0, neutral=0.0,
+                  probes=(-20.0, -8.0, -3.0, 3.0, 8.0, 20.0),
+                  source="a marker stuck on by hand: some degrees; more where its axes are another's"),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.TURN_RATE,), shown=Means(Cue.TURN_RATE, (Panel("forward", "forward speed [m/s]", "sideways"),))
     )
-
-    def begin(self, setting: Setting) -> None:
-        """Nothing to remember."""
+    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Add the angle to each heading."""

@@ -12,30 +12,23 @@ import numpy as np
 
 from proxytune.effects.effect import (
     Cue,
+    FilterContext,
     Form,
-    Lag,
+    LowPassState,
     Means,
     Panel,
-    Setting,
     Signal,
     Stage,
     Trace,
     WheelCurve,
-    follow,
-    lag_of,
+    low_pass,
+    low_pass_at,
+    remember_nothing,
 )
 from proxytune.space import Parameter
 
-IMBALANCE = Parameter(
-    name="imbalance",
-    unit="",
-    low=-1.0,
-    high=1.0,
-    neutral=0.0,
-    probes=(-1.0, -0.5, 0.5, 1.0),
-    source="by definition: −1 is the left wheel alone, 1 the right one",
-    shape=True,
-)
+IMBALANCE = Parameter(name="imbalance", unit="", low=-1.0, high=1.0, neutral=0.0, probes=(-1.0, -0.5, 0.5, 1.0),
+                      source="by definition: −1 is the left wheel alone, 1 the right one", shape=True)  # fmt: skip
 """How much more of an effect the right wheel has than the left one."""
 
 SLIGHT_IMBALANCE = replace(IMBALANCE, probes=(-0.5, -0.2, 0.2, 0.5))
@@ -69,20 +62,11 @@ class DriverMap:
     name: ClassVar[str] = "driver_map"
     stage: ClassVar[Stage] = Stage.ACTUATION
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="offset",
-            unit="duty",
-            low=0.0,
-            high=0.4,
-            neutral=0.0,
-            probes=(0.02, 0.04, 0.08, 0.15, 0.3),
-            source="Duckiebot motor driver: (195|u| + 60)/255 above a duty of 0.01",
-        ),
-    )
+        Parameter(name="offset", unit="duty", low=0.0, high=0.4, neutral=0.0, probes=(0.02, 0.04, 0.08, 0.15, 0.3),
+                  source="Duckiebot motor driver: (195|u| + 60)/255 above a duty of 0.01"),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(cues=(Cue.WHEEL_COMMAND,), shown=WheelCurve.STEADY)
-
-    def begin(self, setting: Setting) -> None:
-        """Nothing to remember."""
+    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Map each sample on its own."""
@@ -99,20 +83,11 @@ class Trim:
     name: ClassVar[str] = "trim"
     stage: ClassVar[Stage] = Stage.ACTUATION
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="trim",
-            unit="",
-            low=-0.5,
-            high=0.5,
-            neutral=0.0,
-            probes=(-0.2, -0.1, -0.05, 0.05, 0.1, 0.2),
-            source="31 calibrated Duckiebots: −0.014 ± 0.057; box of the paper ±0.3",
-        ),
-    )
+        Parameter(name="trim", unit="", low=-0.5, high=0.5, neutral=0.0, probes=(-0.2, -0.1, -0.05, 0.05, 0.1, 0.2),
+                  source="31 calibrated Duckiebots: −0.014 ± 0.057; box of the paper ±0.3"),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(cues=(Cue.WHEEL_COMMAND,), shown=WheelCurve.STEADY)
-
-    def begin(self, setting: Setting) -> None:
-        """Nothing to remember."""
+    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Scale the two wheels apart."""
@@ -128,36 +103,20 @@ class WheelGain:
     name: ClassVar[str] = "wheel_gain"
     stage: ClassVar[Stage] = Stage.ACTUATION
     parameters: ClassVar[tuple[Parameter, ...]] = tuple(
-        Parameter(
-            name=side,
-            unit="",
-            low=0.3,
-            high=1.7,
-            neutral=1.0,
-            probes=(0.7, 0.85, 0.95, 1.05, 1.15, 1.3),
-            source="31 calibrated Duckiebots: 1.01 ± 0.14",
-        )
+        Parameter(name=side, unit="", low=0.3, high=1.7, neutral=1.0, probes=(0.7, 0.85, 0.95, 1.05, 1.15, 1.3),
+                  source="31 calibrated Duckiebots: 1.01 ± 0.14")
         for side in ("left", "right")
-    )
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.WHEEL_COMMAND,),
         shown=WheelCurve.STEADY,
         forms=(Form((("left", "right"),)), Form((("left",),), "left wheel"), Form((("right",),), "right wheel")),
     )
-
-    def begin(self, setting: Setting) -> None:
-        """Nothing to remember."""
+    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Scale each wheel."""
         return signal * np.array((self.left, self.right)), None
-
-
-class Spin(NamedTuple):
-    """Wheel speed at the end of the last sample, and the lag of the wheels: one for both, or one for each."""
-
-    speed: Signal
-    lags: tuple[Lag, ...]
 
 
 @dataclass(frozen=True)
@@ -169,42 +128,30 @@ class MotorLag:
     name: ClassVar[str] = "motor_lag"
     stage: ClassVar[Stage] = Stage.ACTUATION
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="time_constant",
-            unit="s",
-            low=0.0,
-            high=1.0,
-            neutral="motor_time_constant",
-            probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8),
-            source="gym-duckietown's dynamics fit: 0.20 s",
-        ),
+        Parameter(name="time_constant", unit="s", low=0.0, high=1.0, neutral="motor_time_constant",
+                  probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8), source="gym-duckietown's dynamics fit: 0.20 s"),
         SLIGHT_IMBALANCE,
-    )
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.TRANSIENTS, Cue.WHEEL_COMMAND), shown=WheelCurve.STEP, forms=wheel_forms("time_constant")
     )
 
-    def begin(self, setting: Setting) -> Spin:
+    def begin(self, context: FilterContext) -> tuple[LowPassState, ...]:
         """Wheels turn at the speed asked of them before time zero."""
-        samples = per_wheel(self.time_constant * setting.rate_hz, self.imbalance)
-        # One filter over both wheels is faster than one for each
-        apart = samples if self.imbalance else samples[:1]
-        return Spin(np.asarray(setting.rest, dtype=float), tuple(lag_of(value) for value in apart.tolist()))
+        samples = per_wheel(self.time_constant * context.rate_hz, self.imbalance).tolist()
+        rest = np.asarray(context.rest, dtype=float)
+        if not self.imbalance:  # one filter over both wheels is faster than one for each
+            return (low_pass_at(rest, samples[0]),)
+        return tuple(low_pass_at(rest[..., side : side + 1], value) for side, value in enumerate(samples))
 
-    def apply(self, signal: Signal, memory: Spin) -> tuple[Signal, Spin]:
+    def apply(self, signal: Signal, memory: tuple[LowPassState, ...]) -> tuple[Signal, tuple[LowPassState, ...]]:
         """The mean speed over each sample, exact for a command that holds over it."""
-        if len(memory.lags) == 1:
-            mean, speed = follow(signal, memory.speed, memory.lags[0])
-            return mean, Spin(speed, memory.lags)
-        sides = [
-            follow(signal[..., side : side + 1], memory.speed[..., side : side + 1], lag)
-            for side, lag in enumerate(memory.lags)
-        ]
-        mean, speed = (np.concatenate(parts, axis=-1) for parts in zip(*sides, strict=True))
-        return mean, memory._replace(speed=speed)
+        parts = [signal] if len(memory) == 1 else [signal[..., :1], signal[..., 1:]]
+        means, after = zip(*(low_pass(*part) for part in zip(parts, memory, strict=True)), strict=True)
+        return np.concatenate(means, axis=-1), after
 
 
-class Ramp(NamedTuple):
+class SlewState(NamedTuple):
     """The newest duty (…, 2), and how far it can change within a sample."""
 
     duty: Signal
@@ -219,24 +166,17 @@ class SlewRate:
     name: ClassVar[str] = "slew_rate"
     stage: ClassVar[Stage] = Stage.ACTUATION
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="rise_time",
-            unit="s",
-            low=0.0,
-            high=3.0,
-            neutral=0.0,
-            probes=(0.05, 0.1, 0.2, 0.4, 0.8, 1.6),
-            source="ramps of motor drivers: some tenths of a second to a few seconds from rest to full speed",
-        ),
-    )
+        Parameter(name="rise_time", unit="s", low=0.0, high=3.0, neutral=0.0, probes=(0.05, 0.1, 0.2, 0.4, 0.8, 1.6),
+                  source="ramps of motor drivers: some tenths of a second to a few seconds from rest to full speed"),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(cues=(Cue.TRANSIENTS, Cue.WHEEL_COMMAND), shown=WheelCurve.STEP)
 
-    def begin(self, setting: Setting) -> Ramp:
+    def begin(self, context: FilterContext) -> SlewState:
         """The resting duty has been reached."""
-        step = 1.0 / (self.rise_time * setting.rate_hz) if self.rise_time > 0.0 else np.inf
-        return Ramp(np.asarray(setting.rest, dtype=float), step)
+        step = 1.0 / (self.rise_time * context.rate_hz) if self.rise_time > 0.0 else np.inf
+        return SlewState(np.asarray(context.rest, dtype=float), step)
 
-    def apply(self, signal: Signal, memory: Ramp) -> tuple[Signal, Ramp]:
+    def apply(self, signal: Signal, memory: SlewState) -> tuple[Signal, SlewState]:
         """Go towards each sample by one step at most."""
         series = np.moveaxis(np.asarray(signal, dtype=float), -2, -1)
         start = np.broadcast_to(memory.duty, series.shape[:-1])
@@ -265,13 +205,6 @@ def _ramps(wanted: Signal, start: Signal, step: float) -> Signal:
     return np.asarray((held[of] + ramp).reshape(wanted.shape))
 
 
-class Heat(NamedTuple):
-    """The load of late (…, 1), and how it follows the load of the moment."""
-
-    load: Signal
-    lag: Lag
-
-
 @dataclass(frozen=True)
 class ThermalFade:
     """Both wheels turn slower the harder they have worked of late, by `loss` after long work at full duty.
@@ -284,40 +217,25 @@ class ThermalFade:
     name: ClassVar[str] = "thermal_fade"
     stage: ClassVar[Stage] = Stage.ACTUATION
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="loss",
-            unit="",
-            low=0.0,
-            high=0.9,
-            neutral=0.0,
-            probes=(0.05, 0.1, 0.2, 0.4, 0.8),
-            source="windings that are 80 °C warmer have a third more resistance",
-        ),
-        Parameter(
-            name="time_constant",
-            unit="s",
-            low=0.5,
-            high=120.0,
-            neutral=8.0,
-            probes=(2.0, 4.0, 15.0, 40.0),
-            source="small motors warm up within seconds to minutes",
-            shape=True,
-        ),
-    )
+        Parameter(name="loss", unit="", low=0.0, high=0.9, neutral=0.0, probes=(0.05, 0.1, 0.2, 0.4, 0.8),
+                  source="windings that are 80 °C warmer have a third more resistance"),
+        Parameter(name="time_constant", unit="s", low=0.5, high=120.0, neutral=8.0, probes=(2.0, 4.0, 15.0, 40.0),
+                  source="small motors warm up within seconds to minutes", shape=True),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.USE, Cue.TIME),
         shown=Means(Cue.USE, (Panel("", "use so far [s at full duty]", "forward", share=True),)),
     )
 
-    def begin(self, setting: Setting) -> Heat:
+    def begin(self, context: FilterContext) -> LowPassState:
         """With motors as warm as the resting duty keeps them."""
-        rest = np.abs(np.asarray(setting.rest, dtype=float)).mean(axis=-1, keepdims=True)
-        return Heat(rest, lag_of(self.time_constant * setting.rate_hz))
+        rest = np.abs(np.asarray(context.rest, dtype=float)).mean(axis=-1, keepdims=True)
+        return low_pass_at(rest, self.time_constant * context.rate_hz)
 
-    def apply(self, signal: Signal, memory: Heat) -> tuple[Signal, Heat]:
+    def apply(self, signal: Signal, memory: LowPassState) -> tuple[Signal, LowPassState]:
         """Slow both wheels by one factor."""
-        late, load = follow(np.abs(signal).mean(axis=-1, keepdims=True), memory.load, memory.lag)
-        return signal * (1.0 - self.loss * np.minimum(1.0, late)), memory._replace(load=load)
+        load, after = low_pass(np.abs(signal).mean(axis=-1, keepdims=True), memory)
+        return signal * (1.0 - self.loss * np.minimum(1.0, load)), after
 
 
 SMALLEST_LIMIT = 0.05
@@ -333,22 +251,15 @@ class Saturation:
     name: ClassVar[str] = "saturation"
     stage: ClassVar[Stage] = Stage.ACTUATION
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="limit",
-            unit="duty",
-            low=0.1,
-            high=1.0,
-            neutral=1.0,
-            probes=(0.15, 0.25, 0.4, 0.6, 0.8, 0.9),
-            source="drivers that cap the duty, batteries run down: 0.5 to 1",
-        ),
+        Parameter(name="limit", unit="duty", low=0.1, high=1.0, neutral=1.0, probes=(0.15, 0.25, 0.4, 0.6, 0.8, 0.9),
+                  source="drivers that cap the duty, batteries run down: 0.5 to 1"),
         IMBALANCE,
-    )
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.WHEEL_COMMAND,), shown=WheelCurve.STEADY, forms=wheel_forms("limit")
     )
 
-    def begin(self, setting: Setting) -> Signal:
+    def begin(self, context: FilterContext) -> Signal:
         """The limit of each wheel (2,)."""
         return np.maximum(SMALLEST_LIMIT, 1.0 - per_wheel(1.0 - self.limit, self.imbalance))
 
@@ -361,7 +272,7 @@ def _fading(cue: Cue, label: str) -> Means:
     return Means(cue, (Panel("", label, "forward", share=True),))
 
 
-class Charge(NamedTuple):
+class BatteryState(NamedTuple):
     """Minutes at full duty since the start (…,), number of the next sample, and how many minutes a sample lasts."""
 
     use: Signal
@@ -383,34 +294,14 @@ class BatterySag:
     name: ClassVar[str] = "battery_sag"
     stage: ClassVar[Stage] = Stage.ACTUATION
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="load",
-            unit="",
-            low=0.0,
-            high=0.8,
-            neutral=0.0,
-            probes=(0.03, 0.06, 0.12, 0.25, 0.5),
-            source="inner resistance of small batteries: some hundredths at full load, old ones some tenths",
-        ),
-        Parameter(
-            name="fade",
-            unit="1/min",
-            low=0.0,
-            high=1.0,
-            neutral=0.0,
-            probes=(0.03, 0.06, 0.12, 0.25, 0.5, 1.0),
-            source="a battery that lasts minutes to an hour at full duty",
-        ),
-        Parameter(
-            name="fade_with_time",
-            unit="1/min",
-            low=0.0,
-            high=1.0,
-            neutral=0.0,
-            probes=(0.03, 0.06, 0.12, 0.25, 0.5, 1.0),
-            source="what else a battery feeds empties it too, driving or not",
-        ),
-    )
+        Parameter(name="load", unit="", low=0.0, high=0.8, neutral=0.0, probes=(0.03, 0.06, 0.12, 0.25, 0.5),
+                  source="inner resistance of small batteries: some hundredths at full load, old ones some tenths"),
+        Parameter(name="fade", unit="1/min", low=0.0, high=1.0, neutral=0.0, probes=(0.03, 0.06, 0.12, 0.25, 0.5, 1.0),
+                  source="a battery that lasts minutes to an hour at full duty"),
+        Parameter(name="fade_with_time", unit="1/min", low=0.0, high=1.0, neutral=0.0,
+                  probes=(0.03, 0.06, 0.12, 0.25, 0.5, 1.0),
+                  source="what else a battery feeds empties it too, driving or not"),
+    )  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.USE, Cue.TIME),
         shown=WheelCurve.STEADY,
@@ -421,11 +312,11 @@ class BatterySag:
         ),
     )
 
-    def begin(self, setting: Setting) -> Charge:
+    def begin(self, context: FilterContext) -> BatteryState:
         """With the battery as it is at the start."""
-        return Charge(np.zeros(np.shape(setting.rest)[:-1]), 0, 1.0 / (60.0 * setting.rate_hz))
+        return BatteryState(np.zeros(np.shape(context.rest)[:-1]), 0, 1.0 / (60.0 * context.rate_hz))
 
-    def apply(self, signal: Signal, memory: Charge) -> tuple[Signal, Charge]:
+    def apply(self, signal: Signal, memory: BatteryState) -> tuple[Signal, BatteryState]:
         """Slow both wheels by one factor, its fading taken at the middle of each sample."""
         mean = (np.abs(signal[..., 0]) + np.abs(signal[..., 1])) / 2.0
         used = memory.use[..., None] + np.cumsum(mean, axis=-1) * memory.minutes

@@ -1,0 +1,1 @@
+from .family import PolicyAgent as PolicyAgent, agent_of as agent_of

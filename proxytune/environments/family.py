@@ -30,7 +30,7 @@ from proxytune.settings import Section, nearest
 from proxytune.space import Theta
 
 
-class Policy(Protocol):
+class Predictor(Protocol):
     """What has learnt to act, as stable-baselines3's algorithms and policies."""
 
     def predict(self, observation: Any, *, deterministic: bool) -> Any:
@@ -38,7 +38,7 @@ class Policy(Protocol):
         ...
 
 
-def ask_policy(policy: Policy, observation: Any, state: Any, *, deterministic: bool = True) -> tuple[Any, Any]:
+def ask_policy(policy: Predictor, observation: Any, state: Any, *, deterministic: bool = True) -> tuple[Any, Any]:
     """A policy's action, and its state for the next observation, None where it has none."""
     known = {} if state is None else {"state": state}
     answer = policy.predict(observation, deterministic=deterministic, **known)
@@ -54,7 +54,7 @@ class PolicyAgent:
         deterministic: Whether it takes its likeliest action; one that draws would make episodes differ at one seed.
     """
 
-    policy: Policy
+    policy: Predictor
     deterministic: bool = True
 
     def begin(self, robot: Robot) -> None:
@@ -66,7 +66,7 @@ class PolicyAgent:
         return np.clip(np.asarray(action, dtype=float), -1.0, 1.0), memory
 
 
-def agent_of(policy: Policy, *, deterministic: bool = True) -> PolicyAgent:
+def agent_of(policy: Predictor, *, deterministic: bool = True) -> PolicyAgent:
     """An agent for studies of anything with `predict(observation, deterministic=…) -> (action, state)`.
 
     Args:
@@ -174,7 +174,7 @@ Infos = list[Mapping[str, Any]]
 FOLDS: Mapping[str, Any] = {"sum": np.sum, "mean": np.mean, "max": np.max, "min": np.min}
 
 
-class Wrapped:
+class WrappedEnvironment:
     """An environment behind effects, in the midst of an episode."""
 
     def __init__(self, environment: Any, actuators: Actuators, sensors: Sensors) -> None:
@@ -202,7 +202,7 @@ class Wrapped:
         return self._sensors.show(seen), bool(terminated or truncated)
 
 
-def play(wrapped: Wrapped, act: Act, first: Any, space: Any, steps: int) -> None:
+def play(wrapped: WrappedEnvironment, act: Act, first: Any, space: Any, steps: int) -> None:
     """Let an agent act from its first observation on, for so many steps at most.
 
     Raises:
@@ -215,7 +215,7 @@ def play(wrapped: Wrapped, act: Act, first: Any, space: Any, steps: int) -> None
             return
 
 
-def score(wrapped: Wrapped, metrics: tuple[EpisodeMetric, ...]) -> dict[str, float]:
+def score(wrapped: WrappedEnvironment, metrics: tuple[EpisodeMetric, ...]) -> dict[str, float]:
     """The metrics of an episode that is over.
 
     Raises:
@@ -240,9 +240,9 @@ def _of_info(infos: Infos, metric: EpisodeMetric) -> float:
 
 def wrap(
     environment: Any, effects: tuple[Effect, ...], spaces: Spaces, state: tuple[int, ...] | None, seed: int
-) -> Wrapped:
+) -> WrappedEnvironment:
     """An environment behind the effects of a domain instance."""
-    return Wrapped(environment, Actuators(effects, spaces, seed), Sensors(effects, spaces, state, seed))
+    return WrappedEnvironment(environment, Actuators(effects, spaces, seed), Sensors(effects, spaces, state, seed))
 
 
 STARTS = 1000

@@ -84,10 +84,10 @@ def _even(number: float) -> int:
     return 2 * round(number / 2.0)
 
 
-Interval = tuple[float, float]
+ValueRange = tuple[float, float]
 
 
-def read_theta(given: Mapping[str, Any], known: Mapping[str, Parameter]) -> dict[str, Interval]:
+def read_theta(given: Mapping[str, Any], known: Mapping[str, Parameter]) -> dict[str, ValueRange]:
     """The interval of each parameter, of no width where its value is fixed.
 
     Args:
@@ -102,12 +102,12 @@ def read_theta(given: Mapping[str, Any], known: Mapping[str, Parameter]) -> dict
     return {name: _interval(name, value, known) for name, value in given.items()}
 
 
-def draw_theta(intervals: Mapping[str, Interval], generator: np.random.Generator) -> Theta:
+def draw_theta(intervals: Mapping[str, ValueRange], generator: np.random.Generator) -> Theta:
     """θ with each parameter drawn evenly from its interval, in the order of their names."""
     return {name: float(generator.uniform(*intervals[name])) for name in sorted(intervals)}
 
 
-def _interval(name: str, value: Any, known: Mapping[str, Parameter]) -> Interval:
+def _interval(name: str, value: Any, known: Mapping[str, Parameter]) -> ValueRange:
     if name not in known:
         raise InputError(f"theta: unknown parameter '{name}'; {nearest(name, known)}")
     parameter, ends = known[name], _numbers(value)
@@ -189,7 +189,7 @@ SEEDS = 2**32
 """How many seeds of episodes there are, as in a study."""
 
 
-class _Drive(NamedTuple):
+class _EpisodeUnderWay(NamedTuple):
     """An episode under way."""
 
     plant: Plant
@@ -250,7 +250,7 @@ class LaneFollowingEnv(gymnasium.Env[Picture, NDArray[Any]]):
         camera = robot.camera_figures()
         self.observation_space = gymnasium.spaces.Box(0, 255, (camera.rows, camera.columns, 3), np.uint8)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32)
-        self._drive: _Drive | None = None
+        self._drive: _EpisodeUnderWay | None = None
         self._step, self._over = 0, True
 
     def reset(
@@ -273,7 +273,7 @@ class LaneFollowingEnv(gymnasium.Env[Picture, NDArray[Any]]):
         course = self.family.course(episode, self.family.seconds)
         plant = self.family.plant_at(instance.robot, course.start)
         tally = Tally(self.family.map, self.family.seconds, course.start)
-        self._drive = _Drive(plant, course, Rollout(instance, plant, course), tally)
+        self._drive = _EpisodeUnderWay(plant, course, Rollout(instance, plant, course), tally)
         self._step, self._over = 0, False
         told = {"theta": dict(episode.theta), "start": episode.start, "episode_seed": episode.seed}
         return self._picture(), {**self._info(), **told}
@@ -324,7 +324,7 @@ class LaneFollowingEnv(gymnasium.Env[Picture, NDArray[Any]]):
         seed = _whole("episode_seed", chosen["episode_seed"], SEEDS)
         return make_episode(draw_theta(intervals, self.np_random), agent="-", start=start, seed=seed)
 
-    def _under_way(self) -> _Drive:
+    def _under_way(self) -> _EpisodeUnderWay:
         if self._drive is None:
             raise InputError("no episode is under way; call reset() first")
         return self._drive

@@ -19,7 +19,7 @@ from proxytune.effects import (
     Catalogue,
     Chain,
     Effect,
-    Setting,
+    FilterContext,
     Signal,
     Stage,
     effect_of,
@@ -152,9 +152,9 @@ def rest_of(stage: Stage, spaces: Spaces) -> Signal:
     return np.zeros(WHEELS if len(spaces.low) == WHEELS else (len(spaces.low), WHEELS))
 
 
-def setting_of(spaces: Spaces, rest: Signal, seed: int) -> Setting:
+def context_of(spaces: Spaces, rest: Signal, seed: int) -> FilterContext:
     """What a chain is told before its first sample; where the rate is not known, no effect asks for it."""
-    return Setting(spaces.rate_hz or 1.0, rest, figures(spaces), seed)
+    return FilterContext(spaces.rate_hz or 1.0, rest, figures(spaces), seed)
 
 
 class Actuators:
@@ -168,8 +168,8 @@ class Actuators:
         chosen = tuple(effects)
         self._chains = [stage_chain(chosen, stage) for stage in (Stage.COMMAND, Stage.ACTUATION)]
         self._idle = not any(chain.effects for chain in self._chains)
-        setting = setting_of(spaces, rest_of(Stage.COMMAND, spaces), seed)
-        self._memories: list[Any] = [chain.begin(setting) for chain in self._chains]
+        context = context_of(spaces, rest_of(Stage.COMMAND, spaces), seed)
+        self._memories: list[Any] = [chain.begin(context) for chain in self._chains]
         self._low, self._high = np.array(spaces.low), np.array(spaces.high)
         self._largest = np.maximum(np.abs(self._low), np.abs(self._high))
         self._largest[self._largest == 0.0] = 1.0
@@ -213,7 +213,7 @@ class Sensors:
 
     def _filtered(self, chain: Chain, signal: Signal) -> NDArray[Any]:
         if self._memory is None:
-            self._memory = chain.begin(setting_of(self._spaces, signal[0], self._seed))
+            self._memory = chain.begin(context_of(self._spaces, signal[0], self._seed))
         bent, self._memory = chain.apply(signal, self._memory)
         return bent
 
@@ -305,7 +305,7 @@ def _of_needs(kind: type[Effect], spaces: Spaces) -> str:
     known = figures(spaces)
     try:
         values = [one.neutral_value(known) for one in kind.parameters]
-        kind(*values).begin(Setting(spaces.rate_hz or 1.0, rest_of(kind.stage, spaces), known))
+        kind(*values).begin(FilterContext(spaces.rate_hz or 1.0, rest_of(kind.stage, spaces), known))
     except KeyError as figure:
         return f"it needs a robot's {str(figure).strip(chr(39))}, which an environment does not state"
     return ""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from proxytune.arrays import Floats
 from proxytune.errors import InputError
-from proxytune.logs import GEOMETRY
+from proxytune.settings import GEOMETRY
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,6 @@
 from .frames import BROKEN as BROKEN, read_pictures as read_pictures
 from .log import (
     COMMANDS as COMMANDS,
-    GEOMETRY as GEOMETRY,
     Frames as Frames,
     Log as Log,
     LogEpisode as LogEpisode,

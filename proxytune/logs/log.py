@@ -23,11 +23,6 @@ COMMANDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 POSE = ("x", "y", "heading")
 WHEELS = ("wheel_left", "wheel_right")
 
-GEOMETRY: Mapping[str, str] = MappingProxyType(
-    {"wheel_radius_m": "wheel_radius", "baseline_m": "effective_baseline", "full_speed_m_s": "full_speed"}
-)
-"""What log.toml may say of a robot, and what a robot.toml calls it."""
-
 
 class Measured(NamedTuple):
     """Poses at times of their own, N of them, as they were measured.

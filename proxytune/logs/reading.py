@@ -9,10 +9,10 @@ import numpy as np
 
 from proxytune.errors import LogError, SettingsError
 from proxytune.logs.frames import Camera, read_camera, read_frames
-from proxytune.logs.log import COMMANDS, GEOMETRY, POSE, WHEELS, Log, LogEpisode
+from proxytune.logs.log import COMMANDS, POSE, WHEELS, Log, LogEpisode
 from proxytune.logs.rows import Layout, Rows, check_known_episodes, read_rows
 from proxytune.logs.times import Issued, check_headings, episodes_at_own_times, episodes_on_grid, usual_rate
-from proxytune.settings import Section, read_settings
+from proxytune.settings import GEOMETRY, Section, read_settings
 
 TEXTS = ("name", "robot", "pose", "source", "licence", "map", "frames")
 KEYS = ("format", *TEXTS, "command", "rate_hz", "clock_offset_s", "measured", "camera", *GEOMETRY)

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.domain import DomainFamily, Episode, Recording
-from proxytune.driving import Road
 from proxytune.errors import EpisodeError, InputError, ProxytuneError
 from proxytune.extensions import describe
 from proxytune.running import run_episode
@@ -156,21 +155,18 @@ class SideBySide:
     Attributes:
         episode: Which one; its θ is the proxy's.
         units: The family's metrics with their units.
-        road: The map, where robots drive on one of ours.
+        command_unit: What commands are given in, empty where that is not known.
+        road: The map to draw ways on, where the family has one (`domain.Recorder`).
         proxy: What became of it in the proxy.
         target: What became of it in the target, None if there is none.
     """
 
     episode: Episode
     units: Mapping[str, str]
-    road: Road | None
+    command_unit: str
+    road: Any
     proxy: RecordedEpisode
     target: RecordedEpisode | None
-
-    @property
-    def command_unit(self) -> str:
-        """What commands are given in, empty where that is not known: on our roads wheels are given duties."""
-        return "" if self.road is None else "duty"
 
     @property
     def sides(self) -> dict[str, RecordedEpisode]:
@@ -197,10 +193,10 @@ def drive_side_by_side(
     Raises:
         EpisodeError: If agent or domain fail in either.
     """
-    road = getattr(proxy, "map", None)
+    unit, road = getattr(proxy, "command_unit", ""), getattr(proxy, "road_to_draw", None)
     there = None if target is None else record_episode(target, replace(episode, theta=()), filmed=filmed)
     here = record_episode(proxy, episode, filmed=filmed)
-    return SideBySide(episode, proxy.metrics, road if isinstance(road, Road) else None, here, there)
+    return SideBySide(episode, proxy.metrics, unit, road, here, there)
 
 
 def load_target(settings: StudySettings, proxy: DomainFamily, model: Path, option: str) -> DomainFamily:

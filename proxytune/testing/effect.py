@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from proxytune.driving import Robot, read_robot
-from proxytune.effects import CHANNELS, MEMBERS, Effect, Setting, Signal, Stage, problems
+from proxytune.effects import CHANNELS, MEMBERS, Effect, FilterContext, Signal, Stage, problems
 from proxytune.errors import ConformanceError, ProxytuneError
 from proxytune.extensions import describe
 from proxytune.space import Parameter
@@ -84,11 +84,11 @@ class Candidate:
         """A signal of its stage."""
         return signal_at(self.kind.stage, self.robot, seed, length)
 
-    def setting(self, rest: Signal, seed: int = 7) -> Setting:
+    def context(self, rest: Signal, seed: int = 7) -> FilterContext:
         """What its filter is told; an effect of a place is shown one everywhere."""
-        setting = Setting(RATE_HZ, rest, {**self.robot.figures, **PICTURE}, seed=seed)
+        context = FilterContext(RATE_HZ, rest, {**self.robot.figures, **PICTURE}, seed=seed)
         placed = self.kind.trace is not None and self.kind.trace.placed
-        return replace(setting, places=PLACES, headings=np.zeros(len(PLACES))) if placed else setting
+        return replace(context, places=PLACES, headings=np.zeros(len(PLACES))) if placed else context
 
     def rest(self, signal: Signal) -> Signal:
         """What was there before a signal: pictures stand still, commands and motion rest."""
@@ -97,7 +97,7 @@ class Candidate:
 
     def filtered(self, effect: Effect, signal: Signal, cuts: Iterable[int] = (), seed: int = 7) -> Signal:
         """The signal (…, time, channels) filtered, in one go or in chunks."""
-        memory: Any = effect.begin(self.setting(self.rest(signal), seed))
+        memory: Any = effect.begin(self.context(self.rest(signal), seed))
         chunks = []
         for chunk in np.split(signal, sorted(cuts), axis=-2):
             if chunk.shape[-2]:
@@ -240,7 +240,7 @@ def _claim_filter(candidate: Candidate, effect: Effect, what: str) -> None:
     claim(filtered.shape == signal.shape, f"{what} makes a signal {filtered.shape} of {signal.shape}; keep the shape")
     claim(np.isfinite(filtered).all(), f"{what} is not finite; it must be, up to both ends of its range")
     again = candidate.filtered(effect, signal)
-    claim(np.array_equal(filtered, again), f"{what} gives two results for one seed; draw from setting.seed alone")
+    claim(np.array_equal(filtered, again), f"{what} gives two results for one seed; draw from context.seed alone")
     other = np.concatenate((signal[:45], signal[45:] * 0.5 + 0.1))
     causal = np.array_equal(filtered[:45], candidate.filtered(effect, other.astype(signal.dtype))[:45])
     claim(causal, f"{what} depends on samples that come later; a filter knows the past alone")
@@ -270,7 +270,7 @@ def _claim_chunks(candidate: Candidate, effect: Effect, what: str) -> None:
 
 def _claim_nothing_in_place(candidate: Candidate, effect: Effect, what: str) -> None:
     signal = candidate.signal(4)
-    kept, memory = signal.copy(), effect.begin(candidate.setting(candidate.rest(signal)))
+    kept, memory = signal.copy(), effect.begin(candidate.context(candidate.rest(signal)))
     first, middle = effect.apply(signal, memory)
     first = first.copy()
     second = effect.apply(signal, middle)[0].copy()

@@ -8,7 +8,7 @@ import pytest
 from proxytune.diagnosis import film, recording as filming
 from proxytune.driving import LaneFollowing, drive, lane_pose, shipped_map
 from proxytune.driving.family import with_columns
-from proxytune.effects import Setting
+from proxytune.effects import FilterContext
 from proxytune.errors import EpisodeError, SettingsError
 from proxytune.files import shipped
 
@@ -81,7 +81,7 @@ def test_a_picture_is_the_one_that_an_agent_is_shown_when_it_is_finished(family,
     instance = family.instance({}, columns=160)
     ticks = instance.camera.render(driven[0].poses)
     shape, signal = ticks.shape[1:], ticks.reshape(len(ticks), -1).astype(np.float32)
-    memory = instance.image.begin(Setting(60, ticks[0].reshape(-1), instance.robot.figures))
+    memory = instance.image.begin(FilterContext(60, ticks[0].reshape(-1), instance.robot.figures))
     filtered = np.rint(instance.image.apply(signal, memory)[0])
     (picture,), tick = taken.pictures, round((float(taken.times[0]) + 0.07 / 2) * 60)
     np.testing.assert_array_equal(picture, filtered[tick].reshape(shape))

@@ -106,7 +106,7 @@ def test_every_effect_of_the_catalogue_does_the_same_side_by_side(name):
 
 OWN = '''
 import numpy as np
-from proxytune.effects import Setting, Stage
+from proxytune.effects import FilterContext, Stage
 from proxytune.space import Parameter
 
 class Wrong:

@@ -47,7 +47,7 @@ from proxytune.driving import (
     texels as choosing,
 )
 from proxytune.driving.cameras import View
-from proxytune.effects import CATALOGUE, PARAMETERS, Blur, Chain, RollingShutter, Setting, Stage, theta_names
+from proxytune.effects import CATALOGUE, PARAMETERS, Blur, Chain, FilterContext, RollingShutter, Stage, theta_names
 from proxytune.effects.image import CameraLatency
 from proxytune.settings import Section
 
@@ -328,7 +328,7 @@ class Plain:
 
 
 def setting(rest):
-    return Setting(60.0, rest, FIGURES, seed=4)
+    return FilterContext(60.0, rest, FIGURES, seed=4)
 
 
 def pictures_of(camera, effects, lengths=(3,) * 8):

@@ -32,7 +32,7 @@ from proxytune.driving import (
 )
 from proxytune.driving.episode import driving_score
 from proxytune.driving.plants import PlanarPlant, integrate
-from proxytune.effects import CATALOGUE, DECLARED, PARAMETERS, Setting, Stage, effects_from, theta_names
+from proxytune.effects import CATALOGUE, DECLARED, PARAMETERS, FilterContext, Stage, effects_from, theta_names
 from proxytune.errors import EpisodeError, SettingsError
 from proxytune.settings import Section
 
@@ -335,7 +335,9 @@ def values_to_agree_on():
 
 def twists_for(duties, **theta):
     train = drivetrain(ROBOT, effects_from({**ROBOT.theta, "delay": 0.0, **theta}, ROBOT.figures))
-    return train.apply(duties, train.begin(Setting(60.0, np.zeros(2), ROBOT.figures, 3, START[2:], START[None, :2])))[0]
+    return train.apply(
+        duties, train.begin(FilterContext(60.0, np.zeros(2), ROBOT.figures, 3, START[2:], START[None, :2]))
+    )[0]
 
 
 def poses_for(plant, duties, **theta):

@@ -21,7 +21,7 @@ from proxytune.driving import (
 )
 from proxytune.driving.plants import PlanarPlant
 from proxytune.driving.robot import REQUIRED
-from proxytune.effects import CATALOGUE, Setting, Stage, effects_from, theta_names
+from proxytune.effects import CATALOGUE, FilterContext, Stage, effects_from, theta_names
 from proxytune.errors import ExtensionError, SettingsError
 from proxytune.files import shipped
 from proxytune.settings import Section, read_settings
@@ -40,7 +40,7 @@ def stated(name):
 
 def twists(robot, duties, **theta):
     train = drivetrain(robot, effects_from({**robot.theta, **theta}, robot.figures))
-    return train.apply(duties, train.begin(Setting(60.0, np.zeros(2), robot.figures)))[0]
+    return train.apply(duties, train.begin(FilterContext(60.0, np.zeros(2), robot.figures)))[0]
 
 
 def copy_duckiebot(folder, before, after):
@@ -97,7 +97,7 @@ def test_neutral_drivetrain_effects_leave_every_robot_as_it_is(name):
     neutral = drivetrain(
         robot, effects_from({n: parameters[n].neutral_value(robot.figures) for n in names}, robot.figures)
     )
-    setting = Setting(60.0, np.zeros(2), robot.figures)
+    setting = FilterContext(60.0, np.zeros(2), robot.figures)
     np.testing.assert_allclose(
         neutral.apply(held, neutral.begin(setting))[0], plain.apply(held, plain.begin(setting))[0], atol=1e-9
     )

@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 
 from proxytune.driving import read_robot
-from proxytune.effects import CATALOGUE, CHANNELS, PARAMETERS, Setting, Stage, effects_from, stage_chain, theta_names
+from proxytune.effects import (
+    CATALOGUE,
+    CHANNELS,
+    PARAMETERS,
+    FilterContext,
+    Stage,
+    effects_from,
+    stage_chain,
+    theta_names,
+)
 
 ROBOT = read_robot("duckiebot")
 SETS = {
@@ -25,7 +34,7 @@ SETS = {
 def test_a_parameter_of_a_camera_effect_sets_its_figure_alone(name):
     nominal, value = ROBOT.camera_figures().channels(), PARAMETERS[name].probes[0]
     chain = stage_chain(effects_from({name: value}, ROBOT.figures), Stage.CAMERA)
-    mounted = chain.apply(nominal[None], chain.begin(Setting(60.0, nominal, ROBOT.figures)))[0][0]
+    mounted = chain.apply(nominal[None], chain.begin(FilterContext(60.0, nominal, ROBOT.figures)))[0][0]
     expected = nominal.copy()
     expected[CHANNELS[Stage.CAMERA].index(SETS[name])] = value
     np.testing.assert_array_equal(mounted, expected)

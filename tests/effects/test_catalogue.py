@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from proxytune.driving import read_robot
-from proxytune.effects import CATALOGUE, PARAMETERS, Blur, Setting, Stage, effects_from, stage_chain
+from proxytune.effects import CATALOGUE, PARAMETERS, Blur, FilterContext, Stage, effects_from, stage_chain
 from proxytune.effects.command import CommandQuantisation, Delay
 from proxytune.effects.motors import DriverMap, MotorLag, Trim, WheelGain, per_wheel
 from proxytune.space import Parameter
@@ -37,7 +37,7 @@ ORDER = (
 def wheels(theta, duty):
     """Both wheels' speeds, as shares of full speed, at a steady duty."""
     chain = stage_chain(effects_from(theta, ROBOT.figures), Stage.ACTUATION)
-    memory = chain.begin(Setting(60.0, np.zeros(2), ROBOT.figures))
+    memory = chain.begin(FilterContext(60.0, np.zeros(2), ROBOT.figures))
     return chain.apply(np.full((600, 2), duty), memory)[0][-1]
 
 
@@ -145,7 +145,7 @@ NOMINAL: dict[str, float] = {}
 
 def run(effect, signal, rest=0.0, rate_hz=10.0):
     signal = np.asarray(signal, dtype=float)
-    memory = effect.begin(Setting(rate_hz, np.full(signal.shape[-1], rest), NOMINAL))
+    memory = effect.begin(FilterContext(rate_hz, np.full(signal.shape[-1], rest), NOMINAL))
     return effect.apply(signal, memory)[0]
 
 
@@ -230,7 +230,7 @@ def test_blur_is_the_mean_of_a_scene_that_changes_linearly(samples):
 def test_blur_adds_8_bit_pictures_exactly_in_any_order(samples):
     pictures = np.random.default_rng(2).integers(0, 256, (20, 50)).astype(np.float32)
     effect = Blur(samples / 10.0)
-    memory = effect.begin(Setting(10.0, pictures[0], NOMINAL))
+    memory = effect.begin(FilterContext(10.0, pictures[0], NOMINAL))
     weights = memory.weights.astype(np.float64)
     assert weights.sum() == 1.0
     exact = [weights @ pictures[row - len(weights) + 1 : row + 1].astype(np.float64) for row in range(13, 20)]

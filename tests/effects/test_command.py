@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from proxytune.effects import Setting
+from proxytune.effects import FilterContext
 from proxytune.effects.command import DelayJitter, DroppedCommands, Messages
 
 RATE_HZ = 60.0
@@ -13,7 +13,7 @@ SEED = 11
 
 
 def run(effect, signal, rate_hz=RATE_HZ, seed=SEED):
-    memory = effect.begin(Setting(rate_hz, np.full(signal.shape[-1], -1.0), NOMINAL, seed))
+    memory = effect.begin(FilterContext(rate_hz, np.full(signal.shape[-1], -1.0), NOMINAL, seed))
     return effect.apply(signal, memory)[0]
 
 

@@ -6,7 +6,7 @@ A wheel that is not round rolls faster and slower once a turn.
 import numpy as np
 import pytest
 
-from proxytune.effects import Setting
+from proxytune.effects import FilterContext
 from proxytune.effects.friction import Backlash, DeadBand, Stiction, WheelRipple
 
 NOMINAL = {"full_speed": 0.6, "wheel_radius": 0.03}
@@ -16,7 +16,7 @@ RATE_HZ = 10.0
 
 def run(effect, left, right=None, rest=0.0):
     signal = np.stack((left, left if right is None else right), axis=-1).astype(float)
-    memory = effect.begin(Setting(RATE_HZ, np.full(2, rest), NOMINAL))
+    memory = effect.begin(FilterContext(RATE_HZ, np.full(2, rest), NOMINAL))
     return effect.apply(signal, memory)[0]
 
 
@@ -123,8 +123,8 @@ RIPPLE_NOMINAL = {"wheel_radius": RADIUS, "effective_baseline": BASELINE}
 
 def wheels(effect, forward, samples, angles=((0.0, 0.0),)):
     """Speeds of the left and the right wheel over a straight drive."""
-    setting = Setting(RIPPLE_RATE_HZ, np.zeros(3), RIPPLE_NOMINAL, angles=np.array(angles))
-    moved = effect.apply(np.tile((forward, 0.0, 0.0), (samples, 1)), effect.begin(setting))[0]
+    context = FilterContext(RIPPLE_RATE_HZ, np.zeros(3), RIPPLE_NOMINAL, angles=np.array(angles))
+    moved = effect.apply(np.tile((forward, 0.0, 0.0), (samples, 1)), effect.begin(context))[0]
     turn = moved[:, 2] * BASELINE / 2.0
     return np.stack((moved[:, 0] - turn, moved[:, 0] + turn), axis=-1)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from proxytune.effects import Blur, Chain, RollingShutter, Setting
+from proxytune.effects import Blur, Chain, FilterContext, RollingShutter
 from proxytune.effects.image import CameraLatency, Defocus, Exposure, ImageNoise, Vignetting
 
 ROWS, COLUMNS = 41, 61
@@ -18,7 +18,7 @@ def run(effect, pictures, seed=0, cuts=()):
     rows, columns = pictures.shape[1:3]
     signal = np.asarray(pictures, dtype=np.float32).reshape(len(pictures), -1)
     nominal = {"camera_rows": float(rows), "camera_columns": float(columns)}
-    memory, chunks = effect.begin(Setting(60.0, signal[0], nominal, seed)), []
+    memory, chunks = effect.begin(FilterContext(60.0, signal[0], nominal, seed)), []
     for chunk in np.split(signal, cuts):
         answer, memory = effect.apply(chunk, memory)
         chunks.append(answer)
@@ -97,7 +97,7 @@ SECONDS = st.floats(0.0, 0.5)
 
 
 def run_of_shutter(effect, pictures):
-    memory = effect.begin(Setting(RATE_HZ, pictures[0], NOMINAL))
+    memory = effect.begin(FilterContext(RATE_HZ, pictures[0], NOMINAL))
     return effect.apply(pictures, memory)[0]
 
 
@@ -116,7 +116,7 @@ def test_a_picture_is_as_old_as_the_latency(latency):
 def test_a_latency_mixes_the_two_pictures_that_it_falls_between(latency, expected):
     flash = np.zeros((3, SHUTTER_ROWS * SHUTTER_COLUMNS * 3), dtype=np.float32)
     flash[0] = 7.0
-    memory = CameraLatency(latency).begin(Setting(RATE_HZ, np.zeros(flash.shape[1]), NOMINAL))
+    memory = CameraLatency(latency).begin(FilterContext(RATE_HZ, np.zeros(flash.shape[1]), NOMINAL))
     np.testing.assert_allclose(CameraLatency(latency).apply(flash, memory)[0][:, 5], expected, atol=1e-6)
 
 

@@ -13,11 +13,11 @@ from hypothesis import given, settings, strategies as st
 from proxytune.driving import read_robot
 from proxytune.effects import (
     GROUPS,
-    Curve,
+    FilterContext,
+    FittedRange,
     Learnt,
+    LearntCurve,
     Model,
-    Seen,
-    Setting,
     effects_from,
     learnt_effect,
     learnt_theta,
@@ -29,7 +29,7 @@ from proxytune.errors import SettingsError
 
 ROBOT = read_robot("duckiebot")
 RATE_HZ = 60.0
-SEEN = Seen((-0.4, 0.5), (-4.0, 3.0))
+SEEN = FittedRange((-0.4, 0.5), (-4.0, 3.0))
 KNOTS = {
     "level": (1.0,),
     "start": (0.1, 0.4),
@@ -51,7 +51,7 @@ KNOTS = {
 def effect_of(*groups, size=0.3, seed=3):
     random = np.random.default_rng(seed)
     curves = [
-        Curve(group, channel, KNOTS[group], tuple(size * random.uniform(0.5, 1.0, len(KNOTS[group]))))
+        LearntCurve(group, channel, KNOTS[group], tuple(size * random.uniform(0.5, 1.0, len(KNOTS[group]))))
         for group in groups
         for channel in GROUPS[group].channels
     ]
@@ -69,7 +69,7 @@ def a_signal(seed, length=90):
 
 
 def begin(effect, batch=(), headings=0.4):
-    return effect.begin(Setting(RATE_HZ, np.zeros((*batch, 3)), ROBOT.figures, headings=np.array([headings])))
+    return effect.begin(FilterContext(RATE_HZ, np.zeros((*batch, 3)), ROBOT.figures, headings=np.array([headings])))
 
 
 def run(effect, signal, cuts=()):
@@ -159,7 +159,7 @@ def test_beyond_the_last_knot_of_time_or_use_a_curve_is_level(group):
 def test_features_times_weights_are_what_is_added_where_headings_are_known(effect):
     signal = a_signal(6)[None]
     known = np.linspace(0.0, 3.0, 91)
-    memory = effect.begin(Setting(RATE_HZ, np.zeros((1, 3)), ROBOT.figures, headings=known))
+    memory = effect.begin(FilterContext(RATE_HZ, np.zeros((1, 3)), ROBOT.figures, headings=known))
     parts = effect.features(signal, memory)
     total = sum(
         (basis @ np.array(curve.weights))[..., None] * unit
@@ -177,21 +177,23 @@ def test_a_window_amid_a_drive_goes_on_as_the_drive_does(effect, sample):
     whole = [run(effect, drive) for drive in drives]
     so_far = [0.4 + np.concatenate(([0.0], np.cumsum(one[:, 2]))) / RATE_HZ for one in whole]
     turned = np.array([so_far[r][sample] for r in row])
-    setting = Setting(RATE_HZ, np.zeros((3, 3)), ROBOT.figures, headings=turned[:, None])
-    moved, _ = effect.apply(drives[row][:, sample:], effect.recall(setting, drives, row, samples))
+    context = FilterContext(RATE_HZ, np.zeros((3, 3)), ROBOT.figures, headings=turned[:, None])
+    moved, _ = effect.apply(drives[row][:, sample:], effect.recall(context, drives, row, samples))
     np.testing.assert_allclose(moved, np.stack([whole[r][sample:] for r in row]), rtol=0, atol=1e-9)
 
 
 def test_a_curve_over_wheel_speed_adds_to_that_wheel():
     baseline = ROBOT.figures["effective_baseline"]
-    effect = Learnt(SEEN, (Curve("wheel_speed", "right", (0.2, 0.4), (0.05, 0.01)),))
+    effect = Learnt(SEEN, (LearntCurve("wheel_speed", "right", (0.2, 0.4), (0.05, 0.01)),))
     straight = np.tile((0.3, 0.0, 0.0), (5, 1))
     added = run(effect, straight) - straight
     np.testing.assert_allclose(added[-1], (0.015, 0.0, 0.03 / baseline))
 
 
 def test_a_transient_fades_with_its_time_constant():
-    effect = Learnt(SEEN, (Curve("transients", "left", (0.5,), (1.0,)), Curve("transients", "right", (0.5,), (1.0,))))
+    effect = Learnt(
+        SEEN, (LearntCurve("transients", "left", (0.5,), (1.0,)), LearntCurve("transients", "right", (0.5,), (1.0,)))
+    )
     step = np.tile((0.2, 0.0, 0.0), (120, 1))
     added = (run(effect, step) - step)[:, 0]
     np.testing.assert_allclose(added, 0.2 * np.exp(-np.arange(1, 121) / (0.5 * RATE_HZ)), rtol=1e-9)
@@ -206,7 +208,7 @@ def test_a_learnt_effect_comes_after_all_named_ones():
 
 
 def test_a_veer_by_the_heading_follows_the_heading_that_it_leads_to():
-    turning = Learnt(SEEN, (Curve("heading", "veer_sin", (1.0,), (3.0,)),))
+    turning = Learnt(SEEN, (LearntCurve("heading", "veer_sin", (1.0,), (3.0,)),))
     ahead = np.tile((0.4, 0.0, 0.0), (600, 1))
     moved = run(turning, ahead)
     heading = 0.4 + np.concatenate(((0.0,), np.cumsum(moved[:-1, 2]) / RATE_HZ))
@@ -269,9 +271,9 @@ def learnt(draw):
         channels = draw(st.sets(st.sampled_from(sorted(kind.channels)))) if knots else ()
         for channel in kind.channels:
             if channel in channels:
-                curves.append(Curve(group, channel, knots, tuple(draw(NUMBERS) for _ in knots)))
+                curves.append(LearntCurve(group, channel, knots, tuple(draw(NUMBERS) for _ in knots)))
     ends = [draw(st.floats(-9.0, -0.1)), draw(st.floats(0.1, 9.0))]
-    return Learnt(Seen((ends[0], ends[1]), (2.0 * ends[0], 3.0 * ends[1])), tuple(curves))
+    return Learnt(FittedRange((ends[0], ends[1]), (2.0 * ends[0], 3.0 * ends[1])), tuple(curves))
 
 
 @given(effect=learnt())
@@ -331,7 +333,11 @@ def test_a_mistake_is_one_line_with_file_and_key(tmp_path, before, after, says):
 
 
 WHOLE = {
-    **{f"learnt.range.{channel}@{end}": value for channel in Seen._fields for end, value in (("low", -1), ("high", 1))},
+    **{
+        f"learnt.range.{channel}@{end}": value
+        for channel in FittedRange._fields
+        for end, value in (("low", -1), ("high", 1))
+    },
     "learnt.turn_rate.yaw@1.0": 0.1,
 }
 

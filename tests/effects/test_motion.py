@@ -7,7 +7,7 @@ Driving and turning mix as the formulas say.
 import numpy as np
 import pytest
 
-from proxytune.effects import Setting
+from proxytune.effects import FilterContext
 from proxytune.effects.motion import (
     CrossCoupling,
     FloorSlope,
@@ -26,9 +26,9 @@ PATCH = SlipperyPatch(0.5, 1.0, 0.0, 0.3)
 
 
 def run(effect, signal, places=((0.0, 0.0),), headings=(0.0,), cut=None):
-    setting = Setting(RATE_HZ, np.zeros(3), {}, 0, np.array(headings), np.array(places))
+    context = FilterContext(RATE_HZ, np.zeros(3), {}, 0, np.array(headings), np.array(places))
     signal = np.asarray(signal, dtype=float)
-    first, memory = effect.apply(signal[:cut], effect.begin(setting))
+    first, memory = effect.apply(signal[:cut], effect.begin(context))
     return first if cut is None else np.concatenate((first, effect.apply(signal[cut:], memory)[0]))
 
 
@@ -70,7 +70,7 @@ MOTION_RATE_HZ = 10.0
 def run_of_motion(effect, signal, headings=(0.0,), cut=None):
     signal = np.asarray(signal, dtype=float)
     rest = np.zeros((*signal.shape[:-2], 3))
-    memory = effect.begin(Setting(MOTION_RATE_HZ, rest, NOMINAL, 0, np.asarray(headings, dtype=float)))
+    memory = effect.begin(FilterContext(MOTION_RATE_HZ, rest, NOMINAL, 0, np.asarray(headings, dtype=float)))
     first, memory = effect.apply(signal[..., :cut, :], memory)
     return first if cut is None else np.concatenate((first, effect.apply(signal[..., cut:, :], memory)[0]), axis=-2)
 
@@ -135,7 +135,7 @@ def test_a_turned_marker_adds_to_the_heading_alone():
 
 
 def run_of_turning(effect, signal, rest=(0.0, 0.0, 0.0)):
-    memory = effect.begin(Setting(RATE_HZ, np.array(rest), {}))
+    memory = effect.begin(FilterContext(RATE_HZ, np.array(rest), {}))
     return effect.apply(np.asarray(signal, dtype=float), memory)[0]
 
 

@@ -6,14 +6,14 @@ Saturation and battery sag against what they should do by hand.
 import numpy as np
 import pytest
 
-from proxytune.effects import Setting
+from proxytune.effects import FilterContext
 from proxytune.effects.motors import BatterySag, Saturation, SlewRate, ThermalFade
 
 RATE_HZ = 60.0
 
 
 def run(effect, signal, rest=(0.0, 0.0)):
-    memory = effect.begin(Setting(RATE_HZ, np.array(rest), {}))
+    memory = effect.begin(FilterContext(RATE_HZ, np.array(rest), {}))
     return effect.apply(np.asarray(signal, dtype=float), memory)[0]
 
 
@@ -45,7 +45,7 @@ def test_a_motor_that_rests_recovers():
 
 
 def run_of_power(effect, signal, rate_hz=10.0):
-    memory = effect.begin(Setting(rate_hz, np.zeros(2), {}))
+    memory = effect.begin(FilterContext(rate_hz, np.zeros(2), {}))
     return effect.apply(np.asarray(signal, dtype=float), memory)[0]
 
 

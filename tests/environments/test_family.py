@@ -16,7 +16,7 @@ from toy_families import CART, PENDULUM, SCREEN, TOYS, family
 from proxytune.cli.main import main
 from proxytune.domain import make_episode
 from proxytune.effects import CATALOGUE, PARAMETERS, effect_of
-from proxytune.environments.family import Wrapped, load_agent, play, score
+from proxytune.environments.family import WrappedEnvironment, load_agent, play, score
 from proxytune.environments.making import EpisodeMetric
 from proxytune.environments.signals import Actuators, Sensors, Spaces
 from proxytune.errors import EpisodeError, InputError
@@ -50,7 +50,7 @@ class Scripted:
 
 def played(environment, steps=4):
     known = Spaces((), (), "", None, "", "", None, steps, ())
-    wrapped = Wrapped(environment, Actuators((), known, 1), Sensors((), known, None, 1))
+    wrapped = WrappedEnvironment(environment, Actuators((), known, 1), Sensors((), known, None, 1))
     space = Discrete(2)
     first = wrapped.reset(5, np.random.default_rng(1))
     play(wrapped, load_agent("zero", None, space, 0), first, space, steps)

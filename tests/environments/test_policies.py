@@ -86,7 +86,7 @@ def test_what_cannot_predict_is_refused():
 
 
 def test_a_policy_beside_a_study_is_scored_as_an_agent(study):
-    code = "from proxytune.environments.family import agent_of\nclass P:\n    def predict(self, o, deterministic):\n"
+    code = "from proxytune.environments import agent_of\nclass P:\n    def predict(self, o, deterministic):\n"
     (study / "my_policy.py").write_text(f"{code}        return (0.4, 0.4), None\nagent = agent_of(P())\n")
     found = proxytune.score(proxy=scores(study), target=scores(study, trim=0.2), metrics="distance:max")
     assert load_agent("my_policy:agent", study).policy.predict(None, True) == ((0.4, 0.4), None)
@@ -104,7 +104,7 @@ def test_stable_baselines3_trains_and_what_it_trained_is_scored(study):
     model.save(study / "policy.zip")
     (study / "my_policy.py").write_text(
         "from pathlib import Path\nfrom stable_baselines3 import PPO\n"
-        "from proxytune.environments.family import agent_of\n"
+        "from proxytune.environments import agent_of\n"
         'agent = agent_of(PPO.load(Path(__file__).with_name("policy.zip"), device="cpu"))\n'
     )
     check_agent(load_agent("my_policy:agent", study))

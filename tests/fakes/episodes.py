@@ -17,4 +17,4 @@ def recorded(x, seconds=2.0, pictures=None):
 
 def paired(proxy, target=None, road=None):
     """An episode in both."""
-    return SideBySide(EPISODE, {"distance": "m"}, road, proxy, target)
+    return SideBySide(EPISODE, {"distance": "m"}, "" if road is None else "duty", road, proxy, target)

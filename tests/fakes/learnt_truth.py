@@ -1,12 +1,12 @@
 """A robot whose hidden motion is a learnt effect: what a fit should find again."""
 
-from proxytune.effects import Curve, Learnt, Seen, learnt_theta
+from proxytune.effects import FittedRange, Learnt, LearntCurve, learnt_theta
 
-SEEN = Seen((-0.6, 0.6), (-6.0, 6.0))
+SEEN = FittedRange((-0.6, 0.6), (-6.0, 6.0))
 
 
 def learnt(*curves):
-    return learnt_theta(Learnt(SEEN, tuple(Curve(*curve) for curve in curves)))
+    return learnt_theta(Learnt(SEEN, tuple(LearntCurve(*curve) for curve in curves)))
 
 
 TURNING = learnt(("turn_rate", "yaw", (-2.0, -0.5, 0.5, 2.0), (0.5, 0.3, -0.3, -0.5)))

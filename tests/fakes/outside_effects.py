@@ -7,8 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from proxytune.effects import Cue, Form, Means, Panel, Setting, Signal, Stage, Trace
-from proxytune.effects import Draws
+from proxytune.effects import Cue, Draws, FilterContext, Form, Means, Panel, Signal, Stage, Trace
 from proxytune.space import Parameter
 
 
@@ -30,7 +29,7 @@ class WeakReverse:
         shown=Means(Cue.DIRECTION, (Panel("forward", "forward speed [m/s]", "forward"),)),
     )
 
-    def begin(self, setting: Setting) -> None:
+    def begin(self, context: FilterContext) -> None:
         """Nothing to remember."""
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:

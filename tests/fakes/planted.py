@@ -16,7 +16,7 @@ from proxytune.diagnosis.motion.fitting import fit
 from proxytune.diagnosis.motion.innovations import TURN_WEIGHT, Noise
 from proxytune.driving import drivetrain, read_robot
 from proxytune.driving.plants import integrate
-from proxytune.effects import Setting, effects_from
+from proxytune.effects import FilterContext, effects_from
 from proxytune.logs import COMMANDS, Log, LogEpisode
 
 Array = NDArray[np.float64]
@@ -59,8 +59,10 @@ def driven_log(theta: Theta, duties: Array, starts: Array, *, seed: int = 1, noi
 def _twists(theta: Theta, duties: Array, starts: Array) -> Array:
     train = drivetrain(ROBOT, effects_from({**ROBOT.theta, **theta}, ROBOT.figures, ROBOT.catalogue))
     nominal = {**ROBOT.figures, "control_rate": float(RATE_HZ)}
-    setting = Setting(TICK_HZ, np.zeros((len(duties), 2)), nominal, headings=starts[:, 2:], places=starts[:, None, :2])
-    return train.apply(np.repeat(duties, TICKS, axis=1), train.begin(setting))[0]
+    context = FilterContext(
+        TICK_HZ, np.zeros((len(duties), 2)), nominal, headings=starts[:, 2:], places=starts[:, None, :2]
+    )
+    return train.apply(np.repeat(duties, TICKS, axis=1), train.begin(context))[0]
 
 
 def _disturbance(twists: Array, noise: Noise, random: np.random.Generator) -> Array:

@@ -34,7 +34,7 @@ from proxytune.diagnosis.motion.innovations import huber
 from proxytune.diagnosis.motion.screening import candidates
 from proxytune.diagnosis.motion.signals import signal_groups
 from proxytune.driving import read_robot
-from proxytune.effects import GROUPS, Curve, Learnt, Means, Panel, Seen, learnt_theta, theta_names
+from proxytune.effects import GROUPS, FittedRange, Learnt, LearntCurve, Means, Panel, learnt_theta, theta_names
 from proxytune.effects.catalogue import CATALOGUE
 from proxytune.effects.effect import MOTIONS, SIGNALS
 from proxytune.report.diagnosis.answer import CAPTIONS, diagnosis_pictures
@@ -434,12 +434,12 @@ KNOTS = {"speed_and_turn": ((-0.2, -1.0), (0.2, 1.0)), "direction": (-1.0,), "he
 
 def learning(*groups):
     curves = [
-        Curve(group, channel, knots, tuple(0.01 * (number + 1) for number in range(len(knots))))
+        LearntCurve(group, channel, knots, tuple(0.01 * (number + 1) for number in range(len(knots))))
         for group in groups
         for channel in GROUPS[group].channels
         for knots in [KNOTS.get(group, (0.5, 1.0, 2.0))]
     ]
-    theta = learnt_theta(Learnt(Seen((-0.3, 0.4), (-3.0, 3.0)), tuple(curves)))
+    theta = learnt_theta(Learnt(FittedRange((-0.3, 0.4), (-3.0, 3.0)), tuple(curves)))
     return Learning(Remainder(theta, {GROUPS[group].title: 1.0 / len(groups) for group in groups}, {}, True), (), False)
 
 

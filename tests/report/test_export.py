@@ -13,7 +13,7 @@ from export_truth import ROBOT, instance
 from proxytune.api.transfer import WRITERS
 from proxytune.driving import AXLES, drivetrain, orientation, read_body
 from proxytune.driving.plants import PlanarPlant
-from proxytune.effects import CATALOGUE, Setting, effects_from, theta_names
+from proxytune.effects import CATALOGUE, FilterContext, effects_from, theta_names
 from proxytune.errors import InputError, SettingsError
 from proxytune.report import FORMATS, export_lines, mjcf_text, ros_text, urdf_text
 from proxytune.report.export.instance import PLACES, place_of
@@ -30,7 +30,7 @@ FOUND = {
 def planar(found):
     robot = found.robot
     train = drivetrain(robot, effects_from(found.theta, robot.figures))
-    twists, _ = train.apply(DUTIES, train.begin(Setting(60.0, np.zeros(2), robot.figures)))
+    twists, _ = train.apply(DUTIES, train.begin(FilterContext(60.0, np.zeros(2), robot.figures)))
     return PlanarPlant(np.zeros(3), 1.0 / 60.0).move(twists)[0]
 
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings, strategies as st
 
 from proxytune.driving import UNITS, BulletPlant, drivetrain, read_robot
 from proxytune.driving.plants import PlanarPlant, check_body
-from proxytune.effects import Setting, effects_from
+from proxytune.effects import FilterContext, effects_from
 from proxytune.errors import InputError
 from proxytune.settings import read_settings
 from proxytune.skeletons import robot_skeleton
@@ -27,7 +27,7 @@ def write(folder, figures):
 
 def drive(plant, robot, duties):
     train = drivetrain(robot, effects_from(robot.theta, robot.figures))
-    twists, _ = train.apply(duties, train.begin(Setting(60.0, np.zeros(2), robot.figures)))
+    twists, _ = train.apply(duties, train.begin(FilterContext(60.0, np.zeros(2), robot.figures)))
     with plant:
         return plant.move(twists)
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from proxytune.arrays import Floats
 from proxytune.diagnosis.camera.edges import LATENCY, READOUT, Tape, Views
 from proxytune.driving import LINES, CameraFigures, GroundPlaneCamera, Marks, draw_floor, floor_points
-from proxytune.effects import Setting, Stage, effects_from, stage_chain
+from proxytune.effects import FilterContext, Stage, effects_from, stage_chain
 
 FARTHEST_M = 1.2
 """Edges farther ahead of the lens are too coarse to count [m]."""
@@ -258,5 +258,5 @@ def _develop(views: Views, theta: Mapping[str, float], pictures: Pictures) -> Pi
         return pictures
     figures = {**robot.figures, "camera_columns": float(optics.columns), "camera_rows": float(optics.rows)}
     signal = pictures.reshape(len(pictures), 1, -1)
-    developed, _ = chain.apply(signal, chain.begin(Setting(60.0, signal[:, 0], figures)))
+    developed, _ = chain.apply(signal, chain.begin(FilterContext(60.0, signal[:, 0], figures)))
     return np.clip(developed, 0.0, 255.0).reshape(pictures.shape).astype(np.float32)

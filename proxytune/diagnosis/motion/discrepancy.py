@@ -38,7 +38,7 @@ from proxytune.diagnosis.motion.prediction import (
 )
 from proxytune.diagnosis.motion.screening import Candidate, candidates
 from proxytune.driving import Robot
-from proxytune.effects import GROUPS, LEVEL, Curve, Knots, Learnt, Seen, effect_of, learnt_theta
+from proxytune.effects import GROUPS, LEVEL, FittedRange, Knots, Learnt, LearntCurve, effect_of, learnt_theta
 from proxytune.space import Theta
 
 RARE = 0.002
@@ -94,12 +94,12 @@ def offer_curves(drives: Drives, theta: Theta) -> Learnt:
         "heading": (1.0, 2.0),
     }
     curves = [
-        Curve(group, channel, knots[group], (0.0,) * len(knots[group]))
+        LearntCurve(group, channel, knots[group], (0.0,) * len(knots[group]))
         for group, kind in GROUPS.items()
         for channel in kind.channels
         if knots[group]
     ]
-    return Learnt(Seen(_ends(forward), _ends(yaw)), tuple(curves))
+    return Learnt(FittedRange(_ends(forward), _ends(yaw)), tuple(curves))
 
 
 def _ticks_in_motion(drives: Drives) -> Floats:

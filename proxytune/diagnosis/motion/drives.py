@@ -20,8 +20,8 @@ from proxytune.diagnosis.answer import RULES, Rules
 from proxytune.driving import Robot, read_robot, robot_from_geometry, robot_names
 from proxytune.effects import SHIPPED, Catalogue
 from proxytune.errors import LogError
-from proxytune.logs import GEOMETRY, Log, LogEpisode
-from proxytune.settings import nearest
+from proxytune.logs import Log, LogEpisode
+from proxytune.settings import GEOMETRY, nearest
 
 
 def cosine_and_sine(angle: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:

@@ -26,8 +26,8 @@ from proxytune.effects import (
     PARAMETERS,
     Chain,
     Draws,
+    FilterContext,
     Learnt,
-    Setting,
     Stage,
     effect_of,
     effects_from,
@@ -375,7 +375,7 @@ def tracked_paths(drives: Drives, theta: Theta, twists: Floats) -> Floats:
     return _walk_and_track(drives, twists, _model(drives, theta)[1])
 
 
-def _window_setting(drives: Drives, begin: Whole, before: Floats) -> Setting:
+def _window_setting(drives: Drives, begin: Whole, before: Floats) -> FilterContext:
     """The setting of motion effects in windows: the motion before each, its place, and the angles of its wheels."""
     episode, start = drives.episode[begin], drives.first[begin]
     return replace(
@@ -408,7 +408,7 @@ def drawn_paths(drives: Drives, theta: Theta, seed: int) -> Floats:
     return _walk_and_track(drives, np.asarray(twists), stage_chain(effects, Stage.MEASUREMENT))
 
 
-def _wheel_speeds(drives: Drives, train: Drivetrain, setting: Setting) -> Floats:
+def _wheel_speeds(drives: Drives, train: Drivetrain, setting: FilterContext) -> Floats:
     memory = train.begin(setting)
     arrived, _ = train.command.apply(drives.duties, memory.command)
     return np.asarray(train.actuation.apply(np.clip(arrived, -1.0, 1.0), memory.actuation)[0])
@@ -426,9 +426,9 @@ def _model(drives: Drives, theta: Theta) -> tuple[Drivetrain, Chain]:
     return drivetrain(robot, effects), stage_chain(effects, Stage.MEASUREMENT)
 
 
-def _setting(drives: Drives) -> Setting:
+def _setting(drives: Drives) -> FilterContext:
     nominal: Mapping[str, float] = {**drives.robot.figures, "control_rate": drives.rate_hz}
-    setting = Setting(drives.tick_hz, drives.rest, nominal)
+    setting = FilterContext(drives.tick_hz, drives.rest, nominal)
     return replace(setting, headings=drives.headings, places=drives.places, angles=drives.angles)
 
 

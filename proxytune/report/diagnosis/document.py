@@ -26,8 +26,8 @@ from proxytune.diagnosis import (
 )
 from proxytune.driving import robot_names
 from proxytune.effects import Catalogue, Model, model_text
-from proxytune.logs import GEOMETRY
 from proxytune.report.diagnosis.notes import decisive, may_matter, per_cent
+from proxytune.settings import GEOMETRY
 
 TOP = ("verdict", "declared", "effects", "extended", "could_not_be_seen")
 """Keys of the camera that the document has above all, where there is nothing to say of motion."""

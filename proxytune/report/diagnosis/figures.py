@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from proxytune.diagnosis import RULES, Diagnosis, Findings, Learning, TriedEffect
-from proxytune.effects import GROUPS, HEADING, LEVEL, Curve, Learnt, learnt_effect
+from proxytune.effects import GROUPS, HEADING, LEVEL, Learnt, LearntCurve, learnt_effect
 from proxytune.report.diagnosis.effect_figure import effect_curve
 from proxytune.report.diagnosis.error_figures import error_figure, residual_map, residual_over_time, strayed
 from proxytune.report.figure_style import BLUE, COLUMN, GREY, LIGHT_BLUE, PURPLE, dress, legend_below
@@ -169,7 +169,7 @@ def learnt_figure(learning: Learning) -> Figure | None:
     return figure
 
 
-def _courses(curves: Sequence[Curve]) -> list[Curve]:
+def _courses(curves: Sequence[LearntCurve]) -> list[LearntCurve]:
     """Harmonics of the heading as curves over it, one for each direction."""
     around = np.linspace(0.0, 360.0, 73)
     courses = []
@@ -179,11 +179,11 @@ def _courses(curves: Sequence[Curve]) -> list[Curve]:
             if curve.channel.startswith(to):
                 wave = np.cos if curve.channel.endswith("cos") else np.sin
                 total += wave(np.radians(around)[:, None] * np.asarray(curve.knots)) @ np.asarray(curve.weights)
-        courses.append(Curve(HEADING, to, tuple(around.tolist()), tuple(total.tolist())))
+        courses.append(LearntCurve(HEADING, to, tuple(around.tolist()), tuple(total.tolist())))
     return courses
 
 
-def _draw_learnt(axes: Axes, effect: Learnt, curve: Curve) -> None:
+def _draw_learnt(axes: Axes, effect: Learnt, curve: LearntCurve) -> None:
     group = GROUPS[curve.group]
     unit = group.channels[curve.channel if curve.group != HEADING else f"{curve.channel}_cos"].unit
     factor, label_unit = SHOWN_AS.get(unit, (100.0, f"% {unit}"))
@@ -201,7 +201,7 @@ def _draw_learnt(axes: Axes, effect: Learnt, curve: Curve) -> None:
     dress(axes)
 
 
-def _line(axes: Axes, curve: Curve, factor: float) -> None:
+def _line(axes: Axes, curve: LearntCurve, factor: float) -> None:
     """A curve through its knots, and through 0 at 0; what fades is points."""
     knots, weights = np.array(curve.knots), factor * np.array(curve.weights)
     if curve.group in FADING:
@@ -217,7 +217,7 @@ def _line(axes: Axes, curve: Curve, factor: float) -> None:
     axes.plot(knots, weights, "-" if curve.group == HEADING else ".-", color=BLUE, lw=1.3, ms=5)
 
 
-def _surface(axes: Axes, curve: Curve, factor: float, label: str) -> None:
+def _surface(axes: Axes, curve: LearntCurve, factor: float, label: str) -> None:
     """Colours over speed and yaw rate."""
     places, weights = np.array(curve.knots), factor * np.array(curve.weights)
     speeds, turns = (np.unique(np.append(axis, 0.0)) for axis in places.T)

@@ -1,10 +1,8 @@
-"""Agents by name: those shipped, plug-ins, and a user's own as `module:attribute`.
+"""Agents: controllers that see only the camera's picture and know only the robot's nominal figures.
 
-From a picture to where the lane lies: colour segmentation and projection by the nominal camera.
-Agents that see the lane, each its own way, and steer for its centre.
-Agents that go by the picture itself, without a notion of where the floor lies.
-Agents around agents: the same driver, slower to react, smoother, leaning to one side, or wary of a smeared view.
-Agents: controllers that see only the camera's picture and know only the nominal camera.
+Some segment the markings by colour, project them on the floor and steer for the lane's centre; some go by the picture
+itself. Around any of them others react later, smooth, lean to one side, or slow down where the view is smeared.
+`load_agent` finds an agent by name: one of `AGENTS`, a plug-in, or a user's own as `module:attribute`.
 """
 
 import functools
@@ -116,7 +114,7 @@ _NONE: Pixels = np.empty(0, dtype=np.intp)
 
 
 class PilotMemory(NamedTuple):
-    """What a pilot remembers: the eye, the robot's figures that turn a twist into duties, and the last lane seen."""
+    """Memory of a pilot: the eye, the robot's figures that turn a twist into duties, and the last lane seen."""
 
     eye: Eye
     full_speed: float

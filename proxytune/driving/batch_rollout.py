@@ -1,4 +1,7 @@
-"""Robots of one domain instance that drive side by side, step by step: each as it does by itself, to the bit."""
+"""Episodes of one domain instance as one batch, step by step: each goes as it does by itself, to the bit.
+
+Our effects filter a batch as they filter one robot, unless they draw at random; others get a drivetrain for each robot.
+"""
 
 import itertools
 from collections.abc import Iterator, Sequence
@@ -56,7 +59,7 @@ def batched_drivetrain(drivetrain: Drivetrain, seeds: tuple[int, ...]) -> Drivet
 
 
 def _same_in_batches(effect: Effect) -> bool:
-    """Whether it does to each robot of a batch, to the bit, what it does to a single one: ours do, unless they draw."""
+    """Tell whether it does to each robot of a batch, to the bit, what it does to one: ours do, unless they draw."""
     return type(effect) in _OURS and (effect.trace is None or effect.trace.draws is None)
 
 

@@ -1,8 +1,7 @@
 """All that runs on PyBullet: the reference plant and the reference camera.
 
-PyBullet worlds that nobody looks at: emptied and used again, since a new one takes as long as a second's driving.
-The bullet plant: the robot's URDF with contact, friction and limited torque, in PyBullet.
-The reference camera: PyBullet's own renderer looking at the floor's picture.
+The plant drives the robot's URDF with contact, friction and limited torque; it takes an emptied world again, since a
+new one takes as long as a second's driving. The camera is PyBullet's own renderer over the floor's picture.
 """
 
 import contextlib
@@ -151,7 +150,7 @@ class BulletPlant:
         return centre[0] - cosine * ahead + sine * left, centre[1] - sine * ahead - cosine * left, self._heading
 
     def _crashed(self) -> bool:
-        """Whether the chassis touches anything: on its wheels and caster it never does."""
+        """Tell whether the chassis touches anything: on its wheels and caster it never does."""
         return bool(pybullet.getContactPoints(bodyA=self._body, linkIndexA=-1, physicsClientId=self._world))
 
     def __enter__(self) -> Self:
@@ -192,7 +191,7 @@ class BulletCamera:
         _lay(floor, self._world)
 
     def render(self, poses: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
-        """What it sees from poses (n, 3) of x [m], y [m], heading [rad]: (n, rows, columns, 3) RGB."""
+        """Render what it sees from poses (n, 3) of x [m], y [m], heading [rad]: (n, rows, columns, 3) RGB."""
         figures = self._figures
         pictures = np.empty((len(poses), figures.rows, figures.columns, 3), dtype=np.uint8)
         for picture, pose in zip(pictures, poses, strict=True):
@@ -235,7 +234,7 @@ class BulletCamera:
 
 
 def _slopes(figures: CameraFigures) -> NDArray[np.float64]:
-    """How far right and down each fine pixel looks, (2, rows, columns), per metre along the lens' axis."""
+    """Slopes right and down at which each fine pixel looks, (2, rows, columns), per metre along the lens' axis."""
     places = ((np.arange(count * OVERSAMPLING) + 0.5) / OVERSAMPLING for count in (figures.columns, figures.rows))
     columns, rows = np.meshgrid(*places)
     ahead, left, up = np.moveaxis(lens_rays(figures, columns, rows) @ orientation(figures), -1, 0)

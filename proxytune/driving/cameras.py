@@ -1,6 +1,7 @@
-"""What the robot's camera sees of a flat floor: each pixel is one look-up of the floor's picture.
+"""What the robot's camera shows of a flat floor, and the newest picture at the camera's rate.
 
-What a robot's camera shows while it drives: the newest picture, at the camera's rate.
+The floor is flat, so where each pixel looks in the robot's frame is known beforehand: a picture is one look-up a pixel.
+`View` is the camera with its image effects while the robot drives.
 """
 
 import functools
@@ -13,9 +14,8 @@ from scipy.ndimage import gaussian_filter
 
 from proxytune.driving.agent import Picture
 from proxytune.driving.optics import SKY, CameraFigures, Renderer, floor_hits, ground_points
-from proxytune.driving.plain_texels import TexelTable, keep_colours
 from proxytune.driving.road_picture import Floor
-from proxytune.driving.texels import fastest
+from proxytune.driving.texels import TexelTable, fastest, keep_colours
 from proxytune.effects import Chain, FilterContext, Signal
 
 
@@ -34,7 +34,7 @@ class GroundPlaneCamera:
         self._shape = (figures.rows, figures.columns, 3)
 
     def render(self, poses: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
-        """What it sees from poses (n, 3) of x [m], y [m], heading [rad]: (n, rows, columns, 3) RGB."""
+        """Render what it sees from poses (n, 3) of x [m], y [m], heading [rad]: (n, rows, columns, 3) RGB."""
         pictures = self._sky_only(len(poses))
         texels = self.glimpse(poses).view(np.uint8).reshape(len(poses), -1, 4)
         keep_colours(texels, pictures[:, self._sky :])
@@ -64,7 +64,7 @@ class GroundPlaneCamera:
 
 
 def _tabulate(figures: CameraFigures, floor: Floor) -> tuple[int, TexelTable]:
-    """How many pixels are sky before the first that sees floor, and where each from that one on looks."""
+    """Number of pixels that are sky before the first that sees floor, and a table of where the others look."""
     copies, points = _copies(floor), ground_points(figures).reshape(-1, 2)
     on_floor = np.isfinite(points[:, 0])
     sky = int(np.argmax(on_floor)) if on_floor.any() else len(on_floor)
@@ -123,7 +123,7 @@ def _copies(floor: Floor) -> _Copies:
 
 
 def _blur_octaves(figures: CameraFigures, floor: Floor) -> NDArray[np.int64]:
-    """Which copy each pixel (rows, columns) looks up: blurred over half the diagonal of what the pixel covers."""
+    """Copy that each pixel (rows, columns) looks up: blurred over half the diagonal of what the pixel covers."""
     across = floor_hits(figures, 0.5, 0.0) - floor_hits(figures, -0.5, 0.0)
     along = floor_hits(figures, 0.0, 0.5) - floor_hits(figures, 0.0, -0.5)
     width = np.sqrt((across**2 + along**2).sum(axis=-1)) / 2.0 * floor.pixels_per_metre
@@ -132,7 +132,7 @@ def _blur_octaves(figures: CameraFigures, floor: Floor) -> NDArray[np.int64]:
 
 
 class _Film(Protocol):
-    """How pictures are made of what the camera sees."""
+    """Film: makes pictures of what the camera sees."""
 
     def expose(self, poses: Signal) -> Picture:
         """The picture after the poses (ticks, 3) since the one before."""

@@ -1,4 +1,4 @@
-"""Looking up texels by Numba, an extra: the arithmetic of `plain`, operation by operation, in a quarter of the time."""
+"""Texels looked up by Numba, an extra: the arithmetic of `texels`, operation by operation, in a quarter of the time."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.driving.plain_texels import Colours, Glimpses, Places, TexelTable
+from proxytune.driving.texels import Colours, Glimpses, Places, TexelTable
 
 if vars(numba.config)["DISABLE_JIT"]:
     raise ImportError("NUMBA_DISABLE_JIT is set: uncompiled, these loops take a thousand times as long")

@@ -1,12 +1,10 @@
-"""One episode: an agent drives a plant through the effects of a domain instance until time or luck runs out.
+"""One episode: a driver, a plant and a camera behind the effects of a domain instance, until time or luck runs out.
 
-The lane-following task: where an episode starts, and what a drive is worth.
-
-An episode ends when the axle's middle leaves the map, when the robot hits something, or when its time is over. The
-lane of a pose is the one whose direction agrees with its heading (right-hand traffic); a robot is in it
-while it is at most half a lane width from its centre line. So whoever drives the wrong way is in neither lane.
-Driving recorded commands without an agent or a camera, and measuring the poses.
-Plants by their names: one robot, or several side by side.
+`drive` asks a driver for commands; `Rollout` is the same one command at a time. `follow` drives recorded commands
+without a camera. An episode ends when the axle's middle leaves the map, when the robot hits something, or when its time
+is over. It is worth what `score_trajectory` says: the lane of a pose is the one whose direction agrees with its heading
+(right-hand traffic), and a robot is in it while it is at most half a lane width from its centre line, so whoever drives
+the wrong way is in neither lane. `driving_score` is that of the paper's learning experiment.
 """
 
 import math
@@ -55,7 +53,7 @@ class Instance:
 
 
 class Sight(NamedTuple):
-    """What an expert sees, who need not make do with the picture.
+    """Sight of an expert, who need not make do with the picture.
 
     Attributes:
         picture: The newest picture.
@@ -79,7 +77,7 @@ class Driver(Protocol):
 
 
 class Drive(NamedTuple):
-    """What an episode leaves behind.
+    """Record of an episode.
 
     Attributes:
         poses: Start, then the pose after every tick, (ticks + 1, 3): x [m], y [m], heading [rad].
@@ -105,7 +103,7 @@ class Drive(NamedTuple):
 
 @dataclass(frozen=True)
 class Course:
-    """What an episode starts from and how it ends.
+    """Start and end of an episode.
 
     Attributes:
         start: Starting pose (3,): x [m], y [m], heading [rad].
@@ -146,7 +144,7 @@ class Rollout:
 
     @property
     def ended(self) -> bool:
-        """Whether the robot has crashed or left the course."""
+        """Tell whether the robot has crashed or left the course."""
         return self.crashed or self._course.ended(float(self.poses[-1, 0]), float(self.poses[-1, 1]))
 
     def step(self, command: Command) -> None:

@@ -1,7 +1,6 @@
-"""The expert that learners imitate: pure pursuit of the lane's centre line, on the robot's true pose.
+"""Drivers besides agents: the expert that learners imitate, and those that replay or do what was learnt.
 
-An agent that plays recorded commands and keeps what it sees: the same drive in another domain.
-An agent that does what a policy has learnt, and remembers nothing.
+The expert is pure pursuit of the lane's centre line on the robot's true pose.
 """
 
 from dataclasses import dataclass
@@ -25,7 +24,7 @@ MEMORY = 0.9
 
 
 class LessonMemory(NamedTuple):
-    """What a lesson has shown so far.
+    """Memory of what a lesson has shown so far.
 
     Attributes:
         figures: The robot's nominal full speed [m/s] and effective baseline [m].
@@ -43,7 +42,7 @@ class LessonMemory(NamedTuple):
 
     @property
     def samples(self) -> Demonstration:
-        """What is worth imitating: steps off the road are not."""
+        """Samples worth imitating: steps off the road are not."""
         kept = np.array(self.on_road)
         return Demonstration(np.stack(self.pictures)[kept], np.stack(self.commands)[kept])
 
@@ -130,14 +129,14 @@ def lesson_driver(road: Road, robot: Robot, seed: int, policy: Policy | None) ->
 
 
 class Played(NamedTuple):
-    """How many commands have been played, and the picture before each."""
+    """Number of commands played, and the picture before each."""
 
     played: int
     pictures: tuple[Picture, ...]
 
 
 class Observation(NamedTuple):
-    """What recorded commands lead to.
+    """Poses and pictures that recorded commands lead to.
 
     Attributes:
         poses: Start, then the pose after every tick, (ticks + 1, 3): x [m], y [m], heading [rad].

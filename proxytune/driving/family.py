@@ -1,10 +1,6 @@
-"""The lane-following family as a study's `[domain]` table describes it.
+"""Lane following as a domain family: a robot on a map, its plant, camera and effects, as a `[domain]` table has them.
 
-The name under which a family's episodes are kept: a digest of all but the episode that determines a result.
-A robot's camera once effects have set its figures, and the effects on its pictures.
-Pictures of another size than the robot's agents are given.
-The ways to draw what a camera sees, by name.
-The lane-following domain family: a robot on a map, its plant, camera and effects.
+A family's episodes are kept under its `identity`: a digest of all that determines a result but the episode itself.
 """
 
 import functools
@@ -187,7 +183,7 @@ class LaneFollowing:
 
     @property
     def starts(self) -> int:
-        """How many starting poses the map has."""
+        """Number of starting poses of the map."""
         return len(self.map.starts)
 
     def check_agent(self, name: str) -> None:
@@ -273,7 +269,7 @@ class LaneFollowing:
         return score(self._drive(episode, Pupil(policy), self.course(episode, self.seconds)).poses)
 
     def examine_together(self, episodes: Sequence[Episode], policy: Policy) -> list[float]:
-        """What `examine` says of each of several episodes, to the bit: those of one θ are driven side by side.
+        """Score several episodes as `examine` does, to the bit: those of one θ are driven side by side.
 
         Raises:
             EpisodeError: As `examine` does, for the first episode that fails; SettingsError likewise.
@@ -312,7 +308,7 @@ class LaneFollowing:
         return Observation(driven.poses, np.stack(driven.memory.pictures))
 
     def course(self, episode: Episode, seconds: float) -> Course:
-        """Where an episode starts, and its end: after some time [s], or off the map."""
+        """Start of an episode, and its end: after some time [s], or off the map."""
         noise = {"position_noise_m": self.position_noise_m, "heading_noise_deg": self.heading_noise_deg}
         start = np.asarray(start_pose(self.map, episode.start, seed=episode.seed, **noise))
         return Course(start, seconds, episode.seed, functools.partial(off_map, self.map))

@@ -1,10 +1,8 @@
 """The lanes of a road as geometry: how far along, how far aside and how askew a robot is.
 
-A road's sections laid out on the map as arrays: where each lies, and what lies before it.
-
-The straight and the bend of a section share a pivot, the centre of the bend. Beside the straight the centre line is the
-bend's radius away from the line through the pivot, round the bend from the pivot itself.
-The road's centre line: its nearest point to a position, and how far round the map a point of it lies.
+A road is laid out by sections, a straight and the bend that ends it. Both share a pivot, the centre of the bend: beside
+the straight the centre line is the bend's radius away from the line through the pivot, round the bend from the pivot
+itself. On that rest the nearest point of the centre line, the way round the map, and the lanes on either side.
 """
 
 import functools
@@ -81,7 +79,7 @@ def lay_out(begin: Begin, segments: tuple[Segment, ...]) -> RoadLayout:
 
 
 def corners(begin: Begin, segments: tuple[Segment, ...]) -> Floats:
-    """Where each section begins and the last one ends, (sections + 1, 2) [m]."""
+    """Places where each section begins and the last one ends, (sections + 1, 2) [m]."""
     lap, places = tuple(road_sections(segments)), [np.array(begin[:2])]
     for number, section in enumerate(lap):
         here = math.radians(begin[2]) + _turn(lap[:number])
@@ -164,7 +162,7 @@ def find_nearest(layout: RoadLayout, positions: Floats) -> NearestPoints:
 
 
 def way_round(layout: RoadLayout, section: Numbers, straight: Floats, turned: Floats, offset: Floats) -> Floats:
-    """How far round the map a point of a line beside the centre line lies, counter-clockwise [m].
+    """Way round the map to a point of a line beside the centre line, counter-clockwise [m].
 
     Args:
         layout: Of the road.
@@ -277,7 +275,7 @@ def lane_pose(road: Road, positions: Floats, headings: Floats) -> LanePose:
 
 
 def lane_point(road: Road, counter_clockwise: Flags | bool, along: Floats | float) -> Floats:
-    """Where on the map a lane's centre line is after so much of a lap: `lane_pose` the other way round.
+    """Point of a lane's centre line after so much of a lap: `lane_pose` the other way round.
 
     Args:
         road: The map.
@@ -304,16 +302,16 @@ def lane_point(road: Road, counter_clockwise: Flags | bool, along: Floats | floa
 
 
 def off_map(road: Road, x: float, y: float) -> bool:
-    """Whether a point [m] lies beyond the map's edge; a point that is not a number does."""
+    """Tell whether a point [m] lies beyond the map's edge; a point that is not a number does."""
     return not (0.0 <= x <= road.size[0] and 0.0 <= y <= road.size[1])
 
 
 def _offset(road: Road, counter_clockwise: Flags | bool) -> Floats:
-    """How far right of the road's centre line, seen counter-clockwise, a lane's is [m]."""
+    """Distance of a lane's centre line to the right of the road's, seen counter-clockwise [m]."""
     return np.where(counter_clockwise, road.lane_offset, -road.lane_offset)
 
 
 def _way_to_end(layout: RoadLayout, section: int, offset: Floats) -> Floats:
-    """How far round the map a section ends, counter-clockwise [m]."""
+    """Way round the map to a section's end, counter-clockwise [m]."""
     number = np.asarray(section)
     return way_round(layout, number, layout.last[number], layout.turn[number], offset)

@@ -1,6 +1,7 @@
-"""Whether a map can be driven: its road closes, keeps to the map and clear of itself, and starts lie in lanes.
+"""Maps from their files: those that travel with the package, and a user's own beside the study.
 
-Maps as their files describe them: those that travel with the package, and a user's own beside the study.
+A map that cannot be driven is refused: its road must close, keep to the map and clear of itself, and starts lie in
+lanes.
 """
 
 import functools

@@ -19,7 +19,7 @@ SKY = (115, 209, 255)
 
 @dataclass(frozen=True)
 class CameraFigures:
-    """How a camera is made and mounted.
+    """Figures of how a camera is made and mounted.
 
     Attributes:
         columns: Width of a picture [pixel].
@@ -78,12 +78,12 @@ class Renderer(Protocol):
     """A camera on a robot."""
 
     def render(self, poses: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
-        """What it sees from poses (n, 3) of x [m], y [m], heading [rad]: (n, rows, columns, 3) RGB."""
+        """Render what it sees from poses (n, 3) of x [m], y [m], heading [rad]: (n, rows, columns, 3) RGB."""
         ...
 
 
 def ground_points(figures: CameraFigures) -> NDArray[np.float64]:
-    """Where on the floor each pixel's middle looks, in the robot's frame.
+    """Points of the floor at which each pixel's middle looks, in the robot's frame.
 
     Returns:
         Shape (rows, columns, 2): x ahead of the axle and y to the left [m]; NaN at and above the horizon.
@@ -92,13 +92,13 @@ def ground_points(figures: CameraFigures) -> NDArray[np.float64]:
 
 
 def floor_hits(figures: CameraFigures, right: float, down: float) -> NDArray[np.float64]:
-    """Where the rays through the pixels' middles, shifted by a part of a pixel, meet the floor."""
+    """Points where the rays through the pixels' middles, shifted by a part of a pixel, meet the floor."""
     columns, rows = np.meshgrid(np.arange(figures.columns), np.arange(figures.rows))
     return floor_points(figures, columns + 0.5 + right, rows + 0.5 + down)
 
 
 def floor_points(figures: CameraFigures, columns: NDArray[Any], rows: NDArray[Any]) -> NDArray[np.float64]:
-    """Where on the floor any points of the picture look, in the robot's frame.
+    """Points of the floor at which any points of the picture look, in the robot's frame.
 
     Args:
         figures: Of the camera.

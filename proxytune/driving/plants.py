@@ -1,8 +1,8 @@
-"""What a plant is: the thing that moves.
+"""Plants: what moves, from the motion that wheels ask for to poses.
 
-From duties to the motion that the wheels ask of the body: the part that both plants share.
-What a URDF says of a robot that drives on two wheels: where they are, how large, and how heavy it is.
-The planar plant: kinematics over whole arrays of time, exact for twists that hold over a tick.
+`Drivetrain` makes twists of duties, and both plants share it. The planar plant is kinematics over whole arrays of time,
+exact for twists that hold over a tick. What a URDF says of a robot on two wheels is read here too: the bullet plant
+drives it.
 """
 
 import math
@@ -42,7 +42,7 @@ class Plant(Protocol):
 
 
 class DrivetrainState(NamedTuple):
-    """What the three stages remember."""
+    """Memories of the three stages."""
 
     command: Memory
     actuation: Memory
@@ -63,7 +63,7 @@ class Drivetrain:
     motion: Chain
 
     def begin(self, context: FilterContext) -> DrivetrainState:
-        """As if the resting command of `context` had been given for ever."""
+        """Begin as if the resting command of `context` had been given for ever."""
         still = np.zeros((*np.shape(context.rest)[:-1], len(CHANNELS[Stage.MOTION])))
         return DrivetrainState(
             self.command.begin(context),
@@ -164,7 +164,7 @@ def parse_urdf(path: Path) -> ET.Element:
 
 
 def read_body(root: ET.Element, path: Path) -> Body:
-    """What a URDF says of its wheels, mass and camera.
+    """Read a URDF's wheels, mass and camera.
 
     Raises:
         SettingsError: If its two driven wheels cannot be told, or a number in it is none.
@@ -272,7 +272,7 @@ def _wheel(root: ET.Element, joint: ET.Element) -> Wheel:
 
 
 def _radius(root: ET.Element, link: str) -> float | None:
-    """Of what the wheel collides as, else of what it looks like."""
+    """Radius of what the wheel collides as, else of what it looks like."""
     shapes = (f"{part}/geometry/{shape}" for part in ("collision", "visual") for shape in ("sphere", "cylinder"))
     for shape in shapes:
         for element in links_called(root, link):

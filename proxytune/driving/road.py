@@ -1,6 +1,7 @@
-"""What a road consists of: straights and arcs, one after the other, counter-clockwise round the map.
+"""A map as its file states it: the road's segments, its lanes and markings, and where robots are put down.
 
-A map: the road's segments, its lanes and markings, and where robots are put down; in metres from its corner.
+The road's centre line is straights and arcs, one after the other, counter-clockwise round the map; lengths are in
+metres from the map's corner. Names and fields of `Road` and its parts count in a family's identity.
 """
 
 import math
@@ -64,7 +65,7 @@ def road_sections(segments: tuple[Segment, ...]) -> Iterator[RoadSection]:
 
 
 def repeats_of(lap: tuple[RoadSection, ...]) -> int:
-    """How many times a lap repeats its first sections: 4 on a square loop, 1 where it never does."""
+    """Number of times that a lap repeats its first sections: 4 on a square loop, 1 where it never does."""
     count = len(lap)
     return next(n for n in range(count, 0, -1) if count % n == 0 and lap[: count // n] * n == lap)
 
@@ -88,7 +89,7 @@ def _arc_length(arc: Arc) -> float:
 
 @dataclass(frozen=True)
 class Paint:
-    """How a road is marked.
+    """Markings of a road.
 
     Attributes:
         white_width: Width of the solid white edge lines [m].

@@ -1,6 +1,7 @@
-"""Where a road's markings lie: signed distances with their slopes, and which line of which stretch is nearest.
+"""The floor of a map as a picture seen from above, and where the markings on it lie.
 
-The floor of a map as a picture seen from above, drawn from the map's road.
+The picture is drawn from signed distances to what is painted. `Markings` gives such distances with their slopes, and
+says which line of which stretch is nearest.
 """
 
 import functools
@@ -71,7 +72,7 @@ def draw_floor(road: Road) -> Floor:
 
 
 def painted(road: Road) -> list[tuple[Segment, ...]]:
-    """What is painted for each segment of the road, its bends as tight as the paint's."""
+    """Segments as painted for each one of the road, its bends as tight as the paint's."""
     return [tightened(segment, road.paint.bend_radius) for segment in road.segments]
 
 
@@ -110,7 +111,7 @@ def _dash_distance(road: Road, stretches: list[tuple[Segment, ...]], along: Floa
 
 
 def dashes_on(paint: Paint, segment: Segment, size: float) -> int:
-    """How many dashes are painted on a segment whose centre line is painted so long [m]."""
+    """Number of dashes on a segment whose centre line is painted so long [m]."""
     dash = paint.straight_dash if isinstance(segment, Straight) else paint.bend_dash
     return max(1, round((size / dash * DASH_PER_GAP - 1.0) / (DASH_PER_GAP + 1.0)))
 
@@ -191,7 +192,7 @@ class Markings:
         return Marks(distance, slope, stretch, np.where(end, 3, 2), -beyond, share)
 
     def _along(self, places: Floats) -> tuple[Floats, Floats, Floats, NDArray[np.intp], Floats]:
-        """How far right of the centre line, the unit vector to the right, how far round, stretch and share of it."""
+        """Distance right of the centre line, the unit vector to the right, how far round, stretch and share of it."""
         near = find_nearest(self._layout, places)
         side = self._layout.side[near.section]
         along = way_round(self._layout, near.section, near.straight, near.turned, np.zeros(()))

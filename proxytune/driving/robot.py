@@ -218,7 +218,7 @@ def robot_from_geometry(name: str, geometry: Mapping[str, float], control_rate: 
 
 
 def _homes(folder: Path | None) -> list[Path]:
-    """Where robots are looked for, in this order."""
+    """Folders in which robots are looked for, in this order."""
     own = [folder, folder.resolve().parent] if folder else []
     return [*own, shipped("robots")]
 

@@ -1,7 +1,4 @@
-"""Effects on how the lens draws: each sets figures of the camera.
-
-Effects on how the camera is mounted: each sets one of the camera's figures.
-"""
+"""Effects on how a camera is mounted and on what its lens draws: each sets one of the camera's figures, for good."""
 
 from dataclasses import dataclass
 from typing import ClassVar

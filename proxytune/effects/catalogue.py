@@ -1,6 +1,7 @@
-"""Every effect there is, in the order in which the signal meets them, and effects from named values.
+"""Every effect by name, in the order in which the signal meets them, and effects from values of θ.
 
-An effect from outside, found through the one door and checked: it is what it claims to be, or is refused by name.
+A user's own effect and a plug-in's come through `outside_effect`, which refuses whatever is not what an effect must be;
+`problems` tries it on a short signal. Whoever wants effects of θ asks a `Catalogue`, which knows whose folder counts.
 """
 
 import inspect
@@ -83,7 +84,7 @@ def outside_effect(name: str, folder: Path | None) -> type[Effect]:
 
 
 def problems(kind: Any) -> Iterator[str]:
-    """What is wrong with an effect that has all MEMBERS, the first thing first.
+    """Problems of an effect that has all MEMBERS, the first thing first.
 
     Take the first alone: what follows supposes that nothing before is wrong.
     """
@@ -136,7 +137,7 @@ def _wrong_form(kind: Any, form: Form) -> Iterator[str]:
 
 
 def _wrong_figure(shown: Any) -> Iterator[str]:
-    """What a figure of the effect could not be drawn for."""
+    """Reasons why no figure of the effect could be drawn."""
     if not isinstance(shown, WheelCurve | Means):
         yield f"is to be shown by {shown!r}; give its trace a WheelCurve, or Means with panels"
     if not isinstance(shown, Means):
@@ -196,50 +197,15 @@ def _filtered(kind: Any, values: list[float], signal: Any) -> Any:
 
 
 _ALL: tuple[type[Effect], ...] = (
-    DelayJitter,
-    DroppedCommands,
-    CommandQuantisation,
-    Delay,
-    SlewRate,
-    DriverMap,
-    DeadBand,
-    Stiction,
-    Saturation,
-    Trim,
-    WheelGain,
-    BatterySag,
-    ThermalFade,
-    MotorLag,
-    Backlash,
-    WheelRipple,
-    YawScrub,
-    Understeer,
-    YawLag,
-    TurnSlip,
-    LateralSlip,
-    CrossCoupling,
-    FloorSlope,
-    SlipperyPatch,
-    MarkerOffset,
-    HeadingOffset,
-    CameraPitch,
-    CameraRoll,
-    CameraYaw,
-    CameraHeight,
-    CameraForward,
-    FieldOfView,
-    LensDistortion,
-    LensCentre,
+    DelayJitter, DroppedCommands, CommandQuantisation, Delay,
+    SlewRate, DriverMap, DeadBand, Stiction, Saturation, Trim, WheelGain, BatterySag, ThermalFade, MotorLag, Backlash,
+    WheelRipple, YawScrub, Understeer, YawLag, TurnSlip, LateralSlip, CrossCoupling, FloorSlope, SlipperyPatch,
+    MarkerOffset, HeadingOffset,
+    CameraPitch, CameraRoll, CameraYaw, CameraHeight, CameraForward, FieldOfView, LensDistortion, LensCentre,
     PixelAspect,
     # Mixtures of pictures commute; blur is exact on 8-bit pictures alone, so it comes first
-    Blur,
-    RollingShutter,
-    CameraLatency,
-    Defocus,
-    Vignetting,
-    Exposure,
-    ImageNoise,
-)
+    Blur, RollingShutter, CameraLatency, Defocus, Vignetting, Exposure, ImageNoise,
+)  # fmt: skip
 
 CATALOGUE: Mapping[str, type[Effect]] = MappingProxyType({effect.name: effect for effect in _ALL})
 
@@ -316,7 +282,7 @@ class Catalogue:
         return theta_names(self.effect(name), name)
 
     def knows(self, name: str) -> bool:
-        """Whether an effect of this name is shipped, a plug-in, or written as a user's own is."""
+        """Tell whether an effect of this name is shipped, a plug-in, or written as a user's own is."""
         return ":" in name or name in self.names
 
 

@@ -1,6 +1,7 @@
 """Effects on commands between the agent that issues them and the motors that obey them.
 
-Effects on single messages: commands that arrive irregularly, or never.
+Delay and quantisation treat every sample alike. Jitter and loss strike single messages, so they draw one number for
+each message of the robot's control rate, found by the message's number: the same in every chunk and batch.
 """
 
 import functools
@@ -51,7 +52,7 @@ class Delay:
     trace: ClassVar[Trace | None] = Trace(cues=(Cue.TRANSIENTS,), shown=WheelCurve.STEP)
 
     def begin(self, context: FilterContext) -> DelayLine:
-        """As if the robot had been at rest for ever."""
+        """Begin as if the robot had been at rest for ever."""
         samples = self.delay * context.rate_hz
         whole = int(np.floor(samples + 1e-9))
         rest = np.asarray(context.rest, dtype=float)[..., None, :]
@@ -154,7 +155,7 @@ class JitterState(NamedTuple):
 
 
 class HoldIntervals(NamedTuple):
-    """Stretches of time with one message in force: first sample it counts in, how long it lasts, whence its value."""
+    """Zero-order-hold intervals, one message in force: first sample, length [samples], and the sample of its value."""
 
     firsts: NDArray[np.int64]
     lengths: Signal
@@ -181,7 +182,7 @@ class DelayJitter:
     )
 
     def begin(self, context: FilterContext) -> JitterState:
-        """As if the robot had been at rest for ever."""
+        """Begin as if the robot had been at rest for ever."""
         spread = self.spread * context.rate_hz
         rest = np.asarray(context.rest, dtype=float)[..., None, :]
         return JitterState(0, np.repeat(rest, math.ceil(spread), axis=-2), spread, messages(context))
@@ -197,7 +198,7 @@ class DelayJitter:
 
 
 def _arrivals(memory: JitterState, length: int) -> HoldIntervals:
-    """What is in force when, over the next samples; the same for all members of a batch."""
+    """Messages in force over the next samples; the same for all members of a batch."""
     begin, end, sent = memory.next, memory.next + length, memory.messages
     late = math.ceil((memory.spread + 1.0) * sent.per_sample) + 1
     newest = int(sent.numbers(np.array(end - 1)))

@@ -1,8 +1,9 @@
-"""What an effect is: a causal filter between a command and the pictures that come of it.
+"""An effect is a causal filter; here is what it promises, and what filters of any stage share.
 
-The trace that an effect leaves in measured motion: what a diagnosis goes by to find it, fit it and draw it.
-First-order lags: what follows a signal with a time constant, exactly for a signal that holds over each sample.
-Dead reckoning: values known beforehand, sample by sample, and beyond them those that a rate leads to.
+`begin` gives the memory before the first sample, `apply` filters the next chunk and gives the memory for the one after,
+so that cutting a signal into chunks changes nothing. `Trace` is what a diagnosis has to know to find an effect in
+measured motion. Filters share a first-order low-pass, exact for signals that hold over each sample, and dead reckoning
+of headings and angles beyond those that are known.
 """
 
 from collections.abc import Callable, Mapping
@@ -42,7 +43,7 @@ SIGNALS = ("", "x", "y", "heading", "left angle", "right angle", "bend", *MOTION
 
 
 class Panel(NamedTuple):
-    """What is drawn against what.
+    """Axes of one panel of a figure.
 
     Attributes:
         signal: Along the axis, one of SIGNALS; empty for that of the cue.
@@ -77,7 +78,7 @@ class WheelCurve(StrEnum):
 
 
 class Lateness(NamedTuple):
-    """How late a random effect makes commands: its mean [s], and a mixture of times about it.
+    """Lateness of commands under a random effect: its mean [s], and a mixture of times about it.
 
     Attributes:
         mean_s: How late a command is on average [s].
@@ -92,7 +93,7 @@ class Lateness(NamedTuple):
 
 @dataclass(frozen=True)
 class Draws:
-    """What an effect of one parameter draws for each command.
+    """Random draws of an effect of one parameter, one for each command.
 
     Attributes:
         lateness: From the parameter's value and the commands per second to how late commands are.
@@ -126,7 +127,7 @@ class Form:
 
 @dataclass(frozen=True)
 class Trace:
-    """What a diagnosis has to know of an effect on motion.
+    """Knowledge of an effect on motion that a diagnosis goes by.
 
     Attributes:
         cues: The signals through which it acts.
@@ -145,7 +146,7 @@ class Trace:
     placed: bool = False
 
     def shown_in(self, form: str) -> WheelCurve | Means:
-        """What shows the form of this name."""
+        """Curve or means that show the form of this name."""
         own = next((one.shown for one in self.forms if one.name == form), None)
         return own or self.shown
 
@@ -158,7 +159,7 @@ Memory = Any
 
 
 class Stage(StrEnum):
-    """Where in a domain instance an effect bends the signal, in the order the signal passes."""
+    """Places in a domain instance where effects bend the signal, in the order in which it passes them."""
 
     COMMAND = "command"
     ACTUATION = "actuation"
@@ -191,7 +192,7 @@ CHANNELS: Mapping[Stage, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class FilterContext:
-    """What a filter is told before the first sample.
+    """Context that a filter is told before the first sample.
 
     Attributes:
         rate_hz: Samples per second.

@@ -1,7 +1,7 @@
-"""What a learnt effect looks at: groups of causal features of the motion that is asked for.
+"""Causal features of the motion that is asked for, in groups: what curves of unnamed motion are fitted over.
 
-Functions of the motion that is asked for, of which learnt curves are made: each 0 where the robot stands.
-What a signal was like before: low-passes of it, and how far a wheel has rolled since it last turned.
+`AskedMotion` is that motion with its past. A group of `GROUPS` names the signal, and for each channel of the body or of
+a wheel the basis functions over it, each 0 where the robot stands. The filters that make the past come last.
 """
 
 from collections.abc import Callable, Mapping
@@ -73,7 +73,7 @@ def grid(asked: AskedMotion, knots: Knots) -> Signal:
 
 
 def sign(asked: AskedMotion, wheel: int) -> Signal:
-    """Which way a wheel turns: from −1 to 1, 0 where it stands (…, time, 1)."""
+    """Sign of a wheel's speed: from −1 to 1, 0 where it stands (…, time, 1)."""
     return np.asarray(np.clip(asked.wheels[wheel][..., None] / REST_SPEED, -1.0, 1.0))
 
 
@@ -83,7 +83,7 @@ def moving(asked: AskedMotion) -> Signal:
 
 
 def backwards(asked: AskedMotion, knots: Knots) -> Signal:
-    """Whether the robot moves backwards, for a knot of −1."""
+    """Indicator of moving backwards, for a knot of −1."""
     return hats(np.clip(asked.forward / REST_SPEED, -1.0, 1.0), knots)
 
 
@@ -134,7 +134,7 @@ def waves(wave: Callable[[Signal], Signal]) -> Callable[[AskedMotion, Knots], Si
 
 
 class Channel(NamedTuple):
-    """Where a group's curves go: to the body's `forward`, `sideways` or `yaw`, or to the `left` or `right` wheel."""
+    """Target of a group's curves: to the body's `forward`, `sideways` or `yaw`, or to the `left` or `right` wheel."""
 
     to: str
     unit: str
@@ -310,7 +310,7 @@ def rings(change: Signal, before: Signal, frequencies_hz: Knots, rate_hz: float)
 
 
 def play(signal: Signal, before: Signal, halves: Knots) -> Signal:
-    """What is dragged along by a signal (…, time) through plays of these half widths (…, time, widths)."""
+    """Value dragged along by a signal (…, time) through plays of these half widths (…, time, widths)."""
     out, now = np.empty((*signal.shape, len(halves))), before
     half = np.asarray(halves)
     for step in range(signal.shape[-1] if len(halves) else 0):
@@ -321,7 +321,7 @@ def play(signal: Signal, before: Signal, halves: Knots) -> Signal:
 
 
 def moved_since(speed: Signal, before: Signal, rest_speed: float, rate_hz: float) -> Signal:
-    """How long ago a wheel last stood [s] (…, time), 0 while it does.
+    """Time since a wheel last stood [s] (…, time), 0 while it does.
 
     Args:
         speed: Its speed (…, time).
@@ -335,7 +335,7 @@ def moved_since(speed: Signal, before: Signal, rest_speed: float, rate_hz: float
 
 
 def rolled_since(speed: Signal, before: Signal, rate_hz: float) -> Signal:
-    """How far a wheel has rolled since it last turned the other way [m] (…, time), negative backwards.
+    """Way that a wheel has rolled since it last turned the other way [m] (…, time), negative backwards.
 
     Args:
         speed: Its speed [m/s] (…, time).

@@ -1,6 +1,6 @@
-"""Effects of friction and play: wheels that do not turn for small duties, and gears with slack.
+"""Effects of friction, play and wheels that are out of round.
 
-Wheels that are not round, or not mounted in their middle.
+Dead band, stiction and backlash depend on how a wheel's duty came about; ripple on the angle that it has turned by.
 """
 
 import math
@@ -119,7 +119,7 @@ class Stiction:
 
 
 def _latest(on: NDArray[np.bool_], off: NDArray[np.bool_], first: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Whether the latest event was an `on`, sample by sample: a sample's number, doubled, leaves a bit for it."""
+    """Tell whether the latest event was an `on`, sample by sample: a sample's number, doubled, leaves a bit for it."""
     numbers = 2 * np.arange(1, on.shape[-2] + 1)[:, None]
     events = np.where(on | off, numbers + on, 0)
     events[..., :1, :] = np.where(events[..., :1, :] > 0, events[..., :1, :], first)

@@ -1,6 +1,7 @@
-"""Effects of lens and sensor on how bright and how sharp a picture is: each picture by itself.
+"""Effects on how a picture comes out, once it is known what is before the lens.
 
-Effects of the shutter: from which instants a picture is made. They are seen only in motion.
+Focus, vignetting, exposure and noise change each picture by itself. Blur, rolling shutter and latency mix it with those
+before it, and are seen only in motion.
 """
 
 import math
@@ -194,7 +195,7 @@ class Blur:
     trace: ClassVar[Trace | None] = None
 
     def begin(self, context: FilterContext) -> ShutterWindow:
-        """As if the robot had stood before the first picture for ever."""
+        """Begin as if the robot had stood before the first picture for ever."""
         weights = _window(self.blur * context.rate_hz)
         return ShutterWindow(_still(context, weights.size - 1), weights)
 
@@ -208,7 +209,7 @@ class Blur:
         return band @ joined, memory._replace(pictures=joined[..., length:, :])
 
     def mean_weights(self, rate_hz: float) -> Signal:
-        """What each of the last pictures counts in the newest mean, the newest last: exact for pictures of 8 bits."""
+        """Weights of the last pictures in the newest mean, the newest last: exact for pictures of 8 bits."""
         weights = _window(self.blur * rate_hz)
         return weights[int(np.argmax(weights > 0.0)) :]
 
@@ -231,7 +232,7 @@ class RollingShutter:
     trace: ClassVar[Trace | None] = None
 
     def begin(self, context: FilterContext) -> DelayedPictures:
-        """As if the robot had stood before the first picture for ever."""
+        """Begin as if the robot had stood before the first picture for ever."""
         rows = int(context.nominal["camera_rows"])
         return _late(self.readout * context.rate_hz * (1.0 - (np.arange(rows) + 0.5) / rows), context)
 
@@ -258,7 +259,7 @@ class CameraLatency:
     trace: ClassVar[Trace | None] = None
 
     def begin(self, context: FilterContext) -> DelayedPictures:
-        """As if the robot had stood before the first picture for ever."""
+        """Begin as if the robot had stood before the first picture for ever."""
         return _late(np.array([self.camera_latency * context.rate_hz]), context)
 
     def apply(self, signal: Signal, memory: DelayedPictures) -> tuple[Signal, DelayedPictures]:

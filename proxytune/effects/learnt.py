@@ -1,6 +1,7 @@
-"""Motion that was learnt from drives and has no name: curves over causal features. It is not physics.
+"""Motion that was learnt from drives and has no name: the twist grows by Σ weight · feature. It is not physics.
 
-A learnt effect as named values of θ, and as the `[effects.learnt.GROUP]` tables of a model.toml.
+`Learnt` is the effect. Its values are names of θ, `learnt.GROUP.CHANNEL@KNOT`, and tables of a model.toml,
+`[effects.learnt.GROUP]`; both ways of writing it are read and checked here.
 """
 
 import math
@@ -47,7 +48,7 @@ class FittedRange(NamedTuple):
 
 
 class LearntState(NamedTuple):
-    """What has been so far: arrays of the batch's shape, and low-passes with their time constants last.
+    """State of all that has been so far: arrays of the batch's shape, and low-passes with their time constants last.
 
     Attributes:
         seconds: Since the start [s].
@@ -175,7 +176,7 @@ class Learnt:
         )
 
     def features(self, signal: Signal, memory: LearntState) -> list[tuple[Signal, Signal]]:
-        """What each weight adds, curve by curve: its features (…, time, knots) and the twist of one unit (3,).
+        """Features that weights scale, curve by curve: the features (…, time, knots) and the twist of one unit (3,).
 
         The heading is taken from what is known beforehand and from the twist that is asked for.
         """
@@ -199,7 +200,7 @@ class Learnt:
         return next((curve.knots for curve in self.curves if curve.group == group), ())
 
     def _asked(self, signal: Signal, past: LearntState) -> tuple[AskedMotion, LearntState]:
-        """What is asked for and its past, and the past of the next chunk; no heading yet."""
+        """Motion asked for with its past, and the past of the next chunk; no heading yet."""
         forward, yaw = np.clip(signal[..., 0], *self.seen.forward), np.clip(signal[..., 2], *self.seen.yaw)
         turn = yaw * (past.baseline / 2.0)
         wheels = np.stack((forward - turn, forward + turn))
@@ -238,7 +239,7 @@ LABEL = "learnt from drives: not physics, and of no use beyond what they visited
 
 
 def is_learnt(name: str) -> bool:
-    """Whether a name of θ belongs to the learnt effect."""
+    """Tell whether a name of θ belongs to the learnt effect."""
     return name.startswith(f"{Learnt.name}.")
 
 

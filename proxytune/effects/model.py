@@ -1,7 +1,4 @@
-"""A domain instance as a file: robot, plant, and the effects with their values.
-
-Effects in a row: what one stage of a domain instance does to its signal.
-"""
+"""A domain instance as model.toml: robot, plant and effects with their values; and a stage's effects as one chain."""
 
 import math
 import zlib
@@ -21,7 +18,7 @@ from proxytune.space import Parameter
 
 @dataclass(frozen=True)
 class Model:
-    """What model.toml says.
+    """Content of a model.toml.
 
     Attributes:
         robot: Name of the robot.

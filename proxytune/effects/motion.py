@@ -1,8 +1,7 @@
-"""Effects between the motion that the wheels ask of the body and the motion that the body makes.
+"""Effects between the motion that wheels ask of the body, the one that it makes, and the pose that is measured of it.
 
-Effects on how driving and turning mix: each is changed by the other, or turning comes late.
-Effects of the floor: slopes that slow the robot down or push it aside, and patches where its wheels slip.
-Effects between the pose of the robot and the pose that is measured of it.
+First how forward speed, sideways speed and yaw rate change each other; then what the floor does where the robot is;
+last how the pose that is tracked differs from that of the axle's middle.
 """
 
 from dataclasses import dataclass

@@ -1,8 +1,7 @@
 """Effects between a command that has arrived and the speed that a wheel turns at, as a fraction of full speed.
 
-How an effect on the wheels is shared out between the left one and the right one.
-Effects of what a motor and its driver can bear: commands that rise slowly, motors that tire under load.
-Effects of the battery and the motor's limits on how fast wheels can turn.
+An effect with `imbalance` is shared out between the wheels: value · (1 − imbalance) left, value · (1 + imbalance)
+right. `wheel_forms` are the forms in which a diagnosis tries such an effect: both wheels alike, one alone, or unevenly.
 """
 
 from dataclasses import dataclass, replace

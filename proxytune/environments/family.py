@@ -1,8 +1,7 @@
 """Any Gymnasium environment as a domain family: its own parameters and our effects are θ.
 
-A policy that was trained elsewhere, as an agent of a study.
-Agents of an environment by name: a function, what has `predict`, or one of the two that need no code.
-One episode of an environment: an agent acts through effects until the environment or the time ends it.
+An agent is a function, what has `predict`, or one of two that need no code. One episode: it acts through effects until
+the environment or the time ends it. `agent_of` goes the other way: a policy trained elsewhere drives our robot.
 """
 
 import hashlib
@@ -31,7 +30,7 @@ from proxytune.space import Theta
 
 
 class Predictor(Protocol):
-    """What has learnt to act, as stable-baselines3's algorithms and policies."""
+    """Anything that has learnt to act, as stable-baselines3's algorithms and policies."""
 
     def predict(self, observation: Any, *, deterministic: bool) -> Any:
         """The action for an observation, or the action and a state, which it is given back as `state=`."""
@@ -102,7 +101,7 @@ BUILT_IN: Mapping[str, Callable[[Any, int], Act]] = MappingProxyType({"random": 
 
 @dataclass
 class Predicting:
-    """What has `predict`, as the policies of stable-baselines3 do; a state that it answers with is handed back."""
+    """Anything with `predict`, as the policies of stable-baselines3 do; a state that it answers with is handed back."""
 
     policy: Any
     state: Any = None
@@ -298,7 +297,7 @@ class GymnasiumFamily:
 
     @property
     def starts(self) -> int:
-        """How many initial states are numbered."""
+        """Number of initial states."""
         return STARTS
 
     def truth(self, model: Path) -> Theta:

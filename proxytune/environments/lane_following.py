@@ -1,8 +1,7 @@
-"""The lane-following domain as a Gymnasium environment: picture in, duties out.
+"""Lane following as a Gymnasium environment: picture in, duties out, the episodes that a study scores.
 
-What an environment renders: the camera's picture beside the map from above, with the robot's way.
-θ of an environment: fixed values, and intervals to draw from at each reset.
-The task's metrics of an episode under way.
+θ is fixed or drawn from intervals at each reset; rewards add up to the task's distance; what is rendered is the
+camera's picture beside the map from above with the robot's way.
 """
 
 import math

@@ -1,16 +1,15 @@
-"""Making a Gymnasium environment, with values for its own parameters.
+"""An environment as a study's [domain] table describes it, made with values for its own parameters.
 
-What a study's [domain] table says of a Gymnasium environment, read strictly.
-What a model.toml gives an environment.
+Class names and fields of the settings count in a family's identity.
 """
 
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
+import gymnasium
 import numpy as np
 
 from proxytune.effects import PARAMETERS, Catalogue, read_effects
@@ -47,7 +46,7 @@ class OwnParameter:
 
 @dataclass(frozen=True)
 class EpisodeMetric:
-    """How an episode is scored.
+    """Rule by which an episode is scored.
 
     Attributes:
         name: What the metric is called.
@@ -171,19 +170,6 @@ REGISTERED = re.compile(r"(.*/)?[\w.-]+-v\d+")
 """How Gymnasium writes what is registered: `Name-v0`, `namespace/Name-v0`."""
 
 
-def gymnasium() -> ModuleType:
-    """The library.
-
-    Raises:
-        InputError: If it is not installed.
-    """
-    try:
-        import gymnasium as library
-    except ImportError:
-        raise InputError('Gymnasium is not installed; run pip install "proxytune[gym]"') from None
-    return library
-
-
 def make_environment(settings: EnvironmentSettings, theta: Mapping[str, float]) -> Any:
     """An environment whose own parameters have the values of θ, neutral where θ leaves them out.
 
@@ -194,16 +180,15 @@ def make_environment(settings: EnvironmentSettings, theta: Mapping[str, float]) 
     """
     values = {one: float(theta.get(one.parameter.name, one.parameter.neutral)) for one in settings.own}
     arguments = {**dict(settings.arguments), **{one.argument: value for one, value in values.items() if one.argument}}
-    library = gymnasium()
     try:
-        made = _make(library, settings, arguments)
+        made = _make(settings, arguments)
     except ProxytuneError:
         raise
     except ModuleNotFoundError as problem:
         raise InputError(f"environment '{settings.environment}' needs {problem.name}; install it") from problem
     except Exception as problem:
         raise InputError(f"environment '{settings.environment}' raised {describe(problem)}; correct it") from problem
-    if not isinstance(made, library.Env):
+    if not isinstance(made, gymnasium.Env):
         kind = type(made).__name__
         raise InputError(f"environment '{settings.environment}' is a {kind}; it must be a gymnasium.Env")
     try:
@@ -216,14 +201,14 @@ def make_environment(settings: EnvironmentSettings, theta: Mapping[str, float]) 
     return made
 
 
-def _make(library: ModuleType, settings: EnvironmentSettings, arguments: Mapping[str, Any]) -> Any:
+def _make(settings: EnvironmentSettings, arguments: Mapping[str, Any]) -> Any:
     module, colon, name = settings.environment.rpartition(":")
     if colon and not REGISTERED.fullmatch(name):
         return load(settings.environment, kind="environment", beside=settings.folder, needs=("__call__",))(**arguments)
     if colon:
         import_beside(module, settings.folder)
     limit = {"max_episode_steps": settings.steps} if settings.steps else {}
-    return library.make(name, disable_env_checker=True, **limit, **arguments)
+    return gymnasium.make(name, disable_env_checker=True, **limit, **arguments)
 
 
 def _set(environment: Any, one: OwnParameter, value: float) -> None:
@@ -263,7 +248,7 @@ def _name_and_index(step: str) -> tuple[str, Any]:
 
 
 def _hint(environment: Any, one: OwnParameter) -> str:
-    """What the attribute is likely to be: wrappers hide those of the environment itself."""
+    """Guess what was meant by an attribute: wrappers hide those of the environment itself."""
     first = _name_and_index(one.attribute.split(".")[0])[0]
     hidden = first != "unwrapped" and hasattr(environment.unwrapped, first)
     return f"; did you mean 'unwrapped.{one.attribute}'?" if hidden else "; correct it"
@@ -274,7 +259,7 @@ def _unset(one: OwnParameter, problem: str) -> SettingsError:
 
 
 def read_values(path: Path, own: tuple[OwnParameter, ...], folder: Path) -> dict[str, float]:
-    """What a model.toml gives an environment: its effects, and in [parameters] values of the environment's own.
+    """Read what a model.toml gives an environment: its effects, and in [parameters] values of the environment's own.
 
     A model that `diagnose` wrote names a robot too, which says nothing of an environment.
 

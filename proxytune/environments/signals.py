@@ -1,9 +1,8 @@
-"""What effects are told before the first step of an environment.
+"""Our effects round an environment: on actions on their way in, on observations on their way out.
 
-What proxytune has to know of an environment: its actions, observations and rate.
-Our effects on actions, on their way into an environment.
-Our effects on observations, on their way out of an environment.
-Which parameters θ may name of an environment: its own, and those of every effect that can wrap it.
+`look_at` finds out what an environment is. `Actuators` and `Sensors` filter its signals, and `EnvironmentParameters`
+names what θ may tune of it: its own parameters, and those of every effect that can wrap it. The name and fields of
+`Spaces` count in a family's identity.
 """
 
 import re
@@ -11,6 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,7 +26,7 @@ from proxytune.effects import (
     is_learnt,
     stage_chain,
 )
-from proxytune.environments.making import POSE, EnvironmentSettings, OwnParameter, gymnasium, make_environment
+from proxytune.environments.making import POSE, EnvironmentSettings, OwnParameter, make_environment
 from proxytune.errors import ExtensionError, SettingsError
 from proxytune.identity import versions_of
 from proxytune.space import Parameter
@@ -70,7 +70,7 @@ def look_at(settings: EnvironmentSettings) -> Spaces:
     """
     environment = make_environment(settings, {})
     try:
-        box = gymnasium().spaces.Box
+        box = gymnasium.spaces.Box
         low, high, no_actions = _actions(environment.action_space, box)
         picture, no_picture = _picture(environment.observation_space, box)
         no_state = _check_state(settings, environment.observation_space, box)
@@ -153,7 +153,7 @@ def rest_of(stage: Stage, spaces: Spaces) -> Signal:
 
 
 def context_of(spaces: Spaces, rest: Signal, seed: int) -> FilterContext:
-    """What a chain is told before its first sample; where the rate is not known, no effect asks for it."""
+    """Context of a chain before its first sample; where the rate is not known, no effect asks for it."""
     return FilterContext(spaces.rate_hz or 1.0, rest, figures(spaces), seed)
 
 
@@ -175,7 +175,7 @@ class Actuators:
         self._largest[self._largest == 0.0] = 1.0
 
     def pass_on(self, action: Any) -> Any:
-        """What reaches the environment of the next action; whole numbers are rounded to the nearest ones."""
+        """Action that reaches the environment of the next action; whole numbers are rounded to the nearest ones."""
         if self._idle:
             return action
         shares = np.asarray(action, dtype=float) / self._largest
@@ -200,7 +200,7 @@ class Sensors:
         self._memory: Any = None
 
     def show(self, observation: Any) -> Any:
-        """What the agent sees of the next observation."""
+        """Observation as the agent sees it."""
         if self._image.effects:
             signal = np.asarray(observation).reshape(1, -1)
             developed = self._filtered(self._image, signal.astype(np.float32))
@@ -275,7 +275,7 @@ class EnvironmentParameters(Mapping[str, Parameter]):
 
 
 def _of_stage(kind: type[Effect], spaces: Spaces) -> str:
-    """Why nothing of this stage can be bent, or empty."""
+    """Reason why nothing of this stage can be bent, or empty."""
     if kind.stage is Stage.MOTION:
         return "it bends the motion of a robot's body; vary the environment's own physics in [domain.parameters]"
     if kind.stage is Stage.CAMERA:
@@ -286,7 +286,7 @@ def _of_stage(kind: type[Effect], spaces: Spaces) -> str:
 
 
 def _of_wheels(name: str, kind: type[Effect], parameter: Parameter, spaces: Spaces) -> str:
-    """Why it needs two wheels where there are not two actions, or empty."""
+    """Reason why it needs two wheels where there are not two actions, or empty."""
     count = len(spaces.low)
     if kind.stage not in ON_COMMANDS or count == 2:
         return ""
@@ -298,7 +298,7 @@ def _of_wheels(name: str, kind: type[Effect], parameter: Parameter, spaces: Spac
 
 
 def _of_needs(kind: type[Effect], spaces: Spaces) -> str:
-    """What it would have to know of the robot and nobody says, or empty."""
+    """Something that it would have to know of the robot and nobody says, or empty."""
     units = {part for one in kind.parameters for part in re.split(r"[^A-Za-z]+", one.unit)}
     if spaces.rate_hz is None and units & TIMES:
         return "it needs the time that a step takes; add rate_hz to [domain], steps per second"

@@ -41,10 +41,9 @@ from proxytune.driving import (
     draw_floor,
     ground_points,
     lane_following,
-    plain_texels as plain,
     read_robot,
     shipped_map,
-    texels as choosing,
+    texels as plain,
 )
 from proxytune.driving.cameras import View
 from proxytune.effects import CATALOGUE, PARAMETERS, Blur, Chain, FilterContext, RollingShutter, Stage, theta_names
@@ -294,7 +293,7 @@ def test_numpy_does_it_where_numba_is_told_not_to_compile(compiled):
         text=True,
         check=True,
     )
-    assert told.stdout == "proxytune.driving.texels.plain\n"
+    assert told.stdout == "proxytune.driving.texels\n"
 
 
 @pytest.mark.parametrize("at_hand", [True, False])
@@ -302,12 +301,12 @@ def test_numpy_does_it_where_numba_does_not_work(compiled, monkeypatch, at_hand)
     if not at_hand:
         monkeypatch.delattr("proxytune.driving.compiled_texels")
         monkeypatch.setitem(sys.modules, "proxytune.driving.compiled_texels", None)
-    assert choosing.by_numba.__wrapped__() is (compiled if at_hand else plain)
+    assert plain.by_numba.__wrapped__() is (compiled if at_hand else plain)
 
 
 def test_numba_is_loaded_once_that_pays_off(compiled, monkeypatch):
-    monkeypatch.setattr(choosing, "_uses", itertools.count(choosing.PAYS_OFF - 2))
-    assert [choosing.fastest() for _ in range(4)] == [plain, plain, compiled, compiled]
+    monkeypatch.setattr(plain, "_uses", itertools.count(plain.PAYS_OFF - 2))
+    assert [plain.fastest() for _ in range(4)] == [plain, plain, compiled, compiled]
 
 
 FIGURES = {"camera_rate": 15.0, "camera_rows": float(CAMERA.rows), "camera_columns": float(CAMERA.columns)}

@@ -3,8 +3,6 @@
 Our effects round an environment: what they do to actions and observations, and that neutral ones do nothing.
 """
 
-import sys
-
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
@@ -96,13 +94,6 @@ def test_an_environment_with_an_unknown_attribute_is_closed(tmp_path):
     with pytest.raises(InputError):
         family(tmp_path, CART + f"[parameters]\nm = {{ attribute = 'wait', {MASS} }}")
     assert load("toys:Cart", kind="environment", beside=tmp_path).open == 0
-
-
-def test_without_gymnasium_the_user_is_told_what_to_install(tmp_path, monkeypatch):
-    table = domain(tmp_path, CART)
-    monkeypatch.setitem(sys.modules, "gymnasium", None)
-    with pytest.raises(InputError, match=r'Gymnasium is not installed; run pip install "proxytune\[gym\]"'):
-        make_environment(read_domain(table), {})
 
 
 def test_without_a_table_of_metrics_there_are_return_and_length(tmp_path):

@@ -399,9 +399,6 @@ AGENTS: Mapping[str, Agent] = MappingProxyType(
 )
 """The agents that travel with the package, by name."""
 
-__all__ = ["AGENTS", "Agent", "Braitenberg", "Command", "EdgePilot", "Laggy", "LanePilot", "Leaning", "Picture"]
-__all__ += ["PursuitPilot", "Smoothed", "Wary"]
-
 
 NEEDS = ("begin", "act")
 

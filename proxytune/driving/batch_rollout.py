@@ -137,10 +137,8 @@ class _Rollouts:
             self.poses[robot].append(driven)
             self._views[robot].pass_by(driven)
         self.new_pictures = self.pictures[0] is not before
-        self.under_way = [robot for robot, driven, hit in moved if not (hit or self._left(robot, driven[-1]))]
-
-    def _left(self, robot: int, pose: Signal) -> bool:
-        return self._courses[robot].ended(float(pose[0]), float(pose[1]))
+        ended = [hit or self._courses[robot].ended(*driven[-1, :2].tolist()) for robot, driven, hit in moved]
+        self.under_way = [robot for robot, over in zip(self.under_way, ended, strict=True) if not over]
 
 
 def answers(policy: Policy, pictures: Sequence[Picture], time_s: float) -> Sequence[Command] | Signal:

@@ -91,7 +91,9 @@ class BulletPlant:
             if sideways:
                 self._shift(sideways * self._tick_s)
             poses.append(self._pose())
-        return np.array(poses).reshape(-1, 3), self._crashed()
+        # On its wheels and caster the chassis touches nothing
+        touched = pybullet.getContactPoints(bodyA=self._body, linkIndexA=-1, physicsClientId=self._world)
+        return np.array(poses).reshape(-1, 3), bool(touched)
 
     def _build(self, urdf: Path, start: Signal) -> int:
         world: dict[str, Any] = {"physicsClientId": self._world}
@@ -107,7 +109,9 @@ class BulletPlant:
         pybullet.changeDynamics(floor, -1, lateralFriction=1.0, **world)
         turn = pybullet.getQuaternionFromEuler((0.0, 0.0, float(start[2])))
         body: int = pybullet.loadURDF(str(urdf), (0.0, 0.0, 0.0), **world)
-        self._wheels = self._find_wheels(body)
+        joints = range(pybullet.getNumJoints(body, **world))
+        named = {pybullet.getJointInfo(body, joint, **world)[1].decode(): joint for joint in joints}
+        self._wheels = [named["axle_left"], named["axle_right"]]
         self._floor = floor
         self._offset = pybullet.getDynamicsInfo(body, -1, **world)[3]
         centre = np.array((start[0], start[1], 0.0)) + pybullet.rotateVector(turn, list(self._offset))
@@ -115,11 +119,6 @@ class BulletPlant:
         for link in range(-1, pybullet.getNumJoints(body, **world)):
             pybullet.changeDynamics(body, link, linearDamping=0.0, angularDamping=0.0, jointDamping=0.0, **world)
         return body
-
-    def _find_wheels(self, body: int) -> list[int]:
-        joints = range(pybullet.getNumJoints(body, physicsClientId=self._world))
-        names = {pybullet.getJointInfo(body, j, physicsClientId=self._world)[1].decode(): j for j in joints}
-        return [names["axle_left"], names["axle_right"]]
 
     def _spin(self, forward: float, yaw: float) -> None:
         difference = yaw * self._half_distance
@@ -148,10 +147,6 @@ class BulletPlant:
         cosine, sine = math.cos(heading), math.sin(heading)
         ahead, left, _ = self._offset
         return centre[0] - cosine * ahead + sine * left, centre[1] - sine * ahead - cosine * left, self._heading
-
-    def _crashed(self) -> bool:
-        """Tell whether the chassis touches anything: on its wheels and caster it never does."""
-        return bool(pybullet.getContactPoints(bodyA=self._body, linkIndexA=-1, physicsClientId=self._world))
 
     def __enter__(self) -> Self:
         return self
@@ -185,7 +180,8 @@ class BulletCamera:
         if figures.k1 != 0.0:
             slopes = _slopes(figures)
             self._straight = _without_distortion(figures, slopes)
-            self._places = _fine_places(self._straight, slopes)
+            middle = np.reshape([self._straight.columns / 2.0, self._straight.rows / 2.0], (2, 1, 1))
+            self._places = (middle + self._straight.focal * slopes)[::-1] * OVERSAMPLING - 0.5
         self._world: int = pybullet.connect(pybullet.DIRECT)
         self._end = weakref.finalize(self, pybullet.disconnect, self._world)
         _lay(floor, self._world)
@@ -196,7 +192,10 @@ class BulletCamera:
         pictures = np.empty((len(poses), figures.rows, figures.columns, 3), dtype=np.uint8)
         for picture, pose in zip(pictures, poses, strict=True):
             straight = self._shoot(pose)
-            fine: NDArray[Any] = straight if self._places is None else _look_up(straight, self._places)
+            fine: NDArray[Any] = straight
+            if self._places is not None:  # linear between the pixels of the picture without distortion
+                colours = np.moveaxis(straight, -1, 0)
+                fine = np.stack([map_coordinates(one, self._places, np.float32, order=1) for one in colours], axis=-1)
             fine = fine.reshape(figures.rows, OVERSAMPLING, figures.columns, OVERSAMPLING, 3)
             picture[:] = np.rint(fine.mean(axis=(1, 3)))
         return pictures
@@ -242,31 +241,13 @@ def _slopes(figures: CameraFigures) -> NDArray[np.float64]:
     return slopes
 
 
-def _focal(figures: CameraFigures) -> float:
-    """Vertical focal length [pixel]."""
-    return figures.rows / 2.0 / math.tan(math.radians(figures.field_of_view_deg) / 2.0)
-
-
 def _without_distortion(figures: CameraFigures, slopes: NDArray[np.float64]) -> CameraFigures:
     """A camera at the same place, with the same focal length, that draws straight lines straight and sees as much."""
-    focal = _focal(figures)
+    focal = figures.focal
     columns, rows = (2 * math.ceil(focal * float(np.abs(one).max()) + 0.5) for one in slopes)
     field = math.degrees(2.0 * math.atan(rows / 2.0 / focal))
     plain = {"k1": 0.0, "centre_right": 0.0, "centre_down": 0.0, "aspect": 1.0}
     return replace(figures, columns=columns, rows=rows, field_of_view_deg=field, **plain)
-
-
-def _fine_places(straight: CameraFigures, slopes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Row and column (2, …) in the fine picture of a camera without distortion of rays with these slopes."""
-    middle = np.reshape([straight.columns / 2.0, straight.rows / 2.0], (2, 1, 1))
-    places: NDArray[np.float64] = (middle + _focal(straight) * slopes)[::-1] * OVERSAMPLING - 0.5
-    return places
-
-
-def _look_up(picture: NDArray[np.uint8], places: NDArray[np.float64]) -> NDArray[Any]:
-    """Colours (…, 3) at rows and columns (2, …) of a picture, linear between its pixels."""
-    colours = [map_coordinates(one, places, np.float32, order=1) for one in np.moveaxis(picture, -1, 0)]
-    return np.stack(colours, axis=-1)
 
 
 def _projection(figures: CameraFigures, width: int, height: int) -> list[float]:

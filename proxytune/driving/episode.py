@@ -131,7 +131,8 @@ class Rollout:
         figures = instance.robot.figures
         self._drivetrain, self._plant, self._course = instance.drivetrain, plant, course
         self._hold = round(TICK_HZ / figures["control_rate"])
-        self._memory = instance.drivetrain.begin(_context(figures, course))
+        resting = FilterContext(TICK_HZ, np.zeros(2), figures, course.seed, course.start[2:], course.start[None, :2])
+        self._memory = instance.drivetrain.begin(resting)
         self._view = View(instance.camera, instance.image, FilterContext(TICK_HZ, course.start, figures, course.seed))
         self.steps = round(course.seconds * figures["control_rate"])
         self.poses: Signal = course.start[None]
@@ -190,11 +191,6 @@ def drive(
         if rollout.ended:
             break
     return Drive(np.concatenate(poses), np.array(commands), rollout.crashed, remembered)
-
-
-def _context(figures: Mapping[str, float], course: Course) -> FilterContext:
-    """The start of an episode, from rest."""
-    return FilterContext(TICK_HZ, np.zeros(2), figures, course.seed, course.start[2:], course.start[None, :2])
 
 
 def measured(instance: Instance, poses: Signal, seed: int) -> Signal:

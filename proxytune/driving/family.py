@@ -105,11 +105,11 @@ def mounted_camera(robot: Robot, effects: Iterable[Effect]) -> CameraFigures:
 def image_chain(effects: Iterable[Effect], figures: Mapping[str, float]) -> Chain:
     """The image effects that change a picture, given the nominal figures: neutral ones would only cost time."""
     chain = stage_chain(effects, Stage.IMAGE)
-    return Chain(tuple(effect for effect in chain.effects if not _is_neutral(effect, figures)))
 
+    def vanishes(effect: Effect) -> bool:
+        return all(getattr(effect, one.name, None) == one.neutral_value(figures) for one in effect.parameters)
 
-def _is_neutral(effect: Effect, figures: Mapping[str, float]) -> bool:
-    return all(getattr(effect, one.name, None) == one.neutral_value(figures) for one in effect.parameters)
+    return Chain(tuple(effect for effect in chain.effects if not vanishes(effect)))
 
 
 def with_columns(robot: Robot, least: int) -> Robot:

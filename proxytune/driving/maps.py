@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxytune.driving.lane import corners, find_nearest, lane_length, lane_point, lane_pose, lay_out
 from proxytune.driving.road import Arc, Paint, Road, Segment, Straight
@@ -39,18 +38,14 @@ def check_road(road: Road, settings: Section) -> None:
     Raises:
         SettingsError: With file, key and remedy.
     """
-    _check_size(road, settings)
+    if not 0.0 < min(road.size) <= max(road.size) <= LARGEST_M:
+        given = f"{road.size[0]:g} m × {road.size[1]:g} m"
+        raise settings.error("size", f"each side must be above 0 and at most {LARGEST_M:g} m, got {given}")
     _check_lanes(road, settings.section("road"))
     _check_bends(road, settings)
     _check_closed(road, settings.section("road"))
     _check_edges(road, settings.section("road"))
     _check_starts(road, settings)
-
-
-def _check_size(road: Road, settings: Section) -> None:
-    if not 0.0 < min(road.size) <= max(road.size) <= LARGEST_M:
-        given = f"{road.size[0]:g} m × {road.size[1]:g} m"
-        raise settings.error("size", f"each side must be above 0 and at most {LARGEST_M:g} m, got {given}")
 
 
 def _check_lanes(road: Road, section: Section) -> None:
@@ -91,7 +86,8 @@ def _check_closed(road: Road, section: Section) -> None:
 def _check_edges(road: Road, section: Section) -> None:
     half = road.width / 2.0 * (1.0 - 1e-6)
     edges = replace(road, lane_offset=half)
-    points = np.concatenate([_points(edges, outer) for outer in (True, False)])
+    ways = {outer: np.arange(0.0, float(lane_length(edges, outer)), STEP_M) for outer in (True, False)}
+    points = np.concatenate([lane_point(edges, outer, along) for outer, along in ways.items()])
     clear = np.abs(find_nearest(lay_out(road.begin, road.segments), points).outside) > half - TOLERANCE
     if not clear.all():
         x, y = points[int(np.argmin(clear))]
@@ -101,11 +97,6 @@ def _check_edges(road: Road, section: Section) -> None:
         x, y = points[int(np.argmax(beside))]
         problem = f"the road leaves the map at ({x:.2f}, {y:.2f}); move begin or make size larger"
         raise section.error("segments", problem)
-
-
-def _points(road: Road, outer: bool) -> NDArray[np.float64]:
-    """A lane's centre line point by point."""
-    return lane_point(road, outer, np.arange(0.0, float(lane_length(road, outer)), STEP_M))
 
 
 def _check_starts(road: Road, settings: Section) -> None:
@@ -232,10 +223,7 @@ def _list(section: Section, key: str) -> list[Any]:
 def _numbers(section: Section, key: str, count: int) -> list[float]:
     value = section.values.get(key)
     numbers = value if isinstance(value, list) else []
-    if len(numbers) != count or not all(_is_number(number) for number in numbers):
+    sound = [isinstance(one, int | float) and not isinstance(one, bool) and is_finite(one) for one in numbers]
+    if len(numbers) != count or not all(sound):
         raise section.error(key, f"must be a list of {count} finite numbers, got {value!r}")
     return [float(number) for number in numbers]
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and is_finite(value)

@@ -65,6 +65,11 @@ class CameraFigures:
         if not 0.0 < self.field_of_view_deg < 180.0:
             raise SettingsError(f"camera: field_of_view_deg must be between 0° and 180°, got {self.field_of_view_deg}")
 
+    @property
+    def focal(self) -> float:
+        """The vertical focal length [pixel]."""
+        return self.rows / 2.0 / math.tan(math.radians(self.field_of_view_deg) / 2.0)
+
     def channels(self) -> NDArray[np.float64]:
         """The figures that camera effects act on, in the order of CAMERA_CHANNELS."""
         return np.array([getattr(self, name) for name in CAMERA_CHANNELS], dtype=float)
@@ -117,7 +122,7 @@ def floor_points(figures: CameraFigures, columns: NDArray[Any], rows: NDArray[An
 
 def lens_rays(figures: CameraFigures, columns: NDArray[Any], rows: NDArray[Any]) -> NDArray[np.float64]:
     """Directions (…, 3) in the robot's frame, forward, left, up, of the rays through points of the picture [pixel]."""
-    focal = figures.rows / 2.0 / math.tan(math.radians(figures.field_of_view_deg) / 2.0)
+    focal = figures.focal
     u = (columns - figures.columns / 2.0 - figures.centre_right * figures.rows) / focal / figures.aspect
     v = (rows - figures.rows / 2.0 - figures.centre_down * figures.rows) / focal
     # Plumb-bob r' = r (1 + k1 r²) solved for r to second order in k1: exact inverses end where r' has its maximum,
@@ -129,10 +134,13 @@ def lens_rays(figures: CameraFigures, columns: NDArray[Any], rows: NDArray[Any])
 
 
 def orientation(figures: CameraFigures) -> NDArray[np.float64]:
-    """Rotation (3, 3) from the camera's frame to the robot's, both forward, left, up: roll, then pitch, then yaw."""
-    roll, pitch, yaw = (math.radians(angle) for angle in (figures.roll_deg, figures.pitch_deg, figures.yaw_deg))
+    """Rotation (3, 3) from the camera's frame to the robot's, both forward, left, up."""
+    return rotation(*(math.radians(angle) for angle in (figures.roll_deg, figures.pitch_deg, figures.yaw_deg)))
+
+
+def rotation(roll: float, pitch: float, yaw: float) -> NDArray[np.float64]:
+    """Rotation (3, 3) by roll, then pitch, then yaw [rad]."""
     about_x = np.array([[1, 0, 0], [0, math.cos(roll), -math.sin(roll)], [0, math.sin(roll), math.cos(roll)]])
     about_y = np.array([[math.cos(pitch), 0, math.sin(pitch)], [0, 1, 0], [-math.sin(pitch), 0, math.cos(pitch)]])
     about_z = np.array([[math.cos(yaw), -math.sin(yaw), 0], [math.sin(yaw), math.cos(yaw), 0], [0, 0, 1]])
-    rotation: NDArray[np.float64] = about_z @ about_y @ about_x
-    return rotation
+    return np.asarray(about_z @ about_y @ about_x)

@@ -5,7 +5,6 @@ exact for twists that hold over a tick. What a URDF says of a robot on two wheel
 drives it.
 """
 
-import math
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -17,6 +16,7 @@ from typing import NamedTuple, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from proxytune.driving.optics import rotation
 from proxytune.driving.robot import Robot
 from proxytune.effects import CHANNELS, Chain, Effect, FilterContext, Memory, Signal, Stage, stage_chain
 from proxytune.errors import SettingsError
@@ -196,12 +196,9 @@ def _read_body(root: ET.Element, path: Path) -> Body:
         remedy = f"call the two driven joints {' and '.join(AXLES)}"
         raise SettingsError(f"{path}: the axles must be two continuous joints, left and right; found {found}; {remedy}")
     masses = (float(mass.get("value", 0.0)) for mass in root.findall("link/inertial/mass"))
-    camera = next((name for name in _links(root) if "camera" in name and "optical" not in name), None)
+    names = (link.get("name", "") for link in root.iter("link"))
+    camera = next((name for name in names if "camera" in name and "optical" not in name), None)
     return Body(pair[0], pair[1], sum(masses), link_pose(root, camera) if camera else None)
-
-
-def _links(root: ET.Element) -> list[str]:
-    return [link.get("name", "") for link in root.iter("link")]
 
 
 def links_called(root: ET.Element, name: str) -> list[ET.Element]:
@@ -229,12 +226,8 @@ def origin_of(element: ET.Element) -> NDArray[np.float64]:
     """The transform (4, 4) of an element's <origin>, roll first, then pitch, then yaw."""
     origin = element.find("origin")
     xyz, rpy = ((origin.get(key, "0 0 0") if origin is not None else "0 0 0").split() for key in ("xyz", "rpy"))
-    roll, pitch, yaw = (float(angle) for angle in rpy)
-    about_x = np.array([[1, 0, 0], [0, math.cos(roll), -math.sin(roll)], [0, math.sin(roll), math.cos(roll)]])
-    about_y = np.array([[math.cos(pitch), 0, math.sin(pitch)], [0, 1, 0], [-math.sin(pitch), 0, math.cos(pitch)]])
-    about_z = np.array([[math.cos(yaw), -math.sin(yaw), 0], [math.sin(yaw), math.cos(yaw), 0], [0, 0, 1]])
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = about_z @ about_y @ about_x, [float(value) for value in xyz]
+    pose, (roll, pitch, yaw) = np.eye(4), (float(angle) for angle in rpy)
+    pose[:3, :3], pose[:3, 3] = rotation(roll, pitch, yaw), [float(value) for value in xyz]
     return pose
 
 
@@ -250,15 +243,11 @@ def check_body(robot: Robot) -> None:
         if wheel.joint != name or wheel.axis[1] < 0.0:
             said = f"joint '{wheel.joint}' must be called {name}"
             raise SettingsError(f"{path.name}: {said}, and its axis must point to the left (0 1 0)")
-    for figure, value in _figures(body):
+    radii = [wheel.radius_m for wheel in (body.left, body.right) if wheel.radius_m is not None]
+    for figure, value in (*(("wheel_radius", radius) for radius in radii), ("wheel_distance", body.wheel_distance)):
         if abs(value - robot.figures[figure]) > AGREES * robot.figures[figure]:
             said = f"has the {figure} {value:g} m, robot.toml says {robot.figures[figure]:g} m"
             raise SettingsError(f"{path.name}: {said}; correct the one that is wrong")
-
-
-def _figures(body: Body) -> Iterator[tuple[str, float]]:
-    yield from (("wheel_radius", wheel.radius_m) for wheel in (body.left, body.right) if wheel.radius_m is not None)
-    yield "wheel_distance", body.wheel_distance
 
 
 def _wheel(root: ET.Element, joint: ET.Element) -> Wheel:

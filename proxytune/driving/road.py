@@ -80,11 +80,10 @@ def tightened(segment: Segment, radius: float | None) -> tuple[Segment, ...]:
 
 def length(segments: tuple[Segment, ...]) -> float:
     """Length of the centre line [m]."""
-    return math.fsum(s.length if isinstance(s, Straight) else _arc_length(s) for s in segments)
-
-
-def _arc_length(arc: Arc) -> float:
-    return arc.radius * math.radians(abs(arc.turn_deg))
+    return math.fsum(
+        part.length if isinstance(part, Straight) else part.radius * math.radians(abs(part.turn_deg))
+        for part in segments
+    )
 
 
 @dataclass(frozen=True)

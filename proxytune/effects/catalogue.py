@@ -162,12 +162,13 @@ def _wrong_filter(kind: Any) -> Iterator[str]:
     """Try it on a short signal, in the middle of its range, at both ends, and where it is to change nothing."""
     tried = [[one.low + share * (one.high - one.low) for one in kind.parameters] for share in (0.5, 0.0, 1.0)]
     neutral = [one.neutral for one in kind.parameters]
-    signal = _signal(kind.stage)
+    signal, nominal = _signal(kind.stage), defaultdict[str, float](lambda: 1.0)
     for values in (*tried, neutral):
         if any(isinstance(value, str) for value in values):
             continue
         try:
-            answer = _filtered(kind, values, signal)
+            effect = kind(*values)
+            answer = effect.apply(signal, effect.begin(FilterContext(RATE_HZ, signal[:, 0], nominal)))
         except Exception as problem:
             yield f"raised {describe(problem)} at {values}; correct its begin and apply"
             return
@@ -188,12 +189,6 @@ def _signal(stage: Stage) -> Any:
         level = {"pitch_deg": 1.0, "height_m": 1.0, "field_of_view_deg": 1.0, "aspect": 1.0}
         return np.tile([level.get(name, 0.0) for name in CHANNELS[stage]], (1, TICKS, 1))
     return np.sin(np.arange(TICKS * channels, dtype=float)).reshape(1, TICKS, channels)
-
-
-def _filtered(kind: Any, values: list[float], signal: Any) -> Any:
-    nominal: Mapping[str, float] = defaultdict(lambda: 1.0)
-    effect = kind(*values)
-    return effect.apply(signal, effect.begin(FilterContext(RATE_HZ, signal[:, 0], nominal)))
 
 
 _ALL: tuple[type[Effect], ...] = (

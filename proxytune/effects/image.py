@@ -51,7 +51,11 @@ class Defocus:
     def begin(self, context: FilterContext) -> PointSpread:
         """The spot's width in pixels of this picture."""
         rows, columns = _size(context)
-        return PointSpread(rows, columns, _gaussian(self.deviation * rows))
+        deviation = self.deviation * rows
+        # The Gaussian on whole pixels (Lindeberg 1990) has this standard deviation even if that is part of a pixel
+        reach = math.ceil(4.0 * deviation) + 2
+        weights = ive(np.abs(np.arange(-reach, reach + 1)), deviation**2)
+        return PointSpread(rows, columns, np.asarray(weights / weights.sum()))
 
     def apply(self, signal: Signal, memory: PointSpread) -> tuple[Signal, PointSpread]:
         """Spread every point; beyond its edges the picture goes on as it ends."""
@@ -59,13 +63,6 @@ class Defocus:
         for axis in (-3, -2):
             soft = correlate1d(soft, memory.weights, axis, output=np.float32, mode="nearest")
         return soft.reshape(signal.shape), memory
-
-
-def _gaussian(deviation: float) -> Signal:
-    """The Gaussian on whole pixels (Lindeberg 1990): it has this standard deviation even if that is part of a pixel."""
-    reach = math.ceil(4.0 * deviation) + 2
-    weights = ive(np.abs(np.arange(-reach, reach + 1)), deviation**2)
-    return np.asarray(weights / weights.sum())
 
 
 @dataclass(frozen=True)

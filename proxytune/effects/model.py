@@ -50,12 +50,10 @@ def read_model(path: Path, catalogue: Catalogue = SHIPPED) -> Model:
     settings.whole("format", 1, low=1, high=1)
     plant = settings.text("plant") if "plant" in settings.values else None
     theta, intervals = read_effects(settings.section("effects"), catalogue)
-    return Model(settings.text("robot"), plant, theta, intervals, _read_geometry(settings.section("geometry")))
-
-
-def _read_geometry(section: Section) -> dict[str, float]:
-    section.only(GEOMETRY)
-    return {figure: section.number(key, low=0.0) for key, figure in GEOMETRY.items() if key in section.values}
+    stated = settings.section("geometry")
+    stated.only(GEOMETRY)
+    geometry = {figure: stated.number(key, low=0.0) for key, figure in GEOMETRY.items() if key in stated.values}
+    return Model(settings.text("robot"), plant, theta, intervals, geometry)
 
 
 def model_text(model: Model, comments: Iterable[str] = (), catalogue: Catalogue = SHIPPED) -> str:

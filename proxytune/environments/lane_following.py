@@ -18,7 +18,6 @@ from proxytune.domain import Episode, make_episode
 from proxytune.driving import (
     TICK_HZ,
     Course,
-    LaneFollowing,
     Picture,
     Plant,
     Road,
@@ -237,7 +236,9 @@ class LaneFollowingEnv(gymnasium.Env[Picture, NDArray[Any]]):
         render_mode: str | None = None,
         **domain: Any,
     ) -> None:
-        self.family = _family(domain, model, Path(folder))
+        plain = {key: str(value) if isinstance(value, Path) else value for key, value in domain.items()}
+        table = Section(Path(folder) / LaneFollowingEnv.__name__, "", plain)
+        self.family = lane_following(table, model=Path(model) if model else None)
         self._theta = read_theta(theta or {}, self.family.parameters)
         self._start = None if start is None else _whole("start", start, self.family.starts)
         if render_mode not in (None, *self.metadata["render_modes"]):
@@ -336,11 +337,6 @@ class LaneFollowingEnv(gymnasium.Env[Picture, NDArray[Any]]):
         drive = self._under_way()
         scores = drive.tally.whole() if self._over else drive.tally.so_far()
         return {"pose": drive.rollout.poses[-1].copy(), **scores}
-
-
-def _family(domain: Mapping[str, Any], model: str | Path | None, folder: Path) -> LaneFollowing:
-    plain = {key: str(value) if isinstance(value, Path) else value for key, value in domain.items()}
-    return lane_following(Section(folder / LaneFollowingEnv.__name__, "", plain), model=Path(model) if model else None)
 
 
 def _whole(name: str, value: Any, count: int) -> int:

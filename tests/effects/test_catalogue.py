@@ -6,6 +6,7 @@ Each filter against what it should do by hand.
 
 import numpy as np
 import pytest
+from filtered import filtered
 
 from proxytune.driving import read_robot
 from proxytune.effects import CATALOGUE, PARAMETERS, Blur, FilterContext, Stage, effects_from, stage_chain
@@ -144,9 +145,7 @@ NOMINAL: dict[str, float] = {}
 
 
 def run(effect, signal, rest=0.0, rate_hz=10.0):
-    signal = np.asarray(signal, dtype=float)
-    memory = effect.begin(FilterContext(rate_hz, np.full(signal.shape[-1], rest), NOMINAL))
-    return effect.apply(signal, memory)[0]
+    return filtered(effect, signal, rate_hz=rate_hz, rest=rest, nominal=NOMINAL)
 
 
 def step(length=20):

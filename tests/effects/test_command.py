@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from filtered import filtered
 
-from proxytune.effects import FilterContext
 from proxytune.effects.command import DelayJitter, DroppedCommands, Messages
 
 RATE_HZ = 60.0
@@ -13,8 +13,7 @@ SEED = 11
 
 
 def run(effect, signal, rate_hz=RATE_HZ, seed=SEED):
-    memory = effect.begin(FilterContext(rate_hz, np.full(signal.shape[-1], -1.0), NOMINAL, seed))
-    return effect.apply(signal, memory)[0]
+    return filtered(effect, signal, rate_hz=rate_hz, rest=-1.0, nominal=NOMINAL, seed=seed)
 
 
 def numbered(count, every=EVERY):

@@ -5,6 +5,7 @@ A wheel that is not round rolls faster and slower once a turn.
 
 import numpy as np
 import pytest
+from filtered import filtered
 
 from proxytune.effects import FilterContext
 from proxytune.effects.friction import Backlash, DeadBand, Stiction, WheelRipple
@@ -16,8 +17,7 @@ RATE_HZ = 10.0
 
 def run(effect, left, right=None, rest=0.0):
     signal = np.stack((left, left if right is None else right), axis=-1).astype(float)
-    memory = effect.begin(FilterContext(RATE_HZ, np.full(2, rest), NOMINAL))
-    return effect.apply(signal, memory)[0]
+    return filtered(effect, signal, rate_hz=RATE_HZ, rest=rest, nominal=NOMINAL)
 
 
 def test_a_dead_band_swallows_small_duties_and_shortens_larger_ones():

@@ -96,14 +96,14 @@ RAMP = np.repeat(np.arange(40.0, dtype=np.float32)[:, None], SHUTTER_ROWS * SHUT
 SECONDS = st.floats(0.0, 0.5)
 
 
-def run_of_shutter(effect, pictures):
+def shown(effect, pictures):
     memory = effect.begin(FilterContext(RATE_HZ, pictures[0], NOMINAL))
     return effect.apply(pictures, memory)[0]
 
 
 def ages(effect):
     """How old each pixel of a late picture of the ramp is [s], (rows, columns, 3)."""
-    return ((RAMP[-1] - run_of_shutter(effect, RAMP)[-1]) / RATE_HZ).reshape(SHUTTER_ROWS, SHUTTER_COLUMNS, 3)
+    return ((RAMP[-1] - shown(effect, RAMP)[-1]) / RATE_HZ).reshape(SHUTTER_ROWS, SHUTTER_COLUMNS, 3)
 
 
 @given(SECONDS)
@@ -131,7 +131,7 @@ def test_rows_are_the_older_the_higher_they_are_and_the_picture_by_half_the_read
 
 def test_blur_looks_like_a_latency_of_half_of_it_and_a_latency_adds_to_that():
     np.testing.assert_allclose(ages(Blur(0.2)), 0.1, atol=1e-5)
-    late = run_of_shutter(CameraLatency(0.13), run_of_shutter(Blur(0.2), RAMP))
+    late = shown(CameraLatency(0.13), shown(Blur(0.2), RAMP))
     np.testing.assert_allclose(RAMP[-1] - late[-1], (0.1 + 0.13) * RATE_HZ, atol=1e-4)
 
 
@@ -142,14 +142,14 @@ def test_it_does_not_matter_which_mixture_of_pictures_comes_first(latency, reado
     one, other = pictures, pictures
     effects = Blur(blur), RollingShutter(readout), CameraLatency(latency)
     for forwards, backwards in zip(effects, reversed(effects), strict=True):
-        one, other = run_of_shutter(forwards, one), run_of_shutter(backwards, other)
+        one, other = shown(forwards, one), shown(backwards, other)
     np.testing.assert_allclose(one, other, atol=1e-3)
 
 
 @pytest.mark.parametrize("effect", [CameraLatency(0.37), RollingShutter(0.1)])
 def test_a_scene_that_stands_still_hides_the_shutter(effect):
     still = np.repeat(np.arange(SHUTTER_ROWS * SHUTTER_COLUMNS * 3, dtype=np.float32)[None], 12, axis=0)
-    np.testing.assert_allclose(run_of_shutter(effect, still), still, atol=1e-4)
+    np.testing.assert_allclose(shown(effect, still), still, atol=1e-4)
 
 
 @given(st.floats(0.0, 0.9))
@@ -158,7 +158,7 @@ def test_the_mean_of_the_last_pictures_is_the_newest_blurred_one_to_the_last_bit
     pictures = np.random.default_rng(0).integers(0, 256, (12, 12)).astype(np.float32)
     weights = Chain((Blur(blur),)).mean_weights(RATE_HZ)
     assert weights[0] > 0.0
-    np.testing.assert_array_equal(weights @ pictures[-len(weights) :], run_of_shutter(Blur(blur), pictures)[-1])
+    np.testing.assert_array_equal(weights @ pictures[-len(weights) :], shown(Blur(blur), pictures)[-1])
 
 
 @pytest.mark.parametrize(("blur", "expected"), [(0.0, 1), (0.1, 2), (0.15, 3), (0.3, 4)])

@@ -6,8 +6,8 @@ Driving and turning mix as the formulas say.
 
 import numpy as np
 import pytest
+from filtered import filtered
 
-from proxytune.effects import FilterContext
 from proxytune.effects.motion import (
     CrossCoupling,
     FloorSlope,
@@ -25,32 +25,25 @@ RATE_HZ = 60.0
 PATCH = SlipperyPatch(0.5, 1.0, 0.0, 0.3)
 
 
-def run(effect, signal, places=((0.0, 0.0),), headings=(0.0,), cut=None):
-    context = FilterContext(RATE_HZ, np.zeros(3), {}, 0, np.array(headings), np.array(places))
-    signal = np.asarray(signal, dtype=float)
-    first, memory = effect.apply(signal[:cut], effect.begin(context))
-    return first if cut is None else np.concatenate((first, effect.apply(signal[cut:], memory)[0]))
-
-
 def test_a_robot_across_a_slope_slides_downhill_by_the_push():
-    (along,) = run(FloorSlope(0.1, 0.0, 0.5), [[0.4, 0.0, 0.0]])
+    (along,) = filtered(FloorSlope(0.1, 0.0, 0.5), [[0.4, 0.0, 0.0]])
     np.testing.assert_allclose(along, (0.3, 0.0, 0.0), atol=1e-12)
-    (across,) = run(FloorSlope(0.1, 0.0, 0.5), [[0.4, 0.0, 0.0]], headings=(np.pi / 2,))
+    (across,) = filtered(FloorSlope(0.1, 0.0, 0.5), [[0.4, 0.0, 0.0]], headings=(np.pi / 2,))
     np.testing.assert_allclose(across, (0.4, 0.05, 0.0), atol=1e-12)
 
 
 def test_a_robot_at_rest_slides_nowhere():
-    np.testing.assert_array_equal(run(FloorSlope(0.1, 0.1, 1.0), [[0.0, 0.0, 1.0]]), [[0.0, 0.0, 1.0]])
+    np.testing.assert_array_equal(filtered(FloorSlope(0.1, 0.1, 1.0), [[0.0, 0.0, 1.0]]), [[0.0, 0.0, 1.0]])
 
 
 @pytest.mark.parametrize(("place", "kept"), [((1.0, 0.0), 0.5), ((1.0, 0.3), 0.75), ((0.5, 0.0), 1.0)])
 def test_all_motion_shrinks_within_a_patch_and_half_as_much_at_its_edge(place, kept):
-    np.testing.assert_allclose(run(PATCH, [[0.4, 0.1, 1.0]], places=(place,)), [[0.4 * kept, 0.1 * kept, kept]])
+    np.testing.assert_allclose(filtered(PATCH, [[0.4, 0.1, 1.0]], places=(place,)), [[0.4 * kept, 0.1 * kept, kept]])
 
 
 @pytest.mark.parametrize("cut", [None, 7, 100])
 def test_a_robot_that_drives_over_a_patch_finds_it_by_its_own_motion(cut):
-    moved = run(PATCH, np.tile((0.5, 0.0, 0.0), (300, 1)), cut=cut)[:, 0]
+    moved = filtered(PATCH, np.tile((0.5, 0.0, 0.0), (300, 1)), cut=cut)[:, 0]
     way = np.cumsum(moved) / RATE_HZ
     np.testing.assert_allclose(moved[way < 0.6], 0.5)
     np.testing.assert_allclose(moved[(way > 0.8) & (way < 1.2)], 0.25)
@@ -59,34 +52,29 @@ def test_a_robot_that_drives_over_a_patch_finds_it_by_its_own_motion(cut):
 
 def test_poses_known_beforehand_say_where_the_robot_is_whatever_it_was_asked():
     places = [(0.0, 0.0)] * 3 + [(1.0, 0.0)] * 3
-    moved = run(PATCH, np.tile((0.1, 0.0, 0.0), (6, 1)), places=places, headings=[0.0] * 6, cut=4)
+    moved = filtered(PATCH, np.tile((0.1, 0.0, 0.0), (6, 1)), places=places, headings=[0.0] * 6, cut=4)
     np.testing.assert_allclose(moved[:, 0], [0.1] * 3 + [0.05] * 3)
 
 
 NOMINAL = {"effective_baseline": 0.16}
-MOTION_RATE_HZ = 10.0
 
 
-def run_of_motion(effect, signal, headings=(0.0,), cut=None):
-    signal = np.asarray(signal, dtype=float)
-    rest = np.zeros((*signal.shape[:-2], 3))
-    memory = effect.begin(FilterContext(MOTION_RATE_HZ, rest, NOMINAL, 0, np.asarray(headings, dtype=float)))
-    first, memory = effect.apply(signal[..., :cut, :], memory)
-    return first if cut is None else np.concatenate((first, effect.apply(signal[..., cut:, :], memory)[0]), axis=-2)
+def driven(effect, signal, **known):
+    return filtered(effect, signal, rate_hz=10.0, nominal=NOMINAL, **known)
 
 
 def test_a_baseline_twice_as_wide_halves_the_yaw_rate():
-    np.testing.assert_allclose(run_of_motion(YawScrub(0.32), [[0.5, 0.1, 2.0]]), [[0.5, 0.1, 1.0]])
+    np.testing.assert_allclose(driven(YawScrub(0.32), [[0.5, 0.1, 2.0]]), [[0.5, 0.1, 1.0]])
 
 
 @pytest.mark.parametrize(("yaw", "forward"), [(0.0, 0.5), (2.0, 0.3), (-2.0, 0.3), (9.0, 0.0)])
 def test_turning_costs_forward_speed_at_most_all_of_it(yaw, forward):
-    np.testing.assert_allclose(run_of_motion(TurnSlip(0.2), [[0.5, 0.1, yaw]]), [[forward, 0.1, yaw]])
+    np.testing.assert_allclose(driven(TurnSlip(0.2), [[0.5, 0.1, yaw]]), [[forward, 0.1, yaw]])
 
 
 @pytest.mark.parametrize(("forward", "yaw", "sideways"), [(0.5, 2.0, -0.1), (0.5, -2.0, 0.1), (0.0, 2.0, 0.0)])
 def test_a_robot_slides_outwards_in_a_bend(forward, yaw, sideways):
-    np.testing.assert_allclose(run_of_motion(LateralSlip(0.1), [[forward, 0.0, yaw]]), [[forward, sideways, yaw]])
+    np.testing.assert_allclose(driven(LateralSlip(0.1), [[forward, 0.0, yaw]]), [[forward, sideways, yaw]])
 
 
 @pytest.mark.parametrize(
@@ -101,7 +89,7 @@ def test_a_robot_slides_outwards_in_a_bend(forward, yaw, sideways):
     ],
 )
 def test_uphill_is_slower_and_a_robot_at_rest_stays(heading, forward, slowed):
-    twist = run_of_motion(FloorSlope(0.1, -0.05, 0.0), [[forward, 0.2, 0.3]], headings=(heading,))
+    twist = driven(FloorSlope(0.1, -0.05, 0.0), [[forward, 0.2, 0.3]], headings=(heading,))
     np.testing.assert_allclose(twist, [[slowed, 0.2, 0.3]], atol=1e-12)
 
 
@@ -114,51 +102,44 @@ LOST = {"start": [1.0, 1.5, 2.0, 2.5, 3.0, 3.5], "some": [1.0, 1.1, 1.2, 1.7, 2.
     ("headings", "used"), [([1.0], "start"), ([1.0, 1.1, 1.2], "some"), ([0.1] * 6, "all"), ([0.1] * 9, "all")]
 )
 def test_headings_known_beforehand_are_used_and_beyond_them_the_robot_turns_on(headings, used, cut):
-    slowed = run_of_motion(FloorSlope(0.1, 0.0, 0.0), TURNING, headings=headings, cut=cut)[:, 0]
+    slowed = driven(FloorSlope(0.1, 0.0, 0.0), TURNING, headings=headings, cut=cut)[:, 0]
     np.testing.assert_allclose(slowed, 0.3 - 0.1 * np.cos(LOST[used]), atol=1e-12)
 
 
 def test_each_member_of_a_batch_has_headings_of_its_own():
     batch = np.stack((TURNING, TURNING))
-    slowed = run_of_motion(FloorSlope(0.1, 0.0, 0.0), batch, headings=[[1.0, 1.1, 1.2], [0.0, 0.0, 0.0]])[..., 0]
+    slowed = driven(FloorSlope(0.1, 0.0, 0.0), batch, headings=[[1.0, 1.1, 1.2], [0.0, 0.0, 0.0]])[..., 0]
     expected = [LOST["some"], [0.0, 0.0, 0.0, 0.5, 1.0, 1.5]]
     np.testing.assert_allclose(slowed, 0.3 - 0.1 * np.cos(expected), atol=1e-12)
 
 
 @pytest.mark.parametrize(("heading", "x", "y"), [(0.0, 1.1, 2.02), (np.pi / 2, 0.98, 2.1), (np.pi, 0.9, 1.98)])
 def test_the_tracked_point_lies_ahead_of_the_axle_and_to_its_left(heading, x, y):
-    np.testing.assert_allclose(run_of_motion(MarkerOffset(0.1, 0.02), [[1.0, 2.0, heading]]), [[x, y, heading]])
+    np.testing.assert_allclose(driven(MarkerOffset(0.1, 0.02), [[1.0, 2.0, heading]]), [[x, y, heading]])
 
 
 def test_a_turned_marker_adds_to_the_heading_alone():
-    np.testing.assert_allclose(run_of_motion(HeadingOffset(-30.0), [[1.0, 2.0, 0.5]]), [[1.0, 2.0, 0.5 - np.pi / 6]])
-
-
-def run_of_turning(effect, signal, rest=(0.0, 0.0, 0.0)):
-    memory = effect.begin(FilterContext(RATE_HZ, np.array(rest), {}))
-    return effect.apply(np.asarray(signal, dtype=float), memory)[0]
+    np.testing.assert_allclose(driven(HeadingOffset(-30.0), [[1.0, 2.0, 0.5]]), [[1.0, 2.0, 0.5 - np.pi / 6]])
 
 
 @pytest.mark.parametrize("yaw", [2.0, -2.0])
 @pytest.mark.parametrize("forward", [0.5, -0.5])
 def test_coupling_does_not_ask_which_way_the_robot_turns_or_drives(forward, yaw):
-    (moved,) = run_of_turning(CrossCoupling(0.01, 0.4), [[forward, 0.1, yaw]])
+    (moved,) = filtered(CrossCoupling(0.01, 0.4), [[forward, 0.1, yaw]])
     np.testing.assert_allclose(moved, (forward + 0.04, 0.1, yaw + 0.2))
 
 
 def test_a_fast_robot_turns_less_and_a_robot_that_spins_turns_as_asked():
-    moved = run_of_turning(Understeer(0.5), [[0.4, 0.1, 1.2], [-0.4, 0.1, 1.2], [0.0, 0.0, 1.2]])
+    moved = filtered(Understeer(0.5), [[0.4, 0.1, 1.2], [-0.4, 0.1, 1.2], [0.0, 0.0, 1.2]])
     np.testing.assert_allclose(moved, [[0.4, 0.1, 1.0], [-0.4, 0.1, 1.0], [0.0, 0.0, 1.2]])
 
 
 def test_the_yaw_rate_comes_late_and_the_forward_speed_does_not():
-    moved = run_of_turning(YawLag(0.2), np.tile((0.3, 0.0, 1.0), (60, 1)))
+    moved = filtered(YawLag(0.2), np.tile((0.3, 0.0, 1.0), (60, 1)))
     np.testing.assert_array_equal(moved[:, :2], np.tile((0.3, 0.0), (60, 1)))
     assert moved[:12, 2].sum() / RATE_HZ == pytest.approx(0.2 * np.exp(-1.0), rel=1e-6)
     assert moved[-1, 2] == pytest.approx(1.0, abs=0.01)
 
 
 def test_a_robot_that_turns_already_goes_on_turning():
-    np.testing.assert_allclose(
-        run_of_turning(YawLag(0.2), np.tile((0.0, 0.0, 1.0), (5, 1)), rest=(0.0, 0.0, 1.0))[:, 2], 1.0
-    )
+    np.testing.assert_allclose(filtered(YawLag(0.2), np.tile((0.0, 0.0, 1.0), (5, 1)), rest=(0.0, 0.0, 1.0))[:, 2], 1.0)

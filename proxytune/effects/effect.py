@@ -289,7 +289,8 @@ def low_pass(signal: Signal, state: LowPassState) -> tuple[Signal, LowPassState]
     else:
         ends = lfilter([gain], [1.0, -remainder], signal, axis=-2, zi=remainder * start)[0]
     starts = np.concatenate((start, ends[..., :-1, :]), axis=-2)
-    return signal + mean_remainder * (starts - signal), state._replace(value=ends[..., -1, :])
+    mean = signal + mean_remainder * (starts - signal)
+    return mean, LowPassState(ends[..., -1, :], remainder, mean_remainder)
 
 
 class DeadReckoning(NamedTuple):

@@ -145,9 +145,11 @@ class MotorLag:
 
     def apply(self, signal: Signal, memory: tuple[LowPassState, ...]) -> tuple[Signal, tuple[LowPassState, ...]]:
         """The mean speed over each sample, exact for a command that holds over it."""
-        parts = [signal] if len(memory) == 1 else [signal[..., :1], signal[..., 1:]]
-        means, after = zip(*(low_pass(*part) for part in zip(parts, memory, strict=True)), strict=True)
-        return np.concatenate(means, axis=-1), after
+        if len(memory) == 1:
+            mean, after = low_pass(signal, memory[0])
+            return mean, (after,)
+        sides = [low_pass(signal[..., side : side + 1], state) for side, state in enumerate(memory)]
+        return np.concatenate([mean for mean, _ in sides], axis=-1), tuple(after for _, after in sides)
 
 
 class SlewState(NamedTuple):

@@ -34,10 +34,12 @@ SAME_CODE = {
         "8665bf1429be4f790845550636c6be36488fd8abad2d7c7c04d92819a7ecd9c2",
         "d43c92de07b5011a427c9ed33d4ca4f567c5591797b2514b6562cab501a7b671",
         "193fc67d257973b214825df8319b0a2bd8fa4f91d07b407e963e05f4ac01ae17",
+        "40cf65f28f3498953f50738fbe845c1fd35b17d76ad174cb9c32a3f73dd245ae",
     ),
     "environments": (
         "f5b9c2c9586c29cd4dc2d6e27f44fd2731ecc2d27bf96a80c745aecd5a3ddb50",
         "efd8ee20ccef978bc76d2d8a4347a02b439e79a2e68d2dd89f86ca5ae1a37343",
+        "2d234bef5a24a59299be636b7159f1377c3e8f1f1c01a7f2087013b1975dbd20",
     ),
     "engine outcomes": ("94c0ba12f9bf", "169c7ef2065e"),
     "engine composite": ("82865583b592", "169c7ef2065e"),

@@ -19,8 +19,8 @@ from proxytune.driving import (
     drivetrain,
     lane_following,
     load_agent,
-    plain_texels as plain,
     read_robot,
+    texels as plain,
 )
 from proxytune.driving.cameras import View
 from proxytune.driving.plants import PlanarPlant, integrate

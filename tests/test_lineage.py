@@ -108,6 +108,6 @@ def test_code_that_is_proven_to_play_the_same_episodes_keeps_their_identity(pack
 
 def test_code_of_one_family_is_no_part_of_another_s(package):
     before = lineage.code_name("driving")
-    path = package / "environments" / "episode.py"
+    path = package / "environments" / "family.py"
     path.write_text(f"{path.read_text()}\nMORE = 1\n")
     assert lineage.code_name("driving") == before != lineage.code_name("environments")

@@ -67,7 +67,7 @@ def test_an_episode_alone_has_nothing_of_a_target():
 
 
 def test_on_a_road_the_whole_map_is_shown_and_commands_are_duties(pair):
-    on_road = dataclasses.replace(pair, road=shipped_map("small_loop"))
+    on_road = dataclasses.replace(pair, road=shipped_map("small_loop"), command_unit="duty")
     ways, commands, *_ = axes_of(episode_figure(on_road, []))
     assert ways.get_xlim() == (0.0, on_road.road.size[0])
     assert len(ways.images) == 1

@@ -29,7 +29,7 @@ from proxytune.diagnosis import (
     pose_errors,
 )
 from proxytune.diagnosis.motion.diagnose import diagnose
-from proxytune.diagnosis.motion.discrepancy import Remainder
+from proxytune.diagnosis.motion.discrepancy import Discrepancy
 from proxytune.diagnosis.motion.innovations import huber
 from proxytune.diagnosis.motion.screening import candidates
 from proxytune.diagnosis.motion.signals import signal_groups
@@ -445,7 +445,9 @@ def learning(*groups):
         for knots in [KNOTS.get(group, (0.5, 1.0, 2.0))]
     ]
     theta = learnt_theta(Learnt(FittedRange((-0.3, 0.4), (-3.0, 3.0)), tuple(curves)))
-    return Learning(Remainder(theta, {GROUPS[group].title: 1.0 / len(groups) for group in groups}, {}, True), (), False)
+    return Learning(
+        Discrepancy(theta, {GROUPS[group].title: 1.0 / len(groups) for group in groups}, {}, True), (), False
+    )
 
 
 def test_every_group_is_drawn_without_a_warning_and_every_panel_has_units():
@@ -475,7 +477,7 @@ def test_harmonics_of_the_heading_are_drawn_as_what_they_add_up_to():
 
 
 def test_nothing_is_drawn_where_nothing_is_used():
-    assert learnt_figure(Learning(Remainder({"learnt.turn_rate.yaw@1.0": 0.1}), (), False)) is None
+    assert learnt_figure(Learning(Discrepancy({"learnt.turn_rate.yaw@1.0": 0.1}), (), False)) is None
 
 
 DRIVES = planted_drives(TRUTH, episodes=1, seconds=10.0)

@@ -13,7 +13,7 @@ from matplotlib.text import Text
 
 sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
 
-import hidden
+import hidden_cases as hidden
 from planted import TRUTH, planted_drives
 
 import proxytune
@@ -29,7 +29,7 @@ from proxytune.diagnosis import (
     pose_errors,
 )
 from proxytune.diagnosis.motion.diagnose import diagnose
-from proxytune.diagnosis.motion.discrepancy import Remainder
+from proxytune.diagnosis.motion.discrepancy import Discrepancy
 from proxytune.diagnosis.motion.innovations import huber
 from proxytune.diagnosis.motion.screening import candidates
 from proxytune.diagnosis.motion.signals import signal_groups
@@ -269,13 +269,18 @@ def test_the_ranking_holds_those_added_then_every_other_gain_best_first(diagnosi
 def test_every_effect_that_was_added_is_on_top_in_the_order_of_adding(diagnosis):
     (first,) = diagnosis.found.adopted
     added = (first, replace(first, effect="wheel_gain", form="left wheel", gain=40.0), replace(first, effect="new"))
-    top = ranking_figure(replace(diagnosis.found, adopted=added)).axes[0]
+    top = ranking_figure(replace(diagnosis.found, adopted=added), diagnosis.rules).axes[0]
     assert [tick.get_text() for tick in top.get_yticklabels()] == ["dead band", "wheel gain (left wheel)", "new"]
     assert {dot.get_label() for dot in dots(top)} == {"added"}
 
 
+def test_the_ranking_draws_the_threshold_of_the_rules_that_it_is_given(diagnosis):
+    axes = ranking_figure(diagnosis.found, replace(diagnosis.rules, least_gain_nats=40.0)).axes[0]
+    assert "least to be added: 40 nats" in axes.get_legend_handles_labels()[1]
+
+
 def test_with_nothing_added_the_ranking_begins_with_what_was_tried(clean):
-    figure = ranking_figure(clean.found)
+    figure = ranking_figure(clean.found, clean.rules)
     assert [axes.get_title(loc="left") for axes in figure.axes] == ["tried alone", "any curve over"]
 
 
@@ -440,7 +445,9 @@ def learning(*groups):
         for knots in [KNOTS.get(group, (0.5, 1.0, 2.0))]
     ]
     theta = learnt_theta(Learnt(FittedRange((-0.3, 0.4), (-3.0, 3.0)), tuple(curves)))
-    return Learning(Remainder(theta, {GROUPS[group].title: 1.0 / len(groups) for group in groups}, {}, True), (), False)
+    return Learning(
+        Discrepancy(theta, {GROUPS[group].title: 1.0 / len(groups) for group in groups}, {}, True), (), False
+    )
 
 
 def test_every_group_is_drawn_without_a_warning_and_every_panel_has_units():
@@ -470,7 +477,7 @@ def test_harmonics_of_the_heading_are_drawn_as_what_they_add_up_to():
 
 
 def test_nothing_is_drawn_where_nothing_is_used():
-    assert learnt_figure(Learning(Remainder({"learnt.turn_rate.yaw@1.0": 0.1}), (), False)) is None
+    assert learnt_figure(Learning(Discrepancy({"learnt.turn_rate.yaw@1.0": 0.1}), (), False)) is None
 
 
 DRIVES = planted_drives(TRUTH, episodes=1, seconds=10.0)

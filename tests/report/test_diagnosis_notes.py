@@ -6,9 +6,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from proxytune.diagnosis.motion.discrepancy_match import LearntError
 
 from proxytune.diagnosis import (
+    RULES,
     AdoptedEffect,
     Clocks,
     Estimate,
@@ -20,9 +20,9 @@ from proxytune.diagnosis import (
     RobotClusters,
 )
 from proxytune.diagnosis.motion.clocks import Jump
-from proxytune.diagnosis.motion.discrepancy import Remainder
+from proxytune.diagnosis.motion.discrepancy import Discrepancy, LearntError
 from proxytune.diagnosis.motion.manoeuvres import LIBRARY, Manoeuvre
-from proxytune.diagnosis.motion.multistep_fit import Polish
+from proxytune.diagnosis.motion.multistep_fit import MultistepFit
 from proxytune.report.diagnosis.document import clocks_document, learnt_document, unlike_document
 from proxytune.report.diagnosis.notes import (
     MEANINGS,
@@ -58,7 +58,7 @@ def diagnosis(**changes):
         "clocks": (),
         "unlike": None,
         "drive_names": (),
-        "learning": Learning(Remainder(), (), False),
+        "learning": Learning(Discrepancy(), (), False),
         "theta": {},
     }
     plain |= {"dropped_values": {"lateral_slip": Estimate(0.0024, (0.0024, 0.0024), "s")}}
@@ -114,7 +114,7 @@ def test_where_noise_is_not_known_a_manoeuvre_is_to_be_driven_ten_times():
 
 
 def test_parameters_fitted_to_windows_are_told_with_what_that_did():
-    polish = Polish(2.0, {1.0: Ratio(0.95, (0.9, 1.0)), 2.0: Ratio(0.8, (0.7, 0.9))}, {})
+    polish = MultistepFit(2.0, {1.0: Ratio(0.95, (0.9, 1.0)), 2.0: Ratio(0.8, (0.7, 0.9))}, {})
     (note,) = motion_notes(diagnosis(multistep=polish))
     assert "fitted to windows of 2 s" in note
     assert "1 s: 0.95, 2 s: 0.80" in note
@@ -124,8 +124,8 @@ def test_a_ratio_is_told_as_what_it_adds():
     value, ends = per_cent(Ratio(1.25, (0.9, 2.0)))
     assert (value, *ends) == pytest.approx((25.0, -10.0, 100.0))
     assert decisive(LITTLE) == 5.0
-    assert may_matter(LITTLE)
-    assert not may_matter(SURE)
+    assert may_matter(LITTLE, RULES.material_factor)
+    assert not may_matter(SURE, RULES.material_factor)
 
 
 def test_a_value_at_the_end_of_its_range_is_no_physics():
@@ -196,8 +196,8 @@ RATIO = Ratio(0.5, (0.4, 0.6))
 ERROR = LearntError(2.0, Rmse(0.01, (0.009, 0.011)), Rmse(0.02, (0.01, 0.03)), RATIO)
 THETA = {"learnt.turn_rate.yaw@1.0": 0.1}
 SHARE = {"heading": 0.25, "turn rate": 0.75}
-USED = Learning(Remainder(THETA, SHARE, {2.0: RATIO}, True), (ERROR,), False)
-REFUSED = Learning(Remainder(THETA, SHARE, {2.0: RATIO}, False), (), True)
+USED = Learning(Discrepancy(THETA, SHARE, {2.0: RATIO}, True), (ERROR,), False)
+REFUSED = Learning(Discrepancy(THETA, SHARE, {2.0: RATIO}, False), (), True)
 
 
 def test_the_document_has_groups_shares_and_ratios_by_horizon():
@@ -230,7 +230,7 @@ def test_what_was_tried_and_left_out_is_told_and_doubtful_names_are_warned_of():
 
 
 def test_nothing_is_said_where_nothing_was_found():
-    assert learnt_notes(Learning(Remainder(), (), False)) == []
+    assert learnt_notes(Learning(Discrepancy(), (), False)) == []
 
 
 def test_a_name_that_would_do_as_well_is_told():

@@ -130,7 +130,11 @@ def _immaterial_document(effect: AdoptedEffect, diagnosis: Diagnosis) -> dict[st
     horizon = decisive(worth) if worth else None
     change = _percent(worth[horizon]) if horizon is not None else {"value": None, "interval": None, "unit": "%"}
     evidence = {"nats": effect.gain, "changes_error_by": change["value"], "interval": change["interval"], "unit": "%"}
-    open_ = {"horizon_s": horizon, "may_matter": not worth or may_matter(worth), "worth": _worth_document(worth)}
+    open_ = {
+        "horizon_s": horizon,
+        "may_matter": not worth or may_matter(worth, diagnosis.rules.material_factor),
+        "worth": _worth_document(worth),
+    }
     return _effect_document(effect, diagnosis.dropped_values, diagnosis.robot.catalogue) | evidence | open_
 
 

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from proxytune.diagnosis import RULES, Diagnosis, Findings, Learning, TriedEffect
+from proxytune.diagnosis import Diagnosis, Findings, Learning, Rules
 from proxytune.effects import GROUPS, HEADING, LEVEL, Learnt, LearntCurve, learnt_effect
 from proxytune.report.diagnosis.effect_figure import effect_curve
 from proxytune.report.diagnosis.error_figures import error_figure, residual_map, residual_over_time, strayed
@@ -28,7 +28,7 @@ def motion_figures(diagnosis: Diagnosis) -> Mapping[str, Figure]:
     figures = {
         "residual_over_time": residual_over_time(diagnosis.parts.tested, both),
         "residual_map": residual_map(diagnosis.parts.tested, both),
-        "ranking": ranking_figure(diagnosis.found),
+        "ranking": ranking_figure(diagnosis.found, diagnosis.rules),
         "effect_curve": effect_curve(diagnosis),
         "learnt": learnt_figure(diagnosis.learning),
         "error": error_figure(diagnosis),
@@ -40,7 +40,6 @@ SHOWN = 12
 """So many effects are ranked that were not added."""
 JUDGES = 5
 """So many signals are ranked beneath them."""
-LEAST_GAIN = RULES.least_gain_nats
 LINEAR = 20.0
 """Evidence of no more than so many thresholds is drawn on a linear axis."""
 ROW, ELSE = 0.145, 0.95
@@ -66,20 +65,22 @@ class _Row(NamedTuple):
 ADDED = _Role("added", BLUE, BLUE)
 RIVAL = _Role("fits as well as one added", LIGHT_BLUE, LIGHT_BLUE)
 OTHER = _Role("not added", GREY, GREY)
-CHANCE = _Role(f"not added, p > {RULES.p_value:g}", GREY, "white")
 SIGNAL = _Role("free curve", PURPLE, PURPLE)
 
 
-def ranking_figure(found: Findings) -> Figure | None:
+def ranking_figure(found: Findings, rules: Rules) -> Figure | None:
     """Draw effects in the order in which they were added, others tried, and signals under any curve, on one axis.
 
     The evidence of those added is that when they were added; of the others, alone, in the first round. Nothing is
     drawn where nothing was tried.
     """
+    chance, least = _Role(f"not added, p > {rules.p_value:g}", GREY, "white"), rules.least_gain_nats
+    rivals = {rival.effect for one in found.adopted for rival in one.rivals}
     forms = {(one.effect, one.form) for one in found.adopted}
     others = [one for one in found.tried if (one.effect, one.form) not in forms][:SHOWN]
     added = [_Row(_name(one.effect, one.form), one.gain, ADDED) for one in found.adopted]
-    tried = [_Row(_name(one.effect, one.form), one.gain, _role(found, one)) for one in others]
+    roles = [RIVAL if one.effect in rivals else OTHER if one.p_value <= rules.p_value else chance for one in others]
+    tried = [_Row(_name(one.effect, one.form), one.gain, role) for one, role in zip(others, roles, strict=True)]
     signals = [_Row(curve.group.name, curve.gain, SIGNAL) for curve in found.curves[:JUDGES]]
     if not tried or not signals:
         return None
@@ -90,9 +91,9 @@ def ranking_figure(found: Findings) -> Figure | None:
     panels = figure.subplots(len(parts), 1, sharex=True, height_ratios=heights)
     for axes, (title, rows) in zip(panels, parts.items(), strict=True):
         _dots(axes, rows)
-        axes.axvline(LEAST_GAIN, color="0.45", lw=1.0, ls=":", label=f"least to be added: {LEAST_GAIN:g} nats")
+        axes.axvline(least, color="0.45", lw=1.0, ls=":", label=f"least to be added: {least:g} nats")
         axes.set_title(title, fontsize=7, loc="left", pad=2)
-    _scale(panels[-1], [row.gain for rows in parts.values() for row in rows])
+    _scale(panels[-1], [row.gain for rows in parts.values() for row in rows], least)
     panels[-1].set_xlabel("evidence on drives left out [nats]", fontsize=8, loc="right")
     legend_below(figure, *panels, without=[ADDED.name, SIGNAL.name])
     return figure
@@ -102,19 +103,13 @@ def _name(effect: str, form: str) -> str:
     return plain(effect) + (f" ({form})" if form else "")
 
 
-def _role(found: Findings, tried: TriedEffect) -> _Role:
-    if any(rival.effect == tried.effect for one in found.adopted for rival in one.rivals):
-        return RIVAL
-    return OTHER if tried.p_value <= RULES.p_value else CHANCE
-
-
-def _scale(axes: Axes, gains: Sequence[float]) -> None:
+def _scale(axes: Axes, gains: Sequence[float], least: float) -> None:
     """A linear axis for evidence of one size, a logarithmic one with plain numbers where sizes differ by orders."""
-    low, high = min(0.0, *gains), max(2.0 * LEAST_GAIN, *gains)
-    if high <= LINEAR * LEAST_GAIN:
+    low, high = min(0.0, *gains), max(2.0 * least, *gains)
+    if high <= LINEAR * least:
         axes.set_xlim(low - 0.03 * (high - low), high + 0.03 * (high - low))
         return
-    axes.set_xscale("symlog", linthresh=2.0 * LEAST_GAIN, linscale=0.5)
+    axes.set_xscale("symlog", linthresh=2.0 * least, linscale=0.5)
     axes.set_xlim(1.3 * low, 1.5 * high)
     axes.set_xticks([0.0, *(10.0**power for power in range(2, 9) if 10.0**power <= 1.5 * high)])
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}".replace(",", "\u2009")))

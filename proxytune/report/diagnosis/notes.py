@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from proxytune.diagnosis import (
-    RULES,
     AdoptedEffect,
     Clocks,
     Diagnosis,
@@ -59,9 +58,9 @@ def decisive(worth: EffectSize) -> float:
     return max(worth, key=lambda horizon: worth[horizon].value)
 
 
-def may_matter(worth: EffectSize) -> bool:
-    """Tell whether these drives leave it open that an effect matters."""
-    return any(one.interval[1] >= RULES.material_factor for one in worth.values())
+def may_matter(worth: EffectSize, factor: float) -> bool:
+    """True if these drives leave it open that the error grows by the factor from which an effect matters."""
+    return any(one.interval[1] >= factor for one in worth.values())
 
 
 def _say_added(diagnosis: Diagnosis, effect: AdoptedEffect) -> str:
@@ -79,15 +78,11 @@ def _say_immaterial(effect: AdoptedEffect, diagnosis: Diagnosis) -> str:
         return f"not shown to matter: {_label(effect)}, {_gain(effect)}"
     horizon = decisive(worth)
     value, _ = per_cent(worth[horizon])
-    kind = "not shown to matter" if may_matter(worth) else "detectable but immaterial"
+    kind = "not shown to matter" if may_matter(worth, diagnosis.rules.material_factor) else "detectable but immaterial"
+    dropped = (one for name, one in diagnosis.dropped_values.items() if name in effect.names)
+    values = "".join(f" {one.value:.3g} {one.unit}".rstrip() for one in dropped)
     change = f"changes the error at {horizon:g} s by {fixed(value, 1)} % ({_ends(worth[horizon], 1)})"
-    return f"{kind}: {_label(effect)}{_values(effect, diagnosis)}, {_gain(effect)}, {change}"
-
-
-def _values(effect: AdoptedEffect, diagnosis: Diagnosis) -> str:
-    """The fitted values of an effect that is no longer in the model."""
-    estimates = {name: estimate for name, estimate in diagnosis.dropped_values.items() if name in effect.names}
-    return "".join(f" {estimate.value:.3g} {estimate.unit}".rstrip() for estimate in estimates.values())
+    return f"{kind}: {_label(effect)}{values}, {_gain(effect)}, {change}"
 
 
 def _gain(effect: AdoptedEffect) -> str:

@@ -24,7 +24,7 @@ from .motion.diagnose import Diagnosis as Diagnosis, HorizonError as HorizonErro
 from .motion.discrepancy import Learning as Learning, MatchedEffect as MatchedEffect
 from .motion.drives import Drives as Drives, Floats as Floats, Whole as Whole, robot_of as robot_of
 from .motion.effect_size import EffectSize as EffectSize, RobotClusters as RobotClusters
-from .motion.evidence import AdoptedEffect as AdoptedEffect, Findings as Findings, TriedEffect as TriedEffect
+from .motion.evidence import AdoptedEffect as AdoptedEffect, Findings as Findings
 from .motion.fitting import Fit as Fit
 from .motion.innovations import (
     HUBER as HUBER,

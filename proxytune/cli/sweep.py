@@ -45,6 +45,8 @@ def run(arguments: argparse.Namespace) -> Answer:
         progress=True,
     )
     figures, files = report.write(arguments.output, typed(arguments))
+    document = report.document()
+    at = document.pop("at")
     paths = {"figures": [str(path) for path in figures], "files": [str(path) for path in files]}
     text = sweep_text(report.curves, report.episodes, [*figures, *files], report.held)
-    return Answer(report.document() | paths, text)
+    return Answer(document | paths | {"at": at}, text)

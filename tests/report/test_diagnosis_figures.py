@@ -79,9 +79,9 @@ def figures(diagnosis):
     return motion_figures(diagnosis)
 
 
-def without_effects(diagnosis, remainder=()):
+def without_effects(diagnosis, unnamed_curves=()):
     """The same drives, as if nothing had been added, and these signals were left over."""
-    found = replace(diagnosis.found, model=diagnosis.found.declared, adopted=(), remainder=remainder)
+    found = replace(diagnosis.found, model=diagnosis.found.declared, adopted=(), unnamed_curves=unnamed_curves)
     return replace(diagnosis, effects=(), found=found)
 
 

@@ -49,14 +49,15 @@ def diagnosis(**changes):
         "log": "run",
         "verdict": "explained",
         "effects": (),
-        "immaterial": (),
-        "worth": {},
-        "polish": None,
+        "negligible": (),
+        "effect_sizes": {},
+        "rules": RULES,
+        "multistep": None,
     }
     plain |= {"errors": (), "residual_depends_on": (), "could_not_be_seen": (), "manoeuvre": None}
     plain |= {
         "clocks": (),
-        "unlike": None,
+        "robot_clusters": None,
         "drive_names": (),
         "learning": Learning(Discrepancy(), (), False),
         "theta": {},
@@ -234,7 +235,7 @@ def test_nothing_is_said_where_nothing_was_found():
 
 
 def test_a_name_that_would_do_as_well_is_told():
-    like = Learning(USED.remainder, USED.errors, False, MatchedEffect("turn_slip", "", {"turn_slip": 0.1}, 0.93))
+    like = Learning(USED.discrepancy, USED.errors, False, MatchedEffect("turn_slip", "", {"turn_slip": 0.1}, 0.93))
     assert learnt_notes(like)[1] == "the curves look like turn_slip (turn_slip 0.1), which alone keeps 93 % of it"
     assert learnt_document(like)["looks_like"]["share"] == 0.93
     assert learnt_document(USED)["looks_like"] is None

@@ -17,7 +17,7 @@ from pictured import ROBOT, lane_poses, write_still_frames
 from proxytune.diagnosis import Blemish, CameraEffect, Estimate, LaidLine, LaidMap
 from proxytune.diagnosis.camera import error as weighing
 from proxytune.diagnosis.camera.appearance import look_at
-from proxytune.diagnosis.camera.diagnose import Evidence, conclude, diagnose_camera
+from proxytune.diagnosis.camera.diagnose import conclude, diagnose_camera
 from proxytune.logs import read_log
 from proxytune.report.diagnosis.camera_figures import (
     camera_figures,
@@ -84,7 +84,7 @@ def test_effects_that_do_not_matter_are_told_with_the_values_they_had(diagnosis,
     monkeypatch.setattr(weighing, "MATERIAL", math.inf)
     weighed = weighing.weigh_effects(diagnosis.named, 1)
     look = look_at(diagnosis.gathered, weighed.named.model)
-    dropped = conclude(Evidence(diagnosis.gathered, weighed, look, DECLARED_MODEL, ()), 1)
+    dropped = conclude(diagnosis.gathered, weighed, look, DECLARED_MODEL, (), 1)
     document = camera_document(dropped)
     assert "camera_roll" not in document["extended"]
     low, high = document["immaterial"][0]["parameters"]["camera_roll"]["interval"]

@@ -91,3 +91,12 @@ def everything(theta=None, count=50, moving=False):
 
 def at_truth(views, theta=None):
     return neutral_state(views, NEUTRAL | (theta or {}))
+
+
+def pushed(views, by):
+    """Views whose edge points lie so far along their normals (n,) [pixel]."""
+    edges = views.edges
+    return replace(
+        views,
+        edges=edges._replace(column=edges.column + by * edges.normal[:, 0], row=edges.row + by * edges.normal[:, 1]),
+    )

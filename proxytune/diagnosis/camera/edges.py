@@ -21,7 +21,7 @@ from proxytune.arrays import Floats
 from proxytune.driving import LINES, CameraFigures, Markings, Road, Robot, mounted_camera, read_map, shipped_map
 from proxytune.effects import Stage, effect_of, effects_from
 from proxytune.errors import LogError
-from proxytune.logs import Frames, Log, LogEpisode, read_pictures
+from proxytune.logs import Frames, Log, read_pictures
 
 SMOOTHING_PX = 1.0
 """Standard deviation of the Gaussian whose slope is the gradient [pixel]."""
@@ -149,8 +149,8 @@ class Tracks:
     def at(self, late_s: float) -> tuple[Floats, Floats]:
         """Poses and rates (N, 3) so long before each frame's instant."""
         when = np.maximum(self.instants - late_s, self.begins)
-        columns = (self.poses.T, self.rates.T)
-        poses, rates = (np.stack([np.interp(when, self.times, one) for one in column], axis=-1) for column in columns)
+        series = (self.poses.T, self.rates.T)
+        poses, rates = (np.stack([np.interp(when, self.times, one) for one in each], axis=-1) for each in series)
         return poses, rates
 
     def only(self, chosen: NDArray[np.intp]) -> "Tracks":
@@ -180,7 +180,14 @@ def track_frames(log: Log, frames: Frames) -> tuple[Tracks, NDArray[np.intp]]:
         shift = offset - episode.times[0]
         near = own[_within_poses(frames.times[own], episode.times[known], still)]
         instants[near], begins[own] = frames.times[near] + shift, episode.times[known][0] + shift
-        parts.append((episode.times[known] + shift, *_smooth(episode, known, log.rate_hz)))
+        poses = episode.poses[known]
+        rates = np.zeros_like(poses)
+        if not still:
+            window, columns = _samples(log.rate_hz), poses.T
+            filled = np.stack([np.interp(episode.times, episode.times[known], one) for one in columns], axis=-1)
+            poses = savgol_filter(filled, window, ORDER, axis=0)[known]
+            rates = savgol_filter(filled, window, ORDER, deriv=1, delta=1.0 / log.rate_hz, axis=0)[known]
+        parts.append((episode.times[known] + shift, poses, rates))
         offset += float(episode.times[-1] - episode.times[0]) + APART_S
     kept = np.flatnonzero(np.isfinite(instants))
     if not len(kept):
@@ -201,18 +208,6 @@ def _within_poses(times: Floats, known: Floats, still: bool) -> NDArray[np.bool_
     inside = (times >= known[0]) & (times <= known[-1])
     exact = np.isclose(known[np.clip(after, 0, len(known) - 1)], times, atol=1e-6)
     return np.asarray(exact if still else inside & (exact | (gap <= LONGEST_GAP_S)))
-
-
-def _smooth(episode: LogEpisode, known: NDArray[np.bool_], rate_hz: float) -> tuple[Floats, Floats]:
-    """Smoothed poses and their rates, at the samples that have a pose."""
-    poses = episode.poses[known]
-    if not rate_hz:
-        return poses, np.zeros_like(poses)
-    window = _samples(rate_hz)
-    filled = np.stack([np.interp(episode.times, episode.times[known], column) for column in poses.T], axis=-1)
-    smooth = savgol_filter(filled, window, ORDER, axis=0)[known]
-    rates = savgol_filter(filled, window, ORDER, deriv=1, delta=1.0 / rate_hz, axis=0)[known]
-    return smooth, rates
 
 
 LATENCY = "camera_latency"

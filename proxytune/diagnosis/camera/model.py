@@ -96,7 +96,11 @@ def project(views: Views, state: State) -> Projection:
     near = on_floor & (reach < FARTHEST_M) & wide
     outward = _turned(marks.slope, state.offset[2])
     aligned = -(outward * across).sum(axis=1) / metres > ALIGNED
-    residual = (marks.distance + _tape_shift(views, state.tape, marks)) / metres
+    tape = Tape(views.markings.stretches)
+    shift = state.tape[tape.shift(marks.stretch, marks.line)]
+    shift = shift + state.tape[tape.tilt(marks.stretch, marks.line)] * _askew(marks)
+    shift = marks.side * shift - 0.5 * state.tape[tape.width(edges.white, marks.line)]
+    residual = (marks.distance + shift) / metres
     slope = outward / metres[:, None]
     lever = place - poses[:, :2]
     return Projection(residual, near, near & aligned, slope, lever, place, poses[:, 2], metres, marks, rates)
@@ -143,14 +147,6 @@ def tape_slopes(views: Views, there: Projection) -> tuple[tuple[NDArray[np.intp]
         (tape.tilt(marks.stretch, marks.line), across * _askew(marks)),
         (tape.width(white, marks.line), -0.5 / there.metres),
     )
-
-
-def _tape_shift(views: Views, errors: Floats, marks: Marks) -> Floats:
-    """Distances that the tape's errors add [m]."""
-    tape, white = Tape(views.markings.stretches), views.edges.white
-    shift = errors[tape.shift(marks.stretch, marks.line)]
-    shift = shift + errors[tape.tilt(marks.stretch, marks.line)] * _askew(marks)
-    return marks.side * shift - 0.5 * errors[tape.width(white, marks.line)]
 
 
 def _askew(marks: Marks) -> Floats:

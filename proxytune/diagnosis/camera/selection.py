@@ -306,7 +306,12 @@ def check_match(name: str, fit: CameraFit) -> tuple[str, ...]:
     share = matched_share(fit)
     if share >= USUAL_MATCHED:
         return ()
-    causes = {cause: _share_if(fit.views, change) for cause, change in MISTAKES.items()}
+    causes = {}
+    for cause, change in MISTAKES.items():
+        views = change(fit.views)
+        mounting = views.optics.mounting
+        start = neutral_state(views, {one: views.optics.neutral(one) for one in mounting})
+        causes[cause] = matched_share(fit_camera(views, start, [one for one in FIRST if one in mounting], FAR))
     likely = max(causes, key=causes.__getitem__)
     problem = f"{name}: frames do not fit the poses: {100 * share:.0f} % of the markings' edges match at best"
     if causes[likely] > max(2.0 * share, LIKELY if share < FEWEST_MATCHED else USUAL_MATCHED):
@@ -315,13 +320,6 @@ def check_match(name: str, fit: CameraFit) -> tuple[str, ...]:
         raise LogError(f"{problem}; {ADVICE}")
     usual = f"{100 * USUAL_MATCHED:.0f} % or more is usual"
     return (f"{100 * share:.0f} % of the markings' edges match ({usual}): poses or map are off by centimetres",)
-
-
-def _share_if(views: Views, change: Callable[[Views], Views]) -> float:
-    changed = change(views)
-    optics = changed.optics
-    start = neutral_state(changed, {name: optics.neutral(name) for name in optics.mounting})
-    return matched_share(fit_camera(changed, start, [name for name in FIRST if name in optics.mounting], FAR))
 
 
 def _turned_pictures(right: float, down: float) -> Callable[[Views], Views]:

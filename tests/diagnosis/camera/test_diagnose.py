@@ -17,7 +17,7 @@ from camera_rates import confusion, coverage, diagnosed, rates
 from joblib import Parallel, delayed
 from pictured import PICTURES, ROAD, ROBOT, lane_poses, pictures, write_pictures, write_still_frames
 from scipy.ndimage import map_coordinates
-from viewed import NEUTRAL, at_truth, driven, everything, stood, tracked
+from viewed import NEUTRAL, at_truth, driven, everything, pushed, stood, tracked
 
 from proxytune.diagnosis import camera_effects, project
 from proxytune.diagnosis.answer import verdict
@@ -261,13 +261,7 @@ def moved(line, by_m):
     own = (there.marks.line == LINES.index(line)) & (there.marks.stretch == STRETCH)
     # The edge moves by side · by against the distance's slope; normals point into the marking, so with it
     size = np.where(own & there.near, there.marks.side * by_m / there.metres, 0.0)
-    edges = views.edges
-    return replace(
-        views,
-        edges=edges._replace(
-            column=edges.column + size * edges.normal[:, 0], row=edges.row + size * edges.normal[:, 1]
-        ),
-    )
+    return pushed(views, size)
 
 
 @pytest.mark.parametrize("line", ["left white line", "right white line", "yellow line"])
@@ -310,14 +304,7 @@ def test_wider_white_lines_are_told_as_such():
     views = replace(stood(noisy=False), tape_m=0.005)
     there = project(views, at_truth(views))
     out = np.where(views.edges.white & there.near, -0.002 / there.metres, 0.0)
-    wider = replace(
-        views,
-        edges=views.edges._replace(
-            column=views.edges.column + out * views.edges.normal[:, 0],
-            row=views.edges.row + out * views.edges.normal[:, 1],
-        ),
-    )
-    before, after = (describe_map(fitted(each)).widths["white lines"].value for each in (views, wider))
+    before, after = (describe_map(fitted(each)).widths["white lines"].value for each in (views, pushed(views, out)))
     assert after - before == pytest.approx(0.004, abs=0.001)
 
 

@@ -104,9 +104,9 @@ def test_a_yellow_stripe_has_yellow_edges_as_far_out_on_either_side():
     assert sides[0] == pytest.approx(sides[1], abs=0.03)
 
 
-@pytest.mark.parametrize("level", [0, 20, 128, 255])
-def test_nothing_is_found_in_a_flat_picture(level):
-    edges = find_edges(np.full((2, ROWS, COLUMNS, 3), level, dtype=np.uint8))
+@pytest.mark.parametrize("colour", [0, 20, 128, 255, SKY], ids=str)
+def test_nothing_is_found_in_a_flat_picture_nor_in_one_of_nothing_but_sky(colour):
+    edges = find_edges(np.full((2, ROWS, COLUMNS, 3), colour, dtype=np.uint8))
     assert [len(field) for field in edges] == [0] * 5
 
 
@@ -126,10 +126,6 @@ def test_edges_of_the_sky_are_left_out():
     away, outward = along_normal(edges, 0.0, 0.0)
     assert np.abs(np.abs(away) - 6.0).max() < 0.1
     assert (np.abs(outward) > 0.99).all()
-
-
-def test_a_picture_of_nothing_but_sky_has_no_edges():
-    assert len(find_edges(np.full((1, ROWS, COLUMNS, 3), SKY, dtype=np.uint8)).row) == 0
 
 
 def test_edges_at_the_picture_s_border_are_left_out():
@@ -347,25 +343,19 @@ def test_every_error_of_the_tape_has_a_place_of_its_own(stretches):
     widths = tape.width(white, yellow)
     places = np.concatenate((shifts, tilts, widths))
     assert sorted(places.tolist()) == list(range(tape.size))
-
-
-def test_both_white_lines_have_one_width():
-    tape = Tape(8)
+    # Both white lines have one width
     assert tape.width(np.array([True]), np.array([0])) == tape.width(np.array([True]), np.array([1]))
 
 
 def test_a_tracker_and_a_map_are_never_trusted_beyond_their_least():
-    views = stood(count=1).with_scatter(0.0, 0.0)
+    """Another scatter leaves all else alone."""
+    before = stood(count=1)
+    views = before.with_scatter(0.0, 0.0)
+    assert views.edges is before.edges
+    assert (views.count, len(views.tape_scatter)) == (1, Tape(views.markings.stretches).size)
     np.testing.assert_allclose(views.pose_scatter, (LEAST_SCATTER[0], *LEAST_SCATTER))
     assert (views.tape_scatter >= LEAST_TAPE_M).all()
     np.testing.assert_allclose(views.with_scatter(0.01, 0.02).pose_scatter, (0.01, 0.01, 0.02))
-
-
-def test_another_scatter_leaves_all_else_alone():
-    views = stood(count=1)
-    assert views.with_scatter(0.01, 0.02).edges is views.edges
-    assert len(views.tape_scatter) == Tape(views.markings.stretches).size
-    assert views.count == 1
 
 
 COUNT = 24

@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 from pictured import ROBOT, lane_poses, pictures
-from viewed import OPTICS, at_truth, driven, everything, still, stood, tracked, views_of
+from viewed import OPTICS, at_truth, driven, everything, pushed, still, stood, tracked, views_of
 
-from proxytune.diagnosis import Edges, ResidualField, project, rank_subsets
+from proxytune.diagnosis import ResidualField, project, rank_subsets
 from proxytune.diagnosis.camera.fitting import fit_camera
 from proxytune.diagnosis.camera.selection import (
     ALWAYS,
@@ -174,11 +174,8 @@ def test_parameters_of_one_effect_stay_together():
     assert chosen == set(EFFECTS)
 
 
-def test_all_effects_together_lose_nothing():
+def test_all_effects_together_lose_nothing_and_more_than_there_are_make_no_set():
     assert rank_subsets(linear(3)[0], (), len(EFFECTS))[0].loss == 0.0
-
-
-def test_more_effects_than_there_are_make_no_set():
     assert rank_subsets(linear(3)[0], (), len(EFFECTS) + 1) == []
 
 
@@ -202,9 +199,8 @@ def bend(views):
 
 
 def displaced(views, by):
-    right, down = by
-    edges = views.edges
-    return replace(views, edges=edges._replace(column=edges.column + right, row=edges.row + down))
+    places = {"column": views.edges.column + by[0], "row": views.edges.row + by[1]}
+    return replace(views, edges=views.edges._replace(**places))
 
 
 @functools.cache
@@ -255,7 +251,7 @@ def test_tape_beside_its_place_is_nothing_of_the_camera_s():
     shift = np.random.default_rng(1).normal(0.0, 0.005, (4, 40))
     there = project(views, at_truth(views))
     by = shift[there.marks.line, there.marks.stretch] * there.marks.side / there.metres
-    moved = displaced(views, (views.edges.normal * by[:, None]).T)
+    moved = pushed(views, by)
     fit = fit_everything(moved, OPTICS.mounting, {}, learn_scatter=False)
     assert not fit_residual_field(fit_set(fit, ("camera_pitch",))).significant
 
@@ -379,7 +375,7 @@ MOTION = ("camera_latency", "rolling_shutter")
 
 
 def only(views, chosen):
-    return replace(views, edges=Edges(*(field[chosen] for field in views.edges)))
+    return replace(views, edges=views.edges.only(chosen))
 
 
 def test_frames_standing_still_hide_latency_and_shutter():

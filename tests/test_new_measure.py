@@ -10,7 +10,7 @@ MEASURE = '''"""The largest error of a mean score."""
 
 import numpy as np
 
-from proxytune.usefulness import Measure
+from proxytune.usefulness.catalogue import Measure
 
 
 def largest_error(proxy, target, metrics):
@@ -38,7 +38,7 @@ def folder(tmp_path_factory, make_studies):
     folder = copy_project(tmp_path_factory.mktemp("project"))
     room = folder / "proxytune" / "usefulness"
     (room / "largest.py").write_text(MEASURE, encoding="utf-8")
-    insert(room / "catalogue.py", "from proxytune.usefulness.catalogue", "from proxytune.usefulness import largest")
+    insert(room / "catalogue.py", "PRPV = Measure(", "from proxytune.usefulness import largest\n")
     insert(room / "catalogue.py", "    MMRV,\n", "    largest.MEASURE,")
     (folder / "sim.csv").write_text(SIM)
     (folder / "real.csv").write_text(SIM.replace("D,1,3.1", "D,1,9.1"))

@@ -3,9 +3,9 @@
     study        run_study, read_study: pre-flight, trials, confirmation
     families     several simulators, each tuned in the same time
     curves       run_sweep, teach
-    scores       score: tables as DataFrames
+    scores       score, log_of: tables as DataFrames
     diagnosis    diagnose
-    logs         log_of, record_log
+    logs         record_log
     transfer     import_log, measure, predict, export
     driving      drive
     search_box   SearchBox: the optimiser alone

@@ -1,53 +1,18 @@
-"""A log from DataFrames.
+"""Logs recorded of the domain of a model file: manoeuvres, and lane drives for pictures; `record` is this."""
 
-A log recorded of the domain of a model file: manoeuvres, and lane drives for pictures; `record` is this.
-"""
-
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
-import tomlkit
 
-from proxytune.api.scores import as_files
 from proxytune.diagnosis import PICTURES, FilmedDrive, film, frames_text, log_text, record, samples_text
 from proxytune.driving import LaneFollowing
-from proxytune.errors import InputError, LogError
-from proxytune.logs import Frames, Log, read_log
+from proxytune.errors import InputError
+from proxytune.logs import Frames, Log
 from proxytune.report import write_picture, write_text
 from proxytune.settings import Section
 from proxytune.study import StudySettings, bare_family
-
-Description = Mapping[str, str | float]
-
-
-def log_of(samples: pd.DataFrame, description: Description, commands: pd.DataFrame | None = None) -> Log:
-    """A log from what its files would hold.
-
-    Args:
-        samples: The columns of samples.csv: episode, time [s], commands, x, y [m], heading [rad].
-        description: The keys of log.toml, as in {"robot": "duckiebot", "command": "duty", "rate_hz": 20}.
-        commands: The columns of commands.csv, where commands have times of their own.
-
-    Raises:
-        LogError: If it is no such log, with table, row and column.
-    """
-    frames = {"samples": samples} if commands is None else {"samples": samples, "commands": commands}
-    stated = {"name": "log", **description}
-    with as_files(frames) as folder:
-        (folder / "log.toml").write_text(_toml(stated), encoding="utf-8")
-        return read_log(folder)
-
-
-def _toml(stated: Description) -> str:
-    plain = {key: value.item() if isinstance(value, np.generic) else value for key, value in stated.items()}
-    try:
-        return tomlkit.dumps(plain)
-    except TypeError as problem:
-        raise LogError(f"log.toml: {problem}; give texts and numbers") from None
-
 
 Tell = Callable[[str], None]
 

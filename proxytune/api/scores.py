@@ -1,4 +1,4 @@
-"""Usefulness from two tables of scores: DataFrames, files, or tables that were read before.
+"""Scores and logs from DataFrames: usefulness from two tables, and a log of what its files would hold.
 
 DataFrames given to the readers of files: there is one way to read, and complaints speak of rows.
 """
@@ -9,9 +9,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
+import tomlkit
 
-from proxytune.errors import InputError, ScoresError
+from proxytune.errors import InputError, LogError, ScoresError
+from proxytune.logs import Log, read_log
 from proxytune.scores import Metric, ScoreTable, read_scores
 from proxytune.usefulness import Assessment, assess
 
@@ -114,3 +117,32 @@ def _check_columns(scores: pd.DataFrame, side: str) -> None:
     domains = list(scores["domain"].unique()) if "domain" in scores else []
     if len(domains) > 1:
         raise ScoresError(f"{side}: has several domains; select one, as in scores[scores.domain == {domains[0]!r}]")
+
+
+Description = Mapping[str, str | float]
+
+
+def log_of(samples: pd.DataFrame, description: Description, commands: pd.DataFrame | None = None) -> Log:
+    """A log from what its files would hold.
+
+    Args:
+        samples: The columns of samples.csv: episode, time [s], commands, x, y [m], heading [rad].
+        description: The keys of log.toml, as in {"robot": "duckiebot", "command": "duty", "rate_hz": 20}.
+        commands: The columns of commands.csv, where commands have times of their own.
+
+    Raises:
+        LogError: If it is no such log, with table, row and column.
+    """
+    frames = {"samples": samples} if commands is None else {"samples": samples, "commands": commands}
+    stated = {"name": "log", **description}
+    with as_files(frames) as folder:
+        (folder / "log.toml").write_text(_toml(stated), encoding="utf-8")
+        return read_log(folder)
+
+
+def _toml(stated: Description) -> str:
+    plain = {key: value.item() if isinstance(value, np.generic) else value for key, value in stated.items()}
+    try:
+        return tomlkit.dumps(plain)
+    except TypeError as problem:
+        raise LogError(f"log.toml: {problem}; give texts and numbers") from None

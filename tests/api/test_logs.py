@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from pictured import lane_poses, write_still_frames
 from planted import CALM, TRUTH, planted_log, write_log
 
+from proxytune.api import log_of
 from proxytune.api.diagnosis import diagnose
-from proxytune.api.logs import log_of
 from proxytune.effects import read_model
 from proxytune.errors import InputError, LogError
 from proxytune.logs import read_log

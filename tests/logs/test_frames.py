@@ -12,7 +12,7 @@ from hypothesis import given, settings, strategies as st
 from log_folders import complaint, write_files
 from PIL import Image
 
-from proxytune.api.logs import log_of
+from proxytune.api import log_of
 from proxytune.errors import LogError
 from proxytune.logs import Frames, read_log, read_pictures
 

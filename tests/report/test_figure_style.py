@@ -17,7 +17,6 @@ HEAVY = ("pybullet", "skopt", "sklearn", "optuna", "torch", "proxytune.diagnosis
     "module",
     [
         "proxytune.report.study.figures",
-        "proxytune.report.compare.figure",
         "proxytune.report.sweep_figures",
     ],
 )

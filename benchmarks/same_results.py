@@ -36,7 +36,7 @@ from typing import Any
 from results_to_compare import PARTS, Part
 
 REPOSITORY = Path(__file__).resolve().parent.parent
-ROOMS = ("proxytune", "robots", "studies")
+ROOMS = ("proxytune", "robots", "studies", "benchmarks/truths")
 """Folders of a checkout that its answers depend on."""
 LEFT_OUT = {
     "seconds": "how long it took",
@@ -46,12 +46,14 @@ LEFT_OUT = {
     "cheapest": "which simulator was the fastest",
 }
 """Keys of JSON that differ by nature, at any depth, and what they say."""
+PROGRESS = re.compile(r"^\d+ s: ")
+"""A line that is left out: it comes by the clock."""
 MASKED = {
-    r"^\d+ s: .*$": "a line of progress: it comes by the clock",
     r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d(\.\d+)?)?": "a time of day",
     r"(?<![\w.])[\d.]+ (s|ms|min|h|seconds?|minutes?) of episodes": "how long it took",
+    r"(?<=episodes )\([\d.]+ (ms|s|min|h)\)|(?<=episode )\([\d.]+ (ms|s|min|h)\)": "how long it would have taken",
 }
-"""Text that differs by nature, and what it says; the folders of the checkout and of the part are masked too."""
+"""Parts of text that differ by nature, and what they say."""
 UNREAD = {
     ".db": "study.db: its format changes; what it holds is read by `study` and `plot`",
     ".npz": "kept lessons and examinations: named by digests of the code",
@@ -108,8 +110,12 @@ class Place:
         self.answers: Answers = {}
         self._given: dict[str, str] = {}
 
-    def run(self, command: str, *, status: int = 0) -> Any:
-        """Run a command of `python -m proxytune` and keep what it prints; give its JSON document, or text.
+    def run(self, command: str, *, status: int | None = 0) -> Any:
+        """Run a command of `python -m proxytune` and keep what it prints; give its JSON document, or lines.
+
+        Args:
+            command: What follows `python -m proxytune`.
+            status: The exit status that it must have; None where any will do.
 
         Raises:
             CannotRunError: If it ends with another status.
@@ -125,10 +131,11 @@ class Place:
         return self._run(name, ["-c", code, *arguments], 0)
 
     def shipped(self, study: str, name: str = "", **settings: Any) -> None:
-        """Copy a study of the checkout, and set keys of its study.toml."""
+        """Copy a study of the checkout, wherever it keeps it, and set keys of its study.toml."""
         copy = self.folder / (name or study)
         leave = shutil.ignore_patterns("figures", "report.html", "study.db*", "teaching", "__pycache__")
-        shutil.copytree(self.checkout / "studies" / study, copy, ignore=leave)
+        homes = (self.checkout / room / study for room in ("studies", "benchmarks"))
+        shutil.copytree(next(home for home in homes if home.is_dir()), copy, ignore=leave)
         for path in copy.rglob("study.toml"):
             path.write_text(edited(path.read_text(encoding="utf-8"), settings), encoding="utf-8")
         self._remember(copy)
@@ -149,19 +156,19 @@ class Place:
                 written[name] = self._content(path)
         return {"printed": self.answers, "written": written}
 
-    def _run(self, name: str, arguments: list[str], status: int) -> Any:
+    def _run(self, name: str, arguments: list[str], status: int | None) -> Any:
         own = {"PYTHONPATH": str(self.checkout), "XDG_STATE_HOME": f"{self.folder}.state", "PROXYTUNE_TRUST": "1"}
         quiet = {"NO_COLOR": "1", "COLUMNS": "120", "MPLBACKEND": "Agg", "OMP_NUM_THREADS": "1"}
         environment = {**os.environ, **own, **quiet}
         call = [sys.executable, *arguments]
         done = subprocess.run(call, cwd=self.folder, env=environment, capture_output=True, text=True, check=False)
-        if done.returncode != status:
+        if status is not None and done.returncode != status:
             last = (done.stderr.strip() or done.stdout.strip() or "nothing said").splitlines()[-1]
             raise CannotRunError(f"{name}: exit status {done.returncode}: {last}")
         said: Any = self._lines(done.stdout)
         with contextlib.suppress(ValueError):
             said = json.loads(done.stdout)
-        self.answers[name] = {"said": said, "remarks": self._lines(done.stderr)}
+        self.answers[name] = {"status": done.returncode, "said": said, "remarks": self._lines(done.stderr)}
         return said
 
     def _content(self, path: Path) -> Any:
@@ -181,9 +188,7 @@ class Place:
     def _lines(self, text: str) -> list[str]:
         for path, name in ((self.folder, "PLACE"), (self.checkout, "CHECKOUT")):
             text = text.replace(str(path), name)
-        for pattern in MASKED:
-            text = re.sub(pattern, "…", text, flags=re.MULTILINE)
-        return [line for line in text.splitlines() if line != "…"]
+        return [line for line in text.splitlines() if not PROGRESS.match(line)]
 
     def _remember(self, folder: Path) -> None:
         files = (path for path in folder.rglob("*") if path.is_file())
@@ -231,6 +236,8 @@ def answers_of(part: Part, checkout: Path, keep: Path | None, tables: Path | Non
             part.ask(place)
         except CannotRunError as problem:
             return {"failure": str(problem)}
+        except (LookupError, TypeError, ValueError, OSError, StopIteration) as problem:
+            return {"failure": f"an answer is not what the part expects: {type(problem).__name__}: {problem}"}
         answers = {**place.gather(), "took_s": round(time.monotonic() - began, 1)}
     if kept:
         kept.parent.mkdir(parents=True, exist_ok=True)
@@ -258,11 +265,14 @@ def differences(before: Any, after: Any, path: str = "") -> Iterator[tuple[str, 
 
 
 def same(before: Any, after: Any) -> bool:
-    """Two values are of one kind and equal to the last bit; 0.0 is not -0.0."""
+    """Two values are of one kind and equal to the last bit, but for text that is masked; 0.0 is not -0.0."""
     if isinstance(before, float) and isinstance(after, float):
         if math.isnan(before) or math.isnan(after):
             return math.isnan(before) and math.isnan(after)
         return before.hex() == after.hex()
+    if isinstance(before, str) and isinstance(after, str):
+        for pattern in MASKED:
+            before, after = re.sub(pattern, "…", before), re.sub(pattern, "…", after)
     return type(before) is type(after) and bool(before == after)
 
 

@@ -30,6 +30,12 @@ def test_what_differs_by_nature_is_left_out_at_any_depth_and_nothing_else_is():
     assert list(same_results.differences(before, {"cut_off": {"seconds": 1.0, "trials": 3}, "value": float("nan")}))
 
 
+def test_seconds_in_a_sentence_are_masked_and_its_numbers_are_not():
+    assert same_results.same("saved 2 episodes (0.149 s)", "saved 2 episodes (0.235 s)")
+    assert not same_results.same("saved 2 episodes (0.149 s)", "saved 3 episodes (0.149 s)")
+    assert not same_results.same("delay 0.107 s (0.092 s)", "delay 0.107 s (0.093 s)")
+
+
 def test_keys_of_a_study_are_set_in_their_own_table():
     text = same_results.edited(STUDY, {"budget": 2, "starts": 1, "domain__seconds": 3.0, "nowhere__seconds": 1.0})
     changed = {"format = 1": "starts = 1\nformat = 1", "budget = 9": "budget = 2", "seconds = 20.0": "seconds = 3.0"}

@@ -16,6 +16,7 @@ from proxytune.learning.cloning import BehaviourCloning
 from proxytune.study import load_family, read_study_settings
 
 STUDIES = Path(__file__).resolve().parent.parent / "studies"
+TRUTHS = STUDIES.parent / "benchmarks" / "truths"
 MADE_FROM = {
     "quickstart": "truth.toml",
     "known_answer": "truth.toml",
@@ -25,7 +26,7 @@ MADE_FROM = {
     "closing_the_loop/no_name": "twin.toml",
     "closing_the_camera_loop": "twin.toml",
     "teacher": "twin.toml",
-    "truths": "truth.toml",
+    "../benchmarks/truths": "truth.toml",
     "which_simulator": "truth.toml",
     "gymnasium_pendulum": "truth.toml",
 }
@@ -37,7 +38,7 @@ NEEDS = {"gymnasium_pendulum": "gymnasium"}
 def study(tmp_path):
     def copy(name):
         kept = shutil.ignore_patterns("study.db*", "figures", "*.lock")
-        return Path(shutil.copytree(STUDIES / name, tmp_path / name, ignore=kept))
+        return Path(shutil.copytree(STUDIES / name, tmp_path / Path(name).name, ignore=kept))
 
     return copy
 
@@ -76,9 +77,9 @@ def test_targets_hold_every_agent_and_start_of_their_study(name):
     assert (table.groupby("agent").size() == table["episode"].nunique()).all()
 
 
-@pytest.mark.parametrize("path", sorted((STUDIES / "truths").glob("lacks_*.toml")), ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", sorted(TRUTHS.glob("lacks_*.toml")), ids=lambda path: path.stem)
 def test_what_truths_lack_is_an_effect_of_its_own_beyond_the_box(path):
-    settings = read_study_settings(STUDIES / "truths")
+    settings = read_study_settings(TRUTHS)
     held = dict(load_family(settings, path).effects)
     assert path.stem.removeprefix("lacks_") in " ".join(held)
     assert not set(held) & set(settings.space.names), "a truth would be written over it"

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from proxytune.report.figure_style import LineName, name_lines, spread_places
 
-HEAVY = ("pybullet", "skopt", "sklearn", "optuna", "torch", "proxytune.diagnosis.result")
+HEAVY = ("pybullet", "skopt", "sklearn", "optuna", "torch", "proxytune.diagnosis.motion.diagnose")
 
 
 @pytest.mark.slow

@@ -215,12 +215,14 @@ class Part:
         ask: Runs its commands in a place.
         needs: Modules that must be installed.
         tables: Whether score tables must be given.
+        leaves_out: Paths of answers that differ by nature, as a regular expression.
     """
 
     name: str
     ask: Callable[[Place], None]
     needs: tuple[str, ...] = ()
     tables: bool = False
+    leaves_out: str = "^$"
 
     @property
     def version(self) -> str:
@@ -536,7 +538,8 @@ PARTS = (
         extended_studies("closing_the_camera_loop", "closing_the_camera_loop/extended"),
     ),
     Part("study truths, resumed and exported", resumed),
-    Part("study which_simulator", families),
+    # What an episode of each takes, drawn and in a table.
+    Part("study which_simulator", families, leaves_out=r"/families\.png$|/report\.html/(2[7-9]|3[0-3])$"),
     Part("study teacher", taught),
     Part("study which_randomisation", randomised),
     Part("mujoco robot", mujoco_robot, ("gymnasium", "mujoco")),

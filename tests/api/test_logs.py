@@ -126,7 +126,7 @@ def test_parameters_and_errors_are_those_of_the_document(report_of_diagnosing_fr
 def test_what_is_written_is_what_is_said(report_of_diagnosing_frames, tmp_path):
     paths = report_of_diagnosing_frames.write(tmp_path / "found")
     assert json.loads(paths[0].read_text()) == json.loads(json.dumps(report_of_diagnosing_frames.document()))
-    assert {path.stem for path in paths[2:]} == {*report_of_diagnosing_frames.figures(), "report_of_diagnosing_frames"}
+    assert {path.stem for path in paths[2:]} == {*report_of_diagnosing_frames.figures(), "report"}
     assert any("camera_roll" in note for note in report_of_diagnosing_frames.notes)
 
 

@@ -70,12 +70,7 @@ Answer = TypeVar("Answer")
 
 
 def load(
-    name: str,
-    *,
-    kind: str,
-    beside: Path | None = None,
-    needs: Iterable[str] = (),
-    shipped: Mapping[str, Any] = NONE,
+    name: str, *, kind: str, beside: Path | None = None, needs: Iterable[str] = (), shipped: Mapping[str, Any] = NONE
 ) -> Any:
     """What a name stands for: something shipped, `module:attribute`, or an installed plug-in.
 
@@ -99,12 +94,7 @@ def load(
 
 
 def make(
-    name: str,
-    *,
-    kind: str,
-    beside: Path | None = None,
-    needs: Iterable[str] = (),
-    shipped: Mapping[str, Any] = NONE,
+    name: str, *, kind: str, beside: Path | None = None, needs: Iterable[str] = (), shipped: Mapping[str, Any] = NONE
 ) -> Any:
     """What a name stands for as `load` finds it; a class, or what lacks the members, is called without arguments.
 

@@ -66,8 +66,7 @@ def study_skeleton(name: str, robot: Robot) -> Skeleton:
         "study.toml.txt", name=name, robot=robot.name, plant=plant, pitch_low=f"{low:g}", pitch_high=f"{high:g}"
     )
     return Skeleton(
-        {"study.toml": study, "truth.toml": fill("truth.toml.txt", robot=robot.name, pitch=f"{off:g}")},
-        commands(name),
+        {"study.toml": study, "truth.toml": fill("truth.toml.txt", robot=robot.name, pitch=f"{off:g}")}, commands(name)
     )
 
 

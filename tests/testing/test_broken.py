@@ -285,10 +285,7 @@ FAMILIES = {
     "an undeclared metric": (Altered(extra=("height",)), "gives 'height', which its metrics do not declare"),
     "a missing metric": (Altered(missing="distance"), "gives no 'distance', which its metrics declare"),
     "a metric that is no number": (Wobbly(faults=("agent0:*:nan",)), "gives 'distance' nan; it must be finite"),
-    "an idle parameter": (
-        Altered(idle="trim"),
-        "scores all the same with 'trim' left out, -0.3 and 0.3; use it",
-    ),
+    "an idle parameter": (Altered(idle="trim"), "scores all the same with 'trim' left out, -0.3 and 0.3; use it"),
     "chance": (Altered(chance=True), "scores an episode otherwise after others; keep no state"),
     "an identity of the process": (ByProcess(), "has the identity 'of .*' in another process, 'of .*' here"),
     "any agent": (AnyAgent(), "takes an agent 'nobody drives like this'; check_agent must raise"),

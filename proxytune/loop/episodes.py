@@ -71,7 +71,7 @@ MOST_STARTS = 4
 
 
 class BothEpisodes(NamedTuple):
-    """The same episode beside the target in both tuned proxies."""
+    """One episode beside the target in both tuned proxies."""
 
     before: SideBySide
     after: SideBySide

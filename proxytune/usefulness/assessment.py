@@ -29,7 +29,6 @@ from proxytune.usefulness.resampling import (
     PrpvInterval,
     bootstrap_means,
     intervals,
-    means_if_repeated,
     prpv_in_blocks,
     prpv_interval,
     why_not_repeated,
@@ -163,7 +162,8 @@ def assess(
     inputs = compare(proxy=proxy, target=target, metrics=metrics)
     one, other = inputs.proxy, inputs.target
     error = ppv(proxy=one, target=other, metrics=metrics, beta=beta)
-    means = means_if_repeated(inputs, resamples=resamples, seed=seed)
+    repeated = not why_not_repeated(inputs)
+    means = bootstrap_means(inputs, resamples=resamples, seed=seed) if repeated else None
     return Assessment(
         inputs=inputs,
         prpv=prpv(proxy=one, target=other, metrics=metrics),

@@ -89,7 +89,7 @@ class Measure:
         inputs, on_means = assessment.inputs, self.on_means
 
         def by_metric(proxy: Floats, target: Floats) -> Floats:
-            """Of means (…, agents, metrics), shape (…, metrics or 1)."""
+            """Values (…, metrics or 1) of means (…, agents, metrics)."""
             values = on_means(proxy, target, inputs.metrics)
             return values if self.per_metric else values[..., None]
 

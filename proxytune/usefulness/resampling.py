@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from proxytune.arrays import Floats
 from proxytune.scores import Metric, ScoreTable
-from proxytune.usefulness.comparison import Comparison, compare, start_of, start_places
+from proxytune.usefulness.comparison import Comparison, start_of, start_places
 from proxytune.usefulness.pairs import prpv_of_means
 from proxytune.usefulness.predictivity import Ppv, kendall_of_means, mmrv_of_means, pearson_of_means, ppv_of_means
 
@@ -69,11 +69,6 @@ def too_few(table: ScoreTable, name: str) -> str:
         return ""
     who = "each agent" if len(single) == len(table.agents) else f"agent '{single[0]}'"
     return f"{who} has one episode {name}, which says nothing about noise; score at least two"
-
-
-def means_if_repeated(inputs: Comparison, *, resamples: int, seed: int) -> Means | None:
-    """Mean scores of resampled episodes, None where episodes are not repeated."""
-    return None if why_not_repeated(inputs) else bootstrap_means(inputs, resamples=resamples, seed=seed)
 
 
 def bootstrap_means(inputs: Comparison, *, resamples: int, seed: int) -> Means:
@@ -179,18 +174,6 @@ def interval(values: Floats, confidence: float = CONFIDENCE) -> tuple[float, flo
     tail = (1 - confidence) / 2
     low, high = np.quantile(values, [tail, 1 - tail])
     return float(low), float(high)
-
-
-def bootstrap_prpv(
-    *, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric], resamples: int = 1000, seed: int = 0
-) -> PrpvInterval:
-    """Resample episodes to tell how far PRPV would be off in a repeat of the experiment.
-
-    Raises:
-        ScoresError: As in prpv.
-    """
-    inputs = compare(proxy=proxy, target=target, metrics=metrics)
-    return prpv_interval(inputs, means_if_repeated(inputs, resamples=resamples, seed=seed))
 
 
 def prpv_interval(inputs: Comparison, means: Means | None) -> PrpvInterval:

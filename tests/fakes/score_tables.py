@@ -3,6 +3,8 @@
 import numpy as np
 
 from proxytune.scores import ScoreTable
+from proxytune.usefulness import bootstrap_means, compare, why_not_repeated
+from proxytune.usefulness.resampling import prpv_interval
 
 
 def table_of(values, labels=None, metrics="mn"):
@@ -23,3 +25,10 @@ def of_means(*rows, metrics="mn"):
 def ordered(seed, episodes=6, agents=5):
     """Two metrics of agents that are in order but for a noise of their distance."""
     return table_of(np.random.default_rng(seed).normal(size=(agents, episodes, 2)) + np.arange(agents)[:, None, None])
+
+
+def bootstrap_prpv(*, proxy, target, metrics, resamples=1000, seed=0):
+    """The interval of PRPV alone."""
+    inputs = compare(proxy=proxy, target=target, metrics=metrics)
+    repeated = not why_not_repeated(inputs)
+    return prpv_interval(inputs, bootstrap_means(inputs, resamples=resamples, seed=seed) if repeated else None)

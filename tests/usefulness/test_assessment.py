@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
-from score_tables import ordered, table_of
+from score_tables import bootstrap_prpv, ordered, table_of
 
 from proxytune.errors import ScoresError
 from proxytune.scores import Metric, ScoreTable
 from proxytune.usefulness import assess, floor_of_repeats, resampling, select_proxy
 from proxytune.usefulness.pairs import prpv
 from proxytune.usefulness.predictivity import kendall_tau, mmrv, ppv, srcc
-from proxytune.usefulness.resampling import bootstrap_prpv
 
 M = (Metric("m"), Metric("n", "min"))
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
-from score_tables import of_means, table_of
+from score_tables import bootstrap_prpv, of_means, table_of
 
 from proxytune.errors import ScoresError
 from proxytune.scores import Metric, ScoreTable, read_domains
@@ -30,7 +30,7 @@ from proxytune.usefulness.comparison import by_start, is_repeated, split_repeats
 from proxytune.usefulness.noise import success_rates
 from proxytune.usefulness.pairs import FlippedPair, prpv, stand
 from proxytune.usefulness.predictivity import kendall_of_means, mmrv_of_means
-from proxytune.usefulness.resampling import bootstrap_prpv, draw_counts
+from proxytune.usefulness.resampling import draw_counts
 
 M = [Metric("m")]
 

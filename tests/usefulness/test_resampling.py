@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from score_tables import table_of
+from score_tables import bootstrap_prpv, table_of
 
 from proxytune.scores import Metric
 from proxytune.usefulness import bootstrap_means, compare, prpv_of_means, resampling
-from proxytune.usefulness.resampling import bootstrap_prpv, draw_counts
+from proxytune.usefulness.resampling import draw_counts
 
 M = (Metric("m"), Metric("n"))
 

@@ -16,28 +16,13 @@
 The command line turns each into one line on standard error and the exit status above.
 """
 
-__all__ = [
-    "BusyError",
-    "ConformanceError",
-    "EpisodeError",
-    "ExtensionError",
-    "InputError",
-    "LearnerError",
-    "LogError",
-    "ProxytuneError",
-    "RunError",
-    "ScoresError",
-    "SettingsError",
-    "StoreError",
-]
-
 
 class ProxytuneError(Exception):
     """Anything that proxytune reports to its user in one line."""
 
 
 class InputError(ProxytuneError):
-    """What was given cannot be used; the message says what to change."""
+    """Something given cannot be used; the message says what to change."""
 
 
 class ScoresError(InputError):

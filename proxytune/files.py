@@ -1,6 +1,6 @@
 """Files that are written whole or not at all: as a draft beside them, which takes their name once the disk has it.
 
-Where the robots and studies that travel with the package lie.
+Also the folders of robots and studies that travel with the package (`shipped`).
 """
 
 import contextlib
@@ -24,7 +24,9 @@ def draft_of(path: Path) -> Iterator[Path]:
     draft = draft_path(path)
     try:
         _clear_away(path)
-        _make_anew(draft)
+        # What lies there may be left of a killed process, or a link that leads elsewhere.
+        draft.unlink(missing_ok=True)
+        os.close(os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o666))
         yield draft
         _to_disk(draft)
         draft.replace(path)
@@ -35,7 +37,7 @@ def draft_of(path: Path) -> Iterator[Path]:
 
 
 def draft_path(path: Path) -> Path:
-    """Where this process writes a draft, of a file or a folder: on another machine a process may have its number."""
+    """The path of this process's draft, of a file or a folder: on another machine a process may have its number."""
     return path.with_name(f"{_of_this_machine(path)}{os.getpid()}")
 
 
@@ -54,7 +56,7 @@ def _clear_away(path: Path) -> None:
 
 
 def _is_alive(process: int) -> bool:
-    """Whether a process of this machine is still there."""
+    """True if a process of this machine is still there."""
     try:
         os.kill(process, 0)
     except (ProcessLookupError, OverflowError):
@@ -62,12 +64,6 @@ def _is_alive(process: int) -> bool:
     except PermissionError:  # another user's
         pass
     return True
-
-
-def _make_anew(draft: Path) -> None:
-    """Make the file: what lies there may be left of a killed process, or a link that leads elsewhere."""
-    draft.unlink(missing_ok=True)
-    os.close(os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o666))
 
 
 def _to_disk(draft: Path) -> None:

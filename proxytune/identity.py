@@ -47,7 +47,8 @@ def files_beside(folder: Path) -> list[Path]:
         known.add(os.path.realpath(here))
         # A link may lead back up.
         within = [name for name in folders if os.path.realpath(Path(here, name)) not in known]
-        folders[:] = [name for name in within if _can_be_package(Path(here, name))]
+        named = [name for name in within if name.isidentifier() and name != "__pycache__"]
+        folders[:] = [name for name in named if not any(Path(here, name, one).exists() for one in NOT_A_PACKAGE)]
         found += [Path(here, name) for name in names if not name.startswith(".")]
     return sorted(found)
 
@@ -58,13 +59,8 @@ def modules_beside(folder: Path) -> list[Path]:
 
 
 def is_module(path: Path) -> bool:
-    """Whether this is a module of Python."""
+    """True if this is a module of Python."""
     return path.suffix == ".py" and path.is_file()
-
-
-def _can_be_package(folder: Path) -> bool:
-    named = folder.name.isidentifier() and folder.name != "__pycache__"
-    return named and not any((folder / name).exists() for name in NOT_A_PACKAGE)
 
 
 @functools.lru_cache(maxsize=4096)
@@ -73,7 +69,9 @@ def _meaning(suffix: str, content: bytes) -> str:
     known = content
     try:
         if suffix == ".py":
-            known = "\n".join(_walk(_parsed(content))).encode()
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                known = "\n".join(_walk(ast.parse(content))).encode()
         if suffix == ".toml":
             known = json.dumps(tomllib.loads(content.decode()), sort_keys=True, default=str).encode()
     except (SyntaxError, ValueError, RecursionError):
@@ -81,18 +79,14 @@ def _meaning(suffix: str, content: bytes) -> str:
     return hashlib.sha256(known).hexdigest()
 
 
-def _parsed(content: bytes) -> ast.Module:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        return ast.parse(content)
-
-
 def _walk(node: Any) -> Iterator[str]:
     """A syntax tree as lines; fields that are empty go unsaid, since newer versions of Python have more of them."""
     if isinstance(node, list):
         yield "["
         for one in node:
-            if not _stands_alone(one):
+            # A string that is a statement of its own is a docstring, or describes an attribute.
+            constant = one.value if isinstance(one, ast.Expr) else None
+            if not (isinstance(constant, ast.Constant) and isinstance(constant.value, str)):
                 yield from _walk(one)
         yield "]"
     elif isinstance(node, ast.AST):
@@ -106,28 +100,22 @@ def _walk(node: Any) -> Iterator[str]:
         yield repr(node)
 
 
-def _stands_alone(node: Any) -> bool:
-    """Whether this is a string that is a statement of its own: a docstring, or what describes an attribute."""
-    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
-
-
 CALLED = {"numpy": "NumPy", "pybullet": "PyBullet", "scipy": "SciPy", "optuna": "Optuna"}
 """What a package is called, where that is not its name."""
 
 
 def versions_of(packages: Iterable[str]) -> dict[str, str]:
     """The version of each package, without importing it; "unknown" where it was not installed as one."""
-    return {package: _version(package) for package in packages}
+    versions = {}
+    for package in packages:
+        try:
+            versions[package] = version(package)
+        except PackageNotFoundError:
+            versions[package] = "unknown"
+    return versions
 
 
 def version_changes(before: Mapping[str, str], after: Mapping[str, str]) -> list[str]:
     """Each package whose version has changed, as one phrase for the user."""
     both = {name: (before.get(name, "not used"), after.get(name, "not used")) for name in {**after, **before}}
     return [f"{CALLED.get(name, name)} {new} (was {old})" for name, (old, new) in both.items() if old != new]
-
-
-def _version(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return "unknown"

@@ -39,7 +39,7 @@ RESET, COURSE, ACTING = 11, 12, 13
 
 
 class LessonSeeds(NamedTuple):
-    """What one lesson is drawn from.
+    """The seeds of one lesson.
 
     Attributes:
         theta: Seed of θ.
@@ -103,7 +103,7 @@ def exam_seed(study_seed: int, start: int) -> int:
 
 
 def lesson_seeds(lessons_seed: int, number: int) -> LessonSeeds:
-    """What a lesson, counted from 0, is drawn from."""
+    """The seeds of a lesson, counted from 0."""
     return LessonSeeds(*_words(3, lessons_seed, number))
 
 
@@ -113,7 +113,7 @@ def reset_seed(start: int) -> int:
 
 
 def course_generator(seed: int, start: int) -> np.random.Generator:
-    """What an environment draws from in an episode after its first state."""
+    """The generator of an environment in an episode after its first state."""
     return np.random.default_rng((seed, start, COURSE))
 
 
@@ -123,22 +123,22 @@ def acting_seed(seed: int, start: int) -> int:
 
 
 def placement_generator(seed: int, start: int) -> np.random.Generator:
-    """What the pose is drawn from in which an episode's robot is put down at a start."""
+    """The generator of the pose in which an episode's robot is put down at a start."""
     return np.random.default_rng((seed, start))
 
 
 def message_generator(seed: int, block: int) -> np.random.Generator:
-    """What becomes of a block of an episode's commands is drawn from this."""
+    """The generator of what becomes of a block of an episode's commands."""
     return np.random.default_rng((seed, block))
 
 
 def picture_generator(seed: int, number: int) -> np.random.Generator:
-    """What the noise on one of an episode's pictures is drawn from."""
+    """The generator of the noise on one of an episode's pictures."""
     return np.random.default_rng((seed, number))
 
 
 def expert_generator(seed: int, step: int) -> np.random.Generator:
-    """What the push is drawn from that disturbs an episode's expert in a control step."""
+    """The generator of the push that disturbs an episode's expert in a control step."""
     return np.random.default_rng((seed, step))
 
 

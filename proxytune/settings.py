@@ -183,7 +183,9 @@ def read_settings(path: Path) -> Section:
     """
     try:
         text = read_text(path)
-        _check_dots(text)
+        for number, line in enumerate(text.splitlines(), start=1):
+            if line.count(".") > MOST_DOTS and max(part.count(".") for part in re.split("[,=]", line)) > MOST_DOTS:
+                raise ValueError(f"a key of more than {MOST_DOTS} parts (at line {number})")
         return Section(path, "", tomllib.loads(text))
     except FileNotFoundError:
         raise SettingsError(f"{path}: no such file; check the path") from None
@@ -211,19 +213,8 @@ def read_text(path: Path, encoding: str = "utf-8") -> str:
     return path.read_text(encoding=encoding)
 
 
-def _check_dots(text: str) -> None:
-    """Refuse keys of more parts than anyone writes.
-
-    Raises:
-        ValueError: With the line.
-    """
-    for number, line in enumerate(text.splitlines(), start=1):
-        if line.count(".") > MOST_DOTS and max(part.count(".") for part in re.split("[,=]", line)) > MOST_DOTS:
-            raise ValueError(f"a key of more than {MOST_DOTS} parts (at line {number})")
-
-
 def is_finite(value: float) -> bool:
-    """Whether a number is finite as a float; a whole number may have too many digits."""
+    """True if a number is finite as a float; a whole number may have too many digits."""
     try:
         return math.isfinite(value)
     except OverflowError:

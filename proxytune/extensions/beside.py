@@ -6,11 +6,9 @@ that of the first. A folder's modules are therefore imported under a name that b
 The folder is also added to the end of sys.path, for what imports by text (an environment registered as "module:Class"):
 what is found there, after all else, may be of any folder that this process has opened.
 
-Whose a KeyboardInterrupt is: the user's Ctrl-C, or an exception of that name raised by code that is not ours.
-Whose code may be run: who starts a command is asked before code beside a study runs for the first time.
-
-A caller of Python's API has chosen what to run: nothing is asked there.
-A user's modules as one value that another machine can import from.
+Whoever starts a command is asked before code beside a study runs for the first time (`permitting`); a caller of
+Python's API has chosen what to run, and is not asked. Such code may raise a KeyboardInterrupt of its own: `is_users`
+tells the user's Ctrl-C from it. `pack` and `unpack` carry a folder's modules to another machine.
 """
 
 import builtins
@@ -40,7 +38,7 @@ class Interrupted(KeyboardInterrupt):
 
 
 def interrupt(number: int, frame: FrameType | None) -> None:
-    """What SIGINT does on the command line.
+    """Handle SIGINT on the command line.
 
     Raises:
         Interrupted: Always.
@@ -49,7 +47,7 @@ def interrupt(number: int, frame: FrameType | None) -> None:
 
 
 def is_users(problem: BaseException) -> bool:
-    """Whether what was raised is the user's Ctrl-C.
+    """True if what was raised is the user's Ctrl-C.
 
     Where SIGINT raises Interrupted, or is ignored as in the processes that do pieces of work, any other
     KeyboardInterrupt is not, unless it was raised on catching that one. Under another handler, as in a Python session,
@@ -123,14 +121,6 @@ def open_folders(known: Sequence[str]) -> None:
         _home(folder)
 
 
-def open_folder(folder: str, place: str) -> None:
-    """Let this process import a folder's modules by the names that they have there, though they lie elsewhere."""
-    name = _home(folder)
-    sys.modules[name].__path__ = [place]
-    if place not in sys.path:
-        sys.path.append(place)
-
-
 def _home(folder: str) -> str:
     """The name under which a folder's modules are imported: that of an empty package."""
     word = "".join(letter if letter.isalnum() else "_" for letter in Path(folder).name)
@@ -189,7 +179,7 @@ def _import(
     fromlist: Sequence[str] | None = (),
     level: int = 0,
 ) -> ModuleType:
-    """What `import` does in a module of a folder."""
+    """Import as `import` does in a module of a folder."""
     if level or not _lies_in(Path(sys.modules[home].__path__[0]), name):
         return builtins.__import__(name, globals, locals, fromlist or (), level)
     found = builtins.__import__(f"{home}.{name}", globals, locals, fromlist or (), 0)
@@ -202,22 +192,24 @@ Packed = tuple[tuple[str, bytes], ...]
 
 def pack(folders: Sequence[str]) -> Packed:
     """The modules of folders; other files stay where they are."""
-    return tuple((folder, _zipped(Path(folder))) for folder in folders)
+    packed = []
+    for folder in folders:
+        content = io.BytesIO()
+        with zipfile.ZipFile(content, "w") as archive:
+            for path in modules_beside(Path(folder)):
+                # No dates: the same modules are the same bytes.
+                archive.writestr(zipfile.ZipInfo(path.relative_to(folder).as_posix()), path.read_bytes())
+        packed.append((folder, content.getvalue()))
+    return tuple(packed)
 
 
 def unpack(packed: Packed) -> None:
     """Let this process import packed modules by the names that they had where they were packed."""
     for folder, content in packed:
-        open_folder(folder, _unzipped(content))
-
-
-def _zipped(folder: Path) -> bytes:
-    content = io.BytesIO()
-    with zipfile.ZipFile(content, "w") as archive:
-        for path in modules_beside(folder):
-            # No dates: the same modules are the same bytes.
-            archive.writestr(zipfile.ZipInfo(path.relative_to(folder).as_posix()), path.read_bytes())
-    return content.getvalue()
+        home, place = _home(folder), _unzipped(content)
+        sys.modules[home].__path__ = [place]
+        if place not in sys.path:
+            sys.path.append(place)
 
 
 @lru_cache(maxsize=64)

@@ -1,6 +1,7 @@
-"""Finding what a user's name stands for, and saying in one line why it cannot be used.
+"""The search for what a user's name stands for, and one line for why it cannot be used.
 
-Plug-ins: entry points of installed packages that add something to proxytune.
+`load` and `make` find it among what is shipped, a folder's modules or the plug-ins (entry points of installed packages,
+none of which is imported before it is named); `ask` calls it, and tells what it raised and where.
 """
 
 import importlib
@@ -70,14 +71,9 @@ Answer = TypeVar("Answer")
 
 
 def load(
-    name: str,
-    *,
-    kind: str,
-    beside: Path | None = None,
-    needs: Iterable[str] = (),
-    shipped: Mapping[str, Any] = NONE,
+    name: str, *, kind: str, beside: Path | None = None, needs: Iterable[str] = (), shipped: Mapping[str, Any] = NONE
 ) -> Any:
-    """What a name stands for: something shipped, `module:attribute`, or an installed plug-in.
+    """Find what a name stands for: something shipped, `module:attribute`, or an installed plug-in.
 
     Args:
         name: `module:attribute`, or a plain name.
@@ -99,14 +95,9 @@ def load(
 
 
 def make(
-    name: str,
-    *,
-    kind: str,
-    beside: Path | None = None,
-    needs: Iterable[str] = (),
-    shipped: Mapping[str, Any] = NONE,
+    name: str, *, kind: str, beside: Path | None = None, needs: Iterable[str] = (), shipped: Mapping[str, Any] = NONE
 ) -> Any:
-    """What a name stands for as `load` finds it; a class, or what lacks the members, is called without arguments.
+    """Find what a name stands for, as `load` does; a class, or what lacks the members, is called without arguments.
 
     Raises:
         ExtensionError: If it cannot be loaded, calling it raises, or what it makes lacks a member.
@@ -120,7 +111,7 @@ def make(
 
 
 def ask(what: str, question: Callable[[], Answer], where: str = "") -> Answer:
-    """What code that is not ours answers.
+    """Ask code that is not ours.
 
     Args:
         what: Whose it is, as a complaint names it.
@@ -165,16 +156,12 @@ def one_line(text: str) -> str:
 
 
 def place_of(problem: BaseException | None) -> str:
-    """Where in code that is neither ours nor installed an exception arose, in brackets; empty if nowhere."""
-    frames = traceback.extract_tb(problem.__traceback__) if problem else []
-    own = [frame for frame in frames if _is_users(frame.filename)]
-    return f" ({Path(own[-1].filename).name}, line {own[-1].lineno})" if own else ""
-
-
-def _is_users(file: str) -> bool:
-    """Whether a file of code is a user's own."""
-    path = Path(file).resolve()
-    return path.is_file() and not any(path.is_relative_to(folder) for folder in NOT_USERS)
+    """The place in code that is neither ours nor installed where an exception arose, in brackets; empty if nowhere."""
+    for frame in reversed(traceback.extract_tb(problem.__traceback__) if problem else []):
+        path = Path(frame.filename).resolve()
+        if path.is_file() and not any(path.is_relative_to(folder) for folder in NOT_USERS):
+            return f" ({Path(frame.filename).name}, line {frame.lineno})"
+    return ""
 
 
 def _lacks(found: Any, needs: Iterable[str]) -> list[str]:

@@ -1,7 +1,7 @@
-"""Before and after: each measure of the proxy without what was found and with it, its interval and its floor.
+"""Before and after: each measure of the proxy without what was found and with it, its interval and its noise floor.
 
-What a loop found, in a sentence, and what to do next.
-PRPV of the tuned proxy before and after, against its noise floor.
+`compare_prpv` and `compare_errors` make the rows, `answer` and `following` say what they come to and what to do next,
+and `prpv_figure` draws PRPV.
 """
 
 from collections.abc import Mapping, Sequence
@@ -71,7 +71,7 @@ class Compared:
 
     @property
     def falls(self) -> bool:
-        """Whether it is lower after than before, beyond its intervals."""
+        """True if it is lower after than before, beyond its intervals."""
         if self.after is None or self.after.interval is None or self.before.interval is None:
             return False
         return self.after.interval[1] < self.before.interval[0]
@@ -136,17 +136,18 @@ NEXT = " Next: "
 
 
 def lacking(diagnosis: Mapping[str, Any]) -> str:
-    """What the proxy lacks, as in "a dead band and a turn slip"; empty where it has no name."""
+    """List what the proxy lacks, as in "a dead band and a turn slip"; empty where it has no name."""
     camera = diagnosis["camera"] or {}
     names = [effect["name"] for effect in (*diagnosis["effects"], *camera.get("effects", ()))]
     return listed([plain(name) for name in dict.fromkeys(names)])
 
 
 def answer(diagnosis: Mapping[str, Any], rows: Sequence[Compared]) -> str:
-    """What the simulator lacked, and what it is worth to declare it."""
+    """Say what the simulator lacked, and what it is worth to declare it."""
     verdict, named = diagnosis["verdict"], lacking(diagnosis)
     if all(row.after is None for row in rows):
-        return f"The log shows nothing to extend the simulator by (verdict: {verdict}). {_only(rows[0])}"
+        only = f"{rows[0].title}: {level_text(rows[0].before, rows[0].unit)}."
+        return f"The log shows nothing to extend the simulator by (verdict: {verdict}). {only}"
     if named:
         lacked = f"The simulator lacked: {named} (verdict: {verdict})."
     else:
@@ -159,7 +160,7 @@ def answer(diagnosis: Mapping[str, Any], rows: Sequence[Compared]) -> str:
 
 
 def following(diagnosis: Mapping[str, Any], studied: str, model: str, theta: Theta) -> str:
-    """What to do next.
+    """Say what to do next.
 
     Args:
         diagnosis: What `diagnose --json` prints.
@@ -170,18 +171,16 @@ def following(diagnosis: Mapping[str, Any], studied: str, model: str, theta: The
     drive, step = diagnosis.get("next_manoeuvre"), studied.rpartition(NEXT)[2]
     if drive and diagnosis["verdict"] in OPEN:
         return f"Log {drive['name']} ({drive['description']}), and close the loop with that log."
+    if not model and "diagnose" in step:
+        unseen = [plain(name) for name in diagnosis["could_not_be_seen"]]
+        shows = f" that can show {listed(unseen[:MOST_NAMED])}" if unseen else ", longer and more varied"
+        return f"No θ explains the scores, and this log does not tell why: log drives{shows}."
     if not model:
-        return _log_more(diagnosis) if "diagnose" in step else f"{step[:1].upper()}{step[1:]}"
+        return f"{step[:1].upper()}{step[1:]}"
     known = {**diagnosis["extended"], **(diagnosis["camera"] or {}).get("extended", {})}
     rest = [f"{plain(name)} {value:.4g}" for name, value in theta.items() if name not in known]
     left = f"; what the log does not show is known from scores alone: {listed(rest)}" if rest else ""
     return f"Run your simulator with {model}, which was fitted to the log{left}."
-
-
-def _log_more(diagnosis: Mapping[str, Any]) -> str:
-    unseen = [plain(name) for name in diagnosis["could_not_be_seen"]]
-    shows = f" that can show {listed(unseen[:MOST_NAMED])}" if unseen else ", longer and more varied"
-    return f"No θ explains the scores, and this log does not tell why: log drives{shows}."
 
 
 def level_text(level: Level | None, unit: str) -> str:
@@ -202,12 +201,8 @@ def floor_text(level: Level | None, unit: str) -> str:
 
 
 def chance_text(level: Level | None) -> str:
-    """What a random ranking would have."""
+    """PRPV of a random ranking, with its deviation."""
     return "–" if level is None or level.chance is None else f"{level.chance[0]:.1f} ± {level.chance[1]:.1f}"
-
-
-def _only(row: Compared) -> str:
-    return f"{row.title}: {level_text(row.before, row.unit)}."
 
 
 def _change(row: Compared) -> str:
@@ -230,7 +225,14 @@ def prpv_figure(rows: Sequence[Compared]) -> Figure:
     figure = Figure(figsize=(COLUMN, 0.62 * COLUMN), layout="constrained")
     panels = figure.subplots(1, len(rows), squeeze=False)[0]
     for axes, row in zip(panels, rows, strict=True):
-        _panel(axes, row)
+        dress(axes)
+        for place, (level, colour) in enumerate(((row.before, VERMILLION), (row.after, BLUE))):
+            if level is not None:
+                _draw_level(axes, place, level, colour)
+        axes.set_xlim(-0.6, 1.6)
+        axes.set_xticks([0, 1], ["before", "after"], fontsize=7)
+        axes.set_ylim(bottom=0.0)
+        axes.set_title("held-out agents" if row.key == "held_out" else "tuned agents", fontsize=8)
     panels[0].set_ylabel("PRPV (lower is better)", fontsize=8)
     floor = rows[0].before.floor_ends
     if floor:
@@ -238,18 +240,7 @@ def prpv_figure(rows: Sequence[Compared]) -> Figure:
     return figure
 
 
-def _panel(axes: Axes, row: Compared) -> None:
-    dress(axes)
-    for place, (level, colour) in enumerate(((row.before, VERMILLION), (row.after, BLUE))):
-        if level is not None:
-            _level(axes, place, level, colour)
-    axes.set_xlim(-0.6, 1.6)
-    axes.set_xticks([0, 1], ["before", "after"], fontsize=7)
-    axes.set_ylim(bottom=0.0)
-    axes.set_title("held-out agents" if row.key == "held_out" else "tuned agents", fontsize=8)
-
-
-def _level(axes: Axes, place: int, level: Level, colour: str) -> None:
+def _draw_level(axes: Axes, place: int, level: Level, colour: str) -> None:
     low, high = level.floor_ends or (0.0, 0.0)
     axes.fill_between([place - HALF, place + HALF], low, high, color=LIGHT_GREY, lw=0)
     if level.floor is not None:

@@ -1,6 +1,8 @@
-"""What the target's log says that the proxy lacks.
+"""From the target's log to the extended study.
 
-The extended study: the same study by a proxy that has what the diagnosis found.
+The log is recorded of a twin or given, and diagnosed as by `diagnose`; what is read of its document is read through
+before anything is made of it. The extended study is the study itself with what it may read beside it, by a proxy that
+has what the diagnosis found.
 """
 
 import json
@@ -32,7 +34,7 @@ FRAMES = 120
 
 
 def wanted_of(loop: Loop) -> Wanted:
-    """What is recorded of a twin: frames too where the study declares anything of the camera."""
+    """The wanted record of a twin: frames too where the study declares anything of the camera."""
     of_camera = camera_effects(Catalogue(loop.settings.folder.resolve()))
     seen = any(name in of_camera for name in declared_names(loop))
     return Wanted(frames=FRAMES if seen else 0, seed=loop.settings.seed)
@@ -108,7 +110,7 @@ def _read_through(document: Mapping[str, Any]) -> None:
 
 
 def adds_something(document: Mapping[str, Any]) -> bool:
-    """Whether a diagnosis found anything to extend the proxy by: named effects, or curves."""
+    """True if a diagnosis found anything to extend the proxy by: named effects, or curves."""
     camera = document["camera"] or {}
     return bool(document["effects"] or camera.get("effects") or document.get("learnt", {}).get("used"))
 
@@ -142,7 +144,10 @@ def extension_text(settings: StudySettings, model: Path, folder: Path) -> str:
     if settings.truth:
         values["truth"] = _from(folder, settings.truth)
     domain = {key: value for key, value in settings.domain.items() if key != "effects"}
-    kept = _kept_effects(settings, model)
+    found = read_settings(model).section("effects").keys()
+    proxy = read_settings(settings.proxy).section("effects").values if settings.proxy else {}
+    own = settings.domain.section("effects").values
+    kept = {name: {**proxy.get(name, {}), **own.get(name, {})} for name in {**proxy, **own} if name not in found}
     values["domain"] = {**domain, "effects": kept} if kept else domain
     return f"# {settings.name} with what `diagnose` found, written by `loop`.\n" + tomlkit.dumps(values)
 
@@ -157,7 +162,10 @@ def write_extension(settings: StudySettings, model: Path, folder: Path) -> None:
     write_text(folder / FILE_NAME, extension_text(settings, model, folder))
     try:
         for path in files_of(settings):
-            _copy(path, folder / path.name)
+            if path.is_dir():
+                shutil.copytree(path, folder / path.name, ignore=_ignored, dirs_exist_ok=True)
+            else:
+                shutil.copy2(path, folder / path.name)
     except (OSError, shutil.Error) as problem:
         raise StoreError(f"{folder}: cannot be written ({problem}); make room and run again") from None
 
@@ -177,26 +185,11 @@ def begin_anew_if_changed(study: Study) -> None:
             store.begin(study_facts(study), study.objective.name)
 
 
-def _copy(source: Path, target: Path) -> None:
-    if source.is_dir():
-        shutil.copytree(source, target, ignore=_ignored, dirs_exist_ok=True)
-    else:
-        shutil.copy2(source, target)
-
-
 def _ignored(folder: str, names: list[str]) -> set[str]:
-    """What is not copied of a folder's entries."""
+    """The entries of a folder that are not copied."""
     made = shutil.ignore_patterns(*LEFT_OUT)(folder, names)
     own = {name for name in names if any(Path(folder, name, one).exists() for one in A_FOLDER_OF_ITS_OWN)}
     return made | own
-
-
-def _kept_effects(settings: StudySettings, model: Path) -> dict[str, Any]:
-    """Effects of the study's proxy and [domain] that the found model does not have."""
-    found = read_settings(model).section("effects").keys()
-    proxy = read_settings(settings.proxy).section("effects").values if settings.proxy else {}
-    own = settings.domain.section("effects").values
-    return {name: {**proxy.get(name, {}), **own.get(name, {})} for name in {**proxy, **own} if name not in found}
 
 
 def _from(folder: Path, path: Path) -> str:

@@ -1,7 +1,7 @@
-"""The righted agent on its way: beside the target in the proxy tuned before, and in the extended one after.
+"""A loop that has come to its end, and the agent that it has righted, on its way beside the target.
 
-A loop that has come to its end.
-The agent whose place among the others was wrong before and is right after.
+Righted is the agent that most wrongly ordered pairs lose. It is driven in the proxy tuned before and in the extended
+one after, from the start in which the first is furthest from the target, and a picture of either is kept.
 """
 
 import json
@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from proxytune.api import StudyReport
-from proxytune.arrays import Floats
 from proxytune.domain import DomainFamily, make_episode
 from proxytune.errors import EpisodeError, StoreError
 from proxytune.loop.opening import Loop
@@ -61,14 +60,10 @@ def righted(closed: Closed) -> dict[str, Any] | None:
 
 
 def wrong_pairs(assessment: Assessment) -> dict[str, float]:
-    """How many pairs with each agent proxy and target order differently; a tie of one side alone counts half."""
+    """Count the pairs with each agent that proxy and target order differently; a tie of one side alone counts half."""
     inputs = assessment.inputs
-    proxy, target = (_dominance(table.means, assessment) for table in (inputs.proxy, inputs.target))
+    proxy, target = (dominance(means, inputs.metrics) for means in inputs.means)
     return dict(zip(inputs.agents, np.abs(proxy - target).sum(axis=1).tolist(), strict=True))
-
-
-def _dominance(means: Floats, assessment: Assessment) -> Floats:
-    return dominance(means, assessment.inputs.metrics)
 
 
 MOST_STARTS = 4
@@ -76,14 +71,14 @@ MOST_STARTS = 4
 
 
 class BothEpisodes(NamedTuple):
-    """The same episode beside the target in both tuned proxies."""
+    """One episode beside the target in both tuned proxies."""
 
     before: SideBySide
     after: SideBySide
 
 
 def pictures_file(home: Path) -> Path:
-    """Where a loop keeps titles and captions of the pictures that lie beside them."""
+    """The file in which a loop keeps titles and captions of the pictures that lie beside them."""
     return home / "righted" / "pictures.json"
 
 
@@ -143,7 +138,7 @@ def drive_both(closed: Closed, agent: str) -> BothEpisodes | None:
 
 
 def mean_gap_m(pair: SideBySide) -> float:
-    """How far proxy and target are apart on average [m]; a robot whose episode has ended stays where it is."""
+    """The mean distance of proxy and target [m]; a robot whose episode has ended stays where it is."""
     sides = [episode.poses for episode in pair.sides.values()]
     times = max((poses["time"] for poses in sides), key=lambda time: float(time[-1]))
     here, there = ([np.interp(times, poses["time"], poses[name]) for name in ("x", "y")] for poses in sides)
@@ -168,23 +163,17 @@ def _starts(closed: Closed) -> range:
 
 
 def _captions(closed: Closed, gain: dict[str, Any], both: BothEpisodes) -> tuple[str, str]:
-    metrics = [metric.name for metric in closed.loop.settings.metrics]
-    before, after = (f"{say_parting(pair)} {_scores(pair, metrics)}" for pair in both)
-    rest = "This is one episode; the order of the agents counts every start, under other seeds."
-    return (
-        f"{_introduction(closed, gain, both.before)} {before}",
-        f"The same start and seed in the extended proxy. {after} {rest}",
-    )
-
-
-def _introduction(closed: Closed, gain: dict[str, Any], pair: SideBySide) -> str:
-    agent, start, starts = gain["agent"], pair.episode.start, _starts(closed)
+    agent, start, starts = gain["agent"], both.before.episode.start, _starts(closed)
     pairs = f"{short(gain['wrong_pairs_before'])} before, {short(gain['wrong_pairs_after'])} after"
     chosen = f", where of starts 0 to {starts[-1]} the two are furthest apart on average" if starts[1:] else ""
-    return (
+    first = (
         f"Wrongly ordered pairs with {agent}: {pairs}. Here it drives in the proxy tuned before and in the target, "
         f"under the same seed from start {start}{chosen}."
     )
+    metrics = [metric.name for metric in closed.loop.settings.metrics]
+    before, after = (f"{say_parting(pair)} {_scores(pair, metrics)}" for pair in both)
+    rest = "This is one episode; the order of the agents counts every start, under other seeds."
+    return f"{first} {before}", f"The same start and seed in the extended proxy. {after} {rest}"
 
 
 def _scores(pair: SideBySide, metrics: list[str]) -> str:

@@ -1,7 +1,7 @@
-"""What a loop is about, checked before anything is driven.
+"""A loop, checked before anything is driven; its held-out agents; and its steps, which are kept.
 
-Agents that no tuning sees: how well each tuned proxy orders them.
-Steps that are kept: one whose output is there, made from the same inputs, is not done again.
+Held-out agents are those that no tuning sees: how well a tuned proxy orders them is what the loop is judged by. A step
+whose output is there, made from inputs of the same digest, is not done again.
 """
 
 import hashlib
@@ -12,10 +12,10 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 from proxytune.api import recordable
-from proxytune.domain import DomainFamily, Episode, Outcome
+from proxytune.domain import DomainFamily, Episode
 from proxytune.driving import AGENTS, LaneFollowing
 from proxytune.errors import InputError, LogError, RunError, SettingsError, StoreError
 from proxytune.extensions import ask
@@ -48,25 +48,13 @@ FEWEST = 3
 """Of fewer agents PRPV says nothing."""
 
 
-class HeldOut(NamedTuple):
-    """What held-out agents say of a proxy.
-
-    Attributes:
-        assessment: How useful it is for them.
-        episodes: How many episodes were driven now.
-    """
-
-    assessment: Assessment
-    episodes: int
-
-
 def held_out_of(settings: StudySettings, family: DomainFamily, *, driven: bool) -> tuple[str, ...]:
     """The agents that study.toml holds out, else shipped ones that it does not use; empty where they are too few.
 
     Args:
         settings: Of the study.
         family: Its family.
-        driven: Whether the target is driven; otherwise only agents that its table has can be held out.
+        driven: True if the target is driven; otherwise only agents that its table has can be held out.
 
     Raises:
         InputError: If one that study.toml names is tuned on, or has no rank: the target's table has no scores of it.
@@ -81,9 +69,10 @@ def held_out_of(settings: StudySettings, family: DomainFamily, *, driven: bool) 
             raise settings.error(KEY, f"the target's table has no scores of '{name}'; measure them, or take it out")
     if named and len(named) < FEWEST:
         raise settings.error(KEY, f"names {len(named)} of at least {FEWEST} agents; add some, or take the key out")
-    candidates = _shipped(settings) if driven else scored
-    others = [name for name in candidates if name not in used and _is_known(family, name)]
-    found = named or tuple(others)
+    if driven:  # A family that names its agents otherwise is asked without its guard.
+        lane_following = isinstance(bare_family(settings, settings.proxy), LaneFollowing)
+        scored = tuple(AGENTS) if lane_following else ()
+    found = named or tuple(name for name in scored if name not in used and _is_known(family, name))
     return found if len(found) >= FEWEST else ()
 
 
@@ -108,11 +97,6 @@ def scored_agents(settings: StudySettings) -> tuple[str, ...]:
     return read_scores(settings.targets, metrics, columns=settings.target_columns).agents
 
 
-def _shipped(settings: StudySettings) -> tuple[str, ...]:
-    """The agents that come with the family; one that names its agents otherwise is asked without its guard."""
-    return tuple(AGENTS) if isinstance(bare_family(settings, settings.proxy), LaneFollowing) else ()
-
-
 def _is_known(family: DomainFamily, name: str) -> bool:
     try:
         family.check_agent(name)
@@ -122,12 +106,12 @@ def _is_known(family: DomainFamily, name: str) -> bool:
 
 
 def held_out_settings(settings: StudySettings, names: tuple[str, ...], target: Path | None = None) -> StudySettings:
-    """The same study with these agents, and the target's scores of them from another file if one is given."""
+    """The study with these agents instead, and the target's scores of them from another file if one is given."""
     known = replace(settings, agents=names)
     return known if target is None else replace(known, target=target, more_targets=(), target_columns={})
 
 
-def drive_held_out(study: Study, settings: StudySettings, theta: Theta, watcher: Watcher) -> HeldOut:
+def drive_held_out(study: Study, settings: StudySettings, theta: Theta, watcher: Watcher) -> tuple[Assessment, int]:
     """Drive held-out agents in the instance of a study's family, twice from each start, and assess it.
 
     Episodes are kept in the study's own database, and those that are there are not driven again. The second time is
@@ -139,6 +123,9 @@ def drive_held_out(study: Study, settings: StudySettings, theta: Theta, watcher:
         theta: The instance.
         watcher: Hears of every episode.
 
+    Returns:
+        The assessment, and the number of episodes that were driven now.
+
     Raises:
         RunError: If an agent has no episode that works.
     """
@@ -148,20 +135,16 @@ def drive_held_out(study: Study, settings: StudySettings, theta: Theta, watcher:
         run = StudyRun(held, store, watcher)
         once, again = (_scores(run, plan_episodes(settings, theta, seed)) for seed in seeds)
     floor = floor_of_repeats(domain=once, again=again, metrics=settings.metrics)
-    return HeldOut(assess(proxy=once, target=held.target, metrics=settings.metrics, floor=floor), run.spent.episodes)
+    return assess(proxy=once, target=held.target, metrics=settings.metrics, floor=floor), run.spent.episodes
 
 
 def _scores(run: StudyRun, planned: list[Episode]) -> ScoreTable:
     outcomes = list(run.outcomes(planned, "held-out agents").values())
-    _check_worked(outcomes)
-    return score_table(outcomes)
-
-
-def _check_worked(outcomes: list[Outcome]) -> None:
     worked = {outcome.episode.agent for outcome in outcomes if outcome.metrics is not None}
     for outcome in outcomes:
         if outcome.episode.agent not in worked:
             raise RunError(f"held out: {failure_of(outcome)}; name other agents under {KEY} in study.toml")
+    return score_table(outcomes)
 
 
 HOME = "loop"
@@ -190,12 +173,12 @@ class Loop:
 
     @property
     def home(self) -> Path:
-        """Where all is kept that the loop makes."""
+        """The folder of all that the loop makes."""
         return self.settings.folder / HOME
 
     @property
     def facts(self) -> Facts:
-        """What a source that is no log's folder does not say: the study's robot and map."""
+        """The study's robot and map, which a source that is no log's folder does not say."""
         road = self.settings.domain.get("map", "small_loop")
         return Facts(self.robot, road=str(self.settings.folder.resolve() / road) if road.endswith(".toml") else road)
 
@@ -289,25 +272,8 @@ class Teller(Protocol):
         ...
 
 
-@dataclass(frozen=True)
-class Step:
-    """A step of a loop.
-
-    Attributes:
-        name: What it is called.
-        inputs: A digest of all that its output depends on.
-        output: The file that is there once it is done.
-        do: Makes the output.
-    """
-
-    name: str
-    inputs: str
-    output: Path
-    do: Callable[[], object]
-
-
 class Kept:
-    """What a loop has done so far, in loop.json: each step's digest of its inputs, written once its output is there."""
+    """The done steps of a loop, in loop.json: each step's digest of its inputs, written once its output is there."""
 
     def __init__(self, folder: Path) -> None:
         """Read what is known.
@@ -322,19 +288,19 @@ class Kept:
         """The digest of the inputs that a step's output was made of; None where it was never done."""
         return self._inputs.get(name)
 
-    def has(self, step: Step) -> bool:
-        """Whether a step is done."""
-        return self._inputs.get(step.name) == step.inputs and step.output.exists()
+    def has(self, name: str, inputs: str, output: Path) -> bool:
+        """True if a step is done: its output is there, and made of inputs of this digest."""
+        return self._inputs.get(name) == inputs and output.exists()
 
-    def run(self, step: Step) -> None:
-        """Do a step.
+    def run(self, name: str, inputs: str, do: Callable[[], object]) -> None:
+        """Do a step, which makes its output of inputs of this digest.
 
         Raises:
             RunError: If loop.json cannot be written.
         """
-        self._write({name: inputs for name, inputs in self._inputs.items() if name != step.name})
-        step.do()
-        self._write({**self._inputs, step.name: step.inputs})
+        self._write({known: digest for known, digest in self._inputs.items() if known != name})
+        do()
+        self._write({**self._inputs, name: inputs})
 
     def _write(self, inputs: dict[str, str]) -> None:
         # Until a step has been done again, what is left of its old output counts as none.
@@ -350,13 +316,11 @@ def digest(*parts: Any) -> str:
 
 def digest_of_files(path: Path) -> str:
     """A digest of a file, or of all files in a folder with their names; its hidden and compiled ones are left out."""
-    files = [path] if path.is_file() else _files_in(path)
+    files = [path]
+    if not path.is_file():
+        found = sorted(one for one in path.rglob("*") if one.is_file())
+        files = [one for one in found if not one.name.startswith(".") and one.parent.name != "__pycache__"]
     return digest([(str(one.relative_to(path)), hashlib.sha256(one.read_bytes()).hexdigest()) for one in files])
-
-
-def _files_in(folder: Path) -> list[Path]:
-    files = sorted(one for one in folder.rglob("*") if one.is_file())
-    return [one for one in files if not one.name.startswith(".") and one.parent.name != "__pycache__"]
 
 
 def _read(path: Path) -> dict[str, str]:

@@ -1,6 +1,7 @@
 """The loop: tune, diagnose, extend, tune again, compare; whatever was done is kept.
 
-A closed loop as one JSON document and one page.
+`run_loop` does every step of STEPS that is not done, and a LoopReport tells the closed loop as a table, as one JSON
+document and as one page.
 """
 
 from collections.abc import Callable, Mapping
@@ -48,7 +49,6 @@ from proxytune.loop.episodes import Closed, pictures_file, read_pictures, righte
 from proxytune.loop.opening import (
     Kept,
     Loop,
-    Step,
     Teller,
     digest,
     digest_of_files,
@@ -92,19 +92,6 @@ STEPS = {
 """The steps in their order, as they are told."""
 
 
-def close_loop(loop: Loop, teller: Teller) -> Closed:
-    """Do every step that is not done.
-
-    Stopped at any moment, it goes on when it is called again: what was finished is kept.
-
-    Raises:
-        ProxytuneError: From any step, as the command that does the same; what was finished is kept.
-    """
-    check_camera(loop)
-    with locked(loop.home):
-        return _Closing(loop, teller, Kept(loop.home)).run()
-
-
 @dataclass
 class _Closing:
     """A loop on its way."""
@@ -137,11 +124,10 @@ class _Closing:
 
     def _keep(self, name: str, inputs: str, output: Path, do: Callable[[], object]) -> None:
         """Do a step unless it is done."""
-        step = Step(name, inputs, output, do)
-        known = self.kept.has(step)
+        known = self.kept.has(name, inputs, output)
         self._begin(name, "kept" if known else "")
         if not known:
-            self.kept.run(step)
+            self.kept.run(name, inputs, do)
             self.done.append(name)
 
     def _measure_target(self) -> None:
@@ -201,11 +187,8 @@ class _Closing:
 
     def _extend(self) -> Study:
         """Write the extended study, and open it."""
-        settings, folder, model = (
-            self.settings,
-            self.loop.home / "extended",
-            self.loop.home / "diagnosed" / "model.toml",
-        )
+        settings, home = self.settings, self.loop.home
+        folder, model = home / "extended", home / "diagnosed" / "model.toml"
         files = [(path.name, digest_of_files(path)) for path in files_of(settings)]
         inputs = digest("extension", extension_text(settings, model, folder), digest_of_files(model), files)
         do = partial(write_extension, settings, model, folder)
@@ -228,10 +211,10 @@ class _Closing:
                 drive_held_out(study, held_out_settings(study.settings, names, target), theta, watcher)
                 for study, theta in studies
             ]
-        episodes = sum(one.episodes for one in driven)
+        episodes = sum(count for _, count in driven)
         self.episodes += episodes
         self.done += [name] if episodes else []
-        return driven[0].assessment, driven[1].assessment
+        return driven[0][0], driven[1][0]
 
     def _show_righted(self, closed: Closed) -> None:
         """Draw the righted agent's episodes, where there is a proxy after."""
@@ -256,7 +239,7 @@ class _Closing:
         return output
 
     def _agents(self, names: tuple[str, ...]) -> list[Any]:
-        """What scores of a domain depend on besides its model."""
+        """All that scores of a domain depend on besides its model."""
         settings, code = self.settings, user_code(held_out_settings(self.settings, names))
         return [names, dict(settings.aliases), settings.starts, settings.seed, dict(settings.domain.values), code]
 
@@ -300,8 +283,29 @@ class LoopReport:
         return pd.DataFrame(found.rows, columns=[column.name or "measure" for column in found.columns])
 
     def document(self) -> dict[str, Any]:
-        """What `loop --json` prints of it, without the files."""
-        return document_of(self.closed)
+        """All that `loop --json` prints but for its files; what differs from run to run is under `this_run`."""
+        closed, rows = self.closed, dict[str, dict[str, Any]]()
+        for row in rows_of(closed):
+            levels = {"before": asdict(row.before), "after": None if row.after is None else asdict(row.after)}
+            rows[row.key] = levels | ({"most": row.most} if row.most else {"unit": row.unit})
+        held_out = {"agents": list(closed.loop.held_out), **rows.pop("held_out", {"before": None, "after": None})}
+        camera = closed.diagnosis["camera"] or {}
+        reports = (("before", closed.before), ("after", closed.after))
+        return {
+            "study": closed.loop.settings.name,
+            "sentence": answer(closed.diagnosis, rows_of(closed)),
+            "next": _following(closed),
+            "steps": list(STEPS) if closed.after else list(STEPS)[:4],
+            "verdict": closed.diagnosis["verdict"],
+            "effects": closed.diagnosis["effects"],
+            "camera": {"verdict": camera["verdict"], "effects": camera["effects"]} if camera else None,
+            "theta": {side: None if report is None else report.theta for side, report in reports},
+            "prpv": {**rows.pop("prpv"), "held_out": held_out},
+            "error": closed.diagnosis.get("error"),
+            "errors": rows,
+            "righted": righted(closed),
+            "this_run": {"steps": list(closed.done), "episodes": closed.episodes},
+        }
 
     def write(self, command: str = "") -> Path:
         """Write the page into the loop's folder; its path.
@@ -311,7 +315,13 @@ class LoopReport:
         """
         page = self.closed.loop.home / "report.html"
         date = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
-        write_page(page, view_of(self.closed), foot_of_loop(self.closed, command, date))
+        settings = tuple(
+            (key, ", ".join(map(str, value)) if isinstance(value, list) else str(value))
+            for key, value in settings_document(self.closed.loop.settings).items()
+            if value not in (None, {}, []) and key != "path"
+        )
+        foot = Foot(command, settings, tuple(versions_of(PACKAGES).items()), date)
+        write_page(page, view_of(self.closed), foot)
         return page
 
 
@@ -335,6 +345,8 @@ def run_loop(
 ) -> LoopReport:
     """Tune, diagnose, extend and tune again; every step that is done is kept.
 
+    Stopped at any moment, it goes on when it is called again.
+
     Args:
         path: The study's folder, or its study.toml.
         log: The target's log, or what `import_log` reads; recorded from the twin where it is not given.
@@ -345,8 +357,10 @@ def run_loop(
         InputError: If the study, the log or the twin cannot be used.
         RunError: If a step fails; all that was finished is kept.
     """
-    given = (Path(one) if one is not None else None for one in (twin, log))
-    return LoopReport(close_loop(open_loop(Path(path), *given), teller or Quiet()))
+    loop = open_loop(Path(path), *(Path(one) if one is not None else None for one in (twin, log)))
+    check_camera(loop)
+    with locked(loop.home):
+        return LoopReport(_Closing(loop, teller or Quiet(), Kept(loop.home)).run())
 
 
 def rows_of(closed: Closed) -> list[Compared]:
@@ -358,31 +372,8 @@ def rows_of(closed: Closed) -> list[Compared]:
         rows.append(compare_prpv("held_out", f"{names} agents that no tuning saw", *closed.held_out))
     errors = compare_errors(closed.diagnosis)
     if closed.after is None:
-        errors = [Compared(row.key, row.title, row.unit, row.before, None) for row in errors]
+        errors = [replace(row, after=None) for row in errors]
     return rows + errors
-
-
-def document_of(closed: Closed) -> dict[str, Any]:
-    """Everything that `loop --json` prints but for its files; what differs from run to run is under `this_run`."""
-    rows = {row.key: _row(row) for row in rows_of(closed)}
-    held_out = {"agents": list(closed.loop.held_out), **rows.pop("held_out", {"before": None, "after": None})}
-    camera = closed.diagnosis["camera"] or {}
-    reports = (("before", closed.before), ("after", closed.after))
-    return {
-        "study": closed.loop.settings.name,
-        "sentence": answer(closed.diagnosis, rows_of(closed)),
-        "next": _following(closed),
-        "steps": list(STEPS) if closed.after else list(STEPS)[:4],
-        "verdict": closed.diagnosis["verdict"],
-        "effects": closed.diagnosis["effects"],
-        "camera": {"verdict": camera["verdict"], "effects": camera["effects"]} if camera else None,
-        "theta": {side: None if report is None else report.theta for side, report in reports},
-        "prpv": {**rows.pop("prpv"), "held_out": held_out},
-        "error": closed.diagnosis.get("error"),
-        "errors": rows,
-        "righted": righted(closed),
-        "this_run": {"steps": list(closed.done), "episodes": closed.episodes},
-    }
 
 
 def text_of(closed: Closed, page: Path) -> Group:
@@ -403,31 +394,24 @@ def view_of(closed: Closed) -> View:
     rows = rows_of(closed)
     prpv = [row for row in rows if row.key in ("prpv", "held_out")]
     caption = "PRPV of the best θ on fresh episodes with 95 % intervals; grey: what a perfect proxy scores."
-    shown = []
+    home, shown = closed.loop.home, []
     if closed.after:
         first = Picture("PRPV before and after", png_of(prpv_figure(prpv)), caption)
-        shown = [first, *read_pictures(closed.loop.home)]
+        shown = [first, *read_pictures(home)]
+    for name, (title, text) in PICTURES.items():
+        if (home / "diagnosed" / f"{name}.png").is_file():
+            shown.append(Picture(title, (home / "diagnosed" / f"{name}.png").read_bytes(), text))
+    said = (
+        f"Found: {lacking(closed.diagnosis) or 'nothing that has a name'}; verdict: {closed.diagnosis['verdict']}.",
+        f"Before: {closed.before.sentence}",
+        *((f"After: {closed.after.sentence}",) if closed.after else ()),
+    )
     return View(
         title=f"{closed.loop.settings.name}: the loop closed",
         sentence=answer(closed.diagnosis, rows),
         next_step=_following(closed),
-        parts=(_table(closed, rows), *shown, *_found(closed), _steps(closed)),
+        parts=(_table(closed, rows), *shown, Paragraphs("What each step said", said)),
     )
-
-
-def foot_of_loop(closed: Closed, command: str, date: str) -> Foot:
-    """The foot of a loop's page.
-
-    Args:
-        closed: The loop.
-        command: The command that makes the page, as typed in a shell.
-        date: When it was written.
-    """
-    values = {
-        key: value for key, value in settings_document(closed.loop.settings).items() if value not in (None, {}, [])
-    }
-    settings = tuple((key, _text(value)) for key, value in values.items() if key != "path")
-    return Foot(command, settings, tuple(versions_of(PACKAGES).items()), date)
 
 
 def _table(closed: Closed, rows: list[Compared]) -> Table:
@@ -442,46 +426,15 @@ def _table(closed: Closed, rows: list[Compared]) -> Table:
         )
         for row in rows
     )
-    return Table("Before and after", COLUMNS, cells, tuple(_notes(closed)))
-
-
-def _notes(closed: Closed) -> list[str]:
-    """What the table does not hold."""
     counted = "PRPV (proxy relative predictivity value) counts wrongly ordered pairs of agents at the best θ"
     notes = [f"{counted}; in brackets 95 % intervals"]
     if closed.after and not closed.held_out:
         notes.append(
             "no agent was held out: name at least three under held_out in study.toml that the target has scores of"
         )
-    return notes
-
-
-def _steps(closed: Closed) -> Paragraphs:
-    found = lacking(closed.diagnosis) or "nothing that has a name"
-    paragraphs = (
-        f"Found: {found}; verdict: {closed.diagnosis['verdict']}.",
-        f"Before: {closed.before.sentence}",
-        *((f"After: {closed.after.sentence}",) if closed.after else ()),
-    )
-    return Paragraphs("What each step said", paragraphs)
-
-
-def _found(closed: Closed) -> list[Picture]:
-    """The figures that `diagnose` wrote."""
-    home = closed.loop.home / "diagnosed"
-    there = {name: home / f"{name}.png" for name in PICTURES if (home / f"{name}.png").is_file()}
-    return [Picture(PICTURES[name][0], path.read_bytes(), PICTURES[name][1]) for name, path in there.items()]
+    return Table("Before and after", COLUMNS, cells, tuple(notes))
 
 
 def _following(closed: Closed) -> str:
     last, model = closed.after or closed.before, closed.loop.home / "diagnosed" / "model.toml"
     return following(closed.diagnosis, last.sentence, str(model) if closed.after else "", last.theta)
-
-
-def _row(row: Compared) -> dict[str, Any]:
-    levels = {"before": asdict(row.before), "after": None if row.after is None else asdict(row.after)}
-    return levels | ({"most": row.most} if row.most else {"unit": row.unit})
-
-
-def _text(value: Any) -> str:
-    return ", ".join(map(str, value)) if isinstance(value, list) else str(value)

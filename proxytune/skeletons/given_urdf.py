@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from proxytune.driving import AXLES, Body, add_little_mass, origin_of, parse_urdf, read_body, sound_urdf
 from proxytune.errors import InputError
-from proxytune.skeletons.writing import Known, Skeleton, check_figures, completed, robot_text, then
+from proxytune.skeletons.writing import Skeleton, check_figures, completed, robot_text, then
 
 WHEELS = ("wheel_radius", "wheel_distance")
 """Of these robot.toml and URDF must say the same: the bullet plant drives by both."""
@@ -35,7 +35,7 @@ def robot_from_urdf(name: str, path: Path, figures: Mapping[str, float]) -> Skel
         radius = _radius(body, figures, path)
         notes = tuple(_conform(root, body, radius))
     read = {name: value for name, value in _figures(body, radius).items() if name in WHEELS or name not in figures}
-    known = (Known(read, f"read from {path.name}"), Known(figures, "given to `new robot`"))
+    known = {f"read from {path.name}": read, "given to `new robot`": figures}
     values = completed({**figures, **read})
     ET.indent(root)
     urdf = ET.tostring(root, encoding="unicode") + "\n"
@@ -71,18 +71,7 @@ def _origin(body: Body, radius: float) -> NDArray[np.float64]:
 
 
 def _conform(root: ET.Element, body: Body, radius: float) -> Iterator[str]:
-    """Make the URDF what the bullet plant drives; says what was changed."""
-    yield from _name_axles(root, body)
-    shift = _origin(body, radius)
-    if np.abs(shift).max() > 1e-9:
-        _move(root, shift)
-        yield f"the origin is now the middle of the axle, on the floor: moved by {_text(shift)} m"
-    yield from _complete_links(root)
-    yield "if an episode ends at once, the root link touches the floor: make its casters links of their own"
-
-
-def _name_axles(root: ET.Element, body: Body) -> Iterator[str]:
-    """Call the axles as the plant does, and let them point to the left."""
+    """Make the URDF what the bullet plant drives, its axles named and pointing to the left; says what was changed."""
     for wheel, name in zip((body.left, body.right), AXLES, strict=True):
         joint = next(one for one in root.iter("joint") if one.get("name") == wheel.joint)
         joint.set("name", name)
@@ -91,28 +80,29 @@ def _name_axles(root: ET.Element, body: Body) -> Iterator[str]:
             axis.set("xyz", _text(-float(value) for value in axis.get("xyz", "1 0 0").split()))
         if wheel.joint != name:
             yield f"joint {wheel.joint} is now called {name}"
+    shift = _origin(body, radius)
+    if np.abs(shift).max() > 1e-9:
+        _move(root, shift)
+        yield f"the origin is now the middle of the axle, on the floor: moved by {_text(shift)} m"
+    yield from _complete_links(root)
+    yield "if an episode ends at once, the root link touches the floor: make its casters links of their own"
 
 
 def _complete_links(root: ET.Element) -> Iterator[str]:
-    """Take out what nothing draws, and give every link a mass."""
-    left_out = [_drop_meshes(link) for link in root.iter("link")]
-    if any(left_out):
-        yield f"{sum(left_out)} meshes of its looks are left out: nothing draws them"
-    without = [link for link in root.iter("link") if link.find("inertial") is None]
+    """Take out looks that are meshes, which nothing draws, and give every link a mass."""
+    links = list(root.iter("link"))
+    meshes = [(link, one) for link in links for one in link.findall("visual") if one.find("geometry/mesh") is not None]
+    for link, mesh in meshes:
+        link.remove(mesh)
+    if meshes:
+        yield f"{len(meshes)} meshes of its looks are left out: nothing draws them"
+    without = [link for link in links if link.find("inertial") is None]
     for link in without:
         add_little_mass(link)
     if without:
         yield f"links without mass have 1 g now: {', '.join(link.get('name', '') for link in without)}"
     if root.find("link/collision/geometry/mesh") is not None:
         yield "EDIT: write boxes, cylinders or spheres for the meshes under <collision>: they are not found here"
-
-
-def _drop_meshes(link: ET.Element) -> int:
-    """Take out what a link looks like where that is a mesh; says how many there were."""
-    meshes = [visual for visual in link.findall("visual") if visual.find("geometry/mesh") is not None]
-    for visual in meshes:
-        link.remove(visual)
-    return len(meshes)
 
 
 def _drop_empty_roots(root: ET.Element, path: Path) -> None:

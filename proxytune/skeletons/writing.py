@@ -1,8 +1,7 @@
-"""A skeleton: the files of something to start from, and what to do with them.
+"""Skeletons: the files of a study, a domain family or a robot to start from, and the commands to type then.
 
-A study of a robot to start from, with a target to try it.
-A domain family to start from: a tiny simulator with all that a study asks of one.
-A robot to start from: two wheels, a caster and a camera, for both plants.
+A study has a target to try it; a family is a tiny simulator with all that a study asks of one; a robot has two wheels,
+a caster and a camera, for both plants, and what is not known of it is guessed and marked EDIT.
 """
 
 import math
@@ -20,7 +19,7 @@ from proxytune.settings import nearest
 
 @dataclass(frozen=True)
 class Skeleton:
-    """What `new` writes.
+    """The files that `new` writes.
 
     Attributes:
         files: Texts by file name.
@@ -66,13 +65,12 @@ def study_skeleton(name: str, robot: Robot) -> Skeleton:
         "study.toml.txt", name=name, robot=robot.name, plant=plant, pitch_low=f"{low:g}", pitch_high=f"{high:g}"
     )
     return Skeleton(
-        {"study.toml": study, "truth.toml": fill("truth.toml.txt", robot=robot.name, pitch=f"{off:g}")},
-        commands(name),
+        {"study.toml": study, "truth.toml": fill("truth.toml.txt", robot=robot.name, pitch=f"{off:g}")}, commands(name)
     )
 
 
 def commands(name: str) -> tuple[str, str]:
-    """What makes the target of a study, and what runs it."""
+    """The commands that make the target of a study and run it."""
     return (
         f"python -m proxytune measure {name} --model {name}/truth.toml --output {name}/target.csv",
         f"python -m proxytune study {name}",
@@ -145,19 +143,6 @@ LEAST_S = 0.05
 """A motor is taken to be no faster than that where its torque is guessed [s]."""
 
 
-@dataclass(frozen=True)
-class Known:
-    """What is known of a robot's figures.
-
-    Attributes:
-        figures: Values by name, in the units of a robot.toml.
-        source: Where they come from.
-    """
-
-    figures: Mapping[str, float]
-    source: str
-
-
 def robot_skeleton(name: str, figures: Mapping[str, float]) -> Skeleton:
     """A robot.toml and a URDF of its own, which agree with each other.
 
@@ -172,7 +157,7 @@ def robot_skeleton(name: str, figures: Mapping[str, float]) -> Skeleton:
     values = completed(figures)
     return Skeleton(
         {
-            "robot.toml": robot_text(name, values, (Known(figures, "given to `new robot`"),)),
+            "robot.toml": robot_text(name, values, {"given to `new robot`": figures}),
             f"{name}.urdf": fill("body.urdf.txt", name=name, **_dimensions(values)),
         },
         then(name),
@@ -181,7 +166,7 @@ def robot_skeleton(name: str, figures: Mapping[str, float]) -> Skeleton:
 
 
 def then(name: str) -> tuple[str, ...]:
-    """What to type once a robot is there."""
+    """The commands to type once a robot is there."""
     return ("python -m proxytune list robots", f"python -m proxytune new study {name}_study --robot {name}")
 
 
@@ -213,27 +198,27 @@ def completed(figures: Mapping[str, float]) -> dict[str, float]:
     return values
 
 
-def robot_text(name: str, values: Mapping[str, float], known: tuple[Known, ...]) -> str:
-    """A robot.toml: the six figures first; what is not known is marked EDIT."""
-    rows = [_row(figure, values[figure], known) for figure in (*SIX, *(f for f in values if f not in SIX))]
-    return fill("robot.toml.txt", name=name, figures="\n".join(rows), **_effects(values))
+def robot_text(name: str, values: Mapping[str, float], known: Mapping[str, Mapping[str, float]]) -> str:
+    """A robot.toml: the six figures first; what is not known is marked EDIT.
 
-
-def _row(figure: str, value: float, known: tuple[Known, ...]) -> str:
-    cell = f'value = {value:.6g}, unit = "{UNITS[figure]}"'
-    for one in known:
-        if figure in one.figures:
-            return f'{figure} = {{ {cell}, source = "{one.source}" }}'
-    how = GUESSES[figure][1] if figure in GUESSES else "measure it"
-    return f'{figure} = {{ {cell}, source = "a guess" }}  # EDIT: {how}'
-
-
-def _effects(values: Mapping[str, float]) -> dict[str, str]:
-    return {key: f"{values[key]:.6g}" for key in ("motor_time_constant", "camera_pitch")}
+    Args:
+        name: Of the robot.
+        values: Every figure, in the units of a robot.toml.
+        known: Source to the figures that come from it; the first source that has a figure is named.
+    """
+    rows = []
+    for figure in (*SIX, *(one for one in values if one not in SIX)):
+        cell = f'value = {values[figure]:.6g}, unit = "{UNITS[figure]}"'
+        source = next((source for source, figures in known.items() if figure in figures), "")
+        how = GUESSES[figure][1] if figure in GUESSES else "measure it"
+        edit = "" if source else f"  # EDIT: {how}"
+        rows.append(f'{figure} = {{ {cell}, source = "{source or "a guess"}" }}{edit}')
+    effects = {key: f"{values[key]:.6g}" for key in ("motor_time_constant", "camera_pitch")}
+    return fill("robot.toml.txt", name=name, figures="\n".join(rows), **effects)
 
 
 def _dimensions(values: Mapping[str, float]) -> dict[str, str]:
-    """What the template of a body asks for: a box between the wheels, its weight behind the axle, on the caster."""
+    """The values of the template of a body: a box between the wheels, its weight behind the axle, on the caster."""
     radius, distance, mass = values["wheel_radius"], values["wheel_distance"], values["mass"]
     length, width, height = 1.2 * distance, 0.7 * distance, 1.2 * radius
     chassis, wheel, caster = 0.88 * mass, 0.05 * mass, 0.35 * radius

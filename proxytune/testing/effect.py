@@ -1,7 +1,7 @@
-"""What every effect promises.
+"""The promises of every effect: `check_effect` filters signals that an effect could meet, and compares the answers.
 
-Signals that an effect could meet, and an effect's answer to them.
-How a broken promise is told: in one line.
+A broken promise is one line (`claim`). An effect vanishes at its neutral values, matters all along its range, is a
+causal filter whose memory a signal may be cut at, and draws from its seed alone.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -26,29 +26,13 @@ PICTURE = {"camera_columns": 4.0, "camera_rows": 3.0}
 """The size of the pictures that image effects are tried on: no two sides alike, so that none is taken for the other."""
 
 
-def signal_at(stage: Stage, robot: Robot, seed: int, length: int = 90) -> Signal:
-    """Held commands or motion, camera figures, or changing pictures, shape (length, channels)."""
-    random = np.random.default_rng(seed)
-    if stage is Stage.CAMERA:
-        return np.repeat(robot.camera_figures().channels()[None], length, axis=0)
-    if stage is Stage.IMAGE:
-        channels = 3 * int(PICTURE["camera_columns"] * PICTURE["camera_rows"])
-        return random.uniform(0.0, 255.0, (length, channels)).astype(np.float32)
-    return np.repeat(random.uniform(-1.0, 1.0, (length // HELD, len(CHANNELS[stage]))), HELD, axis=0)
-
-
-def everywhere() -> Signal:
-    """Places [m] along both axes that reach beyond every patch, nearest first, to and fro, shape (places, 2)."""
-    way = np.repeat(np.linspace(0.0, 21.0, 225), 2) * np.tile((1.0, -1.0), 225)
-    along = np.stack((way, np.zeros_like(way)), axis=-1)
-    return np.stack((along, along[:, ::-1]), axis=1).reshape(-1, 2)
-
-
-PLACES = everywhere()
+WAY = np.repeat(np.linspace(0.0, 21.0, 225), 2) * np.tile((1.0, -1.0), 225)
+PLACES = np.stack([axis for way in WAY for axis in ((way, 0.0), (0.0, way))])
+"""Places [m] along both axes that reach beyond every patch, nearest first, to and fro, shape (places, 2)."""
 
 
 @dataclass(frozen=True)
-class Candidate:
+class Subject:
     """An effect class that is put to the test.
 
     Attributes:
@@ -78,20 +62,27 @@ class Candidate:
     def moved(self, parameter: Parameter, value: float) -> Effect:
         """The effect with one value moved; what only shapes an effect is moved in one that is there."""
         first = self.parameters[0]
-        return self.at({**({first.name: _usual(first)} if parameter.shape else {}), parameter.name: value})
+        usual = first.probes[len(first.probes) // 2] if first.probes else 0.5 * (first.low + first.high)
+        return self.at({**({first.name: usual} if parameter.shape else {}), parameter.name: value})
 
     def signal(self, seed: int, length: int = 90) -> Signal:
-        """A signal of its stage."""
-        return signal_at(self.kind.stage, self.robot, seed, length)
+        """Held commands or motion, camera figures, or changing pictures, shape (length, channels)."""
+        random, stage = np.random.default_rng(seed), self.kind.stage
+        if stage is Stage.CAMERA:
+            return np.repeat(self.robot.camera_figures().channels()[None], length, axis=0)
+        if stage is Stage.IMAGE:
+            channels = 3 * int(PICTURE["camera_columns"] * PICTURE["camera_rows"])
+            return random.uniform(0.0, 255.0, (length, channels)).astype(np.float32)
+        return np.repeat(random.uniform(-1.0, 1.0, (length // HELD, len(CHANNELS[stage]))), HELD, axis=0)
 
     def context(self, rest: Signal, seed: int = 7) -> FilterContext:
-        """What its filter is told; an effect of a place is shown one everywhere."""
+        """The context of its filter; an effect of a place is shown one everywhere."""
         context = FilterContext(RATE_HZ, rest, {**self.robot.figures, **PICTURE}, seed=seed)
         placed = self.kind.trace is not None and self.kind.trace.placed
         return replace(context, places=PLACES, headings=np.zeros(len(PLACES))) if placed else context
 
     def rest(self, signal: Signal) -> Signal:
-        """What was there before a signal: pictures stand still, commands and motion rest."""
+        """The signal before a signal: pictures stand still, commands and motion rest."""
         seen = self.kind.stage in (Stage.IMAGE, Stage.CAMERA)
         return np.asarray(signal[0] if seen else np.zeros((*signal.shape[:-2], signal.shape[-1])))
 
@@ -104,12 +95,6 @@ class Candidate:
                 filtered, memory = effect.apply(chunk, memory)
                 chunks.append(filtered)
         return np.concatenate(chunks, axis=-2)
-
-
-def _usual(parameter: Parameter) -> float:
-    """A value at which an effect is there."""
-    probes = parameter.probes
-    return probes[len(probes) // 2] if probes else 0.5 * (parameter.low + parameter.high)
 
 
 Answer = TypeVar("Answer")
@@ -136,7 +121,7 @@ def claim_members(thing: Any, what: str, members: Iterable[str]) -> None:
 
 
 def ask(what: str, question: Callable[[], Answer]) -> Answer:
-    """What an extension answers.
+    """Ask an extension.
 
     Raises:
         ConformanceError: If it raises instead.
@@ -174,103 +159,101 @@ def check_effect(effect: type[Effect], *, robot: Robot | None = None, least: flo
     claim_members(effect, f"effect '{name}'", MEMBERS)
     for problem in problems(effect):
         claim(False, f"effect '{name}' {problem}")
-    candidate = Candidate(effect, robot or read_robot(ROBOT), name)
-    ask(f"effect '{name}'", lambda: _check(candidate, least))
+    subject = Subject(effect, robot or read_robot(ROBOT), name)
+    ask(f"effect '{name}'", lambda: _check(subject, least))
 
 
-def _check(candidate: Candidate, least: float) -> None:
-    _claim_vanishes(candidate)
-    for parameter in candidate.parameters:
-        _claim_moves(candidate, parameter, least)
+def _check(subject: Subject, least: float) -> None:
+    _claim_vanishes(subject)
+    for parameter in subject.parameters:
+        _claim_moves(subject, parameter, least)
         for value in dict.fromkeys((*parameter.probes, parameter.low, parameter.high)):
-            effect = candidate.moved(parameter, value)
-            what = f"effect '{candidate.name}' at {parameter.name} {value:g}"
-            _claim_filter(candidate, effect, what)
-            _claim_chunks(candidate, effect, what)
-    if candidate.kind.trace is not None:
-        _claim_seed(candidate, bool(candidate.kind.trace.draws))
-        _claim_no_drift(candidate)
+            effect = subject.moved(parameter, value)
+            what = f"effect '{subject.name}' at {parameter.name} {value:g}"
+            _claim_filter(subject, effect, what)
+            _claim_chunks(subject, effect, what)
+    if subject.kind.trace is not None:
+        _claim_seed(subject, bool(subject.kind.trace.draws))
+        _claim_no_drift(subject)
 
 
-def _claim_vanishes(candidate: Candidate) -> None:
+def _claim_vanishes(subject: Subject) -> None:
     """At its neutral values it changes nothing, or is what the robot has in any case."""
-    signal, still = candidate.signal(1), candidate.at({})
-    filtered = candidate.filtered(still, signal)
-    told = ", ".join(f"{name} {value:g}" for name, value in candidate.neutral.items())
-    own = _of_the_robot(candidate)
+    signal, still = subject.signal(1), subject.at({})
+    filtered = subject.filtered(still, signal)
+    told = ", ".join(f"{name} {value:g}" for name, value in subject.neutral.items())
+    own = _of_the_robot(subject)
     if own is not None:
-        same = np.array_equal(filtered, candidate.filtered(own, signal))
-        claim(same, f"effect '{candidate.name}' at its neutral {told} is not the robot's own; it must be")
+        same = np.array_equal(filtered, subject.filtered(own, signal))
+        claim(same, f"effect '{subject.name}' at its neutral {told} is not the robot's own; it must be")
     else:
         same = np.array_equal(filtered, signal)
-        claim(same, f"effect '{candidate.name}' changes the signal at its neutral {told}; it must vanish there")
+        claim(same, f"effect '{subject.name}' changes the signal at its neutral {told}; it must vanish there")
 
 
-def _of_the_robot(candidate: Candidate) -> Effect | None:
+def _of_the_robot(subject: Subject) -> Effect | None:
     """The robot's own effect of this kind, where the neutral value is a nominal figure that it follows in any case."""
-    single = len(candidate.parameters) == 1
-    theta = candidate.robot.theta
-    names = {p.name: candidate.name if single else f"{candidate.name}.{p.name}" for p in candidate.parameters}
+    single = len(subject.parameters) == 1
+    theta = subject.robot.theta
+    names = {p.name: subject.name if single else f"{subject.name}.{p.name}" for p in subject.parameters}
     own = {parameter: theta[name] for parameter, name in names.items() if name in theta}
-    nominal = any(isinstance(parameter.neutral, str) for parameter in candidate.parameters)
-    return candidate.at(own) if own and nominal and candidate.kind.stage is not Stage.CAMERA else None
+    nominal = any(isinstance(parameter.neutral, str) for parameter in subject.parameters)
+    return subject.at(own) if own and nominal and subject.kind.stage is not Stage.CAMERA else None
 
 
-def _claim_moves(candidate: Candidate, parameter: Parameter, least: float) -> None:
+def _claim_moves(subject: Subject, parameter: Parameter, least: float) -> None:
     """Each step over its range changes the signal, and so does each probe."""
-    signal = candidate.signal(6, 2700)
+    signal = subject.signal(6, 2700)
     steps = np.linspace(parameter.low, parameter.high, STEPS)
-    filtered = [candidate.filtered(candidate.moved(parameter, float(value)), signal) for value in steps]
+    filtered = [subject.filtered(subject.moved(parameter, float(value)), signal) for value in steps]
     for (low, earlier), (high, later) in pairwise(zip(steps, filtered, strict=True)):
         line = f"is the same at {parameter.name} {low:g} and {high:g}; a parameter must matter all along its range"
-        claim(_apart(earlier, later) > least, f"effect '{candidate.name}' {line}")
-    signal, neutral = candidate.signal(2, 900), candidate.neutral[parameter.name]
-    still = candidate.filtered(candidate.moved(parameter, neutral), signal)
+        claim(_apart(earlier, later) > least, f"effect '{subject.name}' {line}")
+    signal, neutral = subject.signal(2, 900), subject.neutral[parameter.name]
+    still = subject.filtered(subject.moved(parameter, neutral), signal)
     for probe in parameter.probes:
-        moved = _apart(candidate.filtered(candidate.moved(parameter, probe), signal), still)
+        moved = _apart(subject.filtered(subject.moved(parameter, probe), signal), still)
         holds = moved == 0.0 if probe == neutral else moved > least
         line = f"does nothing at its probe {parameter.name} {probe:g}; a search must be able to see it there"
-        claim(holds, f"effect '{candidate.name}' {line}")
+        claim(holds, f"effect '{subject.name}' {line}")
 
 
-def _claim_filter(candidate: Candidate, effect: Effect, what: str) -> None:
+def _claim_filter(subject: Subject, effect: Effect, what: str) -> None:
     """It keeps shapes, is finite, repeats itself and looks at the past alone."""
-    signal = candidate.signal(3)
-    filtered = candidate.filtered(effect, signal)
+    signal = subject.signal(3)
+    filtered = subject.filtered(effect, signal)
     claim(filtered.shape == signal.shape, f"{what} makes a signal {filtered.shape} of {signal.shape}; keep the shape")
     claim(np.isfinite(filtered).all(), f"{what} is not finite; it must be, up to both ends of its range")
-    again = candidate.filtered(effect, signal)
+    again = subject.filtered(effect, signal)
     claim(np.array_equal(filtered, again), f"{what} gives two results for one seed; draw from context.seed alone")
     other = np.concatenate((signal[:45], signal[45:] * 0.5 + 0.1))
-    causal = np.array_equal(filtered[:45], candidate.filtered(effect, other.astype(signal.dtype))[:45])
+    causal = np.array_equal(filtered[:45], subject.filtered(effect, other.astype(signal.dtype))[:45])
     claim(causal, f"{what} depends on samples that come later; a filter knows the past alone")
 
 
-def _claim_chunks(candidate: Candidate, effect: Effect, what: str) -> None:
+def _claim_chunks(subject: Subject, effect: Effect, what: str) -> None:
     """Neither cutting nor batching changes the result, and nothing is changed in place."""
     random = np.random.default_rng(0)
+    tolerance = 2e-4 if subject.kind.stage is Stage.IMAGE else 1e-12  # Pictures are of single precision.
     for seed in range(CUTTINGS):
-        signal, cuts = candidate.signal(seed), random.integers(1, 90, seed % 7)
-        apart = _apart(candidate.filtered(effect, signal, cuts), candidate.filtered(effect, signal))
+        signal, cuts = subject.signal(seed), random.integers(1, 90, seed % 7)
+        apart = _apart(subject.filtered(effect, signal, cuts), subject.filtered(effect, signal))
         where = ", ".join(map(str, sorted(cuts)))
-        claim(
-            apart <= _tolerance(candidate),
-            f"{what} changes by {apart:.2g} if the signal is cut at {where}; keep memory",
-        )
-    _claim_nothing_in_place(candidate, effect, what)
-    if candidate.kind.stage not in (Stage.CAMERA, Stage.IMAGE):
-        batch = np.stack([candidate.signal(seed) for seed in range(6)]).reshape(2, 3, 90, -1)
-        alone = np.array([[candidate.filtered(effect, one) for one in row] for row in batch])
-        together = candidate.filtered(effect, batch, (50,))
+        claim(apart <= tolerance, f"{what} changes by {apart:.2g} if the signal is cut at {where}; keep memory")
+    _claim_nothing_in_place(subject, effect, what)
+    if subject.kind.stage not in (Stage.CAMERA, Stage.IMAGE):
+        batch = np.stack([subject.signal(seed) for seed in range(6)]).reshape(2, 3, 90, -1)
+        alone = np.array([[subject.filtered(effect, one) for one in row] for row in batch])
+        together = subject.filtered(effect, batch, (50,))
         claim(
             _apart(together, alone) <= 1e-12,
             f"{what} filters a batch unlike its members; use leading axes (…, time, 2)",
         )
 
 
-def _claim_nothing_in_place(candidate: Candidate, effect: Effect, what: str) -> None:
-    signal = candidate.signal(4)
-    kept, memory = signal.copy(), effect.begin(candidate.context(candidate.rest(signal)))
+def _claim_nothing_in_place(subject: Subject, effect: Effect, what: str) -> None:
+    signal = subject.signal(4)
+    kept, memory = signal.copy(), effect.begin(subject.context(subject.rest(signal)))
     first, middle = effect.apply(signal, memory)
     first = first.copy()
     second = effect.apply(signal, middle)[0].copy()
@@ -280,30 +263,25 @@ def _claim_nothing_in_place(candidate: Candidate, effect: Effect, what: str) -> 
     claim(np.array_equal(signal, kept), f"{what} changes the signal in place; make a new one")
 
 
-def _claim_seed(candidate: Candidate, draws: bool) -> None:
+def _claim_seed(subject: Subject, draws: bool) -> None:
     """An effect that a diagnosis may fit depends on the seed only if its trace says that it draws."""
-    effect, signal = _strongest(candidate), candidate.signal(4)
-    differ = _apart(candidate.filtered(effect, signal, seed=7), candidate.filtered(effect, signal, seed=8)) > 0.0
+    effect, signal = _strongest(subject), subject.signal(4)
+    differ = _apart(subject.filtered(effect, signal, seed=7), subject.filtered(effect, signal, seed=8)) > 0.0
     line = "depends on the seed" if differ else "does not depend on the seed"
-    claim(differ == draws, f"effect '{candidate.name}' {line}, and its trace says otherwise; correct one of them")
+    claim(differ == draws, f"effect '{subject.name}' {line}, and its trace says otherwise; correct one of them")
 
 
-def _claim_no_drift(candidate: Candidate) -> None:
+def _claim_no_drift(subject: Subject) -> None:
     """A long signal told a control step at a time is filtered as a whole one."""
-    effect, signal = _strongest(candidate), candidate.signal(5, 1800)
-    apart = _apart(candidate.filtered(effect, signal, range(3, 1800, 3)), candidate.filtered(effect, signal))
+    effect, signal = _strongest(subject), subject.signal(5, 1800)
+    apart = _apart(subject.filtered(effect, signal, range(3, 1800, 3)), subject.filtered(effect, signal))
     line = f"changes by {apart:.2g} if it is told a control step at a time; a memory must not drift"
-    claim(apart <= DRIFT, f"effect '{candidate.name}' {line}")
+    claim(apart <= DRIFT, f"effect '{subject.name}' {line}")
 
 
-def _strongest(candidate: Candidate) -> Effect:
-    first = candidate.parameters[0]
-    return candidate.moved(first, first.probes[-1])
-
-
-def _tolerance(candidate: Candidate) -> float:
-    """Pictures are of single precision."""
-    return 2e-4 if candidate.kind.stage is Stage.IMAGE else 1e-12
+def _strongest(subject: Subject) -> Effect:
+    first = subject.parameters[0]
+    return subject.moved(first, first.probes[-1])
 
 
 def _apart(one: Signal, other: Signal) -> float:

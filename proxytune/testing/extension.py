@@ -1,8 +1,6 @@
-"""What every agent of lane following promises.
+"""The promises of every agent of lane following, search engine, domain family and measure of usefulness.
 
-What every search engine promises.
-What every domain family promises.
-What every measure of usefulness promises.
+Each `check_…` puts the thing to tasks of its own, and refuses it in one line with the first promise that is broken.
 """
 
 import copy
@@ -56,24 +54,21 @@ def check_agent(agent: Agent | type[Agent], *, robot: Robot | None = None) -> No
     what = f"agent {getattr(agent, '__name__', type(agent).__name__)}"
     made: Any = ask(what, agent) if inspect.isclass(agent) else agent
     claim_members(made, what, NEEDS)
-    _check_agent(made, what, robot or read_robot(ROBOT))
-
-
-def _check_agent(agent: Agent, what: str, robot: Robot) -> None:
+    robot = robot or read_robot(ROBOT)
     seen = _pictures(robot)
-    alone = _driven(agent, what, robot, seen)
+    alone = _driven(made, what, robot, seen)
     for tick, command in enumerate(alone):
         told = f"{what} answers picture {tick} with {command.tolist()}"
         claim(command.shape == (2,), f"{told}; a command is two duties, left and right")
         claim(np.isfinite(command).all() and np.abs(command).max() <= 1.0, f"{told}; duties lie within [-1, 1]")
-    again = _driven(agent, what, robot, seen)
+    again = _driven(made, what, robot, seen)
     claim(np.array_equal(alone, again), f"{what} drives otherwise the second time; keep all it learns in its memory")
-    _claim_apart(agent, what, robot, seen, alone)
-    _claim_nothing_in_place(agent, what, robot, seen)
+    _claim_apart(made, what, robot, seen, alone)
+    _claim_nothing_in_place(made, what, robot, seen)
 
 
 def _pictures(robot: Robot) -> list[Picture]:
-    """What the robot sees along a map, from askew too; then night, snow and noise."""
+    """The pictures that the robot sees along a map, from askew too; then night, snow and noise."""
     road = shipped_map(MAP)
     camera = GroundPlaneCamera(robot.camera_figures(), draw_floor(road))
     poses = np.array([(x, y, np.radians(heading) + turned) for x, y, heading in road.starts for turned in (0.0, 0.8)])
@@ -136,19 +131,7 @@ def _stepped(box: Space, values: Values) -> float | None:
     return float(np.floor(12.0 * np.abs(to_unit(box, values) - 1.0 / 3.0).sum()))
 
 
-def _at_a_corner(box: Space, values: Values) -> float | None:
-    return -float(to_unit(box, values).sum())
-
-
-def _half_failed(box: Space, values: Values) -> float | None:
-    return None if to_unit(box, values)[0] > 0.5 else _stepped(box, values)
-
-
-def _score_itself(outcomes: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray(outcomes[..., 0])
-
-
-GOAL = Goal((("agent", "score"),), np.zeros(1), np.zeros(1), _score_itself)
+GOAL = Goal((("agent", "score"),), np.zeros(1), np.zeros(1), lambda outcomes: np.asarray(outcomes[..., 0]))
 """An outcome that is the score itself, for an engine that learns from outputs; the target's is 0."""
 
 
@@ -169,7 +152,12 @@ def check_engine(engine: Engine) -> None:
     what = f"engine '{engine.name}'"
     reason = why_not_engine(engine, composed=True)
     claim(not reason, f"{what} cannot be used: {reason}")
-    for score in (_stepped, _at_a_corner, _half_failed):
+    scores: tuple[Score, ...] = (
+        _stepped,
+        lambda box, values: -float(to_unit(box, values).sum()),  # lowest in a corner
+        lambda box, values: None if to_unit(box, values)[0] > 0.5 else _stepped(box, values),  # half of it fails
+    )
+    for score in scores:
         _check_engine(engine, what, BOX, score)
     _check_engine(engine, what, NARROW, _stepped)
 
@@ -178,7 +166,8 @@ def _check_engine(engine: Engine, what: str, box: Space, score: Score) -> None:
     trials: list[Trial] = []
     for _ in range(BUDGET):
         values = _proposed(_made(engine, what), what, box, trials)
-        trials.append(_trial(values, score(box, values)))
+        found = score(box, values)
+        trials.append(Trial(values, found, None if found is None else (found,)))
     used = _made(engine, what)
     for stop in (BUDGET - 1, INITIAL, BUDGET - 2):
         again = _proposed(used, what, box, trials[:stop])
@@ -205,10 +194,6 @@ def _claim_inside(what: str, box: Space, values: Values) -> None:
     sides = [f"{side.name} in [{side.low:g}, {side.high:g}]" for side in box.intervals]
     inside = len(values) == len(sides) and all(i.low <= v <= i.high for i, v in zip(box.intervals, values, strict=True))
     claim(inside, f"{what} proposes {values}; give one value for each of {', '.join(sides)}")
-
-
-def _trial(values: Values, score: float | None) -> Trial:
-    return Trial(values, score, None if score is None else (score,))
 
 
 MEMBERS = ("identity", "metrics", "parameters", "starts", "check_agent", "run")
@@ -304,9 +289,8 @@ def _claim_elsewhere(family: DomainFamily, what: str, episode: Episode, scores: 
     try:
         copied = pickle.loads(pickle.dumps(family))
     except Exception as problem:
-        return claim(
-            False, f"{what} cannot be pickled ({type(problem).__name__}: {problem}); make it a frozen dataclass"
-        )
+        said = f"{type(problem).__name__}: {problem}"
+        return claim(False, f"{what} cannot be pickled ({said}); make it a frozen dataclass")
     with working(functools.partial(_answer, copied), [episode, episode], jobs=2) as answers:
         there = list(answers)
     for where, (identity, answered) in (("a copy", _answer(copied, episode)), *(("another process", a) for a in there)):

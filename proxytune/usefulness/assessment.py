@@ -1,6 +1,11 @@
-"""Every measure of one proxy at once, with its uncertainty.
+"""Every measure of one proxy at once with its uncertainty, and the choice among several proxies.
 
-Proxy selection: which of several proxies ranks the agents most like the target, and beyond noise.
+`assess` takes two score tables to an Assessment: PRPV, PPV, correlations and MMRV with their bootstrap intervals, the
+noise floor and chance. `select_proxy` ranks several proxies by PRPV, with intervals of
+
+    PRPV(worse) − PRPV(better) ± q · standard deviation over resamples
+
+where q, one for all pairs, is the 95 % quantile of the largest studentised deviation.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,9 +28,8 @@ from proxytune.usefulness.resampling import (
     Intervals,
     PrpvInterval,
     bootstrap_means,
-    in_blocks,
     intervals,
-    means_if_repeated,
+    prpv_in_blocks,
     prpv_interval,
     why_not_repeated,
 )
@@ -50,7 +54,7 @@ HALVES = (
 
 @dataclass(frozen=True)
 class Assessment:
-    """How useful one proxy is as a predictor of the target.
+    """The usefulness of one proxy as a predictor of the target.
 
     Attributes:
         inputs: What was compared, with its sample sizes.
@@ -97,7 +101,7 @@ class Assessment:
 
     @property
     def at_noise_floor(self) -> bool | None:
-        """Whether it is shown that PRPV is what a perfect proxy would score; None where nothing can show it.
+        """True if PRPV is shown to be what a perfect proxy would score; None where nothing can show it.
 
         That takes a noise floor of the same starts, and a PRPV that chance does not explain.
         """
@@ -113,14 +117,21 @@ class Assessment:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is undefined or uncertain, in one line each."""
+        """Lines on what is undefined or uncertain, and on where PRPV lies between chance and the noise floor."""
+        floor, random = self.noise_floor, self.chance
         lines = [*self.ppv.notes, *self.srcc.notes, *self.kendall_tau.notes]
         if self.prpv_interval.reason:
             lines.append(f"no interval: {self.prpv_interval.reason}")
-        if self.noise_floor.reason:
-            lines.append(f"no noise floor: {self.noise_floor.reason}")
-        lines += [rates.note for rates in self.success_rates if rates.note]
-        return (*lines, *_caution(self))
+        if floor.reason:
+            lines.append(f"no noise floor: {floor.reason}")
+        lines += [*(rates.note for rates in self.success_rates if rates.note), *_few(self)]
+        if random.explains:
+            lines.append(f"PRPV is no better than chance: a random ranking scores as low with p = {random.p_value:.2g}")
+        if self.at_noise_floor:
+            lines.append(PERFECT)
+        if floor.kind == "halves" and floor.high is not None and self.prpv.value <= floor.high:
+            lines.append(HALVES)
+        return tuple(lines)
 
 
 def assess(
@@ -151,7 +162,8 @@ def assess(
     inputs = compare(proxy=proxy, target=target, metrics=metrics)
     one, other = inputs.proxy, inputs.target
     error = ppv(proxy=one, target=other, metrics=metrics, beta=beta)
-    means = means_if_repeated(inputs, resamples=resamples, seed=seed)
+    repeated = not why_not_repeated(inputs)
+    means = bootstrap_means(inputs, resamples=resamples, seed=seed) if repeated else None
     return Assessment(
         inputs=inputs,
         prpv=prpv(proxy=one, target=other, metrics=metrics),
@@ -167,10 +179,6 @@ def assess(
     )
 
 
-def _caution(assessment: Assessment) -> list[str]:
-    return [*_few(assessment), *_level(assessment)]
-
-
 def _few(assessment: Assessment) -> list[str]:
     """Warn of few starts or episodes, where there are intervals, and say that equal labels were paired."""
     inputs = assessment.inputs
@@ -184,21 +192,9 @@ def _few(assessment: Assessment) -> list[str]:
     return [few, PAIRED] if inputs.paired else [few]
 
 
-def _level(assessment: Assessment) -> list[str]:
-    """Where PRPV lies between chance and the noise floor, as far as anything is shown."""
-    lines, floor, random = [], assessment.noise_floor, assessment.chance
-    if random.explains:
-        lines.append(f"PRPV is no better than chance: a random ranking scores as low with p = {random.p_value:.2g}")
-    if assessment.at_noise_floor:
-        lines.append(PERFECT)
-    if floor.kind == "halves" and floor.high is not None and assessment.prpv.value <= floor.high:
-        lines.append(HALVES)
-    return lines
-
-
 @dataclass(frozen=True)
 class Difference:
-    """How much worse one proxy is than another.
+    """The lead of one proxy over another.
 
     Attributes:
         better: The proxy with the lower PRPV.
@@ -216,7 +212,7 @@ class Difference:
 
     @property
     def beyond_noise(self) -> bool | None:
-        """Whether the interval leaves out zero; None if there is none."""
+        """True if the interval leaves out zero; None if there is none."""
         return None if self.low is None else self.low > 0
 
 
@@ -264,16 +260,12 @@ def select_proxy(
     if reason or not pairs:
         bare = (Difference(*pair, int(value), None, None) for pair, value in zip(pairs, observed, strict=True))
         return Selection(ranking, tuple(bare), reason)
-    resampled = {name: _resampled(side, resamples, seed) for name, side in inputs.items()}
+    # The same seed resamples the target alike for every proxy.
+    means = {name: bootstrap_means(side, resamples=resamples, seed=seed) for name, side in inputs.items()}
+    resampled = {name: prpv_in_blocks(*sides, metrics) for name, sides in means.items()}
     half = _simultaneous(np.array([resampled[worse] - resampled[better] for better, worse in pairs]))
     rows = zip(pairs, observed, half, strict=True)
     return Selection(ranking, tuple(Difference(*pair, int(v), float(v - h), float(v + h)) for pair, v, h in rows))
-
-
-def _resampled(inputs: Comparison, resamples: int, seed: int) -> Floats:
-    """PRPV of resampled episodes; the same seed resamples the target alike for every proxy."""
-    means = bootstrap_means(inputs, resamples=resamples, seed=seed)
-    return in_blocks(lambda proxy, target: prpv_of_means(proxy, target, inputs.metrics), *means)
 
 
 def _simultaneous(differences: Floats) -> Floats:

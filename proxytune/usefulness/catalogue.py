@@ -1,6 +1,8 @@
-"""The measures of usefulness, each with all that is to be known of it.
+"""The measures of usefulness, each with all that is to be known of it: nothing that reports one knows it from another.
 
-What a measure of usefulness says of itself: nothing that reports one knows it from another.
+A Measure has its names, direction, unit and format, and either a function of mean scores (`on_means`), from which its
+interval follows by the bootstrap, or a reader of an Assessment that holds both (`read`). MEASURES are all those of
+score tables.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -67,27 +69,38 @@ class Measure:
 
     @property
     def lower_is_better(self) -> bool:
-        """Whether a search would make it small."""
+        """True if a search would make it small."""
         return self.better == "lower"
 
     def key_for(self, metric: str) -> str:
-        """What files call it for a metric, or for ALL."""
+        """The name in files for a metric, or for ALL."""
         return "_".join(filter(None, (self.key, metric)))
 
     def name_for(self, metric: str) -> str:
-        """What people call it for a metric, or for ALL."""
+        """The name for people for a metric, or for ALL."""
         return " ".join(filter(None, (self.name, metric)))
 
     def measured(self, assessment: Assessment) -> Mapping[str, Measured]:
         """Value and interval by metric; by ALL if there is one for all metrics."""
         if self.read is not None:
             return self.read(assessment)
-        values, resampled = self._values(*assessment.inputs.means, assessment), self._resampled(assessment)
-        names = [metric.name for metric in assessment.inputs.metrics] if self.per_metric else [ALL]
-        ends = [None] * len(names) if resampled is None else [interval_where_defined(one) for one in resampled.T]
-        pairs = zip(values, ends, strict=True)
-        found = [Measured(None if np.isnan(value) else float(value), inner) for value, inner in pairs]
-        return dict(zip(names, found, strict=True))
+        if self.on_means is None:
+            raise InputError(f"{self.name} is not measured on score tables")
+        inputs, on_means = assessment.inputs, self.on_means
+
+        def by_metric(proxy: Floats, target: Floats) -> Floats:
+            """Values (…, metrics or 1) of means (…, agents, metrics)."""
+            values = on_means(proxy, target, inputs.metrics)
+            return values if self.per_metric else values[..., None]
+
+        names = [metric.name for metric in inputs.metrics] if self.per_metric else [ALL]
+        ends: Sequence[Ends | None] = [None] * len(names)
+        if assessment.intervals is not None:
+            resamples = assessment.prpv_interval.resamples
+            means = bootstrap_means(inputs, resamples=resamples, seed=assessment.seed)
+            ends = [interval_where_defined(one) for one in in_blocks(by_metric, *means).T]
+        values = [None if np.isnan(value) else float(value) for value in by_metric(*inputs.means)]
+        return dict(zip(names, map(Measured, values, ends), strict=True))
 
     def of_means(self, *, proxy: Floats, target: Floats, metrics: Sequence[Metric]) -> float:
         """Measure mean scores alone, as an objective of a search does.
@@ -107,30 +120,11 @@ class Measure:
             raise InputError(f"{self.name} is no single number of mean scores; take a measure that is, as PRPV")
         return float(self.on_means(proxy, target, metrics))
 
-    def _values(self, proxy: Floats, target: Floats, assessment: Assessment) -> Floats:
-        """Of means (…, agents, metrics), shape (…, metrics or 1)."""
-        if self.on_means is None:
-            raise InputError(f"{self.name} is not measured on score tables")
-        values = self.on_means(proxy, target, assessment.inputs.metrics)
-        return values if self.per_metric else values[..., None]
-
-    def _resampled(self, assessment: Assessment) -> Floats | None:
-        """Values of resampled episodes, shape (resamples, metrics or 1); None where episodes are not repeated."""
-        if assessment.intervals is None:
-            return None
-        resamples, seed = assessment.prpv_interval.resamples, assessment.seed
-        means = bootstrap_means(assessment.inputs, resamples=resamples, seed=seed)
-        return in_blocks(lambda proxy, target: self._values(proxy, target, assessment), *means)
-
 
 def _prpv(assessment: Assessment) -> Mapping[str, Measured]:
     inner = assessment.prpv_interval
     ends = None if inner.low is None or inner.high is None else (inner.low, inner.high)
     return {ALL: Measured(assessment.prpv.value, ends)}
-
-
-def _ppv(assessment: Assessment) -> Mapping[str, Measured]:
-    return {ALL: Measured(assessment.ppv.value, assessment.intervals.ppv if assessment.intervals else None)}
 
 
 def _ppv_of_means(proxy: Floats, target: Floats, metrics: Sequence[Metric]) -> Floats:
@@ -139,12 +133,13 @@ def _ppv_of_means(proxy: Floats, target: Floats, metrics: Sequence[Metric]) -> F
 
 
 def _held_as(name: str) -> Callable[[Assessment], Mapping[str, Measured]]:
-    """Read a measure per metric from the attribute of this name, and its intervals from theirs."""
+    """Read a measure from the attribute of this name, and its intervals from theirs: by metric, or one for ALL."""
 
     def read(assessment: Assessment) -> Mapping[str, Measured]:
-        values = getattr(assessment, name).value
-        ends = getattr(assessment.intervals, name) if assessment.intervals else {}
-        return {metric: Measured(value, ends.get(metric)) for metric, value in values.items()}
+        values, ends = getattr(assessment, name).value, getattr(assessment.intervals, name, None)
+        if not isinstance(values, Mapping):
+            return {ALL: Measured(values, ends)}
+        return {metric: Measured(value, ends and ends.get(metric)) for metric, value in values.items()}
 
     return read
 
@@ -170,7 +165,7 @@ PPV = Measure(
     digits=".3g",
     in_paper=True,
     on_means=_ppv_of_means,
-    read=_ppv,
+    read=_held_as("ppv"),
 )
 SRCC = Measure(
     key="srcc",

@@ -4,7 +4,7 @@ Starts and their repeats are read off the episodes' labels: START/REPEAT is one 
 under other noise.
 """
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -76,22 +76,20 @@ def compare(*, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric])
         raise ScoresError("no metric is given; name at least one")
     if len(set(names)) < len(names):
         raise ScoresError(f"a metric is given twice: {', '.join(names)}")
-    _check_agents(proxy, "the proxy", target, "the target")
-    _check_agents(target, "the target", proxy, "the proxy")
+    for present, where, absent, other in (
+        (proxy, "the proxy", target, "the target"),
+        (target, "the target", proxy, "the proxy"),
+    ):
+        known = set(absent.agents)
+        if missing := [name for name in present.agents if name not in known]:
+            remedy = "add or remove them, or compare the others alone (score --common)"
+            raise ScoresError(f"{other} lacks scores of {', '.join(missing)}, which {where} has; {remedy}")
     if len(target.agents) < 2:
         raise ScoresError(f"only one agent ('{target.agents[0]}') is scored; comparing takes at least two")
     target = target.select(names)
     same = set(proxy.episodes) == set(target.episodes)
     proxy = proxy.select(names).arrange(agents=target.agents, episodes=target.episodes if same else None)
     return Comparison(proxy, target, tuple(metrics))
-
-
-def _check_agents(present: ScoreTable, where: str, absent: ScoreTable, other: str) -> None:
-    known = set(absent.agents)
-    missing = [name for name in present.agents if name not in known]
-    if missing:
-        remedy = "add or remove them, or compare the others alone (score --common)"
-        raise ScoresError(f"{other} lacks scores of {', '.join(missing)}, which {where} has; {remedy}")
 
 
 def in_common(tables: Mapping[str, ScoreTable]) -> tuple[dict[str, ScoreTable], tuple[str, ...]]:
@@ -109,15 +107,12 @@ def in_common(tables: Mapping[str, ScoreTable]) -> tuple[dict[str, ScoreTable], 
     if len(shared) < 2:
         sides = "; ".join(f"{name} has {', '.join(table.agents)}" for name, table in tables.items())
         raise ScoresError(f"comparing takes at least two agents in common; {sides}")
-    kept = {name: _only(table, shared) for name, table in tables.items()}
+    kept = {}
+    for name, table in tables.items():
+        rest = table.arrange(agents=[agent for agent in table.agents if agent in shared])
+        driven = [label for column, label in enumerate(rest.episodes) if rest.driven[:, column].any()]
+        kept[name] = rest.arrange(agents=rest.agents, episodes=driven)
     return kept, tuple(lines)
-
-
-def _only(table: ScoreTable, agents: Collection[str]) -> ScoreTable:
-    """The table of these agents and of the episodes that they drove."""
-    rest = table.arrange(agents=[agent for agent in table.agents if agent in agents])
-    driven = [label for column, label in enumerate(rest.episodes) if rest.driven[:, column].any()]
-    return rest.arrange(agents=rest.agents, episodes=driven)
 
 
 def start_of(label: str) -> str:

@@ -1,7 +1,9 @@
-"""The noise floor: the PRPV that a domain gets against itself from the same starts, or what stands in for it.
+"""The two ends of the scale of PRPV, and success rates, whose ties shift it.
 
-Success rates: metrics of zeros and ones, each agent's rate with an interval of its own, and how often agents tie.
-Chance: the PRPV of a proxy that ranks the agents at random.
+    noise floor    PRPV of a domain against itself: what a perfect proxy scores
+    chance         PRPV of a proxy that ranks at random; p = (1 + permutations as low) / (1 + permutations)
+
+Of metrics of zeros and ones each agent's rate has Wilson's interval, and the pairs of agents that tie are counted.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,7 +16,16 @@ from proxytune.arrays import Flags, Floats
 from proxytune.scores import Metric, ScoreTable
 from proxytune.usefulness.comparison import Comparison, by_start, compare, is_repeated, split_repeats, start_places
 from proxytune.usefulness.pairs import prpv_of_means, stand
-from proxytune.usefulness.resampling import agent_blocks, counted_means, draw_counts, in_blocks, interval, too_few
+from proxytune.usefulness.resampling import (
+    CONFIDENCE,
+    agent_blocks,
+    counted_means,
+    draw_counts,
+    in_blocks,
+    interval,
+    prpv_in_blocks,
+    too_few,
+)
 
 FloorKind = Literal["same starts", "halves", "none"]
 MEANINGS: dict[FloorKind, str] = {
@@ -59,7 +70,7 @@ class NoiseFloor:
 
     @property
     def meaning(self) -> str:
-        """What it means, in one phrase."""
+        """Its meaning in one phrase."""
         return MEANINGS[self.kind]
 
 
@@ -78,7 +89,7 @@ def noise_floor(*, target: ScoreTable, metrics: Sequence[Metric], splits: int = 
     if reason:
         return NoiseFloor("none", None, None, None, 0, chosen, tuple(metrics), reason=reason)
     same_starts = is_repeated(chosen)
-    values = _prpv(*_split_means(chosen, np.random.default_rng(seed), splits, same_starts), metrics)
+    values = prpv_in_blocks(*_split_means(chosen, np.random.default_rng(seed), splits, same_starts), metrics)
     kind: FloorKind = "same starts" if same_starts else "halves"
     return NoiseFloor(kind, float(values.mean()), *interval(values), splits, chosen, tuple(metrics))
 
@@ -112,7 +123,8 @@ def floor_of_repeats(
         return NoiseFloor("none", None, None, None, 0, inputs.target, inputs.metrics, inputs.proxy, reason)
     value = float(prpv_of_means(one.means, other.means, metrics))
     counts = draw_counts(one, np.random.default_rng(seed), resamples)
-    low, high = interval(_prpv(counted_means(one.values, counts), counted_means(other.values, counts), metrics))
+    means = counted_means(one.values, counts), counted_means(other.values, counts)
+    low, high = interval(prpv_in_blocks(*means, metrics))
     ends = min(low, value), max(high, value)
     return NoiseFloor("same starts", value, *ends, resamples, inputs.target, inputs.metrics, inputs.proxy)
 
@@ -129,7 +141,7 @@ def _split_means(table: ScoreTable, rng: np.random.Generator, splits: int, same_
 
 
 def split_halves(driven: Flags, rng: np.random.Generator, splits: int) -> tuple[Flags, Flags]:
-    """Which episodes fall into the first half and which into the second, each of shape (agents, splits, episodes).
+    """Halves of the episodes, those in the first and those in the second, each of shape (agents, splits, episodes).
 
     Args:
         driven: Which agent drove which episode, shape (agents, episodes).
@@ -153,13 +165,6 @@ def _shared_starts(inputs: Comparison) -> tuple[ScoreTable, ScoreTable]:
         for table in (one, other)
     )
     return first, second
-
-
-def _prpv(one: Floats, other: Floats, metrics: Sequence[Metric]) -> Floats:
-    return in_blocks(lambda p, t: prpv_of_means(p, t, metrics), one, other)
-
-
-CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
@@ -199,7 +204,7 @@ class SuccessRates:
 
     @property
     def note(self) -> str:
-        """How many pairs tie and what that does; empty where none does."""
+        """The number of pairs that tie, and what a tie does; empty where none ties."""
         if not any(self.ties):
             return ""
         count = f"{self.ties[0]} of {self.pairs} pairs of agents tie in the proxy, {self.ties[1]} on the target"
@@ -208,24 +213,18 @@ class SuccessRates:
 
 def success_rates(inputs: Comparison) -> tuple[SuccessRates, ...]:
     """The metrics that are nothing but zeros and ones, and not all alike, in their order."""
-    return tuple(
-        _rates(inputs, metric, column) for column, metric in enumerate(inputs.metrics) if _is_rate(inputs, column)
-    )
+    found, pairs = [], len(inputs.agents) * (len(inputs.agents) - 1) // 2
+    for column, metric in enumerate(inputs.metrics):
+        sides = inputs.proxy, inputs.target
+        known = [np.unique(side.values[side.driven][:, column]) for side in sides]
+        if np.array_equal(np.union1d(*known), (0.0, 1.0)):
+            proxy, target = (_rates(side, column) for side in sides)
+            ordered = [_ordered_pairs(side.means[:, column], metric) for side in sides]
+            found.append(SuccessRates(metric.name, proxy, target, (pairs - ordered[0], pairs - ordered[1]), pairs))
+    return tuple(found)
 
 
-def _is_rate(inputs: Comparison, column: int) -> bool:
-    known = [np.unique(side.values[side.driven][:, column]) for side in (inputs.proxy, inputs.target)]
-    return bool(np.array_equal(np.union1d(*known), (0.0, 1.0)))
-
-
-def _rates(inputs: Comparison, metric: Metric, column: int) -> SuccessRates:
-    proxy, target = (_of_agents(side, column) for side in (inputs.proxy, inputs.target))
-    ties = _ties(inputs.proxy, metric, column), _ties(inputs.target, metric, column)
-    agents = len(inputs.agents)
-    return SuccessRates(metric.name, proxy, target, ties, agents * (agents - 1) // 2)
-
-
-def _of_agents(table: ScoreTable, column: int) -> dict[str, Rate]:
+def _rates(table: ScoreTable, column: int) -> dict[str, Rate]:
     # Loading scipy.stats takes longer than all else of most commands.
     from scipy.stats import binomtest
 
@@ -238,10 +237,9 @@ def _of_agents(table: ScoreTable, column: int) -> dict[str, Rate]:
     return rates
 
 
-def _ties(table: ScoreTable, metric: Metric, column: int) -> int:
-    merits, tie = metric.merits(table.means[:, column])
-    agents = len(merits)
-    return agents * (agents - 1) // 2 - int(stand(merits, float(tie[0])).below.sum())
+def _ordered_pairs(means: Floats, metric: Metric) -> int:
+    merits, tie = metric.merits(means)
+    return int(stand(merits, float(tie[0])).below.sum())
 
 
 LEVEL = 0.05
@@ -268,7 +266,7 @@ class Chance:
 
     @property
     def explains(self) -> bool:
-        """Whether a random ranking does as well too often to be ruled out."""
+        """True if a random ranking does as well too often to be ruled out."""
         return self.p_value >= LEVEL
 
 

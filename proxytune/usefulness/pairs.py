@@ -23,10 +23,7 @@ from proxytune.usefulness.comparison import Comparison, compare
 FEW_AGENTS = 128
 """Up to so many agents each pair is compared, in many tables at once, which is quicker for them."""
 
-
 Flip = Literal["reversed", "lost", "invented"]
-
-
 FLIPS: dict[tuple[float, float], Flip] = {(1.0, 0.0): "reversed", (1.0, 0.5): "lost", (0.5, 1.0): "invented"}
 
 
@@ -237,19 +234,15 @@ def by_table(measure: Callable[[Floats, Floats], float | Floats], proxy: Floats,
 
 def prpv_of_table(proxy: Floats, target: Floats, metrics: Sequence[Metric]) -> float:
     """PRPV of mean scores, each of shape (agents, metrics)."""
-    sides = [_standings(means, metrics) for means in (proxy, target)]
-    value = 0
+    sides, value = [], 0
+    for means in (proxy, target):
+        merits = (metric.merits(means[:, column]) for column, metric in enumerate(metrics))
+        sides.append([stand(scores, float(tie[0])) for scores, tie in merits])
     for block in blocks(len(proxy)):
         one, other = (_dominated(standings, block) for standings in sides)
         # A pair costs 1 where one side alone has an order, 2 where both have one and it is not the same.
         value += count(one) + count(other) - 2 * count(one & other)
     return float(value)
-
-
-def _standings(means: Floats, metrics: Sequence[Metric]) -> list[Standing]:
-    """Sort each metric's column, more being better."""
-    merits = (metric.merits(means[:, column]) for column, metric in enumerate(metrics))
-    return [stand(scores, float(tie[0])) for scores, tie in merits]
 
 
 def _dominated(standings: Sequence[Standing], block: slice) -> Sets:
@@ -266,19 +259,16 @@ def _dominated(standings: Sequence[Standing], block: slice) -> Sets:
 
 def kendall_of_table(proxy: Floats, target: Floats) -> Floats:
     """Kendall's τ-b of mean scores, each of shape (agents, metrics): shape (metrics,), NaN where undefined."""
-    return np.array([_kendall(one, other) for one, other in zip(proxy.T, target.T, strict=True)])
-
-
-def _kendall(proxy: Floats, target: Floats) -> float:
-    """Kendall's τ-b of one metric's mean scores, each of shape (agents,); NaN where all are alike on a side."""
-    one, other = stand_by_rounding(proxy), stand_by_rounding(target)
-    concordant = 0
-    for block in blocks(len(proxy)):
-        below, sets = one.sets(block)[one.below], other.sets(block)
-        discordant = below & ~sets[other.reach]
-        concordant += 2 * (count(below & sets[other.below]) - count(discordant))
-    pairs = 2.0 * one.below.sum() * 2.0 * other.below.sum()
-    return float(concordant / np.sqrt(pairs)) if pairs else np.nan
+    coefficients = []
+    for one, other in zip(map(stand_by_rounding, proxy.T), map(stand_by_rounding, target.T), strict=True):
+        concordant = 0
+        for block in blocks(len(proxy)):
+            below, sets = one.sets(block)[one.below], other.sets(block)
+            discordant = below & ~sets[other.reach]
+            concordant += 2 * (count(below & sets[other.below]) - count(discordant))
+        pairs = 2.0 * one.below.sum() * 2.0 * other.below.sum()
+        coefficients.append(float(concordant / np.sqrt(pairs)) if pairs else np.nan)
+    return np.array(coefficients)
 
 
 def violations_of_table(proxy: Floats, target: Floats) -> Floats:

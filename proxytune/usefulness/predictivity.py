@@ -1,8 +1,10 @@
-"""PPV, the proxy predictivity value: how far the proxy's scores are from the target's.
+"""The measures beside PRPV: errors, costs of a wrong order and correlations of scores, and unlike observations.
 
-MMRV, the mean maximum rank violation of SIMPLER: what a wrong order costs on the target.
-Correlation of the agents' scores in two domains: SRCC (Pearson) and Kendall's τ, metric by metric.
-POD, the proxy observation discrepancy: how unlike two domains answer the same commands.
+POD  = mean or Σ over time of ‖o(proxy) − o(target)‖, under the same commands        # eq. (1)
+PPV  = mean over agents of Σ_m β_m |M_m(proxy) − M_m(target)|                        # eq. (2)
+MMRV = mean over agents i of max_j |M_i(target) − M_j(target)| where i, j are ordered wrongly (SIMPLER)
+SRCC = Pearson's correlation of the agents' mean scores in proxy and target, per metric
+Kendall's τ-b = Σ sign(proxy) sign(target) / √(pairs untied in proxy · on target), per metric
 """
 
 from collections.abc import Mapping, Sequence
@@ -40,7 +42,7 @@ class Ppv:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What had to be left out, in one line each."""
+        """Lines on what had to be left out."""
         return tuple(
             f"{name}: left out of PPV, since all agents score alike on the target and no weight is given"
             for name, weight in self.beta.items()
@@ -63,11 +65,7 @@ def ppv_of_means(proxy: Floats, target: Floats, weights: Floats) -> Floats:
 
 
 def ppv(
-    *,
-    proxy: ScoreTable,
-    target: ScoreTable,
-    metrics: Sequence[Metric],
-    beta: Mapping[str, float] | None = None,
+    *, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric], beta: Mapping[str, float] | None = None
 ) -> Ppv:
     """Weigh how far the proxy's scores are from the target's, eq. (2) of the paper.
 
@@ -152,7 +150,7 @@ def mmrv_of_means(proxy: Floats, target: Floats, metrics: Sequence[Metric]) -> F
     signs = np.array([1.0 if metric.direction == "max" else -1.0 for metric in metrics])
     if proxy.shape[-2] > FEW_AGENTS:
         return np.asarray(by_table(violations_of_table, proxy * signs, target * signs).mean(axis=-2), dtype=np.float64)
-    violated = _above(proxy * signs) != _above(target * signs)
+    violated = (_orders(proxy * signs) > 0.0) != (_orders(target * signs) > 0.0)
     costs = np.abs(target[..., :, None, :] - target[..., None, :, :]) * violated
     return np.asarray(costs.max(axis=-2).mean(axis=-2), dtype=np.float64)
 
@@ -169,12 +167,6 @@ def mmrv(*, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) ->
     inputs = compare(proxy=proxy, target=target, metrics=metrics)
     values = mmrv_of_means(*inputs.means, inputs.metrics)
     return Mmrv({m.name: float(value) for m, value in zip(inputs.metrics, values, strict=True)}, inputs)
-
-
-def _above(scores: Floats) -> NDArray[np.bool_]:
-    """Whether row scores above column, shape (…, agents, agents, metrics)."""
-    tie = ROUNDING * np.abs(scores).max(axis=-2)[..., None, None, :]
-    return np.asarray(scores[..., :, None, :] - scores[..., None, :, :] > tie, dtype=np.bool_)
 
 
 SIMPLER_EPSILON = 1e-8
@@ -300,7 +292,7 @@ class Pod:
 
     @property
     def observations(self) -> int:
-        """How many pairs of observations were compared."""
+        """Number of pairs of observations that were compared."""
         return self.discrepancies.size
 
 
@@ -324,9 +316,8 @@ def pod_of_poses(
     difference = one - other
     turned = np.angle(np.exp(1j * difference[..., 2]))
     discrepancies = np.sqrt(difference[..., 0] ** 2 + difference[..., 1] ** 2 + (metres_per_radian * turned) ** 2)
-    norm = (
-        f"Euclidean norm of (x, y, {metres_per_radian:g} m/rad · heading)" if metres_per_radian else "distance (x, y)"
-    )
+    weighted = f"Euclidean norm of (x, y, {metres_per_radian:g} m/rad · heading)"
+    norm = weighted if metres_per_radian else "distance (x, y)"
     return Pod(_reduce(discrepancies, reduction), "m", "pose", norm, reduction, discrepancies)
 
 

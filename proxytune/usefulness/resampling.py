@@ -1,6 +1,8 @@
 """Bootstrap over episodes: what the measures would be, had the same agents driven other episodes.
 
-Bootstrap intervals of the measures beside PRPV.
+Starts are drawn with replacement, each with all its repeats, and a measure of the mean scores of every draw has a
+central 95 % interval: for PRPV, widened to hold its value, and for PPV, the correlations and MMRV. Where all agents
+drove the same episodes they share the draws; where both domains have the same starts, so do these.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -11,7 +13,7 @@ from numpy.typing import NDArray
 
 from proxytune.arrays import Floats
 from proxytune.scores import Metric, ScoreTable
-from proxytune.usefulness.comparison import Comparison, compare, start_of, start_places
+from proxytune.usefulness.comparison import Comparison, start_of, start_places
 from proxytune.usefulness.pairs import prpv_of_means
 from proxytune.usefulness.predictivity import Ppv, kendall_of_means, mmrv_of_means, pearson_of_means, ppv_of_means
 
@@ -52,7 +54,7 @@ class PrpvInterval:
 
 
 def why_not_repeated(inputs: Comparison) -> str:
-    """Why these tables bear no bootstrap, empty if they do."""
+    """The reason for which these tables bear no bootstrap, empty if they do."""
     for name, table in (("in the proxy", inputs.proxy), ("on the target", inputs.target)):
         reason = too_few(table, name)
         if reason:
@@ -61,17 +63,12 @@ def why_not_repeated(inputs: Comparison) -> str:
 
 
 def too_few(table: ScoreTable, name: str) -> str:
-    """Why a table has no noise to be seen, empty if every agent has at least two episodes."""
+    """The reason for which a table shows no noise, empty if every agent has at least two episodes."""
     single = [agent for agent, count in zip(table.agents, table.counts, strict=True) if count < 2]
     if not single:
         return ""
     who = "each agent" if len(single) == len(table.agents) else f"agent '{single[0]}'"
     return f"{who} has one episode {name}, which says nothing about noise; score at least two"
-
-
-def means_if_repeated(inputs: Comparison, *, resamples: int, seed: int) -> Means | None:
-    """Mean scores of resampled episodes, None where episodes are not repeated."""
-    return None if why_not_repeated(inputs) else bootstrap_means(inputs, resamples=resamples, seed=seed)
 
 
 def bootstrap_means(inputs: Comparison, *, resamples: int, seed: int) -> Means:
@@ -113,7 +110,7 @@ def agent_blocks(table: ScoreTable, draws: int) -> Iterator[tuple[slice, NDArray
 
 
 def draw_counts(table: ScoreTable, rng: np.random.Generator, resamples: int) -> NDArray[np.int64]:
-    """How often each episode is drawn: shape (agents, or 1 if all share the draw; resamples, episodes).
+    """Count how often each episode is drawn: shape (agents, or 1 if all share the draw; resamples, episodes).
 
     Starts are drawn, and with a start all its repeats: these are no new starts. Of one start alone, repeats are drawn.
     """
@@ -126,16 +123,15 @@ def draw_counts(table: ScoreTable, rng: np.random.Generator, resamples: int) -> 
 
 
 def _draw_own(driven: NDArray[np.bool_], rng: np.random.Generator, resamples: int) -> NDArray[np.int64]:
-    """How often each agent's each episode is drawn of its own, shape (agents, resamples, episodes)."""
-    return np.stack([_draw_some(np.flatnonzero(own), rng, resamples, driven.shape[1]) for own in driven])
-
-
-def _draw_some(places: NDArray[np.intp], rng: np.random.Generator, resamples: int, episodes: int) -> NDArray[np.int64]:
-    """How often each episode is drawn of those at some places, as many as these are, shape (resamples, episodes)."""
-    # One by one and counted, since a multinomial draws a binomial for every episode, which takes ten times as long
-    drawn = places[rng.integers(len(places), size=(resamples, len(places)), dtype=np.uint32)]
-    drawn += episodes * np.arange(resamples)[:, None]
-    return np.bincount(drawn.ravel(), minlength=resamples * episodes).reshape(resamples, episodes)
+    """Count how often each agent's each episode is drawn of its own, shape (agents, resamples, episodes)."""
+    episodes, counts = driven.shape[1], []
+    for own in driven:
+        # One by one and counted, since a multinomial draws a binomial for every episode, which takes ten times as long
+        places = np.flatnonzero(own)
+        drawn = places[rng.integers(len(places), size=(resamples, len(places)), dtype=np.uint32)]
+        drawn += episodes * np.arange(resamples)[:, None]
+        counts.append(np.bincount(drawn.ravel(), minlength=resamples * episodes).reshape(resamples, episodes))
+    return np.stack(counts)
 
 
 def _alike(inputs: Comparison, target_counts: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -168,6 +164,11 @@ def in_blocks(
     return np.concatenate([measure(proxy[start : start + size], target[start : start + size]) for start in starts])
 
 
+def prpv_in_blocks(proxy: Floats, target: Floats, metrics: Sequence[Metric]) -> Floats:
+    """PRPV of many pairs of tables, (tables, agents, metrics) each."""
+    return in_blocks(lambda one, other: prpv_of_means(one, other, metrics), proxy, target)
+
+
 def interval(values: Floats, confidence: float = CONFIDENCE) -> tuple[float, float]:
     """The central interval that holds this share of the values."""
     tail = (1 - confidence) / 2
@@ -175,24 +176,12 @@ def interval(values: Floats, confidence: float = CONFIDENCE) -> tuple[float, flo
     return float(low), float(high)
 
 
-def bootstrap_prpv(
-    *, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric], resamples: int = 1000, seed: int = 0
-) -> PrpvInterval:
-    """Resample episodes to tell how far PRPV would be off in a repeat of the experiment.
-
-    Raises:
-        ScoresError: As in prpv.
-    """
-    inputs = compare(proxy=proxy, target=target, metrics=metrics)
-    return prpv_interval(inputs, means_if_repeated(inputs, resamples=resamples, seed=seed))
-
-
 def prpv_interval(inputs: Comparison, means: Means | None) -> PrpvInterval:
     """The interval of PRPV from mean scores of resampled episodes; without one where there are none."""
     value = round(float(prpv_of_means(*inputs.means, inputs.metrics)))
     if means is None:
         return PrpvInterval(value, None, None, None, 0, inputs, why_not_repeated(inputs))
-    values = in_blocks(lambda p, t: prpv_of_means(p, t, inputs.metrics), *means)
+    values = prpv_in_blocks(*means, inputs.metrics)
     low, high = interval(values)
     return PrpvInterval(value, float(values.mean()), min(low, value), max(high, value), len(values), inputs)
 
@@ -223,11 +212,11 @@ def intervals(*, inputs: Comparison, error: Ppv, means: Means | None) -> Interva
     if means is None:
         return None
     weights = np.array([error.beta[metric.name] or 0.0 for metric in inputs.metrics])
-    each = inputs.target.means.size
+    each, ppv = inputs.target.means.size, None
+    if error.value is not None:
+        ppv = interval(in_blocks(lambda p, t: ppv_of_means(p, t, weights), *means, numbers=each))
     return Intervals(
-        ppv=None
-        if error.value is None
-        else interval(in_blocks(lambda p, t: ppv_of_means(p, t, weights), *means, numbers=each)),
+        ppv=ppv,
         srcc=_per_metric(inputs.metrics, in_blocks(pearson_of_means, *means, numbers=each)),
         kendall_tau=_per_metric(inputs.metrics, in_blocks(kendall_of_means, *means)),
         mmrv=_per_metric(inputs.metrics, in_blocks(lambda p, t: mmrv_of_means(p, t, inputs.metrics), *means)),

@@ -173,8 +173,7 @@ def test_a_class_or_factory_is_called_and_what_has_the_members_is_taken_as_it_is
     for name in ("mine:Mine", "mine:ready", "mine:factory"):
         assert make(name, kind="agent", beside=folder, needs=("size",)).size == 1
     with pytest.raises(
-        ExtensionError,
-        match=r"'mine:broken' raised ZeroDivisionError: division by zero \(mine.py, line 12\); correct",
+        ExtensionError, match=r"'mine:broken' raised ZeroDivisionError: division by zero \(mine.py, line 12\); correct"
     ):
         make("mine:broken", kind="agent", beside=folder, needs=("size",))
 

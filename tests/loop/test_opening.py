@@ -12,7 +12,7 @@ from proxytune.cli.main import BAD_INPUT, FAILED, main
 from proxytune.errors import StoreError
 from proxytune.files import shipped
 from proxytune.loop import open_loop
-from proxytune.loop.opening import FILE_NAME, Kept, Step, digest_of_files
+from proxytune.loop.opening import FILE_NAME, Kept, digest_of_files
 
 LOG = 'format = 1\nname = "log"\nrobot = "husky"\ncommand = "duty"\nrate_hz = 20.0\n'
 NO_TRUTH = ('truth = "twin.toml"\n', "")
@@ -166,51 +166,51 @@ def test_a_twin_of_which_no_frames_can_be_recorded_is_refused_before_anything_is
 
 
 def step(folder, inputs="a", name="log"):
+    """A step, how to do it, and the inputs of which it was made."""
     done = []
 
     def do():
         done.append(inputs)
         (folder / name).write_text(inputs)
 
-    return Step(name, inputs, folder / name, do), done
+    return (name, inputs, folder / name), (name, inputs, do), done
 
 
 def test_a_step_is_known_after_it_was_done_and_not_with_other_inputs(tmp_path):
-    first, done = step(tmp_path)
-    assert not Kept(tmp_path).has(first)
-    Kept(tmp_path).run(first)
+    first, doing, done = step(tmp_path)
+    assert not Kept(tmp_path).has(*first)
+    Kept(tmp_path).run(*doing)
     assert done == ["a"]
-    assert Kept(tmp_path).has(first)
-    assert not Kept(tmp_path).has(step(tmp_path, "b")[0])
+    assert Kept(tmp_path).has(*first)
+    assert not Kept(tmp_path).has(*step(tmp_path, "b")[0])
 
 
 def test_a_step_whose_output_is_gone_is_not_done(tmp_path):
-    first, _ = step(tmp_path)
-    Kept(tmp_path).run(first)
-    first.output.unlink()
-    assert not Kept(tmp_path).has(first)
+    first, doing, _ = step(tmp_path)
+    Kept(tmp_path).run(*doing)
+    (tmp_path / "log").unlink()
+    assert not Kept(tmp_path).has(*first)
 
 
 def test_a_step_that_was_broken_off_is_not_done_though_its_old_output_is_there(tmp_path):
-    first, _ = step(tmp_path)
-    Kept(tmp_path).run(first)
+    first, doing, _ = step(tmp_path)
+    Kept(tmp_path).run(*doing)
 
     def interrupted():
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        Kept(tmp_path).run(Step("log", "b", first.output, interrupted))
-    assert first.output.exists()
-    assert not Kept(tmp_path).has(first)
-    assert not Kept(tmp_path).has(step(tmp_path, "b")[0])
+        Kept(tmp_path).run("log", "b", interrupted)
+    assert (tmp_path / "log").exists()
+    assert not Kept(tmp_path).has(*first)
+    assert not Kept(tmp_path).has(*step(tmp_path, "b")[0])
 
 
 def test_steps_do_not_forget_each_other(tmp_path):
-    kept, (first, _), (second, _) = Kept(tmp_path), step(tmp_path), step(tmp_path, name="diagnosis")
-    kept.run(first)
-    kept.run(second)
-    assert Kept(tmp_path).has(first)
-    assert Kept(tmp_path).has(second)
+    kept, steps = Kept(tmp_path), [step(tmp_path), step(tmp_path, name="diagnosis")]
+    for _, doing, _ in steps:
+        kept.run(*doing)
+    assert all(Kept(tmp_path).has(*one) for one, _, _ in steps)
 
 
 @pytest.mark.parametrize("text", ["", "[]", '{"steps": 1}'])

@@ -1,7 +1,4 @@
-"""An effect that breaks a promise is refused in one line that names the promise.
-
-An agent, a family, an engine or a measure that breaks a promise is refused in one line that names the promise.
-"""
+"""An effect, agent, family, engine or measure that breaks a promise is refused in one line that names the promise."""
 
 import itertools
 import os
@@ -126,7 +123,7 @@ class OddPanel(Slow):
     trace = Trace(cues=(Cue.TIME,), shown=Means(Cue.TIME, (Panel("", "time [s]", "speed"),)))
 
 
-BROKEN = {
+BROKEN_EFFECTS = {
     Forgetful: "slow' at share 0.* changes by .* if the signal is cut at .*; keep memory",
     FromTheEnd: "depends on samples that come later",
     InPlace: "changes a memory in place",
@@ -151,10 +148,10 @@ def test_an_effect_that_keeps_every_promise_passes():
     assert check_effect(effect) is None
 
 
-@pytest.mark.parametrize("effect", BROKEN, ids=lambda effect: effect.__name__)
+@pytest.mark.parametrize("effect", BROKEN_EFFECTS, ids=lambda effect: effect.__name__)
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
 def test_a_broken_promise_is_named_in_one_line(effect):
-    with pytest.raises(ConformanceError, match=BROKEN[effect]) as refused:
+    with pytest.raises(ConformanceError, match=BROKEN_EFFECTS[effect]) as refused:
         check_effect(effect)
     assert "\n" not in str(refused.value)
 
@@ -215,7 +212,7 @@ class Sharing(Agent):
         return np.full(2, self.seen), memory
 
 
-class BrokenOthersInPlace(Agent):
+class Overwriting(Agent):
     def act(self, picture, memory):
         memory[0] += 0.01
         return np.full(2, memory[0]), memory
@@ -227,14 +224,14 @@ class Painting(Agent):
         return np.zeros(2), memory
 
 
-AGENTS_OF_THIS = {
+BROKEN_AGENTS = {
     Impatient: r"answers picture 0 with \[2.0, 0.0\]; duties lie within",
     Three: "a command is two duties",
     Alone: "a command is two duties",
     Single: "answers with ndarray; act must give a tuple",
     Counting: "drives otherwise the second time",
     Sharing: "is disturbed by another episode under way",
-    BrokenOthersInPlace: "changes its memory in place",
+    Overwriting: "changes its memory in place",
     Painting: "changes the picture in place",
     int: "lacks begin, act",
 }
@@ -244,9 +241,9 @@ def test_an_agent_that_keeps_every_promise_passes():
     assert check_agent(Agent) is check_agent(AGENTS["steady"]) is None
 
 
-@pytest.mark.parametrize("agent", AGENTS_OF_THIS, ids=lambda agent: agent.__name__)
+@pytest.mark.parametrize("agent", BROKEN_AGENTS, ids=lambda agent: agent.__name__)
 def test_an_agent_that_breaks_a_promise_is_refused(agent):
-    refused(check_agent, agent, AGENTS_OF_THIS[agent])
+    refused(check_agent, agent, BROKEN_AGENTS[agent])
 
 
 @dataclass(frozen=True)
@@ -281,14 +278,11 @@ class Unpicklable(Wobbly):
         raise TypeError("an open window")
 
 
-FAMILIES = {
+BROKEN_FAMILIES = {
     "an undeclared metric": (Altered(extra=("height",)), "gives 'height', which its metrics do not declare"),
     "a missing metric": (Altered(missing="distance"), "gives no 'distance', which its metrics declare"),
     "a metric that is no number": (Wobbly(faults=("agent0:*:nan",)), "gives 'distance' nan; it must be finite"),
-    "an idle parameter": (
-        Altered(idle="trim"),
-        "scores all the same with 'trim' left out, -0.3 and 0.3; use it",
-    ),
+    "an idle parameter": (Altered(idle="trim"), "scores all the same with 'trim' left out, -0.3 and 0.3; use it"),
     "chance": (Altered(chance=True), "scores an episode otherwise after others; keep no state"),
     "an identity of the process": (ByProcess(), "has the identity 'of .*' in another process, 'of .*' here"),
     "any agent": (AnyAgent(), "takes an agent 'nobody drives like this'; check_agent must raise"),
@@ -305,9 +299,9 @@ def test_a_family_that_keeps_every_promise_passes_also_with_a_parameter_that_is_
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", FAMILIES)
+@pytest.mark.parametrize("case", BROKEN_FAMILIES)
 def test_a_family_that_breaks_a_promise_is_refused(case):
-    refused(check_family, FAMILIES[case][0], FAMILIES[case][1], agents=["agent0"])
+    refused(check_family, BROKEN_FAMILIES[case][0], BROKEN_FAMILIES[case][1], agents=["agent0"])
 
 
 def test_a_family_with_a_dead_parameter_is_told_so():
@@ -354,7 +348,7 @@ class NeedsScores(Proposer):
         return super().propose(space, trials, seed)
 
 
-PROPOSERS = {
+BROKEN_PROPOSERS = {
     Outside: r"'mine' proposed \(1.3, 1.3\); give one value for each of delay in \[0, 0.3\], trim in",
     Short: "give one value for each of delay",
     Remembering: "proposes otherwise when asked again; remember nothing",
@@ -367,9 +361,9 @@ def test_an_engine_that_keeps_every_promise_passes():
     assert check_engine(Engine("mine", "mine", "the design", Proposer)) is None
 
 
-@pytest.mark.parametrize("proposer", PROPOSERS, ids=lambda proposer: proposer.__name__)
+@pytest.mark.parametrize("proposer", BROKEN_PROPOSERS, ids=lambda proposer: proposer.__name__)
 def test_an_engine_that_breaks_a_promise_is_refused(proposer):
-    refused(check_engine, Engine("mine", "mine", "wrong", proposer), PROPOSERS[proposer])
+    refused(check_engine, Engine("mine", "mine", "wrong", proposer), BROKEN_PROPOSERS[proposer])
 
 
 def test_what_is_no_engine_is_refused():
@@ -385,7 +379,7 @@ def in_place(proxy, target, metrics):
     return np.abs(proxy).mean(axis=(-2, -1))
 
 
-MEASURES = {
+BROKEN_MEASURES = {
     "of a shape of its own": (lambda p, t, m: np.abs(p - t).mean(axis=-1), r"give \(…\), here \(8,\)"),
     "of all tables together": (lambda p, t, m: bias(p, t, m) * 0.0 + np.mean(p), "gives tables together other values"),
     "in place": (in_place, "changes the scores in place"),
@@ -405,9 +399,9 @@ def test_a_measure_that_keeps_every_promise_passes():
     assert check_measure(measure(bias), perfect=0.0) is None
 
 
-@pytest.mark.parametrize("case", MEASURES)
+@pytest.mark.parametrize("case", BROKEN_MEASURES)
 def test_a_measure_that_breaks_a_promise_is_refused(case):
-    refused(check_measure, measure(MEASURES[case][0]), MEASURES[case][1], perfect=0.0)
+    refused(check_measure, measure(BROKEN_MEASURES[case][0]), BROKEN_MEASURES[case][1], perfect=0.0)
 
 
 @pytest.mark.slow

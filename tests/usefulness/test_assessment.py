@@ -1,28 +1,20 @@
-"""One call gives every measure of a proxy, and says what is missing.
-
-Proxies are ranked, and only differences beyond noise are called so.
-"""
+"""One call gives every measure of a proxy, and says what is missing; of several proxies, only what is beyond noise."""
 
 import numpy as np
 import pytest
+from score_tables import bootstrap_prpv, ordered, table_of
 
 from proxytune.errors import ScoresError
 from proxytune.scores import Metric, ScoreTable
 from proxytune.usefulness import assess, floor_of_repeats, resampling, select_proxy
 from proxytune.usefulness.pairs import prpv
 from proxytune.usefulness.predictivity import kendall_tau, mmrv, ppv, srcc
-from proxytune.usefulness.resampling import bootstrap_prpv
 
 M = (Metric("m"), Metric("n", "min"))
 
 
-def table(seed, episodes=6, agents=5):
-    values = np.random.default_rng(seed).normal(size=(agents, episodes, 2)) + np.arange(agents)[:, None, None]
-    return ScoreTable(tuple(f"A{i}" for i in range(agents)), tuple(map(str, range(episodes))), ("m", "n"), values)
-
-
 def test_it_gathers_the_single_measures():
-    sides = {"proxy": table(1), "target": table(2), "metrics": M}
+    sides = {"proxy": ordered(1), "target": ordered(2), "metrics": M}
     found = assess(**sides)
     assert found.prpv.value == prpv(**sides).value == found.prpv_interval.value
     assert found.ppv.value == ppv(**sides).value
@@ -31,7 +23,7 @@ def test_it_gathers_the_single_measures():
 
 
 def test_every_measure_has_an_interval_around_it():
-    found = assess(proxy=table(1, 20), target=table(2, 20), metrics=M)
+    found = assess(proxy=ordered(1, 20), target=ordered(2, 20), metrics=M)
     assert found.intervals.ppv[0] < found.ppv.value < found.intervals.ppv[1]
     for name in ("srcc", "kendall_tau", "mmrv"):
         for metric, (low, high) in getattr(found.intervals, name).items():
@@ -39,7 +31,7 @@ def test_every_measure_has_an_interval_around_it():
 
 
 def test_episodes_are_drawn_once_for_all_intervals_though_one_is_missing(monkeypatch):
-    sides, drawn, draw = {"proxy": table(1), "target": table(2), "metrics": M}, [], resampling._means_of_draws
+    sides, drawn, draw = ({"proxy": ordered(1), "target": ordered(2), "metrics": M}, [], resampling._means_of_draws)
     sides["target"].values[3, 2] = np.nan
     monkeypatch.setattr(resampling, "_means_of_draws", lambda one, *rest: drawn.append(one) or draw(one, *rest))
     found = assess(**sides, resamples=200, seed=5)
@@ -49,25 +41,25 @@ def test_episodes_are_drawn_once_for_all_intervals_though_one_is_missing(monkeyp
 
 
 def test_a_constant_metric_has_no_interval_and_a_note():
-    flat = table(1).values.copy()
+    flat = ordered(1).values.copy()
     flat[:, :, 0] = 3.0
-    found = assess(proxy=ScoreTable(table(1).agents, table(1).episodes, ("m", "n"), flat), target=table(2), metrics=M)
+    found = assess(proxy=table_of(flat), target=ordered(2), metrics=M)
     assert found.srcc.value["m"] is found.intervals.srcc["m"] is found.intervals.kendall_tau["m"] is None
     assert found.intervals.srcc["n"] is not None
     assert any("m: SRCC is undefined" in note for note in found.notes)
 
 
 def test_single_episodes_have_no_interval_nor_floor_and_two_notes():
-    found = assess(proxy=table(1, 1), target=table(2, 1), metrics=M)
+    found = assess(proxy=ordered(1, 1), target=ordered(2, 1), metrics=M)
     assert found.intervals is found.at_noise_floor is found.prpv_interval.low is found.noise_floor.value is None
     assert [note.split(":")[0] for note in found.notes] == ["no interval", "no noise floor"]
 
 
 def test_few_episodes_are_warned_of():
     assert any(
-        "only 2 episodes per agent" in note for note in assess(proxy=table(1, 2), target=table(2), metrics=M).notes
+        "only 2 episodes per agent" in note for note in assess(proxy=ordered(1, 2), target=ordered(2), metrics=M).notes
     )
-    assert not any("per agent" in note for note in assess(proxy=table(1), target=table(2), metrics=M).notes)
+    assert not any("per agent" in note for note in assess(proxy=ordered(1), target=ordered(2), metrics=M).notes)
 
 
 PERFECT = "no difference between proxy and target"
@@ -82,7 +74,7 @@ def again(one, noise=0.1, seed=9):
 
 
 def test_a_proxy_within_the_noise_of_the_same_starts_is_said_to_be():
-    target = table(2, agents=8)
+    target = ordered(2, agents=8)
     floor = floor_of_repeats(domain=target, again=again(target), metrics=CLEAR)
     found = assess(proxy=target, target=target, metrics=CLEAR, floor=floor)
     assert found.noise_floor is floor
@@ -91,9 +83,9 @@ def test_a_proxy_within_the_noise_of_the_same_starts_is_said_to_be():
 
 
 def test_a_proxy_above_the_floor_is_not():
-    target = table(2, agents=8)
+    target = ordered(2, agents=8)
     floor = floor_of_repeats(domain=target, again=target, metrics=CLEAR)
-    found = assess(proxy=table(3, agents=8), target=target, metrics=CLEAR, floor=floor)
+    found = assess(proxy=ordered(3, agents=8), target=target, metrics=CLEAR, floor=floor)
     assert found.prpv.value > floor.high
     assert found.at_noise_floor is False
     assert not any(PERFECT in note for note in found.notes)
@@ -101,7 +93,7 @@ def test_a_proxy_above_the_floor_is_not():
 
 @pytest.mark.parametrize("seed", range(5))
 def test_halves_never_show_that_a_proxy_is_perfect(seed):
-    target = table(seed, agents=8)
+    target = ordered(seed, agents=8)
     found = assess(proxy=target, target=target, metrics=CLEAR)
     assert found.noise_floor.kind == "halves"
     assert found.prpv.value == 0
@@ -111,7 +103,7 @@ def test_halves_never_show_that_a_proxy_is_perfect(seed):
 
 
 def test_above_what_halves_score_nothing_is_said_of_them():
-    target, worst = table(2, agents=8), table(2, agents=8)
+    target, worst = ordered(2, agents=8), ordered(2, agents=8)
     worst = ScoreTable(worst.agents, worst.episodes, worst.metrics, -worst.values)
     found = assess(proxy=worst, target=target, metrics=CLEAR)
     assert found.prpv.value > found.noise_floor.high
@@ -120,7 +112,7 @@ def test_above_what_halves_score_nothing_is_said_of_them():
 
 def test_what_chance_explains_is_no_perfect_proxy_and_is_said_to_be_chance():
     """Of three agents every order comes by chance too often."""
-    target = table(2, agents=3)
+    target = ordered(2, agents=3)
     floor = floor_of_repeats(domain=target, again=again(target), metrics=CLEAR)
     found = assess(proxy=target, target=target, metrics=CLEAR, floor=floor)
     assert found.prpv.value == 0 <= floor.high
@@ -128,12 +120,12 @@ def test_what_chance_explains_is_no_perfect_proxy_and_is_said_to_be_chance():
     assert found.at_noise_floor is False
     assert any(note.startswith("PRPV is no better than chance") for note in found.notes)
     assert not any(PERFECT in note for note in found.notes)
-    sure = assess(proxy=table(2, agents=8), target=table(2, agents=8), metrics=CLEAR)
+    sure = assess(proxy=ordered(2, agents=8), target=ordered(2, agents=8), metrics=CLEAR)
     assert not any("chance" in note for note in sure.notes)
 
 
 def test_the_target_s_own_repeats_are_taken_where_it_has_them():
-    one = table(4, agents=8)
+    one = ordered(4, agents=8)
     values = np.concatenate([one.values, again(one).values], axis=1)
     labels = tuple(f"{episode}/{repeat}" for repeat in range(2) for episode in one.episodes)
     target = ScoreTable(one.agents, labels, one.metrics, values)
@@ -143,27 +135,21 @@ def test_the_target_s_own_repeats_are_taken_where_it_has_them():
     assert found.inputs.paired
 
 
-SELECTION_M = (Metric("m"),)
+CLEAR = (Metric("m"),)
 TRUTH = np.arange(8.0)
 
 
-def table_of_selection(truth, seed, noise=0.3, episodes=8):
-    values = np.asarray(truth)[:, None] + noise * np.random.default_rng(seed).normal(size=(len(truth), episodes))
-    return ScoreTable(
-        tuple(f"A{i}" for i in range(len(truth))), tuple(map(str, range(episodes))), ("m",), values[..., None]
-    )
+def noisy(truth, seed, noise=0.3, episodes=8):
+    """Episodes around each agent's true score."""
+    return table_of(truth[:, None] + noise * np.random.default_rng(seed).normal(size=(len(truth), episodes)))
 
 
-TARGET = table_of_selection(TRUTH, 0)
+TARGET = noisy(TRUTH, 0)
 
 
 def test_a_good_proxy_beats_a_bad_one_beyond_noise_but_not_its_twin():
-    proxies = {
-        "bad": table_of_selection(-TRUTH, 1),
-        "good": table_of_selection(TRUTH, 2),
-        "twin": table_of_selection(TRUTH, 3),
-    }
-    selection = select_proxy(proxies=proxies, target=TARGET, metrics=SELECTION_M)
+    proxies = {"bad": noisy(-TRUTH, 1), "good": noisy(TRUTH, 2), "twin": noisy(TRUTH, 3)}
+    selection = select_proxy(proxies=proxies, target=TARGET, metrics=CLEAR)
     assert [name for name, _ in selection.ranking][2] == "bad"
     beyond = {(pair.better, pair.worse): pair.beyond_noise for pair in selection.differences}
     assert beyond["good", "bad"] is beyond["twin", "bad"] is True
@@ -171,9 +157,9 @@ def test_a_good_proxy_beats_a_bad_one_beyond_noise_but_not_its_twin():
 
 
 def test_the_ranking_is_by_prpv_and_differences_are_of_prpv():
-    proxies = {name: table_of_selection(TRUTH, seed, noise=4.0) for seed, name in enumerate("abcd", 10)}
-    selection = select_proxy(proxies=proxies, target=TARGET, metrics=SELECTION_M)
-    own = {name: prpv(proxy=proxy, target=TARGET, metrics=SELECTION_M).value for name, proxy in proxies.items()}
+    proxies = {name: noisy(TRUTH, seed, noise=4.0) for seed, name in enumerate("abcd", 10)}
+    selection = select_proxy(proxies=proxies, target=TARGET, metrics=CLEAR)
+    own = {name: prpv(proxy=proxy, target=TARGET, metrics=CLEAR).value for name, proxy in proxies.items()}
     assert dict(selection.ranking) == own
     assert [value for _, value in selection.ranking] == sorted(own.values())
     assert len(selection.differences) == 6
@@ -183,15 +169,15 @@ def test_the_ranking_is_by_prpv_and_differences_are_of_prpv():
 
 
 def test_a_proxy_against_itself_differs_by_nothing():
-    same = table_of_selection(TRUTH, 5, noise=3.0)
-    selection = select_proxy(proxies={"a": same, "b": same}, target=TARGET, metrics=SELECTION_M)
+    same = noisy(TRUTH, 5, noise=3.0)
+    selection = select_proxy(proxies={"a": same, "b": same}, target=TARGET, metrics=CLEAR)
     assert (selection.differences[0].low, selection.differences[0].high) == (0.0, 0.0)
     assert selection.differences[0].beyond_noise is False
 
 
 def test_one_episode_gives_a_ranking_without_intervals_and_says_why():
-    proxies = {"a": table_of_selection(TRUTH, 1, episodes=1), "b": table_of_selection(-TRUTH, 2, episodes=1)}
-    selection = select_proxy(proxies=proxies, target=TARGET, metrics=SELECTION_M)
+    proxies = {"a": noisy(TRUTH, 1, episodes=1), "b": noisy(-TRUTH, 2, episodes=1)}
+    selection = select_proxy(proxies=proxies, target=TARGET, metrics=CLEAR)
     assert [name for name, _ in selection.ranking] == ["a", "b"]
     assert selection.differences[0].beyond_noise is None
     assert "one episode in the proxy" in selection.reason
@@ -199,20 +185,16 @@ def test_one_episode_gives_a_ranking_without_intervals_and_says_why():
 
 def test_no_proxy_is_refused():
     with pytest.raises(ScoresError, match="no proxy"):
-        select_proxy(proxies={}, target=TARGET, metrics=SELECTION_M)
+        select_proxy(proxies={}, target=TARGET, metrics=CLEAR)
 
 
 @pytest.mark.slow
 def test_equally_good_proxies_are_seldom_told_apart():
     false = 0
     for seed in range(0, 600, 4):
-        proxies = {name: table_of_selection(TRUTH / 4, seed + i, noise=1.0) for i, name in enumerate("abc")}
+        proxies = {name: noisy(TRUTH / 4, seed + i, noise=1.0) for i, name in enumerate("abc")}
         selection = select_proxy(
-            proxies=proxies,
-            target=table_of_selection(TRUTH / 4, seed + 3, noise=1.0),
-            metrics=SELECTION_M,
-            resamples=300,
-            seed=seed,
+            proxies=proxies, target=noisy(TRUTH / 4, seed + 3, noise=1.0), metrics=CLEAR, resamples=300, seed=seed
         )
         false += any(pair.beyond_noise for pair in selection.differences)
     assert false / 150 <= 0.10

@@ -2,19 +2,15 @@
 
 import numpy as np
 import pytest
+from score_tables import ordered, table_of
 
 from proxytune.errors import InputError
-from proxytune.scores import Metric, ScoreTable
+from proxytune.scores import Metric
 from proxytune.sweep import METRICS
 from proxytune.testing.extension import check_measure
 from proxytune.usefulness import ALL, MEASURES, PODS, PPV, PRPV, SRCC, Measure, assess
 
 M = (Metric("m"), Metric("n", "min", 0.1))
-
-
-def table(seed, episodes=6, agents=5):
-    values = np.random.default_rng(seed).normal(size=(agents, episodes, 2)) + np.arange(agents)[:, None, None]
-    return ScoreTable(tuple(f"A{i}" for i in range(agents)), tuple(map(str, range(episodes))), ("m", "n"), values)
 
 
 def bias(proxy, target, metrics):
@@ -29,7 +25,7 @@ def largest(proxy, target, metrics):
 
 BIAS = Measure("bias", "bias", "mean error", "lower", "in the metric's unit", ".2f", per_metric=True, on_means=bias)
 LARGEST = Measure("largest", "largest bias", "largest mean error", "lower", "any", ".2f", on_means=largest)
-FOUND = assess(proxy=table(1), target=table(2), metrics=M)
+FOUND = assess(proxy=ordered(1), target=ordered(2), metrics=M)
 
 
 @pytest.mark.parametrize("measure", MEASURES, ids=lambda measure: measure.key)
@@ -47,7 +43,7 @@ def test_every_measure_of_score_tables_has_a_value_within_its_interval_for_each_
 
 @pytest.mark.parametrize("measure", [*MEASURES, BIAS, LARGEST], ids=lambda measure: measure.key)
 def test_without_repeats_a_measure_has_a_value_and_no_interval(measure):
-    found = measure.measured(assess(proxy=table(1, 1), target=table(2, 1), metrics=M))
+    found = measure.measured(assess(proxy=ordered(1, 1), target=ordered(2, 1), metrics=M))
     assert [one.interval for one in found.values()] == [None] * len(found)
     assert None not in [one.value for one in found.values()]
 
@@ -66,16 +62,15 @@ def weighted_as_before(proxy, target, metrics):
 
 
 def test_an_undefined_value_is_none():
-    values = table(1).values.copy()
+    values = ordered(1).values.copy()
     values[0] = 0.0
-    flat = ScoreTable(table(1).agents, table(1).episodes, ("m", "n"), values)
-    assert LARGEST.measured(assess(proxy=flat, target=table(2), metrics=M)) == {ALL: (None, None)}
+    assert LARGEST.measured(assess(proxy=table_of(values), target=ordered(2), metrics=M)) == {ALL: (None, None)}
 
 
 @pytest.mark.parametrize("measure", [PRPV, PPV])
 @pytest.mark.parametrize("seed", range(5))
 def test_on_means_alone_a_measure_is_what_is_reported(measure, seed):
-    found = assess(proxy=table(seed), target=table(seed + 100), metrics=M)
+    found = assess(proxy=ordered(seed), target=ordered(seed + 100), metrics=M)
     proxy, target = found.inputs.means
     assert measure.of_means(proxy=proxy, target=target, metrics=M) == measure.measured(found)[ALL].value
 

@@ -1,6 +1,5 @@
-"""Chance is a proxy that knows nothing about which agent is which.
+"""PRPV lies between chance and the noise floor, a domain against itself from the same starts; halves are called so.
 
-The noise floor is a domain against itself from the same starts; halves are called halves.
 Success rates have intervals of their own, and ties are counted.
 """
 
@@ -10,22 +9,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
+from score_tables import of_means, table_of
 
 from proxytune.scores import Metric, ScoreTable, read_domains
 from proxytune.usefulness import assess, chance, compare, floor_of_repeats, prpv_of_means
 from proxytune.usefulness.noise import noise_floor, split_halves, success_rates
 
 M = (Metric("m"), Metric("n"))
-
-
-def table(values):
-    return ScoreTable(tuple(f"A{i}" for i in range(len(values))), ("1",), ("m", "n"), values[:, None])
+FIRST = M[:1]
+SCORES = Path(__file__).parents[2] / "../shared/data/scores"
 
 
 def test_it_agrees_with_all_permutations_of_five_agents():
     proxy, target = np.random.default_rng(0).normal(size=(2, 5, 2))
     every = np.array([prpv_of_means(proxy[list(order)], target, M) for order in permutations(range(5))])
-    result = chance(proxy=table(proxy), target=table(target), metrics=M, permutations=4000)
+    result = chance(proxy=of_means(*proxy), target=of_means(*target), metrics=M, permutations=4000)
     assert result.mean == pytest.approx(every.mean(), abs=0.2)
     assert result.deviation == pytest.approx(every.std(), abs=0.2)
     assert result.p_value == pytest.approx((every <= prpv_of_means(proxy, target, M)).mean(), abs=0.03)
@@ -36,7 +34,10 @@ def test_ten_agents_and_two_unrelated_metrics_give_33_9_and_7_1():
     rng = np.random.default_rng(1)
     found = [
         chance(
-            proxy=table(rng.normal(size=(10, 2))), target=table(rng.normal(size=(10, 2))), metrics=M, permutations=300
+            proxy=of_means(*rng.normal(size=(10, 2))),
+            target=of_means(*rng.normal(size=(10, 2))),
+            metrics=M,
+            permutations=300,
         )
         for _ in range(60)
     ]
@@ -47,26 +48,15 @@ def test_ten_agents_and_two_unrelated_metrics_give_33_9_and_7_1():
 
 def test_a_perfect_proxy_is_hardly_by_chance_and_a_useless_one_is():
     target = np.random.default_rng(2).normal(size=(8, 1)).repeat(2, axis=1)
-    assert chance(proxy=table(target), target=table(target), metrics=M).p_value == pytest.approx(1 / 1001, abs=2e-3)
-    assert chance(proxy=table(-target), target=table(target), metrics=M).p_value == 1.0
-
-
-SCORES = Path(__file__).parents[2] / "../shared/data/scores"
-NOISE_M = (Metric("m"),)
-
-
-def table_of_noise(values):
-    agents, episodes = values.shape
-    return ScoreTable(
-        tuple(f"A{i}" for i in range(agents)), tuple(map(str, range(episodes))), ("m",), values[:, :, None]
+    assert chance(proxy=of_means(*target), target=of_means(*target), metrics=M).p_value == pytest.approx(
+        1 / 1001, abs=2e-3
     )
+    assert chance(proxy=of_means(*-target), target=of_means(*target), metrics=M).p_value == 1.0
 
 
 def repeated(values, repeats):
     """A table of START/REPEAT from values of shape (agents, starts · repeats)."""
-    plain = table_of_noise(values)
-    labels = (f"{episode // repeats}/{episode % repeats}" for episode in range(values.shape[1]))
-    return ScoreTable(plain.agents, tuple(labels), plain.metrics, plain.values)
+    return table_of(values, [f"{episode // repeats}/{episode % repeats}" for episode in range(values.shape[1])])
 
 
 def planted(seed, starts=6, noise=0.2):
@@ -81,7 +71,7 @@ def interleaved(one, two):
 
 
 def test_episodes_without_noise_have_no_floor_above_zero():
-    result = noise_floor(target=table_of_noise(np.arange(5.0)[:, None].repeat(4, axis=1)), metrics=NOISE_M)
+    result = noise_floor(target=table_of(np.arange(5.0)[:, None].repeat(4, axis=1)), metrics=FIRST)
     assert (result.value, result.low, result.high) == (0.0, 0.0, 0.0)
 
 
@@ -89,8 +79,7 @@ def test_more_noise_gives_a_higher_floor():
     rng = np.random.default_rng(0)
     noise = rng.normal(size=(8, 6))
     floors = [
-        noise_floor(target=table_of_noise(np.arange(8.0)[:, None] + size * noise), metrics=NOISE_M).value
-        for size in (0.3, 3.0)
+        noise_floor(target=table_of(np.arange(8.0)[:, None] + size * noise), metrics=FIRST).value for size in (0.3, 3.0)
     ]
     assert floors[0] < floors[1]
 
@@ -98,7 +87,7 @@ def test_more_noise_gives_a_higher_floor():
 def test_halves_are_disjoint_and_take_all_episodes_of_each_agent():
     values = np.zeros((3, 5))
     values[0, 4], values[1, :2] = np.nan, np.nan
-    uneven = table_of_noise(values)
+    uneven = table_of(values)
     first, second = split_halves(uneven.driven, np.random.default_rng(0), 50)
     assert ((first ^ second) == uneven.driven[:, None]).all()
     assert (first.sum(axis=-1) == np.array([[2], [1], [2]])).all()
@@ -110,11 +99,11 @@ def test_halves_are_disjoint_and_take_all_episodes_of_each_agent():
 def test_agents_with_the_same_episodes_are_split_alike():
     """Scores that depend on the start alone leave the order as it is in both halves."""
     starts = np.random.default_rng(0).normal(size=(1, 4))
-    assert noise_floor(target=table_of_noise(starts + np.arange(3.0)[:, None]), metrics=NOISE_M).high == 0.0
+    assert noise_floor(target=table_of(starts + np.arange(3.0)[:, None]), metrics=FIRST).high == 0.0
 
 
 def test_one_episode_gives_no_floor_and_says_why():
-    result = noise_floor(target=table_of_noise(np.arange(3.0)[:, None]), metrics=NOISE_M)
+    result = noise_floor(target=table_of(np.arange(3.0)[:, None]), metrics=FIRST)
     assert result.value is None
     assert result.kind == "none"
     assert "each agent has one episode on the target" in result.reason
@@ -123,17 +112,17 @@ def test_one_episode_gives_no_floor_and_says_why():
 @given(seed=st.integers(0, 10_000), starts=st.integers(2, 5), repeats=st.integers(2, 5))
 def test_without_placement_noise_a_domain_has_a_floor_of_zero(seed, starts, repeats):
     values = np.random.default_rng(seed).normal(size=(6, starts))
-    result = noise_floor(target=repeated(values.repeat(repeats, axis=1), repeats), metrics=NOISE_M, splits=20)
+    result = noise_floor(target=repeated(values.repeat(repeats, axis=1), repeats), metrics=FIRST, splits=20)
     assert (result.kind, result.value, result.high) == ("same starts", 0.0, 0.0)
-    same = floor_of_repeats(domain=table_of_noise(values), again=table_of_noise(values), metrics=NOISE_M, resamples=20)
+    same = floor_of_repeats(domain=table_of(values), again=table_of(values), metrics=FIRST, resamples=20)
     assert (same.kind, same.value, same.low, same.high) == ("same starts", 0.0, 0.0, 0.0)
 
 
 def test_with_strong_starts_and_little_noise_the_floor_lies_far_below_that_of_halves():
     (one, two), _ = planted(1)
-    halves = noise_floor(target=table_of_noise(interleaved(one, two)), metrics=NOISE_M)
-    floor = noise_floor(target=repeated(interleaved(one, two), 2), metrics=NOISE_M)
-    again = floor_of_repeats(domain=table_of_noise(one), again=table_of_noise(two), metrics=NOISE_M)
+    halves = noise_floor(target=table_of(interleaved(one, two)), metrics=FIRST)
+    floor = noise_floor(target=repeated(interleaved(one, two), 2), metrics=FIRST)
+    again = floor_of_repeats(domain=table_of(one), again=table_of(two), metrics=FIRST)
     assert (halves.kind, floor.kind, again.kind) == ("halves", "same starts", "same starts")
     assert 0.0 < floor.value < 0.4 * halves.value
     assert again.high < 0.4 * halves.value
@@ -146,8 +135,8 @@ def test_the_floor_is_what_a_perfect_proxy_scores():
     for seed in range(60):
         (one, two), rng = planted(seed, noise=1.0)
         third = planted(seed, noise=0.0)[0][0] + rng.normal(size=one.shape)
-        perfect = float(prpv_of_means(third.mean(axis=1)[:, None], one.mean(axis=1)[:, None], NOISE_M))
-        floor = floor_of_repeats(domain=table_of_noise(one), again=table_of_noise(two), metrics=NOISE_M, resamples=200)
+        perfect = float(prpv_of_means(third.mean(axis=1)[:, None], one.mean(axis=1)[:, None], FIRST))
+        floor = floor_of_repeats(domain=table_of(one), again=table_of(two), metrics=FIRST, resamples=200)
         scored.append(perfect)
         values.append(floor.value)
         within.append(perfect <= floor.high)
@@ -157,21 +146,21 @@ def test_the_floor_is_what_a_perfect_proxy_scores():
 
 def test_starts_are_paired_by_their_label_and_those_not_driven_both_times_left_out():
     (one, _), rng = planted(2)
-    again = table_of_noise(one).arrange(agents=table_of_noise(one).agents, episodes=tuple("543210"))
+    again = table_of(one).arrange(agents=table_of(one).agents, episodes=tuple("543210"))
     holes = again.values.copy()
     holes[0, 2], holes[3, :4] = np.nan, np.nan
     again = ScoreTable(again.agents, again.episodes, again.metrics, holes)
-    found = floor_of_repeats(domain=table_of_noise(one), again=again, metrics=NOISE_M)
+    found = floor_of_repeats(domain=table_of(one), again=again, metrics=FIRST)
     assert (found.value, found.low, found.high) == (0.0, 0.0, 0.0)
     assert found.again.driven.sum() == again.driven.sum()
     loud = ScoreTable(again.agents, again.episodes, again.metrics, holes + rng.normal(size=holes.shape))
-    assert floor_of_repeats(domain=table_of_noise(one), again=loud, metrics=NOISE_M).value > 0.0
+    assert floor_of_repeats(domain=table_of(one), again=loud, metrics=FIRST).value > 0.0
 
 
 def test_both_sides_may_have_repeats():
     (one, _), _ = planted(3)
     domain, again = repeated(one.repeat(2, axis=1), 2), repeated(one.repeat(3, axis=1), 3)
-    assert floor_of_repeats(domain=domain, again=again, metrics=NOISE_M).high == 0.0
+    assert floor_of_repeats(domain=domain, again=again, metrics=FIRST).high == 0.0
 
 
 @pytest.mark.parametrize(
@@ -181,15 +170,15 @@ def test_an_agent_with_less_than_two_starts_driven_both_times_gives_no_floor_but
     (one, two), _ = planted(4)
     two[5, [column for column in range(6) if column not in driven]] = np.nan
     two[5, 0] = two[4, 0] if driven else np.nan
-    found = floor_of_repeats(domain=table_of_noise(one), again=table_of_noise(two), metrics=NOISE_M)
+    found = floor_of_repeats(domain=table_of(one), again=table_of(two), metrics=FIRST)
     assert (found.kind, found.value, found.high) == ("none", None, None)
     assert told in found.reason
 
 
 def test_tables_without_a_start_in_common_give_no_floor():
     (one, two), _ = planted(5)
-    other = ScoreTable(table_of_noise(two).agents, tuple("abcdef"), ("m",), two[:, :, None])
-    assert "both times" in floor_of_repeats(domain=table_of_noise(one), again=other, metrics=NOISE_M).reason
+    other = table_of(two, "abcdef")
+    assert "both times" in floor_of_repeats(domain=table_of(one), again=other, metrics=FIRST).reason
 
 
 @pytest.mark.skipif(not SCORES.is_dir(), reason="the measured scores of ../shared/data are not here")

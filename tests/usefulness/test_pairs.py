@@ -1,8 +1,7 @@
-"""Both sides of a comparison must hold the same agents and metrics.
+"""PRPV counts wrongly ordered pairs of the same agents, sorted or compared, and repeats of a start are no other starts.
 
-Many agents are sorted instead of compared pair by pair, and every measure stays what it is to the last bit.
-PRPV against hand-worked cases, its properties, and the published pilot.
-START/REPEAT: repeats of a start are no other starts, for the bootstrap and for splits alike.
+First what is compared; then sorting, to the last bit; PRPV by hand, by its properties and in the published pilot; last
+START/REPEAT for the bootstrap and for splits.
 """
 
 from pathlib import Path
@@ -10,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
+from score_tables import bootstrap_prpv, of_means, table_of
 
 from proxytune.errors import ScoresError
 from proxytune.scores import Metric, ScoreTable, read_domains
@@ -27,10 +27,10 @@ from proxytune.usefulness import (
     starts_of,
 )
 from proxytune.usefulness.comparison import by_start, is_repeated, split_repeats, start_places
-from proxytune.usefulness.noise import _ties
+from proxytune.usefulness.noise import success_rates
 from proxytune.usefulness.pairs import FlippedPair, prpv, stand
 from proxytune.usefulness.predictivity import kendall_of_means, mmrv_of_means
-from proxytune.usefulness.resampling import bootstrap_prpv, draw_counts
+from proxytune.usefulness.resampling import draw_counts
 
 M = [Metric("m")]
 
@@ -121,16 +121,16 @@ def test_a_tolerance_that_differences_only_just_reach_is_a_tie_as_rounded():
 
 
 def test_ties_of_a_metric_are_counted_once_per_pair():
-    values = np.array([0.0, 1.0, 1.0, 1.0])[:, None, None]
-    table = ScoreTable(tuple("ABCD"), ("0",), ("won",), values)
-    assert _ties(table, Metric("won"), 0) == 3
+    scores = of_means(0.0, 1.0, 1.0, 1.0)
+    (rates,) = success_rates(compare(proxy=scores, target=scores, metrics=M))
+    assert (rates.ties, rates.pairs) == ((3, 3), 6)
 
 
 @pytest.mark.parametrize("labels", ["012345", ["0/0", "0/1", "1/0", "1/1", "2/0", "2/1"]])
 def test_drawing_for_a_few_agents_at_a_time_changes_nothing(labels, monkeypatch):
     values = np.random.default_rng(0).normal(size=(2, 7, 6, 1))
     values[:, 2, 4] = np.nan
-    proxy, target = (ScoreTable(tuple("ABCDEFG"), tuple(labels), ("m",), side) for side in values)
+    proxy, target = (table_of(side, labels) for side in values)
     first = assess(proxy=proxy, target=target, metrics=[Metric("m")], resamples=100)
     monkeypatch.setattr(resampling, "BLOCK", 1)
     again = assess(proxy=proxy, target=target, metrics=[Metric("m")], resamples=100)
@@ -145,12 +145,6 @@ M2 = (Metric("m"), Metric("n"))
 few = settings(max_examples=60, derandomize=True, deadline=None)
 
 
-def table_of_prpv(*rows, metrics=("m", "n"), agents="ABCDEFGHIJ"):
-    return ScoreTable.from_episodes(
-        {(agents[i], 1): dict(zip(metrics, np.atleast_1d(row).tolist(), strict=True)) for i, row in enumerate(rows)}
-    )
-
-
 @st.composite
 def pairs_of_means(draw):
     agents = draw(st.integers(2, 7))
@@ -160,16 +154,15 @@ def pairs_of_means(draw):
 
 def test_three_agents_by_hand():
     """Target A > B > C; proxy C > A > B: A–C and B–C are reversed, two each."""
-    m = [Metric("m")]
-    result = prpv(proxy=table_of_prpv(2, 1, 3, metrics=["m"]), target=table_of_prpv(3, 2, 1, metrics=["m"]), metrics=m)
+    result = prpv(proxy=of_means(2, 1, 3), target=of_means(3, 2, 1), metrics=M)
     assert result.value == 4
     assert result.pairs == (FlippedPair("A", "C", "reversed"), FlippedPair("B", "C", "reversed"))
 
 
 def test_four_agents_and_two_metrics_by_hand():
     """Target: A dominates all, B and C incomparable, both dominate D; proxy: as worked out pair by pair."""
-    target = table_of_prpv((4, 4), (3, 2), (2, 3), (1, 1))
-    proxy = table_of_prpv((4, 1), (3, 3), (2, 2), (1, 4))
+    target = of_means((4, 4), (3, 2), (2, 3), (1, 1))
+    proxy = of_means((4, 1), (3, 3), (2, 2), (1, 4))
     result = prpv(proxy=proxy, target=target, metrics=M2)
     assert set(result.pairs) == {
         FlippedPair("A", "B", "lost"),
@@ -184,16 +177,14 @@ def test_four_agents_and_two_metrics_by_hand():
 
 
 def test_a_result_carries_inputs_direction_and_range():
-    result = prpv(proxy=table_of_prpv((1, 1), (2, 2)), target=table_of_prpv((2, 2), (1, 1)), metrics=M2)
+    result = prpv(proxy=of_means((1, 1), (2, 2)), target=of_means((2, 2), (1, 1)), metrics=M2)
     assert (result.value, result.range, result.better) == (2, (0, 2), "lower")
     assert (result.inputs.agents, result.inputs.target_episodes) == (("A", "B"), (1, 1))
 
 
 def test_the_parts_make_up_the_whole():
     rng = np.random.default_rng(3)
-    result = prpv(
-        proxy=table_of_prpv(*rng.normal(size=(9, 2))), target=table_of_prpv(*rng.normal(size=(9, 2))), metrics=M2
-    )
+    result = prpv(proxy=of_means(*rng.normal(size=(9, 2))), target=of_means(*rng.normal(size=(9, 2))), metrics=M2)
     assert sum(2 if pair.flip == "reversed" else 1 for pair in result.pairs) == result.value
     assert {pair.flip for pair in result.pairs} == {"reversed", "lost", "invented"}
 
@@ -221,7 +212,7 @@ def test_it_is_a_whole_number_within_bounds_symmetric_and_zero_for_the_same(mean
 @few
 @given(pairs_of_means(), st.randoms(use_true_random=False))
 def test_the_order_of_the_agents_does_not_matter(means, random):
-    proxy, target = (table_of_prpv(*rows) for rows in means)
+    proxy, target = (of_means(*rows) for rows in means)
     names = list(proxy.agents)
     random.shuffle(names)
     shuffled = ScoreTable.from_episodes(
@@ -296,13 +287,6 @@ def test_the_real_duckiebot_against_itself_flips_56_of_240():
     assert (result.value, result.range[1]) == (56, 240)
 
 
-REPEATS_M = (Metric("m"),)
-
-
-def table_of_repeats(values, labels):
-    return ScoreTable(tuple(f"A{i}" for i in range(len(values))), tuple(labels), ("m",), np.array(values)[:, :, None])
-
-
 def split(scores, splits):
     keys = np.random.default_rng(0).random((splits, len(scores.episodes)))
     return split_repeats(scores.driven, start_places(scores), keys)
@@ -320,7 +304,7 @@ def test_the_start_is_what_is_before_the_last_stroke():
 def test_both_sets_hold_every_start_equally_often_and_share_no_episode():
     values = np.zeros((3, 9))
     values[0, 4] = np.nan
-    first, second = split(table_of_repeats(values, labelled(3, 3)), 40)
+    first, second = split(table_of(values, labelled(3, 3)), 40)
     assert not (first & second).any()
     assert not first[0, :, 4].any()
     assert not second[0, :, 4].any()
@@ -333,7 +317,7 @@ def test_both_sets_hold_every_start_equally_often_and_share_no_episode():
 def test_an_agent_that_lost_a_repeat_is_split_over_its_other_starts():
     values = np.zeros((2, 4))
     values[0, 3] = np.nan
-    first, second = split(table_of_repeats(values, labelled(2, 2)), 10)
+    first, second = split(table_of(values, labelled(2, 2)), 10)
     assert (first[0] ^ second[0] == [True, True, False, False]).all()
     assert (first[1] ^ second[1]).all()
 
@@ -348,27 +332,27 @@ def test_an_agent_that_lost_a_repeat_is_split_over_its_other_starts():
     ],
 )
 def test_repeats_are_there_only_where_every_start_has_two(labels, expected):
-    assert is_repeated(table_of_repeats(np.zeros((2, 4)), labels)) is expected
+    assert is_repeated(table_of(np.zeros((2, 4)), labels)) is expected
 
 
 def test_labels_of_an_agent_s_own_are_no_starts():
     values = [[0.0, 0.0, np.nan, np.nan], [np.nan, np.nan, 0.0, 0.0]]
-    assert not is_repeated(table_of_repeats(values, ["A0/0", "A0/1", "A1/0", "A1/1"]))
+    assert not is_repeated(table_of(values, ["A0/0", "A0/1", "A1/0", "A1/1"]))
 
 
 def test_an_agent_without_any_start_twice_leaves_nothing_to_split():
     values = [[0.0, np.nan, 0.0, np.nan], [0.0] * 4]
-    assert not is_repeated(table_of_repeats(values, labelled(2, 2)))
+    assert not is_repeated(table_of(values, labelled(2, 2)))
 
 
 def test_by_start_takes_the_mean_over_the_repeats_that_were_driven():
-    found = by_start(table_of_repeats([[1.0, 3.0, np.nan, 5.0], [1.0, 1.0, np.nan, np.nan]], labelled(2, 2)))
+    found = by_start(table_of([[1.0, 3.0, np.nan, 5.0], [1.0, 1.0, np.nan, np.nan]], labelled(2, 2)))
     assert found.episodes == ("0", "1")
     np.testing.assert_array_equal(found.values[:, :, 0], [[2.0, 5.0], [1.0, np.nan]])
 
 
 def test_repeats_of_a_start_are_drawn_together_and_plain_episodes_as_ever():
-    repeated, plain = table_of_repeats(np.zeros((2, 6)), labelled(3, 2)), table_of_repeats(np.zeros((2, 3)), "012")
+    repeated, plain = table_of(np.zeros((2, 6)), labelled(3, 2)), table_of(np.zeros((2, 3)), "012")
     counts = draw_counts(repeated, np.random.default_rng(0), 30)
     assert (counts[..., ::2] == counts[..., 1::2]).all()
     np.testing.assert_array_equal(counts[..., ::2], draw_counts(plain, np.random.default_rng(0), 30))
@@ -376,49 +360,39 @@ def test_repeats_of_a_start_are_drawn_together_and_plain_episodes_as_ever():
 
 def test_of_one_start_alone_the_repeats_are_drawn_and_that_is_said():
     values = np.random.default_rng(0).normal(size=(4, 6))
-    counts = draw_counts(table_of_repeats(values, labelled(1, 6)), np.random.default_rng(0), 30)
+    counts = draw_counts(table_of(values, labelled(1, 6)), np.random.default_rng(0), 30)
     assert len(np.unique(counts[0], axis=0)) > 10
     assert not compare(
-        proxy=table_of_repeats(values[:, :3], labelled(1, 3)),
-        target=table_of_repeats(values, labelled(1, 6)),
-        metrics=REPEATS_M,
+        proxy=table_of(values[:, :3], labelled(1, 3)), target=table_of(values, labelled(1, 6)), metrics=M
     ).paired
-    found = assess(
-        proxy=table_of_repeats(values, "abcdef"), target=table_of_repeats(values, labelled(1, 6)), metrics=REPEATS_M
-    )
+    found = assess(proxy=table_of(values, "abcdef"), target=table_of(values, labelled(1, 6)), metrics=M)
     assert any("from one start" in note for note in found.notes)
 
 
 def test_a_proxy_of_plain_starts_is_paired_with_a_target_of_repeats_by_start():
     """Scores that depend on the start alone stay equal in every resample, in whatever order the starts come."""
     starts = np.random.default_rng(0).normal(size=(1, 5)).repeat(3, axis=0)
-    target = table_of_repeats(starts.repeat(2, axis=1), labelled(5, 2))
-    inputs = compare(proxy=table_of_repeats(starts[:, ::-1], "43210"), target=target, metrics=REPEATS_M)
+    target = table_of(starts.repeat(2, axis=1), labelled(5, 2))
+    inputs = compare(proxy=table_of(starts[:, ::-1], "43210"), target=target, metrics=M)
     assert inputs.paired
     means = bootstrap_means(inputs, resamples=50, seed=1)
     np.testing.assert_allclose(means[0], means[1], atol=1e-12)
     assert np.ptp(means[0], axis=0).min() > 0.0
-    assert not compare(proxy=table_of_repeats(starts, "abcde"), target=target, metrics=REPEATS_M).paired
+    assert not compare(proxy=table_of(starts, "abcde"), target=target, metrics=M).paired
 
 
 def test_more_repeats_of_the_same_starts_make_no_interval_narrower():
     """Copies of every episode say nothing new."""
     rng = np.random.default_rng(3)
-    starts, proxy = rng.normal(size=(8, 4)), table_of_repeats(rng.normal(size=(8, 6)), "abcdef")
-    once = bootstrap_prpv(proxy=proxy, target=table_of_repeats(starts, "0123"), metrics=REPEATS_M)
-    copied = bootstrap_prpv(
-        proxy=proxy, target=table_of_repeats(starts.repeat(5, axis=1), labelled(4, 5)), metrics=REPEATS_M
-    )
+    starts, proxy = rng.normal(size=(8, 4)), table_of(rng.normal(size=(8, 6)), "abcdef")
+    once = bootstrap_prpv(proxy=proxy, target=table_of(starts, "0123"), metrics=M)
+    copied = bootstrap_prpv(proxy=proxy, target=table_of(starts.repeat(5, axis=1), labelled(4, 5)), metrics=M)
     assert (copied.low, copied.high) == (once.low, once.high)
 
 
 def test_starts_and_not_repeats_are_counted_as_few():
     values = np.random.default_rng(0).normal(size=(4, 12))
-    found = assess(
-        proxy=table_of_repeats(values, labelled(3, 4)),
-        target=table_of_repeats(values, labelled(3, 4)),
-        metrics=REPEATS_M,
-    )
+    found = assess(proxy=table_of(values, labelled(3, 4)), target=table_of(values, labelled(3, 4)), metrics=M)
     assert any(note.startswith("only 3 starts per agent") for note in found.notes)
-    loose = table_of_repeats(values, labelled(3, 4)).unpaired()
-    assert not any("few" in note for note in assess(proxy=loose, target=loose, metrics=REPEATS_M).notes)
+    loose = table_of(values, labelled(3, 4)).unpaired()
+    assert not any("few" in note for note in assess(proxy=loose, target=loose, metrics=M).notes)

@@ -1,9 +1,4 @@
-"""SRCC and Kendall's τ agree with scipy and SIMPLER, and say where they are undefined.
-
-MMRV is what a wrong order costs on the target.
-POD compares what two domains answer to the same commands.
-PPV weighs how far the scores are off.
-"""
+"""Correlations agree with scipy and SIMPLER; MMRV is the cost of a wrong order, POD and PPV that of wrong values."""
 
 import csv
 from pathlib import Path
@@ -11,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy import stats
+from score_tables import of_means
 
 from proxytune.errors import InputError
 from proxytune.scores import Metric, ScoreTable
@@ -29,10 +25,6 @@ SCORES = Path(__file__).parents[2] / "../shared/data/scores"
 M = [Metric("m"), Metric("n")]
 
 
-def table(rows, agents="ABCDEFGH"):
-    return ScoreTable.from_episodes({(agents[i], 1): {"m": float(m), "n": float(n)} for i, (m, n) in enumerate(rows)})
-
-
 def test_both_agree_with_scipy_also_where_there_are_ties():
     rng = np.random.default_rng(1)
     proxy, target = rng.integers(0, 4, size=(2, 50, 8, 2)).astype(float)
@@ -44,7 +36,7 @@ def test_both_agree_with_scipy_also_where_there_are_ties():
 
 
 def test_a_constant_metric_is_undefined_and_said_so():
-    proxy, target = table([(1, 5), (2, 5), (3, 5)]), table([(1, 1), (2, 2), (2, 3)])
+    proxy, target = of_means((1, 5), (2, 5), (3, 5)), of_means((1, 1), (2, 2), (2, 3))
     for measure in (srcc, kendall_tau):
         result = measure(proxy=proxy, target=target, metrics=M)
         assert result.value["n"] is None
@@ -54,13 +46,13 @@ def test_a_constant_metric_is_undefined_and_said_so():
 
 
 def test_identical_tables_correlate_exactly():
-    same = table([(0.1, 5), (0.2, 3), (0.4, 4)])
+    same = of_means((0.1, 5), (0.2, 3), (0.4, 4))
     for measure in (srcc, kendall_tau):
         assert measure(proxy=same, target=same, metrics=M).value == {"m": 1.0, "n": 1.0}
 
 
 def test_two_agents_correlate_perfectly_which_means_nothing():
-    result = srcc(proxy=table([(1, 1), (2, 2)]), target=table([(1, 2), (2, 1)]), metrics=M)
+    result = srcc(proxy=of_means((1, 1), (2, 2)), target=of_means((1, 2), (2, 1)), metrics=M)
     assert result.value == {"m": pytest.approx(1.0), "n": pytest.approx(-1.0)}
     assert "of two agents" in result.notes[0]
 
@@ -81,13 +73,9 @@ def test_simplers_own_figures_come_out():
         assert srcc(**sides, metrics=metric).value["success"] == pytest.approx(float(task["pearson"]), abs=1e-9)
 
 
-def table_of_mmrv(values):
-    return ScoreTable.from_episodes({(a, 1): {"m": v} for a, v in zip("ABC", values, strict=True)})
-
-
 def test_three_agents_by_hand():
     """B and C change places: that costs each of them 0.3, and A nothing."""
-    result = mmrv(proxy=table_of_mmrv([0.9, 0.4, 0.6]), target=table_of_mmrv([0.8, 0.5, 0.2]), metrics=[Metric("m")])
+    result = mmrv(proxy=of_means(0.9, 0.4, 0.6), target=of_means(0.8, 0.5, 0.2), metrics=[Metric("m")])
     assert result.value["m"] == pytest.approx((0 + 0.3 + 0.3) / 3)
     assert result.range["m"] == (0.0, pytest.approx(0.6))
     assert result.better == "lower"
@@ -113,7 +101,7 @@ def test_it_is_simplers_double_loop_also_where_there_are_ties():
 
 
 def test_a_proxy_that_ties_everything_is_charged_for_the_better_agents():
-    tied, target = table_of_mmrv([0.5, 0.5, 0.5]), table_of_mmrv([0.1, 0.4, 0.9])
+    tied, target = of_means(0.5, 0.5, 0.5), of_means(0.1, 0.4, 0.9)
     assert mmrv(proxy=tied, target=target, metrics=[Metric("m")]).value["m"] == pytest.approx((0 + 0.3 + 0.8) / 3)
     assert mmrv(proxy=tied, target=target, metrics=[Metric("m", "min")]).value["m"] == pytest.approx(
         (0.8 + 0.5 + 0) / 3
@@ -123,10 +111,7 @@ def test_a_proxy_that_ties_everything_is_charged_for_the_better_agents():
 def test_the_same_order_costs_nothing_in_either_direction():
     for direction in ("max", "min"):
         metric = [Metric("m", direction)]
-        assert (
-            mmrv(proxy=table_of_mmrv([1.0, 5.0, 9.0]), target=table_of_mmrv([0.1, 0.2, 0.7]), metrics=metric).value["m"]
-            == 0.0
-        )
+        assert mmrv(proxy=of_means(1.0, 5.0, 9.0), target=of_means(0.1, 0.2, 0.7), metrics=metric).value["m"] == 0.0
 
 
 STILL = np.zeros((4, 3))
@@ -178,22 +163,18 @@ def test_observations_that_cannot_be_compared_are_refused(measure, proxy, target
         measure(proxy=proxy, target=target)
 
 
-def table_of_ppv(rows):
-    return ScoreTable.from_episodes({(a, 1): {"m": m, "n": n} for a, (m, n) in zip("ABC", rows, strict=True)})
-
-
-TARGET = table_of_ppv([(1.0, 10.0), (2.0, 20.0), (3.0, 30.0)])
+TARGET = of_means((1.0, 10.0), (2.0, 20.0), (3.0, 30.0))
 
 
 def test_given_weights_by_hand():
-    proxy = table_of_ppv([(2.0, 10.0), (2.0, 20.0), (1.0, 36.0)])
+    proxy = of_means((2.0, 10.0), (2.0, 20.0), (1.0, 36.0))
     result = ppv(proxy=proxy, target=TARGET, metrics=M, beta={"m": 1.0, "n": 0.5})
     assert result.value == pytest.approx((1 + 0 + 2 + 0.5 * 6) / 3)
     assert result.better == "lower"
 
 
 def test_without_weights_a_metric_counts_in_its_spread_on_the_target():
-    proxy = table_of_ppv([(2.0, 20.0), (3.0, 30.0), (4.0, 40.0)])
+    proxy = of_means((2.0, 20.0), (3.0, 30.0), (4.0, 40.0))
     result = ppv(proxy=proxy, target=TARGET, metrics=M)
     assert result.beta == {"m": pytest.approx(1.0), "n": pytest.approx(0.1)}
     assert result.value == pytest.approx(2.0)
@@ -204,15 +185,15 @@ def test_identical_tables_are_foretold_exactly():
 
 
 def test_the_unit_of_a_metric_does_not_matter_without_weights():
-    proxy = table_of_ppv([(2.0, 10.0), (2.0, 20.0), (1.0, 36.0)])
-    scaled = [table_of_ppv([(1000 * m, n) for m, n in side.means.tolist()]) for side in (proxy, TARGET)]
+    proxy = of_means((2.0, 10.0), (2.0, 20.0), (1.0, 36.0))
+    scaled = [of_means(*[(1000 * m, n) for m, n in side.means.tolist()]) for side in (proxy, TARGET)]
     assert ppv(proxy=scaled[0], target=scaled[1], metrics=M).value == pytest.approx(
         ppv(proxy=proxy, target=TARGET, metrics=M).value
     )
 
 
 def test_a_metric_constant_on_the_target_is_left_out_and_said_so():
-    flat = table_of_ppv([(1.0, 5.0), (2.0, 5.0), (3.0, 5.0)])
+    flat = of_means((1.0, 5.0), (2.0, 5.0), (3.0, 5.0))
     result = ppv(proxy=TARGET, target=flat, metrics=M)
     assert (result.value, result.beta["n"]) == (0.0, None)
     assert "n: left out of PPV" in result.notes[0]

@@ -2,29 +2,24 @@
 
 import numpy as np
 import pytest
+from score_tables import bootstrap_prpv, table_of
 
-from proxytune.scores import Metric, ScoreTable
+from proxytune.scores import Metric
 from proxytune.usefulness import bootstrap_means, compare, prpv_of_means, resampling
-from proxytune.usefulness.resampling import bootstrap_prpv, draw_counts
+from proxytune.usefulness.resampling import draw_counts
 
 M = (Metric("m"), Metric("n"))
 
 
-def table(values, labels=None):
-    agents, episodes, _ = values.shape
-    labels = labels or [str(e) for e in range(episodes)]
-    return ScoreTable(tuple(f"A{i}" for i in range(agents)), tuple(labels), ("m", "n"), values)
-
-
 def noisy(seed, agents=6, episodes=5, noise=1.0):
     rng = np.random.default_rng(seed)
-    return table(rng.normal(size=(agents, 1, 2)) + noise * rng.normal(size=(agents, episodes, 2)))
+    return table_of(rng.normal(size=(agents, 1, 2)) + noise * rng.normal(size=(agents, episodes, 2)))
 
 
 def test_paired_episodes_are_resampled_alike_for_all_agents_and_both_domains():
     """Scores that depend on the start alone stay equal in every resample."""
     starts = np.random.default_rng(0).normal(size=(1, 5, 2)).repeat(4, axis=0)
-    means = bootstrap_means(compare(proxy=table(starts), target=table(starts), metrics=M), resamples=50, seed=1)
+    means = bootstrap_means(compare(proxy=table_of(starts), target=table_of(starts), metrics=M), resamples=50, seed=1)
     np.testing.assert_array_equal(means[0], means[1])
     assert np.ptp(means[0], axis=1).max() == 0.0
     assert np.ptp(means[0], axis=0).min() > 0.0
@@ -32,7 +27,7 @@ def test_paired_episodes_are_resampled_alike_for_all_agents_and_both_domains():
 
 def test_episodes_of_other_labels_are_resampled_apart():
     starts = np.random.default_rng(0).normal(size=(1, 5, 2)).repeat(4, axis=0)
-    inputs = compare(proxy=table(starts, "abcde"), target=table(starts), metrics=M)
+    inputs = compare(proxy=table_of(starts, "abcde"), target=table_of(starts), metrics=M)
     means = bootstrap_means(inputs, resamples=50, seed=1)
     assert np.abs(means[0] - means[1]).max() > 0.0
 
@@ -40,7 +35,7 @@ def test_episodes_of_other_labels_are_resampled_apart():
 def test_each_agent_keeps_its_own_number_of_episodes():
     values = np.random.default_rng(0).normal(size=(3, 4, 2))
     values[0, 2:], values[1, 0] = np.nan, np.nan
-    uneven = table(values)
+    uneven = table_of(values)
     counts = draw_counts(uneven, np.random.default_rng(2), 100)
     assert (counts.sum(axis=-1) == np.array([[2], [3], [4]])).all()
     assert not counts[~np.isnan(values[:, None, :, 0]).repeat(100, axis=1) == 0].any()
@@ -82,7 +77,7 @@ def test_one_episode_gives_no_interval_and_says_why():
         assert f"each agent has one episode {where}" in result.reason
     uneven = noisy(1).values.copy()
     uneven[3, 1:] = np.nan
-    assert "agent 'A3' has one" in bootstrap_prpv(proxy=table(uneven), target=noisy(2), metrics=M).reason
+    assert "agent 'A3' has one" in bootstrap_prpv(proxy=table_of(uneven), target=noisy(2), metrics=M).reason
 
 
 def test_blocks_change_nothing(monkeypatch):
@@ -104,7 +99,7 @@ def test_the_interval_covers_the_expected_prpv_at_about_the_nominal_rate(paired)
     expected = prpv_of_means(many[0], many[1], M).mean()
     held = []
     for seed in range(300):
-        sides = [table(mean[:, None] + noise * rng.normal(size=(agents, episodes, 2))) for mean in truth]
+        sides = [table_of(mean[:, None] + noise * rng.normal(size=(agents, episodes, 2))) for mean in truth]
         sides = sides if paired else [side.unpaired() for side in sides]
         result = bootstrap_prpv(proxy=sides[0], target=sides[1], metrics=M, resamples=300, seed=seed)
         held.append(result.low <= expected <= result.high)
@@ -114,7 +109,7 @@ def test_the_interval_covers_the_expected_prpv_at_about_the_nominal_rate(paired)
 def test_episodes_of_uneven_agents_are_drawn_evenly_and_independently():
     values = np.zeros((2, 5, 2))
     values[0, 3:] = np.nan
-    counts = draw_counts(table(values), np.random.default_rng(3), 20_000)
+    counts = draw_counts(table_of(values), np.random.default_rng(3), 20_000)
     for drawn, episodes in zip(counts, (3, 5), strict=True):
         together = np.full((episodes, episodes), -1 / episodes) + np.eye(episodes)  # a multinomial's
         np.testing.assert_allclose(drawn[:, :episodes].mean(axis=0), 1.0, atol=0.03)

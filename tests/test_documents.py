@@ -9,6 +9,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+from operator import attrgetter
 from pathlib import Path
 
 import pytest
@@ -253,6 +254,15 @@ def test_every_room_is_on_the_page_about_architecture_in_reading_order():
     named = re.findall(r"^\| `proxytune\.(\w+)", section(DOCS["architecture.md"], "The rooms"), flags=re.MULTILINE)
     assert rooms == set(named)
     assert [floor(room) for room in named] == sorted(floor(room) for room in named), "a room stands before one it needs"
+
+
+def test_every_step_of_the_architecture_s_stories_names_what_its_module_defines():
+    steps = re.findall(r"^\d+\. `(proxytune[\w.]*)`:((?:.|\n {3})*)", DOCS["architecture.md"], flags=re.MULTILINE)
+    assert len(steps) > 25
+    for module, told in steps:
+        for name in re.findall(r"`(?!proxytune\.)(\w+(?:\.\w+)*)`", told):
+            value = attrgetter(name)(importlib.import_module(module))
+            assert value.__module__ == module, f"{module}: {name} is of {value.__module__}"
 
 
 def test_the_readme_is_short_and_docs_readme_leads_to_every_page_of_docs():

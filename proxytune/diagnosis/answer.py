@@ -1,9 +1,9 @@
 """The answer that both houses of a diagnosis give, motion and camera: estimates, verdicts, and the rules they go by.
 
-Each house fits the declared model, selects the effects that it lacks by forward selection, drops those that are
-negligible, and compares the error before and after on data that was not fitted. Both then say one of five words
-(`verdict`). Every threshold that decides what is named, believed or told of motion is one of `Rules`: a diagnosis takes
-them as an argument, and its drives carry them (`Drives.rules`), so that one may ask what another rule would have said.
+Each house fits the declared model, selects the effects that it lacks, drops those that are negligible, and compares
+the error before and after on data that was not fitted. Both then say one of five words (`verdict`). Every threshold
+that decides what is named, believed or told of motion is one of `Rules`: a diagnosis takes them as an argument, and its
+drives carry them (`Drives.rules`), so that one may ask what another rule would have said.
 What makes the arithmetic work or keeps it quick (steps, grids, numbers of draws) stands beside the arithmetic; what
 makes a log unusable stands beside the checks of logs.
 """

@@ -96,24 +96,6 @@ class SweepRecord:
     replays: str = ""
 
 
-_OF_EARLIER = "instance IN (SELECT id FROM instances WHERE identity = :earlier)"
-_SAME_THETA = """
-    (SELECT renamed.id FROM instances AS renamed JOIN instances AS old USING (theta)
-    WHERE renamed.identity = :now AND old.id = instance)"""
-RENAMING = (
-    "INSERT OR IGNORE INTO instances (identity, theta) SELECT :now, theta FROM instances WHERE identity = :earlier",
-    f"UPDATE trials SET instance = {_SAME_THETA} WHERE {_OF_EARLIER}",
-    f"UPDATE OR IGNORE episodes SET instance = {_SAME_THETA} WHERE {_OF_EARLIER}",
-    f"DELETE FROM episodes WHERE {_OF_EARLIER}",
-    "DELETE FROM instances WHERE identity = :earlier",
-    "UPDATE OR IGNORE sweeps SET identity = :now WHERE identity = :earlier",
-    "DELETE FROM sweeps WHERE identity = :earlier",
-    "UPDATE OR IGNORE sweeps SET replays = :now WHERE replays = :earlier",
-    "DELETE FROM sweeps WHERE replays = :earlier",
-)
-"""What gives one identity's instances, trials, episodes and sweeps to another, step by step."""
-
-
 class Store:
     """A study's database. Every method raises StoreError in one line; what had been committed stays."""
 
@@ -171,20 +153,6 @@ class Store:
         """Write one more fact, over what it was before; trials are kept."""
         with self._transaction() as connection:
             write_row(connection, "facts", {"key": key, "value": json.dumps(value, allow_nan=False)})
-
-    def rename_identity(self, earlier: Collection[str], identity: str) -> None:
-        """Make all that is kept under earlier identities of a domain family belong to this one, at once.
-
-        Where both have the same episode or sweep, this one's is kept.
-        """
-        with self._transaction() as connection:
-            for name in earlier:
-                for statement in RENAMING:
-                    connection.execute(statement, {"earlier": name, "now": identity})
-                values = (json.dumps(identity), json.dumps(name))
-                connection.execute("UPDATE facts SET value = ? WHERE key = 'identity' AND value = ?", values)
-            seal(connection)
-        self._outcomes.clear()
 
     def trials(self, objective: str = "prpv") -> list[TrialRecord]:
         """Every trial of a search, in order; the last ones may be open."""

@@ -6,7 +6,7 @@ import pytest
 from proxytune.domain import Outcome, make_episode
 from proxytune.errors import InputError, StoreError
 from proxytune.storage import Store, SweepRecord, TrialRecord
-from proxytune.storage.store import RENAMING, theta_json
+from proxytune.storage.store import theta_json
 
 THETA = {"trim": 0.1, "delay": 1 / 3}
 EPISODE = make_episode(THETA, agent="agent1", start=2, seed=11)
@@ -179,52 +179,6 @@ def test_a_fact_is_added_and_written_over_without_a_trial_lost(tmp_path):
         store.save_fact("versions", {"numpy": "2.1"})
         assert store.facts() == {"seed": 2, "versions": {"numpy": "2.1"}}
         assert store.trials() == [TrialRecord(1, THETA)]
-
-
-def test_what_earlier_identities_have_belongs_to_the_new_one(tmp_path):
-    finished = TrialRecord(1, THETA, "finished", 4.0, {"prpv": 4.0, "ppv": 0.25})
-    sweep = SweepRecord("trim", {"delay": 0.1}, (0.0, 0.1))
-    with Store.open(tmp_path) as store:
-        store.begin({"seed": 2, "identity": "older"})
-        store.save_trial("old", finished)
-        store.save_outcome("old", WORKED)
-        store.save_outcome("older", replace(WORKED, episode=OTHER_EPISODE))
-        store.save_outcome("somebody's", replace(WORKED, episode=OTHER_EPISODE))
-        store.save_sweep("old", replace(sweep, target_model="trim = 0.1", replays="older"))
-        store.rename_identity(("old", "older"), "new")
-        assert store.outcomes("new", THETA) == {e: replace(WORKED, episode=e) for e in (EPISODE, OTHER_EPISODE)}
-        assert store.outcomes("old", THETA) == store.outcomes("older", THETA) == {}
-        assert set(store.outcomes("somebody's", THETA)) == {OTHER_EPISODE}
-        assert store.trials() == [finished]
-        assert store.facts() == {"seed": 2, "identity": "new"}
-        assert store.sweeps() == [("new", replace(sweep, target_model="trim = 0.1", replays="new"))]
-
-
-def test_where_both_identities_have_something_the_new_one_s_is_kept(tmp_path):
-    sweep = SweepRecord("trim", {}, (0.0, 0.1))
-    with Store.open(tmp_path) as store:
-        store.save_trial("old", TrialRecord(1, THETA))
-        store.save_outcome("old", replace(WORKED, metrics={"distance": 1.0}))
-        store.save_outcome("new", WORKED)
-        for name in ("old", "new"):
-            store.save_sweep(name, sweep)
-        store.rename_identity(("old",), "new")
-        assert store.outcomes("new", THETA) == {EPISODE: WORKED}
-        assert store.trials() == [TrialRecord(1, THETA)]
-        assert store.sweeps() == [("new", sweep)]
-    with sqlite3.connect(tmp_path / "study.db") as plain:
-        assert plain.execute("SELECT count(*) FROM instances").fetchone() == (1,)
-        assert plain.execute("SELECT count(*) FROM episodes").fetchone() == (1,)
-
-
-def test_renaming_is_whole_or_not_at_all(tmp_path, monkeypatch):
-    monkeypatch.setattr("proxytune.storage.store.RENAMING", (*RENAMING[:4], "no such statement"))
-    with Store.open(tmp_path) as store:
-        store.save_outcome("old", WORKED)
-        with pytest.raises(StoreError):
-            store.rename_identity(("old",), "new")
-        assert store.outcomes("old", THETA) == {EPISODE: WORKED}
-        assert store.outcomes("new", THETA) == {}
 
 
 RUNNING = [replace(EPISODE, start=start) for start in (0, 1)]

@@ -329,8 +329,8 @@ def diagnose(
         rules: Thresholds of what is named, believed and told.
 
     Raises:
-        LogError: If the log cannot bear the question (too short, no motion, other units), or a declared effect is unknown
-            or does not act on motion.
+        LogError: If the log cannot bear the question (too short, no motion, other units), or a declared effect is
+            unknown or does not act on motion.
     """
     names, parameters = declared_parameters(declared, robot.catalogue), robot.catalogue.parameters
     start = {name: robot.theta.get(name, parameters[name].neutral_value(robot.figures)) for name in names}

@@ -150,7 +150,7 @@ class Discrepancy:
 
 @functools.lru_cache(maxsize=64)
 def _on_target(target: Replayable, episode: Episode) -> tuple[Any, Observed]:
-    """What the agent issued and what it led to; the same at every point of a sweep."""
+    """Commands of the agent and the poses they led to; the same at every point of a sweep."""
     commands = np.asarray(target.drive(episode).commands)[:COMMANDS]
     return commands, target.replay(episode, commands)
 

@@ -1,4 +1,4 @@
-"""What a Python user calls: one function for each command, on files or DataFrames, with a report that shows itself.
+"""The Python interface: one function for each command, on files or DataFrames, with a report that shows itself.
 
     study        run_study, read_study: pre-flight, trials, confirmation
     families     several simulators, each tuned in the same time

@@ -88,7 +88,7 @@ class SweepReport:
 
     @property
     def held(self) -> str:
-        """What the other parameters are held at, in words."""
+        """Values at which the other parameters are held, in words."""
         if self.chosen == "best":
             values = held_values(self.theta, whose="the study's best θ: ")
             return f"{values}; --at nominal holds the robot's own"
@@ -105,7 +105,7 @@ class SweepReport:
         }
 
     def document(self) -> dict[str, Any]:
-        """What `sweep --json` prints of it, without the files."""
+        """The JSON document of `sweep --json`, without the files."""
         return {
             "curves": [curve_document(curve) for curve in self.curves],
             "episodes": {"run": self.episodes},
@@ -220,7 +220,7 @@ class TeachReport:
         return pd.DataFrame.from_dict(rows, orient="index").rename_axis("proxy")
 
     def document(self) -> dict[str, Any]:
-        """What `teach --json` prints of it, without the files."""
+        """The JSON document of `teach --json`, without the files."""
         return teach_document(self.experiment, self.prpv)
 
     def write(self, command: str = "") -> tuple[Path, Path]:

@@ -32,7 +32,7 @@ IN_PYTHON = {"--robot": "robot=…", "--declared ": "declared: ", "--test": "tes
 
 @dataclass(frozen=True, repr=False)
 class DiagnosisReport:
-    """What a log says of a model.
+    """Result of a diagnosis: what a log says of a model.
 
     Attributes:
         found: All of it.
@@ -71,7 +71,7 @@ class DiagnosisReport:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What else is to be known, a line each: what each effect is worth, what this log could not show."""
+        """Notes, a line each: what each effect is worth, what this log could not show."""
         return tuple(diagnosis_notes(self.found))
 
     @property
@@ -105,7 +105,7 @@ class DiagnosisReport:
         return diagnosis_figures(self.found)
 
     def document(self) -> dict[str, Any]:
-        """What `diagnose --json` prints of it."""
+        """The JSON document of `diagnose --json`."""
         return diagnosis_document(self.found)
 
     def write(self, folder: str | Path, command: str = "") -> list[Path]:

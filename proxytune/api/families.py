@@ -74,7 +74,7 @@ class Quiet:
 
 
 class Spending(NamedTuple):
-    """What a call spends otherwise than study.toml says.
+    """Budgets of a call that differ from study.toml's.
 
     Attributes:
         budget: How many trials a family has at most.
@@ -89,7 +89,7 @@ class Spending(NamedTuple):
 
 @dataclass(frozen=True, repr=False)
 class FamiliesReport:
-    """Which of several domain families should be used, and for what.
+    """Comparison of several domain families: which to use, and for what.
 
     Attributes:
         compared: The tuned families beside one another.
@@ -107,16 +107,16 @@ class FamiliesReport:
 
     @property
     def sentence(self) -> str:
-        """Which family predicts best, which teaches best, and which is the cheapest."""
+        """Say which family predicts best, which teaches best, and which is the cheapest."""
         return families_sentence(self.compared)
 
     @property
     def studies(self) -> dict[str, StudyReport]:
-        """What the study of each family has found, by name."""
+        """Reports of each family's study, by name."""
         return {one.name: StudyReport(one.result, Spent()) for one in self.compared.families}
 
     def document(self) -> dict[str, Any]:
-        """What `study --json` prints of it."""
+        """The JSON document of `study --json`."""
         return families_document(self.compared)
 
     def figure(self) -> Figure:

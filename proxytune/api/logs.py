@@ -19,7 +19,7 @@ Tell = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Wanted:
-    """What is to be driven.
+    """Drives to be recorded.
 
     Attributes:
         repeats: Drives of each manoeuvre.

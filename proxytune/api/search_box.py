@@ -102,7 +102,7 @@ class SearchBox:
         )
 
     def _place(self, theta: Theta) -> int:
-        """Which of the asked θ this is, the first that has no score."""
+        """Index of this θ among those asked for, the first that has no score."""
         if set(theta) != set(self._space.names):
             raise InputError(f"θ names {', '.join(theta)}; the box has {', '.join(self._space.names)}")
         values = self._space.values(theta)

@@ -43,7 +43,7 @@ from proxytune.study import (
 
 
 class ReportFiles(NamedTuple):
-    """Where a study's figures and its page were written."""
+    """Paths of a study's figures and of its page."""
 
     figures: list[Path]
     page: Path
@@ -51,7 +51,7 @@ class ReportFiles(NamedTuple):
 
 @dataclass(frozen=True, repr=False)
 class StudyReport:
-    """What a study has found.
+    """Result of a study.
 
     Attributes:
         result: All of it.
@@ -69,7 +69,7 @@ class StudyReport:
 
     @property
     def sentence(self) -> str:
-        """What was found, how good the proxy is there, and what to do next."""
+        """Say what was found, how good the proxy is there, and what to do next."""
         return study_sentence(self.result)
 
     @property
@@ -112,7 +112,7 @@ class StudyReport:
         return optimize_result(self.history())
 
     def document(self) -> dict[str, Any]:
-        """What `study --json` prints of it."""
+        """The JSON document of `study --json`."""
         return study_document(self.result)
 
     def write(self, folder: str | Path | None = None, command: str = "") -> ReportFiles:
@@ -202,6 +202,6 @@ def read_study(path: str | Path) -> StudyReport:
 
 
 def most_episodes(settings: StudySettings) -> int:
-    """How many episodes a study takes at most, from pre-flight to confirmation."""
+    """Count the episodes that a study takes at most, from pre-flight to confirmation."""
     trials = settings.budget * len(settings.agents) * settings.starts
     return trials + most_preflight_episodes(settings) + most_confirmation_episodes(settings)

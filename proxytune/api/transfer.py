@@ -1,4 +1,4 @@
-"""What goes in and out of proxytune from Python: logs of others, score tables of a twin, predictions, exports."""
+"""Ways in and out of proxytune from Python: logs of others, score tables of a twin, predictions, exports."""
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
@@ -63,7 +63,7 @@ MOST_REPEATS = 1_000_000
 
 @dataclass(frozen=True, repr=False)
 class ImportReport:
-    """What a bag, a table or a trajectory holds, and the log that was written of it.
+    """Result of an import: what a bag, a table or a trajectory holds, and the log that was written of it.
 
     Attributes:
         source: Its channels, drives and notes.
@@ -84,7 +84,7 @@ class ImportReport:
         return pd.DataFrame([one.facts for one in self.source.surveys])
 
     def document(self) -> dict[str, Any]:
-        """What `import --json` prints."""
+        """The JSON document of `import --json`."""
         written = None if self.log is None else str(self.log)
         return self.source.facts | {"log": written, "drives": [one.facts for one in self.source.surveys]}
 
@@ -140,7 +140,7 @@ class Measurement:
         return pd.DataFrame(self.scores.means, index=index, columns=list(self.scores.metrics))
 
     def document(self) -> dict[str, Any]:
-        """What `measure --json` prints of it, without the file."""
+        """The JSON document of `measure --json`, without the file."""
         return {
             "model": str(self.model),
             "seed": self.seed,
@@ -210,14 +210,14 @@ class Prediction:
 
     @property
     def sentence(self) -> str:
-        """How far the predicted poses are from the measured ones."""
+        """Say how far the predicted poses are from the measured ones."""
         rmse = self.error
         if not rmse.poses:
             return "no drive has measured poses over a whole window"
         return f"RMSE {1e3 * rmse.place:.1f} mm, {np.degrees(rmse.turn):.2f}° over {rmse.poses} poses"
 
     def document(self) -> dict[str, Any]:
-        """What `predict --json` prints of it, without the file."""
+        """The JSON document of `predict --json`, without the file."""
         rmse = self.error
         heading = {"heading": rmse.turn, "heading_unit": "rad", "poses": rmse.poses}
         error = {"value": rmse.place, "unit": "m", **heading}
@@ -246,11 +246,11 @@ class PicturePrediction:
 
     @property
     def sentence(self) -> str:
-        """How far the drawn pictures are from the measured ones."""
+        """Say how far the drawn pictures are from the measured ones."""
         return f"{self.frames} frames: mean absolute difference on the floor {self.grey_error:.1f} grey levels"
 
     def document(self) -> dict[str, Any]:
-        """What `predict --frames --json` prints."""
+        """The JSON document of `predict --frames --json`."""
         return {"frames": self.frames, "output": str(self.folder), "grey_error": self.grey_error}
 
 
@@ -323,7 +323,7 @@ def _robot_of(model: Model, log: Log, catalogue: Catalogue) -> Robot:
 
 @dataclass(frozen=True, repr=False)
 class ExportReport:
-    """What was written for another simulator, the robot or another optimiser.
+    """Result of an export: what was written for another simulator, the robot or another optimiser.
 
     Attributes:
         output: The file.
@@ -348,7 +348,7 @@ class ExportReport:
         return pd.DataFrame([_row(line) for line in self.lines] or [dict(self.facts)])
 
     def document(self) -> dict[str, Any]:
-        """What `export --json` prints."""
+        """The JSON document of `export --json`."""
         rows = {
             "written": [_row(line) for line in self.lines if line.place],
             "no_place": [_row(line) for line in self.lines if not line.place],

@@ -30,7 +30,7 @@ class Command(NamedTuple):
 
     @property
     def left(self) -> str:
-        """What an interruption leaves, and what the same command does then."""
+        """Say what an interruption leaves, and what the same command does then."""
         kept = self.kept or ("everything finished is kept" if self.resumes else "nothing was written")
         return f"{kept}; run the same command to {'continue' if self.resumes else 'start again'}"
 

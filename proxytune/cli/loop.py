@@ -64,7 +64,7 @@ def _command(arguments: argparse.Namespace) -> str:
 
 
 def _files(closed: Closed, page: Path) -> dict[str, Path]:
-    """What was made, by name."""
+    """Files that were made, by name."""
     home = closed.loop.home
     found = {"model": home / "diagnosed" / "model.toml", "diagnosis": home / "diagnosed" / "diagnosis.json"}
     extended = {"extended": home / "extended" / "study.toml"} if closed.after else {}

@@ -20,7 +20,7 @@ EXIT_STATUS = "exit status: 0 done, 1 failed, 2 bad input, 130 interrupted (Ctrl
 
 
 def program() -> str:
-    """What the program was started as."""
+    """Command line that started the program."""
     return "proxytune" if Path(sys.argv[0]).stem == "proxytune" else "python -m proxytune"
 
 

@@ -97,7 +97,7 @@ def configure_source(parser: argparse.ArgumentParser) -> None:
 
 
 def wanted_of(arguments: argparse.Namespace) -> Wanted:
-    """What to take.
+    """Columns and topics to take.
 
     Raises:
         InputError: If the column map is none.
@@ -113,7 +113,7 @@ def wanted_of(arguments: argparse.Namespace) -> Wanted:
 
 
 def facts_of(arguments: argparse.Namespace) -> Facts:
-    """What only the user knows.
+    """Facts that only the user knows.
 
     Raises:
         InputError: If a figure or the offset is no number.

@@ -102,7 +102,7 @@ def _read(run: StudyRun, metrics: Sequence[Metric]) -> tuple[StudyResult | None,
 
 
 def _folder(study: Path, metrics: Sequence[Metric]) -> Path:
-    """Where figures go: a folder for each choice of metrics."""
+    """Folder of the figures: one for each choice of metrics."""
     names = [re.sub(r"[^\w.-]+", "_", str(metric).replace("%", "percent")) for metric in metrics]
     return study / RESCORED / "+".join(names) if names else study
 

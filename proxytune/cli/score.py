@@ -183,7 +183,7 @@ def run(arguments: argparse.Namespace) -> Answer:
 
 
 def _answer(document: dict[str, Any], assessments: Mapping[str, Assessment], selection: Selection | None) -> Answer:
-    """What is printed: the sentence, the table and the notes."""
+    """Text that is printed: the sentence, the table and the notes."""
     shown = score_text(assessments, selection, document["left_out"], target=document["target"])
     if selection is not None:
         return Answer(document | ranking_document(assessments, selection), shown)

@@ -1,4 +1,4 @@
-"""What every command returns: one JSON document, and the same for people.
+"""Output of every command: one JSON document, and the same for people.
 
 Ctrl-C and SIGTERM end a command alike: everything finished is kept, and its processes end too.
 What stops a command that nobody nearer to it could name.
@@ -72,7 +72,7 @@ FAILED = 1
 
 
 def stopped_by(problem: KeyboardInterrupt | SystemExit | MemoryError | OSError) -> tuple[str, int]:
-    """What stopped a command, in one phrase, and its exit status."""
+    """Say what stopped a command, in one phrase, and its exit status."""
     if is_users(problem):
         return ("terminated", TERMINATED) if isinstance(problem, Terminated) else ("interrupted", INTERRUPTED)
     if isinstance(problem, MemoryError):

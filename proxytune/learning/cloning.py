@@ -55,7 +55,7 @@ def _cell_means(values: Floats, cells: int, axis: int) -> Floats:
 
 @functools.lru_cache
 def _cells(length: int, cells: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Where each cell begins along an axis, and how many pixels it has."""
+    """First pixel of each cell along an axis, and its number of pixels."""
     edges = np.linspace(0, length, cells + 1).round().astype(int)
     return edges[:-1], np.diff(edges)
 

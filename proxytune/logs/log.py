@@ -1,4 +1,4 @@
-"""What a log holds: a robot's drives, commands and measured poses."""
+"""A log: a robot's drives, commands and measured poses."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -44,7 +44,7 @@ def code_of(*modules: str) -> str:
 
 
 def _imported(path: Path) -> Iterator[str]:
-    """What a module imports, anywhere in it, by full names."""
+    """Names that a module imports, anywhere in it, in full."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -120,7 +120,7 @@ def why_not_engine(engine: Engine, *, composed: bool) -> str:
 
 
 def is_installed(engine: Engine) -> bool:
-    """Whether the library that an engine needs is there."""
+    """Tell whether the library that an engine needs is there."""
     return engine.needs is None or all(find_spec(module) for module in engine.needs.modules)
 
 

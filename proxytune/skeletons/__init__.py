@@ -1,4 +1,4 @@
-"""What `new` writes: a working robot, study or family to start from."""
+"""Skeletons that `new` writes: a working robot, study or family to start from."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""What a study keeps in its folder: study.db with its rows, and its lock.
+"""The folder of a study: study.db with its rows, and its lock.
 
 store     Store, TrialRecord, SweepRecord, State, theta_json, is_begun, FILE_NAME: values in and out of study.db
 folder    locked, refuse_links, FAMILIES: one process at a time, and no links that lead elsewhere

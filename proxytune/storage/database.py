@@ -231,7 +231,7 @@ def digest_of(*values: Any) -> str:
 
 
 def counted(connection: sqlite3.Connection) -> dict[str, int]:
-    """How many rows the tables had; those of which that cannot be read are left out."""
+    """Count the rows that the tables had; tables of which that cannot be read are left out."""
     return {name: rows for name, rows in connection.execute("SELECT name, rows FROM counts") if type(rows) is int}
 
 

@@ -69,7 +69,7 @@ def refuse_links(folder: Path) -> None:
 
 
 def is_of_family(folder: Path) -> bool:
-    """Whether this is the folder of one of several families of a study."""
+    """Tell whether this is the folder of one of several families of a study."""
     return folder.parent.name == FAMILIES and not (folder / "study.toml").exists()
 
 

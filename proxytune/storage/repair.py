@@ -35,7 +35,7 @@ WITH_A_GAP_BEFORE = """
 
 @dataclass(frozen=True)
 class Salvage:
-    """What was kept of a damaged database.
+    """Rows kept of a damaged database.
 
     Attributes:
         problem: What was wrong with it, in one line.

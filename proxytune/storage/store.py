@@ -1,4 +1,4 @@
-"""What a study has done so far, kept in study.db: every finished episode is there at once and for good.
+"""Results of a study so far, kept in study.db: every finished episode is there at once and for good.
 
 Rows go in and come out as values; database.py says what a row is, and what tells a damaged one.
 """
@@ -73,7 +73,7 @@ class TrialRecord:
 
     @property
     def estimate(self) -> float | None:
-        """What its PRPV is expected to be; None unless it was cut off."""
+        """Its expected PRPV; None unless it was cut off."""
         return self.score if self.state == "cut" else None
 
 
@@ -136,7 +136,7 @@ class Store:
             connection.close()
 
     def facts(self) -> dict[str, Any]:
-        """What determined the finished trials; empty before the first."""
+        """Facts that determined the finished trials; empty before the first."""
         return dict(self._made(lambda key, value: (key, json.loads(value)), "SELECT key, value FROM facts"))
 
     def begin(self, facts: Mapping[str, Any], objective: str = "prpv") -> None:
@@ -265,14 +265,14 @@ class Store:
             seal(connection, "episodes")
 
     def seconds(self) -> dict[tuple[str, int], float]:
-        """How long the episodes of each agent and start took on average."""
+        """Mean time that the episodes of each agent and start took."""
         if self._seconds is None:
             rows = self._all("SELECT agent, start, total(seconds), count(*) FROM episodes GROUP BY agent, start")
             self._seconds = {(agent, start): (total, count) for agent, start, total, count in rows}
         return {key: total / count for key, (total, count) in self._seconds.items()}
 
     def seconds_of_trials(self, objective: str, last: int, seeds: Collection[int]) -> float:
-        """How long the episodes with these seeds took of all trials of a search up to this one."""
+        """Time that the episodes with these seeds took of all trials of a search up to this one."""
         query = (
             "SELECT total(episodes.seconds) FROM trials JOIN episodes ON episodes.instance = trials.instance"
             f" WHERE objective = ? AND number <= ? AND seed IN ({', '.join('?' * len(seeds))})"
@@ -307,7 +307,7 @@ class Store:
         return int(known[0])
 
     def _made(self, make: Callable[..., Made], query: str, values: tuple[Any, ...] = ()) -> list[Made]:
-        """What rows are made into; a row that is whole and none of ours is damage too."""
+        """Make values of rows; a row that is whole and none of ours is damage too."""
         rows = self._all(query, values)
         try:
             return [make(*row) for row in rows]
@@ -329,7 +329,7 @@ def _next(connection: sqlite3.Connection, column: str, table: str) -> int:
 
 
 def is_begun(folder: Path) -> bool:
-    """Whether a study has a database; not where a kill came before its first table."""
+    """Tell whether a study has a database; not where a kill came before its first table."""
     path = folder / FILE_NAME
     refuse_links(folder)
     undo_broken_write(path)

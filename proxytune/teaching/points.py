@@ -117,7 +117,7 @@ class Supervised:
 
 @dataclass(frozen=True)
 class Trainee:
-    """Who learns, and where what it has learnt is kept.
+    """A learner, and where what it has learnt is kept.
 
     Attributes:
         learner: What is trained.

@@ -1,4 +1,4 @@
-"""What every extension promises, as functions to call in a test of your own; each needs no more than the thing itself.
+"""Promises of every extension, as functions to call in a test of your own; each needs no more than the thing itself.
 
     check_effect    an Effect class       check_engine    an Engine
     check_agent     an Agent              check_measure   a Measure

@@ -1,4 +1,4 @@
-"""What to drive next: the manoeuvre in which two rivals would differ most."""
+"""The manoeuvre to drive next: the one in which two rivals would differ most."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -1,22 +1,38 @@
 """The entry point: finds the command, prints its answer, and turns our exceptions into one line and an exit status."""
 
 import argparse
+import re
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
+from typing import NoReturn
 
 import proxytune
 from proxytune.cli.commands import COMMANDS, epilog
 from proxytune.cli.terminal import FAILED, Answer, print_answer, prints_to_stderr, signals_as_interruptions, stopped_by
 from proxytune.cli.trusting import only_trusted_code
 from proxytune.errors import InputError, ProxytuneError
+from proxytune.settings import nearest
 
 DONE, BAD_INPUT = 0, 2
 FORMATS = ("png", "svg", "pdf")
 
 
 EXIT_STATUS = "exit status: 0 done, 1 failed, 2 bad input, 130 interrupted (Ctrl-C), 143 terminated (SIGTERM)"
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser that says what was probably meant by a command, an option or a choice that there is not."""
+
+    def error(self, message: str) -> NoReturn:
+        """Complain in two lines, usage and problem, and end with 2."""
+        choice = re.fullmatch(r"(.*)invalid choice: '(.*)' \(choose from (.*)\)", message)
+        if choice:
+            where, word, listed = choice.groups()
+            known = re.findall(r"'(.*?)'", listed)
+            message = f"{where}unknown '{word}'; {nearest(word, known)}"
+        super().error(message)
 
 
 def program() -> str:
@@ -27,7 +43,7 @@ def program() -> str:
 def parser(words: Sequence[str] | None = None, prog: str = "") -> argparse.ArgumentParser:
     """The parser, with the options of every command; with words, only of the first command that they name."""
     prog = prog or program()
-    top = argparse.ArgumentParser(
+    top = Parser(
         prog=prog,
         description="Find out how useful a robot simulator is, tune it to the robot, and learn what it still lacks.",
         epilog=EXIT_STATUS,
@@ -46,7 +62,20 @@ def parser(words: Sequence[str] | None = None, prog: str = "") -> argparse.Argum
         if words is None or name == asked:
             known.load().configure(command)
         add_shared_options(command, draws=known.draws, runs_code=known.runs_code)
+        command.set_defaults(parser=command)
     return top
+
+
+def parse(words: Sequence[str]) -> argparse.Namespace:
+    """The command that words ask for, with its options; words that are none of these end the program with 2."""
+    arguments, unknown = parser(words).parse_known_args(words, argparse.Namespace(words=words))
+    option = next((word.partition("=")[0] for word in unknown if word.startswith("--")), "")
+    if option:
+        known = re.findall(r"--[a-z][\w-]*", arguments.parser.format_help())
+        arguments.parser.error(f"unknown option '{option}'; {nearest(option, set(known))}")
+    if unknown:
+        arguments.parser.error(f"unrecognized arguments: {' '.join(unknown)}")
+    return arguments
 
 
 def add_shared_options(parser: argparse.ArgumentParser, *, draws: bool, runs_code: bool) -> None:
@@ -89,7 +118,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         says what is kept.
     """
     words = sys.argv[1:] if argv is None else argv
-    arguments = parser(words).parse_args(words, argparse.Namespace(words=words))
+    if not words:
+        parser(words).print_help()
+        return DONE
+    arguments = parse(words)
     command = COMMANDS[arguments.command]
     return run_command(
         lambda: command.load().run(arguments), arguments, program=f"proxytune {arguments.command}", left=command.left

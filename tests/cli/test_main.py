@@ -44,6 +44,28 @@ def test_json_is_one_document_and_nothing_else(kind, capsys):
     assert out.err == ""
 
 
+def test_without_a_command_there_is_help(capsys):
+    assert main([]) == DONE
+    assert "diagnose" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "problem"),
+    [
+        (["studdy"], "argument COMMAND: unknown 'studdy'; did you mean 'study'?"),
+        (["study", "--budgett", "3", "q"], "unknown option '--budgett'; did you mean '--budget'?"),
+        (["study", "--budgett=3", "q"], "unknown option '--budgett'; did you mean '--budget'?"),
+        (["list", "efects"], "unknown 'efects'; did you mean 'effects'?"),
+        (["plot", "one", "two", "three"], "unrecognized arguments: two three"),
+    ],
+)
+def test_a_mistyped_word_is_answered_with_the_one_that_was_probably_meant(capsys, words, problem):
+    with pytest.raises(SystemExit) as end:
+        main(words)
+    assert end.value.code == BAD_INPUT
+    assert capsys.readouterr().err.strip().endswith(problem)
+
+
 def test_people_see_a_table(capsys):
     assert main(["list", "robots"]) == 0
     assert "duckiebot" in capsys.readouterr().out
@@ -86,7 +108,7 @@ def test_what_is_not_json_is_a_defect_and_not_printed(monkeypatch):
         main(["list", "robots", "--json"])
 
 
-@pytest.mark.parametrize("words", [[], ["studdy"], ["list", "unicorns"], ["score"], ["study"]])
+@pytest.mark.parametrize("words", [["studdy"], ["list", "unicorns"], ["score"], ["study"]])
 def test_wrong_usage_exits_with_2(words, capsys):
     with pytest.raises(SystemExit) as caught:
         main(words)

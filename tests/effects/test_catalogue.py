@@ -13,7 +13,7 @@ from proxytune.effects import CATALOGUE, PARAMETERS, Blur, FilterContext, Stage,
 from proxytune.effects.command import CommandQuantisation, Delay
 from proxytune.effects.motors import DriverMap, MotorLag, Trim, WheelGain, per_wheel
 from proxytune.space import Parameter
-from proxytune.testing.effect import Candidate, check_effect
+from proxytune.testing.effect import Subject, check_effect
 
 ROBOT = read_robot("duckiebot")
 
@@ -69,8 +69,8 @@ IMBALANCED = [name for name, effect in CATALOGUE.items() if f"{name}.imbalance" 
 FLAT = [name for name, effect in CATALOGUE.items() if effect.stage not in (Stage.CAMERA, Stage.IMAGE)]
 
 
-def candidate(name):
-    return Candidate(CATALOGUE[name], ROBOT, name)
+def subject(name):
+    return Subject(CATALOGUE[name], ROBOT, name)
 
 
 @pytest.mark.parametrize("name", CATALOGUE)
@@ -82,14 +82,14 @@ def test_every_effect_keeps_what_effects_promise(name):
 @pytest.mark.parametrize("imbalance", [-1.0, 0.3, 1.0])
 def test_an_imbalance_of_nothing_changes_nothing(name, imbalance):
     lagging = {"time_constant": 0.0} if name == "motor_lag" else {}
-    signal, tried = candidate(name).signal(1), candidate(name)
+    signal, tried = subject(name).signal(1), subject(name)
     np.testing.assert_array_equal(tried.filtered(tried.at({"imbalance": imbalance, **lagging}), signal), signal)
 
 
 @pytest.mark.parametrize("name", IMBALANCED)
 @pytest.mark.parametrize(("imbalance", "wheel"), [(-1.0, "left"), (1.0, "right")])
 def test_an_imbalance_of_one_leaves_the_other_wheel_alone(name, imbalance, wheel):
-    signal, tried = candidate(name).signal(1), candidate(name)
+    signal, tried = subject(name).signal(1), subject(name)
     effect = tried.moved(CATALOGUE[name].parameters[1], imbalance)
     moved = np.abs(tried.filtered(effect, signal) - signal).max(axis=0)
     here, there = moved if wheel == "left" else moved[::-1]

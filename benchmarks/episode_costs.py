@@ -22,7 +22,7 @@ from proxytune.driving import (
     read_robot,
     texels as plain,
 )
-from proxytune.driving.cameras import View
+from proxytune.driving.cameras import Views
 from proxytune.driving.plants import PlanarPlant, integrate
 from proxytune.driving.texels import by_numba
 from proxytune.effects import FilterContext, effects_from
@@ -132,9 +132,11 @@ def test_pictures(benchmark, driven, monkeypatch, by):
     instance, steps = driven[0], driven[1].poses[1:].reshape(-1, 3, 3)
 
     def see():
-        view = View(instance.camera, instance.image, FilterContext(TICK_HZ, driven[1].poses[0], ROBOT.figures))
+        setting = FilterContext(TICK_HZ, driven[1].poses[0], ROBOT.figures)
+        views = Views(instance.camera, instance.image, (setting,))
         for poses in steps:
-            view.pass_by(poses)
+            views.pass_by(poses[None], (0,))
+            views.pictures((0,))
 
     benchmark(see)
 

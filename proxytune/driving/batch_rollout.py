@@ -9,10 +9,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from proxytune.domain import Episode, Policy
-from proxytune.driving.agent import Command, Picture
-from proxytune.driving.cameras import View
+from proxytune.driving.agent import Command
+from proxytune.driving.cameras import Views
 from proxytune.driving.episode import TICK_HZ, Course, Fleet, Instance, ask, check_command
 from proxytune.driving.expert import Pupil
 from proxytune.driving.plants import Drivetrain, DrivetrainState
@@ -113,15 +114,15 @@ class _Rollouts:
         resting = FilterContext(TICK_HZ, np.zeros((len(courses), 2)), figures, 0, starts[:, 2:], starts[:, None, :2])
         self._memory: Any = self._drivetrain.begin(resting)
         settings = [FilterContext(TICK_HZ, one.start, figures, one.seed) for one in courses]
-        self._views = [View(instance.camera, instance.image, context) for context in settings]
+        self._views = Views(instance.camera, instance.image, settings)
         self.under_way = list(range(len(courses)))
         self.new_pictures = True
         self.poses = [[start[None]] for start in starts]
 
     @property
-    def pictures(self) -> list[Picture]:
-        """The newest picture of each robot under way."""
-        return [self._views[robot].picture for robot in self.under_way]
+    def pictures(self) -> NDArray[np.uint8]:
+        """The newest picture of each robot under way, (robots, rows, columns, 3)."""
+        return self._views.pictures(self.under_way)
 
     def obey(self, commands: Sequence[Command] | Signal) -> None:
         """Hold these commands, one for each robot under way, from now on."""
@@ -132,16 +133,16 @@ class _Rollouts:
         held = np.repeat(self._commands[:, None], self._hold, axis=1)
         twists, self._memory = self._drivetrain.apply(held, self._memory)
         poses, crashed = self._fleet.move(twists, self.under_way)
-        before, moved = self.pictures[0], list(zip(self.under_way, poses, crashed, strict=True))
+        moved = list(zip(self.under_way, poses, crashed, strict=True))
         for robot, driven, _ in moved:
             self.poses[robot].append(driven)
-            self._views[robot].pass_by(driven)
-        self.new_pictures = self.pictures[0] is not before
+        self._views.pass_by(poses, self.under_way)
+        self.new_pictures = self._views.changed
         ended = [hit or self._courses[robot].ended(*driven[-1, :2].tolist()) for robot, driven, hit in moved]
         self.under_way = [robot for robot, over in zip(self.under_way, ended, strict=True) if not over]
 
 
-def answers(policy: Policy, pictures: Sequence[Picture], time_s: float) -> Sequence[Command] | Signal:
+def answers(policy: Policy, pictures: NDArray[np.uint8], time_s: float) -> Sequence[Command] | Signal:
     """A policy's commands for pictures, all at once where it can.
 
     Raises:
@@ -151,7 +152,7 @@ def answers(policy: Policy, pictures: Sequence[Picture], time_s: float) -> Seque
     if act_many is None:
         return [ask(Pupil(policy), picture, None, time_s)[0] for picture in pictures]
     try:
-        commands = np.asarray(act_many(np.stack(pictures)), dtype=float)
+        commands = np.asarray(act_many(pictures), dtype=float)
     except Exception as problem:
         raise EpisodeError(f"raised {type(problem).__name__} at {time_s:.2f} s: {problem}") from problem
     if commands.shape[:1] != (len(pictures),):

@@ -1,10 +1,11 @@
 """What the robot's camera shows of a flat floor, and the newest picture at the camera's rate.
 
 The floor is flat, so where each pixel looks in the robot's frame is known beforehand: a picture is one look-up a pixel.
-`View` is the camera with its image effects while the robot drives.
+`Views` are the cameras of robots with their image effects while they drive.
 """
 
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -173,29 +174,39 @@ class _Developed:
         return np.asarray(levels.astype(np.uint8).reshape(pictures.shape[1:]))
 
 
-class View:
-    """The camera with its image effects: the newest picture, at the camera's rate.
+class Views:
+    """What the cameras of robots that drive side by side show through the image effects, at the camera's rate.
 
     Attributes:
-        picture: That picture, (rows, columns, 3).
+        changed: Whether the last poses brought new pictures; so they do to all robots or to none.
     """
 
-    def __init__(self, camera: Renderer, effects: Chain, context: FilterContext) -> None:
-        """Take the first picture; `context` is that of poses, and its rest where the robot stood before them, (3,)."""
-        weights = effects.mean_weights(context.rate_hz)
-        self._film: _Film = (
-            _Developed(camera, effects, context) if weights is None else _Averaged(camera, weights, context.rest)
-        )
-        self._every = round(context.rate_hz / context.nominal["camera_rate"])
-        self._waiting = np.empty((0, 3))
-        self.picture = self._film.expose(context.rest[None])
+    def __init__(self, camera: Renderer, image: Chain, contexts: Sequence[FilterContext]) -> None:
+        """Take the first pictures; each context is that of poses, its rest where that robot stood before them, (3,)."""
+        weights = image.mean_weights(contexts[0].rate_hz)
+        self._films: list[_Film] = [
+            _Developed(camera, image, one) if weights is None else _Averaged(camera, weights, one.rest)
+            for one in contexts
+        ]
+        self._every = round(contexts[0].rate_hz / contexts[0].nominal["camera_rate"])
+        self._waiting = np.empty((len(contexts), 0, 3))
+        self._pictures = [film.expose(one.rest[None]) for film, one in zip(self._films, contexts, strict=True)]
+        self.changed = True
 
-    def pass_by(self, poses: Signal) -> None:
-        """Let the shutter see the poses of the next ticks."""
-        self._waiting = np.concatenate((self._waiting, poses))
-        while len(self._waiting) >= self._every:
-            seen, self._waiting = self._waiting[: self._every], self._waiting[self._every :]
-            self.picture = self._film.expose(seen)
+    def pass_by(self, poses: Signal, robots: Sequence[int]) -> None:
+        """Let some robots see their poses (robots, ticks, 3) of the next ticks; the others have left."""
+        rows = np.zeros((len(self._films), *poses.shape[1:]))
+        rows[list(robots)] = poses
+        self._waiting = np.concatenate((self._waiting, rows), axis=1)
+        self.changed = self._waiting.shape[1] >= self._every
+        while self._waiting.shape[1] >= self._every:
+            seen, self._waiting = self._waiting[:, : self._every], self._waiting[:, self._every :]
+            for robot in robots:
+                self._pictures[robot] = self._films[robot].expose(seen[robot])
+
+    def pictures(self, robots: Sequence[int]) -> NDArray[np.uint8]:
+        """The newest pictures (n, rows, columns, 3) of some robots."""
+        return np.stack([self._pictures[robot] for robot in robots])
 
 
 def mean_picture(pictures: NDArray[np.uint8], weights: Signal) -> Picture:

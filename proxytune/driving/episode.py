@@ -19,7 +19,7 @@ import numpy as np
 from proxytune.arrays import Floats
 from proxytune.driving.agent import Command, Picture
 from proxytune.driving.bullet import BulletPlant
-from proxytune.driving.cameras import View
+from proxytune.driving.cameras import Views
 from proxytune.driving.lane import LanePose, lane_length, lane_pose
 from proxytune.driving.optics import Renderer
 from proxytune.driving.plants import Drivetrain, PlanarFleet, PlanarPlant, Plant
@@ -123,6 +123,7 @@ class Rollout:
 
     Attributes:
         steps: How many commands there is time for.
+        picture: The newest picture.
         poses: After each tick of the last step, (ticks, 3): x [m], y [m], heading [rad]; before the first, the start.
         crashed: Whether the robot has hit something or fallen over.
     """
@@ -133,15 +134,12 @@ class Rollout:
         self._hold = round(TICK_HZ / figures["control_rate"])
         resting = FilterContext(TICK_HZ, np.zeros(2), figures, course.seed, course.start[2:], course.start[None, :2])
         self._memory = instance.drivetrain.begin(resting)
-        self._view = View(instance.camera, instance.image, FilterContext(TICK_HZ, course.start, figures, course.seed))
+        seen = FilterContext(TICK_HZ, course.start, figures, course.seed)
+        self._views = Views(instance.camera, instance.image, (seen,))
+        self.picture: Picture = self._views.pictures((0,))[0]
         self.steps = round(course.seconds * figures["control_rate"])
         self.poses: Signal = course.start[None]
         self.crashed = False
-
-    @property
-    def picture(self) -> Picture:
-        """The newest picture."""
-        return self._view.picture
 
     @property
     def ended(self) -> bool:
@@ -152,7 +150,9 @@ class Rollout:
         """Hold a command (2,) for one control step."""
         twists, self._memory = self._drivetrain.apply(np.repeat(command[None], self._hold, axis=0), self._memory)
         self.poses, self.crashed = self._plant.move(twists)
-        self._view.pass_by(self.poses)
+        self._views.pass_by(self.poses[None], (0,))
+        if self._views.changed:
+            self.picture = self._views.pictures((0,))[0]
 
 
 def picture_only(picture: Picture, pose: Signal) -> Picture:

@@ -45,7 +45,7 @@ from proxytune.driving import (
     shipped_map,
     texels as plain,
 )
-from proxytune.driving.cameras import View
+from proxytune.driving.cameras import Views
 from proxytune.effects import CATALOGUE, PARAMETERS, Blur, Chain, FilterContext, RollingShutter, Stage, theta_names
 from proxytune.effects.image import CameraLatency
 from proxytune.settings import Section
@@ -332,12 +332,12 @@ def setting(rest):
 
 def pictures_of(camera, effects, lengths=(3,) * 8):
     """Every new picture on the way along POSES, of which so many are passed by at a time, the start first."""
-    view, passed = View(camera, Chain(effects), setting(POSES[0])), 1
-    shown = [view.picture]
+    views, passed = Views(camera, Chain(effects), (setting(POSES[0]),)), 1
+    shown = [views.pictures((0,))[0]]
     for length in lengths:
-        view.pass_by(POSES[passed : passed + length])
+        views.pass_by(POSES[None, passed : passed + length], (0,))
         passed += length
-        shown += [view.picture] if view.picture is not shown[-1] else []
+        shown += [views.pictures((0,))[0]] if views.changed else []
     return np.array(shown)
 
 
@@ -369,7 +369,9 @@ def test_it_does_not_matter_how_many_ticks_pass_at_a_time(lengths):
 @pytest.mark.parametrize(("effects", "rendered"), [((), 1), ((Blur(0.02),), 3), ((Blur(0.1),), 4)])
 def test_no_more_is_rendered_than_is_averaged(effects, rendered):
     camera = Plain()
-    view = View(camera, Chain(effects), setting(POSES[0]))
+    views = Views(camera, Chain(effects), (setting(POSES[0]),))
+    views.pictures((0,))
     before = camera.rendered
-    view.pass_by(POSES[1:5])
+    views.pass_by(POSES[None, 1:5], (0,))
+    views.pictures((0,))
     assert camera.rendered - before == rendered

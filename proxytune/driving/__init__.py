@@ -9,7 +9,7 @@ optics, cameras, texels, compiled_texels
 agent, agents     what an agent is, and those that come with the package
 expert            the expert that learners imitate, and drivers that replay or do as they learnt
 episode           one episode, and what it is worth
-batch_rollout     several episodes of one θ side by side, to the same bits
+fleet             episodes driven side by side, to the same bits
 family            all of it as a study's domain family
 """
 

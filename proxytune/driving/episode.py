@@ -1,15 +1,13 @@
-"""One episode: a driver, a plant and a camera behind the effects of a domain instance, until time or luck runs out.
+"""One episode: who drives, what a domain instance bends, where it starts and ends, and what it is worth.
 
-`drive` asks a driver for commands; `Rollout` is the same one command at a time. `follow` drives recorded commands
-without a camera. An episode ends when the axle's middle leaves the map, when the robot hits something, or when its time
-is over. It is worth what `score_trajectory` says: the lane of a pose is the one whose direction agrees with its heading
-(right-hand traffic), and a robot is in it while it is at most half a lane width from its centre line, so whoever drives
-the wrong way is in neither lane. `driving_score` is that of the paper's learning experiment.
+An episode ends when the axle's middle leaves the map, when the robot hits something, or when its time is over. It is
+worth what `score_trajectory` says: the lane of a pose is the one whose direction agrees with its heading (right-hand
+traffic), and a robot is in it while it is at most half a lane width from its centre line, so whoever drives the wrong
+way is in neither lane. `driving_score` is that of the paper's learning experiment.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, NamedTuple, Protocol
@@ -18,11 +16,9 @@ import numpy as np
 
 from proxytune.arrays import Floats
 from proxytune.driving.agent import Command, Picture
-from proxytune.driving.bullet import BulletPlant
-from proxytune.driving.cameras import Views
 from proxytune.driving.lane import LanePose, lane_length, lane_pose
 from proxytune.driving.optics import Renderer
-from proxytune.driving.plants import Drivetrain, PlanarFleet, PlanarPlant, Plant
+from proxytune.driving.plants import Drivetrain
 from proxytune.driving.road import Road
 from proxytune.driving.robot import Robot
 from proxytune.effects import Chain, FilterContext, Signal
@@ -118,79 +114,9 @@ class Course:
     ended: Callable[[float, float], bool]
 
 
-class Rollout:
-    """An episode under way, one command after the other: `drive` asks an agent for them, an environment its user.
-
-    Attributes:
-        steps: How many commands there is time for.
-        picture: The newest picture.
-        poses: After each tick of the last step, (ticks, 3): x [m], y [m], heading [rad]; before the first, the start.
-        crashed: Whether the robot has hit something or fallen over.
-    """
-
-    def __init__(self, instance: Instance, plant: Plant, course: Course) -> None:
-        figures = instance.robot.figures
-        self._drivetrain, self._plant, self._course = instance.drivetrain, plant, course
-        self._hold = round(TICK_HZ / figures["control_rate"])
-        resting = FilterContext(TICK_HZ, np.zeros(2), figures, course.seed, course.start[2:], course.start[None, :2])
-        self._memory = instance.drivetrain.begin(resting)
-        seen = FilterContext(TICK_HZ, course.start, figures, course.seed)
-        self._views = Views(instance.camera, instance.image, (seen,))
-        self.picture: Picture = self._views.pictures((0,))[0]
-        self.steps = round(course.seconds * figures["control_rate"])
-        self.poses: Signal = course.start[None]
-        self.crashed = False
-
-    @property
-    def ended(self) -> bool:
-        """Tell whether the robot has crashed or left the course."""
-        return self.crashed or self._course.ended(float(self.poses[-1, 0]), float(self.poses[-1, 1]))
-
-    def step(self, command: Command) -> None:
-        """Hold a command (2,) for one control step."""
-        twists, self._memory = self._drivetrain.apply(np.repeat(command[None], self._hold, axis=0), self._memory)
-        self.poses, self.crashed = self._plant.move(twists)
-        self._views.pass_by(self.poses[None], (0,))
-        if self._views.changed:
-            self.picture = self._views.pictures((0,))[0]
-
-
 def picture_only(picture: Picture, pose: Signal) -> Picture:
     """All that an agent sees."""
     return picture
-
-
-def drive(
-    instance: Instance,
-    plant: Plant,
-    driver: Driver,
-    course: Course,
-    sees: Callable[[Picture, Signal], Any] = picture_only,
-) -> Drive:
-    """Drive until the time is over, the robot crashes or the course ends.
-
-    Args:
-        instance: What bends commands, motion and pictures.
-        plant: What moves, at its start.
-        driver: Who drives.
-        course: What it drives.
-        sees: What the driver is shown of the picture and the true pose; an expert's is `Sight`.
-
-    Raises:
-        EpisodeError: If the agent raises, or its answer is not two finite duties.
-    """
-    rollout, control_hz = Rollout(instance, plant, course), instance.robot.figures["control_rate"]
-    remembered = _begin(driver, instance.robot)
-    poses, commands = [rollout.poses], []
-    for step in range(rollout.steps):
-        seen = sees(rollout.picture, rollout.poses[-1])
-        command, remembered = ask(driver, seen, remembered, step / control_hz)
-        rollout.step(command)
-        poses.append(rollout.poses)
-        commands.append(command)
-        if rollout.ended:
-            break
-    return Drive(np.concatenate(poses), np.array(commands), rollout.crashed, remembered)
 
 
 def measured(instance: Instance, poses: Signal, seed: int) -> Signal:
@@ -199,15 +125,84 @@ def measured(instance: Instance, poses: Signal, seed: int) -> Signal:
     return instance.measurement.apply(poses, instance.measurement.begin(context))[0]
 
 
-def _begin(driver: Driver, robot: Robot) -> Any:
+def alike(drivers: Sequence[Driver]) -> list[Driver]:
+    """Drivers, one and the same object for those that can answer together: equal ones with `act_many`."""
+    distinct: list[Driver] = []
+    return [_known(driver, distinct) if hasattr(driver, "act_many") else driver for driver in drivers]
+
+
+def _known(driver: Driver, distinct: list[Driver]) -> Driver:
+    """The first of those known that equals a driver; where there is none it becomes known."""
+    found = next((one for one in distinct if one is driver or (type(one) is type(driver) and one == driver)), driver)
+    if found is driver and not any(one is driver for one in distinct):
+        distinct.append(driver)
+    return found
+
+
+def begin_all(drivers: Sequence[Driver], robots: Sequence[Robot]) -> tuple[list[Any], dict[int, EpisodeError]]:
+    """Every driver's memory before the first command, and by its number why one has none."""
+    memories: list[Any] = [None] * len(drivers)
+    failed: dict[int, EpisodeError] = {}
+    for number, (driver, robot) in enumerate(zip(drivers, robots, strict=True)):
+        try:
+            memories[number] = driver.begin(robot)
+        except Exception as problem:
+            failed[number] = EpisodeError(f"raised {type(problem).__name__} before the first picture: {problem}")
+            failed[number].__cause__ = problem
+    return memories, failed
+
+
+def ask_many(
+    drivers: Sequence[Driver], seen: Sequence[Any], memories: Sequence[Any], time_s: float
+) -> tuple[Signal, list[Any], dict[int, EpisodeError]]:
+    """Ask drivers for their next commands: those that are one object and offer `act_many` at once, others one by one.
+
+    Returns:
+        Commands (drivers, 2), memories for the ones after, and by its number why a driver failed, with the time [s].
+    """
+    commands, after, failed = np.zeros((len(drivers), 2)), list(memories), {}
+    groups: dict[int, list[int]] = {}
+    for number, driver in enumerate(drivers):
+        groups.setdefault(id(driver), []).append(number)
+    for members in groups.values():
+        together = _ask_together(drivers[members[0]], seen, memories, members)
+        if together is not None:
+            commands[members], kept = together
+            for number, memory in zip(members, kept, strict=True):
+                after[number] = memory
+            continue
+        for number in members:
+            try:
+                commands[number], after[number] = ask(drivers[number], seen[number], memories[number], time_s)
+            except EpisodeError as problem:
+                failed[number] = problem
+    return commands, after, failed
+
+
+def _ask_together(
+    driver: Any, seen: Sequence[Any], memories: Sequence[Any], members: list[int]
+) -> tuple[Signal, Sequence[Any]] | None:
+    """A driver's commands and memories for several robots; None where it has to be asked one by one."""
+    act_many = getattr(driver, "act_many", None)
+    if act_many is None or len(members) == 1 or not isinstance(seen, np.ndarray):
+        return None
+    first, last = members[0], members[-1] + 1
+    pictures = seen[first:last] if last - first == len(members) else seen[members]
     try:
-        return driver.begin(robot)
-    except Exception as problem:
-        raise EpisodeError(f"raised {type(problem).__name__} before the first picture: {problem}") from problem
+        answer, kept = act_many(pictures, [memories[number] for number in members])
+        commands = np.asarray(answer, dtype=float)
+        sound = commands.shape == (len(members), 2) and len(kept) == len(members) and np.isfinite(commands).all()
+    except Exception:
+        return None  # one by one the culprit is named, and the others go on
+    return (commands, kept) if sound else None
 
 
 def ask(driver: Driver, seen: Any, memory: Any, time_s: float) -> tuple[Command, Any]:
-    """A driver's next command and memory; an error tells the time [s]."""
+    """A driver's next command and memory.
+
+    Raises:
+        EpisodeError: With the time [s], if it raises or its answer is not two finite duties.
+    """
     try:
         answer, memory = driver.act(seen, memory)
         command = np.asarray(answer, dtype=float)
@@ -360,69 +355,3 @@ def _mean_over_steps(values: Floats) -> float:
 def _over_steps(values: Floats) -> Floats:
     """Mean over each step of what was sampled at its two ends."""
     return (values[:-1] + values[1:]) / 2.0
-
-
-def follow(instance: Instance, plant: Plant, start: Signal, duties: Signal, seed: int) -> Signal:
-    """Drive commands on open floor.
-
-    Args:
-        instance: Whose effects bend commands, motion and measurement.
-        plant: What moves, at its start.
-        start: That start (3,): x [m], y [m], heading [rad].
-        duties: Commands (rows, 2), one per control step.
-        seed: Of everything random in the effects.
-
-    Returns:
-        The measured pose at each command (rows, 3).
-    """
-    figures = instance.robot.figures
-    hold = round(TICK_HZ / figures["control_rate"])
-    train = instance.drivetrain
-    memory = train.begin(FilterContext(TICK_HZ, np.zeros(2), figures, seed, start[2:], start[None, :2]))
-    poses = [start[None]]
-    for command in duties[:-1]:
-        twists, memory = train.apply(np.repeat(command[None], hold, axis=0), memory)
-        poses.append(plant.move(twists)[0])
-    return np.asarray(measured(instance, np.concatenate(poses), seed)[::hold])
-
-
-PLANTS = ("bullet", "planar")
-
-
-class Fleet(Protocol):
-    """Robots side by side, each on a floor of its own."""
-
-    def move(self, twists: Signal, robots: Sequence[int], /) -> tuple[Signal, Sequence[bool]]:
-        """Let some robots follow their twists, of all robots' (all, time, 3), each for one tick.
-
-        Returns:
-            Their poses after each tick (robots, time, 3), and whether each has hit something or fallen over.
-        """
-        ...
-
-
-@dataclass(frozen=True)
-class Plants:
-    """A plant for each robot."""
-
-    plants: Sequence[Plant]
-
-    def move(self, twists: Signal, robots: Sequence[int]) -> tuple[Signal, Sequence[bool]]:
-        """Let one robot after the other follow its twists."""
-        poses, crashed = zip(*(self.plants[robot].move(twists[robot]) for robot in robots), strict=True)
-        return np.stack(poses), crashed
-
-
-def plant_at(plant: str, robot: Robot, start: Signal) -> Plant:
-    """One of PLANTS with the robot at a starting pose (3,)."""
-    return BulletPlant(robot, start, 1.0 / TICK_HZ) if plant == "bullet" else PlanarPlant(start, 1.0 / TICK_HZ)
-
-
-@contextmanager
-def fleet_at(plant: str, robot: Robot, starts: Signal) -> Iterator[Fleet]:
-    """One of PLANTS with such a robot at each of several starting poses (robots, 3)."""
-    if plant == "planar":
-        yield PlanarFleet(starts, 1.0 / TICK_HZ)
-        return
-    with ExitStack() as stack:
-        yield Plants([stack.enter_context(plant_at(plant, robot, start)) for start in starts])

@@ -3,6 +3,7 @@
 The expert is pure pursuit of the lane's centre line on the robot's true pose.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -175,3 +176,8 @@ class Pupil:
     def act(self, picture: Picture, memory: None) -> tuple[Command, None]:
         """The policy's command."""
         return self.policy(picture), None
+
+    def act_many(self, pictures: NDArray[np.uint8], memories: Sequence[None]) -> tuple[Signal, Sequence[None]]:
+        """The policy's commands for pictures (n, rows, columns, 3), all at once where it can."""
+        many = getattr(self.policy, "act_many", None)
+        return many(pictures) if many else np.stack([self.policy(picture) for picture in pictures]), memories

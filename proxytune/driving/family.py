@@ -9,35 +9,31 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from proxytune.domain import Demonstration, Episode, Policy, Recording
 from proxytune.driving.agent import Picture
 from proxytune.driving.agents import load_agent
-from proxytune.driving.batch_rollout import drive_together, groups_of
 from proxytune.driving.bullet import BulletCamera
 from proxytune.driving.cameras import GroundPlaneCamera
 from proxytune.driving.episode import (
     METRICS,
-    PLANTS,
     TICK_HZ,
     Course,
     Drive,
     Driver,
     Instance,
     Sight,
-    drive,
     driving_score,
-    fleet_at,
     measured,
     picture_only,
-    plant_at,
     score_trajectory,
     start_pose,
 )
 from proxytune.driving.expert import Observation, Playback, Pupil, lesson_driver
+from proxytune.driving.fleet import AT_ONCE, PLANTS, drive_fleet, fleet_at, only, plant_at
 from proxytune.driving.lane import off_map
 from proxytune.driving.maps import chosen_map
 from proxytune.driving.optics import CameraFigures, Renderer
@@ -62,6 +58,8 @@ from proxytune.identity import meaning_of, modules_beside, versions_of
 from proxytune.lineage import code_name
 from proxytune.settings import Section, nearest
 from proxytune.space import Parameter, Theta
+
+Score = TypeVar("Score")
 
 
 def identity_of(settings: tuple[Any, ...], robot: Path, folder: Path, versions: Mapping[str, str]) -> str:
@@ -200,7 +198,12 @@ class LaneFollowing:
         Raises:
             EpisodeError: With the time at which the agent failed.
         """
-        return score_trajectory(self.map, self.drive(episode).poses, tick_s=1.0 / TICK_HZ, seconds=self.seconds)
+        metrics: Mapping[str, float] = only(self.run_many([episode]))
+        return metrics
+
+    def run_many(self, episodes: Sequence[Episode]) -> list[Mapping[str, float] | EpisodeError]:
+        """Drive episodes side by side and score each as `run` does, to the bit; an EpisodeError where one failed."""
+        return [_scored(self._metrics, driven) for driven in self.drive_many(episodes)]
 
     def record(self, episode: Episode) -> Recording:
         """Drive one episode; its scores, the true pose at every tick, and the duties of both wheels.
@@ -209,8 +212,7 @@ class LaneFollowing:
             EpisodeError: With the time at which the agent failed.
         """
         driven, control_hz = self.drive(episode), read_robot(self.robot, self.folder).figures["control_rate"]
-        metrics = score_trajectory(self.map, driven.poses, tick_s=1.0 / TICK_HZ, seconds=self.seconds)
-        return Recording(metrics, *driven.columns(control_hz))
+        return Recording(self._metrics(driven.poses), *driven.columns(control_hz))
 
     def drive(self, episode: Episode) -> Drive:
         """Drive one episode.
@@ -218,7 +220,15 @@ class LaneFollowing:
         Raises:
             EpisodeError: With the time at which the agent failed.
         """
-        return self._drive(episode, load_agent(episode.agent, self.folder), self.course(episode, self.seconds))
+        driven: Drive = only(self.drive_many([episode]))
+        return driven
+
+    def drive_many(self, episodes: Sequence[Episode]) -> list[Drive | EpisodeError]:
+        """Drive episodes side by side, each as `drive` does."""
+        return self._drive(episodes, [load_agent(episode.agent, self.folder) for episode in episodes], self.seconds)
+
+    def _metrics(self, poses: Signal) -> Mapping[str, float]:
+        return score_trajectory(self.map, poses, tick_s=1.0 / TICK_HZ, seconds=self.seconds)
 
     @property
     def command_unit(self) -> str:
@@ -255,8 +265,8 @@ class LaneFollowing:
     def _lesson(self, episode: Episode, policy: Policy | None, seconds: float) -> tuple[Demonstration, int]:
         robot = read_robot(self.robot, self.folder)
         driver = lesson_driver(self.map, robot, episode.seed, policy)
-        shown = self._drive(episode, driver, self.course(episode, seconds), Sight).memory
-        return shown.samples, round(seconds * robot.figures["control_rate"])
+        shown: Drive = only(self._drive([episode], [driver], seconds, sees=Sight))
+        return shown.memory.samples, round(seconds * robot.figures["control_rate"])
 
     def examine(self, episode: Episode, policy: Policy) -> float:
         """The paper's driving score of a policy, from −`seconds` to `seconds`.
@@ -265,27 +275,17 @@ class LaneFollowing:
             EpisodeError: If the policy raises or does not answer with two finite duties.
             SettingsError: If the robot does not state the distance between its wheels.
         """
-        score = self._driving_score()
-        return score(self._drive(episode, Pupil(policy), self.course(episode, self.seconds)).poses)
+        return self.examine_together([episode], policy)[0]
 
     def examine_together(self, episodes: Sequence[Episode], policy: Policy) -> list[float]:
-        """Score several episodes as `examine` does, to the bit: those of one θ are driven side by side.
+        """Score several episodes as `examine` does, to the bit.
 
         Raises:
             EpisodeError: As `examine` does, for the first episode that fails; SettingsError likewise.
         """
-        score = self._driving_score()
-        try:
-            return [score(poses) for group in groups_of(episodes) for poses in self._drive_together(group, policy)]
-        except EpisodeError:
-            # Side by side another episode may fail first
-            return [self.examine(episode, policy) for episode in episodes]
-
-    def _drive_together(self, episodes: Sequence[Episode], policy: Policy) -> list[Signal]:
-        instance = self.instance(dict(episodes[0].theta))
-        courses = [self.course(episode, self.seconds) for episode in episodes]
-        with fleet_at(self.plant, instance.robot, np.stack([course.start for course in courses])) as fleet:
-            return drive_together(instance, fleet, policy, courses)
+        score, pupil = self._driving_score(), Pupil(policy)
+        driven = self._drive(episodes, [pupil] * len(episodes), self.seconds)
+        return [only([_scored(score, one)]) for one in driven]
 
     def _driving_score(self) -> Callable[[Signal], float]:
         """The paper's driving score of poses."""
@@ -303,8 +303,7 @@ class LaneFollowing:
         It goes on wherever it leads, so that two domains can be compared step by step.
         """
         seconds = len(commands) / read_robot(self.robot, self.folder).figures["control_rate"]
-        endless = replace(self.course(episode, seconds), ended=lambda x, y: False)
-        driven = self._drive(episode, Playback(commands), endless)
+        driven: Drive = only(self._drive([episode], [Playback(commands)], seconds, ended=lambda x, y: False))
         return Observation(driven.poses, np.stack(driven.memory.pictures))
 
     def course(self, episode: Episode, seconds: float) -> Course:
@@ -314,11 +313,25 @@ class LaneFollowing:
         return Course(start, seconds, episode.seed, functools.partial(off_map, self.map))
 
     def _drive(
-        self, episode: Episode, driver: Driver, course: Course, sees: Callable[[Picture, Signal], Any] = picture_only
-    ) -> Drive:
-        instance = self.instance(dict(episode.theta))
-        with self.plant_at(instance.robot, course.start) as plant:
-            return drive(instance, plant, driver, course, sees)
+        self,
+        episodes: Sequence[Episode],
+        drivers: Sequence[Driver],
+        seconds: float,
+        *,
+        sees: Callable[[Picture, Signal], Any] = picture_only,
+        ended: Callable[[float, float], bool] | None = None,
+    ) -> list[Drive | EpisodeError]:
+        """Drive episodes AT_ONCE side by side for some time [s], or until they have `ended`: off the map."""
+        driven: list[Drive | EpisodeError] = []
+        for first in range(0, len(episodes), AT_ONCE):
+            some = episodes[first : first + AT_ONCE]
+            thetas = {episode.theta: self.instance(dict(episode.theta)) for episode in some}
+            instances = [thetas[episode.theta] for episode in some]
+            courses = [self.course(episode, seconds) for episode in some]
+            courses = [replace(course, ended=ended) for course in courses] if ended else courses
+            with fleet_at(self.plant, instances[0].robot, np.stack([course.start for course in courses])) as fleet:
+                driven += drive_fleet(instances, fleet, drivers[first : first + AT_ONCE], courses, sees)
+        return driven
 
     def instance(self, theta: Theta, columns: int = 0) -> Instance:
         """The domain instance S_θ: nominal effects, then the family's, then θ; pictures of at least so many columns."""
@@ -327,6 +340,16 @@ class LaneFollowing:
     def plant_at(self, robot: Robot, start: Signal) -> Plant:
         """The plant with the robot at a starting pose."""
         return plant_at(self.plant, robot, start)
+
+
+def _scored(score: Callable[[Signal], Score], driven: Drive | EpisodeError) -> Score | EpisodeError:
+    """The score of a drive; an EpisodeError where it failed or cannot be scored."""
+    if isinstance(driven, EpisodeError):
+        return driven
+    try:
+        return score(driven.poses)
+    except EpisodeError as problem:
+        return problem
 
 
 @functools.lru_cache(maxsize=4)

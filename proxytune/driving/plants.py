@@ -327,7 +327,7 @@ class PlanarFleet:
         self._tick_s = tick_s
 
     def move(self, twists: Signal, robots: Sequence[int]) -> tuple[Signal, Sequence[bool]]:
-        """Follow twists, each for one tick."""
-        poses = integrate(self._poses[robots], twists[robots], self._tick_s)
+        """Let some robots follow their twists (robots, time, 3), each for one tick."""
+        poses = integrate(self._poses[robots], twists, self._tick_s)
         self._poses[robots] = poses[:, -1]
         return poses, [False] * len(robots)

@@ -20,8 +20,9 @@ from proxytune.driving import (
     Course,
     Picture,
     Plant,
+    Plants,
     Road,
-    Rollout,
+    Rollouts,
     check_command,
     draw_floor,
     lane_following,
@@ -192,7 +193,7 @@ class _EpisodeUnderWay(NamedTuple):
 
     plant: Plant
     course: Course
-    rollout: Rollout
+    rollouts: Rollouts
     tally: Tally
 
 
@@ -273,7 +274,8 @@ class LaneFollowingEnv(gymnasium.Env[Picture, NDArray[Any]]):
         course = self.family.course(episode, self.family.seconds)
         plant = self.family.plant_at(instance.robot, course.start)
         tally = Tally(self.family.map, self.family.seconds, course.start)
-        self._drive = _EpisodeUnderWay(plant, course, Rollout(instance, plant, course), tally)
+        rollouts = Rollouts([instance], [course], Plants([plant]))
+        self._drive = _EpisodeUnderWay(plant, course, rollouts, tally)
         self._step, self._over = 0, False
         told = {"theta": dict(episode.theta), "start": episode.start, "episode_seed": episode.seed}
         return self._picture(), {**self._info(), **told}
@@ -290,11 +292,12 @@ class LaneFollowingEnv(gymnasium.Env[Picture, NDArray[Any]]):
             raise InputError("the episode is over; call reset() for another one")
         command = np.asarray(action, dtype=float)
         check_command(command, self._step / self._control_hz)
-        drive.rollout.step(command)
+        drive.rollouts.step(command[None])
         self._step += 1
-        reward = drive.tally.add(drive.rollout.poses)
-        terminated = drive.rollout.crashed or any(drive.course.ended(x, y) for x, y, _ in drive.rollout.poses.tolist())
-        truncated = not terminated and self._step >= drive.rollout.steps
+        [poses], [crashed] = drive.rollouts.poses, drive.rollouts.crashed
+        reward = drive.tally.add(poses)
+        terminated = crashed or any(drive.course.ended(x, y) for x, y, _ in poses.tolist())
+        truncated = not terminated and self._step >= drive.rollouts.steps
         self._over = terminated or truncated
         return self._picture(), reward, terminated, truncated, self._info()
 
@@ -303,7 +306,7 @@ class LaneFollowingEnv(gymnasium.Env[Picture, NDArray[Any]]):
         if self.render_mode is None:
             return None
         drive = self._under_way()
-        return render(drive.rollout.picture, self.family.map, drive.tally.poses)
+        return render(drive.rollouts.pictures[0], self.family.map, drive.tally.poses)
 
     def close(self) -> None:
         """End the plant's world; once is enough, twice does no harm."""
@@ -331,12 +334,12 @@ class LaneFollowingEnv(gymnasium.Env[Picture, NDArray[Any]]):
 
     def _picture(self) -> Picture:
         """A copy: the camera is slower than the commands, so two steps may see one picture."""
-        return self._under_way().rollout.picture.copy()
+        return self._under_way().rollouts.pictures[0].copy()
 
     def _info(self) -> dict[str, Any]:
         drive = self._under_way()
         scores = drive.tally.whole() if self._over else drive.tally.so_far()
-        return {"pose": drive.rollout.poses[-1].copy(), **scores}
+        return {"pose": drive.rollouts.poses[0, -1].copy(), **scores}
 
 
 def _whole(name: str, value: Any, count: int) -> int:

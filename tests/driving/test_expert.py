@@ -28,6 +28,7 @@ from proxytune.driving import (
 )
 from proxytune.driving.episode import driving_score
 from proxytune.driving.expert import MEMORY, Pupil
+from proxytune.driving.fleet import only
 from proxytune.driving.plants import PlanarPlant
 from proxytune.effects import Stage, stage_chain
 from proxytune.errors import EpisodeError, SettingsError
@@ -318,7 +319,7 @@ def test_steps_off_the_road_are_not_shown_but_counted_among_those_asked_for(thet
 def test_a_guided_policy_drives_as_it_does_alone_and_sees_what_it_sees_then(plant):
     room = classroom(plant=plant)
     samples, asked = room.guide(episode(), lean, 1.0)
-    driven = room._drive(episode(), Pupil(lean), room.course(episode(), 1.0))
+    driven = only(room._drive([episode()], [Pupil(lean)], 1.0))
     assert len(driven.commands) == len(samples.commands) == asked == RATE
     np.testing.assert_array_equal(samples.observations, room.replay(episode(), driven.commands).pictures)
 
@@ -326,7 +327,7 @@ def test_a_guided_policy_drives_as_it_does_alone_and_sees_what_it_sees_then(plan
 def test_a_guided_policys_steps_are_labelled_with_what_the_expert_would_do_there():
     room = classroom(plant="planar")
     samples, _ = room.guide(episode(), lean, 1.0)
-    poses = room._drive(episode(), Pupil(lean), room.course(episode(), 1.0)).poses[:: TICK_HZ // RATE]
+    poses = only(room._drive([episode()], [Pupil(lean)], 1.0)).poses[:: TICK_HZ // RATE]
     expert = Expert(ROAD, *ROBOT.expert_figures(), seed=0)
     asked = [expert.act(Sight(None, pose), expert.begin(ROBOT))[1].commands[0] for pose in poses[:RATE]]
     np.testing.assert_array_equal(samples.commands, asked)
@@ -347,7 +348,7 @@ def test_a_policy_that_drives_as_the_expert_does_visits_what_it_is_shown():
 def test_where_a_guided_policy_is_off_the_road_nothing_is_labelled():
     room, straight = classroom(plant="planar"), lambda picture: np.array((0.5, 0.5))
     samples, asked = room.guide(episode(start=1), straight, 12.0)
-    driven = room._drive(episode(start=1), Pupil(straight), room.course(episode(start=1), 12.0))
+    driven = only(room._drive([episode(start=1)], [Pupil(straight)], 12.0))
     assert 0 < len(samples.commands) == len(samples.observations) < len(driven.commands) < asked == 12 * RATE
 
 

@@ -9,9 +9,8 @@ import pytest
 
 from proxytune.domain import BatchClassroom, Demonstration, make_episode
 from proxytune.driving import LaneFollowing, drive, lane_following
-from proxytune.driving.batch_rollout import AT_ONCE, drive_together
-from proxytune.driving.episode import fleet_at, plant_at
 from proxytune.driving.expert import Pupil
+from proxytune.driving.fleet import AT_ONCE, drive_fleet, fleet_at, plant_at
 from proxytune.effects import CATALOGUE, Stage, theta_names
 from proxytune.errors import EpisodeError, SettingsError
 from proxytune.files import shipped
@@ -62,7 +61,8 @@ def alone_and_together(room, what, policy):
         with plant_at(room.plant, instance.robot, course.start) as plant:
             alone.append(drive(instance, plant, Pupil(policy), course).poses)
     with fleet_at(room.plant, instance.robot, np.stack([course.start for course in courses])) as fleet:
-        return alone, drive_together(instance, fleet, policy, courses)
+        driven = drive_fleet([instance] * len(what), fleet, [Pupil(policy) for _ in what], courses)
+    return alone, [one.poses for one in driven]
 
 
 def assert_same(alone, together):

@@ -1,0 +1,371 @@
+"""Robots driven side by side, control step by control step: each goes as it does by itself, to the bit.
+
+`drive_fleet` asks drivers for commands; `Rollouts` is the same one step at a time. A single episode is a fleet of one:
+`drive`. `follow` drives recorded commands without a camera. Robots that crash, leave their course or whose driver fails
+drop out. Our effects filter a batch as they filter one robot, unless they draw at random; those and a user's own are
+asked for each robot by itself.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxytune.driving.agent import Picture
+from proxytune.driving.bullet import BulletPlant
+from proxytune.driving.cameras import Views
+from proxytune.driving.episode import (
+    TICK_HZ,
+    Course,
+    Drive,
+    Driver,
+    Instance,
+    alike,
+    ask_many,
+    begin_all,
+    measured,
+    picture_only,
+)
+from proxytune.driving.expert import Pupil
+from proxytune.driving.plants import Drivetrain, PlanarFleet, PlanarPlant, Plant
+from proxytune.driving.robot import Robot
+from proxytune.effects import CATALOGUE, Chain, Effect, FilterContext, Learnt, Memory, Signal, Stage
+from proxytune.errors import EpisodeError
+from proxytune.space import Parameter
+
+AT_ONCE = 48
+"""So many robots drive side by side: each has a world in memory."""
+
+PLANTS = ("bullet", "planar")
+
+
+class Fleet(Protocol):
+    """Robots side by side, each on a floor of its own."""
+
+    def move(self, twists: Signal, robots: Sequence[int], /) -> tuple[Signal, Sequence[bool]]:
+        """Let some robots follow their twists (robots, time, 3), each for one tick.
+
+        Returns:
+            Their poses after each tick (robots, time, 3), and whether each has hit something or fallen over.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class Plants:
+    """A plant for each robot."""
+
+    plants: Sequence[Plant]
+
+    def move(self, twists: Signal, robots: Sequence[int]) -> tuple[Signal, Sequence[bool]]:
+        """Let one robot after the other follow its twists."""
+        poses, crashed = np.empty_like(twists), []
+        for row, robot in enumerate(robots):
+            poses[row], hit = self.plants[robot].move(twists[row])
+            crashed.append(hit)
+        return poses, crashed
+
+
+def plant_at(plant: str, robot: Robot, start: Signal) -> Plant:
+    """One of PLANTS with the robot at a starting pose (3,)."""
+    return BulletPlant(robot, start, 1.0 / TICK_HZ) if plant == "bullet" else PlanarPlant(start, 1.0 / TICK_HZ)
+
+
+@contextmanager
+def fleet_at(plant: str, robot: Robot, starts: Signal) -> Iterator[Fleet]:
+    """One of PLANTS with such a robot at each of several starting poses (robots, 3)."""
+    if plant == "planar":
+        yield PlanarFleet(starts, 1.0 / TICK_HZ)
+        return
+    with ExitStack() as stack:
+        yield Plants([stack.enter_context(plant_at(plant, robot, start)) for start in starts])
+
+
+_OURS = frozenset((*CATALOGUE.values(), Learnt))
+
+
+def _same_in_batches(effect: Effect) -> bool:
+    """Tell whether it does to each robot of a batch, to the bit, what it does to one: ours do, unless they draw."""
+    return type(effect) in _OURS and (effect.trace is None or effect.trace.draws is None)
+
+
+@dataclass(frozen=True)
+class _Apart:
+    """An effect that is done to each robot by itself, whose seed it draws by.
+
+    Attributes:
+        effect: What is done.
+        seeds: Each robot's.
+        left: The robots that have left: nothing more is done to them. It grows as they leave.
+    """
+
+    effect: Effect
+    seeds: tuple[int, ...]
+    left: set[int]
+    name: ClassVar[str] = "apart"
+    stage: ClassVar[Stage] = Stage.COMMAND
+    parameters: ClassVar[tuple[Parameter, ...]] = ()
+    trace: ClassVar[None] = None
+
+    def begin(self, context: FilterContext) -> list[Memory]:
+        """Each robot's memory, from a context of arrays (robots, …)."""
+        one = Chain((self.effect,))  # which gives the effect its own seed
+        parts = zip(self.seeds, context.rest, context.headings, context.places, strict=True)
+        return [
+            one.begin(replace(context, seed=seed, rest=rest, headings=headings, places=places))[0]
+            for seed, rest, headings, places in parts
+        ]
+
+    def apply(self, signal: Signal, memory: list[Memory]) -> tuple[Signal, list[Memory]]:
+        """Filter each robot's next chunk."""
+        filtered, kept = np.array(signal, dtype=float), list(memory)
+        for robot in range(len(filtered)):
+            if robot not in self.left:
+                filtered[robot], kept[robot] = self.effect.apply(signal[robot], memory[robot])
+        return filtered, kept
+
+
+class _Band:
+    """Robots of a fleet that are of one domain instance.
+
+    Attributes:
+        robots: Their numbers in the fleet.
+        here: Which of them are still under way.
+        rows: Where these are among the fleet's robots under way.
+        views: What their cameras show; None where nobody looks.
+    """
+
+    def __init__(self, instance: Instance, robots: Sequence[int], courses: Sequence[Course], *, blind: bool) -> None:
+        figures, own = instance.robot.figures, [courses[robot] for robot in robots]
+        self.robots, self.here, self.rows = list(robots), list(range(len(robots))), list(robots)
+        self._left: set[int] = set()
+        self._train, self._alone = instance.drivetrain, len(own) == 1
+        if self._alone:  # without an axis of robots our filters take less time
+            start = own[0].start
+            resting = FilterContext(TICK_HZ, np.zeros(2), figures, own[0].seed, start[2:], start[None, :2])
+        else:
+            starts = np.stack([course.start for course in own])
+            resting = FilterContext(TICK_HZ, np.zeros((len(own), 2)), figures, 0, starts[:, 2:], starts[:, None, :2])
+            seeds = tuple(course.seed for course in own)
+            self._train = _side_by_side(instance.drivetrain, seeds, self._left)
+        self._memory: Any = self._train.begin(resting)
+        contexts = [FilterContext(TICK_HZ, course.start, figures, course.seed) for course in own]
+        self.views = None if blind else Views(instance.camera, instance.image, contexts)
+
+    def twists(self, duties: Signal) -> Signal:
+        """The twists (robots, time, 3) that the next duties (robots, time, 2) of all of them lead to."""
+        if self._alone:
+            twists, self._memory = self._train.apply(duties[0], self._memory)
+            return twists[None]
+        twists, self._memory = self._train.apply(duties, self._memory)
+        return twists
+
+    def leave(self, rows: dict[int, int]) -> None:
+        """Keep those whose rows among the robots under way are given by their numbers in the fleet."""
+        self.here = [own for own, robot in enumerate(self.robots) if robot in rows]
+        self.rows = [rows[self.robots[own]] for own in self.here]
+        self._left.update(set(range(len(self.robots))) - set(self.here))
+
+
+def _side_by_side(train: Drivetrain, seeds: tuple[int, ...], left: set[int]) -> Drivetrain:
+    """A drivetrain over a leading axis of robots, each with a seed of its own."""
+
+    def chain(of_one: Chain) -> Chain:
+        return Chain(tuple(one if _same_in_batches(one) else _Apart(one, seeds, left) for one in of_one.effects))
+
+    return replace(train, command=chain(train.command), actuation=chain(train.actuation), motion=chain(train.motion))
+
+
+class Rollouts:
+    """Episodes under way side by side, one control step after the other, all for the same time.
+
+    Attributes:
+        steps: How many commands there is time for.
+        under_way: The robots that are still driven, by their numbers.
+        new_pictures: Whether they have new pictures since the last step.
+        poses: Theirs after each tick of the last step, (robots under way, ticks, 3): x [m], y [m], heading [rad];
+            before the first, the starts.
+        crashed: Whether each of them has hit something or fallen over.
+    """
+
+    def __init__(
+        self, instances: Sequence[Instance], courses: Sequence[Course], fleet: Fleet, *, blind: bool = False
+    ) -> None:
+        """Put robots of these instances at their starts; `fleet` has them there. Without cameras where `blind`."""
+        control_hz = instances[0].robot.figures["control_rate"]
+        self._hold, self._fleet, self._courses = round(TICK_HZ / control_hz), fleet, courses
+        members: dict[int, list[int]] = {}
+        for robot, instance in enumerate(instances):
+            members.setdefault(id(instance), []).append(robot)
+        self._bands = [_Band(instances[own[0]], own, courses, blind=blind) for own in members.values()]
+        self._commands = np.zeros((len(courses), 2))
+        self.steps = round(courses[0].seconds * control_hz)
+        self.under_way = list(range(len(courses)))
+        self.new_pictures = True
+        self.poses: Signal = np.stack([course.start[None] for course in courses])
+        self.crashed: Sequence[bool] = [False] * len(courses)
+
+    @property
+    def pictures(self) -> NDArray[np.uint8]:
+        """The newest pictures (robots under way, rows, columns, 3)."""
+        shown = [band.views.pictures(band.here) for band in self._bands if band.views]
+        if len(shown) == 1:
+            return shown[0]
+        pictures = np.empty((len(self.under_way), *shown[0].shape[1:]), dtype=np.uint8)
+        for band, own in zip(self._bands, shown, strict=True):
+            pictures[band.rows] = own
+        return pictures
+
+    @property
+    def ended(self) -> list[bool]:
+        """Tell which of the robots under way have crashed or left their courses."""
+        ends = zip(self.under_way, self.crashed, self.poses[:, -1, :2].tolist(), strict=True)
+        return [hit or self._courses[robot].ended(x, y) for robot, hit, (x, y) in ends]
+
+    def step(self, commands: Signal) -> None:
+        """Hold a command of each robot under way, (robots under way, 2), for one control step."""
+        self._commands[self.under_way] = commands
+        held = np.repeat(self._commands[:, None], self._hold, axis=1)
+        if len(self._bands) == 1 and len(held) == len(self.under_way):
+            twists = self._bands[0].twists(held)
+        else:
+            twists = np.empty((len(self.under_way), self._hold, 3))
+            for band in self._bands:
+                twists[band.rows] = band.twists(held[band.robots])[band.here]
+        self.poses, self.crashed = self._fleet.move(twists, self.under_way)
+        for band in self._bands:
+            if band.views:
+                band.views.pass_by(self.poses if len(self._bands) == 1 else self.poses[band.rows], band.here)
+                self.new_pictures = band.views.changed
+
+    def keep(self, rows: Sequence[int]) -> None:
+        """Go on with these rows of the robots under way alone."""
+        if len(rows) == len(self.under_way):
+            return
+        self.under_way = [self.under_way[row] for row in rows]
+        self.poses, self.crashed = self.poses[list(rows)], [self.crashed[row] for row in rows]
+        row_of = {robot: row for row, robot in enumerate(self.under_way)}
+        for band in self._bands:
+            band.leave(row_of)
+        self._bands = [band for band in self._bands if band.here]
+
+
+def drive_fleet(
+    instances: Sequence[Instance],
+    fleet: Fleet,
+    drivers: Sequence[Driver],
+    courses: Sequence[Course],
+    sees: Callable[[Picture, Signal], Any] = picture_only,
+) -> list[Drive | EpisodeError]:
+    """Drive robots side by side, each until the time is over, it crashes, its course ends or its driver fails.
+
+    Args:
+        instances: What bends each robot's commands, motion and pictures.
+        fleet: What moves, at the starts.
+        drivers: Who drives each.
+        courses: What each drives, all for the same time.
+        sees: What a driver is shown of the picture and the true pose; an expert's is `Sight`.
+
+    Returns:
+        Each robot's drive; an EpisodeError where its agent raised, or its answer was not two finite duties.
+    """
+    rollouts, control_hz = Rollouts(instances, courses, fleet), instances[0].robot.figures["control_rate"]
+    drivers, hold = alike(drivers), round(TICK_HZ / control_hz)
+    by_picture = all(isinstance(driver, Pupil) for driver in drivers)
+    memories, failed = begin_all(drivers, [instance.robot for instance in instances])
+    rollouts.keep([robot for robot in rollouts.under_way if robot not in failed])
+    poses = np.empty((len(drivers), rollouts.steps * hold + 1, 3))
+    poses[:, 0] = [course.start for course in courses]
+    issued, crashed = np.empty((len(drivers), rollouts.steps, 2)), [False] * len(drivers)
+    driven, commands = [0] * len(drivers), np.empty((0, 2))
+    for step in range(rollouts.steps):
+        if not rollouts.under_way:
+            break
+        if rollouts.new_pictures or not by_picture:
+            under_way, pictures = rollouts.under_way, rollouts.pictures
+            shown = zip(pictures, rollouts.poses[:, -1], strict=True)
+            seen = pictures if sees is picture_only else [sees(*one) for one in shown]
+            commands, kept, problems = ask_many(
+                [drivers[robot] for robot in under_way],
+                seen,
+                [memories[robot] for robot in under_way],
+                step / control_hz,
+            )
+            for robot, memory in zip(under_way, kept, strict=True):
+                memories[robot] = memory
+            if problems:
+                failed |= {under_way[row]: problem for row, problem in problems.items()}
+                rows = [row for row in range(len(under_way)) if row not in problems]
+                rollouts.keep(rows)
+                commands = commands[rows]
+                if not rows:
+                    break
+        rollouts.step(commands)
+        issued[rollouts.under_way, step] = commands
+        poses[rollouts.under_way, step * hold + 1 : (step + 1) * hold + 1] = rollouts.poses
+        ended = rollouts.ended
+        if any(ended) or step + 1 == rollouts.steps:
+            for robot, hit in zip(rollouts.under_way, rollouts.crashed, strict=True):
+                driven[robot], crashed[robot] = step + 1, hit
+            rows = [row for row, over in enumerate(ended) if not over]
+            rollouts.keep(rows)
+            commands = commands[rows]
+    return [
+        failed.get(robot)
+        or Drive(
+            poses[robot, : driven[robot] * hold + 1], issued[robot, : driven[robot]], crashed[robot], memories[robot]
+        )
+        for robot in range(len(drivers))
+    ]
+
+
+def drive(
+    instance: Instance,
+    plant: Plant,
+    driver: Driver,
+    course: Course,
+    sees: Callable[[Picture, Signal], Any] = picture_only,
+) -> Drive:
+    """Drive one robot as `drive_fleet` drives several.
+
+    Raises:
+        EpisodeError: If the agent raises, or its answer is not two finite duties.
+    """
+    return only(drive_fleet([instance], Plants([plant]), [driver], [course], sees))
+
+
+def only(results: Sequence[Any | EpisodeError]) -> Any:
+    """The result of a fleet of one.
+
+    Raises:
+        EpisodeError: If it is one.
+    """
+    [result] = results
+    if isinstance(result, EpisodeError):
+        raise result
+    return result
+
+
+def follow(instance: Instance, plant: Plant, start: Signal, duties: Signal, seed: int) -> Signal:
+    """Drive commands on open floor.
+
+    Args:
+        instance: Whose effects bend commands, motion and measurement.
+        plant: What moves, at its start.
+        start: That start (3,): x [m], y [m], heading [rad].
+        duties: Commands (rows, 2), one per control step.
+        seed: Of everything random in the effects.
+
+    Returns:
+        The measured pose at each command (rows, 3).
+    """
+    course = Course(start, 0.0, seed, lambda x, y: False)
+    rollouts, poses = Rollouts([instance], [course], Plants([plant]), blind=True), [start[None]]
+    for command in duties[:-1]:
+        rollouts.step(command[None])
+        poses.append(rollouts.poses[0])
+    hold = round(TICK_HZ / instance.robot.figures["control_rate"])
+    return np.asarray(measured(instance, np.concatenate(poses), seed)[::hold])

@@ -239,6 +239,20 @@ def remember_nothing(effect: object, context: FilterContext) -> None:
 
 
 @runtime_checkable
+class Separate(Protocol):
+    """An effect that does each sample by itself, so that those nobody looks at may be left out."""
+
+    def skip(self, memory: Memory, samples: int, /) -> Memory:
+        """The memory after so many more samples."""
+        ...
+
+
+def skip_nothing(effect: object, memory: Any, samples: int) -> Any:
+    """The `skip` of an effect that does the same to each sample."""
+    return memory
+
+
+@runtime_checkable
 class Recalling(Protocol):
     """An effect for which it matters what came before a window that begins amid a drive."""
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import correlate1d
 from scipy.special import ive
 
-from proxytune.effects.effect import FilterContext, Signal, Stage, Trace, remember_nothing
+from proxytune.effects.effect import FilterContext, Signal, Stage, Trace, remember_nothing, skip_nothing
 from proxytune.seeds import picture_generator
 from proxytune.space import Parameter
 
@@ -47,6 +47,7 @@ class Defocus:
                          "1 to 5 pixels of 480 on well-kept cameras"),
     )  # fmt: skip
     trace: ClassVar[Trace | None] = None
+    skip = skip_nothing
 
     def begin(self, context: FilterContext) -> PointSpread:
         """The spot's width in pixels of this picture."""
@@ -80,6 +81,7 @@ class Vignetting:
                   source="the cos⁴ law: 0.5 in corners 33° off the axis, 0.85 in those of a Duckiebot, 52° off"),
     )  # fmt: skip
     trace: ClassVar[Trace | None] = None
+    skip = skip_nothing
 
     def begin(self, context: FilterContext) -> Signal:
         """The factor of every pixel and colour (channels,)."""
@@ -112,7 +114,7 @@ class Exposure:
                   source="a sensor's linear pictures against encoded ones (sRGB): 2.2, or 1/2.2 the other way"),
     )  # fmt: skip
     trace: ClassVar[Trace | None] = None
-    begin = remember_nothing
+    begin, skip = remember_nothing, skip_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Brighten or darken; the picture is clipped only once it is complete."""
@@ -156,6 +158,10 @@ class ImageNoise:
         generators = (picture_generator(memory.seed, number) for number in range(memory.next, end))
         drawn = np.stack([one.standard_normal(channels, dtype=np.float32) for one in generators])
         return signal + self.deviation * drawn, memory._replace(next=end)
+
+    def skip(self, memory: NoiseState, samples: int) -> NoiseState:
+        """Leave the noise of some pictures undrawn."""
+        return memory._replace(next=memory.next + samples)
 
 
 class ShutterWindow(NamedTuple):

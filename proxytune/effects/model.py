@@ -5,11 +5,12 @@ import zlib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
 from proxytune.effects.catalogue import CATALOGUE, PARAMETERS, SHIPPED, Catalogue, effect_of
-from proxytune.effects.effect import Effect, FilterContext, Memory, Recalling, Signal, Stage
+from proxytune.effects.effect import Effect, FilterContext, Memory, Recalling, Separate, Signal, Stage
 from proxytune.effects.learnt import Learnt, is_learnt, learnt_text, read_learnt
 from proxytune.errors import ExtensionError
 from proxytune.settings import GEOMETRY, Section, nearest, read_settings
@@ -188,6 +189,18 @@ class Chain:
             signal, kept = effect.apply(signal, memory)
             after.append(kept)
         return signal, tuple(after)
+
+    def parted(self) -> tuple["Chain", "Chain"]:
+        """The effects that mix samples with those before, and the last ones, which do each sample by itself."""
+        first = len(self.effects)
+        while first and isinstance(self.effects[first - 1], Separate):
+            first -= 1
+        return Chain(self.effects[:first]), Chain(self.effects[first:])
+
+    def skip(self, memories: tuple[Memory, ...], samples: int) -> tuple[Memory, ...]:
+        """The memories after samples that nobody looks at; all effects have to do each sample by itself."""
+        kept = zip(self.effects, memories, strict=True)
+        return tuple(cast(Separate, effect).skip(memory, samples) for effect, memory in kept)
 
     def mean_weights(self, rate_hz: float) -> Signal | None:
         """The weights of the last samples, the newest last, if all that the effects make is a mean of these.

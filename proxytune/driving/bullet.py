@@ -65,6 +65,10 @@ SOLVER_ITERATIONS = 20
 """Enough for one robot on a floor: 50, PyBullet's default, moves it by less than a millimetre a metre."""
 
 
+_SPEED, _WHERE, _GAINS = pybullet.VELOCITY_CONTROL, pybullet.getBasePositionAndOrientation, (0.1, 1.0, 0.0)
+"""The mode of a driven wheel, the call that tells its body's place, and the gains that PyBullet takes by itself."""
+
+
 class BulletPlant:
     """One robot in a PyBullet world of its own.
 
@@ -84,15 +88,27 @@ class BulletPlant:
 
     def move(self, twists: Signal) -> tuple[Signal, bool]:
         """Follow twists, each for one tick."""
-        poses = []
+        poses, world, body, reached = [], self._world, self._body, self._heading
+        half, radius, (left, right), (torque, _) = self._half_distance, self._radius, self._wheels, self._torques
+        spin, step, where = pybullet.setJointMotorControl2, pybullet.stepSimulation, _WHERE
+        ahead, aside, _ = self._offset
         for forward, sideways, yaw in twists.tolist():
-            self._spin(forward, yaw)
-            pybullet.stepSimulation(self._world)
+            # Arguments by place, and one call a wheel: a list of two takes longer to unpack
+            spin(body, left, _SPEED, 0.0, (forward - yaw * half) / radius, torque, *_GAINS, world)
+            spin(body, right, _SPEED, 0.0, (forward + yaw * half) / radius, torque, *_GAINS, world)
+            step(world)
             if sideways:
                 self._shift(sideways * self._tick_s)
-            poses.append(self._pose())
+            centre, (x, y, z, w) = where(body, world)
+            heading = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+            reached += math.remainder(heading - reached, math.tau)
+            cosine, sine = math.cos(heading), math.sin(heading)
+            poses.append(
+                (centre[0] - cosine * ahead + sine * aside, centre[1] - sine * ahead - cosine * aside, reached)
+            )
+        self._heading = reached
         # On its wheels and caster the chassis touches nothing
-        touched = pybullet.getContactPoints(bodyA=self._body, linkIndexA=-1, physicsClientId=self._world)
+        touched = pybullet.getContactPoints(bodyA=body, linkIndexA=-1, physicsClientId=world)
         return np.array(poses).reshape(-1, 3), bool(touched)
 
     def _build(self, urdf: Path, start: Signal) -> int:
@@ -120,17 +136,6 @@ class BulletPlant:
             pybullet.changeDynamics(body, link, linearDamping=0.0, angularDamping=0.0, jointDamping=0.0, **world)
         return body
 
-    def _spin(self, forward: float, yaw: float) -> None:
-        difference = yaw * self._half_distance
-        pybullet.setJointMotorControlArray(
-            self._body,
-            self._wheels,
-            pybullet.VELOCITY_CONTROL,
-            targetVelocities=[(forward - difference) / self._radius, (forward + difference) / self._radius],
-            forces=self._torques,
-            physicsClientId=self._world,
-        )
-
     def _shift(self, sideways: float) -> None:
         """Slide the body to its left [m], its speeds unchanged: wheels cannot push that way."""
         centre, turn = pybullet.getBasePositionAndOrientation(self._body, physicsClientId=self._world)
@@ -139,14 +144,6 @@ class BulletPlant:
         moved = [a + b for a, b in zip(centre, step, strict=True)]
         pybullet.resetBasePositionAndOrientation(self._body, moved, turn, physicsClientId=self._world)
         pybullet.resetBaseVelocity(self._body, linear, angular, physicsClientId=self._world)
-
-    def _pose(self) -> tuple[float, float, float]:
-        centre, (x, y, z, w) = pybullet.getBasePositionAndOrientation(self._body, physicsClientId=self._world)
-        heading = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-        self._heading += math.remainder(heading - self._heading, math.tau)
-        cosine, sine = math.cos(heading), math.sin(heading)
-        ahead, left, _ = self._offset
-        return centre[0] - cosine * ahead + sine * left, centre[1] - sine * ahead - cosine * left, self._heading
 
     def __enter__(self) -> Self:
         return self

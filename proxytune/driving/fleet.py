@@ -6,7 +6,7 @@ drop out. Our effects filter a batch as they filter one robot, unless they draw 
 asked for each robot by itself.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Protocol
@@ -184,7 +184,9 @@ class Rollouts:
 
     Attributes:
         steps: How many commands there is time for.
+        hold: How many ticks each is held for.
         under_way: The robots that are still driven, by their numbers.
+        here: The same as an index of arrays over all robots.
         new_pictures: Whether they have new pictures since the last step.
         poses: Theirs after each tick of the last step, (robots under way, ticks, 3): x [m], y [m], heading [rad];
             before the first, the starts.
@@ -196,14 +198,15 @@ class Rollouts:
     ) -> None:
         """Put robots of these instances at their starts; `fleet` has them there. Without cameras where `blind`."""
         control_hz = instances[0].robot.figures["control_rate"]
-        self._hold, self._fleet, self._courses = round(TICK_HZ / control_hz), fleet, courses
+        self.hold, self._fleet, self._courses = round(TICK_HZ / control_hz), fleet, courses
         members: dict[int, list[int]] = {}
         for robot, instance in enumerate(instances):
             members.setdefault(id(instance), []).append(robot)
         self._bands = [_Band(instances[own[0]], own, courses, blind=blind) for own in members.values()]
-        self._commands = np.zeros((len(courses), 2))
+        self._held = np.zeros((len(courses), self.hold, 2))
         self.steps = round(courses[0].seconds * control_hz)
         self.under_way = list(range(len(courses)))
+        self.here: slice | list[int] = slice(None)
         self.new_pictures = True
         self.poses: Signal = np.stack([course.start[None] for course in courses])
         self.crashed: Sequence[bool] = [False] * len(courses)
@@ -227,12 +230,12 @@ class Rollouts:
 
     def step(self, commands: Signal) -> None:
         """Hold a command of each robot under way, (robots under way, 2), for one control step."""
-        self._commands[self.under_way] = commands
-        held = np.repeat(self._commands[:, None], self._hold, axis=1)
+        self._held[self.here] = commands[:, None]
+        held = self._held.copy()  # effects remember what they are given
         if len(self._bands) == 1 and len(held) == len(self.under_way):
             twists = self._bands[0].twists(held)
         else:
-            twists = np.empty((len(self.under_way), self._hold, 3))
+            twists = np.empty((len(self.under_way), self.hold, 3))
             for band in self._bands:
                 twists[band.rows] = band.twists(held[band.robots])[band.here]
         self.poses, self.crashed = self._fleet.move(twists, self.under_way)
@@ -245,7 +248,7 @@ class Rollouts:
         """Go on with these rows of the robots under way alone."""
         if len(rows) == len(self.under_way):
             return
-        self.under_way = [self.under_way[row] for row in rows]
+        self.here = self.under_way = [self.under_way[row] for row in rows]
         self.poses, self.crashed = self.poses[list(rows)], [self.crashed[row] for row in rows]
         row_of = {robot: row for row, robot in enumerate(self.under_way)}
         for band in self._bands:
@@ -272,54 +275,78 @@ def drive_fleet(
     Returns:
         Each robot's drive; an EpisodeError where its agent raised, or its answer was not two finite duties.
     """
-    rollouts, control_hz = Rollouts(instances, courses, fleet), instances[0].robot.figures["control_rate"]
-    drivers, hold = alike(drivers), round(TICK_HZ / control_hz)
-    by_picture = all(isinstance(driver, Pupil) for driver in drivers)
-    memories, failed = begin_all(drivers, [instance.robot for instance in instances])
-    rollouts.keep([robot for robot in rollouts.under_way if robot not in failed])
-    poses = np.empty((len(drivers), rollouts.steps * hold + 1, 3))
-    poses[:, 0] = [course.start for course in courses]
-    issued, crashed = np.empty((len(drivers), rollouts.steps, 2)), [False] * len(drivers)
-    driven, commands = [0] * len(drivers), np.empty((0, 2))
-    for step in range(rollouts.steps):
-        if not rollouts.under_way:
+    control_hz = instances[0].robot.figures["control_rate"]
+    drives = _Drives(Rollouts(instances, courses, fleet), drivers, sees)
+    drives.begin([instance.robot for instance in instances])
+    for step in range(drives.rollouts.steps):
+        drives.ask(step / control_hz)
+        if not drives.drivers:
             break
-        if rollouts.new_pictures or not by_picture:
-            under_way, pictures = rollouts.under_way, rollouts.pictures
-            shown = zip(pictures, rollouts.poses[:, -1], strict=True)
-            seen = pictures if sees is picture_only else [sees(*one) for one in shown]
-            commands, kept, problems = ask_many(
-                [drivers[robot] for robot in under_way],
-                seen,
-                [memories[robot] for robot in under_way],
-                step / control_hz,
-            )
-            for robot, memory in zip(under_way, kept, strict=True):
-                memories[robot] = memory
-            if problems:
-                failed |= {under_way[row]: problem for row, problem in problems.items()}
-                rows = [row for row in range(len(under_way)) if row not in problems]
-                rollouts.keep(rows)
-                commands = commands[rows]
-                if not rows:
-                    break
-        rollouts.step(commands)
-        issued[rollouts.under_way, step] = commands
-        poses[rollouts.under_way, step * hold + 1 : (step + 1) * hold + 1] = rollouts.poses
-        ended = rollouts.ended
-        if any(ended) or step + 1 == rollouts.steps:
-            for robot, hit in zip(rollouts.under_way, rollouts.crashed, strict=True):
-                driven[robot], crashed[robot] = step + 1, hit
-            rows = [row for row, over in enumerate(ended) if not over]
-            rollouts.keep(rows)
-            commands = commands[rows]
-    return [
-        failed.get(robot)
-        or Drive(
-            poses[robot, : driven[robot] * hold + 1], issued[robot, : driven[robot]], crashed[robot], memories[robot]
-        )
-        for robot in range(len(drivers))
-    ]
+        drives.step(step)
+    return drives.results
+
+
+class _Drives:
+    """Drives under way, in the rows of the robots under way, and what became of those that ended.
+
+    Attributes:
+        rollouts: What is driven.
+        drivers: Who drives each robot under way.
+        results: Of each robot that has ended.
+    """
+
+    def __init__(self, rollouts: Rollouts, drivers: Sequence[Driver], sees: Callable[[Picture, Signal], Any]) -> None:
+        self.rollouts, self.drivers, self._sees = rollouts, alike(drivers), sees
+        self.results: list[Any] = [None] * len(drivers)
+        self._by_picture = all(isinstance(driver, Pupil) for driver in drivers)
+        self._memories: list[Any] = []
+        self._commands = np.zeros((len(drivers), 2))
+        self._issued = np.empty((len(drivers), rollouts.steps, 2))
+        self._poses = np.empty((len(drivers), rollouts.steps * rollouts.hold + 1, 3))
+        self._poses[:, 0] = rollouts.poses[:, 0]
+
+    def begin(self, robots: Sequence[Robot]) -> None:
+        """Give every driver the memory it begins with."""
+        self._memories, problems = begin_all(self.drivers, robots)
+        self._fail(problems)
+
+    def ask(self, time_s: float) -> None:
+        """Ask for the next commands; a policy that has seen the pictures before would answer the same."""
+        if not self.drivers or (self._by_picture and not self.rollouts.new_pictures):
+            return
+        seen: Sequence[Any] = self.rollouts.pictures
+        if self._sees is not picture_only:
+            seen = [self._sees(*one) for one in zip(seen, self.rollouts.poses[:, -1], strict=True)]
+        self._commands, self._memories, problems = ask_many(self.drivers, seen, self._memories, time_s)
+        self._fail(problems)
+
+    def step(self, number: int) -> None:
+        """Go on for the control step of this number, and leave out whoever has ended with it."""
+        rollouts, first = self.rollouts, number * self.rollouts.hold + 1
+        rollouts.step(self._commands)
+        self._issued[rollouts.here, number] = self._commands
+        self._poses[rollouts.here, first : first + rollouts.hold] = rollouts.poses
+        ended = rollouts.ended if number + 1 < rollouts.steps else [True] * len(self.drivers)
+        if not any(ended):
+            return
+        for row, robot in enumerate(rollouts.under_way):
+            if ended[row]:
+                poses, issued = self._poses[robot, : first + rollouts.hold], self._issued[robot, : number + 1]
+                self.results[robot] = Drive(poses, issued, bool(rollouts.crashed[row]), self._memories[row])
+        self._go_on([row for row, over in enumerate(ended) if not over])
+
+    def _fail(self, problems: Mapping[int, EpisodeError]) -> None:
+        """Leave out the robots in these rows."""
+        if problems:
+            for row, problem in problems.items():
+                self.results[self.rollouts.under_way[row]] = problem
+            self._go_on([row for row in range(len(self.drivers)) if row not in problems])
+
+    def _go_on(self, rows: list[int]) -> None:
+        self.rollouts.keep(rows)
+        self.drivers = [self.drivers[row] for row in rows]
+        self._memories = [self._memories[row] for row in rows]
+        self._commands = self._commands[rows]
 
 
 def drive(

@@ -290,10 +290,10 @@ def integrate(start: Signal, twists: Signal, tick_s: float) -> Signal:
     chord = tick_s * (np.sin(half) / half)
     forward, sideways = twists[..., 0] * chord, twists[..., 1] * chord
     cosine, sine = np.cos(middles), np.sin(middles)
-    x = start[..., None, 0] + (forward * cosine - sideways * sine).cumsum(axis=-1)
-    y = start[..., None, 1] + (forward * sine + sideways * cosine).cumsum(axis=-1)
     poses = np.empty((*headings.shape, 3))
-    poses[..., 0], poses[..., 1], poses[..., 2] = x, y, headings
+    poses[..., 0], poses[..., 1] = forward * cosine - sideways * sine, forward * sine + sideways * cosine
+    poses[..., :2] = start[..., None, :2] + poses[..., :2].cumsum(axis=-2)
+    poses[..., 2] = headings
     return poses
 
 
@@ -328,6 +328,7 @@ class PlanarFleet:
 
     def move(self, twists: Signal, robots: Sequence[int]) -> tuple[Signal, Sequence[bool]]:
         """Let some robots follow their twists (robots, time, 3), each for one tick."""
-        poses = integrate(self._poses[robots], twists, self._tick_s)
-        self._poses[robots] = poses[:, -1]
+        here = slice(None) if len(robots) == len(self._poses) else list(robots)
+        poses = integrate(self._poses[here], twists, self._tick_s)
+        self._poses[here] = poses[:, -1]
         return poses, [False] * len(robots)

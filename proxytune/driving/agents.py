@@ -5,138 +5,140 @@ itself. Around any of them others react later, smooth, lean to one side, or slow
 `load_agent` finds an agent by name: one of `AGENTS`, a plug-in, or a user's own as `module:attribute`.
 """
 
-import functools
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal, NamedTuple, cast
+from typing import Any, Literal, NamedTuple, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.driving.agent import Agent, Command, Picture
-from proxytune.driving.optics import CameraFigures, ground_points
+from proxytune.driving.perception import (
+    Kind,
+    Lane,
+    Lower,
+    Markings,
+    Seen,
+    count_yellow,
+    find_lanes,
+    lower_part,
+    open_eye,
+    take_picture,
+    weigh_edges,
+    weigh_markings,
+)
 from proxytune.driving.robot import Robot
 from proxytune.extensions import make
 
-Pixels = NDArray[np.intp]
+Look = tuple[Kind, Any]
+"""What an agent asks of its newest picture: how, and what of."""
+
+Decision = Generator[Look, Any, tuple[Any, Any]]
+"""Looks, until the answers lead to a command and the memory for the next picture."""
 
 
-class Lane(NamedTuple):
-    """A straight line through the lane's centre in the robot's frame: left(x) = offset + slope · x.
+class Deciding(Protocol):
+    """An agent that says what it looks at, so that it can look together with others."""
 
-    Attributes:
-        offset: How far to the left of the axle's middle the lane's centre lies [m].
-        slope: Tangent of the lane's direction, positive to the left.
-        pixels: How many pixels say so.
-    """
+    def begin(self, robot: Robot) -> Any:
+        """The memory before the first picture."""
+        ...
 
-    offset: float
-    slope: float
-    pixels: int
+    def decide(self, memory: Any) -> Decision:
+        """Look at the newest picture, and decide."""
+        ...
 
 
-@dataclass(frozen=True)
-class Eye:
-    """The part of the picture that the nominal camera takes for nearby floor.
+def act_together(
+    agents: Sequence[Deciding], pictures: NDArray[np.uint8] | Seen, memories: Sequence[Any]
+) -> tuple[NDArray[np.float64], list[Any]]:
+    """Ask several agents at once, each for the command that it would give by itself, to the bit.
 
-    Attributes:
-        first_row: The rows from here on are looked at.
-        ahead: How far ahead of the axle each of their pixels lies [m], NaN beyond `reach`.
-        left: How far to the left [m].
-        near: Whether it lies within `reach`.
-    """
-
-    first_row: int
-    ahead: NDArray[np.float64]
-    left: NDArray[np.float64]
-    near: NDArray[np.bool_]
-
-
-@functools.lru_cache
-def _eye(figures: CameraFigures, reach_m: float) -> Eye:
-    ground = ground_points(figures)
-    near = ground[..., 0] <= reach_m
-    first_row = int(np.argmax(near.any(axis=1)))
-    floor = np.where(near[..., None], ground, np.nan)[first_row:].reshape(-1, 2)
-    ahead, left = np.ascontiguousarray(floor.T)
-    return Eye(first_row, ahead, left, near[first_row:].ravel())
-
-
-def open_eye(robot: Robot, *, reach_m: float = 0.7) -> Eye:
-    """The eye of an agent on this robot, looking no further ahead than `reach_m`."""
-    return _eye(robot.camera_figures(), reach_m)
-
-
-def yellow_pixels(picture: Picture, eye: Eye, *, contrast: float = 60.0) -> Pixels:
-    """Pixels of the dashed centre line: red and green brighter than blue by `contrast` (of 255)."""
-    looked = picture[eye.first_row :].reshape(-1, 3)
-    blue = looked[:, 2].astype(np.int16)
-    yellow = np.minimum(looked[:, 0], looked[:, 1]) - blue > contrast
-    return (yellow & eye.near).nonzero()[0]
-
-
-def white_pixels(picture: Picture, eye: Eye, *, brightness: float = 150.0) -> Pixels:
-    """Pixels of the solid edge lines: every colour brighter than `brightness` (of 255)."""
-    looked = picture[eye.first_row :].reshape(-1, 3)
-    darkest = np.minimum(np.minimum(looked[:, 0], looked[:, 1]), looked[:, 2])
-    return ((darkest > brightness) & eye.near).nonzero()[0]
-
-
-def fit_lane(eye: Eye, *, yellow: Pixels, white: Pixels, half_lane_m: float) -> Lane | None:
-    """Least squares through the lane's centre: right of the yellow line, left of the white one.
-
-    White pixels to the left of the yellow ones belong to the other lane's edge and are left out.
+    Args:
+        agents: One for each robot, the same for several robots or not.
+        pictures: The newest of each robot (n, rows, columns, 3); or what is known of them, while they are the newest.
+        memories: Of each robot's agent.
 
     Returns:
-        The lane, or None where fewer than six pixels are left to fit.
+        The commands (n, 2), and the memories for the next pictures.
     """
-    left_of_robot = eye.left.take(yellow)
-    divide = left_of_robot.sum() / yellow.size if yellow.size else half_lane_m
-    white = white[eye.left.take(white) < divide]
-    count = yellow.size + white.size
-    if count < 6:
-        return None
-    ahead = eye.ahead.take(np.concatenate((yellow, white)))
-    left = np.concatenate((left_of_robot - half_lane_m, eye.left.take(white) + half_lane_m))
-    mean_ahead, mean_left = float(ahead.sum()) / count, float(left.sum()) / count
-    centred = ahead - mean_ahead
-    # a ridge keeps a handful of pixels at one distance from spinning the line round
-    slope = float((centred * left).sum()) / (float((centred * centred).sum()) + 0.005 * count)
-    return Lane(mean_left - slope * mean_ahead, slope, count)
+    commands, after = _decide(agents, pictures if isinstance(pictures, Seen) else Seen(pictures), memories)
+    return np.array(commands, dtype=float), after
 
 
-HALF_LANE_M = 0.128
-"""From a lane's centre to the middle of the marking on either side of it [m]."""
+def _decide(agents: Sequence[Deciding], seen: Seen, memories: Sequence[Any]) -> tuple[list[Any], list[Any]]:
+    decisions = [agent.decide(memory) for agent, memory in zip(agents, memories, strict=True)]
+    commands: list[Any] = [None] * len(agents)
+    after: list[Any] = [None] * len(agents)
+    asked = {robot: next(decision) for robot, decision in enumerate(decisions)}
+    while asked:
+        kinds: dict[Kind, list[int]] = {}
+        for robot, (kind, _) in asked.items():
+            kinds.setdefault(kind, []).append(robot)
+        answers: dict[int, Any] = {}
+        for kind, robots in kinds.items():
+            looks = tuple([asked[robot][1] for robot in robots])
+            answers.update(zip(robots, seen.answer(kind, looks, robots), strict=True))
+        still = {}
+        for robot in asked:
+            try:
+                still[robot] = decisions[robot].send(answers[robot])
+            except StopIteration as decided:
+                commands[robot], after[robot] = decided.value
+        asked = still
+    return commands, after
 
-_NONE: Pixels = np.empty(0, dtype=np.intp)
+
+def act(self: Deciding, picture: Picture, memory: Any) -> tuple[Command, Any]:
+    """The command for the newest picture, and the memory for the next."""
+    commands, after = _decide((self,), Seen(picture[None]), (memory,))
+    return np.asarray(commands[0], dtype=float), after[0]
+
+
+def act_many(
+    self: Deciding, pictures: NDArray[np.uint8], memories: Sequence[Any]
+) -> tuple[NDArray[np.float64], list[Any]]:
+    """The commands (n, 2) of several robots' pictures (n, rows, columns, 3), and their memories, as `act` has them."""
+    return act_together([self] * len(memories), pictures, memories)
+
+
+def _decision(agent: Agent, memory: Any) -> Decision:
+    """What an agent decides, which may be a user's and look at the whole picture."""
+    own: Callable[[Any], Decision] | None = getattr(agent, "decide", None)
+    return own(memory) if own else _ask(agent, memory)
+
+
+def _ask(agent: Agent, memory: Any) -> Decision:
+    picture = yield take_picture, None
+    return agent.act(picture, memory)
+
+
+Duties = tuple[float, float]
+"""Of the left and the right wheel."""
 
 
 class PilotMemory(NamedTuple):
-    """Memory of a pilot: the eye, the robot's figures that turn a twist into duties, and the last lane seen."""
+    """Memory of a pilot: what it looks at, the robot's figures that turn a twist into duties, the last lane seen."""
 
-    eye: Eye
+    look: Any
     full_speed: float
     baseline: float
-    lane: Lane
+    lane: Lane = Lane(0.0, 0.0, 0)
 
 
-def _begin(robot: Robot, reach_m: float) -> PilotMemory:
-    return PilotMemory(
-        open_eye(robot, reach_m=reach_m),
-        robot.figures["full_speed"],
-        robot.figures["effective_baseline"],
-        Lane(0.0, 0.0, 0),
-    )
+def _begin(robot: Robot, look: Any) -> PilotMemory:
+    return PilotMemory(look, robot.figures["full_speed"], robot.figures["effective_baseline"])
 
 
-def duties(speed: float, yaw_rate: float, *, full_speed: float, baseline: float) -> Command:
+def duties(speed: float, yaw_rate: float, *, full_speed: float, baseline: float) -> Duties:
     """Duties for a forward speed [m/s] and a yaw rate [rad/s]; where a wheel saturates, turning goes first."""
-    turn = min(max(float(yaw_rate * baseline / 2.0), -full_speed), full_speed)
+    turn = min(max(yaw_rate * baseline / 2.0, -full_speed), full_speed)
     room = full_speed - abs(turn)
-    ahead = min(max(float(speed), -room), room)
-    return np.array((ahead - turn, ahead + turn)) / full_speed
+    ahead = min(max(speed, -room), room)
+    return (ahead - turn) / full_speed, (ahead + turn) / full_speed
 
 
 @dataclass(frozen=True)
@@ -163,17 +165,19 @@ class LanePilot:
 
     def begin(self, robot: Robot) -> PilotMemory:
         """Nothing seen yet."""
-        return _begin(robot, self.reach_m)
+        contrast = math.inf if self.markings == "white" else self.contrast
+        brightness = math.inf if self.markings == "yellow" else self.brightness
+        return _begin(robot, Markings(open_eye(robot, reach_m=self.reach_m), contrast, brightness))
 
-    def act(self, picture: Picture, memory: PilotMemory) -> tuple[Command, PilotMemory]:
+    def decide(self, memory: PilotMemory) -> Decision:
         """Steer for the lane; where none is seen, as the last time."""
-        eye = memory.eye
-        yellow = _NONE if self.markings == "white" else yellow_pixels(picture, eye, contrast=self.contrast)
-        white = _NONE if self.markings == "yellow" else white_pixels(picture, eye, brightness=self.brightness)
-        lane = fit_lane(eye, yellow=yellow, white=white, half_lane_m=HALF_LANE_M) or memory.lane
+        look, full_speed, baseline, last = memory
+        lane = (yield find_lanes, look) or last
         yaw_rate = self.offset_gain * lane.offset + self.slope_gain * lane.slope
-        command = duties(self.speed, yaw_rate, full_speed=memory.full_speed, baseline=memory.baseline)
-        return command, PilotMemory(eye, memory.full_speed, memory.baseline, lane)
+        command = duties(self.speed, yaw_rate, full_speed=full_speed, baseline=baseline)
+        return command, PilotMemory(look, full_speed, baseline, lane)
+
+    act, act_many = act, act_many
 
 
 @dataclass(frozen=True)
@@ -192,35 +196,23 @@ class PursuitPilot:
 
     def begin(self, robot: Robot) -> PilotMemory:
         """Nothing seen yet."""
-        return _begin(robot, 1.6 * self.look_ahead_m)
+        return _begin(robot, Markings(open_eye(robot, reach_m=1.6 * self.look_ahead_m), 60.0, 150.0))
 
-    def act(self, picture: Picture, memory: PilotMemory) -> tuple[Command, PilotMemory]:
+    def decide(self, memory: PilotMemory) -> Decision:
         """Drive the arc through the point pursued."""
-        eye = memory.eye
-        yellow, white = yellow_pixels(picture, eye), white_pixels(picture, eye)
-        lane = fit_lane(eye, yellow=yellow, white=white, half_lane_m=HALF_LANE_M) or memory.lane
+        look, full_speed, baseline, last = memory
+        lane = (yield find_lanes, look) or last
         left = lane.offset + lane.slope * self.look_ahead_m
         curvature = 2.0 * left / (self.look_ahead_m**2 + left**2)
         speed = self.speed / (1.0 + self.caution * abs(curvature) * self.look_ahead_m)
-        command = duties(speed, speed * curvature, full_speed=memory.full_speed, baseline=memory.baseline)
-        return command, PilotMemory(eye, memory.full_speed, memory.baseline, lane)
+        command = duties(speed, speed * curvature, full_speed=full_speed, baseline=baseline)
+        return command, PilotMemory(look, full_speed, baseline, lane)
+
+    act, act_many = act, act_many
 
 
-class Wiring(NamedTuple):
-    """The weight of every pixel on the turn, and the robot's figures that turn a twist into duties."""
-
-    weights: NDArray[np.float64]
-    first_row: int
-    full_speed: float
-    baseline: float
-
-
-def _wire(robot: Robot, first_row: float) -> Wiring:
-    rows, columns = int(robot.figures["camera_rows"]), int(robot.figures["camera_columns"])
-    top = int(first_row * rows)
-    side = np.linspace(-1.0, 1.0, columns)
-    weights = np.repeat(side[None, :], rows - top, axis=0)
-    return Wiring(weights, top, robot.figures["full_speed"], robot.figures["effective_baseline"])
+def _below(robot: Robot, share: float) -> Lower:
+    return lower_part(int(robot.figures["camera_rows"]), int(robot.figures["camera_columns"]), share)
 
 
 @dataclass(frozen=True)
@@ -239,21 +231,17 @@ class Braitenberg:
     push: float
     first_row: float = 0.45
 
-    def begin(self, robot: Robot) -> Wiring:
+    def begin(self, robot: Robot) -> PilotMemory:
         """Wires for this robot's camera."""
-        return _wire(robot, self.first_row)
+        return _begin(robot, _below(robot, self.first_row))
 
-    def act(self, picture: Picture, memory: Wiring) -> tuple[Command, Wiring]:
+    def decide(self, memory: PilotMemory) -> Decision:
         """Steer away from yellow on the right and from white on the left, towards the room between them."""
-        red, green, blue = np.moveaxis(picture[memory.first_row :].astype(np.int16), -1, 0)
-        yellow = np.minimum(red, green) - blue > 60
-        white = np.minimum(np.minimum(red, green), blue) > 150
-        right_half = memory.weights > -0.35
-        left_half = memory.weights < 0.35
-        away_from_yellow = (yellow & right_half).mean()
-        away_from_white = (white & ~left_half).mean()
-        yaw_rate = self.push * (away_from_white - away_from_yellow)
+        yellow, white = yield weigh_markings, memory.look
+        yaw_rate = self.push * (white - yellow)
         return duties(self.speed, yaw_rate, full_speed=memory.full_speed, baseline=memory.baseline), memory
+
+    act, act_many = act, act_many
 
 
 @dataclass(frozen=True)
@@ -274,18 +262,17 @@ class EdgePilot:
     step: float = 60.0
     first_row: float = 0.55
 
-    def begin(self, robot: Robot) -> Wiring:
+    def begin(self, robot: Robot) -> PilotMemory:
         """Wires for this robot's camera."""
-        return _wire(robot, self.first_row)
+        return _begin(robot, (_below(robot, self.first_row), self.step))
 
-    def act(self, picture: Picture, memory: Wiring) -> tuple[Command, Wiring]:
+    def decide(self, memory: PilotMemory) -> Decision:
         """Turn from the side with more edges, and the nearer to the middle they are the harder."""
-        grey = picture[memory.first_row :].astype(np.int16).sum(axis=-1) // 3
-        edges = np.abs(np.diff(grey, axis=1)) > self.step
-        side = memory.weights[:, 1:]
-        pull = np.where(edges, np.sign(side) * (1.0 - np.abs(side)), 0.0).sum()
-        yaw_rate = self.gain * float(pull) / max(int(edges.sum()), 8)
+        pull, edges = yield weigh_edges, memory.look
+        yaw_rate = self.gain * pull / max(edges, 8)
         return duties(self.speed, yaw_rate, full_speed=memory.full_speed, baseline=memory.baseline), memory
+
+    act, act_many = act, act_many
 
 
 @dataclass(frozen=True)
@@ -295,16 +282,18 @@ class Smoothed:
     agent: Agent
     share: float
 
-    def begin(self, robot: Robot) -> tuple[Command, Any]:
+    def begin(self, robot: Robot) -> tuple[Duties, Any]:
         """At rest."""
-        return np.zeros(2), self.agent.begin(robot)
+        return (0.0, 0.0), self.agent.begin(robot)
 
-    def act(self, picture: Picture, memory: tuple[Command, Any]) -> tuple[Command, tuple[Command, Any]]:
+    def decide(self, memory: tuple[Duties, Any]) -> Decision:
         """Go part of the way to what the other agent wants."""
         last, inner = memory
-        wanted, inner = self.agent.act(picture, inner)
-        command = last + self.share * (wanted - last)
+        wanted, inner = yield from _decision(self.agent, inner)
+        command = tuple([old + self.share * (new - old) for old, new in zip(last, wanted, strict=True)])
         return command, (command, inner)
+
+    act, act_many = act, act_many
 
 
 @dataclass(frozen=True)
@@ -314,18 +303,18 @@ class Laggy:
     agent: Agent
     steps: int
 
-    def begin(self, robot: Robot) -> tuple[tuple[Command, ...], Any]:
+    def begin(self, robot: Robot) -> tuple[tuple[Any, ...], Any]:
         """Rest commands until the first one is due."""
-        return (np.zeros(2),) * self.steps, self.agent.begin(robot)
+        return ((0.0, 0.0),) * self.steps, self.agent.begin(robot)
 
-    def act(
-        self, picture: Picture, memory: tuple[tuple[Command, ...], Any]
-    ) -> tuple[Command, tuple[tuple[Command, ...], Any]]:
+    def decide(self, memory: tuple[tuple[Any, ...], Any]) -> Decision:
         """Queue the new command and issue the oldest."""
         waiting, inner = memory
-        wanted, inner = self.agent.act(picture, inner)
+        wanted, inner = yield from _decision(self.agent, inner)
         waiting = (*waiting, wanted)
         return waiting[0], (waiting[1:], inner)
+
+    act, act_many = act, act_many
 
 
 @dataclass(frozen=True)
@@ -339,10 +328,13 @@ class Leaning:
         """As the other agent."""
         return self.agent.begin(robot)
 
-    def act(self, picture: Picture, memory: Any) -> tuple[Command, Any]:
+    def decide(self, memory: Any) -> Decision:
         """Give the left wheel less and the right wheel more."""
-        command, memory = self.agent.act(picture, memory)
-        return np.clip(command * np.array((1.0 - self.bias, 1.0 + self.bias)), -1.0, 1.0), memory
+        (left, right), memory = yield from _decision(self.agent, memory)
+        left, right = left * (1.0 - self.bias), right * (1.0 + self.bias)
+        return (min(max(left, -1.0), 1.0), min(max(right, -1.0), 1.0)), memory
+
+    act, act_many = act, act_many
 
 
 @dataclass(frozen=True)
@@ -363,17 +355,19 @@ class Wary:
     crisp: float
     slowest: float = 0.3
 
-    def begin(self, robot: Robot) -> tuple[Eye, float, Any]:
+    def begin(self, robot: Robot) -> tuple[Markings, float, Any]:
         """At its slowest."""
-        return open_eye(robot, reach_m=0.5), self.slowest, self.agent.begin(robot)
+        return Markings(open_eye(robot, reach_m=0.5), self.contrast), self.slowest, self.agent.begin(robot)
 
-    def act(self, picture: Picture, memory: tuple[Eye, float, Any]) -> tuple[Command, tuple[Eye, float, Any]]:
+    def decide(self, memory: tuple[Markings, float, Any]) -> Decision:
         """Adapt the speed over about half a second."""
-        eye, share, inner = memory
-        command, inner = self.agent.act(picture, inner)
-        seen = yellow_pixels(picture, eye, contrast=self.contrast).size / self.crisp
+        look, share, inner = memory
+        (left, right), inner = yield from _decision(self.agent, inner)
+        seen = (yield count_yellow, look) / self.crisp
         share += 0.1 * (min(1.0, max(self.slowest, seen)) - share)
-        return share * command, (eye, share, inner)
+        return (share * left, share * right), (look, share, inner)
+
+    act, act_many = act, act_many
 
 
 AGENTS: Mapping[str, Agent] = MappingProxyType(

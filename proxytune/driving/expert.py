@@ -93,7 +93,7 @@ class Expert:
         ahead = lane_point(self.road, seen.counter_clockwise, seen.along + self.look_ahead_m) - pose[:2]
         left = float(np.cos(pose[2]) * ahead[1] - np.sin(pose[2]) * ahead[0])
         yaw_rate = self.gain * self.speed * 2.0 * left / float(ahead @ ahead)
-        command = duties(self.speed, yaw_rate, full_speed=full_speed, baseline=baseline)
+        command = np.array(duties(self.speed, yaw_rate, full_speed=full_speed, baseline=baseline))
         from_middle = abs(self.road.lane_offset - float(seen.deviation))
         return command, from_middle <= self.road.lane_offset + self.road.lane_width / 2.0
 

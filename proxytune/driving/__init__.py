@@ -6,6 +6,7 @@ road, lane, maps  a map's road, its lanes as geometry, and maps from their files
 road_picture      the floor as a picture, and where its markings lie
 optics, cameras   where pixels look, and pictures of the floor while the robot drives
 agent, agents     what an agent is, and those that come with the package
+perception        what these make out in pictures, of many robots at once
 expert            the expert that learners imitate, and drivers that replay or do as they learnt
 episode           one episode, and what it is worth
 fleet             episodes driven side by side, to the same bits

@@ -94,8 +94,14 @@ def _decide(agents: Sequence[Deciding], seen: Seen, memories: Sequence[Any]) -> 
 
 def act(self: Deciding, picture: Picture, memory: Any) -> tuple[Command, Any]:
     """The command for the newest picture, and the memory for the next."""
-    commands, after = _decide((self,), Seen(picture[None]), (memory,))
-    return np.asarray(commands[0], dtype=float), after[0]
+    seen, decision = Seen(picture[None]), self.decide(memory)
+    try:
+        kind, look = next(decision)
+        while True:
+            kind, look = decision.send(kind(seen, (look,), (0,))[0])
+    except StopIteration as decided:
+        command, memory = decided.value
+    return np.asarray(command, dtype=float), memory
 
 
 def act_many(
@@ -151,8 +157,8 @@ class LanePilot:
         slope_gain: Yaw rate for the lane's direction [rad/s].
         markings: Which markings it goes by.
         reach_m: How far ahead it looks [m].
-        contrast: How yellow a pixel must be (of 255).
-        brightness: How white a pixel must be (of 255).
+        contrast: How yellow a pixel must be (0 to 255).
+        brightness: How white a pixel must be (0 to 255).
     """
 
     speed: float
@@ -345,7 +351,7 @@ class Wary:
 
     Attributes:
         agent: Whose path it drives.
-        contrast: How yellow a pixel must be to count as crisp (of 255).
+        contrast: How yellow a pixel must be to count as crisp (0 to 255).
         crisp: How many crisp pixels it takes to drive at full speed.
         slowest: Share of the speed it keeps when it sees none.
     """

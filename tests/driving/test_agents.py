@@ -2,21 +2,21 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings, strategies as st
 
 from proxytune.driving import AGENTS, Agent, GroundPlaneCamera, draw_floor, load_agent, read_robot, shipped_map
 from proxytune.driving.agents import (
-    HALF_LANE_M,
+    Braitenberg,
+    EdgePilot,
     Laggy,
     LanePilot,
     Leaning,
     Smoothed,
     Wary,
+    act_together,
     duties,
-    fit_lane,
-    open_eye,
-    white_pixels,
-    yellow_pixels,
 )
+from proxytune.driving.perception import Markings, Seen, find_lanes, open_eye
 from proxytune.errors import ExtensionError
 from proxytune.testing.extension import check_agent
 
@@ -72,18 +72,98 @@ def test_the_agents_differ_from_each_other():
     ("left", "turned"), [(0.0, 0.0), (0.05, 0.0), (-0.05, 0.0), (0.0, 0.2), (0.0, -0.2), (0.04, 0.1)]
 )
 def test_the_lane_is_found_where_it_lies(left, turned):
-    eye = open_eye(ROBOT, reach_m=0.5)
-    picture = seen_from(left, turned)
-    lane = fit_lane(eye, yellow=yellow_pixels(picture, eye), white=white_pixels(picture, eye), half_lane_m=HALF_LANE_M)
+    look = Markings(open_eye(ROBOT, reach_m=0.5), 60.0, 150.0)
+    (lane,) = find_lanes(Seen(seen_from(left, turned)[None]), (look,), (0,))
     assert lane is not None
     assert lane.slope == pytest.approx(-np.tan(turned), abs=0.12)
     assert lane.offset == pytest.approx(-left / np.cos(turned), abs=0.025)
 
 
 def test_without_markings_there_is_no_lane():
-    eye = open_eye(ROBOT)
-    nothing = np.empty(0, dtype=np.intp)
-    assert fit_lane(eye, yellow=nothing, white=nothing, half_lane_m=HALF_LANE_M) is None
+    look = Markings(open_eye(ROBOT), 60.0, 150.0)
+    assert find_lanes(Seen(np.zeros_like(seen_from())[None]), (look,), (0,)) == [None]
+
+
+MORE = {
+    **AGENTS,
+    "eager": LanePilot(speed=0.2, offset_gain=8.0, slope_gain=2.0, contrast=0.0, brightness=0.0, reach_m=0.9),
+    "blind": LanePilot(speed=0.2, offset_gain=8.0, slope_gain=2.0, contrast=300.0, brightness=255.0),
+    "nested": Laggy(
+        Wary(Smoothed(LanePilot(0.3, 8.0, 2.0, contrast=60.5), share=0.3), contrast=99.0, crisp=9.0), steps=2
+    ),
+    "leaning_edges": Leaning(EdgePilot(speed=0.3, gain=4.0, step=20.5, first_row=0.1), bias=0.4),
+    "pushed": Braitenberg(speed=0.3, push=4.0, first_row=0.0),
+}
+
+
+def scenes(seed):
+    """So many robots' pictures of three times: of the road, with noise, and of noise alone."""
+    random = np.random.default_rng(seed)
+    x, y = random.uniform(0.1, 1.7, (2, 3 * len(MORE)))
+    pictures = CAMERA.render(np.stack((x, y, random.uniform(-np.pi, np.pi, x.size)), axis=1)).astype(int)
+    pictures[::3] += random.integers(-80, 80, pictures[::3].shape)
+    pictures[::5] = random.integers(0, 256, pictures[::5].shape)
+    return pictures.clip(0, 255).astype(np.uint8).reshape(3, len(MORE), *pictures.shape[1:])
+
+
+@given(st.permutations(list(MORE)), st.integers(1, len(MORE)), st.integers(0, 2**32 - 1))
+@settings(max_examples=20, derandomize=True, deadline=None)
+def test_who_is_asked_beside_an_agent_does_not_matter_to_a_bit(names, count, seed):
+    agents = [MORE[name] for name in names[:count]]
+    alone = together = [agent.begin(ROBOT) for agent in agents]
+    for pictures in scenes(seed)[:, :count]:
+        answers = [agent.act(one, memory) for agent, one, memory in zip(agents, pictures, alone, strict=True)]
+        alone = [memory for _, memory in answers]
+        commands, together = act_together(agents, pictures, together)
+        assert commands.tobytes() == np.array([command for command, _ in answers]).tobytes()
+
+
+@pytest.mark.parametrize("name", MORE)
+def test_many_pictures_are_answered_as_each_would_be(name):
+    agent = MORE[name]
+    alone = many = [agent.begin(ROBOT)] * len(MORE)
+    for pictures in scenes(4):
+        answers = [agent.act(one, memory) for one, memory in zip(pictures, alone, strict=True)]
+        alone = [memory for _, memory in answers]
+        commands, many = agent.act_many(pictures, many)
+        assert commands.tobytes() == np.array([command for command, _ in answers]).tobytes()
+
+
+def lane_by_the_book(picture, look):
+    """Least squares over the pixels of one picture, one after another."""
+    eye, (red, green, blue) = look.eye, picture.reshape(-1, 3)[look.eye.first :].astype(int).T
+    yellow = ((np.minimum(red, green) - blue > look.contrast) & eye.near).nonzero()[0]
+    divide = eye.left[yellow].sum() / yellow.size if yellow.size else 0.128
+    white = (np.minimum(np.minimum(red, green), blue) > look.brightness) & eye.near & (eye.left < divide)
+    white = white.nonzero()[0]
+    ahead = eye.ahead[np.concatenate((yellow, white))]
+    left = np.concatenate((eye.left[yellow] - 0.128, eye.left[white] + 0.128))
+    if ahead.size < 6:
+        return None
+    centred = ahead - ahead.sum() / ahead.size
+    slope = (centred * left).sum() / ((centred * centred).sum() + 0.005 * ahead.size)
+    return left.sum() / ahead.size - slope * (ahead.sum() / ahead.size), slope, ahead.size
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(0.0, 260.0), st.floats(0.0, 260.0), st.sampled_from([0.3, 0.5, 0.9]))
+@settings(max_examples=40, derandomize=True, deadline=None)
+def test_lanes_of_many_pictures_are_those_of_one_picture_after_another(seed, contrast, brightness, reach):
+    pictures = scenes(seed)[0]
+    looks = [
+        Markings(open_eye(ROBOT, reach_m=0.5), 60.0, 150.0),
+        Markings(open_eye(ROBOT, reach_m=reach), contrast, brightness),
+    ]
+    asked = tuple(looks[robot % 2] for robot in range(len(pictures)))
+    expected = [lane_by_the_book(*pair) for pair in zip(pictures, asked, strict=True)]
+    assert find_lanes(Seen(pictures), asked, range(len(pictures))) == expected
+
+
+def test_pictures_are_looked_at_once():
+    agents, pictures = [AGENTS["wary"], AGENTS["braitenberg"], AGENTS["wary"]], scenes(1)[0][:3]
+    seen, memories = Seen(pictures), [agent.begin(ROBOT) for agent in agents]
+    once, _ = act_together(agents, seen, memories)
+    pictures[:] = 0
+    np.testing.assert_array_equal(act_together(agents, seen, memories)[0], once)
 
 
 @pytest.mark.parametrize("name", ["steady", "brisk", "pursuer_near", "white_only", "smooth"])

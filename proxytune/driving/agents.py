@@ -73,23 +73,27 @@ def _decide(agents: Sequence[Deciding], seen: Seen, memories: Sequence[Any]) -> 
     decisions = [agent.decide(memory) for agent, memory in zip(agents, memories, strict=True)]
     commands: list[Any] = [None] * len(agents)
     after: list[Any] = [None] * len(agents)
-    asked = {robot: next(decision) for robot, decision in enumerate(decisions)}
+    asked = [(robot, *next(decision)) for robot, decision in enumerate(decisions)]
     while asked:
-        kinds: dict[Kind, list[int]] = {}
-        for robot, (kind, _) in asked.items():
-            kinds.setdefault(kind, []).append(robot)
-        answers: dict[int, Any] = {}
-        for kind, robots in kinds.items():
-            looks = tuple([asked[robot][1] for robot in robots])
-            answers.update(zip(robots, seen.answer(kind, looks, robots), strict=True))
-        still = {}
-        for robot in asked:
-            try:
-                still[robot] = decisions[robot].send(answers[robot])
-            except StopIteration as decided:
-                commands[robot], after[robot] = decided.value
-        asked = still
+        kinds: dict[Kind, tuple[list[int], list[Any]]] = {}
+        for robot, kind, look in asked:
+            if kind not in kinds:
+                kinds[kind] = [], []
+            kinds[kind][0].append(robot)
+            kinds[kind][1].append(look)
+        asked = []
+        for kind, (robots, looks) in kinds.items():
+            for robot, answer in zip(robots, seen.answer(kind, tuple(looks), robots), strict=True):
+                try:
+                    asked.append((robot, *decisions[robot].send(answer)))
+                except StopIteration as decided:
+                    commands[robot], after[robot] = decided.value
+        asked.sort(key=_robot)
     return commands, after
+
+
+def _robot(asked: tuple[int, Kind, Any]) -> int:
+    return asked[0]
 
 
 def act(self: Deciding, picture: Picture, memory: Any) -> tuple[Command, Any]:

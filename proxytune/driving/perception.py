@@ -24,6 +24,9 @@ HALF_LANE_M = 0.128
 FEWEST = 6
 """So many pixels it takes to see a lane."""
 
+RIDGE = 0.005
+"""For each pixel, it keeps a handful of them at one distance from spinning the line round [m²]."""
+
 
 class Lane(NamedTuple):
     """A straight line through the lane's centre in the robot's frame: left(x) = offset + slope · x.
@@ -81,7 +84,7 @@ class Seen:
     def __init__(self, pictures: NDArray[np.uint8]) -> None:
         """Look at nothing yet."""
         self.pictures = pictures
-        self._first = pictures[0].size
+        self._first = pictures[0].size // 3
         self._known: dict[tuple[Any, ...], list[Any]] = {}
 
     def answer(self, kind: "Kind", looks: tuple[Any, ...], robots: Sequence[int]) -> list[Any]:
@@ -93,14 +96,14 @@ class Seen:
 
     def colours(self, first: int, robots: Sequence[int]) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
         """How yellow some robots' pixels are from one of them on, and how bright, (robots, pixels), 0 to 255."""
-        if 3 * first < self._first:
+        if first < self._first:
             levels = self.pictures.reshape(len(self.pictures), -1)[:, 3 * first :]
-            # Red, green and blue are compared as they lie, two thirds in vain: faster than to part them
-            golden = np.minimum(levels[:, :-2], levels[:, 1:-1])
-            self._bright = np.minimum(golden, levels[:, 2:])
-            self._yellow = golden - self._bright
-            self._first = 3 * first
-        pixels = _rows(robots), slice(3 * first - self._first, None, 3)
+            # Compared as they lie, two thirds in vain, then parted: faster than to part red and green first
+            golden = np.minimum(levels[:, :-2], levels[:, 1:-1])[:, ::3].copy()
+            self._bright = np.minimum(golden, levels[:, 2::3])
+            self._yellow = np.subtract(golden, self._bright, out=golden)
+            self._first = first
+        pixels = _rows(robots), slice(first - self._first, None)
         return self._yellow[pixels], self._bright[pixels]
 
 
@@ -186,6 +189,8 @@ def find_lanes(seen: Seen, looks: tuple[Markings, ...], robots: Sequence[int]) -
     plan = _plan(looks)
     yellow, bright = seen.colours(plan.first, robots)
     count, pixels = yellow.shape
+    if count == 1:
+        return [_find_lane(looks[0].eye, (yellow > plan.yellow)[0].nonzero()[0], (bright > plan.white)[0].nonzero()[0])]
     hits = np.empty(count * (1 + 2 * pixels) + 1, dtype=bool)
     rows = hits[:-1].reshape(count, -1)
     # Sums over pieces begin with their first number, those over arrays with 0: so each row begins with 0
@@ -208,6 +213,23 @@ def find_lanes(seen: Seen, looks: tuple[Markings, ...], robots: Sequence[int]) -
     return _fit(lines, starts[:-1], starts[1:] - starts[:-1])
 
 
+def _find_lane(eye: Eye, yellow: NDArray[np.intp], white: NDArray[np.intp]) -> Lane | None:
+    """The same for one robot: what many share costs one alone more than it saves."""
+    on_line, on_edge = eye.left.take(yellow), eye.left.take(white)
+    right = on_edge < (float(np.add.reduce(on_line)) / len(on_line) if len(on_line) else HALF_LANE_M)
+    ahead = eye.ahead.take(np.concatenate((yellow, white[right])))
+    left = np.concatenate((on_line - HALF_LANE_M, on_edge[right] + HALF_LANE_M))
+    count = len(ahead)
+    if count < FEWEST:
+        return None
+    mean_ahead, mean_left = float(np.add.reduce(ahead)) / count, float(np.add.reduce(left)) / count
+    ahead -= mean_ahead
+    left *= ahead
+    ahead *= ahead
+    slope = float(np.add.reduce(left)) / (float(np.add.reduce(ahead)) + RIDGE * count)
+    return Lane(mean_left - slope * mean_ahead, slope, count)
+
+
 def _fit(lines: Floats, starts: NDArray[np.intp], sizes: NDArray[np.intp]) -> list[Lane | None]:
     """Lines through places.
 
@@ -224,8 +246,7 @@ def _fit(lines: Floats, starts: NDArray[np.intp], sizes: NDArray[np.intp]) -> li
     lines[0] = centred
     lines *= centred
     spread, tilt = np.add.reduceat(lines, starts, axis=1)
-    # a ridge keeps a handful of pixels at one distance from spinning the line round
-    slope = tilt / (spread + 0.005 * weights)
+    slope = tilt / (spread + RIDGE * weights)
     found = zip((left - slope * ahead).tolist(), slope.tolist(), counts.tolist(), strict=True)
     return [Lane(*line) if line[2] >= FEWEST else None for line in found]
 
@@ -243,12 +264,16 @@ class Lower:
 
     Attributes:
         first_row: The rows from here on.
-        side: Of each of their pixels, from −1 at the left to 1 at the right, (rows, columns).
+        first: The pixels from here on.
+        yellow: More is yellow, and on the right or in the middle, (pixels,).
+        white: More is white, and on the right, (pixels,).
         pull: How near to the picture's middle each is, from −1 to 1, on the left below zero; from the second column on.
     """
 
     first_row: int
-    side: Floats
+    first: int
+    yellow: NDArray[np.uint8]
+    white: NDArray[np.uint8]
     pull: Floats
 
 
@@ -257,18 +282,21 @@ def lower_part(rows: int, columns: int, share: float) -> Lower:
     """The part of a picture below a share of its height."""
     first = int(share * rows)
     side = np.repeat(np.linspace(-1.0, 1.0, columns)[None, :], rows - first, axis=0)
-    inner = side[:, 1:]
-    return Lower(first, side, np.sign(inner) * (1.0 - np.abs(inner)))
+    yellow, white = np.where(side > -0.35, 60, 255), np.where(side >= 0.35, 150, 255)
+    pull = np.sign(side) * (1.0 - np.abs(side))
+    return Lower(
+        first, first * columns, yellow.astype(np.uint8).ravel(), white.astype(np.uint8).ravel(), pull[:, 1:].copy()
+    )
 
 
 def weigh_markings(seen: Seen, looks: tuple[Lower, ...], robots: Sequence[int]) -> list[tuple[float, float]]:
     """Shares of the lower part that are yellow on the right or in the middle, and white on the right."""
-    columns, shares = seen.pictures.shape[2], []
-    for robot, look in zip(robots, looks, strict=True):
-        yellow, bright = seen.colours(look.first_row * columns, (robot,))
-        right, middle = look.side.ravel() >= 0.35, look.side.ravel() > -0.35
-        shown = (yellow[0] > 60) & middle, (bright[0] > 150) & right
-        shares.append((int(shown[0].sum()) / right.size, int(shown[1].sum()) / right.size))
+    yellow, bright = seen.colours(min(look.first for look in looks), robots)
+    shares: list[tuple[float, float]] = []
+    for golden, shining, look in zip(yellow, bright, looks, strict=True):
+        size = look.yellow.size
+        counts = (np.count_nonzero(golden[-size:] > look.yellow), np.count_nonzero(shining[-size:] > look.white))
+        shares.append((counts[0] / size, counts[1] / size))
     return shares
 
 

@@ -1,0 +1,100 @@
+"""Agents that cannot be run beside others: found by running two episodes of each side by side, and one after the other.
+
+An agent's memory is what it gives back with its command. One that keeps anything elsewhere (in its class, in a global,
+in the generators of `random` or `numpy.random`) mixes up the episodes that it drives at once. It is run by itself then,
+which is kept in study.db (`APART`). The agents that proxytune brings are known not to.
+"""
+
+import functools
+from collections.abc import Callable, Collection, Sequence
+
+from proxytune.domain import DomainFamily, Episode, make_episode
+from proxytune.extensions import plugins
+from proxytune.running import Rescue, Watch, can_run_together, run_episode, run_together, working
+from proxytune.seeds import preflight_seed
+from proxytune.storage import Store
+from proxytune.study.family import is_users_family
+from proxytune.study.settings import StudySettings
+
+APART = "apart"
+"""The fact in study.db: the agents that were tried, those of them that are run by themselves, and the user's code."""
+Pair = tuple[Episode, Episode]
+
+
+def users_agents(settings: StudySettings) -> list[str]:
+    """The agents that proxytune does not bring: a user's own, plug-ins, and all of another domain family."""
+    installed, others = plugins("agent"), is_users_family(settings)
+    names = zip(settings.agents, settings.loaded_agents, strict=True)
+    return [
+        agent
+        for agent, name in names
+        if others or name in installed or (":" in name and not name.startswith("proxytune."))
+    ]
+
+
+def find_apart(
+    settings: StudySettings, family: DomainFamily, agents: Sequence[str], needed: Collection[str], watch: Watch
+) -> list[str]:
+    """The agents among these that come to something else beside others; two episodes of each are run twice.
+
+    Raises:
+        RunError: If the machine fails.
+    """
+    if not agents or not can_run_together(family):
+        return []
+    pairs = [(_episode(settings, agent, 0), _episode(settings, agent, 1)) for agent in agents]
+    rescue = Rescue[Pair, tuple[str, bool]](
+        lambda pair, end: (pair[0].agent, True),
+        watch.timeout_s and 4.0 * watch.timeout_s,
+        lambda pair: any(map(watch.suspect, pair)),
+        watch.begins,
+    )
+    work: Callable[[Pair], tuple[str, bool]] = functools.partial(_differs, family, tuple(needed))
+    with working(work, pairs, settings.jobs, rescue) as tried:
+        differing = {agent for agent, differs in tried if differs}
+    return [agent for agent in agents if agent in differing]
+
+
+def _episode(settings: StudySettings, agent: str, turn: int) -> Episode:
+    start = turn % settings.starts
+    return make_episode({}, agent=agent, start=start, seed=preflight_seed(settings.seed, start, turn))
+
+
+def _differs(family: DomainFamily, needed: Collection[str], pair: Pair) -> tuple[str, bool]:
+    together = run_together(family, pair, needed)
+    single = [run_episode(family, episode, needed) for episode in pair]
+    same = [(one.metrics, one.failure) for one in together or ()] == [(one.metrics, one.failure) for one in single]
+    return pair[0].agent, not same
+
+
+def kept_apart(
+    store: Store,
+    settings: StudySettings,
+    family: DomainFamily,
+    code: str,
+    needed: Collection[str],
+    watch: Watch,
+) -> frozenset[str]:
+    """The study's agents that are run by themselves; those not tried yet, or in other code, are tried now and kept.
+
+    Raises:
+        RunError: If the machine fails.
+    """
+    known = store.facts().get(APART, {})
+    known = known if known.get("code") == code else {"tried": [], "apart": []}
+    missing = [agent for agent in users_agents(settings) if agent not in known["tried"]]
+    if not missing or not can_run_together(family):
+        return frozenset(known["apart"])
+    found = find_apart(settings, family, missing, needed, watch)
+    known = {"code": code, "tried": [*known["tried"], *missing], "apart": [*known["apart"], *found]}
+    store.save_fact(APART, known)
+    return frozenset(known["apart"])
+
+
+def apart_notes(store: Store) -> list[str]:
+    """One line for each agent that is run by itself."""
+    return [
+        f"agent '{agent}' does otherwise beside others than by itself, so it is driven alone, which takes longer; keep "
+        "what it remembers in its memory, not in its class, in globals or in the state of random or numpy.random"
+        for agent in store.facts().get(APART, {}).get("apart", ())
+    ]

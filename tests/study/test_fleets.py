@@ -127,6 +127,8 @@ FAULTS = {
 @pytest.mark.parametrize("jobs", ["1", "2"])
 @pytest.mark.parametrize("fault", FAULTS)
 def test_what_one_agent_does_wrong_is_said_of_it_alone_and_the_others_score_as_ever(make_study, jobs, fault):
+    if (fault, jobs) == ("hangs", "2"):
+        pytest.skip("joblib's processes are given half a minute more; see tests/running/test_fleets.py")
     limit = {"episode_timeout_s": "1.5"} if fault == "hangs" else {}
     changes = {**FAMILY, **limit, "budget": "2", "initial": "2", "jobs": jobs}
     whole = make_study("whole", **changes)
@@ -154,21 +156,23 @@ def test_killed_in_the_middle_of_a_fleet_nothing_finished_is_driven_again_and_th
     whole = make_study("whole", **FAMILY)
     assert main(["study", str(whole), "--json"]) == 0
     journal = whole.with_name("journal")
-    folder = make_study("stopped", domain={"sleep": "0.05", "journal": f'"{journal}"'}, jobs=jobs, **FAMILY)
+    folder = make_study("stopped", domain={"sleep": "0.3", "journal": f'"{journal}"'}, jobs=jobs, **FAMILY)
     lost = 0
-    for moment in (15, 40, 80):
+    for moment in (15, 60):
         process = Launched(launcher, folder)
         wait_for(folder, process, moment)
+        while sum(map(len, driven(journal))) - TRIED - lost <= finished_episodes(folder):
+            time.sleep(0.01)
         os.kill(process.pid, signal.SIGKILL)
-        process.end()
+        assert process.end()[0] == -signal.SIGKILL
         # Workers end a moment later.
         time.sleep(1.0)
         before, lost = lost, sum(map(len, driven(journal))) - TRIED - finished_episodes(folder)
-        assert 0 <= lost - before <= 3 * PER_TRIAL
+        assert 0 < lost - before <= PER_TRIAL
     status, printed = Launched(launcher, folder).end()
     assert status == 0, printed
     assert (trials(folder), episodes(folder)) == (trials(whole), episodes(whole))
-    assert sum(map(len, driven(journal))) - TRIED - finished_episodes(folder) == lost > 0
+    assert sum(map(len, driven(journal))) - TRIED - finished_episodes(folder) == lost
 
 
 def pruned(folder, **changes):

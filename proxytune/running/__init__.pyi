@@ -1,10 +1,10 @@
 from .cluster import on_cluster as on_cluster
 from .episodes import ENDED as ENDED, ENDLESS as ENDLESS, Watch as Watch, running as running
 from .fleets import (
+    RAISED as RAISED,
     Fleet as Fleet,
     can_run_together as can_run_together,
     check_machine as check_machine,
-    one_by_one as one_by_one,
     run_episode as run_episode,
     run_fleet as run_fleet,
     run_together as run_together,

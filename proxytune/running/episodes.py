@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 from proxytune.domain import DomainFamily, Episode, Outcome
 from proxytune.errors import RunError
-from proxytune.running.fleets import Fleet, can_run_together, one_by_one, run_fleet
+from proxytune.running.fleets import RAISED, Fleet, can_run_together, one_by_one, run_fleet
 from proxytune.running.workers import Rescue, WorkerExit, places, working
 
 ENDED, ENDLESS = "it ended its process", "it took longer than"
@@ -85,17 +85,18 @@ def running(
     Raises:
         RunError: If the machine fails rather than an episode: memory, disk or descriptors run out.
     """
-    known, ended = dict(watch.known), set[str]()
+    known, alone, ended = dict(watch.known), set(watch.alone), set[str]()
 
     def suspect(episode: Episode) -> bool:
         return episode.agent in ended or watch.suspect(episode)
 
     def apart(episode: Episode) -> bool:
-        return not together or episode.agent in watch.alone or suspect(episode)
+        return not together or episode.agent in alone or suspect(episode)
 
     def noted(fleets: Iterable[list[Outcome]]) -> Iterator[list[Outcome]]:
         for outcomes in fleets:
             ended.update(one.episode.agent for one in outcomes if one.failure.startswith((ENDED, ENDLESS)))
+            alone.update(one.episode.agent for one in outcomes if one.failure.startswith(RAISED))
             known.update({(one.episode.agent, one.episode.start): one.seconds for one in outcomes})
             yield outcomes
 

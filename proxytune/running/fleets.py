@@ -23,6 +23,8 @@ from proxytune.errors import EpisodeError, RunError
 from proxytune.extensions import describe, is_users, one_line, place_of
 
 Fleet = tuple[Episode, ...]
+RAISED = "the agent or the domain family raised"
+"""How failures begin of episodes that raise what is no Exception, as sys.exit does: that ends a whole fleet."""
 OF_THE_MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.ENOMEM, errno.EMFILE, errno.ENFILE, errno.EIO)
 
 
@@ -145,8 +147,8 @@ def _failure(problem: BaseException) -> str:
     if isinstance(problem, EpisodeError):
         return f"{problem}{place_of(problem.__cause__)}"
     # What is no Exception, as of sys.exit, goes through every family, so it may be the agent's.
-    whose = "the domain family" if isinstance(problem, Exception) else "the agent or the domain family"
-    return f"{whose} raised {describe(problem)}{place_of(problem)}"
+    raised = "the domain family raised" if isinstance(problem, Exception) else RAISED
+    return f"{raised} {describe(problem)}{place_of(problem)}"
 
 
 @contextmanager

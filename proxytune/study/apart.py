@@ -10,14 +10,20 @@ from collections.abc import Callable, Collection, Sequence
 
 from proxytune.domain import DomainFamily, Episode, make_episode
 from proxytune.extensions import plugins
-from proxytune.running import Rescue, Watch, can_run_together, run_episode, run_together, working
+from proxytune.running import RAISED, Rescue, Watch, can_run_together, run_episode, run_together, working
 from proxytune.seeds import preflight_seed
 from proxytune.storage import Store
 from proxytune.study.family import is_users_family
 from proxytune.study.settings import StudySettings
 
 APART = "apart"
-"""The fact in study.db: the agents that were tried, those of them that are run by themselves, and the user's code."""
+"""The fact in study.db: the agents that were tried, why some are run by themselves, and the user's code."""
+DIFFERS, ENDS = "differs", "ends"
+WHY = {
+    DIFFERS: "does otherwise beside others than by itself, so it is driven alone, which takes longer; keep what it "
+    "remembers in its memory, not in its class or in globals, and draw from a generator of its own",
+    ENDS: "ends what is driven beside it, so it is driven alone, which takes longer; let it raise an Exception instead",
+}
 Pair = tuple[Episode, Episode]
 
 
@@ -34,25 +40,28 @@ def users_agents(settings: StudySettings) -> list[str]:
 
 def find_apart(
     settings: StudySettings, family: DomainFamily, agents: Sequence[str], needed: Collection[str], watch: Watch
-) -> list[str]:
-    """The agents among these that come to something else beside others; two episodes of each are run twice.
+) -> dict[str, str]:
+    """Run two episodes of each of these agents side by side and one after the other.
+
+    Returns:
+        Why it is to be run by itself, by agent; nothing of one that may be run beside others.
 
     Raises:
         RunError: If the machine fails.
     """
     if not agents or not can_run_together(family):
-        return []
+        return {}
     pairs = [(_episode(settings, agent, 0), _episode(settings, agent, 1)) for agent in agents]
-    rescue = Rescue[Pair, tuple[str, bool]](
-        lambda pair, end: (pair[0].agent, True),
+    rescue = Rescue[Pair, tuple[str, str]](
+        lambda pair, end: (pair[0].agent, ENDS),
         watch.timeout_s and 4.0 * watch.timeout_s,
         lambda pair: any(map(watch.suspect, pair)),
         watch.begins,
     )
-    work: Callable[[Pair], tuple[str, bool]] = functools.partial(_differs, family, tuple(needed))
+    work: Callable[[Pair], tuple[str, str]] = functools.partial(_why_apart, family, tuple(needed))
     with working(work, pairs, settings.jobs, rescue) as tried:
-        differing = {agent for agent, differs in tried if differs}
-    return [agent for agent in agents if agent in differing]
+        why = dict(tried)
+    return {agent: why[agent] for agent in agents if why[agent]}
 
 
 def _episode(settings: StudySettings, agent: str, turn: int) -> Episode:
@@ -60,11 +69,13 @@ def _episode(settings: StudySettings, agent: str, turn: int) -> Episode:
     return make_episode({}, agent=agent, start=start, seed=preflight_seed(settings.seed, start, turn))
 
 
-def _differs(family: DomainFamily, needed: Collection[str], pair: Pair) -> tuple[str, bool]:
+def _why_apart(family: DomainFamily, needed: Collection[str], pair: Pair) -> tuple[str, str]:
     together = run_together(family, pair, needed)
     single = [run_episode(family, episode, needed) for episode in pair]
-    same = [(one.metrics, one.failure) for one in together or ()] == [(one.metrics, one.failure) for one in single]
-    return pair[0].agent, not same
+    if together is None:
+        return pair[0].agent, ENDS if any(one.failure.startswith(RAISED) for one in single) else DIFFERS
+    same = [(one.metrics, one.failure) for one in together] == [(one.metrics, one.failure) for one in single]
+    return pair[0].agent, "" if same else DIFFERS
 
 
 def kept_apart(
@@ -81,20 +92,16 @@ def kept_apart(
         RunError: If the machine fails.
     """
     known = store.facts().get(APART, {})
-    known = known if known.get("code") == code else {"tried": [], "apart": []}
+    known = known if known.get("code") == code else {"code": code, "tried": [], "why": {}}
     missing = [agent for agent in users_agents(settings) if agent not in known["tried"]]
-    if not missing or not can_run_together(family):
-        return frozenset(known["apart"])
-    found = find_apart(settings, family, missing, needed, watch)
-    known = {"code": code, "tried": [*known["tried"], *missing], "apart": [*known["apart"], *found]}
-    store.save_fact(APART, known)
-    return frozenset(known["apart"])
+    if missing and can_run_together(family):
+        why = {**known["why"], **find_apart(settings, family, missing, needed, watch)}
+        known = {"code": code, "tried": [*known["tried"], *missing], "why": why}
+        store.save_fact(APART, known)
+    return frozenset(known["why"])
 
 
 def apart_notes(store: Store) -> list[str]:
     """One line for each agent that is run by itself."""
-    return [
-        f"agent '{agent}' does otherwise beside others than by itself, so it is driven alone, which takes longer; keep "
-        "what it remembers in its memory, not in its class, in globals or in the state of random or numpy.random"
-        for agent in store.facts().get(APART, {}).get("apart", ())
-    ]
+    why = store.facts().get(APART, {}).get("why", {})
+    return [f"agent '{agent}' {WHY[reason]}" for agent, reason in why.items()]

@@ -19,7 +19,7 @@ import numpy as np
 from proxytune.arrays import Floats
 from proxytune.domain import DomainFamily, Episode, Instance, Outcome, instance_of
 from proxytune.errors import EpisodeError, InputError, RunError
-from proxytune.running import ENDED, ENDLESS, Silent, Watch, Watcher, can_run_together, places, running
+from proxytune.running import ENDED, ENDLESS, RAISED, Silent, Watch, Watcher, can_run_together, places, running
 from proxytune.scores import ScoreTable
 from proxytune.search import Compose, Trial, Values
 from proxytune.seeds import episode_seed, fresh_seed
@@ -307,7 +307,7 @@ class StudyRun:
         needed = needed_metrics(self.settings, self.study.family)
         try:
             apart = kept_apart(store, self.settings, self.study.family, self.study.code, needed, watch)
-            yield replace(watch, alone=apart)
+            yield replace(watch, alone=apart | store.agents_that_failed(RAISED))
         finally:
             store.end_episodes()
 

@@ -54,6 +54,7 @@ def test_one_that_raises_fails_by_itself_and_where_it_arose_is_told(tmp_path):
 
 @pytest.mark.parametrize(("fault", "raised"), [("exits", "SystemExit: 0"), ("own error", "OwnError: of its own")])
 def test_one_that_exits_has_the_fleet_run_one_by_one_and_is_named(fault, raised):
+    """Its agent is not put beside others again."""
     found, _ = run_all((f"agent3:2:{fault}",))
     assert but_last(found) == but_last(by_itself())
     assert found[LAST].startswith(f"the agent or the domain family raised {raised}")

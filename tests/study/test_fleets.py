@@ -57,6 +57,11 @@ def test_fleets_of_any_size_and_any_number_of_jobs_give_the_same_document(make_s
     assert most == 1 or max(map(len, driven(journal))) > 2
 
 
+def test_an_agent_that_exits_is_driven_alone_and_told_so(make_study, capsys):
+    found = document(make_study(domain={"faults": '["agent2:1:exits"]'}, **FAMILY), capsys)
+    assert "agent 'agent2' ends what is driven beside it, so it is driven alone" in str(found["cautions"])
+
+
 @pytest.mark.parametrize("kind", ["hides", "draws"])
 def test_an_agent_that_keeps_something_outside_its_memory_is_found_driven_alone_and_named(make_study, capsys, kind):
     journal = make_study().parent / "journal"
@@ -87,7 +92,7 @@ def test_an_agent_that_remembers_by_its_memory_alone_is_driven_beside_others(mak
     assert HIDES not in str(document(folder, capsys))
     with Store.read(folder) as store:
         known = store.facts()["apart"]
-    assert (known["tried"], known["apart"]) == ([f"agent{number}" for number in range(6)], [])
+    assert (known["tried"], known["why"]) == ([f"agent{number}" for number in range(6)], {})
 
 
 def test_a_family_that_runs_one_episode_at_a_time_tries_no_agent(make_study, capsys):

@@ -289,14 +289,14 @@ def low_pass(signal: Signal, state: LowPassState) -> tuple[Signal, LowPassState]
         # As `lfilter` does it, operation by operation
         kept, rows = [remainder * before for before in value.tolist()], []
         for sample in signal.tolist():
-            rows.append([rest + gain * new for rest, new in zip(kept, sample, strict=True)])
+            rows.append([was + gain * new for was, new in zip(kept, sample, strict=True)])
             kept = [0.0 * new + remainder * end for new, end in zip(sample, rows[-1], strict=True)]
         ends = np.array(rows)
     elif signal.shape[-2] <= FEW:
-        kept, ends = remainder * value, np.empty(signal.shape)
+        rest, ends = remainder * value, np.empty(signal.shape)
         for number in range(signal.shape[-2]):
-            ends[..., number, :] = kept + gain * signal[..., number, :]
-            kept = 0.0 * signal[..., number, :] + remainder * ends[..., number, :]
+            ends[..., number, :] = rest + gain * signal[..., number, :]
+            rest = 0.0 * signal[..., number, :] + remainder * ends[..., number, :]
     else:
         ends = lfilter([gain], [1.0, -remainder], signal, axis=-2, zi=remainder * start)[0]
     starts = np.concatenate((start, ends[..., :-1, :]), axis=-2)

@@ -9,6 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from convoy import Convoy
 from partly_dead import PartlyDead
 from wobbly import Wobbly
 
@@ -299,6 +300,18 @@ def test_a_family_that_keeps_every_promise_passes_also_with_a_parameter_that_is_
 
 
 @pytest.mark.slow
+class Mixing(Convoy):
+    def run_many(self, episodes):
+        return super().run_many(episodes)[::-1]
+
+
+def test_a_family_that_scores_episodes_otherwise_at_once_is_refused():
+    assert check_family(Convoy(), agents=["agent0", "agent1"]) is None
+    refused(
+        check_family, Mixing(), "scores agent 'agent0', start 0 otherwise beside others", agents=["agent0", "agent1"]
+    )
+
+
 @pytest.mark.parametrize("case", BROKEN_FAMILIES)
 def test_a_family_that_breaks_a_promise_is_refused(case):
     refused(check_family, BROKEN_FAMILIES[case][0], BROKEN_FAMILIES[case][1], agents=["agent0"])

@@ -5,10 +5,12 @@ import os
 from functools import partial
 
 import pytest
+from convoy import Convoy
 
 from proxytune.cli.main import main
+from proxytune.domain import make_episode
 from proxytune.errors import InputError
-from proxytune.running import on_cluster, working
+from proxytune.running import Watch, on_cluster, run_episode, running, working
 from proxytune.running.sending import check_code, made_by
 
 distributed = pytest.importorskip("distributed")
@@ -75,6 +77,21 @@ def test_workers_do_all_pieces_and_one_that_dies_is_made_up_for(cluster, tmp_pat
         with working(partial(ends_its_worker_once, tmp_path / "flag"), range(20), jobs=1) as results:
             assert sorted(results) == [2 * piece for piece in range(20)]
     assert (tmp_path / "flag").exists()
+
+
+@pytest.mark.slow
+def test_each_worker_is_sent_a_fleet(cluster):
+    """However many jobs there are here."""
+    episodes = [make_episode({}, agent=f"agent{number}", start=0, seed=number) for number in range(6)]
+    known = {(one.agent, one.start): 0.1 for one in episodes}
+    here = {one: run_episode(Convoy(), one).metrics for one in episodes}
+    with (
+        on_cluster(cluster.scheduler_address),
+        running(Convoy(), episodes, jobs=1, watch=Watch(known=known)) as fleets,
+    ):
+        sent = list(fleets)
+    assert [len(fleet) for fleet in sent] == [3, 3]
+    assert {one.episode: one.metrics for fleet in sent for one in fleet} == here
 
 
 @pytest.mark.slow

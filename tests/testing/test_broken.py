@@ -299,7 +299,6 @@ def test_a_family_that_keeps_every_promise_passes_also_with_a_parameter_that_is_
     assert check_family(Altered(idle="trim"), agents=["agent0"], without_effect=["trim"]) is None
 
 
-@pytest.mark.slow
 class Mixing(Convoy):
     def run_many(self, episodes):
         return super().run_many(episodes)[::-1]
@@ -312,6 +311,7 @@ def test_a_family_that_scores_episodes_otherwise_at_once_is_refused():
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", BROKEN_FAMILIES)
 def test_a_family_that_breaks_a_promise_is_refused(case):
     refused(check_family, BROKEN_FAMILIES[case][0], BROKEN_FAMILIES[case][1], agents=["agent0"])

@@ -70,16 +70,6 @@ def test_backend_and_address_go_together(make_study, capsys, words, complaint):
 
 
 @pytest.mark.slow
-def test_workers_do_all_pieces_and_one_that_dies_is_made_up_for(cluster, tmp_path):
-    with on_cluster(cluster.scheduler_address):
-        with working(doubled, range(20), jobs=1) as results:
-            assert sorted(results) == [2 * piece for piece in range(20)]
-        with working(partial(ends_its_worker_once, tmp_path / "flag"), range(20), jobs=1) as results:
-            assert sorted(results) == [2 * piece for piece in range(20)]
-    assert (tmp_path / "flag").exists()
-
-
-@pytest.mark.slow
 def test_each_worker_is_sent_a_fleet(cluster):
     """However many jobs there are here."""
     episodes = [make_episode({}, agent=f"agent{number}", start=0, seed=number) for number in range(6)]
@@ -92,6 +82,16 @@ def test_each_worker_is_sent_a_fleet(cluster):
         sent = list(fleets)
     assert [len(fleet) for fleet in sent] == [3, 3]
     assert {one.episode: one.metrics for fleet in sent for one in fleet} == here
+
+
+@pytest.mark.slow
+def test_workers_do_all_pieces_and_one_that_dies_is_made_up_for(cluster, tmp_path):
+    with on_cluster(cluster.scheduler_address):
+        with working(doubled, range(20), jobs=1) as results:
+            assert sorted(results) == [2 * piece for piece in range(20)]
+        with working(partial(ends_its_worker_once, tmp_path / "flag"), range(20), jobs=1) as results:
+            assert sorted(results) == [2 * piece for piece in range(20)]
+    assert (tmp_path / "flag").exists()
 
 
 @pytest.mark.slow

@@ -191,6 +191,8 @@ def test_the_last_episode_that_began_is_known_to_the_next_process_of_the_same_fa
     with Store.open(tmp_path) as store:
         assert store.under_way("one") == RUNNING[1:]
         assert store.under_way("another") == []
+        store.begin_episode("one", *RUNNING)
+        assert store.under_way("one") == RUNNING, "all that run at once"
         store.end_episodes()
         assert store.under_way("one") == []
 

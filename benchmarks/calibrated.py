@@ -282,8 +282,8 @@ def sobol(dimensions: int, count: int, seed: int) -> Array:
 def simulated_means(study: Study, values: Values, seed: int) -> Array:
     """Every agent's mean metrics at a θ, shape (agents × metrics,)."""
     planned = plan_episodes(study.settings, study.settings.space.theta(values), seed)
-    with running(study.family, planned, study.settings.jobs) as outcomes:
-        found = {(o.episode.agent, o.episode.start): o.metrics for o in outcomes if o.metrics}
+    with running(study.family, planned, study.settings.jobs) as fleets:
+        found = {(o.episode.agent, o.episode.start): o.metrics for fleet in fleets for o in fleet if o.metrics}
     table = ScoreTable.from_episodes({(e.agent, e.start): found[e.agent, e.start] for e in planned})
     return table.select(METRICS).means.ravel()
 

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from proxytune.errors import EpisodeError
 from proxytune.space import Parameter, Theta
 
 
@@ -102,6 +103,19 @@ class DomainFamily(Protocol):
         Raises:
             EpisodeError: If the agent raises or answers with something that is not a command; who runs the episode
                 adds the agent's name.
+        """
+        ...
+
+
+class FleetFamily(DomainFamily, Protocol):
+    """A domain family that can run several episodes at once, faster than one after the other."""
+
+    def run_many(self, episodes: Sequence[Episode], /) -> Sequence[Mapping[str, float] | EpisodeError]:
+        """Simulate episodes of any agents, starts and θ side by side; each to the bit as `run` does.
+
+        Returns:
+            What each came to: its scores, or the EpisodeError that `run` raises. Whatever this raises or ends instead,
+            its process included, has the episodes run one by one.
         """
         ...
 

@@ -13,7 +13,6 @@ from typing import Any, ClassVar, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from proxytune.space import Parameter
 
@@ -285,6 +284,13 @@ def low_pass_at(value: Signal, samples: float) -> LowPassState:
     return LowPassState(value, remainder, samples * (1.0 - remainder))
 
 
+def lfilter(*words: Any, **named: Any) -> Any:
+    """As scipy.signal's, of which importing takes longer than driving an episode."""
+    from scipy import signal
+
+    return signal.lfilter(*words, **named)
+
+
 def low_pass(signal: Signal, state: LowPassState) -> tuple[Signal, LowPassState]:
     """Follow a signal (…, time, channels) with a first-order lag, exactly for one that holds over each sample.
 
@@ -297,9 +303,14 @@ def low_pass(signal: Signal, state: LowPassState) -> tuple[Signal, LowPassState]
         # As `lfilter` does it, operation by operation
         kept, rows = [remainder * before for before in value.tolist()], []
         for sample in signal.tolist():
-            rows.append([rest + gain * new for rest, new in zip(kept, sample, strict=True)])
+            rows.append([was + gain * new for was, new in zip(kept, sample, strict=True)])
             kept = [0.0 * new + remainder * end for new, end in zip(sample, rows[-1], strict=True)]
         ends = np.array(rows)
+    elif signal.shape[-2] <= FEW:
+        rest, ends = remainder * value, np.empty(signal.shape)
+        for number in range(signal.shape[-2]):
+            ends[..., number, :] = rest + gain * signal[..., number, :]
+            rest = 0.0 * signal[..., number, :] + remainder * ends[..., number, :]
     else:
         ends = lfilter([gain], [1.0, -remainder], signal, axis=-2, zi=remainder * start)[0]
     starts = np.concatenate((start, ends[..., :-1, :]), axis=-2)

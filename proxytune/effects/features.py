@@ -9,9 +9,8 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import lfilter
 
-from proxytune.effects.effect import Signal
+from proxytune.effects.effect import Signal, lfilter
 from proxytune.effects.motion import REST_SPEED
 
 Knot = float | tuple[float, float]

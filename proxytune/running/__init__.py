@@ -1,7 +1,8 @@
 """Running work: episodes and other pieces, in this process, several, or on a cluster, with progress.
 
-episodes  running, run_episode, Watch, ENDED, ENDLESS, check_machine: outcomes of episodes
-workers   working, Rescue, IsolatedWorker, WorkerExit, TracedTask, limited, was_ended_in, OVERRUN: pieces of any work
+fleets    Fleet, run_fleet, run_episode, run_together, can_run_together, one_by_one, RAISED, check_machine: outcomes
+episodes  running, Watch, ENDED, ENDLESS: the fleets of many episodes, and what ends or hangs
+workers   working, places, Rescue, IsolatedWorker, WorkerExit, TracedTask, limited, was_ended_in, OVERRUN: any work
 cluster   on_cluster: the same on the machines of a Dask cluster
 progress  Watcher, Silent, Bars, Lines, progress_bar: how far a command is
 sending   work as it goes to other processes; for this room alone

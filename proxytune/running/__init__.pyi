@@ -1,11 +1,13 @@
 from .cluster import on_cluster as on_cluster
-from .episodes import (
-    ENDED as ENDED,
-    ENDLESS as ENDLESS,
-    Watch as Watch,
+from .episodes import ENDED as ENDED, ENDLESS as ENDLESS, Watch as Watch, running as running
+from .fleets import (
+    RAISED as RAISED,
+    Fleet as Fleet,
+    can_run_together as can_run_together,
     check_machine as check_machine,
     run_episode as run_episode,
-    running as running,
+    run_fleet as run_fleet,
+    run_together as run_together,
 )
 from .progress import Bars as Bars, Lines as Lines, Silent as Silent, Watcher as Watcher, progress_bar as progress_bar
 from .workers import (
@@ -15,6 +17,7 @@ from .workers import (
     TracedTask as TracedTask,
     WorkerExit as WorkerExit,
     limited as limited,
+    places as places,
     was_ended_in as was_ended_in,
     working as working,
 )

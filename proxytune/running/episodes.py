@@ -1,49 +1,61 @@
-"""Running episodes: what fails is an outcome, what the machine lacks is not, and what takes long is told of."""
+"""Running episodes in fleets: cut to keep every process busy, told of where they take long, and named where they end.
 
-import errno
+A fleet is what a process is given. It is small enough that a kill loses little and that no time limit is near
+(`in_fleets`). One that ends its process or overruns is run again episode by episode, each by itself in a process that
+it may end. How episodes are put together never changes what they come to.
+"""
+
 import functools
 import math
-import random
-import sys
 import threading
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
-from threadpoolctl import ThreadpoolController
+from dataclasses import dataclass, field
 
 from proxytune.domain import DomainFamily, Episode, Outcome
-from proxytune.errors import EpisodeError, RunError
-from proxytune.extensions import describe, is_users, one_line, place_of
-from proxytune.running.workers import Rescue, WorkerExit, working
+from proxytune.errors import RunError
+from proxytune.running.fleets import RAISED, Fleet, can_run_together, one_by_one, run_fleet
+from proxytune.running.workers import Rescue, WorkerExit, places, working
 
 ENDED, ENDLESS = "it ended its process", "it took longer than"
 """How failures begin of episodes that end their process, and of those that do not end themselves."""
 LONG_S = 60.0
-"""An episode that has been under way for so long is told of [s]: nothing else shows that an agent hangs."""
+"""A fleet that has been under way for so long is told of [s]: nothing else shows that an agent hangs."""
 MONITOR = "stall monitor"
-OF_THE_MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.ENOMEM, errno.EMFILE, errno.ENFILE, errno.EIO)
+MOST = 48
+"""Episodes of a fleet: with more, an episode hardly gets cheaper, and each may need a world in memory."""
+MOST_S = 30.0
+"""A kill loses at most so much of a process's work [s], unless a single episode takes longer."""
+MARGIN = 3.0
+"""A fleet is expected to take at most this part of the time that one episode may take."""
+UNKNOWN = 4
+"""Episodes of a fleet while it is not known how long they take."""
+Seconds = Mapping[tuple[str, int], float]
+"""How long episodes of an agent from a start took before, each its share of a fleet [s]."""
 
 
 @dataclass(frozen=True)
 class Watch:
-    """How episodes are watched that may end their process or never end.
+    """How episodes are watched that may end their process or never end, and what is known of them.
 
     Attributes:
-        timeout_s: How long an episode may take [s]; one that takes longer has failed. None for as long as it takes.
+        timeout_s: How long an episode may take [s]; one that takes longer by itself has failed. None for as long as it
+            takes.
         suspect: Whether an episode is run in a process of its own at once, as an earlier process ended during its like.
-        begins: Told of each episode that begins in this very process, which it may end.
-        waits: Told again and again, where nothing limits it, which episode has been under way longest, if that is long,
+        begins: Told of the episodes that begin in this very process, which they may end.
+        waits: Told again and again, where nothing limits it, which fleet has been under way longest, if that is long,
             and for how long [s]; from another thread.
+        alone: Agents that are not run beside others.
+        known: How long episodes took before.
     """
 
     timeout_s: float | None = None
     suspect: Callable[[Episode], bool] = lambda _: False
-    begins: Callable[[Episode], None] = lambda _: None
+    begins: Callable[[Fleet], None] = lambda _: None
     waits: Callable[[str, float], None] = lambda what, seconds: None
+    alone: Collection[str] = ()
+    known: Seconds = field(default_factory=dict)
 
 
 UNWATCHED = Watch()
@@ -57,22 +69,98 @@ def running(
     skip: Callable[[Episode], bool] = lambda _: False,
     needed: Collection[str] = (),
     watch: Watch = UNWATCHED,
-) -> Iterator[Iterator[Outcome]]:
-    """Run episodes and give each outcome as soon as it is there, in no particular order; see `working`.
+) -> Iterator[Iterator[list[Outcome]]]:
+    """Run episodes and give the outcomes of a fleet as soon as they are there, in no particular order; see `working`.
 
     An episode that ends two processes, the second one its own, has failed, and so has one that takes too long.
+
+    Args:
+        family: Where they run; only a `domain.FleetFamily` has fleets of more than one episode.
+        episodes: Which, those that take longest first.
+        jobs: How many processes.
+        skip: Whether an episode need not be run any more, asked when its fleet is about to begin.
+        needed: As of run_episode.
+        watch: How they are watched.
 
     Raises:
         RunError: If the machine fails rather than an episode: memory, disk or descriptors run out.
     """
-    work = functools.partial(run_episode, family, needed=tuple(needed))
-    rescue = Rescue(functools.partial(_lost, watch), watch.timeout_s, watch.suspect, watch.begins)
+    known, alone, ended = dict(watch.known), set(watch.alone), set[str]()
+
+    def suspect(episode: Episode) -> bool:
+        return episode.agent in ended or watch.suspect(episode)
+
+    def apart(episode: Episode) -> bool:
+        return not together or episode.agent in alone or suspect(episode)
+
+    def noted(fleets: Iterable[list[Outcome]]) -> Iterator[list[Outcome]]:
+        for outcomes in fleets:
+            ended.update(one.episode.agent for one in outcomes if one.failure.startswith((ENDED, ENDLESS)))
+            alone.update(one.episode.agent for one in outcomes if one.failure.startswith(RAISED))
+            known.update({(one.episode.agent, one.episode.start): one.seconds for one in outcomes})
+            yield outcomes
+
+    together = can_run_together(family)
+    most_s = min(MOST_S, watch.timeout_s / MARGIN) if watch.timeout_s else MOST_S
+    fleets = in_fleets(episodes, places(jobs), apart, skip, known, most_s)
+    work = functools.partial(run_fleet, family, needed=tuple(needed))
+    rescue = Rescue[Fleet, list[Outcome]](
+        lambda fleet, end: [_lost(watch, fleet[0], end)],
+        watch.timeout_s,
+        lambda fleet: any(map(suspect, fleet)),
+        watch.begins,
+        parts=one_by_one,
+    )
     waits = watch.waits if watch.timeout_s is None else UNWATCHED.waits
     with (
         StallMonitor(waits) as monitor,
-        working(work, episodes, jobs, monitor.begins_unless(skip), rescue) as outcomes,
+        working(work, monitor.begun(fleets), min(jobs, len(episodes)), rescue) as outcomes,
     ):
-        yield monitor.until_there(outcomes)
+        yield noted(monitor.until_there(outcomes))
+
+
+def in_fleets(
+    episodes: Sequence[Episode],
+    jobs: int,
+    apart: Callable[[Episode], bool],
+    skip: Callable[[Episode], bool],
+    known: Seconds,
+    most_s: float = MOST_S,
+) -> Iterator[Fleet]:
+    """Cut episodes into fleets, each when a process asks for it, by what is known then.
+
+    All processes have as much to do: episodes are dealt out, the longest first, to as many fleets as it takes, or to a
+    multiple of `jobs`. As long as nothing is known of how long they take, fleets are small.
+
+    Args:
+        episodes: Which, those that take longest first.
+        jobs: How many processes are to be kept busy.
+        apart: Whether an episode is a fleet of its own.
+        skip: Whether an episode need not be run any more, asked when its fleet is about to begin.
+        known: How long they took before.
+        most_s: How long a fleet may take [s].
+    """
+    single = [one for one in episodes if apart(one)]
+    left = [one for one in episodes if not apart(one)]
+    while left:
+        count = _count(left, jobs, known, most_s)
+        now, left = (left, []) if count else (left[:UNKNOWN], left[UNKNOWN:])
+        for number in range(count or 1):
+            fleet = [one for one in now[number :: count or 1] if not skip(one)]
+            single += [one for one in fleet if apart(one)]
+            if beside := tuple(one for one in fleet if not apart(one)):
+                yield beside
+    yield from ((one,) for one in single if not skip(one))
+
+
+def _count(episodes: Sequence[Episode], jobs: int, known: Seconds, most_s: float) -> int:
+    """The number of fleets that episodes make; none while nothing is known of how long any takes."""
+    if not known:
+        return 0
+    mean = sum(known.values()) / len(known)
+    seconds = sum(known.get((one.agent, one.start), mean) for one in episodes)
+    rounds = math.ceil(max(len(episodes) / MOST, seconds / most_s) / jobs)
+    return min(len(episodes), jobs * rounds)
 
 
 def _lost(watch: Watch, episode: Episode, end: WorkerExit) -> Outcome:
@@ -91,110 +179,8 @@ def _lost(watch: Watch, episode: Episode, end: WorkerExit) -> Outcome:
     return Outcome(episode, None, failure, end.seconds)
 
 
-def run_episode(family: DomainFamily, episode: Episode, needed: Collection[str] = ()) -> Outcome:
-    """Run one episode on one thread; what the agent or the domain does wrong is its outcome.
-
-    What it draws from `random` and `numpy.random`, which belong to the whole process, follows from the episode's seed.
-
-    Args:
-        family: Where it runs.
-        episode: Which one.
-        needed: The metrics without which it has failed; others may be missing. All, where none is named.
-
-    Raises:
-        RunError: If memory, disk or descriptors run out: that is not the episode's doing.
-    """
-    start = time.perf_counter()
-    metrics: Mapping[str, float] | None = None
-    failure = ""
-    try:
-        with _libraries(len(sys.modules)).limit(limits=1), _seeded(episode.seed):
-            metrics = _checked(family, episode, family.run(episode), needed)
-    except BaseException as problem:
-        if is_users(problem):
-            raise
-        who = f"agent '{episode.agent}' from start {episode.start}"
-        check_machine(who, problem, "with more room or without that agent")
-        failure = one_line(_failure(problem))
-    return Outcome(episode, metrics, failure, time.perf_counter() - start)
-
-
-def check_machine(whose: str, problem: BaseException | None, remedy: str) -> None:
-    """Refuse to call something failed of what memory, disk or descriptors lacked, whoever caught that first.
-
-    Args:
-        whose: What was under way, as the complaint begins.
-        problem: What was raised.
-        remedy: How to run again, as the complaint ends.
-
-    Raises:
-        RunError: With what the machine lacked.
-    """
-    while problem is not None:
-        if isinstance(problem, MemoryError) or getattr(problem, "errno", None) in OF_THE_MACHINE:
-            where = place_of(problem)
-            raise RunError(
-                f"{whose}: the machine failed ({describe(problem)}){where}; run again to continue, {remedy}"
-            ) from None
-        problem = problem.__cause__ or problem.__context__
-
-
-def _failure(problem: BaseException) -> str:
-    """Why an episode failed."""
-    if isinstance(problem, EpisodeError):
-        return f"{problem}{place_of(problem.__cause__)}"
-    # What is no Exception, as of sys.exit, goes through every family, so it may be the agent's.
-    whose = "the domain family" if isinstance(problem, Exception) else "the agent or the domain family"
-    return f"{whose} raised {describe(problem)}{place_of(problem)}"
-
-
-@contextmanager
-def _seeded(seed: int) -> Iterator[None]:
-    """Let the generators of the whole process draw from a seed, and go on afterwards as if they had not."""
-    plain, array = random.getstate(), np.random.get_state()
-    random.seed(seed)
-    np.random.seed(seed % 2**32)
-    try:
-        yield
-    finally:
-        random.setstate(plain)
-        np.random.set_state(array)
-
-
-@functools.lru_cache(maxsize=1)
-def _libraries(modules: int) -> ThreadpoolController:
-    """The libraries that have threads of their own; looking for them takes longer than a short episode.
-
-    Args:
-        modules: How many modules are loaded: with another, there may be another library.
-    """
-    return ThreadpoolController()
-
-
-def _checked(family: DomainFamily, episode: Episode, result: Any, needed: Collection[str]) -> dict[str, float]:
-    """The result as plain numbers, one per metric of the family; what is not needed may be missing."""
-    if not hasattr(result, "keys"):
-        raise EpisodeError(f"run of the domain family must give metrics by name, got {type(result).__name__}")
-    metrics = {}
-    for name in family.metrics:
-        value = _number(result[name]) if name in result else math.nan
-        if math.isfinite(value):
-            metrics[name] = value
-        elif name in (needed or family.metrics):
-            raise EpisodeError(f"agent '{episode.agent}': the domain family gave no finite '{name}'")
-    return metrics
-
-
-def _number(value: Any) -> float:
-    """A value as a number; NaN if it is none."""
-    try:
-        return float(value)
-    except (TypeError, ValueError, OverflowError):
-        return math.nan
-
-
 class StallMonitor:
-    """Says again and again which episode has been under way longest, if that is long; use as a context.
+    """Says again and again which fleet has been under way longest, if that is long; use as a context.
 
     What tells is called from a thread of its own.
     """
@@ -211,26 +197,30 @@ class StallMonitor:
         self._ended.set()
         self._thread.join()
 
-    def begins_unless(self, skip: Callable[[Episode], bool]) -> Callable[[Episode], bool]:
-        """Whether an episode is skipped, asked when it is about to begin: if not, it is under way from then on."""
+    def begun(self, fleets: Iterable[Fleet]) -> Iterator[Fleet]:
+        """The fleets, each under way from when it is asked for."""
+        for fleet in fleets:
+            self._begun |= dict.fromkeys(fleet, time.monotonic())
+            yield fleet
 
-        def asked(episode: Episode) -> bool:
-            skipped = skip(episode)
-            if not skipped:
-                self._begun[episode] = time.monotonic()
-            return skipped
-
-        return asked
-
-    def until_there(self, outcomes: Iterable[Outcome]) -> Iterator[Outcome]:
+    def until_there(self, fleets: Iterable[list[Outcome]]) -> Iterator[list[Outcome]]:
         """The outcomes, whose episodes are under way no more."""
-        for outcome in outcomes:
-            self._begun.pop(outcome.episode, None)
-            yield outcome
+        for outcomes in fleets:
+            for outcome in outcomes:
+                self._begun.pop(outcome.episode, None)
+            yield outcomes
 
     def _watch(self) -> None:
         while not self._ended.wait(LONG_S / 10.0):
-            for episode, since in sorted(self._begun.items(), key=lambda begun: begun[1])[:1]:
-                seconds = time.monotonic() - since
-                if seconds >= LONG_S:
-                    self._tell(f"agent '{episode.agent}' from start {episode.start}", seconds)
+            # Those of one fleet have begun at one moment.
+            begun = sorted(self._begun.copy().items(), key=lambda episode: episode[1])
+            seconds = time.monotonic() - begun[0][1] if begun else 0.0
+            if seconds >= LONG_S:
+                self._tell(_who([episode for episode, since in begun if since == begun[0][1]]), seconds)
+
+
+def _who(fleet: Sequence[Episode]) -> str:
+    if len(fleet) == 1:
+        return f"agent '{fleet[0].agent}' from start {fleet[0].start}"
+    agents = ", ".join(f"'{agent}'" for agent in dict.fromkeys(episode.agent for episode in fleet))
+    return f"a fleet of {len(fleet)} episodes (of {agents})"

@@ -85,6 +85,8 @@ class Bars:
     def begin(self, what: str, known: int) -> None:
         """Show what is being done; episodes known already need no time, so they are taken off the total."""
         total = self._progress.tasks[0].total or 0.0
+        if not (known or self._progress.tasks[0].description):
+            self._lines.say(f"{what} begins; at most {total:.0f} {self._unit}")
         self._progress.update(self._task, description=what, total=max(0.0, total - known))
 
     def episode(self) -> None:

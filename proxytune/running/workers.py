@@ -19,6 +19,7 @@ from contextlib import closing, contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass
 from multiprocessing import TimeoutError as ParallelTimeoutError
+from operator import length_hint
 from pathlib import Path
 from typing import Any, Generic, TypeVar, cast
 
@@ -59,8 +60,8 @@ class WorkerExit:
 class Rescue(Generic[Piece, Result]):
     """What becomes of pieces that end their process, or do not end themselves.
 
-    A process that dies is not known to have died of its piece: that is done once more by an isolated worker, and lost
-    if that dies too.
+    A process that dies is not known to have died of its piece: each part of that is done once more by an isolated
+    worker, and lost if that dies too.
 
     Attributes:
         lost: The result of a piece that has no other, from how its process ended.
@@ -68,6 +69,7 @@ class Rescue(Generic[Piece, Result]):
         suspect: Whether a piece is done by an isolated worker at once, because the like of it has ended a process.
         begins: Told of each piece that begins in this very process, which it may end.
         isolated: Whether no piece is done in this process, as one may end it.
+        parts: What a piece is done again by, each part by itself.
     """
 
     lost: Callable[[Piece, WorkerExit], Result]
@@ -75,6 +77,7 @@ class Rescue(Generic[Piece, Result]):
     suspect: Callable[[Piece], bool] = lambda _: False
     begins: Callable[[Piece], None] = lambda _: None
     isolated: bool = False
+    parts: Callable[[Piece], Sequence[Piece]] = lambda piece: (piece,)
 
 
 @dataclass(frozen=True)
@@ -105,12 +108,17 @@ def elsewhere(place: Elsewhere) -> Iterator[None]:
         _elsewhere.reset(before)
 
 
+def places(jobs: int) -> int:
+    """The number of pieces that are done at once: by so many processes of this machine, or elsewhere."""
+    place = _elsewhere.get()
+    return place.cores() if place else jobs
+
+
 @contextmanager
 def working(
     work: Callable[[Piece], Result],
-    pieces: Sequence[Piece],
+    pieces: Iterable[Piece],
     jobs: int,
-    skip: Callable[[Piece], bool] = lambda _: False,
     rescue: Rescue[Piece, Result] | None = None,
 ) -> Iterator[Iterator[Result]]:
     """Do pieces of work and give each result as soon as it is there, in no particular order.
@@ -120,22 +128,20 @@ def working(
 
     Args:
         work: Does one piece; picklable.
-        pieces: What to do, in the order in which to begin.
+        pieces: What to do, in the order in which to begin; the next one is asked for when it is about to begin.
         jobs: How many processes; with one, and no time-out, everything is done in this process.
-        skip: Whether a piece need not be done any more, asked when it is about to begin; those under way are finished.
         rescue: What becomes of pieces that end their process; nothing else can be done without them.
 
     Raises:
         RunError: If a process dies and there is no rescue.
     """
-    begun = (piece for piece in pieces if not skip(piece))
-    jobs, rescue = min(jobs, len(pieces)), rescue or Rescue(_no_rescue)
+    jobs, rescue = min(jobs, length_hint(pieces, jobs)), rescue or Rescue(_no_rescue)
     if jobs > 1 or _elsewhere.get():
-        results = _spread(work, begun, jobs, rescue)
+        results = _spread(work, pieces, jobs, rescue)
     elif rescue.isolated or rescue.timeout_s is not None:
-        results = _isolated(work, begun, rescue)
+        results = _isolated(work, pieces, rescue)
     else:
-        results = _here(work, begun, rescue)
+        results = _here(work, pieces, rescue)
     try:
         yield results
     finally:
@@ -166,12 +172,21 @@ def _here(
             yield work(piece)
 
 
+_LOST = object()
+
+
 def _isolated(
     work: Callable[[Piece], Result], pieces: Iterable[Piece], rescue: Rescue[Piece, Result]
 ) -> Generator[Result, None, None]:
     with IsolatedWorker(work, rescue.timeout_s) as isolated:
         for piece in pieces:
-            yield isolated.do(piece, functools.partial(rescue.lost, piece))
+            parts = rescue.parts(piece)
+            whole: Any = isolated.do(piece, lambda _: _LOST) if len(parts) > 1 else _LOST
+            if whole is not _LOST:
+                yield whole
+                continue
+            for part in parts:
+                yield isolated.do(part, functools.partial(rescue.lost, part))
 
 
 def _spread(
@@ -200,8 +215,9 @@ def _spread(
                     yield result
         except ended:
             broken = True
-        yield from _isolated(work, list(under_way.values()), rescue)
+        again = [part for piece in under_way.values() for part in rescue.parts(piece)]
         under_way.clear()
+        yield from _isolated(work, again, rescue)
 
 
 def _in_processes(

@@ -19,8 +19,8 @@ For plain SQL (`sqlite3 study.db`); the format is `PRAGMA user_version`:
     sweeps     number, parameter, base (JSON), points (JSON), identity     the curves asked for, the last one last
                target_model                       the target's model.toml as it was; empty without POD
                replays                            identity of the instances whose episodes are POD's replays, or empty
-    under_way  place (1), identity, theta (JSON)  the episode that runs in the study's own process; no row between runs
-               agent, start, seed
+    under_way  place (from 1), identity           the episodes that run in the study's own process; no row between runs
+               theta (JSON), agent, start, seed
     counts     name, rows                         how many rows each of these tables has
 
 θ as JSON has its parameters sorted by name and every digit of its numbers. Each row but those of counts has a `digest`,
@@ -84,6 +84,14 @@ CREATE TABLE under_way (
     place INTEGER PRIMARY KEY CHECK (place = 1), identity TEXT NOT NULL, theta TEXT NOT NULL, agent TEXT NOT NULL,
     start INTEGER NOT NULL, seed INTEGER NOT NULL, digest TEXT NOT NULL DEFAULT '');
 CREATE TABLE counts (name TEXT PRIMARY KEY, rows INTEGER NOT NULL) WITHOUT ROWID;
+""",
+    """
+ALTER TABLE under_way RENAME TO one_under_way;
+CREATE TABLE under_way (
+    place INTEGER PRIMARY KEY, identity TEXT NOT NULL, theta TEXT NOT NULL, agent TEXT NOT NULL,
+    start INTEGER NOT NULL, seed INTEGER NOT NULL, digest TEXT NOT NULL DEFAULT '');
+INSERT INTO under_way SELECT * FROM one_under_way;
+DROP TABLE one_under_way;
 """,
 )
 """What makes an empty database one of the first format, and then what makes each format the next."""

@@ -191,28 +191,30 @@ class Store:
         if objective in self._trials:
             self._trials[objective] |= {trial.number: trial for trial in trials}
 
-    def save_outcome(self, identity: str, outcome: Outcome, code: str | None = None) -> None:
-        """Write an episode, over an earlier failure of the same; of a failure, the code that failed too."""
-        episode, works = outcome.episode, outcome.metrics is not None
-        theta = theta_json(episode.theta)
-        metrics = None if outcome.metrics is None else json.dumps(dict(outcome.metrics), allow_nan=False)
+    def save_outcome(self, identity: str, *outcomes: Outcome, code: str | None = None) -> None:
+        """Write an episode, or several at once, over an earlier failure of the same; of a failure, its code too."""
+        thetas = [theta_json(outcome.episode.theta) for outcome in outcomes]
         with self._transaction() as connection:
-            row = {
-                "instance": self._instance(connection, identity, theta),
-                "agent": episode.agent,
-                "start": episode.start,
-                "seed": episode.seed,
-                "metrics": metrics,
-                "failure": None if works else outcome.failure,
-                "seconds": outcome.seconds,
-                "code": None if works else code,
-            }
-            write_row(connection, "episodes", row)
-        if (identity, theta) in self._outcomes:
-            self._outcomes[identity, theta][episode] = outcome
-        if self._seconds is not None:
-            total, count = self._seconds.get((episode.agent, episode.start), (0.0, 0))
-            self._seconds[episode.agent, episode.start] = (total + outcome.seconds, count + 1)
+            for outcome, theta in zip(outcomes, thetas, strict=True):
+                episode, works = outcome.episode, outcome.metrics is not None
+                row = {
+                    "instance": self._instance(connection, identity, theta),
+                    "agent": episode.agent,
+                    "start": episode.start,
+                    "seed": episode.seed,
+                    "metrics": json.dumps(dict(outcome.metrics or {}), allow_nan=False) if works else None,
+                    "failure": None if works else outcome.failure,
+                    "seconds": outcome.seconds,
+                    "code": None if works else code,
+                }
+                write_row(connection, "episodes", row)
+        for outcome, theta in zip(outcomes, thetas, strict=True):
+            episode = outcome.episode
+            if (identity, theta) in self._outcomes:
+                self._outcomes[identity, theta][episode] = outcome
+            if self._seconds is not None:
+                total, count = self._seconds.get((episode.agent, episode.start), (0.0, 0))
+                self._seconds[episode.agent, episode.start] = (total + outcome.seconds, count + 1)
 
     def outcomes(self, identity: str, theta: Theta) -> Mapping[Episode, Outcome]:
         """Every episode known of a domain instance: read once, and kept up with what is written."""
@@ -228,15 +230,19 @@ class Store:
         return self._outcomes[key]
 
     def under_way(self, identity: str) -> list[Episode]:
-        """The episode of a domain family during which an earlier process ended, if one did; it need not be why."""
-        return self._made(_episode, "SELECT theta, agent, start, seed FROM under_way WHERE identity = ?", (identity,))
+        """The episodes of a domain family during which an earlier process ended; they need not be why."""
+        query = "SELECT theta, agent, start, seed FROM under_way WHERE identity = ? ORDER BY place"
+        return self._made(_episode, query, (identity,))
 
-    def begin_episode(self, identity: str, episode: Episode) -> None:
-        """Keep which episode runs in this very process, in place of the one before: it may end the process."""
-        which = {"theta": json.dumps(dict(episode.theta)), "agent": episode.agent}
-        place = {"place": 1, "identity": identity}
+    def begin_episode(self, identity: str, *episodes: Episode) -> None:
+        """Keep which episodes run in this very process, in place of those before: they may end the process."""
         with self._transaction() as connection:
-            write_row(connection, "under_way", place | which | {"start": episode.start, "seed": episode.seed})
+            connection.execute("DELETE FROM under_way")
+            seal(connection, "under_way")
+            for place, episode in enumerate(episodes, start=1):
+                which = {"theta": json.dumps(dict(episode.theta)), "agent": episode.agent}
+                row = {"place": place, "identity": identity, "start": episode.start, "seed": episode.seed}
+                write_row(connection, "under_way", row | which)
 
     def end_episodes(self) -> None:
         """Keep that no episode is under way."""

@@ -26,6 +26,7 @@ from proxytune.scores import ScoreTable
 from proxytune.search import ENGINE_NAMES, Engine, engine_code, engine_of
 from proxytune.space import Parameter
 from proxytune.storage import Store
+from proxytune.study.apart import APART
 from proxytune.study.opening import Study, objective_of, open_settings, read_target, with_scores
 from proxytune.study.preflight import NOT_REPEATABLE
 from proxytune.study.settings import LEARNING, StudySettings
@@ -37,7 +38,7 @@ SEARCH = "search"
 """Lists which code proposed trials: from which trial on, its digest and the versions of the packages it uses."""
 DESCRIBED = "described"
 """Tells what figures and tables need of a study's own code."""
-NOTED = (LEARNING, SEARCH, DESCRIBED, NOT_REPEATABLE)
+NOTED = (LEARNING, SEARCH, DESCRIBED, NOT_REPEATABLE, APART)
 """Facts that trials do not depend on; LEARNING has those of a search for learning value."""
 UNSAID = {"batch": 1, "engine": "gp"}
 """Values that go without saying: a study.db that names none of these was run with them."""

@@ -25,7 +25,7 @@ from proxytune.study.settings import StudySettings
 MISSING = object()
 ON_EPISODES = ("run", "record", "drive", "replay", "demonstrate", "guide", "examine")
 """Methods whose first argument is an episode."""
-ON_SEVERAL = ("examine_together",)
+ON_SEVERAL = ("run_many", "examine_together")
 """Methods whose first argument is a list of them."""
 
 
@@ -121,6 +121,11 @@ def load_family(settings: StudySettings, model: Path | None) -> DomainFamily:
     if type(family).__module__.startswith("proxytune.") and not settings.aliases:
         return family
     return cast(DomainFamily, UserFamily(family, settings.family, tuple(settings.aliases.items())))
+
+
+def is_users_family(settings: StudySettings) -> bool:
+    """Tell whether the domain family is not proxytune's own."""
+    return not settings.family.startswith("proxytune.")
 
 
 def bare_family(settings: StudySettings, model: Path | None) -> DomainFamily:

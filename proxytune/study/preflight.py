@@ -11,7 +11,7 @@ study stops and says of what.
 
 What a trial comes to must not depend on which process drove which episode before. So one episode of each agent is
 driven twice more, by one process, one after the other (`check_repeatable`): an agent that draws from what no episode
-seeds, or remembers earlier episodes, comes to other scores.
+seeds, or remembers earlier episodes, comes to other scores. The agents that proxytune brings are one fleet there.
 
 `noise_of` says how far chance alone puts proxy and target apart at the same θ, which a search has to forgive. Both
 sides drive from the same starts, so it is the placement noise that differs, not the starts. The base has been driven
@@ -34,10 +34,11 @@ from scipy.stats import wilcoxon
 from proxytune.arrays import Floats
 from proxytune.domain import DomainFamily, Episode, Outcome, make_episode
 from proxytune.errors import RunError
-from proxytune.running import Rescue, WorkerExit, run_episode, working
+from proxytune.running import Fleet, Rescue, WorkerExit, run_fleet, working
 from proxytune.seeds import preflight_noise_seed, preflight_seed
 from proxytune.space import Interval, Theta
 from proxytune.storage import Store
+from proxytune.study.apart import users_agents
 from proxytune.study.opening import Study
 from proxytune.study.settings import StudySettings
 from proxytune.study.study_run import StudyRun, needed_metrics
@@ -124,8 +125,8 @@ def judge(interval: Interval, names: Sequence[str], values: Floats) -> Movement:
 NOT_REPEATABLE = "not_repeatable"
 """The fact in study.db: a line for each agent that scores otherwise in the same episode, in their order."""
 REMEDY = "draw from random or numpy.random, which each episode seeds, and keep nothing from one episode to the next"
-Again = tuple[Episode, tuple[Mapping[str, float] | None, ...]]
-"""An episode with its scores when it was driven twice more; None where it failed."""
+Again = tuple[Episode, Mapping[str, float] | None]
+"""An episode with its scores when it was driven once more; None where it failed."""
 
 
 def check_repeatable(run: StudyRun, episodes: Sequence[Episode]) -> None:
@@ -142,12 +143,18 @@ def check_repeatable(run: StudyRun, episodes: Sequence[Episode]) -> None:
         return
     known = {one: outcome.metrics for one, outcome in run.known(episodes).items() if outcome.metrics is not None}
     run.watcher.begin("pre-flight: each agent twice", 0)
-    drive = functools.partial(_drive_twice, run.study.family, tuple(needed_metrics(run.settings, run.study.family)))
+    users = users_agents(run.settings)
+    shipped = tuple(one for one in known if one.agent not in users)
+    fleets = [fleet for fleet in (*((one,) for one in known if one.agent in users), shipped) if fleet]
+    needed = tuple(needed_metrics(run.settings, run.study.family))
+    drive: Callable[[Fleet], list[Again]] = functools.partial(_drive_twice, run.study.family, needed)
     with run.watched() as watch:
         timeout_s = watch.timeout_s and 2.0 * watch.timeout_s
-        rescue = Rescue(_lost, timeout_s, watch.suspect, watch.begins)
-        with working(drive, list(known), run.settings.jobs, rescue=rescue) as driven:
-            others = {one.agent for one, again in driven if any(scores != known[one] for scores in again)}
+        rescue = Rescue[Fleet, list[Again]](
+            _lost, timeout_s, lambda fleet: any(map(watch.suspect, fleet)), watch.begins
+        )
+        with working(drive, fleets, run.settings.jobs, rescue) as driven:
+            others = {one.agent for again in driven for one, scores in again if scores != known[one]}
     told = [agent for agent in run.settings.agents if agent in others]
     lines = [f"pre-flight: agent '{agent}' scores otherwise in the same episode; {REMEDY}" for agent in told]
     run.store.save_fact(NOT_REPEATABLE, lines)
@@ -158,12 +165,13 @@ def not_repeatable(store: Store) -> tuple[str, ...]:
     return tuple(store.facts().get(NOT_REPEATABLE, ()))
 
 
-def _drive_twice(family: DomainFamily, needed: Sequence[str], episode: Episode) -> Again:
-    return episode, tuple(run_episode(family, episode, needed).metrics for _ in range(2))
+def _drive_twice(family: DomainFamily, needed: Sequence[str], fleet: Fleet) -> list[Again]:
+    both = run_fleet(family, fleet, needed) + run_fleet(family, fleet, needed)
+    return [(outcome.episode, outcome.metrics) for outcome in both]
 
 
-def _lost(episode: Episode, end: WorkerExit) -> Again:
-    return episode, (None,)
+def _lost(fleet: Fleet, end: WorkerExit) -> list[Again]:
+    return [(episode, None) for episode in fleet]
 
 
 def check_some_work(outcomes: Collection[Outcome], where: str) -> None:

@@ -1,11 +1,12 @@
 """Pruning: a trial is stopped once it cannot reach the incumbents any more.
 
-Agents are driven one after the other, each from all starts; then its place among those before it is decided. The pairs
-of decided agents are a lower bound of PRPV: eq. (4) of the paper is a sum over pairs, none of them negative. As soon as
-that bound lies above the limit, the evaluation cannot end among the incumbents (the trials within one standard
-deviation of the score's noise of the lowest posterior mean), whatever the other agents do, and they are not driven. The
-order of the agents puts those first that disagreed most with the target so far. Order, limit and verdict follow from
-the finished trials and the decided agents' episodes alone: a trial comes to the same end with any number of processes.
+Agents are driven in waves (`StudyRun.outcomes`), each from all starts; then its place among those before it is decided,
+and the fewest agents that suffice end the trial, whichever were driven beside them. The pairs of decided agents are a
+lower bound of PRPV: eq. (4) of the paper is a sum over pairs, none of them negative. As soon as that bound lies above
+the limit, the evaluation cannot end among the incumbents (the trials within one standard deviation of the score's noise
+of the lowest posterior mean), whatever the other agents do, and they are not driven. The order of the agents puts those
+first that disagreed most with the target so far. Order, limit and verdict follow from the finished trials and the
+decided agents' episodes alone: a trial comes to the same end with any number of processes and waves of any size.
 The trials of a batch are all held against the trials before it, each by its own episodes.
 
 A pruned trial has the state "cut" in study.db. Its score there is an estimate: the bound, divided by the share that

@@ -15,6 +15,7 @@ from proxytune.search import History, Importance, Knowledge, PastTrial, fit_surr
 from proxytune.settings import nearest
 from proxytune.space import Theta
 from proxytune.storage import TrialRecord
+from proxytune.study.apart import apart_notes
 from proxytune.study.opening import Study, read_target
 from proxytune.study.preflight import Preflight, noise_of, preflight_of
 from proxytune.study.pruning import rescored_pruned, spared
@@ -163,7 +164,7 @@ def result_of(run: StudyRun, scored_anew: Sequence[TrialRecord] | None = None) -
         stopped=stopped(run, trials),
         spared=spared(run, trials),
         failures=_failures(run, trials),
-        cautions=tuple(line for line in (*study.cautions, noise_of(run).caution) if line),
+        cautions=tuple(line for line in (*study.cautions, noise_of(run).caution, *apart_notes(run.store)) if line),
     )
 
 

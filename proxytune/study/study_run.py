@@ -6,11 +6,12 @@ trial's score, and each agent's mean of every metric that both sides have (`outp
 composed (`compose_of`). `measure_agents` scores the agents in one fixed domain: how a twin's target.csv is made.
 """
 
+import itertools
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -18,12 +19,13 @@ import numpy as np
 from proxytune.arrays import Floats
 from proxytune.domain import DomainFamily, Episode, Instance, Outcome, instance_of
 from proxytune.errors import EpisodeError, InputError, RunError
-from proxytune.running import ENDED, ENDLESS, Silent, Watch, Watcher, running
+from proxytune.running import ENDED, ENDLESS, RAISED, Silent, Watch, Watcher, can_run_together, places, running
 from proxytune.scores import ScoreTable
 from proxytune.search import Compose, Trial, Values
 from proxytune.seeds import episode_seed, fresh_seed
 from proxytune.space import Space, Theta
 from proxytune.storage import Store, TrialRecord
+from proxytune.study.apart import find_apart, kept_apart, users_agents
 from proxytune.study.family import load_family
 from proxytune.study.opening import Study
 from proxytune.study.settings import LEARNING, StudySettings
@@ -91,6 +93,14 @@ class Spent:
 def longest_first(episodes: Sequence[Episode], seconds: Mapping[tuple[str, int], float]) -> list[Episode]:
     """The episodes in the order that keeps several processes busy to the end, by how long their like took before."""
     return sorted(episodes, key=lambda episode: -seconds.get((episode.agent, episode.start), float("inf")))
+
+
+def _split(episodes: list[Episode], least: int) -> tuple[list[Episode], list[Episode]]:
+    """The first so many episodes and the rest of their last agent's; and those after them."""
+    end = least
+    while 0 < end < len(episodes) and episodes[end].agent == episodes[end - 1].agent:
+        end += 1
+    return episodes[:end], episodes[end:]
 
 
 def evaluate_outcomes(study: Study, theta: Theta, outcomes: Sequence[Outcome]) -> Evaluation:
@@ -181,6 +191,8 @@ def compose_of(study: Study) -> Compose:
     return compose
 
 
+WAVE = 16
+"""So many episodes for each process at once, before it is asked whether they are enough."""
 Enough = Callable[[Instance, Mapping[Episode, Outcome]], bool]
 """True if the outcomes so far are enough of a domain instance, so that no more of its episodes begin."""
 
@@ -263,41 +275,52 @@ class StudyRun:
     ) -> None:
         """Simulate what is missing, and add it to what is known."""
         ended = {theta for theta in {episode.theta for episode in planned} if enough and enough(theta, known)}
-        order = longest_first(missing, self.store.seconds())
+        left, least = longest_first(missing, self.store.seconds()), len(missing)
         if enough:
-            # Agent by agent as planned, and only within an agent the longest first
+            # Agents as planned, and only within a wave of them the longest first
             place = {agent: number for number, agent in enumerate(dict.fromkeys(one.agent for one in planned))}
-            order.sort(key=lambda episode: place[episode.agent])
+            left.sort(key=lambda episode: place[episode.agent])
+            least = WAVE * places(self.settings.jobs) if can_run_together(self.study.family) else least
         family, needed = self.study.family, needed_metrics(self.settings, self.study.family)
-        with (
-            self.watched() as watch,
-            running(family, order, self.settings.jobs, lambda one: one.theta in ended, needed, watch) as outcomes,
-        ):
-            for outcome in outcomes:
-                self._keep(outcome)
-                known[outcome.episode] = outcome
-                theta = outcome.episode.theta
-                if enough and theta not in ended and enough(theta, known):
-                    ended.add(theta)
+        with self.watched() as watch:
+            while left:
+                wave, left = _split([one for one in left if one.theta not in ended], least)
+                with running(family, wave, self.settings.jobs, lambda one: one.theta in ended, needed, watch) as fleets:
+                    for outcomes in fleets:
+                        self._keep(outcomes)
+                        known.update({outcome.episode: outcome for outcome in outcomes})
+                        thetas = {outcome.episode.theta for outcome in outcomes} - ended
+                        ended.update(theta for theta in thetas if enough and enough(theta, known))
 
     @contextmanager
     def watched(self) -> Iterator[Watch]:
         """Watch episodes: one that ends this process is known to the next, and its agent is isolated then."""
         store, identity = self.store, self.study.identity
         left, agents = store.under_way(identity), store.agents_that_failed(ENDED, ENDLESS)
-        begins, waits = partial(store.begin_episode, identity), self.watcher.waiting
+        watch = Watch(
+            self.settings.episode_timeout_s,
+            lambda one: one in left or one.agent in agents,
+            lambda fleet: store.begin_episode(identity, *fleet),
+            self.watcher.waiting,
+            known=store.seconds(),
+        )
+        needed = needed_metrics(self.settings, self.study.family)
         try:
-            yield Watch(self.settings.episode_timeout_s, lambda one: one in left or one.agent in agents, begins, waits)
+            apart = kept_apart(store, self.settings, self.study.family, self.study.code, needed, watch)
+            yield replace(watch, alone=apart | store.agents_that_failed(RAISED))
         finally:
             store.end_episodes()
 
-    def _keep(self, outcome: Outcome) -> None:
-        self.store.save_outcome(self.study.identity, outcome, self.study.code)
-        self.corrected.discard(outcome.episode)
-        self.watcher.episode()
-        self.spent += Spent(1, outcome.seconds)
-        if self.settings.stop_on_failure and outcome.failure:
-            raise EpisodeError(f"{failure_of(outcome)}; correct it and run again, or set on_failure = 'continue'")
+    def _keep(self, outcomes: Sequence[Outcome]) -> None:
+        """Keep the outcomes of a fleet, all at once."""
+        self.store.save_outcome(self.study.identity, *outcomes, code=self.study.code)
+        for outcome in outcomes:
+            self.corrected.discard(outcome.episode)
+            self.watcher.episode()
+            self.spent += Spent(1, outcome.seconds)
+        failed = [outcome for outcome in outcomes if outcome.failure]
+        if self.settings.stop_on_failure and failed:
+            raise EpisodeError(f"{failure_of(failed[0])}; correct it and run again, or set on_failure = 'continue'")
 
     def evaluate(self, theta: Theta, what: str) -> Evaluation:
         """Score a domain instance by every agent from every start.
@@ -404,8 +427,9 @@ def measure_agents(settings: StudySettings, model: Path, seed: int, watcher: Wat
     needed, left = needed_metrics(settings, family), Counter(episode.agent for episode in labels)
     metrics: dict[Episode, Mapping[str, float]] = {}
     watch = Watch(settings.episode_timeout_s, waits=watcher.waiting)
-    with running(family, longest_first(list(labels), {}), settings.jobs, needed=needed, watch=watch) as outcomes:
-        for outcome in outcomes:
+    watch = replace(watch, alone=find_apart(settings, family, users_agents(settings), needed, watch))
+    with running(family, longest_first(list(labels), {}), settings.jobs, needed=needed, watch=watch) as fleets:
+        for outcome in itertools.chain.from_iterable(fleets):
             if outcome.metrics is None:
                 raise EpisodeError(failure_of(outcome))
             agent = outcome.episode.agent

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from proxytune.arrays import Floats
 from proxytune.domain import DomainFamily, Episode, make_episode
 from proxytune.driving import NEEDS, Agent, GroundPlaneCamera, Picture, Robot, draw_floor, read_robot, shipped_map
-from proxytune.errors import InputError
+from proxytune.errors import EpisodeError, InputError
 from proxytune.running import working
 from proxytune.scores import Metric, ScoreTable
 from proxytune.search import (
@@ -207,9 +207,10 @@ Scores = Mapping[str, float]
 def check_family(family: DomainFamily, *, agents: Sequence[str], without_effect: Collection[str] = ()) -> None:
     """Refuse a domain family that breaks a promise.
 
-    It can be pickled; the same episode has the same result, after other episodes and in another process too; each
-    parameter changes a metric of some agent, or is named as one that does not; metrics are those that it declares, all
-    finite; its identity stays the same; and an agent that it does not know is refused.
+    It can be pickled; the same episode has the same result, after other episodes, in another process and, where it has
+    `run_many`, beside others too; each parameter changes a metric of some agent, or is named as one that does not;
+    metrics are those that it declares, all finite; its identity stays the same; and an agent that it does not know is
+    refused.
 
     Args:
         family: The family.
@@ -232,6 +233,8 @@ def check_family(family: DomainFamily, *, agents: Sequence[str], without_effect:
     claim(_scores(family, what, tried) == before, f"{what} scores an episode otherwise after others; keep no state")
     claim(family.identity == identity, f"{what} has another identity after episodes; it must not depend on them")
     _claim_elsewhere(family, what, tried, before)
+    if hasattr(family, "run_many"):
+        _claim_together(family, what, agents)
 
 
 def _claim_declared(family: Any, what: str) -> None:
@@ -300,6 +303,19 @@ def _claim_elsewhere(family: DomainFamily, what: str, episode: Episode, scores: 
         claim(identity == family.identity, f"{what} {line}")
         claim(answered == scores, f"{what} scores an episode otherwise in {where}; draw from episode.seed alone")
     return None
+
+
+def _claim_together(family: Any, what: str, agents: Sequence[str]) -> None:
+    """Episodes at once score as each does by itself."""
+    starts = range(min(family.starts, STARTS))
+    episodes = [make_episode({}, agent=agent, start=start, seed=1) for agent in agents for start in starts]
+    together = list(ask(f"run_many of {what}", lambda: family.run_many(episodes)))
+    claim(len(together) == len(episodes), f"{what}: run_many of {len(episodes)} episodes gives {len(together)} results")
+    for episode, scores in zip(episodes, together, strict=True):
+        same = not isinstance(scores, EpisodeError) and dict(scores) == _scores(family, what, episode)
+        claim(
+            same, f"{what} scores agent '{episode.agent}', start {episode.start} otherwise beside others; mix nothing"
+        )
 
 
 def _answer(family: DomainFamily, episode: Episode) -> tuple[str, Scores]:

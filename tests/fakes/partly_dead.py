@@ -1,6 +1,6 @@
 """A domain family with one parameter that matters, one that moves no more than noise does, and a dead one."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -73,6 +73,19 @@ def ordered(section: Section, *, model: Path | None) -> Ordered:
     """The family."""
     section.only(())
     return Ordered()
+
+
+class OrderedFleet(Ordered):
+    """Ordered, several episodes at once."""
+
+    def run_many(self, episodes: Sequence[Episode]) -> list[Mapping[str, float]]:
+        return [self.run(episode) for episode in episodes]
+
+
+def ordered_fleet(section: Section, *, model: Path | None) -> OrderedFleet:
+    """The family."""
+    section.only(())
+    return OrderedFleet()
 
 
 def ordered_study(make, called="cutting", **changes):

@@ -5,10 +5,12 @@ import os
 from functools import partial
 
 import pytest
+from convoy import Convoy
 
 from proxytune.cli.main import main
+from proxytune.domain import make_episode
 from proxytune.errors import InputError
-from proxytune.running import on_cluster, working
+from proxytune.running import Watch, on_cluster, run_episode, running, working
 from proxytune.running.sending import check_code, made_by
 
 distributed = pytest.importorskip("distributed")
@@ -65,6 +67,21 @@ def test_where_nothing_answers_the_user_is_told_in_one_line(make_study, capsys, 
 def test_backend_and_address_go_together(make_study, capsys, words, complaint):
     assert main(["study", str(make_study()), *words]) == 2
     assert complaint in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_each_worker_is_sent_a_fleet(cluster):
+    """However many jobs there are here."""
+    episodes = [make_episode({}, agent=f"agent{number}", start=0, seed=number) for number in range(6)]
+    known = {(one.agent, one.start): 0.1 for one in episodes}
+    here = {one: run_episode(Convoy(), one).metrics for one in episodes}
+    with (
+        on_cluster(cluster.scheduler_address),
+        running(Convoy(), episodes, jobs=1, watch=Watch(known=known)) as fleets,
+    ):
+        sent = list(fleets)
+    assert [len(fleet) for fleet in sent] == [3, 3]
+    assert {one.episode: one.metrics for fleet in sent for one in fleet} == here
 
 
 @pytest.mark.slow

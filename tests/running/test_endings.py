@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -24,8 +25,8 @@ LAST = EPISODES[-1]
 
 
 def run_all(faults, jobs=1, **watch):
-    with running(Deadly(faults=faults), EPISODES, jobs, watch=Watch(**watch)) as outcomes:
-        return {one.episode: one.metrics if one.metrics else one.failure for one in outcomes}
+    with running(Deadly(faults=faults), EPISODES, jobs, watch=Watch(**watch)) as fleets:
+        return {one.episode: one.metrics if one.metrics else one.failure for one in chain.from_iterable(fleets)}
 
 
 def but_last(outcomes):
@@ -110,7 +111,7 @@ def test_an_episode_during_which_an_earlier_process_ended_does_not_end_this_one(
     found = run_all(("agent2:2:leaves",), suspect=LAST.__eq__, begins=begun.append)
     assert but_last(found) == but_last(run_all(()))
     assert found[LAST] == "it ended its process twice (exit status 9)"
-    assert begun == EPISODES[:-1]
+    assert begun == [(episode,) for episode in EPISODES[:-1]]
 
 
 def test_a_suspect_that_cannot_be_sent_to_another_process_is_run_in_this_one():
@@ -118,7 +119,7 @@ def test_a_suspect_that_cannot_be_sent_to_another_process_is_run_in_this_one():
         pass
 
     with running(Local(), EPISODES, 1, watch=Watch(suspect=lambda _: True)) as outcomes:
-        assert [one.metrics is not None for one in outcomes] == [True] * len(EPISODES)
+        assert [one.metrics is not None for (one,) in outcomes] == [True] * len(EPISODES)
 
 
 PARENT = """

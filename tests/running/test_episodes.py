@@ -1,3 +1,4 @@
+import itertools
 import os
 
 import pytest
@@ -13,7 +14,7 @@ EPISODES = [make_episode({"trim": 0.1}, agent=f"agent{a}", start=s, seed=s) for 
 
 def run_all(family, jobs, episodes=EPISODES):
     with running(family, episodes, jobs) as outcomes:
-        return {outcome.episode: (outcome.metrics, outcome.failure) for outcome in outcomes}
+        return {one.episode: (one.metrics, one.failure) for one in itertools.chain.from_iterable(outcomes)}
 
 
 def test_two_processes_find_what_one_finds():
@@ -93,7 +94,7 @@ def test_whether_an_episode_is_left_out_is_asked_when_it_is_about_to_begin(jobs,
         return episode.agent == "agent1" or len(journal.read_text().splitlines()) >= 3
 
     with running(Wobbly(journal=str(journal)), EPISODES * 5, jobs, left_out) as outcomes:
-        given = [outcome.episode for outcome in outcomes]
+        given = [outcome.episode for (outcome,) in outcomes]
     assert "agent1" not in {episode.agent for episode in given}
     assert 3 <= len(given) <= 3 + 2 * jobs
 

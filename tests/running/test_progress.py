@@ -82,3 +82,12 @@ def test_an_episode_that_waits_is_told_of_ever_more_rarely_on_a_terminal_too(mon
     told = [f"agent 'one' from start 3 has been under way for {minutes} min" for minutes in (1, 2, 4)]
     assert [line.partition(" s: ")[2].partition(";")[0] for line in lines] == told
     assert all(line.endswith("; episode_timeout_s in study.toml would end it") for line in lines)
+
+
+def test_a_run_of_which_nothing_is_known_says_at_once_that_it_has_begun(monkeypatch):
+    text = io.StringIO()
+    monkeypatch.setattr("proxytune.running.progress.Console", lambda stderr: Console(file=text, width=120))
+    with Bars(432) as bars:
+        bars.begin("pre-flight 1 of 2", 0)
+        bars.begin("pre-flight 2 of 2", 0)
+    assert text.getvalue() == "0 s: pre-flight 1 of 2 begins; at most 432 episodes\n"

@@ -310,8 +310,8 @@ def small_study(folder):
         store.begin({"seed": 1, "identity": "i"})
         for number, theta in enumerate(THETAS, start=1):
             episode = make_episode(theta, agent="agent1", start=2, seed=11)
-            store.save_outcome("i", Outcome(episode, {"distance": number + 0.1}, "", 1.5), "code")
-            store.save_outcome("i", Outcome(replace(episode, start=3), None, "it fell", 0.5), "code")
+            store.save_outcome("i", Outcome(episode, {"distance": number + 0.1}, "", 1.5), code="code")
+            store.save_outcome("i", Outcome(replace(episode, start=3), None, "it fell", 0.5), code="code")
             store.save_trial("i", TrialRecord(number, theta))
             store.save_trial("i", TrialRecord(number, theta, "finished", 4.0, {"prpv": 4.0, "ppv": 1 / 3}))
         store.save_trial("i", TrialRecord(1, THETAS[0], "finished", -3.0, {"plv": 3.0}), objective="plv")

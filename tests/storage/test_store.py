@@ -47,15 +47,15 @@ def test_a_failure_is_kept_until_the_episode_works(tmp_path):
 def test_failures_are_those_of_other_code_once_the_code_has_changed_or_all_are_to_be_tried_again(tmp_path):
     failed = Outcome(EPISODE, None, "it lost its way", 0.5)
     with Store.open(tmp_path) as store:
-        store.save_outcome("identity", failed, "code 1")
-        store.save_outcome("identity", replace(WORKED, episode=OTHER_EPISODE), "code 1")
-        assert store.failed_in_other_code("identity", "code 1") == set()
+        store.save_outcome("identity", failed, code="code 1")
+        store.save_outcome("identity", replace(WORKED, episode=OTHER_EPISODE), code="code 1")
+        assert store.failed_in_other_code("identity", code="code 1") == set()
         assert store.failed_in_other_code("identity", "code 2") == {EPISODE}
         assert store.failed_in_other_code("another identity", "code 2") == set()
         store.forget_failures()
-        assert store.failed_in_other_code("identity", "code 1") == {EPISODE}
+        assert store.failed_in_other_code("identity", code="code 1") == {EPISODE}
         store.save_outcome("identity", replace(failed, episode=OTHER_EPISODE))
-        assert store.failed_in_other_code("identity", "code 1") == {EPISODE}, "of some the code is not known"
+        assert store.failed_in_other_code("identity", code="code 1") == {EPISODE}, "of some the code is not known"
 
 
 def test_trials_come_back_in_order_and_the_last_word_counts(tmp_path):
@@ -191,6 +191,8 @@ def test_the_last_episode_that_began_is_known_to_the_next_process_of_the_same_fa
     with Store.open(tmp_path) as store:
         assert store.under_way("one") == RUNNING[1:]
         assert store.under_way("another") == []
+        store.begin_episode("one", *RUNNING)
+        assert store.under_way("one") == RUNNING, "all that run at once"
         store.end_episodes()
         assert store.under_way("one") == []
 

@@ -9,6 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from convoy import Convoy
 from partly_dead import PartlyDead
 from wobbly import Wobbly
 
@@ -296,6 +297,18 @@ BROKEN_FAMILIES = {
 def test_a_family_that_keeps_every_promise_passes_also_with_a_parameter_that_is_said_to_do_nothing():
     assert check_family(Wobbly(), agents=["agent0"]) is None
     assert check_family(Altered(idle="trim"), agents=["agent0"], without_effect=["trim"]) is None
+
+
+class Mixing(Convoy):
+    def run_many(self, episodes):
+        return super().run_many(episodes)[::-1]
+
+
+def test_a_family_that_scores_episodes_otherwise_at_once_is_refused():
+    assert check_family(Convoy(), agents=["agent0", "agent1"]) is None
+    refused(
+        check_family, Mixing(), "scores agent 'agent0', start 0 otherwise beside others", agents=["agent0", "agent1"]
+    )
 
 
 @pytest.mark.slow

@@ -1,0 +1,205 @@
+"""A study driven in fleets comes to what it comes to episode by episode, whatever its agents do and however it ends."""
+
+import json
+import os
+import signal
+import time
+
+import pytest
+from launched import Launched, launching
+from partly_dead import ordered_study
+from processes import besides_progress, episodes, finished_episodes, start, trials, wait_for
+
+from proxytune.cli.main import main
+from proxytune.running import Silent
+from proxytune.search import make_proposer
+from proxytune.storage import Store
+from proxytune.study import StudyRun, open_study, read_study_settings, run_trials
+from proxytune.study.study_run import measure_agents
+
+FAMILY = {"family": '"convoy:convoy"'}
+PHASES = {"preflight": "true", "confirm": "1", "budget": "6"}
+PER_TRIAL, TRIED = 6 * 3, 6 * 4
+"""Episodes of a trial, and those that try the agents."""
+HIDES = "does otherwise beside others than by itself, so it is driven alone"
+
+
+@pytest.fixture(scope="module")
+def launcher():
+    with launching() as process:
+        yield process
+
+
+def document(folder, capsys):
+    """The study's document, without where it lies, how long it took, and in how many processes."""
+    assert main(["study", str(folder), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out.replace(str(folder), ""))
+    del found["seconds"], found["settings"]["jobs"]
+    return found
+
+
+def driven(journal):
+    """The fleets that were driven, each by its agents."""
+    return [line.split()[2].split("+") for line in journal.read_text().splitlines()]
+
+
+@pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.slow), pytest.param(3, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("most", [1, 5, 48])
+def test_fleets_of_any_size_and_any_number_of_jobs_give_the_same_document(make_study, capsys, monkeypatch, jobs, most):
+    whole = document(make_study("whole", **FAMILY, **PHASES), capsys)
+    monkeypatch.setattr("proxytune.running.episodes.MOST", most)
+    monkeypatch.setattr("proxytune.running.episodes.UNKNOWN", most)
+    journal = make_study("other").parent / "journal"
+    folder = make_study("other", jobs=str(jobs), domain={"journal": f'"{journal}"'}, **FAMILY, **PHASES)
+    assert document(folder, capsys) == whole
+    assert episodes(folder) == episodes(folder.with_name("whole"))
+    assert max(map(len, driven(journal))) <= max(2, most)
+    assert most == 1 or max(map(len, driven(journal))) > 2
+
+
+def test_an_agent_that_exits_is_driven_alone_and_told_so(make_study, capsys):
+    found = document(make_study(domain={"faults": '["agent2:1:exits"]'}, **FAMILY), capsys)
+    assert "agent 'agent2' ends what is driven beside it, so it is driven alone" in str(found["cautions"])
+
+
+@pytest.mark.parametrize("kind", ["hides", "draws"])
+def test_an_agent_that_keeps_something_outside_its_memory_is_found_driven_alone_and_named(make_study, capsys, kind):
+    journal = make_study().parent / "journal"
+    domain = {"faults": f'["agent2:*:{kind}"]', "journal": f'"{journal}"'}
+    folder = make_study(domain=domain, **FAMILY)
+    assert main(["study", str(folder)]) == 0
+    assert f"note: agent 'agent2' {HIDES}" in " ".join(capsys.readouterr().out.split())
+    fleets = driven(journal)
+    assert [fleet for fleet in fleets if "agent2" in fleet and len(fleet) > 1] == [["agent2", "agent2"]], "tried once"
+    assert max(map(len, fleets)) > 4
+    cautions = document(folder, capsys)["cautions"]
+    assert [HIDES in line and "'agent2'" in line for line in cautions].count(True) == 1
+
+
+def test_what_was_found_of_an_agent_is_known_when_the_study_goes_on(make_study, capsys):
+    journal = make_study().parent / "journal"
+    domain = {"faults": '["agent2:*:hides"]', "journal": f'"{journal}"'}
+    first = {**FAMILY, "domain": domain}
+    document(make_study(**first), capsys)
+    journal.unlink()
+    found = document(make_study(**first, budget="9"), capsys)
+    assert {len(fleet) for fleet in driven(journal) if "agent2" in fleet} == {1}
+    assert any(HIDES in line for line in found["cautions"])
+
+
+def test_an_agent_that_remembers_by_its_memory_alone_is_driven_beside_others(make_study, capsys):
+    folder = make_study(**FAMILY)
+    assert HIDES not in str(document(folder, capsys))
+    with Store.read(folder) as store:
+        known = store.facts()["apart"]
+    assert (known["tried"], known["why"]) == ([f"agent{number}" for number in range(6)], {})
+
+
+def test_a_family_that_runs_one_episode_at_a_time_tries_no_agent(make_study, capsys):
+    folder = make_study()
+    document(folder, capsys)
+    with Store.read(folder) as store:
+        assert "apart" not in store.facts()
+
+
+def test_measuring_drives_fleets_and_what_hides_something_alone(make_study):
+    folder = make_study()
+    journal, model = folder.parent / "journal", folder / "model.toml"
+    model.write_text("trim = 0.1\n")
+    tables = []
+    for name, family in (("one", '"wobbly:wobbly"'), ("many", FAMILY["family"])):
+        domain = {"journal": f'"{journal}"'}
+        tables.append(
+            measure_agents(read_study_settings(make_study(name, domain=domain, family=family)), model, 3, Silent())
+        )
+    assert tables[0].select(["survival_time"]).values.tolist() == tables[1].select(["survival_time"]).values.tolist()
+    journal.unlink()
+    domain = {"journal": f'"{journal}"', "faults": '["agent2:*:hides"]'}
+    measure_agents(read_study_settings(make_study("many", domain=domain, **FAMILY)), model, 3, Silent())
+    assert sum("agent2" in fleet and len(fleet) > 1 for fleet in driven(journal)) == 1
+    assert max(map(len, driven(journal))) > 4
+
+
+FAULTS = {
+    "raises": "agent 'agent1' raised ValueError at 7 s: no way (deadly.py, line",
+    "exits": "the agent or the domain family raised SystemExit: 0 (deadly.py, line",
+    "leaves": "it ended its process twice (exit status 9)",
+    "hangs": "it took longer than 1.5 s",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("jobs", ["1", "2"])
+@pytest.mark.parametrize("fault", FAULTS)
+def test_what_one_agent_does_wrong_is_said_of_it_alone_and_the_others_score_as_ever(make_study, jobs, fault):
+    if (fault, jobs) == ("hangs", "2"):
+        pytest.skip("joblib's processes are given half a minute more; see tests/running/test_fleets.py")
+    limit = {"episode_timeout_s": "1.5"} if fault == "hangs" else {}
+    changes = {**FAMILY, **limit, "budget": "2", "initial": "2", "jobs": jobs}
+    whole = make_study("whole", **changes)
+    assert main(["study", str(whole), "--json"]) == 0
+    folder = make_study(domain={"faults": f'["agent1:1:{fault}"]'}, **changes)
+    for _ in range(3):
+        process = start("study", folder, "--json")
+        out, said = process.communicate(timeout=300)
+        if fault != "leaves" or process.returncode != 9:
+            break
+    assert (process.returncode, besides_progress(said)) == (0, "")
+    assert json.loads(out)["episodes"]["failed"] == 2
+    scored, expected = episodes(folder), episodes(whole)
+    assert [one for one in scored if one[4]] == [one for one in expected if one[1:3] != ("agent1", 1)]
+    with Store.read(folder) as store:
+        known = [one for trial in store.trials() for one in store.outcomes("wobbly 1 ()", trial.theta).values()]
+    assert {one.failure[: len(FAULTS[fault])] for one in known if one.failure} == {FAULTS[fault]}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_killed_in_the_middle_of_a_fleet_nothing_finished_is_driven_again_and_the_result_is_the_same(
+    make_study, launcher, jobs
+):
+    whole = make_study("whole", **FAMILY)
+    assert main(["study", str(whole), "--json"]) == 0
+    journal = whole.with_name("journal")
+    folder = make_study("stopped", domain={"sleep": "0.3", "journal": f'"{journal}"'}, jobs=jobs, **FAMILY)
+    lost = 0
+    for moment in (15, 60):
+        process = Launched(launcher, folder)
+        wait_for(folder, process, moment)
+        while sum(map(len, driven(journal))) - TRIED - lost <= finished_episodes(folder):
+            time.sleep(0.01)
+        os.kill(process.pid, signal.SIGKILL)
+        assert process.end()[0] == -signal.SIGKILL
+        # Workers end a moment later.
+        time.sleep(1.0)
+        before, lost = lost, sum(map(len, driven(journal))) - TRIED - finished_episodes(folder)
+        assert 0 < lost - before <= PER_TRIAL
+    status, printed = Launched(launcher, folder).end()
+    assert status == 0, printed
+    assert (trials(folder), episodes(folder)) == (trials(whole), episodes(whole))
+    assert sum(map(len, driven(journal))) - TRIED - finished_episodes(folder) == lost
+
+
+def pruned(folder, **changes):
+    """The trials of a study with pruning, and how many episodes it took."""
+    study = open_study(folder)
+    with Store.open(folder) as store:
+        run = StudyRun(study, store)
+        run_trials(run, make_proposer("gp", study.settings.initial))
+        return store.trials(), run.spent
+
+
+@pytest.mark.parametrize("wave", [1, 16, 1000])
+@pytest.mark.parametrize("keys", [{}, {"batch": "3"}, {"jobs": "2"}])
+def test_waves_of_any_size_prune_the_trials_that_agent_by_agent_prunes_at_the_same_agents(
+    make_study, monkeypatch, wave, keys
+):
+    """Those beside the last agent that was needed are driven in vain, and no trial stands on them."""
+    expected, least = pruned(ordered_study(make_study, "one_by_one", **{**keys, "jobs": "1"}))
+    monkeypatch.setattr("proxytune.study.study_run.WAVE", wave)
+    found, spent = pruned(ordered_study(make_study, family='"partly_dead:ordered_fleet"', **keys))
+    assert found == expected
+    assert any(trial.state == "cut" for trial in found)
+    assert spent.episodes - spent.unused == least.episodes - least.unused
+    if wave == 1 and "jobs" not in keys:
+        assert spent.unused == least.unused == 0

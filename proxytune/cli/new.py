@@ -10,9 +10,8 @@ from pathlib import Path
 from rich.text import Text
 
 from proxytune.cli.terminal import Answer
-from proxytune.cli.trusting import remember
 from proxytune.driving import read_robot, robot_names
-from proxytune.errors import InputError, ProxytuneError, RunError
+from proxytune.errors import InputError, RunError
 from proxytune.files import draft_path
 from proxytune.skeletons import Skeleton, family_skeleton, robot_from_urdf, robot_skeleton, study_skeleton
 
@@ -46,9 +45,6 @@ def run(arguments: argparse.Namespace) -> Answer:
     _check(arguments)
     skeleton = _skeleton(arguments)
     write_folder(folder, skeleton)
-    with suppress(ProxytuneError):
-        # Where it cannot be remembered, the first run asks.
-        remember(folder)
     files = [str(folder / name) for name in skeleton.files]
     document = {"kind": arguments.kind, "files": files, "notes": list(skeleton.notes), "next": list(skeleton.next)}
     lines = [*files, *skeleton.notes, "next:", *map(pasteable, skeleton.next)]

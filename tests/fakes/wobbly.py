@@ -1,6 +1,9 @@
 """A domain family that is a formula: fast, seeded, picklable, and as faulty as a test asks for."""
 
+import atexit
+import ctypes
 import os
+import signal
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -75,6 +78,15 @@ class Wobbly:
             raise ZeroDivisionError("division\nby zero")
         if fault == "dies":
             os._exit(9)
+        if fault == "leaves":
+            os._exit(0)
+        if fault == "leaves in C":
+            ctypes.CDLL(None).exit(0)
+        if fault == "leaves later":
+            atexit.register(os._exit, 0)
+            os.kill(os.getpid(), signal.SIGTERM)
+        if fault == "prints":
+            print("something", flush=True)
         if fault == "full":
             raise OSError(28, "No space left on device")
         scores = formula({**dict(self.theta), **dict(episode.theta)}, episode)

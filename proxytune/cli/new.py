@@ -2,8 +2,6 @@
 
 import argparse
 import keyword
-import shutil
-from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -12,7 +10,7 @@ from rich.text import Text
 from proxytune.cli.terminal import Answer
 from proxytune.driving import read_robot, robot_names
 from proxytune.errors import InputError, RunError
-from proxytune.files import draft_path
+from proxytune.files import folder_draft_of
 from proxytune.skeletons import Skeleton, family_skeleton, robot_from_urdf, robot_skeleton, study_skeleton
 
 KINDS = ("robot", "study", "family")
@@ -40,8 +38,6 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> Answer:
     """Write the skeleton's folder."""
     folder = Path(arguments.name)
-    if folder.exists():
-        raise InputError(f"{folder}: is there already; choose another name, or move it away")
     _check(arguments)
     skeleton = _skeleton(arguments)
     write_folder(folder, skeleton)
@@ -63,19 +59,16 @@ def write_folder(folder: Path, skeleton: Skeleton) -> None:
     """Write all files of a skeleton, or none.
 
     Raises:
+        InputError: If something else is there.
         RunError: If they cannot be written.
     """
-    draft = draft_path(folder)
     try:
-        draft.mkdir()
-        for name, text in skeleton.files.items():
-            (draft / name).write_text(text, encoding="utf-8", newline="\n")
-        draft.rename(folder)
-    except BaseException as problem:
-        with suppress(OSError):
-            shutil.rmtree(draft)
-        if not isinstance(problem, OSError):
-            raise
+        with folder_draft_of(folder) as draft:
+            for name, text in skeleton.files.items():
+                (draft / name).write_text(text, encoding="utf-8", newline="\n")
+    except (FileExistsError, NotADirectoryError):
+        raise InputError(f"{folder}: is there already; choose another name, or move it away") from None
+    except OSError as problem:
         raise RunError(f"{folder}: cannot be written ({problem.strerror}); choose another place") from None
 
 

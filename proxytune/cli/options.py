@@ -8,7 +8,6 @@ The folder that a PATH means: an existing one, or a copy of a study that comes w
 """
 
 import argparse
-import contextlib
 import shlex
 import shutil
 import sys
@@ -19,7 +18,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from proxytune.errors import InputError, StoreError
-from proxytune.files import draft_path, shipped
+from proxytune.files import folder_draft_of, shipped
 from proxytune.importing import Facts, Wanted, finite, read_geometry
 from proxytune.logs import COMMANDS
 from proxytune.running import on_cluster
@@ -172,13 +171,9 @@ def study_folder(path: Path) -> Path:
 
 def _copy(source: Path, folder: Path) -> None:
     """Copy the whole folder or nothing."""
-    draft = draft_path(folder)
     try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copytree(source, draft, ignore=shutil.ignore_patterns(*NOT_COPIED))
-        draft.replace(folder)
+        with folder_draft_of(folder) as draft:
+            shutil.copytree(source, draft, ignore=shutil.ignore_patterns(*NOT_COPIED), dirs_exist_ok=True)
     except (OSError, shutil.Error) as problem:
-        with contextlib.suppress(OSError):
-            shutil.rmtree(draft)
         reason = problem.strerror if isinstance(problem, OSError) and problem.strerror else "copying failed"
         raise StoreError(f"{folder}: cannot be written ({reason}); choose another place") from None

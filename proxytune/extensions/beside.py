@@ -11,6 +11,7 @@ A command that only looks runs none of what files name (`running_none`). A user'
 its own: `is_users` tells the user's Ctrl-C from it. `pack` and `unpack` carry a folder's modules to another machine.
 """
 
+import atexit
 import builtins
 import functools
 import hashlib
@@ -18,10 +19,9 @@ import importlib
 import io
 import signal
 import sys
-import tempfile
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
 from functools import lru_cache
 from importlib.abc import Loader
@@ -31,6 +31,7 @@ from types import FrameType, ModuleType
 from typing import Any
 
 from proxytune.errors import ExtensionError
+from proxytune.files import temporary_folder
 from proxytune.identity import modules_beside
 
 
@@ -226,8 +227,11 @@ def unpack(packed: Packed) -> None:
 @lru_cache(maxsize=64)
 def _unzipped(content: bytes) -> str:
     """A folder of this process's own with the files; it stays as long as the process does."""
-    digest = hashlib.sha256(content).hexdigest()[:8]
-    folder = tempfile.mkdtemp(prefix=f"proxytune_{digest}_")
+    folder = _folders.enter_context(temporary_folder())
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         archive.extractall(folder)
-    return folder
+    return str(folder)
+
+
+_folders = ExitStack()
+atexit.register(_folders.close)

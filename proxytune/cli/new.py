@@ -93,7 +93,8 @@ def _check(arguments: argparse.Namespace) -> None:
         raise InputError(f"'{name}': a family is a Python module; write _ for -")
     if kind == "family" and (keyword.iskeyword(name) or name.startswith("_")):
         raise InputError(f"'{name}': a family is a Python module that is imported by its name; choose another name")
-    if kind == "family" and find_spec(name) is not None:
+    spec = find_spec(name) if kind == "family" else None
+    if spec is not None and spec.origin:  # A mere folder of this name has none
         raise InputError(f"'{name}': a Python module of this name is installed; choose another name")
     if kind == "robot" and name in robot_names():
         raise InputError(f"'{name}': a robot of this name comes with proxytune; choose another name")

@@ -76,7 +76,7 @@ def test_a_family_follows_its_truth_and_refuses_what_it_does_not_know(typed, tmp
     assert "truth.toml: grip: unknown key" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("words", ["robot rover", "study mine", "family sleds"])
+@pytest.mark.parametrize("words", ["robot rover", "study mine", "family sleighs"])
 def test_the_same_again_is_no_error_until_something_was_edited(typed, tmp_path, words):
     for _ in range(2):
         typed(f"new {words}")

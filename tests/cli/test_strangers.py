@@ -152,9 +152,12 @@ def signatures(folder):
     return (folder / SIGNED).read_text().split() if (folder / SIGNED).exists() else []
 
 
+HOW = [(name, how) for how in (True, False) for name in STRANGERS if how or STRANGERS[name].here]
+"""Each by `python -m`, and those in the current folder by the installed command too."""
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("by_module", [True, False], ids=["python -m", "installed"])
-@pytest.mark.parametrize("name", STRANGERS)
+@pytest.mark.parametrize(("name", "by_module"), HOW)
 def test_a_study_that_names_no_code_runs_none_whatever_lies_beside_it(write, name, by_module):
     stranger = STRANGERS[name]
     folder = write(stranger)
@@ -276,6 +279,7 @@ def test_the_effect_that_a_model_names_runs_once_the_user_has_typed_it(tmp_path,
     sys.path.remove(str(tmp_path))
 
 
+@pytest.mark.slow
 def test_a_study_with_an_effect_of_its_own_is_drawn_without_it(tmp_path, capsys):
     folder = tmp_path / "study"
     folder.mkdir()

@@ -184,7 +184,7 @@ def parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--output", type=Path, metavar="DIR", help="folder for runs and figure [./compare_STUDY]")
     configure_cluster(parser)
-    add_shared_options(parser, draws=True, runs_code=True)
+    add_shared_options(parser, draws=True)
     return parser
 
 

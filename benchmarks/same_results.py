@@ -161,6 +161,7 @@ class Place:
         return {"printed": self.answers, "written": written}
 
     def _run(self, name: str, arguments: list[str], status: int | None) -> Any:
+        # Checkouts until 24 November 2026 ask before they run code
         own = {"PYTHONPATH": str(self.checkout), "XDG_STATE_HOME": f"{self.folder}.state", "PROXYTUNE_TRUST": "1"}
         quiet = {"NO_COLOR": "1", "COLUMNS": "120", "MPLBACKEND": "Agg", "OMP_NUM_THREADS": "1"}
         environment = {**os.environ, **own, **quiet}

@@ -16,6 +16,15 @@
 A name is loaded when it is first used, so that `import proxytune` costs nothing. docs/how-to/python.md shows all.
 """
 
+import os
+import sys
+
+if sys.argv[:1] == ["-m"] and sys.orig_argv[-len(sys.argv)].removeprefix("-m") == "proxytune":
+    # `python -m proxytune` looks for modules in the current folder first, where a stranger's study may lie
+    _here, _home = (os.path.realpath(place) for place in (sys.path[0], os.path.join(os.path.dirname(__file__), "..")))
+    if not sys.flags.safe_path and _here != _home:
+        del sys.path[0]
+
 import lazy_loader
 
 __version__ = "0.1.0"

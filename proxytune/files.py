@@ -1,11 +1,18 @@
-"""Files that are written whole or not at all: as a draft beside them, which takes their name once the disk has it.
+"""Files and folders that are written whole or not at all: as a draft beside them, which takes their name at last.
 
-Also the folders of robots and studies that travel with the package (`shipped`).
+Also folders for the moment (`temporary_folder`), and those of robots and studies that travel with the package
+(`shipped`).
 """
 
 import contextlib
+import errno
+import fcntl
+import filecmp
 import os
 import platform
+import shutil
+import tempfile
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,7 +23,7 @@ from proxytune.errors import SettingsError
 def draft_of(path: Path) -> Iterator[Path]:
     """The empty draft of a file, to be written meanwhile; what raises leaves the old file, and no draft.
 
-    Drafts of the same file that killed processes of this machine have left are removed.
+    Drafts of the same file that killed processes have left are removed.
 
     Raises:
         OSError: If it cannot be made, brought to the disk, or take the file's name.
@@ -36,23 +43,104 @@ def draft_of(path: Path) -> Iterator[Path]:
         raise
 
 
+@contextlib.contextmanager
+def folder_draft_of(path: Path) -> Iterator[Path]:
+    """The empty draft of a folder, to be filled meanwhile; what raises leaves neither folder nor draft.
+
+    A folder that is there is left alone if it holds the very same files, as after a command that was killed when all
+    was done, and replaced if it is empty.
+
+    Raises:
+        FileExistsError: If something else is there.
+        OSError: If it cannot be made, or take the folder's name.
+    """
+    draft = draft_path(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        _clear_away(path)
+        draft.mkdir()
+        yield draft
+        if not path.is_dir() or not any(path.iterdir()):
+            draft.replace(path)
+        elif not _alike(path, draft):
+            raise FileExistsError(errno.EEXIST, "is there already", str(path))
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+
+
+def _alike(one: Path, other: Path) -> bool:
+    """True if two folders hold the same files with the same contents."""
+    names, others = ({path.relative_to(home) for path in home.rglob("*") if path.is_file()} for home in (one, other))
+    return names == others and all(filecmp.cmp(one / name, other / name, shallow=False) for name in names)
+
+
+DRAFT = ".draft"
+OLD_S = 86400.0
+"""A draft of another machine, on a shared disk, has been left if nobody has touched it for so long [s]."""
+
+
 def draft_path(path: Path) -> Path:
     """The path of this process's draft, of a file or a folder: on another machine a process may have its number."""
-    return path.with_name(f"{_of_this_machine(path)}{os.getpid()}")
-
-
-def _of_this_machine(path: Path) -> str:
-    return f".{path.name}.{platform.node()}-"
+    return path.with_name(f".{path.name}.{platform.node()}-{os.getpid()}{DRAFT}")
 
 
 def _clear_away(path: Path) -> None:
-    """Remove what processes left that were killed while they wrote this file."""
-    start = _of_this_machine(path)
+    """Remove what processes left that were killed while they wrote this file or folder."""
+    start = f".{path.name}."
     for name in os.listdir(path.parent):
-        process = name.removeprefix(start)
-        if name.startswith(start) and process.isdecimal() and not _is_alive(int(process)):
+        machine, _, process = name.removeprefix(start).removesuffix(DRAFT).rpartition("-")
+        if not (name.startswith(start) and name.endswith(DRAFT) and process.isdecimal()):
+            continue
+        left = path.with_name(name)
+        with contextlib.suppress(OSError):
+            ours = machine == platform.node()
+            if not _is_alive(int(process)) if ours else time.time() - left.lstat().st_mtime > OLD_S:
+                shutil.rmtree(left) if left.is_dir() and not left.is_symlink() else left.unlink()
+
+
+TEMPORARY = "proxytune_"
+NEW_S = 60.0
+"""So long after it was made [s] a temporary folder may not be locked yet."""
+
+
+@contextlib.contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """A folder for the moment, where the system has such; those that killed processes have left are removed.
+
+    It is locked, which ends with the process, however that ends.
+
+    Raises:
+        OSError: If it cannot be made.
+    """
+    place = Path(tempfile.gettempdir())
+    for name in os.listdir(place):
+        if name.startswith(TEMPORARY):
             with contextlib.suppress(OSError):
-                path.with_name(name).unlink()
+                _remove_if_left(place / name)
+    folder = Path(tempfile.mkdtemp(prefix=TEMPORARY))
+    lock = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        os.close(lock)
+
+
+def _remove_if_left(folder: Path) -> None:
+    """Remove a temporary folder whose process has ended.
+
+    Raises:
+        OSError: If it has not, or the folder is not ours.
+    """
+    if time.time() - folder.lstat().st_mtime < NEW_S:
+        return
+    lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        shutil.rmtree(folder, ignore_errors=True)
+    finally:
+        os.close(lock)
 
 
 def _is_alive(process: int) -> bool:

@@ -21,7 +21,17 @@ from proxytune.identity import digest
 from proxytune.settings import nearest
 from proxytune.space import Interval, Parameter, Theta
 from proxytune.storage import Store, SweepRecord, is_begun
-from proxytune.study import LEARNING, Evaluation, Study, StudyRun, load_family, plan_episodes, result_of, stored_run
+from proxytune.study import (
+    LEARNING,
+    Evaluation,
+    Study,
+    StudyRun,
+    describe,
+    load_family,
+    plan_episodes,
+    result_of,
+    stored_run,
+)
 from proxytune.usefulness import (
     ALL,
     MEASURES,
@@ -287,6 +297,7 @@ def run_sweep(run: StudyRun, sweep: SweepRecord, discrepancy: Study | None = Non
 
     With the study of the discrepancy that the sweep names (with_target), POD is simulated too.
     """
+    describe(run.study, run.store)
     run.store.save_sweep(run.study.identity, sweep)
     replays = run.of(discrepancy) if discrepancy is not None else None
     for number, value in enumerate(sweep.points, start=1):

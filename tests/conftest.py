@@ -4,7 +4,6 @@ import os
 import shutil
 import signal
 import sys
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,12 +14,8 @@ HERE = Path(__file__).resolve().parent
 sys.path += [str(HERE / "fakes"), str(HERE.parent / "benchmarks")]
 # Two processes whose linear algebra has two threads each wait for one another; NumPy is not imported yet.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
-# Tests write the code that they run; those of trust take this back.
-os.environ["PROXYTUNE_TRUST"] = "1"
 # A run in the background ignores Ctrl-C; tests mean it to be heeded, as in a terminal.
 signal.signal(signal.SIGINT, signal.default_int_handler)
-STATE = tempfile.TemporaryDirectory()
-os.environ["XDG_STATE_HOME"] = STATE.name
 
 FUZZ = 1000
 """How many files of each kind are spoilt in tests/fuzzing, if nobody says otherwise."""

@@ -18,7 +18,6 @@ from floors import floor
 
 import proxytune
 from proxytune.cli.main import BAD_INPUT, COMMANDS, DONE, FAILED, main, parser
-from proxytune.cli.terminal import INTERRUPTED, TERMINATED
 from proxytune.driving import AGENTS, METRICS, UNITS, map_names
 from proxytune.effects import CATALOGUE, GROUPS
 from proxytune.files import shipped
@@ -26,6 +25,7 @@ from proxytune.learning.settings import KEYS as TEACHING_KEYS
 from proxytune.report.diagnosis.notes import MEANINGS
 from proxytune.search import ENGINES
 from proxytune.settings import read_settings
+from proxytune.starting import STOPPING
 from proxytune.study.settings import KEYS
 from proxytune.usefulness import MEASURES, PODS
 
@@ -55,7 +55,7 @@ RUN_ELSEWHERE = (
     "judge_two_score_tables",
 )
 """Pages whose commands need what comes before them; tests/test_pages.py and tests/test_extending.py run them."""
-SHARED = ("--json", "--format", "--trust")
+SHARED = ("--json", "--format")
 COMMAND_LINES = sorted(
     {
         line.removeprefix("$ ")
@@ -225,7 +225,7 @@ def test_every_agent_is_listed_with_how_it_drives(capsys):
     assert all("speed=" in how for how in listed.values())
 
 
-@pytest.mark.parametrize("status", [INTERRUPTED, TERMINATED, DONE, FAILED, BAD_INPUT])
+@pytest.mark.parametrize("status", [DONE, FAILED, BAD_INPUT, *(128 + number for number in STOPPING)])
 def test_every_exit_status_is_documented(status):
     rows = [line for line in COMMANDS_PAGE.splitlines() if re.match(r"\| \d", line)]
     assert any(re.search(rf"\b{status}\b", row.split("|")[1]) for row in rows)

@@ -6,12 +6,14 @@ Robots and studies are found beside the package.
 import os
 import subprocess
 import sys
+import tempfile
+import time
 from pathlib import Path
 
 import pytest
 
 from proxytune.errors import SettingsError
-from proxytune.files import draft_of, draft_path, shipped
+from proxytune.files import draft_of, draft_path, folder_draft_of, shipped, temporary_folder
 
 
 def test_the_draft_takes_the_files_name_once_it_is_written(tmp_path):
@@ -87,7 +89,7 @@ def test_what_others_write_is_left_alone(tmp_path):
 
 def test_a_process_number_beyond_all_is_no_process(tmp_path):
     path = tmp_path / "table.csv"
-    draft_path(path).with_name(draft_path(path).name + "9" * 30).write_text("nobody's")
+    draft_path(path).with_name(draft_path(path).name.replace(str(os.getpid()), "9" * 30)).write_text("nobody's")
     with draft_of(path) as draft:
         draft.write_text("new")
     assert list(tmp_path.iterdir()) == [path]
@@ -95,7 +97,7 @@ def test_a_process_number_beyond_all_is_no_process(tmp_path):
 
 def test_another_users_process_still_writes(tmp_path, monkeypatch):
     path = tmp_path / "table.csv"
-    draft_path(path).with_name(draft_path(path).name + "1").write_text("theirs")
+    draft_path(path).with_name(draft_path(path).name.replace(str(os.getpid()), "1")).write_text("theirs")
 
     def forbidden(process, signal):
         raise PermissionError
@@ -104,6 +106,80 @@ def test_another_users_process_still_writes(tmp_path, monkeypatch):
     with draft_of(path) as draft:
         draft.write_text("new")
     assert len(list(tmp_path.iterdir())) == 2
+
+
+@pytest.mark.parametrize(("hours", "left"), [(23, True), (25, False)])
+def test_a_draft_of_another_machine_goes_once_nobody_has_touched_it_for_a_day(tmp_path, hours, left):
+    path = tmp_path / "table.csv"
+    theirs = draft_path(path).with_name(".table.csv.node-7-1234.draft")
+    theirs.write_text("half")
+    touched = time.time() - 3600.0 * hours
+    os.utime(theirs, (touched, touched))
+    with draft_of(path) as draft:
+        draft.write_text("whole")
+    assert theirs.exists() == left
+
+
+KILLED_FOLDER = """
+import os, signal, sys
+from pathlib import Path
+from proxytune.files import folder_draft_of, temporary_folder
+with temporary_folder() as home, folder_draft_of(Path(sys.argv[1])) as draft:
+    (draft / "half").write_text("half")
+    print(home, flush=True)
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def killed(path, **environment):
+    words = [sys.executable, "-c", KILLED_FOLDER, str(path)]
+    done = subprocess.run(words, capture_output=True, text=True, env={**os.environ, **environment}, check=False)
+    return Path(done.stdout.strip())
+
+
+def fill(path, **files):
+    with folder_draft_of(path) as draft:
+        for name, text in files.items():
+            (draft / name).write_text(text)
+
+
+def test_a_folder_is_there_whole_or_not_at_all_and_a_killed_process_is_no_hindrance(tmp_path):
+    path = tmp_path / "log"
+    killed(path)
+    assert [entry.name.startswith(".log.") for entry in tmp_path.iterdir()] == [True]
+    with pytest.raises(ValueError), folder_draft_of(path) as draft:
+        (draft / "half").write_text("half")
+        raise ValueError
+    assert not list(tmp_path.iterdir())
+    fill(path, samples="whole")
+    assert [entry.name for entry in tmp_path.rglob("*")] == ["log", "samples"]
+
+
+def test_the_same_folder_again_is_left_alone_and_another_is_not_replaced(tmp_path):
+    path = tmp_path / "log"
+    path.mkdir()
+    fill(path, samples="whole", more="files")
+    before = (path / "samples").stat()
+    fill(path, samples="whole", more="files")
+    assert (path / "samples").stat() == before
+    for other in ({"samples": "whole"}, {"samples": "whole", "more": "others"}):
+        with pytest.raises(FileExistsError):
+            fill(path, **other)
+    assert {entry.name for entry in tmp_path.rglob("*")} == {"log", "samples", "more"}
+
+
+def test_a_temporary_folder_goes_with_its_process_or_when_the_next_is_made(tmp_path, monkeypatch):
+    left = killed(tmp_path / "log", TMPDIR=str(tmp_path))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    assert left.parent == tmp_path
+    with temporary_folder() as mine:
+        assert left.exists()  # it is new: its process may be about to lock it
+        for folder in (mine, left):
+            os.utime(folder, (0.0, 0.0))
+        with temporary_folder() as another:
+            assert (mine.exists(), another.exists(), left.exists()) == (True, True, False)
+    assert not mine.exists()
+    assert not another.exists()
 
 
 def test_robots_are_found():

@@ -34,7 +34,7 @@ def installed(tmp_path_factory):
 
 
 def proxytune(site, *words, cwd):
-    start = "from proxytune.cli.main import main; sys.exit(main(sys.argv[1:]))"
+    start = "from proxytune.__main__ import run; sys.exit(run())"
     command = [sys.executable, "-I", "-c", f"import sys; sys.path.insert(0, {str(site)!r}); {start}", *words]
     return subprocess.run(command, capture_output=True, text=True, cwd=cwd, check=False)
 

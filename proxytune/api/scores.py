@@ -4,7 +4,6 @@ DataFrames given to the readers of files: there is one way to read, and complain
 """
 
 import re
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,6 +13,7 @@ import pandas as pd
 import tomlkit
 
 from proxytune.errors import InputError, LogError, ScoresError
+from proxytune.files import temporary_folder
 from proxytune.logs import Log, read_log
 from proxytune.scores import Metric, ScoreTable, read_scores
 from proxytune.usefulness import Assessment, assess
@@ -29,8 +29,7 @@ def as_files(frames: Mapping[str, pd.DataFrame]) -> Iterator[Path]:
     Raises:
         InputError: What the reader raises, in terms of the DataFrames; rows are counted from 0.
     """
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
+    with temporary_folder() as folder:
         for title, frame in frames.items():
             _with_labels(title, frame).to_csv(folder / f"{title}.csv", index=False)
         try:

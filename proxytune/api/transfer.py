@@ -23,6 +23,7 @@ from proxytune.diagnosis import (
 from proxytune.driving import LaneFollowing, Robot, read_robot, robot_from_geometry, robot_names
 from proxytune.effects import Catalogue, Model, read_model
 from proxytune.errors import InputError
+from proxytune.extensions import is_ours
 from proxytune.importing import (
     Facts,
     Source,
@@ -418,7 +419,7 @@ def _of_study(folder: Path) -> Instance:
     """The best θ of a study, with its 95 % intervals."""
     result = read_study(folder).result
     settings, region = result.study.settings, result.knowledge
-    family = bare_family(settings, settings.proxy)
+    family = bare_family(settings, settings.proxy) if is_ours(settings.family) else None
     if not isinstance(family, LaneFollowing):
         raise InputError(f"{folder}: is a study of another simulator; only what drives here can be exported")
     robot = read_robot(family.robot, family.folder)

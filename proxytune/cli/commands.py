@@ -18,7 +18,7 @@ class Command(NamedTuple):
         resumes: Whether it continues where it was interrupted.
         kept: What an interruption leaves, in one phrase; everything finished, or nothing, where it does not say.
         draws: Whether it writes figures.
-        runs_code: Whether it may run a study's own code.
+        runs_code: Whether it runs the code that a study names; else none runs, whatever a file names.
     """
 
     module: str
@@ -93,7 +93,6 @@ COMMANDS: dict[str, Command] = {
         "find the effect that the model lacks, from a log of measured drives",
         kept="findings are written last, each file whole or not at all",
         draws=True,
-        runs_code=True,
     ),
     "loop": Command(
         "loop",
@@ -107,30 +106,31 @@ COMMANDS: dict[str, Command] = {
         "predict",
         "predict the poses of a log with a fitted model",
         kept="no table was written, at most some of the pictures",
-        runs_code=True,
     ),
     "plot": Command(
         "plot",
         "draw a study's figures and report again, without simulating",
         kept="every file is the old one or the new one",
         draws=True,
-        runs_code=True,
     ),
-    "new": Command("new", "write a robot, study or domain family to start from"),
+    "new": Command("new", "write a robot, study or domain family to start from", runs_code=True),
     "repair": Command(
         "repair",
         "keep what is whole of a damaged study.db, and say what the study does again",
         kept="study.db is the old one or the repaired one",
-        runs_code=True,
     ),
     "export": Command(
         "export",
         "write what was found for another simulator, the robot or another optimiser",
-        runs_code=True,
     ),
     "list": Command("listing", "list robots, maps, effects, agents, metrics, engines or measures"),
     "completion": Command("completion", "print a script that completes commands and options in your shell"),
 }
+
+
+def names_in(given: str) -> tuple[str, ...]:
+    """The names of a list with commas."""
+    return tuple(name.strip() for name in given.split(",") if name.strip())
 
 
 EXAMPLES: Mapping[str, tuple[str, ...]] = {

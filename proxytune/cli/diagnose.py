@@ -9,7 +9,8 @@ from rich.console import Group
 from rich.text import Text
 
 from proxytune.api import DiagnosisReport
-from proxytune.cli.options import configure_source, facts_of, typed, wanted_of
+from proxytune.cli.commands import names_in
+from proxytune.cli.options import configure_effects, configure_source, facts_of, typed, wanted_of
 from proxytune.cli.terminal import Answer, Steps
 from proxytune.diagnosis import diagnose_log, robot_of
 from proxytune.effects import Catalogue
@@ -57,12 +58,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="NAMES",
         help="effects tuned in any case, on motion and camera, as in trim,delay,camera_pitch [the robot's]",
     )
-    parser.add_argument(
-        "--effects",
-        default="",
-        metavar="NAMES",
-        help="your own effects to try too, as module:Attribute of this folder; plug-ins take part by themselves",
-    )
+    configure_effects(parser, "your own effects to try too; plug-ins take part by themselves")
     parser.add_argument("--robot", metavar="NAME", help="the robot, if not the one in log.toml")
     parser.add_argument("--test", type=Path, metavar="LOG", help="another log to test motion on [part of LOG]")
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the null distributions [1]")
@@ -83,8 +79,8 @@ def run(arguments: argparse.Namespace) -> Answer:
 
 
 def _diagnosed(arguments: argparse.Namespace, log: Log, test: Log | None, imported: Sequence[str]) -> Answer:
-    robot = robot_of(log, arguments.robot, Catalogue(Path.cwd(), _names(arguments.effects)))
-    declared = None if arguments.declared is None else _names(arguments.declared)
+    robot = robot_of(log, arguments.robot, Catalogue(Path.cwd(), names_in(arguments.effects)))
+    declared = None if arguments.declared is None else names_in(arguments.declared)
     with Steps(shares(log)) as step:
         found = diagnose_log(log, robot, declared, test=test, seed=arguments.seed, report=step)
         here = arguments.log.resolve()
@@ -105,7 +101,3 @@ def shares(log: Log) -> dict[str, float]:
         return CAMERA
     motion = {step: MOTION_SHARE * share for step, share in MOTION.items()}
     return motion | {step: MOTION_SHARE + (1.0 - MOTION_SHARE) * share for step, share in CAMERA.items()}
-
-
-def _names(given: str) -> tuple[str, ...]:
-    return tuple(name.strip() for name in given.split(",") if name.strip())

@@ -6,6 +6,7 @@ from pathlib import Path
 from rich.text import Text
 
 from proxytune.api import TRIALS, export
+from proxytune.cli.options import configure_effects
 from proxytune.cli.terminal import Answer
 from proxytune.report import FORMATS
 
@@ -20,6 +21,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="URDF, MuJoCo model or ROS 2 parameters; of a study its trials: Optuna storage or skopt's OptimizeResult",
     )
     parser.add_argument("--output", type=Path, required=True, metavar="FILE", help="the file to write")
+    configure_effects(parser)
 
 
 def run(arguments: argparse.Namespace) -> Answer:

@@ -9,6 +9,7 @@ from rich.table import Table
 from proxytune.cli.terminal import Answer
 from proxytune.driving import AGENTS, METRICS, lane_length, load_agent, map_names, read_robot, robot_names, shipped_map
 from proxytune.effects import DECLARED, SHIPPED
+from proxytune.errors import InputError
 from proxytune.extensions import plugins
 from proxytune.search import ENGINE_NAMES, ENGINES, engine_of, is_installed
 from proxytune.study import measure_of
@@ -38,12 +39,14 @@ def _cell(value: object) -> str:
 
 
 def _robots() -> list[Row]:
-    here = Path.cwd()
-    robots = [read_robot(name, here) for name in robot_names(here)]
-    return [
-        {"name": robot.name, "description": robot.description, "mass_kg": robot.figures.get("mass", "")}
-        for robot in robots
-    ]
+    here, rows = Path.cwd(), list[Row]()
+    for name in robot_names(here):
+        try:
+            robot = read_robot(name, here)
+            rows.append({"name": name, "description": robot.description, "mass_kg": robot.figures.get("mass", "")})
+        except InputError as problem:  # One that names code, or is damaged, hides no other
+            rows.append({"name": name, "description": f"cannot be read: {problem}", "mass_kg": ""})
+    return rows
 
 
 def _maps() -> list[Row]:

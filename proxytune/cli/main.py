@@ -9,17 +9,18 @@ from pathlib import Path
 from typing import NoReturn
 
 import proxytune
-from proxytune.cli.commands import COMMANDS, epilog
+from proxytune.cli.commands import COMMANDS, epilog, names_in
 from proxytune.cli.terminal import FAILED, Answer, print_answer, prints_to_stderr, signals_as_interruptions, stopped_by
-from proxytune.cli.trusting import only_trusted_code
 from proxytune.errors import InputError, ProxytuneError
+from proxytune.extensions import running_none
 from proxytune.settings import nearest
+from proxytune.starting import UNDER_WAY, lasting_stderr
 
 DONE, BAD_INPUT = 0, 2
 FORMATS = ("png", "svg", "pdf")
 
 
-EXIT_STATUS = "exit status: 0 done, 1 failed, 2 bad input, 130 interrupted (Ctrl-C), 143 terminated (SIGTERM)"
+EXIT_STATUS = "exit status: 0 done, 1 failed, 2 bad input, 129 hung up, 130 interrupted (Ctrl-C), 143 terminated"
 
 
 class Parser(argparse.ArgumentParser):
@@ -61,7 +62,7 @@ def parser(words: Sequence[str] | None = None, prog: str = "") -> argparse.Argum
         )
         if words is None or name == asked:
             known.load().configure(command)
-        add_shared_options(command, draws=known.draws, runs_code=known.runs_code)
+        add_shared_options(command, draws=known.draws)
         command.set_defaults(parser=command)
     return top
 
@@ -78,21 +79,16 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     return arguments
 
 
-def add_shared_options(parser: argparse.ArgumentParser, *, draws: bool, runs_code: bool) -> None:
+def add_shared_options(parser: argparse.ArgumentParser, *, draws: bool) -> None:
     """Add the options that commands have in common.
 
     Args:
         parser: The command's.
         draws: Whether it writes figures.
-        runs_code: Whether it may run a study's own code.
     """
     if draws:
         parser.add_argument(
             "--format", type=formats, default=(), metavar="svg,pdf", help="figures also as SVG or PDF [PNG alone]"
-        )
-    if runs_code:
-        parser.add_argument(
-            "--trust", action="store_true", help="run the code beside the study, from now on without asking"
         )
     parser.add_argument("--json", action="store_true", help="print one JSON document instead of text")
 
@@ -103,7 +99,7 @@ def formats(text: str) -> tuple[str, ...]:
     Raises:
         ArgumentTypeError: If it names another.
     """
-    named = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
+    named = tuple(dict.fromkeys(names_in(text)))
     for name in named:
         if name not in FORMATS:
             raise argparse.ArgumentTypeError(f"'{name}' is none of {', '.join(FORMATS)}")
@@ -114,8 +110,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command.
 
     Returns:
-        0 done, 1 failed, 2 bad input or usage; 130 interrupted (Ctrl-C) and 143 terminated (SIGTERM): the command
-        says what is kept.
+        0 done, 1 failed, 2 bad input or usage; 129 hung up (SIGHUP), 130 interrupted (Ctrl-C) and 143 terminated
+        (SIGTERM): the command says what is kept.
     """
     words = sys.argv[1:] if argv is None else argv
     if not words:
@@ -123,9 +119,15 @@ def main(argv: Sequence[str] | None = None) -> int:
         return DONE
     arguments = parse(words)
     command = COMMANDS[arguments.command]
-    return run_command(
-        lambda: command.load().run(arguments), arguments, program=f"proxytune {arguments.command}", left=command.left
-    )
+    # Of effects that are typed the code is asked for; what a file names is another's wish
+    typed = names_in(getattr(arguments, "effects", ""))
+    with nullcontext() if command.runs_code else running_none(arguments.command, typed):
+        return run_command(
+            lambda: command.load().run(arguments),
+            arguments,
+            program=f"proxytune {arguments.command}",
+            left=command.left,
+        )
 
 
 def run_command(answer_of: Callable[[], Answer], arguments: argparse.Namespace, *, program: str, left: str) -> int:
@@ -140,9 +142,10 @@ def run_command(answer_of: Callable[[], Answer], arguments: argparse.Namespace, 
     Returns:
         The exit status, as of `main`.
     """
-    with signals_as_interruptions():
+    UNDER_WAY[:] = program, left
+    with signals_as_interruptions(), lasting_stderr():
         try:
-            with only_trusted_code(getattr(arguments, "trust", False)), _figures(getattr(arguments, "format", ())):
+            with _figures(getattr(arguments, "format", ())):
                 with prints_to_stderr():
                     answer = answer_of()
                 print_answer(answer, as_json=arguments.json)

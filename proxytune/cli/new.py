@@ -2,18 +2,15 @@
 
 import argparse
 import keyword
-import shutil
-from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 
 from rich.text import Text
 
 from proxytune.cli.terminal import Answer
-from proxytune.cli.trusting import remember
 from proxytune.driving import read_robot, robot_names
-from proxytune.errors import InputError, ProxytuneError, RunError
-from proxytune.files import draft_path
+from proxytune.errors import InputError, RunError
+from proxytune.files import folder_draft_of
 from proxytune.skeletons import Skeleton, family_skeleton, robot_from_urdf, robot_skeleton, study_skeleton
 
 KINDS = ("robot", "study", "family")
@@ -41,14 +38,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> Answer:
     """Write the skeleton's folder."""
     folder = Path(arguments.name)
-    if folder.exists():
-        raise InputError(f"{folder}: is there already; choose another name, or move it away")
     _check(arguments)
     skeleton = _skeleton(arguments)
     write_folder(folder, skeleton)
-    with suppress(ProxytuneError):
-        # Where it cannot be remembered, the first run asks.
-        remember(folder)
     files = [str(folder / name) for name in skeleton.files]
     document = {"kind": arguments.kind, "files": files, "notes": list(skeleton.notes), "next": list(skeleton.next)}
     lines = [*files, *skeleton.notes, "next:", *map(pasteable, skeleton.next)]
@@ -67,19 +59,16 @@ def write_folder(folder: Path, skeleton: Skeleton) -> None:
     """Write all files of a skeleton, or none.
 
     Raises:
+        InputError: If something else is there.
         RunError: If they cannot be written.
     """
-    draft = draft_path(folder)
     try:
-        draft.mkdir()
-        for name, text in skeleton.files.items():
-            (draft / name).write_text(text, encoding="utf-8", newline="\n")
-        draft.rename(folder)
-    except BaseException as problem:
-        with suppress(OSError):
-            shutil.rmtree(draft)
-        if not isinstance(problem, OSError):
-            raise
+        with folder_draft_of(folder) as draft:
+            for name, text in skeleton.files.items():
+                (draft / name).write_text(text, encoding="utf-8", newline="\n")
+    except (FileExistsError, NotADirectoryError):
+        raise InputError(f"{folder}: is there already; choose another name, or move it away") from None
+    except OSError as problem:
         raise RunError(f"{folder}: cannot be written ({problem.strerror}); choose another place") from None
 
 
@@ -104,7 +93,8 @@ def _check(arguments: argparse.Namespace) -> None:
         raise InputError(f"'{name}': a family is a Python module; write _ for -")
     if kind == "family" and (keyword.iskeyword(name) or name.startswith("_")):
         raise InputError(f"'{name}': a family is a Python module that is imported by its name; choose another name")
-    if kind == "family" and find_spec(name) is not None:
+    spec = find_spec(name) if kind == "family" else None
+    if spec is not None and spec.origin:  # A mere folder of this name has none
         raise InputError(f"'{name}': a Python module of this name is installed; choose another name")
     if kind == "robot" and name in robot_names():
         raise InputError(f"'{name}': a robot of this name comes with proxytune; choose another name")

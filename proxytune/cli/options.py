@@ -1,13 +1,13 @@
 """The command as it was typed.
 
 The options that say where episodes run, alike for every command that runs many.
+The option that names effects of one's own.
 The options that say what to take from a bag or a table, alike for every command that reads one.
 θ as people give it: values, a model.toml, the best that a study has found, or none.
 The folder that a PATH means: an existing one, or a copy of a study that comes with the package.
 """
 
 import argparse
-import contextlib
 import shlex
 import shutil
 import sys
@@ -17,9 +17,8 @@ from functools import wraps
 from pathlib import Path
 from typing import TypeVar
 
-from proxytune.cli.trusting import remember
-from proxytune.errors import InputError, ProxytuneError, StoreError
-from proxytune.files import draft_path, shipped
+from proxytune.errors import InputError, StoreError
+from proxytune.files import folder_draft_of, shipped
 from proxytune.importing import Facts, Wanted, finite, read_geometry
 from proxytune.logs import COMMANDS
 from proxytune.running import on_cluster
@@ -61,6 +60,11 @@ def on_its_cluster(run: Callable[[argparse.Namespace], Result]) -> Callable[[arg
             return run(arguments)
 
     return placed
+
+
+def configure_effects(parser: argparse.ArgumentParser, what: str = "your own effects that the model may name") -> None:
+    """Add effects whose code the user asks for: a command that only looks runs none that a file names."""
+    parser.add_argument("--effects", default="", metavar="NAMES", help=f"{what}; module:Attribute of this folder")
 
 
 def configure_source(parser: argparse.ArgumentParser) -> None:
@@ -161,22 +165,15 @@ def study_folder(path: Path) -> Path:
         hint = nearest(folder.name, studies)
         raise InputError(f"{folder}: no such folder, and no study of that name comes with proxytune; {hint}")
     _copy(studies[folder.name], folder)
-    with contextlib.suppress(ProxytuneError):
-        # Where it cannot be remembered, its code is still known by its contents.
-        remember(folder)
     print(f"copied the study '{folder.name}', which comes with proxytune, to {folder}", file=sys.stderr)
     return folder
 
 
 def _copy(source: Path, folder: Path) -> None:
     """Copy the whole folder or nothing."""
-    draft = draft_path(folder)
     try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copytree(source, draft, ignore=shutil.ignore_patterns(*NOT_COPIED))
-        draft.replace(folder)
+        with folder_draft_of(folder) as draft:
+            shutil.copytree(source, draft, ignore=shutil.ignore_patterns(*NOT_COPIED), dirs_exist_ok=True)
     except (OSError, shutil.Error) as problem:
-        with contextlib.suppress(OSError):
-            shutil.rmtree(draft)
         reason = problem.strerror if isinstance(problem, OSError) and problem.strerror else "copying failed"
         raise StoreError(f"{folder}: cannot be written ({reason}); choose another place") from None

@@ -6,7 +6,7 @@ from pathlib import Path
 from rich.text import Text
 
 from proxytune.api import PicturePrediction, predict
-from proxytune.cli.options import configure_source, facts_of, wanted_of
+from proxytune.cli.options import configure_effects, configure_source, facts_of, wanted_of
 from proxytune.cli.terminal import Answer, waiting
 from proxytune.report import write_text
 
@@ -25,6 +25,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="PATH",
         help="the CSV of predicted poses to write; with --frames the folder for frames.csv and pictures",
     )
+    configure_effects(parser)
     configure_source(parser)
 
 

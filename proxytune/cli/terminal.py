@@ -1,12 +1,13 @@
 """Output of every command: one JSON document, and the same for people.
 
-Ctrl-C and SIGTERM end a command alike: everything finished is kept, and its processes end too.
+Ctrl-C, SIGTERM and SIGHUP end a command alike: everything finished is kept, and its processes end too.
 What stops a command that nobody nearer to it could name.
 Standard output holds a command's answer and nothing else: what agents print goes to standard error.
 Progress of a command whose length is not known: a spinner on a terminal, elsewhere a line for whatever is done.
 Progress of a command in several steps: a bar with the time left on a terminal, elsewhere a line per step.
 """
 
+import errno
 import io
 import json
 import os
@@ -23,6 +24,7 @@ from rich.console import Console, RenderableType
 from proxytune.errors import RunError
 from proxytune.extensions import Interrupted, describe, interrupt, is_users, place_of
 from proxytune.running import Lines, progress_bar
+from proxytune.starting import STOPPING
 
 
 @dataclass(frozen=True)
@@ -38,24 +40,20 @@ class Answer:
     text: RenderableType
 
 
-INTERRUPTED, TERMINATED = 128 + signal.SIGINT, 128 + signal.SIGTERM
-"""Exit statuses that shells and schedulers expect: 130 and 143."""
-
-
 class Terminated(Interrupted):
-    """SIGTERM was received; raised in the main thread."""
+    """SIGTERM, or SIGHUP as its terminal went away, was received; raised in the main thread."""
 
 
 @contextmanager
 def signals_as_interruptions() -> Iterator[None]:
-    """Raise Interrupted at every Ctrl-C and Terminated at the first SIGTERM.
+    """Raise Interrupted at every Ctrl-C and Terminated at the first SIGTERM or SIGHUP.
 
-    Later ones of the latter are ignored, so that cleaning up is not interrupted; so is Ctrl-C where it is already, as
-    for a command that a script has put into the background.
+    Later ones of the latter are ignored, so that cleaning up is not interrupted; so is what is ignored already, as
+    Ctrl-C for a command that a script has put into the background, and SIGHUP after nohup.
     """
-    before = {signal.SIGTERM: signal.signal(signal.SIGTERM, _terminate)}
-    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
-        before[signal.SIGINT] = signal.signal(signal.SIGINT, interrupt)
+    handlers = {signal.SIGTERM: _terminate, signal.SIGHUP: _terminate, signal.SIGINT: interrupt}
+    heard = [number for number in handlers if signal.getsignal(number) is not signal.SIG_IGN]
+    before = {number: signal.signal(number, handlers[number]) for number in heard}
     try:
         yield
     finally:
@@ -64,8 +62,9 @@ def signals_as_interruptions() -> Iterator[None]:
 
 
 def _terminate(number: int, frame: FrameType | None) -> None:
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
-    raise Terminated
+    for later in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(later, signal.SIG_IGN)
+    raise Terminated(number)
 
 
 FAILED = 1
@@ -74,7 +73,8 @@ FAILED = 1
 def stopped_by(problem: KeyboardInterrupt | SystemExit | MemoryError | OSError) -> tuple[str, int]:
     """Say what stopped a command, in one phrase, and its exit status."""
     if is_users(problem):
-        return ("terminated", TERMINATED) if isinstance(problem, Terminated) else ("interrupted", INTERRUPTED)
+        number = problem.args[0] if isinstance(problem, Terminated) else signal.SIGINT
+        return STOPPING[number], 128 + number
     if isinstance(problem, MemoryError):
         return f"memory ran out ({describe(problem)}); ask for less", FAILED
     if isinstance(problem, OSError):
@@ -111,7 +111,7 @@ def _redirected() -> int | None:
 
 
 def print_answer(answer: Answer, *, as_json: bool) -> None:
-    """Print a command's answer; a closed pipe is not an error, and letters that a terminal lacks are escaped.
+    """Print a command's answer; a reader that has gone is not an error, and letters that a terminal lacks are escaped.
 
     Raises:
         RunError: If it cannot be written.
@@ -126,10 +126,10 @@ def print_answer(answer: Answer, *, as_json: bool) -> None:
         else:
             Console().print(answer.text)
         sys.stdout.flush()
-    except BrokenPipeError:
-        _discard_the_rest()
     except OSError as problem:
         _discard_the_rest()
+        if problem.errno in (errno.EPIPE, errno.EIO):  # The reader, or the terminal, has gone
+            return
         raise RunError(f"standard output: cannot be written ({problem.strerror}); make room and run again") from None
 
 

@@ -8,7 +8,6 @@ import contextlib
 import math
 import os
 import struct
-import tempfile
 import weakref
 from collections.abc import Iterator
 from dataclasses import replace
@@ -24,6 +23,7 @@ from proxytune.driving.optics import SKY, CameraFigures, lens_rays, orientation
 from proxytune.driving.road_picture import Floor
 from proxytune.driving.robot import Robot
 from proxytune.effects import Signal
+from proxytune.files import temporary_folder
 
 
 @contextlib.contextmanager
@@ -284,8 +284,8 @@ def _lay(floor: Floor, world: int) -> None:
         physicsClientId=world,
     )
     body = pybullet.createMultiBody(0, -1, shape, physicsClientId=world)
-    with tempfile.TemporaryDirectory() as folder:
-        texture = pybullet.loadTexture(str(_write_targa(floor, Path(folder))), physicsClientId=world)
+    with temporary_folder() as folder:
+        texture = pybullet.loadTexture(str(_write_targa(floor, folder)), physicsClientId=world)
     pybullet.changeVisualShape(body, -1, textureUniqueId=texture, rgbaColor=(1, 1, 1, 1), physicsClientId=world)
 
 

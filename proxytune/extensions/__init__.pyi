@@ -4,10 +4,11 @@ from .beside import (
     folders as folders,
     import_beside as import_beside,
     interrupt as interrupt,
+    is_ours as is_ours,
     is_users as is_users,
     open_folders as open_folders,
     pack as pack,
-    permitting as permitting,
+    running_none as running_none,
     unpack as unpack,
 )
 from .door import (

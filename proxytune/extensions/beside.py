@@ -4,13 +4,14 @@ Python knows every module of a process by its name alone, so that the `family.py
 that of the first. A folder's modules are therefore imported under a name that belongs to the folder
 (`beside_my_study_1a2b3c4d.family`), and so are those of the folder that they import in turn by plain `import helper`.
 The folder is also added to the end of sys.path, for what imports by text (an environment registered as "module:Class"):
-what is found there, after all else, may be of any folder that this process has opened.
+what is found there, after all else, may be of any folder that this process has opened. A folder whose files name no
+code is never there: a library that tries an import (`import bottleneck`) would find what lies in it.
 
-Whoever starts a command is asked before code beside a study runs for the first time (`permitting`); a caller of
-Python's API has chosen what to run, and is not asked. Such code may raise a KeyboardInterrupt of its own: `is_users`
-tells the user's Ctrl-C from it. `pack` and `unpack` carry a folder's modules to another machine.
+A command that only looks runs none of what files name (`running_none`). A user's code may raise a KeyboardInterrupt of
+its own: `is_users` tells the user's Ctrl-C from it. `pack` and `unpack` carry a folder's modules to another machine.
 """
 
+import atexit
 import builtins
 import functools
 import hashlib
@@ -18,10 +19,9 @@ import importlib
 import io
 import signal
 import sys
-import tempfile
 import zipfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
 from functools import lru_cache
 from importlib.abc import Loader
@@ -30,6 +30,8 @@ from pathlib import Path
 from types import FrameType, ModuleType
 from typing import Any
 
+from proxytune.errors import ExtensionError
+from proxytune.files import temporary_folder
 from proxytune.identity import modules_beside
 
 
@@ -60,46 +62,56 @@ def is_users(problem: BaseException) -> bool:
     return isinstance(problem, Interrupted) or isinstance(problem.__context__, Interrupted)
 
 
-Permit = Callable[[Path, str], None]
-"""Raises an ExtensionError unless a module may be run that is named by something in a folder."""
-
-_permit: ContextVar[Permit | None] = ContextVar("permit", default=None)
+_refusing: ContextVar[tuple[str, tuple[str, ...]] | None] = ContextVar("refusing", default=None)
 
 
 @contextmanager
-def permitting(permit: Permit) -> Iterator[None]:
-    """Have every module that is named beside a study permitted before it is imported."""
-    before = _permit.set(permit)
+def running_none(command: str, but: Sequence[str] = ()) -> Iterator[None]:
+    """Have code that files name beside the installed plug-ins refused meanwhile, wherever it lies.
+
+    Args:
+        command: Who refuses it.
+        but: What the user has typed, as `module:attribute`: these modules run.
+    """
+    before = _refusing.set((command, tuple(name.partition(":")[0] for name in but)))
     try:
         yield
     finally:
-        _permit.reset(before)
+        _refusing.reset(before)
 
 
-def check_permitted(module: str, folder: Path) -> None:
-    """Refuse a module that a folder's files name, unless whoever is responsible permits it.
+def is_ours(module: str) -> bool:
+    """Tell whether a module is one of proxytune's own."""
+    return module.partition(".")[0] == "proxytune"
 
-    An installed plug-in is permitted by having been installed, and proxytune's own modules are ours.
+
+def check_runs(module: str) -> None:
+    """Refuse a module that a file names, where none is run.
 
     Raises:
-        ExtensionError: If it is not permitted.
+        ExtensionError: With who refuses it.
     """
-    permit = _permit.get()
-    if permit is not None and module.partition(".")[0] != "proxytune":
-        permit(folder, module)
+    command, typed = _refusing.get() or ("", ())
+    if command and module not in typed and not is_ours(module):
+        named = f"module '{module}' is code, and {command} runs none that a file names"
+        raise ExtensionError(f"{named}; install it as a plug-in{TYPED.get(command, '')}")
 
 
+TYPED = dict.fromkeys(("diagnose", "predict", "export"), ", or name it yourself, as in --effects module:Attribute")
+"""How a command is told what to run nevertheless, where it can be."""
 PREFIX = "beside_"
 
 
 def import_beside(module: str, folder: Path) -> ModuleType:
-    """Import a module that lies in a folder, or else is installed.
+    """Import a module that lies in a folder, or else is installed; the folder joins sys.path unless it is ours.
 
     Raises:
-        ExtensionError: If it may not be run.
+        ExtensionError: If no code is run.
         Exception: Whatever importing it raises; ModuleNotFoundError where there is none.
     """
-    check_permitted(module, folder)
+    check_runs(module)
+    if is_ours(module):
+        return importlib.import_module(module)
     home = _home(str(folder.resolve()))
     if str(folder.resolve()) not in sys.path:
         sys.path.append(str(folder.resolve()))
@@ -136,7 +148,7 @@ def _home(folder: str) -> str:
 
 def _lies_in(folder: Path, module: str) -> bool:
     top = folder / module.partition(".")[0]
-    return top.name != "proxytune" and (top.with_name(f"{top.name}.py").is_file() or (top / "__init__.py").is_file())
+    return not is_ours(module) and (top.with_name(f"{top.name}.py").is_file() or (top / "__init__.py").is_file())
 
 
 class _Finder:
@@ -203,25 +215,23 @@ def pack(folders: Sequence[str]) -> Packed:
     return tuple(packed)
 
 
-def unpack(packed: Packed, parent: str | None = None) -> None:
-    """Let this process import packed modules by the names that they had where they were packed.
-
-    Args:
-        packed: The modules.
-        parent: Where they are put, each of its folders in one of this process's own; among temporary files by default.
-    """
+def unpack(packed: Packed) -> None:
+    """Let this process import packed modules by the names that they had where they were packed."""
     for folder, content in packed:
-        home, place = _home(folder), _unzipped(content, parent)
+        home, place = _home(folder), _unzipped(content)
         sys.modules[home].__path__ = [place]
         if place not in sys.path:
             sys.path.append(place)
 
 
 @lru_cache(maxsize=64)
-def _unzipped(content: bytes, parent: str | None) -> str:
+def _unzipped(content: bytes) -> str:
     """A folder of this process's own with the files; it stays as long as the process does."""
-    digest = hashlib.sha256(content).hexdigest()[:8]
-    folder = tempfile.mkdtemp(prefix=f"proxytune_{digest}_", dir=parent)
+    folder = _folders.enter_context(temporary_folder())
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         archive.extractall(folder)
-    return folder
+    return str(folder)
+
+
+_folders = ExitStack()
+atexit.register(_folders.close)

@@ -6,18 +6,19 @@ none of which is imported before it is named); `ask` calls it, and tells what it
 
 import importlib
 import inspect
+import os
 import sys
 import sysconfig
 import traceback
 from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import lru_cache
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint, distributions
 from pathlib import Path
 from types import MappingProxyType, ModuleType
 from typing import Any, TypeVar
 
 from proxytune.errors import ExtensionError, ProxytuneError
-from proxytune.extensions.beside import check_permitted, import_beside, is_users
+from proxytune.extensions.beside import check_runs, folders, import_beside, is_users
 from proxytune.settings import nearest
 
 GROUP = "proxytune"
@@ -35,7 +36,7 @@ def plugins(kind: str, shipped: Collection[str] = ()) -> Mapping[str, EntryPoint
         ExtensionError: If two have one name, or one is called like something shipped.
     """
     found: dict[str, EntryPoint] = {}
-    for point in _installed(tuple(sys.path)):
+    for point in _installed(_path()):
         of_kind, _, name = point.name.partition(".")
         if of_kind != kind:
             continue
@@ -51,10 +52,25 @@ def plugins(kind: str, shipped: Collection[str] = ()) -> Mapping[str, EntryPoint
     return MappingProxyType(found)
 
 
+def _path() -> tuple[str, ...]:
+    """Where packages are installed: sys.path without the current folder and those of studies, which hold anything."""
+    try:
+        users = {*map(os.path.realpath, folders()), os.getcwd()}
+    except FileNotFoundError:  # It has been deleted
+        return tuple(filter(None, sys.path))
+    return tuple(place for place in sys.path if os.path.realpath(place) not in users)
+
+
 @lru_cache(maxsize=1)
 def _installed(path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
-    """The entry points of every kind; `path` is sys.path, on which they depend: looking for them takes 20 ms."""
-    return tuple(sorted(entry_points(group=GROUP), key=lambda point: (point.name, _package(point))))
+    """The entry points of every kind on a path: looking for them takes 20 ms."""
+    found: dict[str, Iterable[EntryPoint]] = {}
+    for package in distributions(path=list(path)):
+        own = package.entry_points.select(group=GROUP)
+        if own:  # Of two versions the first counts, as it does for imports
+            found.setdefault(package.name, own)
+    points = (point for own in found.values() for point in own)
+    return tuple(sorted(points, key=lambda point: (point.name, _package(point))))
 
 
 def _package(point: EntryPoint) -> str:
@@ -181,7 +197,7 @@ def _attribute(name: str, kind: str, beside: Path | None) -> Any:
 
 def _imported(name: str, kind: str, module: str, beside: Path | None) -> ModuleType:
     if beside is None:
-        check_permitted(module, Path.cwd())
+        check_runs(module)
     try:
         return importlib.import_module(module) if beside is None else import_beside(module, beside)
     except ProxytuneError:

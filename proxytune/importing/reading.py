@@ -3,8 +3,6 @@
 A source is read, checked, put in numbers drive by drive, and written as a log's folder: whole, or not at all.
 """
 
-import shutil
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -18,6 +16,7 @@ from PIL import Image
 
 from proxytune.arrays import Floats
 from proxytune.errors import InputError, LogError, RunError
+from proxytune.files import folder_draft_of, temporary_folder
 from proxytune.importing.arrays import is_arrays, read_arrays
 from proxytune.importing.bag import is_bag
 from proxytune.importing.checks import check_units, checked_drive, reaction_of
@@ -138,7 +137,7 @@ def write_log(source: Source, folder: Path, facts: Facts, origin: str) -> None:
 
     Args:
         source: What was read and checked.
-        folder: The log's folder, which must not exist or be empty.
+        folder: The log's folder, which must not exist or be empty, or else be this very log.
         facts: What only the user knows.
         origin: Where it came from, for log.toml.
 
@@ -148,7 +147,7 @@ def write_log(source: Source, folder: Path, facts: Facts, origin: str) -> None:
         RunError: If it cannot be written.
     """
     folder = folder.resolve()
-    with _written_whole(folder) as draft:
+    with writable(folder), folder_draft_of(folder) as draft:
         fill_log(draft, source, facts, folder.name, origin)
         read_as(draft, folder)
 
@@ -193,30 +192,17 @@ def read_as(folder: Path, shown: Path) -> Log:
 
 
 @contextmanager
-def _written_whole(folder: Path) -> Iterator[Path]:
-    """A folder to fill that becomes the wanted one once it is whole."""
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise InputError(f"{folder}: is there already; give a folder that is not")
-    with writable(folder):
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix=f".{folder.name}.", dir=folder.parent) as draft:
-            inside = Path(draft) / "log"
-            inside.mkdir()
-            yield inside
-            if folder.exists():
-                folder.rmdir()
-            shutil.move(inside, folder)
-
-
-@contextmanager
 def writable(folder: Path) -> Iterator[None]:
     """Tell in one line what keeps a folder from being written.
 
     Raises:
-        RunError: If something does.
+        InputError: If something else is there.
+        RunError: If anything else does.
     """
     try:
         yield
+    except FileExistsError:
+        raise InputError(f"{folder}: is there already; give a folder that is not") from None
     except OSError as problem:
         raise RunError(f"{folder}: cannot be written ({problem.strerror}); make room, or give another folder") from None
 
@@ -267,8 +253,7 @@ def open_log(path: Path, wanted: Wanted = NOTHING, facts: Facts = NO_FACTS) -> I
         yield read_log(path), ()
         return
     source = read_source(path, wanted, facts.offset_s)
-    with tempfile.TemporaryDirectory(prefix="proxytune_") as home:
-        folder = Path(home)
+    with temporary_folder() as folder:
         named = source_without_unnamed_pictures(source, facts)
         with writable(folder):
             fill_log(folder, named, facts, path.resolve().stem, origin=path.name)

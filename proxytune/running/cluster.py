@@ -289,7 +289,7 @@ class Cluster:
                 answers = self._ask()
                 for key in self._usable() if answers else ():
                     if key not in held and (given := pieces.next()):
-                        future = self._submit(self._workers[key], do_there, recipe, given[1])
+                        future = self._submit(self._workers[key], do_sent, recipe, given[1])
                         held[key] = _Held(given[0], future, self._clock.seconds())
                 patience.wait(self._waits_for(answers))
                 self._woken.wait(POLL_S)
@@ -365,10 +365,3 @@ class Cluster:
         why = [worker.address for worker in self._workers.values() if self._silent(worker)]
         silent = f" ({', '.join(why)} not heard of for {SILENT_S:.0f} s)" if why else ""
         return f"no worker is there{silent}; waiting for one: dask worker {self._address} --nthreads 1"
-
-
-def do_there(recipe: Recipe, piece: Any) -> Any:
-    """Do a piece in a worker, whose folder has the user's modules: Dask removes it, whatever becomes of the worker."""
-    from distributed import get_worker
-
-    return do_sent(recipe, piece, get_worker().local_directory)

@@ -8,16 +8,18 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from pathlib import Path
 from platform import node, python_version
-from typing import Any, cast
+from typing import Any, TextIO, cast
 
 from proxytune.errors import InputError, RunError
 from proxytune.extensions import Packed, describe, folders, open_folders, pack, place_of, unpack
 from proxytune.identity import version_changes, versions_of
+from proxytune.starting import LastingStream
 
 WATCH_S = 0.5
 PACKAGES = ("numpy", "scipy", "scikit-learn", "pybullet", "joblib", "distributed")
@@ -68,22 +70,17 @@ def recipe_of(work: Callable[..., Any], made_by: Mapping[str, str] | None = None
     return replace(recipe, packed=pack(recipe.own), made_by=tuple(made_by.items())) if made_by else recipe
 
 
-def do_sent(recipe: Recipe, piece: Any, place: str | None = None) -> Any:
+def do_sent(recipe: Recipe, piece: Any) -> Any:
     """Do one piece of the work, in the process it was sent to.
-
-    Args:
-        recipe: The work.
-        piece: The piece.
-        place: Where the user's modules are unpacked; among the temporary files by default.
 
     Raises:
         NotSendableError: If the work cannot be loaded there.
     """
-    return load_sent(recipe, place)(piece)
+    return load_sent(recipe)(piece)
 
 
 @lru_cache(maxsize=1)
-def load_sent(recipe: Recipe, place: str | None = None) -> Callable[[Any], Any]:
+def load_sent(recipe: Recipe) -> Callable[[Any], Any]:
     """The work, unpickled.
 
     Raises:
@@ -95,7 +92,7 @@ def load_sent(recipe: Recipe, place: str | None = None) -> Callable[[Any], Any]:
     # A process that has done other work looks in that work's folders last; on another machine its own come first.
     paths = (sys.path, recipe.path) if recipe.made_by else (recipe.path, sys.path)
     sys.path[:] = dict.fromkeys(folder for path in paths for folder in path)
-    unpack(recipe.packed, place) if recipe.made_by else open_folders(recipe.own)
+    unpack(recipe.packed) if recipe.made_by else open_folders(recipe.own)
     try:
         return cast("Callable[[Any], Any]", pickle.loads(recipe.pickled))
     except Exception as problem:
@@ -104,13 +101,43 @@ def load_sent(recipe: Recipe, place: str | None = None) -> Callable[[Any], Any]:
         raise NotSendableError(f"{line}; {remedy}") from None
 
 
-def end_with(parent: int) -> None:
+SAFE_PATH = "PYTHONSAFEPATH"
+
+
+@contextmanager
+def away_from_here() -> Iterator[tuple[int, str | None]]:
+    """Have processes that start meanwhile look for no module in the current folder, as Python does for -m and -c.
+
+    Gives what each of them has to call `end_with` with.
+    """
+    before = os.environ.get(SAFE_PATH)
+    os.environ[SAFE_PATH] = "1"
+    try:
+        yield os.getpid(), before
+    finally:
+        _set_safe_path(before)
+
+
+def _set_safe_path(value: str | None) -> None:
+    os.environ.pop(SAFE_PATH, None)
+    if value is not None:
+        os.environ[SAFE_PATH] = value
+
+
+def end_with(parent: int, safe_path: str | None) -> None:
     """End this process, which a parent has just started, with that parent and not before.
 
-    After a `kill -9` it would wait for work for minutes. Ctrl-C reaches every process of a terminal; the parent answers
-    it, and ends this one. Of a crash the parent tells in one line.
+    After a `kill -9` it would wait for work for minutes. Ctrl-C, and the end of a terminal, reach every process of that
+    terminal; the parent answers them, and ends this one. Of a crash the parent tells in one line.
+
+    Args:
+        parent: Its number.
+        safe_path: What SAFE_PATH is to be for processes that this one starts.
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _set_safe_path(safe_path)
+    sys.stdout, sys.stderr = (cast(TextIO, LastingStream(one)) for one in (sys.stdout, sys.stderr))
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
     if "PYTHONFAULTHANDLER" not in os.environ:
         faulthandler.disable()
 

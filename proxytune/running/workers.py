@@ -7,7 +7,6 @@ here.
 """
 
 import functools
-import os
 import re
 import signal
 import threading
@@ -29,7 +28,7 @@ from joblib.externals.loky import ProcessPoolExecutor
 from joblib.parallel import BACKENDS, get_active_backend
 
 from proxytune.errors import RunError
-from proxytune.running.sending import NotSendableError, Recipe, do_sent, end_with, load_sent, recipe_of
+from proxytune.running.sending import NotSendableError, Recipe, away_from_here, do_sent, end_with, load_sent, recipe_of
 
 START_S = 30.0
 """So long may processes take to start beyond a piece's own time-out [s]."""
@@ -251,17 +250,19 @@ def _in_processes(
 ) -> Generator[tuple[int, Any], None, None]:
     # Only joblib's own processes are ours to end with this one.
     local = isinstance(get_active_backend()[0], BACKENDS["loky"])
-    # One more than there are processes waits its turn: enough to keep them busy, few to be run in vain.
-    parallel = Parallel(
-        n_jobs=jobs,
-        batch_size=1,
-        pre_dispatch=jobs + 1,
-        return_as="generator_unordered",
-        timeout=timeout_s and timeout_s + START_S,
-        **({"initializer": end_with, "initargs": (os.getpid(),)} if local else {}),
-    )
-    tasks = (delayed(_do_numbered)(recipe, number, piece) for number, piece in numbered)
-    return cast("Generator[tuple[int, Any], None, None]", parallel(tasks))
+    with away_from_here() as ours:
+        # One more than there are processes waits its turn: enough to keep them busy, few to be run in vain.
+        parallel = Parallel(
+            n_jobs=jobs,
+            batch_size=1,
+            pre_dispatch=jobs + 1,
+            return_as="generator_unordered",
+            timeout=timeout_s and timeout_s + START_S,
+            **({"initializer": end_with, "initargs": ours} if local else {}),
+        )
+        tasks = (delayed(_do_numbered)(recipe, number, piece) for number, piece in numbered)
+        with closing(cast("Generator[tuple[int, Any], None, None]", parallel(tasks))) as results:
+            yield from results
 
 
 def _do_numbered(recipe: Recipe, number: int, piece: Any) -> tuple[int, Any]:
@@ -298,9 +299,10 @@ class IsolatedWorker:
         """
         if self._process is None:
             self._recipe = self._recipe or recipe_of(self._work)
-            self._process = ProcessPoolExecutor(1, initializer=end_with, initargs=(os.getpid(),))
-            # Loading the work takes none of the pieces' time.
-            self._process.submit(load_sent, self._recipe).exception()
+            with away_from_here() as ours:
+                self._process = ProcessPoolExecutor(1, initializer=end_with, initargs=ours)
+                # Loading the work takes none of the pieces' time.
+                self._process.submit(load_sent, self._recipe).exception()
         how, clock, seconds = "", AwakeClock(), 0.0
         try:
             result = self._process.submit(do_sent, self._recipe, piece)

@@ -1,5 +1,6 @@
 from .facts import (
     check_facts as check_facts,
+    describe as describe,
     open_read_only as open_read_only,
     stored_run as stored_run,
     study_facts as study_facts,

@@ -21,6 +21,7 @@ from typing import Any, NoReturn, cast
 
 from proxytune.domain import DomainFamily
 from proxytune.errors import SettingsError, StoreError
+from proxytune.extensions import folders
 from proxytune.identity import digest, version_changes, versions_of
 from proxytune.scores import ScoreTable
 from proxytune.search import ENGINE_NAMES, Engine, engine_code, engine_of
@@ -151,14 +152,15 @@ def stored_run(study: Study, store: Store) -> StudyRun:
 def open_read_only(settings: StudySettings, store: Store) -> StudyRun:
     """A study to be looked at as its trials were run; code of its own that it names does not run.
 
-    An objective of one's own is computed anew for figures, so that its code is needed.
+    An objective of one's own is computed anew for figures, so that its code is needed; where none is run, the study is
+    refused.
 
     Raises:
         InputError: If anything in it cannot be used, or what the finished trials depend on has changed.
         StoreError: If what is stored is not as we write it.
     """
     described = store.facts().get(DESCRIBED)
-    if described is None or ":" in settings.objective or not names_own_code(settings):
+    if described is None or ":" in settings.objective:
         return stored_run(open_settings(settings), store)
     try:
         family, engine, truth = _described(settings, store, described)
@@ -236,20 +238,14 @@ class DescribedFamily:
     starts: int
 
 
-def names_own_code(settings: StudySettings) -> bool:
-    """Tell whether study.toml itself names code that is not proxytune's."""
-    names = (settings.family, settings.engine, settings.objective, *settings.loaded_agents)
-    return any(":" in name and not name.startswith("proxytune.") for name in names)
-
-
 def describe(study: Study, store: Store) -> None:
-    """Keep what is needed to look at a study without its own code, if it names any."""
-    if not names_own_code(study.settings):
+    """Keep what is needed to look at a study without its own code, if it has run any."""
+    if str(study.settings.folder.resolve()) not in folders():
         return
-    family = study.family
+    family, own = study.family, study.settings.space.names
     described = {
         "metrics": {name: str(unit) for name, unit in family.metrics.items()},
-        "units": {name: str(parameter.unit) for name, parameter in family.parameters.items()},
+        "units": {name: str(family.parameters[name].unit) for name in dict.fromkeys((*family.parameters, *own))},
         "starts": int(family.starts),
         "learns_from": study.engine.learns_from,
         "truth": dict(study.truth) if study.truth is not None else None,

@@ -143,13 +143,11 @@ def test_stopped_at_any_moment_it_goes_on_to_the_same_document(finished, make_st
 
 
 @pytest.mark.slow
-def test_plot_draws_it_again_and_runs_no_code(make_study, capsys, monkeypatch, tmp_path):
+def test_plot_draws_it_again(make_study, capsys):
     folder = make_several(make_study)
     ran = document_of(["study", str(folder)], capsys)
     for path in (folder / "report.html", folder / "figures" / "families.png"):
         path.unlink()
-    monkeypatch.delenv("PROXYTUNE_TRUST")
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "trusts nothing"))
     drawn = document_of(["plot", str(folder)], capsys)
     assert without_this_run(ran) == drawn
     assert (folder / "report.html").exists()
@@ -161,20 +159,6 @@ def test_plot_before_a_family_is_tuned_says_what_to_run(make_study, capsys):
     assert main(["plot", str(folder)]) == 2
     said = capsys.readouterr().err
     assert f"run the study first: python -m proxytune study {folder / 'families' / 'right'}" in said
-
-
-def test_the_code_of_every_family_is_asked_for(make_study, capsys, monkeypatch, tmp_path):
-    monkeypatch.delenv("PROXYTUNE_TRUST")
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "trusts nothing"))
-    shipped = {"family": '"proxytune.environments.family:gymnasium_family"', "domain": {"environment": '"Pendulum-v1"'}}
-    folder = make_several(
-        make_study, families='[families.own]\n[families.theirs]\nfamily = "theirs:family"\n', **shipped
-    )
-    (folder / "theirs.py").write_text("raise SystemExit('ran')")
-    assert main(["study", str(folder / "families" / "theirs")]) == 2
-    said = capsys.readouterr().err
-    assert "families.theirs: family: this runs code that has not been run here before: module 'theirs'" in said
-    assert not (folder / "families").exists()
 
 
 @pytest.mark.parametrize(

@@ -78,6 +78,17 @@ def test_a_source_that_is_none_is_one_line(capsys, tmp_path):
     assert "no such folder" in complaint(capsys, str(tmp_path / "none"))
 
 
+def test_the_same_import_again_is_no_error_as_after_a_kill_at_the_very_end(capsys, table, tmp_path):
+    words = ["import", str(table), str(tmp_path / "log"), "--json"]
+    answers = []
+    for _ in range(2):
+        assert main(words) == 0
+        answers.append(capsys.readouterr().out)
+    assert answers[0] == answers[1]
+    (tmp_path / "log" / "samples.csv").write_text("edited")
+    assert main(words) == 2
+
+
 def test_an_output_that_is_there_is_left_alone(capsys, table, tmp_path):
     (tmp_path / "log").mkdir()
     (tmp_path / "log" / "mine").write_text("kept")

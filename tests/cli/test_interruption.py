@@ -2,18 +2,20 @@
 
 import json
 import os
+import pty
 import signal
-import time
+import subprocess
+import sys
 from contextlib import nullcontext
-from pathlib import Path
 
 import pytest
 from planted import planted_log, write_log
-from processes import besides_progress, finished_episodes, start, wait_for
+from processes import ENVIRONMENT, besides_progress, finished_episodes, heeding_ctrl_c, start, wait_for
 
 from proxytune.cli.main import COMMANDS, main
 from proxytune.cli.terminal import Terminated, signals_as_interruptions
 from proxytune.extensions import Interrupted
+from proxytune.starting import STOPPING
 
 SLOWLY = {"sleep": "0.03"}
 
@@ -22,13 +24,12 @@ def ended(process, number, command):
     """Stop a command, and see that it ends with its one line and no process left."""
     process.send_signal(number)
     out, told = process.communicate(timeout=60)  # returns only when every process that holds its pipes has ended
-    word, status = {signal.SIGTERM: ("terminated", 143), signal.SIGINT: ("interrupted", 130)}[number]
-    assert besides_progress(told) == f"proxytune {command}: {word}; {COMMANDS[command].left}\n"
-    assert (process.returncode, out) == (status, "")
+    assert besides_progress(told) == f"proxytune {command}: {STOPPING[number]}; {COMMANDS[command].left}\n"
+    assert (process.returncode, out) == (128 + number, "")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("number", "jobs"), [(signal.SIGTERM, "1"), (signal.SIGINT, "2")])
+@pytest.mark.parametrize(("number", "jobs"), [(signal.SIGTERM, "1"), (signal.SIGINT, "2"), (signal.SIGHUP, "2")])
 def test_a_stopped_sweep_goes_on_to_the_same_curve(make_study, capsys, number, jobs):
     folder, whole = make_study(domain=SLOWLY, jobs=jobs), make_study("whole")
     arguments = ("--parameter", "trim", "--points", "5", "--json")
@@ -49,34 +50,24 @@ def test_a_stopped_sweep_goes_on_to_the_same_curve(make_study, capsys, number, j
 def test_a_terminated_diagnosis_is_one_line_and_leaves_no_findings(tmp_path):
     log = write_log(planted_log({}, episodes=6, seconds=20.0), tmp_path / "log")
     process = start("diagnose", log, "--output", tmp_path / "out")
-    wait_until_heeding(process)
+    assert process.stderr.readline()  # it has begun
     ended(process, signal.SIGTERM, "diagnose")
     assert not (tmp_path / "out").exists()
 
 
-def wait_until_heeding(process):
-    """Until SIGTERM has a handler: the command has begun."""
-    status = Path(f"/proc/{process.pid}/status")
-    if not status.exists():
-        pytest.skip("this system does not tell which signals a process handles")
-    while process.poll() is None:
-        caught = next(line for line in status.read_text().splitlines() if line.startswith("SigCgt"))
-        if int(caught.split()[1], 16) >> (signal.SIGTERM - 1) & 1:
-            return
-        time.sleep(0.005)
-
-
-def test_sigterm_is_raised_once_and_cleaning_up_is_left_alone():
-    before = signal.getsignal(signal.SIGTERM)
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_to_end_is_raised_once_and_cleaning_up_is_left_alone(number):
+    before = signal.getsignal(number)
     cleaned = []
     with pytest.raises(Terminated), signals_as_interruptions():
         try:
-            os.kill(os.getpid(), signal.SIGTERM)
+            os.kill(os.getpid(), number)
         finally:
             os.kill(os.getpid(), signal.SIGTERM)
+            os.kill(os.getpid(), signal.SIGHUP)
             cleaned.append(True)
     assert cleaned
-    assert signal.getsignal(signal.SIGTERM) is before
+    assert signal.getsignal(number) is before
 
 
 @pytest.mark.parametrize("before", [signal.default_int_handler, signal.SIG_IGN])
@@ -94,9 +85,81 @@ def kept_handler():
     signal.signal(signal.SIGINT, before)
 
 
-def test_ctrl_c_while_libraries_are_loaded_is_one_line(tmp_path):
-    """A rich of our own, which is loaded first, presses it."""
-    (tmp_path / "rich.py").write_text("import os, signal, time\nos.kill(os.getpid(), signal.SIGINT)\ntime.sleep(9)\n")
-    process = start("study", tmp_path, cwd=tmp_path)
+@pytest.mark.parametrize("number", STOPPING)
+def test_a_signal_while_libraries_are_loaded_is_one_line(tmp_path, number):
+    """A rich of our own, which is loaded first, sends it, and catches whatever comes of it."""
+    lines = ("import os, time", "try:", f"    os.kill(os.getpid(), {int(number)})", "    time.sleep(9)")
+    (tmp_path / "rich.py").write_text("\n".join((*lines, "except BaseException:", "    pass")))
+    environment = {**ENVIRONMENT, "PYTHONPATH": f"{tmp_path}{os.pathsep}{ENVIRONMENT['PYTHONPATH']}"}
+    command = [sys.executable, "-m", "proxytune", "study", "quickstart"]
+    how = {"capture_output": True, "text": True, "env": environment, "preexec_fn": heeding_ctrl_c}
+    done = subprocess.run(command, check=False, **how)
+    assert (done.returncode, done.stdout) == (128 + number, "")
+    assert done.stderr == f"proxytune: {STOPPING[number]} before anything began\n"
+
+
+@pytest.mark.slow
+def test_what_is_ignored_stays_so_as_after_nohup(make_study):
+    folder = make_study(domain=SLOWLY, jobs="2")
+    process = start("study", folder, preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN))
+    wait_for(folder, process, 5)
+    os.killpg(process.pid, signal.SIGHUP)
+    process.communicate(timeout=60)
+    assert process.returncode == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_a_run_goes_on_when_nobody_reads_its_progress_any_more(make_study, jobs):
+    """What agents print is lost with it."""
+    folder = make_study(domain={**SLOWLY, "faults": '["agent1:*:prints"]'}, jobs=jobs)
+    process = start("study", folder, "--json")
+    wait_for(folder, process, 5)
+    process.stderr.close()
+    out, _ = process.communicate(timeout=60)
+    assert process.returncode == 0
+    found = json.loads(out)
+    assert (len(found["trials"]), found["failures"]) == (7, [])
+
+
+@pytest.mark.slow
+def test_closed_streams_are_no_reason_to_stop_and_no_file_takes_their_place(make_study):
+    folder = make_study()
+    closed = {"stdin": None, "stdout": None, "stderr": None, "preexec_fn": lambda: os.closerange(0, 3)}
+    assert start("study", folder, **closed).wait(timeout=60) == 0
+    assert (folder / "report.html").exists()
+
+
+@pytest.mark.slow
+def test_a_terminal_that_goes_away_after_nohup_ends_no_run(make_study):
+    folder = make_study(domain=SLOWLY, jobs="2")
+    ours, theirs = pty.openpty()
+    streams = dict.fromkeys(("stdin", "stdout", "stderr"), theirs)
+    process = start("study", folder, **streams, preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN))
+    os.close(theirs)
+    while finished_episodes(folder) < 5 and process.poll() is None:
+        os.read(ours, 4096)  # a terminal that is full is waited for
+    os.close(ours)  # from here on it is EIO that answers
+    assert process.wait(timeout=60) == 0
+    assert (folder / "report.html").exists()
+
+
+ENDINGS = {
+    "leaves": (1, "code that is not proxytune's ended the process with status 0 (wobbly.py, line "),
+    "leaves in C": (1, "code that is not proxytune's ended the process by exit in C"),
+    "dies": (9, "code that is not proxytune's ended the process with status 9 (wobbly.py, line "),
+    "leaves later": (143, "terminated"),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", ENDINGS)
+def test_a_study_whose_code_ends_the_process_has_not_ended_well(make_study, fault):
+    folder = make_study(domain={"faults": f'["agent3:1:{fault}"]'})
+    process = start("study", folder)
     out, told = process.communicate(timeout=60)
-    assert (process.returncode, out, told) == (130, "", "proxytune: interrupted\n")
+    status, line = ENDINGS[fault]
+    assert (process.returncode, out) == (status, "")
+    assert besides_progress(told).startswith(f"proxytune study: {line}")
+    assert besides_progress(told).endswith(f"; {COMMANDS['study'].left}\n")
+    assert besides_progress(told).count("\n") == 1

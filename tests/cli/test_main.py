@@ -11,9 +11,10 @@ import pytest
 import proxytune as proxytune_package
 from proxytune.cli import listing
 from proxytune.cli.main import BAD_INPUT, COMMANDS, DONE, FAILED, formats, main
-from proxytune.cli.terminal import INTERRUPTED, TERMINATED, Answer
+from proxytune.cli.terminal import Answer
 from proxytune.errors import EpisodeError, ScoresError, SettingsError, StoreError
 from proxytune.extensions import Interrupted
+from proxytune.starting import STOPPING
 
 
 def proxytune(*words, cwd):
@@ -148,7 +149,7 @@ def test_the_program_says_the_name_it_was_started_by(started, name, monkeypatch,
     assert f"\n  {name} study quickstart\n" in told
 
 
-@pytest.mark.parametrize("status", [DONE, FAILED, BAD_INPUT, INTERRUPTED, TERMINATED])
+@pytest.mark.parametrize("status", [DONE, FAILED, BAD_INPUT, *(128 + number for number in STOPPING)])
 def test_help_says_every_exit_status(status, capsys):
     with pytest.raises(SystemExit):
         main(["--help"])

@@ -76,6 +76,14 @@ def test_a_family_follows_its_truth_and_refuses_what_it_does_not_know(typed, tmp
     assert "truth.toml: grip: unknown key" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("words", ["robot rover", "study mine", "family sleighs"])
+def test_the_same_again_is_no_error_until_something_was_edited(typed, tmp_path, words):
+    for _ in range(2):
+        typed(f"new {words}")
+    (tmp_path / words.split()[1] / "mine.txt").write_text("mine")
+    assert main(["new", *words.split()]) == 2
+
+
 def test_nothing_is_written_over_what_is_there(typed, tmp_path, capsys):
     (tmp_path / "rover").mkdir()
     (tmp_path / "rover" / "mine.txt").write_text("mine")

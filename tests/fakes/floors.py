@@ -1,8 +1,20 @@
 """The rooms of the package, from the ground up: imports go downwards."""
 
 FLOORS = (
-    {"errors"},
-    {"arrays", "settings", "files", "seeds", "identity", "lineage", "extensions", "space", "scores", "logs"},
+    {"errors", "starting"},
+    {
+        "starting",
+        "arrays",
+        "settings",
+        "files",
+        "seeds",
+        "identity",
+        "lineage",
+        "extensions",
+        "space",
+        "scores",
+        "logs",
+    },
     {"usefulness", "effects", "importing"},
     {"domain"},
     {"driving"},

@@ -1,8 +1,11 @@
 """A domain family that is a formula: fast, seeded, picklable, and as faulty as a test asks for."""
 
+import atexit
+import ctypes
 import os
+import signal
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -21,6 +24,22 @@ PARAMETERS = MappingProxyType(
         "delay": Parameter(name="delay", unit="s", low=0.0, high=0.3, neutral=0.0),
     }
 )
+
+
+def leave_later() -> None:
+    """End with status 0 when Python ends, which is soon."""
+    atexit.register(os._exit, 0)
+    os.kill(os.getpid(), signal.SIGTERM)
+
+
+ENDINGS: Mapping[str, Callable[[], object]] = {
+    "dies": lambda: os._exit(9),
+    "leaves": lambda: os._exit(0),
+    "leaves in C": lambda: ctypes.CDLL(None).exit(0),
+    "leaves later": leave_later,
+    "prints": lambda: print("something", flush=True),
+}
+"""Faults that end the process, or say something."""
 
 
 @dataclass(frozen=True)
@@ -73,8 +92,7 @@ class Wobbly:
             raise EpisodeError(f"agent '{episode.agent}' raised ValueError at 1.20 s: it lost its way")
         if fault == "crashes":
             raise ZeroDivisionError("division\nby zero")
-        if fault == "dies":
-            os._exit(9)
+        ENDINGS.get(fault, int)()
         if fault == "full":
             raise OSError(28, "No space left on device")
         scores = formula({**dict(self.theta), **dict(episode.theta)}, episode)

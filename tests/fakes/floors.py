@@ -2,7 +2,19 @@
 
 FLOORS = (
     {"errors"},
-    {"arrays", "settings", "files", "seeds", "identity", "lineage", "extensions", "space", "scores", "logs"},
+    {
+        "arrays",
+        "settings",
+        "files",
+        "unpacking",
+        "seeds",
+        "identity",
+        "lineage",
+        "extensions",
+        "space",
+        "scores",
+        "logs",
+    },
     {"usefulness", "effects", "importing"},
     {"domain"},
     {"driving"},

@@ -1,11 +1,13 @@
 """Strict reading of TOML settings: every complaint is one line with file, key and what to do."""
 
+import contextlib
 import difflib
 import errno
 import math
 import re
 import stat
 import tomllib
+import unicodedata
 from collections.abc import ItemsView, Iterable, Iterator, KeysView, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,6 +32,26 @@ def nearest(name: str, known: Iterable[str]) -> str:
     names = sorted(known)
     close = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
     return f"did you mean '{close[0]}'?" if close else f"known are: {', '.join(names)}"
+
+
+def alike_caution(what: str, names: Iterable[str]) -> str:
+    """The caution about different names that read the same: by Unicode form, blanks, or as numbers; empty if none do.
+
+    Args:
+        what: What has them, as in "agents".
+        names: All of them.
+    """
+    known: dict[object, str] = {}
+    pairs = []
+    for name in dict.fromkeys(names):
+        key: object = " ".join(unicodedata.normalize("NFKC", name).split())
+        with contextlib.suppress(ValueError):
+            key = float(name) if name.isascii() and "_" not in name else key
+        first = known.setdefault(key, name)
+        if first != name:
+            pairs.append(f"{first!a} and {name!a}")
+    told = f"{pairs[0]} (and {len(pairs) - 1} more pairs)" if len(pairs) > 1 else "".join(pairs)
+    return f"{what} {told} read the same and are taken for different ones; write them alike" if pairs else ""
 
 
 @dataclass(frozen=True)

@@ -1,3 +1,4 @@
+from .cautions import score_cautions as score_cautions
 from .reading import (
     column_names as column_names,
     read_domains as read_domains,

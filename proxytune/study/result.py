@@ -63,7 +63,7 @@ class StudyResult:
         stopped: Why it runs no further; empty while it is not at its end.
         spared: What the trials that were cut off did without: episodes, and about how many seconds of them.
         failures: The first failed episodes, told in one line each.
-        cautions: What the target's table does not allow, in one line each.
+        cautions: What the target's table does not allow, and what is probably not meant, in one line each.
     """
 
     study: Study
@@ -150,10 +150,11 @@ def result_of(run: StudyRun, scored_anew: Sequence[TrialRecord] | None = None) -
     confirmation = confirmation_of(run, trials, learnt)
     answers = _answers(trials, learnt)
     answer = confirmation.answer.trial if confirmation else cast(TrialRecord, answers[-1])
+    best = _best(run, answer, learnt)
     return StudyResult(
         study=study,
         trials=trials,
-        best=_best(run, answer, learnt),
+        best=best,
         knowledge=learnt,
         answers=answers,
         truth=study.truth,
@@ -163,7 +164,7 @@ def result_of(run: StudyRun, scored_anew: Sequence[TrialRecord] | None = None) -
         stopped=stopped(run, trials),
         spared=spared(run, trials),
         failures=_failures(run, trials),
-        cautions=tuple(line for line in (*study.cautions, noise_of(run).caution) if line),
+        cautions=tuple(line for line in (*study.cautions, noise_of(run).caution, *best.assessment.cautions) if line),
     )
 
 

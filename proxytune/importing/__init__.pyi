@@ -1,4 +1,5 @@
 from .reading import (
+    as_log as as_log,
     open_log as open_log,
     read_source as read_source,
     source_without_unnamed_pictures as source_without_unnamed_pictures,

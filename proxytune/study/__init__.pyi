@@ -23,6 +23,7 @@ from .family import (
 from .opening import (
     PRPV as PRPV,
     Study as Study,
+    cautions_of as cautions_of,
     measure_of as measure_of,
     open_settings as open_settings,
     open_study as open_study,

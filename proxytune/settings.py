@@ -1,11 +1,13 @@
 """Strict reading of TOML settings: every complaint is one line with file, key and what to do."""
 
+import contextlib
 import difflib
 import errno
 import math
 import re
 import stat
 import tomllib
+import unicodedata
 from collections.abc import ItemsView, Iterable, Iterator, KeysView, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,11 +27,56 @@ GEOMETRY: Mapping[str, str] = MappingProxyType(
 """Keys of log.toml and model.toml for a robot's figures, and what its robot.toml calls these."""
 
 
+SIZES: Mapping[str, tuple[float, float, str]] = {
+    "wheel_radius": (0.002, 1.5, "m"),
+    "effective_baseline": (0.01, 6.0, "m"),
+    "wheel_distance": (0.01, 6.0, "m"),
+    "full_speed": (0.005, 40.0, "m/s"),
+    "camera_height": (0.002, 10.0, "m"),
+    "mass": (0.005, 2e4, "kg"),
+}
+"""Of anything that drives on wheels, from the smallest robot on a table to a lorry."""
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """A hint that ends an error line: the nearest known name, or all of them."""
     names = sorted(known)
     close = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
     return f"did you mean '{close[0]}'?" if close else f"known are: {', '.join(names)}"
+
+
+def alike_caution(what: str, names: Iterable[str]) -> str:
+    """The caution about different names that read the same: by Unicode form, blanks, or as numbers; empty if none do.
+
+    Args:
+        what: What has them, as in "agents".
+        names: All of them.
+    """
+    known: dict[object, str] = {}
+    pairs = []
+    for name in dict.fromkeys(names):
+        key: object = " ".join(unicodedata.normalize("NFKC", name).split())
+        with contextlib.suppress(ValueError):
+            key = float(name) if name.isascii() and "_" not in name else key
+        first = known.setdefault(key, name)
+        if first != name:
+            pairs.append(f"{first!a} and {name!a}")
+    told = f"{pairs[0]} (and {len(pairs) - 1} more pairs)" if len(pairs) > 1 else "".join(pairs)
+    return f"{what} {told} read the same and are taken for different ones; write them alike" if pairs else ""
+
+
+def figure_cautions(figures: Mapping[str, float], where: str) -> tuple[str, ...]:
+    """Sentences on a robot's figures that are probably in another unit.
+
+    Args:
+        figures: By the names of robot.toml; others are not looked at.
+        where: Who states them, as in "robot.toml".
+    """
+    return tuple(
+        f"{where}: its {name} is {figures[name]:.4g} {unit}, and robots have {low:g} to {high:g} {unit}; check that"
+        for name, (low, high, unit) in SIZES.items()
+        if name in figures and not low <= figures[name] <= high
+    )
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """Ways in and out of proxytune from Python: logs of others, score tables of a twin, predictions, exports."""
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -22,18 +22,19 @@ from proxytune.diagnosis import (
 )
 from proxytune.driving import LaneFollowing, Robot, read_robot, robot_from_geometry, robot_names
 from proxytune.effects import Catalogue, Model, read_model
-from proxytune.errors import InputError
+from proxytune.errors import InputError, LogError
 from proxytune.extensions import is_ours
 from proxytune.importing import (
     Facts,
     Source,
     Wanted,
+    as_log,
     open_log,
     read_source,
     source_without_unnamed_pictures,
     write_log,
 )
-from proxytune.logs import Log
+from proxytune.logs import Log, log_cautions
 from proxytune.report import (
     FORMATS,
     ExportLine,
@@ -51,8 +52,8 @@ from proxytune.running import Bars, Silent
 from proxytune.scores import ScoreTable, write_scores
 from proxytune.search import History, write_optuna, write_skopt
 from proxytune.seeds import target_seed
-from proxytune.settings import GEOMETRY
-from proxytune.study import bare_family, measure_agents, read_study_settings
+from proxytune.settings import GEOMETRY, figure_cautions
+from proxytune.study import bare_family, cautions_of, measure_agents, read_study_settings
 
 TRIALS: Mapping[str, Callable[[History, Path], None]] = {"optuna": write_optuna, "skopt": write_skopt}
 """Formats that take the trials of a study, not what was found."""
@@ -69,10 +70,12 @@ class ImportReport:
     Attributes:
         source: Its channels, drives and notes.
         log: The log's folder; None where none was written.
+        cautions: What is probably not meant in it, a sentence each.
     """
 
     source: Source
     log: Path | None
+    cautions: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return f"ImportReport of {len(self.source.surveys)} drives ({self.source.form}), log: {self.log}"
@@ -87,7 +90,8 @@ class ImportReport:
     def document(self) -> dict[str, Any]:
         """The JSON document of `import --json`."""
         written = None if self.log is None else str(self.log)
-        return self.source.facts | {"log": written, "drives": [one.facts for one in self.source.surveys]}
+        drives = [one.facts for one in self.source.surveys]
+        return self.source.facts | {"log": written, "drives": drives, "cautions": list(self.cautions)}
 
 
 def import_log(
@@ -109,8 +113,22 @@ def import_log(
     whole = read_source(path, wanted or Wanted(), known.offset_s)
     found = source_without_unnamed_pictures(whole, known)
     if output is not None:
-        write_log(found, Path(output), known, origin=path.name)
-    return ImportReport(found, None if output is None else Path(output))
+        folder = Path(output)
+        figures = _figures_of(known.robot or folder.resolve().name)  # Writing may replace the folder that one is in
+        return ImportReport(found, folder, log_cautions(write_log(found, folder, known, origin=path.name), figures))
+    bare = replace(found, drives=tuple(replace(drive, pictures=None) for drive in found.drives))
+    try:
+        with as_log(bare, known, path) as log:
+            return ImportReport(found, None, log_cautions(log, _figures_of(log.robot)))
+    except LogError as problem:
+        return ImportReport(found, None, (f"it makes no log: {problem}",))
+
+
+def _figures_of(robot: str) -> Mapping[str, float]:
+    """The figures of a robot, as far as it is known here."""
+    with suppress(InputError):
+        return read_robot(robot, Path.cwd()).figures if robot in robot_names(Path.cwd()) else {}
+    return {}
 
 
 @dataclass(frozen=True, repr=False)
@@ -122,12 +140,14 @@ class Measurement:
         model: The model.toml of the domain.
         seed: Seed of the episodes.
         repeats: Episodes from every start.
+        cautions: What is probably not meant in the model or the robot, a sentence each.
     """
 
     scores: ScoreTable
     model: Path
     seed: int
     repeats: int
+    cautions: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return f"Measurement of {len(self.scores.agents)} agents in {self.model.name}, seed {self.seed}"
@@ -149,6 +169,7 @@ class Measurement:
             "episodes": len(self.scores.episodes),
             "repeats": self.repeats,
             "means": {str(agent): dict(row) for agent, row in self.means().to_dict("index").items()},
+            "cautions": list(self.cautions),
         }
 
     def write(self, path: str | Path) -> None:
@@ -185,8 +206,9 @@ def measure(
     if not path.is_file():
         raise InputError(f"--model {path}: no such file; check the path")
     episodes = len(settings.agents) * settings.starts * repeats
+    cautions = cautions_of(bare_family(settings, path))
     with Bars(episodes) if progress else nullcontext(Silent()) as watcher:
-        return Measurement(measure_agents(settings, path, own, watcher, repeats), path, own, repeats)
+        return Measurement(measure_agents(settings, path, own, watcher, repeats), path, own, repeats, cautions)
 
 
 @dataclass(frozen=True, repr=False)
@@ -197,11 +219,13 @@ class Prediction:
         poses: One row per predicted pose: episode, start_time, time [s], x, y [m], heading [rad].
         horizon_s: Length of the windows [s].
         error: Root mean square error over the windows.
+        cautions: What is probably not meant in the model or the log, a sentence each.
     """
 
     poses: pd.DataFrame
     horizon_s: float
     error: Agreement
+    cautions: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return f"Prediction over {self.error.windows} windows of {self.horizon_s:g} s: {self.sentence}"
@@ -222,7 +246,8 @@ class Prediction:
         rmse = self.error
         heading = {"heading": rmse.turn, "heading_unit": "rad", "poses": rmse.poses}
         error = {"value": rmse.place, "unit": "m", **heading}
-        return {"rows": len(self.poses), "windows": rmse.windows, "horizon_s": self.horizon_s, "error": error}
+        facts = {"rows": len(self.poses), "windows": rmse.windows, "horizon_s": self.horizon_s}
+        return facts | {"error": error, "cautions": list(self.cautions)}
 
 
 @dataclass(frozen=True, repr=False)
@@ -296,8 +321,10 @@ def predict(
         if drives.command == "none":
             hint = "" if drives.frames is None else ", or give --frames to predict those"
             raise InputError(f"{drives.name}: has no commands to predict poses from; give a log of drives{hint}")
-        table = predict_poses(drives, _robot_of(fitted, drives, catalogue), fitted.theta, horizon_s)
-        return Prediction(table, horizon_s, agreement(table, drives, horizon_s))
+        robot = _robot_of(fitted, drives, catalogue)
+        table = predict_poses(drives, robot, fitted.theta, horizon_s)
+        cautions = (*fitted.cautions, *log_cautions(drives, robot.figures))
+        return Prediction(table, horizon_s, agreement(table, drives, horizon_s), cautions)
 
 
 def _predict_pictures(
@@ -372,10 +399,10 @@ def export(model: str | Path, output: str | Path, *, to: str) -> ExportReport:
     path, file = Path(model), Path(output)
     if to in TRIALS:
         return _export_trials(path, file, to)
-    instance = _of_study(path) if path.is_dir() else _of_model(path)
+    instance, cautions = (_of_study(path), ()) if path.is_dir() else _of_model(path)
     text, lines = WRITERS[to](instance), export_lines(instance, to)
     write_text(file, text)
-    return ExportReport(file, to, lines, {"robot": instance.robot.name})
+    return ExportReport(file, to, lines, {"robot": instance.robot.name, "cautions": list(cautions)})
 
 
 def _export_trials(folder: Path, output: Path, to: str) -> ExportReport:
@@ -400,8 +427,8 @@ def _row(line: ExportLine) -> dict[str, Any]:
     }
 
 
-def _of_model(path: Path) -> Instance:
-    """A model.toml; its robot and its own effects are looked for in the current folder."""
+def _of_model(path: Path) -> tuple[Instance, tuple[str, ...]]:
+    """A model.toml, and its cautions; its robot and its own effects are looked for in the current folder."""
     catalogue = Catalogue(Path.cwd())
     model = read_model(path, catalogue)
     if model.robot in robot_names(catalogue.folder):
@@ -412,7 +439,8 @@ def _of_model(path: Path) -> Instance:
         raise InputError(
             f"{path}: its robot '{model.robot}' is unknown here; go to the folder that {model.robot} lies in"
         )
-    return Instance(robot, {**robot.theta, **model.theta}, model.intervals, str(path))
+    cautions = (*model.cautions, *figure_cautions(robot.figures, f"robot {robot.name}"))
+    return Instance(robot, {**robot.theta, **model.theta}, model.intervals, str(path)), cautions
 
 
 def _of_study(folder: Path) -> Instance:

@@ -27,7 +27,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> Answer:
     """Write the file, and say what went where and what has no place."""
     report = export(arguments.model, arguments.output, to=arguments.to)
-    lines = [*map(str, report.lines), str(arguments.output)]
+    cautions = (f"beware: {line}" for line in report.facts.get("cautions", ()))
+    lines = [*cautions, *map(str, report.lines), str(arguments.output)]
     if arguments.to in TRIALS:
         lines.insert(0, f"{report.facts['trials']} trials of '{report.facts['name']}'")
     if arguments.to == "optuna":

@@ -32,17 +32,18 @@ def run(arguments: argparse.Namespace) -> Answer:
     wanted, facts = wanted_of(arguments), facts_of(arguments)
     with waiting(f"reading {arguments.source}"):
         report = import_log(arguments.source, arguments.output, wanted=wanted, facts=facts)
-    return Answer(report.document(), _told(report.source, arguments.output))
+    return Answer(report.document(), _told(report.source, report.cautions, arguments.output))
 
 
-def _told(source: Source, output: Path | None) -> Group:
+def _told(source: Source, cautions: Sequence[str], output: Path | None) -> Group:
     channels = _table(source.form, ("what", "type", "count", "taken for"), {"count"})
     for channel in source.channels:
         channels.add_row(channel.name, channel.kind, str(channel.count), channel.role)
     drives = _table("Drives", MEASURES, {*MEASURES[1:]})
     for one in source.surveys:
         drives.add_row(*_row(one))
-    notes = Text("\n".join(f"- {note}" for note in source.notes))
+    beware = (f"- beware: {line}" for line in cautions)
+    notes = Text("\n".join((*beware, *(f"- {note}" for note in source.notes))))
     last = f"next: python -m proxytune diagnose {output}" if output else "give OUTPUT to write the log"
     return Group(channels, Text(), drives, Text(), notes, Text(last))
 

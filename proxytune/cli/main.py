@@ -1,6 +1,7 @@
 """The entry point: finds the command, prints its answer, and turns our exceptions into one line and an exit status."""
 
 import argparse
+import errno
 import re
 import sys
 from collections.abc import Callable, Sequence
@@ -19,6 +20,8 @@ from proxytune.starting import UNDER_WAY, lasting_stderr
 DONE, BAD_INPUT = 0, 2
 FORMATS = ("png", "svg", "pdf")
 
+
+LACKING = (errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.ENOSPC)
 
 EXIT_STATUS = "exit status: 0 done, 1 failed, 2 bad input, 129 hung up, 130 interrupted (Ctrl-C), 143 terminated"
 
@@ -156,7 +159,24 @@ def run_command(answer_of: Callable[[], Answer], arguments: argparse.Namespace, 
             what, status = stopped_by(problem)
             _complain(program, f"{what}; {left}")
             return status
+        except Exception as problem:
+            # A library may stumble over what the system refused it, and raise something else
+            refused = _refused(problem)
+            if refused is None:
+                raise
+            what, status = stopped_by(refused)
+            _complain(program, f"{what}; {left}")
+            return status
     return DONE
+
+
+def _refused(problem: BaseException | None) -> MemoryError | OSError | None:
+    """What memory, disk or descriptors lacked, among what led to a problem."""
+    while problem is not None:
+        if isinstance(problem, MemoryError) or (isinstance(problem, OSError) and problem.errno in LACKING):
+            return problem
+        problem = problem.__cause__ or problem.__context__
+    return None
 
 
 def _figures(named: Sequence[str]) -> AbstractContextManager[None]:

@@ -41,7 +41,8 @@ def run(arguments: argparse.Namespace) -> Answer:
     found = measure(arguments.path, arguments.model, progress=True, **options)
     found.write(arguments.output)
     document = {"scores": str(arguments.output), **found.document()}
-    return Answer(document, Group(_table(found.scores), Text(f"seed {found.seed}\n{arguments.output}")))
+    lines = [*(f"beware: {line}" for line in found.cautions), f"seed {found.seed}", str(arguments.output)]
+    return Answer(document, Group(_table(found.scores), Text("\n".join(lines))))
 
 
 def _table(scores: ScoreTable) -> Table:

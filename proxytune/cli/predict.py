@@ -48,4 +48,5 @@ def run(arguments: argparse.Namespace) -> Answer:
     write_text(arguments.output, found.poses.to_csv(index=False))
     windows = f"{found.error.windows} windows of {arguments.horizon:g} s"
     document = {"predictions": str(arguments.output), **found.document()}
-    return Answer(document, Text(f"{windows}: {found.sentence}\n{arguments.output}"))
+    lines = [*(f"beware: {line}" for line in found.cautions), f"{windows}: {found.sentence}", str(arguments.output)]
+    return Answer(document, Text("\n".join(lines)))

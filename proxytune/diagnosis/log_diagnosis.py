@@ -21,7 +21,7 @@ from proxytune.diagnosis.motion.screening import motion_effects
 from proxytune.driving import Markings, Robot, ground_points
 from proxytune.effects import effect_of
 from proxytune.errors import LogError, SettingsError
-from proxytune.logs import Frames, Log, read_pictures
+from proxytune.logs import Frames, Log, log_cautions, read_pictures
 from proxytune.settings import nearest
 from proxytune.space import Theta
 
@@ -39,6 +39,7 @@ class LogDiagnosis:
         camera: What its frames say, or None.
         motion_refused: Why its drives say nothing though it has commands and frames, else empty.
         camera_refused: Why its frames say nothing though its drives do, else empty.
+        cautions: What is probably not meant in the log, a sentence each.
     """
 
     log: str
@@ -47,6 +48,7 @@ class LogDiagnosis:
     camera: CameraDiagnosis | None
     motion_refused: str = ""
     camera_refused: str = ""
+    cautions: tuple[str, ...] = ()
 
 
 def diagnose_log(
@@ -82,18 +84,19 @@ def diagnose_log(
     def camera() -> CameraDiagnosis:
         return diagnose_camera(log, robot, on_camera, seed=seed, report=report)
 
+    cautions = log_cautions(log, robot.figures)
     if log.frames is None:
-        return LogDiagnosis(log.name, robot, motion(), None)
+        return LogDiagnosis(log.name, robot, motion(), None, cautions=cautions)
     if log.command == "none":
         if test is not None:
             raise LogError(
                 f"--test: {log.name} has no commands, and frames are tested on some of its own; leave it out"
             )
-        return LogDiagnosis(log.name, robot, None, camera())
+        return LogDiagnosis(log.name, robot, None, camera(), cautions=cautions)
     (moved, no_motion), (pictured, no_camera) = _or_refusal(motion), _or_refusal(camera)
     if moved is None and pictured is None:
         raise LogError(f"{no_motion}; camera: {no_camera}")
-    return LogDiagnosis(log.name, robot, moved, pictured, no_motion, no_camera)
+    return LogDiagnosis(log.name, robot, moved, pictured, no_motion, no_camera, cautions)
 
 
 def _or_refusal(house: Callable[[], House]) -> tuple[House | None, str]:

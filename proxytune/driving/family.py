@@ -6,7 +6,7 @@ A family's episodes are kept under its `identity`: a digest of all that determin
 import functools
 import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeVar
@@ -56,7 +56,7 @@ from proxytune.effects import (
 from proxytune.errors import EpisodeError, SettingsError
 from proxytune.identity import meaning_of, modules_beside, versions_of
 from proxytune.lineage import code_name
-from proxytune.settings import Section, nearest
+from proxytune.settings import Section, figure_cautions, nearest
 from proxytune.space import Parameter, Theta
 
 Score = TypeVar("Score")
@@ -82,6 +82,9 @@ def robot_meaning(robot: Path) -> str:
     """A digest of what the files of a robot's folder mean."""
     return meaning_of((path for path in robot.iterdir() if path.is_file()), robot)
 
+
+NO_SETTINGS = ("folder", "cautions")
+"""Fields that no episode depends on."""
 
 _RATE_HZ = 60.0
 """Camera effects hold for good: no rate changes what they do."""
@@ -145,6 +148,7 @@ class LaneFollowing:
         heading_noise_deg: Standard deviation of how it is turned [deg].
         effects: Values of effects besides the robot's nominal ones, sorted by name.
         folder: Where a user's own agents, effects and robots lie.
+        cautions: What is probably not meant in its robot or model, a sentence each.
     """
 
     robot: str
@@ -156,11 +160,12 @@ class LaneFollowing:
     heading_noise_deg: float
     effects: tuple[tuple[str, float], ...]
     folder: Path
+    cautions: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
     @property
     def identity(self) -> str:
         """A digest of settings, of what robot, code and the user's modules mean, and of versions."""
-        settings = tuple(getattr(self, name) for name in self.__dataclass_fields__ if name != "folder")
+        settings = tuple(getattr(self, name) for name in self.__dataclass_fields__ if name not in NO_SETTINGS)
         return identity_of(settings, robot_home(self.robot, self.folder), self.folder, self.versions)
 
     @property
@@ -378,6 +383,7 @@ def lane_following(section: Section, *, model: Path | None) -> LaneFollowing:
     robot = _agreed(section, "robot", given.robot if given else None, "duckiebot", robot_names(folder))
     plant = _agreed(section, "plant", given.plant if given else None, "bullet", PLANTS)
     _check_equipment(section, read_robot(robot, folder), plant)
+    figures = read_robot(robot, folder).figures
     theta, _ = read_effects(section.section("effects"), Catalogue(folder))
     effects = {**(given.theta if given else {}), **theta}
     return LaneFollowing(
@@ -390,6 +396,7 @@ def lane_following(section: Section, *, model: Path | None) -> LaneFollowing:
         heading_noise_deg=section.number("heading_noise_deg", 2.0, low=0.0, high=30.0),
         effects=tuple(sorted(effects.items())),
         folder=folder,
+        cautions=(*figure_cautions(figures, f"robot {robot}"), *(given.cautions if given else ())),
     )
 
 

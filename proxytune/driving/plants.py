@@ -5,6 +5,7 @@ exact for twists that hold over a tick. What a URDF says of a robot on two wheel
 drives it.
 """
 
+import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -20,6 +21,7 @@ from proxytune.driving.optics import rotation
 from proxytune.driving.robot import Robot
 from proxytune.effects import CHANNELS, Chain, Effect, FilterContext, Memory, Signal, Stage, stage_chain
 from proxytune.errors import SettingsError
+from proxytune.settings import read_text
 
 
 class Plant(Protocol):
@@ -153,7 +155,7 @@ def parse_urdf(path: Path) -> ET.Element:
         SettingsError: If it cannot be read or is no URDF.
     """
     try:
-        root = ET.fromstring(path.read_text(encoding="utf-8"))
+        root = ET.fromstring(read_text(path))
     except (OSError, UnicodeDecodeError) as problem:
         raise SettingsError(f"{path}: cannot be read ({problem}); check the path") from None
     except ET.ParseError as problem:
@@ -235,10 +237,12 @@ def check_body(robot: Robot) -> None:
     """Refuse a URDF whose wheels are not those of robot.toml: the bullet plant would drive at another speed.
 
     Raises:
-        SettingsError: If they differ, or its axles are not called as the plant calls them.
+        SettingsError: If they differ, its axles are not called as the plant calls them, or what it names is no file.
     """
     path = robot.body()
-    body = read_body(parse_urdf(path), path)
+    root = parse_urdf(path)
+    body = read_body(root, path)
+    _check_files(root, path)
     for wheel, name in zip((body.left, body.right), AXLES, strict=True):
         if wheel.joint != name or wheel.axis[1] < 0.0:
             said = f"joint '{wheel.joint}' must be called {name}"
@@ -248,6 +252,41 @@ def check_body(robot: Robot) -> None:
         if abs(value - robot.figures[figure]) > AGREES * robot.figures[figure]:
             said = f"has the {figure} {value:g} m, robot.toml says {robot.figures[figure]:g} m"
             raise SettingsError(f"{path.name}: {said}; correct the one that is wrong")
+
+
+SCHEMES = re.compile(r"(file|package|model)://")
+NAMED_IN = {".obj": "mtllib", ".mtl": "map_"}
+"""Files of meshes that name others, and how their lines begin that do."""
+
+
+def _check_files(root: ET.Element, path: Path) -> None:
+    """Refuse what a URDF names and is no file: PyBullet would wait for a pipe for ever."""
+    collides = {id(one) for part in root.iter("collision") for one in part.iter()}
+    for element in root.iter():
+        name = element.get("filename")
+        if name is None:
+            continue
+        # PyBullet looks here, then beside the URDF and above
+        plain = SCHEMES.sub("", name)
+        places = (Path(plain), *(folder / plain for folder in path.resolve().parents))
+        found = next((place for place in places if place.exists()), None)
+        if found is not None:
+            _check_file(found, f"{path}: names {name}")
+        elif id(element) in collides:
+            raise SettingsError(f"{path}: names {name}, which is not there; add it beside the URDF")
+
+
+def _check_file(path: Path, where: str) -> None:
+    if not path.is_file():
+        raise SettingsError(f"{where}, which is a folder, a device or a pipe; put the file itself there")
+    begins = NAMED_IN.get(path.suffix.lower())
+    if begins is None:
+        return
+    with path.open(encoding="utf-8", errors="replace") as lines:
+        named = [line.split()[-1] for line in lines if line.lstrip().startswith(begins)]
+    for name in named:
+        if (path.parent / name).exists():
+            _check_file(path.parent / name, f"{where}, which names {name}")
 
 
 def _wheel(root: ET.Element, joint: ET.Element) -> Wheel:

@@ -317,7 +317,8 @@ def effects_from(theta: Theta, nominal: Mapping[str, float], catalogue: Catalogu
     What was learnt comes last: it looks at the motion that all named effects ask for.
 
     Raises:
-        SettingsError: If a name is not a parameter of the catalogue or its value is out of bounds.
+        SettingsError: If a name is not a parameter of the catalogue, its value is out of bounds, or it is left out and
+            the robot does not state the figure that it replaces.
         ExtensionError: If a user's own effect cannot be used.
     """
     for name, value in theta.items():
@@ -329,9 +330,19 @@ def effects_from(theta: Theta, nominal: Mapping[str, float], catalogue: Catalogu
     for effect, names in (*_NAMED.items(), *named):
         if not theta.keys().isdisjoint(names):
             pairs = zip(names, effect.parameters, strict=True)
-            chosen.append(effect(*(float(theta.get(n, p.neutral_value(nominal))) for n, p in pairs)))
+            chosen.append(effect(*(_value(name, parameter, theta, nominal) for name, parameter in pairs)))
     learnt = learnt_effect(theta)
     return tuple(chosen) if learnt is None else (*chosen, learnt)
+
+
+def _value(name: str, parameter: Parameter, theta: Theta, nominal: Mapping[str, float]) -> float:
+    """What θ says of a parameter, or its neutral value."""
+    if name in theta:
+        return float(theta[name])
+    try:
+        return float(parameter.neutral_value(nominal))
+    except KeyError:
+        raise SettingsError(f"{name}: the robot states no {parameter.neutral}; state this parameter too") from None
 
 
 def _check(name: str, value: float, parameters: Parameters) -> None:

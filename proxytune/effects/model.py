@@ -35,6 +35,16 @@ class Model:
     intervals: Mapping[str, tuple[float, float]]
     geometry: Mapping[str, float] = field(default_factory=dict)
 
+    @property
+    def cautions(self) -> tuple[str, ...]:
+        """Sentences on what is probably not meant: an interval without the value that it is of."""
+        return tuple(
+            f"model of {self.robot}: the interval of {name}, {low:g} to {high:g}, does not hold its value {value:g}; "
+            "correct the one that is wrong"
+            for name, (low, high) in self.intervals.items()
+            if (value := self.theta.get(name)) is not None and not low <= value <= high
+        )
+
 
 def read_model(path: Path, catalogue: Catalogue = SHIPPED) -> Model:
     """Read a model.toml.

@@ -13,8 +13,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from proxytune import unpacking
 from proxytune.arrays import Floats
-from proxytune.errors import LogError
+from proxytune.errors import InputError, LogError
 from proxytune.importing.columns import (
     Columns,
     channels_of,
@@ -43,11 +44,12 @@ def load_arrays(path: Path) -> Arrays:
 
     Raises:
         LogError: If it is no such file, is damaged, or holds pickled objects.
+        InputError: If it unpacks to more than is allowed.
     """
     try:
-        with path.open("rb") as stream:
-            file = np.load(stream, allow_pickle=False)
-            arrays = {name: np.asarray(file[name]) for name in getattr(file, "files", ())}
+        arrays = unpacking.read_arrays(path)
+    except InputError:
+        raise
     except FileNotFoundError:
         raise LogError(f"{path}: no such file; check the path") from None
     except Exception as problem:  # A damaged file fails in many ways: zipfile's, zlib's and numpy's own.

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 
 from proxytune.arrays import Floats, Whole
-from proxytune.errors import LogError
+from proxytune.errors import LogError, ProxytuneError
+from proxytune.importing.bag_chunks import check_bag_size, check_messages_size
 from proxytune.importing.checks import headings_and_tilts
 from proxytune.importing.source import Commands, Poses
 from proxytune.settings import nearest
@@ -61,14 +62,16 @@ class Bag:
     @property
     def topics(self) -> tuple[Topic, ...]:
         """Its topics by name."""
-        known = self.reader.typestore.fielddefs
-        kinds = {name: (topic.msgtype or "several types", topic.msgcount) for name, topic in self.reader.topics.items()}
-        return tuple(Topic(name, kind, count, kind in known) for name, (kind, count) in sorted(kinds.items()))
+        with complaints(self.path, "does not say what it holds"):
+            known, listed = self.reader.typestore.fielddefs, self.reader.topics.items()
+            kinds = {str(name): (str(topic.msgtype or "several types"), int(topic.msgcount)) for name, topic in listed}
+            return tuple(Topic(name, kind, count, kind in known) for name, (kind, count) in sorted(kinds.items()))
 
     @property
     def defines_types(self) -> bool:
         """True if the bag says what its messages look like."""
-        return any(connection.msgdef.format.name != "NONE" for connection in self.reader.connections)
+        with complaints(self.path, "does not say what its messages are"):
+            return any(connection.msgdef.format.name != "NONE" for connection in self.reader.connections)
 
     def messages(self, topic: str) -> Iterator[tuple[int, Any]]:
         """The messages of a topic in the order received: when each was received [ns], and what it holds.
@@ -80,7 +83,7 @@ class Bag:
         numbers = count(1)
         incoming = self.reader.messages(connections=connections) if connections else iter(())
         while True:
-            with _complaints(self.path, f"{topic}, message {next(numbers)}: cannot be read"):
+            with complaints(self.path, f"{topic}, message {next(numbers)}: cannot be read"):
                 received = next(incoming, None)
                 if received is None:
                     return
@@ -115,8 +118,11 @@ def open_bag(path: Path) -> Iterator[Bag]:
     Raises:
         LogError: If the library is not installed, or the bag is cut short or is none.
     """
+    check_bag_size(path)
     reader = _open_reader(path)
     try:
+        with complaints(path, "cannot be read as a bag"):
+            check_messages_size(path, reader)
         yield Bag(path, reader)
     finally:
         reader.close()
@@ -136,7 +142,7 @@ def _open_reader(path: Path) -> Any:
         from rosbags.typesys import Stores, get_typestore
     except ModuleNotFoundError:
         raise LogError(f'{path}: reading bags needs rosbags; pip install "proxytune[ros]"') from None
-    with _complaints(path, "cannot be read as a bag"):
+    with complaints(path, "cannot be read as a bag"):
         # The library would take a ROS 2 folder named run.bag for a file of ROS 1.
         inside = path.suffix == ROS1 and path.is_dir()
         paths = sorted(file for file in path.glob("*") if file.suffix in ROS2) if inside else [path]
@@ -146,13 +152,16 @@ def _open_reader(path: Path) -> Any:
 
 
 @contextmanager
-def _complaints(path: Path, what: str) -> Iterator[None]:
-    """Turn whatever the library raises into one line.
+def complaints(path: Path, what: str) -> Iterator[None]:
+    """Turn whatever comes of a damaged bag into one line.
 
-    Damaged bags make it raise nearly anything: its own errors, KeyError, struct.error, AssertionError, MemoryError.
+    That is nearly anything: the library's own errors, KeyError, struct.error, AssertionError, MemoryError; and of a
+    message whose type says text where a number should be, TypeError.
     """
     try:
         yield
+    except ProxytuneError:
+        raise
     except Exception as problem:
         text = "".join(letter if letter.isprintable() else " " for letter in str(problem))
         reason = " ".join(text.split())[:200].rstrip(".") or type(problem).__name__
@@ -278,19 +287,22 @@ def collect(bag: Bag, topic: str, row_of: Callable[[Any], Row], *, finite: bool 
     for number, (receive_ns, message) in enumerate(bag.messages(topic), start=1):
         where = f"{bag.path}: {topic}, message {number}"
         try:
-            row = row_of(message)
+            with complaints(bag.path, f"{topic}, message {number}: is not what its type says"):
+                row, header = tuple(map(float, row_of(message))), header_ns(message)
         except LogError as problem:
-            raise LogError(f"{where}: {problem}") from None
+            text = str(problem)
+            raise LogError(text if text.startswith(f"{where}: ") else f"{where}: {text}") from None
         if finite and not all(map(math.isfinite, row)):
             values = ", ".join(f"{value:g}" for value in row)
             raise LogError(f"{where}: holds a number that is not finite ({values}); leave such messages out of the bag")
         rows.append(row)
         receives.append(receive_ns)
-        headers.append(header_ns(message))
+        headers.append(header)
     if not rows:
         raise LogError(f"{bag.path}: {topic}: no messages; take another topic, or leave the bag out")
-    stamped = None if headers[0] is None else whole(headers)
-    return Stamps(stamped, whole(receives)), np.array(rows, dtype=np.float64)
+    with complaints(bag.path, f"{topic}: has stamps that are no times"):
+        stamped = None if headers[0] is None else whole(headers)
+        return Stamps(stamped, whole(receives)), np.array(rows, dtype=np.float64)
 
 
 def read_commands(bag: Bag, topic: str, kind: str, stamps: str) -> tuple[Commands, tuple[str, ...]]:

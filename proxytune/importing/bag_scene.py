@@ -10,13 +10,24 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from proxytune.arrays import Floats
-from proxytune.errors import LogError
-from proxytune.importing.bag import Bag, Stamps, choose_times, collect, frame_of, header_ns, open_bag, pose_of, whole
+from proxytune.errors import InputError, LogError
+from proxytune.importing.bag import (
+    Bag,
+    Stamps,
+    choose_times,
+    collect,
+    complaints,
+    frame_of,
+    header_ns,
+    open_bag,
+    pose_of,
+    whole,
+)
 from proxytune.importing.source import Pictures
 from proxytune.logs import BROKEN
+from proxytune.unpacking import open_picture
 
 WORLDS = ("map", "world", "odom")
 ROBOTS = ("base_link", "base_footprint")
@@ -57,15 +68,17 @@ def read_transforms(bag: Bag, topics: tuple[str, ...]) -> dict[str, Transform]:
     """
     rows: dict[str, list[Row]] = defaultdict(list)
     for topic in topics:
-        for receive_ns, message in bag.messages(topic):
-            for each in message.transforms:
-                if topic.endswith("tf_static"):
-                    rows[frame_of(each)].clear()
-                rows[frame_of(each)].append((header_ns(each) or 0, receive_ns, pose_of(each)))
+        for number, (receive_ns, message) in enumerate(bag.messages(topic), start=1):
+            with complaints(bag.path, f"{topic}, message {number}: is not what its type says"):
+                for each in message.transforms:
+                    if topic.endswith("tf_static"):
+                        rows[frame_of(each)].clear()
+                    rows[frame_of(each)].append((header_ns(each) or 0, receive_ns, tuple(map(float, pose_of(each)))))
     transforms = {}
     for name, some in rows.items():
         header, receive, values = zip(*some, strict=True)
-        stamps = Stamps(whole(list(header)), whole(list(receive)))
+        with complaints(bag.path, f"{name}: has stamps that are no times"):
+            stamps = Stamps(whole(list(header)), whole(list(receive)))
         transforms[name] = Transform(name, stamps, np.array(values, dtype=np.float64))
     return transforms
 
@@ -164,8 +177,9 @@ def iterate(path: Path, topic: str) -> Iterator[Picture]:
     with open_bag(path) as bag:
         for number, (_, message) in enumerate(bag.messages(topic), start=1):
             try:
-                picture = picture_of(message)
-            except LogError as problem:
+                with complaints(path, "is not what its type says"):
+                    picture = picture_of(message)
+            except InputError as problem:
                 raise LogError(f"{path}: {topic}, message {number}: {problem}") from None
             yield picture
 
@@ -201,9 +215,14 @@ def _check(message: Any) -> tuple[float, ...]:
     return ()
 
 
+PACKED = ("PNG", "JPEG", "TIFF", "WEBP")
+"""As Pillow calls what ROS packs pictures as."""
+
+
 def _compressed(message: Any) -> Picture:
     try:
-        with Image.open(BytesIO(np.asarray(message.data, dtype=np.uint8).tobytes())) as image:
+        packed = BytesIO(np.asarray(message.data, dtype=np.uint8).tobytes())
+        with open_picture(packed, "it", PACKED) as image:
             if image.mode.startswith(("I", "F")):
                 raise LogError("has more than 8 bits a pixel; leave pictures out by --pictures none")
             return np.array(image.convert("RGB"))

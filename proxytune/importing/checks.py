@@ -120,7 +120,8 @@ def headings_and_tilts(quaternions: Floats, where: str) -> tuple[Floats, Floats]
 
 def no_rotation(quaternions: Floats) -> NDArray[np.bool_]:
     """True for quaternions that are not finite or of length zero (N,)."""
-    norms = np.linalg.norm(quaternions, axis=1)
+    with np.errstate(over="ignore", invalid="ignore"):
+        norms = np.linalg.norm(quaternions, axis=1)
     return np.asarray(~(np.isfinite(norms) & (norms > LEAST_NORM)))
 
 
@@ -159,16 +160,31 @@ def checked_drive(drive: Drive, where: str, offset_s: float = 0.0) -> tuple[Driv
         LogError: If stamps jump back, all are equal, poses are not z-up, or commands and poses are of different times.
     """
     about = f"{where}: drive {drive.name}"
+    _check_sizes((drive.poses.times, drive.poses.places), "poses", about)
     poses, notes = _ordered_poses(drive.poses, about)
     _check_upright(poses, about)
     commands = drive.commands
     if commands is not None:
+        _check_sizes((commands.times, commands.values), "commands", about)
         # Of several commands with one stamp, the last is the one that was held.
         kept, more = _order(commands.times, "commands", about, last=True)
         commands = replace(commands, times=commands.times[kept], values=commands.values[kept])
         notes += more
         _check_overlap(commands.times + offset_s, poses.times, about)
     return replace(drive, poses=poses, commands=commands), [f"drive {drive.name}: {note}" for note in notes]
+
+
+def _check_sizes(parts: tuple[Floats, ...], what: str, about: str) -> None:
+    """Refuse numbers that are none of a robot: the square of their square would not be finite."""
+    for part in parts:
+        # NaN stands for what was not measured, and is told of elsewhere
+        large = np.abs(np.where(np.isnan(part), 0.0, part)) > LARGEST
+        if large.any():
+            value = float(part[large].flat[0])
+            raise LogError(f"{about}: its {what} hold the number {value:g}; leave out what was not measured")
+
+
+LARGEST = 1e50
 
 
 def _ordered_poses(poses: Poses, about: str) -> tuple[Poses, list[str]]:

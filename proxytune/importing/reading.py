@@ -132,7 +132,7 @@ def read_source(path: Path, wanted: Wanted, offset_s: float = 0.0) -> Source:
 PICTURES = "frames/%06d.png"
 
 
-def write_log(source: Source, folder: Path, facts: Facts, origin: str) -> None:
+def write_log(source: Source, folder: Path, facts: Facts, origin: str) -> Log:
     """Write log.toml, samples.csv, commands.csv and pictures.
 
     Args:
@@ -140,6 +140,9 @@ def write_log(source: Source, folder: Path, facts: Facts, origin: str) -> None:
         folder: The log's folder, which must not exist or be empty, or else be this very log.
         facts: What only the user knows.
         origin: Where it came from, for log.toml.
+
+    Returns:
+        The log that it reads as.
 
     Raises:
         InputError: If the folder is not free.
@@ -149,7 +152,7 @@ def write_log(source: Source, folder: Path, facts: Facts, origin: str) -> None:
     folder = folder.resolve()
     with writable(folder), folder_draft_of(folder) as draft:
         fill_log(draft, source, facts, folder.name, origin)
-        read_as(draft, folder)
+        return read_as(draft, folder)
 
 
 def fill_log(folder: Path, source: Source, facts: Facts, name: str, origin: str) -> None:
@@ -253,11 +256,26 @@ def open_log(path: Path, wanted: Wanted = NOTHING, facts: Facts = NO_FACTS) -> I
         yield read_log(path), ()
         return
     source = read_source(path, wanted, facts.offset_s)
+    with as_log(source_without_unnamed_pictures(source, facts), facts, path) as log:
+        yield log, source.notes
+
+
+@contextmanager
+def as_log(source: Source, facts: Facts, path: Path) -> Iterator[Log]:
+    """The log that a source makes, in a temporary folder for as long as it is open.
+
+    Args:
+        source: What was read and checked.
+        facts: What only the user knows.
+        path: Where it was read.
+
+    Raises:
+        LogError: If it makes none.
+    """
     with temporary_folder() as folder:
-        named = source_without_unnamed_pictures(source, facts)
         with writable(folder):
-            fill_log(folder, named, facts, path.resolve().stem, origin=path.name)
-        yield read_as(folder, path), source.notes
+            fill_log(folder, source, facts, path.resolve().stem, origin=path.name)
+        yield read_as(folder, path)
 
 
 def source_without_unnamed_pictures(source: Source, facts: Facts) -> Source:

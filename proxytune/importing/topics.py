@@ -327,7 +327,7 @@ def _list(path: Path, bags: dict[str, Path]) -> tuple[tuple[Topic, ...], list[st
     listed, notes = [], []
     for bag_path in bags.values():
         with open_bag(bag_path) as bag:
-            if not bag.reader.message_count:
+            if not any(topic.count for topic in bag.topics):
                 raise LogError(f"{bag_path}: holds no messages; record it again, or leave it out")
             listed.append({topic.name: topic for topic in bag.topics})
             if not bag.defines_types:

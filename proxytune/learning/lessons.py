@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from proxytune.arrays import Floats
 from proxytune.domain import Classroom, Demonstration, Episode, OnPolicyClassroom, Policy, make_episode
-from proxytune.errors import EpisodeError, LearnerError, StoreError
+from proxytune.errors import EpisodeError, InputError, LearnerError, StoreError
 from proxytune.files import draft_of
 from proxytune.identity import digest, meaning_of
 from proxytune.learning.learner import Learner
@@ -29,9 +29,13 @@ from proxytune.lineage import named
 from proxytune.seeds import lesson_seeds
 from proxytune.settings import Section
 from proxytune.space import Theta
+from proxytune.unpacking import read_arrays
 
 EXPERT = "expert"
 """Who drives in a lesson, in place of an agent."""
+
+LESSONS_MB = 4000
+"""Kept samples may be pictures."""
 
 LEAST_SHARE = 0.5
 """An expert that keeps to the road for less than this share of its lessons has nothing to teach."""
@@ -195,8 +199,9 @@ def _write(path: Path, arrays: Arrays) -> None:
 
 def _read(path: Path) -> Arrays:
     try:
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
-            return {name: file[name] for name in file.files if name != FACTS}
+        return {name: array for name, array in read_arrays(path, LESSONS_MB).items() if name != FACTS}
+    except InputError as problem:
+        raise StoreError(str(problem)) from None
     # A damaged file fails in many ways: zipfile's, zlib's and numpy's own.
     except Exception as problem:
         raise StoreError(f"{path}: is damaged ({problem}); delete it, and run again to make it anew") from None

@@ -19,6 +19,7 @@ from proxytune.logs.log import Frames, LogEpisode
 from proxytune.logs.rows import Layout, Rows, check_known_episodes, read_rows
 from proxytune.logs.times import places_on_grid
 from proxytune.settings import Section
+from proxytune.unpacking import ARRAYS_MB, check_unpacked, open_picture
 
 KEYS = ("frames", "poses", "exposure", "rectified", "shutter", "readout_s")
 LISTED = "frames.csv"
@@ -204,12 +205,14 @@ def read_pictures(frames: Frames, numbers: Sequence[int], columns: int = 160) ->
 
     Raises:
         LogError: If a file cannot be read, or is of another size than the first.
+        InputError: If a picture, or all of them, would take more memory than is allowed.
     """
     pictures, first = np.empty((0, 0, 0, 3), dtype=np.uint8), (0, 0)
     for place, number in enumerate(numbers):
         path = frames.paths[number]
         picture, size = _read_picture(path, columns)
         if place == 0:
+            check_unpacked(f"{path.parent}: {len(numbers)} pictures", picture.nbytes * len(numbers), ARRAYS_MB)
             pictures, first = np.empty((len(numbers), *picture.shape), dtype=np.uint8), size
         if size != first:
             sizes = f"is {size[0]} × {size[1]}, but {frames.paths[numbers[0]].name} is {first[0]} × {first[1]}"
@@ -221,7 +224,7 @@ def read_pictures(frames: Frames, numbers: Sequence[int], columns: int = 160) ->
 def _read_picture(path: Path, columns: int) -> tuple[Pictures, tuple[int, int]]:
     """A picture averaged down, and the width and height of its file."""
     try:
-        with Image.open(path, formats=("PNG", "JPEG")) as image:
+        with open_picture(path, path, ("PNG", "JPEG")) as image:
             size = image.size
             if image.mode.startswith(("I", "F")):
                 raise LogError(f"{path}: has more than 8 bits a pixel; save it with 8 bits for each colour")

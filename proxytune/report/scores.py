@@ -90,12 +90,11 @@ def score_text(
         left_out: Notes on agents that were left out.
         target: Name of the target.
     """
-    said: dict[str, list[str]] = {}
-    for name, assessment in assessments.items():
-        for note in assessment.notes:
-            said.setdefault(note, []).append(name)
-    whose = {note: "" if len(names) == len(assessments) else f" ({', '.join(names)})" for note, names in said.items()}
-    notes = [f"note{names}: {note}" for note, names in whose.items()]
+    notes = [
+        f"{kind}{whose}: {line}"
+        for kind, lines in (("beware", "cautions"), ("note", "notes"))
+        for line, whose in _said({name: getattr(one, lines) for name, one in assessments.items()}).items()
+    ]
     noise, floor = next(iter(assessments.values())).noise_floor, []
     if selection is not None and noise.value is not None:
         ends = short_span(noise.low, noise.high)
@@ -103,6 +102,15 @@ def score_text(
     tables = map(table_text, _tables(assessments, selection, target))
     sentence = score_sentence(assessments, selection, target=target)
     return group_texts(f"{sentence}\n", *tables, *floor, *notes, *note_texts(left_out))
+
+
+def _said(lines: Mapping[str, Sequence[str]]) -> dict[str, str]:
+    """Each line once, with the proxies that it is said of, where it is not all."""
+    said: dict[str, list[str]] = {}
+    for name, own in lines.items():
+        for line in own:
+            said.setdefault(line, []).append(name)
+    return {line: "" if len(names) == len(lines) else f" ({', '.join(names)})" for line, names in said.items()}
 
 
 def score_view(
@@ -159,8 +167,10 @@ def write_score_report(
 
 
 def _tables(assessments: Assessments, selection: Selection | None, target: str) -> list[Table]:
-    """Every measure of one proxy with success rates below, or proxies ranked; with all notes, each once."""
-    notes = tuple(dict.fromkeys(note for assessment in assessments.values() for note in assessment.notes))
+    """Every measure of one proxy with success rates below, or proxies ranked; all cautions and notes once."""
+    every = assessments.values()
+    cautions = [f"beware: {line}" for line in dict.fromkeys(line for one in every for line in one.cautions)]
+    notes = (*cautions, *dict.fromkeys(note for one in every for note in one.notes))
     if selection is not None:
         return [_ranking(assessments, selection, target, notes)]
     ((proxy, assessment),) = assessments.items()
@@ -319,6 +329,7 @@ def score_document(assessment: Assessment) -> dict[str, Any]:
             "paired": inputs.paired,
             "resamples": inner.resamples,
         },
+        "cautions": list(assessment.cautions),
         "notes": list(assessment.notes),
     }
 
@@ -329,6 +340,7 @@ def ranking_document(assessments: Assessments, selection: Selection) -> dict[str
     return {
         "proxies": [{"proxy": name, "rank": rank, **score_document(assessments[name])} for rank, (name, _) in ranked],
         "differences": differences_document(selection),
+        "cautions": list(dict.fromkeys(line for one in assessments.values() for line in one.cautions)),
         "notes": [f"no intervals of the differences: {selection.reason}"] if selection.reason else [],
     }
 

@@ -1,2 +1,8 @@
-from .reading import column_names as column_names, read_domains as read_domains, read_scores as read_scores, write_scores as write_scores
-from .table import Metric as Metric, ROUNDING as ROUNDING, ScoreTable as ScoreTable, varies as varies
+from .cautions import score_cautions as score_cautions
+from .reading import (
+    column_names as column_names,
+    read_domains as read_domains,
+    read_scores as read_scores,
+    write_scores as write_scores,
+)
+from .table import ROUNDING as ROUNDING, Metric as Metric, ScoreTable as ScoreTable, varies as varies

@@ -253,9 +253,15 @@ def open_settings(settings: StudySettings) -> Study:
     family = load_family(settings, settings.proxy)
     known, left_out = with_scores(settings)
     target, unused = read_target(known, family)
-    cautions, objective = (*left_out, *unused, *unnoticed(settings.folder)), objective_of(settings)
+    cautions = (*left_out, *unused, *unnoticed(settings.folder), *cautions_of(family))
+    objective = objective_of(settings)
     truth, engine, code = _truth(settings, family), _engine(settings), user_code(settings)
     return Study(known, family, target, family.identity, truth, cautions, objective, engine, code)
+
+
+def cautions_of(family: DomainFamily) -> tuple[str, ...]:
+    """Sentences on what is probably not meant in a family's robot or model, where it has any to say."""
+    return tuple(getattr(family, "cautions", ()))
 
 
 def _engine(settings: StudySettings) -> Engine:

@@ -65,7 +65,7 @@ class StudyResult:
         stopped: Why it runs no further; empty while it is not at its end.
         spared: What the trials that were cut off did without: episodes, and about how many seconds of them.
         failures: The first failed episodes, told in one line each.
-        cautions: What the target's table does not allow, in one line each.
+        cautions: What the target's table does not allow, and what is probably not meant, in one line each.
     """
 
     study: Study
@@ -152,10 +152,11 @@ def result_of(run: StudyRun, scored_anew: Sequence[TrialRecord] | None = None) -
     confirmation = confirmation_of(run, trials, learnt)
     answers = _answers(trials, learnt)
     answer = confirmation.answer.trial if confirmation else cast(TrialRecord, answers[-1])
+    best = _best(run, answer, learnt)
     return StudyResult(
         study=study,
         trials=trials,
-        best=_best(run, answer, learnt),
+        best=best,
         knowledge=learnt,
         answers=answers,
         truth=study.truth,
@@ -166,7 +167,15 @@ def result_of(run: StudyRun, scored_anew: Sequence[TrialRecord] | None = None) -
         spared=spared(run, trials),
         failures=_failures(run, trials),
         cautions=tuple(
-            line for line in (*study.cautions, noise_of(run).caution, *apart_notes(run.store), _overran(run)) if line
+            line
+            for line in (
+                *study.cautions,
+                noise_of(run).caution,
+                *apart_notes(run.store),
+                _overran(run),
+                *best.assessment.cautions,
+            )
+            if line
         ),
     )
 

@@ -1,7 +1,44 @@
-from .assessment import Assessment as Assessment, Difference as Difference, PAIRED as PAIRED, PERFECT as PERFECT, Selection as Selection, assess as assess, select_proxy as select_proxy
-from .catalogue import ALL as ALL, MEASURES as MEASURES, Measure as Measure, Measured as Measured, PODS as PODS, POD_IMAGE as POD_IMAGE, POD_POSE as POD_POSE, PPV as PPV, PRPV as PRPV, SRCC as SRCC
-from .comparison import Comparison as Comparison, compare as compare, in_common as in_common, start_of as start_of, starts_of as starts_of
-from .noise import Chance as Chance, NoiseFloor as NoiseFloor, SuccessRates as SuccessRates, chance as chance, floor_of_repeats as floor_of_repeats
+from .assessment import (
+    PAIRED as PAIRED,
+    PERFECT as PERFECT,
+    Assessment as Assessment,
+    Difference as Difference,
+    Selection as Selection,
+    assess as assess,
+    select_proxy as select_proxy,
+)
+from .catalogue import (
+    ALL as ALL,
+    MEASURES as MEASURES,
+    POD_IMAGE as POD_IMAGE,
+    POD_POSE as POD_POSE,
+    PODS as PODS,
+    PPV as PPV,
+    PRPV as PRPV,
+    SRCC as SRCC,
+    Measure as Measure,
+    Measured as Measured,
+)
+from .comparison import (
+    Comparison as Comparison,
+    compare as compare,
+    in_common as in_common,
+    start_of as start_of,
+    starts_of as starts_of,
+)
+from .noise import (
+    Chance as Chance,
+    NoiseFloor as NoiseFloor,
+    SuccessRates as SuccessRates,
+    chance as chance,
+    floor_of_repeats as floor_of_repeats,
+)
 from .pairs import Prpv as Prpv, dominance as dominance, prpv_of_means as prpv_of_means
 from .predictivity import pod_of_images as pod_of_images, pod_of_poses as pod_of_poses
-from .resampling import Ends as Ends, bootstrap_means as bootstrap_means, in_blocks as in_blocks, interval as interval, why_not_repeated as why_not_repeated
+from .resampling import (
+    Ends as Ends,
+    bootstrap_means as bootstrap_means,
+    in_blocks as in_blocks,
+    interval as interval,
+    why_not_repeated as why_not_repeated,
+)

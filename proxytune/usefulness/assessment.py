@@ -18,7 +18,7 @@ import numpy as np
 
 from proxytune.arrays import Floats
 from proxytune.errors import ScoresError
-from proxytune.scores import Metric, ScoreTable
+from proxytune.scores import Metric, ScoreTable, score_cautions
 from proxytune.usefulness.comparison import Comparison, compare
 from proxytune.usefulness.noise import Chance, NoiseFloor, SuccessRates, chance, noise_floor, success_rates
 from proxytune.usefulness.pairs import Prpv, prpv, prpv_of_means
@@ -114,6 +114,12 @@ class Assessment:
     def success_rates(self) -> tuple[SuccessRates, ...]:
         """The metrics of zeros and ones, with each agent's rate."""
         return success_rates(self.inputs)
+
+    @cached_property
+    def cautions(self) -> tuple[str, ...]:
+        """Sentences on what is probably not meant in the tables, as another unit on one side."""
+        inputs = self.inputs
+        return score_cautions(proxy=inputs.proxy, target=inputs.target, metrics=inputs.metrics)
 
     @property
     def notes(self) -> tuple[str, ...]:

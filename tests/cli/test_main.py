@@ -1,5 +1,6 @@
 """Every command answers in one document, and every mistake in one line with its exit status."""
 
+import errno
 import json
 import os
 import re
@@ -35,6 +36,19 @@ def failing(monkeypatch):
         monkeypatch.setattr(listing, "run", run)
 
     return make
+
+
+def test_a_library_that_stumbles_over_too_few_descriptors_is_one_line(failing, capsys):
+    problem = UnboundLocalError("child_r")
+    problem.__context__ = OSError(errno.EMFILE, "Too many open files")
+    failing(problem)
+    assert main(["list", "robots"]) == FAILED
+    assert re.fullmatch(
+        r"proxytune list: the system refused something \(.*Too many open files\).*\n", capsys.readouterr().err
+    )
+    problem.__context__ = OSError(errno.ENOENT, "a file that somebody looked for")
+    with pytest.raises(UnboundLocalError):
+        main(["list", "robots"])
 
 
 @pytest.mark.parametrize("kind", ["robots", "maps", "effects", "agents", "metrics", "engines", "measures"])

@@ -1,6 +1,7 @@
 """What a URDF says of its wheels, and that the bullet plant does not drive one that says otherwise than robot.toml."""
 
 import math
+import os
 import shutil
 import xml.etree.ElementTree as ET
 from dataclasses import replace
@@ -86,6 +87,27 @@ def test_a_urdf_that_disagrees_with_robot_toml_is_refused(tmp_path, case):
     path = tmp_path / "robot.urdf"
     path.write_text(TEXT.replace(before, after))
     with pytest.raises(SettingsError, match=expected):
+        check_body(replace(ROBOT, urdf=path))
+
+
+@pytest.mark.parametrize("named", ["pipe.stl", "package://robots/pipe.stl", "shape.obj"])
+def test_what_a_urdf_names_must_be_a_file(tmp_path, named):
+    path, pipe = tmp_path / "robot.urdf", tmp_path / ("shape.mtl" if named == "shape.obj" else "pipe.stl")
+    (tmp_path / "robots").mkdir()
+    os.mkfifo(pipe)
+    os.mkfifo(tmp_path / "robots" / "pipe.stl")
+    (tmp_path / "shape.obj").write_text("mtllib shape.mtl\nv 0 0 0\n")
+    mesh = f'<visual><geometry><mesh filename="{named}"/></geometry></visual>'
+    path.write_text(TEXT.replace("</link>", f"{mesh}</link>", 1))
+    with pytest.raises(SettingsError, match=r"robot.urdf: names .*which is a folder, a device or a pipe"):
+        check_body(replace(ROBOT, urdf=path))
+
+
+def test_a_mesh_that_robots_collide_as_must_be_there(tmp_path):
+    path = tmp_path / "robot.urdf"
+    mesh = '<collision><geometry><mesh filename="m.stl"/></geometry></collision>'
+    path.write_text(TEXT.replace("</link>", f"{mesh}</link>", 1))
+    with pytest.raises(SettingsError, match=r"names m.stl, which is not there; add it beside the URDF"):
         check_body(replace(ROBOT, urdf=path))
 
 

@@ -7,6 +7,7 @@ FLOORS = (
         "arrays",
         "settings",
         "files",
+        "unpacking",
         "seeds",
         "identity",
         "lineage",

@@ -176,7 +176,7 @@ def test_pickles_and_what_is_no_npz_are_refused(tmp_path):
         assert "savez" in complaint(tmp_path / name)
     np.save(tmp_path / "one.npy", TIMES)
     assert is_arrays(tmp_path / "one.npy")
-    assert "holds no named arrays" in complaint(tmp_path / "one.npy")
+    assert "no .npz file; save the arrays again" in complaint(tmp_path / "one.npy")
     assert "no such file" in complaint(tmp_path / "none.npz")
 
 

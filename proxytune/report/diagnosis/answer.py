@@ -132,7 +132,7 @@ def diagnosis_text(found: LogDiagnosis) -> Group:
         camera, headline = map(table_text, _camera_tables(found.camera)), camera_headline(found.log, found.camera)
         parts += [Text("")] if parts else []
         parts.append(group_texts(Text(headline, style="bold"), *camera, *camera_notes(found.camera)))
-    return group_texts(*parts, *_say_refusals(found))
+    return group_texts(*_say_cautions(found), *parts, *_say_refusals(found))
 
 
 def diagnosis_figures(found: LogDiagnosis) -> dict[str, Figure]:
@@ -152,7 +152,11 @@ def diagnosis_notes(found: LogDiagnosis) -> list[str]:
     """Everything that the tables do not hold, a line each."""
     motion = [] if found.motion is None else motion_notes(found.motion)
     camera = [] if found.camera is None else camera_notes(found.camera)
-    return [*motion, *camera, *_say_refusals(found)]
+    return [*_say_cautions(found), *motion, *camera, *_say_refusals(found)]
+
+
+def _say_cautions(found: LogDiagnosis) -> list[str]:
+    return [f"beware: {line}" for line in found.cautions]
 
 
 def _say_refusals(found: LogDiagnosis) -> list[str]:

@@ -42,7 +42,7 @@ def diagnosis_document(found: LogDiagnosis) -> dict[str, Any]:
     elif camera is not None:
         top |= {key: camera[key] for key in TOP}
     refused = {"motion_refused": found.motion_refused or None, "camera_refused": found.camera_refused or None}
-    return {**top, "camera": camera, **refused}
+    return {**top, "camera": camera, **refused, "cautions": list(found.cautions)}
 
 
 def extended_model_text(found: LogDiagnosis) -> str:

@@ -1,0 +1,186 @@
+"""What a log says that is allowed and probably not meant, a sentence each: axes, units, copies, names.
+
+Whole drives are looked at as `read_log` gives them, so that `import` and `diagnose` tell the same.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from proxytune.arrays import Floats
+from proxytune.logs.log import Log, LogEpisode
+from proxytune.settings import alike_caution, figure_cautions
+
+Figures = Mapping[str, float]
+"""Of a robot, by the names of robot.toml: wheel_radius, effective_baseline [m], full_speed [m/s]."""
+
+CHORD_S = 0.2
+"""Motion is taken along chords of this length: noise of poses is none."""
+MOVES = 0.3
+"""A chord counts from this share of the fast ones on."""
+TURNED = 0.8
+"""Headings that point less alike than this (1: all the same way) can tell a mirrored axis."""
+FITS, MISFITS = 0.85, 0.5
+"""Headings and courses belong together above the one, and do not below the other (1: exactly)."""
+
+LATEST_S = 1.5
+"""Turning is looked for so long after its command."""
+AGAINST = 0.5
+"""A correlation below its negative is turning the other way."""
+
+FASTER, SLOWER = 1.75, 0.5
+"""Gains of motors, slip and dead bands stay within; a duty of another scale, or a speed in another unit, does not."""
+HELD_S = 0.7
+"""Motors have followed a command that has been as large for so long."""
+LARGE = 0.6
+"""Of the largest commands: dead bands and friction take less of these."""
+ENOUGH = 20
+"""Chords."""
+
+
+def log_cautions(log: Log, figures: Figures) -> tuple[str, ...]:
+    """Sentences on what is probably not meant in a log.
+
+    Args:
+        log: The log.
+        figures: Of the robot that drove it; without them nothing is said of how far its commands should take it.
+    """
+    chords = [_chords(episode) for episode in log.episodes]
+    names = alike_caution("drives", (episode.name for episode in log.episodes))
+    found = [
+        *figure_cautions({**figures, **log.geometry}, f"robot {log.robot}"),
+        *_axes(chords),
+        *([] if log.command == "none" else [*_turning(log, chords), *_speeds(log, chords, figures)]),
+        *([names] if names else []),
+        *_copies(log),
+    ]
+    return tuple(found)
+
+
+class Chords(NamedTuple):
+    """Motion of a drive over CHORD_S each, N of them.
+
+    Attributes:
+        times: When each begins (N,) [s].
+        course: Where it leads (N,) [rad].
+        heading: Where the robot points in its middle (N,) [rad].
+        speed: Its length by its time (N,) [m/s].
+        turn: Yaw rate over it (N,) [rad/s].
+    """
+
+    times: Floats
+    course: Floats
+    heading: Floats
+    speed: Floats
+    turn: Floats
+
+
+def _chords(episode: LogEpisode) -> Chords:
+    times, poses = episode.times, episode.poses
+    if episode.measured is not None:
+        times, poses, _ = episode.measured
+    known = np.isfinite(poses[:, 0])
+    times, poses = times[known], poses[known]
+    later = np.searchsorted(times, times + CHORD_S - 1e-9)
+    here = np.flatnonzero(later < len(times))
+    later = later[here]
+    lasts = times[later] - times[here]
+    here, later, lasts = (part[lasts < 2.0 * CHORD_S] for part in (here, later, lasts))
+    moved = poses[later] - poses[here]
+    heading = (poses[later, 2] + poses[here, 2]) / 2.0
+    course = np.arctan2(moved[:, 1], moved[:, 0])
+    return Chords(times[here], course, heading, np.hypot(moved[:, 0], moved[:, 1]) / lasts, moved[:, 2] / lasts)
+
+
+def _axes(drives: list[Chords]) -> Iterator[str]:
+    """Tell where the robot moves in a mirror: x or y reversed, or exchanged, and headings not."""
+    speed, course, heading = (np.concatenate([getattr(one, name) for one in drives]) for name in CHORD_PARTS)
+    if len(speed) < ENOUGH:
+        return
+    moves = speed >= max(MOVES * float(np.quantile(speed, 0.9)), 1e-9)
+    course, heading = course[moves], heading[moves]
+    # Doubled angles: backwards is as good as forwards
+    together, mirrored, spread = (
+        float(np.abs(np.mean(np.exp(2j * angle)))) for angle in (course - heading, course + heading, heading)
+    )
+    if spread < TURNED and together < MISFITS and mirrored > FITS:
+        yield (
+            "places are mirrored against headings: the robot moves where a mirror image of it points; reverse x or y, "
+            "or exchange them, so that headings turn from x to y"
+        )
+
+
+CHORD_PARTS = ("speed", "course", "heading")
+
+
+def _commanded(log: Log, figures: Figures) -> list[tuple[Floats, Floats]]:
+    """What each drive's commands ask for at its samples: speed [m/s], NaN if not known, and turning in any unit."""
+    figure = {"duty": "full_speed", "wheel_speed": "wheel_radius"}.get(log.command, "")
+    scale = 1.0 if log.command == "twist" else {**figures, **log.geometry}.get(figure, np.nan)
+    held = [episode.held for episode in log.episodes]
+    if figure:
+        return [(scale * one.mean(axis=1), one[:, 1] - one[:, 0]) for one in held]
+    return [(scale * one[:, 0], one[:, 1]) for one in held]
+
+
+def _turning(log: Log, drives: list[Chords]) -> Iterator[str]:
+    """Tell where it turns the other way than its commands ask, at any delay."""
+    lags = np.arange(0.0, LATEST_S, 0.1)
+    found = np.zeros((len(lags), 3))
+    for episode, chords, (_, turn) in zip(log.episodes, drives, _commanded(log, {}), strict=True):
+        if len(chords.times) < ENOUGH:
+            continue
+        asked = np.stack([np.interp(chords.times + CHORD_S / 2.0 - lag, episode.times, turn) for lag in lags])
+        asked = asked - asked.mean(axis=1, keepdims=True)
+        done = chords.turn - chords.turn.mean()
+        found += np.stack((asked @ done, (asked**2).sum(axis=1), np.full(len(lags), done @ done)), axis=1)
+    sizes = np.sqrt(found[:, 1] * found[:, 2])
+    if not sizes.any():
+        return
+    correlation = found[:, 0] / np.where(sizes > 0.0, sizes, 1.0)
+    strongest = float(correlation[np.argmax(np.abs(correlation))])
+    if strongest < -AGAINST:
+        yield (
+            f"the robot turns the other way than its commands say (correlation {strongest:.2f}): headings that grow "
+            "clockwise, a mirrored axis, or left and right exchanged"
+        )
+
+
+def _speeds(log: Log, drives: list[Chords], figures: Figures) -> Iterator[str]:
+    """Tell where large commands, held for a while, take it much further or less far than they ask for."""
+    ratios = []
+    for episode, chords, (asked, _) in zip(log.episodes, drives, _commanded(log, figures), strict=True):
+        size = np.abs(asked)
+        if not len(chords.times) or not np.isfinite(size).all() or not size.any():
+            continue
+        at = [np.interp(chords.times + shift, episode.times, size) for shift in (CHORD_S, 0.0, -HELD_S / 2.0, -HELD_S)]
+        least, most = np.min(at, axis=0), np.max(at, axis=0)
+        held = (least >= LARGE * np.quantile(size, 0.95)) & (most <= 1.2 * least)
+        ratios.append(chords.speed[held] / np.mean(at, axis=0)[held])
+    found = np.concatenate(ratios) if ratios else np.empty(0)
+    if len(found) < ENOUGH:
+        return
+    ratio = float(np.median(found))
+    if not SLOWER < ratio < FASTER:
+        unit = {
+            "duty": "duties of -1 to 1 at full duty, and full_speed",
+            "twist": "the unit of v",
+            "wheel_speed": "wheel speeds in rad/s, and wheel_radius",
+        }[log.command]
+        yield f"the robot drives {ratio:.2g} times as fast as its largest commands say: check {unit}"
+
+
+def _copies(log: Log) -> Iterator[str]:
+    """Tell of drives that are others to the last digit."""
+    first: dict[bytes, str] = {}
+    copies = []
+    for episode in log.episodes:
+        known = episode.poses[np.isfinite(episode.poses[:, 0])]
+        if len(known) > 1 and np.ptp(known, axis=0).any():
+            other = first.setdefault(episode.commands.tobytes() + known.tobytes(), episode.name)
+            copies += [(episode.name, other)] if other != episode.name else []
+    if copies:
+        one, other = copies[0]
+        more = f" (and {len(copies) - 1} more copies)" if len(copies) > 1 else ""
+        yield f"drive '{one}' is a copy of '{other}' to the last digit{more}; give each once, or intervals shrink"

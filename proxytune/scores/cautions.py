@@ -1,0 +1,145 @@
+"""What score tables say that is allowed and probably not meant, a sentence each; none of it changes a figure.
+
+Two sides may differ in units, in the length of their episodes, or in how they spell a name, and are compared all the
+same. What is told here is plain: a poor proxy, a short table or a coarse score draws no caution.
+"""
+
+import re
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from proxytune.arrays import Floats
+from proxytune.scores.table import Metric, ScoreTable, varies
+from proxytune.settings import alike_caution
+
+TIMES = re.compile(r"(^|_|\b)(time|seconds|duration|survival|lifetime|steps)(_|\b|$)", re.IGNORECASE)
+NO_TIMES = re.compile(r"diff|delta|advantage|gain|margin|offset|error|log|reward|per_|rate", re.IGNORECASE)
+"""What names of metrics say that count from zero, and of those that may be below."""
+
+OTHER_UNIT = 8.0
+"""Where all agents' scores differ by about one factor, this one is no longer a matter of physics."""
+ANY_UNIT = 100.0
+"""Where they differ by this factor, they need not agree on it."""
+AGREED = 0.3
+"""Agents agree on a factor: half of them within this many powers of ten."""
+
+SAME_LENGTH = 1.05
+CEILING = 0.1
+"""A time limit is where at least this share of the episodes ends."""
+FEWEST_AT_CEILING = 3
+
+DISTINCT = 0.8
+"""Copies of episodes are told from coarse scores, which agents share: so many rows belong to one agent alone."""
+
+
+def score_cautions(*, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -> tuple[str, ...]:
+    """Sentences on what is probably not meant in two tables of the same agents.
+
+    Args:
+        proxy: Scores in the proxy.
+        target: Scores on the target, with the same agents in the same order.
+        metrics: How agents are compared, in the order of both tables' columns.
+    """
+    sides = {"the proxy": proxy, "the target": target}
+    lines = [*_names(sides)]
+    for side, table in sides.items():
+        lines += _negative_times(table, metrics, side)
+        lines += _copies(table, side)
+        lines += _tolerances(table, metrics, side)
+    lengths = [*_lengths(proxy, target, metrics)]
+    return (*lines, *lengths, *_units(proxy, target, metrics, alone=not lengths))
+
+
+def _names(sides: dict[str, ScoreTable]) -> Iterator[str]:
+    for what in ("agents", "episodes"):
+        line = alike_caution(what, (name for table in sides.values() for name in getattr(table, what)))
+        if line:
+            yield line
+
+
+def _negative_times(table: ScoreTable, metrics: Sequence[Metric], side: str) -> Iterator[str]:
+    for place, metric in enumerate(metrics):
+        if _is_time(metric.name) and (table.values[..., place] < 0.0).any():
+            agent, episode = np.argwhere(table.values[..., place] < 0.0)[0]
+            where = f"as agent '{table.agents[agent]}' in episode '{table.episodes[episode]}'"
+            value = table.values[agent, episode, place]
+            yield f"{metric.name} of {side} is below zero, {where}: {value:g}; a time cannot be: check its sign"
+
+
+def _is_time(name: str) -> bool:
+    return bool(TIMES.search(name)) and not NO_TIMES.search(name)
+
+
+def _copies(table: ScoreTable, side: str) -> Iterator[str]:
+    """Most agents have every episode at least twice, to the last digit."""
+    rows = [table.values[agent][table.driven[agent]] for agent in range(len(table.agents))]
+    distinct = [np.unique(own, axis=0) for own in rows]
+    repeated = [2 * len(few) <= len(own) for own, few in zip(rows, distinct, strict=True)]
+    pooled = len(np.unique(np.concatenate(distinct), axis=0))
+    kept = sum(map(len, distinct))
+    if np.mean(repeated) >= 0.75 and pooled >= max(DISTINCT * kept, 4):
+        yield (
+            f"of {table.counts.sum()} episodes of {side} only {kept} differ from one another: the others are copies to "
+            "the last digit; give each once, or intervals come out too narrow"
+        )
+
+
+def _tolerances(table: ScoreTable, metrics: Sequence[Metric], side: str) -> Iterator[str]:
+    for place, metric in enumerate(metrics):
+        merits, tie = metric.merits(table.means[:, place])
+        if metric.tolerance and varies(table.means)[place] and np.ptp(merits) <= tie[0]:
+            percent = " %" if metric.percent else ""
+            yield (
+                f"the tolerance of {metric.name}, {metric.tolerance:g}{percent}, leaves no two agents of {side} apart: "
+                "all tie; give a smaller one"
+            )
+
+
+def _lengths(proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -> Iterator[str]:
+    """Where a time limit ends episodes on one side, and others last longer on the other."""
+    for place, metric in enumerate(metrics):
+        if not _is_time(metric.name):
+            continue
+        (most, limited), (other, other_limited) = (_longest(table, place) for table in (proxy, target))
+        shorter = limited if most < other else other_limited
+        factor = max(most, other) / min(most, other) if min(most, other) > 0.0 else 1.0
+        if shorter and factor > SAME_LENGTH and not _unit_of_time(factor):
+            yield (
+                f"episodes last up to {most:.4g} in the proxy and up to {other:.4g} on the target by {metric.name}; "
+                "give both sides one time limit, or scores that grow with time cannot be compared"
+            )
+
+
+def _longest(table: ScoreTable, place: int) -> tuple[float, bool]:
+    """The longest episode, and whether a limit ended it: others end with it."""
+    times = table.values[..., place][table.driven]
+    longest = float(times.max())
+    ended = int((times >= longest - 1e-3 * abs(longest)).sum())
+    return longest, ended >= max(FEWEST_AT_CEILING, CEILING * len(times))
+
+
+def _unit_of_time(factor: float) -> bool:
+    """A factor that is one of milliseconds or minutes, and hardly one of time limits."""
+    return any(abs(factor / unit - 1.0) < 0.02 for unit in (60.0, 1e3, 1e6, 1e9))
+
+
+def _units(proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric], *, alone: bool) -> Iterator[str]:
+    for place, metric in enumerate(metrics):
+        ratio = _ratio(proxy.means[:, place], target.means[:, place])
+        largest = [float(np.nanmax(np.abs(table.values[..., place]))) for table in (proxy, target)]
+        if ratio is None or max(largest) <= 1.0 or not (alone or abs(np.log10(ratio)) > np.log10(ANY_UNIT)):
+            continue
+        factor, of = (ratio, "the proxy are") if ratio > 1.0 else (1.0 / ratio, "the target are")
+        yield f"scores of {metric.name} in {of} {factor:.4g} times those of the other side; give both in one unit"
+
+
+def _ratio(one: Floats, other: Floats) -> float | None:
+    """The factor between two sides' means, where there is one that is more than a poor proxy's."""
+    told = (one != 0.0) & (other != 0.0)
+    if told.sum() < 3 or told.mean() < 0.5:
+        return None
+    logs = np.log10(np.abs(one[told])) - np.log10(np.abs(other[told]))
+    middle, low, high = np.median(logs), *np.quantile(logs, (0.25, 0.75))
+    least = np.log10(OTHER_UNIT if high - low < AGREED else ANY_UNIT)
+    return float(10.0**middle) if abs(middle) >= least else None

@@ -1,0 +1,144 @@
+"""What is packed is measured before it is unpacked: a few kilobytes may say that they hold gigabytes.
+
+One limit of each kind, and one environment variable that raises them all.
+"""
+
+import os
+import warnings
+import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from proxytune.errors import InputError
+
+LARGEST = "PROXYTUNE_LARGEST_MB"
+"""The environment variable that raises the limits [MB]."""
+
+ARRAYS_MB = 1000
+"""All arrays of a file together, or all pictures of a log as they are kept: what reads them takes two or three times
+as much memory."""
+
+BAG_MB = 1000
+"""What a bag unpacks to, or a hundred times its own size: no recording of a robot is denser."""
+
+PICTURE_MB = 200
+"""One picture of red, green and blue: 66 megapixels."""
+
+
+def check_unpacked(where: object, size: float, usual_mb: float) -> None:
+    """Refuse what would unpack to more bytes than is allowed.
+
+    Args:
+        where: What it is, as a complaint names it.
+        size: Bytes that it unpacks to.
+        usual_mb: The limit of its kind [MB], where nobody has raised it.
+
+    Raises:
+        InputError: If it does, with what raises the limit; or if what is to raise it is no number.
+    """
+    most = allowed_bytes(usual_mb)
+    if size > most:
+        remedy = f"if it is meant, allow as much by the environment variable {LARGEST}={-(-int(size) // 10**6)}"
+        raise InputError(f"{where}: unpacks to {size / 1e6:.0f} MB or more, of {most / 1e6:.0f} MB at most; {remedy}")
+
+
+def allowed_bytes(usual_mb: float) -> float:
+    """The bytes that something may unpack to.
+
+    Raises:
+        InputError: If the environment variable that raises the limit is no number.
+    """
+    stated = os.environ.get(LARGEST, "0")
+    try:
+        return 1e6 * max(usual_mb, float(stated))
+    except ValueError:
+        raise InputError(f"{LARGEST}={stated}: must be a number of megabytes, as in {LARGEST}=4000") from None
+
+
+def read_arrays(path: Path, usual_mb: float = ARRAYS_MB) -> dict[str, NDArray[Any]]:
+    """The arrays of an .npz file, by name.
+
+    Args:
+        path: The file.
+        usual_mb: The limit of them all together [MB], where nobody has raised it.
+
+    Raises:
+        InputError: If they unpack to more than is allowed.
+        Exception: Nearly any, zipfile's, zlib's and numpy's own, where the file is damaged or holds pickled objects.
+    """
+    with path.open("rb") as stream:
+        with zipfile.ZipFile(stream) as packed:
+            # No more is ever unpacked of an entry than it states
+            check_unpacked(path, sum(entry.file_size for entry in packed.infolist()), usual_mb)
+        stream.seek(0)
+        with np.load(stream, allow_pickle=False) as file:
+            return {name: np.asarray(file[name]) for name in file.files}
+
+
+@contextmanager
+def open_picture(source: Path | IO[bytes], where: object, formats: tuple[str, ...]) -> Iterator[Image.Image]:
+    """A picture whose size is known and whose pixels are not unpacked yet.
+
+    Args:
+        source: The file.
+        where: What it is, as a complaint names it.
+        formats: What it may be, as Pillow calls them; others are handed to no decoder.
+
+    Raises:
+        InputError: If its pixels take more than is allowed.
+        Exception: What Pillow raises at files that are damaged.
+    """
+    with warnings.catch_warnings(), _own_limit():
+        warnings.simplefilter("ignore")
+        with Image.open(source, formats=formats) as image:
+            check_unpacked(
+                f"{where}: a picture of {image.width} × {image.height}", 3.0 * image.width * image.height, PICTURE_MB
+            )
+            yield image
+
+
+@contextmanager
+def _own_limit() -> Iterator[None]:
+    """Pillow's own limit, which nobody can raise from outside, gives way to ours."""
+    kept, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
+    try:
+        yield
+    finally:
+        Image.MAX_IMAGE_PIXELS = kept
+
+
+class Decompressor(Protocol):
+    """What bz2, lz4 and zstd have in common."""
+
+    eof: bool
+    unused_data: bytes
+
+    def decompress(self, data: bytes, max_length: int) -> bytes:
+        """The next bytes, no more than these."""
+        ...
+
+
+AT_ONCE = 2**20
+
+
+def unpacked_size(new: type[Decompressor], data: bytes, most: float) -> int:
+    """The bytes that packed ones unpack to, counted a megabyte at a time, up to where they are too many.
+
+    Raises:
+        Exception: The decompressor's own, where they are damaged.
+    """
+    size, unpacker = 0, new()
+    while size <= most:
+        piece = unpacker.decompress(data, AT_ONCE)
+        size, data = size + len(piece), b""
+        if unpacker.eof and unpacker.unused_data:
+            data, unpacker = unpacker.unused_data, new()
+        elif unpacker.eof or not piece:
+            return size
+    return size

@@ -1,0 +1,166 @@
+"""Whatever is in a recording or a model, import, predict, export, diagnose and drive do it or tell why in one line.
+
+What reads a file may take what that which comes after it cannot bear: here both are done, on the same spoilt files.
+They are spoilt as those of `test_readers`, and as often.
+"""
+
+import shutil
+import sys
+import zlib
+from pathlib import Path
+
+sys.path.append(str(Path(__file__).parent))
+
+import bags
+import foreign_robot
+import numpy as np
+import pytest
+from mutation import mutated
+from PIL import Image
+from test_readers import MODEL, ONE_DRIVE, Reader, copy_robot, inputs, outcome, write_a_log
+
+from proxytune.api import diagnose, export, import_log, predict
+from proxytune.diagnosis import RULES
+from proxytune.domain import make_episode
+from proxytune.driving import lane_following, read_robot
+from proxytune.logs import read_log, read_pictures
+from proxytune.settings import Section
+
+__all__ = ["inputs"]  # A fixture
+
+TIMES = np.arange(0.0, ONE_DRIVE, 0.05)
+
+
+def drive_numbers():
+    """Poses (N, 3) and twists (N, 2) of a circle."""
+    poses = np.stack((np.sin(0.5 * TIMES), 1.0 - np.cos(0.5 * TIMES), 0.5 * TIMES), axis=1)
+    return poses, np.stack((np.full(len(TIMES), 0.5), np.full(len(TIMES), 0.5)), axis=1)
+
+
+def write_bag(storage):
+    def make(home, finished):
+        poses, twists = drive_numbers()
+        pictures = (TIMES[::60], np.zeros((len(TIMES[::60]), 4, 5, 3), dtype=np.uint8))
+        bags.write_bag(
+            home / ("a.bag" if storage == "ros1" else "a"), storage, (TIMES, twists), (TIMES, poses), pictures
+        )
+
+    return make
+
+
+def import_it(name):
+    """As `import SOURCE OUTPUT` does it."""
+
+    def read(home):
+        shutil.rmtree(home / "out", ignore_errors=True)
+        return import_log(home / name, home / "out").document()
+
+    return read
+
+
+def write_npz(home, finished):
+    poses, twists = drive_numbers()
+    columns = {"time": TIMES, "x": poses[:, 0], "y": poses[:, 1], "heading": poses[:, 2]}
+    frames = np.zeros((len(TIMES), 3, 4, 3), dtype=np.uint8)
+    np.savez_compressed(home / "a.npz", **columns, v=twists[:, 0], omega=twists[:, 1], frames=frames)
+
+
+def write_pictures(ending):
+    def make(home, finished):
+        write_a_log(home, finished)
+        (home / "frames").mkdir()
+        noise = np.random.default_rng(0).integers(0, 256, (12, 16, 3), dtype=np.uint8)
+        for number in range(2):
+            Image.fromarray(noise).save(home / "frames" / f"{number}.{ending}")
+        text = (home / "log.toml").read_text()
+        (home / "log.toml").write_text(f'map = "small_loop"\n{text}\n[camera]\nframes = "frames/%d.{ending}"\n')
+        times = (home / "samples.csv").read_text().splitlines()[2].split(",")
+        (home / "frames.csv").write_text(
+            f"frame,episode,time\n0,{times[0]},{float(times[1])}\n1,{times[0]},{float(times[1]) + 1.0}\n"
+        )
+
+    return make
+
+
+def read_frames(home):
+    frames = read_log(home).frames
+    assert frames is not None
+    return read_pictures(frames, range(len(frames.paths)))
+
+
+def write_model_and_log(home, finished):
+    (home / "model.toml").write_text(MODEL + "[effects.camera_pitch]\ncamera_pitch = 20.0\n")
+    (home / "log").mkdir()
+    foreign_robot.write_own_times(home / "log", [foreign_robot.drive(1, seconds=ONE_DRIVE)])
+
+
+def predict_it(home):
+    return predict(home / "model.toml", home / "log", horizon_s=1.0).document()
+
+
+def export_it(home):
+    return [export(home / "model.toml", home / f"out.{to}", to=to).document() for to in ("urdf", "mjcf", "ros")]
+
+
+def diagnose_it(home):
+    return diagnose(home, declared=["delay"], rules=RULES).document()
+
+
+def drive_it(home):
+    read_robot.cache_clear()
+    domain = {"robot": "own", "plant": "planar", "seconds": 1.0}
+    family = lane_following(Section(home / "study.toml", "domain.", domain), model=None)
+    return family.run(make_episode({"trim": 0.01}, agent="steady", start=0, seed=1))
+
+
+LOG = ("log/log.toml", "log/samples.csv", "log/commands.csv")
+BEHIND = {
+    "import ros1": Reader(write_bag("ros1"), ("a.bag",), import_it("a.bag")),
+    "import sqlite3": Reader(write_bag("sqlite3"), ("a/a.db3", "a/metadata.yaml"), import_it("a")),
+    "import mcap": Reader(write_bag("mcap"), ("a/a.mcap", "a/metadata.yaml"), import_it("a")),
+    "import npz": Reader(write_npz, ("a.npz",), import_it("a.npz")),
+    "png": Reader(write_pictures("png"), ("frames/0.png", "frames/1.png"), read_frames),
+    "jpg": Reader(write_pictures("jpg"), ("frames/0.jpg", "frames/1.jpg"), read_frames, complains=False),
+    "predict": Reader(write_model_and_log, ("model.toml",), predict_it),
+    "predict of a log": Reader(
+        write_model_and_log, ("log/log.toml", "log/samples.csv", "log/commands.csv"), predict_it
+    ),
+    "export": Reader(write_model_and_log, ("model.toml",), export_it),
+    "diagnose": Reader(write_a_log, ("log.toml", "samples.csv", "commands.csv"), diagnose_it),
+    "drive": Reader(copy_robot, ("own/robot.toml", "own/duckiebot.urdf"), drive_it),
+}
+SHARE = {
+    "import ros1": 0.3,
+    "import sqlite3": 0.2,
+    "import mcap": 0.3,
+    "import npz": 0.5,
+    "diagnose": 0.02,
+    "drive": 0.2,
+}
+SHARE |= {"predict": 0.5, "predict of a log": 0.3}
+"""What takes longer is done less often."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", BEHIND)
+def test_what_is_done_with_a_spoilt_file_is_done_or_told_in_one_line(name, inputs, tmp_path, finished_once):
+    reader, home = BEHIND[name], tmp_path / "spoilt"
+    home.mkdir()
+    reader.make(home, finished_once)
+    good = {file: (home / file).read_bytes() for file in reader.spoil}
+    first = outcome(reader.read, home)
+    assert first is None or name in ("diagnose",), first
+    complaints = 0
+    for number in range(round(inputs * SHARE.get(name, 1.0))):
+        random = np.random.default_rng((zlib.crc32(name.encode()), number))
+        file = reader.spoil[int(random.integers(len(reader.spoil)))]
+        content = mutated(good[file], random)
+        (home / file).write_bytes(content)
+        try:
+            complaint = outcome(reader.read, home)
+        except Exception as problem:
+            pytest.fail(f"{file}, number {number}: {type(problem).__name__}: {problem}\n{content[:1000]!r}")
+        assert complaint is None or "\n" not in complaint, f"{file}, number {number}: {complaint!r}"
+        complaints += complaint is not None
+        (home / file).write_bytes(good[file])
+    assert not reader.complains or complaints > 0.1 * number, "hardly any change was noticed"

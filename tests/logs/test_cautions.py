@@ -1,0 +1,82 @@
+"""What is allowed in a log and probably not meant is told in a sentence; hidden effects and noise draw none."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hidden_cases import CLEAN, IN_FORM, OTHER_FORM, OUTSIDE, make_log
+
+from proxytune.driving import read_robot
+from proxytune.logs import log_cautions
+from proxytune.settings import figure_cautions
+
+FIGURES = read_robot("duckiebot").figures
+LOG = make_log(CLEAN[0], episodes=3, seconds=40.0)
+
+
+def cautions(log):
+    return log_cautions(log, FIGURES)
+
+
+def changed(change):
+    return replace(LOG, episodes=tuple(change(episode) for episode in LOG.episodes))
+
+
+def moved(*signs):
+    return changed(lambda episode: replace(episode, poses=episode.poses * signs))
+
+
+def exchanged(episode):
+    return replace(episode, poses=episode.poses[:, [1, 0, 2]])
+
+
+def commanded(factor):
+    return changed(lambda episode: replace(episode, commands=factor * episode.commands))
+
+
+def thrice():
+    one = LOG.episodes[0]
+    return replace(LOG, episodes=(one, replace(one, name="again"), replace(one, name="third")))
+
+
+def named(*names):
+    pairs = zip(LOG.episodes, names, strict=False)
+    return replace(LOG, episodes=tuple(replace(episode, name=name) for episode, name in pairs))
+
+
+CASES = {
+    "y reversed": (moved(1, -1, 1), "places are mirrored against headings"),
+    "x and y exchanged": (changed(exchanged), "places are mirrored against headings"),
+    "a left-handed frame": (moved(1, -1, -1), "turns the other way than its commands say"),
+    "duties at half scale": (
+        commanded(0.5),
+        r"drives (1.9|2|2.1) times as fast as its largest commands say: ch",
+    ),
+    "a wheel in mm": (replace(LOG, geometry={"wheel_radius": 31.8}), "its wheel_radius is 31.8 m, and robots have"),
+    "drives given three times": (thrice(), r"drive 'again' is a copy of '00' to the last digit \(and 1 more"),
+    "an é in two forms": (named("\u00e9", "e\u0301"), "read the same and are taken for different ones"),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_what_is_probably_not_meant_is_told_in_one_sentence(case):
+    log, expected = CASES[case]
+    (line,) = cautions(log)
+    assert re.search(expected, line)
+
+
+@pytest.mark.parametrize("case", [CLEAN[0], *IN_FORM[::5], *OTHER_FORM[::7], *OUTSIDE[::3]], ids=lambda case: case.name)
+def test_what_a_diagnosis_is_for_draws_no_caution(case):
+    assert cautions(make_log(case, episodes=3, seconds=40.0)) == ()
+
+
+def test_a_wheel_of_a_few_hundredths_of_a_millimetre_is_told():
+    (line,) = figure_cautions({"wheel_radius": 3e-5, "full_speed": 0.6}, "robot mine")
+    assert line.startswith("robot mine: its wheel_radius is 3e-05 m, and robots have 0.002 to 1.5 m")
+
+
+def test_without_poses_or_figures_nothing_is_said():
+    lost = changed(lambda episode: replace(episode, poses=np.full_like(episode.poses, np.nan)))
+    assert cautions(lost) == ()
+    assert log_cautions(commanded(0.5), {}) == ()

@@ -23,6 +23,7 @@ from proxytune.driving.episode import (
     Drive,
     Driver,
     Instance,
+    Shown,
     alike,
     ask_many,
     begin_all,
@@ -300,6 +301,7 @@ class _Drives:
         self.results: list[Any] = [None] * len(drivers)
         self._by_picture = all(isinstance(driver, Pupil) for driver in drivers)
         self._memories: list[Any] = []
+        self._shown: Shown | None = None
         self._commands = np.zeros((len(drivers), 2))
         self._issued = np.empty((len(drivers), rollouts.steps, 2))
         self._poses = np.empty((len(drivers), rollouts.steps * rollouts.hold + 1, 3))
@@ -314,10 +316,12 @@ class _Drives:
         """Ask for the next commands; a policy that has seen the pictures before would answer the same."""
         if not self.drivers or (self._by_picture and not self.rollouts.new_pictures):
             return
-        seen: Sequence[Any] = self.rollouts.pictures
         if self._sees is not picture_only:
-            seen = [self._sees(*one) for one in zip(seen, self.rollouts.poses[:, -1], strict=True)]
-        self._commands, self._memories, problems = ask_many(self.drivers, seen, self._memories, time_s)
+            sights = zip(self.rollouts.pictures, self.rollouts.poses[:, -1], strict=True)
+            self._shown = Shown(self.drivers, [self._sees(*one) for one in sights])
+        elif self._shown is None or self.rollouts.new_pictures:
+            self._shown = Shown(self.drivers, self.rollouts.pictures)
+        self._commands, self._memories, problems = ask_many(self.drivers, self._shown, self._memories, time_s)
         self._fail(problems)
 
     def step(self, number: int) -> None:
@@ -346,7 +350,7 @@ class _Drives:
         self.rollouts.keep(rows)
         self.drivers = [self.drivers[row] for row in rows]
         self._memories = [self._memories[row] for row in rows]
-        self._commands = self._commands[rows]
+        self._commands, self._shown = self._commands[rows], None
 
 
 def drive(

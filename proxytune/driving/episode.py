@@ -14,6 +14,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from proxytune.arrays import Floats
 from proxytune.driving.agent import Command, Picture
@@ -163,7 +164,7 @@ class Shown:
         groups: Numbers of drivers that are asked at once, and how: by what they look at, or by their own `act_many`.
     """
 
-    def __init__(self, drivers: Sequence[Driver], seen: Sequence[Any]) -> None:
+    def __init__(self, drivers: Sequence[Driver], seen: Sequence[Any] | NDArray[np.uint8]) -> None:
         """Group the drivers; those that say what they look at share what is found there."""
         self.seen = seen
         self.groups: list[tuple[list[int], Callable[[list[Any]], Any]]] = []
@@ -178,7 +179,7 @@ class Shown:
         for numbers in members.values():
             first, last = numbers[0], numbers[-1] + 1
             pictures = seen[first:last] if last - first == len(numbers) else seen[numbers]
-            of_group = [drivers[number] for number in numbers]
+            of_group: list[Any] = [drivers[number] for number in numbers]
             if _looks(of_group[0]):
                 self.groups.append((numbers, functools.partial(act_together, of_group, Seen(pictures))))
             elif len(numbers) > 1:

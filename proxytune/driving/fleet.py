@@ -9,7 +9,7 @@ asked for each robot by itself.
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,14 +33,16 @@ from proxytune.driving.episode import (
 from proxytune.driving.expert import Pupil
 from proxytune.driving.plants import Drivetrain, PlanarFleet, PlanarPlant, Plant
 from proxytune.driving.robot import Robot
-from proxytune.effects import CATALOGUE, Chain, Effect, FilterContext, Learnt, Memory, Signal, Stage
+from proxytune.effects import CATALOGUE, Chain, Effect, FilterContext, Learnt, Memory, Signal, Stage, Trace
 from proxytune.errors import EpisodeError
 from proxytune.space import Parameter
 
-AT_ONCE = 48
-"""So many robots drive side by side: each has a world in memory."""
-
 PLANTS = ("bullet", "planar")
+
+AT_ONCE = {"bullet": 16, "planar": 48}
+"""So many robots drive side by side on a plant: each has a world in Bullet, which takes 33 MB."""
+
+Result = TypeVar("Result")
 
 
 class Fleet(Protocol):
@@ -109,7 +111,7 @@ class _Apart:
     name: ClassVar[str] = "apart"
     stage: ClassVar[Stage] = Stage.COMMAND
     parameters: ClassVar[tuple[Parameter, ...]] = ()
-    trace: ClassVar[None] = None
+    trace: ClassVar[Trace | None] = None
 
     def begin(self, context: FilterContext) -> list[Memory]:
         """Each robot's memory, from a context of arrays (robots, …)."""
@@ -368,7 +370,7 @@ def drive(
     return only(drive_fleet([instance], Plants([plant]), [driver], [course], sees))
 
 
-def only(results: Sequence[Any | EpisodeError]) -> Any:
+def only(results: Sequence[Result | EpisodeError]) -> Result:
     """The result of a fleet of one.
 
     Raises:

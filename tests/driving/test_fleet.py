@@ -136,7 +136,7 @@ def test_robots_drop_out_as_they_leave_the_map_and_the_others_go_on(plant):
 def test_episodes_of_several_thetas_and_more_than_drive_at_once_score_as_each_does():
     room = classroom(plant="planar", seconds=1.0)
     several = [*episodes(2), *episodes(2, trim=0.2), *episodes(1)]
-    many = [make_episode({}, agent="pupil", start=n % room.starts, seed=n) for n in range(AT_ONCE + 3)]
+    many = [make_episode({}, agent="pupil", start=n % room.starts, seed=n) for n in range(AT_ONCE[room.plant] + 3)]
     for what in (several, many, []):
         assert room.examine_together(what, lean) == [room.examine(one, lean) for one in what]
 

@@ -6,6 +6,7 @@ traffic), and a robot is in it while it is at most half a lane width from its ce
 way is in neither lane. `driving_score` is that of the paper's learning experiment.
 """
 
+import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,11 +14,14 @@ from types import MappingProxyType
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from proxytune.arrays import Floats
 from proxytune.driving.agent import Command, Picture
+from proxytune.driving.agents import act_many, act_together
 from proxytune.driving.lane import LanePose, lane_length, lane_pose
 from proxytune.driving.optics import Renderer
+from proxytune.driving.perception import Seen
 from proxytune.driving.plants import Drivetrain
 from proxytune.driving.road import Road
 from proxytune.driving.robot import Robot
@@ -152,48 +156,74 @@ def begin_all(drivers: Sequence[Driver], robots: Sequence[Robot]) -> tuple[list[
     return memories, failed
 
 
+class Shown:
+    """What drivers are shown, and which of them can answer together: kept while the pictures are the newest.
+
+    Attributes:
+        seen: For each driver a picture (an array of all), or what `sees` makes of it.
+        groups: Numbers of drivers that are asked at once, and how: by what they look at, or by their own `act_many`.
+    """
+
+    def __init__(self, drivers: Sequence[Driver], seen: Sequence[Any] | NDArray[np.uint8]) -> None:
+        """Group the drivers; those that say what they look at share what is found there."""
+        self.seen = seen
+        self.groups: list[tuple[list[int], Callable[[list[Any]], Any]]] = []
+        if not isinstance(seen, np.ndarray):
+            return
+        members: dict[Any, list[int]] = {}
+        for number, driver in enumerate(drivers):
+            if _looks(driver):
+                members.setdefault(None, []).append(number)
+            elif hasattr(driver, "act_many"):
+                members.setdefault(id(driver), []).append(number)
+        for numbers in members.values():
+            first, last = numbers[0], numbers[-1] + 1
+            pictures = seen[first:last] if last - first == len(numbers) else seen[numbers]
+            of_group: list[Any] = [drivers[number] for number in numbers]
+            if _looks(of_group[0]):
+                self.groups.append((numbers, functools.partial(act_together, of_group, Seen(pictures))))
+            elif len(numbers) > 1:
+                self.groups.append((numbers, functools.partial(of_group[0].act_many, pictures)))
+
+
+def _looks(driver: Any) -> bool:
+    """Tell whether it is of the shipped agents, which say what they look at."""
+    return getattr(type(driver), "act_many", None) is act_many
+
+
 def ask_many(
-    drivers: Sequence[Driver], seen: Sequence[Any], memories: Sequence[Any], time_s: float
+    drivers: Sequence[Driver], shown: Shown, memories: Sequence[Any], time_s: float
 ) -> tuple[Signal, list[Any], dict[int, EpisodeError]]:
-    """Ask drivers for their next commands: those that are one object and offer `act_many` at once, others one by one.
+    """Ask drivers for their next commands, together where they can: one by one the culprit of an error is named.
 
     Returns:
         Commands (drivers, 2), memories for the ones after, and by its number why a driver failed, with the time [s].
     """
     commands, after, failed = np.zeros((len(drivers), 2)), list(memories), {}
-    groups: dict[int, list[int]] = {}
-    for number, driver in enumerate(drivers):
-        groups.setdefault(id(driver), []).append(number)
-    for members in groups.values():
-        together = _ask_together(drivers[members[0]], seen, memories, members)
+    alone = dict.fromkeys(range(len(drivers)))
+    for numbers, act in shown.groups:
+        together = _ask_together(act, [memories[number] for number in numbers])
         if together is not None:
-            commands[members], kept = together
-            for number, memory in zip(members, kept, strict=True):
+            commands[numbers], kept = together
+            for number, memory in zip(numbers, kept, strict=True):
                 after[number] = memory
-            continue
-        for number in members:
-            try:
-                commands[number], after[number] = ask(drivers[number], seen[number], memories[number], time_s)
-            except EpisodeError as problem:
-                failed[number] = problem
+                del alone[number]
+    for number in alone:
+        try:
+            commands[number], after[number] = ask(drivers[number], shown.seen[number], memories[number], time_s)
+        except EpisodeError as problem:
+            failed[number] = problem
     return commands, after, failed
 
 
-def _ask_together(
-    driver: Any, seen: Sequence[Any], memories: Sequence[Any], members: list[int]
-) -> tuple[Signal, Sequence[Any]] | None:
-    """A driver's commands and memories for several robots; None where it has to be asked one by one."""
-    act_many = getattr(driver, "act_many", None)
-    if act_many is None or len(members) == 1 or not isinstance(seen, np.ndarray):
-        return None
-    first, last = members[0], members[-1] + 1
-    pictures = seen[first:last] if last - first == len(members) else seen[members]
+def _ask_together(act: Callable[[list[Any]], Any], memories: list[Any]) -> tuple[Signal, Sequence[Any]] | None:
+    """A group's commands and memories; None where it has to be asked one by one."""
     try:
-        answer, kept = act_many(pictures, [memories[number] for number in members])
+        answer, kept = act(memories)
         commands = np.asarray(answer, dtype=float)
-        sound = commands.shape == (len(members), 2) and len(kept) == len(members) and np.isfinite(commands).all()
+        sound = commands.shape == (len(memories), 2) and len(kept) == len(memories) and np.isfinite(commands).all()
     except Exception:
-        return None  # one by one the culprit is named, and the others go on
+        return None
     return (commands, kept) if sound else None
 
 

@@ -203,8 +203,7 @@ class LaneFollowing:
         Raises:
             EpisodeError: With the time at which the agent failed.
         """
-        metrics: Mapping[str, float] = only(self.run_many([episode]))
-        return metrics
+        return only(self.run_many([episode]))
 
     def run_many(self, episodes: Sequence[Episode]) -> list[Mapping[str, float] | EpisodeError]:
         """Drive episodes side by side and score each as `run` does, to the bit; an EpisodeError where one failed."""
@@ -225,8 +224,7 @@ class LaneFollowing:
         Raises:
             EpisodeError: With the time at which the agent failed.
         """
-        driven: Drive = only(self.drive_many([episode]))
-        return driven
+        return only(self.drive_many([episode]))
 
     def drive_many(self, episodes: Sequence[Episode]) -> list[Drive | EpisodeError]:
         """Drive episodes side by side, each as `drive` does."""
@@ -270,7 +268,7 @@ class LaneFollowing:
     def _lesson(self, episode: Episode, policy: Policy | None, seconds: float) -> tuple[Demonstration, int]:
         robot = read_robot(self.robot, self.folder)
         driver = lesson_driver(self.map, robot, episode.seed, policy)
-        shown: Drive = only(self._drive([episode], [driver], seconds, sees=Sight))
+        shown = only(self._drive([episode], [driver], seconds, sees=Sight))
         return shown.memory.samples, round(seconds * robot.figures["control_rate"])
 
     def examine(self, episode: Episode, policy: Policy) -> float:
@@ -308,7 +306,7 @@ class LaneFollowing:
         It goes on wherever it leads, so that two domains can be compared step by step.
         """
         seconds = len(commands) / read_robot(self.robot, self.folder).figures["control_rate"]
-        driven: Drive = only(self._drive([episode], [Playback(commands)], seconds, ended=lambda x, y: False))
+        driven = only(self._drive([episode], [Playback(commands)], seconds, ended=lambda x, y: False))
         return Observation(driven.poses, np.stack(driven.memory.pictures))
 
     def course(self, episode: Episode, seconds: float) -> Course:
@@ -326,16 +324,17 @@ class LaneFollowing:
         sees: Callable[[Picture, Signal], Any] = picture_only,
         ended: Callable[[float, float], bool] | None = None,
     ) -> list[Drive | EpisodeError]:
-        """Drive episodes AT_ONCE side by side for some time [s], or until they have `ended`: off the map."""
+        """Drive episodes side by side for some time [s], or until they have `ended`: off the map."""
         driven: list[Drive | EpisodeError] = []
-        for first in range(0, len(episodes), AT_ONCE):
-            some = episodes[first : first + AT_ONCE]
+        at_once = AT_ONCE[self.plant]
+        for first in range(0, len(episodes), at_once):
+            some = episodes[first : first + at_once]
             thetas = {episode.theta: self.instance(dict(episode.theta)) for episode in some}
             instances = [thetas[episode.theta] for episode in some]
             courses = [self.course(episode, seconds) for episode in some]
             courses = [replace(course, ended=ended) for course in courses] if ended else courses
             with fleet_at(self.plant, instances[0].robot, np.stack([course.start for course in courses])) as fleet:
-                driven += drive_fleet(instances, fleet, drivers[first : first + AT_ONCE], courses, sees)
+                driven += drive_fleet(instances, fleet, drivers[first : first + at_once], courses, sees)
         return driven
 
     def instance(self, theta: Theta, columns: int = 0) -> Instance:

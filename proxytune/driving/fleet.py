@@ -9,7 +9,7 @@ asked for each robot by itself.
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ from proxytune.driving.episode import (
     Drive,
     Driver,
     Instance,
+    Shown,
     alike,
     ask_many,
     begin_all,
@@ -32,14 +33,16 @@ from proxytune.driving.episode import (
 from proxytune.driving.expert import Pupil
 from proxytune.driving.plants import Drivetrain, PlanarFleet, PlanarPlant, Plant
 from proxytune.driving.robot import Robot
-from proxytune.effects import CATALOGUE, Chain, Effect, FilterContext, Learnt, Memory, Signal, Stage
+from proxytune.effects import CATALOGUE, Chain, Effect, FilterContext, Learnt, Memory, Signal, Stage, Trace
 from proxytune.errors import EpisodeError
 from proxytune.space import Parameter
 
-AT_ONCE = 48
-"""So many robots drive side by side: each has a world in memory."""
-
 PLANTS = ("bullet", "planar")
+
+AT_ONCE = {"bullet": 16, "planar": 48}
+"""So many robots drive side by side on a plant: each has a world in Bullet, which takes 33 MB."""
+
+Result = TypeVar("Result")
 
 
 class Fleet(Protocol):
@@ -108,7 +111,7 @@ class _Apart:
     name: ClassVar[str] = "apart"
     stage: ClassVar[Stage] = Stage.COMMAND
     parameters: ClassVar[tuple[Parameter, ...]] = ()
-    trace: ClassVar[None] = None
+    trace: ClassVar[Trace | None] = None
 
     def begin(self, context: FilterContext) -> list[Memory]:
         """Each robot's memory, from a context of arrays (robots, …)."""
@@ -300,6 +303,7 @@ class _Drives:
         self.results: list[Any] = [None] * len(drivers)
         self._by_picture = all(isinstance(driver, Pupil) for driver in drivers)
         self._memories: list[Any] = []
+        self._shown: Shown | None = None
         self._commands = np.zeros((len(drivers), 2))
         self._issued = np.empty((len(drivers), rollouts.steps, 2))
         self._poses = np.empty((len(drivers), rollouts.steps * rollouts.hold + 1, 3))
@@ -314,10 +318,12 @@ class _Drives:
         """Ask for the next commands; a policy that has seen the pictures before would answer the same."""
         if not self.drivers or (self._by_picture and not self.rollouts.new_pictures):
             return
-        seen: Sequence[Any] = self.rollouts.pictures
         if self._sees is not picture_only:
-            seen = [self._sees(*one) for one in zip(seen, self.rollouts.poses[:, -1], strict=True)]
-        self._commands, self._memories, problems = ask_many(self.drivers, seen, self._memories, time_s)
+            sights = zip(self.rollouts.pictures, self.rollouts.poses[:, -1], strict=True)
+            self._shown = Shown(self.drivers, [self._sees(*one) for one in sights])
+        elif self._shown is None or self.rollouts.new_pictures:
+            self._shown = Shown(self.drivers, self.rollouts.pictures)
+        self._commands, self._memories, problems = ask_many(self.drivers, self._shown, self._memories, time_s)
         self._fail(problems)
 
     def step(self, number: int) -> None:
@@ -346,7 +352,7 @@ class _Drives:
         self.rollouts.keep(rows)
         self.drivers = [self.drivers[row] for row in rows]
         self._memories = [self._memories[row] for row in rows]
-        self._commands = self._commands[rows]
+        self._commands, self._shown = self._commands[rows], None
 
 
 def drive(
@@ -364,7 +370,7 @@ def drive(
     return only(drive_fleet([instance], Plants([plant]), [driver], [course], sees))
 
 
-def only(results: Sequence[Any | EpisodeError]) -> Any:
+def only(results: Sequence[Result | EpisodeError]) -> Result:
     """The result of a fleet of one.
 
     Raises:

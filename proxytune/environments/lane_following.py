@@ -334,7 +334,7 @@ class LaneFollowingEnv(gymnasium.Env[Picture, NDArray[Any]]):
 
     def _picture(self) -> Picture:
         """A copy: the camera is slower than the commands, so two steps may see one picture."""
-        return self._under_way().rollouts.pictures[0].copy()
+        return np.array(self._under_way().rollouts.pictures[0])
 
     def _info(self) -> dict[str, Any]:
         drive = self._under_way()

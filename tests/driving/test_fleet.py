@@ -136,7 +136,7 @@ def test_robots_drop_out_as_they_leave_the_map_and_the_others_go_on(plant):
 def test_episodes_of_several_thetas_and_more_than_drive_at_once_score_as_each_does():
     room = classroom(plant="planar", seconds=1.0)
     several = [*episodes(2), *episodes(2, trim=0.2), *episodes(1)]
-    many = [make_episode({}, agent="pupil", start=n % room.starts, seed=n) for n in range(AT_ONCE + 3)]
+    many = [make_episode({}, agent="pupil", start=n % room.starts, seed=n) for n in range(AT_ONCE[room.plant] + 3)]
     for what in (several, many, []):
         assert room.examine_together(what, lean) == [room.examine(one, lean) for one in what]
 
@@ -201,3 +201,129 @@ def test_lane_following_offers_what_a_classroom_of_many_has():
     members = {name for name in vars(BatchClassroom) if not name.startswith("_")}
     assert members == {"examine_together"}
     assert all(callable(getattr(LaneFollowing, name)) for name in members)
+
+
+MIXED = (
+    {},
+    {"delay_jitter": 0.1, "dropped_commands": 0.2},
+    {"trim": 0.2, "blur": 0.08},
+    {"image_noise": 9.0, "motor_lag.imbalance": 0.3},
+    LEARNT,
+)
+SEVERAL = ("steady", "wary", "braitenberg", "laggy", "smooth", "edges", "steady")
+
+
+def mixed(count=15):
+    """Episodes of several agents, starts and θ, in no order."""
+    return [
+        make_episode(MIXED[n % len(MIXED)], agent=SEVERAL[n % len(SEVERAL)], start=n % 4, seed=n) for n in range(count)
+    ]
+
+
+@pytest.mark.parametrize("plant", [pytest.param("bullet", marks=pytest.mark.slow), "planar"])
+def test_episodes_of_several_agents_starts_and_thetas_score_side_by_side_as_each_by_itself(plant):
+    room, what = classroom(plant=plant, seconds=2.0), mixed()
+    alone = [room.run(one) for one in what]
+    assert room.run_many(what) == alone
+    assert room.run_many(what[::-1]) == alone[::-1]
+    assert room.run_many(what[:5]) + room.run_many(what[5:7]) == alone[:7]
+
+
+@both_plants
+def test_who_leaves_early_changes_nothing_for_the_others(plant):
+    room = classroom(plant=plant, seconds=6.0)
+    what = [make_episode({"trim": trim}, agent="daredevil", start=n, seed=n) for n in range(2) for trim in (0.0, 0.5)]
+    together = room.drive_many(what)
+    assert len({len(one.poses) for one in together}) > 1
+    for one, other in zip(together, map(room.drive, what), strict=True):
+        np.testing.assert_array_equal(one.poses, other.poses)
+        np.testing.assert_array_equal(one.commands, other.commands)
+
+
+AGENTS_OF_ONE_S_OWN = '''
+import numpy as np
+from proxytune.driving import AGENTS
+
+class Counting:
+    """Goes by how often it was asked, which its memory knows."""
+    def begin(self, robot): return 0
+    def act(self, picture, memory): return (0.2 + 0.1 * (memory % 3), 0.3), memory + 1
+
+class Late(Counting):
+    def act(self, picture, memory):
+        if memory == 30: raise ValueError("lost")
+        return super().act(picture, memory)
+
+class NoStart(Counting):
+    def begin(self, robot): raise KeyError("camera")
+
+class NotFinite(Counting):
+    def act(self, picture, memory): return (0.2, np.nan if memory == 12 else 0.3), memory + 1
+
+class Many(Counting):
+    def act_many(self, pictures, memories):
+        return [self.act(*one)[0] for one in zip(pictures, memories)], [memory + 1 for memory in memories]
+
+class BadMany(Counting):
+    def act_many(self, pictures, memories): return np.zeros((1, 2)), memories
+
+class Deciding(Counting):
+    def decide(self, picture): return 3
+    def act_many(self, pictures, memories): return 1 / 0
+
+class ManyLate(Late):
+    def act_many(self, pictures, memories):
+        return [self.act(*one)[0] for one in zip(pictures, memories)], [memory + 1 for memory in memories]
+'''
+
+
+@pytest.fixture
+def own(tmp_path):
+    """A room whose folder has agents of one's own."""
+    (tmp_path / "mine.py").write_text(AGENTS_OF_ONE_S_OWN)
+    return classroom(tmp_path, plant="planar", seconds=3.0)
+
+
+def of_agents(*agents):
+    return [make_episode({}, agent=agent, start=start, seed=start) for agent in agents for start in range(2)]
+
+
+def test_agents_that_fail_are_named_with_the_time_and_the_others_go_on(own):
+    what = of_agents("steady", "mine:Late", "mine:NoStart", "mine:NotFinite", "mine:ManyLate", "mine:Counting")
+    told = own.run_many(what)
+    assert [str(one) for one in told[2:10]] == [
+        *["raised ValueError at 1.50 s: lost"] * 2,
+        *["raised KeyError before the first picture: 'camera'"] * 2,
+        *["answered [0.2, nan] at 0.60 s; duties must be finite"] * 2,
+        *["raised ValueError at 1.50 s: lost"] * 2,
+    ]
+    assert all(isinstance(one, EpisodeError) for one in told[2:10])
+    assert told[:2] + told[10:] == [own.run(one) for one in what[:2] + what[10:]]
+    with pytest.raises(EpisodeError, match=r"raised ValueError at 1\.50 s: lost"):
+        own.run(what[2])
+
+
+def test_a_fleet_in_which_everybody_fails_ends(own):
+    assert all(isinstance(one, EpisodeError) for one in own.run_many(of_agents("mine:NoStart", "mine:Late")))
+
+
+@pytest.mark.parametrize("agent", ["Counting", "Many", "BadMany", "Deciding"])
+def test_one_s_own_agents_have_a_memory_for_each_robot_however_they_are_asked(own, agent):
+    what = of_agents(f"mine:{agent}", "steady")
+    assert own.run_many(what) == [own.run(one) for one in what]
+    assert own.run_many(what)[:2] == own.run_many(of_agents("mine:Counting"))
+
+
+def test_no_robots_drive_nowhere():
+    assert classroom(plant="planar").run_many([]) == []
+
+
+def test_an_effect_of_one_s_own_is_asked_no_more_for_robots_that_have_left(tmp_path):
+    counting = OWN.replace("own:", "counted:").replace("    parameters =", "    asked = []\n    parameters =")
+    (tmp_path / "counted.py").write_text(counting.replace("return signal *", "self.asked.append(1); return signal *"))
+    room = classroom(tmp_path, plant="planar", seconds=9.0, effects={"counted:Wrong": 0.1})
+    [asked] = [one.asked for one in room.instance({}).drivetrain.actuation.effects if hasattr(one, "asked")]
+    asked.clear()
+    driven = room._drive(episodes(4), [Pupil(lambda picture: np.array((0.6, 0.6)))] * 4, 9.0)
+    assert len({len(one.commands) for one in driven}) > 1
+    assert len(asked) == sum(len(one.commands) for one in driven)

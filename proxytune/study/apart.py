@@ -66,14 +66,18 @@ def find_apart(
 
 def _episode(settings: StudySettings, agent: str, turn: int) -> Episode:
     start = turn % settings.starts
-    return make_episode({}, agent=agent, start=start, seed=preflight_seed(settings.seed, start, turn))
+    theta = {box.name: 0.5 * (box.low + box.high) for box in settings.space.intervals}
+    return make_episode(theta, agent=agent, start=start, seed=preflight_seed(settings.seed, start, turn))
 
 
 def _why_apart(family: DomainFamily, needed: Collection[str], pair: Pair) -> tuple[str, str]:
     together = run_together(family, pair, needed)
     single = [run_episode(family, episode, needed) for episode in pair]
+    if any(one.failure.startswith(RAISED) for one in single):
+        return pair[0].agent, ENDS
     if together is None:
-        return pair[0].agent, ENDS if any(one.failure.startswith(RAISED) for one in single) else DIFFERS
+        # Of a domain that fails nothing is learnt of the agent.
+        return pair[0].agent, "" if any(one.failure for one in single) else DIFFERS
     same = [(one.metrics, one.failure) for one in together] == [(one.metrics, one.failure) for one in single]
     return pair[0].agent, "" if same else DIFFERS
 

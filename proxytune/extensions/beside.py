@@ -203,20 +203,25 @@ def pack(folders: Sequence[str]) -> Packed:
     return tuple(packed)
 
 
-def unpack(packed: Packed) -> None:
-    """Let this process import packed modules by the names that they had where they were packed."""
+def unpack(packed: Packed, parent: str | None = None) -> None:
+    """Let this process import packed modules by the names that they had where they were packed.
+
+    Args:
+        packed: The modules.
+        parent: Where they are put, each of its folders in one of this process's own; among temporary files by default.
+    """
     for folder, content in packed:
-        home, place = _home(folder), _unzipped(content)
+        home, place = _home(folder), _unzipped(content, parent)
         sys.modules[home].__path__ = [place]
         if place not in sys.path:
             sys.path.append(place)
 
 
 @lru_cache(maxsize=64)
-def _unzipped(content: bytes) -> str:
+def _unzipped(content: bytes, parent: str | None) -> str:
     """A folder of this process's own with the files; it stays as long as the process does."""
     digest = hashlib.sha256(content).hexdigest()[:8]
-    folder = tempfile.mkdtemp(prefix=f"proxytune_{digest}_")
+    folder = tempfile.mkdtemp(prefix=f"proxytune_{digest}_", dir=parent)
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         archive.extractall(folder)
     return folder

@@ -30,6 +30,10 @@ class NotSendableError(RunError):
     """Work that cannot go to another process."""
 
 
+class OtherCodeError(InputError):
+    """A machine with other code, whose results may differ."""
+
+
 @dataclass(frozen=True)
 class Recipe:
     """Work pickled once, and where its modules are found: a process unpickles it once.
@@ -64,29 +68,34 @@ def recipe_of(work: Callable[..., Any], made_by: Mapping[str, str] | None = None
     return replace(recipe, packed=pack(recipe.own), made_by=tuple(made_by.items())) if made_by else recipe
 
 
-def do_sent(recipe: Recipe, piece: Any) -> Any:
+def do_sent(recipe: Recipe, piece: Any, place: str | None = None) -> Any:
     """Do one piece of the work, in the process it was sent to.
+
+    Args:
+        recipe: The work.
+        piece: The piece.
+        place: Where the user's modules are unpacked; among the temporary files by default.
 
     Raises:
         NotSendableError: If the work cannot be loaded there.
     """
-    return load_sent(recipe)(piece)
+    return load_sent(recipe, place)(piece)
 
 
 @lru_cache(maxsize=1)
-def load_sent(recipe: Recipe) -> Callable[[Any], Any]:
+def load_sent(recipe: Recipe, place: str | None = None) -> Callable[[Any], Any]:
     """The work, unpickled.
 
     Raises:
         NotSendableError: If that fails.
-        InputError: If this machine has other code.
+        OtherCodeError: If this machine has other code.
     """
     if recipe.made_by:
         check_code(dict(recipe.made_by))
     # A process that has done other work looks in that work's folders last; on another machine its own come first.
     paths = (sys.path, recipe.path) if recipe.made_by else (recipe.path, sys.path)
     sys.path[:] = dict.fromkeys(folder for path in paths for folder in path)
-    unpack(recipe.packed) if recipe.made_by else open_folders(recipe.own)
+    unpack(recipe.packed, place) if recipe.made_by else open_folders(recipe.own)
     try:
         return cast("Callable[[Any], Any]", pickle.loads(recipe.pickled))
     except Exception as problem:
@@ -126,8 +135,8 @@ def check_code(theirs: Mapping[str, str]) -> None:
     """Refuse to work for a process of which the results may differ.
 
     Raises:
-        InputError: If anything has another version there.
+        OtherCodeError: If anything has another version there.
     """
     changes = version_changes(theirs, made_by())
     if changes:
-        raise InputError(f"the worker on {node()} has {', '.join(changes)}; install the same there as here")
+        raise OtherCodeError(f"the worker on {node()} has {', '.join(changes)}; install the same there as here")

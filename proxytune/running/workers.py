@@ -1,8 +1,9 @@
 """Many independent pieces of work, in this process or spread over several; those that end their process, or never end.
 
-joblib spreads them, over the backend that its user chose. What dies or hangs is done once more by an IsolatedWorker,
-which is a process of joblib's own (loky). `pebble` would save the few lines of `do`: its processes run a user's script
-again, where loky's do not, and time limits within a piece and the rescue of joblib's workers would stay here.
+joblib spreads them, unless there is another `Place` for them. What dies or hangs is done once more by an
+IsolatedWorker, which is a process of joblib's own (loky). `pebble` would save the few lines of `do`: its processes run
+a user's script again, where loky's do not, and time limits within a piece and the rescue of joblib's workers would stay
+here.
 """
 
 import functools
@@ -21,7 +22,7 @@ from dataclasses import dataclass
 from multiprocessing import TimeoutError as ParallelTimeoutError
 from operator import length_hint
 from pathlib import Path
-from typing import Any, Generic, TypeVar, cast
+from typing import Any, Generic, Protocol, TypeVar, cast
 
 from joblib import Parallel, delayed
 from joblib.externals.loky import ProcessPoolExecutor
@@ -32,6 +33,8 @@ from proxytune.running.sending import NotSendableError, Recipe, do_sent, end_wit
 
 START_S = 30.0
 """So long may processes take to start beyond a piece's own time-out [s]."""
+ASK_S, NAP_S = 0.25, 1.0
+"""So often is asked whether a piece is done, and no more than this passes between two questions [s] (`AwakeClock`)."""
 OVERRUN = "SIGALRM"
 """How the process of a piece ends that overruns a limit within it."""
 Piece = TypeVar("Piece")
@@ -80,27 +83,33 @@ class Rescue(Generic[Piece, Result]):
     parts: Callable[[Piece], Sequence[Piece]] = lambda piece: (piece,)
 
 
-@dataclass(frozen=True)
-class Elsewhere:
-    """Where pieces are done instead of in processes of this machine.
+LOST: Any = object()
+"""Stands for the result of a piece that has none: it took too long, or ended processes."""
 
-    Attributes:
-        cores: How many are done at once there, asked whenever there are pieces to do.
-        killed: What is raised of a piece that has ended several processes there.
-        made_by: The code that must be there, by names and versions.
-    """
 
-    cores: Callable[[], int]
-    killed: tuple[type[BaseException], ...]
+class Place(Protocol):
+    """Where pieces are done instead of in processes of this machine."""
+
     made_by: Mapping[str, str]
+    """The code that must be there, by names and versions."""
+
+    def cores(self) -> int:
+        """The number of pieces that are done at once there, asked whenever there are pieces to do."""
+        ...
+
+    def results(
+        self, recipe: Recipe, numbered: Iterator[tuple[int, Any]], timeout_s: float | None
+    ) -> Generator[tuple[int, Any], None, None]:
+        """Do numbered pieces, each asked for when it can begin; LOST stands for the result of one that is given up."""
+        ...
 
 
-_elsewhere: ContextVar[Elsewhere | None] = ContextVar("elsewhere", default=None)
+_elsewhere: ContextVar[Place | None] = ContextVar("elsewhere", default=None)
 
 
 @contextmanager
-def elsewhere(place: Elsewhere) -> Iterator[None]:
-    """Have all pieces done there meanwhile, by joblib's backend of the moment."""
+def elsewhere(place: Place) -> Iterator[None]:
+    """Have all pieces done there meanwhile."""
     before = _elsewhere.set(place)
     try:
         yield
@@ -112,6 +121,24 @@ def places(jobs: int) -> int:
     """The number of pieces that are done at once: by so many processes of this machine, or elsewhere."""
     place = _elsewhere.get()
     return place.cores() if place else jobs
+
+
+class AwakeClock:
+    """Counts the seconds in which this process could run: those of a pause are nobody's work.
+
+    Ctrl-Z, a paused container and some sleeping machines stop whoever waits together with the process it waits for.
+    Whoever asks is expected to do so again within a second.
+    """
+
+    def __init__(self) -> None:
+        self._seconds, self._asked = 0.0, time.monotonic()
+
+    def seconds(self) -> float:
+        """The seconds until now [s]."""
+        now = time.monotonic()
+        self._seconds += min(now - self._asked, NAP_S)
+        self._asked = now
+        return self._seconds
 
 
 @contextmanager
@@ -172,17 +199,14 @@ def _here(
             yield work(piece)
 
 
-_LOST = object()
-
-
 def _isolated(
     work: Callable[[Piece], Result], pieces: Iterable[Piece], rescue: Rescue[Piece, Result]
 ) -> Generator[Result, None, None]:
     with IsolatedWorker(work, rescue.timeout_s) as isolated:
         for piece in pieces:
             parts = rescue.parts(piece)
-            whole: Any = isolated.do(piece, lambda _: _LOST) if len(parts) > 1 else _LOST
-            if whole is not _LOST:
+            whole = isolated.do(piece, lambda _: LOST, tries=1) if len(parts) > 1 else LOST
+            if whole is not LOST:
                 yield whole
                 continue
             for part in parts:
@@ -195,7 +219,6 @@ def _spread(
     """Do them in several processes; where one dies or hangs, what was under way is isolated, then the rest is done."""
     place, left = _elsewhere.get(), enumerate(pieces)
     recipe = recipe_of(work, place.made_by if place else None)
-    ended: tuple[type[BaseException], ...] = (BrokenExecutor, ParallelTimeoutError, *(place.killed if place else ()))
     under_way: dict[int, Piece] = {}
 
     def begin() -> Iterator[tuple[int, Piece]]:
@@ -206,14 +229,17 @@ def _spread(
 
     broken = True
     while broken:
-        broken = False
+        broken, timeout_s = False, rescue.timeout_s
+        done = place.results(recipe, begin(), timeout_s) if place else _in_processes(recipe, begin(), jobs, timeout_s)
         try:
-            jobs = place.cores() if place else jobs
-            with closing(_in_processes(recipe, begin(), jobs, rescue.timeout_s)) as results:
+            with closing(done) as results:
                 for number, result in results:
-                    del under_way[number]
-                    yield result
-        except ended:
+                    piece = under_way.pop(number)
+                    if result is LOST:
+                        yield from _isolated(work, rescue.parts(piece), rescue)
+                    else:
+                        yield result
+        except (BrokenExecutor, ParallelTimeoutError):
             broken = True
         again = [part for piece in under_way.values() for part in rescue.parts(piece)]
         under_way.clear()
@@ -259,12 +285,13 @@ class IsolatedWorker:
     def __exit__(self, *problem: object) -> None:
         self._end()
 
-    def do(self, piece: Any, lost: Callable[[WorkerExit], Any]) -> Any:
+    def do(self, piece: Any, lost: Callable[[WorkerExit], Any], tries: int = 2) -> Any:
         """Do a piece.
 
         Args:
             piece: The piece.
             lost: Its result where it ends its process, or takes longer than it may.
+            tries: How often it may take too long: the machine may have been at fault, or a process have been stopped.
 
         Raises:
             NotSendableError: If the work cannot go to another process.
@@ -274,16 +301,18 @@ class IsolatedWorker:
             self._process = ProcessPoolExecutor(1, initializer=end_with, initargs=(os.getpid(),))
             # Loading the work takes none of the pieces' time.
             self._process.submit(load_sent, self._recipe).exception()
-        how, begun = "", time.perf_counter()
+        how, clock, seconds = "", AwakeClock(), 0.0
         try:
             result = self._process.submit(do_sent, self._recipe, piece)
-            wait([result], self._timeout_s)
-            if result.done():
-                return result.result()
+            while self._timeout_s is None or seconds < self._timeout_s:
+                wait([result], ASK_S)
+                if result.done():
+                    return result.result()
+                seconds = clock.seconds()
         except BrokenExecutor as problem:
-            how = _exit_told(str(problem))
+            how, seconds = _exit_told(str(problem)), clock.seconds()
         self._end()
-        return lost(WorkerExit(how, time.perf_counter() - begun))
+        return self.do(piece, lost, tries - 1) if tries > 1 and not how else lost(WorkerExit(how, seconds))
 
     def _end(self) -> None:
         if self._process is not None:

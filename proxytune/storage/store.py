@@ -256,6 +256,14 @@ class Store:
         values = tuple(value for one in how for value in (len(one), one))
         return {agent for (agent,) in self._all(f"SELECT DISTINCT agent FROM episodes WHERE {which}", values)}
 
+    def failed_by(self, identity: str, how: str) -> set[Episode]:
+        """The episodes of a domain family whose failure begins so."""
+        query = (
+            "SELECT theta, agent, start, seed FROM episodes JOIN instances ON instances.id = episodes.instance"
+            " WHERE identity = ? AND substr(failure, 1, ?) = ?"
+        )
+        return set(self._made(_episode, query, (identity, len(how), how)))
+
     def failed_in_other_code(self, identity: str, code: str) -> set[Episode]:
         """The episodes that failed in other code than this; those of which the code is not known are left out."""
         query = (

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, cast
 
 from proxytune.errors import InputError, RunError
+from proxytune.running import ENDLESS
 from proxytune.scores import Metric
 from proxytune.search import History, Importance, Knowledge, PastTrial, fit_surrogate, importances
 from proxytune.settings import nearest
@@ -164,8 +165,22 @@ def result_of(run: StudyRun, scored_anew: Sequence[TrialRecord] | None = None) -
         stopped=stopped(run, trials),
         spared=spared(run, trials),
         failures=_failures(run, trials),
-        cautions=tuple(line for line in (*study.cautions, noise_of(run).caution, *apart_notes(run.store)) if line),
+        cautions=tuple(
+            line for line in (*study.cautions, noise_of(run).caution, *apart_notes(run.store), _overran(run)) if line
+        ),
     )
+
+
+def _overran(run: StudyRun) -> str:
+    """What a time limit made fail, in one line; empty if nothing."""
+    store, study = run.store, run.study
+    late = store.failed_by(study.identity, ENDLESS)
+    if not late:
+        return ""
+    agents = ", ".join(f"'{agent}'" for agent in sorted({episode.agent for episode in late}))
+    again = late & store.failed_in_other_code(study.identity, study.code)
+    tried = "the same command tries them once more" if again else "in two runs; study --retry-failed tries them again"
+    return f"episodes that failed because they took longer than episode_timeout_s: {len(late)}, of {agents}; {tried}"
 
 
 def _answers(trials: tuple[TrialRecord, ...], learnt: Knowledge) -> tuple[TrialRecord | None, ...]:

@@ -246,7 +246,8 @@ class StudyRun:
         """The outcomes of episodes; those not simulated yet are simulated now.
 
         A failed episode counts as known where failures do not stop the study and the code that failed is still the
-        same; else it is tried again, since something is expected to have been corrected. Where it is asked whether what
+        same; else it is tried again, since something is expected to have been corrected. So is, once, one that an
+        earlier run gave too little time. Where it is asked whether what
         is known of a domain instance is enough, agents begin in their order, each in all instances, and none more
         begins in an instance after a yes.
 
@@ -263,7 +264,7 @@ class StudyRun:
 
     @cached_property
     def corrected(self) -> set[Episode]:
-        """The episodes that failed in code that has changed since, and have not been tried again."""
+        """The episodes that failed in code that has changed since or for time alone, and were not tried again."""
         return self.store.failed_in_other_code(self.study.identity, self.study.code)
 
     def _simulate(
@@ -312,8 +313,11 @@ class StudyRun:
             store.end_episodes()
 
     def _keep(self, outcomes: Sequence[Outcome]) -> None:
-        """Keep the outcomes of a fleet, all at once."""
-        self.store.save_outcome(self.study.identity, *outcomes, code=self.study.code)
+        """Keep the outcomes of a fleet; what took too long for the first time is tried again by the next run."""
+        late = [one for one in outcomes if one.failure.startswith(ENDLESS) and one.episode not in self.corrected]
+        for some, code in (([one for one in outcomes if one not in late], self.study.code), (late, "")):
+            if some:
+                self.store.save_outcome(self.study.identity, *some, code=code)
         for outcome in outcomes:
             self.corrected.discard(outcome.episode)
             self.watcher.episode()

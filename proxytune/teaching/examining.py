@@ -111,13 +111,13 @@ class _Loss:
     traced: TracedTask
 
     def __call__(self, point: CurvePoint, end: WorkerExit) -> Any:
-        """Make it once more where that tells which episode it is, or say of what it ended.
+        """Make it once more where that tells which episode it is or it took too long, or say of what it ended.
 
         Raises:
             EpisodeError: If a lesson or an examination took longer than it may.
             RunError: If the process ended otherwise.
         """
-        if self.traced.last(point).endswith(TOGETHER):
+        if self.traced.last(point).endswith(TOGETHER) or end.how == OVERRUN:
             with IsolatedWorker(self.traced) as isolated:
                 return isolated.do(point, functools.partial(self._refuse, point))
         return self._refuse(point, end)

@@ -1,9 +1,9 @@
 """A study on a cluster of this machine whose workers and scheduler are killed, stopped, late or of other code.
 
-Each pattern is a line of what happens, in order: `worker NAME` starts a worker (`nanny`: with one; `threads`, `other`: of two
-threads, of other code), `run` the command, a number waits for so many episodes in study.db, `seconds N` waits,
-`said TEXT` waits for a line of the command, and the rest are signals. Whatever happened, the study comes to the trials
-and episodes of an undisturbed run, to the digit.
+Each pattern says what happens, in order: `worker NAME` starts a worker (`nanny`: with one; `same`: at one address;
+`threads`, `other`: of two threads, of other code), `run` the command on the cluster and `alone` on this machine,
+`joined N` waits for so many workers, a number for so many episodes in study.db, `said TEXT` for a line of the command;
+the rest are signals. Whatever happened, the study comes to the trials and episodes of an undisturbed run, to the digit.
 """
 
 import os
@@ -13,6 +13,8 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from itertools import chain
+from pathlib import Path
 
 import pytest
 from processes import ENVIRONMENT, episodes, finished_episodes, heeding_ctrl_c, trials
@@ -56,16 +58,19 @@ PATTERNS = {
     "one of two is killed": "worker a, worker b, joined 2, run, 20, kill a",
     "one of two ends in order": "worker a, worker b, joined 2, run, 20, term a",
     "both are killed, a third comes": f"worker a, worker b, joined 2, run, 20, kill a, kill b, said {GONE}, worker c",
-    "both are killed before the first episode": f"worker a, worker b, joined 2, run, kill a, kill b, said {GONE}, worker c",
+    "both are killed before the first episode": "worker a, worker b, joined 2, run, "
+    f"said page:, kill a, kill b, said {GONE}, worker c",
     "each is killed in turn": "worker a, run, 10, worker b, joined 2, kill a, 30, worker c, joined 2, kill b, 50, "
     "worker d, joined 2, kill c",
     "its nanny starts a killed worker again": "nanny a, run, 20, kill child a, 60, kill child a",
     "killed and there again at the same address": "same a, run, 20, kill a, same a, 60, kill a, same a",
-    "the scheduler is killed and comes back": "worker a, run, 20, kill scheduler, said does not answer, scheduler, worker b",
+    "the scheduler is killed and comes back": "worker a, run, 20, kill scheduler, said does not answer, scheduler, "
+    "worker b",
     "the scheduler ends in order and comes back": "worker a, run, 20, term scheduler, scheduler, worker b",
     "the scheduler is killed twice": "worker a, run, 20, kill scheduler, scheduler, worker b, 50, kill scheduler, "
     "said does not answer, scheduler, worker c",
-    "the scheduler stops for a while": "worker a, worker b, run, 20, stop scheduler, said does not answer, go scheduler",
+    "the scheduler stops for a while": "worker a, worker b, run, 20, stop scheduler, said does not answer, "
+    "go scheduler",
     "one of two stops answering": "worker a, worker b, joined 2, run, 20, stop a",
     "one of two stops for a while": "worker a, worker b, joined 2, run, 20, stop a, 50, go a",
     "both stop for a while": "worker a, worker b, joined 2, run, 20, stop a, stop b, said not heard of, go a, go b",
@@ -74,12 +79,14 @@ PATTERNS = {
     "the command stops for longer than its limit": "limit 2, worker a, run, 20, stop command, seconds 8, go command",
     "a late worker has two threads": "worker a, run, 10, threads b, said has 2 threads",
     "a late worker has other code": "worker a, run, 10, other b, said it is not used",
-    "a late worker of other code is alone": f"worker a, run, 10, kill a, other b, said it is not used, said {GONE}, worker c",
+    "a late worker of other code is alone": "worker a, run, 10, kill a, other b, said it is not used, "
+    f"said {GONE}, worker c",
     "the command is killed and begun again": "worker a, run, 20, kill command, run",
     "the command is killed with the workers and begun again": "worker a, run, 20, kill command, kill a, worker b, run",
-    "ctrl-c while none is there, then on this machine": f"worker a, run, 20, kill a, said {GONE}, interrupt command, alone",
-    "ctrl-c while there is no scheduler, then on this machine": "worker a, run, 20, kill scheduler, said does not answer, "
-    "interrupt command, alone",
+    "ctrl-c while none is there, then on this machine": f"worker a, run, 20, kill a, said {GONE}, interrupt command, "
+    "alone",
+    "ctrl-c while there is no scheduler, then on this machine": "worker a, run, 20, kill scheduler, "
+    "said does not answer, interrupt command, alone",
     "an episode ends its workers": "fault agent2:1:leaves, worker a, worker b, joined 2, run, 30, worker c, worker d",
     "an episode hangs": "limit 1, fault agent2:1:hangs, nanny a, nanny b, joined 2, run",
 }
@@ -123,11 +130,11 @@ class Loopback:
 
     def child_of(self, name):
         """The worker's process, which its nanny started."""
-        parent = self.processes[name].pid
+        tasks = Path(f"/proc/{self.processes[name].pid}/task")
         for _ in range(600):
-            for task in (open(f"/proc/{parent}/task/{parent}/children").read().split()):
-                if b"multiprocessing.spawn" in open(f"/proc/{task}/cmdline", "rb").read():
-                    return int(task)
+            for child in chain.from_iterable(task.read_text().split() for task in tasks.glob("*/children")):
+                if b"multiprocessing.spawn" in Path(f"/proc/{child}/cmdline").read_bytes():
+                    return int(child)
             time.sleep(0.05)
         raise AssertionError(f"{name} has no child")
 

@@ -1,0 +1,126 @@
+"""What only waited has not failed; what took too long twice has, which is told, and tried once more by the next run."""
+
+import json
+import os
+import signal
+import time
+
+import pytest
+from processes import episodes, start, trials, wait_for
+
+from proxytune.cli.main import main
+from proxytune.running.workers import NAP_S, AwakeClock
+
+SLOW = """
+import time
+from pathlib import Path
+from wobbly import Wobbly, wobbly
+
+
+class Slow(Wobbly):
+    def run(self, episode):
+        counted = Path(__file__).with_name("slow_times")
+        left = int(counted.read_text()) if counted.exists() else 0
+        if (episode.agent, episode.start) == ("agent2", 1) and left:
+            counted.write_text(str(left - 1))
+            time.sleep(600.0)
+        return super().run(episode)
+
+
+def make(domain, *, model):
+    return Slow(**vars(wobbly(domain, model=model)))
+"""
+
+
+@pytest.fixture
+def slow(make_study):
+    """A study of which one episode hangs so many times, with a limit of a second."""
+
+    def make(called, times):
+        folder = make_study(called, family='"slow:make"', budget="5", episode_timeout_s="1.0")
+        (folder / "slow.py").write_text(SLOW)
+        (folder / "slow_times").write_text(str(times))
+        return folder
+
+    return make
+
+
+def left(folder):
+    return int((folder / "slow_times").read_text())
+
+
+def test_a_clock_counts_no_pause(monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    clock = AwakeClock()
+    for step in (0.25, 0.25, 3600.0, 0.25):
+        now[0] += step
+        seconds = clock.seconds()
+    assert seconds == 0.75 + NAP_S
+
+
+def told(folder, capsys, *words):
+    """The document of one more run."""
+    assert main(["study", str(folder), "--json", *words]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+@pytest.mark.slow
+def test_what_takes_too_long_once_is_run_again_and_has_not_failed(slow, capsys):
+    folder, whole = slow("study", 1), slow("whole", 0)
+    document = told(folder, capsys)
+    assert (left(folder), document["episodes"]["failed"]) == (0, 0)
+    told(whole, capsys)
+    assert trials(folder) == trials(whole)
+    assert not [line for line in document["cautions"] if "took longer" in line]
+
+
+@pytest.mark.slow
+def test_what_takes_too_long_twice_is_told_and_tried_again_by_the_next_run(slow, capsys):
+    folder, whole = slow("study", 2), slow("whole", 0)
+    document = told(folder, capsys)
+    assert document["episodes"]["failed"] == 1
+    line = (
+        "episodes that failed because they took longer than episode_timeout_s: 1, of 'agent2'; the same command tries"
+    )
+    assert [one for one in document["cautions"] if one.startswith(line)]
+    again = told(folder, capsys)
+    assert (again["episodes"]["run"], again["episodes"]["failed"], again["cautions"]) == (
+        1,
+        0,
+        told(whole, capsys)["cautions"],
+    )
+    assert trials(folder)[0] == trials(whole)[0]
+
+
+@pytest.mark.slow
+def test_what_takes_too_long_in_two_runs_is_left_alone(slow, capsys):
+    folder = slow("study", 100)
+    first = told(folder, capsys)
+    second = told(folder, capsys)
+    assert second["episodes"]["run"] == first["episodes"]["failed"] == 5
+    assert any("; in two runs; study --retry-failed" in line for line in second["cautions"])
+    third = told(folder, capsys)
+    assert (third["episodes"]["run"], third["episodes"]["failed"]) == (0, 5)
+    assert left(folder) == 100 - 4 * 5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_command_that_was_stopped_with_its_processes_comes_to_the_same(make_study, jobs):
+    """As by Ctrl-Z, by a paused container, or by a laptop that sleeps."""
+    folders = []
+    for called, sleep in (("whole", "0.0"), ("stopped", "0.05")):
+        folder = make_study(called, domain={"sleep": sleep}, jobs=str(jobs), episode_timeout_s="2.0")
+        process = start("study", folder)
+        if called == "stopped":
+            for episode in (10, 40):
+                wait_for(folder, process, episode)
+                os.killpg(process.pid, signal.SIGSTOP)
+                time.sleep(5.0)
+                os.killpg(process.pid, signal.SIGCONT)
+        assert process.wait(120) == 0, process.stderr.read()
+        folders.append(folder)
+    whole, stopped = folders
+    assert trials(stopped) == trials(whole)
+    assert episodes(stopped) == episodes(whole)

@@ -208,7 +208,7 @@ class Cluster:
             if worker.unfit:
                 raise InputError(worker.unfit)
             # One that does not answer now is looked at when it has work.
-            with suppress(TimeoutError):
+            with suppress(TimeoutError, CancelledError, self._killed):
                 self._submit(worker, check_code, self.made_by).result(timeout=ANSWER_S)
         self._checked = True
 
@@ -233,8 +233,8 @@ class Cluster:
                 self._client = self._connected()
             scheduler = self._client.scheduler
             told = self._client.sync(scheduler.identity, n_workers=-1, callback_timeout=ANSWER_S)["workers"]
-        # A client that is closing has no scheduler.
-        except (OSError, InputError, AttributeError):
+        # A client that is closing has no scheduler, or no loop.
+        except (OSError, InputError, AttributeError, RuntimeError):
             return False
         known, self._workers = self._workers, {}
         for address, one in told.items():

@@ -34,14 +34,14 @@ def family(domain, *, model):
 HELPER = "def shift(family):\n    return family\n"
 COMMAND = """
 import sys
-from proxytune.running import cluster, workers
+import proxytune.running.cluster as cluster
 cluster.SILENT_S, cluster.START_S, cluster.PATIENCE_S = 4.0, 3.0, 1.0
 from proxytune.cli.main import main
 sys.exit(main(sys.argv[1:]))
 """
 SCHEDULER = "from distributed.cli.dask_scheduler import main; main()"
 WORKER = "from distributed.cli.dask_worker import main; main()"
-OTHER_WORKER = "from proxytune.running import sending; sending.PACKAGES = ('numpy',); " + WORKER
+OTHER_WORKER = "import proxytune.running.sending as sending; sending.PACKAGES = ('numpy',); " + WORKER
 SIGNALS = {
     "kill": signal.SIGKILL,
     "term": signal.SIGTERM,

@@ -171,7 +171,7 @@ class Cluster:
         self._clock, self._woken = AwakeClock(), threading.Event()
         self._workers: dict[Key, _Worker] = {}
         self._asked, self._answers, self._checked = -POLL_S, False, False
-        self._client = self._connected()
+        self._client: Any = self._connected()
 
     def _connected(self) -> Any:
         try:
@@ -268,7 +268,7 @@ class Cluster:
 
     def _submit(self, worker: _Worker, work: Callable[..., Any], *arguments: Any) -> Any:
         key = f"proxytune-{uuid4().hex}"
-        future = self._client.submit(work, *arguments, key=key, workers=[worker.address], pure=False)
+        future: Any = self._client.submit(work, *arguments, key=key, workers=[worker.address], pure=False)
         future.add_done_callback(lambda _: self._woken.set())
         return future
 
@@ -368,4 +368,5 @@ def do_there(recipe: Recipe, piece: Any) -> Any:
     """Do a piece in a worker, whose folder has the user's modules: Dask removes it, whatever becomes of the worker."""
     from distributed import get_worker
 
-    return do_sent(recipe, piece, get_worker().local_directory)
+    here: Callable[[], Any] = get_worker
+    return do_sent(recipe, piece, here().local_directory)

@@ -167,11 +167,14 @@ class Cluster:
 
     def __init__(self, address: str, say: Callable[[str], None] = _say) -> None:
         self.made_by: Mapping[str, str] = made_by()
-        self._address, self._say = address, lambda line: say(f"--address {address}: {line}")
+        self._address, self._hears = address, say
         self._clock, self._woken = AwakeClock(), threading.Event()
         self._workers: dict[Key, _Worker] = {}
         self._asked, self._answers, self._checked = -POLL_S, False, False
-        self._client: Any = self._connected()
+        self._client = self._connected()
+
+    def _say(self, line: str) -> None:
+        self._hears(f"--address {self._address}: {line}")
 
     def _connected(self) -> Any:
         try:
@@ -268,7 +271,7 @@ class Cluster:
 
     def _submit(self, worker: _Worker, work: Callable[..., Any], *arguments: Any) -> Any:
         key = f"proxytune-{uuid4().hex}"
-        future: Any = self._client.submit(work, *arguments, key=key, workers=[worker.address], pure=False)
+        future = self._client.submit(work, *arguments, key=key, workers=[worker.address], pure=False)
         future.add_done_callback(lambda _: self._woken.set())
         return future
 
@@ -368,5 +371,4 @@ def do_there(recipe: Recipe, piece: Any) -> Any:
     """Do a piece in a worker, whose folder has the user's modules: Dask removes it, whatever becomes of the worker."""
     from distributed import get_worker
 
-    here: Callable[[], Any] = get_worker
-    return do_sent(recipe, piece, here().local_directory)
+    return do_sent(recipe, piece, get_worker().local_directory)

@@ -87,7 +87,7 @@ PATTERNS = {
     "alone",
     "ctrl-c while there is no scheduler, then on this machine": "worker a, run, 20, kill scheduler, "
     "said does not answer, interrupt command, alone",
-    "an episode ends its workers": "fault agent2:1:leaves, worker a, worker b, joined 2, run, 30, worker c, worker d",
+    "an episode ends its workers": "fault agent2:1:leaves, nanny a, nanny b, joined 2, run",
     "an episode hangs": "limit 1, fault agent2:1:hangs, nanny a, nanny b, joined 2, run",
 }
 

@@ -77,7 +77,7 @@ def test_a_family_that_keeps_no_poses_gives_scores_alone(make_study):
         (
             "crashes",
             "agent 'agent1' failed from start 2: the domain family raised ZeroDivisionError: division by zero "
-            "(wobbly.py, line 75)",
+            "(wobbly.py, line 94)",
         ),
         ("nan", "agent 'agent1' failed from start 2: agent 'agent1': the domain family gave no finite 'distance'"),
     ],

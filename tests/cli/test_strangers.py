@@ -29,7 +29,7 @@ OPTIONAL = (
     "bottleneck", "cython", "imageio_ffmpeg", "numba", "numexpr", "optuna", "pyarrow", "sksparse", "torch", "viztracer",
 )  # fmt: skip
 """What libraries try to import, and a venv may not have."""
-STANDARD = ("contextlib", "ctypes", "json", "pickle", "random", "signal", "socket", "tempfile", "typing", "uuid")
+STANDARD = ("ctypes", "json", "pickle", "random", "signal", "socket", "tempfile", "typing", "uuid")
 USED = ("joblib", "lazy_loader", "matplotlib", "numpy", "pandas", "rich", "scipy", "sklearn", "skopt", "tomlkit")
 STUDY = """
 format = 1

@@ -44,7 +44,7 @@ BAD = {
     ),
     "a factory with a bug": (
         {"family": '"wobbly:broken_factory"'},
-        "raised KeyError: 'robot' (wobbly.py, line 114); correct it",
+        "raised KeyError: 'robot' (wobbly.py, line 132); correct it",
     ),
     "a factory without a model": (
         {"family": '"wobbly:domain_alone"'},

@@ -81,14 +81,14 @@ def _decompressor(packing: str) -> type[Decompressor]:
 
 
 def _chunks(path: Path) -> Iterator[Chunk]:
-    with suppress(OSError, struct.error, UnicodeDecodeError), path.open("rb") as file:
+    with suppress(OSError, struct.error, ValueError, OverflowError), path.open("rb") as file:
         start = file.read(16)
         if start.startswith(b"#ROSBAG"):
             file.seek(start.find(b"\n") + 1)
-            yield from _of_ros1(file)
+            yield from _of_ros1(file, path.stat().st_size)
         elif start.startswith(b"\x89MCAP0\r\n"):
             file.seek(8)
-            yield from _of_mcap(file)
+            yield from _of_mcap(file, path.stat().st_size)
         elif start.startswith(ZSTD):
             yield Chunk("zstd", start + file.read())
 
@@ -96,10 +96,10 @@ def _chunks(path: Path) -> Iterator[Chunk]:
 ZSTD = b"\x28\xb5\x2f\xfd"
 
 
-def _of_ros1(file: IO[bytes]) -> Iterator[Chunk]:
-    """Records are a header of fields, name=value, and data; each has its length before it."""
+def _of_ros1(file: IO[bytes], most: int) -> Iterator[Chunk]:
+    """Records are a header of fields, name=value, and data; each has its length before it, of `most` bytes at most."""
     while length := file.read(4):
-        header, fields = file.read(*struct.unpack("<I", length)), dict[bytes, bytes]()
+        header, fields = file.read(min(most, *struct.unpack("<I", length))), dict[bytes, bytes]()
         while header:
             (size,) = struct.unpack_from("<I", header)
             name, _, value = header[4 : 4 + size].partition(b"=")
@@ -107,12 +107,12 @@ def _of_ros1(file: IO[bytes]) -> Iterator[Chunk]:
         (size,) = struct.unpack("<I", file.read(4))
         packing = fields.get(b"compression", b"none").decode()
         if fields.get(b"op") == b"\x05" and packing in ("bz2", "lz4"):
-            yield Chunk(packing, file.read(size))
+            yield Chunk(packing, file.read(min(size, most)))
         else:
             file.seek(size, 1)
 
 
-def _of_mcap(file: IO[bytes]) -> Iterator[Chunk]:
+def _of_mcap(file: IO[bytes], most: int) -> Iterator[Chunk]:
     """Records are a kind and a length; a chunk states times, size and checksum (28 bytes) and its packing first."""
     while kind := file.read(1):
         (size,) = struct.unpack("<Q", file.read(8))
@@ -120,8 +120,8 @@ def _of_mcap(file: IO[bytes]) -> Iterator[Chunk]:
             file.seek(size, 1)
             continue
         head = file.read(32)
-        packing = file.read(*struct.unpack("<I", head[28:])).decode()
+        packing = file.read(min(most, *struct.unpack("<I", head[28:]))).decode()
         file.seek(8, 1)
-        data = file.read(max(0, size - 40 - len(packing)))
+        data = file.read(min(most, max(0, size - 40 - len(packing))))
         if packing in ("lz4", "zstd"):
             yield Chunk(packing, data)

@@ -44,7 +44,7 @@ def check_unpacked(where: object, size: float, usual_mb: float) -> None:
     """
     most = allowed_bytes(usual_mb)
     if size > most:
-        remedy = f"if it is meant, allow as much by the environment variable {LARGEST}={-(-int(size) // 10**6)}"
+        remedy = f"if it is meant, allow as much by the environment variable {LARGEST}={int(size / 1e6) + 1}"
         raise InputError(f"{where}: unpacks to {size / 1e6:.0f} MB or more, of {most / 1e6:.0f} MB at most; {remedy}")
 
 

@@ -7,10 +7,10 @@ files say of the sizes is not believed, as the libraries that unpack them do not
 import bz2
 import struct
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import IO, Any, NamedTuple, cast
 
 from proxytune.unpacking import BAG_MB, Decompressor, allowed_bytes, check_unpacked, unpacked_size
 
@@ -47,7 +47,8 @@ def check_messages_size(path: Path, reader: Any) -> None:
     Raises:
         InputError: If they do, with what raises the limit.
     """
-    folders = [inner for one in reader.readers if hasattr(inner := getattr(one, "storage", None), "storages")]
+    inside: list[Any] = [getattr(one, "storage", None) for one in reader.readers]
+    folders = [one for one in inside if hasattr(one, "storages")]
     packed = [folder for folder in folders if folder.metadata.compression_mode == "message"]
     stores = [store for folder in packed for store in folder.storages]
     _check(path, (Chunk("zstd", bytes(row[-1])) for store in stores for row in store.messages(store.connections)))
@@ -66,13 +67,13 @@ def _check(path: Path, chunks: Iterable[Chunk]) -> None:
             check_unpacked(path, size, most / 1e6)
 
 
-def _decompressor(packing: str) -> type[Decompressor]:
+def _decompressor(packing: str) -> Callable[[], Decompressor]:
     if packing == "bz2":
         return bz2.BZ2Decompressor
     if packing == "lz4":
         from lz4.frame import LZ4FrameDecompressor
 
-        return LZ4FrameDecompressor
+        return cast(Callable[[], Decompressor], LZ4FrameDecompressor)
     if sys.version_info >= (3, 14):
         from compression.zstd import ZstdDecompressor
     else:

@@ -6,7 +6,7 @@ One limit of each kind, and one environment variable that raises them all.
 import os
 import warnings
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any, Protocol
@@ -44,7 +44,7 @@ def check_unpacked(where: object, size: float, usual_mb: float) -> None:
     """
     most = allowed_bytes(usual_mb)
     if size > most:
-        remedy = f"if it is meant, allow as much by the environment variable {LARGEST}={-(-int(size) // 10**6)}"
+        remedy = f"if it is meant, allow as much by the environment variable {LARGEST}={int(size / 1e6) + 1}"
         raise InputError(f"{where}: unpacks to {size / 1e6:.0f} MB or more, of {most / 1e6:.0f} MB at most; {remedy}")
 
 
@@ -116,8 +116,15 @@ def _own_limit() -> Iterator[None]:
 class Decompressor(Protocol):
     """What bz2, lz4 and zstd have in common."""
 
-    eof: bool
-    unused_data: bytes
+    @property
+    def eof(self) -> bool:
+        """True at the end of the packed bytes."""
+        ...
+
+    @property
+    def unused_data(self) -> bytes:
+        """What comes after that."""
+        ...
 
     def decompress(self, data: bytes, max_length: int) -> bytes:
         """The next bytes, no more than these."""
@@ -127,7 +134,7 @@ class Decompressor(Protocol):
 AT_ONCE = 2**20
 
 
-def unpacked_size(new: type[Decompressor], data: bytes, most: float) -> int:
+def unpacked_size(new: Callable[[], Decompressor], data: bytes, most: float) -> int:
     """The bytes that packed ones unpack to, counted a megabyte at a time, up to where they are too many.
 
     Raises:

@@ -7,10 +7,10 @@ files say of the sizes is not believed, as the libraries that unpack them do not
 import bz2
 import struct
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import IO, Any, NamedTuple, cast
 
 from proxytune.unpacking import BAG_MB, Decompressor, allowed_bytes, check_unpacked, unpacked_size
 
@@ -47,7 +47,8 @@ def check_messages_size(path: Path, reader: Any) -> None:
     Raises:
         InputError: If they do, with what raises the limit.
     """
-    folders = [inner for one in reader.readers if hasattr(inner := getattr(one, "storage", None), "storages")]
+    inside: list[Any] = [getattr(one, "storage", None) for one in reader.readers]
+    folders = [one for one in inside if hasattr(one, "storages")]
     packed = [folder for folder in folders if folder.metadata.compression_mode == "message"]
     stores = [store for folder in packed for store in folder.storages]
     _check(path, (Chunk("zstd", bytes(row[-1])) for store in stores for row in store.messages(store.connections)))
@@ -66,13 +67,13 @@ def _check(path: Path, chunks: Iterable[Chunk]) -> None:
             check_unpacked(path, size, most / 1e6)
 
 
-def _decompressor(packing: str) -> type[Decompressor]:
+def _decompressor(packing: str) -> Callable[[], Decompressor]:
     if packing == "bz2":
         return bz2.BZ2Decompressor
     if packing == "lz4":
         from lz4.frame import LZ4FrameDecompressor
 
-        return LZ4FrameDecompressor
+        return cast(Callable[[], Decompressor], LZ4FrameDecompressor)
     if sys.version_info >= (3, 14):
         from compression.zstd import ZstdDecompressor
     else:
@@ -81,14 +82,14 @@ def _decompressor(packing: str) -> type[Decompressor]:
 
 
 def _chunks(path: Path) -> Iterator[Chunk]:
-    with suppress(OSError, struct.error, UnicodeDecodeError), path.open("rb") as file:
+    with suppress(OSError, struct.error, ValueError, OverflowError), path.open("rb") as file:
         start = file.read(16)
         if start.startswith(b"#ROSBAG"):
             file.seek(start.find(b"\n") + 1)
-            yield from _of_ros1(file)
+            yield from _of_ros1(file, path.stat().st_size)
         elif start.startswith(b"\x89MCAP0\r\n"):
             file.seek(8)
-            yield from _of_mcap(file)
+            yield from _of_mcap(file, path.stat().st_size)
         elif start.startswith(ZSTD):
             yield Chunk("zstd", start + file.read())
 
@@ -96,10 +97,10 @@ def _chunks(path: Path) -> Iterator[Chunk]:
 ZSTD = b"\x28\xb5\x2f\xfd"
 
 
-def _of_ros1(file: IO[bytes]) -> Iterator[Chunk]:
-    """Records are a header of fields, name=value, and data; each has its length before it."""
+def _of_ros1(file: IO[bytes], most: int) -> Iterator[Chunk]:
+    """Records are a header of fields, name=value, and data; each has its length before it, of `most` bytes at most."""
     while length := file.read(4):
-        header, fields = file.read(*struct.unpack("<I", length)), dict[bytes, bytes]()
+        header, fields = file.read(min(most, *struct.unpack("<I", length))), dict[bytes, bytes]()
         while header:
             (size,) = struct.unpack_from("<I", header)
             name, _, value = header[4 : 4 + size].partition(b"=")
@@ -107,12 +108,12 @@ def _of_ros1(file: IO[bytes]) -> Iterator[Chunk]:
         (size,) = struct.unpack("<I", file.read(4))
         packing = fields.get(b"compression", b"none").decode()
         if fields.get(b"op") == b"\x05" and packing in ("bz2", "lz4"):
-            yield Chunk(packing, file.read(size))
+            yield Chunk(packing, file.read(min(size, most)))
         else:
             file.seek(size, 1)
 
 
-def _of_mcap(file: IO[bytes]) -> Iterator[Chunk]:
+def _of_mcap(file: IO[bytes], most: int) -> Iterator[Chunk]:
     """Records are a kind and a length; a chunk states times, size and checksum (28 bytes) and its packing first."""
     while kind := file.read(1):
         (size,) = struct.unpack("<Q", file.read(8))
@@ -120,8 +121,8 @@ def _of_mcap(file: IO[bytes]) -> Iterator[Chunk]:
             file.seek(size, 1)
             continue
         head = file.read(32)
-        packing = file.read(*struct.unpack("<I", head[28:])).decode()
+        packing = file.read(min(most, *struct.unpack("<I", head[28:]))).decode()
         file.seek(8, 1)
-        data = file.read(max(0, size - 40 - len(packing)))
+        data = file.read(min(most, max(0, size - 40 - len(packing))))
         if packing in ("lz4", "zstd"):
             yield Chunk(packing, data)

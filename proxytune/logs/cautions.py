@@ -86,7 +86,8 @@ def _chords(episode: LogEpisode) -> Chords:
     here = np.flatnonzero(later < len(times))
     later = later[here]
     lasts = times[later] - times[here]
-    here, later, lasts = (part[lasts < 2.0 * CHORD_S] for part in (here, later, lasts))
+    short = lasts < 2.0 * CHORD_S
+    here, later, lasts = here[short], later[short], lasts[short]
     moved = poses[later] - poses[here]
     heading = (poses[later, 2] + poses[here, 2]) / 2.0
     course = np.arctan2(moved[:, 1], moved[:, 0])

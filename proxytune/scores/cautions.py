@@ -140,6 +140,6 @@ def _ratio(one: Floats, other: Floats) -> float | None:
     if told.sum() < 3 or told.mean() < 0.5:
         return None
     logs = np.log10(np.abs(one[told])) - np.log10(np.abs(other[told]))
-    middle, low, high = np.median(logs), *np.quantile(logs, (0.25, 0.75))
+    low, middle, high = np.quantile(logs, (0.25, 0.5, 0.75)).tolist()
     least = np.log10(OTHER_UNIT if high - low < AGREED else ANY_UNIT)
     return float(10.0**middle) if abs(middle) >= least else None

@@ -1,6 +1,7 @@
 """`import` lists what a source holds, writes a log that reads back, and complains in one line."""
 
 import json
+from dataclasses import replace
 
 import foreign_robot
 import pytest
@@ -141,3 +142,20 @@ def test_the_folder_that_one_is_in_may_become_the_log(capsys, table, tmp_path, m
     monkeypatch.chdir(tmp_path / "empty")
     document(capsys, str(table), ".", "--robot", "nobodys", *FIGURES)
     assert read_log(tmp_path / "empty").name == "empty"
+
+
+def test_axes_in_a_mirror_and_a_wheel_in_millimetres_are_cautions(capsys, tmp_path):
+    drives = [foreign_robot.drive(number, seconds=20.0) for number in range(2)]
+    mirrored = [replace(one, poses=one.poses * (1.0, -1.0, 1.0)) for one in drives]
+    source = str(foreign_robot.write_form(tmp_path, "csv", mirrored))
+    figures = ["--figure", "wheel_radius_m=31.8", "--figure", "baseline_m=0.2"]
+    for words in ((source,), (source, str(tmp_path / "log"))):
+        wheel, axes, *_ = document(capsys, *words, *figures)["cautions"]
+        assert "its wheel_radius is 31.8 m" in wheel
+        assert axes.startswith("places are mirrored against headings")
+    assert main(["import", source, *figures]) == 0
+    assert "- beware: places are mirrored against headings" in capsys.readouterr().out
+
+
+def test_a_good_recording_draws_no_caution(capsys, table):
+    assert document(capsys, str(table), *FIGURES)["cautions"] == []

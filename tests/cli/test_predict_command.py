@@ -154,3 +154,22 @@ def test_an_output_needs_a_name(folder, model, capsys):
         main(["predict", str(model()), str(folder)])
     assert caught.value.code == 2
     assert "--output" in capsys.readouterr().err
+
+
+def test_an_interval_without_its_value_is_a_caution(folder, model, tmp_path, capsys):
+    path = model({"trim": 0.2, "delay": 0.12})
+    good = predicted(path, folder, "--output", tmp_path / "poses.csv", capsys=capsys)
+    assert good["cautions"] == []
+    path.write_text(path.read_text().replace("value = 0.2", "value = 0.2, interval = [0.01, 0.05]"))
+    told = predicted(path, folder, "--output", tmp_path / "poses.csv", capsys=capsys)
+    (line,) = told.pop("cautions")
+    assert "the interval of trim, 0.01 to 0.05, does not hold its value 0.2" in line
+    assert told == {key: value for key, value in good.items() if key != "cautions"}
+    assert main(["export", str(path), "--to", "urdf", "--output", str(tmp_path / "o.urdf"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["cautions"] == [line]
+
+
+def test_a_camera_parameter_of_a_robot_without_a_folder_is_no_matter_of_its_poses(folder, model, tmp_path, capsys):
+    geometry = {"wheel_radius": 0.0318, "effective_baseline": 0.16, "full_speed": 0.6}
+    path = model({"camera_pitch": 20.0}, robot="nobodys", geometry=geometry)
+    assert predicted(path, folder, "--output", tmp_path / "poses.csv", capsys=capsys)["rows"]

@@ -26,6 +26,15 @@ from .comparison import (
     start_of as start_of,
     starts_of as starts_of,
 )
+from .decision import (
+    ASKED as ASKED,
+    Asked as Asked,
+    Decision as Decision,
+    Panel as Panel,
+    chosen as chosen,
+    decide as decide,
+    mmrv_conventions as mmrv_conventions,
+)
 from .noise import (
     Chance as Chance,
     NoiseFloor as NoiseFloor,
@@ -41,4 +50,11 @@ from .resampling import (
     in_blocks as in_blocks,
     interval as interval,
     why_not_repeated as why_not_repeated,
+)
+from .saving import Saving as Saving, saving_of as saving_of
+from .sequential import (
+    Plan as Plan,
+    Sequential as Sequential,
+    sequential as sequential,
+    wealth_of as wealth_of,
 )

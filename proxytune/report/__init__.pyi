@@ -1,3 +1,4 @@
+from .decision import sequential_document as sequential_document, sequential_sentence as sequential_sentence
 from .diagnosis.answer import (
     diagnosis_figures as diagnosis_figures,
     diagnosis_headline as diagnosis_headline,

@@ -6,6 +6,13 @@ from typing import Any
 
 from rich.console import Group
 
+from proxytune.report.decision import (
+    CAPTION,
+    decision_document,
+    decision_figure,
+    decision_sentence,
+    decision_table,
+)
 from proxytune.report.html import write_page
 from proxytune.report.score_figures import MOST, flipped_pairs_figure, scatter_figure
 from proxytune.report.table_files import write_csv, write_latex
@@ -34,7 +41,7 @@ def score_sentence(assessments: Assessments, selection: Selection | None, *, tar
     """Say how low PRPV is and what that is worth; of several proxies which is best, and than which beyond noise."""
     if selection is None:
         ((proxy, assessment),) = assessments.items()
-        return _say_prpv(assessment, proxy, target)
+        return f"{_say_prpv(assessment, proxy, target)} {decision_sentence(assessment, target)}"
     best = selection.ranking[0][0]
     worse = [pair.worse for pair in selection.differences if pair.better == best and pair.beyond_noise]
     beyond = f"beyond noise better than {listed(worse)}" if worse else "not beyond noise better than any other"
@@ -95,6 +102,9 @@ def score_text(
         for kind, lines in (("beware", "cautions"), ("note", "notes"))
         for line, whose in _said({name: getattr(one, lines) for name, one in assessments.items()}).items()
     ]
+    if selection is None:
+        ((_, assessment),) = assessments.items()
+        notes += [f"decision: {line}" for line in decision_table(assessment, target).notes]
     noise, floor = next(iter(assessments.values())).noise_floor, []
     if selection is not None and noise.value is not None:
         ends = short_span(noise.low, noise.high)
@@ -157,6 +167,7 @@ def write_score_report(
                 "Pairs of agents that the proxy ranks wrongly",
                 FLIPPED,
             ),
+            ("decision", decision_figure(assessment.decision), "Regret of deploying each agent", CAPTION),
         ):
             paths.append(folder / f"{kind}{file}.png")
             save_figure(figure, paths[-1])
@@ -178,6 +189,7 @@ def _tables(assessments: Assessments, selection: Selection | None, target: str) 
     columns = (*columns_of(("measure",), ("value", "95 % interval")), *columns_of(("better", "what it says")))
     title = f"{proxy} as a proxy of {target}: {_sizes(assessment)}"
     return [
+        decision_table(assessment, target),
         Table(title, columns, (*_prpv_rows(assessment), *beside), notes),
         *map(_rates, assessment.success_rates),
     ]
@@ -329,6 +341,7 @@ def score_document(assessment: Assessment) -> dict[str, Any]:
             "paired": inputs.paired,
             "resamples": inner.resamples,
         },
+        **decision_document(assessment),
         "cautions": list(assessment.cautions),
         "notes": list(assessment.notes),
     }

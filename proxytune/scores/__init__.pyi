@@ -1,4 +1,5 @@
 from .cautions import score_cautions as score_cautions
+from .forms import Side as Side, both_metrics as both_metrics, expand as expand, own_column as own_column
 from .reading import (
     column_names as column_names,
     read_domains as read_domains,

@@ -55,6 +55,5 @@ from .saving import Saving as Saving, saving_of as saving_of
 from .sequential import (
     Plan as Plan,
     Sequential as Sequential,
-    sequential as sequential,
-    wealth_of as wealth_of,
+    sequential_test as sequential_test,
 )

@@ -28,7 +28,7 @@ MOST_DRAWN = 4_000_000
 PRIOR = 1.0
 """Successes and failures before the first episode: every rate is as probable as any other."""
 EDGE = 0.3
-"""A rate's interval: between Clopper and Pearson's (0), too wide on average, and Jeffreys' (½), too narrow at some rates.
+"""A rate's interval: between Clopper and Pearson's (0), too wide on average, and Jeffreys' (½), too narrow at some.
 It holds at fixed rates with 92 % or more, and with 96 to 97 % on average over all of them."""
 NO_NOISE = (
     "the target gives means without the number of rollouts: no probability can be told; give it (score --rollouts)"
@@ -166,7 +166,7 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
             not_told_apart=observed.target_winners[1:], chosen_on=chosen_on, observed=observed, tasks=tasks,
             without=without, least_told=None, basis="", scores=None, draws=None, counts=(),
         )  # fmt: skip
-    draws, counts, basis = known
+    draws, counts, centre, basis = known
     regret = draws.max(axis=1, keepdims=True) - draws
     expected, best = regret.mean(axis=0), np.bincount(draws.argmax(axis=1), minlength=len(agents)) / len(draws)
     place = int(expected.argmin())
@@ -174,9 +174,9 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
     held = order[: int(np.searchsorted(np.cumsum(best[order]), CONFIDENCE - ROUNDING)) + 1]
     spread = draws.std(axis=0)
     sign = signs[0]
-    ends = [interval(sign * draws[:, row]) for row in range(len(agents))]
+    middle, ends = sign * centre, [interval(sign * draws[:, row]) for row in range(len(agents))]
     if len(columns) == 1 and is_rate(inputs.target, columns[0]):
-        ends = rate_intervals(sign * draws.mean(axis=0), counts)
+        ends = rate_intervals(middle, counts)
     return Decision(
         winner=agents[place],
         probability_best=float(best[place]),
@@ -190,7 +190,7 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
         without=without,
         least_told=float(1.96 * np.sqrt(2.0) * np.median(spread)),
         basis=basis,
-        scores={agent: (float(sign * draws[:, row].mean()), ends[row]) for row, agent in enumerate(agents)},
+        scores={agent: (float(middle[row]), ends[row]) for row, agent in enumerate(agents)},
         draws=draws,
         counts=tuple(map(float, counts)),
     )
@@ -261,13 +261,14 @@ def draw_means(
     rollouts: int | None,
     saving: Saving | None,
     rng: np.random.Generator,
-) -> tuple[Floats, Floats, str] | None:
-    """Draws of each agent's true mean over these metrics, shape (draws, agents); what they are worth, and their basis.
+) -> tuple[Floats, Floats, Floats, str] | None:
+    """Draws of each agent's true mean over these metrics, shape (draws, agents); rollouts, means, and their basis.
 
     None where nothing is known of the noise of some metric.
     """
     draws = max(FEWEST_DRAWS, min(DRAWS, MOST_DRAWN // len(target.agents)))
-    total, worth, bases = np.zeros((draws, len(target.agents))), np.zeros(len(target.agents)), []
+    total, bases = np.zeros((draws, len(target.agents))), []
+    worth, centre = np.zeros((2, len(target.agents)))
     for column, sign in zip(columns, signs, strict=True):
         means, counts = target.means[:, column], target.counts.astype(np.float64)
         rectified = saving.rectified.get(target.metrics[column]) if saving is not None else None
@@ -292,8 +293,9 @@ def draw_means(
             basis += ", rectified by the proxy's paired starts"
         total += sign * drawn
         worth += counts
+        centre += sign * means
         bases.append(basis)
-    return total / len(columns), worth / len(columns), " and ".join(dict.fromkeys(bases))
+    return total / len(columns), worth / len(columns), centre / len(columns), " and ".join(dict.fromkeys(bases))
 
 
 def _rates(means: Floats, counts: Floats, draws: int, rng: np.random.Generator) -> Floats:
@@ -301,17 +303,17 @@ def _rates(means: Floats, counts: Floats, draws: int, rng: np.random.Generator) 
     return rng.beta(counts * means + PRIOR, counts * (1.0 - means) + PRIOR, (draws, len(means)))
 
 
-def rate_intervals(expected: Floats, counts: Floats) -> list[Ends]:
+def rate_intervals(rates: Floats, counts: Floats) -> list[Ends]:
     """The 95 % interval of each rate.
 
     Args:
-        expected: Its mean after the rollouts, with the prior's, shape (agents,).
+        rates: The share that succeeded, shape (agents,).
         counts: Rollouts that it rests on.
     """
     from scipy.special import betaincinv
 
     tail = (1.0 - CONFIDENCE) / 2.0
-    successes = np.clip(expected * (counts + 2.0 * PRIOR) - PRIOR, 0.0, counts)
+    successes = np.clip(rates, 0.0, 1.0) * counts
     failures = counts - successes
     low = betaincinv(successes + EDGE, failures + 1.0 - EDGE, tail)
     high = betaincinv(successes + 1.0 - EDGE, failures + EDGE, 1.0 - tail)

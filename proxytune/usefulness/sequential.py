@@ -74,6 +74,8 @@ def plan(decision: Decision, *, bound: float | None, made: Floats, scale: float)
         return Plan({}, bound, None, reason="nothing is known of the target's noise")
     if float(decision.draws.std(axis=0).max()) == 0.0:
         return Plan({}, bound, None, reason="the target's rollouts do not differ")
+    if made.min() <= 0.0:
+        return Plan({}, bound, None, reason="the number of rollouts behind the target's means is not known")
     draws, worth = decision.draws, np.array(decision.counts)
     worth = worth if (worth > 0.0).all() else made
     regret = draws.max(axis=1) - draws[:, draws.mean(axis=0).argmax()]
@@ -139,7 +141,7 @@ class Sequential:
     expected_rounds: Mapping[str, int | None]
 
 
-def sequential(inputs: Comparison, column: int = 0, *, seed: int = 0) -> Sequential:
+def sequential_test(inputs: Comparison, column: int = 0, *, seed: int = 0) -> Sequential:
     """Test, rollout by rollout in the target table's order, which agent is the best.
 
     Raises:

@@ -174,10 +174,12 @@ def test_figures_are_drawn_where_asked(tables):
     found = document("--proxy", "sim.csv", "--target", "real.csv", *METRIC, "--output", "out")
     assert found["report"] == "out/report.html"
     assert "As a proxy of real, sim has a PRPV" in Path("out/report.html").read_text()
-    assert [Path(path).name for path in found["figures"]] == ["scatter.png", "flipped_pairs.png"]
+    assert [Path(path).name for path in found["figures"]] == ["scatter.png", "flipped_pairs.png", "decision.png"]
     Path("b a.csv").write_text(SIM)
     found = document("--proxy", "sim.csv", "--proxy", "b a.csv", "--target", "real.csv", *METRIC, "--output", "many")
     assert sorted(path.name for path in Path("many").iterdir()) == [
+        "decision_b_a.png",
+        "decision_sim.png",
         "flipped_pairs_b_a.png",
         "flipped_pairs_sim.png",
         "report.html",

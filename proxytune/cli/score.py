@@ -26,9 +26,9 @@ from proxytune.scores import (
     Metric,
     ScoreTable,
     both_metrics,
+    check_sides,
     column_names,
     expand,
-    own_column,
     read_domains,
     read_scores,
 )
@@ -68,13 +68,7 @@ def _check_other_column(arguments: argparse.Namespace, metrics: Sequence[str]) -
         header = column_names(path, domain)
         if domain is None and "domain" in header:
             continue
-        for name in metrics:
-            own = {own_column(name, header, side) for side in ("proxy", "target")}
-            if len(own) == 1 and None not in own:
-                raise InputError(
-                    f"{source}: the column '{own.pop()}' would be both proxy and target; name the sides in "
-                    "the columns, as 'Sim success' and 'Real success', or give two tables"
-                )
+        check_sides(source, header, metrics)
 
 
 def _sides_given(arguments: argparse.Namespace) -> None:

@@ -1,9 +1,10 @@
 """Scores of proxies: sentence, tables, page, JSON document and table file of `score`."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from matplotlib.figure import Figure
 from rich.console import Group
 
 from proxytune.report.decision import (
@@ -148,6 +149,14 @@ def score_view(
     )
 
 
+def score_figures(assessment: Assessment) -> Iterator[tuple[str, Figure, str, str]]:
+    """The figures of one proxy: name, figure, title and caption."""
+    yield "scatter", scatter_figure(assessment), "Scores in the proxy and on the target", SCATTER
+    flipped = flipped_pairs_figure(assessment.prpv)
+    yield "flipped_pairs", flipped, "Pairs of agents that the proxy ranks wrongly", FLIPPED
+    yield "decision", decision_figure(assessment.decision), "Regret of deploying each agent", CAPTION
+
+
 def write_score_report(
     assessments: Assessments, selection: Selection | None, folder: Path, foot: Foot, *, target: str
 ) -> tuple[list[Path], Path]:
@@ -159,16 +168,7 @@ def write_score_report(
     paths, pictures, files = list[Path](), list[Picture](), file_names(assessments)
     for name, assessment in assessments.items():
         file, title = ("", "") if selection is None else (f"_{files[name]}", f": {name}")
-        for kind, figure, head, caption in (
-            ("scatter", scatter_figure(assessment), "Scores in the proxy and on the target", SCATTER),
-            (
-                "flipped_pairs",
-                flipped_pairs_figure(assessment.prpv),
-                "Pairs of agents that the proxy ranks wrongly",
-                FLIPPED,
-            ),
-            ("decision", decision_figure(assessment.decision), "Regret of deploying each agent", CAPTION),
-        ):
+        for kind, figure, head, caption in score_figures(assessment):
             paths.append(folder / f"{kind}{file}.png")
             save_figure(figure, paths[-1])
             pictures.append(Picture(f"{head}{title}", paths[-1].read_bytes(), caption))

@@ -251,3 +251,18 @@ def expand(metrics: Sequence[str], header: Sequence[str]) -> list[str]:
         fit = fnmatch.filter([one for one in header if one not in LABELS], name) if {"*", "?"} & set(name) else []
         found += [f"{one}:{rest}" for one in fit] or [text]
     return list(dict.fromkeys(found))
+
+
+def check_sides(where: str, header: Sequence[str], metrics: Sequence[str]) -> None:
+    """Refuse to compare a column of a table with itself.
+
+    Raises:
+        ScoresError: If both sides would take the same column.
+    """
+    for name in metrics:
+        own = {own_column(name, header, side) for side in ("proxy", "target")}
+        if len(own) == 1 and None not in own:
+            raise ScoresError(
+                f"{where}: the column '{own.pop()}' would be both proxy and target; name the sides in the columns, "
+                "as 'Sim success' and 'Real success', or give two tables"
+            )

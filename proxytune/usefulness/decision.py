@@ -11,6 +11,7 @@ of a published mean alone nothing is known of its noise, and no probability is g
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,6 +22,9 @@ from proxytune.settings import nearest
 from proxytune.usefulness.comparison import Comparison, by_start
 from proxytune.usefulness.resampling import CONFIDENCE, Ends, interval
 from proxytune.usefulness.saving import Saving, effective
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 DRAWS, FEWEST_DRAWS = 10_000, 1000
 MOST_DRAWN = 4_000_000
@@ -124,6 +128,19 @@ class Decision:
     scores: Mapping[str, tuple[float, Ends]] | None
     draws: Floats | None
     counts: tuple[float, ...]
+
+    def to_frame(self) -> "pd.DataFrame":
+        """One row per agent: its score, the probability that it is the best, and its expected regret, with intervals."""
+        import pandas as pd
+
+        rows = {}
+        for agent, regret in self.expected_regret.items():
+            mean, ends = self.scores[agent] if self.scores else (None, (None, None))
+            span = self.regret_interval[agent] if self.regret_interval else (None, None)
+            best = self.best_probabilities[agent] if self.best_probabilities else None
+            rows[agent] = (mean, *ends, best, regret, *span)
+        heads = ["score", "score_low", "score_high", "best_with", "expected_regret", "regret_low", "regret_high"]
+        return pd.DataFrame.from_dict(rows, orient="index", columns=heads).rename_axis("agent")
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -20,12 +20,12 @@ from proxytune.errors import InputError, LogError, ScoresError
 from proxytune.logs import Log, read_log
 from proxytune.report import (
     Picture,
+    drawn_scores,
     foot_of,
     fragment_html,
     page_html,
     png_of,
     score_document,
-    score_figures,
     score_sentence,
     score_view,
     write_text,
@@ -118,7 +118,7 @@ class ScoreReport(Assessment):
 
     def figures(self) -> dict[str, Figure]:
         """The figures by name: scatter, flipped_pairs and decision."""
-        return {name: figure for name, figure, _, _ in score_figures(self)}
+        return {name: figure for name, figure, _, _ in drawn_scores(self)}
 
     def page(self, path: str | Path | None = None) -> str:
         """The page as HTML; also written where a path is given.
@@ -126,7 +126,7 @@ class ScoreReport(Assessment):
         Raises:
             RunError: If it cannot be written.
         """
-        pictures = [Picture(head, png_of(figure), caption) for _, figure, head, caption in score_figures(self)]
+        pictures = [Picture(head, png_of(figure), caption) for _, figure, head, caption in drawn_scores(self)]
         text = page_html(score_view(self._named, None, pictures, target=self.names[1]), foot_of("proxytune.score(…)"))
         if path is not None:
             write_text(Path(path), text)

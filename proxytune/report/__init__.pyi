@@ -58,9 +58,9 @@ from .html import (
 )
 from .plv_search import plv_document as plv_document, plv_text as plv_text, write_plv_report as write_plv_report
 from .scores import (
+    drawn_scores as drawn_scores,
     ranking_document as ranking_document,
     score_document as score_document,
-    score_figures as score_figures,
     score_sentence as score_sentence,
     score_text as score_text,
     score_view as score_view,

@@ -149,7 +149,7 @@ def score_view(
     )
 
 
-def score_figures(assessment: Assessment) -> Iterator[tuple[str, Figure, str, str]]:
+def drawn_scores(assessment: Assessment) -> Iterator[tuple[str, Figure, str, str]]:
     """The figures of one proxy: name, figure, title and caption."""
     yield "scatter", scatter_figure(assessment), "Scores in the proxy and on the target", SCATTER
     flipped = flipped_pairs_figure(assessment.prpv)
@@ -168,7 +168,7 @@ def write_score_report(
     paths, pictures, files = list[Path](), list[Picture](), file_names(assessments)
     for name, assessment in assessments.items():
         file, title = ("", "") if selection is None else (f"_{files[name]}", f": {name}")
-        for kind, figure, head, caption in score_figures(assessment):
+        for kind, figure, head, caption in drawn_scores(assessment):
             paths.append(folder / f"{kind}{file}.png")
             save_figure(figure, paths[-1])
             pictures.append(Picture(f"{head}{title}", paths[-1].read_bytes(), caption))

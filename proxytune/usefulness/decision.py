@@ -130,7 +130,7 @@ class Decision:
     counts: tuple[float, ...]
 
     def to_frame(self) -> "pd.DataFrame":
-        """One row per agent: its score, the probability that it is the best, and its expected regret, with intervals."""
+        """One row per agent: score, probability to be the best and expected regret, with intervals."""
         import pandas as pd
 
         rows = {}

@@ -20,7 +20,7 @@ import numpy as np
 
 from proxytune.arrays import Flags, Floats
 from proxytune.scores import ScoreTable
-from proxytune.usefulness.comparison import Comparison, by_start, start_places
+from proxytune.usefulness.comparison import Comparison, by_start, start_places, starts_of
 from proxytune.usefulness.resampling import Ends
 
 FEWEST_AGENTS = 4
@@ -134,11 +134,15 @@ def _pairs(inputs: Comparison, column: int) -> _Pairs | None:
     sides = inputs.proxy, inputs.target
     if is_sorted(inputs.proxy, column) and is_sorted(inputs.target, column):
         return None
+    if (inputs.target.driven.sum(axis=0) < 2).all() and len(set(starts_of(inputs.target.episodes))) > 1:
+        return None  # no two agents share a label: these are numbers
     one, other = (by_start(side) for side in sides)
-    shared = [label for label in other.episodes if label in set(one.episodes)]
-    extra = [label for label in one.episodes if label not in set(shared)]
-    if len(shared) < FEWEST_PAIRS or (other.driven.sum(axis=0) < 2).all():  # no two agents share a start
+    known = set(one.episodes)
+    shared = [label for label in other.episodes if label in known]
+    met = set(shared)
+    if len(shared) < FEWEST_PAIRS:
         return None
+    extra = [label for label in one.episodes if label not in met]
     x, y = (side.arrange(agents=inputs.agents, episodes=shared).values[..., column] for side in (one, other))
     both: Flags = ~np.isnan(x) & ~np.isnan(y)
     if both.sum(axis=1).min() < FEWEST_PAIRS or (both.sum(axis=1) < other.counts).any():
@@ -220,22 +224,18 @@ def _of_policies(inputs: Comparison, column: int, real: float, simulated: float)
 def _shrunken(target: Floats, variances: Floats, design: Floats) -> tuple[Floats, Floats, tuple[Floats, Floats]]:
     """Posterior means and variances of the agents' true means, and the variances at the ends of τ's 95 %."""
     scale = max(float(np.ptp(target)), float(np.sqrt(variances.max())))
-    grid = np.linspace(0.0, 2.0 * scale, 201)[1:]
-    logs, means, spreads = np.empty(len(grid)), [], []
-    for place, tau in enumerate(grid):
-        weight = 1.0 / (variances + tau**2)
-        information = design.T @ (weight[:, None] * design)
-        cover = np.linalg.inv(information)
-        foretold = design @ (cover @ (design.T @ (weight * target)))
-        logs[place] = 0.5 * (
-            np.log(weight).sum() - np.linalg.slogdet(information)[1] - (weight * (target - foretold) ** 2).sum()
-        )
-        trust = tau**2 * weight
-        means.append(trust * target + (1.0 - trust) * foretold)
-        spreads.append(tau**2 * (1.0 - trust) + (1.0 - trust) ** 2 * np.einsum("ij,jk,ik->i", design, cover, design))
+    grid = np.linspace(0.0, 2.0 * scale, 201)[1:, None]
+    weight = 1.0 / (variances + grid**2)  # (grid, agents)
+    information = np.einsum("ta,ai,aj->tij", weight, design, design)
+    cover = np.linalg.inv(information)
+    foretold = np.einsum("ai,tij,bj,tb->ta", design, cover, design, weight * target, optimize=True)
+    logs = 0.5 * (np.log(weight).sum(axis=1) - np.linalg.slogdet(information)[1])
+    logs -= 0.5 * (weight * (target - foretold) ** 2).sum(axis=1)
+    trust = grid**2 * weight
+    every = trust * target + (1.0 - trust) * foretold
+    each = grid**2 * (1.0 - trust) + (1.0 - trust) ** 2 * np.einsum("ai,tij,aj->ta", design, cover, design)
     mass = np.exp(logs - logs.max())
     mass /= mass.sum()
-    every, each = np.array(means), np.array(spreads)
     mean = mass @ every
     cumulated = np.cumsum(mass)
     low, high = (each[min(int(np.searchsorted(cumulated, q)), len(grid) - 1)] for q in (0.975, 0.025))

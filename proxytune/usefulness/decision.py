@@ -26,8 +26,8 @@ from proxytune.usefulness.saving import Saving, effective
 if TYPE_CHECKING:
     import pandas as pd
 
-DRAWS, FEWEST_DRAWS = 10_000, 1000
-MOST_DRAWN = 4_000_000
+DRAWS, FEWEST_DRAWS = 40_000, 1000
+MOST_DRAWN = 1_000_000
 """Draws of all agents together."""
 PRIOR = 1.0
 """Successes and failures before the first episode: every rate is as probable as any other."""

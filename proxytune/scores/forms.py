@@ -129,6 +129,8 @@ def _literal(path: Path, name: str | None) -> Mapping[str, Any]:
                 continue
     if name is None and len(known) == 1:
         return next(iter(known.values()))
+    if not known:
+        raise ScoresError(f"{path}: has none that is written out, {{task: {{agent: score}}}}")
     if name not in known:
         asked = (
             f"no dictionary '{name}'; {nearest(name, known)}" if name else f"has the dictionaries {', '.join(known)}"

@@ -97,8 +97,8 @@ def main(page: Path, markdown: Path | None) -> None:
     chance = sum(pair.claim in (2, 3) for pair in pairs)
     wrong = sum(pair.claim in (1, 3) for pair in pairs)
     sentence = (
-        f"Of {len(pairs)} published pairs of tables, chance explains the ranking in {chance}; in {wrong} the simulator's "
-        "winner is not the robot's, or ties with one that is not."
+        f"Of {len(pairs)} published pairs of tables, chance explains the ranking in {chance}; in {wrong} the "
+        "simulator's winner is not the robot's, or ties with one that is not."
     )
     table = [(pair.name, f"{pair.paper}, arXiv {pair.arxiv}", *pair.cells) for pair in pairs]
     parts: list[Table | Picture | Paragraphs] = [

@@ -38,7 +38,7 @@ def _observed_sentence(observed: Panel) -> str:
     if observed.agrees:
         return f"the proxy's winner is the target's ({winners})"
     wins = "win" if len(observed.proxy_winners) > 1 else "wins"
-    return f"{winners} {wins} in the proxy, which by the target's means costs {short(observed.regret, 2)}"
+    return f"in the proxy {winners} {wins}, which by the target's means costs {short(observed.regret, 2)}"
 
 
 def _few(names: tuple[str, ...]) -> str:

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 DRAWS, FEWEST_DRAWS = 40_000, 1000
 MOST_DRAWN = 1_000_000
 """Draws of all agents together."""
+MOST_COMPARED = 2000
 PRIOR = 1.0
 """Successes and failures before the first episode: every rate is as probable as any other."""
 EDGE = 0.3
@@ -358,12 +359,14 @@ def _means(
 
 
 def mmrv_conventions(inputs: Comparison) -> dict[str, dict[str, float]]:
-    """MMRV of each metric in every convention that papers use.
+    """MMRV of each metric in every convention that papers use; none of more than 2000 agents.
 
     simpler: the target's gap where (s_i > s_j) differs from (t_i > t_j), SIMPLER's code; strictly_less: the same with
     "less"; sign_product: where (s_i − s_j)(t_i − t_j) < 0, so that ties cost nothing; proxy_gap: the proxy's gap where
     simpler has the target's.
     """
+    if len(inputs.agents) > MOST_COMPARED:
+        return {}
     return {metric.name: _conventions(inputs, metric, column) for column, metric in enumerate(inputs.metrics)}
 
 

@@ -33,6 +33,7 @@ PROXY_PRIOR = 8.0
 """Rollouts that the proxy's rate counts for in a bet."""
 MOST_ROLLOUTS = 100_000
 SCALE_SHARE = 0.05
+MOST_BETS = 20_000_000
 PATHS, MOST_ROUNDS = 200, 1000
 
 
@@ -151,6 +152,8 @@ def sequential_test(inputs: Comparison, column: int = 0, *, seed: int = 0) -> Se
     values = [_order(row[driven], metric.direction) for row, driven in zip(
         inputs.target.values[..., column], inputs.target.driven, strict=True)]  # fmt: skip
     rounds = min(map(len, values))
+    if len(agents) ** 2 * rounds > MOST_BETS:
+        raise ScoresError(f"--sequential: {len(agents)} agents are too many to be bet on; test those that may be best")
     if min(row.min() for row in values) < 0.0 or max(row.max() for row in values) > 1.0:
         raise ScoresError(
             f"--sequential: {metric.name} goes beyond 0 and 1; give successes, or scores as shares of the best"

@@ -9,7 +9,17 @@ from matplotlib.figure import Figure
 from proxytune.report.figure_style import BLUE, COLUMN, GREY, LIGHT_BLUE, dress
 from proxytune.report.view import Table, columns_of
 from proxytune.report.wording import listed, plain, short, with_span
-from proxytune.usefulness import Assessment, Decision, Panel, Plan, Saving, Sequential, mmrv_conventions
+from proxytune.usefulness import (
+    Assessment,
+    Choice,
+    Decision,
+    Panel,
+    Plan,
+    Saving,
+    Sequential,
+    compare_choices,
+    mmrv_conventions,
+)
 
 MOST_NAMED = 28
 """Agents that can be named at 85 mm: the best by expected regret."""
@@ -188,6 +198,40 @@ def decision_document(assessment: Assessment) -> dict[str, Any]:
         },
         "mmrv_conventions": mmrv_conventions(assessment.inputs),
     }
+
+
+def choices_document(assessments: Mapping[str, Assessment]) -> list[dict[str, Any]]:
+    """What choosing by one proxy instead of another saves on the target, as plain JSON."""
+    return [
+        {
+            "better": one.better,
+            "worse": one.worse,
+            "difference": one.value,
+            "interval": list(one.interval) if one.interval else None,
+            "beyond_noise": one.beyond_noise,
+        }
+        for one in _choices(assessments)
+    ]
+
+
+def choices_sentences(assessments: Mapping[str, Assessment], target: str) -> list[str]:
+    """Say of every proxy what it would have chosen and saves, and of which two the choice differs beyond noise."""
+    lines = []
+    for name, one in assessments.items():
+        regret = short(one.decision.expected_regret[one.decision.observed.proxy_winners[0]], 2)
+        winners = _few(one.decision.observed.proxy_winners)
+        lines.append(f"{name}: chooses {winners}, at an expected regret of {regret}; {saving_sentence(one.saves)}")
+    for choice in _choices(assessments):
+        if choice.value > 0.0:
+            told = {True: "beyond noise", False: "not beyond noise", None: "noise not known"}[choice.beyond_noise]
+            gain = with_span(short(choice.value, 2), *(choice.interval or (None, None)))
+            lines.append(f"choosing by {choice.better} instead of {choice.worse} gains {gain} on {target}, {told}")
+    return lines
+
+
+def _choices(assessments: Mapping[str, Assessment]) -> tuple[Choice, ...]:
+    first = next(iter(assessments.values()))
+    return compare_choices({name: one.inputs for name, one in assessments.items()}, first.asked, first.seed)
 
 
 def sequential_document(found: Sequential) -> dict[str, Any]:

@@ -9,6 +9,8 @@ from rich.console import Group
 
 from proxytune.report.decision import (
     CAPTION,
+    choices_document,
+    choices_sentences,
     decision_document,
     decision_figure,
     decision_sentence,
@@ -106,6 +108,8 @@ def score_text(
     if selection is None:
         ((_, assessment),) = assessments.items()
         notes += [f"decision: {line}" for line in decision_table(assessment, target).notes]
+    else:
+        notes += [f"decision: {line}" for line in choices_sentences(assessments, target)]
     noise, floor = next(iter(assessments.values())).noise_floor, []
     if selection is not None and noise.value is not None:
         ends = short_span(noise.low, noise.high)
@@ -353,6 +357,7 @@ def ranking_document(assessments: Assessments, selection: Selection) -> dict[str
     return {
         "proxies": [{"proxy": name, "rank": rank, **score_document(assessments[name])} for rank, (name, _) in ranked],
         "differences": differences_document(selection),
+        "choices": choices_document(assessments),
         "cautions": list(dict.fromkeys(line for one in assessments.values() for line in one.cautions)),
         "notes": [f"no intervals of the differences: {selection.reason}"] if selection.reason else [],
     }

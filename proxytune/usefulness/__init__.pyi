@@ -29,9 +29,11 @@ from .comparison import (
 from .decision import (
     ASKED as ASKED,
     Asked as Asked,
+    Choice as Choice,
     Decision as Decision,
     Panel as Panel,
     chosen as chosen,
+    compare_choices as compare_choices,
     decide as decide,
     mmrv_conventions as mmrv_conventions,
 )

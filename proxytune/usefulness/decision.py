@@ -8,6 +8,7 @@ uniform; of other scores Student's t, its spread pooled over agents; of a publis
 of a published mean alone nothing is known of its noise, and no probability is given.
 """
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -356,6 +357,50 @@ def _means(
     per = effective(counts, table, starts)
     scale = spread / np.sqrt(per) * np.sqrt(freedom / rng.chisquare(freedom, (draws, 1)))
     return means + scale * rng.standard_normal((draws, len(means)))
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What choosing by one proxy instead of another saves on the target.
+
+    Attributes:
+        better: The proxy whose winner has the lower expected regret.
+        worse: The other.
+        value: Expected score on the target of the better one's winner less that of the other's.
+        interval: Its 95 % interval; None where nothing is known of the target's noise.
+    """
+
+    better: str
+    worse: str
+    value: float
+    interval: Ends | None
+
+    @property
+    def beyond_noise(self) -> bool | None:
+        """True if the interval leaves out zero; None if there is none."""
+        return None if self.interval is None else self.interval[0] > 0.0
+
+
+def compare_choices(inputs: Mapping[str, Comparison], asked: Asked, seed: int = 0) -> tuple[Choice, ...]:
+    """Compare every two proxies of one target by what their winners do there, by the target's rollouts alone.
+
+    Raises:
+        InputError: As in decide.
+    """
+    found = {name: decide(one, asked, None, seed) for name, one in inputs.items()}
+    choices = []
+    for pair in itertools.combinations(found, 2):
+        chosen_agents = [found[name].observed.proxy_winners[0] for name in pair]
+        # The target is one: the draws of both are the same.
+        regrets = [found[pair[0]].expected_regret[agent] for agent in chosen_agents]
+        better, worse = (0, 1) if regrets[0] <= regrets[1] else (1, 0)
+        draws, agents = found[pair[0]].draws, inputs[pair[0]].agents
+        ends = None
+        if draws is not None:
+            lead, other = (draws[:, agents.index(chosen_agents[place])] for place in (better, worse))
+            ends = interval(lead - other)
+        choices.append(Choice(pair[better], pair[worse], regrets[worse] - regrets[better], ends))
+    return tuple(choices)
 
 
 def mmrv_conventions(inputs: Comparison) -> dict[str, dict[str, float]]:

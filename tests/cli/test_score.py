@@ -341,3 +341,50 @@ def test_a_table_of_another_kind_is_refused_before_anything_is_written(tables):
     with pytest.raises(InputError, match=r"--table t\.xlsx: a table is written as \.csv or \.tex"):
         run("--proxy", "sim.csv", "--target", "real.csv", *METRIC, "--table", "t.xlsx", "--output", "out")
     assert not Path("out").exists()
+
+
+BOTH = "Policy,Sim success (%),Real success (%)\nACT,62,48\nDiffusion,81,70\npi0,90,85\nOpenVLA,40,52\n"
+
+
+def test_a_papers_table_gives_the_decision_with_the_promised_keys(tables):
+    Path("both.csv").write_text(BOTH)
+    found = document("both.csv", "--rollouts", "25")
+    decision = found["decision"]
+    assert (decision["winner"], decision["chosen_on"]) == ("pi0", "success")
+    assert decision["not_told_apart"] == ["Diffusion"]
+    assert 0.8 < decision["probability_best"] < 0.95
+    assert set(decision["expected_regret"]) == {"ACT", "Diffusion", "pi0", "OpenVLA"}
+    assert found["observed"]["proxy_winner"] == found["observed"]["target_winner"] == "pi0"
+    assert found["observed"]["regret"] == 0.0
+    assert found["p_exact"] == pytest.approx(4 / 24)
+    assert set(found["saves"]) >= {"real_rollouts_worth", "interval"}
+    assert set(found["next"]) == {"pi0", "Diffusion"}
+    assert found["mmrv_conventions"]["success"]["simpler"] == pytest.approx(found["mmrv"]["success"])
+    bare = document("both.csv")["decision"]
+    assert (bare["winner"], bare["probability_best"]) == ("pi0", None)
+    assert "Deploy pi0" in " ".join(shown("both.csv", "--rollouts", "25").split())
+
+
+def test_lerobots_files_give_the_sentence_and_a_test_after_each_rollout(tables):
+    for side, count, rates in (("sim", 60, (0.6, 0.95)), ("real", 30, (0.2, 0.9))):
+        for agent, rate in zip(("act", "pi0"), rates, strict=True):
+            episodes = [{"success": (7 * i) % 10 < 10 * rate, "seed": None} for i in range(count)]
+            Path(side, agent).mkdir(parents=True)
+            Path(side, agent, "eval_info.json").write_text(json.dumps({"per_episode": episodes}))
+    words = ("--proxy", "sim", "--target", "real", "--metric", "success:max", "--sequential")
+    found = document(*words)
+    assert found["sequential"]["winner"] == found["decision"]["winner"] == "pi0"
+    assert found["sequential"]["decided_at"] <= 30
+    assert "sequential test: pi0 is shown to be the best" in " ".join(shown(*words).split())
+
+
+def test_of_several_proxies_it_is_told_what_choosing_by_each_costs(tables):
+    target = "agent,success\na,0.2\nb,0.9\nc,0.3\n"
+    Path("real.csv").write_text(target)
+    Path("right.csv").write_text(target.replace("0.9", "0.8"))
+    Path("wrong.csv").write_text("agent,success\na,0.9\nb,0.1\nc,0.3\n")
+    words = ("--proxy", "right.csv", "--proxy", "wrong.csv", "--target", "real.csv", "--metric", "success:max")
+    (choice,) = document(*words, "--rollouts", "50")["choices"]
+    assert (choice["better"], choice["worse"], choice["beyond_noise"]) == ("right", "wrong", True)
+    assert choice["difference"] == pytest.approx(0.68, abs=0.05)
+    assert document(*words)["choices"][0]["interval"] is None

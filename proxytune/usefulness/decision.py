@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 DRAWS, FEWEST_DRAWS = 40_000, 1000
 MOST_DRAWN = 1_000_000
 """Draws of all agents together."""
-MOST_COMPARED = 2000
+MOST_COMPARED, FEW_TASKS = 2000, 3
 PRIOR = 1.0
 """Successes and failures before the first episode: every rate is as probable as any other."""
 EDGE = 0.3
@@ -231,7 +231,8 @@ def chosen(inputs: Comparison, decide_on: str) -> tuple[list[int], str]:
     if decide_on == "mean" and not alike:
         raise InputError("--decide-on mean: metrics of two directions have no mean; name one of them")
     if len(names) > 1 and alike and (shares or decide_on == "mean"):
-        return list(range(len(names))), f"mean of {', '.join(names)}"
+        told = ", ".join(names) if len(names) <= FEW_TASKS else f"{len(names)} metrics"
+        return list(range(len(names))), f"mean of {told}"
     return [0], names[0]
 
 

@@ -109,7 +109,8 @@ def read_cells(
     Raises:
         ScoresError: If it cannot be read, or lacks a column.
     """
-    separator, rows = ",", iter(())
+    separator = ","
+    rows: Iterator[tuple[int, list[str]]]
     if is_form(path):
         named, given = form_rows(path, part)
         rows = iter(given)

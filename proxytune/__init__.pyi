@@ -7,6 +7,7 @@ from .api import (
     Measurement as Measurement,
     PicturePrediction as PicturePrediction,
     Prediction as Prediction,
+    ScoreReport as ScoreReport,
     SearchBox as SearchBox,
     StudyReport as StudyReport,
     SweepReport as SweepReport,

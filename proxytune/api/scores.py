@@ -6,17 +6,42 @@ DataFrames given to the readers of files: there is one way to read, and complain
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import tomlkit
+from matplotlib.figure import Figure
 
 from proxytune.errors import InputError, LogError, ScoresError
 from proxytune.files import temporary_folder
 from proxytune.logs import Log, read_log
-from proxytune.scores import Metric, ScoreTable, read_scores
-from proxytune.usefulness import Assessment, assess
+from proxytune.report import (
+    Picture,
+    drawn_scores,
+    foot_of,
+    fragment_html,
+    page_html,
+    png_of,
+    score_document,
+    score_sentence,
+    score_view,
+    write_text,
+)
+from proxytune.scores import (
+    Metric,
+    ScoreTable,
+    Side,
+    agent_column,
+    both_metrics,
+    check_sides,
+    column_names,
+    expand,
+    read_scores,
+)
+from proxytune.usefulness import Asked, Assessment, Sequential, assess, chosen, in_common, sequential_test
 
 LABELS = ("agent", "episode", "time")
 """What may be an index instead of a column."""
@@ -52,50 +77,162 @@ def _in_rows(problem: str) -> str:
 
 
 Scores = pd.DataFrame | ScoreTable | str | Path
+FEWEST_RESAMPLES, MOST_RESAMPLES = 100, 1_000_000
+
+
+@dataclass(frozen=True)
+class ScoreReport(Assessment):
+    """How useful a proxy is, and which agent to deploy: every measure, `.decision`, figures and a page.
+
+    Attributes:
+        names: What the proxy and the target are called.
+    """
+
+    names: tuple[str, str] = ("proxy", "target")
+
+    def __repr__(self) -> str:
+        return f"ScoreReport: {self.sentence}"
+
+    def _repr_html_(self) -> str:
+        pictures = [Picture(name, png_of(figure), "") for name, figure in self.figures().items()]
+        return fragment_html(score_view(self._named, None, pictures, target=self.names[1]))
+
+    @property
+    def _named(self) -> dict[str, Assessment]:
+        return {self.names[0]: self}
+
+    @property
+    def sentence(self) -> str:
+        """Say how low PRPV is, which agent to deploy, and what that risks."""
+        return score_sentence(self._named, None, target=self.names[1])
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """Plain numbers, texts, lists and dicts under the keys of `score --json`."""
+        return score_document(self)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per measure and metric: value, and the ends of its 95 % interval."""
+        return self.table()
+
+    def figures(self) -> dict[str, Figure]:
+        """The figures by name: scatter, flipped_pairs and decision."""
+        return {name: figure for name, figure, _, _ in drawn_scores(self)}
+
+    def page(self, path: str | Path | None = None) -> str:
+        """The page as HTML; also written where a path is given.
+
+        Raises:
+            RunError: If it cannot be written.
+        """
+        pictures = [Picture(head, png_of(figure), caption) for _, figure, head, caption in drawn_scores(self)]
+        text = page_html(score_view(self._named, None, pictures, target=self.names[1]), foot_of("proxytune.score(…)"))
+        if path is not None:
+            write_text(Path(path), text)
+        return text
+
+    def sequential(self) -> Sequential:
+        """Test after each rollout, in the order of the target's table, which agent is the best.
+
+        Raises:
+            ScoresError: If scores are not within 0 and 1, an agent has one rollout, or outcomes are sorted.
+        """
+        columns, _ = chosen(self.inputs, self.asked.decide_on)
+        return sequential_test(self.inputs, columns[0], seed=self.seed)
 
 
 def score(
+    both: Scores | None = None,
+    /,
     *,
-    proxy: Scores,
-    target: Scores,
-    metrics: str | Metric | Sequence[str | Metric],
+    proxy: Scores | None = None,
+    target: Scores | None = None,
+    metrics: str | Metric | Sequence[str | Metric] | None = None,
     beta: Mapping[str, float] | None = None,
     seed: int = 0,
-) -> Assessment:
-    """Measure how useful a proxy is as a predictor, from the scores of the same agents on both sides.
+    resamples: int = 1000,
+    columns: Mapping[str, str] | None = None,
+    common: bool = False,
+    unpaired: bool = False,
+    decide_on: str = "",
+    rollouts: int | None = None,
+    regret: float | None = None,
+) -> ScoreReport:
+    """Measure how useful a proxy is as a predictor, and say which agent to deploy on the target.
 
     Args:
+        both: One table of both sides, as with the columns "Sim success" and "Real success"; else name the two tables.
         proxy: One row per agent and episode, with the columns agent, episode (not needed for one row per agent) and
-            the metrics; a DataFrame, a CSV file or a ScoreTable.
+            the metrics; a DataFrame, a file in any form that the command reads, or a ScoreTable.
         target: The same of the target. Equal episodes on both sides are the same start.
-        metrics: How agents are compared, as in "distance:max" or ["distance:max:5%", "time_out_of_lane:min"].
+        metrics: How agents are compared, as in "distance:max" or ["distance:max:5%", "time_out_of_lane:min"], "*:max"
+            for all columns; not needed for a table of both sides' success.
         beta: Weight of each metric in PPV; by default one over its spread on the target.
-        seed: Seed of resamples and permutations.
+        seed: Seed of resamples, permutations and draws.
+        resamples: How many resamples and permutations to draw.
+        columns: What columns are called in the tables, as in {"agent": "policy"}.
+        common: Leave out agents that one side has alone, instead of refusing them.
+        unpaired: Treat episodes with equal labels as unrelated.
+        decide_on: The metric to choose an agent by, or "mean".
+        rollouts: Rollouts behind each mean of the target, where it has means alone.
+        regret: The regret that is accepted, for what to do next, in the metric's unit.
 
     Returns:
-        Every measure: `.prpv.value`, `.srcc.value["distance"]`, `.noise_floor`, `.chance`, `.notes`.
+        Every measure: `.prpv.value`, `.srcc.value["distance"]`, `.noise_floor`, `.chance`, `.notes`; and `.decision`,
+        `.saves`, `.next`, `.figures()`, `.page()`, `.to_frame()`.
 
     Raises:
         ScoresError: If a table lacks an agent or a metric, with side, row and column.
-        InputError: If a metric, a weight or the seed cannot be used.
+        InputError: If a metric, a weight or another option cannot be used.
     """
-    if seed < 0:
-        raise InputError(f"seed must be at least 0, got {seed}")
-    given = [metrics] if isinstance(metrics, str | Metric) else metrics
-    compared = [metric if isinstance(metric, Metric) else Metric.parse(metric) for metric in given]
-    names = [metric.name for metric in compared]
-    sides = {side: _table(scores, side, names) for side, scores in (("proxy", proxy), ("target", target))}
-    return assess(proxy=sides["proxy"], target=sides["target"], metrics=compared, beta=beta, seed=seed)
+    if seed < 0 or not FEWEST_RESAMPLES <= resamples <= MOST_RESAMPLES:
+        raise InputError(f"seed must be at least 0, and resamples from {FEWEST_RESAMPLES}, got {seed} and {resamples}")
+    if (both is None) == (proxy is None) or (proxy is None) != (target is None):
+        raise InputError("give the proxy's and the target's scores, or one table of both sides")
+    given = [metrics] if isinstance(metrics, str | Metric) else list(metrics or ())
+    names, header = ("proxy", "target") if both is None else ("sim", "real"), _header(target if both is None else both)
+    if not given:
+        given = [f"{name}:max" for name in both_metrics(header) if "success" in name]
+    compared = [Metric.parse(one) if isinstance(one, str) else one for text in given for one in _expanded(text, header)]
+    if not compared:
+        raise InputError("no metric is given; name what is compared and whether more is better, as in 'success:max'")
+    wanted = [metric.name for metric in compared]
+    if both is not None:
+        check_sides(names[1], header, wanted)
+    sides = {
+        "proxy": _table(proxy if both is None else both, "proxy", wanted, columns),
+        "target": _table(target if both is None else both, "target", wanted, columns),
+    }
+    if common:
+        sides = dict(zip(sides, in_common(sides)[0].values(), strict=True))
+    if unpaired:
+        sides = {side: table.unpaired() for side, table in sides.items()}
+    asked = Asked(decide_on, rollouts, regret)
+    found = assess(**sides, metrics=compared, beta=beta, seed=seed, resamples=resamples, asked=asked)
+    return ScoreReport(**{one.name: getattr(found, one.name) for one in fields(Assessment)}, names=names)
 
 
-def _table(scores: Scores, side: str, names: Sequence[str]) -> ScoreTable:
+def _header(scores: Scores | None) -> list[str]:
+    """The columns of a table, as far as they are known before it is read."""
+    if isinstance(scores, pd.DataFrame):
+        return [str(name) for name in scores.columns]
+    if isinstance(scores, str | Path):
+        return column_names(Path(scores))
+    return list(scores.metrics) if isinstance(scores, ScoreTable) else []
+
+
+def _expanded(metric: str | Metric, header: Sequence[str]) -> Sequence[str | Metric]:
+    return expand([metric], header) if isinstance(metric, str) else [metric]
+
+
+def _table(scores: Scores | None, side: Side, names: Sequence[str], columns: Mapping[str, str] | None) -> ScoreTable:
     if isinstance(scores, ScoreTable):
         return _selected(scores, side, names)
     if isinstance(scores, str | Path):
-        return read_scores(scores, names)
-    _check_columns(scores, side)
+        return read_scores(scores, names, columns=columns, side=side)
+    _check_columns(scores, side, columns)
     with as_files({side: scores}) as folder:
-        return read_scores(folder / f"{side}.csv", names)
+        return read_scores(folder / f"{side}.csv", names, columns=columns, side=side)
 
 
 def _selected(scores: ScoreTable, side: str, names: Sequence[str]) -> ScoreTable:
@@ -105,12 +242,12 @@ def _selected(scores: ScoreTable, side: str, names: Sequence[str]) -> ScoreTable
         raise ScoresError(f"{side}: {problem}") from None
 
 
-def _check_columns(scores: pd.DataFrame, side: str) -> None:
+def _check_columns(scores: pd.DataFrame | None, side: str, columns: Mapping[str, str] | None) -> None:
     """Refuse what a DataFrame may be like and a file not."""
     if not isinstance(scores, pd.DataFrame):
         kind = type(scores).__name__
         raise InputError(f"{side}: must be a DataFrame, a CSV file or a ScoreTable, got {kind}")
-    if "agent" not in (*scores.columns, *scores.index.names):
+    if "agent" not in (*scores.columns, *scores.index.names, *(columns or ())) and not agent_column(_header(scores)):
         found = ", ".join(map(str, scores.columns))[:60]
         raise ScoresError(f"{side}: no column 'agent'; columns are {found}; name the column or index of agents 'agent'")
     domains = list(scores["domain"].unique()) if "domain" in scores else []

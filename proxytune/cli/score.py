@@ -17,12 +17,33 @@ from proxytune.report import (
     ranking_document,
     score_document,
     score_text,
+    sequential_document,
+    sequential_sentence,
     write_score_report,
     write_score_table,
 )
-from proxytune.scores import Metric, ScoreTable, column_names, read_domains, read_scores
+from proxytune.scores import (
+    Metric,
+    ScoreTable,
+    both_metrics,
+    check_sides,
+    column_names,
+    expand,
+    read_domains,
+    read_scores,
+)
 from proxytune.settings import nearest
-from proxytune.usefulness import Assessment, Selection, assess, in_common, select_proxy
+from proxytune.usefulness import (
+    Asked,
+    Assessment,
+    Selection,
+    Sequential,
+    assess,
+    chosen,
+    in_common,
+    select_proxy,
+    sequential_test,
+)
 
 
 def read_sides(
@@ -35,8 +56,54 @@ def read_sides(
     """
     columns = _columns(arguments.columns)
     _check_columns(columns, [split_source(source)[0] for source in (*arguments.target, *arguments.proxy)])
-    target = _read_target(arguments.target, metrics, columns)
+    _check_other_column(arguments, metrics)
+    target = _read_target(arguments.target, metrics, columns, both=arguments.target == arguments.proxy)
     return target, _read_proxies(arguments.proxy, arguments.target, metrics, columns)
+
+
+def _check_other_column(arguments: argparse.Namespace, metrics: Sequence[str]) -> None:
+    """Refuse to compare a column with itself."""
+    for source in set(arguments.target) & set(arguments.proxy):
+        path, domain = split_source(source)
+        header = column_names(path, domain)
+        if domain is None and "domain" in header:
+            continue
+        check_sides(source, header, metrics)
+
+
+def _sides_given(arguments: argparse.Namespace) -> None:
+    """Take one table for both sides, where there is one.
+
+    Raises:
+        InputError: If a side is missing.
+    """
+    if arguments.both is not None:
+        if arguments.proxy or arguments.target:
+            raise InputError(f"{arguments.both}: give one table of both sides, or --proxy and --target")
+        arguments.proxy = arguments.target = [arguments.both]
+    for side in ("proxy", "target"):
+        if not getattr(arguments, side):
+            raise InputError(f"--{side} is missing: name its scores, or one table of both sides: score TABLE")
+
+
+def _metrics_given(arguments: argparse.Namespace) -> list[str]:
+    """The metrics asked for with patterns resolved, or those that one table has of both sides.
+
+    Raises:
+        InputError: If there are none, or their direction cannot be guessed.
+    """
+    path, domain = split_source(arguments.target[0])
+    known = arguments.metric or []
+    if known and not any("*" in text or "?" in text for text in known):
+        return list(known)
+    header = column_names(path, domain)
+    if known:
+        return expand(known, header)
+    found = both_metrics(header)
+    if not found or not all("success" in name for name in found):
+        told = f"; the table has {', '.join(found)}" if found else ""
+        raise InputError(f"--metric is missing: say what is compared and whether more is better, NAME:max{told}")
+    return [f"{name}:max" for name in found]
 
 
 def split_source(source: str) -> tuple[Path, str | None]:
@@ -64,13 +131,15 @@ def _check_columns(columns: Mapping[str, str], files: Sequence[Path]) -> None:
             raise InputError(f"--columns {name}={theirs}: no table has a column '{theirs}'; {nearest(theirs, found)}")
 
 
-def _read_target(sources: Sequence[str], metrics: Sequence[str], columns: Mapping[str, str]) -> tuple[str, ScoreTable]:
+def _read_target(
+    sources: Sequence[str], metrics: Sequence[str], columns: Mapping[str, str], *, both: bool
+) -> tuple[str, ScoreTable]:
     parts = [split_source(source) for source in sources]
     if len({domain for _, domain in parts}) > 1:
         raise InputError(f"--target {sources[1]}: several files make one table; give all of them one domain, or none")
     paths, domain = [path for path, _ in parts], parts[0][1]
-    name = domain or ", ".join(path.stem for path in paths)
-    return name, read_scores(paths, metrics, domain, _present(columns, paths))
+    name = domain or ("real" if both else ", ".join(path.stem for path in paths))
+    return name, read_scores(paths, metrics, domain, _present(columns, paths), "target")
 
 
 def _read_proxies(
@@ -82,11 +151,14 @@ def _read_proxies(
     for source in sources:
         path, domain = split_source(source)
         here = _present(columns, [path])
-        tables = {domain: read_scores(path, metrics, domain, here)} if domain else read_domains(path, metrics, here)
+        if domain:
+            tables = {domain: read_scores(path, metrics, domain, here, "proxy")}
+        else:
+            tables = read_domains(path, metrics, here, "proxy")
         if not domain and len(tables) > 1 and of_target.get(path):
             tables.pop(of_target[path] or "", None)
         for label, table in tables.items():
-            name = label or path.stem
+            name = label or ("sim" if source in target else path.stem)
             name = name if name not in proxies else f"{path}:{label}" if label else str(path)
             if name in proxies:
                 raise InputError(f"--proxy {source}: is given twice; give each proxy once")
@@ -107,16 +179,20 @@ LARGEST_WEIGHT = 1e70
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the tables, the metrics and what is done with them."""
     parser.add_argument(
+        "both",
+        nargs="?",
+        metavar="TABLE",
+        help="one table of both sides: Sim success, Real success",
+    )
+    parser.add_argument(
         "--proxy",
         action="append",
-        required=True,
         metavar="CSV[:DOMAIN]",
         help="scores in the proxy; repeat it, or give a file with several domains, to rank proxies",
     )
     parser.add_argument(
         "--target",
         action="append",
-        required=True,
         metavar="CSV[:DOMAIN]",
         help="scores on the target; repeat it for a table in several files",
     )
@@ -130,7 +206,6 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--metric",
         action="append",
-        required=True,
         metavar="NAME:max|min[:TOLERANCE]",
         help="a column to compare agents by, whether higher or lower is better, and the largest tie (0.5 or 5%%)",
     )
@@ -143,6 +218,21 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--unpaired", action="store_true", help="treat episodes with equal labels as unrelated [as the same start]"
+    )
+    parser.add_argument(
+        "--decide-on",
+        default="",
+        metavar="NAME",
+        help="the metric to choose by, or mean [mean of shares, or first]",
+    )
+    parser.add_argument(
+        "--rollouts", type=int, metavar="N", help="rollouts behind each mean of the target, where it has means alone"
+    )
+    parser.add_argument("--regret", type=float, metavar="R", help="regret that is accepted, for what to do next [0.05]")
+    parser.add_argument(
+        "--sequential",
+        action="store_true",
+        help="test after each rollout, in the target's order, which agent is best",
     )
     parser.add_argument("--resamples", type=int, default=1000, help="bootstrap resamples and permutations [1000]")
     parser.add_argument("--seed", type=int, default=0, help="seed of the resampling [0]")
@@ -159,6 +249,8 @@ def run(arguments: argparse.Namespace) -> Answer:
         raise InputError(f"--resamples must be between {between}, and --seed at least 0")
     if arguments.table:
         check_table_file("--table", arguments.table)
+    _sides_given(arguments)
+    arguments.metric = _metrics_given(arguments)
     metrics = [Metric.parse(text) for text in arguments.metric]
     (target_name, target), proxies = read_sides(arguments, [metric.name for metric in metrics])
     (target, proxies), left_out = _common(target, proxies) if arguments.common else ((target, proxies), ())
@@ -167,24 +259,45 @@ def run(arguments: argparse.Namespace) -> Answer:
         proxies = {name: table.unpaired() for name, table in proxies.items()}
     beta = _weights(arguments.beta)
     sampling = {"resamples": arguments.resamples, "seed": arguments.seed}
+    asked = Asked(arguments.decide_on, arguments.rollouts, arguments.regret)
     assessments = {
-        name: assess(proxy=proxy, target=target, metrics=metrics, beta=beta, **sampling)
+        name: assess(proxy=proxy, target=target, metrics=metrics, beta=beta, asked=asked, **sampling)
         for name, proxy in proxies.items()
     }
     selection = None
     if len(assessments) > 1:
         selection = select_proxy(proxies=proxies, target=target, metrics=metrics, **sampling)
+    tested = _test(assessments, arguments) if arguments.sequential else None
     written = _write(arguments, assessments, selection, target_name) if arguments.output else {"figures": []}
     document = {"target": target_name, **written, "left_out": list(left_out)}
     if arguments.table:
         write_score_table(assessments, arguments.table)
         document["table"] = str(arguments.table)
-    return _answer(document, assessments, selection)
+    if tested is not None:
+        document["sequential"] = sequential_document(tested)
+    return _answer(document, assessments, selection, tested)
 
 
-def _answer(document: dict[str, Any], assessments: Mapping[str, Assessment], selection: Selection | None) -> Answer:
+def _test(assessments: Mapping[str, Assessment], arguments: argparse.Namespace) -> Sequential:
+    """The test after each rollout, whose bets the proxy foretells."""
+    if len(assessments) > 1:
+        raise InputError("--sequential: takes one proxy; name the one to bet by")
+    ((_, assessment),) = assessments.items()
+    columns, name = chosen(assessment.inputs, arguments.decide_on)
+    if len(columns) > 1:
+        raise InputError(f"--sequential: takes one metric, not the {name}; name it with --decide-on")
+    return sequential_test(assessment.inputs, columns[0], seed=arguments.seed)
+
+
+def _answer(
+    document: dict[str, Any],
+    assessments: Mapping[str, Assessment],
+    selection: Selection | None,
+    tested: Sequential | None,
+) -> Answer:
     """Text that is printed: the sentence, the table and the notes."""
-    shown = score_text(assessments, selection, document["left_out"], target=document["target"])
+    lines = [*document["left_out"], *([f"sequential test: {sequential_sentence(tested)}"] if tested else ())]
+    shown = score_text(assessments, selection, lines, target=document["target"])
     if selection is not None:
         return Answer(document | ranking_document(assessments, selection), shown)
     ((name, assessment),) = assessments.items()

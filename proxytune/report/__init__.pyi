@@ -1,3 +1,4 @@
+from .decision import sequential_document as sequential_document, sequential_sentence as sequential_sentence
 from .diagnosis.answer import (
     diagnosis_figures as diagnosis_figures,
     diagnosis_headline as diagnosis_headline,
@@ -49,12 +50,20 @@ from .figure_style import (
     dress as dress,
     name_lines as name_lines,
 )
-from .html import fragment_html as fragment_html, frame_html as frame_html, write_page as write_page
+from .html import (
+    fragment_html as fragment_html,
+    frame_html as frame_html,
+    page_html as page_html,
+    write_page as write_page,
+)
 from .plv_search import plv_document as plv_document, plv_text as plv_text, write_plv_report as write_plv_report
 from .scores import (
+    drawn_scores as drawn_scores,
     ranking_document as ranking_document,
     score_document as score_document,
+    score_sentence as score_sentence,
     score_text as score_text,
+    score_view as score_view,
     write_score_report as write_score_report,
     write_score_table as write_score_table,
 )

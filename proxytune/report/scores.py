@@ -1,11 +1,21 @@
 """Scores of proxies: sentence, tables, page, JSON document and table file of `score`."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from matplotlib.figure import Figure
 from rich.console import Group
 
+from proxytune.report.decision import (
+    CAPTION,
+    choices_document,
+    choices_sentences,
+    decision_document,
+    decision_figure,
+    decision_sentence,
+    decision_table,
+)
 from proxytune.report.html import write_page
 from proxytune.report.score_figures import MOST, flipped_pairs_figure, scatter_figure
 from proxytune.report.table_files import write_csv, write_latex
@@ -34,7 +44,7 @@ def score_sentence(assessments: Assessments, selection: Selection | None, *, tar
     """Say how low PRPV is and what that is worth; of several proxies which is best, and than which beyond noise."""
     if selection is None:
         ((proxy, assessment),) = assessments.items()
-        return _say_prpv(assessment, proxy, target)
+        return f"{_say_prpv(assessment, proxy, target)} {decision_sentence(assessment, target)}"
     best = selection.ranking[0][0]
     worse = [pair.worse for pair in selection.differences if pair.better == best and pair.beyond_noise]
     beyond = f"beyond noise better than {listed(worse)}" if worse else "not beyond noise better than any other"
@@ -95,6 +105,11 @@ def score_text(
         for kind, lines in (("beware", "cautions"), ("note", "notes"))
         for line, whose in _said({name: getattr(one, lines) for name, one in assessments.items()}).items()
     ]
+    if selection is None:
+        ((_, assessment),) = assessments.items()
+        notes += [f"decision: {line}" for line in decision_table(assessment, target).notes]
+    else:
+        notes += [f"decision: {line}" for line in choices_sentences(assessments, target)]
     noise, floor = next(iter(assessments.values())).noise_floor, []
     if selection is not None and noise.value is not None:
         ends = short_span(noise.low, noise.high)
@@ -138,6 +153,14 @@ def score_view(
     )
 
 
+def drawn_scores(assessment: Assessment) -> Iterator[tuple[str, Figure, str, str]]:
+    """The figures of one proxy: name, figure, title and caption."""
+    yield "scatter", scatter_figure(assessment), "Scores in the proxy and on the target", SCATTER
+    flipped = flipped_pairs_figure(assessment.prpv)
+    yield "flipped_pairs", flipped, "Pairs of agents that the proxy ranks wrongly", FLIPPED
+    yield "decision", decision_figure(assessment.decision), "Regret of deploying each agent", CAPTION
+
+
 def write_score_report(
     assessments: Assessments, selection: Selection | None, folder: Path, foot: Foot, *, target: str
 ) -> tuple[list[Path], Path]:
@@ -149,15 +172,7 @@ def write_score_report(
     paths, pictures, files = list[Path](), list[Picture](), file_names(assessments)
     for name, assessment in assessments.items():
         file, title = ("", "") if selection is None else (f"_{files[name]}", f": {name}")
-        for kind, figure, head, caption in (
-            ("scatter", scatter_figure(assessment), "Scores in the proxy and on the target", SCATTER),
-            (
-                "flipped_pairs",
-                flipped_pairs_figure(assessment.prpv),
-                "Pairs of agents that the proxy ranks wrongly",
-                FLIPPED,
-            ),
-        ):
+        for kind, figure, head, caption in drawn_scores(assessment):
             paths.append(folder / f"{kind}{file}.png")
             save_figure(figure, paths[-1])
             pictures.append(Picture(f"{head}{title}", paths[-1].read_bytes(), caption))
@@ -178,6 +193,7 @@ def _tables(assessments: Assessments, selection: Selection | None, target: str) 
     columns = (*columns_of(("measure",), ("value", "95 % interval")), *columns_of(("better", "what it says")))
     title = f"{proxy} as a proxy of {target}: {_sizes(assessment)}"
     return [
+        decision_table(assessment, target),
         Table(title, columns, (*_prpv_rows(assessment), *beside), notes),
         *map(_rates, assessment.success_rates),
     ]
@@ -329,6 +345,7 @@ def score_document(assessment: Assessment) -> dict[str, Any]:
             "paired": inputs.paired,
             "resamples": inner.resamples,
         },
+        **decision_document(assessment),
         "cautions": list(assessment.cautions),
         "notes": list(assessment.notes),
     }
@@ -340,6 +357,7 @@ def ranking_document(assessments: Assessments, selection: Selection) -> dict[str
     return {
         "proxies": [{"proxy": name, "rank": rank, **score_document(assessments[name])} for rank, (name, _) in ranked],
         "differences": differences_document(selection),
+        "choices": choices_document(assessments),
         "cautions": list(dict.fromkeys(line for one in assessments.values() for line in one.cautions)),
         "notes": [f"no intervals of the differences: {selection.reason}"] if selection.reason else [],
     }

@@ -8,7 +8,7 @@ import csv
 import io
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,10 +16,22 @@ import numpy as np
 from proxytune.arrays import Floats
 from proxytune.errors import ScoresError
 from proxytune.files import draft_of
+from proxytune.scores.forms import (
+    LABELS,
+    Side,
+    agent_column,
+    beside,
+    counted,
+    form_rows,
+    is_form,
+    own_column,
+    percent_column,
+    read_cell,
+    spread_out,
+)
 from proxytune.scores.table import LARGEST, ScoreTable
 from proxytune.settings import nearest, read_text
 
-LABELS = ("agent", "episode", "domain")
 SEPARATORS = (",", ";", "\t")
 Columns = Mapping[str, str]
 """What a column is called in a file, by what it is called here: `{"agent": "policy"}`."""
@@ -36,6 +48,7 @@ class Cells:
         lines: The line number of each row.
         cells: The cells of each row by column: labels and the metrics asked for.
         decimal: What numbers have before their fractions.
+        errors: Published standard errors of each row, by metric; of those that have some.
     """
 
     path: Path
@@ -44,6 +57,7 @@ class Cells:
     lines: Sequence[int]
     cells: Mapping[str, Sequence[str]]
     decimal: str = "."
+    errors: Mapping[str, Sequence[float]] = field(default_factory=dict)
 
     def label(self, name: str) -> Sequence[str]:
         """The labels of this kind, one per row; empty ones where the file has no such column.
@@ -76,28 +90,116 @@ class Cells:
         return values
 
 
-def read_cells(path: Path, metrics: Sequence[str], columns: Columns | None = None) -> Cells:
-    """Read a file of scores.
+def read_cells(
+    path: Path,
+    metrics: Sequence[str],
+    columns: Columns | None = None,
+    side: Side | None = None,
+    part: str | None = None,
+) -> Cells:
+    """Read a file of scores, in any form that is known.
 
     Args:
         path: CSV, its columns separated by commas, semicolons or tabs; with the latter two, decimals may have commas.
         metrics: The columns that it must have besides that of the agents.
         columns: What columns are called in the file; one that is not there may have its name from here.
+        side: Whose columns to take where the table has both sides'.
+        part: The dictionary in a Python file.
 
     Raises:
         ScoresError: If it cannot be read, or lacks a column.
     """
-    text = _text(path)
-    separator = _separator(text)
-    rows = _rows(path, text, separator)
-    named = _first(path, rows)
+    separator = ","
+    rows: Iterator[tuple[int, list[str]]]
+    if is_form(path):
+        named, given = form_rows(path, part)
+        rows = iter(given)
+    else:
+        text = _text(path)
+        separator = _separator(text)
+        rows = _rows(path, text, separator)
+        named = _first(path, rows)
     ours = {theirs: name for name, theirs in (columns or {}).items() if theirs in named}
+    alias = agent_column(named)
+    if alias is not None and not {"agent"} & {*named, *ours.values()}:
+        ours[alias] = "agent"
     # Another column that has such a name is out of the way.
     header = [ours.get(name, f"{name} of the file" if name in ours.values() else name) for name in named]
+    whose = {name: column for name in metrics if (column := own_column(name, header, side)) not in (None, name)}
+    bare = {column: name for name, column in whose.items()}
+    if len(bare) == len(whose):
+        header = [bare.get(name, name) for name in header]
     _check_header(path, header, metrics)
-    lines, cells = _columns(path, rows, header, {*LABELS, *metrics})
+    more = {name: beside(name, name, header, side) for name in metrics}
+    wanted = {*LABELS, *metrics, *(column for pair in more.values() for column in pair if column is not None)}
+    lines, cells = _columns(path, rows, header, wanted)
+    if is_form(path):  # an agent that a dictionary does not have is left out
+        kept = [row for row in range(len(lines)) if all(cells[name][row] for name in metrics)]
+        lines, cells = [lines[row] for row in kept], {name: [own[row] for row in kept] for name, own in cells.items()}
     found = Cells(path, named, header, lines, cells)
-    return found if separator == "," else replace(found, decimal=_decimal(found, metrics))
+    found = found if separator == "," else replace(found, decimal=_decimal(found, metrics))
+    in_percent = {name: percent_column(whose.get(name) or name, name) for name in metrics}
+    return _plain_cells(found, metrics, more, in_percent)
+
+
+def _plain_cells(
+    found: Cells,
+    metrics: Sequence[str],
+    more: Mapping[str, tuple[str | None, str | None]],
+    in_percent: Mapping[str, bool],
+) -> Cells:
+    """Counts as a row per rollout, per cent as shares, and standard errors by themselves."""
+    named = any(column is not None for pair in more.values() for column in pair) or any(in_percent.values())
+    odd = any(mark in cell for name in metrics for cell in found.cells[name] for mark in "%/o±+")
+    if not (named or odd) or ("episode" in found.cells and not odd and not any(in_percent.values())):
+        return found
+    lines: list[int] = []
+    cells: dict[str, list[str]] = {name: [] for name in {*found.cells, "episode"}}
+    errors: dict[str, list[float]] = {name: [] for name in metrics}
+    for row, line in enumerate(found.lines):
+        own = {name: column[row] for name, column in found.cells.items()}
+        read = {name: _read(found, own, name, more[name], in_percent[name], line) for name in metrics}
+        done, label = [one[2] for one in read.values() if one[2] is not None], own.get("episode", "")
+        if done and (len(done) < len(metrics) or len({of for _, of in done}) > 1):
+            where = f"{found.path}: line {line}: counts of rollouts"
+            raise ScoresError(f"{where} must be one number an agent in every metric; give the metrics one by one")
+        for place, values in enumerate(spread_out(done) or [[one[0] for one in read.values()]]):
+            lines.append(line)
+            episode = f"{own['agent']} {label}#{place}" if done else label
+            for name, value in (own | dict(zip(metrics, values, strict=True)) | {"episode": episode}).items():
+                cells[name].append(value)
+            for name, one in read.items():
+                errors[name].append(one[1])
+    if "episode" not in found.cells and not any(cells["episode"]):
+        del cells["episode"]
+    known = {name: own for name, own in errors.items() if any(own)}
+    return replace(found, lines=lines, cells=cells, errors=known)
+
+
+def _read(
+    found: Cells,
+    own: Mapping[str, str],
+    name: str,
+    more: tuple[str | None, str | None],
+    in_percent: bool,
+    line: int,
+) -> tuple[str, float, tuple[int, int] | None]:
+    """What a row says of a metric: its text, its standard error (0: not known), and successes of rollouts."""
+    text, error, scale = own[name], 0.0, 100.0 if in_percent else 1.0
+    read, where = read_cell(text, found.decimal, in_percent), f"{found.path}: line {line}, column '{name}'"
+    if read is not None:
+        text, error = repr(read[0]).replace(".", found.decimal), read[1] or 0.0
+        if read[2] is not None:
+            return text, error, read[2]
+    counts, errors = more
+    value = _number(text.replace(found.decimal, "."))
+    if counts is not None and not math.isnan(value):
+        return text, error, counted(value, own[counts], where)
+    if errors is not None:
+        error = _number(own[errors].replace(found.decimal, ".")) / scale
+        if not 0.0 <= error < LARGEST:
+            raise ScoresError(f"{where}: its standard error must be zero or more, got {own[errors]!r}")
+    return text, error, None
 
 
 def _number(text: str) -> float:
@@ -108,12 +210,14 @@ def _number(text: str) -> float:
         return math.nan
 
 
-def column_names(path: Path) -> list[str]:
+def column_names(path: Path, part: str | None = None) -> list[str]:
     """The columns of a file, as its first line names them.
 
     Raises:
         ScoresError: If it cannot be read.
     """
+    if is_form(path):
+        return form_rows(path, part)[0]
     text = _text(path)
     return _first(path, _rows(path, text, _separator(text)))
 
@@ -218,11 +322,16 @@ Row = tuple[str, str, str]
 
 
 def read_scores(
-    path: Files, metrics: Iterable[str], domain: str | None = None, columns: Columns | None = None
+    path: Files,
+    metrics: Iterable[str],
+    domain: str | None = None,
+    columns: Columns | None = None,
+    side: Side | None = None,
 ) -> ScoreTable:
     """Read the scores of one domain from a CSV file, or from several that make one table.
 
-    Columns are separated by commas, semicolons or tabs; with the latter two, decimals may be written with a comma.
+    LeRobot's eval_info.json, folders of them and dictionaries {task: {agent: score}} are read too. Columns are
+    separated by commas, semicolons or tabs; with the latter two, decimals may be written with a comma.
 
     Args:
         path: CSV with the columns agent, episode (not needed for one row per agent), domain (optional) and metrics; or
@@ -230,12 +339,14 @@ def read_scores(
         metrics: The columns to read; others are ignored.
         domain: Which domain, where there are several.
         columns: What columns are called in the file where that is another name, as in {"agent": "policy"}.
+        side: Whose columns to take where a table has both sides', as "Sim success (%)" and "Real success (%)".
 
     Raises:
         ScoresError: If the file is not such a table, naming line and column.
     """
-    tables, path = read_domains(path, metrics, columns), " and ".join(map(str, _files(path)))
-    if domain is None:
+    part = domain if any(file.suffix == ".py" for file in _files(path)) else None
+    tables, path = read_domains(path, metrics, columns, side, part), " and ".join(map(str, _files(path)))
+    if domain is None or part is not None:
         if len(tables) > 1:
             example = next(iter(tables))
             raise ScoresError(f"{path}: has the domains {', '.join(tables)}; choose one, as in {path}:{example}")
@@ -247,14 +358,20 @@ def read_scores(
     return tables[domain]
 
 
-def read_domains(path: Files, metrics: Iterable[str], columns: Columns | None = None) -> dict[str, ScoreTable]:
+def read_domains(
+    path: Files,
+    metrics: Iterable[str],
+    columns: Columns | None = None,
+    side: Side | None = None,
+    part: str | None = None,
+) -> dict[str, ScoreTable]:
     """Read every domain of a CSV file or of several, in their order; without a domain column the only one is "".
 
     Raises:
         ScoresError: As in read_scores.
     """
     names = tuple(metrics)
-    files = [read_cells(file, names, columns) for file in _files(path)]
+    files = [read_cells(file, names, columns, side, part) for file in _files(path)]
     _check_alike(files)
     for name, theirs in (columns or {}).items():
         if not any(theirs in cells.named for cells in files):
@@ -267,12 +384,24 @@ def read_domains(path: Files, metrics: Iterable[str], columns: Columns | None = 
     )
     _check_single(files, list(zip(domain, agent, episode, strict=True)))
     values = np.concatenate([cells.numbers(names) for cells in files])
+    published = {
+        name: [one for cells in files for one in cells.errors.get(name, [0.0] * len(cells.lines))] for name in names
+    }
     rows: dict[str, list[int]] = {}
     for row, name in enumerate(domain):
         rows.setdefault(name, []).append(row)
-    return {
+    tables = {
         name: ScoreTable.from_rows([agent[row] for row in own], [episode[row] for row in own], names, values[own])
         for name, own in rows.items()
+    }
+    if not any(map(any, published.values())):
+        return tables
+    of_agent = {
+        (name, *one): error for name, own in published.items() for *one, error in zip(domain, agent, own, strict=True)
+    }
+    return {
+        name: replace(table, errors=np.array([[of_agent[one, name, who] for one in names] for who in table.agents]))
+        for name, table in tables.items()
     }
 
 

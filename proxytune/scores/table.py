@@ -107,12 +107,14 @@ class ScoreTable:
         episodes: Labels of the episodes; the same label for two agents means the same start.
         metrics: Names of the metrics.
         values: Shape (agents, episodes, metrics); NaN throughout an episode that an agent did not drive.
+        errors: Published standard errors of the means, shape (agents, metrics); None where there are none.
     """
 
     agents: tuple[str, ...]
     episodes: tuple[str, ...]
     metrics: tuple[str, ...]
     values: Floats
+    errors: Floats | None = None
 
     @classmethod
     def from_episodes(cls, scored: Mapping[tuple[str, str | int], Mapping[str, float]]) -> "ScoreTable":
@@ -181,7 +183,7 @@ class ScoreTable:
         labels = tuple(map(str, range(len(rows))))
         values = _empty(len(self.agents), len(labels), len(self.metrics))
         values[rows, np.arange(len(labels))] = self.values[rows, columns]
-        return ScoreTable(self.agents, labels, self.metrics, values)
+        return ScoreTable(self.agents, labels, self.metrics, values, self.errors)
 
     def select(self, metrics: Iterable[str]) -> "ScoreTable":
         """Give the same table with these metrics only, in this order.
@@ -196,7 +198,8 @@ class ScoreTable:
         if names == self.metrics:
             return self
         columns = [self.metrics.index(name) for name in names]
-        return ScoreTable(self.agents, self.episodes, names, self.values[:, :, columns])
+        errors = None if self.errors is None else self.errors[:, columns]
+        return ScoreTable(self.agents, self.episodes, names, self.values[:, :, columns], errors)
 
     def arrange(self, *, agents: Sequence[str], episodes: Sequence[str] | None = None) -> "ScoreTable":
         """Give the same table with its agents, and its episodes if given, in this order; names must be known."""
@@ -204,8 +207,11 @@ class ScoreTable:
         if tuple(agents) == self.agents and labels == self.episodes:
             return self
         rows, columns = _places(self.agents), _places(self.episodes)
-        values = self.values[np.ix_([rows[name] for name in agents], [columns[label] for label in labels])]
-        return ScoreTable(tuple(agents), labels, self.metrics, values)
+        order = [rows[name] for name in agents]
+        values = self.values[np.ix_(order, [columns[label] for label in labels])]
+        return ScoreTable(
+            tuple(agents), labels, self.metrics, values, None if self.errors is None else self.errors[order]
+        )
 
 
 def _places(names: Iterable[str]) -> dict[str, int]:

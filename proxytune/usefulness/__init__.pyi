@@ -26,6 +26,17 @@ from .comparison import (
     start_of as start_of,
     starts_of as starts_of,
 )
+from .decision import (
+    ASKED as ASKED,
+    Asked as Asked,
+    Choice as Choice,
+    Decision as Decision,
+    Panel as Panel,
+    chosen as chosen,
+    compare_choices as compare_choices,
+    decide as decide,
+    mmrv_conventions as mmrv_conventions,
+)
 from .noise import (
     Chance as Chance,
     NoiseFloor as NoiseFloor,
@@ -41,4 +52,10 @@ from .resampling import (
     in_blocks as in_blocks,
     interval as interval,
     why_not_repeated as why_not_repeated,
+)
+from .saving import Saving as Saving, saving_of as saving_of
+from .sequential import (
+    Plan as Plan,
+    Sequential as Sequential,
+    sequential_test as sequential_test,
 )

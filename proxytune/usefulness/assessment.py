@@ -20,6 +20,7 @@ from proxytune.arrays import Floats
 from proxytune.errors import ScoresError
 from proxytune.scores import Metric, ScoreTable, score_cautions
 from proxytune.usefulness.comparison import Comparison, compare
+from proxytune.usefulness.decision import ASKED, Asked, Decision, chosen, decide
 from proxytune.usefulness.noise import Chance, NoiseFloor, SuccessRates, chance, noise_floor, success_rates
 from proxytune.usefulness.pairs import Prpv, prpv, prpv_of_means
 from proxytune.usefulness.predictivity import Correlation, Mmrv, Ppv, kendall_tau, mmrv, ppv, srcc
@@ -33,6 +34,8 @@ from proxytune.usefulness.resampling import (
     prpv_interval,
     why_not_repeated,
 )
+from proxytune.usefulness.saving import Saving, saving_of
+from proxytune.usefulness.sequential import Plan, plan
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -68,6 +71,7 @@ class Assessment:
         noise_floor: PRPV of the target, or of a domain like it, against itself.
         chance: PRPV of a proxy that ranks at random.
         seed: Seed of the resampling.
+        asked: What the decision is asked for.
     """
 
     inputs: Comparison
@@ -81,6 +85,31 @@ class Assessment:
     noise_floor: NoiseFloor
     chance: Chance
     seed: int
+    asked: Asked = ASKED
+
+    @cached_property
+    def saves(self) -> Saving:
+        """What the proxy's rollouts are worth in rollouts on the target."""
+        columns, _ = chosen(self.inputs, self.asked.decide_on)
+        return saving_of(self.inputs, columns[0])
+
+    @cached_property
+    def decision(self) -> Decision:
+        """Which agent to deploy, and what it risks."""
+        return decide(self.inputs, self.asked, self.saves, self.seed)
+
+    @cached_property
+    def next(self) -> Plan:
+        """How many more rollouts of which agents on the target."""
+        columns, _ = chosen(self.inputs, self.asked.decide_on)
+        means = self.inputs.target.means[:, columns].mean(axis=1)
+        scale = 1.0 if means.min() >= 0.0 and means.max() <= 1.0 else float(np.ptp(means)) or 1.0
+        made = (
+            np.full(len(means), float(self.asked.rollouts or 0))
+            if self.inputs.target.counts.max() < 2
+            else self.inputs.target.counts
+        )
+        return plan(self.decision, bound=self.asked.bound, made=np.asarray(made, dtype=np.float64), scale=scale)
 
     def table(self) -> "pd.DataFrame":
         """One row per measure and metric: value, and the ends of its 95 % interval."""
@@ -149,6 +178,7 @@ def assess(
     resamples: int = 1000,
     seed: int = 0,
     floor: NoiseFloor | None = None,
+    asked: Asked = ASKED,
 ) -> Assessment:
     """Measure a proxy in every way that score tables allow.
 
@@ -160,6 +190,7 @@ def assess(
         resamples: How many to draw, and permutations.
         seed: Seed of both.
         floor: The noise floor, where one is known; by default it is found from the target's episodes.
+        asked: What the decision is asked for.
 
     Raises:
         ScoresError: If an agent is missing on one side, there are fewer than two, or a metric is unknown.
@@ -182,6 +213,7 @@ def assess(
         noise_floor=floor or noise_floor(target=other, metrics=metrics, seed=seed),
         chance=chance(proxy=one, target=other, metrics=metrics, permutations=resamples, seed=seed),
         seed=seed,
+        asked=asked,
     )
 
 

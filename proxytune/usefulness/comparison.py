@@ -153,6 +153,8 @@ def is_repeated(table: ScoreTable) -> bool:
 def by_start(table: ScoreTable) -> ScoreTable:
     """Average over the repeats of each start: the same scores with one episode per start."""
     places = start_places(table)
+    if places.max() + 1 == len(places):
+        return ScoreTable(table.agents, starts_of(table.episodes), table.metrics, table.values)
     members = (places[:, None] == np.arange(places.max() + 1)).astype(np.float64)  # (episodes, starts)
     counts = repeats(table)
     sums = np.einsum("aem,es->asm", np.nan_to_num(table.values), members)

@@ -1,11 +1,13 @@
 """The two ends of the scale of PRPV, and success rates, whose ties shift it.
 
     noise floor    PRPV of a domain against itself: what a perfect proxy scores
-    chance         PRPV of a proxy that ranks at random; p = (1 + permutations as low) / (1 + permutations)
+    chance         PRPV of a proxy that ranks at random; p = (1 + permutations as low) / (1 + permutations), or of up to
+                   seven agents the share of all K! orders that score as low, which is exact
 
 Of metrics of zeros and ones each agent's rate has Wilson's interval, and the pairs of agents that tie are counted.
 """
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -242,6 +244,8 @@ def _ordered_pairs(means: Floats, metric: Metric) -> int:
     return int(stand(merits, float(tie[0])).below.sum())
 
 
+MOST_ENUMERATED = 7
+"""Agents of which all orders are looked at: 5040."""
 LEVEL = 0.05
 """Chance explains a PRPV as low as is found by chance at least so often."""
 
@@ -254,8 +258,9 @@ class Chance:
         mean: Mean over permutations.
         deviation: Standard deviation over permutations.
         p_value: How probable a PRPV as low as the proxy's is by chance, the proxy's own order counted as one.
-        permutations: How many were drawn.
+        permutations: How many were drawn, or all.
         inputs: What was compared, with its sample sizes.
+        exact: Whether all orders were looked at.
     """
 
     mean: float
@@ -263,6 +268,7 @@ class Chance:
     p_value: float
     permutations: int
     inputs: Comparison
+    exact: bool = False
 
     @property
     def explains(self) -> bool:
@@ -275,14 +281,22 @@ def chance(
 ) -> Chance:
     """Permute which agent got which of the proxy's scores; the metrics of one agent stay together.
 
+    Of up to seven agents every order is looked at, and none is drawn.
+
     Raises:
         ScoresError: If an agent is missing on one side, there are fewer than two, or a metric is unknown.
     """
     inputs = compare(proxy=proxy, target=target, metrics=metrics)
     in_proxy, on_target = inputs.means
-    rng = np.random.default_rng(seed)
-    shuffled = in_proxy[np.stack([rng.permutation(len(in_proxy)) for _ in range(permutations)])]
+    exact = len(in_proxy) <= MOST_ENUMERATED
+    if exact:
+        orders = np.array(list(itertools.permutations(range(len(in_proxy)))))
+    else:
+        rng = np.random.default_rng(seed)
+        orders = np.stack([rng.permutation(len(in_proxy)) for _ in range(permutations)])
+    shuffled = in_proxy[orders]
     values = in_blocks(lambda proxy, _: prpv_of_means(proxy, on_target, inputs.metrics), shuffled, shuffled)
     as_low = (values <= prpv_of_means(in_proxy, on_target, inputs.metrics)).sum()
-    p_value = float((1 + as_low) / (1 + permutations))
-    return Chance(float(values.mean()), float(values.std(ddof=1)), p_value, permutations, inputs)
+    # The proxy's own order is one of all, and is counted with those that are drawn.
+    p_value = float(as_low / len(orders) if exact else (1 + as_low) / (1 + len(orders)))
+    return Chance(float(values.mean()), float(values.std(ddof=not exact)), p_value, len(orders), inputs, exact)

@@ -153,3 +153,28 @@ def test_wrong_arguments_are_one_line(changes, words):
     with pytest.raises(InputError, match=words) as problem:
         score(**{"proxy": table(1), "target": table(2), "metrics": METRICS, **changes})
     assert "\n" not in str(problem.value)
+
+
+def test_one_table_of_both_sides_gives_a_decision_figures_a_page_and_frames(tmp_path):
+    columns = {"policy": ["act", "pi0"], "Sim success (%)": [62, 90], "Real success (%)": [48, 84]}
+    found = score(pd.DataFrame(columns), rollouts=25)
+    assert found.decision.winner == "pi0"
+    assert set(found.figures()) == {"scatter", "flipped_pairs", "decision"}
+    assert found.page(tmp_path / "page.html") == (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "Deploy pi0" in found.page()
+    assert found.to_frame().loc["PRPV", "value"] == 0
+    assert found.decision.to_frame().loc["act", "score"] == pytest.approx(0.48)
+    assert repr(found).startswith("ScoreReport: As a proxy of real, sim has a PRPV")
+    assert "\n" not in repr(found)
+    assert found.document == score_document(found)
+
+
+def test_one_column_is_not_compared_with_itself_and_sides_are_given_whole():
+    table = pd.DataFrame({"agent": ["a", "b"], "success": [0.1, 0.2]})
+    with pytest.raises(InputError, match="would be both proxy and target"):
+        score(table, metrics="success:max")
+    for sides in ({}, {"proxy": table}):
+        with pytest.raises(InputError, match="or one table of both sides"):
+            score(**sides, metrics="success:max")
+    with pytest.raises(InputError, match="no metric is given"):
+        score(proxy=table, target=table)

@@ -26,7 +26,8 @@ def refused(capsys, *words):
 def table(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "t.csv").write_text(TABLE)
-    return ("score", "--proxy", "t.csv", "--target", "t.csv", "--metric")
+    (tmp_path / "again.csv").symlink_to("t.csv")
+    return ("score", "--proxy", "again.csv", "--target", "t.csv", "--metric")
 
 
 @pytest.mark.parametrize(

@@ -121,12 +121,13 @@ def test_the_ranking_shows_every_proxy_and_names_with_brackets_survive(tables):
 
 def test_single_rows_give_no_interval_but_a_note(tables):
     rows = "agent,distance\nA,1\nB,2\nC,3\n"
-    Path("one.csv").write_text(rows)
-    found = document("--proxy", "one.csv", "--target", "one.csv", "--metric", "distance:max")
+    for file in ("one.csv", "again.csv"):
+        Path(file).write_text(rows)
+    found = document("--proxy", "again.csv", "--target", "one.csv", "--metric", "distance:max")
     assert found["prpv"] == 0
     assert found["prpv_interval"] is found["noise_floor"] is found["intervals"] is None
     assert any("no interval: each agent has one episode" in note for note in found["notes"])
-    assert "–" in shown("--proxy", "one.csv", "--target", "one.csv", "--metric", "distance:max")
+    assert "–" in shown("--proxy", "again.csv", "--target", "one.csv", "--metric", "distance:max")
 
 
 def test_halves_are_called_halves_and_repeats_of_the_starts_a_noise_floor(tables):
@@ -148,14 +149,16 @@ def test_halves_are_called_halves_and_repeats_of_the_starts_a_noise_floor(tables
 
 
 def test_a_ranking_says_what_its_floor_is(tables):
-    text = shown("--proxy", "sim.csv", "--proxy", "real.csv", "--target", "real.csv", *METRIC)
+    Path("again.csv").write_text(Path("real.csv").read_text())
+    text = shown("--proxy", "sim.csv", "--proxy", "again.csv", "--target", "real.csv", *METRIC)
     assert "halves 0" in text
     assert "an upper bound of the noise floor" in text
 
 
 def test_a_constant_metric_is_null_with_a_note(tables):
-    Path("flat.csv").write_text("agent,distance\nA,1\nB,1\nC,1\n")
-    found = document("--proxy", "flat.csv", "--target", "flat.csv", "--metric", "distance:max")
+    for file in ("flat.csv", "again.csv"):
+        Path(file).write_text("agent,distance\nA,1\nB,1\nC,1\n")
+    found = document("--proxy", "again.csv", "--target", "flat.csv", "--metric", "distance:max")
     assert found["srcc"] == found["kendall_tau"] == {"distance": None}
     assert found["ppv"] is None
     assert len(found["notes"]) == len(set(found["notes"])) == 8
@@ -174,10 +177,12 @@ def test_figures_are_drawn_where_asked(tables):
     found = document("--proxy", "sim.csv", "--target", "real.csv", *METRIC, "--output", "out")
     assert found["report"] == "out/report.html"
     assert "As a proxy of real, sim has a PRPV" in Path("out/report.html").read_text()
-    assert [Path(path).name for path in found["figures"]] == ["scatter.png", "flipped_pairs.png"]
+    assert [Path(path).name for path in found["figures"]] == ["scatter.png", "flipped_pairs.png", "decision.png"]
     Path("b a.csv").write_text(SIM)
     found = document("--proxy", "sim.csv", "--proxy", "b a.csv", "--target", "real.csv", *METRIC, "--output", "many")
     assert sorted(path.name for path in Path("many").iterdir()) == [
+        "decision_b_a.png",
+        "decision_sim.png",
         "flipped_pairs_b_a.png",
         "flipped_pairs_sim.png",
         "report.html",
@@ -191,6 +196,15 @@ def test_figures_are_drawn_where_asked(tables):
     ("words", "complaint"),
     [
         (("--proxy", "none.csv", "--target", "real.csv", *METRIC), "none.csv: no such file"),
+        (("--proxy", "real.csv", "--target", "real.csv", *METRIC), "'distance' would be both proxy and target"),
+        (("--proxy", "sim.csv", *METRIC), "--target is missing"),
+        ((), "--proxy is missing"),
+        (("sim.csv", "--proxy", "sim.csv", *METRIC), "give one table of both sides, or --proxy and --target"),
+        (("--proxy", "sim.csv", "--target", "real.csv"), "--metric is missing"),
+        (("--proxy", "sim.csv", "--target", "real.csv", *METRIC, "--regret", "-1"), "must be above 0"),
+        (("--proxy", "sim.csv", "--target", "real.csv", *METRIC, "--rollouts", "0"), "rollouts must be between"),
+        (("--proxy", "sim.csv", "--target", "real.csv", *METRIC, "--decide-on", "distanse"), "did you mean 'distance'"),
+        (("--proxy", "sim.csv", "--target", "real.csv", *METRIC, "--sequential"), "goes beyond 0 and 1"),
         (("--proxy", "both.csv:sm", "--target", "real.csv", *METRIC), "no domain 'sm'; did you mean 'sim'"),
         (("--proxy", "sim.csv", "--target", "both.csv", *METRIC), "choose one, as in both.csv:sim"),
         (("--proxy", "sim.csv", "--target", "real.csv", "--metric", "distanc:max"), "did you mean 'distance'"),
@@ -282,8 +296,9 @@ def test_several_files_of_different_domains_make_no_table(own):
 def test_success_rates_stand_in_table_and_document_and_ties_are_told(tables):
     wins = {"A": 2, "B": 2, "C": 5, "D": 8}
     rows = [f"{agent},{episode},{int(episode < wins[agent])}" for agent in wins for episode in range(9)]
-    Path("rates.csv").write_text("\n".join(["agent,episode,success", *rows]) + "\n")
-    words = ("--proxy", "rates.csv", "--target", "rates.csv", "--metric", "success:max")
+    for file in ("rates.csv", "again.csv"):
+        Path(file).write_text("\n".join(["agent,episode,success", *rows]) + "\n")
+    words = ("--proxy", "again.csv", "--target", "rates.csv", "--metric", "success:max")
     rate = document(*words)["success_rates"]["success"]["C"]["target"]
     assert (rate["value"], rate["episodes"]) == (pytest.approx(5 / 9), 9)
     assert rate["low"] < 5 / 9 < rate["high"]
@@ -295,8 +310,9 @@ def test_with_three_agents_no_proxy_is_called_perfect(tables):
     """Chance alone ranks three agents rightly in one case of six."""
     labels = [f"{episode}/{repeat}" for episode in range(5) for repeat in (0, 1)]
     again = [f"{agent},{label},{ord(agent)}" for agent in "ABC" for label in labels]
-    Path("three.csv").write_text("\n".join(["agent,episode,distance", *again]) + "\n")
-    found = document("--proxy", "three.csv", "--target", "three.csv", "--metric", "distance:max")
+    for file in ("three.csv", "again.csv"):
+        Path(file).write_text("\n".join(["agent,episode,distance", *again]) + "\n")
+    found = document("--proxy", "again.csv", "--target", "three.csv", "--metric", "distance:max")
     assert (found["prpv"], found["noise_floor_kind"], found["at_noise_floor"]) == (0, "same starts", False)
     assert any(note.startswith("PRPV is no better than chance") for note in found["notes"])
     assert not any("no difference between proxy and target" in note for note in found["notes"])
@@ -325,3 +341,50 @@ def test_a_table_of_another_kind_is_refused_before_anything_is_written(tables):
     with pytest.raises(InputError, match=r"--table t\.xlsx: a table is written as \.csv or \.tex"):
         run("--proxy", "sim.csv", "--target", "real.csv", *METRIC, "--table", "t.xlsx", "--output", "out")
     assert not Path("out").exists()
+
+
+BOTH = "Policy,Sim success (%),Real success (%)\nACT,62,48\nDiffusion,81,70\npi0,90,85\nOpenVLA,40,52\n"
+
+
+def test_a_papers_table_gives_the_decision_with_the_promised_keys(tables):
+    Path("both.csv").write_text(BOTH)
+    found = document("both.csv", "--rollouts", "25")
+    decision = found["decision"]
+    assert (decision["winner"], decision["chosen_on"]) == ("pi0", "success")
+    assert decision["not_told_apart"] == ["Diffusion"]
+    assert 0.8 < decision["probability_best"] < 0.95
+    assert set(decision["expected_regret"]) == {"ACT", "Diffusion", "pi0", "OpenVLA"}
+    assert found["observed"]["proxy_winner"] == found["observed"]["target_winner"] == "pi0"
+    assert found["observed"]["regret"] == 0.0
+    assert found["p_exact"] == pytest.approx(4 / 24)
+    assert set(found["saves"]) >= {"real_rollouts_worth", "interval"}
+    assert "Diffusion" in found["next"]
+    assert found["mmrv_conventions"]["success"]["simpler"] == pytest.approx(found["mmrv"]["success"])
+    bare = document("both.csv")["decision"]
+    assert (bare["winner"], bare["probability_best"]) == ("pi0", None)
+    assert "Deploy pi0" in " ".join(shown("both.csv", "--rollouts", "25").split())
+
+
+def test_lerobots_files_give_the_sentence_and_a_test_after_each_rollout(tables):
+    for side, count, rates in (("sim", 60, (0.6, 0.95)), ("real", 30, (0.2, 0.9))):
+        for agent, rate in zip(("act", "pi0"), rates, strict=True):
+            episodes = [{"success": (7 * i) % 10 < 10 * rate, "seed": None} for i in range(count)]
+            Path(side, agent).mkdir(parents=True)
+            Path(side, agent, "eval_info.json").write_text(json.dumps({"per_episode": episodes}))
+    words = ("--proxy", "sim", "--target", "real", "--metric", "success:max", "--sequential")
+    found = document(*words)
+    assert found["sequential"]["winner"] == found["decision"]["winner"] == "pi0"
+    assert found["sequential"]["decided_at"] <= 30
+    assert "sequential test: pi0 is shown to be the best" in " ".join(shown(*words).split())
+
+
+def test_of_several_proxies_it_is_told_what_choosing_by_each_costs(tables):
+    target = "agent,success\na,0.2\nb,0.9\nc,0.3\n"
+    Path("real.csv").write_text(target)
+    Path("right.csv").write_text(target.replace("0.9", "0.8"))
+    Path("wrong.csv").write_text("agent,success\na,0.9\nb,0.1\nc,0.3\n")
+    words = ("--proxy", "right.csv", "--proxy", "wrong.csv", "--target", "real.csv", "--metric", "success:max")
+    (choice,) = document(*words, "--rollouts", "50")["choices"]
+    assert (choice["better"], choice["worse"], choice["beyond_noise"]) == ("right", "wrong", True)
+    assert choice["difference"] == pytest.approx(0.68, abs=0.05)
+    assert document(*words)["choices"][0]["interval"] is None

@@ -67,7 +67,7 @@ def test_the_page_has_what_the_terminal_shows_each_note_once_and_no_markup_of_na
     found = {EVIL: assessed(REVERSED), "other": assessed(SAME)}
     selection = select_proxy(proxies={EVIL: REVERSED, "other": SAME}, target=TARGET, metrics=M, resamples=100)
     texts = []
-    for proxies, ranked, count in (({EVIL: found[EVIL]}, None, 2), (found, selection, 4)):
+    for proxies, ranked, count in (({EVIL: found[EVIL]}, None, 3), (found, selection, 6)):
         figures, page = write_score_report(proxies, ranked, tmp_path, foot_of("a"), target=EVIL)
         texts.append(page.read_text(encoding="utf-8"))
         assert len(figures) == texts[-1].count("<figure>") == count

@@ -1,0 +1,265 @@
+"""The decision of `score`: which agent to deploy, for people, as JSON, and drawn."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from proxytune.report.figure_style import BLUE, COLUMN, GREY, LIGHT_BLUE, dress
+from proxytune.report.view import Table, columns_of
+from proxytune.report.wording import listed, plain, short, with_span
+from proxytune.usefulness import (
+    Assessment,
+    Choice,
+    Decision,
+    Panel,
+    Plan,
+    Saving,
+    Sequential,
+    compare_choices,
+    mmrv_conventions,
+)
+
+MOST_NAMED = 28
+"""Agents that can be named at 85 mm: the best by expected regret."""
+CAPTION = (
+    "Expected regret of deploying each agent with its 95 % interval, best on top: what it costs on the target if "
+    "another is better. Blue is the agent to deploy, light blue those that cannot be told from the best; at the right "
+    "the probability of being the best."
+)
+
+
+def decision_sentence(assessment: Assessment, target: str) -> str:
+    """Say which agent to deploy, what it risks, and which others may be as good."""
+    decision, where = assessment.decision, f"on {target}"
+    observed = _observed_sentence(decision.observed)
+    if decision.probability_best is None:
+        return f"By the means as published, {decision.winner} is the best {where}; {observed}."
+    risk = f"{_percent(decision.probability_best)} to be the best {where}, expected regret "
+    risk += f"{short(decision.expected_regret[decision.winner], 2)} in {decision.chosen_on}"
+    others = decision.not_told_apart
+    rest = f"{_few(others)} cannot be told from it" if others else "no other agent can be as good with 95 %"
+    return f"Deploy {decision.winner}: {risk}; {rest}. {observed[0].upper()}{observed[1:]}."
+
+
+def _observed_sentence(observed: Panel) -> str:
+    winners = _few(observed.proxy_winners)
+    if observed.agrees:
+        return f"the proxy's winner is the target's ({winners})"
+    wins = "win" if len(observed.proxy_winners) > 1 else "wins"
+    return f"in the proxy {winners} {wins}, which by the target's means costs {short(observed.regret, 2)}"
+
+
+def _few(names: tuple[str, ...]) -> str:
+    return listed(list(names)) if len(names) <= 4 else f"{', '.join(names[:3])} and {len(names) - 3} others"
+
+
+def _percent(share: float) -> str:
+    return "over 99.9 %" if share > 0.999 else f"{100.0 * share:.2g} %" if share < 0.995 else f"{100.0 * share:.1f} %"
+
+
+def saving_sentence(saving: Saving) -> str:
+    """Say what the proxy's rollouts are worth in real ones."""
+    worth = saving.real_rollouts_worth
+    if worth is None or saving.interval is None:
+        return f"what simulation saves is not known: {saving.reason}"
+    if saving.reason:
+        return f"simulation saves no real rollouts: {saving.reason}"
+    rollouts = with_span(short(worth, 2), *saving.interval)
+    how = "by paired starts" if saving.kind == "paired" else "by what the proxy foretells over agents, not by pairs"
+    return f"{saving.simulated:.0f} simulated rollouts of an agent are worth {rollouts} real ones, {how}"
+
+
+def next_sentence(plan: Plan, target: str) -> str:
+    """Say what to do next on the target."""
+    bound = short(plan.bound, 2)
+    if plan.reason:
+        return f"no number of further rollouts can be given: {plan.reason}"
+    if not plan.rollouts:
+        return f"regret is below {bound} with 95 %: no more rollouts are needed on {target} for that"
+    rows = [f"{n} of {agent}" for agent, n in sorted(plan.rollouts.items(), key=lambda one: -one[1])]
+    text = f"for a regret below {bound} with 95 %, {plan.total} more rollouts on {target}: {_few(tuple(rows))}"
+    return text if plan.without_proxy is None else f"{text} ({plan.without_proxy} without the proxy)"
+
+
+def sequential_sentence(found: Sequential) -> str:
+    """Say what may be concluded after these rollouts, looked at after each."""
+    times = [f"{name} {'over 1000' if n is None else n}" for name, n in found.expected_rounds.items()]
+    if found.winner is not None:
+        return (
+            f"{found.winner} is shown to be the best, after {found.decided_at} of {found.rounds} rollouts of each agent"
+        )
+    lead = max(found.evidence, key=lambda agent: found.evidence[agent])
+    wealth = f"{lead} has most evidence, {short(found.evidence[lead])} of {short(found.threshold)}"
+    return f"none is shown to be the best after {found.rounds} rollouts of each ({wealth}); expect {', '.join(times)}"
+
+
+def decision_table(assessment: Assessment, target: str) -> Table:
+    """Each agent's score, chance to be the best and expected regret, with what follows below."""
+    decision, saving, plan = assessment.decision, assessment.saves, assessment.next
+    rows = []
+    for agent in sorted(decision.expected_regret, key=lambda one: decision.expected_regret[one]):
+        mean, ends = decision.scores[agent] if decision.scores else (None, None)
+        span = decision.regret_interval[agent] if decision.regret_interval else None
+        chance = decision.best_probabilities[agent] if decision.best_probabilities else None
+        rows.append((
+            agent,
+            "–" if mean is None or ends is None else with_span(mean, *ends),
+            "–" if chance is None else f"{chance:.2g}",
+            with_span(short(decision.expected_regret[agent], 2), *(span or (None, None))),
+            str(plan.rollouts.get(agent, "")),
+        ))  # fmt: skip
+    heads = (f"{decision.chosen_on} on the target", "best with", "expected regret", "more rollouts")
+    notes = [*decision.notes]
+    if decision.least_told is not None and decision.least_told > 0.0:
+        notes.append(f"with so many rollouts differences below {short(decision.least_told, 2)} cannot be told apart")
+    notes += [saving_sentence(saving), next_sentence(plan, target)]
+    if decision.without:
+        right = sum(panel.agrees is True for panel in decision.without)
+        alone = sum(panel.agrees is True for panel in decision.tasks)
+        notes.append(
+            f"the proxy's winner is the target's in {alone} of {len(decision.tasks)} tasks alone, "
+            f"and in {right} of {len(decision.without)} cases with one task left out"
+        )
+    title = f"Which agent to deploy on {target}, chosen on {decision.chosen_on}"
+    return Table(title, columns_of(("agent",), heads), tuple(rows), tuple(notes))
+
+
+def decision_figure(decision: Decision) -> Figure:
+    """Draw the expected regret of each agent with its interval, the best on top."""
+    order = sorted(decision.expected_regret, key=lambda agent: decision.expected_regret[agent])[:MOST_NAMED]
+    figure = Figure(figsize=(COLUMN, 0.9 + 0.16 * max(4, len(order))), layout="constrained")
+    axes = figure.subplots()
+    for row, agent in enumerate(order):
+        near = agent in decision.not_told_apart
+        colour = BLUE if agent == decision.winner else LIGHT_BLUE if near else GREY
+        if decision.regret_interval is not None:
+            axes.plot(decision.regret_interval[agent], (row, row), color=colour, linewidth=1.4, solid_capstyle="butt")
+        axes.plot(decision.expected_regret[agent], row, "o", color=colour, markersize=4, clip_on=False, zorder=3)
+        if decision.best_probabilities is not None:
+            text = f"{decision.best_probabilities[agent]:.2f}"
+            axes.text(1.02, row, text, transform=axes.get_yaxis_transform(), fontsize=6, va="center")
+    axes.set_yticks(np.arange(len(order)), [name if len(name) <= 24 else f"…{name[-23:]}" for name in order])
+    axes.set_ylim(len(order) - 0.5, -0.5)
+    axes.set_xlim(left=0.0)
+    dress(axes, f"regret in {plain(decision.chosen_on)[:44]}")
+    axes.tick_params(axis="y", labelsize=6, length=0)
+    if decision.best_probabilities is not None:
+        axes.text(1.02, 1.0, "P(best)", transform=axes.transAxes, fontsize=6, va="bottom")
+    return figure
+
+
+def decision_document(assessment: Assessment) -> dict[str, Any]:
+    """The decision and what follows from it, as plain JSON whose keys are promises."""
+    decision, saving, plan = assessment.decision, assessment.saves, assessment.next
+    observed, random = decision.observed, assessment.chance
+    return {
+        "decision": {
+            "winner": decision.winner,
+            "probability_best": decision.probability_best,
+            "expected_regret": dict(decision.expected_regret),
+            "regret_interval": _ends(decision.regret_interval),
+            "probabilities_best": _plain(decision.best_probabilities),
+            "not_told_apart": list(decision.not_told_apart),
+            "chosen_on": decision.chosen_on,
+            "scores": None
+            if decision.scores is None
+            else {agent: {"value": mean, "interval": list(ends)} for agent, (mean, ends) in decision.scores.items()},
+            "least_difference": decision.least_told,
+            "basis": decision.basis or None,
+            "notes": list(decision.notes),
+        },
+        "observed": {
+            **_panel(observed),
+            "tasks": {panel.name: _panel(panel) for panel in decision.tasks},
+            "without_task": {panel.name: _panel(panel) for panel in decision.without},
+        },
+        "p_exact": random.p_value if random.exact else None,
+        "saves": {
+            "real_rollouts_worth": saving.real_rollouts_worth,
+            "interval": list(saving.interval) if saving.interval else None,
+            "by": saving.kind,
+            "correlation": saving.correlation,
+            "real_rollouts": saving.real,
+            "simulated_rollouts": saving.simulated,
+            "saved_share": saving.saved_share,
+            "scores": {agent: {"value": mean, "interval": list(ends)} for agent, (mean, ends) in saving.means.items()},
+            "scores_alone": {agent: {"value": m, "interval": list(ends)} for agent, (m, ends) in saving.alone.items()},
+            "reason": saving.reason or None,
+        },
+        "next": dict(plan.rollouts),
+        "next_bound": {
+            "regret": plan.bound,
+            "now": plan.regret_bound,
+            "rollouts": plan.total,
+            "without_proxy": plan.without_proxy,
+            "reason": plan.reason or None,
+        },
+        "mmrv_conventions": mmrv_conventions(assessment.inputs),
+    }
+
+
+def choices_document(assessments: Mapping[str, Assessment]) -> list[dict[str, Any]]:
+    """What choosing by one proxy instead of another saves on the target, as plain JSON."""
+    return [
+        {
+            "better": one.better,
+            "worse": one.worse,
+            "difference": one.value,
+            "interval": list(one.interval) if one.interval else None,
+            "beyond_noise": one.beyond_noise,
+        }
+        for one in _choices(assessments)
+    ]
+
+
+def choices_sentences(assessments: Mapping[str, Assessment], target: str) -> list[str]:
+    """Say of every proxy what it would have chosen and saves, and of which two the choice differs beyond noise."""
+    lines = []
+    for name, one in assessments.items():
+        regret = short(one.decision.expected_regret[one.decision.observed.proxy_winners[0]], 2)
+        winners = _few(one.decision.observed.proxy_winners)
+        lines.append(f"{name}: chooses {winners}, at an expected regret of {regret}; {saving_sentence(one.saves)}")
+    for choice in _choices(assessments):
+        if choice.value > 0.0:
+            told = {True: "beyond noise", False: "not beyond noise", None: "noise not known"}[choice.beyond_noise]
+            gain = with_span(short(choice.value, 2), *(choice.interval or (None, None)))
+            lines.append(f"choosing by {choice.better} instead of {choice.worse} gains {gain} on {target}, {told}")
+    return lines
+
+
+def _choices(assessments: Mapping[str, Assessment]) -> tuple[Choice, ...]:
+    first = next(iter(assessments.values()))
+    return compare_choices({name: one.inputs for name, one in assessments.items()}, first.asked, first.seed)
+
+
+def sequential_document(found: Sequential) -> dict[str, Any]:
+    """The sequential test as plain JSON."""
+    return {
+        "winner": found.winner,
+        "decided_at": found.decided_at,
+        "rounds": found.rounds,
+        "evidence": dict(found.evidence),
+        "threshold": found.threshold,
+        "expected_rounds": dict(found.expected_rounds),
+    }
+
+
+def _panel(panel: Panel) -> dict[str, Any]:
+    return {
+        "proxy_winner": panel.proxy_winners[0],
+        "target_winner": panel.target_winners[0],
+        "regret": panel.regret,
+        "agrees": panel.agrees,
+        "proxy_winners": list(panel.proxy_winners),
+        "target_winners": list(panel.target_winners),
+    }
+
+
+def _plain(values: Mapping[str, float] | None) -> dict[str, float] | None:
+    return None if values is None else dict(values)
+
+
+def _ends(intervals: Mapping[str, tuple[float, float]] | None) -> dict[str, list[float]] | None:
+    return None if intervals is None else {agent: list(ends) for agent, ends in intervals.items()}

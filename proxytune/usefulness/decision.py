@@ -1,0 +1,432 @@
+"""The decision: which agent to deploy on the target, what it risks, and which others may be as good.
+
+    regret of agent i = max_j μ_j − μ_i                with μ the true mean scores on the target, more being better
+    expected regret   = its mean over draws of μ       given the target's episodes, and the proxy's where they help
+
+μ is drawn of each agent and metric by what is known of it: of successes a Beta(successes + 1, failures + 1), the prior
+uniform; of other scores Student's t, its spread pooled over agents; of a published mean with a standard error a normal;
+of a published mean alone nothing is known of its noise, and no probability is given.
+"""
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from proxytune.arrays import Floats
+from proxytune.errors import InputError
+from proxytune.scores import ROUNDING, Metric, ScoreTable
+from proxytune.settings import nearest
+from proxytune.usefulness.comparison import Comparison, by_start
+from proxytune.usefulness.resampling import CONFIDENCE, Ends, interval
+from proxytune.usefulness.saving import Saving, effective
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+DRAWS, FEWEST_DRAWS = 40_000, 1000
+MOST_DRAWN = 1_000_000
+"""Draws of all agents together."""
+MOST_COMPARED, FEW_TASKS = 2000, 3
+PRIOR = 1.0
+"""Successes and failures before the first episode: every rate is as probable as any other."""
+EDGE = 0.3
+"""A rate's interval: between Clopper and Pearson's (0), too wide on average, and Jeffreys' (½), too narrow at some.
+It holds at fixed rates with 92 % or more, and with 96 to 97 % on average over all of them."""
+NO_NOISE = (
+    "the target gives means without the number of rollouts: no probability can be told; give it (score --rollouts)"
+)
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What a decision is asked for.
+
+    Attributes:
+        decide_on: The metric to choose by, or "mean"; "" for the mean of success rates, else the first metric.
+        rollouts: Rollouts on the target behind each published mean of a success rate; None if not known.
+        bound: The regret that is still accepted, in the metric's unit; None for 5 % of the scores' scale.
+
+    Raises:
+        InputError: If there is no rollout, or the bound is none.
+    """
+
+    decide_on: str = ""
+    rollouts: int | None = None
+    bound: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.rollouts is not None and not 1 <= self.rollouts <= 10**6:
+            raise InputError(f"rollouts must be between 1 and 1000000, got {self.rollouts}")
+        if self.bound is not None and not (math.isfinite(self.bound) and self.bound > 0):
+            raise InputError(f"the regret that is accepted must be above 0, got {self.bound}")
+
+
+ASKED = Asked()
+"""Nothing in particular."""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Observed winners on a part of the tables.
+
+    Attributes:
+        name: The task, or the one that is left out.
+        proxy_winners: The agents of the highest mean in the proxy.
+        target_winners: The same on the target.
+        regret: The most that choosing a winner of the proxy costs by the target's means.
+    """
+
+    name: str
+    proxy_winners: tuple[str, ...]
+    target_winners: tuple[str, ...]
+    regret: float
+
+    @property
+    def agrees(self) -> bool | None:
+        """True if every winner in the proxy is one on the target; None if only some of those that tie are."""
+        if set(self.proxy_winners) <= set(self.target_winners):
+            return True
+        return None if set(self.proxy_winners) & set(self.target_winners) else False
+
+
+@dataclass(frozen=True)
+class Decision:
+    """The agent to deploy, and what it risks.
+
+    Attributes:
+        winner: The agent of the lowest expected regret.
+        probability_best: That it is the target's best; None where nothing is known of the target's noise.
+        expected_regret: Of deploying each agent, in the metric's unit.
+        regret_interval: The 95 % interval of each agent's regret; None where nothing is known of the noise.
+        best_probabilities: Of each agent that it is the target's best; None likewise.
+        not_told_apart: Other agents that belong to the smallest set which holds the best with 95 %.
+        chosen_on: What was chosen by: a metric's name, or "mean of …".
+        observed: Winners by the means as they are, and the regret of the proxy's.
+        tasks: The same on each task alone.
+        without: The same without each task.
+        least_told: The difference of two agents that so many rollouts can tell apart; None likewise.
+        basis: What the draws rest on, in a phrase.
+        scores: Mean of each agent on the target with its 95 % interval; None likewise.
+        draws: Draws of the true means, shape (draws, agents), more being better; None likewise.
+        counts: Rollouts on the target that each agent's mean is worth; none where that is not known.
+    """
+
+    winner: str
+    probability_best: float | None
+    expected_regret: Mapping[str, float]
+    regret_interval: Mapping[str, Ends] | None
+    best_probabilities: Mapping[str, float] | None
+    not_told_apart: tuple[str, ...]
+    chosen_on: str
+    observed: Panel
+    tasks: tuple[Panel, ...]
+    without: tuple[Panel, ...]
+    least_told: float | None
+    basis: str
+    scores: Mapping[str, tuple[float, Ends]] | None
+    draws: Floats | None
+    counts: tuple[float, ...]
+
+    def to_frame(self) -> "pd.DataFrame":
+        """One row per agent: score, probability to be the best and expected regret, with intervals."""
+        import pandas as pd
+
+        rows = {}
+        for agent, regret in self.expected_regret.items():
+            mean, ends = self.scores[agent] if self.scores else (None, (None, None))
+            span = self.regret_interval[agent] if self.regret_interval else (None, None)
+            best = self.best_probabilities[agent] if self.best_probabilities else None
+            rows[agent] = (mean, *ends, best, regret, *span)
+        heads = ["score", "score_low", "score_high", "best_with", "expected_regret", "regret_low", "regret_high"]
+        return pd.DataFrame.from_dict(rows, orient="index", columns=heads).rename_axis("agent")
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Lines on what the decision rests on, or why it says little."""
+        lines = [f"chosen by {self.basis}" if self.draws is not None else NO_NOISE]
+        if len(self.observed.proxy_winners) > 1:
+            lines.append(f"{' and '.join(self.observed.proxy_winners)} tie in the proxy; regret is that of the worse")
+        return tuple(lines)
+
+
+def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed: int = 0) -> Decision:
+    """Say which agent to deploy.
+
+    Args:
+        inputs: Both sides.
+        asked: What to choose by, and what is known beside the tables.
+        saving: What the proxy adds to the target's means where starts are paired; it counts where that is beyond noise.
+        seed: Seed of the draws.
+
+    Raises:
+        InputError: If the metric to choose by is not there.
+    """
+    columns, chosen_on = chosen(inputs, asked.decide_on)
+    signs = np.array([1.0 if inputs.metrics[column].direction == "max" else -1.0 for column in columns])
+    proxy, target = ((means[:, columns] * signs) for means in inputs.means)
+    sides = proxy.mean(axis=1), target.mean(axis=1)
+    agents = inputs.agents
+    observed = _panel("", agents, *sides)
+    parts = [(inputs.metrics[column].name, proxy[:, k], target[:, k]) for k, column in enumerate(columns)]
+    if len(parts) == 1:
+        parts = _parts_by_start(inputs, columns[0], float(signs[0]))
+    tasks = tuple(_panel(name, agents, one, other) for name, one, other in parts) if len(parts) > 1 else ()
+    without = tuple(_without(agents, parts, out) for out in range(len(parts))) if len(parts) > 1 else ()
+    known = draw_means(inputs.target, columns, signs, asked.rollouts, saving, np.random.default_rng(seed))
+    if known is None:
+        regrets = sides[1].max() - sides[1]
+        return Decision(
+            winner=observed.target_winners[0], probability_best=None, regret_interval=None, best_probabilities=None,
+            expected_regret=dict(zip(agents, map(float, regrets), strict=True)),
+            not_told_apart=observed.target_winners[1:], chosen_on=chosen_on, observed=observed, tasks=tasks,
+            without=without, least_told=None, basis="", scores=None, draws=None, counts=(),
+        )  # fmt: skip
+    draws, counts, centre, basis = known
+    regret = draws.max(axis=1, keepdims=True) - draws
+    expected, best = regret.mean(axis=0), np.bincount(draws.argmax(axis=1), minlength=len(agents)) / len(draws)
+    place = int(expected.argmin())
+    order = np.argsort(-best, kind="stable")
+    held = order[: int(np.searchsorted(np.cumsum(best[order]), CONFIDENCE - ROUNDING)) + 1]
+    spread = draws.std(axis=0)
+    sign = signs[0]
+    middle, ends = sign * centre, [interval(sign * draws[:, row]) for row in range(len(agents))]
+    if len(columns) == 1 and is_rate(inputs.target, columns[0]):
+        ends = rate_intervals(middle, counts)
+    return Decision(
+        winner=agents[place],
+        probability_best=float(best[place]),
+        expected_regret=dict(zip(agents, map(float, expected), strict=True)),
+        regret_interval={agent: interval(regret[:, row]) for row, agent in enumerate(agents)},
+        best_probabilities=dict(zip(agents, map(float, best), strict=True)),
+        not_told_apart=tuple(agents[row] for row in held if row != place),
+        chosen_on=chosen_on,
+        observed=observed,
+        tasks=tasks,
+        without=without,
+        least_told=float(1.96 * np.sqrt(2.0) * np.median(spread)),
+        basis=basis,
+        scores={agent: (float(middle[row]), ends[row]) for row, agent in enumerate(agents)},
+        draws=draws,
+        counts=tuple(map(float, counts)),
+    )
+
+
+def chosen(inputs: Comparison, decide_on: str) -> tuple[list[int], str]:
+    """The metrics that a decision averages over, by column, and what that is called.
+
+    Raises:
+        InputError: If the metric is not there, or metrics of two directions were to be averaged.
+    """
+    names = [metric.name for metric in inputs.metrics]
+    alike = len({metric.direction for metric in inputs.metrics}) == 1
+    shares = all(_within_one(side) for side in (inputs.proxy, inputs.target))
+    if decide_on in names:
+        return [names.index(decide_on)], decide_on
+    if decide_on not in ("", "mean"):
+        raise InputError(f"--decide-on {decide_on}: no such metric is compared; {nearest(decide_on, [*names, 'mean'])}")
+    if decide_on == "mean" and not alike:
+        raise InputError("--decide-on mean: metrics of two directions have no mean; name one of them")
+    if len(names) > 1 and alike and (shares or decide_on == "mean"):
+        told = ", ".join(names) if len(names) <= FEW_TASKS else f"{len(names)} metrics"
+        return list(range(len(names))), f"mean of {told}"
+    return [0], names[0]
+
+
+def _within_one(table: ScoreTable) -> bool:
+    driven = table.values[table.driven]
+    return bool(driven.min() >= 0.0 and driven.max() <= 1.0)
+
+
+def _panel(name: str, agents: Sequence[str], proxy: Floats, target: Floats) -> Panel:
+    """The winners of mean scores, more being better."""
+    best = [np.flatnonzero(side.max() - side <= ROUNDING * max(1.0, np.abs(side).max())) for side in (proxy, target)]
+    regret = float((target.max() - target[best[0]]).max())
+    return Panel(name, *(tuple(agents[row] for row in rows) for rows in best), regret)
+
+
+def _parts_by_start(inputs: Comparison, column: int, sign: float) -> list[tuple[str, Floats, Floats]]:
+    """The tasks that the labels of episodes name (TASK/NUMBER), where both sides have several, all of every agent."""
+    sides = inputs.proxy, inputs.target
+    if not all("/" in label for side in sides for label in side.episodes):
+        return []
+    one, other = (by_start(side) for side in sides)
+    if set(one.episodes) != set(other.episodes) or not (one.complete and other.complete):
+        return []
+    places = {start: row for row, start in enumerate(one.episodes)}
+    return [
+        (start, sign * one.values[:, places[start], column], sign * other.values[:, row, column])
+        for row, start in enumerate(other.episodes)
+    ]
+
+
+def _without(agents: Sequence[str], parts: Sequence[tuple[str, Floats, Floats]], out: int) -> Panel:
+    rest = [part for place, part in enumerate(parts) if place != out]
+    return _panel(parts[out][0], agents, *(np.mean([part[side] for part in rest], axis=0) for side in (1, 2)))
+
+
+def is_rate(table: ScoreTable, column: int) -> bool:
+    """True of a metric of zeros and ones with more than one episode an agent."""
+    values = table.values[..., column][table.driven]
+    return bool(table.counts.max() > 1 and np.isin(values, (0.0, 1.0)).all())
+
+
+def draw_means(
+    target: ScoreTable,
+    columns: Sequence[int],
+    signs: Floats,
+    rollouts: int | None,
+    saving: Saving | None,
+    rng: np.random.Generator,
+) -> tuple[Floats, Floats, Floats, str] | None:
+    """Draws of each agent's true mean over these metrics, shape (draws, agents); rollouts, means, and their basis.
+
+    None where nothing is known of the noise of some metric.
+    """
+    draws = max(FEWEST_DRAWS, min(DRAWS, MOST_DRAWN // len(target.agents)))
+    total, bases = np.zeros((draws, len(target.agents))), []
+    worth, centre = np.zeros((2, len(target.agents)))
+    for column, sign in zip(columns, signs, strict=True):
+        means, counts = target.means[:, column], target.counts.astype(np.float64)
+        rectified = saving.rectified.get(target.metrics[column]) if saving is not None else None
+        if rectified is not None:
+            means, counts = rectified
+        if is_rate(target, column):
+            drawn, basis = _rates(means, counts, draws, rng), "successes, uniform prior"
+        elif target.counts.min() > 1:
+            drawn, basis = _means(target, column, means, counts, draws, rng), "episodes' spread, pooled over agents"
+        elif target.errors is not None and (target.errors[:, column] > 0.0).any():
+            errors = np.nan_to_num(target.errors[:, column])
+            drawn, basis = means + errors * rng.standard_normal((draws, len(means))), "published standard errors"
+        elif rollouts is not None and (means >= 0.0).all() and (means <= 1.0).all():
+            counts = np.full(len(means), float(rollouts))
+            drawn, basis = (
+                _rates(means, counts, draws, rng),
+                f"{rollouts} rollouts behind each mean as stated, uniform prior",
+            )
+        else:
+            return None
+        if rectified is not None:
+            basis += ", rectified by the proxy's paired starts"
+        total += sign * drawn
+        worth += counts
+        centre += sign * means
+        bases.append(basis)
+    return total / len(columns), worth / len(columns), centre / len(columns), " and ".join(dict.fromkeys(bases))
+
+
+def _rates(means: Floats, counts: Floats, draws: int, rng: np.random.Generator) -> Floats:
+    means = np.clip(means, 0.0, 1.0)
+    return rng.beta(counts * means + PRIOR, counts * (1.0 - means) + PRIOR, (draws, len(means)))
+
+
+def rate_intervals(rates: Floats, counts: Floats) -> list[Ends]:
+    """The 95 % interval of each rate.
+
+    Args:
+        rates: The share that succeeded, shape (agents,).
+        counts: Rollouts that it rests on.
+    """
+    from scipy.special import betaincinv
+
+    tail = (1.0 - CONFIDENCE) / 2.0
+    successes = np.clip(rates, 0.0, 1.0) * counts
+    failures = counts - successes
+    low = betaincinv(successes + EDGE, failures + 1.0 - EDGE, tail)
+    high = betaincinv(successes + 1.0 - EDGE, failures + EDGE, 1.0 - tail)
+    low, high = np.where(successes < 0.5, 0.0, low), np.where(failures < 0.5, 1.0, high)
+    return list(zip(map(float, low), map(float, high), strict=True))
+
+
+def _means(
+    table: ScoreTable, column: int, means: Floats, counts: Floats, draws: int, rng: np.random.Generator
+) -> Floats:
+    """Student's t about each mean; where all agents share their starts, what these do to all alike is left out."""
+    starts = by_start(table)
+    values = starts.values[..., column]
+    residuals = values - np.nanmean(values, axis=1, keepdims=True)
+    freedom = float(starts.counts.sum() - len(means))
+    if starts.complete and len(starts.episodes) > 1:
+        residuals = residuals - residuals.mean(axis=0)
+        freedom = float((len(means) - 1) * (len(starts.episodes) - 1))
+    elif freedom < 1.0:  # one start alone, driven many times
+        residuals, freedom = table.values[..., column] - means[:, None], float(table.counts.sum() - len(means))
+    spread = np.sqrt(np.nansum(residuals**2) / freedom)
+    per = effective(counts, table, starts)
+    scale = spread / np.sqrt(per) * np.sqrt(freedom / rng.chisquare(freedom, (draws, 1)))
+    return means + scale * rng.standard_normal((draws, len(means)))
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What choosing by one proxy instead of another saves on the target.
+
+    Attributes:
+        better: The proxy whose winner has the lower expected regret.
+        worse: The other.
+        value: Expected score on the target of the better one's winner less that of the other's.
+        interval: Its 95 % interval; None where nothing is known of the target's noise.
+    """
+
+    better: str
+    worse: str
+    value: float
+    interval: Ends | None
+
+    @property
+    def beyond_noise(self) -> bool | None:
+        """True if the interval leaves out zero; None if there is none."""
+        return None if self.interval is None else self.interval[0] > 0.0
+
+
+def compare_choices(inputs: Mapping[str, Comparison], asked: Asked, seed: int = 0) -> tuple[Choice, ...]:
+    """Compare every two proxies of one target by what their winners do there, by the target's rollouts alone.
+
+    Raises:
+        InputError: As in decide.
+    """
+    found = {name: decide(one, asked, None, seed) for name, one in inputs.items()}
+    choices = []
+    for pair in itertools.combinations(found, 2):
+        chosen_agents = [found[name].observed.proxy_winners[0] for name in pair]
+        # The target is one: the draws of both are the same.
+        regrets = [found[pair[0]].expected_regret[agent] for agent in chosen_agents]
+        better, worse = (0, 1) if regrets[0] <= regrets[1] else (1, 0)
+        draws, agents = found[pair[0]].draws, inputs[pair[0]].agents
+        ends = None
+        if draws is not None:
+            lead, other = (draws[:, agents.index(chosen_agents[place])] for place in (better, worse))
+            ends = interval(lead - other)
+        choices.append(Choice(pair[better], pair[worse], regrets[worse] - regrets[better], ends))
+    return tuple(choices)
+
+
+def mmrv_conventions(inputs: Comparison) -> dict[str, dict[str, float]]:
+    """MMRV of each metric in every convention that papers use; none of more than 2000 agents.
+
+    simpler: the target's gap where (s_i > s_j) differs from (t_i > t_j), SIMPLER's code; strictly_less: the same with
+    "less"; sign_product: where (s_i − s_j)(t_i − t_j) < 0, so that ties cost nothing; proxy_gap: the proxy's gap where
+    simpler has the target's.
+    """
+    if len(inputs.agents) > MOST_COMPARED:
+        return {}
+    return {metric.name: _conventions(inputs, metric, column) for column, metric in enumerate(inputs.metrics)}
+
+
+def _conventions(inputs: Comparison, metric: Metric, column: int) -> dict[str, float]:
+    sign = 1.0 if metric.direction == "max" else -1.0
+    gaps, orders = [], []
+    for means in inputs.means:
+        merits = sign * means[:, column]
+        gap = merits[:, None] - merits
+        gaps.append(np.abs(gap))
+        orders.append(np.where(np.abs(gap) > ROUNDING * np.abs(merits).max(), np.sign(gap), 0.0))
+    (ours, theirs), (one, other) = gaps, orders
+    violated = {"simpler": (one > 0) != (other > 0), "strictly_less": (one < 0) != (other < 0)}
+    found = {name: float((theirs * wrong).max(axis=1).mean()) for name, wrong in violated.items()}
+    found["sign_product"] = float((theirs * (one * other < 0)).max(axis=1).mean())
+    found["proxy_gap"] = float((ours * violated["simpler"]).max(axis=1).mean())
+    return found

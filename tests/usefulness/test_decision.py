@@ -1,0 +1,125 @@
+"""Which agent to deploy: probabilities and regrets are those of the posterior, and what is not known is not told."""
+
+import numpy as np
+import pytest
+
+from proxytune.errors import InputError
+from proxytune.scores import Metric, ScoreTable
+from proxytune.usefulness import Asked, compare, decide, mmrv_conventions
+from proxytune.usefulness.noise import chance
+
+SUCCESS = [Metric("success")]
+
+
+def counted(successes, of):
+    """A table of so many successes, every agent with as many rollouts."""
+    rows = {
+        (f"agent {row}", f"{row} {place}"): {"success": float(place < done)}
+        for row, done in enumerate(successes)
+        for place in range(of)
+    }
+    return ScoreTable.from_episodes(rows)
+
+
+def means(columns, **scores):
+    rows = {(agent, "1"): dict(zip(columns, own, strict=True)) for agent, own in scores.items()}
+    return ScoreTable.from_episodes(rows)
+
+
+def decided(proxy, target, metrics=SUCCESS, **asked):
+    return decide(compare(proxy=proxy, target=target, metrics=metrics), Asked(**asked), None, 1)
+
+
+def test_of_two_agents_the_probability_is_that_of_two_betas():
+    found = decided(counted([5, 9], 10), counted([5, 9], 10))
+    rng = np.random.default_rng(0)
+    one, other = rng.beta(6, 6, 400_000), rng.beta(10, 2, 400_000)
+    assert found.winner == "agent 1"
+    assert found.probability_best == pytest.approx((other > one).mean(), abs=0.01)
+    assert found.expected_regret["agent 1"] == pytest.approx(np.maximum(one - other, 0).mean(), abs=0.003)
+    assert found.expected_regret["agent 0"] == pytest.approx(np.maximum(other - one, 0).mean(), abs=0.005)
+
+
+def test_the_agents_to_keep_hold_the_best_with_95_percent_and_no_more():
+    found = decided(counted([1, 20, 21, 22], 25), counted([1, 20, 21, 22], 25))
+    kept = {found.winner, *found.not_told_apart}
+    assert kept == {"agent 1", "agent 2", "agent 3"}
+    assert sum(found.best_probabilities[agent] for agent in kept) >= 0.95
+    assert not decided(counted([1, 24], 25), counted([1, 24], 25)).not_told_apart
+
+
+def test_means_without_rollouts_give_no_probability_but_the_observed_regret():
+    proxy, target = means(["success"], a=(0.9,), b=(0.8,)), means(["success"], a=(0.5,), b=(0.75,))
+    found = decided(proxy, target)
+    assert (found.winner, found.probability_best, found.best_probabilities) == ("b", None, None)
+    assert found.observed.regret == found.expected_regret["a"] == 0.25
+    assert "number of rollouts" in found.notes[0]
+    assert decided(proxy, target, rollouts=100).probability_best > 0.99
+
+
+def test_less_is_better_of_a_metric_to_be_small():
+    proxy = means(["seconds"], a=(1.0,), b=(2.0,))
+    found = decided(proxy, means(["seconds"], a=(5.0,), b=(4.0,)), [Metric("seconds", "min")])
+    assert (found.winner, found.observed.proxy_winners, found.observed.regret) == ("b", ("a",), 1.0)
+
+
+def test_tasks_are_averaged_and_left_out_one_at_a_time():
+    proxy = means(["x", "y", "z"], a=(0.9, 0.1, 0.1), b=(0.2, 0.3, 0.3))
+    target = means(["x", "y", "z"], a=(0.9, 0.0, 0.1), b=(0.1, 0.3, 0.3))
+    found = decided(proxy, target, [Metric(name) for name in "xyz"])
+    assert found.chosen_on == "mean of x, y, z"
+    assert [panel.agrees for panel in found.tasks] == [True, True, True]
+    assert [panel.proxy_winners for panel in found.without] == [("b",), ("a",), ("a",)]
+    assert decided(proxy, target, [Metric(name) for name in "xyz"], decide_on="y").winner == "b"
+
+
+def test_a_tie_in_the_proxy_is_told_and_costs_what_the_worse_costs():
+    proxy, target = means(["success"], a=(0.9,), b=(0.9,), c=(0.1,)), means(["success"], a=(0.5,), b=(0.7,), c=(0.1,))
+    observed = decided(proxy, target).observed
+    assert observed.agrees is None
+    assert observed.regret == pytest.approx(0.2)
+
+
+def test_published_standard_errors_are_taken():
+    target = ScoreTable(("a", "b"), ("1",), ("success",), np.array([[[0.5]], [[0.7]]]), np.array([[0.1], [0.1]]))
+    found = decided(means(["success"], a=(0.5,), b=(0.7,)), target)
+    assert found.probability_best == pytest.approx(0.921, abs=0.01)  # Φ(0.2 / (0.1 √2))
+
+
+def test_means_of_few_episodes_share_their_spread():
+    rng = np.random.default_rng(3)
+    values = np.array([0.0, 0.0, 3.0])[:, None, None] + rng.normal(size=(3, 2, 1))
+    target = ScoreTable(("a", "b", "c"), ("1", "2"), ("success",), values).unpaired()
+    assert decided(target, target).winner == "c"
+
+
+@pytest.mark.parametrize(
+    ("asked", "complaint"),
+    [({"rollouts": 0}, "rollouts must be"), ({"bound": 0.0}, "above 0"), ({"decide_on": "succes"}, "did you mean")],
+)
+def test_what_cannot_be_asked_is_said(asked, complaint):
+    with pytest.raises(InputError, match=complaint):
+        decided(counted([1, 2], 4), counted([1, 2], 4), **asked)
+
+
+def test_chance_of_up_to_seven_agents_is_exact_and_not_below_one_in_all_orders():
+    for agents, orders in ((2, 2), (3, 6), (4, 24), (5, 120), (7, 5040)):
+        table = means(["success"], **{f"a{row}": (row / 10,) for row in range(agents)})
+        found = chance(proxy=table, target=table, metrics=SUCCESS)
+        assert (found.p_value, found.permutations, found.exact) == (pytest.approx(1 / orders), orders, True)
+    table = means(["success"], **{f"a{row}": (row / 10,) for row in range(8)})
+    assert not chance(proxy=table, target=table, metrics=SUCCESS).exact
+
+
+def test_mmrv_has_every_published_convention():
+    proxy = means(["success"], a=(0.9,), b=(0.8,), c=(0.8,))
+    target = means(["success"], a=(0.5,), b=(0.75,), c=(0.45,))
+    found = mmrv_conventions(compare(proxy=proxy, target=target, metrics=SUCCESS))["success"]
+    assert found == pytest.approx(
+        {
+            "simpler": (0.25 + 0.3 + 0.0) / 3,
+            "strictly_less": (0.25 + 0.25 + 0.3) / 3,
+            "sign_product": (0.25 + 0.25 + 0.0) / 3,
+            "proxy_gap": (0.1 + 0.1 + 0.0) / 3,
+        }
+    )

@@ -1,0 +1,92 @@
+"""What simulation saves: pairs are used where they help beyond noise, and never make a score worse than that."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
+from decisions import decisions, paired, plans, savings, tests as looked_at, wealth_of
+
+from proxytune.scores import Metric, ScoreTable
+from proxytune.usefulness import compare, saving_of
+
+SUCCESS = [Metric("success")]
+RATES = [0.3, 0.5, 0.6, 0.7]
+
+
+def saved(correlation, real=25, simulated=200, seed=1):
+    proxy, target = paired(RATES, correlation, np.random.default_rng(seed), real, simulated)
+    return saving_of(compare(proxy=proxy, target=target, metrics=SUCCESS))
+
+
+def test_paired_rollouts_that_correlate_are_worth_real_ones():
+    found = saved(0.7)
+    assert found.kind == "paired"
+    assert found.interval[0] < found.real_rollouts_worth < found.interval[1]
+    assert 0.25 < found.saved_share < 0.6
+    for agent, (_, (low, high)) in found.means.items():
+        assert high - low < found.alone[agent][1][1] - found.alone[agent][1][0]
+
+
+def test_a_proxy_that_does_not_correlate_is_left_out_and_that_is_said():
+    found = saved(0.0)
+    assert (found.real_rollouts_worth, found.rectified) == (0.0, {})
+    assert "beyond noise" in found.reason
+
+
+def test_the_same_starts_alone_save_nothing():
+    assert "simulate more" in saved(0.7, simulated=25).reason
+
+
+def test_the_rectified_mean_is_the_control_variate():
+    rng = np.random.default_rng(4)
+    x = rng.normal(size=(2, 40))
+    y = x[:, :10] + 0.3 * rng.normal(size=(2, 10))
+    labels = tuple(map(str, range(40)))
+    proxy = ScoreTable(("a", "b"), labels, ("success",), x[..., None])
+    target = ScoreTable(("a", "b"), labels[:10], ("success",), y[..., None])
+    means, _ = saving_of(compare(proxy=proxy, target=target, metrics=SUCCESS)).rectified["success"]
+    dx, dy = x[:, :10] - x[:, :10].mean(1, keepdims=True), y - y.mean(1, keepdims=True)
+    slope = (dx * dy).sum() / (dx**2).sum()
+    assert means == pytest.approx(y.mean(1) - slope * (x[:, :10].mean(1) - x.mean(1)))
+
+
+def test_without_pairs_a_model_over_agents_says_so():
+    proxy, target = paired([0.1, 0.3, 0.5, 0.6, 0.8, 0.9], 0.0, np.random.default_rng(2), 10, 200)
+    found = saving_of(compare(proxy=proxy.unpaired(), target=target.unpaired(), metrics=SUCCESS))
+    assert found.kind == "policies"
+    assert found.real_rollouts_worth > 1.0
+    few = [side.arrange(agents=side.agents[:3]).unpaired() for side in (proxy, target)]
+    assert "fewer than 4" in saving_of(compare(proxy=few[0], target=few[1], metrics=SUCCESS)).reason
+
+
+def test_sorted_outcomes_are_no_pairs():
+    values = np.array([[1.0] * done + [0.0] * (20 - done) for done in (5, 10, 15, 8)])[..., None]
+    table = ScoreTable(tuple("abcd"), tuple(map(str, range(20))), ("success",), values)
+    assert saving_of(compare(proxy=table, target=table, metrics=SUCCESS)).kind == "policies"
+
+
+@pytest.mark.slow
+def test_made_up_evaluations_find_intervals_that_hold_regret_that_is_calibrated_and_a_test_that_errs_seldom():
+    held, regret_held, said, found, best_said, best_found, kept, _ = decisions(4, 25, 300, 1)
+    assert 0.93 <= held <= 0.99
+    assert regret_held >= 0.93
+    assert said == pytest.approx(found, abs=0.006)
+    assert best_said == pytest.approx(best_found, abs=0.06)
+    assert kept >= 0.95
+    assert savings(0.6, 4, 25, 200, 200, 2)[0] >= 0.2
+    assert savings(0.0, 4, 10, 200, 200, 3)[0] >= -0.1
+    assert savings(0.0, 4, 100, 200, 200, 4)[0] >= -0.02
+    assert looked_at([0.5, 0.5], None, 500, 300, 5)[0] <= 0.07
+    assert looked_at([0.5] * 4, np.array([0.9, 0.6, 0.3, 0.1]), 500, 300, 6)[0] <= 0.07
+    assert plans(4, 10, 0.05, 100, 7)[0] <= 0.1
+
+
+def test_a_bet_does_not_grow_on_average_where_the_agent_is_no_better():
+    rng = np.random.default_rng(5)
+    outcomes = (rng.random((4000, 2, 30)) < 0.5).astype(float)
+    wealth = wealth_of(outcomes, np.array([0.9, 0.2]))[:, :, 0, 1]
+    assert (wealth[:, [0, 9, 29]].mean(axis=0) <= 1.15).all()
+    assert (wealth.max(axis=1) >= 20.0).mean() <= 0.05

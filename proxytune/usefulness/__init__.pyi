@@ -27,7 +27,6 @@ from .comparison import (
     starts_of as starts_of,
 )
 from .decision import (
-    ASKED as ASKED,
     Asked as Asked,
     Choice as Choice,
     Decision as Decision,
@@ -54,8 +53,4 @@ from .resampling import (
     why_not_repeated as why_not_repeated,
 )
 from .saving import Saving as Saving, saving_of as saving_of
-from .sequential import (
-    Plan as Plan,
-    Sequential as Sequential,
-    sequential_test as sequential_test,
-)
+from .sequential import Plan as Plan, Sequential as Sequential, sequential_test as sequential_test

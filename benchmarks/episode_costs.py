@@ -15,13 +15,16 @@ from proxytune.driving import (
     AGENTS,
     TICK_HZ,
     BulletPlant,
+    cameras as ground_plane,
     drivetrain,
     lane_following,
     load_agent,
     read_robot,
+    texels as plain,
 )
 from proxytune.driving.cameras import Views
 from proxytune.driving.plants import PlanarPlant, integrate
+from proxytune.driving.texels import by_numba
 from proxytune.effects import FilterContext, effects_from
 from proxytune.settings import Section
 
@@ -40,12 +43,22 @@ def family(folder: Path, plant: str):
     return lane_following(Section(folder / "study.toml", "domain.", {"plant": plant}), model=None)
 
 
+def use(monkeypatch, by):
+    """Let texels be looked up by Numba or by NumPy."""
+    way = by_numba() if by == "numba" else plain
+    monkeypatch.setattr(ground_plane, "fastest", lambda pictures: way)
+
+
 ROUNDS, EPISODES = 5, 3
+
+both = pytest.mark.parametrize("by", ["numpy", "numba"])
 
 
 @pytest.mark.benchmark(group="60-s episode")
+@both
 @pytest.mark.parametrize("plant", ["bullet", "planar"])
-def test_episode_with_camera_and_agent(benchmark, tmp_path, plant):
+def test_episode_with_camera_and_agent(benchmark, tmp_path, monkeypatch, plant, by):
+    use(monkeypatch, by)
     domain = family(tmp_path, plant)
     metrics = benchmark.pedantic(domain.run, args=(CAREFUL,), rounds=7, warmup_rounds=1)
     assert metrics["survival_time"] == 60.0
@@ -114,7 +127,9 @@ def test_planar_plant(benchmark):
 
 
 @pytest.mark.benchmark(group="parts of a 60-s planar episode")
-def test_pictures(benchmark, driven):
+@both
+def test_pictures(benchmark, driven, monkeypatch, by):
+    use(monkeypatch, by)
     instance, steps = driven[0], driven[1].poses[1:].reshape(-1, 3, 3)
 
     def see():

@@ -7,21 +7,16 @@ The floor is flat, so where each pixel looks in the robot's frame is known befor
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from proxytune.arrays import SmallBuffers
 from proxytune.driving.optics import SKY, CameraFigures, Renderer, floor_hits, ground_points
 from proxytune.driving.road_picture import Floor
+from proxytune.driving.texels import AT_ONCE, TexelTable, fastest
 from proxytune.effects import Chain, FilterContext, Signal
-
-Level = TypeVar("Level", np.uint8, np.float32)
-
-AT_ONCE = 8
-"""So many pictures are looked up at once: what is worked on stays in the processor's cache."""
 
 
 class GroundPlaneCamera:
@@ -40,76 +35,40 @@ class GroundPlaneCamera:
 
     def render(self, poses: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
         """Render what it sees from poses (n, 3) of x [m], y [m], heading [rad]: (n, rows, columns, 3) RGB."""
-        return self.picture(self.glimpse(poses))
+        pictures = np.empty((len(poses), *self._shape), dtype=np.uint8)
+        for first in range(0, len(poses), AT_ONCE):
+            here = slice(first, first + AT_ONCE)
+            self.develop(self.glimpse(poses[here])[:, None], _ALONE, pictures[here])
+        return pictures
 
     def glimpse(self, poses: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
         """The levels (n, levels) that make a picture from poses (n, 3): of pixels that are not always sky."""
-        cos, sin, turned = np.cos(poses[:, 2]), np.sin(poses[:, 2]), np.empty((3, 2, len(poses), 1), dtype=np.float32)
-        turned[0, 0, :, 0] = turned[1, 1, :, 0] = cos
-        turned[0, 1, :, 0], turned[1, 0, :, 0] = sin, -sin
-        turned[2, ..., 0] = poses[:, :2].T
-        turned[2] -= self._origin
-        return _look_up(self._table, turned).view(np.uint8)
+        places = np.empty((len(poses), 6), dtype=np.float32)
+        places[:, 0] = places[:, 3] = np.cos(poses[:, 2])
+        places[:, 1] = sin = np.sin(poses[:, 2])
+        places[:, 2] = -sin
+        places[:, 4:] = poses[:, :2]
+        places[:, 4:] -= self._origin
+        return fastest(len(poses)).look_up(self._table, places).view(np.uint8)
 
-    def picture(self, levels: NDArray[Level]) -> NDArray[Level]:
-        """The pictures (n, rows, columns, 3) of glimpses, or of means over glimpses, (n, levels)."""
-        pixels = levels.reshape(len(levels), -1, 4)
-        pictures = np.empty((len(levels), self._sky + pixels.shape[1], 3), dtype=levels.dtype)
-        pictures.reshape(len(levels), -1)[:, : 3 * self._sky] = self._sky_levels
-        for colour in range(3):  # four times as fast as one copy of [..., :3]
-            pictures[:, self._sky :, colour] = pixels[..., colour]
-        return pictures.reshape(-1, *self._shape)
+    def develop(self, glimpses: NDArray[np.uint8], weights: Signal, pictures: NDArray[Any]) -> None:
+        """Write weighted means of glimpses (n, times, levels) as pictures (n, rows, columns, 3), rounded if bytes."""
+        pixels = pictures.reshape(len(pictures), -1, 3)
+        pictures.reshape(len(pictures), -1)[:, : 3 * self._sky] = self._sky_levels
+        fastest(0).average(glimpses, weights, pixels[:, self._sky :])
 
 
-class _TexelTable(NamedTuple):
-    """For each of a camera's pixels, a point in the robot's frame and a square of texels that shows it.
-
-    Attributes:
-        plane: The point and 1, in texels a metre, (3, pixels): x ahead, y to the left, 1.
-        begin: The first column and row of the pixel's square, 0, (pixels,).
-        last: The last column and row of the pixel's square, (pixels,).
-        first: Index of the first texel of that square, (pixels,).
-        side: Texels along its side, (pixels,).
-        texels: All squares one after another, (texels,): red, green, blue and a spare byte in one number each.
-    """
-
-    plane: NDArray[np.float32]
-    begin: NDArray[np.float32]
-    last: NDArray[np.float32]
-    first: NDArray[np.int32]
-    side: NDArray[np.int32]
-    texels: NDArray[np.uint32]
+_ALONE = np.ones(1, dtype=np.float32)
 
 
-def _look_up(table: _TexelTable, turned: NDArray[np.float32]) -> NDArray[np.uint32]:
-    """The texels (n, pixels) that pixels show; what is beyond the floor shows its edge.
-
-    Args:
-        table: Of the camera.
-        turned: Robots' frames in that of the floor's picture, (3, 2, n, 1): x and y of what is ahead, of what is to the
-            left, and of the robot's place from the corner of the picture [m].
-    """
-    texels = np.empty((turned.shape[2], len(table.last)), dtype=np.uint32)
-    with SmallBuffers():
-        for first in range(0, len(texels), AT_ONCE):
-            ahead, left, place = turned[:, :, first : first + AT_ONCE]
-            # Not a matrix product: BLAS rounds differently from processor to processor, and so would the pictures
-            where = ahead * table.plane[0]
-            part = left * table.plane[1]
-            where += part
-            where += np.multiply(place, table.plane[2], out=part)
-            # Both at once, np.clip, takes twice as long, and so does a number instead of an array
-            np.maximum(where, table.begin, out=where)
-            np.minimum(where, table.last, out=where)
-            column, row = where.astype(np.int32)
-            row *= table.side
-            row += column
-            row += table.first
-            table.texels.take(row, mode="wrap", out=texels[first : first + AT_ONCE])
-    return texels
+def _develop(glimpses: NDArray[np.uint8], weights: Signal, pictures: NDArray[Any]) -> None:
+    """Do the same for glimpses that are pictures themselves, (n, times, rows, columns, 3)."""
+    for glimpse, picture in zip(glimpses, pictures, strict=True):
+        mean = weights @ glimpse.reshape(len(weights), -1).astype(np.float32)
+        picture[...] = (np.rint(mean) if pictures.dtype == np.uint8 else mean).reshape(picture.shape)
 
 
-def _tabulate(figures: CameraFigures, floor: Floor) -> tuple[int, _TexelTable]:
+def _tabulate(figures: CameraFigures, floor: Floor) -> tuple[int, TexelTable]:
     """Number of pixels that are sky before the first that sees floor, and a table of where the others look."""
     copies, points = _copies(floor), ground_points(figures).reshape(-1, 2)
     on_floor = np.isfinite(points[:, 0])
@@ -119,7 +78,7 @@ def _tabulate(figures: CameraFigures, floor: Floor) -> tuple[int, _TexelTable]:
     scale = copies.per_metre[copy]
     plane = np.stack((points[:, 0] * scale, points[:, 1] * scale, scale))
     # Those above the horizon stay at the last texel, the sky
-    return sky, _TexelTable(
+    return sky, TexelTable(
         plane=np.where(on_floor, plane, 0.0).astype(np.float32),
         begin=np.zeros(len(points), dtype=np.float32),
         last=np.where(on_floor, copies.sides[copy] - 1, 0).astype(np.float32),
@@ -178,6 +137,11 @@ def _blur_octaves(figures: CameraFigures, floor: Floor) -> NDArray[np.int64]:
     return octaves
 
 
+def _ticks(context: FilterContext) -> int:
+    """How many there are from one picture to the next."""
+    return round(context.rate_hz / context.nominal["camera_rate"])
+
+
 class _Film(Protocol):
     """Film: makes pictures of what cameras see."""
 
@@ -193,11 +157,14 @@ class _Film(Protocol):
 class _Averaged:
     """Each picture is a weighted mean of what the camera saw at the last ticks, which is all that blur does."""
 
-    def __init__(self, camera: Renderer, weights: Signal, rests: Signal) -> None:
+    def __init__(self, camera: Renderer, weights: Signal, contexts: Sequence[FilterContext], level: Any) -> None:
         self._glimpse = getattr(camera, "glimpse", camera.render)
-        self._picture = getattr(camera, "picture", np.asarray)
-        self._weights = weights
-        self._poses = np.repeat(rests[:, None], len(weights), axis=1)
+        self._develop = getattr(camera, "develop", _develop)
+        nominal = contexts[0].nominal
+        self._shape = (int(nominal["camera_rows"]), int(nominal["camera_columns"]), 3)
+        self._every = _ticks(contexts[0])
+        self._weights, self._level = weights, level
+        self._poses = np.repeat(np.stack([context.rest for context in contexts])[:, None], len(weights), axis=1)
         self._glimpses: dict[int, NDArray[np.uint8]] = {}
         self._new = len(weights)
 
@@ -208,20 +175,18 @@ class _Averaged:
 
     def expose(self, robots: Sequence[int]) -> NDArray[Any]:
         """The means of what these robots' cameras saw; what is known from the pictures before is not looked up."""
-        new, self._new = self._new, 0
-        latest = self._glimpse(self._poses[list(robots), -new:].reshape(-1, 3))
-        if len(self._weights) == 1:
-            return np.asarray(self._picture(latest))
-        means = np.empty((len(robots), *latest.shape[1:]), dtype=np.float32)
-        exact = np.empty((len(self._weights), means[0].size), dtype=np.float32)
-        for number, robot in enumerate(robots):
-            seen = latest[number * new : (number + 1) * new]
+        new, self._new, kept = self._new, 0, self._glimpses
+        pictures, self._glimpses = np.empty((len(robots), *self._shape), dtype=self._level), {}
+        for first in range(0, len(robots), AT_ONCE):
+            here = list(robots[first : first + AT_ONCE])
+            seen = self._glimpse(self._poses[here, -new:].reshape(-1, 3))
+            seen = seen.reshape(len(here), new, *seen.shape[1:])
             if new < len(self._weights):
-                seen = np.concatenate((self._glimpses[robot][new:], seen))
-            self._glimpses[robot] = seen
-            exact[...] = seen.reshape(exact.shape)
-            means[number] = (self._weights @ exact).reshape(means.shape[1:])
-        return np.asarray(self._picture(means))
+                seen = np.concatenate((np.stack([kept[robot][new:] for robot in here]), seen), axis=1)
+            if len(self._weights) > self._every:
+                self._glimpses.update(zip(here, seen, strict=True))
+            self._develop(seen, self._weights, pictures[first : first + AT_ONCE])
+        return pictures
 
 
 class _Mixed:
@@ -260,15 +225,18 @@ class Views:
 
     def __init__(self, camera: Renderer, image: Chain, contexts: Sequence[FilterContext]) -> None:
         """Open the shutters; each context is that of poses, its rest where that robot stood before them, (3,)."""
-        rests = np.stack([one.rest for one in contexts])
+        rests, developed = np.stack([one.rest for one in contexts]), contexts
         if image.effects:
             stills = camera.render(rests).reshape(len(rests), -1)
-            contexts = [replace(one, rest=still) for one, still in zip(contexts, stills, strict=True)]
+            developed = [replace(one, rest=still) for one, still in zip(contexts, stills, strict=True)]
         mixing, self._alone = image.parted()
         weights = mixing.mean_weights(contexts[0].rate_hz)
-        self._film: _Film = _Mixed(camera, mixing, contexts) if weights is None else _Averaged(camera, weights, rests)
-        self._memories = [self._alone.begin(one) for one in contexts]
-        self._every = round(contexts[0].rate_hz / contexts[0].nominal["camera_rate"])
+        level = np.float32 if self._alone.effects else np.uint8
+        self._film: _Film = (
+            _Mixed(camera, mixing, developed) if weights is None else _Averaged(camera, weights, contexts, level)
+        )
+        self._memories = [self._alone.begin(one) for one in developed]
+        self._every = _ticks(contexts[0])
         self._under_way = list(range(len(contexts)))
         self._waiting, self._unseen = rests[:, None], 0
         self._shown: NDArray[np.uint8] | None = None

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from proxytune.arrays import SmallBuffers
 
-PAYS_OFF = 20_000
+PAYS_OFF = 40_000
 """So many pictures NumPy looks up before Numba, which takes half a second to load and would have saved that."""
 
 _used = [0]

@@ -24,6 +24,9 @@ class GroundPlaneCamera:
 
     A pixel looks up one point in that of several blurred copies of the floor's picture whose blur is as wide as what
     the pixel covers there; without that, small pictures of a sharp floor alias.
+
+    Attributes:
+        shape: Of its pictures: rows, columns, 3.
     """
 
     def __init__(self, figures: CameraFigures, floor: Floor) -> None:
@@ -31,11 +34,11 @@ class GroundPlaneCamera:
         self._sky, self._table = _tabulate(figures, floor)
         self._sky_levels = np.array(SKY * self._sky, dtype=np.uint8)
         self._origin = np.float32(floor.origin)
-        self._shape = (figures.rows, figures.columns, 3)
+        self.shape = (figures.rows, figures.columns, 3)
 
     def render(self, poses: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
         """Render what it sees from poses (n, 3) of x [m], y [m], heading [rad]: (n, rows, columns, 3) RGB."""
-        pictures = np.empty((len(poses), *self._shape), dtype=np.uint8)
+        pictures = np.empty((len(poses), *self.shape), dtype=np.uint8)
         for first in range(0, len(poses), AT_ONCE):
             here = slice(first, first + AT_ONCE)
             self.develop(self.glimpse(poses[here])[:, None], _ALONE, pictures[here])
@@ -160,8 +163,7 @@ class _Averaged:
     def __init__(self, camera: Renderer, weights: Signal, contexts: Sequence[FilterContext], level: Any) -> None:
         self._glimpse = getattr(camera, "glimpse", camera.render)
         self._develop = getattr(camera, "develop", _develop)
-        nominal = contexts[0].nominal
-        self._shape = (int(nominal["camera_rows"]), int(nominal["camera_columns"]), 3)
+        self._shape = getattr(camera, "shape", None) or camera.render(contexts[0].rest[None]).shape[1:]
         self._every = _ticks(contexts[0])
         self._weights, self._level = weights, level
         self._poses = np.repeat(np.stack([context.rest for context in contexts])[:, None], len(weights), axis=1)

@@ -185,8 +185,10 @@ def score(
         ScoresError: If a table lacks an agent or a metric, with side, row and column.
         InputError: If a metric, a weight or another option cannot be used.
     """
-    if seed < 0 or not FEWEST_RESAMPLES <= resamples <= MOST_RESAMPLES:
-        raise InputError(f"seed must be at least 0, and resamples from {FEWEST_RESAMPLES}, got {seed} and {resamples}")
+    if seed < 0:
+        raise InputError(f"seed must be at least 0, got {seed}")
+    if not FEWEST_RESAMPLES <= resamples <= MOST_RESAMPLES:
+        raise InputError(f"resamples must be between {FEWEST_RESAMPLES} and {MOST_RESAMPLES}, got {resamples}")
     if (both is None) == (proxy is None) or (proxy is None) != (target is None):
         raise InputError("give the proxy's and the target's scores, or one table of both sides")
     given = [metrics] if isinstance(metrics, str | Metric) else list(metrics or ())
@@ -195,7 +197,7 @@ def score(
         given = [f"{name}:max" for name in both_metrics(header) if "success" in name]
     compared = [Metric.parse(one) if isinstance(one, str) else one for text in given for one in _expanded(text, header)]
     if not compared:
-        raise InputError("no metric is given; name what is compared and whether more is better, as in 'success:max'")
+        raise InputError("no metric is given; name at least one, as in 'success:max'")
     wanted = [metric.name for metric in compared]
     if both is not None:
         check_sides(names[1], header, wanted)
@@ -208,7 +210,8 @@ def score(
     if unpaired:
         sides = {side: table.unpaired() for side, table in sides.items()}
     asked = Asked(decide_on, rollouts, regret)
-    found = assess(**sides, metrics=compared, beta=beta, seed=seed, resamples=resamples, asked=asked)
+    one, other = sides["proxy"], sides["target"]
+    found = assess(proxy=one, target=other, metrics=compared, beta=beta, seed=seed, resamples=resamples, asked=asked)
     return ScoreReport(**{one.name: getattr(found, one.name) for one in fields(Assessment)}, names=names)
 
 
@@ -230,8 +233,7 @@ def _table(scores: Scores | None, side: Side, names: Sequence[str], columns: Map
         return _selected(scores, side, names)
     if isinstance(scores, str | Path):
         return read_scores(scores, names, columns=columns, side=side)
-    _check_columns(scores, side, columns)
-    with as_files({side: scores}) as folder:
+    with as_files({side: _checked(scores, side, columns)}) as folder:
         return read_scores(folder / f"{side}.csv", names, columns=columns, side=side)
 
 
@@ -242,8 +244,8 @@ def _selected(scores: ScoreTable, side: str, names: Sequence[str]) -> ScoreTable
         raise ScoresError(f"{side}: {problem}") from None
 
 
-def _check_columns(scores: pd.DataFrame | None, side: str, columns: Mapping[str, str] | None) -> None:
-    """Refuse what a DataFrame may be like and a file not."""
+def _checked(scores: pd.DataFrame | None, side: str, columns: Mapping[str, str] | None) -> pd.DataFrame:
+    """A DataFrame; what it may be like and a file not is refused."""
     if not isinstance(scores, pd.DataFrame):
         kind = type(scores).__name__
         raise InputError(f"{side}: must be a DataFrame, a CSV file or a ScoreTable, got {kind}")
@@ -253,6 +255,7 @@ def _check_columns(scores: pd.DataFrame | None, side: str, columns: Mapping[str,
     domains = list(scores["domain"].unique()) if "domain" in scores else []
     if len(domains) > 1:
         raise ScoresError(f"{side}: has several domains; select one, as in scores[scores.domain == {domains[0]!r}]")
+    return scores
 
 
 Description = Mapping[str, str | float]

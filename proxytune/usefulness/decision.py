@@ -245,7 +245,8 @@ def _panel(name: str, agents: Sequence[str], proxy: Floats, target: Floats) -> P
     """The winners of mean scores, more being better."""
     best = [np.flatnonzero(side.max() - side <= ROUNDING * max(1.0, np.abs(side).max())) for side in (proxy, target)]
     regret = float((target.max() - target[best[0]]).max())
-    return Panel(name, *(tuple(agents[row] for row in rows) for rows in best), regret)
+    winners, others = (tuple(agents[int(row)] for row in rows) for rows in best)
+    return Panel(name, winners, others, regret)
 
 
 def _parts_by_start(inputs: Comparison, column: int, sign: float) -> list[tuple[str, Floats, Floats]]:
@@ -265,7 +266,8 @@ def _parts_by_start(inputs: Comparison, column: int, sign: float) -> list[tuple[
 
 def _without(agents: Sequence[str], parts: Sequence[tuple[str, Floats, Floats]], out: int) -> Panel:
     rest = [part for place, part in enumerate(parts) if place != out]
-    return _panel(parts[out][0], agents, *(np.mean([part[side] for part in rest], axis=0) for side in (1, 2)))
+    proxy, target = np.mean([part[1] for part in rest], axis=0), np.mean([part[2] for part in rest], axis=0)
+    return _panel(parts[out][0], agents, proxy, target)
 
 
 def is_rate(table: ScoreTable, column: int) -> bool:
@@ -357,7 +359,7 @@ def _means(
     spread = np.sqrt(np.nansum(residuals**2) / freedom)
     per = effective(counts, table, starts)
     scale = spread / np.sqrt(per) * np.sqrt(freedom / rng.chisquare(freedom, (draws, 1)))
-    return means + scale * rng.standard_normal((draws, len(means)))
+    return np.asarray(means + scale * rng.standard_normal((draws, len(means))), dtype=np.float64)
 
 
 @dataclass(frozen=True)

@@ -117,7 +117,7 @@ def _more(draws: Floats, worth: Floats, bound: float) -> Floats:
     while high - low > max(0.5, 0.005 * high):
         middle = (low + high) / 2.0
         low, high = (middle, high) if exceeds(middle) else (low, middle)
-    return np.ceil(np.maximum(high * share - worth, 0.0))
+    return np.asarray(np.ceil(np.maximum(high * share - worth, 0.0)), dtype=np.float64)
 
 
 @dataclass(frozen=True)

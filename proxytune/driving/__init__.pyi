@@ -24,6 +24,7 @@ from .optics import (
     floor_points as floor_points,
     ground_points as ground_points,
     orientation as orientation,
+    rotation as rotation,
 )
 from .plants import (
     AXLES as AXLES,

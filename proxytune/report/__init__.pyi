@@ -20,12 +20,16 @@ from .drive.movie import (
     write_episode as write_episode,
 )
 from .export.instance import (
+    FILTER as FILTER,
     FORMATS as FORMATS,
+    IN_WHEELS as IN_WHEELS,
     ExportLine as ExportLine,
     Instance as Instance,
     export_lines as export_lines,
 )
+from .export.into import patch as patch
 from .export.mjcf import mjcf_text as mjcf_text
+from .export.node import node_text as node_text
 from .export.ros import ros_text as ros_text
 from .export.urdf import urdf_text as urdf_text
 from .families import (

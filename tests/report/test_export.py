@@ -10,7 +10,7 @@ import pybullet
 import pytest
 from export_truth import ROBOT, instance
 
-from proxytune.api.transfer import WRITERS
+from proxytune.api.exporting import WRITERS
 from proxytune.driving import AXLES, drivetrain, orientation, read_body
 from proxytune.driving.plants import PlanarPlant
 from proxytune.effects import CATALOGUE, FilterContext, effects_from, theta_names

@@ -37,7 +37,7 @@ from proxytune.report import frame_html, write_picture, write_text
 from proxytune.running import Bars, Silent
 from proxytune.scores import ScoreTable, write_scores
 from proxytune.seeds import target_seed
-from proxytune.settings import GEOMETRY, figure_cautions
+from proxytune.settings import GEOMETRY
 from proxytune.study import bare_family, cautions_of, measure_agents, read_study_settings
 
 MOST_REPEATS = 1_000_000

@@ -32,6 +32,7 @@ from proxytune.loop.comparison import (
     lacking,
     level_text,
     prpv_figure,
+    theta_table,
 )
 from proxytune.loop.diagnosing import (
     adds_something,
@@ -385,8 +386,9 @@ def text_of(closed: Closed, page: Path) -> Group:
     """
     rows = rows_of(closed)
     sentence, table = Text(answer(closed.diagnosis, rows), style="bold"), _table(closed, rows)
-    shown = table_text(replace(table, title=""), ragged=True)
-    return group_texts(sentence, shown, *note_texts(table.notes), f"Next: {_following(closed)}", str(page))
+    shown, theta = (table_text(one, ragged=True) for one in (replace(table, title=""), _theta_table(closed)))
+    following = f"Next: {_following(closed)}"
+    return group_texts(sentence, shown, *note_texts(table.notes), Text(), theta, following, str(page))
 
 
 def view_of(closed: Closed) -> View:
@@ -410,7 +412,7 @@ def view_of(closed: Closed) -> View:
         title=f"{closed.loop.settings.name}: the loop closed",
         sentence=answer(closed.diagnosis, rows),
         next_step=_following(closed),
-        parts=(_table(closed, rows), *shown, Paragraphs("What each step said", said)),
+        parts=(_table(closed, rows), _theta_table(closed), *shown, Paragraphs("What each step said", said)),
     )
 
 
@@ -433,6 +435,14 @@ def _table(closed: Closed, rows: list[Compared]) -> Table:
             "no agent was held out: name at least three under held_out in study.toml that the target has scores of"
         )
     return Table("Before and after", COLUMNS, cells, tuple(notes))
+
+
+def _theta_table(closed: Closed) -> Table:
+    sides = [
+        report and {name: (value, report.result.knowledge.intervals.get(name)) for name, value in report.theta.items()}
+        for report in (closed.before, closed.after)
+    ]
+    return theta_table(sides[0] or {}, sides[1], closed.diagnosis)
 
 
 def _following(closed: Closed) -> str:

@@ -23,6 +23,7 @@ from proxytune.identity import versions_of
 from proxytune.logs import Log
 from proxytune.loop.comparison import (
     Compared,
+    Known,
     answer,
     chance_text,
     compare_errors,
@@ -438,11 +439,13 @@ def _table(closed: Closed, rows: list[Compared]) -> Table:
 
 
 def _theta_table(closed: Closed) -> Table:
-    sides = [
-        report and {name: (value, report.result.knowledge.intervals.get(name)) for name, value in report.theta.items()}
-        for report in (closed.before, closed.after)
-    ]
-    return theta_table(sides[0] or {}, sides[1], closed.diagnosis)
+    after = None if closed.after is None else _known(closed.after)
+    return theta_table(_known(closed.before), after, closed.diagnosis)
+
+
+def _known(report: StudyReport) -> Known:
+    ends = report.result.knowledge.intervals
+    return {name: (value, ends.get(name)) for name, value in report.theta.items()}
 
 
 def _following(closed: Closed) -> str:

@@ -8,7 +8,7 @@ from rich.console import Group
 from rich.text import Text
 
 from proxytune.api import import_log
-from proxytune.cli.options import configure_source, facts_of, wanted_of
+from proxytune.cli.options import configure_source, facts_of, take_late, wanted_of
 from proxytune.cli.terminal import Answer, waiting
 from proxytune.importing import Source, Survey
 from proxytune.report import Column, Table, columns_of, table_text
@@ -25,6 +25,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("output", type=Path, nargs="?", metavar="OUTPUT", help="the log's folder to write [list only]")
     parser.add_argument("--robot", metavar="NAME", help="the robot, of list robots or your own [the log's name]")
     configure_source(parser)
+    take_late(parser, "output", Path)
 
 
 def run(arguments: argparse.Namespace) -> Answer:

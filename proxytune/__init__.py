@@ -4,7 +4,7 @@
     simulators   run_families, read_families, FamiliesReport: several tuned in the same time
     sweep        run_sweep, SweepReport: usefulness along a parameter
     teaching     teach, TeachReport: what a proxy saves in training
-    scores       score, ScoreReport, Assessment, Metric, ScoreTable, read_scores; measure, Measurement: of a model's domain
+    scores       score, ScoreReport, Assessment, Metric, ScoreTable, read_scores; measure, Measurement: of a model
     search       SearchBox: ask for a θ, tell its score
     logs         diagnose, DiagnosisReport, read_log, log_of, Log; import_log, ImportReport
     models       predict, Prediction, PicturePrediction; export, ExportReport; CommandFilter

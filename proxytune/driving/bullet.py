@@ -86,7 +86,8 @@ SOLVER_ITERATIONS = 20
 """Enough for one robot on a floor: 50, PyBullet's default, moves it by less than a millimetre a metre."""
 
 
-_SPEED, _WHERE = (getattr(pybullet, name, None) for name in ("VELOCITY_CONTROL", "getBasePositionAndOrientation"))
+_SPEED: Any = getattr(pybullet, "VELOCITY_CONTROL", None)
+_WHERE: Any = getattr(pybullet, "getBasePositionAndOrientation", None)
 _GAINS = (0.1, 1.0, 0.0)
 """The mode of a driven wheel, the call that tells its body's place, and the gains that PyBullet takes by itself."""
 

@@ -7,7 +7,7 @@
     scores       score, ScoreReport, Assessment, Metric, ScoreTable, read_scores; measure, Measurement: a model's scores
     search       SearchBox: ask for a θ, tell its score
     logs         diagnose, DiagnosisReport, read_log, log_of, Log; import_log, ImportReport
-    models       predict, Prediction, PicturePrediction; export, ExportReport
+    models       predict, Prediction, PicturePrediction; export, ExportReport; CommandFilter
     loop         run_loop, LoopReport: tune, diagnose, extend, tune again
     driving      drive, DrivenEpisode: one episode of a study's proxy
     to extend    DomainFamily, Episode, Parameter, Agent, Effect, Engine, Proposer, Learner, Measure

@@ -1,4 +1,5 @@
 from .api import (
+    CommandFilter as CommandFilter,
     DiagnosisReport as DiagnosisReport,
     DrivenEpisode as DrivenEpisode,
     ExportReport as ExportReport,

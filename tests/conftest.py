@@ -5,6 +5,7 @@ import shutil
 import signal
 import sys
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -24,6 +25,13 @@ FUZZ = 1000
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Let a nightly run spoil more files."""
     parser.addoption("--fuzz", type=int, default=FUZZ, metavar="N", help=f"spoilt files of each kind [{FUZZ}]")
+
+
+@pytest.fixture(autouse=True)
+def _skip_without_pybullet(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Skip what turns out to need PyBullet where it is not installed, with the reason that a user is told."""
+    if find_spec("pybullet") is None:
+        monkeypatch.setattr("proxytune.driving.bullet.InputError", pytest.skip)
 
 
 STUDY = {

@@ -133,7 +133,7 @@ def test_every_engine_is_documented_with_what_it_learns_from_and_what_installs_i
     assert row, f"docs/reference/engines.md has no row for the engine '{engine.name}'"
     cells = [cell.strip() for cell in row.strip("|").split("|")]
     assert cells[1] == engine.learns_from
-    assert engine.needs is None or f'pip install "proxytune[{engine.needs.extra}]"' in cells[-1]
+    assert engine.needs is None or f'pip install ".[{engine.needs.extra}]"' in cells[-1]
 
 
 def test_every_engine_is_listed_with_how_it_proposes(capsys):

@@ -6,7 +6,8 @@
     scores       score, log_of: tables as DataFrames
     diagnosis    diagnose
     logs         record_log
-    transfer     import_log, measure, predict, export
+    transfer     import_log, measure, predict
+    exporting    export; CommandFilter: a model before any simulator's step
     driving      drive
     search_box   SearchBox: the optimiser alone
     theta        θ as people give it

@@ -1,6 +1,7 @@
 from .curves import SweepReport as SweepReport, TeachReport as TeachReport, run_sweep as run_sweep, teach as teach
 from .diagnosis import DiagnosisReport as DiagnosisReport, diagnose as diagnose
 from .driving import DrivenEpisode as DrivenEpisode, drive as drive
+from .exporting import TRIALS as TRIALS, CommandFilter as CommandFilter, ExportReport as ExportReport, export as export
 from .families import (
     FamiliesReport as FamiliesReport,
     Spending as Spending,
@@ -20,13 +21,10 @@ from .study import (
 )
 from .theta import ChosenTheta as ChosenTheta, choose_theta as choose_theta, read_theta as read_theta
 from .transfer import (
-    TRIALS as TRIALS,
-    ExportReport as ExportReport,
     ImportReport as ImportReport,
     Measurement as Measurement,
     PicturePrediction as PicturePrediction,
     Prediction as Prediction,
-    export as export,
     import_log as import_log,
     measure as measure,
     predict as predict,

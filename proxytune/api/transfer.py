@@ -1,6 +1,6 @@
-"""Ways in and out of proxytune from Python: logs of others, score tables of a twin, predictions, exports."""
+"""Ways in and out of proxytune from Python: logs of others, score tables of a twin, predictions."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from proxytune.api.study import read_study
 from proxytune.diagnosis import (
     PICTURES,
     Agreement,
@@ -20,10 +19,9 @@ from proxytune.diagnosis import (
     predict_pictures,
     robot_of,
 )
-from proxytune.driving import LaneFollowing, Robot, read_robot, robot_from_geometry, robot_names
+from proxytune.driving import Robot, read_robot, robot_from_geometry, robot_names
 from proxytune.effects import Catalogue, Model, read_model
 from proxytune.errors import InputError, LogError
-from proxytune.extensions import is_ours
 from proxytune.importing import (
     Facts,
     Source,
@@ -35,31 +33,13 @@ from proxytune.importing import (
     write_log,
 )
 from proxytune.logs import Log, log_cautions
-from proxytune.report import (
-    FORMATS,
-    ExportLine,
-    Instance,
-    export_lines,
-    frame_html,
-    mjcf_text,
-    ros_text,
-    urdf_text,
-    write_picture,
-    write_text,
-    write_whole,
-)
+from proxytune.report import frame_html, write_picture, write_text
 from proxytune.running import Bars, Silent
 from proxytune.scores import ScoreTable, write_scores
-from proxytune.search import History, write_optuna, write_skopt
 from proxytune.seeds import target_seed
-from proxytune.settings import GEOMETRY, figure_cautions
+from proxytune.settings import GEOMETRY
 from proxytune.study import bare_family, cautions_of, measure_agents, read_study_settings
 
-TRIALS: Mapping[str, Callable[[History, Path], None]] = {"optuna": write_optuna, "skopt": write_skopt}
-"""Formats that take the trials of a study, not what was found."""
-WRITERS: Mapping[str, Callable[[Instance], str]] = {"urdf": urdf_text, "mjcf": mjcf_text, "ros": ros_text}
-NO_RATE_HZ = 20.0
-"""A robot without a folder has no rate of control; none of the formats states one."""
 MOST_REPEATS = 1_000_000
 
 
@@ -347,109 +327,3 @@ def _robot_of(model: Model, log: Log, catalogue: Catalogue) -> Robot:
         return robot_of(log, model.robot, catalogue)
     robot = robot_from_geometry(model.robot, model.geometry or log.geometry, log.rate_hz)
     return replace(robot, catalogue=catalogue)
-
-
-@dataclass(frozen=True, repr=False)
-class ExportReport:
-    """Result of an export: what was written for another simulator, the robot or another optimiser.
-
-    Attributes:
-        output: The file.
-        to: Its format.
-        lines: Each parameter with its place in the file, or without one; none where trials were written.
-        facts: What `export --json` says beside them.
-    """
-
-    output: Path
-    to: str
-    lines: Sequence[ExportLine]
-    facts: Mapping[str, Any]
-
-    def __repr__(self) -> str:
-        return f"ExportReport of {self.output} ({self.to})"
-
-    def _repr_html_(self) -> str:
-        return frame_html(repr(self), self.table())
-
-    def table(self) -> pd.DataFrame:
-        """One row per parameter: value, interval, unit, and its place in the file."""
-        return pd.DataFrame([_row(line) for line in self.lines] or [dict(self.facts)])
-
-    def document(self) -> dict[str, Any]:
-        """The JSON document of `export --json`."""
-        rows = {
-            "written": [_row(line) for line in self.lines if line.place],
-            "no_place": [_row(line) for line in self.lines if not line.place],
-        }
-        return {"output": str(self.output), "to": self.to, **self.facts, **(rows if self.to in FORMATS else {})}
-
-
-def export(model: str | Path, output: str | Path, *, to: str) -> ExportReport:
-    """Write what was found as a URDF, a MuJoCo model or ROS 2 parameters, or a study's trials for other optimisers.
-
-    Args:
-        model: A model.toml, or a study's folder: its best θ.
-        output: The file to write.
-        to: "urdf", "mjcf" or "ros"; of a study also "optuna" or "skopt".
-
-    Raises:
-        InputError: If what is given cannot be exported so.
-        RunError: If the file cannot be written.
-    """
-    path, file = Path(model), Path(output)
-    if to in TRIALS:
-        return _export_trials(path, file, to)
-    instance, cautions = (_of_study(path), ()) if path.is_dir() else _of_model(path)
-    text, lines = WRITERS[to](instance), export_lines(instance, to)
-    write_text(file, text)
-    return ExportReport(file, to, lines, {"robot": instance.robot.name, "cautions": list(cautions)})
-
-
-def _export_trials(folder: Path, output: Path, to: str) -> ExportReport:
-    """Write all trials of a study; a file that is there may be a storage with other studies, so it is left alone."""
-    if not folder.is_dir():
-        raise InputError(f"{folder}: --to {to} takes the trials of a study; give the study's folder")
-    if output.exists():
-        raise InputError(f"{output}: is there already; give another name, or move it away")
-    history = read_study(folder).history()
-    write_whole(output, "", lambda draft: TRIALS[to](history, draft))
-    return ExportReport(output, to, (), {"name": history.name, "trials": len(history.trials)})
-
-
-def _row(line: ExportLine) -> dict[str, Any]:
-    interval = list(line.interval) if line.interval else None
-    return {
-        "name": line.name,
-        "value": line.value,
-        "interval": interval,
-        "unit": line.unit,
-        "place": line.place or None,
-    }
-
-
-def _of_model(path: Path) -> tuple[Instance, tuple[str, ...]]:
-    """A model.toml, and its cautions; its robot and its own effects are looked for in the current folder."""
-    catalogue = Catalogue(Path.cwd())
-    model = read_model(path, catalogue)
-    if model.robot in robot_names(catalogue.folder):
-        robot = read_robot(model.robot, catalogue.folder)
-    elif model.geometry:
-        robot = robot_from_geometry(model.robot, model.geometry, NO_RATE_HZ)
-    else:
-        raise InputError(
-            f"{path}: its robot '{model.robot}' is unknown here; go to the folder that {model.robot} lies in"
-        )
-    cautions = (*model.cautions, *figure_cautions(robot.figures, f"robot {robot.name}"))
-    return Instance(robot, {**robot.theta, **model.theta}, model.intervals, str(path)), cautions
-
-
-def _of_study(folder: Path) -> Instance:
-    """The best θ of a study, with its 95 % intervals."""
-    result = read_study(folder).result
-    settings, region = result.study.settings, result.knowledge
-    family = bare_family(settings, settings.proxy) if is_ours(settings.family) else None
-    if not isinstance(family, LaneFollowing):
-        raise InputError(f"{folder}: is a study of another simulator; only what drives here can be exported")
-    robot = read_robot(family.robot, family.folder)
-    theta = {**robot.theta, **dict(family.effects), **result.best.trial.theta}
-    return Instance(robot, theta, dict(region.intervals), f"the best θ of the study {settings.name}")

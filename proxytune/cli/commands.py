@@ -192,8 +192,8 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
         "new study rover_study --robot rover",
     ),
     "export": (
-        "export found/model.toml --to mjcf --output rover.xml",
-        "export my_study --to ros --output rover.yaml",
+        "export found/model.toml --into my.urdf --output my_found.urdf",
+        "export found/model.toml --to filter --output cmd_vel_filter.py",
         "export my_study --to optuna --output my_study.sqlite3",
     ),
     "list": ("list robots", "list effects --json"),

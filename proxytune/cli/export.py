@@ -1,14 +1,15 @@
-"""`export`: what was found, written to a URDF, a MuJoCo model or ROS parameters, or a study's trials for others."""
+"""`export`: what was found, for other simulators, into a user's own files, or for the robot; a study's trials."""
 
 import argparse
 from pathlib import Path
 
+from rich.console import Group
 from rich.text import Text
 
 from proxytune.api import TRIALS, export
 from proxytune.cli.options import configure_effects
 from proxytune.cli.terminal import Answer
-from proxytune.report import FORMATS
+from proxytune.report import FILTER, FORMATS, IN_WHEELS
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -16,9 +17,18 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("model", type=Path, metavar="MODEL", help="a model.toml, or a study's folder: its best θ")
     parser.add_argument(
         "--to",
-        required=True,
-        choices=(*FORMATS, *TRIALS),
-        help="URDF, MuJoCo model or ROS 2 parameters; of a study its trials: Optuna storage or skopt's OptimizeResult",
+        default="",
+        choices=(*FORMATS, FILTER, *TRIALS),
+        help="URDF, MuJoCo model or ROS 2 parameters, or a ROS 2 node before a simulator's driver (filter); of a study "
+        "its trials: Optuna storage or skopt's OptimizeResult",
+    )
+    parser.add_argument("--into", type=Path, metavar="FILE", help="patch a copy of your own .urdf, .sdf or MuJoCo .xml")
+    parser.add_argument("--wheels", default="", metavar="LEFT,RIGHT", help="joints of its driven wheels [found]")
+    parser.add_argument(
+        "--has",
+        default="",
+        metavar="NAMES",
+        help="effects that the simulator behind the filter has already, as in trim",
     )
     parser.add_argument("--output", type=Path, required=True, metavar="FILE", help="the file to write")
     configure_effects(parser)
@@ -26,11 +36,18 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> Answer:
     """Write the file, and say what went where and what has no place."""
-    report = export(arguments.model, arguments.output, to=arguments.to)
+    wheels, has = (tuple(filter(None, given.split(","))) for given in (arguments.wheels, arguments.has))
+    report = export(arguments.model, arguments.output, to=arguments.to, into=arguments.into, wheels=wheels, has=has)
     cautions = (f"beware: {line}" for line in report.facts.get("cautions", ()))
     lines = [*cautions, *map(str, report.lines), str(arguments.output)]
     if arguments.to in TRIALS:
         lines.insert(0, f"{report.facts['trials']} trials of '{report.facts['name']}'")
     if arguments.to == "optuna":
         lines.append(f"look: optuna-dashboard sqlite:///{arguments.output}")
-    return Answer(report.document(), Text("\n".join(lines)))
+    said = Text("\n".join(lines))
+    if arguments.into is None:
+        return Answer(report.document(), said)
+    diff = report.facts["diff"] or f"{arguments.into}: nothing in it has to change\n"
+    rest = f"--to filter --has {','.join(IN_WHEELS)} --output cmd_vel_filter.py"
+    then = f"the filter for the rest: proxytune export {arguments.model} {rest}"
+    return Answer(report.document(), Group(Text(diff, no_wrap=True, overflow="ignore"), said, Text(then)))

@@ -1,17 +1,17 @@
 """`import`: a bag, a table or a trajectory, made a log."""
 
 import argparse
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Group
-from rich.table import Table
 from rich.text import Text
 
 from proxytune.api import import_log
-from proxytune.cli.options import configure_source, facts_of, wanted_of
+from proxytune.cli.options import configure_source, facts_of, take_late, wanted_of
 from proxytune.cli.terminal import Answer, waiting
 from proxytune.importing import Source, Survey
+from proxytune.report import Column, Table, columns_of, table_text
 
 MEASURES = ("drive", "time", "poses", "rate", "jitter", "lost", "gaps", "commands", "answers after")
 """The columns of the table of drives."""
@@ -25,6 +25,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("output", type=Path, nargs="?", metavar="OUTPUT", help="the log's folder to write [list only]")
     parser.add_argument("--robot", metavar="NAME", help="the robot, of list robots or your own [the log's name]")
     configure_source(parser)
+    take_late(parser, "output", Path)
 
 
 def run(arguments: argparse.Namespace) -> Answer:
@@ -36,23 +37,14 @@ def run(arguments: argparse.Namespace) -> Answer:
 
 
 def _told(source: Source, cautions: Sequence[str], output: Path | None) -> Group:
-    channels = _table(source.form, ("what", "type", "count", "taken for"), {"count"})
-    for channel in source.channels:
-        channels.add_row(channel.name, channel.kind, str(channel.count), channel.role)
-    drives = _table("Drives", MEASURES, {*MEASURES[1:]})
-    for one in source.surveys:
-        drives.add_row(*_row(one))
+    rows = tuple((one.name, one.kind, str(one.count), one.role) for one in source.channels)
+    columns = (Column("what"), Column("type"), Column("count", numbers=True), Column("taken for"))
+    channels = table_text(Table(source.form, columns, rows))
+    drives = table_text(Table("Drives", columns_of(MEASURES[:1], MEASURES[1:]), tuple(map(_row, source.surveys))))
     beware = (f"- beware: {line}" for line in cautions)
     notes = Text("\n".join((*beware, *(f"- {note}" for note in source.notes))))
     last = f"next: python -m proxytune diagnose {output}" if output else "give OUTPUT to write the log"
     return Group(channels, Text(), drives, Text(), notes, Text(last))
-
-
-def _table(title: str, columns: Sequence[str], numbers: Collection[str]) -> Table:
-    table = Table(title=title, title_justify="left", box=None, pad_edge=False, header_style="")
-    for column in columns:
-        table.add_column(column, justify="right" if column in numbers else "left", overflow="fold")
-    return table
 
 
 def _row(one: Survey) -> tuple[str, ...]:

@@ -4,12 +4,12 @@ import argparse
 from pathlib import Path
 
 from rich.console import Group
-from rich.table import Table
 from rich.text import Text
 
 from proxytune.api import measure
 from proxytune.cli.terminal import Answer
 from proxytune.errors import InputError
+from proxytune.report import Table, WholeWords, columns_of, plain, table_text
 from proxytune.scores import ScoreTable
 from proxytune.seeds import TARGET_OFFSET
 
@@ -45,10 +45,9 @@ def run(arguments: argparse.Namespace) -> Answer:
     return Answer(document, Group(_table(found.scores), Text("\n".join(lines))))
 
 
-def _table(scores: ScoreTable) -> Table:
-    table = Table(box=None, pad_edge=False)
-    for name in ("agent", *scores.metrics):
-        table.add_column(name.replace("_", " "), justify="left" if name == "agent" else "right", overflow="fold")
-    for row, agent in enumerate(scores.agents):
-        table.add_row(agent, *(f"{value:.3f}" for value in scores.means[row]))
-    return table
+def _table(scores: ScoreTable) -> WholeWords:
+    rows = tuple(
+        (str(agent), *(f"{value:.3f}" for value in means))
+        for agent, means in zip(scores.agents, scores.means, strict=True)
+    )
+    return table_text(Table("", columns_of(("agent",), [plain(name) for name in scores.metrics]), rows))

@@ -11,7 +11,7 @@ import argparse
 import shlex
 import shutil
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from functools import wraps
 from pathlib import Path
@@ -65,6 +65,21 @@ def on_its_cluster(run: Callable[[argparse.Namespace], Result]) -> Callable[[arg
 def configure_effects(parser: argparse.ArgumentParser, what: str = "your own effects that the model may name") -> None:
     """Add effects whose code the user asks for: a command that only looks runs none that a file names."""
     parser.add_argument("--effects", default="", metavar="NAMES", help=f"{what}; module:Attribute of this folder")
+
+
+def take_late(parser: argparse.ArgumentParser, name: str, kind: Callable[[str], object]) -> None:
+    """Let options stand before a last argument that may be left out: argparse takes it for left out at the first."""
+    plain = parser.parse_known_args
+
+    def parse(
+        words: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
+    ) -> tuple[argparse.Namespace, list[str]]:
+        known, rest = plain(words, namespace)
+        if rest and getattr(known, name) is None and not rest[0].startswith("-"):
+            setattr(known, name, kind(rest.pop(0)))
+        return known, rest
+
+    parser.parse_known_args = parse  # type: ignore[method-assign, assignment]
 
 
 def configure_source(parser: argparse.ArgumentParser) -> None:

@@ -124,7 +124,7 @@ def print_answer(answer: Answer, *, as_json: bool) -> None:
         elif isinstance(answer.text, str):
             print(answer.text)
         else:
-            Console().print(answer.text)
+            Console().print(answer.text, crop=False)
         sys.stdout.flush()
     except OSError as problem:
         _discard_the_rest()

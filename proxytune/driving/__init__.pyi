@@ -1,6 +1,6 @@
 from .agent import Agent as Agent, Command as Command, Picture as Picture
 from .agents import AGENTS as AGENTS, NEEDS as NEEDS, load_agent as load_agent
-from .bullet import BulletPlant as BulletPlant
+from .bullet import BulletPlant as BulletPlant, has_pybullet as has_pybullet
 from .cameras import GroundPlaneCamera as GroundPlaneCamera
 from .episode import (
     METRICS as METRICS,
@@ -24,6 +24,7 @@ from .optics import (
     floor_points as floor_points,
     ground_points as ground_points,
     orientation as orientation,
+    rotation as rotation,
 )
 from .plants import (
     AXLES as AXLES,

@@ -23,6 +23,7 @@ from proxytune.driving.optics import SKY, CameraFigures, lens_rays, orientation
 from proxytune.driving.road_picture import Floor
 from proxytune.driving.robot import Robot
 from proxytune.effects import Signal
+from proxytune.errors import InputError
 from proxytune.files import temporary_folder
 
 
@@ -38,9 +39,28 @@ def _standard_error_closed() -> Iterator[None]:
         os.close(nowhere)
 
 
-# PyBullet's extension module announces its build time on standard error, where people look for what went wrong
-with _standard_error_closed():
-    import pybullet
+try:
+    # PyBullet's extension module announces its build time on standard error, where people look for what went wrong
+    with _standard_error_closed():
+        import pybullet
+except ImportError:
+    pybullet = None
+
+
+def has_pybullet() -> bool:
+    """Tell whether PyBullet is installed."""
+    return pybullet is not None
+
+
+def need_pybullet(instead: str = 'plant = "planar"') -> None:
+    """Refuse to go on without PyBullet, which has wheels for Python 3.11 alone.
+
+    Raises:
+        InputError: If it is not installed, with what to take instead.
+    """
+    if not has_pybullet():
+        built = "with a C++ compiler run `pip install pybullet`"
+        raise InputError(f"PyBullet is not installed; take {instead}, use Python 3.11, or {built}")
 
 
 _empty: list[int] = []
@@ -48,6 +68,7 @@ _empty: list[int] = []
 
 def open_world() -> int:
     """A world with nothing in it; physics are the same, to the bit, in a new one and in one that was left."""
+    need_pybullet()
     return _empty.pop() if _empty else int(pybullet.connect(pybullet.DIRECT))
 
 
@@ -65,7 +86,9 @@ SOLVER_ITERATIONS = 20
 """Enough for one robot on a floor: 50, PyBullet's default, moves it by less than a millimetre a metre."""
 
 
-_SPEED, _WHERE, _GAINS = pybullet.VELOCITY_CONTROL, pybullet.getBasePositionAndOrientation, (0.1, 1.0, 0.0)
+_SPEED: Any = getattr(pybullet, "VELOCITY_CONTROL", None)
+_WHERE: Any = getattr(pybullet, "getBasePositionAndOrientation", None)
+_GAINS = (0.1, 1.0, 0.0)
 """The mode of a driven wheel, the call that tells its body's place, and the gains that PyBullet takes by itself."""
 
 
@@ -172,6 +195,7 @@ class BulletCamera:
 
     def __init__(self, figures: CameraFigures, floor: Floor) -> None:
         """Lay the floor, and find where the rays of a lens that distorts meet the picture without distortion."""
+        need_pybullet('camera = "ground_plane"')
         self._figures = self._straight = figures
         self._places: NDArray[np.float64] | None = None
         if figures.k1 != 0.0:

@@ -16,7 +16,7 @@ import numpy as np
 from proxytune.domain import Demonstration, Episode, Policy, Recording
 from proxytune.driving.agent import Picture
 from proxytune.driving.agents import load_agent
-from proxytune.driving.bullet import BulletCamera
+from proxytune.driving.bullet import BulletCamera, need_pybullet
 from proxytune.driving.cameras import GroundPlaneCamera
 from proxytune.driving.episode import (
     METRICS,
@@ -53,7 +53,7 @@ from proxytune.effects import (
     read_model,
     stage_chain,
 )
-from proxytune.errors import EpisodeError, SettingsError
+from proxytune.errors import EpisodeError, InputError
 from proxytune.identity import meaning_of, modules_beside, versions_of
 from proxytune.lineage import code_name
 from proxytune.settings import Section, figure_cautions, nearest
@@ -381,14 +381,15 @@ def lane_following(section: Section, *, model: Path | None) -> LaneFollowing:
     given = read_model(model, Catalogue(folder)) if model else None
     robot = _agreed(section, "robot", given.robot if given else None, "duckiebot", robot_names(folder))
     plant = _agreed(section, "plant", given.plant if given else None, "bullet", PLANTS)
-    _check_equipment(section, read_robot(robot, folder), plant)
+    camera = section.text("camera", "ground_plane", choices=CAMERAS)
+    _check_equipment(section, read_robot(robot, folder), plant, camera)
     figures = read_robot(robot, folder).figures
     theta, _ = read_effects(section.section("effects"), Catalogue(folder))
     effects = {**(given.theta if given else {}), **theta}
     return LaneFollowing(
         robot=robot,
         plant=plant,
-        camera=section.text("camera", "ground_plane", choices=CAMERAS),
+        camera=camera,
         map=chosen_map(section),
         seconds=section.number("seconds", 60.0, low=1.0, high=3600.0),
         position_noise_m=section.number("position_noise_m", 0.01, low=0.0, high=0.1),
@@ -399,14 +400,21 @@ def lane_following(section: Section, *, model: Path | None) -> LaneFollowing:
     )
 
 
-def _check_equipment(section: Section, robot: Robot, plant: str) -> None:
-    """Refuse a robot that has no camera, or no body for the bullet plant, before the first episode."""
+def _check_equipment(section: Section, robot: Robot, plant: str, camera: str) -> None:
+    """Refuse what no episode can go without, a camera, PyBullet or a body for it, before the first one."""
+    key = "plant"
     try:
+        if plant == "bullet":
+            need_pybullet()
+        key = "camera"
+        if camera == "renderer":
+            need_pybullet('camera = "ground_plane"')
+        key = "robot"
         robot.camera_figures()
         if plant == "bullet":
             check_body(robot)
-    except SettingsError as problem:
-        raise section.error("robot", str(problem)) from None
+    except InputError as problem:
+        raise section.error(key, str(problem)) from None
 
 
 def _agreed(section: Section, key: str, of_model: str | None, default: str, known: tuple[str, ...]) -> str:

@@ -235,7 +235,7 @@ def _gym_duckietown(table: Table, arrays: Arrays, wanted: Wanted) -> tuple[Table
 def _columns(table: Table, stated: Mapping[str, str], wanted: Wanted) -> tuple[Columns, str]:
     """The columns that are used, and the kind of the commands; "none" where none are wanted."""
     none = "none" in (wanted.commands, wanted.kind)
-    fields = ("time", "episode", *POSE, *(() if none else COMMAND_FIELDS))
+    fields = ("time", "episode", *POSE, *(() if none else ("command_time", *COMMAND_FIELDS)))
     columns = choose_columns(table, {field: entry for field, entry in stated.items() if field in fields}, fields)
     return (columns, "none") if none else with_commands(columns, wanted.kind, table)
 

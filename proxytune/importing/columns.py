@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from proxytune.arrays import Floats
 from proxytune.errors import LogError
-from proxytune.importing.checks import headings_and_tilts
+from proxytune.importing.checks import FURTHEST_BACK_S, headings_and_tilts
 from proxytune.importing.source import Channel, Commands, Poses
 from proxytune.importing.text import COMMAND_FIELDS, EXAMPLE, PLACE, POSE, QUANTITIES, QUATERNION, USUAL, Table
 from proxytune.logs import COMMANDS
@@ -223,11 +223,43 @@ def choose_columns(table: Table, stated: Mapping[str, str], fields: Sequence[str
             chosen[field] = _by_ending(field, names[0])
     if set(QUATERNION) <= set(chosen) and "heading" not in stated:
         chosen.pop("heading", None)
-    time = chosen.get("time")
-    if time and time.known_by == "assumed":
-        unit = epoch_unit(table.numbers(time.name))
-        chosen["time"] = replace(time, unit=unit, known_by="by its size") if unit else time
+    for field in ("time", "command_time"):
+        time = chosen.get(field)
+        if time and time.known_by == "assumed":
+            unit = epoch_unit(table.numbers(time.name))
+            chosen[field] = replace(time, unit=unit, known_by="by its size") if unit else time
     return chosen
+
+
+def with_drives(table: Table, columns: Columns) -> Columns:
+    """The columns with one that names drives, where stamps go back: an unused one that changes there and nowhere else.
+
+    Raises:
+        LogError: If stamps go back and no column tells the drives apart, or several do.
+    """
+    if "episode" in columns or "time" not in columns:
+        return columns
+    times = column_values(table, columns["time"])
+    rows = np.flatnonzero(np.isfinite(times))
+    back = np.flatnonzero(np.diff(times[rows]) < -FURTHEST_BACK_S) + 1
+    if not len(back):
+        return columns
+    taken = {column.name for column in columns.values()}
+    names = [name for name in table.names if name not in taken and _names_drives(table, name, rows, back)]
+    if len(names) == 1:
+        return {**columns, "episode": Column("episode", names[0], own_unit("number"), "where stamps go back")}
+    either = f"take {' or '.join(names)}" if names else "add a column that names the drive of each row"
+    remedy = f"{either}, as in --columns episode={names[0] if names else 'run'}"
+    raise table.error(
+        int(rows[back[0]]), columns["time"].name, f"stamps go back, as where another drive begins; {remedy}"
+    )
+
+
+def _names_drives(table: Table, name: str, rows: NDArray[np.intp], back: NDArray[np.intp]) -> bool:
+    """True of a column that changes where stamps go back, and nowhere else, to another value each time."""
+    values = table.cells[name].astype(str).to_numpy()[rows]
+    changes = np.flatnonzero(values[1:] != values[:-1]) + 1
+    return np.array_equal(changes, back) and len({values[0], *values[back]}) == len(back) + 1
 
 
 def check_fields(stated: Mapping[str, str], where: str) -> None:
@@ -338,7 +370,10 @@ def commands_by_drive(table: Table, columns: Columns, kind: str) -> dict[str, Co
     Raises:
         LogError: If a cell is no number, or half of a command is empty.
     """
-    times, values, labels = _filled_rows(table, columns, COMMANDS[kind])
+    times, values, labels = _filled_rows(table, _on_own_clock(columns), COMMANDS[kind])
+    if "command_time" in columns:  # a command stands in every row until the next one
+        anew = np.append(True, (np.diff(times) != 0.0) | (np.diff(values, axis=0) != 0.0).any(axis=1))[: len(times)]
+        times, values, labels = times[anew], values[anew], labels[anew]
     drives = {}
     for name in dict.fromkeys(map(str, labels)):
         mine = labels == name
@@ -347,6 +382,11 @@ def commands_by_drive(table: Table, columns: Columns, kind: str) -> dict[str, Co
     if not drives:
         raise LogError(f"{table.path}: has columns of commands, but no row with one; fill them, or take them out")
     return drives
+
+
+def _on_own_clock(columns: Columns) -> Columns:
+    """The columns with the commands' own stamps, where they have such, as their time."""
+    return {**columns, "time": columns["command_time"]} if "command_time" in columns else columns
 
 
 def pose_fields(table: Table, columns: Columns) -> list[str]:
@@ -364,14 +404,19 @@ def pose_fields(table: Table, columns: Columns) -> list[str]:
     return [field for field in POSE if field in columns and field in (*PLACE, *turned)]
 
 
-def poses_by_drive(table: Table, columns: Columns) -> dict[str, Poses]:
+def poses_by_drive(table: Table, columns: Columns, *, gaps: bool = False) -> dict[str, Poses]:
     """The poses of each drive that a table names; of "" where it names none.
+
+    Args:
+        table: The table.
+        columns: Its columns.
+        gaps: Leave out rows that lack part of a pose (`gaps_note` tells of them).
 
     Raises:
         LogError: If a column is missing, a cell is no number, part of a pose is empty, or a drive has no two poses.
     """
     fields = pose_fields(table, columns)
-    times, values, labels = _filled_rows(table, columns, fields)
+    times, values, labels = _filled_rows(table, columns, fields, gaps=gaps)
     if not len(times):
         raise LogError(f"{table.path}: has no row with a pose; give the file that the poses were written to")
     by_field = dict(zip(fields, values.T, strict=True))
@@ -391,13 +436,38 @@ def poses_by_drive(table: Table, columns: Columns) -> dict[str, Poses]:
     return drives
 
 
-def _filled_rows(table: Table, columns: Columns, fields: Sequence[str]) -> tuple[Floats, Floats, NDArray[np.str_]]:
-    """Times, values (M, fields) and drives of the rows in which some fields are given, all of them or none."""
+def gaps_note(table: Table, columns: Columns) -> list[str]:
+    """Say how many rows lack part of a pose; nothing where none does."""
+    fields = pose_fields(table, columns)
+    lacks = ~np.isfinite(np.stack([column_values(table, columns[field]) for field in fields], axis=1))
+    partly = lacks.any(axis=1) & ~lacks.all(axis=1)
+    if not partly.any():
+        return []
+    row = int(np.argmax(partly))
+    first = f"{table.counted} {table.cells.index[row]}, column '{columns[fields[int(np.argmax(lacks[row]))]].name}'"
+    count = "1 row lacks" if partly.sum() == 1 else f"{partly.sum()} rows lack"
+    return [f"{table.path.name}: {count} part of a pose (first: {first}); it is left out there, commands are kept."]
+
+
+MOST_GAPS = 0.5
+"""Where more of the rows lack part of a pose, a column is wrong."""
+
+
+def _filled_rows(
+    table: Table, columns: Columns, fields: Sequence[str], *, gaps: bool = False
+) -> tuple[Floats, Floats, NDArray[np.str_]]:
+    """Times, values (M, fields) and drives of the rows in which some fields are given, all of them or none.
+
+    With gaps, rows that lack some are left out, unless they are many.
+    """
     if "time" not in columns:
         raise missing(table, ["time"])
     times = column_values(table, columns["time"])
     values = np.stack([column_values(table, columns[field]) for field in fields], axis=1)
-    rows = np.isfinite(values).any(axis=1)
+    lacking = ~np.isfinite(values)
+    rows = ~lacking.all(axis=1)
+    if gaps and (rows & lacking.any(axis=1)).sum() <= MOST_GAPS * rows.sum():
+        rows &= ~lacking.any(axis=1)
     for field, lacks in zip(("time", *fields), ~np.isfinite(np.column_stack((times, values))).T, strict=True):
         if (lacks & rows).any():
             row = int(np.argmax(lacks & rows))

@@ -24,12 +24,14 @@ from proxytune.importing.columns import (
     choose_columns,
     commands_by_drive,
     described,
+    gaps_note,
     named_in,
     own_columns,
     pose_fields,
     poses_by_drive,
     summed,
     with_commands,
+    with_drives,
 )
 from proxytune.importing.source import Channel, Commands, Drive, Source, Wanted
 from proxytune.importing.text import (
@@ -180,14 +182,14 @@ class Recording:
         labels: What the file calls each; "" where it names none.
         apart: The file that their commands are in; None where they have theirs, or need none.
         channels: Its columns.
-        note: What was taken for what.
+        notes: What was taken for what, and what was left out.
     """
 
     drives: tuple[Drive, ...]
     labels: tuple[str, ...]
     apart: Path | None
     channels: tuple[Channel, ...]
-    note: str
+    notes: tuple[str, ...]
 
 
 def is_csv_tables(path: Path) -> bool:
@@ -214,7 +216,7 @@ def read_csv_tables(path: Path, wanted: Wanted) -> Source:
     check_fields(wanted.columns, str(path))
     files = _files(path, wanted)
     recordings = [_read_recording(file, wanted, alone=len(files) == 1) for file in files]
-    drives, notes = [], [recording.note for recording in recordings]
+    drives, notes = [], [note for recording in recordings for note in recording.notes]
     channels = list(summed([recording.channels for recording in recordings]))
     for apart in dict.fromkeys(recording.apart for recording in recordings):
         mine = [recording for recording in recordings if recording.apart == apart]
@@ -244,7 +246,8 @@ def _read_recording(file: Path, wanted: Wanted, *, alone: bool) -> Recording:
     table = read_text_table(file)
     apart = find_commands(file, wanted)
     columns, kind = _columns(table, wanted, apart)
-    poses = poses_by_drive(table, columns)
+    columns = with_drives(table, columns)
+    poses = poses_by_drive(table, columns, gaps=True)
     commands: dict[str, Commands] = commands_by_drive(table, columns, kind) if kind != "none" else {}
     if commands or wanted.commands == "none":
         apart = None
@@ -253,14 +256,14 @@ def _read_recording(file: Path, wanted: Wanted, *, alone: bool) -> Recording:
             raise LogError(f"{file}: drive '{label}' has commands but no poses; leave its rows out")
     names = [label if label and alone else "_".join(filter(None, (file.stem, label))) for label in poses]
     drives = tuple(Drive(name, commands.get(label), poses[label]) for name, label in zip(names, poses, strict=True))
-    note = f"Columns: {described(columns)}."
-    return Recording(drives, tuple(poses), apart, tuple(channels_of(table, columns)), note)
+    notes = (f"Columns: {described(columns)}.", *gaps_note(table, columns))
+    return Recording(drives, tuple(poses), apart, tuple(channels_of(table, columns)), notes)
 
 
 def _columns(table: Table, wanted: Wanted, apart: Path | None) -> tuple[Columns, str]:
     """The columns of a table of poses that are used, and the kind of its commands; "none" where it has none."""
     own = wanted.commands == "" and wanted.kind != "none"
-    fields = ("time", "episode", *POSE, *(COMMAND_FIELDS if own else ()))
+    fields = ("time", "episode", *POSE, *(("command_time", *COMMAND_FIELDS) if own else ()))
     stated = {
         field: entry
         for field, entry in wanted.columns.items()
@@ -268,6 +271,10 @@ def _columns(table: Table, wanted: Wanted, apart: Path | None) -> tuple[Columns,
     }
     columns = choose_columns(table, stated, fields)
     found = set(COMMAND_FIELDS) & set(columns)
+    if not found and "command_time" in wanted.columns:
+        raise LogError(
+            f"{table.path}: command_time is the clock of commands in the same table, which has none; leave it out"
+        )
     if not own or (apart and not found):
         return {field: column for field, column in columns.items() if field not in COMMAND_FIELDS}, "none"
     if not found:

@@ -218,6 +218,7 @@ EXAMPLE = "--columns time=stamp_ns:ns,x=pos_x_mm:mm,y=pos_y_mm:mm,heading=yaw_de
 QUANTITIES: Mapping[str, str] = MappingProxyType(
     {
         "time": "time",
+        "command_time": "time",
         "episode": "number",
         **dict.fromkeys(PLACE, "length"),
         "heading": "angle",
@@ -255,6 +256,7 @@ def _filled(pattern: str, *parts: str) -> frozenset[str]:
 USUAL: Mapping[str, frozenset[str]] = MappingProxyType(
     {
         "time": _filled(TIMES, ""),
+        "command_time": frozenset(),  # to be stated
         "episode": _filled(EPISODES, ""),
         **{axis: _filled(PLACES, axis) for axis in PLACE},
         "heading": _filled(HEADINGS, ""),

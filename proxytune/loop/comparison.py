@@ -11,23 +11,30 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from proxytune.effects import SHIPPED
 from proxytune.report import (
     BLUE,
     COLUMN,
     GREY,
     LIGHT_GREY,
     VERMILLION,
+    Table,
+    columns_of,
     dress,
+    findings,
     listed,
     plain,
     short,
     short_span,
     with_span,
+    with_unit,
 )
 from proxytune.space import Theta
 from proxytune.usefulness import Assessment
 
 Ends = tuple[float, float]
+Known = Mapping[str, tuple[float, Ends | None]]
+"""Values with their intervals, by name in θ."""
 
 
 @dataclass(frozen=True)
@@ -144,12 +151,12 @@ def lacking(diagnosis: Mapping[str, Any]) -> str:
 
 def answer(diagnosis: Mapping[str, Any], rows: Sequence[Compared]) -> str:
     """Say what the simulator lacked, and what it is worth to declare it."""
-    verdict, named = diagnosis["verdict"], lacking(diagnosis)
+    verdict, effects = diagnosis["verdict"], (*diagnosis["effects"], *(diagnosis["camera"] or {}).get("effects", ()))
     if all(row.after is None for row in rows):
         only = f"{rows[0].title}: {level_text(rows[0].before, rows[0].unit)}."
         return f"The log shows nothing to extend the simulator by (verdict: {verdict}). {only}"
-    if named:
-        lacked = f"The simulator lacked: {named} (verdict: {verdict})."
+    if effects:
+        lacked = f"The simulator lacked: {findings(effects)} (verdict: {verdict})."
     else:
         lacked = f"The simulator lacked what no named effect explains (verdict: {verdict}); curves stand in for it."
     chosen = {row.key: row for row in rows}
@@ -157,6 +164,33 @@ def answer(diagnosis: Mapping[str, Any], rows: Sequence[Compared]) -> str:
     seen = chosen.get("markings_error") if (diagnosis["camera"] or {}).get("effects") else None
     shown = (chosen["prpv"], chosen.get("held_out"), moved, seen)
     return f"{lacked} With it, {'; '.join(_change(row) for row in shown if row)}."
+
+
+def theta_table(before: Known, after: Known | None, diagnosis: Mapping[str, Any]) -> Table:
+    """θ before and after: what scores alone told, what the log tells, and what the extended proxy has.
+
+    Args:
+        before: Values and 95 % intervals of the first study's best θ, by name.
+        after: Those of the extended study; None where nothing was found.
+        diagnosis: What `diagnose --json` prints.
+    """
+    logged = {**diagnosis["extended"], **(diagnosis["camera"] or {}).get("extended", {})}
+    measured = {name: (one["value"], one.get("interval")) for name, one in logged.items() if one["value"] is not None}
+    extended = {} if after is None else {**{name: (value, None) for name, (value, _) in measured.items()}, **after}
+    names = dict.fromkeys((*before, *measured, *extended))
+    rows = tuple(
+        (
+            with_unit(name, SHIPPED.parameters[name].unit if name in SHIPPED.parameters else ""),
+            *(_known(side.get(name)) for side in (before, measured, extended)),
+        )
+        for name in names
+        if not (name.endswith(".imbalance") and name not in before and measured[name][0] == 0.0)
+    )
+    return Table("θ before and after", columns_of(("parameter",), ("before, by scores", "in the log", "after")), rows)
+
+
+def _known(known: tuple[float, Sequence[float | None] | None] | None) -> str:
+    return "–" if known is None else with_span(short(known[0]), *(known[1] or (None, None)))
 
 
 def following(diagnosis: Mapping[str, Any], studied: str, model: str, theta: Theta) -> str:

@@ -22,9 +22,9 @@ from proxytune.errors import RunError, SettingsError, StoreError
 from proxytune.extensions import describe
 from proxytune.importing import open_log
 from proxytune.logs import Log
-from proxytune.loop.comparison import NEXT, compare_errors, floor_text, following, lacking, level_text
+from proxytune.loop.comparison import NEXT, compare_errors, floor_text, following, lacking, level_text, theta_table
 from proxytune.loop.opening import Loop, Teller
-from proxytune.report import write_text
+from proxytune.report import findings, write_text
 from proxytune.settings import read_settings
 from proxytune.storage import Store, locked
 from proxytune.study import FILE_NAME, MADE, Study, StudyRun, StudySettings, check_facts, study_facts
@@ -99,11 +99,12 @@ def read_diagnosis(folder: Path) -> dict[str, Any]:
 def _read_through(document: Mapping[str, Any]) -> None:
     """Read all that a loop reads, so that what is spoilt shows before anything is made of it."""
     json.dumps(document, allow_nan=False)
-    lacking(document)
+    lacking(document), theta_table({}, {}, document)
     for row in compare_errors(document):
         for level in (row.before, row.after):
             level_text(level, row.unit), floor_text(level, row.unit)
     for told in (document, document["camera"] or document):
+        findings(told["effects"])
         told["verdict"], told["effects"], told["extended"]
     for studied, model in (("", "model.toml"), (f"{NEXT}diagnose", "")):
         following(document, studied, model, {})

@@ -23,6 +23,7 @@ from proxytune.identity import versions_of
 from proxytune.logs import Log
 from proxytune.loop.comparison import (
     Compared,
+    Known,
     answer,
     chance_text,
     compare_errors,
@@ -32,6 +33,7 @@ from proxytune.loop.comparison import (
     lacking,
     level_text,
     prpv_figure,
+    theta_table,
 )
 from proxytune.loop.diagnosing import (
     adds_something,
@@ -385,8 +387,9 @@ def text_of(closed: Closed, page: Path) -> Group:
     """
     rows = rows_of(closed)
     sentence, table = Text(answer(closed.diagnosis, rows), style="bold"), _table(closed, rows)
-    shown = table_text(replace(table, title=""), ragged=True)
-    return group_texts(sentence, shown, *note_texts(table.notes), f"Next: {_following(closed)}", str(page))
+    shown, theta = (table_text(one, ragged=True) for one in (replace(table, title=""), _theta_table(closed)))
+    following = f"Next: {_following(closed)}"
+    return group_texts(sentence, shown, *note_texts(table.notes), Text(), theta, following, str(page))
 
 
 def view_of(closed: Closed) -> View:
@@ -410,7 +413,7 @@ def view_of(closed: Closed) -> View:
         title=f"{closed.loop.settings.name}: the loop closed",
         sentence=answer(closed.diagnosis, rows),
         next_step=_following(closed),
-        parts=(_table(closed, rows), *shown, Paragraphs("What each step said", said)),
+        parts=(_table(closed, rows), _theta_table(closed), *shown, Paragraphs("What each step said", said)),
     )
 
 
@@ -433,6 +436,16 @@ def _table(closed: Closed, rows: list[Compared]) -> Table:
             "no agent was held out: name at least three under held_out in study.toml that the target has scores of"
         )
     return Table("Before and after", COLUMNS, cells, tuple(notes))
+
+
+def _theta_table(closed: Closed) -> Table:
+    after = None if closed.after is None else _known(closed.after)
+    return theta_table(_known(closed.before), after, closed.diagnosis)
+
+
+def _known(report: StudyReport) -> Known:
+    ends = report.result.knowledge.intervals
+    return {name: (value, ends.get(name)) for name, value in report.theta.items()}
 
 
 def _following(closed: Closed) -> str:

@@ -20,12 +20,16 @@ from .drive.movie import (
     write_episode as write_episode,
 )
 from .export.instance import (
+    FILTER as FILTER,
     FORMATS as FORMATS,
+    IN_WHEELS as IN_WHEELS,
     ExportLine as ExportLine,
     Instance as Instance,
     export_lines as export_lines,
 )
+from .export.into import patch as patch
 from .export.mjcf import mjcf_text as mjcf_text
+from .export.node import node_text as node_text
 from .export.ros import ros_text as ros_text
 from .export.urdf import urdf_text as urdf_text
 from .families import (
@@ -56,6 +60,7 @@ from .html import (
     page_html as page_html,
     write_page as write_page,
 )
+from .meanings import clause_of as clause_of, findings as findings, what_it_does as what_it_does
 from .plv_search import plv_document as plv_document, plv_text as plv_text, write_plv_report as write_plv_report
 from .scores import (
     drawn_scores as drawn_scores,
@@ -98,8 +103,14 @@ from .teaching import (
     teach_view as teach_view,
     write_teach_report as write_teach_report,
 )
-from .text import group_texts as group_texts, note_texts as note_texts, table_text as table_text
+from .text import (
+    WholeWords as WholeWords,
+    group_texts as group_texts,
+    note_texts as note_texts,
+    table_text as table_text,
+)
 from .view import (
+    Column as Column,
     Foot as Foot,
     Paragraphs as Paragraphs,
     Picture as Picture,
@@ -108,7 +119,14 @@ from .view import (
     columns_of as columns_of,
     foot_of as foot_of,
 )
-from .wording import listed as listed, plain as plain, short as short, short_span as short_span, with_span as with_span
+from .wording import (
+    listed as listed,
+    plain as plain,
+    short as short,
+    short_span as short_span,
+    with_span as with_span,
+    with_unit as with_unit,
+)
 from .writing import (
     figures_also_as as figures_also_as,
     png_of as png_of,

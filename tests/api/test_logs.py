@@ -39,7 +39,9 @@ def test_the_planted_effect_is_found_with_its_value(report):
     assert abs(row.value - 0.12) < row.high - row.low
     assert row.unit == "m"
     assert np.isnan(row.before)
-    assert repr(report) == "DiagnosisReport of planted: explained: with the effects added, only noise is left"
+    said = repr(report)
+    assert said.startswith("DiagnosisReport of planted: yaw scrub: the robot turns as if its wheels were 0.1")
+    assert said.endswith(". Explained: with the effects added, only noise is left")
 
 
 def test_the_errors_are_those_of_the_document_by_horizon(report):
@@ -107,7 +109,9 @@ def test_the_camera_speaks_where_there_is_no_motion(report_of_diagnosing_frames)
     assert (report_of_diagnosing_frames.verdict, report_of_diagnosing_frames.effects) == ("explained", ("camera_roll",))
     assert report_of_diagnosing_frames.diagnosis is None
     assert report_of_diagnosing_frames.camera.verdict == "explained"
-    assert repr(report_of_diagnosing_frames).startswith("DiagnosisReport of pictured: camera: explained: ")
+    assert repr(report_of_diagnosing_frames).startswith(
+        "DiagnosisReport of pictured: camera: camera roll: the camera is tilted by 4."
+    )
 
 
 def test_parameters_and_errors_are_those_of_the_document(report_of_diagnosing_frames):

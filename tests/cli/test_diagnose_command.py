@@ -1,6 +1,7 @@
 """`diagnose` from a log's folder to its findings: the JSON of DESIGN.md, files that read back, one-line refusals."""
 
 import json
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -124,7 +125,10 @@ def test_what_is_printed_is_what_is_written(document, home):
     assert len(figures) >= 3
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in figures)
     page = (home / "out" / "report.html").read_text(encoding="utf-8")
-    assert '<p class="answer">planted: explained: with the effects added, only noise is left.</p>' in page
+    said = re.search('<p class="answer">(.*?)</p>', page).group(1)
+    assert said.startswith("planted: yaw scrub: the robot turns as if its wheels were 0.1")
+    assert " apart; without it predictions over 2 s are " in said
+    assert said.endswith(". Explained: with the effects added, only noise is left.")
     assert page.count("<img ") == len(figures)
     assert "python -m proxytune diagnose " in page.split("<footer>")[1]
     assert "--json" not in page

@@ -123,7 +123,8 @@ def test_figures_of_the_camera_are_written_and_none_of_motion(found):
 
 def test_people_read_the_verdict_the_roll_and_both_errors(found):
     words = " ".join(found.out.split())
-    assert "pictured: camera: explained: with the effects added, the camera explains the frames" in words
+    assert "pictured: camera: camera roll: the camera is tilted by 4." in words
+    assert ". Explained: with the effects added, the camera explains the frames" in words
     assert "added camera_roll: log-likelihood gain" in words
     assert "markings [px]" in words
     assert "brightness [grey]" in words

@@ -159,3 +159,14 @@ def test_axes_in_a_mirror_and_a_wheel_in_millimetres_are_cautions(capsys, tmp_pa
 
 def test_a_good_recording_draws_no_caution(capsys, table):
     assert document(capsys, str(table), *FIGURES)["cautions"] == []
+
+
+def test_options_may_stand_before_and_after_the_output(capsys, table, tmp_path):
+    for number, place in enumerate((1, 2)):
+        output = str(tmp_path / f"log{number}")
+        options = ["--robot", "nobodys", *FIGURES]
+        words = [str(table), *options, output] if place == 1 else [str(table), output, *options]
+        assert document(capsys, *words)["log"] == output
+    with pytest.raises(SystemExit):
+        main(["import", str(table), "--robot", "nobodys", "a", "b"])
+    assert "unrecognized arguments: b" in capsys.readouterr().err

@@ -22,7 +22,7 @@ SCORES = "domain,agent,episode,distance,lane_error_of_the_whole_drive\n" + "".jo
 def marks(text, width):
     """What is shown at a width, without what lays it out."""
     console = Console(width=width, file=io.StringIO(), color_system=None)
-    console.print(text)
+    console.print(text, crop=False)
     return sorted("".join(console.file.getvalue().split()))
 
 

@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pybullet
 import pytest
 from nominal_camera import CAMERA
 
@@ -11,6 +10,8 @@ from proxytune.driving import GroundPlaneCamera, bullet as renderer, draw_floor,
 from proxytune.driving.bullet import BulletCamera
 from proxytune.driving.optics import SKY
 from proxytune.driving.road_picture import Floor
+
+pybullet = pytest.importorskip("pybullet", reason="PyBullet is not installed")
 
 NOMINAL = replace(CAMERA, columns=64, rows=48)
 SMALL_LOOP = shipped_map("small_loop")

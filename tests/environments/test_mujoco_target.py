@@ -64,6 +64,7 @@ def test_the_stronger_right_motor_turns_it_left_and_commands_arrive_late():
 
 
 def test_the_family_scores_an_episode_alike_again_and_refuses_what_its_model_must_not_hold(tmp_path):
+    pytest.importorskip("pybullet", reason="PyBullet is not installed")
     settings = read_study_settings(ROBOT)
     whole = bare_family(settings, ROBOT / "truth.toml")
     robot = dataclasses.replace(whole, view=dataclasses.replace(whole.view, seconds=2.0))

@@ -52,6 +52,51 @@ def test_what_was_taken_for_what_is_told(tmp_path):
     assert {channel.count for channel in source.channels} == {60}
 
 
+def test_a_row_that_lacks_part_of_its_pose_keeps_its_command_and_is_told(file):
+    source = read(file(BOTH.replace("0.1,0.1,0,0.1,,", "0.1,,0,0.1,0.4,0")))
+    (drive,) = source.drives
+    np.testing.assert_array_equal(drive.poses.times, [0.0, 0.3])
+    np.testing.assert_array_equal(drive.commands.times, [0.0, 0.1, 0.2, 0.3])
+    said = "run1.csv: 1 row lacks part of a pose (first: line 3, column 'x'); it is left out there, commands are kept."
+    assert source.notes[-1] == said
+
+
+TWICE = (
+    "run_no,lap,time,x,y,heading,v,omega,battery\n"
+    "7,1,0,0,0,0,0.5,0,9\n7,1,1,0.1,0,0.1,0.5,0,8\n7,1,2,0.2,0,0.1,0.5,0,8\n"
+    "8,1,0,0,0,0,0.5,0,8\n8,1,1,0.1,0,0.1,0.5,0,7\n"
+)
+
+
+def test_a_column_that_changes_where_stamps_go_back_names_the_drives(file):
+    source = read(file(TWICE))
+    assert [drive.name for drive in source.drives] == ["7", "8"]
+    assert "episode from 'run_no'" in source.notes[0]
+
+
+def test_drives_that_no_column_or_several_tell_apart_are_asked_for(file):
+    told = complaint(file(TWICE.replace("8,1,0,0,0,0", "7,1,0,0,0,0").replace("8,1,1", "7,1,1")))
+    assert "line 5, column 'time': stamps go back, as where another drive begins; add a column" in told
+    told = complaint(file(TWICE.replace("8,1,0,0", "8,2,0,0").replace("8,1,1", "8,2,1")))
+    assert "take run_no or lap, as in --columns episode=run_no" in told
+
+
+def test_commands_may_have_a_second_clock_in_the_same_table(file):
+    text = "stamp,cmd_stamp,x,y,heading,v,omega\n"
+    text += "0,5.01,0,0,0,0.5,0\n0.1,5.01,0.1,0,0.1,0.5,0\n0.2,5.15,0.2,0,0.1,0.6,0.1\n0.3,5.15,0.3,0,0.1,0.6,0.1\n"
+    (drive,) = read(file(text), columns={"command_time": "cmd_stamp:s"}).drives
+    np.testing.assert_array_equal(drive.poses.times, [0.0, 0.1, 0.2, 0.3])
+    np.testing.assert_array_equal(drive.commands.times, [5.01, 5.15])
+    np.testing.assert_array_equal(drive.commands.values, [[0.5, 0.0], [0.6, 0.1]])
+
+
+def test_a_clock_of_commands_that_are_in_another_file_is_refused(file):
+    file(COMMANDS, "run1_commands.csv")
+    assert "command_time is the clock of commands in the same table" in complaint(
+        file(POSES), columns={"command_time": "time"}
+    )
+
+
 def test_rows_may_hold_commands_or_poses_alone(file):
     (drive,) = read(file(BOTH)).drives
     np.testing.assert_array_equal(drive.poses.times, [0.0, 0.1, 0.3])
@@ -211,7 +256,7 @@ def test_without_commands_only_if_asked_for(file):
         (POSES + "0.3,1,2\n", "line 5: has 3 cells, but there are 4 columns", "correct that line"),
         (POSES.replace("0.2,0,0.2", "0.2,oops,0.2"), "line 4, column 'y': must be a finite number", "'oops'"),
         (POSES.replace("0.2,0,0.2", "0.2,inf,0.2"), "line 4, column 'y'", "'inf'"),
-        (POSES.replace("0.2,0,0.2", "0.2,,0.2"), "line 4, column 'y': is empty beside time, x, heading", "fill it"),
+        (POSES.replace(",0,0.", ",,0."), "line 3, column 'y': is empty beside time, x, heading", "fill it"),
         ("0,0,0,0\n1,1,1,1\n", "line 1: holds numbers", "add a line of names"),
         ("time,x,x\n1,2,3\n", "names the column 'x' twice", "rename"),
         (

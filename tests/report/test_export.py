@@ -6,11 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pybullet
 import pytest
 from export_truth import ROBOT, instance
 
-from proxytune.api.transfer import WRITERS
+from proxytune.api.exporting import WRITERS
 from proxytune.driving import AXLES, drivetrain, orientation, read_body
 from proxytune.driving.plants import PlanarPlant
 from proxytune.effects import CATALOGUE, FilterContext, effects_from, theta_names
@@ -77,6 +76,7 @@ def test_the_exported_urdf_has_wheels_that_turn_and_pull_as_was_found():
 
 
 def test_pybullet_loads_the_exported_urdf_and_finds_camera_and_tracked_point_where_they_are(tmp_path):
+    pybullet = pytest.importorskip("pybullet", reason="PyBullet is not installed")
     found = instance(camera_pitch=30.0, camera_yaw=5.0, marker_offset__forward=0.05, heading_offset=30.0)
     path = tmp_path / "found.urdf"
     path.write_text(urdf_text(found), encoding="utf-8")

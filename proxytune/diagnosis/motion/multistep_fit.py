@@ -37,7 +37,7 @@ from proxytune.diagnosis.motion.prediction import (
     ratio,
     select_windows,
 )
-from proxytune.driving import BulletPlant
+from proxytune.driving import BulletPlant, has_pybullet
 from proxytune.space import Theta
 
 HORIZONS_S = (1.0, 2.0, 5.0)
@@ -307,8 +307,8 @@ def noise_floor(drives: Drives, windows: Windows, noise: PoseNoise) -> tuple[flo
 
 
 def has_body(drives: Drives) -> bool:
-    """Tell whether the bullet plant has a body for this robot."""
-    return drives.robot.urdf is not None
+    """Tell whether the bullet plant is installed and has a body for this robot."""
+    return drives.robot.urdf is not None and has_pybullet()
 
 
 def bullet_pose_errors(drives: Drives, theta: Theta, windows: Windows) -> Floats:

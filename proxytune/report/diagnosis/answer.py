@@ -12,10 +12,17 @@ from rich.text import Text
 from proxytune.diagnosis import CameraDiagnosis, Diagnosis, Estimate, LogDiagnosis, PictureError
 from proxytune.report.diagnosis.camera_figures import camera_figures
 from proxytune.report.diagnosis.camera_notes import camera_headline, camera_notes
-from proxytune.report.diagnosis.document import camera_noise_floor, diagnosis_document, extended_model_text
+from proxytune.report.diagnosis.document import (
+    camera_effects,
+    camera_noise_floor,
+    diagnosis_document,
+    extended_model_text,
+    motion_effects,
+)
 from proxytune.report.diagnosis.figures import motion_figures
 from proxytune.report.diagnosis.notes import motion_headline, motion_notes, next_drives
 from proxytune.report.html import write_page
+from proxytune.report.meanings import findings
 from proxytune.report.text import group_texts, table_text
 from proxytune.report.view import Paragraphs, Part, Picture, Table, View, columns_of, foot_of
 from proxytune.report.writing import save_figure, write_text
@@ -126,10 +133,10 @@ def diagnosis_text(found: LogDiagnosis) -> Group:
     """The diagnosis as `diagnose` prints it: of motion, then of the camera, a verdict, tables and notes."""
     parts: list[Group | Text] = []
     if found.motion is not None:
-        motion, headline = map(table_text, _motion_tables(found.motion)), motion_headline(found.motion)
+        motion, headline = map(table_text, _motion_tables(found.motion)), _motion_said(found.motion)
         parts.append(group_texts(Text(headline, style="bold"), *motion, *motion_notes(found.motion)))
     if found.camera is not None:
-        camera, headline = map(table_text, _camera_tables(found.camera)), camera_headline(found.log, found.camera)
+        camera, headline = map(table_text, _camera_tables(found.camera)), _camera_said(found.log, found.camera)
         parts += [Text("")] if parts else []
         parts.append(group_texts(Text(headline, style="bold"), *camera, *camera_notes(found.camera)))
     return group_texts(*_say_cautions(found), *parts, *_say_refusals(found))
@@ -143,9 +150,17 @@ def diagnosis_figures(found: LogDiagnosis) -> dict[str, Figure]:
 
 
 def diagnosis_headline(found: LogDiagnosis) -> str:
-    """The verdicts and what they mean."""
-    lines = [] if found.motion is None else [motion_headline(found.motion)]
-    return "; ".join([*lines, *([] if found.camera is None else [camera_headline(found.log, found.camera)])])
+    """What was found, each effect with its size and what it is worth; then the verdicts and what they mean."""
+    lines = [] if found.motion is None else [_motion_said(found.motion)]
+    return "; ".join([*lines, *([] if found.camera is None else [_camera_said(found.log, found.camera)])])
+
+
+def _motion_said(diagnosis: Diagnosis) -> str:
+    return motion_headline(diagnosis, findings(motion_effects(diagnosis), diagnosis.robot.catalogue))
+
+
+def _camera_said(log: str, diagnosis: CameraDiagnosis) -> str:
+    return camera_headline(log, diagnosis, findings(camera_effects(diagnosis)))
 
 
 def diagnosis_notes(found: LogDiagnosis) -> list[str]:

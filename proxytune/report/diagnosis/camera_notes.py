@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 from proxytune.diagnosis import Blemish, CameraDiagnosis, CameraEffect, Estimate, LaidLine, LaidMap
+from proxytune.report.diagnosis.notes import told
 from proxytune.report.wording import fixed, listed, short
 
 CAMERA_MEANINGS = {
@@ -21,9 +22,9 @@ RELATIVE = (
 )
 
 
-def camera_headline(log: str, diagnosis: CameraDiagnosis) -> str:
-    """The verdict on the camera and what it means."""
-    return f"{log}: camera: {diagnosis.verdict}: {CAMERA_MEANINGS[diagnosis.verdict]}"
+def camera_headline(log: str, diagnosis: CameraDiagnosis, found: str = "") -> str:
+    """What was found of the camera, then the verdict and what it means."""
+    return f"{log}: camera: {told(found, diagnosis.verdict)}: {CAMERA_MEANINGS[diagnosis.verdict]}"
 
 
 def camera_notes(diagnosis: CameraDiagnosis) -> list[str]:

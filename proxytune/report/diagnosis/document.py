@@ -77,7 +77,7 @@ def motion_document(diagnosis: Diagnosis) -> dict[str, Any]:
         "robot": diagnosis.robot.name,
         "verdict": diagnosis.verdict,
         "declared": {name: _estimate_document(estimate) for name, estimate in diagnosis.declared.items()},
-        "effects": [_added_document(effect, diagnosis) for effect in diagnosis.effects],
+        "effects": motion_effects(diagnosis),
         "immaterial": [_immaterial_document(effect, diagnosis) for effect in diagnosis.negligible],
         "extended": {name: _estimate_document(estimate) for name, estimate in diagnosis.theta.items()},
         "candidates": [
@@ -116,6 +116,11 @@ def _effect_document(effect: AdoptedEffect, theta: Mapping[str, Estimate], catal
         "p_value": effect.p_value,
         "indistinguishable_from": [rival.effect for rival in effect.rivals],
     }
+
+
+def motion_effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """The effects of motion that were added, as `diagnose --json` has them."""
+    return [_added_document(effect, diagnosis) for effect in diagnosis.effects]
 
 
 def _added_document(effect: AdoptedEffect, diagnosis: Diagnosis) -> dict[str, Any]:
@@ -248,7 +253,7 @@ def camera_document(diagnosis: CameraDiagnosis) -> dict[str, Any]:
     return {
         "verdict": diagnosis.verdict,
         "declared": estimates_document(diagnosis.declared),
-        "effects": [_camera_effect_document(effect, diagnosis, diagnosis.theta) for effect in diagnosis.effects],
+        "effects": camera_effects(diagnosis),
         "immaterial": [
             _camera_effect_document(effect, diagnosis, diagnosis.dropped) for effect in diagnosis.negligible
         ],
@@ -267,6 +272,11 @@ def camera_document(diagnosis: CameraDiagnosis) -> dict[str, Any]:
         "pose_scatter": {"position_m": _number(place), "heading_deg": _number(float(turn))},
         "notes": list(diagnosis.notes),
     }
+
+
+def camera_effects(diagnosis: CameraDiagnosis) -> list[dict[str, Any]]:
+    """The effects of the camera that were added, as `diagnose --json` has them."""
+    return [_camera_effect_document(effect, diagnosis, diagnosis.theta) for effect in diagnosis.effects]
 
 
 def estimates_document(estimates: Mapping[str, Estimate]) -> dict[str, Any]:

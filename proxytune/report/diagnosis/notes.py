@@ -27,9 +27,14 @@ AMPLE = 30.0
 """Log-likelihood gain [nats] in a minute above which one minute surely decides."""
 
 
-def motion_headline(diagnosis: Diagnosis) -> str:
-    """The verdict and what it means."""
-    return f"{diagnosis.log}: {diagnosis.verdict}: {MEANINGS[diagnosis.verdict]}"
+def motion_headline(diagnosis: Diagnosis, found: str = "") -> str:
+    """What was found, in the words of `meanings.findings`, then the verdict and what it means."""
+    return f"{diagnosis.log}: {told(found, diagnosis.verdict)}: {MEANINGS[diagnosis.verdict]}"
+
+
+def told(found: str, verdict: str) -> str:
+    """A verdict after what was found, as a sentence of its own where anything was."""
+    return f"{found}. {verdict.capitalize()}" if found else verdict
 
 
 def motion_notes(diagnosis: Diagnosis) -> list[str]:

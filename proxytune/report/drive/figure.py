@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure, SubFigure
-from rich.table import Table as TerminalTable
 
 from proxytune.report.drive.scene import COLOURS, draw_map, draw_parting, draw_paths, map_aspect
 from proxytune.report.figure_style import COLUMN, GREY, LIGHT_GREY, dress
-from proxytune.report.text import table_text
+from proxytune.report.text import WholeWords, table_text
 from proxytune.report.view import Table, columns_of
 from proxytune.report.wording import plain, short, with_unit
 from proxytune.study import APART_M, SideBySide
@@ -34,7 +33,7 @@ def episode_document(pair: SideBySide, study_seed: int) -> dict[str, Any]:
     }
 
 
-def episode_text(pair: SideBySide, first: Sequence[str]) -> TerminalTable:
+def episode_text(pair: SideBySide, first: Sequence[str]) -> WholeWords:
     """A row for each metric, those that the study compares first."""
     names = [*first, *(name for name in pair.proxy.metrics if name not in first)]
     rows = tuple(

@@ -1,7 +1,7 @@
 """Domain instance in the figures that other simulators take, and where each effect goes in each format."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import NamedTuple
@@ -118,21 +118,28 @@ class ExportLine:
         return f"{self.name} {self.value:.4g}{unit}{interval}: {self.place or 'NO PLACE, not in this file'}"
 
 
-def export_lines(instance: Instance, form: str) -> list[ExportLine]:
-    """Values with what becomes of each in a format; those that are neutral need no place."""
+def export_lines(instance: Instance, form: str, has: Container[str] = ()) -> list[ExportLine]:
+    """Values with what becomes of each; those that are neutral need no place.
+
+    Args:
+        instance: What is written.
+        form: The format.
+        has: Effects that a patched file has, or the simulator behind a filter.
+    """
     parameters = instance.robot.catalogue.parameters
     lines = []
     for name, value in sorted(instance.theta.items()):
-        parameter, place = parameters.get(name), place_of(effect_of(name), form)
+        effect = effect_of(name)
+        parameter, place = parameters.get(name), ("in the file" if effect in has else place_of(effect, form))
         if place or parameter is None or isinstance(parameter.neutral, str) or value != parameter.neutral:
             unit = parameter.unit if parameter else ""
             lines.append(ExportLine(name, value, unit, instance.intervals.get(name), place))
     return lines
 
 
-def header(instance: Instance, form: str) -> list[str]:
+def header(instance: Instance, form: str, has: Container[str] = ()) -> list[str]:
     """Lines of the head of a file: whose values they are, where each went, and what is not in it."""
-    found = export_lines(instance, form)
+    found = export_lines(instance, form, has)
     placed, left_out = [line for line in found if line.place], [line for line in found if not line.place]
     return [
         f"{instance.robot.name} as proxytune found it: {instance.source}",
@@ -156,6 +163,12 @@ def xml_comment(instance: Instance, form: str, columns: int) -> str:
 
 FORMATS = ("urdf", "mjcf", "ros")
 """Formats that can be written, as `export --to` calls it."""
+
+FILTER = "filter"
+"""What `export --to` calls the ROS 2 node that bends commands as was found."""
+
+IN_WHEELS = ("trim", "wheel_gain", "yaw_scrub")
+"""Effects that a patched file has by its wheels' radii and distance; what such a file has is undone by a filter."""
 
 
 class Places(NamedTuple):
@@ -224,7 +237,13 @@ PLACES: Mapping[str, Places] = MappingProxyType(
 """By effect of the catalogue; a user's own effect and what was learnt have no place anywhere."""
 
 
+FILTERED = tuple(PLACES)[: tuple(PLACES).index("marker_offset")]
+"""Effects on commands, wheels and motion: what a filter bends."""
+
+
 def place_of(effect: str, form: str) -> str:
     """Place of an effect in a format; empty where it has no place."""
+    if form == FILTER:
+        return "the filter" if effect in FILTERED or effect not in PLACES else ""
     place: str = getattr(PLACES.get(effect, _NOWHERE), form)
     return place

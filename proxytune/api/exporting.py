@@ -1,0 +1,267 @@
+"""Exports: what was found for other simulators and robots, a study's trials for other optimisers, and a filter."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from proxytune.api.study import read_study
+from proxytune.driving import LaneFollowing, Robot, drivetrain, read_robot, robot_from_geometry, robot_names
+from proxytune.effects import Catalogue, FilterContext, effect_of, read_model
+from proxytune.errors import InputError
+from proxytune.extensions import is_ours
+from proxytune.report import (
+    FILTER,
+    IN_WHEELS,
+    ExportLine,
+    Instance,
+    export_lines,
+    frame_html,
+    mjcf_text,
+    node_text,
+    patch,
+    ros_text,
+    urdf_text,
+    write_text,
+    write_whole,
+)
+from proxytune.search import History, write_optuna, write_skopt
+from proxytune.settings import figure_cautions, nearest
+from proxytune.space import Theta
+from proxytune.study import bare_family
+
+TRIALS: Mapping[str, Callable[[History, Path], None]] = {"optuna": write_optuna, "skopt": write_skopt}
+"""Formats that take the trials of a study, not what was found."""
+WRITERS: Mapping[str, Callable[[Instance], str]] = {"urdf": urdf_text, "mjcf": mjcf_text, "ros": ros_text}
+NO_RATE_HZ = 20.0
+"""A robot without a folder has no rate of control; none of the formats states one."""
+
+
+@dataclass(frozen=True, repr=False)
+class ExportReport:
+    """Result of an export: what was written for another simulator, the robot or another optimiser.
+
+    Attributes:
+        output: The file.
+        to: Its format.
+        lines: Each parameter with its place in the file, or without one; none where trials were written.
+        facts: What `export --json` says beside them.
+    """
+
+    output: Path
+    to: str
+    lines: Sequence[ExportLine]
+    facts: Mapping[str, Any]
+
+    def __repr__(self) -> str:
+        return f"ExportReport of {self.output} ({self.to})"
+
+    def _repr_html_(self) -> str:
+        return frame_html(repr(self), self.table())
+
+    def table(self) -> pd.DataFrame:
+        """One row per parameter: value, interval, unit, and its place in the file."""
+        return pd.DataFrame([_row(line) for line in self.lines] or [dict(self.facts)])
+
+    def document(self) -> dict[str, Any]:
+        """The JSON document of `export --json`."""
+        rows = {
+            "written": [_row(line) for line in self.lines if line.place],
+            "no_place": [_row(line) for line in self.lines if not line.place],
+        }
+        return {"output": str(self.output), "to": self.to, **self.facts, **({} if self.to in TRIALS else rows)}
+
+
+def export(
+    model: str | Path,
+    output: str | Path,
+    *,
+    to: str = "",
+    into: str | Path | None = None,
+    wheels: Sequence[str] = (),
+    has: Sequence[str] = (),
+) -> ExportReport:
+    """Write what was found for another simulator or the robot, or a study's trials for other optimisers.
+
+    Args:
+        model: A model.toml, or a study's folder: its best θ.
+        output: The file to write.
+        to: "urdf", "mjcf", "ros" or "filter"; of a study also "optuna" or "skopt".
+        into: A URDF, SDF or MuJoCo model of yours, of which `output` becomes a patched copy; in place of `to`.
+        wheels: Joints of the left and the right wheel in that file; found where they are not given.
+        has: Effects that the simulator behind a filter has already.
+
+    Raises:
+        InputError: If what is given cannot be exported so.
+        RunError: If the file cannot be written.
+    """
+    path, file = Path(model), Path(output)
+    if bool(to) == (into is not None):
+        raise InputError("give either --to FORMAT for a new file, or --into FILE for a patched copy of yours")
+    if to in TRIALS:
+        return _export_trials(path, file, to)
+    instance, cautions = _instance_of(path)
+    told: dict[str, Any] = {"robot": instance.robot.name, "cautions": list(cautions)}
+    if into is not None:
+        given = Path(into)
+        if file.resolve() == given.resolve():
+            raise InputError(f"--output {file}: is the file to be patched; give another name, so that yours is kept")
+        patched = patch(instance, given, file, wheels)
+        write_text(file, patched.text)
+        facts = told | {"into": str(given), "has": sorted(patched.has), "diff": patched.diff}
+        return ExportReport(file, given.suffix[1:], export_lines(instance, FILTER, patched.has), facts)
+    if to == FILTER:
+        _check_has(has, instance.robot.catalogue)
+        text, lines = node_text(instance, has), export_lines(instance, FILTER, has)
+    else:
+        text, lines = WRITERS[to](instance), export_lines(instance, to)
+    write_text(file, text)
+    return ExportReport(file, to, lines, told)
+
+
+def _check_has(has: Sequence[str], catalogue: Catalogue) -> None:
+    for name in has:
+        if not catalogue.knows(name):
+            raise InputError(f"--has {name}: no such effect; {nearest(name, catalogue.names)}")
+
+
+def _export_trials(folder: Path, output: Path, to: str) -> ExportReport:
+    """Write all trials of a study; a file that is there may be a storage with other studies, so it is left alone."""
+    if not folder.is_dir():
+        raise InputError(f"{folder}: --to {to} takes the trials of a study; give the study's folder")
+    if output.exists():
+        raise InputError(f"{output}: is there already; give another name, or move it away")
+    history = read_study(folder).history()
+    write_whole(output, "", lambda draft: TRIALS[to](history, draft))
+    return ExportReport(output, to, (), {"name": history.name, "trials": len(history.trials)})
+
+
+def _row(line: ExportLine) -> dict[str, Any]:
+    interval = list(line.interval) if line.interval else None
+    return {
+        "name": line.name,
+        "value": line.value,
+        "interval": interval,
+        "unit": line.unit,
+        "place": line.place or None,
+    }
+
+
+def _instance_of(path: Path) -> tuple[Instance, tuple[str, ...]]:
+    return (_of_study(path), ()) if path.is_dir() else _of_model(path)
+
+
+def _of_model(path: Path) -> tuple[Instance, tuple[str, ...]]:
+    """A model.toml, and its cautions; its robot and its own effects are looked for in the current folder."""
+    catalogue = Catalogue(Path.cwd())
+    model = read_model(path, catalogue)
+    if model.robot in robot_names(catalogue.folder):
+        robot = read_robot(model.robot, catalogue.folder)
+    elif model.geometry:
+        robot = robot_from_geometry(model.robot, model.geometry, NO_RATE_HZ)
+    else:
+        raise InputError(
+            f"{path}: its robot '{model.robot}' is unknown here; go to the folder that {model.robot} lies in"
+        )
+    cautions = (*model.cautions, *figure_cautions(robot.figures, f"robot {robot.name}"))
+    return Instance(robot, {**robot.theta, **model.theta}, model.intervals, str(path)), cautions
+
+
+def _of_study(folder: Path) -> Instance:
+    """The best θ of a study, with its 95 % intervals."""
+    result = read_study(folder).result
+    settings, region = result.study.settings, result.knowledge
+    family = bare_family(settings, settings.proxy) if is_ours(settings.family) else None
+    if not isinstance(family, LaneFollowing):
+        raise InputError(f"{folder}: is a study of another simulator; only what drives here can be exported")
+    robot = read_robot(family.robot, family.folder)
+    theta = {**robot.theta, **dict(family.effects), **result.best.trial.theta}
+    return Instance(robot, theta, dict(region.intervals), f"the best θ of the study {settings.name}")
+
+
+class CommandFilter:
+    """A filter before any simulator's step: its robot then moves as the one that was measured.
+
+    Commands are bent as the model's command, actuation and motion effects do it, and told as what the simulator has to
+    be asked for, so that it moves so. Effects of place and heading go by dead reckoning from `start` on.
+
+    Args:
+        model: A model.toml, a study's folder, or values by name in θ, with `figures` beside them.
+        rate_hz: How often `step` is called per second; a command holds from one call to the next.
+        command: "twist" for forward speed [m/s] and yaw rate [rad/s], "duty" for left and right in [−1, 1].
+        has: Effects that the simulator has already, as those that `export --into` wrote into its file.
+        start: x, y [m] and heading [rad] at the start.
+        seed: Seed of jitter and lost commands.
+        figures: The robot's nominal figures, where the model is values.
+
+    Raises:
+        InputError: If the model, or an argument, cannot be used.
+    """
+
+    def __init__(
+        self,
+        model: str | Path | Theta,
+        *,
+        rate_hz: float,
+        command: str = "twist",
+        has: Sequence[str] = (),
+        start: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        seed: int = 0,
+        figures: Mapping[str, float] | None = None,
+    ) -> None:
+        if command not in ("twist", "duty"):
+            raise InputError(f"command='{command}': must be 'twist' or 'duty'")
+        if not (np.isfinite(rate_hz) and rate_hz > 0.0):
+            raise InputError(f"rate_hz={rate_hz}: must be a positive number of calls per second")
+        if isinstance(model, Mapping):
+            own = Catalogue(Path.cwd())
+            if figures is None:
+                raise InputError("figures: must be given where the model is values; take them from robot.toml")
+            robot = Robot("given", "", dict(figures), {}, None, own)
+            instance = Instance(robot, dict(model), {}, "given")
+        else:
+            instance, _ = _instance_of(Path(model))
+        _check_has(has, instance.robot.catalogue)
+        left_out = set(has) - set(IN_WHEELS)
+        effects = [one for name, one in instance.effects.items() if name not in left_out]
+        self._twist, self._train = command == "twist", drivetrain(instance.robot, effects)
+        self._full, self._nominal = instance.figure("full_speed"), instance.figure("effective_baseline")
+        behind = replace(instance, theta={n: v for n, v in instance.theta.items() if effect_of(n) in has})
+        self._gains, self._baseline = behind.gains, behind.baseline_m
+        x, y, heading = start
+        figures_known, place = instance.robot.figures, np.array([[x, y]])
+        context = FilterContext(rate_hz, np.zeros(2), figures_known, seed, np.array([heading]), place)
+        self._memory = self._train.begin(context)
+
+    def step(self, command: Sequence[float]) -> tuple[float, ...]:
+        """What to ask of the simulator until the next step.
+
+        Args:
+            command: What the robot is told: forward speed and yaw rate, or duties left and right.
+
+        Returns:
+            For twists the forward speed, the sideways speed, which a robot on two wheels cannot be asked for, and the
+            yaw rate; for duties left and right.
+
+        Raises:
+            InputError: If it is not two finite numbers.
+        """
+        given = np.asarray(command, dtype=float)
+        if given.shape != (2,) or not np.isfinite(given).all():
+            raise InputError(f"a command must be two finite numbers, got {command!r}")
+        duties = self._wheels(given[0], given[1], self._nominal) / self._full if self._twist else given
+        moved, self._memory = self._train.apply(duties[None], self._memory)
+        forward, sideways, yaw = moved[0].tolist()
+        # What the simulator's own wheels make of it is undone
+        left, right = self._wheels(forward, yaw, self._baseline) / np.array(self._gains)
+        if not self._twist:
+            return float(left / self._full), float(right / self._full)
+        return float(left + right) / 2.0, sideways, float(right - left) / self._nominal
+
+    @staticmethod
+    def _wheels(forward: float, yaw: float, baseline: float) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """Speeds of the left and right rims [m/s]."""
+        return np.array((forward - yaw * baseline / 2.0, forward + yaw * baseline / 2.0))

@@ -1,0 +1,102 @@
+"""Every effect and parameter is told in a plain clause, and a finding in a sentence with its size and worth."""
+
+import io
+import re
+
+import pytest
+from rich.console import Console
+
+from proxytune.cli.main import main
+from proxytune.effects import CATALOGUE, PARAMETERS
+from proxytune.report import Table, columns_of, table_text
+from proxytune.report.meanings import CLAUSES, finding, findings, what_it_does
+
+BAND = {
+    "name": "dead_band",
+    "parameters": {
+        "width": {"value": 0.14996, "interval": [0.149, 0.151], "unit": "duty"},
+        "imbalance": {"value": 0.0, "interval": [0.0, 0.0], "unit": ""},
+    },
+    "worth": {
+        "1": {"value": 900.0, "interval": [850.0, 950.0], "unit": "%"},
+        "2": {"value": 1900.0, "interval": [1700.0, 2200.0], "unit": "%"},
+    },
+}
+SLIP = {
+    "name": "turn_slip",
+    "parameters": {"loss": {"value": 0.31, "interval": [0.27, 0.35], "unit": "s/rad"}},
+    "worth": {"2": {"value": 13.2, "interval": [8.0, 19.0], "unit": "%"}},
+}
+
+
+def test_every_parameter_of_the_catalogue_has_a_clause_with_a_place_for_its_value():
+    assert set(CLAUSES) == set(PARAMETERS)
+    assert all(clause.count("{}") == 1 for clause in CLAUSES.values())
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_every_effect_says_in_a_clause_what_it_does(name):
+    assert len(what_it_does(name).split()) >= 4
+    assert "`" not in what_it_does(name)
+
+
+def test_a_finding_has_name_meaning_size_with_interval_and_unit_and_what_it_is_worth():
+    assert finding(BAND) == (
+        "dead band: wheels stand still below a duty of 0.150 (0.149 to 0.151); "
+        "without it predictions over 2 s are 20 times as far off (18 to 23)"
+    )
+    assert finding(SLIP) == (
+        "turn slip: turning costs forward speed, a share of 0.31 s/rad (0.27 to 0.35) for each rad/s; "
+        "without it predictions over 2 s are 13 % worse (8 to 19)"
+    )
+    assert findings([BAND, SLIP]) == f"{finding(BAND)}; {finding(SLIP)}"
+
+
+def test_no_worth_is_claimed_where_none_was_shown():
+    doubtful = {**SLIP, "worth": {"2": {"value": 0.0, "interval": [-2.0, 2.0], "unit": "%"}}}
+    assert "without it" not in finding(doubtful)
+    assert findings([{"name": "dead_band"}, {"name": "trim"}]) == "dead band and trim"
+
+
+def test_a_users_own_effect_is_told_by_its_own_names():
+    own = {"name": "gone:Wheel", "parameters": {"shrink": {"value": 0.25, "interval": [0.25, 0.25], "unit": "m"}}}
+    assert finding(own) == "gone:Wheel: shrink 0.25 m"
+
+
+def test_effects_are_a_row_each_within_80_columns_and_no_name_is_broken(monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", "80")
+    assert main(["list", "effects"]) == 0
+    told = capsys.readouterr().out
+    assert max(map(len, told.splitlines())) <= 80
+    words = set(re.findall(r"\S+", told.replace("*", " ").replace(",", " ")))
+    assert set(CATALOGUE) <= words
+    assert {one.name for effect in CATALOGUE.values() for one in effect.parameters} <= words
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("effects", "dead_band"), "wheels stand still below a duty of WIDTH"),
+        (("effects", "yaw_scrub"), "without effect at the robot's effective baseline"),
+        (("robots", "husky"), "mass kg: 56.6"),
+    ],
+)
+def test_all_of_one_is_told(words, said, capsys):
+    assert main(["list", *words]) == 0
+    assert said in " ".join(capsys.readouterr().out.split())
+
+
+def test_an_unknown_one_is_asked_back(capsys):
+    assert main(["list", "effects", "ded_band"]) == 2
+    assert "no 'ded_band'; did you mean 'dead_band'?" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("width", [30, 60, 80, 200])
+def test_no_word_of_a_table_is_broken_however_narrow_the_terminal(width):
+    topic = "/front/camera/image_raw/compressed"
+    rows = ((topic, "sensor_msgs/msg/CompressedImage", "812", "frames, every second one of them"),) * 2
+    console = Console(width=width, file=io.StringIO(), color_system=None)
+    console.print(table_text(Table("", columns_of(("what", "type", "count", "for")), rows)), crop=False)
+    told = console.file.getvalue()
+    assert {topic, "sensor_msgs/msg/CompressedImage", "every"} <= set(told.split())
+    assert max(map(len, told.splitlines())) <= max(width, len(topic) + 31 + 5 + 7 + 6)

@@ -1,0 +1,339 @@
+"""A user's own URDF, SDF or MuJoCo model, patched, with the filter before it, moves as the model that was found."""
+
+import importlib.util
+import sys
+import types
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from export_truth import instance
+
+from proxytune import CommandFilter, InputError, export
+from proxytune.cli.main import main
+from proxytune.driving import drivetrain, link_pose, parse_urdf
+from proxytune.driving.plants import PlanarPlant
+from proxytune.effects import FilterContext, Model, effects_from, model_text
+from proxytune.report.export.instance import IN_WHEELS
+
+HZ = 60.0
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "how-to" / "exporting.md"
+TWISTS = np.repeat([[0.3, 0.0], [0.25, 1.2], [0.4, -0.6], [-0.15, 0.8]], 90, axis=0)
+FOUND = {
+    "trim": 0.08,
+    "wheel_gain.left": 0.93,
+    "yaw_scrub": 0.2,
+    "dead_band.width": 0.08,
+    "turn_slip": 0.12,
+    "delay": 0.2,
+    "delay_jitter": 0.05,
+    "saturation.limit": 0.7,
+    "camera_pitch": 25.0,
+    "field_of_view": 80.0,
+}
+URDF = """<?xml version="1.0"?>
+<!-- mine, keep this: a > b -->
+<robot name="mine">
+  <link name="base_footprint"/>
+  <link name="base_link"/>
+  <joint name="foot" type="fixed">
+    <parent link="base_footprint"/><child link="base_link"/><origin xyz="0 0 0.03"/></joint>
+  <link name="wheel_l"><collision><geometry><cylinder radius='0.03' length="0.01"/></geometry></collision>
+    <visual><geometry><mesh filename="package://mine/wheel.dae"/></geometry></visual></link>
+  <link name="wheel_r"><collision><geometry><cylinder radius="0.03" length="0.01"/></geometry></collision></link>
+  <joint name="left_wheel_joint" type="continuous">
+    <parent link="base_link"/><child link="wheel_l"/>
+    <origin xyz="0.02 0.08 0" rpy="-1.5708 0 0"/><axis xyz="0 0 1"/>
+  </joint>
+  <joint name="right_wheel_joint" type="continuous">
+    <parent link="base_link"/><child link="wheel_r"/>
+    <origin xyz="0.02 -0.08 0" rpy="-1.5708 0 0"/><axis xyz="0 0 1"/>
+  </joint>
+  <link name="camera_link"/>
+  <joint name="eye" type="fixed">
+    <parent link="base_link"/><child link="camera_link"/><origin xyz="0.08 0 0.05"/></joint>
+  <gazebo><plugin filename="gz-sim-diff-drive-system" name="gz::sim::systems::DiffDrive">
+    <wheel_separation>0.16</wheel_separation></plugin></gazebo>
+</robot>
+"""
+SDF = """<sdf version="1.9"><world name="w"><model name="mine">
+  <link name="chassis"><pose relative_to="__model__">0 0 0.05 0 0 0</pose>
+    <sensor name="eye" type="camera"><pose>0.06 0 0.04 0 0.3 0</pose>
+      <camera><horizontal_fov>1.2</horizontal_fov><image><width>640</width><height>480</height></image></camera></sensor>
+  </link>
+  <link name="lw"><pose relative_to="chassis">0.02 0.08 -0.02 -1.5708 0 0</pose>
+    <collision name="c"><geometry><cylinder><radius>0.03</radius></cylinder></geometry></collision></link>
+  <link name="rw"><pose relative_to="chassis">0.02 -0.08 -0.02 -1.5708 0 0</pose>
+    <collision name="c"><geometry><cylinder><radius>0.03</radius></cylinder></geometry></collision></link>
+  <joint name="a" type="revolute"><parent>chassis</parent><child>lw</child></joint>
+  <joint name="b" type="revolute"><parent>chassis</parent><child>rw</child></joint>
+  <plugin filename="x" name="drive"><left_joint>a</left_joint><right_joint>b</right_joint></plugin>
+</model></world></sdf>
+"""
+MJCF = """<mujoco model="mine">
+  <option timestep="0.0005"/>  <!-- mine -->
+  <worldbody>
+    <geom name="floor" type="plane" size="9 9 0.1"/>
+    <body name="cart" pos="0 0 0"><freejoint/>
+      <geom type="box" pos="-0.02 0 0.07" size="0.08 0.05 0.03" mass="0.9"/>
+      <geom type="sphere" pos="-0.07 0 0.01" size="0.01" mass="0.01" condim="1" priority="1"/>
+      <camera name="eye" pos="0.06 0 0.1" euler="90 0 0" fovy="75"/>
+      <body name="a" pos="0 0.08 0.0318"><joint name="WheelLeft" axis="0 1 0"/>
+        <geom size="0.0318" mass="0.05"/></body>
+      <body name="b" pos="0 -0.08 0.0318"><joint name="WheelRight" axis="0 1 0"/>
+        <geom size="0.0318" mass="0.05"/></body>
+    </body>
+  </worldbody>
+  <contact><exclude body1="cart" body2="a"/><exclude body1="cart" body2="b"/></contact>
+  <actuator><velocity joint="WheelLeft" kv="0.05"/><velocity joint="WheelRight" kv="0.05"/></actuator>
+</mujoco>
+"""
+FILES = {"mine.urdf": URDF, "mine.sdf": SDF, "mine.xml": MJCF}
+
+
+@pytest.fixture
+def model(tmp_path):
+    path = tmp_path / "model.toml"
+    path.write_text(model_text(Model("duckiebot", None, FOUND, {})))
+    return path
+
+
+def extended(**more):
+    """Poses of the model that was found, at each tick."""
+    found = instance(**{name.replace(".", "__"): value for name, value in FOUND.items()})
+    figures = found.robot.figures
+    train = drivetrain(found.robot, effects_from({**found.theta, **more}, figures))
+    turn = TWISTS[:, 1] * figures["effective_baseline"] / 2.0
+    duties = np.stack((TWISTS[:, 0] - turn, TWISTS[:, 0] + turn), axis=1) / figures["full_speed"]
+    twists, _ = train.apply(duties, train.begin(FilterContext(HZ, np.zeros(2), figures)))
+    return PlanarPlant(np.zeros(3), 1.0 / HZ).move(twists)[0]
+
+
+def nominal(twists):
+    return PlanarPlant(np.zeros(3), 1.0 / HZ).move(np.array(twists))[0]
+
+
+def test_the_filter_before_the_nominal_simulator_moves_it_as_the_extended_one(model):
+    bent = CommandFilter(model, rate_hz=HZ)
+    assert nominal([bent.step(one) for one in TWISTS]) == pytest.approx(extended(), abs=1e-9)
+
+
+def test_what_a_patched_file_has_is_left_to_its_wheels(model):
+    bent = CommandFilter(model, rate_hz=HZ, has=IN_WHEELS)
+    asked = np.array([bent.step(one) for one in TWISTS])
+    rims = np.stack((asked[:, 0] - 0.08 * asked[:, 2], asked[:, 0] + 0.08 * asked[:, 2]), axis=1)
+    rims *= (0.93 * 0.92, 1.08)
+    moved = np.stack((rims.mean(axis=1), asked[:, 1], (rims[:, 1] - rims[:, 0]) / 0.2), axis=1)
+    assert nominal(moved) == pytest.approx(extended(), abs=1e-9)
+
+
+def driven(mujoco, text, commands):
+    """Poses of a robot in MuJoCo whose wheels follow the speeds that velocities ask of nominal wheels."""
+    simulated = mujoco.MjModel.from_xml_string(text)
+    data, poses = mujoco.MjData(simulated), []
+    for tick, (forward, _, yaw) in enumerate(commands, start=1):
+        data.ctrl[:] = (forward - 0.08 * yaw) / 0.0318, (forward + 0.08 * yaw) / 0.0318
+        while data.time < tick / HZ - 1e-9:
+            mujoco.mj_step(simulated, data)
+        w, _, _, z = data.qpos[3:7]
+        poses.append((*data.qpos[:2], 2.0 * np.arctan2(z, w)))
+    return np.array(poses)
+
+
+def test_a_users_own_mujoco_model_patched_and_filtered_drives_as_the_twin_does(model, tmp_path):
+    mujoco = pytest.importorskip("mujoco")
+    (tmp_path / "mine.xml").write_text(MJCF)
+    report = export(model, tmp_path / "found.xml", into=tmp_path / "mine.xml")
+    bent = CommandFilter(model, rate_hz=HZ, has=report.facts["has"])
+    twin = extended()
+    way = np.linalg.norm(np.diff(twin[:, :2], axis=0), axis=1).sum()
+
+    def error(poses):
+        return np.linalg.norm(poses[:, :2] - twin[:, :2], axis=1).max()
+
+    plain = np.insert(TWISTS, 1, 0.0, axis=1)
+    after = error(driven(mujoco, (tmp_path / "found.xml").read_text(), [bent.step(one) for one in TWISTS]))
+    before = error(driven(mujoco, MJCF, plain))
+    only_filter = CommandFilter(model, rate_hz=HZ)
+    filtered = error(driven(mujoco, MJCF, [only_filter.step(one) for one in TWISTS]))
+    assert max(after, filtered) < 0.015 * way
+    assert before > 20.0 * max(after, filtered)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_only_wheels_and_camera_of_a_file_change_and_the_diff_shows_them(model, tmp_path, name):
+    (tmp_path / name).write_text(FILES[name])
+    report = export(model, tmp_path / "out" / name, into=tmp_path / name)
+    before, after = (text.splitlines() for text in (FILES[name], report.output.read_text()))
+    changed = [new for old, new in zip(before, after, strict=True) if old != new]
+    assert 3 <= len(changed) <= 6
+    assert all(f"+{line}" in report.facts["diff"].splitlines() for line in changed)
+    assert set(IN_WHEELS) <= set(report.facts["has"])
+    left = {line.name: line.place for line in report.lines}
+    assert left["dead_band.width"] == left["delay_jitter"] == "the filter"
+    assert left["trim"] == "in the file"
+    assert (tmp_path / name).read_text() == FILES[name]
+
+
+def test_a_patched_urdf_has_wheels_and_camera_where_they_were_found(model, tmp_path):
+    (tmp_path / "mine.urdf").write_text(URDF)
+    export(model, tmp_path / "found.urdf", into=tmp_path / "mine.urdf")
+    root = parse_urdf(tmp_path / "found.urdf")
+    left, right, camera = (link_pose(root, name) for name in ("wheel_l", "wheel_r", "camera_link"))
+    assert left[1, 3] - right[1, 3] == pytest.approx(0.16 * 0.2 / 0.16)
+    radii = [float(one.get("radius")) for one in root.iter("cylinder")]
+    assert radii == pytest.approx([0.03 * 0.93 * 0.92, 0.03 * 1.08])
+    assert [left[2, 3], right[2, 3]] == pytest.approx(radii)  # both touch the floor
+    assert camera[:3, 3] == pytest.approx((0.02 + 0.066, 0.0, 0.108))
+    assert np.degrees(np.arcsin(-camera[2, 0])) == pytest.approx(25.0)
+    assert root.find("gazebo/plugin/wheel_separation").text == "0.16"
+
+
+def test_a_patched_sdf_has_wheels_and_camera_where_they_were_found(model, tmp_path):
+    (tmp_path / "mine.sdf").write_text(SDF)
+    export(model, tmp_path / "found.sdf", into=tmp_path / "mine.sdf")
+    root = ET.fromstring((tmp_path / "found.sdf").read_text())
+    places = [[float(v) for v in root.find(f".//link[@name='{name}']/pose").text.split()] for name in ("lw", "rw")]
+    assert places[0][1] - places[1][1] == pytest.approx(0.2)
+    radii = [float(one.text) for one in root.iter("radius")]
+    assert [place[2] + 0.05 for place in places] == pytest.approx(radii)
+    eye = [float(value) for value in root.find(".//sensor/pose").text.split()]
+    assert eye == pytest.approx([0.086, 0.0, 0.058, 0.0, np.radians(25.0), 0.0], abs=1e-6)
+    vertical = 2.0 * np.arctan(0.75 * np.tan(float(root.find(".//horizontal_fov").text) / 2.0))
+    assert np.degrees(vertical) == pytest.approx(80.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "before", "after", "said"),
+    [
+        ("mine.urdf.xacro", "", "", "run `xacro mine.urdf.xacro > mine.urdf`, patch mine.urdf"),
+        ("mine.urdf", "left_wheel_joint", "port", "cannot be told; name their joints: --wheels LEFT,RIGHT of port"),
+        ("mine.urdf", "<robot", "<robots", "is not XML"),
+        ("mine.urdf", "robot", "rover", "begins with <rover>"),
+        ("mine.urdf", 'xyz="0.02 0.08 0"', 'xyz="0.02 x 0"', "not sound"),
+        ("mine.urdf", 'xyz="0.02 0.08 0"', 'xyz="0.02 -0.18 0"', "is not to the left of"),
+        ("mine.sdf", 'relative_to="chassis"', 'relative_to="nowhere"', "not sound"),
+        ("mine.xml", 'size="0.0318"', "", "states its own size"),
+    ],
+)
+def test_a_file_that_cannot_be_patched_is_refused_in_one_line_and_nothing_is_written(
+    model, tmp_path, name, before, after, said
+):
+    (tmp_path / name).write_text(FILES.get(name, URDF).replace(before, after))
+    with pytest.raises(InputError, match=".*") as refused:
+        export(model, tmp_path / "out.xml", into=tmp_path / name)
+    assert said in str(refused.value)
+    assert "\n" not in str(refused.value)
+    assert not (tmp_path / "out.xml").exists()
+
+
+def test_wheels_may_be_named(model, tmp_path):
+    (tmp_path / "mine.urdf").write_text(URDF.replace("left_wheel_joint", "port"))
+    export(model, tmp_path / "a.urdf", into=tmp_path / "mine.urdf", wheels=("port", "right_wheel_joint"))
+
+
+def test_the_users_own_file_is_never_overwritten(model, tmp_path):
+    (tmp_path / "mine.urdf").write_text(URDF)
+    with pytest.raises(InputError, match="give another name, so that yours is kept"):
+        export(model, tmp_path / "mine.urdf", into=tmp_path / "mine.urdf")
+
+
+class Vector:
+    x = y = z = 0.0
+
+
+class Twist:
+    def __init__(self):
+        self.linear, self.angular = Vector(), Vector()
+
+
+class Stamped:
+    def __init__(self):
+        self.twist, self.header = Twist(), types.SimpleNamespace(stamp=None)
+
+
+class Node:
+    parameters: ClassVar = {}
+
+    def __init__(self, name):
+        self.told = []
+
+    def declare_parameter(self, name, value):
+        return types.SimpleNamespace(value=self.parameters.get(name, value))
+
+    def create_publisher(self, kind, topic, depth):
+        return types.SimpleNamespace(publish=self.told.append)
+
+    def create_subscription(self, kind, topic, hear, depth):
+        self.heard = hear
+
+    def create_timer(self, period, tell):
+        self.tick = tell
+
+    def get_clock(self):
+        return types.SimpleNamespace(now=lambda: types.SimpleNamespace(to_msg=lambda: "now"))
+
+
+@pytest.mark.parametrize("stamped", [False, True])
+def test_the_ros_node_tells_the_driver_what_the_python_class_answers_and_stops_after_silence(
+    model, tmp_path, monkeypatch, stamped
+):
+    path = export(model, tmp_path / "bend.py", to="filter", has=("trim",)).output
+    modules = {"rclpy": {}, "rclpy.node": {"Node": Node}, "geometry_msgs": {}}
+    modules["geometry_msgs.msg"] = {"Twist": Twist, "TwistStamped": Stamped}
+    for name, content in modules.items():
+        monkeypatch.setitem(sys.modules, name, types.ModuleType(name))
+        vars(sys.modules[name]).update(content)
+    monkeypatch.setattr(Node, "parameters", {"stamped": stamped})
+    spec = importlib.util.spec_from_file_location("bend", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    node, bent = module.CommandVelocityFilter(), CommandFilter(model, rate_hz=HZ, has=("trim",))
+    said = Stamped() if stamped else Twist()
+    twist = said.twist if stamped else said
+    twist.linear.x, twist.angular.z = 0.3, 0.5
+    node.heard(said)
+    for _ in range(300):
+        node.tick()
+    told = [one.twist if stamped else one for one in node.told]
+    expected = [bent.step((0.3, 0.5)) for _ in range(30)]
+    assert [(one.linear.x, one.linear.y, one.angular.z) for one in told[:30]] == pytest.approx(np.array(expected))
+    assert abs(told[-1].linear.x) < 1e-6
+    assert "dead_band.width 0.08 duty: the filter" in path.read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"command": "speed"}, "must be 'twist' or 'duty'"),
+        ({"rate_hz": 0.0}, "must be a positive number"),
+        ({"has": ("trimm",)}, "did you mean 'trim'"),
+    ],
+)
+def test_a_wrong_argument_of_the_filter_is_one_line(model, arguments, said):
+    with pytest.raises(InputError, match=said):
+        CommandFilter(model, **{"rate_hz": HZ, **arguments})
+
+
+def test_a_command_that_is_no_number_is_refused(model):
+    with pytest.raises(InputError, match="two finite numbers"):
+        CommandFilter(model, rate_hz=HZ).step((np.nan, 0.0))
+
+
+def test_the_python_of_the_page_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    page = PAGE.read_text(encoding="utf-8")
+    exec(page.split("```python")[1].split("```")[0], {})
+
+
+def test_the_command_shows_the_diff_and_how_to_make_the_filter(model, tmp_path, capsys):
+    (tmp_path / "mine.urdf").write_text(URDF)
+    given = ["export", str(model), "--into", str(tmp_path / "mine.urdf"), "--output", str(tmp_path / "found.urdf")]
+    assert main(given) == 0
+    told = capsys.readouterr().out
+    assert """+  <link name="wheel_l"><collision><geometry><cylinder radius="0.02566""" in told
+    assert "--to filter --has trim,wheel_gain,yaw_scrub --output" in " ".join(told.split())
+    assert main([*given, "--to", "urdf"]) == 2
+    assert "give either --to FORMAT" in capsys.readouterr().err

@@ -65,7 +65,7 @@ class Plants:
 
     def move(self, twists: Signal, robots: Sequence[int]) -> tuple[Signal, Sequence[bool]]:
         """Let one robot after the other follow its twists."""
-        poses, crashed = np.empty_like(twists), []
+        poses, crashed = np.empty((*twists.shape[:2], 3)), []
         for row, robot in enumerate(robots):
             poses[row], hit = self.plants[robot].move(twists[row])
             crashed.append(hit)

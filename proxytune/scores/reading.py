@@ -121,7 +121,7 @@ def read_cells(
         named = _first(path, rows)
     ours = {theirs: name for name, theirs in (columns or {}).items() if theirs in named}
     alias = agent_column(named)
-    if alias is not None and not {"agent"} & {*named, *ours.values()}:
+    if alias is not None and "agent" not in {*named, *(columns or {})}:
         ours[alias] = "agent"
     # Another column that has such a name is out of the way.
     header = [ours.get(name, f"{name} of the file" if name in ours.values() else name) for name in named]

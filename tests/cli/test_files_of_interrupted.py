@@ -73,10 +73,11 @@ def test_plot_leaves_every_file_the_old_or_the_new_one(finished, interrupted, ct
 
 def test_score_leaves_whole_figures_alone(tmp_path, interrupted, ctrl_c):
     (tmp_path / "a.csv").write_text(TABLE)
+    (tmp_path / "b.csv").write_text(TABLE)
     ctrl_c(2)
-    both = ("--proxy", tmp_path / "a.csv", "--target", tmp_path / "a.csv", "--metric", "distance:max")
+    both = ("--proxy", tmp_path / "a.csv", "--target", tmp_path / "b.csv", "--metric", "distance:max")
     files = interrupted(tmp_path, "score", *both, "--output", tmp_path / "out", "--table", tmp_path / "t.csv")
-    assert files == {"a.csv", "out/scatter.png"}
+    assert files == {"a.csv", "b.csv", "out/scatter.png"}
     assert (tmp_path / "out" / "scatter.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -99,7 +100,7 @@ def test_measure_leaves_the_old_table(make_study, tmp_path, interrupted, monkeyp
 
 def test_new_leaves_nothing(tmp_path, interrupted, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(Path, "rename", lambda self, target: signal.raise_signal(signal.SIGINT))
+    monkeypatch.setattr(Path, "replace", lambda self, target: signal.raise_signal(signal.SIGINT))
     assert interrupted(tmp_path, "new", "family", "rovers") == set()
 
 

@@ -59,7 +59,7 @@ def test_names_that_are_alike_in_file_names_have_files_of_their_own(table, tmp_p
     words = ["score", *proxies, "--target", "t.csv", "--metric", "d:max", "--resamples", "100", "--json"]
     assert main([*words, "--output", "F"]) == 0
     figures = json.loads(capsys.readouterr().out)["figures"]
-    assert len(figures) == len(set(figures)) == 4 == len(list((tmp_path / "F").glob("*.png")))
+    assert len(figures) == len(set(figures)) == 6 == len(list((tmp_path / "F").glob("*.png")))
 
 
 def test_scores_whose_squares_are_no_numbers_are_refused_or_have_no_spread(table, tmp_path, capsys):

@@ -101,7 +101,9 @@ def test_without_a_terminal_every_trial_is_a_plain_line_with_its_prpv_the_best_a
     folder = make_study(preflight="true", confirm="1", cut_off="true")
     assert main(["study", str(folder), "--json"]) == 0
     out, told = capsys.readouterr()
-    said = [line.partition(" s: ")[2] for line in told.splitlines() if "study: page: " not in line]
+    lines = [line for line in told.splitlines() if "study: page: " not in line]
+    assert lines[0].endswith("pre-flight 1 of 2 begins; at most 216 episodes") or "pre-flight 1 of 2 begins" in lines[0]
+    said = [line.partition(" s: ")[2] for line in lines if " begins" not in line]
     found = json.loads(out)
     assert [line.partition(";")[0] for line in said[:2]] == ["pre-flight 1 of 2", "pre-flight 2 of 2"]
     trials = [line for line in said if line.startswith("trial ")]

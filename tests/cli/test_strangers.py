@@ -111,7 +111,7 @@ STRANGERS = {
         here=True,
     ),
     "a robot without code": Stranger(
-        {"wolf/robot.toml": robot_of(".trim]\ntrim = 0.1"), **modules("wolf/optuna", "bottleneck")}, {"robot": "wolf"}
+        {"wolf/robot.toml": robot_of(".dead_band]\nwidth = 0.01"), **modules("wolf/optuna", "bottleneck")}, {"robot": "wolf"}
     ),
 }  # fmt: skip
 

@@ -55,6 +55,7 @@ def study(tmp_path):
     return tmp_path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("domain", "instead"),
     [("", 'plant = "planar"'), ('plant = "planar"\ncamera = "renderer"', 'camera = "ground_plane"')],
@@ -69,12 +70,14 @@ def test_what_needs_pybullet_is_refused_in_one_line_with_three_remedies(study, d
     assert "study.toml" in line
 
 
+@pytest.mark.slow
 def test_a_study_on_the_planar_plant_runs_without_pybullet(study):
     (study / "study.toml").write_text(STUDY + 'plant = "planar"')
     done = command(study, "study", ".")
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.slow
 def test_every_public_name_can_be_had_without_pybullet(tmp_path):
     done = run(tmp_path, "import proxytune\nfor name in proxytune.__all__: getattr(proxytune, name)")
     assert done.returncode == 0, done.stderr
@@ -93,6 +96,7 @@ except InputError as problem:
     assert "use Python 3.11, or with a C++ compiler run `pip install pybullet`" in run(tmp_path, code).stdout
 
 
+@pytest.mark.slow
 def test_a_diagnosis_leaves_the_bullet_plant_out(tmp_path):
     code = """
 from types import SimpleNamespace

@@ -44,7 +44,7 @@ def driven(journal):
 
 
 @pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.slow), pytest.param(3, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("most", [1, 5, 48])
+@pytest.mark.parametrize("most", [pytest.param(1, marks=pytest.mark.slow), 5, pytest.param(48, marks=pytest.mark.slow)])
 def test_fleets_of_any_size_and_any_number_of_jobs_give_the_same_document(make_study, capsys, monkeypatch, jobs, most):
     whole = document(make_study("whole", **FAMILY, **PHASES), capsys)
     monkeypatch.setattr("proxytune.running.episodes.MOST", most)
@@ -62,7 +62,7 @@ def test_an_agent_that_exits_is_driven_alone_and_told_so(make_study, capsys):
     assert "agent 'agent2' ends what is driven beside it, so it is driven alone" in str(found["cautions"])
 
 
-@pytest.mark.parametrize("kind", ["hides", "draws"])
+@pytest.mark.parametrize("kind", ["hides", pytest.param("draws", marks=pytest.mark.slow)])
 def test_an_agent_that_keeps_something_outside_its_memory_is_found_driven_alone_and_named(make_study, capsys, kind):
     journal = make_study().parent / "journal"
     domain = {"faults": f'["agent2:*:{kind}"]', "journal": f'"{journal}"'}
@@ -189,8 +189,8 @@ def pruned(folder, **changes):
         return store.trials(), run.spent
 
 
-@pytest.mark.parametrize("wave", [1, 16, 1000])
-@pytest.mark.parametrize("keys", [{}, {"batch": "3"}, {"jobs": "2"}])
+@pytest.mark.parametrize("wave", [pytest.param(1, marks=pytest.mark.slow), 16, 1000])
+@pytest.mark.parametrize("keys", [{}, {"batch": "3"}, pytest.param({"jobs": "2"}, marks=pytest.mark.slow)])
 def test_waves_of_any_size_prune_the_trials_that_agent_by_agent_prunes_at_the_same_agents(
     make_study, monkeypatch, wave, keys
 ):

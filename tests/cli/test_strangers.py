@@ -111,7 +111,8 @@ STRANGERS = {
         here=True,
     ),
     "a robot without code": Stranger(
-        {"wolf/robot.toml": robot_of(".dead_band]\nwidth = 0.01"), **modules("wolf/optuna", "bottleneck")}, {"robot": "wolf"}
+        {"wolf/robot.toml": robot_of(".dead_band]\nwidth = 0.01"), **modules("wolf/optuna", "bottleneck")},
+        {"robot": "wolf"},
     ),
 }  # fmt: skip
 

@@ -83,7 +83,7 @@ def test_what_the_machine_lacks_is_no_failure_of_the_agent_that_met_it(fault, wh
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("fault", "how"), [("leaves", "exit status 9"), ("aborts", "SIGABRT")])
+@pytest.mark.parametrize(("fault", "how"), [("dies", "exit status 9"), ("aborts", "SIGABRT")])
 def test_an_episode_that_ends_two_processes_has_failed_and_the_others_are_what_they_are(fault, how):
     whole, found = run_all(()), run_all((f"agent2:2:{fault}",), jobs=2)
     assert but_last(found) == but_last(whole)
@@ -108,7 +108,7 @@ def test_an_episode_that_takes_too_long_has_failed_and_the_others_are_what_they_
 @pytest.mark.slow
 def test_an_episode_during_which_an_earlier_process_ended_does_not_end_this_one():
     begun = []
-    found = run_all(("agent2:2:leaves",), suspect=LAST.__eq__, begins=begun.append)
+    found = run_all(("agent2:2:dies",), suspect=LAST.__eq__, begins=begun.append)
     assert but_last(found) == but_last(run_all(()))
     assert found[LAST] == "it ended its process twice (exit status 9)"
     assert begun == [(episode,) for episode in EPISODES[:-1]]

@@ -34,8 +34,10 @@ def domain(fault):
 
 @pytest.mark.slow
 def test_an_agent_that_ends_the_study_s_own_process_is_named_by_the_next_run_which_goes_on(make_study):
-    folder = make_study(domain=domain("leaves"), **FAMILY)
-    assert run(folder) == (9, "", "")
+    folder = make_study(domain=domain("dies"), **FAMILY)
+    status, out, told = run(folder)
+    assert (status, out) == (9, "")
+    assert told.startswith("proxytune study: code that is not proxytune's ended the process with status 9 (")
     assert not failures(folder)
     status, out, _ = run(folder)
     assert (status, json.loads(out)["episodes"]["failed"]) == (0, 2)

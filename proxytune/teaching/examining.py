@@ -119,6 +119,13 @@ class _Loss:
         """
         if self.traced.last(point).endswith(TOGETHER) or end.how == OVERRUN:
             with IsolatedWorker(self.traced) as isolated:
+                return isolated.do(point, functools.partial(self._lost_again, point))
+        return self._refuse(point, end)
+
+    def _lost_again(self, point: CurvePoint, end: WorkerExit) -> Any:
+        """Refuse a point that was lost again; by the name of one examination, where it was several at once."""
+        if self.traced.last(point).endswith(TOGETHER):
+            with IsolatedWorker(self.traced) as isolated:
                 return isolated.do(point, functools.partial(self._refuse, point))
         return self._refuse(point, end)
 

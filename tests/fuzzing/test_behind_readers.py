@@ -6,7 +6,6 @@ They are spoilt as those of `test_readers`, and as often.
 
 import shutil
 import sys
-import zlib
 from pathlib import Path
 
 sys.path.append(str(Path(__file__).parent))
@@ -15,9 +14,8 @@ import bags
 import foreign_robot
 import numpy as np
 import pytest
-from mutation import mutated
 from PIL import Image
-from test_readers import MODEL, ONE_DRIVE, Reader, copy_robot, inputs, outcome, write_a_log
+from test_readers import MODEL, ONE_DRIVE, Reader, check_spoilt, copy_robot, inputs, outcome, write_a_log
 
 from proxytune.api import diagnose, export, import_log, predict
 from proxytune.diagnosis import RULES
@@ -147,20 +145,6 @@ def test_what_is_done_with_a_spoilt_file_is_done_or_told_in_one_line(name, input
     reader, home = BEHIND[name], tmp_path / "spoilt"
     home.mkdir()
     reader.make(home, finished_once)
-    good = {file: (home / file).read_bytes() for file in reader.spoil}
     first = outcome(reader.read, home)
     assert first is None or name in ("diagnose",), first
-    complaints = 0
-    for number in range(round(inputs * SHARE.get(name, 1.0))):
-        random = np.random.default_rng((zlib.crc32(name.encode()), number))
-        file = reader.spoil[int(random.integers(len(reader.spoil)))]
-        content = mutated(good[file], random)
-        (home / file).write_bytes(content)
-        try:
-            complaint = outcome(reader.read, home)
-        except Exception as problem:
-            pytest.fail(f"{file}, number {number}: {type(problem).__name__}: {problem}\n{content[:1000]!r}")
-        assert complaint is None or "\n" not in complaint, f"{file}, number {number}: {complaint!r}"
-        complaints += complaint is not None
-        (home / file).write_bytes(good[file])
-    assert not reader.complains or complaints > 0.1 * number, "hardly any change was noticed"
+    check_spoilt(name, reader, home, round(inputs * SHARE.get(name, 1.0)))

@@ -222,7 +222,7 @@ def test_the_commands_about_a_cluster_start_a_scheduler_two_workers_and_a_study(
         page("cluster").split("## What it brings")[0].replace("8786", port).replace("studies/quickstart", str(folder))
     )
     install, *commands = lines_of(text)
-    assert install == 'pip install "proxytune[dask]"'
+    assert install == 'pip install ".[dask]"'
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     started = []
     try:

@@ -43,6 +43,10 @@ class Plant(Protocol):
     ) -> None: ...
 
 
+STEEPEST = np.radians(75.0)
+"""No wheel turns farther, whatever effects ask for [rad]."""
+
+
 class DrivetrainState(NamedTuple):
     """Memories of the three stages."""
 
@@ -55,8 +59,8 @@ class DrivetrainState(NamedTuple):
 class Drivetrain:
     """Command, actuation and motion effects with the robot's kinematics; itself a causal filter.
 
-    Takes duties (…, time, 2), left and right in [−1, 1]; gives twists (…, time, 3): forward and sideways speed [m/s]
-    and yaw rate [rad/s], each the mean over its sample interval.
+    Takes duties (…, time, 2), left and right in [−1, 1], of a car throttle and steering; gives twists (…, time, 3):
+    forward and sideways speed [m/s] and yaw rate [rad/s], each the mean over its sample interval.
     """
 
     robot: Robot
@@ -76,15 +80,29 @@ class Drivetrain:
     def apply(self, signal: Signal, memory: DrivetrainState) -> tuple[Signal, DrivetrainState]:
         """The twists that the next chunk of duties leads to."""
         arrived, command = self.command.apply(signal, memory.command)
-        wheels, actuation = self.actuation.apply(np.minimum(np.maximum(arrived, -1.0), 1.0), memory.actuation)
+        wheels, actuation = self.actuation.apply(self.within_range(arrived), memory.actuation)
         twists, motion = self.motion.apply(self.ideal(wheels), memory.motion)
         return twists, DrivetrainState(command, actuation, motion)
 
+    def within_range(self, arrived: Signal) -> Signal:
+        """Commands cut to what motors and servos take: −1 to 1, throttle from 0 on where there is no reverse."""
+        least = -1.0 if self.robot.reverse else np.array((0.0, -1.0))
+        return np.minimum(np.maximum(arrived, least), 1.0)
+
     def ideal(self, wheels: Signal) -> Signal:
-        """The twists that wheel speeds (…, time, 2) ask for, nothing slipping."""
-        full_speed, baseline = self.robot.figures["full_speed"], self.robot.figures["effective_baseline"]
-        left, right = wheels[..., 0], wheels[..., 1]
+        """The twists of the middle of the (rear) axle that wheels (…, time, 2) ask for, nothing slipping.
+
+        Wheels are the speeds of the left and the right one, of a car the speed and the angle of those that steer, all
+        as fractions of the full ones.
+        """
+        figures, (left, right) = self.robot.figures, np.moveaxis(wheels, -1, 0)
         twists = np.zeros((*left.shape, 3))
+        if self.robot.drive == "ackermann":
+            twists[..., 0] = left * figures["full_speed"]
+            angle = np.clip(right * np.radians(figures["wheel_angle"]), -STEEPEST, STEEPEST)
+            twists[..., 2] = twists[..., 0] * np.tan(angle) / figures["wheelbase"]
+            return twists
+        full_speed, baseline = figures["full_speed"], figures["effective_baseline"]
         twists[..., 0] = (left + right) * (full_speed / 2.0)
         twists[..., 2] = (right - left) * (full_speed / baseline)
         return twists

@@ -1,13 +1,14 @@
 """Robots as their robot.toml describes them."""
 
 import functools
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 
 from proxytune.driving.optics import CameraFigures
-from proxytune.effects import SHIPPED, Catalogue, read_effects
+from proxytune.effects import DRIVES, SHIPPED, Catalogue, read_effects
 from proxytune.errors import ExtensionError, SettingsError
 from proxytune.extensions import load, plugins
 from proxytune.files import shipped
@@ -20,12 +21,15 @@ UNITS: Mapping[str, str] = MappingProxyType(
         "effective_baseline": "m",
         "full_speed": "m/s",
         "motor_time_constant": "s",
+        "wheelbase": "m",
+        "wheel_angle": "deg",
         "wheel_torque": "N m",
         "mass": "kg",
         "length": "m",
         "width": "m",
         "height": "m",
         "control_rate": "Hz",
+        "lane_width": "m",
         "camera_rate": "Hz",
         "camera_columns": "pixel",
         "camera_rows": "pixel",
@@ -41,8 +45,14 @@ UNITS: Mapping[str, str] = MappingProxyType(
 )
 """Every figure that a robot.toml may state, with its unit."""
 
-REQUIRED = ("wheel_radius", "effective_baseline", "full_speed", "motor_time_constant", "control_rate")
-"""What every robot states: enough to drive a log on the planar plant."""
+REQUIRED = {
+    "differential": ("wheel_radius", "effective_baseline", "full_speed", "motor_time_constant", "control_rate"),
+    "ackermann": ("wheel_radius", "wheelbase", "wheel_angle", "full_speed", "motor_time_constant", "control_rate"),
+}
+"""What every robot states by how it drives: enough to drive a log on the planar plant."""
+
+COLUMNS = {"differential": ("left", "right"), "ackermann": ("throttle", "steering")}
+"""What the two columns of commands are by how the robot drives, both from −1 to 1; steering is positive to the left."""
 
 BODY = ("wheel_distance", "wheel_torque")
 """What the bullet plant needs besides the URDF."""
@@ -74,10 +84,11 @@ class Robot:
     Attributes:
         name: Name of its folder.
         description: What it is, in one line.
-        figures: Those nominal figures that are known, by name, in the units of UNITS; REQUIRED are among them.
+        figures: Those nominal figures that are known, by name, in the units of UNITS; those REQUIRED are among them.
         theta: Values of the effects that every instance of it has.
         urdf: Its body for the bullet plant, or None.
-        catalogue: The effects that it may have.
+        catalogue: The effects that it may have, and how it drives.
+        reverse: Whether it drives backwards too.
     """
 
     name: str
@@ -86,6 +97,24 @@ class Robot:
     theta: Mapping[str, float]
     urdf: Path | None
     catalogue: Catalogue = SHIPPED
+    reverse: bool = True
+
+    @property
+    def drive(self) -> str:
+        """How it drives: "differential", on two wheels of their own speed, or "ackermann", on wheels that steer."""
+        return self.catalogue.drive
+
+    @property
+    def columns(self) -> tuple[str, str]:
+        """What the two columns of its commands are."""
+        return COLUMNS[self.drive]
+
+    @property
+    def least_radius(self) -> float:
+        """Radius of the tightest circle of the middle of its rear axle [m]; 0 where it turns on the spot."""
+        if self.drive == "differential":
+            return 0.0
+        return self.figures["wheelbase"] / math.tan(math.radians(self.figures["wheel_angle"]))
 
     def body(self) -> Path:
         """The URDF for the bullet plant.
@@ -185,15 +214,30 @@ def read_robot(name: str, folder: Path | None = None) -> Robot:
     Raises:
         SettingsError: If there is no such robot or its robot.toml is not complete.
     """
-    catalogue = Catalogue(folder)
     settings = read_settings(robot_home(name, folder) / "robot.toml")
-    settings.only(("format", "name", "description", "urdf", "figures", "effects"))
+    settings.only(("format", "name", "description", "drive", "reverse", "urdf", "figures", "effects"))
     settings.whole("format", low=1, high=1)
+    catalogue = Catalogue(folder, drive=settings.text("drive", "differential", choices=tuple(DRIVES)))
+    reverse = settings.flag("reverse", True)
+    if not reverse and catalogue.drive == "differential":
+        raise settings.error("reverse", 'is for drive = "ackermann"; leave it out')
     settings.text("name", choices=(name,))
     theta, _ = read_effects(settings.section("effects"), catalogue)
-    figures = _read_figures(settings.section("figures"))
+    figures = _read_figures(settings.section("figures"), catalogue.drive)
     description = settings.text("description")
-    return Robot(name, description, figures, MappingProxyType(theta), _urdf(settings), catalogue)
+    return Robot(name, description, figures, MappingProxyType(theta), _urdf(settings), catalogue, reverse)
+
+
+def catalogue_of(robot: str, folder: Path | None, own: tuple[str, ...] = ()) -> Catalogue:
+    """The effects that a robot of this name may have, or one on two wheels where none is known by it.
+
+    Args:
+        robot: Its name.
+        folder: A user's folder, where robots and modules of effects come before those shipped.
+        own: Effects that a diagnosis is to try beside.
+    """
+    known = robot in robot_names(folder)
+    return replace(read_robot(robot, folder).catalogue if known else Catalogue(folder), folder=folder, own=own)
 
 
 def robot_from_geometry(name: str, geometry: Mapping[str, float], control_rate: float) -> Robot:
@@ -232,17 +276,25 @@ def _urdf(settings: Section) -> Path | None:
     return urdf
 
 
-def _read_figures(section: Section) -> Mapping[str, float]:
+LARGEST_DEG = 60.0
+"""Greatest angle of a steered wheel."""
+
+
+def _read_figures(section: Section, drive: str) -> Mapping[str, float]:
     section.only(UNITS)
-    for name in REQUIRED:
+    required = REQUIRED[drive]
+    for name in required:
         if name not in section.values:
-            raise section.error(name, "is missing; add { value, unit, source }")
+            other = next((kind for kind, names in REQUIRED.items() if set(names) <= section.values.keys()), None)
+            hint = f', or state drive = "{other}", for which all figures are there' if other else ""
+            raise section.error(name, f"is missing; add {{ value, unit, source }}{hint}")
     figures = {}
     for name in section.values:
         figure = section.section(name)
         figure.only(("value", "unit", "source"))
         figure.text("unit", choices=(UNITS[name],))
         figure.text("source")
-        divides = name in REQUIRED and name != "motor_time_constant"
-        figures[name] = figure.number("value", low=1e-6 if divides else 0.0)
+        divides = name in required and name != "motor_time_constant"
+        most = {"high": LARGEST_DEG} if name == "wheel_angle" else {}
+        figures[name] = figure.number("value", low=1e-6 if divides else 0.0, **most)
     return MappingProxyType(figures)

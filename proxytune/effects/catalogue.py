@@ -26,6 +26,7 @@ from proxytune.effects.camera import (
     LensDistortion,
     PixelAspect,
 )
+from proxytune.effects.columns import QUANTISATION, STEERED, STEERED_COMMANDS, THROTTLED
 from proxytune.effects.command import CommandQuantisation, Delay, DelayJitter, DroppedCommands
 from proxytune.effects.effect import (
     CHANNELS,
@@ -56,6 +57,7 @@ from proxytune.effects.motion import (
     YawScrub,
 )
 from proxytune.effects.motors import BatterySag, DriverMap, MotorLag, Saturation, SlewRate, ThermalFade, Trim, WheelGain
+from proxytune.effects.steering import Rolling, SteeringBacklash, SteeringCurve, SteeringFriction, SteeringOffset, Tyres
 from proxytune.errors import ExtensionError, SettingsError
 from proxytune.extensions import describe, load, plugins
 from proxytune.settings import nearest
@@ -191,10 +193,7 @@ def _signal(stage: Stage) -> Any:
     return np.sin(np.arange(TICKS * channels, dtype=float)).reshape(1, TICKS, channels)
 
 
-_ALL: tuple[type[Effect], ...] = (
-    DelayJitter, DroppedCommands, CommandQuantisation, Delay,
-    SlewRate, DriverMap, DeadBand, Stiction, Saturation, Trim, WheelGain, BatterySag, ThermalFade, MotorLag, Backlash,
-    WheelRipple, YawScrub, Understeer, YawLag, TurnSlip, LateralSlip, CrossCoupling, FloorSlope, SlipperyPatch,
+_TRACKER_AND_CAMERA: tuple[type[Effect], ...] = (
     MarkerOffset, HeadingOffset,
     CameraPitch, CameraRoll, CameraYaw, CameraHeight, CameraForward, FieldOfView, LensDistortion, LensCentre,
     PixelAspect,
@@ -202,10 +201,35 @@ _ALL: tuple[type[Effect], ...] = (
     Blur, RollingShutter, CameraLatency, Defocus, Vignetting, Exposure, ImageNoise,
 )  # fmt: skip
 
+_ALL: tuple[type[Effect], ...] = (
+    DelayJitter, DroppedCommands, CommandQuantisation, Delay,
+    SlewRate, DriverMap, DeadBand, Stiction, Saturation, Trim, WheelGain, BatterySag, ThermalFade, MotorLag, Backlash,
+    WheelRipple, YawScrub, Understeer, YawLag, TurnSlip, LateralSlip, CrossCoupling, FloorSlope, SlipperyPatch,
+    *_TRACKER_AND_CAMERA,
+)  # fmt: skip
+
+# What bends the angle of the wheels goes before what is lost by it, and the mass comes last
+_OF_CARS: tuple[type[Effect], ...] = (
+    DelayJitter, DroppedCommands, QUANTISATION, Delay, *STEERED_COMMANDS,
+    *STEERED, SteeringBacklash, SteeringOffset, SteeringCurve, *THROTTLED, SteeringFriction, Rolling,
+    Tyres, YawLag, TurnSlip, FloorSlope, SlipperyPatch,
+    *_TRACKER_AND_CAMERA,
+)  # fmt: skip
+
 CATALOGUE: Mapping[str, type[Effect]] = MappingProxyType({effect.name: effect for effect in _ALL})
+
+CAR_CATALOGUE: Mapping[str, type[Effect]] = MappingProxyType({effect.name: effect for effect in _OF_CARS})
+
+DRIVES: Mapping[str, Mapping[str, type[Effect]]] = MappingProxyType(
+    {"differential": CATALOGUE, "ackermann": CAR_CATALOGUE}
+)
+"""The shipped effects of robots by how they drive: with two wheels of their own speed, or with wheels that steer."""
 
 DECLARED: tuple[str, ...] = ("trim", "delay", "blur", "camera_pitch")
 """The effects that a domain family has before anything is found to be missing: θ of the paper."""
+
+DECLARED_OF_CARS: tuple[str, ...] = ("steering_offset", "delay", "blur", "camera_pitch")
+"""The same of a car, whose trim is its steering's."""
 
 
 def theta_names(effect: type[Effect], name: str = "") -> tuple[str, ...]:
@@ -227,12 +251,21 @@ def effect_of(theta_name: str) -> str:
     return module + colon + rest.split(".")[0]
 
 
-_NAMED: Mapping[type[Effect], tuple[str, ...]] = {effect: theta_names(effect) for effect in _ALL}
+_NAMED: Mapping[str, Mapping[type[Effect], tuple[str, ...]]] = {
+    drive: {effect: theta_names(effect) for effect in effects.values()} for drive, effects in DRIVES.items()
+}
 
-PARAMETERS: Mapping[str, Parameter] = MappingProxyType(
-    {name: parameter for effect in _ALL for name, parameter in zip(theta_names(effect), effect.parameters, strict=True)}
-)
-"""Every shipped effect's parameters by their names in θ."""
+_PARAMETERS: Mapping[str, Mapping[str, Parameter]] = {
+    drive: {
+        name: parameter
+        for effect, names in effects.items()
+        for name, parameter in zip(names, effect.parameters, strict=True)
+    }
+    for drive, effects in _NAMED.items()
+}
+
+PARAMETERS: Mapping[str, Parameter] = MappingProxyType(_PARAMETERS["differential"])
+"""Parameters of the shipped effects of a robot on two wheels by their names in θ."""
 
 
 @dataclass(frozen=True)
@@ -245,10 +278,30 @@ class Catalogue:
     Attributes:
         folder: Whose modules come before the installed ones; None for the installed ones alone.
         own: Effects that a diagnosis is to try beside the shipped ones and plug-ins.
+        drive: How the robot drives, one of DRIVES: which effects are shipped for it.
     """
 
     folder: Path | None = None
     own: tuple[str, ...] = ()
+    drive: str = "differential"
+
+    @property
+    def shipped(self) -> Mapping[str, type[Effect]]:
+        """The shipped effects of such a robot by name."""
+        return DRIVES[self.drive]
+
+    @property
+    def declared(self) -> tuple[str, ...]:
+        """The effects that a domain family of it has before anything is found to be missing."""
+        return DECLARED if self.drive == "differential" else DECLARED_OF_CARS
+
+    def hint(self, name: str) -> str:
+        """A hint that ends an error line on an effect or a parameter that it does not have."""
+        effect = effect_of(name)
+        others = [drive for drive, effects in DRIVES.items() if effect in effects and effect not in self.shipped]
+        if others:
+            return f'only a robot with drive = "{others[0]}" has it, this one is "{self.drive}"'
+        return nearest(name, self.parameters if name not in self.shipped else self.theta_names(name))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -257,7 +310,8 @@ class Catalogue:
         Raises:
             ExtensionError: If two plug-ins have one name, or one has that of a shipped effect.
         """
-        return tuple(dict.fromkeys((*CATALOGUE, *plugins("effect", CATALOGUE), *self.own)))
+        known = {name for effects in DRIVES.values() for name in effects}
+        return tuple(dict.fromkeys((*self.shipped, *plugins("effect", known), *self.own)))
 
     @property
     def parameters(self) -> "Parameters":
@@ -270,7 +324,7 @@ class Catalogue:
         Raises:
             ExtensionError: If there is none, or it is not what an effect must be.
         """
-        return CATALOGUE[name] if name in CATALOGUE else outside_effect(name, self.folder)
+        return self.shipped[name] if name in self.shipped else outside_effect(name, self.folder)
 
     def theta_names(self, name: str) -> tuple[str, ...]:
         """The names in θ of an effect's parameters."""
@@ -292,8 +346,9 @@ class Parameters(Mapping[str, Parameter]):
     catalogue: Catalogue
 
     def __getitem__(self, name: str) -> Parameter:
-        if name in PARAMETERS:
-            return PARAMETERS[name]
+        shipped = _PARAMETERS[self.catalogue.drive]
+        if name in shipped:
+            return shipped[name]
         effect = effect_of(name)
         if not self.catalogue.knows(effect):
             raise KeyError(name)
@@ -323,11 +378,12 @@ def effects_from(theta: Theta, nominal: Mapping[str, float], catalogue: Catalogu
     """
     for name, value in theta.items():
         if not is_learnt(name):
-            _check(name, value, catalogue.parameters)
-    outside = {effect_of(name) for name in theta if name not in PARAMETERS and not is_learnt(name)}
+            _check(name, value, catalogue)
+    shipped = _NAMED[catalogue.drive]
+    outside = {effect_of(name) for name in theta if name not in _PARAMETERS[catalogue.drive] and not is_learnt(name)}
     named = [(catalogue.effect(name), catalogue.theta_names(name)) for name in sorted(outside)]
     chosen: list[Effect] = []
-    for effect, names in (*_NAMED.items(), *named):
+    for effect, names in (*shipped.items(), *named):
         if not theta.keys().isdisjoint(names):
             pairs = zip(names, effect.parameters, strict=True)
             chosen.append(effect(*(_value(name, parameter, theta, nominal) for name, parameter in pairs)))
@@ -345,9 +401,10 @@ def _value(name: str, parameter: Parameter, theta: Theta, nominal: Mapping[str, 
         raise SettingsError(f"{name}: the robot states no {parameter.neutral}; state this parameter too") from None
 
 
-def _check(name: str, value: float, parameters: Parameters) -> None:
+def _check(name: str, value: float, catalogue: Catalogue) -> None:
+    parameters = catalogue.parameters
     if name not in parameters:
-        raise SettingsError(f"{name}: no effect has this parameter; {nearest(name, parameters)}")
+        raise SettingsError(f"{name}: no effect has this parameter; {catalogue.hint(name)}")
     parameter = parameters[name]
     if not parameter.low <= value <= parameter.high:
         raise SettingsError(

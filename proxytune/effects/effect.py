@@ -21,6 +21,7 @@ class Cue(StrEnum):
     """A signal that motion may depend on, as people call it."""
 
     WHEEL_COMMAND = "wheel command"
+    STEERING = "steering"
     COMMAND_DIFFERENCE = "difference of the wheel commands"
     TRANSIENTS = "command transients"
     REVERSAL = "distance since reversal"
@@ -169,7 +170,7 @@ class Stage(StrEnum):
 
 
 CHANNELS: Mapping[Stage, tuple[str, ...]] = {
-    Stage.COMMAND: ("left", "right"),
+    Stage.COMMAND: ("left", "right"),  # of a car: throttle and steering
     Stage.ACTUATION: ("left", "right"),
     Stage.MOTION: ("forward_m_s", "sideways_m_s", "yaw_rad_s"),
     Stage.MEASUREMENT: ("x_m", "y_m", "heading_rad"),

@@ -162,12 +162,12 @@ class Backlash:
     def apply(self, signal: Signal, memory: BacklashState) -> tuple[Signal, BacklashState]:
         """The wheel's angle stays while it is within the gear's angle ± half the gap."""
         gear = memory.ahead + np.cumsum(signal, axis=-2)
-        ahead = gear - _taken_along(gear, memory.half)
+        ahead = gear - taken_along(gear, memory.half)
         gained = np.diff(ahead, axis=-2, prepend=memory.ahead)
         return signal - gained, memory._replace(ahead=ahead[..., -1:, :])
 
 
-def _taken_along(gear: Signal, half: Signal) -> Signal:
+def taken_along(gear: Signal, half: Signal) -> Signal:
     """The wheel's angle as the gear's angle ± half the gap takes it along from 0 on (…, time, 2).
 
     Clips of clips are clips: bounds are composed within √time blocks side by side, then the blocks follow each other.

@@ -9,7 +9,7 @@ from typing import cast
 
 import numpy as np
 
-from proxytune.effects.catalogue import CATALOGUE, PARAMETERS, SHIPPED, Catalogue, effect_of
+from proxytune.effects.catalogue import DRIVES, SHIPPED, Catalogue, effect_of
 from proxytune.effects.effect import Effect, FilterContext, Memory, Recalling, Separate, Signal, Stage
 from proxytune.effects.learnt import Learnt, is_learnt, learnt_text, read_learnt
 from proxytune.errors import ExtensionError
@@ -106,7 +106,8 @@ def read_effects(
 def _parameters(section: Section, effect: str, catalogue: Catalogue) -> dict[str, Parameter]:
     """The parameters of an effect by their names in θ."""
     if not catalogue.knows(effect):
-        hint = nearest(effect, (*catalogue.names, Learnt.name))
+        elsewhere = any(effect in effects for effects in DRIVES.values())
+        hint = catalogue.hint(effect) if elsewhere else nearest(effect, (*catalogue.names, Learnt.name))
         raise section.error(effect, f"no such effect; {hint} (your own is written module:Attribute)")
     try:
         return dict(zip(catalogue.theta_names(effect), catalogue.effect(effect).parameters, strict=True))
@@ -140,8 +141,8 @@ def effects_table(
 ) -> str:
     """The `[effects.NAME]` tables that read back as these values and intervals."""
     lines: list[str] = []
-    outside = {effect_of(name) for name in theta if name not in PARAMETERS and not is_learnt(name)}
-    for effect in (*CATALOGUE, *sorted(outside)):
+    outside = {effect_of(name) for name in theta if not is_learnt(name)} - catalogue.shipped.keys()
+    for effect in (*catalogue.shipped, *sorted(outside)):
         pairs = list(zip(catalogue.theta_names(effect), catalogue.effect(effect).parameters, strict=True))
         named = [(name, parameter) for name, parameter in pairs if name in theta]
         lines += [f"\n[effects.{_key(effect)}]"] if named else []

@@ -21,7 +21,7 @@ from proxytune.driving import (
 )
 from proxytune.driving.plants import PlanarPlant
 from proxytune.driving.robot import REQUIRED
-from proxytune.effects import CATALOGUE, FilterContext, Stage, effects_from, theta_names
+from proxytune.effects import FilterContext, Stage, effects_from, theta_names
 from proxytune.errors import ExtensionError, SettingsError
 from proxytune.files import shipped
 from proxytune.settings import Section, read_settings
@@ -55,18 +55,18 @@ def copy_duckiebot(folder, before, after):
 
 
 def test_the_robots_of_the_package_are_listed():
-    assert robot_names() == ("duckiebot", "husky", "irobot_create")
+    assert robot_names() == ("car", "dart", "duckiebot", "husky", "irobot_create")
 
 
 @pytest.mark.parametrize("name", robot_names())
 def test_every_figure_has_a_unit_and_a_source_and_is_not_negative(name):
-    figures = stated(name)["figures"]
-    assert set(REQUIRED) <= set(figures) <= set(UNITS)
+    figures, required = stated(name)["figures"], REQUIRED[read_robot(name).drive]
+    assert set(required) <= set(figures) <= set(UNITS)
     for figure, cell in figures.items():
         assert cell["unit"] == UNITS[figure]
         assert len(cell["source"]) > 10
         assert cell["value"] >= 0
-    assert all(figures[figure]["value"] > 0 for figure in REQUIRED if figure != "motor_time_constant")
+    assert all(figures[figure]["value"] > 0 for figure in required if figure != "motor_time_constant")
 
 
 @pytest.mark.parametrize("name", robot_names())
@@ -79,9 +79,10 @@ def test_a_robot_is_called_as_its_folder_and_described_in_a_line(name):
 
 @pytest.mark.parametrize("name", robot_names())
 def test_every_effect_but_the_cameras_has_a_neutral_value_for_every_robot(name):
-    figures = read_robot(name).figures
-    seen = [e for e in CATALOGUE.values() if e.stage is not Stage.CAMERA or set(CAMERA) <= set(figures)]
-    assert len(seen) >= len(CATALOGUE) - 9
+    robot = read_robot(name)
+    figures, effects = robot.figures, robot.catalogue.shipped.values()
+    seen = [e for e in effects if e.stage is not Stage.CAMERA or set(CAMERA) <= set(figures)]
+    assert len(seen) >= len(effects) - 9
     values = [parameter.neutral_value(figures) for effect in seen for parameter in effect.parameters]
     assert np.isfinite(values).all()
 
@@ -92,18 +93,20 @@ def test_neutral_drivetrain_effects_leave_every_robot_as_it_is(name):
     held = np.tile((0.3, 0.5), (240, 1))
     plain = drivetrain(robot, ())
     stages = (Stage.COMMAND, Stage.ACTUATION, Stage.MOTION)
-    names = [n for e in CATALOGUE.values() if e.stage in stages and e.name != "motor_lag" for n in theta_names(e)]
-    parameters = {n: p for e in CATALOGUE.values() for n, p in zip(theta_names(e), e.parameters, strict=True)}
-    neutral = drivetrain(
-        robot, effects_from({n: parameters[n].neutral_value(robot.figures) for n in names}, robot.figures)
-    )
+    kinds = [e for e in robot.catalogue.shipped.values() if e.stage in stages and e.name != "motor_lag"]
+    parameters = {n: p for e in kinds for n, p in zip(theta_names(e), e.parameters, strict=True)}
+    theta = {name: parameter.neutral_value(robot.figures) for name, parameter in parameters.items()}
+    neutral = drivetrain(robot, effects_from(theta, robot.figures, robot.catalogue))
     setting = FilterContext(60.0, np.zeros(2), robot.figures)
     np.testing.assert_allclose(
         neutral.apply(held, neutral.begin(setting))[0], plain.apply(held, plain.begin(setting))[0], atol=1e-9
     )
 
 
-@pytest.mark.parametrize("name", robot_names())
+DIFFERENTIAL = [name for name in robot_names() if read_robot(name).drive == "differential"]
+
+
+@pytest.mark.parametrize("name", DIFFERENTIAL)
 def test_every_robot_drives_straight_at_full_speed_and_turns_by_its_baseline_on_the_planar_plant(name):
     robot = read_robot(name)
     start = np.array((0.2, -0.1, 0.4))
@@ -252,7 +255,7 @@ def test_a_robot_beside_the_study_comes_before_a_shipped_one(tmp_path):
         assert family.instance({}).robot.figures["wheel_radius"] == 0.04
         assert family.instance({}).robot.urdf == home / "duckiebot.urdf"
     assert read_robot("duckiebot").figures["wheel_radius"] == 0.0318
-    assert robot_names(tmp_path) == ("duckiebot", "husky", "irobot_create", "my_robot")
+    assert robot_names(tmp_path) == ("car", "dart", "duckiebot", "husky", "irobot_create", "my_robot")
 
 
 def test_a_robot_whose_toml_has_another_name_than_its_folder_is_refused(tmp_path):

@@ -9,7 +9,16 @@ import pytest
 from filtered import filtered
 
 from proxytune.driving import read_robot
-from proxytune.effects import CATALOGUE, PARAMETERS, Blur, FilterContext, Stage, effects_from, stage_chain
+from proxytune.effects import (
+    CAR_CATALOGUE,
+    CATALOGUE,
+    PARAMETERS,
+    Blur,
+    FilterContext,
+    Stage,
+    effects_from,
+    stage_chain,
+)
 from proxytune.effects.command import CommandQuantisation, Delay
 from proxytune.effects.motors import DriverMap, MotorLag, Trim, WheelGain, per_wheel
 from proxytune.space import Parameter
@@ -76,6 +85,14 @@ def subject(name):
 @pytest.mark.parametrize("name", CATALOGUE)
 def test_every_effect_keeps_what_effects_promise(name):
     check_effect(CATALOGUE[name], robot=ROBOT)
+
+
+OF_CARS = [name for name, effect in CAR_CATALOGUE.items() if effect not in CATALOGUE.values()]
+
+
+@pytest.mark.parametrize("name", OF_CARS)
+def test_every_effect_of_a_car_keeps_what_effects_promise(name):
+    check_effect(CAR_CATALOGUE[name], robot=read_robot("car"))
 
 
 @pytest.mark.parametrize("name", IMBALANCED)

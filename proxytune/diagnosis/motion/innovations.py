@@ -347,7 +347,7 @@ def _window_wheels(drives: Drives, train: Drivetrain, begin: Whole, length: int)
     """Wheel speeds in whole drives (E, T, 2), and in windows (W, length, 2), there from measured ones on if any are."""
     setting = _setting(drives)
     memory = train.begin(setting)
-    arrived = np.clip(train.command.apply(drives.duties, memory.command)[0], -1.0, 1.0)
+    arrived = train.within_range(train.command.apply(drives.duties, memory.command)[0])
     episode, start = drives.episode[begin], drives.first[begin]
     ticks = np.minimum(start[:, None] + np.arange(length), arrived.shape[1] - 1)
     whole = train.actuation.apply(arrived, memory.actuation)[0]
@@ -411,7 +411,7 @@ def drawn_paths(drives: Drives, theta: Theta, seed: int) -> Floats:
 def _wheel_speeds(drives: Drives, train: Drivetrain, setting: FilterContext) -> Floats:
     memory = train.begin(setting)
     arrived, _ = train.command.apply(drives.duties, memory.command)
-    return np.asarray(train.actuation.apply(np.clip(arrived, -1.0, 1.0), memory.actuation)[0])
+    return np.asarray(train.actuation.apply(train.within_range(arrived), memory.actuation)[0])
 
 
 def arrived_commands(drives: Drives, theta: Theta) -> Floats:

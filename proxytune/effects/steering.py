@@ -1,0 +1,304 @@
+"""Effects that only a car has: of its linkage, of what steering costs, of its mass, and of its tyres.
+
+They work on a car's two columns, speed and angle of the front wheels as fractions of full ones, or, the tyres, on the
+motion that these ask of the body.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from proxytune.effects.columns import STEERING, THROTTLE
+from proxytune.effects.effect import (
+    TURN,
+    Cue,
+    FilterContext,
+    Form,
+    Means,
+    Panel,
+    Signal,
+    Stage,
+    Trace,
+    WheelCurve,
+    remember_nothing,
+)
+from proxytune.effects.friction import taken_along
+from proxytune.space import Parameter
+
+
+def _steered(signal: Signal, angle: Signal) -> Signal:
+    return np.stack((signal[..., THROTTLE], angle), axis=-1)
+
+
+@dataclass(frozen=True)
+class SteeringBacklash:
+    """The linkage has play: the wheels stay where they are while the servo is within half the gap of them."""
+
+    gap: float
+    name: ClassVar[str] = "steering_backlash"
+    stage: ClassVar[Stage] = Stage.ACTUATION
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(name="gap", unit="full lock", low=0.0, high=0.4, neutral=0.0, probes=(0.02, 0.05, 0.1, 0.2),
+                  source="ball joints and plastic knuckles: some degrees of the wheels, worn ones more"),
+    )  # fmt: skip
+    trace: ClassVar[Trace | None] = Trace(cues=(Cue.STEERING, Cue.TRANSIENTS), shown=WheelCurve.REVERSAL)
+
+    def begin(self, context: FilterContext) -> Signal:
+        """With the wheels where the servo rests."""
+        return np.asarray(context.rest, dtype=float)[..., None, STEERING:]
+
+    def apply(self, signal: Signal, memory: Signal) -> tuple[Signal, Signal]:
+        """The wheels' angle is taken along by the servo's ± half the gap."""
+        wheels = memory + taken_along(signal[..., STEERING:] - memory, np.asarray(self.gap / 2.0))
+        return _steered(signal, wheels[..., 0]), wheels[..., -1:, :]
+
+
+@dataclass(frozen=True)
+class SteeringOffset:
+    """The wheels are not straight at a steering of 0: the trim of a car."""
+
+    offset: float
+    name: ClassVar[str] = "steering_offset"
+    stage: ClassVar[Stage] = Stage.ACTUATION
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(name="offset", unit="full lock", low=-0.4, high=0.4, neutral=0.0,
+                  probes=(-0.2, -0.08, -0.03, 0.03, 0.08, 0.2),
+                  source="servo horns have some 25 teeth: up to 7° of the horn off; DART: 0.027 of full lock"),
+    )  # fmt: skip
+    trace: ClassVar[Trace | None] = Trace(cues=(Cue.STEERING,), shown=WheelCurve.STEADY)
+    begin = remember_nothing
+
+    def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
+        """Add it."""
+        return _steered(signal, signal[..., STEERING] + self.offset), None
+
+
+@dataclass(frozen=True)
+class SteeringCurve:
+    """The wheels' angle is a curve of the steering, to either side its own: side · tanh(bend · s) / tanh(bend).
+
+    `left` and `right` are the angles at full lock; at a bend of 0 a side is a straight line.
+    """
+
+    left: float
+    right: float
+    left_bend: float
+    right_bend: float
+    name: ClassVar[str] = "steering_curve"
+    stage: ClassVar[Stage] = Stage.ACTUATION
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        *(
+            Parameter(name=side, unit="deg", low=3.0, high=60.0, neutral="wheel_angle",
+                      probes=(10.0, 15.0, 20.0, 25.0, 30.0, 40.0),
+                      source="knuckles of cars stop at 20° to 45°, left and right some degrees apart")
+            for side in ("left", "right")
+        ),
+        *(
+            Parameter(name=f"{side}_bend", unit="", low=0.0, high=3.0, neutral=0.0, probes=(0.5, 1.0, 1.5, 2.0),
+                      source="DART: 1.4 to the left, 1.0 to the right")
+            for side in ("left", "right")
+        ),
+    )  # fmt: skip
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.STEERING,),
+        shown=WheelCurve.STEADY,
+        forms=(
+            Form((("left",), ("right",)), "sides", moved=("left", "right")),
+            Form((("left",), ("right",), ("left_bend", "right_bend")), "sides bent alike"),
+            Form((("left",), ("right",), ("left_bend",), ("right_bend",)), "sides bent apart"),
+        ),
+    )
+
+    def begin(self, context: FilterContext) -> float:
+        """The angle that stands for 1 [deg]."""
+        return context.nominal["wheel_angle"]
+
+    def apply(self, signal: Signal, memory: float) -> tuple[Signal, float]:
+        """Bend each sample by the curve of its side."""
+        steering = signal[..., STEERING]
+        left, right = (
+            share / memory * (np.tanh(bend * steering) / math.tanh(bend) if bend > 0.0 else steering)
+            for share, bend in ((self.left, self.left_bend), (self.right, self.right_bend))
+        )
+        return _steered(signal, np.where(steering > 0.0, left, right)), memory
+
+
+@dataclass(frozen=True)
+class SteeringFriction:
+    """Turned wheels brake: the motor's speed shrinks by the factor 1 − loss · |wheel angle at full lock|."""
+
+    loss: float
+    name: ClassVar[str] = "steering_friction"
+    stage: ClassVar[Stage] = Stage.ACTUATION
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(name="loss", unit="", low=0.0, high=0.9, neutral=0.0, probes=(0.05, 0.1, 0.2, 0.4),
+                  source="front tyres that scrub: some tenths of the speed at full lock"),
+    )  # fmt: skip
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.STEERING,), shown=Means(Cue.TURN_RATE, (Panel("turn", TURN, "forward", share=True),))
+    )
+    begin = remember_nothing
+
+    def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
+        """Slow the car down by how far its wheels are turned, at most to a stop."""
+        kept = np.maximum(0.0, 1.0 - self.loss * np.abs(signal[..., STEERING]))
+        return np.stack((signal[..., THROTTLE] * kept, signal[..., STEERING]), axis=-1), None
+
+
+FAR = 1e9
+"""Beyond any speed."""
+
+
+class RollingState(NamedTuple):
+    """A car that rolls.
+
+    Attributes:
+        speed: At the end of the last sample (…,), as a fraction of full speed.
+        ahead: Whether its motor last drove it forwards (…,): 1, or −1.
+        sample_s: How long a sample lasts [s].
+        friction: What friction takes from it in a second.
+    """
+
+    speed: Signal
+    ahead: Signal
+    sample_s: float
+    friction: float
+
+
+@dataclass(frozen=True)
+class Rolling:
+    """The car has mass: its speed v follows the motor's u, and without throttle it rolls on.
+
+    dv/dt = (u − (1 − freewheel + freewheel · |u|) · v) / inertia − friction − drag · v, u and v as fractions of full
+    speed. At a `freewheel` of 0 the motor holds the speed asked for and brakes as it drives; at 1 it pulls the less the
+    faster it turns, as a motor does on a voltage that is switched, and without throttle it does not brake at all.
+    """
+
+    inertia: float
+    freewheel: float
+    friction: float
+    drag: float
+    name: ClassVar[str] = "rolling"
+    stage: ClassVar[Stage] = Stage.ACTUATION
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(name="inertia", unit="s", low=0.0, high=3.0, neutral=0.0, probes=(0.1, 0.2, 0.4, 0.8, 1.6),
+                  source="full speed by the acceleration from rest: 0.2 to 1 s for model cars, seconds for large ones"),
+        Parameter(name="freewheel", unit="", low=0.0, high=1.0, neutral=0.0, probes=(0.25, 0.5, 0.75, 1.0),
+                  source="0 for a speed controller that holds a speed, 1 for one that switches a voltage", shape=True),
+        Parameter(name="friction", unit="m/s²", low=0.0, high=4.0, neutral=0.0, probes=(0.1, 0.3, 0.7, 1.5),
+                  source="rolling friction of model cars: 0.2 to 1 m/s²; DART: 0.74 m/s²", shape=True),
+        Parameter(name="drag", unit="1/s", low=0.0, high=2.0, neutral=0.0, probes=(0.05, 0.1, 0.2, 0.5, 1.0),
+                  source="gears, bearings and air: some tenths of the speed in a second", shape=True),
+    )  # fmt: skip
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.TRANSIENTS, Cue.WHEEL_COMMAND),
+        shown=WheelCurve.STEP,
+        forms=(
+            Form((("inertia",),), moved=("inertia",)),
+            Form((("inertia",), ("friction",)), "rolls on", fixed={"freewheel": 1.0}, moved=("inertia", "friction")),
+            Form((("inertia",), ("freewheel",), ("friction",), ("drag",)), "all"),
+        ),
+    )
+
+    def begin(self, context: FilterContext) -> RollingState:
+        """At the speed that the motor rests at."""
+        rest = np.asarray(context.rest, dtype=float)[..., THROTTLE]
+        friction = self.friction / context.nominal["full_speed"]
+        return RollingState(rest, np.where(rest < 0.0, -1.0, 1.0), 1.0 / context.rate_hz, friction)
+
+    def apply(self, signal: Signal, memory: RollingState) -> tuple[Signal, RollingState]:
+        """The mean speed over each sample, exact for a throttle that holds over it."""
+        if self.inertia == 0.0:
+            return signal, memory
+        motor = signal[..., THROTTLE]
+        speed = np.broadcast_to(memory.speed, motor.shape[:-1])
+        ahead = _last_sign(motor, memory.ahead)
+        rate = (1.0 - self.freewheel + self.freewheel * np.abs(motor)) / self.inertia + self.drag
+        rate = np.maximum(rate, 1e-9)
+        push = motor / self.inertia - ahead * memory.friction
+        # Where the motor is too weak for friction, that ends at rest
+        stuck = np.abs(motor) / self.inertia < memory.friction
+        low, high = np.where(stuck & (ahead > 0.0), 0.0, -FAR), np.where(stuck & (ahead < 0.0), 0.0, FAR)
+        kept, goal = np.exp(-rate * memory.sample_s), push / rate
+        ends = _follow(np.stack((kept, goal * (1.0 - kept), low, high)), speed)
+        starts = np.concatenate((speed[..., None], ends[..., :-1]), axis=-1)
+        mean = goal + (starts - goal) * (1.0 - kept) / (rate * memory.sample_s)
+        rolled = np.stack((np.clip(mean, low, high), signal[..., STEERING]), axis=-1)
+        return rolled, memory._replace(speed=ends[..., -1], ahead=ahead[..., -1])
+
+
+def _last_sign(motor: Signal, before: Signal) -> Signal:
+    """The sign of each sample (…, time), or of the last one before it that was not 0."""
+    signs = np.concatenate((np.broadcast_to(before, motor.shape[:-1])[..., None], np.sign(motor)), axis=-1)
+    latest = np.maximum.accumulate(np.where(signs != 0.0, np.arange(signs.shape[-1]), 0), axis=-1)
+    return np.asarray(np.take_along_axis(signs, latest, axis=-1)[..., 1:])
+
+
+def _follow(steps: Signal, start: Signal) -> Signal:
+    """The values (…, time) that steps v → clip(factor · v + shift, low, high) (4, …, time) make of a start (…,).
+
+    Such steps in a row are one such step: they are composed within √time blocks side by side, then these follow.
+    """
+    length = steps.shape[-1]
+    size = math.isqrt(length)
+    filler = np.reshape([1.0, 0.0, -FAR, FAR], (4, *[1] * (steps.ndim - 1)))
+    filled = np.concatenate((steps, np.broadcast_to(filler, (*steps.shape[:-1], -length % size))), axis=-1)
+    blocks = filled.reshape(*steps.shape[:-1], -1, size).copy()
+    for inside in range(1, size):
+        factor, shift, low, high = blocks[..., inside].copy()
+        before = blocks[..., inside - 1]
+        blocks[0, ..., inside], blocks[1, ..., inside] = factor * before[0], factor * before[1] + shift
+        for bound in (2, 3):
+            blocks[bound, ..., inside] = np.clip(factor * before[bound] + shift, low, high)
+    values = np.empty(blocks.shape[1:])
+    for block in range(values.shape[-2]):
+        factor, shift, low, high = blocks[..., block, :]
+        values[..., block, :] = np.clip(factor * start[..., None] + shift, low, high)
+        start = values[..., block, -1]
+    return values.reshape(*steps.shape[1:-1], -1)[..., :length]
+
+
+@dataclass(frozen=True)
+class Tyres:
+    """Tyres slip sideways: the car turns the less the harder it corners, and its rear slides outwards.
+
+    The yaw rate is divided by 1 + understeer · v²; then the lateral acceleration a = v · yaw is held back as
+    tanh(slide · a) / slide, at most 1 / slide; and the rear axle slides by v · rear_slip · a.
+    """
+
+    understeer: float
+    slide: float
+    rear_slip: float
+    name: ClassVar[str] = "tyres"
+    stage: ClassVar[Stage] = Stage.MOTION
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(name="understeer", unit="s²/m²", low=0.0, high=1.0, neutral=0.0, probes=(0.01, 0.03, 0.1, 0.3),
+                  source="1 by the square of the speed at which a car turns half as far: 3 to 10 m/s for model cars"),
+        Parameter(name="slide", unit="s²/m", low=0.0, high=1.0, neutral=0.0, probes=(0.07, 0.15, 0.3, 0.6),
+                  source="1 by the lateral acceleration that tyres hold: 2 to 10 m/s²"),
+        Parameter(name="rear_slip", unit="s²/m", low=-0.1, high=0.2, neutral=0.0, probes=(0.005, 0.015, 0.04, 0.1),
+                  source="slip angle of some degrees at 5 m/s²"),
+    )  # fmt: skip
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.TURN_RATE,),
+        shown=Means(Cue.TURN_RATE, (Panel("bend", "forward speed times turn rate [m/s²]", "turn", share=True),)),
+        forms=(
+            Form((("understeer",),), "understeer", moved=("understeer",)),
+            Form((("slide",),), "slide", moved=("slide",)),
+            Form((("rear_slip",),), "rear slip", moved=("rear_slip",),
+                 shown=Means(Cue.TURN_RATE,
+                             (Panel("bend", "forward speed times turn rate [m/s²]", "sideways"),))),
+        ),
+    )  # fmt: skip
+    begin = remember_nothing
+
+    def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
+        """Turn the less, and slide the more, the harder the car corners."""
+        forward, sideways, yaw = np.moveaxis(signal, -1, 0)
+        turned = yaw / (1.0 + self.understeer * forward**2)
+        wanted = self.slide * np.abs(forward * turned)
+        turned = turned * np.where(wanted > 1e-9, np.tanh(wanted) / np.maximum(wanted, 1e-9), 1.0)
+        slid = sideways - self.rear_slip * np.abs(forward) * forward * turned
+        return np.stack((forward, slid, turned), axis=-1), None

@@ -1,12 +1,12 @@
 from .catalogue import (
     CAR_CATALOGUE as CAR_CATALOGUE,
     CATALOGUE as CATALOGUE,
+    Catalogue as Catalogue,
     DECLARED as DECLARED,
     DRIVES as DRIVES,
     MEMBERS as MEMBERS,
     PARAMETERS as PARAMETERS,
     SHIPPED as SHIPPED,
-    Catalogue as Catalogue,
     effect_of as effect_of,
     effects_from as effects_from,
     problems as problems,
@@ -14,7 +14,6 @@ from .catalogue import (
 )
 from .effect import (
     CHANNELS as CHANNELS,
-    TURN as TURN,
     Cue as Cue,
     Draws as Draws,
     Effect as Effect,
@@ -26,10 +25,11 @@ from .effect import (
     Panel as Panel,
     Signal as Signal,
     Stage as Stage,
+    TURN as TURN,
     Trace as Trace,
     WheelCurve as WheelCurve,
 )
-from .features import GROUPS as GROUPS, HEADING as HEADING, LEVEL as LEVEL, Knots as Knots
+from .features import GROUPS as GROUPS, HEADING as HEADING, Knots as Knots, LEVEL as LEVEL
 from .image import Blur as Blur, RollingShutter as RollingShutter
 from .learnt import (
     FittedRange as FittedRange,

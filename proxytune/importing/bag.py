@@ -387,7 +387,14 @@ def _joints(message: Any) -> Row:
     return (float(sides[0][0]), float(sides[1][0]))
 
 
+def _ackermann(message: Any) -> Row:
+    drive = getattr(message, "drive", message)
+    return (drive.speed, drive.steering_angle)
+
+
 COMMANDS: Mapping[str, Callable[[Any], Row]] = {
+    "AckermannDrive": _ackermann,
+    "AckermannDriveStamped": _ackermann,
     "Twist": _twist,
     "TwistStamped": _twist,
     "WheelsCmdStamped": lambda message: (message.vel_left, message.vel_right),

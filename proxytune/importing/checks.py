@@ -64,7 +64,7 @@ def _check_commands(commands: Commands, poses: Poses, about: str) -> None:
     most = float(np.percentile(np.abs(commands.values[:, 0]), 95))
     if commands.kind == "wheel_speed" and most > FASTEST_WHEEL_RAD_S:
         raise LogError(f"{about}: asks a wheel for {most:.3g} rad/s; state the unit of its commands")
-    if commands.kind != "twist":
+    if commands.kind not in ("twist", "speed_steering"):
         return
     if most > FASTEST_M_S:
         raise LogError(f"{about}: asks for {most:.3g} m/s; state the unit of its commands (--columns v=cmd_lin:mm/s)")
@@ -305,7 +305,7 @@ def _commanded_turn(drive: Drive, times: Floats) -> Floats:
     commands = drive.commands
     assert commands is not None
     held = commands.values[np.maximum(np.searchsorted(commands.times, times, side="right") - 1, 0)]
-    turn = held[:, 1] if commands.kind == "twist" else held[:, 1] - held[:, 0]
+    turn = held[:, 1] - held[:, 0] if commands.kind in ("duty", "wheel_speed") else held[:, 1]
     return np.asarray(turn - turn.mean())
 
 

@@ -16,7 +16,7 @@ from proxytune.errors import LogError
 from proxytune.importing.checks import FURTHEST_BACK_S, headings_and_tilts
 from proxytune.importing.source import Channel, Commands, Poses
 from proxytune.importing.text import COMMAND_FIELDS, EXAMPLE, PLACE, POSE, QUANTITIES, QUATERNION, USUAL, Table
-from proxytune.logs import COMMANDS
+from proxytune.logs import COMMANDS, ENABLED
 from proxytune.settings import nearest
 
 
@@ -67,6 +67,9 @@ EPOCHS = ((1e17, UNITS["ns"]), (1e14, UNITS["us"]), (1e11, UNITS["ms"]))
 
 LARGEST = {"speed": 30.0, "turning speed": 300.0, "length": 1000.0}
 """Beyond these [m/s, rad/s, m from end to end] a unit that nobody stated is doubted."""
+
+PULSES = (900.0, 2200.0)
+"""Lengths of servo pulses [us]."""
 
 SHORTEST_STEP_S, LONGEST_STEP_S = 1e-5, 10.0
 """Median step of stamps outside of which a unit that nobody stated is doubted."""
@@ -140,7 +143,8 @@ def contradiction(unit: Unit, values: Floats) -> str:
             return _angle_contradiction(unit, seen)
         size = np.ptp(seen) if unit.quantity == "length" else np.abs(seen).max()
     if unit.quantity == "duty" and size * unit.factor > 1.0 + 1e-6:
-        return f"{size:g} is more than full duty"
+        pulses = "; servo pulses are made shares by (pulse - rest) / range" if PULSES[0] < size < PULSES[1] else ""
+        return f"{size:g} is more than 1, all that there is{pulses}"
     if size * unit.factor > LARGEST.get(unit.quantity, np.inf):
         return f"{size:g} {unit.name} {'from end to end ' if unit.quantity == 'length' else ''}is much for a robot"
     return ""
@@ -315,7 +319,7 @@ def with_commands(columns: Columns, kind: str, table: Table) -> tuple[Columns, s
         either = " or ".join(kinds)
         raise LogError(f"{table.path}: its commands may be {either}; choose one, as in --kind {kinds[0]}")
     if kinds:
-        unused = set(COMMAND_FIELDS) - set(COMMANDS[kinds[0]])
+        unused = set(COMMAND_FIELDS) - {*COMMANDS[kinds[0]], ENABLED}
         return {field: column for field, column in columns.items() if field not in unused}, kinds[0]
     pairs = [COMMANDS[kind]] if kind in COMMANDS else [pair for pair in COMMANDS.values() if set(pair) & set(columns)]
     lacking = [field for pair in pairs for field in pair if field not in columns]
@@ -370,7 +374,8 @@ def commands_by_drive(table: Table, columns: Columns, kind: str) -> dict[str, Co
     Raises:
         LogError: If a cell is no number, or half of a command is empty.
     """
-    times, values, labels = _filled_rows(table, _on_own_clock(columns), COMMANDS[kind])
+    fields = (*COMMANDS[kind], *((ENABLED,) if ENABLED in columns else ()))
+    times, values, labels = _filled_rows(table, _on_own_clock(columns), fields)
     if "command_time" in columns:  # a command stands in every row until the next one
         anew = np.append(True, (np.diff(times) != 0.0) | (np.diff(values, axis=0) != 0.0).any(axis=1))[: len(times)]
         times, values, labels = times[anew], values[anew], labels[anew]

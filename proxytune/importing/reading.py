@@ -23,7 +23,7 @@ from proxytune.importing.checks import check_units, checked_drive, reaction_of
 from proxytune.importing.source import Drive, Facts, Pictures, Source, Survey, Wanted
 from proxytune.importing.tables import is_csv_tables, is_mrclam, is_tum, read_csv_tables, read_mrclam, read_tum
 from proxytune.importing.topics import read_bag
-from proxytune.logs import COMMANDS, Log, read_log
+from proxytune.logs import CAR_COMMANDS, COMMANDS, ENABLED, Log, read_log
 
 GAP_S = 0.5
 """A longer time without a pose is a gap."""
@@ -170,8 +170,13 @@ def fill_log(folder: Path, source: Source, facts: Facts, name: str, origin: str)
         poses = (drive.poses.times, drive.poses.places[:, :2], np.unwrap(drive.poses.headings))
         samples.append(_named(drive.name, poses, ("time", "x", "y", "heading")))
         if drive.commands is not None:
-            issued = (drive.commands.times, drive.commands.values)
-            commands.append(_named(drive.name, issued, ("time", *COMMANDS[drive.commands.kind])))
+            names = ("time", *COMMANDS[drive.commands.kind], ENABLED)[: 1 + drive.commands.values.shape[1]]
+            commands.append(_named(drive.name, (drive.commands.times, drive.commands.values), names))
+    if commands and _beside(source):
+        samples = [
+            pd.concat((one, own.drop(columns=["episode", "time"])), axis=1) for one, own in zip(samples, commands)
+        ]
+        commands = []
     for name_of_file, tables in (("samples.csv", samples), ("commands.csv", commands)):
         if tables:
             pd.concat(tables).to_csv(folder / name_of_file, index=False, lineterminator="\n")
@@ -180,6 +185,16 @@ def fill_log(folder: Path, source: Source, facts: Facts, name: str, origin: str)
         _write_pictures(folder, pictures)
     text = _description(source, name, facts, origin, with_pictures=bool(pictures))
     (folder / "log.toml").write_text(text, encoding="utf-8")
+
+
+def _beside(source: Source) -> bool:
+    """True where every command of a car was written down with a pose."""
+    return all(
+        drive.commands is not None
+        and drive.commands.kind in CAR_COMMANDS
+        and np.array_equal(drive.commands.times, drive.poses.times)
+        for drive in source.drives
+    )
 
 
 def read_as(folder: Path, shown: Path) -> Log:

@@ -24,7 +24,7 @@ class Commands:
     Attributes:
         kind: One of `proxytune.logs.COMMANDS`, which says what the two columns are.
         times: When each was issued (M,) [s], as stamped.
-        values: What was commanded (M, 2).
+        values: What was commanded (M, 2); a third column is `enabled`, where the source has it.
     """
 
     kind: str

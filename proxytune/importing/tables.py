@@ -45,7 +45,7 @@ from proxytune.importing.text import (
     is_number,
     read_text_table,
 )
-from proxytune.logs import COMMANDS
+from proxytune.logs import COMMANDS, ENABLED
 from proxytune.settings import nearest
 
 STEMS = ("commands", "cmd_vel", "cmd")
@@ -110,7 +110,7 @@ def read_commands(path: Path, wanted: Wanted) -> CommandFile:
     }
     found = choose_columns(table, stated, ("time", "episode", *COMMAND_FIELDS))
     columns, kind = with_commands(found, wanted.kind, table)
-    used = {field: columns[field] for field in ("time", "episode", *COMMANDS[kind]) if field in columns}
+    used = {field: columns[field] for field in ("time", "episode", *COMMANDS[kind], ENABLED) if field in columns}
     commands = commands_by_drive(table, used, kind)
     channels = tuple(replace(c, name=f"{path.name}: {c.name}") for c in channels_of(table, used))
     return CommandFile(path, commands, channels, f"Commands of {path.name}: {described(used)}.")
@@ -270,7 +270,7 @@ def _columns(table: Table, wanted: Wanted, apart: Path | None) -> tuple[Columns,
         if field in fields and not (apart and field in COMMAND_FIELDS and not named_in(table, entry))
     }
     columns = choose_columns(table, stated, fields)
-    found = set(COMMAND_FIELDS) & set(columns)
+    found = set(COMMAND_FIELDS) & set(columns) - {ENABLED}
     if not found and "command_time" in wanted.columns:
         raise LogError(
             f"{table.path}: command_time is the clock of commands in the same table, which has none; leave it out"

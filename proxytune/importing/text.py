@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from proxytune.arrays import Floats
 from proxytune.errors import LogError
-from proxytune.logs import COMMANDS
+from proxytune.logs import COMMANDS, ENABLED
 
 EMPTY = ("", "nan", "NaN", "NAN", "na", "NA", "n/a", "N/A", "null", "NULL", "none", "None")
 """What stands in a cell in which there is nothing."""
@@ -210,7 +210,7 @@ def _cells(path: Path, number: int, line: str, separator: str) -> list[str]:
 PLACE = ("x", "y", "z")
 QUATERNION = ("qx", "qy", "qz", "qw")
 POSE = (*PLACE, "heading", *QUATERNION)
-COMMAND_FIELDS = tuple(field for pair in COMMANDS.values() for field in pair)
+COMMAND_FIELDS = (*(field for pair in COMMANDS.values() for field in pair), ENABLED)
 
 EXAMPLE = "--columns time=stamp_ns:ns,x=pos_x_mm:mm,y=pos_y_mm:mm,heading=yaw_deg:deg,v=cmd_lin,omega=cmd_ang"
 """A column map, for complaints."""
@@ -227,6 +227,10 @@ QUANTITIES: Mapping[str, str] = MappingProxyType(
         "omega": "turning speed",
         **dict.fromkeys(COMMANDS["duty"], "duty"),
         **dict.fromkeys(COMMANDS["wheel_speed"], "turning speed"),
+        **dict.fromkeys(COMMANDS["ackermann"], "duty"),
+        "speed": "speed",
+        "steering_angle": "angle",
+        ENABLED: "number",
     }
 )
 """What each field measures; episodes and quaternions have no unit."""
@@ -267,6 +271,11 @@ USUAL: Mapping[str, frozenset[str]] = MappingProxyType(
         "right": _filled(DUTIES, "right"),
         "wheel_command_left": _filled(WHEEL_SPEEDS, "left"),
         "wheel_command_right": _filled(WHEEL_SPEEDS, "right"),
+        "throttle": frozenset("throttle cmdthrottle throttlecmd throttlecommand gas".split()),
+        "steering": frozenset("steering steer cmdsteering steeringcmd steeringcommand".split()),
+        "speed": frozenset("speed cmdspeed speedcmd drivespeed commandedspeed commandspeed".split()),
+        "steering_angle": frozenset("steeringangle drivesteeringangle cmdsteeringangle steeringanglecmd".split()),
+        ENABLED: frozenset("enabled enable motorsenabled motorenabled".split()),
     }
 )
 """Usual names of each field, without underscores and units."""

@@ -23,6 +23,8 @@ from proxytune.settings import nearest
 KINDS: Mapping[str, str] = {
     "Twist": "twist",
     "TwistStamped": "twist",
+    "AckermannDriveStamped": "speed_steering",
+    "AckermannDrive": "speed_steering",
     "WheelsCmdStamped": "duty",
     "Float32MultiArray": "",
     "Float64MultiArray": "",

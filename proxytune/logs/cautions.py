@@ -118,7 +118,9 @@ CHORD_PARTS = ("speed", "course", "heading")
 def _commanded(log: Log, figures: Figures) -> list[tuple[Floats, Floats]]:
     """What each drive's commands ask for at its samples: speed [m/s], NaN if not known, and turning in any unit."""
     figure = {"duty": "full_speed", "wheel_speed": "wheel_radius"}.get(log.command, "")
-    scale = 1.0 if log.command == "twist" else {**figures, **log.geometry}.get(figure, np.nan)
+    # Throttle is no speed: a car's motor does nothing for small ones.
+    unit = {"twist": 1.0, "speed_steering": 1.0, "ackermann": np.nan}.get(log.command)
+    scale = {**figures, **log.geometry}.get(figure, np.nan) if unit is None else unit
     held = [episode.held for episode in log.episodes]
     if figure:
         return [(scale * one.mean(axis=1), one[:, 1] - one[:, 0]) for one in held]
@@ -167,6 +169,7 @@ def _speeds(log: Log, drives: list[Chords], figures: Figures) -> Iterator[str]:
         unit = {
             "duty": "duties of -1 to 1 at full duty, and full_speed",
             "twist": "the unit of v",
+            "speed_steering": "the unit of speed",
             "wheel_speed": "wheel speeds in rad/s, and wheel_radius",
         }[log.command]
         yield f"the robot drives {ratio:.2g} times as fast as its largest commands say: check {unit}"

@@ -148,7 +148,7 @@ def _per_row(samples: Rows, rate_hz: float, episodes: Sequence[LogEpisode]) -> I
 
 def _read_instants(path: Path, samples: Rows, episodes: Sequence[LogEpisode]) -> Instants:
     """The rows of frames.csv that lie within the poses of their drive."""
-    rows = read_rows(path, Layout(("frame",), (), (), 1, "frames"))
+    rows = read_rows(path, Layout(("frame",), (), (), (), 1, "frames"))
     check_known_episodes(rows, samples.names)
     _check_numbers(rows)
     order = {name: number for number, name in enumerate(samples.names)}

@@ -15,10 +15,19 @@ COMMANDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "duty": ("left", "right"),
         "twist": ("v", "omega"),
         "wheel_speed": ("wheel_command_left", "wheel_command_right"),
+        "ackermann": ("throttle", "steering"),
+        "speed_steering": ("speed", "steering_angle"),
         "none": (),
     }
 )
-"""The columns of each kind of command: duties in [−1, 1], a speed [m/s] and yaw rate [rad/s], wheel speeds [rad/s]."""
+"""The columns of each kind of command: duties in [−1, 1], a speed [m/s] and yaw rate [rad/s], wheel speeds [rad/s];
+of a car throttle and steering in [−1, 1], left positive, or speed [m/s] and wheel angle [rad]."""
+
+CAR_COMMANDS = ("ackermann", "speed_steering")
+"""Kinds of command that are a car's."""
+
+ENABLED = "enabled"
+"""The column that says whether the motors are on (1) or cut by a switch (0)."""
 
 POSE = ("x", "y", "heading")
 WHEELS = ("wheel_left", "wheel_right")
@@ -46,7 +55,7 @@ class LogEpisode:
         name: What the column `episode` says.
         times: Times of the samples (rows,) [s], 1 / rate_hz apart.
         commands: What was commanded (rows, 2), in the units of the log's command kind, held until the next row; or
-            (M, 2) where commands have times of their own.
+            (M, 2) where commands have times of their own. Where the motors were cut, what drives is 0.
         poses: Measured poses (rows, 3): x [m], y [m], heading [rad, unwrapped]; NaN where there is none.
         wheels: Measured wheel speeds (rows, 2), left and right [rad/s], or None.
         issued: When each command was issued (M,) [s], held until the next; None where they go with the samples.

@@ -3,13 +3,15 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from proxytune.arrays import Floats
 from proxytune.errors import LogError, SettingsError
 from proxytune.logs.frames import Camera, read_camera, read_frames
-from proxytune.logs.log import COMMANDS, POSE, WHEELS, Log, LogEpisode
+from proxytune.logs.log import CAR_COMMANDS, COMMANDS, ENABLED, POSE, WHEELS, Log, LogEpisode
 from proxytune.logs.rows import Layout, Rows, check_known_episodes, read_rows
 from proxytune.logs.times import Issued, check_headings, episodes_at_own_times, episodes_on_grid, usual_rate
 from proxytune.settings import GEOMETRY, Section, read_settings
@@ -144,7 +146,7 @@ def read_log(path: str | Path) -> Log:
 
 def _episodes(samples: Rows, stated: Description, issued: Mapping[str, Issued]) -> tuple[tuple[LogEpisode, ...], float]:
     """The drives, and their samples a second."""
-    commands = samples.columns(() if issued else COMMANDS[stated.command])
+    commands = samples.columns(()) if issued else _commands(samples, stated.command)
     own_times = not stated.rate_hz and stated.command != "none"
     check_headings(samples, stated.command, usual_rate(samples) if own_times else stated.rate_hz)
     if own_times:
@@ -163,7 +165,8 @@ def _on_poses_clock(episode: LogEpisode, offset_s: float) -> LogEpisode:
 def _read_samples(path: Path, command: str, *, apart: bool) -> Rows:
     columns = () if apart else COMMANDS[command]
     why = "samples beside a commands.csv" if apart else f"commands of kind '{command}'"
-    samples = read_rows(path, Layout((*columns, *POSE), WHEELS, (*POSE, *WHEELS), 2, why))
+    switch = () if apart or command == "none" else (ENABLED,)
+    samples = read_rows(path, Layout((*columns, *POSE), WHEELS, (*POSE, *WHEELS), switch, 2, why))
     for together in (POSE, WHEELS):
         empty = np.isnan(samples.columns(together)) if together[0] in samples.values else np.empty((0, len(together)))
         half = empty.any(axis=1) & ~empty.all(axis=1)
@@ -172,8 +175,17 @@ def _read_samples(path: Path, command: str, *, apart: bool) -> Rows:
             column, those = together[int(np.argmax(empty[row]))], ", ".join(together)
             raise samples.error(row, column, f"is empty, but not all of {those}; fill it in or empty them all")
     if not apart:
-        _check_duties(samples, command)
+        _check_sizes(samples, command)
     return samples
+
+
+def _commands(rows: Rows, command: str) -> Floats:
+    """The columns of a kind of command (N, 2); where `enabled` is 0, what drives is 0 and a car still steers."""
+    columns = rows.columns(COMMANDS[command])
+    if ENABLED in rows.values:
+        driving = slice(1) if command in CAR_COMMANDS else slice(None)
+        columns[:, driving] *= rows.values[ENABLED][:, None]
+    return columns
 
 
 def _read_commands(path: Path, stated: Description, samples: Rows) -> dict[str, Issued]:
@@ -181,10 +193,10 @@ def _read_commands(path: Path, stated: Description, samples: Rows) -> dict[str, 
     command = stated.command
     if command == "none":
         raise LogError(f"{path}: log.toml states that there are no commands; state their kind, or take this file out")
-    rows = read_rows(path, Layout(COMMANDS[command], (), (), 1, f"commands of kind '{command}'"))
-    _check_duties(rows, command)
+    rows = read_rows(path, Layout(COMMANDS[command], (), (), (ENABLED,), 1, f"commands of kind '{command}'"))
+    _check_sizes(rows, command)
     check_known_episodes(rows, samples.names)
-    times, columns = rows.values["time"], rows.columns(COMMANDS[command])
+    times, columns = rows.values["time"], _commands(rows, command)
     cuts = rows.firsts[1:]
     parts = zip(rows.names, np.split(times, cuts), np.split(columns, cuts), strict=True)
     issued: dict[str, Issued] = {name: (own, values) for name, own, values in parts}
@@ -211,10 +223,30 @@ def _check_overlap(samples: Rows, rows: Rows, issued: Mapping[str, Issued], offs
             raise rows.error(row, "time", problem)
 
 
-def _check_duties(rows: Rows, command: str) -> None:
-    for name in COMMANDS["duty"] if command == "duty" else ():
-        over = np.abs(rows.values[name]) > LARGEST_DUTY
+SIZES: Mapping[str, tuple[str, float, str]] = MappingProxyType(
+    {
+        **dict.fromkeys(COMMANDS["duty"], ("a duty must be", 1.0, "divide by full duty")),
+        "throttle": (
+            "throttle must be",
+            1.0,
+            "divide a percentage by 100, and a pulse's distance from rest by its range",
+        ),
+        "steering": ("steering must be", 1.0, "divide degrees by the greatest wheel angle, pulses by their range"),
+        "steering_angle": ("a wheel angle must be", np.pi / 2.0, "turn degrees into radians"),
+    }
+)
+"""How a command is called in a complaint, the largest, and what to do about a larger one."""
+
+
+def _check_sizes(rows: Rows, command: str) -> None:
+    for name in COMMANDS[command]:
+        what, most, remedy = SIZES.get(name, ("", np.inf, ""))
+        over = np.abs(rows.values[name]) > most * LARGEST_DUTY
         if over.any():
             row = int(np.argmax(over))
-            problem = f"a duty must be between -1 and 1, got {rows.values[name][row]:g}; divide by full duty"
-            raise rows.error(row, name, problem)
+            value = rows.values[name][row]
+            raise rows.error(row, name, f"{what} between {-most:.4g} and {most:.4g}, got {value:g}; {remedy}")
+    switch = rows.values.get(ENABLED, np.empty(0))
+    if not np.isin(switch, (0.0, 1.0)).all():
+        row = int(np.argmin(np.isin(switch, (0.0, 1.0))))
+        raise rows.error(row, ENABLED, f"must be 1 (motors on) or 0 (cut), got {switch[row]:g}")

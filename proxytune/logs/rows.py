@@ -119,6 +119,7 @@ class Layout:
         needed: Its columns besides `episode` and `time`.
         together: Columns that are there all or none.
         may_lack: Columns whose cells may be empty.
+        optional: Columns that may be left out.
         fewest: Rows that an episode has at least.
         why: What needs the columns, for a complaint.
     """
@@ -126,6 +127,7 @@ class Layout:
     needed: tuple[str, ...]
     together: tuple[str, ...]
     may_lack: tuple[str, ...]
+    optional: tuple[str, ...]
     fewest: int
     why: str
 
@@ -201,9 +203,10 @@ def _part(path: Path, header: Sequence[str], layout: Layout, block: Block) -> _P
 def _check_header(path: Path, header: Sequence[str], layout: Layout) -> None:
     needed = ("episode", "time", *layout.needed)
     together = layout.together if set(layout.together) & set(header) else ()
+    known = (*needed, *layout.together, *layout.optional)
     for name in header:
-        if name not in (*needed, *layout.together):
-            raise LogError(f"{path}: line 1: unknown column '{name}'; {nearest(name, (*needed, *layout.together))}")
+        if name not in known:
+            raise LogError(f"{path}: line 1: unknown column '{name}'; {nearest(name, known)}")
         if list(header).count(name) > 1:
             raise LogError(f"{path}: line 1: names the column '{name}' twice; take one of them out")
     for name in (*needed, *together):

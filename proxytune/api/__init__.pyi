@@ -1,7 +1,7 @@
 from .curves import SweepReport as SweepReport, TeachReport as TeachReport, run_sweep as run_sweep, teach as teach
 from .diagnosis import DiagnosisReport as DiagnosisReport, diagnose as diagnose
 from .driving import DrivenEpisode as DrivenEpisode, drive as drive
-from .exporting import CommandFilter as CommandFilter, ExportReport as ExportReport, TRIALS as TRIALS, export as export
+from .exporting import TRIALS as TRIALS, CommandFilter as CommandFilter, ExportReport as ExportReport, export as export
 from .families import (
     FamiliesReport as FamiliesReport,
     Spending as Spending,

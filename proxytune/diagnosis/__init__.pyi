@@ -1,4 +1,4 @@
-from .answer import Estimate as Estimate, RULES as RULES, Rules as Rules
+from .answer import RULES as RULES, Estimate as Estimate, Rules as Rules
 from .camera.diagnose import camera_effects as camera_effects
 from .camera.edges import Edges as Edges, effects_of as effects_of
 from .camera.error import (
@@ -48,8 +48,8 @@ from .motion.prediction import (
 from .motion.screening import MOTION_EFFECTS as MOTION_EFFECTS, motion_effects as motion_effects
 from .motion.signals import SignalCurve as SignalCurve, refit_beside_curve as refit_beside_curve
 from .recording import (
-    FilmedDrive as FilmedDrive,
     PICTURES as PICTURES,
+    FilmedDrive as FilmedDrive,
     film as film,
     frames_text as frames_text,
     log_text as log_text,

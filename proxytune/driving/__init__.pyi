@@ -3,12 +3,12 @@ from .agents import AGENTS as AGENTS, NEEDS as NEEDS, load_agent as load_agent
 from .bullet import BulletPlant as BulletPlant, has_pybullet as has_pybullet
 from .cameras import GroundPlaneCamera as GroundPlaneCamera
 from .episode import (
+    METRICS as METRICS,
+    TICK_HZ as TICK_HZ,
     Course as Course,
     Drive as Drive,
     Instance as Instance,
-    METRICS as METRICS,
     Sight as Sight,
-    TICK_HZ as TICK_HZ,
     check_command as check_command,
     measured as measured,
     score_trajectory as score_trajectory,
@@ -50,8 +50,8 @@ from .road_picture import (
 )
 from .robot import (
     CAMERA as CAMERA,
-    Robot as Robot,
     UNITS as UNITS,
+    Robot as Robot,
     read_robot as read_robot,
     robot_from_geometry as robot_from_geometry,
     robot_home as robot_home,

@@ -1,12 +1,12 @@
 from .catalogue import (
     CAR_CATALOGUE as CAR_CATALOGUE,
     CATALOGUE as CATALOGUE,
-    Catalogue as Catalogue,
     DECLARED as DECLARED,
     DRIVES as DRIVES,
     MEMBERS as MEMBERS,
     PARAMETERS as PARAMETERS,
     SHIPPED as SHIPPED,
+    Catalogue as Catalogue,
     effect_of as effect_of,
     effects_from as effects_from,
     problems as problems,
@@ -14,6 +14,7 @@ from .catalogue import (
 )
 from .effect import (
     CHANNELS as CHANNELS,
+    TURN as TURN,
     Cue as Cue,
     Draws as Draws,
     Effect as Effect,
@@ -25,11 +26,10 @@ from .effect import (
     Panel as Panel,
     Signal as Signal,
     Stage as Stage,
-    TURN as TURN,
     Trace as Trace,
     WheelCurve as WheelCurve,
 )
-from .features import GROUPS as GROUPS, HEADING as HEADING, Knots as Knots, LEVEL as LEVEL
+from .features import GROUPS as GROUPS, HEADING as HEADING, LEVEL as LEVEL, Knots as Knots
 from .image import Blur as Blur, RollingShutter as RollingShutter
 from .learnt import (
     FittedRange as FittedRange,
@@ -38,6 +38,7 @@ from .learnt import (
     is_learnt as is_learnt,
     learnt_effect as learnt_effect,
     learnt_theta as learnt_theta,
+    track_of as track_of,
 )
 from .model import (
     Chain as Chain,

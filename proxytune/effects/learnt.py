@@ -82,6 +82,13 @@ class LearntState(NamedTuple):
     full_speed: float
 
 
+def track_of(nominal: Mapping[str, float]) -> float:
+    """Length [m] by which a yaw rate is the difference of two wheels' speeds; of a car between the rear ones."""
+    if "effective_baseline" in nominal:
+        return nominal["effective_baseline"]
+    return nominal.get("wheel_distance", nominal["wheelbase"])
+
+
 @dataclass(frozen=True)
 class Learnt:
     """Adds to the twist the sum of curves over features of the twist that is asked for.
@@ -102,7 +109,7 @@ class Learnt:
         slow = np.zeros((2, *batch, len(self._constants("transients"))))
         load = np.zeros((*batch, len(self._constants("load"))))
         nominal = context.nominal
-        figures = (context.rate_hz, nominal["effective_baseline"], nominal["full_speed"])
+        figures = (context.rate_hz, track_of(nominal), nominal["full_speed"])
         return LearntState(
             np.zeros(batch),
             np.zeros(batch),

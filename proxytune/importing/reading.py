@@ -173,9 +173,8 @@ def fill_log(folder: Path, source: Source, facts: Facts, name: str, origin: str)
             names = ("time", *COMMANDS[drive.commands.kind], ENABLED)[: 1 + drive.commands.values.shape[1]]
             commands.append(_named(drive.name, (drive.commands.times, drive.commands.values), names))
     if commands and _beside(source):
-        samples = [
-            pd.concat((one, own.drop(columns=["episode", "time"])), axis=1) for one, own in zip(samples, commands)
-        ]
+        issued = (own.drop(columns=["episode", "time"]) for own in commands)
+        samples = [pd.concat(both, axis=1) for both in zip(samples, issued, strict=True)]
         commands = []
     for name_of_file, tables in (("samples.csv", samples), ("commands.csv", commands)):
         if tables:

@@ -271,11 +271,11 @@ USUAL: Mapping[str, frozenset[str]] = MappingProxyType(
         "right": _filled(DUTIES, "right"),
         "wheel_command_left": _filled(WHEEL_SPEEDS, "left"),
         "wheel_command_right": _filled(WHEEL_SPEEDS, "right"),
-        "throttle": frozenset("throttle cmdthrottle throttlecmd throttlecommand gas".split()),
-        "steering": frozenset("steering steer cmdsteering steeringcmd steeringcommand".split()),
-        "speed": frozenset("speed cmdspeed speedcmd drivespeed commandedspeed commandspeed".split()),
-        "steering_angle": frozenset("steeringangle drivesteeringangle cmdsteeringangle steeringanglecmd".split()),
-        ENABLED: frozenset("enabled enable motorsenabled motorenabled".split()),
+        "throttle": _filled("throttle cmdthrottle throttlecmd throttlecommand gas", ""),
+        "steering": _filled("steering steer cmdsteering steeringcmd steeringcommand", ""),
+        "speed": _filled("speed cmdspeed speedcmd drivespeed commandedspeed commandspeed", ""),
+        "steering_angle": _filled("steeringangle drivesteeringangle cmdsteeringangle steeringanglecmd", ""),
+        ENABLED: _filled("enabled enable motorsenabled motorenabled", ""),
     }
 )
 """Usual names of each field, without underscores and units."""

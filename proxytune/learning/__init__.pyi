@@ -1,4 +1,4 @@
-from .curve_model import LearningCurve as LearningCurve, POSTERIOR_DRAWS as POSTERIOR_DRAWS, doublings as doublings
+from .curve_model import POSTERIOR_DRAWS as POSTERIOR_DRAWS, LearningCurve as LearningCurve, doublings as doublings
 from .learner import Learner as Learner, Weights as Weights, policy_of as policy_of
 from .lessons import (
     Arrays as Arrays,
@@ -13,11 +13,11 @@ from .lessons import (
     mix_samples as mix_samples,
 )
 from .plv import (
+    LEVELS as LEVELS,
     AdaptiveDesign as AdaptiveDesign,
     Convergence as Convergence,
     Examination as Examination,
     ExaminationScores as ExaminationScores,
-    LEVELS as LEVELS,
     LearningEstimate as LearningEstimate,
     SampleNeeds as SampleNeeds,
     TeachingValue as TeachingValue,

@@ -20,10 +20,10 @@ from .drive.movie import (
     write_episode as write_episode,
 )
 from .export.instance import (
-    ExportLine as ExportLine,
     FILTER as FILTER,
     FORMATS as FORMATS,
     IN_WHEELS as IN_WHEELS,
+    ExportLine as ExportLine,
     Instance as Instance,
     export_lines as export_lines,
 )
@@ -47,10 +47,10 @@ from .figure_style import (
     GREY as GREY,
     LIGHT_BLUE as LIGHT_BLUE,
     LIGHT_GREY as LIGHT_GREY,
-    LineName as LineName,
     ORANGE as ORANGE,
     PURPLE as PURPLE,
     VERMILLION as VERMILLION,
+    LineName as LineName,
     dress as dress,
     name_lines as name_lines,
 )

@@ -1,8 +1,8 @@
 from .cluster import on_cluster as on_cluster
 from .episodes import ENDED as ENDED, ENDLESS as ENDLESS, Watch as Watch, running as running
 from .fleets import (
-    Fleet as Fleet,
     RAISED as RAISED,
+    Fleet as Fleet,
     can_run_together as can_run_together,
     check_machine as check_machine,
     run_episode as run_episode,
@@ -11,8 +11,8 @@ from .fleets import (
 )
 from .progress import Bars as Bars, Lines as Lines, Silent as Silent, Watcher as Watcher, progress_bar as progress_bar
 from .workers import (
-    IsolatedWorker as IsolatedWorker,
     OVERRUN as OVERRUN,
+    IsolatedWorker as IsolatedWorker,
     Rescue as Rescue,
     TracedTask as TracedTask,
     WorkerExit as WorkerExit,

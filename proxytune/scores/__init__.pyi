@@ -12,4 +12,4 @@ from .reading import (
     read_scores as read_scores,
     write_scores as write_scores,
 )
-from .table import Metric as Metric, ROUNDING as ROUNDING, ScoreTable as ScoreTable, varies as varies
+from .table import ROUNDING as ROUNDING, Metric as Metric, ScoreTable as ScoreTable, varies as varies

@@ -34,8 +34,8 @@ from .optuna_bridge import (
 from .outcomes import expected_gain as expected_gain
 from .registry import (
     DEFAULT_ENGINE as DEFAULT_ENGINE,
-    ENGINES as ENGINES,
     ENGINE_NAMES as ENGINE_NAMES,
+    ENGINES as ENGINES,
     SCORE_ENGINE as SCORE_ENGINE,
     code_of as code_of,
     engine_code as engine_code,

@@ -1,8 +1,8 @@
 from .assessment import (
-    Assessment as Assessment,
-    Difference as Difference,
     PAIRED as PAIRED,
     PERFECT as PERFECT,
+    Assessment as Assessment,
+    Difference as Difference,
     Selection as Selection,
     assess as assess,
     select_proxy as select_proxy,
@@ -10,14 +10,14 @@ from .assessment import (
 from .catalogue import (
     ALL as ALL,
     MEASURES as MEASURES,
-    Measure as Measure,
-    Measured as Measured,
-    PODS as PODS,
     POD_IMAGE as POD_IMAGE,
     POD_POSE as POD_POSE,
+    PODS as PODS,
     PPV as PPV,
     PRPV as PRPV,
     SRCC as SRCC,
+    Measure as Measure,
+    Measured as Measured,
 )
 from .comparison import (
     Comparison as Comparison,

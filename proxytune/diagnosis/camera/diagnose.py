@@ -38,7 +38,7 @@ from proxytune.diagnosis.camera.selection import (
     select_camera_effects,
 )
 from proxytune.driving import LINES, Robot
-from proxytune.effects import DECLARED, PARAMETERS, Catalogue, Stage, effect_of
+from proxytune.effects import PARAMETERS, Catalogue, Stage, effect_of
 from proxytune.errors import LogError
 from proxytune.logs import Log
 
@@ -186,7 +186,7 @@ def camera_effects(catalogue: Catalogue) -> tuple[str, ...]:
 
 def declared_camera_effects(robot: Robot) -> tuple[str, ...]:
     """The camera's effects that are declared by default: those of θ."""
-    return tuple(name for name in DECLARED if name in camera_effects(robot.catalogue))
+    return tuple(name for name in robot.catalogue.declared if name in camera_effects(robot.catalogue))
 
 
 def diagnose_camera(

@@ -59,7 +59,7 @@ from proxytune.diagnosis.motion.prediction import (
 from proxytune.diagnosis.motion.screening import MOTION_EFFECTS, motion_effects
 from proxytune.diagnosis.motion.selection import fit_declared, select_effects
 from proxytune.driving import Robot
-from proxytune.effects import DECLARED, SHIPPED, Catalogue, effect_of
+from proxytune.effects import SHIPPED, Catalogue, effect_of
 from proxytune.errors import LogError
 from proxytune.logs import Log
 from proxytune.settings import nearest
@@ -399,7 +399,7 @@ def diagnose(
 
 def declared_effects(robot: Robot) -> tuple[str, ...]:
     """The effects that are declared by default: those of θ that act on motion and that the robot has."""
-    return tuple(name for name in DECLARED if name in MOTION_EFFECTS and name in robot.theta)
+    return tuple(name for name in robot.catalogue.declared if name in MOTION_EFFECTS and name in robot.theta)
 
 
 def declared_parameters(effects: Iterable[str], catalogue: Catalogue = SHIPPED) -> tuple[str, ...]:

@@ -38,7 +38,7 @@ from proxytune.diagnosis.motion.prediction import (
 )
 from proxytune.diagnosis.motion.screening import Candidate, candidates
 from proxytune.driving import Robot
-from proxytune.effects import GROUPS, LEVEL, FittedRange, Knots, Learnt, LearntCurve, effect_of, learnt_theta
+from proxytune.effects import GROUPS, LEVEL, FittedRange, Knots, Learnt, LearntCurve, effect_of, learnt_theta, track_of
 from proxytune.space import Theta
 
 RARE = 0.002
@@ -73,7 +73,7 @@ def offer_curves(drives: Drives, theta: Theta) -> Learnt:
     asked = twists_of(drives, theta)
     used = _ticks_in_motion(drives)
     forward, yaw = asked[..., 0][used], asked[..., 2][used]
-    turn = yaw * drives.robot.figures["effective_baseline"] / 2.0
+    turn = yaw * track_of(drives.robot.figures) / 2.0
     effort = (np.abs(forward - turn) + np.abs(forward + turn)) / 2.0 / drives.robot.figures["full_speed"]
     seconds = float(drives.last.max()) / drives.tick_hz
     both = product(sorted((0.0, *_corners(forward, GRID[0]))), sorted((0.0, *_corners(yaw, GRID[1]))))

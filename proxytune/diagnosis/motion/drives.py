@@ -18,9 +18,9 @@ from scipy import sparse
 
 from proxytune.diagnosis.answer import RULES, Rules
 from proxytune.driving import Robot, read_robot, robot_from_geometry, robot_names
-from proxytune.effects import SHIPPED, Catalogue
+from proxytune.effects import SHIPPED, Catalogue, track_of
 from proxytune.errors import LogError
-from proxytune.logs import Log, LogEpisode
+from proxytune.logs import CAR_COMMANDS, Log, LogEpisode
 from proxytune.settings import GEOMETRY, nearest
 
 
@@ -60,16 +60,24 @@ Floats = NDArray[Any]
 
 
 def duties_of(log: Log, robot: Robot, commands: Floats) -> Floats:
-    """A log's commands (…, 2) as fractions of full wheel speed, left and right.
+    """A log's commands (…, 2) as fractions of full wheel speed, left and right; of a car as throttle and steering.
 
     Raises:
-        LogError: If the log has no commands, or they ask for more than full speed.
+        LogError: If the log has no commands, they are not of such a robot, or they ask for more than it can.
     """
     figures = robot.figures
-    if log.command == "duty":
-        return commands
     if log.command == "none":
         raise LogError(f"{log.name}: has no commands; a log needs duties, twists or wheel speeds to learn from")
+    if (log.command in CAR_COMMANDS) != (robot.drive == "ackermann") and log.command != "twist":
+        drives = "steers" if robot.drive == "ackermann" else "drives by two wheels"
+        raise LogError(
+            f"{log.name}: commands of kind '{log.command}' are not for robot '{robot.name}', which {drives} "
+            f'(drive = "{robot.drive}" in its robot.toml); name another with --robot'
+        )
+    if log.command in ("duty", "ackermann"):
+        return commands
+    if robot.drive == "ackermann":
+        return _steered(log, robot, commands)
     if log.command == "twist":
         turn = commands[..., 1] * figures["effective_baseline"] / 2.0
         speeds = np.stack((commands[..., 0] - turn, commands[..., 0] + turn), axis=-1)
@@ -83,6 +91,25 @@ def duties_of(log: Log, robot: Robot, commands: Floats) -> Floats:
             f"{figures['full_speed']:g} m/s; state a higher full_speed_m_s in log.toml"
         )
     return np.asarray(duties)
+
+
+def _steered(log: Log, robot: Robot, commands: Floats) -> Floats:
+    """Speeds with wheel angles, or twists (…, 2), as a car's throttle and steering.
+
+    Raises:
+        LogError: If they ask for more than full speed, or turn on the spot.
+    """
+    figures, speeds, angles = robot.figures, commands[..., 0], commands[..., 1]
+    if log.command == "twist":
+        with np.errstate(divide="ignore", invalid="ignore"):
+            angles = np.arctan(np.where(commands[..., 1] == 0.0, 0.0, figures["wheelbase"] * commands[..., 1] / speeds))
+    fastest, widest = float(np.abs(speeds).max()), math.radians(figures["wheel_angle"])
+    if fastest > figures["full_speed"] * (1.0 + 1e-9):
+        raise LogError(
+            f"{log.name}: asks for {fastest:.2f} m/s, more than the full speed {figures['full_speed']:g} m/s of robot "
+            f"'{robot.name}'; state a higher full_speed in its robot.toml"
+        )
+    return np.stack((speeds / figures["full_speed"], np.clip(angles / widest, -1.0, 1.0)), axis=-1)
 
 
 class Commands(NamedTuple):
@@ -126,7 +153,7 @@ def commands_of(log: Log, robot: Robot, episode: LogEpisode, ticks: int) -> Comm
         LogError: If it has none, or they ask for more than full speed.
     """
     duties, rest = duties_of(log, robot, episode.commands), np.zeros(2)
-    if episode.wheels is not None and np.isfinite(episode.wheels[0]).all():
+    if episode.wheels is not None and robot.drive == "differential" and np.isfinite(episode.wheels[0]).all():
         rest = np.asarray(episode.wheels[0] * robot.figures["wheel_radius"] / robot.figures["full_speed"])
     if episode.issued is None:
         return Commands(np.arange(len(duties)) / log.rate_hz, duties, rest, ticks)
@@ -247,9 +274,9 @@ class Drives:
     @cached_property
     def angles(self) -> Floats:
         """Angles by which each wheel has turned in its episode by the measured motion (E, T, 2) [rad], interpolated."""
-        figures = self.robot.figures
-        turn = self.measured[:, 2] * figures["effective_baseline"] / 2.0
-        wheels = np.stack((self.measured[:, 0] - turn, self.measured[:, 0] + turn), axis=1) / figures["wheel_radius"]
+        turn = self.measured[:, 2] * track_of(self.robot.figures) / 2.0
+        forward = self.measured[:, 0]
+        wheels = np.stack((forward - turn, forward + turn), axis=1) / self.robot.figures["wheel_radius"]
         before = np.cumsum(wheels, axis=0) - wheels
         return self._interpolated(before - before[np.searchsorted(self.episode, self.episode)])
 
@@ -354,7 +381,8 @@ def _hold(rows: Floats, ticks: int, length: int) -> Floats:
 
 def _wheels(robot: Robot, episodes: Sequence[LogEpisode], ticks: int, length: int) -> Floats | None:
     unit = robot.figures["wheel_radius"] / robot.figures["full_speed"]
-    measured = [_hold(e.wheels * unit, ticks, length) for e in episodes if e.wheels is not None]
+    known = (e.wheels for e in episodes if robot.drive == "differential")
+    measured = [_hold(wheels * unit, ticks, length) for wheels in known if wheels is not None]
     whole = len(measured) == len(episodes) and all(np.isfinite(wheels).all() for wheels in measured)
     return np.stack(measured) if whole else None
 
@@ -422,7 +450,8 @@ def robot_of(log: Log, name: str | None = None, catalogue: Catalogue = SHIPPED) 
     """
     names = robot_names(catalogue.folder)
     if log.robot in names or name not in (None, log.robot):
-        return replace(read_robot(name or log.robot, catalogue.folder), catalogue=catalogue)
+        robot = read_robot(name or log.robot, catalogue.folder)
+        return replace(robot, catalogue=replace(catalogue, drive=robot.drive))
     missing = [key for figure, key in NEEDED.items() if figure not in log.geometry]
     if missing:
         raise LogError(

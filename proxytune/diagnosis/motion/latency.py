@@ -15,6 +15,7 @@ from scipy.optimize import minimize, minimize_scalar
 from scipy.signal import lfilter
 
 from proxytune.diagnosis.motion.drives import Drives, Floats, Whole, sum_by
+from proxytune.driving import drivetrain
 from proxytune.logs import Log
 
 SPAN_S = 0.2
@@ -175,8 +176,11 @@ class _CommandedSpeeds:
         duties = np.concatenate((before, given, np.repeat(given[:, -1:], self.pad, axis=1)), axis=1)
         kept = float(np.exp(-1.0 / (constant_s * self.drives.tick_hz))) if constant_s > 1e-4 else 0.0
         wheels, _ = lfilter([1.0 - kept], [1.0, -kept], duties, axis=1, zi=kept * duties[:, :1])
-        yaw = (wheels[..., 1] - wheels[..., 0]) / figures["effective_baseline"]
-        twists = figures["full_speed"] * np.stack((wheels.mean(axis=-1), yaw), axis=-1)
+        if self.drives.robot.drive == "ackermann":
+            twists = drivetrain(self.drives.robot, ()).ideal(wheels)[..., ::2]
+        else:
+            yaw = (wheels[..., 1] - wheels[..., 0]) / figures["effective_baseline"]
+            twists = figures["full_speed"] * np.stack((wheels.mean(axis=-1), yaw), axis=-1)
         return np.concatenate((np.zeros_like(twists[:, :1]), np.cumsum(twists, axis=1)), axis=1)
 
     def reactions(self, speeds: Speeds, latencies_s: Sequence[float], constant_s: float) -> list[Reaction]:

@@ -31,17 +31,18 @@ from proxytune.diagnosis.motion.innovations import (
     theta_at,
 )
 from proxytune.driving import Robot
-from proxytune.effects import CATALOGUE, Catalogue, Effect, Form, theta_names
+from proxytune.effects import DRIVES, Catalogue, Effect, Form, theta_names
 from proxytune.space import Parameter, Theta
 
-MOTION_EFFECTS = tuple(name for name, effect in CATALOGUE.items() if effect.trace)
-"""The shipped effects that measured motion can show."""
+MOTION_EFFECTS = tuple(
+    dict.fromkeys(name for effects in DRIVES.values() for name, effect in effects.items() if effect.trace)
+)
+"""The shipped effects that measured motion can show, of robots of any drive."""
 
 
 def motion_effects(catalogue: Catalogue) -> tuple[str, ...]:
     """The effects of a catalogue that measured motion can show."""
-    outside = (name for name in catalogue.names if name not in CATALOGUE)
-    return (*MOTION_EFFECTS, *(name for name in outside if catalogue.effect(name).trace))
+    return tuple(name for name in catalogue.names if catalogue.effect(name).trace)
 
 
 @dataclass(frozen=True)

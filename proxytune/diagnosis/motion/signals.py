@@ -36,7 +36,8 @@ from proxytune.diagnosis.motion.innovations import (
     twists_of,
     wheel_speeds,
 )
-from proxytune.effects import CATALOGUE, Cue
+from proxytune.driving import drivetrain
+from proxytune.effects import DRIVES, Cue, track_of
 from proxytune.space import Theta
 
 KNOTS = 6
@@ -80,7 +81,8 @@ class SignalGroup:
     @property
     def effects(self) -> tuple[str, ...]:
         """Effects that act through it."""
-        return tuple(name for name, effect in CATALOGUE.items() if effect.trace and self.name in effect.trace.cues)
+        effects = {name: effect for every in DRIVES.values() for name, effect in every.items()}
+        return tuple(name for name, effect in effects.items() if effect.trace and self.name in effect.trace.cues)
 
 
 @dataclass(frozen=True)
@@ -98,20 +100,13 @@ class _Motion:
 def signal_groups(fitted: Fit) -> Iterator[SignalGroup]:
     """Every signal group of these drives, seen with the fitted model, as it is asked for."""
     motion = _motion(fitted)
-    for maker in (
-        _command_level,
+    of_wheels = (
         _wheel_difference,
-        _transients,
-        _after_reversal,
-        _time,
-        _use,
-        _turning,
-        _heading,
-        _position,
         partial(_wheel_angle, side=0, name=Cue.LEFT_ANGLE),
         partial(_wheel_angle, side=1, name=Cue.RIGHT_ANGLE),
-        _direction,
-    ):
+    )
+    both = (_command_level, _transients, _after_reversal, _time, _use, _turning, _heading, _position, _direction)
+    for maker in (*both, *((_steering,) if fitted.drives.robot.drive == "ackermann" else of_wheels)):
         made = maker(motion)
         if np.abs(made.twists).max() > 1e-9:
             yield SignalGroup(made.name, made.signal, made.unit, partial(maker, motion))
@@ -119,10 +114,14 @@ def signal_groups(fitted: Fit) -> Iterator[SignalGroup]:
 
 def _motion(fitted: Fit) -> _Motion:
     drives, figures = fitted.drives, fitted.drives.robot.figures
-    speeds = wheel_speeds(drives, fitted.theta) * figures["full_speed"]
-    left, right = speeds[..., 0], speeds[..., 1]
+    wheels, commands = wheel_speeds(drives, fitted.theta), arrived_commands(drives, fitted.theta)
+    if drives.robot.drive == "ackermann":
+        forward, _, yaw = np.moveaxis(drivetrain(drives.robot, ()).ideal(wheels), -1, 0)
+        turn = yaw * track_of(drives.robot.figures) / 2.0
+        return _Motion(drives, forward - turn, forward + turn, forward, yaw, commands)
+    left, right = np.moveaxis(wheels * figures["full_speed"], -1, 0)
     yaw = (right - left) / figures["effective_baseline"]
-    return _Motion(drives, left, right, (left + right) / 2.0, yaw, arrived_commands(drives, fitted.theta))
+    return _Motion(drives, left, right, (left + right) / 2.0, yaw, commands)
 
 
 def hats(signal: Floats, knots: int = KNOTS) -> Floats:
@@ -141,7 +140,7 @@ def _twists(forward: Floats | None = None, sideways: Floats | None = None, yaw: 
 
 def _of_wheels(motion: _Motion, left: Floats | None, right: Floats | None) -> Floats:
     """Motion that extra speeds of the wheels [m/s] make (E, T, 3, columns)."""
-    baseline = motion.drives.robot.figures["effective_baseline"]
+    baseline = track_of(motion.drives.robot.figures)
     wheels = [(columns, side) for columns, side in ((left, -1.0), (right, 1.0)) if columns is not None]
     return _side_by_side([{0: columns / 2.0, 2: side * columns / baseline} for columns, side in wheels])
 
@@ -169,6 +168,12 @@ def _wheel_difference(motion: _Motion) -> _Signal:
     return _Signal(Cue.COMMAND_DIFFERENCE, signal, "duty", _twists(columns, yaw=columns))
 
 
+def _steering(motion: _Motion) -> _Signal:
+    signal = motion.commands[..., 1]
+    columns = hats(signal, 9) * motion.forward[..., None]
+    return _Signal(Cue.STEERING, signal, "full lock", _twists(columns, yaw=columns))
+
+
 def _transients(motion: _Motion) -> _Signal:
     rate = motion.drives.tick_hz
     parts = []
@@ -178,7 +183,11 @@ def _transients(motion: _Motion) -> _Signal:
         parts.append(np.stack([command - slow[0]] + [a - b for a, b in pairwise(slow)], axis=-1))
     full = motion.drives.robot.figures["full_speed"]
     signal = parts[0].sum(axis=-1)
-    return _Signal(Cue.TRANSIENTS, signal, "duty", _of_wheels(motion, *(p * full for p in parts)))
+    if motion.drives.robot.drive == "ackermann":
+        twists = _twists(parts[0] * full, yaw=parts[1] * motion.forward[..., None])
+    else:
+        twists = _of_wheels(motion, *(p * full for p in parts))
+    return _Signal(Cue.TRANSIENTS, signal, "duty", twists)
 
 
 def _smooth(signal: Floats, ticks: float) -> Floats:

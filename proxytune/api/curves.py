@@ -9,7 +9,6 @@ from typing import Any
 import pandas as pd
 
 from proxytune.api.theta import read_theta
-from proxytune.effects import Catalogue
 from proxytune.errors import InputError
 from proxytune.report import (
     curve_document,
@@ -30,7 +29,7 @@ from proxytune.report import (
 from proxytune.running import Bars, Silent, Watcher
 from proxytune.space import Theta
 from proxytune.storage import Store, locked
-from proxytune.study import Study, StudyRun, StudySettings, open_study
+from proxytune.study import Study, StudyRun, StudySettings, family_catalogue, open_study
 from proxytune.sweep import (
     SweepCurve,
     best_theta,
@@ -177,7 +176,7 @@ def _base(study: Study, word: str | Theta) -> Theta:
     elif word == "best":
         base = best_theta(study)
     else:
-        base = read_theta(word, Catalogue(study.settings.folder.resolve()), "--at")
+        base = read_theta(word, family_catalogue(study.family, study.settings), "--at")
     check_base(study, base)
     return base
 

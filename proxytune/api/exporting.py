@@ -9,8 +9,17 @@ import numpy as np
 import pandas as pd
 
 from proxytune.api.study import read_study
-from proxytune.driving import LaneFollowing, Robot, drivetrain, read_robot, robot_from_geometry, robot_names
-from proxytune.effects import Catalogue, FilterContext, effect_of, read_model
+from proxytune.driving import (
+    LaneFollowing,
+    Robot,
+    catalogue_of,
+    drivetrain,
+    read_model_of,
+    read_robot,
+    robot_from_geometry,
+    robot_names,
+)
+from proxytune.effects import Catalogue, FilterContext, effect_of
 from proxytune.errors import InputError
 from proxytune.extensions import is_ours
 from proxytune.report import (
@@ -156,8 +165,8 @@ def _instance_of(path: Path) -> tuple[Instance, tuple[str, ...]]:
 
 def _of_model(path: Path) -> tuple[Instance, tuple[str, ...]]:
     """A model.toml, and its cautions; its robot and its own effects are looked for in the current folder."""
-    catalogue = Catalogue(Path.cwd())
-    model = read_model(path, catalogue)
+    model = read_model_of(path, Path.cwd())
+    catalogue = catalogue_of(model.robot, Path.cwd())
     if model.robot in robot_names(catalogue.folder):
         robot = read_robot(model.robot, catalogue.folder)
     elif model.geometry:

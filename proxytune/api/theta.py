@@ -8,7 +8,7 @@ from proxytune.effects import SHIPPED, Catalogue, read_model
 from proxytune.errors import InputError
 from proxytune.space import Theta
 from proxytune.storage import FILE_NAME as DATABASE
-from proxytune.study import StudySettings, check_robot, open_settings
+from proxytune.study import StudySettings, check_robot, family_catalogue, open_settings
 from proxytune.sweep import best_theta, has_answer
 
 
@@ -41,7 +41,7 @@ def choose_theta(text: str | None, settings: StudySettings, family: DomainFamily
     if own is not None and text is not None and text.endswith(".toml"):
         # A family with parameters that are no effects reads them itself
         return ChosenTheta(own(Path(text)), "given")
-    theta = read_theta(text, Catalogue(settings.folder.resolve()), option)
+    theta = read_theta(text, family_catalogue(family, settings), option)
     return ChosenTheta(theta, "nominal" if text in (None, "nominal") else "given")
 
 

@@ -19,8 +19,8 @@ from proxytune.diagnosis import (
     predict_pictures,
     robot_of,
 )
-from proxytune.driving import Robot, read_robot, robot_from_geometry, robot_names
-from proxytune.effects import Catalogue, Model, read_model
+from proxytune.driving import Robot, catalogue_of, read_model_of, read_robot, robot_from_geometry, robot_names
+from proxytune.effects import Catalogue, Model
 from proxytune.errors import InputError, LogError
 from proxytune.importing import (
     Facts,
@@ -287,10 +287,10 @@ def predict(
         InputError: If the model or the log cannot be used.
         RunError: If a picture cannot be written.
     """
-    catalogue = Catalogue(Path.cwd())
     if not (np.isfinite(horizon_s) and horizon_s > 0.0):
         raise InputError(f"--horizon must be a positive number of seconds, got {horizon_s}")
-    fitted, known = read_model(Path(model), catalogue), facts or Facts()
+    fitted, known = read_model_of(Path(model), Path.cwd()), facts or Facts()
+    catalogue = catalogue_of(fitted.robot, Path.cwd())
     keys = {figure: key for key, figure in GEOMETRY.items()}
     stated = {keys[name]: value for name, value in (fitted.geometry or {}).items() if name in keys}
     named = replace(known, robot=known.robot or fitted.robot, figures=known.figures or stated)

@@ -32,6 +32,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--urdf", type=Path, metavar="FILE", help="of a robot: its URDF; wheels, mass and camera are read"
     )
+    parser.add_argument(
+        "--drive", choices=("differential", "ackermann"), help="of a robot: on two wheels, or a car [differential]"
+    )
     parser.add_argument("--robot", metavar="ROBOT", help="of a study: the robot that drives in it [duckiebot]")
 
 
@@ -98,7 +101,7 @@ def _check(arguments: argparse.Namespace) -> None:
         raise InputError(f"'{name}': a Python module of this name is installed; choose another name")
     if kind == "robot" and name in robot_names():
         raise InputError(f"'{name}': a robot of this name comes with proxytune; choose another name")
-    for option, of in (("figures", "robot"), ("urdf", "robot"), ("robot", "study")):
+    for option, of in (("figures", "robot"), ("urdf", "robot"), ("drive", "robot"), ("robot", "study")):
         if getattr(arguments, option) is not None and kind != of:
             raise InputError(f"--{option}: is for `new {of}`; leave it out")
 
@@ -109,6 +112,7 @@ def _skeleton(arguments: argparse.Namespace) -> Skeleton:
     if arguments.kind == "study":
         return study_skeleton(arguments.name, read_robot(arguments.robot or "duckiebot", Path.cwd()))
     figures = read_figures(arguments.figures)
+    drive = arguments.drive or "differential"
     if arguments.urdf is not None:
-        return robot_from_urdf(arguments.name, arguments.urdf, figures)
-    return robot_skeleton(arguments.name, figures)
+        return robot_from_urdf(arguments.name, arguments.urdf, figures, drive)
+    return robot_skeleton(arguments.name, figures, drive)

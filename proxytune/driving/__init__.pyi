@@ -27,7 +27,9 @@ from .optics import (
     rotation as rotation,
 )
 from .plants import (
+    ACROSS as ACROSS,
     AXLES as AXLES,
+    STEERS as STEERS,
     Body as Body,
     Drivetrain as Drivetrain,
     Plant as Plant,
@@ -39,6 +41,7 @@ from .plants import (
     parse_urdf as parse_urdf,
     read_body as read_body,
     sound_urdf as sound_urdf,
+    wheelbase_of as wheelbase_of,
 )
 from .road import Road as Road
 from .road_picture import (
@@ -52,6 +55,8 @@ from .robot import (
     CAMERA as CAMERA,
     UNITS as UNITS,
     Robot as Robot,
+    catalogue_of as catalogue_of,
+    read_model_of as read_model_of,
     read_robot as read_robot,
     robot_from_geometry as robot_from_geometry,
     robot_home as robot_home,

@@ -7,7 +7,7 @@ itself. Around any of them others react later, smooth, lean to one side, or slow
 
 import math
 from collections.abc import Callable, Generator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, Protocol, cast
@@ -141,6 +141,14 @@ class PilotMemory(NamedTuple):
 
 def _begin(robot: Robot, look: Any) -> PilotMemory:
     return PilotMemory(look, robot.figures["full_speed"], robot.figures["effective_baseline"])
+
+
+def throttle_and_steering(robot: Robot, speed: float, curvature: float) -> Duties:
+    """A car's command, within its range, for a forward speed [m/s] and a curvature [1/m] of its rear axle's path."""
+    figures = robot.figures
+    throttle = min(max(speed / figures["full_speed"], -1.0 if robot.reverse else 0.0), 1.0)
+    angle = math.atan(figures["wheelbase"] * curvature) / math.radians(figures["wheel_angle"])
+    return throttle, min(max(angle, -1.0), 1.0)
 
 
 def duties(speed: float, yaw_rate: float, *, full_speed: float, baseline: float) -> Duties:
@@ -376,6 +384,44 @@ class Wary:
         seen = (yield count_yellow, look) / self.crisp
         share += 0.1 * (min(1.0, max(self.slowest, seen)) - share)
         return (share * left, share * right), (look, share, inner)
+
+    act, act_many = act, act_many
+
+
+LANE_M, BASELINE_M = 0.22, 0.16
+"""Width of the lanes that the agents were made for, and the effective baseline of the robot [m]: a Duckiebot's."""
+
+
+@dataclass(frozen=True)
+class AtTheWheel:
+    """An agent for two wheels in a car: it thinks that it drives a small robot in the lanes that it was made for.
+
+    What it wants of two wheels is a speed and a curvature; to scale, these are the car's throttle and steering.
+
+    Attributes:
+        agent: The agent for two wheels.
+    """
+
+    agent: Agent
+
+    def begin(self, robot: Robot) -> tuple[Robot, float, Any]:
+        """As the other agent on the small robot; with the car, and how many times as large it is."""
+        figures = dict(robot.figures)
+        scale = figures.get("lane_width", LANE_M) / LANE_M
+        for name in ("camera_height", "camera_forward", "full_speed"):
+            figures[name] /= scale
+        figures["effective_baseline"] = BASELINE_M
+        inner = self.agent.begin(replace(robot, figures=MappingProxyType(figures)))
+        return robot, scale, inner
+
+    def decide(self, memory: tuple[Robot, float, Any]) -> Decision:
+        """Turn the wheels' speeds into throttle and steering."""
+        robot, scale, inner = memory
+        (left, right), inner = yield from _decision(self.agent, inner)
+        ahead = (left + right) / 2.0
+        # To turn on the spot is to turn as far as the wheels go
+        curvature = (right - left) / math.copysign(max(abs(ahead), 1e-6), ahead) / (scale * BASELINE_M)
+        return throttle_and_steering(robot, ahead * robot.figures["full_speed"], curvature), (robot, scale, inner)
 
     act, act_many = act, act_many
 

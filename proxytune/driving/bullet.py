@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from proxytune.driving.optics import SKY, CameraFigures, lens_rays, orientation
+from proxytune.driving.plants import AXLES, STEERS
 from proxytune.driving.road_picture import Floor
 from proxytune.driving.robot import Robot
 from proxytune.effects import Signal
@@ -86,6 +87,12 @@ SOLVER_ITERATIONS = 20
 """Enough for one robot on a floor: 50, PyBullet's default, moves it by less than a millimetre a metre."""
 
 
+SLOWEST = 0.01
+"""Below this speed [m/s] a car's front wheels stay as they are."""
+
+SERVO_TORQUE = 100.0
+"""Servos hold their wheels whatever the floor does [N m]: how they follow is the steering effects' part."""
+
 _SPEED: Any = getattr(pybullet, "VELOCITY_CONTROL", None)
 _WHERE: Any = getattr(pybullet, "getBasePositionAndOrientation", None)
 _GAINS = (0.1, 1.0, 0.0)
@@ -96,7 +103,8 @@ class BulletPlant:
     """One robot in a PyBullet world of its own.
 
     The wheels are 0.10 m apart in the URDF, but scrubbing tyres turn the robot as if they were `effective_baseline`
-    apart. So each rim is driven at the speed that reaches the floor after scrub.
+    apart. So each rim is driven at the speed that reaches the floor after scrub. A car's rear wheels are driven so too,
+    and its front wheels point along their own circles.
     """
 
     def __init__(self, robot: Robot, start: Signal, tick_s: float) -> None:
@@ -106,6 +114,7 @@ class BulletPlant:
         self._radius = robot.figures["wheel_radius"]
         self._half_distance = robot.figures["wheel_distance"] / 2.0
         self._torques = [robot.figures["wheel_torque"]] * 2
+        self._wheelbase = robot.figures["wheelbase"] if robot.drive == "ackermann" else 0.0
         self._body = self._build(urdf, start)
         self._heading = float(start[2])
 
@@ -116,6 +125,8 @@ class BulletPlant:
         spin, step, where = pybullet.setJointMotorControl2, pybullet.stepSimulation, _WHERE
         ahead, aside, _ = self._offset
         for forward, sideways, yaw in twists.tolist():
+            if self._steered:
+                self._steer(forward, yaw)
             # Arguments by place, and one call a wheel: a list of two takes longer to unpack
             spin(body, left, _SPEED, 0.0, (forward - yaw * half) / radius, torque, *_GAINS, world)
             spin(body, right, _SPEED, 0.0, (forward + yaw * half) / radius, torque, *_GAINS, world)
@@ -150,7 +161,11 @@ class BulletPlant:
         body: int = pybullet.loadURDF(str(urdf), (0.0, 0.0, 0.0), **world)
         joints = range(pybullet.getNumJoints(body, **world))
         named = {pybullet.getJointInfo(body, joint, **world)[1].decode(): joint for joint in joints}
-        self._wheels = [named["axle_left"], named["axle_right"]]
+        self._wheels = [named[name] for name in AXLES]
+        self._steered = [named[name] for name in STEERS] if self._wheelbase else []
+        if self._steered:  # PyBullet brakes every joint of its own accord
+            for joint in set(joints) - {*self._wheels, *self._steered}:
+                pybullet.setJointMotorControl2(body, joint, _SPEED, force=0.0, **world)
         self._floor = floor
         self._offset = pybullet.getDynamicsInfo(body, -1, **world)[3]
         centre = np.array((start[0], start[1], 0.0)) + pybullet.rotateVector(turn, list(self._offset))
@@ -158,6 +173,16 @@ class BulletPlant:
         for link in range(-1, pybullet.getNumJoints(body, **world)):
             pybullet.changeDynamics(body, link, linearDamping=0.0, angularDamping=0.0, jointDamping=0.0, **world)
         return body
+
+    def _steer(self, forward: float, yaw: float) -> None:
+        """Point each front wheel along its own circle; a car that stands keeps them as they are."""
+        if abs(forward) < SLOWEST:
+            return
+        for joint, aside in zip(self._steered, (self._half_distance, -self._half_distance), strict=True):
+            angle = math.atan2(self._wheelbase * yaw, abs(forward - yaw * aside)) * math.copysign(1.0, forward)
+            pybullet.setJointMotorControl2(
+                self._body, joint, pybullet.POSITION_CONTROL, angle, force=SERVO_TORQUE, physicsClientId=self._world
+            )
 
     def _shift(self, sideways: float) -> None:
         """Slide the body to its left [m], its speeds unchanged: wheels cannot push that way."""

@@ -91,10 +91,11 @@ class Drive(NamedTuple):
     crashed: bool
     memory: Any
 
-    def columns(self, control_hz: float) -> tuple[dict[str, Signal], dict[str, Signal]]:
-        """Poses and commands as columns by name, each with its `time` [s]; the robot is asked at `control_hz`."""
+    def columns(self, robot: Robot) -> tuple[dict[str, Signal], dict[str, Signal]]:
+        """Poses and commands of the robot as columns by name, each with its `time` [s]."""
+        control_hz = robot.figures["control_rate"]
         poses = dict(zip(("x", "y", "heading"), self.poses.T, strict=True))
-        commands = dict(zip(("left", "right"), self.commands.T, strict=True))
+        commands = dict(zip(robot.columns, self.commands.T, strict=True))
         return (
             {"time": np.arange(len(self.poses)) / TICK_HZ, **poses},
             {"time": np.arange(len(self.commands)) / control_hz, **commands},

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from proxytune.domain import Demonstration, Policy
 from proxytune.driving.agent import Command, Picture
-from proxytune.driving.agents import duties
+from proxytune.driving.agents import duties, throttle_and_steering
 from proxytune.driving.episode import Sight
 from proxytune.driving.lane import lane_point, lane_pose
 from proxytune.driving.road import Road
@@ -24,18 +24,22 @@ MEMORY = 0.9
 """Share of the disturbance of one control step that is left in the next: it lasts for half a second."""
 
 
+PUSHES = {"differential": np.array((-1.0, 1.0)), "ackermann": np.array((0.0, 1.0))}
+"""What a disturbance to the left adds to the columns of a command."""
+
+
 class LessonMemory(NamedTuple):
     """Memory of what a lesson has shown so far.
 
     Attributes:
-        figures: The robot's nominal full speed [m/s] and effective baseline [m].
+        robot: Whose nominal figures are known.
         disturbance: What was added to the steering at the last step [duty].
         pictures: One before every command.
         commands: What the expert would do, undisturbed.
         on_road: Whether the middle of its axle was on the road then, whichever lane.
     """
 
-    figures: tuple[float, float]
+    robot: Robot
     disturbance: float
     pictures: tuple[Picture, ...]
     commands: tuple[Command, ...]
@@ -73,11 +77,11 @@ class Expert:
 
     def begin(self, robot: Robot) -> LessonMemory:
         """Nothing shown yet."""
-        return LessonMemory((robot.figures["full_speed"], robot.figures["effective_baseline"]), 0.0, (), (), ())
+        return LessonMemory(robot, 0.0, (), (), ())
 
     def act(self, sight: Sight, memory: LessonMemory) -> tuple[Command, LessonMemory]:
         """Steer for the point pursued, disturbed."""
-        command, on_road = self._command(sight.pose, *memory.figures)
+        command, on_road = self._command(sight.pose, memory.robot)
         drawn = expert_generator(self.seed, len(memory.commands)).standard_normal()
         push = MEMORY * memory.disturbance + np.sqrt(1.0 - MEMORY**2) * self.disturbance * float(drawn)
         shown = memory._replace(
@@ -86,14 +90,18 @@ class Expert:
             commands=(*memory.commands, command),
             on_road=(*memory.on_road, on_road),
         )
-        return np.clip(command + np.array((-push, push)), -1.0, 1.0), shown
+        return np.clip(command + PUSHES[memory.robot.drive] * push, -1.0, 1.0), shown
 
-    def _command(self, pose: Signal, full_speed: float, baseline: float) -> tuple[Command, bool]:
+    def _command(self, pose: Signal, robot: Robot) -> tuple[Command, bool]:
         seen = lane_pose(self.road, pose[:2], pose[2])
         ahead = lane_point(self.road, seen.counter_clockwise, seen.along + self.look_ahead_m) - pose[:2]
         left = float(np.cos(pose[2]) * ahead[1] - np.sin(pose[2]) * ahead[0])
-        yaw_rate = self.gain * self.speed * 2.0 * left / float(ahead @ ahead)
-        command = np.array(duties(self.speed, yaw_rate, full_speed=full_speed, baseline=baseline))
+        if robot.drive == "ackermann":
+            command = np.array(throttle_and_steering(robot, self.speed, self.gain * 2.0 * left / float(ahead @ ahead)))
+        else:
+            full_speed, baseline = robot.figures["full_speed"], robot.figures["effective_baseline"]
+            yaw_rate = self.gain * self.speed * 2.0 * left / float(ahead @ ahead)
+            command = np.array(duties(self.speed, yaw_rate, full_speed=full_speed, baseline=baseline))
         from_middle = abs(self.road.lane_offset - float(seen.deviation))
         return command, from_middle <= self.road.lane_offset + self.road.lane_width / 2.0
 

@@ -14,8 +14,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 from proxytune.domain import Demonstration, Episode, Policy, Recording
-from proxytune.driving.agent import Picture
-from proxytune.driving.agents import load_agent
+from proxytune.driving.agent import Agent, Picture
+from proxytune.driving.agents import AGENTS, AtTheWheel, load_agent
 from proxytune.driving.bullet import BulletCamera, need_pybullet
 from proxytune.driving.cameras import GroundPlaneCamera
 from proxytune.driving.episode import (
@@ -38,11 +38,10 @@ from proxytune.driving.lane import off_map
 from proxytune.driving.maps import chosen_map
 from proxytune.driving.optics import CameraFigures, Renderer
 from proxytune.driving.plants import Plant, check_body, drivetrain
-from proxytune.driving.road import Road
+from proxytune.driving.road import Arc, Road
 from proxytune.driving.road_picture import Floor, draw_floor
-from proxytune.driving.robot import Robot, read_robot, robot_home, robot_names
+from proxytune.driving.robot import Robot, catalogue_of, read_model_of, read_robot, robot_home, robot_names
 from proxytune.effects import (
-    Catalogue,
     Chain,
     Effect,
     FilterContext,
@@ -50,7 +49,6 @@ from proxytune.effects import (
     Stage,
     effects_from,
     read_effects,
-    read_model,
     stage_chain,
 )
 from proxytune.errors import EpisodeError, InputError
@@ -182,7 +180,7 @@ class LaneFollowing:
     @property
     def parameters(self) -> Mapping[str, Parameter]:
         """Every parameter of the catalogue of effects, a user's own when asked for by name."""
-        return Catalogue(self.folder).parameters
+        return catalogue_of(self.robot, self.folder).parameters
 
     @property
     def starts(self) -> int:
@@ -195,7 +193,7 @@ class LaneFollowing:
         Raises:
             SettingsError: If there is no such agent.
         """
-        load_agent(name, self.folder)
+        self._agent(name)
 
     def run(self, episode: Episode) -> Mapping[str, float]:
         """Drive one episode and score it.
@@ -215,8 +213,8 @@ class LaneFollowing:
         Raises:
             EpisodeError: With the time at which the agent failed.
         """
-        driven, control_hz = self.drive(episode), read_robot(self.robot, self.folder).figures["control_rate"]
-        return Recording(self._metrics(driven.poses), *driven.columns(control_hz))
+        driven = self.drive(episode)
+        return Recording(self._metrics(driven.poses), *driven.columns(read_robot(self.robot, self.folder)))
 
     def drive(self, episode: Episode) -> Drive:
         """Drive one episode.
@@ -228,7 +226,13 @@ class LaneFollowing:
 
     def drive_many(self, episodes: Sequence[Episode]) -> list[Drive | EpisodeError]:
         """Drive episodes side by side, each as `drive` does."""
-        return self._drive(episodes, [load_agent(episode.agent, self.folder) for episode in episodes], self.seconds)
+        return self._drive(episodes, [self._agent(episode.agent) for episode in episodes], self.seconds)
+
+    def _agent(self, name: str) -> Agent:
+        """An agent; ours are made for two wheels, others answer with the robot's own commands."""
+        agent = load_agent(name, self.folder)
+        steers = name in AGENTS and read_robot(self.robot, self.folder).drive == "ackermann"
+        return AtTheWheel(agent) if steers else agent
 
     def _metrics(self, poses: Signal) -> Mapping[str, float]:
         return score_trajectory(self.map, poses, tick_s=1.0 / TICK_HZ, seconds=self.seconds)
@@ -378,19 +382,22 @@ def lane_following(section: Section, *, model: Path | None) -> LaneFollowing:
     """
     section.only(("robot", "plant", "camera", "map", "seconds", "position_noise_m", "heading_noise_deg", "effects"))
     folder = section.path.resolve().parent
-    given = read_model(model, Catalogue(folder)) if model else None
+    given = read_model_of(model, folder) if model else None
     robot = _agreed(section, "robot", given.robot if given else None, "duckiebot", robot_names(folder))
+    catalogue = catalogue_of(robot, folder)
     plant = _agreed(section, "plant", given.plant if given else None, "bullet", PLANTS)
     camera = section.text("camera", "ground_plane", choices=CAMERAS)
     _check_equipment(section, read_robot(robot, folder), plant, camera)
     figures = read_robot(robot, folder).figures
-    theta, _ = read_effects(section.section("effects"), Catalogue(folder))
+    theta, _ = read_effects(section.section("effects"), catalogue)
     effects = {**(given.theta if given else {}), **theta}
+    road = chosen_map(section)
+    _check_bends(section, read_robot(robot, folder), road)
     return LaneFollowing(
         robot=robot,
         plant=plant,
         camera=camera,
-        map=chosen_map(section),
+        map=road,
         seconds=section.number("seconds", 60.0, low=1.0, high=3600.0),
         position_noise_m=section.number("position_noise_m", 0.01, low=0.0, high=0.1),
         heading_noise_deg=section.number("heading_noise_deg", 2.0, low=0.0, high=30.0),
@@ -415,6 +422,15 @@ def _check_equipment(section: Section, robot: Robot, plant: str, camera: str) ->
             check_body(robot)
     except InputError as problem:
         raise section.error(key, str(problem)) from None
+
+
+def _check_bends(section: Section, robot: Robot, road: Road) -> None:
+    """Refuse a map whose lanes bend more tightly than the robot can turn."""
+    lanes = [arc.radius - road.lane_offset for arc in road.segments if isinstance(arc, Arc)]
+    least = robot.least_radius
+    if lanes and min(lanes) < least:
+        tight = f"lanes of {road.name} bend at {min(lanes):.2g} m, robot '{robot.name}' turns at {least:.2g} m or more"
+        raise section.error("map", f'{tight}; take map = "car_loop" or a map of your own')
 
 
 def _agreed(section: Section, key: str, of_model: str | None, default: str, known: tuple[str, ...]) -> str:

@@ -33,7 +33,7 @@ from proxytune.driving.episode import (
 from proxytune.driving.expert import Pupil
 from proxytune.driving.plants import Drivetrain, PlanarFleet, PlanarPlant, Plant
 from proxytune.driving.robot import Robot
-from proxytune.effects import CATALOGUE, Chain, Effect, FilterContext, Learnt, Memory, Signal, Stage, Trace
+from proxytune.effects import DRIVES, Chain, Effect, FilterContext, Learnt, Memory, Signal, Stage, Trace
 from proxytune.errors import EpisodeError
 from proxytune.space import Parameter
 
@@ -87,7 +87,7 @@ def fleet_at(plant: str, robot: Robot, starts: Signal) -> Iterator[Fleet]:
         yield Plants([stack.enter_context(plant_at(plant, robot, start)) for start in starts])
 
 
-_OURS = frozenset((*CATALOGUE.values(), Learnt))
+_OURS = frozenset((*(effect for effects in DRIVES.values() for effect in effects.values()), Learnt))
 
 
 def _same_in_batches(effect: Effect) -> bool:

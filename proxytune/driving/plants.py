@@ -118,6 +118,9 @@ def drivetrain(robot: Robot, effects: Iterable[Effect]) -> Drivetrain:
 AXLES = ("axle_left", "axle_right")
 """How the bullet plant calls the joints that it drives."""
 
+STEERS = ("steer_left", "steer_right")
+"""How it calls those that it turns the front wheels of a car by."""
+
 AGREES = 0.01
 """How far, relatively, a URDF may be from robot.toml."""
 
@@ -261,15 +264,34 @@ def check_body(robot: Robot) -> None:
     root = parse_urdf(path)
     body = read_body(root, path)
     _check_files(root, path)
+    stated = [("wheel_distance", body.wheel_distance)]
+    if robot.drive == "ackermann":
+        stated.append(("wheelbase", wheelbase_of(root, body, path)))
     for wheel, name in zip((body.left, body.right), AXLES, strict=True):
         if wheel.joint != name or wheel.axis[1] < 0.0:
             said = f"joint '{wheel.joint}' must be called {name}"
             raise SettingsError(f"{path.name}: {said}, and its axis must point to the left (0 1 0)")
     radii = [wheel.radius_m for wheel in (body.left, body.right) if wheel.radius_m is not None]
-    for figure, value in (*(("wheel_radius", radius) for radius in radii), ("wheel_distance", body.wheel_distance)):
+    for figure, value in (*(("wheel_radius", radius) for radius in radii), *stated):
         if abs(value - robot.figures[figure]) > AGREES * robot.figures[figure]:
             said = f"has the {figure} {value:g} m, robot.toml says {robot.figures[figure]:g} m"
             raise SettingsError(f"{path.name}: {said}; correct the one that is wrong")
+
+
+def wheelbase_of(root: ET.Element, body: Body, path: Path) -> float:
+    """How far the front wheels, which have to steer, are ahead of the driven ones [m].
+
+    Raises:
+        SettingsError: If they do not hang on two joints called as the bullet plant calls them.
+    """
+    steers = {joint.get("name"): joint for joint in root.iter("joint") if joint.get("type") == "revolute"}
+    missing = [name for name in STEERS if name not in steers]
+    if missing:
+        remedy = "the front wheels of a car hang on two revolute joints of these names, axis 0 0 1"
+        raise SettingsError(f"{path.name}: has no joint {' and '.join(missing)}; {remedy}")
+    children = [child.get("link", "") for name in STEERS if (child := steers[name].find("child")) is not None]
+    ahead = [link_pose(root, child)[0, 3] - body.left.centre[0] for child in children]
+    return float(np.mean(ahead))
 
 
 SCHEMES = re.compile(r"(file|package|model)://")

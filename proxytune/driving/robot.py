@@ -8,7 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from proxytune.driving.optics import CameraFigures
-from proxytune.effects import DRIVES, SHIPPED, Catalogue, read_effects
+from proxytune.effects import DRIVES, SHIPPED, Catalogue, Model, read_effects, read_model
 from proxytune.errors import ExtensionError, SettingsError
 from proxytune.extensions import load, plugins
 from proxytune.files import shipped
@@ -238,6 +238,16 @@ def catalogue_of(robot: str, folder: Path | None, own: tuple[str, ...] = ()) -> 
     """
     known = robot in robot_names(folder)
     return replace(read_robot(robot, folder).catalogue if known else Catalogue(folder), folder=folder, own=own)
+
+
+def read_model_of(path: Path, folder: Path | None) -> Model:
+    """Read a model.toml with the effects that its robot may have.
+
+    Raises:
+        SettingsError: With file, key and remedy.
+    """
+    named = read_settings(path).values.get("robot")
+    return read_model(path, catalogue_of(named if isinstance(named, str) else "", folder))
 
 
 def robot_from_geometry(name: str, geometry: Mapping[str, float], control_rate: float) -> Robot:

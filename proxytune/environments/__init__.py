@@ -1,7 +1,8 @@
 """Gymnasium both ways: lane following as an environment, and any environment as a domain family.
 
-Importing this package registers `proxytune/LaneFollowing-v0`, so that `gymnasium.make` knows it. Gymnasium itself can
-be told to: `gymnasium.make("proxytune.environments:proxytune/LaneFollowing-v0")`.
+Importing this package registers `proxytune/LaneFollowing-v0` and `proxytune/CarLaneFollowing-v0`, the same with a car,
+so that `gymnasium.make` knows them. Gymnasium itself can be told to:
+`gymnasium.make("proxytune.environments:proxytune/LaneFollowing-v0")`.
 """
 
 import lazy_loader
@@ -14,8 +15,10 @@ except ModuleNotFoundError:
     raise ExtensionError('gymnasium is not installed; pip install "proxytune[gym]"') from None
 
 LANE_FOLLOWING = "proxytune/LaneFollowing-v0"
+CAR_LANE_FOLLOWING = "proxytune/CarLaneFollowing-v0"
+_DOMAINS = {LANE_FOLLOWING: {}, CAR_LANE_FOLLOWING: {"robot": "car", "map": "car_loop"}}
 
-if LANE_FOLLOWING not in gymnasium.registry:
-    gymnasium.register(LANE_FOLLOWING, entry_point="proxytune.environments.lane_following:LaneFollowingEnv")
+for _id in _DOMAINS.keys() - gymnasium.registry.keys():
+    gymnasium.register(_id, "proxytune.environments.lane_following:LaneFollowingEnv", kwargs=_DOMAINS[_id])
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -200,8 +200,8 @@ class _EpisodeUnderWay(NamedTuple):
 class LaneFollowingEnv(gymnasium.Env[Picture, NDArray[Any]]):
     """One robot that is to follow its lane: the episodes that a study scores, one control step at a time.
 
-    Observation: the camera's newest picture, (rows, columns, 3), uint8. Action: duties of the left and right wheel,
-    each in [−1, 1]; what lies beyond is clipped. A step holds it for one control step of the robot.
+    Observation: the camera's newest picture, (rows, columns, 3), uint8. Action: duties of the left and right wheel, of
+    a car throttle and steering, each in [−1, 1]; what lies beyond is clipped. A step holds it for one control step.
 
     Reward: metres along the lane's centre line in its direction in this step, counted while in the lane, as the task's
     metric `distance`: an episode's rewards add up to it.

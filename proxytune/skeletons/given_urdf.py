@@ -8,7 +8,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.driving import AXLES, Body, add_little_mass, origin_of, parse_urdf, read_body, sound_urdf
+from proxytune.driving import (
+    ACROSS,
+    AXLES,
+    STEERS,
+    Body,
+    add_little_mass,
+    link_pose,
+    origin_of,
+    parse_urdf,
+    read_body,
+    sound_urdf,
+    wheelbase_of,
+)
 from proxytune.errors import InputError
 from proxytune.skeletons.writing import Skeleton, check_figures, completed, robot_text, then
 
@@ -16,13 +28,14 @@ WHEELS = ("wheel_radius", "wheel_distance")
 """Of these robot.toml and URDF must say the same: the bullet plant drives by both."""
 
 
-def robot_from_urdf(name: str, path: Path, figures: Mapping[str, float]) -> Skeleton:
+def robot_from_urdf(name: str, path: Path, figures: Mapping[str, float], drive: str = "differential") -> Skeleton:
     """A robot.toml with what a URDF says, and that URDF with its axles and origin as the bullet plant has them.
 
     Args:
         name: Of the robot and its folder.
         path: The URDF.
         figures: What the user states; it goes before what the URDF says, save for the wheels.
+        drive: "differential", or "ackermann" for a car.
 
     Raises:
         InputError: If its wheels cannot be told, or a number in it is none.
@@ -31,17 +44,63 @@ def robot_from_urdf(name: str, path: Path, figures: Mapping[str, float]) -> Skel
     root = parse_urdf(path)
     with sound_urdf(path):
         _drop_empty_roots(root, path)
+        named = tuple(_name_joints(root, path)) if drive == "ackermann" else ()
         body = read_body(root, path)
         radius = _radius(body, figures, path)
-        notes = tuple(_conform(root, body, radius))
+        base = {"wheelbase": wheelbase_of(root, body, path)} if drive == "ackermann" else {}
+        notes = (*named, *_conform(root, body, radius))
     read = {name: value for name, value in _figures(body, radius).items() if name in WHEELS or name not in figures}
+    read |= base
     known = {f"read from {path.name}": read, "given to `new robot`": figures}
-    values = completed({**figures, **read})
+    values = completed({**figures, **read}, drive)
     ET.indent(root)
     urdf = ET.tostring(root, encoding="unicode") + "\n"
     said = ", ".join(f"{figure} {value:.4g}" for figure, value in read.items())
     lines = (f"read from {path.name}: {said}", *notes, "what a URDF cannot know is marked EDIT in robot.toml")
-    return Skeleton({"robot.toml": robot_text(name, values, known), f"{name}.urdf": urdf}, then(name), lines)
+    return Skeleton({"robot.toml": robot_text(name, values, known, drive), f"{name}.urdf": urdf}, then(name), lines)
+
+
+def _name_joints(root: ET.Element, path: Path) -> Iterator[str]:
+    """Name the joints of a car as the bullet plant calls them; says what was changed."""
+    joints = [joint for joint in root.iter("joint") if joint.get("type") in ("revolute", "continuous")]
+    upright = [joint for joint in joints if abs(_axis(root, joint)[2]) > ACROSS]
+    front = {link for joint in upright for link in _below(root, _child(joint))}
+    rear = [joint for joint in joints if abs(_axis(root, joint)[1]) > ACROSS and _child(joint) not in front]
+    for what, found, names in (("steer", upright, STEERS), ("are driven, behind", rear, AXLES)):
+        pair = [one for one in found if one.get("name") in names] or found
+        if len(pair) != 2:
+            told = ", ".join(one.get("name", "") for one in pair) or "none"
+            raise InputError(
+                f"{path}: a car needs two joints that {what}, found {told}; call them {' and '.join(names)}"
+            )
+        pair.sort(key=lambda joint: -link_pose(root, _child(joint))[1, 3])
+        for joint, name in zip(pair, names, strict=True):
+            if joint.get("name") != name:
+                yield f"joint {joint.get('name')} is now called {name}"
+            joint.set("name", name)
+            joint.set("type", "revolute" if names is STEERS else "continuous")
+
+
+def _child(joint: ET.Element) -> str:
+    child = joint.find("child")
+    return child.get("link", "") if child is not None else ""
+
+
+def _below(root: ET.Element, link: str) -> Iterator[str]:
+    """A link and all that hang on it."""
+    yield link
+    for joint in root.iter("joint"):
+        if _parent(joint) == link:
+            yield from _below(root, _child(joint))
+
+
+def _axis(root: ET.Element, joint: ET.Element) -> NDArray[np.float64]:
+    """Direction of a joint's axis in the root link's frame (3,)."""
+    axis = joint.find("axis")
+    said = axis.get("xyz", "1 0 0") if axis is not None else "1 0 0"
+    direction = np.array([float(value) for value in said.split()])
+    turned: NDArray[np.float64] = link_pose(root, _child(joint))[:3, :3] @ (direction / np.linalg.norm(direction))
+    return turned
 
 
 def _radius(body: Body, figures: Mapping[str, float], path: Path) -> float:

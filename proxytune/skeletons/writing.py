@@ -60,13 +60,12 @@ def study_skeleton(name: str, robot: Robot) -> Skeleton:
     pitch = robot.camera_figures().pitch_deg
     low, high = max(0.0, pitch - AROUND_DEG), min(HIGHEST_DEG, pitch + AROUND_DEG)
     off = pitch + OFF_DEG if pitch + OFF_DEG < high else pitch - OFF_DEG
-    plant = _plant(robot)
-    study = fill(
-        "study.toml.txt", name=name, robot=robot.name, plant=plant, pitch_low=f"{low:g}", pitch_high=f"{high:g}"
-    )
-    return Skeleton(
-        {"study.toml": study, "truth.toml": fill("truth.toml.txt", robot=robot.name, pitch=f"{off:g}")}, commands(name)
-    )
+    trim = robot.catalogue.declared[0]
+    values = {"name": name, "robot": robot.name, "plant": _plant(robot), "trim": trim, "pitch": f"{off:g}"}
+    values |= {"pitch_low": f"{low:g}", "pitch_high": f"{high:g}"}
+    values |= {"map": "small_loop" if robot.drive == "differential" else "car_loop"}
+    values |= {"trim_key": robot.catalogue.effect(trim).parameters[0].name}
+    return Skeleton({part: fill(f"{part}.txt", **values) for part in ("study.toml", "truth.toml")}, commands(name))
 
 
 def commands(name: str) -> tuple[str, str]:
@@ -130,6 +129,28 @@ GUESSES: Mapping[str, tuple[float, str]] = MappingProxyType(
 )
 """What is written where nothing is known of a figure, and how to know it."""
 
+CAR_GUESSES: Mapping[str, tuple[float, str]] = MappingProxyType(
+    {
+        "wheelbase": (0.26, "from the rear axle to the front one"),
+        "wheel_angle": (25.0, "greatest angle of the front wheels, mean of both sides"),
+        "wheel_radius": (0.033, "half a wheel's diameter"),
+        "wheel_distance": (0.16, "track width: between the middles of the rear wheels"),
+        "full_speed": (2.0, "straight ahead at full throttle"),
+        "mass": (1.6, "of the whole car"),
+        "camera_forward": (0.20, "of the lens ahead of the rear axle"),
+        "lane_width": (0.40, "of the lanes it is to follow; shipped agents scale what they do by it"),
+        "expert_look_ahead": (0.45, "for `teach` alone"),
+        "expert_speed": (0.45, "for `teach` alone"),
+    }
+)
+"""The same of a car, where it differs."""
+
+EIGHT = (
+    *("wheelbase", "wheel_angle", "wheel_radius", "wheel_distance", "full_speed", "motor_time_constant"),
+    *("camera_height", "camera_pitch"),
+)
+"""What a car's body and model are made of."""
+
 SIX = ("wheel_radius", "wheel_distance", "full_speed", "motor_time_constant", "camera_height", "camera_pitch")
 """What a skeleton's body and model are made of; the rest can wait."""
 
@@ -143,22 +164,24 @@ LEAST_S = 0.05
 """A motor is taken to be no faster than that where its torque is guessed [s]."""
 
 
-def robot_skeleton(name: str, figures: Mapping[str, float]) -> Skeleton:
+def robot_skeleton(name: str, figures: Mapping[str, float], drive: str = "differential") -> Skeleton:
     """A robot.toml and a URDF of its own, which agree with each other.
 
     Args:
         name: Of the robot and its folder.
         figures: What is known of it; the rest is guessed and marked.
+        drive: "differential", or "ackermann" for a car.
 
     Raises:
         InputError: If a figure is unknown or cannot be.
     """
     check_figures(figures)
-    values = completed(figures)
+    values = completed(figures, drive)
+    body = _car_text(name, values) if drive == "ackermann" else fill("body.urdf.txt", name=name, **_dimensions(values))
     return Skeleton(
         {
-            "robot.toml": robot_text(name, values, {"given to `new robot`": figures}),
-            f"{name}.urdf": fill("body.urdf.txt", name=name, **_dimensions(values)),
+            "robot.toml": robot_text(name, values, {"given to `new robot`": figures}, drive),
+            f"{name}.urdf": body,
         },
         then(name),
         (f"what is not known of {name} is marked EDIT in robot.toml; its wheels are in {name}.urdf too",),
@@ -187,10 +210,15 @@ def check_figures(figures: Mapping[str, float]) -> None:
             raise InputError(f"--figures: {figure} must be above 0 and finite, got {value:g}")
 
 
-def completed(figures: Mapping[str, float]) -> dict[str, float]:
+def _guesses(drive: str) -> Mapping[str, tuple[float, str]]:
+    of_wheels = {name: guess for name, guess in GUESSES.items() if name != "effective_baseline"}
+    return GUESSES if drive == "differential" else {**of_wheels, **CAR_GUESSES}
+
+
+def completed(figures: Mapping[str, float], drive: str = "differential") -> dict[str, float]:
     """Every figure: those known, and guesses that go with them."""
-    values = {name: guess for name, (guess, _) in GUESSES.items()} | dict(figures)
-    if "effective_baseline" not in figures:
+    values = {name: guess for name, (guess, _) in _guesses(drive).items()} | dict(figures)
+    if drive == "differential" and "effective_baseline" not in figures:
         values["effective_baseline"] = values["wheel_distance"]
     if "wheel_torque" not in figures:
         force = 2.0 * values["mass"] * values["full_speed"] / max(values["motor_time_constant"], LEAST_S)
@@ -198,23 +226,57 @@ def completed(figures: Mapping[str, float]) -> dict[str, float]:
     return values
 
 
-def robot_text(name: str, values: Mapping[str, float], known: Mapping[str, Mapping[str, float]]) -> str:
-    """A robot.toml: the six figures first; what is not known is marked EDIT.
+def robot_text(
+    name: str, values: Mapping[str, float], known: Mapping[str, Mapping[str, float]], drive: str = "differential"
+) -> str:
+    """A robot.toml: the figures that matter most first; what is not known is marked EDIT.
 
     Args:
         name: Of the robot.
         values: Every figure, in the units of a robot.toml.
         known: Source to the figures that come from it; the first source that has a figure is named.
+        drive: How it drives.
     """
-    rows = []
-    for figure in (*SIX, *(one for one in values if one not in SIX)):
+    rows, guesses = [], _guesses(drive)
+    template, first = ("robot.toml.txt", SIX) if drive == "differential" else ("car.toml.txt", EIGHT)
+    for figure in (*first, *(one for one in values if one not in first)):
         cell = f'value = {values[figure]:.6g}, unit = "{UNITS[figure]}"'
         source = next((source for source, figures in known.items() if figure in figures), "")
-        how = GUESSES[figure][1] if figure in GUESSES else "measure it"
+        how = guesses[figure][1] if figure in guesses else "measure it"
         edit = "" if source else f"  # EDIT: {how}"
         rows.append(f'{figure} = {{ {cell}, source = "{source or "a guess"}" }}{edit}')
     effects = {key: f"{values[key]:.6g}" for key in ("motor_time_constant", "camera_pitch")}
-    return fill("robot.toml.txt", name=name, figures="\n".join(rows), **effects)
+    return fill(template, name=name, figures="\n".join(rows), **effects)
+
+
+def _car_text(name: str, values: Mapping[str, float]) -> str:
+    """A car's body: a box over four wheels, of which the front ones hang on knuckles that turn."""
+    common = _dimensions(values)
+    base, half, radius = values["wheelbase"], values["wheel_distance"] / 2.0, values["wheel_radius"]
+    length, width, height = 1.3 * base, 1.6 * half, 1.2 * radius
+    chassis = 0.77 * values["mass"]
+    own = {
+        "half_wheelbase": base / 2.0,
+        "length": length,
+        "width": width,
+        "height": height,
+        "middle": 1.3 * radius + height / 2.0,
+        "chassis_mass": chassis,
+        "chassis_ixx": chassis * (width**2 + height**2) / 12.0,
+        "chassis_iyy": chassis * (length**2 + height**2) / 12.0,
+        "chassis_izz": chassis * (length**2 + width**2) / 12.0,
+    }
+    common |= {key: f"{number:.6g}" for key, number in own.items()}
+    wheels = ""
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        rear, front = (f"{x:.6g} {sign * half:.6g} {radius:.6g}" for x in (0.0, base))
+        wheels += fill(
+            "wheel.urdf.txt", **common, at=f"rear_{side}", joint=f"axle_{side}", parent="chassis", place=rear
+        )
+        wheels += fill("knuckle.urdf.txt", **common, side=side, place=front)
+        hub = {"joint": f"hub_{side}", "parent": f"knuckle_{side}", "place": "0 0 0"}
+        wheels += fill("wheel.urdf.txt", **common, at=f"front_{side}", **hub)
+    return fill("car.urdf.txt", name=name, wheels=wheels, **common)
 
 
 def _dimensions(values: Mapping[str, float]) -> dict[str, str]:

@@ -25,6 +25,7 @@ from .opening import (
     PRPV as PRPV,
     Study as Study,
     cautions_of as cautions_of,
+    family_catalogue as family_catalogue,
     measure_of as measure_of,
     open_settings as open_settings,
     open_study as open_study,

@@ -15,6 +15,7 @@ import numpy as np
 
 from proxytune.arrays import Floats
 from proxytune.domain import DomainFamily
+from proxytune.driving import catalogue_of
 from proxytune.effects import Catalogue, read_model
 from proxytune.errors import ExtensionError, InputError, ScoresError
 from proxytune.extensions import ask, load, plugins
@@ -282,6 +283,11 @@ def _engine(settings: StudySettings) -> Engine:
     return engine
 
 
+def family_catalogue(family: DomainFamily, settings: StudySettings) -> Catalogue:
+    """The effects that a study's family may have: those of its robot, a user's own from the study's folder."""
+    return catalogue_of(getattr(family, "robot", ""), settings.folder.resolve())
+
+
 def _truth(settings: StudySettings, family: DomainFamily) -> Theta | None:
     if settings.truth is None:
         return None
@@ -289,5 +295,5 @@ def _truth(settings: StudySettings, family: DomainFamily) -> Theta | None:
         raise settings.error("truth", f"no such file: {settings.truth}; check the path, or remove it")
     # A family with parameters that are no effects reads them itself
     own = getattr(family, "truth", None)
-    known = own(settings.truth) if own else read_model(settings.truth, Catalogue(settings.folder.resolve())).theta
+    known = own(settings.truth) if own else read_model(settings.truth, family_catalogue(family, settings)).theta
     return {name: known[name] for name in settings.space.names if name in known}

@@ -221,7 +221,7 @@ def test_what_determines_a_result_determines_the_identity(tmp_path):
         ({"robot": "duckybot"}, "domain.robot: unknown value 'duckybot'; did you mean 'duckiebot'?"),
         ({"plant": "bulet"}, "domain.plant: unknown value 'bulet'; did you mean 'bullet'?"),
         ({"camera": "eye"}, "domain.camera: unknown value 'eye'"),
-        ({"map": "big_loop"}, "domain.map: unknown value 'big_loop'; did you mean 'small_loop'?"),
+        ({"map": "smal_loop"}, "domain.map: unknown value 'smal_loop'; did you mean 'small_loop'?"),
         ({"seconds": 0.0}, "domain.seconds: must be between"),
         ({"position_noise_m": float("nan")}, "domain.position_noise_m: must be finite"),
         ({"effects": {"trim": {"trim": 3.0}}}, "domain.effects.trim.trim: must be between"),

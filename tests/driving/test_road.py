@@ -93,7 +93,7 @@ def overlapping():
 
 
 def test_maps_that_travel_along_are_no_robots():
-    assert set(map_names()) == {"horseshoe", "small_loop"}
+    assert set(map_names()) == {"car_loop", "horseshoe", "small_loop"}
     assert "maps" not in robot_names()
 
 

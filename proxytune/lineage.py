@@ -39,14 +39,14 @@ SAME_CODE = {
     "environments": (
         "f5b9c2c9586c29cd4dc2d6e27f44fd2731ecc2d27bf96a80c745aecd5a3ddb50",
         "efd8ee20ccef978bc76d2d8a4347a02b439e79a2e68d2dd89f86ca5ae1a37343",
-        "616232d64eff873aea0ad9096beabe2f420e9befade17e9d4858855b3de5406c",
+        "857f8bf0c18a0f1ddda799bbf267b3fcfcea58b673fb74cb056aedf297d965ba",
     ),
     "engine outcomes": ("94c0ba12f9bf", "169c7ef2065e"),
     "engine composite": ("82865583b592", "169c7ef2065e"),
     "engine gp": ("231c6791b2b7", "1dae7f006157"),
     "engine random": ("0faabd65d4d9", "40019bb841cc"),
     "engine sobol": ("225f0b0407fb", "40019bb841cc"),
-    "engine tpe": ("7bbfc93f55ba", "5004f0c9a482"),
+    "engine tpe": ("7bbfc93f55ba", "5004f0c9a482", "dab8e44a497a"),
     "design": ("3695c894b9c7", "40019bb841cc"),
     "learner proxytune.learning.cloning": (
         "ceb19d953492d57f248e919c7553724e5616f3b383452117639093a35b2ce432",

@@ -6,12 +6,12 @@ be told to: `gymnasium.make("proxytune.environments:proxytune/LaneFollowing-v0")
 
 import lazy_loader
 
-from proxytune.errors import ExtensionError
+from proxytune.errors import ExtensionError, to_install
 
 try:
     import gymnasium
 except ModuleNotFoundError:
-    raise ExtensionError('gymnasium is not installed; pip install "proxytune[gym]"') from None
+    raise ExtensionError(f"gymnasium is not installed; {to_install('gym')}") from None
 
 LANE_FOLLOWING = "proxytune/LaneFollowing-v0"
 

@@ -1,7 +1,10 @@
-"""What a study survives: `python benchmarks/reliability.py kills|digits|bits|cuts [COUNT]`.
+"""What is survived: `python benchmarks/reliability.py kills|commands|digits|bits|cuts [COUNT]`.
 
 `kills`: so many studies of each engine, with one job and with two, each ended by `kill -9` at four random moments and
 then finished; their trials and episodes are compared with those of a study that was never stopped.
+
+`commands`: each command is ended by so many `kill -9` at random moments, alone or with its processes, at most four in a
+row, and then run again to its end. Every file must then be what two undisturbed runs agree upon, and no draft be left.
 
 `digits`, `bits`, `cuts`: so many times the study.db of a finished study is damaged in one place (a digit of a stored
 value is changed, a bit flipped, the end cut off) and read again. Each damage is told in one line, or changes nothing
@@ -13,13 +16,16 @@ import itertools
 import os
 import random
 import re
+import shutil
 import signal
 import sqlite3
 import sys
 import tempfile
+import time
+import zlib
 from collections import Counter
 from collections.abc import Callable
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
@@ -29,15 +35,21 @@ sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "fakes"))
 
 import conftest
+import foreign_robot
 import launched
 import processes
+import several
+import taught
+import tiny_loop
 
+from proxytune.cli.main import main
 from proxytune.errors import ProxytuneError
 from proxytune.search import ENGINE_NAMES
 from proxytune.storage import Store
 from proxytune.study import Study, open_study, result_of, stored_run
 
 KILLS = 4
+TIMES = re.compile(rb"Written [-0-9]+ [0-9:]+( UTC)?|\d+(\.\d+)? m?s\b")
 TABLES = ("facts", "trials", "episodes", "instances")
 
 
@@ -58,6 +70,122 @@ def survive_kills(count: int, home: Path) -> str:
             assert status == 0, printed
             equal += (processes.trials(folder), processes.episodes(folder)) == whole
     return f"{kills} kills: {equal} of {len(cases)} studies came to the same trials and episodes"
+
+
+SMALL = {"agents": '["agent0", "agent1", "agent2"]', "domain": {"sleep": "0.01"}}
+COMMANDS = {
+    "study": "study fresh",
+    "study, two jobs": "study fresh2",
+    "study of families": "study several",
+    "study by PLV": "study teachable",
+    "sweep": "sweep fresh --parameter trim --points 5",
+    "teach": "teach taught",
+    "score": "score --proxy proxy.csv --target target.csv --metric distance:max --output scored --table scored.csv",
+    "plot": "plot done",
+    "repair": "repair spoilt",
+    "export": "export done --to optuna --output trials.sqlite3",
+    "export of a model": "export tiny/twin.toml --to filter --output filter.py",
+    "new": "new study begun",
+    "import": "import table.csv imported --robot nobodys" + "".join(
+        f" --figure {key}={value}" for key, value in foreign_robot.FIGURES.items()
+    ),
+    "record": "record tiny --model tiny/twin.toml --output recorded --seconds 5 --frames 4",
+    "measure": "measure tiny --model tiny/twin.toml --output measured.csv",
+    "drive": "drive tiny --agent steady --output drive.png",
+    "predict": "predict tiny/twin.toml log --horizon 2 --output poses.csv",
+    "diagnose": "diagnose log --output found",
+    "loop": "loop tiny --log driven",
+}  # fmt: skip
+
+
+def prepare(home: Path) -> None:
+    """Write what the commands need."""
+    make = conftest.study_maker(home)
+    make("fresh", **SMALL)
+    make("fresh2", jobs="2", **SMALL)
+    several.make_several(make, called="several", **SMALL)
+    lessons = {**SMALL, "grid": [0, 20, 40], "starts": "1", "metrics": '["distance:max"]'}
+    taught.make_taught(make, called="taught", **lessons)
+    more = {
+        "parameters": {"trim": "[-0.2, 0.2]"},
+        "objective": '"plv"',
+        "more": "examinations = 10\nbudget = 3\n[teaching.width]\ntrim = [0.0, 0.3]",
+    }
+    taught.make_taught(make, called="teachable", **lessons, **more)
+    launched.never_stopped(make)
+    for name in ("done", "spoilt"):
+        shutil.copytree(home / "whole", home / name)
+    change_digit(home / "spoilt" / "study.db", random.Random(1))
+    for name, more in (("proxy", 0.1), ("target", 0.0)):
+        rows = [f"{a},{e},{a * e + more * a * a}\n" for a in range(1, 7) for e in range(20)]
+        (home / f"{name}.csv").write_text("agent,episode,distance\n" + "".join(rows))
+    tiny_loop.write_tiny(home / "tiny")
+    drives = [foreign_robot.drive(1, seconds=45.0)]
+    shutil.copy(foreign_robot.write_form(home / "made", "csv", drives) / "run0.csv", home / "table.csv")
+    twin, driven = str(home / "tiny" / "twin.toml"), str(home / "driven")
+    main(["record", str(home / "tiny"), "--model", twin, "--output", driven, "--repeats", "1", "--seconds", "15"])
+    (home / "log").mkdir()
+    foreign_robot.write_own_times(home / "log", drives)
+
+
+def survive_in_every_command(count: int, home: Path) -> str:
+    """Kill every command, run it again, and compare what it leaves; a line of a table each."""
+    start, work = home / "start", home / "work"
+    start.mkdir()
+    prepare(start)
+    os.environ["TMPDIR"] = str(home)
+    work.mkdir()
+    os.chdir(work)
+    lines = ["| command | kills | before its end | runs | came to the same |", "|---|---|---|---|---|"]
+    with launched.launching() as launcher:
+        for name, words in COMMANDS.items():
+            whole, seconds = [], 0.0
+            for _ in range(2):
+                renew(work, start)
+                begun = time.monotonic()
+                status, printed = launched.Launched(launcher, work, words.split()).end()
+                assert status == 0, printed
+                seconds = time.monotonic() - begun
+                whole.append(left_in(work))
+            rng, sent, kills, runs, equal = random.Random(zlib.crc32(name.encode())), 0, 0, 0, 0
+            while sent < count:
+                renew(work, start)
+                for _ in range(min(KILLS, count - sent)):
+                    process = launched.Launched(launcher, work, words.split())
+                    time.sleep(rng.uniform(0.0, seconds))
+                    with suppress(ProcessLookupError):
+                        (os.kill if rng.random() < 0.4 else os.killpg)(process.pid, signal.SIGKILL)
+                    sent, kills = sent + 1, kills + (process.end()[0] == -signal.SIGKILL)
+                status, printed = launched.Launched(launcher, work, words.split()).end()
+                after = left_in(work)
+                agreed = {path: content for path, content in whole[0].items() if whole[1][path] == content}
+                odd = [path for path in agreed if after.get(path) != agreed[path]]
+                odd += sorted({*after} - {*whole[0]})
+                runs, equal = runs + 1, equal + (status == 0 and not odd)
+                if status or odd:
+                    print(f"{name}: status {status}, {odd}: {printed[-200:]}", file=sys.stderr, flush=True)
+            lines.append(f"| {name} | {sent} | {kills} | {runs} | {equal} |")
+            print(lines[-1], file=sys.stderr, flush=True)
+    return "\n".join(lines)
+
+
+def renew(work: Path, start: Path) -> None:
+    """Put everything back as it was before the command."""
+    for path in work.iterdir():
+        shutil.rmtree(path) if path.is_dir() else path.unlink()
+    shutil.copytree(start, work, dirs_exist_ok=True)
+
+
+def left_in(folder: Path) -> dict[str, Any]:
+    """Every file and what is in it; of a study.db its trials and episodes."""
+    found: dict[str, Any] = {}
+    for path in sorted(folder.rglob("*")):
+        name = str(path.relative_to(folder))
+        if path.name == "study.db":
+            found[name] = processes.trials(path.parent), processes.episodes(path.parent)
+        elif path.is_file() and not path.name.startswith("study.db-"):
+            found[name] = TIMES.sub(b"", path.read_bytes()) if path.suffix == ".html" else path.read_bytes()
+    return found
 
 
 def killed(launcher: Any, folder: Path, episodes: int) -> bool:
@@ -132,21 +260,22 @@ def survive_damage(damage: Callable[[Path, random.Random], None], count: int, ho
     return f"{count} times: " + ", ".join(f"{number} {what}" for what, number in said.most_common())
 
 
+SURVIVALS = {"kills": survive_kills, "commands": survive_in_every_command}
 DAMAGES = {"digits": change_digit, "bits": flip_bit, "cuts": cut_off}
 
 
-def main() -> None:
+def run() -> None:
     """Do one of them, and print a line."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("what", choices=("kills", *DAMAGES))
+    parser.add_argument("what", choices=(*SURVIVALS, *DAMAGES))
     parser.add_argument("count", type=int, nargs="?", default=3)
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as home:
-        if asked.what == "kills":
-            print(survive_kills(asked.count, Path(home)))
+        if asked.what in SURVIVALS:
+            print(SURVIVALS[asked.what](asked.count, Path(home)))
         else:
             print(survive_damage(DAMAGES[asked.what], asked.count, Path(home)))
 
 
 if __name__ == "__main__":
-    main()
+    run()

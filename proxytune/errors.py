@@ -17,6 +17,11 @@ The command line turns each into one line on standard error and the exit status 
 """
 
 
+def to_install(extra: str) -> str:
+    """What installs a group of optional libraries; proxytune itself is on no index."""
+    return f'pip install ".[{extra}]" in the checkout of proxytune'
+
+
 class ProxytuneError(Exception):
     """Anything that proxytune reports to its user in one line."""
 

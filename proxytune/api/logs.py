@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from proxytune.diagnosis import PICTURES, FilmedDrive, film, frames_text, log_text, record, samples_text
-from proxytune.driving import LaneFollowing
+from proxytune.driving import LaneFollowing, read_robot
 from proxytune.errors import InputError
-from proxytune.logs import Frames, Log
+from proxytune.logs import Frames, Log, log_cautions
 from proxytune.report import write_picture, write_text
 from proxytune.settings import Section
-from proxytune.study import StudySettings, bare_family
+from proxytune.study import StudySettings, bare_family, cautions_of
 
 Tell = Callable[[str], None]
 
@@ -46,7 +46,9 @@ def recordable(settings: StudySettings, model: Path) -> LaneFollowing:
     return family
 
 
-def record_log(settings: StudySettings, model: Path, folder: Path, wanted: Wanted, tell: Tell) -> Log:
+def record_log(
+    settings: StudySettings, model: Path, folder: Path, wanted: Wanted, tell: Tell
+) -> tuple[Log, tuple[str, ...]]:
     """Drive every manoeuvre, and lanes where pictures are wanted, and write the log; without log.toml it is none.
 
     Args:
@@ -55,6 +57,9 @@ def record_log(settings: StudySettings, model: Path, folder: Path, wanted: Wante
         folder: The log's folder to write.
         wanted: What is to be driven.
         tell: Hears how far it is.
+
+    Returns:
+        The log, and what is probably not meant in its domain or itself, a sentence each.
 
     Raises:
         InputError: If the domain cannot be recorded, or has no camera or expert where pictures are wanted.
@@ -68,7 +73,8 @@ def record_log(settings: StudySettings, model: Path, folder: Path, wanted: Wante
         road = _write_map(settings.domain, folder)
         log = _film(log, drives, road, folder, lambda taken: tell(f"driving: {taken} of {wanted.frames} frames"))
     _write(log, folder, f"{model.name} on the {family.plant} plant, driven by proxytune")
-    return log
+    found = (*cautions_of(family), *log_cautions(log, read_robot(family.robot, family.folder).figures))
+    return log, tuple(dict.fromkeys(found))
 
 
 def _write_map(domain: Section, folder: Path) -> str:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from proxytune.cli.terminal import Answer
-from proxytune.errors import InputError
+from proxytune.errors import InputError, to_install
 
 SHELLS = ("bash", "zsh", "tcsh")
 
@@ -32,8 +32,7 @@ def completion_script(shell: str) -> str:
     try:
         import shtab
     except ImportError:
-        remedy = 'install it with: pip install "proxytune[completion]"'
-        raise InputError(f"completion needs shtab, which is not installed; {remedy}") from None
+        raise InputError(f"completion needs shtab, which is not installed; {to_install('completion')}") from None
     whole = parser(prog="proxytune")
     for action in _actions(whole):
         if action.type is Path:

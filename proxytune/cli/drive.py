@@ -18,6 +18,7 @@ from proxytune.study import (
     SideBySide,
     StudySettings,
     can_record,
+    cautions_of,
     check_episode,
     drive_side_by_side,
     load_family,
@@ -63,8 +64,15 @@ def run(arguments: argparse.Namespace) -> Answer:
     if arguments.output:
         write_episode(pair, compared, arguments.output)
     files = {"against": str(model) if model else None, "output": str(arguments.output) if arguments.output else None}
-    document = {**episode_document(pair, seed), "theta_from": chosen.origin, **files}
-    about = [_say_episode(pair, settings, seed), _say_theta(chosen), _say_target(model), ""]
+    cautions = list(dict.fromkeys(line for side in (family, target) if side for line in cautions_of(side)))
+    document = {**episode_document(pair, seed), "theta_from": chosen.origin, **files, "cautions": cautions}
+    about = [
+        *(f"beware: {line}" for line in cautions),
+        _say_episode(pair, settings, seed),
+        _say_theta(chosen),
+        _say_target(model),
+        "",
+    ]
     below = ["", *(line for line in (say_parting(pair), files["output"]) if line)]
     return Answer(document, Group(Text("\n".join(about)), episode_text(pair, compared), Text("\n".join(below))))
 

@@ -13,7 +13,7 @@ from proxytune.cli.options import take_late
 from proxytune.cli.terminal import Answer
 from proxytune.driving import AGENTS, METRICS, lane_length, load_agent, map_names, read_robot, robot_names, shipped_map
 from proxytune.effects import DECLARED, SHIPPED
-from proxytune.errors import InputError
+from proxytune.errors import InputError, to_install
 from proxytune.extensions import plugins
 from proxytune.report import Table, clause_of, columns_of, plain, table_text, what_it_does
 from proxytune.search import ENGINE_NAMES, ENGINES, engine_of, is_installed
@@ -137,7 +137,7 @@ def _engines() -> list[Row]:
             "label": engine.label,
             "learns_from": engine.learns_from,
             "of_studies": "yes" if engine.in_studies else "",
-            "install": "" if is_installed(engine) or not engine.needs else f"proxytune[{engine.needs.extra}]",
+            "install": "" if is_installed(engine) or not engine.needs else to_install(engine.needs.extra),
             "what_it_proposes": engine.summary,
         }
         for engine in (*ENGINES, *own)

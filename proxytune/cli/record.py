@@ -1,6 +1,7 @@
 """`record`: the log of a simulated domain that is driven through manoeuvres, and along its lanes for pictures."""
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 from rich.text import Text
@@ -36,8 +37,8 @@ def run(arguments: argparse.Namespace) -> Answer:
         raise InputError(f"--model {arguments.model}: no such file; check the path")
     wanted = Wanted(arguments.repeats, arguments.seconds, arguments.frames, arguments.seed)
     with waiting("driving") as tell:
-        log = record_log(settings, arguments.model, arguments.output, wanted, tell)
-    return _answer(log, arguments)
+        log, cautions = record_log(settings, arguments.model, arguments.output, wanted, tell)
+    return _answer(log, cautions, arguments)
 
 
 def _check(arguments: argparse.Namespace) -> None:
@@ -48,9 +49,10 @@ def _check(arguments: argparse.Namespace) -> None:
         raise InputError(f"--frames must be between 0 and {MOST_FRAMES}, got {arguments.frames}")
 
 
-def _answer(log: Log, arguments: argparse.Namespace) -> Answer:
+def _answer(log: Log, cautions: Sequence[str], arguments: argparse.Namespace) -> Answer:
     rows, frames = sum(len(episode.times) for episode in log.episodes), arguments.frames
     document = {"log": str(arguments.output), "episodes": len(log.episodes), "rows": rows, "frames": frames}
     pictures = f", {frames} frames" if frames else ""
     text = f"{len(log.episodes)} drives, {rows} rows{pictures}\n{arguments.output}"
-    return Answer({**document, "seed": arguments.seed}, Text(text))
+    lines = [*(f"beware: {line}" for line in cautions), text]
+    return Answer({**document, "seed": arguments.seed, "cautions": list(cautions)}, Text("\n".join(lines)))

@@ -7,12 +7,12 @@ so that `gymnasium.make` knows them. Gymnasium itself can be told to:
 
 import lazy_loader
 
-from proxytune.errors import ExtensionError
+from proxytune.errors import ExtensionError, to_install
 
 try:
     import gymnasium
 except ModuleNotFoundError:
-    raise ExtensionError('gymnasium is not installed; pip install "proxytune[gym]"') from None
+    raise ExtensionError(f"gymnasium is not installed; {to_install('gym')}") from None
 
 LANE_FOLLOWING = "proxytune/LaneFollowing-v0"
 CAR_LANE_FOLLOWING = "proxytune/CarLaneFollowing-v0"

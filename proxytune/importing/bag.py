@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from proxytune.arrays import Floats, Whole
-from proxytune.errors import LogError, ProxytuneError
+from proxytune.errors import LogError, ProxytuneError, to_install
 from proxytune.importing.bag_chunks import check_bag_size, check_messages_size
 from proxytune.importing.checks import headings_and_tilts
 from proxytune.importing.source import Commands, Poses
@@ -141,7 +141,7 @@ def _open_reader(path: Path) -> Any:
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
     except ModuleNotFoundError:
-        raise LogError(f'{path}: reading bags needs rosbags; pip install "proxytune[ros]"') from None
+        raise LogError(f"{path}: reading bags needs rosbags; {to_install('ros')}") from None
     with complaints(path, "cannot be read as a bag"):
         # The library would take a ROS 2 folder named run.bag for a file of ROS 1.
         inside = path.suffix == ROS1 and path.is_dir()

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Any
 from uuid import uuid4
 
-from proxytune.errors import ExtensionError, InputError, RunError
+from proxytune.errors import ExtensionError, InputError, RunError, to_install
 from proxytune.running.sending import OtherCodeError, Recipe, check_code, do_sent, made_by
 from proxytune.running.workers import LOST, START_S, AwakeClock, elsewhere
 
@@ -180,8 +180,7 @@ class Cluster:
         try:
             from distributed import Client, KilledWorker
         except ModuleNotFoundError:
-            line = '--backend dask needs distributed; install it: pip install "proxytune[dask]"'
-            raise ExtensionError(line) from None
+            raise ExtensionError(f"--backend dask needs distributed; {to_install('dask')}") from None
         # What becomes of connections is told here, in one line.
         for name in ("distributed", *logging.root.manager.loggerDict):
             if name.partition(".")[0] in ("distributed", "tornado", "asyncio"):

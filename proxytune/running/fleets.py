@@ -10,7 +10,6 @@ import math
 import pickle
 import random
 import sys
-import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -21,6 +20,7 @@ from threadpoolctl import ThreadpoolController
 from proxytune.domain import DomainFamily, Episode, Outcome
 from proxytune.errors import EpisodeError, RunError
 from proxytune.extensions import describe, is_users, one_line, place_of
+from proxytune.running.workers import AwakeClock, awake
 
 Fleet = tuple[Episode, ...]
 RAISED = "the agent or the domain family raised"
@@ -62,9 +62,8 @@ def run_together(family: Any, episodes: Sequence[Episode], needed: Collection[st
     """
     if not can_run_together(family):
         return None
-    start = time.perf_counter()
     try:
-        with _libraries(len(sys.modules)).limit(limits=1), _seeded(episodes[0].seed) as drawn:
+        with awake() as clock, _libraries(len(sys.modules)).limit(limits=1), _seeded(episodes[0].seed) as drawn:
             results = list(family.run_many(episodes))
             scored = [_judged(family, *pair, needed) for pair in zip(episodes, results, strict=True)]
             if drawn():
@@ -73,7 +72,7 @@ def run_together(family: Any, episodes: Sequence[Episode], needed: Collection[st
         if is_users(problem):
             raise
         return None
-    seconds = (time.perf_counter() - start) / len(episodes)
+    seconds = clock.seconds() / len(episodes)
     return [Outcome(one, *score, seconds) for one, score in zip(episodes, scored, strict=True)]
 
 
@@ -107,11 +106,10 @@ def run_episode(family: DomainFamily, episode: Episode, needed: Collection[str] 
     Raises:
         RunError: If memory, disk or descriptors run out: that is not the episode's doing.
     """
-    start = time.perf_counter()
     metrics: Mapping[str, float] | None = None
-    failure = ""
+    failure, clock = "", AwakeClock()
     try:
-        with _libraries(len(sys.modules)).limit(limits=1), _seeded(episode.seed):
+        with awake() as clock, _libraries(len(sys.modules)).limit(limits=1), _seeded(episode.seed):
             metrics = _checked(family, episode, family.run(episode), needed)
     except BaseException as problem:
         if is_users(problem):
@@ -119,7 +117,7 @@ def run_episode(family: DomainFamily, episode: Episode, needed: Collection[str] 
         who = f"agent '{episode.agent}' from start {episode.start}"
         check_machine(who, problem, "with more room or without that agent")
         failure = one_line(_failure(problem))
-    return Outcome(episode, metrics, failure, time.perf_counter() - start)
+    return Outcome(episode, metrics, failure, clock.seconds())
 
 
 def check_machine(whose: str, problem: BaseException | None, remedy: str) -> None:

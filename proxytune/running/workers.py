@@ -126,18 +126,36 @@ class AwakeClock:
     """Counts the seconds in which this process could run: those of a pause are nobody's work.
 
     Ctrl-Z, a paused container and some sleeping machines stop whoever waits together with the process it waits for.
-    Whoever asks is expected to do so again within a second.
+    Whoever asks is expected to do so again within a second, or has worked meanwhile.
     """
 
     def __init__(self) -> None:
-        self._seconds, self._asked = 0.0, time.monotonic()
+        self._seconds, self._asked, self._worked = 0.0, time.monotonic(), time.process_time()
 
     def seconds(self) -> float:
         """The seconds until now [s]."""
-        now = time.monotonic()
-        self._seconds += min(now - self._asked, NAP_S)
-        self._asked = now
+        now, worked = time.monotonic(), time.process_time()
+        self._seconds += min(now - self._asked, NAP_S + worked - self._worked)
+        self._asked, self._worked = now, worked
         return self._seconds
+
+
+@contextmanager
+def awake() -> Iterator[AwakeClock]:
+    """A clock that is asked often enough meanwhile; read it afterwards."""
+    clock, over = AwakeClock(), threading.Event()
+
+    def ask() -> None:
+        while not over.wait(ASK_S):
+            clock.seconds()
+
+    asking = threading.Thread(target=ask, daemon=True)
+    asking.start()
+    try:
+        yield clock
+    finally:
+        over.set()
+        asking.join()
 
 
 @contextmanager

@@ -9,10 +9,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, Literal
 
-from proxytune.errors import InputError
+from proxytune.errors import InputError, to_install
+from proxytune.files import temporary_folder
 from proxytune.search.engine import Engine, Library, Look
 from proxytune.search.loop import Trial, Values
 from proxytune.seeds import proposal_seed
@@ -123,11 +123,10 @@ def write_optuna(history: History, path: Path) -> None:
     try:
         import optuna
     except ImportError:
-        remedy = 'install it with: pip install "proxytune[tpe]"'
-        raise InputError(f"an Optuna storage needs Optuna, which is not installed; {remedy}") from None
-    with quiet(optuna.logging), TemporaryDirectory() as folder:
+        raise InputError(f"an Optuna storage needs Optuna, which is not installed; {to_install('tpe')}") from None
+    with quiet(optuna.logging), temporary_folder() as folder:
         # An address has characters that mean something in it; the name of a user's file may have them too.
-        draft = Path(folder) / "storage.sqlite3"
+        draft = folder / "storage.sqlite3"
         storage = optuna.storages.RDBStorage(f"sqlite:///{draft}")
         direction: Literal["minimize", "maximize"] = "maximize" if history.maximise else "minimize"
         study = optuna.create_study(storage=storage, study_name=history.name, direction=direction)

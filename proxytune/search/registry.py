@@ -12,7 +12,7 @@ from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
-from proxytune.errors import ExtensionError, InputError
+from proxytune.errors import ExtensionError, InputError, to_install
 from proxytune.extensions import load, plugins
 from proxytune.identity import meaning_of
 from proxytune.lineage import named
@@ -111,7 +111,7 @@ def why_not_engine(engine: Engine, *, composed: bool) -> str:
     if engine.needs and not is_installed(engine):
         modules, library, extra = engine.needs
         verb = "are" if len(modules) > 1 else "is"
-        remedy = f"pip install 'proxytune[{extra}]', or use another engine"
+        remedy = f"{to_install(extra)}, or use another engine"
         return f"'{engine.name}' needs {library}, which {verb} not installed; {remedy}"
     if engine.learns_from == "outputs" and not composed:
         remedy = f"use '{SCORE_ENGINE}'"

@@ -22,7 +22,7 @@ from proxytune.scores import ROUNDING, Metric, ScoreTable
 from proxytune.settings import nearest
 from proxytune.usefulness.comparison import Comparison, by_start
 from proxytune.usefulness.resampling import CONFIDENCE, Ends, interval
-from proxytune.usefulness.saving import Saving, effective
+from proxytune.usefulness.saving import Saving, effective, is_rate, rate_intervals
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,9 +33,6 @@ MOST_DRAWN = 1_000_000
 MOST_COMPARED, FEW_TASKS = 2000, 3
 PRIOR = 1.0
 """Successes and failures before the first episode: every rate is as probable as any other."""
-EDGE = 0.3
-"""A rate's interval: between Clopper and Pearson's (0), too wide on average, and Jeffreys' (½), too narrow at some.
-It holds at fixed rates with 92 % or more, and with 96 to 97 % on average over all of them."""
 NO_NOISE = (
     "the target gives means without the number of rollouts: no probability can be told; give it (score --rollouts)"
 )
@@ -270,12 +267,6 @@ def _without(agents: Sequence[str], parts: Sequence[tuple[str, Floats, Floats]],
     return _panel(parts[out][0], agents, proxy, target)
 
 
-def is_rate(table: ScoreTable, column: int) -> bool:
-    """True of a metric of zeros and ones with more than one episode an agent."""
-    values = table.values[..., column][table.driven]
-    return bool(table.counts.max() > 1 and np.isin(values, (0.0, 1.0)).all())
-
-
 def draw_means(
     target: ScoreTable,
     columns: Sequence[int],
@@ -323,24 +314,6 @@ def draw_means(
 def _rates(means: Floats, counts: Floats, draws: int, rng: np.random.Generator) -> Floats:
     means = np.clip(means, 0.0, 1.0)
     return rng.beta(counts * means + PRIOR, counts * (1.0 - means) + PRIOR, (draws, len(means)))
-
-
-def rate_intervals(rates: Floats, counts: Floats) -> list[Ends]:
-    """The 95 % interval of each rate.
-
-    Args:
-        rates: The share that succeeded, shape (agents,).
-        counts: Rollouts that it rests on.
-    """
-    from scipy.special import betaincinv
-
-    tail = (1.0 - CONFIDENCE) / 2.0
-    successes = np.clip(rates, 0.0, 1.0) * counts
-    failures = counts - successes
-    low = betaincinv(successes + EDGE, failures + 1.0 - EDGE, tail)
-    high = betaincinv(successes + 1.0 - EDGE, failures + EDGE, 1.0 - tail)
-    low, high = np.where(successes < 0.5, 0.0, low), np.where(failures < 0.5, 1.0, high)
-    return list(zip(map(float, low), map(float, high), strict=True))
 
 
 def _means(

@@ -12,7 +12,7 @@ foretells (Fay and Herriot, 1979): μ_i = a + b s_i + τ e_i, with a, b flat and
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -21,11 +21,14 @@ import numpy as np
 from proxytune.arrays import Flags, Floats
 from proxytune.scores import ScoreTable
 from proxytune.usefulness.comparison import Comparison, by_start, start_places, starts_of
-from proxytune.usefulness.resampling import Ends
+from proxytune.usefulness.resampling import CONFIDENCE, Ends
 
 FEWEST_AGENTS = 4
 FEWEST_PAIRS = 3
 NORMAL = 1.959964
+EDGE = 0.3
+"""A rate's interval: between Clopper and Pearson's (0), too wide on average, and Jeffreys' (½), too narrow at some.
+It holds at fixed rates with 92 % or more, and with 96 to 97 % on average over all of them."""
 SORTED = "outcomes are sorted by value in every agent: episode numbers are no pairs and no order in time"
 
 
@@ -70,27 +73,37 @@ def effective(counts: Floats, table: ScoreTable, starts: ScoreTable) -> Floats:
     return np.asarray(counts * few / table.counts, dtype=np.float64)
 
 
-def saving_of(inputs: Comparison, column: int = 0) -> Saving:
-    """Say what the proxy's rollouts save on one metric: by paired starts, else by a model over agents."""
-    real, simulated = float(inputs.target.counts.mean()), float(inputs.proxy.counts.mean())
+def saving_of(inputs: Comparison, column: int = 0, *others: Comparison) -> Saving:
+    """Say what the proxy's rollouts save on one metric: by paired starts, else by a model over agents.
+
+    Args:
+        inputs: The proxy and the target.
+        column: The metric.
+        others: Other proxies of that target, used together with the first.
+    """
+    every = (inputs, *others)
+    real, simulated = float(inputs.target.counts.mean()), sum(float(one.proxy.counts.mean()) for one in every)
     if inputs.target.counts.min() < 2:
         return Saving("none", None, None, None, real, simulated, reason="the target has one row an agent: no rollouts")
     rectified = {}
     for place, metric in enumerate(inputs.metrics):
-        found = _pairs(inputs, place)
+        found = _pairs(every, place)
         if found is not None and found.beyond_noise:
-            rectified[metric.name] = found.means, found.worth
-    pairs, reason = _pairs(inputs, column), ""
-    if pairs is not None:
-        if not pairs.share:
-            reason = "both sides have the same starts only: simulate more of them, which costs no real rollout"
-        elif not pairs.beyond_noise:
-            reason = "paired rollouts do not correlate beyond noise: the proxy is left out"
-        if not reason:
-            return _of_pairs(inputs, column, pairs, rectified)
+            rectified[metric.name] = found.means, found.sure_worth
+    pairs, reason = _pairs(every, column), ""
+    if pairs is None:
+        return _of_policies(every, column, real, simulated)
+    if not pairs.share:
+        reason = "both sides have the same starts only: simulate more of them, which costs no real rollout"
+    elif not pairs.beyond_noise:
+        reason = "paired rollouts do not correlate beyond noise: the proxy is left out"
+    if reason:
         return Saving("paired", 0.0, pairs.worth_interval, pairs.correlation, real, simulated, rectified=rectified,
                       reason=reason)  # fmt: skip
-    return _of_policies(inputs, column, real, simulated)
+    table, worth = inputs.target, float((pairs.worth - pairs.counts).mean())
+    alone = _with_ends(table, column, table.means[:, column], pairs.counts)
+    means = _with_ends(table, column, pairs.means, pairs.sure_worth)
+    return Saving("paired", worth, pairs.worth_interval, pairs.correlation, real, simulated, means, alone, rectified)
 
 
 def is_sorted(table: ScoreTable, column: int) -> bool:
@@ -106,15 +119,54 @@ def is_sorted(table: ScoreTable, column: int) -> bool:
     return mixed >= 2
 
 
+def is_rate(table: ScoreTable, column: int) -> bool:
+    """True of a metric of zeros and ones with more than one episode an agent."""
+    values = table.values[..., column][table.driven]
+    return bool(table.counts.max() > 1 and np.isin(values, (0.0, 1.0)).all())
+
+
+def rate_intervals(rates: Floats, counts: Floats) -> list[Ends]:
+    """The 95 % interval of each rate.
+
+    Args:
+        rates: The share that succeeded, shape (agents,).
+        counts: Rollouts that it rests on.
+    """
+    from scipy.special import betaincinv
+
+    tail = (1.0 - CONFIDENCE) / 2.0
+    successes = np.clip(rates, 0.0, 1.0) * counts
+    failures = counts - successes
+    low = betaincinv(successes + EDGE, failures + 1.0 - EDGE, tail)
+    high = betaincinv(successes + 1.0 - EDGE, failures + EDGE, 1.0 - tail)
+    low, high = np.where(successes < 0.5, 0.0, low), np.where(failures < 0.5, 1.0, high)
+    return list(zip(map(float, low), map(float, high), strict=True))
+
+
 @dataclass(frozen=True)
 class _Pairs:
     means: Floats
-    worth: Floats
     counts: Floats
     correlation: float
     correlation_interval: Ends
-    share: float
-    """N/(n + N) on average."""
+    square: float
+    """Of the correlation, without what chance adds to that of few pairs."""
+    sure_square: float
+    """Of a correlation lower by its standard error: what is chosen for being high is too high."""
+    shares: Floats
+    """N/(n + N) of each agent."""
+
+    @property
+    def share(self) -> float:
+        return float(self.shares.mean())
+
+    @property
+    def worth(self) -> Floats:
+        return self.counts / (1.0 - self.square * self.shares)
+
+    @property
+    def sure_worth(self) -> Floats:
+        return self.counts / (1.0 - self.sure_square * self.shares)
 
     @property
     def beyond_noise(self) -> bool:
@@ -129,54 +181,51 @@ class _Pairs:
         return next(ends), next(ends)
 
 
-def _pairs(inputs: Comparison, column: int) -> _Pairs | None:
-    """Rectified means of a metric; None where starts are not paired."""
-    sides = inputs.proxy, inputs.target
-    if is_sorted(inputs.proxy, column) and is_sorted(inputs.target, column):
+def _pairs(every: Sequence[Comparison], column: int) -> _Pairs | None:
+    """Means of a metric, rectified by one or several proxies; None where starts are not paired."""
+    from scipy.special import chdtri
+
+    target, agents = every[0].target, every[0].agents
+    if is_sorted(target, column) and any(is_sorted(one.proxy, column) for one in every):
         return None
-    if (inputs.target.driven.sum(axis=0) < 2).all() and len(set(starts_of(inputs.target.episodes))) > 1:
+    if (target.driven.sum(axis=0) < 2).all() and len(set(starts_of(target.episodes))) > 1:
         return None  # no two agents share a label: these are numbers
-    one, other = (by_start(side) for side in sides)
-    known = set(one.episodes)
+    proxies, other = [by_start(one.proxy) for one in every], by_start(target)
+    known = set.intersection(*(set(one.episodes) for one in proxies))
     shared = [label for label in other.episodes if label in known]
-    met = set(shared)
     if len(shared) < FEWEST_PAIRS:
         return None
-    extra = [label for label in one.episodes if label not in met]
-    x, y = (side.arrange(agents=inputs.agents, episodes=shared).values[..., column] for side in (one, other))
-    both: Flags = ~np.isnan(x) & ~np.isnan(y)
+    rest = [label for label in proxies[0].episodes if label in known - set(shared)]
+    x = np.stack([one.arrange(agents=agents, episodes=shared + rest).values[..., column] for one in proxies])
+    y = other.arrange(agents=agents, episodes=shared).values[..., column]
+    met: Flags = ~np.isnan(x).any(axis=0)
+    both, more = met[:, : len(shared)] & ~np.isnan(y), met[:, len(shared) :].sum(axis=1)
     if both.sum(axis=1).min() < FEWEST_PAIRS or (both.sum(axis=1) < other.counts).any():
         return None
     n = both.sum(axis=1).astype(np.float64)
-    x, y = np.where(both, x, np.nan), np.where(both, y, np.nan)
-    dx, dy = (side - np.nanmean(side, axis=1, keepdims=True) for side in (x, y))
-    xx, yy, xy = (float(np.nansum(product)) for product in (dx * dx, dy * dy, dx * dy))
-    if not (xx > 0.0 and yy > 0.0):
+    paired, y = np.where(both, x[..., : len(shared)], np.nan), np.where(both, y, np.nan)
+    dx, dy = (np.nan_to_num(side - np.nanmean(side, axis=-1, keepdims=True)) for side in (paired, y))
+    gram, xy, yy = np.einsum("ian,jan->ij", dx, dx), np.einsum("ian,an->i", dx, dy), float((dy * dy).sum())
+    if not (np.diag(gram).min() > 0.0 and yy > 0.0):
         return None
-    freedom = float(n.sum() - len(n))
-    rho = float(np.clip(xy / math.sqrt(xx * yy), -0.999999, 0.999999))
-    middle, half = math.atanh(rho), NORMAL / math.sqrt(max(freedom - 2.0, 1.0))
-    ends = math.tanh(middle - half), math.tanh(middle + half)
-    rest = one.arrange(agents=inputs.agents, episodes=extra).values[..., column] if extra else np.empty((len(n), 0))
-    more = (~np.isnan(rest)).sum(axis=1)
-    share = more / (n + more)
-    everything = (np.nansum(x, axis=1) + np.nansum(rest, axis=1)) / (n + more)
-    means = np.nanmean(y, axis=1) - xy / xx * (np.nanmean(x, axis=1) - everything)
-    # The squared correlation of few pairs is high by what chance adds to it.
-    square = max(0.0, 1.0 - (1.0 - rho**2) * freedom / max(freedom - 1.0, 1.0))
-    counts = inputs.target.counts.astype(np.float64)
-    return _Pairs(means, counts / (1.0 - square * share), counts, rho, ends, float(share.mean()))
-
-
-def _of_pairs(inputs: Comparison, column: int, pairs: _Pairs, rectified: Mapping[str, tuple[Floats, Floats]]) -> Saving:
-    variances = _variances(inputs.target, column)
-    counts = inputs.target.counts
-    alone = _with_ends(inputs.agents, inputs.target.means[:, column], np.sqrt(variances / counts))
-    means = _with_ends(inputs.agents, pairs.means, np.sqrt(variances / pairs.worth))
-    return Saving(
-        "paired", float((pairs.worth - pairs.counts).mean()), pairs.worth_interval, pairs.correlation,
-        float(counts.mean()), float(inputs.proxy.counts.mean()), means, alone, rectified,
-    )  # fmt: skip
+    slopes = np.linalg.lstsq(gram, xy, rcond=1e-9)[0]
+    freedom, used = float(n.sum() - len(n)), len(every)
+    size = min(math.sqrt(max(float(slopes @ xy), 0.0) / yy), 0.999999)
+    rho = math.copysign(size, slopes[0]) if used == 1 else size
+    error = 1.0 / math.sqrt(max(freedom - used - 1.0, 1.0))
+    middle, half = math.atanh(rho), error * math.sqrt(chdtri(used, 1.0 - CONFIDENCE))
+    counted = np.concatenate([both, met[:, len(shared) :]], axis=1)
+    everything = np.nanmean(np.where(counted, x, np.nan), axis=-1)
+    means = np.nanmean(y, axis=1) - slopes @ (np.nanmean(paired, axis=-1) - everything)
+    return _Pairs(
+        means=means,
+        counts=target.counts.astype(np.float64),
+        correlation=rho,
+        correlation_interval=(math.tanh(middle - half), math.tanh(middle + half)),
+        square=max(0.0, 1.0 - (1.0 - rho**2) * freedom / max(freedom - used, 1.0)),
+        sure_square=math.tanh(max(0.0, abs(middle) - error)) ** 2,
+        shares=more / (n + more),
+    )
 
 
 def _variances(table: ScoreTable, column: int) -> Floats:
@@ -189,34 +238,47 @@ def _variances(table: ScoreTable, column: int) -> Floats:
     return np.full(len(table.agents), squares / max(1, table.counts.sum() - len(table.agents)))
 
 
-def _with_ends(agents: tuple[str, ...], means: Floats, errors: Floats) -> dict[str, tuple[float, Ends]]:
+def _with_ends(table: ScoreTable, column: int, means: Floats, counts: Floats) -> dict[str, tuple[float, Ends]]:
+    """Means with their 95 % intervals: of rates as rates have them, else by Student's t."""
+    if is_rate(table, column):
+        return {
+            agent: (float(mean), ends)
+            for agent, mean, ends in zip(table.agents, means, rate_intervals(means, counts), strict=True)
+        }
+    from scipy.special import stdtrit
+
+    freedom = max(1.0, float(table.counts.sum() - len(table.agents)))
+    errors = np.sqrt(_variances(table, column) / counts) * stdtrit(freedom, 0.5 + CONFIDENCE / 2.0) / NORMAL
+    return _normal(table.agents, means, errors)
+
+
+def _normal(agents: tuple[str, ...], means: Floats, errors: Floats) -> dict[str, tuple[float, Ends]]:
     rows = zip(agents, means, errors, strict=True)
     return {agent: (float(m), (float(m - NORMAL * s), float(m + NORMAL * s))) for agent, m, s in rows}
 
 
-def _of_policies(inputs: Comparison, column: int, real: float, simulated: float) -> Saving:
-    """By what a proxy's mean foretells of the target's, over agents."""
-    agents, (proxy, target) = inputs.agents, (means[:, column] for means in inputs.means)
-    if len(agents) < FEWEST_AGENTS or np.ptp(proxy) <= 0.0:
-        what = (
-            f"fewer than {FEWEST_AGENTS} agents"
-            if len(agents) < FEWEST_AGENTS
-            else "all agents score alike in the proxy"
-        )
+def _of_policies(every: Sequence[Comparison], column: int, real: float, simulated: float) -> Saving:
+    """By what the proxies' means foretell of the target's, over agents."""
+    inputs, agents = every[0], every[0].agents
+    proxies, target = np.stack([one.means[0][:, column] for one in every], axis=1), inputs.means[1][:, column]
+    fewest = FEWEST_AGENTS + len(every) - 1
+    if len(agents) < fewest or np.ptp(proxies, axis=0).min() <= 0.0:
+        what = f"fewer than {fewest} agents" if len(agents) < fewest else "all agents score alike in the proxy"
         return Saving("none", None, None, None, real, simulated, reason=f"starts are not paired, and there are {what}")
     counts = inputs.target.counts.astype(np.float64)
     variances = _variances(inputs.target, column) / counts
     if not (variances > 0.0).all():
         return Saving("none", None, None, None, real, simulated, reason="the target's rollouts do not differ")
     ones = np.ones(len(agents))
-    means, spread, ends = _shrunken(target, variances, np.stack([ones, proxy - proxy.mean()], axis=1))
+    means, spread, ends = _shrunken(target, variances, np.column_stack([ones, proxies - proxies.mean(axis=0)]))
     _, without, _ = _shrunken(target, variances, ones[:, None])
     worth = float((counts * (variances / spread - variances / without)).mean())
     low, high = (float((counts * (variances / end - variances / without)).mean()) for end in ends)
-    r = float(np.corrcoef(proxy, target)[0, 1]) if np.ptp(target) > 0.0 else None
+    one = len(every) == 1 and np.ptp(target) > 0.0
+    r = float(np.corrcoef(proxies[:, 0], target)[0, 1]) if one else None
     return Saving(
         "policies", max(worth, 0.0), (max(min(low, high), 0.0), max(low, high, 0.0)), r, real, simulated,
-        _with_ends(agents, means, np.sqrt(spread)), _with_ends(agents, target, np.sqrt(variances)),
+        _normal(agents, means, np.sqrt(spread)), _normal(agents, target, np.sqrt(variances)),
         reason="" if worth > 0.0 else "what the proxy foretells of an agent adds nothing to its own rollouts",
     )  # fmt: skip
 

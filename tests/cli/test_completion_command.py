@@ -44,4 +44,4 @@ def test_without_shtab_there_is_one_line_on_what_to_install(monkeypatch, capsys)
     assert main(["completion", "bash"]) == 2
     told = capsys.readouterr()
     assert told.out == ""
-    assert told.err.endswith('which is not installed; install it with: pip install "proxytune[completion]"\n')
+    assert told.err.endswith('which is not installed; pip install ".[completion]" in the checkout of proxytune\n')

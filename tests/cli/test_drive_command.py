@@ -38,12 +38,34 @@ def complaint(capsys, *words):
 
 def test_the_document_has_both_scores_and_when_they_part(lane, capsys):
     answer = document(capsys, lane, "--agent", "steady", "--theta", "trim=-0.2")
-    keys = ["agent", "start", "seed", "theta", "proxy", "target", "parted_s", "theta_from", "against", "output"]
+    keys = [
+        "agent",
+        "start",
+        "seed",
+        "theta",
+        "proxy",
+        "target",
+        "parted_s",
+        "theta_from",
+        "against",
+        "output",
+        "cautions",
+    ]
     assert list(answer) == keys
     assert (answer["agent"], answer["start"], answer["seed"], answer["theta"]) == ("steady", 0, 1, {"trim": -0.2})
     assert answer["proxy"]["metrics"]["distance"] != answer["target"]["metrics"]["distance"]
     assert 0.0 < answer["parted_s"] < 2.0
     assert (answer["theta_from"], answer["against"], answer["output"]) == ("given", str(lane / "truth.toml"), None)
+    assert answer["cautions"] == []
+
+
+def test_an_interval_without_its_value_in_the_target_s_model_is_a_caution(lane, capsys):
+    (lane / "odd.toml").write_text(MODEL.format("duckiebot", "{ value = 0.2, interval = [0.01, 0.05] }"))
+    words = (lane, "--agent", "steady", "--against", lane / "odd.toml")
+    (line,) = document(capsys, *words)["cautions"]
+    assert "the interval of trim, 0.01 to 0.05, does not hold its value 0.2" in line
+    assert main(["drive", *map(str, words)]) == 0
+    assert capsys.readouterr().out.startswith("beware: model of duckiebot: the interval of trim")
 
 
 def test_the_proxy_at_the_target_s_own_values_does_not_part_from_it(lane, capsys):

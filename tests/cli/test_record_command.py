@@ -49,6 +49,15 @@ def test_frames_are_read_as_they_were_taken(recorded, capsys):
     assert not list(home.rglob(".*"))
 
 
+def test_an_interval_without_its_value_in_the_model_is_a_caution(recorded, tmp_path, capsys):
+    assert recorded("good", "--json")[0] == 0
+    assert json.loads(capsys.readouterr().out)["cautions"] == []
+    odd = "[effects.trim]\ntrim = { value = 0.2, interval = [0.01, 0.05] }\n"
+    (tmp_path / "model.toml").write_text(MODEL + odd)
+    assert recorded("odd")[0] == 0
+    assert capsys.readouterr().out.startswith("beware: ")
+
+
 def family_of(home):
     return load_family(read_study_settings(home.parent), home.parent / "model.toml")
 

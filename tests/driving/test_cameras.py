@@ -238,7 +238,7 @@ NUMBERED = TABLE._replace(texels=np.arange(TABLE.texels.size, dtype=np.uint32))
 
 @pytest.fixture(scope="module")
 def compiled():
-    pytest.importorskip("numba", reason="Numba is not installed: pip install 'proxytune[fast]'")
+    pytest.importorskip("numba", reason="Numba is not installed: pip install '.[fast]'")
     return importlib.import_module("proxytune.driving.compiled_texels")
 
 

@@ -370,7 +370,9 @@ def test_gymnasium_makes_it(code):
 
 def test_without_gymnasium_it_says_what_to_install():
     _, errors = printed("import sys; sys.modules['gymnasium'] = None; import proxytune.environments")
-    assert errors.splitlines()[-1].endswith('gymnasium is not installed; pip install "proxytune[gym]"')
+    assert errors.splitlines()[-1].endswith(
+        'gymnasium is not installed; pip install ".[gym]" in the checkout of proxytune'
+    )
 
 
 def test_importing_proxytune_does_not_import_gymnasium():

@@ -15,12 +15,12 @@ from proxytune.study import StudyRun, goal_of, open_study, run_trials
 
 
 class Launched:
-    """A study run by a fork of a process that has loaded proxytune; one at a time."""
+    """A study, or a command, run by a fork of a process that has loaded proxytune; one at a time."""
 
-    def __init__(self, launcher, folder):
+    def __init__(self, launcher, folder, words=None):
         # What is left of a killed process, joblib's clean-up, may still print: into a file of its own.
         self.launcher, self.output = launcher, folder.with_name(f"{folder.name}_{time.monotonic_ns()}.txt")
-        launcher.stdin.write(json.dumps(["study", str(folder), "--json", str(self.output)]) + "\n")
+        launcher.stdin.write(json.dumps([*(words or ["study", str(folder)]), "--json", str(self.output)]) + "\n")
         launcher.stdin.flush()
         self.pid = int(launcher.stdout.readline())
 

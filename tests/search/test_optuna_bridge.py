@@ -43,7 +43,7 @@ def test_an_optuna_storage_has_every_trial_with_its_state_value_and_what_else_is
 
 def test_without_optuna_there_is_one_line_on_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "optuna", None)
-    with pytest.raises(InputError, match=r'pip install "proxytune\[tpe\]"'):
+    with pytest.raises(InputError, match=r'pip install ".\[tpe\]" in the checkout'):
         write_optuna(history(), tmp_path / "a.sqlite3")
 
 

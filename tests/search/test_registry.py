@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from steps import SPACE, WHOLE, lacking, search, steps
 
-from proxytune.errors import InputError
+from proxytune.errors import InputError, to_install
 from proxytune.search import (
     ENGINE_NAMES,
     ENGINES,
@@ -159,7 +159,7 @@ def test_tpe_learns_from_the_scores_and_says_nothing(capfd):
 
 NEEDY = [engine.name for engine in ENGINES if engine.needs]
 NEED = {
-    "tpe": "'tpe' needs Optuna, which is not installed; pip install 'proxytune[tpe]'",
+    "tpe": "'tpe' needs Optuna, which is not installed; " + to_install("tpe"),
 }
 
 

@@ -7,9 +7,12 @@ import time
 
 import pytest
 from processes import episodes, start, trials, wait_for
+from wobbly import Wobbly
 
 from proxytune.cli.main import main
-from proxytune.running.workers import NAP_S, AwakeClock
+from proxytune.domain import make_episode
+from proxytune.running import run_episode
+from proxytune.running.workers import NAP_S, AwakeClock, awake
 
 SLOW = """
 import time
@@ -45,6 +48,27 @@ def slow(make_study):
     return make
 
 
+def test_an_episode_takes_no_time_while_the_machine_pauses(monkeypatch):
+    paused, now = [0.0], time.monotonic
+    monkeypatch.setattr(time, "monotonic", lambda: now() + paused[0])
+
+    class Paused(Wobbly):
+        def run(self, episode):
+            paused[0] += 3600.0
+            return super().run(episode)
+
+    assert run_episode(Paused(), make_episode({}, agent="agent1", start=0, seed=1)).seconds < NAP_S + 1.0
+
+
+def test_an_episode_that_works_without_a_word_takes_its_time(monkeypatch):
+    now, worked = [0.0], [0.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(time, "process_time", lambda: worked[0])
+    with awake() as clock:
+        now[0], worked[0] = 60.0, 59.5
+    assert clock.seconds() == 60.0
+
+
 def left(folder):
     return int((folder / "slow_times").read_text())
 
@@ -52,6 +76,7 @@ def left(folder):
 def test_a_clock_counts_no_pause(monkeypatch):
     now = [0.0]
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(time, "process_time", lambda: 0.0)
     clock = AwakeClock()
     for step in (0.25, 0.25, 3600.0, 0.25):
         now[0] += step

@@ -56,14 +56,14 @@ def as_files(frames: Mapping[str, pd.DataFrame]) -> Iterator[Path]:
     """
     with temporary_folder() as folder:
         for title, frame in frames.items():
-            _with_labels(title, frame).to_csv(folder / f"{title}.csv", index=False)
+            column_table(title, frame).to_csv(folder / f"{title}.csv", index=False)
         try:
             yield folder
         except InputError as problem:
             raise type(problem)(_in_rows(str(problem).replace(f"{folder}/", ""))) from None
 
 
-def _with_labels(title: str, frame: pd.DataFrame) -> pd.DataFrame:
+def column_table(title: str, frame: pd.DataFrame) -> pd.DataFrame:
     """The DataFrame with the labels of its index as columns."""
     if not isinstance(frame, pd.DataFrame):
         raise InputError(f"{title}: must be a DataFrame, got {type(frame).__name__}")

@@ -17,8 +17,8 @@ from proxytune.report import (
     figures_of_sweep,
     fragment_html,
     held_values,
-    png_of,
     study_foot,
+    svg_of,
     sweep_view,
     teach_document,
     teach_figure,
@@ -83,7 +83,7 @@ class SweepReport:
         )
 
     def _repr_html_(self) -> str:
-        figures = {name: png_of(figure) for name, figure in figures_of_sweep(self.curves, self.truth).items()}
+        figures = {name: svg_of(figure) for name, figure in figures_of_sweep(self.curves, self.truth).items()}
         return fragment_html(sweep_view(self.settings.name, self.curves, figures, self.held))
 
     @property
@@ -120,7 +120,7 @@ class SweepReport:
         """
         output = self.settings.home / "figures" if folder is None else Path(folder)
         figures = draw_curves(self.curves, output, self.truth)
-        page = write_sweep_page(self.settings, self.curves, output, self.held, command)
+        page = write_sweep_page(self.settings, self.curves, output, self.held, command, self.truth)
         return figures, [*write_curves(self.curves, output), page]
 
 
@@ -206,7 +206,7 @@ class TeachReport:
         return f"TeachReport of '{self.settings.name}': {self._view(b'').sentence}"
 
     def _repr_html_(self) -> str:
-        return fragment_html(self._view(png_of(teach_figure(self.experiment))))
+        return fragment_html(self._view(svg_of(teach_figure(self.experiment))))
 
     def _view(self, figure: bytes) -> Any:
         return teach_view(self.experiment, self.prpv, figure)

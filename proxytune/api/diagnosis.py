@@ -22,7 +22,7 @@ from proxytune.report import (
     diagnosis_notes,
     diagnosis_view,
     fragment_html,
-    png_of,
+    svg_of,
     write_diagnosis,
 )
 
@@ -44,7 +44,7 @@ class DiagnosisReport:
         return f"DiagnosisReport of {diagnosis_headline(self.found)}"
 
     def _repr_html_(self) -> str:
-        return fragment_html(diagnosis_view(self.found, {name: png_of(one) for name, one in self.figures().items()}))
+        return fragment_html(diagnosis_view(self.found, {name: svg_of(one) for name, one in self.figures().items()}))
 
     @property
     def diagnosis(self) -> Diagnosis | None:

@@ -16,7 +16,7 @@ from proxytune.report import (
     families_sentence,
     families_view,
     fragment_html,
-    png_of,
+    svg_of,
     write_families_report,
 )
 from proxytune.running import Bars, Silent, Watcher
@@ -103,7 +103,7 @@ class FamiliesReport:
         return f"FamiliesReport of '{self.compared.settings.name}': {self.sentence}"
 
     def _repr_html_(self) -> str:
-        return fragment_html(families_view(self.compared, png_of(self.figure())))
+        return fragment_html(families_view(self.compared, svg_of(self.figure())))
 
     @property
     def sentence(self) -> str:

@@ -24,10 +24,10 @@ from proxytune.report import (
     foot_of,
     fragment_html,
     page_html,
-    png_of,
     score_document,
     score_sentence,
     score_view,
+    svg_of,
     write_text,
 )
 from proxytune.scores import (
@@ -94,7 +94,7 @@ class ScoreReport(Assessment):
         return f"ScoreReport: {self.sentence}"
 
     def _repr_html_(self) -> str:
-        pictures = [Picture(name, png_of(figure), "") for name, figure in self.figures().items()]
+        pictures = [Picture(name, svg_of(figure), "") for name, figure in self.figures().items()]
         return fragment_html(score_view(self._named, None, pictures, target=self.names[1]))
 
     @property
@@ -125,7 +125,7 @@ class ScoreReport(Assessment):
         Raises:
             RunError: If it cannot be written.
         """
-        pictures = [Picture(head, png_of(figure), caption) for _, figure, head, caption in drawn_scores(self)]
+        pictures = [Picture(head, svg_of(figure), caption) for _, figure, head, caption in drawn_scores(self)]
         text = page_html(score_view(self._named, None, pictures, target=self.names[1]), foot_of("proxytune.score(…)"))
         if path is not None:
             write_text(Path(path), text)

@@ -13,11 +13,11 @@ from matplotlib.figure import Figure
 from proxytune.domain import Outcome
 from proxytune.report import (
     fragment_html,
-    png_of,
     study_document,
     study_figures,
     study_sentence,
     study_view,
+    svg_of,
     write_study_report,
 )
 from proxytune.running import Bars, Silent, Watcher
@@ -67,7 +67,7 @@ class StudyReport:
         return f"StudyReport of '{self.result.study.settings.name}': {self.sentence}"
 
     def _repr_html_(self) -> str:
-        return fragment_html(study_view(self.result, {name: png_of(one) for name, one in self.figures().items()}))
+        return fragment_html(study_view(self.result, {name: svg_of(one) for name, one in self.figures().items()}))
 
     @property
     def sentence(self) -> str:

@@ -133,7 +133,6 @@ def tune(
             "agents": list(names),
             "starts": counted if starts is None else starts,
             "budget": budget,
-            "initial": min(8, budget),
             **({"target_columns": dict(columns)} if columns else {}),
             **keys,
             "parameters": {one.name: [one.low, one.high] for one in space.intervals},

@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 
 from proxytune.domain import Outcome
 from proxytune.report import (
-    fragment_html,
+    Shown,
+    View,
     study_document,
     study_figures,
     study_sentence,
@@ -52,7 +53,7 @@ class ReportFiles(NamedTuple):
 
 
 @dataclass(frozen=True, repr=False)
-class StudyReport:
+class StudyReport(Shown):
     """Result of a study.
 
     Attributes:
@@ -66,8 +67,9 @@ class StudyReport:
     def __repr__(self) -> str:
         return f"StudyReport of '{self.result.study.settings.name}': {self.sentence}"
 
-    def _repr_html_(self) -> str:
-        return fragment_html(study_view(self.result, {name: svg_of(one) for name, one in self.figures().items()}))
+    def view(self) -> View:
+        """What the page shows."""
+        return study_view(self.result, {name: svg_of(one) for name, one in self.figures().items()})
 
     @property
     def sentence(self) -> str:
@@ -96,6 +98,8 @@ class StudyReport:
             for one in self.result.trials
         ]
         return pd.DataFrame(rows).set_index("trial")
+
+    to_frame = trials
 
     def figures(self) -> dict[str, Figure]:
         """Convergence, profiles, evaluations and importance, by name."""

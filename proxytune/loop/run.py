@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from matplotlib.figure import Figure
 from rich.console import Group
 from rich.text import Text
 
@@ -61,10 +62,10 @@ from proxytune.loop.opening import (
 from proxytune.report import (
     Paragraphs,
     Picture,
+    Shown,
     Table,
     View,
     columns_of,
-    fragment_html,
     group_texts,
     note_texts,
     study_foot,
@@ -262,7 +263,7 @@ PICTURES = {
 
 
 @dataclass(frozen=True, repr=False)
-class LoopReport:
+class LoopReport(Shown):
     """A closed loop: before and after.
 
     Attributes:
@@ -274,13 +275,20 @@ class LoopReport:
     def __repr__(self) -> str:
         return f"LoopReport: {view_of(self.closed).sentence}"
 
-    def _repr_html_(self) -> str:
-        return fragment_html(view_of(self.closed))
+    def view(self) -> View:
+        """What the page shows."""
+        return view_of(self.closed)
+
+    def figures(self) -> dict[str, Figure]:
+        """PRPV before and after, by name."""
+        return {"prpv": prpv_figure([row for row in rows_of(self.closed) if row.key in ("prpv", "held_out")])}
 
     def table(self) -> pd.DataFrame:
-        """One row per measure: before, after, noise floors, a random ranking."""
+        """One row per measure: before, after; then noise floor and a random ranking."""
         found = _table(self.closed, rows_of(self.closed))
         return pd.DataFrame(found.rows, columns=[column.name or "measure" for column in found.columns])
+
+    to_frame = table
 
     def document(self) -> dict[str, Any]:
         """All that `loop --json` prints but for its files; what differs from run to run is under `this_run`."""

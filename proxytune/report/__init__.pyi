@@ -55,6 +55,7 @@ from .figure_style import (
     name_lines as name_lines,
 )
 from .html import (
+    Shown as Shown,
     fragment_html as fragment_html,
     frame_html as frame_html,
     page_html as page_html,

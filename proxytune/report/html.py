@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from PIL import Image
 
-from proxytune.report.view import Column, Foot, Paragraphs, Part, Picture, Table, View
+from proxytune.report.view import Column, Foot, Paragraphs, Part, Picture, Table, View, foot_of
 from proxytune.report.writing import write_text
 
 if TYPE_CHECKING:
@@ -65,7 +65,6 @@ h2 { font-size: 1.15rem; margin: 2.5rem 0 .5rem; }
 .following, .under-way { padding: .6rem .9rem; border-left: .25rem solid var(--accent); background: var(--tint); }
 .under-way { border-left-color: #e69f00; }
 figure { margin: .5rem 0 0; display: flex; flex-wrap: wrap; gap: .6rem 1.5rem; align-items: flex-start; }
-figure .scroll { max-width: 100%; }
 figcaption { flex: 1 1 15rem; max-width: 40rem; }
 svg.drawn { display: block; max-width: 100%; height: auto; stroke-linejoin: round; stroke-linecap: butt; }
 dl { font-size: .93rem; color: var(--soft); }
@@ -74,9 +73,9 @@ dt::after { content: ":"; }
 dd { margin: 0 0 .3rem 1rem; }
 figcaption, .notes, footer { color: var(--soft); font-size: .93rem; }
 .notes { padding-left: 1.2rem; }
-.scroll { overflow-x: auto; background:
-  linear-gradient(to right, var(--paper), transparent) 0 0 / 2.5rem 100% no-repeat local,
-  linear-gradient(to left, var(--paper), transparent) 100% 0 / 2.5rem 100% no-repeat local,
+.scroll { overflow-x: auto; width: fit-content; max-width: 100%; background:
+  linear-gradient(to right, var(--paper) 40%, transparent) 0 0 / 2.5rem 100% no-repeat local,
+  linear-gradient(to left, var(--paper) 40%, transparent) 100% 0 / 2.5rem 100% no-repeat local,
   linear-gradient(to right, var(--shade), transparent) 0 0 / .8rem 100% no-repeat scroll,
   linear-gradient(to left, var(--shade), transparent) 100% 0 / .8rem 100% no-repeat scroll; }
 .scroll:focus-visible { outline: 2px solid var(--accent); }
@@ -161,6 +160,28 @@ def fragment_html(view: View) -> str:
     following = f"<p><strong>Next:</strong> {_text(view.next_step)}</p>" if view.next_step else ""
     parts = "\n".join(_part(part, f"part-{number}") for number, part in enumerate(view.parts, start=1))
     return f"<h3>{html.escape(view.title)}</h3>\n<p>{_text(view.sentence)}</p>\n{following}\n{parts}"
+
+
+class Shown:
+    """What has a view shows itself in a notebook, and has a page."""
+
+    def view(self) -> View:
+        """Sentence, next step, figures and tables."""
+        raise NotImplementedError
+
+    def _repr_html_(self) -> str:
+        return fragment_html(self.view())
+
+    def page(self, path: str | Path | None = None) -> str:
+        """The page as HTML; also written where a path is given.
+
+        Raises:
+            RunError: If it cannot be written.
+        """
+        text = page_html(self.view(), foot_of(""))
+        if path is not None:
+            write_text(Path(path), text)
+        return text
 
 
 def frame_html(sentence: str, frame: "DataFrame") -> str:

@@ -14,6 +14,7 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axis import Axis
+from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
@@ -76,15 +77,14 @@ def svg_of(figure: Figure) -> bytes:
 def _marks(figure: Figure) -> Iterator[tuple[str, list[str]]]:
     """Whatever is drawn by markers gets a name, with which goes what each of its markers says."""
     for axes in figure.axes:
-        for artist in (*axes.lines, *axes.collections):
+        drawn = [line for line in axes.lines if line.get_transform() is axes.transData]
+        for artist in (*drawn, *(one for one in axes.collections if isinstance(one, PathCollection))):
             points = np.asarray(artist.get_xydata() if isinstance(artist, Line2D) else artist.get_offsets())
-            if artist.get_transform() is axes.transData or artist in axes.collections:
-                label = str(artist.get_label())
-                names = [] if label.startswith("_") else [label]
-                sides = [(axes.xaxis, 0), (axes.yaxis, 1)]
-                artist.set_gid(f"mark{id(artist)}")
-                shown = [names + [_place(axis, point[side]) for axis, side in sides] for point in points]
-                yield f"mark{id(artist)}", ["; ".join(one) for one in shown]
+            label, name = str(artist.get_label()), f"mark{id(artist)}"
+            names = [] if label.startswith("_") else [label]
+            shown = ([*names, *map(_place, (axes.xaxis, axes.yaxis), point)] for point in points)
+            artist.set_gid(name)
+            yield name, ["; ".join(filter(None, one)) for one in shown]
 
 
 def _place(axis: Axis, value: float) -> str:

@@ -118,7 +118,8 @@ def study_pictures(result: StudyResult, figures: Mapping[str, bytes]) -> dict[st
         "stroke is what it does alone. Lines are 95 % intervals: where they overlap, the order is not known. Where a "
         "dot stands near the lower end of its line, the true share may well be larger, but hardly smaller.",
         "evaluations": f"Darker points have lower PRPV{hollow}. The shadow is the 95 % region: where it is "
-        f"long and slanting, two parameters make up for each other. The ring is the answer.{truth}",
+        "long and slanting, two parameters make up for each other (correlation above it). The ring is the "
+        f"answer.{truth}",
     }
     return {name: Picture(TITLES[name], image, captions[name]) for name, image in figures.items()}
 

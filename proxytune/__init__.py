@@ -1,6 +1,6 @@
 """Find out how useful a robot simulator is, tune it to the robot, and learn what it still lacks.
 
-    study        run_study, read_study, StudyReport
+    study        run_study, read_study, StudyReport; tune: without a folder or TOML
     simulators   run_families, read_families, FamiliesReport: several tuned in the same time
     sweep        run_sweep, SweepReport: usefulness along a parameter
     teaching     teach, TeachReport: what a proxy saves in training

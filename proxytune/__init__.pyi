@@ -27,6 +27,7 @@ from .api import (
     run_sweep as run_sweep,
     score as score,
     teach as teach,
+    tune as tune,
 )
 from .domain import DomainFamily as DomainFamily, Episode as Episode
 from .driving import Agent as Agent

@@ -9,13 +9,16 @@ where code reads them when it runs.
 import ast
 import functools
 import hashlib
+import inspect
 import json
 import os
+import textwrap
 import tomllib
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from types import CodeType
 from typing import Any
 
 LEFT_OUT = ("kind", "type_comment")
@@ -61,6 +64,30 @@ def modules_beside(folder: Path) -> list[Path]:
 def is_module(path: Path) -> bool:
     """True if this is a module of Python."""
     return path.suffix == ".py" and path.is_file()
+
+
+def meaning_of_code(thing: Any) -> str:
+    """A digest of what a function means, or an object by its class; of its source, or where there is none its code.
+
+    What it calls is not looked at.
+    """
+    kept: tuple[Any, ...] = ()
+    while isinstance(thing, functools.partial):
+        thing, kept = thing.func, (*kept, repr(thing.args), repr(sorted(thing.keywords.items())))
+    if isinstance(thing, str):
+        return digest(thing, *kept)
+    code = thing if inspect.isroutine(thing) or inspect.isclass(thing) else type(thing)
+    try:
+        return digest(_meaning(".py", textwrap.dedent(inspect.getsource(code)).encode()), *kept)
+    except (OSError, TypeError):
+        return digest(_compiled(getattr(code, "__code__", code.__qualname__)), *kept)
+
+
+def _compiled(code: Any) -> object:
+    """Compiled code without places in files."""
+    if not isinstance(code, CodeType):
+        return code
+    return code.co_code, code.co_names, [_compiled(one) for one in code.co_consts]
 
 
 @functools.lru_cache(maxsize=4096)

@@ -1,6 +1,7 @@
 """The Python interface: one function for each command, on files or DataFrames, with a report that shows itself.
 
     study        run_study, read_study: pre-flight, trials, confirmation
+    tuning       tune: a study of a function or an environment, without a folder or TOML
     families     several simulators, each tuned in the same time
     curves       run_sweep, teach
     scores       score, log_of: tables as DataFrames

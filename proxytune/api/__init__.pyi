@@ -29,3 +29,4 @@ from .transfer import (
     measure as measure,
     predict as predict,
 )
+from .tuning import tune as tune

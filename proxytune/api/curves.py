@@ -7,17 +7,19 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from matplotlib.figure import Figure
 
 from proxytune.api.theta import read_theta
 from proxytune.errors import InputError
 from proxytune.report import (
+    Shown,
+    View,
     curve_document,
     draw_curves,
     figures_of_sweep,
-    fragment_html,
     held_values,
-    png_of,
     study_foot,
+    svg_of,
     sweep_view,
     teach_document,
     teach_figure,
@@ -57,7 +59,7 @@ MOST_POINTS = 10_000
 
 
 @dataclass(frozen=True, repr=False)
-class SweepReport:
+class SweepReport(Shown):
     """Usefulness along one parameter or each of a study's.
 
     Attributes:
@@ -81,9 +83,18 @@ class SweepReport:
             f"SweepReport of '{self.settings.name}': {', '.join(curve.parameter for curve in self.curves)}; {self.held}"
         )
 
-    def _repr_html_(self) -> str:
-        figures = {name: png_of(figure) for name, figure in figures_of_sweep(self.curves, self.truth).items()}
-        return fragment_html(sweep_view(self.settings.name, self.curves, figures, self.held))
+    def view(self) -> View:
+        """What the page shows."""
+        figures = {name: svg_of(figure) for name, figure in self.figures().items()}
+        return sweep_view(self.settings.name, self.curves, figures, self.held)
+
+    def figures(self) -> dict[str, Figure]:
+        """A figure per parameter, and two of all, by name."""
+        return figures_of_sweep(self.curves, self.truth)
+
+    def to_frame(self) -> pd.DataFrame:
+        """All tables, one below the other: parameter, value, each measure."""
+        return pd.concat(self.tables(), names=["parameter", "value"])
 
     @property
     def held(self) -> str:
@@ -119,7 +130,7 @@ class SweepReport:
         """
         output = self.settings.home / "figures" if folder is None else Path(folder)
         figures = draw_curves(self.curves, output, self.truth)
-        page = write_sweep_page(self.settings, self.curves, output, self.held, command)
+        page = write_sweep_page(self.settings, self.curves, output, self.held, command, self.truth)
         return figures, [*write_curves(self.curves, output), page]
 
 
@@ -188,7 +199,7 @@ def _watching(progress: bool, total: int, unit: str = "") -> AbstractContextMana
 
 
 @dataclass(frozen=True, repr=False)
-class TeachReport:
+class TeachReport(Shown):
     """Learning curves and PLV, the proxy learning value (eq. 5): how many target samples each proxy saves.
 
     Attributes:
@@ -202,13 +213,15 @@ class TeachReport:
     prpv: Mapping[str, Predictivity | None]
 
     def __repr__(self) -> str:
-        return f"TeachReport of '{self.settings.name}': {self._view(b'').sentence}"
+        return f"TeachReport of '{self.settings.name}': {teach_view(self.experiment, self.prpv, b'').sentence}"
 
-    def _repr_html_(self) -> str:
-        return fragment_html(self._view(png_of(teach_figure(self.experiment))))
+    def view(self) -> View:
+        """What the page shows."""
+        return teach_view(self.experiment, self.prpv, svg_of(self.figures()["teach"]))
 
-    def _view(self, figure: bytes) -> Any:
-        return teach_view(self.experiment, self.prpv, figure)
+    def figures(self) -> dict[str, Figure]:
+        """The learning curves, by name."""
+        return {"teach": teach_figure(self.experiment)}
 
     def table(self) -> pd.DataFrame:
         """One row per proxy: PLV, with the ends of its interval where they are known."""
@@ -217,6 +230,8 @@ class TeachReport:
             for name, row in self.document().get("proxies", {}).items()
         }
         return pd.DataFrame.from_dict(rows, orient="index").rename_axis("proxy")
+
+    to_frame = table
 
     def document(self) -> dict[str, Any]:
         """The JSON document of `teach --json`, without the files."""

@@ -15,14 +15,15 @@ from proxytune.errors import InputError
 from proxytune.importing import open_log
 from proxytune.logs import Log
 from proxytune.report import (
+    Shown,
+    View,
     camera_noise_floor,
     diagnosis_document,
     diagnosis_figures,
     diagnosis_headline,
     diagnosis_notes,
     diagnosis_view,
-    fragment_html,
-    png_of,
+    svg_of,
     write_diagnosis,
 )
 
@@ -31,7 +32,7 @@ IN_PYTHON = {"--robot": "robot=…", "--declared ": "declared: ", "--test": "tes
 
 
 @dataclass(frozen=True, repr=False)
-class DiagnosisReport:
+class DiagnosisReport(Shown):
     """Result of a diagnosis: what a log says of a model.
 
     Attributes:
@@ -43,8 +44,9 @@ class DiagnosisReport:
     def __repr__(self) -> str:
         return f"DiagnosisReport of {diagnosis_headline(self.found)}"
 
-    def _repr_html_(self) -> str:
-        return fragment_html(diagnosis_view(self.found, {name: png_of(one) for name, one in self.figures().items()}))
+    def view(self) -> View:
+        """What the page shows."""
+        return diagnosis_view(self.found, {name: svg_of(one) for name, one in self.figures().items()})
 
     @property
     def diagnosis(self) -> Diagnosis | None:
@@ -87,6 +89,8 @@ class DiagnosisReport:
         ]
         columns = ["parameter", "value", "low", "high", "unit", "before"]
         return pd.DataFrame(rows, columns=columns).set_index("parameter")
+
+    to_frame = parameters
 
     def errors(self) -> pd.DataFrame:
         """One row per horizon [s]: RMSE of position [m] on drives kept aside, before, after, and the noise floor."""

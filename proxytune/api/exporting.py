@@ -75,6 +75,8 @@ class ExportReport:
         """One row per parameter: value, interval, unit, and its place in the file."""
         return pd.DataFrame([_row(line) for line in self.lines] or [dict(self.facts)])
 
+    to_frame = table
+
     def document(self) -> dict[str, Any]:
         """The JSON document of `export --json`."""
         rows = {

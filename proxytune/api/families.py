@@ -6,17 +6,19 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
+import pandas as pd
 from matplotlib.figure import Figure
 
 from proxytune.api.study import StudyReport, most_episodes, read_study, run_opened
 from proxytune.errors import RunError
 from proxytune.report import (
+    Shown,
+    View,
     families_document,
     families_figure,
     families_sentence,
     families_view,
-    fragment_html,
-    png_of,
+    svg_of,
     write_families_report,
 )
 from proxytune.running import Bars, Silent, Watcher
@@ -88,7 +90,7 @@ class Spending(NamedTuple):
 
 
 @dataclass(frozen=True, repr=False)
-class FamiliesReport:
+class FamiliesReport(Shown):
     """Comparison of several domain families: which to use, and for what.
 
     Attributes:
@@ -102,8 +104,17 @@ class FamiliesReport:
     def __repr__(self) -> str:
         return f"FamiliesReport of '{self.compared.settings.name}': {self.sentence}"
 
-    def _repr_html_(self) -> str:
-        return fragment_html(families_view(self.compared, png_of(self.figure())))
+    def view(self) -> View:
+        """What the page shows."""
+        return families_view(self.compared, svg_of(self.figure()))
+
+    def figures(self) -> dict[str, Figure]:
+        """The figure of all families, by name."""
+        return {"families": self.figure()}
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per trial of each family."""
+        return pd.concat({name: report.trials() for name, report in self.studies.items()}, names=["family"])
 
     @property
     def sentence(self) -> str:

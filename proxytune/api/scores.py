@@ -20,15 +20,13 @@ from proxytune.files import temporary_folder
 from proxytune.logs import Log, read_log
 from proxytune.report import (
     Picture,
+    Shown,
+    View,
     drawn_scores,
-    foot_of,
-    fragment_html,
-    page_html,
-    png_of,
     score_document,
     score_sentence,
     score_view,
-    write_text,
+    svg_of,
 )
 from proxytune.scores import (
     Metric,
@@ -56,14 +54,14 @@ def as_files(frames: Mapping[str, pd.DataFrame]) -> Iterator[Path]:
     """
     with temporary_folder() as folder:
         for title, frame in frames.items():
-            _with_labels(title, frame).to_csv(folder / f"{title}.csv", index=False)
+            column_table(title, frame).to_csv(folder / f"{title}.csv", index=False)
         try:
             yield folder
         except InputError as problem:
             raise type(problem)(_in_rows(str(problem).replace(f"{folder}/", ""))) from None
 
 
-def _with_labels(title: str, frame: pd.DataFrame) -> pd.DataFrame:
+def column_table(title: str, frame: pd.DataFrame) -> pd.DataFrame:
     """The DataFrame with the labels of its index as columns."""
     if not isinstance(frame, pd.DataFrame):
         raise InputError(f"{title}: must be a DataFrame, got {type(frame).__name__}")
@@ -81,7 +79,7 @@ FEWEST_RESAMPLES, MOST_RESAMPLES = 100, 1_000_000
 
 
 @dataclass(frozen=True)
-class ScoreReport(Assessment):
+class ScoreReport(Shown, Assessment):
     """How useful a proxy is, and which agent to deploy: every measure, `.decision`, figures and a page.
 
     Attributes:
@@ -93,9 +91,10 @@ class ScoreReport(Assessment):
     def __repr__(self) -> str:
         return f"ScoreReport: {self.sentence}"
 
-    def _repr_html_(self) -> str:
-        pictures = [Picture(name, png_of(figure), "") for name, figure in self.figures().items()]
-        return fragment_html(score_view(self._named, None, pictures, target=self.names[1]))
+    def view(self) -> View:
+        """What the page shows."""
+        pictures = [Picture(head, svg_of(figure), caption) for _, figure, head, caption in drawn_scores(self)]
+        return score_view(self._named, None, pictures, target=self.names[1])
 
     @property
     def _named(self) -> dict[str, Assessment]:
@@ -118,18 +117,6 @@ class ScoreReport(Assessment):
     def figures(self) -> dict[str, Figure]:
         """The figures by name: scatter, flipped_pairs and decision."""
         return {name: figure for name, figure, _, _ in drawn_scores(self)}
-
-    def page(self, path: str | Path | None = None) -> str:
-        """The page as HTML; also written where a path is given.
-
-        Raises:
-            RunError: If it cannot be written.
-        """
-        pictures = [Picture(head, png_of(figure), caption) for _, figure, head, caption in drawn_scores(self)]
-        text = page_html(score_view(self._named, None, pictures, target=self.names[1]), foot_of("proxytune.score(…)"))
-        if path is not None:
-            write_text(Path(path), text)
-        return text
 
     def sequential(self) -> Sequential:
         """Test after each rollout, in the order of the target's table, which agent is the best.

@@ -44,12 +44,10 @@ class SearchBox:
         Raises:
             InputError: If the box is empty or inside out, or the engine cannot be used.
         """
-        if not box:
-            raise InputError("the box is empty; give at least one parameter, as in {'trim': (-0.3, 0.3)}")
         for name, number, lowest in (("initial", initial, 1), ("seed", seed, 0)):
             if number < lowest:
                 raise InputError(f"{name} must be at least {lowest}, got {number}")
-        self._space = Space(tuple(_interval(name, box[name]) for name in sorted(box)))
+        self._space = box_space(box)
         self._proposer, self._seed, self._sign = make_proposer(engine, initial), seed, -1.0 if maximise else 1.0
         self._asked: list[Values] = []
         self._scores: dict[int, float | None] = {}
@@ -112,6 +110,17 @@ class SearchBox:
             problem = "has a score already; ask for the next" if places else "was not asked for; tell what `ask` gave"
             raise InputError(f"θ {self._space.theta(values)} {problem}")
         return left[0]
+
+
+def box_space(box: Mapping[str, tuple[float, float]]) -> Space:
+    """The box of these ends by name.
+
+    Raises:
+        InputError: If it is empty or inside out.
+    """
+    if not box:
+        raise InputError("the box is empty; give at least one parameter, as in {'trim': (-0.3, 0.3)}")
+    return Space(tuple(_interval(name, box[name]) for name in sorted(box)))
 
 
 def _interval(name: str, ends: tuple[float, float]) -> Interval:

@@ -1,7 +1,7 @@
 """A study from Python: run or resume it, or look at what it has; the command `study` is this and a terminal."""
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,17 +10,20 @@ from typing import Any, NamedTuple
 import pandas as pd
 from matplotlib.figure import Figure
 
+from proxytune.domain import Outcome
 from proxytune.report import (
-    fragment_html,
-    png_of,
+    Shown,
+    View,
     study_document,
     study_figures,
     study_sentence,
     study_view,
+    svg_of,
     write_study_report,
 )
 from proxytune.running import Bars, Silent, Watcher
 from proxytune.search import History, optimize_result
+from proxytune.space import Theta
 from proxytune.storage import Store, locked
 from proxytune.study import (
     LEARNING,
@@ -50,7 +53,7 @@ class ReportFiles(NamedTuple):
 
 
 @dataclass(frozen=True, repr=False)
-class StudyReport:
+class StudyReport(Shown):
     """Result of a study.
 
     Attributes:
@@ -64,8 +67,9 @@ class StudyReport:
     def __repr__(self) -> str:
         return f"StudyReport of '{self.result.study.settings.name}': {self.sentence}"
 
-    def _repr_html_(self) -> str:
-        return fragment_html(study_view(self.result, {name: png_of(one) for name, one in self.figures().items()}))
+    def view(self) -> View:
+        """What the page shows."""
+        return study_view(self.result, {name: svg_of(one) for name, one in self.figures().items()})
 
     @property
     def sentence(self) -> str:
@@ -94,6 +98,8 @@ class StudyReport:
             for one in self.result.trials
         ]
         return pd.DataFrame(rows).set_index("trial")
+
+    to_frame = trials
 
     def figures(self) -> dict[str, Figure]:
         """Convergence, profiles, evaluations and importance, by name."""
@@ -157,8 +163,15 @@ def run_study(
     if study.settings.objective == LEARNING:
         remedy = f"run it with: python -m proxytune study {study.settings.home}"
         raise study.settings.error("objective", f"run_study has no search for '{LEARNING}'; {remedy}")
+    return run_quietly(study, progress, retry_failed=retry_failed)
+
+
+def run_quietly(
+    study: Study, progress: bool, known: Sequence[Outcome | Theta] = (), retry_failed: bool = False
+) -> StudyReport:
+    """Run a study that has been opened, as `run_study` does; what is to be known at once is a warning."""
     watching = Bars(most_episodes(study.settings)) if progress else nullcontext(Silent())
-    return run_opened(study, watching, lambda line: warnings.warn(line, stacklevel=5), retry_failed)
+    return run_opened(study, watching, lambda line: warnings.warn(line, stacklevel=6), retry_failed, known)
 
 
 def run_opened(
@@ -166,6 +179,7 @@ def run_opened(
     watching: AbstractContextManager[Watcher],
     warn: Callable[[str], None] = lambda line: None,
     retry_failed: bool = False,
+    known: Sequence[Outcome | Theta] = (),
 ) -> StudyReport:
     """Search by predictivity from wherever it was left: pre-flight, trials, confirmation.
 
@@ -174,6 +188,7 @@ def run_opened(
         watching: Gives what hears of every episode.
         warn: Hears, before the first trial, of another search than before and of parameters without effect.
         retry_failed: Whether to drive every failed episode again, not only those whose code has changed.
+        known: As `run_stages` takes them.
     """
     settings = study.settings
     with locked(settings.home), Store.open(settings.home) as store:
@@ -181,7 +196,7 @@ def run_opened(
             store.forget_failures()
         with watching as watcher:
             under_way = StudyRun(study, store, watcher)
-            run_stages(under_way, warn)
+            run_stages(under_way, warn, known)
         return StudyReport(result_of(under_way), under_way.spent)
 
 

@@ -67,6 +67,8 @@ class ImportReport:
         """One row per drive: its length, rates, gaps and reaction."""
         return pd.DataFrame([one.facts for one in self.source.surveys])
 
+    to_frame = drives
+
     def document(self) -> dict[str, Any]:
         """The JSON document of `import --json`."""
         written = None if self.log is None else str(self.log)
@@ -139,6 +141,8 @@ class Measurement:
         """One row per agent: its mean score in each metric."""
         index = pd.Index(self.scores.agents, name="agent")
         return pd.DataFrame(self.scores.means, index=index, columns=list(self.scores.metrics))
+
+    to_frame = means
 
     def document(self) -> dict[str, Any]:
         """The JSON document of `measure --json`, without the file."""

@@ -24,6 +24,7 @@ from proxytune.report import (
     write_sweep_page,
 )
 from proxytune.scores import Metric
+from proxytune.space import Theta
 from proxytune.storage import Store
 from proxytune.study import (
     Spent,
@@ -70,7 +71,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     folder = _folder(settings.home, metrics)
     figures = draw_curves(curves, folder / "figures", run.study.truth)
     shown = result.study.settings if result else settings
-    pages = [str(page) for page in _pages(shown, curves, folder / "figures", typed(arguments))]
+    pages = [str(page) for page in _pages(shown, curves, folder / "figures", typed(arguments), run.study.truth)]
     document: dict[str, Any] = {}
     if result:
         found = StudyReport(result, Spent())
@@ -86,11 +87,13 @@ def run(arguments: argparse.Namespace) -> Answer:
     )
 
 
-def _pages(settings: StudySettings, curves: Sequence[SweepCurve], folder: Path, command: str) -> Iterator[Path]:
+def _pages(
+    settings: StudySettings, curves: Sequence[SweepCurve], folder: Path, command: str, truth: Theta | None
+) -> Iterator[Path]:
     """Write a page of all sweeps that hold the others at the same values."""
     drawn = list({curve_name(curve): curve for curve in curves}.values())
     for alike in held_alike(drawn):
-        yield write_sweep_page(settings, alike, folder, held_values(alike[0].base), command)
+        yield write_sweep_page(settings, alike, folder, held_values(alike[0].base), command, truth)
 
 
 def _read(run: StudyRun, metrics: Sequence[Metric]) -> tuple[StudyResult | None, Sequence[SweepCurve]]:

@@ -8,7 +8,7 @@ import hashlib
 import inspect
 from collections.abc import Callable, Mapping
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Protocol
@@ -112,11 +112,12 @@ class Predicting:
         return action
 
 
-def load_agent(name: str, folder: Path, space: Any, seed: int) -> Act:
+def load_agent(name: Any, folder: Path, space: Any, seed: int) -> Act:
     """An agent ready for one episode; a class is made anew for each.
 
     Args:
-        name: "random", "zero", or `module:attribute`: a function, an object with `predict`, or a class of either.
+        name: "random", "zero", or `module:attribute`: a function, an object with `predict`, or a class of either; or
+            one of these itself.
         folder: Where a user's modules lie.
         space: The environment's actions.
         seed: Of the agent "random".
@@ -124,11 +125,11 @@ def load_agent(name: str, folder: Path, space: Any, seed: int) -> Act:
     Raises:
         InputError: If there is no such agent, or the actions have no zero.
     """
-    if name in BUILT_IN:
+    if isinstance(name, str) and name in BUILT_IN:
         if name == "zero" and (space.shape is None or space.dtype is None):
             raise InputError(f"agent 'zero': the actions are {space}, which have no zero; take another")
         return BUILT_IN[name](space, seed)
-    found = load(name, kind="agent", beside=folder, shipped=BUILT_IN)
+    found = load(name, kind="agent", beside=folder, shipped=BUILT_IN) if isinstance(name, str) else name
     if inspect.isclass(found):
         found = ask(f"agent '{name}'", found)
     if hasattr(found, "predict"):
@@ -261,11 +262,13 @@ class GymnasiumFamily:
         settings: The [domain] table.
         spaces: What the environment is.
         held: Values that every instance has, sorted by name in θ.
+        policies: Agents that are at hand, by name; its identity says nothing of them.
     """
 
     settings: EnvironmentSettings
     spaces: Spaces
     held: tuple[tuple[str, float], ...]
+    policies: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def identity(self) -> str:
@@ -311,7 +314,7 @@ class GymnasiumFamily:
             InputError: If there is no such agent.
         """
         with closing(make_environment(self.settings, dict(self.held))) as environment:
-            load_agent(name, self.settings.folder, environment.action_space, 0)
+            load_agent(self.policies.get(name, name), self.settings.folder, environment.action_space, 0)
 
     def run(self, episode: Episode) -> Mapping[str, float]:
         """Play one episode and score it.
@@ -327,7 +330,8 @@ class GymnasiumFamily:
             raise EpisodeError(str(problem)) from problem
         with closing(environment):
             wrapped = wrap(environment, effects, self.spaces, self.settings.state, episode.seed)
-            act = load_agent(episode.agent, folder, environment.action_space, seed)
+            agent = self.policies.get(episode.agent, episode.agent)
+            act = load_agent(agent, folder, environment.action_space, seed)
             first = wrapped.reset(reset_seed(episode.start), course_generator(episode.seed, episode.start))
             play(wrapped, act, first, environment.action_space, self.spaces.steps)
             return score(wrapped, self.settings.metrics)
@@ -338,12 +342,15 @@ class GymnasiumFamily:
         return effects_from(named, figures(self.spaces), Catalogue(self.settings.folder))
 
 
-def gymnasium_family(section: Section, *, model: Path | None) -> GymnasiumFamily:
+def gymnasium_family(
+    section: Section, *, model: Path | None, policies: Mapping[str, Any] = MappingProxyType({})
+) -> GymnasiumFamily:
     """The family that a study's `[domain]` table describes.
 
     Args:
         section: Keys environment, steps, rate_hz, and tables arguments, parameters, metrics, state, effects.
         model: A model.toml: effects, and in its table [parameters] values of the environment's own.
+        policies: Agents that are at hand, by name.
 
     Raises:
         InputError: In one line, with file, key and remedy.
@@ -361,7 +368,7 @@ def gymnasium_family(section: Section, *, model: Path | None) -> GymnasiumFamily
         given = read_values(model, settings.own, settings.folder)
         _check(Section(model, "", {}), given, settings, spaces)
         held |= given
-    return GymnasiumFamily(settings, spaces, tuple(sorted(held.items())))
+    return GymnasiumFamily(settings, spaces, tuple(sorted(held.items())), dict(policies))
 
 
 def _check(table: Section, values: Theta, settings: EnvironmentSettings, spaces: Spaces) -> None:

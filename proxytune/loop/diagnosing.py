@@ -24,7 +24,7 @@ from proxytune.importing import open_log
 from proxytune.logs import Log
 from proxytune.loop.comparison import NEXT, compare_errors, floor_text, following, lacking, level_text, theta_table
 from proxytune.loop.opening import Loop, Teller
-from proxytune.report import findings, write_text
+from proxytune.report import figures_also_as, findings, write_text
 from proxytune.settings import read_settings
 from proxytune.storage import Store, locked
 from proxytune.study import FILE_NAME, MADE, Study, StudyRun, StudySettings, check_facts, study_facts
@@ -71,7 +71,8 @@ def diagnose_target(loop: Loop, source: Path, folder: Path, teller: Teller) -> N
         with teller.diagnosis(log) as report:
             found = diagnose_log(log, robot, declared_of(loop, robot, log), seed=loop.settings.seed, report=report)
             report("drawing")
-            DiagnosisReport(found).write(folder)
+            with figures_also_as(("svg",)):
+                DiagnosisReport(found).write(folder)
 
 
 def declared_of(loop: Loop, robot: Robot, log: Log) -> tuple[str, ...]:

@@ -94,9 +94,10 @@ def write_pictures(closed: Closed) -> None:
     if gain and both:
         metrics = [metric.name for metric in closed.loop.settings.metrics]
         for name, pair, caption in zip(BothEpisodes._fields, both, _captions(closed, gain, both), strict=True):
-            save_figure(episode_figure(pair, metrics), path.with_name(f"{name}.png"))
+            drawn = save_figure(episode_figure(pair, metrics), path.with_name(f"{name}.png"))
+            path.with_name(f"{name}.svg").write_bytes(drawn)
             title = f"{gain['agent']} beside the target, {name}"
-            texts.append({"file": f"{name}.png", "title": title, "caption": caption})
+            texts.append({"file": f"{name}.svg", "title": title, "caption": caption})
     write_text(path, json.dumps(texts, indent=2) + "\n")
 
 

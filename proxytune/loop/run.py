@@ -7,12 +7,12 @@ document and as one page.
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass, field, replace
-from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from matplotlib.figure import Figure
 from rich.console import Group
 from rich.text import Text
 
@@ -60,16 +60,16 @@ from proxytune.loop.opening import (
     scored_agents,
 )
 from proxytune.report import (
-    Foot,
     Paragraphs,
     Picture,
+    Shown,
     Table,
     View,
     columns_of,
-    fragment_html,
     group_texts,
     note_texts,
-    png_of,
+    study_foot,
+    svg_of,
     table_text,
     write_page,
 )
@@ -77,7 +77,7 @@ from proxytune.running import Silent, Watcher
 from proxytune.scores import write_scores
 from proxytune.seeds import target_seed
 from proxytune.storage import locked
-from proxytune.study import FILE_NAME, Study, StudySettings, measure_agents, open_study, settings_document, user_code
+from proxytune.study import FILE_NAME, Study, StudySettings, measure_agents, open_study, user_code
 from proxytune.usefulness import Assessment
 
 STEPS = {
@@ -246,8 +246,7 @@ class _Closing:
         return [names, dict(settings.aliases), settings.starts, settings.seed, dict(settings.domain.values), code]
 
 
-COLUMNS = columns_of(("",), ("before", "after", "noise floor before; after", "a random ranking"))
-PACKAGES = ("proxytune", "numpy", "scipy", "pybullet")
+COLUMNS = columns_of(("",), ("before", "after"))
 PICTURES = {
     "effect_curve": ("The effect", "What was measured against what the simulator did without it, and with it."),
     "learnt": ("What was learnt", "Curves over what the robot does, for what no named effect explains."),
@@ -264,7 +263,7 @@ PICTURES = {
 
 
 @dataclass(frozen=True, repr=False)
-class LoopReport:
+class LoopReport(Shown):
     """A closed loop: before and after.
 
     Attributes:
@@ -276,13 +275,20 @@ class LoopReport:
     def __repr__(self) -> str:
         return f"LoopReport: {view_of(self.closed).sentence}"
 
-    def _repr_html_(self) -> str:
-        return fragment_html(view_of(self.closed))
+    def view(self) -> View:
+        """What the page shows."""
+        return view_of(self.closed)
+
+    def figures(self) -> dict[str, Figure]:
+        """PRPV before and after, by name."""
+        return {"prpv": prpv_figure([row for row in rows_of(self.closed) if row.key in ("prpv", "held_out")])}
 
     def table(self) -> pd.DataFrame:
-        """One row per measure: before, after, noise floors, a random ranking."""
+        """One row per measure: before, after; then noise floor and a random ranking."""
         found = _table(self.closed, rows_of(self.closed))
         return pd.DataFrame(found.rows, columns=[column.name or "measure" for column in found.columns])
+
+    to_frame = table
 
     def document(self) -> dict[str, Any]:
         """All that `loop --json` prints but for its files; what differs from run to run is under `this_run`."""
@@ -316,14 +322,7 @@ class LoopReport:
             RunError: If it cannot be written.
         """
         page = self.closed.loop.home / "report.html"
-        date = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
-        settings = tuple(
-            (key, ", ".join(map(str, value)) if isinstance(value, list) else str(value))
-            for key, value in settings_document(self.closed.loop.settings).items()
-            if value not in (None, {}, []) and key != "path"
-        )
-        foot = Foot(command, settings, tuple(versions_of(PACKAGES).items()), date)
-        write_page(page, view_of(self.closed), foot)
+        write_page(page, view_of(self.closed), study_foot(self.closed.loop.settings, command))
         return page
 
 
@@ -399,43 +398,67 @@ def view_of(closed: Closed) -> View:
     caption = "PRPV of the best θ on fresh episodes with 95 % intervals; grey: what a perfect proxy scores."
     home, shown = closed.loop.home, []
     if closed.after:
-        first = Picture("PRPV before and after", png_of(prpv_figure(prpv)), caption)
+        first = Picture("PRPV before and after", svg_of(prpv_figure(prpv)), caption)
         shown = [first, *read_pictures(home)]
+    found = (closed.diagnosis["effects"], (closed.diagnosis["camera"] or {}).get("effects"))
     for name, (title, text) in PICTURES.items():
-        if (home / "diagnosed" / f"{name}.png").is_file():
-            shown.append(Picture(title, (home / "diagnosed" / f"{name}.png").read_bytes(), text))
+        # Of the camera there is a figure where it lacked nothing too
+        file = home / "diagnosed" / f"{name}.svg"
+        if file.is_file() and (found[1] or not name.startswith("camera")):
+            shown.append(Picture(title, file.read_bytes(), text))
     said = (
         f"Found: {lacking(closed.diagnosis) or 'nothing that has a name'}; verdict: {closed.diagnosis['verdict']}.",
         f"Before: {closed.before.sentence}",
         *((f"After: {closed.after.sentence}",) if closed.after else ()),
     )
     return View(
-        title=f"{closed.loop.settings.name}: the loop closed",
+        title=f"{closed.loop.settings.name}: what did the simulator lack, and what is it worth?",
         sentence=answer(closed.diagnosis, rows),
         next_step=_following(closed),
-        parts=(_table(closed, rows), _theta_table(closed), *shown, Paragraphs("What each step said", said)),
+        parts=(
+            _table(closed, rows),
+            _theta_table(closed),
+            *shown,
+            Paragraphs("What each step said", said),
+            _links(closed),
+        ),
     )
+
+
+def _links(closed: Closed) -> Paragraphs:
+    """The pages and files beside the loop's page that there are."""
+    home = closed.loop.home
+    beside = {"tuning without": "../report.html", "the diagnosis": "diagnosed/report.html"}
+    beside |= {"tuning again": "extended/report.html", "the model that was found": "diagnosed/model.toml"}
+    links = (f"[{title}]({name})" for title, name in beside.items() if (home / name).is_file())
+    return Paragraphs("Pages and files", (" · ".join(links),))
 
 
 def _table(closed: Closed, rows: list[Compared]) -> Table:
     """Every measure before and after, with its noise floor and chance."""
-    cells = tuple(
-        (
-            f"{row.title}, 0 to {row.most}" if row.most else row.title,
-            level_text(row.before, row.unit),
-            level_text(row.after, row.unit),
-            "; ".join(dict.fromkeys(floor_text(level, row.unit) for level in (row.before, row.after) if level)),
-            "; ".join(dict.fromkeys(chance_text(level) for level in (row.before, row.after) if level)),
-        )
-        for row in rows
-    )
+    cells, same = list[tuple[str, ...]](), list[str]()
+    for row in rows:
+        title, sides = f"{row.title}, 0 to {row.most}" if row.most else row.title, (row.before, row.after)
+        shown = [level_text(one, row.unit) for one in sides]
+        if not row.most and shown[0] == shown[1]:
+            same.append(f"{row.title} {shown[0]}")
+            continue
+        cells.append((title, *shown))
+        for name, texts in (
+            ("noise floor", [floor_text(one, row.unit) for one in sides]),
+            ("chance", list(map(chance_text, sides))),
+        ):
+            if set(texts) != {"–"}:
+                cells.append((f"  {name}", *texts))
     counted = "PRPV (proxy relative predictivity value) counts wrongly ordered pairs of agents at the best θ"
     notes = [f"{counted}; in brackets 95 % intervals"]
     if closed.after and not closed.held_out:
         notes.append(
             "no agent was held out: name at least three under held_out in study.toml that the target has scores of"
         )
-    return Table("Before and after", COLUMNS, cells, tuple(notes))
+    if same:
+        notes.append(f"the same before and after: {'; '.join(same)}")
+    return Table("Before and after", COLUMNS, tuple(cells), tuple(notes))
 
 
 def _theta_table(closed: Closed) -> Table:

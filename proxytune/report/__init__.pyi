@@ -55,6 +55,7 @@ from .figure_style import (
     name_lines as name_lines,
 )
 from .html import (
+    Shown as Shown,
     fragment_html as fragment_html,
     frame_html as frame_html,
     page_html as page_html,
@@ -111,7 +112,6 @@ from .text import (
 )
 from .view import (
     Column as Column,
-    Foot as Foot,
     Paragraphs as Paragraphs,
     Picture as Picture,
     Table as Table,
@@ -129,8 +129,8 @@ from .wording import (
 )
 from .writing import (
     figures_also_as as figures_also_as,
-    png_of as png_of,
     save_figure as save_figure,
+    svg_of as svg_of,
     write_picture as write_picture,
     write_text as write_text,
     write_whole as write_whole,

@@ -250,8 +250,8 @@ def write_families_report(compared: ComparedFamilies) -> tuple[Path, Path]:
     """
     settings = compared.settings
     figure, page = settings.home / "figures" / "families.png", settings.home / "report.html"
-    save_figure(families_figure(compared), figure)
-    write_page(page, families_view(compared, figure.read_bytes()), study_foot(settings))
+    drawn = save_figure(families_figure(compared), figure)
+    write_page(page, families_view(compared, drawn), study_foot(settings))
     return figure, page
 
 

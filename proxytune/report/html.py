@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from PIL import Image
 
-from proxytune.report.view import Column, Foot, Paragraphs, Part, Picture, Table, View
+from proxytune.report.view import Column, Foot, Paragraphs, Part, Picture, Table, View, foot_of
 from proxytune.report.writing import write_text
 
 if TYPE_CHECKING:
@@ -20,29 +20,64 @@ MANY = 12
 """A page of more parts than this has a table of contents."""
 SMALLEST = 0.47
 """A picture is made no smaller than this share of its width, so that it can be read; beyond that it scrolls."""
-ENLARGED = 144.0
-"""Pixels of the page to an inch of a figure: 1.5 times its printed size, where 8 pt are the page's 16 pixels."""
+ENLARGED = 160.0
+"""Pixels of the page to an inch of a figure, where 7 pt are about the page's 16 pixels."""
+ABOUT = ("robot", "log", "target", "targets")
+"""Settings that stand at the top of a page too."""
 PROSE = 28
 """A cell of more characters than this is wrapped, and kept wide enough to be read."""
+WORDS = {
+    "PRPV": "how many ordered pairs of agents the simulator ranks otherwise than the robot; 0 is best",
+    "θ": "the simulator’s parameters that are tuned, all together",
+    "noise floor": "what a perfect simulator would still score, since episodes differ from one another",
+    "chance": "what a simulator scores that ranks agents at random",
+    "held-out": "kept aside: nothing was tuned or fitted to it",
+    "nats": "evidence as a natural logarithm: 3 nats make something 20 times as likely",
+    "declared": "what the simulator had before anything was added: the robot as its files describe it",
+    "free curve": "a flexible curve over one signal, fitted without a physical model; it shows what room is left",
+    "innovations": "what a model could not predict from one measured pose to the next",
+    "RMSE": "root of the mean squared error",
+    "planar": "the simulator that moves the robot as a point on a plane, without contacts",
+    "bullet": "the simulator that moves the robot as a body with wheels and contacts (PyBullet)",
+    "unidentified": "nearly any value in the range that was searched fits",
+    "misfit": "how probable scores as far from the simulator’s are if some θ were right; a small p says that none is",
+    "Sobol index": "the share of a measure’s variation that a parameter takes part in",
+    "nominal": "as the robot’s files have it, before tuning",
+}
+"""What a page explains at its foot of the words that it uses."""
 STYLE = """
 :root { color-scheme: light dark; --paper: #fff; --ink: #1d2126; --soft: #5a626c; --line: #d9dde2; --tint: #f1f5f9;
-  --accent: #0072b2; }
+  --shade: #0003; --accent: #0072b2; }
 @media (prefers-color-scheme: dark) {
-  :root { --paper: #15181c; --ink: #e6e8ea; --soft: #a3abb4; --line: #3a414a; --tint: #20262d; --accent: #6cc0f0; }
+  :root { --paper: #15181c; --ink: #e6e8ea; --soft: #a3abb4; --line: #3a414a; --tint: #20262d;
+    --shade: #fff4; --accent: #6cc0f0; }
+  svg.drawn, svg.drawn image { filter: invert(1) hue-rotate(180deg); }
 }
 * { box-sizing: border-box; }
 html { -webkit-text-size-adjust: 100%; }
-body { font: 16px/1.5 system-ui, sans-serif; max-width: 52rem; margin: 0 auto; padding: 1.5rem 1rem 3rem;
+body { font: 16px/1.5 system-ui, sans-serif; max-width: 70rem; margin: 0 auto; padding: 1.5rem 1rem 3rem;
   color: var(--ink); background: var(--paper); overflow-wrap: anywhere; }
 h1 { font-size: 1.6rem; line-height: 1.25; margin: 0 0 1rem; }
+p, .notes, dl { max-width: 46rem; }
+.about { color: var(--soft); margin: -.6rem 0 1rem; }
 h2 { font-size: 1.15rem; margin: 2.5rem 0 .5rem; }
 .answer { font-size: 1.15rem; margin: 0 0 1rem; }
 .following, .under-way { padding: .6rem .9rem; border-left: .25rem solid var(--accent); background: var(--tint); }
 .under-way { border-left-color: #e69f00; }
-figure { margin: 0; }
+figure { margin: .5rem 0 0; display: flex; flex-wrap: wrap; gap: .6rem 1.5rem; align-items: flex-start; }
+figcaption { flex: 1 1 15rem; max-width: 40rem; }
+svg.drawn { display: block; max-width: 100%; height: auto; stroke-linejoin: round; stroke-linecap: butt; }
+dl { font-size: .93rem; color: var(--soft); }
+dt { font-weight: 600; float: left; margin-right: .5rem; }
+dt::after { content: ":"; }
+dd { margin: 0 0 .3rem 1rem; }
 figcaption, .notes, footer { color: var(--soft); font-size: .93rem; }
 .notes { padding-left: 1.2rem; }
-.scroll { overflow-x: auto; }
+.scroll { overflow-x: auto; width: fit-content; max-width: 100%; background:
+  linear-gradient(to right, var(--paper) 40%, transparent) 0 0 / 2.5rem 100% no-repeat local,
+  linear-gradient(to left, var(--paper) 40%, transparent) 100% 0 / 2.5rem 100% no-repeat local,
+  linear-gradient(to right, var(--shade), transparent) 0 0 / .8rem 100% no-repeat scroll,
+  linear-gradient(to left, var(--shade), transparent) 100% 0 / .8rem 100% no-repeat scroll; }
 .scroll:focus-visible { outline: 2px solid var(--accent); }
 .card { display: block; width: fit-content; max-width: 100%; min-width: min-content; background: #fff; padding: .5rem;
   border: 1px solid var(--line); border-radius: .4rem; }
@@ -72,7 +107,7 @@ footer { margin-top: 3rem; border-top: 1px solid var(--line); }
   th, td { padding-right: .6rem; }
   td.prose { min-width: 0; }
   .number { white-space: normal; }
-  img { max-height: 7.5cm; width: auto; min-width: 0 !important; }
+  img, svg.drawn { max-height: 7.5cm; width: auto; min-width: 0 !important; }
   section, figure, tr, .following { break-inside: avoid; }
   h2 { break-after: avoid; }
   thead { display: table-header-group; }
@@ -92,7 +127,7 @@ $renew<link rel="icon" href="data:,">
 <body>
 <header>
 <h1>$title</h1>
-$under_way<p class="answer">$answer</p>
+$about$under_way<p class="answer">$answer</p>
 $following</header>
 $contents<main>
 $parts
@@ -127,6 +162,28 @@ def fragment_html(view: View) -> str:
     return f"<h3>{html.escape(view.title)}</h3>\n<p>{_text(view.sentence)}</p>\n{following}\n{parts}"
 
 
+class Shown:
+    """What has a view shows itself in a notebook, and has a page."""
+
+    def view(self) -> View:
+        """Sentence, next step, figures and tables."""
+        raise NotImplementedError
+
+    def _repr_html_(self) -> str:
+        return fragment_html(self.view())
+
+    def page(self, path: str | Path | None = None) -> str:
+        """The page as HTML; also written where a path is given.
+
+        Raises:
+            RunError: If it cannot be written.
+        """
+        text = page_html(self.view(), foot_of(""))
+        if path is not None:
+            write_text(Path(path), text)
+        return text
+
+
 def frame_html(sentence: str, frame: "DataFrame") -> str:
     """A sentence and a DataFrame as a piece of HTML for a notebook."""
     return f"<p>{_text(sentence)}</p>\n{frame.to_html(max_rows=20)}"
@@ -140,17 +197,26 @@ def page_html(view: View, foot: Foot, renew_s: int = 0) -> str:
     """
     renews = f"Under way: this page loads itself again every {renew_s} s."
     following = f'<p class="following"><strong>Next:</strong> {_text(view.next_step)}</p>\n'
+    parts = "\n".join(_part(part, f"part-{number}") for number, part in enumerate(view.parts, start=1))
     return PAGE.substitute(
         title=html.escape(view.title),
+        about=_about(foot),
         style=STYLE,
         renew=f'<meta http-equiv="refresh" content="{renew_s}">\n' if renew_s else "",
         under_way=f'<p class="under-way" role="status">{renews}</p>\n' if renew_s else "",
         answer=_text(view.sentence),
         following=following if view.next_step else "",
         contents=_contents(view) if len(view.parts) > MANY else "",
-        parts="\n".join(_part(part, f"part-{number}") for number, part in enumerate(view.parts, start=1)),
-        foot=_foot(foot),
+        parts=parts,
+        foot=_foot(foot, _words(parts + _text(view.sentence))),
     )
+
+
+def _about(foot: Foot) -> str:
+    """What the page is about, at its top: robot, log, target and so on, and the date."""
+    stated = dict(foot.settings)
+    told = [*(f"{name} {stated[name]}" for name in ABOUT if stated.get(name)), foot.date]
+    return f'<p class="about">{html.escape(" · ".join(filter(None, told)))}</p>\n'
 
 
 def _contents(view: View) -> str:
@@ -172,23 +238,36 @@ def _part(part: Part, place: str) -> str:
 
 
 def _picture(part: Picture, place: str) -> str:
-    source, width = _data_image(part.image)
-    size = f' width="{width}" style="min-width:{SMALLEST * width:.0f}px"' if width else ""
     alt = html.escape(f"{part.title}. {part.caption}".strip())
-    card = f'<div class="scroll" role="region" tabindex="0" aria-labelledby="{place}"><span class="card">'
+    if b"<svg" in part.image[:1000]:
+        drawing = _inline_svg(part.image.decode("utf-8"), place, alt)
+    else:
+        source, width = _data_image(part.image)
+        size = f' width="{width}" style="min-width:{SMALLEST * width:.0f}px"' if width else ""
+        drawing = f'<span class="card"><img alt="{alt}" src="{source}"{size}></span>'
+    card = f'<div class="scroll" role="region" tabindex="0" aria-labelledby="{place}">{drawing}</div>'
     # The alternative text says the same, so that it is not read twice.
     caption = f'<figcaption aria-hidden="true">{_text(part.caption)}</figcaption>' if part.caption else ""
-    return f'<figure>{card}<img alt="{alt}" src="{source}"{size}></span></div>{caption}</figure>'
+    return f"<figure>{card}{caption}</figure>"
+
+
+def _inline_svg(svg: str, place: str, alt: str) -> str:
+    """A figure as part of the page, where markers show their titles; names in it are this figure's alone."""
+    body = re.sub(r"<!--.*?-->|<metadata>.*?</metadata>|<style.*?</style>", "", svg, flags=re.DOTALL)
+    body = re.sub(
+        r' id="(?:figure|axes|patch|text|line2d|xtick|ytick|matplotlib)[^"]*"', "", body[body.index("<svg") :]
+    )
+    body = re.sub(r'( id="|"#|url\(#)(?=\w)', lambda one: f"{one[1]}{place}-", body)
+    head, _, rest = body.partition(">")
+    box = re.search(r'viewBox="[-\d.]+ [-\d.]+ ([\d.]+) ([\d.]+)"', head)
+    width = float(box[1]) * ENLARGED / 72.0 if box else 0.0
+    size = f'{box[0]} style="width:{width:.0f}px;min-width:{SMALLEST * width:.0f}px"' if box else ""
+    return f'<svg class="drawn" role="img" aria-label="{alt}" {size}>{rest}'
 
 
 def _data_image(image: bytes) -> tuple[str, int]:
-    """A picture as a data URI, and how wide it is drawn where there is room [pixel]; 0 as wide as it likes.
-
-    A figure, which states how many pixels make an inch, is drawn at 1.5 times its printed size.
-    """
+    """A picture as a data URI, and how wide it is drawn where there is room [pixel]; 0 as wide as it likes."""
     data = base64.b64encode(image).decode("ascii")
-    if b"<svg" in image[:1000]:
-        return f"data:image/svg+xml;base64,{data}", 0
     kind = "png" if image.startswith(b"\x89PNG\r\n") else "gif" if image.startswith(b"GIF8") else ""
     if not kind:
         raise ValueError("the picture is no PNG, GIF or SVG")
@@ -220,7 +299,7 @@ def _class(column: Column, length: int = 0) -> str:
     return ' class="prose"' if length > PROSE else ' class="number"' if column.numbers else ""
 
 
-def _foot(foot: Foot) -> str:
+def _foot(foot: Foot, words: str) -> str:
     settings = Table("Settings", (Column(""), Column("")), foot.settings)
     versions = ", ".join(f"{name} {version}" for name, version in foot.versions)
     parts = [_part(settings, "settings")] if foot.settings else []
@@ -228,9 +307,17 @@ def _foot(foot: Foot) -> str:
         command = f"<pre><code>{html.escape(foot.command)}</code></pre>"
         parts.append(f'<section><h2 id="again">The command that makes this page</h2>{command}</section>')
     written = [f"Written {foot.date}"] * bool(foot.date) + [f"with {versions}"] * bool(versions)
+    parts += [f'<section><h2 id="words">Words on this page</h2><dl>{words}</dl></section>'] if words else []
     return "\n".join([*parts, f"<p>{html.escape(' '.join(written))}.</p>" if written else ""])
 
 
+def _words(page: str) -> str:
+    """The words of WORDS that a page uses, each with what it means."""
+    said = re.sub(r"<svg.*?</svg>|<[^>]*>", " ", page, flags=re.DOTALL)
+    return "".join(f"<dt>{word}</dt><dd>{means}</dd>" for word, means in WORDS.items() if re.search(rf"\b{word}", said))
+
+
 def _text(text: str) -> str:
-    """A text with what is between backticks as code."""
-    return re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(text))
+    """A text with what is between backticks as code, and [words](a/file) beside the page as a link."""
+    linked = re.sub(r"\[([^\]\[]+)\]\((\w[\w./ -]*|\.\./[\w./ -]*)\)", r'<a href="\2">\1</a>', html.escape(text))
+    return re.sub(r"`([^`]+)`", r"<code>\1</code>", linked)

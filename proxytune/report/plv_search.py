@@ -100,8 +100,8 @@ def write_plv_report(study: PlvStudy, folder: Path) -> tuple[Path, Path]:
         RunError: If a file cannot be written.
     """
     figure, page = folder / "figures" / "plv.png", folder / "report.html"
-    save_figure(plv_figure(study), figure)
-    write_page(page, plv_view(study, figure.read_bytes()), study_foot(study.settings))
+    drawn = save_figure(plv_figure(study), figure)
+    write_page(page, plv_view(study, drawn), study_foot(study.settings))
     return figure, page
 
 

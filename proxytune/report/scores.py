@@ -174,8 +174,7 @@ def write_score_report(
         file, title = ("", "") if selection is None else (f"_{files[name]}", f": {name}")
         for kind, figure, head, caption in drawn_scores(assessment):
             paths.append(folder / f"{kind}{file}.png")
-            save_figure(figure, paths[-1])
-            pictures.append(Picture(f"{head}{title}", paths[-1].read_bytes(), caption))
+            pictures.append(Picture(f"{head}{title}", save_figure(figure, paths[-1]), caption))
     page = folder / "report.html"
     write_page(page, score_view(assessments, selection, pictures, target=target), foot)
     return paths, page

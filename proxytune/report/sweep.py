@@ -19,7 +19,7 @@ from proxytune.report.study.page import study_foot
 from proxytune.report.sweep_figures import bars_figure, panels_figure, sweep_figure
 from proxytune.report.text import group_texts, table_text
 from proxytune.report.view import Paragraphs, Part, Picture, Table, View, columns_of
-from proxytune.report.writing import save_figure, write_text
+from proxytune.report.writing import save_figure, svg_of, write_text
 from proxytune.space import Theta
 from proxytune.study import StudySettings
 from proxytune.sweep import METRICS, Series, SweepCurve, SweepPoint, describe_shape, series_of, shape_of
@@ -269,19 +269,26 @@ def write_curves(curves: Sequence[SweepCurve], folder: Path) -> list[Path]:
 
 
 def write_sweep_page(
-    settings: StudySettings, curves: Sequence[SweepCurve], folder: Path, held: str, command: str
+    settings: StudySettings,
+    curves: Sequence[SweepCurve],
+    folder: Path,
+    held: str,
+    command: str,
+    truth: Theta | None = None,
 ) -> Path:
     """Write the page of curves that hold the same values beside their figures; return its path.
 
     Args:
         settings: The study's.
-        curves: At least one; their figures are in the folder.
-        folder: Where figures and page are.
+        curves: At least one.
+        folder: Where the page goes.
         held: What the other parameters are held at, in words.
         command: The command that makes the page, as typed in a shell.
+        truth: The θ that made the target, where that is known.
     """
     names = [*_names_together(curves), *map(curve_name, curves)]
-    drawn = {name: (folder / f"{name}.png").read_bytes() for name in names}
+    figures = figures_of_sweep(curves, truth)
+    drawn = {name: svg_of(figures[name]) for name in names}
     view = sweep_view(settings.name, curves, drawn, f"{held[0].upper()}{held[1:]}")
     path = folder / f"{names[0]}.html"
     write_page(path, view, study_foot(settings, command))

@@ -229,9 +229,9 @@ def write_teach_report(experiment: Experiment, prpv: Predictivities, figure: Pat
     Raises:
         RunError: If a file cannot be written.
     """
-    save_figure(teach_figure(experiment), figure)
+    drawn = save_figure(teach_figure(experiment), figure)
     page = figure.with_suffix(".html")
-    write_page(page, teach_view(experiment, prpv, figure.read_bytes()), foot)
+    write_page(page, teach_view(experiment, prpv, drawn), foot)
     return page
 
 

@@ -1,9 +1,10 @@
 """Writing a file whole or not at all."""
 
 import contextlib
+import html
 import re
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextvars import ContextVar
 from functools import partial
 from io import BytesIO
@@ -12,8 +13,12 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.axis import Axis
+from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.text import Text
+from matplotlib.ticker import FixedFormatter
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -44,8 +49,11 @@ def write_text(path: Path, text: str) -> None:
     write_whole(path, "", lambda draft: draft.write_text(text, encoding="utf-8", newline="\n"))
 
 
-def save_figure(figure: Figure, path: Path) -> None:
+def save_figure(figure: Figure, path: Path) -> bytes:
     """Write a figure as PNG, and in the formats of `figures_also_as`; an interrupted write leaves the old file.
+
+    Returns:
+        The figure as a page shows it.
 
     Raises:
         RunError: If the figure cannot be written.
@@ -53,18 +61,62 @@ def save_figure(figure: Figure, path: Path) -> None:
     write_whole(path, "the figure ", lambda draft: _save_as(figure, draft, format="png", dpi=200))
     for form in _beside.get():
         write_whole(path.with_suffix(f".{form}"), "the figure ", partial(_draw, figure, form))
+    return svg_of(figure)
 
 
-def png_of(figure: Figure) -> bytes:
-    """A figure as the bytes of a PNG file."""
+def svg_of(figure: Figure) -> bytes:
+    """A figure as an SVG for a page: without a background, and what a marker stands for as its title."""
+    said = dict(_marks(figure))
     image = BytesIO()
-    _save_as(figure, image, format="png", dpi=200)
-    return image.getvalue()
+    with mpl.rc_context({"svg.hashsalt": "proxytune"}):
+        _save_as(figure, image, format="svg", metadata=UNDATED["svg"], transparent=True)
+    head, *groups = re.split(r'(?=<g id=")', image.getvalue().decode("utf-8"))
+    return "".join([head, *(_titled(group, said) for group in groups)]).encode("utf-8")
+
+
+def _marks(figure: Figure) -> Iterator[tuple[str, list[str]]]:
+    """Whatever is drawn by markers gets a name, with which goes what each of its markers says."""
+    for axes in figure.axes:
+        drawn = [line for line in axes.lines if line.get_transform() is axes.transData]
+        for artist in (*drawn, *(one for one in axes.collections if isinstance(one, PathCollection))):
+            points = np.asarray(artist.get_xydata() if isinstance(artist, Line2D) else artist.get_offsets())
+            label, name = str(artist.get_label()), f"mark{id(artist)}"
+            names = [] if label.startswith("_") else [label]
+            shown = ([*names, *map(_place, (axes.xaxis, axes.yaxis), point)] for point in points)
+            artist.set_gid(name)
+            yield name, ["; ".join(filter(None, one)) for one in shown]
+
+
+def _place(axis: Axis, value: float) -> str:
+    """A value on an axis, by the axis' name; or the name that stands beside it."""
+    if isinstance(axis.get_major_formatter(), FixedFormatter):
+        ticks = {
+            float(place): one.get_text() for place, one in zip(axis.get_ticklocs(), axis.get_ticklabels(), strict=True)
+        }
+        return ticks.get(round(float(value)), "")
+    return f"{axis.get_label().get_text()} {value:.4g}".replace("\n", " ").replace("-", "−").strip()
+
+
+def _titled(group: str, said: Mapping[str, list[str]]) -> str:
+    """A group of an SVG with titles for its markers; without a name that differs from one time to the next."""
+    name = group[len('<g id="') :].partition('"')[0]
+    uses = re.findall(r"<use [^>]*/>", group)
+    if name not in said:
+        return group
+    parts = iter(said[name])
+    if len(uses) == len(said[name]):
+        group = re.sub(
+            r"(<use [^>]*)/>", lambda one: f"{one[1]}><title>{html.escape(next(parts))}</title></use>", group
+        )
+    return group.replace(f' id="{name}"', "", 1)
 
 
 def _draw(figure: Figure, form: str, draft: Path) -> None:
     """Write a vector file; journals refuse the fonts that Matplotlib's PDF has by default."""
-    with mpl.rc_context({"pdf.fonttype": 42, "svg.hashsalt": "proxytune"}):
+    if form == "svg":
+        draft.write_bytes(svg_of(figure))
+        return
+    with mpl.rc_context({"pdf.fonttype": 42}):
         _save_as(figure, draft, format=form, metadata=UNDATED[form])
 
 

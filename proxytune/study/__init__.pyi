@@ -16,6 +16,7 @@ from .families import (
     tuned_family as tuned_family,
 )
 from .family import (
+    GIVEN as GIVEN,
     bare_family as bare_family,
     check_bounds as check_bounds,
     load_family as load_family,

@@ -28,6 +28,7 @@ from proxytune.search import ENGINE_NAMES, Engine, engine_code, engine_of
 from proxytune.space import Parameter
 from proxytune.storage import Store
 from proxytune.study.apart import APART
+from proxytune.study.family import GIVEN
 from proxytune.study.opening import Study, objective_of, open_settings, read_target, with_scores
 from proxytune.study.preflight import NOT_REPEATABLE
 from proxytune.study.settings import LEARNING, StudySettings
@@ -240,7 +241,7 @@ class DescribedFamily:
 
 def describe(study: Study, store: Store) -> None:
     """Keep what is needed to look at a study without its own code, if it has run any."""
-    if str(study.settings.folder.resolve()) not in folders():
+    if str(study.settings.folder.resolve()) not in folders() and study.settings.family != GIVEN:
         return
     family, own = study.family, study.settings.space.names
     described = {

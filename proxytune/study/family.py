@@ -22,6 +22,8 @@ from proxytune.settings import nearest
 from proxytune.space import Parameter
 from proxytune.study.settings import StudySettings
 
+GIVEN = "tune"
+"""The domain family of a study whose simulator is not named in a file but given to `proxytune.tune`."""
 MISSING = object()
 ON_EPISODES = ("run", "record", "drive", "replay", "demonstrate", "guide", "examine")
 """Methods whose first argument is an episode."""
@@ -123,6 +125,16 @@ def load_family(settings: StudySettings, model: Path | None) -> DomainFamily:
     return cast(DomainFamily, UserFamily(family, settings.family, tuple(settings.aliases.items())))
 
 
+def given_family(settings: StudySettings, family: Any) -> DomainFamily:
+    """A family that is at hand, checked as one that a study names, behind the guard.
+
+    Raises:
+        InputError: As load_family.
+    """
+    _check(settings, family)
+    return cast(DomainFamily, UserFamily(family, "the simulator"))
+
+
 def is_users_family(settings: StudySettings) -> bool:
     """Tell whether the domain family is not proxytune's own."""
     return not settings.family.startswith("proxytune.")
@@ -136,6 +148,8 @@ def bare_family(settings: StudySettings, model: Path | None) -> DomainFamily:
     """
     if model is not None and not model.is_file():
         raise settings.error("proxy", f"no such file: {model}; check the path")
+    if settings.family == GIVEN:
+        raise settings.error("family", "is what was given in Python; call proxytune.tune again with this folder")
     try:
         factory = load(settings.family, kind="family", beside=settings.folder, needs=("__call__",))
     except InputError as problem:

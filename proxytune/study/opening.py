@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from proxytune.scores import Metric, ScoreTable, read_scores
 from proxytune.search import ENGINE_NAMES, GAUSSIAN_PROCESS, Engine, engine_of, why_not_engine
 from proxytune.settings import nearest
 from proxytune.space import Theta
-from proxytune.study.family import load_family, user_code
+from proxytune.study.family import given_family, load_family, user_code
 from proxytune.study.settings import LEARNING, StudySettings, read_study_settings, unnoticed
 from proxytune.usefulness import MEASURES, Measure, compare, start_of, starts_of
 
@@ -244,14 +245,14 @@ def open_study(path: Path) -> Study:
     return open_settings(read_study_settings(path))
 
 
-def open_settings(settings: StudySettings) -> Study:
-    """Load the family that a study.toml names and the target's scores.
+def open_settings(settings: StudySettings, given: Any = None) -> Study:
+    """Load the family that a study.toml names, unless one is given, and the target's scores.
 
     Raises:
         InputError: As open_study, and if they are of several families.
     """
     settings.check_single()
-    family = load_family(settings, settings.proxy)
+    family = load_family(settings, settings.proxy) if given is None else given_family(settings, given)
     known, left_out = with_scores(settings)
     target, unused = read_target(known, family)
     cautions = (*left_out, *unused, *unnoticed(settings.folder), *cautions_of(family))

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from proxytune.domain import Episode, Outcome
+from proxytune.domain import Episode, Outcome, instance_of
 from proxytune.errors import RunError
 from proxytune.scores import ScoreTable
 from proxytune.search import (
@@ -37,6 +37,7 @@ from proxytune.search import (
     make_proposer,
 )
 from proxytune.seeds import fresh_seed
+from proxytune.space import Theta
 from proxytune.storage import State, TrialRecord
 from proxytune.study.facts import check_facts, note_search
 from proxytune.study.opening import Objective, Study
@@ -59,17 +60,19 @@ MOST_FINALISTS = 3
 """At most so many θ are driven again."""
 
 
-def run_stages(run: StudyRun, warn: Callable[[str], None]) -> None:
+def run_stages(run: StudyRun, warn: Callable[[str], None], known: Sequence[Outcome | Theta] = ()) -> None:
     """Run a study to its end, from wherever it was left: pre-flight, trials, fresh episodes.
 
     Args:
         run: The study.
         warn: Hears, before the first trial, of another search than before and of parameters without effect.
+        known: θ to try next, before what the search proposes, and outcomes that need not be simulated.
 
     Raises:
         InputError, RunError: As `run_trials`.
     """
     check_facts(run)
+    _attach(run, known)
     retry_failed(run)
     if line := note_search(run.study, run.store):
         warn(line)
@@ -79,6 +82,20 @@ def run_stages(run: StudyRun, warn: Callable[[str], None]) -> None:
     # The proposer allows for the noise that the pre-flight measured.
     run_trials(run, make_proposer(run.study.engine, run.settings.initial, goal_of(run)))
     run_confirmation(run)
+
+
+def _attach(run: StudyRun, known: Sequence[Outcome | Theta]) -> None:
+    """Keep outcomes, and open a trial for each θ that has none yet: what is open is not proposed."""
+    outcomes = [one for one in known if isinstance(one, Outcome)]
+    if outcomes:
+        run.store.save_outcome(run.study.identity, *outcomes)
+    trials = [*run.finished_trials(), *run.open_trials()]
+    tried = {instance_of(trial.theta) for trial in trials}
+    wanted = (dict(one.episode.theta) if isinstance(one, Outcome) else one for one in known)
+    new = [one for key, one in {instance_of(theta): theta for theta in wanted}.items() if key not in tried]
+    opened = [TrialRecord(number, dict(theta)) for number, theta in enumerate(new, start=len(trials) + 1)]
+    if opened:
+        run.save_trials(*opened)
 
 
 def retry_failed(run: StudyRun) -> None:

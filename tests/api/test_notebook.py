@@ -38,7 +38,7 @@ def test_a_study_shows_its_sentence_its_tables_and_its_figures(finished):
     page = report._repr_html_()
     assert report.sentence[:12] in page
     assert "<table" in page
-    assert page.count("data:image/png;base64") == len(report.figures())
+    assert page.count("<svg") == len(report.figures())
 
 
 def test_scores_show_every_measure_in_a_table():
@@ -53,4 +53,21 @@ def test_a_sweep_shows_its_curves_and_holds_them_as_tables(make_study):
     assert list(report.tables()["trim"].index) == [-0.3, 0.0, 0.3]
     page = report._repr_html_()
     assert "<table" in page
-    assert "data:image/png;base64" in page
+    assert "<svg" in page
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["StudyReport", "DiagnosisReport", "ScoreReport", "SweepReport", "TeachReport", "FamiliesReport", "LoopReport"],
+)
+def test_every_report_of_a_page_gives_page_figures_and_a_table(name):
+    """What a command writes can be had from Python by the same names everywhere."""
+    for method in ("page", "figures", "to_frame"):
+        assert inspect.isfunction(getattr(getattr(proxytune, name), method))
+
+
+def test_a_report_is_written_as_the_page_that_it_gives(finished, tmp_path):
+    """page(path) writes what it returns, and that reaches for nothing elsewhere."""
+    text = proxytune.read_study(finished).page(tmp_path / "mine.html")
+    assert (tmp_path / "mine.html").read_text(encoding="utf-8") == text
+    assert "<title>" in text and "http" not in text.replace("http://www.w3.org", "")

@@ -109,9 +109,7 @@ def write_diagnosis(found: LogDiagnosis, folder: Path, command: str = "") -> lis
     write_text(document, text)
     write_text(model, extended_model_text(found))
     figures = {folder / f"{name}.png": figure for name, figure in diagnosis_figures(found).items()}
-    for path, figure in figures.items():
-        save_figure(figure, path)
-    drawn = {path.stem: path.read_bytes() for path in figures}
+    drawn = {path.stem: save_figure(figure, path) for path, figure in figures.items()}
     foot = foot_of(command, [("log", found.log), ("robot", found.robot.name)])
     write_page(page, diagnosis_view(found, drawn), foot)
     return [document, model, *figures, page]
@@ -120,13 +118,22 @@ def write_diagnosis(found: LogDiagnosis, folder: Path, command: str = "") -> lis
 def diagnosis_view(found: LogDiagnosis, figures: Mapping[str, bytes]) -> View:
     """A diagnosis: the figures by their names, then the tables and all notes."""
     notes = diagnosis_notes(found)
-    paragraphs = [Paragraphs("What else is to be known", tuple(notes))] if notes else []
+    paragraphs = (
+        [Paragraphs("What else is to be known", tuple(f"{note[:1].upper()}{note[1:]}." for note in notes))]
+        if notes
+        else []
+    )
     motion = [] if found.motion is None else _motion_tables(found.motion)
     camera = [] if found.camera is None else _camera_tables(found.camera)
     drives, part = [] if found.motion is None else next_drives(found.motion), found.motion or found.camera
     next_step = f"{'; '.join(drives)}." if drives else NEXT_STEPS[part.verdict] if part else ""
     parts: tuple[Part, ...] = (*diagnosis_pictures(figures), *motion, *camera, *paragraphs)
-    return View(f"{found.log}: what the model lacks", f"{diagnosis_headline(found)}.", next_step, parts)
+    return View(
+        f"{found.log}: what does the model of {found.robot.name} lack?",
+        f"{diagnosis_headline(found)}.",
+        next_step,
+        parts,
+    )
 
 
 def diagnosis_text(found: LogDiagnosis) -> Group:

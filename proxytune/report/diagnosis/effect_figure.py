@@ -283,4 +283,8 @@ def draw_means(axes: Axes, rates: Rates, signal: Floats, panel: Panel) -> None:
         places, values = _means(signal, added[panel.motion], rates.declared[panel.motion] if panel.share else None)
         style = {MEASURED: ("o", GREY, 3.0, 1), ANY: ("--", PURPLE, 0.0, 3)}.get(name, ("-", BLUE, 0.0, 2))
         axes.plot(places, factor * values, style[0], color=style[1], ms=style[2], lw=1.4, zorder=style[3], label=name)
+    # A free curve may leave what was measured, where it says nothing
+    seen = np.concatenate([line.get_ydata() for line in axes.lines if line.get_label() != ANY])
+    room = 0.15 * (np.ptp(seen) or 1.0)
+    axes.set_ylim(seen.min() - room, seen.max() + room)
     dress(axes, up=f"{NAMES[panel.motion]}\n− declared [{unit}]")

@@ -27,7 +27,7 @@ from proxytune.report.figure_style import (
     name_lines,
     named_handles,
 )
-from proxytune.report.wording import plain, span, with_unit
+from proxytune.report.wording import fixed, plain, span, with_unit
 from proxytune.study import PRPV, StudyResult
 
 TWO_LINES = 0.14
@@ -151,7 +151,7 @@ def _draw_profile(axes: Axes, result: StudyResult, place: int) -> None:
     box, learnt = result.study.settings.space.intervals[place], result.knowledge
     low, high = learnt.intervals[box.name]
     for ends in ((box.low, low), (high, box.high)):
-        axes.axvspan(*ends, color="0.88", linewidth=0, label="excluded (95 %)")
+        axes.axvspan(*ends, color="0.82", linewidth=0, label="excluded (95 %)")
     values, density = density_of(result, place)
     axes.fill_between(values, density, color=BLUE, alpha=0.35, linewidth=0)
     axes.plot(values, density, color=BLUE, linewidth=1.2)
@@ -236,6 +236,9 @@ def _pair(axes: Axes, result: StudyResult, places: tuple[int, int], norm: Normal
     if result.truth is not None and {intervals[place].name for place in places} <= set(result.truth):
         _mark(axes, [result.truth[intervals[place].name] for place in places], "truth")
     across, up = (intervals[place] for place in places)
+    for *both, correlation in result.knowledge.trades:
+        if set(both) == {across.name, up.name}:
+            axes.set_title(f"trade off: {fixed(correlation, 1)}", fontsize=7, pad=2)
     axes.set_xlim(across.low, across.high)
     axes.set_ylim(up.low, up.high)
     _name(axes, result, places)

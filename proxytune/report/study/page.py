@@ -14,7 +14,7 @@ from proxytune.report.study.sentence import finding_of, say_answer, say_next_ste
 from proxytune.report.study.tables import INFORMATION, MEASURES, SEARCH, THETA, USEFULNESS, study_tables, trials_table
 from proxytune.report.view import Foot, Paragraphs, Part, Picture, View, foot_of
 from proxytune.report.wording import short
-from proxytune.report.writing import png_of, save_figure
+from proxytune.report.writing import save_figure, svg_of
 from proxytune.storage import TrialRecord
 from proxytune.study import LEARNING, StudyResult, StudySettings
 
@@ -40,13 +40,11 @@ def write_study_report(result: StudyResult, folder: Path, command: str = "") -> 
     Raises:
         RunError: If a file cannot be written.
     """
-    paths, page = list[Path](), folder / "report.html"
-    for name, figure in study_figures(result).items():
-        paths.append(folder / "figures" / f"{name}.png")
-        save_figure(figure, paths[-1])
+    figures = {folder / "figures" / f"{name}.png": figure for name, figure in study_figures(result).items()}
+    drawn, page = {path.stem: save_figure(figure, path) for path, figure in figures.items()}, folder / "report.html"
     foot = study_foot(result.study.settings, command or None)
-    write_page(page, study_view(result, {path.stem: path.read_bytes() for path in paths}), foot)
-    return paths, page
+    write_page(page, study_view(result, drawn), foot)
+    return list(figures), page
 
 
 def study_view(result: StudyResult, figures: Mapping[str, bytes]) -> View:
@@ -71,7 +69,9 @@ def study_view(result: StudyResult, figures: Mapping[str, bytes]) -> View:
         trials_table(result.trials, settings.space.names),
     )
     present: tuple[Part, ...] = tuple(part for part in parts if part is not None)
-    return View(settings.name, say_answer(finding), say_next_step(finding), present)
+    return View(
+        f"{settings.name}: which θ makes the simulator useful?", say_answer(finding), say_next_step(finding), present
+    )
 
 
 def study_foot(settings: StudySettings, command: str | None = None) -> Foot:
@@ -118,7 +118,8 @@ def study_pictures(result: StudyResult, figures: Mapping[str, bytes]) -> dict[st
         "stroke is what it does alone. Lines are 95 % intervals: where they overlap, the order is not known. Where a "
         "dot stands near the lower end of its line, the true share may well be larger, but hardly smaller.",
         "evaluations": f"Darker points have lower PRPV{hollow}. The shadow is the 95 % region: where it is "
-        f"long and slanting, two parameters make up for each other. The ring is the answer.{truth}",
+        "long and slanting, two parameters make up for each other (correlation above it). The ring is the "
+        f"answer.{truth}",
     }
     return {name: Picture(TITLES[name], image, captions[name]) for name, image in figures.items()}
 
@@ -148,7 +149,7 @@ def live_view(settings: StudySettings, objective: str, trials: Sequence[TrialRec
     if trials:
         measures = tuple(dict.fromkeys((objective, *(MEASURES if objective != LEARNING else ()))))
         caption = "Each point is a trial; trials that failed or were stopped early have none. The best may be luck."
-        image = png_of(_trials_figure(trials, objective))
+        image = svg_of(_trials_figure(trials, objective))
         picture = Picture(f"{objective.upper()} trial by trial", image, caption)
         shown = (picture, trials_table(trials, tuple(trials[0].theta), measures))
     sentence = f"{f'Under way: {doing}.' if doing else 'Stopped before its end.'} {_say_best(trials, objective)}"

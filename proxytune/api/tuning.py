@@ -1,0 +1,270 @@
+"""A study without a folder or TOML: a function or an environment, a box of parameters, and the target's scores.
+
+`tune` writes the study.toml that says all but the simulator, and runs it as `run_study` does; the simulator is at hand.
+"""
+
+import inspect
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import tomlkit
+
+from proxytune.api.scores import column_table
+from proxytune.api.search_box import box_space
+from proxytune.api.study import StudyReport, run_quietly
+from proxytune.domain import Episode, Outcome, make_episode
+from proxytune.errors import EpisodeError, InputError
+from proxytune.files import temporary_folder
+from proxytune.identity import digest, meaning_of_code
+from proxytune.report import write_text
+from proxytune.scores import Metric, read_scores
+from proxytune.settings import nearest
+from proxytune.space import Parameter, Space, Theta
+from proxytune.study import FILE_NAME, GIVEN, Study, open_settings, plan_episodes, read_study_settings
+
+Simulate = Callable[..., float | Mapping[str, float]]
+HEAD = "# Written by proxytune.tune, which writes it anew at every call.\n"
+
+
+@dataclass(frozen=True)
+class GivenFamily:
+    """A user's function as a domain family.
+
+    Attributes:
+        simulate: Called with θ and the agent's name; with start and seed too where it has such arguments.
+        parameters: Each of θ.
+        metrics: What it scores, with units.
+        agents: Whom it can run.
+        starts: How many starting conditions there are.
+        identity: A digest of its code.
+    """
+
+    simulate: Simulate
+    parameters: Mapping[str, Parameter]
+    metrics: Mapping[str, str]
+    agents: tuple[str, ...]
+    starts: int
+    identity: str
+
+    def check_agent(self, name: str) -> None:
+        """Refuse an agent that has no policy.
+
+        Raises:
+            InputError: If it is unknown.
+        """
+        if name not in self.agents:
+            raise InputError(f"agent '{name}' is not given; {nearest(name, self.agents)}")
+
+    def run(self, episode: Episode) -> Mapping[str, float]:
+        """The scores of one episode.
+
+        Raises:
+            EpisodeError: If it scores nothing, or one number where there are several metrics.
+        """
+        known = {"start": episode.start, "seed": episode.seed}
+        named = {name: value for name, value in known.items() if name in _arguments(self.simulate)}
+        scores = self.simulate(dict(episode.theta), episode.agent, **named)
+        if isinstance(scores, Mapping):
+            return scores
+        if len(self.metrics) > 1 or scores is None:
+            raise EpisodeError(f"the simulator must answer with a dict of {', '.join(self.metrics)}, got {scores!r}")
+        return dict.fromkeys(self.metrics, float(scores))
+
+
+def tune(
+    simulator: Simulate | str,
+    box: Mapping[str, tuple[float, float]],
+    scores: pd.DataFrame | str | Path,
+    *,
+    metrics: str | Sequence[str],
+    agents: Mapping[str, Any] | None = None,
+    folder: str | Path | None = None,
+    known: pd.DataFrame | Iterable[Theta] = (),
+    columns: Mapping[str, str] | None = None,
+    starts: int | None = None,
+    budget: int = 40,
+    domain: Mapping[str, Any] | None = None,
+    progress: bool = False,
+    **keys: Any,
+) -> StudyReport:
+    """Find the θ at which a simulator ranks agents as the target does; no folder and no TOML are needed.
+
+    Args:
+        simulator: A function `simulate(theta, agent)`, or `simulate(theta, agent, start, seed)`, that answers with a
+            score or a dict of metrics; with `agents` a Gymnasium environment: its name, or what makes it.
+        box: Lowest and highest value of each parameter. An environment's are arguments of its constructor, attributes
+            written with a point (`unwrapped.m`), and effects by their names in θ.
+        scores: The target's: one row per agent and episode, as `score` takes them. Episode 0, 1, … is that start.
+        metrics: How agents are compared, as in "distance:max".
+        agents: Policies by name, each a function of an observation or with `predict`, or "random" or "zero".
+        folder: Where trials are kept: called again with the same, it goes on from there; nowhere if not given.
+        known: θ to try first; or a DataFrame of what was simulated before, by θ, agent and episode, that is not
+            simulated again.
+        columns: What columns are called in `scores`, as in {"agent": "policy"}.
+        starts: How many starting conditions; as many as the target has episodes of an agent if not given.
+        budget: How many trials.
+        domain: Other keys of an environment's `[domain]` table, as in {"steps": 200}.
+        progress: Whether to show a bar.
+        keys: Any other key of study.toml, as in seed=2, jobs=4, batch=4, engine="composite".
+
+    Raises:
+        InputError: If anything cannot be used, or the function's code has changed since trials were kept.
+        RunError: If no trial works; all that was finished is kept.
+    """
+    space, compared = box_space(box), [metrics] if isinstance(metrics, str) else list(metrics)
+    with temporary_folder() if folder is None else nullcontext(Path(folder)) as home, _written(home, scores) as target:
+        table = read_scores(target, [Metric.parse(one).name for one in compared], columns=columns)
+        names = tuple(agents) if agents else table.agents
+        simulate = _environment(simulator, space, agents, domain or {}, home) if agents else simulator
+        if not callable(simulate):
+            raise InputError(f"simulator: {simulate!r} is no function; an environment needs agents={{name: policy}}")
+        counted = int(table.counts.max()) if "start" in _arguments(simulate) else 1
+        stated = {
+            "format": 1,
+            "name": "tune" if folder is None else home.name,
+            "family": GIVEN,
+            "target": str(target.absolute()),
+            "metrics": compared,
+            "agents": list(names),
+            "starts": counted if starts is None else starts,
+            "budget": budget,
+            **({"target_columns": dict(columns)} if columns else {}),
+            **keys,
+            "parameters": {one.name: [one.low, one.high] for one in space.intervals},
+        }
+        write_text(home / FILE_NAME, HEAD + tomlkit.dumps(stated))
+        settings = read_study_settings(home)
+        own = {one.name: _parameter(one.name, one.low, one.high) for one in space.intervals}
+        code = (meaning_of_code(one) for one in (simulator, *(agents or {}).values()))
+        identity = digest(*code, names, sorted((domain or {}).items()))
+        family = GivenFamily(
+            simulate, own, {one.name: "" for one in settings.metrics}, names, settings.starts, identity
+        )
+        study = open_settings(settings, family)
+        return run_quietly(study, progress, _known(study, known))
+
+
+def _parameter(name: str, low: float, high: float) -> Parameter:
+    return Parameter(name=name, unit="", low=low, high=high, neutral=float("nan"))
+
+
+@contextmanager
+def _written(home: Path, scores: pd.DataFrame | str | Path) -> Iterator[Path]:
+    """The file of the target's scores, in the study's folder if they are a DataFrame.
+
+    Raises:
+        InputError: If the folder is that of another study; what else is raised leaves the folder's files as they were.
+    """
+    path, table = home / FILE_NAME, home / "target.csv"
+    before = {one: one.read_text(encoding="utf-8") for one in (path, table) if one.exists()}
+    if not before.get(path, HEAD).startswith(HEAD):
+        raise InputError(f"{home}: has a study.toml that tune did not write; use run_study, or give another folder")
+    given = not isinstance(scores, str | Path)
+    if given:
+        write_text(table, column_table("scores", scores).to_csv(index=False, lineterminator="\n"))
+    try:
+        yield table if given else Path(scores)
+    except InputError as problem:
+        for one, text in before.items():
+            write_text(one, text)
+        where = f"{home}: " if before else ""
+        raise type(problem)(str(problem).replace(str(table), "scores").replace(f"{path}: ", where)) from None
+
+
+def _known(study: Study, known: pd.DataFrame | Iterable[Theta]) -> list[Outcome | Theta]:
+    """Known points as the study has them: θ, or the outcomes of its episodes.
+
+    Raises:
+        InputError: If one is no θ of the box, or an outcome is of no episode of the study.
+    """
+    settings, space = study.settings, study.settings.space
+    rows = known.reset_index().to_dict("records") if isinstance(known, pd.DataFrame) else [dict(one) for one in known]
+    found: list[Outcome | Theta] = []
+    for place, row in enumerate(rows):
+        where = f"known: row {place}"
+        if missing := [name for name in space.names if name not in row]:
+            raise InputError(f"{where}: has no '{missing[0]}'; give each parameter of the box")
+        theta = {one.name: float(row[one.name]) for one in space.intervals}
+        for one in space.intervals:
+            if not one.low <= theta[one.name] <= one.high:
+                raise InputError(f"{where}: {one.name} is {theta[one.name]:g}, outside [{one.low:g}, {one.high:g}]")
+        if not isinstance(known, pd.DataFrame):
+            found.append(theta)
+            continue
+        episodes = {
+            (episode.agent, str(episode.start)): episode for episode in plan_episodes(settings, theta, settings.seed)
+        }
+        episode = episodes.get((str(row.get("agent")), str(row.get("episode", 0))))
+        if episode is None:
+            starts = f"episode 0 to {settings.starts - 1}"
+            raise InputError(f"{where}: is no episode of this study; its agents are {settings.agents}, {starts}")
+        scored = {metric.name: float(row.get(metric.name, float("nan"))) for metric in settings.metrics}
+        if lacks := [name for name, value in scored.items() if not math.isfinite(value)]:
+            raise InputError(f"{where}: has no finite '{lacks[0]}'")
+        found.append(Outcome(episode, scored, "", 0.0))
+    return found
+
+
+def _arguments(simulate: Simulate) -> frozenset[str]:
+    """Names of the arguments that a function takes; none where nobody says."""
+    try:
+        return frozenset(inspect.signature(simulate).parameters)
+    except ValueError:
+        return frozenset()
+
+
+@dataclass(frozen=True)
+class _Played:
+    """An environment as a function of θ, agent, start and seed."""
+
+    family: Any
+    name: str
+    make: Callable[..., Any] | None
+
+    def __call__(self, theta: Theta, agent: str, start: int, seed: int) -> Mapping[str, float]:
+        _register(self.name, self.make)
+        return self.family.run(make_episode(theta, agent=agent, start=start, seed=seed))  # type: ignore[no-any-return]
+
+
+def _register(name: str, make: Callable[..., Any] | None) -> None:
+    """Have Gymnasium know what makes an environment, in this process."""
+    import gymnasium
+
+    if make is not None:
+        gymnasium.registry.pop(name, None)
+        gymnasium.register(name, entry_point=make)
+
+
+def _environment(
+    given: Any, space: Space, policies: Mapping[str, Any], domain: Mapping[str, Any], home: Path
+) -> _Played:
+    """The function that plays an environment's episodes.
+
+    Raises:
+        InputError: If the environment, a parameter or a policy cannot be used.
+    """
+    from proxytune.effects import PARAMETERS
+    from proxytune.environments import gymnasium_family
+    from proxytune.settings import Section
+
+    make = None if isinstance(given, str) else given
+    name = given if make is None else f"proxytune_tune/{getattr(make, '__name__', type(make).__name__).strip('<>')}-v0"
+    _register(name, make)
+    own = {
+        one.name: {
+            "attribute" if "." in one.name else "argument": one.name,
+            "low": one.low,
+            "high": one.high,
+            "neutral": 0.5 * (one.low + one.high),
+        }
+        for one in space.intervals
+        if one.name not in PARAMETERS
+    }
+    section = Section(home / FILE_NAME, "domain.", {"environment": name, "parameters": own, **domain})
+    family = gymnasium_family(section, model=None, policies=policies)
+    return _Played(family, name, make)

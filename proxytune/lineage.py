@@ -39,7 +39,7 @@ SAME_CODE = {
     "environments": (
         "f5b9c2c9586c29cd4dc2d6e27f44fd2731ecc2d27bf96a80c745aecd5a3ddb50",
         "efd8ee20ccef978bc76d2d8a4347a02b439e79a2e68d2dd89f86ca5ae1a37343",
-        "d0cf614043116bc9f35c4ed1dc58a6e349fbaba1f17054120bc9b2a7b41acc39",
+        "c3440e9fa88c4672c69e9869d9638955f66fe73ec8721eab73c976d0ba22cbc3",
     ),
     "engine outcomes": ("94c0ba12f9bf", "169c7ef2065e"),
     "engine composite": ("82865583b592", "169c7ef2065e"),

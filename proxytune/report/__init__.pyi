@@ -54,13 +54,7 @@ from .figure_style import (
     dress as dress,
     name_lines as name_lines,
 )
-from .html import (
-    Shown as Shown,
-    fragment_html as fragment_html,
-    frame_html as frame_html,
-    page_html as page_html,
-    write_page as write_page,
-)
+from .html import Shown as Shown, frame_html as frame_html, write_page as write_page
 from .meanings import clause_of as clause_of, findings as findings, what_it_does as what_it_does
 from .plv_search import plv_document as plv_document, plv_text as plv_text, write_plv_report as write_plv_report
 from .scores import (

@@ -44,7 +44,8 @@ def test_what_was_kept_in_a_folder_is_not_simulated_again_and_more_trials_follow
     first = tuned(counted, folder=tmp_path)
     driven = len(calls)
     again = tuned(counted, folder=tmp_path, budget=5)
-    assert driven and len(calls) - driven <= 8
+    assert driven
+    assert len(calls) - driven <= 8
     assert again.trials()[:4].equals(first.trials())
     assert proxytune.read_study(tmp_path).theta == again.theta
 
@@ -61,7 +62,8 @@ def test_known_points_come_first_and_known_scores_are_not_simulated():
 
     report = tuned(counted, known=rows(near, 3, **near))
     assert report.trials().loc[1, ["gain", "drag"]].to_dict() == near
-    assert near not in driven and driven
+    assert near not in driven
+    assert driven
 
 
 def test_a_function_of_theta_and_agent_with_one_score_is_enough():
@@ -97,7 +99,8 @@ def test_what_cannot_be_used_is_one_line(options, said):
     with pytest.raises(proxytune.InputError) as caught:
         tuned(**options)
     assert said in str(caught.value)
-    assert "study.toml" not in str(caught.value) and "\n" not in str(caught.value)
+    assert "study.toml" not in str(caught.value)
+    assert "\n" not in str(caught.value)
 
 
 def test_another_function_is_refused_and_leaves_the_folder_as_it_was(tmp_path):

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 import pandas as pd
@@ -23,6 +23,7 @@ from proxytune.report import (
     Shown,
     View,
     drawn_scores,
+    ranking_document,
     score_document,
     score_sentence,
     score_view,
@@ -39,7 +40,17 @@ from proxytune.scores import (
     expand,
     read_scores,
 )
-from proxytune.usefulness import Asked, Assessment, Sequential, assess, chosen, in_common, sequential_test
+from proxytune.usefulness import (
+    Asked,
+    Assessment,
+    Selection,
+    Sequential,
+    assess,
+    chosen,
+    in_common,
+    select_proxy,
+    sequential_test,
+)
 
 LABELS = ("agent", "episode", "time")
 """What may be an index instead of a column."""
@@ -93,11 +104,10 @@ class ScoreReport(Shown, Assessment):
 
     def view(self) -> View:
         """What the page shows."""
-        pictures = [Picture(head, svg_of(figure), caption) for _, figure, head, caption in drawn_scores(self)]
-        return score_view(self._named, None, pictures, target=self.names[1])
+        return _view(self._named, None, self.names[1])
 
     @property
-    def _named(self) -> dict[str, Assessment]:
+    def _named(self) -> "dict[str, ScoreReport]":
         return {self.names[0]: self}
 
     @property
@@ -128,11 +138,70 @@ class ScoreReport(Shown, Assessment):
         return sequential_test(self.inputs, columns[0], seed=self.seed)
 
 
+@dataclass(frozen=True, repr=False)
+class Ranking(Shown):
+    """Several proxies of one target: which is better beyond noise, by PRPV, by regret and by what it saves.
+
+    Attributes:
+        proxies: Each one's report, by name.
+        selection: Ranked by PRPV.
+    """
+
+    proxies: Mapping[str, ScoreReport]
+    selection: Selection
+
+    def __getitem__(self, name: str) -> ScoreReport:
+        return self.proxies[name]
+
+    def __repr__(self) -> str:
+        return f"Ranking: {self.sentence}"
+
+    def view(self) -> View:
+        """What the page shows."""
+        return _view(self.proxies, self.selection, "target")
+
+    def figures(self) -> dict[str, Figure]:
+        """The figures of every proxy, as "scatter: NAME"."""
+        drawn = ((name, kind, figure) for name, one in self.proxies.items() for kind, figure in one.figures().items())
+        return {f"{kind}: {name}": figure for name, kind, figure in drawn}
+
+    @property
+    def sentence(self) -> str:
+        """Say which proxy is the best, and whether that is beyond noise."""
+        return score_sentence(self.proxies, self.selection, target="target")
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """Plain numbers, texts, lists and dicts under the keys of `score --json`."""
+        return ranking_document(self.proxies, self.selection)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per proxy, measure and metric: value, and the ends of its 95 % interval."""
+        return pd.concat({name: one.to_frame() for name, one in self.proxies.items()}, names=["proxy"])
+
+
+def _view(reports: Mapping[str, ScoreReport], selection: Selection | None, target: str) -> View:
+    pictures = [
+        Picture(f"{head}: {name}" if selection else head, svg_of(figure), caption)
+        for name, report in reports.items()
+        for _, figure, head, caption in drawn_scores(report)
+    ]
+    return score_view(reports, selection, pictures, target=target)
+
+
+@overload
+def score(both: Scores | None = None, /, *, proxy: Scores | None = None, **options: Any) -> ScoreReport: ...
+
+
+@overload
+def score(both: None = None, /, *, proxy: Mapping[str, Scores], **options: Any) -> Ranking: ...
+
+
 def score(
     both: Scores | None = None,
     /,
     *,
-    proxy: Scores | None = None,
+    proxy: Scores | Mapping[str, Scores] | None = None,
     target: Scores | None = None,
     metrics: str | Metric | Sequence[str | Metric] | None = None,
     beta: Mapping[str, float] | None = None,
@@ -144,13 +213,14 @@ def score(
     decide_on: str = "",
     rollouts: int | None = None,
     regret: float | None = None,
-) -> ScoreReport:
-    """Measure how useful a proxy is as a predictor, and say which agent to deploy on the target.
+) -> ScoreReport | Ranking:
+    """Measure how useful a proxy, or each of several, is as a predictor, and say which agent to deploy on the target.
 
     Args:
         both: One table of both sides, as with the columns "Sim success" and "Real success"; else name the two tables.
         proxy: One row per agent and episode, with the columns agent, episode (not needed for one row per agent) and
-            the metrics; a DataFrame, a file in any form that the command reads, or a ScoreTable.
+            the metrics; a DataFrame, a file in any form that the command reads, or a ScoreTable. Several by name, as in
+            {"one": table, "other": table}, are ranked.
         target: The same of the target. Equal episodes on both sides are the same start.
         metrics: How agents are compared, as in "distance:max" or ["distance:max:5%", "time_out_of_lane:min"], "*:max"
             for all columns; not needed for a table of both sides' success.
@@ -166,7 +236,8 @@ def score(
 
     Returns:
         Every measure: `.prpv.value`, `.srcc.value["distance"]`, `.noise_floor`, `.chance`, `.notes`; and `.decision`,
-        `.saves`, `.next`, `.figures()`, `.page()`, `.to_frame()`.
+        `.saves`, `.next`, `.figures()`, `.page()`, `.to_frame()`. Of several proxies each one's by its name, as in
+        `found["one"].prpv.value`; and `.document`, `.selection`, `.page()`, `.to_frame()`.
 
     Raises:
         ScoresError: If a table lacks an agent or a metric, with side, row and column.
@@ -178,28 +249,44 @@ def score(
         raise InputError(f"resamples must be between {FEWEST_RESAMPLES} and {MOST_RESAMPLES}, got {resamples}")
     if (both is None) == (proxy is None) or (proxy is None) != (target is None):
         raise InputError("give the proxy's and the target's scores, or one table of both sides")
-    given = [metrics] if isinstance(metrics, str | Metric) else list(metrics or ())
     names, header = ("proxy", "target") if both is None else ("sim", "real"), _header(target if both is None else both)
-    if not given:
-        given = [f"{name}:max" for name in both_metrics(header) if "success" in name]
-    compared = [Metric.parse(one) if isinstance(one, str) else one for text in given for one in _expanded(text, header)]
-    if not compared:
-        raise InputError("no metric is given; name at least one, as in 'success:max'")
+    compared = _metrics(metrics, header)
     wanted = [metric.name for metric in compared]
     if both is not None:
         check_sides(names[1], header, wanted)
-    sides = {
-        "proxy": _table(proxy if both is None else both, "proxy", wanted, columns),
-        "target": _table(target if both is None else both, "target", wanted, columns),
-    }
+    several = proxy if isinstance(proxy, Mapping) else None
+    if several is not None and (len(several) < 2 or "target" in several):
+        raise InputError("proxy: give two tables or more by their names, none of them 'target'; or one table")
+    given: Mapping[str, Any] = several or {names[0]: both if proxy is None else proxy}
+    sides = {name: _table(one, "proxy", wanted, columns) for name, one in given.items()}
+    sides["target"] = _table(target if both is None else both, "target", wanted, columns)
     if common:
         sides = dict(zip(sides, in_common(sides)[0].values(), strict=True))
     if unpaired:
         sides = {side: table.unpaired() for side, table in sides.items()}
     asked = Asked(decide_on, rollouts, regret)
-    one, other = sides["proxy"], sides["target"]
-    found = assess(proxy=one, target=other, metrics=compared, beta=beta, seed=seed, resamples=resamples, asked=asked)
-    return ScoreReport(**{one.name: getattr(found, one.name) for one in fields(Assessment)}, names=names)
+    other = sides.pop("target")
+    reports = {}
+    for name, one in sides.items():
+        found = assess(
+            proxy=one, target=other, metrics=compared, beta=beta, seed=seed, resamples=resamples, asked=asked
+        )
+        own = {each.name: getattr(found, each.name) for each in fields(Assessment)}
+        reports[name] = ScoreReport(**own, names=(name, names[1]))
+    if several is not None:
+        sampling = {"resamples": resamples, "seed": seed}
+        return Ranking(reports, select_proxy(proxies=sides, target=other, metrics=compared, **sampling))
+    return reports[names[0]]
+
+
+def _metrics(metrics: str | Metric | Sequence[str | Metric] | None, header: Sequence[str]) -> list[Metric]:
+    given = [metrics] if isinstance(metrics, str | Metric) else list(metrics or ())
+    if not given:
+        given = [f"{name}:max" for name in both_metrics(header) if "success" in name]
+    compared = [Metric.parse(one) if isinstance(one, str) else one for text in given for one in _expanded(text, header)]
+    if not compared:
+        raise InputError("no metric is given; name at least one, as in 'success:max'")
+    return compared
 
 
 def _header(scores: Scores | None) -> list[str]:

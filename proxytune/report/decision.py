@@ -17,8 +17,11 @@ from proxytune.usefulness import (
     Plan,
     Saving,
     Sequential,
+    Together,
     compare_choices,
+    compare_savings,
     mmrv_conventions,
+    use_two,
 )
 
 MOST_NAMED = 28
@@ -150,6 +153,21 @@ def decision_figure(decision: Decision) -> Figure:
     return figure
 
 
+def _saves(saving: Saving) -> dict[str, Any]:
+    return {
+        "real_rollouts_worth": saving.real_rollouts_worth,
+        "interval": list(saving.interval) if saving.interval else None,
+        "by": saving.kind,
+        "correlation": saving.correlation,
+        "real_rollouts": saving.real,
+        "simulated_rollouts": saving.simulated,
+        "saved_share": saving.saved_share,
+        "scores": {agent: {"value": mean, "interval": list(ends)} for agent, (mean, ends) in saving.means.items()},
+        "scores_alone": {agent: {"value": m, "interval": list(ends)} for agent, (m, ends) in saving.alone.items()},
+        "reason": saving.reason or None,
+    }
+
+
 def decision_document(assessment: Assessment) -> dict[str, Any]:
     """The decision and what follows from it, as plain JSON whose keys are promises."""
     decision, saving, plan = assessment.decision, assessment.saves, assessment.next
@@ -176,18 +194,7 @@ def decision_document(assessment: Assessment) -> dict[str, Any]:
             "without_task": {panel.name: _panel(panel) for panel in decision.without},
         },
         "p_exact": random.p_value if random.exact else None,
-        "saves": {
-            "real_rollouts_worth": saving.real_rollouts_worth,
-            "interval": list(saving.interval) if saving.interval else None,
-            "by": saving.kind,
-            "correlation": saving.correlation,
-            "real_rollouts": saving.real,
-            "simulated_rollouts": saving.simulated,
-            "saved_share": saving.saved_share,
-            "scores": {agent: {"value": mean, "interval": list(ends)} for agent, (mean, ends) in saving.means.items()},
-            "scores_alone": {agent: {"value": m, "interval": list(ends)} for agent, (m, ends) in saving.alone.items()},
-            "reason": saving.reason or None,
-        },
+        "saves": _saves(saving),
         "next": dict(plan.rollouts),
         "next_bound": {
             "regret": plan.bound,
@@ -209,9 +216,27 @@ def choices_document(assessments: Mapping[str, Assessment]) -> list[dict[str, An
             "difference": one.value,
             "interval": list(one.interval) if one.interval else None,
             "beyond_noise": one.beyond_noise,
+            "on": one.on,
         }
         for one in _choices(assessments)
     ]
+
+
+def together_document(assessments: Mapping[str, Assessment]) -> dict[str, Any]:
+    """What the two best proxies save together, and the agent to deploy then, as plain JSON."""
+    both = _together(assessments)
+    decision = both.decision
+    return {
+        "proxies": list(both.proxies),
+        "saves": _saves(both.saves),
+        "decision": {
+            "winner": decision.winner,
+            "probability_best": decision.probability_best,
+            "expected_regret": dict(decision.expected_regret),
+            "not_told_apart": list(decision.not_told_apart),
+            "chosen_on": decision.chosen_on,
+        },
+    }
 
 
 def choices_sentences(assessments: Mapping[str, Assessment], target: str) -> list[str]:
@@ -222,16 +247,29 @@ def choices_sentences(assessments: Mapping[str, Assessment], target: str) -> lis
         winners = _few(one.decision.observed.proxy_winners)
         lines.append(f"{name}: chooses {winners}, at an expected regret of {regret}; {saving_sentence(one.saves)}")
     for choice in _choices(assessments):
-        if choice.value > 0.0:
+        if choice.value > 0.0 or choice.on == "rollouts":
             told = {True: "beyond noise", False: "not beyond noise", None: "noise not known"}[choice.beyond_noise]
             gain = with_span(short(choice.value, 2), *(choice.interval or (None, None)))
-            lines.append(f"choosing by {choice.better} instead of {choice.worse} gains {gain} on {target}, {told}")
-    return lines
+            if choice.on == "rollouts":
+                lines.append(f"{choice.better} saves {gain} real rollouts of an agent more than {choice.worse}, {told}")
+            else:
+                lines.append(f"choosing by {choice.better} instead of {choice.worse} gains {gain} on {target}, {told}")
+    both = _together(assessments)
+    names, decision = " and ".join(both.proxies), both.decision
+    risk = f"deploy {decision.winner}, at an expected regret of {short(decision.expected_regret[decision.winner], 2)}"
+    return [*lines, f"{names} together: {saving_sentence(both.saves)}; {risk}"]
 
 
 def _choices(assessments: Mapping[str, Assessment]) -> tuple[Choice, ...]:
     first = next(iter(assessments.values()))
-    return compare_choices({name: one.inputs for name, one in assessments.items()}, first.asked, first.seed)
+    regrets = compare_choices({name: one.inputs for name, one in assessments.items()}, first.asked, first.seed)
+    return (*regrets, *compare_savings({name: one.saves for name, one in assessments.items()}))
+
+
+def _together(assessments: Mapping[str, Assessment]) -> Together:
+    first = next(iter(assessments.values()))
+    inputs, savings = ({name: getattr(one, what) for name, one in assessments.items()} for what in ("inputs", "saves"))
+    return use_two(inputs, savings, first.asked, first.seed)
 
 
 def sequential_document(found: Sequential) -> dict[str, Any]:
@@ -254,6 +292,7 @@ def _panel(panel: Panel) -> dict[str, Any]:
         "agrees": panel.agrees,
         "proxy_winners": list(panel.proxy_winners),
         "target_winners": list(panel.target_winners),
+        "expected_regret": _plain(panel.expected_regret),
     }
 
 

@@ -15,12 +15,13 @@ from proxytune.report.decision import (
     decision_figure,
     decision_sentence,
     decision_table,
+    together_document,
 )
 from proxytune.report.html import write_page
 from proxytune.report.score_figures import MOST, flipped_pairs_figure, scatter_figure
 from proxytune.report.table_files import write_csv, write_latex
 from proxytune.report.text import group_texts, note_texts, table_text
-from proxytune.report.view import Column, Foot, Picture, Table, View, columns_of
+from proxytune.report.view import Column, Foot, Paragraphs, Picture, Table, View, columns_of
 from proxytune.report.wording import listed, short, short_span, with_span
 from proxytune.report.writing import file_names, save_figure
 from proxytune.usefulness import ALL, MEASURES, PPV, PRPV, Assessment, Measure, Measured, Selection, SuccessRates
@@ -145,11 +146,16 @@ def score_view(
     """
     tables = _tables(assessments, selection, target)
     names = f"{next(iter(assessments))} as a proxy" if selection is None else f"{len(assessments)} proxies"
+    choices = (
+        ()
+        if selection is None
+        else (Paragraphs("Which proxy to choose by", tuple(choices_sentences(assessments, target))),)
+    )
     return View(
         f"{names} of {target}",
         score_sentence(assessments, selection, target=target),
         score_next_step(assessments, selection),
-        (*figures, *tables) if selection is None else (*tables, *figures),
+        (*figures, *tables) if selection is None else (*tables, *choices, *figures),
     )
 
 
@@ -357,6 +363,7 @@ def ranking_document(assessments: Assessments, selection: Selection) -> dict[str
         "proxies": [{"proxy": name, "rank": rank, **score_document(assessments[name])} for rank, (name, _) in ranked],
         "differences": differences_document(selection),
         "choices": choices_document(assessments),
+        "together": together_document(assessments),
         "cautions": list(dict.fromkeys(line for one in assessments.values() for line in one.cautions)),
         "notes": [f"no intervals of the differences: {selection.reason}"] if selection.reason else [],
     }

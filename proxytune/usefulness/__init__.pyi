@@ -31,10 +31,13 @@ from .decision import (
     Choice as Choice,
     Decision as Decision,
     Panel as Panel,
+    Together as Together,
     chosen as chosen,
     compare_choices as compare_choices,
+    compare_savings as compare_savings,
     decide as decide,
     mmrv_conventions as mmrv_conventions,
+    use_two as use_two,
 )
 from .noise import (
     Chance as Chance,

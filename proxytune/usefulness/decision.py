@@ -11,8 +11,8 @@ of a published mean alone nothing is known of its noise, and no probability is g
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -20,9 +20,9 @@ from proxytune.arrays import Floats
 from proxytune.errors import InputError
 from proxytune.scores import ROUNDING, Metric, ScoreTable
 from proxytune.settings import nearest
-from proxytune.usefulness.comparison import Comparison, by_start
+from proxytune.usefulness.comparison import Comparison, by_start, start_of
 from proxytune.usefulness.resampling import CONFIDENCE, Ends, interval
-from proxytune.usefulness.saving import Saving, effective, is_rate, rate_intervals
+from proxytune.usefulness.saving import Saving, effective, is_rate, rate_intervals, saving_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,6 +31,8 @@ DRAWS, FEWEST_DRAWS = 40_000, 1000
 MOST_DRAWN = 1_000_000
 """Draws of all agents together."""
 MOST_COMPARED, FEW_TASKS = 2000, 3
+BARELY_BEST = 0.005
+"""A regret of 0 has a probability of its own. With 2.5 % in its place, intervals of equal agents would hold 87 %."""
 PRIOR = 1.0
 """Successes and failures before the first episode: every rate is as probable as any other."""
 NO_NOISE = (
@@ -75,12 +77,14 @@ class Panel:
         proxy_winners: The agents of the highest mean in the proxy.
         target_winners: The same on the target.
         regret: The most that choosing a winner of the proxy costs by the target's means.
+        expected_regret: Of deploying each agent there; None where nothing is known of the noise.
     """
 
     name: str
     proxy_winners: tuple[str, ...]
     target_winners: tuple[str, ...]
     regret: float
+    expected_regret: Mapping[str, float] | None = None
 
     @property
     def agrees(self) -> bool | None:
@@ -171,9 +175,16 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
     parts = [(inputs.metrics[column].name, proxy[:, k], target[:, k]) for k, column in enumerate(columns)]
     if len(parts) == 1:
         parts = _parts_by_start(inputs, columns[0], float(signs[0]))
-    tasks = tuple(_panel(name, agents, one, other) for name, one, other in parts) if len(parts) > 1 else ()
-    without = tuple(_without(agents, parts, out) for out in range(len(parts))) if len(parts) > 1 else ()
-    known = draw_means(inputs.target, columns, signs, asked.rollouts, saving, np.random.default_rng(seed))
+    rng = np.random.default_rng(seed)
+    known = draw_means(inputs.target, columns, signs, asked.rollouts, saving, rng)
+    each = None if known is None else known[0]
+    if len(columns) == 1 and len(parts) > 1:
+        each = _draws_by_start(inputs.target, [name for name, _, _ in parts], columns, signs, rng)
+    places = range(len(parts) if len(parts) > 1 else 0)
+    tasks = tuple(_part(agents, parts, each, [k]) for k in places)
+    without = tuple(
+        replace(_part(agents, parts, each, [k for k in places if k != out]), name=parts[out][0]) for out in places
+    )
     if known is None:
         regrets = sides[1].max() - sides[1]
         return Decision(
@@ -182,7 +193,8 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
             not_told_apart=observed.target_winners[1:], chosen_on=chosen_on, observed=observed, tasks=tasks,
             without=without, least_told=None, basis="", scores=None, draws=None, counts=(),
         )  # fmt: skip
-    draws, counts, centre, basis = known
+    every, counts, centre, basis = known
+    draws = np.mean(every, axis=0)
     regret = draws.max(axis=1, keepdims=True) - draws
     expected, best = regret.mean(axis=0), np.bincount(draws.argmax(axis=1), minlength=len(agents)) / len(draws)
     place = int(expected.argmin())
@@ -197,7 +209,7 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
         winner=agents[place],
         probability_best=float(best[place]),
         expected_regret=dict(zip(agents, map(float, expected), strict=True)),
-        regret_interval={agent: interval(regret[:, row]) for row, agent in enumerate(agents)},
+        regret_interval={agent: _regret_ends(regret[:, row], best[row]) for row, agent in enumerate(agents)},
         best_probabilities=dict(zip(agents, map(float, best), strict=True)),
         not_told_apart=tuple(agents[row] for row in held if row != place),
         chosen_on=chosen_on,
@@ -210,6 +222,12 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
         draws=draws,
         counts=tuple(map(float, counts)),
     )
+
+
+def _regret_ends(regret: Floats, best: float) -> Ends:
+    """An agent's 95 % interval: none at all belongs to it unless the agent is very unlikely to be the best."""
+    low, high = interval(regret)
+    return (0.0 if best > BARELY_BEST else low), high
 
 
 def chosen(inputs: Comparison, decide_on: str) -> tuple[list[int], str]:
@@ -261,10 +279,31 @@ def _parts_by_start(inputs: Comparison, column: int, sign: float) -> list[tuple[
     ]
 
 
-def _without(agents: Sequence[str], parts: Sequence[tuple[str, Floats, Floats]], out: int) -> Panel:
-    rest = [part for place, part in enumerate(parts) if place != out]
-    proxy, target = np.mean([part[1] for part in rest], axis=0), np.mean([part[2] for part in rest], axis=0)
-    return _panel(parts[out][0], agents, proxy, target)
+def _draws_by_start(
+    target: ScoreTable, tasks: Sequence[str], columns: Sequence[int], signs: Floats, rng: np.random.Generator
+) -> list[Floats] | None:
+    """Draws of each agent's mean on each task; None where some task has one rollout of an agent."""
+    found = []
+    for task in tasks:
+        labels = [label for label in target.episodes if start_of(label) == task]
+        drawn = draw_means(target.arrange(agents=target.agents, episodes=labels), columns, signs, None, None, rng)
+        if drawn is None:
+            return None
+        found += drawn[0]
+    return found
+
+
+def _part(
+    agents: Sequence[str], parts: Sequence[tuple[str, Floats, Floats]], each: Sequence[Floats] | None, of: Sequence[int]
+) -> Panel:
+    """The mean over some tasks."""
+    proxy, target = np.mean([parts[k][1] for k in of], axis=0), np.mean([parts[k][2] for k in of], axis=0)
+    panel = _panel(parts[of[0]][0], agents, proxy, target)
+    if each is None:
+        return panel
+    draws = np.mean([each[k] for k in of], axis=0)
+    regrets = (draws.max(axis=1, keepdims=True) - draws).mean(axis=0)
+    return replace(panel, expected_regret=dict(zip(agents, map(float, regrets), strict=True)))
 
 
 def draw_means(
@@ -274,13 +313,13 @@ def draw_means(
     rollouts: int | None,
     saving: Saving | None,
     rng: np.random.Generator,
-) -> tuple[Floats, Floats, Floats, str] | None:
-    """Draws of each agent's true mean over these metrics, shape (draws, agents); rollouts, means, and their basis.
+) -> tuple[list[Floats], Floats, Floats, str] | None:
+    """Draws of each agent's true mean by each metric, shape (draws, agents); rollouts, means over all, and their basis.
 
     None where nothing is known of the noise of some metric.
     """
     draws = max(FEWEST_DRAWS, min(DRAWS, MOST_DRAWN // len(target.agents)))
-    total, bases = np.zeros((draws, len(target.agents))), []
+    found, bases = list[Floats](), []
     worth, centre = np.zeros((2, len(target.agents)))
     for column, sign in zip(columns, signs, strict=True):
         means, counts = target.means[:, column], target.counts.astype(np.float64)
@@ -304,11 +343,11 @@ def draw_means(
             return None
         if rectified is not None:
             basis += ", rectified by the proxy's paired starts"
-        total += sign * drawn
+        found.append(sign * drawn)
         worth += counts
         centre += sign * means
         bases.append(basis)
-    return total / len(columns), worth / len(columns), centre / len(columns), " and ".join(dict.fromkeys(bases))
+    return found, worth / len(columns), centre / len(columns), " and ".join(dict.fromkeys(bases))
 
 
 def _rates(means: Floats, counts: Floats, draws: int, rng: np.random.Generator) -> Floats:
@@ -337,19 +376,22 @@ def _means(
 
 @dataclass(frozen=True)
 class Choice:
-    """What choosing by one proxy instead of another saves on the target.
+    """What choosing by one proxy instead of another gains on the target, or saves there.
 
     Attributes:
-        better: The proxy whose winner has the lower expected regret.
+        better: The proxy whose winner has the lower expected regret, or which saves more.
         worse: The other.
-        value: Expected score on the target of the better one's winner less that of the other's.
+        value: Expected score on the target of the better one's winner less that of the other's, or real rollouts of an
+            agent that the better one saves beyond the other.
         interval: Its 95 % interval; None where nothing is known of the target's noise.
+        on: Of which of the two this is.
     """
 
     better: str
     worse: str
     value: float
     interval: Ends | None
+    on: Literal["regret", "rollouts"] = "regret"
 
     @property
     def beyond_noise(self) -> bool | None:
@@ -377,6 +419,50 @@ def compare_choices(inputs: Mapping[str, Comparison], asked: Asked, seed: int = 
             ends = interval(lead - other)
         choices.append(Choice(pair[better], pair[worse], regrets[worse] - regrets[better], ends))
     return tuple(choices)
+
+
+def compare_savings(savings: Mapping[str, Saving]) -> tuple[Choice, ...]:
+    """Compare every two proxies of one target by the real rollouts that they save, where both are known.
+
+    The interval is made of those of both (Zou 2007), as if these were independent, which they are not: it is too wide.
+    """
+    found = []
+    for pair in itertools.combinations(savings, 2):
+        better, worse = sorted(pair, key=lambda name: -(savings[name].real_rollouts_worth or 0.0))
+        (more, ends), (less, others) = ((savings[n].real_rollouts_worth, savings[n].interval) for n in (better, worse))
+        if more is None or less is None or ends is None or others is None:
+            continue
+        low = math.hypot(more - ends[0], others[1] - less)
+        high = math.hypot(ends[1] - more, less - others[0])
+        found.append(Choice(better, worse, more - less, (more - less - low, more - less + high), "rollouts"))
+    return tuple(found)
+
+
+@dataclass(frozen=True)
+class Together:
+    """Two proxies of one target that are used at once.
+
+    Attributes:
+        proxies: Those two that save most by themselves.
+        saves: What both are worth in rollouts on the target.
+        decision: The agent to deploy, the target's means being rectified by both.
+    """
+
+    proxies: tuple[str, str]
+    saves: Saving
+    decision: Decision
+
+
+def use_two(inputs: Mapping[str, Comparison], savings: Mapping[str, Saving], asked: Asked, seed: int = 0) -> Together:
+    """Rectify the target by the two proxies that save most.
+
+    Raises:
+        InputError: As in decide.
+    """
+    names = sorted(savings, key=lambda name: -(savings[name].real_rollouts_worth or 0.0))[:2]
+    one, other = (inputs[name] for name in names)
+    saves = saving_of(one, chosen(one, asked.decide_on)[0][0], other)
+    return Together((names[0], names[1]), saves, decide(one, asked, saves, seed))
 
 
 def mmrv_conventions(inputs: Comparison) -> dict[str, dict[str, float]]:

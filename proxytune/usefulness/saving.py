@@ -198,8 +198,9 @@ def _pairs(every: Sequence[Comparison], column: int) -> _Pairs | None:
     rest = [label for label in proxies[0].episodes if label in known - set(shared)]
     x = np.stack([one.arrange(agents=agents, episodes=shared + rest).values[..., column] for one in proxies])
     y = other.arrange(agents=agents, episodes=shared).values[..., column]
-    met: Flags = ~np.isnan(x).any(axis=0)
-    both, more = met[:, : len(shared)] & ~np.isnan(y), met[:, len(shared) :].sum(axis=1)
+    met: Flags = np.asarray(~np.isnan(x).any(axis=0))
+    more = met[:, len(shared) :].sum(axis=1)
+    both: Flags = met[:, : len(shared)] & ~np.isnan(y)
     if both.sum(axis=1).min() < FEWEST_PAIRS or (both.sum(axis=1) < other.counts).any():
         return None
     n = both.sum(axis=1).astype(np.float64)
@@ -248,8 +249,8 @@ def _with_ends(table: ScoreTable, column: int, means: Floats, counts: Floats) ->
     from scipy.special import stdtrit
 
     freedom = max(1.0, float(table.counts.sum() - len(table.agents)))
-    errors = np.sqrt(_variances(table, column) / counts) * stdtrit(freedom, 0.5 + CONFIDENCE / 2.0) / NORMAL
-    return _normal(table.agents, means, errors)
+    wider = float(stdtrit(freedom, 0.5 + CONFIDENCE / 2.0)) / NORMAL
+    return _normal(table.agents, means, np.asarray(wider * np.sqrt(_variances(table, column) / counts)))
 
 
 def _normal(agents: tuple[str, ...], means: Floats, errors: Floats) -> dict[str, tuple[float, Ends]]:

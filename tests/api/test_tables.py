@@ -54,6 +54,26 @@ def test_the_numbers_of_two_dataframes_are_those_of_the_command(by_command):
     assert documented(score(proxy=str(paths[0]), target=paths[1], metrics=METRICS)) == found
 
 
+def test_several_proxies_by_name_are_those_of_the_command(by_command, tmp_path, capsys):
+    proxy, target = table(1), table(2)
+    _, paths = by_command(proxy, target)
+    table(3).to_csv(tmp_path / "other.csv", index=False)
+    words = [word for metric in METRICS for word in ("--metric", metric)]
+    words += ["--proxy", str(paths[0]), "--proxy", str(tmp_path / "other.csv"), "--target", str(paths[1])]
+    assert main(["score", *words, "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    found = score(proxy={"sim": proxy, "other": table(3)}, target=target, metrics=METRICS)
+    document = json.loads(json.dumps(found.document))
+    assert document == {key: printed[key] for key in document}
+    assert document["together"]["saves"].keys() == document["proxies"][0]["saves"].keys()
+    assert found["other"].prpv.value == {one["proxy"]: one["prpv"] for one in document["proxies"]}["other"]
+    assert repr(found).startswith("Ranking: ")
+    assert "together: " in found._repr_html_()
+    assert set(found.to_frame().index.get_level_values("proxy")) == {"sim", "other"}
+    with pytest.raises(InputError, match="two tables or more"):
+        score(proxy={"sim": proxy}, target=target, metrics=METRICS)
+
+
 def test_weights_and_seed_are_those_of_the_command(by_command):
     proxy, target = table(1), table(2)
     printed, _ = by_command(proxy, target, "--beta", "distance:2", "--beta", "time:0.5", "--seed", "3")
@@ -117,7 +137,7 @@ WRONG = {
     "a word": (spoilt(distance=(0, "far")), "proxy: row 0, column 'distance': must be a finite number, got 'far'"),
     "an episode twice": (spoilt(episode=(1, 0)), "proxy: row 1: agent 'A' has episode '0' twice; number the episodes"),
     "several domains": (TWO_DOMAINS, r"proxy: has several domains; select one, as in scores\[scores.domain == 'sim'\]"),
-    "no table": ({"agent": ["A"]}, "proxy: must be a DataFrame, a CSV file or a ScoreTable, got dict"),
+    "no table": ({"agent"}, "proxy: must be a DataFrame, a CSV file or a ScoreTable, got set"),
     "no rows": (table(1).head(0), "proxy: has no rows; add one per agent and episode"),
     "no file": ("nowhere.csv", "nowhere.csv: no such file; check the path"),
 }

@@ -5,7 +5,7 @@ import pytest
 
 from proxytune.errors import InputError
 from proxytune.scores import Metric, ScoreTable
-from proxytune.usefulness import Asked, compare, decide, mmrv_conventions
+from proxytune.usefulness import Asked, compare, decide, decision, mmrv_conventions
 from proxytune.usefulness.noise import chance
 
 SUCCESS = [Metric("success")]
@@ -71,6 +71,40 @@ def test_tasks_are_averaged_and_left_out_one_at_a_time():
     assert [panel.agrees for panel in found.tasks] == [True, True, True]
     assert [panel.proxy_winners for panel in found.without] == [("b",), ("a",), ("a",)]
     assert decided(proxy, target, [Metric(name) for name in "xyz"], decide_on="y").winner == "b"
+
+
+def test_each_task_and_all_but_each_have_a_regret_of_their_own_where_rollouts_are_known():
+    target = means(["x", "y", "z"], a=(0.9, 0.0, 0.1), b=(0.1, 0.3, 0.3))
+    metrics = [Metric(name) for name in "xyz"]
+    found = decided(target, target, metrics, rollouts=50)
+    assert found.tasks[0].expected_regret["b"] == pytest.approx(0.77, abs=0.02)
+    assert found.without[0].expected_regret["a"] == pytest.approx((0.31 + 0.19) / 2 - 0.01, abs=0.03)
+    assert decided(target, target, metrics).tasks[0].expected_regret is None
+
+
+def test_tasks_by_their_starts_have_regrets_too():
+    rows = {
+        (agent, f"{task}/{place}"): {"success": float(place < done)}
+        for agent, each in {"a": (9, 2), "b": (3, 5)}.items()
+        for task, done in zip(("lift", "open"), each, strict=True)
+        for place in range(10)
+    }
+    table = ScoreTable.from_episodes(rows)
+    found = {panel.name: panel.expected_regret for panel in decided(table, table).tasks}
+    assert found["lift"]["b"] > 0.4
+    assert found["lift"]["a"] < 0.02
+    assert found["open"]["a"] == pytest.approx(0.25, abs=0.04)
+
+
+def test_the_regret_of_equal_agents_is_held_as_often_as_is_said(monkeypatch):
+    monkeypatch.setattr(decision, "DRAWS", 1000)
+    rng, held = np.random.default_rng(5), []
+    for seed in range(150):
+        values = (rng.random((4, 10)) < 0.5).astype(float)[..., None]
+        table = ScoreTable(tuple("abcd"), tuple(map(str, range(10))), ("success",), values)
+        found = decide(compare(proxy=table, target=table, metrics=SUCCESS), Asked(), None, seed)
+        held += [low <= 1e-9 for low, _ in found.regret_interval.values()]
+    assert np.mean(held) > 0.93
 
 
 def test_a_tie_in_the_proxy_is_told_and_costs_what_the_worse_costs():

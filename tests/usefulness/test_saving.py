@@ -10,7 +10,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 from decisions import decisions, paired, plans, savings, tests as looked_at, wealth_of
 
 from proxytune.scores import Metric, ScoreTable
-from proxytune.usefulness import compare, saving_of
+from proxytune.usefulness import compare, compare_savings, saving_of
 
 SUCCESS = [Metric("success")]
 RATES = [0.3, 0.5, 0.6, 0.7]
@@ -51,6 +51,45 @@ def test_the_rectified_mean_is_the_control_variate():
     dx, dy = x[:, :10] - x[:, :10].mean(1, keepdims=True), y - y.mean(1, keepdims=True)
     slope = (dx * dy).sum() / (dx**2).sum()
     assert means == pytest.approx(y.mean(1) - slope * (x[:, :10].mean(1) - x.mean(1)))
+
+
+def two_halves(real=25, simulated=200, seed=3):
+    """Two proxies that each know another half of what decides on the target."""
+    rng = np.random.default_rng(seed)
+    halves = rng.normal(size=(2, 5, simulated))
+    whole = halves.mean(axis=0)[:, :real] + 0.1 * rng.normal(size=(5, real))
+    agents, labels = tuple("abcde"), tuple(map(str, range(simulated)))
+    target = ScoreTable(agents, labels[:real], ("success",), whole[..., None])
+    proxies = [ScoreTable(agents, labels, ("success",), half[..., None]) for half in halves]
+    return [compare(proxy=proxy, target=target, metrics=SUCCESS) for proxy in proxies]
+
+
+def test_two_proxies_rectify_more_than_either_and_one_twice_no_more_than_once():
+    one, other = two_halves()
+    alone, both = saving_of(one), saving_of(one, 0, other)
+    assert both.real_rollouts_worth > 2.0 * max(alone.real_rollouts_worth, saving_of(other).real_rollouts_worth)
+    assert both.correlation == pytest.approx(0.99, abs=0.01)
+    assert saving_of(one, 0, one).rectified["success"][0] == pytest.approx(alone.rectified["success"][0])
+
+
+def test_two_proxies_that_know_nothing_are_hardly_ever_used():
+    used = 0
+    for seed in range(200):
+        one, other = two_halves(simulated=40, seed=seed)
+        target = two_halves(seed=seed + 1000)[0].target
+        pair = [compare(proxy=side.proxy, target=target, metrics=SUCCESS) for side in (one, other)]
+        used += bool(saving_of(pair[0], 0, pair[1]).rectified)
+    assert used <= 20
+
+
+def test_which_of_two_proxies_saves_more_is_told_with_an_interval_that_is_that_of_both():
+    savings = {"one": saved(0.8), "other": saved(0.0), "again": saved(0.8)}
+    found = {(one.better, one.worse): one for one in compare_savings(savings)}
+    assert found["one", "other"].beyond_noise
+    assert found["one", "again"].value == 0.0
+    assert not found["one", "again"].beyond_noise
+    low, high = found["one", "again"].interval
+    assert low == pytest.approx(-high)
 
 
 def test_without_pairs_a_model_over_agents_says_so():

@@ -197,7 +197,7 @@ def score(both: Scores | None = None, /, *, proxy: Scores | None = None, **optio
 def score(both: None = None, /, *, proxy: Mapping[str, Scores], **options: Any) -> Ranking: ...
 
 
-def score(
+def score(  # type: ignore[misc]  # the options above are those below
     both: Scores | None = None,
     /,
     *,

@@ -31,8 +31,9 @@ DRAWS, FEWEST_DRAWS = 40_000, 1000
 MOST_DRAWN = 1_000_000
 """Draws of all agents together."""
 MOST_COMPARED, FEW_TASKS = 2000, 3
-BARELY_BEST = 0.005
-"""A regret of 0 has a probability of its own. With 2.5 % in its place, intervals of equal agents would hold 87 %."""
+BARELY_BEST = 0.08
+"""By the square of the number of agents. A regret of 0 has a probability of its own: with 2.5 % for it, intervals of four
+equal agents would hold 87 %, of eight 67 %; so they hold 95 to 97 %."""
 PRIOR = 1.0
 """Successes and failures before the first episode: every rate is as probable as any other."""
 NO_NOISE = (
@@ -209,7 +210,9 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
         winner=agents[place],
         probability_best=float(best[place]),
         expected_regret=dict(zip(agents, map(float, expected), strict=True)),
-        regret_interval={agent: _regret_ends(regret[:, row], best[row]) for row, agent in enumerate(agents)},
+        regret_interval={
+            agent: _regret_ends(regret[:, row], best[row], len(agents)) for row, agent in enumerate(agents)
+        },
         best_probabilities=dict(zip(agents, map(float, best), strict=True)),
         not_told_apart=tuple(agents[row] for row in held if row != place),
         chosen_on=chosen_on,
@@ -224,10 +227,10 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
     )
 
 
-def _regret_ends(regret: Floats, best: float) -> Ends:
+def _regret_ends(regret: Floats, best: float, agents: int) -> Ends:
     """An agent's 95 % interval: none at all belongs to it unless the agent is very unlikely to be the best."""
     low, high = interval(regret)
-    return (0.0 if best > BARELY_BEST else low), high
+    return (0.0 if best > BARELY_BEST / agents**2 else low), high
 
 
 def chosen(inputs: Comparison, decide_on: str) -> tuple[list[int], str]:

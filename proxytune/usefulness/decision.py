@@ -32,8 +32,8 @@ MOST_DRAWN = 1_000_000
 """Draws of all agents together."""
 MOST_COMPARED, FEW_TASKS = 2000, 3
 BARELY_BEST = 0.08
-"""By the square of the number of agents. A regret of 0 has a probability of its own: with 2.5 % for it, intervals of four
-equal agents would hold 87 %, of eight 67 %; so they hold 95 to 97 %."""
+"""By the square of the number of agents. A regret of 0 has a probability of its own: with 2.5 % for it, intervals of
+four equal agents would hold 87 %, of eight 67 %; so they hold 95 to 97 %."""
 PRIOR = 1.0
 """Successes and failures before the first episode: every rate is as probable as any other."""
 NO_NOISE = (

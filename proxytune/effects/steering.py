@@ -252,12 +252,13 @@ def _follow(steps: Signal, start: Signal) -> Signal:
         blocks[0, ..., inside], blocks[1, ..., inside] = factor * before[0], factor * before[1] + shift
         for bound in (2, 3):
             blocks[bound, ..., inside] = np.clip(factor * before[bound] + shift, low, high)
-    values = np.empty(blocks.shape[1:])
+    values: Signal = np.empty_like(blocks[0])
     for block in range(values.shape[-2]):
         factor, shift, low, high = blocks[..., block, :]
         values[..., block, :] = np.clip(factor * start[..., None] + shift, low, high)
         start = values[..., block, -1]
-    return values.reshape(*steps.shape[1:-1], -1)[..., :length]
+    flat: Signal = values.reshape(*steps.shape[1:-1], -1)
+    return flat[..., :length]
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from proxytune.driving.episode import driving_score
 from proxytune.driving.expert import lesson_driver
 from proxytune.driving.plants import PlanarPlant, check_body
 from proxytune.driving.robot import catalogue_of, read_model_of
-from proxytune.effects import Catalogue, FilterContext, effects_from
+from proxytune.effects import Catalogue, FilterContext, effects_from, parameter_hint
 from proxytune.errors import SettingsError
 from proxytune.files import shipped
 from proxytune.settings import Section
@@ -226,3 +226,8 @@ def test_a_body_whose_front_wheels_do_not_steer_is_refused_in_a_line(tmp_path):
         (tmp_path / "mine" / file).write_text(text.replace("steer_left", "turn_left"), encoding="utf-8")
     with pytest.raises(SettingsError, match="has no joint steer_left; the front wheels of a car hang on two revolute"):
         check_body(read_robot("mine", tmp_path))
+
+
+def test_a_study_of_a_car_that_tunes_a_trim_is_told_whose_it_is(tmp_path):
+    assert parameter_hint("trim", family(tmp_path).parameters).startswith('only a robot with drive = "differential"')
+    assert parameter_hint("steering_ofset", family(tmp_path).parameters) == "did you mean 'steering_offset'?"

@@ -19,7 +19,7 @@ from floors import floor
 import proxytune
 from proxytune.cli.main import BAD_INPUT, COMMANDS, DONE, FAILED, main, parser
 from proxytune.driving import AGENTS, METRICS, UNITS, map_names
-from proxytune.effects import CATALOGUE, GROUPS
+from proxytune.effects import CAR_CATALOGUE, CATALOGUE, GROUPS
 from proxytune.files import shipped
 from proxytune.learning.settings import KEYS as TEACHING_KEYS
 from proxytune.report.diagnosis.notes import MEANINGS
@@ -191,6 +191,13 @@ def test_every_effect_and_its_parameters_are_documented(name):
     assert row, f"docs/reference/effects.md has no row for the effect '{name}'"
     assert effect.stage.value in row
     assert all(f"`{parameter.name}`" in row for parameter in effect.parameters)
+
+
+@pytest.mark.parametrize("name", [name for name, kind in CAR_CATALOGUE.items() if CATALOGUE.get(name) is not kind])
+def test_every_effect_of_a_car_and_its_parameters_are_documented(name):
+    row = next(line for line in section(DOCS["reference/effects.md"], "Of a car").splitlines() if f"| `{name}`" in line)
+    assert CAR_CATALOGUE[name].stage.value in row
+    assert all(f"`{parameter.name}`" in row for parameter in CAR_CATALOGUE[name].parameters)
 
 
 @pytest.mark.parametrize("group", GROUPS)

@@ -2,7 +2,7 @@
 
 import argparse
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NoReturn
 
@@ -12,7 +12,7 @@ from rich.text import Text
 from proxytune.cli.options import take_late
 from proxytune.cli.terminal import Answer
 from proxytune.driving import AGENTS, METRICS, lane_length, load_agent, map_names, read_robot, robot_names, shipped_map
-from proxytune.effects import DECLARED, SHIPPED
+from proxytune.effects import SHIPPED, Catalogue
 from proxytune.errors import InputError, to_install
 from proxytune.extensions import plugins
 from proxytune.report import Table, clause_of, columns_of, plain, table_text, what_it_does
@@ -59,25 +59,37 @@ def _all_of(rows: list[Row]) -> Group:
 
 
 def _effects_text() -> Group:
-    """A row per effect: what it does, and its parameters with their units."""
-    rows = []
-    for name in SHIPPED.names:
-        parameters = SHIPPED.effect(name).parameters
-        units = ", ".join(f"{one.name} [{one.unit}]" if one.unit else one.name for one in parameters)
-        rows.append((f"{name}{'*' * (name in DECLARED)}", what_it_does(name), units))
-    table = Table("", columns_of(("effect", "what it does", "parameters [unit]")), tuple(rows))
-    return Group(table_text(table), Text("* declared by default: the θ of the paper. All of one: list effects NAME"))
+    """A row per effect: what it does, and its parameters with their units; those of a car in a table of their own."""
+    tables, heads = [], columns_of(("effect", "what it does", "parameters [unit]"))
+    for catalogue, names in _known_effects().items():
+        rows = []
+        for name in names:
+            parameters = catalogue.effect(name).parameters
+            units = ", ".join(f"{one.name} [{one.unit}]" if one.unit else one.name for one in parameters)
+            rows.append((f"{name}{'*' * (name in catalogue.declared)}", what_it_does(name, catalogue), units))
+        title = "" if catalogue is SHIPPED else "Of a car, in place of those on wheels"
+        tables.append(table_text(Table(title, heads, tuple(rows))))
+    return Group(*tables, Text("* declared by default: the θ of the paper. All of one: list effects NAME"))
+
+
+def _known_effects() -> Mapping[Catalogue, Sequence[str]]:
+    """The effects by whom they are for: all of a robot on two wheels, and those that a car has otherwise or alone."""
+    cars = Catalogue(drive="ackermann")
+    own = [name for name, effect in cars.shipped.items() if SHIPPED.shipped.get(name) is not effect]
+    return {SHIPPED: SHIPPED.names, cars: own}
 
 
 def _effect_text(name: str) -> Group:
-    """All of one effect."""
-    effect = SHIPPED.effect(name)
-    lines = [f"{name}: {inspect.cleandoc(effect.__doc__ or '')}", f"\nstage: {effect.stage.value}"]
-    for theta_name, one in zip(SHIPPED.theta_names(name), effect.parameters, strict=True):
-        unit = f" {one.unit}".rstrip()
-        neutral = f"the robot's {plain(one.neutral)}" if isinstance(one.neutral, str) else f"{one.neutral:g}{unit}"
-        lines.append(f"\n{theta_name}, {one.low:g} to {one.high:g}{unit}, without effect at {neutral}")
-        lines += [f"  meaning: {clause_of(theta_name, one.name.upper())}", f"  source: {one.source}"]
+    """All of one effect, on wheels and of a car."""
+    lines = []
+    for catalogue in (one for one, names in _known_effects().items() if name in names):
+        effect, of = catalogue.effect(name), "" if catalogue is SHIPPED else "\nof a car: "
+        lines += [f"{of}{name}: {inspect.cleandoc(effect.__doc__ or '')}", f"\nstage: {effect.stage.value}"]
+        for theta_name, one in zip(catalogue.theta_names(name), effect.parameters, strict=True):
+            unit = f" {one.unit}".rstrip()
+            neutral = f"the robot's {plain(one.neutral)}" if isinstance(one.neutral, str) else f"{one.neutral:g}{unit}"
+            lines.append(f"\n{theta_name}, {one.low:g} to {one.high:g}{unit}, without effect at {neutral}")
+            lines += [f"  meaning: {clause_of(theta_name, one.name.upper())}", f"  source: {one.source}"]
     return Group(*map(Text, lines))
 
 
@@ -111,12 +123,13 @@ def _maps() -> list[Row]:
 
 def _effects() -> list[Row]:
     rows: list[Row] = []
-    for name in SHIPPED.names:
-        effect = SHIPPED.effect(name)
-        for theta_name, parameter in zip(SHIPPED.theta_names(name), effect.parameters, strict=True):
+    for catalogue, name in ((one, name) for one, names in _known_effects().items() for name in names):
+        effect = catalogue.effect(name)
+        for theta_name, parameter in zip(catalogue.theta_names(name), effect.parameters, strict=True):
             row: Row = {"effect": name, "stage": effect.stage.value, "parameter": theta_name, "unit": parameter.unit}
             row |= {"low": parameter.low, "high": parameter.high, "neutral": parameter.neutral}
-            rows.append(row | {"declared": "yes" if name in DECLARED else "", "source": parameter.source})
+            row |= {"declared": "yes" if name in catalogue.declared else "", "source": parameter.source}
+            rows.append(row | {"of": "" if catalogue is SHIPPED else "car"})
     return rows
 
 

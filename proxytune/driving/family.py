@@ -239,8 +239,8 @@ class LaneFollowing:
 
     @property
     def command_unit(self) -> str:
-        """The unit of a command: wheels are given duties."""
-        return "duty"
+        """The unit of a command: wheels are given duties, a car shares of full throttle and full lock."""
+        return "duty" if read_robot(self.robot, self.folder).drive == "differential" else "of full"
 
     @property
     def road_to_draw(self) -> Road:

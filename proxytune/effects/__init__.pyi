@@ -9,6 +9,7 @@ from .catalogue import (
     Catalogue as Catalogue,
     effect_of as effect_of,
     effects_from as effects_from,
+    parameter_hint as parameter_hint,
     problems as problems,
     theta_names as theta_names,
 )

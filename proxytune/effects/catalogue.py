@@ -297,11 +297,7 @@ class Catalogue:
 
     def hint(self, name: str) -> str:
         """A hint that ends an error line on an effect or a parameter that it does not have."""
-        effect = effect_of(name)
-        others = [drive for drive, effects in DRIVES.items() if effect in effects and effect not in self.shipped]
-        if others:
-            return f'only a robot with drive = "{others[0]}" has it, this one is "{self.drive}"'
-        return nearest(name, self.parameters if name not in self.shipped else self.theta_names(name))
+        return parameter_hint(name, self.parameters)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -360,6 +356,16 @@ class Parameters(Mapping[str, Parameter]):
 
     def __len__(self) -> int:
         return sum(1 for _ in self)
+
+
+def parameter_hint(name: str, known: Mapping[str, Parameter]) -> str:
+    """A hint that ends an error line on an effect or a parameter that is none of those known."""
+    effect = effect_of(name)
+    if isinstance(known, Parameters) and effect not in known.catalogue.shipped:
+        others = [drive for drive, effects in DRIVES.items() if effect in effects]
+        if others:
+            return f'only a robot with drive = "{others[0]}" has it, this one is "{known.catalogue.drive}"'
+    return nearest(name, known)
 
 
 SHIPPED = Catalogue()

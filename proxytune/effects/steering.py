@@ -34,7 +34,7 @@ def _steered(signal: Signal, angle: Signal) -> Signal:
 
 @dataclass(frozen=True)
 class SteeringBacklash:
-    """The linkage has play: the wheels stay where they are while the servo is within half the gap of them."""
+    """The linkage of the steering has play: the wheels stay while the servo is within half the gap of them."""
 
     gap: float
     name: ClassVar[str] = "steering_backlash"
@@ -127,7 +127,7 @@ class SteeringCurve:
 
 @dataclass(frozen=True)
 class SteeringFriction:
-    """Turned wheels brake: the motor's speed shrinks by the factor 1 − loss · |wheel angle at full lock|."""
+    """Turned wheels brake the car: the motor's speed shrinks by the factor 1 − loss · |wheel angle at full lock|."""
 
     loss: float
     name: ClassVar[str] = "steering_friction"
@@ -169,7 +169,7 @@ class RollingState(NamedTuple):
 
 @dataclass(frozen=True)
 class Rolling:
-    """The car has mass: its speed v follows the motor's u, and without throttle it rolls on.
+    """The car has mass and rolls on without throttle: its speed v follows the motor's u.
 
     dv/dt = (u − (1 − freewheel + freewheel · |u|) · v) / inertia − friction − drag · v, u and v as fractions of full
     speed. At a `freewheel` of 0 the motor holds the speed asked for and brakes as it drives; at 1 it pulls the less the
@@ -252,17 +252,18 @@ def _follow(steps: Signal, start: Signal) -> Signal:
         blocks[0, ..., inside], blocks[1, ..., inside] = factor * before[0], factor * before[1] + shift
         for bound in (2, 3):
             blocks[bound, ..., inside] = np.clip(factor * before[bound] + shift, low, high)
-    values = np.empty(blocks.shape[1:])
+    values: Signal = np.empty_like(blocks[0])
     for block in range(values.shape[-2]):
         factor, shift, low, high = blocks[..., block, :]
         values[..., block, :] = np.clip(factor * start[..., None] + shift, low, high)
         start = values[..., block, -1]
-    return values.reshape(*steps.shape[1:-1], -1)[..., :length]
+    flat: Signal = values.reshape(*steps.shape[1:-1], -1)
+    return flat[..., :length]
 
 
 @dataclass(frozen=True)
 class Tyres:
-    """Tyres slip sideways: the car turns the less the harder it corners, and its rear slides outwards.
+    """Tyres slip sideways in bends: the car turns the less the harder it corners, and its rear slides outwards.
 
     The yaw rate is divided by 1 + understeer · v²; then the lateral acceleration a = v · yaw is held back as
     tanh(slide · a) / slide, at most 1 / slide; and the rear axle slides by v · rear_slip · a.

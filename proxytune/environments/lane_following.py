@@ -28,7 +28,7 @@ from proxytune.driving import (
     lane_following,
     score_trajectory,
 )
-from proxytune.effects import Signal
+from proxytune.effects import Signal, parameter_hint
 from proxytune.errors import InputError
 from proxytune.settings import Section, nearest
 from proxytune.space import Parameter, Theta
@@ -108,7 +108,7 @@ def draw_theta(intervals: Mapping[str, ValueRange], generator: np.random.Generat
 
 def _interval(name: str, value: Any, known: Mapping[str, Parameter]) -> ValueRange:
     if name not in known:
-        raise InputError(f"theta: unknown parameter '{name}'; {nearest(name, known)}")
+        raise InputError(f"theta: unknown parameter '{name}'; {parameter_hint(name, known)}")
     parameter, ends = known[name], _numbers(value)
     if len(ends) not in (1, 2) or not all(math.isfinite(end) for end in ends):
         raise InputError(f"theta: {name} must be a finite number or [low, high], got {value!r}")

@@ -63,7 +63,8 @@ def study_skeleton(name: str, robot: Robot) -> Skeleton:
     trim = robot.catalogue.declared[0]
     values = {"name": name, "robot": robot.name, "plant": _plant(robot), "trim": trim, "pitch": f"{off:g}"}
     values |= {"pitch_low": f"{low:g}", "pitch_high": f"{high:g}"}
-    values |= {"map": "small_loop" if robot.drive == "differential" else "car_loop"}
+    on_wheels = robot.drive == "differential"
+    values |= {"map": "small_loop" if on_wheels else "car_loop", "dead_band": "0.06" if on_wheels else "0.02"}
     values |= {"trim_key": robot.catalogue.effect(trim).parameters[0].name}
     return Skeleton({part: fill(f"{part}.txt", **values) for part in ("study.toml", "truth.toml")}, commands(name))
 
@@ -138,7 +139,10 @@ CAR_GUESSES: Mapping[str, tuple[float, str]] = MappingProxyType(
         "full_speed": (2.0, "straight ahead at full throttle"),
         "mass": (1.6, "of the whole car"),
         "camera_forward": (0.20, "of the lens ahead of the rear axle"),
-        "lane_width": (0.40, "of the lanes it is to follow; shipped agents scale what they do by it"),
+        "lane_width": (
+            0.495,
+            "of the lanes it is to follow, here car_loop's: shipped agents go by it",
+        ),
         "expert_look_ahead": (0.45, "for `teach` alone"),
         "expert_speed": (0.45, "for `teach` alone"),
     }

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from proxytune.domain import DomainFamily, Episode
+from proxytune.effects import parameter_hint
 from proxytune.errors import ExtensionError, InputError, ProxytuneError
 from proxytune.extensions import ask, describe, is_users, load, place_of
 from proxytune.identity import digest, meaning_of, modules_beside
@@ -241,7 +242,7 @@ def check_bounds(
     except ExtensionError as problem:
         raise settings.error(key, str(problem)) from None
     if known is None:
-        raise settings.error(key, f"unknown parameter; {nearest(name, family.parameters)}")
+        raise settings.error(key, f"unknown parameter; {parameter_hint(name, family.parameters)}")
     if not isinstance(known, Parameter):
         kind = type(known).__name__
         raise settings.error("family", f"parameters['{name}'] of {settings.family} must be a Parameter, got {kind}")

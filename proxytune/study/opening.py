@@ -16,7 +16,6 @@ import numpy as np
 
 from proxytune.arrays import Floats
 from proxytune.domain import DomainFamily
-from proxytune.driving import catalogue_of
 from proxytune.effects import Catalogue, read_model
 from proxytune.errors import ExtensionError, InputError, ScoresError
 from proxytune.extensions import ask, load, plugins
@@ -286,7 +285,8 @@ def _engine(settings: StudySettings) -> Engine:
 
 def family_catalogue(family: DomainFamily, settings: StudySettings) -> Catalogue:
     """The effects that a study's family may have: those of its robot, a user's own from the study's folder."""
-    return catalogue_of(getattr(family, "robot", ""), settings.folder.resolve())
+    own: Catalogue | None = getattr(family.parameters, "catalogue", None)
+    return own or Catalogue(settings.folder.resolve())
 
 
 def _truth(settings: StudySettings, family: DomainFamily) -> Theta | None:

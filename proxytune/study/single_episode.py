@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.domain import DomainFamily, Episode, Recording
+from proxytune.effects import parameter_hint
 from proxytune.errors import EpisodeError, InputError, ProxytuneError
 from proxytune.extensions import describe
 from proxytune.running import run_episode
-from proxytune.settings import nearest, read_settings
+from proxytune.settings import read_settings
 from proxytune.space import Theta
 from proxytune.study.family import load_family
 from proxytune.study.settings import StudySettings
@@ -80,7 +81,7 @@ def check_episode(family: DomainFamily, agent: str, theta: Theta, start: int) ->
     for name, value in theta.items():
         known = family.parameters.get(name)
         if known is None:
-            raise InputError(f"θ: unknown parameter '{name}'; {nearest(name, family.parameters)}")
+            raise InputError(f"θ: unknown parameter '{name}'; {parameter_hint(name, family.parameters)}")
         if not known.low <= value <= known.high:
             raise InputError(f"θ: {name} must lie within [{known.low:g}, {known.high:g}], got {value:g}")
 

@@ -16,7 +16,7 @@ from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 
 from proxytune.domain import make_episode
 from proxytune.driving import AGENTS, METRICS, read_robot
-from proxytune.environments import LANE_FOLLOWING
+from proxytune.environments import CAR_LANE_FOLLOWING, LANE_FOLLOWING
 from proxytune.environments.lane_following import LaneFollowingEnv
 from proxytune.errors import EpisodeError, InputError, SettingsError
 
@@ -377,3 +377,17 @@ def test_without_gymnasium_it_says_what_to_install():
 
 def test_importing_proxytune_does_not_import_gymnasium():
     assert printed("import sys, proxytune; print('gymnasium' in sys.modules)")[0] == "False"
+
+
+@pytest.mark.slow
+def test_a_car_follows_its_lane_as_an_environment_of_its_own():
+    env = gymnasium.make(CAR_LANE_FOLLOWING, plant="planar", seconds=1.0, theta={"steering_offset": 0.05}, start=0)
+    env.reset(seed=1)
+    over, total = False, 0.0
+    while not over:
+        _, reward, terminated, over, info = env.step([0.2, -0.05])
+        total += reward
+    assert not terminated
+    assert total == pytest.approx(info["distance"])
+    assert info["distance"] > 0.2
+    env.close()

@@ -6,7 +6,7 @@ import pytest
 from proxytune.driving import BulletPlant, parse_urdf, read_body, read_robot
 from proxytune.driving.plants import check_body
 from proxytune.errors import InputError
-from proxytune.skeletons import robot_from_urdf
+from proxytune.skeletons import robot_from_urdf, robot_skeleton
 
 OTHERS = """<robot name="turtle">
   <link name="base_footprint"/>
@@ -126,3 +126,21 @@ def test_a_number_that_is_none_is_one_line(tmp_path, number, wrong):
     path.write_text(text.replace(f'xyz="{number}"', f'xyz="{wrong}"'))
     with pytest.raises(InputError, match="turtle.urdf: is no sound URDF .*; correct it"):
         robot_from_urdf("rover", path, {})
+
+
+def test_the_joints_of_a_car_are_found_and_named_and_its_wheelbase_is_read(tmp_path):
+    text = robot_skeleton("other", {"wheelbase": 0.31, "wheel_distance": 0.2}, "ackermann").files["other.urdf"]
+    renamed = {"axle": "rear_wheel_joint", "steer": "hinge", "hub": "front_wheel_joint"}
+    for name, other in renamed.items():
+        text = text.replace(f'joint name="{name}_', f'joint name="{other}_')
+    (tmp_path / "other.urdf").write_text(text, encoding="utf-8")
+    skeleton = robot_from_urdf("rover", tmp_path / "other.urdf", {}, "ackermann")
+    robot = write(tmp_path, skeleton)
+    check_body(robot)
+    assert robot.figures["wheelbase"] == pytest.approx(0.31)
+    assert "joint hinge_left is now called steer_left" in skeleton.notes
+
+
+def test_a_urdf_of_two_wheels_is_no_car(tmp_path):
+    with pytest.raises(InputError, match="a car needs two joints that steer, found none; call them steer_left and"):
+        robot_from_urdf("mine", urdf(tmp_path), {}, "ackermann")

@@ -26,7 +26,7 @@ def write(folder, figures):
 
 
 def drive(plant, robot, duties):
-    train = drivetrain(robot, effects_from(robot.theta, robot.figures))
+    train = drivetrain(robot, effects_from(robot.theta, robot.figures, robot.catalogue))
     twists, _ = train.apply(duties, train.begin(FilterContext(60.0, np.zeros(2), robot.figures)))
     with plant:
         return plant.move(twists)
@@ -73,3 +73,23 @@ def test_a_figure_that_it_does_not_have_is_refused():
 def test_the_six_figures_stand_first(tmp_path):
     write(tmp_path, {})
     assert tuple(read_settings(tmp_path / "rover" / "robot.toml").values["figures"])[:6] == SIX
+
+
+SMALL_CAR = {"wheelbase": 0.17, "wheel_distance": 0.12}
+ROAD_CAR = {"wheelbase": 2.6, "wheel_radius": 0.3, "wheel_distance": 1.5, "full_speed": 12.0, "mass": 1200.0}
+
+
+@pytest.mark.parametrize("figures", [SMALL_CAR, ROAD_CAR], ids=["small", "road"])
+def test_both_plants_drive_a_car_of_one_s_own_alike_without_touching_the_floor(tmp_path, figures):
+    (tmp_path / "rover").mkdir()
+    for name, text in robot_skeleton("rover", figures, "ackermann").files.items():
+        (tmp_path / "rover" / name).write_text(text, encoding="utf-8")
+    robot = read_robot("rover", tmp_path)
+    check_body(robot)
+    commands = np.tile((0.15, 0.5), (180, 1))
+    start = np.zeros(3)
+    with BulletPlant(robot, start, TICK_S) as bullet, PlanarPlant(start, TICK_S) as planar:
+        (poses, hit), (expected, _) = (drive(plant, robot, commands) for plant in (bullet, planar))
+    assert not hit
+    assert poses[-1, 2] == pytest.approx(expected[-1, 2], rel=0.05)
+    assert np.hypot(*(poses[-1] - expected[-1])[:2]) < 0.05 * np.hypot(*expected[-1, :2]) + 0.02

@@ -5,6 +5,7 @@ machine. Times are of the processor, best of ROUNDS; a minute is one that a robo
 multiple of its bare steps too. Code that cannot drive robots side by side drives them one after the other.
 """
 
+import importlib
 import json
 import os
 import resource
@@ -54,9 +55,12 @@ def _bare_steps() -> float:
     import numpy as np
     import pybullet
 
-    from proxytune.driving import TICK_HZ, BulletPlant, read_robot
+    from proxytune.driving import bullet
+    from proxytune.driving.episode import TICK_HZ
+    from proxytune.driving.robot import read_robot
 
-    with BulletPlant(read_robot("duckiebot"), np.array((0.9, 0.2, 0.0)), 1.0 / TICK_HZ) as plant:
+    own = getattr(bullet, "BulletPlant", None) or importlib.import_module("proxytune.driving.bullet.plant").BulletPlant
+    with own(read_robot("duckiebot"), np.array((0.9, 0.2, 0.0)), 1.0 / TICK_HZ) as plant:
         plant.move(np.tile((0.2, 0.0, 0.4), (TICK_HZ, 1)))
         begun = time.process_time()
         for _ in range(BARE_TICKS):

@@ -5,6 +5,7 @@ machine. Times are of the processor, best of ROUNDS; a minute is one that a robo
 multiple of its bare steps too. Code that cannot drive robots side by side drives them one after the other.
 """
 
+import importlib
 import json
 import os
 import resource
@@ -27,7 +28,8 @@ BARE_TICKS = 1200
 def measure(plant: str, robots: int, seconds: float) -> dict[str, float]:
     """Milliseconds of the processor's time for a robot-minute, those of Bullet's bare steps, and peak memory [MB]."""
     from proxytune.domain import make_episode
-    from proxytune.driving import AGENTS, lane_following
+    from proxytune.driving.agents import AGENTS
+    from proxytune.driving.family import lane_following
     from proxytune.settings import Section
 
     with tempfile.TemporaryDirectory() as folder:
@@ -43,7 +45,7 @@ def measure(plant: str, robots: int, seconds: float) -> dict[str, float]:
         scores = many(some) if many else [family.run(episode) for episode in some]
         return (time.process_time() - begun) / sum(one["survival_time"] for one in scores) * 6e4
 
-    drive(episodes[:1])
+    drive(episodes)  # once for what is loaded and compiled
     found = {"ms": drive(episodes), "mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0}
     return {**found, "bare": _bare_steps()} if plant == "bullet" else found
 
@@ -53,9 +55,12 @@ def _bare_steps() -> float:
     import numpy as np
     import pybullet
 
-    from proxytune.driving import TICK_HZ, BulletPlant, read_robot
+    from proxytune.driving import bullet
+    from proxytune.driving.episode import TICK_HZ
+    from proxytune.driving.robot import read_robot
 
-    with BulletPlant(read_robot("duckiebot"), np.array((0.9, 0.2, 0.0)), 1.0 / TICK_HZ) as plant:
+    own = getattr(bullet, "BulletPlant", None) or importlib.import_module("proxytune.driving.bullet.plant").BulletPlant
+    with own(read_robot("duckiebot"), np.array((0.9, 0.2, 0.0)), 1.0 / TICK_HZ) as plant:
         plant.move(np.tile((0.2, 0.0, 0.4), (TICK_HZ, 1)))
         begun = time.process_time()
         for _ in range(BARE_TICKS):

@@ -70,6 +70,9 @@ def act_together(
 
 
 def _decide(agents: Sequence[Deciding], seen: Seen, memories: Sequence[Any]) -> tuple[list[Any], list[Any]]:
+    if len(agents) == 1:
+        command, memory = _decide_alone(agents[0], seen, memories[0])
+        return [command], [memory]
     decisions = [agent.decide(memory) for agent, memory in zip(agents, memories, strict=True)]
     commands: list[Any] = [None] * len(agents)
     after: list[Any] = [None] * len(agents)
@@ -92,19 +95,23 @@ def _decide(agents: Sequence[Deciding], seen: Seen, memories: Sequence[Any]) -> 
     return commands, after
 
 
+def _decide_alone(agent: Deciding, seen: Seen, memory: Any) -> tuple[Any, Any]:
+    decision = agent.decide(memory)
+    try:
+        kind, look = next(decision)
+        while True:
+            kind, look = decision.send(seen.answer(kind, (look,), (0,))[0])
+    except StopIteration as decided:
+        return cast(tuple[Any, Any], decided.value)
+
+
 def _robot(asked: tuple[int, Kind, Any]) -> int:
     return asked[0]
 
 
 def act(self: Deciding, picture: Picture, memory: Any) -> tuple[Command, Any]:
     """The command for the newest picture, and the memory for the next."""
-    seen, decision = Seen(picture[None]), self.decide(memory)
-    try:
-        kind, look = next(decision)
-        while True:
-            kind, look = decision.send(kind(seen, (look,), (0,))[0])
-    except StopIteration as decided:
-        command, memory = decided.value
+    command, memory = _decide_alone(self, Seen(picture[None]), memory)
     return np.asarray(command, dtype=float), memory
 
 

@@ -5,6 +5,7 @@ The floor is flat, so where each pixel looks in the robot's frame is known befor
 """
 
 import functools
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
@@ -31,8 +32,9 @@ class GroundPlaneCamera:
 
     def __init__(self, figures: CameraFigures, floor: Floor) -> None:
         """Find for every pixel its point on the floor and its copy of the floor's picture."""
-        self._sky, self._table = _tabulate(figures, floor)
-        self._sky_levels = np.array(SKY * self._sky, dtype=np.uint8)
+        self._sky, table = _tabulate(figures, floor)
+        self._tables = {self._sky: table}
+        self._sky_levels = np.array(SKY * (figures.rows * figures.columns), dtype=np.uint8)
         self._origin = np.float32(floor.origin)
         self.shape = (figures.rows, figures.columns, 3)
 
@@ -44,21 +46,28 @@ class GroundPlaneCamera:
             self.develop(self.glimpse(poses[here])[:, None], _ALONE, pictures[here])
         return pictures
 
-    def glimpse(self, poses: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
-        """The levels (n, levels) that make a picture from poses (n, 3): of pixels that are not always sky."""
+    def glimpse(self, poses: NDArray[np.floating[Any]], first: int = 0) -> NDArray[np.uint8]:
+        """The levels (n, levels) that make a picture from poses (n, 3): of pixels from one on, but for the sky's."""
+        first = max(first, self._sky)
+        if first not in self._tables:
+            self._tables[first] = self._tables[self._sky].without(first - self._sky)
         places = np.empty((len(poses), 6), dtype=np.float32)
         places[:, 0] = places[:, 3] = np.cos(poses[:, 2])
         places[:, 1] = sin = np.sin(poses[:, 2])
         places[:, 2] = -sin
         places[:, 4:] = poses[:, :2]
         places[:, 4:] -= self._origin
-        return fastest(len(poses)).look_up(self._table, places).view(np.uint8)
+        return fastest(len(poses)).look_up(self._tables[first], places).view(np.uint8)
 
     def develop(self, glimpses: NDArray[np.uint8], weights: Signal, pictures: NDArray[Any]) -> None:
-        """Write weighted means of glimpses (n, times, levels) as pictures (n, rows, columns, 3), rounded if bytes."""
-        pixels = pictures.reshape(len(pictures), -1, 3)
-        pictures.reshape(len(pictures), -1)[:, : 3 * self._sky] = self._sky_levels
-        fastest(0).average(glimpses, weights, pixels[:, self._sky :])
+        """Write weighted means of glimpses (n, times, levels) as pictures (n, rows, columns, 3), rounded if bytes.
+
+        What they do not show is sky.
+        """
+        levels = pictures.reshape(len(pictures), -1)
+        first = levels.shape[1] - glimpses.shape[2] // 4 * 3
+        levels[:, :first] = self._sky_levels[:first]
+        fastest(0).average(glimpses, weights, levels)
 
 
 _ALONE = np.ones(1, dtype=np.float32)
@@ -146,14 +155,20 @@ def _ticks(context: FilterContext) -> int:
 
 
 class _Film(Protocol):
-    """Film: makes pictures of what cameras see."""
+    """Film: makes pictures of what cameras see.
+
+    Attributes:
+        partial: Whether it can show parts, and the same picture again.
+    """
+
+    partial: bool
 
     def see(self, poses: Signal) -> None:
         """Let in the poses (robots, ticks, 3) since the picture before."""
         ...
 
-    def expose(self, robots: Sequence[int]) -> NDArray[Any]:
-        """The newest pictures (n, rows, columns, 3) of the robots that are left, not yet rounded."""
+    def expose(self, robots: Sequence[int], first: int) -> NDArray[Any]:
+        """The newest pictures (n, rows, columns, 3) of the robots left, right from the first pixel on, not rounded."""
         ...
 
 
@@ -161,10 +176,10 @@ class _Averaged:
     """Each picture is a weighted mean of what the camera saw at the last ticks, which is all that blur does."""
 
     def __init__(self, camera: Renderer, weights: Signal, contexts: Sequence[FilterContext], level: Any) -> None:
-        self._glimpse = getattr(camera, "glimpse", camera.render)
+        self._glimpse = getattr(camera, "glimpse", lambda poses, first: camera.render(poses))
         self._develop = getattr(camera, "develop", _develop)
+        self.partial = len(weights) <= _ticks(contexts[0])
         self._shape = getattr(camera, "shape", None) or camera.render(contexts[0].rest[None]).shape[1:]
-        self._every = _ticks(contexts[0])
         self._weights, self._level = weights, level
         self._poses = np.repeat(np.stack([context.rest for context in contexts])[:, None], len(weights), axis=1)
         self._glimpses: dict[int, NDArray[np.uint8]] = {}
@@ -172,20 +187,24 @@ class _Averaged:
 
     def see(self, poses: Signal) -> None:
         """Keep the last poses, as many as are averaged."""
-        self._poses = np.concatenate((self._poses, poses), axis=1)[:, -len(self._weights) :]
         self._new = min(self._new + poses.shape[1], len(self._weights))
+        if poses.shape[1] < len(self._weights):
+            poses = np.concatenate((self._poses, poses), axis=1)
+        self._poses = poses[:, -len(self._weights) :]
 
-    def expose(self, robots: Sequence[int]) -> NDArray[Any]:
+    def expose(self, robots: Sequence[int], first: int) -> NDArray[Any]:
         """The means of what these robots' cameras saw; what is known from the pictures before is not looked up."""
-        new, self._new, kept = self._new, 0, self._glimpses
+        new, kept, pixel = self._new, self._glimpses, first
         pictures, self._glimpses = np.empty((len(robots), *self._shape), dtype=self._level), {}
+        if not self.partial:
+            self._new = 0
         for first in range(0, len(robots), AT_ONCE):
             here = list(robots[first : first + AT_ONCE])
-            seen = self._glimpse(self._poses[here, -new:].reshape(-1, 3))
+            seen = self._glimpse(self._poses[here, -new:].reshape(-1, 3), pixel)
             seen = seen.reshape(len(here), new, *seen.shape[1:])
             if new < len(self._weights):
                 seen = np.concatenate((np.stack([kept[robot][new:] for robot in here]), seen), axis=1)
-            if len(self._weights) > self._every:
+            if not self.partial:
                 self._glimpses.update(zip(here, seen, strict=True))
             self._develop(seen, self._weights, pictures[first : first + AT_ONCE])
         return pictures
@@ -193,6 +212,8 @@ class _Averaged:
 
 class _Mixed:
     """Effects mix each picture with those before it, one after another."""
+
+    partial = False
 
     def __init__(self, camera: Renderer, effects: Chain, contexts: Sequence[FilterContext]) -> None:
         self._camera, self._effects = camera, effects
@@ -203,7 +224,7 @@ class _Mixed:
         """Remember what is to be mixed."""
         self._waiting.append(poses)
 
-    def expose(self, robots: Sequence[int]) -> NDArray[Any]:
+    def expose(self, robots: Sequence[int], first: int) -> NDArray[Any]:
         """The last of all pictures since."""
         mixed: list[Signal] = []
         for poses in self._waiting:
@@ -243,6 +264,7 @@ class Views:
         self._waiting, self._unseen = rests[:, None], 0
         self._shown: NDArray[np.uint8] | None = None
         self._shows: list[int] = []
+        self._first = sys.maxsize if self._film.partial and not self._alone.effects else 0
         self._let_in(1)
         self.changed = True
 
@@ -258,9 +280,11 @@ class Views:
         while self._waiting.shape[1] >= self._every:
             self._let_in(self._every)
 
-    def pictures(self, robots: Sequence[int]) -> NDArray[np.uint8]:
-        """The newest pictures (n, rows, columns, 3) of some robots under way."""
-        if self._shown is None:
+    def pictures(self, robots: Sequence[int], first: int = 0) -> NDArray[np.uint8]:
+        """The newest pictures (n, rows, columns, 3) of some robots under way, right from the first pixel on."""
+        if self._shown is None or first < self._first:
+            # From then on: whoever looks at this part of a picture looks at that of the next
+            self._first = min(self._first, first)
             self._shown, self._shows = self._draw(), self._under_way
         if list(robots) == self._shows:
             return self._shown
@@ -274,7 +298,7 @@ class Views:
         self._shown = None
 
     def _draw(self) -> NDArray[np.uint8]:
-        shown = self._film.expose(self._under_way)
+        shown = self._film.expose(self._under_way, self._first)
         if self._alone.effects:
             signals, developed = shown.reshape(len(shown), 1, -1).astype(np.float32), []
             for robot, signal in zip(self._under_way, signals, strict=True):

@@ -23,12 +23,12 @@ def look_up(table: TexelTable, places: Places) -> NDArray[np.uint32]:
     return glimpses
 
 
-def average(glimpses: NDArray[np.uint8], weights: NDArray[np.float32], colours: NDArray[Any]) -> None:
-    """Write the weighted means of glimpses (n, times, levels) into colours (n, pixels, 3), rounded if bytes."""
-    if colours.dtype == np.uint8:
-        _average(glimpses, weights, colours)
+def average(glimpses: NDArray[np.uint8], weights: NDArray[np.float32], pictures: NDArray[Any]) -> None:
+    """Write weighted means of glimpses (n, times, levels) as the ends of pictures (n, 3 · pixels), rounded if bytes."""
+    if pictures.dtype == np.uint8:
+        _average(glimpses.view(np.uint32), weights, pictures)
     else:
-        texels.average(glimpses, weights, colours)
+        texels.average(glimpses, weights, pictures)
 
 
 def _find(places, plane, last, first, side, texels, glimpses):  # type: ignore[no-untyped-def]
@@ -49,22 +49,23 @@ def _find(places, plane, last, first, side, texels, glimpses):  # type: ignore[n
             glimpses[place, pixel] = texels[glimpses[place, pixel]]
 
 
-def _mix(glimpses, weights, colours):  # type: ignore[no-untyped-def]
-    sums = np.empty(glimpses.shape[2], np.float32)
-    levels = np.empty(glimpses.shape[2], np.uint8)
+def _mix(glimpses, weights, pictures):  # type: ignore[no-untyped-def]
+    pixels = glimpses.shape[2]
+    sums, first = np.empty((3, pixels), np.float32), pictures.shape[1] - 3 * pixels
     for robot in range(glimpses.shape[0]):
         sums[:] = 0.0
         for number in range(glimpses.shape[1]):
             weight = weights[number]
-            for level in range(sums.size):
-                sums[level] += weight * np.float32(glimpses[robot, number, level])
-        for level in range(sums.size):
-            levels[level] = np.uint8(np.int32(np.rint(sums[level])))
-        for pixel in range(colours.shape[1]):
             for colour in range(3):
-                colours[robot, pixel, colour] = levels[4 * pixel + colour]
+                shift = np.uint32(8 * colour)
+                for pixel in range(pixels):
+                    level = (glimpses[robot, number, pixel] >> shift) & np.uint32(255)
+                    sums[colour, pixel] += weight * np.float32(np.int32(level))
+        for pixel in range(pixels):
+            for colour in range(3):
+                pictures[robot, first + 3 * pixel + colour] = np.uint8(np.int32(np.rint(sums[colour, pixel])))
 
 
 _TABLE = "float32[:,::1], float32[::1], int32[::1], int32[::1], uint32[::1]"
 _look_up = numba.jit(f"void(float32[:,::1], {_TABLE}, uint32[:,::1])", **_compiled)(_find)
-_average = numba.jit("void(uint8[:,:,::1], float32[::1], uint8[:,:,:])", **_compiled)(_mix)
+_average = numba.jit("void(uint32[:,:,::1], float32[::1], uint8[:,::1])", **_compiled)(_mix)

@@ -14,14 +14,13 @@ from types import MappingProxyType
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxytune.arrays import Floats
 from proxytune.driving.agent import Command, Picture
 from proxytune.driving.agents import act_many, act_together
 from proxytune.driving.lane import LanePose, lane_length, lane_pose
 from proxytune.driving.optics import Renderer
-from proxytune.driving.perception import Seen
+from proxytune.driving.perception import Seen, rows_of
 from proxytune.driving.plants import Drivetrain
 from proxytune.driving.road import Road
 from proxytune.driving.robot import Robot
@@ -157,34 +156,35 @@ def begin_all(drivers: Sequence[Driver], robots: Sequence[Robot]) -> tuple[list[
     return memories, failed
 
 
+def grouped(drivers: Sequence[Driver]) -> list[list[int]]:
+    """Numbers of drivers that can be asked at once: those that say what they look at share what is found there."""
+    members: dict[Any, list[int]] = {}
+    for number, driver in enumerate(drivers):
+        if _looks(driver):
+            members.setdefault(None, []).append(number)
+        elif hasattr(driver, "act_many"):
+            members.setdefault(id(driver), []).append(number)
+    return [numbers for key, numbers in members.items() if key is None or len(numbers) > 1]
+
+
 class Shown:
-    """What drivers are shown, and which of them can answer together: kept while the pictures are the newest.
+    """What drivers are shown: kept while the pictures are the newest.
 
     Attributes:
-        seen: For each driver a picture (an array of all), or what `sees` makes of it.
+        draw: Draws the pictures; or what `sees` makes of them.
         groups: Numbers of drivers that are asked at once, and how: by what they look at, or by their own `act_many`.
     """
 
-    def __init__(self, drivers: Sequence[Driver], seen: Sequence[Any] | NDArray[np.uint8]) -> None:
-        """Group the drivers; those that say what they look at share what is found there."""
-        self.seen = seen
+    def __init__(self, drivers: Sequence[Driver], draw: Callable[[int], Any], groups: Sequence[list[int]]) -> None:
+        """Show each group its part."""
+        self.draw = draw
         self.groups: list[tuple[list[int], Callable[[list[Any]], Any]]] = []
-        if not isinstance(seen, np.ndarray):
-            return
-        members: dict[Any, list[int]] = {}
-        for number, driver in enumerate(drivers):
-            if _looks(driver):
-                members.setdefault(None, []).append(number)
-            elif hasattr(driver, "act_many"):
-                members.setdefault(id(driver), []).append(number)
-        for numbers in members.values():
-            first, last = numbers[0], numbers[-1] + 1
-            pictures = seen[first:last] if last - first == len(numbers) else seen[numbers]
+        for numbers in groups:
             of_group: list[Any] = [drivers[number] for number in numbers]
             if _looks(of_group[0]):
-                self.groups.append((numbers, functools.partial(act_together, of_group, Seen(pictures))))
-            elif len(numbers) > 1:
-                self.groups.append((numbers, functools.partial(of_group[0].act_many, pictures)))
+                self.groups.append((numbers, functools.partial(act_together, of_group, Seen(draw, rows_of(numbers)))))
+            else:
+                self.groups.append((numbers, functools.partial(of_group[0].act_many, draw(0)[rows_of(numbers)])))
 
 
 def _looks(driver: Any) -> bool:
@@ -209,9 +209,10 @@ def ask_many(
             for number, memory in zip(numbers, kept, strict=True):
                 after[number] = memory
                 del alone[number]
+    seen = shown.draw(0) if alone else None
     for number in alone:
         try:
-            commands[number], after[number] = ask(drivers[number], shown.seen[number], memories[number], time_s)
+            commands[number], after[number] = ask(drivers[number], seen[number], memories[number], time_s)
         except EpisodeError as problem:
             failed[number] = problem
     return commands, after, failed

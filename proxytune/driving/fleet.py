@@ -27,6 +27,7 @@ from proxytune.driving.episode import (
     alike,
     ask_many,
     begin_all,
+    grouped,
     measured,
     picture_only,
 )
@@ -214,10 +215,9 @@ class Rollouts:
         self.poses: Signal = np.stack([course.start[None] for course in courses])
         self.crashed: Sequence[bool] = [False] * len(courses)
 
-    @property
-    def pictures(self) -> NDArray[np.uint8]:
-        """The newest pictures (robots under way, rows, columns, 3)."""
-        shown = [band.views.pictures(band.here) for band in self._bands if band.views]
+    def pictures(self, first: int = 0) -> NDArray[np.uint8]:
+        """The newest pictures (robots under way, rows, columns, 3), right from the first pixel that is looked at on."""
+        shown = [band.views.pictures(band.here, first) for band in self._bands if band.views]
         if len(shown) == 1:
             return shown[0]
         pictures = np.empty((len(self.under_way), *shown[0].shape[1:]), dtype=np.uint8)
@@ -301,6 +301,7 @@ class _Drives:
     def __init__(self, rollouts: Rollouts, drivers: Sequence[Driver], sees: Callable[[Picture, Signal], Any]) -> None:
         self.rollouts, self.drivers, self._sees = rollouts, alike(drivers), sees
         self.results: list[Any] = [None] * len(drivers)
+        self._groups = grouped(self.drivers)
         self._by_picture = all(isinstance(driver, Pupil) for driver in drivers)
         self._memories: list[Any] = []
         self._shown: Shown | None = None
@@ -319,10 +320,11 @@ class _Drives:
         if not self.drivers or (self._by_picture and not self.rollouts.new_pictures):
             return
         if self._sees is not picture_only:
-            sights = zip(self.rollouts.pictures, self.rollouts.poses[:, -1], strict=True)
-            self._shown = Shown(self.drivers, [self._sees(*one) for one in sights])
+            sights = zip(self.rollouts.pictures(), self.rollouts.poses[:, -1], strict=True)
+            seen = [self._sees(*one) for one in sights]
+            self._shown = Shown(self.drivers, lambda first: seen, ())
         elif self._shown is None or self.rollouts.new_pictures:
-            self._shown = Shown(self.drivers, self.rollouts.pictures)
+            self._shown = Shown(self.drivers, self.rollouts.pictures, self._groups)
         self._commands, self._memories, problems = ask_many(self.drivers, self._shown, self._memories, time_s)
         self._fail(problems)
 
@@ -351,6 +353,7 @@ class _Drives:
     def _go_on(self, rows: list[int]) -> None:
         self.rollouts.keep(rows)
         self.drivers = [self.drivers[row] for row in rows]
+        self._groups = grouped(self.drivers)
         self._memories = [self._memories[row] for row in rows]
         self._commands, self._shown = self._commands[rows], None
 

@@ -75,17 +75,26 @@ def open_eye(robot: Robot, *, reach_m: float = 0.7) -> Eye:
     return _eye(robot.camera_figures(), reach_m)
 
 
+Draw = Callable[[int], NDArray[np.uint8]]
+"""Pictures (n, rows, columns, 3) that are right from the pixel of this number on."""
+
+
 class Seen:
     """The newest pictures (n, rows, columns, 3) of robots, and what has been made out in them.
 
-    Whoever asks again before there are new pictures is answered from memory.
+    Whoever asks again before there are new pictures is answered from memory. Only what is looked at is drawn.
+
     """
 
-    def __init__(self, pictures: NDArray[np.uint8]) -> None:
-        """Look at nothing yet."""
-        self.pictures = pictures
-        self._first = pictures[0].size // 3
+    def __init__(self, pictures: NDArray[np.uint8] | Draw, rows: Any = slice(None)) -> None:
+        """Look at nothing yet, but later at these rows of the pictures or of what draws them."""
+        self._pictures, self._rows = pictures, rows
+        self._first: float = math.inf
         self._known: dict[tuple[Any, ...], list[Any]] = {}
+
+    def pictures(self, first: int) -> NDArray[np.uint8]:
+        """The pictures, right from the first pixel on."""
+        return (self._pictures(first) if callable(self._pictures) else self._pictures)[self._rows]
 
     def answer(self, kind: "Kind", looks: tuple[Any, ...], robots: Sequence[int]) -> list[Any]:
         """Answer looks of one kind, each at the picture of one of these robots."""
@@ -97,17 +106,18 @@ class Seen:
     def colours(self, first: int, robots: Sequence[int]) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
         """How yellow some robots' pixels are from one of them on, and how bright, (robots, pixels), 0 to 255."""
         if first < self._first:
-            levels = self.pictures.reshape(len(self.pictures), -1)[:, 3 * first :]
+            drawn = self.pictures(first)
+            levels = drawn.reshape(len(drawn), -1)[:, 3 * first :]
             # Compared as they lie, two thirds in vain, then parted: faster than to part red and green first
             golden = np.minimum(levels[:, :-2], levels[:, 1:-1])[:, ::3].copy()
             self._bright = np.minimum(golden, levels[:, 2::3])
             self._yellow = np.subtract(golden, self._bright, out=golden)
             self._first = first
-        pixels = _rows(robots), slice(first - self._first, None)
+        pixels = rows_of(robots), slice(first - int(self._first), None)
         return self._yellow[pixels], self._bright[pixels]
 
 
-def _rows(robots: Sequence[int]) -> Any:
+def rows_of(robots: Sequence[int]) -> Any:
     """Rows of some robots, in ascending order, without a copy where they follow one another."""
     first, end = robots[0], robots[-1] + 1
     return slice(first, end) if end - first == len(robots) else list(robots)
@@ -304,7 +314,7 @@ def weigh_edges(seen: Seen, looks: tuple[tuple[Lower, float], ...], robots: Sequ
     """Sums of the pulls of edges in the lower part, where brightness steps by more (of 255), and their numbers."""
     weighed = []
     for robot, (look, step) in zip(robots, looks, strict=True):
-        grey = seen.pictures[robot, look.first_row :].astype(np.int16).sum(axis=-1) // 3
+        grey = seen.pictures(look.first)[robot, look.first_row :].astype(np.int16).sum(axis=-1) // 3
         edges = np.abs(np.diff(grey, axis=1)) > step
         weighed.append((float(np.where(edges, look.pull, 0.0).sum()), int(edges.sum())))
     return weighed
@@ -312,4 +322,5 @@ def weigh_edges(seen: Seen, looks: tuple[tuple[Lower, float], ...], robots: Sequ
 
 def take_picture(seen: Seen, looks: tuple[None, ...], robots: Sequence[int]) -> list[Picture]:
     """The pictures themselves."""
-    return [seen.pictures[robot] for robot in robots]
+    pictures = seen.pictures(0)
+    return [pictures[robot] for robot in robots]

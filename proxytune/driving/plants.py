@@ -6,6 +6,7 @@ drives it.
 """
 
 import re
+import sys
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -365,7 +366,7 @@ def integrate(start: Signal, twists: Signal, tick_s: float) -> Signal:
     headings = start[..., None, 2] + turns.cumsum(axis=-1)
     middles = headings - turns / 2.0
     half = np.pi * (turns / (2.0 * np.pi))
-    half[half == 0.0] = np.finfo(float).eps
+    half[half == 0.0] = sys.float_info.epsilon
     chord = tick_s * (np.sin(half) / half)
     forward, sideways = twists[..., 0] * chord, twists[..., 1] * chord
     cosine, sine = np.cos(middles), np.sin(middles)

@@ -41,6 +41,11 @@ class TexelTable(NamedTuple):
     side: NDArray[np.int32]
     texels: NDArray[np.uint32]
 
+    def without(self, pixels: int) -> "TexelTable":
+        """The same but for the first pixels."""
+        plane, *others = (np.ascontiguousarray(one[..., pixels:]) for one in self[:-1])
+        return TexelTable(plane, *others, self.texels)
+
 
 Places = NDArray[np.float32]
 """Robots' frames in that of the floor's picture, (n, 6): x and y of what is ahead, of what is to the left, and of the
@@ -69,21 +74,22 @@ def look_up(table: TexelTable, places: Places) -> NDArray[np.uint32]:
     return texels
 
 
-def average(glimpses: NDArray[np.uint8], weights: NDArray[np.float32], colours: NDArray[Any]) -> None:
-    """Write the weighted means of glimpses (n, times, levels) into colours (n, pixels, 3), rounded if these are bytes.
+def average(glimpses: NDArray[np.uint8], weights: NDArray[np.float32], pictures: NDArray[Any]) -> None:
+    """Write weighted means of glimpses (n, times, levels) as the ends of pictures (n, 3 · pixels), rounded if bytes.
 
     They are exact for weights as `Blur` has them.
     """
     exact = np.empty(glimpses.shape[1:], dtype=np.float32)
-    for glimpse, shown in zip(glimpses, colours, strict=True):
+    first = pictures.shape[1] - glimpses.shape[2] // 4 * 3
+    for glimpse, picture in zip(glimpses, pictures, strict=True):
         mean: NDArray[Any] = glimpse[0]
         if len(weights) > 1:
             exact[...] = glimpse
             mean = weights @ exact
-            if colours.dtype == np.uint8:
+            if pictures.dtype == np.uint8:
                 mean = np.rint(mean, out=mean).astype(np.uint8)
         for colour in range(3):  # four times as fast as one copy of [..., :3]
-            shown[:, colour] = mean[colour::4]
+            picture[first + colour :: 3] = mean[colour::4]
 
 
 class Lookup(Protocol):
@@ -93,8 +99,8 @@ class Lookup(Protocol):
         """The texels (n, pixels) that pixels show; what is beyond the floor shows its edge."""
         ...
 
-    def average(self, glimpses: NDArray[np.uint8], weights: NDArray[np.float32], colours: NDArray[Any]) -> None:
-        """Write the weighted means of glimpses (n, times, levels) into colours (n, pixels, 3), rounded if bytes."""
+    def average(self, glimpses: NDArray[np.uint8], weights: NDArray[np.float32], pictures: NDArray[Any]) -> None:
+        """Write weighted means of glimpses (n, times, levels) as the ends of pictures (n, 3 · pixels)."""
         ...
 
 

@@ -306,7 +306,7 @@ class LaneFollowingEnv(gymnasium.Env[Picture, NDArray[Any]]):
         if self.render_mode is None:
             return None
         drive = self._under_way()
-        return render(drive.rollouts.pictures[0], self.family.map, drive.tally.poses)
+        return render(drive.rollouts.pictures()[0], self.family.map, drive.tally.poses)
 
     def close(self) -> None:
         """End the plant's world; once is enough, twice does no harm."""
@@ -334,7 +334,7 @@ class LaneFollowingEnv(gymnasium.Env[Picture, NDArray[Any]]):
 
     def _picture(self) -> Picture:
         """A copy: the camera is slower than the commands, so two steps may see one picture."""
-        return np.array(self._under_way().rollouts.pictures[0])
+        return np.array(self._under_way().rollouts.pictures()[0])
 
     def _info(self) -> dict[str, Any]:
         drive = self._under_way()

@@ -231,7 +231,8 @@ def test_pictures_are_clipped_only_once_all_effects_have_met_them(tmp_path):
     assert (observed(family(tmp_path), **noisy, **bright).pictures[sky] == 255).all()
 
 
-TABLE = ground_plane.GroundPlaneCamera(CAMERA, draw_floor(shipped_map("small_loop")))._table
+TABLE = ground_plane.GroundPlaneCamera(CAMERA, draw_floor(shipped_map("small_loop")))._tables
+(TABLE,) = TABLE.values()
 NUMBERED = TABLE._replace(texels=np.arange(TABLE.texels.size, dtype=np.uint32))
 """Every texel has a colour of its own: on the road most have their neighbours'."""
 
@@ -267,7 +268,7 @@ def test_a_robot_that_is_nowhere_sees_something(compiled, wrong):
 def test_both_blur_to_the_same_picture(compiled, blur, seed):
     weights = Blur(blur).mean_weights(60.0)
     glimpses = np.random.default_rng(seed).integers(0, 256, (3, len(weights), 160), dtype=np.uint8)
-    pictures = np.empty((2, 3, 40, 3), dtype=np.uint8)
+    pictures = np.zeros((2, 3, 129), dtype=np.uint8)
     for average, colours in zip((compiled.average, plain.average), pictures, strict=True):
         average(glimpses, weights, colours)
     np.testing.assert_array_equal(*pictures)
@@ -395,6 +396,18 @@ def test_a_robots_pictures_do_not_depend_on_who_drives_beside_it(camera, effects
         expected = np.stack([alone[robot].pictures((0,))[0] for robot in robots])
         np.testing.assert_array_equal(views.pictures(robots), expected)
         np.testing.assert_array_equal(views.pictures(robots[::-2]), expected[::-2])
+
+
+@pytest.mark.parametrize("effects", [(), (Blur(0.05),), (Blur(0.15),), (Vignetting(0.4),), (RollingShutter(0.03),)])
+def test_what_is_not_looked_at_may_be_left_out_and_is_there_when_asked_for(effects):
+    part, whole = (Views(GROUND_PLANE, Chain(effects), (setting(POSES[0]),)) for _ in range(2))
+    for first in range(1, 13, 4):
+        for views in (part, whole):
+            views.pass_by(POSES[None, first : first + 4], (0,))
+        expected = whole.pictures((0,)).reshape(-1, 3)
+        seen = len(expected) * (7 if first < 9 else 5) // 10
+        np.testing.assert_array_equal(part.pictures((0,), seen).reshape(-1, 3)[seen:], expected[seen:])
+    np.testing.assert_array_equal(part.pictures((0,)).reshape(-1, 3), expected)
 
 
 def test_pictures_that_nobody_asks_for_leave_those_after_them_as_they_are():

@@ -45,7 +45,7 @@ MUCH = {2.0: Ratio(1.34, (1.2, 1.5))}
 
 
 def diagnosis(**changes):
-    plain = {"at_edge": lambda effect: ()} | {
+    plain = {"edges": (), "expected_false_names": 0.02} | {
         "log": "run",
         "verdict": "explained",
         "effects": (),
@@ -130,8 +130,13 @@ def test_a_ratio_is_told_as_what_it_adds():
 
 
 def test_a_value_at_the_end_of_its_range_is_no_physics():
-    lines = motion_notes(diagnosis(effects=(BAND,), at_edge=lambda effect: effect.names))
-    assert "beware: dead_band.width at the end of the range: it probably stands for something else" in lines
+    ends = diagnosis(effects=(BAND,), edges=BAND.names, verdict="partly explained")
+    assert "dead_band.width at the end of the range stands for something else" in motion_headline(ends)
+
+
+def test_a_name_is_told_with_how_many_false_ones_chance_adds():
+    assert "expected false names: at most 0.02" in motion_headline(diagnosis(effects=(BAND,)))
+    assert "false names" not in motion_headline(diagnosis())
 
 
 def test_beside_what_has_no_name_values_are_no_physics_yet():

@@ -26,6 +26,7 @@ from proxytune.diagnosis.motion.drives import Drives, Floats
 from proxytune.diagnosis.motion.effect_size import (
     EffectSize,
     RobotClusters,
+    drop_negligible,
     find_robot_clusters,
     invisible_effects,
     measure_effect_size,
@@ -88,6 +89,15 @@ class Bracket(NamedTuple):
     reached: float
     again: Repeated | None
 
+    @property
+    def least(self) -> float:
+        """The lower end with what repeats leave at least, in the windows that have any [m]."""
+        if self.again is None:
+            return self.lower
+        share = self.again.share
+        apart = self.again.apart * share.interval[0] / share.value
+        return max(self.lower, float(np.sqrt((1.0 - self.again.part) * self.lower**2 + self.again.part * apart**2)))
+
 
 def bracket(lower: float, reached: float, again: Repeated | None, rules: Rules = RULES) -> Bracket:
     """Bracket the error of a right model; the lower end is an estimate too, and never above what a model reached.
@@ -129,7 +139,8 @@ def _is_at_floor(after: float, floor: Bracket, unnamed: bool, rules: Rules) -> b
     if unnamed or floor.reached < rules.lowers * after:
         return False
     if floor.again is not None:
-        return floor.again.share.value >= 1.0 / rules.floor_factor and after <= rules.repeats_alike * floor.again.apart
+        repeated = after <= rules.repeats_alike * floor.again.apart and floor.upper <= rules.known_bracket * floor.least
+        return floor.again.share.value >= 1.0 / rules.floor_factor and repeated
     return floor.upper < rules.lowest_by_chance * rules.narrow_bracket * floor.lower
 
 
@@ -292,9 +303,17 @@ class Diagnosis:
 
         The effect then stands for something else.
         """
-        fitted = {name for coordinate in effect.free for name in coordinate} or set(effect.names)
-        known = [name for name in effect.names if name in fitted and name in self.theta]
-        return tuple(name for name in known if at_edge(name, self.theta[name].value, self.robot, self.rules))
+        return _at_edge(self.found.model, effect)
+
+    @property
+    def edges(self) -> tuple[str, ...]:
+        """Such parameters of all that was added."""
+        return tuple(name for effect in self.effects for name in self.at_edge(effect))
+
+    @property
+    def expected_false_names(self) -> float:
+        """The number of effects that chance adds to a model that is right, at most: a share of logs for each look."""
+        return (len(self.found.adopted) + len(self.found.negligible) + 1) * self.rules.p_value
 
     @property
     def rules(self) -> Rules:
@@ -345,6 +364,7 @@ def diagnose(
     check_units(log.name, parts.fitted, start)
     report("fitting what is declared")
     found = select_effects(fit_declared(parts.fitted, start, names), seed, report)
+    found = drop_negligible(found, seed, parts.tested)
     report("fitting to windows of prediction")
     declared_fit, before = fit_multistep(found.declared)
     # Before and after are compared on equal terms.
@@ -361,6 +381,8 @@ def diagnose(
         raise LogError(f"{log.name}: no second of unbroken poses to test on; record longer drives")
     main, unnamed = main_error(errors), bool(found.unnamed_curves) or learning.discrepancy.used
     explained = is_explained(main.after.value, main.floor, unnamed=unnamed, rules=rules)
+    # A value at an end of its range is no explanation, however small the error.
+    explained = explained and not any(_at_edge(found.model, effect) for effect in found.adopted)
     confirmed = None
     if has_body(parts.tested):
         report("confirming on the bullet plant")
@@ -395,6 +417,13 @@ def diagnose(
         drive_names=tuple(episode.name for episode in log.episodes),
         learning=learning,
     )
+
+
+def _at_edge(model: Fit, effect: AdoptedEffect) -> tuple[str, ...]:
+    fitted = {name for coordinate in effect.free for name in coordinate} or set(effect.names)
+    known = (name for name in effect.names if name in fitted and name in model.theta)
+    robot, rules = model.drives.robot, model.drives.rules
+    return tuple(name for name in known if at_edge(name, model.theta[name], robot, rules))
 
 
 def declared_effects(robot: Robot) -> tuple[str, ...]:

@@ -78,6 +78,7 @@ def motion_document(diagnosis: Diagnosis) -> dict[str, Any]:
         "verdict": diagnosis.verdict,
         "declared": {name: _estimate_document(estimate) for name, estimate in diagnosis.declared.items()},
         "effects": motion_effects(diagnosis),
+        "expected_false_names": diagnosis.expected_false_names,
         "immaterial": [_immaterial_document(effect, diagnosis) for effect in diagnosis.negligible],
         "extended": {name: _estimate_document(estimate) for name, estimate in diagnosis.theta.items()},
         "candidates": [

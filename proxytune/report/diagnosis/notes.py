@@ -29,7 +29,13 @@ AMPLE = 30.0
 
 def motion_headline(diagnosis: Diagnosis, found: str = "") -> str:
     """What was found, in the words of `meanings.findings`, then the verdict and what it means."""
-    return f"{diagnosis.log}: {told(found, diagnosis.verdict)}: {MEANINGS[diagnosis.verdict]}"
+    meaning = MEANINGS[diagnosis.verdict]
+    if diagnosis.edges:
+        end = f"{listed(diagnosis.edges)} at the end of the range"
+        rest = "" if diagnosis.verdict == "partly explained" else f"; {meaning}"
+        meaning = f"{end} stands for something else, which no named effect explains{rest}"
+    sure = f" (expected false names: at most {diagnosis.expected_false_names:.2f})" if diagnosis.effects else ""
+    return f"{diagnosis.log}: {told(found, diagnosis.verdict)}: {meaning}{sure}"
 
 
 def told(found: str, verdict: str) -> str:
@@ -84,6 +90,8 @@ def _say_immaterial(effect: AdoptedEffect, diagnosis: Diagnosis) -> str:
     horizon = decisive(worth)
     value, _ = per_cent(worth[horizon])
     kind = "not shown to matter" if may_matter(worth, diagnosis.rules.material_factor) else "detectable but immaterial"
+    if worth[horizon].interval[0] > 1.0:
+        kind = "left out, for it is not shown to matter on the drives that were fitted, if on those kept aside"
     dropped = (one for name, one in diagnosis.dropped_values.items() if name in effect.names)
     values = "".join(f" {one.value:.3g} {one.unit}".rstrip() for one in dropped)
     change = f"changes the error at {horizon:g} s by {fixed(value, 1)} % ({_ends(worth[horizon], 1)})"
@@ -104,8 +112,7 @@ def _ends(one: Ratio, decimals: int) -> str:
 
 
 def _cautions(diagnosis: Diagnosis) -> list[str]:
-    edges = [name for effect in diagnosis.effects for name in diagnosis.at_edge(effect)]
-    lines = [f"beware: {listed(edges)} at the end of the range: it probably stands for something else"] if edges else []
+    lines = []
     if diagnosis.verdict == "partly explained":
         lines.append("beware: added effects may stand in for what is still unnamed: their values are no physics yet")
     worse = [f"{error.horizon_s:g} s" for error in diagnosis.errors if error.ratio.interval[0] > 1.0]

@@ -35,6 +35,7 @@ from proxytune.diagnosis.motion.evidence import AdoptedEffect, DroppedEffect, Fi
 from proxytune.diagnosis.motion.fitting import Fit, check_motion, check_units, intervals
 from proxytune.diagnosis.motion.innovations import Noise, at_edge
 from proxytune.diagnosis.motion.manoeuvres import Manoeuvre, next_manoeuvre
+from proxytune.diagnosis.motion.moments import Period, find_period
 from proxytune.diagnosis.motion.multistep_fit import (
     HORIZONS_S,
     MultistepFit,
@@ -68,6 +69,9 @@ from proxytune.space import Theta
 
 CONFIRMED_S = 2.0
 """The horizon at which errors are confirmed on the bullet plant."""
+
+PERIODIC = "time, again and again"
+"""What a remainder with a period is said to depend on."""
 
 MAIN_S = 2.0
 """The horizon of the one error that stands for all."""
@@ -266,6 +270,7 @@ class Diagnosis:
         robot_clusters: Two groups that the drives fall in as if of two robots, by number, or None.
         drive_names: Names of the log's drives.
         learning: What was learnt beside the named effects, and what that is worth.
+        period: What slows the robot down again and again, None where nothing does; no model has it.
     """
 
     log: str
@@ -288,6 +293,7 @@ class Diagnosis:
     robot_clusters: RobotClusters | None
     drive_names: tuple[str, ...]
     learning: Learning
+    period: Period | None = None
 
     @property
     def dropped_values(self) -> dict[str, Estimate]:
@@ -379,7 +385,9 @@ def diagnose(
     errors = tuple(error for h in HORIZONS_S if (error := horizon_error(found, tested, h, learning.theta)) is not None)
     if not errors:
         raise LogError(f"{log.name}: no second of unbroken poses to test on; record longer drives")
-    main, unnamed = main_error(errors), bool(found.unnamed_curves) or learning.discrepancy.used
+    period = find_period(parts.fitted, found.model.theta)
+    main = main_error(errors)
+    unnamed = bool(found.unnamed_curves) or learning.discrepancy.used or period is not None
     explained = is_explained(main.after.value, main.floor, unnamed=unnamed, rules=rules)
     # A value at an end of its range is no explanation, however small the error.
     explained = explained and not any(_at_edge(found.model, effect) for effect in found.adopted)
@@ -405,7 +413,9 @@ def diagnose(
             for effect, model_with, _ in weighed
         },
         multistep=after,
-        residual_depends_on=learning.depends_on(curve.group.name for curve in found.unnamed_curves),
+        residual_depends_on=learning.depends_on(
+            [*([PERIODIC] if period else []), *(curve.group.name for curve in found.unnamed_curves)]
+        ),
         errors=errors,
         confirmed=confirmed,
         could_not_be_seen=invisible_effects(found.model, seen),
@@ -416,6 +426,7 @@ def diagnose(
         robot_clusters=find_robot_clusters(cut_into_blocks(every), found.model),
         drive_names=tuple(episode.name for episode in log.episodes),
         learning=learning,
+        period=period,
     )
 
 

@@ -88,6 +88,7 @@ def motion_document(diagnosis: Diagnosis) -> dict[str, Any]:
         "signals": [{"name": curve.group.name, "held_out_gain": curve.gain} for curve in diagnosis.found.curves],
         "residual_depends_on": list(diagnosis.residual_depends_on),
         "error": _error_document(main_error(diagnosis.errors)),
+        "periodic": diagnosis.period and diagnosis.period._asdict(),
         "learnt": learnt_document(diagnosis.learning),
         "errors": [_error_document(error) for error in diagnosis.errors],
         "error_on_bullet": _error_document(diagnosis.confirmed) if diagnosis.confirmed else None,

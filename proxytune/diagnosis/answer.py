@@ -158,6 +158,10 @@ class Rules:
     narrow_bracket: float = 1.5
     """All is explained only within a bracket of the floor whose upper end is at most so many times its lower one."""
 
+    known_bracket: float = 3.0
+    """Repeated drives explain all only where they leave the floor's ends no further apart than this: a wider bracket
+    knows nothing."""
+
     lowest_by_chance: float = 1.03
     """The lowest of several errors is by chance lower than that of the right model, by no more than this factor."""
 

@@ -27,6 +27,7 @@ class AskedMotion(NamedTuple):
         seconds: Since the start [s].
         use: Integral of the mean wheel speed's size, as a fraction of full speed, since the start [min].
         heading: Heading [rad].
+        place: Place on the floor [m] (…, time, 2).
         bands: Of each wheel's speed, the part between neighbouring low-passes [m/s] (2, …, time, time constants).
         loads: Low-passes of the mean wheel speed's size, as a fraction of full speed (…, time, time constants).
         rolled: How far each wheel, and the robot, has gone since it last turned the other way [m] (3, …, time).
@@ -41,6 +42,7 @@ class AskedMotion(NamedTuple):
     seconds: Signal
     use: Signal
     heading: Signal
+    place: Signal
     bands: Signal
     loads: Signal
     rolled: Signal
@@ -48,6 +50,9 @@ class AskedMotion(NamedTuple):
     rings: Signal
     played: Signal
 
+
+WIDEST_MESH_M = 2.0
+"""The knots of a map of the floor lie on a lattice, no wider than this."""
 
 STANDS = 0.1
 """A wheel is to stand where it is asked to go slower than this share of its speed of late."""
@@ -71,9 +76,22 @@ def grid(asked: AskedMotion, knots: Knots) -> Signal:
     return np.asarray(parts[0] * parts[1])
 
 
+def floor_map(asked: AskedMotion, knots: Knots) -> Signal:
+    """Products of hats over x and y (…, knots): each 1 at its knot, 0 a mesh away from it, so 0 where no knot is."""
+    places = np.asarray(knots, dtype=float)
+    gaps = np.diff(np.sort(places, axis=0), axis=0)
+    mesh = float(gaps[gaps > 0.0].min(initial=WIDEST_MESH_M))
+    return np.asarray(np.maximum(0.0, 1.0 - np.abs(asked.place[..., None, :] - places) / mesh).prod(axis=-1))
+
+
 def sign(asked: AskedMotion, wheel: int) -> Signal:
     """Sign of a wheel's speed: from −1 to 1, 0 where it stands (…, time, 1)."""
     return np.asarray(np.clip(asked.wheels[wheel][..., None] / REST_SPEED, -1.0, 1.0))
+
+
+def fast(asked: AskedMotion, wheel: int) -> Signal:
+    """Size of a wheel's speed (…, time, 1)."""
+    return np.abs(asked.wheels[wheel])[..., None]
 
 
 def moving(asked: AskedMotion) -> Signal:
@@ -167,13 +185,16 @@ def _of_wheels(unit: str, basis: Callable[[AskedMotion, Knots, int], Signal]) ->
 LEVEL = "level"
 """The one group that is no curve: beside others it takes back what fitted gains and trim have taken of theirs."""
 
-HEADING = "heading"
-"""The one group that looks at where the robot points."""
+HEADING, PLACE = "heading", "place"
+"""The groups that look at where the robot points, and at where it is."""
 
 GROUPS: Mapping[str, Group] = MappingProxyType(
     {
         LEVEL: Group("level", "at all speeds", _of_wheels("of its speed", level), 1e-3),
         "wheel_speed": Group("wheel speed", "m/s", _of_wheels("m/s", lambda a, k, wheel: hats(a.wheels[wheel], k))),
+        "other_wheel": Group(
+            "speed of the other wheel", "m/s", _of_wheels("m/s", lambda a, k, wheel: hats(a.wheels[1 - wheel], k))
+        ),
         "turn_rate": Group(
             "turn rate",
             "rad/s",
@@ -201,6 +222,19 @@ GROUPS: Mapping[str, Group] = MappingProxyType(
                 "right_slowing": Channel("right", "of the change", lambda a, k: slowing(a, k, 1)),
                 "left_stopping": Channel("left", "of the change", lambda a, k: stopping(a, k, 0)),
                 "right_stopping": Channel("right", "of the change", lambda a, k: stopping(a, k, 1)),
+            },
+            1e-3,
+        ),
+        "changes": Group(
+            "changes of either wheel's speed, by speed and direction",
+            "s",
+            {
+                "left_fast": Channel("left", "s/m of the change", lambda a, k: a.bands[0] * fast(a, 0)),
+                "right_fast": Channel("right", "s/m of the change", lambda a, k: a.bands[1] * fast(a, 1)),
+                "left_backwards": Channel("left", "of the change", lambda a, k: a.bands[0] * (sign(a, 0) < 0.0)),
+                "right_backwards": Channel("right", "of the change", lambda a, k: a.bands[1] * (sign(a, 1) < 0.0)),
+                "left_crossed": Channel("left", "of the change", lambda a, k: a.bands[1]),
+                "right_crossed": Channel("right", "of the change", lambda a, k: a.bands[0]),
             },
             1e-3,
         ),
@@ -277,10 +311,19 @@ GROUPS: Mapping[str, Group] = MappingProxyType(
             },
             1.0,
         ),
+        PLACE: Group(
+            "place on the floor",
+            "m, m",
+            {
+                "forward": Channel("forward", "of the speed", lambda a, k: floor_map(a, k) * a.forward[..., None]),
+                "yaw": Channel("yaw", "of the yaw rate", lambda a, k: floor_map(a, k) * a.yaw[..., None]),
+                "veer": Channel("yaw", "rad/m", lambda a, k: floor_map(a, k) * a.forward[..., None]),
+            },
+        ),
     }
 )
-"""Every group that a learnt effect can have. Where the robot is and how its wheels are turned are no groups: a study's
-proxy starts elsewhere than the drives did, and its wheels at another angle."""
+"""Every group that a learnt effect can have. A map of the floor is 0 where the drives were not. How wheels are turned
+is no group: a study's start at another angle."""
 
 
 DAMPING = 0.25

@@ -15,6 +15,7 @@ from proxytune.effects.effect import DeadReckoning, FilterContext, Signal, Stage
 from proxytune.effects.features import (
     GROUPS,
     HEADING,
+    PLACE,
     AskedMotion,
     Group,
     Knot,
@@ -25,7 +26,7 @@ from proxytune.effects.features import (
     rings,
     rolled_since,
 )
-from proxytune.effects.motion import REST_SPEED
+from proxytune.effects.motion import REST_SPEED, PoseReckoning, pose_after, start_poses
 from proxytune.errors import SettingsError
 from proxytune.settings import Section, nearest
 from proxytune.space import Parameter, Theta
@@ -62,6 +63,7 @@ class LearntState(NamedTuple):
         ring: Swings of each wheel's speed, complex (2, …, frequencies).
         dragged: Each wheel's speed through plays (2, …, widths).
         bearing: The heading, and headings that are known beforehand.
+        spot: The pose, and poses that are known beforehand.
         rate_hz: Samples per second.
         baseline: The robot's effective baseline [m].
         full_speed: The robot's full speed [m/s].
@@ -77,6 +79,7 @@ class LearntState(NamedTuple):
     ring: Signal
     dragged: Signal
     bearing: DeadReckoning
+    spot: PoseReckoning
     rate_hz: float
     baseline: float
     full_speed: float
@@ -106,7 +109,7 @@ class Learnt:
     def begin(self, context: FilterContext) -> LearntState:
         """At rest, unused."""
         batch = np.shape(context.rest)[:-1]
-        slow = np.zeros((2, *batch, len(self._constants("transients"))))
+        slow = np.zeros((2, *batch, len(self._bands)))
         load = np.zeros((*batch, len(self._constants("load"))))
         nominal = context.nominal
         figures = (context.rate_hz, track_of(nominal), nominal["full_speed"])
@@ -121,36 +124,52 @@ class Learnt:
             np.zeros((2, *batch, len(self._constants("ringing"))), dtype=complex),
             np.zeros((2, *batch, len(self._constants("play")))),
             start_reckoning(context.headings, context),
+            start_poses(context),
             *figures,
         )
 
     def apply(self, signal: Signal, memory: LearntState) -> tuple[Signal, LearntState]:
         """Add what the curves say."""
         asked, after = self._asked(signal, memory)
-        moved = signal + self._added(asked, memory.baseline, of_heading=False)
-        if self._constants(HEADING):
-            moved, onwards = self._bent(moved, asked, memory)
-            after = after._replace(bearing=onwards)
+        moved = signal + self._added(asked, memory.baseline, of_pose=False)
+        if self._constants(HEADING) or self._constants(PLACE):
+            moved, bearing, spot = self._bent(moved, asked, memory)
+            after = after._replace(bearing=bearing, spot=spot)
         return moved, after
 
-    def _bent(self, moved: Signal, asked: AskedMotion, memory: LearntState) -> tuple[Signal, DeadReckoning]:
-        """The motion with what depends on the heading: sample by sample where that leads to another heading."""
-        bearing, length = memory.bearing, moved.shape[-2]
-        at_once = bearing.values.shape[-1] - bearing.next >= length or not self._turns_by_heading
-        out = []
-        for begin in range(0, length, length if at_once else 1):
-            here = slice(begin, length if at_once else begin + 1)
+    def _bent(
+        self, moved: Signal, asked: AskedMotion, memory: LearntState
+    ) -> tuple[Signal, DeadReckoning, PoseReckoning]:
+        """The motion with what depends on the pose: sample by sample where that leads to another pose."""
+        bearing, spot, length = memory.bearing, memory.spot, moved.shape[-2]
+        known = bearing.values.shape[-1] - bearing.next >= length or not self._turns_by_heading
+        there = not self._constants(PLACE) or spot.known.shape[-2] - spot.next >= length
+        step, out = length if known and there else 1, []
+        for begin in range(0, length, step):
+            here = slice(begin, begin + step)
             course, _ = reckon(moved[..., here, 2], bearing)
-            there = asked._replace(forward=asked.forward[..., here], yaw=asked.yaw[..., here], heading=course)
-            out.append(moved[..., here, :] + self._added(there, memory.baseline, of_heading=True))
+            given = spot.known[..., spot.next : spot.next + step, :]
+            poses = given if given.shape[-2] else spot.pose[..., None, :]
+            now = asked._replace(
+                forward=asked.forward[..., here], yaw=asked.yaw[..., here], heading=course, place=poses[..., :2]
+            )
+            out.append(moved[..., here, :] + self._added(now, memory.baseline, of_pose=True))
             _, bearing = reckon(out[-1][..., 2], bearing)
-        return np.concatenate(out, axis=-2), bearing
+            spot = spot._replace(
+                next=spot.next + step, pose=pose_after(poses[..., -1, :], out[-1][..., -1, :] / memory.rate_hz)
+            )
+        return np.concatenate(out, axis=-2), bearing, spot
 
     @property
     def _turns_by_heading(self) -> bool:
         return any(
             curve.group == HEADING and GROUPS[HEADING].channels[curve.channel].to == "yaw" for curve in self.curves
         )
+
+    @property
+    def _bands(self) -> Knots:
+        """The time constants of changes: both groups over them have the same."""
+        return self._constants("transients") or self._constants("changes")
 
     def recall(self, context: FilterContext, signal: Signal, row: Signal, sample: Signal) -> LearntState:
         """The memory as of given samples of longer signals: the past of windows that begin amid drives.
@@ -189,14 +208,24 @@ class Learnt:
         """
         asked, _ = self._asked(signal, memory)
         course, _ = reckon(signal[..., 2], memory.bearing)
-        asked = asked._replace(heading=course)
+        asked = asked._replace(heading=course, place=self._places(signal, course, memory.spot))
         channels = [(curve, GROUPS[curve.group].channels[curve.channel]) for curve in self.curves]
         return [(one.basis(asked, curve.knots), _direction(one.to, memory.baseline)) for curve, one in channels]
 
-    def _added(self, asked: AskedMotion, baseline: float, *, of_heading: bool) -> Signal:
+    def _places(self, signal: Signal, course: Signal, spot: PoseReckoning) -> Signal:
+        """Places at the start of each sample (…, time, 2): known ones, and beyond them where the motion leads."""
+        given = spot.known[..., spot.next : spot.next + signal.shape[-2], :]
+        first = given if given.shape[-2] else spot.pose[..., None, :]
+        beyond = slice(first.shape[-2] - 1, signal.shape[-2] - 1)
+        ahead = course[..., beyond]
+        origin = np.stack((np.zeros_like(ahead), np.zeros_like(ahead), ahead), axis=-1)
+        way = pose_after(origin, signal[..., beyond, :] / spot.rate_hz)[..., :2]
+        return np.concatenate((first[..., :2], first[..., -1:, :2] + way.cumsum(axis=-2)), axis=-2)
+
+    def _added(self, asked: AskedMotion, baseline: float, *, of_pose: bool) -> Signal:
         added = np.zeros((*asked.forward.shape, 3))
         for curve in self.curves:
-            if (curve.group == HEADING) == of_heading:
+            if (curve.group in (HEADING, PLACE)) == of_pose:
                 channel = GROUPS[curve.group].channels[curve.channel]
                 amount = channel.basis(asked, curve.knots) @ np.asarray(curve.weights)
                 added += amount[..., None] * _direction(channel.to, baseline)
@@ -214,7 +243,7 @@ class Learnt:
         effort = np.abs(wheels).mean(axis=0) / past.full_speed
         seconds = past.seconds[..., None] + np.arange(1, forward.shape[-1] + 1) / past.rate_hz
         use = past.use[..., None] + np.cumsum(effort, axis=-1) / (60.0 * past.rate_hz)
-        slow = low_passes(wheels, past.slow, self._constants("transients"), past.rate_hz)
+        slow = low_passes(wheels, past.slow, self._bands, past.rate_hz)
         load = low_passes(effort, past.load, self._constants("load"), past.rate_hz)
         bands = -np.diff(slow, axis=-1, prepend=wheels[..., None])
         rolled = rolled_since(np.stack((*wheels, forward)), past.rolled, past.rate_hz)
@@ -224,7 +253,9 @@ class Learnt:
         played = play(wheels, past.dragged, self._constants("play"))
         after = past._replace(seconds=seconds[..., -1], use=use[..., -1], slow=slow[..., -1, :], load=load[..., -1, :])
         of_wheels = (bands, load, rolled, started, ringing, played)
-        asked = AskedMotion(forward, yaw, wheels, seconds, use, np.zeros_like(yaw), *of_wheels)
+        asked = AskedMotion(
+            forward, yaw, wheels, seconds, use, np.zeros_like(yaw), np.zeros((*yaw.shape, 2)), *of_wheels
+        )
         after = after._replace(rolled=rolled[..., -1], started=started[..., -1], last=wheels[..., -1])
         return asked, after._replace(ring=ringing[..., -1, :], dragged=played[..., -1, :])
 
@@ -358,6 +389,9 @@ def _checked(seen: FittedRange, curves: list[LearntCurve], problem: Callable[[st
         other = next(one for one in curves if one.group == curve.group)
         if other.knots != curve.knots:
             raise problem(where, f"must have the same knots as {other.group}.{other.channel}: one weight for each")
+    bands = {curve.knots for curve in curves if curve.group in ("transients", "changes")}
+    if len(bands) > 1:
+        raise problem("changes.knots", "must be those of transients")
     order = {(group, channel): None for group, one in GROUPS.items() for channel in one.channels}
     places = list(order)
     return Learnt(seen, tuple(sorted(curves, key=lambda curve: places.index((curve.group, curve.channel)))))

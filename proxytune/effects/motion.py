@@ -249,6 +249,16 @@ class PoseReckoning(NamedTuple):
     rate_hz: float
 
 
+def start_poses(context: FilterContext) -> PoseReckoning:
+    """Poses known beforehand, as far as both their places and their headings are."""
+    places, headings = np.asarray(context.places, dtype=float), np.asarray(context.headings, dtype=float)
+    count = min(places.shape[-2], headings.shape[-1])
+    shape = np.broadcast_shapes(places.shape[:-2], headings.shape[:-1], np.shape(context.rest)[:-1])
+    parts = (places[..., :count, 0], places[..., :count, 1], headings[..., :count])
+    known = np.stack([np.broadcast_to(part, (*shape, count)) for part in parts], axis=-1)
+    return PoseReckoning(known, 0, known[..., 0, :], context.rate_hz)
+
+
 @dataclass(frozen=True)
 class SlipperyPatch:
     """In a round part of the map the wheels slip: the robot loses a share of its motion there.
@@ -282,12 +292,7 @@ class SlipperyPatch:
 
     def begin(self, context: FilterContext) -> PoseReckoning:
         """With the poses that are known beforehand."""
-        places, headings = np.asarray(context.places, dtype=float), np.asarray(context.headings, dtype=float)
-        count = min(places.shape[-2], headings.shape[-1])
-        shape = np.broadcast_shapes(places.shape[:-2], headings.shape[:-1], np.shape(context.rest)[:-1])
-        parts = (places[..., :count, 0], places[..., :count, 1], headings[..., :count])
-        known = np.stack([np.broadcast_to(part, (*shape, count)) for part in parts], axis=-1)
-        return PoseReckoning(known, 0, known[..., 0, :], context.rate_hz)
+        return start_poses(context)
 
     def apply(self, signal: Signal, memory: PoseReckoning) -> tuple[Signal, PoseReckoning]:
         """Scale the motion by where the robot is at the start of each sample."""
@@ -300,7 +305,7 @@ class SlipperyPatch:
         for sample in range(max(0, given - 1), length):
             if sample >= given:
                 moved[..., sample, :] *= self._kept(pose)[..., None]
-            pose = _after(pose, moved[..., sample, :] / memory.rate_hz)
+            pose = pose_after(pose, moved[..., sample, :] / memory.rate_hz)
         return moved, memory._replace(next=memory.next + length, pose=pose)
 
     def _kept(self, poses: Signal) -> Signal:
@@ -309,7 +314,7 @@ class SlipperyPatch:
         return np.asarray(1.0 - self.loss * np.clip((self.radius - away) / RIM_M + 0.5, 0.0, 1.0))
 
 
-def _after(pose: Signal, motion: Signal) -> Signal:
+def pose_after(pose: Signal, motion: Signal) -> Signal:
     """The pose after a small motion in the body's frame, (…, 3) both."""
     middle = pose[..., 2] + motion[..., 2] / 2.0
     cosine, sine = np.cos(middle), np.sin(middle)

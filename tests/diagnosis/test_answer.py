@@ -91,6 +91,11 @@ def test_an_error_that_drives_do_not_repeat_is_explained():
     assert said(0.012, 0.004, repeated=KNOWN, named=False) == "nothing missing"
 
 
+def test_few_repeats_whose_scatter_leaves_the_floor_wide_explain_nothing():
+    assert said(0.012, 0.0005, repeated=KNOWN._replace(part=0.03)) == "cannot be told"
+    assert said(0.012, 0.0005, repeated=KNOWN) == "explained"
+
+
 def test_repeats_of_a_manoeuvre_that_never_meets_what_is_missing_explain_nothing():
     assert said(0.029, 0.004, repeated=KNOWN) == "cannot be told"
 

@@ -25,6 +25,7 @@ from proxytune.effects import (
     read_model,
 )
 from proxytune.effects.learnt import LABEL
+from proxytune.effects.motion import pose_after
 from proxytune.errors import SettingsError
 
 ROBOT = read_robot("duckiebot")
@@ -45,6 +46,9 @@ KNOTS = {
     "use": (0.002, 0.006),
     "load": (0.5, 4.0),
     "heading": (1.0, 2.0),
+    "other_wheel": (-0.3, 0.2, 0.5),
+    "changes": (0.04, 0.2, 1.0),
+    "place": ((-0.05, -0.05), (-0.05, 0.05), (0.05, -0.05), (0.05, 0.05), (0.15, 0.05)),
 }
 
 
@@ -66,6 +70,16 @@ def a_signal(seed, length=90):
     random = np.random.default_rng(seed)
     held = np.repeat(random.uniform(-1.0, 1.0, (length // 3, 3)), 3, axis=0)
     return held * (0.6, 0.0, 5.0)
+
+
+def integrate_twists(twists, tick_s, heading):
+    """Places before each sample and after the last, in the little steps that effects take."""
+    pose = np.array((0.0, 0.0, heading))
+    poses = [pose]
+    for twist in twists:
+        pose = pose_after(pose, twist * tick_s)
+        poses.append(pose)
+    return np.array(poses)
 
 
 def begin(effect, batch=(), headings=0.4):
@@ -140,7 +154,7 @@ def test_a_robot_that_has_not_moved_stays_where_it_is(effect):
     np.testing.assert_array_equal(run(effect, np.zeros((600, 3))), 0.0)
 
 
-@pytest.mark.parametrize("group", [group for group in GROUPS if group != "heading"])
+@pytest.mark.parametrize("group", [group for group in GROUPS if group not in ("heading", "place")])
 def test_beyond_what_was_seen_what_is_added_is_what_it_was_at_the_edge(group):
     effect, edge = effect_of(group), np.tile((SEEN.forward[1], 0.0, SEEN.yaw[0]), (90, 1))
     beyond = edge * (3.0, 0.0, 2.0)
@@ -159,7 +173,8 @@ def test_beyond_the_last_knot_of_time_or_use_a_curve_is_level(group):
 def test_features_times_weights_are_what_is_added_where_headings_are_known(effect):
     signal = a_signal(6)[None]
     known = np.linspace(0.0, 3.0, 91)
-    memory = effect.begin(FilterContext(RATE_HZ, np.zeros((1, 3)), ROBOT.figures, headings=known))
+    places = np.stack((0.1 * np.cos(known), 0.1 * np.sin(known)), axis=-1)
+    memory = effect.begin(FilterContext(RATE_HZ, np.zeros((1, 3)), ROBOT.figures, headings=known, places=places))
     parts = effect.features(signal, memory)
     total = sum(
         (basis @ np.array(curve.weights))[..., None] * unit
@@ -177,7 +192,9 @@ def test_a_window_amid_a_drive_goes_on_as_the_drive_does(effect, sample):
     whole = [run(effect, drive) for drive in drives]
     so_far = [0.4 + np.concatenate(([0.0], np.cumsum(one[:, 2]))) / RATE_HZ for one in whole]
     turned = np.array([so_far[r][sample] for r in row])
-    context = FilterContext(RATE_HZ, np.zeros((3, 3)), ROBOT.figures, headings=turned[:, None])
+    walked = [integrate_twists(one, 1.0 / RATE_HZ, 0.4) for one in whole]
+    places = np.array([walked[r][sample, :2] for r in row])[:, None]
+    context = FilterContext(RATE_HZ, np.zeros((3, 3)), ROBOT.figures, headings=turned[:, None], places=places)
     moved, _ = effect.apply(drives[row][:, sample:], effect.recall(context, drives, row, samples))
     np.testing.assert_allclose(moved, np.stack([whole[r][sample:] for r in row]), rtol=0, atol=1e-9)
 
@@ -263,11 +280,12 @@ NUMBERS = st.floats(-99.0, 99.0)
 def learnt(draw):
     curves = []
     for group, kind in GROUPS.items():
-        pairs = group == "speed_and_turn"
+        pairs = group in ("speed_and_turn", "place")
         low = kind.low if kind.low is not None else -20.0
         number = st.floats(low, 30.0).filter(bool)
         knot = st.tuples(NUMBERS, number) if pairs else number
-        knots = tuple(sorted(draw(st.sets(knot, max_size=4))))
+        drawn = tuple(sorted(draw(st.sets(knot, max_size=4))))
+        knots = next((one.knots for one in curves if (one.group, group) == ("transients", "changes")), drawn)
         channels = draw(st.sets(st.sampled_from(sorted(kind.channels)))) if knots else ()
         for channel in kind.channels:
             if channel in channels:

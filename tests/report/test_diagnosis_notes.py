@@ -22,7 +22,9 @@ from proxytune.diagnosis import (
 from proxytune.diagnosis.motion.clocks import Jump
 from proxytune.diagnosis.motion.discrepancy import Discrepancy, LearntError
 from proxytune.diagnosis.motion.manoeuvres import LIBRARY, Manoeuvre
+from proxytune.diagnosis.motion.moments import Period
 from proxytune.diagnosis.motion.multistep_fit import MultistepFit
+from proxytune.effects import FittedRange, Learnt, LearntCurve, learnt_theta
 from proxytune.report.diagnosis.document import clocks_document, learnt_document, unlike_document
 from proxytune.report.diagnosis.notes import (
     MEANINGS,
@@ -45,7 +47,7 @@ MUCH = {2.0: Ratio(1.34, (1.2, 1.5))}
 
 
 def diagnosis(**changes):
-    plain = {"at_edge": lambda effect: ()} | {
+    plain = {"edges": (), "expected_false_names": 0.02, "period": None} | {
         "log": "run",
         "verdict": "explained",
         "effects": (),
@@ -130,8 +132,13 @@ def test_a_ratio_is_told_as_what_it_adds():
 
 
 def test_a_value_at_the_end_of_its_range_is_no_physics():
-    lines = motion_notes(diagnosis(effects=(BAND,), at_edge=lambda effect: effect.names))
-    assert "beware: dead_band.width at the end of the range: it probably stands for something else" in lines
+    ends = diagnosis(effects=(BAND,), edges=BAND.names, verdict="partly explained")
+    assert "dead_band.width at the end of the range stands for something else" in motion_headline(ends)
+
+
+def test_a_name_is_told_with_how_many_false_ones_chance_adds():
+    assert "expected false names: at most 0.02" in motion_headline(diagnosis(effects=(BAND,)))
+    assert "false names" not in motion_headline(diagnosis())
 
 
 def test_beside_what_has_no_name_values_are_no_physics_yet():
@@ -259,3 +266,16 @@ def test_both_groups_are_told_with_their_gains():
 def test_drives_that_are_alike_are_no_news():
     assert unlike_document(None, NAMES) is None
     assert unlike_notes(None, NAMES) == []
+
+
+def test_what_slows_the_robot_down_again_and_again_is_told():
+    (note,) = motion_notes(diagnosis(period=Period(4.0, 0.3, 1e-9)))
+    assert "as if it stood for 0.3 s every 4.0 s" in note
+
+
+def test_a_map_of_the_floor_is_told_in_words():
+    knots = tuple((x, y) for x in (-0.75, -0.25, 0.25, 0.75) for y in (-0.25, 0.25))
+    curve = LearntCurve("place", "forward", knots, (0.0, 0.01, -0.02, 0.0, -0.5, -0.48, -0.52, -0.5))
+    theta = learnt_theta(Learnt(FittedRange((0.0, 1.0), (-1.0, 1.0)), (curve,)))
+    notes = learnt_notes(Learning(Discrepancy(theta, {"place on the floor": 1.0}, {}, True), (), False))
+    assert "slower by 50 % where x > 0 m" in notes[1]

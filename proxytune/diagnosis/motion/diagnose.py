@@ -26,6 +26,7 @@ from proxytune.diagnosis.motion.drives import Drives, Floats
 from proxytune.diagnosis.motion.effect_size import (
     EffectSize,
     RobotClusters,
+    drop_negligible,
     find_robot_clusters,
     invisible_effects,
     measure_effect_size,
@@ -34,6 +35,7 @@ from proxytune.diagnosis.motion.evidence import AdoptedEffect, DroppedEffect, Fi
 from proxytune.diagnosis.motion.fitting import Fit, check_motion, check_units, intervals
 from proxytune.diagnosis.motion.innovations import Noise, at_edge
 from proxytune.diagnosis.motion.manoeuvres import Manoeuvre, next_manoeuvre
+from proxytune.diagnosis.motion.moments import Period, find_period
 from proxytune.diagnosis.motion.multistep_fit import (
     HORIZONS_S,
     MultistepFit,
@@ -68,6 +70,9 @@ from proxytune.space import Theta
 CONFIRMED_S = 2.0
 """The horizon at which errors are confirmed on the bullet plant."""
 
+PERIODIC = "time, again and again"
+"""What a remainder with a period is said to depend on."""
+
 MAIN_S = 2.0
 """The horizon of the one error that stands for all."""
 
@@ -87,6 +92,15 @@ class Bracket(NamedTuple):
     upper: float
     reached: float
     again: Repeated | None
+
+    @property
+    def least(self) -> float:
+        """The lower end with what repeats leave at least, in the windows that have any [m]."""
+        if self.again is None:
+            return self.lower
+        share = self.again.share
+        apart = self.again.apart * share.interval[0] / share.value
+        return max(self.lower, float(np.sqrt((1.0 - self.again.part) * self.lower**2 + self.again.part * apart**2)))
 
 
 def bracket(lower: float, reached: float, again: Repeated | None, rules: Rules = RULES) -> Bracket:
@@ -129,7 +143,8 @@ def _is_at_floor(after: float, floor: Bracket, unnamed: bool, rules: Rules) -> b
     if unnamed or floor.reached < rules.lowers * after:
         return False
     if floor.again is not None:
-        return floor.again.share.value >= 1.0 / rules.floor_factor and after <= rules.repeats_alike * floor.again.apart
+        repeated = after <= rules.repeats_alike * floor.again.apart and floor.upper <= rules.known_bracket * floor.least
+        return floor.again.share.value >= 1.0 / rules.floor_factor and repeated
     return floor.upper < rules.lowest_by_chance * rules.narrow_bracket * floor.lower
 
 
@@ -255,6 +270,7 @@ class Diagnosis:
         robot_clusters: Two groups that the drives fall in as if of two robots, by number, or None.
         drive_names: Names of the log's drives.
         learning: What was learnt beside the named effects, and what that is worth.
+        period: What slows the robot down again and again, None where nothing does; no model has it.
     """
 
     log: str
@@ -277,6 +293,7 @@ class Diagnosis:
     robot_clusters: RobotClusters | None
     drive_names: tuple[str, ...]
     learning: Learning
+    period: Period | None = None
 
     @property
     def dropped_values(self) -> dict[str, Estimate]:
@@ -292,9 +309,17 @@ class Diagnosis:
 
         The effect then stands for something else.
         """
-        fitted = {name for coordinate in effect.free for name in coordinate} or set(effect.names)
-        known = [name for name in effect.names if name in fitted and name in self.theta]
-        return tuple(name for name in known if at_edge(name, self.theta[name].value, self.robot, self.rules))
+        return _at_edge(self.found.model, effect)
+
+    @property
+    def edges(self) -> tuple[str, ...]:
+        """Such parameters of all that was added."""
+        return tuple(name for effect in self.effects for name in self.at_edge(effect))
+
+    @property
+    def expected_false_names(self) -> float:
+        """The number of effects that chance adds to a model that is right, at most: a share of logs for each look."""
+        return (len(self.found.adopted) + len(self.found.negligible) + 1) * self.rules.p_value
 
     @property
     def rules(self) -> Rules:
@@ -345,6 +370,7 @@ def diagnose(
     check_units(log.name, parts.fitted, start)
     report("fitting what is declared")
     found = select_effects(fit_declared(parts.fitted, start, names), seed, report)
+    found = drop_negligible(found, seed, parts.tested)
     report("fitting to windows of prediction")
     declared_fit, before = fit_multistep(found.declared)
     # Before and after are compared on equal terms.
@@ -359,8 +385,12 @@ def diagnose(
     errors = tuple(error for h in HORIZONS_S if (error := horizon_error(found, tested, h, learning.theta)) is not None)
     if not errors:
         raise LogError(f"{log.name}: no second of unbroken poses to test on; record longer drives")
-    main, unnamed = main_error(errors), bool(found.unnamed_curves) or learning.discrepancy.used
+    period = find_period(parts.fitted, found.model.theta)
+    main = main_error(errors)
+    unnamed = bool(found.unnamed_curves) or learning.discrepancy.used or period is not None
     explained = is_explained(main.after.value, main.floor, unnamed=unnamed, rules=rules)
+    # A value at an end of its range is no explanation, however small the error.
+    explained = explained and not any(_at_edge(found.model, effect) for effect in found.adopted)
     confirmed = None
     if has_body(parts.tested):
         report("confirming on the bullet plant")
@@ -383,7 +413,9 @@ def diagnose(
             for effect, model_with, _ in weighed
         },
         multistep=after,
-        residual_depends_on=learning.depends_on(curve.group.name for curve in found.unnamed_curves),
+        residual_depends_on=learning.depends_on(
+            [*([PERIODIC] if period else []), *(curve.group.name for curve in found.unnamed_curves)]
+        ),
         errors=errors,
         confirmed=confirmed,
         could_not_be_seen=invisible_effects(found.model, seen),
@@ -394,7 +426,15 @@ def diagnose(
         robot_clusters=find_robot_clusters(cut_into_blocks(every), found.model),
         drive_names=tuple(episode.name for episode in log.episodes),
         learning=learning,
+        period=period,
     )
+
+
+def _at_edge(model: Fit, effect: AdoptedEffect) -> tuple[str, ...]:
+    fitted = {name for coordinate in effect.free for name in coordinate} or set(effect.names)
+    known = (name for name in effect.names if name in fitted and name in model.theta)
+    robot, rules = model.drives.robot, model.drives.rules
+    return tuple(name for name in known if at_edge(name, model.theta[name], robot, rules))
 
 
 def declared_effects(robot: Robot) -> tuple[str, ...]:

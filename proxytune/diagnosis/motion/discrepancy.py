@@ -48,6 +48,12 @@ WHEEL_KNOTS, TURN_KNOTS, TIME_KNOTS = 9, 8, 6
 GRID = (4, 6)
 """Knots of a curve over a wheel's speed, over the yaw rate, over time or use, and over speed and yaw rate together."""
 
+OTHER_KNOTS = 5
+"""Knots of a curve over the other wheel's speed."""
+
+MESHES_M, MOST_CORNERS = (0.25, 0.5, 1.0, 2.0), 64
+"""Meshes of the lattices of a map of the floor, and how many corners it may have."""
+
 TRANSIENTS_S = (0.04, 0.1, 0.25, 0.63, 1.6)
 STARTS_S = (0.05, 0.15, 0.5)
 """Time constants over which the memory of a start fades [s]."""
@@ -79,10 +85,12 @@ def offer_curves(drives: Drives, theta: Theta) -> Learnt:
     both = product(sorted((0.0, *_corners(forward, GRID[0]))), sorted((0.0, *_corners(yaw, GRID[1]))))
     knots: dict[str, Knots] = {
         "wheel_speed": _corners(np.concatenate((forward - turn, forward + turn)), WHEEL_KNOTS),
+        "other_wheel": _corners(np.concatenate((forward - turn, forward + turn)), OTHER_KNOTS),
         "turn_rate": _corners(yaw, TURN_KNOTS),
         "speed_and_turn": tuple((speed, turning) for speed, turning in both if speed or turning),
         LEVEL: (1.0,),
         "transients": TRANSIENTS_S,
+        "changes": TRANSIENTS_S,
         "start": STARTS_S,
         "ringing": RINGING_HZ,
         "play": tuple(_round_knot(share * drives.robot.figures["full_speed"]) for share in PLAYS),
@@ -92,6 +100,7 @@ def offer_curves(drives: Drives, theta: Theta) -> Learnt:
         "use": _steps(float(effort.mean()) * seconds / 60.0),
         "load": LOADS_S,
         "heading": (1.0, 2.0),
+        "place": _lattice(drives.places[used]),
     }
     curves = [
         LearntCurve(group, channel, knots[group], (0.0,) * len(knots[group]))
@@ -100,6 +109,16 @@ def offer_curves(drives: Drives, theta: Theta) -> Learnt:
         if knots[group]
     ]
     return Learnt(FittedRange(_ends(forward), _ends(yaw)), tuple(curves))
+
+
+def _lattice(places: Floats) -> Knots:
+    """Corners of the meshes that were driven through, of a lattice as fine as so many corners allow."""
+    for mesh in MESHES_M:
+        cells = np.unique(np.floor(places / mesh - 0.5), axis=0)
+        corners = np.unique(np.concatenate([cells + step for step in product((0, 1), repeat=2)]), axis=0)
+        if len(corners) <= MOST_CORNERS:
+            return tuple((float(x), float(y)) for x, y in (mesh * (corners + 0.5)).tolist())
+    return ()
 
 
 def _ticks_in_motion(drives: Drives) -> Floats:
@@ -145,7 +164,7 @@ def _round_knot(value: float) -> float:
 RIDGES = (1e-3, 1e-2, 1e-1, 1.0)
 """Pulls towards no curve that are tried, as shares of what an average weight of the group is held by."""
 
-FIRMEST_ONLY = {"speed_and_turn": 0.1}
+FIRMEST_ONLY = {"speed_and_turn": 0.1, "place": 0.01}
 """Curves over two signals are never pulled less than this: most of their knots are seldom visited."""
 
 FREE = 1e-6

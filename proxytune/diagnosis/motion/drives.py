@@ -223,7 +223,7 @@ class Drives:
         rate_hz: Commands per second.
         duties: Commands as fractions of full speed (E, T, 2), each the mean over its tick.
         issued: Whether a command is issued within each tick (E, T).
-        rest: Duties before the first row (E, 2).
+        rest: Duties before the first row (E, 2): what was sent, or wheel speeds of a drive that begins in motion.
         headings: Measured heading at the start of each tick, interpolated (E, T).
         episode: Episode of each increment (N,).
         first: Tick at which it begins (N,).
@@ -358,7 +358,7 @@ def gather(log: Log, robot: Robot, episodes: Sequence[LogEpisode]) -> Drives:
         rate_hz=commands_a_second(log, episodes),
         duties=np.stack([one.over_ticks(length, tick_hz) for one in given]),
         issued=np.stack([one.ticks(length, tick_hz) for one in given]),
-        rest=np.stack([one.rest for one in given]),
+        rest=np.stack([_at_start(one, e, s, robot) for one, e, s in zip(given, episodes, samples, strict=True)]),
         headings=np.stack([_ticks_of_heading(e, ticks, length) for e in episodes]),
         episode=number,
         first=rows[:, 0] * ticks,
@@ -371,6 +371,30 @@ def gather(log: Log, robot: Robot, episodes: Sequence[LogEpisode]) -> Drives:
         after=after * tick_hz if after.any() else None,
     )
     return drives.only(rows[:, 1] - rows[:, 0] <= GAP_S * log.rate_hz)
+
+
+BEGINNING_S = 0.15
+"""The first instants of a drive: long enough to see its speed, too short for a robot at rest to reach it."""
+
+IN_MOTION, STEADY = 0.15, 0.75
+"""A drive begins in motion if its wheels go faster than this share of full speed, and than this share of later on."""
+
+
+def _at_start(given: Commands, episode: LogEpisode, samples: Whole, robot: Robot) -> Floats:
+    """Duties before the first sample (2,): known ones, or of a drive that begins in motion its speeds as such."""
+    times = episode.times[samples] - episode.times[0]
+    at = np.searchsorted(times, np.arange(4) * BEGINNING_S - 1e-9)
+    if given.rest.any() or episode.wheels is not None or at[-1] >= len(samples) or samples[0] != 0:
+        return given.rest
+    if np.diff(times[at]).min() <= 0.0:
+        return given.rest
+    poses, figures = episode.poses[samples[at]], robot.figures
+    moved = relative(poses[::2], poses[1::2]) / np.diff(times[at])[::2, None]
+    turn = moved[:, 2] * figures["effective_baseline"] / 2.0
+    first, later = np.stack((moved[:, 0] - turn, moved[:, 0] + turn), axis=1) / figures["full_speed"]
+    fast = float(np.abs(first).max())
+    in_motion = fast > max(IN_MOTION, STEADY * float(np.abs(later).max()))
+    return np.clip(first, -1.0, 1.0) if in_motion else given.rest
 
 
 def _hold(rows: Floats, ticks: int, length: int) -> Floats:

@@ -77,19 +77,26 @@ class WeighedEffect(NamedTuple):
         return any(one.value <= 1.0 / self.rules.material_factor and one.below for one in self.size.values())
 
 
-def drop_negligible(found: Findings, seed: int) -> Findings:
+def drop_negligible(found: Findings, seed: int, aside: Drives | None = None) -> Findings:
     """Drop the effects that are negligible for prediction, the weakest first.
 
     Args:
         found: What the search came to.
         seed: Of the draws of random effects.
+        aside: Drives that nothing was fitted to: what is not shown to be worth anything on them is dropped. Without
+            them effects are weighed on the fitted drives, and have to be material.
     """
     drives = found.model.drives
     variant, kept = Variant(found.model.theta, found.model.free), list(found.adopted)
     dropped: list[DroppedEffect] = []
-    while kept and horizons(drives):
-        weighed = _weigh_effects(drives, variant, kept, seed)
-        negligible = (one for one in weighed if not one.material)
+    while kept and horizons(drives) and (aside is None or horizons(aside)):
+        if aside is None:
+            weighed = _weigh_effects(drives, variant, kept, seed)
+            negligible = [one for one in weighed if not one.material]
+        else:
+            sizes = ((effect, measure_effect_size(drives, aside, variant, effect, seed)) for effect in kept)
+            weighed = [WeighedEffect(effect, size, drives.rules) for effect, size in sizes]
+            negligible = [one for one in weighed if not any(size.above for size in one.size.values())]
         weakest = min(negligible, key=lambda one: max(size.value for size in one.size.values()), default=None)
         if weakest is None:
             break
@@ -99,7 +106,7 @@ def drop_negligible(found: Findings, seed: int) -> Findings:
     if not dropped:
         return found
     model = fit(drives, variant.theta, variant.free, found.model.noise)
-    return replace(found, model=model, adopted=tuple(kept), negligible=tuple(dropped))
+    return replace(found, model=model, adopted=tuple(kept), negligible=found.negligible + tuple(dropped))
 
 
 def _weigh_effects(

@@ -472,6 +472,9 @@ FEWEST = 20
 ALIKE = 1e-6
 """Commands that differ by less than this [duty] are the same."""
 
+ALIKE_AT_START = 0.1
+"""Drives that begin in motion repeat each other if they begin about so equally fast [duty]."""
+
 
 class Repeated(NamedTuple):
     """The scatter of drives from the same commands, beside the error of a model.
@@ -519,13 +522,15 @@ def compare_repeats(drives: Drives, theta: Theta, horizon_s: float) -> Repeated 
 def _label_repeats(drives: Drives, windows: Windows) -> tuple[Whole, Whole]:
     """Label each compared pose by what it repeats (M,), and count how often each of those was driven.
 
-    A pose is a repeat if its window began at the same time and all commands before it were the same, not all zero.
+    A pose is a repeat if its window began at the same time and all commands before it were the same, not all zero, and
+    the drive began as fast.
     """
     begin, end = drives.first[windows.begin][windows.window], drives.last[windows.increment]
     # A number for all commands up to each tick: equal ones have the same, and no commands have 0.
     rounded = np.round(drives.duties / ALIKE).astype(np.int64)
     weights = np.random.default_rng(1).integers(1, 2**62, size=rounded.shape[1:])
-    histories = np.asarray(np.cumsum((rounded * weights).sum(axis=-1), axis=1))
+    started = np.round(drives.rest / ALIKE_AT_START).astype(np.int64) @ weights[-1]
+    histories = np.asarray(np.cumsum((rounded * weights).sum(axis=-1), axis=1)) + started[:, None]
     past = histories[drives.episode[windows.increment], end - 1]
     alone = np.where(past == 0, np.arange(len(past)) + 1, 0)
     _, label, counts = np.unique(np.stack((past, begin, end, alone)), axis=1, return_inverse=True, return_counts=True)

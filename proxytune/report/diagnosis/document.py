@@ -78,6 +78,7 @@ def motion_document(diagnosis: Diagnosis) -> dict[str, Any]:
         "verdict": diagnosis.verdict,
         "declared": {name: _estimate_document(estimate) for name, estimate in diagnosis.declared.items()},
         "effects": motion_effects(diagnosis),
+        "expected_false_names": diagnosis.expected_false_names,
         "immaterial": [_immaterial_document(effect, diagnosis) for effect in diagnosis.negligible],
         "extended": {name: _estimate_document(estimate) for name, estimate in diagnosis.theta.items()},
         "candidates": [
@@ -87,6 +88,7 @@ def motion_document(diagnosis: Diagnosis) -> dict[str, Any]:
         "signals": [{"name": curve.group.name, "held_out_gain": curve.gain} for curve in diagnosis.found.curves],
         "residual_depends_on": list(diagnosis.residual_depends_on),
         "error": _error_document(main_error(diagnosis.errors)),
+        "periodic": diagnosis.period and diagnosis.period._asdict(),
         "learnt": learnt_document(diagnosis.learning),
         "errors": [_error_document(error) for error in diagnosis.errors],
         "error_on_bullet": _error_document(diagnosis.confirmed) if diagnosis.confirmed else None,

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from proxytune.diagnosis import Diagnosis, Findings, Learning, Rules
-from proxytune.effects import GROUPS, HEADING, LEVEL, Learnt, LearntCurve, learnt_effect
+from proxytune.effects import GROUPS, HEADING, LEVEL, PLACE, Learnt, LearntCurve, learnt_effect
 from proxytune.report.diagnosis.effect_figure import effect_curve
 from proxytune.report.diagnosis.error_figures import error_figure, residual_map, residual_over_time, strayed
 from proxytune.report.figure_style import BLUE, COLUMN, GREY, LIGHT_BLUE, PURPLE, dress, legend_below
@@ -132,6 +132,7 @@ SHOWN_AS = {
 }
 """Units in which weights are told, by their own: a factor and its unit; shares in per cent."""
 FADING = {
+    "changes": "time constant",
     "transients": "time constant",
     "load": "time constant",
     "reversal": "fading over",
@@ -140,7 +141,8 @@ FADING = {
     "play": "half the play",
 }
 """Groups whose weights are points, each of something that fades, and what their knots are."""
-PAIRS = "speed_and_turn"
+PAIRS = {"speed_and_turn": ("forward speed [m/s]", "yaw rate [rad/s]"), "place": ("x [m]", "y [m]")}
+"""Groups over two signals, and what their axes are called."""
 COLUMNS = 2
 WIDEST, HIGHEST = 24, 18
 """Characters in a line below a panel, and beside it."""
@@ -183,7 +185,7 @@ def _draw_learnt(axes: Axes, effect: Learnt, curve: LearntCurve) -> None:
     unit = group.channels[curve.channel if curve.group != HEADING else f"{curve.channel}_cos"].unit
     factor, label_unit = SHOWN_AS.get(unit, (100.0, f"% {unit}"))
     label = fill(f"{plain(curve.channel)} [{label_unit}]", HIGHEST)
-    if curve.group == PAIRS:
+    if curve.group in PAIRS:
         _surface(axes, curve, factor, label)
     else:
         _line(axes, curve, factor)
@@ -213,15 +215,16 @@ def _line(axes: Axes, curve: LearntCurve, factor: float) -> None:
 
 
 def _surface(axes: Axes, curve: LearntCurve, factor: float, label: str) -> None:
-    """Colours over speed and yaw rate."""
+    """Colours over two signals."""
     places, weights = np.array(curve.knots), factor * np.array(curve.weights)
-    speeds, turns = (np.unique(np.append(axis, 0.0)) for axis in places.T)
-    values = np.zeros((len(turns), len(speeds)))
-    values[np.searchsorted(turns, places[:, 1]), np.searchsorted(speeds, places[:, 0])] = weights
+    zero = [0.0] if curve.group != PLACE else []
+    across, up = (np.unique(np.append(axis, zero)) for axis in places.T)
+    values = np.zeros((len(up), len(across)))
+    values[np.searchsorted(up, places[:, 1]), np.searchsorted(across, places[:, 0])] = weights
     most = float(np.abs(values).max()) or 1.0
-    mesh = axes.pcolormesh(speeds, turns, values, shading="gouraud", cmap="RdBu_r", vmin=-most, vmax=most)
-    axes.set_xlabel("forward speed [m/s]", fontsize=8)
-    axes.set_ylabel("yaw rate [rad/s]", fontsize=8)
+    mesh = axes.pcolormesh(across, up, values, shading="gouraud", cmap="RdBu_r", vmin=-most, vmax=most)
+    axes.set_xlabel(PAIRS[curve.group][0], fontsize=8)
+    axes.set_ylabel(PAIRS[curve.group][1], fontsize=8)
     bar = axes.figure.colorbar(mesh, ax=axes)
     bar.set_label(label, fontsize=8)
     bar.ax.tick_params(labelsize=7)

@@ -3,6 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from proxytune.diagnosis import (
     AdoptedEffect,
     Clocks,
@@ -13,7 +15,9 @@ from proxytune.diagnosis import (
     Ratio,
     RobotClusters,
 )
+from proxytune.effects import PLACE, learnt_effect
 from proxytune.report.wording import fixed, listed
+from proxytune.space import Theta
 
 MEANINGS = {
     "nothing missing": "only noise is left",
@@ -29,7 +33,13 @@ AMPLE = 30.0
 
 def motion_headline(diagnosis: Diagnosis, found: str = "") -> str:
     """What was found, in the words of `meanings.findings`, then the verdict and what it means."""
-    return f"{diagnosis.log}: {told(found, diagnosis.verdict)}: {MEANINGS[diagnosis.verdict]}"
+    meaning = MEANINGS[diagnosis.verdict]
+    if diagnosis.edges:
+        end = f"{listed(diagnosis.edges)} at the end of the range"
+        rest = "" if diagnosis.verdict == "partly explained" else f"; {meaning}"
+        meaning = f"{end} stands for something else, which no named effect explains{rest}"
+    sure = f" (expected false names: at most {diagnosis.expected_false_names:.2f})" if diagnosis.effects else ""
+    return f"{diagnosis.log}: {told(found, diagnosis.verdict)}: {meaning}{sure}"
 
 
 def told(found: str, verdict: str) -> str:
@@ -46,6 +56,11 @@ def motion_notes(diagnosis: Diagnosis) -> list[str]:
     lines += _cautions(diagnosis)
     if diagnosis.residual_depends_on:
         lines.append(f"no named effect explains the rest, which depends on: {', '.join(diagnosis.residual_depends_on)}")
+    if diagnosis.period is not None:
+        lines.append(
+            f"the robot falls behind {diagnosis.period}; a new drive does not tell when, so no model has it: look for "
+            "what cuts the motors' power, or holds up their commands, so often"
+        )
     lines += learnt_notes(diagnosis.learning)
     if diagnosis.could_not_be_seen:
         lines.append(f"these drives could not have shown: {', '.join(diagnosis.could_not_be_seen)}")
@@ -84,6 +99,8 @@ def _say_immaterial(effect: AdoptedEffect, diagnosis: Diagnosis) -> str:
     horizon = decisive(worth)
     value, _ = per_cent(worth[horizon])
     kind = "not shown to matter" if may_matter(worth, diagnosis.rules.material_factor) else "detectable but immaterial"
+    if worth[horizon].interval[0] > 1.0:
+        kind = "left out, for it is not shown to matter on the drives that were fitted, if on those kept aside"
     dropped = (one for name, one in diagnosis.dropped_values.items() if name in effect.names)
     values = "".join(f" {one.value:.3g} {one.unit}".rstrip() for one in dropped)
     change = f"changes the error at {horizon:g} s by {fixed(value, 1)} % ({_ends(worth[horizon], 1)})"
@@ -104,8 +121,7 @@ def _ends(one: Ratio, decimals: int) -> str:
 
 
 def _cautions(diagnosis: Diagnosis) -> list[str]:
-    edges = [name for effect in diagnosis.effects for name in diagnosis.at_edge(effect)]
-    lines = [f"beware: {listed(edges)} at the end of the range: it probably stands for something else"] if edges else []
+    lines = []
     if diagnosis.verdict == "partly explained":
         lines.append("beware: added effects may stand in for what is still unnamed: their values are no physics yet")
     worse = [f"{error.horizon_s:g} s" for error in diagnosis.errors if error.ratio.interval[0] > 1.0]
@@ -205,6 +221,31 @@ def unlike_notes(unlike: RobotClusters | None, names: Sequence[str]) -> list[str
     ]
 
 
+LEAST_SHARE = 0.05
+"""A map of the floor is told in words where the speed on one side of a line differs by this share."""
+
+
+def _say_map(theta: Theta) -> list[str]:
+    """Say on which side of a line along x or y a learnt map slows the robot down or speeds it up."""
+    effect = learnt_effect(theta) if any(f".{PLACE}." in name for name in theta) else None
+    curve = next((c for c in effect.curves if (c.group, c.channel) == (PLACE, "forward")), None) if effect else None
+    if curve is None:
+        return []
+    found, weights = [(0.0, "")], np.array(curve.weights)
+    for axis, places in zip("xy", np.array(curve.knots).T, strict=True):
+        lines = np.unique(places)
+        for line in (lines[1:] + lines[:-1]) / 2.0:
+            for above in (True, False):
+                side = (places > line) == above
+                here, there = float(weights[side].mean()), float(weights[~side].mean())
+                if abs(here) >= max(LEAST_SHARE, abs(there)):
+                    kind = "slower" if here < 0.0 else "faster"
+                    words = f"{kind} by {abs(100.0 * here):.0f} % where {axis} {'>' if above else '<'} {line:.2g} m"
+                    found.append((abs(here - there) * float(np.sqrt(side.mean() * (1.0 - side.mean()))), words))
+    words = max(found)[1]
+    return [f"as that map has it, the robot is {words}"] if words else []
+
+
 def learnt_notes(learning: Learning) -> list[str]:
     """Say what was learnt; nothing where nothing was."""
     beside = learning.discrepancy
@@ -217,6 +258,7 @@ def learnt_notes(learning: Learning) -> list[str]:
             for error in learning.errors
         )
         notes.append(f"learnt, not physics: curves over {curves}; position error with them at {worth}")
+        notes += _say_map(learning.theta)
     elif beside.theta:
         notes.append(f"curves over {curves} were tried and dropped: they do not clearly help on drives left out")
     if learning.looks_like is not None:

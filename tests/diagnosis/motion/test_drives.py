@@ -160,6 +160,12 @@ def test_a_drive_begins_at_rest_or_at_the_measured_wheel_speeds():
     np.testing.assert_allclose(drives.wheels[0, 3:, 1], 6.0 * SPEED_PER_RAD)
 
 
+def test_a_drive_that_begins_in_motion_has_its_first_speed_behind_it():
+    steady = gathered(episode(0.01 * np.arange(40)))
+    np.testing.assert_allclose(steady.rest[0], 0.2 / ROBOT.figures["full_speed"])
+    np.testing.assert_array_equal(gathered(episode(0.004 * np.arange(40) ** 2 / 40)).rest[0], 0.0)
+
+
 def test_wheel_speeds_with_a_gap_are_not_used_but_where_they_begin():
     gap = episode([0.0, 0.1, 0.2], wheels=[[3.0, 4.0], [np.nan, np.nan], [5.0, 6.0]])
     drives = gathered(gap)

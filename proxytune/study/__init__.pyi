@@ -1,5 +1,5 @@
 from .bank import WITHIN as WITHIN, Bank as Bank, bank_of as bank_of, run_bank as run_bank
-from .earlier import write_table as write_table
+from .earlier import earlier_trials as earlier_trials, learn as learn, write_table as write_table
 from .facts import (
     check_facts as check_facts,
     describe as describe,

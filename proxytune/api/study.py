@@ -97,7 +97,7 @@ class StudyReport(Shown):
             {"trial": one.number, **one.theta, "state": one.state, "score": one.score, **one.measures}
             for one in self.result.trials
         ]
-        return pd.DataFrame(rows).set_index("trial")
+        return pd.DataFrame(rows, columns=None if rows else ["trial"]).set_index("trial")
 
     to_frame = trials
 

@@ -27,10 +27,13 @@ from proxytune.cli.terminal import Answer
 from proxytune.errors import ProxytuneError
 from proxytune.report import (
     RENEW_S,
+    bank_document,
+    bank_text,
     families_text,
     plv_document,
     plv_text,
     study_text,
+    write_bank_page,
     write_live_page,
     write_plv_report,
 )
@@ -42,10 +45,15 @@ from proxytune.study import (
     Spent,
     Study,
     StudyResult,
+    StudyRun,
     StudySettings,
+    bank_of,
+    open_bank,
     open_settings,
     read_study_settings,
+    run_bank,
     with_spending,
+    write_table,
 )
 from proxytune.teaching import PlvSearch, load_setup, most_examinations, search_space
 
@@ -171,6 +179,21 @@ def search_by_plv(study: Study, folder: Path, by_prpv: Callable[[], StudyResult]
     return Answer(document, plv_text(result, {"figure": figure, "report": page}))
 
 
+def run_a_bank(settings: StudySettings, spending: Spending) -> Answer:
+    """Run what is left of a bank, and write its table of trials and its page."""
+    study = with_spending(open_bank(settings), budget=spending.budget, jobs=spending.jobs)
+    with locked(settings.home), Store.open(settings.home) as store, Bars(most_episodes(study.settings)) as bars:
+        if spending.retry_failed:
+            store.forget_failures()
+        run = StudyRun(study, store, bars)
+        run_bank(run)
+        bank, table = bank_of(run), write_table(run)
+    files = {"table": table, "report": write_bank_page(bank, table)}
+    costs = {"episodes": {"run": run.spent.episodes}, "seconds": {"episodes": run.spent.seconds}}
+    document = {**bank_document(bank), **costs, **{name: str(path) for name, path in files.items()}}
+    return Answer(document, bank_text(bank, files))
+
+
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the study."""
     parser.add_argument(
@@ -197,6 +220,8 @@ def run(arguments: argparse.Namespace) -> Answer:
     settings, again = read_study_settings(folder), arguments.retry_failed
     if settings.families:
         return compare_families(settings, Spending(arguments.budget, arguments.jobs, again))
+    if not settings.targets:
+        return run_a_bank(settings, Spending(arguments.budget, arguments.jobs, again))
     study = with_spending(open_settings(settings), budget=arguments.budget, jobs=arguments.jobs)
     if study.settings.objective == LEARNING:
         return search_by_plv(study, folder, lambda: _search(study, again).result)

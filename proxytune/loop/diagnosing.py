@@ -142,7 +142,7 @@ def extension_text(settings: StudySettings, model: Path, folder: Path) -> str:
     values = dict(read_settings(settings.path).values)
     values |= {"name": f"{settings.name}_extended", "proxy": _from(folder, model)}
     targets = [_from(folder, path) for path in settings.targets]
-    values["target"] = targets if settings.more_targets else targets[0]
+    values["target"] = targets if len(targets) > 1 else targets[0]
     if settings.truth:
         values["truth"] = _from(folder, settings.truth)
     domain = {key: value for key, value in settings.domain.items() if key != "effects"}

@@ -108,7 +108,7 @@ def _is_known(family: DomainFamily, name: str) -> bool:
 def held_out_settings(settings: StudySettings, names: tuple[str, ...], target: Path | None = None) -> StudySettings:
     """The study with these agents instead, and the target's scores of them from another file if one is given."""
     known = replace(settings, agents=names)
-    return known if target is None else replace(known, target=target, more_targets=(), target_columns={})
+    return known if target is None else replace(known, targets=(target,), target_columns={})
 
 
 def drive_held_out(study: Study, settings: StudySettings, theta: Theta, watcher: Watcher) -> tuple[Assessment, int]:

@@ -1,14 +1,17 @@
 from .engine import (
     Engine as Engine,
     Look as Look,
+    design_point as design_point,
     from_unit as from_unit,
     to_unit as to_unit,
     unit_points as unit_points,
 )
 from .knowledge import (
+    Expected as Expected,
     Importance as Importance,
     Information as Information,
     Knowledge as Knowledge,
+    expect_of as expect_of,
     importances as importances,
     learn_theta as learn_theta,
 )

@@ -18,7 +18,16 @@ from proxytune.search.engine import from_unit, to_unit, unit_points
 from proxytune.search.likelihood import Likelihood, OutputModel, fit_outputs
 from proxytune.search.loop import Goal, Trial, Values
 from proxytune.search.outcomes import composed_scores, fresh_scores
-from proxytune.search.posterior import LeftOut, Misfit, Posterior, leave_out, misfit_of, posterior_of
+from proxytune.search.posterior import (
+    LeftOut,
+    Misfit,
+    Posterior,
+    as_targets,
+    leave_out,
+    left_out_of,
+    misfit_of,
+    posterior_of,
+)
 from proxytune.search.surrogate import Surrogate, unit_array
 from proxytune.space import Space
 
@@ -175,6 +184,15 @@ class Knowledge:
         both = {values: (own[values] + float(one)) / 2.0 for values, one in zip(visited, composed, strict=True)}
         return dict(sorted(both.items(), key=lambda pair: pair[1]))
 
+    def expected_at(self, values: Values) -> float:
+        """PRPV that is expected in fresh episodes of any θ of the box."""
+        return self.expected[values] if values in self.expected else float(self.scores([values])[0][0])
+
+    @property
+    def mode(self) -> Values:
+        """The most probable θ."""
+        return from_unit(self.space, self.posterior.mode)
+
     @property
     def answer(self) -> Values:
         """The visited θ of lowest expected PRPV."""
@@ -211,6 +229,51 @@ class Knowledge:
     def information(self) -> tuple[Information, ...]:
         """Information of agents and metrics on each parameter, in the order of the box."""
         return information_of(self.likelihood, self.posterior.mode)
+
+
+@dataclass(frozen=True, eq=False)
+class Expected:
+    """Knowledge of θ that a target not measured yet is expected to give.
+
+    Attributes:
+        widths: Mean width of each parameter's 95 % interval, in widths of the box.
+        information: Each agent's and each metric's mean share in what is told of each parameter.
+    """
+
+    widths: Floats
+    information: tuple[Information, ...]
+
+
+def expect_of(space: Space, trials: Sequence[Trial], goal: Goal, seed: int = 0) -> Expected:
+    """Expect what a target will tell: trials are taken for one in turn, with a target's noise.
+
+    Args:
+        space: The search box.
+        trials: Simulated trials, spread over it.
+        goal: The outputs and noise of a target; its values count for nothing where they are known.
+        seed: Seeds the noise.
+
+    Raises:
+        RunError: If no trial has an outcome.
+    """
+    targets = tuple(as_targets(fit_outputs(space, trials), trials, goal, seed))
+    if not targets:
+        return Expected(np.ones(len(space.names)), ())
+    widening = left_out_of(targets).widening
+    told = zip(*(information_of(one.likelihood, one.theta) for one in targets), strict=True)
+    return Expected(np.mean([one.widths(widening) for one in targets], axis=0), tuple(map(_mean_information, told)))
+
+
+def _mean_information(several: Sequence[Information]) -> Information:
+    def mean(side: Sequence[tuple[tuple[str, float], ...]]) -> tuple[tuple[str, float], ...]:
+        pairs = [pair for shares in side for pair in shares]
+        return _summed([name for name, _ in pairs], np.array([share / len(several) for _, share in pairs]))
+
+    limits = [one.limit for one in several]
+    agents, metrics = mean([one.agents for one in several]), mean([one.metrics for one in several])
+    return Information(
+        several[0].name, agents, metrics, "trials" if 2 * limits.count("trials") > len(limits) else "starts"
+    )
 
 
 def learn_theta(space: Space, trials: Sequence[Trial], goal: Goal, seed: int = 0) -> Knowledge:

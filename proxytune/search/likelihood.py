@@ -163,13 +163,14 @@ def fit_outputs(space: Space, trials: Sequence[Trial], kernel: "Kernel | None" =
     Raises:
         RunError: If no trial has an outcome.
     """
-    known = sorted((trial.values, trial.outcome) for trial in trials if trial.outcome is not None)
+    known = sorted((trial.values, trial.outcome, trial.placement) for trial in trials if trial.outcome is not None)
     if not known:
         raise RunError("no trial has an outcome, so there is nothing to learn from")
-    visited, outputs = unit_array(space, [values for values, _ in known]), np.array([found for _, found in known])
+    visited, outputs = unit_array(space, [one[0] for one in known]), np.array([one[1] for one in known])
+    placement = np.array([one[2] for one in known])
     with threadpool_limits(limits=1):
         kernel = kernel or _fitted_kernel(visited, outputs)
-        groups = _groups(kernel, visited, outputs)
+        groups = _groups(kernel, visited, outputs, placement)
     seen = ~np.isnan(outputs)
     with np.errstate(invalid="ignore"):
         constant = np.where(seen, outputs, 0.0).sum(axis=0) / seen.sum(axis=0)
@@ -216,19 +217,23 @@ def _worth_modelling(outputs: Floats) -> Rows:
     return np.flatnonzero(often & (np.nan_to_num(changes) > 1e-9 * np.nan_to_num(largest)))
 
 
-def _groups(kernel: "Kernel", visited: Floats, outputs: Floats) -> tuple[OutputGroup, ...]:
+def _groups(kernel: "Kernel", visited: Floats, outputs: Floats, placement: Rows) -> tuple[OutputGroup, ...]:
     by_rows: dict[bytes, list[int]] = {}
     seen = ~np.isnan(outputs)
     for column in _worth_modelling(outputs):
         by_rows.setdefault(seen[:, column].tobytes(), []).append(int(column))
-    return tuple(_group(kernel, visited, outputs, np.array(columns)) for columns in by_rows.values())
+    return tuple(_group(kernel, visited, outputs, placement, np.array(columns)) for columns in by_rows.values())
 
 
-def _group(kernel: "Kernel", visited: Floats, outputs: Floats, columns: Rows) -> OutputGroup:
+def _group(kernel: "Kernel", visited: Floats, outputs: Floats, placement: Rows, columns: Rows) -> OutputGroup:
     rows = ~np.isnan(outputs[:, columns[0]])
     known = outputs[np.ix_(rows, columns)]
     middle, scale = known.mean(axis=0), known.std(axis=0)
-    inverse = np.linalg.inv(kernel(visited[rows]))
+    matrix, placed = kernel(visited[rows]), placement[rows]
+    if np.ptp(placed):
+        # What a placement does to an output all trials share that were driven under it; roughness is much the same.
+        matrix += kernel.k2.noise_level * (placed[:, None] == placed)
+    inverse = np.linalg.inv(matrix)
     return OutputGroup(
         columns, np.flatnonzero(rows), visited[rows], inverse, inverse @ ((known - middle) / scale), middle, scale
     )

@@ -34,12 +34,14 @@ class Trial:
         outcome: What the score was computed from, one value per output; None where the trial failed or is pending, or
             where the score has no such parts.
         pending: Whether it has been proposed and is not finished.
+        placement: Which placement noise it was driven under: trials with the same number share theirs, 0 the study's.
     """
 
     values: Values
     score: float | None
     outcome: Values | None = None
     pending: bool = False
+    placement: int = 0
 
 
 class Proposer(Protocol):

@@ -7,7 +7,7 @@ be. How far it is from what the others predict at its most probable θ says how 
 Nothing is assumed of how outputs correlate.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -160,6 +160,34 @@ Of 46 searches of five engines for nine truths, regions held the truth in 40 wit
 
 
 @dataclass(frozen=True, eq=False)
+class AsTarget:
+    """A trial that is taken for a target, with a target's noise, as the other trials explain it.
+
+    Attributes:
+        theta: Its own θ, in the unit cube.
+        likelihood: Of its outputs.
+    """
+
+    theta: Floats
+    likelihood: Likelihood
+
+    @cached_property
+    def posterior(self) -> Posterior:
+        """What the others say of its θ."""
+        return posterior_of(self.likelihood.log, len(self.theta), DEVIANCE_POINTS)
+
+    def above(self, widening: float) -> float:
+        """Probability of all θ more probable than its own, with the log density divided by so much."""
+        density, own = self.posterior.density, float(self.likelihood.log(self.theta[None])[0])
+        weights = np.exp((density - density.max()) / widening)
+        return float(weights[density > own].sum() / weights.sum())
+
+    def widths(self, widening: float) -> Floats:
+        """Widths of the 95 % intervals that the others give, in widths of the box."""
+        return np.diff(replace(self.posterior, density=self.posterior.density / widening).intervals)[:, 0]
+
+
+@dataclass(frozen=True, eq=False)
 class LeftOut:
     """Trials that were left out, each as a target whose θ is known.
 
@@ -195,37 +223,33 @@ def leave_out(model: OutputModel, trials: Sequence[Trial], goal: Goal, seed: int
         goal: The target; outputs that it lacks tell nothing here either.
         seed: Seeds the noise that each is given.
     """
+    return left_out_of(as_targets(model, trials, goal, seed))
+
+
+def left_out_of(targets: Iterable[AsTarget]) -> LeftOut:
+    """Sum up trials that were taken for targets."""
+    told = [(least_deviance(one.likelihood, one.posterior), [one.above(w) for w in WIDENINGS]) for one in targets]
+    return LeftOut(np.array([one[0] for one in told]), np.array([one[1] for one in told]).reshape(-1, len(WIDENINGS)))
+
+
+def as_targets(model: OutputModel, trials: Sequence[Trial], goal: Goal, seed: int) -> Iterator[AsTarget]:
+    """Take each of the trials that `leave_out` leaves out for a target."""
     known = sorted((trial for trial in trials if trial.outcome is not None), key=lambda trial: trial.values)
     whole = [row for row, trial in enumerate(known) if not np.isnan(trial.outcome or ()).any()]
     normal = np.random.default_rng(seed).standard_normal((len(known), len(goal.values)))
     places = np.unique(np.linspace(0, max(0, len(whole) - 1), MOST).round().astype(int)).tolist()
-    rows = [whole[place] for place in places] if len(whole) >= FEWEST else []
-    found = [_left_out(model, known, goal, row, normal[row]) for row in rows]
-    told = [one for one in found if one is not None]
-    return LeftOut(np.array([one[0] for one in told]), np.array([one[1] for one in told]).reshape(-1, len(WIDENINGS)))
+    for row in [whole[place] for place in places] if len(whole) >= FEWEST else []:
+        others = fit_outputs(model.space, [*known[:row], *known[row + 1 :]], model.kernel)
+        outcome = np.array(known[row].outcome) + normal[row] * np.sqrt(goal.noise)
+        likelihood = Likelihood(others, replace(goal, values=np.where(np.isnan(goal.values), np.nan, outcome)))
+        if likelihood.columns.size:
+            yield AsTarget(to_unit(model.space, known[row].values), likelihood)
 
 
 def least_deviance(likelihood: Likelihood, posterior: Posterior) -> float:
     """Mean deviance of the target's outputs at the most probable θ."""
     distance, _ = likelihood.standardised(posterior.mode[None])
     return float(deviance(distance).mean())
-
-
-def _left_out(
-    model: OutputModel, known: Sequence[Trial], goal: Goal, row: int, normal: Floats
-) -> tuple[float, list[float]] | None:
-    others = fit_outputs(model.space, [*known[:row], *known[row + 1 :]], model.kernel)
-    values = np.where(np.isnan(goal.values), np.nan, np.array(known[row].outcome)) + normal * np.sqrt(goal.noise)
-    likelihood = Likelihood(others, replace(goal, values=values))
-    if not likelihood.columns.size:
-        return None
-    posterior = posterior_of(likelihood.log, len(model.space.intervals), DEVIANCE_POINTS)
-    own = float(likelihood.log(to_unit(model.space, known[row].values)[None])[0])
-    above = []
-    for widening in WIDENINGS:
-        weights = np.exp((posterior.density - posterior.density.max()) / widening)
-        above.append(float(weights[posterior.density > own].sum() / weights.sum()))
-    return least_deviance(likelihood, posterior), above
 
 
 SIGNIFICANCE = 0.05

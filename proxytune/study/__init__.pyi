@@ -1,3 +1,5 @@
+from .bank import WITHIN as WITHIN, Bank as Bank, bank_of as bank_of, run_bank as run_bank
+from .earlier import earlier_trials as earlier_trials, learn as learn, write_table as write_table
 from .facts import (
     check_facts as check_facts,
     describe as describe,
@@ -28,6 +30,7 @@ from .opening import (
     cautions_of as cautions_of,
     family_catalogue as family_catalogue,
     measure_of as measure_of,
+    open_bank as open_bank,
     open_settings as open_settings,
     open_study as open_study,
     read_target as read_target,

@@ -90,7 +90,7 @@ def read_target(settings: StudySettings, family: DomainFamily) -> tuple[ScoreTab
 
 
 def _read(settings: StudySettings, metrics: Iterable[str]) -> ScoreTable:
-    return read_scores(settings.targets, metrics, columns=settings.target_columns)
+    return read_scores((settings.target, *settings.targets[1:]), metrics, columns=settings.target_columns)
 
 
 OfMeans = Callable[[Floats, Floats, Sequence[Metric]], Floats]
@@ -258,6 +258,23 @@ def open_settings(settings: StudySettings, given: Any = None) -> Study:
     objective = objective_of(settings)
     truth, engine, code = _truth(settings, family), _engine(settings), user_code(settings)
     return Study(known, family, target, family.identity, truth, cautions, objective, engine, code)
+
+
+def open_bank(settings: StudySettings) -> Study:
+    """Load the family of a bank, a study without a target; its table of scores has zeros for those of a target.
+
+    Raises:
+        InputError: If anything in it cannot be used.
+    """
+    family = load_family(settings, settings.proxy)
+    for metric in settings.metrics:
+        if metric.name not in family.metrics:
+            raise settings.error("metrics", f"unknown metric '{metric.name}'; {nearest(metric.name, family.metrics)}")
+    names = dict.fromkeys((*(metric.name for metric in settings.metrics), *family.metrics))
+    table = ScoreTable.from_episodes(
+        {(agent, start): dict.fromkeys(names, 0.0) for agent in settings.agents for start in range(settings.starts)}
+    )
+    return Study(settings, family, table, family.identity, code=user_code(settings))
 
 
 def cautions_of(family: DomainFamily) -> tuple[str, ...]:

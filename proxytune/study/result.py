@@ -17,10 +17,11 @@ from proxytune.settings import nearest
 from proxytune.space import Theta
 from proxytune.storage import TrialRecord
 from proxytune.study.apart import apart_notes
+from proxytune.study.earlier import earlier_trials
 from proxytune.study.opening import Study, read_target
 from proxytune.study.preflight import Preflight, noise_of, preflight_of
 from proxytune.study.pruning import rescored_pruned, spared
-from proxytune.study.run import Confirmation, confirmation_of, knowledge_of, record, stopped
+from proxytune.study.run import Confirmation, confirmation_of, finalists, knowledge_of, record, stopped
 from proxytune.study.study_run import StudyRun, failure_of, score_trials
 from proxytune.usefulness import Assessment, NoiseFloor, assess
 
@@ -113,6 +114,11 @@ class StudyResult:
             return False
         return bool(self.judged.at_noise_floor) and self.knowledge.misfit.fits is not False and self.inside
 
+    @property
+    def earlier(self) -> int:
+        """The number of trials of earlier studies that count."""
+        return len(self.knowledge.trials) - len(self.trials)
+
     def value_of(self, trial: TrialRecord) -> float | None:
         """The objective of a finished trial; None of any other."""
         return trial.measures.get(self.study.objective.name)
@@ -144,14 +150,18 @@ def result_of(run: StudyRun, scored_anew: Sequence[TrialRecord] | None = None) -
         RunError: If no trial has a score.
     """
     trials = tuple(run.finished_trials() if scored_anew is None else scored_anew)
-    if not any(trial.state == "finished" for trial in trials):
+    earlier = earlier_trials(run)
+    if not any(trial.state == "finished" for trial in trials) and (run.settings.budget or not earlier):
         reason = f"all trials failed, the first because {trials[0].failure}" if trials else "no trial is finished yet"
         raise RunError(f"{run.store.path}: {reason}")
     study, space = run.study, run.settings.space
     learnt = knowledge_of(run, trials)
     confirmation = confirmation_of(run, trials, learnt)
     answers = _answers(trials, learnt)
-    answer = confirmation.answer.trial if confirmation else cast(TrialRecord, answers[-1])
+    if confirmation:
+        answer = confirmation.answer.trial
+    else:
+        answer = answers[-1] if answers and answers[-1] else record(0, run.evaluation_of(finalists(trials, learnt)[0]))
     best = _best(run, answer, learnt)
     return StudyResult(
         study=study,
@@ -160,7 +170,7 @@ def result_of(run: StudyRun, scored_anew: Sequence[TrialRecord] | None = None) -
         knowledge=learnt,
         answers=answers,
         truth=study.truth,
-        importances=importances(fit_surrogate(space, score_trials(space, trials))),
+        importances=importances(fit_surrogate(space, [*earlier, *score_trials(space, trials)])),
         confirmation=confirmation,
         preflight=preflight_of(run),
         stopped=stopped(run, trials),
@@ -210,7 +220,7 @@ def _best(run: StudyRun, answer: TrialRecord, learnt: Knowledge) -> Best:
     proxy = run.evaluation_of(answer).proxy
     assert proxy is not None
     assessment = assess(proxy=proxy, target=run.study.target, metrics=run.settings.metrics)
-    return Best(answer, learnt.expected[values], float(deviation[0]), assessment)
+    return Best(answer, learnt.expected_at(values), float(deviation[0]), assessment)
 
 
 def _failures(run: StudyRun, trials: tuple[TrialRecord, ...]) -> tuple[str, ...]:
@@ -271,5 +281,9 @@ def history_of(result: StudyResult) -> History:
         return PastTrial(trial.theta, state, trial.measures.get(study.objective.name), known)
 
     trials = tuple(past(trial) for trial in result.trials)
-    answer = [trial.number for trial in result.trials].index(result.best.trial.number)
+    # Where no trial visited the answer, the best of them is as near as a history of trials comes.
+    best = result.best.trial if result.best.trial.number else result.answers[-1] if result.answers else None
+    if best is None:
+        raise RunError(f"{study.settings.path}: no trial is finished yet; raise budget to have any to export")
+    answer = [trial.number for trial in result.trials].index(best.number)
     return History(study.settings.name, study.settings.space, trials, study.objective.maximise, answer)

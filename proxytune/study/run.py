@@ -30,6 +30,7 @@ from proxytune.search import (
     Proposer,
     Search,
     Trial,
+    Values,
     batch_at,
     expected_gain,
     expected_improvement,
@@ -37,8 +38,9 @@ from proxytune.search import (
     make_proposer,
 )
 from proxytune.seeds import fresh_seed
-from proxytune.space import Theta
+from proxytune.space import Space, Theta
 from proxytune.storage import State, TrialRecord
+from proxytune.study.earlier import earlier_trials, learn
 from proxytune.study.facts import check_facts, note_search
 from proxytune.study.opening import Objective, Study
 from proxytune.study.preflight import check_some_work, noise_of, run_preflight
@@ -74,13 +76,15 @@ def run_stages(run: StudyRun, warn: Callable[[str], None], known: Sequence[Outco
     check_facts(run)
     _attach(run, known)
     retry_failed(run)
+    learn(run)
     if line := note_search(run.study, run.store):
         warn(line)
     learnt = run_preflight(run)
     for warning in learnt.warnings if learnt and run.spent.episodes else ():
         warn(warning)
     # The proposer allows for the noise that the pre-flight measured.
-    run_trials(run, make_proposer(run.study.engine, run.settings.initial, goal_of(run)))
+    proposer = make_proposer(run.study.engine, run.settings.initial, goal_of(run))
+    run_trials(run, AfterEarlier(proposer, earlier) if (earlier := earlier_trials(run)) else proposer)
     run_confirmation(run)
 
 
@@ -96,6 +100,23 @@ def _attach(run: StudyRun, known: Sequence[Outcome | Theta]) -> None:
     opened = [TrialRecord(number, dict(theta)) for number, theta in enumerate(new, start=len(trials) + 1)]
     if opened:
         run.save_trials(*opened)
+
+
+@dataclass(frozen=True)
+class AfterEarlier:
+    """A proposer that is told of earlier studies' trials as of its own: where there are enough, none is a design's.
+
+    Attributes:
+        inner: The proposer.
+        earlier: The trials.
+    """
+
+    inner: Proposer
+    earlier: tuple[Trial, ...]
+
+    def propose(self, space: Space, trials: Sequence[Trial], seed: int) -> Values:
+        """The next point."""
+        return self.inner.propose(space, [*self.earlier, *trials], seed)
 
 
 def retry_failed(run: StudyRun) -> None:
@@ -125,12 +146,12 @@ def goal_of(run: StudyRun) -> Goal:
 
 
 def knowledge_of(run: StudyRun, done: Iterable[TrialRecord]) -> Knowledge:
-    """All that finished trials say of θ.
+    """All that finished trials say of θ, those of earlier studies too.
 
     Raises:
         RunError: If no trial has an outcome, or the store lacks episodes of one.
     """
-    trials = [run.search_trial(trial) for trial in done]
+    trials = [*earlier_trials(run), *(run.search_trial(trial) for trial in done)]
     return learn_theta(run.settings.space, trials, goal_of(run), run.settings.seed)
 
 
@@ -253,6 +274,8 @@ def stopped(run: StudyRun, done: Sequence[TrialRecord]) -> str:
     are asked where a batch has ended: a budget that cut one short has no say in what they would have said of the whole.
     """
     settings, rules = run.settings, run.settings.stop
+    if not settings.budget and not done:
+        return "the budget is 0 trials: earlier studies alone tell"
     if len(done) >= settings.budget:
         kept = f"; all {len(done)} that are finished count" if len(done) > settings.budget else ""
         return f"the budget of {settings.budget} trials is spent{kept}"
@@ -297,9 +320,10 @@ def _gain(run: StudyRun, done: Sequence[TrialRecord]) -> tuple[float, float]:
     """The most that any θ is expected to improve the objective, and its noise, as the study's engine sees it."""
     settings = run.settings
     if run.study.engine.learns_from == "outputs":
-        trials = [run.search_trial(trial) for trial in done]
+        trials = [*earlier_trials(run), *(run.search_trial(trial) for trial in done)]
         return expected_gain(settings.space, trials, goal_of(run), settings.seed)
-    return expected_improvement(settings.space, score_trials(settings.space, done), settings.seed)
+    scored = [*earlier_trials(run), *score_trials(settings.space, done)]
+    return expected_improvement(settings.space, scored, settings.seed)
 
 
 @dataclass(frozen=True)
@@ -346,9 +370,12 @@ def run_confirmation(run: StudyRun) -> None:
         RunError: If no trial has a score.
     """
     settings, trials = run.settings, run.finished_trials()
-    if not settings.confirm or not stopped(run, trials):
+    if not stopped(run, trials) or (trials and not settings.confirm):
         return
     chosen = finalists(trials, knowledge_of(run, trials))
+    # A θ that no trial visited gets what a trial would: its luck is told, and how near a perfect proxy comes.
+    new = [one.theta for one in chosen if not one.number]
+    run.outcomes([e for theta in new for e in plan_episodes(settings, theta, settings.seed)], "unvisited θ")
     known = most_confirmation_episodes(settings) - len(chosen) * _episodes_per_finalist(settings)
     run.watcher.begin("fresh episodes", known)
     for number, trial in enumerate(chosen, start=1):
@@ -368,11 +395,11 @@ def confirmation_of(run: StudyRun, trials: Sequence[TrialRecord], learnt: Knowle
     if not run.settings.confirm:
         return None
     driven = [_driven_again(run, trial) for trial in finalists(trials, learnt)]
-    known = tuple(one for one in driven if one is not None)
-    if len(known) < len(driven):
+    known = tuple(one for one in driven if one is not None and one.trial.state == "finished")
+    if not known or None in driven:
         return None
     # Each has as many fresh episodes, so what fresh noise does to all of them alike favours none.
-    expected = [learnt.expected[learnt.space.values(one.trial.theta)] for one in known]
+    expected = [learnt.expected_at(learnt.space.values(one.trial.theta)) for one in known]
     scores = [[mean, *(s for s in one.scores if s is not None)] for mean, one in zip(expected, known, strict=True)]
     answer = known[int(np.argmin([np.mean(each) for each in scores]))]
     return Confirmation(answer, known, _episodes_per_finalist(run.settings))
@@ -381,18 +408,30 @@ def confirmation_of(run: StudyRun, trials: Sequence[TrialRecord], learnt: Knowle
 def finalists(trials: Sequence[TrialRecord], learnt: Knowledge) -> list[TrialRecord]:
     """The trials that are driven again, that of lowest expected PRPV first: a function of what was finished alone.
 
+    Where earlier studies tell too, the most probable θ is among them, and θ that only those have visited may be: such
+    a one has the number 0, and no score yet.
+
     Args:
-        trials: Finished trials, one of them with a score.
-        learnt: What they say of θ.
+        trials: Finished trials, one of them with a score, if there are any.
+        learnt: What they and those of earlier studies say of θ.
     """
     # Of a pruned trial it is certain that it is none of the best.
     scored = {learnt.space.values(trial.theta): trial for trial in trials if trial.state == "finished"}
+    others = {learnt.space.values(trial.theta) for trial in trials} - scored.keys()
+    whole = [one for one in learnt.trials if one.values not in {*scored, *others} and one.outcome]
+    scored |= {
+        one.values: TrialRecord(0, learnt.space.theta(one.values), "finished")
+        for one in whole
+        if not np.isnan(one.outcome or ()).any()
+    }
     expected = {values: mean for values, mean in learnt.expected.items() if values in scored}
     best = min(expected, key=expected.__getitem__)
     noise = float(learnt.fresh_scores(best).std())
     near = [values for values, mean in expected.items() if mean - expected[best] <= noise]
     likeliest = learnt.likeliest_of(list(expected))
-    return [scored[values] for values in dict.fromkeys([near[0], likeliest, *near[1:]])][:MOST_FINALISTS]
+    mode = learnt.mode if whole else near[0]
+    scored.setdefault(mode, TrialRecord(0, learnt.space.theta(mode), "finished"))
+    return [scored[values] for values in dict.fromkeys([near[0], mode, likeliest, *near[1:]])][:MOST_FINALISTS]
 
 
 def _episodes_per_finalist(settings: StudySettings) -> int:
@@ -411,6 +450,11 @@ def _repetitions(settings: StudySettings, trial: TrialRecord) -> list[list[Episo
 
 
 def _driven_again(run: StudyRun, trial: TrialRecord) -> Finalist | None:
+    if not trial.number:
+        evaluation = run.evaluation(trial.theta)
+        if evaluation is None:
+            return None
+        trial = record(0, evaluation)
     repetitions = []
     for planned in _repetitions(run.settings, trial):
         known = run.known(planned)

@@ -44,7 +44,9 @@ def agents_of(read: Section) -> tuple[str, ...]:
 
 
 def targets_of(read: Section) -> tuple[str, ...]:
-    """The file of the target's scores, or several."""
+    """The file of the target's scores, or several; none of a bank."""
+    if "target" not in read.values:
+        return ()
     if not isinstance(read.values.get("target"), list):
         return (read.text("target"),)
     return read.texts("target") or (read.text("target"),)
@@ -181,8 +183,8 @@ FORMAT = 1
 LEARNING = "plv"
 """The objective that is not a measure of scores but of learning."""
 KEYS = (
-    "format", "name", "family", "proxy", "target", "target_columns", "truth", "objective", "metrics", "agents",
-    "starts", "budget", "initial", "batch", "engine", "seed", "jobs", "on_failure", "preflight", "confirm",
+    "format", "name", "family", "proxy", "target", "target_columns", "truth", "learn_from", "objective", "metrics",
+    "agents", "starts", "budget", "initial", "batch", "engine", "seed", "jobs", "on_failure", "preflight", "confirm",
     "cut_off", "stop", "parameters", "domain", "teaching", "held_out", "episode_timeout_s",
     FAMILIES,
 )  # fmt: skip
@@ -197,7 +199,6 @@ class StudySettings:
         name: What the study is called.
         family: Where the domain family comes from, as "module:factory".
         proxy: A model.toml whose effects the proxy has, if any.
-        target: The score table of the target; of several files the first.
         truth: A model.toml of what made the target, where that is known.
         objective: The measure that is made small or large: "prpv", "ppv", "plv", or one's own.
         metrics: How agents are compared.
@@ -218,7 +219,8 @@ class StudySettings:
         domain: The table that the family's factory reads.
         teaching: How a proxy's worth as a teacher is measured, if it is.
         aliases: What is loaded for an agent whose name in tables is another.
-        more_targets: The other files of the target's score table.
+        targets: The files that hold the target's scores; none of a bank, which simulates for other studies.
+        learn_from: Studies and tables of trials whose trials are known before the first one, as study.toml has them.
         target_columns: What columns are called in the target's files where that is another name.
         episode_timeout_s: How long an episode may take before it counts as failed [s], if that is limited.
         families: The same study of each of several domain families, by their names; empty of a study of one.
@@ -229,7 +231,6 @@ class StudySettings:
     name: str
     family: str
     proxy: Path | None
-    target: Path
     truth: Path | None
     objective: str
     metrics: tuple[Metric, ...]
@@ -250,16 +251,24 @@ class StudySettings:
     domain: Section
     teaching: TeachingSettings | None = None
     aliases: Mapping[str, str] = field(default_factory=dict)
-    more_targets: tuple[Path, ...] = ()
+    targets: tuple[Path, ...] = ()
+    learn_from: tuple[str, ...] = ()
     target_columns: Mapping[str, str] = field(default_factory=dict)
     episode_timeout_s: float | None = None
     families: Mapping[str, "StudySettings"] = field(default_factory=dict)
     family_name: str = ""
 
     @property
-    def targets(self) -> tuple[Path, ...]:
-        """The files that hold the target's scores."""
-        return (self.target, *self.more_targets)
+    def target(self) -> Path:
+        """The score table of the target; of several files the first.
+
+        Raises:
+            SettingsError: If there is none.
+        """
+        if not self.targets:
+            told = "is missing, so this is a bank, which `study` runs and learn_from names; name a table of scores"
+            raise self.error("target", told)
+        return self.targets[0]
 
     @property
     def loaded_agents(self) -> tuple[str, ...]:
@@ -307,13 +316,33 @@ def read_study_settings(path: Path) -> StudySettings:
     read = read_settings(path / FILE_NAME if path.is_dir() else path)
     study = _settings(read)
     tables = family_tables(read, study.family, study.name)
+    _check_known(study)
     if tables:
         _check_comparable(study)
     return replace(study, families={name: replace(_settings(one), family_name=name) for name, one in tables.items()})
 
 
+def _check_known(study: StudySettings) -> None:
+    """Refuse a study that has nothing to learn from, or could not use it."""
+    if not study.targets:
+        if study.objective == LEARNING:
+            raise study.error("objective", f"'{LEARNING}' needs a target, and this is a bank; name a target")
+        if study.learn_from:
+            raise study.error("learn_from", "is for studies with a target, and this is a bank; name a target")
+        if not study.preflight:
+            raise study.error("preflight", "is off, and tells a bank what placement does; leave it on")
+    if study.learn_from and study.objective == LEARNING:
+        raise study.error("learn_from", f"has scores, and '{LEARNING}' is not searched by them; remove it")
+    if not study.budget and not study.learn_from:
+        nothing = "is 0, and nothing is known without a trial; name studies in learn_from, or make it 1 or more"
+        raise study.error("budget", nothing)
+
+
 def _check_comparable(study: StudySettings) -> None:
     """Refuse a study whose families could not be compared."""
+    for key, has in (("target", bool(study.targets)), ("learn_from", not study.learn_from), ("budget", study.budget)):
+        if not has:
+            raise study.error(key, f"of a study of {FAMILIES}: needs a target, a budget, and trials of its own alone")
     if study.objective == LEARNING:
         raise study.error("objective", f"'{LEARNING}' is not for {FAMILIES}: they are tuned by scores, and teach after")
     if study.stop.wall_time_s is None:
@@ -333,13 +362,12 @@ def _settings(read: Section) -> StudySettings:
         name=read.text("name", path.absolute().parent.name),
         family=read.text("family", DEFAULT_FAMILY),
         proxy=read.file("proxy") if "proxy" in read.values else None,
-        target=targets[0],
         truth=read.file("truth") if "truth" in read.values else None,
         objective=objective,
         metrics=metrics_of(read),
         agents=agents_of(read),
         starts=read.whole("starts", low=1),
-        budget=read.whole("budget", low=1, high=100_000),
+        budget=read.whole("budget", high=100_000),
         initial=read.whole("initial", 8, low=1, high=100_000),
         batch=read.whole("batch", 1, low=1, high=100_000),
         # Of learning value nothing is known but the score.
@@ -355,7 +383,8 @@ def _settings(read: Section) -> StudySettings:
         domain=read.section("domain"),
         teaching=read_teaching(read.section("teaching")),
         aliases=aliases_of(read),
-        more_targets=targets[1:],
+        targets=targets,
+        learn_from=read.texts("learn_from", ()),
         target_columns=texts_of(read.section("target_columns")),
         episode_timeout_s=positive(read, "episode_timeout_s"),
     )
@@ -373,6 +402,7 @@ def settings_document(settings: StudySettings) -> Mapping[str, Any]:
         "path": str(settings.path),
         "family": settings.family,
         "proxy": str(settings.proxy) if settings.proxy else None,
+        "learn_from": list(settings.learn_from),
         "objective": settings.objective,
         "metrics": [str(metric) for metric in settings.metrics],
         "agents": list(settings.agents),

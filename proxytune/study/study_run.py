@@ -397,14 +397,15 @@ def with_spending(study: Study, *, budget: int | None = None, jobs: int | None =
         InputError: If one is out of bounds, or the study's trials are not the ones that a budget counts.
     """
     for name, value, most in (("budget", budget, MOST_TRIALS), ("jobs", jobs, MOST_JOBS)):
-        if value is not None and not 1 <= value <= most:
-            raise InputError(f"{name} must be between 1 and {most}, got {value}")
+        least = 0 if name == "budget" and study.settings.learn_from else 1
+        if value is not None and not least <= value <= most:
+            raise InputError(f"{name} must be between {least} and {most}, got {value}")
     settings = study.settings
     if budget is not None and settings.objective == LEARNING:
         raise settings.error(
             "budget", f"a search for '{LEARNING}' has its own; set teaching.budget in this file instead"
         )
-    spending = replace(settings, budget=budget or settings.budget, jobs=jobs or settings.jobs)
+    spending = replace(settings, budget=settings.budget if budget is None else budget, jobs=jobs or settings.jobs)
     return replace(study, settings=spending)
 
 

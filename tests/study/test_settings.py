@@ -195,10 +195,9 @@ def test_the_box_does_not_depend_on_the_order_of_its_lines(make_study):
 BAD = {
     "an unknown key": ({"bugdet": "5"}, "bugdet: unknown key; did you mean 'budget'?"),
     "a missing key": ({"budget": None}, "budget: is missing"),
-    "a missing target": ({"target": None}, "target: is missing"),
     "a number as text": ({"budget": '"many"'}, "budget: must be a whole number, got 'many'"),
     "a fraction": ({"starts": "2.5"}, "starts: must be a whole number"),
-    "no budget": ({"budget": "0"}, "budget: must be between 1 and"),
+    "no budget": ({"budget": "0"}, "budget: is 0, and nothing is known"),
     "no start": ({"starts": "0"}, "starts: must be between 1 and"),
     "no trial at all in a batch": ({"batch": "0"}, "batch: must be between 1 and"),
     "half a trial more in a batch": ({"batch": "1.5"}, "batch: must be a whole number"),

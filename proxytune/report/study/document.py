@@ -27,6 +27,7 @@ def study_document(result: StudyResult) -> dict[str, Any]:
         },
         "preflight": _preflight(result.preflight),
         "stopped": result.stopped or None,
+        "earlier": result.earlier,
         "cut_off": {"trials": len(result.pruned), "episodes": result.spared[0], "seconds": result.spared[1]},
         "trials": [_trial(trial) for trial in result.trials],
         "failures": list(result.failures),
@@ -40,7 +41,7 @@ def _best(result: StudyResult) -> dict[str, Any]:
     best, learnt, measures = result.best, result.knowledge, score_document(result.best.assessment)
     shared = ("prpv", "prpv_normalised", "prpv_interval", "ppv")
     return {
-        "index": best.trial.number,
+        "index": best.trial.number or None,
         "theta": dict(best.trial.theta),
         "theta_interval": intervals_document(learnt.intervals),
         "region_share": float(learnt.posterior.share),
@@ -75,7 +76,7 @@ def _fresh(confirmation: Confirmation | None, *, by_prpv: bool) -> dict[str, Any
         "episodes": confirmation.episodes,
         "candidates": [
             {
-                "index": one.trial.number,
+                "index": one.trial.number or None,
                 "prpv": round(one.trial.prpv or 0.0),
                 "fresh_prpv": [None if score is None else round(score) for score in one.scores if by_prpv],
                 "fresh_scores": list(one.scores),

@@ -356,10 +356,7 @@ def importance_figure(result: StudyResult) -> Figure:
 
 
 def study_figures(result: StudyResult) -> dict[str, Figure]:
-    """Convergence, profiles, evaluations and importance, by name."""
-    return {
-        "convergence": convergence_figure(result),
-        "profiles": profiles_figure(result),
-        "evaluations": evaluations_figure(result),
-        "importance": importance_figure(result),
-    }
+    """Convergence, profiles, evaluations and importance, by name; without trials only what needs none."""
+    drawn = {"convergence": convergence_figure, "profiles": profiles_figure}
+    drawn |= {"evaluations": evaluations_figure, "importance": importance_figure}
+    return {name: draw(result) for name, draw in drawn.items() if result.trials or name in ("profiles", "importance")}

@@ -191,7 +191,7 @@ def _say_what_to_add(finding: Finding) -> str:
 
 
 def _more_trials(finding: Finding) -> str:
-    more = f"raise budget from {finding.budget} to {2 * finding.budget}"
+    more = f"raise budget from {finding.budget} to {2 * finding.budget or 8}"
     return "loosen the rule under [stop] that ended the search" if finding.ruled else more
 
 

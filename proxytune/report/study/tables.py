@@ -83,7 +83,7 @@ def _theta_notes(result: StudyResult) -> list[str]:
     space, learnt = result.study.settings.space, result.knowledge
     notes = []
     if learnt.unidentified:
-        few = f"{len(result.trials)} trials exclude almost no value of {listed(list(map(plain, learnt.unidentified)))}"
+        few = f"{len(learnt.trials)} trials exclude almost no value of {listed(list(map(plain, learnt.unidentified)))}"
         notes.append(f"{few}; unidentified: the interval fills more than 0.9 of the range")
     if not result.inside:
         notes.append("the best θ by PRPV is outside the 95 % region, which uses every metric of every agent")
@@ -178,7 +178,10 @@ def search_table(result: StudyResult, spent: str = "") -> Table:
     count, budget = len(result.trials), result.study.settings.budget
     number = f"{count} (budget {budget})" if count > budget else f"{count} of {budget}"
     ended = f"; ended: {result.stopped}" if result.stopped else ""
-    rows: Rows = [("trials", f"{number}; best: trial {result.best.trial.number}{ended}")]
+    best = f"trial {result.best.trial.number}" if result.best.trial.number else "a θ that no trial visited"
+    rows: Rows = [("trials", f"{number}; best: {best}{ended}")]
+    if result.earlier:
+        rows.append(("earlier", f"{result.earlier} trials of {', '.join(result.study.settings.learn_from)}"))
     if result.preflight is not None:
         warnings = [line.removeprefix("pre-flight: ") for line in result.preflight.warnings]
         every = ["every parameter changes some metric beyond noise"]

@@ -1,0 +1,87 @@
+"""What a bank says before anything is measured: sentence, table, page and JSON document."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from rich.console import Group
+
+from proxytune.report.html import write_page
+from proxytune.report.study.page import study_foot
+from proxytune.report.text import file_texts, group_texts, table_text
+from proxytune.report.view import Paragraphs, Table, View, columns_of
+from proxytune.report.wording import listed, plain, short
+from proxytune.study import WITHIN, Bank, settings_document
+
+MOST_NAMED = 3
+MEANING = (
+    "Some trials were taken for a target in turn, with a new placement's noise, and told from the others. The width "
+    "is that of the 95 % interval, on average. The starts needed bring it to a thirtieth of the box to either side."
+)
+
+
+def bank_sentence(bank: Bank) -> str:
+    """Say which parameters these agents would tell, and how well."""
+    widths = bank.widths(bank.settings.starts)
+    told = [f"{plain(name)} to ± {short(width / 2.0)}" for name, width in widths.items()]
+    best = [name for name, _ in bank.agents[:MOST_NAMED]]
+    from_starts = f"{len(bank.settings.agents)} agents measured from {bank.settings.starts} starts"
+    return f"{bank.trials} trials: {from_starts} tell {listed(told)}; {listed(best)} tell most."
+
+
+def bank_document(bank: Bank) -> dict[str, Any]:
+    """A bank as plain JSON; its keys are promises."""
+    starts = bank.settings.starts
+    return {
+        "name": bank.settings.name,
+        "sentence": bank_sentence(bank),
+        "bank": {
+            "trials": bank.trials,
+            "expected_interval": bank.widths(starts),
+            "agents": [name for name, _ in bank.agents],
+            "starts": starts,
+            "expected_interval_by_starts": {str(count): bank.widths(count) for count in bank.expected},
+            "starts_needed": dict(bank.needed),
+            "within": {box.name: WITHIN * (box.high - box.low) for box in bank.settings.space.intervals},
+            "information": {
+                one.name: {"agents": dict(one.agents), "metrics": dict(one.metrics), "limit": one.limit}
+                for one in bank.expected[starts].information
+            },
+        },
+        "settings": dict(settings_document(bank.settings)),
+    }
+
+
+def bank_table(bank: Bank) -> Table:
+    """Each parameter with its expected width by the number of starts, the starts needed, and who tells it."""
+    told = {one.name: one for one in bank.expected[bank.settings.starts].information}
+    rows = []
+    for box in bank.settings.space.intervals:
+        needed, one = bank.needed[box.name], told.get(box.name)
+        agents = ", ".join(f"{name} {share:.0%}" for name, share in one.agents[:MOST_NAMED]) if one else ""
+        metrics = ", ".join(f"{name} {share:.0%}" for name, share in one.metrics[:2]) if one else ""
+        widths = [short(bank.widths(count)[box.name]) for count in bank.expected]
+        within = f"± {short(WITHIN * (box.high - box.low))}: {needed or 'not by starts'}"
+        rows.append((box.name, *widths, within, agents, metrics))
+    heads = [f"width, {count} start{'s' if count > 1 else ''}" for count in bank.expected]
+    columns = columns_of(("parameter",), (*heads, "starts needed", "agents that tell", "metrics that tell"))
+    return Table("What a target would tell", columns, tuple(rows), (MEANING,))
+
+
+def bank_text(bank: Bank, files: Mapping[str, Any]) -> Group:
+    """A bank as `study` prints it."""
+    return group_texts(f"{bank_sentence(bank)}\n", table_text(bank_table(bank)), *file_texts(files))
+
+
+def write_bank_page(bank: Bank, table: Path) -> Path:
+    """Write the page beside the table of trials; its path.
+
+    Raises:
+        RunError: If it cannot be written.
+    """
+    page = table.with_name("report.html")
+    learn = f'Measure these agents on the target and write learn_from = ["{table.parent.name}"] into its study.toml.'
+    parts = (bank_table(bank), Paragraphs("How to use it", (learn,)))
+    view = View(bank.settings.name, bank_sentence(bank), learn, parts)
+    write_page(page, view, study_foot(bank.settings))
+    return page

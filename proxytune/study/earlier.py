@@ -1,0 +1,275 @@
+"""Earlier studies whose trials are known before the first one: what an agent does at θ depends on no target.
+
+A source is the folder of a study, or the table of trials that a bank writes (`write_table`). It counts if it is of the
+same domain family, settings, parameters and agents; where its code or versions are others, some of its episodes are
+driven again and must come out alike. `learn` copies what counts into study.db before the first trial, and from then on
+that is a fact (`earlier_trials`): a source may grow, move or go. Trials of another study seed share another placement,
+which `Trial.placement` tells the search.
+"""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from proxytune.domain import Episode, Instance, instance_of
+from proxytune.errors import InputError, StoreError
+from proxytune.files import draft_of, shipped
+from proxytune.search import Trial
+from proxytune.seeds import episode_seed
+from proxytune.settings import is_finite, read_text
+from proxytune.storage import FILE_NAME as DATABASE, Store
+from proxytune.study.facts import LEARNT, stored_facts, study_facts
+from proxytune.study.settings import LEARNING, StudySettings, read_study_settings
+from proxytune.study.study_run import StudyRun, compose_of
+
+AGAIN = 12
+"""So many episodes of a source are driven again where its code or versions are others."""
+TOLERANCE = 1e-3
+"""Of its value, in which a metric of them may differ."""
+DIGITS = 5
+"""Of each score in a table of trials."""
+TABLE = "bank.json"
+FORMAT = 1
+
+Scores = Mapping[tuple[str, int], Mapping[str, float]]
+"""Metrics by agent and start."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """An earlier study as its folder or table has it.
+
+    Attributes:
+        path: Where it is.
+        facts: What its trials depend on.
+        trials: The scores of each domain instance under the study's own placement, episodes that failed left out.
+    """
+
+    path: Path
+    facts: Mapping[str, Any]
+    trials: Mapping[Instance, Scores]
+
+    def episode(self, theta: Instance, agent: str, start: int) -> Episode:
+        """An episode of it."""
+        return Episode(theta, agent, start, episode_seed(self.facts["seed"], start))
+
+
+def learn(run: StudyRun) -> None:
+    """Copy what earlier studies know into the store, unless it has been.
+
+    Raises:
+        InputError: If one of them is not there, or is none of this domain, with its name.
+        StoreError: If its database is damaged.
+    """
+    settings = run.settings
+    if not settings.learn_from or LEARNT in run.store.facts():
+        return
+    sources = [read_source(settings, name) for name in settings.learn_from]
+    places, rows, names = {settings.seed: 0}, [], sorted(_metrics(run))
+    for source in sources:
+        _check_same(run, source)
+        place = places.setdefault(source.facts["seed"], len(places))
+        inside = [theta for theta in source.trials if _is_inside(settings, theta)]
+        if not inside:
+            raise _refused(settings, source.path, "has no trial in the box of [parameters]; widen it, or remove this")
+        for theta in inside:
+            means = _means(source.trials[theta], settings, names)
+            rows.append([place, list(settings.space.values(dict(theta))), means])
+    unique = {json.dumps(row[:2]): row for row in rows}
+    told = {"metrics": names, "agents": list(settings.agents), "trials": list(unique.values())}
+    run.store.save_fact(LEARNT, {**told, "sources": [str(source.path) for source in sources]})
+
+
+def earlier_trials(run: StudyRun) -> tuple[Trial, ...]:
+    """The trials of earlier studies, as copied; those whose agents were not all driven have a score of what is likely.
+
+    Raises:
+        StoreError: If they are not as we write them.
+    """
+    settings, table = run.settings, run.study.target
+    if not settings.learn_from:
+        return ()
+    try:
+        learnt = run.store.facts()[LEARNT]
+        rows = [learnt["agents"].index(agent) for agent in table.agents]
+        metrics = [learnt["metrics"].index(name) if name in learnt["metrics"] else -1 for name in table.metrics]
+        shape = (len(learnt["trials"]), len(learnt["agents"]), len(learnt["metrics"]))
+        values = np.array([means for _, _, means in learnt["trials"]], dtype=float).reshape(shape)
+        placed = [(int(place), tuple(map(float, theta))) for place, theta, _ in learnt["trials"]]
+    except (KeyError, TypeError, ValueError, AttributeError):
+        raise StoreError(f"{run.store.path}: '{LEARNT}' is not as proxytune writes it; restore a copy") from None
+    values = np.concatenate([values, np.full((*shape[:2], 1), np.nan)], axis=2)[:, rows][:, :, metrics]
+    outputs = values.reshape(len(values), -1)
+    with np.errstate(invalid="ignore"):
+        middle = np.nansum(outputs, axis=0) / (~np.isnan(outputs)).sum(axis=0)
+    middle = np.where(np.isnan(middle), table.means.ravel(), middle)
+    scores = compose_of(run.study)(np.where(np.isnan(outputs), middle, outputs)).tolist()
+    return tuple(
+        Trial(theta, score, tuple(row), placement=place)
+        for (place, theta), score, row in zip(placed, scores, outputs.tolist(), strict=True)
+    )
+
+
+def read_source(settings: StudySettings, name: str) -> Source:
+    """A study or table of trials that learn_from names, from this study's folder on; or a study that is shipped.
+
+    Raises:
+        InputError: If it is not there, was not run, is this study, or learns from it in turn.
+        StoreError: If its database or table is damaged.
+    """
+    path = settings.folder / name
+    path = shipped("studies") / name if not path.exists() and (shipped("studies") / name).is_dir() else path
+    if not path.exists():
+        raise _refused(settings, path, "no such study or table of trials; check the path")
+    for home, learns in _chain(path):
+        if home.resolve() == settings.folder.resolve():
+            told = "learns from this study in turn" if learns else "is this very study"
+            raise _refused(settings, path, f"{told}; remove it")
+    if path.is_dir() and (path / DATABASE).exists():
+        return _of_study(path)
+    table = path / TABLE if path.is_dir() else path
+    if not table.exists():
+        told = f"has neither {DATABASE} nor {TABLE}; run it first: python -m proxytune study {path}"
+        raise _refused(settings, path, told)
+    return _of_table(table)
+
+
+def _chain(path: Path) -> Iterator[tuple[Path, bool]]:
+    """A source and all that it learns from in turn: each folder, and whether it is not the source itself."""
+    seen, left = set[Path](), [path]
+    while left:
+        one = left.pop()
+        if one.resolve() not in seen and one.is_dir():
+            seen.add(one.resolve())
+            yield one, len(seen) > 1
+            settings = read_study_settings(one)
+            left += [settings.folder / name for name in settings.learn_from]
+
+
+def _of_study(path: Path) -> Source:
+    settings = read_study_settings(path)
+    settings.check_single()
+    with Store.read(settings.home) as store:
+        facts = stored_facts(store)
+        done = [one for kind in store.searches() if kind != LEARNING for one in store.trials(kind)]
+        seeds = {start: episode_seed(facts["seed"], start) for start in range(facts["starts"])} if done else {}
+        trials: dict[Instance, Scores] = {}
+        for trial in done:
+            known = store.outcomes(facts["identity"], trial.theta).items()
+            scored = {(e.agent, e.start): o.metrics for e, o in known if o.metrics and seeds.get(e.start) == e.seed}
+            if scored and trial.state in ("finished", "cut"):
+                trials[instance_of(trial.theta)] = scored
+    return Source(path, facts, trials)
+
+
+def _of_table(path: Path) -> Source:
+    try:
+        kept = json.loads(read_text(path))
+        facts, metrics, agents = kept["facts"], kept["metrics"], kept["agents"]
+        trials: dict[Instance, Scores] = {}
+        if kept["format"] != FORMAT or not all(type(facts[key]) is int for key in ("seed", "starts")):
+            raise ValueError
+        for theta, scores in kept["trials"]:
+            cells = {(a, s): one for a, row in zip(agents, scores, strict=True) for s, one in enumerate(row) if one}
+            found = {key: dict(zip(metrics, one, strict=True)) for key, one in cells.items()}
+            if not all(is_finite(value) for one in (theta, *found.values()) for value in one.values()):
+                raise ValueError
+            trials[instance_of(theta)] = found
+    except OSError as problem:
+        raise StoreError(f"{path}: cannot be read ({problem.strerror}); check it") from None
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        raise StoreError(f"{path}: is no table of trials as proxytune writes it; restore a copy") from None
+    return Source(path, facts, trials)
+
+
+def write_table(run: StudyRun) -> Path:
+    """Write a study's trials as a table beside it, for other studies to learn from.
+
+    Raises:
+        StoreError: If it cannot be written.
+    """
+    source, path = _of_study(run.settings.home), run.settings.home / TABLE
+    metrics, agents = sorted(_metrics(run)), run.settings.agents
+
+    def cell(scores: Mapping[str, float] | None) -> list[float] | None:
+        return scores and [float(f"{scores[name]:.{DIGITS}g}") for name in metrics]  # type: ignore[return-value]
+
+    rows = [
+        [dict(theta), [[cell(scores.get((agent, s))) for s in range(run.settings.starts)] for agent in agents]]
+        for theta, scores in source.trials.items()
+    ]
+    table = {"format": FORMAT, "facts": dict(source.facts), "metrics": metrics, "agents": list(agents), "trials": rows}
+    try:
+        with draft_of(path) as draft:
+            draft.write_text(json.dumps(table, separators=(",", ":"), allow_nan=False) + "\n", encoding="utf-8")
+    except OSError as problem:
+        raise StoreError(f"{path}: cannot be written ({problem.strerror}); make room and run again") from None
+    return path
+
+
+def _check_same(run: StudyRun, source: Source) -> None:
+    """Refuse a source that is not of this domain, parameters, agents and starts."""
+    settings, theirs, ours = run.settings, source.facts, study_facts(run.study)
+    if not source.trials:
+        raise _refused(settings, source.path, "has no finished trial; run it first, or remove it")
+    agents = {agent for scores in source.trials.values() for agent, _ in scores}
+    if lacks := [agent for agent in settings.agents if agent not in agents]:
+        raise _refused(settings, source.path, f"has not driven {', '.join(lacks)}; remove it")
+    boxes = [sorted(name for name, _ in next(iter(source.trials))), sorted(settings.space.names)]
+    if boxes[0] != boxes[1]:
+        told = f"its parameters are {', '.join(boxes[0])}, this study's {', '.join(boxes[1])}"
+        raise _refused(settings, source.path, f"{told}; remove it")
+    if theirs["starts"] < settings.starts:
+        told = f"has driven from {theirs['starts']} starts, and this study asks for {settings.starts}"
+        raise _refused(settings, source.path, f"{told}; lower starts, or remove it")
+    same = all(theirs.get(key) == ours.get(key) for key in ("identity", "versions"))
+    loaded = [f"agents.{agent}" for agent in settings.agents]
+    settled = [key for key in {**theirs, **ours} if key == "family" or key.startswith("domain.")] if not same else []
+    for key in (*settled, *loaded):
+        if theirs.get(key) != ours.get(key):
+            values = [value or "not given" for value in (theirs.get(key), ours.get(key))]
+            raise _refused(settings, source.path, f"{key} is {values[0]} there and {values[1]} here; remove it")
+    if not same:
+        _check_again(run, source)
+
+
+def _check_again(run: StudyRun, source: Source) -> None:
+    """Drive episodes of a source again, spread over its trials and agents, and refuse one that comes out otherwise."""
+    cells = [(theta, *key) for theta, scores in source.trials.items() for key in sorted(scores)]
+    mine = [cell for cell in cells if cell[1] in run.settings.agents and cell[2] < run.settings.starts]
+    chosen = [mine[row] for row in np.unique(np.linspace(0, len(mine) - 1, AGAIN).round().astype(int))]
+    planned = [source.episode(*cell) for cell in chosen]
+    found = run.outcomes(planned, f"episodes of {source.path.name} again")
+    for (theta, agent, start), episode in zip(chosen, planned, strict=True):
+        before, now = source.trials[theta][agent, start], found[episode].metrics or {}
+        for name, value in before.items():
+            again = now.get(name, float("inf")) if name in _metrics(run) else value
+            if abs(again - value) > TOLERANCE * max(abs(value), TOLERANCE):
+                told = f"its code or versions are others, and {agent} from start {start} has {name} {value:.4g} there"
+                raise _refused(run.settings, source.path, f"{told} and {again:.4g} here; run it again, or remove it")
+
+
+def _metrics(run: StudyRun) -> set[str]:
+    return {*run.study.family.metrics, *(metric.name for metric in run.settings.metrics)}
+
+
+def _is_inside(settings: StudySettings, theta: Instance) -> bool:
+    return all(box.low <= dict(theta)[box.name] <= box.high for box in settings.space.intervals)
+
+
+def _means(scores: Scores, settings: StudySettings, names: Sequence[str]) -> list[list[float | None]]:
+    """Each agent's mean metrics over the study's starts; None where no episode tells."""
+
+    def mean(agent: str, name: str) -> float | None:
+        known = [scores[agent, s][name] for s in range(settings.starts) if name in scores.get((agent, s), {})]
+        return float(np.mean(known)) if known else None
+
+    return [[mean(agent, name) for name in names] for agent in settings.agents]
+
+
+def _refused(settings: StudySettings, path: Path, why: str) -> InputError:
+    return settings.error("learn_from", f"{path}: {why}")

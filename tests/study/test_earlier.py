@@ -1,0 +1,188 @@
+"""Earlier studies count before the first trial, or are refused in one line that names them."""
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from proxytune.api import read_study, run_study
+from proxytune.cli.main import main
+from proxytune.errors import ProxytuneError
+from proxytune.storage import Store
+from proxytune.study import StudyRun, open_study, read_study_settings
+from proxytune.study.earlier import TABLE, earlier_trials
+from tests.conftest import MakeStudy
+
+BANK = {"target": None, "preflight": "true", "budget": "10", "engine": None}
+LEARNS = {"learn_from": '["../bank"]', "budget": "0", "engine": None, "confirm": "1"}
+
+
+@pytest.fixture(scope="module")
+def bank(make_studies: MakeStudy) -> Path:
+    """A bank that has been run."""
+    folder = make_studies("bank", **BANK)
+    assert main(["study", str(folder), "--json"]) == 0
+    return folder
+
+
+@pytest.fixture
+def beside(bank: Path, tmp_path: Path) -> Path:
+    """The same bank beside a test's own studies."""
+    return Path(shutil.copytree(bank, tmp_path / "bank"))
+
+
+def test_knowledge_alone_answers_without_a_trial(beside: Path, make_study: MakeStudy) -> None:
+    """With budget = 0 the document has posterior, answer, misfit and confirmation, and no trial was run."""
+    found = run_study(make_study(**LEARNS)).document()
+    assert found["trials"] == []
+    assert found["earlier"] == 10
+    assert found["best"]["index"] is None
+    assert found["best"]["fresh"]["prpv"] is not None
+    assert found["misfit"]["p_value"] is not None
+    low, high = found["best"]["theta_interval"]["trim"]
+    assert low <= 0.1 <= high
+    assert high - low < 0.3
+
+
+def test_a_study_with_knowledge_has_no_design(beside: Path, make_study: MakeStudy) -> None:
+    """The first trial is proposed from what is known; the answer knows of earlier trials too."""
+    known = run_study(make_study(**{**LEARNS, "budget": "2"})).document()
+    alone = run_study(make_study("alone", engine=None, budget="2")).document()
+    assert [one["index"] for one in known["trials"]] == [1, 2]
+    assert known["earlier"] == 10
+    assert known["trials"][0]["theta"] != alone["trials"][0]["theta"]
+    assert known["best"]["region_share"] < alone["best"]["region_share"] + 1e-9
+
+
+@pytest.mark.slow
+def test_what_is_learnt_is_a_fact(beside: Path, make_study: MakeStudy) -> None:
+    """A source that grows, or goes, changes nothing of a study that has learnt from it."""
+    folder = make_study(**LEARNS)
+    first = run_study(folder).document()
+    make_study("bank", **{**BANK, "budget": "12"})
+    assert main(["study", str(beside), "--json"]) == 0
+    assert run_study(folder).document() == first
+    shutil.rmtree(beside)
+    assert run_study(folder).document() == first == read_study(folder).document()
+
+
+@pytest.mark.slow
+def test_a_table_knows_what_its_study_knows(beside: Path, make_study: MakeStudy) -> None:
+    """The table that a bank writes gives the same answer as its database, to the digits that it has."""
+    first = run_study(make_study(**LEARNS)).document()["best"]["theta_interval"]
+    (beside / "study.db").unlink()
+    second = run_study(make_study("other", **LEARNS)).document()["best"]["theta_interval"]
+    assert second == {name: pytest.approx(ends, abs=0.01) for name, ends in first.items()}
+
+
+@pytest.mark.slow
+def test_trials_of_another_seed_are_another_placement(beside: Path, make_study: MakeStudy) -> None:
+    """Trials that share the study's seed have its placement, 0; others one of their own."""
+    for seed, placement in (("1", 0), ("2", 1)):
+        folder = make_study(f"seed{seed}", **{**LEARNS, "seed": seed})
+        run_study(folder)
+        with Store.read(folder) as store:
+            assert {one.placement for one in earlier_trials(StudyRun(open_study(folder), store))} == {placement}
+
+
+def _cut_in_half(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+def _other_code(folder: Path, shift: float) -> None:
+    """Make the source's table one of other code, whose scores differ by so much."""
+    (folder / "study.db").unlink()
+    table = json.loads((folder / TABLE).read_text())
+    table["facts"]["identity"] = "other"
+    table["trials"] = [
+        [theta, [[one and [value + shift for value in one] for one in row] for row in scores]]
+        for theta, scores in table["trials"]
+    ]
+    (folder / TABLE).write_text(json.dumps(table))
+
+
+def test_other_code_that_plays_the_same_counts(beside: Path, make_study: MakeStudy) -> None:
+    """Twelve episodes of a source of other code are driven again; where they come out alike it counts."""
+    _other_code(beside, 0.0)
+    report = run_study(make_study(**LEARNS))
+    assert report.document()["earlier"] == 10
+
+
+BAD = {
+    "another robot": ({}, lambda bank: _set_fact(bank, "domain.robot", '"cart"'), "domain.robot is .*cart.* there"),
+    "other agents": ({"agents": '["agent0", "agent1"]'}, None, "has not driven agent2, agent3"),
+    "fewer starts": ({"starts": "2"}, None, "has driven from 2 starts, and this study asks for 3"),
+    "other code": ({}, lambda bank: _other_code(bank, 0.5), "its code or versions are others, and agent"),
+    "half a database": ({}, lambda bank: _cut_in_half(bank / "study.db"), "study.db: "),
+    "half a table": ({}, lambda bank: ((bank / "study.db").unlink(), _cut_in_half(bank / TABLE)), "no table of trials"),
+    "not run": ({}, lambda bank: [(bank / name).unlink() for name in ("study.db", TABLE)], "run it first"),
+    "not there": ({}, lambda bank: shutil.rmtree(bank), "no such study or table of trials"),
+}
+
+
+def _set_fact(folder: Path, key: str, value: str) -> None:
+    """Make the source's table one of another setting, and so of another identity."""
+    (folder / "study.db").unlink()
+    table = json.loads((folder / TABLE).read_text())
+    table["facts"] |= {"identity": "other", key: value}
+    (folder / TABLE).write_text(json.dumps(table))
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_a_source_that_is_none_is_refused(case: str, tmp_path: Path, bank: Path, make_study: MakeStudy) -> None:
+    """One line names the study.toml or the file, the source, what is wrong and what to do."""
+    changes, spoil, words = BAD[case]
+    if changes:
+        main(["study", str(make_study("bank", **{**BANK, **changes})), "--json"])
+    else:
+        spoil(Path(shutil.copytree(bank, tmp_path / "bank")))
+    with pytest.raises(ProxytuneError, match=words) as refused:
+        run_study(make_study(**LEARNS))
+    assert str(refused.value).count("\n") == 0
+    assert "bank" in str(refused.value)
+
+
+def test_a_study_learns_neither_from_itself_nor_in_a_circle(make_study: MakeStudy) -> None:
+    """Both are refused by name."""
+    folder = make_study(**{**LEARNS, "learn_from": '["../study"]'})
+    with pytest.raises(ProxytuneError, match="is this very study"):
+        run_study(folder)
+    make_study("monday", **{**LEARNS, "learn_from": '["../study"]'})
+    make_study(**{**LEARNS, "learn_from": '["../monday"]'})
+    with pytest.raises(ProxytuneError, match="monday: learns from this study in turn"):
+        run_study(folder)
+
+
+SETTINGS = {
+    "nothing known": ({"budget": "0"}, "budget: is 0, and nothing is known"),
+    "a bank by learning value": ({"target": None, "objective": '"plv"'}, "objective: 'plv' needs a target"),
+    "a bank that learns": ({"target": None, "preflight": "true", "learn_from": '["x"]'}, "learn_from: is for studies"),
+    "a bank without pre-flight": ({"target": None}, "preflight: is off"),
+    "learning value that learns": ({"objective": '"plv"', "learn_from": '["x"]'}, "learn_from: has scores"),
+}
+
+
+@pytest.mark.parametrize("case", SETTINGS)
+def test_settings_that_know_nothing_are_refused(case: str, make_study: MakeStudy) -> None:
+    """One line names the key and says what to do."""
+    changes, words = SETTINGS[case]
+    with pytest.raises(ProxytuneError, match=re.escape(words)):
+        read_study_settings(make_study(**changes))
+
+
+def test_a_bank_is_for_study_alone(beside: Path) -> None:
+    """Commands that need a target refuse it in one line."""
+    with pytest.raises(ProxytuneError, match="target: is missing, so this is a bank"):
+        run_study(beside)
+
+
+def test_a_damaged_fact_is_told(beside: Path, make_study: MakeStudy) -> None:
+    """What was learnt is not as it was written: one line, no traceback."""
+    folder = make_study(**LEARNS)
+    run_study(folder)
+    with Store.open(folder) as store:
+        store.save_fact("learnt", {"trials": 3})
+    with pytest.raises(ProxytuneError, match="'learnt' is not as proxytune writes it"):
+        run_study(folder)

@@ -39,7 +39,7 @@ SAME_CODE = {
     "environments": (
         "f5b9c2c9586c29cd4dc2d6e27f44fd2731ecc2d27bf96a80c745aecd5a3ddb50",
         "efd8ee20ccef978bc76d2d8a4347a02b439e79a2e68d2dd89f86ca5ae1a37343",
-        "c3440e9fa88c4672c69e9869d9638955f66fe73ec8721eab73c976d0ba22cbc3",
+        "e5ccdf9c955c61978f9bdf5929314e998ca5a90b6eba16f59dfcb4033190b770",
     ),
     "engine outcomes": ("94c0ba12f9bf", "169c7ef2065e"),
     "engine composite": ("82865583b592", "169c7ef2065e"),

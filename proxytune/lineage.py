@@ -39,7 +39,7 @@ SAME_CODE = {
     "environments": (
         "f5b9c2c9586c29cd4dc2d6e27f44fd2731ecc2d27bf96a80c745aecd5a3ddb50",
         "efd8ee20ccef978bc76d2d8a4347a02b439e79a2e68d2dd89f86ca5ae1a37343",
-        "6b5ac819fbc8582d3d4ba9b8af27e5c03958c83adbb8d2045c50ecb9337045cc",
+        "0bc581a6e212bdd4b71ea5499c7421387f6648798b00f044c0e70df6dcd086a8",
     ),
     "engine outcomes": ("94c0ba12f9bf", "169c7ef2065e", "bd67473b82b2"),
     "engine composite": ("82865583b592", "169c7ef2065e", "bd67473b82b2"),

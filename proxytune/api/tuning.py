@@ -17,7 +17,7 @@ import tomlkit
 from proxytune.api.scores import column_table
 from proxytune.api.search_box import box_space
 from proxytune.api.study import StudyReport, run_quietly
-from proxytune.domain import Episode, Outcome, make_episode
+from proxytune.domain import Episode, Outcome
 from proxytune.errors import EpisodeError, InputError
 from proxytune.files import temporary_folder
 from proxytune.identity import digest, meaning_of_code
@@ -120,7 +120,7 @@ def tune(
     with temporary_folder() if folder is None else nullcontext(Path(folder)) as home, _written(home, scores) as target:
         table = read_scores(target, [Metric.parse(one).name for one in compared], columns=columns)
         names = tuple(agents) if agents else table.agents
-        simulate = _environment(simulator, space, agents, domain or {}, home) if agents else simulator
+        simulate = _environment(simulator, space, agents, domain, home) if agents else simulator
         if not callable(simulate):
             raise InputError(f"simulator: {simulate!r} is no function; an environment needs agents={{name: policy}}")
         counted = int(table.counts.max()) if "start" in _arguments(simulate) else 1
@@ -218,53 +218,12 @@ def _arguments(simulate: Simulate) -> frozenset[str]:
         return frozenset()
 
 
-@dataclass(frozen=True)
-class _Played:
-    """An environment as a function of θ, agent, start and seed."""
-
-    family: Any
-    name: str
-    make: Callable[..., Any] | None
-
-    def __call__(self, theta: Theta, agent: str, start: int, seed: int) -> Mapping[str, float]:
-        _register(self.name, self.make)
-        return self.family.run(make_episode(theta, agent=agent, start=start, seed=seed))  # type: ignore[no-any-return]
-
-
-def _register(name: str, make: Callable[..., Any] | None) -> None:
-    """Have Gymnasium know what makes an environment, in this process."""
-    import gymnasium
-
-    if make is not None:
-        gymnasium.registry.pop(name, None)
-        gymnasium.register(name, entry_point=make)
-
-
-def _environment(
-    given: Any, space: Space, policies: Mapping[str, Any], domain: Mapping[str, Any], home: Path
-) -> _Played:
-    """The function that plays an environment's episodes.
+def _environment(simulator: Any, space: Space, agents: Mapping[str, Any], domain: Any, home: Path) -> Simulate:
+    """An environment as a function; Gymnasium is loaded for it alone.
 
     Raises:
-        InputError: If the environment, a parameter or a policy cannot be used.
+        InputError: If Gymnasium, the environment, a parameter or a policy cannot be used.
     """
-    from proxytune.effects import PARAMETERS
-    from proxytune.environments import gymnasium_family
-    from proxytune.settings import Section
+    from proxytune.environments import played_environment
 
-    make = None if isinstance(given, str) else given
-    name = given if make is None else f"proxytune_tune/{getattr(make, '__name__', type(make).__name__).strip('<>')}-v0"
-    _register(name, make)
-    own = {
-        one.name: {
-            "attribute" if "." in one.name else "argument": one.name,
-            "low": one.low,
-            "high": one.high,
-            "neutral": 0.5 * (one.low + one.high),
-        }
-        for one in space.intervals
-        if one.name not in PARAMETERS
-    }
-    section = Section(home / FILE_NAME, "domain.", {"environment": name, "parameters": own, **domain})
-    family = gymnasium_family(section, model=None, policies=policies)
-    return _Played(family, name, make)
+    return played_environment(simulator, space, agents, domain or {}, home / FILE_NAME)

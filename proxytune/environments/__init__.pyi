@@ -1,1 +1,2 @@
-from .family import agent_of as agent_of, gymnasium_family as gymnasium_family
+from .family import agent_of as agent_of
+from .given import played_environment as played_environment

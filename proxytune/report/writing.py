@@ -77,7 +77,7 @@ def svg_of(figure: Figure) -> bytes:
 def _marks(figure: Figure) -> Iterator[tuple[str, list[str]]]:
     """Whatever is drawn by markers gets a name, with which goes what each of its markers says."""
     for axes in figure.axes:
-        drawn = [line for line in axes.lines if line.get_transform() is axes.transData]
+        drawn: list[Any] = [line for line in axes.lines if line.get_transform() is axes.transData]
         for artist in (*drawn, *(one for one in axes.collections if isinstance(one, PathCollection))):
             points = np.asarray(artist.get_xydata() if isinstance(artist, Line2D) else artist.get_offsets())
             label, name = str(artist.get_label()), f"mark{id(artist)}"

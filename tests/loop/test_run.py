@@ -90,7 +90,7 @@ def test_before_and_after_come_with_interval_and_floor(closed_once):
             assert levels[side]["floor_ends"] is not None
     page = (folder / "loop" / "report.html").read_text()
     assert document["sentence"] in page
-    assert page.count("data:image/png;base64,") == 1
+    assert page.count('<svg class="drawn"') == 1
 
 
 @pytest.fixture
@@ -104,8 +104,8 @@ def righting(closed, diagnosed, close):
 def captions_of_episodes(folder):
     """Captions of the righted agent's pictures on the page."""
     page = (folder / "loop" / "report.html").read_text()
-    captions = re.findall(r'<img [^>]*src="data:image/png.*?<figcaption[^>]*>(.*?)</figcaption>', page, re.DOTALL)
-    assert len(captions) == page.count("data:image/png;base64,")
+    captions = re.findall(r'<svg class="drawn".*?<figcaption[^>]*>(.*?)</figcaption>', page, re.DOTALL)
+    assert len(captions) == page.count('<svg class="drawn"')
     return [caption for caption in captions if "seed" in caption]
 
 
@@ -137,7 +137,7 @@ def test_without_a_twin_the_righted_agent_is_named_but_not_shown(righting, close
 @pytest.mark.slow
 def test_kept_pictures_that_are_damaged_are_told_of_and_drawn_again_once_removed(righting, close, capsys):
     kept = righting[0] / "loop" / "righted"
-    (kept / "before.png").unlink()
+    (kept / "before.svg").unlink()
     assert main(["loop", str(righting[0])]) == 1
     assert "pictures.json: cannot be read; remove it to draw the righted agent again" in capsys.readouterr().err
     (kept / "pictures.json").unlink()
@@ -268,4 +268,4 @@ def test_a_real_diagnosis_names_what_the_proxy_lacks(tmp_path):
     document, page, _ = finished(tmp_path)
     assert [effect["name"] for effect in document["effects"]] == ["dead_band"]
     assert document["errors"]["error"]["after"]["value"] < 0.2 * document["errors"]["error"]["before"]["value"]
-    assert page.count("data:image/png;base64,") == 3
+    assert page.count('<svg class="drawn"') == 3

@@ -7,10 +7,12 @@ from io import BytesIO
 
 import pytest
 from hypothesis import given, strategies as st
+from matplotlib.figure import Figure
 from PIL import Image
 
 from proxytune.report.html import MANY, page_html, write_page
 from proxytune.report.view import Column, Foot, Paragraphs, Picture, Table, View, columns_of, foot_of
+from proxytune.report.writing import svg_of
 
 VOID = {"meta", "link", "img", "br"}
 EVIL = "<script>alert('\"&')</script>"
@@ -170,16 +172,14 @@ def test_the_foot_says_how_to_come_by_it_again():
     assert re.match(r"\d{4}-\d\d-\d\d \d\d:\d\d", written.date)
 
 
-@pytest.mark.parametrize(("dpi", "width"), [(None, 400), ((200, 200), 288)])
-def test_figures_are_drawn_at_one_and_a_half_times_their_printed_size(dpi, width):
+@pytest.mark.parametrize(("dpi", "width"), [(None, 400), ((200, 200), 320)])
+def test_pictures_are_drawn_at_160_pixels_to_the_inch(dpi, width):
     image = png(400, **({"dpi": dpi} if dpi else {}))
     (attrs,) = Reader(html_of(replace(VIEW, parts=(Picture("P", image, "C"),)))).all("img")
     assert attrs["width"] == str(width)
 
 
-@pytest.mark.parametrize(
-    ("image", "kind"), [(b"GIF89a", "gif"), (b'<?xml version="1.0"?><svg xmlns="x"></svg>', "svg+xml"), (png(), "png")]
-)
+@pytest.mark.parametrize(("image", "kind"), [(b"GIF89a", "gif"), (png(), "png")])
 def test_pictures_are_data_of_their_own_kind(image, kind):
     if kind == "gif":
         file = BytesIO()
@@ -196,3 +196,49 @@ def test_what_is_no_picture_is_refused():
 def test_a_page_is_written_as_it_is_shown(tmp_path):
     write_page(tmp_path / "new" / "report.html", VIEW, FOOT)
     assert (tmp_path / "new" / "report.html").read_text(encoding="utf-8") == html_of(VIEW)
+
+
+def drawn(label="design", xlabel="trial"):
+    figure = Figure(figsize=(3.0, 2.0))
+    axes = figure.subplots()
+    axes.plot([1.0, 2.0], [3.0, 4.5], "o", label=label)
+    axes.set_xlabel(xlabel)
+    axes.set_ylabel("PRPV")
+    return svg_of(figure)
+
+
+def test_a_figure_is_part_of_the_page_and_its_markers_say_their_values():
+    """An SVG is drawn inline, 160 pixels to the inch, and hovering a marker tells what it stands for."""
+    page = html_of(replace(VIEW, parts=(Picture("P", drawn(), "C"),)))
+    assert "<title>design; trial 1; PRPV 3</title>" in page
+    assert "<title>design; trial 2; PRPV 4.5</title>" in page
+    assert "width:480px" in page
+    assert 'role="img"' in page
+
+
+def test_two_figures_on_a_page_share_no_names():
+    """Whatever a figure refers to is its own, so that no figure changes another."""
+    page = html_of(replace(VIEW, parts=(Picture("P", drawn(), "C"), Picture("Q", drawn(), "C"))))
+    names = re.findall(r' id="([^"]+)"', page)
+    assert len(names) == len(set(names))
+    wanted = set(re.findall(r'(?:href="#|url\(#)([^")]+)', page))
+    assert wanted <= set(names)
+
+
+def test_a_name_in_a_figure_is_text_and_nothing_else():
+    """What a user calls an agent or a metric cannot become a tag."""
+    page = html_of(replace(VIEW, parts=(Picture("P", drawn("<script>x</script>--><b>", "<i>&"), "C"),)))
+    assert "<script" not in page
+    assert "<b>" not in page
+    assert "<i>" not in page
+
+
+def test_words_are_explained_where_they_are_used_and_links_stay_beside_the_page():
+    """Jargon has a meaning at the foot; a link goes to a file near the page and never elsewhere."""
+    said = Paragraphs(
+        "P", ("The noise floor. [here](diagnosed/report.html) [there](https://x.org) [up](../report.html)",)
+    )
+    page = html_of(replace(VIEW, parts=(said,)))
+    assert "<dt>noise floor</dt>" in page
+    assert "<dt>nats</dt>" not in page
+    assert re.findall(r'<a href="([^"#]+)', page) == ["diagnosed/report.html", "../report.html"]

@@ -61,6 +61,9 @@ class Rules:
     most_effects: int = 5
     """Effects that may be adopted: a search that goes astray ends."""
 
+    most_effects_of_cars: int = 10
+    """Those of a car: its nominal figures say neither how throttle becomes speed nor how steering becomes an angle."""
+
     curve_factor: float = 1.2
     curve_margin_nats: float = 30.0
     """A curve over a signal is believed over named effects if it gains by this factor more, and by so many nats. It has

@@ -144,7 +144,7 @@ def contradiction(unit: Unit, values: Floats) -> str:
         size = np.ptp(seen) if unit.quantity == "length" else np.abs(seen).max()
     if unit.quantity == "duty" and size * unit.factor > 1.0 + 1e-6:
         pulses = "; servo pulses are made shares by (pulse - rest) / range" if PULSES[0] < size < PULSES[1] else ""
-        return f"{size:g} is more than 1, all that there is{pulses}"
+        return f"{size:g} is more than full duty{pulses}"
     if size * unit.factor > LARGEST.get(unit.quantity, np.inf):
         return f"{size:g} {unit.name} {'from end to end ' if unit.quantity == 'length' else ''}is much for a robot"
     return ""

@@ -276,3 +276,13 @@ def test_figures_are_read_by_the_names_of_log_toml():
 def test_a_figure_that_is_none_is_refused(text):
     with pytest.raises(InputError, match="--figure"):
         read_geometry([text])
+
+
+def test_a_cars_commands_and_its_switch_stand_beside_the_poses(tmp_path, write_file):
+    rows = "".join(f"{t / 20},{t / 50},0,0,0.3,{t % 3 - 1},1\n" for t in range(40))
+    source = read_source(write_file("time,x,y,heading,throttle,steering,enabled\n" + rows, "car.csv"), Wanted())
+    log = write_log(source, tmp_path / "log", Facts(robot="car"), "car.csv")
+    header = (tmp_path / "log" / "samples.csv").read_text().splitlines()[0]
+    assert header == "episode,time,x,y,heading,throttle,steering,enabled"
+    assert log.command == "ackermann"
+    assert not (tmp_path / "log" / "commands.csv").exists()

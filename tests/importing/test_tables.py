@@ -532,7 +532,7 @@ def test_tum_bad_commands_are_refused(file_of_tum):
         in complaint_of_tum(path)
     )
     assert "no such file of commands" in complaint_of_tum(path, commands="elsewhere.csv")
-    assert "unknown name 'speed'" in complaint_of_tum(path, columns={"speed": "lin"})
+    assert "unknown name 'velocity'" in complaint_of_tum(path, columns={"velocity": "lin"})
 
 
 def test_trajectories_are_known_by_content(file_of_tum, tmp_path):
@@ -559,3 +559,27 @@ def test_tum_whatever_happens_to_the_bytes_nothing_but_a_log_error_comes_out(fil
         said = str(problem)
     assert "\n" not in said
     assert all(np.isfinite(drive.poses.headings).all() for drive in drives)
+
+
+CAR = "time,x,y,heading,gas,servo,switch\n0,0,0,0,0.3,0.5,1\n0.1,0.1,0,0.1,0.3,-0.5,0\n0.2,0.2,0,0.2,0.2,0,1\n"
+CAR_MAP = {"throttle": "gas", "steering": "servo", "enabled": "switch"}
+
+
+def test_throttle_steering_and_the_switch_are_a_cars_commands(file):
+    (drive,) = read(file(CAR), columns=CAR_MAP).drives
+    assert drive.commands.kind == "ackermann"
+    np.testing.assert_array_equal(drive.commands.values, [[0.3, 0.5, 1.0], [0.3, -0.5, 0.0], [0.2, 0.0, 1.0]])
+
+
+def test_speed_and_wheel_angle_are_a_cars_commands_too(file):
+    text = CAR.replace("gas,servo,switch", "speed,steering_angle_deg,switch").replace("0.5", "20")
+    (drive,) = read(file(text)).drives
+    assert drive.commands.kind == "speed_steering"
+    np.testing.assert_allclose(drive.commands.values[0], [0.3, np.radians(20.0)])
+
+
+@pytest.mark.parametrize(
+    ("steering", "said"), [("28", "28 is more than full duty"), ("1650", "servo pulses are made shares")]
+)
+def test_steering_in_degrees_or_pulses_is_refused(file, steering, said):
+    assert said in complaint(file(CAR.replace("0.5,1", f"{steering},1")), columns=CAR_MAP)

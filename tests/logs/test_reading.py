@@ -528,3 +528,41 @@ def test_measured_logs_in_degrees_are_found_out(folder_of_reading, name):
     assert "look like degrees" in complaint(
         folder_of_reading(turned, (DATA / name / "log.toml").read_text(encoding="utf-8"))
     )
+
+
+CAR_TOML = TOML.replace('"twist"', '"ackermann"')
+CAR = "episode,time,x,y,heading,throttle,steering,enabled\na,0,0,0,0,0.3,0.5,0\na,0.1,0,0,0,0.4,-1,1\n"
+
+
+def test_the_switch_of_a_car_cuts_its_motor_and_leaves_its_steering(tmp_path):
+    (episode,) = read_log(write_files(tmp_path / "log", {"log.toml": CAR_TOML, "samples.csv": CAR})).episodes
+    np.testing.assert_array_equal(episode.commands, [[0.0, 0.5], [0.4, -1.0]])
+
+
+def test_the_switch_of_a_robot_on_two_wheels_stops_both(tmp_path):
+    samples = CAR.replace("throttle,steering", "left,right")
+    files = {"log.toml": TOML.replace('"twist"', '"duty"'), "samples.csv": samples}
+    (episode,) = read_log(write_files(tmp_path / "log", files)).episodes
+    np.testing.assert_array_equal(episode.commands, [[0.0, 0.0], [0.4, -1.0]])
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "kind", "said"),
+    [
+        ("0.5,0", "28,0", "ackermann", "column 'steering': steering must be between -1 and 1, got 28; divide degrees"),
+        ("0.3,", "30,", "ackermann", "column 'throttle': throttle must be between -1 and 1, got 30; divide a percent"),
+        ("0.5,0", "0.5,7", "ackermann", "column 'enabled': must be 1 (motors on) or 0 (cut), got 7"),
+        ("throttle,steering", "speed,steering_angle", "speed_steering", ""),
+    ],
+)
+def test_what_no_car_can_be_told_is_refused_with_its_cell(tmp_path, before, after, kind, said):
+    samples, toml = CAR.replace(before, after), TOML.replace('"twist"', f'"{kind}"')
+    home = write_files(tmp_path / "log", {"log.toml": toml, "samples.csv": samples})
+    if not said:
+        assert read_log(home).command == kind
+        samples = samples.replace(",0.5,0", ",28,0")
+        home, said = write_files(tmp_path / "other", {"log.toml": toml, "samples.csv": samples}), "turn degrees into"
+    with pytest.raises(LogError, match="samples.csv: line 2") as caught:
+        read_log(home)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)

@@ -39,7 +39,7 @@ from proxytune.diagnosis.motion.fitting import Fit, fit, held_out_log_likelihood
 from proxytune.diagnosis.motion.innovations import at_edge, lateness
 from proxytune.diagnosis.motion.prediction import blocks_of, cut, pose_errors, ratio
 from proxytune.diagnosis.motion.random_effects import RandomEffect, infer_size_indirectly
-from proxytune.diagnosis.motion.screening import Candidate, ScreenedCandidate
+from proxytune.diagnosis.motion.screening import Candidate, ScreenedCandidate, candidates, screen
 from proxytune.diagnosis.motion.signals import SignalCurve
 from proxytune.effects import effect_of
 from proxytune.space import Theta
@@ -96,45 +96,78 @@ def search(base: Fit, seed: int, report: Progress, without: Collection[str] = ()
     """
     rules = base.drives.rules
     declared = {effect_of(name) for coordinate in base.free for name in coordinate} | set(without)
+    of_car = base.drives.robot.drive == "ackermann"
+    most = rules.most_effects_of_cars if of_car else rules.most_effects
     model = base
     adopted: list[AdoptedEffect] = []
     tried: list[TriedEffect] = []
     first_curves: list[SignalCurve] = []
     unnamed: list[SignalCurve] = []
-    for number in range(rules.most_effects + 1):
+    for number in range(most + 1):
         report(f"looking for what is missing, round {number + 1}")
         evidence = gather_evidence(model, declared | {effect.effect for effect in adopted}, seed)
         tried = tried or list_tried(evidence)
         first_curves = first_curves or evidence.curves
         least = max(rules.least_gain_nats, rules.least_gain_share * sum(effect.gain for effect in adopted))
-        best = choose_best(model, evidence, least)
+        best = choose_best(model, evidence, least, 1.0 if of_car else rules.p_value)
         named = max(least, best.gain if best else 0.0)
         unnamed = [curve for curve in evidence.curves if exceeds_names(curve, named, rules)]
         # One round more than there may be effects: the last one only says what is still left over.
-        if best is None or number == rules.most_effects:
+        if best is None or number == most:
             break
         # Where a signal explains more, an effect is still added if it says enough beside it; the first never is, for it
         # might be wrong.
-        if unnamed and not (
-            adopted and best.gain > max(rules.curve_margin_nats, rules.share_of_curve * unnamed[0].gain)
+        if (
+            not of_car
+            and unnamed
+            and not (adopted and best.gain > max(rules.curve_margin_nats, rules.share_of_curve * unnamed[0].gain))
         ):
             break
         if best.random is not None:
             best = fit_random(model, infer_size_indirectly(model, best.random, seed))
         model, adopted = drop_idle(best.fitted, adopt(adopted, best, evidence))
+    if of_car:
+        report("holding each effect against chance")
+        model, adopted = drop_unconfirmed(model, adopted, declared, seed)
     return Findings(base, model, tuple(adopted), tuple(tried), tuple(unnamed), tuple(first_curves))
 
 
-def choose_best(model: Fit, evidence: Evidence, least: float) -> FittedCandidate | None:
+def drop_unconfirmed(
+    model: Fit, adopted: Sequence[AdoptedEffect], taken: set[str], seed: int
+) -> tuple[Fit, list[AdoptedEffect]]:
+    """Drop effects that chance does as well as, the others given, the weakest first.
+
+    A car lacks several large effects at once, and each hides the others: what is left over is then no noise, and chance
+    cannot be drawn from it. So effects are added by their gain, and held against chance once all are there.
+    """
+    kept = list(adopted)
+    for effect in sorted((one for one in adopted if one.free), key=lambda one: one.gain):
+        rules, rest = model.drives.rules, without_effect(Variant(model.theta, model.free), effect, model.drives.rate_hz)
+        without = fit(model.drives, rest.theta, rest.free, model.noise)
+        others = taken | {one.effect for one in kept if one is not effect}
+        forms = [one for one in candidates(model.drives.robot, rest.theta, others) if one.effect == effect.effect]
+        p_value = min((one.p_value for one in screen(without, forms, seed)), default=1.0)
+        place = kept.index(effect)
+        if p_value > rules.p_value:
+            model = without
+            kept.pop(place)
+        else:
+            kept[place] = replace(effect, p_value=p_value)
+    return model, kept
+
+
+def choose_best(model: Fit, evidence: Evidence, least: float, p_value: float | None = None) -> FittedCandidate | None:
     """Choose the effect with most evidence, if that is more than chance and predicts no worse.
 
     Args:
         model: The model without it.
         evidence: What speaks for each effect.
         least: Evidence that it needs [nats].
+        p_value: Chance that it may have of being none, if not that of the rules.
     """
     rules = model.drives.rules
-    fits = [one for one in evidence.fits.values() if one.screened and one.screened.p_value <= rules.p_value]
+    most = rules.p_value if p_value is None else p_value
+    fits = [one for one in evidence.fits.values() if one.screened and one.screened.p_value <= most]
     named = [one for one in fits if not _is_everywhere(one)]
     rare = [effect for effect in evidence.random if effect.p_value <= rules.p_value]
     clear = [effect for effect in rare if effect.gain >= rules.least_random_gain_nats]

@@ -30,8 +30,7 @@ def text_of(result, figures=None):
 
 @pytest.fixture
 def figures(result, tmp_path):
-    save_figure(convergence_figure(result), tmp_path / "convergence.png")
-    return {"convergence": (tmp_path / "convergence.png").read_bytes()}
+    return {"convergence": save_figure(convergence_figure(result), tmp_path / "convergence.png")}
 
 
 def test_the_page_needs_nothing_else_and_is_small(result, figures):
@@ -45,7 +44,7 @@ def test_it_begins_with_the_answer_and_the_next_step_which_are_the_sentence(resu
     finding = finding_of(result)
     text = text_of(result, figures)
     first, after = html.escape(say_answer(finding)), html.escape(say_next_step(finding)).split("`")[0]
-    heads = (f'class="answer">{first}</p>', after, ">95 % interval</th>", "<img ", ">Trials</h2>")
+    heads = (f'class="answer">{first}</p>', after, ">95 % interval</th>", "<svg ", ">Trials</h2>")
     places = [text.index(one) for one in heads]
     assert places == sorted(places)
     assert say_finding(finding) == f"{say_answer(finding)} Next: {say_next_step(finding)}"
@@ -55,7 +54,7 @@ def test_every_figure_has_a_caption_and_an_alternative_text_that_says_what_to_se
     image = figures["convergence"]
     text = text_of(result, dict.fromkeys(TITLES, image))
     for name, title in TITLES.items():
-        (alt,) = re.findall(f'alt="({re.escape(html.escape(title))}[^"]*)"', text)
+        (alt,) = re.findall(f'aria-label="({re.escape(html.escape(title))}[^"]*)"', text)
         assert len(alt) > len(title) + 40, name
     assert text.count("<figcaption") == len(TITLES)
 
@@ -81,7 +80,7 @@ def test_its_foot_has_the_command_the_settings_the_versions_and_the_date(result)
 def test_names_are_not_taken_for_markup(result):
     settings = replace(result.study.settings, name="<b>A & B</b>", agents=(EVIL, "b"))
     text = text_of(replace(result, study=replace(result.study, settings=settings)))
-    assert "<title>&lt;b&gt;A &amp; B&lt;/b&gt;</title>" in text
+    assert "<title>&lt;b&gt;A &amp; B&lt;/b&gt;: which θ makes the simulator useful?</title>" in text
     assert not re.search("<(b|script)>", text)
     told = replace(TOLD[0], agents=(("<i>agent</i>", 1.0),))
     text = text_of(planted(result, information=(told, TOLD[1])))

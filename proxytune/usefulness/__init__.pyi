@@ -36,6 +36,7 @@ from .decision import (
     decide as decide,
     mmrv_conventions as mmrv_conventions,
 )
+from .expectation import Expectation as Expectation, donors_of as donors_of, expect as expect
 from .noise import (
     Chance as Chance,
     NoiseFloor as NoiseFloor,
@@ -44,7 +45,7 @@ from .noise import (
     floor_of_repeats as floor_of_repeats,
 )
 from .pairs import Prpv as Prpv, dominance as dominance, prpv_of_means as prpv_of_means
-from .predictivity import pod_of_images as pod_of_images, pod_of_poses as pod_of_poses
+from .predictivity import pod_of_images as pod_of_images, pod_of_poses as pod_of_poses, ppv_of_means as ppv_of_means
 from .resampling import (
     Ends as Ends,
     bootstrap_means as bootstrap_means,

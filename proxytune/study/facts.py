@@ -40,7 +40,9 @@ SEARCH = "search"
 """Lists which code proposed trials: from which trial on, its digest and the versions of the packages it uses."""
 DESCRIBED = "described"
 """Tells what figures and tables need of a study's own code."""
-NOTED = (LEARNING, SEARCH, DESCRIBED, NOT_REPEATABLE, APART)
+NOMINAL = "nominal"
+"""The nominal θ of the parameters that are searched, where the family knows it."""
+NOTED = (LEARNING, SEARCH, DESCRIBED, NOT_REPEATABLE, APART, NOMINAL)
 """Facts that trials do not depend on; LEARNING has those of a search for learning value."""
 UNSAID = {"batch": 1, "engine": "gp"}
 """Values that go without saying: a study.db that names none of these was run with them."""

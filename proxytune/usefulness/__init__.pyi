@@ -1,4 +1,5 @@
 from .assessment import (
+    LEFT_OUT as LEFT_OUT,
     PAIRED as PAIRED,
     PERFECT as PERFECT,
     Assessment as Assessment,
@@ -36,7 +37,7 @@ from .decision import (
     decide as decide,
     mmrv_conventions as mmrv_conventions,
 )
-from .expectation import Expectation as Expectation, donors_of as donors_of, expect as expect
+from .expectation import Estimate as Estimate, Expectation as Expectation, donors_of as donors_of, expect as expect
 from .noise import (
     Chance as Chance,
     NoiseFloor as NoiseFloor,

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from proxytune.arrays import Floats, Whole
+from proxytune.arrays import Flags, Floats, Whole
 from proxytune.scores import Metric, ScoreTable
 from proxytune.usefulness.comparison import Comparison, compare, start_places
 from proxytune.usefulness.noise import NoiseFloor
@@ -41,11 +41,11 @@ NORMAL = 1.96
 
 
 class Estimate(NamedTuple):
-    """A figure and the ends of its 95 % interval, which are None where noise is not known."""
+    """A figure and the ends of its 95 % interval."""
 
     value: float
-    low: float | None
-    high: float | None
+    low: float
+    high: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +72,7 @@ class Donors:
     def _ranks(self, cells: Floats) -> Floats:
         """Where cells lie among the pairs' in each metric, 0 to 1; the middle of equal ones."""
         sides = [
-            [np.searchsorted(known, own, side=side) for side in ("left", "right")]  # type: ignore[call-overload]
+            [np.searchsorted(known, own, side=side) for side in ("left", "right")]
             for known, own in zip(self._sorted.T, cells.T, strict=True)
         ]
         return np.asarray(np.mean(sides, axis=1).T / len(self.first))
@@ -100,14 +100,14 @@ class Donors:
         count = min(NEAREST, len(self.first))
         near = np.argpartition(apart, count - 1, axis=1)[:, :count]
         chosen = near[np.arange(len(cells)), rng.integers(count, size=(draws, len(cells)))]
-        turned = ~_same(before, after).all(axis=-1)[chosen]
+        turned = np.asarray(~_same(before, after).all(axis=-1))[chosen]
         moved = np.clip(cells + self.second[chosen] - self.first[chosen], self._sorted[0], self._sorted[-1])
         moved = np.where(np.isnan(own), moved, cells)
         return np.where(turned[..., None], self.second[chosen], moved)
 
 
-def _same(one: Floats, other: Floats) -> Floats:
-    return np.asarray((one == other) | (np.isnan(one) & np.isnan(other)))
+def _same(one: Floats, other: Floats) -> Flags:
+    return np.asarray((one == other) | (np.isnan(one) & np.isnan(other)), dtype=np.bool_)
 
 
 def donors_of(pairs: Iterable[Floats], metrics: int) -> Donors:
@@ -217,7 +217,8 @@ def _expected(
     own, counts = float(values.var(ddof=1)) if m > 1 else 0.0, m - 1 + MODELLED * bool(draws)
     middle = float(values.mean())
     if not counts:
-        return Expected(Estimate(middle, None, None), None, None), 0.0
+        # Nothing tells of noise.
+        return Expected(Estimate(middle, 0.0, most), None, None), 0.0
     variance = ((m - 1) * own + MODELLED * modelled) / counts
     reach = float(student.ppf(0.975, counts)) if m > 1 else NORMAL
     half = reach * np.sqrt(variance / m)

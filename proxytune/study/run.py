@@ -38,20 +38,6 @@ from proxytune.study.study_run import (
 )
 
 
-def _attach(run: StudyRun, known: Sequence[Outcome | Theta]) -> None:
-    """Keep outcomes, and open a trial for each θ that has none yet: what is open is not proposed."""
-    outcomes = [one for one in known if isinstance(one, Outcome)]
-    if outcomes:
-        run.store.save_outcome(run.study.identity, *outcomes)
-    trials = [*run.finished_trials(), *run.open_trials()]
-    tried = {instance_of(trial.theta) for trial in trials}
-    wanted = (dict(one.episode.theta) if isinstance(one, Outcome) else one for one in known)
-    new = [one for key, one in {instance_of(theta): theta for theta in wanted}.items() if key not in tried]
-    opened = [TrialRecord(number, dict(theta)) for number, theta in enumerate(new, start=len(trials) + 1)]
-    if opened:
-        run.save_trials(*opened)
-
-
 def retry_failed(run: StudyRun) -> None:
     """Drive failed episodes of ended trials again where the user's code has changed since, and score these trials anew.
 

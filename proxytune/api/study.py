@@ -219,4 +219,5 @@ def read_study(path: str | Path) -> StudyReport:
 def most_episodes(settings: StudySettings) -> int:
     """Count the episodes that a study takes at most, from pre-flight to confirmation."""
     trials = settings.budget * len(settings.agents) * settings.starts
-    return trials + most_preflight_episodes(settings) + most_confirmation_episodes(settings)
+    nominal = len(settings.agents) * settings.starts
+    return trials + most_preflight_episodes(settings) + nominal + most_confirmation_episodes(settings)

@@ -183,6 +183,18 @@ class LaneFollowing:
         return catalogue_of(self.robot, self.folder).parameters
 
     @property
+    def nominal(self) -> Mapping[str, float]:
+        """Values of an instance that names no θ: by this family's effects, the robot's, and else its figures."""
+        robot = read_robot(self.robot, self.folder)
+        known, figures = {**robot.theta, **dict(self.effects)}, robot.figures
+        neutral = {
+            name: one.neutral_value(figures)
+            for name, one in robot.catalogue.parameters.items()
+            if not isinstance(one.neutral, str) or one.neutral in figures
+        }
+        return {**neutral, **known}
+
+    @property
     def starts(self) -> int:
         """Number of starting poses of the map."""
         return len(self.map.starts)

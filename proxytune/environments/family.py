@@ -299,6 +299,12 @@ class GymnasiumFamily:
         return EnvironmentParameters(self.settings.own, Catalogue(self.settings.folder), self.spaces)
 
     @property
+    def nominal(self) -> Mapping[str, float]:
+        """Values of an instance that names no θ: those that every instance has, and else neutral ones."""
+        neutral = {name: one.neutral for name, one in self.parameters.items() if not isinstance(one.neutral, str)}
+        return neutral | dict(self.held)
+
+    @property
     def starts(self) -> int:
         """Number of initial states."""
         return STARTS

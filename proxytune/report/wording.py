@@ -39,6 +39,16 @@ def with_span(value: float | str, low: float | None, high: float | None) -> str:
     return f"{text} ({ends})" if ends else text
 
 
+def pairs_span(low: float, high: float) -> str:
+    """An interval of PRPV in whole pairs, rounded outwards."""
+    return f"{fixed(math.floor(low), 0)} to {fixed(math.ceil(high), 0)}"
+
+
+def in_pairs(value: float, low: float, high: float) -> str:
+    """PRPV in whole pairs with its interval."""
+    return f"{fixed(value, 0)} ({pairs_span(low, high)})"
+
+
 def percent(share: float) -> str:
     """A share of the box in per cent, of two significant figures."""
     if share <= 0.0:

@@ -1,3 +1,8 @@
+from .answer import (
+    Confirmation as Confirmation,
+    most_confirmation_episodes as most_confirmation_episodes,
+    run_stages as run_stages,
+)
 from .bank import WITHIN as WITHIN, Bank as Bank, bank_of as bank_of, run_bank as run_bank
 from .earlier import earlier_trials as earlier_trials, learn as learn, write_table as write_table
 from .facts import (
@@ -49,12 +54,9 @@ from .result import (
     with_metrics as with_metrics,
 )
 from .run import (
-    Confirmation as Confirmation,
     goal_of as goal_of,
-    most_confirmation_episodes as most_confirmation_episodes,
     nothing_to_gain as nothing_to_gain,
     out_of_time as out_of_time,
-    run_stages as run_stages,
     run_trials as run_trials,
 )
 from .settings import (

@@ -42,7 +42,9 @@ DESCRIBED = "described"
 """Tells what figures and tables need of a study's own code."""
 LEARNT = "learnt"
 """Holds the trials of earlier studies, as they were when this one began."""
-NOTED = (LEARNING, LEARNT, SEARCH, DESCRIBED, NOT_REPEATABLE, APART)
+NOMINAL = "nominal"
+"""The nominal θ of the parameters that are searched, where the family knows it."""
+NOTED = (LEARNING, LEARNT, SEARCH, DESCRIBED, NOT_REPEATABLE, APART, NOMINAL)
 """Facts that trials do not depend on; LEARNING has those of a search for learning value."""
 UNSAID = {"batch": 1, "engine": "gp"}
 """Values that go without saying: a study.db that names none of these was run with them."""

@@ -16,14 +16,15 @@ from proxytune.search import History, Importance, Knowledge, PastTrial, fit_surr
 from proxytune.settings import nearest
 from proxytune.space import Theta
 from proxytune.storage import TrialRecord
+from proxytune.study.answer import UNVISITED, Confirmation, Nominal, confirmation_of, finalists, nominal_of
 from proxytune.study.apart import apart_notes
 from proxytune.study.earlier import earlier_trials
 from proxytune.study.opening import Study, read_target
 from proxytune.study.preflight import Preflight, noise_of, preflight_of
 from proxytune.study.pruning import rescored_pruned, spared
-from proxytune.study.run import Confirmation, confirmation_of, finalists, knowledge_of, record, stopped
+from proxytune.study.run import knowledge_of, record, stopped
 from proxytune.study.study_run import StudyRun, failure_of, score_trials
-from proxytune.usefulness import Assessment, NoiseFloor, assess
+from proxytune.usefulness import Assessment, Estimate, Expectation, NoiseFloor, assess
 
 FAILURES_TOLD = 10
 
@@ -35,7 +36,7 @@ class Best:
     It is never the trial with the lowest PRPV for that alone, which is partly luck.
 
     Attributes:
-        trial: The trial that visited it.
+        trial: The trial that visited it, or its own episodes as a trial of number UNVISITED.
         posterior_mean: PRPV that is expected there in fresh episodes.
         posterior_deviation: Its standard deviation.
         assessment: How useful the proxy is there in the trial's own episodes, by every measure, with noise floor and
@@ -62,6 +63,7 @@ class StudyResult:
         truth: The θ that made the target, where that is known.
         importances: How much each parameter matters, in the order of the box.
         confirmation: What fresh episodes say of it; None if they are off, or not all driven yet.
+        nominal: The simulator as it is; None if the family has no nominal values, or they are not driven yet.
         preflight: What was learnt of the parameters before the first trial; None if it is off or was never run.
         stopped: Why it runs no further; empty while it is not at its end.
         spared: What the trials that were cut off did without: episodes, and about how many seconds of them.
@@ -77,6 +79,7 @@ class StudyResult:
     truth: Theta | None
     importances: tuple[Importance, ...]
     confirmation: Confirmation | None
+    nominal: Nominal | None
     preflight: Preflight | None
     stopped: str
     spared: tuple[int, float]
@@ -105,14 +108,24 @@ class StudyResult:
         return self.judged.noise_floor
 
     @property
-    def perfect(self) -> bool:
-        """True if it has been shown that the proxy cannot be told from a perfect one.
+    def expected(self) -> Expectation | None:
+        """What is expected of the answer in more episodes; None while no fresh ones tell."""
+        return self.confirmation.expected if self.confirmation else None
 
-        By PRPV in fresh episodes, and by every other output: where the answer lies outside the 95 % region, these tell.
+    @property
+    def excess(self) -> Estimate | None:
+        """By how much more PRPV is expected of the answer than of a perfect proxy; None where that is not known."""
+        return self.expected.prpv.excess if self.expected else None
+
+    @property
+    def perfect(self) -> bool:
+        """True if the proxy cannot be told from a perfect one.
+
+        By the PRPV expected of it, and by every other output: where the answer lies outside the 95 % region, these
+        tell.
         """
-        if self.confirmation is None or self.confirmation.answer.assessment is None:
-            return False
-        return bool(self.judged.at_noise_floor) and self.knowledge.misfit.fits is not False and self.inside
+        excess, fits = self.excess, self.knowledge.misfit.fits is not False and self.inside
+        return excess is not None and excess.low <= 0.0 and not self.judged.chance.explains and fits
 
     @property
     def earlier(self) -> int:
@@ -135,11 +148,15 @@ class StudyResult:
 
     @property
     def episodes(self) -> int:
-        """The number of episodes of trials, pre-flight and confirmation, failed ones counted."""
+        """The number of episodes of trials, pre-flight, nominal θ and confirmation, failed ones counted."""
         settings = self.study.settings
         trials = sum((len(trial.decided) or len(settings.agents)) * settings.starts for trial in self.trials)
         before = self.preflight.episodes if self.preflight else 0
-        after = self.confirmation.episodes * len(self.confirmation.candidates) if self.confirmation else 0
+        each, last = len(settings.agents) * settings.starts, self.confirmation
+        after = each if self.nominal else 0
+        if last:
+            own = sum(one.trial.number == UNVISITED for one in last.candidates) + last.repetitions
+            after += last.episodes * len(last.candidates) + each * own
         return before + trials + after
 
 
@@ -172,6 +189,7 @@ def result_of(run: StudyRun, scored_anew: Sequence[TrialRecord] | None = None) -
         truth=study.truth,
         importances=importances(fit_surrogate(space, [*earlier, *score_trials(space, trials)])),
         confirmation=confirmation,
+        nominal=nominal_of(run, confirmation),
         preflight=preflight_of(run),
         stopped=stopped(run, trials),
         spared=spared(run, trials),
@@ -220,7 +238,8 @@ def _best(run: StudyRun, answer: TrialRecord, learnt: Knowledge) -> Best:
     proxy = run.evaluation_of(answer).proxy
     assert proxy is not None
     assessment = assess(proxy=proxy, target=run.study.target, metrics=run.settings.metrics)
-    return Best(answer, learnt.expected_at(values), float(deviation[0]), assessment)
+    mean = learnt.expected_of({values: answer.score or 0.0})[values]
+    return Best(answer, mean, float(deviation[0]), assessment)
 
 
 def _failures(run: StudyRun, trials: tuple[TrialRecord, ...]) -> tuple[str, ...]:

@@ -1,28 +1,16 @@
-"""A study from its first trial to its answer: what it is after, its trials, when it ends, and fresh episodes.
+"""A study's trials: what the search is after, how trials are evaluated and kept, and when they end.
 
-`run_stages` is the whole of it. The pre-flight (preflight.py) tells the noise, from which follows what the search is
-after (`goal_of`). `run_trials` leaves the order of things to the one search loop, `proxytune.search.Search`: that asks
-`StudyTrials` for the finished trials, for a reason to end, and to evaluate a batch of θ. Their episodes are simulated
-by `StudyRun`, all of them or until a trial is pruned (pruning.py), and come to PRPV in `evaluate_outcomes`. A study
-ends with its budget or before (`stopped`): a function of what is stored, so that nothing need be remembered.
-
-Then the answer is driven again in fresh episodes, together with those that are nearly as good. All trials share the
-placement noise of the study's seed, so the θ that the search likes best also suits that noise. The finalists (the
-visited θ of lowest expected PRPV given all trials, the one that explains the target's outputs best, and others not more
-than a standard deviation of a fresh score's noise behind) get episodes under seeds that the search has not seen. The
-answer is the finalist whose expected PRPV and fresh scores are lowest on average; what fresh episodes say of it beside
-the search's own is how much of that was luck. They tell the noise floor too: what the same domain scores against itself
-from the same starts. No trial depends on any of this.
+The pre-flight (preflight.py) tells the noise, from which follows what the search is after (`goal_of`). `run_trials`
+leaves the order of things to the one search loop, `proxytune.search.Search`: that asks `StudyTrials` for the finished
+trials, for a reason to end, and to evaluate a batch of θ. Their episodes are simulated by `StudyRun`, all of them or
+until a trial is pruned (pruning.py), and come to PRPV in `evaluate_outcomes`. A study ends with its budget or before
+(`stopped`): a function of what is stored, so that nothing need be remembered.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from proxytune.domain import Episode, Outcome, instance_of
 from proxytune.errors import RunError
-from proxytune.scores import ScoreTable
 from proxytune.search import (
     BatchPoints,
     Goal,
@@ -35,71 +23,22 @@ from proxytune.search import (
     expected_gain,
     expected_improvement,
     learn_theta,
-    make_proposer,
 )
-from proxytune.seeds import fresh_seed
-from proxytune.space import Space, Theta
+from proxytune.space import Space
 from proxytune.storage import State, TrialRecord
-from proxytune.study.earlier import earlier_trials, learn
-from proxytune.study.facts import check_facts, note_search
-from proxytune.study.opening import Objective, Study
-from proxytune.study.preflight import check_some_work, noise_of, run_preflight
+from proxytune.study.earlier import earlier_trials
+from proxytune.study.facts import check_facts
+from proxytune.study.opening import Objective
+from proxytune.study.preflight import check_some_work, noise_of
 from proxytune.study.pruning import Pruned, pruning_rule, run_or_prune
-from proxytune.study.settings import StopRules, StudySettings
+from proxytune.study.settings import StopRules
 from proxytune.study.study_run import (
     Evaluation,
     StudyRun,
     compose_of,
-    evaluate_outcomes,
-    in_common,
     plan_episodes,
-    score_table,
     score_trials,
 )
-from proxytune.usefulness import Assessment, assess, floor_of_repeats
-
-MOST_FINALISTS = 3
-"""At most so many θ are driven again."""
-
-
-def run_stages(run: StudyRun, warn: Callable[[str], None], known: Sequence[Outcome | Theta] = ()) -> None:
-    """Run a study to its end, from wherever it was left: pre-flight, trials, fresh episodes.
-
-    Args:
-        run: The study.
-        warn: Hears, before the first trial, of another search than before and of parameters without effect.
-        known: θ to try next, before what the search proposes, and outcomes that need not be simulated.
-
-    Raises:
-        InputError, RunError: As `run_trials`.
-    """
-    check_facts(run)
-    _attach(run, known)
-    retry_failed(run)
-    learn(run)
-    if line := note_search(run.study, run.store):
-        warn(line)
-    learnt = run_preflight(run)
-    for warning in learnt.warnings if learnt and run.spent.episodes else ():
-        warn(warning)
-    # The proposer allows for the noise that the pre-flight measured.
-    proposer = make_proposer(run.study.engine, run.settings.initial, goal_of(run))
-    run_trials(run, AfterEarlier(proposer, earlier) if (earlier := earlier_trials(run)) else proposer)
-    run_confirmation(run)
-
-
-def _attach(run: StudyRun, known: Sequence[Outcome | Theta]) -> None:
-    """Keep outcomes, and open a trial for each θ that has none yet: what is open is not proposed."""
-    outcomes = [one for one in known if isinstance(one, Outcome)]
-    if outcomes:
-        run.store.save_outcome(run.study.identity, *outcomes)
-    trials = [*run.finished_trials(), *run.open_trials()]
-    tried = {instance_of(trial.theta) for trial in trials}
-    wanted = (dict(one.episode.theta) if isinstance(one, Outcome) else one for one in known)
-    new = [one for key, one in {instance_of(theta): theta for theta in wanted}.items() if key not in tried]
-    opened = [TrialRecord(number, dict(theta)) for number, theta in enumerate(new, start=len(trials) + 1)]
-    if opened:
-        run.save_trials(*opened)
 
 
 @dataclass(frozen=True)
@@ -324,161 +263,3 @@ def _gain(run: StudyRun, done: Sequence[TrialRecord]) -> tuple[float, float]:
         return expected_gain(settings.space, trials, goal_of(run), settings.seed)
     scored = [*earlier_trials(run), *score_trials(settings.space, done)]
     return expected_improvement(settings.space, scored, settings.seed)
-
-
-@dataclass(frozen=True)
-class Finalist:
-    """A visited θ that has been driven again.
-
-    Attributes:
-        trial: The trial that visited it.
-        scores: The study's cost in each fresh repetition of it; None where an agent has no episode that worked.
-        assessment: How useful the proxy is there, over all fresh episodes; None if an agent has none that worked.
-    """
-
-    trial: TrialRecord
-    scores: tuple[float | None, ...]
-    assessment: Assessment | None
-
-    @property
-    def optimism(self) -> float | None:
-        """The trial's luck: how much better it scored than its fresh repetitions do on average."""
-        known = [one for one in self.scores if one is not None]
-        return float(np.mean(known)) - self.trial.score if known and self.trial.score is not None else None
-
-
-@dataclass(frozen=True)
-class Confirmation:
-    """The answer of fresh episodes.
-
-    Attributes:
-        answer: The finalist whose expected PRPV and fresh scores are lowest on average.
-        candidates: All that were driven again, the search's own favourite first.
-        episodes: How many fresh episodes each was driven in.
-    """
-
-    answer: Finalist
-    candidates: tuple[Finalist, ...]
-    episodes: int
-
-
-def run_confirmation(run: StudyRun) -> None:
-    """Simulate what is missing of the fresh episodes of a study that has come to its end.
-
-    Raises:
-        EpisodeError: If an episode fails and the study is to stop then.
-        RunError: If no trial has a score.
-    """
-    settings, trials = run.settings, run.finished_trials()
-    if not stopped(run, trials) or (trials and not settings.confirm):
-        return
-    chosen = finalists(trials, knowledge_of(run, trials))
-    # A θ that no trial visited gets what a trial would: its luck is told, and how near a perfect proxy comes.
-    new = [one.theta for one in chosen if not one.number]
-    run.outcomes([e for theta in new for e in plan_episodes(settings, theta, settings.seed)], "unvisited θ")
-    known = most_confirmation_episodes(settings) - len(chosen) * _episodes_per_finalist(settings)
-    run.watcher.begin("fresh episodes", known)
-    for number, trial in enumerate(chosen, start=1):
-        what = f"fresh episodes {number} of {len(chosen)}"
-        run.outcomes([episode for repetition in _repetitions(settings, trial) for episode in repetition], what)
-        run.watcher.finished(what)
-
-
-def confirmation_of(run: StudyRun, trials: Sequence[TrialRecord], learnt: Knowledge) -> Confirmation | None:
-    """The answer of the fresh episodes of these trials; None if it is off, or an episode is still missing.
-
-    Args:
-        run: The study.
-        trials: Finished trials, one of them with a score.
-        learnt: What they say of θ.
-    """
-    if not run.settings.confirm:
-        return None
-    driven = [_driven_again(run, trial) for trial in finalists(trials, learnt)]
-    known = tuple(one for one in driven if one is not None and one.trial.state == "finished")
-    if not known or None in driven:
-        return None
-    # Each has as many fresh episodes, so what fresh noise does to all of them alike favours none.
-    expected = [learnt.expected_at(learnt.space.values(one.trial.theta)) for one in known]
-    scores = [[mean, *(s for s in one.scores if s is not None)] for mean, one in zip(expected, known, strict=True)]
-    answer = known[int(np.argmin([np.mean(each) for each in scores]))]
-    return Confirmation(answer, known, _episodes_per_finalist(run.settings))
-
-
-def finalists(trials: Sequence[TrialRecord], learnt: Knowledge) -> list[TrialRecord]:
-    """The trials that are driven again, that of lowest expected PRPV first: a function of what was finished alone.
-
-    Where earlier studies tell too, the most probable θ is among them, and θ that only those have visited may be: such
-    a one has the number 0, and no score yet.
-
-    Args:
-        trials: Finished trials, one of them with a score, if there are any.
-        learnt: What they and those of earlier studies say of θ.
-    """
-    # Of a pruned trial it is certain that it is none of the best.
-    scored = {learnt.space.values(trial.theta): trial for trial in trials if trial.state == "finished"}
-    others = {learnt.space.values(trial.theta) for trial in trials} - scored.keys()
-    whole = [one for one in learnt.trials if one.values not in {*scored, *others} and one.outcome]
-    scored |= {
-        one.values: TrialRecord(0, learnt.space.theta(one.values), "finished")
-        for one in whole
-        if not np.isnan(one.outcome or ()).any()
-    }
-    expected = {values: mean for values, mean in learnt.expected.items() if values in scored}
-    best = min(expected, key=expected.__getitem__)
-    noise = float(learnt.fresh_scores(best).std())
-    near = [values for values, mean in expected.items() if mean - expected[best] <= noise]
-    likeliest = learnt.likeliest_of(list(expected))
-    mode = learnt.mode if whole else near[0]
-    scored.setdefault(mode, TrialRecord(0, learnt.space.theta(mode), "finished"))
-    return [scored[values] for values in dict.fromkeys([near[0], mode, likeliest, *near[1:]])][:MOST_FINALISTS]
-
-
-def _episodes_per_finalist(settings: StudySettings) -> int:
-    return settings.confirm * len(settings.agents) * settings.starts
-
-
-def most_confirmation_episodes(settings: StudySettings) -> int:
-    """The number of episodes that a confirmation takes at most."""
-    return MOST_FINALISTS * _episodes_per_finalist(settings)
-
-
-def _repetitions(settings: StudySettings, trial: TrialRecord) -> list[list[Episode]]:
-    """The episodes of each fresh repetition of a trial."""
-    seeds = [fresh_seed(settings.seed, repetition) for repetition in range(1, settings.confirm + 1)]
-    return [plan_episodes(settings, trial.theta, seed) for seed in seeds]
-
-
-def _driven_again(run: StudyRun, trial: TrialRecord) -> Finalist | None:
-    if not trial.number:
-        evaluation = run.evaluation(trial.theta)
-        if evaluation is None:
-            return None
-        trial = record(0, evaluation)
-    repetitions = []
-    for planned in _repetitions(run.settings, trial):
-        known = run.known(planned)
-        if len(known) < len(planned):
-            return None
-        repetitions.append(list(known.values()))
-    scores = tuple(evaluate_outcomes(run.study, trial.theta, outcomes).score for outcomes in repetitions)
-    own = list(run.known(plan_episodes(run.settings, trial.theta, run.settings.seed)).values())
-    return Finalist(trial, scores, _assessed(run.study, own, repetitions))
-
-
-def _assessed(study: Study, own: list[Outcome], runs: Sequence[Sequence[Outcome]]) -> Assessment | None:
-    """All fresh episodes as one table; of several repetitions, each start is another episode every time.
-
-    The noise floor is what the domain's own trial scores against them.
-    """
-    scored: dict[tuple[str, str], Mapping[str, float]] = {}
-    for repetition, outcomes in enumerate(runs):
-        for one in outcomes:
-            label = f"{one.episode.start}/{repetition}" if len(runs) > 1 else str(one.episode.start)
-            if one.metrics is not None:
-                scored[one.episode.agent, label] = one.metrics
-    if {agent for agent, _ in scored} != set(study.settings.agents):
-        return None
-    proxy, metrics = ScoreTable.from_episodes(in_common(scored)), study.settings.metrics
-    floor = floor_of_repeats(domain=score_table(own), again=proxy, metrics=metrics)
-    return assess(proxy=proxy, target=study.target, metrics=metrics, floor=floor)

@@ -1,4 +1,5 @@
 from .assessment import (
+    LEFT_OUT as LEFT_OUT,
     PAIRED as PAIRED,
     PERFECT as PERFECT,
     Assessment as Assessment,
@@ -39,6 +40,7 @@ from .decision import (
     mmrv_conventions as mmrv_conventions,
     use_two as use_two,
 )
+from .expectation import Estimate as Estimate, Expectation as Expectation, donors_of as donors_of, expect as expect
 from .noise import (
     Chance as Chance,
     NoiseFloor as NoiseFloor,
@@ -47,7 +49,7 @@ from .noise import (
     floor_of_repeats as floor_of_repeats,
 )
 from .pairs import Prpv as Prpv, dominance as dominance, prpv_of_means as prpv_of_means
-from .predictivity import pod_of_images as pod_of_images, pod_of_poses as pod_of_poses
+from .predictivity import pod_of_images as pod_of_images, pod_of_poses as pod_of_poses, ppv_of_means as ppv_of_means
 from .resampling import (
     Ends as Ends,
     bootstrap_means as bootstrap_means,

@@ -40,10 +40,12 @@ from proxytune.usefulness.sequential import Plan, plan
 if TYPE_CHECKING:
     import pandas as pd
 
-FEW_EPISODES = 5
-ENOUGH_EPISODES = 10
 PAIRED = "episodes with equal labels are resampled as pairs; use --unpaired if they are not the same starts"
 ONE_START = "all episodes are from one start: the intervals do not say what other starts would give"
+LEFT_OUT = (
+    "the intervals are over starts: they leave out that the same start may turn out otherwise another time, and may be "
+    "too narrow; a study drives starts again to know"
+)
 PERFECT = (
     "PRPV is within the noise floor from the same starts: these episodes show no difference between proxy and target; "
     "take more starts to see one"
@@ -159,7 +161,7 @@ class Assessment:
             lines.append(f"no interval: {self.prpv_interval.reason}")
         if floor.reason:
             lines.append(f"no noise floor: {floor.reason}")
-        lines += [*(rates.note for rates in self.success_rates if rates.note), *_few(self)]
+        lines += [*(rates.note for rates in self.success_rates if rates.note), *_scope(self)]
         if random.explains:
             lines.append(f"PRPV is no better than chance: a random ranking scores as low with p = {random.p_value:.2g}")
         if self.at_noise_floor:
@@ -217,17 +219,13 @@ def assess(
     )
 
 
-def _few(assessment: Assessment) -> list[str]:
-    """Warn of few starts or episodes, where there are intervals, and say that equal labels were paired."""
-    inputs = assessment.inputs
-    episodes, starts = min(inputs.proxy_episodes[0], inputs.target_episodes[0]), inputs.fewest_starts
-    if assessment.intervals is None or starts >= FEW_EPISODES:
+def _scope(assessment: Assessment) -> list[str]:
+    """What the intervals leave out, where there are any, and that equal labels were paired."""
+    if assessment.intervals is None:
         return []
-    if starts == 1:
+    if assessment.inputs.fewest_starts == 1:
         return [ONE_START]
-    what = f"{episodes} episodes" if starts >= episodes else f"{starts} starts"
-    few = f"only {what} per agent: the intervals are too narrow; take {ENOUGH_EPISODES} or more"
-    return [few, PAIRED] if inputs.paired else [few]
+    return [LEFT_OUT, PAIRED] if assessment.inputs.paired else [LEFT_OUT]
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,8 @@ import numpy as np
 from proxytune.search import Information
 from proxytune.search.posterior import Misfit, posterior_of
 from proxytune.study import Confirmation
-from proxytune.study.run import Finalist
+from proxytune.study.answer import Finalist
+from proxytune.usefulness.expectation import Estimate, Expectation, Expected
 
 FITS, LACKS, UNTOLD = Misfit(1.0, 1.1, 0.4), Misfit(9.0, 1.1, 0.002), Misfit(1.0, None, None)
 AGENTS = (("agent4", 0.46), ("agent0", 0.3), ("agent1", 0.2), ("agent2", 0.04))
@@ -47,8 +48,11 @@ def confirmed(result, score=12, ends=(8.0, 20.0), **floor):
     own = result.best.assessment
     inner = replace(own.prpv_interval, low=ends[0], high=ends[1])
     noise = replace(own.noise_floor, **floor)
+    excess = Estimate(score - noise.value, ends[0] - noise.high, ends[1] - noise.low)
+    prpv = Expected(Estimate(score, *ends), Estimate(noise.value, noise.low, noise.high), excess)
+    expected = Expectation(prpv, None, 5, 2.0, noise)
     fresh = replace(own, prpv=replace(own.prpv, value=score), prpv_interval=inner, noise_floor=noise)
     # What else a candidate has is of no matter to a report.
     fields = dict.fromkeys(Finalist.__dataclass_fields__, ())
     answer = Finalist(**{**fields, "trial": result.best.trial, "scores": (score,), "assessment": fresh})
-    return replace(result, confirmation=Confirmation(answer, (answer,), 18))
+    return replace(result, confirmation=Confirmation(answer, (answer,), 18, expected, 5))

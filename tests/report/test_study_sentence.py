@@ -11,7 +11,7 @@ from proxytune.scores import Metric, ScoreTable
 from proxytune.search import Information
 from proxytune.storage import Store
 from proxytune.study import StudyRun, open_study, result_of
-from proxytune.usefulness import Chance, NoiseFloor
+from proxytune.usefulness import Chance, Estimate, NoiseFloor
 
 TRIM = KnownParameter("trim", "", 0.1213, (0.108, 0.146), 0.06, True)
 PITCH = KnownParameter("camera_pitch", "deg", 13.04, (11.1, 14.4), 0.1, True)
@@ -23,9 +23,11 @@ FOUND = Finding(
     parameters=(TRIM, PITCH, BLUR),
     region=0.0016,
     inside=True,
-    prpv=6,
+    prpv=Estimate(6.2, 2.6, 9.9),
     fresh=True,
     floor=FLOOR,
+    excess=Estimate(1.2, -5.3, 7.7),
+    nominal=None,
     chance=Chance(65.8, 13.7, 0.001, 1000, None),
     perfect=True,
     misfit=0.4,
@@ -39,15 +41,15 @@ FOUND = Finding(
     confirm=1,
     declared=("trim", "delay"),
 )
-ABOVE = replace(FOUND, prpv=16, perfect=False)
-BY_CHANCE = replace(ABOVE, prpv=58, chance=Chance(65.8, 13.7, 0.3, 1000, None))
+ABOVE = replace(FOUND, prpv=Estimate(16.0, 13.0, 19.0), excess=Estimate(11.0, 4.2, 17.8), perfect=False)
+BY_CHANCE = replace(ABOVE, prpv=Estimate(58.0, 50.2, 66.0), chance=Chance(65.8, 13.7, 0.3, 1000, None))
 
 
 def test_theta_that_makes_a_perfect_proxy_is_found_and_the_least_known_parameter_comes_next():
     assert say_finding(FOUND) == (
         "θ found: trim 0.121 (0.108 to 0.146), camera pitch 13.0 deg (11.1 to 14.4), blur 0.026 s (0.005 to 0.062). "
-        "PRPV (proxy relative predictivity value) is 6 on fresh episodes, noise floor 5 (1 to 9): "
-        "no difference from the target can be seen. "
+        "PRPV (proxy relative predictivity value) is 6 (2 to 10), a perfect proxy's 5 (1 to 9): "
+        "it cannot be told from a perfect proxy; at most 8 pairs worse. "
         "Next: use this θ; to know blur better, raise starts from 4 to 8 and measure the target from them too."
     )
 
@@ -55,7 +57,10 @@ def test_theta_that_makes_a_perfect_proxy_is_found_and_the_least_known_parameter
 def test_a_score_above_the_floor_is_not_called_found():
     text = say_finding(ABOVE)
     assert text.startswith("θ narrowed down to 0.16 % of the box: trim 0.121 ")
-    assert "noise floor 5 (1 to 9): better than chance, but a perfect proxy scores lower." in text
+    assert (
+        "is 16 (13 to 19), a perfect proxy's 5 (1 to 9): better than chance, but a perfect proxy scores lower, " in text
+    )
+    assert "by 4 to 18." in text
     assert "found" not in text
 
 
@@ -97,7 +102,7 @@ def test_a_proxy_that_lacks_something_is_sent_to_diagnose():
 def test_what_chance_explains_is_not_found_and_has_its_probability():
     text = say_finding(BY_CHANCE)
     assert text == (
-        "No θ found. PRPV (proxy relative predictivity value) is 58 on fresh episodes, no better than chance "
+        "No θ found. PRPV (proxy relative predictivity value) is 58 (50 to 66), no better than chance "
         "(65.8 ± 13.7, p = 0.3). Next: raise budget from 24 to 48, or add agents whose scores differ more."
     )
     assert "diagnose LOG" in say_finding(replace(BY_CHANCE, fits=False))
@@ -114,9 +119,14 @@ def test_without_fresh_episodes_luck_is_named_and_they_are_the_next_step():
     assert "perfect" not in say_finding(unconfirmed)
 
 
-def test_halves_of_the_target_say_nothing_of_a_perfect_proxy():
-    text = say_finding(replace(ABOVE, floor=replace(FLOOR, kind="halves")))
-    assert "the noise floor is not known" in text
+def test_the_simulator_as_it_is_stands_beside_the_best():
+    text = say_finding(replace(FOUND, nominal=Estimate(31.0, 24.5, 37.2)))
+    assert "8 pairs worse. The simulator as it is scores 31 (24 to 38). Next: " in text
+
+
+def test_where_noise_is_not_known_nothing_is_said_of_a_perfect_proxy():
+    text = say_finding(replace(ABOVE, excess=None))
+    assert "better than chance; what a perfect proxy scores is not known." in text
     assert "(1 to 9)" not in text
 
 
@@ -173,9 +183,6 @@ def test_a_study_s_finding_holds_what_the_study_knows(finished):
 def test_a_score_at_the_floor_of_a_theta_that_other_scores_exclude_is_not_called_perfect():
     text = say_finding(replace(FOUND, perfect=False, inside=False))
     assert text.startswith("θ narrowed down to 0.16 % of the box: ")
-    assert (
-        "noise floor 5 (1 to 9): PRPV can get no better, but other scores of the agents differ from the target's."
-        in text
-    )
+    assert "at most 8 pairs worse, but other scores of the agents differ from the target's." in text
     assert "no difference" not in text
     assert text.endswith("Next: raise budget from 24 to 48, to get closer.")

@@ -134,7 +134,7 @@ def test_people_see_what_the_proxy_is_worth(result):
     assert list(rows) == ["PRPV", "halves", "chance", "PPV", "misfit (p)"]
     value, interval, meaning = rows["PRPV"]
     assert value == f"{result.best.trial.prpv:g}"
-    assert " to " in interval
+    assert interval == ""
     assert "0 to 30" in meaning
     assert rows["PPV"][2].startswith("proxy predictivity value")
     assert not row_of(search_table(result), "failed")
@@ -157,15 +157,26 @@ def test_halves_are_not_called_a_noise_floor(result):
     assert not row_of(usefulness_table(with_floor(result, value=None)), "  halves")
 
 
-def test_the_floor_of_a_confirmed_study_is_said_to_be_the_proxy_s_own(result):
-    assert not [row for row in usefulness_table(result).rows if "this one re-run" in row[3]]
-    again = confirmed(result, kind="same starts")
-    assert [row for row in usefulness_table(again).rows if "this one re-run" in row[3]]
+def test_a_confirmed_study_tells_what_is_expected_a_perfect_proxy_s_score_and_the_excess(result):
+    again = confirmed(result, kind="same starts", value=5.0, low=1.2, high=9.1)
+    table = usefulness_table(again)
+    assert row_of(table, "PRPV") == (
+        "PRPV",
+        "12",
+        "8 to 20",
+        "wrongly ordered pairs, 0 to 30; expected, in 5 more runs",
+    )
+    assert row_of(table, "  noise floor")[1:] == ("5", "1 to 10", "what a perfect proxy scores against this target")
+    assert row_of(table, "  excess") == ("  excess", "7", "−2 to 19", "more than a perfect proxy; may be none")
+    document = study_document(again)
+    assert document["best"]["expected_prpv"] == {"value": 12, "interval": [8.0, 20.0]}
+    assert document["excess"]["value"] == 7.0
+    assert not row_of(usefulness_table(result), "  excess")
+    assert study_document(result)["best"]["expected_prpv"] is study_document(result)["excess"] is None
 
 
 def test_notes_give_no_advice_that_study_cannot_follow(result):
     assert any("--unpaired" in note for note in result.judged.notes)
-    assert usefulness_table(result).notes
     assert not any("--unpaired" in note for note in usefulness_table(result).notes)
 
 

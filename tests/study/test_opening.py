@@ -11,8 +11,8 @@ from proxytune.report.study.tables import usefulness_table
 from proxytune.search import make_proposer
 from proxytune.storage import Store
 from proxytune.study import PRPV, StudyRun, goal_of, open_study, result_of, run_trials, study_facts
+from proxytune.study.answer import run_confirmation
 from proxytune.study.facts import changes
-from proxytune.study.run import run_confirmation
 
 OWN = """
 import numpy as np

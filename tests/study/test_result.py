@@ -28,7 +28,17 @@ from proxytune.study import (
     run_trials,
     score_table,
 )
-from proxytune.study.run import MOST_FINALISTS, confirmation_of, finalists, knowledge_of, run_confirmation
+from proxytune.study.answer import (
+    MOST_FINALISTS,
+    MOST_REPETITIONS,
+    UNVISITED,
+    confirmation_of,
+    finalists,
+    nominal_theta,
+    run_confirmation,
+)
+from proxytune.study.facts import NOMINAL
+from proxytune.study.run import knowledge_of
 from proxytune.study.settings import StopRules
 from proxytune.usefulness import assess
 from proxytune.usefulness.pairs import prpv
@@ -56,13 +66,15 @@ def test_the_answer_is_told_with_its_score_on_episodes_that_the_search_has_not_s
     spent, found = confirmed(finished)
     answer = found.confirmation.answer
     assert found.best.trial == answer.trial
-    assert spent.episodes == ONE * len(found.confirmation.candidates) == found.episodes - 7 * ONE
+    own = sum(one.trial.number == UNVISITED for one in found.confirmation.candidates)
+    more = found.confirmation.repetitions
+    assert spent.episodes == ONE * (len(found.confirmation.candidates) + own + more) == found.episodes - 7 * ONE
     assert answer.scores == (answer.assessment.prpv.value,)
     assert answer.optimism == answer.scores[0] - answer.trial.prpv
     with Store.read(finished) as store:
         known = store.outcomes(found.study.identity, answer.trial.theta)
     seen = plan_episodes(found.study.settings, answer.trial.theta, found.study.settings.seed)
-    assert len(set(known) - set(seen)) == ONE
+    assert len(set(known) - set(seen)) == ONE * (1 + more)
     assert {e.seed for e in set(known) - set(seen)}.isdisjoint(e.seed for e in seen)
 
 
@@ -83,14 +95,17 @@ def test_candidates_are_the_lowest_expected_scores_within_the_noise_with_the_lik
     noise = known.fresh_scores(ranked[0]).std()
     near = [values for values in ranked if known.expected[values] - known.expected[ranked[0]] <= noise]
     assert chosen[0] == known.answer == ranked[0]
-    assert set(chosen) <= {*near, known.likeliest_of(ranked)}
-    assert known.likeliest_of(ranked) in chosen
-    assert len(chosen) == min(MOST_FINALISTS, len({*near, known.likeliest_of(ranked)}))
+    inner = [known.likeliest_of(ranked)] if known.misfit.fits is False else [known.mode, known.lowest_inside]
+    assert chosen == list(dict.fromkeys([ranked[0], *inner, *near[1:]]))[:MOST_FINALISTS]
+    assert all(known.holds(values) for values in (known.mode, known.lowest_inside))
 
 
 def plant(study, store, trial, shift):
-    """Fresh episodes of this trial in which the agents rank as on the target, or the other way round."""
-    for episode in plan_episodes(study.settings, trial.theta, fresh_seed(study.settings.seed, 1)):
+    """Episodes of this finalist in which the agents rank as on the target, or the other way round."""
+    seeds = [
+        fresh_seed(study.settings.seed, repetition) for repetition in range(0 if trial.number == UNVISITED else 1, 7)
+    ]
+    for episode in [one for seed in seeds for one in plan_episodes(study.settings, trial.theta, seed)]:
         row = study.target.agents.index(episode.agent)
         metrics = dict(zip(study.target.metrics, (shift * study.target.means[row]).tolist(), strict=True))
         store.save_outcome(study.identity, Outcome(episode, metrics, "", 0.0))
@@ -101,7 +116,7 @@ def test_a_favourite_that_was_lucky_gives_way_to_a_rival_that_fresh_episodes_con
     with Store.open(finished) as store:
         trials = store.trials()
         chosen = sorted(trials, key=lambda trial: trial.prpv)[:MOST_FINALISTS]
-        monkeypatch.setattr("proxytune.study.run.finalists", lambda *_: chosen)
+        monkeypatch.setattr("proxytune.study.answer.finalists", lambda *_: chosen)
         lucky, *rivals = chosen
         plant(study, store, lucky, -1.0)
         for rival in rivals:
@@ -112,15 +127,44 @@ def test_a_favourite_that_was_lucky_gives_way_to_a_rival_that_fresh_episodes_con
     assert found.candidates[0].optimism > 0
 
 
-def test_the_noise_floor_is_what_the_answer_s_own_trial_scores_against_its_fresh_episodes(finished):
+def test_what_is_expected_of_the_answer_is_the_mean_of_repetitions_that_nothing_was_chosen_by(finished):
     _, found = confirmed(finished)
-    answer, study = found.confirmation.answer, found.study
+    answer, study, count = found.confirmation.answer, found.study, found.confirmation.repetitions
+    assert 0 < count <= MOST_REPETITIONS
+    scores = []
     with Store.read(finished) as store:
-        known = store.outcomes(study.identity, answer.trial.theta).values()
-    seeds = {episode.seed for episode in plan_episodes(study.settings, answer.trial.theta, study.settings.seed)}
-    own, fresh = ([o for o in known if (o.episode.seed in seeds) is mine] for mine in (True, False))
-    floor = prpv(proxy=score_table(fresh), target=score_table(own), metrics=study.settings.metrics).value
-    assert (found.floor.kind, found.floor.value) == ("same starts", floor)
+        study_run = StudyRun(study, store)
+        for number in range(2, 2 + count):
+            planned = plan_episodes(study.settings, answer.trial.theta, fresh_seed(study.settings.seed, number))
+            proxy = score_table(list(study_run.known(planned).values()))
+            scores.append(prpv(proxy=proxy, target=study.target, metrics=study.settings.metrics).value)
+    value, low, high = found.expected.prpv.value
+    assert value == pytest.approx(sum(scores) / count)
+    assert low < value < high
+    assert (found.floor.kind, found.floor.value) == ("same starts", found.expected.prpv.floor.value)
+    assert found.excess.value == pytest.approx(value - found.floor.value)
+
+
+def test_the_nominal_theta_is_driven_once_beside_the_trials_and_told(finished):
+    study = opened(finished)
+    assert result_of_result(finished).nominal is None
+    family = SimpleNamespace(**{name: getattr(study.family, name) for name in ("identity", "metrics", "parameters")})
+    assert nominal_theta(replace(study, family=family)) is None
+    family.nominal = {"delay": 0.1}
+    assert nominal_theta(replace(study, family=family)) is None, "of one parameter nothing is known"
+    family.nominal["trim"] = 0
+    theta = nominal_theta(replace(study, family=family))
+    with Store.open(finished) as store:
+        store.save_fact(NOMINAL, theta)
+        study_run = StudyRun(study, store)
+        study_run.outcomes(plan_episodes(study.settings, theta, study.settings.seed), "nominal")
+        before = result_of(study_run)
+        assert before.trials == tuple(store.trials())
+        told = study_document(before)["nominal"]
+        value = study_run.evaluation(theta).prpv
+    assert told["theta"] == {"delay": 0.1, "trim": 0.0}
+    assert told["expected_prpv"]["value"] == value
+    assert usefulness_table(before).rows[-4][:2] == ("  nominal", f"{value:.0f}")
 
 
 def test_trials_do_not_depend_on_it(finished, make_study):
@@ -157,7 +201,7 @@ def test_interrupted_anywhere_it_comes_to_the_same_answer(finished, jobs):
 def test_what_need_not_be_run_is_taken_off_the_bar(finished):
     watcher = Stopping()
     spent, found = confirmed(finished, watcher)
-    assert spent.episodes + watcher.off == most_confirmation_episodes(found.study.settings) == MOST_FINALISTS * ONE
+    assert spent.episodes + watcher.off == most_confirmation_episodes(found.study.settings)
 
 
 def test_every_repetition_has_episodes_and_a_score_of_its_own(finished):
@@ -204,7 +248,7 @@ def test_an_agent_that_fails_in_all_fresh_episodes_leaves_the_answer_without_a_s
                     store.save_outcome(study.identity, Outcome(episode, None, "it fell", 0.0))
     _, found = confirmed(finished)
     assert found.confirmation.answer.scores == (None,)
-    assert found.best.trial == found.confirmation.candidates[0].trial
+    assert found.expected is None
     assert usefulness_table(found).rows[0] == (
         "PRPV",
         "–",
@@ -228,8 +272,8 @@ def test_how_much_was_luck_is_in_the_row_of_the_search(finished):
     lucky = replace(answer, scores=(int(answer.trial.prpv) + 4,))
     luck = replace(found, confirmation=replace(found.confirmation, answer=lucky))
     fresh, searched = usefulness_table(luck).rows[:2]
-    assert fresh[:2] == ("PRPV", str(answer.assessment.prpv.value))
-    assert "; fresh episodes" in fresh[3]
+    assert fresh[:2] == ("PRPV", f"{found.expected.prpv.value.value:.0f}")
+    assert "; expected, in " in fresh[3]
     assert searched[:2] == ("  in search", str(found.best.assessment.prpv.value))
     assert searched[3].startswith("4 lower by luck")
     unlucky = replace(answer, scores=(int(answer.trial.prpv),))
@@ -245,7 +289,9 @@ def test_the_document_has_the_answer_and_every_candidate(finished):
     inner = answer.assessment.prpv_interval
     assert (fresh["prpv"], fresh["prpv_interval"]) == (answer.scores[0], [inner.low, inner.high])
     assert fresh["optimism"] == answer.optimism
-    assert [one["index"] for one in fresh["candidates"]] == [c.trial.number for c in found.confirmation.candidates]
+    assert [one["index"] for one in fresh["candidates"]] == [
+        one.trial.number or None for one in found.confirmation.candidates
+    ]
 
 
 @pytest.mark.parametrize(
@@ -260,9 +306,9 @@ def test_perfect_is_only_what_neither_prpv_nor_any_other_output_tells_from_the_t
             plant(study, store, trial, 1.0)
         found = result_of(StudyRun(study, store))
     monkeypatch.setattr(type(found.knowledge), "holds", lambda *_: inside)
-    monkeypatch.setattr(type(found.knowledge), "misfit", Misfit(1.0, 1.0, 0.5 if fits else 0.01))
+    found.knowledge.__dict__["misfit"] = Misfit(1.0, 1.0, 0.5 if fits else 0.01)
     assert found.judged.prpv.value == 0
-    assert found.perfect is (perfect and bool(found.judged.at_noise_floor))
+    assert found.perfect is perfect
     assert found.judged.at_noise_floor is True
 
 

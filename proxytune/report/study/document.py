@@ -9,6 +9,7 @@ from proxytune.report.wording import Ends
 from proxytune.search import Knowledge
 from proxytune.storage import TrialRecord
 from proxytune.study import PRPV, Confirmation, Preflight, StudyResult, settings_document
+from proxytune.usefulness import Estimate
 
 
 def study_document(result: StudyResult) -> dict[str, Any]:
@@ -49,6 +50,8 @@ def _best(result: StudyResult) -> dict[str, Any]:
         **{key: measures[key] for key in shared},
         "objective": {"name": result.study.objective.name, "value": result.value_of(best.trial)},
         "fresh": _fresh(result.confirmation, by_prpv=result.study.objective == PRPV),
+        "expected_prpv": _estimate(result.expected and result.expected.prpv.value),
+        "expected_ppv": _estimate(result.expected and result.expected.ppv and result.expected.ppv.value),
         "posterior_mean": best.posterior_mean,
         "posterior_deviation": best.posterior_deviation,
         "usefulness": measures,
@@ -61,8 +64,19 @@ def _worth(result: StudyResult) -> dict[str, Any]:
     levels = ("noise_floor", "noise_floor_interval", "noise_floor_kind", "at_noise_floor", "chance", "chance_deviation")
     return {
         **{key: measures[key] for key in (*levels, "p_value", "notes")},
+        "excess": _estimate(result.excess),
+        "excess_ppv": _estimate(result.expected and result.expected.ppv and result.expected.ppv.excess),
+        "nominal": result.nominal
+        and {
+            "theta": dict(result.nominal.theta),
+            "expected_prpv": _estimate(result.nominal.expected.prpv.value),
+        },
         "cannot_be_told_from_perfect": bool(result.perfect),
     }
+
+
+def _estimate(found: Estimate | None) -> dict[str, Any] | None:
+    return found and {"value": found.value, "interval": [found.low, found.high]}
 
 
 def _fresh(confirmation: Confirmation | None, *, by_prpv: bool) -> dict[str, Any] | None:
@@ -74,6 +88,7 @@ def _fresh(confirmation: Confirmation | None, *, by_prpv: bool) -> dict[str, Any
         **{key: measures.get(key) for key in ("prpv", "prpv_normalised", "prpv_interval", "ppv")},
         "optimism": confirmation.answer.optimism,
         "episodes": confirmation.episodes,
+        "repetitions": confirmation.repetitions,
         "candidates": [
             {
                 "index": one.trial.number or None,

@@ -35,14 +35,14 @@ TWO_LINES = 0.14
 
 
 def convergence_figure(result: StudyResult) -> Figure:
-    """Draw every trial's PRPV, that of the answer so far, and at the end the answer's on fresh episodes.
+    """Draw every trial's PRPV, that of the answer so far, and at its ends the nominal θ's and the answer's.
 
     Where the objective is another measure, that is drawn in its place.
 
     The answer so far is the visited θ of lowest expected PRPV, which need not be the luckiest trial. Filled points were
     proposed by the surrogate, open ones come from the quasi-random design; crosses are trials that failed, triangles
     what PRPV of those cut off cannot be below. The diamond with its 95 % interval, right of the last trial, is
-    the answer in episodes that the search has not seen.
+    the answer in episodes that nothing was chosen by; the square, left of the first, is the nominal θ.
     """
     figure = Figure(figsize=(COLUMN, 2.9), layout="constrained")
     axes = figure.subplots()
@@ -107,16 +107,15 @@ def _draw_answer(axes: Axes, result: StudyResult) -> LineName:
 
 
 def _draw_fresh(axes: Axes, result: StudyResult) -> None:
-    fresh = result.confirmation.answer.assessment if result.confirmation else None
-    if fresh is None:
-        return
-    score, inner = fresh.prpv.value, fresh.prpv_interval
-    reach = None if inner.low is None or inner.high is None else [[score - inner.low], [inner.high - score]]
-    place, label = result.trials[-1].number + 1, "answer, fresh episodes"
-    bars = np.maximum(0.0, reach) if reach else None
-    axes.errorbar(
-        [place], [score], yerr=bars, fmt="D", color=VERMILLION, markersize=5, capsize=2, zorder=4, label=label
-    )
+    last = result.trials[-1].number + 1
+    told = [(last, result.expected, VERMILLION, "D", "answer, fresh episodes")] if result.expected else []
+    told += [(0, result.nominal.expected, "black", "s", "simulator as it is")] if result.nominal else []
+    for place, expected, colour, mark, label in told:
+        value, low, high = expected.prpv.value
+        reach = [[max(0.0, value - low)], [max(0.0, high - value)]]
+        axes.errorbar(
+            [place], [value], yerr=reach, fmt=mark, color=colour, markersize=5, capsize=2, zorder=4, label=label
+        )
 
 
 COLUMNS = 2

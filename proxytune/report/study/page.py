@@ -93,9 +93,10 @@ def study_foot(settings: StudySettings, command: str | None = None) -> Foot:
 def _say_meaning(agents: int) -> str:
     return (
         "PRPV, the proxy relative predictivity value, counts on how many ordered pairs of the "
-        f"{agents} agents proxy and target disagree which is the better. The best θ is the visited one of lowest "
-        "expected PRPV, given all trials and fresh episodes. The 95 % interval holds the values that agree with every "
-        "agent's every metric on the target; “by PRPV alone” those whose PRPV is as low as the best, within noise."
+        f"{agents} agents proxy and target disagree which is the better. The best θ is the most probable of those "
+        "whose PRPV, by all trials and fresh episodes, cannot be told from the lowest. The 95 % interval holds the "
+        "values that agree with every agent's every metric on the target; “by PRPV alone” those whose PRPV is as low "
+        "as the best, within noise."
     )
 
 
@@ -104,8 +105,9 @@ def study_pictures(result: StudyResult, figures: Mapping[str, bytes]) -> dict[st
     truth = "" if result.truth is None else " The triangle is the θ that made the target."
     nothing = " Where almost nothing is grey, the parameter is unidentified: these trials exclude almost no value."
     unidentified = nothing if result.knowledge.unidentified else ""
-    again = result.confirmation is not None and result.confirmation.answer.assessment is not None
     fresh = " The diamond is the answer in episodes that the search has not seen: only that is free of luck."
+    fresh = fresh if result.expected else ""
+    fresh += " The square is the simulator as it is, at its nominal θ." if result.nominal else ""
     floor = " What lies within the green band is within noise." if result.floor.value is not None else ""
     cut = any(trial.bound is not None for trial in result.trials)
     hollow = "; open ones were stopped early, and theirs is an estimate" if cut else ""
@@ -113,7 +115,7 @@ def study_pictures(result: StudyResult, figures: Mapping[str, bytes]) -> dict[st
         "profiles": "Grey values are excluded (95 %), the others remain; the higher the curve, the more probable the "
         f"value.{unidentified} The vertical line is the answer.{truth}",
         "convergence": "The line is the answer so far, the θ of lowest expected score, which need not be the luckiest "
-        f"point.{fresh if again else ''}{floor}",
+        f"point.{fresh}{floor}",
         "importance": "A dot is the share in the variance of PRPV over the box that a parameter takes part in; the "
         "stroke is what it does alone. Lines are 95 % intervals: where they overlap, the order is not known. Where a "
         "dot stands near the lower end of its line, the true share may well be larger, but hardly smaller.",

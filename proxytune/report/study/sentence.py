@@ -2,12 +2,25 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import ceil
 
 from proxytune.diagnosis import MOTION_EFFECTS
-from proxytune.report.wording import Ends, digits, fixed, listed, percent, plain, probability, short, span, with_span
+from proxytune.report.wording import (
+    Ends,
+    digits,
+    fixed,
+    in_pairs,
+    listed,
+    pairs_span,
+    percent,
+    plain,
+    probability,
+    short,
+    span,
+)
 from proxytune.search import Information
 from proxytune.study import StudyResult
-from proxytune.usefulness import Chance, NoiseFloor
+from proxytune.usefulness import Chance, Estimate, NoiseFloor
 
 MOST_NAMED = 5
 """At most this many parameters are named one by one."""
@@ -42,9 +55,11 @@ class Finding:
         parameters: In the order of the box.
         region: The 95 % region's share of the box.
         inside: Whether the best θ lies in it.
-        prpv: PRPV of the best θ.
-        fresh: Whether that is of fresh episodes.
+        prpv: PRPV of the best θ: expected of more episodes, or without fresh ones that of its own.
+        fresh: Whether there are fresh ones.
         floor: What a perfect proxy would score.
+        excess: By how much more is expected of this one than of that; None where it is not known.
+        nominal: PRPV expected of the simulator as it is; None where it has no nominal values.
         chance: What a proxy that ranks at random would score.
         perfect: Whether no difference between proxy and target can be seen, which takes fresh episodes.
         misfit: p-value of the misfit test; None where there is none.
@@ -62,9 +77,11 @@ class Finding:
     parameters: tuple[KnownParameter, ...]
     region: float
     inside: bool
-    prpv: int
+    prpv: Estimate
     fresh: bool
     floor: NoiseFloor
+    excess: Estimate | None
+    nominal: Estimate | None
     chance: Chance
     perfect: bool
     misfit: float | None
@@ -139,23 +156,29 @@ def _say_value(parameter: KnownParameter) -> str:
 
 
 def _say_usefulness(finding: Finding) -> str:
-    """PRPV, beside what a perfect proxy and one that ranks at random would score."""
-    where = "on fresh episodes" if finding.fresh else "in the search's own episodes"
-    score = f"PRPV (proxy relative predictivity value) is {finding.prpv} {where}"
+    """PRPV, beside what a perfect proxy, one that ranks at random and the simulator as it is score."""
+    name = "PRPV (proxy relative predictivity value)"
+    if not finding.fresh:
+        score = f"{name} is {short(finding.prpv.value)} in the search's own episodes"
+    else:
+        score = f"{name} is {in_pairs(*finding.prpv)}"
     if finding.chance.explains:
         at_random = f"{short(finding.chance.mean)} ± {short(finding.chance.deviation)}"
         return f"{score}, no better than chance ({at_random}, {probability(finding.chance.p_value)})."
     if not finding.fresh:
         return f"{score}, which may be partly luck."
-    level = finding.floor
-    if level.kind != "same starts" or level.value is None or level.low is None or level.high is None:
-        return f"{score}, better than chance; the noise floor is not known."
-    floor = f"noise floor {with_span(level.value, level.low, level.high)}"
-    if finding.perfect:
-        return f"{score}, {floor}: no difference from the target can be seen."
-    if finding.prpv <= level.high:
-        return f"{score}, {floor}: PRPV can get no better, but other scores of the agents differ from the target's."
-    return f"{score}, {floor}: better than chance, but a perfect proxy scores lower."
+    nominal = finding.nominal
+    before = f" The simulator as it is scores {in_pairs(*nominal)}." if nominal else ""
+    level, excess = finding.floor, finding.excess
+    if excess is None or level.value is None or level.low is None or level.high is None:
+        return f"{score}, better than chance; what a perfect proxy scores is not known.{before}"
+    floor = f"a perfect proxy's {in_pairs(level.value, level.low, level.high)}"
+    if excess.low > 0.0:
+        lower = f"a perfect proxy scores lower, by {pairs_span(*excess[1:])}"
+        return f"{score}, {floor}: better than chance, but {lower}.{before}"
+    told = f"it cannot be told from a perfect proxy; at most {fixed(ceil(excess.high), 0)} pairs worse"
+    other = "" if finding.perfect else ", but other scores of the agents differ from the target's"
+    return f"{score}, {floor}: {told}{other}.{before}"
 
 
 def _choose_next_step(finding: Finding) -> str:
@@ -199,14 +222,17 @@ def finding_of(result: StudyResult) -> Finding:
     """Gather what the sentence of a study is made of."""
     settings, learnt, judged = result.study.settings, result.knowledge, result.judged
     parameters = known_parameters(result)
-    least = max(parameters, key=lambda one: one.share).name
+    least, own = max(parameters, key=lambda one: one.share).name, float(judged.prpv.value)
+    prpv = result.expected.prpv.value if result.expected else Estimate(own, own, own)
     return Finding(
         parameters=parameters,
         region=learnt.posterior.share,
         inside=result.inside,
-        prpv=judged.prpv.value,
+        prpv=prpv,
         fresh=judged is not result.best.assessment,
         floor=result.floor,
+        excess=result.excess,
+        nominal=result.nominal and result.nominal.expected.prpv.value,
         chance=judged.chance,
         perfect=bool(result.perfect),
         misfit=learnt.misfit.p_value,

@@ -11,11 +11,23 @@ from proxytune.report.study.sentence import known_parameters, study_sentence
 from proxytune.report.table_files import write_latex
 from proxytune.report.text import file_texts, group_texts, section_text
 from proxytune.report.view import Column, Table, columns_of
-from proxytune.report.wording import digits, fixed, listed, percent, plain, probability, short, short_span, span
+from proxytune.report.wording import (
+    digits,
+    fixed,
+    listed,
+    pairs_span,
+    percent,
+    plain,
+    probability,
+    short,
+    short_span,
+    span,
+    with_span,
+)
 from proxytune.report.writing import write_text
 from proxytune.storage import TrialRecord
 from proxytune.study import PRPV, StudyResult
-from proxytune.usefulness import PAIRED, PERFECT, Assessment
+from proxytune.usefulness import LEFT_OUT, PAIRED, PERFECT
 
 Rows = list[tuple[str, ...]]
 THETA, USEFULNESS, INFORMATION, SEARCH = (
@@ -103,15 +115,17 @@ def usefulness_table(result: StudyResult) -> Table:
 
     Its notes are not what the sentence says already, nor advice on the options of `score`.
     """
-    own, floor, chance = result.best.assessment, result.floor, result.judged.chance
-    rows = [*_objective_rows(result), *_prpv_rows(result)]
-    if floor.value is not None and (ends := short_span(floor.low, floor.high)):
-        meaning = floor.meaning if result.judged is own else "what a perfect proxy scores (this one re-run)"
-        rows.append((f"  {floor.title}", short(floor.value), ends, meaning))
+    own, chance, expected = result.best.assessment, result.judged.chance, result.expected
+    rows = [*_objective_rows(result), *_prpv_rows(result), *_level_rows(result)]
     as_low = f"a random ranking; as low: {probability(chance.p_value)}"
     rows.append(("  chance", fixed(chance.mean, 1), f"± {fixed(chance.deviation, 1)}", as_low))
-    if own.ppv.value is not None:
-        rows.append(("PPV", f"{own.ppv.value:.3g}", "", "proxy predictivity value: error of the scores"))
+    meaning = "proxy predictivity value: error of the scores"
+    if expected and expected.ppv:
+        found = expected.ppv
+        more = f"; a perfect proxy's {with_span(*found.floor)}" if found.floor else ""
+        rows.append(("PPV", f"{found.value.value:.3g}", short_span(*found.value[1:]), meaning + more))
+    elif own.ppv.value is not None:
+        rows.append(("PPV", f"{own.ppv.value:.3g}", "", meaning))
     misfit = result.knowledge.misfit
     if misfit.p_value is None:
         few = "too few complete trials to test whether any θ explains the target's scores"
@@ -120,7 +134,7 @@ def usefulness_table(result: StudyResult) -> Table:
         fits = "some θ may explain" if misfit.fits else "no θ explains"
         rows.append((MISFIT, f"{misfit.p_value:.2g}", "", f"{fits} the target's scores"))
     columns = (*columns_of(("measure",), ("value", "interval")), Column("meaning"))
-    notes = tuple(note for note in result.judged.notes if note not in (PAIRED, PERFECT))
+    notes = tuple(note for note in result.judged.notes if note not in (PAIRED, PERFECT, LEFT_OUT))
     return Table(USEFULNESS, columns, tuple(rows), notes)
 
 
@@ -136,27 +150,44 @@ def _objective_rows(result: StudyResult) -> Rows:
 
 
 def _prpv_rows(result: StudyResult) -> Rows:
-    """PRPV of the best θ, first on fresh episodes where there are any, then on those that the search chose it by."""
-
-    def measured(assessment: Assessment) -> tuple[str, str]:
-        inner = assessment.prpv_interval
-        return str(assessment.prpv.value), short_span(inner.low, inner.high)
-
-    own, confirmation = result.best.assessment, result.confirmation
+    """PRPV that is expected of the best θ, that of the fresh episodes that chose it, and of the search's own."""
+    own, confirmation, expected = result.best.assessment, result.confirmation, result.expected
     pairs = f"wrongly ordered pairs, 0 to {own.prpv.range[1]}"
+    value = str(own.prpv.value)
     if confirmation is None:
-        return [("PRPV", *measured(own), f"{pairs}; the search's own episodes")]
-    fresh = confirmation.answer.assessment
-    if fresh is None:
+        return [("PRPV", value, "", f"{pairs}; the search's own episodes")]
+    if expected is None:
         failed = "none on fresh episodes: an agent failed in all of them"
-        return [("PRPV", "–", "", failed), (IN_SEARCH, *measured(own), pairs)]
+        return [("PRPV", "–", "", failed), (IN_SEARCH, value, "", pairs)]
     optimism, others = confirmation.answer.optimism or 0.0, len(confirmation.candidates) - 1
     luck = f"{optimism:.3g} lower by luck" if optimism > 0.0 else "no optimism"
     rivals = f"; {others} runner{'' if others == 1 else 's'}-up re-run as well" if others else ""
+    count = f"in {expected.repetitions} more runs" if confirmation.repetitions > 1 else "in fresh episodes"
     return [
-        ("PRPV", *measured(fresh), f"{pairs}; fresh episodes"),
-        (IN_SEARCH, *measured(own), f"{luck}{rivals}"),
+        (
+            "PRPV",
+            fixed(expected.prpv.value.value, 0),
+            pairs_span(*expected.prpv.value[1:]),
+            f"{pairs}; expected, {count}",
+        ),
+        (IN_SEARCH, value, "", f"{luck}{rivals}"),
     ]
+
+
+def _level_rows(result: StudyResult) -> Rows:
+    """What a perfect proxy scores and how much more is expected of this one; what the simulator as it is scores."""
+    floor, excess, nominal = result.floor, result.excess, result.nominal
+    rows = Rows()
+    if floor.value is not None and floor.low is not None and floor.high is not None:
+        meaning = floor.meaning if result.expected is None else "what a perfect proxy scores against this target"
+        rows.append((f"  {floor.title}", fixed(floor.value, 0), pairs_span(floor.low, floor.high), meaning))
+    if excess:
+        told = "more than a perfect proxy" if excess.low > 0.0 else "more than a perfect proxy; may be none"
+        rows.append(("  excess", fixed(excess.value, 0), pairs_span(*excess[1:]), told))
+    if nominal:
+        level = nominal.expected.prpv.value
+        rows.append(("  nominal", fixed(level.value, 0), pairs_span(*level[1:]), "the simulator as it is"))
+    return rows
 
 
 def information_table(result: StudyResult) -> Table:

@@ -1,0 +1,350 @@
+"""A study from its first trial to its answer, confirmed by fresh episodes; `run_stages` is the whole of it.
+
+All trials share the placement noise of the study's seed, so the θ that the search likes best also suits that noise.
+After the trials, finalists are driven under seeds that the search has not seen: the visited θ of lowest expected PRPV,
+and two that no trial need have visited, the most probable θ and the θ of the 95 % region whose PRPV is expected to be
+lowest. The answer is the most probable of those whose expected PRPV and fresh scores are, on average, not more than a
+standard deviation of a fresh score above the lowest. Its own fresh score was chosen by; so it is driven in repetitions
+that nothing is chosen by, as many as its interval needs (`_more`). Beside it stands the nominal θ. What was driven
+twice from the same start, here and in the pre-flight, tells the noise of all that (`expect`). No trial depends on it.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from math import ceil
+
+import numpy as np
+
+from proxytune.arrays import Floats
+from proxytune.domain import Episode, Outcome, instance_of
+from proxytune.errors import EpisodeError
+from proxytune.scores import ScoreTable
+from proxytune.search import Knowledge, make_proposer
+from proxytune.seeds import fresh_seed
+from proxytune.space import Theta
+from proxytune.storage import TrialRecord
+from proxytune.study.earlier import earlier_trials, learn
+from proxytune.study.facts import NOMINAL, check_facts, note_search
+from proxytune.study.opening import Study
+from proxytune.study.preflight import placement_pairs, run_preflight
+from proxytune.study.run import AfterEarlier, goal_of, knowledge_of, record, retry_failed, run_trials, stopped
+from proxytune.study.settings import StudySettings
+from proxytune.study.study_run import StudyRun, evaluate_outcomes, in_common, plan_episodes, score_table
+from proxytune.usefulness import Assessment, Expectation, assess, donors_of, expect
+
+MOST_FINALISTS = 3
+"""At most so many θ are driven again."""
+UNVISITED = 0
+"""Number of a finalist that no trial visited."""
+MOST_REPETITIONS = 5
+"""At most so many more of the answer, which nothing is chosen by."""
+NARROW = 1.0
+"""Half an interval of PRPV [ordered pairs] that more repetitions need not make narrower."""
+
+
+def run_stages(run: StudyRun, warn: Callable[[str], None], known: Sequence[Outcome | Theta] = ()) -> None:
+    """Run a study to its end, from wherever it was left: pre-flight, trials, fresh episodes.
+
+    Args:
+        run: The study.
+        warn: Hears, before the first trial, of another search than before and of parameters without effect.
+        known: θ to try next, before what the search proposes, and outcomes that need not be simulated.
+
+    Raises:
+        InputError, RunError: As `run_trials`.
+    """
+    check_facts(run)
+    _attach(run, known)
+    retry_failed(run)
+    learn(run)
+    if line := note_search(run.study, run.store):
+        warn(line)
+    learnt = run_preflight(run)
+    for warning in learnt.warnings if learnt and run.spent.episodes else ():
+        warn(warning)
+    # The proposer allows for the noise that the pre-flight measured.
+    proposer = make_proposer(run.study.engine, run.settings.initial, goal_of(run))
+    run_trials(run, AfterEarlier(proposer, earlier) if (earlier := earlier_trials(run)) else proposer)
+    run_nominal(run)
+    run_confirmation(run)
+
+
+def _attach(run: StudyRun, known: Sequence[Outcome | Theta]) -> None:
+    """Keep outcomes, and open a trial for each θ that has none yet: what is open is not proposed."""
+    outcomes = [one for one in known if isinstance(one, Outcome)]
+    if outcomes:
+        run.store.save_outcome(run.study.identity, *outcomes)
+    trials = [*run.finished_trials(), *run.open_trials()]
+    tried = {instance_of(trial.theta) for trial in trials}
+    wanted = (dict(one.episode.theta) if isinstance(one, Outcome) else one for one in known)
+    new = [one for key, one in {instance_of(theta): theta for theta in wanted}.items() if key not in tried]
+    opened = [TrialRecord(number, dict(theta)) for number, theta in enumerate(new, start=len(trials) + 1)]
+    if opened:
+        run.save_trials(*opened)
+
+
+@dataclass(frozen=True)
+class Finalist:
+    """A θ that has been driven again.
+
+    Attributes:
+        trial: The trial that visited it; its own episodes as a trial of number UNVISITED where none did.
+        fresh: The outcomes of each fresh repetition.
+        scores: The study's cost in each of them; None where an agent has no episode that worked.
+        assessment: How useful the proxy is there, over all fresh episodes; None of all but the answer, and if an agent
+            has none that worked.
+    """
+
+    trial: TrialRecord
+    fresh: tuple[tuple[Outcome, ...], ...]
+    scores: tuple[float | None, ...]
+    assessment: Assessment | None = None
+
+    @property
+    def optimism(self) -> float | None:
+        """The trial's luck: how much better it scored than its fresh repetitions do on average."""
+        known = [one for one in self.scores if one is not None]
+        return float(np.mean(known)) - self.trial.score if known and self.trial.score is not None else None
+
+
+@dataclass(frozen=True)
+class Confirmation:
+    """The answer of fresh episodes.
+
+    Attributes:
+        answer: The finalist that is the answer.
+        candidates: All finalists, the search's own favourite first.
+        episodes: How many fresh episodes each was driven in.
+        expected: What is expected of the answer: by the repetitions that nothing was chosen by, or by its fresh
+            episodes where noise asks for none of these, or they are still missing; None if an agent failed in all.
+        repetitions: How many repetitions that nothing was chosen by were driven.
+    """
+
+    answer: Finalist
+    candidates: tuple[Finalist, ...]
+    episodes: int
+    expected: Expectation | None
+    repetitions: int
+
+
+@dataclass(frozen=True)
+class Nominal:
+    """The simulator as it is.
+
+    Attributes:
+        theta: The nominal values of the parameters that are searched.
+        expected: What is expected of it.
+    """
+
+    theta: Theta
+    expected: Expectation
+
+
+def nominal_theta(study: Study) -> Theta | None:
+    """The nominal values of the parameters that are searched; None where the family does not know all of them."""
+    known = getattr(study.family, "nominal", None) or {}
+    names = study.settings.space.names
+    return {name: float(known[name]) for name in names} if set(names) <= set(known) else None
+
+
+def run_nominal(run: StudyRun) -> None:
+    """Drive the nominal θ once, where there is one: no trial, and out of the search's sight."""
+    if theta := nominal_theta(run.study):
+        run.store.save_fact(NOMINAL, dict(theta))
+        # Where it fails, nothing is said of it.
+        with suppress(EpisodeError):
+            run.outcomes(plan_episodes(run.settings, theta, run.settings.seed), "nominal θ")
+
+
+def nominal_of(run: StudyRun, confirmation: Confirmation | None) -> Nominal | None:
+    """The nominal θ from what has been simulated; None if there is none, or an agent has no episode of it."""
+    theta = run.store.facts().get(NOMINAL)
+    if not isinstance(theta, dict) or set(theta) != set(run.settings.space.names):
+        return None
+    found = run.evaluation(theta)
+    if found is None or found.proxy is None:
+        return None
+    return Nominal(theta, _expect(run, [found.proxy], confirmation.candidates if confirmation else ()))
+
+
+def run_confirmation(run: StudyRun) -> None:
+    """Simulate what is missing of the fresh episodes of a study that has come to its end.
+
+    Raises:
+        EpisodeError: If an episode fails and the study is to stop then.
+        RunError: If no trial has a score.
+    """
+    settings, trials = run.settings, run.finished_trials()
+    # An answer that no trial visited needs episodes of its own, also without fresh ones.
+    if not stopped(run, trials) or (trials and not settings.confirm):
+        return
+    learnt = knowledge_of(run, trials)
+    chosen = finalists(trials, learnt)
+    planned = [_planned(settings, trial) for trial in chosen]
+    most, each = most_confirmation_episodes(settings), len(settings.agents) * settings.starts
+    run.watcher.begin("fresh episodes", most - sum(map(len, planned)) - MOST_REPETITIONS * each)
+    for number, episodes in enumerate(planned, start=1):
+        what = f"fresh episodes {number} of {len(chosen)}"
+        run.outcomes(episodes, what)
+        run.watcher.finished(what)
+    driven = _driven(run, chosen) if settings.confirm else None
+    more = _more(run, _answer(driven, learnt), driven) if driven else []
+    run.watcher.begin("the answer again", (MOST_REPETITIONS - len(more)) * each)
+    run.outcomes([episode for repetition in more for episode in repetition], "the answer again")
+
+
+def confirmation_of(run: StudyRun, trials: Sequence[TrialRecord], learnt: Knowledge) -> Confirmation | None:
+    """The answer of the fresh episodes of these trials; None if it is off, or an episode is still missing.
+
+    Args:
+        run: The study.
+        trials: Finished trials, one of them with a score.
+        learnt: What they say of θ.
+    """
+    settings = run.settings
+    driven = _driven(run, finalists(trials, learnt)) if settings.confirm else None
+    if not driven:
+        return None
+    answer = _answer(driven, learnt)
+    whole = _assessed(run.study, answer.fresh)
+    tables, count = [table for one in answer.fresh if (table := _table(run.study, one))], 0
+    expected = None
+    if whole and tables:
+        known = [run.known(planned) for planned in _more(run, answer, driven)]
+        again = [table for one in known if len(one) == settings.starts * len(settings.agents)
+                 if (table := _table(run.study, tuple(one.values())))]  # fmt: skip
+        chosen_by, expected = _expect(run, tables, driven), _expect(run, again or tables, driven)
+        inner = replace(whole.prpv_interval, low=chosen_by.prpv.value.low, high=chosen_by.prpv.value.high)
+        answer = replace(answer, assessment=replace(whole, prpv_interval=inner, noise_floor=expected.floor))
+        count = len(again)
+    return Confirmation(
+        answer, tuple(driven), settings.confirm * settings.starts * len(settings.agents), expected, count
+    )
+
+
+def finalists(trials: Sequence[TrialRecord], learnt: Knowledge) -> list[TrialRecord]:
+    """The θ that are driven again, that of lowest expected PRPV first: a function of what was finished alone.
+
+    Where no θ explains the target, the most probable one is worth little: then visited θ take the place of what no
+    trial visited, those not more than a standard deviation of a fresh score behind.
+
+    Args:
+        trials: Finished trials, one of them with a score, or none where earlier studies tell.
+        learnt: What they and those of earlier studies say of θ.
+    """
+    # Of a pruned trial it is certain that it is none of the best.
+    scored = {learnt.space.values(trial.theta): trial for trial in trials if trial.state == "finished"}
+    pruned = {learnt.space.values(trial.theta) for trial in trials} - scored.keys()
+    whole = {one.values for one in learnt.trials if one.outcome and not np.isnan(one.outcome).any()} - pruned
+    expected = {values: mean for values, mean in learnt.expected.items() if values in scored or values in whole}
+    best = min(expected, key=expected.__getitem__)
+    noise = float(learnt.fresh_scores(best).std())
+    near = [values for values, mean in expected.items() if mean - expected[best] <= noise]
+    inner = (
+        [learnt.likeliest_of(list(expected))] if learnt.misfit.fits is False else [learnt.mode, learnt.lowest_inside]
+    )
+    chosen = list(dict.fromkeys([near[0], *inner, *near[1:]]))[:MOST_FINALISTS]
+    return [scored.get(values) or TrialRecord(UNVISITED, learnt.space.theta(values)) for values in chosen]
+
+
+def _planned(settings: StudySettings, trial: TrialRecord) -> list[Episode]:
+    """The fresh episodes of a finalist, and under the search's seed those that no trial has driven."""
+    first = 1 if trial.number else 0
+    seeds = [fresh_seed(settings.seed, repetition) for repetition in range(first, settings.confirm + 1)]
+    return [episode for seed in seeds for episode in plan_episodes(settings, trial.theta, seed)]
+
+
+def _driven(run: StudyRun, chosen: Sequence[TrialRecord]) -> list[Finalist] | None:
+    """The finalists with their fresh episodes; None while one is missing, and without θ that fail in their own."""
+    found, settings = [], run.settings
+    for trial in chosen:
+        own, fresh = run.evaluation(trial.theta), []
+        for repetition in range(1, settings.confirm + 1):
+            planned = plan_episodes(settings, trial.theta, fresh_seed(settings.seed, repetition))
+            known = run.known(planned)
+            if len(known) < len(planned) or own is None:
+                return None
+            fresh.append(tuple(known.values()))
+        scores = tuple(evaluate_outcomes(run.study, trial.theta, outcomes).score for outcomes in fresh)
+        found.append(Finalist(trial if trial.number or own is None else record(UNVISITED, own), tuple(fresh), scores))
+    return [one for one in found if one.trial.score is not None]
+
+
+def _answer(driven: Sequence[Finalist], learnt: Knowledge) -> Finalist:
+    """The most probable of those that PRPV cannot tell from the best; the best itself where no θ explains the target.
+
+    Each has as many fresh episodes, so what fresh noise does to all of them alike favours none.
+    """
+    by_values = {learnt.space.values(one.trial.theta): one for one in driven}
+    own = learnt.expected_of({values: one.trial.score or 0.0 for values, one in by_values.items()})
+    mean = {
+        values: float(np.mean([own[values], *(score for score in one.scores if score is not None)]))
+        for values, one in by_values.items()
+    }
+    best = min(mean, key=mean.__getitem__)
+    if learnt.misfit.fits is False:
+        return by_values[best]
+    limit = mean[best] + float(learnt.fresh_scores(best).std())
+    return by_values[learnt.likeliest_of([values for values in mean if mean[values] <= limit])]
+
+
+def _more(run: StudyRun, answer: Finalist, driven: Sequence[Finalist]) -> list[list[Episode]]:
+    """The repetitions of the answer that nothing is chosen by: as many as make its interval narrow."""
+    table = _table(run.study, answer.fresh[0])
+    if table is None:
+        return []
+    settings, reach = run.settings, 1.96 * _expect(run, [table], driven).deviation
+    count = min(MOST_REPETITIONS, ceil((reach / NARROW) ** 2))
+    seeds = [fresh_seed(settings.seed, settings.confirm + 1 + number) for number in range(count)]
+    return [plan_episodes(settings, answer.trial.theta, seed) for seed in seeds]
+
+
+def _expect(run: StudyRun, tables: Sequence[ScoreTable], driven: Sequence[Finalist]) -> Expectation:
+    """What is expected by these tables, and by the noise of the finalists and of the pre-flight."""
+    metrics = run.settings.metrics
+    pairs = [np.moveaxis(placement_pairs(run)[..., : len(metrics)], 1, 0)]
+    for one in driven:
+        own = run.known(plan_episodes(run.settings, one.trial.theta, run.settings.seed))
+        pairs += [np.stack([_cells(run, own.values()), _cells(run, fresh)]) for fresh in one.fresh]
+    return expect(
+        fresh=tables,
+        target=run.study.target,
+        metrics=metrics,
+        donors=donors_of(pairs, len(metrics)),
+        seed=run.settings.seed,
+    )
+
+
+def _cells(run: StudyRun, outcomes: Iterable[Outcome]) -> Floats:
+    """The metrics of each agent and start, in the order in which they are planned; NaN where one failed."""
+    known = {(one.episode.agent, one.episode.start): one.metrics or {} for one in outcomes}
+    places = [(agent, start) for agent in run.settings.agents for start in range(run.settings.starts)]
+    names = [metric.name for metric in run.settings.metrics]
+    return np.array([[known.get(place, {}).get(name, np.nan) for name in names] for place in places])
+
+
+def most_confirmation_episodes(settings: StudySettings) -> int:
+    """The number of episodes that a confirmation takes at most, the nominal θ not counted."""
+    repetitions = MOST_FINALISTS * settings.confirm + MOST_FINALISTS - 1 + MOST_REPETITIONS
+    return repetitions * len(settings.agents) * settings.starts if settings.confirm else 0
+
+
+def _table(study: Study, outcomes: Sequence[Outcome]) -> ScoreTable | None:
+    """The scores of one repetition; None if an agent has no episode that worked."""
+    worked = {outcome.episode.agent for outcome in outcomes if outcome.metrics is not None}
+    return score_table(outcomes) if worked == set(study.settings.agents) else None
+
+
+def _assessed(study: Study, runs: Sequence[Sequence[Outcome]]) -> Assessment | None:
+    """All fresh episodes as one table; of several repetitions, each start is another episode every time."""
+    scored: dict[tuple[str, str], Mapping[str, float]] = {}
+    for repetition, outcomes in enumerate(runs):
+        for one in outcomes:
+            label = f"{one.episode.start}/{repetition}" if len(runs) > 1 else str(one.episode.start)
+            if one.metrics is not None:
+                scored[one.episode.agent, label] = one.metrics
+    if {agent for agent, _ in scored} != set(study.settings.agents):
+        return None
+    proxy = ScoreTable.from_episodes(in_common(scored))
+    return assess(proxy=proxy, target=study.target, metrics=study.settings.metrics)

@@ -1,0 +1,260 @@
+"""What more episodes would come to: PRPV and PPV expected of a proxy, and what a perfect proxy scores beside it.
+
+An agent from one start does nearly the same each time. The noise of PRPV is a few cells (agent, start) that turn out
+one way or the other, as by a crash, and break or make ties; starts do not vary between repeats, so resampling them says
+nothing of it. What is known of noise are pairs: cells that were driven twice from the same start (`donors_of`). A cell
+is repeated by the change of one of the pairs most like it (`Donors.again`), each cell by itself.
+
+    expected    mean v ± t √(s²/m),    v = PRPV(P, T) of m fresh tables, which is unbiased; s by P repeated
+    floor       the quantiles of f = PRPV(T repeated, T): what a perfect proxy scores against this target
+    excess      mean v − mean f ± z √(s²/m + var f)
+
+s² pools the variance of the fresh scores with that of repeated tables, which counts as ten more. PPV likewise. Where a
+proxy draws nothing, the target's repeats are the donors, or where there are none its episodes from different starts,
+which overstate noise: then a proxy is not called imperfect for that.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from proxytune.arrays import Flags, Floats, Whole
+from proxytune.scores import Metric, ScoreTable
+from proxytune.usefulness.comparison import Comparison, compare, start_places
+from proxytune.usefulness.noise import NoiseFloor
+from proxytune.usefulness.predictivity import ppv, ppv_of_means
+from proxytune.usefulness.resampling import interval, prpv_in_blocks
+
+NEAREST = 24
+"""Pairs most like a cell, one of which is drawn to repeat it."""
+DRAWS = 400
+ATOM = 0.05
+"""A value that more than this share of all cells have is one that agents end up at, as the time limit."""
+OTHER_ATOMS = 10.0
+"""How far, in ranks, a pair at other such values is off."""
+MODELLED = 10.0
+"""The variance of repeated tables counts as so many fresh ones."""
+NORMAL = 1.96
+
+
+class Estimate(NamedTuple):
+    """A figure and the ends of its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, eq=False)
+class Donors:
+    """Cells that were driven twice from the same start.
+
+    Attributes:
+        first: Metrics of one time, shape (pairs, metrics).
+        second: Metrics of the other; every pair is there both ways round.
+    """
+
+    first: Floats
+    second: Floats
+
+    @property
+    def still(self) -> bool:
+        """True if nothing changes from one time to the other, or nothing was driven twice."""
+        return np.array_equal(self.first, self.second)
+
+    @cached_property
+    def _sorted(self) -> Floats:
+        return np.sort(self.first, axis=0)
+
+    def _ranks(self, cells: Floats) -> Floats:
+        """Where cells lie among the pairs' in each metric, 0 to 1; the middle of equal ones."""
+        sides = [
+            [np.searchsorted(known, own, side=side) for side in ("left", "right")]
+            for known, own in zip(self._sorted.T, cells.T, strict=True)
+        ]
+        return np.asarray(np.mean(sides, axis=1).T / len(self.first))
+
+    def _atoms(self, cells: Floats) -> Floats:
+        """In each metric, the value that many cells share; NaN of all other values."""
+        found = np.full(cells.shape, np.nan)
+        for column, known in enumerate(self.first.T):
+            values, counts = np.unique(known, return_counts=True)
+            shared = np.isin(cells[:, column], values[counts > ATOM * len(known)])
+            found[shared, column] = cells[shared, column]
+        return found
+
+    def again(self, cells: Floats, rng: np.random.Generator, draws: int = DRAWS) -> Floats:
+        """Repeat cells (cells, metrics) so many times: (draws, cells, metrics).
+
+        Each takes the change of one of its nearest pairs: another outcome where that changed to or from a value that
+        many share; else its difference, within the range of all.
+        """
+        own, before, after = (self._atoms(each) for each in (cells, self.first, self.second))
+        apart = np.abs(self._ranks(cells)[:, None] - self._ranks(self.first)).sum(axis=-1)
+        other = ~_same(own[:, None], before).all(axis=-1)
+        # Equal ones in random order.
+        apart += OTHER_ATOMS * other + 1e-6 * rng.random(apart.shape)
+        count = min(NEAREST, len(self.first))
+        near = np.argpartition(apart, count - 1, axis=1)[:, :count]
+        chosen = near[np.arange(len(cells)), rng.integers(count, size=(draws, len(cells)))]
+        turned = np.asarray(~_same(before, after).all(axis=-1))[chosen]
+        moved = np.clip(cells + self.second[chosen] - self.first[chosen], self._sorted[0], self._sorted[-1])
+        moved = np.where(np.isnan(own), moved, cells)
+        return np.where(turned[..., None], self.second[chosen], moved)
+
+
+def _same(one: Floats, other: Floats) -> Flags:
+    return np.asarray((one == other) | (np.isnan(one) & np.isnan(other)), dtype=np.bool_)
+
+
+def donors_of(pairs: Iterable[Floats], metrics: int) -> Donors:
+    """Gather what is known of noise: arrays (2, …, metrics) of the same cells driven twice, NaN where one failed."""
+    flat = [np.reshape(pair, (2, -1, metrics)) for pair in pairs]
+    both = np.concatenate([np.empty((2, 0, metrics)), *flat], axis=1)
+    both = both[:, ~np.isnan(both).any(axis=(0, 2))]
+    return Donors(np.concatenate([both[0], both[1]]), np.concatenate([both[1], both[0]]))
+
+
+def _target_donors(target: ScoreTable) -> Donors:
+    """Repeats of the target's starts, or where there are none its episodes from different starts."""
+    places, (_, episodes, metrics) = start_places(target), target.values.shape
+    two = np.array([(a, b) for a in range(episodes) for b in range(a)], dtype=np.intp).reshape(-1, 2)
+    alike = two[places[two[:, 0]] == places[two[:, 1]]]
+    chosen = (alike if len(alike) else two).T
+    return donors_of([np.moveaxis(target.values[:, chosen], 1, 0)], metrics)
+
+
+@dataclass(frozen=True)
+class Expected:
+    """One measure in more episodes.
+
+    Attributes:
+        value: Expected of more fresh episodes against this target.
+        floor: What a perfect proxy scores against this target, with where 95 % of its scores lie; None if noise is not
+            known.
+        excess: By how much more is expected of this proxy than of a perfect one; None if noise is not known.
+    """
+
+    value: Estimate
+    floor: Estimate | None
+    excess: Estimate | None
+
+
+@dataclass(frozen=True, eq=False)
+class Expectation:
+    """What is expected of a proxy in more episodes.
+
+    Attributes:
+        prpv: Its PRPV.
+        ppv: Its PPV; None where that is undefined.
+        repetitions: From how many fresh tables.
+        deviation: Standard deviation of PRPV from one table to the next.
+        floor: The noise floor.
+    """
+
+    prpv: Expected
+    ppv: Expected | None
+    repetitions: int
+    deviation: float
+    floor: NoiseFloor
+
+
+def expect(
+    *, fresh: Sequence[ScoreTable], target: ScoreTable, metrics: Sequence[Metric], donors: Donors, seed: int = 0
+) -> Expectation:
+    """What a proxy and a perfect one are expected to score against this target.
+
+    Args:
+        fresh: Scores in the proxy by repetition, which nothing was chosen by.
+        target: Scores on the target.
+        metrics: How agents are compared, in the order in which `donors` have them.
+        donors: What is known of noise.
+        seed: Seeds what is drawn.
+
+    Raises:
+        ScoresError: As in prpv.
+    """
+    rng, sides = np.random.default_rng(seed), [compare(proxy=one, target=target, metrics=metrics) for one in fresh]
+    means, known = sides[0].target.means, len(donors.first) > 0
+    proxies = np.stack([side.proxy.means for side in sides])
+    draws = [_again(side.proxy, donors, rng, _all(side.proxy)) for side in sides] if known else []
+    of_target = _target_donors(sides[0].target) if donors.still else donors
+    perfect = _perfect(sides[0], of_target, rng) if len(of_target.first) else None
+    weights = ppv(proxy=fresh[0], target=target, metrics=metrics).beta
+    beta = np.array([weights[metric.name] or 0.0 for metric in metrics])
+
+    def prpv_of(tables: Floats) -> Floats:
+        return prpv_in_blocks(tables, np.broadcast_to(means, tables.shape), metrics)
+
+    def ppv_of(tables: Floats) -> Floats:
+        return ppv_of_means(tables, means, beta)
+
+    most = float(len(means) * (len(means) - 1))
+    counted, deviation = _expected(prpv_of, proxies, draws, perfect, most)
+    level = counted.floor
+    chosen, reason = sides[0].target, "noise is not known: nothing was driven twice"
+    floor = (
+        NoiseFloor("same starts", *level, DRAWS, chosen, tuple(metrics))
+        if level
+        else NoiseFloor("none", None, None, None, 0, chosen, tuple(metrics), reason=reason)
+    )
+    error = _expected(ppv_of, proxies, draws, perfect, np.inf)[0] if beta.any() else None
+    return Expectation(counted, error, len(fresh), deviation, floor)
+
+
+def _expected(
+    measure: Callable[[Floats], Floats], proxies: Floats, draws: Sequence[Floats], perfect: Floats | None, most: float
+) -> tuple[Expected, float]:
+    """A measure of fresh tables (m, agents, metrics), and its standard deviation from one to the next."""
+    # Loading scipy.stats takes longer than all else of most commands.
+    from scipy.stats import t as student
+
+    values, m = measure(proxies), len(proxies)
+    modelled = float(np.mean([measure(each).var() for each in draws])) if draws else 0.0
+    own, counts = float(values.var(ddof=1)) if m > 1 else 0.0, m - 1 + MODELLED * bool(draws)
+    middle = float(values.mean())
+    if not counts:
+        # Nothing tells of noise.
+        return Expected(Estimate(middle, 0.0, most), None, None), 0.0
+    variance = ((m - 1) * own + MODELLED * modelled) / counts
+    reach = float(student.ppf(0.975, counts)) if m > 1 else NORMAL
+    half = reach * np.sqrt(variance / m)
+    value = Estimate(middle, max(0.0, middle - half), min(most, middle + half))
+    if perfect is None:
+        return Expected(value, None, None), float(np.sqrt(variance))
+    levels = measure(perfect)
+    more, wide = middle - float(levels.mean()), NORMAL * np.sqrt(variance / m + levels.var())
+    floor = Estimate(float(levels.mean()), *interval(levels))
+    return Expected(value, floor, Estimate(more, more - wide, more + wide)), float(np.sqrt(variance))
+
+
+def _all(table: ScoreTable) -> Whole:
+    """Every episode of a table once, shape (1, episodes)."""
+    return np.arange(len(table.episodes))[None]
+
+
+def _again(table: ScoreTable, donors: Donors, rng: np.random.Generator, columns: Whole) -> Floats:
+    """Mean scores of a table repeated: (draws, agents, metrics); in each draw these columns of it (draws or 1, n)."""
+    driven = table.driven
+    values = np.full((DRAWS, *table.values.shape), np.nan)
+    values[:, driven] = donors.again(table.values[driven], rng)
+    taken = np.take_along_axis(values, columns[:, None, :, None], axis=2)
+    return np.asarray(np.nanmean(taken, axis=2))
+
+
+def _perfect(sides: Comparison, donors: Donors, rng: np.random.Generator) -> Floats:
+    """Mean scores of a perfect proxy: the target's cells repeated, each start once, by one of its repeats.
+
+    A proxy that drives from other starts meets starts like the target's: as many of them, drawn with replacement.
+    """
+    places = start_places(sides.target)
+    count = int(places.max()) + 1
+    keys = rng.random((DRAWS, len(places)))
+    each = np.stack([np.where(places == start, keys, -1.0).argmax(axis=1) for start in range(count)], axis=1)
+    if not sides.paired:
+        drawn = rng.integers(count, size=(DRAWS, len(sides.proxy.episodes)))
+        each = np.take_along_axis(each, drawn, axis=1)
+    return _again(sides.target, donors, rng, each)

@@ -91,7 +91,7 @@ def sign(asked: AskedMotion, wheel: int) -> Signal:
 
 def fast(asked: AskedMotion, wheel: int) -> Signal:
     """Size of a wheel's speed (…, time, 1)."""
-    return np.abs(asked.wheels[wheel])[..., None]
+    return np.asarray(np.abs(asked.wheels[wheel])[..., None])
 
 
 def moving(asked: AskedMotion) -> Signal:

@@ -1,2 +1,15 @@
-from .reading import as_log as as_log, open_log as open_log, read_source as read_source, source_without_unnamed_pictures as source_without_unnamed_pictures, write_log as write_log
-from .source import Facts as Facts, Source as Source, Survey as Survey, Wanted as Wanted, finite as finite, read_geometry as read_geometry
+from .reading import (
+    as_log as as_log,
+    open_log as open_log,
+    read_source as read_source,
+    source_without_unnamed_pictures as source_without_unnamed_pictures,
+    write_log as write_log,
+)
+from .source import (
+    Facts as Facts,
+    Source as Source,
+    Survey as Survey,
+    Wanted as Wanted,
+    finite as finite,
+    read_geometry as read_geometry,
+)

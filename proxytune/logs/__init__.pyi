@@ -1,4 +1,12 @@
 from .cautions import log_cautions as log_cautions
 from .frames import BROKEN as BROKEN, read_pictures as read_pictures
-from .log import CAR_COMMANDS as CAR_COMMANDS, COMMANDS as COMMANDS, ENABLED as ENABLED, Frames as Frames, Log as Log, LogEpisode as LogEpisode, Measured as Measured
+from .log import (
+    CAR_COMMANDS as CAR_COMMANDS,
+    COMMANDS as COMMANDS,
+    ENABLED as ENABLED,
+    Frames as Frames,
+    Log as Log,
+    LogEpisode as LogEpisode,
+    Measured as Measured,
+)
 from .reading import read_log as read_log

@@ -1,30 +1,132 @@
 from .bank import bank_document as bank_document, bank_text as bank_text, write_bank_page as write_bank_page
 from .decision import sequential_document as sequential_document, sequential_sentence as sequential_sentence
-from .diagnosis.answer import diagnosis_figures as diagnosis_figures, diagnosis_headline as diagnosis_headline, diagnosis_notes as diagnosis_notes, diagnosis_text as diagnosis_text, diagnosis_view as diagnosis_view, write_diagnosis as write_diagnosis
+from .diagnosis.answer import (
+    diagnosis_figures as diagnosis_figures,
+    diagnosis_headline as diagnosis_headline,
+    diagnosis_notes as diagnosis_notes,
+    diagnosis_text as diagnosis_text,
+    diagnosis_view as diagnosis_view,
+    write_diagnosis as write_diagnosis,
+)
 from .diagnosis.document import camera_noise_floor as camera_noise_floor, diagnosis_document as diagnosis_document
-from .drive.figure import episode_document as episode_document, episode_figure as episode_figure, episode_text as episode_text, say_parting as say_parting
-from .drive.movie import NO_PLACES as NO_PLACES, check_episode_file as check_episode_file, write_episode as write_episode
-from .export.instance import ExportLine as ExportLine, FILTER as FILTER, FORMATS as FORMATS, IN_WHEELS as IN_WHEELS, Instance as Instance, export_lines as export_lines
+from .drive.figure import (
+    episode_document as episode_document,
+    episode_figure as episode_figure,
+    episode_text as episode_text,
+    say_parting as say_parting,
+)
+from .drive.movie import (
+    NO_PLACES as NO_PLACES,
+    check_episode_file as check_episode_file,
+    write_episode as write_episode,
+)
+from .export.instance import (
+    FILTER as FILTER,
+    FORMATS as FORMATS,
+    IN_WHEELS as IN_WHEELS,
+    ExportLine as ExportLine,
+    Instance as Instance,
+    export_lines as export_lines,
+)
 from .export.into import patch as patch
 from .export.mjcf import mjcf_text as mjcf_text
 from .export.node import node_text as node_text
 from .export.ros import ros_text as ros_text
 from .export.urdf import urdf_text as urdf_text
-from .families import families_document as families_document, families_figure as families_figure, families_sentence as families_sentence, families_text as families_text, families_view as families_view, write_families_report as write_families_report
-from .figure_style import BLUE as BLUE, COLUMN as COLUMN, GREEN as GREEN, GREY as GREY, LIGHT_BLUE as LIGHT_BLUE, LIGHT_GREY as LIGHT_GREY, LineName as LineName, ORANGE as ORANGE, PURPLE as PURPLE, VERMILLION as VERMILLION, dress as dress, name_lines as name_lines
+from .families import (
+    families_document as families_document,
+    families_figure as families_figure,
+    families_sentence as families_sentence,
+    families_text as families_text,
+    families_view as families_view,
+    write_families_report as write_families_report,
+)
+from .figure_style import (
+    BLUE as BLUE,
+    COLUMN as COLUMN,
+    GREEN as GREEN,
+    GREY as GREY,
+    LIGHT_BLUE as LIGHT_BLUE,
+    LIGHT_GREY as LIGHT_GREY,
+    ORANGE as ORANGE,
+    PURPLE as PURPLE,
+    VERMILLION as VERMILLION,
+    LineName as LineName,
+    dress as dress,
+    name_lines as name_lines,
+)
 from .html import Shown as Shown, frame_html as frame_html, write_page as write_page
 from .meanings import clause_of as clause_of, findings as findings, what_it_does as what_it_does
 from .plv_search import plv_document as plv_document, plv_text as plv_text, write_plv_report as write_plv_report
-from .scores import drawn_scores as drawn_scores, ranking_document as ranking_document, score_document as score_document, score_sentence as score_sentence, score_text as score_text, score_view as score_view, write_score_report as write_score_report, write_score_table as write_score_table
+from .scores import (
+    drawn_scores as drawn_scores,
+    ranking_document as ranking_document,
+    score_document as score_document,
+    score_sentence as score_sentence,
+    score_text as score_text,
+    score_view as score_view,
+    write_score_report as write_score_report,
+    write_score_table as write_score_table,
+)
 from .study.document import study_document as study_document
 from .study.figures import study_figures as study_figures
-from .study.page import RENEW_S as RENEW_S, study_foot as study_foot, study_view as study_view, write_live_page as write_live_page, write_study_report as write_study_report
+from .study.page import (
+    RENEW_S as RENEW_S,
+    study_foot as study_foot,
+    study_view as study_view,
+    write_live_page as write_live_page,
+    write_study_report as write_study_report,
+)
 from .study.sentence import study_sentence as study_sentence
 from .study.tables import study_text as study_text, write_study_tables as write_study_tables
-from .sweep import curve_document as curve_document, curve_name as curve_name, draw_curves as draw_curves, figures_of_sweep as figures_of_sweep, held_alike as held_alike, held_values as held_values, sweep_text as sweep_text, sweep_view as sweep_view, write_curves as write_curves, write_sweep_page as write_sweep_page
+from .sweep import (
+    curve_document as curve_document,
+    curve_name as curve_name,
+    draw_curves as draw_curves,
+    figures_of_sweep as figures_of_sweep,
+    held_alike as held_alike,
+    held_values as held_values,
+    sweep_text as sweep_text,
+    sweep_view as sweep_view,
+    write_curves as write_curves,
+    write_sweep_page as write_sweep_page,
+)
 from .table_files import check_table_file as check_table_file
-from .teaching import teach_document as teach_document, teach_figure as teach_figure, teach_text as teach_text, teach_view as teach_view, write_teach_report as write_teach_report
-from .text import WholeWords as WholeWords, group_texts as group_texts, note_texts as note_texts, table_text as table_text
-from .view import Column as Column, Paragraphs as Paragraphs, Picture as Picture, Table as Table, View as View, columns_of as columns_of, foot_of as foot_of
-from .wording import listed as listed, plain as plain, short as short, short_span as short_span, with_span as with_span, with_unit as with_unit
-from .writing import figures_also_as as figures_also_as, save_figure as save_figure, svg_of as svg_of, write_picture as write_picture, write_text as write_text, write_whole as write_whole
+from .teaching import (
+    teach_document as teach_document,
+    teach_figure as teach_figure,
+    teach_text as teach_text,
+    teach_view as teach_view,
+    write_teach_report as write_teach_report,
+)
+from .text import (
+    WholeWords as WholeWords,
+    group_texts as group_texts,
+    note_texts as note_texts,
+    table_text as table_text,
+)
+from .view import (
+    Column as Column,
+    Paragraphs as Paragraphs,
+    Picture as Picture,
+    Table as Table,
+    View as View,
+    columns_of as columns_of,
+    foot_of as foot_of,
+)
+from .wording import (
+    listed as listed,
+    plain as plain,
+    short as short,
+    short_span as short_span,
+    with_span as with_span,
+    with_unit as with_unit,
+)
+from .writing import (
+    figures_also_as as figures_also_as,
+    save_figure as save_figure,
+    svg_of as svg_of,
+    write_picture as write_picture,
+    write_text as write_text,
+    write_whole as write_whole,
+)

@@ -1,11 +1,61 @@
-from .assessment import Assessment as Assessment, Difference as Difference, LEFT_OUT as LEFT_OUT, PAIRED as PAIRED, PERFECT as PERFECT, Selection as Selection, assess as assess, select_proxy as select_proxy
-from .catalogue import ALL as ALL, MEASURES as MEASURES, Measure as Measure, Measured as Measured, PODS as PODS, POD_IMAGE as POD_IMAGE, POD_POSE as POD_POSE, PPV as PPV, PRPV as PRPV, SRCC as SRCC
-from .comparison import Comparison as Comparison, compare as compare, in_common as in_common, start_of as start_of, starts_of as starts_of
-from .decision import Asked as Asked, Choice as Choice, Decision as Decision, Panel as Panel, Together as Together, chosen as chosen, compare_choices as compare_choices, compare_savings as compare_savings, decide as decide, mmrv_conventions as mmrv_conventions, use_two as use_two
+from .assessment import (
+    LEFT_OUT as LEFT_OUT,
+    PAIRED as PAIRED,
+    PERFECT as PERFECT,
+    Assessment as Assessment,
+    Difference as Difference,
+    Selection as Selection,
+    assess as assess,
+    select_proxy as select_proxy,
+)
+from .catalogue import (
+    ALL as ALL,
+    MEASURES as MEASURES,
+    POD_IMAGE as POD_IMAGE,
+    POD_POSE as POD_POSE,
+    PODS as PODS,
+    PPV as PPV,
+    PRPV as PRPV,
+    SRCC as SRCC,
+    Measure as Measure,
+    Measured as Measured,
+)
+from .comparison import (
+    Comparison as Comparison,
+    compare as compare,
+    in_common as in_common,
+    start_of as start_of,
+    starts_of as starts_of,
+)
+from .decision import (
+    Asked as Asked,
+    Choice as Choice,
+    Decision as Decision,
+    Panel as Panel,
+    Together as Together,
+    chosen as chosen,
+    compare_choices as compare_choices,
+    compare_savings as compare_savings,
+    decide as decide,
+    mmrv_conventions as mmrv_conventions,
+    use_two as use_two,
+)
 from .expectation import Estimate as Estimate, Expectation as Expectation, donors_of as donors_of, expect as expect
-from .noise import Chance as Chance, NoiseFloor as NoiseFloor, SuccessRates as SuccessRates, chance as chance, floor_of_repeats as floor_of_repeats
+from .noise import (
+    Chance as Chance,
+    NoiseFloor as NoiseFloor,
+    SuccessRates as SuccessRates,
+    chance as chance,
+    floor_of_repeats as floor_of_repeats,
+)
 from .pairs import Prpv as Prpv, dominance as dominance, prpv_of_means as prpv_of_means
 from .predictivity import pod_of_images as pod_of_images, pod_of_poses as pod_of_poses, ppv_of_means as ppv_of_means
-from .resampling import Ends as Ends, bootstrap_means as bootstrap_means, in_blocks as in_blocks, interval as interval, why_not_repeated as why_not_repeated
+from .resampling import (
+    Ends as Ends,
+    bootstrap_means as bootstrap_means,
+    in_blocks as in_blocks,
+    interval as interval,
+    why_not_repeated as why_not_repeated,
+)
 from .saving import Saving as Saving, saving_of as saving_of
 from .sequential import Plan as Plan, Sequential as Sequential, sequential_test as sequential_test

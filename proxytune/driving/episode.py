@@ -209,7 +209,7 @@ def ask_many(
             for number, memory in zip(numbers, kept, strict=True):
                 after[number] = memory
                 del alone[number]
-    seen = shown.draw(0) if alone else None
+    seen = shown.draw(0) if alone else ()
     for number in alone:
         try:
             commands[number], after[number] = ask(drivers[number], seen[number], memories[number], time_s)

@@ -94,7 +94,8 @@ class Seen:
 
     def pictures(self, first: int) -> NDArray[np.uint8]:
         """The pictures, right from the first pixel on."""
-        return (self._pictures(first) if callable(self._pictures) else self._pictures)[self._rows]
+        drawn = self._pictures(first) if callable(self._pictures) else self._pictures
+        return np.asarray(drawn[self._rows])
 
     def answer(self, kind: "Kind", looks: tuple[Any, ...], robots: Sequence[int]) -> list[Any]:
         """Answer looks of one kind, each at the picture of one of these robots."""

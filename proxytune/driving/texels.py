@@ -43,8 +43,8 @@ class TexelTable(NamedTuple):
 
     def without(self, pixels: int) -> "TexelTable":
         """The same but for the first pixels."""
-        plane, *others = (np.ascontiguousarray(one[..., pixels:]) for one in self[:-1])
-        return TexelTable(plane, *others, self.texels)
+        cut: list[Any] = [np.ascontiguousarray(one[..., pixels:]) for one in self[:-1]]
+        return TexelTable._make((*cut, self.texels))
 
 
 Places = NDArray[np.float32]

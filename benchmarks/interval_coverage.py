@@ -1,4 +1,4 @@
-"""How often the intervals of a study's answer hold: `python benchmarks/coverage.py TABLES [--splits 500]`.
+"""How often the intervals of a study's answer hold: `python benchmarks/interval_coverage.py TABLES [--splits 500]`.
 
 Five targets of the planar plant, drawn at random, each with three proxies (itself, one near, one
 mediocre), are driven by quickstart's twelve agents again and again; TABLES (.npz) keeps the episodes and is made if it

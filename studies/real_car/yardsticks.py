@@ -59,8 +59,8 @@ def turned(x: Array, y: Array, angle: Array) -> tuple[Array, Array]:
 
 
 def constant_velocity(drive: Drive, starts: NDArray[np.intp], steps: int) -> Array:
-    """The marker goes on straight, and turns on."""
-    return drive.poses[starts] + drive.velocities[starts] * (steps * STEP_S)
+    """The marker goes on straight at its velocity, and turns on."""
+    return np.asarray(drive.poses[starts] + drive.velocities[starts] * (steps * STEP_S))
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ def fitted_bicycle(drives: list[Drive], steps: int = 100) -> Bicycle:
 
     first = Bicycle()
     start = [getattr(first, name) for name in Bicycle.__dataclass_fields__]
-    low, high = [1.0, 0.0, 0.02, 0.05, -0.3, -0.3], [40.0, 0.4, 3.0, 1.2, 0.3, 0.3]
+    low, high = [1.0, 0.0, 0.02, 0.05, -0.3, -0.3], [40.0, 0.4, 30.0, 1.2, 0.3, 0.3]
     return Bicycle(*least_squares(gaps, start, bounds=(low, high), x_scale=np.maximum(np.abs(start), 0.05)).x)
 
 

@@ -1,4 +1,4 @@
-"""How often a diagnosis is right: `python benchmarks/rates.py OUTPUT [--generator second] [--every N]`.
+"""How often a diagnosis is right: `python benchmarks/rates.py OUTPUT [--generator NAME] [--every N]`.
 
 Cases that OUTPUT has no line of yet are diagnosed, about half a minute of processor time each, and added to it one by
 one: a run that was stopped goes on where it was. At the end come the rates over everything in OUTPUT.
@@ -17,8 +17,10 @@ from types import ModuleType
 from typing import Any
 from unittest import mock
 
+import hidden_cars
 import hidden_cases as hidden
 import numpy as np
+import second_hidden_cars
 import second_hidden_cases as second
 from bullet_cases import BULLET, BulletCase, make_bullet_log
 from joblib import Parallel, delayed
@@ -34,8 +36,13 @@ from proxytune.driving import Robot, read_robot
 from proxytune.logs import Log
 from proxytune.space import Theta
 
-GENERATORS: dict[str, ModuleType] = {"first": hidden, "second": second}
-"""Modules with cases of every kind, and a make_log for them."""
+GENERATORS: dict[str, ModuleType] = {
+    "first": hidden,
+    "second": second,
+    "car": hidden_cars,
+    "second_car": second_hidden_cars,
+}
+"""Modules with cases of every kind, and a make_log for them; those of cars say which ROBOT."""
 
 
 @dataclass(frozen=True)
@@ -43,13 +50,14 @@ class Job:
     """A case to diagnose; `without` is taken out of the catalogue."""
 
     kind: str
-    case: hidden.Case | second.Case | BulletCase
+    case: hidden.Case | second.Case | hidden_cars.Case | second_hidden_cars.Case | BulletCase
     without: str = ""
 
     @property
     def generator(self) -> str:
-        """Which generator makes its log: "first" or "second"."""
-        return "second" if isinstance(self.case, second.Case) else "first"
+        """Which of GENERATORS makes its log."""
+        own = (name for name, cases in GENERATORS.items() if isinstance(self.case, cases.Case))
+        return next(own, "first")
 
     @property
     def right(self) -> tuple[tuple[str, ...], ...]:
@@ -60,7 +68,7 @@ class Job:
 def all_jobs(every: int = 1, generator: str = "first") -> tuple[Job, ...]:
     """Every n-th case of each kind, the kinds mixed so that any beginning has a share of each.
 
-    The second generator has cases of its own, and none of the bullet plant.
+    Only the first generator has cases of the bullet plant.
     """
     whole = _by_kind(GENERATORS[generator])
     if generator == "first":
@@ -182,7 +190,7 @@ class Row:
 
 def diagnosed(job: Job, episodes: int = 12, seconds: float = 60.0) -> Row:
     """Diagnose one case."""
-    robot = read_robot("duckiebot")
+    robot = read_robot(getattr(GENERATORS[job.generator], "ROBOT", "duckiebot"))
     log = _log(job, episodes, seconds)
     try:
         with _without(job.without):

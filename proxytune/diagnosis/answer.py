@@ -55,6 +55,9 @@ class Rules:
     least_gain_share: float = 0.01
     """Evidence that an effect needs, as a share of all gained before: less may only mend the form of those effects."""
 
+    sure_gain_nats: float = 300.0
+    """Evidence of a car's effect that is not held against chance, which cannot be drawn while much else is missing."""
+
     least_random_gain_nats: float = 30.0
     """Evidence that a random effect needs: twice as much, for its chance is drawn from shifted innovations, roughly."""
 

@@ -384,7 +384,8 @@ def _at_start(given: Commands, episode: LogEpisode, samples: Whole, robot: Robot
     """Duties before the first sample (2,): known ones, or of a drive that begins in motion its speeds as such."""
     times = episode.times[samples] - episode.times[0]
     at = np.searchsorted(times, np.arange(4) * BEGINNING_S - 1e-9)
-    if given.rest.any() or episode.wheels is not None or at[-1] >= len(samples) or samples[0] != 0:
+    of_car = robot.drive == "ackermann"  # its speed alone does not tell its wheels' angle
+    if of_car or given.rest.any() or episode.wheels is not None or at[-1] >= len(samples) or samples[0] != 0:
         return given.rest
     if np.diff(times[at]).min() <= 0.0:
         return given.rest

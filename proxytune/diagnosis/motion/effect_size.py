@@ -212,7 +212,11 @@ def trace_of(model: Fit, form: Candidate, values: tuple[float, ...]) -> Floats:
     return project_out(model.slopes, column, np.ones(len(column)))[:, 0]
 
 
-GAINS: tuple[Coordinate, ...] = (("wheel_gain.left",), ("wheel_gain.right",))
+GAINS: Mapping[str, Mapping[str, Coordinate]] = {
+    "differential": {"left": ("wheel_gain.left",), "right": ("wheel_gain.right",)},
+    "ackermann": {"driven": ("wheel_gain",), "steered": ("steering_gain",)},
+}
+"""What tells robots apart, by how they drive."""
 
 AT_ONCE = 100_000
 """About so many increments are looked at together: what is computed of each takes a kilobyte."""
@@ -222,7 +226,7 @@ class RobotClusters(NamedTuple):
     """Two groups of drives with different wheel gains, as if of two robots.
 
     Attributes:
-        wheel: "left" or "right", whichever tells them apart better.
+        wheel: "left" or "right", of a car "driven" or "steered": whichever tells them apart better.
         gains: Mean gain of that wheel in either group.
         groups: Numbers of the drives in either group.
     """
@@ -248,14 +252,15 @@ def find_robot_clusters(drives: Drives, model: Fit) -> RobotClusters | None:
         return None
     groups = found[side][1]
     means = [float(gains[np.isin(episodes, group), side].mean()) for group in groups]
-    return RobotClusters(("left", "right")[side], (means[0], means[1]), groups)
+    return RobotClusters(list(GAINS[drives.robot.drive])[side], (means[0], means[1]), groups)
 
 
 def _own_gains(drives: Drives, model: Fit) -> tuple[Floats, Floats]:
     """Each drive's own gains and their deviations (E, 2): one Newton step from the gains of all."""
-    neutral = {name: model.theta.get(name, 1.0) for (name,) in GAINS}
+    coordinates = tuple(GAINS[drives.robot.drive].values())
+    neutral = {name: model.theta.get(name, 1.0) for (name,) in coordinates}
     whole, count = evaluate(drives, {**model.theta, **neutral}, (), model.noise), len(drives.duties)
-    columns = slopes(drives, whole.theta, GAINS, whole.whiten)
+    columns = slopes(drives, whole.theta, coordinates, whole.whiten)
     label = np.repeat(drives.episode, 3)
     z = whole.innovations
     gradient = sum_by(label, columns * clip_outliers(z)[:, None], count)
@@ -264,8 +269,8 @@ def _own_gains(drives: Drives, model: Fit) -> tuple[Floats, Floats]:
     loud = np.maximum(1.0, sum_by(label, clip_outliers(z) ** 2, count) / np.bincount(label))
     inverse = np.linalg.inv(hessian)
     step = -np.einsum("eij,ej->ei", inverse, gradient)
-    low, high = np.array([span(coordinate, drives.robot) for coordinate in GAINS]).T
-    here = np.array([whole.theta[name] for (name,) in GAINS])
+    low, high = np.array([span(coordinate, drives.robot) for coordinate in coordinates]).T
+    here = np.array([whole.theta[name] for (name,) in coordinates])
     variances = np.diagonal(inverse, axis1=1, axis2=2) * loud[:, None]
     return here + step * (high - low), np.sqrt(variances) * (high - low)
 

@@ -135,10 +135,11 @@ def search(base: Fit, seed: int, report: Progress, without: Collection[str] = ()
 def drop_unconfirmed(
     model: Fit, adopted: Sequence[AdoptedEffect], taken: set[str], seed: int
 ) -> tuple[Fit, list[AdoptedEffect]]:
-    """Drop effects that chance does as well as, the others given, the weakest first.
+    """Drop effects of a car that chance does as well as, the others given, the weakest first.
 
     A car lacks several large effects at once, and each hides the others: what is left over is then no noise, and chance
-    cannot be drawn from it. So effects are added by their gain, and held against chance once all are there.
+    cannot be drawn from it. So effects are added by their gain, and the weaker ones are held against chance once all
+    are there.
     """
     kept = list(adopted)
     for effect in sorted((one for one in adopted if one.free), key=lambda one: one.gain):
@@ -147,8 +148,9 @@ def drop_unconfirmed(
         others = taken | {one.effect for one in kept if one is not effect}
         forms = [one for one in candidates(model.drives.robot, rest.theta, others) if one.effect == effect.effect]
         p_value = min((one.p_value for one in screen(without, forms, seed)), default=1.0)
+        gain = float(held_out_log_likelihood(model).sum() - held_out_log_likelihood(without).sum())
         place = kept.index(effect)
-        if p_value > rules.p_value:
+        if p_value > rules.p_value and gain < rules.sure_gain_nats:
             model = without
             kept.pop(place)
         else:

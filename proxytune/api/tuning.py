@@ -164,11 +164,10 @@ def _written(home: Path, scores: pd.DataFrame | str | Path) -> Iterator[Path]:
     before = {one: one.read_text(encoding="utf-8") for one in (path, table) if one.exists()}
     if not before.get(path, HEAD).startswith(HEAD):
         raise InputError(f"{home}: has a study.toml that tune did not write; use run_study, or give another folder")
-    given = not isinstance(scores, str | Path)
-    if given:
+    if isinstance(scores, pd.DataFrame):
         write_text(table, column_table("scores", scores).to_csv(index=False, lineterminator="\n"))
     try:
-        yield table if given else Path(scores)
+        yield table if isinstance(scores, pd.DataFrame) else Path(scores)
     except InputError as problem:
         for one, text in before.items():
             write_text(one, text)
@@ -183,6 +182,7 @@ def _known(study: Study, known: pd.DataFrame | Iterable[Theta]) -> list[Outcome 
         InputError: If one is no θ of the box, or an outcome is of no episode of the study.
     """
     settings, space = study.settings, study.settings.space
+    rows: list[dict[Any, Any]]
     rows = known.reset_index().to_dict("records") if isinstance(known, pd.DataFrame) else [dict(one) for one in known]
     found: list[Outcome | Theta] = []
     for place, row in enumerate(rows):

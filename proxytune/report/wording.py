@@ -1,6 +1,7 @@
 """Numbers and names as people read them: no more digits than are known, with a true minus sign."""
 
 import math
+from collections.abc import Sequence
 
 Ends = tuple[float, float]
 
@@ -61,7 +62,7 @@ def probability(p_value: float) -> str:
     return "p < 0.001" if p_value < 0.001 else f"p = {p_value:.2g}"
 
 
-def listed(names: list[str]) -> str:
+def listed(names: Sequence[str]) -> str:
     """Names as a list in a sentence: "a", "a and b", "a, b and c"."""
     return " and ".join(filter(None, [", ".join(names[:-1]), names[-1]])) if names else ""
 

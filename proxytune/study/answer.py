@@ -155,6 +155,8 @@ def run_nominal(run: StudyRun) -> None:
         # Where it fails, nothing is said of it.
         with suppress(EpisodeError):
             run.outcomes(plan_episodes(run.settings, theta, run.settings.seed), "nominal θ")
+    else:
+        run.watcher.begin("no nominal θ", len(run.settings.agents) * run.settings.starts)
 
 
 def nominal_of(run: StudyRun, confirmation: Confirmation | None) -> Nominal | None:

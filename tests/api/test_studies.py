@@ -66,10 +66,10 @@ def test_the_trials_are_a_table_of_theta_state_score_and_measures(report):
     assert trials.delay.between(0.0, 0.3).all()
 
 
-def test_the_best_theta_is_that_of_the_best_trial(report):
-    row = report.trials().loc[report.best.trial.number]
-    assert report.theta == {"delay": row.delay, "trim": row.trim}
-    assert report.best.assessment.prpv.value == row.prpv
+def test_the_best_theta_is_that_of_the_trial_that_it_names_or_of_none(report):
+    visited = report.trials()[["delay", "trim"]].to_dict("index")
+    number = report.document()["best"]["index"]
+    assert [trial for trial, theta in visited.items() if theta == report.theta] == ([number] if number else [])
 
 
 def test_a_report_shows_itself_in_the_words_of_the_command(report):
@@ -139,7 +139,7 @@ def test_progress_is_shown_only_when_asked_for(make_study, monkeypatch):
     run_study(folder)
     assert totals == []
     run_study(folder, progress=True)
-    assert totals == [2 * 6 * 3]
+    assert totals == [(2 + 1) * 6 * 3], "two trials and the nominal θ"
 
 
 @pytest.mark.parametrize(
@@ -174,8 +174,7 @@ def test_a_report_is_an_optimize_result_of_the_measured_trials(report):
     assert [one.name for one in found.space] == ["delay", "trim"]
     assert found.func_vals.tolist() == trials.score.tolist()
     assert found.x_iters == trials[["delay", "trim"]].to_numpy().tolist()
-    assert dict(zip(("delay", "trim"), found.x, strict=True)) == report.theta
-    assert found.fun == report.best.trial.score
+    assert found.fun == trials.score[trials[["delay", "trim"]].to_numpy().tolist().index(list(found.x)) + 1]
 
 
 def test_budget_and_jobs_stand_over_study_toml(make_study):

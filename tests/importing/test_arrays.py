@@ -161,7 +161,7 @@ def test_without_commands_only_if_asked_for(tmp_path):
         (OWN, {"columns": {"time": "clock"}}, "say it, as in --columns time=timestamps:s"),
         ({"short": TIMES[:5]}, {"columns": {"x": "short"}}, "array 'short' is (5,) of float64, but there are 60 times"),
         ({}, {"commands": "actions"}, "--columns left=actions[0],right=actions[1]"),
-        ({}, {"columns": {"speed": "v"}}, "unknown name 'speed'"),
+        ({}, {"columns": {"velocity": "v"}}, "unknown name 'velocity'"),
     ],
 )
 def test_bad_arrays_are_refused(tmp_path, changes, wanted, where):

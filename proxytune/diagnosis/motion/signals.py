@@ -37,7 +37,7 @@ from proxytune.diagnosis.motion.innovations import (
     wheel_speeds,
 )
 from proxytune.driving import drivetrain
-from proxytune.effects import DRIVES, Cue, track_of
+from proxytune.effects import Cue, track_of
 from proxytune.space import Theta
 
 KNOTS = 6
@@ -77,12 +77,6 @@ class SignalGroup:
     def twists(self) -> Floats:
         """Motion added to that of the model, per basis function (E, T, 3, columns): [m/s], [m/s], [rad/s]."""
         return self.make().twists
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        """Effects that act through it."""
-        effects = {name: effect for every in DRIVES.values() for name, effect in every.items()}
-        return tuple(name for name, effect in effects.items() if effect.trace and self.name in effect.trace.cues)
 
 
 @dataclass(frozen=True)

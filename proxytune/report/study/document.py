@@ -40,7 +40,7 @@ def study_document(result: StudyResult) -> dict[str, Any]:
 def _best(result: StudyResult) -> dict[str, Any]:
     """The answer, what is known of it, and its measures in the trial's own episodes and in fresh ones."""
     best, learnt, measures = result.best, result.knowledge, score_document(result.best.assessment)
-    shared = ("prpv", "prpv_normalised", "prpv_interval", "ppv")
+    shared, ppv = ("prpv", "prpv_normalised", "prpv_interval", "ppv"), result.expected.ppv if result.expected else None
     return {
         "index": best.trial.number or None,
         "theta": dict(best.trial.theta),
@@ -50,8 +50,8 @@ def _best(result: StudyResult) -> dict[str, Any]:
         **{key: measures[key] for key in shared},
         "objective": {"name": result.study.objective.name, "value": result.value_of(best.trial)},
         "fresh": _fresh(result.confirmation, by_prpv=result.study.objective == PRPV),
-        "expected_prpv": _estimate(result.expected and result.expected.prpv.value),
-        "expected_ppv": _estimate(result.expected and result.expected.ppv and result.expected.ppv.value),
+        "expected_prpv": _estimate(result.expected.prpv.value if result.expected else None),
+        "expected_ppv": _estimate(ppv.value if ppv else None),
         "posterior_mean": best.posterior_mean,
         "posterior_deviation": best.posterior_deviation,
         "usefulness": measures,
@@ -60,12 +60,12 @@ def _best(result: StudyResult) -> dict[str, Any]:
 
 def _worth(result: StudyResult) -> dict[str, Any]:
     """Levels that PRPV of the answer is held against: of its fresh episodes where they were driven."""
-    measures = score_document(result.judged)
+    measures, ppv = score_document(result.judged), result.expected.ppv if result.expected else None
     levels = ("noise_floor", "noise_floor_interval", "noise_floor_kind", "at_noise_floor", "chance", "chance_deviation")
     return {
         **{key: measures[key] for key in (*levels, "p_value", "notes")},
         "excess": _estimate(result.excess),
-        "excess_ppv": _estimate(result.expected and result.expected.ppv and result.expected.ppv.excess),
+        "excess_ppv": _estimate(ppv.excess if ppv else None),
         "nominal": result.nominal
         and {
             "theta": dict(result.nominal.theta),

@@ -232,7 +232,7 @@ def finding_of(result: StudyResult) -> Finding:
         fresh=judged is not result.best.assessment,
         floor=result.floor,
         excess=result.excess,
-        nominal=result.nominal and result.nominal.expected.prpv.value,
+        nominal=result.nominal.expected.prpv.value if result.nominal else None,
         chance=judged.chance,
         perfect=bool(result.perfect),
         misfit=learnt.misfit.p_value,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from planted import ROBOT, TRUTH, drives_of, fitted, planted_drives, planted_log, with_poses
 
-from proxytune.diagnosis import MOTION_EFFECTS, RANDOM_EFFECTS, increments, theta_at
+from proxytune.diagnosis import RANDOM_EFFECTS, increments, motion_effects, theta_at
 from proxytune.diagnosis.motion.screening import (
     candidates,
     cut_part,
@@ -19,10 +19,13 @@ from proxytune.diagnosis.motion.screening import (
     screen,
     with_dense_probes,
 )
-from proxytune.effects import CATALOGUE, PARAMETERS, Stage, effects_from
+from proxytune.effects import CATALOGUE, PARAMETERS, SHIPPED, Stage, effects_from
 
 THETA = {**ROBOT.theta, **TRUTH}
 WHEELS = ("dead_band", "stiction", "backlash", "saturation")
+
+
+MOTION_EFFECTS = motion_effects(SHIPPED)
 
 
 def forms(effect, theta=TRUTH, taken=()):

@@ -309,7 +309,7 @@ class Diagnosis:
 
         The effect then stands for something else.
         """
-        return _at_edge(self.found.model, effect)
+        return _at_edge({name: one.value for name, one in self.theta.items()}, effect, self.robot, self.rules)
 
     @property
     def edges(self) -> tuple[str, ...]:
@@ -390,7 +390,7 @@ def diagnose(
     unnamed = bool(found.unnamed_curves) or learning.discrepancy.used or period is not None
     explained = is_explained(main.after.value, main.floor, unnamed=unnamed, rules=rules)
     # A value at an end of its range is no explanation, however small the error.
-    explained = explained and not any(_at_edge(found.model, effect) for effect in found.adopted)
+    explained = explained and not any(_at_edge(found.model.theta, effect, robot, rules) for effect in found.adopted)
     confirmed = None
     if has_body(parts.tested):
         report("confirming on the bullet plant")
@@ -430,11 +430,10 @@ def diagnose(
     )
 
 
-def _at_edge(model: Fit, effect: AdoptedEffect) -> tuple[str, ...]:
+def _at_edge(theta: Theta, effect: AdoptedEffect, robot: Robot, rules: Rules) -> tuple[str, ...]:
     fitted = {name for coordinate in effect.free for name in coordinate} or set(effect.names)
-    known = (name for name in effect.names if name in fitted and name in model.theta)
-    robot, rules = model.drives.robot, model.drives.rules
-    return tuple(name for name in known if at_edge(name, model.theta[name], robot, rules))
+    known = (name for name in effect.names if name in fitted and name in theta)
+    return tuple(name for name in known if at_edge(name, theta[name], robot, rules))
 
 
 def declared_effects(robot: Robot) -> tuple[str, ...]:

@@ -37,7 +37,8 @@ def motion_headline(diagnosis: Diagnosis, found: str = "") -> str:
     if diagnosis.edges:
         end = f"{listed(diagnosis.edges)} at the end of the range"
         rest = "" if diagnosis.verdict == "partly explained" else f"; {meaning}"
-        meaning = f"{end} stands for something else, which no named effect explains{rest}"
+        stands = "stands" if len(diagnosis.edges) == 1 else "stand"
+        meaning = f"{end} {stands} for something else, which no named effect explains{rest}"
     sure = f" (expected false names: at most {diagnosis.expected_false_names:.2f})" if diagnosis.effects else ""
     return f"{diagnosis.log}: {told(found, diagnosis.verdict)}: {meaning}{sure}"
 

@@ -119,6 +119,7 @@ def test_the_engine_runs_in_a_study(follow, tmp_path):
     assert open_study(tmp_path).engine.label == "Halton sequence"
 
 
+@pytest.mark.slow
 def test_the_learner_is_taught(follow):
     taught = follow("A learner")["teach ."]
     assert list(taught["proxies"]) == ["nominal"]

@@ -57,6 +57,7 @@ def test_a_command_that_ends_otherwise_than_it_should_is_a_failure_and_no_answer
         place.run("no_such_command")
 
 
+@pytest.mark.slow
 def test_what_a_checkout_computes_is_collected_and_the_same_again(tmp_path, capsys):
     def ask(place):
         place.write("given.csv", "a,b\n")

@@ -282,6 +282,7 @@ def test_an_interrupted_sweep_goes_on_where_it_was(make_study):
         assert [curve.parameter for curve in all_curves(StudyRun(study, store))] == ["trim"]
 
 
+@pytest.mark.slow
 def test_sweeps_of_a_parameter_that_the_family_no_longer_has_are_left_out(make_study, monkeypatch):
     folder = make_study()
     swept_of_sweep(folder)

@@ -177,6 +177,7 @@ def test_a_report_is_an_optimize_result_of_the_measured_trials(report):
     assert found.fun == trials.score[trials[["delay", "trim"]].to_numpy().tolist().index(list(found.x)) + 1]
 
 
+@pytest.mark.slow
 def test_budget_and_jobs_stand_over_study_toml(make_study):
     report = run_study(make_study("over"), budget=6, jobs=2)
     assert len(report.trials()) == 6

@@ -114,6 +114,7 @@ def test_pictures_are_the_ground_plane_cameras_with_the_same_figures(changed):
     assert from_nominal > 3.0 * off or not changed
 
 
+@pytest.mark.slow
 def test_what_moves_during_an_exposure_is_seen_from_where_the_robot_was():
     before = STARTS - (0.02, -0.01, 0.05)
     right = pictures(Sight(), before)
@@ -278,6 +279,7 @@ def test_a_driven_set_tells_when_its_frames_were_taken(few_frames, tmp_path):
     assert {"left", "right", "x", "y", "heading"} <= set(samples[0])
 
 
+@pytest.mark.slow
 def test_the_same_seed_writes_the_same_set_and_its_truth(few_frames, tmp_path):
     for name in ("one", "other"):
         write_truth(tmp_path / name / "truth.json", write_set(tmp_path / name, "dirt still small_loop", 4))

@@ -116,6 +116,7 @@ def test_an_unknown_robot_is_refused_with_where_it_is_looked_for(tmp_path, capsy
     assert "its robot 'rover' is unknown here; go to the folder that rover lies in" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_studys_trials_go_into_an_optuna_storage_each_with_its_value(finished, tmp_path, capsys):
     optuna = pytest.importorskip("optuna")
     words = ["export", str(finished), "--to", "optuna", "--output", str(tmp_path / "new" / "trials.sqlite3")]

@@ -45,6 +45,7 @@ def finished(make_studies):
     return folder
 
 
+@pytest.mark.slow
 def test_the_family_that_the_target_is_an_instance_of_predicts_best(finished, capsys):
     document = document_of(["study", str(finished)], capsys)
     assert document["best"]["predict"] == {"family": "right", "cannot_be_told_from": []}
@@ -57,6 +58,7 @@ def test_the_family_that_the_target_is_an_instance_of_predicts_best(finished, ca
     assert "worse: wrong +" in document["sentence"]
 
 
+@pytest.mark.slow
 def test_the_document_has_the_promised_keys(finished, capsys):
     document = document_of(["study", str(finished)], capsys)
     assert {"sentence", "best", "families", "differences", "seconds_per_family", "settings"} <= set(document)

@@ -213,6 +213,7 @@ def test_a_closed_pipe_is_no_error(tmp_path):
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 def test_a_study_that_is_nowhere_is_one_line(tmp_path):
     done = proxytune("study", tmp_path / "gone", cwd=tmp_path)
     assert done.returncode == 2

@@ -73,6 +73,7 @@ def test_looking_at_a_study_whose_lost_episodes_are_not_driven_yet_says_how_to_d
     assert line in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_sweep_that_was_deleted_is_told_and_there_again_after_the_same_command(finished, capsys):
     sweep = ["sweep", str(finished), "--parameter", "trim", "--points", "2", "--json"]
     assert main(sweep) == 0

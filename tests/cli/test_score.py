@@ -173,6 +173,7 @@ def test_weights_unpaired_episodes_and_the_seed_are_obeyed(tables):
     assert document(*base, "--seed", "1") == document(*base, "--seed", "1")
 
 
+@pytest.mark.slow
 def test_figures_are_drawn_where_asked(tables):
     found = document("--proxy", "sim.csv", "--target", "real.csv", *METRIC, "--output", "out")
     assert found["report"] == "out/report.html"
@@ -230,6 +231,7 @@ def test_a_missing_agent_is_named(tables):
         run("--proxy", "less.csv", "--target", "real.csv", *METRIC)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not SCORES.is_dir(), reason="the measured scores of ../shared/data are not here")
 def test_the_pilots_real_duckiebot_is_scored_from_its_episodes():
     path = SCORES / "duckietown_pilot_episodes.csv"

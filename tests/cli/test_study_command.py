@@ -204,6 +204,7 @@ def travelling(make_study, tmp_path, monkeypatch):
     return home
 
 
+@pytest.mark.slow
 def test_a_study_that_comes_with_the_package_is_copied_and_that_is_said(travelling, tmp_path, capsys):
     folder = tmp_path / "somewhere" / "quickstart"
     assert main(["study", str(folder), "--json"]) == 0

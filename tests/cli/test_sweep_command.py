@@ -61,6 +61,7 @@ def test_trials_and_sweeps_share_episodes(finished, capsys):
     assert json.loads(capsys.readouterr().out)["episodes"] == {"run": 2 * 18}
 
 
+@pytest.mark.slow
 def test_a_finished_study_is_swept_at_its_best_theta_and_says_so(finished, capsys):
     assert main(["study", str(finished), "--json"]) == 0
     best = json.loads(capsys.readouterr().out)["best"]["theta"]

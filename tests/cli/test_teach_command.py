@@ -13,6 +13,7 @@ from taught import GRID, make_taught
 from proxytune.cli.main import main
 
 
+@pytest.mark.slow
 def test_teach_prints_one_document_with_the_promised_keys(make_study, capsys):
     folder = make_taught(make_study)
     assert main(["teach", str(folder), "--json"]) == 0
@@ -39,6 +40,7 @@ def test_teach_prints_one_document_with_the_promised_keys(make_study, capsys):
     assert "Target samples saved (PLV" in (folder / "figures" / "teach.html").read_text()
 
 
+@pytest.mark.slow
 def test_people_see_table_1_and_when_a_learner_counts_as_converged(make_study, capsys):
     folder = make_taught(make_study)
     assert main(["teach", str(folder)]) == 0

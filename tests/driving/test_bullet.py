@@ -100,6 +100,7 @@ def test_both_see_the_sky_where_the_horizon_is():
     assert not (reference[~sky] == SKY).all(axis=-1).any()
 
 
+@pytest.mark.slow
 def test_the_cameras_agree_along_the_loop_through_a_lens_that_is_all_but_ideal():
     """Measured: an overlap of markings of 0.95 and a mean difference of 0.9 grey levels at 160 × 120."""
     lens = {"k1": -0.27, "centre_right": 0.05, "centre_down": -0.04, "aspect": 1.1}

@@ -294,6 +294,7 @@ def learnt(draw):
     return Learnt(FittedRange((ends[0], ends[1]), (2.0 * ends[0], 3.0 * ends[1])), tuple(curves))
 
 
+@pytest.mark.slow
 @given(effect=learnt())
 @settings(max_examples=60, derandomize=True, deadline=None)
 def test_a_learnt_effect_reads_back_from_a_model_file_exactly(effect, tmp_path_factory):

@@ -114,6 +114,7 @@ def test_values_that_fit_a_unit_pass(unit, values):
     assert contradiction(UNITS[unit], np.array(values)) == ""
 
 
+@pytest.mark.slow
 @given(st.text(max_size=30), st.sampled_from(["time", "length", "angle", "number"]))
 def test_any_entry_is_split_or_refused_in_one_line(entry, quantity):
     written, said = entry, "here: "

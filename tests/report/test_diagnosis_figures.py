@@ -451,6 +451,7 @@ def learning(*groups):
     )
 
 
+@pytest.mark.slow
 def test_every_group_is_drawn_without_a_warning_and_every_panel_has_units():
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -63,6 +63,7 @@ def test_of_several_the_best_is_called_better_only_beyond_noise():
     assert "tell the best proxies apart" in score_next_step(found, selection)
 
 
+@pytest.mark.slow
 def test_the_page_has_what_the_terminal_shows_each_note_once_and_no_markup_of_names(tmp_path):
     found = {EVIL: assessed(REVERSED), "other": assessed(SAME)}
     selection = select_proxy(proxies={EVIL: REVERSED, "other": SAME}, target=TARGET, metrics=M, resamples=100)

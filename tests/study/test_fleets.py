@@ -76,6 +76,7 @@ def test_an_agent_that_keeps_something_outside_its_memory_is_found_driven_alone_
     assert [HIDES in line and "'agent2'" in line for line in cautions].count(True) == 1
 
 
+@pytest.mark.slow
 def test_what_was_found_of_an_agent_is_known_when_the_study_goes_on(make_study, capsys):
     journal = make_study().parent / "journal"
     domain = {"faults": '["agent2:*:hides"]', "journal": f'"{journal}"'}
@@ -87,6 +88,7 @@ def test_what_was_found_of_an_agent_is_known_when_the_study_goes_on(make_study, 
     assert any(HIDES in line for line in found["cautions"])
 
 
+@pytest.mark.slow
 def test_an_agent_that_remembers_by_its_memory_alone_is_driven_beside_others(make_study, capsys):
     folder = make_study(**FAMILY)
     assert HIDES not in str(document(folder, capsys))

@@ -52,6 +52,7 @@ def test_a_study_works_where_a_metric_beside_its_own_is_missing_here_and_there(p
     assert read_study(folder).document()["best"] == report.document()["best"]
 
 
+@pytest.mark.slow
 def test_scored_by_a_metric_that_some_episodes_lack_these_count_as_failed(partly, capsys):
     folder = partly("plotted", "False", "gp")
     run_study(folder)

@@ -195,6 +195,7 @@ def test_of_the_planted_parameters_only_the_one_that_matters_moves_a_metric_beyo
     assert found["matters"].change > found["matters"].noise > 0.0
 
 
+@pytest.mark.slow
 def test_a_parameter_that_matters_is_not_looked_at_twice_and_nothing_is_simulated_again(planted):
     folder = planted(jobs="2")
     spent, found = run(folder)

@@ -140,6 +140,7 @@ def test_an_agent_that_always_fails_is_a_failure_and_no_reason_to_cut_off(make_s
     assert found.failed_episodes == sum(trial.failed_episodes for trial in trials)
 
 
+@pytest.mark.slow
 def test_the_order_of_agents_in_the_settings_does_not_matter(cutting, done):
     folder = cutting("turned", agents="[" + ", ".join(f'"agent{number}"' for number in range(7, -1, -1)) + "]")
     assert run(folder)[1] == done[1]
@@ -194,6 +195,7 @@ def test_a_trial_stands_on_the_episodes_of_its_decided_agents(done):
     assert len(StudyRun(found.study, None).episodes_of(replace(trial, state="finished", decided=()))) == ALL
 
 
+@pytest.mark.slow
 def test_an_engine_that_learns_from_outputs_has_its_trials_cut_off_too(cutting):
     folder = cutting(engine='"outcomes"')
     study = open_study(folder)

@@ -230,6 +230,7 @@ def test_it_can_be_turned_off(finished):
     assert study_document(found)["best"]["fresh"] is None
 
 
+@pytest.mark.slow
 def test_the_time_of_fresh_episodes_does_not_count_for_the_rule_to_stop(finished):
     study = opened(finished, budget=8)
     with Store.open(finished) as store:

@@ -130,6 +130,7 @@ def test_two_jobs_give_the_trials_of_one(make_study):
     assert run(make_study("one"), jobs=1)[1] == run(make_study("two"), jobs=2)[1]
 
 
+@pytest.mark.slow
 def test_a_raised_budget_goes_on_as_if_it_had_been_so_from_the_start(make_study):
     short, long = make_study("short"), make_study("long")
     run(short, budget=6)

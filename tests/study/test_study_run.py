@@ -102,6 +102,7 @@ def test_each_trial_of_a_batch_is_held_against_the_trials_before_the_batch_by_it
             assert StudyRun(study, store).evaluation(trial.theta).prpv >= trial.bound > against.limit
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first", [1, 4, 6, 9])
 def test_a_budget_raised_within_a_batch_gives_the_trials_of_one_that_was_so_from_the_start(make_study, cutting, first):
     folder = ordered_study(make_study, "raised", **KEYS)
@@ -297,6 +298,7 @@ def test_scoring_does_not_depend_on_the_order_of_the_outcomes(make_study):
     assert (forth.prpv, forth.measures["ppv"]) == (back.prpv, pytest.approx(back.measures["ppv"], abs=1e-12))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_after_enough_no_further_episode_begins_and_those_under_way_are_kept(make_study, jobs):
     study = open_study(make_study(jobs=str(jobs)))
@@ -376,6 +378,7 @@ def test_every_agent_is_told_of_once_it_is_measured(make_study, model):
     assert sorted(watcher.lines) == ["agent agent0 measured", "agent agent1 measured"]
 
 
+@pytest.mark.slow
 def test_the_number_of_jobs_changes_nothing_and_the_seed_and_the_model_do(make_study, model):
     lingering = {"faults": '["agent0:0:lingers"]'}
     one, two = (read_study_settings(make_study(f"jobs{jobs}", jobs=jobs, domain=lingering)) for jobs in ("1", "2"))

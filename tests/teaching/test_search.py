@@ -157,6 +157,7 @@ def test_a_raised_budget_goes_on_after_the_very_same_trials(make_study, tmp_path
     assert len(thetas[2]) == 5
 
 
+@pytest.mark.slow
 def test_its_trials_are_kept_in_the_study_with_score_and_measures(make_study):
     folder = make_taught(make_study, parameters=SEARCH_BOX, more="budget = 3", initial="2")
     found = run(folder)

@@ -24,6 +24,7 @@ def test_noise_on_a_plain_floor_is_told_outright(noise):
     assert found.interval[0] <= noise <= found.interval[1]
 
 
+@pytest.mark.slow
 def test_a_picture_without_noise_has_none():
     model, _ = scene()
     found = fit_grain(logged(model), model, floor()).noise

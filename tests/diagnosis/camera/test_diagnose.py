@@ -123,6 +123,7 @@ LOGS = {
 }
 
 
+@pytest.mark.slow
 def test_nothing_is_missing_of_a_nominal_camera():
     found = diagnosed_frames("nominal")
     assert (found.verdict, found.effects) == ("nothing missing", ())
@@ -133,6 +134,7 @@ def test_nothing_is_missing_of_a_nominal_camera():
     assert found.notes == ()
 
 
+@pytest.mark.slow
 def test_a_rolled_camera_is_explained_by_its_roll():
     found = diagnosed_frames("rolled")
     (effect,) = found.effects

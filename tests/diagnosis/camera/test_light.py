@@ -37,6 +37,7 @@ def test_dirt_is_found_where_it_is(row, column):
     assert 0.001 < spot.share < 0.02
 
 
+@pytest.mark.slow
 def test_a_bumper_leaves_no_contrast_where_markings_pass():
     """Its left part is not judged: few of these frames show a marking there."""
     model, seen = scene()
@@ -74,6 +75,7 @@ def unevenly_lit():
     return Floor(pixels, plain.pixels_per_metre, plain.origin)
 
 
+@pytest.mark.slow
 def test_lamps_over_the_floor_are_not_fixed_to_the_camera():
     model, _ = scene()
     assert blemishes(logged(drawn(on_the_road(), unevenly_lit()), noise=2.0), model) == ()
@@ -89,6 +91,7 @@ def test_measured_frames_of_the_nominal_camera_have_no_blemish():
     assert blemishes(measured(), predicted()) == ()
 
 
+@pytest.mark.slow
 @needs_measured
 def test_dirt_and_a_bumper_before_measured_frames_are_found():
     hidden = dirty(measured().astype(float), 85, 60, diameter=14.0)

@@ -324,6 +324,7 @@ def test_nothing_is_named_of_a_nominal_camera(name):
     assert named.model.names == DECLARED
 
 
+@pytest.mark.slow
 def test_an_effect_is_named_on_another_map():
     full = fit_everything(on("horseshoe", {"camera_roll": 4.0}), OPTICS.mounting, {}, learn_scatter=False)
     assert select_camera_effects(full, DECLARED).effects == ("camera_roll",)

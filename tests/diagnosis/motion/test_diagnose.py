@@ -50,6 +50,7 @@ def test_the_planted_effect_is_found_with_its_value(diagnosis):
     assert np.ptp(estimate.interval) < 0.02
 
 
+@pytest.mark.slow
 def test_what_another_rule_would_have_said_is_an_argument(diagnosis):
     strict = replace(RULES, p_value=1e-3)  # less than the draws of chance can show
     asked = diagnose_log(scrubbing_log(), ROBOT, ("trim", "delay"), rules=strict).motion

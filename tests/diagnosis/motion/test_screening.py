@@ -208,6 +208,7 @@ def mirrored(log):
     return with_poses(replace(log, episodes=swapped), lambda poses: poses * (1.0, -1.0, -1.0))
 
 
+@pytest.mark.slow
 def test_a_mirror_swaps_left_and_right_and_nothing_else():
     log = planted_log(
         {"trim": 0.0, "delay": 0.12, "dead_band.width": 0.1, "dead_band.imbalance": -1.0}, **SCREENING_SHORT
@@ -240,6 +241,7 @@ def test_stretches_last_a_second_and_never_cross_episodes():
         assert np.ptp(drives.first[own]) < drives.tick_hz
 
 
+@pytest.mark.slow
 def test_what_changes_nothing_in_these_drives_is_no_lead():
     drives = planted_drives(TRUTH, **SCREENING_SHORT)
     half = replace(drives, duties=0.5 * drives.duties)

@@ -83,6 +83,8 @@ class _Guard:
         return self
 
     def __exit__(self, *problem: object) -> None:
+        if self.status is None:  # an exception passes: Python tells of it, and taking the guard back calls it
+            self.status = 1
         self._forget()
 
     def _python_exits(self, status: int) -> None:

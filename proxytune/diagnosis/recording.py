@@ -15,7 +15,7 @@ import tomlkit
 from numpy.typing import NDArray
 
 from proxytune.diagnosis.motion.drives import Floats
-from proxytune.diagnosis.motion.manoeuvres import LIBRARY
+from proxytune.diagnosis.motion.manoeuvres import LIBRARY, commands_of
 from proxytune.driving import (
     TICK_HZ,
     Course,
@@ -36,7 +36,7 @@ from proxytune.driving import (
 )
 from proxytune.effects import Blur, RollingShutter
 from proxytune.errors import EpisodeError
-from proxytune.logs import Frames, Log, LogEpisode
+from proxytune.logs import COMMANDS, Frames, Log, LogEpisode
 
 POSITION_NOISE_M = 0.002
 HEADING_NOISE_RAD = 0.005
@@ -65,16 +65,23 @@ def record(family: LaneFollowing, *, name: str, repeats: int, seconds: float, se
         seconds: Length of a drive [s].
         seed: Of sizes, starts and noise.
     """
-    rate = read_robot(family.robot, family.folder).figures["control_rate"]
+    robot = read_robot(family.robot, family.folder)
+    rate = robot.figures["control_rate"]
     times = np.arange(round(seconds * rate)) / rate
     episodes = []
     for number in range(repeats * len(LIBRARY)):
         random = np.random.default_rng((seed, number))
-        sized = LIBRARY[number % len(LIBRARY)][2](times) * random.uniform(0.75, 1.0)
-        duties = np.round(sized if number // len(LIBRARY) % 2 == 0 else sized[:, ::-1], 4)
-        poses = _drive(family, duties, random, number)
-        episodes.append(LogEpisode(str(number), times, duties, poses, None))
-    return Log(name, family.robot, "duty", rate, {}, tuple(episodes))
+        sized = commands_of(LIBRARY[number % len(LIBRARY)][2], times, robot) * random.uniform(0.75, 1.0)
+        if number // len(LIBRARY) % 2 == 1:
+            sized = sized * (1.0, -1.0) if robot.drive == "ackermann" else sized[:, ::-1]
+        commands = np.round(sized, 4)
+        poses = _drive(family, commands, random, number)
+        episodes.append(LogEpisode(str(number), times, commands, poses, None))
+    return Log(name, family.robot, KIND[robot.drive], rate, {}, tuple(episodes))
+
+
+KIND = {"differential": "duty", "ackermann": "ackermann"}
+"""Kind of the commands that robots are given, by how they drive."""
 
 
 def _drive(family: LaneFollowing, duties: Floats, random: np.random.Generator, number: int) -> Floats:
@@ -101,8 +108,8 @@ def log_text(log: Log, source: str) -> str:
 
 
 def samples_text(log: Log) -> str:
-    """A samples.csv for a log of duties."""
-    columns = ("time", "left", "right", "x", "y", "heading")
+    """A samples.csv for a recorded log."""
+    columns = ("time", *COMMANDS[log.command], "x", "y", "heading")
     tables = [
         pd.DataFrame(np.column_stack((e.times, e.commands, e.poses)), columns=columns).assign(episode=e.name)
         for e in log.episodes

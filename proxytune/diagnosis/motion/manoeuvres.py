@@ -10,6 +10,7 @@ from proxytune.diagnosis.motion.effect_size import trace_of
 from proxytune.diagnosis.motion.evidence import AdoptedEffect, Findings
 from proxytune.diagnosis.motion.fitting import Fit, evaluate
 from proxytune.diagnosis.motion.screening import Candidate
+from proxytune.driving import Robot
 
 SECONDS = 60.0
 
@@ -93,6 +94,23 @@ LIBRARY: tuple[tuple[str, str, Callable[[Floats], Floats]], ...] = (
 )
 
 
+BEND = 2.0
+"""How far a car steers [full lock] where its wheels would differ by half of full speed."""
+
+ROLLING = 0.4
+"""Throttle of a car in manoeuvres that turn on the spot, which it cannot."""
+
+
+def commands_of(shape: Callable[[Floats], Floats], times: Floats, robot: Robot) -> Floats:
+    """The commands of a manoeuvre at some times (rows, 2): duties of two wheels, or a car's throttle and steering."""
+    duties = shape(times)
+    if robot.drive == "differential":
+        return duties
+    forward = duties.mean(axis=1)
+    throttle = np.where(np.any(forward != 0.0), forward, ROLLING)
+    return np.stack((throttle, np.clip(BEND * (duties[:, 1] - duties[:, 0]), -1.0, 1.0)), axis=-1)
+
+
 def next_manoeuvre(found: Findings, *, again: bool = False) -> Manoeuvre | None:
     """Choose the manoeuvre that tells the adopted effect with a rival from that rival best, None where nothing would.
 
@@ -121,7 +139,7 @@ def _best_offer(found: Findings) -> Manoeuvre | None:
 
 
 def _duties_of(shape: Callable[[Floats], Floats], drives: Drives) -> Floats:
-    return shape(np.arange(round(SECONDS * drives.rate_hz)) / drives.rate_hz)
+    return commands_of(shape, np.arange(round(SECONDS * drives.rate_hz)) / drives.rate_hz, drives.robot)
 
 
 def _nats_apart(model: Fit, shape: Callable[[Floats], Floats], effect: AdoptedEffect, rival: Candidate) -> float:

@@ -22,7 +22,7 @@ from proxytune.diagnosis import (
     refit_beside_curve,
     wheel_speeds,
 )
-from proxytune.effects import TURN, Catalogue, Means, Panel, WheelCurve
+from proxytune.effects import TURN, Catalogue, Means, Panel, WheelCurve, track_of
 from proxytune.report.diagnosis.error_figures import DECLARED_MODEL, extended_name
 from proxytune.report.figure_style import BLUE, COLUMN, GREY, LIGHT_GREY, PURPLE, VERMILLION, dress, legend_below
 from proxytune.space import Theta
@@ -50,7 +50,9 @@ def effect_curve(diagnosis: Diagnosis) -> Figure | None:
     kind = _curve_kind(first, diagnosis.robot.catalogue)
     if isinstance(kind, Means):
         return means_figure(diagnosis, _curve(found.curves, kind.cue), kind.panels)
-    return _wheels_figure(diagnosis) if kind is WheelCurve.STEADY else _steps_figure(diagnosis)
+    if kind is not WheelCurve.STEADY:
+        return _steps_figure(diagnosis)
+    return _wheels_figure(diagnosis) if diagnosis.robot.drive == "differential" else _car_figure(diagnosis)
 
 
 def _curve_kind(effect: AdoptedEffect, catalogue: Catalogue) -> WheelCurve | Means:
@@ -60,6 +62,41 @@ def _curve_kind(effect: AdoptedEffect, catalogue: Catalogue) -> WheelCurve | Mea
 
 def _curve(curves: Sequence[SignalCurve], name: str) -> SignalCurve | None:
     return next((curve for curve in curves if curve.group.name == name), None)
+
+
+class Shown(NamedTuple):
+    """The part of a robot that an effect bends: its column, what 1 stands for there, and an axis' label."""
+
+    column: int
+    full: float
+    label: str
+
+
+def _shown(diagnosis: Diagnosis) -> Shown:
+    """The part that the first effect that was added bends."""
+    first, figures = diagnosis.found.adopted[0], diagnosis.robot.figures
+    if diagnosis.robot.drive == "differential":
+        column = int(first.form.startswith("right"))
+        return Shown(column, figures["full_speed"], f"speed of the {('left', 'right')[column]} wheel [m/s]")
+    if first.effect.startswith("steering_"):
+        return Shown(1, figures["wheel_angle"], "angle of the wheels [deg]")
+    return Shown(0, figures["full_speed"], "speed [m/s]")
+
+
+def _car_figure(diagnosis: Diagnosis) -> Figure:
+    """A car's steady speed against throttle, or its wheels' angle against steering."""
+    found, shown, drives = diagnosis.found, _shown(diagnosis), diagnosis.found.declared.drives
+    figure = Figure(figsize=(COLUMN, 2.4), layout="constrained")
+    axes, given = figure.subplots(), drives.duties[..., shown.column]
+    commands = np.linspace(float(given.min()), float(given.max()), COMMANDS)
+    pairs = np.stack([commands * (column == shown.column) for column in (0, 1)], axis=-1)
+    models = {DECLARED_MODEL: found.declared.theta, extended_name(diagnosis): found.model.theta}
+    _draw_steady(
+        axes, commands, {n: shown.full * _steady(drives, t, pairs)[:, shown.column] for n, t in models.items()}
+    )
+    dress(axes, ("throttle", "steering [full lock]")[shown.column], shown.label)
+    legend_below(figure, axes)
+    return figure
 
 
 def _wheels_figure(diagnosis: Diagnosis) -> Figure:
@@ -86,12 +123,13 @@ def _wheels_figure(diagnosis: Diagnosis) -> Figure:
 def _steady_models(diagnosis: Diagnosis, commands: Floats) -> dict[str, Floats]:
     """Steady wheel speeds (commands, 2) [m/s] of every model, by name: declared, extended, with the flexible curve."""
     found, drives = diagnosis.found, diagnosis.found.declared.drives
-    before = _steady(drives, found.declared.theta, commands)
-    models = {DECLARED_MODEL: before, extended_name(diagnosis): _steady(drives, found.model.theta, commands)}
+    full, pairs = drives.robot.figures["full_speed"], np.stack((commands, commands), axis=-1)
+    before = full * _steady(drives, found.declared.theta, pairs)
+    models = {DECLARED_MODEL: before, extended_name(diagnosis): full * _steady(drives, found.model.theta, pairs)}
     curve = _curve(found.curves, "wheel command")
     if curve is not None and curve.gain > 0.0:
         extra = [np.interp(before[:, side], *_flexible(diagnosis, curve, side)) for side in (0, 1)]
-        models[ANY] = _steady(drives, refit_beside_curve(found.declared, curve), commands) + np.stack(extra, axis=1)
+        models[ANY] = full * _steady(drives, refit_beside_curve(found.declared, curve), pairs) + np.stack(extra, axis=1)
     return models
 
 
@@ -103,10 +141,10 @@ def _draw_steady(axes: Axes, commands: Floats, models: Mapping[str, Floats]) -> 
 
 
 def _steady(drives: Drives, theta: Theta, commands: Floats) -> Floats:
-    """Wheel speeds (commands, 2) [m/s] that a model comes to from rest when both wheels get the same command."""
+    """Wheel speeds, of a car speed and angle (n, 2), as fractions of full that commands (n, 2) come to from rest."""
     ticks = round(HELD_S * drives.tick_hz)
-    duties = np.broadcast_to(commands[:, None, None], (len(commands), ticks, 2))
-    return wheel_speeds(_driven(drives, duties), theta)[:, -1] * drives.robot.figures["full_speed"]
+    duties = np.broadcast_to(commands[:, None], (len(commands), ticks, 2))
+    return wheel_speeds(_driven(drives, duties), theta)[:, -1]
 
 
 def _driven(drives: Drives, duties: Floats) -> Drives:
@@ -120,7 +158,7 @@ def _flexible(diagnosis: Diagnosis, curve: SignalCurve, column: int) -> tuple[Fl
     drives, figures = diagnosis.found.declared.drives, diagnosis.robot.figures
     speeds = wheel_speeds(drives, diagnosis.found.declared.theta)[..., column].ravel() * figures["full_speed"]
     twists = curve.group.twists @ curve.weights
-    side = (-1.0, 1.0)[column] * figures["effective_baseline"] / 2.0
+    side = (-1.0, 1.0)[column] * track_of(figures) / 2.0
     speeds, where = np.unique(speeds, return_index=True)
     return speeds, (twists[..., 0] + side * twists[..., 2]).ravel()[where]
 
@@ -136,8 +174,7 @@ def _steps_figure(diagnosis: Diagnosis) -> Figure:
     times = np.arange(round(lasts * drives.tick_hz)) / drives.tick_hz
     size = min(0.5, float(np.abs(drives.duties).max()))
     duties = np.repeat(np.where(times < STEP_S, size, -size)[None, :, None], 2, axis=2)
-    column = int(found.adopted[0].form.startswith("right"))
-    full = drives.robot.figures["full_speed"]
+    column, full, label = _shown(diagnosis)
     # An area, which no line on its edge can hide.
     axes.fill_between(times, duties[0, :, 0] * full, color=LIGHT_GREY, linewidth=0, zorder=0, label="command")
     for fitted, colour, name in (
@@ -146,7 +183,7 @@ def _steps_figure(diagnosis: Diagnosis) -> Figure:
     ):
         draws = full * _responses(_driven(drives, duties), fitted.theta)[..., column]
         _draw_responses(axes, times, draws, colour, name)
-    dress(axes, "time since the command [s]", f"speed of the {('left', 'right')[column]} wheel [m/s]")
+    dress(axes, "time since the command [s]", label)
     legend_below(figure, axes)
     return figure
 
@@ -176,6 +213,7 @@ CUE_PANELS: Mapping[str, tuple[Panel, ...]] = {
         Panel("left", "speed of the left wheel [m/s]", "left"),
         Panel("right", "speed of the right wheel [m/s]", "right"),
     ),
+    "steering": tuple(Panel("", "steering [full lock]", m, m == "forward") for m in ("forward", "turn")),
     "difference of the wheel commands": tuple(
         Panel("", "right less left command [duty]", m) for m in ("forward", "turn")
     ),
@@ -228,7 +266,7 @@ def rates_of(diagnosis: Diagnosis, curve: SignalCurve | None) -> Rates:
 
 def _channels(drives: Drives, moved: Floats) -> dict[str, Floats]:
     forward, sideways, turn = (moved / ((drives.last - drives.first) / drives.tick_hz)[:, None]).T
-    side = turn * drives.robot.figures["effective_baseline"] / 2.0
+    side = turn * track_of(drives.robot.figures) / 2.0
     return {"forward": forward, "sideways": sideways, "turn": turn, "left": forward - side, "right": forward + side}
 
 

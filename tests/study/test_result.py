@@ -3,6 +3,7 @@
 A study's trials as a search of any kind has them.
 """
 
+import shutil
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -186,6 +187,7 @@ def test_trials_do_not_depend_on_it(finished, make_study):
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_interrupted_anywhere_it_comes_to_the_same_answer(finished, jobs):
+    _, whole = confirmed(shutil.copytree(finished, finished.parent / "whole"), jobs=jobs, confirm=2)
     study = opened(finished, jobs=jobs, confirm=2)
     for episodes in (1, 20):
         with Store.open(finished) as store:
@@ -194,8 +196,12 @@ def test_interrupted_anywhere_it_comes_to_the_same_answer(finished, jobs):
                 run_confirmation(study_run)
             assert result_of(StudyRun(study, store)).confirmation is None
     spent, found = confirmed(finished, jobs=jobs, confirm=2)
-    assert spent.episodes == 2 * ONE * len(found.confirmation.candidates) - 21
-    assert found.confirmation.answer.trial in found.trials
+    last = found.confirmation
+    unvisited = sum(one.trial.number == 0 for one in last.candidates)
+    assert spent.episodes == ONE * (2 * len(last.candidates) + unvisited + last.repetitions) - 21
+    assert last.answer.scores == whole.confirmation.answer.scores
+    assert last.answer.trial.theta == whole.confirmation.answer.trial.theta
+    assert last.expected.prpv == whole.confirmation.expected.prpv
 
 
 def test_what_need_not_be_run_is_taken_off_the_bar(finished):

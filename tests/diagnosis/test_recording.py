@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from proxytune.diagnosis import film, recording as filming
-from proxytune.driving import LaneFollowing, drive, lane_pose, shipped_map
+from proxytune.diagnosis import film, record, recording as filming
+from proxytune.diagnosis.motion.diagnose import diagnose
+from proxytune.driving import LaneFollowing, drive, lane_pose, read_robot, shipped_map
 from proxytune.driving.family import with_columns
 from proxytune.effects import FilterContext
 from proxytune.errors import EpisodeError, SettingsError
@@ -132,3 +133,17 @@ def test_a_robot_without_an_expert_is_refused_before_anything_is_driven(family, 
     (tmp_path / "novice" / "robot.toml").write_text("\n".join(kept).replace('"duckiebot"', '"novice"'))
     with pytest.raises(SettingsError, match="'novice' has no expert"):
         film(replace(family, robot="novice"), 1, 1)
+
+
+HIDDEN = (("dead_band", 0.08), ("steering_lag", 0.25), ("steering_offset", 0.05), ("delay", 0.12))
+
+
+@pytest.mark.slow
+def test_what_a_recorded_car_lacks_is_named_with_its_value(tmp_path):
+    family = LaneFollowing("car", "planar", "ground_plane", ROAD, 60.0, 0.0, 0.0, HIDDEN, tmp_path)
+    log = record(family, name="car", repeats=2, seconds=20.0, seed=1)
+    assert log.command == "ackermann"
+    found = diagnose(log, read_robot("car"), ("steering_offset", "delay"))
+    assert (found.verdict, {one.effect for one in found.effects}) == ("explained", {"dead_band", "steering_lag"})
+    for name, value in HIDDEN:
+        assert found.theta[name].value == pytest.approx(value, abs=0.002), name

@@ -349,3 +349,28 @@ def test_full_speed_of_duties_is_how_fast_it_drove(rows):
 def test_full_speed_of_a_robot_that_never_moved_is_still_positive(log_of_vehicle):
     still = with_commands(log_of_vehicle, "duty", np.zeros((200, 2)))
     assert robot_of(still).figures["full_speed"] > 0.0
+
+
+CAR = read_robot("car")
+
+
+def test_what_a_car_is_asked_for_is_throttle_and_steering_in_any_kind():
+    """0.5 m/s at half lock: as shares, as speed and wheel angle, as speed and yaw rate."""
+    angle, figures = np.radians(CAR.figures["wheel_angle"]) / 2.0, CAR.figures
+    wanted = np.array([[0.5 / figures["full_speed"], 0.5]])
+    turn = 0.5 * np.tan(angle) / figures["wheelbase"]
+    for command, asked in (("ackermann", wanted[0]), ("speed_steering", (0.5, angle)), ("twist", (0.5, turn))):
+        log = Log("log", "car", command, 20.0, {}, ())
+        np.testing.assert_allclose(duties_of(log, CAR, np.array([asked])), wanted, err_msg=command)
+
+
+@pytest.mark.parametrize(("robot", "command"), [("car", "duty"), ("car", "wheel_speed"), ("duckiebot", "ackermann")])
+def test_commands_of_the_other_kind_of_drive_are_refused_in_one_line(robot, command):
+    with pytest.raises(LogError, match=f"commands of kind '{command}' are not for robot '{robot}'") as caught:
+        duties_of(Log("log", robot, command, 20.0, {}, ()), read_robot(robot), np.zeros((2, 2)))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_car_asked_for_more_than_its_full_speed_is_refused():
+    with pytest.raises(LogError, match="more than the full speed"):
+        duties_of(Log("log", "car", "speed_steering", 20.0, {}, ()), CAR, np.array([[99.0, 0.0]]))

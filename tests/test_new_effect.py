@@ -27,8 +27,8 @@ def folder(tmp_path_factory):
     motion.write_text(motion.read_text(encoding="utf-8") + EFFECT, encoding="utf-8")
     catalogue = folder / "proxytune" / "effects" / "catalogue.py"
     text = catalogue.read_text(encoding="utf-8")
-    assert text.count("FloorSlope,") == 2  # imported, and listed
-    catalogue.write_text(text.replace("FloorSlope,", "WeakReverse, FloorSlope,"), encoding="utf-8")
+    assert text.count("FloorSlope,") == 3  # imported, listed for two wheels, and listed for cars
+    catalogue.write_text(text.replace("FloorSlope,", "WeakReverse, FloorSlope,", 2), encoding="utf-8")
     return folder
 
 

@@ -129,7 +129,7 @@ def test_what_is_printed_is_what_is_written(document, home):
     assert said.startswith("planted: yaw scrub: the robot turns as if its wheels were 0.1")
     assert " apart; without it predictions over 2 s are " in said
     assert ". Explained: with the effects added, only noise is left (expected false names: at most 0.0" in said
-    assert page.count("<img ") == len(figures)
+    assert page.count("<figure") == len(figures)
     assert "python -m proxytune diagnose " in page.split("<footer>")[1]
     assert "--json" not in page
 

@@ -41,14 +41,15 @@ from proxytune.scores import (
     read_scores,
 )
 from proxytune.usefulness import (
+    FEWEST_RESAMPLES,
+    MOST_RESAMPLES,
     Asked,
     Assessment,
     Selection,
     Sequential,
-    assess,
+    assess_each,
     chosen,
     in_common,
-    select_proxy,
     sequential_test,
 )
 
@@ -86,7 +87,6 @@ def _in_rows(problem: str) -> str:
 
 
 Scores = pd.DataFrame | ScoreTable | str | Path
-FEWEST_RESAMPLES, MOST_RESAMPLES = 100, 1_000_000
 
 
 @dataclass(frozen=True)
@@ -266,17 +266,14 @@ def score(  # type: ignore[misc]  # the options above are those below
         sides = {side: table.unpaired() for side, table in sides.items()}
     asked = Asked(decide_on, rollouts, regret)
     other = sides.pop("target")
+    found, selection = assess_each(
+        proxies=sides, target=other, metrics=compared, beta=beta, asked=asked, resamples=resamples, seed=seed
+    )
     reports = {}
-    for name, one in sides.items():
-        found = assess(
-            proxy=one, target=other, metrics=compared, beta=beta, seed=seed, resamples=resamples, asked=asked
-        )
-        own = {each.name: getattr(found, each.name) for each in fields(Assessment)}
+    for name, one in found.items():
+        own = {each.name: getattr(one, each.name) for each in fields(Assessment)}
         reports[name] = ScoreReport(**own, names=(name, names[1]))
-    if several is not None:
-        sampling = {"resamples": resamples, "seed": seed}
-        return Ranking(reports, select_proxy(proxies=sides, target=other, metrics=compared, **sampling))
-    return reports[names[0]]
+    return reports[names[0]] if selection is None else Ranking(reports, selection)
 
 
 def _metrics(metrics: str | Metric | Sequence[str | Metric] | None, header: Sequence[str]) -> list[Metric]:

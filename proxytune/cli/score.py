@@ -34,14 +34,15 @@ from proxytune.scores import (
 )
 from proxytune.settings import nearest
 from proxytune.usefulness import (
+    FEWEST_RESAMPLES,
+    MOST_RESAMPLES,
     Asked,
     Assessment,
     Selection,
     Sequential,
-    assess,
+    assess_each,
     chosen,
     in_common,
-    select_proxy,
     sequential_test,
 )
 
@@ -172,7 +173,6 @@ def _present(columns: Mapping[str, str], paths: Sequence[Path]) -> dict[str, str
     return {name: theirs for name, theirs in columns.items() if theirs in found}
 
 
-FEWEST_RESAMPLES, MOST_RESAMPLES = 100, 1_000_000
 LARGEST_WEIGHT = 1e70
 
 
@@ -257,16 +257,15 @@ def run(arguments: argparse.Namespace) -> Answer:
     if arguments.unpaired:
         target = target.unpaired()
         proxies = {name: table.unpaired() for name, table in proxies.items()}
-    beta = _weights(arguments.beta)
-    sampling = {"resamples": arguments.resamples, "seed": arguments.seed}
-    asked = Asked(arguments.decide_on, arguments.rollouts, arguments.regret)
-    assessments = {
-        name: assess(proxy=proxy, target=target, metrics=metrics, beta=beta, asked=asked, **sampling)
-        for name, proxy in proxies.items()
-    }
-    selection = None
-    if len(assessments) > 1:
-        selection = select_proxy(proxies=proxies, target=target, metrics=metrics, **sampling)
+    assessments, selection = assess_each(
+        proxies=proxies,
+        target=target,
+        metrics=metrics,
+        beta=_weights(arguments.beta),
+        asked=Asked(arguments.decide_on, arguments.rollouts, arguments.regret),
+        resamples=arguments.resamples,
+        seed=arguments.seed,
+    )
     tested = _test(assessments, arguments) if arguments.sequential else None
     written = _write(arguments, assessments, selection, target_name) if arguments.output else {"figures": []}
     document = {"target": target_name, **written, "left_out": list(left_out)}

@@ -1,11 +1,14 @@
 from .assessment import (
+    FEWEST_RESAMPLES as FEWEST_RESAMPLES,
     LEFT_OUT as LEFT_OUT,
+    MOST_RESAMPLES as MOST_RESAMPLES,
     PAIRED as PAIRED,
     PERFECT as PERFECT,
     Assessment as Assessment,
     Difference as Difference,
     Selection as Selection,
     assess as assess,
+    assess_each as assess_each,
     select_proxy as select_proxy,
 )
 from .catalogue import (
@@ -40,7 +43,13 @@ from .decision import (
     mmrv_conventions as mmrv_conventions,
     use_two as use_two,
 )
-from .expectation import Estimate as Estimate, Expectation as Expectation, donors_of as donors_of, expect as expect
+from .expectation import (
+    Donors as Donors,
+    Estimate as Estimate,
+    Expectation as Expectation,
+    donors_of as donors_of,
+    expect as expect,
+)
 from .noise import (
     Chance as Chance,
     NoiseFloor as NoiseFloor,

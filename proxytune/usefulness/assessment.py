@@ -269,6 +269,34 @@ class Selection:
     confidence: float = CONFIDENCE
 
 
+FEWEST_RESAMPLES, MOST_RESAMPLES = 100, 1_000_000
+"""Of a bootstrap that people ask for."""
+
+
+def assess_each(
+    *,
+    proxies: Mapping[str, ScoreTable],
+    target: ScoreTable,
+    metrics: Sequence[Metric],
+    beta: Mapping[str, float] | None = None,
+    asked: Asked = ASKED,
+    resamples: int = 1000,
+    seed: int = 0,
+) -> tuple[dict[str, Assessment], Selection | None]:
+    """Assess proxies of one target by name, and rank them where there are several.
+
+    Raises:
+        ScoresError, InputError: As in assess.
+    """
+    found = {
+        name: assess(proxy=one, target=target, metrics=metrics, beta=beta, asked=asked, resamples=resamples, seed=seed)
+        for name, one in proxies.items()
+    }
+    if len(found) == 1:
+        return found, None
+    return found, select_proxy(proxies=proxies, target=target, metrics=metrics, resamples=resamples, seed=seed)
+
+
 def select_proxy(
     *,
     proxies: Mapping[str, ScoreTable],

@@ -31,7 +31,7 @@ from proxytune.study.preflight import placement_pairs, run_preflight
 from proxytune.study.run import AfterEarlier, goal_of, knowledge_of, record, retry_failed, run_trials, stopped
 from proxytune.study.settings import StudySettings
 from proxytune.study.study_run import StudyRun, evaluate_outcomes, in_common, plan_episodes, score_table
-from proxytune.usefulness import Assessment, Expectation, assess, donors_of, expect
+from proxytune.usefulness import Assessment, Donors, Expectation, assess, donors_of, expect
 
 MOST_FINALISTS = 3
 """At most so many θ are driven again."""
@@ -167,7 +167,8 @@ def nominal_of(run: StudyRun, confirmation: Confirmation | None) -> Nominal | No
     found = run.evaluation(theta)
     if found is None or found.proxy is None:
         return None
-    return Nominal(theta, _expect(run, [found.proxy], confirmation.candidates if confirmation else ()))
+    donors = _donors(run, confirmation.candidates if confirmation else ())
+    return Nominal(theta, _expect(run, [found.proxy], donors))
 
 
 def run_confirmation(run: StudyRun) -> None:
@@ -191,7 +192,7 @@ def run_confirmation(run: StudyRun) -> None:
         run.outcomes(episodes, what)
         run.watcher.finished(what)
     driven = _driven(run, chosen) if settings.confirm else None
-    more = _more(run, _answer(driven, learnt), driven) if driven else []
+    more = _more(run, _answer(driven, learnt), _donors(run, driven)) if driven else []
     run.watcher.begin("the answer again", (MOST_REPETITIONS - len(more)) * each)
     run.outcomes([episode for repetition in more for episode in repetition], "the answer again")
 
@@ -208,21 +209,19 @@ def confirmation_of(run: StudyRun, trials: Sequence[TrialRecord], learnt: Knowle
     driven = _driven(run, finalists(trials, learnt)) if settings.confirm else None
     if not driven:
         return None
-    answer = _answer(driven, learnt)
+    answer, donors, each = _answer(driven, learnt), _donors(run, driven), len(settings.agents) * settings.starts
     whole = _assessed(run.study, answer.fresh)
     tables, count = [table for one in answer.fresh if (table := _table(run.study, one))], 0
     expected = None
     if whole and tables:
-        known = [run.known(planned) for planned in _more(run, answer, driven)]
-        again = [table for one in known if len(one) == settings.starts * len(settings.agents)
-                 if (table := _table(run.study, tuple(one.values())))]  # fmt: skip
-        chosen_by, expected = _expect(run, tables, driven), _expect(run, again or tables, driven)
+        known = [run.known(planned) for planned in _more(run, answer, donors)]
+        again = [table for one in known if len(one) == each and (table := _table(run.study, tuple(one.values())))]
+        chosen_by = _expect(run, tables, donors)
+        expected = _expect(run, again, donors) if again else chosen_by
         inner = replace(whole.prpv_interval, low=chosen_by.prpv.value.low, high=chosen_by.prpv.value.high)
         answer = replace(answer, assessment=replace(whole, prpv_interval=inner, noise_floor=expected.floor))
         count = len(again)
-    return Confirmation(
-        answer, tuple(driven), settings.confirm * settings.starts * len(settings.agents), expected, count
-    )
+    return Confirmation(answer, tuple(driven), settings.confirm * each, expected, count)
 
 
 def finalists(trials: Sequence[TrialRecord], learnt: Knowledge) -> list[TrialRecord]:
@@ -291,31 +290,31 @@ def _answer(driven: Sequence[Finalist], learnt: Knowledge) -> Finalist:
     return by_values[learnt.likeliest_of([values for values in mean if mean[values] <= limit])]
 
 
-def _more(run: StudyRun, answer: Finalist, driven: Sequence[Finalist]) -> list[list[Episode]]:
+def _more(run: StudyRun, answer: Finalist, donors: Donors) -> list[list[Episode]]:
     """The repetitions of the answer that nothing is chosen by: as many as make its interval narrow."""
     table = _table(run.study, answer.fresh[0])
     if table is None:
         return []
-    settings, reach = run.settings, 1.96 * _expect(run, [table], driven).deviation
+    settings, reach = run.settings, 1.96 * _expect(run, [table], donors).deviation
     count = min(MOST_REPETITIONS, ceil((reach / NARROW) ** 2))
     seeds = [fresh_seed(settings.seed, settings.confirm + 1 + number) for number in range(count)]
     return [plan_episodes(settings, answer.trial.theta, seed) for seed in seeds]
 
 
-def _expect(run: StudyRun, tables: Sequence[ScoreTable], driven: Sequence[Finalist]) -> Expectation:
-    """What is expected by these tables, and by the noise of the finalists and of the pre-flight."""
+def _donors(run: StudyRun, driven: Sequence[Finalist]) -> Donors:
+    """What was driven twice from the same start: finalists, and the pre-flight's θ."""
     metrics = run.settings.metrics
     pairs = [np.moveaxis(placement_pairs(run)[..., : len(metrics)], 1, 0)]
     for one in driven:
         own = run.known(plan_episodes(run.settings, one.trial.theta, run.settings.seed))
         pairs += [np.stack([_cells(run, own.values()), _cells(run, fresh)]) for fresh in one.fresh]
-    return expect(
-        fresh=tables,
-        target=run.study.target,
-        metrics=metrics,
-        donors=donors_of(pairs, len(metrics)),
-        seed=run.settings.seed,
-    )
+    return donors_of(pairs, len(metrics))
+
+
+def _expect(run: StudyRun, tables: Sequence[ScoreTable], donors: Donors) -> Expectation:
+    """What is expected by these tables, under the noise of the donors."""
+    settings = run.settings
+    return expect(fresh=tables, target=run.study.target, metrics=settings.metrics, donors=donors, seed=settings.seed)
 
 
 def _cells(run: StudyRun, outcomes: Iterable[Outcome]) -> Floats:

@@ -17,7 +17,7 @@ from yardsticks import AROUND, STEP_S, Array, Drive, Physics, Yardstick, constan
 
 from proxytune.diagnosis.motion.innovations import integrate_twists
 from proxytune.driving import drivetrain, read_robot
-from proxytune.effects import FilterContext, effects_from
+from proxytune.effects import FilterContext, Model, effects_from, model_text
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
@@ -177,7 +177,9 @@ def main(folder: Path, output: Path) -> None:
     effects = [(n, *found[n], *tiles.get(n, blank), AUTHORS.get(n, "")) for n in found]
     columns = ["parameter", "rubber", "low", "high", "tiles", "tiles_low", "tiles_high", "authors"]
     pd.DataFrame(effects, columns=columns).to_csv(output / "effects.csv", index=False, float_format="%.4f")
-    write_model(theta, output / "model.toml")
+    comment = f"fitted to {', '.join(FITTED)} of DART"
+    model = Model(ROBOT.name, None, theta, {})
+    (output / "model.toml").write_text(model_text(model, [comment], ROBOT.catalogue), encoding="utf-8")
     draw(table, output / "errors.png")
     print(
         table.round(3).to_string(index=False), pd.DataFrame(effects, columns=columns).to_string(index=False), sep="\n\n"
@@ -186,18 +188,6 @@ def main(folder: Path, output: Path) -> None:
     print(
         "\ntape and tiles with its own floor:", *(f"{error(changed, [drives[OTHER_FLOOR]], h):.3f}" for h in HORIZONS_S)
     )
-
-
-def write_model(theta: Theta, path: Path) -> None:
-    """A model file of these values."""
-    lines = ["# fitted to " + ", ".join(FITTED) + " of DART", "format = 1", 'robot = "dart"']
-    for effect in dict.fromkeys(name.split(".")[0] for name in theta):
-        own = {name: value for name, value in theta.items() if name.split(".")[0] == effect}
-        lines += ["", f"[effects.{effect}]"]
-        for name, value in own.items():
-            parameter = ROBOT.catalogue.parameters[name]
-            lines.append(f'{parameter.name} = {{ value = {value!r}, unit = "{parameter.unit}" }}')
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -168,26 +168,34 @@ def _saves(saving: Saving) -> dict[str, Any]:
     }
 
 
+def _chosen(decision: Decision) -> dict[str, Any]:
+    return {
+        "winner": decision.winner,
+        "probability_best": decision.probability_best,
+        "expected_regret": dict(decision.expected_regret),
+        "regret_interval": _ends(decision.regret_interval),
+        "probabilities_best": _plain(decision.best_probabilities),
+        "not_told_apart": list(decision.not_told_apart),
+        "chosen_on": decision.chosen_on,
+        "scores": None
+        if decision.scores is None
+        else {agent: {"value": mean, "interval": list(ends)} for agent, (mean, ends) in decision.scores.items()},
+        "least_difference": decision.least_told,
+        "basis": decision.basis or None,
+        "notes": list(decision.notes),
+    }
+
+
+PROMISED = ("winner", "probability_best", "expected_regret", "not_told_apart", "chosen_on")
+"""What is told of a decision by two proxies together."""
+
+
 def decision_document(assessment: Assessment) -> dict[str, Any]:
     """The decision and what follows from it, as plain JSON whose keys are promises."""
     decision, saving, plan = assessment.decision, assessment.saves, assessment.next
     observed, random = decision.observed, assessment.chance
     return {
-        "decision": {
-            "winner": decision.winner,
-            "probability_best": decision.probability_best,
-            "expected_regret": dict(decision.expected_regret),
-            "regret_interval": _ends(decision.regret_interval),
-            "probabilities_best": _plain(decision.best_probabilities),
-            "not_told_apart": list(decision.not_told_apart),
-            "chosen_on": decision.chosen_on,
-            "scores": None
-            if decision.scores is None
-            else {agent: {"value": mean, "interval": list(ends)} for agent, (mean, ends) in decision.scores.items()},
-            "least_difference": decision.least_told,
-            "basis": decision.basis or None,
-            "notes": list(decision.notes),
-        },
+        "decision": _chosen(decision),
         "observed": {
             **_panel(observed),
             "tasks": {panel.name: _panel(panel) for panel in decision.tasks},
@@ -225,17 +233,10 @@ def choices_document(assessments: Mapping[str, Assessment]) -> list[dict[str, An
 def together_document(assessments: Mapping[str, Assessment]) -> dict[str, Any]:
     """What the two best proxies save together, and the agent to deploy then, as plain JSON."""
     both = _together(assessments)
-    decision = both.decision
     return {
         "proxies": list(both.proxies),
         "saves": _saves(both.saves),
-        "decision": {
-            "winner": decision.winner,
-            "probability_best": decision.probability_best,
-            "expected_regret": dict(decision.expected_regret),
-            "not_told_apart": list(decision.not_told_apart),
-            "chosen_on": decision.chosen_on,
-        },
+        "decision": {key: value for key, value in _chosen(both.decision).items() if key in PROMISED},
     }
 
 

@@ -71,7 +71,8 @@ def played_environment(
 
 
 def _register(name: str, make: Callable[..., Any] | None) -> None:
-    """Have Gymnasium know what makes an environment, in this process."""
-    if make is not None:
+    """Have Gymnasium know what makes an environment, in this process; once is enough."""
+    known = gymnasium.registry.get(name)
+    if make is not None and (known is None or known.entry_point is not make):
         gymnasium.registry.pop(name, None)
         gymnasium.register(name, entry_point=make)

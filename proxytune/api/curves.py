@@ -129,9 +129,10 @@ class SweepReport(Shown):
             RunError: If one cannot be written.
         """
         output = self.settings.home / "figures" if folder is None else Path(folder)
-        figures = draw_curves(self.curves, output, self.truth)
-        page = write_sweep_page(self.settings, self.curves, output, self.held, command, self.truth)
-        return figures, [*write_curves(self.curves, output), page]
+        figures = self.figures()
+        drawn = draw_curves(figures, output)
+        page = write_sweep_page(self.settings, self.curves, figures, output, self.held, command)
+        return drawn, [*write_curves(self.curves, output), page]
 
 
 def run_sweep(

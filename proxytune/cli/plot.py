@@ -2,10 +2,11 @@
 
 import argparse
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from matplotlib.figure import Figure
 from rich.console import Group, RenderableType
 from rich.text import Text
 
@@ -16,6 +17,7 @@ from proxytune.cli.terminal import Answer
 from proxytune.report import (
     curve_name,
     draw_curves,
+    figures_of_sweep,
     held_alike,
     held_values,
     study_document,
@@ -24,7 +26,6 @@ from proxytune.report import (
     write_sweep_page,
 )
 from proxytune.scores import Metric
-from proxytune.space import Theta
 from proxytune.storage import Store
 from proxytune.study import (
     Spent,
@@ -69,9 +70,10 @@ def run(arguments: argparse.Namespace) -> Answer:
         run = open_read_only(settings, store)
         result, curves = _read(run, metrics)
     folder = _folder(settings.home, metrics)
-    figures = draw_curves(curves, folder / "figures", run.study.truth)
+    drawn = figures_of_sweep(curves, run.study.truth)
+    figures = draw_curves(drawn, folder / "figures")
     shown = result.study.settings if result else settings
-    pages = [str(page) for page in _pages(shown, curves, folder / "figures", typed(arguments), run.study.truth)]
+    pages = [str(page) for page in _pages(shown, curves, drawn, folder / "figures", typed(arguments))]
     document: dict[str, Any] = {}
     if result:
         found = StudyReport(result, Spent())
@@ -88,12 +90,12 @@ def run(arguments: argparse.Namespace) -> Answer:
 
 
 def _pages(
-    settings: StudySettings, curves: Sequence[SweepCurve], folder: Path, command: str, truth: Theta | None
+    settings: StudySettings, curves: Sequence[SweepCurve], figures: Mapping[str, Figure], folder: Path, command: str
 ) -> Iterator[Path]:
     """Write a page of all sweeps that hold the others at the same values."""
-    drawn = list({curve_name(curve): curve for curve in curves}.values())
-    for alike in held_alike(drawn):
-        yield write_sweep_page(settings, alike, folder, held_values(alike[0].base), command, truth)
+    latest = list({curve_name(curve): curve for curve in curves}.values())
+    for alike in held_alike(latest):
+        yield write_sweep_page(settings, alike, figures, folder, held_values(alike[0].base), command)
 
 
 def _read(run: StudyRun, metrics: Sequence[Metric]) -> tuple[StudyResult | None, Sequence[SweepCurve]]:

@@ -16,7 +16,7 @@ from proxytune.api import StudyReport
 from proxytune.domain import DomainFamily, make_episode
 from proxytune.errors import EpisodeError, StoreError
 from proxytune.loop.opening import Loop
-from proxytune.report import Picture, episode_figure, plain, save_figure, say_parting, short, write_text
+from proxytune.report import Picture, episode_figure, plain, save_figure, say_parting, short, svg_of, write_text
 from proxytune.seeds import episode_seed
 from proxytune.study import SideBySide, can_record, drive_side_by_side, load_family
 from proxytune.usefulness import Assessment, dominance
@@ -94,8 +94,9 @@ def write_pictures(closed: Closed) -> None:
     if gain and both:
         metrics = [metric.name for metric in closed.loop.settings.metrics]
         for name, pair, caption in zip(BothEpisodes._fields, both, _captions(closed, gain, both), strict=True):
-            drawn = save_figure(episode_figure(pair, metrics), path.with_name(f"{name}.png"))
-            path.with_name(f"{name}.svg").write_bytes(drawn)
+            drawn = episode_figure(pair, metrics)
+            save_figure(drawn, path.with_name(f"{name}.png"))
+            write_text(path.with_name(f"{name}.svg"), svg_of(drawn).decode("utf-8"))
             title = f"{gain['agent']} beside the target, {name}"
             texts.append({"file": f"{name}.svg", "title": title, "caption": caption})
     write_text(path, json.dumps(texts, indent=2) + "\n")

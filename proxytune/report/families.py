@@ -20,7 +20,7 @@ from proxytune.report.teaching import UNKNOWN, count, estimate_document
 from proxytune.report.text import file_texts, group_texts, note_texts, section_text
 from proxytune.report.view import Paragraphs, Picture, Table, View, columns_of
 from proxytune.report.wording import fixed, listed, short, span, with_span
-from proxytune.report.writing import save_figure
+from proxytune.report.writing import save_figure, svg_of
 from proxytune.study import BestFamilies, ComparedFamilies, Lesson, TunedFamily, settings_document
 from proxytune.usefulness import Assessment, Difference
 
@@ -250,8 +250,9 @@ def write_families_report(compared: ComparedFamilies) -> tuple[Path, Path]:
     """
     settings = compared.settings
     figure, page = settings.home / "figures" / "families.png", settings.home / "report.html"
-    drawn = save_figure(families_figure(compared), figure)
-    write_page(page, families_view(compared, drawn), study_foot(settings))
+    drawn = families_figure(compared)
+    save_figure(drawn, figure)
+    write_page(page, families_view(compared, svg_of(drawn)), study_foot(settings))
     return figure, page
 
 

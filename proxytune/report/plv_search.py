@@ -28,7 +28,7 @@ from proxytune.report.teaching import (
 from proxytune.report.text import file_texts, group_texts, table_text
 from proxytune.report.view import Paragraphs, Picture, Table, View, columns_of
 from proxytune.report.wording import listed, short
-from proxytune.report.writing import save_figure
+from proxytune.report.writing import save_figure, svg_of
 from proxytune.study import settings_document
 from proxytune.teaching import Experiment, PlvStudy, PlvTrial, best_teacher, plv_or_worst, saves_more, why_unknown
 
@@ -100,8 +100,9 @@ def write_plv_report(study: PlvStudy, folder: Path) -> tuple[Path, Path]:
         RunError: If a file cannot be written.
     """
     figure, page = folder / "figures" / "plv.png", folder / "report.html"
-    drawn = save_figure(plv_figure(study), figure)
-    write_page(page, plv_view(study, drawn), study_foot(study.settings))
+    drawn = plv_figure(study)
+    save_figure(drawn, figure)
+    write_page(page, plv_view(study, svg_of(drawn)), study_foot(study.settings))
     return figure, page
 
 

@@ -23,7 +23,7 @@ from proxytune.report.table_files import write_csv, write_latex
 from proxytune.report.text import group_texts, note_texts, table_text
 from proxytune.report.view import Column, Foot, Paragraphs, Picture, Table, View, columns_of
 from proxytune.report.wording import listed, short, short_span, with_span
-from proxytune.report.writing import file_names, save_figure
+from proxytune.report.writing import file_names, save_figure, svg_of
 from proxytune.usefulness import ALL, MEASURES, PPV, PRPV, Assessment, Measure, Measured, Selection, SuccessRates
 
 Row = tuple[str, str, str, str, str]
@@ -180,7 +180,8 @@ def write_score_report(
         file, title = ("", "") if selection is None else (f"_{files[name]}", f": {name}")
         for kind, figure, head, caption in drawn_scores(assessment):
             paths.append(folder / f"{kind}{file}.png")
-            pictures.append(Picture(f"{head}{title}", save_figure(figure, paths[-1]), caption))
+            save_figure(figure, paths[-1])
+            pictures.append(Picture(f"{head}{title}", svg_of(figure), caption))
     page = folder / "report.html"
     write_page(page, score_view(assessments, selection, pictures, target=target), foot)
     return paths, page

@@ -249,9 +249,8 @@ def figures_of_sweep(curves: Sequence[SweepCurve], truth: Theta | None) -> dict[
     return figures
 
 
-def draw_curves(curves: Sequence[SweepCurve], folder: Path, truth: Theta | None) -> list[Path]:
-    """Draw the figures of a sweep; return their paths."""
-    figures = figures_of_sweep(curves, truth)
+def draw_curves(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
+    """Write the figures of a sweep; return their paths."""
     for name, figure in figures.items():
         save_figure(figure, folder / f"{name}.png")
     return [folder / f"{name}.png" for name in figures]
@@ -271,23 +270,22 @@ def write_curves(curves: Sequence[SweepCurve], folder: Path) -> list[Path]:
 def write_sweep_page(
     settings: StudySettings,
     curves: Sequence[SweepCurve],
+    figures: Mapping[str, Figure],
     folder: Path,
     held: str,
     command: str,
-    truth: Theta | None = None,
 ) -> Path:
     """Write the page of curves that hold the same values beside their figures; return its path.
 
     Args:
         settings: The study's.
         curves: At least one.
+        figures: Theirs, by name, as `figures_of_sweep` has them; others may be among them.
         folder: Where the page goes.
         held: What the other parameters are held at, in words.
         command: The command that makes the page, as typed in a shell.
-        truth: The θ that made the target, where that is known.
     """
     names = [*_names_together(curves), *map(curve_name, curves)]
-    figures = figures_of_sweep(curves, truth)
     drawn = {name: svg_of(figures[name]) for name in names}
     view = sweep_view(settings.name, curves, drawn, f"{held[0].upper()}{held[1:]}")
     path = folder / f"{names[0]}.html"

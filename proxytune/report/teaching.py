@@ -18,7 +18,7 @@ from proxytune.report.html import write_page
 from proxytune.report.text import file_texts, group_texts, table_text
 from proxytune.report.view import Foot, Paragraphs, Part, Picture, Table, View, columns_of
 from proxytune.report.wording import fixed, listed, short, span
-from proxytune.report.writing import save_figure
+from proxytune.report.writing import save_figure, svg_of
 from proxytune.study import settings_document
 from proxytune.teaching import (
     Experiment,
@@ -229,9 +229,10 @@ def write_teach_report(experiment: Experiment, prpv: Predictivities, figure: Pat
     Raises:
         RunError: If a file cannot be written.
     """
-    drawn = save_figure(teach_figure(experiment), figure)
+    drawn = teach_figure(experiment)
+    save_figure(drawn, figure)
     page = figure.with_suffix(".html")
-    write_page(page, teach_view(experiment, prpv, drawn), foot)
+    write_page(page, teach_view(experiment, prpv, svg_of(drawn)), foot)
     return page
 
 

@@ -49,11 +49,8 @@ def write_text(path: Path, text: str) -> None:
     write_whole(path, "", lambda draft: draft.write_text(text, encoding="utf-8", newline="\n"))
 
 
-def save_figure(figure: Figure, path: Path) -> bytes:
+def save_figure(figure: Figure, path: Path) -> None:
     """Write a figure as PNG, and in the formats of `figures_also_as`; an interrupted write leaves the old file.
-
-    Returns:
-        The figure as a page shows it.
 
     Raises:
         RunError: If the figure cannot be written.
@@ -61,7 +58,6 @@ def save_figure(figure: Figure, path: Path) -> bytes:
     write_whole(path, "the figure ", lambda draft: _save_as(figure, draft, format="png", dpi=200))
     for form in _beside.get():
         write_whole(path.with_suffix(f".{form}"), "the figure ", partial(_draw, figure, form))
-    return svg_of(figure)
 
 
 def svg_of(figure: Figure) -> bytes:

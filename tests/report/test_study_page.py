@@ -11,7 +11,7 @@ from proxytune.report.html import page_html
 from proxytune.report.study.figures import convergence_figure
 from proxytune.report.study.page import RENEW_S, TITLES, live_view, study_foot, study_view, write_live_page
 from proxytune.report.study.sentence import finding_of, say_answer, say_finding, say_next_step
-from proxytune.report.writing import save_figure
+from proxytune.report.writing import svg_of
 from proxytune.storage import Store
 from proxytune.study import StudyRun, open_study, result_of
 
@@ -29,8 +29,8 @@ def text_of(result, figures=None):
 
 
 @pytest.fixture
-def figures(result, tmp_path):
-    return {"convergence": save_figure(convergence_figure(result), tmp_path / "convergence.png")}
+def figures(result):
+    return {"convergence": svg_of(convergence_figure(result))}
 
 
 def test_the_page_needs_nothing_else_and_is_small(result, figures):

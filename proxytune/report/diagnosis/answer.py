@@ -25,7 +25,7 @@ from proxytune.report.html import write_page
 from proxytune.report.meanings import findings
 from proxytune.report.text import group_texts, table_text
 from proxytune.report.view import Paragraphs, Part, Picture, Table, View, columns_of, foot_of
-from proxytune.report.writing import save_figure, write_text
+from proxytune.report.writing import save_figure, svg_of, write_text
 
 MOST_TRIED = 8
 """So many effects that were tried are in the table."""
@@ -109,7 +109,9 @@ def write_diagnosis(found: LogDiagnosis, folder: Path, command: str = "") -> lis
     write_text(document, text)
     write_text(model, extended_model_text(found))
     figures = {folder / f"{name}.png": figure for name, figure in diagnosis_figures(found).items()}
-    drawn = {path.stem: save_figure(figure, path) for path, figure in figures.items()}
+    for path, figure in figures.items():
+        save_figure(figure, path)
+    drawn = {path.stem: svg_of(figure) for path, figure in figures.items()}
     foot = foot_of(command, [("log", found.log), ("robot", found.robot.name)])
     write_page(page, diagnosis_view(found, drawn), foot)
     return [document, model, *figures, page]

@@ -41,7 +41,9 @@ def write_study_report(result: StudyResult, folder: Path, command: str = "") -> 
         RunError: If a file cannot be written.
     """
     figures = {folder / "figures" / f"{name}.png": figure for name, figure in study_figures(result).items()}
-    drawn, page = {path.stem: save_figure(figure, path) for path, figure in figures.items()}, folder / "report.html"
+    for path, figure in figures.items():
+        save_figure(figure, path)
+    drawn, page = {path.stem: svg_of(figure) for path, figure in figures.items()}, folder / "report.html"
     foot = study_foot(result.study.settings, command or None)
     write_page(page, study_view(result, drawn), foot)
     return list(figures), page

@@ -156,8 +156,6 @@ FAMILIES = "[families.right]\n[families.far.parameters]\ntrim = [-0.3, -0.29]\n"
 LESSONS = TEACHING.format(grid=ROOM["grid"], more="examinations = 10").split("[teaching.proxies.right]")[0]
 TIMES = ("seconds", "episodes", "seconds_per_episode", "seconds_per_episode_interval", "cheapest", "sentence")
 """Keys of what depends on how long something took, or is of this run alone; the sentence tells the cheapest family."""
-EACH = 40
-"""Episodes of a family's study."""
 TUNED = ("episode 10", "episode 30", "episode 20", "training 3", "exam 5", "rule 1", "exam 20")
 
 
@@ -180,11 +178,12 @@ def test_families_killed_in_a_search_and_in_lessons_come_to_the_same_but_for_tim
     folder = make_families(make_study, jobs)
     assert commands.run("study", folder) == 0, commands.printed
     whole = json.loads(commands.document)
+    homes = [folder / "families" / name for name in ("right", "far")]
+    of_right, of_far = (finished_episodes(home) for home in homes)
     shutil.rmtree(folder)
     make_families(make_study, jobs)
-    homes = [folder / "families" / name for name in ("right", "far")]
     kept = kill_at(commands, ("study", folder), TUNED, whom, lambda: [finished_episodes(home) for home in homes])
-    assert 0 < kept[0][0] < kept[1][0] < kept[2][0] == EACH, "within the search of the first family"
-    assert kept[1][1] == 0 < kept[2][1] < EACH, "within that of the second"
-    assert kept[3:] == [[EACH, EACH]] * 4, "in its lessons"
+    assert 0 < kept[0][0] < kept[1][0] < kept[2][0] == of_right, "within the search of the first family"
+    assert kept[1][1] == 0 < kept[2][1] < of_far, "within that of the second"
+    assert kept[3:] == [[of_right, of_far]] * 4, "in its lessons"
     assert but_for_times(json.loads(commands.document)) == but_for_times(whole)

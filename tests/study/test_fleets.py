@@ -168,8 +168,11 @@ def test_killed_in_the_middle_of_a_fleet_nothing_finished_is_driven_again_and_th
     for moment in (15, 60):
         process = Launched(launcher, folder)
         wait_for(folder, process, moment)
+        os.kill(process.pid, signal.SIGSTOP)  # so that no fleet ends between the look and the kill
         while sum(map(len, driven(journal))) - TRIED - lost <= finished_episodes(folder):
+            os.kill(process.pid, signal.SIGCONT)
             time.sleep(0.01)
+            os.kill(process.pid, signal.SIGSTOP)
         os.kill(process.pid, signal.SIGKILL)
         assert process.end()[0] == -signal.SIGKILL
         # Workers end a moment later.

@@ -2,10 +2,10 @@
 
 Each checkout, this one if none is named, is measured in processes of its own, in turns, so that all see the same
 machine. Times are of the processor, best of ROUNDS; a minute is one that a robot has driven. Bullet is told as a
-multiple of its bare steps too. Code that cannot drive robots side by side drives them one after the other.
+multiple of its bare steps too: those of the same drives, timed one by one in a run of their own. Code that cannot drive
+robots side by side drives them one after the other.
 """
 
-import importlib
 import json
 import os
 import resource
@@ -13,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +21,7 @@ SIZES = (1, 4, 16, 48)
 """Robots at once: of so many agents as make them with 4 starts each."""
 
 PLANTS, STARTS, ROUNDS = ("planar", "bullet"), 4, 3
-SECONDS = {"planar": 60.0, "bullet": 20.0}
-BARE_TICKS = 1200
+SECONDS = 60.0
 
 
 def measure(plant: str, robots: int, seconds: float) -> dict[str, float]:
@@ -47,25 +46,28 @@ def measure(plant: str, robots: int, seconds: float) -> dict[str, float]:
 
     drive(episodes)  # once for what is loaded and compiled
     found = {"ms": drive(episodes), "mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0}
-    return {**found, "bare": _bare_steps()} if plant == "bullet" else found
+    return {**found, "bare": _share_of_steps(lambda: drive(episodes)) * found["ms"]} if plant == "bullet" else found
 
 
-def _bare_steps() -> float:
-    """Milliseconds of a minute of nothing but PyBullet's steps, the robot driving along."""
-    import numpy as np
+def _share_of_steps(drive: Callable[[], float]) -> float:
+    """The share of PyBullet's own steps in the processor's time of drives: what is left if all else cost nothing."""
     import pybullet
 
-    from proxytune.driving import bullet
-    from proxytune.driving.episode import TICK_HZ
-    from proxytune.driving.robot import read_robot
+    step, spent = pybullet.stepSimulation, 0.0
 
-    own = getattr(bullet, "BulletPlant", None) or importlib.import_module("proxytune.driving.bullet.plant").BulletPlant
-    with own(read_robot("duckiebot"), np.array((0.9, 0.2, 0.0)), 1.0 / TICK_HZ) as plant:
-        plant.move(np.tile((0.2, 0.0, 0.4), (TICK_HZ, 1)))
+    def timed(*arguments: Any, **options: Any) -> None:
+        nonlocal spent
         begun = time.process_time()
-        for _ in range(BARE_TICKS):
-            pybullet.stepSimulation(plant._world)
-    return (time.process_time() - begun) / BARE_TICKS * 60 * TICK_HZ * 1e3
+        step(*arguments, **options)
+        spent += time.process_time() - begun
+
+    pybullet.stepSimulation = timed
+    begun = time.process_time()
+    try:
+        drive()
+    finally:
+        pybullet.stepSimulation = step
+    return spent / (time.process_time() - begun)
 
 
 def in_process(checkout: Path, plant: str, robots: int, seconds: float) -> dict[str, float]:
@@ -98,7 +100,7 @@ def main(checkouts: Sequence[str], sizes: Sequence[int] = SIZES, rounds: int = R
     places = [Path(one).resolve() for one in checkouts] or [Path(__file__).resolve().parents[1]]
     for plant in PLANTS:
         for robots in sizes:
-            turns = [[in_process(one, plant, robots, SECONDS[plant]) for one in places] for _ in range(rounds)]
+            turns = [[in_process(one, plant, robots, SECONDS) for one in places] for _ in range(rounds)]
             for place, found in zip(places, zip(*turns, strict=True), strict=True):
                 print(f"  {plant:7} {robots:2} robots  {place.name:12} {line(best(found))}", flush=True)
 

@@ -16,6 +16,8 @@ from pathlib import Path
 from platform import node, python_version
 from typing import Any, TextIO, cast
 
+import cloudpickle
+
 from proxytune.errors import InputError, RunError
 from proxytune.extensions import Packed, describe, folders, open_folders, pack, place_of, unpack
 from proxytune.identity import version_changes, versions_of
@@ -62,9 +64,9 @@ def recipe_of(work: Callable[..., Any], made_by: Mapping[str, str] | None = None
         NotSendableError: If it cannot be pickled.
     """
     try:
-        recipe = Recipe(pickle.dumps(work), tuple(sys.path), folders())
+        recipe = Recipe(cloudpickle.dumps(work), tuple(sys.path), folders())
     except Exception as problem:
-        remedy = "make it of classes and functions that a module has by name, without open files, or set jobs = 1"
+        remedy = "make it without open files, locks and connections, or set jobs = 1"
         line = f"what is to be run cannot be sent to other processes ({describe(problem)}){place_of(problem)}"
         raise NotSendableError(f"{line}; {remedy}") from problem
     return replace(recipe, packed=pack(recipe.own), made_by=tuple(made_by.items())) if made_by else recipe

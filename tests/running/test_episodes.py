@@ -1,5 +1,6 @@
 import itertools
 import os
+import threading
 
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
@@ -122,14 +123,21 @@ class Unloadable(Wobbly):
 
 
 def test_a_family_that_cannot_go_to_another_process_is_one_line():
+    class Held(Wobbly):
+        held = threading.Lock()
+
+    with pytest.raises(RunError, match=r"cannot be sent to other processes \(.*lock.*or set jobs = 1"):
+        run_all(Held(), 2)
+    assert len(run_all(Held(), 1)) == len(EPISODES)
+    with pytest.raises(RunError, match=r"another process cannot load .*No module named 'my_simulator' \(test_ep"):
+        run_all(Unloadable(), 2)
+
+
+def test_a_family_that_no_module_has_as_in_a_notebook_goes_to_other_processes():
     class Local(Wobbly):
         pass
 
-    with pytest.raises(RunError, match=r"cannot be sent to other processes \(.*Local.*or set jobs = 1"):
-        run_all(Local(), 2)
-    assert len(run_all(Local(), 1)) == len(EPISODES)
-    with pytest.raises(RunError, match=r"another process cannot load .*No module named 'my_simulator' \(test_ep"):
-        run_all(Unloadable(), 2)
+    assert run_all(Local(), 2) == run_all(Wobbly(), 1)
 
 
 def test_where_an_agent_s_exception_arose_is_told_with_the_failure():

@@ -10,7 +10,7 @@ on drives that were not fitted, and whether the names do worse than curves alone
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -166,6 +166,9 @@ RIDGES = (1e-3, 1e-2, 1e-1, 1.0)
 
 FIRMEST_ONLY = {"speed_and_turn": 0.1, "place": 0.01}
 """Curves over two signals are never pulled less than this: most of their knots are seldom visited."""
+
+MAP = "place"
+"""The group with the most weights by far: where the guard refuses curves with it, they are fitted without it."""
 
 FREE = 1e-6
 """The level is hardly pulled."""
@@ -333,21 +336,26 @@ def fit_discrepancy(drives: Drives, theta: Theta, promises: Callable[[Floats], b
     before = pose_errors(drives, theta, windows)[:, 0] ** 2 if blocks else np.empty(0)
     if blocks < drives.rules.discrepancy_blocks:
         return Discrepancy(held_out=before)
-    learnt, gains, folds = _fit_curves(drives, theta)
-    if not gains:
-        return Discrepancy(held_out=before)
-    after = _cross_validate(drives, theta, folds, windows)
-    if not promises(after):
-        return Discrepancy(held_out=after)
-    guard = _guard(drives, theta, folds, {FITTED_S: (before, after)})
-    total = sum(gains.values())
-    share = {GROUPS[group].title: gain / total for group, gain in gains.items()}
-    return Discrepancy(learnt, share, guard, _helps(guard, drives.rules), after)
+    offer = offer_curves(drives, theta)
+    for curves in (offer.curves, tuple(curve for curve in offer.curves if curve.group != MAP)):
+        learnt, gains, folds = _fit_curves(drives, theta, replace(offer, curves=curves))
+        if not gains:
+            return Discrepancy(held_out=before)
+        after = _cross_validate(drives, theta, folds, windows)
+        if not promises(after):
+            return Discrepancy(held_out=after)
+        guard = _guard(drives, theta, folds, {FITTED_S: (before, after)})
+        total = sum(gains.values())
+        share = {GROUPS[group].title: gain / total for group, gain in gains.items()}
+        fitted = Discrepancy(learnt, share, guard, _helps(guard, drives.rules), after)
+        if fitted.used or MAP not in gains:
+            break
+    return fitted
 
 
-def _fit_curves(drives: Drives, theta: Theta) -> tuple[Theta, Mapping[str, float], Sequence[Theta]]:
+def _fit_curves(drives: Drives, theta: Theta, offer: Learnt) -> tuple[Theta, Mapping[str, float], Sequence[Theta]]:
     """Fit the curves to all parts, with what each group gained, and without each fold in turn; by names in θ."""
-    offer, parts = offer_curves(drives, theta), _parts(drives)
+    parts = _parts(drives)
     names = np.array([curve.group for curve in offer.curves for _ in curve.knots])
     groups = {name: np.flatnonzero(names == name) for name in dict.fromkeys(names.tolist())}
     weights = np.zeros(sum(len(curve.knots) for curve in offer.curves))

@@ -204,14 +204,16 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
     spread = draws.std(axis=0)
     sign = signs[0]
     middle, ends = sign * centre, [interval(sign * draws[:, row]) for row in range(len(agents))]
+    most = np.zeros(len(agents))
     if len(columns) == 1 and is_rate(inputs.target, columns[0]):
         ends = rate_intervals(middle, counts)
+        most = _most_regrets(centre, np.sort(sign * np.array(ends), axis=1), middle)
     return Decision(
         winner=agents[place],
         probability_best=float(best[place]),
         expected_regret=dict(zip(agents, map(float, expected), strict=True)),
         regret_interval={
-            agent: _regret_ends(regret[:, row], best[row], len(agents)) for row, agent in enumerate(agents)
+            agent: _regret_ends(regret[:, row], best[row], len(agents), most[row]) for row, agent in enumerate(agents)
         },
         best_probabilities=dict(zip(agents, map(float, best), strict=True)),
         not_told_apart=tuple(agents[row] for row in held if row != place),
@@ -227,10 +229,26 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
     )
 
 
-def _regret_ends(regret: Floats, best: float, agents: int) -> Ends:
+def _regret_ends(regret: Floats, best: float, agents: int, most: float) -> Ends:
     """An agent's 95 % interval: none at all belongs to it unless the agent is very unlikely to be the best."""
     low, high = interval(regret)
-    return (0.0 if best > BARELY_BEST / agents**2 else low), high
+    return (0.0 if best > BARELY_BEST / agents**2 else low), max(high, most)
+
+
+def _most_regrets(centre: Floats, ends: Floats, rates: Floats) -> Floats:
+    """The upper ends of regrets of agents that, or whose best rival, always or never succeeded; 0 of all others.
+
+    There the prior pulls draws away from rates that are at the end of what can be. The ends follow from those of both
+    rates (Zou and Donner, 2008, "Construction of confidence limits about effect measures").
+
+    Args:
+        centre: Means, more being better (agents,).
+        ends: Intervals of these (agents, 2).
+        rates: The share that succeeded (agents,).
+    """
+    best, settled = int(centre.argmax()), (rates <= 0.0) | (rates >= 1.0)
+    reach = np.hypot(ends[best, 1] - centre[best], centre - ends[:, 0])
+    return np.asarray(np.where(settled | settled[best], centre[best] - centre + reach, 0.0))
 
 
 def chosen(inputs: Comparison, decide_on: str) -> tuple[list[int], str]:

@@ -107,6 +107,16 @@ def test_the_regret_of_equal_agents_is_held_as_often_as_is_said(monkeypatch):
     assert np.mean(held) > 0.93
 
 
+@pytest.mark.parametrize("direction", ["max", "min"])
+def test_the_regret_of_an_agent_that_never_succeeded_may_be_all_that_there_is(direction):
+    """The uniform prior alone holds that of rates of 1 and 0 after 10 rollouts in half of the cases."""
+    scores = counted([10, 0, 5], 10)
+    found = decided(scores, scores, [Metric("success", direction)])
+    worst = "agent 1" if direction == "max" else "agent 0"
+    assert found.regret_interval[worst][1] >= 1.0
+    assert found.regret_interval["agent 2"][1] < 0.9
+
+
 def test_a_tie_in_the_proxy_is_told_and_costs_what_the_worse_costs():
     proxy, target = means(["success"], a=(0.9,), b=(0.9,), c=(0.1,)), means(["success"], a=(0.5,), b=(0.7,), c=(0.1,))
     observed = decided(proxy, target).observed

@@ -146,7 +146,7 @@ def main():
     parser.add_argument("--runs", type=int, default=2000)
     runs, started = parser.parse_args().runs, time.process_time()
     decision.DRAWS = DRAWS
-    print(f"# Decisions of made-up evaluations, {runs} a setting\n\n{DRAWS} draws a decision, instead of 10 000.\n")
+    print(f"# Decisions of made-up evaluations, {runs} a setting\n\n{DRAWS} draws a decision, instead of 40 000.\n")
     print("## Truths from the stated prior (uniform), target alone\n")
     head = (
         "held: scores | held: regret | regret said | regret found | best said | best found | set holds best | set size"

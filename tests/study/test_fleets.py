@@ -1,5 +1,6 @@
 """A study driven in fleets comes to what it comes to episode by episode, whatever its agents do and however it ends."""
 
+import functools
 import json
 import os
 import signal
@@ -97,10 +98,8 @@ def test_an_agent_that_remembers_by_its_memory_alone_is_driven_beside_others(mak
     assert (known["tried"], known["why"]) == ([f"agent{number}" for number in range(6)], {})
 
 
-def test_a_family_that_runs_one_episode_at_a_time_tries_no_agent(make_study, capsys):
-    folder = make_study()
-    document(folder, capsys)
-    with Store.read(folder) as store:
+def test_a_family_that_runs_one_episode_at_a_time_tries_no_agent(finished):
+    with Store.read(finished) as store:
         assert "apart" not in store.facts()
 
 
@@ -185,7 +184,13 @@ def test_killed_in_the_middle_of_a_fleet_nothing_finished_is_driven_again_and_th
     assert sum(map(len, driven(journal))) - TRIED - finished_episodes(folder) == lost
 
 
-def pruned(folder, **changes):
+@pytest.fixture(scope="module")
+def one_by_one(make_studies):
+    """The trials of a study with pruning, agent by agent, and what it cost, by its changes; run once for each."""
+    return functools.cache(lambda **keys: pruned(ordered_study(make_studies, f"alone{len(keys)}", **keys)))
+
+
+def pruned(folder):
     """The trials of a study with pruning, and how many episodes it took."""
     study = open_study(folder)
     with Store.open(folder) as store:
@@ -197,10 +202,10 @@ def pruned(folder, **changes):
 @pytest.mark.parametrize("wave", [pytest.param(1, marks=pytest.mark.slow), 16, 1000])
 @pytest.mark.parametrize("keys", [{}, {"batch": "3"}, pytest.param({"jobs": "2"}, marks=pytest.mark.slow)])
 def test_waves_of_any_size_prune_the_trials_that_agent_by_agent_prunes_at_the_same_agents(
-    make_study, monkeypatch, wave, keys
+    make_study, one_by_one, monkeypatch, wave, keys
 ):
     """Those beside the last agent that was needed are driven in vain, and no trial stands on them."""
-    expected, least = pruned(ordered_study(make_study, "one_by_one", **{**keys, "jobs": "1"}))
+    expected, least = one_by_one(**{key: value for key, value in keys.items() if key != "jobs"})
     monkeypatch.setattr("proxytune.study.study_run.WAVE", wave)
     found, spent = pruned(ordered_study(make_study, family='"partly_dead:ordered_fleet"', **keys))
     assert found == expected

@@ -20,7 +20,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 # A run in the background ignores Ctrl-C; tests mean it to be heeded, as in a terminal.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
-FUZZ = 1000
+FUZZ = 500
 """How many files of each kind are spoilt in tests/fuzzing, if nobody says otherwise."""
 
 

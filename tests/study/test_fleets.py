@@ -5,6 +5,8 @@ import json
 import os
 import signal
 import time
+from contextlib import redirect_stdout
+from io import StringIO
 
 import pytest
 from launched import Launched, launching
@@ -32,9 +34,14 @@ def launcher():
 
 
 def document(folder, capsys):
-    """The study's document, without where it lies, how long it took, and in how many processes."""
+    """What `study` prints, as far as it lasts."""
     assert main(["study", str(folder), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out.replace(str(folder), ""))
+    return lasting(capsys.readouterr().out, folder)
+
+
+def lasting(printed, folder):
+    """A document without where the study lies, how long it took, and in how many processes."""
+    found = json.loads(printed.replace(str(folder), ""))
     del found["seconds"], found["settings"]["jobs"]
     return found
 
@@ -44,16 +51,31 @@ def driven(journal):
     return [line.split()[2].split("+") for line in journal.read_text().splitlines()]
 
 
+@pytest.fixture(scope="module")
+def undisturbed(make_studies):
+    """The folder and the document of a study that nothing disturbs, by its changes; each is run once."""
+
+    def run(**changes):
+        folder = make_studies("_".join(["whole", *changes]), **FAMILY, **changes)
+        with redirect_stdout(StringIO()) as printed:
+            assert main(["study", str(folder), "--json"]) == 0
+        return folder, lasting(printed.getvalue(), folder)
+
+    return functools.cache(run)
+
+
 @pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.slow), pytest.param(3, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("most", [pytest.param(1, marks=pytest.mark.slow), 5, pytest.param(48, marks=pytest.mark.slow)])
-def test_fleets_of_any_size_and_any_number_of_jobs_give_the_same_document(make_study, capsys, monkeypatch, jobs, most):
-    whole = document(make_study("whole", **FAMILY, **PHASES), capsys)
+def test_fleets_of_any_size_and_any_number_of_jobs_give_the_same_document(
+    make_study, undisturbed, capsys, monkeypatch, jobs, most
+):
+    alone, whole = undisturbed(**PHASES)
     monkeypatch.setattr("proxytune.running.episodes.MOST", most)
     monkeypatch.setattr("proxytune.running.episodes.UNKNOWN", most)
     journal = make_study("other").parent / "journal"
     folder = make_study("other", jobs=str(jobs), domain={"journal": f'"{journal}"'}, **FAMILY, **PHASES)
     assert document(folder, capsys) == whole
-    assert episodes(folder) == episodes(folder.with_name("whole"))
+    assert episodes(folder) == episodes(alone)
     assert max(map(len, driven(journal))) <= max(2, most)
     assert most == 1 or max(map(len, driven(journal))) > 2
 
@@ -132,14 +154,15 @@ FAULTS = {
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", ["1", "2"])
 @pytest.mark.parametrize("fault", FAULTS)
-def test_what_one_agent_does_wrong_is_said_of_it_alone_and_the_others_score_as_ever(make_study, jobs, fault):
+def test_what_one_agent_does_wrong_is_said_of_it_alone_and_the_others_score_as_ever(
+    make_study, undisturbed, jobs, fault
+):
     if (fault, jobs) == ("hangs", "2"):
         pytest.skip("joblib's processes are given half a minute more; see tests/running/test_fleets.py")
     limit = {"episode_timeout_s": "1.5"} if fault == "hangs" else {}
-    changes = {**FAMILY, **limit, "budget": "2", "initial": "2", "jobs": jobs}
-    whole = make_study("whole", **changes)
-    assert main(["study", str(whole), "--json"]) == 0
-    folder = make_study(domain={"faults": f'["agent1:1:{fault}"]'}, **changes)
+    few = {"budget": "2", "initial": "2"}
+    whole, _ = undisturbed(**few)
+    folder = make_study(domain={"faults": f'["agent1:1:{fault}"]'}, jobs=jobs, **FAMILY, **limit, **few)
     for _ in range(3):
         process = start("study", folder, "--json")
         out, said = process.communicate(timeout=300)
@@ -157,11 +180,9 @@ def test_what_one_agent_does_wrong_is_said_of_it_alone_and_the_others_score_as_e
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_killed_in_the_middle_of_a_fleet_nothing_finished_is_driven_again_and_the_result_is_the_same(
-    make_study, launcher, jobs
+    make_study, undisturbed, launcher, tmp_path, jobs
 ):
-    whole = make_study("whole", **FAMILY)
-    assert main(["study", str(whole), "--json"]) == 0
-    journal = whole.with_name("journal")
+    (whole, _), journal = undisturbed(), tmp_path / "journal"
     folder = make_study("stopped", domain={"sleep": "0.3", "journal": f'"{journal}"'}, jobs=jobs, **FAMILY)
     lost = 0
     for moment in (15, 60):

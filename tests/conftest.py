@@ -4,11 +4,13 @@ import os
 import shutil
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from importlib.util import find_spec
+from io import BytesIO
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 HERE = Path(__file__).resolve().parent
 # Stand-ins; and what the benchmarks have: cases with hidden effects, problems of a search.
@@ -18,7 +20,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 # A run in the background ignores Ctrl-C; tests mean it to be heeded, as in a terminal.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
-FUZZ = 1000
+FUZZ = 500
 """How many files of each kind are spoilt in tests/fuzzing, if nobody says otherwise."""
 
 
@@ -28,10 +30,42 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 @pytest.fixture(autouse=True)
+def _forget_folders() -> Iterator[None]:
+    """Forget where a test's modules lay: a search for plug-ins looks at every folder that is still known."""
+    path = list(sys.path)
+    homes = {name for name in sys.modules if name.startswith("beside_")}
+    yield
+    sys.path[:] = path
+    for name in [name for name in sys.modules if name.startswith("beside_") and name not in homes]:
+        del sys.modules[name]
+
+
+@pytest.fixture(autouse=not find_spec("pybullet"))
 def _skip_without_pybullet(monkeypatch: pytest.MonkeyPatch) -> None:
     """Skip what turns out to need PyBullet where it is not installed, with the reason that a user is told."""
-    if find_spec("pybullet") is None:
-        monkeypatch.setattr("proxytune.driving.bullet.InputError", pytest.skip)
+    monkeypatch.setattr("proxytune.driving.bullet.InputError", pytest.skip)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _blank_figures(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Save figures blank in the quick run, where they cost half the time; tests/report and modules `drawn` do not."""
+    quick = request.config.getoption("markexpr") == "not slow"
+    if not quick or "report" in request.path.parts or request.node.get_closest_marker("drawn"):
+        yield
+        return
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("matplotlib.figure.Figure.savefig", blank)
+        yield
+
+
+def blank(figure: object, where: Path | BytesIO, *, format: str, **how: object) -> None:
+    """Save a figure as `Figure.savefig` does, with nothing on it."""
+    image = BytesIO()
+    if format == "png":
+        Image.new("RGB", (4, 3)).save(image, "png")
+    else:
+        image.write(b'<svg xmlns="http://www.w3.org/2000/svg"></svg>' if format == "svg" else b"%PDF-1.4")
+    where.write_bytes(image.getvalue()) if isinstance(where, Path) else where.write(image.getvalue())
 
 
 STUDY = {

@@ -100,6 +100,8 @@ def check_runs(module: str) -> None:
 TYPED = dict.fromkeys(("diagnose", "predict", "export"), ", or name it yourself, as in --effects module:Attribute")
 """How a command is told what to run nevertheless, where it can be."""
 PREFIX = "beside_"
+_homes: dict[str, None] = {}
+"""The names of the packages that stand for folders, in the order of their imports."""
 
 
 def import_beside(module: str, folder: Path) -> ModuleType:
@@ -123,8 +125,7 @@ def import_beside(module: str, folder: Path) -> ModuleType:
 
 def folders() -> tuple[str, ...]:
     """The folders whose modules this process has imported; another process needs them to unpickle what came of them."""
-    homes = [module for name, module in list(sys.modules.items()) if name.startswith(PREFIX) and "." not in name]
-    return tuple(folder for home in homes for folder in home.__path__)
+    return tuple(folder for home in _homes if home in sys.modules for folder in sys.modules[home].__path__)
 
 
 def open_folders(known: Sequence[str]) -> None:
@@ -141,6 +142,7 @@ def _home(folder: str) -> str:
         home = ModuleType(name, f"The modules of {folder}.")
         home.__path__ = [folder]
         sys.modules[name] = home
+        _homes[name] = None
     if _Finder not in sys.meta_path:
         sys.meta_path.insert(0, _Finder)
     return name

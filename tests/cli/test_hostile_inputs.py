@@ -10,6 +10,7 @@ from processes import besides_progress
 from proxytune.cli.main import main
 from proxytune.report.writing import file_names
 
+pytestmark = pytest.mark.drawn
 TABLE = "agent,episode,d\n" + "".join(f"{a},{e},{i + 0.1 * e}\n" for i, a in enumerate("ABC") for e in (0, 1))
 
 

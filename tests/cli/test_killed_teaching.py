@@ -117,8 +117,10 @@ def taught(make_studies, commands):
     return make
 
 
-@pytest.mark.parametrize(("jobs", "whom"), KILLED)
-@pytest.mark.parametrize("name", TAUGHT)
+@pytest.mark.parametrize(
+    ("name", "jobs", "whom"),
+    [("every count", *KILLED[0]), ("chosen", *KILLED[1]), *(("learner drives", *killed) for killed in KILLED)],
+)
 def test_teaching_killed_again_and_again_prints_the_same_document_to_the_byte(taught, commands, name, jobs, whom):
     folder, whole = taught(name, jobs)
     kill_at(commands, ("teach", folder), TAUGHT[name][1], whom)

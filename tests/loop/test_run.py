@@ -93,12 +93,23 @@ def test_before_and_after_come_with_interval_and_floor(closed_once):
     assert page.count('<svg class="drawn"') == 1
 
 
-@pytest.fixture
-def righting(closed, diagnosed, close):
+@pytest.fixture(scope="module")
+def righted_once(closed_once, tmp_path_factory):
     """A closed loop with other held-out agents, one of which is righted, and its document."""
-    study = closed / "study.toml"
+    folder, lines = Path(shutil.copytree(closed_once[0], tmp_path_factory.mktemp("righted") / "tiny")), []
+    study = folder / "study.toml"
     study.write_text(study.read_text().replace(*RIGHTING))
-    return closed, close(closed)
+    with pytest.MonkeyPatch.context() as patch:
+        give_a_diagnosis(patch)
+        patch.setattr("builtins.print", lambda *words, **_: lines.append(" ".join(map(str, words))))
+        assert main(["loop", str(folder), "--json"]) == 0
+    return folder, json.loads(lines[-1])
+
+
+@pytest.fixture
+def righting(righted_once, diagnosed, tmp_path):
+    """The same in a folder of one's own."""
+    return Path(shutil.copytree(righted_once[0], tmp_path / "tiny")), righted_once[1]
 
 
 def captions_of_episodes(folder):

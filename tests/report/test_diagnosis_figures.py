@@ -14,7 +14,7 @@ from matplotlib.text import Text
 sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
 
 import hidden_cases as hidden
-from planted import TRUTH, planted_drives
+from planted import ROBOT, TRUTH, planted_drives
 
 import proxytune
 from proxytune.diagnosis import (
@@ -33,7 +33,6 @@ from proxytune.diagnosis.motion.discrepancy import Discrepancy
 from proxytune.diagnosis.motion.innovations import huber
 from proxytune.diagnosis.motion.screening import candidates
 from proxytune.diagnosis.motion.signals import signal_groups
-from proxytune.driving import read_robot
 from proxytune.effects import GROUPS, FittedRange, Learnt, LearntCurve, Means, Panel, learnt_theta, theta_names
 from proxytune.effects.catalogue import CATALOGUE
 from proxytune.effects.effect import MOTIONS, SIGNALS
@@ -64,7 +63,7 @@ AFTER = "with dead band"
 @pytest.fixture(scope="module")
 def diagnosis():
     case = next(case for case in hidden.IN_FORM if case.effects == (("dead_band", {"width": WIDTH}),))
-    found = diagnose(hidden.make_log(case, episodes=6, seconds=20.0), read_robot("duckiebot"), ("trim", "delay"))
+    found = diagnose(hidden.make_log(case, episodes=6, seconds=20.0), ROBOT, ("trim", "delay"))
     assert [effect.effect for effect in found.effects] == ["dead_band"]
     return found
 
@@ -76,7 +75,13 @@ def clean(diagnosis):
 
 @pytest.fixture(scope="module")
 def figures(diagnosis):
-    return motion_figures(diagnosis)
+    """Every figure, drawn once without a warning."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        figures = motion_figures(diagnosis)
+        for figure in figures.values():
+            figure.draw_without_rendering()
+    return figures
 
 
 def without_effects(diagnosis, unnamed_curves=()):
@@ -101,25 +106,18 @@ def values(axes, label):
     return np.asarray(drawn.get_xdata()), np.asarray(drawn.get_ydata())
 
 
-def test_every_figure_is_drawn_without_a_warning(diagnosis):
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        figures = motion_figures(diagnosis)
-        for figure in figures.values():
-            figure.draw_without_rendering()
+def test_every_figure_is_drawn_without_a_warning(figures):
     assert set(figures) == {"residual_over_time", "residual_map", "ranking", "effect_curve", "error"}
 
 
 def test_figures_are_as_wide_as_a_column_with_type_of_six_points_and_more(figures):
     for figure in figures.values():
         assert figure.get_figwidth() * 25.4 == pytest.approx(85.0)
-        figure.draw_without_rendering()
         assert min(text.get_fontsize() for text in figure.findobj(Text) if text.get_text()) >= 6.0
 
 
 def test_the_legend_lies_within_its_figure_and_on_no_label(figures):
     for figure in figures.values():
-        figure.draw_without_rendering()
         labels = [label for axes in figure.axes for label in (axes.xaxis.label, axes.yaxis.label) if label.get_text()]
         for legend in figure.legends:
             box = legend.get_window_extent()
@@ -130,7 +128,6 @@ def test_the_legend_lies_within_its_figure_and_on_no_label(figures):
 
 def test_no_label_is_cut_by_the_figure_s_edge(figures):
     for name, figure in figures.items():
-        figure.draw_without_rendering()
         for axes in figure.axes:
             for text in filter(Text.get_text, (axes.xaxis.label, axes.yaxis.label, axes.title)):
                 box = text.get_window_extent()
@@ -365,7 +362,7 @@ def test_means_are_drawn_over_a_signal_that_has_a_figure_of_its_own():
     assert all(one.cue in CUE_PANELS and one.panels for one in means)
 
 
-EVERY = candidates(read_robot("duckiebot"), {}, ("trim", "delay"))
+EVERY = candidates(ROBOT, {}, ("trim", "delay"))
 FORMS = [one for one in EVERY if one.form not in ("left wheel", "right wheel") or one.label == "dead_band (left wheel)"]
 
 
@@ -375,7 +372,6 @@ def test_each_form_of_an_effect_bends_its_curve(diagnosis, candidate):
     for coordinate, probe in zip(candidate.free, candidate.probes[-2], strict=True):
         theta |= dict.fromkeys(coordinate, probe)
     figure = effect_curve(with_effect(diagnosis, candidate.effect, candidate.form, theta))
-    figure.draw_without_rendering()
     label = f"with {candidate.effect.replace('_', ' ')}"
     bent = 0.0
     for axes in figure.axes:

@@ -22,10 +22,10 @@ from proxytune.storage import Store, TrialRecord
 from proxytune.study import StudyRun, open_study, result_of
 
 
-@pytest.fixture
-def result(finished):
-    with Store.read(finished) as store:
-        return result_of(StudyRun(open_study(finished), store))
+@pytest.fixture(scope="module")
+def result(finished_once):
+    with Store.read(finished_once) as store:
+        return result_of(StudyRun(open_study(finished_once), store))
 
 
 def lines(figure):
@@ -116,11 +116,11 @@ def test_convergence_can_be_read_in_one_column_of_a_paper(result):
     assert min(text.get_fontsize() for text in texts) >= 7.0
 
 
-@pytest.fixture
-def learnt(finished):
+@pytest.fixture(scope="module")
+def learnt(finished_once):
     """θ is known to be delay 0.12 and trim 0.1."""
-    with Store.read(finished) as store:
-        return planted(result_of(StudyRun(open_study(finished), store)))
+    with Store.read(finished_once) as store:
+        return planted(result_of(StudyRun(open_study(finished_once), store)))
 
 
 def test_the_density_is_highest_where_theta_is_known_to_be_and_adds_up_to_one(learnt):
@@ -241,10 +241,10 @@ def test_trials_and_their_key_can_be_read_in_one_column_of_a_paper(learnt):
     assert [text.get_text() for text in key.get_legend().get_texts()] == ["95 % region", "answer"]
 
 
-@pytest.fixture
-def weighed(finished):
-    with Store.read(finished) as store:
-        found = result_of(StudyRun(open_study(finished), store))
+@pytest.fixture(scope="module")
+def weighed(finished_once):
+    with Store.read(finished_once) as store:
+        found = result_of(StudyRun(open_study(finished_once), store))
     planted = (Importance("delay", 0.25, (0.1, 0.4), 0.125), Importance("trim", 0.75, (0.5, 1.0), 0.5))
     return replace(found, importances=planted)
 

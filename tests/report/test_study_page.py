@@ -18,17 +18,17 @@ from proxytune.study import StudyRun, open_study, result_of
 EVIL = "<script>alert(1)</script>"
 
 
-@pytest.fixture
-def result(finished):
-    with Store.read(finished) as store:
-        return result_of(StudyRun(open_study(finished), store))
+@pytest.fixture(scope="module")
+def result(finished_once):
+    with Store.read(finished_once) as store:
+        return result_of(StudyRun(open_study(finished_once), store))
 
 
 def text_of(result, figures=None):
     return page_html(study_view(result, figures or {}), study_foot(result.study.settings))
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def figures(result):
     return {"convergence": svg_of(convergence_figure(result))}
 

@@ -28,10 +28,10 @@ from proxytune.study import Preflight, StudyRun, open_study, result_of, run_tria
 from proxytune.study.preflight import Movement
 
 
-@pytest.fixture
-def result(finished):
-    with Store.read(finished) as store:
-        return result_of(StudyRun(open_study(finished), store))
+@pytest.fixture(scope="module")
+def result(finished_once):
+    with Store.read(finished_once) as store:
+        return result_of(StudyRun(open_study(finished_once), store))
 
 
 def row_of(table, name):
@@ -256,10 +256,10 @@ def test_failed_episodes_are_told_with_the_first_of_them(make_study):
     assert study_document(result)["trials"][0]["failed_episodes"] == 1
 
 
-@pytest.fixture
-def known(finished):
-    with Store.read(finished) as store:
-        return planted(replace(result_of(StudyRun(open_study(finished), store)), cautions=()))
+@pytest.fixture(scope="module")
+def known(finished_once):
+    with Store.read(finished_once) as store:
+        return planted(replace(result_of(StudyRun(open_study(finished_once), store)), cautions=()))
 
 
 def test_a_row_has_the_best_value_its_interval_what_is_as_good_and_the_box(known):

@@ -45,15 +45,16 @@ def curve(folder, parameter="trim", base=TRUTH, model=None):
         return curve_of(StudyRun(study, store), plan)
 
 
-@pytest.fixture
-def with_pod(make_study, tmp_path):
-    (tmp_path / "truth.toml").write_text("trim = 0.1\ndelay = 0.12\n")
-    return curve(make_study(family='"echo:echo"'), model=tmp_path / "truth.toml")
+@pytest.fixture(scope="module")
+def with_pod(make_studies):
+    folder = make_studies("echo", family='"echo:echo"')
+    (folder.parent / "truth.toml").write_text("trim = 0.1\ndelay = 0.12\n")
+    return curve(folder, model=folder.parent / "truth.toml")
 
 
-@pytest.fixture
-def swept(make_study):
-    return curve(make_study())
+@pytest.fixture(scope="module")
+def swept(make_studies):
+    return curve(make_studies())
 
 
 def test_the_document_is_plain_json_with_a_point_per_value(swept):

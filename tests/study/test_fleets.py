@@ -1,9 +1,12 @@
 """A study driven in fleets comes to what it comes to episode by episode, whatever its agents do and however it ends."""
 
+import functools
 import json
 import os
 import signal
 import time
+from contextlib import redirect_stdout
+from io import StringIO
 
 import pytest
 from launched import Launched, launching
@@ -31,9 +34,14 @@ def launcher():
 
 
 def document(folder, capsys):
-    """The study's document, without where it lies, how long it took, and in how many processes."""
+    """What `study` prints, as far as it lasts."""
     assert main(["study", str(folder), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out.replace(str(folder), ""))
+    return lasting(capsys.readouterr().out, folder)
+
+
+def lasting(printed, folder):
+    """A document without where the study lies, how long it took, and in how many processes."""
+    found = json.loads(printed.replace(str(folder), ""))
     del found["seconds"], found["settings"]["jobs"]
     return found
 
@@ -43,16 +51,31 @@ def driven(journal):
     return [line.split()[2].split("+") for line in journal.read_text().splitlines()]
 
 
+@pytest.fixture(scope="module")
+def undisturbed(make_studies):
+    """The folder and the document of a study that nothing disturbs, by its changes; each is run once."""
+
+    def run(**changes):
+        folder = make_studies("_".join(["whole", *changes]), **FAMILY, **changes)
+        with redirect_stdout(StringIO()) as printed:
+            assert main(["study", str(folder), "--json"]) == 0
+        return folder, lasting(printed.getvalue(), folder)
+
+    return functools.cache(run)
+
+
 @pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.slow), pytest.param(3, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("most", [pytest.param(1, marks=pytest.mark.slow), 5, pytest.param(48, marks=pytest.mark.slow)])
-def test_fleets_of_any_size_and_any_number_of_jobs_give_the_same_document(make_study, capsys, monkeypatch, jobs, most):
-    whole = document(make_study("whole", **FAMILY, **PHASES), capsys)
+def test_fleets_of_any_size_and_any_number_of_jobs_give_the_same_document(
+    make_study, undisturbed, capsys, monkeypatch, jobs, most
+):
+    alone, whole = undisturbed(**PHASES)
     monkeypatch.setattr("proxytune.running.episodes.MOST", most)
     monkeypatch.setattr("proxytune.running.episodes.UNKNOWN", most)
     journal = make_study("other").parent / "journal"
     folder = make_study("other", jobs=str(jobs), domain={"journal": f'"{journal}"'}, **FAMILY, **PHASES)
     assert document(folder, capsys) == whole
-    assert episodes(folder) == episodes(folder.with_name("whole"))
+    assert episodes(folder) == episodes(alone)
     assert max(map(len, driven(journal))) <= max(2, most)
     assert most == 1 or max(map(len, driven(journal))) > 2
 
@@ -97,10 +120,8 @@ def test_an_agent_that_remembers_by_its_memory_alone_is_driven_beside_others(mak
     assert (known["tried"], known["why"]) == ([f"agent{number}" for number in range(6)], {})
 
 
-def test_a_family_that_runs_one_episode_at_a_time_tries_no_agent(make_study, capsys):
-    folder = make_study()
-    document(folder, capsys)
-    with Store.read(folder) as store:
+def test_a_family_that_runs_one_episode_at_a_time_tries_no_agent(finished):
+    with Store.read(finished) as store:
         assert "apart" not in store.facts()
 
 
@@ -133,14 +154,15 @@ FAULTS = {
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", ["1", "2"])
 @pytest.mark.parametrize("fault", FAULTS)
-def test_what_one_agent_does_wrong_is_said_of_it_alone_and_the_others_score_as_ever(make_study, jobs, fault):
+def test_what_one_agent_does_wrong_is_said_of_it_alone_and_the_others_score_as_ever(
+    make_study, undisturbed, jobs, fault
+):
     if (fault, jobs) == ("hangs", "2"):
         pytest.skip("joblib's processes are given half a minute more; see tests/running/test_fleets.py")
     limit = {"episode_timeout_s": "1.5"} if fault == "hangs" else {}
-    changes = {**FAMILY, **limit, "budget": "2", "initial": "2", "jobs": jobs}
-    whole = make_study("whole", **changes)
-    assert main(["study", str(whole), "--json"]) == 0
-    folder = make_study(domain={"faults": f'["agent1:1:{fault}"]'}, **changes)
+    few = {"budget": "2", "initial": "2"}
+    whole, _ = undisturbed(**few)
+    folder = make_study(domain={"faults": f'["agent1:1:{fault}"]'}, jobs=jobs, **FAMILY, **limit, **few)
     for _ in range(3):
         process = start("study", folder, "--json")
         out, said = process.communicate(timeout=300)
@@ -158,11 +180,9 @@ def test_what_one_agent_does_wrong_is_said_of_it_alone_and_the_others_score_as_e
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_killed_in_the_middle_of_a_fleet_nothing_finished_is_driven_again_and_the_result_is_the_same(
-    make_study, launcher, jobs
+    make_study, undisturbed, launcher, tmp_path, jobs
 ):
-    whole = make_study("whole", **FAMILY)
-    assert main(["study", str(whole), "--json"]) == 0
-    journal = whole.with_name("journal")
+    (whole, _), journal = undisturbed(), tmp_path / "journal"
     folder = make_study("stopped", domain={"sleep": "0.3", "journal": f'"{journal}"'}, jobs=jobs, **FAMILY)
     lost = 0
     for moment in (15, 60):
@@ -185,7 +205,13 @@ def test_killed_in_the_middle_of_a_fleet_nothing_finished_is_driven_again_and_th
     assert sum(map(len, driven(journal))) - TRIED - finished_episodes(folder) == lost
 
 
-def pruned(folder, **changes):
+@pytest.fixture(scope="module")
+def one_by_one(make_studies):
+    """The trials of a study with pruning, agent by agent, and what it cost, by its changes; run once for each."""
+    return functools.cache(lambda **keys: pruned(ordered_study(make_studies, f"alone{len(keys)}", **keys)))
+
+
+def pruned(folder):
     """The trials of a study with pruning, and how many episodes it took."""
     study = open_study(folder)
     with Store.open(folder) as store:
@@ -197,10 +223,10 @@ def pruned(folder, **changes):
 @pytest.mark.parametrize("wave", [pytest.param(1, marks=pytest.mark.slow), 16, 1000])
 @pytest.mark.parametrize("keys", [{}, {"batch": "3"}, pytest.param({"jobs": "2"}, marks=pytest.mark.slow)])
 def test_waves_of_any_size_prune_the_trials_that_agent_by_agent_prunes_at_the_same_agents(
-    make_study, monkeypatch, wave, keys
+    make_study, one_by_one, monkeypatch, wave, keys
 ):
     """Those beside the last agent that was needed are driven in vain, and no trial stands on them."""
-    expected, least = pruned(ordered_study(make_study, "one_by_one", **{**keys, "jobs": "1"}))
+    expected, least = one_by_one(**{key: value for key, value in keys.items() if key != "jobs"})
     monkeypatch.setattr("proxytune.study.study_run.WAVE", wave)
     found, spent = pruned(ordered_study(make_study, family='"partly_dead:ordered_fleet"', **keys))
     assert found == expected

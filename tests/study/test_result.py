@@ -63,8 +63,15 @@ def confirmed(folder, watcher=None, **changes):
         return spent, result_of(StudyRun(study, store))
 
 
-def test_the_answer_is_told_with_its_score_on_episodes_that_the_search_has_not_seen(finished):
-    spent, found = confirmed(finished)
+@pytest.fixture(scope="module")
+def once(finished_once, tmp_path_factory):
+    """A study that was confirmed once, by who watched what it cost and found; only to be read."""
+    folder, watcher = shutil.copytree(finished_once, tmp_path_factory.mktemp("once") / "study"), Stopping()
+    return watcher, *confirmed(folder, watcher)
+
+
+def test_the_answer_is_told_with_its_score_on_episodes_that_the_search_has_not_seen(once):
+    watcher, spent, found = once
     answer = found.confirmation.answer
     assert found.best.trial == answer.trial
     own = sum(one.trial.number == UNVISITED for one in found.confirmation.candidates)
@@ -72,16 +79,17 @@ def test_the_answer_is_told_with_its_score_on_episodes_that_the_search_has_not_s
     assert spent.episodes == ONE * (len(found.confirmation.candidates) + own + more) == found.episodes - 7 * ONE
     assert answer.scores == (answer.assessment.prpv.value,)
     assert answer.optimism == answer.scores[0] - answer.trial.prpv
-    with Store.read(finished) as store:
+    assert spent.episodes + watcher.off == most_confirmation_episodes(found.study.settings), "the rest is off the bar"
+    with Store.read(found.study.settings.folder) as store:
         known = store.outcomes(found.study.identity, answer.trial.theta)
     seen = plan_episodes(found.study.settings, answer.trial.theta, found.study.settings.seed)
     assert len(set(known) - set(seen)) == ONE * (1 + more)
     assert {e.seed for e in set(known) - set(seen)}.isdisjoint(e.seed for e in seen)
 
 
-def test_a_second_time_nothing_is_simulated(finished):
-    _, found = confirmed(finished)
-    spent, again = confirmed(finished)
+def test_a_second_time_nothing_is_simulated(once):
+    *_, found = once
+    spent, again = confirmed(found.study.settings.folder)
     assert spent.episodes == 0
     assert study_document(again) == study_document(found)
 
@@ -128,12 +136,12 @@ def test_a_favourite_that_was_lucky_gives_way_to_a_rival_that_fresh_episodes_con
     assert found.candidates[0].optimism > 0
 
 
-def test_what_is_expected_of_the_answer_is_the_mean_of_repetitions_that_nothing_was_chosen_by(finished):
-    _, found = confirmed(finished)
+def test_what_is_expected_of_the_answer_is_the_mean_of_repetitions_that_nothing_was_chosen_by(once):
+    *_, found = once
     answer, study, count = found.confirmation.answer, found.study, found.confirmation.repetitions
     assert 0 < count <= MOST_REPETITIONS
     scores = []
-    with Store.read(finished) as store:
+    with Store.read(study.settings.folder) as store:
         study_run = StudyRun(study, store)
         for number in range(2, 2 + count):
             planned = plan_episodes(study.settings, answer.trial.theta, fresh_seed(study.settings.seed, number))
@@ -204,12 +212,6 @@ def test_interrupted_anywhere_it_comes_to_the_same_answer(finished, jobs):
     assert last.expected.prpv == whole.confirmation.expected.prpv
 
 
-def test_what_need_not_be_run_is_taken_off_the_bar(finished):
-    watcher = Stopping()
-    spent, found = confirmed(finished, watcher)
-    assert spent.episodes + watcher.off == most_confirmation_episodes(found.study.settings)
-
-
 def test_every_repetition_has_episodes_and_a_score_of_its_own(finished):
     _, found = confirmed(finished, confirm=3)
     answer = found.confirmation.answer
@@ -273,8 +275,8 @@ def test_where_failures_stop_the_study_they_stop_it_here(finished):
         run_confirmation(study_run)
 
 
-def test_how_much_was_luck_is_in_the_row_of_the_search(finished):
-    _, found = confirmed(finished)
+def test_how_much_was_luck_is_in_the_row_of_the_search(once):
+    *_, found = once
     answer = found.confirmation.answer
     lucky = replace(answer, scores=(int(answer.trial.prpv) + 4,))
     luck = replace(found, confirmation=replace(found.confirmation, answer=lucky))
@@ -289,8 +291,8 @@ def test_how_much_was_luck_is_in_the_row_of_the_search(finished):
     assert searched[3].startswith("no optimism")
 
 
-def test_the_document_has_the_answer_and_every_candidate(finished):
-    _, found = confirmed(finished)
+def test_the_document_has_the_answer_and_every_candidate(once):
+    *_, found = once
     fresh = study_document(found)["best"]["fresh"]
     answer = found.confirmation.answer
     inner = answer.assessment.prpv_interval

@@ -39,7 +39,7 @@ SAME_CODE = {
     "environments": (
         "f5b9c2c9586c29cd4dc2d6e27f44fd2731ecc2d27bf96a80c745aecd5a3ddb50",
         "efd8ee20ccef978bc76d2d8a4347a02b439e79a2e68d2dd89f86ca5ae1a37343",
-        "a6e89552b5fc969e6a916f6214522f68f91cbdc972212c2f3320307f1bd42973",
+        "66964875fbf13cfa088ed0c037d223b9c23bf6430123e1d70b28b5655469b672",
         "66964875fbf13cfa088ed0c037d223b9c23bf6430123e1d70b28b5655469b672",
     ),
     "engine outcomes": ("94c0ba12f9bf", "169c7ef2065e", "bd67473b82b2"),

@@ -1,5 +1,6 @@
 """Exports: what was found for other simulators and robots, a study's trials for other optimisers, and a filter."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -47,6 +48,9 @@ TRIALS: Mapping[str, Callable[[History, Path], None]] = {"optuna": write_optuna,
 WRITERS: Mapping[str, Callable[[Instance], str]] = {"urdf": urdf_text, "mjcf": mjcf_text, "ros": ros_text}
 NO_RATE_HZ = 20.0
 """A robot without a folder has no rate of control; none of the formats states one."""
+COMMANDS = {"differential": ("twist", "duty"), "ackermann": ("twist", "ackermann", "speed_steering")}
+"""What a filter takes, by how the robot drives."""
+AT_REST_M_S = 1e-6
 
 
 @dataclass(frozen=True, repr=False)
@@ -202,11 +206,14 @@ class CommandFilter:
     Args:
         model: A model.toml, a study's folder, or values by name in θ, with `figures` beside them.
         rate_hz: How often `step` is called per second; a command holds from one call to the next.
-        command: "twist" for forward speed [m/s] and yaw rate [rad/s], "duty" for left and right in [−1, 1].
+        command: "twist" for forward speed [m/s] and yaw rate [rad/s], "duty" for left and right in [−1, 1]; of a car
+            "twist", "ackermann" for throttle and steering in [−1, 1], or "speed_steering" for speed [m/s] and the
+            wheels' angle [rad].
         has: Effects that the simulator has already, as those that `export --into` wrote into its file.
         start: x, y [m] and heading [rad] at the start.
         seed: Seed of jitter and lost commands.
-        figures: The robot's nominal figures, where the model is values.
+        figures: The robot's nominal figures, where the model is values; a car's have its wheelbase.
+        reverse: Whether it drives backwards too, where the model is values.
 
     Raises:
         InputError: If the model, or an argument, cannot be used.
@@ -222,26 +229,33 @@ class CommandFilter:
         start: tuple[float, float, float] = (0.0, 0.0, 0.0),
         seed: int = 0,
         figures: Mapping[str, float] | None = None,
+        reverse: bool = True,
     ) -> None:
-        if command not in ("twist", "duty"):
-            raise InputError(f"command='{command}': must be 'twist' or 'duty'")
         if not (np.isfinite(rate_hz) and rate_hz > 0.0):
             raise InputError(f"rate_hz={rate_hz}: must be a positive number of calls per second")
         if isinstance(model, Mapping):
-            own = Catalogue(Path.cwd())
             if figures is None:
                 raise InputError("figures: must be given where the model is values; take them from robot.toml")
-            robot = Robot("given", "", dict(figures), {}, None, own)
+            drive = "ackermann" if "wheelbase" in figures else "differential"
+            robot = Robot("given", "", dict(figures), {}, None, Catalogue(Path.cwd(), drive=drive), reverse)
             instance = Instance(robot, dict(model), {}, "given")
         else:
             instance, _ = _instance_of(Path(model))
+        self._steers = instance.steers
+        if command not in (kinds := COMMANDS[instance.robot.drive]):
+            raise InputError(f"command='{command}': must be " + " or ".join(f"'{one}'" for one in kinds))
         _check_has(has, instance.robot.catalogue)
         left_out = set(has) - set(IN_WHEELS)
         effects = [one for name, one in instance.effects.items() if name not in left_out]
         self._twist, self._train = command == "twist", drivetrain(instance.robot, effects)
-        self._full, self._nominal = instance.figure("full_speed"), instance.figure("effective_baseline")
+        self._full, self._command, self._angle = instance.figure("full_speed"), command, 0.0
+        if self._steers:
+            self._wheelbase, self._lock = instance.figure("wheelbase"), math.radians(instance.figure("wheel_angle"))
+        else:
+            self._nominal = instance.figure("effective_baseline")
         behind = replace(instance, theta={n: v for n, v in instance.theta.items() if effect_of(n) in has})
-        self._gains, self._baseline = behind.gains, behind.baseline_m
+        self._gains = behind.gains
+        self._baseline = 0.0 if self._steers else behind.baseline_m
         x, y, heading = start
         figures_known, place = instance.robot.figures, np.array([[x, y]])
         context = FilterContext(rate_hz, np.zeros(2), figures_known, seed, np.array([heading]), place)
@@ -251,11 +265,11 @@ class CommandFilter:
         """What to ask of the simulator until the next step.
 
         Args:
-            command: What the robot is told: forward speed and yaw rate, or duties left and right.
+            command: What the robot is told: forward speed and yaw rate, duties left and right, or a car's.
 
         Returns:
-            For twists the forward speed, the sideways speed, which a robot on two wheels cannot be asked for, and the
-            yaw rate; for duties left and right.
+            For twists the forward speed, the sideways speed, which a robot on wheels cannot be asked for, and the
+            yaw rate; else two numbers as the command's.
 
         Raises:
             InputError: If it is not two finite numbers.
@@ -263,6 +277,8 @@ class CommandFilter:
         given = np.asarray(command, dtype=float)
         if given.shape != (2,) or not np.isfinite(given).all():
             raise InputError(f"a command must be two finite numbers, got {command!r}")
+        if self._steers:
+            return self._step_car(given[0], given[1])
         duties = self._wheels(given[0], given[1], self._nominal) / self._full if self._twist else given
         moved, self._memory = self._train.apply(duties[None], self._memory)
         forward, sideways, yaw = moved[0].tolist()
@@ -271,6 +287,25 @@ class CommandFilter:
         if not self._twist:
             return float(left / self._full), float(right / self._full)
         return float(left + right) / 2.0, sideways, float(right - left) / self._nominal
+
+    def _step_car(self, first: float, second: float) -> tuple[float, ...]:
+        unit = np.array((self._full, self._lock))
+        wanted = np.array((first, second))
+        if self._twist:
+            wanted[1] = self._wheels_angle(first, second, 0.0)
+        fractions = wanted if self._command == "ackermann" else wanted / unit
+        moved, self._memory = self._train.apply(fractions[None], self._memory)
+        forward, sideways, yaw = moved[0].tolist()
+        speed = forward / self._gains[0]
+        if self._twist:
+            return speed, sideways, yaw / self._gains[0]
+        self._angle = self._wheels_angle(forward, yaw, self._angle)
+        asked = np.array((speed, self._angle)) / (unit if self._command == "ackermann" else 1.0)
+        return float(asked[0]), float(asked[1])
+
+    def _wheels_angle(self, forward: float, yaw: float, at_rest: float) -> float:
+        """Angle of the front wheels [rad]; a car at rest does not tell it."""
+        return math.atan(self._wheelbase * yaw / forward) if abs(forward) > AT_REST_M_S else at_rest
 
     @staticmethod
     def _wheels(forward: float, yaw: float, baseline: float) -> np.ndarray[Any, np.dtype[np.float64]]:

@@ -53,6 +53,7 @@ from .road_picture import (
 )
 from .robot import (
     CAMERA as CAMERA,
+    REQUIRED as REQUIRED,
     UNITS as UNITS,
     Robot as Robot,
     catalogue_of as catalogue_of,

@@ -286,9 +286,16 @@ def column_values(table: Table, column: Column) -> Floats:
     values = table.numbers(column.name)
     problem = contradiction(column.unit, values) if column.known_by in ("assumed", "by its name") else ""
     if problem:
+        remedy = f"state its unit, as in --columns {column.field}={column.name}:{column.unit.name}"
+        if "pulses" in problem:
+            remedy = "write such a column into the file"
+        elif column.field == "throttle":
+            remedy = f"if it is in percent, --columns throttle={column.name}:percent"
+        elif column.field == "steering":
+            remedy = f"if it is the wheels' angle, import a speed with it: --columns steering_angle={column.name}:deg"
         raise LogError(
             f"{table.path}: column '{column.name}' as {column.field} in {column.unit.name} ({column.known_by}): "
-            f"{problem}; state its unit, as in --columns {column.field}={column.name}:{column.unit.name}"
+            f"{problem}; {remedy}"
         )
     return values * column.unit.factor
 

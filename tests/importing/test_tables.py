@@ -579,7 +579,16 @@ def test_speed_and_wheel_angle_are_a_cars_commands_too(file):
 
 
 @pytest.mark.parametrize(
-    ("steering", "said"), [("28", "28 is more than full duty"), ("1650", "servo pulses are made shares")]
+    ("steering", "said"),
+    [
+        ("28", "28 is more than full duty; if it is the wheels' angle, import a speed"),
+        ("1650", "servo pulses are made shares"),
+    ],
 )
 def test_steering_in_degrees_or_pulses_is_refused(file, steering, said):
     assert said in complaint(file(CAR.replace("0.5,1", f"{steering},1")), columns=CAR_MAP)
+
+
+def test_throttle_in_percent_is_refused_with_its_unit(file):
+    said = complaint(file(CAR.replace("0.3,", "30,")), columns=CAR_MAP)
+    assert "30 is more than full duty; if it is in percent, --columns throttle=gas:percent" in said

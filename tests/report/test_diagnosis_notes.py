@@ -24,6 +24,7 @@ from proxytune.diagnosis.motion.discrepancy import Discrepancy, LearntError
 from proxytune.diagnosis.motion.manoeuvres import LIBRARY, Manoeuvre
 from proxytune.diagnosis.motion.moments import Period
 from proxytune.diagnosis.motion.multistep_fit import MultistepFit
+from proxytune.driving import read_robot
 from proxytune.effects import FittedRange, Learnt, LearntCurve, learnt_theta
 from proxytune.report.diagnosis.document import clocks_document, learnt_document, unlike_document
 from proxytune.report.diagnosis.notes import (
@@ -34,6 +35,7 @@ from proxytune.report.diagnosis.notes import (
     may_matter,
     motion_headline,
     motion_notes,
+    moves_from,
     per_cent,
     unlike_notes,
 )
@@ -279,3 +281,10 @@ def test_a_map_of_the_floor_is_told_in_words():
     theta = learnt_theta(Learnt(FittedRange((0.0, 1.0), (-1.0, 1.0)), (curve,)))
     notes = learnt_notes(Learning(Discrepancy(theta, {"place on the floor": 1.0}, {}, True), (), False))
     assert "slower by 50 % where x > 0 m" in notes[1]
+
+
+def test_a_car_that_its_friction_keeps_at_rest_is_told_with_the_throttle_up_to_which_it_does():
+    theta = {"rolling.inertia": Estimate(0.27, (0.2, 0.3), "s"), "rolling.friction": Estimate(3.4, (2.4, 4.0), "m/s²")}
+    (line,) = moves_from(SimpleNamespace(theta=theta, robot=read_robot("dart")))
+    assert line.startswith("with this rolling a throttle up to 0.2 moves nothing: a dead band")
+    assert moves_from(SimpleNamespace(theta={**theta, "dead_band": Estimate(0.1, (0.1, 0.1), "")})) == []

@@ -10,12 +10,12 @@ import pytest
 from export_truth import ROBOT, instance
 
 from proxytune.api.exporting import WRITERS
-from proxytune.driving import AXLES, drivetrain, orientation, read_body
+from proxytune.driving import AXLES, drivetrain, orientation, read_body, read_robot
 from proxytune.driving.plants import PlanarPlant
-from proxytune.effects import CATALOGUE, FilterContext, effects_from, theta_names
+from proxytune.effects import CAR_CATALOGUE, CATALOGUE, FilterContext, effects_from, theta_names
 from proxytune.errors import InputError, SettingsError
 from proxytune.report import FORMATS, export_lines, mjcf_text, ros_text, urdf_text
-from proxytune.report.export.instance import PLACES, place_of
+from proxytune.report.export.instance import CAR_PLACES, PLACES, Instance, place_of
 
 DUTIES = np.repeat([[0.5, 0.5], [0.3, 0.6], [0.9, 0.9], [-0.2, 0.3]], 60, axis=0)
 FOUND = {
@@ -49,6 +49,57 @@ def test_mujoco_drives_the_exported_model_as_the_planar_plant_drives_the_instanc
     driven = np.linalg.norm(np.diff(expected[:, :2], axis=0), axis=1).sum()
     assert np.linalg.norm(poses[:, :2] - expected[:, :2], axis=1).max() < 0.015 * driven
     assert abs(np.arctan2(*(f(poses[-1, 2] - expected[-1, 2]) for f in (np.sin, np.cos)))) < 0.03
+
+
+CAR = read_robot("car")
+HELD = np.repeat([[0.3, 0.0], [0.3, 0.8], [0.25, -0.6], [0.5, 0.1]], 60, axis=0)
+FOUND_OF_CARS = {
+    "as it is": {},
+    "steers to one side": {"steering_offset": 0.1, "steering_gain": 0.8, "wheel_gain": 0.9},
+    "late and lazy": {"delay": 0.3, "motor_lag": 0.3, "steering_lag": 0.3},
+    "weak, with stops": {"saturation": 0.3, "steering_saturation": 0.5},
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", FOUND_OF_CARS)
+def test_mujoco_drives_an_exported_car_as_the_planar_plant_drives_the_instance(case):
+    mujoco = pytest.importorskip("mujoco")
+    found = instance(CAR, **FOUND_OF_CARS[case])
+    train = drivetrain(CAR, effects_from(found.theta, CAR.figures, CAR.catalogue))
+    twists, _ = train.apply(HELD, train.begin(FilterContext(60.0, np.zeros(2), CAR.figures)))
+    expected = PlanarPlant(np.zeros(3), 1.0 / 60.0).move(twists)[0]
+    model = mujoco.MjModel.from_xml_string(mjcf_text(found))
+    data, poses = mujoco.MjData(model), []
+    for tick, command in enumerate(HELD, start=1):
+        data.ctrl[:] = command
+        while data.time < tick / 60.0 - 1e-9:
+            mujoco.mj_step(model, data)
+        poses.append(data.qpos[:2].copy())
+    driven = np.linalg.norm(np.diff(expected[:, :2], axis=0), axis=1).sum()
+    assert np.linalg.norm(np.array(poses) - expected[:, :2], axis=1).max() < 0.03 * driven
+
+
+def test_an_exported_car_has_wheels_as_large_and_front_wheels_as_askew_as_was_found():
+    found = instance(CAR, wheel_gain=0.9, steering_offset=0.1)
+    root = ET.fromstring(urdf_text(found))
+    body = read_body(root, Path("exported.urdf"))
+    assert (body.left.radius_m, body.right.radius_m) == pytest.approx((0.045, 0.045))
+    askew = [joint.find("origin").get("rpy") for joint in root.iter("joint") if "steer" in joint.get("name")]
+    assert [float(turned.split()[2]) for turned in askew] == pytest.approx([np.radians(2.4)] * 2)
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_what_a_car_has_a_place_for_changes_its_file_and_the_rest_is_named(form):
+    for effect, kind in CAR_CATALOGUE.items():
+        if effect in PLACES and PLACES[effect] == CAR_PLACES.get(effect):
+            continue  # as on two wheels
+        name, one = theta_names(kind)[0], kind.parameters[0]
+        texts = []
+        for share in (0.4, 0.7):
+            found = Instance(CAR, {**CAR.theta, name: one.low + share * (one.high - one.low)}, {}, "a test")
+            texts.append(without_comments(WRITERS[form](found)))
+        assert (texts[0] != texts[1]) == bool(place_of(effect, form, "ackermann")), name
 
 
 def test_mujocos_camera_stands_and_looks_as_was_found():

@@ -13,10 +13,11 @@ from export_truth import instance
 
 from proxytune import CommandFilter, InputError, export
 from proxytune.cli.main import main
-from proxytune.driving import drivetrain, link_pose, parse_urdf
+from proxytune.driving import drivetrain, link_pose, parse_urdf, read_robot
 from proxytune.driving.plants import PlanarPlant
 from proxytune.effects import FilterContext, Model, effects_from, model_text
 from proxytune.report.export.instance import IN_WHEELS
+from proxytune.report.export.into import patch
 
 HZ = 60.0
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "how-to" / "exporting.md"
@@ -302,6 +303,75 @@ def test_the_ros_node_tells_the_driver_what_the_python_class_answers_and_stops_a
     assert [(one.linear.x, one.linear.y, one.angular.z) for one in told[:30]] == pytest.approx(np.array(expected))
     assert abs(told[-1].linear.x) < 1e-6
     assert "dead_band.width 0.08 duty: the filter" in path.read_text()
+
+
+CAR = read_robot("car")
+FOUND_OF_CAR = {"dead_band": 0.08, "delay": 0.12, "steering_offset": 0.05, "steering_lag": 0.2, "wheel_gain": 0.9}
+DRIVES = np.repeat([[0.5, 0.3], [0.9, -0.2], [0.0, 0.1], [0.7, 0.4]], 60, axis=0)
+
+
+@pytest.mark.parametrize("command", ["ackermann", "speed_steering", "twist"])
+def test_the_filter_moves_a_nominal_car_as_the_one_that_was_found(tmp_path, command):
+    path = tmp_path / "model.toml"
+    path.write_text(model_text(Model("car", None, FOUND_OF_CAR, {}), (), CAR.catalogue))
+    full, lock, wheelbase = 3.0, np.radians(24.0), 0.33
+    train = drivetrain(CAR, effects_from({**CAR.theta, **FOUND_OF_CAR}, CAR.figures, CAR.catalogue))
+    twists, _ = train.apply(DRIVES / (full, lock), train.begin(FilterContext(HZ, np.zeros(2), CAR.figures)))
+    asked = DRIVES / (full, lock) if command == "ackermann" else DRIVES
+    if command == "twist":
+        asked = np.stack((DRIVES[:, 0], DRIVES[:, 0] * np.tan(DRIVES[:, 1]) / wheelbase), axis=1)
+        asked, twists = asked[:120], twists[:120]  # at rest a twist tells no angle
+    bent = CommandFilter(path, rate_hz=HZ, command=command, has=("wheel_gain",))
+    told = np.array([bent.step(one) for one in asked])
+    if command == "ackermann":
+        told = told * (full, lock)
+    if command != "twist":
+        told = np.stack((told[:, 0], 0.0 * told[:, 0], told[:, 0] * np.tan(told[:, 1]) / wheelbase), axis=1)
+    assert 0.9 * told == pytest.approx(twists, abs=1e-9)  # the simulator's own wheels are smaller
+
+
+def test_the_node_of_a_car_hears_and_tells_ackermann_drives(tmp_path, monkeypatch):
+    model = tmp_path / "model.toml"
+    model.write_text(model_text(Model("dart", None, {"steering_offset": 0.1}, {}), (), CAR.catalogue))
+    path = export(model, tmp_path / "bend.py", to="filter").output
+
+    class Message:
+        def __init__(self):
+            self.header = types.SimpleNamespace(stamp=None)
+            self.drive = types.SimpleNamespace(speed=0.0, steering_angle=0.0)
+
+    modules = {"rclpy": {}, "rclpy.node": {"Node": Node}, "ackermann_msgs": {}}
+    modules["ackermann_msgs.msg"] = {"AckermannDriveStamped": Message}
+    for name, content in modules.items():
+        monkeypatch.setitem(sys.modules, name, types.ModuleType(name))
+        vars(sys.modules[name]).update(content)
+    monkeypatch.setattr(Node, "parameters", {})
+    spec = importlib.util.spec_from_file_location("bend_car", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    node, said = module.AckermannFilter(), Message()
+    said.drive.speed, said.drive.steering_angle = 1.0, 0.1
+    node.heard(said)
+    for _ in range(60):
+        node.tick()
+    assert node.told[9].drive.speed == pytest.approx(1.0)
+    assert node.told[9].drive.steering_angle == pytest.approx(0.1 + 0.1 * np.radians(25.0))
+    assert node.told[-1].drive.speed == pytest.approx(0.0)
+    said.drive.speed = -1.0  # a car without reverse stays
+    node.heard(said)
+    node.tick()
+    assert node.told[-1].drive.speed == pytest.approx(0.0)
+
+
+def test_a_users_own_car_is_patched_at_its_rear_wheels_and_has_their_gain():
+    body = read_robot("car").body()
+    found = instance(CAR, wheel_gain=0.9, steering_offset=0.1)
+    with pytest.raises(InputError, match="--wheels LEFT,RIGHT of axle_left, steer_left"):
+        patch(found, body, Path("mine.urdf"))
+    patched = patch(found, body, Path("mine.urdf"), ("axle_left", "axle_right"))
+    assert {"wheel_gain", "yaw_scrub"} & patched.has == {"wheel_gain"}
+    assert patched.text.count('radius="0.045"') == 4
+    assert patched.text.count('radius="0.05"') == 4
 
 
 @pytest.mark.parametrize(

@@ -53,6 +53,7 @@ def motion_notes(diagnosis: Diagnosis) -> list[str]:
     lines = clocks_notes(diagnosis.log, diagnosis.clocks, diagnosis.theta)
     lines += unlike_notes(diagnosis.robot_clusters, diagnosis.drive_names)
     lines += [_say_added(diagnosis, effect) for effect in diagnosis.effects]
+    lines += moves_from(diagnosis)
     lines += [_say_immaterial(effect, diagnosis) for effect in diagnosis.negligible]
     lines += _cautions(diagnosis)
     if diagnosis.residual_depends_on:
@@ -66,6 +67,19 @@ def motion_notes(diagnosis: Diagnosis) -> list[str]:
     if diagnosis.could_not_be_seen:
         lines.append(f"these drives could not have shown: {', '.join(diagnosis.could_not_be_seen)}")
     return lines + next_drives(diagnosis)
+
+
+def moves_from(diagnosis: Diagnosis) -> list[str]:
+    """Say which throttle keeps a car at rest where that is its friction's doing: a dead band looks much the same."""
+    theta = diagnosis.theta
+    inertia, friction = (theta.get(f"rolling.{name}") for name in ("inertia", "friction"))
+    if inertia is None or friction is None or not inertia.value * friction.value > 0.0 or "dead_band" in theta:
+        return []
+    least = inertia.value * friction.value / diagnosis.robot.figures["full_speed"]
+    return [
+        f"with this rolling a throttle up to {least:.2g} moves nothing: a dead band of as much looks nearly the same; "
+        "to tell them apart, drive fast, then let the car roll without throttle"
+    ]
 
 
 def per_cent(one: Ratio) -> tuple[float, tuple[float, float]]:

@@ -54,8 +54,15 @@ class Instance:
         return self.robot.figures[name]
 
     @property
+    def steers(self) -> bool:
+        """Whether it is a car."""
+        return self.robot.drive == "ackermann"
+
+    @property
     def gains(self) -> Pair:
-        """Speeds of the left and right wheels as multiples of the nominal."""
+        """Speeds of the left and right driven wheels as multiples of the nominal."""
+        if self.steers:
+            return (self.value("wheel_gain", "gain", 1.0),) * 2
         trim = self.value("trim", "trim", 0.0)
         left, right = (self.value("wheel_gain", side, 1.0) for side in ("left", "right"))
         return left * (1.0 - trim), right * (1.0 + trim)
@@ -63,19 +70,25 @@ class Instance:
     @property
     def limits(self) -> Pair:
         """The duties beyond which the left and right wheels turn no faster."""
-        lost, imbalance = 1.0 - self.value("saturation", "limit", 1.0), self.value("saturation", "imbalance", 0.0)
+        lost, imbalance = 1.0 - self.value("saturation", "limit", 1.0), self.imbalance("saturation")
         left, right = (max(SMALLEST_LIMIT, 1.0 - lost * (1.0 + side * imbalance)) for side in (-1.0, 1.0))
         return left, right
 
     @property
     def lags_s(self) -> Pair:
         """Time constants of the left and right motors [s]."""
-        time, imbalance = self.value("motor_lag", "time_constant", 0.0), self.value("motor_lag", "imbalance", 0.0)
+        time, imbalance = self.value("motor_lag", "time_constant", 0.0), self.imbalance("motor_lag")
         return time * (1.0 - imbalance), time * (1.0 + imbalance)
+
+    def imbalance(self, effect: str) -> float:
+        """How uneven an effect is on the wheels; a car's are alike."""
+        return 0.0 if self.steers else self.value(effect, "imbalance", 0.0)
 
     @property
     def baseline_m(self) -> float:
-        """Distance of the wheels as the turn rate shows it [m]."""
+        """Distance of the driven wheels, on a robot on two wheels as the turn rate shows it [m]."""
+        if self.steers:
+            return self.figure("wheel_distance")
         return self.value("yaw_scrub", "baseline", self.figure("effective_baseline"))
 
     @property
@@ -130,7 +143,10 @@ def export_lines(instance: Instance, form: str, has: Container[str] = ()) -> lis
     lines = []
     for name, value in sorted(instance.theta.items()):
         effect = effect_of(name)
-        parameter, place = parameters.get(name), ("in the file" if effect in has else place_of(effect, form))
+        parameter, place = (
+            parameters.get(name),
+            ("in the file" if effect in has else place_of(effect, form, instance.robot.drive)),
+        )
         if place or parameter is None or isinstance(parameter.neutral, str) or value != parameter.neutral:
             unit = parameter.unit if parameter else ""
             lines.append(ExportLine(name, value, unit, instance.intervals.get(name), place))
@@ -237,13 +253,30 @@ PLACES: Mapping[str, Places] = MappingProxyType(
 """By effect of the catalogue; a user's own effect and what was learnt have no place anywhere."""
 
 
+CAR_PLACES: Mapping[str, Places] = MappingProxyType(
+    {
+        **dict(tuple(PLACES.items())[tuple(PLACES).index("marker_offset") :]),
+        "delay": Places(mjcf="actuator delay"),
+        "saturation": Places("joint limit velocity", "actuator ctrlrange"),
+        "wheel_gain": Places("wheel radii", "actuator gainprm", "traction_wheels_radius"),
+        "motor_lag": Places(mjcf="actuator dynprm"),
+        "steering_saturation": Places(mjcf="actuator ctrlrange"),
+        "steering_lag": Places(mjcf="actuator dynprm"),
+        "steering_offset": Places("origins of the joints that steer", "actuator biasprm"),
+        "steering_gain": Places(mjcf="actuator gainprm"),
+    }
+)
+"""Those of a car's effects that have a place."""
+
+
 FILTERED = tuple(PLACES)[: tuple(PLACES).index("marker_offset")]
 """Effects on commands, wheels and motion: what a filter bends."""
 
 
-def place_of(effect: str, form: str) -> str:
-    """Place of an effect in a format; empty where it has no place."""
+def place_of(effect: str, form: str, drive: str = "differential") -> str:
+    """Place of an effect of such robots in a format; empty where it has no place."""
     if form == FILTER:
         return "the filter" if effect in FILTERED or effect not in PLACES else ""
-    place: str = getattr(PLACES.get(effect, _NOWHERE), form)
+    places = PLACES if drive == "differential" else CAR_PLACES
+    place: str = getattr(places.get(effect, _NOWHERE), form)
     return place

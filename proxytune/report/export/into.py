@@ -103,7 +103,7 @@ def _change_wheels(instance: Instance, own: OwnFile) -> Iterator[str]:
     left, right = own.wheels
     if not left.centre[1] > right.centre[1]:
         raise InputError(f"joint '{left.joint}' is not to the left of '{right.joint}'; name them: --wheels LEFT,RIGHT")
-    wider = instance.baseline_m / instance.figure("effective_baseline")
+    wider = 1.0 if instance.steers else instance.baseline_m / instance.figure("effective_baseline")
     apart = (wider - 1.0) * (left.centre[1] - right.centre[1]) / 2.0
     for wheel, gain, side in zip(own.wheels, instance.gains, (1.0, -1.0), strict=True):
         higher = (gain - 1.0) * (wheel.radius_m or instance.figure("wheel_radius"))
@@ -111,7 +111,7 @@ def _change_wheels(instance: Instance, own: OwnFile) -> Iterator[str]:
             wheel.move(np.array((0.0, side * apart, higher)))
         if abs(gain - 1.0) > SMALL:
             wheel.grow(gain)
-    yield from IN_WHEELS
+    yield from (name for name in IN_WHEELS if instance.robot.catalogue.knows(name))
 
 
 def _change_camera(instance: Instance, own: OwnFile) -> Iterator[str]:

@@ -1,6 +1,7 @@
-"""A complete MuJoCo model of a domain instance: a robot on a floor, its control the duties of both wheels."""
+"""A complete MuJoCo model of a domain instance: a robot on a floor, controlled by its two commands."""
 
 import math
+from functools import partial
 from string import Template
 from xml.sax.saxutils import escape
 
@@ -13,10 +14,27 @@ TIMESTEP_S = 0.0005
 """Short, and integrated explicitly: MuJoCo's implicit integrators push a robot with stiffly driven light wheels."""
 SERVO_S = 0.01
 """Time constant of the wheels' servos, with which the robot's mass follows [s]; part of the motors' lag."""
+CASTER = Template("""\
+      <geom name="caster" type="sphere" pos="$caster_x 0 $caster" size="$caster" mass="$caster_mass"
+            condim="1" priority="1"/>""")
+FRONT_WHEEL = Template("""\
+      <body name="steered" pos="$wheelbase 0 $radius">
+        <joint name="steering" type="hinge" axis="0 0 1" armature="$armature" damping="$damping"/>
+        <geom type="sphere" size="0.001" mass="$caster_mass" contype="0" conaffinity="0"/>
+        <body name="wheel_front">
+          <joint name="axle_front" type="hinge" axis="0 1 0"/>
+          <geom type="sphere" size="$radius" mass="$wheel_mass"/>
+        </body>
+      </body>""")
+OPEN_DIFFERENTIAL = """\
+  <tendon>
+    <fixed name="rear"><joint joint="axle_left" coef="0.5"/><joint joint="axle_right" coef="0.5"/></fixed>
+  </tendon>
+"""
 MODEL = Template("""\
 <mujoco model="$name">
   <!-- $comment -->
-  <!-- Control: duties of the left and right wheels, -1 to 1. Origin: middle of the axle, on the floor; x forward. -->
+  <!-- Control: $control, -1 to 1. Origin: middle of the driven axle, on the floor; x forward. -->
   <option timestep="$timestep"/>
   <worldbody>
     <light pos="0 0 3"/>
@@ -24,8 +42,6 @@ MODEL = Template("""\
     <body name="$name">
       <freejoint/>
       <geom name="chassis" type="box" pos="$chassis_x 0 $chassis_z" size="$chassis_size" mass="$chassis_mass"/>
-      <geom name="caster" type="sphere" pos="$caster_x 0 $caster" size="$caster" mass="$caster_mass"
-            condim="1" priority="1"/>
 $parts
       <body name="wheel_left" pos="0 $half_baseline $radius">
         <joint name="axle_left" type="hinge" axis="0 1 0"/>
@@ -40,8 +56,8 @@ $parts
   <contact>
     <exclude body1="$name" body2="wheel_left"/>
     <exclude body1="$name" body2="wheel_right"/>
-  </contact>
-  <actuator>
+$excluded  </contact>
+$tendons  <actuator>
 $actuators
   </actuator>
 </mujoco>
@@ -52,32 +68,44 @@ def mjcf_text(instance: Instance) -> str:
     """A MuJoCo model whose motors lag, saturate, are late and pull to one side as was found.
 
     Each wheel is a servo of speed within its motor's torque. Its wheels are spheres, as far apart as the turn rate
-    shows it. A delay needs a MuJoCo whose actuators have one (the attribute `delay`).
+    shows it. A car has one front wheel, in the middle, and an open differential.
+
+    A delay needs a MuJoCo whose actuators have one (the attribute `delay`).
 
     Raises:
         InputError: If the robot states no mass or no wheel torque.
     """
     radius, mass, baseline = instance.figure("wheel_radius"), instance.figure("mass"), instance.baseline_m
-    length, height = 1.2 * baseline, 1.2 * radius
+    wheelbase = instance.figure("wheelbase") if instance.steers else 0.0
+    length, height, armature = 1.2 * (wheelbase or baseline), 1.2 * radius, _armature(instance)
     numbers = {
         "timestep": TIMESTEP_S,
         "radius": radius,
         "half_baseline": baseline / 2.0,
-        "chassis_x": -0.15 * baseline,
-        "chassis_z": radius + height / 2.0,
+        "chassis_x": 0.4 * wheelbase or -0.15 * baseline,
+        "chassis_z": radius if wheelbase else radius + height / 2.0,
         "chassis_mass": 0.89 * mass,
         "caster": 0.35 * radius,
         "caster_x": -0.5 * baseline,
         "caster_mass": 0.01 * mass,
         "wheel_mass": 0.05 * mass,
+        "wheelbase": wheelbase,
+        "armature": armature,
+        "damping": 2.0 * armature * STEERS_HZ,
     }
+    name = escape(instance.robot.name, {'"': "&quot;"})
+    said = {key: f"{number:.9g}" for key, number in numbers.items()}
+    actuators = (_throttle, _steering) if wheelbase else (partial(_actuator, side=0), partial(_actuator, side=1))
     return MODEL.substitute(
-        {key: f"{number:.9g}" for key, number in numbers.items()},
-        name=escape(instance.robot.name, {'"': "&quot;"}),
+        said,
+        name=name,
         comment=xml_comment(instance, "mjcf", 7),
         chassis_size=f"{length / 2.0:.6g} {0.35 * baseline:.6g} {height / 2.0:.6g}",
-        parts="\n".join(_parts(instance)),
-        actuators="\n".join(_actuator(instance, side) for side in (0, 1)),
+        parts="\n".join([(FRONT_WHEEL if wheelbase else CASTER).substitute(said), *_parts(instance)]),
+        control="throttle and steering (left is above 0)" if wheelbase else "duties of the left and right wheels",
+        excluded='    <exclude body1="$name" body2="wheel_front"/>\n'.replace("$name", name) if wheelbase else "",
+        tendons=OPEN_DIFFERENTIAL if wheelbase else "",
+        actuators="\n".join(actuator(instance) for actuator in actuators),
     )
 
 
@@ -104,22 +132,57 @@ def _camera(figures: CameraFigures) -> str:
 
 
 def _actuator(instance: Instance, side: int) -> str:
-    """A servo of one wheel's speed: torque = stiffness · (full wheel speed · gain · duty − wheel speed)."""
-    radius = instance.figure("wheel_radius")
-    stiffness = instance.figure("mass") * radius**2 / 2.0 / SERVO_S
+    """A servo of one wheel's speed."""
+    place = f'name="{("left", "right")[side]}" joint="{("axle_left", "axle_right")[side]}"'
+    return _speed_servo(instance, place, side, 1)
+
+
+def _throttle(instance: Instance) -> str:
+    """A servo of the mean speed of a car's rear wheels."""
+    return _speed_servo(instance, 'name="throttle" tendon="rear"', 0, 2)
+
+
+def _speed_servo(instance: Instance, place: str, side: int, wheels: int) -> str:
+    """A servo: torque = stiffness · (full wheel speed · gain · command − wheel speed)."""
+    radius, torque = instance.figure("wheel_radius"), wheels * instance.figure("wheel_torque")
+    stiffness = wheels * instance.figure("mass") * radius**2 / 2.0 / SERVO_S
     full = stiffness * instance.figure("full_speed") / radius * instance.gains[side]
-    torque, limit, lag = instance.figure("wheel_torque"), instance.limits[side], instance.lags_s[side] - SERVO_S
-    delay = instance.value("delay", "delay", 0.0)
+    limit = instance.limits[side]
+    least = -limit if instance.robot.reverse else 0.0
     words = [
-        f'<general name="{("left", "right")[side]}" joint="{("axle_left", "axle_right")[side]}"',
-        f'gainprm="{full:.9g}" biastype="affine" biasprm="0 0 {-stiffness:.9g}"',
-        f'ctrllimited="true" ctrlrange="{-limit:.9g} {limit:.9g}"',
+        f'<general {place} gainprm="{full:.9g}" biastype="affine" biasprm="0 0 {-stiffness:.9g}"',
+        f'ctrllimited="true" ctrlrange="{least:.9g} {limit:.9g}"',
         f'forcelimited="true" forcerange="{-torque:.9g} {torque:.9g}"',
-        *([f'dyntype="filterexact" dynprm="{lag:.9g}"'] if lag > 0.0 else []),
-        *(
-            [f'delay="{delay:.9g}" nsample="{math.ceil(delay / TIMESTEP_S) + 2}" interp="linear"']
-            if delay > 0.0
-            else []
-        ),
+        *_follows(instance, instance.lags_s[side] - SERVO_S),
     ]
     return "    " + " ".join(words) + "/>"
+
+
+STEERS_HZ = 400.0
+"""Natural frequency of the servo that holds the front wheel [rad/s]; it is damped so that it does not swing."""
+
+
+def _armature(instance: Instance) -> float:
+    """Inertia of a car's steering [kg m²], large beside that of its wheel."""
+    return 0.1 * instance.figure("mass") * instance.figure("wheel_radius") ** 2
+
+
+def _steering(instance: Instance) -> str:
+    """A servo of the front wheel's angle: torque = stiffness · (full angle · (gain · command + offset) − angle)."""
+    stiffness = _armature(instance) * STEERS_HZ**2
+    full = stiffness * math.radians(instance.figure("wheel_angle"))
+    offset, gain = instance.value("steering_offset", "offset", 0.0), instance.value("steering_gain", "gain", 1.0)
+    limit = instance.value("steering_saturation", "limit", 1.0)
+    words = [
+        f'<general name="steering" joint="steering" gainprm="{full * gain:.9g}" biastype="affine"',
+        f'biasprm="{full * offset:.9g} {-stiffness:.9g} 0" ctrllimited="true" ctrlrange="{-limit:.9g} {limit:.9g}"',
+        *_follows(instance, instance.value("steering_lag", "time_constant", 0.0) - 2.0 / STEERS_HZ),
+    ]
+    return "    " + " ".join(words) + "/>"
+
+
+def _follows(instance: Instance, lag_s: float) -> list[str]:
+    """How late an actuator hears its command, and how slowly it follows."""
+    delay = instance.value("delay", "delay", 0.0)
+    late = f'delay="{delay:.9g}" nsample="{math.ceil(delay / TIMESTEP_S) + 2}" interp="linear"'
+    return [f'dyntype="filterexact" dynprm="{lag_s:.9g}"'] * (lag_s > 0.0) + [late] * (delay > 0.0)

@@ -1,9 +1,10 @@
-"""A ROS 2 node that stands between `cmd_vel` and the driver and bends commands as was found."""
+"""A ROS 2 node that stands before the driver and bends commands as was found: `cmd_vel`, or a car's Ackermann drive."""
 
 from collections.abc import Sequence
 from pprint import pformat
 from string import Template
 
+from proxytune.driving import REQUIRED
 from proxytune.effects import Stage, effect_of, is_learnt
 from proxytune.report.export.instance import FILTER, Instance, header
 
@@ -71,21 +72,82 @@ def main():
 if __name__ == "__main__":
     main()
 ''')
+CAR_NODE = Template('''\
+#!/usr/bin/env python3
+"""Bend a car's commands as proxytune found that it does: between what drives and the simulated car.
+
+$head
+
+Run, with proxytune installed in the Python that ROS uses (3.11 or newer):
+    python3 THIS_FILE --ros-args -r drive_in:=/drive -r drive_out:=/simulator/drive -p use_sim_time:=true
+Messages are AckermannDriveStamped. After `timeout` [s] of silence the car is told to stop.
+"""
+
+import rclpy
+from ackermann_msgs.msg import AckermannDriveStamped
+from rclpy.node import Node
+
+from proxytune import CommandFilter
+
+THETA = $theta
+FIGURES = $figures
+HAS = $has  # what the simulator has already
+RATE_HZ = $rate
+
+
+class AckermannFilter(Node):
+    """Hears drive_in, tells drive_out."""
+
+    def __init__(self):
+        super().__init__("ackermann_filter")
+        self.timeout = self.declare_parameter("timeout", 0.5).value
+        self.filter = CommandFilter(
+            THETA, figures=FIGURES, has=HAS, rate_hz=RATE_HZ, command="speed_steering", reverse=$reverse
+        )
+        self.speed, self.angle, self.silent = 0.0, 0.0, 0.0
+        self.publisher = self.create_publisher(AckermannDriveStamped, "drive_out", 10)
+        self.create_subscription(AckermannDriveStamped, "drive_in", self.hear, 10)
+        self.create_timer(1.0 / RATE_HZ, self.tell)
+
+    def hear(self, message):
+        """Keep the newest command."""
+        self.speed, self.angle, self.silent = message.drive.speed, message.drive.steering_angle, 0.0
+
+    def tell(self):
+        """Give the driver what the car makes of it."""
+        self.silent += 1.0 / RATE_HZ
+        message = AckermannDriveStamped()
+        message.header.stamp = self.get_clock().now().to_msg()
+        speed = self.speed if self.silent <= self.timeout else 0.0
+        message.drive.speed, message.drive.steering_angle = self.filter.step((speed, self.angle))
+        self.publisher.publish(message)
+
+
+def main():
+    """Run until it is stopped."""
+    rclpy.init()
+    rclpy.spin(AckermannFilter())
+
+
+if __name__ == "__main__":
+    main()
+''')
 
 
 def node_text(instance: Instance, has: Sequence[str] = ()) -> str:
     """The node as a Python file: all values in it, no other file needed."""
-    names = ("wheel_radius", "effective_baseline", "full_speed", "motor_time_constant", "control_rate")
+    names = REQUIRED[instance.robot.drive]
     kinds, passed = instance.robot.catalogue, (Stage.COMMAND, Stage.ACTUATION, Stage.MOTION)
     known = {
         name: value
         for name, value in sorted(instance.theta.items())
         if is_learnt(name) or kinds.effect(effect_of(name)).stage in passed
     }
-    return NODE.substitute(
+    return (CAR_NODE if instance.steers else NODE).substitute(
         head="\n".join(header(instance, FILTER, has)).replace("\\", "/").replace('"""', "'''"),
         theta=pformat(known, sort_dicts=False),
         figures=pformat({name: float(instance.figure(name)) for name in names}, sort_dicts=False),
         has=repr(tuple(has)),
         rate=RATE_HZ,
+        reverse=instance.robot.reverse,
     )

@@ -9,6 +9,7 @@ import numpy as np
 from proxytune.arrays import Floats
 from proxytune.driving import (
     AXLES,
+    STEERS,
     add_little_mass,
     link_pose,
     links_called,
@@ -16,13 +17,14 @@ from proxytune.driving import (
     origin_of,
     parse_urdf,
     read_body,
+    rotation,
     sound_urdf,
 )
 from proxytune.report.export.instance import Instance, xml_comment
 
 
 def urdf_text(instance: Instance) -> str:
-    """A URDF of a domain instance: a literal differential drive in it turns and pulls as was found.
+    """A URDF of a domain instance: a literal drive in it turns and pulls as was found.
 
     A wheel that turns faster than nominal is a larger one; wheels stand as far apart as the turn rate shows it.
 
@@ -46,6 +48,12 @@ def _change(root: ET.Element, instance: Instance) -> None:
         _set_wheel(root, joint, (0.5 - side) * instance.baseline_m, instance.figure("wheel_radius"), gain)
         top_speed = limit * instance.figure("full_speed") / instance.figure("wheel_radius")
         _part(joint, "limit", effort="0").set("velocity", f"{top_speed:.6g}")
+    if offset := instance.value("steering_offset", "offset", 0.0):
+        turned = rotation(0.0, 0.0, math.radians(offset * instance.figure("wheel_angle")))
+        for joint in (one for one in root.iter("joint") if one.get("name") in STEERS):
+            pose = origin_of(joint)
+            pose[:3, :3] = pose[:3, :3] @ turned
+            _set_origin(joint, pose)
     if (camera := instance.camera) is not None:
         pose = _pose(orientation(camera), (camera.forward_m, 0.0, camera.height_m))
         _mount(root, "camera", "camera_mount", pose)

@@ -48,9 +48,9 @@ def _skip_without_pybullet(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(autouse=True, scope="module")
 def _blank_figures(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Save figures blank in the quick run, where they cost half the time; tests/report and modules `drawn` do not."""
+    """Save figures blank in the quick run, where they cost half the time; not in tests/report, nor with FIGURES_DRAWN."""
     quick = request.config.getoption("markexpr") == "not slow"
-    if not quick or "report" in request.path.parts or request.node.get_closest_marker("drawn"):
+    if not quick or "report" in request.path.parts or getattr(request.module, "FIGURES_DRAWN", False):
         yield
         return
     with pytest.MonkeyPatch.context() as patch:

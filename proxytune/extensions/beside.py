@@ -125,7 +125,7 @@ def import_beside(module: str, folder: Path) -> ModuleType:
 
 def folders() -> tuple[str, ...]:
     """The folders whose modules this process has imported; another process needs them to unpickle what came of them."""
-    return tuple(folder for home in _homes if home in sys.modules for folder in sys.modules[home].__path__)
+    return tuple(folder for home in list(_homes) if home in sys.modules for folder in sys.modules[home].__path__)
 
 
 def open_folders(known: Sequence[str]) -> None:

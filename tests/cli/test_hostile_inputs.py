@@ -10,7 +10,7 @@ from processes import besides_progress
 from proxytune.cli.main import main
 from proxytune.report.writing import file_names
 
-pytestmark = pytest.mark.drawn
+FIGURES_DRAWN = True  # also in the quick run: see conftest.py
 TABLE = "agent,episode,d\n" + "".join(f"{a},{e},{i + 0.1 * e}\n" for i, a in enumerate("ABC") for e in (0, 1))
 
 

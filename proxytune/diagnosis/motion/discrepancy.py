@@ -54,6 +54,9 @@ OTHER_KNOTS = 5
 MESHES_M, MOST_CORNERS = (0.25, 0.5, 1.0, 2.0), 64
 """Meshes of the lattices of a map of the floor, and how many corners it may have."""
 
+SAME_PLACE_M = 1e-3
+"""Drives that begin in motion so near to each other did not begin at one place: their frames begin there."""
+
 TRANSIENTS_S = (0.04, 0.1, 0.25, 0.63, 1.6)
 STARTS_S = (0.05, 0.15, 0.5)
 """Time constants over which the memory of a start fades [s]."""
@@ -100,7 +103,7 @@ def offer_curves(drives: Drives, theta: Theta) -> Learnt:
         "use": _steps(float(effort.mean()) * seconds / 60.0),
         "load": LOADS_S,
         "heading": (1.0, 2.0),
-        "place": _lattice(drives.places[used]),
+        "place": () if _in_frames_of_their_own(drives) else _lattice(drives.places[used]),
     }
     curves = [
         LearntCurve(group, channel, knots[group], (0.0,) * len(knots[group]))
@@ -109,6 +112,12 @@ def offer_curves(drives: Drives, theta: Theta) -> Learnt:
         if knots[group]
     ]
     return Learnt(FittedRange(_ends(forward), _ends(yaw)), tuple(curves))
+
+
+def _in_frames_of_their_own(drives: Drives) -> bool:
+    """Tell whether each drive counts places from where it begins: several begin in motion at one and the same place."""
+    begun = drives.places[drives.rest.any(axis=1), 0]
+    return len(begun) > 1 and bool(np.ptp(begun, axis=0).max() < SAME_PLACE_M)
 
 
 def _lattice(places: Floats) -> Knots:

@@ -10,7 +10,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from learnt_truth import TURNING, VEERING
-from planted import TRUTH, planted_drives
+from manoeuvres import make_drives
+from planted import TRUTH, driven_log, drives_of, planted_drives
 
 from proxytune.diagnosis import RULES, AdoptedEffect, Findings, Learning, Ratio, cut, pose_errors
 from proxytune.diagnosis.motion import discrepancy
@@ -294,3 +295,16 @@ def test_curves_that_gain_nothing_look_like_nothing():
     drives = planted_drives(TRUTH, episodes=2, seconds=12.0)
     worse = replace(perfect(drives, TRUTH), held_out=np.ones(3))
     assert match_named_effect(drives, TRUTH, worse, TAKEN) is None
+
+
+def test_windows_cut_from_a_drive_each_in_a_frame_of_its_own_get_no_map_of_the_floor():
+    drives, moving = make_drives(1, 4, 200), np.full((4, 2), 0.3)
+    at_one_place = drives_of(driven_log(TRUTH, drives.duties, np.zeros((4, 3)), noise=None))
+    apart = drives_of(driven_log(TRUTH, drives.duties, drives.starts + 0.1 * np.arange(4)[:, None], noise=None))
+
+    def is_mapped(some):
+        return any(curve.group == "place" for curve in offer_curves(some, TRUTH).curves)
+
+    assert is_mapped(at_one_place)
+    assert is_mapped(replace(apart, rest=moving))
+    assert not is_mapped(replace(at_one_place, rest=moving))

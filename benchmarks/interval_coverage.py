@@ -40,8 +40,16 @@ def thetas(target: int) -> list[dict[str, float]]:
     return [dict(zip(NAMES, map(float, point), strict=True)) for point in points]
 
 
+def read_tables(path: Path) -> dict[str, Floats]:
+    """The tables so far; none of a file that is not there."""
+    if not path.exists():
+        return {}
+    with np.load(path) as known:
+        return dict(known)
+
+
 def drive_tables(path: Path) -> None:
-    """Drive every θ again and again, and keep the metrics (repeats, agents, starts, metrics) of each."""
+    """Drive what is left, every θ again and again, and keep the metrics (repeats, agents, starts, metrics) of each."""
     study = open_study(QUICKSTART)
     family = replace(study.family, plant="planar")  # type: ignore[type-var]
     settings = replace(study.settings, starts=STARTS)
@@ -53,8 +61,8 @@ def drive_tables(path: Path) -> None:
         return np.array(values).reshape(len(settings.agents), STARTS, len(names))
 
     centre = {"trim": 0.0, "delay": 0.15, "blur": 0.05, "camera_pitch": 19.0}
-    kept = {"centre": np.stack([table(centre, fresh_seed(9, repeat)) for repeat in range(2)])}
-    for target in range(TARGETS):
+    kept = read_tables(path) or {"centre": np.stack([table(centre, fresh_seed(9, repeat)) for repeat in range(2)])}
+    for target in range(len(kept) // len(KINDS), TARGETS):
         for place, (kind, theta, repeats) in enumerate(zip(KINDS, thetas(target), REPEATS, strict=True)):
             seeds = [fresh_seed(1000 * (target + 1) + 100 * place, repeat) for repeat in range(repeats)]
             kept[f"{target} {kind}"] = np.stack([table(theta, seed) for seed in seeds])
@@ -112,7 +120,7 @@ def split(kept: dict[str, Floats], target: int, kind: str, starts: int, times: i
     donors = donors_of([*pairs, kept["centre"][:, :, chosen[:PLACES]]], len(metrics))
     tables = [table_of(one[None], metrics) for one in fresh]
     said = expect(fresh=tables, target=on_target, metrics=metrics, donors=donors, seed=seed)
-    means, beta = on_target.means, 1.0 / on_target.means.std(axis=0, ddof=0)
+    means, beta = on_target.means, 1.0 / on_target.means.std(axis=0, ddof=1)
     following, perfect = (drawn(each, rng, NEXT).mean(axis=2) for each in (proxy, itself))
     scores, levels = (prpv_of_means(each, np.broadcast_to(means, each.shape), metrics) for each in (following, perfect))
     assert said.prpv.floor is not None
@@ -174,10 +182,8 @@ def main() -> None:
     parser.add_argument("--starts", default="4,6,10")
     parser.add_argument("--times", type=int, default=1, help="how often the target was measured")
     options = parser.parse_args()
-    if not options.tables.exists():
-        drive_tables(options.tables)
-    with np.load(options.tables) as known:
-        kept = dict(known)
+    drive_tables(options.tables)
+    kept = read_tables(options.tables)
     print("| starts | proxy | splits | PRPV | floor | excess | PPV | wrongly called imperfect | rightly |")
     print("|---|---|---|---|---|---|---|---|---|")
     for line in rows(kept, [int(part) for part in options.starts.split(",")], options.splits, options.times):

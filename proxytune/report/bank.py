@@ -26,6 +26,8 @@ def bank_sentence(bank: Bank) -> str:
     told = [f"{plain(name)} to ± {short(width / 2.0)}" for name, width in widths.items()]
     best = [name for name, _ in bank.agents[:MOST_NAMED]]
     from_starts = f"{len(bank.settings.agents)} agents measured from {bank.settings.starts} starts"
+    if not best:
+        return f"{bank.trials} trials are too few to say what {from_starts} would tell; raise budget."
     return f"{bank.trials} trials: {from_starts} tell {listed(told)}; {listed(best)} tell most."
 
 

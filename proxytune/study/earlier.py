@@ -10,6 +10,7 @@ which `Trial.placement` tells the search.
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from os.path import exists
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,8 @@ TOLERANCE = 1e-3
 """Of its value, in which a metric of them may differ."""
 DIGITS = 5
 """Of each score in a table of trials."""
+LARGEST = 1e12
+"""No θ or score is further from 0 than this; squares and sums of such are still numbers."""
 TABLE = "bank.json"
 FORMAT = 1
 
@@ -122,8 +125,8 @@ def read_source(settings: StudySettings, name: str) -> Source:
         StoreError: If its database or table is damaged.
     """
     path = settings.folder / name
-    path = shipped("studies") / name if not path.exists() and (shipped("studies") / name).is_dir() else path
-    if not path.exists():
+    path = shipped("studies") / name if not exists(path) and exists(shipped("studies") / name) else path
+    if not exists(path):
         raise _refused(settings, path, "no such study or table of trials; check the path")
     for home, learns in _chain(path):
         if home.resolve() == settings.folder.resolve():
@@ -171,12 +174,14 @@ def _of_table(path: Path) -> Source:
         kept = json.loads(read_text(path))
         facts, metrics, agents = kept["facts"], kept["metrics"], kept["agents"]
         trials: dict[Instance, Scores] = {}
-        if kept["format"] != FORMAT or not all(type(facts[key]) is int for key in ("seed", "starts")):
+        whole = all(type(facts[key]) is int and facts[key] >= 0 for key in ("seed", "starts"))
+        if kept["format"] != FORMAT or not whole or len({tuple(sorted(theta)) for theta, _ in kept["trials"]}) > 1:
             raise ValueError
         for theta, scores in kept["trials"]:
             cells = {(a, s): one for a, row in zip(agents, scores, strict=True) for s, one in enumerate(row) if one}
             found = {key: dict(zip(metrics, one, strict=True)) for key, one in cells.items()}
-            if not all(is_finite(value) for one in (theta, *found.values()) for value in one.values()):
+            values = [value for one in (theta, *found.values()) for value in one.values()]
+            if not all(is_finite(value) and abs(value) < LARGEST for value in values):
                 raise ValueError
             trials[instance_of(theta)] = found
     except OSError as problem:
@@ -219,6 +224,9 @@ def _check_same(run: StudyRun, source: Source) -> None:
     agents = {agent for scores in source.trials.values() for agent, _ in scores}
     if lacks := [agent for agent in settings.agents if agent not in agents]:
         raise _refused(settings, source.path, f"has not driven {', '.join(lacks)}; remove it")
+    scored = {name for scores in source.trials.values() for one in scores.values() for name in one}
+    if lacks := [metric.name for metric in settings.metrics if metric.name not in scored]:
+        raise _refused(settings, source.path, f"has no scores of {', '.join(lacks)}; remove it")
     boxes = [sorted(name for name, _ in next(iter(source.trials))), sorted(settings.space.names)]
     if boxes[0] != boxes[1]:
         told = f"its parameters are {', '.join(boxes[0])}, this study's {', '.join(boxes[1])}"

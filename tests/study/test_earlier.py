@@ -91,6 +91,14 @@ def _cut_in_half(path: Path) -> None:
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
 
 
+def _edit_table(folder: Path, **changes: object) -> None:
+    """Leave the source its table alone, in which these keys are others; a function changes what is there."""
+    (folder / "study.db").unlink()
+    table = json.loads((folder / TABLE).read_text())
+    table |= {key: value(table[key]) if callable(value) else value for key, value in changes.items()}
+    (folder / TABLE).write_text(json.dumps(table))
+
+
 def _other_code(folder: Path, shift: float) -> None:
     """Make the source's table one of other code, whose scores differ by so much."""
     (folder / "study.db").unlink()
@@ -117,6 +125,24 @@ BAD = {
     "other code": ({}, lambda bank: _other_code(bank, 0.5), "its code or versions are others, and agent"),
     "half a database": ({}, lambda bank: _cut_in_half(bank / "study.db"), "study.db: "),
     "half a table": ({}, lambda bank: ((bank / "study.db").unlink(), _cut_in_half(bank / TABLE)), "no table of trials"),
+    "a seed below 0": ({}, lambda bank: _edit_table(bank, facts=lambda own: own | {"seed": -1}), "no table of trials"),
+    "other metrics": (
+        {},
+        lambda bank: _edit_table(bank, metrics=["a", "b"]),
+        "has no scores of distance, survival_time",
+    ),
+    "θ cut short": (
+        {},
+        lambda bank: _edit_table(bank, trials=lambda own: [*own[1:], [{"trim": 0.1}, own[0][1]]]),
+        "no table of trials",
+    ),
+    "a score beyond all": (
+        {},
+        lambda bank: _edit_table(
+            bank, trials=lambda own: [[theta, [[[1e308, 1.0]] * 3] * len(rows)] for theta, rows in own]
+        ),
+        "no table of trials",
+    ),
     "not run": ({}, lambda bank: [(bank / name).unlink() for name in ("study.db", TABLE)], "run it first"),
     "not there": ({}, lambda bank: shutil.rmtree(bank), "no such study or table of trials"),
 }
@@ -142,6 +168,12 @@ def test_a_source_that_is_none_is_refused(case: str, tmp_path: Path, bank: Path,
         run_study(make_study(**LEARNS))
     assert str(refused.value).count("\n") == 0
     assert "bank" in str(refused.value)
+
+
+def test_a_name_longer_than_a_path_is_refused(make_study: MakeStudy) -> None:
+    """No system has such a path: one line, as of any that is not there."""
+    with pytest.raises(ProxytuneError, match="no such study or table of trials"):
+        run_study(make_study(**{**LEARNS, "learn_from": json.dumps(["a" * 5000])}))
 
 
 def test_a_study_learns_neither_from_itself_nor_in_a_circle(make_study: MakeStudy) -> None:

@@ -66,14 +66,14 @@ class Job:
 
 
 def all_jobs(every: int = 1, generator: str = "first") -> tuple[Job, ...]:
-    """Every n-th case of each kind, the kinds mixed so that any beginning has a share of each.
+    """Every n-th case of each kind (0: none), the kinds mixed so that any beginning has a share of each.
 
     Only the first generator has cases of the bullet plant.
     """
     whole = _by_kind(GENERATORS[generator])
     if generator == "first":
         whole["bullet"] = [Job("bullet", case) for case in BULLET]
-    chosen = [_shuffled(jobs[::every]) for jobs in whole.values()]
+    chosen = [_shuffled(jobs[::every]) for jobs in whole.values()] if every else []
     placed = [((n + 0.5) / len(jobs), k, job) for k, jobs in enumerate(chosen) for n, job in enumerate(jobs)]
     return tuple(job for _, _, job in sorted(placed, key=lambda entry: entry[:2]))
 
@@ -414,7 +414,7 @@ def arguments(words: Sequence[str] | None = None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("output", type=Path, help="file of JSON lines, one a case, that is added to")
     parser.add_argument("--generator", choices=tuple(GENERATORS), default="first", help="whose cases")
-    parser.add_argument("--every", type=int, default=1, help="every so many-th case of each kind")
+    parser.add_argument("--every", type=int, default=1, help="every so many-th case of each kind; 0: count only")
     parser.add_argument("--jobs", type=int, default=2, help="cases at a time")
     parser.add_argument("--episodes", type=int, default=12, help="drives of a log")
     parser.add_argument("--seconds", type=float, default=60.0, help="length of a drive")

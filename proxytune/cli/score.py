@@ -23,6 +23,7 @@ from proxytune.report import (
     write_score_table,
 )
 from proxytune.scores import (
+    LABELS,
     Metric,
     ScoreTable,
     both_metrics,
@@ -102,7 +103,8 @@ def _metrics_given(arguments: argparse.Namespace) -> list[str]:
         return expand(known, header)
     found = both_metrics(header)
     if not found or not all("success" in name for name in found):
-        told = f"; the table has {', '.join(found)}" if found else ""
+        known = found or [name for name in header if name not in LABELS]
+        told = f"; the table has {', '.join(known)[:80]}" if known else ""
         raise InputError(f"--metric is missing: say what is compared and whether more is better, NAME:max{told}")
     return [f"{name}:max" for name in found]
 

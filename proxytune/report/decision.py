@@ -11,17 +11,14 @@ from proxytune.report.view import Table, columns_of
 from proxytune.report.wording import listed, plain, short, with_span
 from proxytune.usefulness import (
     Assessment,
-    Choice,
     Decision,
     Panel,
     Plan,
     Saving,
+    Selection,
     Sequential,
     Together,
-    compare_choices,
-    compare_savings,
     mmrv_conventions,
-    use_two,
 )
 
 MOST_NAMED = 28
@@ -215,7 +212,7 @@ def decision_document(assessment: Assessment) -> dict[str, Any]:
     }
 
 
-def choices_document(assessments: Mapping[str, Assessment]) -> list[dict[str, Any]]:
+def choices_document(selection: Selection) -> list[dict[str, Any]]:
     """What choosing by one proxy instead of another saves on the target, as plain JSON."""
     return [
         {
@@ -226,13 +223,12 @@ def choices_document(assessments: Mapping[str, Assessment]) -> list[dict[str, An
             "beyond_noise": one.beyond_noise,
             "on": one.on,
         }
-        for one in _choices(assessments)
+        for one in selection.choices
     ]
 
 
-def together_document(assessments: Mapping[str, Assessment]) -> dict[str, Any]:
+def together_document(both: Together) -> dict[str, Any]:
     """What the two best proxies save together, and the agent to deploy then, as plain JSON."""
-    both = _together(assessments)
     return {
         "proxies": list(both.proxies),
         "saves": _saves(both.saves),
@@ -240,14 +236,14 @@ def together_document(assessments: Mapping[str, Assessment]) -> dict[str, Any]:
     }
 
 
-def choices_sentences(assessments: Mapping[str, Assessment], target: str) -> list[str]:
+def choices_sentences(assessments: Mapping[str, Assessment], selection: Selection, target: str) -> list[str]:
     """Say of every proxy what it would have chosen and saves, and of which two the choice differs beyond noise."""
     lines = []
     for name, one in assessments.items():
         regret = short(one.decision.expected_regret[one.decision.observed.proxy_winners[0]], 2)
         winners = _few(one.decision.observed.proxy_winners)
         lines.append(f"{name}: chooses {winners}, at an expected regret of {regret}; {saving_sentence(one.saves)}")
-    for choice in _choices(assessments):
+    for choice in selection.choices:
         if choice.value > 0.0 or choice.on == "rollouts":
             told = {True: "beyond noise", False: "not beyond noise", None: "noise not known"}[choice.beyond_noise]
             gain = with_span(short(choice.value, 2), *(choice.interval or (None, None)))
@@ -255,22 +251,12 @@ def choices_sentences(assessments: Mapping[str, Assessment], target: str) -> lis
                 lines.append(f"{choice.better} saves {gain} real rollouts of an agent more than {choice.worse}, {told}")
             else:
                 lines.append(f"choosing by {choice.better} instead of {choice.worse} gains {gain} on {target}, {told}")
-    both = _together(assessments)
+    both = selection.together
+    if both is None:
+        return lines
     names, decision = " and ".join(both.proxies), both.decision
     risk = f"deploy {decision.winner}, at an expected regret of {short(decision.expected_regret[decision.winner], 2)}"
     return [*lines, f"{names} together: {saving_sentence(both.saves)}; {risk}"]
-
-
-def _choices(assessments: Mapping[str, Assessment]) -> tuple[Choice, ...]:
-    first = next(iter(assessments.values()))
-    regrets = compare_choices({name: one.inputs for name, one in assessments.items()}, first.asked, first.seed)
-    return (*regrets, *compare_savings({name: one.saves for name, one in assessments.items()}))
-
-
-def _together(assessments: Mapping[str, Assessment]) -> Together:
-    first = next(iter(assessments.values()))
-    inputs, savings = ({name: getattr(one, what) for name, one in assessments.items()} for what in ("inputs", "saves"))
-    return use_two(inputs, savings, first.asked, first.seed)
 
 
 def sequential_document(found: Sequential) -> dict[str, Any]:

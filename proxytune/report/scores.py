@@ -110,7 +110,7 @@ def score_text(
         ((_, assessment),) = assessments.items()
         notes += [f"decision: {line}" for line in decision_table(assessment, target).notes]
     else:
-        notes += [f"decision: {line}" for line in choices_sentences(assessments, target)]
+        notes += [f"decision: {line}" for line in choices_sentences(assessments, selection, target)]
     noise, floor = next(iter(assessments.values())).noise_floor, []
     if selection is not None and noise.value is not None:
         ends = short_span(noise.low, noise.high)
@@ -149,7 +149,7 @@ def score_view(
     choices = (
         ()
         if selection is None
-        else (Paragraphs("Which proxy to choose by", tuple(choices_sentences(assessments, target))),)
+        else (Paragraphs("Which proxy to choose by", tuple(choices_sentences(assessments, selection, target))),)
     )
     return View(
         f"{names} of {target}",
@@ -363,8 +363,8 @@ def ranking_document(assessments: Assessments, selection: Selection) -> dict[str
     return {
         "proxies": [{"proxy": name, "rank": rank, **score_document(assessments[name])} for rank, (name, _) in ranked],
         "differences": differences_document(selection),
-        "choices": choices_document(assessments),
-        "together": together_document(assessments),
+        "choices": choices_document(selection),
+        "together": together_document(selection.together) if selection.together else None,
         "cautions": list(dict.fromkeys(line for one in assessments.values() for line in one.cautions)),
         "notes": [f"no intervals of the differences: {selection.reason}"] if selection.reason else [],
     }

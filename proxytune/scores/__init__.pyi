@@ -1,5 +1,6 @@
 from .cautions import score_cautions as score_cautions
 from .forms import (
+    LABELS as LABELS,
     Side as Side,
     agent_column as agent_column,
     both_metrics as both_metrics,

@@ -170,7 +170,10 @@ def _plain_cells(
                 cells[name].append(value)
             for name, one in read.items():
                 errors[name].append(one[1])
-    if "episode" not in found.cells and not any(cells["episode"]):
+    if "episode" not in found.cells and not all(cells["episode"]):
+        if any(cells["episode"]):
+            line = lines[cells["episode"].index("")]
+            raise ScoresError(f"{found.path}: line {line}: has no counts of rollouts, as other lines have; add them")
         del cells["episode"]
     known = {name: own for name, own in errors.items() if any(own)}
     return replace(found, lines=lines, cells=cells, errors=known)
@@ -193,7 +196,9 @@ def _read(
             return text, error, read[2]
     counts, errors = more
     value = _number(text.replace(found.decimal, "."))
-    if counts is not None and not math.isnan(value):
+    if math.isnan(value):
+        raise ScoresError(f"{where}: must be a finite number, got {text!r}; write successes of rollouts as '18 of 25'")
+    if counts is not None:
         return text, error, counted(value, own[counts], where)
     if errors is not None:
         error = _number(own[errors].replace(found.decimal, ".")) / scale

@@ -32,16 +32,13 @@ from .comparison import (
 )
 from .decision import (
     Asked as Asked,
-    Choice as Choice,
     Decision as Decision,
     Panel as Panel,
     Together as Together,
     chosen as chosen,
-    compare_choices as compare_choices,
     compare_savings as compare_savings,
     decide as decide,
     mmrv_conventions as mmrv_conventions,
-    use_two as use_two,
 )
 from .expectation import (
     Donors as Donors,

@@ -9,7 +9,7 @@ where q, one for all pairs, is the 95 % quantile of the largest studentised devi
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
 from typing import TYPE_CHECKING
@@ -20,7 +20,18 @@ from proxytune.arrays import Floats
 from proxytune.errors import ScoresError
 from proxytune.scores import Metric, ScoreTable, score_cautions
 from proxytune.usefulness.comparison import Comparison, compare
-from proxytune.usefulness.decision import ASKED, Asked, Decision, chosen, decide
+from proxytune.usefulness.decision import (
+    ASKED,
+    Asked,
+    Choice,
+    Decision,
+    Together,
+    chosen,
+    compare_choices,
+    compare_savings,
+    decide,
+    use_two,
+)
 from proxytune.usefulness.noise import Chance, NoiseFloor, SuccessRates, chance, noise_floor, success_rates
 from proxytune.usefulness.pairs import Prpv, prpv, prpv_of_means
 from proxytune.usefulness.predictivity import Correlation, Mmrv, Ppv, kendall_tau, mmrv, ppv, srcc
@@ -261,12 +272,16 @@ class Selection:
         differences: Every two proxies, the better one first; the intervals hold for all of them at once.
         reason: Why there are no intervals, empty if there are.
         confidence: How often such intervals all hold at once.
+        choices: Every two compared by what choosing by them gains, and by what they save; none if not assessed.
+        together: The two that save most, used at once; None likewise.
     """
 
     ranking: tuple[tuple[str, int], ...]
     differences: tuple[Difference, ...]
     reason: str = ""
     confidence: float = CONFIDENCE
+    choices: tuple[Choice, ...] = ()
+    together: Together | None = None
 
 
 FEWEST_RESAMPLES, MOST_RESAMPLES = 100, 1_000_000
@@ -294,7 +309,12 @@ def assess_each(
     }
     if len(found) == 1:
         return found, None
-    return found, select_proxy(proxies=proxies, target=target, metrics=metrics, resamples=resamples, seed=seed)
+    inputs, saves = {name: one.inputs for name, one in found.items()}, {name: one.saves for name, one in found.items()}
+    return found, replace(
+        select_proxy(proxies=proxies, target=target, metrics=metrics, resamples=resamples, seed=seed),
+        choices=(*compare_choices(inputs, asked, seed), *compare_savings(saves)),
+        together=use_two(inputs, saves, asked, seed),
+    )
 
 
 def select_proxy(

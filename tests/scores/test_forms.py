@@ -86,6 +86,12 @@ def test_dictionaries_in_a_python_file_are_read_and_nothing_is_run(file, tmp_pat
         ("a.csv", "policy,success,n\na,0.5,x\n", "must be a whole number"),
         ("a.csv", "policy,success,n\na,0.333,4\n", "no whole number of successes"),
         ("a.csv", "policy,success\na,26 of 25\n", "must be a finite number, got '26 of 25'"),
+        (
+            "a.csv",
+            "policy,success\na,18 of 25\nb,x of 25\n",
+            "line 3, column 'success': must be a finite number, got 'x",
+        ),
+        ("a.csv", "policy,success\na,18 of 25\nb,0.5\n", "line 3: has no counts of rollouts, as other lines have"),
         ("a.csv", "policy,success,success se\na,0.5,-1\n", "standard error must be zero or more"),
         ("a.json", "{", "not readable as JSON"),
         ("a.json", '{"pick": 3}', "holds no scores by agent"),

@@ -198,7 +198,7 @@ def own_plug_ins(at: Checkout) -> str:
 
 def one_worker_then_a_second(at: Checkout) -> str:
     """D3: a cluster of one worker that a second joins."""
-    study = at.own_study(sleep=0.5)
+    study = at.own_study(sleep=1.5)
     with socket.socket() as one:
         one.bind(("127.0.0.1", 0))
         address = f"tcp://127.0.0.1:{one.getsockname()[1]}"
@@ -217,7 +217,7 @@ def one_worker_then_a_second(at: Checkout) -> str:
         command = at.start("study", study, "--backend", "dask", "--address", address)
         time.sleep(10.0)
         start(WORKER, address, "--nthreads", "1", "--no-nanny")
-        return at.end(command).told()
+        return at.end(command, 300.0).told()
 
 
 @contextmanager

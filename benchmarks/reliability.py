@@ -1,10 +1,11 @@
-"""What is survived: `python benchmarks/reliability.py kills|commands|digits|bits|cuts [COUNT]`.
+"""What is survived: `python benchmarks/reliability.py kills|commands|digits|bits|cuts [COUNT] [COMMAND ...]`.
 
 `kills`: so many studies of each engine, with one job and with two, each ended by `kill -9` at four random moments and
 then finished; their trials and episodes are compared with those of a study that was never stopped.
 
 `commands`: each command is ended by so many `kill -9` at random moments, alone or with its processes, at most four in a
 row, and then run again to its end. Every file must then be what two undisturbed runs agree upon, and no draft be left.
+Commands may be chosen by the names of their table's first column.
 
 `digits`, `bits`, `cuts`: so many times the study.db of a finished study is damaged in one place (a digit of a stored
 value is changed, a bit flipped, the end cut off) and read again. Each damage is told in one line, or changes nothing
@@ -24,7 +25,7 @@ import tempfile
 import time
 import zlib
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
@@ -49,7 +50,8 @@ from proxytune.storage import Store
 from proxytune.study import Study, open_study, result_of, stored_run
 
 KILLS = 4
-TIMES = re.compile(rb"Written [-0-9]+ [0-9:]+( UTC)?|\d+(\.\d+)? m?s\b")
+TIMES = re.compile(rb"\d{4}-\d\d-\d\d \d\d:\d\d|\d+(\.\d+)? m?s\b")
+"""When a page was written, and how long it took."""
 TABLES = ("facts", "trials", "episodes", "instances")
 
 
@@ -128,7 +130,7 @@ def prepare(home: Path) -> None:
     foreign_robot.write_own_times(home / "log", drives)
 
 
-def survive_in_every_command(count: int, home: Path) -> str:
+def survive_in_every_command(count: int, home: Path, chosen: Collection[str] = COMMANDS) -> str:
     """Kill every command, run it again, and compare what it leaves; a line of a table each."""
     start, work = home / "start", home / "work"
     start.mkdir()
@@ -138,7 +140,8 @@ def survive_in_every_command(count: int, home: Path) -> str:
     os.chdir(work)
     lines = ["| command | kills | before its end | runs | came to the same |", "|---|---|---|---|---|"]
     with launched.launching() as launcher:
-        for name, words in COMMANDS.items():
+        for name in chosen:
+            words = COMMANDS[name]
             whole, seconds = [], 0.0
             for _ in range(2):
                 renew(work, start)
@@ -260,19 +263,21 @@ def survive_damage(damage: Callable[[Path, random.Random], None], count: int, ho
     return f"{count} times: " + ", ".join(f"{number} {what}" for what, number in said.most_common())
 
 
-SURVIVALS = {"kills": survive_kills, "commands": survive_in_every_command}
 DAMAGES = {"digits": change_digit, "bits": flip_bit, "cuts": cut_off}
 
 
 def run() -> None:
     """Do one of them, and print a line."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("what", choices=(*SURVIVALS, *DAMAGES))
+    parser.add_argument("what", choices=("kills", "commands", *DAMAGES))
     parser.add_argument("count", type=int, nargs="?", default=3)
+    parser.add_argument("names", nargs="*", choices=[[], *COMMANDS], metavar="COMMAND")
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as home:
-        if asked.what in SURVIVALS:
-            print(SURVIVALS[asked.what](asked.count, Path(home)))
+        if asked.what == "commands":
+            print(survive_in_every_command(asked.count, Path(home), asked.names or COMMANDS))
+        elif asked.what == "kills":
+            print(survive_kills(asked.count, Path(home)))
         else:
             print(survive_damage(DAMAGES[asked.what], asked.count, Path(home)))
 

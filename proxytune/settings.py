@@ -46,7 +46,9 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
 
 def alike_caution(what: str, names: Iterable[str]) -> str:
-    """The caution about different names that read the same: by Unicode form, blanks, or as numbers; empty if none do.
+    """The caution about different names that read the same; empty if none do.
+
+    They may differ by Unicode form, by blanks and what is not seen at all, or in how a number is written.
 
     Args:
         what: What has them, as in "agents".
@@ -55,7 +57,8 @@ def alike_caution(what: str, names: Iterable[str]) -> str:
     known: dict[object, str] = {}
     pairs = []
     for name in dict.fromkeys(names):
-        key: object = " ".join(unicodedata.normalize("NFKC", name).split())
+        seen = "".join(letter for letter in name if unicodedata.category(letter) != "Cf")
+        key: object = " ".join(unicodedata.normalize("NFKC", seen).split())
         with contextlib.suppress(ValueError):
             key = float(name) if name.isascii() and "_" not in name else key
         first = known.setdefault(key, name)

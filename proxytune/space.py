@@ -49,7 +49,7 @@ class Interval:
     """One side of a search box.
 
     Raises:
-        SettingsError: If a bound is not finite or the bounds are reversed or equal.
+        SettingsError: If a bound is not finite or the bounds are reversed, or equal but for rounding.
     """
 
     name: str
@@ -64,6 +64,9 @@ class Interval:
             raise SettingsError(
                 f"{self.name}: the lower bound must be below the upper one, got [{self.low}, {self.high}]"
             )
+        if not max(1e-9 * max(abs(self.low), abs(self.high)), 1e-100) < self.high - self.low < math.inf:
+            apart = "bounds must be further apart than rounding, and not infinitely far"
+            raise SettingsError(f"{self.name}: {apart}, got [{self.low}, {self.high}]")
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """Exports: what was found for other simulators and robots, a study's trials for other optimisers, and a filter."""
 
+import filecmp
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -144,13 +145,17 @@ def _check_has(has: Sequence[str], catalogue: Catalogue) -> None:
 
 
 def _export_trials(folder: Path, output: Path, to: str) -> ExportReport:
-    """Write all trials of a study; a file that is there may be a storage with other studies, so it is left alone."""
+    """Write all trials of a study; a file that is there may be a storage with other studies, and only the same goes."""
     if not folder.is_dir():
         raise InputError(f"{folder}: --to {to} takes the trials of a study; give the study's folder")
-    if output.exists():
-        raise InputError(f"{output}: is there already; give another name, or move it away")
     history = read_study(folder).history()
-    write_whole(output, "", lambda draft: TRIALS[to](history, draft))
+
+    def write(draft: Path) -> None:
+        TRIALS[to](history, draft)
+        if output.exists() and not filecmp.cmp(output, draft, shallow=False):
+            raise InputError(f"{output}: is there already; give another name, or move it away")
+
+    write_whole(output, "", write)
     return ExportReport(output, to, (), {"name": history.name, "trials": len(history.trials)})
 
 

@@ -3,7 +3,8 @@
 Whole drives are looked at as `read_log` gives them, so that `import` and `diagnose` tell the same.
 """
 
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +30,18 @@ LATEST_S = 1.5
 AGAINST = 0.5
 """A correlation below its negative is turning the other way."""
 
+ASKEW_DEG = 40.0
+"""Trackers' frames are turned by less where nobody meant it otherwise."""
+
+JUMP_M, JUMP = 0.5, 5.0
+"""A chord that is longer, and so many times a fast one, was not driven."""
+
+FROZEN_S, STILL_M_S = 2.0, 0.02
+"""Longer than a cut-out of the motors; slower than any drive."""
+
+SLOWEST_TURN, FASTEST_TURN = 0.1, 5.0
+"""Skid steering loses less; degrees are 57 to a radian."""
+
 FASTER, SLOWER = 1.75, 0.5
 """Gains of motors, slip and dead bands stay within; a duty of another scale, or a speed in another unit, does not."""
 HELD_S = 0.7
@@ -51,7 +64,8 @@ def log_cautions(log: Log, figures: Figures) -> tuple[str, ...]:
     found = [
         *figure_cautions({**figures, **log.geometry}, f"robot {log.robot}"),
         *_axes(chords),
-        *([] if log.command == "none" else [*_turning(log, chords), *_speeds(log, chords, figures)]),
+        *_jumps(log, chords),
+        *([] if log.command == "none" else _obedience(log, chords, figures)),
         *([names] if names else []),
         *_copies(log),
     ]
@@ -110,6 +124,72 @@ def _axes(drives: list[Chords]) -> Iterator[str]:
             "places are mirrored against headings: the robot moves where a mirror image of it points; reverse x or y, "
             "or exchange them, so that headings turn from x to y"
         )
+    askew = math.degrees(float(np.angle(np.mean(np.exp(2j * (course - heading)))))) / 2.0
+    if spread < TURNED and together > FITS and abs(askew) > ASKEW_DEG:
+        yield (
+            f"the robot moves at {abs(askew):.0f}° to where its headings point: headings grow from x to y and are 0 "
+            "along x; turn them, or the places"
+        )
+
+
+def _jumps(log: Log, drives: list[Chords]) -> Iterator[str]:
+    """Tell where a drive is all at once elsewhere."""
+    for episode, chords in zip(log.episodes, drives, strict=True):
+        usual = float(np.quantile(chords.speed, 0.9)) if len(chords.speed) >= ENOUGH else np.inf
+        if chords.speed.max(initial=0.0) * CHORD_S > max(JUMP_M, JUMP * usual * CHORD_S):
+            at = int(np.argmax(chords.speed))
+            yield (
+                f"drive '{episode.name}' jumps by {chords.speed[at] * CHORD_S:.2g} m "
+                f"after {chords.times[at] - chords.times[0]:.4g} s: "
+                "the tracker took something else for it, or two drives are one; cut there"
+            )
+            return
+
+
+def _obedience(log: Log, drives: list[Chords], figures: Figures) -> Iterator[str]:
+    """Compare what was driven with what was asked for."""
+    asked = _commanded(log, figures)
+    driven = max((float(np.quantile(one.speed, 0.9)) for one in drives if len(one.speed)), default=0.0)
+    if driven > STILL_M_S and not any(episode.commands.any() for episode in log.episodes):
+        yield f"the robot drives at {driven:.2g} m/s, and every command is zero: take what moved it"
+        return
+    yield from _turning(log, drives)
+    if np.isfinite(np.concatenate([speed for speed, _ in asked])).all():
+        yield from _backwards(log, drives, asked)
+        yield from [*_frozen(log, asked)] or _speeds(log, drives, asked)
+
+
+def _backwards(log: Log, drives: list[Chords], asked: Sequence[tuple[Floats, Floats]]) -> Iterator[str]:
+    """Tell where it goes back when it is told to go on."""
+    along = [one.speed * np.cos(one.course - one.heading) for one in drives]
+    wanted = [
+        np.interp(one.times, episode.times, speed)
+        for episode, one, (speed, _) in zip(log.episodes, drives, asked, strict=True)
+    ]
+    done, said = np.concatenate(along), np.concatenate(wanted)
+    size = float(np.linalg.norm(done) * np.linalg.norm(said))
+    if len(done) >= ENOUGH and size > 0.0 and float(done @ said) < -AGAINST * size:
+        yield "the robot drives backwards where its commands say forwards: turn the sign of v, or headings, around"
+
+
+def _frozen(log: Log, asked: Sequence[tuple[Floats, Floats]]) -> Iterator[str]:
+    """Tell where poses stay the same to the last digit while it is told to drive on."""
+    large = LARGE * float(np.quantile(np.abs(np.concatenate([speed for speed, _ in asked])), 0.95))
+    for episode, (speed, _) in zip(log.episodes, asked, strict=True):
+        times, poses = (episode.times, episode.poses) if episode.measured is None else episode.measured[:2]
+        times, poses = times[np.isfinite(poses[:, 0])], poses[np.isfinite(poses[:, 0])]
+        driving = np.interp(times, episode.times, np.abs(speed)) > max(large, 1e-9)
+        changes = np.flatnonzero(np.append(len(poses) > 0, (np.diff(poses, axis=0) != 0.0).any(axis=1)))
+        ends = np.append(changes, len(times))[1:]
+        for first, end in zip(changes, ends, strict=True):
+            lasts = float(times[end - 1] - times[first])
+            if lasts > FROZEN_S and driving[first:end].mean() * lasts > FROZEN_S:
+                yield (
+                    f"drive '{episode.name}' keeps one pose to the last digit for {lasts:.2g} s, "
+                    f"from {times[first] - times[0]:.4g} s on, while its commands go on: "
+                    "a tracker that lost the robot; cut it there"
+                )
+                return
 
 
 CHORD_PARTS = ("speed", "course", "heading")
@@ -142,7 +222,11 @@ def _turning(log: Log, drives: list[Chords]) -> Iterator[str]:
     if not sizes.any():
         return
     correlation = found[:, 0] / np.where(sizes > 0.0, sizes, 1.0)
-    strongest = float(correlation[np.argmax(np.abs(correlation))])
+    at = int(np.argmax(np.abs(correlation)))
+    strongest = float(correlation[at])
+    gain = float(found[at, 0] / found[at, 1])
+    if strongest > AGAINST and log.command == "twist" and not SLOWEST_TURN < gain < FASTEST_TURN:
+        yield f"the robot turns {gain:.2g} times as fast as its commands say: check the unit of omega, rad/s"
     if strongest < -AGAINST:
         yield (
             f"the robot turns the other way than its commands say (correlation {strongest:.2f}): headings that grow "
@@ -150,12 +234,12 @@ def _turning(log: Log, drives: list[Chords]) -> Iterator[str]:
         )
 
 
-def _speeds(log: Log, drives: list[Chords], figures: Figures) -> Iterator[str]:
+def _speeds(log: Log, drives: list[Chords], asked: Sequence[tuple[Floats, Floats]]) -> Iterator[str]:
     """Tell where large commands, held for a while, take it much further or less far than they ask for."""
     ratios = []
-    for episode, chords, (asked, _) in zip(log.episodes, drives, _commanded(log, figures), strict=True):
-        size = np.abs(asked)
-        if not len(chords.times) or not np.isfinite(size).all() or not size.any():
+    for episode, chords, (wanted, _) in zip(log.episodes, drives, asked, strict=True):
+        size = np.abs(wanted)
+        if not len(chords.times) or not size.any():
             continue
         at = [np.interp(chords.times + shift, episode.times, size) for shift in (CHORD_S, 0.0, -HELD_S / 2.0, -HELD_S)]
         least, most = np.min(at, axis=0), np.max(at, axis=0)

@@ -47,6 +47,7 @@ def score_cautions(*, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[M
         lines += _negative_times(table, metrics, side)
         lines += _copies(table, side)
         lines += _tolerances(table, metrics, side)
+    lines += [*_one_table(proxy, target), *_signs(proxy, target, metrics)]
     lengths = [*_lengths(proxy, target, metrics)]
     return (*lines, *lengths, *_units(proxy, target, metrics, alone=not lengths))
 
@@ -83,6 +84,25 @@ def _copies(table: ScoreTable, side: str) -> Iterator[str]:
             f"of {table.counts.sum()} episodes of {side} only {kept} differ from one another: the others are copies to "
             "the last digit; give each once, or intervals come out too narrow"
         )
+
+
+def _one_table(proxy: ScoreTable, target: ScoreTable) -> Iterator[str]:
+    rows = proxy.values[proxy.driven]
+    distinct = len(np.unique(rows, axis=0)) >= max(DISTINCT * len(rows), 4)
+    if distinct and np.array_equal(proxy.values, target.values, equal_nan=True):
+        yield "the proxy has the target's scores to the last digit; give another table, unless one is a copy on purpose"
+
+
+def _signs(proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -> Iterator[str]:
+    """Every agent has about its score of the other side, but for the sign."""
+    for place, metric in enumerate(metrics):
+        one, other = proxy.means[:, place], target.means[:, place]
+        apart = (np.sign(one) == np.sign(one[0])).all() and (np.sign(one) == -np.sign(other)).all() and one[0] != 0.0
+        if not apart or len(one) < 3 or _is_time(metric.name):
+            continue
+        if np.ptp(np.log10(np.abs(one)) - np.log10(np.abs(other))) < AGREED:
+            below = "the proxy and above it on the target" if one[0] < 0.0 else "the target and above it in the proxy"
+            yield f"scores of {metric.name} are below zero in {below}, of like size; give both with one sign"
 
 
 def _tolerances(table: ScoreTable, metrics: Sequence[Metric], side: str) -> Iterator[str]:

@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal
 
@@ -111,6 +112,9 @@ class History:
     answer: int
 
 
+UNDATED = datetime(2000, 1, 1)
+
+
 def write_optuna(history: History, path: Path) -> None:
     """Write an Optuna storage, an SQLite file with one study of one trial per trial.
 
@@ -139,13 +143,16 @@ def write_optuna(history: History, path: Path) -> None:
 
 def _optuna_trial(optuna: Any, space: Space, trial: PastTrial) -> Any:
     states = optuna.trial.TrialState
-    return optuna.trial.create_trial(
+    past = optuna.trial.create_trial(
         state={"finished": states.COMPLETE, "cut": states.PRUNED, "failed": states.FAIL}[trial.state],
         params={name: trial.theta[name] for name in space.names},
         distributions={one.name: optuna.distributions.FloatDistribution(one.low, one.high) for one in space.intervals},
         value=trial.value,
         user_attrs=dict(trial.facts),
     )
+    # When it was driven is not known; the time of writing would make every copy another
+    past.datetime_start = past.datetime_complete = UNDATED
+    return past
 
 
 def optimize_result(history: History) -> Any:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from proxytune.errors import InputError
+from proxytune.errors import InputError, SettingsError
 from proxytune.identity import files_beside, is_module
 from proxytune.learning import TeachingSettings, read_teaching
 from proxytune.scores import Metric
@@ -393,7 +393,11 @@ def _settings(read: Section) -> StudySettings:
 def _space(parameters: Section) -> Space:
     if not parameters.values:
         raise Section(parameters.path, "", {}).error("parameters", "is missing; write NAME = [low, high] in it")
-    return Space(tuple(Interval(name, *parameters.bounds(name)) for name in sorted(parameters.values)))
+    pairs = {name: parameters.bounds(name) for name in sorted(parameters.values)}
+    try:
+        return Space(tuple(Interval(name, *pair) for name, pair in pairs.items()))
+    except SettingsError as problem:
+        raise SettingsError(f"{parameters.path}: {parameters.name}{problem}") from None
 
 
 def settings_document(settings: StudySettings) -> Mapping[str, Any]:

@@ -12,6 +12,7 @@ import numpy as np
 from proxytune.arrays import Flags, Floats, Whole
 from proxytune.errors import ScoresError
 from proxytune.scores import Metric, ScoreTable
+from proxytune.settings import alike_caution
 
 
 @dataclass(frozen=True)
@@ -83,6 +84,7 @@ def compare(*, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric])
         known = set(absent.agents)
         if missing := [name for name in present.agents if name not in known]:
             remedy = "add or remove them, or compare the others alone (score --common)"
+            remedy = alike_caution("agents", (*missing, *absent.agents)) or remedy
             raise ScoresError(f"{other} lacks scores of {', '.join(missing)}, which {where} has; {remedy}")
     if len(target.agents) < 2:
         raise ScoresError(f"only one agent ('{target.agents[0]}') is scored; comparing takes at least two")

@@ -153,6 +153,18 @@ def test_a_file_that_is_there_and_a_model_have_no_trials_written(finished, model
     assert not (tmp_path / "new").exists()
 
 
+@pytest.mark.parametrize("form", ["optuna", "skopt"])
+def test_the_same_export_again_is_no_error_as_a_killed_one_may_have_been_through(finished, tmp_path, form):
+    pytest.importorskip("optuna")
+    words, file = ["export", str(finished), "--to", form, "--output", str(tmp_path / "trials")], tmp_path / "trials"
+    assert main(words) == 0
+    first = file.read_bytes()
+    assert main(words) == 0
+    assert file.read_bytes() == first
+    file.write_bytes(first + b" ")
+    assert main(words) == 2
+
+
 def test_an_output_that_cannot_be_written_is_one_line(finished, tmp_path, capsys):
     (tmp_path / "file").write_text("")
     output = tmp_path / "file" / "trials.pkl"

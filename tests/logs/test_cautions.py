@@ -45,7 +45,36 @@ def named(*names):
     return replace(LOG, episodes=tuple(replace(episode, name=name) for episode, name in pairs))
 
 
+def lost(episode):
+    """The tracker keeps what it saw last, from half of the drive on."""
+    half = len(episode.poses) // 2
+    return replace(episode, poses=np.concatenate((episode.poses[:half], np.tile(episode.poses[half], (half, 1)))))
+
+
+def elsewhere(episode):
+    return replace(episode, poses=episode.poses + (np.arange(len(episode.poses)) > 400)[:, None] * (3.0, 0.0, 0.0))
+
+
+def in_degrees():
+    """Twists whose omega is in degrees a second."""
+    twists = [one.commands @ np.array(((0.3, -150.0), (0.3, 150.0))) for one in LOG.episodes]
+    pairs = zip(LOG.episodes, twists, strict=True)
+    return replace(LOG, command="twist", episodes=tuple(replace(one, commands=own) for one, own in pairs))
+
+
 CASES = {
+    "headings along y": (
+        changed(lambda episode: replace(episode, poses=episode.poses + (0.0, 0.0, np.pi / 2))),
+        "moves at (89|90)° to where its headings point",
+    ),
+    "headings to the rear": (
+        changed(lambda episode: replace(episode, poses=episode.poses + (0.0, 0.0, np.pi))),
+        "drives backwards where its commands say forwards",
+    ),
+    "a frozen tracker": (changed(lost), r"drive '00' keeps one pose to the last digit for 2\d s, from \d+ s on"),
+    "a jump": (changed(elsewhere), r"drive '00' jumps by 3(\.\d)? m after (19|20)"),
+    "no commands": (commanded(0.0), "every command is zero"),
+    "omega in degrees": (in_degrees(), r"turns 0\.0\d+ times as fast as its commands say: check the unit of omega"),
     "y reversed": (moved(1, -1, 1), "places are mirrored against headings"),
     "x and y exchanged": (changed(exchanged), "places are mirrored against headings"),
     "a left-handed frame": (moved(1, -1, -1), "turns the other way than its commands say"),

@@ -43,6 +43,19 @@ CASES = {
     "a tenfold proxy": (table(scaled(PROXY, 10)), table(TRUE), METRICS, r"distance in the proxy are \d.* times"),
     "far too much": (table(PROXY), table(scaled(TRUE, 1e60)), METRICS, r"distance in the target are .*e\+60 times"),
     "negative times": (table(scaled(PROXY, 1, -1)), table(TRUE), METRICS, r"survival_time of the proxy is below zero"),
+    "a proxy with the other sign": (
+        table(scaled(PROXY, -1)),
+        table(TRUE),
+        METRICS,
+        r"distance are below zero in the proxy and above it on the target",
+    ),
+    "one table twice": (table(TRUE), table(TRUE), METRICS, r"the target's scores to the last digit"),
+    "a letter that is not seen": (
+        table(PROXY, ("agent\u200b1", *AGENTS[1:])),
+        table(TRUE),
+        METRICS,
+        r"agents 'agent\\u200b1' and 'agent1' read",
+    ),
     "no pair left": (table(PROXY), table(TRUE), TIED, r"tolerance of distance, 1e\+06, leaves no two agents of"),
     "copies": (
         table(PROXY),

@@ -47,7 +47,7 @@ SAME_CODE = {
     "engine gp": ("231c6791b2b7", "1dae7f006157", "41a805e87825"),
     "engine random": ("0faabd65d4d9", "40019bb841cc", "aa9b7e2da380"),
     "engine sobol": ("225f0b0407fb", "40019bb841cc", "aa9b7e2da380"),
-    "engine tpe": ("7bbfc93f55ba", "5004f0c9a482", "dab8e44a497a", "ddc23b002b6e"),
+    "engine tpe": ("7bbfc93f55ba", "5004f0c9a482", "dab8e44a497a", "ddc23b002b6e", "126945151387"),
     "design": ("3695c894b9c7", "40019bb841cc", "aa9b7e2da380"),
     "learner proxytune.learning.cloning": (
         "ceb19d953492d57f248e919c7553724e5616f3b383452117639093a35b2ce432",

@@ -113,6 +113,7 @@ class History:
 
 
 UNDATED = datetime(2000, 1, 1)
+"""The start and end of every trial that is written: when it was driven is not known."""
 
 
 def write_optuna(history: History, path: Path) -> None:
@@ -150,7 +151,7 @@ def _optuna_trial(optuna: Any, space: Space, trial: PastTrial) -> Any:
         value=trial.value,
         user_attrs=dict(trial.facts),
     )
-    # When it was driven is not known; the time of writing would make every copy another
+    # The time of writing would make every copy another
     past.datetime_start = past.datetime_complete = UNDATED
     return past
 

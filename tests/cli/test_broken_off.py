@@ -16,7 +16,7 @@ pytestmark = [
     pytest.mark.skipif(not HOOKED, reason="this Python's SQLite hides what its system calls could be replaced by"),
 ]
 SMALL = {"agents": '["agent0", "agent1"]', "metrics": '["distance:max"]', "starts": "1"}
-TIMES = re.compile(rb"Written [-0-9]+ [0-9:]+( UTC)?|\d+(\.\d+)? m?s\b")
+TIMES = re.compile(rb"\d{4}-\d\d-\d\d \d\d:\d\d UTC|\d+(\.\d+)? m?s\b")
 TOLD = re.compile(r"proxytune \w+: .*(disk (is )?full|No space left|cannot be written).*\n")
 TIMED = {"study.toml", "study.db", "report.html"}
 """What has times in it everywhere, or names the folder; documents are compared instead."""

@@ -175,7 +175,7 @@ def test_a_disk_that_fills_up_is_told_and_the_study_goes_on_when_there_is_room(h
 def drawn(folder):
     """Figures and report, but for its date, and whatever else is in the folder but the database."""
     files = [path for path in folder.rglob("*") if path.is_file() and path.name != "study.db"]
-    return {path: re.sub(rb"Written [-0-9]+ [0-9:]+", b"", path.read_bytes()) for path in files}
+    return {path: re.sub(rb"\d{4}-\d\d-\d\d \d\d:\d\d UTC", b"", path.read_bytes()) for path in files}
 
 
 @slow

@@ -68,6 +68,8 @@ def saving_sentence(saving: Saving) -> str:
         return f"simulation saves no real rollouts: {saving.reason}"
     rollouts = with_span(short(worth, 2), *saving.interval)
     how = "by paired starts" if saving.kind == "paired" else "by what the proxy foretells over agents, not by pairs"
+    if saving.simulated <= 1.0:  # a mean, of who knows how many
+        return f"the one simulated row of an agent is worth {rollouts} real rollouts, {how}"
     return f"{saving.simulated:.0f} simulated rollouts of an agent are worth {rollouts} real ones, {how}"
 
 

@@ -82,7 +82,7 @@ def score_next_step(assessments: Assessments, selection: Selection | None) -> st
         return "score more agents or more episodes, to tell the best proxies apart."
     (assessment,) = assessments.values()
     if assessment.prpv_interval.low is None:
-        return "score every agent in at least two episodes on both sides, which gives intervals."
+        return "score every agent in at least two episodes on both sides, or state their number; that gives intervals."
     if assessment.chance.explains:
         return "score more agents, or agents whose scores differ more, until chance can be excluded."
     if assessment.at_noise_floor:

@@ -68,7 +68,10 @@ def too_few(table: ScoreTable, name: str) -> str:
     if not single:
         return ""
     who = "each agent" if len(single) == len(table.agents) else f"agent '{single[0]}'"
-    return f"{who} has one episode {name}, which says nothing about noise; score at least two"
+    return (
+        f"{who} has one episode {name}, or a mean of an unknown number, which says nothing about noise; "
+        "score at least two, or state the number (of a success rate: a column n)"
+    )
 
 
 def bootstrap_means(inputs: Comparison, *, resamples: int, seed: int) -> Means:

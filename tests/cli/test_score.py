@@ -130,6 +130,13 @@ def test_single_rows_give_no_interval_but_a_note(tables):
     assert "–" in shown("--proxy", "again.csv", "--target", "one.csv", "--metric", "distance:max")
 
 
+def test_a_rate_without_its_number_is_not_called_a_rollout(tables):
+    Path("both.csv").write_text("Policy,Sim success (%),Real success (%),Real n\nA,48,40,20\nB,72,65,20\nC,81,45,20\n")
+    text = " ".join(shown("both.csv").split())
+    assert "or a mean of an unknown number, which says nothing about noise" in text
+    assert "1 simulated rollouts" not in text
+
+
 def test_halves_are_called_halves_and_repeats_of_the_starts_a_noise_floor(tables):
     base = ("--proxy", "sim.csv", "--target")
     halves = document(*base, "real.csv", *METRIC)

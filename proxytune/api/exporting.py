@@ -42,7 +42,7 @@ from proxytune.report import (
 from proxytune.search import History, write_optuna, write_skopt
 from proxytune.settings import figure_cautions, nearest
 from proxytune.space import Theta
-from proxytune.study import bare_family
+from proxytune.study import FILE_NAME, bare_family
 
 TRIALS: Mapping[str, Callable[[History, Path], None]] = {"optuna": write_optuna, "skopt": write_skopt}
 """Formats that take the trials of a study, not what was found."""
@@ -171,6 +171,8 @@ def _row(line: ExportLine) -> dict[str, Any]:
 
 
 def _instance_of(path: Path) -> tuple[Instance, tuple[str, ...]]:
+    if (model := path / "model.toml").is_file() and not (path / FILE_NAME).exists():
+        raise InputError(f"{path}: is no study's folder; give what was diagnosed, {model}")
     return (_of_study(path), ()) if path.is_dir() else _of_model(path)
 
 

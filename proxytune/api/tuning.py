@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import tomlkit
 
@@ -22,7 +23,7 @@ from proxytune.errors import EpisodeError, InputError
 from proxytune.files import temporary_folder
 from proxytune.identity import digest, meaning_of_code
 from proxytune.report import write_text
-from proxytune.scores import Metric, read_scores
+from proxytune.scores import Metric, ScoreTable, read_scores
 from proxytune.settings import nearest
 from proxytune.space import Parameter, Space, Theta
 from proxytune.study import FILE_NAME, GIVEN, Study, open_settings, plan_episodes, read_study_settings
@@ -106,7 +107,8 @@ def tune(
         known: θ to try first; or a DataFrame of what was simulated before, by θ, agent and episode, that is not
             simulated again.
         columns: What columns are called in `scores`, as in {"agent": "policy"}.
-        starts: How many starting conditions; as many as the target has episodes of an agent if not given.
+        starts: How many starting conditions. If not given, as many as the target has episodes of an agent; one of a
+            function that takes no start, and all of the target's episodes repeat it.
         budget: How many trials.
         domain: Other keys of an environment's `[domain]` table, as in {"steps": 200}.
         progress: Whether to show a bar.
@@ -124,6 +126,8 @@ def tune(
         if not callable(simulate):
             raise InputError(f"simulator: {simulate!r} is no function; an environment needs agents={{name: policy}}")
         counted = int(table.counts.max()) if "start" in _arguments(simulate) else 1
+        if repeated := starts is None and counted < table.counts.max():
+            target = _as_repeats(table, home)
         stated = {
             "format": 1,
             "name": "tune" if folder is None else home.name,
@@ -133,7 +137,7 @@ def tune(
             "agents": list(names),
             "starts": counted if starts is None else starts,
             "budget": budget,
-            **({"target_columns": dict(columns)} if columns else {}),
+            **({"target_columns": dict(columns)} if columns and not repeated else {}),
             **keys,
             "parameters": {one.name: [one.low, one.high] for one in space.intervals},
         }
@@ -173,6 +177,17 @@ def _written(home: Path, scores: pd.DataFrame | str | Path) -> Iterator[Path]:
             write_text(one, text)
         where = f"{home}: " if before else ""
         raise type(problem)(str(problem).replace(str(table), "scores").replace(f"{path}: ", where)) from None
+
+
+def _as_repeats(table: ScoreTable, home: Path) -> Path:
+    """The file of a target's scores, in the study's folder, in which every episode repeats start 0."""
+    rows = pd.DataFrame(
+        {"agent": agent, "episode": f"0/{place}", **dict(zip(table.metrics, values[place], strict=True))}
+        for agent, values in zip(table.agents, table.values, strict=True)
+        for place in np.flatnonzero(~np.isnan(values[:, 0]))
+    )
+    write_text(home / "target.csv", rows.to_csv(index=False, lineterminator="\n"))
+    return home / "target.csv"
 
 
 def _known(study: Study, known: pd.DataFrame | Iterable[Theta]) -> list[Outcome | Theta]:

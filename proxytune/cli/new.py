@@ -27,7 +27,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--figures",
         metavar="NAME=VALUE,…",
         help="of a robot: what you know, as wheel_radius=0.033,wheel_distance=0.16,full_speed=0.5,"
-        "motor_time_constant=0.1,camera_height=0.11,camera_pitch=20 (m, m/s, s, deg)",
+        "motor_time_constant=0.1,camera_height=0.11,camera_pitch=20 (m, m/s, s, deg); "
+        "of a car also wheelbase=0.26,wheel_angle=26",
     )
     parser.add_argument(
         "--urdf", type=Path, metavar="FILE", help="of a robot: its URDF; wheels, mass and camera are read"

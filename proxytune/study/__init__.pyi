@@ -60,6 +60,7 @@ from .run import (
     run_trials as run_trials,
 )
 from .settings import (
+    DEFAULT_FAMILY as DEFAULT_FAMILY,
     FILE_NAME as FILE_NAME,
     LEARNING as LEARNING,
     MADE as MADE,

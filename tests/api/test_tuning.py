@@ -66,6 +66,30 @@ def test_known_points_come_first_and_known_scores_are_not_simulated():
     assert driven
 
 
+def test_every_episode_of_the_target_counts_where_a_function_takes_no_start(tmp_path):
+    """They repeat its one start: none is left out, in a DataFrame or a file, under columns of the user's own names."""
+    scores = pd.DataFrame(
+        {"policy": name, "try": place, "reach": reach + 0.1 * place}
+        for name, reach in REACH.items()
+        for place in range(4)
+    )
+    scores.to_csv(tmp_path / "mine.csv", index=False)
+    for given in (scores, tmp_path / "mine.csv"):
+        report = proxytune.tune(
+            lambda theta, agent: theta["gain"] * REACH[agent],
+            {"gain": (0.5, 2.0)},
+            given,
+            metrics="reach:max",
+            columns={"agent": "policy", "episode": "try"},
+            budget=2,
+            preflight=False,
+            confirm=0,
+        )
+        assert report.document()["target"]["episodes_per_agent"] == [4, 4]
+        assert report.document()["settings"]["starts"] == 1
+        assert not any("left out" in line for line in report.document()["cautions"])
+
+
 def test_a_function_of_theta_and_agent_with_one_score_is_enough():
     """Without starts and seeds there is one start, and a bare number is the one metric."""
     scores = pd.DataFrame({"policy": ["a", "bb", "ccc"], "success": [0.2, 0.5, 0.9]})

@@ -235,6 +235,26 @@ def test_wheels_may_be_named(model, tmp_path):
     export(model, tmp_path / "a.urdf", into=tmp_path / "mine.urdf", wheels=("port", "right_wheel_joint"))
 
 
+def test_wheels_called_l_and_r_are_found(model, tmp_path):
+    (tmp_path / "mine.urdf").write_text(URDF)
+    (tmp_path / "short.urdf").write_text(
+        URDF.replace("left_wheel_joint", "wheel_l").replace("right_wheel_joint", "wheel_r")
+    )
+    for name in ("mine", "short"):
+        export(model, tmp_path / f"{name}_found.urdf", into=tmp_path / f"{name}.urdf")
+    renamed = (tmp_path / "mine_found.urdf").read_text()
+    renamed = renamed.replace("left_wheel_joint", "wheel_l").replace("right_wheel_joint", "wheel_r")
+    assert (tmp_path / "short_found.urdf").read_text() == renamed
+
+
+def test_what_a_diagnosis_wrote_is_named_where_its_folder_is_given(model, tmp_path):
+    (tmp_path / "found").mkdir()
+    (tmp_path / "found" / "model.toml").write_text(model.read_text())
+    (tmp_path / "mine.urdf").write_text(URDF)
+    with pytest.raises(InputError, match="is no study's folder; give what was diagnosed, .*found/model.toml"):
+        export(tmp_path / "found", tmp_path / "out.urdf", into=tmp_path / "mine.urdf")
+
+
 def test_the_users_own_file_is_never_overwritten(model, tmp_path):
     (tmp_path / "mine.urdf").write_text(URDF)
     with pytest.raises(InputError, match="give another name, so that yours is kept"):

@@ -99,6 +99,14 @@ def test_a_proxy_that_lacks_something_is_sent_to_diagnose():
     assert say_finding(replace(ABOVE, fits=False, declared=())).endswith("run `python -m proxytune diagnose LOG`.")
 
 
+def test_of_another_simulator_no_log_is_asked_for_unless_its_robot_drives():
+    lacking = say_finding(replace(ABOVE, fits=False, declared=None))
+    assert lacking.startswith("The proxy lacks something: no θ explains the target's scores")
+    assert lacking.endswith("widen the box; of a robot on wheels a log tells (`diagnose`).")
+    unknown = replace(ABOVE, parameters=(TRIM, DELAY), information=TOLD[0], declared=None)
+    assert say_finding(unknown).endswith("whose scores change with delay (so far agent4's do most), to get closer.")
+
+
 def test_what_chance_explains_is_not_found_and_has_its_probability():
     text = say_finding(BY_CHANCE)
     assert text == (

@@ -5,6 +5,7 @@ robot's own, so that whatever turns velocities into wheel speeds stays as it is.
 """
 
 import math
+import re
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -136,7 +137,7 @@ def _change_camera(instance: Instance, own: OwnFile) -> Iterator[str]:
 
 
 def _joints(xml: XmlPatch, wheels: Sequence[str]) -> tuple[ET.Element, ET.Element]:
-    """The joints of both wheels: those named, those that a plug-in names, or the one pair of left and right names."""
+    """The joints of both wheels: those named, those that a plug-in names, or one pair of left and right names."""
     turning = {
         one.get("name", ""): one
         for one in xml.root.iter("joint")
@@ -158,7 +159,8 @@ def _joints(xml: XmlPatch, wheels: Sequence[str]) -> tuple[ET.Element, ET.Elemen
 
 
 def _mirrored(name: str) -> str:
-    return next((name.replace(a, b) for a, b in (("left", "right"), ("Left", "Right")) if a in name), name)
+    words = next((name.replace(a, b) for a, b in (("left", "right"), ("Left", "Right")) if a in name), name)
+    return words if words != name else re.sub("(?<![^_])l(?![^_])", "r", name)  # wheel_l_joint
 
 
 def _urdf(xml: XmlPatch, left: ET.Element, right: ET.Element) -> OwnFile:

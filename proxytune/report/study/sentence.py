@@ -19,7 +19,7 @@ from proxytune.report.wording import (
     span,
 )
 from proxytune.search import Information
-from proxytune.study import StudyResult
+from proxytune.study import DEFAULT_FAMILY, StudyResult
 from proxytune.usefulness import Chance, Estimate, NoiseFloor
 
 MOST_NAMED = 5
@@ -71,7 +71,8 @@ class Finding:
         starts: How many starts each agent drives from.
         most_starts: How many starts there are.
         confirm: How often the study drives its best θ again.
-        declared: The effects on motion that θ belongs to, which `diagnose` is to tune in any case.
+        declared: The effects on motion that θ belongs to, which `diagnose` is to tune in any case; None where the
+            simulator is another, of which nobody knows whether its robot drives.
     """
 
     parameters: tuple[KnownParameter, ...]
@@ -93,7 +94,7 @@ class Finding:
     starts: int
     most_starts: int
     confirm: int
-    declared: tuple[str, ...]
+    declared: tuple[str, ...] | None
 
     @property
     def least(self) -> KnownParameter:
@@ -185,6 +186,8 @@ def _choose_next_step(finding: Finding) -> str:
     """The one step that brings most."""
     if finding.left:
         return f"run the study again for the {finding.left} trials that are left"
+    if finding.fits is False and finding.declared is None:
+        return "look for what the simulator lacks, or widen the box; of a robot on wheels a log tells (`diagnose`)"
     if finding.fits is False:
         declared = f" --declared {','.join(finding.declared)}" if finding.declared else ""
         return f"log drives of the target (a model's: `record`) and run `python -m proxytune diagnose LOG{declared}`"
@@ -204,7 +207,8 @@ def _say_what_to_add(finding: Finding) -> str:
         informed = finding.information and finding.information.agents
         best = f" (so far {informed[0][0]}'s do most)" if informed else ""
         changes = f"whose scores change with {plain(finding.least.name)}"
-        return f"add an agent or a metric {changes}{best}, or a log for `diagnose`"
+        log = ", or a log for `diagnose`" if finding.declared is not None else ""
+        return f"add an agent or a metric {changes}{best}{log}"
     if finding.information is None or finding.information.limit != "starts":
         return _more_trials(finding)
     if finding.starts == finding.most_starts:
@@ -247,7 +251,7 @@ def finding_of(result: StudyResult) -> Finding:
         starts=settings.starts,
         most_starts=result.study.family.starts,
         confirm=settings.confirm,
-        declared=declared_of(settings.space.names),
+        declared=declared_of(settings.space.names) if settings.family == DEFAULT_FAMILY else None,
     )
 
 

@@ -302,9 +302,11 @@ def column_values(table: Table, column: Column) -> Floats:
 
 def missing(table: Table, fields: Sequence[str]) -> LogError:
     """The complaint about fields that no column was found for."""
+    car = {"throttle", "steering", "speed", "steering_angle"} & set(fields)
+    example = EXAMPLE.replace("v=cmd_lin,omega=cmd_ang", "throttle=gas,steering=wheel") if car else EXAMPLE
     return LogError(
         f"{table.path}: no column found for {', '.join(fields)}; its columns are: {', '.join(table.names)}; "
-        f"say which is which, as in {EXAMPLE}"
+        f"say which is which, as in {example}"
     )
 
 

@@ -578,6 +578,12 @@ def test_speed_and_wheel_angle_are_a_cars_commands_too(file):
     np.testing.assert_allclose(drive.commands.values[0], [0.3, np.radians(20.0)])
 
 
+def test_a_car_is_shown_how_its_own_columns_are_named(file):
+    said = complaint(file(CAR), columns={"throttle": "gas"})
+    assert "no column found for steering" in said
+    assert said.endswith("throttle=gas,steering=wheel")
+
+
 @pytest.mark.parametrize(
     ("steering", "said"),
     [

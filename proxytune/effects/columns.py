@@ -13,7 +13,7 @@ import numpy as np
 from proxytune.effects.command import CommandQuantisation, Delay
 from proxytune.effects.effect import Cue, Effect, FilterContext, Memory, Signal, Trace
 from proxytune.effects.friction import Backlash, DeadBand, Stiction
-from proxytune.effects.motors import BatterySag, DriverMap, MotorLag, Saturation, SlewRate, ThermalFade, WheelGain
+from proxytune.effects.motors import GAIN, BatterySag, DriverMap, MotorLag, Saturation, SlewRate, ThermalFade, WheelGain
 from proxytune.space import Parameter
 
 THROTTLE, STEERING = 0, 1
@@ -85,7 +85,6 @@ def _both_gains(gain: float) -> WheelGain:
     return WheelGain(gain, gain)
 
 
-_GAIN = (replace(WheelGain.parameters[0], name="gain"),)
 _SERVO = "hobby servos of model cars"
 
 QUANTISATION = on_column(CommandQuantisation, THROTTLE, "command_quantisation", "Throttle is rounded to multiples.")
@@ -109,7 +108,7 @@ THROTTLED: tuple[type[Effect], ...] = (
     on_column(Saturation, THROTTLE, "saturation", "The motor turns no faster than at a throttle of `limit`."),
     on_column(WheelGain, THROTTLE, "wheel_gain", "The car drives faster or slower than nominal by a factor.",
               {"source": "batteries, gears and motors other than nominal: up to half faster or slower"},
-              make=_both_gains, parameters=_GAIN),
+              make=_both_gains, parameters=(GAIN,)),
     on_column(BatterySag, THROTTLE, "battery_sag"),
     on_column(ThermalFade, THROTTLE, "thermal_fade"),
     on_column(MotorLag, THROTTLE, "motor_lag", "The motor follows throttle with a first-order lag."),
@@ -130,5 +129,5 @@ STEERED: tuple[type[Effect], ...] = (
                "source": f"{_SERVO}: 0.05 to 0.2 s"}),
     on_column(WheelGain, STEERING, "steering_gain", "The wheels turn by more or less than nominal by a factor.",
               {"source": "linkages and servo horns other than nominal: some tenths more or less"},
-              make=_both_gains, parameters=_GAIN),
+              make=_both_gains, parameters=(GAIN,)),
 )  # fmt: skip

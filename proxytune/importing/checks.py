@@ -36,11 +36,7 @@ SPARSEST = 20.0
 
 
 def check_units(drive: Drive, where: str) -> None:
-    """Refuse a drive whose times, places or commands are plainly in another unit.
-
-    Raises:
-        LogError: With what is odd, and how units are stated.
-    """
+    """Refuse a drive whose times, places or commands are plainly in another unit."""
     about = f"{where}: drive {drive.name}"
     times = drive.poses.times
     lasts = float(times[-1] - times[0])
@@ -101,12 +97,7 @@ MOST_LACKING = 0.1
 def headings_and_tilts(quaternions: Floats, where: str) -> tuple[Floats, Floats]:
     """Headings about the upward axis and tilts away from it, (N,) each [rad]; NaN where a few are no rotation.
 
-    Args:
-        quaternions: Orientations in the world (N, 4): x, y, z, w.
-        where: What they come from, for a complaint.
-
-    Raises:
-        LogError: If more than a few are not finite or of length zero.
+    Quaternions (N, 4) are x, y, z, w in the world.
     """
     wrong = no_rotation(quaternions)
     if wrong.mean() > MOST_LACKING:
@@ -155,9 +146,6 @@ def checked_drive(drive: Drive, where: str, offset_s: float = 0.0) -> tuple[Driv
         drive: As an importer has read it.
         where: The source, as a complaint names it.
         offset_s: How much later poses are stamped than commands, as far as that is known [s].
-
-    Raises:
-        LogError: If stamps jump back, all are equal, poses are not z-up, or commands and poses are of different times.
     """
     about = f"{where}: drive {drive.name}"
     _check_sizes((drive.poses.times, drive.poses.places), "poses", about)

@@ -156,15 +156,7 @@ def write_log(source: Source, folder: Path, facts: Facts, origin: str) -> Log:
 
 
 def fill_log(folder: Path, source: Source, facts: Facts, name: str, origin: str) -> None:
-    """Write a log's files into a folder that is there.
-
-    Args:
-        folder: Where to.
-        source: What was read and checked.
-        facts: What only the user knows.
-        name: What the log is called.
-        origin: Where it came from, for log.toml.
-    """
+    """Write the files of a log of this name into a folder that is there, with its origin in log.toml."""
     samples, commands = [], []
     for drive in source.drives:
         poses = (drive.poses.times, drive.poses.places[:, :2], np.unwrap(drive.poses.headings))
@@ -197,11 +189,7 @@ def _beside(source: Source) -> bool:
 
 
 def read_as(folder: Path, shown: Path) -> Log:
-    """Read a log that lies elsewhere for the moment; complaints name where the user knows it.
-
-    Raises:
-        LogError: If it is none.
-    """
+    """Read a log that lies elsewhere for the moment; complaints name where the user knows it."""
     try:
         return read_log(folder)
     except LogError as problem:

@@ -132,16 +132,7 @@ class Choice:
 
 
 def choose(topics: tuple[Topic, ...], wanted: Wanted, where: str) -> Choice:
-    """Choose topics by what is wanted, else by type, name and number of messages.
-
-    Args:
-        topics: All topics.
-        wanted: What the user asks for.
-        where: The bag, as a complaint names it.
-
-    Raises:
-        LogError: If a topic is named that is missing or of no use, or none can be commands or poses.
-    """
+    """Choose topics by what is wanted, else by type, name and number of messages."""
     if wanted.kind and wanted.kind not in COMMANDS:
         raise LogError(f"{where}: unknown kind of commands '{wanted.kind}'; {nearest(wanted.kind, COMMANDS)}")
     without = "none" in (wanted.commands, wanted.kind)
@@ -234,18 +225,9 @@ def _part(topic: Topic, choice: Choice) -> str:
 
 
 def read_chain(transforms: dict[str, Transform], name: str, stamps: str, where: str) -> tuple[Poses, tuple[str, ...]]:
-    """Poses of a child in a parent, at the times of the transform between them that comes most often.
+    """Poses of a child in a parent ("map>base_link"), at the times of the transform between them that comes most often.
 
     Other moving transforms are interpolated to these times; poses outside of what they cover are left out.
-
-    Args:
-        transforms: All transforms of a bag.
-        name: Parent and child, as in "map>base_link".
-        stamps: Whose times count.
-        where: The bag and topic, as a complaint names them.
-
-    Raises:
-        LogError: If no chain leads from the one to the other, nothing in it moves, or a transform is no rotation.
     """
     chain = chain_of(transforms, name, where)
     for transform in chain:
@@ -298,12 +280,7 @@ def _at(values: Floats, times: Floats | None, wanted: Floats) -> tuple[Floats, R
 def read_bag(path: Path, wanted: Wanted) -> Source:
     """Read a ROS bag, or a folder of bags with a drive each, of the same topics.
 
-    Args:
-        path: A ROS 1 file, a ROS 2 folder or storage file (sqlite3 or mcap), or a folder of such.
-        wanted: Topics and stamps to take.
-
-    Raises:
-        LogError: If a bag cannot be read, or there is nothing that can be commands or poses.
+    The path is a ROS 1 file, a ROS 2 folder or storage file (sqlite3 or mcap), or a folder of such.
     """
     bags = bags_in(path)
     topics, notes = _list(path, bags)

@@ -54,11 +54,7 @@ def has_pybullet() -> bool:
 
 
 def need_pybullet(instead: str = 'plant = "planar"') -> None:
-    """Refuse to go on without PyBullet, which has wheels for Python 3.11 alone.
-
-    Raises:
-        InputError: If it is not installed, with what to take instead.
-    """
+    """Refuse to go on without PyBullet, which has wheels for Python 3.11 alone."""
     if not has_pybullet():
         built = "with a C++ compiler run `pip install pybullet`"
         raise InputError(f"PyBullet is not installed; take {instead}, use Python 3.11, or {built}")

@@ -245,11 +245,7 @@ def ask(driver: Driver, seen: Any, memory: Any, time_s: float) -> tuple[Command,
 
 
 def check_command(command: Command, time_s: float) -> None:
-    """Refuse what are not two finite duties.
-
-    Raises:
-        EpisodeError: With the time [s].
-    """
+    """Refuse what are not two finite duties, with the time [s]."""
     if command.shape != (2,):
         raise EpisodeError(
             f"answered with shape {command.shape} at {time_s:.2f} s; a command is two duties, left and right"

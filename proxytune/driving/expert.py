@@ -128,11 +128,7 @@ class Guide:
 
 
 def lesson_driver(road: Road, robot: Robot, seed: int, policy: Policy | None) -> Expert | Guide:
-    """Who drives in a lesson: the robot's expert, or a policy that it guides.
-
-    Raises:
-        SettingsError: If the robot has no expert.
-    """
+    """Who drives in a lesson: the robot's expert, or a policy that it guides."""
     expert = Expert(road, *robot.expert_figures(), seed=seed)
     return expert if policy is None else Guide(expert, policy)
 

@@ -112,11 +112,7 @@ def image_chain(effects: Iterable[Effect], figures: Mapping[str, float]) -> Chai
 
 
 def with_columns(robot: Robot, least: int) -> Robot:
-    """The robot with a camera of at least so many columns, rows in proportion; every other figure is the same.
-
-    Raises:
-        SettingsError: If the robot has no camera.
-    """
+    """The robot with a camera of at least so many columns, rows in proportion; every other figure is the same."""
     camera = robot.camera_figures()
     columns = max(camera.columns, least)
     rows = round(camera.rows * columns / camera.columns)

@@ -374,11 +374,7 @@ def drive(
 
 
 def only(results: Sequence[Result | EpisodeError]) -> Result:
-    """The result of a fleet of one.
-
-    Raises:
-        EpisodeError: If it is one.
-    """
+    """The result of a fleet of one; if it is an EpisodeError, that is raised."""
     [result] = results
     if isinstance(result, EpisodeError):
         raise result

@@ -256,11 +256,7 @@ def origin_of(element: ET.Element) -> NDArray[np.float64]:
 
 
 def check_body(robot: Robot) -> None:
-    """Refuse a URDF whose wheels are not those of robot.toml: the bullet plant would drive at another speed.
-
-    Raises:
-        SettingsError: If they differ, its axles are not called as the plant calls them, or what it names is no file.
-    """
+    """Refuse a URDF whose wheels are not those of robot.toml: the bullet plant would drive at another speed."""
     path = robot.body()
     root = parse_urdf(path)
     body = read_body(root, path)

@@ -141,11 +141,7 @@ def load_agent(name: Any, folder: Path, space: Any, seed: int) -> Act:
 
 
 def ask_agent(act: Act, observation: Any, space: Any, step: int) -> Any:
-    """An agent's next action, checked.
-
-    Raises:
-        EpisodeError: If it raises, or answers with what is no action.
-    """
+    """An agent's next action, checked."""
     try:
         answer = act(observation)
     except Exception as problem:
@@ -203,11 +199,7 @@ class WrappedEnvironment:
 
 
 def play(wrapped: WrappedEnvironment, act: Act, first: Any, space: Any, steps: int) -> None:
-    """Let an agent act from its first observation on, for so many steps at most.
-
-    Raises:
-        EpisodeError: If agent or environment fail.
-    """
+    """Let an agent act from its first observation on, for so many steps at most."""
     observation = first
     for step in range(steps):
         observation, over = wrapped.step(ask_agent(act, observation, space, step))
@@ -216,11 +208,7 @@ def play(wrapped: WrappedEnvironment, act: Act, first: Any, space: Any, steps: i
 
 
 def score(wrapped: WrappedEnvironment, metrics: tuple[EpisodeMetric, ...]) -> dict[str, float]:
-    """The metrics of an episode that is over.
-
-    Raises:
-        EpisodeError: If info lacks an entry, or it is no number.
-    """
+    """The metrics of an episode that is over."""
     whole = {"return": float(np.sum(wrapped.rewards)), "length": float(len(wrapped.rewards))}
     return {one.name: whole[one.source] if one.source in whole else _of_info(wrapped.infos, one) for one in metrics}
 
@@ -314,20 +302,12 @@ class GymnasiumFamily:
         return read_values(model, self.settings.own, self.settings.folder)
 
     def check_agent(self, name: str) -> None:
-        """Load the agent once.
-
-        Raises:
-            InputError: If there is no such agent.
-        """
+        """Load the agent once."""
         with closing(make_environment(self.settings, dict(self.held))) as environment:
             load_agent(self.policies.get(name, name), self.settings.folder, environment.action_space, 0)
 
     def run(self, episode: Episode) -> Mapping[str, float]:
-        """Play one episode and score it.
-
-        Raises:
-            EpisodeError: If the agent or the environment fails.
-        """
+        """Play one episode and score it."""
         theta = {**dict(self.held), **dict(episode.theta)}
         effects, folder, seed = self._effects(theta), self.settings.folder, acting_seed(episode.seed, episode.start)
         try:

@@ -29,11 +29,7 @@ class PlayedEnvironment:
     make: Callable[..., Any] | None
 
     def __call__(self, theta: Theta, agent: str, start: int, seed: int) -> Mapping[str, float]:
-        """The metrics of one episode.
-
-        Raises:
-            EpisodeError: If the agent or the environment fails.
-        """
+        """The metrics of one episode."""
         _register(self.name, self.make)
         return self.family.run(make_episode(theta, agent=agent, start=start, seed=seed))
 

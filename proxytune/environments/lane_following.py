@@ -151,11 +151,7 @@ class Tally:
         return np.concatenate(self._parts)
 
     def add(self, poses: Signal) -> float:
-        """The distance [m] along the lane in the next ticks' poses (ticks, 3).
-
-        Raises:
-            EpisodeError: If a pose is not finite.
-        """
+        """The distance [m] along the lane in the next ticks' poses (ticks, 3)."""
         part = self._score(np.concatenate((self._parts[-1][-1:], poses)), self._seconds - self._ticks * TICK_S)
         ticks = round(part["survival_time"] / TICK_S)
         self._parts.append(poses)
@@ -170,11 +166,7 @@ class Tally:
         return {"distance": self._distance, "survival_time": self._ticks * TICK_S, "deviation": deviation}
 
     def whole(self) -> dict[str, float]:
-        """Every metric of the drive as a study scores it.
-
-        Raises:
-            EpisodeError: If a pose is not finite.
-        """
+        """Every metric of the drive as a study scores it."""
         return self._score(self.poses, self._seconds)
 
     def _score(self, poses: Signal, seconds: float) -> dict[str, float]:

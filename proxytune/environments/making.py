@@ -91,11 +91,7 @@ class EnvironmentSettings:
 
 
 def read_domain(section: Section) -> EnvironmentSettings:
-    """Read a [domain] table.
-
-    Raises:
-        SettingsError: With file, key and remedy.
-    """
+    """Read a [domain] table."""
     section.only(KEYS)
     folder = section.path.resolve().parent
     effects, _ = read_effects(section.section("effects"), Catalogue(folder))
@@ -262,9 +258,6 @@ def read_values(path: Path, own: tuple[OwnParameter, ...], folder: Path) -> dict
     """Read what a model.toml gives an environment: its effects, and in [parameters] values of the environment's own.
 
     A model that `diagnose` wrote names a robot too, which says nothing of an environment.
-
-    Raises:
-        SettingsError: With file, key and remedy.
     """
     settings = read_settings(path)
     settings.only(("format", "robot", "plant", "geometry", "parameters", "effects"))

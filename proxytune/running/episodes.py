@@ -164,11 +164,7 @@ def _count(episodes: Sequence[Episode], jobs: int, known: Seconds, most_s: float
 
 
 def _lost(watch: Watch, episode: Episode, end: WorkerExit) -> Outcome:
-    """The outcome of an episode that has ended its process, or was ended.
-
-    Raises:
-        RunError: If the process was killed from outside, as a machine without memory does.
-    """
+    """The outcome of an episode that has ended its process, or was ended."""
     where = f"agent '{episode.agent}' from start {episode.start}"
     if end.killed:
         raise RunError(

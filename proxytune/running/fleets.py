@@ -79,11 +79,7 @@ def run_together(family: Any, episodes: Sequence[Episode], needed: Collection[st
 def _judged(
     family: DomainFamily, episode: Episode, result: Any, needed: Collection[str]
 ) -> tuple[Mapping[str, float] | None, str]:
-    """What a fleet's result says of an episode: its metrics, or why it failed.
-
-    Raises:
-        RunError: If the machine failed.
-    """
+    """What a fleet's result says of an episode: its metrics, or why it failed."""
     try:
         if isinstance(result, EpisodeError):
             raise result
@@ -173,10 +169,9 @@ def _generators() -> bytes:
 
 @functools.lru_cache(maxsize=1)
 def _libraries(modules: int) -> ThreadpoolController:
-    """The libraries that have threads of their own; looking for them takes longer than a short episode.
+    """The libraries that have threads of their own, while so many modules are loaded: another may bring another.
 
-    Args:
-        modules: How many modules are loaded: with another, there may be another library.
+    Looking for them takes longer than a short episode.
     """
     return ThreadpoolController()
 

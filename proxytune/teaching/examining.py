@@ -53,11 +53,7 @@ def prepare_points(setup: TeachingSetup, points: Sequence[CurvePoint], jobs: int
 
 
 def prepare_shared(setup: TeachingSetup, points: Sequence[CurvePoint], jobs: int) -> None:
-    """Make what several points share before they are scored, so that no two processes make the same.
-
-    Raises:
-        InputError, RunError: As prepare_points.
-    """
+    """Make what several points share before they are scored, so that no two processes make the same."""
     prepare_points(setup, _shared(setup.settings, points), jobs)
 
 
@@ -67,9 +63,6 @@ def score_points(
     """Score the points in parallel, each yielded as soon as it is there.
 
     Those that take longest begin first: otherwise one of them, begun last, would keep one process busy alone.
-
-    Raises:
-        InputError, RunError: As prepare_points.
     """
     ordered = sorted(points, key=lambda point: -point.count)
     return _spread(setup, functools.partial(_score, setup.score), ordered, jobs)
@@ -111,12 +104,7 @@ class _Loss:
     traced: TracedTask
 
     def __call__(self, point: CurvePoint, end: WorkerExit) -> Any:
-        """Make it once more where that tells which episode it is or it took too long, or say of what it ended.
-
-        Raises:
-            EpisodeError: If a lesson or an examination took longer than it may.
-            RunError: If the process ended otherwise.
-        """
+        """Make it once more where that tells which episode it is or it took too long, or say of what it ended."""
         if self.traced.last(point).endswith(TOGETHER) or end.how == OVERRUN:
             with IsolatedWorker(self.traced) as isolated:
                 return isolated.do(point, functools.partial(self._lost_again, point))

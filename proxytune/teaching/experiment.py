@@ -200,11 +200,7 @@ def check_proxies(settings: StudySettings, setup: TeachingSetup) -> None:
 
 
 def classroom(settings: StudySettings, model: Path | None, lessons: str) -> Classroom:
-    """The domain family that a study names, with a model: one that can teach, for lessons as their key has them.
-
-    Raises:
-        SettingsError: If it cannot.
-    """
+    """The domain family that a study names, with a model: one that can teach, for lessons as their key has them."""
     family = load_family(settings, model)
     lacks = [member for member in ("best_score", "demonstrate", "examine") if not hasattr(family, member)]
     if lacks:

@@ -49,10 +49,6 @@ def watching(what: str, timeout_s: float | None = None) -> Iterator[None]:
     Args:
         what: What is under way.
         timeout_s: How long it may take [s], where processes may be ended (`limited`).
-
-    Raises:
-        EpisodeError: With what was under way.
-        RunError: If memory, disk or descriptors run out.
     """
     try:
         with limited(what, timeout_s):
@@ -327,12 +323,7 @@ class TeachingSetup:
         return self.proxy.identity, self.target.identity
 
     def score(self, point: CurvePoint) -> float:
-        """Mean score in the target over all starts; NaN where nothing has been learnt, so nothing can drive.
-
-        Raises:
-            LearnerError: If the proxy's expert cannot drive, or the learner cannot use the samples.
-            EpisodeError: If a domain or the policy fails.
-        """
+        """Mean score in the target over all starts; NaN where nothing has been learnt, so nothing can drive."""
         with _name_proxy_in_errors(point), threadpool_limits(limits=1):
             found = self.cache.get("exam", self.exam_facts(point), lambda: self._examine(point))
             return float(np.mean(found["scores"]))

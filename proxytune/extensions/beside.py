@@ -86,11 +86,7 @@ def is_ours(module: str) -> bool:
 
 
 def check_runs(module: str) -> None:
-    """Refuse a module that a file names, where none is run.
-
-    Raises:
-        ExtensionError: With who refuses it.
-    """
+    """Refuse a module that a file names, where none is run."""
     command, typed = _refusing.get() or ("", ())
     if command and module not in typed and not is_ours(module):
         named = f"module '{module}' is code, and {command} runs none that a file names"

@@ -198,11 +198,7 @@ def then(name: str) -> tuple[str, ...]:
 
 
 def check_figures(figures: Mapping[str, float]) -> None:
-    """Refuse figures that a robot.toml does not have, and values that none can have.
-
-    Raises:
-        InputError: With the figure's name.
-    """
+    """Refuse figures that a robot.toml does not have, and values that none can have."""
     for figure, value in figures.items():
         if figure not in UNITS:
             raise InputError(f"--figures: no figure '{figure}'; {nearest(figure, UNITS)}")

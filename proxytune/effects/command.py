@@ -88,12 +88,7 @@ def _block(seed: int, number: int) -> Signal:
 
 @dataclass(frozen=True)
 class Messages:
-    """The messages that a signal comes in, numbered from time zero.
-
-    Attributes:
-        per_sample: Messages per sample.
-        seed: Seed of what is drawn for each message.
-    """
+    """The messages that a signal comes in, numbered from time zero: so many per sample, and the seed of the draws."""
 
     per_sample: float
     seed: int

@@ -182,8 +182,22 @@ class Blur(ShippedEffect):
         return weights[int(np.argmax(weights > 0.0)) :]
 
 
+class Delaying(ShippedEffect):
+    """Shows equal parts of the pictures, from above, each as old as it is."""
+
+    def apply(self, signal: Signal, memory: DelayedPictures) -> tuple[Signal, DelayedPictures]:
+        """Mix, for each part, the two pictures that its age falls between."""
+        length, past, parts = signal.shape[-2], memory.pictures.shape[-2], memory.whole.size
+        joined = np.concatenate((memory.pictures, signal), axis=-2)
+        split = joined.reshape(*joined.shape[:-1], parts, -1)
+        newer, part = np.arange(past, past + length)[:, None] - memory.whole, np.arange(parts)
+        older = memory.fraction[:, None]
+        mixed = (1.0 - older) * split[..., newer, part, :] + older * split[..., newer - 1, part, :]
+        return mixed.reshape(signal.shape), memory._replace(pictures=joined[..., length:, :])
+
+
 @effect("rolling_shutter", Stage.IMAGE)
-class RollingShutter(ShippedEffect):
+class RollingShutter(Delaying):
     """Rows are read out one after another: the last is on time, row r of R older by readout · (1 − (r + ½)/R).
 
     The picture as a whole is thus older by half the readout, which looks like a latency; bends alone show that the rows
@@ -198,13 +212,9 @@ class RollingShutter(ShippedEffect):
         rows = int(context.nominal["camera_rows"])
         return _late(self.readout * context.rate_hz * (1.0 - (np.arange(rows) + 0.5) / rows), context)
 
-    def apply(self, signal: Signal, memory: DelayedPictures) -> tuple[Signal, DelayedPictures]:
-        """Show each row as old as it is."""
-        return _show(signal, memory)
-
 
 @effect("camera_latency", Stage.IMAGE)
-class CameraLatency(ShippedEffect):
+class CameraLatency(Delaying):
     """Pictures arrive late by a constant time; between two of them, their linear mix.
 
     Pictures at known places tell it where speeds and turns vary. What is found without blur in the model is the latency
@@ -218,10 +228,6 @@ class CameraLatency(ShippedEffect):
         """Begin as if the robot had stood before the first picture for ever."""
         return _late(np.array([self.camera_latency * context.rate_hz]), context)
 
-    def apply(self, signal: Signal, memory: DelayedPictures) -> tuple[Signal, DelayedPictures]:
-        """Show each picture as old as it is."""
-        return _show(signal, memory)
-
 
 def _still(context: FilterContext, count: int) -> Signal:
     """So many pictures of what was there before time zero."""
@@ -234,17 +240,6 @@ def _late(samples: Signal, context: FilterContext) -> DelayedPictures:
     whole = np.floor(samples + 1e-9).astype(np.int64)
     fraction = np.maximum(0.0, samples - whole).astype(np.float32)
     return DelayedPictures(_still(context, int(whole.max()) + 1), whole, fraction)
-
-
-def _show(signal: Signal, memory: DelayedPictures) -> tuple[Signal, DelayedPictures]:
-    """Mix, for each part, the two pictures that its age falls between."""
-    length, past, parts = signal.shape[-2], memory.pictures.shape[-2], memory.whole.size
-    joined = np.concatenate((memory.pictures, signal), axis=-2)
-    split = joined.reshape(*joined.shape[:-1], parts, -1)
-    newer, part = np.arange(past, past + length)[:, None] - memory.whole, np.arange(parts)
-    older = memory.fraction[:, None]
-    mixed = (1.0 - older) * split[..., newer, part, :] + older * split[..., newer - 1, part, :]
-    return mixed.reshape(signal.shape), memory._replace(pictures=joined[..., length:, :])
 
 
 _QUANTUM = 2**16

@@ -88,6 +88,18 @@ GAIN = Parameter(name="gain", unit="", low=0.3, high=1.7, neutral=1.0, probes=(0
                  source="31 calibrated Duckiebots: 1.01 ± 0.14")  # fmt: skip
 
 
+@effect("gain", Stage.ACTUATION)
+class Gain(ShippedEffect):
+    """Both wheels turn faster or slower than nominal by one factor: on a single column, all that a gain is."""
+
+    gain: float = like(GAIN)
+    trace: ClassVar[Trace | None] = Trace(cues=(Cue.WHEEL_COMMAND,), shown=WheelCurve.STEADY)
+
+    def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
+        """Scale both."""
+        return signal * self.gain, None
+
+
 @effect("wheel_gain", Stage.ACTUATION)
 class WheelGain(ShippedEffect):
     """Each wheel turns faster or slower than nominal by a factor of its own."""

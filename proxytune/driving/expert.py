@@ -108,12 +108,7 @@ class Expert:
 
 @dataclass(frozen=True)
 class Guide:
-    """Lets a policy drive, and tells what the expert would do wherever that leads (Ross et al. 2011, DAgger).
-
-    Attributes:
-        expert: Who tells.
-        policy: Who drives.
-    """
+    """Lets a policy drive, and tells what the expert would do wherever that leads (Ross et al. 2011, DAgger)."""
 
     expert: Expert
     policy: Policy

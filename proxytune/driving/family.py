@@ -36,10 +36,10 @@ from proxytune.driving.expert import Observation, Playback, Pupil, lesson_driver
 from proxytune.driving.fleet import AT_ONCE, PLANTS, drive_fleet, fleet_at, only, plant_at
 from proxytune.driving.lane import off_map
 from proxytune.driving.maps import chosen_map
-from proxytune.driving.optics import CameraFigures, Renderer
+from proxytune.driving.optics import CameraFigures
 from proxytune.driving.plants import Plant, check_body, drivetrain
 from proxytune.driving.road import Arc, Road
-from proxytune.driving.road_picture import Floor, draw_floor
+from proxytune.driving.road_picture import draw_floor
 from proxytune.driving.robot import Robot, catalogue_of, read_model_of, read_robot, robot_home, robot_names
 from proxytune.effects import (
     Chain,
@@ -121,11 +121,6 @@ def with_columns(robot: Robot, least: int) -> Robot:
 
 
 CAMERAS = ("ground_plane", "renderer")
-
-
-def camera_over(floor: Floor, mounted: CameraFigures, kind: str) -> Renderer:
-    """A camera of one of CAMERAS over a floor."""
-    return GroundPlaneCamera(mounted, floor) if kind == "ground_plane" else BulletCamera(mounted, floor)
 
 
 @dataclass(frozen=True)
@@ -298,15 +293,11 @@ class LaneFollowing:
         Raises:
             EpisodeError: As `examine` does, for the first episode that fails; SettingsError likewise.
         """
-        score, pupil = self._driving_score(), Pupil(policy)
+        wheels, pupil = read_robot(self.robot, self.folder).wheel_distance(), Pupil(policy)
+        timed = functools.partial(driving_score, tick_s=1.0 / TICK_HZ, seconds=self.seconds)
+        score = functools.partial(timed, self.map, wheel_distance=wheels)
         driven = self._drive(episodes, [pupil] * len(episodes), self.seconds)
         return [only([_scored(score, one)]) for one in driven]
-
-    def _driving_score(self) -> Callable[[Signal], float]:
-        """The paper's driving score of poses."""
-        wheels = read_robot(self.robot, self.folder).wheel_distance()
-        timed = functools.partial(driving_score, tick_s=1.0 / TICK_HZ, seconds=self.seconds)
-        return functools.partial(timed, self.map, wheel_distance=wheels)
 
     def measured(self, episode: Episode, driven: Drive) -> Signal:
         """The poses of an episode's drive as they are measured, (ticks + 1, 3); it is scored on the true ones."""
@@ -373,7 +364,8 @@ def _instance(family: LaneFollowing, theta: tuple[tuple[str, float], ...], colum
     named = read_robot(family.robot, family.folder)
     robot = with_columns(named, columns) if columns else named
     effects = effects_from({**robot.theta, **dict(family.effects), **dict(theta)}, robot.figures, robot.catalogue)
-    camera = camera_over(draw_floor(family.map), mounted_camera(robot, effects), family.camera)
+    mounted, floor = mounted_camera(robot, effects), draw_floor(family.map)
+    camera = GroundPlaneCamera(mounted, floor) if family.camera == "ground_plane" else BulletCamera(mounted, floor)
     image, measurement = image_chain(effects, robot.figures), stage_chain(effects, Stage.MEASUREMENT)
     return Instance(robot, drivetrain(robot, effects), camera, image, measurement)
 

@@ -107,22 +107,19 @@ def _dash_distance(road: Road, stretches: list[tuple[Segment, ...]], along: Floa
     )
     ends = np.cumsum(sizes)
     stretch = np.clip(np.searchsorted(ends, along, side="right"), 0, len(ends) - 1)
-    return _from_dash(along - (ends - sizes)[stretch], sizes[stretch], dashes[stretch])
+    within, size, count = along - (ends - sizes)[stretch], sizes[stretch], dashes[stretch]
+    # The dashes share a stretch's length evenly, a gap at either end
+    gap = size / (count * (DASH_PER_GAP + 1.0) + 1.0)
+    period = gap * (DASH_PER_GAP + 1.0)
+    first = gap + gap * DASH_PER_GAP / 2.0
+    nearest = np.clip(np.rint((within - first) / period), 0, count - 1)
+    return np.abs(within - first - nearest * period) - gap * DASH_PER_GAP / 2.0
 
 
 def dashes_on(paint: Paint, segment: Segment, size: float) -> int:
     """Number of dashes on a segment whose centre line is painted so long [m]."""
     dash = paint.straight_dash if isinstance(segment, Straight) else paint.bend_dash
     return max(1, round((size / dash * DASH_PER_GAP - 1.0) / (DASH_PER_GAP + 1.0)))
-
-
-def _from_dash(along: Floats, size: Floats, dashes: NDArray[np.int_]) -> Floats:
-    """Signed distance from the nearest of the dashes that share a stretch's length evenly, a gap at either end."""
-    gap = size / (dashes * (DASH_PER_GAP + 1.0) + 1.0)
-    period = gap * (DASH_PER_GAP + 1.0)
-    first = gap + gap * DASH_PER_GAP / 2.0
-    nearest = np.clip(np.rint((along - first) / period), 0, dashes - 1)
-    return np.abs(along - first - nearest * period) - gap * DASH_PER_GAP / 2.0
 
 
 LINES = ("left white line", "right white line", "yellow line", "yellow dashes")

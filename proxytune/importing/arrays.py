@@ -4,8 +4,9 @@ All arrays as long as the times become columns of one table, which is then read 
 hold the frames.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,6 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from proxytune import unpacking
-from proxytune.arrays import Floats
 from proxytune.errors import InputError, LogError
 from proxytune.importing.columns import (
     Columns,
@@ -122,12 +122,6 @@ def find_frames(path: Path, arrays: Mapping[str, NDArray[Any]], wanted: str, cou
     return wanted or next((name for name in USUAL if name in arrays and _is_frames(arrays[name], count)), "")
 
 
-def pictures_of(frames: NDArray[np.uint8], times: Floats, rows: NDArray[np.bool_]) -> Pictures:
-    """The pictures of some rows (N,) whose time [s] is known, of all frames (N, rows, columns, 3)."""
-    numbers = np.flatnonzero(rows & np.isfinite(times))
-    return Pictures(times[numbers], lambda: (frames[number] for number in numbers))
-
-
 def _is_frames(array: NDArray[Any], count: int) -> bool:
     return array.ndim == 4 and len(array) == count and array.shape[-1] == 3 and array.dtype == np.uint8
 
@@ -221,7 +215,12 @@ def _drives(table: Table, columns: Columns, kind: str, frames: NDArray[np.uint8]
     if frames is None:
         return drives
     times = column_values(table, columns["time"])
-    pictures = [pictures_of(frames, times, labels == label) for label in poses]
+    rows = [np.flatnonzero((labels == label) & np.isfinite(times)) for label in poses]
+
+    def read(numbers: NDArray[np.intp]) -> Iterator[NDArray[np.uint8]]:
+        return (frames[number] for number in numbers)
+
+    pictures = [Pictures(times[numbers], partial(read, numbers)) for numbers in rows]
     return [replace(drive, pictures=each) for drive, each in zip(drives, pictures, strict=True)]
 
 

@@ -190,12 +190,7 @@ DRIFT_S = 0.02
 
 @dataclass(frozen=True)
 class Stamps:
-    """Times at which the messages of a topic were made and received.
-
-    Attributes:
-        header: Stamps in their headers (N,) [ns], or None for a type without a header.
-        receive: When the bag received them (N,) [ns].
-    """
+    """When messages (N,) were made, as their headers say, None if there are none, and when the bag got them [ns]."""
 
     header: Whole | None
     receive: Whole
@@ -279,7 +274,7 @@ def collect(bag: Bag, topic: str, row_of: Callable[[Any], Row], *, finite: bool 
 
 def read_commands(bag: Bag, topic: str, kind: str, stamps: str) -> tuple[Commands, tuple[str, ...]]:
     """The commands of a topic, and what there is to say of their times."""
-    both, values = collect(bag, topic, command_of)
+    both, values = collect(bag, topic, lambda message: COMMANDS[message.__msgtype__.rpartition("/")[2]](message))
     times, notes = choose_times(both, stamps, topic)
     return Commands(kind, times, values), notes
 
@@ -326,11 +321,6 @@ def pose_of(message: Any) -> Row:
     return (place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w)
 
 
-def command_of(message: Any) -> Row:
-    """The two columns of a command: forward speed and yaw rate, or left and right."""
-    return COMMANDS[message.__msgtype__.rpartition("/")[2]](message)
-
-
 def _twist(message: Any) -> Row:
     twist = getattr(message, "twist", message)
     return (twist.linear.x, twist.angular.z)
@@ -366,3 +356,4 @@ COMMANDS: Mapping[str, Callable[[Any], Row]] = {
     "Float64MultiArray": _array,
     "JointState": _joints,
 }
+"""How each type of message says its two columns: forward speed and yaw rate, or left and right."""

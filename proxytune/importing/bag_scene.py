@@ -38,13 +38,7 @@ Row = tuple[int, int, tuple[float, ...]]
 
 @dataclass(frozen=True)
 class Transform:
-    """Place and turn of a frame in its parent, over time.
-
-    Attributes:
-        name: Parent and child, as in "odom>base_link".
-        stamps: When it was stamped and received, N times.
-        values: Place and quaternion x, y, z, w (N, 7).
-    """
+    """A frame in its parent ("odom>base_link"): stamps, and place and quaternion x, y, z, w at each (N, 7)."""
 
     name: str
     stamps: Stamps

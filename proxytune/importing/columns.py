@@ -22,13 +22,7 @@ from proxytune.settings import nearest
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit of measurement.
-
-    Attributes:
-        name: How a column map writes it.
-        quantity: What it measures, as in "length".
-        factor: What a value is multiplied by to have it in the package's unit: s, m, rad, m/s, rad/s, duty.
-    """
+    """A unit of a quantity, as in "length", and the factor to the package's own: s, m, rad, m/s, rad/s, duty."""
 
     name: str
     quantity: str
@@ -336,8 +330,10 @@ LEAST_EXTENT_M = 0.01
 def commands_by_drive(table: Table, columns: Columns, kind: str) -> dict[str, Commands]:
     """The commands of each drive that a table names; of "" where it names none."""
     fields = (*COMMANDS[kind], *((ENABLED,) if ENABLED in columns else ()))
-    times, values, labels = _filled_rows(table, _on_own_clock(columns), fields)
-    if "command_time" in columns:  # a command stands in every row until the next one
+    own_clock = "command_time" in columns
+    timed = {**columns, "time": columns["command_time"]} if own_clock else columns
+    times, values, labels = _filled_rows(table, timed, fields)
+    if own_clock:  # a command stands in every row until the next one
         anew = np.append(True, (np.diff(times) != 0.0) | (np.diff(values, axis=0) != 0.0).any(axis=1))[: len(times)]
         times, values, labels = times[anew], values[anew], labels[anew]
     drives = {}
@@ -348,11 +344,6 @@ def commands_by_drive(table: Table, columns: Columns, kind: str) -> dict[str, Co
     if not drives:
         raise LogError(f"{table.path}: has columns of commands, but no row with one; fill them, or take them out")
     return drives
-
-
-def _on_own_clock(columns: Columns) -> Columns:
-    """The columns with the commands' own stamps, where they have such, as their time."""
-    return {**columns, "time": columns["command_time"]} if "command_time" in columns else columns
 
 
 def pose_fields(table: Table, columns: Columns) -> list[str]:

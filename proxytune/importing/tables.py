@@ -54,14 +54,7 @@ COMMAND_SUFFIXES = (".csv", ".tsv", ".txt")
 
 @dataclass(frozen=True)
 class CommandFile:
-    """The contents of a file of commands.
-
-    Attributes:
-        path: The file.
-        commands: The commands by the drive that the file names; of "" where it names none.
-        channels: Its columns.
-        note: What was taken for what.
-    """
+    """A file of commands: these by the drive that it names, or "" where it names none, and what was taken for what."""
 
     path: Path
     commands: Mapping[str, Commands]

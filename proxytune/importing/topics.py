@@ -136,7 +136,11 @@ def choose(topics: tuple[Topic, ...], wanted: Wanted, where: str) -> Choice:
     if wanted.kind and wanted.kind not in COMMANDS:
         raise LogError(f"{where}: unknown kind of commands '{wanted.kind}'; {nearest(wanted.kind, COMMANDS)}")
     without = "none" in (wanted.commands, wanted.kind)
-    commands = None if without else _choose(_command_role(wanted), topics, wanted.commands, where)
+    of_kind = COMMAND_ROLE
+    if wanted.kind and not wanted.commands:
+        ranks = {name: rank for name, rank in COMMAND_ROLE.ranks.items() if KINDS[name] in ("", wanted.kind)}
+        of_kind = replace(COMMAND_ROLE, ranks=ranks)
+    commands = None if without else _choose(of_kind, topics, wanted.commands, where)
     if not without and commands is None:
         raise LogError(f"{_nothing(COMMAND_ROLE, topics, where)}, or take a log without commands by --commands none")
     transform = wanted.poses if ">" in wanted.poses else ""
@@ -169,14 +173,6 @@ def notes_of(topics: tuple[Topic, ...], choice: Choice) -> tuple[str, ...]:
             what = f"{topic.count} messages of {topic.name} ({short(topic.kind)}){also}"
             notes.append(f"{role.name.capitalize()} are {what}.")
     return tuple(notes)
-
-
-def _command_role(wanted: Wanted) -> Role:
-    """Commands of the kind that is wanted, where one is."""
-    if wanted.commands or not wanted.kind:
-        return COMMAND_ROLE
-    ranks = {name: rank for name, rank in COMMAND_ROLE.ranks.items() if KINDS[name] in ("", wanted.kind)}
-    return replace(COMMAND_ROLE, ranks=ranks)
 
 
 def _choose(role: Role, topics: tuple[Topic, ...], name: str, where: str) -> Topic | None:

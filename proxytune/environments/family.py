@@ -17,7 +17,7 @@ import numpy as np
 
 from proxytune.domain import Episode
 from proxytune.driving import Command, Picture, Robot
-from proxytune.effects import Catalogue, Effect, effects_from, is_learnt
+from proxytune.effects import Catalogue, effects_from, is_learnt
 from proxytune.environments.making import EnvironmentSettings, EpisodeMetric, make_environment, read_domain, read_values
 from proxytune.environments.signals import Actuators, EnvironmentParameters, Sensors, Spaces, figures, look_at
 from proxytune.errors import EpisodeError, ExtensionError, InputError, SettingsError
@@ -226,13 +226,6 @@ def _of_info(infos: Infos, metric: EpisodeMetric) -> float:
     return values[-1] if metric.fold == "last" else float(FOLDS[metric.fold](values))
 
 
-def wrap(
-    environment: Any, effects: tuple[Effect, ...], spaces: Spaces, state: tuple[int, ...] | None, seed: int
-) -> WrappedEnvironment:
-    """An environment behind the effects of a domain instance."""
-    return WrappedEnvironment(environment, Actuators(effects, spaces, seed), Sensors(effects, spaces, state, seed))
-
-
 STARTS = 1000
 """Each is an initial state of the environment, by a seed of its own."""
 READ_BY_CODE = (".py", ".xml", ".urdf", ".sdf", ".zip", ".npz", ".pt", ".onnx")
@@ -309,23 +302,22 @@ class GymnasiumFamily:
     def run(self, episode: Episode) -> Mapping[str, float]:
         """Play one episode and score it."""
         theta = {**dict(self.held), **dict(episode.theta)}
-        effects, folder, seed = self._effects(theta), self.settings.folder, acting_seed(episode.seed, episode.start)
+        own, folder = {one.parameter.name for one in self.settings.own}, self.settings.folder
+        named = {name: value for name, value in theta.items() if name not in own}
+        effects = effects_from(named, figures(self.spaces), Catalogue(folder))
+        seed = acting_seed(episode.seed, episode.start)
         try:
             environment = make_environment(self.settings, theta)
         except InputError as problem:
             raise EpisodeError(str(problem)) from problem
         with closing(environment):
-            wrapped = wrap(environment, effects, self.spaces, self.settings.state, episode.seed)
+            sensors = Sensors(effects, self.spaces, self.settings.state, episode.seed)
+            wrapped = WrappedEnvironment(environment, Actuators(effects, self.spaces, episode.seed), sensors)
             agent = self.policies.get(episode.agent, episode.agent)
             act = load_agent(agent, folder, environment.action_space, seed)
             first = wrapped.reset(reset_seed(episode.start), course_generator(episode.seed, episode.start))
             play(wrapped, act, first, environment.action_space, self.spaces.steps)
             return score(wrapped, self.settings.metrics)
-
-    def _effects(self, theta: Theta) -> tuple[Effect, ...]:
-        own = {one.parameter.name for one in self.settings.own}
-        named = {name: value for name, value in theta.items() if name not in own}
-        return effects_from(named, figures(self.spaces), Catalogue(self.settings.folder))
 
 
 def gymnasium_family(

@@ -16,13 +16,7 @@ from proxytune.space import Space, Theta
 
 @dataclass(frozen=True)
 class PlayedEnvironment:
-    """An environment as a function.
-
-    Attributes:
-        family: Plays its episodes.
-        name: What Gymnasium calls it.
-        make: What makes it; None where its name is registered.
-    """
+    """An environment as a function: its family plays it, and what has no registered name is made by `make`."""
 
     family: GymnasiumFamily
     name: str

@@ -31,13 +31,7 @@ ATTRIBUTE = re.compile(rf"{_STEP}(\.{_STEP})*")
 
 @dataclass(frozen=True)
 class OwnParameter:
-    """A parameter of the environment's own.
-
-    Attributes:
-        parameter: Its name in θ, unit, bounds and neutral value.
-        argument: The constructor's argument that it is, or empty.
-        attribute: The attribute of the finished environment that it is, or empty.
-    """
+    """A parameter of the environment's own: an argument of its constructor, or an attribute of what that made."""
 
     parameter: Parameter
     argument: str

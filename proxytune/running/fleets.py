@@ -43,11 +43,6 @@ def run_fleet(family: DomainFamily, episodes: Sequence[Episode], needed: Collect
     return [run_episode(family, one, needed) for one in episodes] if together is None else together
 
 
-def one_by_one(fleet: Fleet) -> list[Fleet]:
-    """The fleet's episodes, each by itself."""
-    return [(episode,) for episode in fleet]
-
-
 def can_run_together(family: DomainFamily) -> bool:
     """Whether a family runs several episodes at once (`domain.FleetFamily`)."""
     return hasattr(family, "run_many")

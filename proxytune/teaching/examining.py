@@ -52,11 +52,6 @@ def prepare_points(setup: TeachingSetup, points: Sequence[CurvePoint], jobs: int
             pass
 
 
-def prepare_shared(setup: TeachingSetup, points: Sequence[CurvePoint], jobs: int) -> None:
-    """Make what several points share before they are scored, so that no two processes make the same."""
-    prepare_points(setup, _shared(setup.settings, points), jobs)
-
-
 def score_points(
     setup: TeachingSetup, points: Sequence[CurvePoint], jobs: int
 ) -> AbstractContextManager[Iterator[tuple[CurvePoint, float]]]:
@@ -216,7 +211,8 @@ def _examine(
     points = {one: CurvePoint(one.curve, proxies[one.curve], one.repetition, one.samples) for one in batch}
     missing = [point for point in points.values() if not setup.is_cached(point)]
     watcher.begin("demonstrations", len(points) - len(missing))
-    prepare_shared(setup, missing, jobs)
+    # Before they are scored, so that no two processes make the same
+    prepare_points(setup, _shared(setup.settings, missing), jobs)
     watcher.begin("learning", 0)
     with score_points(setup, missing, jobs) as scored:
         for point, score in scored:

@@ -113,14 +113,7 @@ class Supervised:
 
 @dataclass(frozen=True)
 class Trainee:
-    """A learner, and where what it has learnt is kept.
-
-    Attributes:
-        learner: What is trained.
-        identity: A digest of its code and settings.
-        seed: Of its initial weights and the order of its samples.
-        cache: Where samples and weights are kept.
-    """
+    """A learner, a digest of its code and settings, the seed of its weights and of its samples' order; its cache."""
 
     learner: Learner
     identity: str
@@ -207,7 +200,7 @@ class Stage:
 
     def weights_facts(self, count: int) -> dict[str, Any] | None:
         """All that determines the weights after so many samples; None where nothing has been learnt."""
-        start = self.before.final_facts() if self.before else None
+        start = self.before.weights_facts(self.before.lessons.ends[-1]) if self.before else None
         if not count:
             return start
         return {
@@ -218,10 +211,6 @@ class Stage:
             "count": count,
             **({"rehearsal": self.rehearsal} if self.before and self.rehearsal else {}),
         }
-
-    def final_facts(self) -> dict[str, Any] | None:
-        """All that determines the weights after its last sample."""
-        return self.weights_facts(self.lessons.ends[-1])
 
     def weights(self, count: int) -> Weights | None:
         """The weights after so many samples; None where nothing has been learnt."""

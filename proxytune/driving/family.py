@@ -4,7 +4,6 @@ A family's episodes are kept under its `identity`: a digest of all that determin
 """
 
 import functools
-import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -52,7 +51,7 @@ from proxytune.effects import (
     stage_chain,
 )
 from proxytune.errors import EpisodeError, InputError
-from proxytune.identity import meaning_of, modules_beside, versions_of
+from proxytune.identity import digest, meaning_of, modules_beside, versions_of
 from proxytune.lineage import code_name
 from proxytune.settings import Section, figure_cautions, nearest
 from proxytune.space import Parameter, Theta
@@ -71,8 +70,7 @@ def identity_of(settings: tuple[Any, ...], robot: Path, folder: Path, versions: 
         versions: Of the packages that simulate.
     """
     own = meaning_of(modules_beside(folder), folder)
-    parts = (settings, code_name("driving"), robot_meaning(robot), own, sorted(versions.items()))
-    return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
+    return digest(settings, code_name("driving"), robot_meaning(robot), own, sorted(versions.items()))
 
 
 @functools.lru_cache

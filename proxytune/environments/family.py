@@ -4,7 +4,6 @@ An agent is a function, what has `predict`, or one of two that need no code. One
 the environment or the time ends it. `agent_of` goes the other way: a policy trained elsewhere drives our robot.
 """
 
-import hashlib
 import inspect
 from collections.abc import Callable, Mapping
 from contextlib import closing
@@ -22,7 +21,7 @@ from proxytune.environments.making import EnvironmentSettings, EpisodeMetric, ma
 from proxytune.environments.signals import Actuators, EnvironmentParameters, Sensors, Spaces, figures, look_at
 from proxytune.errors import EpisodeError, ExtensionError, InputError, SettingsError
 from proxytune.extensions import ask, describe, load
-from proxytune.identity import files_beside, meaning_of
+from proxytune.identity import digest, files_beside, meaning_of
 from proxytune.lineage import code_name
 from proxytune.seeds import acting_seed, course_generator, reset_seed
 from proxytune.settings import Section, nearest
@@ -261,8 +260,7 @@ class GymnasiumFamily:
         folder = self.settings.folder
         own = meaning_of((path for path in files_beside(folder) if path.suffix in READ_BY_CODE), folder)
         table = [getattr(self.settings, name) for name in self.settings.__dataclass_fields__ if name != "folder"]
-        parts = (table, self.spaces, self.held, code_name("environments"), own)
-        return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
+        return digest(table, self.spaces, self.held, code_name("environments"), own)
 
     @property
     def versions(self) -> Mapping[str, str]:

@@ -14,7 +14,6 @@ its own: `is_users` tells the user's Ctrl-C from it. `pack` and `unpack` carry a
 import atexit
 import builtins
 import functools
-import hashlib
 import importlib
 import io
 import signal
@@ -32,7 +31,7 @@ from typing import Any
 
 from proxytune.errors import ExtensionError
 from proxytune.files import temporary_folder
-from proxytune.identity import modules_beside
+from proxytune.identity import digest, modules_beside
 
 
 class Interrupted(KeyboardInterrupt):
@@ -133,7 +132,7 @@ def open_folders(known: Sequence[str]) -> None:
 def _home(folder: str) -> str:
     """The name under which a folder's modules are imported: that of an empty package."""
     word = "".join(letter if letter.isalnum() else "_" for letter in Path(folder).name)
-    name = f"{PREFIX}{word}_{hashlib.sha256(folder.encode()).hexdigest()[:8]}"
+    name = f"{PREFIX}{word}_{digest(folder, length=8)}"
     if name not in sys.modules:
         home = ModuleType(name, f"The modules of {folder}.")
         home.__path__ = [folder]

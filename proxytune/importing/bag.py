@@ -274,7 +274,11 @@ def collect(bag: Bag, topic: str, row_of: Callable[[Any], Row], *, finite: bool 
 
 def read_commands(bag: Bag, topic: str, kind: str, stamps: str) -> tuple[Commands, tuple[str, ...]]:
     """The commands of a topic, and what there is to say of their times."""
-    both, values = collect(bag, topic, lambda message: COMMANDS[message.__msgtype__.rpartition("/")[2]](message))
+
+    def row_of(message: Any) -> Row:
+        return COMMAND_TYPES[message.__msgtype__.rpartition("/")[2]][1](message)
+
+    both, values = collect(bag, topic, row_of)
     times, notes = choose_times(both, stamps, topic)
     return Commands(kind, times, values), notes
 
@@ -346,14 +350,14 @@ def _ackermann(message: Any) -> Row:
     return (drive.speed, drive.steering_angle)
 
 
-COMMANDS: Mapping[str, Callable[[Any], Row]] = {
-    "AckermannDrive": _ackermann,
-    "AckermannDriveStamped": _ackermann,
-    "Twist": _twist,
-    "TwistStamped": _twist,
-    "WheelsCmdStamped": lambda message: (message.vel_left, message.vel_right),
-    "Float32MultiArray": _array,
-    "Float64MultiArray": _array,
-    "JointState": _joints,
+COMMAND_TYPES: Mapping[str, tuple[str, Callable[[Any], Row]]] = {
+    "Twist": ("twist", _twist),
+    "TwistStamped": ("twist", _twist),
+    "AckermannDriveStamped": ("speed_steering", _ackermann),
+    "AckermannDrive": ("speed_steering", _ackermann),
+    "WheelsCmdStamped": ("duty", lambda message: (message.vel_left, message.vel_right)),
+    "Float32MultiArray": ("", _array),
+    "Float64MultiArray": ("", _array),
+    "JointState": ("wheel_speed", _joints),
 }
-"""How each type of message says its two columns: forward speed and yaw rate, or left and right."""
+"""The kind of command that a type of message says, and its two columns; two numbers in an array do not say theirs."""

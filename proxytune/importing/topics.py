@@ -13,24 +13,22 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from proxytune.arrays import Floats
 from proxytune.errors import LogError
-from proxytune.importing.bag import Bag, Topic, bags_in, choose_times, form_of, open_bag, read_commands, read_poses
+from proxytune.importing.bag import (
+    COMMAND_TYPES,
+    Bag,
+    Topic,
+    bags_in,
+    choose_times,
+    form_of,
+    open_bag,
+    read_commands,
+    read_poses,
+)
 from proxytune.importing.bag_scene import Transform, chain_of, choose_transform, read_pictures, read_transforms
 from proxytune.importing.checks import complaint, headings_and_tilts, no_rotation
 from proxytune.importing.source import Channel, Drive, Poses, Source, Wanted
 from proxytune.logs import COMMANDS
 from proxytune.settings import nearest
-
-KINDS: Mapping[str, str] = {
-    "Twist": "twist",
-    "TwistStamped": "twist",
-    "AckermannDriveStamped": "speed_steering",
-    "AckermannDrive": "speed_steering",
-    "WheelsCmdStamped": "duty",
-    "Float32MultiArray": "",
-    "Float64MultiArray": "",
-    "JointState": "wheel_speed",
-}
-"""The kind of command that a type of message says; two numbers in an array do not say theirs."""
 
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 
@@ -87,7 +85,7 @@ class Role:
 COMMAND_ROLE = Role(
     "commands",
     "--commands",
-    {name: place for place, name in enumerate(KINDS)} | {"TwistStamped": 0, "Float64MultiArray": 3},
+    {name: place for place, name in enumerate(COMMAND_TYPES)} | {"TwistStamped": 0, "Float64MultiArray": 3},
     first=("cmd_vel", "cmd", "command"),
     asked=("JointState",),
 )
@@ -138,7 +136,7 @@ def choose(topics: tuple[Topic, ...], wanted: Wanted, where: str) -> Choice:
     without = "none" in (wanted.commands, wanted.kind)
     of_kind = COMMAND_ROLE
     if wanted.kind and not wanted.commands:
-        ranks = {name: rank for name, rank in COMMAND_ROLE.ranks.items() if KINDS[name] in ("", wanted.kind)}
+        ranks = {name: rank for name, rank in COMMAND_ROLE.ranks.items() if COMMAND_TYPES[name][0] in ("", wanted.kind)}
         of_kind = replace(COMMAND_ROLE, ranks=ranks)
     commands = None if without else _choose(of_kind, topics, wanted.commands, where)
     if not without and commands is None:
@@ -188,7 +186,7 @@ def _choose(role: Role, topics: tuple[Topic, ...], name: str, where: str) -> Top
 
 
 def _kind_of(topic: Topic, wanted: str, where: str) -> str:
-    said = KINDS[short(topic.kind)]
+    said, _ = COMMAND_TYPES[short(topic.kind)]
     if not said and not wanted:
         raise LogError(
             f"{where}: topic {topic.name} does not say what its two numbers are; add --kind duty, "

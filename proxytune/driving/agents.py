@@ -32,7 +32,7 @@ from proxytune.driving.perception import (
     weigh_markings,
 )
 from proxytune.driving.robot import Robot
-from proxytune.extensions import make
+from proxytune.extensions import load
 
 Look = tuple[Kind, Any]
 """What an agent asks of its newest picture: how, and what of."""
@@ -440,4 +440,4 @@ def load_agent(name: str, folder: Path) -> Agent:
     Raises:
         ExtensionError: If there is no such agent.
     """
-    return cast(Agent, make(name, kind="agent", beside=folder, needs=NEEDS, shipped=AGENTS))
+    return cast(Agent, load(name, kind="agent", beside=folder, needs=NEEDS, shipped=AGENTS, call=True))

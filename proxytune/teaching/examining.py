@@ -98,18 +98,15 @@ class _Loss:
     timeout_s: float | None
     traced: TracedTask
 
-    def __call__(self, point: CurvePoint, end: WorkerExit) -> Any:
-        """Make it once more where that tells which episode it is or it took too long, or say of what it ended."""
-        if self.traced.last(point).endswith(TOGETHER) or end.how == OVERRUN:
-            with IsolatedWorker(self.traced) as isolated:
-                return isolated.do(point, functools.partial(self._lost_again, point))
-        return self._refuse(point, end)
+    def __call__(self, point: CurvePoint, end: WorkerExit, first: bool = True) -> Any:
+        """Make it once more where that tells which episode it is or it took too long, or say of what it ended.
 
-    def _lost_again(self, point: CurvePoint, end: WorkerExit) -> Any:
-        """Refuse a point that was lost again; by the name of one examination, where it was several at once."""
-        if self.traced.last(point).endswith(TOGETHER):
+        Where it is lost again it is made once more by the name of one examination, if it was several at once.
+        """
+        if self.traced.last(point).endswith(TOGETHER) or (first and end.how == OVERRUN):
+            again = functools.partial(self, first=False) if first else self._refuse
             with IsolatedWorker(self.traced) as isolated:
-                return isolated.do(point, functools.partial(self._refuse, point))
+                return isolated.do(point, functools.partial(again, point))
         return self._refuse(point, end)
 
     def _refuse(self, point: CurvePoint, end: WorkerExit) -> NoReturn:

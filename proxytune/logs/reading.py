@@ -131,13 +131,16 @@ def read_log(path: str | Path) -> Log:
     issued = _read_commands(path / "commands.csv", stated, samples) if apart else {}
     episodes, rate_hz = _episodes(samples, stated, issued)
     frames = read_frames(stated.camera, path, samples, stated.rate_hz, episodes) if stated.camera else None
+    if offset_s := stated.clock_offset_s:  # so much earlier the commands' clock is than that of the poses
+        clocks = (one.times if one.issued is None else one.issued for one in episodes)
+        episodes = tuple(replace(one, issued=own + offset_s) for one, own in zip(episodes, clocks, strict=True))
     return Log(
         name=stated.name,
         robot=stated.robot,
         command=stated.command,
         rate_hz=rate_hz,
         geometry=stated.geometry,
-        episodes=tuple(_on_poses_clock(episode, stated.clock_offset_s or 0.0) for episode in episodes),
+        episodes=episodes,
         frames=frames,
         clock_offset_s=stated.clock_offset_s,
         fit_clock_offset=stated.fit_clock_offset,
@@ -152,14 +155,6 @@ def _episodes(samples: Rows, stated: Description, issued: Mapping[str, Issued]) 
     if own_times:
         return episodes_at_own_times(samples, commands, issued)
     return episodes_on_grid(samples, commands, issued, stated.rate_hz), stated.rate_hz
-
-
-def _on_poses_clock(episode: LogEpisode, offset_s: float) -> LogEpisode:
-    """An episode whose commands were stamped by a clock that is so much earlier than that of the poses."""
-    if not offset_s:
-        return episode
-    issued = episode.times if episode.issued is None else episode.issued
-    return replace(episode, issued=issued + offset_s)
 
 
 def _read_samples(path: Path, command: str, *, apart: bool) -> Rows:

@@ -54,6 +54,12 @@ def test_theta_that_makes_a_perfect_proxy_is_found_and_the_least_known_parameter
     )
 
 
+def test_a_proxy_that_is_never_worse_than_a_perfect_one_is_not_said_to_be_worse_by_less_than_nothing():
+    text = say_finding(replace(FOUND, excess=Estimate(-8.0, -15.0, -1.0)))
+    assert "it cannot be told from a perfect proxy. " in text
+    assert "worse" not in text
+
+
 def test_a_score_above_the_floor_is_not_called_found():
     text = say_finding(ABOVE)
     assert text.startswith("θ narrowed down to 0.16 % of the box: trim 0.121 ")

@@ -176,7 +176,8 @@ def _say_usefulness(finding: Finding) -> str:
     if excess.low > 0.0:
         lower = f"a perfect proxy scores lower, by {pairs_span(*excess[1:])}"
         return f"{score}, {floor}: better than chance, but {lower}.{before}"
-    told = f"it cannot be told from a perfect proxy; at most {fixed(ceil(excess.high), 0)} pairs worse"
+    worse = ceil(excess.high)
+    told = f"it cannot be told from a perfect proxy{f'; at most {fixed(worse, 0)} pairs worse' * (worse > 0)}"
     other = "" if finding.perfect else ", but other scores of the agents differ from the target's"
     return f"{score}, {floor}: {told}{other}.{before}"
 

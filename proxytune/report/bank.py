@@ -84,6 +84,6 @@ def write_bank_page(bank: Bank, table: Path) -> Path:
     page = table.with_name("report.html")
     learn = f'Measure these agents on the target and write learn_from = ["{table.parent.name}"] into its study.toml.'
     parts = (bank_table(bank), Paragraphs("How to use it", (learn,)))
-    view = View(bank.settings.name, bank_sentence(bank), learn, parts)
+    view = View(f"{bank.settings.name}: what can a target learn from this bank?", bank_sentence(bank), learn, parts)
     write_page(page, view, study_foot(bank.settings))
     return page

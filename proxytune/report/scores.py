@@ -145,14 +145,14 @@ def score_view(
         target: Name of the target.
     """
     tables = _tables(assessments, selection, target)
-    names = f"{next(iter(assessments))} as a proxy" if selection is None else f"{len(assessments)} proxies"
+    one = f"{next(iter(assessments))}: how well does it predict {target}?"
     choices = (
         ()
         if selection is None
         else (Paragraphs("Which proxy to choose by", tuple(choices_sentences(assessments, selection, target))),)
     )
     return View(
-        f"{names} of {target}",
+        one if selection is None else f"Which of {len(assessments)} proxies predicts {target} best?",
         score_sentence(assessments, selection, target=target),
         score_next_step(assessments, selection),
         (*figures, *tables) if selection is None else (*tables, *choices, *figures),

@@ -241,7 +241,7 @@ def teach_view(experiment: Experiment, prpv: Predictivities, figure: bytes) -> V
     table, observations = teach_table(experiment, prpv), observation_lines(observe(experiment, prpv), experiment)
     said = [Paragraphs("The paper's two observations", observations)] if observations else []
     picture = Picture("What each proxy saves, curve by curve", figure, CURVES)
-    title = f"{experiment.settings.name}: proxies as teachers"
+    title = f"{experiment.settings.name}: which proxy is worth learning in?"
     parts: tuple[Part, ...] = (table, *said, *_published(experiment, table.rows), picture)
     return View(title, teach_answer(experiment), teach_next_step(experiment), parts)
 

@@ -17,6 +17,7 @@ from proxytune.diagnosis.camera.edges import Edges, Optics, Views, read_road, tr
 from proxytune.diagnosis.camera.error import CameraDiagnosis, grey_differences
 from proxytune.diagnosis.camera.model import draw_pictures, neutral_state
 from proxytune.diagnosis.motion.diagnose import Diagnosis, declared_effects, diagnose
+from proxytune.diagnosis.motion.excitation import LIMITS, Limits
 from proxytune.diagnosis.motion.screening import motion_effects
 from proxytune.driving import Markings, Robot, ground_points
 from proxytune.effects import effect_of
@@ -60,6 +61,7 @@ def diagnose_log(
     seed: int = 1,
     report: Progress = lambda _: None,
     rules: Rules = RULES,
+    limits: Limits = LIMITS,
 ) -> LogDiagnosis:
     """Diagnose motion where the log has commands, and the camera where it has frames.
 
@@ -71,6 +73,7 @@ def diagnose_log(
         seed: Of the null distributions and the bootstrap.
         report: Takes a line about each step, as it begins.
         rules: Thresholds of what is named, believed and told of motion.
+        limits: Of the next drive.
 
     Raises:
         LogError: If neither drives nor frames can bear the question, or a declared effect is unknown.
@@ -79,7 +82,7 @@ def diagnose_log(
     on_motion, on_camera = _declared_by_kind(log, robot, declared)
 
     def motion() -> Diagnosis:
-        return diagnose(log, robot, on_motion, test=test, seed=seed, report=report, rules=rules)
+        return diagnose(log, robot, on_motion, test=test, seed=seed, report=report, rules=rules, limits=limits)
 
     def camera() -> CameraDiagnosis:
         return diagnose_camera(log, robot, on_camera, seed=seed, report=report)

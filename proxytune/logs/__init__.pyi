@@ -9,4 +9,4 @@ from .log import (
     LogEpisode as LogEpisode,
     Measured as Measured,
 )
-from .reading import read_log as read_log
+from .reading import read_commands as read_commands, read_log as read_log

@@ -32,9 +32,9 @@ from proxytune.diagnosis.motion.effect_size import (
     measure_effect_size,
 )
 from proxytune.diagnosis.motion.evidence import AdoptedEffect, DroppedEffect, Findings, Variant
+from proxytune.diagnosis.motion.excitation import LIMITS, Limits, NextDrive, design_drive
 from proxytune.diagnosis.motion.fitting import Fit, check_motion, check_units, intervals
 from proxytune.diagnosis.motion.innovations import Noise, at_edge
-from proxytune.diagnosis.motion.manoeuvres import Manoeuvre, next_manoeuvre
 from proxytune.diagnosis.motion.moments import Period, find_period
 from proxytune.diagnosis.motion.multistep_fit import (
     HORIZONS_S,
@@ -263,7 +263,8 @@ class Diagnosis:
         errors: On the planar plant, by horizon, shortest first.
         confirmed: The error over 2 s on the bullet plant, None where the robot has no body for it.
         could_not_be_seen: Effects that these drives could not have shown.
-        manoeuvre: What to drive to tell rivals apart, or noise from what is missing; None where nothing is asked.
+        next_drive: What to drive to tell rivals apart, or noise from what is missing; None where nothing is asked.
+        command: Kind of the log's commands.
         parts: The drives that were fitted and tested.
         found: What the search came to.
         clocks: Those of the log, and of the log to test on where that is another.
@@ -286,7 +287,8 @@ class Diagnosis:
     errors: tuple[HorizonError, ...]
     confirmed: HorizonError | None
     could_not_be_seen: tuple[str, ...]
-    manoeuvre: Manoeuvre | None
+    next_drive: NextDrive | None
+    command: str
     parts: Parts
     found: Findings
     clocks: tuple[Clocks, ...]
@@ -341,6 +343,7 @@ def diagnose(
     seed: int = 1,
     report: Progress = lambda _: None,
     rules: Rules = RULES,
+    limits: Limits = LIMITS,
 ) -> Diagnosis:
     """Tune what is declared, find what is missing, and test both on drives kept aside.
 
@@ -352,6 +355,7 @@ def diagnose(
         seed: Of the null distributions.
         report: Takes a line about each step, as it begins.
         rules: Thresholds of what is named, believed and told.
+        limits: Of the next drive.
 
     Raises:
         LogError: If the log cannot bear the question (too short, no motion, other units), or a declared effect is
@@ -399,7 +403,9 @@ def diagnose(
     dropped = tuple(one.effect for one in found.negligible)
     beside = Variant(found.model.theta, found.model.free)
     weighed = [DroppedEffect(effect, beside) for effect in found.adopted] + list(found.negligible)
+    report("designing the next drive")
     seen = {effect_of(name) for name in names} | {effect.effect for effect in (*found.adopted, *dropped)}
+    unseen = invisible_effects(found.model, seen)
     return Diagnosis(
         log=log.name,
         robot=robot,
@@ -418,8 +424,9 @@ def diagnose(
         ),
         errors=errors,
         confirmed=confirmed,
-        could_not_be_seen=invisible_effects(found.model, seen),
-        manoeuvre=next_manoeuvre(found, again=explained is None),
+        could_not_be_seen=unseen,
+        next_drive=design_drive(found, again=explained is None, limits=limits, unseen=unseen, seed=seed),
+        command=log.command,
         parts=parts,
         found=found,
         clocks=clocks,

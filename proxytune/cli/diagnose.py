@@ -12,7 +12,7 @@ from proxytune.api import DiagnosisReport
 from proxytune.cli.commands import names_in
 from proxytune.cli.options import configure_effects, configure_source, facts_of, typed, wanted_of
 from proxytune.cli.terminal import Answer, Steps
-from proxytune.diagnosis import LIMITS, Limits, diagnose_log, robot_of
+from proxytune.diagnosis import LIMITS, Limits, diagnose_log, forget_stages, robot_of
 from proxytune.effects import Catalogue
 from proxytune.errors import InputError
 from proxytune.importing import finite, open_log
@@ -115,12 +115,14 @@ def _diagnosed(
     robot = robot_of(log, arguments.robot, Catalogue(Path.cwd(), names_in(arguments.effects)))
     declared = None if arguments.declared is None else names_in(arguments.declared)
     with Steps(shares(log)) as step:
-        found = diagnose_log(log, robot, declared, test=test, seed=arguments.seed, report=step, limits=limits)
         here = arguments.log.resolve()
         folder = arguments.output or Path(f"diagnosis_{here.stem if here.is_file() else here.name}")
+        seed = arguments.seed
+        found = diagnose_log(log, robot, declared, test=test, seed=seed, report=step, limits=limits, folder=folder)
         step("drawing")
         report = DiagnosisReport(found)
         files = [str(path) for path in report.write(folder, typed(arguments))]
+        forget_stages(folder)
     lines = [*(f"{arguments.log.name}: {note}" for note in imported), *files]
     document = report.document() | {"files": files} | ({"imported": list(imported)} if imported else {})
     return Answer(document, Group(diagnosis_text(found), Text("\n".join(lines))))

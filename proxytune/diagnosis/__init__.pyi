@@ -63,3 +63,4 @@ from .recording import (
     record as record,
     samples_text as samples_text,
 )
+from .stages import forget_stages as forget_stages

@@ -60,6 +60,7 @@ from proxytune.diagnosis.motion.prediction import (
 )
 from proxytune.diagnosis.motion.screening import MOTION_EFFECTS, motion_effects
 from proxytune.diagnosis.motion.selection import fit_declared, select_effects
+from proxytune.diagnosis.stages import Stages
 from proxytune.driving import Robot
 from proxytune.effects import SHIPPED, Catalogue, effect_of
 from proxytune.errors import LogError
@@ -344,6 +345,7 @@ def diagnose(
     report: Progress = lambda _: None,
     rules: Rules = RULES,
     limits: Limits = LIMITS,
+    stages: Stages | None = None,
 ) -> Diagnosis:
     """Tune what is declared, find what is missing, and test both on drives kept aside.
 
@@ -356,6 +358,7 @@ def diagnose(
         report: Takes a line about each step, as it begins.
         rules: Thresholds of what is named, believed and told.
         limits: Of the next drive.
+        stages: Where results are kept on the way, so that a diagnosis that was killed goes on.
 
     Raises:
         LogError: If the log cannot bear the question (too short, no motion, other units), or a declared effect is
@@ -372,21 +375,26 @@ def diagnose(
     parts = Parts(*(replace(drives, rules=rules) for drives in split(log, robot, test, clocks)))
     check_motion(log.name, parts.fitted)
     check_units(log.name, parts.fitted, start)
-    report("fitting what is declared")
-    found = select_effects(fit_declared(parts.fitted, start, names), seed, report)
-    found = drop_negligible(found, seed, parts.tested)
-    report("fitting to windows of prediction")
-    declared_fit, before = fit_multistep(found.declared)
-    # Before and after are compared on equal terms.
-    added = found.adopted or found.negligible
-    model, after = fit_multistep(found.model) if added else (declared_fit, before)
-    found = replace(found, declared=declared_fit, model=model)
-    report("learning what no named effect explains")
-    learning = learn(found, parts.tested, HORIZONS_S)
-    report("testing on drives kept aside")
+    stages = stages or Stages()
     whole = replace(all_drives(test or log, robot, clocks[-1]), rules=rules)
+    stages.know(robot=robot, rules=rules, fitted=parts.fitted, tested=parts.tested, whole=whole)
+    keep = stages.keep
+    report("fitting what is declared")
+    declared_alone = keep("declared", lambda: fit_declared(parts.fitted, start, names))
+    selected = keep("selected", lambda: select_effects(declared_alone, seed, report))
+    named = keep("worth", lambda: drop_negligible(selected, seed, parts.tested))
+    report("fitting to windows of prediction")
+    declared_fit, before = keep("declared_windows", lambda: fit_multistep(named.declared))
+    # Before and after are compared on equal terms.
+    added = named.adopted or named.negligible
+    model, after = keep("windows", lambda: fit_multistep(named.model)) if added else (declared_fit, before)
+    found = replace(named, declared=declared_fit, model=model)
+    report("learning what no named effect explains")
+    learning = keep("learnt", lambda: learn(found, parts.tested, HORIZONS_S))
+    report("testing on drives kept aside")
     tested = KeptAside(parts.tested, whole, pose_noise(parts.tested, found.model.theta))
-    errors = tuple(error for h in HORIZONS_S if (error := horizon_error(found, tested, h, learning.theta)) is not None)
+    told = [keep(f"error_{h:g}", lambda h=h: horizon_error(found, tested, h, learning.theta)) for h in HORIZONS_S]  # type: ignore[misc]
+    errors = tuple(error for error in told if error is not None)
     if not errors:
         raise LogError(f"{log.name}: no second of unbroken poses to test on; record longer drives")
     period = find_period(parts.fitted, found.model.theta)
@@ -398,7 +406,7 @@ def diagnose(
     confirmed = None
     if has_body(parts.tested):
         report("confirming on the bullet plant")
-        confirmed = horizon_error(found, tested, CONFIRMED_S, {}, bullet_pose_errors)
+        confirmed = keep("bullet", lambda: horizon_error(found, tested, CONFIRMED_S, {}, bullet_pose_errors))
     every = whole if test is None else replace(all_drives(log, robot, own), rules=rules)
     dropped = tuple(one.effect for one in found.negligible)
     beside = Variant(found.model.theta, found.model.free)
@@ -425,7 +433,9 @@ def diagnose(
         errors=errors,
         confirmed=confirmed,
         could_not_be_seen=unseen,
-        next_drive=design_drive(found, again=explained is None, limits=limits, unseen=unseen, seed=seed),
+        next_drive=keep(
+            "next", lambda: design_drive(found, again=explained is None, limits=limits, unseen=unseen, seed=seed)
+        ),
         command=log.command,
         parts=parts,
         found=found,

@@ -20,7 +20,7 @@ from proxytune.diagnosis.answer import RULES, Rules
 from proxytune.driving import Robot, read_robot, robot_from_geometry, robot_names
 from proxytune.effects import SHIPPED, Catalogue, track_of
 from proxytune.errors import LogError
-from proxytune.logs import CAR_COMMANDS, Log, LogEpisode
+from proxytune.logs import Log, LogEpisode, check_kind
 from proxytune.settings import GEOMETRY, nearest
 
 
@@ -68,12 +68,7 @@ def duties_of(log: Log, robot: Robot, commands: Floats) -> Floats:
     figures = robot.figures
     if log.command == "none":
         raise LogError(f"{log.name}: has no commands; a log needs duties, twists or wheel speeds to learn from")
-    if (log.command in CAR_COMMANDS) != (robot.drive == "ackermann") and log.command != "twist":
-        drives = "steers" if robot.drive == "ackermann" else "drives by two wheels"
-        raise LogError(
-            f"{log.name}: commands of kind '{log.command}' are not for robot '{robot.name}', which {drives} "
-            f'(drive = "{robot.drive}" in its robot.toml); name another with --robot'
-        )
+    check_kind(log.command, robot.name, robot.drive, log.name)
     if log.command in ("duty", "ackermann"):
         return commands
     if robot.drive == "ackermann":

@@ -10,4 +10,4 @@ from .log import (
     Measured as Measured,
     check_kind as check_kind,
 )
-from .reading import read_log as read_log
+from .reading import read_commands as read_commands, read_log as read_log

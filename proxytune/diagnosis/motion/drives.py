@@ -107,6 +107,27 @@ def _steered(log: Log, robot: Robot, commands: Floats) -> Floats:
     return np.stack((speeds / figures["full_speed"], np.clip(angles / widest, -1.0, 1.0)), axis=-1)
 
 
+def commands_as(kind: str, robot: Robot, duties: Floats) -> Floats:
+    """Fractions of full wheel speed (…, 2), of a car throttle and steering, as a log's kind of commands (…, 2).
+
+    Args:
+        kind: One of the kinds that suit the robot.
+        robot: Whose figures count.
+        duties: What `duties_of` would make of the result.
+    """
+    if kind in ("duty", "ackermann"):
+        return duties
+    figures, speeds = robot.figures, duties * robot.figures["full_speed"]
+    if robot.drive == "ackermann":
+        speed, angle = speeds[..., 0], duties[..., 1] * math.radians(figures["wheel_angle"])
+        if kind == "twist":
+            return np.stack((speed, speed * np.tan(angle) / figures["wheelbase"]), axis=-1)
+        return np.stack((speed, angle), axis=-1)
+    if kind == "wheel_speed":
+        return np.asarray(speeds / figures["wheel_radius"])
+    return np.stack((speeds.mean(axis=-1), np.diff(speeds)[..., 0] / figures["effective_baseline"]), axis=-1)
+
+
 class Commands(NamedTuple):
     """An episode's commands.
 

@@ -31,8 +31,8 @@ Assessments = Mapping[str, Assessment]
 BESIDE_PRPV = tuple(measure for measure in MEASURES if measure is not PRPV)
 SCATTER = (
     "A point is an agent: its mean score on the target (across) and in the proxy (up), with standard errors. On the "
-    "dashed line both agree; two points that fall from left to right are a pair ranked wrongly. Names are in the proxy's "
-    "order, highest score on top"
+    "dashed line both agree; two points that fall from left to right are a pair ranked wrongly. Names are in "
+    "the proxy's order, highest score on top"
 )
 FLIPPED = (
     "A square is a pair of agents, in the target's order, best first. Grey pairs are ranked as on the target; coloured "

@@ -94,21 +94,15 @@ def open_picture(source: Path | IO[bytes], where: object, formats: tuple[str, ..
         InputError: If its pixels take more than is allowed.
         Exception: What Pillow raises at files that are damaged.
     """
-    with warnings.catch_warnings(), _own_limit():
-        warnings.simplefilter("ignore")
-        with Image.open(source, formats=formats) as image:
-            check_unpacked(
-                f"{where}: a picture of {image.width} × {image.height}", 3.0 * image.width * image.height, PICTURE_MB
-            )
-            yield image
-
-
-@contextmanager
-def _own_limit() -> Iterator[None]:
-    """Pillow's own limit, which nobody can raise from outside, gives way to ours."""
+    # Pillow's own limit, which nobody can raise from outside, gives way to ours
     kept, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
     try:
-        yield
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            with Image.open(source, formats=formats) as image:
+                size = f"{where}: a picture of {image.width} × {image.height}"
+                check_unpacked(size, 3.0 * image.width * image.height, PICTURE_MB)
+                yield image
     finally:
         Image.MAX_IMAGE_PIXELS = kept
 

@@ -3,10 +3,25 @@
 import json
 
 import pytest
-from outside_effects import WEAK_REVERSE
 from project import copy_project, run
 
-EFFECT = "\n\n" + WEAK_REVERSE[WEAK_REVERSE.index("@dataclass") :]
+EFFECT = '''
+
+@effect("weak_reverse", Stage.MOTION)
+class WeakReverse(ShippedEffect):
+    """The robot is slower backwards than forwards."""
+
+    loss: float = parameter("", 0.0, 0.9, probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8), source="made up")
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.DIRECTION,), shown=Means(Cue.DIRECTION, (Panel("forward", "forward speed [m/s]", "forward"),))
+    )
+
+    def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
+        """Slow down what is backwards."""
+        forward = signal[..., :1]
+        slowed = np.where(forward < 0.0, (1.0 - self.loss) * forward, forward)
+        return np.concatenate((slowed, signal[..., 1:]), axis=-1), None
+'''
 
 DIAGNOSE = """
 import sys

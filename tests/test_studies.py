@@ -1,8 +1,12 @@
 """The studies that travel with the package are what their READMEs say."""
 
+import ast
 import dataclasses
 import functools
+import importlib
+import runpy
 import shutil
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -68,6 +72,27 @@ def test_on_the_nominal_proxy_agents_spread_from_seconds_to_the_end_with_few_tie
     assert means["distance"].max() > 10.0
     apart = np.diff(np.sort(means["distance"]))
     assert (apart > 0.05).sum() >= len(means) - 2, "agents tie on distance"
+
+
+SCRIPTS = sorted([*STUDIES.rglob("*.py"), *(STUDIES.parent / "benchmarks").glob("*.py")])
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: f"{path.parent.name}/{path.name}")
+def test_what_a_script_takes_of_the_package_is_there(script):
+    for node in ast.walk(ast.parse(script.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and f"{node.module}.".startswith("proxytune."):
+            module = importlib.import_module(node.module)
+            for alias in node.names:
+                if not hasattr(module, alias.name):
+                    importlib.import_module(f"{node.module}.{alias.name}")
+
+
+@pytest.mark.slow
+def test_the_published_tables_are_read_again_as_the_reference_has_them(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["page.py", str(tmp_path / "page.html"), str(tmp_path / "table.md")])
+    runpy.run_path(str(STUDIES / "published" / "page.py"), run_name="__main__")
+    assert (tmp_path / "table.md").read_text() in (STUDIES.parent / "docs" / "reference" / "published.md").read_text()
+    assert "<svg" in (tmp_path / "page.html").read_text()
 
 
 @pytest.mark.parametrize("name", MADE_FROM)

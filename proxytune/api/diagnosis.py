@@ -9,7 +9,17 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure
 
-from proxytune.diagnosis import RULES, CameraDiagnosis, Diagnosis, LogDiagnosis, Rules, diagnose_log, robot_of
+from proxytune.diagnosis import (
+    LIMITS,
+    RULES,
+    CameraDiagnosis,
+    Diagnosis,
+    Limits,
+    LogDiagnosis,
+    Rules,
+    diagnose_log,
+    robot_of,
+)
 from proxytune.effects import Catalogue
 from proxytune.errors import InputError
 from proxytune.importing import open_log
@@ -113,7 +123,7 @@ class DiagnosisReport(Shown):
         return diagnosis_document(self.found)
 
     def write(self, folder: str | Path, command: str = "") -> list[Path]:
-        """Write diagnosis.json, model.toml, which `predict` and a study's `proxy` read, figures and page; their paths.
+        """Write diagnosis.json, model.toml (for `predict` and a study's `proxy`), next drive, figures and page; paths.
 
         Args:
             folder: Where to.
@@ -134,6 +144,7 @@ def diagnose(
     effects: Sequence[str] = (),
     seed: int = 1,
     rules: Rules = RULES,
+    limits: Limits = LIMITS,
 ) -> DiagnosisReport:
     """Tune what is declared to a log, find the effects that the model lacks, and test both on what was kept aside.
 
@@ -148,6 +159,7 @@ def diagnose(
         effects: Effects of your own to try too, as "module:Attribute".
         seed: Seed of the null distributions.
         rules: Thresholds of the selection, as in replace(RULES, p_value=0.01).
+        limits: Of the next drive, as in Limits(room=(4.0, 3.0)).
 
     Raises:
         InputError: If the log, the robot or an effect cannot be used.
@@ -157,7 +169,9 @@ def diagnose(
     with _opened(log) as drives, nullcontext() if test is None else _opened(test) as others:
         try:
             vehicle = robot_of(drives, robot, Catalogue(Path.cwd(), tuple(effects)))
-            return DiagnosisReport(diagnose_log(drives, vehicle, declared, test=others, seed=seed, rules=rules))
+            return DiagnosisReport(
+                diagnose_log(drives, vehicle, declared, test=others, seed=seed, rules=rules, limits=limits)
+            )
         except InputError as problem:
             raise type(problem)(_in_python(str(problem))) from None
 

@@ -9,7 +9,7 @@ import numpy as np
 from proxytune.diagnosis import PICTURES, FilmedDrive, film, frames_text, log_text, record, samples_text
 from proxytune.driving import LaneFollowing, read_robot
 from proxytune.errors import InputError
-from proxytune.logs import Frames, Log, log_cautions
+from proxytune.logs import Frames, Log, log_cautions, read_commands
 from proxytune.report import write_picture, write_text
 from proxytune.settings import Section
 from proxytune.study import StudySettings, bare_family, cautions_of
@@ -22,16 +22,18 @@ class Wanted:
     """Drives to be recorded.
 
     Attributes:
-        repeats: Drives of each manoeuvre.
-        seconds: Length of a drive [s].
+        repeats: Drives of each manoeuvre, or of each drive of the table.
+        seconds: Length of a manoeuvre [s].
         frames: How many pictures are taken, on lane drives; 0: none.
         seed: Of manoeuvres, starts and noise.
+        commands: A table of commands to drive instead of manoeuvres, as a log's commands.csv; None: manoeuvres.
     """
 
     repeats: int = 2
     seconds: float = 60.0
     frames: int = 0
     seed: int = 1
+    commands: Path | None = None
 
 
 def recordable(settings: StudySettings, model: Path) -> LaneFollowing:
@@ -62,13 +64,16 @@ def record_log(
         The log, and what is probably not meant in its domain or itself, a sentence each.
 
     Raises:
-        InputError: If the domain cannot be recorded, or has no camera or expert where pictures are wanted.
+        InputError: If the domain cannot be recorded, its robot cannot do what a table says, or it has no camera or
+            expert where pictures are wanted.
         EpisodeError: If a lane drive ends before its pictures are taken.
         RunError: If a file cannot be written.
     """
     family = recordable(settings, model)
     drives = film(family, wanted.frames, wanted.seed) if wanted.frames else ()
-    log = record(family, name=folder.name, repeats=wanted.repeats, seconds=wanted.seconds, seed=wanted.seed)
+    table = None if wanted.commands is None else read_commands(wanted.commands)
+    repeats, seconds, seed = wanted.repeats, wanted.seconds, wanted.seed
+    log = record(family, name=folder.name, repeats=repeats, seconds=seconds, seed=seed, table=table)
     if wanted.frames:
         road = _write_map(settings.domain, folder)
         log = _film(log, drives, road, folder, lambda taken: tell(f"driving: {taken} of {wanted.frames} frames"))

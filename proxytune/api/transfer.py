@@ -1,6 +1,6 @@
 """Ways in and out of proxytune from Python: logs of others, score tables of a twin, predictions."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -32,7 +32,7 @@ from proxytune.importing import (
     source_without_unnamed_pictures,
     write_log,
 )
-from proxytune.logs import Log, log_cautions
+from proxytune.logs import Log, check_kind, log_cautions
 from proxytune.report import frame_html, write_picture, write_text
 from proxytune.running import Bars, Silent
 from proxytune.scores import ScoreTable, write_scores
@@ -96,21 +96,26 @@ def import_log(
     found = source_without_unnamed_pictures(whole, known)
     if output is not None:
         folder = Path(output)
-        figures = _figures_of(known.robot or folder.resolve().name)  # Writing may replace the folder that one is in
-        return ImportReport(found, folder, log_cautions(write_log(found, folder, known, origin=path.name), figures))
+        robot = _known_robot(known.robot or folder.resolve().name)  # Writing may replace the folder that one is in
+        for drive in whole.drives:
+            if robot is not None and drive.commands is not None:
+                check_kind(drive.commands.kind, robot.name, robot.drive, str(path))
+        log = write_log(found, folder, known, origin=path.name)
+        return ImportReport(found, folder, log_cautions(log, {} if robot is None else robot.figures))
     bare = replace(found, drives=tuple(replace(drive, pictures=None) for drive in found.drives))
     try:
         with as_log(bare, known, path) as log:
-            return ImportReport(found, None, log_cautions(log, _figures_of(log.robot)))
+            robot = _known_robot(log.robot)
+            return ImportReport(found, None, log_cautions(log, {} if robot is None else robot.figures))
     except LogError as problem:
         return ImportReport(found, None, (f"it makes no log: {problem}",))
 
 
-def _figures_of(robot: str) -> Mapping[str, float]:
-    """The figures of a robot, as far as it is known here."""
+def _known_robot(name: str) -> Robot | None:
+    """A robot, if it is known here."""
     with suppress(InputError):
-        return read_robot(robot, Path.cwd()).figures if robot in robot_names(Path.cwd()) else {}
-    return {}
+        return read_robot(name, Path.cwd()) if name in robot_names(Path.cwd()) else None
+    return None
 
 
 @dataclass(frozen=True, repr=False)

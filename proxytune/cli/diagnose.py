@@ -12,10 +12,10 @@ from proxytune.api import DiagnosisReport
 from proxytune.cli.commands import names_in
 from proxytune.cli.options import configure_effects, configure_source, facts_of, typed, wanted_of
 from proxytune.cli.terminal import Answer, Steps
-from proxytune.diagnosis import diagnose_log, robot_of
+from proxytune.diagnosis import LIMITS, Limits, diagnose_log, forget_stages, robot_of
 from proxytune.effects import Catalogue
 from proxytune.errors import InputError
-from proxytune.importing import open_log
+from proxytune.importing import finite, open_log
 from proxytune.logs import Log
 from proxytune.report import diagnosis_text
 
@@ -29,7 +29,8 @@ MOTION = {
     "fitting to windows of prediction": 0.75,
     "learning what no named effect explains": 0.8,
     "testing on drives kept aside": 0.85,
-    "confirming on the bullet plant": 0.88,
+    "confirming on the bullet plant": 0.86,
+    "designing the next drive": 0.9,
     "drawing": 0.96,
 }
 """The share of a diagnosis of motion that has usually passed when each of its steps begins."""
@@ -63,31 +64,65 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--test", type=Path, metavar="LOG", help="another log to test motion on [part of LOG]")
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the null distributions [1]")
     parser.add_argument("--output", type=Path, metavar="DIR", help="folder for the findings [diagnosis_LOG]")
+    group = parser.add_argument_group("the next drive")
+    group.add_argument(
+        "--room", metavar="LxW", help="free floor for it, length x width [m], as in 4x3 [where the log's drives were]"
+    )
+    group.add_argument(
+        "--fastest", type=float, default=LIMITS.fastest, metavar="SHARE", help="its greatest command [1: full speed]"
+    )
+    group.add_argument(
+        "--drive-seconds", type=float, default=LIMITS.seconds, metavar="S", help="how long it lasts [20 s]"
+    )
     configure_source(parser)
+
+
+def limits_of(arguments: argparse.Namespace) -> Limits:
+    """Limits of the next drive.
+
+    Raises:
+        InputError: If one is none.
+    """
+    room = None
+    if arguments.room is not None:
+        sides = [finite(side) for side in arguments.room.split("x")]
+        if len(sides) != 2 or any(side is None or not 0.3 <= side <= 1000.0 for side in sides):
+            raise InputError(f"--room {arguments.room}: give length x width from 0.3 to 1000 m, as in 4x3")
+        room = (float(sides[0] or 0.0), float(sides[1] or 0.0))
+    if not 0.05 <= arguments.fastest <= 1.0:
+        raise InputError(f"--fastest must be between 0.05 and 1, a share of full speed, got {arguments.fastest:g}")
+    if not 5.0 <= arguments.drive_seconds <= 120.0:
+        raise InputError(f"--drive-seconds must be between 5 and 120, got {arguments.drive_seconds:g}")
+    return Limits(room, arguments.fastest, arguments.drive_seconds)
 
 
 def run(arguments: argparse.Namespace) -> Answer:
     """Diagnose, and write diagnosis.json, model.toml and the figures."""
     if arguments.seed < 0:
         raise InputError(f"--seed must be at least 0, got {arguments.seed}")
+    limits = limits_of(arguments)
     with ExitStack() as stack:
         log, imported = stack.enter_context(open_log(arguments.log, wanted_of(arguments), facts_of(arguments)))
         test = None
         if arguments.test:
             test, _ = stack.enter_context(open_log(arguments.test, wanted_of(arguments), facts_of(arguments)))
-        return _diagnosed(arguments, log, test, imported)
+        return _diagnosed(arguments, limits, log, test, imported)
 
 
-def _diagnosed(arguments: argparse.Namespace, log: Log, test: Log | None, imported: Sequence[str]) -> Answer:
+def _diagnosed(
+    arguments: argparse.Namespace, limits: Limits, log: Log, test: Log | None, imported: Sequence[str]
+) -> Answer:
     robot = robot_of(log, arguments.robot, Catalogue(Path.cwd(), names_in(arguments.effects)))
     declared = None if arguments.declared is None else names_in(arguments.declared)
     with Steps(shares(log)) as step:
-        found = diagnose_log(log, robot, declared, test=test, seed=arguments.seed, report=step)
         here = arguments.log.resolve()
         folder = arguments.output or Path(f"diagnosis_{here.stem if here.is_file() else here.name}")
+        seed = arguments.seed
+        found = diagnose_log(log, robot, declared, test=test, seed=seed, report=step, limits=limits, folder=folder)
         step("drawing")
         report = DiagnosisReport(found)
         files = [str(path) for path in report.write(folder, typed(arguments))]
+        forget_stages(folder)
     lines = [*(f"{arguments.log.name}: {note}" for note in imported), *files]
     document = report.document() | {"files": files} | ({"imported": list(imported)} if imported else {})
     return Answer(document, Group(diagnosis_text(found), Text("\n".join(lines))))

@@ -23,8 +23,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("path", type=Path, metavar="PATH", help="a study's folder, for its [domain]")
     parser.add_argument("--model", type=Path, required=True, metavar="MODEL", help="the model.toml of the domain")
     parser.add_argument("--output", type=Path, required=True, metavar="DIR", help="the log's folder to write")
-    parser.add_argument("--repeats", type=int, default=2, metavar="N", help="drives of each manoeuvre [2]")
-    parser.add_argument("--seconds", type=float, default=60.0, metavar="S", help="length of a drive [60 s]")
+    parser.add_argument("--repeats", type=int, default=2, metavar="N", help="drives of each manoeuvre or table [2]")
+    parser.add_argument("--seconds", type=float, default=60.0, metavar="S", help="length of a manoeuvre [60 s]")
+    parser.add_argument("--commands", type=Path, metavar="CSV", help="drive these commands instead of manoeuvres")
     parser.add_argument("--frames", type=int, default=0, metavar="N", help="pictures, taken on lane drives [0: none]")
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="seed of manoeuvres, starts and noise [1]")
 
@@ -35,7 +36,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     settings = read_study_settings(arguments.path)
     if not arguments.model.is_file():
         raise InputError(f"--model {arguments.model}: no such file; check the path")
-    wanted = Wanted(arguments.repeats, arguments.seconds, arguments.frames, arguments.seed)
+    wanted = Wanted(arguments.repeats, arguments.seconds, arguments.frames, arguments.seed, arguments.commands)
     with waiting("driving") as tell:
         log, cautions = record_log(settings, arguments.model, arguments.output, wanted, tell)
     return _answer(log, cautions, arguments)

@@ -6,6 +6,7 @@ Two houses that know nothing of one another, and one answer:
     answer          what both houses say: estimates, verdicts, and the rules that decide (an argument of `diagnose_log`)
     motion/         commands and poses: a Kalman filter in SE(2), forward selection of effects, prediction
     camera/         frames: edges of markings against the map, the fewest effects, brightness and sharpness
+    stages          results on the way, kept so that a diagnosis that was killed goes on
     recording       logs of a simulated domain, driven and measured as a robot's would be
 """
 

@@ -22,9 +22,16 @@ from .log_diagnosis import (
 from .motion.clocks import Clocks as Clocks, Offset as Offset
 from .motion.diagnose import Diagnosis as Diagnosis, HorizonError as HorizonError, main_error as main_error
 from .motion.discrepancy import Learning as Learning, MatchedEffect as MatchedEffect
-from .motion.drives import Drives as Drives, Floats as Floats, Whole as Whole, robot_of as robot_of
+from .motion.drives import (
+    Drives as Drives,
+    Floats as Floats,
+    Whole as Whole,
+    commands_as as commands_as,
+    robot_of as robot_of,
+)
 from .motion.effect_size import EffectSize as EffectSize, RobotClusters as RobotClusters
 from .motion.evidence import AdoptedEffect as AdoptedEffect, Findings as Findings
+from .motion.excitation import LIMITS as LIMITS, Limits as Limits, NextDrive as NextDrive
 from .motion.fitting import Fit as Fit
 from .motion.innovations import (
     HUBER as HUBER,
@@ -56,3 +63,4 @@ from .recording import (
     record as record,
     samples_text as samples_text,
 )
+from .stages import forget_stages as forget_stages

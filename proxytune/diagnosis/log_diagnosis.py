@@ -6,6 +6,7 @@ told with its reason. `predict_pictures` draws what a fitted model's camera woul
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -17,7 +18,9 @@ from proxytune.diagnosis.camera.edges import Edges, Optics, Views, read_road, tr
 from proxytune.diagnosis.camera.error import CameraDiagnosis, grey_differences
 from proxytune.diagnosis.camera.model import draw_pictures, neutral_state
 from proxytune.diagnosis.motion.diagnose import Diagnosis, declared_effects, diagnose
+from proxytune.diagnosis.motion.excitation import LIMITS, Limits
 from proxytune.diagnosis.motion.screening import motion_effects
+from proxytune.diagnosis.stages import Stages, facts_of
 from proxytune.driving import Markings, Robot, ground_points
 from proxytune.effects import effect_of
 from proxytune.errors import LogError, SettingsError
@@ -60,6 +63,8 @@ def diagnose_log(
     seed: int = 1,
     report: Progress = lambda _: None,
     rules: Rules = RULES,
+    limits: Limits = LIMITS,
+    folder: Path | None = None,
 ) -> LogDiagnosis:
     """Diagnose motion where the log has commands, and the camera where it has frames.
 
@@ -71,6 +76,9 @@ def diagnose_log(
         seed: Of the null distributions and the bootstrap.
         report: Takes a line about each step, as it begins.
         rules: Thresholds of what is named, believed and told of motion.
+        limits: Of the next drive.
+        folder: Where the findings go: what is known of motion is kept there on the way, and a diagnosis that was killed
+            goes on with it; None: nothing is kept.
 
     Raises:
         LogError: If neither drives nor frames can bear the question, or a declared effect is unknown.
@@ -79,7 +87,11 @@ def diagnose_log(
     on_motion, on_camera = _declared_by_kind(log, robot, declared)
 
     def motion() -> Diagnosis:
-        return diagnose(log, robot, on_motion, test=test, seed=seed, report=report, rules=rules)
+        options = (on_motion, seed, rules, limits)
+        stages = Stages(folder, facts_of(log, test, robot, *options) if folder else "")
+        return diagnose(
+            log, robot, on_motion, test=test, seed=seed, report=report, rules=rules, limits=limits, stages=stages
+        )
 
     def camera() -> CameraDiagnosis:
         return diagnose_camera(log, robot, on_camera, seed=seed, report=report)

@@ -5,7 +5,7 @@
 
 import functools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,7 +14,7 @@ import pandas as pd
 import tomlkit
 from numpy.typing import NDArray
 
-from proxytune.diagnosis.motion.drives import Floats
+from proxytune.diagnosis.motion.drives import Floats, duties_of
 from proxytune.diagnosis.motion.manoeuvres import LIBRARY, commands_of
 from proxytune.driving import (
     TICK_HZ,
@@ -24,6 +24,7 @@ from proxytune.driving import (
     Instance,
     LaneFollowing,
     Road,
+    Robot,
     Sight,
     drive,
     follow,
@@ -55,29 +56,53 @@ CAMERA = {
 """What log.toml states of the pictures: no effect adjusts the exposure from one to the next."""
 
 
-def record(family: LaneFollowing, *, name: str, repeats: int, seconds: float, seed: int) -> Log:
-    """Drive every manoeuvre so many times, each time at another size and to the other side.
+Table = tuple[str, Mapping[str, tuple[Floats, Floats]]]
+"""Kind of commands, and each drive's times [s] and commands, as `proxytune.logs.read_commands` gives them."""
+
+
+def record(
+    family: LaneFollowing, *, name: str, repeats: int, seconds: float, seed: int, table: Table | None = None
+) -> Log:
+    """Drive every manoeuvre so many times, each time at another size and to the other side; or the drives of a table.
 
     Args:
         family: The domain; its effects are what is recorded.
         name: What the log is called.
-        repeats: Drives of each manoeuvre.
-        seconds: Length of a drive [s].
+        repeats: Drives of each manoeuvre, or of each drive of the table.
+        seconds: Length of a manoeuvre [s].
         seed: Of sizes, starts and noise.
+        table: Commands to drive as they are instead of manoeuvres.
+
+    Raises:
+        LogError: If the table's commands are not for the robot.
     """
     robot = read_robot(family.robot, family.folder)
     rate = robot.figures["control_rate"]
     times = np.arange(round(seconds * rate)) / rate
+    own = [] if table is None else _duties(Log(name, family.robot, table[0], rate, {}, ()), robot, table[1])
     episodes = []
-    for number in range(repeats * len(LIBRARY)):
+    for number in range(repeats * (len(own) or len(LIBRARY))):
         random = np.random.default_rng((seed, number))
-        sized = commands_of(LIBRARY[number % len(LIBRARY)][2], times, robot) * random.uniform(0.75, 1.0)
-        if number // len(LIBRARY) % 2 == 1:
-            sized = sized * (1.0, -1.0) if robot.drive == "ackermann" else sized[:, ::-1]
-        commands = np.round(sized, 4)
+        if own:
+            sized = own[number % len(own)]
+            times = np.arange(len(sized)) / rate
+        else:
+            sized = commands_of(LIBRARY[number % len(LIBRARY)][2], times, robot) * random.uniform(0.75, 1.0)
+            if number // len(LIBRARY) % 2 == 1:
+                sized = sized * (1.0, -1.0) if robot.drive == "ackermann" else sized[:, ::-1]
+        commands = np.asarray(np.round(sized, 4), dtype=float)
         poses = _drive(family, commands, random, number)
         episodes.append(LogEpisode(str(number), times, commands, poses, None))
     return Log(name, family.robot, KIND[robot.drive], rate, {}, tuple(episodes))
+
+
+def _duties(log: Log, robot: Robot, drives: Mapping[str, tuple[Floats, Floats]]) -> list[Floats]:
+    """The drives of a table as what the robot is given at each control step (rows, 2); the last command lasts one."""
+    found = []
+    for times, commands in drives.values():
+        held = np.arange(max(2, round((times[-1] - times[0]) * log.rate_hz) + 1)) / log.rate_hz + times[0]
+        found.append(duties_of(log, robot, commands)[np.searchsorted(times, held + 1e-6, side="right") - 1])
+    return found
 
 
 KIND = {"differential": "duty", "ackermann": "ackermann"}

@@ -6,6 +6,7 @@ itself. Around any of them others react later, smooth, lean to one side, or slow
 """
 
 import math
+import operator
 from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -31,7 +32,7 @@ from proxytune.driving.perception import (
     weigh_markings,
 )
 from proxytune.driving.robot import Robot
-from proxytune.extensions import make
+from proxytune.extensions import load
 
 Look = tuple[Kind, Any]
 """What an agent asks of its newest picture: how, and what of."""
@@ -41,7 +42,7 @@ Decision = Generator[Look, Any, tuple[Any, Any]]
 
 
 class Deciding(Protocol):
-    """An agent that says what it looks at, so that it can look together with others."""
+    """An agent that says what it looks at, so that it can look together with others: so do the shipped ones."""
 
     def begin(self, robot: Robot) -> Any:
         """The memory before the first picture."""
@@ -50,6 +51,15 @@ class Deciding(Protocol):
     def decide(self, memory: Any) -> Decision:
         """Look at the newest picture, and decide."""
         ...
+
+    def act(self, picture: Picture, memory: Any) -> tuple[Command, Any]:
+        """The command for the newest picture, and the memory for the next."""
+        command, memory = _decide_alone(self, Seen(picture[None]), memory)
+        return np.asarray(command, dtype=float), memory
+
+    def act_many(self, pictures: NDArray[np.uint8], memories: Sequence[Any]) -> tuple[NDArray[np.float64], list[Any]]:
+        """The commands (n, 2) of several robots' pictures (n, rows, columns, 3), and their memories, as `act` does."""
+        return act_together([self] * len(memories), pictures, memories)
 
 
 def act_together(
@@ -91,7 +101,7 @@ def _decide(agents: Sequence[Deciding], seen: Seen, memories: Sequence[Any]) -> 
                     asked.append((robot, *decisions[robot].send(answer)))
                 except StopIteration as decided:
                     commands[robot], after[robot] = decided.value
-        asked.sort(key=_robot)
+        asked.sort(key=operator.itemgetter(0))
     return commands, after
 
 
@@ -105,30 +115,11 @@ def _decide_alone(agent: Deciding, seen: Seen, memory: Any) -> tuple[Any, Any]:
         return cast(tuple[Any, Any], decided.value)
 
 
-def _robot(asked: tuple[int, Kind, Any]) -> int:
-    return asked[0]
-
-
-def act(self: Deciding, picture: Picture, memory: Any) -> tuple[Command, Any]:
-    """The command for the newest picture, and the memory for the next."""
-    command, memory = _decide_alone(self, Seen(picture[None]), memory)
-    return np.asarray(command, dtype=float), memory
-
-
-def act_many(
-    self: Deciding, pictures: NDArray[np.uint8], memories: Sequence[Any]
-) -> tuple[NDArray[np.float64], list[Any]]:
-    """The commands (n, 2) of several robots' pictures (n, rows, columns, 3), and their memories, as `act` has them."""
-    return act_together([self] * len(memories), pictures, memories)
-
-
 def _decision(agent: Agent, memory: Any) -> Decision:
     """What an agent decides, which may be a user's and look at the whole picture."""
     own: Callable[[Any], Decision] | None = getattr(agent, "decide", None)
-    return own(memory) if own else _ask(agent, memory)
-
-
-def _ask(agent: Agent, memory: Any) -> Decision:
+    if own:
+        return (yield from own(memory))
     picture = yield take_picture, None
     return agent.act(picture, memory)
 
@@ -167,7 +158,7 @@ def duties(speed: float, yaw_rate: float, *, full_speed: float, baseline: float)
 
 
 @dataclass(frozen=True)
-class LanePilot:
+class LanePilot(Deciding):
     """Segments the markings by colour, projects them on the floor and steers by offset and direction (PD).
 
     Attributes:
@@ -202,11 +193,9 @@ class LanePilot:
         command = duties(self.speed, yaw_rate, full_speed=full_speed, baseline=baseline)
         return command, PilotMemory(look, full_speed, baseline, lane)
 
-    act, act_many = act, act_many
-
 
 @dataclass(frozen=True)
-class PursuitPilot:
+class PursuitPilot(Deciding):
     """Pure pursuit of a point on the lane's centre as the markings show it.
 
     Attributes:
@@ -233,15 +222,13 @@ class PursuitPilot:
         command = duties(speed, speed * curvature, full_speed=full_speed, baseline=baseline)
         return command, PilotMemory(look, full_speed, baseline, lane)
 
-    act, act_many = act, act_many
-
 
 def _below(robot: Robot, share: float) -> Lower:
     return lower_part(int(robot.figures["camera_rows"]), int(robot.figures["camera_columns"]), share)
 
 
 @dataclass(frozen=True)
-class Braitenberg:
+class Braitenberg(Deciding):
     """Two eyes, crossed wires: yellow on the right pushes right, white on the left pushes left.
 
     Like Duckietown's Braitenberg exercise: what it sees drives the wheels and nothing is remembered.
@@ -266,11 +253,9 @@ class Braitenberg:
         yaw_rate = self.push * (white - yellow)
         return duties(self.speed, yaw_rate, full_speed=memory.full_speed, baseline=memory.baseline), memory
 
-    act, act_many = act, act_many
-
 
 @dataclass(frozen=True)
-class EdgePilot:
+class EdgePilot(Deciding):
     """Balances sharp edges: steers for the gap between the contours left and right of the picture's middle.
 
     It sees brightness steps, not colours, so a smeared picture leaves it little to go by.
@@ -297,11 +282,9 @@ class EdgePilot:
         yaw_rate = self.gain * pull / max(edges, 8)
         return duties(self.speed, yaw_rate, full_speed=memory.full_speed, baseline=memory.baseline), memory
 
-    act, act_many = act, act_many
-
 
 @dataclass(frozen=True)
-class Smoothed:
+class Smoothed(Deciding):
     """Low-pass filters another agent's commands: each step it goes a share of the way to the new one."""
 
     agent: Agent
@@ -318,11 +301,9 @@ class Smoothed:
         command = tuple([old + self.share * (new - old) for old, new in zip(last, wanted, strict=True)])
         return command, (command, inner)
 
-    act, act_many = act, act_many
-
 
 @dataclass(frozen=True)
-class Laggy:
+class Laggy(Deciding):
     """Issues another agent's commands some control steps late, as slow image processing does."""
 
     agent: Agent
@@ -339,11 +320,9 @@ class Laggy:
         waiting = (*waiting, wanted)
         return waiting[0], (waiting[1:], inner)
 
-    act, act_many = act, act_many
-
 
 @dataclass(frozen=True)
-class Leaning:
+class Leaning(Deciding):
     """Another agent on a robot whose right wheel it believes to be weaker than it is."""
 
     agent: Agent
@@ -359,11 +338,9 @@ class Leaning:
         left, right = left * (1.0 - self.bias), right * (1.0 + self.bias)
         return (min(max(left, -1.0), 1.0), min(max(right, -1.0), 1.0)), memory
 
-    act, act_many = act, act_many
-
 
 @dataclass(frozen=True)
-class Wary:
+class Wary(Deciding):
     """Another agent's path, driven as fast as the yellow dashes look crisp.
 
     Motion smears the dashes into their gaps, so this agent drives at the speed at which it still sees well.
@@ -392,21 +369,16 @@ class Wary:
         share += 0.1 * (min(1.0, max(self.slowest, seen)) - share)
         return (share * left, share * right), (look, share, inner)
 
-    act, act_many = act, act_many
-
 
 LANE_M, BASELINE_M = 0.22, 0.16
 """Width of the lanes that the agents were made for, and the effective baseline of the robot [m]: a Duckiebot's."""
 
 
 @dataclass(frozen=True)
-class AtTheWheel:
+class AtTheWheel(Deciding):
     """An agent for two wheels in a car: it thinks that it drives a small robot in the lanes that it was made for.
 
     What it wants of two wheels is a speed and a curvature; to scale, these are the car's throttle and steering.
-
-    Attributes:
-        agent: The agent for two wheels.
     """
 
     agent: Agent
@@ -429,8 +401,6 @@ class AtTheWheel:
         # To turn on the spot is to turn as far as the wheels go
         curvature = (right - left) / math.copysign(max(abs(ahead), 1e-6), ahead) / (scale * BASELINE_M)
         return throttle_and_steering(robot, ahead * robot.figures["full_speed"], curvature), (robot, scale, inner)
-
-    act, act_many = act, act_many
 
 
 AGENTS: Mapping[str, Agent] = MappingProxyType(
@@ -470,4 +440,4 @@ def load_agent(name: str, folder: Path) -> Agent:
     Raises:
         ExtensionError: If there is no such agent.
     """
-    return cast(Agent, make(name, kind="agent", beside=folder, needs=NEEDS, shipped=AGENTS))
+    return cast(Agent, load(name, kind="agent", beside=folder, needs=NEEDS, shipped=AGENTS, call=True))

@@ -12,7 +12,6 @@ import weakref
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
@@ -54,11 +53,7 @@ def has_pybullet() -> bool:
 
 
 def need_pybullet(instead: str = 'plant = "planar"') -> None:
-    """Refuse to go on without PyBullet, which has wheels for Python 3.11 alone.
-
-    Raises:
-        InputError: If it is not installed, with what to take instead.
-    """
+    """Refuse to go on without PyBullet, which has wheels for Python 3.11 alone."""
     if not has_pybullet():
         built = "with a C++ compiler run `pip install pybullet`"
         raise InputError(f"PyBullet is not installed; take {instead}, use Python 3.11, or {built}")
@@ -196,9 +191,7 @@ class BulletPlant:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, problem: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *problem: object) -> None:
         leave_world(self._world)
 
 
@@ -249,14 +242,6 @@ class BulletCamera:
     def close(self) -> None:
         """End the camera's PyBullet world; once is enough, twice does no harm."""
         self._end()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, problem: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _shoot(self, pose: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
         figures = self._straight
@@ -334,13 +319,9 @@ def _lay(floor: Floor, world: int) -> None:
     )
     body = pybullet.createMultiBody(0, -1, shape, physicsClientId=world)
     with temporary_folder() as folder:
-        texture = pybullet.loadTexture(str(_write_targa(floor, folder)), physicsClientId=world)
+        # An uncompressed TGA, whose rows go up and whose pixels are blue, green, red
+        path = folder / "floor.tga"
+        header = struct.pack("<BBBHHBHHHHBB", 0, 0, 2, 0, 0, 0, 0, 0, size, size, 24, 0)
+        path.write_bytes(header + floor.pixels[..., ::-1].tobytes())
+        texture = pybullet.loadTexture(str(path), physicsClientId=world)
     pybullet.changeVisualShape(body, -1, textureUniqueId=texture, rgbaColor=(1, 1, 1, 1), physicsClientId=world)
-
-
-def _write_targa(floor: Floor, folder: Path) -> Path:
-    """The floor's picture as an uncompressed TGA, whose rows go up and whose pixels are blue, green, red."""
-    path, side = folder / "floor.tga", floor.pixels.shape[0]
-    header = struct.pack("<BBBHHBHHHHBB", 0, 0, 2, 0, 0, 0, 0, 0, side, side, 24, 0)
-    path.write_bytes(header + floor.pixels[..., ::-1].tobytes())
-    return path

@@ -8,7 +8,7 @@ import functools
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -154,26 +154,12 @@ def _ticks(context: FilterContext) -> int:
     return round(context.rate_hz / context.nominal["camera_rate"])
 
 
-class _Film(Protocol):
-    """Film: makes pictures of what cameras see.
+class _Averaged:
+    """Film on which a picture is a weighted mean of what the camera saw at the last ticks, which is all that blur does.
 
     Attributes:
         partial: Whether it can show parts, and the same picture again.
     """
-
-    partial: bool
-
-    def see(self, poses: Signal) -> None:
-        """Let in the poses (robots, ticks, 3) since the picture before."""
-        ...
-
-    def expose(self, robots: Sequence[int], first: int) -> NDArray[Any]:
-        """The newest pictures (n, rows, columns, 3) of the robots left, right from the first pixel on, not rounded."""
-        ...
-
-
-class _Averaged:
-    """Each picture is a weighted mean of what the camera saw at the last ticks, which is all that blur does."""
 
     def __init__(self, camera: Renderer, weights: Signal, contexts: Sequence[FilterContext], level: Any) -> None:
         self._glimpse = getattr(camera, "glimpse", lambda poses, first: camera.render(poses))
@@ -186,14 +172,17 @@ class _Averaged:
         self._new = len(weights)
 
     def see(self, poses: Signal) -> None:
-        """Keep the last poses, as many as are averaged."""
+        """Let in the poses (robots, ticks, 3) since the picture before; the last are kept, as many as are averaged."""
         self._new = min(self._new + poses.shape[1], len(self._weights))
         if poses.shape[1] < len(self._weights):
             poses = np.concatenate((self._poses, poses), axis=1)
         self._poses = poses[:, -len(self._weights) :]
 
     def expose(self, robots: Sequence[int], first: int) -> NDArray[Any]:
-        """The means of what these robots' cameras saw; what is known from the pictures before is not looked up."""
+        """The newest pictures (n, rows, columns, 3) of the robots left, right from the first pixel on, not rounded.
+
+        What is known from the pictures before is not looked up.
+        """
         new, kept, pixel = self._new, self._glimpses, first
         pictures, self._glimpses = np.empty((len(robots), *self._shape), dtype=self._level), {}
         if not self.partial:
@@ -211,7 +200,7 @@ class _Averaged:
 
 
 class _Mixed:
-    """Effects mix each picture with those before it, one after another."""
+    """Film on which effects mix each picture with those before it, one after another."""
 
     partial = False
 
@@ -255,7 +244,7 @@ class Views:
         mixing, self._alone = image.parted()
         weights = mixing.mean_weights(contexts[0].rate_hz)
         level = np.float32 if self._alone.effects else np.uint8
-        self._film: _Film = (
+        self._film: _Mixed | _Averaged = (
             _Mixed(camera, mixing, developed) if weights is None else _Averaged(camera, weights, contexts, level)
         )
         self._memories = [self._alone.begin(one) for one in developed]

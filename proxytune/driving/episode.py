@@ -17,8 +17,8 @@ import numpy as np
 
 from proxytune.arrays import Floats
 from proxytune.driving.agent import Command, Picture
-from proxytune.driving.agents import act_many, act_together
-from proxytune.driving.lane import LanePose, lane_length, lane_pose
+from proxytune.driving.agents import Deciding, act_together
+from proxytune.driving.lane import lane_length, lane_pose
 from proxytune.driving.optics import Renderer
 from proxytune.driving.perception import Seen, rows_of
 from proxytune.driving.plants import Drivetrain
@@ -131,15 +131,13 @@ def measured(instance: Instance, poses: Signal, seed: int) -> Signal:
 
 def alike(drivers: Sequence[Driver]) -> list[Driver]:
     """Drivers, one and the same object for those that can answer together: equal ones with `act_many`."""
-    distinct: list[Driver] = []
-    return [_known(driver, distinct) if hasattr(driver, "act_many") else driver for driver in drivers]
-
-
-def _known(driver: Driver, distinct: list[Driver]) -> Driver:
-    """The first of those known that equals a driver; where there is none it becomes known."""
-    found = next((one for one in distinct if one is driver or (type(one) is type(driver) and one == driver)), driver)
-    if found is driver and not any(one is driver for one in distinct):
-        distinct.append(driver)
+    distinct, found = list[Driver](), list[Driver]()
+    for driver in drivers:
+        same = (one for one in distinct if one is driver or (type(one) is type(driver) and one == driver))
+        known = next(same, None) if hasattr(driver, "act_many") else driver
+        if known is None:
+            distinct.append(driver)
+        found.append(driver if known is None else known)
     return found
 
 
@@ -189,7 +187,7 @@ class Shown:
 
 def _looks(driver: Any) -> bool:
     """Tell whether it is of the shipped agents, which say what they look at."""
-    return getattr(type(driver), "act_many", None) is act_many
+    return getattr(type(driver), "act_many", None) is Deciding.act_many
 
 
 def ask_many(
@@ -245,11 +243,7 @@ def ask(driver: Driver, seen: Any, memory: Any, time_s: float) -> tuple[Command,
 
 
 def check_command(command: Command, time_s: float) -> None:
-    """Refuse what are not two finite duties.
-
-    Raises:
-        EpisodeError: With the time [s].
-    """
+    """Refuse what are not two finite duties, with the time [s]."""
     if command.shape != (2,):
         raise EpisodeError(
             f"answered with shape {command.shape} at {time_s:.2f} s; a command is two duties, left and right"
@@ -324,7 +318,11 @@ def score_trajectory(road: Road, poses: Floats, *, tick_s: float, seconds: float
     pose = lane_pose(road, driven[:, :2], driven[:, 2])
     aside = np.abs(pose.deviation)
     in_lane = _over_steps((aside <= road.lane_width / 2.0).astype(float))
-    along, early = in_lane * _steps_along(road, pose), round(EARLY_S / tick_s)
+    # The way from each pose to the next is the short one round the loop
+    lap = lane_length(road, pose.counter_clockwise[:-1])
+    ahead = np.mod(np.diff(pose.along) + lap / 2.0, lap) - lap / 2.0
+    along = in_lane * np.where(pose.counter_clockwise[1:] == pose.counter_clockwise[:-1], ahead, 0.0)
+    early = round(EARLY_S / tick_s)
     way = np.hypot(*np.diff(driven[:, :2], axis=0).T)
     return {
         "distance": float(np.sum(along)),
@@ -370,13 +368,6 @@ def _driven(road: Road, poses: Floats, *, tick_s: float, seconds: float) -> Floa
         step = int(np.argmin(np.isfinite(driven).all(axis=1)))
         raise EpisodeError(f"the pose is not finite at {step * tick_s:.2f} s; the plant cannot follow these commands")
     return driven
-
-
-def _steps_along(road: Road, pose: LanePose) -> Floats:
-    """Way along the lane from each pose to the next [m], the short way round the loop."""
-    lap = lane_length(road, pose.counter_clockwise[:-1])
-    way = np.mod(np.diff(pose.along) + lap / 2.0, lap) - lap / 2.0
-    return np.where(pose.counter_clockwise[1:] == pose.counter_clockwise[:-1], way, 0.0)
 
 
 def _mean_over_steps(values: Floats) -> float:

@@ -108,12 +108,7 @@ class Expert:
 
 @dataclass(frozen=True)
 class Guide:
-    """Lets a policy drive, and tells what the expert would do wherever that leads (Ross et al. 2011, DAgger).
-
-    Attributes:
-        expert: Who tells.
-        policy: Who drives.
-    """
+    """Lets a policy drive, and tells what the expert would do wherever that leads (Ross et al. 2011, DAgger)."""
 
     expert: Expert
     policy: Policy
@@ -128,11 +123,7 @@ class Guide:
 
 
 def lesson_driver(road: Road, robot: Robot, seed: int, policy: Policy | None) -> Expert | Guide:
-    """Who drives in a lesson: the robot's expert, or a policy that it guides.
-
-    Raises:
-        SettingsError: If the robot has no expert.
-    """
+    """Who drives in a lesson: the robot's expert, or a policy that it guides."""
     expert = Expert(road, *robot.expert_figures(), seed=seed)
     return expert if policy is None else Guide(expert, policy)
 

@@ -4,7 +4,6 @@ A family's episodes are kept under its `identity`: a digest of all that determin
 """
 
 import functools
-import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -36,10 +35,10 @@ from proxytune.driving.expert import Observation, Playback, Pupil, lesson_driver
 from proxytune.driving.fleet import AT_ONCE, PLANTS, drive_fleet, fleet_at, only, plant_at
 from proxytune.driving.lane import off_map
 from proxytune.driving.maps import chosen_map
-from proxytune.driving.optics import CameraFigures, Renderer
+from proxytune.driving.optics import CameraFigures
 from proxytune.driving.plants import Plant, check_body, drivetrain
 from proxytune.driving.road import Arc, Road
-from proxytune.driving.road_picture import Floor, draw_floor
+from proxytune.driving.road_picture import draw_floor
 from proxytune.driving.robot import Robot, catalogue_of, read_model_of, read_robot, robot_home, robot_names
 from proxytune.effects import (
     Chain,
@@ -52,7 +51,7 @@ from proxytune.effects import (
     stage_chain,
 )
 from proxytune.errors import EpisodeError, InputError
-from proxytune.identity import meaning_of, modules_beside, versions_of
+from proxytune.identity import digest, meaning_of, modules_beside, versions_of
 from proxytune.lineage import code_name
 from proxytune.settings import Section, figure_cautions, nearest
 from proxytune.space import Parameter, Theta
@@ -71,8 +70,7 @@ def identity_of(settings: tuple[Any, ...], robot: Path, folder: Path, versions: 
         versions: Of the packages that simulate.
     """
     own = meaning_of(modules_beside(folder), folder)
-    parts = (settings, code_name("driving"), robot_meaning(robot), own, sorted(versions.items()))
-    return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
+    return digest(settings, code_name("driving"), robot_meaning(robot), own, sorted(versions.items()))
 
 
 @functools.lru_cache
@@ -112,11 +110,7 @@ def image_chain(effects: Iterable[Effect], figures: Mapping[str, float]) -> Chai
 
 
 def with_columns(robot: Robot, least: int) -> Robot:
-    """The robot with a camera of at least so many columns, rows in proportion; every other figure is the same.
-
-    Raises:
-        SettingsError: If the robot has no camera.
-    """
+    """The robot with a camera of at least so many columns, rows in proportion; every other figure is the same."""
     camera = robot.camera_figures()
     columns = max(camera.columns, least)
     rows = round(camera.rows * columns / camera.columns)
@@ -125,11 +119,6 @@ def with_columns(robot: Robot, least: int) -> Robot:
 
 
 CAMERAS = ("ground_plane", "renderer")
-
-
-def camera_over(floor: Floor, mounted: CameraFigures, kind: str) -> Renderer:
-    """A camera of one of CAMERAS over a floor."""
-    return GroundPlaneCamera(mounted, floor) if kind == "ground_plane" else BulletCamera(mounted, floor)
 
 
 @dataclass(frozen=True)
@@ -302,15 +291,11 @@ class LaneFollowing:
         Raises:
             EpisodeError: As `examine` does, for the first episode that fails; SettingsError likewise.
         """
-        score, pupil = self._driving_score(), Pupil(policy)
+        wheels, pupil = read_robot(self.robot, self.folder).wheel_distance(), Pupil(policy)
+        timed = functools.partial(driving_score, tick_s=1.0 / TICK_HZ, seconds=self.seconds)
+        score = functools.partial(timed, self.map, wheel_distance=wheels)
         driven = self._drive(episodes, [pupil] * len(episodes), self.seconds)
         return [only([_scored(score, one)]) for one in driven]
-
-    def _driving_score(self) -> Callable[[Signal], float]:
-        """The paper's driving score of poses."""
-        wheels = read_robot(self.robot, self.folder).wheel_distance()
-        timed = functools.partial(driving_score, tick_s=1.0 / TICK_HZ, seconds=self.seconds)
-        return functools.partial(timed, self.map, wheel_distance=wheels)
 
     def measured(self, episode: Episode, driven: Drive) -> Signal:
         """The poses of an episode's drive as they are measured, (ticks + 1, 3); it is scored on the true ones."""
@@ -377,7 +362,8 @@ def _instance(family: LaneFollowing, theta: tuple[tuple[str, float], ...], colum
     named = read_robot(family.robot, family.folder)
     robot = with_columns(named, columns) if columns else named
     effects = effects_from({**robot.theta, **dict(family.effects), **dict(theta)}, robot.figures, robot.catalogue)
-    camera = camera_over(draw_floor(family.map), mounted_camera(robot, effects), family.camera)
+    mounted, floor = mounted_camera(robot, effects), draw_floor(family.map)
+    camera = GroundPlaneCamera(mounted, floor) if family.camera == "ground_plane" else BulletCamera(mounted, floor)
     image, measurement = image_chain(effects, robot.figures), stage_chain(effects, Stage.MEASUREMENT)
     return Instance(robot, drivetrain(robot, effects), camera, image, measurement)
 

@@ -89,22 +89,12 @@ def fleet_at(plant: str, robot: Robot, starts: Signal) -> Iterator[Fleet]:
 
 
 _OURS = frozenset((*(effect for effects in DRIVES.values() for effect in effects.values()), Learnt))
-
-
-def _same_in_batches(effect: Effect) -> bool:
-    """Tell whether it does to each robot of a batch, to the bit, what it does to one: ours do, unless they draw."""
-    return type(effect) in _OURS and (effect.trace is None or effect.trace.draws is None)
+"""Effects that do to each robot of a batch, to the bit, what they do to one, unless they draw."""
 
 
 @dataclass(frozen=True)
 class _Apart:
-    """An effect that is done to each robot by itself, whose seed it draws by.
-
-    Attributes:
-        effect: What is done.
-        seeds: Each robot's.
-        left: The robots that have left: nothing more is done to them. It grows as they leave.
-    """
+    """An effect that is done to each robot by itself, whose seed it draws by, unless that has `left`: these grow."""
 
     effect: Effect
     seeds: tuple[int, ...]
@@ -178,7 +168,9 @@ def _side_by_side(train: Drivetrain, seeds: tuple[int, ...], left: set[int]) -> 
     """A drivetrain over a leading axis of robots, each with a seed of its own."""
 
     def chain(of_one: Chain) -> Chain:
-        return Chain(tuple(one if _same_in_batches(one) else _Apart(one, seeds, left) for one in of_one.effects))
+        together = (type(one) in _OURS and not (one.trace and one.trace.draws) for one in of_one.effects)
+        pairs = zip(of_one.effects, together, strict=True)
+        return Chain(tuple(one if same else _Apart(one, seeds, left) for one, same in pairs))
 
     return replace(train, command=chain(train.command), actuation=chain(train.actuation), motion=chain(train.motion))
 
@@ -290,13 +282,7 @@ def drive_fleet(
 
 
 class _Drives:
-    """Drives under way, in the rows of the robots under way, and what became of those that ended.
-
-    Attributes:
-        rollouts: What is driven.
-        drivers: Who drives each robot under way.
-        results: Of each robot that has ended.
-    """
+    """Drives under way, in the rows of the robots under way, and the `results` of those that ended."""
 
     def __init__(self, rollouts: Rollouts, drivers: Sequence[Driver], sees: Callable[[Picture, Signal], Any]) -> None:
         self.rollouts, self.drivers, self._sees = rollouts, alike(drivers), sees
@@ -374,11 +360,7 @@ def drive(
 
 
 def only(results: Sequence[Result | EpisodeError]) -> Result:
-    """The result of a fleet of one.
-
-    Raises:
-        EpisodeError: If it is one.
-    """
+    """The result of a fleet of one; if it is an EpisodeError, that is raised."""
     [result] = results
     if isinstance(result, EpisodeError):
         raise result

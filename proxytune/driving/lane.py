@@ -61,12 +61,7 @@ class RoadLayout(NamedTuple):
 
 @functools.lru_cache
 def lay_out(begin: Begin, segments: tuple[Segment, ...]) -> RoadLayout:
-    """Lay a closed road's segments out.
-
-    Args:
-        begin: Where the first segment begins: x [m], y [m], heading [deg].
-        segments: Of the whole lap.
-    """
+    """Lay a closed road out, whose first segment begins at x [m], y [m], heading [deg]."""
     lap = tuple(road_sections(segments))
     repeats = repeats_of(lap)
     starts = corners(begin, segments)[:-1]
@@ -144,12 +139,7 @@ class NearestPoints(NamedTuple):
 
 
 def find_nearest(layout: RoadLayout, positions: Floats) -> NearestPoints:
-    """Find the centre line's nearest points.
-
-    Args:
-        layout: Of the road.
-        positions: x and y [m], shape (…, 2).
-    """
+    """Find the centre line's points that are nearest to x and y [m], (…, 2)."""
     places = np.asarray(positions, dtype=float) - layout.origin
     section = _nearest_section(layout, places)
     view = _view(layout, section, places)

@@ -29,15 +29,7 @@ TOLERANCE = 1e-4
 
 
 def check_road(road: Road, settings: Section) -> None:
-    """Refuse a map that cannot be driven.
-
-    Args:
-        road: As its file describes it.
-        settings: The file.
-
-    Raises:
-        SettingsError: With file, key and remedy.
-    """
+    """Refuse a map that cannot be driven, as its file describes it."""
     if not 0.0 < min(road.size) <= max(road.size) <= LARGEST_M:
         given = f"{road.size[0]:g} m × {road.size[1]:g} m"
         raise settings.error("size", f"each side must be above 0 and at most {LARGEST_M:g} m, got {given}")
@@ -133,11 +125,7 @@ def shipped_map(name: str) -> Road:
 
 
 def chosen_map(section: Section) -> Road:
-    """The map that a `[domain]` table names: one of the package's, or a .toml file beside the study.
-
-    Raises:
-        SettingsError: With file, key and remedy.
-    """
+    """The map that a `[domain]` table names: one of the package's, or a .toml file beside the study."""
     name = section.text("map", "small_loop")
     if name.endswith(".toml"):
         return read_map(section.file("map"))

@@ -12,7 +12,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import TracebackType
 from typing import NamedTuple, Protocol, Self
 
 import numpy as np
@@ -39,9 +38,7 @@ class Plant(Protocol):
 
     def __enter__(self) -> Self: ...
 
-    def __exit__(
-        self, kind: type[BaseException] | None, problem: BaseException | None, trace: TracebackType | None
-    ) -> None: ...
+    def __exit__(self, *problem: object) -> None: ...
 
 
 STEEPEST = np.radians(75.0)
@@ -256,11 +253,7 @@ def origin_of(element: ET.Element) -> NDArray[np.float64]:
 
 
 def check_body(robot: Robot) -> None:
-    """Refuse a URDF whose wheels are not those of robot.toml: the bullet plant would drive at another speed.
-
-    Raises:
-        SettingsError: If they differ, its axles are not called as the plant calls them, or what it names is no file.
-    """
+    """Refuse a URDF whose wheels are not those of robot.toml: the bullet plant would drive at another speed."""
     path = robot.body()
     root = parse_urdf(path)
     body = read_body(root, path)
@@ -393,9 +386,7 @@ class PlanarPlant:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, problem: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *problem: object) -> None:
         return None
 
 

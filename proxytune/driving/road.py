@@ -11,23 +11,14 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Straight:
-    """A straight stretch of the road's centre line.
-
-    Attributes:
-        length: Its length [m].
-    """
+    """A straight stretch of the road's centre line, of this length [m]."""
 
     length: float
 
 
 @dataclass(frozen=True)
 class Arc:
-    """A bend of the road's centre line.
-
-    Attributes:
-        radius: Of the centre line [m].
-        turn_deg: How far the road turns [deg], to the left positive, 90 at most.
-    """
+    """A bend of the centre line, of this radius [m], that turns so far [deg], to the left positive, 90 at most."""
 
     radius: float
     turn_deg: float
@@ -38,13 +29,7 @@ Segment = Straight | Arc
 
 @dataclass(frozen=True)
 class RoadSection:
-    """A straight with the bend that ends it; either may have no length.
-
-    Attributes:
-        straight: Length of the straight [m].
-        radius: Of the bend [m].
-        turn: Of the bend [rad], to the left positive.
-    """
+    """A straight [m] with the bend that ends it, radius [m] and turn [rad], left positive; either may be missing."""
 
     straight: float
     radius: float

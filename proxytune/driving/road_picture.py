@@ -101,28 +101,28 @@ def _shapes(road: Road, stretches: list[tuple[Segment, ...]], positions: Floats)
 
 def _dash_distance(road: Road, stretches: list[tuple[Segment, ...]], along: Floats) -> Floats:
     """Signed distance along the centre line from the nearest dash [m]."""
-    sizes = np.array([length(stretch) for stretch in stretches])
-    dashes = np.array(
-        [dashes_on(road.paint, segment, size) for segment, size in zip(road.segments, sizes, strict=True)]
-    )
-    ends = np.cumsum(sizes)
+    sizes, ends, dashes = _lengths_and_dashes(road, stretches)
     stretch = np.clip(np.searchsorted(ends, along, side="right"), 0, len(ends) - 1)
-    return _from_dash(along - (ends - sizes)[stretch], sizes[stretch], dashes[stretch])
+    within, size, count = along - (ends - sizes)[stretch], sizes[stretch], dashes[stretch]
+    # The dashes share a stretch's length evenly, a gap at either end
+    gap = size / (count * (DASH_PER_GAP + 1.0) + 1.0)
+    period = gap * (DASH_PER_GAP + 1.0)
+    first = gap + gap * DASH_PER_GAP / 2.0
+    nearest = np.clip(np.rint((within - first) / period), 0, count - 1)
+    return np.asarray(np.abs(within - first - nearest * period) - gap * DASH_PER_GAP / 2.0)
+
+
+def _lengths_and_dashes(road: Road, stretches: list[tuple[Segment, ...]]) -> tuple[Floats, Floats, NDArray[np.int_]]:
+    """How long each stretch is, how far round it ends [m], and how many dashes it has."""
+    sizes = np.array([length(stretch) for stretch in stretches])
+    pairs = zip(road.segments, sizes, strict=True)
+    return sizes, np.cumsum(sizes), np.array([dashes_on(road.paint, segment, float(size)) for segment, size in pairs])
 
 
 def dashes_on(paint: Paint, segment: Segment, size: float) -> int:
     """Number of dashes on a segment whose centre line is painted so long [m]."""
     dash = paint.straight_dash if isinstance(segment, Straight) else paint.bend_dash
     return max(1, round((size / dash * DASH_PER_GAP - 1.0) / (DASH_PER_GAP + 1.0)))
-
-
-def _from_dash(along: Floats, size: Floats, dashes: NDArray[np.int_]) -> Floats:
-    """Signed distance from the nearest of the dashes that share a stretch's length evenly, a gap at either end."""
-    gap = size / (dashes * (DASH_PER_GAP + 1.0) + 1.0)
-    period = gap * (DASH_PER_GAP + 1.0)
-    first = gap + gap * DASH_PER_GAP / 2.0
-    nearest = np.clip(np.rint((along - first) / period), 0, dashes - 1)
-    return np.abs(along - first - nearest * period) - gap * DASH_PER_GAP / 2.0
 
 
 LINES = ("left white line", "right white line", "yellow line", "yellow dashes")
@@ -160,11 +160,8 @@ class Markings:
         self.road = road
         self.stretches = len(stretches)
         self._layout: RoadLayout = lay_out(road.begin, tuple(part for stretch in stretches for part in stretch))
-        self._sizes = np.array([length(stretch) for stretch in stretches])
-        self._ends = np.cumsum(self._sizes)
-        pairs = zip(road.segments, self._sizes, strict=True)
-        dashes = np.array([dashes_on(road.paint, segment, float(size)) for segment, size in pairs])
-        self._dashes, self._gap = dashes, self._sizes / (dashes * (DASH_PER_GAP + 1.0) + 1.0)
+        self._sizes, self._ends, self._dashes = _lengths_and_dashes(road, stretches)
+        self._gap = self._sizes / (self._dashes * (DASH_PER_GAP + 1.0) + 1.0)
 
     def white(self, places: Floats) -> Marks:
         """The nearest white line to places (n, 2) [m]."""

@@ -35,7 +35,6 @@ from proxytune.effects.effect import (
     Cue,
     Effect,
     FilterContext,
-    Form,
     Means,
     Stage,
     Trace,
@@ -100,7 +99,10 @@ def problems(kind: Any) -> Iterator[str]:
     for parameter in given:
         yield from _wrong_parameter(parameter)
     yield from _wrong_trace(kind)
-    yield from _wrong_fields(kind)
+    names = [parameter.name for parameter in given]
+    own = [field.name for field in fields(kind) if field.init] if is_dataclass(kind) else names
+    if own != names:
+        yield f"has the fields {', '.join(own) or 'none'}; its parameters are {', '.join(names)}: the same, in order"
     if kind.stage is not Stage.IMAGE:
         yield from _wrong_filter(kind)
 
@@ -125,17 +127,13 @@ def _wrong_trace(kind: Any) -> Iterator[str]:
         yield f"has a trace with the cues {trace.cues!r}; give a tuple of at least one Cue"
     if not kind.parameters[0].probes:
         yield f"has a trace, but '{kind.parameters[0].name}' has no probes, from which a search sets out; add them"
+    known = [parameter.name for parameter in kind.parameters]
     for form in trace.forms:
-        yield from _wrong_form(kind, form)
+        free = {name for coordinate in form.free for name in coordinate}
+        if unknown := sorted((free | set(form.fixed) | set(form.moved)) - set(known)):
+            yield f"has a form with the parameter '{unknown[0]}'; its parameters are {', '.join(known)}"
     for shown in (trace.shown, *(form.shown for form in trace.forms if form.shown is not None)):
         yield from _wrong_figure(shown)
-
-
-def _wrong_form(kind: Any, form: Form) -> Iterator[str]:
-    known = [parameter.name for parameter in kind.parameters]
-    free = {name for coordinate in form.free for name in coordinate}
-    if unknown := sorted((free | set(form.fixed) | set(form.moved)) - set(known)):
-        yield f"has a form with the parameter '{unknown[0]}'; its parameters are {', '.join(known)}"
 
 
 def _wrong_figure(shown: Any) -> Iterator[str]:
@@ -151,13 +149,6 @@ def _wrong_figure(shown: Any) -> Iterator[str]:
             yield f"has a panel of the motion '{panel.motion}'; take one of {', '.join(MOTIONS)}"
         if panel.signal not in SIGNALS:
             yield f"has a panel of the signal '{panel.signal}'; leave it empty, or take one of {', '.join(SIGNALS[1:])}"
-
-
-def _wrong_fields(kind: Any) -> Iterator[str]:
-    names = [parameter.name for parameter in kind.parameters]
-    own = [field.name for field in fields(kind) if field.init] if is_dataclass(kind) else names
-    if own != names:
-        yield f"has the fields {', '.join(own) or 'none'}; its parameters are {', '.join(names)}: the same, in order"
 
 
 def _wrong_filter(kind: Any) -> Iterator[str]:

@@ -4,7 +4,7 @@ A column goes through the wheels' own filter as two wheels that are alike, so th
 effect. What steers has the prefix `steering_`; what drives is called as on wheels.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import make_dataclass, replace
 from typing import Any, cast
 
@@ -13,8 +13,7 @@ import numpy as np
 from proxytune.effects.command import CommandQuantisation, Delay
 from proxytune.effects.effect import Cue, Effect, FilterContext, Memory, Signal, Trace
 from proxytune.effects.friction import Backlash, DeadBand, Stiction
-from proxytune.effects.motors import BatterySag, DriverMap, MotorLag, Saturation, SlewRate, ThermalFade, WheelGain
-from proxytune.space import Parameter
+from proxytune.effects.motors import BatterySag, DriverMap, Gain, MotorLag, Saturation, SlewRate, ThermalFade
 
 THROTTLE, STEERING = 0, 1
 """The columns of a car's commands and of what comes of them: speed, and angle of the front wheels."""
@@ -28,8 +27,6 @@ def on_column(
     name: str,
     does: str = "",
     changed: Mapping[str, Any] | None = None,
-    make: Callable[..., Any] | None = None,
-    parameters: tuple[Parameter, ...] | None = None,
 ) -> type[Effect]:
     """An effect on wheels as one on a column.
 
@@ -39,17 +36,12 @@ def on_column(
         name: What it is called.
         does: What it does, where the wheels' own docstring does not say it.
         changed: What is different about its parameters: bounds, probes, source.
-        make: Makes the effect on wheels of the parameters, where they are not its own.
-        parameters: Those, likewise.
     """
-    own = parameters or tuple(one for one in wheels.parameters if one.name != UNEVEN)
-    own = tuple(replace(one, **(changed or {})) for one in own)
+    own = tuple(replace(one, **(changed or {})) for one in wheels.parameters if one.name != UNEVEN)
+    even = {UNEVEN: 0.0} if len(own) < len(wheels.parameters) else {}
 
     def begin(self: Any, context: FilterContext) -> tuple[Any, Memory]:
-        values = {one.name: getattr(self, one.name) for one in own}
-        if make is None and len(own) < len(wheels.parameters):
-            values[UNEVEN] = 0.0
-        effect = (make or wheels)(**values)
+        effect = wheels(**{one.name: getattr(self, one.name) for one in own}, **even)
         return effect, effect.begin(replace(context, rest=_twice(np.asarray(context.rest, dtype=float), column)))
 
     def apply(self: Any, signal: Signal, memory: tuple[Any, Memory]) -> tuple[Signal, tuple[Any, Memory]]:
@@ -81,11 +73,6 @@ def _trace(trace: Trace, column: int) -> Trace:
     return replace(trace, forms=kept, cues=cues if column == STEERING else trace.cues)
 
 
-def _both_gains(gain: float) -> WheelGain:
-    return WheelGain(gain, gain)
-
-
-_GAIN = (replace(WheelGain.parameters[0], name="gain"),)
 _SERVO = "hobby servos of model cars"
 
 QUANTISATION = on_column(CommandQuantisation, THROTTLE, "command_quantisation", "Throttle is rounded to multiples.")
@@ -107,9 +94,8 @@ THROTTLED: tuple[type[Effect], ...] = (
     on_column(Stiction, THROTTLE, "stiction", "A resting car needs a throttle of `breakaway` to start; a moving one "
               "goes on down to `release` times that."),
     on_column(Saturation, THROTTLE, "saturation", "The motor turns no faster than at a throttle of `limit`."),
-    on_column(WheelGain, THROTTLE, "wheel_gain", "The car drives faster or slower than nominal by a factor.",
-              {"source": "batteries, gears and motors other than nominal: up to half faster or slower"},
-              make=_both_gains, parameters=_GAIN),
+    on_column(Gain, THROTTLE, "wheel_gain", "The car drives faster or slower than nominal by a factor.",
+              {"source": "batteries, gears and motors other than nominal: up to half faster or slower"}),
     on_column(BatterySag, THROTTLE, "battery_sag"),
     on_column(ThermalFade, THROTTLE, "thermal_fade"),
     on_column(MotorLag, THROTTLE, "motor_lag", "The motor follows throttle with a first-order lag."),
@@ -128,7 +114,6 @@ STEERED: tuple[type[Effect], ...] = (
     on_column(MotorLag, STEERING, "steering_lag", "The servo follows steering with a first-order lag.",
               {"high": 0.6, "neutral": 0.0, "probes": (0.02, 0.05, 0.1, 0.2, 0.4),
                "source": f"{_SERVO}: 0.05 to 0.2 s"}),
-    on_column(WheelGain, STEERING, "steering_gain", "The wheels turn by more or less than nominal by a factor.",
-              {"source": "linkages and servo horns other than nominal: some tenths more or less"},
-              make=_both_gains, parameters=_GAIN),
+    on_column(Gain, STEERING, "steering_gain", "The wheels turn by more or less than nominal by a factor.",
+              {"source": "linkages and servo horns other than nominal: some tenths more or less"}),
 )  # fmt: skip

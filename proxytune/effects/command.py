@@ -17,14 +17,15 @@ from proxytune.effects.effect import (
     Draws,
     FilterContext,
     Lateness,
+    ShippedEffect,
     Signal,
     Stage,
     Trace,
     WheelCurve,
-    remember_nothing,
+    effect,
+    parameter,
 )
 from proxytune.seeds import message_generator
-from proxytune.space import Parameter
 
 
 class DelayLine(NamedTuple):
@@ -34,21 +35,16 @@ class DelayLine(NamedTuple):
     fraction: float
 
 
-@dataclass(frozen=True)
-class Delay:
+@effect("delay", Stage.COMMAND)
+class Delay(ShippedEffect):
     """Commands arrive late by a constant time, interpolated between samples.
 
     A command holds over its sample interval, so the mean of the delayed command over an interval is the linear
     interpolation between two samples: exact for a delay of any length, and continuous in it.
     """
 
-    delay: float
-    name: ClassVar[str] = "delay"
-    stage: ClassVar[Stage] = Stage.COMMAND
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="delay", unit="s", low=0.0, high=0.6, neutral=0.0, probes=(0.02, 0.04, 0.08, 0.15, 0.3),
-                  source="Duckiebot image-to-motor latency about 0.14 s; box of the paper 0 to 0.30 s"),
-    )  # fmt: skip
+    delay: float = parameter("s", 0.0, 0.6, probes=(0.02, 0.04, 0.08, 0.15, 0.3),
+        source="Duckiebot image-to-motor latency about 0.14 s; box of the paper 0 to 0.30 s")  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(cues=(Cue.TRANSIENTS,), shown=WheelCurve.STEP)
 
     def begin(self, context: FilterContext) -> DelayLine:
@@ -66,19 +62,13 @@ class Delay:
         return late, DelayLine(joined[..., length:, :], memory.fraction)
 
 
-@dataclass(frozen=True)
-class CommandQuantisation:
+@effect("command_quantisation", Stage.COMMAND)
+class CommandQuantisation(ShippedEffect):
     """Commands are rounded to multiples of a step on their way."""
 
-    step: float
-    name: ClassVar[str] = "command_quantisation"
-    stage: ClassVar[Stage] = Stage.COMMAND
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="step", unit="duty", low=0.0, high=0.5, neutral=0.0, probes=(0.02, 0.05, 0.1, 0.2, 0.4),
-                  source="8 bits: 0.008; drivers with a few speed levels: 0.1 to 0.3"),
-    )  # fmt: skip
+    step: float = parameter("duty", 0.0, 0.5, probes=(0.02, 0.05, 0.1, 0.2, 0.4),
+        source="8 bits: 0.008; drivers with a few speed levels: 0.1 to 0.3")  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(cues=(Cue.WHEEL_COMMAND,), shown=WheelCurve.STEADY, stepwise=True)
-    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Round each sample, halves to the even multiple."""
@@ -98,12 +88,7 @@ def _block(seed: int, number: int) -> Signal:
 
 @dataclass(frozen=True)
 class Messages:
-    """The messages that a signal comes in, numbered from time zero.
-
-    Attributes:
-        per_sample: Messages per sample.
-        seed: Seed of what is drawn for each message.
-    """
+    """The messages that a signal comes in, numbered from time zero: so many per sample, and the seed of the draws."""
 
     per_sample: float
     seed: int
@@ -162,21 +147,16 @@ class HoldIntervals(NamedTuple):
     sources: NDArray[np.int64]
 
 
-@dataclass(frozen=True)
-class DelayJitter:
+@effect("delay_jitter", Stage.COMMAND)
+class DelayJitter(ShippedEffect):
     """Every command is late by an extra time of its own, drawn evenly from 0 to `spread`.
 
     The order is kept: a command never arrives before the one that was sent before it. A command that arrives within a
     sample counts for the rest of it.
     """
 
-    spread: float
-    name: ClassVar[str] = "delay_jitter"
-    stage: ClassVar[Stage] = Stage.COMMAND
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="spread", unit="s", low=0.0, high=0.3, neutral=0.0, probes=(0.02, 0.04, 0.08, 0.15, 0.3),
-                  source="wireless links: tens of milliseconds, now and then some tenths of a second"),
-    )  # fmt: skip
+    spread: float = parameter("s", 0.0, 0.3, probes=(0.02, 0.04, 0.08, 0.15, 0.3),
+        source="wireless links: tens of milliseconds, now and then some tenths of a second")  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.TRANSIENTS,), shown=WheelCurve.STEP, draws=Draws(_jittered, (2e-3, 0.3))
     )
@@ -223,17 +203,12 @@ class LastReceived(NamedTuple):
     messages: Messages
 
 
-@dataclass(frozen=True)
-class DroppedCommands:
+@effect("dropped_commands", Stage.COMMAND)
+class DroppedCommands(ShippedEffect):
     """Some commands never arrive; the one before stays in force."""
 
-    probability: float
-    name: ClassVar[str] = "dropped_commands"
-    stage: ClassVar[Stage] = Stage.COMMAND
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="probability", unit="", low=0.0, high=0.9, neutral=0.0, probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.7),
-                  source="wireless links: some in a hundred, in bad places half"),
-    )  # fmt: skip
+    probability: float = parameter("", 0.0, 0.9, probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.7),
+        source="wireless links: some in a hundred, in bad places half")  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.TRANSIENTS,), shown=WheelCurve.STEP, draws=Draws(_lost, (1e-3, 0.6))
     )

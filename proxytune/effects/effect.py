@@ -7,9 +7,9 @@ of headings and angles beyond those that are known.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
-from typing import Any, ClassVar, NamedTuple, Protocol, runtime_checkable
+from typing import Any, ClassVar, NamedTuple, Protocol, TypeVar, dataclass_transform, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -234,8 +234,56 @@ class Effect(Protocol):
         ...
 
 
-def remember_nothing(effect: object, context: FilterContext) -> None:
-    """The `begin` of an effect without memory, which does to each sample the same."""
+class ShippedEffect:
+    """A shipped effect, which `effect` completes: without a trace, and without memory, unless it says so."""
+
+    name: ClassVar[str]
+    stage: ClassVar[Stage]
+    parameters: ClassVar[tuple[Parameter, ...]]
+    trace: ClassVar[Trace | None] = None
+
+    def begin(self, context: FilterContext) -> Memory:
+        """Remember nothing: what is done to each sample is the same."""
+        return None
+
+
+Kind = TypeVar("Kind", bound=ShippedEffect)
+
+
+def like(known: Parameter) -> Any:
+    """A field of an effect that is such a parameter, called as the field is."""
+    return field(metadata={"parameter": known})
+
+
+def parameter(
+    unit: str,
+    low: float,
+    high: float,
+    neutral: float | str = 0.0,
+    *,
+    probes: tuple[float, ...],
+    source: str,
+    shape: bool = False,
+) -> Any:
+    """A field of an effect that is a parameter with these properties."""
+    known = Parameter(
+        name="", unit=unit, low=low, high=high, neutral=neutral, probes=probes, source=source, shape=shape
+    )
+    return like(known)
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(like, parameter))
+def effect(name: str, stage: Stage) -> Callable[[type[Kind]], type[Kind]]:
+    """Make a class a frozen dataclass and an effect of this name and stage, whose parameters are its fields."""
+
+    def make(kind: type[Kind]) -> type[Kind]:
+        made = dataclass(frozen=True)(kind)
+        made.name, made.stage = name, stage
+        own: tuple[Any, ...] = fields(made)  # type: ignore[arg-type]
+        made.parameters = tuple(replace(one.metadata["parameter"], name=one.name) for one in own)
+        return made
+
+    return make
 
 
 @runtime_checkable

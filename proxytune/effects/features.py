@@ -174,11 +174,11 @@ class Group(NamedTuple):
     low: float | None = None
 
 
-def _of_wheels(unit: str, basis: Callable[[AskedMotion, Knots, int], Signal]) -> dict[str, Channel]:
-    """One channel a wheel."""
+def _of_wheels(unit: str, basis: Callable[[AskedMotion, Knots, int], Signal], ending: str = "") -> dict[str, Channel]:
+    """One channel a wheel, called after it, with an ending."""
     return {
-        "left": Channel("left", unit, lambda a, k: basis(a, k, 0)),
-        "right": Channel("right", unit, lambda a, k: basis(a, k, 1)),
+        f"left{ending}": Channel("left", unit, lambda a, k: basis(a, k, 0)),
+        f"right{ending}": Channel("right", unit, lambda a, k: basis(a, k, 1)),
     }
 
 
@@ -218,10 +218,8 @@ GROUPS: Mapping[str, Group] = MappingProxyType(
             "s",
             {
                 **_of_wheels("of the change", lambda a, k, wheel: a.bands[wheel]),
-                "left_slowing": Channel("left", "of the change", lambda a, k: slowing(a, k, 0)),
-                "right_slowing": Channel("right", "of the change", lambda a, k: slowing(a, k, 1)),
-                "left_stopping": Channel("left", "of the change", lambda a, k: stopping(a, k, 0)),
-                "right_stopping": Channel("right", "of the change", lambda a, k: stopping(a, k, 1)),
+                **_of_wheels("of the change", slowing, "_slowing"),
+                **_of_wheels("of the change", stopping, "_stopping"),
             },
             1e-3,
         ),
@@ -229,12 +227,11 @@ GROUPS: Mapping[str, Group] = MappingProxyType(
             "changes of either wheel's speed, by speed and direction",
             "s",
             {
-                "left_fast": Channel("left", "s/m of the change", lambda a, k: a.bands[0] * fast(a, 0)),
-                "right_fast": Channel("right", "s/m of the change", lambda a, k: a.bands[1] * fast(a, 1)),
-                "left_backwards": Channel("left", "of the change", lambda a, k: a.bands[0] * (sign(a, 0) < 0.0)),
-                "right_backwards": Channel("right", "of the change", lambda a, k: a.bands[1] * (sign(a, 1) < 0.0)),
-                "left_crossed": Channel("left", "of the change", lambda a, k: a.bands[1]),
-                "right_crossed": Channel("right", "of the change", lambda a, k: a.bands[0]),
+                **_of_wheels("s/m of the change", lambda a, k, wheel: a.bands[wheel] * fast(a, wheel), "_fast"),
+                **_of_wheels(
+                    "of the change", lambda a, k, wheel: a.bands[wheel] * (sign(a, wheel) < 0.0), "_backwards"
+                ),
+                **_of_wheels("of the change", lambda a, k, wheel: a.bands[1 - wheel], "_crossed"),
             },
             1e-3,
         ),
@@ -243,8 +240,7 @@ GROUPS: Mapping[str, Group] = MappingProxyType(
             "Hz",
             {
                 **_of_wheels("of the change", lambda a, k, wheel: a.rings[wheel].real),
-                "left_later": Channel("left", "of the change", lambda a, k: a.rings[0].imag),
-                "right_later": Channel("right", "of the change", lambda a, k: a.rings[1].imag),
+                **_of_wheels("of the change", lambda a, k, wheel: a.rings[wheel].imag, "_later"),
             },
             1e-3,
         ),
@@ -254,8 +250,7 @@ GROUPS: Mapping[str, Group] = MappingProxyType(
             "s",
             {
                 **_of_wheels("of its speed", lambda a, k, wheel: a.wheels[wheel][..., None] * started(a, k, wheel)),
-                "left_push": Channel("left", "m/s", lambda a, k: sign(a, 0) * started(a, k, 0)),
-                "right_push": Channel("right", "m/s", lambda a, k: sign(a, 1) * started(a, k, 1)),
+                **_of_wheels("m/s", lambda a, k, wheel: sign(a, wheel) * started(a, k, wheel), "_push"),
             },
             1e-3,
         ),

@@ -4,7 +4,6 @@ Dead band, stiction and backlash depend on how a wheel's duty came about; ripple
 """
 
 import math
-from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -17,10 +16,14 @@ from proxytune.effects.effect import (
     Form,
     Means,
     Panel,
+    ShippedEffect,
     Signal,
     Stage,
     Trace,
     WheelCurve,
+    effect,
+    like,
+    parameter,
     reckon,
     start_reckoning,
 )
@@ -28,19 +31,13 @@ from proxytune.effects.motors import IMBALANCE, per_wheel, wheel_forms
 from proxytune.space import Parameter
 
 
-@dataclass(frozen=True)
-class DeadBand:
+@effect("dead_band", Stage.ACTUATION)
+class DeadBand(ShippedEffect):
     """A wheel does not turn for duties up to `width`, and by that much less for larger ones."""
 
-    width: float
-    imbalance: float
-    name: ClassVar[str] = "dead_band"
-    stage: ClassVar[Stage] = Stage.ACTUATION
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="width", unit="duty", low=0.0, high=0.5, neutral=0.0, probes=(0.02, 0.04, 0.08, 0.15, 0.3),
-                  source="friction of small gear motors: 0.05 to 0.2 of full duty"),
-        IMBALANCE,
-    )  # fmt: skip
+    width: float = parameter("duty", 0.0, 0.5, probes=(0.02, 0.04, 0.08, 0.15, 0.3),
+        source="friction of small gear motors: 0.05 to 0.2 of full duty")  # fmt: skip
+    imbalance: float = like(IMBALANCE)
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.WHEEL_COMMAND,), shown=WheelCurve.STEADY, forms=wheel_forms("width")
     )
@@ -64,33 +61,23 @@ class StictionState(NamedTuple):
     moving: NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
-class Stiction:
+@effect("stiction", Stage.ACTUATION)
+class Stiction(ShippedEffect):
     """A resting wheel needs a duty of `breakaway` to start; a moving one goes on down to `release` times that.
 
     A wheel whose duty changes sign comes to rest on the way, unless that duty is large enough: from what keeps a wheel
     going, at a `reversal` of 0, to what breaks it away, at 1.
     """
 
-    breakaway: float
-    imbalance: float
-    release: float
-    reversal: float
-    name: ClassVar[str] = "stiction"
-    stage: ClassVar[Stage] = Stage.ACTUATION
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="breakaway", unit="duty", low=0.0, high=0.6, neutral=0.0,
-                  probes=(0.03, 0.06, 0.12, 0.2, 0.3, 0.45),
-                  source="small gear motors start at 0.1 to 0.3 of full duty"),
-        IMBALANCE,
-        Parameter(name="release", unit="", low=0.0, high=1.0, neutral=0.5, probes=(0.2, 0.35, 0.65, 0.8, 0.9, 1.0),
-                  source="rolling friction by sticking friction: "
-                         "about half, nearly all where a driver cuts small duties",
-                  shape=True),
-        Parameter(name="reversal", unit="", low=0.0, high=1.0, neutral=1.0, probes=(0.0, 0.25, 0.5, 0.75),
-                  source="1: friction catches a slow wheel as it passes rest; 0: a wheel with momentum runs through",
-                  shape=True),
-    )  # fmt: skip
+    breakaway: float = parameter("duty", 0.0, 0.6, probes=(0.03, 0.06, 0.12, 0.2, 0.3, 0.45),
+        source="small gear motors start at 0.1 to 0.3 of full duty")  # fmt: skip
+    imbalance: float = like(IMBALANCE)
+    release: float = parameter("", 0.0, 1.0, 0.5, probes=(0.2, 0.35, 0.65, 0.8, 0.9, 1.0),
+        source="rolling friction by sticking friction: about half, nearly all where a driver cuts small duties",
+        shape=True)  # fmt: skip
+    reversal: float = parameter("", 0.0, 1.0, 1.0, probes=(0.0, 0.25, 0.5, 0.75),
+        source="1: friction catches a slow wheel as it passes rest; 0: a wheel with momentum runs through",
+        shape=True)  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.WHEEL_COMMAND, Cue.REVERSAL),
         shown=WheelCurve.STEADY,
@@ -136,19 +123,13 @@ class BacklashState(NamedTuple):
     ahead: Signal
 
 
-@dataclass(frozen=True)
-class Backlash:
+@effect("backlash", Stage.ACTUATION)
+class Backlash(ShippedEffect):
     """The gear turns through a gap before it takes the wheel along, whenever it reverses."""
 
-    gap: float
-    imbalance: float
-    name: ClassVar[str] = "backlash"
-    stage: ClassVar[Stage] = Stage.ACTUATION
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="gap", unit="rad", low=0.0, high=1.5, neutral=0.0, probes=(0.05, 0.1, 0.2, 0.4, 0.8, 1.5),
-                  source="plastic gearboxes: some degrees, worn ones some tens"),
-        IMBALANCE,
-    )  # fmt: skip
+    gap: float = parameter("rad", 0.0, 1.5, probes=(0.05, 0.1, 0.2, 0.4, 0.8, 1.5),
+        source="plastic gearboxes: some degrees, worn ones some tens")  # fmt: skip
+    imbalance: float = like(IMBALANCE)
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.REVERSAL, Cue.TRANSIENTS), shown=WheelCurve.REVERSAL, forms=wheel_forms("gap")
     )
@@ -206,26 +187,22 @@ class RippleState(NamedTuple):
     radius: float
 
 
-@dataclass(frozen=True)
-class WheelRipple:
+RIPPLE = Parameter(
+    name="ripple", unit="", low=-0.6, high=0.6, neutral=0.0, probes=(-0.3, -0.1, -0.03, 0.03, 0.1, 0.3),
+    source="a hub some tenths of a millimetre to some millimetres off the middle of a small wheel")  # fmt: skip
+
+
+@effect("wheel_ripple", Stage.MOTION)
+class WheelRipple(ShippedEffect):
     """Each wheel rolls faster and slower once a turn: by the factor 1 + sine · sin(angle) + cosine · cos(angle).
 
     Its amplitude is √(sine² + cosine²). Angles count from the start of the episode.
     """
 
-    left_sine: float
-    left_cosine: float
-    right_sine: float
-    right_cosine: float
-    name: ClassVar[str] = "wheel_ripple"
-    stage: ClassVar[Stage] = Stage.MOTION
-    parameters: ClassVar[tuple[Parameter, ...]] = tuple(
-        Parameter(name=f"{side}_{part}", unit="", low=-0.6, high=0.6, neutral=0.0,
-                  probes=(-0.3, -0.1, -0.03, 0.03, 0.1, 0.3),
-                  source="a hub some tenths of a millimetre to some millimetres off the middle of a small wheel")
-        for side in ("left", "right")
-        for part in ("sine", "cosine")
-    )  # fmt: skip
+    left_sine: float = like(RIPPLE)
+    left_cosine: float = like(RIPPLE)
+    right_sine: float = like(RIPPLE)
+    right_cosine: float = like(RIPPLE)
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.LEFT_ANGLE, Cue.RIGHT_ANGLE),
         shown=Means(

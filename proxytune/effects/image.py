@@ -5,17 +5,15 @@ before it, and are seen only in motion.
 """
 
 import math
-from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import correlate1d
 from scipy.special import ive
 
-from proxytune.effects.effect import FilterContext, Signal, Stage, Trace, remember_nothing, skip_nothing
+from proxytune.effects.effect import FilterContext, ShippedEffect, Signal, Stage, effect, parameter, skip_nothing
 from proxytune.seeds import picture_generator
-from proxytune.space import Parameter
 
 
 def _size(context: FilterContext) -> tuple[int, int]:
@@ -31,22 +29,16 @@ class PointSpread(NamedTuple):
     weights: Signal
 
 
-@dataclass(frozen=True)
-class Defocus:
+@effect("defocus", Stage.IMAGE)
+class Defocus(ShippedEffect):
     """The lens is out of focus: a point becomes a Gaussian spot, of the same width all over the picture.
 
     Edges tell it by the width that they have when nothing moves; motion widens them by blur.
     """
 
-    deviation: float
-    name: ClassVar[str] = "defocus"
-    stage: ClassVar[Stage] = Stage.IMAGE
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="deviation", unit="", low=0.0, high=0.05, neutral=0.0, probes=(0.005, 0.01, 0.02, 0.04),
-                  source="standard deviation as a share of the picture's height: "
-                         "1 to 5 pixels of 480 on well-kept cameras"),
-    )  # fmt: skip
-    trace: ClassVar[Trace | None] = None
+    deviation: float = parameter("", 0.0, 0.05, probes=(0.005, 0.01, 0.02, 0.04),
+        source="standard deviation as a share of the picture's height: 1 to 5 pixels of 480 on "
+               "well-kept cameras")  # fmt: skip
     skip = skip_nothing
 
     def begin(self, context: FilterContext) -> PointSpread:
@@ -66,21 +58,15 @@ class Defocus:
         return soft.reshape(signal.shape), memory
 
 
-@dataclass(frozen=True)
-class Vignetting:
+@effect("vignetting", Stage.IMAGE)
+class Vignetting(ShippedEffect):
     """The picture is darker towards its corners: by the factor 1 − strength · (r/r_corner)² about its middle.
 
     The floor tells it without knowledge of the paint, for the same paint is seen near the middle and near the corners.
     """
 
-    strength: float
-    name: ClassVar[str] = "vignetting"
-    stage: ClassVar[Stage] = Stage.IMAGE
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="strength", unit="", low=0.0, high=0.9, neutral=0.0, probes=(0.1, 0.2, 0.4, 0.7),
-                  source="the cos⁴ law: 0.5 in corners 33° off the axis, 0.85 in those of a Duckiebot, 52° off"),
-    )  # fmt: skip
-    trace: ClassVar[Trace | None] = None
+    strength: float = parameter("", 0.0, 0.9, probes=(0.1, 0.2, 0.4, 0.7),
+        source="the cos⁴ law: 0.5 in corners 33° off the axis, 0.85 in those of a Duckiebot, 52° off")  # fmt: skip
     skip = skip_nothing
 
     def begin(self, context: FilterContext) -> Signal:
@@ -95,26 +81,18 @@ class Vignetting:
         return signal * memory, memory
 
 
-@dataclass(frozen=True)
-class Exposure:
+@effect("exposure", Stage.IMAGE)
+class Exposure(ShippedEffect):
     """Brightness x of 255 becomes 255 · gain · (x/255)^gamma.
 
     Pictures tell both only relative to the paint that the map declares: a brighter floor is the same as a greater gain.
     What is found makes the proxy's pictures match; it is no statement about the camera.
     """
 
-    gain: float
-    gamma: float
-    name: ClassVar[str] = "exposure"
-    stage: ClassVar[Stage] = Stage.IMAGE
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="gain", unit="", low=0.2, high=4.0, neutral=1.0, probes=(0.5, 0.8, 1.25, 2.0),
-                  source="about two stops to either side"),
-        Parameter(name="gamma", unit="", low=0.3, high=3.0, neutral=1.0, probes=(0.45, 0.75, 1.3, 2.2),
-                  source="a sensor's linear pictures against encoded ones (sRGB): 2.2, or 1/2.2 the other way"),
-    )  # fmt: skip
-    trace: ClassVar[Trace | None] = None
-    begin, skip = remember_nothing, skip_nothing
+    gain: float = parameter("", 0.2, 4.0, 1.0, probes=(0.5, 0.8, 1.25, 2.0), source="about two stops to either side")
+    gamma: float = parameter("", 0.3, 3.0, 1.0, probes=(0.45, 0.75, 1.3, 2.2),
+        source="a sensor's linear pictures against encoded ones (sRGB): 2.2, or 1/2.2 the other way")  # fmt: skip
+    skip = skip_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Brighten or darken; the picture is clipped only once it is complete."""
@@ -132,21 +110,15 @@ class NoiseState(NamedTuple):
     seed: int
 
 
-@dataclass(frozen=True)
-class ImageNoise:
+@effect("image_noise", Stage.IMAGE)
+class ImageNoise(ShippedEffect):
     """White noise on every pixel and colour, drawn anew for each picture.
 
     It takes two pictures standing still to tell it from the floor's texture; one will do where the floor is plain.
     """
 
-    deviation: float
-    name: ClassVar[str] = "image_noise"
-    stage: ClassVar[Stage] = Stage.IMAGE
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="deviation", unit="grey levels", low=0.0, high=40.0, neutral=0.0, probes=(2.0, 5.0, 10.0, 20.0),
-                  source="standard deviation, of 255: small sensors 1 to 5 by daylight, 10 to 30 in a dim room"),
-    )  # fmt: skip
-    trace: ClassVar[Trace | None] = None
+    deviation: float = parameter("grey levels", 0.0, 40.0, probes=(2.0, 5.0, 10.0, 20.0),
+        source="standard deviation, of 255: small sensors 1 to 5 by daylight, 10 to 30 in a dim room")  # fmt: skip
 
     def begin(self, context: FilterContext) -> NoiseState:
         """No picture drawn yet."""
@@ -179,8 +151,8 @@ class DelayedPictures(NamedTuple):
     fraction: Signal
 
 
-@dataclass(frozen=True)
-class Blur:
+@effect("blur", Stage.IMAGE)
+class Blur(ShippedEffect):
     """A picture is the mean of what was before the lens during the last `blur` seconds.
 
     Between two rendered pictures the scene is taken to change linearly, so the mean is continuous in `blur`.
@@ -188,14 +160,7 @@ class Blur:
     latency that is found without it is too long by as much.
     """
 
-    blur: float
-    name: ClassVar[str] = "blur"
-    stage: ClassVar[Stage] = Stage.IMAGE
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="blur", unit="s", low=0.0, high=0.2, neutral=0.0, probes=(0.0125, 0.025, 0.05, 0.1),
-                  source="box of the paper 0 to 0.10 s"),
-    )  # fmt: skip
-    trace: ClassVar[Trace | None] = None
+    blur: float = parameter("s", 0.0, 0.2, probes=(0.0125, 0.025, 0.05, 0.1), source="box of the paper 0 to 0.10 s")
 
     def begin(self, context: FilterContext) -> ShutterWindow:
         """Begin as if the robot had stood before the first picture for ever."""
@@ -217,57 +182,51 @@ class Blur:
         return weights[int(np.argmax(weights > 0.0)) :]
 
 
-@dataclass(frozen=True)
-class RollingShutter:
+class Delaying(ShippedEffect):
+    """Shows equal parts of the pictures, from above, each as old as it is."""
+
+    def apply(self, signal: Signal, memory: DelayedPictures) -> tuple[Signal, DelayedPictures]:
+        """Mix, for each part, the two pictures that its age falls between."""
+        length, past, parts = signal.shape[-2], memory.pictures.shape[-2], memory.whole.size
+        joined = np.concatenate((memory.pictures, signal), axis=-2)
+        split = joined.reshape(*joined.shape[:-1], parts, -1)
+        newer, part = np.arange(past, past + length)[:, None] - memory.whole, np.arange(parts)
+        older = memory.fraction[:, None]
+        mixed = (1.0 - older) * split[..., newer, part, :] + older * split[..., newer - 1, part, :]
+        return mixed.reshape(signal.shape), memory._replace(pictures=joined[..., length:, :])
+
+
+@effect("rolling_shutter", Stage.IMAGE)
+class RollingShutter(Delaying):
     """Rows are read out one after another: the last is on time, row r of R older by readout · (1 − (r + ½)/R).
 
     The picture as a whole is thus older by half the readout, which looks like a latency; bends alone show that the rows
     differ.
     """
 
-    readout: float
-    name: ClassVar[str] = "rolling_shutter"
-    stage: ClassVar[Stage] = Stage.IMAGE
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="readout", unit="s", low=0.0, high=0.1, neutral=0.0, probes=(0.01, 0.02, 0.033, 0.06),
-                  source="CMOS sensors: up to the time between two frames, 0.033 s at 30 Hz, 0.067 s at 15 Hz"),
-    )  # fmt: skip
-    trace: ClassVar[Trace | None] = None
+    readout: float = parameter("s", 0.0, 0.1, probes=(0.01, 0.02, 0.033, 0.06),
+        source="CMOS sensors: up to the time between two frames, 0.033 s at 30 Hz, 0.067 s at 15 Hz")  # fmt: skip
 
     def begin(self, context: FilterContext) -> DelayedPictures:
         """Begin as if the robot had stood before the first picture for ever."""
         rows = int(context.nominal["camera_rows"])
         return _late(self.readout * context.rate_hz * (1.0 - (np.arange(rows) + 0.5) / rows), context)
 
-    def apply(self, signal: Signal, memory: DelayedPictures) -> tuple[Signal, DelayedPictures]:
-        """Show each row as old as it is."""
-        return _show(signal, memory)
 
-
-@dataclass(frozen=True)
-class CameraLatency:
+@effect("camera_latency", Stage.IMAGE)
+class CameraLatency(Delaying):
     """Pictures arrive late by a constant time; between two of them, their linear mix.
 
     Pictures at known places tell it where speeds and turns vary. What is found without blur in the model is the latency
     and half the blur.
     """
 
-    camera_latency: float
-    name: ClassVar[str] = "camera_latency"
-    stage: ClassVar[Stage] = Stage.IMAGE
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="camera_latency", unit="s", low=0.0, high=0.5, neutral=0.0, probes=(0.03, 0.06, 0.1, 0.2),
-                  source="USB cameras 0.03 to 0.1 s; over a wireless link some tenths of a second"),
-    )  # fmt: skip
-    trace: ClassVar[Trace | None] = None
+    camera_latency: float = parameter("s", 0.0, 0.5, probes=(0.03, 0.06, 0.1, 0.2),
+        source="USB cameras 0.03 to 0.1 s; over a wireless link some tenths of a second")  # fmt: skip
 
     def begin(self, context: FilterContext) -> DelayedPictures:
         """Begin as if the robot had stood before the first picture for ever."""
         return _late(np.array([self.camera_latency * context.rate_hz]), context)
-
-    def apply(self, signal: Signal, memory: DelayedPictures) -> tuple[Signal, DelayedPictures]:
-        """Show each picture as old as it is."""
-        return _show(signal, memory)
 
 
 def _still(context: FilterContext, count: int) -> Signal:
@@ -281,17 +240,6 @@ def _late(samples: Signal, context: FilterContext) -> DelayedPictures:
     whole = np.floor(samples + 1e-9).astype(np.int64)
     fraction = np.maximum(0.0, samples - whole).astype(np.float32)
     return DelayedPictures(_still(context, int(whole.max()) + 1), whole, fraction)
-
-
-def _show(signal: Signal, memory: DelayedPictures) -> tuple[Signal, DelayedPictures]:
-    """Mix, for each part, the two pictures that its age falls between."""
-    length, past, parts = signal.shape[-2], memory.pictures.shape[-2], memory.whole.size
-    joined = np.concatenate((memory.pictures, signal), axis=-2)
-    split = joined.reshape(*joined.shape[:-1], parts, -1)
-    newer, part = np.arange(past, past + length)[:, None] - memory.whole, np.arange(parts)
-    older = memory.fraction[:, None]
-    mixed = (1.0 - older) * split[..., newer, part, :] + older * split[..., newer - 1, part, :]
-    return mixed.reshape(signal.shape), memory._replace(pictures=joined[..., length:, :])
 
 
 _QUANTUM = 2**16

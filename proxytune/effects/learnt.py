@@ -108,24 +108,22 @@ class Learnt:
 
     def begin(self, context: FilterContext) -> LearntState:
         """At rest, unused."""
-        batch = np.shape(context.rest)[:-1]
-        slow = np.zeros((2, *batch, len(self._bands)))
-        load = np.zeros((*batch, len(self._constants("load"))))
-        nominal = context.nominal
-        figures = (context.rate_hz, track_of(nominal), nominal["full_speed"])
+        batch, nominal = np.shape(context.rest)[:-1], context.nominal
         return LearntState(
-            np.zeros(batch),
-            np.zeros(batch),
-            slow,
-            load,
-            np.zeros((3, *batch)),
-            np.zeros((2, *batch)),
-            np.zeros((2, *batch)),
-            np.zeros((2, *batch, len(self._constants("ringing"))), dtype=complex),
-            np.zeros((2, *batch, len(self._constants("play")))),
-            start_reckoning(context.headings, context),
-            start_poses(context),
-            *figures,
+            seconds=np.zeros(batch),
+            use=np.zeros(batch),
+            slow=np.zeros((2, *batch, len(self._bands))),
+            load=np.zeros((*batch, len(self._constants("load")))),
+            rolled=np.zeros((3, *batch)),
+            started=np.zeros((2, *batch)),
+            last=np.zeros((2, *batch)),
+            ring=np.zeros((2, *batch, len(self._constants("ringing"))), dtype=complex),
+            dragged=np.zeros((2, *batch, len(self._constants("play")))),
+            bearing=start_reckoning(context.headings, context),
+            spot=start_poses(context),
+            rate_hz=context.rate_hz,
+            baseline=track_of(nominal),
+            full_speed=nominal["full_speed"],
         )
 
     def apply(self, signal: Signal, memory: LearntState) -> tuple[Signal, LearntState]:
@@ -142,7 +140,8 @@ class Learnt:
     ) -> tuple[Signal, DeadReckoning, PoseReckoning]:
         """The motion with what depends on the pose: sample by sample where that leads to another pose."""
         bearing, spot, length = memory.bearing, memory.spot, moved.shape[-2]
-        known = bearing.values.shape[-1] - bearing.next >= length or not self._turns_by_heading
+        turns = any(one.group == HEADING and GROUPS[HEADING].channels[one.channel].to == "yaw" for one in self.curves)
+        known = bearing.values.shape[-1] - bearing.next >= length or not turns
         there = not self._constants(PLACE) or spot.known.shape[-2] - spot.next >= length
         step, out = length if known and there else 1, []
         for begin in range(0, length, step):
@@ -159,12 +158,6 @@ class Learnt:
                 next=spot.next + step, pose=pose_after(poses[..., -1, :], out[-1][..., -1, :] / memory.rate_hz)
             )
         return np.concatenate(out, axis=-2), bearing, spot
-
-    @property
-    def _turns_by_heading(self) -> bool:
-        return any(
-            curve.group == HEADING and GROUPS[HEADING].channels[curve.channel].to == "yaw" for curve in self.curves
-        )
 
     @property
     def _bands(self) -> Knots:
@@ -289,7 +282,8 @@ def learnt_theta(effect: Learnt) -> dict[str, float]:
             theta[f"{Learnt.name}.{RANGE}.{channel}@{end}"] = float(value)
     for curve in effect.curves:
         for knot, weight in zip(curve.knots, curve.weights, strict=True):
-            theta[f"{Learnt.name}.{curve.group}.{curve.channel}@{_text(knot)}"] = float(weight)
+            at = ",".join(repr(float(part)) for part in (knot if isinstance(knot, tuple) else (knot,)))
+            theta[f"{Learnt.name}.{curve.group}.{curve.channel}@{at}"] = float(weight)
     return theta
 
 
@@ -392,8 +386,7 @@ def _checked(seen: FittedRange, curves: list[LearntCurve], problem: Callable[[st
     bands = {curve.knots for curve in curves if curve.group in ("transients", "changes")}
     if len(bands) > 1:
         raise problem("changes.knots", "must be those of transients")
-    order = {(group, channel): None for group, one in GROUPS.items() for channel in one.channels}
-    places = list(order)
+    places = [(group, channel) for group, one in GROUPS.items() for channel in one.channels]
     return Learnt(seen, tuple(sorted(curves, key=lambda curve: places.index((curve.group, curve.channel)))))
 
 
@@ -456,7 +449,3 @@ def _knot(name: str, text: str) -> Knot:
     except ValueError:
         raise SettingsError(f"{name}: '{text}' is no knot; write a number, or two with a comma") from None
     return (values[0], values[1]) if len(values) == 2 else values[0]
-
-
-def _text(knot: Knot) -> str:
-    return ",".join(repr(float(value)) for value in (knot if isinstance(knot, tuple) else (knot,)))

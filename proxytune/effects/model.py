@@ -98,8 +98,17 @@ def read_effects(
         table = section.section(effect)
         table.only([parameter.name for parameter in known.values()])
         for name, parameter in known.items():
-            if parameter.name in table.values:
-                _read_parameter(table, parameter, name, theta, intervals)
+            key, low, high = parameter.name, parameter.low, parameter.high
+            if not isinstance(table.get(key), dict):
+                theta |= {name: table.number(key, low=low, high=high)} if key in table else {}
+                continue
+            detail = table.section(key)
+            detail.only(("value", "interval", "unit", "source"))
+            theta[name] = detail.number("value", low=low, high=high)
+            if "interval" in detail:
+                intervals[name] = detail.bounds("interval")
+            if (unit := detail.text("unit", parameter.unit)) != parameter.unit:
+                raise detail.error("unit", f"must be '{parameter.unit}', got '{unit}'")
     return theta, intervals
 
 
@@ -115,27 +124,6 @@ def _parameters(section: Section, effect: str, catalogue: Catalogue) -> dict[str
         raise section.error(effect, str(problem)) from None
 
 
-def _read_parameter(
-    table: Section,
-    parameter: Parameter,
-    name: str,
-    theta: dict[str, float],
-    intervals: dict[str, tuple[float, float]],
-) -> None:
-    key, low, high = parameter.name, parameter.low, parameter.high
-    if not isinstance(table.values[key], dict):
-        theta[name] = table.number(key, low=low, high=high)
-        return
-    detail = table.section(key)
-    detail.only(("value", "interval", "unit", "source"))
-    theta[name] = detail.number("value", low=low, high=high)
-    if "interval" in detail.values:
-        intervals[name] = detail.bounds("interval")
-    unit = detail.text("unit", parameter.unit)
-    if unit != parameter.unit:
-        raise detail.error("unit", f"must be '{parameter.unit}', got '{unit}'")
-
-
 def effects_table(
     theta: Mapping[str, float], intervals: Mapping[str, tuple[float, float]], catalogue: Catalogue = SHIPPED
 ) -> str:
@@ -145,18 +133,15 @@ def effects_table(
     for effect in (*catalogue.shipped, *sorted(outside)):
         pairs = list(zip(catalogue.theta_names(effect), catalogue.effect(effect).parameters, strict=True))
         named = [(name, parameter) for name, parameter in pairs if name in theta]
-        lines += [f"\n[effects.{_key(effect)}]"] if named else []
+        # A key of TOML is in quotes where it needs them
+        key = effect if effect.replace("-", "_").isidentifier() and effect.isascii() else f'"{effect}"'
+        lines += [f"\n[effects.{key}]"] if named else []
         for name, parameter in named:
             interval = intervals.get(name)
             finite = interval is not None and interval[0] < interval[1] and all(map(math.isfinite, interval))
             bounds = f", interval = [{interval[0]!r}, {interval[1]!r}]" if interval and finite else ""
             lines.append(f'{parameter.name} = {{ value = {theta[name]!r}{bounds}, unit = "{parameter.unit}" }}')
     return "\n".join(lines) + "\n" + learnt_text(theta)
-
-
-def _key(name: str) -> str:
-    """A name as a key of TOML, in quotes where it needs them."""
-    return name if name.replace("-", "_").isidentifier() and name.isascii() else f'"{name}"'
 
 
 @dataclass(frozen=True)
@@ -167,11 +152,10 @@ class Chain:
 
     def begin(self, context: FilterContext) -> tuple[Memory, ...]:
         """Every effect's memory, each with a seed of its own."""
-        memories = []
-        for effect in self.effects:
-            own = replace(context, seed=zlib.crc32(effect.name.encode(), context.seed))
-            memories.append(effect.begin(own))
-        return tuple(memories)
+        return tuple(
+            effect.begin(replace(context, seed=zlib.crc32(effect.name.encode(), context.seed)))
+            for effect in self.effects
+        )
 
     def begin_amid(
         self, context: FilterContext, whole: FilterContext, signal: Signal, row: Signal, sample: Signal

@@ -4,7 +4,6 @@ First how forward speed, sideways speed and yaw rate change each other; then wha
 last how the pose that is tracked differs from that of the axle's middle.
 """
 
-from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -17,35 +16,28 @@ from proxytune.effects.effect import (
     LowPassState,
     Means,
     Panel,
+    ShippedEffect,
     Signal,
     Stage,
     Trace,
+    effect,
+    like,
     low_pass,
     low_pass_at,
+    parameter,
     reckon,
-    remember_nothing,
     start_reckoning,
 )
 from proxytune.space import Parameter
 
 
-def _moved(forward: Signal, sideways: Signal, yaw: Signal) -> Signal:
-    return np.stack((forward, sideways, yaw), axis=-1)
-
-
-@dataclass(frozen=True)
-class YawScrub:
+@effect("yaw_scrub", Stage.MOTION)
+class YawScrub(ShippedEffect):
     """Tyres that scrub turn the robot as if its wheels were `baseline` apart."""
 
-    baseline: float
-    name: ClassVar[str] = "yaw_scrub"
-    stage: ClassVar[Stage] = Stage.MOTION
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="baseline", unit="m", low=0.03, high=3.0, neutral="effective_baseline",
-                  probes=(0.05, 0.08, 0.12, 0.2, 0.3, 0.5, 1.0),
-                  source="wheel distance on hard tyres to a few times it with scrub: "
-                         "0.16 m instead of 0.10 m on a Duckiebot"),
-    )  # fmt: skip
+    baseline: float = parameter("m", 0.03, 3.0, "effective_baseline", probes=(0.05, 0.08, 0.12, 0.2, 0.3, 0.5, 1.0),
+        source="wheel distance on hard tyres to a few times it with scrub: 0.16 m instead of 0.10 m on "
+               "a Duckiebot")  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.TURN_RATE, Cue.COMMAND_DIFFERENCE), shown=Means(Cue.TURN_RATE, (Panel("turn", TURN, "turn"),))
     )
@@ -56,80 +48,59 @@ class YawScrub:
 
     def apply(self, signal: Signal, memory: float) -> tuple[Signal, float]:
         """Scale the yaw rate."""
-        return _moved(signal[..., 0], signal[..., 1], signal[..., 2] * memory), memory
+        return np.stack((signal[..., 0], signal[..., 1], signal[..., 2] * memory), axis=-1), memory
 
 
-@dataclass(frozen=True)
-class TurnSlip:
+@effect("turn_slip", Stage.MOTION)
+class TurnSlip(ShippedEffect):
     """Turning costs forward speed: it shrinks by the factor 1 − loss · |yaw rate|."""
 
-    loss: float
-    name: ClassVar[str] = "turn_slip"
-    stage: ClassVar[Stage] = Stage.MOTION
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="loss", unit="s/rad", low=0.0, high=1.5, neutral=0.0, probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8),
-                  source="tyres in a bend: some hundredths of the speed at 1 rad/s, tracks up to half"),
-    )  # fmt: skip
+    loss: float = parameter("s/rad", 0.0, 1.5, probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8),
+        source="tyres in a bend: some hundredths of the speed at 1 rad/s, tracks up to half")  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.TURN_RATE, Cue.COMMAND_DIFFERENCE),
         shown=Means(Cue.TURN_RATE, (Panel("turn", TURN, "forward", share=True),)),
     )
-    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Slow the robot down in bends, at most to a stop."""
         kept = np.maximum(0.0, 1.0 - self.loss * np.abs(signal[..., 2]))
-        return _moved(signal[..., 0] * kept, signal[..., 1], signal[..., 2]), None
+        return np.stack((signal[..., 0] * kept, signal[..., 1], signal[..., 2]), axis=-1), None
 
 
-@dataclass(frozen=True)
-class LateralSlip:
+@effect("lateral_slip", Stage.MOTION)
+class LateralSlip(ShippedEffect):
     """The robot slides outwards in bends, by `slip` times its forward speed and its yaw rate."""
 
-    slip: float
-    name: ClassVar[str] = "lateral_slip"
-    stage: ClassVar[Stage] = Stage.MOTION
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="slip", unit="s", low=-0.5, high=0.5, neutral=0.0, probes=(-0.2, -0.08, -0.03, 0.03, 0.08, 0.2),
-                  source="slip angle of some degrees at 1 rad/s; a pose that is not measured at the axle looks the "
-                         "same"),
-    )  # fmt: skip
+    slip: float = parameter("s", -0.5, 0.5, probes=(-0.2, -0.08, -0.03, 0.03, 0.08, 0.2),
+        source="slip angle of some degrees at 1 rad/s; a pose that is not measured at the axle looks "
+               "the same")  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.TURN_RATE,),
         shown=Means(Cue.TURN_RATE, (Panel("bend", "forward speed times turn rate [m/s²]", "sideways"),)),
     )
-    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Slide to the right in a bend to the left."""
         outwards = self.slip * signal[..., 0] * signal[..., 2]
-        return _moved(signal[..., 0], signal[..., 1] - outwards, signal[..., 2]), None
+        return np.stack((signal[..., 0], signal[..., 1] - outwards, signal[..., 2]), axis=-1), None
 
 
-@dataclass(frozen=True)
-class CrossCoupling:
+@effect("cross_coupling", Stage.MOTION)
+class CrossCoupling(ShippedEffect):
     """Turning pushes the robot forwards, and driving turns it, whichever way it turns and drives.
 
     The forward speed grows by `forward` times the square of the yaw rate, the yaw rate by `turn` times |forward speed|.
     """
 
-    forward: float
-    turn: float
-    name: ClassVar[str] = "cross_coupling"
-    stage: ClassVar[Stage] = Stage.MOTION
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="forward", unit="m·s/rad²", low=-0.2, high=0.2, neutral=0.0,
-                  probes=(-0.03, -0.01, -0.003, 0.003, 0.01, 0.03),
-                  source="a centre of turning some millimetres to centimetres off the middle of the axle"),
-        Parameter(name="turn", unit="rad/m", low=-2.0, high=2.0, neutral=0.0,
-                  probes=(-0.6, -0.2, -0.06, 0.06, 0.2, 0.6),
-                  source="a dragging caster or a tyre that pulls: some degrees to tens of degrees a metre"),
-    )  # fmt: skip
+    forward: float = parameter("m·s/rad²", -0.2, 0.2, probes=(-0.03, -0.01, -0.003, 0.003, 0.01, 0.03),
+        source="a centre of turning some millimetres to centimetres off the middle of the axle")  # fmt: skip
+    turn: float = parameter("rad/m", -2.0, 2.0, probes=(-0.6, -0.2, -0.06, 0.06, 0.2, 0.6),
+        source="a dragging caster or a tyre that pulls: some degrees to tens of degrees a metre")  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.TURN_RATE, Cue.DIRECTION, Cue.COMMAND_DIFFERENCE),
         shown=Means(Cue.TURN_RATE, (Panel("turn", TURN, "forward"), Panel("forward", "forward speed [m/s]", "turn"))),
     )
-    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Add to each what comes of the other."""
@@ -138,22 +109,16 @@ class CrossCoupling:
         return np.stack((pushed, signal[..., 1], turned), axis=-1), None
 
 
-@dataclass(frozen=True)
-class Understeer:
+@effect("understeer", Stage.MOTION)
+class Understeer(ShippedEffect):
     """The faster the robot drives the less it turns: the yaw rate is divided by 1 + gain · |forward speed|."""
 
-    gain: float
-    name: ClassVar[str] = "understeer"
-    stage: ClassVar[Stage] = Stage.MOTION
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="gain", unit="s/m", low=0.0, high=5.0, neutral=0.0, probes=(0.03, 0.1, 0.3, 0.8, 2.0),
-                  source="tyres that slip sideways: some tenths of the turn at 1 m/s, small robots more"),
-    )  # fmt: skip
+    gain: float = parameter("s/m", 0.0, 5.0, probes=(0.03, 0.1, 0.3, 0.8, 2.0),
+        source="tyres that slip sideways: some tenths of the turn at 1 m/s, small robots more")  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.TURN_RATE, Cue.COMMAND_DIFFERENCE),
         shown=Means(Cue.TURN_RATE, (Panel("forward", "forward speed [m/s]", "turn", share=True),)),
     )
-    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Scale the yaw rate."""
@@ -161,18 +126,12 @@ class Understeer:
         return np.stack((signal[..., 0], signal[..., 1], turned), axis=-1), None
 
 
-@dataclass(frozen=True)
-class YawLag:
+@effect("yaw_lag", Stage.MOTION)
+class YawLag(ShippedEffect):
     """The yaw rate follows the one that the wheels ask for with a first-order lag; the forward speed does not."""
 
-    time_constant: float
-    name: ClassVar[str] = "yaw_lag"
-    stage: ClassVar[Stage] = Stage.MOTION
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="time_constant", unit="s", low=0.0, high=1.0, neutral=0.0,
-                  probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8),
-                  source="a body that has to be turned on tyres that give: some hundredths to tenths of a second"),
-    )  # fmt: skip
+    time_constant: float = parameter("s", 0.0, 1.0, probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8),
+        source="a body that has to be turned on tyres that give: some hundredths to tenths of a second")  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.TRANSIENTS, Cue.TURN_RATE), shown=Means(Cue.TURN_RATE, (Panel("turn", TURN, "turn"),))
     )
@@ -194,30 +153,24 @@ RIM_M = 0.1
 """A patch begins to be felt over this way: a robot is not a point."""
 
 
-@dataclass(frozen=True)
-class FloorSlope:
+SLOPE = Parameter(name="slope", unit="m/s", low=-0.3, high=0.3, neutral=0.0,
+                  probes=(-0.1, -0.04, -0.015, 0.015, 0.04, 0.1),
+                  source="speed that a small robot loses on a floor some degrees from level")  # fmt: skip
+
+
+@effect("floor_slope", Stage.MOTION)
+class FloorSlope(ShippedEffect):
     """The floor rises along x and y: uphill the robot is slower, downhill faster, and at rest it stays.
 
     The forward speed shrinks by (x · cos heading + y · sin heading) · min(1, |forward speed| / REST_SPEED); across the
     slope the robot slides downhill by `push` times what the slope would take from it along its heading.
     """
 
-    x: float
-    y: float
-    push: float
-    name: ClassVar[str] = "floor_slope"
-    stage: ClassVar[Stage] = Stage.MOTION
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        *(
-            Parameter(name=axis, unit="m/s", low=-0.3, high=0.3, neutral=0.0,
-                      probes=(-0.1, -0.04, -0.015, 0.015, 0.04, 0.1),
-                      source="speed that a small robot loses on a floor some degrees from level")
-            for axis in ("x", "y")
-        ),
-        Parameter(name="push", unit="", low=0.0, high=2.0, neutral=0.0, probes=(0.25, 0.5, 1.0, 1.0, 0.5, 0.25),
-                  source="0 for tyres that hold sideways, 1 for a robot that slides as easily across as along",
-                  shape=True),
-    )  # fmt: skip
+    x: float = like(SLOPE)
+    y: float = like(SLOPE)
+    push: float = parameter("", 0.0, 2.0, probes=(0.25, 0.5, 1.0, 1.0, 0.5, 0.25),
+        source="0 for tyres that hold sideways, 1 for a robot that slides as easily across as along",
+        shape=True)  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.HEADING,),
         shown=Means(
@@ -259,31 +212,24 @@ def start_poses(context: FilterContext) -> PoseReckoning:
     return PoseReckoning(known, 0, known[..., 0, :], context.rate_hz)
 
 
-@dataclass(frozen=True)
-class SlipperyPatch:
+PLACE = Parameter(name="place", unit="m", low=-20.0, high=20.0, neutral=0.0, probes=(-1.0, -0.5, 0.5, 1.0),
+                  source="where the robot drives; a diagnosis looks over all places that were driven through",
+                  shape=True)  # fmt: skip
+
+
+@effect("slippery_patch", Stage.MOTION)
+class SlipperyPatch(ShippedEffect):
     """In a round part of the map the wheels slip: the robot loses a share of its motion there.
 
     The part's rim is RIM_M wide, and half of the loss is felt in its middle, `radius` away from (x, y).
     """
 
-    loss: float
-    x: float
-    y: float
-    radius: float
-    name: ClassVar[str] = "slippery_patch"
-    stage: ClassVar[Stage] = Stage.MOTION
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="loss", unit="", low=0.0, high=0.9, neutral=0.0, probes=(0.05, 0.1, 0.2, 0.4),
-                  source="carpet, dust and wet floors: some hundredths to half of the motion"),
-        *(
-            Parameter(name=axis, unit="m", low=-20.0, high=20.0, neutral=0.0, probes=(-1.0, -0.5, 0.5, 1.0),
-                      source="where the robot drives; a diagnosis looks over all places that were driven through",
-                      shape=True)
-            for axis in ("x", "y")
-        ),
-        Parameter(name="radius", unit="m", low=0.1, high=5.0, neutral=0.5, probes=(0.3, 0.8, 1.5, 2.5),
-                  source="from a puddle to a carpet", shape=True),
-    )  # fmt: skip
+    loss: float = parameter("", 0.0, 0.9, probes=(0.05, 0.1, 0.2, 0.4),
+        source="carpet, dust and wet floors: some hundredths to half of the motion")  # fmt: skip
+    x: float = like(PLACE)
+    y: float = like(PLACE)
+    radius: float = parameter("m", 0.1, 5.0, 0.5, probes=(0.3, 0.8, 1.5, 2.5), source="from a puddle to a carpet",
+        shape=True)  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.POSITION,),
         shown=Means(Cue.POSITION, tuple(Panel(axis, f"{axis} [m]", "forward", share=True) for axis in ("x", "y"))),
@@ -323,25 +269,21 @@ def pose_after(pose: Signal, motion: Signal) -> Signal:
     return np.stack((x, y, pose[..., 2] + motion[..., 2]), axis=-1)
 
 
-@dataclass(frozen=True)
-class MarkerOffset:
+ASIDE = Parameter(name="aside", unit="m", low=-0.3, high=0.3, neutral=0.0,
+                  probes=(-0.1, -0.04, -0.015, 0.015, 0.04, 0.1),
+                  source="a marker is anywhere on the robot: up to half its length")  # fmt: skip
+
+
+@effect("marker_offset", Stage.MEASUREMENT)
+class MarkerOffset(ShippedEffect):
     """The point that is tracked lies ahead of the middle of the axle and to the left of it."""
 
-    forward: float
-    left: float
-    name: ClassVar[str] = "marker_offset"
-    stage: ClassVar[Stage] = Stage.MEASUREMENT
-    parameters: ClassVar[tuple[Parameter, ...]] = tuple(
-        Parameter(name=direction, unit="m", low=-0.3, high=0.3, neutral=0.0,
-                  probes=(-0.1, -0.04, -0.015, 0.015, 0.04, 0.1),
-                  source="a marker is anywhere on the robot: up to half its length")
-        for direction in ("forward", "left")
-    )  # fmt: skip
+    forward: float = like(ASIDE)
+    left: float = like(ASIDE)
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.TURN_RATE,),
         shown=Means(Cue.TURN_RATE, (Panel("turn", TURN, "forward"), Panel("turn", TURN, "sideways"))),
     )
-    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Move each pose to the tracked point."""
@@ -352,22 +294,15 @@ class MarkerOffset:
         return np.stack((tracked_x, tracked_y, heading), axis=-1), None
 
 
-@dataclass(frozen=True)
-class HeadingOffset:
+@effect("heading_offset", Stage.MEASUREMENT)
+class HeadingOffset(ShippedEffect):
     """The marker is stuck on turned: measured headings are off by a constant angle."""
 
-    angle: float
-    name: ClassVar[str] = "heading_offset"
-    stage: ClassVar[Stage] = Stage.MEASUREMENT
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="angle", unit="deg", low=-45.0, high=45.0, neutral=0.0,
-                  probes=(-20.0, -8.0, -3.0, 3.0, 8.0, 20.0),
-                  source="a marker stuck on by hand: some degrees; more where its axes are another's"),
-    )  # fmt: skip
+    angle: float = parameter("deg", -45.0, 45.0, probes=(-20.0, -8.0, -3.0, 3.0, 8.0, 20.0),
+        source="a marker stuck on by hand: some degrees; more where its axes are another's")  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.TURN_RATE,), shown=Means(Cue.TURN_RATE, (Panel("forward", "forward speed [m/s]", "sideways"),))
     )
-    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Add the angle to each heading."""

@@ -4,7 +4,7 @@ An effect with `imbalance` is shared out between the wheels: value · (1 − imb
 right. `wheel_forms` are the forms in which a diagnosis tries such an effect: both wheels alike, one alone, or unevenly.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -16,13 +16,16 @@ from proxytune.effects.effect import (
     LowPassState,
     Means,
     Panel,
+    ShippedEffect,
     Signal,
     Stage,
     Trace,
     WheelCurve,
+    effect,
+    like,
     low_pass,
     low_pass_at,
-    remember_nothing,
+    parameter,
 )
 from proxytune.space import Parameter
 
@@ -50,22 +53,16 @@ def wheel_forms(*parameters: str) -> tuple[Form, ...]:
     )
 
 
-@dataclass(frozen=True)
-class DriverMap:
+@effect("driver_map", Stage.ACTUATION)
+class DriverMap(ShippedEffect):
     """The motor driver jumps to a smallest output as soon as the duty leaves zero.
 
     |output| = offset + (1 − offset)·|duty| from a duty of 0.01 on, nothing below it.
     """
 
-    offset: float
-    name: ClassVar[str] = "driver_map"
-    stage: ClassVar[Stage] = Stage.ACTUATION
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="offset", unit="duty", low=0.0, high=0.4, neutral=0.0, probes=(0.02, 0.04, 0.08, 0.15, 0.3),
-                  source="Duckiebot motor driver: (195|u| + 60)/255 above a duty of 0.01"),
-    )  # fmt: skip
+    offset: float = parameter("duty", 0.0, 0.4, probes=(0.02, 0.04, 0.08, 0.15, 0.3),
+        source="Duckiebot motor driver: (195|u| + 60)/255 above a duty of 0.01")  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(cues=(Cue.WHEEL_COMMAND,), shown=WheelCurve.STEADY)
-    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Map each sample on its own."""
@@ -74,63 +71,59 @@ class DriverMap:
         return (signal if self.offset == 0.0 else np.where(size < 0.01, 0.0, jumped)), None
 
 
-@dataclass(frozen=True)
-class Trim:
+@effect("trim", Stage.ACTUATION)
+class Trim(ShippedEffect):
     """The right wheel runs faster than the left: left · (1 − trim), right · (1 + trim)."""
 
-    trim: float
-    name: ClassVar[str] = "trim"
-    stage: ClassVar[Stage] = Stage.ACTUATION
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="trim", unit="", low=-0.5, high=0.5, neutral=0.0, probes=(-0.2, -0.1, -0.05, 0.05, 0.1, 0.2),
-                  source="31 calibrated Duckiebots: −0.014 ± 0.057; box of the paper ±0.3"),
-    )  # fmt: skip
+    trim: float = parameter("", -0.5, 0.5, probes=(-0.2, -0.1, -0.05, 0.05, 0.1, 0.2),
+        source="31 calibrated Duckiebots: −0.014 ± 0.057; box of the paper ±0.3")  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(cues=(Cue.WHEEL_COMMAND,), shown=WheelCurve.STEADY)
-    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Scale the two wheels apart."""
         return signal * np.array((1.0 - self.trim, 1.0 + self.trim)), None
 
 
-@dataclass(frozen=True)
-class WheelGain:
+GAIN = Parameter(name="gain", unit="", low=0.3, high=1.7, neutral=1.0, probes=(0.7, 0.85, 0.95, 1.05, 1.15, 1.3),
+                 source="31 calibrated Duckiebots: 1.01 ± 0.14")  # fmt: skip
+
+
+@effect("gain", Stage.ACTUATION)
+class Gain(ShippedEffect):
+    """Both wheels turn faster or slower than nominal by one factor: on a single column, all that a gain is."""
+
+    gain: float = like(GAIN)
+    trace: ClassVar[Trace | None] = Trace(cues=(Cue.WHEEL_COMMAND,), shown=WheelCurve.STEADY)
+
+    def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
+        """Scale both."""
+        return signal * self.gain, None
+
+
+@effect("wheel_gain", Stage.ACTUATION)
+class WheelGain(ShippedEffect):
     """Each wheel turns faster or slower than nominal by a factor of its own."""
 
-    left: float
-    right: float
-    name: ClassVar[str] = "wheel_gain"
-    stage: ClassVar[Stage] = Stage.ACTUATION
-    parameters: ClassVar[tuple[Parameter, ...]] = tuple(
-        Parameter(name=side, unit="", low=0.3, high=1.7, neutral=1.0, probes=(0.7, 0.85, 0.95, 1.05, 1.15, 1.3),
-                  source="31 calibrated Duckiebots: 1.01 ± 0.14")
-        for side in ("left", "right")
-    )  # fmt: skip
+    left: float = like(GAIN)
+    right: float = like(GAIN)
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.WHEEL_COMMAND,),
         shown=WheelCurve.STEADY,
         forms=(Form((("left", "right"),)), Form((("left",),), "left wheel"), Form((("right",),), "right wheel")),
     )
-    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Scale each wheel."""
         return signal * np.array((self.left, self.right)), None
 
 
-@dataclass(frozen=True)
-class MotorLag:
+@effect("motor_lag", Stage.ACTUATION)
+class MotorLag(ShippedEffect):
     """Wheels follow the speed asked of them with a first-order lag, τ dω/dt = ω* − ω."""
 
-    time_constant: float
-    imbalance: float
-    name: ClassVar[str] = "motor_lag"
-    stage: ClassVar[Stage] = Stage.ACTUATION
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="time_constant", unit="s", low=0.0, high=1.0, neutral="motor_time_constant",
-                  probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8), source="gym-duckietown's dynamics fit: 0.20 s"),
-        SLIGHT_IMBALANCE,
-    )  # fmt: skip
+    time_constant: float = parameter("s", 0.0, 1.0, "motor_time_constant", probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8),
+        source="gym-duckietown's dynamics fit: 0.20 s")  # fmt: skip
+    imbalance: float = like(SLIGHT_IMBALANCE)
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.TRANSIENTS, Cue.WHEEL_COMMAND), shown=WheelCurve.STEP, forms=wheel_forms("time_constant")
     )
@@ -159,17 +152,12 @@ class SlewState(NamedTuple):
     step: float
 
 
-@dataclass(frozen=True)
-class SlewRate:
+@effect("slew_rate", Stage.ACTUATION)
+class SlewRate(ShippedEffect):
     """The motor driver changes each wheel's duty no faster than from rest to full within `rise_time`."""
 
-    rise_time: float
-    name: ClassVar[str] = "slew_rate"
-    stage: ClassVar[Stage] = Stage.ACTUATION
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="rise_time", unit="s", low=0.0, high=3.0, neutral=0.0, probes=(0.05, 0.1, 0.2, 0.4, 0.8, 1.6),
-                  source="ramps of motor drivers: some tenths of a second to a few seconds from rest to full speed"),
-    )  # fmt: skip
+    rise_time: float = parameter("s", 0.0, 3.0, probes=(0.05, 0.1, 0.2, 0.4, 0.8, 1.6),
+        source="ramps of motor drivers: some tenths of a second to a few seconds from rest to full speed")  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(cues=(Cue.TRANSIENTS, Cue.WHEEL_COMMAND), shown=WheelCurve.STEP)
 
     def begin(self, context: FilterContext) -> SlewState:
@@ -206,23 +194,17 @@ def _ramps(wanted: Signal, start: Signal, step: float) -> Signal:
     return np.asarray((held[of] + ramp).reshape(wanted.shape))
 
 
-@dataclass(frozen=True)
-class ThermalFade:
+@effect("thermal_fade", Stage.ACTUATION)
+class ThermalFade(ShippedEffect):
     """Both wheels turn slower the harder they have worked of late, by `loss` after long work at full duty.
 
     Their speed is multiplied by 1 − loss · load, where load follows mean |u| with a lag of `time_constant`.
     """
 
-    loss: float
-    time_constant: float
-    name: ClassVar[str] = "thermal_fade"
-    stage: ClassVar[Stage] = Stage.ACTUATION
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="loss", unit="", low=0.0, high=0.9, neutral=0.0, probes=(0.05, 0.1, 0.2, 0.4, 0.8),
-                  source="windings that are 80 °C warmer have a third more resistance"),
-        Parameter(name="time_constant", unit="s", low=0.5, high=120.0, neutral=8.0, probes=(2.0, 4.0, 15.0, 40.0),
-                  source="small motors warm up within seconds to minutes", shape=True),
-    )  # fmt: skip
+    loss: float = parameter("", 0.0, 0.9, probes=(0.05, 0.1, 0.2, 0.4, 0.8),
+        source="windings that are 80 °C warmer have a third more resistance")  # fmt: skip
+    time_constant: float = parameter("s", 0.5, 120.0, 8.0, probes=(2.0, 4.0, 15.0, 40.0),
+        source="small motors warm up within seconds to minutes", shape=True)  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.USE, Cue.TIME),
         shown=Means(Cue.USE, (Panel("", "use so far [s at full duty]", "forward", share=True),)),
@@ -243,19 +225,13 @@ SMALLEST_LIMIT = 0.05
 """A wheel keeps so much of its duty, however the lost part is shared out."""
 
 
-@dataclass(frozen=True)
-class Saturation:
+@effect("saturation", Stage.ACTUATION)
+class Saturation(ShippedEffect):
     """Wheels turn no faster than at a duty of `limit`; the lost part, 1 − limit, is what the wheels share."""
 
-    limit: float
-    imbalance: float
-    name: ClassVar[str] = "saturation"
-    stage: ClassVar[Stage] = Stage.ACTUATION
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="limit", unit="duty", low=0.1, high=1.0, neutral=1.0, probes=(0.15, 0.25, 0.4, 0.6, 0.8, 0.9),
-                  source="drivers that cap the duty, batteries run down: 0.5 to 1"),
-        IMBALANCE,
-    )  # fmt: skip
+    limit: float = parameter("duty", 0.1, 1.0, 1.0, probes=(0.15, 0.25, 0.4, 0.6, 0.8, 0.9),
+        source="drivers that cap the duty, batteries run down: 0.5 to 1")  # fmt: skip
+    imbalance: float = like(IMBALANCE)
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.WHEEL_COMMAND,), shown=WheelCurve.STEADY, forms=wheel_forms("limit")
     )
@@ -281,28 +257,20 @@ class BatteryState(NamedTuple):
     minutes: float
 
 
-@dataclass(frozen=True)
-class BatterySag:
+@effect("battery_sag", Stage.ACTUATION)
+class BatterySag(ShippedEffect):
     """Both wheels turn slower under load, and the slower the more, or the longer, has been driven since the start.
 
     Their speed is multiplied by (1 − load · mean |u|) · exp(−fade · use − fade_with_time · time), use being the
     integral of mean |u|.
     """
 
-    load: float
-    fade: float
-    fade_with_time: float
-    name: ClassVar[str] = "battery_sag"
-    stage: ClassVar[Stage] = Stage.ACTUATION
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="load", unit="", low=0.0, high=0.8, neutral=0.0, probes=(0.03, 0.06, 0.12, 0.25, 0.5),
-                  source="inner resistance of small batteries: some hundredths at full load, old ones some tenths"),
-        Parameter(name="fade", unit="1/min", low=0.0, high=1.0, neutral=0.0, probes=(0.03, 0.06, 0.12, 0.25, 0.5, 1.0),
-                  source="a battery that lasts minutes to an hour at full duty"),
-        Parameter(name="fade_with_time", unit="1/min", low=0.0, high=1.0, neutral=0.0,
-                  probes=(0.03, 0.06, 0.12, 0.25, 0.5, 1.0),
-                  source="what else a battery feeds empties it too, driving or not"),
-    )  # fmt: skip
+    load: float = parameter("", 0.0, 0.8, probes=(0.03, 0.06, 0.12, 0.25, 0.5),
+        source="inner resistance of small batteries: some hundredths at full load, old ones some tenths")  # fmt: skip
+    fade: float = parameter("1/min", 0.0, 1.0, probes=(0.03, 0.06, 0.12, 0.25, 0.5, 1.0),
+        source="a battery that lasts minutes to an hour at full duty")  # fmt: skip
+    fade_with_time: float = parameter("1/min", 0.0, 1.0, probes=(0.03, 0.06, 0.12, 0.25, 0.5, 1.0),
+        source="what else a battery feeds empties it too, driving or not")  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.USE, Cue.TIME),
         shown=WheelCurve.STEADY,

@@ -5,7 +5,6 @@ motion that these ask of the body.
 """
 
 import math
-from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -18,11 +17,14 @@ from proxytune.effects.effect import (
     Form,
     Means,
     Panel,
+    ShippedEffect,
     Signal,
     Stage,
     Trace,
     WheelCurve,
-    remember_nothing,
+    effect,
+    like,
+    parameter,
 )
 from proxytune.effects.friction import taken_along
 from proxytune.space import Parameter
@@ -32,17 +34,12 @@ def _steered(signal: Signal, angle: Signal) -> Signal:
     return np.stack((signal[..., THROTTLE], angle), axis=-1)
 
 
-@dataclass(frozen=True)
-class SteeringBacklash:
+@effect("steering_backlash", Stage.ACTUATION)
+class SteeringBacklash(ShippedEffect):
     """The linkage of the steering has play: the wheels stay while the servo is within half the gap of them."""
 
-    gap: float
-    name: ClassVar[str] = "steering_backlash"
-    stage: ClassVar[Stage] = Stage.ACTUATION
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="gap", unit="full lock", low=0.0, high=0.4, neutral=0.0, probes=(0.02, 0.05, 0.1, 0.2),
-                  source="ball joints and plastic knuckles: some degrees of the wheels, worn ones more"),
-    )  # fmt: skip
+    gap: float = parameter("full lock", 0.0, 0.4, probes=(0.02, 0.05, 0.1, 0.2),
+        source="ball joints and plastic knuckles: some degrees of the wheels, worn ones more")  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(cues=(Cue.STEERING, Cue.TRANSIENTS), shown=WheelCurve.REVERSAL)
 
     def begin(self, context: FilterContext) -> Signal:
@@ -55,52 +52,37 @@ class SteeringBacklash:
         return _steered(signal, wheels[..., 0]), wheels[..., -1:, :]
 
 
-@dataclass(frozen=True)
-class SteeringOffset:
+@effect("steering_offset", Stage.ACTUATION)
+class SteeringOffset(ShippedEffect):
     """The wheels are not straight at a steering of 0: the trim of a car."""
 
-    offset: float
-    name: ClassVar[str] = "steering_offset"
-    stage: ClassVar[Stage] = Stage.ACTUATION
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="offset", unit="full lock", low=-0.4, high=0.4, neutral=0.0,
-                  probes=(-0.2, -0.08, -0.03, 0.03, 0.08, 0.2),
-                  source="servo horns have some 25 teeth: up to 7° of the horn off; DART: 0.027 of full lock"),
-    )  # fmt: skip
+    offset: float = parameter("full lock", -0.4, 0.4, probes=(-0.2, -0.08, -0.03, 0.03, 0.08, 0.2),
+        source="servo horns have some 25 teeth: up to 7° of the horn off; DART: 0.027 of full lock")  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(cues=(Cue.STEERING,), shown=WheelCurve.STEADY)
-    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Add it."""
         return _steered(signal, signal[..., STEERING] + self.offset), None
 
 
-@dataclass(frozen=True)
-class SteeringCurve:
+LOCK = Parameter(name="lock", unit="deg", low=3.0, high=60.0, neutral="wheel_angle",
+                 probes=(10.0, 15.0, 20.0, 25.0, 30.0, 40.0),
+                 source="knuckles of cars stop at 20° to 45°, left and right some degrees apart")  # fmt: skip
+BEND = Parameter(name="bend", unit="", low=0.0, high=3.0, neutral=0.0, probes=(0.5, 1.0, 1.5, 2.0),
+                 source="DART: 1.4 to the left, 1.0 to the right")  # fmt: skip
+
+
+@effect("steering_curve", Stage.ACTUATION)
+class SteeringCurve(ShippedEffect):
     """The wheels' angle is a curve of the steering, to either side its own: side · tanh(bend · s) / tanh(bend).
 
     `left` and `right` are the angles at full lock; at a bend of 0 a side is a straight line.
     """
 
-    left: float
-    right: float
-    left_bend: float
-    right_bend: float
-    name: ClassVar[str] = "steering_curve"
-    stage: ClassVar[Stage] = Stage.ACTUATION
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        *(
-            Parameter(name=side, unit="deg", low=3.0, high=60.0, neutral="wheel_angle",
-                      probes=(10.0, 15.0, 20.0, 25.0, 30.0, 40.0),
-                      source="knuckles of cars stop at 20° to 45°, left and right some degrees apart")
-            for side in ("left", "right")
-        ),
-        *(
-            Parameter(name=f"{side}_bend", unit="", low=0.0, high=3.0, neutral=0.0, probes=(0.5, 1.0, 1.5, 2.0),
-                      source="DART: 1.4 to the left, 1.0 to the right")
-            for side in ("left", "right")
-        ),
-    )  # fmt: skip
+    left: float = like(LOCK)
+    right: float = like(LOCK)
+    left_bend: float = like(BEND)
+    right_bend: float = like(BEND)
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.STEERING,),
         shown=WheelCurve.STEADY,
@@ -125,21 +107,15 @@ class SteeringCurve:
         return _steered(signal, np.where(steering > 0.0, left, right)), memory
 
 
-@dataclass(frozen=True)
-class SteeringFriction:
+@effect("steering_friction", Stage.ACTUATION)
+class SteeringFriction(ShippedEffect):
     """Turned wheels brake the car: the motor's speed shrinks by the factor 1 − loss · |wheel angle at full lock|."""
 
-    loss: float
-    name: ClassVar[str] = "steering_friction"
-    stage: ClassVar[Stage] = Stage.ACTUATION
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="loss", unit="", low=0.0, high=0.9, neutral=0.0, probes=(0.05, 0.1, 0.2, 0.4),
-                  source="front tyres that scrub: some tenths of the speed at full lock"),
-    )  # fmt: skip
+    loss: float = parameter("", 0.0, 0.9, probes=(0.05, 0.1, 0.2, 0.4),
+        source="front tyres that scrub: some tenths of the speed at full lock")  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.STEERING,), shown=Means(Cue.TURN_RATE, (Panel("turn", TURN, "forward", share=True),))
     )
-    begin = remember_nothing
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Slow the car down by how far its wheels are turned, at most to a stop."""
@@ -167,8 +143,8 @@ class RollingState(NamedTuple):
     friction: float
 
 
-@dataclass(frozen=True)
-class Rolling:
+@effect("rolling", Stage.ACTUATION)
+class Rolling(ShippedEffect):
     """The car has mass and rolls on without throttle: its speed v follows the motor's u.
 
     dv/dt = (u − (1 − freewheel + freewheel · |u|) · v) / inertia − friction − drag · v, u and v as fractions of full
@@ -176,22 +152,16 @@ class Rolling:
     faster it turns, as a motor does on a voltage that is switched, and without throttle it does not brake at all.
     """
 
-    inertia: float
-    freewheel: float
-    friction: float
-    drag: float
-    name: ClassVar[str] = "rolling"
-    stage: ClassVar[Stage] = Stage.ACTUATION
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="inertia", unit="s", low=0.0, high=3.0, neutral=0.0, probes=(0.1, 0.2, 0.4, 0.8, 1.6),
-                  source="full speed by the acceleration from rest: 0.2 to 1 s for model cars, seconds for large ones"),
-        Parameter(name="freewheel", unit="", low=0.0, high=1.0, neutral=0.0, probes=(0.25, 0.5, 0.75, 1.0),
-                  source="0 for a speed controller that holds a speed, 1 for one that switches a voltage", shape=True),
-        Parameter(name="friction", unit="m/s²", low=0.0, high=4.0, neutral=0.0, probes=(0.1, 0.3, 0.7, 1.5),
-                  source="rolling friction of model cars: 0.2 to 1 m/s²; DART: 0.74 m/s²", shape=True),
-        Parameter(name="drag", unit="1/s", low=0.0, high=2.0, neutral=0.0, probes=(0.05, 0.1, 0.2, 0.5, 1.0),
-                  source="gears, bearings and air: some tenths of the speed in a second", shape=True),
-    )  # fmt: skip
+    inertia: float = parameter("s", 0.0, 3.0, probes=(0.1, 0.2, 0.4, 0.8, 1.6),
+        source="full speed by the acceleration from rest: 0.2 to 1 s for model cars, seconds for large "
+               "ones")  # fmt: skip
+    freewheel: float = parameter("", 0.0, 1.0, probes=(0.25, 0.5, 0.75, 1.0),
+        source="0 for a speed controller that holds a speed, 1 for one that switches a voltage",
+        shape=True)  # fmt: skip
+    friction: float = parameter("m/s²", 0.0, 4.0, probes=(0.1, 0.3, 0.7, 1.5),
+        source="rolling friction of model cars: 0.2 to 1 m/s²; DART: 0.74 m/s²", shape=True)  # fmt: skip
+    drag: float = parameter("1/s", 0.0, 2.0, probes=(0.05, 0.1, 0.2, 0.5, 1.0),
+        source="gears, bearings and air: some tenths of the speed in a second", shape=True)  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.TRANSIENTS, Cue.WHEEL_COMMAND),
         shown=WheelCurve.STEP,
@@ -261,39 +231,34 @@ def _follow(steps: Signal, start: Signal) -> Signal:
     return flat[..., :length]
 
 
-@dataclass(frozen=True)
-class Tyres:
+@effect("tyres", Stage.MOTION)
+class Tyres(ShippedEffect):
     """Tyres slip sideways in bends: the car turns the less the harder it corners, and its rear slides outwards.
 
     The yaw rate is divided by 1 + understeer · v²; then the lateral acceleration a = v · yaw is held back as
     tanh(slide · a) / slide, at most 1 / slide; and the rear axle slides by v · rear_slip · a.
     """
 
-    understeer: float
-    slide: float
-    rear_slip: float
-    name: ClassVar[str] = "tyres"
-    stage: ClassVar[Stage] = Stage.MOTION
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="understeer", unit="s²/m²", low=0.0, high=1.0, neutral=0.0, probes=(0.01, 0.03, 0.1, 0.3),
-                  source="1 by the square of the speed at which a car turns half as far: 3 to 10 m/s for model cars"),
-        Parameter(name="slide", unit="s²/m", low=0.0, high=1.0, neutral=0.0, probes=(0.07, 0.15, 0.3, 0.6),
-                  source="1 by the lateral acceleration that tyres hold: 2 to 10 m/s²"),
-        Parameter(name="rear_slip", unit="s²/m", low=-0.1, high=0.2, neutral=0.0, probes=(0.005, 0.015, 0.04, 0.1),
-                  source="slip angle of some degrees at 5 m/s²"),
-    )  # fmt: skip
+    understeer: float = parameter("s²/m²", 0.0, 1.0, probes=(0.01, 0.03, 0.1, 0.3),
+        source="1 by the square of the speed at which a car turns half as far: 3 to 10 m/s for model cars")  # fmt: skip
+    slide: float = parameter("s²/m", 0.0, 1.0, probes=(0.07, 0.15, 0.3, 0.6),
+        source="1 by the lateral acceleration that tyres hold: 2 to 10 m/s²")  # fmt: skip
+    rear_slip: float = parameter("s²/m", -0.1, 0.2, probes=(0.005, 0.015, 0.04, 0.1),
+        source="slip angle of some degrees at 5 m/s²")  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.TURN_RATE,),
         shown=Means(Cue.TURN_RATE, (Panel("bend", "forward speed times turn rate [m/s²]", "turn", share=True),)),
         forms=(
             Form((("understeer",),), "understeer", moved=("understeer",)),
             Form((("slide",),), "slide", moved=("slide",)),
-            Form((("rear_slip",),), "rear slip", moved=("rear_slip",),
-                 shown=Means(Cue.TURN_RATE,
-                             (Panel("bend", "forward speed times turn rate [m/s²]", "sideways"),))),
+            Form(
+                (("rear_slip",),),
+                "rear slip",
+                moved=("rear_slip",),
+                shown=Means(Cue.TURN_RATE, (Panel("bend", "forward speed times turn rate [m/s²]", "sideways"),)),
+            ),
         ),
-    )  # fmt: skip
-    begin = remember_nothing
+    )
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Turn the less, and slide the more, the harder the car corners."""

@@ -4,7 +4,6 @@ An agent is a function, what has `predict`, or one of two that need no code. One
 the environment or the time ends it. `agent_of` goes the other way: a policy trained elsewhere drives our robot.
 """
 
-import hashlib
 import inspect
 from collections.abc import Callable, Mapping
 from contextlib import closing
@@ -17,12 +16,12 @@ import numpy as np
 
 from proxytune.domain import Episode
 from proxytune.driving import Command, Picture, Robot
-from proxytune.effects import Catalogue, Effect, effects_from, is_learnt
+from proxytune.effects import Catalogue, effects_from, is_learnt
 from proxytune.environments.making import EnvironmentSettings, EpisodeMetric, make_environment, read_domain, read_values
 from proxytune.environments.signals import Actuators, EnvironmentParameters, Sensors, Spaces, figures, look_at
 from proxytune.errors import EpisodeError, ExtensionError, InputError, SettingsError
 from proxytune.extensions import ask, describe, load
-from proxytune.identity import files_beside, meaning_of
+from proxytune.identity import digest, files_beside, meaning_of
 from proxytune.lineage import code_name
 from proxytune.seeds import acting_seed, course_generator, reset_seed
 from proxytune.settings import Section, nearest
@@ -141,11 +140,7 @@ def load_agent(name: Any, folder: Path, space: Any, seed: int) -> Act:
 
 
 def ask_agent(act: Act, observation: Any, space: Any, step: int) -> Any:
-    """An agent's next action, checked.
-
-    Raises:
-        EpisodeError: If it raises, or answers with what is no action.
-    """
+    """An agent's next action, checked."""
     try:
         answer = act(observation)
     except Exception as problem:
@@ -203,11 +198,7 @@ class WrappedEnvironment:
 
 
 def play(wrapped: WrappedEnvironment, act: Act, first: Any, space: Any, steps: int) -> None:
-    """Let an agent act from its first observation on, for so many steps at most.
-
-    Raises:
-        EpisodeError: If agent or environment fail.
-    """
+    """Let an agent act from its first observation on, for so many steps at most."""
     observation = first
     for step in range(steps):
         observation, over = wrapped.step(ask_agent(act, observation, space, step))
@@ -216,11 +207,7 @@ def play(wrapped: WrappedEnvironment, act: Act, first: Any, space: Any, steps: i
 
 
 def score(wrapped: WrappedEnvironment, metrics: tuple[EpisodeMetric, ...]) -> dict[str, float]:
-    """The metrics of an episode that is over.
-
-    Raises:
-        EpisodeError: If info lacks an entry, or it is no number.
-    """
+    """The metrics of an episode that is over."""
     whole = {"return": float(np.sum(wrapped.rewards)), "length": float(len(wrapped.rewards))}
     return {one.name: whole[one.source] if one.source in whole else _of_info(wrapped.infos, one) for one in metrics}
 
@@ -236,13 +223,6 @@ def _of_info(infos: Infos, metric: EpisodeMetric) -> float:
     except (TypeError, ValueError):
         raise EpisodeError(f"metric '{metric.name}': '{metric.entry}' of info is no number; name another") from None
     return values[-1] if metric.fold == "last" else float(FOLDS[metric.fold](values))
-
-
-def wrap(
-    environment: Any, effects: tuple[Effect, ...], spaces: Spaces, state: tuple[int, ...] | None, seed: int
-) -> WrappedEnvironment:
-    """An environment behind the effects of a domain instance."""
-    return WrappedEnvironment(environment, Actuators(effects, spaces, seed), Sensors(effects, spaces, state, seed))
 
 
 STARTS = 1000
@@ -280,8 +260,7 @@ class GymnasiumFamily:
         folder = self.settings.folder
         own = meaning_of((path for path in files_beside(folder) if path.suffix in READ_BY_CODE), folder)
         table = [getattr(self.settings, name) for name in self.settings.__dataclass_fields__ if name != "folder"]
-        parts = (table, self.spaces, self.held, code_name("environments"), own)
-        return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
+        return digest(table, self.spaces, self.held, code_name("environments"), own)
 
     @property
     def versions(self) -> Mapping[str, str]:
@@ -314,38 +293,29 @@ class GymnasiumFamily:
         return read_values(model, self.settings.own, self.settings.folder)
 
     def check_agent(self, name: str) -> None:
-        """Load the agent once.
-
-        Raises:
-            InputError: If there is no such agent.
-        """
+        """Load the agent once."""
         with closing(make_environment(self.settings, dict(self.held))) as environment:
             load_agent(self.policies.get(name, name), self.settings.folder, environment.action_space, 0)
 
     def run(self, episode: Episode) -> Mapping[str, float]:
-        """Play one episode and score it.
-
-        Raises:
-            EpisodeError: If the agent or the environment fails.
-        """
+        """Play one episode and score it."""
         theta = {**dict(self.held), **dict(episode.theta)}
-        effects, folder, seed = self._effects(theta), self.settings.folder, acting_seed(episode.seed, episode.start)
+        own, folder = {one.parameter.name for one in self.settings.own}, self.settings.folder
+        named = {name: value for name, value in theta.items() if name not in own}
+        effects = effects_from(named, figures(self.spaces), Catalogue(folder))
+        seed = acting_seed(episode.seed, episode.start)
         try:
             environment = make_environment(self.settings, theta)
         except InputError as problem:
             raise EpisodeError(str(problem)) from problem
         with closing(environment):
-            wrapped = wrap(environment, effects, self.spaces, self.settings.state, episode.seed)
+            sensors = Sensors(effects, self.spaces, self.settings.state, episode.seed)
+            wrapped = WrappedEnvironment(environment, Actuators(effects, self.spaces, episode.seed), sensors)
             agent = self.policies.get(episode.agent, episode.agent)
             act = load_agent(agent, folder, environment.action_space, seed)
             first = wrapped.reset(reset_seed(episode.start), course_generator(episode.seed, episode.start))
             play(wrapped, act, first, environment.action_space, self.spaces.steps)
             return score(wrapped, self.settings.metrics)
-
-    def _effects(self, theta: Theta) -> tuple[Effect, ...]:
-        own = {one.parameter.name for one in self.settings.own}
-        named = {name: value for name, value in theta.items() if name not in own}
-        return effects_from(named, figures(self.spaces), Catalogue(self.settings.folder))
 
 
 def gymnasium_family(

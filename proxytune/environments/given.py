@@ -16,24 +16,14 @@ from proxytune.space import Space, Theta
 
 @dataclass(frozen=True)
 class PlayedEnvironment:
-    """An environment as a function.
-
-    Attributes:
-        family: Plays its episodes.
-        name: What Gymnasium calls it.
-        make: What makes it; None where its name is registered.
-    """
+    """An environment as a function: its family plays it, and what has no registered name is made by `make`."""
 
     family: GymnasiumFamily
     name: str
     make: Callable[..., Any] | None
 
     def __call__(self, theta: Theta, agent: str, start: int, seed: int) -> Mapping[str, float]:
-        """The metrics of one episode.
-
-        Raises:
-            EpisodeError: If the agent or the environment fails.
-        """
+        """The metrics of one episode."""
         _register(self.name, self.make)
         return self.family.run(make_episode(theta, agent=agent, start=start, seed=seed))
 

@@ -31,7 +31,7 @@ from proxytune.driving import (
 from proxytune.effects import Signal, parameter_hint
 from proxytune.errors import InputError
 from proxytune.settings import Section, nearest
-from proxytune.space import Parameter, Theta
+from proxytune.space import Parameter
 
 ROWS = 480
 """Height of what is rendered [pixel]."""
@@ -56,8 +56,12 @@ def render(picture: Picture, road: Road, poses: Signal) -> NDArray[np.uint8]:
     """
     seen = Image.fromarray(picture)
     seen = seen.resize((_even(ROWS * seen.width / seen.height), ROWS), Image.Resampling.NEAREST)
-    above = _map(road)
-    _draw_way(ImageDraw.Draw(above), poses, ROWS / road.size[1])
+    above, scale = _map(road), ROWS / road.size[1]
+    draw, way = ImageDraw.Draw(above), poses[:, :2] * (scale, -scale) + (0.0, ROWS)
+    draw.line([(float(x), float(y)) for x, y in way], fill=WAY, width=3)
+    angles = poses[-1, 2] + np.radians((0.0, 140.0, 220.0))
+    corners = way[-1] + ARROW_M * scale * np.stack((np.cos(angles), -np.sin(angles)), axis=-1)
+    draw.polygon([(float(x), float(y)) for x, y in corners], fill=ROBOT, outline=(255, 255, 255))
     return np.concatenate((np.asarray(seen), np.asarray(above)), axis=1)
 
 
@@ -69,14 +73,6 @@ def _map(road: Road) -> Image.Image:
     )
     above = Image.fromarray(np.ascontiguousarray(floor.pixels[rows, columns][::-1]))
     return above.resize((_even(ROWS * road.size[0] / road.size[1]), ROWS), Image.Resampling.BOX)
-
-
-def _draw_way(draw: ImageDraw.ImageDraw, poses: Signal, pixels_per_metre: float) -> None:
-    way = poses[:, :2] * (pixels_per_metre, -pixels_per_metre) + (0.0, ROWS)
-    draw.line([(float(x), float(y)) for x, y in way], fill=WAY, width=3)
-    angles = poses[-1, 2] + np.radians((0.0, 140.0, 220.0))
-    corners = way[-1] + ARROW_M * pixels_per_metre * np.stack((np.cos(angles), -np.sin(angles)), axis=-1)
-    draw.polygon([(float(x), float(y)) for x, y in corners], fill=ROBOT, outline=(255, 255, 255))
 
 
 def _even(number: float) -> int:
@@ -99,11 +95,6 @@ def read_theta(given: Mapping[str, Any], known: Mapping[str, Parameter]) -> dict
     if not isinstance(given, Mapping):
         raise InputError(f"theta: must give a value or [low, high] by parameter, got {given!r}")
     return {name: _interval(name, value, known) for name, value in given.items()}
-
-
-def draw_theta(intervals: Mapping[str, ValueRange], generator: np.random.Generator) -> Theta:
-    """θ with each parameter drawn evenly from its interval, in the order of their names."""
-    return {name: float(generator.uniform(*intervals[name])) for name in sorted(intervals)}
 
 
 def _interval(name: str, value: Any, known: Mapping[str, Parameter]) -> ValueRange:
@@ -151,11 +142,7 @@ class Tally:
         return np.concatenate(self._parts)
 
     def add(self, poses: Signal) -> float:
-        """The distance [m] along the lane in the next ticks' poses (ticks, 3).
-
-        Raises:
-            EpisodeError: If a pose is not finite.
-        """
+        """The distance [m] along the lane in the next ticks' poses (ticks, 3)."""
         part = self._score(np.concatenate((self._parts[-1][-1:], poses)), self._seconds - self._ticks * TICK_S)
         ticks = round(part["survival_time"] / TICK_S)
         self._parts.append(poses)
@@ -170,11 +157,7 @@ class Tally:
         return {"distance": self._distance, "survival_time": self._ticks * TICK_S, "deviation": deviation}
 
     def whole(self) -> dict[str, float]:
-        """Every metric of the drive as a study scores it.
-
-        Raises:
-            EpisodeError: If a pose is not finite.
-        """
+        """Every metric of the drive as a study scores it."""
         return self._score(self.poses, self._seconds)
 
     def _score(self, poses: Signal, seconds: float) -> dict[str, float]:
@@ -325,7 +308,8 @@ class LaneFollowingEnv(gymnasium.Env[Picture, NDArray[Any]]):
         intervals = {**self._theta, **read_theta(options.get("theta", {}), self.family.parameters)}
         start = _whole("start", chosen["start"], self.family.starts)
         seed = _whole("episode_seed", chosen["episode_seed"], SEEDS)
-        return make_episode(draw_theta(intervals, self.np_random), agent="-", start=start, seed=seed)
+        theta = {name: float(self.np_random.uniform(*intervals[name])) for name in sorted(intervals)}
+        return make_episode(theta, agent="-", start=start, seed=seed)
 
     def _under_way(self) -> _EpisodeUnderWay:
         if self._drive is None:

@@ -31,13 +31,7 @@ ATTRIBUTE = re.compile(rf"{_STEP}(\.{_STEP})*")
 
 @dataclass(frozen=True)
 class OwnParameter:
-    """A parameter of the environment's own.
-
-    Attributes:
-        parameter: Its name in θ, unit, bounds and neutral value.
-        argument: The constructor's argument that it is, or empty.
-        attribute: The attribute of the finished environment that it is, or empty.
-    """
+    """A parameter of the environment's own: an argument of its constructor, or an attribute of what that made."""
 
     parameter: Parameter
     argument: str
@@ -91,11 +85,7 @@ class EnvironmentSettings:
 
 
 def read_domain(section: Section) -> EnvironmentSettings:
-    """Read a [domain] table.
-
-    Raises:
-        SettingsError: With file, key and remedy.
-    """
+    """Read a [domain] table."""
     section.only(KEYS)
     folder = section.path.resolve().parent
     effects, _ = read_effects(section.section("effects"), Catalogue(folder))
@@ -262,9 +252,6 @@ def read_values(path: Path, own: tuple[OwnParameter, ...], folder: Path) -> dict
     """Read what a model.toml gives an environment: its effects, and in [parameters] values of the environment's own.
 
     A model that `diagnose` wrote names a robot too, which says nothing of an environment.
-
-    Raises:
-        SettingsError: With file, key and remedy.
     """
     settings = read_settings(path)
     settings.only(("format", "robot", "plant", "geometry", "parameters", "effects"))

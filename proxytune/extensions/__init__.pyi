@@ -15,7 +15,6 @@ from .door import (
     ask as ask,
     describe as describe,
     load as load,
-    make as make,
     one_line as one_line,
     place_of as place_of,
     plugins as plugins,

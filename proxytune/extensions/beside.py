@@ -14,7 +14,6 @@ its own: `is_users` tells the user's Ctrl-C from it. `pack` and `unpack` carry a
 import atexit
 import builtins
 import functools
-import hashlib
 import importlib
 import io
 import signal
@@ -32,7 +31,7 @@ from typing import Any
 
 from proxytune.errors import ExtensionError
 from proxytune.files import temporary_folder
-from proxytune.identity import modules_beside
+from proxytune.identity import digest, modules_beside
 
 
 class Interrupted(KeyboardInterrupt):
@@ -86,11 +85,7 @@ def is_ours(module: str) -> bool:
 
 
 def check_runs(module: str) -> None:
-    """Refuse a module that a file names, where none is run.
-
-    Raises:
-        ExtensionError: With who refuses it.
-    """
+    """Refuse a module that a file names, where none is run."""
     command, typed = _refusing.get() or ("", ())
     if command and module not in typed and not is_ours(module):
         named = f"module '{module}' is code, and {command} runs none that a file names"
@@ -137,7 +132,7 @@ def open_folders(known: Sequence[str]) -> None:
 def _home(folder: str) -> str:
     """The name under which a folder's modules are imported: that of an empty package."""
     word = "".join(letter if letter.isalnum() else "_" for letter in Path(folder).name)
-    name = f"{PREFIX}{word}_{hashlib.sha256(folder.encode()).hexdigest()[:8]}"
+    name = f"{PREFIX}{word}_{digest(folder, length=8)}"
     if name not in sys.modules:
         home = ModuleType(name, f"The modules of {folder}.")
         home.__path__ = [folder]

@@ -1,6 +1,6 @@
 """The search for what a user's name stands for, and one line for why it cannot be used.
 
-`load` and `make` find it among what is shipped, a folder's modules or the plug-ins (entry points of installed packages,
+`load` finds it among what is shipped, a folder's modules or the plug-ins (entry points of installed packages,
 none of which is imported before it is named); `ask` calls it, and tells what it raised and where.
 """
 
@@ -87,7 +87,13 @@ Answer = TypeVar("Answer")
 
 
 def load(
-    name: str, *, kind: str, beside: Path | None = None, needs: Iterable[str] = (), shipped: Mapping[str, Any] = NONE
+    name: str,
+    *,
+    kind: str,
+    beside: Path | None = None,
+    needs: Iterable[str] = (),
+    shipped: Mapping[str, Any] = NONE,
+    call: bool = False,
 ) -> Any:
     """Find what a name stands for: something shipped, `module:attribute`, or an installed plug-in.
 
@@ -97,30 +103,19 @@ def load(
         beside: The folder whose modules come before the installed ones.
         needs: Members that it must have.
         shipped: What proxytune itself has of this kind, by name.
+        call: Whether a class, or what lacks the members, is called without arguments for what has them.
 
     Raises:
-        ExtensionError: If there is no such thing, it may not be run, importing it fails, or it lacks a member.
+        ExtensionError: If there is no such thing, it may not be run, importing or calling it fails, or it lacks a
+            member.
     """
     if ":" in name:
         found = _attribute(name, kind, beside)
     else:
         installed = plugins(kind, shipped)
         found = shipped[name] if name in shipped else _plugin(name, kind, installed, shipped)
-    require(found, needs, name=name, kind=kind)
-    return found
-
-
-def make(
-    name: str, *, kind: str, beside: Path | None = None, needs: Iterable[str] = (), shipped: Mapping[str, Any] = NONE
-) -> Any:
-    """Find what a name stands for, as `load` does; a class, or what lacks the members, is called without arguments.
-
-    Raises:
-        ExtensionError: If it cannot be loaded, calling it raises, or what it makes lacks a member.
-    """
-    found = load(name, kind=kind, beside=beside, shipped=shipped)
     needs = tuple(needs)
-    if callable(found) and (inspect.isclass(found) or _lacks(found, needs)):
+    if call and callable(found) and (inspect.isclass(found) or _lacks(found, needs)):
         found = ask(f"{kind} '{name}'", found)
     require(found, needs, name=name, kind=kind)
     return found

@@ -1,4 +1,7 @@
-"""Bags, CSV files, trajectories and arrays of others, made a log."""
+"""Bags, CSV files, trajectories and arrays of others, made a log.
+
+Whatever reads here raises LogError, in one line with file and place, where a source is not what it takes it for.
+"""
 
 import lazy_loader
 

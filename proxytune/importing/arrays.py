@@ -4,8 +4,9 @@ All arrays as long as the times become columns of one table, which is then read 
 hold the frames.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,6 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from proxytune import unpacking
-from proxytune.arrays import Floats
 from proxytune.errors import InputError, LogError
 from proxytune.importing.columns import (
     Columns,
@@ -43,7 +43,6 @@ def load_arrays(path: Path) -> Arrays:
     """Read every array of an .npz file.
 
     Raises:
-        LogError: If it is no such file, is damaged, or holds pickled objects.
         InputError: If it unpacks to more than is allowed.
     """
     try:
@@ -64,15 +63,8 @@ def load_arrays(path: Path) -> Arrays:
 def as_table(path: Path, arrays: Arrays, times: str) -> Table:
     """The arrays that are as long as the times, as a table: states[0], states[1] are columns of `states`.
 
-    An array `actions` that is one shorter, as no action follows the last pose, ends with an empty row.
-
-    Args:
-        path: The file.
-        arrays: Its arrays.
-        times: What a column map says of the times, or "".
-
-    Raises:
-        LogError: If there are no times.
+    An array `actions` that is one shorter, as no action follows the last pose, ends with an empty row. The entry of a
+    column map says which are the times, if it is not "".
     """
     count = len(arrays[_times(path, arrays, times)])
     if not count:
@@ -119,17 +111,7 @@ SHAPE = "frames must be (N, rows, columns, 3) of uint8, as many as there are tim
 
 
 def find_frames(path: Path, arrays: Mapping[str, NDArray[Any]], wanted: str, count: int) -> str:
-    """The name of the array of frames; "" where there is none.
-
-    Args:
-        path: The file.
-        arrays: Its arrays.
-        wanted: The name asked for; "none" for no frames, "" for whichever is there.
-        count: How many times there are.
-
-    Raises:
-        LogError: If the one asked for is not there, or is no array of frames.
-    """
+    """The name of the array of so many frames; what is wanted may be "none", or "" for whichever is there."""
     if wanted == "none":
         return ""
     if wanted and wanted not in arrays:
@@ -138,18 +120,6 @@ def find_frames(path: Path, arrays: Mapping[str, NDArray[Any]], wanted: str, cou
         array = arrays[wanted]
         raise LogError(f"{path}: array '{wanted}' is {array.shape} of {array.dtype}; {SHAPE}")
     return wanted or next((name for name in USUAL if name in arrays and _is_frames(arrays[name], count)), "")
-
-
-def pictures_of(frames: NDArray[np.uint8], times: Floats, rows: NDArray[np.bool_]) -> Pictures:
-    """The pictures of some rows whose time is known.
-
-    Args:
-        frames: All frames (N, rows, columns, 3).
-        times: Their times (N,) [s].
-        rows: Which to take (N,).
-    """
-    numbers = np.flatnonzero(rows & np.isfinite(times))
-    return Pictures(times[numbers], lambda: (frames[number] for number in numbers))
 
 
 def _is_frames(array: NDArray[Any], count: int) -> bool:
@@ -175,9 +145,6 @@ def read_arrays(path: Path, wanted: Wanted) -> Source:
 
     gym-duckietown's are known by their names: `timestamps`, `actions` (N, 2), `positions` or `cur_pos` (N, 3) and
     `angles` or `cur_angle` (N,) [rad]. Of an array (N, k) a column map names a column as "states[0]".
-
-    Raises:
-        LogError: If the file is damaged or holds pickled objects, or arrays are missing or of other lengths.
     """
     check_fields(wanted.columns, str(path))
     arrays = load_arrays(path)
@@ -248,7 +215,12 @@ def _drives(table: Table, columns: Columns, kind: str, frames: NDArray[np.uint8]
     if frames is None:
         return drives
     times = column_values(table, columns["time"])
-    pictures = [pictures_of(frames, times, labels == label) for label in poses]
+    rows = [np.flatnonzero((labels == label) & np.isfinite(times)) for label in poses]
+
+    def read(numbers: NDArray[np.intp]) -> Iterator[NDArray[np.uint8]]:
+        return (frames[number] for number in numbers)
+
+    pictures = [Pictures(times[numbers], partial(read, numbers)) for numbers in rows]
     return [replace(drive, pictures=each) for drive, each in zip(drives, pictures, strict=True)]
 
 

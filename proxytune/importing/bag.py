@@ -74,11 +74,7 @@ class Bag:
             return any(connection.msgdef.format.name != "NONE" for connection in self.reader.connections)
 
     def messages(self, topic: str) -> Iterator[tuple[int, Any]]:
-        """The messages of a topic in the order received: when each was received [ns], and what it holds.
-
-        Raises:
-            LogError: If the bag breaks off, or a message is not what its type says.
-        """
+        """The messages of a topic in the order received: when each was received [ns], and what it holds."""
         connections = [connection for connection in self.reader.connections if connection.topic == topic]
         numbers = count(1)
         incoming = self.reader.messages(connections=connections) if connections else iter(())
@@ -98,11 +94,7 @@ def is_bag(path: Path) -> bool:
 
 
 def bags_in(path: Path) -> dict[str, Path]:
-    """The bags that a path holds, by the names of their drives.
-
-    Raises:
-        LogError: If there is none.
-    """
+    """The bags that a path holds, by the names of their drives."""
     if not path.exists():
         raise LogError(f"{path}: no such file; check the path")
     bags = _bags_in(path)
@@ -113,11 +105,7 @@ def bags_in(path: Path) -> dict[str, Path]:
 
 @contextmanager
 def open_bag(path: Path) -> Iterator[Bag]:
-    """Open a bag while it is read.
-
-    Raises:
-        LogError: If the library is not installed, or the bag is cut short or is none.
-    """
+    """Open a bag while it is read."""
     check_bag_size(path)
     reader = _open_reader(path)
     try:
@@ -202,12 +190,7 @@ DRIFT_S = 0.02
 
 @dataclass(frozen=True)
 class Stamps:
-    """Times at which the messages of a topic were made and received.
-
-    Attributes:
-        header: Stamps in their headers (N,) [ns], or None for a type without a header.
-        receive: When the bag received them (N,) [ns].
-    """
+    """When messages (N,) were made, as their headers say, None if there are none, and when the bag got them [ns]."""
 
     header: Whole | None
     receive: Whole
@@ -219,16 +202,7 @@ def seconds(stamps_ns: Whole) -> Floats:
 
 
 def choose_times(stamps: Stamps, wanted: str, where: str) -> tuple[Floats, tuple[str, ...]]:
-    """Times of a topic's messages (N,) [s], and what there is to say of them.
-
-    Args:
-        stamps: Both times of each message.
-        wanted: "header" or "receive".
-        where: The topic, as a complaint names it.
-
-    Raises:
-        LogError: If `wanted` is neither, or some headers have a stamp and others have none.
-    """
+    """Times of a topic's messages (N,) [s], "header" or "receive" as wanted, and what there is to say of them."""
     if wanted not in ("header", "receive"):
         raise LogError(f"{where}: unknown stamps '{wanted}'; {nearest(wanted, ('header', 'receive'))}")
     received = seconds(stamps.receive)
@@ -274,14 +248,7 @@ Row = tuple[float, ...]
 def collect(bag: Bag, topic: str, row_of: Callable[[Any], Row], *, finite: bool = True) -> tuple[Stamps, Floats]:
     """The stamps of a topic's messages, and a row of numbers of each (N, columns).
 
-    Args:
-        bag: An open bag.
-        topic: Name of the topic.
-        row_of: Makes a row of a message; a LogError of its own is completed by topic and number.
-        finite: Whether all numbers must be finite.
-
-    Raises:
-        LogError: If a message cannot be read, makes no row, or holds a number that is not finite where it must.
+    A LogError of `row_of` is completed by topic and number. Numbers must be finite where `finite` says so.
     """
     headers, receives, rows = [], [], []
     for number, (receive_ns, message) in enumerate(bag.messages(topic), start=1):
@@ -307,17 +274,17 @@ def collect(bag: Bag, topic: str, row_of: Callable[[Any], Row], *, finite: bool 
 
 def read_commands(bag: Bag, topic: str, kind: str, stamps: str) -> tuple[Commands, tuple[str, ...]]:
     """The commands of a topic, and what there is to say of their times."""
-    both, values = collect(bag, topic, command_of)
+
+    def row_of(message: Any) -> Row:
+        return COMMAND_TYPES[message.__msgtype__.rpartition("/")[2]][1](message)
+
+    both, values = collect(bag, topic, row_of)
     times, notes = choose_times(both, stamps, topic)
     return Commands(kind, times, values), notes
 
 
 def read_poses(bag: Bag, topic: str, stamps: str) -> tuple[Poses, tuple[str, ...]]:
-    """The poses of a topic, and what there is to say of their times.
-
-    Raises:
-        LogError: If the topic mixes the poses of several frames, or an orientation is no rotation.
-    """
+    """The poses of a topic, and what there is to say of their times."""
     frames: dict[str, None] = {}
 
     def row_of(message: Any) -> Row:
@@ -358,15 +325,6 @@ def pose_of(message: Any) -> Row:
     return (place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w)
 
 
-def command_of(message: Any) -> Row:
-    """The two columns of a command: forward speed and yaw rate, or left and right.
-
-    Raises:
-        LogError: If an array has not two elements, or joints are not one left and one right.
-    """
-    return COMMANDS[message.__msgtype__.rpartition("/")[2]](message)
-
-
 def _twist(message: Any) -> Row:
     twist = getattr(message, "twist", message)
     return (twist.linear.x, twist.angular.z)
@@ -392,13 +350,14 @@ def _ackermann(message: Any) -> Row:
     return (drive.speed, drive.steering_angle)
 
 
-COMMANDS: Mapping[str, Callable[[Any], Row]] = {
-    "AckermannDrive": _ackermann,
-    "AckermannDriveStamped": _ackermann,
-    "Twist": _twist,
-    "TwistStamped": _twist,
-    "WheelsCmdStamped": lambda message: (message.vel_left, message.vel_right),
-    "Float32MultiArray": _array,
-    "Float64MultiArray": _array,
-    "JointState": _joints,
+COMMAND_TYPES: Mapping[str, tuple[str, Callable[[Any], Row]]] = {
+    "Twist": ("twist", _twist),
+    "TwistStamped": ("twist", _twist),
+    "AckermannDriveStamped": ("speed_steering", _ackermann),
+    "AckermannDrive": ("speed_steering", _ackermann),
+    "WheelsCmdStamped": ("duty", lambda message: (message.vel_left, message.vel_right)),
+    "Float32MultiArray": ("", _array),
+    "Float64MultiArray": ("", _array),
+    "JointState": ("wheel_speed", _joints),
 }
+"""The kind of command that a type of message says, and its two columns; two numbers in an array do not say theirs."""

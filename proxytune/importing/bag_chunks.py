@@ -28,24 +28,17 @@ class Chunk(NamedTuple):
 def check_bag_size(path: Path) -> None:
     """Refuse a bag whose files unpack to more than is allowed; what is damaged is left to whoever reads it.
 
-    Args:
-        path: A file, or the folder of a ROS 2 bag.
-
     Raises:
-        InputError: If they do, with what raises the limit.
+        InputError: With what raises the limit.
     """
     _check(path, (chunk for file in _files(path) for chunk in _chunks(file)))
 
 
 def check_messages_size(path: Path, reader: Any) -> None:
-    """Refuse a bag whose messages, each packed by itself, unpack to more than is allowed.
-
-    Args:
-        path: The bag.
-        reader: The library's reader of it, open.
+    """Refuse a bag whose messages, each packed by itself, unpack to more; the library's reader of it is open.
 
     Raises:
-        InputError: If they do, with what raises the limit.
+        InputError: With what raises the limit.
     """
     inside: list[Any] = [getattr(one, "storage", None) for one in reader.readers]
     folders = [one for one in inside if hasattr(one, "storages")]

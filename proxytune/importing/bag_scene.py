@@ -38,13 +38,7 @@ Row = tuple[int, int, tuple[float, ...]]
 
 @dataclass(frozen=True)
 class Transform:
-    """Place and turn of a frame in its parent, over time.
-
-    Attributes:
-        name: Parent and child, as in "odom>base_link".
-        stamps: When it was stamped and received, N times.
-        values: Place and quaternion x, y, z, w (N, 7).
-    """
+    """A frame in its parent ("odom>base_link"): stamps, and place and quaternion x, y, z, w at each (N, 7)."""
 
     name: str
     stamps: Stamps
@@ -57,15 +51,7 @@ class Transform:
 
 
 def read_transforms(bag: Bag, topics: tuple[str, ...]) -> dict[str, Transform]:
-    """The transforms of a bag, by parent and child.
-
-    Args:
-        bag: An open bag.
-        topics: Topics of transforms; of those named tf_static the last message holds for all times.
-
-    Raises:
-        LogError: If a message cannot be read.
-    """
+    """The transforms of a bag, by parent and child; of topics named tf_static the last message holds for all times."""
     rows: dict[str, list[Row]] = defaultdict(list)
     for topic in topics:
         for number, (receive_ns, message) in enumerate(bag.messages(topic), start=1):
@@ -84,11 +70,7 @@ def read_transforms(bag: Bag, topics: tuple[str, ...]) -> dict[str, Transform]:
 
 
 def choose_transform(transforms: dict[str, Transform], where: str) -> str:
-    """Parent and child of the robot's pose: a map, world or odom frame and a base, or all that moves.
-
-    Raises:
-        LogError: If none is plainly the robot's pose.
-    """
+    """Parent and child of the robot's pose: a map, world or odom frame and a base, or all that moves."""
     for parent in WORLDS:
         for child in ROBOTS:
             for name in _pairs(transforms, parent, child):
@@ -100,11 +82,7 @@ def choose_transform(transforms: dict[str, Transform], where: str) -> str:
 
 
 def chain_of(transforms: dict[str, Transform], name: str, where: str) -> list[Transform]:
-    """The transforms that lead from a parent down to a child, as in "map>base_link".
-
-    Raises:
-        LogError: If there is no way, or nothing on it moves.
-    """
+    """The transforms that lead from a parent down to a child, as in "map>base_link"."""
     parent, _, child = name.partition(">")
     chain = _chain(transforms, parent, child)
     if not chain:
@@ -159,9 +137,6 @@ def read_pictures(bag: Bag, topic: str, stamps: str) -> tuple[Pictures, tuple[st
     """The pictures of a topic, and what there is to say of their times.
 
     Times are read at once, the pictures when they are asked for, from the bag opened anew.
-
-    Raises:
-        LogError: If a message cannot be read, or its pixels are of a kind that is not known.
     """
     both, _ = collect(bag, topic, _check)
     times, notes = choose_times(both, stamps, topic)
@@ -169,11 +144,7 @@ def read_pictures(bag: Bag, topic: str, stamps: str) -> tuple[Pictures, tuple[st
 
 
 def iterate(path: Path, topic: str) -> Iterator[Picture]:
-    """The pictures of a topic, one after the other, (rows, columns, 3) each.
-
-    Raises:
-        LogError: If one cannot be read.
-    """
+    """The pictures of a topic, one after the other, (rows, columns, 3) each."""
     with open_bag(path) as bag:
         for number, (_, message) in enumerate(bag.messages(topic), start=1):
             try:
@@ -185,11 +156,7 @@ def iterate(path: Path, topic: str) -> Iterator[Picture]:
 
 
 def picture_of(message: Any) -> Picture:
-    """Red, green and blue (rows, columns, 3) of an Image or a CompressedImage.
-
-    Raises:
-        LogError: If its encoding is not known, or it is damaged.
-    """
+    """Red, green and blue (rows, columns, 3) of an Image or a CompressedImage."""
     if not hasattr(message, "encoding"):
         return _compressed(message)
     _check(message)

@@ -5,7 +5,7 @@ The lag of a robot's turning behind its commands, by cross-correlation, shows tw
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,11 +36,7 @@ SPARSEST = 20.0
 
 
 def check_units(drive: Drive, where: str) -> None:
-    """Refuse a drive whose times, places or commands are plainly in another unit.
-
-    Raises:
-        LogError: With what is odd, and how units are stated.
-    """
+    """Refuse a drive whose times, places or commands are plainly in another unit."""
     about = f"{where}: drive {drive.name}"
     times = drive.poses.times
     lasts = float(times[-1] - times[0])
@@ -101,12 +97,7 @@ MOST_LACKING = 0.1
 def headings_and_tilts(quaternions: Floats, where: str) -> tuple[Floats, Floats]:
     """Headings about the upward axis and tilts away from it, (N,) each [rad]; NaN where a few are no rotation.
 
-    Args:
-        quaternions: Orientations in the world (N, 4): x, y, z, w.
-        where: What they come from, for a complaint.
-
-    Raises:
-        LogError: If more than a few are not finite or of length zero.
+    Quaternions (N, 4) are x, y, z, w in the world.
     """
     wrong = no_rotation(quaternions)
     if wrong.mean() > MOST_LACKING:
@@ -155,9 +146,6 @@ def checked_drive(drive: Drive, where: str, offset_s: float = 0.0) -> tuple[Driv
         drive: As an importer has read it.
         where: The source, as a complaint names it.
         offset_s: How much later poses are stamped than commands, as far as that is known [s].
-
-    Raises:
-        LogError: If stamps jump back, all are equal, poses are not z-up, or commands and poses are of different times.
     """
     about = f"{where}: drive {drive.name}"
     _check_sizes((drive.poses.times, drive.poses.places), "poses", about)
@@ -268,27 +256,22 @@ SMOOTH_S = 0.1
 """Measured turns are taken over so long."""
 
 
-@dataclass(frozen=True)
-class Reaction:
-    """Lag and correlation of commanded and measured turning in a drive.
-
-    Attributes:
-        lag_s: By how much the measured turning follows the commanded one [s]; below 0 it comes before.
-        correlation: How well they fit there, −1 to 1.
-    """
-
-    lag_s: float
-    correlation: float
-
-
-def reaction_of(drive: Drive) -> Reaction | None:
-    """The lag of measured behind commanded turning; None where the robot hardly turned, or without commands."""
-    if drive.commands is None:
+def lag_of(drive: Drive) -> float | None:
+    """The lag of measured behind commanded turning [s], below 0 where it comes before; None where nothing tells it."""
+    commands = drive.commands
+    if commands is None:
         return None
     times = np.arange(drive.poses.times[0], drive.poses.times[-1], STEP_S)
     if len(times) * STEP_S < 3.0 * FURTHEST_S:
         return None
-    commanded, measured = _commanded_turn(drive, times), _measured_turn(drive, times)
+    held = commands.values[np.maximum(np.searchsorted(commands.times, times, side="right") - 1, 0)]
+    turn = held[:, 1] - held[:, 0] if commands.kind in ("duty", "wheel_speed") else held[:, 1]
+    heading = np.interp(times, drive.poses.times, np.unwrap(drive.poses.headings))
+    half = round(SMOOTH_S / STEP_S / 2.0)
+    rate = np.zeros(len(times))
+    rate[half:-half] = heading[2 * half :] - heading[: -2 * half]
+    # In whatever unit, the means taken out
+    commanded, measured = turn - turn.mean(), rate - rate.mean()
     size = np.linalg.norm(commanded) * np.linalg.norm(measured)
     if not size > 0.0:
         return None
@@ -296,23 +279,4 @@ def reaction_of(drive: Drive) -> Reaction | None:
     strength = correlate(measured, commanded) / size
     near = np.abs(lags) <= FURTHEST_S
     best = int(np.argmax(strength[near]))
-    found = Reaction(float(lags[near][best]), float(strength[near][best]))
-    return found if found.correlation > CLEAR else None
-
-
-def _commanded_turn(drive: Drive, times: Floats) -> Floats:
-    """The commanded turning at each time, in whatever unit, its mean taken out."""
-    commands = drive.commands
-    assert commands is not None
-    held = commands.values[np.maximum(np.searchsorted(commands.times, times, side="right") - 1, 0)]
-    turn = held[:, 1] - held[:, 0] if commands.kind in ("duty", "wheel_speed") else held[:, 1]
-    return np.asarray(turn - turn.mean())
-
-
-def _measured_turn(drive: Drive, times: Floats) -> Floats:
-    """The measured yaw rate at each time, its mean taken out."""
-    heading = np.interp(times, drive.poses.times, np.unwrap(drive.poses.headings))
-    half = round(SMOOTH_S / STEP_S / 2.0)
-    rate = np.zeros(len(times))
-    rate[half:-half] = heading[2 * half :] - heading[: -2 * half]
-    return np.asarray(rate - rate.mean())
+    return float(lags[near][best]) if strength[near][best] > CLEAR else None

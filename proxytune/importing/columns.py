@@ -22,13 +22,7 @@ from proxytune.settings import nearest
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit of measurement.
-
-    Attributes:
-        name: How a column map writes it.
-        quantity: What it measures, as in "length".
-        factor: What a value is multiplied by to have it in the package's unit: s, m, rad, m/s, rad/s, duty.
-    """
+    """A unit of a quantity, as in "length", and the factor to the package's own: s, m, rad, m/s, rad/s, duty."""
 
     name: str
     quantity: str
@@ -96,16 +90,9 @@ def split_ending(name: str, quantity: str) -> tuple[str, Unit | None]:
 
 
 def split_unit(entry: str, quantity: str, names: Sequence[str], where: str) -> tuple[str, Unit | None]:
-    """The column that an entry of a map names, and its unit where the entry states one.
+    """The column that an entry of a map names, as in "stamp_ns:ns" or "yaw", and its unit where the entry states one.
 
-    Args:
-        entry: As in "stamp_ns:ns" or "yaw".
-        quantity: What the column measures.
-        names: Columns that the file has; one of them may hold a colon itself.
-        where: What the entry belongs to, for a complaint.
-
-    Raises:
-        LogError: If the unit is unknown or of another quantity.
+    One of the file's names may hold a colon itself.
     """
     name, colon, unit = entry.rpartition(":")
     if entry in names or not colon or (name not in names and unit not in UNITS):
@@ -127,12 +114,7 @@ def epoch_unit(values: Floats) -> Unit | None:
 
 
 def contradiction(unit: Unit, values: Floats) -> str:
-    """The reason against a unit that nobody stated, or "".
-
-    Args:
-        unit: The unit assumed.
-        values: A column in that unit (N,), NaN where a cell is empty.
-    """
+    """The reason why values (N,), NaN where a cell is empty, are not in a unit that nobody stated, or ""."""
     seen = values[np.isfinite(values)]
     if not len(seen):
         return ""
@@ -204,16 +186,7 @@ def usual_names(field: str, names: Sequence[str]) -> list[str]:
 
 
 def choose_columns(table: Table, stated: Mapping[str, str], fields: Sequence[str]) -> dict[str, Column]:
-    """Find the columns of some fields.
-
-    Args:
-        table: The table.
-        stated: Entries of a column map, by field; a field that it leaves out is looked for by its usual names.
-        fields: What may be looked for.
-
-    Raises:
-        LogError: If a stated column is not there, or two columns may be the same field.
-    """
+    """Find the columns of some fields: those stated in a column map, else by their usual names."""
     chosen = {field: _stated(table, field, stated[field]) for field in fields if field in stated}
     if "heading" in chosen:
         fields = [field for field in fields if field not in QUATERNION]
@@ -236,11 +209,7 @@ def choose_columns(table: Table, stated: Mapping[str, str], fields: Sequence[str
 
 
 def with_drives(table: Table, columns: Columns) -> Columns:
-    """The columns with one that names drives, where stamps go back: an unused one that changes there and nowhere else.
-
-    Raises:
-        LogError: If stamps go back and no column tells the drives apart, or several do.
-    """
+    """The columns with one that tells drives apart, where stamps go back: an unused one that changes there alone."""
     if "episode" in columns or "time" not in columns:
         return columns
     times = column_values(table, columns["time"])
@@ -267,22 +236,14 @@ def _names_drives(table: Table, name: str, rows: NDArray[np.intp], back: NDArray
 
 
 def check_fields(stated: Mapping[str, str], where: str) -> None:
-    """Refuse a column map that names something else than the package's fields.
-
-    Raises:
-        LogError: If it does.
-    """
+    """Refuse a column map that names something else than the package's fields."""
     for field in stated:
         if field not in QUANTITIES:
             raise LogError(f"{where}: column map: unknown name '{field}'; {nearest(field, QUANTITIES)}")
 
 
 def column_values(table: Table, column: Column) -> Floats:
-    """The values of a column in the package's unit (N,), NaN where a cell is empty.
-
-    Raises:
-        LogError: If a cell is no number, or the values contradict a unit that was not stated.
-    """
+    """The values of a column in the package's unit (N,), NaN where a cell is empty."""
     values = table.numbers(column.name)
     problem = contradiction(column.unit, values) if column.known_by in ("assumed", "by its name") else ""
     if problem:
@@ -309,16 +270,7 @@ def missing(table: Table, fields: Sequence[str]) -> LogError:
 
 
 def with_commands(columns: Columns, kind: str, table: Table) -> tuple[Columns, str]:
-    """The columns without those of other commands than the table's, and the kind of these.
-
-    Args:
-        columns: The columns that were found.
-        kind: The kind asked for, or "".
-        table: The table.
-
-    Raises:
-        LogError: If it holds none, half of a pair, or several kinds and none is asked for.
-    """
+    """The columns without those of other commands than the table's, and the kind of these; "" asks for any."""
     kinds = [name for name, pair in COMMANDS.items() if pair and set(pair) <= set(columns) and kind in ("", name)]
     stated = [name for name in kinds if all(columns[field].known_by == "stated" for field in COMMANDS[name])]
     kinds = stated if len(stated) == 1 else kinds
@@ -376,14 +328,12 @@ LEAST_EXTENT_M = 0.01
 
 
 def commands_by_drive(table: Table, columns: Columns, kind: str) -> dict[str, Commands]:
-    """The commands of each drive that a table names; of "" where it names none.
-
-    Raises:
-        LogError: If a cell is no number, or half of a command is empty.
-    """
+    """The commands of each drive that a table names; of "" where it names none."""
     fields = (*COMMANDS[kind], *((ENABLED,) if ENABLED in columns else ()))
-    times, values, labels = _filled_rows(table, _on_own_clock(columns), fields)
-    if "command_time" in columns:  # a command stands in every row until the next one
+    own_clock = "command_time" in columns
+    timed = {**columns, "time": columns["command_time"]} if own_clock else columns
+    times, values, labels = _filled_rows(table, timed, fields)
+    if own_clock:  # a command stands in every row until the next one
         anew = np.append(True, (np.diff(times) != 0.0) | (np.diff(values, axis=0) != 0.0).any(axis=1))[: len(times)]
         times, values, labels = times[anew], values[anew], labels[anew]
     drives = {}
@@ -396,17 +346,8 @@ def commands_by_drive(table: Table, columns: Columns, kind: str) -> dict[str, Co
     return drives
 
 
-def _on_own_clock(columns: Columns) -> Columns:
-    """The columns with the commands' own stamps, where they have such, as their time."""
-    return {**columns, "time": columns["command_time"]} if "command_time" in columns else columns
-
-
 def pose_fields(table: Table, columns: Columns) -> list[str]:
-    """The fields of a pose that the table has, quaternions last.
-
-    Raises:
-        LogError: If it lacks some.
-    """
+    """The fields of a pose that the table has, quaternions last."""
     lacking = [field for field in ("time", "x", "y") if field not in columns]
     if "heading" not in columns and not set(QUATERNION) <= set(columns):
         lacking.append("heading (or qx, qy, qz, qw)")
@@ -419,13 +360,7 @@ def pose_fields(table: Table, columns: Columns) -> list[str]:
 def poses_by_drive(table: Table, columns: Columns, *, gaps: bool = False) -> dict[str, Poses]:
     """The poses of each drive that a table names; of "" where it names none.
 
-    Args:
-        table: The table.
-        columns: Its columns.
-        gaps: Leave out rows that lack part of a pose (`gaps_note` tells of them).
-
-    Raises:
-        LogError: If a column is missing, a cell is no number, part of a pose is empty, or a drive has no two poses.
+    With `gaps`, rows that lack part of a pose are left out (`gaps_note` tells of them).
     """
     fields = pose_fields(table, columns)
     times, values, labels = _filled_rows(table, columns, fields, gaps=gaps)

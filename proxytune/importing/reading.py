@@ -19,7 +19,7 @@ from proxytune.errors import InputError, LogError, RunError
 from proxytune.files import folder_draft_of, temporary_folder
 from proxytune.importing.arrays import is_arrays, read_arrays
 from proxytune.importing.bag import is_bag
-from proxytune.importing.checks import check_units, checked_drive, reaction_of
+from proxytune.importing.checks import check_units, checked_drive, lag_of
 from proxytune.importing.source import Drive, Facts, Pictures, Source, Survey, Wanted
 from proxytune.importing.tables import is_csv_tables, is_mrclam, is_tum, read_csv_tables, read_mrclam, read_tum
 from proxytune.importing.topics import read_bag
@@ -36,7 +36,6 @@ def survey(drive: Drive) -> Survey:
     usual = float(np.median(steps))
     gaps = steps[steps > max(GAP_S, 3.0 * usual)]
     missing = float(np.maximum(np.rint(steps / usual) - 1.0, 0.0)[steps <= GAP_S].sum())
-    answer = reaction_of(drive)
     return Survey(
         name=drive.name,
         seconds=float(times[-1] - times[0]),
@@ -48,7 +47,7 @@ def survey(drive: Drive) -> Survey:
         jitter_s=float(steps[steps < 1.5 * usual].std()),
         commands=0 if drive.commands is None else len(drive.commands.times),
         frames=0 if drive.pictures is None else len(drive.pictures.times),
-        lag_s=None if answer is None else answer.lag_s,
+        lag_s=lag_of(drive),
     )
 
 
@@ -156,15 +155,7 @@ def write_log(source: Source, folder: Path, facts: Facts, origin: str) -> Log:
 
 
 def fill_log(folder: Path, source: Source, facts: Facts, name: str, origin: str) -> None:
-    """Write a log's files into a folder that is there.
-
-    Args:
-        folder: Where to.
-        source: What was read and checked.
-        facts: What only the user knows.
-        name: What the log is called.
-        origin: Where it came from, for log.toml.
-    """
+    """Write the files of a log of this name into a folder that is there, with its origin in log.toml."""
     samples, commands = [], []
     for drive in source.drives:
         poses = (drive.poses.times, drive.poses.places[:, :2], np.unwrap(drive.poses.headings))
@@ -197,11 +188,7 @@ def _beside(source: Source) -> bool:
 
 
 def read_as(folder: Path, shown: Path) -> Log:
-    """Read a log that lies elsewhere for the moment; complaints name where the user knows it.
-
-    Raises:
-        LogError: If it is none.
-    """
+    """Read a log that lies elsewhere for the moment; complaints name where the user knows it."""
     try:
         return read_log(folder)
     except LogError as problem:

@@ -55,12 +55,7 @@ class Poses:
 
 @dataclass(frozen=True)
 class Pictures:
-    """Pictures of the robot's camera, K of them, read one after the other.
-
-    Attributes:
-        times: When each was taken (K,) [s], as stamped.
-        read: Makes them, (rows, columns, 3) of red, green and blue.
-    """
+    """Pictures of the robot's camera, taken at K times [s]; `read` makes them, (rows, columns, 3), one by one."""
 
     times: Floats
     read: Callable[[], Iterator[NDArray[np.uint8]]]
@@ -68,14 +63,7 @@ class Pictures:
 
 @dataclass(frozen=True)
 class Drive:
-    """One drive of a source.
-
-    Attributes:
-        name: What the log calls the episode.
-        commands: What was commanded, or None.
-        poses: What was measured.
-        pictures: What the camera saw, or None.
-    """
+    """One drive of a source, as the log calls it: its commands, poses and pictures, None where there are none."""
 
     name: str
     commands: Commands | None

@@ -54,14 +54,7 @@ COMMAND_SUFFIXES = (".csv", ".tsv", ".txt")
 
 @dataclass(frozen=True)
 class CommandFile:
-    """The contents of a file of commands.
-
-    Attributes:
-        path: The file.
-        commands: The commands by the drive that the file names; of "" where it names none.
-        channels: Its columns.
-        note: What was taken for what.
-    """
+    """A file of commands: these by the drive that it names, or "" where it names none, and what was taken for what."""
 
     path: Path
     commands: Mapping[str, Commands]
@@ -81,9 +74,6 @@ def find_commands(path: Path, wanted: Wanted) -> Path | None:
 
     It is the one asked for, else the first that lies beside the poses: run1_commands, run1_cmd_vel, run1_cmd for
     run1.csv, then commands, cmd_vel, cmd; each as .csv, .tsv or .txt.
-
-    Raises:
-        LogError: If the one asked for is not there.
     """
     if wanted.commands == "none" or wanted.kind == "none":
         return None
@@ -99,11 +89,7 @@ def find_commands(path: Path, wanted: Wanted) -> Path | None:
 
 
 def read_commands(path: Path, wanted: Wanted) -> CommandFile:
-    """Read a file of commands: a table with stamps and the columns of one kind of command.
-
-    Raises:
-        LogError: If it is not such a table.
-    """
+    """Read a file of commands: a table with stamps and the columns of one kind of command."""
     table = read_text_table(path)
     stated = {
         field: entry for field, entry in wanted.columns.items() if field in COMMAND_FIELDS or named_in(table, entry)
@@ -119,13 +105,7 @@ def read_commands(path: Path, wanted: Wanted) -> CommandFile:
 def share_commands(file: CommandFile, drives: Sequence[Drive], labels: Sequence[str]) -> list[Drive]:
     """Give each drive its commands: by name, or by time where the file names no drives.
 
-    Args:
-        file: The commands.
-        drives: The drives, without commands.
-        labels: What the table of poses calls each; a drive may go by either name.
-
-    Raises:
-        LogError: If commands and drives do not match.
+    A drive may also go by its label, which is what the table of poses calls it.
     """
     unnamed = set(file.commands) == {""} or set(labels) == {""}
     if unnamed and len(file.commands) == 1 and len(drives) == 1:
@@ -209,9 +189,6 @@ def read_csv_tables(path: Path, wanted: Wanted) -> Source:
 
     Separators are commas, semicolons, tabs or blanks; lines that begin with # are comments. A command counts as issued
     in each row in which it stands. Commands may be in a second file (`find_commands`).
-
-    Raises:
-        LogError: If it cannot be read so, with file, line and column.
     """
     check_fields(wanted.columns, str(path))
     files = _files(path, wanted)
@@ -299,12 +276,7 @@ def is_mrclam(path: Path) -> bool:
 def read_mrclam(path: Path, wanted: Wanted) -> Source:
     """Read one robot's commands (Robot1_Odometry.dat) and poses (Robot1_Groundtruth.dat).
 
-    Args:
-        path: One of the two files, or the folder; of a folder with several robots `wanted.poses` chooses.
-        wanted: What to take; commands "none" leaves them out.
-
-    Raises:
-        LogError: If a file is missing or not as the data set writes it, or the robot is not chosen.
+    The path is one of the two files, or the folder; of a folder with several robots `wanted.poses` chooses.
     """
     match = FILE.fullmatch(path.name)
     folder, robot = (path.parent, match[1]) if match and not path.is_dir() else (path, _choose(path, wanted.poses))
@@ -366,11 +338,7 @@ def _trajectory_files(path: Path) -> list[Path]:
 
 
 def read_tum(path: Path, wanted: Wanted) -> Source:
-    """Read TUM trajectories, a drive each, and the commands of each from a second file (`find_commands`).
-
-    Raises:
-        LogError: If a line is not stamp, place and quaternion, or there are no commands and none were not asked for.
-    """
+    """Read TUM trajectories, a drive each, and the commands of each from a second file (`find_commands`)."""
     check_fields(wanted.columns, str(path))
     parts = [_read_one(file, wanted) for file in _trajectory_files(path)]
     return replace(

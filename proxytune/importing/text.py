@@ -49,11 +49,7 @@ class Table:
         return LogError(f"{self.path}: {self.counted} {self.cells.index[row]}, column '{column}': {problem}")
 
     def labels(self, column: str) -> NDArray[np.str_]:
-        """A column as texts (N,).
-
-        Raises:
-            LogError: If one is empty.
-        """
+        """A column as texts (N,)."""
         texts = self.cells[column].astype(str)
         empty = texts.isin(EMPTY).to_numpy()
         if empty.any():
@@ -66,11 +62,7 @@ class Table:
         return len(cells) - int((cells.isna() | cells.isin(EMPTY)).sum())
 
     def numbers(self, column: str) -> Floats:
-        """A column as numbers (N,), NaN where a cell is empty; decimal commas are read as points.
-
-        Raises:
-            LogError: If a cell holds something else.
-        """
+        """A column as numbers (N,), NaN where a cell is empty; decimal commas are read as points."""
         cells = self.cells[column]
         values = pd.to_numeric(cells, errors="coerce").to_numpy(dtype=np.float64, copy=True)
         if not pd.api.types.is_numeric_dtype(cells):
@@ -92,15 +84,7 @@ Lines = list[tuple[int, str]]
 
 
 def read_text_table(path: Path, names: Sequence[str] = ()) -> Table:
-    """Read a text file.
-
-    Args:
-        path: The file.
-        names: Its columns where it names none itself; its cells are separated by blanks then.
-
-    Raises:
-        LogError: If it is not text, is empty, has no names of columns, or a row has another number of cells.
-    """
+    """Read a text file; where `names` are given it has none of its own, and blanks between its cells."""
     comments, lines = _split_comments(_read_lines(path))
     if not lines:
         raise LogError(f"{path}: is empty; it needs a line of column names and a row for each sample")

@@ -13,24 +13,22 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from proxytune.arrays import Floats
 from proxytune.errors import LogError
-from proxytune.importing.bag import Bag, Topic, bags_in, choose_times, form_of, open_bag, read_commands, read_poses
+from proxytune.importing.bag import (
+    COMMAND_TYPES,
+    Bag,
+    Topic,
+    bags_in,
+    choose_times,
+    form_of,
+    open_bag,
+    read_commands,
+    read_poses,
+)
 from proxytune.importing.bag_scene import Transform, chain_of, choose_transform, read_pictures, read_transforms
 from proxytune.importing.checks import complaint, headings_and_tilts, no_rotation
 from proxytune.importing.source import Channel, Drive, Poses, Source, Wanted
 from proxytune.logs import COMMANDS
 from proxytune.settings import nearest
-
-KINDS: Mapping[str, str] = {
-    "Twist": "twist",
-    "TwistStamped": "twist",
-    "AckermannDriveStamped": "speed_steering",
-    "AckermannDrive": "speed_steering",
-    "WheelsCmdStamped": "duty",
-    "Float32MultiArray": "",
-    "Float64MultiArray": "",
-    "JointState": "wheel_speed",
-}
-"""The kind of command that a type of message says; two numbers in an array do not say theirs."""
 
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 
@@ -87,7 +85,7 @@ class Role:
 COMMAND_ROLE = Role(
     "commands",
     "--commands",
-    {name: place for place, name in enumerate(KINDS)} | {"TwistStamped": 0, "Float64MultiArray": 3},
+    {name: place for place, name in enumerate(COMMAND_TYPES)} | {"TwistStamped": 0, "Float64MultiArray": 3},
     first=("cmd_vel", "cmd", "command"),
     asked=("JointState",),
 )
@@ -132,20 +130,15 @@ class Choice:
 
 
 def choose(topics: tuple[Topic, ...], wanted: Wanted, where: str) -> Choice:
-    """Choose topics by what is wanted, else by type, name and number of messages.
-
-    Args:
-        topics: All topics.
-        wanted: What the user asks for.
-        where: The bag, as a complaint names it.
-
-    Raises:
-        LogError: If a topic is named that is missing or of no use, or none can be commands or poses.
-    """
+    """Choose topics by what is wanted, else by type, name and number of messages."""
     if wanted.kind and wanted.kind not in COMMANDS:
         raise LogError(f"{where}: unknown kind of commands '{wanted.kind}'; {nearest(wanted.kind, COMMANDS)}")
     without = "none" in (wanted.commands, wanted.kind)
-    commands = None if without else _choose(_command_role(wanted), topics, wanted.commands, where)
+    of_kind = COMMAND_ROLE
+    if wanted.kind and not wanted.commands:
+        ranks = {name: rank for name, rank in COMMAND_ROLE.ranks.items() if COMMAND_TYPES[name][0] in ("", wanted.kind)}
+        of_kind = replace(COMMAND_ROLE, ranks=ranks)
+    commands = None if without else _choose(of_kind, topics, wanted.commands, where)
     if not without and commands is None:
         raise LogError(f"{_nothing(COMMAND_ROLE, topics, where)}, or take a log without commands by --commands none")
     transform = wanted.poses if ">" in wanted.poses else ""
@@ -180,14 +173,6 @@ def notes_of(topics: tuple[Topic, ...], choice: Choice) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _command_role(wanted: Wanted) -> Role:
-    """Commands of the kind that is wanted, where one is."""
-    if wanted.commands or not wanted.kind:
-        return COMMAND_ROLE
-    ranks = {name: rank for name, rank in COMMAND_ROLE.ranks.items() if KINDS[name] in ("", wanted.kind)}
-    return replace(COMMAND_ROLE, ranks=ranks)
-
-
 def _choose(role: Role, topics: tuple[Topic, ...], name: str, where: str) -> Topic | None:
     if not name:
         return min(filter(role.is_offered, topics), key=role.order, default=None)
@@ -201,7 +186,7 @@ def _choose(role: Role, topics: tuple[Topic, ...], name: str, where: str) -> Top
 
 
 def _kind_of(topic: Topic, wanted: str, where: str) -> str:
-    said = KINDS[short(topic.kind)]
+    said, _ = COMMAND_TYPES[short(topic.kind)]
     if not said and not wanted:
         raise LogError(
             f"{where}: topic {topic.name} does not say what its two numbers are; add --kind duty, "
@@ -234,18 +219,9 @@ def _part(topic: Topic, choice: Choice) -> str:
 
 
 def read_chain(transforms: dict[str, Transform], name: str, stamps: str, where: str) -> tuple[Poses, tuple[str, ...]]:
-    """Poses of a child in a parent, at the times of the transform between them that comes most often.
+    """Poses of a child in a parent ("map>base_link"), at the times of the transform between them that comes most often.
 
     Other moving transforms are interpolated to these times; poses outside of what they cover are left out.
-
-    Args:
-        transforms: All transforms of a bag.
-        name: Parent and child, as in "map>base_link".
-        stamps: Whose times count.
-        where: The bag and topic, as a complaint names them.
-
-    Raises:
-        LogError: If no chain leads from the one to the other, nothing in it moves, or a transform is no rotation.
     """
     chain = chain_of(transforms, name, where)
     for transform in chain:
@@ -298,12 +274,7 @@ def _at(values: Floats, times: Floats | None, wanted: Floats) -> tuple[Floats, R
 def read_bag(path: Path, wanted: Wanted) -> Source:
     """Read a ROS bag, or a folder of bags with a drive each, of the same topics.
 
-    Args:
-        path: A ROS 1 file, a ROS 2 folder or storage file (sqlite3 or mcap), or a folder of such.
-        wanted: Topics and stamps to take.
-
-    Raises:
-        LogError: If a bag cannot be read, or there is nothing that can be commands or poses.
+    The path is a ROS 1 file, a ROS 2 folder or storage file (sqlite3 or mcap), or a folder of such.
     """
     bags = bags_in(path)
     topics, notes = _list(path, bags)

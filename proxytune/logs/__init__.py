@@ -1,4 +1,7 @@
-"""Logs: commands and measured poses of a robot, as a folder with log.toml, samples.csv and maybe commands.csv."""
+"""Logs: commands and measured poses of a robot, as a folder with log.toml, samples.csv and maybe commands.csv.
+
+Whatever reads here raises LogError, in one line with file, line and column, where a log is not as it must be.
+"""
 
 import lazy_loader
 

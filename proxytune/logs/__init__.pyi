@@ -8,5 +8,6 @@ from .log import (
     Log as Log,
     LogEpisode as LogEpisode,
     Measured as Measured,
+    check_kind as check_kind,
 )
-from .reading import read_log as read_log
+from .reading import read_commands as read_commands, read_log as read_log

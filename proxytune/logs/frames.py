@@ -117,9 +117,6 @@ def read_frames(
 
     Without frames.csv there is one for each row of samples.csv, by its number from 0; those without a pose are left
     out. None of the pictures need be there where only the key of the top level names them: the log then has none.
-
-    Raises:
-        LogError: If pictures are missing, or frames.csv does not belong to the poses.
     """
     listed = (folder / LISTED).exists()
     taken = _read_instants(folder / LISTED, samples, episodes) if listed else _per_row(samples, rate_hz, episodes)

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from proxytune.arrays import Floats, Whole
+from proxytune.errors import LogError
 
 COMMANDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
@@ -25,6 +26,27 @@ of a car throttle and steering in [−1, 1], left positive, or speed [m/s] and w
 
 CAR_COMMANDS = ("ackermann", "speed_steering")
 """Kinds of command that are a car's."""
+
+
+def check_kind(command: str, robot: str, drive: str, where: str) -> None:
+    """Refuse commands of another kind than a robot takes; a twist is for any.
+
+    Args:
+        command: Of COMMANDS.
+        robot: The robot's name.
+        drive: "differential" or "ackermann".
+        where: The log or file.
+
+    Raises:
+        LogError: If they are a car's and the robot is none, or the other way about.
+    """
+    if command not in ("twist", "none") and (command in CAR_COMMANDS) != (drive == "ackermann"):
+        drives = "steers" if drive == "ackermann" else "drives by two wheels"
+        raise LogError(
+            f"{where}: commands of kind '{command}' are not for robot '{robot}', which {drives} "
+            f'(drive = "{drive}" in its robot.toml); name another with --robot'
+        )
+
 
 ENABLED = "enabled"
 """The column that says whether the motors are on (1) or cut by a switch (0)."""

@@ -12,7 +12,7 @@ from proxytune.arrays import Floats
 from proxytune.errors import LogError, SettingsError
 from proxytune.logs.frames import Camera, read_camera, read_frames
 from proxytune.logs.log import CAR_COMMANDS, COMMANDS, ENABLED, POSE, WHEELS, Log, LogEpisode
-from proxytune.logs.rows import Layout, Rows, check_known_episodes, read_rows
+from proxytune.logs.rows import Layout, Rows, check_known_episodes, read_cells, read_rows
 from proxytune.logs.times import Issued, check_headings, episodes_at_own_times, episodes_on_grid, usual_rate
 from proxytune.settings import GEOMETRY, Section, read_settings
 
@@ -131,17 +131,44 @@ def read_log(path: str | Path) -> Log:
     issued = _read_commands(path / "commands.csv", stated, samples) if apart else {}
     episodes, rate_hz = _episodes(samples, stated, issued)
     frames = read_frames(stated.camera, path, samples, stated.rate_hz, episodes) if stated.camera else None
+    if offset_s := stated.clock_offset_s:  # so much earlier the commands' clock is than that of the poses
+        clocks = (one.times if one.issued is None else one.issued for one in episodes)
+        episodes = tuple(replace(one, issued=own + offset_s) for one, own in zip(episodes, clocks, strict=True))
     return Log(
         name=stated.name,
         robot=stated.robot,
         command=stated.command,
         rate_hz=rate_hz,
         geometry=stated.geometry,
-        episodes=tuple(_on_poses_clock(episode, stated.clock_offset_s or 0.0) for episode in episodes),
+        episodes=episodes,
         frames=frames,
         clock_offset_s=stated.clock_offset_s,
         fit_clock_offset=stated.fit_clock_offset,
     )
+
+
+def read_commands(path: Path) -> tuple[str, dict[str, tuple[Floats, Floats]]]:
+    """Read a table of commands alone, whose columns tell their kind.
+
+    Args:
+        path: A CSV file as a log's commands.csv.
+
+    Returns:
+        Kind of the commands, and each episode's times (M,) [s] and commands (M, 2).
+
+    Raises:
+        LogError: If it is not such a table.
+    """
+    header, _ = read_cells(path)
+    kind = next((kind for kind, columns in COMMANDS.items() if columns and {*columns} <= {*header}), "")
+    if not kind:
+        known = "; ".join(f"{kind}: {', '.join(columns)}" for kind, columns in COMMANDS.items() if columns)
+        raise LogError(f"{path}: has no columns of commands; name them as a log does ({known})")
+    rows = read_rows(path, Layout(COMMANDS[kind], (), (), (ENABLED,), 1, f"commands of kind '{kind}'"))
+    _check_sizes(rows, kind)
+    cuts = rows.firsts[1:]
+    parts = zip(rows.names, np.split(rows.values["time"], cuts), np.split(_commands(rows, kind), cuts), strict=True)
+    return kind, {name: (times, commands) for name, times, commands in parts}
 
 
 def _episodes(samples: Rows, stated: Description, issued: Mapping[str, Issued]) -> tuple[tuple[LogEpisode, ...], float]:
@@ -152,14 +179,6 @@ def _episodes(samples: Rows, stated: Description, issued: Mapping[str, Issued]) 
     if own_times:
         return episodes_at_own_times(samples, commands, issued)
     return episodes_on_grid(samples, commands, issued, stated.rate_hz), stated.rate_hz
-
-
-def _on_poses_clock(episode: LogEpisode, offset_s: float) -> LogEpisode:
-    """An episode whose commands were stamped by a clock that is so much earlier than that of the poses."""
-    if not offset_s:
-        return episode
-    issued = episode.times if episode.issued is None else episode.issued
-    return replace(episode, issued=issued + offset_s)
 
 
 def _read_samples(path: Path, command: str, *, apart: bool) -> Rows:

@@ -34,11 +34,7 @@ class Block(NamedTuple):
 
 
 def read_cells(path: Path) -> tuple[list[str], Iterator[Block]]:
-    """The columns that the first line names, and the rows below it; lines that are blank are passed over.
-
-    Raises:
-        LogError: If it is no CSV file, or empty; of what is no CSV further down, when that is read.
-    """
+    """The columns that the first line names, and the rows below it; lines that are blank are passed over."""
     rows = _rows(path)
     _, header = next(rows, (0, []))
     if not header:
@@ -133,11 +129,7 @@ class Layout:
 
 
 def read_rows(path: Path, layout: Layout) -> Rows:
-    """Read a table.
-
-    Raises:
-        LogError: If it is not such a table.
-    """
+    """Read a table."""
     header, blocks = read_cells(path)
     _check_header(path, header, layout)
     parts = [_part(path, header, layout, block) for block in blocks]
@@ -156,11 +148,7 @@ def read_rows(path: Path, layout: Layout) -> Rows:
 
 
 def check_known_episodes(rows: Rows, names: Sequence[str]) -> None:
-    """Refuse episodes that samples.csv does not have.
-
-    Raises:
-        LogError: If there is one.
-    """
+    """Refuse episodes that samples.csv does not have."""
     for name, first in zip(rows.names, rows.firsts, strict=True):
         if name not in names:
             raise rows.error(int(first), "episode", f"'{name}' is not in samples.csv; add its poses, or leave it out")

@@ -24,11 +24,7 @@ SPARSEST = 10
 
 
 def places_on_grid(samples: Rows, rate_hz: float) -> tuple[Whole, Whole]:
-    """Place of each row on all grids laid end to end (N,), and where each episode's grid ends (E,).
-
-    Raises:
-        LogError: If rows lie off the grid.
-    """
+    """Place of each row on all grids laid end to end (N,), and where each episode's grid ends (E,)."""
     lasts = np.append(samples.firsts[1:], len(samples.lines)) - 1
     if not rate_hz:
         return np.arange(len(samples.lines)), lasts + 1
@@ -69,11 +65,7 @@ def spread(values: Floats, places: Whole, length: int) -> Floats:
 
 
 def check_headings(samples: Rows, command: str, rate_hz: float) -> None:
-    """Refuse headings in degrees: they jump by 360, or fit the course over ground far better than as radians.
-
-    Raises:
-        LogError: If they are.
-    """
+    """Refuse headings in degrees: they jump by 360, or fit the course over ground far better than as radians."""
     heading = samples.values["heading"]
     if command == "none" or np.isnan(heading).all():
         return
@@ -130,14 +122,7 @@ def episodes_on_grid(
 ) -> tuple[LogEpisode, ...]:
     """Lay rows on their grids; missing ones are filled: the last command held, no pose.
 
-    Args:
-        samples: The rows of samples.csv.
-        commands: Their commands (rows, 2); unused where there are commands apart.
-        issued: Every episode's commands, where they have times of their own.
-        rate_hz: Rows per second; 0 for still frames.
-
-    Raises:
-        LogError: If rows lie off the grid.
+    Commands (rows, 2) go with the rows, unless an episode's are `issued` at times of their own. Still frames have 0 Hz.
     """
     places, ends = places_on_grid(samples, rate_hz)
     filled = np.zeros(int(ends[-1]), dtype=np.int64)
@@ -170,11 +155,7 @@ REACH_S = 0.1
 
 
 def usual_rate(samples: Rows) -> float:
-    """Measured poses a second, drop-outs and gaps apart.
-
-    Raises:
-        LogError: If no drive has two poses.
-    """
+    """Measured poses a second, drop-outs and gaps apart."""
     known = np.isfinite(samples.values["x"])
     times, episode = samples.values["time"][known], samples.episode[known]
     between = np.diff(times)[np.diff(episode) == 0]
@@ -190,13 +171,7 @@ def episodes_at_own_times(
 ) -> tuple[tuple[LogEpisode, ...], float]:
     """Every drive on a grid of steps, with its poses as they were measured, and the grid's steps a second.
 
-    Args:
-        samples: The rows of samples.csv.
-        commands: The command of each row (rows, 2), issued at the row's time; unused where there are commands apart.
-        issued: Every episode's commands, where they lie apart.
-
-    Raises:
-        LogError: If there are too few poses for their times.
+    Commands (rows, 2) are issued at the rows' times unless an episode's are `issued` apart.
     """
     usual = usual_rate(samples)
     _check_density(samples, usual)

@@ -98,11 +98,7 @@ def compare_prpv(key: str, title: str, before: Assessment, after: Assessment | N
 
 
 def compare_errors(diagnosis: Mapping[str, Any]) -> list[Compared]:
-    """The errors of a diagnosis, on drives and frames that were not fitted.
-
-    Args:
-        diagnosis: What `diagnose --json` prints.
-    """
+    """The errors of a diagnosis, as `diagnose --json` prints it, on drives and frames that were not fitted."""
     camera = diagnosis["camera"] or {}
     errors = (
         ("error", "position in windows of {:g} s, planar plant", diagnosis.get("error")),

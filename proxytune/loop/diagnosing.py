@@ -41,11 +41,7 @@ def wanted_of(loop: Loop) -> Wanted:
 
 
 def check_camera(loop: Loop) -> None:
-    """Refuse a twin of which frames cannot be recorded, before anything is driven.
-
-    Raises:
-        InputError: If it has no camera, or nobody who drives along lanes.
-    """
+    """Refuse a twin of which frames cannot be recorded, before anything is driven."""
     if loop.log is not None or loop.twin is None or not wanted_of(loop).frames:
         return
     try:
@@ -59,10 +55,6 @@ def diagnose_target(loop: Loop, source: Path, folder: Path, teller: Teller) -> N
     """Diagnose a log, and write what `diagnose` does: diagnosis.json, model.toml and figures.
 
     What is declared is all that the study's box and its proxy have.
-
-    Raises:
-        LogError: If the log cannot bear the question.
-        RunError: If a file cannot be written.
     """
     with open_log(source, facts=loop.facts) as (log, notes):
         for note in notes:
@@ -83,11 +75,7 @@ def declared_of(loop: Loop, robot: Robot, log: Log) -> tuple[str, ...]:
 
 
 def read_diagnosis(folder: Path) -> dict[str, Any]:
-    """The diagnosis that was written.
-
-    Raises:
-        RunError: If it cannot be read, or lacks something that a loop reads of it.
-    """
+    """The diagnosis that was written."""
     path = folder / "diagnosis.json"
     try:
         document: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
@@ -130,14 +118,9 @@ A_FOLDER_OF_ITS_OWN = (FILE_NAME, "log.toml")
 
 
 def extension_text(settings: StudySettings, model: Path, folder: Path) -> str:
-    """The study.toml of the extended study: as the study's own, but for its proxy and its paths.
+    """The study.toml of the extended study in this folder: as the study's own, but for its proxy and its paths.
 
     What the study's own proxy has beside what was diagnosed stays, as [domain.effects].
-
-    Args:
-        settings: The study's.
-        model: The model.toml that was found.
-        folder: Where the extended study is to lie.
     """
     values = dict(read_settings(settings.path).values)
     values |= {"name": f"{settings.name}_extended", "proxy": _from(folder, model)}
@@ -155,11 +138,7 @@ def extension_text(settings: StudySettings, model: Path, folder: Path) -> str:
 
 
 def write_extension(settings: StudySettings, model: Path, folder: Path) -> None:
-    """Write the extended study, with the study's own modules, robots, maps and weights beside it.
-
-    Raises:
-        RunError: If it cannot be written.
-    """
+    """Write the extended study, with the study's own modules, robots, maps and weights beside it."""
     # Without study.toml its modules would count as the study's own.
     write_text(folder / FILE_NAME, extension_text(settings, model, folder))
     try:

@@ -83,11 +83,7 @@ def pictures_file(home: Path) -> Path:
 
 
 def write_pictures(closed: Closed) -> None:
-    """Drive the righted agent, and keep a picture of it before and after; none without such an agent, or a twin.
-
-    Raises:
-        RunError: If they cannot be written.
-    """
+    """Drive the righted agent, and keep a picture of it before and after; none without such an agent, or a twin."""
     path, gain = pictures_file(closed.loop.home), righted(closed)
     both = drive_both(closed, gain["agent"]) if gain else None
     texts = []
@@ -103,11 +99,7 @@ def write_pictures(closed: Closed) -> None:
 
 
 def read_pictures(home: Path) -> list[Picture]:
-    """The pictures that were kept.
-
-    Raises:
-        StoreError: If they cannot be read.
-    """
+    """The pictures that were kept."""
     path = pictures_file(home)
     try:
         texts = json.loads(path.read_text(encoding="utf-8"))

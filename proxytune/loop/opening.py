@@ -77,11 +77,7 @@ def held_out_of(settings: StudySettings, family: DomainFamily, *, driven: bool) 
 
 
 def check_held_out(settings: StudySettings, family: DomainFamily, names: tuple[str, ...]) -> None:
-    """Refuse agents that the family cannot run.
-
-    Raises:
-        InputError: With the agent's name.
-    """
+    """Refuse agents that the family cannot run."""
     for name in names:
         try:
             ask(f"check_agent('{name}') of {settings.family}", partial(family.check_agent, name))
@@ -276,11 +272,7 @@ class Kept:
     """The done steps of a loop, in loop.json: each step's digest of its inputs, written once its output is there."""
 
     def __init__(self, folder: Path) -> None:
-        """Read what is known.
-
-        Raises:
-            StoreError: If loop.json cannot be read.
-        """
+        """Read what is known."""
         self._path = folder / FILE_NAME
         self._inputs: dict[str, str] = _read(self._path)
 
@@ -293,11 +285,7 @@ class Kept:
         return self._inputs.get(name) == inputs and output.exists()
 
     def run(self, name: str, inputs: str, do: Callable[[], object]) -> None:
-        """Do a step, which makes its output of inputs of this digest.
-
-        Raises:
-            RunError: If loop.json cannot be written.
-        """
+        """Do a step, which makes its output of inputs of this digest."""
         self._write({known: digest for known, digest in self._inputs.items() if known != name})
         do()
         self._write({**self._inputs, name: inputs})

@@ -60,8 +60,8 @@ def bank_table(bank: Bank) -> Table:
     rows = []
     for box in bank.settings.space.intervals:
         needed, one = bank.needed[box.name], told.get(box.name)
-        agents = ", ".join(f"{name} {share:.0%}" for name, share in one.agents[:MOST_NAMED]) if one else ""
-        metrics = ", ".join(f"{name} {share:.0%}" for name, share in one.metrics[:2]) if one else ""
+        agents = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in one.agents[:MOST_NAMED]) if one else ""
+        metrics = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in one.metrics[:2]) if one else ""
         widths = [short(bank.widths(count)[box.name]) for count in bank.expected]
         within = f"± {short(WITHIN * (box.high - box.low))}: {needed or 'not by starts'}"
         rows.append((box.name, *widths, within, agents, metrics))
@@ -84,6 +84,6 @@ def write_bank_page(bank: Bank, table: Path) -> Path:
     page = table.with_name("report.html")
     learn = f'Measure these agents on the target and write learn_from = ["{table.parent.name}"] into its study.toml.'
     parts = (bank_table(bank), Paragraphs("How to use it", (learn,)))
-    view = View(bank.settings.name, bank_sentence(bank), learn, parts)
+    view = View(f"{bank.settings.name}: what can a target learn from this bank?", bank_sentence(bank), learn, parts)
     write_page(page, view, study_foot(bank.settings))
     return page

@@ -1,5 +1,6 @@
 """Several domain families compared: sentence, tables, figure, page and JSON document."""
 
+import os
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -279,14 +280,16 @@ def families_view(compared: ComparedFamilies, figure: bytes) -> View:
         "Time per episode is of the episodes at the best θ, every agent from every start, on this machine as busy as "
         "it was then.",
     )
-    pages = tuple(f"{one.name}: {one.result.study.settings.home / 'report.html'}" for one in compared.families)
+    homes = ((one.name, one.result.study.settings.home) for one in compared.families)
+    pages = tuple(f"[{name}]({os.path.relpath(home, settings.home)}/report.html)" for name, home in homes)
     parts = (
         Picture("What each family predicts, teaches and costs", figure, CAPTION),
         *families_tables(compared),
         Paragraphs("What the numbers are", meanings),
         Paragraphs("The page of each family", pages),
     )
-    return View(settings.name, families_answer(compared), families_next_step(compared), parts)
+    title = f"{settings.name}: which simulator is the most useful?"
+    return View(title, families_answer(compared), families_next_step(compared), parts)
 
 
 def families_document(compared: ComparedFamilies) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from proxytune.usefulness import NoiseFloor
 
 BLUE, LIGHT_BLUE, GREEN = "#0072B2", "#56B4E9", "#009E73"  # Okabe and Ito, safe for the colour-blind
 ORANGE, VERMILLION, PURPLE = "#E69F00", "#D55E00", "#CC79A7"
-GREY, LIGHT_GREY = "0.55", "0.9"
+GREY, LIGHT_GREY = "0.55", "0.82"
 COLUMN = 85.0 / 25.4
 """Width in inches of a figure that is to be read at 85 mm, one column of a paper."""
 CHARACTERS_PER_INCH, HANDLE = 19, 8

@@ -41,6 +41,12 @@ WORDS = {
     "bullet": "the simulator that moves the robot as a body with wheels and contacts (PyBullet)",
     "unidentified": "nearly any value in the range that was searched fits",
     "misfit": "how probable scores as far from the simulator’s are if some θ were right; a small p says that none is",
+    "PLV": "proxy learning value: the target’s samples that a learner saves by learning in the simulator first",
+    "PPV": "proxy predictivity value: how far the simulator’s scores are from the target’s; 0 is best",
+    "SRCC": "Spearman’s rank correlation of the agents’ scores on both sides; 1 is the same order",
+    "MMRV": "mean maximum rank violation: the score that the worst wrongly ordered pair costs; 0 is best",
+    "regret": "the score that is lost on the target by not choosing the agent that is best there",
+    "zero-shot": "on the target, after learning in the simulator alone",
     "Sobol index": "the share of a measure’s variation that a parameter takes part in",
     "nominal": "as the robot’s files have it, before tuning",
 }
@@ -86,7 +92,8 @@ table { border-collapse: collapse; font-size: .93rem; font-variant-numeric: tabu
 th, td { text-align: left; vertical-align: top; padding: .25rem 1.1rem .25rem 0; border-bottom: 1px solid var(--line);
   overflow-wrap: normal; }
 thead th { color: var(--soft); vertical-align: bottom; }
-tbody th { font-weight: 600; white-space: pre-wrap; }
+tbody th { font-weight: 600; }
+tbody th.part { padding-left: 1rem; }
 td.prose { min-width: 11rem; }
 table:not(:has(thead)) td { overflow-wrap: anywhere; }
 .number { text-align: right; white-space: nowrap; }
@@ -291,8 +298,15 @@ def _table(table: Table, label: str) -> str:
 
 def _row(row: tuple[str, ...], columns: tuple[Column, ...]) -> str:
     first, *others = zip(row, columns, strict=True)
-    name = f'<th scope="row"{_class(first[1])}>{html.escape(first[0])}</th>'
-    return name + "".join(f"<td{_class(one, len(cell))}>{html.escape(cell)}</td>" for cell, one in others)
+    kind = ' class="part"' if first[0].startswith(" ") else _class(first[1])
+    name = f'<th scope="row"{kind}>{_cell(first[0].strip(), first[1])}</th>'
+    return name + "".join(f"<td{_class(one, len(cell))}>{_cell(cell, one)}</td>" for cell, one in others)
+
+
+def _cell(text: str, column: Column) -> str:
+    """A cell; numbers have a minus, not a hyphen."""
+    plain = html.escape(text)
+    return re.sub(r"(?<![\w.)-])-(?=\d)", "−", plain) if column.numbers else plain
 
 
 def _class(column: Column, length: int = 0) -> str:

@@ -112,7 +112,8 @@ def plv_view(study: PlvStudy, figure: bytes) -> View:
     stopped = Paragraphs("Why the search ended", (f"{study.stopped}.", f"{PLV_MEANING}."))
     picture = Picture("PLV of the proxies tried", figure, TRIALS)
     finalists = replace(finals, notes=(PLV_MEANING, *study.unable.values()))
-    return View(study.settings.name, plv_answer(study), plv_next_step(study), (finalists, picture, tried, stopped))
+    title = f"{study.settings.name}: in which simulator does a learner learn most?"
+    return View(title, plv_answer(study), plv_next_step(study), (finalists, picture, tried, stopped))
 
 
 def _tables(study: PlvStudy) -> tuple[Table, Table]:

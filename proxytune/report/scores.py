@@ -31,13 +31,12 @@ Assessments = Mapping[str, Assessment]
 BESIDE_PRPV = tuple(measure for measure in MEASURES if measure is not PRPV)
 SCATTER = (
     "A point is an agent: its mean score on the target (across) and in the proxy (up), with standard errors. On the "
-    "dashed line both agree; two points that fall from left to right are a pair ranked wrongly. Names are in the "
-    f"proxy's order, highest score on top; of more than {MOST} agents those whose rank differs most are named."
+    "dashed line both agree; two points that fall from left to right are a pair ranked wrongly. Names are in the proxy's "
+    "order, highest score on top"
 )
 FLIPPED = (
     "A square is a pair of agents, in the target's order, best first. Grey pairs are ranked as on the target; coloured "
-    "ones are what PRPV counts: reversed, lost (a tie in the proxy alone) or invented (a tie on the target alone). "
-    f"Of more than {MOST} agents the axes are ranks on the target."
+    "ones are what PRPV counts: reversed, lost (a tie in the proxy alone) or invented (a tie on the target alone)"
 )
 
 
@@ -145,14 +144,14 @@ def score_view(
         target: Name of the target.
     """
     tables = _tables(assessments, selection, target)
-    names = f"{next(iter(assessments))} as a proxy" if selection is None else f"{len(assessments)} proxies"
+    one = f"{next(iter(assessments))}: how well does it predict {target}?"
     choices = (
         ()
         if selection is None
         else (Paragraphs("Which proxy to choose by", tuple(choices_sentences(assessments, selection, target))),)
     )
     return View(
-        f"{names} of {target}",
+        one if selection is None else f"Which of {len(assessments)} proxies predicts {target} best?",
         score_sentence(assessments, selection, target=target),
         score_next_step(assessments, selection),
         (*figures, *tables) if selection is None else (*tables, *choices, *figures),
@@ -161,9 +160,12 @@ def score_view(
 
 def drawn_scores(assessment: Assessment) -> Iterator[tuple[str, Figure, str, str]]:
     """The figures of one proxy: name, figure, title and caption."""
-    yield "scatter", scatter_figure(assessment), "Scores in the proxy and on the target", SCATTER
+    many = len(assessment.inputs.agents) > MOST
+    names = "; those whose rank differs most are named." if many else "."
+    yield "scatter", scatter_figure(assessment), "Scores in the proxy and on the target", SCATTER + names
+    axes = "; the axes are ranks on the target." if many else "."
     flipped = flipped_pairs_figure(assessment.prpv)
-    yield "flipped_pairs", flipped, "Pairs of agents that the proxy ranks wrongly", FLIPPED
+    yield "flipped_pairs", flipped, "Pairs of agents that the proxy ranks wrongly", FLIPPED + axes
     yield "decision", decision_figure(assessment.decision), "Regret of deploying each agent", CAPTION
 
 

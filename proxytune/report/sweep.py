@@ -219,7 +219,9 @@ def sweep_view(study: str, curves: Sequence[SweepCurve], figures: Mapping[str, b
     wrong = say_failures(curves)
     parts += [Paragraphs("What failed", tuple(wrong))] if wrong else []
     names, answer = ", ".join(curve.parameter for curve in curves), " ".join(f"{_lowest(curve)}." for curve in curves)
-    return View(f"{study}: usefulness along {names}", f"{answer} {held}.", _next_step(curves), tuple(parts))
+    return View(
+        f"{study}: how does usefulness depend on {names}?", f"{answer} {held}.", _next_step(curves), tuple(parts)
+    )
 
 
 def _lowest(curve: SweepCurve) -> str:

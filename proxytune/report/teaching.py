@@ -139,7 +139,7 @@ def _row(lesson: TeacherResult, prpv: Predictivity | None) -> tuple[str, ...]:
     predicts = "" if prpv is None else f"{prpv.prpv:g}" + (f" ({span(prpv.interval, 0)})" if prpv.interval else "")
     if worth is None:
         return (lesson.name, predicts, zero_shot, "", "", "")
-    reduction = "" if worth.reduction.value is None else f"{worth.reduction.value:.0%}"
+    reduction = "" if worth.reduction.value is None else f"{fixed(100.0 * worth.reduction.value, 0)} %"
     return (lesson.name, predicts, zero_shot, count(worth.needed), count(worth.plv, UNKNOWN), reduction)
 
 
@@ -241,7 +241,7 @@ def teach_view(experiment: Experiment, prpv: Predictivities, figure: bytes) -> V
     table, observations = teach_table(experiment, prpv), observation_lines(observe(experiment, prpv), experiment)
     said = [Paragraphs("The paper's two observations", observations)] if observations else []
     picture = Picture("What each proxy saves, curve by curve", figure, CURVES)
-    title = f"{experiment.settings.name}: proxies as teachers"
+    title = f"{experiment.settings.name}: which proxy is worth learning in?"
     parts: tuple[Part, ...] = (table, *said, *_published(experiment, table.rows), picture)
     return View(title, teach_answer(experiment), teach_next_step(experiment), parts)
 
@@ -255,7 +255,7 @@ def _published(experiment: Experiment, rows: Sequence[tuple[str, ...]]) -> tuple
     cells = []
     for name, theirs in taught.published.items():
         _, _, zero_shot, needed, _, reduction, *_ = here[name]
-        published = (f"{theirs.zero_shot:g}", f"{theirs.samples}", f"{theirs.reduction:.0%}")
+        published = (f"{theirs.zero_shot:g}", f"{theirs.samples}", f"{fixed(100.0 * theirs.reduction, 0)} %")
         cells.append((name, published[0], zero_shot, published[1], needed, published[2], reduction))
     notes = tuple(filter(None, [taught.published_in]))
     return (Table("Beside what was published", columns_of(("proxy",), PUBLISHED), tuple(cells), notes),)

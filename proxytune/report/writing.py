@@ -117,9 +117,12 @@ def _draw(figure: Figure, form: str, draft: Path) -> None:
 
 
 def _save_as(figure: Figure, where: Path | BytesIO, **how: Any) -> None:
-    """Save a figure with names as they are: a dollar begins no formula, and a letter without a glyph is no news."""
+    """Save a figure with names as they are: a dollar begins no formula, and a letter without a glyph is no news.
+
+    What Matplotlib writes itself at the ticks of an axis, such as powers of ten, stays a formula.
+    """
     for text in figure.findobj(Text):
-        if "$" in text.get_text():
+        if "$" in text.get_text() and r"\mathdefault" not in text.get_text():
             text.set_parse_math(False)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)

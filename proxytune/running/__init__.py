@@ -1,6 +1,6 @@
 """Running work: episodes and other pieces, in this process, several, or on a cluster, with progress.
 
-fleets    Fleet, run_fleet, run_episode, run_together, can_run_together, one_by_one, RAISED, check_machine: outcomes
+fleets    Fleet, run_fleet, run_episode, run_together, can_run_together, RAISED, check_machine: outcomes
 episodes  running, Watch, ENDED, ENDLESS: the fleets of many episodes, and what ends or hangs
 workers   working, places, Rescue, IsolatedWorker, WorkerExit, TracedTask, limited, was_ended_in, OVERRUN: any work
 cluster   on_cluster: the same on the machines of a Dask cluster

@@ -194,12 +194,7 @@ class Cluster:
             raise InputError(f"{line}; start one with `dask scheduler`, and give the address that it prints") from None
 
     def check(self) -> None:
-        """Wait for a worker, and refuse a cluster with one that cannot be used.
-
-        Raises:
-            InputError: If a worker has other code, other packages or several threads.
-            RunError: If no worker joins.
-        """
+        """Wait for a worker, and refuse a cluster with one that cannot be used."""
         begun = time.monotonic()
         while not self._ask() or not self._workers:
             if time.monotonic() - begun > JOINED_S:
@@ -277,11 +272,7 @@ class Cluster:
     def results(
         self, recipe: Recipe, numbered: Iterator[tuple[int, Any]], timeout_s: float | None
     ) -> Generator[tuple[int, Any], None, None]:
-        """Do numbered pieces; LOST stands for the result of one that ended several workers, or takes too long.
-
-        Raises:
-            ProxytuneError: What a piece raised.
-        """
+        """Do numbered pieces; LOST stands for the result of one that ended several workers, or takes too long."""
         pieces, held, patience = _Pieces(numbered), dict[Key, _Held](), _Patience(self._say)
         try:
             while pieces.more():

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 from proxytune.domain import DomainFamily, Episode, Outcome
 from proxytune.errors import RunError
-from proxytune.running.fleets import RAISED, Fleet, can_run_together, one_by_one, run_fleet
+from proxytune.running.fleets import RAISED, Fleet, can_run_together, run_fleet
 from proxytune.running.workers import Rescue, WorkerExit, places, working
 
 ENDED, ENDLESS = "it ended its process", "it took longer than"
@@ -109,7 +109,7 @@ def running(
         watch.timeout_s,
         lambda fleet: any(map(suspect, fleet)),
         watch.begins,
-        parts=one_by_one,
+        parts=lambda fleet: [(episode,) for episode in fleet],
     )
     waits = watch.waits if watch.timeout_s is None else UNWATCHED.waits
     with (
@@ -164,11 +164,7 @@ def _count(episodes: Sequence[Episode], jobs: int, known: Seconds, most_s: float
 
 
 def _lost(watch: Watch, episode: Episode, end: WorkerExit) -> Outcome:
-    """The outcome of an episode that has ended its process, or was ended.
-
-    Raises:
-        RunError: If the process was killed from outside, as a machine without memory does.
-    """
+    """The outcome of an episode that has ended its process, or was ended."""
     where = f"agent '{episode.agent}' from start {episode.start}"
     if end.killed:
         raise RunError(
@@ -216,11 +212,7 @@ class StallMonitor:
             begun = sorted(self._begun.copy().items(), key=lambda episode: episode[1])
             seconds = time.monotonic() - begun[0][1] if begun else 0.0
             if seconds >= LONG_S:
-                self._tell(_who([episode for episode, since in begun if since == begun[0][1]]), seconds)
-
-
-def _who(fleet: Sequence[Episode]) -> str:
-    if len(fleet) == 1:
-        return f"agent '{fleet[0].agent}' from start {fleet[0].start}"
-    agents = ", ".join(f"'{agent}'" for agent in dict.fromkeys(episode.agent for episode in fleet))
-    return f"a fleet of {len(fleet)} episodes (of {agents})"
+                fleet = [episode for episode, since in begun if since == begun[0][1]]
+                agents = ", ".join(f"'{agent}'" for agent in dict.fromkeys(episode.agent for episode in fleet))
+                alone = f"agent {agents} from start {fleet[0].start}"
+                self._tell(alone if len(fleet) == 1 else f"a fleet of {len(fleet)} episodes (of {agents})", seconds)

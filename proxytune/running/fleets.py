@@ -43,11 +43,6 @@ def run_fleet(family: DomainFamily, episodes: Sequence[Episode], needed: Collect
     return [run_episode(family, one, needed) for one in episodes] if together is None else together
 
 
-def one_by_one(fleet: Fleet) -> list[Fleet]:
-    """The fleet's episodes, each by itself."""
-    return [(episode,) for episode in fleet]
-
-
 def can_run_together(family: DomainFamily) -> bool:
     """Whether a family runs several episodes at once (`domain.FleetFamily`)."""
     return hasattr(family, "run_many")
@@ -79,11 +74,7 @@ def run_together(family: Any, episodes: Sequence[Episode], needed: Collection[st
 def _judged(
     family: DomainFamily, episode: Episode, result: Any, needed: Collection[str]
 ) -> tuple[Mapping[str, float] | None, str]:
-    """What a fleet's result says of an episode: its metrics, or why it failed.
-
-    Raises:
-        RunError: If the machine failed.
-    """
+    """What a fleet's result says of an episode: its metrics, or why it failed."""
     try:
         if isinstance(result, EpisodeError):
             raise result
@@ -173,10 +164,9 @@ def _generators() -> bytes:
 
 @functools.lru_cache(maxsize=1)
 def _libraries(modules: int) -> ThreadpoolController:
-    """The libraries that have threads of their own; looking for them takes longer than a short episode.
+    """The libraries that have threads of their own, while so many modules are loaded: another may bring another.
 
-    Args:
-        modules: How many modules are loaded: with another, there may be another library.
+    Looking for them takes longer than a short episode.
     """
     return ThreadpoolController()
 

@@ -47,20 +47,10 @@ class Watcher(Protocol):
 class Silent:
     """Watches without a word."""
 
-    def begin(self, what: str, known: int) -> None:
-        """Say nothing."""
+    def begin(self, *told: object) -> None:
+        """Say nothing, whatever is told."""
 
-    def episode(self) -> None:
-        """Say nothing."""
-
-    def best(self, score: float) -> None:
-        """Say nothing."""
-
-    def finished(self, what: str) -> None:
-        """Say nothing."""
-
-    def waiting(self, episode: str, seconds: float) -> None:
-        """Say nothing."""
+    episode = best = finished = waiting = begin
 
 
 class Bars:

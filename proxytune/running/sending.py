@@ -58,11 +58,7 @@ class Recipe:
 
 
 def recipe_of(work: Callable[..., Any], made_by: Mapping[str, str] | None = None) -> Recipe:
-    """Work as it is sent; with the user's modules where it goes to machines of which `made_by` is asked.
-
-    Raises:
-        NotSendableError: If it cannot be pickled.
-    """
+    """Work as it is sent; with the user's modules where it goes to machines of which `made_by` is asked."""
     try:
         recipe = Recipe(cloudpickle.dumps(work), tuple(sys.path), folders())
     except Exception as problem:
@@ -73,22 +69,13 @@ def recipe_of(work: Callable[..., Any], made_by: Mapping[str, str] | None = None
 
 
 def do_sent(recipe: Recipe, piece: Any) -> Any:
-    """Do one piece of the work, in the process it was sent to.
-
-    Raises:
-        NotSendableError: If the work cannot be loaded there.
-    """
+    """Do one piece of the work, in the process it was sent to."""
     return load_sent(recipe)(piece)
 
 
 @lru_cache(maxsize=1)
 def load_sent(recipe: Recipe) -> Callable[[Any], Any]:
-    """The work, unpickled.
-
-    Raises:
-        NotSendableError: If that fails.
-        OtherCodeError: If this machine has other code.
-    """
+    """The work, unpickled."""
     if recipe.made_by:
         check_code(dict(recipe.made_by))
     # A process that has done other work looks in that work's folders last; on another machine its own come first.
@@ -161,11 +148,7 @@ def made_by() -> Mapping[str, str]:
 
 
 def check_code(theirs: Mapping[str, str]) -> None:
-    """Refuse to work for a process of which the results may differ.
-
-    Raises:
-        OtherCodeError: If anything has another version there.
-    """
+    """Refuse to work for a process of which the results may differ."""
     changes = version_changes(theirs, made_by())
     if changes:
         raise OtherCodeError(f"the worker on {node()} has {', '.join(changes)}; install the same there as here")

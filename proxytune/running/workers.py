@@ -355,12 +355,7 @@ def _exit_told(told: str) -> str:
 
 @dataclass(frozen=True)
 class Trace:
-    """What a piece says of itself.
-
-    Attributes:
-        path: Where it says it.
-        before: What it was doing when an earlier process ended with it; empty if none did.
-    """
+    """Where a piece says what it does, and what it did when an earlier process ended with it; empty if none did."""
 
     path: Path
     before: str

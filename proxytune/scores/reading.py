@@ -194,6 +194,8 @@ def _read(
         text, error = repr(read[0]).replace(".", found.decimal), read[1] or 0.0
         if read[2] is not None:
             return text, error, read[2]
+        if "success" in name.lower() and not 0.0 <= read[0] <= 1.0:
+            raise ScoresError(f"{where}: a success rate lies between 0 and 100 %, got {own[name]!r}; correct the cell")
     counts, errors = more
     value = _number(text.replace(found.decimal, "."))
     if math.isnan(value):

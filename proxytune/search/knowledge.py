@@ -94,6 +94,8 @@ def _summed(names: Sequence[str], shares: Floats) -> tuple[tuple[str, float], ..
 Ends = tuple[float, float]
 REPORTED = 16384
 """Points of the posterior that is reported: four times as many as a draw takes, so that small regions are smooth."""
+EXPECTED_FROM = 24
+"""At most so many trials are taken for targets to expect what one will tell."""
 MOST_INSIDE = 2048
 """At most so many of these are looked at for the lowest PRPV."""
 UPPER = 97.5
@@ -134,14 +136,25 @@ class Knowledge:
     def log(self, points: Floats) -> Floats:
         """Log density of θ at points (n, parameters) of the unit cube, up to a constant.
 
-        Wider than the likelihood where its regions do not hold as many left-out trials as they should.
+        Wider than the likelihood where its regions do not hold as many left-out trials as they should. Where no θ
+        explains the target, wider by its dispersion, as a quasi-likelihood is (McCullagh and Nelder, Generalized linear
+        models, 1989, chapter 9): outputs are off by more than the model's noise at every θ, so also at the true one.
         """
-        return self.likelihood.log(points) / self.left_out.widening
+        return self._log_if_it_fits(points) / self.misfit.dispersion
 
     @cached_property
     def posterior(self) -> Posterior:
         """θ given the target's outputs, over the unit cube."""
+        if self.misfit.dispersion == 1.0:
+            return self._posterior_if_it_fits
         return posterior_of(self.log, len(self.space.intervals), REPORTED)
+
+    def _log_if_it_fits(self, points: Floats) -> Floats:
+        return self.likelihood.log(points) / self.left_out.widening
+
+    @cached_property
+    def _posterior_if_it_fits(self) -> Posterior:
+        return posterior_of(self._log_if_it_fits, len(self.space.intervals), REPORTED)
 
     @property
     def intervals(self) -> Mapping[str, Ends]:
@@ -232,7 +245,7 @@ class Knowledge:
     @cached_property
     def misfit(self) -> Misfit:
         """The test of whether any θ explains the target."""
-        return misfit_of(self.likelihood, self.posterior, self.left_out)
+        return misfit_of(self.likelihood, self._posterior_if_it_fits, self.left_out)
 
     @cached_property
     def information(self) -> tuple[Information, ...]:
@@ -265,7 +278,7 @@ def expect_of(space: Space, trials: Sequence[Trial], goal: Goal, seed: int = 0) 
     Raises:
         RunError: If no trial has an outcome.
     """
-    targets = tuple(as_targets(fit_outputs(space, trials), trials, goal, seed))
+    targets = tuple(as_targets(fit_outputs(space, trials), trials, goal, seed, EXPECTED_FROM))
     if not targets:
         return Expected(np.ones(len(space.names)), ())
     widening = left_out_of(targets).widening

@@ -198,11 +198,7 @@ def then(name: str) -> tuple[str, ...]:
 
 
 def check_figures(figures: Mapping[str, float]) -> None:
-    """Refuse figures that a robot.toml does not have, and values that none can have.
-
-    Raises:
-        InputError: With the figure's name.
-    """
+    """Refuse figures that a robot.toml does not have, and values that none can have."""
     for figure, value in figures.items():
         if figure not in UNITS:
             raise InputError(f"--figures: no figure '{figure}'; {nearest(figure, UNITS)}")
@@ -258,18 +254,8 @@ def _car_text(name: str, values: Mapping[str, float]) -> str:
     common = _dimensions(values)
     base, half, radius = values["wheelbase"], values["wheel_distance"] / 2.0, values["wheel_radius"]
     length, width, height = 1.3 * base, 1.6 * half, 1.2 * radius
-    chassis = 0.77 * values["mass"]
-    own = {
-        "half_wheelbase": base / 2.0,
-        "length": length,
-        "width": width,
-        "height": height,
-        "middle": 1.3 * radius + height / 2.0,
-        "chassis_mass": chassis,
-        "chassis_ixx": chassis * (width**2 + height**2) / 12.0,
-        "chassis_iyy": chassis * (length**2 + height**2) / 12.0,
-        "chassis_izz": chassis * (length**2 + width**2) / 12.0,
-    }
+    own = {"half_wheelbase": base / 2.0, "middle": 1.3 * radius + height / 2.0}
+    own |= _chassis(0.77 * values["mass"], length, width, height)
     common |= {key: f"{number:.6g}" for key, number in own.items()}
     wheels = ""
     for side, sign in (("left", 1.0), ("right", -1.0)):
@@ -283,26 +269,33 @@ def _car_text(name: str, values: Mapping[str, float]) -> str:
     return fill("car.urdf.txt", name=name, wheels=wheels, **common)
 
 
+def _chassis(mass: float, length: float, width: float, height: float) -> dict[str, float]:
+    """A box of this mass [kg] and these sides [m], with its moments of inertia."""
+    return {
+        "length": length,
+        "width": width,
+        "height": height,
+        "chassis_mass": mass,
+        "chassis_ixx": mass * (width**2 + height**2) / 12.0,
+        "chassis_iyy": mass * (length**2 + height**2) / 12.0,
+        "chassis_izz": mass * (length**2 + width**2) / 12.0,
+    }
+
+
 def _dimensions(values: Mapping[str, float]) -> dict[str, str]:
     """The values of the template of a body: a box between the wheels, its weight behind the axle, on the caster."""
     radius, distance, mass = values["wheel_radius"], values["wheel_distance"], values["mass"]
     length, width, height = 1.2 * distance, 0.7 * distance, 1.2 * radius
-    chassis, wheel, caster = 0.88 * mass, 0.05 * mass, 0.35 * radius
+    wheel, caster = 0.05 * mass, 0.35 * radius
     numbers = {
         "radius": radius,
         "half_distance": distance / 2.0,
         "tread": 0.6 * radius,
         "torque": values["wheel_torque"],
         "top_speed": 2.0 * values["full_speed"] / radius,
-        "length": length,
-        "width": width,
-        "height": height,
         "middle": radius + height / 2.0,
         "weight_x": -0.15 * distance,
-        "chassis_mass": chassis,
-        "chassis_ixx": chassis * (width**2 + height**2) / 12.0,
-        "chassis_iyy": chassis * (length**2 + height**2) / 12.0,
-        "chassis_izz": chassis * (length**2 + width**2) / 12.0,
+        **_chassis(0.88 * mass, length, width, height),
         "wheel_mass": wheel,
         "wheel_iyy": wheel * radius**2 / 2.0,
         "wheel_ixx": wheel * radius**2 / 4.0,

@@ -159,11 +159,7 @@ def open_file(path: Path, *, writable: bool) -> sqlite3.Connection:
 
 
 def undo_broken_write(path: Path) -> None:
-    """Have SQLite undo what a kill broke off between two writes to a database: it does so for writers alone.
-
-    Raises:
-        StoreError: If what would be undone was not written by proxytune.
-    """
+    """Have SQLite undo what a kill broke off between two writes to a database: it does so for writers alone."""
     journal = path.with_name(f"{path.name}-journal")
     if journal.is_file() and path.is_file():
         if journal.read_bytes()[-8:] == OF_SEVERAL_FILES:
@@ -182,11 +178,7 @@ def make_tables(connection: sqlite3.Connection, version: int = FORMAT) -> None:
 
 @contextmanager
 def transaction(connection: sqlite3.Connection, path: Path) -> Iterator[sqlite3.Connection]:
-    """Have all that is written meanwhile be there at once, or nothing of it.
-
-    Raises:
-        StoreError: In place of any sqlite3.Error.
-    """
+    """Have all that is written meanwhile be there at once, or nothing of it."""
     with sqlite_errors_as_store_errors(path):
         connection.execute("BEGIN IMMEDIATE")
         try:
@@ -255,11 +247,7 @@ def readable_texts(connection: sqlite3.Connection) -> Iterator[None]:
 
 @contextmanager
 def sqlite_errors_as_store_errors(path: Path) -> Iterator[None]:
-    """Raise every error of SQLite as one line with a remedy.
-
-    Raises:
-        StoreError: In place of any sqlite3.Error, and of text that is none.
-    """
+    """Raise every error of SQLite as one line with a remedy."""
     try:
         yield
     except sqlite3.Error as problem:

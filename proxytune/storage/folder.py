@@ -54,9 +54,6 @@ def refuse_links(folder: Path) -> None:
     """Refuse a study in which a symbolic link is in the place of something that running it writes to or into.
 
     Of a family's folder, that and the one of all families are such places too.
-
-    Raises:
-        StoreError: If there is one.
     """
     own = [folder, folder.parent] if is_of_family(folder) else []
     for place in (*own, *(folder / name for name in NAMES)):
@@ -96,11 +93,7 @@ def _acquire(path: Path) -> int:
 
 
 def _open(path: Path) -> int:
-    """Open a file of a study for reading and writing, made where there is none.
-
-    Raises:
-        StoreError: If it is a link, of either kind, no file, or cannot be written.
-    """
+    """Open a file of a study for reading and writing, made where there is none; refuse a link of either kind."""
     try:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o644)
     except OSError as problem:

@@ -309,8 +309,12 @@ class Store:
 
     def sweeps(self) -> list[tuple[str, SweepRecord]]:
         """Every sweep that has been asked for, the last one last, with the identity of its domain family."""
+
+        def sweep(identity: str, parameter: str, base: str, points: str, *pod: str) -> tuple[str, SweepRecord]:
+            return identity, SweepRecord(parameter, _numbers(base), tuple(_list(points, int, float)), *pod)
+
         query = "SELECT identity, parameter, base, points, target_model, replays FROM sweeps ORDER BY number"
-        return self._made(_sweep, query)
+        return self._made(sweep, query)
 
     def _instance(self, connection: sqlite3.Connection, identity: str, theta: str) -> int:
         query = "SELECT id FROM instances WHERE identity = ? AND theta = ?"
@@ -377,11 +381,6 @@ def _outcome(theta: str, agent: str, start: int, seed: int, *rest: Any) -> Outco
     _expect(_is_number(seconds), "a time that is no number", seconds)
     scored = _numbers(metrics) if metrics else None
     return Outcome(_episode(theta, agent, start, seed), scored, failure or "", seconds)
-
-
-def _sweep(identity: str, parameter: str, base: str, points: str, *pod: str) -> tuple[str, SweepRecord]:
-    target_model, replays = pod
-    return identity, SweepRecord(parameter, _numbers(base), tuple(_list(points, int, float)), target_model, replays)
 
 
 def _numbers(text: str, or_none: bool = False) -> dict[str, Any]:

@@ -198,6 +198,7 @@ def result_of(run: StudyRun, scored_anew: Sequence[TrialRecord] | None = None) -
             line
             for line in (
                 *study.cautions,
+                _misfit_caution(learnt),
                 noise_of(run).caution,
                 *apart_notes(run.store),
                 _overran(run),
@@ -206,6 +207,14 @@ def result_of(run: StudyRun, scored_anew: Sequence[TrialRecord] | None = None) -
             if line
         ),
     )
+
+
+def _misfit_caution(learnt: Knowledge) -> str:
+    """What a misfit makes of θ, in one line; empty if none is said."""
+    if learnt.misfit.fits is not False:
+        return ""
+    wider = f"the 95 % region is wider for it (log likelihood divided by {learnt.misfit.dispersion:.1f})"
+    return f"what the proxy lacks bends θ: {wider}; do not trust θ elsewhere before it is found and added"
 
 
 def _overran(run: StudyRun) -> str:

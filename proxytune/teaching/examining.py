@@ -52,24 +52,12 @@ def prepare_points(setup: TeachingSetup, points: Sequence[CurvePoint], jobs: int
             pass
 
 
-def prepare_shared(setup: TeachingSetup, points: Sequence[CurvePoint], jobs: int) -> None:
-    """Make what several points share before they are scored, so that no two processes make the same.
-
-    Raises:
-        InputError, RunError: As prepare_points.
-    """
-    prepare_points(setup, _shared(setup.settings, points), jobs)
-
-
 def score_points(
     setup: TeachingSetup, points: Sequence[CurvePoint], jobs: int
 ) -> AbstractContextManager[Iterator[tuple[CurvePoint, float]]]:
     """Score the points in parallel, each yielded as soon as it is there.
 
     Those that take longest begin first: otherwise one of them, begun last, would keep one process busy alone.
-
-    Raises:
-        InputError, RunError: As prepare_points.
     """
     ordered = sorted(points, key=lambda point: -point.count)
     return _spread(setup, functools.partial(_score, setup.score), ordered, jobs)
@@ -110,23 +98,15 @@ class _Loss:
     timeout_s: float | None
     traced: TracedTask
 
-    def __call__(self, point: CurvePoint, end: WorkerExit) -> Any:
+    def __call__(self, point: CurvePoint, end: WorkerExit, first: bool = True) -> Any:
         """Make it once more where that tells which episode it is or it took too long, or say of what it ended.
 
-        Raises:
-            EpisodeError: If a lesson or an examination took longer than it may.
-            RunError: If the process ended otherwise.
+        Where it is lost again it is made once more by the name of one examination, if it was several at once.
         """
-        if self.traced.last(point).endswith(TOGETHER) or end.how == OVERRUN:
+        if self.traced.last(point).endswith(TOGETHER) or (first and end.how == OVERRUN):
+            again = functools.partial(self, first=False) if first else self._refuse
             with IsolatedWorker(self.traced) as isolated:
-                return isolated.do(point, functools.partial(self._lost_again, point))
-        return self._refuse(point, end)
-
-    def _lost_again(self, point: CurvePoint, end: WorkerExit) -> Any:
-        """Refuse a point that was lost again; by the name of one examination, where it was several at once."""
-        if self.traced.last(point).endswith(TOGETHER):
-            with IsolatedWorker(self.traced) as isolated:
-                return isolated.do(point, functools.partial(self._refuse, point))
+                return isolated.do(point, functools.partial(again, point))
         return self._refuse(point, end)
 
     def _refuse(self, point: CurvePoint, end: WorkerExit) -> NoReturn:
@@ -228,7 +208,8 @@ def _examine(
     points = {one: CurvePoint(one.curve, proxies[one.curve], one.repetition, one.samples) for one in batch}
     missing = [point for point in points.values() if not setup.is_cached(point)]
     watcher.begin("demonstrations", len(points) - len(missing))
-    prepare_shared(setup, missing, jobs)
+    # Before they are scored, so that no two processes make the same
+    prepare_points(setup, _shared(setup.settings, missing), jobs)
     watcher.begin("learning", 0)
     with score_points(setup, missing, jobs) as scored:
         for point, score in scored:

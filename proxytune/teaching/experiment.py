@@ -17,7 +17,7 @@ import numpy as np
 from proxytune.arrays import Floats
 from proxytune.domain import Classroom
 from proxytune.errors import InputError, LearnerError
-from proxytune.extensions import make
+from proxytune.extensions import load
 from proxytune.learning import (
     EXPERT,
     LEARNER,
@@ -200,11 +200,7 @@ def check_proxies(settings: StudySettings, setup: TeachingSetup) -> None:
 
 
 def classroom(settings: StudySettings, model: Path | None, lessons: str) -> Classroom:
-    """The domain family that a study names, with a model: one that can teach, for lessons as their key has them.
-
-    Raises:
-        SettingsError: If it cannot.
-    """
+    """The domain family that a study names, with a model: one that can teach, for lessons as their key has them."""
     family = load_family(settings, model)
     lacks = [member for member in ("best_score", "demonstrate", "examine") if not hasattr(family, member)]
     if lacks:
@@ -220,7 +216,7 @@ def classroom(settings: StudySettings, model: Path | None, lessons: str) -> Clas
 def _load_learner(settings: StudySettings, name: str) -> tuple[Learner, str]:
     """The learner and a digest of what its code means and of its settings."""
     try:
-        made = make(name, kind="learner", beside=settings.folder, needs=("train", "act"))
+        made = load(name, kind="learner", beside=settings.folder, needs=("train", "act"), call=True)
     except InputError as problem:
         raise settings.error("teaching.learner", str(problem)) from None
     learner = cast(Learner, made)

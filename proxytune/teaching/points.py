@@ -49,10 +49,6 @@ def watching(what: str, timeout_s: float | None = None) -> Iterator[None]:
     Args:
         what: What is under way.
         timeout_s: How long it may take [s], where processes may be ended (`limited`).
-
-    Raises:
-        EpisodeError: With what was under way.
-        RunError: If memory, disk or descriptors run out.
     """
     try:
         with limited(what, timeout_s):
@@ -117,14 +113,7 @@ class Supervised:
 
 @dataclass(frozen=True)
 class Trainee:
-    """A learner, and where what it has learnt is kept.
-
-    Attributes:
-        learner: What is trained.
-        identity: A digest of its code and settings.
-        seed: Of its initial weights and the order of its samples.
-        cache: Where samples and weights are kept.
-    """
+    """A learner, a digest of its code and settings, the seed of its weights and of its samples' order; its cache."""
 
     learner: Learner
     identity: str
@@ -211,7 +200,7 @@ class Stage:
 
     def weights_facts(self, count: int) -> dict[str, Any] | None:
         """All that determines the weights after so many samples; None where nothing has been learnt."""
-        start = self.before.final_facts() if self.before else None
+        start = self.before.weights_facts(self.before.lessons.ends[-1]) if self.before else None
         if not count:
             return start
         return {
@@ -222,10 +211,6 @@ class Stage:
             "count": count,
             **({"rehearsal": self.rehearsal} if self.before and self.rehearsal else {}),
         }
-
-    def final_facts(self) -> dict[str, Any] | None:
-        """All that determines the weights after its last sample."""
-        return self.weights_facts(self.lessons.ends[-1])
 
     def weights(self, count: int) -> Weights | None:
         """The weights after so many samples; None where nothing has been learnt."""
@@ -327,12 +312,7 @@ class TeachingSetup:
         return self.proxy.identity, self.target.identity
 
     def score(self, point: CurvePoint) -> float:
-        """Mean score in the target over all starts; NaN where nothing has been learnt, so nothing can drive.
-
-        Raises:
-            LearnerError: If the proxy's expert cannot drive, or the learner cannot use the samples.
-            EpisodeError: If a domain or the policy fails.
-        """
+        """Mean score in the target over all starts; NaN where nothing has been learnt, so nothing can drive."""
         with _name_proxy_in_errors(point), threadpool_limits(limits=1):
             found = self.cache.get("exam", self.exam_facts(point), lambda: self._examine(point))
             return float(np.mean(found["scores"]))

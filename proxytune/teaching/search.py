@@ -64,12 +64,7 @@ CLOSER = 2
 
 @dataclass(frozen=True)
 class TaughtFinalists:
-    """The finalists of a search, taught anew under fresh seeds.
-
-    Attributes:
-        experiment: Those that can teach, and the learner without a proxy.
-        unable: Why each of the others cannot, by name.
-    """
+    """The finalists taught anew under fresh seeds beside the learner without a proxy, and why others cannot teach."""
 
     experiment: Experiment
     unable: Mapping[str, str]
@@ -161,12 +156,7 @@ RAISE = "raise teaching.target_samples"
 
 
 class PlvUnknown(NamedTuple):
-    """The reason why PLV is not known.
-
-    Attributes:
-        reason: Half a sentence.
-        remedy: The other half, an instruction.
-    """
+    """Why PLV is not known, and what to do about it: half a sentence each."""
 
     reason: str
     remedy: str

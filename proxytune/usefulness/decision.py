@@ -31,9 +31,9 @@ DRAWS, FEWEST_DRAWS = 40_000, 1000
 MOST_DRAWN = 1_000_000
 """Draws of all agents together."""
 MOST_COMPARED, FEW_TASKS = 2000, 3
-BARELY_BEST = 0.08
-"""By the square of the number of agents. A regret of 0 has a probability of its own: with 2.5 % for it, intervals of
-four equal agents would hold 87 %, of eight 67 %; so they hold 95 to 97 %."""
+BARELY_BEST = 0.3
+"""By the cube of the number of agents. A regret of 0 has a probability of its own: with 2.5 % for it, intervals of
+four equal agents would hold 87 %, of eight 67 %; so those of two to twenty hold about 96 %."""
 PRIOR = 1.0
 """Successes and failures before the first episode: every rate is as probable as any other."""
 NO_NOISE = (
@@ -232,7 +232,7 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
 def _regret_ends(regret: Floats, best: float, agents: int, most: float) -> Ends:
     """An agent's 95 % interval: none at all belongs to it unless the agent is very unlikely to be the best."""
     low, high = interval(regret)
-    return (0.0 if best > BARELY_BEST / agents**2 else low), max(high, most)
+    return (0.0 if best > BARELY_BEST / agents**3 else low), max(high, most)
 
 
 def _most_regrets(centre: Floats, ends: Floats, rates: Floats) -> Floats:

@@ -1,8 +1,9 @@
 """What to do next on the target: how many rollouts of which agents, and a test that may be looked at after each.
 
-Rollouts to come are planned on the draws of a decision: were the means what they are, how many more would leave a
-regret above the bound with less than 5 %? They go to the agents in proportion to what tells them from the best
-(optimal computing budget allocation, Chen et al. 2000).
+Rollouts to come are planned on the draws of a decision, each taken for the truth in turn (preposterior analysis, Raiffa
+and Schlaifer 1961): how many more would leave the winner by all rollouts with a regret above the bound in less than
+5 % of draws? They go to the agents in proportion to what tells them from the best (optimal computing budget
+allocation, Chen et al. 2000).
 
 The test is a bet. After t rollouts of agents a and b, with p̂ foretold from the rollouts before, p₀ the mean of both and
 d = (p̂_a − p̂_b) / (2 p₀ (1 − p₀)), the wealth against "a is no better than b" is
@@ -96,7 +97,7 @@ def plan(decision: Decision, *, bound: float | None, made: Floats, scale: float)
 
 
 def _more(draws: Floats, worth: Floats, bound: float) -> Floats:
-    """More rollouts of each agent, were the means what they are; shape (agents,)."""
+    """More rollouts of each agent, shape (agents,)."""
     means, spread = draws.mean(axis=0), draws.std(axis=0) * np.sqrt(worth)
     best = int(means.argmax())
     gap = np.maximum(means[best] - means, bound)
@@ -104,12 +105,14 @@ def _more(draws: Floats, worth: Floats, bound: float) -> Floats:
     others = np.arange(len(means)) != best
     share[best] = spread[best] * np.sqrt((share[others] ** 2 / np.maximum(spread[others], 1e-12) ** 2).sum())
     share /= share.max()
-    noise = (draws - means) / np.maximum(draws.std(axis=0), 1e-300)
+    noise = spread * np.random.default_rng(0).standard_normal(draws.shape)
+    top, rows = draws.max(axis=1), np.arange(len(draws))
 
     def exceeds(size: float) -> bool:
-        counts = np.maximum(worth, size * share)
-        drawn = means + noise * spread / np.sqrt(counts)
-        return bool(np.quantile(drawn.max(axis=1) - drawn[:, best], CONFIDENCE) > bound)
+        """True if the winner of so many rollouts, were the means each draw in turn, regrets more too often."""
+        more = np.maximum(size * share - worth, 0.0)
+        later = (worth * means + more * draws + np.sqrt(more) * noise) / (worth + more)
+        return bool(np.mean(top - draws[rows, later.argmax(axis=1)] > bound) > LEVEL)
 
     low, high = 1.0, 2.0
     while high < MOST_ROLLOUTS and exceeds(high):

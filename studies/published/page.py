@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 import proxytune
-from proxytune.report import Paragraphs, Picture, Table, View, columns_of, foot_of, png_of, write_page
+from proxytune.report import Paragraphs, Picture, Table, View, columns_of, foot_of, svg_of, write_page
 from proxytune.scores import ScoreTable
 from proxytune.usefulness import mmrv_conventions
 
@@ -112,7 +112,7 @@ def main(page: Path, markdown: Path | None) -> None:
         for pair in own:
             if pair.score is not None:
                 source = f"{pair.paper}, arXiv {pair.arxiv}; numbers recovered by Tri Lam's audit (CC BY 4.0)."
-                parts.append(Picture(pair.name, png_of(pair.score.figures()["scatter"]), source))
+                parts.append(Picture(pair.name, svg_of(pair.score.figures()["scatter"]), source))
     next_step = "score your own two tables: `python -m proxytune score --proxy sim.csv --target real.csv`."
     write_page(
         page,

@@ -90,6 +90,15 @@ def test_the_same_import_again_is_no_error_as_after_a_kill_at_the_very_end(capsy
     assert main(words) == 2
 
 
+@pytest.mark.parametrize(("columns", "robot"), [("throttle,steering", "duckiebot"), ("left,right", "car")])
+def test_a_table_of_the_other_kind_of_drive_is_refused_before_anything_is_written(capsys, tmp_path, columns, robot):
+    rows = "".join(f"{k / 20},{k / 100},0,0,0.3,0.0\n" for k in range(200))
+    (tmp_path / "drive.csv").write_text(f"time,x,y,heading,{columns}\n{rows}")
+    said = complaint(capsys, str(tmp_path / "drive.csv"), str(tmp_path / "log"), "--robot", robot)
+    assert f"are not for robot '{robot}'" in said
+    assert not (tmp_path / "log").exists()
+
+
 def test_an_output_that_is_there_is_left_alone(capsys, table, tmp_path):
     (tmp_path / "log").mkdir()
     (tmp_path / "log" / "mine").write_text("kept")

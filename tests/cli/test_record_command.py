@@ -118,3 +118,39 @@ def test_pictures_are_png_files_of_the_robots_camera_at_160_columns(recorded):
     _, home = recorded("log", "--frames", "1")
     with Image.open(home / "frames" / "000000.png") as picture:
         assert (picture.format, picture.mode, picture.size) == ("PNG", "RGB", (160, 120))
+
+
+@pytest.mark.parametrize("kind", ["duty", "twist"])
+def test_a_table_of_commands_is_driven_as_it_is(recorded, tmp_path, kind):
+    duties = np.repeat([[0.2, 0.4], [0.5, 0.5], [-0.1, 0.1]], 20, axis=0)
+    shown = duties
+    if kind == "twist":
+        shown = np.stack((0.6 * duties.mean(axis=1), 0.6 * (duties[:, 1] - duties[:, 0]) / 0.16), axis=1)
+    rows = [f"next,{row / 20.0:.4f},{first:.6f},{second:.6f}" for row, (first, second) in enumerate(shown)]
+    header = {"duty": "episode,time,left,right", "twist": "episode,time,v,omega"}[kind]
+    (tmp_path / "commands.csv").write_text("\n".join([header, *rows]) + "\n")
+    status, home = recorded("played", "--commands", str(tmp_path / "commands.csv"), "--repeats", "2")
+    assert status == 0
+    log = read_log(home)
+    assert [episode.name for episode in log.episodes] == ["0", "1"]
+    for episode in log.episodes:
+        np.testing.assert_allclose(episode.commands, duties, atol=2e-4)
+    assert not np.array_equal(*(episode.poses for episode in log.episodes)), "each has noise of its own"
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        ("episode,time,a,b\nnext,0,1,1\n", "has no columns of commands; name them as a log does"),
+        ("episode,time,throttle,steering\nnext,0,1,1\n", "which drives by two wheels"),
+        ("episode,time,v,omega\nnext,0,9,1\n", "more than the robot's full speed"),
+        ("episode,time,left,right\nnext,0,1,nan\n", "column 'right'"),
+    ],
+)
+def test_a_table_that_cannot_be_driven_is_refused_in_one_line(recorded, tmp_path, capsys, table, said):
+    (tmp_path / "commands.csv").write_text(table)
+    status, home = recorded("refused", "--commands", str(tmp_path / "commands.csv"))
+    err = capsys.readouterr().err
+    assert (status, len(err.splitlines())) == (2, 1)
+    assert said in err
+    assert not home.exists()

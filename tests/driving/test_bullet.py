@@ -1,5 +1,6 @@
 """The two cameras agree: PyBullet's renderer is the reference for the ground-plane camera."""
 
+from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
@@ -35,7 +36,7 @@ def markings(pictures):
 
 
 def both(figures, floor, poses):
-    with BulletCamera(figures, floor) as reference:
+    with closing(BulletCamera(figures, floor)) as reference:
         return GroundPlaneCamera(figures, floor).render(poses), reference.render(poses)
 
 
@@ -114,7 +115,7 @@ def test_the_cameras_agree_along_the_loop_through_a_lens_that_is_all_but_ideal()
 
 def test_a_lens_without_distortion_is_not_looked_up(monkeypatch):
     monkeypatch.setattr(renderer, "map_coordinates", None)
-    with BulletCamera(replace(NOMINAL, centre_right=0.1, aspect=1.1), FLOOR) as reference:
+    with closing(BulletCamera(replace(NOMINAL, centre_right=0.1, aspect=1.1), FLOOR)) as reference:
         assert reference.render(loop_poses(1)).shape == (1, 48, 64, 3)
 
 
@@ -141,9 +142,9 @@ def worlds():
 
 def test_cameras_live_side_by_side_and_end_with_their_worlds():
     before, poses, inverted = worlds(), loop_poses(1), replace(FLOOR, pixels=255 - FLOOR.pixels)
-    with BulletCamera(NOMINAL, FLOOR) as one:
+    with closing(BulletCamera(NOMINAL, FLOOR)) as one:
         alone = one.render(poses)
-        with BulletCamera(NOMINAL, inverted) as other:
+        with closing(BulletCamera(NOMINAL, inverted)) as other:
             assert other.render(poses)[0, -1, 32].tolist() == (255 - alone[0, -1, 32]).tolist()
             assert (one.render(poses) == alone).all()
     forgotten = BulletCamera(NOMINAL, FLOOR)

@@ -17,7 +17,7 @@ from processes import ENVIRONMENT
 from proxytune.cli.terminal import signals_as_interruptions
 from proxytune.driving import AGENTS, load_agent
 from proxytune.errors import ExtensionError
-from proxytune.extensions import folders, import_beside, load, make, pack, plugins
+from proxytune.extensions import folders, import_beside, load, pack, plugins
 from proxytune.running import working
 
 SHIPPED = {"steady": 1, "bold": 2}
@@ -160,10 +160,10 @@ def test_what_cannot_be_used_is_told_in_one_line(write, case):
 def test_a_keyboard_interrupt_of_a_users_code_is_told_on_the_command_line_and_else_the_users_own(write, name):
     folder = write("study", pressed="raise KeyboardInterrupt\n", mine="def factory(): raise KeyboardInterrupt\n")
     with pytest.raises(KeyboardInterrupt):
-        make(name, kind="agent", beside=folder, needs=("act",))
+        load(name, kind="agent", beside=folder, needs=("act",), call=True)
     told = r"raised KeyboardInterrupt \((pressed|mine).py, line 1\); correct it"
     with signals_as_interruptions(), pytest.raises(ExtensionError, match=told):
-        make(name, kind="agent", beside=folder, needs=("act",))
+        load(name, kind="agent", beside=folder, needs=("act",), call=True)
 
 
 def test_a_class_or_factory_is_called_and_what_has_the_members_is_taken_as_it_is(write):
@@ -171,11 +171,11 @@ def test_a_class_or_factory_is_called_and_what_has_the_members_is_taken_as_it_is
     made = "def factory(): return Mine()\n\n\ndef broken(): return 1 / 0\n"
     folder = write("study", mine=mine + made)
     for name in ("mine:Mine", "mine:ready", "mine:factory"):
-        assert make(name, kind="agent", beside=folder, needs=("size",)).size == 1
+        assert load(name, kind="agent", beside=folder, needs=("size",), call=True).size == 1
     with pytest.raises(
         ExtensionError, match=r"'mine:broken' raised ZeroDivisionError: division by zero \(mine.py, line 12\); correct"
     ):
-        make("mine:broken", kind="agent", beside=folder, needs=("size",))
+        load("mine:broken", kind="agent", beside=folder, needs=("size",), call=True)
 
 
 def test_a_plugin_is_loaded_by_its_name_and_listed(install, write, tmp_path):

@@ -353,14 +353,18 @@ def complaint_of_mrclam(path, **wanted):
     return complaint_of(read_mrclam, path, Wanted(**wanted))
 
 
-def test_a_robot_s_two_files_are_a_drive(tmp_path):
-    source = read_mrclam(write_mrclam(tmp_path), Wanted())
+def holds_the_drive(source, form, name):
     (drive,) = source.drives
-    assert (source.form, drive.name, drive.commands.kind) == ("MRCLAM data set", "Robot1", "twist")
+    assert (source.form, drive.name, drive.commands.kind) == (form, name, "twist")
     np.testing.assert_array_equal(drive.poses.times, TIMES)
     np.testing.assert_array_equal(drive.poses.places[:, :2], PLACES)
-    np.testing.assert_array_equal(drive.poses.headings, HEADINGS)
+    np.testing.assert_allclose(drive.poses.headings, HEADINGS, atol=1e-12)
     np.testing.assert_array_equal(drive.commands.values, SPEEDS)
+
+
+def test_a_robot_s_two_files_are_a_drive(tmp_path):
+    source = read_mrclam(write_mrclam(tmp_path), Wanted())
+    holds_the_drive(source, "MRCLAM data set", "Robot1")
     assert source.channels[0].name == "Robot1_Groundtruth.dat: time"
 
 
@@ -461,12 +465,7 @@ def complaint_of_tum(path, **wanted):
 
 def test_a_trajectory_and_its_commands_are_read(tmp_path):
     source = read_tum(write_tum(tmp_path), Wanted())
-    (drive,) = source.drives
-    assert (source.form, drive.name, drive.commands.kind) == ("TUM trajectory", "run1", "twist")
-    np.testing.assert_array_equal(drive.poses.times, TIMES)
-    np.testing.assert_array_equal(drive.poses.places[:, :2], PLACES)
-    np.testing.assert_allclose(drive.poses.headings, HEADINGS, atol=1e-12)
-    np.testing.assert_array_equal(drive.commands.values, SPEEDS)
+    holds_the_drive(source, "TUM trajectory", "run1")
     assert [channel.role for channel in source.channels][:4] == ["time", "x", "y", "z"]
 
 

@@ -46,7 +46,11 @@ def diagnosed(monkeypatch):
 @pytest.fixture(scope="module")
 def closed_once(tmp_path_factory):
     """A loop, closed once, and its document."""
-    folder, lines = write_tiny(tmp_path_factory.mktemp("closed") / "tiny"), []
+    return close_tiny(write_tiny(tmp_path_factory.mktemp("closed") / "tiny"))
+
+
+def close_tiny(folder):
+    lines = []
     with pytest.MonkeyPatch.context() as patch:
         give_a_diagnosis(patch)
         patch.setattr("builtins.print", lambda *words, **_: lines.append(" ".join(map(str, words))))
@@ -96,14 +100,10 @@ def test_before_and_after_come_with_interval_and_floor(closed_once):
 @pytest.fixture(scope="module")
 def righted_once(closed_once, tmp_path_factory):
     """A closed loop with other held-out agents, one of which is righted, and its document."""
-    folder, lines = Path(shutil.copytree(closed_once[0], tmp_path_factory.mktemp("righted") / "tiny")), []
+    folder = Path(shutil.copytree(closed_once[0], tmp_path_factory.mktemp("righted") / "tiny"))
     study = folder / "study.toml"
     study.write_text(study.read_text().replace(*RIGHTING))
-    with pytest.MonkeyPatch.context() as patch:
-        give_a_diagnosis(patch)
-        patch.setattr("builtins.print", lambda *words, **_: lines.append(" ".join(map(str, words))))
-        assert main(["loop", str(folder), "--json"]) == 0
-    return folder, json.loads(lines[-1])
+    return close_tiny(folder)
 
 
 @pytest.fixture

@@ -14,6 +14,7 @@ from proxytune.diagnosis import (
     Estimate,
     Learning,
     MatchedEffect,
+    NextDrive,
     Offset,
     Ratio,
     Rmse,
@@ -21,7 +22,6 @@ from proxytune.diagnosis import (
 )
 from proxytune.diagnosis.motion.clocks import Jump
 from proxytune.diagnosis.motion.discrepancy import Discrepancy, LearntError
-from proxytune.diagnosis.motion.manoeuvres import LIBRARY, Manoeuvre
 from proxytune.diagnosis.motion.moments import Period
 from proxytune.diagnosis.motion.multistep_fit import MultistepFit
 from proxytune.driving import read_robot
@@ -58,7 +58,7 @@ def diagnosis(**changes):
         "rules": RULES,
         "multistep": None,
     }
-    plain |= {"errors": (), "residual_depends_on": (), "could_not_be_seen": (), "manoeuvre": None}
+    plain |= {"errors": (), "residual_depends_on": (), "could_not_be_seen": (), "next_drive": None}
     plain |= {
         "clocks": (),
         "robot_clusters": None,
@@ -104,18 +104,16 @@ def test_an_effect_that_could_not_be_weighed_is_not_shown_to_matter():
     ]
 
 
-def test_where_noise_is_not_known_a_manoeuvre_is_to_be_driven_ten_times():
-    name, text, shape = LIBRARY[0]
-    again = Manoeuvre(name, text, ("noise", "what is missing"), None, shape(TIMES), 10)
-    (note,) = motion_notes(diagnosis(manoeuvre=again))
-    assert note.startswith("to tell noise from what is missing, drive figure-eight 10 times from the same commands")
-    rivals = Manoeuvre(name, text, ("a", "b"), 50.0, shape(TIMES), 10)
-    lines = motion_notes(diagnosis(manoeuvre=rivals))
-    assert lines[0].startswith("to tell a from b, drive figure-eight (one minute is ample): ")
-    assert "10 times" in lines[1]
-    (weak,) = motion_notes(diagnosis(manoeuvre=Manoeuvre(name, text, ("a", "b"), 3.0, shape(TIMES))))
-    assert "(expected gain 3 nats a minute)" in weak
-    assert len(motion_notes(diagnosis(manoeuvre=Manoeuvre(name, text, ("a", "b"), 50.0, shape(TIMES))))) == 1
+def test_the_next_drive_is_told_with_what_it_tells_and_how_often_to_drive_it():
+    def told(nats, *between, verdict="explained"):
+        drive = NextDrive("the designed drive", "so", between, nats, np.zeros((2, 2)), 20.0, 10, (4.0, 3.0), None)
+        return motion_notes(diagnosis(next_drive=drive, verdict=verdict))
+
+    often = "drive the designed drive 10 times from the same commands, and diagnose the log with these drives in it"
+    assert told(9.0, "noise", "what is missing") == [f"to tell noise from what is missing, {often}: so"]
+    assert told(50.0, "a", "b") == [f"to tell a from b, {often} (one minute is ample): so"]
+    assert told(3.0, "a", "b", "c") == [f"to tell a from b from c, {often} (expected gain 3 nats a minute): so"]
+    assert told(50.0, "a", "b", verdict="cannot be told")[1] == "the same drives tell noise from what is missing"
 
 
 def test_parameters_fitted_to_windows_are_told_with_what_that_did():

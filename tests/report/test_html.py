@@ -242,3 +242,10 @@ def test_words_are_explained_where_they_are_used_and_links_stay_beside_the_page(
     assert "<dt>noise floor</dt>" in page
     assert "<dt>nats</dt>" not in page
     assert re.findall(r'<a href="([^"#]+)', page) == ["diagnosed/report.html", "../report.html"]
+
+
+def test_numbers_have_a_minus_and_what_a_row_is_of_is_told_by_its_indent():
+    """A name with a hyphen keeps it; an indent holds where the name takes two lines."""
+    columns = columns_of(("name",), ("value",))
+    page = html_of(replace(VIEW, parts=(Table("T", columns, (("  a-1", "-0.3 (-1 to 2)"),)),)))
+    assert '<th scope="row" class="part">a-1</th><td class="number">−0.3 (−1 to 2)</td>' in page

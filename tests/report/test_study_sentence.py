@@ -54,6 +54,13 @@ def test_theta_that_makes_a_perfect_proxy_is_found_and_the_least_known_parameter
     )
 
 
+@pytest.mark.parametrize(
+    ("high", "said"), [(-0.5, "perfect proxy. Next"), (0.4, "at most 1 pair worse. "), (1.2, "at most 2 pairs worse. ")]
+)
+def test_pairs_that_may_be_worse_are_counted_where_there_may_be_any(high, said):
+    assert said in say_finding(replace(FOUND, excess=Estimate(-8.0, -15.0, high)))
+
+
 def test_a_score_above_the_floor_is_not_called_found():
     text = say_finding(ABOVE)
     assert text.startswith("θ narrowed down to 0.16 % of the box: trim 0.121 ")

@@ -87,7 +87,7 @@ def test_what_was_published_stands_beside_what_is_found_here_with_its_source():
     page = teach_view(experiment(published=theirs), {}, b"a picture")
     table = next(part for part in page.parts if getattr(part, "title", "") == "Beside what was published")
     assert [row[:2] for row in table.rows] == [("none", "0"), ("sure", "47.4")]
-    assert table.rows[1][3:] == ("250", "100 (50 to 400)", "97%", "")
+    assert table.rows[1][3:] == ("250", "100 (50 to 400)", "97 %", "")
     assert table.notes == ("a paper",)
     nobody = teach_view(experiment(), {}, b"a picture")
     assert len(nobody.parts) == len(page.parts) - 1

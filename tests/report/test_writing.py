@@ -1,5 +1,7 @@
 import os
+import re
 
+import matplotlib as mpl
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -7,7 +9,7 @@ from PIL import Image
 
 from proxytune.errors import RunError
 from proxytune.files import draft_path
-from proxytune.report.writing import figures_also_as, save_figure, write_picture, write_text
+from proxytune.report.writing import figures_also_as, save_figure, svg_of, write_picture, write_text
 
 
 @pytest.fixture
@@ -104,3 +106,17 @@ def test_a_file_is_on_disk_before_it_has_its_name(tmp_path, monkeypatch):
     monkeypatch.setattr(os, "fsync", lambda descriptor: steps.append((os.fstat(descriptor).st_size, path.exists())))
     write_text(path, "new")
     assert steps == [(3, False)]
+
+
+def test_powers_of_ten_at_an_axis_are_formulas_and_a_dollar_in_a_name_is_none():
+    """What Matplotlib writes at ticks is never shown as its source, on a page or in a file."""
+    made = Figure(figsize=(2.0, 1.5))
+    axes = made.subplots()
+    axes.plot([1, 1000], [0, 1])
+    axes.set_xscale("symlog")
+    axes.set_title("$a$ and $b$")
+    with mpl.rc_context({"svg.fonttype": "none"}):
+        svg_of(made)  # tick labels have their texts from the first drawing on
+        drawn = svg_of(made).decode("utf-8")
+    assert "mathdefault" not in re.sub("<!--.*?-->", "", drawn)
+    assert "$a$ and $b$" in drawn

@@ -34,6 +34,13 @@ def test_one_table_of_both_sides_gives_each_its_own_column_as_a_share(file):
     assert both_metrics(["Policy", "Sim success (%)", "Real success (%)", "Real n", "Sim n"]) == ["success"]
 
 
+@pytest.mark.parametrize("cell", ["120", "-20", "100.5%"])
+def test_a_success_rate_beyond_all_rollouts_is_refused_by_its_line_and_other_percentages_are_not(file, cell):
+    with pytest.raises(ScoresError, match="line 2, column 'success': a success rate lies between 0 and 100 %"):
+        means(file(f"Policy,success (%)\nACT,{cell}\npi0,90\n"))
+    assert means(file("Policy,progress (%)\nACT,120\npi0,90\n"), "progress") == {"ACT": 1.2, "pi0": 0.9}
+
+
 @pytest.mark.parametrize(
     "text",
     [

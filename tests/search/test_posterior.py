@@ -13,7 +13,7 @@ from steps import SPACE, goal, whole
 from proxytune.search import Trial, from_unit, learn_theta, to_unit
 from proxytune.search.engine import design_point
 from proxytune.search.likelihood import fit_outputs
-from proxytune.search.posterior import FEWEST, MARGIN, WIDENINGS, LeftOut, leave_out, posterior_of
+from proxytune.search.posterior import FEWEST, MARGIN, WIDENINGS, LeftOut, Misfit, leave_out, posterior_of
 
 AGENTS = np.random.default_rng(0).uniform(1.0, 4.0, (12, 2))
 
@@ -90,11 +90,14 @@ def trials_of_misfit(seed, count=16):
     return [Trial(p, 1.0, tuple(outputs(p, 100 * seed + row).tolist())) for row, p in enumerate(points)]
 
 
-def p_value(seed, shift):
+def learnt(seed, shift):
     values = from_unit(SPACE, np.random.default_rng(seed).uniform(0.2, 0.8, 2))
     target = outputs(values, 10_000 + seed) + shift * np.resize([1.0, -1.0, 0.0], 12)
-    told = trials_of_misfit(seed)
-    return learn_theta(SPACE, told, goal(whole, target, SPREAD**2), seed).misfit.p_value
+    return learn_theta(SPACE, trials_of_misfit(seed), goal(whole, target, SPREAD**2), seed)
+
+
+def p_value(seed, shift):
+    return learnt(seed, shift).misfit.p_value
 
 
 @pytest.mark.slow
@@ -107,6 +110,40 @@ def test_targets_that_the_proxy_can_make_are_seldom_said_to_be_beyond_it():
 @pytest.mark.slow
 def test_targets_beyond_it_are_found():
     assert max(p_value(seed, 0.6) for seed in range(6)) < 0.05
+
+
+def test_where_no_theta_explains_the_target_the_density_is_wider_by_how_much_farther_off_it_is():
+    """The log density is divided by the dispersion, and the region takes more of the box."""
+    found = learnt(0, 0.6)
+    dispersion = found.misfit.deviance / found.misfit.expected
+    assert found.misfit.fits is False
+    assert dispersion > 2.0
+    points = np.array([[0.3, 0.4], [0.7, 0.5]])
+    narrow = found.likelihood.log(points) / found.left_out.widening
+    assert found.log(points) == pytest.approx(narrow / dispersion)
+    as_if_it_fits = posterior_of(lambda some: found.log(some) * dispersion, 2)
+    assert found.posterior.share > 1.5 * as_if_it_fits.share
+
+
+def test_where_some_theta_may_explain_it_the_density_stays():
+    found = learnt(0, 0.0)
+    assert found.misfit.fits is True
+    points = np.array([[0.3, 0.4], [0.7, 0.5]])
+    assert found.log(points).tolist() == (found.likelihood.log(points) / found.left_out.widening).tolist()
+
+
+@pytest.mark.parametrize(
+    ("misfit", "dispersion"),
+    [
+        (Misfit(2.0, 0.5, 0.02), 4.0),
+        (Misfit(0.4, 0.5, 0.02), 1.0),
+        (Misfit(2.0, 0.5, 0.03), 1.0),
+        (Misfit(2.0, None, None), 1.0),
+        (Misfit(None, None, None), 1.0),
+    ],
+)
+def test_the_dispersion_is_one_unless_a_misfit_is_said(misfit, dispersion):
+    assert misfit.dispersion == dispersion
 
 
 def test_the_same_trials_in_any_order_give_the_same_verdict():

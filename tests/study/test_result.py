@@ -15,7 +15,7 @@ from proxytune.errors import EpisodeError, RunError
 from proxytune.report import study_document
 from proxytune.report.study.tables import usefulness_table
 from proxytune.running import Silent
-from proxytune.search import make_proposer
+from proxytune.search import Knowledge, make_proposer
 from proxytune.search.posterior import Misfit
 from proxytune.seeds import fresh_seed
 from proxytune.storage import Store, TrialRecord
@@ -319,6 +319,16 @@ def test_perfect_is_only_what_neither_prpv_nor_any_other_output_tells_from_the_t
     assert found.judged.prpv.value == 0
     assert found.perfect is perfect
     assert found.judged.at_noise_floor is True
+
+
+@pytest.mark.parametrize(("p_value", "warned"), [(0.01, True), (0.5, False), (None, False)])
+def test_a_caution_says_that_theta_is_not_to_be_trusted_where_no_theta_explains_the_target(
+    finished, monkeypatch, p_value, warned
+):
+    monkeypatch.setattr(Knowledge, "misfit", Misfit(3.0, 1.0, p_value))
+    with Store.open(finished) as store:
+        cautions = result_of(StudyRun(opened(finished), store)).cautions
+    assert any("divided by 3.0); do not trust θ elsewhere" in line for line in cautions) is warned
 
 
 TRIALS = (

@@ -71,4 +71,4 @@ def test_a_smaller_bound_takes_more_rollouts():
 
 
 def test_agents_too_much_alike_are_told():
-    assert "too much alike" in planned([12, 12], 25, 1e-6).reason
+    assert "too much alike" in planned([2500, 2500], 5000, 1e-6).reason

@@ -32,9 +32,9 @@ from proxytune.diagnosis.motion.effect_size import (
     measure_effect_size,
 )
 from proxytune.diagnosis.motion.evidence import AdoptedEffect, DroppedEffect, Findings, Variant
+from proxytune.diagnosis.motion.excitation import LIMITS, Limits, NextDrive, design_drive
 from proxytune.diagnosis.motion.fitting import Fit, check_motion, check_units, intervals
 from proxytune.diagnosis.motion.innovations import Noise, at_edge
-from proxytune.diagnosis.motion.manoeuvres import Manoeuvre, next_manoeuvre
 from proxytune.diagnosis.motion.moments import Period, find_period
 from proxytune.diagnosis.motion.multistep_fit import (
     HORIZONS_S,
@@ -60,6 +60,7 @@ from proxytune.diagnosis.motion.prediction import (
 )
 from proxytune.diagnosis.motion.screening import MOTION_EFFECTS, motion_effects
 from proxytune.diagnosis.motion.selection import fit_declared, select_effects
+from proxytune.diagnosis.stages import Stages
 from proxytune.driving import Robot
 from proxytune.effects import SHIPPED, Catalogue, effect_of
 from proxytune.errors import LogError
@@ -263,7 +264,8 @@ class Diagnosis:
         errors: On the planar plant, by horizon, shortest first.
         confirmed: The error over 2 s on the bullet plant, None where the robot has no body for it.
         could_not_be_seen: Effects that these drives could not have shown.
-        manoeuvre: What to drive to tell rivals apart, or noise from what is missing; None where nothing is asked.
+        next_drive: What to drive to tell rivals apart, or noise from what is missing; None where nothing is asked.
+        command: Kind of the log's commands.
         parts: The drives that were fitted and tested.
         found: What the search came to.
         clocks: Those of the log, and of the log to test on where that is another.
@@ -286,7 +288,8 @@ class Diagnosis:
     errors: tuple[HorizonError, ...]
     confirmed: HorizonError | None
     could_not_be_seen: tuple[str, ...]
-    manoeuvre: Manoeuvre | None
+    next_drive: NextDrive | None
+    command: str
     parts: Parts
     found: Findings
     clocks: tuple[Clocks, ...]
@@ -341,6 +344,8 @@ def diagnose(
     seed: int = 1,
     report: Progress = lambda _: None,
     rules: Rules = RULES,
+    limits: Limits = LIMITS,
+    stages: Stages | None = None,
 ) -> Diagnosis:
     """Tune what is declared, find what is missing, and test both on drives kept aside.
 
@@ -352,6 +357,8 @@ def diagnose(
         seed: Of the null distributions.
         report: Takes a line about each step, as it begins.
         rules: Thresholds of what is named, believed and told.
+        limits: Of the next drive.
+        stages: Where results are kept on the way, so that a diagnosis that was killed goes on.
 
     Raises:
         LogError: If the log cannot bear the question (too short, no motion, other units), or a declared effect is
@@ -368,21 +375,26 @@ def diagnose(
     parts = Parts(*(replace(drives, rules=rules) for drives in split(log, robot, test, clocks)))
     check_motion(log.name, parts.fitted)
     check_units(log.name, parts.fitted, start)
-    report("fitting what is declared")
-    found = select_effects(fit_declared(parts.fitted, start, names), seed, report)
-    found = drop_negligible(found, seed, parts.tested)
-    report("fitting to windows of prediction")
-    declared_fit, before = fit_multistep(found.declared)
-    # Before and after are compared on equal terms.
-    added = found.adopted or found.negligible
-    model, after = fit_multistep(found.model) if added else (declared_fit, before)
-    found = replace(found, declared=declared_fit, model=model)
-    report("learning what no named effect explains")
-    learning = learn(found, parts.tested, HORIZONS_S)
-    report("testing on drives kept aside")
+    stages = stages or Stages()
     whole = replace(all_drives(test or log, robot, clocks[-1]), rules=rules)
+    stages.know(robot=robot, rules=rules, fitted=parts.fitted, tested=parts.tested, whole=whole)
+    keep = stages.keep
+    report("fitting what is declared")
+    declared_alone = keep("declared", lambda: fit_declared(parts.fitted, start, names))
+    selected = keep("selected", lambda: select_effects(declared_alone, seed, report))
+    named = keep("worth", lambda: drop_negligible(selected, seed, parts.tested))
+    report("fitting to windows of prediction")
+    declared_fit, before = keep("declared_windows", lambda: fit_multistep(named.declared))
+    # Before and after are compared on equal terms.
+    added = named.adopted or named.negligible
+    model, after = keep("windows", lambda: fit_multistep(named.model)) if added else (declared_fit, before)
+    found = replace(named, declared=declared_fit, model=model)
+    report("learning what no named effect explains")
+    learning = keep("learnt", lambda: learn(found, parts.tested, HORIZONS_S))
+    report("testing on drives kept aside")
     tested = KeptAside(parts.tested, whole, pose_noise(parts.tested, found.model.theta))
-    errors = tuple(error for h in HORIZONS_S if (error := horizon_error(found, tested, h, learning.theta)) is not None)
+    told = [keep(f"error_{h:g}", lambda h=h: horizon_error(found, tested, h, learning.theta)) for h in HORIZONS_S]  # type: ignore[misc]
+    errors = tuple(error for error in told if error is not None)
     if not errors:
         raise LogError(f"{log.name}: no second of unbroken poses to test on; record longer drives")
     period = find_period(parts.fitted, found.model.theta)
@@ -394,12 +406,14 @@ def diagnose(
     confirmed = None
     if has_body(parts.tested):
         report("confirming on the bullet plant")
-        confirmed = horizon_error(found, tested, CONFIRMED_S, {}, bullet_pose_errors)
+        confirmed = keep("bullet", lambda: horizon_error(found, tested, CONFIRMED_S, {}, bullet_pose_errors))
     every = whole if test is None else replace(all_drives(log, robot, own), rules=rules)
     dropped = tuple(one.effect for one in found.negligible)
     beside = Variant(found.model.theta, found.model.free)
     weighed = [DroppedEffect(effect, beside) for effect in found.adopted] + list(found.negligible)
+    report("designing the next drive")
     seen = {effect_of(name) for name in names} | {effect.effect for effect in (*found.adopted, *dropped)}
+    unseen = invisible_effects(found.model, seen)
     return Diagnosis(
         log=log.name,
         robot=robot,
@@ -418,8 +432,11 @@ def diagnose(
         ),
         errors=errors,
         confirmed=confirmed,
-        could_not_be_seen=invisible_effects(found.model, seen),
-        manoeuvre=next_manoeuvre(found, again=explained is None),
+        could_not_be_seen=unseen,
+        next_drive=keep(
+            "next", lambda: design_drive(found, again=explained is None, limits=limits, unseen=unseen, seed=seed)
+        ),
+        command=log.command,
         parts=parts,
         found=found,
         clocks=clocks,

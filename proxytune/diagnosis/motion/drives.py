@@ -20,7 +20,7 @@ from proxytune.diagnosis.answer import RULES, Rules
 from proxytune.driving import Robot, read_robot, robot_from_geometry, robot_names
 from proxytune.effects import SHIPPED, Catalogue, track_of
 from proxytune.errors import LogError
-from proxytune.logs import CAR_COMMANDS, Log, LogEpisode
+from proxytune.logs import Log, LogEpisode, check_kind
 from proxytune.settings import GEOMETRY, nearest
 
 
@@ -68,12 +68,7 @@ def duties_of(log: Log, robot: Robot, commands: Floats) -> Floats:
     figures = robot.figures
     if log.command == "none":
         raise LogError(f"{log.name}: has no commands; a log needs duties, twists or wheel speeds to learn from")
-    if (log.command in CAR_COMMANDS) != (robot.drive == "ackermann") and log.command != "twist":
-        drives = "steers" if robot.drive == "ackermann" else "drives by two wheels"
-        raise LogError(
-            f"{log.name}: commands of kind '{log.command}' are not for robot '{robot.name}', which {drives} "
-            f'(drive = "{robot.drive}" in its robot.toml); name another with --robot'
-        )
+    check_kind(log.command, robot.name, robot.drive, log.name)
     if log.command in ("duty", "ackermann"):
         return commands
     if robot.drive == "ackermann":
@@ -110,6 +105,27 @@ def _steered(log: Log, robot: Robot, commands: Floats) -> Floats:
             f"'{robot.name}'; state a higher full_speed in its robot.toml"
         )
     return np.stack((speeds / figures["full_speed"], np.clip(angles / widest, -1.0, 1.0)), axis=-1)
+
+
+def commands_as(kind: str, robot: Robot, duties: Floats) -> Floats:
+    """Fractions of full wheel speed (…, 2), of a car throttle and steering, as a log's kind of commands (…, 2).
+
+    Args:
+        kind: One of the kinds that suit the robot.
+        robot: Whose figures count.
+        duties: What `duties_of` would make of the result.
+    """
+    if kind in ("duty", "ackermann"):
+        return duties
+    figures, speeds = robot.figures, duties * robot.figures["full_speed"]
+    if robot.drive == "ackermann":
+        speed, angle = speeds[..., 0], duties[..., 1] * math.radians(figures["wheel_angle"])
+        if kind == "twist":
+            return np.stack((speed, speed * np.tan(angle) / figures["wheelbase"]), axis=-1)
+        return np.stack((speed, angle), axis=-1)
+    if kind == "wheel_speed":
+        return np.asarray(speeds / figures["wheel_radius"])
+    return np.stack((speeds.mean(axis=-1), np.diff(speeds)[..., 0] / figures["effective_baseline"]), axis=-1)
 
 
 class Commands(NamedTuple):

@@ -79,12 +79,8 @@ def fit(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], noise: Noise
 
     Within a round the filter's gains are frozen: otherwise flat gains would pass for evidence.
     """
-    sloped = smooth_coordinates(free, drives.robot)
-    rough = tuple(coordinate for coordinate in free if coordinate not in sloped)
     for number in range(ROUNDS):
-        whiten = whitener(drives, noise)
-        theta = _scan(drives, theta, rough, whiten, SCANS[min(number, len(SCANS) - 1)])
-        theta = _fit_theta(drives, theta, sloped, whiten)
+        theta = fit_theta(drives, theta, free, whitener(drives, noise), SCANS[min(number, len(SCANS) - 1)])
         noise = fit_noise(drives, drives.measured - increments(drives, theta), noise)
     return evaluate(drives, theta, free, noise)
 
@@ -96,7 +92,24 @@ def evaluate(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], noise: 
     return Fit(drives, theta, free, noise, whiten, innovations, slopes(drives, theta, free, whiten))
 
 
-def _fit_theta(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], whiten: Whitener) -> Theta:
+def fit_theta(
+    drives: Drives, theta: Theta, free: tuple[Coordinate, ...], whiten: Whitener, multiples: Floats = SCANS[0]
+) -> Theta:
+    """Fit free coordinates from where θ has them under frozen gains; those that change the motion by steps first.
+
+    Args:
+        drives: What is fitted to.
+        theta: Where to begin.
+        free: What is fitted.
+        whiten: Of the noise.
+        multiples: Where coordinates that act by steps are looked for, as multiples of their value.
+    """
+    sloped = smooth_coordinates(free, drives.robot)
+    rough = tuple(coordinate for coordinate in free if coordinate not in sloped)
+    return _fit_sloped(drives, _scan(drives, theta, rough, whiten, multiples), sloped, whiten)
+
+
+def _fit_sloped(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], whiten: Whitener) -> Theta:
     if not free:
         return theta
     low, high = np.array([span(coordinate, drives.robot) for coordinate in free]).T

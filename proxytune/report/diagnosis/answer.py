@@ -21,6 +21,7 @@ from proxytune.report.diagnosis.document import (
 )
 from proxytune.report.diagnosis.figures import motion_figures
 from proxytune.report.diagnosis.notes import motion_headline, motion_notes, next_drives
+from proxytune.report.export.player import commands_text, player_text
 from proxytune.report.html import write_page
 from proxytune.report.meanings import findings
 from proxytune.report.text import group_texts, table_text
@@ -94,7 +95,7 @@ CAPTIONS = {
 
 
 def write_diagnosis(found: LogDiagnosis, folder: Path, command: str = "") -> list[Path]:
-    """Write diagnosis.json, model.toml, figures and page; their paths.
+    """Write diagnosis.json, model.toml, next/commands.csv with a ROS 2 node that plays it, figures and page; paths.
 
     Args:
         found: What the log says.
@@ -108,13 +109,26 @@ def write_diagnosis(found: LogDiagnosis, folder: Path, command: str = "") -> lis
     text = json.dumps(diagnosis_document(found), indent=2, allow_nan=False, ensure_ascii=False)
     write_text(document, text)
     write_text(model, extended_model_text(found))
+    following = _write_next(found, folder / "next")
     figures = {folder / f"{name}.png": figure for name, figure in diagnosis_figures(found).items()}
     for path, figure in figures.items():
         save_figure(figure, path)
     drawn = {path.stem: svg_of(figure) for path, figure in figures.items()}
     foot = foot_of(command, [("log", found.log), ("robot", found.robot.name)])
     write_page(page, diagnosis_view(found, drawn), foot)
-    return [document, model, *figures, page]
+    return [document, model, *following, *figures, page]
+
+
+def _write_next(found: LogDiagnosis, folder: Path) -> list[Path]:
+    """Write the next drive, or take an earlier diagnosis' away."""
+    paths = [folder / "commands.csv", folder / "play_commands.py"]
+    if found.motion is None or found.motion.next_drive is None:
+        for path in paths:
+            path.unlink(missing_ok=True)
+        return []
+    for path, text in zip(paths, (commands_text(found.motion), player_text(found.motion)), strict=True):
+        write_text(path, text)
+    return paths
 
 
 def diagnosis_view(found: LogDiagnosis, figures: Mapping[str, bytes]) -> View:

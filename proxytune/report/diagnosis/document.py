@@ -64,13 +64,16 @@ def extended_model_text(found: LogDiagnosis) -> str:
 
 def motion_document(diagnosis: Diagnosis) -> dict[str, Any]:
     """Everything that `diagnose --json` prints of motion."""
-    polish, drive = diagnosis.multistep, diagnosis.manoeuvre
+    polish, drive = diagnosis.multistep, diagnosis.next_drive
     manoeuvre = drive and {
         "name": drive.name,
         "description": drive.description,
         "tells_apart": list(drive.between),
         "nats_per_minute": drive.nats_per_minute,
         "times": drive.times,
+        "seconds": drive.seconds,
+        "room_m": list(drive.room),
+        "library": drive.manoeuvre and dict(zip(("name", "nats_per_minute"), drive.manoeuvre, strict=True)),
     }
     return {
         "log": diagnosis.log,

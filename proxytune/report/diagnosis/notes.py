@@ -153,18 +153,17 @@ def _cautions(diagnosis: Diagnosis) -> list[str]:
 
 def next_drives(diagnosis: Diagnosis) -> list[str]:
     """Say what to drive next, a line each; nothing where there is nothing to tell apart."""
-    next_drive = diagnosis.manoeuvre
-    if next_drive is None:
+    drive = diagnosis.next_drive
+    if drive is None:
         return []
-    often = f"{next_drive.times} times from the same commands, and diagnose the log with these drives in it"
-    if next_drive.nats_per_minute is None:
-        return [f"to tell noise from what is missing, drive {next_drive.name} {often}: {next_drive.description}"]
-    gain = f"expected gain {next_drive.nats_per_minute:.0f} nats a minute"
-    clear = "one minute is ample" if next_drive.nats_per_minute >= AMPLE else gain
-    drive = f"drive {next_drive.name} ({clear}): {next_drive.description}"
-    lines = [f"to tell {' from '.join(next_drive.between)}, {drive}"]
-    if next_drive.times > 1:
-        lines.append(f"to tell noise from what is missing, drive this {often}")
+    often = f"{drive.times} times from the same commands, and diagnose the log with these drives in it"
+    if drive.between[0] == "noise":
+        return [f"to tell {' from '.join(drive.between)}, drive {drive.name} {often}: {drive.description}"]
+    gain = f"expected gain {drive.nats_per_minute:.0f} nats a minute"
+    clear = "one minute is ample" if drive.nats_per_minute >= AMPLE else gain
+    lines = [f"to tell {' from '.join(drive.between)}, drive {drive.name} {often} ({clear}): {drive.description}"]
+    if diagnosis.verdict == "cannot be told":
+        lines.append("the same drives tell noise from what is missing")
     return lines
 
 

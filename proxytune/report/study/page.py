@@ -121,8 +121,8 @@ def study_pictures(result: StudyResult, figures: Mapping[str, bytes]) -> dict[st
         "importance": "A dot is the share in the variance of PRPV over the box that a parameter takes part in; the "
         "stroke is what it does alone. Lines are 95 % intervals: where they overlap, the order is not known. Where a "
         "dot stands near the lower end of its line, the true share may well be larger, but hardly smaller.",
-        "evaluations": f"Darker points have lower PRPV{hollow}. The shadow is the 95 % region: where it is "
-        "long and slanting, two parameters make up for each other (correlation above it). The ring is the "
+        "evaluations": f"Each point’s colour is its PRPV, as the bar says{hollow}. The shadow is the 95 % region: "
+        "where it is long and slanting, two parameters make up for each other (correlation above it). The ring is the "
         f"answer.{truth}",
     }
     return {name: Picture(TITLES[name], image, captions[name]) for name, image in figures.items()}
@@ -157,7 +157,7 @@ def live_view(settings: StudySettings, objective: str, trials: Sequence[TrialRec
         picture = Picture(f"{objective.upper()} trial by trial", image, caption)
         shown = (picture, trials_table(trials, tuple(trials[0].theta), measures))
     sentence = f"{f'Under way: {doing}.' if doing else 'Stopped before its end.'} {_say_best(trials, objective)}"
-    return View(settings.name, sentence, WAIT if doing else CONTINUE, shown)
+    return View(f"{settings.name}: which θ makes the simulator useful?", sentence, WAIT if doing else CONTINUE, shown)
 
 
 def _say_best(trials: Sequence[TrialRecord], measure: str) -> str:

@@ -176,7 +176,9 @@ def _say_usefulness(finding: Finding) -> str:
     if excess.low > 0.0:
         lower = f"a perfect proxy scores lower, by {pairs_span(*excess[1:])}"
         return f"{score}, {floor}: better than chance, but {lower}.{before}"
-    told = f"it cannot be told from a perfect proxy; at most {fixed(ceil(excess.high), 0)} pairs worse"
+    most = ceil(excess.high)
+    worse = f"; at most {most} {'pair' if most == 1 else 'pairs'} worse" if most > 0 else ""
+    told = f"it cannot be told from a perfect proxy{worse}"
     other = "" if finding.perfect else ", but other scores of the agents differ from the target's"
     return f"{score}, {floor}: {told}{other}.{before}"
 

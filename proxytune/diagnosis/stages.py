@@ -1,0 +1,149 @@
+"""Stages of a diagnosis of motion, kept as facts, so that one that was killed goes on where it was.
+
+Each stage is a function of what came before, of the log, the robot, the options and our code. All of these have one
+digest, under which the results of stages lie; with another digest they are other results, and those of before are
+removed. What is read again is the same to the last bit. Files are pickles of numbers and of our own classes alone:
+nothing else is made of them when they are read, for a folder of findings may be a stranger's. Robots and drives are not
+in them, but what stands for these.
+"""
+
+import contextlib
+import dataclasses
+import io
+import pickle
+import shutil
+from collections.abc import Callable, Mapping
+from enum import Enum
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+import proxytune
+from proxytune.errors import RunError
+from proxytune.files import draft_of
+from proxytune.identity import digest, meaning_of, meaning_of_code, versions_of
+from proxytune.logs import Log
+
+Result = TypeVar("Result")
+
+ROOMS = ("logs", "effects", "driving", "diagnosis")
+"""Rooms whose code a diagnosis of motion depends on."""
+
+FOLDER = ".stages"
+"""Where stages lie in the folder of the findings until these are written."""
+
+NUMBERS = {
+    ("numpy", "ndarray"),
+    ("numpy", "dtype"),
+    ("numpy.core.multiarray", "_reconstruct"),
+    ("numpy.core.multiarray", "scalar"),
+    ("numpy._core.multiarray", "_reconstruct"),
+    ("numpy._core.multiarray", "scalar"),
+    ("numpy._core.numeric", "_frombuffer"),
+    ("numpy.core.numeric", "_frombuffer"),
+}
+"""What arrays are made by."""
+
+SIGNALS = "proxytune.diagnosis.motion.signals"
+"""Its functions, which only reckon, are bound to curves."""
+
+
+def facts_of(log: Log, test: Log | None, robot: Any, *options: object) -> str:
+    """A digest of all that a diagnosis of motion depends on: logs, robot, options, and what our code means."""
+    package = Path(proxytune.__file__).parent
+    code = meaning_of((path for room in ROOMS for path in (package / room).rglob("*.py")), package)
+    effects = [(name, meaning_of_code(robot.catalogue.effect(name))) for name in robot.catalogue.names]
+    built = (robot.name, robot.drive, robot.reverse, sorted(robot.figures.items()), sorted(robot.theta.items()))
+    versions = sorted(versions_of(("numpy", "scipy", "pybullet")).items())
+    return digest(_plain(log), None if test is None else _plain(test), built, effects, options, code, versions)
+
+
+def _plain(value: Any) -> object:
+    """A value without arrays, which are told by their bytes."""
+    if isinstance(value, np.ndarray):
+        return value.shape, str(value.dtype), digest(value.tobytes().hex())
+    if dataclasses.is_dataclass(value):
+        return tuple(_plain(getattr(value, field.name)) for field in dataclasses.fields(value))
+    if isinstance(value, Mapping):
+        return sorted((name, _plain(one)) for name, one in value.items())
+    return tuple(map(_plain, value)) if isinstance(value, tuple | list) else value
+
+
+class Stages:
+    """Results of stages in a folder; without one nothing is kept.
+
+    Args:
+        folder: Where the findings go, or None.
+        facts: What the stages depend on.
+    """
+
+    def __init__(self, folder: Path | None = None, facts: str = "") -> None:
+        self._folder = None if folder is None else folder / FOLDER / facts
+        self._known: dict[str, Any] = {}
+        if folder is not None and (folder / FOLDER).is_dir():
+            for other in (folder / FOLDER).iterdir():
+                if other.name != facts:
+                    shutil.rmtree(other, ignore_errors=True)
+
+    def know(self, **things: Any) -> None:
+        """Name things that stages refer to and that are made anew each time."""
+        self._known |= things
+
+    def keep(self, stage: str, make: Callable[[], Result]) -> Result:
+        """The result of a stage, made if it is not kept.
+
+        Raises:
+            RunError: If it cannot be written.
+        """
+        if self._folder is None:
+            return make()
+        path = self._folder / f"{stage}.pickle"
+        # What a disk has spoilt is made again.
+        with contextlib.suppress(Exception):
+            return _Reader(io.BytesIO(path.read_bytes()), self._known).load()  # type: ignore[no-any-return]
+        result, content = make(), io.BytesIO()
+        _Writer(content, self._known).dump(result)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with draft_of(path) as draft:
+                draft.write_bytes(content.getvalue())
+        except OSError as problem:
+            raise RunError(f"{path}: cannot be written ({problem.strerror}); fix that and run again") from None
+        return result
+
+
+def forget_stages(folder: Path) -> None:
+    """Remove the stages of a diagnosis whose findings are written."""
+    shutil.rmtree(folder / FOLDER, ignore_errors=True)
+
+
+class _Writer(pickle.Pickler):
+    def __init__(self, file: io.BytesIO, known: Mapping[str, Any]) -> None:
+        super().__init__(file, protocol=5)
+        self._names = {id(thing): name for name, thing in known.items()}
+
+    def persistent_id(self, thing: Any) -> str | None:
+        return self._names.get(id(thing))
+
+
+class _Reader(pickle.Unpickler):
+    def __init__(self, file: io.BytesIO, known: Mapping[str, Any]) -> None:
+        super().__init__(file)
+        self._known = known
+
+    def persistent_load(self, name: str) -> Any:
+        return self._known[name]
+
+    def find_class(self, module: str, name: str) -> Any:
+        """Find numbers and our own classes of values; nothing else is made."""
+        if (module, name) in NUMBERS:
+            return super().find_class(module, name)
+        found = super().find_class(module, name) if module.startswith("proxytune.") and "." not in name else None
+        if isinstance(found, type) and (dataclasses.is_dataclass(found) or issubclass(found, tuple | Enum)):
+            return found
+        if (module, name) == ("functools", "partial"):
+            return super().find_class(module, name)
+        if module == SIGNALS and getattr(found, "__module__", "") == SIGNALS:
+            return found
+        raise pickle.UnpicklingError(f"{module}.{name} is no value of a stage")

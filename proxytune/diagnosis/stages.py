@@ -76,12 +76,17 @@ class Stages:
     Args:
         folder: Where the findings go, or None.
         facts: What the stages depend on.
+
+    Raises:
+        RunError: If a symbolic link is in the place of the stages: what it leads to is not ours to remove.
     """
 
     def __init__(self, folder: Path | None = None, facts: str = "") -> None:
         self._folder = None if folder is None else folder / FOLDER / facts
         self._known: dict[str, Any] = {}
         if folder is not None and (folder / FOLDER).is_dir():
+            if (folder / FOLDER).is_symlink():
+                raise RunError(f"{folder / FOLDER}: is a symbolic link; remove it, or give another folder")
             for other in (folder / FOLDER).iterdir():
                 if other.name != facts:
                     shutil.rmtree(other, ignore_errors=True)

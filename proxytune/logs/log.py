@@ -27,6 +27,12 @@ of a car throttle and steering in [−1, 1], left positive, or speed [m/s] and w
 CAR_COMMANDS = ("ackermann", "speed_steering")
 """Kinds of command that are a car's."""
 
+ENABLED = "enabled"
+"""The column that says whether the motors are on (1) or cut by a switch (0)."""
+
+POSE = ("x", "y", "heading")
+WHEELS = ("wheel_left", "wheel_right")
+
 
 def check_kind(command: str, robot: str, drive: str, where: str) -> None:
     """Refuse commands of another kind than a robot takes; a twist is for any.
@@ -46,13 +52,6 @@ def check_kind(command: str, robot: str, drive: str, where: str) -> None:
             f"{where}: commands of kind '{command}' are not for robot '{robot}', which {drives} "
             f'(drive = "{drive}" in its robot.toml); name another with --robot'
         )
-
-
-ENABLED = "enabled"
-"""The column that says whether the motors are on (1) or cut by a switch (0)."""
-
-POSE = ("x", "y", "heading")
-WHEELS = ("wheel_left", "wheel_right")
 
 
 class Measured(NamedTuple):

@@ -13,11 +13,22 @@ from planted import CALM, TRUTH, planted_log
 from proxytune.diagnosis import RULES, diagnose_log, forget_stages, robot_of
 from proxytune.diagnosis.answer import Estimate
 from proxytune.diagnosis.stages import FOLDER, Stages, facts_of
+from proxytune.errors import RunError
 from proxytune.report import diagnosis_document
 
 
 class Killed(BaseException):
     """As a signal that nothing can catch."""
+
+
+def test_nothing_is_removed_behind_a_link_in_the_place_of_the_stages(tmp_path):
+    (tmp_path / "mine" / "kept").mkdir(parents=True)
+    (tmp_path / "found").mkdir()
+    (tmp_path / "found" / FOLDER).symlink_to(tmp_path / "mine")
+    with pytest.raises(RunError, match="is a symbolic link; remove it, or give another folder"):
+        Stages(tmp_path / "found", "facts")
+    forget_stages(tmp_path / "found")
+    assert (tmp_path / "mine" / "kept").is_dir()
 
 
 def test_a_stage_is_made_once_and_read_as_it_was(tmp_path):

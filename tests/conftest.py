@@ -17,6 +17,8 @@ HERE = Path(__file__).resolve().parent
 sys.path += [str(HERE / "fakes"), str(HERE.parent / "benchmarks")]
 # Two processes whose linear algebra has two threads each wait for one another; NumPy is not imported yet.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+# A dumb terminal, as an editor's shell is, has no progress bars; tests of these mean one that has.
+os.environ.pop("TERM", None)
 # A run in the background ignores Ctrl-C; tests mean it to be heeded, as in a terminal.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 

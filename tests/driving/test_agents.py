@@ -108,7 +108,7 @@ def scenes(seed):
 
 
 @given(st.permutations(list(MORE)), st.integers(1, len(MORE)), st.integers(0, 2**32 - 1))
-@settings(max_examples=20, derandomize=True, deadline=None)
+@settings(max_examples=20)
 def test_who_is_asked_beside_an_agent_does_not_matter_to_a_bit(names, count, seed):
     agents = [MORE[name] for name in names[:count]]
     alone = together = [agent.begin(ROBOT) for agent in agents]
@@ -147,7 +147,7 @@ def lane_by_the_book(picture, look):
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(0.0, 260.0), st.floats(0.0, 260.0), st.sampled_from([0.3, 0.5, 0.9]))
-@settings(max_examples=40, derandomize=True, deadline=None)
+@settings(max_examples=40)
 def test_lanes_of_many_pictures_are_those_of_one_picture_after_another(seed, contrast, brightness, reach):
     pictures = scenes(seed)[0]
     looks = [

@@ -267,7 +267,7 @@ def expected(effects):
 
 @pytest.mark.parametrize("camera", [GROUND_PLANE, Plain()])
 @given(st.floats(0.0, 0.2))
-@settings(max_examples=25, derandomize=True, deadline=None)
+@settings(max_examples=25)
 def test_a_blurred_picture_is_that_of_all_pictures_to_the_last_bit(camera, blur):
     np.testing.assert_array_equal(pictures_of(camera, (Blur(blur),)), expected((Blur(blur),)))
 

@@ -40,7 +40,7 @@ near = st.floats(-1.0, 4.0)
 
 
 @given(st.lists(st.builds(place, near, near, st.floats(-7.0, 7.0)), min_size=1, max_size=5))
-@settings(max_examples=200, derandomize=True, deadline=None)
+@settings(max_examples=200)
 def test_both_show_the_same_texels_on_the_map_and_off_it(compiled, places):
     shown = [
         exposed(way, NUMBERED, np.array(places, dtype=np.float32), np.ones(1, np.float32)) for way in (compiled, loops)
@@ -56,7 +56,7 @@ def test_a_robot_that_is_nowhere_sees_something(compiled, wrong):
 
 
 @given(st.floats(0.0, 0.2), st.lists(st.builds(place, near, near, st.floats(-7.0, 7.0)), min_size=13, max_size=13))
-@settings(max_examples=100, derandomize=True, deadline=None)
+@settings(max_examples=100)
 def test_both_blur_to_the_same_picture(compiled, blur, places):
     weights = Blur(blur).mean_weights(60.0)
     seen = np.array(2 * places[: len(weights)], dtype=np.float32)
@@ -70,7 +70,7 @@ def eyes(rng, robots, pixels):
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 5), st.sampled_from([1, 5, 7, 8, 60, 130, 700, 3000]))
-@settings(max_examples=150, derandomize=True, deadline=None)
+@settings(max_examples=150)
 def test_both_find_the_same_lanes_in_noise(compiled, seed, robots, pixels):
     """However many pixels count: sums go in NumPy's order."""
     rng = np.random.default_rng(seed)

@@ -8,13 +8,16 @@ import numpy as np
 
 from proxytune.diagnosis import PICTURES, FilmedDrive, film, frames_text, log_text, record, samples_text
 from proxytune.driving import LaneFollowing, read_robot
-from proxytune.errors import InputError
+from proxytune.errors import InputError, LogError
 from proxytune.logs import Frames, Log, log_cautions, read_commands
 from proxytune.report import write_picture, write_text
 from proxytune.settings import Section
 from proxytune.study import StudySettings, bare_family, cautions_of
 
 Tell = Callable[[str], None]
+
+LONGEST_S = 3600.0
+"""A longer drive of a table is a slip of its times, and would never end."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +75,12 @@ def record_log(
     family = recordable(settings, model)
     drives = film(family, wanted.frames, wanted.seed) if wanted.frames else ()
     table = None if wanted.commands is None else read_commands(wanted.commands)
+    for drive, (times, _) in () if table is None else table[1].items():
+        if (lasts := times[-1] - times[0]) > LONGEST_S:
+            raise LogError(
+                f"{wanted.commands}: drive '{drive}' lasts {lasts:g} s; cut it into drives of at most {LONGEST_S:g} s, "
+                "or check its times"
+            )
     repeats, seconds, seed = wanted.repeats, wanted.seconds, wanted.seed
     log = record(family, name=folder.name, repeats=repeats, seconds=seconds, seed=seed, table=table)
     if wanted.frames:

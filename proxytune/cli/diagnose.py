@@ -15,6 +15,7 @@ from proxytune.cli.terminal import Answer, Steps
 from proxytune.diagnosis import LIMITS, Limits, diagnose_log, forget_stages, robot_of
 from proxytune.effects import Catalogue
 from proxytune.errors import InputError
+from proxytune.files import check_place
 from proxytune.importing import finite, open_log
 from proxytune.logs import Log
 from proxytune.report import diagnosis_text
@@ -112,11 +113,14 @@ def run(arguments: argparse.Namespace) -> Answer:
 def _diagnosed(
     arguments: argparse.Namespace, limits: Limits, log: Log, test: Log | None, imported: Sequence[str]
 ) -> Answer:
+    here = arguments.log.resolve()
+    folder = arguments.output or Path(f"diagnosis_{here.stem if here.is_file() else here.name}")
+    check_place(folder, folder=True)
+    for name in ("diagnosis.json", "model.toml", "report.html"):
+        check_place(folder / name, ours=True)
     robot = robot_of(log, arguments.robot, Catalogue(Path.cwd(), names_in(arguments.effects)))
     declared = None if arguments.declared is None else names_in(arguments.declared)
     with Steps(shares(log)) as step:
-        here = arguments.log.resolve()
-        folder = arguments.output or Path(f"diagnosis_{here.stem if here.is_file() else here.name}")
         seed = arguments.seed
         found = diagnose_log(log, robot, declared, test=test, seed=seed, report=step, limits=limits, folder=folder)
         step("drawing")

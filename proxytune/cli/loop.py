@@ -9,8 +9,9 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 
 from proxytune.cli.diagnose import shares
-from proxytune.cli.options import study_folder
+from proxytune.cli.options import check_made, study_folder
 from proxytune.cli.terminal import Answer, Steps
+from proxytune.files import check_place
 from proxytune.logs import Log
 from proxytune.loop import Closed, run_loop, text_of
 from proxytune.running import Bars, Watcher
@@ -33,6 +34,10 @@ def run(arguments: argparse.Namespace) -> Answer:
     """Do every step that is not done, and write the page."""
     begun = time.perf_counter()
     folder = study_folder(arguments.path)
+    check_made(folder)
+    for name in ("diagnosed", "extended"):
+        check_place(folder / "loop" / name, folder=True, ours=True)
+    check_place(folder / "loop" / "report.html", ours=True)
     report = run_loop(folder, log=arguments.log, twin=arguments.twin, teller=Terminal())
     page = report.write(_command(arguments))
     document = report.document()

@@ -5,6 +5,7 @@ The option that names effects of one's own.
 The options that say what to take from a bag or a table, alike for every command that reads one.
 θ as people give it: values, a model.toml, the best that a study has found, or none.
 The folder that a PATH means: an existing one, or a copy of a study that comes with the package.
+What a study writes into it, checked beforehand.
 """
 
 import argparse
@@ -18,7 +19,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from proxytune.errors import InputError, StoreError
-from proxytune.files import folder_draft_of, shipped
+from proxytune.files import check_place, folder_draft_of, shipped
 from proxytune.importing import Facts, Wanted, finite, read_geometry
 from proxytune.logs import COMMANDS
 from proxytune.running import on_cluster
@@ -182,6 +183,16 @@ def study_folder(path: Path) -> Path:
     _copy(studies[folder.name], folder)
     print(f"copied the study '{folder.name}', which comes with proxytune, to {folder}", file=sys.stderr)
     return folder
+
+
+def check_made(folder: Path) -> None:
+    """Refuse a study's folder in which its figures and its page cannot be written, before anything is simulated.
+
+    Raises:
+        InputError: If they cannot.
+    """
+    check_place(folder / "figures", folder=True, ours=True)
+    check_place(folder / "report.html", ours=True)
 
 
 def _copy(source: Path, folder: Path) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 from proxytune.cli.options import typed
 from proxytune.cli.terminal import Answer
 from proxytune.errors import InputError
+from proxytune.files import check_place
 from proxytune.report import (
     check_table_file,
     foot_of,
@@ -251,6 +252,9 @@ def run(arguments: argparse.Namespace) -> Answer:
         raise InputError(f"--resamples must be between {between}, and --seed at least 0")
     if arguments.table:
         check_table_file("--table", arguments.table)
+        check_place(arguments.table)
+    if arguments.output:
+        check_place(arguments.output, folder=True)
     _sides_given(arguments)
     arguments.metric = _metrics_given(arguments)
     metrics = [Metric.parse(text) for text in arguments.metric]

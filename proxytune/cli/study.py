@@ -22,9 +22,10 @@ from proxytune.api import (
     run_opened,
     run_opened_families,
 )
-from proxytune.cli.options import configure_cluster, on_its_cluster, study_folder
+from proxytune.cli.options import check_made, configure_cluster, on_its_cluster, study_folder
 from proxytune.cli.terminal import Answer
 from proxytune.errors import ProxytuneError
+from proxytune.files import check_place
 from proxytune.report import (
     RENEW_S,
     bank_document,
@@ -41,6 +42,7 @@ from proxytune.running import Bars, Watcher
 from proxytune.search import make_proposer
 from proxytune.storage import Store, locked
 from proxytune.study import (
+    BANK_FILE,
     LEARNING,
     Spent,
     Study,
@@ -181,6 +183,7 @@ def search_by_plv(study: Study, folder: Path, by_prpv: Callable[[], StudyResult]
 
 def run_a_bank(settings: StudySettings, spending: Spending) -> Answer:
     """Run what is left of a bank, and write its table of trials and its page."""
+    check_place(settings.home / BANK_FILE, ours=True)
     study = with_spending(open_bank(settings), budget=spending.budget, jobs=spending.jobs)
     with locked(settings.home), Store.open(settings.home) as store, Bars(most_episodes(study.settings)) as bars:
         if spending.retry_failed:
@@ -218,6 +221,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     begun = time.perf_counter()
     folder = study_folder(arguments.path)
     settings, again = read_study_settings(folder), arguments.retry_failed
+    check_made(folder)
     if settings.families:
         return compare_families(settings, Spending(arguments.budget, arguments.jobs, again))
     if not settings.targets:

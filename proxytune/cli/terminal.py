@@ -69,6 +69,14 @@ def _terminate(number: int, frame: FrameType | None) -> None:
 
 FAILED = 1
 
+REMEDIES = {
+    errno.EMFILE: "; allow more open files (ulimit -n 1024), or take fewer jobs",
+    errno.ENFILE: "; close other programs, or take fewer jobs",
+    errno.ENOMEM: "; close other programs, or take fewer jobs",
+    errno.ENOSPC: "; make room",
+}
+"""What helps where the system lacks something."""
+
 
 def stopped_by(problem: KeyboardInterrupt | SystemExit | MemoryError | OSError) -> tuple[str, int]:
     """Say what stopped a command, in one phrase, and its exit status."""
@@ -78,7 +86,8 @@ def stopped_by(problem: KeyboardInterrupt | SystemExit | MemoryError | OSError) 
     if isinstance(problem, MemoryError):
         return f"memory ran out ({describe(problem)}); ask for less", FAILED
     if isinstance(problem, OSError):
-        return f"the system refused something ({describe(problem)}){place_of(problem)}", FAILED
+        remedy = REMEDIES.get(problem.errno or 0, "")
+        return f"the system refused something ({describe(problem)}){place_of(problem)}{remedy}", FAILED
     return f"code that is not proxytune's ended the command ({describe(problem)}){place_of(problem)}", FAILED
 
 

@@ -15,7 +15,7 @@ from typing import Any
 import tomlkit
 
 from proxytune.api import DiagnosisReport, Wanted, recordable
-from proxytune.diagnosis import camera_effects, diagnose_log, film, motion_effects, robot_of
+from proxytune.diagnosis import camera_effects, diagnose_log, film, forget_stages, motion_effects, robot_of
 from proxytune.driving import Robot
 from proxytune.effects import Catalogue, effect_of
 from proxytune.errors import RunError, SettingsError, StoreError
@@ -61,10 +61,12 @@ def diagnose_target(loop: Loop, source: Path, folder: Path, teller: Teller) -> N
             teller.say(note)
         robot = robot_of(log, loop.robot, Catalogue(loop.settings.folder.resolve()))
         with teller.diagnosis(log) as report:
-            found = diagnose_log(log, robot, declared_of(loop, robot, log), seed=loop.settings.seed, report=report)
+            declared, seed = declared_of(loop, robot, log), loop.settings.seed
+            found = diagnose_log(log, robot, declared, seed=seed, report=report, folder=folder)
             report("drawing")
             with figures_also_as(("svg",)):
                 DiagnosisReport(found).write(folder)
+            forget_stages(folder)
 
 
 def declared_of(loop: Loop, robot: Robot, log: Log) -> tuple[str, ...]:

@@ -35,7 +35,7 @@ DIGITS = 5
 """Of each score in a table of trials."""
 LARGEST = 1e12
 """No θ or score is further from 0 than this; squares and sums of such are still numbers."""
-TABLE = "bank.json"
+BANK_FILE = "bank.json"
 FORMAT = 1
 
 Scores = Mapping[tuple[str, int], Mapping[str, float]]
@@ -134,9 +134,9 @@ def read_source(settings: StudySettings, name: str) -> Source:
             raise _refused(settings, path, f"{told}; remove it")
     if path.is_dir() and (path / DATABASE).exists():
         return _of_study(path)
-    table = path / TABLE if path.is_dir() else path
+    table = path / BANK_FILE if path.is_dir() else path
     if not table.exists():
-        told = f"has neither {DATABASE} nor {TABLE}; run it first: python -m proxytune study {path}"
+        told = f"has neither {DATABASE} nor {BANK_FILE}; run it first: python -m proxytune study {path}"
         raise _refused(settings, path, told)
     return _of_table(table)
 
@@ -197,7 +197,7 @@ def write_table(run: StudyRun) -> Path:
     Raises:
         StoreError: If it cannot be written.
     """
-    source, path = _of_study(run.settings.home), run.settings.home / TABLE
+    source, path = _of_study(run.settings.home), run.settings.home / BANK_FILE
     metrics, agents = sorted(_metrics(run)), run.settings.agents
 
     def cell(scores: Mapping[str, float] | None) -> list[float] | None:

@@ -266,7 +266,7 @@ def prpv_figure(rows: Sequence[Compared]) -> Figure:
     panels[0].set_ylabel("PRPV (lower is better)", fontsize=8)
     floor = rows[0].before.floor_ends
     if floor:
-        panels[0].annotate("noise floor", (-0.55, floor[1]), fontsize=6.5, color="0.3", va="bottom")
+        panels[0].annotate("noise floor", (-0.55, floor[1]), fontsize=7, color="0.3", va="bottom")
     return figure
 
 

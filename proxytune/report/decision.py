@@ -141,14 +141,14 @@ def decision_figure(decision: Decision) -> Figure:
         axes.plot(decision.expected_regret[agent], row, "o", color=colour, markersize=4, clip_on=False, zorder=3)
         if decision.best_probabilities is not None:
             text = f"{decision.best_probabilities[agent]:.2f}"
-            axes.text(1.02, row, text, transform=axes.get_yaxis_transform(), fontsize=6, va="center")
+            axes.text(1.02, row, text, transform=axes.get_yaxis_transform(), fontsize=7, va="center")
     axes.set_yticks(np.arange(len(order)), [name if len(name) <= 24 else f"…{name[-23:]}" for name in order])
     axes.set_ylim(len(order) - 0.5, -0.5)
     axes.set_xlim(left=0.0)
     dress(axes, f"regret in {plain(decision.chosen_on)[:44]}")
-    axes.tick_params(axis="y", labelsize=6, length=0)
+    axes.tick_params(axis="y", labelsize=7, length=0)
     if decision.best_probabilities is not None:
-        axes.text(1.02, 1.0, "P(best)", transform=axes.transAxes, fontsize=6, va="bottom")
+        axes.text(1.02, 1.0, "P(best)", transform=axes.transAxes, fontsize=7, va="bottom")
     return figure
 
 

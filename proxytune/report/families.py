@@ -417,7 +417,7 @@ def _draw(axes: Axes, panel: Panel, names: list[str]) -> None:
         value = panel.values.get(name)
         if value is None:
             axes.annotate(
-                "not known", (0.5, place), xycoords=("axes fraction", "data"), fontsize=6.5, ha="center", va="center",
+                "not known", (0.5, place), xycoords=("axes fraction", "data"), fontsize=7, ha="center", va="center",
                 color="0.3",
             )  # fmt: skip
             continue

@@ -23,7 +23,7 @@ from proxytune.report.diagnosis.figures import motion_figures
 from proxytune.report.diagnosis.notes import motion_headline, motion_notes, next_drives
 from proxytune.report.export.player import commands_text, player_text
 from proxytune.report.html import write_page
-from proxytune.report.meanings import findings
+from proxytune.report.meanings import findings, fitted
 from proxytune.report.text import group_texts, table_text
 from proxytune.report.view import Paragraphs, Part, Picture, Table, View, columns_of, foot_of
 from proxytune.report.writing import save_figure, svg_of, write_text
@@ -179,11 +179,13 @@ def diagnosis_headline(found: LogDiagnosis) -> str:
 
 
 def _motion_said(diagnosis: Diagnosis) -> str:
-    return motion_headline(diagnosis, findings(motion_effects(diagnosis), diagnosis.robot.catalogue))
+    found = findings(motion_effects(diagnosis), diagnosis.robot.catalogue)
+    return motion_headline(diagnosis, found, fitted(diagnosis.declared, diagnosis.theta))
 
 
 def _camera_said(log: str, diagnosis: CameraDiagnosis) -> str:
-    return camera_headline(log, diagnosis, findings(camera_effects(diagnosis)))
+    found = findings(camera_effects(diagnosis))
+    return camera_headline(log, diagnosis, found, fitted(diagnosis.declared, diagnosis.theta))
 
 
 def diagnosis_notes(found: LogDiagnosis) -> list[str]:

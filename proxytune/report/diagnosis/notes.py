@@ -31,8 +31,8 @@ AMPLE = 30.0
 """Log-likelihood gain [nats] in a minute above which one minute surely decides."""
 
 
-def motion_headline(diagnosis: Diagnosis, found: str = "") -> str:
-    """What was found, in the words of `meanings.findings`, then the verdict and what it means."""
+def motion_headline(diagnosis: Diagnosis, found: str = "", beside: str = "") -> str:
+    """What was found and fitted, in the words of `meanings`, then the verdict and what it means."""
     meaning = MEANINGS[diagnosis.verdict]
     if diagnosis.edges:
         end = f"{listed(diagnosis.edges)} at the end of the range"
@@ -40,12 +40,12 @@ def motion_headline(diagnosis: Diagnosis, found: str = "") -> str:
         stands = "stands" if len(diagnosis.edges) == 1 else "stand"
         meaning = f"{end} {stands} for something else, which no named effect explains{rest}"
     sure = f" (expected false names: at most {diagnosis.expected_false_names:.2f})" if diagnosis.effects else ""
-    return f"{diagnosis.log}: {told(found, diagnosis.verdict)}: {meaning}{sure}"
+    return f"{diagnosis.log}: {told(found, beside, diagnosis.verdict)}: {meaning}{sure}"
 
 
-def told(found: str, verdict: str) -> str:
-    """A verdict after what was found, as a sentence of its own where anything was."""
-    return f"{found}. {verdict.capitalize()}" if found else verdict
+def told(found: str, beside: str, verdict: str) -> str:
+    """A verdict after what was found, as a sentence of its own where anything was; what was fitted stands beside."""
+    return f"{found}{beside}. {verdict.capitalize()}" if found else f"{verdict}{beside}"
 
 
 def motion_notes(diagnosis: Diagnosis) -> list[str]:

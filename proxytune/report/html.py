@@ -26,8 +26,6 @@ ABOUT = ("robot", "log", "target", "targets")
 """Settings that stand at the top of a page too."""
 PROSE = 28
 """A cell of more characters than this is wrapped, and kept wide enough to be read."""
-UNITS = "(?:%|mm|cm|m|s|deg|rad|px|nats)"
-"""What stays on the line of its number."""
 WORDS = {
     "PRPV": "how many ordered pairs of agents the simulator ranks otherwise than the robot; 0 is best",
     "θ": "the simulator’s parameters that are tuned, all together",
@@ -321,7 +319,7 @@ def _row(row: tuple[str, ...], columns: tuple[Column, ...]) -> str:
 
 def _cell(text: str, column: Column) -> str:
     """A cell; numbers have a minus, not a hyphen."""
-    plain = _tied(html.escape(text))
+    plain = html.escape(text)
     return re.sub(r"(?<![\w.)-])-(?=\d)", "−", plain) if column.numbers else plain
 
 
@@ -350,7 +348,7 @@ def _words(page: str) -> str:
 def _text(text: str) -> str:
     """A text with what is between backticks as code, and [words](a/file) beside the page as a link."""
     said = re.split(r"`([^`]+)`", html.escape(text))
-    return "".join(_code(one) if place % 2 else _linked(_tied(one)) for place, one in enumerate(said))
+    return "".join(_code(one) if place % 2 else _linked(one) for place, one in enumerate(said))
 
 
 def _linked(text: str) -> str:
@@ -361,8 +359,3 @@ def _code(command: str) -> str:
     """A command as code, its options whole: a browser would break them after their hyphens."""
     whole = re.sub(r"(?<!\S)(-[^ ]*)", r"<span>\1</span>", command)
     return f"<code>{whole}</code>"
-
-
-def _tied(text: str) -> str:
-    """A text in which no line ends between a number and its unit, or between p and its value."""
-    return re.sub(rf"(?<=\d) (?={UNITS}(?![\w-]))|(?<=\bp =) (?=\d)|(?<=\bp &lt;) (?=\d)", "\N{NO-BREAK SPACE}", text)

@@ -87,7 +87,7 @@ def test_an_effect_that_was_added_says_what_the_error_is_without_it():
     (note,) = motion_notes(diagnosis(effects=(BAND,), effect_sizes={"dead_band": MUCH}))
     assert note == (
         "added dead_band (left wheel): log-likelihood gain 900 nats, p = 0.002; "
-        "without it the error grows by 34 % (20 to +50) at 2 s"
+        "without it the error grows by 34 % (20 to 50) at 2 s"
     )
 
 

@@ -195,7 +195,8 @@ def _known(known: tuple[float, Sequence[float | None] | None] | None) -> str:
     low, high = known[1] or (None, None)
     if low is None or high is None or not low < high:
         return short(known[0], 4)
-    places = digits((low, high))
+    # A value that is known to a part in a thousand needs no two figures of its interval.
+    places = max(0, digits((low, high)) - (high - low < 1e-3 * abs(known[0])))
     return f"{fixed(known[0], places)} ({span((low, high), places)})"
 
 

@@ -161,7 +161,7 @@ def test_commands_between_backticks_are_code():
 def test_an_option_that_is_to_be_typed_is_broken_nowhere():
     """Browsers break lines after hyphens."""
     text = html_of(replace(VIEW, next_step="run `python -m proxytune study a --budget 2`"))
-    assert "python <span>-m</span> proxytune study a <span>--budget</span> 2</code>" in text
+    assert "python -m proxytune study a <span>--budget</span> 2</code>" in text
 
 
 def test_the_page_fits_phones_paper_and_the_dark():

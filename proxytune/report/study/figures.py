@@ -175,7 +175,7 @@ def density_of(result: StudyResult, place: int) -> tuple[Floats, Floats]:
     The density is per unit of the parameter; it is 0 where the posterior has no points at all.
     """
     box, posterior = result.study.settings.space.intervals[place], result.knowledge.posterior
-    values = box.low + (box.high - box.low) * posterior.points[:, place]
+    values = result.knowledge.values[:, place]
     heights, edges = np.histogram(values, bins=BINS, weights=posterior.weights, density=True)
     # Mirrored at its ends: at an end of the box nothing leaks out of it.
     smooth = gaussian_filter1d(heights, _reach(values, posterior.weights) / (edges[1] - edges[0]), mode="reflect")
@@ -282,21 +282,18 @@ def _mark(axes: Axes, place: list[float], label: str) -> None:
 
 def _shadow(axes: Axes, result: StudyResult, places: tuple[int, int]) -> None:
     """Draw where the 95 % region lies, whatever the other parameters are."""
-    intervals, posterior = result.study.settings.space.intervals, result.knowledge.posterior
-    inside = posterior.points[posterior.inside][:, places]
+    intervals, learnt = result.study.settings.space.intervals, result.knowledge
+    inside = learnt.values[learnt.posterior.inside][:, places]
     low, high = inside.min(axis=0), inside.max(axis=0)
-    rim = RIM * (high - low) + 0.01
-    low, high = np.maximum(0.0, low - rim), np.minimum(1.0, high + rim)
+    ends = np.transpose([(intervals[place].low, intervals[place].high) for place in places])
+    rim = RIM * (high - low) + 0.01 * (ends[1] - ends[0])
+    low, high = np.maximum(ends[0], low - rim), np.minimum(ends[1], high + rim)
     cells = int(np.clip(1.5 * np.sqrt(len(inside)), *CELLS))
     edges = [np.linspace(low[side], high[side], cells + 1) for side in (0, 1)]
     counts, _, _ = np.histogram2d(inside[:, 0], inside[:, 1], bins=edges)
     smooth = np.pad(gaussian_filter(np.minimum(counts, 1.0), SMOOTH_SHADOW, mode="nearest"), 1, mode="edge")
     smooth /= smooth.max()
-    across, up = (
-        intervals[place].low
-        + (intervals[place].high - intervals[place].low) * np.concatenate([e[:1], 0.5 * (e[1:] + e[:-1]), e[-1:]])
-        for place, e in zip(places, edges, strict=True)
-    )
+    across, up = (np.concatenate([e[:1], 0.5 * (e[1:] + e[:-1]), e[-1:]]) for e in edges)
     axes.contourf(across, up, smooth.T, levels=[EDGE, 2.0], colors=[LIGHT_BLUE], alpha=0.35, zorder=0)
     axes.fill_between([], [], color=LIGHT_BLUE, alpha=0.35, linewidth=0, label=REGION)
 

@@ -80,7 +80,7 @@ def test_every_text_of_every_field_is_escaped():
 
 @given(st.text(max_size=40))
 def test_no_text_breaks_the_page(text):
-    assume(not any(word in text for word in WORDS))
+    assume(not any(word in text for word in WORDS))  # those are explained at the foot
     tags = [tag for tag, _ in Reader(html_of(VIEW)).elements]
     view = replace(VIEW, title=text, sentence=text.replace("`", ""), next_step="do " + text.replace("`", ""))
     assert [tag for tag, _ in Reader(html_of(view)).elements] == tags

@@ -501,21 +501,25 @@ def describe_shape(series: Series, held: float | None) -> str:
     if shape.score is None:
         return f"{series.name}: undefined at every point"
     extreme = "highest" if series.higher_is_better else "lowest"
-    best, near = ", ".join(f"{value:.4g}" for value in shape.best), _listed(shape.near_best, series)
+    best, near = ", ".join(map(_number, shape.best)), _listed(shape.near_best, series)
     line = f"{series.name}: {extreme} ({shape.score:.3g}) at {best}; not worse beyond noise: {near}"
     if held is None:
         return line
     if "unseen" == shape.below == shape.above:
         return line
-    return f"{line}; from {held:.4g} downwards it {OUTWARDS[shape.below]}, upwards it {OUTWARDS[shape.above]}"
+    return f"{line}; from {_number(held)} downwards it {OUTWARDS[shape.below]}, upwards it {OUTWARDS[shape.above]}"
 
 
 def _listed(chosen: Sequence[float], series: Series) -> str:
     """The values as a range where they are one, by name where there are gaps."""
     between = [one.value for one in series.estimates if chosen[0] <= one.value <= chosen[-1] and one.score is not None]
     if len(chosen) > 1 and len(between) == len(chosen):
-        return f"{chosen[0]:.4g} to {chosen[-1]:.4g}"
-    return ", ".join(f"{value:.4g}" for value in chosen)
+        return f"{_number(chosen[0])} to {_number(chosen[-1])}"
+    return ", ".join(map(_number, chosen))
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}".replace("-", "−")
 
 
 def _cost(estimate: SweepEstimate, sign: float) -> _Cost | None:

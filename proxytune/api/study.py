@@ -11,6 +11,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from proxytune.domain import Outcome
+from proxytune.errors import InputError
 from proxytune.report import (
     Shown,
     View,
@@ -100,6 +101,24 @@ class StudyReport(Shown):
         return pd.DataFrame(rows, columns=None if rows else ["trial"]).set_index("trial")
 
     to_frame = trials
+
+    def posterior(self, draws: int = 4000, seed: int = 0) -> pd.DataFrame:
+        """Draw θ from what is known of it: a column per parameter, in its unit; how they trade off is in the rows.
+
+        Each row is a θ that may have made the target, given every metric of every agent, drawn as often as it is
+        probable over the box. Run a simulator at some of them to see what is left open; of one column alone, the
+        central 95 % are the interval in the answer, but for the chance of the draws.
+
+        Args:
+            draws: How many rows.
+            seed: Of the draws.
+
+        Raises:
+            InputError: If the number of draws is not positive.
+        """
+        if draws < 1:
+            raise InputError(f"draws must be at least 1, got {draws}")
+        return pd.DataFrame(self.result.knowledge.draw(draws, seed), columns=list(self.result.knowledge.space.names))
 
     def figures(self) -> dict[str, Figure]:
         """Convergence, profiles, evaluations and importance, by name."""

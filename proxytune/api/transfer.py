@@ -227,7 +227,7 @@ class Prediction:
         """Say how far the predicted poses are from the measured ones."""
         rmse = self.error
         if not rmse.poses:
-            return "no drive has measured poses over a whole window"
+            return "nothing to compare with, for no drive has measured poses over a whole window"
         return f"RMSE {1e3 * rmse.place:.1f} mm, {np.degrees(rmse.turn):.2f}° over {rmse.poses} poses"
 
     def document(self) -> dict[str, Any]:

@@ -20,12 +20,16 @@ from proxytune.report import (
     VERMILLION,
     Table,
     columns_of,
+    digits,
     dress,
     findings,
+    fixed,
+    in_pairs,
     listed,
     plain,
     short,
     short_span,
+    span,
     with_span,
     with_unit,
 )
@@ -176,7 +180,7 @@ def theta_table(before: Known, after: Known | None, diagnosis: Mapping[str, Any]
     names = dict.fromkeys((*before, *measured, *extended))
     rows = tuple(
         (
-            with_unit(name, SHIPPED.parameters[name].unit if name in SHIPPED.parameters else ""),
+            with_unit(name.replace(".", " "), SHIPPED.parameters[name].unit if name in SHIPPED.parameters else ""),
             *(_known(side.get(name)) for side in (before, measured, extended)),
         )
         for name in names
@@ -186,7 +190,14 @@ def theta_table(before: Known, after: Known | None, diagnosis: Mapping[str, Any]
 
 
 def _known(known: tuple[float, Sequence[float | None] | None] | None) -> str:
-    return "–" if known is None else with_span(short(known[0]), *(known[1] or (None, None)))
+    if known is None:
+        return "–"
+    low, high = known[1] or (None, None)
+    if low is None or high is None or not low < high:
+        return short(known[0], 4)
+    # A value that is known to a part in a thousand needs no two figures of its interval.
+    places = max(0, digits((low, high)) - (high - low < 1e-3 * abs(known[0])))
+    return f"{fixed(known[0], places)} ({span((low, high), places)})"
 
 
 def following(diagnosis: Mapping[str, Any], studied: str, model: str, theta: Theta) -> str:
@@ -217,6 +228,8 @@ def level_text(level: Level | None, unit: str) -> str:
     """A measure with its interval, as "28 (21 to 45)"."""
     if level is None:
         return "–"
+    if level.chance is not None and level.interval:
+        return in_pairs(level.value, *level.interval)
     return with_span(f"{short(level.value)}{unit and ' '}{unit}", *(level.interval or (None, None)))
 
 
@@ -227,6 +240,8 @@ def floor_text(level: Level | None, unit: str) -> str:
     if level.floor is None and level.floor_ends:
         return f"{short_span(*level.floor_ends)}{unit and ' '}{unit}"
     assert level.floor is not None
+    if level.chance is not None and level.floor_ends:
+        return in_pairs(level.floor, *level.floor_ends)
     return with_span(f"{short(level.floor)}{unit and ' '}{unit}", *(level.floor_ends or (None, None)))
 
 
@@ -266,7 +281,7 @@ def prpv_figure(rows: Sequence[Compared]) -> Figure:
     panels[0].set_ylabel("PRPV (lower is better)", fontsize=8)
     floor = rows[0].before.floor_ends
     if floor:
-        panels[0].annotate("noise floor", (-0.55, floor[1]), fontsize=6.5, color="0.3", va="bottom")
+        panels[0].annotate("noise floor", (-0.55, floor[1]), fontsize=7, color="0.3", va="bottom")
     return figure
 
 

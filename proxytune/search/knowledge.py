@@ -149,6 +149,18 @@ class Knowledge:
             return self._posterior_if_it_fits
         return posterior_of(self.log, len(self.space.intervals), REPORTED)
 
+    @cached_property
+    def values(self) -> Floats:
+        """The posterior's points in the parameters' own units (n, parameters), as probable as its weights say."""
+        low, high = np.transpose([(box.low, box.high) for box in self.space.intervals])
+        return np.asarray(low + (high - low) * self.posterior.points)
+
+    def draw(self, count: int, seed: int) -> Floats:
+        """Draw values of θ from the posterior (count, parameters): how parameters vary together is in them."""
+        weights = self.posterior.weights
+        rows = np.random.default_rng(seed).choice(len(weights), size=count, p=weights)
+        return np.asarray(self.values[rows])
+
     def _log_if_it_fits(self, points: Floats) -> Floats:
         return self.likelihood.log(points) / self.left_out.widening
 

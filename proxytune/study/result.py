@@ -29,7 +29,7 @@ from proxytune.usefulness import Assessment, Estimate, Expectation, NoiseFloor, 
 FAILURES_TOLD = 10
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Best:
     """The answer: the θ that fresh episodes confirm, and until then the visited one of lowest expected PRPV.
 
@@ -48,8 +48,12 @@ class Best:
     posterior_deviation: float
     assessment: Assessment
 
+    def __repr__(self) -> str:
+        theta = ", ".join(f"{name}={value:.4g}" for name, value in self.trial.theta.items())
+        return f"Best: {theta}; {self.assessment!r} in its own episodes"
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class StudyResult:
     """A study as it stands.
 
@@ -85,6 +89,9 @@ class StudyResult:
     spared: tuple[int, float]
     failures: tuple[str, ...]
     cautions: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        return f"StudyResult of '{self.study.settings.name}': {len(self.trials)} trials; {self.best!r}"
 
     @property
     def unidentified(self) -> tuple[str, ...]:

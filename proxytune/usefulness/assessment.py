@@ -68,7 +68,7 @@ HALVES = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Assessment:
     """The usefulness of one proxy as a predictor of the target.
 
@@ -99,6 +99,11 @@ class Assessment:
     chance: Chance
     seed: int
     asked: Asked = ASKED
+
+    def __repr__(self) -> str:
+        low, high = self.prpv_interval.low, self.prpv_interval.high
+        ends = "" if low is None or high is None else f" ({low:.3g} to {high:.3g})"
+        return f"Assessment: PRPV {self.prpv.value}{ends} of at most {self.prpv.range[1]}"
 
     @cached_property
     def saves(self) -> Saving:

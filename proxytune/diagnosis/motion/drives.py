@@ -351,11 +351,17 @@ def relative(origin: Floats, pose: Floats) -> Floats:
     return np.stack((forward, left, difference[..., 2]), axis=-1)
 
 
-def gather(log: Log, robot: Robot, episodes: Sequence[LogEpisode]) -> Drives:
+def gather(log: Log, robot: Robot, episodes: Sequence[LogEpisode], *, compared: bool = True) -> Drives:
     """A batch of a log's episodes, each command held from its own time.
 
+    Args:
+        log: Whose episodes they are.
+        robot: What drove.
+        episodes: The drives (E,).
+        compared: Whether there must be measured motion to compare a model's with.
+
     Raises:
-        LogError: If there is nothing to compare in them.
+        LogError: If there must be and is none.
     """
     ticks = math.ceil(TICK_HZ / log.rate_hz)
     length = max(len(episode.times) for episode in episodes) * ticks
@@ -364,10 +370,10 @@ def gather(log: Log, robot: Robot, episodes: Sequence[LogEpisode]) -> Drives:
     samples = [_samples(episode, log.rate_hz) for episode in episodes]
     rows = np.concatenate([np.stack((s[:-1], s[1:]), axis=1) for s in samples])
     number = np.repeat(np.arange(len(episodes)), [max(0, len(s) - 1) for s in samples])
-    if len(rows) == 0:
+    if compared and len(rows) == 0:
         raise LogError(f"{log.name}: no two measured poses in a row; nothing can be learnt from it")
     poses, after = ends_of(episodes, samples)
-    linked = np.concatenate(([False], (number[1:] == number[:-1]) & (rows[1:, 0] == rows[:-1, 1])))
+    linked = np.concatenate(([False], (number[1:] == number[:-1]) & (rows[1:, 0] == rows[:-1, 1])))[: len(rows)]
     drives = Drives(
         robot=robot,
         tick_hz=tick_hz,
@@ -450,6 +456,8 @@ def _samples(episode: LogEpisode, rate_hz: float) -> Whole:
 
 def _travel(number: Whole, poses: Floats, rows: Whole, rate_hz: float) -> Floats:
     """The way of each increment, from the chord over half a second round it."""
+    if len(rows) == 0:
+        return np.zeros((0, 2))
     reach = max(1, round(0.25 * rate_hz / max(1.0, float(np.median(rows[:, 1] - rows[:, 0])))))
     index = np.arange(len(rows))
     ends = np.concatenate((np.flatnonzero(np.diff(number)), [len(rows) - 1]))

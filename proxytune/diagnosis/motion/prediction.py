@@ -246,7 +246,7 @@ def predict(log: Log, robot: Robot, theta: Theta, horizon_s: float) -> pd.DataFr
 
     In each window the model starts from the measured pose, and the measured wheel speeds where the log has them, and is
     driven by the recorded commands, those before the window included. Windows follow one another; each begins at the
-    first measured pose after the one before it.
+    first measured pose after the one before it. A drive with one pose alone is predicted from it, over one window.
 
     Returns:
         Columns `episode, start_time, time, x, y, heading` [s], [s], [s], [m], [m], [rad].
@@ -256,7 +256,7 @@ def predict(log: Log, robot: Robot, theta: Theta, horizon_s: float) -> pd.DataFr
     """
     if not horizon_s * log.rate_hz >= 1.0:
         raise LogError(f"{log.name}: a horizon of {horizon_s:g} s is shorter than a sample of {1.0 / log.rate_hz:g} s")
-    whole = gather(log, robot, log.episodes)
+    whole = gather(log, robot, log.episodes, compared=False)
     longest = max(len(episode.times) for episode in log.episodes)
     reach = int(np.floor(min(horizon_s * log.rate_hz, longest) + 1e-9))
     starts = [_starts(episode, reach) for episode in log.episodes]

@@ -71,15 +71,7 @@ def _plain(value: Any) -> object:
 
 
 class Stages:
-    """Results of stages in a folder; without one nothing is kept.
-
-    Args:
-        folder: Where the findings go, or None.
-        facts: What the stages depend on.
-
-    Raises:
-        RunError: If a symbolic link is in the place of the stages: what it leads to is not ours to remove.
-    """
+    """Results of stages in the folder of findings, without one not kept; a link in their place is refused."""
 
     def __init__(self, folder: Path | None = None, facts: str = "") -> None:
         self._folder = None if folder is None else folder / FOLDER / facts
@@ -96,11 +88,7 @@ class Stages:
         self._known |= things
 
     def keep(self, stage: str, make: Callable[[], Result]) -> Result:
-        """The result of a stage, made if it is not kept.
-
-        Raises:
-            RunError: If it cannot be written.
-        """
+        """The result of a stage, made if it is not kept."""
         if self._folder is None:
             return make()
         path = self._folder / f"{stage}.pickle"

@@ -79,13 +79,10 @@ WIDEST = (0.06, 0.01)
 
 @dataclass(frozen=True)
 class MovingEdges:
-    """Points on the edges of markings in measured frames.
+    """Points on the edges of markings in measured frames (P,), whose `normal` (P, 2) goes from dark to bright.
 
-    Attributes:
-        frame: Number of the frame (P,).
-        place: Column and row (P, 2) [pixel]; the first pixel's middle is at 0.5.
-        normal: Unit vector (P, 2) from dark to bright, columns and rows.
-        speed: How fast the edge moves through the picture along its normal (P,) [pixel/s]; 0 in still frames.
+    Places are columns and rows (P, 2) [pixel], 0.5 in the first pixel's middle; `speed` along the normal [pixel/s] is 0
+    in still frames.
     """
 
     frame: NDArray[np.intp]
@@ -96,12 +93,7 @@ class MovingEdges:
 
 @dataclass(frozen=True)
 class Sharpness:
-    """The softness of edges.
-
-    Attributes:
-        blur: How long an exposure lasts [s].
-        defocus: Standard deviation of the blur of poor focus, as a share of the picture's height.
-    """
+    """The softness of edges: how long an exposure lasts [s], and the blur of poor focus as a share of the height."""
 
     blur: Fitted
     defocus: Fitted
@@ -110,14 +102,8 @@ class Sharpness:
 def fit_sharpness(measured: Pictures, edges: MovingEdges, draw: Draw) -> Sharpness:
     """Fit motion blur and defocus: motion widens fast edges, poor focus widens all.
 
-    An edge's squared width is that of its drawing, plus defocus², plus blur² · speed² / 12. Read off directly it is
-    biased by pixels and narrow tape; so both are what gives the model's own frames the measured widths.
-
-    Args:
-        measured: Frames (N, rows, columns, 3) as logged.
-        edges: Points on the edges of markings.
-        draw: Draws the model's frames, best with the fitted light; the middle of each exposure is to be at the
-            instant of the frame's pose.
+    Read off directly, an edge's squared width is biased by pixels and narrow tape; so both are what gives the frames
+    that `draw` makes of the model the measured widths, best with the fitted light and at the middle of each exposure.
     """
     every = max(1, -(-len(edges.frame) // MOST))
     edges = MovingEdges(edges.frame[::every], edges.place[::every], edges.normal[::every], edges.speed[::every])
@@ -230,12 +216,10 @@ LITTLE = 0.5
 
 @dataclass(frozen=True)
 class Grain:
-    """The noise of pixels.
+    """The noise of pixels [grey level], from so many pairs of frames from the same place; 0 if it never stood.
 
-    Attributes:
-        noise: Standard deviation of a pixel as it is logged [grey level]. Where it is not identified, only the
-            interval's upper end says something: the floor's texture may be all that was seen.
-        still_pairs: How many pairs of frames from the same place it was taken from; 0 where the robot never stood.
+    Where it is not identified, only the interval's upper end says something: the floor's texture may be all that was
+    seen.
     """
 
     noise: Fitted
@@ -243,13 +227,7 @@ class Grain:
 
 
 def fit_grain(measured: Pictures, predicted: NDArray[Any], floor: NDArray[np.bool_]) -> Grain:
-    """Fit the noise, from frames between which the robot stood, else from the smoothest flat places.
-
-    Args:
-        measured: Frames (N, rows, columns, 3) as logged.
-        predicted: What the model draws (N, rows, columns, 3) without any image effect.
-        floor: Pixels (rows, columns) that look at the floor.
-    """
+    """Fit the noise, from frames between which the robot stood, else from the smoothest flat places."""
     paint = flat_places(predicted, floor)
     still = _still_variances(measured, predicted, paint)
     if still.size:
@@ -314,14 +292,7 @@ HORIZON_ROWS = 3
 
 @dataclass(frozen=True)
 class Appearance:
-    """All figures of the pictures' look.
-
-    Attributes:
-        light: Exposure and vignetting.
-        grain: Noise.
-        sharpness: Blur and defocus.
-        blemishes: What is fixed to the camera in its pictures.
-    """
+    """All figures of the pictures' look."""
 
     light: Light
     grain: Grain

@@ -70,16 +70,7 @@ def describe_map(fit: CameraFit) -> LaidMap:
 def conclude(
     gathered: Gathered, weighed: Weighed, look: Appearance, declared: Sequence[str], notes: Sequence[str], seed: int
 ) -> CameraDiagnosis:
-    """Give the verdict, with everything that it goes by.
-
-    Args:
-        gathered: The frames.
-        weighed: The camera's fits, and the size of each effect.
-        look: Brightness and sharpness of the pictures.
-        declared: Effects that were tuned in any case.
-        notes: On how frames and poses match.
-        seed: Of the bootstrap.
-    """
+    """Give the verdict, with everything that it goes by."""
     named = weighed.named
     tuned = tuple(name for name, one in look.figures.items() if effect_of(name) in declared and one.identified)
     grey, on_look = _compare_look(gathered, named, look, declared, tuned, seed)
@@ -129,10 +120,7 @@ def _compare_look(
     tuned: Sequence[str],
     seed: int,
 ) -> tuple[Comparison, tuple[CameraEffect, ...]]:
-    """Brightness before and after, and the effects that were added for how pictures look.
-
-    Exposure is one of them where the error without it is larger. Floors may look like noise.
-    """
+    """Brightness before and after, and the effects added for how pictures look, if the error without is larger."""
     changed = tuple(effect for effect in changes(look) if effect not in declared)
     looks = (look_values(look, tuned), look_values(look, (*tuned, *_names(look, changed))))
     grey, ratios = compare_brightness(gathered, named, looks, seed)

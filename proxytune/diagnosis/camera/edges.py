@@ -128,12 +128,12 @@ APART_S = 10.0
 
 @dataclass(frozen=True)
 class Tracks:
-    """The poses of N frames, and those shortly before and after.
+    """The poses of N frames, and those shortly before and after, on an axis of time on which drives follow each other.
 
     Attributes:
-        times: Times on an axis on which drives follow each other (K,) [s].
-        poses: Poses at these times (K, 3): x, y [m], heading [rad, unwrapped].
-        rates: Their rates (K, 3) [m/s, rad/s]; 0 where pictures were taken standing still.
+        times: Of poses and rates (K,) [s].
+        poses: x, y [m], heading [rad, unwrapped] (K, 3).
+        rates: Of these (K, 3) [m/s, rad/s]; 0 where pictures were taken standing still.
         instants: When each frame was taken, on the same axis (N,) [s].
         begins: When the drive of each frame begins, on the same axis (N,) [s].
         share: How much of the tracker's scatter is left after smoothing.
@@ -164,11 +164,7 @@ class Tracks:
 
 
 def track_frames(log: Log, frames: Frames) -> tuple[Tracks, NDArray[np.intp]]:
-    """The tracks of a log's frames, and the numbers of those frames whose pose is known.
-
-    Raises:
-        LogError: If no frame's pose is known.
-    """
+    """The tracks of a log's frames, and the numbers of those frames whose pose is known; refused if there is none."""
     still = log.rate_hz == 0.0
     parts, offset, instants, begins = [], 0.0, np.full(len(frames.times), np.nan), np.zeros(len(frames.times))
     for number, episode in enumerate(log.episodes):
@@ -227,13 +223,7 @@ STEP = 1e-4
 
 @dataclass(frozen=True)
 class Optics:
-    """A robot's camera whose figures are set by θ.
-
-    Attributes:
-        robot: Whose camera.
-        rows: Height of the log's pictures [pixel].
-        columns: Width of the log's pictures [pixel].
-    """
+    """A robot's camera whose figures are set by θ, and the size of its pictures [pixel]."""
 
     robot: Robot
     rows: int
@@ -292,16 +282,10 @@ TILTED = 3
 
 @dataclass(frozen=True)
 class Views:
-    """N pictures with n edge points.
+    """N pictures with n edge points, sorted by picture.
 
-    Attributes:
-        edges: Edge points, sorted by picture.
-        tracks: Where the robot was.
-        markings: Of the map.
-        optics: Of the camera.
-        position_m: Standard deviation of a tracked place after smoothing [m].
-        heading_rad: Standard deviation of a tracked heading after smoothing [rad].
-        tape_m: Standard deviation of where a line lies from where the map has it [m].
+    Scatter is standard deviations: of a tracked place [m] and heading [rad] after smoothing, and of where a line lies
+    from where the map has it [m].
     """
 
     edges: Edges
@@ -335,11 +319,7 @@ class Views:
 
 @dataclass(frozen=True)
 class Tape:
-    """The order of the tape's errors in one row of numbers.
-
-    Attributes:
-        stretches: Of the road.
-    """
+    """The order of the tape's errors in one row of numbers, by the road's stretches."""
 
     stretches: int
 
@@ -386,15 +366,7 @@ FEWEST_FRAMES = 20
 
 @dataclass(frozen=True)
 class Gathered:
-    """Everything that a log shows of its camera.
-
-    Attributes:
-        views: Edges, poses and map.
-        numbers: Which of the log's frames they are (N,).
-        pictures: These frames (N, rows, columns, 3).
-        frames: All frames of the log.
-        notes: What is to be said of them, a line each.
-    """
+    """Everything that a log shows of its camera: its frames of these numbers (N,), and what is to be said of them."""
 
     views: Views
     numbers: NDArray[np.intp]
@@ -408,7 +380,6 @@ def gather_views(log: Log, frames: Frames, robot: Robot) -> Gathered:
 
     Raises:
         LogError: If too few show markings.
-        SettingsError: If the robot has no camera, or the map cannot be read.
     """
     robot.camera_figures()  # Refuses a robot without a camera before anything is read
     road = read_road(frames.road)
@@ -434,11 +405,7 @@ def gather_views(log: Log, frames: Frames, robot: Robot) -> Gathered:
 
 
 def read_road(name: str) -> Road:
-    """The map that frames show: one of the package's, or a file.
-
-    Raises:
-        SettingsError: If there is none, or it cannot be read.
-    """
+    """The map that frames show: one of the package's, or a file; refused if there is none, or it cannot be read."""
     return read_map(Path(name)) if name.endswith(".toml") else shipped_map(name)
 
 

@@ -55,13 +55,7 @@ WIDEST = (0.3, 0.3, 0.12)
 
 @dataclass(frozen=True)
 class Fitted:
-    """A fitted figure.
-
-    Attributes:
-        value: The best one.
-        interval: Holds the true one with 95 %.
-        identified: Whether the frames can tell it.
-    """
+    """A fitted figure with its 95 % interval, and whether the frames can tell it."""
 
     value: float
     interval: tuple[float, float]
@@ -72,15 +66,9 @@ class Fitted:
 class Light:
     """The light by which a drawn grey x is logged as 255 · gain · (x (1 − vignetting r²) / 255) ** gamma.
 
-    r is the distance from the picture's middle, 1 in its corners. Gain and gamma are relative to the declared paint:
-    they make the drawn frames match, and say little of the camera where the paint is not known. Vignetting does not
-    depend on the paint.
-
-    Attributes:
-        gain: Of all frames; where the exposure is automatic, the geometric mean of theirs.
-        gamma: Exponent.
-        vignetting: How much darker the corners are, as a share.
-        levels: Gain of each frame (N,) over that of all.
+    r is the distance from the picture's middle, 1 in its corners. Gain (`levels` are each frame's over it) and gamma
+    are relative to the declared paint: they make the drawn frames match, and say little of the camera where the paint
+    is not known. Vignetting, a share, does not depend on the paint.
     """
 
     gain: Fitted
@@ -121,14 +109,7 @@ def flat_places(predicted: NDArray[Any], floor: NDArray[np.bool_], margin: int =
 def fit_light(
     measured: Pictures, predicted: NDArray[Any], floor: NDArray[np.bool_], fixed_exposure: bool = False
 ) -> Light:
-    """Fit exposure and vignetting to flat places of the floor.
-
-    Args:
-        measured: Frames (N, rows, columns, 3) as logged.
-        predicted: What the model draws (N, rows, columns, 3) without any image effect.
-        floor: Pixels (rows, columns) that look at the floor.
-        fixed_exposure: Whether all frames have one gain.
-    """
+    """Fit exposure and vignetting to flat places of the floor; with a fixed exposure all frames have one gain."""
     means = _means(measured, predicted, floor)
     if means.frame.size == 0:
         gain, gamma, vignetting = (Fitted(*figure, False) for figure in zip((1.0, 1.0, 0.0), RANGES, strict=True))
@@ -307,12 +288,6 @@ def find_blemishes(
 
     Windows in which too few markings pass, near the horizon and at the sides, are not judged: what is hidden may reach
     farther than is said.
-
-    Args:
-        measured: Frames (N, rows, columns, 3) as logged.
-        predicted: What the model draws (N, rows, columns, 3) without any image effect.
-        floor: Pixels (rows, columns) that look at the floor.
-        light: What fit_light says.
     """
     contrast, error, variation = _contrast(measured, predicted, floor, light)
     if not np.isfinite(contrast).any():
@@ -353,8 +328,7 @@ def _contrast(
 ) -> tuple[Singles, Singles, Singles]:
     """Regress the measured brightness of each window on the expected one over the frames; NaN if unknown.
 
-    Returns:
-        The slope, its standard error, and the standard deviation of the measured over that of the expected.
+    Gives slopes, their standard errors, and the standard deviations of the measured over those of the expected.
     """
     green = np.ascontiguousarray(predicted[..., 1], dtype=np.float32)
     level = light.levels.astype(np.float32)[:, None, None]

@@ -29,14 +29,7 @@ ALIGNED = 0.5
 
 @dataclass(frozen=True)
 class State:
-    """Everything that places an edge point.
-
-    Attributes:
-        theta: Of the camera, by name in θ.
-        tape: Errors of the tape, in the order of `Tape` [m].
-        offset: Of the whole map: x, y [m] and heading about its middle [rad] (3,).
-        poses: What is added to each frame's tracked pose (N, 3).
-    """
+    """What places an edge point: θ of the camera, errors of the `Tape` [m], offsets of map (3,) and poses (N, 3)."""
 
     theta: Mapping[str, float]
     tape: Floats
@@ -195,16 +188,9 @@ SHOTS = 9
 
 
 def draw_pictures(views: Views, state: State, theta: Mapping[str, float], frames: NDArray[np.intp]) -> Pictures:
-    """Draw what a model would have seen.
+    """Draw what a model would have seen in some frames: red, green and blue (n, rows, columns, 3), 0 to 255.
 
-    Args:
-        views: Where the robot was, and the map.
-        state: Camera, and what is added to the tracked poses.
-        theta: Values of effects on pictures by name in θ; noise is left out, since no model knows it.
-        frames: Which frames (n,).
-
-    Returns:
-        Red, green and blue (n, rows, columns, 3), 0 to 255.
+    θ is of effects on pictures; noise is left out, since no model knows it.
     """
     camera = GroundPlaneCamera(views.optics.figures(state.theta), draw_floor(views.markings.road))
     poses, rates = (each[frames] for each in views.tracks.at(state.theta.get(LATENCY, 0.0)))

@@ -46,12 +46,7 @@ TRIED = 3
 
 @dataclass(frozen=True)
 class Subset:
-    """A set of effects.
-
-    Attributes:
-        effects: Those besides what is declared.
-        loss: What leaving all others out costs, at the least [nats].
-    """
+    """A set of effects besides those declared, and what leaving all others out costs, at the least [nats]."""
 
     effects: tuple[str, ...]
     loss: float
@@ -119,14 +114,7 @@ class CameraSelection:
 
 
 def fit_everything(views: Views, names: Sequence[str], fixed: Mapping[str, float], *, learn_scatter: bool) -> CameraFit:
-    """Fit all parameters from far away.
-
-    Args:
-        views: What is fitted to; its pose scatter is replaced by what is found where that is to be learnt.
-        names: All parameters that may differ from neutral, by name in θ.
-        fixed: Values that are known.
-        learn_scatter: Whether the tracker's scatter is not known.
-    """
+    """Fit all parameters from far away, but those fixed; the tracker's scatter is learnt where it is not known."""
     theta = {name: views.optics.neutral(name) for name in (*views.optics.mounting, *MOVING)} | dict(fixed)
     start = neutral_state(views, theta)
     # From far away an edge may be taken for another: the tape must not follow it
@@ -298,11 +286,7 @@ def matched_share(fit: CameraFit) -> float:
 
 
 def check_match(name: str, fit: CameraFit) -> tuple[str, ...]:
-    """Refuse frames that do not belong to the poses, and give a note on those that match poorly.
-
-    Raises:
-        LogError: If they do not belong to the poses, with what would make them, where that is found.
-    """
+    """Refuse frames that do not belong to the poses, with what would make them, or note that they match poorly."""
     share = matched_share(fit)
     if share >= USUAL_MATCHED:
         return ()
@@ -359,12 +343,7 @@ ALWAYS: Mapping[str, str] = MappingProxyType(
 
 
 def hidden_effects(full: CameraFit, model: Sequence[str]) -> tuple[str, ...]:
-    """Geometric effects that these frames could not have shown at their smallest usual size.
-
-    Args:
-        full: The fit with every effect.
-        model: Effects of the model, beside which another one would have to show.
-    """
+    """Geometric effects that these frames could not show beside the model's, at their smallest usual size."""
     hidden = [] if full.views.tracks.moving else list(MOVING)
     kept = [name for name in full.names if effect_of(name) in model]
     for name in (one for one in full.names if one not in kept):
@@ -381,12 +360,7 @@ def hidden_effects(full: CameraFit, model: Sequence[str]) -> tuple[str, ...]:
 
 
 def next_views(hidden: Sequence[str], *, repeated: bool) -> tuple[str, ...]:
-    """Advise what to take to see what was hidden.
-
-    Args:
-        hidden: Effects that could not be seen.
-        repeated: Whether some frames were taken standing still at one place.
-    """
+    """Advise what to take to see what was hidden; repeated frames were taken standing still at one place."""
     views = []
     if {LATENCY, READOUT, "blur"} & set(hidden):
         views.append("frames while driving bends at 0.3 m/s and more, for what shows in motion alone")

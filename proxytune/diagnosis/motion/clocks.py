@@ -107,17 +107,7 @@ class Clocks:
 
 
 def read_clocks(log: Log, robot: Robot, like: Clocks | None = None) -> Clocks:
-    """Measure the latency of every drive of a log.
-
-    Args:
-        log: The log.
-        robot: What drove.
-        like: Clocks of another log of the same robot: where the latency differs from what is left of that one, the
-            clocks do too.
-
-    Raises:
-        LogError: If there is nothing to compare in the log.
-    """
+    """Measure the latency of every drive of a log; where it is not what is left of a log it is like, clocks differ."""
     drives = gather(log, robot, log.episodes)
     speeds = measured_speeds(drives)
     if not len(speeds.first):
@@ -196,15 +186,7 @@ def _reaction(drives: Drives, speeds: Speeds) -> tuple[Reaction, bool]:
 
 
 def put_in_step(drives: Drives, clocks: Clocks, episodes: Sequence[int]) -> Drives:
-    """Put drives on one clock: poses later, jumping stretches left out.
-
-    Poses move by whole ticks, and commands by the fraction of a tick that is left.
-
-    Args:
-        drives: The drives.
-        clocks: Those of their log.
-        episodes: Which of the log's episodes they are (E,).
-    """
+    """Put these drives of a log on one clock: poses by whole ticks, commands by the rest; what jumps is left out."""
     later = clocks.later_s[list(episodes)] * drives.tick_hz
     ticks = np.ceil(later - 1e-9).astype(int)
     begin, end = (clocks.kept_s[list(episodes)] * drives.tick_hz).T
@@ -365,12 +347,6 @@ class Parts(NamedTuple):
 
 def split(log: Log, robot: Robot, test: Log | None, clocks: Sequence[Clocks] = ()) -> Parts:
     """Keep every third episode to test on, or the second half of each where there are few, or another log.
-
-    Args:
-        log: What to fit, and to test on.
-        robot: What drove.
-        test: Another log to test on.
-        clocks: Those of `log` and of `test`, to put their drives on one; none where they are.
 
     Raises:
         LogError: If there is too little to fit or to test on.

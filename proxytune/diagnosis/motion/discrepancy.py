@@ -80,7 +80,11 @@ APART = 0.02
 def offer_curves(drives: Drives, theta: Theta) -> Learnt:
     """Offer every group of curves with knots for these drives, all weights 0."""
     asked = twists_of(drives, theta)
-    used = _ticks_in_motion(drives)
+    episodes, length = drives.duties.shape[:2]
+    edges = np.zeros((episodes, length + 1))
+    np.add.at(edges, (drives.episode, drives.first), 1.0)
+    np.add.at(edges, (drives.episode, drives.last), -1.0)
+    used = np.asarray(np.cumsum(edges, axis=1)[:, :-1] > 0.5)
     forward, yaw = asked[..., 0][used], asked[..., 2][used]
     turn = yaw * track_of(drives.robot.figures) / 2.0
     effort = (np.abs(forward - turn) + np.abs(forward + turn)) / 2.0 / drives.robot.figures["full_speed"]
@@ -128,15 +132,6 @@ def _lattice(places: Floats) -> Knots:
         if len(corners) <= MOST_CORNERS:
             return tuple((float(x), float(y)) for x, y in (mesh * (corners + 0.5)).tolist())
     return ()
-
-
-def _ticks_in_motion(drives: Drives) -> Floats:
-    """The ticks (E, T) that lie within measured motion."""
-    episodes, length = drives.duties.shape[:2]
-    edges = np.zeros((episodes, length + 1))
-    np.add.at(edges, (drives.episode, drives.first), 1.0)
-    np.add.at(edges, (drives.episode, drives.last), -1.0)
-    return np.asarray(np.cumsum(edges, axis=1)[:, :-1] > 0.5)
 
 
 def _ends(signal: Floats) -> tuple[float, float]:
@@ -206,14 +201,7 @@ class ChosenGroups(NamedTuple):
 
 
 def sum_squares(slopes: Slopes, weights: Floats, part: Whole, parts: int) -> Sums:
-    """Sum over the poses of each part; errors are counted from weights of 0.
-
-    Args:
-        slopes: Linearised round the weights.
-        weights: Those weights (weights,).
-        part: The part of each pose (M,).
-        parts: How many parts there are.
-    """
+    """Sum over the poses of each part, linearised round these weights; errors are counted from weights of 0."""
     errors = slopes.residuals + slopes.columns @ weights
     size = np.sqrt((slopes.residuals**2).sum(axis=1))
     trust = 1.0 / np.sqrt(1.0 + (size / (ROBUST * np.median(size) + 1e-12)) ** 2)
@@ -227,13 +215,7 @@ def sum_squares(slopes: Slopes, weights: Floats, part: Whole, parts: int) -> Sum
 
 
 def choose_groups(given: Sums, groups: Mapping[str, Whole], rules: Rules) -> ChosenGroups:
-    """Add groups one by one, the best first, as long as they pay on parts that are left out; the level is always there.
-
-    Args:
-        given: Sums over the parts.
-        groups: The columns of each group.
-        rules: Of the diagnosis.
-    """
+    """Add groups one by one, the best first, while they pay on parts left out; the level is always there."""
     mean = given.hessian.sum(axis=0).diagonal()
     pulls = {name: FREE for name in groups if name == LEVEL}
     gains: dict[str, float] = {}
@@ -276,16 +258,7 @@ def _try_group(
 def _penalise(
     groups: Mapping[str, Whole], choices: Sequence[Mapping[str, float]], mean: Floats
 ) -> tuple[Whole, Floats]:
-    """The columns of the groups that have a pull, and how hard each is pulled: alike within a group.
-
-    Args:
-        groups: The columns of each group.
-        choices: Pulls of the same groups (R,).
-        mean: The average curvature of each column.
-
-    Returns:
-        Columns (K,) and pulls (R, K).
-    """
+    """The columns (K,) of the groups that have a pull, and how hard each is pulled (R, K): alike within a group."""
     names = list(choices[0])
     columns = np.concatenate([np.empty(0, int), *(groups[name] for name in names)])
     sizes = np.array([len(groups[name]) for name in names], int)
@@ -334,11 +307,7 @@ class Discrepancy:
 def fit_discrepancy(drives: Drives, theta: Theta, promises: Callable[[Floats], bool] = lambda _: True) -> Discrepancy:
     """Fit the discrepancy of a model over windows, and say whether that helps.
 
-    Args:
-        drives: What the model was fitted to.
-        theta: The model.
-        promises: Whether curves with these held-out squares (M,) are of use to who asks; if not, they are not guarded
-            and not used.
+    Curves whose held-out squares (M,) promise nothing to who asks are not guarded and not used.
     """
     windows = cut(drives, FITTED_S)
     blocks = len(np.unique(drives.block[windows.begin]))
@@ -461,14 +430,7 @@ class MatchedEffect(NamedTuple):
 def match_named_effect(
     drives: Drives, theta: Theta, discrepancy: Discrepancy, taken: Iterable[str]
 ) -> MatchedEffect | None:
-    """Find the named effect that removes as much error as the learnt curves, if one keeps most of their gain.
-
-    Args:
-        drives: What both were fitted to.
-        theta: The model beside which the curves were learnt.
-        discrepancy: The curves.
-        taken: Names of effects that the model has.
-    """
+    """Find the named effect, not taken, that removes as much error as the curves, if one keeps most of their gain."""
     windows = cut(drives, FITTED_S)
 
     def loss(candidate: Candidate, values: Floats) -> float:
@@ -508,14 +470,7 @@ def _tune(
 
 
 class LearntError(NamedTuple):
-    """The error with names and learnt curves, on drives that were not fitted.
-
-    Attributes:
-        horizon_s: Length of the windows [s].
-        after: Position [m].
-        heading: Heading [rad].
-        ratio: Position, by that with names alone.
-    """
+    """The error over windows with names and learnt curves, on drives not fitted [m], [rad], and by that with names."""
 
     horizon_s: float
     after: Rmse
@@ -551,13 +506,7 @@ class Learning:
 
 
 def learn(found: Findings, tested: Drives, horizons_s: Iterable[float]) -> Learning:
-    """Learn what the named effects leave over, and test it.
-
-    Args:
-        found: The models, fitted.
-        tested: Drives that were not fitted.
-        horizons_s: Lengths of the windows that are told [s].
-    """
+    """Learn what the named effects leave over, and test it over windows of these lengths."""
     beside = fit_discrepancy(found.model.drives, found.model.theta)
     errors = [_error(found, beside, tested, horizon_s) for horizon_s in horizons_s] if beside.used else []
     known = tuple(error for error in errors if error is not None)

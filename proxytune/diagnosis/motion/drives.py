@@ -89,11 +89,7 @@ def duties_of(log: Log, robot: Robot, commands: Floats) -> Floats:
 
 
 def _steered(log: Log, robot: Robot, commands: Floats) -> Floats:
-    """Speeds with wheel angles, or twists (…, 2), as a car's throttle and steering.
-
-    Raises:
-        LogError: If they ask for more than full speed, or turn on the spot.
-    """
+    """Speeds with wheel angles, or twists (…, 2), as a car's throttle and steering; refused beyond full speed."""
     figures, speeds, angles = robot.figures, commands[..., 0], commands[..., 1]
     if log.command == "twist":
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -129,13 +125,9 @@ def commands_as(kind: str, robot: Robot, duties: Floats) -> Floats:
 
 
 class Commands(NamedTuple):
-    """An episode's commands.
+    """An episode's commands (M, 2), as fractions of full speed; times [s] count from the first sample.
 
-    Attributes:
-        times: When each was issued (M,) [s after the first sample]; earlier ones are below 0.
-        duties: As fractions of full speed (M, 2).
-        rest: What was in force before the first sample (2,).
-        ticks_each: Ticks that each lasts, where they go with the samples; else 0.
+    `rest` was in force before it; `ticks_each` is how long each lasts where commands go with the samples, else 0.
     """
 
     times: Floats
@@ -163,11 +155,7 @@ class Commands(NamedTuple):
 
 
 def commands_of(log: Log, robot: Robot, episode: LogEpisode, ticks: int) -> Commands:
-    """An episode's commands; `ticks` are a sample's.
-
-    Raises:
-        LogError: If it has none, or they ask for more than full speed.
-    """
+    """An episode's commands; `ticks` are a sample's. Refused if it has none, or they ask for more than full speed."""
     duties, rest = duties_of(log, robot, episode.commands), np.zeros(2)
     if episode.wheels is not None and robot.drive == "differential" and np.isfinite(episode.wheels[0]).all():
         rest = np.asarray(episode.wheels[0] * robot.figures["wheel_radius"] / robot.figures["full_speed"])
@@ -205,12 +193,7 @@ def as_measured(episode: LogEpisode) -> tuple[Floats, Floats]:
 
 
 def ends_of(episodes: Sequence[LogEpisode], samples: Sequence[Whole]) -> tuple[Floats, Floats]:
-    """Poses between which increments lie (N, 2, 3), as measured, and how long after their samples (N, 2) [s].
-
-    Args:
-        episodes: The drives (E,).
-        samples: The samples of each that have a pose of their own.
-    """
+    """Poses as measured between which increments lie (N, 2, 3), and how long after their samples [s]; by each drive."""
     measured = [as_measured(episode) for episode in episodes]
     poses, after = (
         np.concatenate([np.stack((e[part][s[:-1]], e[part][s[1:]]), 1) for e, s in zip(measured, samples, strict=True)])
@@ -352,11 +335,7 @@ def relative(origin: Floats, pose: Floats) -> Floats:
 
 
 def gather(log: Log, robot: Robot, episodes: Sequence[LogEpisode]) -> Drives:
-    """A batch of a log's episodes, each command held from its own time.
-
-    Raises:
-        LogError: If there is nothing to compare in them.
-    """
+    """A batch of a log's episodes, each command held from its own time; refused if there is nothing to compare."""
     ticks = math.ceil(TICK_HZ / log.rate_hz)
     length = max(len(episode.times) for episode in episodes) * ticks
     tick_hz = log.rate_hz * ticks

@@ -43,7 +43,7 @@ from proxytune.diagnosis.motion.multistep_fit import (
 )
 from proxytune.diagnosis.motion.prediction import Ratio, Windows, blocks_of, cut, motion_along, pose_errors, ratio, rmse
 from proxytune.diagnosis.motion.random_effects import responses
-from proxytune.diagnosis.motion.screening import Candidate, candidates, motion_effects, project_out
+from proxytune.diagnosis.motion.screening import candidates, motion_effects, project_out
 
 FITTED_S = 2.0
 """Windows that models with and without an effect are fitted to, the longest that drives have up to this."""
@@ -80,11 +80,8 @@ class WeighedEffect(NamedTuple):
 def drop_negligible(found: Findings, seed: int, aside: Drives | None = None) -> Findings:
     """Drop the effects that are negligible for prediction, the weakest first.
 
-    Args:
-        found: What the search came to.
-        seed: Of the draws of random effects.
-        aside: Drives that nothing was fitted to: what is not shown to be worth anything on them is dropped. Without
-            them effects are weighed on the fitted drives, and have to be material.
+    On drives kept aside what is not shown to be worth anything is dropped. Without them effects are weighed on the
+    fitted drives, and have to be material.
     """
     drives = found.model.drives
     variant, kept = Variant(found.model.theta, found.model.free), list(found.adopted)
@@ -131,15 +128,7 @@ def _weigh_effects(
 def measure_effect_size(
     fitted: Drives, tested: Drives, variant: Variant, effect: AdoptedEffect, seed: int
 ) -> EffectSize:
-    """Measure the error without an effect by the error with it, on drives that nothing was fitted to.
-
-    Args:
-        fitted: Drives that the model with the effect, and the one without it, are fitted to.
-        tested: Drives that they predict.
-        variant: The model with it.
-        effect: The effect.
-        seed: Of the draws of random effects.
-    """
+    """Measure the error without an effect by the error with it, on drives that nothing was fitted to."""
     whole = _squares(fitted, tested, variant)
     if effect.free:
         return compare_errors(tested, _squares(fitted, tested, without_effect(variant, effect, fitted.rate_hz)), whole)
@@ -195,21 +184,16 @@ def invisible_effects(model: Fit, taken: set[str]) -> tuple[str, ...]:
     for form in (form for form in forms if not form.form or form.effect not in plain):
         nats = 0.0
         if form.probes:
-            direction = trace_of(model, form, form.probes[len(form.probes) // 2])
+            moved = theta_at({**model.theta, **form.fixed}, form.free, np.array(form.probes[len(form.probes) // 2]))
+            change = increments(model.drives, model.theta) - increments(model.drives, moved)
+            column = model.whiten.whiten(change)[:, None]
+            direction = project_out(model.slopes, column, np.ones(len(column)))[:, 0]
             nats = 0.5 * float(direction @ direction)
         best[form.effect] = max(best.get(form.effect, 0.0), nats)
     strike = rules.struck_share * float(responses(model, np.empty((len(model.innovations), 0))).size.sum()) / 2.0
     best |= {name: strike for name in RANDOM_EFFECTS if name not in taken}
     seen = {name for name, nats in best.items() if not nats < rules.visible_nats}
     return tuple(name for name in motion_effects(robot.catalogue) if name not in taken and name not in seen)
-
-
-def trace_of(model: Fit, form: Candidate, values: tuple[float, ...]) -> Floats:
-    """The change of the innovations by a form of an effect that the free parameters cannot make (3N,)."""
-    moved = theta_at({**model.theta, **form.fixed}, form.free, np.array(values))
-    change = increments(model.drives, model.theta) - increments(model.drives, moved)
-    column = model.whiten.whiten(change)[:, None]
-    return project_out(model.slopes, column, np.ones(len(column)))[:, 0]
 
 
 GAINS: Mapping[str, Mapping[str, Coordinate]] = {

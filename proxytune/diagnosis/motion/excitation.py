@@ -89,14 +89,7 @@ LIMITS = Limits()
 
 
 class Course(NamedTuple):
-    """Where the next drive is driven: from the middle of a room, facing along its length.
-
-    Attributes:
-        limits: What bounds it.
-        room: Length and width [m].
-        start: Pose in the log's frame (3,).
-        drives: Those of the log, whose robot and rates it has.
-    """
+    """Where the next drive is driven: from the middle of a room [m], along it; `start` is in the log's frame."""
 
     limits: Limits
     room: tuple[float, float]
@@ -170,12 +163,7 @@ class Course(NamedTuple):
         return replace(batch, travel=np.stack((np.hypot(moved[:, 0], moved[:, 1]), moved[:, 2]), axis=1))
 
     def beyond(self, batch: Drives, drift: float) -> Floats:
-        """How far each drive's path comes out of the room, two standard deviations of its drift included (E,) [m].
-
-        Args:
-            batch: Imagined drives.
-            drift: Standard deviation of the heading after a metre [rad].
-        """
+        """How far each path comes out of the room, with two deviations of its drift [rad] after a metre (E,) [m]."""
         count = len(batch.duties)
         cosine, sine = math.cos(self.start[2]), math.sin(self.start[2])
         off = (batch.poses[:, 1, :2] - self.start[:2]) @ np.array(((cosine, -sine), (sine, cosine)))
@@ -198,12 +186,7 @@ def course_of(drives: Drives, limits: Limits) -> Course:
 
 
 class Told(NamedTuple):
-    """What a drive tells.
-
-    Attributes:
-        between: What it tells apart.
-        nats: How clearly a minute of it speaks.
-    """
+    """What a drive tells apart, and how clearly a minute of it speaks."""
 
     between: tuple[str, ...]
     nats: float
@@ -217,18 +200,10 @@ class RivalFit(NamedTuple):
 
 
 class Rivals:
-    """The question which of an effect and its rivals is there.
+    """The question which of an effect and its rivals is there; fewer nats a minute than `least` tell nothing.
 
     The effect counts at the size that was fitted and at half of it: a log that cannot tell it from rivals may not tell
     its size well.
-
-    Args:
-        course: Where drives are driven.
-        model: With the effect.
-        effect: The effect.
-
-    Attributes:
-        least: Fewer nats a minute tell nothing.
     """
 
     def __init__(self, course: Course, model: Fit, effect: AdoptedEffect) -> None:
@@ -302,16 +277,7 @@ def nats_apart(model: Fit, batch: Drives, rival: RivalFit) -> Floats:
 
 
 class Unknown:
-    """The question what is missing at all: parameters known badly, and effects that a log could not show.
-
-    Args:
-        course: Where drives are driven.
-        model: What is known.
-        unseen: Names of the effects.
-
-    Attributes:
-        least: Fewer nats a minute tell nothing.
-    """
+    """The question what is missing at all: parameters known badly, and effects that a log could not show."""
 
     def __init__(self, course: Course, model: Fit, unseen: Sequence[str]) -> None:
         self._course, self._model, self.least = course, model, 0.0
@@ -349,13 +315,7 @@ Worth = Callable[[Floats], Floats]
 
 
 class Sequences:
-    """Sequences of commands that evolve, those worth most kept.
-
-    Args:
-        course: Where they are driven.
-        model: Whose poses they have.
-        seed: Of all that is tried.
-    """
+    """Sequences of commands that evolve, those worth most kept."""
 
     def __init__(self, course: Course, model: Fit, seed: int) -> None:
         self._course, self._model = course, model
@@ -462,12 +422,7 @@ def design_drive(
 ) -> NextDrive | None:
     """Design the drive that tells an adopted effect from its rivals, or noise from what is missing; None without both.
 
-    Args:
-        found: What the search came to.
-        again: Whether noise is to be told from what is missing: it is then driven REPEATS times.
-        limits: Of the drive.
-        unseen: Names of effects that the log could not show.
-        seed: Of the search.
+    Noise is told from what is missing `again`: by REPEATS drives. Effects that the log could not show are `unseen`.
     """
     course = course_of(found.model.drives, limits)
     contested = next((effect for effect in found.adopted if effect.rivals), None)

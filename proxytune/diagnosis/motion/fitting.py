@@ -97,12 +97,7 @@ def fit_theta(
 ) -> Theta:
     """Fit free coordinates from where θ has them under frozen gains; those that change the motion by steps first.
 
-    Args:
-        drives: What is fitted to.
-        theta: Where to begin.
-        free: What is fitted.
-        whiten: Of the noise.
-        multiples: Where coordinates that act by steps are looked for, as multiples of their value.
+    Those are looked for at multiples of their value.
     """
     sloped = smooth_coordinates(free, drives.robot)
     rough = tuple(coordinate for coordinate in free if coordinate not in sloped)
@@ -185,14 +180,7 @@ def held_out_log_likelihood(fitted: Fit) -> Floats:
 
 
 def held_out_innovations(fitted: Fit, columns: Floats, sums: tuple[Floats, Floats], penalty: Floats) -> Floats:
-    """Give the innovations (3N,) once each block's columns (3N, columns) are weighted as all other blocks have it.
-
-    Args:
-        fitted: What was fitted without the columns.
-        columns: Change of the innovations per unit of each weight.
-        sums: Gradient and Hessian of each block along the columns.
-        penalty: Added to the Hessian: it pulls the weights to 0.
-    """
+    """Give the innovations (3N,) with each block's columns weighted, under a penalty, as all others have it."""
     gradient, hessian = sums
     rest = hessian.sum(axis=0) - hessian + penalty
     moved = -np.linalg.solve(rest, (gradient.sum(axis=0) - gradient)[:, :, None])[:, :, 0]
@@ -273,14 +261,15 @@ MOST_ASKEW_DEG = 60.0
 
 
 def check_motion(name: str, drives: Drives) -> None:
-    """Refuse a log in which the robot stands or is never told to move.
-
-    Raises:
-        LogError: Saying which.
-    """
+    """Refuse a log in which the robot stands or is never told to move, and say which."""
     if np.abs(drives.duties).max() < 1e-6:
         raise LogError(f"{name}: every command is zero; nothing can be learnt from a robot that is never told to move")
-    way, turn = _reach(drives)
+    furthest = np.zeros(2)
+    for episode in np.unique(drives.episode):
+        poses = drives.poses[drives.episode == episode, 1]
+        off = np.abs(poses - np.median(poses, axis=0))
+        furthest = np.maximum(furthest, np.quantile((np.hypot(off[:, 0], off[:, 1]), off[:, 2]), 0.9, axis=1))
+    way, turn = furthest
     if way < LEAST_TRAVEL_M and turn < LEAST_TURN_RAD:
         raise LogError(
             f"{name}: the robot got {way:.3f} m far and turned {turn:.2f} rad; nothing can be learnt from a robot that "
@@ -288,22 +277,8 @@ def check_motion(name: str, drives: Drives) -> None:
         )
 
 
-def _reach(drives: Drives) -> tuple[float, float]:
-    """The greatest distance from an episode's middle pose, outliers apart: [m], [rad]."""
-    furthest = np.zeros(2)
-    for episode in np.unique(drives.episode):
-        poses = drives.poses[drives.episode == episode, 1]
-        off = np.abs(poses - np.median(poses, axis=0))
-        furthest = np.maximum(furthest, np.quantile((np.hypot(off[:, 0], off[:, 1]), off[:, 2]), 0.9, axis=1))
-    return float(furthest[0]), float(furthest[1])
-
-
 def check_units(name: str, drives: Drives, theta: Theta) -> None:
-    """Refuse poses in other units or axes than the commands can have led to.
-
-    Raises:
-        LogError: Saying which.
-    """
+    """Refuse poses in other units or axes than the commands can have led to, and say which."""
     asked = increments(drives, theta)
     way, driven = float(np.abs(asked[:, 0]).sum()), float(drives.travel[:, 0].sum())
     if way > LEAST_TRAVEL_M and not 1.0 / MOST_TIMES < driven / way < MOST_TIMES:

@@ -31,13 +31,7 @@ BINS = 40
 
 
 class Period(NamedTuple):
-    """Something that slows the robot down again and again.
-
-    Attributes:
-        period_s: How often [s].
-        lost_s: As if it stood so long each time [s].
-        chance: Of a line so strong without anything periodic, over all lines.
-    """
+    """Something that slows the robot down every so often, as if it stood so long [s]; its chance over all lines."""
 
     period_s: float
     lost_s: float

@@ -58,12 +58,9 @@ MOST_TRIALS = 20
 
 
 class MultistepFit(NamedTuple):
-    """The result of fitting parameters to windows.
+    """The result of fitting parameters to windows: held-out error of the new values by the old ones', by horizon.
 
-    Attributes:
-        horizon_s: Length of the windows [s].
-        ratios: Held-out error of the new values by that of the old ones, by horizon [s].
-        intervals: 95 % intervals of the new values, by name in θ; none of what was not fitted to windows.
+    What was not fitted to windows has no interval.
     """
 
     horizon_s: float
@@ -79,14 +76,7 @@ def horizons(drives: Drives) -> tuple[float, ...]:
 
 
 def fit_windows(drives: Drives, theta: Theta, free: Sequence[Coordinate], windows: Windows) -> dict[str, float]:
-    """Fit the free coordinates of θ to these windows: where the model misses their poses least.
-
-    Args:
-        drives: The measured drives.
-        theta: Where to start.
-        free: What is fitted, except where it changes the motion by steps: single steps tell that far more sharply.
-        windows: Windows over the drives; long logs are thinned to MOST_WINDOWS of them.
-    """
+    """Fit the free coordinates to windows, but those that change the motion by steps; long logs are thinned."""
     fitted = smooth_coordinates(free, drives.robot)
     if not fitted or len(windows.begin) == 0:
         return dict(theta)
@@ -161,12 +151,6 @@ def held_out_squares(drives: Drives, theta: Theta, free: Sequence[Coordinate], f
     """Predict every compared pose, by horizon [s]: its squared distance from the measured one [m²].
 
     No pose is predicted by what was fitted to its own fold.
-
-    Args:
-        drives: The measured drives.
-        theta: Where fits start.
-        free: What is fitted.
-        fitted_s: Length of the windows that are fitted to [s].
     """
     fold = np.asarray(drives.block % min(FOLDS, int(drives.block.max()) + 1))
     windows = cut(drives, fitted_s)
@@ -251,11 +235,7 @@ def pose_noise(drives: Drives, theta: Theta) -> PoseNoise:
     """The noise of measured poses, from third differences of the path of what a model leaves over.
 
     A model's slow errors, and those of a robot that drifts, vanish in third differences or grow with the lag; the noise
-    of a pose does neither.
-
-    Args:
-        drives: The measured drives.
-        theta: The model that is taken off; the better it is, the fewer of its errors pass for noise.
+    of a pose does neither. The better the model, the fewer of its errors pass for noise.
     """
     left = drives.measured - increments(drives, theta)
     heading = drives.poses[:, 0, 2]

@@ -49,13 +49,7 @@ AT_ONCE = 300_000
 
 
 class Windows(NamedTuple):
-    """Windows (W,) over measured increments, and the increments in them (M,).
-
-    Attributes:
-        begin: The increment at whose beginning each window starts (W,).
-        window: The window of each entry (M,).
-        increment: The increment whose end is compared (M,).
-    """
+    """Windows, begun by an increment (W,), and the increments in them whose ends are compared (M,)."""
 
     begin: Whole
     window: Whole
@@ -85,11 +79,6 @@ def select_windows(windows: Windows, kept: NDArray[np.bool_]) -> Windows:
 def blocks_of(drives: Drives, windows: Windows) -> Whole:
     """The block that each compared pose belongs to (M,)."""
     return np.asarray(drives.block[windows.begin][windows.window])
-
-
-def pose_differences(drives: Drives, theta: Theta, windows: Windows) -> Floats:
-    """The model's motion since each window's beginning less the measured one (M, 3): [m], [m], [rad]."""
-    return predicted_motion(drives, theta, windows) - measured_motion(drives, windows)
 
 
 def predicted_motion(drives: Drives, theta: Theta, windows: Windows) -> Floats:
@@ -135,7 +124,7 @@ def motion_in(drives: Drives, walked: Floats, windows: Windows) -> Floats:
 
 def pose_errors(drives: Drives, theta: Theta, windows: Windows) -> Floats:
     """Measure the errors of the model's poses (M, 2): distance [m], heading [rad]."""
-    return _lengths(pose_differences(drives, theta, windows))
+    return _lengths(predicted_motion(drives, theta, windows) - measured_motion(drives, windows))
 
 
 def pose_errors_along(drives: Drives, walked: Floats, windows: Windows) -> Floats:
@@ -386,12 +375,9 @@ MOST_WINDOWS = 600
 
 
 class Slopes(NamedTuple):
-    """Windows' poses as they are compared, in metres.
+    """Windows' poses (M, 3) as they are compared, in metres: forward, left, and heading times the median way.
 
-    Attributes:
-        residuals: Measured less predicted (M, 3): forward, left, and heading times the median way.
-        columns: Change of the prediction per weight (M, 3, weights), curve by curve.
-        block: The block of each pose (M,).
+    `columns` is the change of the prediction per weight (M, 3, weights), curve by curve.
     """
 
     residuals: Floats
@@ -411,13 +397,7 @@ def choose_windows(drives: Drives) -> Windows:
 
 
 def slopes_of(drives: Drives, theta: Theta, offered: Learnt) -> Slopes:
-    """Linearise windows in the weights of learnt curves, around a model that may have a learnt effect itself.
-
-    Args:
-        drives: What is fitted.
-        theta: The model.
-        offered: The curves whose weights may change.
-    """
+    """Linearise windows in the weights of the curves offered, around a model that may have a learnt effect itself."""
     windows = choose_windows(drives)
     begin, window = windows.begin, windows.window
     tick = drives.last[windows.increment] - drives.first[begin][window]
@@ -444,12 +424,7 @@ def _pose_slopes(
 ) -> Floats:
     """Change of compared poses (M, 3, weights) per weight of the curves, to first order; places as complex numbers.
 
-    Args:
-        twists: Those of the windows (W, length, 3).
-        walked: The tracked places along them (W, length + 1, 3).
-        features: What each weight of a curve adds in each tick (W, length, knots), and its unit, a twist (3,).
-        at: Window and tick after which each pose is compared, (M,) each.
-        tick_s: Length of a tick [s].
+    Features are what each weight adds in a tick, and its unit, a twist; `at` is the window and tick of each pose.
     """
     poses = integrate_twists(twists, tick_s)
     cosine, sine = cosine_and_sine(poses[:, 1:, 2] - twists[..., 2] * (tick_s / 2.0))
@@ -477,12 +452,10 @@ ALIKE_AT_START = 0.1
 
 
 class Repeated(NamedTuple):
-    """The scatter of drives from the same commands, beside the error of a model.
+    """The scatter of drives from the same commands: what they do not repeat, RMSE of position [m].
 
-    Attributes:
-        share: What they do not repeat, by the model's error over the same windows: at 1 it predicts all that repeats.
-        apart: What they do not repeat: RMSE of position [m].
-        part: The share of all windows that have repeats.
+    Its `share` of the model's error over the same windows is 1 where the model predicts all that repeats; `part` of all
+    windows have repeats.
     """
 
     share: Ratio
@@ -493,13 +466,8 @@ class Repeated(NamedTuple):
 def compare_repeats(drives: Drives, theta: Theta, horizon_s: float) -> Repeated | None:
     """Compare a model's error with what drives do not repeat; None where too little was driven twice.
 
-    Of windows driven n times the mean is taken off, and n/(n − 1) gives back
-    what that takes: for two drives, √(½ mean square of their difference).
-
-    Args:
-        drives: All drives of a log, each as one block, so that windows of repeats begin together.
-        theta: The model.
-        horizon_s: Length of the windows [s].
+    Of windows driven n times the mean is taken off, and n/(n − 1) gives back what that takes: for two drives, √(½ mean
+    square of their difference). Each drive of the log is one block: windows of repeats begin together.
     """
     windows = cut(drives, horizon_s)
     if len(windows.begin) < FEWEST:

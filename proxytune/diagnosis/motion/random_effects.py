@@ -42,12 +42,10 @@ SHIFTS = 99
 
 
 class Responses(NamedTuple):
-    """Responses of the innovations to the loss of single commands: one row per command that changed anything.
+    """Responses of the innovations to the loss of single commands, a row per command that changed anything.
 
-    Attributes:
-        gradient: Inner product of the change of the innovations with the innovations.
-        size: Inner product of the change with itself.
-        others: The gradient had the innovations been others (columns, commands).
+    `gradient` and `size` are products of the change with the innovations and with itself; `others` the gradient with
+    other innovations (columns, commands).
     """
 
     gradient: Floats
@@ -56,15 +54,9 @@ class Responses(NamedTuple):
 
 
 class RandomEffect(NamedTuple):
-    """A random effect weighed.
+    """A random effect weighed: its likeliest size, and its gain beyond what chance gives on average [nats].
 
-    Attributes:
-        effect: Its name in the catalogue.
-        parameter: The name of its parameter in θ.
-        value: Its likeliest size.
-        interval: Where the size lies; all sizes that are looked for, until `infer_size_indirectly` narrows them.
-        gain: Its gain in log-likelihood beyond what chance gives on average [nats].
-        p_value: How often chance gains as much.
+    The interval is all sizes that are looked for, until `infer_size_indirectly` narrows it.
     """
 
     effect: str
@@ -126,13 +118,9 @@ def _mixture(late: Lateness, gradient: Floats, energy: Floats) -> Floats:
 
 
 def responses(fitted: Fit, others: Floats) -> Responses:
-    """Replay the drives with each command lost, and see what changes.
+    """Replay the drives with each command lost, and see what changes, and what would of other innovations.
 
     Commands far apart are lost together, so that one replay tells of many.
-
-    Args:
-        fitted: The model, and what it leaves over.
-        others: Other innovations, for which the same is asked (3N, columns).
     """
     drives = fitted.drives
     changed, phase = _changed_commands(drives)
@@ -187,20 +175,14 @@ def _respond_to_phase(fitted: Fit, lost: Whole, heard: _Innovations) -> tuple[Fl
     label = np.repeat(after, 3)
     size = sum_by(label, change**2, len(lost))
     gradients = sum_by(label, heard.values, len(lost), change)
-    return size, gradients / _loudness(label, change, heard, gradients / (size[:, None] + 1e-12))
-
-
-def _loudness(label: Whole, change: Floats, heard: _Innovations, share: Floats) -> Floats:
-    """Standard deviation of what the loss of a command does not explain, where it acts, at least 1 (commands, columns).
-
-    After a command all motion may be harder to predict: only what points its way speaks for its loss.
-    """
+    # After a command all motion may be harder to predict: only what points its way speaks for its loss.
+    share = gradients / (size[:, None] + 1e-12)
     weight, count = np.abs(change), len(share)
     total = sum_by(label, weight, count)[:, None] + 1e-12
     along = sum_by(label, heard.values, count, weight * change)
     cubes = sum_by(label, weight, count, change**2)[:, None]
     energy = sum_by(label, heard.squares, count, weight) - 2.0 * share * along + share**2 * cubes
-    return np.asarray(np.sqrt(np.maximum(1.0, energy / total)))
+    return size, gradients / np.sqrt(np.maximum(1.0, energy / total))
 
 
 SMALLEST, LARGEST, SIZES = 0.6, 3.0, 8
@@ -220,13 +202,7 @@ WIDE = 2.2
 
 
 def infer_size_indirectly(model: Fit, effect: RandomEffect, seed: int) -> RandomEffect:
-    """Give the effect the size at which simulated drives say what the measured ones do, and its interval.
-
-    Args:
-        model: The model without the effect, whose delay has its mean lateness.
-        effect: The effect, as the likelihood of single commands has it.
-        seed: Of draws and noise.
-    """
+    """Give the effect the size at which simulated drives say what the measured ones do, and its interval."""
     draws, rate = RANDOM_EFFECTS[effect.effect], model.drives.rate_hz
     sizes = np.geomspace(SMALLEST * effect.value, min(LARGEST * effect.value, draws.sizes[1]), SIZES)
     simulated = [_simulate_innovations(model, effect, size, seed + n) for n in range(DRAWS) for size in sizes]

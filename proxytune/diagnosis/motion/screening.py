@@ -47,16 +47,7 @@ def motion_effects(catalogue: Catalogue) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Candidate:
-    """One form of an effect: what is free in it, what is fixed, and where a search starts.
-
-    Attributes:
-        effect: Its name in the catalogue.
-        form: The name of this form, `left wheel`; empty for the plain one.
-        free: Its coordinates.
-        fixed: Its other parameters.
-        neutral: Where the model has its coordinates.
-        probes: Where a search starts, one value per coordinate.
-    """
+    """One form of an effect: what is free in it, what is fixed, where the model has it, and where a search starts."""
 
     effect: str
     form: str
@@ -72,13 +63,7 @@ class Candidate:
 
 
 def candidates(robot: Robot, theta: Theta, taken: Iterable[str]) -> tuple[Candidate, ...]:
-    """List every form of every deterministic motion effect that is not taken.
-
-    Args:
-        robot: The robot, whose catalogue says what there is.
-        theta: Values of effects that the model has: a form starts from there.
-        taken: Names of effects that are declared or adopted.
-    """
+    """List every form of every deterministic motion effect that is not taken, from where θ has it."""
     left_out = {*taken, *RANDOM_EFFECTS}
     names = (name for name in motion_effects(robot.catalogue) if name not in left_out)
     return tuple(form for name in names for form in _forms(name, robot, theta))

@@ -59,14 +59,7 @@ class _Signal(NamedTuple):
 
 @dataclass(frozen=True)
 class SignalGroup:
-    """Flexible motion that depends on one signal.
-
-    Attributes:
-        name: What people call the signal.
-        signal: The signal over time, for drawing (E, T).
-        unit: Its unit.
-        make: Makes the motion that depends on it: of long drives it is too large to be kept.
-    """
+    """Flexible motion that depends on one signal (E, T); `make` makes it: of long drives it is too large to keep."""
 
     name: Cue
     signal: Floats

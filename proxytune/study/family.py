@@ -36,10 +36,7 @@ ON_SEVERAL = ("run_many", "examine_together")
 class UserFamily:
     """A domain family whose members are asked for one by one; what one of them raises is one line.
 
-    Attributes:
-        family: The family.
-        name: Where it comes from, as a complaint names it.
-        aliases: Pairs of an agent's name in the study and the name by which the family loads it.
+    `name` is where it comes from, as a complaint has it; aliases pair an agent's name with that by which it is loaded.
     """
 
     family: Any
@@ -47,12 +44,7 @@ class UserFamily:
     aliases: tuple[tuple[str, str], ...] = ()
 
     def __getattr__(self, member: str) -> Any:
-        """Any member of the family.
-
-        Raises:
-            AttributeError: If it has no such member.
-            ExtensionError: If asking for it raises.
-        """
+        """Any member of the family; what asking for it raises is an ExtensionError."""
         if member.startswith("__"):
             raise AttributeError(member)
         value = ask(f"{member} of {self.name}", functools.partial(self._member, member))
@@ -73,11 +65,7 @@ class UserFamily:
         return digest(identity, sorted(self.aliases)) if self.aliases else identity
 
     def check_agent(self, name: str) -> None:
-        """Refuse an agent that the family cannot run.
-
-        Raises:
-            InputError: If there is no such agent, or looking for it raises.
-        """
+        """Refuse an agent that the family cannot run."""
         loaded = self._loaded(name)
         ask(f"check_agent('{loaded}') of {self.name}", functools.partial(self.family.check_agent, loaded))
 
@@ -127,11 +115,7 @@ def load_family(settings: StudySettings, model: Path | None) -> DomainFamily:
 
 
 def given_family(settings: StudySettings, family: Any) -> DomainFamily:
-    """A family that is at hand, checked as one that a study names, behind the guard.
-
-    Raises:
-        InputError: As load_family.
-    """
+    """A family that is at hand, checked as one that a study names, behind the guard."""
     _check(settings, family)
     return cast(DomainFamily, UserFamily(family, "the simulator"))
 

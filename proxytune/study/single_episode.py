@@ -127,7 +127,10 @@ class _Recorder:
         _check_columns("poses", self.kept.poses)
         _check_columns("commands", self.kept.commands)
         if self._filmed and hasattr(self._family, "replay"):
-            self.pictures = _pictures(self._family, episode, self.kept.commands)
+            issued = np.column_stack([column for name, column in self.kept.commands.items() if name != "time"])
+            pictures = np.asarray(self._family.replay(episode, issued).pictures)
+            coloured = pictures.dtype == np.uint8 and pictures.ndim == 4 and pictures.shape[-1] == 3
+            self.pictures = pictures if coloured and len(pictures) == len(issued) else None
         return self.kept.metrics
 
 
@@ -135,14 +138,6 @@ def _check_columns(what: str, columns: Columns) -> None:
     lengths = {len(column) for column in columns.values()}
     if columns and ("time" not in columns or len(lengths) > 1 or not min(lengths)):
         raise EpisodeError(f"record of the domain family: {what} need a column `time` and as many rows in every column")
-
-
-def _pictures(family: Any, episode: Episode, commands: Columns) -> NDArray[np.uint8] | None:
-    """The picture before each command; None if the answer has no pictures of red, green and blue."""
-    issued = np.column_stack([column for name, column in commands.items() if name != "time"])
-    pictures = np.asarray(family.replay(episode, issued).pictures)
-    coloured = pictures.dtype == np.uint8 and pictures.ndim == 4 and pictures.shape[-1] == 3
-    return pictures if coloured and len(pictures) == len(issued) else None
 
 
 APART_M = 0.05

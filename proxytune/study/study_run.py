@@ -95,14 +95,6 @@ def longest_first(episodes: Sequence[Episode], seconds: Mapping[tuple[str, int],
     return sorted(episodes, key=lambda episode: -seconds.get((episode.agent, episode.start), float("inf")))
 
 
-def _split(episodes: list[Episode], least: int) -> tuple[list[Episode], list[Episode]]:
-    """The first so many episodes and the rest of their last agent's; and those after them."""
-    end = least
-    while 0 < end < len(episodes) and episodes[end].agent == episodes[end - 1].agent:
-        end += 1
-    return episodes[:end], episodes[end:]
-
-
 def evaluate_outcomes(study: Study, theta: Theta, outcomes: Sequence[Outcome]) -> Evaluation:
     """Compare the outcomes of a domain instance's episodes with the target; a pure function.
 
@@ -285,7 +277,11 @@ class StudyRun:
         family, needed = self.study.family, needed_metrics(self.settings, self.study.family)
         with self.watched() as watch:
             while left:
-                wave, left = _split([one for one in left if one.theta not in ended], least)
+                episodes = [one for one in left if one.theta not in ended]
+                end = least
+                while 0 < end < len(episodes) and episodes[end].agent == episodes[end - 1].agent:
+                    end += 1
+                wave, left = episodes[:end], episodes[end:]
                 with running(family, wave, self.settings.jobs, lambda one: one.theta in ended, needed, watch) as fleets:
                     for outcomes in fleets:
                         self._keep(outcomes)

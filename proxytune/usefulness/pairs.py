@@ -29,13 +29,10 @@ FLIPS: dict[tuple[float, float], Flip] = {(1.0, 0.0): "reversed", (1.0, 0.5): "l
 
 @dataclass(frozen=True)
 class FlippedPair:
-    """Two agents that the proxy ranks unlike the target.
+    """Two agents that the proxy ranks unlike the target; `better` dominates there, or in the proxy if only that orders.
 
-    Attributes:
-        better: The one that dominates on the target, or in the proxy where the target has no order.
-        worse: The other.
-        flip: "reversed" if the proxy says the opposite, "lost" if it sees no order where the target has one,
-            "invented" if it sees one where the target has none.
+    It is "reversed" by the proxy, or "lost" where only the target has an order, "invented" where only the proxy has
+    one.
     """
 
     better: str
@@ -146,13 +143,7 @@ WORDS = 2**20
 
 @dataclass(frozen=True)
 class Standing:
-    """One column of scores, sorted: the agents that each one is ahead of.
-
-    Attributes:
-        order: Agents from the lowest score to the highest.
-        below: How many agents each is ahead of; these come first in the order.
-        reach: How many agents are not ahead of each; these come first in the order too.
-    """
+    """One column sorted: how many agents each is ahead of (first in the order), and how many are not ahead of it."""
 
     order: Whole
     below: Whole
@@ -169,12 +160,7 @@ class Standing:
 
 
 def stand(scores: Floats, tie: float) -> Standing:
-    """Sort a column.
-
-    Args:
-        scores: One per agent, finite.
-        tie: The largest difference that is still a tie.
-    """
+    """Sort a column (agents,), finite; differences up to `tie` are ties."""
     agents = len(scores)
     order = np.argsort(scores)
     ahead_of = _ahead_of(scores[order], tie)
@@ -215,16 +201,7 @@ def _ahead_of(ascending: Floats, tie: float) -> Whole:
 
 
 def by_table(measure: Callable[[Floats, Floats], float | Floats], proxy: Floats, target: Floats) -> Floats:
-    """Measure many pairs of tables one by one.
-
-    Args:
-        measure: Of two arrays of shape (agents, metrics).
-        proxy: Mean scores in the proxy, shape (…, agents, metrics).
-        target: Mean scores on the target, broadcastable to the same shape.
-
-    Returns:
-        Shape (…), followed by that of what is measured.
-    """
+    """Measure pairs of tables (…, agents, metrics), which broadcast, one by one: (…), and the shape of a measure."""
     proxy, target = np.broadcast_arrays(proxy, target)
     leading, table = proxy.shape[:-2], proxy.shape[-2:]
     tables = zip(proxy.reshape(-1, *table), target.reshape(-1, *table), strict=True)

@@ -86,7 +86,12 @@ def bootstrap_means(inputs: Comparison, *, resamples: int, seed: int) -> Means:
     rng = np.random.default_rng(seed)
     if inputs.paired:
         counts = draw_counts(inputs.target, rng, resamples)
-        return counted_means(inputs.proxy.values, _alike(inputs, counts)), counted_means(inputs.target.values, counts)
+        labels = inputs.target.episodes
+        columns = {start_of(label): column for column, label in enumerate(labels)}
+        columns |= {label: column for column, label in enumerate(labels)}
+        # The proxy's episodes are drawn with the target's of the same label or, of other repeats, of the same start.
+        alike = counts[..., [columns.get(label, columns[start_of(label)]) for label in inputs.proxy.episodes]]
+        return counted_means(inputs.proxy.values, alike), counted_means(inputs.target.values, counts)
     on_target = _means_of_draws(inputs.target, rng, resamples)
     return _means_of_draws(inputs.proxy, rng, resamples), on_target
 
@@ -135,14 +140,6 @@ def _draw_own(driven: NDArray[np.bool_], rng: np.random.Generator, resamples: in
         drawn += episodes * np.arange(resamples)[:, None]
         counts.append(np.bincount(drawn.ravel(), minlength=resamples * episodes).reshape(resamples, episodes))
     return np.stack(counts)
-
-
-def _alike(inputs: Comparison, target_counts: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The target's draws for the proxy's episodes: by label or, of other repeats, by start."""
-    labels = inputs.target.episodes
-    columns = {start_of(label): column for column, label in enumerate(labels)}
-    columns |= {label: column for column, label in enumerate(labels)}
-    return target_counts[..., [columns.get(label, columns[start_of(label)]) for label in inputs.proxy.episodes]]
 
 
 def counted_means(values: Floats, counts: NDArray[np.int64] | NDArray[np.bool_]) -> Floats:
@@ -205,13 +202,7 @@ class Intervals:
 
 
 def intervals(*, inputs: Comparison, error: Ppv, means: Means | None) -> Intervals | None:
-    """The interval of every measure at once; None where episodes are not repeated.
-
-    Args:
-        inputs: What is compared.
-        error: PPV, with the weights that it has.
-        means: Mean scores of resampled episodes, None where there are none.
-    """
+    """The interval of every measure, PPV with its weights, from resampled means; None without repeated episodes."""
     if means is None:
         return None
     weights = np.array([error.beta[metric.name] or 0.0 for metric in inputs.metrics])

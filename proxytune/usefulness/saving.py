@@ -126,12 +126,7 @@ def is_rate(table: ScoreTable, column: int) -> bool:
 
 
 def rate_intervals(rates: Floats, counts: Floats) -> list[Ends]:
-    """The 95 % interval of each rate.
-
-    Args:
-        rates: The share that succeeded, shape (agents,).
-        counts: Rollouts that it rests on.
-    """
+    """The 95 % interval of each rate (agents,) that rests on so many rollouts."""
     from scipy.special import betaincinv
 
     tail = (1.0 - CONFIDENCE) / 2.0

@@ -140,12 +140,7 @@ class ScoreReport(Shown, Assessment):
 
 @dataclass(frozen=True, repr=False)
 class Ranking(Shown):
-    """Several proxies of one target: which is better beyond noise, by PRPV, by regret and by what it saves.
-
-    Attributes:
-        proxies: Each one's report, by name.
-        selection: Ranked by PRPV.
-    """
+    """Several proxies of one target: which is better beyond noise, by PRPV, by regret and by what it saves."""
 
     proxies: Mapping[str, ScoreReport]
     selection: Selection

@@ -12,13 +12,8 @@ from typing import NamedTuple
 class Command(NamedTuple):
     """A command: its module, loaded only when it is asked for, and its line in the help.
 
-    Attributes:
-        module: Its name in this room.
-        summary: One line for people.
-        resumes: Whether it continues where it was interrupted.
-        kept: What an interruption leaves, in one phrase; everything finished, or nothing, where it does not say.
-        draws: Whether it writes figures.
-        runs_code: Whether it runs the code that a study names; else none runs, whatever a file names.
+    An interruption leaves everything finished, or nothing, where `kept` does not say; where `runs_code` is not set no
+    code runs, whatever a file names.
     """
 
     module: str

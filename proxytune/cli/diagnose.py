@@ -78,11 +78,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def limits_of(arguments: argparse.Namespace) -> Limits:
-    """Limits of the next drive.
-
-    Raises:
-        InputError: If one is none.
-    """
+    """Limits of the next drive."""
     room = None
     if arguments.room is not None:
         sides = [finite(side) for side in arguments.room.split("x")]

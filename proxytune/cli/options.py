@@ -116,43 +116,31 @@ def configure_source(parser: argparse.ArgumentParser) -> None:
 
 
 def wanted_of(arguments: argparse.Namespace) -> Wanted:
-    """Columns and topics to take.
-
-    Raises:
-        InputError: If the column map is none.
-    """
+    """Columns and topics to take."""
+    columns = {}
+    for part in (part.strip() for part in arguments.columns.split(",") if part.strip()):
+        ours, equals, theirs = part.partition("=")
+        if not (equals and ours.strip() and theirs.strip()):
+            raise InputError(f"--columns {part}: write OURS=THEIRS or OURS=THEIRS:UNIT, as in x=pos_x:mm")
+        columns[ours.strip()] = theirs.strip()
     return Wanted(
         commands=arguments.commands,
         poses=arguments.poses,
         frames=arguments.pictures,
         stamps=arguments.stamps,
-        columns=_columns(arguments.columns),
+        columns=columns,
         kind=arguments.kind,
     )
 
 
 def facts_of(arguments: argparse.Namespace) -> Facts:
-    """Facts that only the user knows.
-
-    Raises:
-        InputError: If a figure or the offset is no number.
-    """
+    """Facts that only the user knows."""
     offset = arguments.clock_offset
     if offset not in ("", "fit") and finite(offset) is None:
         raise InputError(f"--clock-offset {offset}: give seconds, as in -0.25, or fit")
     road = arguments.map
     road = str(Path(road).resolve()) if road.endswith(".toml") else road
     return Facts(arguments.robot or "", read_geometry(arguments.figure), road, offset)
-
-
-def _columns(text: str) -> dict[str, str]:
-    columns = {}
-    for part in (part.strip() for part in text.split(",") if part.strip()):
-        ours, equals, theirs = part.partition("=")
-        if not (equals and ours.strip() and theirs.strip()):
-            raise InputError(f"--columns {part}: write OURS=THEIRS or OURS=THEIRS:UNIT, as in x=pos_x:mm")
-        columns[ours.strip()] = theirs.strip()
-    return columns
 
 
 NOT_COPIED = (*MADE, "study.db*", "study.lock", "report.html", "__pycache__")
@@ -163,10 +151,6 @@ def study_folder(path: Path) -> Path:
     """The study's folder, given as itself or as its study.toml; one of several families has its own in it.
 
     Where there is none and its last part names a study that comes with the package, that study is copied there.
-
-    Raises:
-        InputError: If there is no such study.
-        StoreError: If the copy cannot be written.
     """
     folder = path.parent if path.name == FILE_NAME else path
     if study_around(folder, FILE_NAME) is not None:

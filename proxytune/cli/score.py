@@ -51,12 +51,13 @@ from proxytune.usefulness import (
 def read_sides(
     arguments: argparse.Namespace, metrics: Sequence[str]
 ) -> tuple[tuple[str, ScoreTable], dict[str, ScoreTable]]:
-    """The target with its name, and every proxy by name.
-
-    Raises:
-        InputError: If a table cannot be used, or a column that --columns names is in none of them.
-    """
-    columns = _columns(arguments.columns)
+    """The target with its name, and every proxy by name."""
+    columns: dict[str, str] = {}
+    for pair in filter(None, arguments.columns.split(",")):
+        name, equals, theirs = (part.strip() for part in pair.partition("="))
+        if not (name and equals and theirs):
+            raise InputError(f"--columns {arguments.columns}: write NAME=COLUMN,..., as in agent=policy,episode=trial")
+        columns[name] = theirs
     _check_columns(columns, [split_source(source)[0] for source in (*arguments.target, *arguments.proxy)])
     _check_other_column(arguments, metrics)
     target = _read_target(arguments.target, metrics, columns, both=arguments.target == arguments.proxy)
@@ -74,11 +75,7 @@ def _check_other_column(arguments: argparse.Namespace, metrics: Sequence[str]) -
 
 
 def _sides_given(arguments: argparse.Namespace) -> None:
-    """Take one table for both sides, where there is one.
-
-    Raises:
-        InputError: If a side is missing.
-    """
+    """Take one table for both sides, where there is one."""
     if arguments.both is not None:
         if arguments.proxy or arguments.target:
             raise InputError(f"{arguments.both}: give one table of both sides, or --proxy and --target")
@@ -89,11 +86,7 @@ def _sides_given(arguments: argparse.Namespace) -> None:
 
 
 def _metrics_given(arguments: argparse.Namespace) -> list[str]:
-    """The metrics asked for with patterns resolved, or those that one table has of both sides.
-
-    Raises:
-        InputError: If there are none, or their direction cannot be guessed.
-    """
+    """The metrics asked for with patterns resolved, or those that one table has of both sides."""
     path, domain = split_source(arguments.target[0])
     known = arguments.metric or []
     if known and not any("*" in text or "?" in text for text in known):
@@ -115,16 +108,6 @@ def split_source(source: str) -> tuple[Path, str | None]:
     if not colon or Path(source).exists() or not path:
         return Path(source), None
     return Path(path), domain
-
-
-def _columns(text: str) -> dict[str, str]:
-    columns: dict[str, str] = {}
-    for pair in filter(None, text.split(",")):
-        name, equals, theirs = (part.strip() for part in pair.partition("="))
-        if not (name and equals and theirs):
-            raise InputError(f"--columns {text}: write NAME=COLUMN,..., as in agent=policy,episode=trial")
-        columns[name] = theirs
-    return columns
 
 
 def _check_columns(columns: Mapping[str, str], files: Sequence[Path]) -> None:

@@ -107,13 +107,7 @@ class LivePage:
 def renewed_page(
     settings: StudySettings, objective: str, watching: AbstractContextManager[Watcher]
 ) -> Iterator[Watcher]:
-    """A watcher that keeps the study's page up to date; a run that is stopped leaves a page that says so.
-
-    Args:
-        settings: The study's.
-        objective: The measure that its trials are searched by.
-        watching: Gives what else hears of every episode.
-    """
+    """A watcher that keeps the study's page up to date; a run that is stopped leaves a page that says so."""
     with watching as watcher:
         page = LivePage(settings, objective, watcher)
         try:

@@ -29,12 +29,7 @@ from proxytune.starting import STOPPING
 
 @dataclass(frozen=True)
 class Answer:
-    """The result of a command.
-
-    Attributes:
-        document: What `--json` prints: plain numbers, texts, lists and dicts, None where undefined.
-        text: What a person reads on standard output; of a plain text no line is broken.
-    """
+    """What `--json` prints, plain values, and what a person reads; of a plain text no line is broken."""
 
     document: dict[str, Any]
     text: RenderableType
@@ -111,11 +106,7 @@ def _redirected() -> int | None:
 
 
 def print_answer(answer: Answer, *, as_json: bool) -> None:
-    """Print a command's answer; a reader that has gone is not an error, and letters that a terminal lacks are escaped.
-
-    Raises:
-        RunError: If it cannot be written.
-    """
+    """Print a command's answer; a reader that has gone is no error, and letters that a terminal lacks are escaped."""
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
     try:

@@ -270,35 +270,20 @@ class Costs:
 
 
 def read_costs(section: Section) -> Costs:
-    """Read the table [teaching.costs].
-
-    Raises:
-        SettingsError: With file, key and remedy.
-    """
+    """Read the table [teaching.costs]."""
     section.only(KEYS)
     return Costs(**{key: section.number(key, getattr(Costs, key), low=0.0) for key in KEYS})
 
 
 def split_samples(count: Floats | float, expert_drives: float) -> tuple[Floats, Floats]:
-    """On-policy and off-policy samples among so many, of which the expert drives for the first ones.
-
-    Args:
-        count: How many samples, of any shape.
-        expert_drives: The number from which on the learner drives itself; infinite where it never does.
-    """
+    """On-policy and off-policy samples among so many, of which the first ones, or all, are driven by the expert."""
     off = np.minimum(count, expert_drives)
     with np.errstate(invalid="ignore"):
         return np.where(off < count, np.subtract(count, off), 0.0), off
 
 
 def cost_saved(costs: Costs, *, without: tuple[Floats, Floats], with_proxy: tuple[Floats, Floats]) -> Floats:
-    """PLV in cost: what the target samples cost that are needed without a proxy, less those needed with it.
-
-    Args:
-        costs: Of one sample and label.
-        without: On-policy and off-policy samples needed without the proxy, as `split_samples` has them.
-        with_proxy: The same with it.
-    """
+    """PLV in cost: what on- and off-policy target samples cost without a proxy, less those needed with it."""
 
     def with_a_price(samples: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
         """Samples without those that cost nothing, of which there may be infinitely many."""

@@ -128,11 +128,7 @@ def general_plv(
 ) -> Samples:
     """PLV where samples gathered by the learner itself cost otherwise than an expert's (eq. 6, as we read it).
 
-    Args:
-        without: Target samples needed without the proxy: on-policy η_on, off-policy η_off.
-        with_proxy: The same with it.
-        cost_on: Cost of an on-policy sample.
-        cost_off: Cost of an off-policy sample; with on-policy samples none and cost 1, eq. 5.
+    Samples needed are η_on and η_off; with on-policy samples none and an off-policy cost of 1 it is eq. 5.
     """
     return cost_on * (without[0] - with_proxy[0]) + cost_off * (without[1] - with_proxy[1])  # eq. (6)
 
@@ -400,13 +396,7 @@ KEYS = ("zero_shot", "samples", "reduction")
 
 @dataclass(frozen=True)
 class Published:
-    """A row of somebody's table.
-
-    Attributes:
-        zero_shot: The score in the target before any of its samples.
-        samples: The target samples that were needed to converge.
-        reduction: The share of samples that was saved.
-    """
+    """A row of somebody's table: score before any target sample, samples to converge, and the share saved."""
 
     zero_shot: float
     samples: int
@@ -414,11 +404,7 @@ class Published:
 
 
 def read_published(section: Section, known: Mapping[str, object], none: str) -> Mapping[str, Published]:
-    """Read the rows, each named as a proxy of the study or as learning without one.
-
-    Raises:
-        SettingsError: With file, key and remedy.
-    """
+    """Read the rows, each named as a proxy of the study or as learning without one."""
     section.only((none, *known))
     return {name: _row(section.section(name)) for name in section.values}
 

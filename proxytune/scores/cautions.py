@@ -124,7 +124,11 @@ def _lengths(proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -
         (most, limited), (other, other_limited) = (_longest(table, place) for table in (proxy, target))
         shorter = limited if most < other else other_limited
         factor = max(most, other) / min(most, other) if min(most, other) > 0.0 else 1.0
-        if shorter and factor > SAME_LENGTH and not _unit_of_time(factor):
+        if (
+            shorter
+            and factor > SAME_LENGTH
+            and not any(abs(factor / unit - 1.0) < 0.02 for unit in (60.0, 1e3, 1e6, 1e9))
+        ):
             yield (
                 f"episodes last up to {most:.4g} in the proxy and up to {other:.4g} on the target by {metric.name}; "
                 "give both sides one time limit, or scores that grow with time cannot be compared"
@@ -137,11 +141,6 @@ def _longest(table: ScoreTable, place: int) -> tuple[float, bool]:
     longest = float(times.max())
     ended = int((times >= longest - 1e-3 * abs(longest)).sum())
     return longest, ended >= max(FEWEST_AT_CEILING, CEILING * len(times))
-
-
-def _unit_of_time(factor: float) -> bool:
-    """A factor that is one of milliseconds or minutes, and hardly one of time limits."""
-    return any(abs(factor / unit - 1.0) < 0.02 for unit in (60.0, 1e3, 1e6, 1e9))
 
 
 def _units(proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric], *, alone: bool) -> Iterator[str]:

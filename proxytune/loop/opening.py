@@ -51,13 +51,8 @@ FEWEST = 3
 def held_out_of(settings: StudySettings, family: DomainFamily, *, driven: bool) -> tuple[str, ...]:
     """The agents that study.toml holds out, else shipped ones that it does not use; empty where they are too few.
 
-    Args:
-        settings: Of the study.
-        family: Its family.
-        driven: True if the target is driven; otherwise only agents that its table has can be held out.
-
-    Raises:
-        InputError: If one that study.toml names is tuned on, or has no rank: the target's table has no scores of it.
+    Where the target is not driven, only agents that its table has can be held out. One that study.toml names is refused
+    if it is tuned on, or has no rank.
     """
     named = read_settings(settings.path).texts(KEY, ())
     scored = scored_agents(settings)
@@ -110,20 +105,8 @@ def held_out_settings(settings: StudySettings, names: tuple[str, ...], target: P
 def drive_held_out(study: Study, settings: StudySettings, theta: Theta, watcher: Watcher) -> tuple[Assessment, int]:
     """Drive held-out agents in the instance of a study's family, twice from each start, and assess it.
 
-    Episodes are kept in the study's own database, and those that are there are not driven again. The second time is
-    for the noise floor: what the instance scores against itself.
-
-    Args:
-        study: The proxy's study.
-        settings: Its settings with held-out agents, and the target's scores of them.
-        theta: The instance.
-        watcher: Hears of every episode.
-
-    Returns:
-        The assessment, and the number of episodes that were driven now.
-
-    Raises:
-        RunError: If an agent has no episode that works.
+    Episodes are kept in the study's own database, and those that are there are not driven again. The second time is for
+    the noise floor: what the instance scores against itself. Gives the assessment, and how many were driven now.
     """
     held = replace(study, settings=settings, target=read_target(settings, study.family)[0])
     seeds = [fresh_seed(settings.seed, repetition) for repetition in (1, 2)]
@@ -149,16 +132,7 @@ HOME = "loop"
 
 @dataclass(frozen=True)
 class Loop:
-    """A loop to be closed.
-
-    Attributes:
-        settings: What study.toml says.
-        family: The proxy's domain family.
-        robot: The robot that proxy and log are of.
-        twin: The model.toml of the target, where that is a simulator.
-        log: The target's log, a folder or what `import` reads; None: the twin is recorded.
-        held_out: Agents that the tuning does not see.
-    """
+    """A loop to be closed; the twin is a simulated target's model.toml, recorded where there is no log."""
 
     settings: StudySettings
     family: DomainFamily

@@ -15,7 +15,7 @@ import tomlkit
 from numpy.typing import NDArray
 
 from proxytune.diagnosis.motion.drives import Floats, duties_of
-from proxytune.diagnosis.motion.manoeuvres import LIBRARY, commands_of
+from proxytune.diagnosis.motion.manoeuvres import LIBRARY, commands_of, mirrored
 from proxytune.driving import (
     TICK_HZ,
     Course,
@@ -89,7 +89,7 @@ def record(
         else:
             sized = commands_of(LIBRARY[number % len(LIBRARY)][2], times, robot) * random.uniform(0.75, 1.0)
             if number // len(LIBRARY) % 2 == 1:
-                sized = sized * (1.0, -1.0) if robot.drive == "ackermann" else sized[:, ::-1]
+                sized = mirrored(sized, robot)
         commands = np.asarray(np.round(sized, 4), dtype=float)
         poses = _drive(family, commands, random, number)
         episodes.append(LogEpisode(str(number), times, commands, poses, None))

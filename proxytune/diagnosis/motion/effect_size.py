@@ -41,7 +41,7 @@ from proxytune.diagnosis.motion.multistep_fit import (
     noise_floor,
     pose_noise,
 )
-from proxytune.diagnosis.motion.prediction import Ratio, Windows, blocks_of, cut, motion_along, pose_errors, ratio, rmse
+from proxytune.diagnosis.motion.prediction import Ratio, Windows, blocks_of, cut, motion_in, pose_errors, ratio, rmse
 from proxytune.diagnosis.motion.random_effects import responses
 from proxytune.diagnosis.motion.screening import candidates, motion_effects, project_out
 
@@ -167,10 +167,10 @@ def _size_of_draws(drives: Drives, variant: Variant, whole: Mapping[float, Float
 
 def _drawn_squares(drives: Drives, variant: Variant, windows: Windows, seed: int) -> Floats:
     """Mean squared distance [m²] of drawn and expected replays at every compared pose (M,)."""
-    expected = motion_along(drives, paths(drives, variant.theta), windows)
+    expected = motion_in(drives, paths(drives, variant.theta), windows, in_one_go=True)
     total = np.zeros(len(expected))
     for draw in range(DRAWS):
-        drawn = motion_along(drives, drawn_paths(drives, variant.theta, seed + draw), windows)
+        drawn = motion_in(drives, drawn_paths(drives, variant.theta, seed + draw), windows, in_one_go=True)
         total += np.square(drawn - expected)[:, :2].sum(axis=1)
     return total / DRAWS
 

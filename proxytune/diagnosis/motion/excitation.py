@@ -30,7 +30,7 @@ from proxytune.diagnosis.motion.drives import Drives, Floats
 from proxytune.diagnosis.motion.evidence import AdoptedEffect, Findings
 from proxytune.diagnosis.motion.fitting import Fit, fit_theta, intervals, loss_of, slopes
 from proxytune.diagnosis.motion.innovations import Coordinate, increments, paths, span, theta_at, whitener
-from proxytune.diagnosis.motion.manoeuvres import LIBRARY, commands_of
+from proxytune.diagnosis.motion.manoeuvres import LIBRARY, commands_of, mirrored
 from proxytune.diagnosis.motion.screening import Candidate, candidates
 from proxytune.space import Theta
 
@@ -320,10 +320,7 @@ class Sequences:
     def __init__(self, course: Course, model: Fit, seed: int) -> None:
         self._course, self._model = course, model
         self._random = np.random.default_rng(seed)
-        library = course.library
-        sides = (1.0, -1.0) if course.drives.robot.drive == "ackermann" else (1.0, 1.0)
-        order = slice(None) if course.drives.robot.drive == "ackermann" else slice(None, None, -1)
-        both = (*library, *(library[:, :, order] * sides))
+        both = (*course.library, *mirrored(course.library, course.drives.robot))
         self._living = np.stack([course.within(one * size) for one in both for size in SCALES])
 
     def evolve(self, worth: Worth) -> Floats:

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.stats import t as student
 
 from proxytune.diagnosis.motion.drives import Drives, Floats, sum_by
 from proxytune.diagnosis.motion.innovations import (
@@ -35,6 +34,8 @@ from proxytune.diagnosis.motion.innovations import (
     theta_at,
     whitener,
 )
+from proxytune.diagnosis.motion.prediction import jackknife_half_width
+from proxytune.driving import Robot
 from proxytune.errors import LogError
 from proxytune.space import Theta
 
@@ -206,7 +207,9 @@ LEAST = 0.003
 
 def intervals(fitted: Fit) -> dict[str, tuple[float, float]]:
     """Give 95 % intervals of the fitted parameters, from the scatter between blocks."""
-    known = _smooth_intervals(fitted)
+    gradients, hessian = derivatives_by_block(fitted, fitted.slopes)
+    inverse = np.linalg.inv(hessian.sum(axis=0) + KEPT_SOLVABLE * np.eye(len(fitted.free)))
+    known = sandwich_intervals(fitted.theta, fitted.free, fitted.drives.robot, gradients, inverse)
     for coordinate in fitted.free:
         if is_stepwise(coordinate, fitted.drives.robot):
             known |= dict.fromkeys(coordinate, _stepwise_interval(fitted, coordinate))
@@ -223,29 +226,20 @@ def _stepwise_interval(fitted: Fit, coordinate: Coordinate) -> tuple[float, floa
     left = (fitted.whiten.whiten(drives.measured - increments(drives, theta)) for theta in thetas)
     losses = np.stack([sum_by_block(drives, huber(innovations)) for innovations in left], axis=1)
     best = values[(losses.sum(axis=0) - losses).argmin(axis=1)]
-    count = len(best)
-    if count < 2:
-        return low, high
-    spread = np.sqrt((count - 1) / count * np.square(best - best.mean()).sum())
-    half = max(float(student.ppf(0.975, count - 1) * spread), LEAST * here)
+    half = max(jackknife_half_width(best), LEAST * here)
     return max(low, here - half), min(high, here + half)
 
 
-def _smooth_intervals(fitted: Fit) -> dict[str, tuple[float, float]]:
-    """From the spread between blocks (sandwich)."""
-    gradient, hessian = derivatives_by_block(fitted, fitted.slopes)
-    blocks, count = gradient.shape
-    inverse = np.linalg.inv(hessian.sum(axis=0) + KEPT_SOLVABLE * np.eye(count))
-    spread = inverse @ (gradient.T @ gradient) @ inverse * blocks / max(1, blocks - count)
-    found = {}
-    for coordinate, variance in zip(fitted.free, np.diag(spread), strict=True):
-        if is_stepwise(coordinate, fitted.drives.robot):
-            continue
-        low, high = span(coordinate, fitted.drives.robot)
+def sandwich_intervals(
+    theta: Theta, free: tuple[Coordinate, ...], robot: Robot, gradients: Floats, inverse: Floats
+) -> dict[str, tuple[float, float]]:
+    """95 % intervals from the spread of gradients between blocks (blocks, coordinates), and the Hessian's inverse."""
+    spread = inverse @ (gradients.T @ gradients) @ inverse * len(gradients) / max(1, len(gradients) - len(free))
+    found: dict[str, tuple[float, float]] = {}
+    for coordinate, variance in zip(free, np.diag(spread), strict=True):
+        low, high = span(coordinate, robot)
         half = 1.96 * float(np.sqrt(variance)) * (high - low)
-        for name in coordinate:
-            value = fitted.theta[name]
-            found[name] = (max(low, value - half), min(high, value + half))
+        found |= {name: (max(low, theta[name] - half), min(high, theta[name] + half)) for name in coordinate}
     return found
 
 

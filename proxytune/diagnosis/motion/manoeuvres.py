@@ -70,6 +70,11 @@ ROLLING = 0.4
 """Throttle of a car in manoeuvres that turn on the spot, which it cannot."""
 
 
+def mirrored(commands: Floats, robot: Robot) -> Floats:
+    """Commands (…, 2) that bend the other way."""
+    return np.asarray(commands * (1.0, -1.0)) if robot.drive == "ackermann" else commands[..., ::-1]
+
+
 def commands_of(shape: Callable[[Floats], Floats], times: Floats, robot: Robot) -> Floats:
     """The commands of a manoeuvre at some times (rows, 2): duties of two wheels, or a car's throttle and steering."""
     duties = shape(times)

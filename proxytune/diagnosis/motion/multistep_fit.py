@@ -7,7 +7,7 @@ with that noise from third differences of the residual path, E|Δ³|² = 20 σ²
 `bullet_pose_errors` measures on the bullet plant what the planar plant found.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from scipy.optimize import least_squares, nnls
 from scipy.stats import chi2
 
 from proxytune.diagnosis.motion.drives import Drives, Floats, Recent
-from proxytune.diagnosis.motion.fitting import STEP, Fit, evaluate
+from proxytune.diagnosis.motion.fitting import STEP, Fit, evaluate, sandwich_intervals
 from proxytune.diagnosis.motion.innovations import (
     Coordinate,
     increments,
@@ -97,54 +97,44 @@ def fit_windows(drives: Drives, theta: Theta, free: Sequence[Coordinate], window
 
 
 class _Problem(NamedTuple):
-    """A least-squares problem in fractions of the coordinates' ranges."""
+    """A least-squares problem in fractions of the coordinates' ranges: θ, residuals and their slopes there."""
 
-    drives: Drives
-    theta: Theta
-    free: tuple[Coordinate, ...]
-    windows: Windows
-    measured: Floats
-    weights: Floats
-    recent: Recent[Floats]
-
-    @property
-    def start(self) -> Floats:
-        low, high = np.array([span(coordinate, self.drives.robot) for coordinate in self.free]).T
-        here = np.array([self.theta[coordinate[0]] for coordinate in self.free])
-        return np.asarray(np.clip((here - low) / (high - low), 1e-6, 1.0 - 1e-6))
-
-    @property
-    def scale(self) -> float:
-        return max(1e-6, ROBUST * float(np.median(np.abs(self.residuals(self.start)))))
-
-    def at(self, fractions: Floats) -> dict[str, float]:
-        low, high = np.array([span(coordinate, self.drives.robot) for coordinate in self.free]).T
-        return theta_at(self.theta, self.free, low + fractions * (high - low))
-
-    def residuals(self, fractions: Floats) -> Floats:
-        def make() -> Floats:
-            apart = predicted_motion(self.drives, self.at(fractions), self.windows) - self.measured
-            misses = np.asarray((apart * self.weights).ravel())
-            misses.setflags(write=False)
-            return misses
-
-        return self.recent.get(fractions.tobytes(), make)
-
-    def jacobian(self, fractions: Floats) -> Floats:
-        here, columns = self.residuals(fractions), []
-        for number in range(len(fractions)):
-            step = STEP if fractions[number] + STEP <= 1.0 else -STEP
-            moved = fractions.copy()
-            moved[number] += step
-            columns.append((self.residuals(moved) - here) / step)
-        return np.stack(columns, axis=1)
+    at: Callable[[Floats], dict[str, float]]
+    residuals: Callable[[Floats], Floats]
+    jacobian: Callable[[Floats], Floats]
+    start: Floats
+    scale: float
 
 
 def _problem(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], windows: Windows) -> _Problem:
     """The least-squares problem of these windows; a heading error counts as the way it makes over the median chord."""
-    measured = measured_motion(drives, windows)
-    chord = float(np.median(np.hypot(*measured[:, :2].T)))
-    return _Problem(drives, theta, free, windows, measured, np.array((1.0, 1.0, max(chord, 1e-3))), Recent())
+    measured, recent = measured_motion(drives, windows), Recent[Floats]()
+    weights = np.array((1.0, 1.0, max(float(np.median(np.hypot(*measured[:, :2].T))), 1e-3)))
+    low, high = np.array([span(coordinate, drives.robot) for coordinate in free]).T
+
+    def at(fractions: Floats) -> dict[str, float]:
+        return theta_at(theta, free, low + fractions * (high - low))
+
+    def residuals(fractions: Floats) -> Floats:
+        def make() -> Floats:
+            apart = predicted_motion(drives, at(fractions), windows) - measured
+            misses = np.asarray((apart * weights).ravel())
+            misses.setflags(write=False)
+            return misses
+
+        return recent.get(fractions.tobytes(), make)
+
+    def jacobian(fractions: Floats) -> Floats:
+        here, columns = residuals(fractions), []
+        for number in range(len(fractions)):
+            step = STEP if fractions[number] + STEP <= 1.0 else -STEP
+            moved = fractions.copy()
+            moved[number] += step
+            columns.append((residuals(moved) - here) / step)
+        return np.stack(columns, axis=1)
+
+    start = np.clip((np.array([theta[coordinate[0]] for coordinate in free]) - low) / (high - low), 1e-6, 1.0 - 1e-6)
+    return _Problem(at, residuals, jacobian, start, max(1e-6, ROBUST * float(np.median(np.abs(residuals(start))))))
 
 
 def held_out_squares(drives: Drives, theta: Theta, free: Sequence[Coordinate], fitted_s: float) -> dict[float, Floats]:
@@ -201,14 +191,7 @@ def _intervals(
     hessian = (slopes / (1.0 + (left / scale) ** 2)[:, None] ** 1.5).T @ slopes
     _, block = np.unique(np.repeat(blocks_of(drives, windows), 3), return_inverse=True)
     sums = np.stack([np.bincount(block, column) for column in gradient.T], axis=1)
-    inverse = np.linalg.pinv(hessian, hermitian=True)
-    spread = inverse @ (sums.T @ sums) @ inverse * len(sums) / max(1, len(sums) - len(free))
-    found: dict[str, tuple[float, float]] = {}
-    for coordinate, variance in zip(free, np.diag(spread), strict=True):
-        low, high = span(coordinate, drives.robot)
-        half = 1.96 * float(np.sqrt(variance)) * (high - low)
-        found |= {name: (max(low, theta[name] - half), min(high, theta[name] + half)) for name in coordinate}
-    return found
+    return sandwich_intervals(theta, free, drives.robot, sums, np.linalg.pinv(hessian, hermitian=True))
 
 
 LAGS = (1, 2, 3, 4, 6)

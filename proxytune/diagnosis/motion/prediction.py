@@ -112,14 +112,12 @@ def length_of(drives: Drives, windows: Windows) -> int:
     return int(ticks.max()) + (drives.after is not None)
 
 
-def motion_in(drives: Drives, walked: Floats, windows: Windows) -> Floats:
-    """Motion along windows' own paths (W, length + 1, 3) since each window's beginning (M, 3)."""
+def motion_in(drives: Drives, walked: Floats, windows: Windows, *, in_one_go: bool = False) -> Floats:
+    """Motion (M, 3) since windows' beginnings, along paths of their own (W, length + 1, 3) or episodes in one go."""
     begin = windows.begin[windows.window]
-    start = drives.first[begin]
-    return relative(
-        drives.along(walked, windows.window, begin, start, end=False),
-        drives.along(walked, windows.window, windows.increment, start, end=True),
-    )
+    path, start = (drives.episode[begin], 0) if in_one_go else (windows.window, drives.first[begin])
+    ends = ((begin, False), (windows.increment, True))
+    return relative(*(drives.along(walked, path, increment, start, end=end) for increment, end in ends))
 
 
 def pose_errors(drives: Drives, theta: Theta, windows: Windows) -> Floats:
@@ -129,16 +127,7 @@ def pose_errors(drives: Drives, theta: Theta, windows: Windows) -> Floats:
 
 def pose_errors_along(drives: Drives, walked: Floats, windows: Windows) -> Floats:
     """The errors (M, 2) of paths that were driven in one go (E, T + 1, 3)."""
-    return _lengths(motion_along(drives, walked, windows) - measured_motion(drives, windows))
-
-
-def motion_along(drives: Drives, walked: Floats, windows: Windows) -> Floats:
-    """Motion along such paths since each window's beginning (M, 3)."""
-    begin = windows.begin[windows.window]
-    return relative(
-        drives.along(walked, drives.episode[begin], begin, end=False),
-        drives.along(walked, drives.episode[windows.increment], windows.increment, end=True),
-    )
+    return _lengths(motion_in(drives, walked, windows, in_one_go=True) - measured_motion(drives, windows))
 
 
 def measured_motion(drives: Drives, windows: Windows) -> Floats:
@@ -187,12 +176,12 @@ class Ratio(NamedTuple):
 
 def rmse(squares: Floats, blocks: Whole) -> Rmse:
     """The root mean square, with a t-interval on its logarithm from leaving blocks out in turn."""
-    return _root(float(np.log(squares.mean())), _half_width(_log_means_without_each(squares, blocks)))
+    return _root(float(np.log(squares.mean())), jackknife_half_width(_log_means_without_each(squares, blocks)))
 
 
 def ratio(after: Floats, before: Floats, blocks: Whole, shown_at: float = RULES.ratio_p_value) -> Ratio:
     """Divide two root mean squares over the same windows, with an interval and the chance of a ratio so far off 1."""
-    half = _half_width(_log_means_without_each(after, blocks) - _log_means_without_each(before, blocks))
+    half = jackknife_half_width(_log_means_without_each(after, blocks) - _log_means_without_each(before, blocks))
     value, interval = _root(float(np.log(after.mean() / before.mean())), half)
     return Ratio(value, interval, *_signed_ranks(after, before, blocks), shown_at)
 
@@ -222,11 +211,12 @@ def _log_means_without_each(squares: Floats, blocks: Whole) -> Floats:
     return np.asarray(np.log((sums.sum() - sums) / (counts.sum() - counts)))
 
 
-def _half_width(logs: Floats) -> float:
-    count = len(logs)
+def jackknife_half_width(values: Floats) -> float:
+    """Half of the 95 % interval, from the values without each block in turn; infinite of one block alone."""
+    count = len(values)
     if count < 2:
         return float("inf")
-    spread = np.sqrt((count - 1) / count * ((logs - logs.mean()) ** 2).sum())
+    spread = np.sqrt((count - 1) / count * ((values - values.mean()) ** 2).sum())
     return float(student.ppf(0.975, count - 1) * spread)
 
 

@@ -125,8 +125,7 @@ def responses(fitted: Fit, others: Floats) -> Responses:
     drives = fitted.drives
     changed, phase = _changed_commands(drives)
     values = np.concatenate((fitted.innovations[:, None], others), axis=1)
-    heard = _Innovations(values, values**2)
-    found = [_respond_to_phase(fitted, changed[phase == number], heard) for number in np.unique(phase)]
+    found = [_respond_to_phase(fitted, changed[phase == number], values) for number in np.unique(phase)]
     if not found:
         return Responses(np.empty(0), np.empty(0), np.empty((others.shape[1], 0)))
     size, gradients = (np.concatenate(part) for part in zip(*found, strict=True))
@@ -156,14 +155,7 @@ def _lose_commands(drives: Drives, lost: Whole) -> Floats:
     return duties
 
 
-class _Innovations(NamedTuple):
-    """The innovations of a model and others beside them (3N, columns), and their squares."""
-
-    values: Floats
-    squares: Floats
-
-
-def _respond_to_phase(fitted: Fit, lost: Whole, heard: _Innovations) -> tuple[Floats, Floats]:
+def _respond_to_phase(fitted: Fit, lost: Whole, heard: Floats) -> tuple[Floats, Floats]:
     """The size of the response to each command of one phase (commands,), and its gradients (commands, columns)."""
     drives = fitted.drives
     without = increments_along(drives, paths(drives, fitted.theta, _lose_commands(drives, lost)))
@@ -174,14 +166,14 @@ def _respond_to_phase(fitted: Fit, lost: Whole, heard: _Innovations) -> tuple[Fl
     after = np.where((at >= 0) & (lost[np.maximum(at, 0), 0] == drives.episode), at, -1)
     label = np.repeat(after, 3)
     size = sum_by(label, change**2, len(lost))
-    gradients = sum_by(label, heard.values, len(lost), change)
+    gradients = sum_by(label, heard, len(lost), change)
     # After a command all motion may be harder to predict: only what points its way speaks for its loss.
     share = gradients / (size[:, None] + 1e-12)
     weight, count = np.abs(change), len(share)
     total = sum_by(label, weight, count)[:, None] + 1e-12
-    along = sum_by(label, heard.values, count, weight * change)
+    along = sum_by(label, heard, count, weight * change)
     cubes = sum_by(label, weight, count, change**2)[:, None]
-    energy = sum_by(label, heard.squares, count, weight) - 2.0 * share * along + share**2 * cubes
+    energy = sum_by(label, heard**2, count, weight) - 2.0 * share * along + share**2 * cubes
     return size, gradients / np.sqrt(np.maximum(1.0, energy / total))
 
 

@@ -225,14 +225,8 @@ class ScreenedCandidate(NamedTuple):
     column: Floats
 
 
-@dataclass(frozen=True)
-class _Probe:
-    """One probe of one form: where it sets out from, and the change of the innovations along each coordinate."""
-
-    candidate: Candidate
-    begin: tuple[float, ...]
-    values: tuple[float, ...]
-    columns: Floats
+_Probe = tuple[Candidate, tuple[float, ...], tuple[float, ...], Floats]
+"""A form, where one of its probes sets out from and goes to, and the innovations' change along each coordinate."""
 
 
 def screen(base: Fit, forms: Sequence[Candidate], seed: int) -> list[ScreenedCandidate]:
@@ -241,7 +235,7 @@ def screen(base: Fit, forms: Sequence[Candidate], seed: int) -> list[ScreenedCan
     if not probes:
         return []
     weight, clipped = np.abs(base.innovations) < HUBER, clip_outliers(base.innovations)[:, None]
-    projected = [project_out(base.slopes, probe.columns, weight) for probe in probes]
+    projected = [project_out(base.slopes, columns, weight) for *_, columns in probes]
     stretch = number_stretches(base.drives)
     count = int(stretch.max()) + 1
     flips = np.random.default_rng(seed).choice((-1.0, 1.0), size=(FLIPS, count))
@@ -252,19 +246,18 @@ def screen(base: Fit, forms: Sequence[Candidate], seed: int) -> list[ScreenedCan
         hessian = columns.T @ (columns * weight[:, None])
         gain, step = _step(gradients.sum(axis=0), hessian)
         chance = np.maximum(chance, _gains(flips @ gradients, hessian))
-        old = best.get(probe.candidate.label)
-        if old is None or gain > old[0]:
-            best[probe.candidate.label] = (gain, step, probe, columns)
+        label = probe[0].label
+        if label not in best or gain > best[label][0]:
+            best[label] = (gain, step, probe, columns)
     plain = float(held_out_log_likelihood(base).sum())
     found = []
-    for gain, step, probe, columns in best.values():
+    for gain, step, (form, begin, values, _), columns in best.values():
         slopes = np.concatenate((base.slopes, columns), axis=1) if step.any() else base.slopes
         stepped = replace(base, innovations=base.innovations + columns @ step, slopes=slopes)
         p_value = float((1 + (chance >= gain).sum()) / (1 + FLIPS))
         held_out = float(held_out_log_likelihood(stepped).sum()) - plain
-        way = zip(probe.begin, probe.values, step, strict=True)
-        start = tuple(float(begin + m * (value - begin)) for begin, value, m in way)
-        found.append(ScreenedCandidate(probe.candidate, start, probe.values, gain, held_out, p_value, columns @ step))
+        start = tuple(float(one + m * (value - one)) for one, value, m in zip(begin, values, step, strict=True))
+        found.append(ScreenedCandidate(form, start, values, gain, held_out, p_value, columns @ step))
     return sorted(found, key=lambda one: -one.gain)
 
 
@@ -277,7 +270,7 @@ def _probes(base: Fit, form: Candidate) -> list[_Probe]:
         moved = [theta_at(start, form.free, np.array((*begin[:j], v, *begin[j + 1 :]))) for j, v in enumerate(values)]
         columns = np.stack([here - increments(base.drives, theta) for theta in moved], -1)
         if np.abs(columns).max() > 1e-9:
-            found.append(_Probe(form, begin, values, base.whiten.whiten(columns)))
+            found.append((form, begin, values, base.whiten.whiten(columns)))
     return found
 
 

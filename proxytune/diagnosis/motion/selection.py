@@ -236,10 +236,7 @@ def adopt(adopted: list[AdoptedEffect], best: FittedCandidate, evidence: Evidenc
     form = best.screened.candidate
     names = tuple(dict.fromkeys([name for coordinate in form.free for name in coordinate] + list(form.fixed)))
     rivals = _rivals(best, best.screened, evidence)
-    return [
-        *adopted,
-        AdoptedEffect(form.effect, form.form, names, form.free, best.gain, best.screened.p_value, rivals),
-    ]
+    return [*adopted, AdoptedEffect(form.effect, form.form, names, form.free, best.gain, best.screened.p_value, rivals)]
 
 
 def _rivals(best: FittedCandidate, chosen: ScreenedCandidate, evidence: Evidence) -> tuple[Candidate, ...]:

@@ -1,7 +1,6 @@
 """Sweeps and learning curves from Python: usefulness along a parameter, and what a proxy saves in training."""
 
 from collections.abc import Mapping
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,7 +27,7 @@ from proxytune.report import (
     write_sweep_page,
     write_teach_report,
 )
-from proxytune.running import Bars, Silent, Watcher
+from proxytune.running import watching
 from proxytune.space import Theta
 from proxytune.storage import Store, locked
 from proxytune.study import Study, StudyRun, StudySettings, family_catalogue, open_study
@@ -173,7 +172,7 @@ def run_sweep(
     total = sum(len(sweep.points) for sweep in sweeps) * per_point * study.settings.starts
     folder = study.settings.home
     with locked(folder), Store.open(folder) as store:
-        with _watching(progress, total) as watcher:
+        with watching(progress, total) as watcher:
             run = StudyRun(study, store, watcher)
             for sweep in sweeps:
                 run_planned(run, sweep, discrepancy)
@@ -191,12 +190,6 @@ def _base(study: Study, word: str | Theta) -> Theta:
         base = read_theta(word, family_catalogue(study.family, study.settings), "--at")
     check_base(study, base)
     return base
-
-
-def _watching(progress: bool, total: int, unit: str = "") -> AbstractContextManager[Watcher]:
-    if not progress:
-        return nullcontext(Silent())
-    return Bars(total, unit) if unit else Bars(total)
 
 
 @dataclass(frozen=True, repr=False)
@@ -268,8 +261,8 @@ def teach(path: str | Path, *, progress: bool = False) -> TeachReport:
     proxies = setup.settings.proxies
     with locked(settings.home), Store.open(settings.home) as store:
         examinations = count_examinations(setup.settings, len(proxies) + 1)
-        with _watching(progress, examinations, "points of learning curves") as bars:
+        with watching(progress, examinations, "points of learning curves") as bars:
             experiment = run_experiment(settings, setup, bars)
-        with _watching(progress, len(settings.agents) * settings.starts * len(proxies)) as bars:
+        with watching(progress, len(settings.agents) * settings.starts * len(proxies)) as bars:
             prpv = predictivity(StudyRun(study, store, bars), proxies)
     return TeachReport(settings, experiment, prpv)

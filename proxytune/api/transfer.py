@@ -34,7 +34,7 @@ from proxytune.importing import (
 )
 from proxytune.logs import Log, check_kind, log_cautions
 from proxytune.report import frame_html, write_picture, write_text
-from proxytune.running import Bars, Silent
+from proxytune.running import watching
 from proxytune.scores import ScoreTable, write_scores
 from proxytune.seeds import target_seed
 from proxytune.settings import GEOMETRY
@@ -196,7 +196,7 @@ def measure(
         raise InputError(f"--model {path}: no such file; check the path")
     episodes = len(settings.agents) * settings.starts * repeats
     cautions = cautions_of(bare_family(settings, path))
-    with Bars(episodes) if progress else nullcontext(Silent()) as watcher:
+    with watching(progress, episodes) as watcher:
         return Measurement(measure_agents(settings, path, own, watcher, repeats), path, own, repeats, cautions)
 
 

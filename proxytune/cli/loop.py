@@ -1,7 +1,6 @@
 """`loop`: tune, diagnose, extend, tune again, and compare before with after."""
 
 import argparse
-import shlex
 import sys
 import time
 from collections.abc import Callable
@@ -9,7 +8,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 
 from proxytune.cli.diagnose import shares
-from proxytune.cli.options import study_folder
+from proxytune.cli.options import study_folder, typed
 from proxytune.cli.terminal import Answer, Steps
 from proxytune.logs import Log
 from proxytune.loop import Closed, run_loop, text_of
@@ -34,7 +33,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     begun = time.perf_counter()
     folder = study_folder(arguments.path)
     report = run_loop(folder, log=arguments.log, twin=arguments.twin, teller=Terminal())
-    page = report.write(_command(arguments))
+    page = report.write(typed(arguments))
     document = report.document()
     document["files"] = {name: str(path) for name, path in _files(report.closed, page).items()}
     document["this_run"]["seconds"] = time.perf_counter() - begun
@@ -55,12 +54,6 @@ class Terminal:
     def diagnosis(self, log: Log) -> AbstractContextManager[Callable[[str], None]]:
         """The steps of a diagnosis."""
         return Steps(shares(log))
-
-
-def _command(arguments: argparse.Namespace) -> str:
-    options = [("--log", arguments.log), ("--twin", arguments.twin)]
-    given = [word for option, value in options if value for word in (option, str(value))]
-    return shlex.join(["python", "-m", "proxytune", "loop", str(arguments.path), *given])
 
 
 def _files(closed: Closed, page: Path) -> dict[str, Path]:

@@ -163,12 +163,7 @@ LARGEST_WEIGHT = 1e70
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the tables, the metrics and what is done with them."""
-    parser.add_argument(
-        "both",
-        nargs="?",
-        metavar="TABLE",
-        help="one table of both sides: Sim success, Real success",
-    )
+    parser.add_argument("both", nargs="?", metavar="TABLE", help="one table of both sides: Sim success, Real success")
     parser.add_argument(
         "--proxy",
         action="append",
@@ -205,19 +200,14 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--unpaired", action="store_true", help="treat episodes with equal labels as unrelated [as the same start]"
     )
     parser.add_argument(
-        "--decide-on",
-        default="",
-        metavar="NAME",
-        help="the metric to choose by, or mean [mean of shares, or first]",
+        "--decide-on", default="", metavar="NAME", help="the metric to choose by, or mean [mean of shares, or first]"
     )
     parser.add_argument(
         "--rollouts", type=int, metavar="N", help="rollouts behind each mean of the target, where it has means alone"
     )
     parser.add_argument("--regret", type=float, metavar="R", help="regret that is accepted, for what to do next [0.05]")
     parser.add_argument(
-        "--sequential",
-        action="store_true",
-        help="test after each rollout, in the target's order, which agent is best",
+        "--sequential", action="store_true", help="test after each rollout, in the target's order, which agent is best"
     )
     parser.add_argument("--resamples", type=int, default=1000, help="bootstrap resamples and permutations [1000]")
     parser.add_argument("--seed", type=int, default=0, help="seed of the resampling [0]")

@@ -168,12 +168,7 @@ def fit_curve_model(marks: Examined) -> CurveModel:
     for _ in range(1 + ROUNDS):
         given = (marks, scaled, spread)
         found = minimize(
-            _negative_log_posterior,
-            start,
-            args=given,
-            method="L-BFGS-B",
-            bounds=bounds,
-            options={"maxiter": 40},
+            _negative_log_posterior, start, args=given, method="L-BFGS-B", bounds=bounds, options={"maxiter": 40}
         )
         start, values = found.x, _named(found.x)
         factor = cho_factor(_covariance(marks, values, spread), lower=True)

@@ -75,13 +75,7 @@ class Distribution:
 
 
 def collect_samples(
-    classroom: Classroom,
-    where: Distribution,
-    *,
-    count: int,
-    seed: int,
-    lesson_s: float,
-    policy: Policy | None = None,
+    classroom: Classroom, where: Distribution, *, count: int, seed: int, lesson_s: float, policy: Policy | None = None
 ) -> Demonstration:
     """Collect this many of the expert's samples, lesson by lesson; more samples begin with the same ones.
 

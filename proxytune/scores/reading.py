@@ -160,12 +160,7 @@ def _plain_cells(
 
 
 def _read(
-    found: Cells,
-    own: Mapping[str, str],
-    name: str,
-    more: tuple[str | None, str | None],
-    in_percent: bool,
-    line: int,
+    found: Cells, own: Mapping[str, str], name: str, more: tuple[str | None, str | None], in_percent: bool, line: int
 ) -> tuple[str, float, tuple[int, int] | None]:
     """What a row says of a metric: its text, its standard error (0: not known), and successes of rollouts."""
     text, error, scale = own[name], 0.0, 100.0 if in_percent else 1.0

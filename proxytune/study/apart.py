@@ -76,12 +76,7 @@ def _why_apart(family: DomainFamily, needed: Collection[str], pair: Pair) -> tup
 
 
 def kept_apart(
-    store: Store,
-    settings: StudySettings,
-    family: DomainFamily,
-    code: str,
-    needed: Collection[str],
-    watch: Watch,
+    store: Store, settings: StudySettings, family: DomainFamily, code: str, needed: Collection[str], watch: Watch
 ) -> frozenset[str]:
     """The study's agents that are run by themselves; those not tried yet, or in other code, are tried now and kept."""
     known = store.facts().get(APART, {})

@@ -32,13 +32,7 @@ from proxytune.study.opening import Objective
 from proxytune.study.preflight import check_some_work, noise_of
 from proxytune.study.pruning import Pruned, pruning_rule, run_or_prune
 from proxytune.study.settings import StopRules
-from proxytune.study.study_run import (
-    Evaluation,
-    StudyRun,
-    compose_of,
-    plan_episodes,
-    score_trials,
-)
+from proxytune.study.study_run import Evaluation, StudyRun, compose_of, plan_episodes, score_trials
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ from proxytune.report import (
 from proxytune.running import watching
 from proxytune.space import Theta
 from proxytune.storage import Store, locked
-from proxytune.study import Study, StudyRun, StudySettings, family_catalogue, open_study
+from proxytune.study import StudyRun, StudySettings, family_catalogue, open_study
 from proxytune.sweep import (
     SweepCurve,
     best_theta,
@@ -161,7 +161,13 @@ def run_sweep(
     if not 2 <= points <= MOST_POINTS:
         raise InputError(f"--points must be between 2 and {MOST_POINTS}, got {points}")
     word = ("best" if has_answer(study) else "nominal") if at is None else at
-    base = _base(study, word)
+    if isinstance(word, Mapping):
+        base: Theta = word
+    elif word == "best":
+        base = best_theta(study)
+    else:
+        base = read_theta(word, family_catalogue(study.family, study.settings), "--at")
+    check_base(study, base)
     names = study.settings.space.names if parameter == "all" else (parameter,)
     sweeps = [plan_sweep(sweep_interval(study, name), base, points) for name in names]
     discrepancy = None
@@ -179,17 +185,6 @@ def run_sweep(
         curves = tuple(curve for sweep in sweeps if (curve := curve_of(run, sweep)))
     chosen = word if word in ("best", "nominal") else "given"
     return SweepReport(study.settings, curves, str(chosen), sweeps[0].base, run.spent.episodes, study.truth)
-
-
-def _base(study: Study, word: str | Theta) -> Theta:
-    if isinstance(word, Mapping):
-        base: Theta = word
-    elif word == "best":
-        base = best_theta(study)
-    else:
-        base = read_theta(word, family_catalogue(study.family, study.settings), "--at")
-    check_base(study, base)
-    return base
 
 
 @dataclass(frozen=True, repr=False)

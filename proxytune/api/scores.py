@@ -296,18 +296,14 @@ def _expanded(metric: str | Metric, header: Sequence[str]) -> Sequence[str | Met
 
 def _table(scores: Scores | None, side: Side, names: Sequence[str], columns: Mapping[str, str] | None) -> ScoreTable:
     if isinstance(scores, ScoreTable):
-        return _selected(scores, side, names)
+        try:
+            return scores.select(names)
+        except ScoresError as problem:
+            raise ScoresError(f"{side}: {problem}") from None
     if isinstance(scores, str | Path):
         return read_scores(scores, names, columns=columns, side=side)
     with as_files({side: _checked(scores, side, columns)}) as folder:
         return read_scores(folder / f"{side}.csv", names, columns=columns, side=side)
-
-
-def _selected(scores: ScoreTable, side: str, names: Sequence[str]) -> ScoreTable:
-    try:
-        return scores.select(names)
-    except ScoresError as problem:
-        raise ScoresError(f"{side}: {problem}") from None
 
 
 def _checked(scores: pd.DataFrame | None, side: str, columns: Mapping[str, str] | None) -> pd.DataFrame:

@@ -163,16 +163,11 @@ def study_folder(path: Path) -> Path:
     if folder.name not in studies:
         hint = nearest(folder.name, studies)
         raise InputError(f"{folder}: no such folder, and no study of that name comes with proxytune; {hint}")
-    _copy(studies[folder.name], folder)
-    print(f"copied the study '{folder.name}', which comes with proxytune, to {folder}", file=sys.stderr)
-    return folder
-
-
-def _copy(source: Path, folder: Path) -> None:
-    """Copy the whole folder or nothing."""
     try:
         with folder_draft_of(folder) as draft:
-            shutil.copytree(source, draft, ignore=shutil.ignore_patterns(*NOT_COPIED), dirs_exist_ok=True)
+            shutil.copytree(studies[folder.name], draft, ignore=shutil.ignore_patterns(*NOT_COPIED), dirs_exist_ok=True)
     except (OSError, shutil.Error) as problem:
         reason = problem.strerror if isinstance(problem, OSError) and problem.strerror else "copying failed"
         raise StoreError(f"{folder}: cannot be written ({reason}); choose another place") from None
+    print(f"copied the study '{folder.name}', which comes with proxytune, to {folder}", file=sys.stderr)
+    return folder

@@ -74,17 +74,6 @@ def _check_other_column(arguments: argparse.Namespace, metrics: Sequence[str]) -
         check_sides(source, header, metrics)
 
 
-def _sides_given(arguments: argparse.Namespace) -> None:
-    """Take one table for both sides, where there is one."""
-    if arguments.both is not None:
-        if arguments.proxy or arguments.target:
-            raise InputError(f"{arguments.both}: give one table of both sides, or --proxy and --target")
-        arguments.proxy = arguments.target = [arguments.both]
-    for side in ("proxy", "target"):
-        if not getattr(arguments, side):
-            raise InputError(f"--{side} is missing: name its scores, or one table of both sides: score TABLE")
-
-
 def _metrics_given(arguments: argparse.Namespace) -> list[str]:
     """The metrics asked for with patterns resolved, or those that one table has of both sides."""
     path, domain = split_source(arguments.target[0])
@@ -224,7 +213,13 @@ def run(arguments: argparse.Namespace) -> Answer:
         raise InputError(f"--resamples must be between {between}, and --seed at least 0")
     if arguments.table:
         check_table_file("--table", arguments.table)
-    _sides_given(arguments)
+    if arguments.both is not None:
+        if arguments.proxy or arguments.target:
+            raise InputError(f"{arguments.both}: give one table of both sides, or --proxy and --target")
+        arguments.proxy = arguments.target = [arguments.both]
+    for side in ("proxy", "target"):
+        if not getattr(arguments, side):
+            raise InputError(f"--{side} is missing: name its scores, or one table of both sides: score TABLE")
     arguments.metric = _metrics_given(arguments)
     metrics = [Metric.parse(text) for text in arguments.metric]
     (target_name, target), proxies = read_sides(arguments, [metric.name for metric in metrics])

@@ -118,7 +118,8 @@ def print_answer(answer: Answer, *, as_json: bool) -> None:
             Console().print(answer.text, crop=False)
         sys.stdout.flush()
     except OSError as problem:
-        _discard_the_rest()
+        # What is still in the buffer would raise once more when Python ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         if problem.errno in (errno.EPIPE, errno.EIO):  # The reader, or the terminal, has gone
             return
         raise RunError(f"standard output: cannot be written ({problem.strerror}); make room and run again") from None
@@ -132,11 +133,6 @@ def _json_text(document: dict[str, Any]) -> str:
     except UnicodeEncodeError:
         return json.dumps(document, indent=2, allow_nan=False)
     return text
-
-
-def _discard_the_rest() -> None:
-    """Drop what is still in the buffer, which would raise once more when Python ends."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 @contextmanager

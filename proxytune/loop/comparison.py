@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from proxytune.effects import SHIPPED
@@ -231,7 +230,14 @@ def prpv_figure(rows: Sequence[Compared]) -> Figure:
         dress(axes)
         for place, (level, colour) in enumerate(((row.before, VERMILLION), (row.after, BLUE))):
             if level is not None:
-                _draw_level(axes, place, level, colour)
+                low, high = level.floor_ends or (0.0, 0.0)
+                axes.fill_between([place - HALF, place + HALF], low, high, color=LIGHT_GREY, lw=0)
+                if level.floor is not None:
+                    axes.plot([place - HALF, place + HALF], [level.floor] * 2, color=GREY, lw=1.0)
+                below, above = level.interval or (level.value, level.value)
+                spread = [[max(0.0, level.value - below)], [max(0.0, above - level.value)]]
+                axes.errorbar(place, level.value, yerr=spread, fmt="o", ms=5, color=colour, capsize=3, lw=1.2)
+                axes.annotate(f"{level.value:.3g}", (place + 0.1, level.value), fontsize=8, color=colour, va="center")
         axes.set_xlim(-0.6, 1.6)
         axes.set_xticks([0, 1], ["before", "after"], fontsize=7)
         axes.set_ylim(bottom=0.0)
@@ -241,14 +247,3 @@ def prpv_figure(rows: Sequence[Compared]) -> Figure:
     if floor:
         panels[0].annotate("noise floor", (-0.55, floor[1]), fontsize=6.5, color="0.3", va="bottom")
     return figure
-
-
-def _draw_level(axes: Axes, place: int, level: Level, colour: str) -> None:
-    low, high = level.floor_ends or (0.0, 0.0)
-    axes.fill_between([place - HALF, place + HALF], low, high, color=LIGHT_GREY, lw=0)
-    if level.floor is not None:
-        axes.plot([place - HALF, place + HALF], [level.floor] * 2, color=GREY, lw=1.0)
-    below, above = level.interval or (level.value, level.value)
-    spread = [[max(0.0, level.value - below)], [max(0.0, above - level.value)]]
-    axes.errorbar(place, level.value, yerr=spread, fmt="o", ms=5, color=colour, capsize=3, lw=1.2)
-    axes.annotate(f"{level.value:.3g}", (place + 0.1, level.value), fontsize=8, color=colour, va="center")

@@ -71,15 +71,6 @@ def held_out_of(settings: StudySettings, family: DomainFamily, *, driven: bool) 
     return found if len(found) >= FEWEST else ()
 
 
-def check_held_out(settings: StudySettings, family: DomainFamily, names: tuple[str, ...]) -> None:
-    """Refuse agents that the family cannot run."""
-    for name in names:
-        try:
-            ask(f"check_agent('{name}') of {settings.family}", partial(family.check_agent, name))
-        except InputError as problem:
-            raise settings.error(KEY, str(problem)) from None
-
-
 def scored_agents(settings: StudySettings) -> tuple[str, ...]:
     """The agents that the target's table has."""
     if not all(path.is_file() for path in settings.targets):
@@ -176,9 +167,18 @@ def open_loop(study: Path, twin: Path | None = None, log: Path | None = None) ->
         raise settings.error("family", "`loop` diagnoses a robot's log, and this family names no robot")
     twin = _twin(settings, twin, robot)
     loop = Loop(settings, family, robot, twin, log, held_out_of(settings, family, driven=twin is not None))
-    check_held_out(settings, family, loop.held_out)
+    for name in loop.held_out:
+        try:
+            ask(f"check_agent('{name}') of {settings.family}", partial(family.check_agent, name))
+        except InputError as problem:
+            raise settings.error(KEY, str(problem)) from None
     _check_log(loop)
-    _check_folder(loop.home)
+    try:
+        loop.home.mkdir(exist_ok=True)
+    except OSError as problem:
+        raise StoreError(f"{loop.home}: cannot be written ({problem.strerror}); copy the study elsewhere") from None
+    if not os.access(loop.home, os.W_OK):
+        raise StoreError(f"{loop.home}: cannot be written (permission denied); copy the study elsewhere")
     return loop
 
 
@@ -212,15 +212,6 @@ def _check_log(loop: Loop) -> None:
         if log.robot != loop.robot:
             theirs = f"is of the robot '{log.robot}', the study of '{loop.robot}'"
             raise LogError(f"{loop.log}: {theirs}; give a log of '{loop.robot}'")
-
-
-def _check_folder(home: Path) -> None:
-    try:
-        home.mkdir(exist_ok=True)
-    except OSError as problem:
-        raise StoreError(f"{home}: cannot be written ({problem.strerror}); copy the study elsewhere") from None
-    if not os.access(home, os.W_OK):
-        raise StoreError(f"{home}: cannot be written (permission denied); copy the study elsewhere")
 
 
 FILE_NAME = "loop.json"

@@ -171,7 +171,14 @@ def _asked(settings: StudySettings, what: str, ask: Callable[[], Value]) -> Valu
 
 
 def _check(settings: StudySettings, family: DomainFamily) -> None:
-    _check_members(settings, family)
+    lacks = [member for member in (*MEMBERS, *METHODS) if not has_member(family, member)]
+    if lacks:
+        raise settings.error("family", f"{settings.family} made no domain family: it lacks {', '.join(lacks)}")
+    for member, (kind, word) in MEMBERS.items():
+        value = _asked(settings, f"{member} of {settings.family}", functools.partial(getattr, family, member))
+        if not isinstance(value, kind):
+            name = type(value).__name__
+            raise settings.error("family", f"{member} of {settings.family} must be {word}, got {name}")
     for interval in settings.space.intervals:
         given = f"[{interval.low:g}, {interval.high:g}]"
         bounds = (interval.low, interval.high)
@@ -183,17 +190,6 @@ def _check(settings: StudySettings, family: DomainFamily) -> None:
             raise settings.error("metrics", f"unknown metric '{metric.name}'; {nearest(metric.name, family.metrics)}")
     for agent in settings.agents:
         _check_agent(settings, family, agent)
-
-
-def _check_members(settings: StudySettings, family: Any) -> None:
-    lacks = [member for member in (*MEMBERS, *METHODS) if not has_member(family, member)]
-    if lacks:
-        raise settings.error("family", f"{settings.family} made no domain family: it lacks {', '.join(lacks)}")
-    for member, (kind, word) in MEMBERS.items():
-        value = _asked(settings, f"{member} of {settings.family}", functools.partial(getattr, family, member))
-        if not isinstance(value, kind):
-            name = type(value).__name__
-            raise settings.error("family", f"{member} of {settings.family} must be {word}, got {name}")
 
 
 def _check_agent(settings: StudySettings, family: DomainFamily, agent: str) -> None:

@@ -16,9 +16,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from proxytune.diagnosis.motion.drives import Drives, Floats, Whole, gather, number_of
+from proxytune.diagnosis.motion.drives import Drives, Floats, gather, number_of
 from proxytune.diagnosis.motion.latency import (
     LATENCY_BLOCK_S,
     LEAST_APART_S,
@@ -288,7 +287,16 @@ def thin(drives: Drives) -> Drives:
     usual = float(np.median(drives.last - drives.first)) / drives.tick_hz
     shorter = join_increments(drives, min(-(-count // MOST), max(1, round(JOINED_S / usual))))
     least = round(STRETCH_S * drives.tick_hz / float(np.median(shorter.last - shorter.first)))
-    return shorter.only(_choose_stretches(shorter.block, MOST / len(shorter.episode), least))
+    # Of each block one piece, somewhere within it.
+    number = number_of(shorter.block)
+    size = np.bincount(number)
+    kept = np.minimum(size, np.maximum(np.ceil(min(1.0, MOST / len(shorter.episode)) * size).astype(int), least))
+    # Multiples of the golden ratio spread stretches evenly, in step with nothing that drives repeat.
+    spread = np.arange(len(size)) * 0.6180339887 % 1.0
+    begin = (spread * (size - kept)).astype(int)
+    chosen = spread < max(MOST / kept.sum(), FEWEST_BLOCKS / len(size))
+    place = np.arange(len(shorter.block)) - np.searchsorted(number, number)
+    return shorter.only(chosen[number] & (place >= begin[number]) & (place < (begin + kept)[number]))
 
 
 def join_increments(drives: Drives, times: int) -> Drives:
@@ -304,19 +312,6 @@ def join_increments(drives: Drives, times: int) -> Drives:
     travel = np.add.reduceat(drives.travel, begins)
     after = None if drives.after is None else np.stack((drives.after[begins, 0], drives.after[ends, 1]), axis=1)
     return replace(whole, last=drives.last[ends], poses=poses, travel=travel, linked=drives.linked[begins], after=after)
-
-
-def _choose_stretches(block: Whole, share: float, least: int) -> NDArray[np.bool_]:
-    """This share of each block in one piece, somewhere within it, of no fewer than `least` increments (N,)."""
-    number = number_of(block)
-    size = np.bincount(number)
-    kept = np.minimum(size, np.maximum(np.ceil(min(1.0, share) * size).astype(int), least))
-    # Multiples of the golden ratio spread stretches evenly, in step with nothing that drives repeat.
-    spread = np.arange(len(size)) * 0.6180339887 % 1.0
-    begin = (spread * (size - kept)).astype(int)
-    chosen = spread < max(MOST / kept.sum(), FEWEST_BLOCKS / len(size))
-    place = np.arange(len(block)) - np.searchsorted(number, number)
-    return np.asarray(chosen[number] & (place >= begin[number]) & (place < (begin + kept)[number]))
 
 
 FEWEST_EPISODES = 6

@@ -176,14 +176,7 @@ def fit_multistep(fitted: Fit) -> tuple[Fit, MultistepFit | None]:
         return fitted, None
     windows = cut(drives, best[1])
     theta = fit_windows(drives, fitted.theta, fitted.free, windows)
-    known = _intervals(drives, theta, smooth_coordinates(fitted.free, drives.robot), windows)
-    return evaluate(drives, theta, fitted.free, fitted.noise), MultistepFit(best[1], best[2], known)
-
-
-def _intervals(
-    drives: Drives, theta: Theta, free: tuple[Coordinate, ...], windows: Windows
-) -> dict[str, tuple[float, float]]:
-    """95 % intervals from the spread between blocks (sandwich)."""
+    free = smooth_coordinates(fitted.free, drives.robot)
     problem = _problem(drives, theta, free, windows)
     here = problem.start
     left, slopes, scale = problem.residuals(here), problem.jacobian(here), problem.scale
@@ -191,7 +184,8 @@ def _intervals(
     hessian = (slopes / (1.0 + (left / scale) ** 2)[:, None] ** 1.5).T @ slopes
     _, block = np.unique(np.repeat(blocks_of(drives, windows), 3), return_inverse=True)
     sums = np.stack([np.bincount(block, column) for column in gradient.T], axis=1)
-    return sandwich_intervals(theta, free, drives.robot, sums, np.linalg.pinv(hessian, hermitian=True))
+    known = sandwich_intervals(theta, free, drives.robot, sums, np.linalg.pinv(hessian, hermitian=True))
+    return evaluate(drives, theta, fitted.free, fitted.noise), MultistepFit(best[1], best[2], known)
 
 
 LAGS = (1, 2, 3, 4, 6)

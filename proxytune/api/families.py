@@ -159,14 +159,7 @@ def run_opened_families(
 ) -> FamiliesReport:
     """Tune the families one after the other, teach by them where the study has [teaching], and compare them.
 
-    All of them are opened before the first is tuned, so that a mistake is told at once.
-
-    Args:
-        settings: Of the study of all families.
-        spending: What is spent otherwise than study.toml says.
-        say: Hears how it goes, a line at a time.
-        tuning: Gives what hears of every episode of a family.
-        progress: Whether to show a bar while they teach.
+    All of them are opened before the first is tuned, so that a mistake is told at once. Progress is of the teaching.
     """
     studies = {name: _open(one, spending) for name, one in settings.families.items()}
     classrooms(settings)

@@ -53,13 +53,6 @@ def record_log(
 ) -> tuple[Log, tuple[str, ...]]:
     """Drive every manoeuvre, and lanes where pictures are wanted, and write the log; without log.toml it is none.
 
-    Args:
-        settings: Of the study, for its [domain].
-        model: The model.toml of the domain.
-        folder: The log's folder to write.
-        wanted: What is to be driven.
-        tell: Hears how far it is.
-
     Returns:
         The log, and what is probably not meant in its domain or itself, a sentence each.
 

@@ -181,14 +181,10 @@ def run_opened(
     retry_failed: bool = False,
     known: Sequence[Outcome | Theta] = (),
 ) -> StudyReport:
-    """Search by predictivity from wherever it was left: pre-flight, trials, confirmation.
+    """Search by predictivity from where it was left: pre-flight, trials, confirmation; `known` is as in `run_stages`.
 
-    Args:
-        study: The study.
-        bars: Gives what hears of every episode.
-        warn: Hears, before the first trial, of another search than before and of parameters without effect.
-        retry_failed: Whether to drive every failed episode again, not only those whose code has changed.
-        known: As `run_stages` takes them.
+    Of another search than before, and of parameters without effect, it warns before the first trial. Failed episodes
+    are driven again where their code has changed, or all of them.
     """
     settings = study.settings
     with locked(settings.home), Store.open(settings.home) as store:

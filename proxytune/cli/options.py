@@ -1,10 +1,6 @@
-"""The command as it was typed.
+"""Options that several commands have, and what they mean: the cluster, one's own effects, what to take from a source.
 
-The options that say where episodes run, alike for every command that runs many.
-The option that names effects of one's own.
-The options that say what to take from a bag or a table, alike for every command that reads one.
-θ as people give it: values, a model.toml, the best that a study has found, or none.
-The folder that a PATH means: an existing one, or a copy of a study that comes with the package.
+`typed` is the command as it was typed, `study_folder` what a PATH means: a folder, or a copy of a shipped study.
 """
 
 import argparse

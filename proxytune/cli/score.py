@@ -1,7 +1,4 @@
-"""`score`: how useful proxies are as predictors, from tables of scores.
-
-The tables that `score` compares, as they are named on the command line.
-"""
+"""`score`: how useful proxies are as predictors, from tables of scores, as they are named on the command line."""
 
 import argparse
 from collections.abc import Mapping, Sequence

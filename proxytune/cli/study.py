@@ -1,9 +1,4 @@
-"""`study`: run or resume a study, and sum it up.
-
-A study's page while the study runs: written anew every few seconds, as its episodes end.
-`study` and `plot` of several families: each tuned in the same time, and compared.
-`study` with objective = "plv": the proxy whose samples save most on the target.
-"""
+"""`study`: run or resume a study, of several families, by PLV, or a bank, and sum it up; its page while it runs."""
 
 import argparse
 import sys

@@ -1,10 +1,7 @@
-"""Output of every command: one JSON document, and the same for people.
+"""Output of every command, one JSON document or the same for people, its progress, and the signals that end it.
 
-Ctrl-C, SIGTERM and SIGHUP end a command alike: everything finished is kept, and its processes end too.
-What stops a command that nobody nearer to it could name.
-Standard output holds a command's answer and nothing else: what agents print goes to standard error.
-Progress of a command whose length is not known: a spinner on a terminal, elsewhere a line for whatever is done.
-Progress of a command in several steps: a bar with the time left on a terminal, elsewhere a line per step.
+Standard output holds a command's answer and nothing else: what agents print goes to standard error. Progress of unknown
+length is a spinner on a terminal (`waiting`), of steps a bar (`Steps`); elsewhere it is lines.
 """
 
 import errno

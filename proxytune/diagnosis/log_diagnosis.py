@@ -154,14 +154,9 @@ class PredictedPictures(NamedTuple):
 
 
 def predict_pictures(log: Log, robot: Robot, theta: Theta) -> Iterator[PredictedPictures]:
-    """Draw every frame whose pose is known, a few at a time.
+    """Draw every frame whose pose is known, a few at a time; what θ does not name is the robot's.
 
     Where the log's exposure is automatic, each frame is compared at its own brightness, which no model knows.
-
-    Args:
-        log: With frames.
-        robot: Whose camera it is.
-        theta: The model; parameters of the camera that it does not name are the robot's.
 
     Raises:
         LogError: If the log has no frames, or no frame has a pose; while drawing, if a picture cannot be read.

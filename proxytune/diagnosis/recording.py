@@ -187,12 +187,7 @@ class _Lap(NamedTuple):
 
 
 def film(family: LaneFollowing, frames: int, seed: int) -> Iterator[FilmedDrive]:
-    """Let the robot's expert drive from every start, then from each the other way, and take pictures.
-
-    Args:
-        family: The domain, whose expert drives in the right-hand lane with its disturbances.
-        frames: How many pictures there are in all.
-        seed: Of starts, disturbances and effects.
+    """Let the robot's expert drive from every start, then from each the other way, and take so many pictures in all.
 
     Raises:
         SettingsError: If the robot has no expert or no camera, before anything is driven.

@@ -151,11 +151,6 @@ class Cache:
 
         A file is whole or not there at all, so several processes may use one cache, and a killed one leaves no harm.
 
-        Args:
-            kind: What they are, the beginning of the file's name.
-            facts: All that determines them, as JSON has it.
-            make: Makes them.
-
         Raises:
             StoreError: If the folder cannot be written, or a file in it is damaged.
         """
@@ -223,14 +218,9 @@ def examine_policy(classroom: Classroom, episodes: Sequence[Episode], policy: Po
 
 
 def mix_samples(new: Demonstration, earlier: Demonstration, share: float) -> Demonstration:
-    """The new samples, then so many of the earlier ones that these are this share of all, or all that there are.
+    """The new samples, then so many of the earlier ones that these are this share (below 1) of all, or all there are.
 
     Those taken lie evenly over the earlier ones, and so over their lessons.
-
-    Args:
-        new: Samples of the target.
-        earlier: Samples of the proxy.
-        share: Share of the earlier ones among all, from 0 to below 1.
     """
     wanted = min(len(earlier.commands), round(len(new.commands) * share / (1.0 - share)))
     rows = np.linspace(0, len(earlier.commands) - 1, wanted).round().astype(int)

@@ -144,13 +144,8 @@ def sample_needs(
 ) -> SampleNeeds:
     """Infer the target samples that each learner needs, from the posterior of all learning curves together.
 
-    Args:
-        curves: Scores by name of the learning curve.
-        none: The name of the learner without a proxy.
-        best_score: The score of a flawless examination; none is expected beyond it, nor below its negative.
-        tolerance: How far below the level still counts as converged.
-        level: The score that counts as converged; None for what the learner without a proxy comes to.
-        draws: How many draws.
+    No score is expected beyond that of a flawless examination, nor below its negative. Without a level, what the
+    learner without a proxy comes to counts as converged, up to the tolerance.
     """
     # A family's own scores may lie beyond those of one that drives.
     scores = np.concatenate([curve.scores[np.isfinite(curve.scores)] for curve in curves.values()])
@@ -205,11 +200,7 @@ def estimate_figure(
 ) -> LearningEstimate:
     """A figure of what two learners need, with the ends of its 95 % interval that unreached η leave possible.
 
-    Args:
-        figure: From the η of both, draw by draw; it rises with the first and falls with the second.
-        needs: How many target samples each learner needs.
-        more: The name of the first learner.
-        less: The name of the second.
+    Draw by draw, it rises with the η of the one that needs more and falls with that of the other.
     """
     first, second, last = needs.needed[more], needs.needed[less], needs.last
     reached = np.isfinite(second)
@@ -323,16 +314,9 @@ def next_examinations(needs: SampleNeeds, names: Sequence[str], design: Adaptive
     """Choose the examinations that are expected to take most from the variance of all proxies' PLV, one by one.
 
     What a score would tell is taken from how the drawn mean curve there goes with the drawn PLVs, as in linear
-    regression; the next is chosen for what is left of the variance.
-
-    Args:
-        needs: What the scores known so far say.
-        names: The curves that may be examined. PLV is that of the proxies among them; without one, it is how many
-            samples are needed without a proxy that is to be known.
-        design: How examinations are spent.
-
-    Returns:
-        A batch of them; fewer where every repetition of every count has been examined.
+    regression; the next is chosen for what is left of the variance. PLV is that of the proxies among the names; without
+    one, it is how many samples are needed without a proxy that is to be known. There are fewer than a batch where every
+    repetition of every count has been examined.
     """
     cells = _cells(needs, names, design)
     # What is not reached is taken as some way beyond the grid.

@@ -145,12 +145,7 @@ class Loop:
 
 
 def open_loop(study: Path, twin: Path | None = None, log: Path | None = None) -> Loop:
-    """Read a study and check it, its twin, its log and its held-out agents.
-
-    Args:
-        study: The study's folder, or its study.toml.
-        twin: The model.toml of the target; the study's `truth` if not given.
-        log: The target's log; recorded of the twin if not given.
+    """Read a study and check it, its twin (its `truth` if not given), its log and its held-out agents.
 
     Raises:
         InputError: If any of them cannot be used.

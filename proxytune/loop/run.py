@@ -378,12 +378,7 @@ def rows_of(closed: Closed) -> list[Compared]:
 
 
 def text_of(closed: Closed, page: Path) -> Group:
-    """A closed loop as `loop` prints it.
-
-    Args:
-        closed: The loop.
-        page: Where its page is.
-    """
+    """A closed loop as `loop` prints it, with where its page is."""
     rows = rows_of(closed)
     sentence, table = Text(answer(closed.diagnosis, rows), style="bold"), _table(closed, rows)
     shown, theta = (table_text(one, ragged=True) for one in (replace(table, title=""), _theta_table(closed)))

@@ -34,13 +34,7 @@ DISTINCT = 0.8
 
 
 def score_cautions(*, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -> tuple[str, ...]:
-    """Sentences on what is probably not meant in two tables of the same agents.
-
-    Args:
-        proxy: Scores in the proxy.
-        target: Scores on the target, with the same agents in the same order.
-        metrics: How agents are compared, in the order of both tables' columns.
-    """
+    """Sentences on what is probably not meant in two tables of the same agents, in the same order as the metrics."""
     sides = {"the proxy": proxy, "the target": target}
     lines = [*_names(sides)]
     for side, table in sides.items():

@@ -68,10 +68,9 @@ class Engine:
 
 
 def unit_points(dimensions: int, count: int, seed: int) -> NDArray[np.float64]:
-    """The first points of the scrambled Sobol sequence with this seed.
+    """The first points (count, dimensions) of the scrambled Sobol sequence with this seed, within [0, 1).
 
-    Returns:
-        Array (count, dimensions) within [0, 1); a longer answer begins with every shorter one.
+    A longer answer begins with every shorter one.
     """
     exponent = max(0, math.ceil(math.log2(count)))
     points: NDArray[np.float64] = qmc.Sobol(dimensions, scramble=True, rng=np.random.default_rng(seed)).random_base2(

@@ -267,13 +267,9 @@ class Expected:
 
 
 def expect_of(space: Space, trials: Sequence[Trial], goal: Goal, seed: int = 0) -> Expected:
-    """Expect what a target will tell: trials are taken for one in turn, with a target's noise.
+    """Expect what a target will tell: simulated trials are taken for one in turn, with a target's noise.
 
-    Args:
-        space: The search box.
-        trials: Simulated trials, spread over it.
-        goal: The outputs and noise of a target; its values count for nothing where they are known.
-        seed: Seeds the noise.
+    The goal's values count for nothing where they are known.
 
     Raises:
         RunError: If no trial has an outcome.

@@ -64,11 +64,9 @@ SCORE_ENGINE = GAUSSIAN_PROCESS.name
 
 
 def engine_of(name: str, beside: Path | None = None) -> Engine:
-    """The engine of this name; every look-up goes through here.
+    """The engine of this name, shipped, of a plug-in or `module:attribute`; every look-up goes through here.
 
-    Args:
-        name: Of a shipped engine or of a plug-in, or `module:attribute` of one's own.
-        beside: The folder whose modules come before the installed ones.
+    Modules beside a study come before the installed ones.
 
     Raises:
         InputError: If there is no such engine, or it is none.
@@ -86,13 +84,7 @@ def engine_of(name: str, beside: Path | None = None) -> Engine:
 
 
 def why_not(name: str, *, composed: bool, beside: Path | None = None) -> str:
-    """Why an engine cannot be used, in one phrase; empty if it can.
-
-    Args:
-        name: Of the engine.
-        composed: Whether the score is computed from outcomes that are known.
-        beside: The folder whose modules come before the installed ones.
-    """
+    """Why an engine cannot be used, in one phrase; empty if it can. A score is composed where outcomes are known."""
     try:
         return why_not_engine(engine_of(name, beside), composed=composed)
     except InputError as problem:
@@ -120,10 +112,7 @@ def is_installed(engine: Engine) -> bool:
 def make_proposer(engine: str | Engine, initial: int, goal: Goal | None = None) -> Proposer:
     """The proposer of an engine, with so many trials from the quasi-random design first: all engines share it.
 
-    Args:
-        engine: The engine, or the name of a shipped one.
-        initial: How many trials come from the design.
-        goal: What the outputs of a trial are to come to; None where a score has no such parts.
+    Without a goal a score has no parts.
 
     Raises:
         InputError: If there is no such engine, or it cannot be used.

@@ -206,16 +206,8 @@ def check_bounds(
 ) -> None:
     """Refuse values of a parameter that the family has not, or that lie beyond what it can be.
 
-    Args:
-        settings: Of the study.
-        family: Whose parameter it is.
-        key: Where the values stand in study.toml.
-        name: The parameter.
-        bounds: Lowest and highest of the values.
-        given: The values as text.
-
     Raises:
-        SettingsError: With the key and the remedy.
+        SettingsError: With the key, the values as they were given, and the remedy.
     """
     try:
         known = family.parameters.get(name)

@@ -136,11 +136,7 @@ def objective_of(settings: StudySettings) -> Objective:
 
 
 def measure_of(name: str, beside: Path | None = None) -> Measure:
-    """The measure that is not shipped: `module:attribute`, or the name of a plug-in.
-
-    Args:
-        name: Of the measure.
-        beside: The folder whose modules come before the installed ones.
+    """The measure that is not shipped: `module:attribute`, of this folder first, or the name of a plug-in.
 
     Raises:
         ExtensionError: If there is none.

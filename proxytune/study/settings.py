@@ -372,6 +372,9 @@ def _space(parameters: Section) -> Space:
         raise SettingsError(f"{parameters.path}: {parameters.name}{problem}") from None
 
 
+PLAIN = ("starts", "budget", "initial", "batch", "engine", "seed", "jobs", "episode_timeout_s")
+
+
 def settings_document(settings: StudySettings) -> Mapping[str, Any]:
     """The settings as plain texts and numbers, for reports."""
     return {
@@ -383,14 +386,7 @@ def settings_document(settings: StudySettings) -> Mapping[str, Any]:
         "metrics": [str(metric) for metric in settings.metrics],
         "agents": list(settings.agents),
         "aliases": dict(settings.aliases),
-        "starts": settings.starts,
-        "budget": settings.budget,
-        "initial": settings.initial,
-        "batch": settings.batch,
-        "engine": settings.engine,
-        "seed": settings.seed,
-        "jobs": settings.jobs,
-        "episode_timeout_s": settings.episode_timeout_s,
+        **{key: getattr(settings, key) for key in PLAIN},
         "on_failure": "stop" if settings.stop_on_failure else "continue",
         "preflight": settings.preflight,
         "confirm": settings.confirm,

@@ -1,7 +1,4 @@
-"""One episode of a domain family, to look at: its scores, and what moved, was commanded and was seen.
-
-One episode in proxy and target: the same agent from the same start under the same seed.
-"""
+"""One episode to look at: its scores, and what moved, was commanded and was seen, in proxy and target alike."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -94,11 +91,8 @@ def can_record(family: DomainFamily) -> bool:
 def record_episode(family: DomainFamily, episode: Episode, *, filmed: bool = False) -> RecordedEpisode:
     """Run an episode and keep all that the family shows of it.
 
-    Args:
-        family: Where it runs.
-        episode: Which one.
-        filmed: Whether pictures are wanted. A family with `replay` gives them: the recorded commands are driven again,
-            which takes as long as the episode.
+    Where pictures are wanted, a family with `replay` gives them: the recorded commands are driven again, which takes as
+    long as the episode.
 
     Raises:
         EpisodeError: If the agent or the domain fails, or columns of its recording do not belong together.
@@ -196,13 +190,7 @@ def drive_side_by_side(
 
 
 def load_target(settings: StudySettings, proxy: DomainFamily, model: Path, option: str) -> DomainFamily:
-    """The study's domain as a model.toml describes it.
-
-    Args:
-        settings: Of the study.
-        proxy: The study's own family.
-        model: The model.toml.
-        option: What named it, for complaints.
+    """The study's domain as a model.toml describes it, which the option named.
 
     Raises:
         InputError: If there is no such model, or it is of another robot.

@@ -158,11 +158,7 @@ class Decision:
 def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed: int = 0) -> Decision:
     """Say which agent to deploy.
 
-    Args:
-        inputs: Both sides.
-        asked: What to choose by, and what is known beside the tables.
-        saving: What the proxy adds to the target's means where starts are paired; it counts where that is beyond noise.
-        seed: Seed of the draws.
+    What the proxy adds to the target's means where starts are paired (`saving`) counts where that is beyond noise.
 
     Raises:
         InputError: If the metric to choose by is not there.

@@ -163,12 +163,7 @@ def expect(
 ) -> Expectation:
     """What a proxy and a perfect one are expected to score against this target.
 
-    Args:
-        fresh: Scores in the proxy by repetition, which nothing was chosen by.
-        target: Scores on the target.
-        metrics: How agents are compared, in the order in which `donors` have them.
-        donors: What is known of noise.
-        seed: Seeds what is drawn.
+    The fresh tables, a repetition each, are of episodes that nothing was chosen by; metrics are in the donors' order.
 
     Raises:
         ScoresError: As in prpv.

@@ -103,14 +103,8 @@ def floor_of_repeats(
 
     Each agent is compared over the starts that it drove both times, each start by the mean over its repeats. The
     interval is a bootstrap over starts, which both measurements share, and all agents too where none is missing. It
-    covers the mean PRPV of many such pairs, so like every bootstrap of PRPV it lies on the high side.
-
-    Args:
-        domain: Scores of the domain.
-        again: Its scores under other placement noise: the same agents, episodes labelled START or START/REPEAT.
-        metrics: How agents are compared.
-        resamples: How many to draw.
-        seed: Seed of the resampling.
+    covers the mean PRPV of many such pairs, so like every bootstrap of PRPV it lies on the high side. Episodes are
+    labelled START or START/REPEAT.
 
     Raises:
         ScoresError: As in prpv.

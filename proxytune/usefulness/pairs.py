@@ -86,16 +86,7 @@ def prpv(*, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) ->
 
 
 def prpv_of_means(proxy: Floats, target: Floats, metrics: Sequence[Metric]) -> Floats:
-    """PRPV, eq. (4), of many pairs of tables at once.
-
-    Args:
-        proxy: Mean scores in the proxy, shape (…, agents, metrics).
-        target: Mean scores on the target, broadcastable to the same shape.
-        metrics: How each of the metrics compares.
-
-    Returns:
-        Shape (…).
-    """
+    """PRPV, eq. (4), of many pairs of tables of mean scores (…, agents, metrics), which broadcast: shape (…)."""
     if proxy.shape[-2] > FEW_AGENTS:
         return by_table(lambda one, other: prpv_of_table(one, other, metrics), proxy, target)
     # Each pair counts half in either order.
@@ -104,15 +95,10 @@ def prpv_of_means(proxy: Floats, target: Floats, metrics: Sequence[Metric]) -> F
 
 
 def dominance(means: Floats, metrics: Sequence[Metric]) -> Floats:
-    """α, eq. (3): who dominates whom.
+    """α, eq. (3), of mean scores (…, agents, metrics): who dominates whom, shape (…, agents, agents).
 
-    Args:
-        means: Mean scores, shape (…, agents, metrics).
-        metrics: How each of the metrics compares.
-
-    Returns:
-        Shape (…, agents, agents): 1 where row dominates column (better beyond tolerance on one metric, worse on
-        none), 0 where column dominates row, 0.5 where they are incomparable or tied.
+    It is 1 where row dominates column (better beyond tolerance on one metric, worse on none), 0 where column dominates
+    row, 0.5 where they are incomparable or tied.
     """
     first, second = np.triu_indices(means.shape[-2], 1)
     signs = 0.5 * _signs(means, metrics)

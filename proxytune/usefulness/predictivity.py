@@ -51,16 +51,7 @@ class Ppv:
 
 
 def ppv_of_means(proxy: Floats, target: Floats, weights: Floats) -> Floats:
-    """PPV, eq. (2), of many pairs of tables at once.
-
-    Args:
-        proxy: Mean scores in the proxy, shape (…, agents, metrics).
-        target: Mean scores on the target, broadcastable to the same shape.
-        weights: β, one per metric, shape (…, metrics).
-
-    Returns:
-        Shape (…).
-    """
+    """PPV, eq. (2), of many pairs of tables (…, agents, metrics), which broadcast, by weights β (…, metrics): (…)."""
     return np.asarray((np.abs(proxy - target) @ weights[..., None])[..., 0].mean(axis=-1), dtype=np.float64)
 
 

@@ -75,13 +75,10 @@ def too_few(table: ScoreTable, name: str) -> str:
 
 
 def bootstrap_means(inputs: Comparison, *, resamples: int, seed: int) -> Means:
-    """Mean scores of resampled episodes, in the proxy and on the target.
+    """Mean scores of resampled episodes, in the proxy and on the target: (resamples, agents, metrics) each.
 
     Where all agents drove the same episodes, all get the same resample of their starts, each with all its repeats;
     where both domains have the same starts, both do.
-
-    Returns:
-        Two arrays of shape (resamples, agents, metrics).
     """
     rng = np.random.default_rng(seed)
     if inputs.paired:
@@ -151,13 +148,9 @@ def counted_means(values: Floats, counts: NDArray[np.int64] | NDArray[np.bool_])
 def in_blocks(
     measure: Callable[[Floats, Floats], Floats], proxy: Floats, target: Floats, *, numbers: int | None = None
 ) -> Floats:
-    """Apply a measure to many tables without holding at once all that it takes.
+    """Apply a measure to many pairs of tables (tables, agents, metrics) without holding at once all that it takes.
 
-    Args:
-        measure: Of mean scores in the proxy and on the target, shape (…, agents, metrics).
-        proxy: Mean scores in the proxy, shape (tables, agents, metrics).
-        target: Mean scores on the target, same shape.
-        numbers: How many numbers the measure holds of one table; by default one for each pair of agents.
+    Of one table the measure holds so many numbers; by default one for each pair of agents.
     """
     size = max(1, BLOCK // (numbers or proxy.shape[-2] ** 2))
     starts = range(0, len(proxy), size)

@@ -76,10 +76,7 @@ def effective(counts: Floats, table: ScoreTable, starts: ScoreTable) -> Floats:
 def saving_of(inputs: Comparison, column: int = 0, *others: Comparison) -> Saving:
     """Say what the proxy's rollouts save on one metric: by paired starts, else by a model over agents.
 
-    Args:
-        inputs: The proxy and the target.
-        column: The metric.
-        others: Other proxies of that target, used together with the first.
+    Other proxies of that target are used together with the first.
     """
     every = (inputs, *others)
     real, simulated = float(inputs.target.counts.mean()), sum(float(one.proxy.counts.mean()) for one in every)

@@ -104,13 +104,7 @@ def _steered(log: Log, robot: Robot, commands: Floats) -> Floats:
 
 
 def commands_as(kind: str, robot: Robot, duties: Floats) -> Floats:
-    """Fractions of full wheel speed (…, 2), of a car throttle and steering, as a log's kind of commands (…, 2).
-
-    Args:
-        kind: One of the kinds that suit the robot.
-        robot: Whose figures count.
-        duties: What `duties_of` would make of the result.
-    """
+    """Fractions of full wheel speed (…, 2), of a car throttle and steering, as a log's kind of commands (…, 2)."""
     if kind in ("duty", "ackermann"):
         return duties
     figures, speeds = robot.figures, duties * robot.figures["full_speed"]
@@ -294,14 +288,9 @@ class Drives:
         return float((self.last - self.first).sum() / self.tick_hz)
 
     def along(self, walked: Floats, path: Whole, increment: Whole, begin: Whole | int = 0, *, end: bool) -> Floats:
-        """Read paths (P, T + 1, 3) at the instants at which the poses of increments were measured (M, 3).
+        """Read paths (P, T + 1, 3) when the poses at beginnings or ends of increments (M,) were measured: (M, 3).
 
-        Args:
-            walked: Paths by their ticks.
-            path: Which path each increment belongs to (M,).
-            increment: The increments (M,).
-            begin: The tick at which its path begins (M,).
-            end: Whether it is the pose at the increment's end.
+        `path` is that of each increment (M,), which begins at this tick (M,).
         """
         tick = (self.last if end else self.first)[increment] - begin
         if self.after is None:

@@ -176,6 +176,7 @@ def fit_multistep(fitted: Fit) -> tuple[Fit, MultistepFit | None]:
         return fitted, None
     windows = cut(drives, best[1])
     theta = fit_windows(drives, fitted.theta, fitted.free, windows)
+    # 95 % intervals come from the spread between blocks.
     free = smooth_coordinates(fitted.free, drives.robot)
     problem = _problem(drives, theta, free, windows)
     here = problem.start

@@ -326,14 +326,9 @@ class Agreement(NamedTuple):
 
 
 def agreement(table: pd.DataFrame, log: Log, horizon_s: float) -> Agreement:
-    """Compare predicted poses with those measured after each window's start.
+    """Compare predicted poses, as `predict` gives them, with those measured after each window's start.
 
     Windows in which measured poses reach no further than a stub of the horizon are left out.
-
-    Args:
-        table: What `predict` says of the log.
-        log: The log.
-        horizon_s: Length of the windows [s].
     """
     measured = pd.concat(
         [

@@ -185,7 +185,6 @@ def _open(settings: StudySettings, spending: Spending) -> Study:
 
 
 def _tune(name: str, study: Study, say: Say, bars: AbstractContextManager[Watcher], retry_failed: bool) -> StudyReport:
-    """Run what is left of a family's study, and write its page."""
     try:
         report = run_opened(study, bars, lambda line: say(f"{name}: {line}"), retry_failed)
     except RunError as problem:

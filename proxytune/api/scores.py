@@ -282,7 +282,6 @@ def _metrics(metrics: str | Metric | Sequence[str | Metric] | None, header: Sequ
 
 
 def _header(scores: Scores | None) -> list[str]:
-    """The columns of a table, as far as they are known before it is read."""
     if isinstance(scores, pd.DataFrame):
         return [str(name) for name in scores.columns]
     if isinstance(scores, str | Path):

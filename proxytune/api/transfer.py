@@ -112,7 +112,6 @@ def import_log(
 
 
 def _known_robot(name: str) -> Robot | None:
-    """A robot, if it is known here."""
     with suppress(InputError):
         return read_robot(name, Path.cwd()) if name in robot_names(Path.cwd()) else None
     return None

@@ -37,7 +37,6 @@ def completion_script(shell: str) -> str:
 
 
 def _actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
-    """Every option and argument, those of subcommands too."""
     for action in parser._actions:
         yield action
         if isinstance(action, argparse._SubParsersAction):

@@ -91,7 +91,6 @@ def _drive(
 
 
 def _check(arguments: argparse.Namespace, family: DomainFamily) -> None:
-    """Refuse what cannot be done before anything is simulated."""
     if arguments.seed is not None and arguments.seed < 0:
         raise InputError(f"--seed must be at least 0, got {arguments.seed}")
     if arguments.output:

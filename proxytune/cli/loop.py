@@ -57,7 +57,6 @@ class Terminal:
 
 
 def _files(closed: Closed, page: Path) -> dict[str, Path]:
-    """Files that were made, by name."""
     home = closed.loop.home
     found = {"model": home / "diagnosed" / "model.toml", "diagnosis": home / "diagnosed" / "diagnosis.json"}
     extended = {"extended": home / "extended" / "study.toml"} if closed.after else {}

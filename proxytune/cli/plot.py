@@ -90,7 +90,6 @@ def run(arguments: argparse.Namespace) -> Answer:
 def _pages(
     settings: StudySettings, curves: Sequence[SweepCurve], figures: Mapping[str, Figure], folder: Path, command: str
 ) -> Iterator[Path]:
-    """Write a page of all sweeps that hold the others at the same values."""
     latest = list({curve_name(curve): curve for curve in curves}.values())
     for alike in held_alike(latest):
         yield write_sweep_page(settings, alike, figures, folder, held_values(alike[0].base), command)

@@ -245,7 +245,6 @@ def run(arguments: argparse.Namespace) -> Answer:
 
 
 def _test(assessments: Mapping[str, Assessment], arguments: argparse.Namespace) -> Sequential:
-    """The test after each rollout, whose bets the proxy foretells."""
     if len(assessments) > 1:
         raise InputError("--sequential: takes one proxy; name the one to bet by")
     ((_, assessment),) = assessments.items()
@@ -261,7 +260,6 @@ def _answer(
     selection: Selection | None,
     tested: Sequential | None,
 ) -> Answer:
-    """Text that is printed: the sentence, the table and the notes."""
     lines = [*document["left_out"], *([f"sequential test: {sequential_sentence(tested)}"] if tested else ())]
     shown = score_text(assessments, selection, lines, target=document["target"])
     if selection is not None:
@@ -294,7 +292,6 @@ def _weights(texts: Sequence[str]) -> dict[str, float] | None:
 def _write(
     arguments: argparse.Namespace, assessments: Mapping[str, Assessment], selection: Selection | None, target: str
 ) -> dict[str, Any]:
-    """Draw the figures and write the page; their paths."""
     settings = [("metrics", ", ".join(arguments.metric)), ("resamples", str(arguments.resamples))]
     foot = foot_of(typed(arguments), [*settings, ("seed", str(arguments.seed))])
     figures, page = write_score_report(assessments, selection, arguments.output, foot, target=target)

@@ -112,7 +112,6 @@ def diagnose_log(
 
 
 def _or_refusal(house: Callable[[], House]) -> tuple[House | None, str]:
-    """The answer of a house, or why there is none."""
     try:
         return house(), ""
     except (LogError, SettingsError) as problem:
@@ -122,7 +121,6 @@ def _or_refusal(house: Callable[[], House]) -> tuple[House | None, str]:
 def _declared_by_kind(
     log: Log, robot: Robot, declared: Sequence[str] | None
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Declared effects on motion, and those on the camera and its pictures."""
     if declared is None:
         return declared_effects(robot), declared_camera_effects(robot)
     if log.frames is None:

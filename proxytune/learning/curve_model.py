@@ -204,13 +204,11 @@ def _means(values: Mapping[str, float], same: NDArray[np.bool_], apart: Floats) 
 
 
 def _matern(apart: Floats, length: float) -> Floats:
-    """The Matérn kernel of smoothness 5/2."""
     scaled = np.sqrt(5.0) * apart / length
     return np.asarray((1.0 + scaled + scaled**2 / 3.0) * np.exp(-scaled))
 
 
 def _residuals(marks: Examined, values: Mapping[str, float], scaled: Floats, weights: Floats) -> Floats:
-    """The residuals of the scores about the mean curves, scaled."""
     return np.asarray(scaled - _means(values, marks.same, marks.apart) @ weights)
 
 

@@ -366,7 +366,6 @@ def _points(dimensions: int, most: int) -> Floats:
 
 
 def _draws(surrogate: Surrogate, points: Floats) -> Floats:
-    """Functions drawn from the posterior, at points of the unit cube: (draws, points)."""
     mean, covariance = surrogate.joint(points)
     scale = max(float(np.diag(covariance).mean()), JITTER)
     root = np.linalg.cholesky(covariance + JITTER * scale * np.eye(len(mean)))

@@ -44,7 +44,6 @@ def code_of(*modules: str) -> str:
 
 
 def _imported(path: Path) -> Iterator[str]:
-    """Names that a module imports, anywhere in it, in full."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)

@@ -228,7 +228,6 @@ def maximise_gain(gain: Callable[[Floats], Floats], visited: Floats, seed: int) 
 
 
 def _unvisited(points: Floats, visited: Floats) -> Floats:
-    """The points that are not the same as a visited one."""
     distances = np.abs(points[:, None, :] - visited[None, :, :]).max(axis=2)
     return np.asarray(points[distances.min(axis=1) > SAME / len(visited)])
 

@@ -206,7 +206,6 @@ def write_table(run: StudyRun) -> Path:
 
 
 def _check_same(run: StudyRun, source: Source) -> None:
-    """Refuse a source that is not of this domain, parameters, agents and starts."""
     settings, theirs, ours = run.settings, source.facts, study_facts(run.study)
     if not source.trials:
         raise _refused(settings, source.path, "has no finished trial; run it first, or remove it")

@@ -206,7 +206,6 @@ def note_search(study: Study, store: Store) -> str:
 
 
 def _searches(store: Store) -> list[dict[str, Any]]:
-    """The searches that have proposed trials so far, each with its first trial."""
     known = store.facts().get(SEARCH, [])
     try:
         whole = all(int(one["first_trial"]) and one["code"] and dict(one["versions"]) for one in known)
@@ -246,7 +245,6 @@ def describe(study: Study, store: Store) -> None:
 def _described(
     settings: StudySettings, store: Store, described: Mapping[str, Any]
 ) -> tuple[DomainFamily, Engine, Mapping[str, float] | None]:
-    """The family, the engine and the truth of a study as they had been described."""
 
     def refuse(*_: Any) -> NoReturn:
         raise StoreError("a study that is only looked at proposes nothing")

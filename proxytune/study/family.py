@@ -146,7 +146,6 @@ def bare_family(settings: StudySettings, model: Path | None) -> DomainFamily:
 
 
 def _check_signature(settings: StudySettings, factory: Any, model: Path | None) -> None:
-    """Refuse a factory that cannot be called as a study calls it."""
     try:
         inspect.signature(factory).bind(settings.domain, model=model)
     except TypeError as problem:

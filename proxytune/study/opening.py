@@ -260,7 +260,6 @@ def cautions_of(family: DomainFamily) -> tuple[str, ...]:
 
 
 def _engine(settings: StudySettings) -> Engine:
-    """The engine that a study names, which is installed and may be named."""
     try:
         engine = engine_of(settings.engine, settings.folder)
     except InputError as problem:

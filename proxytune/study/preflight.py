@@ -337,7 +337,6 @@ def _base_again(settings: StudySettings, agent: str, place: Place) -> Episode:
 
 
 def _movement(study: Study, look: int, interval: Interval, known: Mapping[Episode, Outcome]) -> Movement:
-    """Test one parameter on what is known at this look."""
     settings = study.settings
     base = _base(settings)
     instances = [base, *({**base, interval.name: end} for end in (interval.low, interval.high))]

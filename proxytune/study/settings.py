@@ -306,7 +306,6 @@ def _check_known(study: StudySettings) -> None:
 
 
 def _check_comparable(study: StudySettings) -> None:
-    """Refuse a study whose families could not be compared."""
     for key, has in (("target", bool(study.targets)), ("learn_from", not study.learn_from), ("budget", study.budget)):
         if not has:
             raise study.error(key, f"of a study of {FAMILIES}: needs a target, a budget, and trials of its own alone")

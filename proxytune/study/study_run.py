@@ -266,7 +266,6 @@ class StudyRun:
         known: dict[Episode, Outcome],
         enough: Enough | None,
     ) -> None:
-        """Simulate what is missing, and add it to what is known."""
         ended = {theta for theta in {episode.theta for episode in planned} if enough and enough(theta, known)}
         left, least = longest_first(missing, self.store.seconds()), len(missing)
         if enough:

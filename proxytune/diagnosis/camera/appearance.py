@@ -242,7 +242,6 @@ def fit_grain(measured: Pictures, predicted: NDArray[Any], floor: NDArray[np.boo
 
 
 def _noise(low: float, best: float, high: float) -> Fitted:
-    """The standard deviation, from variances with rounding."""
     ends = np.sqrt(np.clip(np.array([low, best, high]) - ROUNDING, 0.0, None))
     return Fitted(float(ends[1]), (float(ends[0]), float(ends[2])), bool(ends[2] < max(STEADY * ends[0], LITTLE)))
 

@@ -139,7 +139,6 @@ def look_values(look: Appearance, names: Sequence[str]) -> dict[str, float]:
 
 
 def _told(weighed: Weighed, effect: str) -> CameraEffect:
-    """An effect on where things are in the picture, as it is told."""
     named = weighed.named
     names = tuple(name for name in named.full.names if effect_of(name) == effect)
     others = {one for rivals in named.rivals for one in rivals} - set(named.effects)
@@ -148,7 +147,6 @@ def _told(weighed: Weighed, effect: str) -> CameraEffect:
 
 
 def _names(look: Appearance, effects: Sequence[str]) -> tuple[str, ...]:
-    """Their figures by name in θ, effect by effect."""
     return tuple(name for effect in effects for name in look.figures if effect_of(name) == effect)
 
 
@@ -158,7 +156,6 @@ def _figures(look: Appearance, names: Sequence[str]) -> dict[str, Estimate]:
 
 
 def _estimates(fit: CameraFit, effects: Sequence[str]) -> dict[str, Estimate]:
-    """Values with their intervals, of the parameters that were free."""
     parameters = fit.views.optics.robot.catalogue.parameters
     return {
         name: estimate_of(fit.theta[name], sd, parameters[name].unit)

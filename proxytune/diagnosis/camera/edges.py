@@ -86,7 +86,6 @@ def _colour_maps(picture: NDArray[np.uint8]) -> tuple[Floats, Floats]:
 
 
 def _edges_of(number: int, white: bool, share: Floats) -> Edges:
-    """Edges of one colour in one picture."""
     known = np.isfinite(share)
     filled = np.where(known, share, 0.0)
     down = gaussian_filter(filled, SMOOTHING_PX, order=(1, 0), mode="nearest")

@@ -347,7 +347,6 @@ def _contrast(
 
 
 def _spread(grey: Singles, weight: Singles) -> Singles:
-    """Standard deviation of each window over the frames."""
     total = np.maximum(weight.sum(axis=0), 1.0)
     off = grey - (weight * grey).sum(axis=0) / total
     return np.asarray(np.sqrt((weight * off**2).sum(axis=0) / total), dtype=np.float32)

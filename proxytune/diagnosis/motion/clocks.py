@@ -383,7 +383,6 @@ def all_drives(log: Log, robot: Robot, clocks: Clocks) -> Drives:
 
 
 def _gather_on_one_clock(log: Log, robot: Robot, chosen: Sequence[int], clocks: Sequence[Clocks]) -> Drives:
-    """Gather some of a log's drives, on one clock."""
     drives = gather(log, robot, [log.episodes[i] for i in chosen])
     return put_in_step(drives, clocks[0], chosen) if clocks else drives
 

@@ -395,7 +395,6 @@ def _cross_validate(drives: Drives, theta: Theta, folds: Sequence[Theta], window
 
 
 def _parts(drives: Drives) -> int:
-    """The number of parts that blocks are dealt out to."""
     return min(PARTS, int(drives.block.max()) + 1)
 
 

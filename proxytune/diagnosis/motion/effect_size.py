@@ -142,7 +142,6 @@ def _squares(fitted: Drives, tested: Drives, variant: Variant) -> dict[float, Fl
 
 
 def _length(drives: Drives) -> float:
-    """The length of the windows that are fitted to [s]."""
     return max((h for h in horizons(drives) if h <= FITTED_S), default=min(horizons(drives), default=FITTED_S))
 
 

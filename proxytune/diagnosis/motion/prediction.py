@@ -203,7 +203,6 @@ def _root(log: float, half: float) -> Rmse:
 
 
 def _log_means_without_each(squares: Floats, blocks: Whole) -> Floats:
-    """Logarithm of the mean without each block."""
     _, label = np.unique(blocks, return_inverse=True)
     sums, counts = np.bincount(label, squares), np.bincount(label)
     if len(counts) < 2:

@@ -70,7 +70,6 @@ def best_theta(study: Study, option: str = "--at") -> Theta:
 
 COMMANDS = 100
 """At most so many commands are replayed, 5 s at 20 Hz: later, two domains are far apart whatever their difference."""
-
 REPLAYED = "f1b2d6a3eda6bd6409dcf09bb3bf65753aad6648d68c23ac343b313fa66dcbc8"
 """Names how replays are compared: what is kept of them is found by it. Change it where they are compared otherwise."""
 METRICS = {"pod_pose": "m", "pod_image": "of full scale"}

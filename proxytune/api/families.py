@@ -43,8 +43,6 @@ from proxytune.teaching import classrooms, teach_families
 Say = Callable[[str], None]
 Tuning = Callable[[Study], AbstractContextManager[Watcher]]
 """Gives what hears of every episode of a family."""
-
-
 CURVE_POINTS = "points of learning curves"
 
 

@@ -34,7 +34,6 @@ MOTION = {
     "drawing": 0.96,
 }
 """The share of a diagnosis of motion that has usually passed when each of its steps begins."""
-
 CAMERA = {
     "reading frames": 0.0,
     "fitting the camera": 0.1,
@@ -44,7 +43,6 @@ CAMERA = {
     "drawing": 0.95,
 }
 """The same of a camera's."""
-
 MOTION_SHARE = 0.8
 """Of the time of both; the camera comes last."""
 

@@ -42,20 +42,16 @@ from proxytune.logs import COMMANDS, Frames, Log, LogEpisode
 POSITION_NOISE_M = 0.002
 HEADING_NOISE_RAD = 0.005
 """White noise of a measured pose, as a tracker above the floor has it."""
-
 HEADING_NOISE_DEG = math.degrees(HEADING_NOISE_RAD)
 
 PICTURES = "frames/%06d.png"
 """Where a log's pictures lie in its folder."""
-
 CAMERA = {
     "frames": PICTURES,
     "exposure": "fixed",
     "poses": {"position_m": POSITION_NOISE_M, "heading_deg": round(HEADING_NOISE_DEG, 4)},
 }
 """What log.toml states of the pictures: no effect adjusts the exposure from one to the next."""
-
-
 Table = tuple[str, Mapping[str, tuple[Floats, Floats]]]
 """Kind of commands, and each drive's times [s] and commands, as `proxytune.logs.read_commands` gives them."""
 
@@ -152,13 +148,10 @@ def frames_text(log: Log, frames: Frames, numbers: Sequence[int], float_format: 
 
 COLUMNS = 160
 """What agents are shown is too coarse for a diagnosis, so the camera is given so many columns where it has fewer."""
-
 FRAMES_HZ = 2.0
 """About how many pictures are taken in a second."""
-
 SHORTEST_S, LONGEST_S = 5.0, 20.0
 """How long a lane drive lasts [s]: in 5 s it comes from a straight into a bend, or out of one."""
-
 LANES = 1
 """Tells the seeds of lane drives from those of manoeuvres."""
 

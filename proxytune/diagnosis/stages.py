@@ -29,10 +29,8 @@ Result = TypeVar("Result")
 
 ROOMS = ("logs", "effects", "driving", "diagnosis")
 """Rooms whose code a diagnosis of motion depends on."""
-
 FOLDER = ".stages"
 """Where stages lie in the folder of the findings until these are written."""
-
 NUMBERS = {
     ("numpy", "ndarray"),
     ("numpy", "dtype"),
@@ -44,7 +42,6 @@ NUMBERS = {
     ("numpy.core.numeric", "_frombuffer"),
 }
 """What arrays are made by."""
-
 SIGNALS = "proxytune.diagnosis.motion.signals"
 """Its functions, which only reckon, are bound to curves."""
 

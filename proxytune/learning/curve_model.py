@@ -68,7 +68,6 @@ PRIORS: Mapping[str, tuple[float, float]] = {
     "noise": (0.3, 1.0),
 }
 """Median of each hyperparameter, and the spread of its logarithm; scores have standard deviation 1."""
-
 REPEATED = ("shared", "own", "drift")
 """Hyperparameters that only several repetitions tell."""
 LEVEL = 3.0

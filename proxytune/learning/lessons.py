@@ -33,16 +33,12 @@ from proxytune.unpacking import read_arrays
 
 EXPERT = "expert"
 """Who drives in a lesson, in place of an agent."""
-
 LESSONS_MB = 4000
 """Kept samples may be pictures."""
-
 LEAST_SHARE = 0.5
 """An expert that keeps to the road for less than this share of its lessons has nothing to teach."""
-
 LEAST_LABELLED = 0.01
 """An expert that labels less than this share of a learner's lessons has no label for where it drives."""
-
 TRIED = 10
 """Lessons after which that is judged."""
 

@@ -118,7 +118,6 @@ def _ends(low: float | None, high: float | None) -> Ends | None:
 MOST_NAMED = 5
 OPEN = ("partly explained", "unexplained", "cannot be told")
 """Verdicts after which more is to be found."""
-
 NEXT = " Next: "
 """What the sentence of a study has before its last part."""
 

@@ -16,14 +16,12 @@ from proxytune.settings import alike_caution
 TIMES = re.compile(r"(^|_|\b)(time|seconds|duration|survival|lifetime|steps)(_|\b|$)", re.IGNORECASE)
 NO_TIMES = re.compile(r"diff|delta|advantage|gain|margin|offset|error|log|reward|per_|rate", re.IGNORECASE)
 """What names of metrics say that count from zero, and of those that may be below."""
-
 OTHER_UNIT = 8.0
 """Where all agents' scores differ by about one factor, this one is no longer a matter of physics."""
 ANY_UNIT = 100.0
 """Where they differ by this factor, they need not agree on it."""
 AGREED = 0.3
 """Agents agree on a factor: half of them within this many powers of ten."""
-
 SAME_LENGTH = 1.05
 CEILING = 0.1
 """A time limit is where at least this share of the episodes ends."""

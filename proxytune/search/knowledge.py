@@ -33,7 +33,6 @@ from proxytune.space import Space
 
 STEP = 0.02
 """In widths of the box, to both sides."""
-
 Limit = Literal["trials", "starts"]
 
 
@@ -305,10 +304,8 @@ def learn_theta(space: Space, trials: Sequence[Trial], goal: Goal, seed: int = 0
 
 POINTS = 2048
 """At most so many points for the posterior mean."""
-
 DRAWN_POINTS = 1024
 """At most so many for the functions drawn: these are drawn jointly, which takes the cube of their number."""
-
 DRAWS = 200
 LEVELS = (0.025, 0.975)
 JITTER = 1e-8

@@ -42,10 +42,8 @@ Rows = NDArray[np.intp]
 
 PRIOR_TRIALS = 4.0
 """The kernel's own variance of an output counts as so many trials beside those left out."""
-
 MOST_FOR_KERNEL = 128
 """At most so many trials, spread over the box, tell the kernel: its few numbers need no more; time is their cube."""
-
 FEWEST = 3
 """Trials that must know an output for it to be modelled."""
 
@@ -219,7 +217,6 @@ def _group(kernel: "Kernel", visited: Floats, outputs: Floats, placement: Rows, 
 
 FREEDOM = 4.0
 """Degrees of freedom of Student's distribution: an output that is far off counts for less than a normal's would."""
-
 LEAST_NOISE = 1e-6
 """Of an output's variance over the trials: without any, a deterministic target would be a spike."""
 

@@ -19,7 +19,6 @@ from proxytune.space import Space
 
 Values = tuple[float, ...]
 """A point of the search box: one value per parameter, in the order of the box."""
-
 Compose = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 """Scores, shape (…,), of outcomes, shape (…, outputs)."""
 

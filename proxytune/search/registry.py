@@ -54,7 +54,6 @@ def _imported(path: Path) -> Iterator[str]:
 
 ENGINES: tuple[Engine, ...] = (OUTCOMES, COMPOSITE, GAUSSIAN_PROCESS, RANDOM, SOBOL, TREE_PARZEN)
 """A new engine is a module of its own and a line here; each says all about itself (engine.py)."""
-
 ENGINE_NAMES = tuple(engine.name for engine in ENGINES)
 """What a study may name."""
 DEFAULT_ENGINE = OUTCOMES.name

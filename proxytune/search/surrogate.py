@@ -45,10 +45,8 @@ class Prior:
 
 AMPLITUDE = Prior(1.0, 0.5, (0.05, 20.0))
 """Of the variance, relative to the scores' own."""
-
 LENGTH_SCALE = Prior(0.4, 0.4, (0.05, 20.0))
 """In widths of the box."""
-
 NOISE = Prior(0.1, 0.7, (1e-2, 1.0))
 """Of the noise variance, relative to the scores' own. The floor stands for the steps, which no smooth function
 follows, so the surrogate never threads them exactly."""

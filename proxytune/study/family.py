@@ -94,7 +94,6 @@ MEMBERS: Mapping[str, tuple[type, str]] = {
     "starts": (Integral, "a whole number"),
 }
 """What a domain family tells of itself, and as what."""
-
 METHODS = ("check_agent", "run")
 Value = TypeVar("Value")
 

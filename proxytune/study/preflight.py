@@ -353,7 +353,6 @@ def _movement(study: Study, look: int, interval: Interval, known: Mapping[Episod
 
 PRIOR_PAIRS = 2
 """An agent's own pairs are few, so the median over the agents counts as so many more."""
-
 UNKNOWN_NOISE = 0.1
 """Where nothing tells: standard deviation of a mean, as a share of the spread over agents."""
 

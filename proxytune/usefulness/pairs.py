@@ -22,7 +22,6 @@ from proxytune.usefulness.comparison import Comparison, compare
 
 FEW_AGENTS = 128
 """Up to so many agents each pair is compared, in many tables at once, which is quicker for them."""
-
 Flip = Literal["reversed", "lost", "invented"]
 FLIPS: dict[tuple[float, float], Flip] = {(1.0, 0.0): "reversed", (1.0, 0.5): "lost", (0.5, 1.0): "invented"}
 

@@ -20,7 +20,6 @@ from proxytune.usefulness.predictivity import Ppv, kendall_of_means, mmrv_of_mea
 CONFIDENCE = 0.95
 BLOCK = 4_000_000
 """Most numbers held at once by a measure over many resamples."""
-
 Means = tuple[Floats, Floats]
 """Mean scores of resampled episodes, in the proxy and on the target, each of shape (resamples, agents, metrics)."""
 

@@ -36,43 +36,30 @@ from proxytune.effects import PARAMETERS, effect_of
 
 Draw = Callable[[float, float], NDArray[Any]]
 """Draws all frames (N, rows, columns, 3) with a blur [s] and a defocus, a share of the picture's height."""
-
 STEP = 0.5
 """Between two points of an edge's profile [pixel]."""
-
 REACH = 24
 """Steps to both sides over which a profile goes: 12 pixels, half of what 0.1 s blurs at 240 pixel/s."""
-
 SHIFT = 8
 """Steps from its place within which an edge is looked for: tape and poses move it by up to 4 pixels."""
-
 SLOWER = 1.0 - 0.5 ** np.arange(1, 7)
 """Shares of the edges that are slower than each group but the first: few are fast, and these tell the most."""
-
 FOOT = 0.15
 """An edge ends where it is less steep than this share of its steepest."""
-
 FAINT = 0.35
 """Edges that the model draws with less than this share of the measured steepness are not the same ones."""
-
 MOST = 12000
 """Edge points that are enough."""
-
 DRAWS = 4
 """Times that the model is drawn: an edge's squared width is nearly linear in the squares of what is fitted."""
-
 RESPONSE = np.array([1.0, 0.5])
 """How much wider an edge gets than in theory: of a pixel's own width, part of a little defocus is not seen."""
-
 WIDER = 1.5
 """What the jackknife's intervals are too narrow by: they held 14 of 20 planted blurs, for a foot's end jumps."""
-
 ROUGH = 0.06
 """What widths of profiles half a pixel apart are wrong by, besides their scatter [pixel²]."""
-
 SLOW = 5.0
 """Edges that all move alike to this tell nothing of blur [pixel/s]."""
-
 WIDEST = (0.06, 0.01)
 """Intervals of blur [s] and defocus that still tell something."""
 
@@ -197,19 +184,14 @@ def _squared_width(profiles: Floats) -> Floats:
 
 BANDS = 6
 """Bands of rows that are compared: a floor's texture changes with distance, noise does not."""
-
 FEWEST = 500
 """Pixels of one paint that a band or a pair of frames needs."""
-
 ROUNDING = 1.0 / 12.0
 """Variance of rounding to whole grey levels."""
-
 STILL = 0.05
 """Mean difference of drawn frames between which the robot has not moved [grey level]."""
-
 STEADY = 2.0
 """Between a low and a high end of less than this ratio, noise is told from texture."""
-
 LITTLE = 0.5
 """Noise below this is none: rounding has a standard deviation of 0.3 [grey level]."""
 
@@ -284,7 +266,6 @@ def _variance(values: Floats) -> float:
 
 SHARP_PX = 2.0
 """Edges that lie farther from the map's are not those that the model draws."""
-
 HORIZON_ROWS = 3
 """So many rows beneath the horizon are left out: what a pixel covers there is a metre long."""
 
@@ -320,7 +301,6 @@ LEAST: Mapping[str, float] = {
     "blur": 0.01,
 }
 """How far from its neutral value a figure must lie to matter for what an agent sees."""
-
 NARROW = 0.12
 """Half of an interval of gain or gamma that is found only where every paint is as declared."""
 

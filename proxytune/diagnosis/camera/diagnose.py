@@ -44,7 +44,6 @@ from proxytune.logs import Log
 
 SURE = 3.0
 """A line is told to lie beside its place from so many standard deviations on."""
-
 WIDTHS = ("white lines", "yellow lines", "yellow dashes")
 
 

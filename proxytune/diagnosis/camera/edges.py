@@ -25,16 +25,12 @@ from proxytune.logs import Frames, Log, read_pictures
 
 SMOOTHING_PX = 1.0
 """Standard deviation of the Gaussian whose slope is the gradient [pixel]."""
-
 LEAST_SLOPE = 0.15
 """A weaker gradient of whiteness or yellowness, from 0 to 1, is none of a marking [1/pixel]."""
-
 YELLOW = 0.55
 """How far a yellow marking's blue lies below its red and green, as a share of the range from the floor to white."""
-
 SKY = 40
 """A pixel whose blue is so much above its red [grey levels] is sky; so are those within SKY_MARGIN pixels."""
-
 SKY_MARGIN = 3
 
 BORDER = 2
@@ -115,12 +111,10 @@ def _edges_of(number: int, white: bool, share: Floats) -> Edges:
 
 WINDOW_S = 0.5
 """Poses are smoothed by parabolas over windows so long, which tell the speed too."""
-
 ORDER = 2
 
 LONGEST_GAP_S = 0.25
 """Frames within a longer gap between poses are left out."""
-
 APART_S = 10.0
 """How far apart drives are put on the common axis of times, so that none reaches into the next."""
 
@@ -209,13 +203,11 @@ LATENCY = "camera_latency"
 READOUT = "rolling_shutter"
 MOVING = (LATENCY, READOUT)
 """Effects that show where a marking lies in the picture only while the robot moves, by their names in θ."""
-
 DISTORTION = "lens_distortion"
 
 SPREAD = 0.4
 """Standard deviation that is expected of a parameter, as a share of the way to the farther end of its range: it decides
 what views cannot."""
-
 STEP = 1e-4
 """How far a parameter is moved for a derivative, as a share of its range."""
 
@@ -268,13 +260,10 @@ def effects_of(names: tuple[str, ...]) -> tuple[str, ...]:
 
 LEAST_SCATTER = (0.0005, np.radians(0.1))
 """No tracker is trusted beyond this: place [m] and heading [rad]."""
-
 LEAST_TAPE_M = 0.0001
 """No map is laid more exactly [m]."""
-
 MAP_SCATTER = np.array((0.03, 0.03, np.radians(1.0)))
 """How far the whole map may lie off, as standard deviations of x, y [m] and heading [rad]."""
-
 TILTED = 3
 """So many of LINES may lie askew; the ends of dashes cannot."""
 
@@ -343,19 +332,14 @@ class Tape:
 
 MOST_FRAMES = 240
 """Of a longer log so many frames are used, evenly spread: more do not tell the camera better."""
-
 EVERY = 2
 """Every second edge point is enough: neighbours are not independent."""
-
 ASSUMED_M, ASSUMED_DEG = 0.005, 1.0
 """Scatter of a tracker that says nothing of it, to begin with."""
-
 COLOURED = 40
 """Two colours that are brighter than the third by so much make a pixel yellow, or cyan [grey level]."""
-
 LEAST_COLOURED, FAR_MORE = 0.001, 3.0
 """Blue comes first in pictures of which a larger share is cyan, so many times as much as yellow."""
-
 SWAPPED = "the pictures have blue first; they were taken as blue, green, red: save them as red, green, blue"
 
 FEWEST_POINTS = 30

@@ -23,12 +23,10 @@ from proxytune.effects import effect_of
 
 FOLDS = 3
 """Every frame is left out once, a third of them at a time."""
-
 SCALES = (2.0 * SCALE_PX, *(SCALE_PX,) * 4)
 POSE_STEPS = 4
 CAP_PX = 4.0
 """A marking that lies farther off counts as so far [pixel]: what is no marking has no distance."""
-
 DRAWS = 400
 """Bootstrap samples over frames."""
 

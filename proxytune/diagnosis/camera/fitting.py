@@ -27,7 +27,6 @@ from proxytune.diagnosis.camera.model import (
 
 EVIDENCE = 0.1
 """Edge points of a picture are not independent: so much of a point's evidence counts."""
-
 LEAST_WEIGHT = 1e-4
 """Edge points of less weight are left out of a fit: they would only cost time."""
 
@@ -118,7 +117,6 @@ class Normal(NamedTuple):
 
 SCALE_PX = 1.0
 """Standard deviation of an edge point in the end; what is far beyond counts no more."""
-
 LARGEST_STEP = 0.75
 """No parameter of the camera moves farther in one step, in spreads of it."""
 

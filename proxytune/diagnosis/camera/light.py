@@ -21,34 +21,24 @@ Pictures = NDArray[np.uint8]
 
 PAINTS = np.array([COLOURS[name] for name in ("asphalt", "white", "yellow")], dtype=float)
 """Red, green, blue of what is compared; what lies off the map is no paint that anyone declared."""
-
 MARGIN = 3
 """Pixels that flat places keep from edges and from the horizon: tape, poses and poor focus shift edges by 2 px."""
-
 RINGS = 6
 """Rings about the picture's middle in which brightness is averaged, even in squared radius."""
-
 BLOCKS = 12
 """Runs of frames that are left out in turn: neighbouring frames show the same piece of floor."""
-
 CLIPPED = (4.0, 246.0)
 """Means beyond these are of clipped pixels [grey level]."""
-
 FEW = 20.0
 """A mean over so many pixels weighs half as much as one over many, whose error is the floor's texture."""
-
 FEWEST_PIXELS = 8
 """Pixels that a mean needs."""
-
 ROUNDS = 40
 """Rounds of the fit: it changes by less than 0.0005 after thirty."""
-
 RANGES = ((0.2, 5.0), (0.3, 3.0), (-0.9, 0.9))
 """Gain, gamma and vignetting of any camera."""
-
 UNKNOWN = 0.3
 """Gamma is off by this share at most where paints are off by 30 % from what is declared."""
-
 WIDEST = (0.3, 0.3, 0.12)
 """Half an interval of gain, gamma or vignetting that still tells something."""
 
@@ -221,45 +211,32 @@ Singles = NDArray[np.float32]
 
 WINDOW = 7
 """Side of the windows whose mean brightness is compared [pixel]: narrower ones miss tape that is 2 px off."""
-
 STEP = 2
 """Between the middles of two windows [pixel]."""
-
 AROUND = 31
 """Windows across the neighbourhood whose contrast is the usual one: poorly fitted light changes it slowly."""
-
 HORIZON = 6
 """Pixels to keep from what is not floor: the floor's far end is too thin to be judged."""
-
 DARKEST = 40.0
 """Less is drawn off the map [grey level], where nobody declared what there is to see."""
-
 VARIED = 12.0
 """Standard deviation of the drawn brightness over the frames that shows a contrast [grey level]."""
-
 FEWEST_FRAMES = 75
 """Frames that a window needs: with 60, two of five draws of photographed frames had false alarms."""
-
 HIDDEN = 0.75
 """Contrast below which something lies between lens and floor: photographed floors alone seldom go below 0.75."""
-
 SUBDUED = 0.65
 """Variation over the frames, against that of what is drawn, below which it does: tape that lies off and poses that
 scatter spoil the first contrast, not this one."""
-
 SURE = 3.0
 """Standard deviations by which the contrast must be below that."""
-
 PARTS = 3
 """Parts of the log, one after another, each of which must show that a place is hidden: one odd passage is none."""
-
 SMALLEST = 7
 """Windows that a blemish has at least."""
-
 LEAST_SHARE = 0.0022
 """Share of the picture that the largest blemish covers, half of a spot of 10 pixels across: smaller ones alone are
 stains of the floor that few passages showed."""
-
 REWEIGHTINGS = 5
 """Rounds of reweighting."""
 

@@ -19,10 +19,8 @@ from proxytune.effects import FilterContext, Stage, effects_from, stage_chain
 
 FARTHEST_M = 1.2
 """Edges farther ahead of the lens are too coarse to count [m]."""
-
 NARROWEST_PX = 2.5
 """A marking must be wider in the picture, else its two edges are one [pixel]."""
-
 ALIGNED = 0.5
 """The map's edge must run within 60° of the picture's, bright on the same side: this is the cosine."""
 
@@ -182,7 +180,6 @@ BLUR = "blur"
 NOISE = "image_noise"
 TIMED = (LATENCY, READOUT, BLUR)
 """Effects that say when a picture is taken: they are drawn by moving the camera."""
-
 SHOTS = 9
 """Pictures that the mean over an exposure is taken of; as many instants of a rolling shutter."""
 

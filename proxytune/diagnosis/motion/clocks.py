@@ -45,16 +45,12 @@ from proxytune.logs import Log, LogEpisode, Measured
 
 FURTHEST_S = 10.0
 """Clocks are looked for up to so far apart."""
-
 EARLIEST_S = 0.02
 """Motion must come so long before its command to be proof."""
-
 ASSUMED_DELAY_S = 0.05
 """The delay that is left to a robot whose nominal delay nobody states, once an offset is taken out."""
-
 RARE = 0.25
 """Clocks of no more than this share of the drives jump, or are others."""
-
 PROOF_BLOCK_S = 5.0
 """Two latencies are compared over such blocks."""
 
@@ -217,10 +213,8 @@ def _lengthen(signal: Floats, ticks: int) -> Floats:
 
 LONGEST_S = 20.0
 """Rests are cut out if they last longer."""
-
 BEFORE_S, AFTER_S = 1.0, 3.0
 """So much of a rest is kept before the next command and after the last one: the robot comes to a stop in it."""
-
 REST = 1e-3
 """A command below this share of the largest is none."""
 
@@ -269,10 +263,8 @@ def _piece(episode: LogEpisode, begin: int, stop: int) -> LogEpisode:
 
 MOST = 6000
 """No more increments are fitted: beyond, they hardly sharpen what is found, and cost in proportion."""
-
 STRETCH_S = 6.0
 """Blocks are shortened no further than this, so that windows of prediction fit into them; else blocks are left out."""
-
 FEWEST_BLOCKS = 16
 
 JOINED_S = 0.1
@@ -316,19 +308,14 @@ def join_increments(drives: Drives, times: int) -> Drives:
 
 FEWEST_EPISODES = 6
 """With fewer, each episode is split by time: the first half is fitted, the second tested."""
-
 LEAST_MOTION_S = 20.0
 """Less measured motion than this is not enough to fit, and as much again to test."""
-
 MOST_S = 900.0
 """No more seconds are fitted where there are drives to choose from: every replay takes all of them."""
-
 MOST_TESTED_S = 1800.0
 """No more seconds are tested on in the same way: the bullet plant drives them all, twice."""
-
 BLOCKS = 16
 """Each part has at least about so many blocks, if they last BLOCK_S."""
-
 TEST_BLOCK_S = 4.0
 """Blocks are no shorter, unless episodes are."""
 

@@ -70,10 +70,8 @@ from proxytune.space import Theta
 
 CONFIRMED_S = 2.0
 """The horizon at which errors are confirmed on the bullet plant."""
-
 PERIODIC = "time, again and again"
 """What a remainder with a period is said to depend on."""
-
 MAIN_S = 2.0
 """The horizon of the one error that stands for all."""
 

@@ -43,36 +43,26 @@ from proxytune.space import Theta
 
 RARE = 0.002
 """The range that was seen leaves out so much of the time at either end."""
-
 WHEEL_KNOTS, TURN_KNOTS, TIME_KNOTS = 9, 8, 6
 GRID = (4, 6)
 """Knots of a curve over a wheel's speed, over the yaw rate, over time or use, and over speed and yaw rate together."""
-
 OTHER_KNOTS = 5
 """Knots of a curve over the other wheel's speed."""
-
 MESHES_M, MOST_CORNERS = (0.25, 0.5, 1.0, 2.0), 64
 """Meshes of the lattices of a map of the floor, and how many corners it may have."""
-
 SAME_PLACE_M = 1e-3
 """Drives that begin in motion so near to each other did not begin at one place: their frames begin there."""
-
 TRANSIENTS_S = (0.04, 0.1, 0.25, 0.63, 1.6)
 STARTS_S = (0.05, 0.15, 0.5)
 """Time constants over which the memory of a start fades [s]."""
-
 RINGING_HZ = (0.4, 0.8, 1.6, 3.2)
 """Frequencies of swings."""
-
 PLAYS = (0.02, 0.05, 0.1, 0.2)
 """Half widths of plays, as shares of full speed."""
-
 REVERSALS_M = (0.003, 0.01, 0.03, 0.1, 0.3)
 """Ways over which the memory of a reversal fades [m]."""
-
 LOADS_S = (1.0, 4.5, 20.0)
 """Time constants of the low-passes."""
-
 APART = 0.02
 """Knots nearer to each other or to 0 than this share of the range are one."""
 
@@ -167,16 +157,12 @@ def _round_knot(value: float) -> float:
 
 RIDGES = (1e-3, 1e-2, 1e-1, 1.0)
 """Pulls towards no curve that are tried, as shares of what an average weight of the group is held by."""
-
 FIRMEST_ONLY = {"speed_and_turn": 0.1, "place": 0.01}
 """Curves over two signals are never pulled less than this: most of their knots are seldom visited."""
-
 MAP = "place"
 """The group with the most weights by far: where the guard refuses curves with it, they are fitted without it."""
-
 FREE = 1e-6
 """The level is hardly pulled."""
-
 ROBUST = 1.5
 """Errors beyond so many medians count less and less."""
 
@@ -277,10 +263,8 @@ def _held_out_losses(given: Sums, columns: Whole, penalties: Floats) -> Floats:
 
 PARTS = 16
 """No more parts are left out in turn."""
-
 FOLDS = 4
 """The whole fit, choice of groups included, is repeated so often for the guard, each time without one fold."""
-
 ROUNDS = 2
 """It is linearised and its weights are made robust so often."""
 
@@ -405,7 +389,6 @@ def _helps(guard: Mapping[float, Ratio], rules: Rules) -> bool:
 
 PROMISING = 3
 """So many forms are tuned, those whose probes gain most."""
-
 EVALUATIONS = 25
 """So often the windows are replayed to tune one."""
 

@@ -198,10 +198,8 @@ def ends_of(episodes: Sequence[LogEpisode], samples: Sequence[Whole]) -> tuple[F
 
 TICK_HZ = 60.0
 """Effects are simulated at least this often."""
-
 HELD_S = 0.2
 """A pose that repeats exactly for up to so long is an older one shown again."""
-
 GAP_S = 1.0
 """Over longer gaps in the measured poses no motion is compared."""
 
@@ -359,7 +357,6 @@ def gather(log: Log, robot: Robot, episodes: Sequence[LogEpisode]) -> Drives:
 
 BEGINNING_S = 0.15
 """The first instants of a drive: long enough to see its speed, too short for a robot at rest to reach it."""
-
 IN_MOTION, STEADY = 0.15, 0.75
 """A drive begins in motion if its wheels go faster than this share of full speed, and than this share of later on."""
 

@@ -47,13 +47,10 @@ from proxytune.diagnosis.motion.screening import candidates, motion_effects, pro
 
 FITTED_S = 2.0
 """Windows that models with and without an effect are fitted to, the longest that drives have up to this."""
-
 DRAWS = 10
 """How often the drives are replayed with a random effect drawn."""
-
 LARGEST_SHARE = 0.95
 """A random effect is said to make up no more of the error than this share, even if its draws stray further."""
-
 EffectSize = Mapping[float, Ratio]
 """The error without an effect by the error with it, by horizon [s]."""
 
@@ -200,7 +197,6 @@ GAINS: Mapping[str, Mapping[str, Coordinate]] = {
     "ackermann": {"driven": ("wheel_gain",), "steered": ("steering_gain",)},
 }
 """What tells robots apart, by how they drive."""
-
 AT_ONCE = 100_000
 """About so many increments are looked at together: what is computed of each takes a kilobyte."""
 

@@ -25,7 +25,6 @@ from proxytune.space import Theta
 
 REFITTED = 6
 """The number of effects that are fitted in full, the most promising first."""
-
 WORTH_FITTING = 0.1
 """Candidates that promise less than this share of the best one are not fitted."""
 

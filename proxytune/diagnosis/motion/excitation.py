@@ -36,35 +36,25 @@ from proxytune.space import Theta
 
 REPEATS = 10
 """A drive is repeated so often to tell noise; and at most to tell rivals."""
-
 FEWEST = 3
 """A drive is repeated at least so often: some of the drives are kept aside."""
-
 ROUNDS = 2
 """A rival is fitted again so often to what was designed against it."""
-
 GENERATIONS = 10
 """Generations of each round."""
-
 KEPT, MADE = 12, 24
 """Sequences that live on, and that each generation makes of them."""
-
 MOST_HZ = 30.0
 """Designed commands, and the poses measured of them, come no oftener."""
-
 SIMPLER = 1.25
 """A manoeuvre of the library is taken if what was designed is not worth so many times as much."""
-
 CLEAR_NATS = 15.0
 """A drive is to be repeated until this is expected for an effect against its rival: with this expectation the evidence
 is above `rival_nats` 98 times in 100, its standard deviation being √(2 · 15)."""
-
 BODY_M = 0.1
 """The path keeps so far from the room's edge, for the robot has a body."""
-
 LEAST_ROOM_M = 0.6
 """A robot has at least so much floor, however little of it a log shows."""
-
 SCALES = (1.0, 0.5, 0.25)
 """The library's manoeuvres begin the search at these sizes, straight on and mirrored."""
 

@@ -41,13 +41,10 @@ from proxytune.space import Theta
 
 ROUNDS = 3
 """Parameters and noise are fitted in turn so often."""
-
 STEP = 1e-3
 """Finite differences step by this fraction of a coordinate's range."""
-
 KEPT_SOLVABLE = 1e-6
 """Added to the Hessian of the loss, so that a coordinate without a slope does no harm."""
-
 SCANS = (np.geomspace(0.5, 1.8, 25), np.geomspace(0.95, 1.05, 15), np.geomspace(0.99, 1.01, 11))
 """Where a scan looks in each round, as multiples of the value it starts from."""
 
@@ -200,7 +197,6 @@ def derivatives_by_block(fitted: Fit, columns: Floats) -> tuple[Floats, Floats]:
 
 LOOKS = (np.geomspace(0.6, 1.6, 31), np.geomspace(0.97, 1.03, 31))
 """Where a coordinate that changes the motion by steps is looked at, as multiples of its value."""
-
 LEAST = 0.003
 """Half of such an interval is no less than this share of the value."""
 
@@ -246,10 +242,8 @@ def sandwich_intervals(
 LEAST_TRAVEL_M = 0.05
 LEAST_TURN_RAD = 0.2
 """A robot that got no further than both from where it was most of the time has shown nothing but noise."""
-
 MOST_TIMES = 6.0
 """A robot that drove so many times as far as it was told, or as much less, is in other units."""
-
 MOST_ASKEW_DEG = 60.0
 """A robot that drives further than this from its heading has another zero of the heading."""
 

@@ -37,23 +37,17 @@ from proxytune.space import Theta
 
 BAND = 6
 """Rows of a lower banded matrix with two blocks of three side by side."""
-
 TURN_WEIGHT = 0.1
 """A radian turned adds as much noise as this many metres driven."""
-
 JITTER = np.array((1e-5, 1e-5, 1e-5)) ** 2
 """Smallest variance of an increment [m², m², rad²]: keeps noise-free logs solvable."""
-
 THINNED = 2400
 RUN = 12
 """Noise is fitted to about so many increments, in runs of so many: more hardly sharpen five values, and cost most."""
-
 SMALLEST, LARGEST = 1e-6, 3.0
 """Noise lies between these, each value in its own unit."""
-
 STEP = 1e-4
 """Finite differences step by this in the logarithm of a value of the noise."""
-
 HUBER = 3.0
 """Innovations beyond so many standard deviations count linearly."""
 

@@ -20,21 +20,16 @@ from proxytune.logs import Log
 
 SPAN_S = 0.2
 """Speeds are means over so long: pose noise is averaged out, and 0.05 s of latency is still clear."""
-
 MOST_SPANS = 8000
 """Of longer logs as many speeds are taken, evenly spread."""
-
 LONGEST_TIME_CONSTANT_S = 1.0
 TIME_CONSTANTS_S = (0.06, 0.25)
 """The longest motor lag that is reckoned with, and those of a first look."""
-
 STEP_S = 0.05
 """Latencies are tried in such steps; the best lies between them, at the vertex of a parabola."""
-
 ROUGH_STEP_S = 0.1
 THINNED = 2
 """The step of the first look, which one span in so many is enough for."""
-
 AT_ONCE = 300_000
 """About so many ticks go through the lag together: memory is not to grow with the number of drives."""
 
@@ -243,26 +238,20 @@ def sum_in_blocks(seconds: float, drives: Drives, speeds: Speeds, values: Floats
 
 LATENCY_BLOCK_S = 2.0
 """Squares are summed over such blocks, whose scatter says how sure a latency is."""
-
 LEAST_APART_S = 0.04
 """Clocks less far apart are one."""
-
 SIDE = 4
 """A stretch between two jumps has at least so many blocks, and a drive of its own clock twice as many."""
-
 SURE, SURE_OF_A_JUMP = 5.0, 8.0
 """Standard deviations; a jump is looked for at every time, so more of them."""
-
 SURE_BESIDE_OTHERS, SHARE_BESIDE_OTHERS = 5.5, 0.15
 """The same where one side of the jump answers as the other drives do; NEAR_S apart, or two deviations, is the same."""
-
 NEAR_S = 0.02
 
 SHARE, SHARE_IF_FAR = 0.08, 0.7
 FAR_S = 1.0
 """The least share of what is left over that another clock takes away, and that one further off than FAR_S does. Drives
 in which a robot sticks or has play answer later than others, but another latency explains little of that."""
-
 MOST_JUMPS = 4
 
 

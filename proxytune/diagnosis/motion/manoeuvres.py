@@ -65,7 +65,6 @@ LIBRARY: tuple[tuple[str, str, Callable[[Floats], Floats]], ...] = (
 
 BEND = 2.0
 """How far a car steers [full lock] where its wheels would differ by half of full speed."""
-
 ROLLING = 0.4
 """Throttle of a car in manoeuvres that turn on the spot, which it cannot."""
 

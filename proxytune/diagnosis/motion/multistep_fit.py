@@ -42,16 +42,12 @@ from proxytune.space import Theta
 
 HORIZONS_S = (1.0, 2.0, 5.0)
 """Horizons at which errors are compared."""
-
 FITTED_S = (5.0, 2.0)
 """Windows of these lengths are fitted to."""
-
 FOLDS = 4
 """Blocks are dealt out to so many folds; each is predicted by what was fitted to the others."""
-
 ROBUST = 1.5
 """Misses beyond so many times the median count linearly."""
-
 MOST_WINDOWS = 400
 MOST_TRIALS = 20
 """A fit takes no more windows, and looks no more often: it stays within seconds on long logs."""
@@ -191,13 +187,10 @@ def fit_multistep(fitted: Fit) -> tuple[Fit, MultistepFit | None]:
 
 LAGS = (1, 2, 3, 4, 6)
 """Third differences are taken over so many samples."""
-
 NOISE_WEIGHT, WALK_WEIGHT = 20.0, 6.0
 """What third differences make of white noise and of a walk: 1² + 3² + 3² + 1², and of its steps 1² + 2² + 1²."""
-
 CUT = 9.0
 """Squares beyond so many times the median are cut: motion that a model misses for a moment is not noise."""
-
 FEWEST = 20
 """With fewer third differences a lag says nothing."""
 

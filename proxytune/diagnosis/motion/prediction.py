@@ -42,8 +42,6 @@ from proxytune.space import Theta
 
 SHORTEST = 0.9
 """Windows that cover less of the horizon are left out: poses seldom end exactly at it, but a stub is no window."""
-
-
 AT_ONCE = 300_000
 """About so many ticks of episodes are replayed together: memory is not to grow with the number of drives."""
 
@@ -350,10 +348,8 @@ def agreement(table: pd.DataFrame, log: Log, horizon_s: float) -> Agreement:
 
 FITTED_S = 2.0
 """What is learnt is fitted to windows of this length [s]."""
-
 POSES = 8
 """No more poses are compared in a window."""
-
 MOST_WINDOWS = 600
 """No more windows are fitted, spread evenly over the drives."""
 
@@ -427,10 +423,8 @@ def _pose_slopes(
 
 FEWEST = 20
 """Of fewer windows that were driven several times nothing is said."""
-
 ALIKE = 1e-6
 """Commands that differ by less than this [duty] are the same."""
-
 ALIKE_AT_START = 0.1
 """Drives that begin in motion repeat each other if they begin about so equally fast [duty]."""
 

@@ -33,10 +33,8 @@ from proxytune.effects import Draws, Lateness
 
 MEMORY_S = 2.5
 """A command moves nothing any more after so long."""
-
 GRID = 25
 """Sizes that are tried at first, evenly in their logarithm."""
-
 SHIFTS = 99
 """How often the null distribution is drawn."""
 
@@ -179,16 +177,12 @@ def _respond_to_phase(fitted: Fit, lost: Whole, heard: Floats) -> tuple[Floats, 
 
 SMALLEST, LARGEST, SIZES = 0.6, 3.0, 8
 """Simulated sizes lie between these multiples of the likeliest one."""
-
 DRAWS = 5
 """Drives are simulated so often for each size."""
-
 QUIETEST = 0.1
 """Noise has at least this share of the innovations' variance."""
-
 STEPS = 3
 """Newton steps of the free parameters: a lost command is an outlier, which a robust fit hardly follows."""
-
 WIDE = 2.2
 """Half an interval is so many standard deviations between simulated drives: 95 % for some thirty of them."""
 

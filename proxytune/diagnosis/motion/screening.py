@@ -104,17 +104,13 @@ def _candidate(effect: str, kind: type[Effect], form: Form, known: Mapping[str, 
 
 SIZES = 240
 """So many sizes of a step are tried: the loss over a step of the command is a spike 2 % wide."""
-
 SMALLEST_SHARE = 0.02
 """The smallest of them, as a share of the largest."""
-
 PART_S, STRETCH_S, WARM_UP_S = 60.0, 8.0, 2.0
 """They are tried on so much driving, in stretches of this length; the warm-up of each is not compared."""
-
 CELL_M = 0.3
 RADII_M = (0.4, 1.0)
 """Places lie so far apart, and patches of these radii are tried round each."""
-
 MOST_PLACES = 40
 
 LARGEST_STEP = 1.5
@@ -195,10 +191,8 @@ def cut_part(drives: Drives) -> Drives:
 
 FLIPS = 499
 """How often the null distribution is drawn."""
-
 FLIP_S = 1.0
 """Innovations keep their sign together for so long: longer than their correlation."""
-
 FURTHEST = 2.0
 """A step may go so many times as far as its probe."""
 

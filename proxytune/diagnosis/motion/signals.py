@@ -42,12 +42,9 @@ from proxytune.space import Theta
 
 KNOTS = 6
 """Corners of a curve over a signal."""
-
 PATCH_M = 0.3
 MOST_PATCHES = 14
 """Over a position, corners lie this far apart [m], but there are no more than so many."""
-
-
 _Signal = tuple[Cue, Floats, str, Floats]
 """A signal (E, T), its unit, and the motion that depends on it, per basis function (E, T, 3, columns)."""
 
@@ -260,7 +257,6 @@ def _direction(motion: _Motion) -> _Signal:
 
 RIDGES = (1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0)
 """Pulls towards no curve at all that are tried, as fractions of what a basis function's weight is held by."""
-
 REFITTED = 3
 """How many groups are fitted again."""
 

@@ -20,13 +20,10 @@ PIPES = ("/dev/stdin", "/dev/fd/", "/proc/self/fd/")
 """Where a shell puts what another command prints."""
 MOST_DOTS = 100
 """In one key: the time to read a dotted key grows with the square of its parts."""
-
 GEOMETRY: Mapping[str, str] = MappingProxyType(
     {"wheel_radius_m": "wheel_radius", "baseline_m": "effective_baseline", "full_speed_m_s": "full_speed"}
 )
 """Keys of log.toml and model.toml for a robot's figures, and what its robot.toml calls these."""
-
-
 SIZES: Mapping[str, tuple[float, float, str]] = {
     "wheel_radius": (0.002, 1.5, "m"),
     "effective_baseline": (0.01, 6.0, "m"),

@@ -19,14 +19,11 @@ from proxytune.errors import InputError
 
 LARGEST = "PROXYTUNE_LARGEST_MB"
 """The environment variable that raises the limits [MB]."""
-
 ARRAYS_MB = 1000
 """All arrays of a file together, or all pictures of a log as they are kept: what reads them takes two or three times
 as much memory."""
-
 BAG_MB = 1000
 """What a bag unpacks to, or a hundred times its own size: no recording of a robot is denser."""
-
 PICTURE_MB = 200
 """One picture of red, green and blue: 66 megapixels."""
 

@@ -22,12 +22,6 @@ class ChosenTheta(NamedTuple):
 def choose_theta(text: str | None, settings: StudySettings, family: DomainFamily, option: str) -> ChosenTheta:
     """θ as an option has it; without one the study's best, or the nominal one as long as no trial is finished.
 
-    Args:
-        text: What was given, if anything.
-        settings: Of the study.
-        family: The proxy's.
-        option: Its name, for complaints.
-
     Raises:
         InputError: If the text is no θ, the model is of another robot, or the study has no best θ.
     """

@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure
 
-from proxytune.api.theta import read_theta
+from proxytune.api.driving import read_theta
 from proxytune.errors import InputError
 from proxytune.report import (
     Shown,

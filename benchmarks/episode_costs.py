@@ -15,16 +15,16 @@ from proxytune.driving import (
     AGENTS,
     TICK_HZ,
     BulletPlant,
-    cameras as ground_plane,
+    cameras,
     drivetrain,
     lane_following,
     load_agent,
+    loops,
+    perception,
     read_robot,
-    texels as plain,
 )
 from proxytune.driving.cameras import Views
 from proxytune.driving.plants import PlanarPlant, integrate
-from proxytune.driving.texels import by_numba
 from proxytune.effects import FilterContext, effects_from
 from proxytune.settings import Section
 
@@ -44,9 +44,10 @@ def family(folder: Path, plant: str):
 
 
 def use(monkeypatch, by):
-    """Let texels be looked up by Numba or by NumPy."""
-    way = by_numba() if by == "numba" else plain
-    monkeypatch.setattr(ground_plane, "fastest", lambda pictures: way)
+    """Let the inner loops be done by Numba or by NumPy."""
+    way = loops.by_numba() if by == "numba" else loops
+    for module in (cameras, perception):
+        monkeypatch.setattr(module, "fastest", lambda pictures: way)
 
 
 ROUNDS, EPISODES = 5, 3
@@ -137,7 +138,7 @@ def test_pictures(benchmark, driven, monkeypatch, by):
         views = Views(instance.camera, instance.image, (setting,))
         for poses in steps:
             views.pass_by(poses[None], (0,))
-            views.pictures((0,))
+            views.planes((0,))
 
     benchmark(see)
 

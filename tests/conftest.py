@@ -9,6 +9,7 @@ from importlib.util import find_spec
 from io import BytesIO
 from pathlib import Path
 
+import hypothesis
 import pytest
 from PIL import Image
 
@@ -21,6 +22,9 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.pop("TERM", None)
 # A run in the background ignores Ctrl-C; tests mean it to be heeded, as in a terminal.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+# The same examples in every run, however long they take.
+hypothesis.settings.register_profile("fixed", derandomize=True, deadline=None)
+hypothesis.settings.load_profile("fixed")
 
 FUZZ = 500
 """How many files of each kind are spoilt in tests/fuzzing, if nobody says otherwise."""

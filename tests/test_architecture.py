@@ -10,7 +10,7 @@ from floors import floor
 PACKAGE = Path(__file__).resolve().parent.parent / "proxytune"
 ROOMS = {
     "pybullet": {"driving/bullet.py"},
-    "numba": {"driving/compiled_texels.py"},
+    "numba": {"driving/compiled.py"},
     "skopt": {"search"},
     "optuna": {"search"},
     "gymnasium": {"environments"},
@@ -61,7 +61,6 @@ SHORT = {
     "arrays",  # types, and one setting of NumPy
     "driving/agent",  # a protocol
     "learning/learner",  # a protocol
-    "driving/texels",  # a protocol, and which of two ways is taken
 }
 """Modules below 60 lines: protocols and types; doors (`__init__`) and commands, one module each, go without saying."""
 

@@ -47,7 +47,7 @@ def test_what_is_run_changes_the_meaning(tmp_path, what):
     assert meaning(tmp_path, a__py=OTHER[what]) != meaning(tmp_path, a__py=PLAIN)
 
 
-@settings(max_examples=50, derandomize=True, deadline=None)
+@settings(max_examples=50)
 @given(st.integers() | st.floats(allow_nan=False) | st.text() | st.booleans() | st.none() | st.binary())
 def test_brackets_around_a_constant_mean_nothing_and_a_list_of_it_something_else(tmp_path_factory, value):
     folder = tmp_path_factory.mktemp("constants")

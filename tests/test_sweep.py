@@ -391,7 +391,7 @@ def test_the_line_says_where_it_is_lowest_and_what_each_side_does():
     assert "not worse beyond noise: 0, 2" in describe_shape(series([1.0, 5.0, 1.0]), None)
 
 
-@settings(derandomize=True, max_examples=50)
+@settings(max_examples=50)
 @given(st.lists(st.floats(-5, 5), min_size=3, max_size=9), st.data())
 def test_the_mirror_image_of_a_curve_has_mirrored_sides(scores, data):
     held = data.draw(st.integers(0, len(scores) - 1))

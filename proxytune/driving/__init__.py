@@ -4,8 +4,8 @@ robot             robots as their robot.toml describes them
 plants, bullet    what moves: the drivetrain, kinematics on a plane, and the URDF in PyBullet
 road, lane, maps  a map's road, its lanes as geometry, and maps from their files
 road_picture      the floor as a picture, and where its markings lie
-optics, cameras, texels, compiled_texels
-                  where pixels look, and pictures of the floor while the robot drives
+optics, cameras   where pixels look, and pictures of the floor while the robot drives
+loops, compiled   the two inner loops, of pixels and of lanes, by NumPy and by Numba
 agent, agents     what an agent is, and those that come with the package
 perception        what these make out in pictures, of many robots at once
 expert            the expert that learners imitate, and drivers that replay or do as they learnt

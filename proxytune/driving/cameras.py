@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from proxytune.driving.optics import SKY, CameraFigures, Renderer, floor_hits, ground_points
+from proxytune.driving.loops import TexelTable, fastest
+from proxytune.driving.optics import SKY, CameraFigures, Renderer, floor_hits, ground_points, joined, parted
 from proxytune.driving.road_picture import Floor
-from proxytune.driving.texels import AT_ONCE, TexelTable, fastest
 from proxytune.effects import Chain, FilterContext, Signal
 
 
@@ -34,50 +34,45 @@ class GroundPlaneCamera:
         """Find for every pixel its point on the floor and its copy of the floor's picture."""
         self._sky, table = _tabulate(figures, floor)
         self._tables = {self._sky: table}
-        self._sky_levels = np.array(SKY * (figures.rows * figures.columns), dtype=np.uint8)
+        self._sky_levels = np.array(SKY, dtype=np.uint8)[:, None]
         self._origin = np.float32(floor.origin)
         self.shape = (figures.rows, figures.columns, 3)
 
     def render(self, poses: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
         """Render what it sees from poses (n, 3) of x [m], y [m], heading [rad]: (n, rows, columns, 3) RGB."""
-        pictures = np.empty((len(poses), *self.shape), dtype=np.uint8)
-        for first in range(0, len(poses), AT_ONCE):
-            here = slice(first, first + AT_ONCE)
-            self.develop(self.glimpse(poses[here])[:, None], _ALONE, pictures[here])
-        return pictures
+        return joined(self.expose(poses[:, None], _ALONE))
 
-    def glimpse(self, poses: NDArray[np.floating[Any]], first: int = 0) -> NDArray[np.uint8]:
-        """The levels (n, levels) that make a picture from poses (n, 3): of pixels from one on, but for the sky's."""
-        first = max(first, self._sky)
-        if first not in self._tables:
-            self._tables[first] = self._tables[self._sky].without(first - self._sky)
-        places = np.empty((len(poses), 6), dtype=np.float32)
-        places[:, 0] = places[:, 3] = np.cos(poses[:, 2])
-        places[:, 1] = sin = np.sin(poses[:, 2])
-        places[:, 2] = -sin
-        places[:, 4:] = poses[:, :2]
-        places[:, 4:] -= self._origin
-        return fastest(len(poses)).look_up(self._tables[first], places).view(np.uint8)
+    def expose(
+        self, poses: NDArray[np.floating[Any]], weights: Signal, first: int = 0, level: Any = np.uint8
+    ) -> NDArray[Any]:
+        """Expose while it moves.
 
-    def develop(self, glimpses: NDArray[np.uint8], weights: Signal, pictures: NDArray[Any]) -> None:
-        """Write weighted means of glimpses (n, times, levels) as pictures (n, rows, columns, 3), rounded if bytes.
+        Args:
+            poses: Of each robot at several times, (n, times, 3).
+            weights: Of those times.
+            first: The first pixel that is looked at; those before may be anything.
+            level: Kind of the levels, 0 to 255; bytes are rounded.
 
-        What they do not show is sky.
+        Returns:
+            Weighted means of what it sees at those times, (n, 3, rows, columns).
         """
-        levels = pictures.reshape(len(pictures), -1)
-        first = levels.shape[1] - glimpses.shape[2] // 4 * 3
-        levels[:, :first] = self._sky_levels[:first]
-        fastest(0).average(glimpses, weights, levels)
+        on_floor = max(first, self._sky)
+        if on_floor not in self._tables:
+            self._tables[on_floor] = self._tables[self._sky].without(on_floor - self._sky)
+        places = np.empty((*poses.shape[:2], 6), dtype=np.float32)
+        places[..., 0] = places[..., 3] = np.cos(poses[..., 2])
+        places[..., 1] = sin = np.sin(poses[..., 2])
+        places[..., 2] = -sin
+        places[..., 4:] = poses[..., :2]
+        places[..., 4:] -= self._origin
+        planes = np.empty((len(poses), 3, self.shape[0] * self.shape[1]), dtype=level)
+        planes[..., first:on_floor] = self._sky_levels
+        places = places.reshape(-1, 6)
+        fastest(len(places)).expose(self._tables[on_floor], places, weights, planes)
+        return planes.reshape(len(poses), 3, *self.shape[:2])
 
 
 _ALONE = np.ones(1, dtype=np.float32)
-
-
-def _develop(glimpses: NDArray[np.uint8], weights: Signal, pictures: NDArray[Any]) -> None:
-    """Do the same for glimpses that are pictures themselves, (n, times, rows, columns, 3)."""
-    for glimpse, picture in zip(glimpses, pictures, strict=True):
-        mean = weights @ glimpse.reshape(len(weights), -1).astype(np.float32)
-        picture[...] = (np.rint(mean) if pictures.dtype == np.uint8 else mean).reshape(picture.shape)
 
 
 def _tabulate(figures: CameraFigures, floor: Floor) -> tuple[int, TexelTable]:
@@ -154,49 +149,59 @@ def _ticks(context: FilterContext) -> int:
     return round(context.rate_hz / context.nominal["camera_rate"])
 
 
-class _Averaged:
+class _Exposed:
     """Film on which a picture is a weighted mean of what the camera saw at the last ticks, which is all that blur does.
 
     Attributes:
         partial: Whether it can show parts, and the same picture again.
     """
 
-    def __init__(self, camera: Renderer, weights: Signal, contexts: Sequence[FilterContext], level: Any) -> None:
-        self._glimpse = getattr(camera, "glimpse", lambda poses, first: camera.render(poses))
-        self._develop = getattr(camera, "develop", _develop)
-        self.partial = len(weights) <= _ticks(contexts[0])
-        self._shape = getattr(camera, "shape", None) or camera.render(contexts[0].rest[None]).shape[1:]
-        self._weights, self._level = weights, level
+    partial = True
+
+    def __init__(
+        self, camera: GroundPlaneCamera, weights: Signal, contexts: Sequence[FilterContext], level: Any
+    ) -> None:
+        self._camera, self._weights, self._level = camera, weights, level
         self._poses = np.repeat(np.stack([context.rest for context in contexts])[:, None], len(weights), axis=1)
-        self._glimpses: dict[int, NDArray[np.uint8]] = {}
-        self._new = len(weights)
 
     def see(self, poses: Signal) -> None:
         """Let in the poses (robots, ticks, 3) since the picture before; the last are kept, as many as are averaged."""
-        self._new = min(self._new + poses.shape[1], len(self._weights))
         if poses.shape[1] < len(self._weights):
             poses = np.concatenate((self._poses, poses), axis=1)
         self._poses = poses[:, -len(self._weights) :]
 
     def expose(self, robots: Sequence[int], first: int) -> NDArray[Any]:
-        """The newest pictures (n, rows, columns, 3) of the robots left, right from the first pixel on, not rounded.
+        """The newest pictures (n, 3, rows, columns) of robots, right from the first pixel on."""
+        return self._camera.expose(self._poses[list(robots)], self._weights, first, self._level)
 
-        What is known from the pictures before is not looked up.
-        """
-        new, kept, pixel = self._new, self._glimpses, first
-        pictures, self._glimpses = np.empty((len(robots), *self._shape), dtype=self._level), {}
-        if not self.partial:
-            self._new = 0
-        for first in range(0, len(robots), AT_ONCE):
-            here = list(robots[first : first + AT_ONCE])
-            seen = self._glimpse(self._poses[here, -new:].reshape(-1, 3), pixel)
-            seen = seen.reshape(len(here), new, *seen.shape[1:])
+
+class _Averaged:
+    """The same of a camera that can only render, which it does once for each pose."""
+
+    partial = False
+
+    def __init__(self, camera: Renderer, weights: Signal, contexts: Sequence[FilterContext], level: Any) -> None:
+        self._camera, self._weights, self._level = camera, weights, level
+        self._poses = np.repeat(np.stack([context.rest for context in contexts])[:, None], len(weights), axis=1)
+        self._rendered: dict[int, NDArray[np.uint8]] = {}
+        self._new = len(weights)
+
+    def see(self, poses: Signal) -> None:
+        """Let in the poses (robots, ticks, 3) since the picture before; the last are kept, as many as are averaged."""
+        self._new = min(self._new + poses.shape[1], len(self._weights))
+        self._poses = np.concatenate((self._poses, poses), axis=1)[:, -len(self._weights) :]
+
+    def expose(self, robots: Sequence[int], first: int) -> NDArray[Any]:
+        """The newest pictures (n, 3, rows, columns) of robots."""
+        new, self._new, exposed = self._new, 0, []
+        for robot in robots:
+            rendered = self._camera.render(self._poses[robot, len(self._weights) - new :])
             if new < len(self._weights):
-                seen = np.concatenate((np.stack([kept[robot][new:] for robot in here]), seen), axis=1)
-            if not self.partial:
-                self._glimpses.update(zip(here, seen, strict=True))
-            self._develop(seen, self._weights, pictures[first : first + AT_ONCE])
-        return pictures
+                rendered = np.concatenate((self._rendered[robot][new:], rendered))
+            self._rendered[robot] = rendered
+            mean = np.tensordot(self._weights, rendered.astype(np.float32), 1)
+            exposed.append(np.rint(mean).astype(np.uint8) if self._level == np.uint8 else mean)
+        return parted(np.stack(exposed))
 
 
 class _Mixed:
@@ -214,7 +219,7 @@ class _Mixed:
         self._waiting.append(poses)
 
     def expose(self, robots: Sequence[int], first: int) -> NDArray[Any]:
-        """The last of all pictures since."""
+        """The last of all pictures (n, 3, rows, columns) since."""
         mixed: list[Signal] = []
         for poses in self._waiting:
             pictures = self._camera.render(poses[list(robots)].reshape(-1, 3))
@@ -223,7 +228,7 @@ class _Mixed:
                 made, self._memories[robot] = self._effects.apply(signal, self._memories[robot])
                 mixed.append(made[-1].reshape(pictures.shape[1:]))
         self._waiting = []
-        return np.stack(mixed)
+        return parted(np.stack(mixed))
 
 
 class Views:
@@ -244,9 +249,13 @@ class Views:
         mixing, self._alone = image.parted()
         weights = mixing.mean_weights(contexts[0].rate_hz)
         level = np.float32 if self._alone.effects else np.uint8
-        self._film: _Mixed | _Averaged = (
-            _Mixed(camera, mixing, developed) if weights is None else _Averaged(camera, weights, contexts, level)
-        )
+        self._film: _Mixed | _Exposed | _Averaged
+        if weights is None:
+            self._film = _Mixed(camera, mixing, developed)
+        elif isinstance(camera, GroundPlaneCamera):
+            self._film = _Exposed(camera, weights, contexts, level)
+        else:
+            self._film = _Averaged(camera, weights, contexts, level)
         self._memories = [self._alone.begin(one) for one in developed]
         self._every = _ticks(contexts[0])
         self._under_way = list(range(len(contexts)))
@@ -269,8 +278,8 @@ class Views:
         while self._waiting.shape[1] >= self._every:
             self._let_in(self._every)
 
-    def pictures(self, robots: Sequence[int], first: int = 0) -> NDArray[np.uint8]:
-        """The newest pictures (n, rows, columns, 3) of some robots under way, right from the first pixel on."""
+    def planes(self, robots: Sequence[int], first: int = 0) -> NDArray[np.uint8]:
+        """The newest pictures (n, 3, rows, columns) of some robots under way, right from the first pixel on."""
         if self._shown is None or first < self._first:
             # From then on: whoever looks at this part of a picture looks at that of the next
             self._first = min(self._first, first)
@@ -289,12 +298,13 @@ class Views:
     def _draw(self) -> NDArray[np.uint8]:
         shown = self._film.expose(self._under_way, self._first)
         if self._alone.effects:
-            signals, developed = shown.reshape(len(shown), 1, -1).astype(np.float32), []
+            pictures, developed = joined(shown), []
+            signals = pictures.reshape(len(shown), 1, -1).astype(np.float32)
             for robot, signal in zip(self._under_way, signals, strict=True):
                 memory = self._alone.skip(self._memories[robot], self._unseen - 1)
                 made, self._memories[robot] = self._alone.apply(signal, memory)
-                developed.append(made.reshape(shown.shape[1:]))
-            shown = np.stack(developed)
+                developed.append(made.reshape(pictures.shape[1:]))
+            shown = parted(np.stack(developed))
         self._unseen = 0
         if shown.dtype != np.uint8:
             shown = np.minimum(np.maximum(np.rint(shown), 0), 255).astype(np.uint8)

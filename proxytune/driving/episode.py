@@ -8,18 +8,19 @@ way is in neither lane. `driving_score` is that of the paper's learning experime
 
 import functools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from proxytune.arrays import Floats
 from proxytune.driving.agent import Command, Picture
 from proxytune.driving.agents import Deciding, act_together
 from proxytune.driving.lane import lane_length, lane_pose
-from proxytune.driving.optics import Renderer
+from proxytune.driving.optics import Renderer, joined
 from proxytune.driving.perception import Seen, rows_of
 from proxytune.driving.plants import Drivetrain
 from proxytune.driving.road import Road
@@ -169,20 +170,27 @@ class Shown:
     """What drivers are shown: kept while the pictures are the newest.
 
     Attributes:
-        draw: Draws the pictures; or what `sees` makes of them.
+        alone: Gives what the drivers of some numbers see, who are asked one by one.
         groups: Numbers of drivers that are asked at once, and how: by what they look at, or by their own `act_many`.
     """
 
-    def __init__(self, drivers: Sequence[Driver], draw: Callable[[int], Any], groups: Sequence[list[int]]) -> None:
+    def __init__(
+        self,
+        drivers: Sequence[Driver],
+        alone: Callable[[list[int]], Iterable[Any]],
+        draw: Callable[[int], NDArray[np.uint8]],
+        groups: Sequence[list[int]],
+    ) -> None:
         """Show each group its part."""
-        self.draw = draw
+        self.alone = alone
         self.groups: list[tuple[list[int], Callable[[list[Any]], Any]]] = []
         for numbers in groups:
             of_group: list[Any] = [drivers[number] for number in numbers]
             if _looks(of_group[0]):
                 self.groups.append((numbers, functools.partial(act_together, of_group, Seen(draw, rows_of(numbers)))))
             else:
-                self.groups.append((numbers, functools.partial(of_group[0].act_many, draw(0)[rows_of(numbers)])))
+                pictures = joined(draw(0)[rows_of(numbers)])
+                self.groups.append((numbers, functools.partial(of_group[0].act_many, pictures)))
 
 
 def _looks(driver: Any) -> bool:
@@ -199,18 +207,17 @@ def ask_many(
         Commands (drivers, 2), memories for the ones after, and by its number why a driver failed, with the time [s].
     """
     commands, after, failed = np.zeros((len(drivers), 2)), list(memories), {}
-    alone = dict.fromkeys(range(len(drivers)))
+    alone = set(range(len(drivers)))
     for numbers, act in shown.groups:
         together = _ask_together(act, [memories[number] for number in numbers])
         if together is not None:
             commands[numbers], kept = together
+            alone.difference_update(numbers)
             for number, memory in zip(numbers, kept, strict=True):
                 after[number] = memory
-                del alone[number]
-    seen = shown.draw(0) if alone else ()
-    for number in alone:
+    for number, seen in zip(sorted(alone), shown.alone(sorted(alone)) if alone else (), strict=True):
         try:
-            commands[number], after[number] = ask(drivers[number], seen[number], memories[number], time_s)
+            commands[number], after[number] = ask(drivers[number], seen, memories[number], time_s)
         except EpisodeError as problem:
             failed[number] = problem
     return commands, after, failed

@@ -32,6 +32,7 @@ from proxytune.driving.episode import (
     picture_only,
 )
 from proxytune.driving.expert import Pupil
+from proxytune.driving.optics import joined
 from proxytune.driving.plants import Drivetrain, PlanarFleet, PlanarPlant, Plant
 from proxytune.driving.robot import Robot
 from proxytune.effects import DRIVES, Chain, Effect, FilterContext, Learnt, Memory, Signal, Stage, Trace
@@ -207,15 +208,19 @@ class Rollouts:
         self.poses: Signal = np.stack([course.start[None] for course in courses])
         self.crashed: Sequence[bool] = [False] * len(courses)
 
-    def pictures(self, first: int = 0) -> NDArray[np.uint8]:
-        """The newest pictures (robots under way, rows, columns, 3), right from the first pixel that is looked at on."""
-        shown = [band.views.pictures(band.here, first) for band in self._bands if band.views]
+    def planes(self, first: int = 0) -> NDArray[np.uint8]:
+        """The newest pictures (robots under way, 3, rows, columns), right from the first pixel that is looked at on."""
+        shown = [band.views.planes(band.here, first) for band in self._bands if band.views]
         if len(shown) == 1:
             return shown[0]
-        pictures = np.empty((len(self.under_way), *shown[0].shape[1:]), dtype=np.uint8)
+        planes = np.empty((len(self.under_way), *shown[0].shape[1:]), dtype=np.uint8)
         for band, own in zip(self._bands, shown, strict=True):
-            pictures[band.rows] = own
-        return pictures
+            planes[band.rows] = own
+        return planes
+
+    def pictures(self, rows: Any = slice(None)) -> NDArray[np.uint8]:
+        """The newest pictures (n, rows, columns, 3) of these rows of the robots under way."""
+        return joined(self.planes()[rows])
 
     @property
     def ended(self) -> list[bool]:
@@ -308,9 +313,9 @@ class _Drives:
         if self._sees is not picture_only:
             sights = zip(self.rollouts.pictures(), self.rollouts.poses[:, -1], strict=True)
             seen = [self._sees(*one) for one in sights]
-            self._shown = Shown(self.drivers, lambda first: seen, ())
+            self._shown = Shown(self.drivers, lambda rows: [seen[row] for row in rows], self.rollouts.planes, ())
         elif self._shown is None or self.rollouts.new_pictures:
-            self._shown = Shown(self.drivers, self.rollouts.pictures, self._groups)
+            self._shown = Shown(self.drivers, self.rollouts.pictures, self.rollouts.planes, self._groups)
         self._commands, self._memories, problems = ask_many(self.drivers, self._shown, self._memories, time_s)
         self._fail(problems)
 

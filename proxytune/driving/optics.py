@@ -87,6 +87,19 @@ class Renderer(Protocol):
         ...
 
 
+def parted(pictures: NDArray[Any]) -> NDArray[Any]:
+    """Pictures (n, rows, columns, 3) as planes of red, green and blue, (n, 3, rows, columns), without a copy."""
+    return pictures.transpose(0, 3, 1, 2)
+
+
+def joined(planes: NDArray[Any]) -> NDArray[Any]:
+    """Planes of red, green and blue (n, 3, rows, columns) as pictures (n, rows, columns, 3)."""
+    pictures = np.empty((len(planes), *planes.shape[2:], 3), dtype=planes.dtype)
+    for colour in range(3):  # four times as fast as one copy
+        pictures[..., colour] = planes[:, colour]
+    return pictures
+
+
 def ground_points(figures: CameraFigures) -> NDArray[np.float64]:
     """Points of the floor at which each pixel's middle looks, in the robot's frame.
 

@@ -15,17 +15,9 @@ from numpy.typing import NDArray
 
 from proxytune.arrays import Flags, Floats
 from proxytune.driving.agent import Picture
-from proxytune.driving.optics import CameraFigures, ground_points
+from proxytune.driving.loops import FEWEST, Eyes, fastest
+from proxytune.driving.optics import CameraFigures, ground_points, joined
 from proxytune.driving.robot import Robot
-
-HALF_LANE_M = 0.128
-"""From a lane's centre to the middle of the marking on either side of it [m]."""
-
-FEWEST = 6
-"""So many pixels it takes to see a lane."""
-
-RIDGE = 0.005
-"""For each pixel, it keeps a handful of them at one distance from spinning the line round [m²]."""
 
 
 class Lane(NamedTuple):
@@ -76,25 +68,24 @@ def open_eye(robot: Robot, *, reach_m: float = 0.7) -> Eye:
 
 
 Draw = Callable[[int], NDArray[np.uint8]]
-"""Pictures (n, rows, columns, 3) that are right from the pixel of this number on."""
+"""Draws pictures as planes (n, 3, rows, columns) that are right from the pixel of this number on."""
 
 
 class Seen:
-    """The newest pictures (n, rows, columns, 3) of robots, and what has been made out in them.
+    """The newest pictures of robots, and what has been made out in them.
 
     Whoever asks again before there are new pictures is answered from memory. Only what is looked at is drawn.
-
     """
 
-    def __init__(self, pictures: NDArray[np.uint8] | Draw, rows: Any = slice(None)) -> None:
-        """Look at nothing yet, but later at these rows of the pictures or of what draws them."""
-        self._pictures, self._rows = pictures, rows
+    def __init__(self, planes: NDArray[np.uint8] | Draw, rows: Any = slice(None)) -> None:
+        """Look at nothing yet, but later at these rows of the planes (n, 3, rows, columns) or of what draws them."""
+        self._planes, self._rows = planes, rows
         self._first: float = math.inf
         self._known: dict[tuple[Any, ...], list[Any]] = {}
 
-    def pictures(self, first: int) -> NDArray[np.uint8]:
-        """The pictures, right from the first pixel on."""
-        drawn = self._pictures(first) if callable(self._pictures) else self._pictures
+    def planes(self, first: int) -> NDArray[np.uint8]:
+        """The pictures (n, 3, rows, columns), right from the first pixel on."""
+        drawn = self._planes(first) if callable(self._planes) else self._planes
         return np.asarray(drawn[self._rows])
 
     def answer(self, kind: "Kind", looks: tuple[Any, ...], robots: Sequence[int]) -> list[Any]:
@@ -107,11 +98,10 @@ class Seen:
     def colours(self, first: int, robots: Sequence[int]) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
         """How yellow some robots' pixels are from one of them on, and how bright, (robots, pixels), 0 to 255."""
         if first < self._first:
-            drawn = self.pictures(first)
-            levels = drawn.reshape(len(drawn), -1)[:, 3 * first :]
-            # Compared as they lie, two thirds in vain, then parted: faster than to part red and green first
-            golden = np.minimum(levels[:, :-2], levels[:, 1:-1])[:, ::3].copy()
-            self._bright = np.minimum(golden, levels[:, 2::3])
+            planes = self.planes(first)
+            red, green, blue = planes.reshape(len(planes), 3, -1)[..., first:].swapaxes(0, 1)
+            golden = np.minimum(red, green)
+            self._bright = np.minimum(golden, blue)
             self._yellow = np.subtract(golden, self._bright, out=golden)
             self._first = first
         pixels = rows_of(robots), slice(first - int(self._first), None)
@@ -142,131 +132,32 @@ class Markings(NamedTuple):
     brightness: float = math.inf
 
 
-class _Plan(NamedTuple):
-    """All that looks have in common whatever the pictures show.
-
-    A robot's row is one place that always counts, then its pixels as they may be yellow, and as they may be white.
-
-    Attributes:
-        first: The first pixel that any of them looks at.
-        yellow: More is yellow, (robots, pixels).
-        white: More is white, (robots, pixels).
-        starts: Where each robot's row begins, where in it what is white, and one more place, (2 · robots + 2,).
-        shifts: From there to what is known of its eye, (2 · robots + 1,).
-        left: How far to the left the places of the eyes' rows lie [m].
-        lines: How far ahead they lie, and how far to the left the lane's middle does if they are markings, (2, …) [m].
-    """
-
-    first: int
-    yellow: NDArray[np.uint8]
-    white: NDArray[np.uint8]
-    starts: NDArray[np.intp]
-    shifts: NDArray[np.intp]
-    left: Floats
-    lines: Floats
-
-
 @functools.lru_cache(maxsize=8)
-def _plan(looks: tuple[Markings, ...]) -> _Plan:
-    eyes = list(dict.fromkeys(look.eye for look in looks))
-    first, last = min(eye.first for eye in eyes), eyes[0].first + len(eyes[0].near)
-    pixels = last - first
-    length = 1 + 2 * pixels
-    thresholds = np.full((2, len(looks), pixels), 255, dtype=np.uint8)
-    for robot, look in enumerate(looks):
-        for marking, least in zip(thresholds, (look.contrast, look.brightness), strict=True):
-            marking[robot, look.eye.first - first :][look.eye.near] = math.floor(min(max(least, 0.0), 255.0))
-    known = np.zeros((3, len(eyes), length))
-    for (left, ahead, middle), eye in zip(known.transpose(1, 0, 2), eyes, strict=True):
-        for end, aside in ((1 + pixels, -HALF_LANE_M), (length, HALF_LANE_M)):
-            here = slice(end - len(eye.near), end)
-            left[here], ahead[here], middle[here] = eye.left, eye.ahead, eye.left + aside
-    rows = np.arange(len(looks) + 1) * length
-    own = np.array([*(eyes.index(look.eye) * length for look in looks), 0]) - rows
-    starts = np.stack((rows, rows + 1 + pixels), axis=1).ravel()
-    starts[-1] = rows[-1] + 1
-    sides, lines = known[0].ravel(), known[1:].reshape(2, -1)
-    return _Plan(first, thresholds[0], thresholds[1], starts, own.repeat(2)[:-1], sides, lines)
+def _eyes(looks: tuple[Markings, ...]) -> tuple[int, Eyes]:
+    """The first pixel that any of them looks at, and the eyes that look."""
+    distinct = list(dict.fromkeys(look.eye for look in looks))
+    first, last = min(eye.first for eye in distinct), distinct[0].first + len(distinct[0].near)
+    near, ahead, left = np.zeros((len(distinct), last - first), dtype=bool), *np.zeros((2, len(distinct), last - first))
+    for number, eye in enumerate(distinct):
+        here = number, slice(eye.first - first, None)
+        near[here], ahead[here], left[here] = eye.near, eye.ahead, eye.left
+    levels = np.clip([(look.contrast, look.brightness) for look in looks], 0.0, 255.0).astype(np.uint8).T.copy()
+    return first, Eyes(near, ahead, left, np.array([distinct.index(look.eye) for look in looks]), *levels)
 
 
 def find_lanes(seen: Seen, looks: tuple[Markings, ...], robots: Sequence[int]) -> list[Lane | None]:
-    """Fit a line through the lane's centre, right of the yellow line and left of the white one, by least squares.
-
-    White pixels to the left of the yellow ones belong to the other lane's edge and are left out.
-
-    Returns:
-        The lanes, None where fewer than FEWEST pixels are left to fit.
-    """
-    plan = _plan(looks)
-    yellow, bright = seen.colours(plan.first, robots)
-    count, pixels = yellow.shape
-    if count == 1:
-        return [_find_lane(looks[0].eye, (yellow > plan.yellow)[0].nonzero()[0], (bright > plan.white)[0].nonzero()[0])]
-    hits = np.empty(count * (1 + 2 * pixels) + 1, dtype=bool)
-    rows = hits[:-1].reshape(count, -1)
-    # Sums over pieces begin with their first number, those over arrays with 0: so each row begins with 0
-    rows[:, 0] = hits[-1] = True
-    np.greater(yellow, plan.yellow, out=rows[:, 1 : 1 + pixels])
-    np.greater(bright, plan.white, out=rows[:, 1 + pixels :])
-    found = hits.nonzero()[0]
-    starts = found.searchsorted(plan.starts)
-    sizes = starts[1:] - starts[:-1]
-    known = found + plan.shifts.repeat(sizes)
-    left = plan.left.take(known)
-    totals = np.add.reduceat(left, starts[:-1]).tolist()
-    ends: list[float] = []
-    for total, size in zip(totals[:-1:2], sizes[:-1:2].tolist(), strict=True):
-        ends += math.inf, total / (size - 1) if size > 1 else HALF_LANE_M
-    ends.append(-math.inf)
-    right = left < np.array(ends).repeat(sizes)
-    starts = found[right].searchsorted(plan.starts[::2])
-    lines = plan.lines.take(known[right], axis=1)
-    return _fit(lines, starts[:-1], starts[1:] - starts[:-1])
-
-
-def _find_lane(eye: Eye, yellow: NDArray[np.intp], white: NDArray[np.intp]) -> Lane | None:
-    """The same for one robot: what many share costs one alone more than it saves."""
-    on_line, on_edge = eye.left.take(yellow), eye.left.take(white)
-    right = on_edge < (float(np.add.reduce(on_line)) / len(on_line) if len(on_line) else HALF_LANE_M)
-    ahead = eye.ahead.take(np.concatenate((yellow, white[right])))
-    left = np.concatenate((on_line - HALF_LANE_M, on_edge[right] + HALF_LANE_M))
-    count = len(ahead)
-    if count < FEWEST:
-        return None
-    mean_ahead, mean_left = float(np.add.reduce(ahead)) / count, float(np.add.reduce(left)) / count
-    ahead -= mean_ahead
-    left *= ahead
-    ahead *= ahead
-    slope = float(np.add.reduce(left)) / (float(np.add.reduce(ahead)) + RIDGE * count)
-    return Lane(mean_left - slope * mean_ahead, slope, count)
-
-
-def _fit(lines: Floats, starts: NDArray[np.intp], sizes: NDArray[np.intp]) -> list[Lane | None]:
-    """Lines through places.
-
-    Args:
-        lines: How far ahead they lie and to the left, (2, places); overwritten.
-        starts: Where those of each picture begin; the first of them does not count and is 0.
-        sizes: How many they are.
-    """
-    counts = sizes - 1
-    weights = np.maximum(counts, 1)
-    ahead, left = np.add.reduceat(lines, starts, axis=1) / weights
-    centred = lines[0] - ahead.repeat(sizes)
-    centred[starts] = 0.0
-    lines[0] = centred
-    lines *= centred
-    spread, tilt = np.add.reduceat(lines, starts, axis=1)
-    slope = tilt / (spread + RIDGE * weights)
-    found = zip((left - slope * ahead).tolist(), slope.tolist(), counts.tolist(), strict=True)
-    return [Lane(*line) if line[2] >= FEWEST else None for line in found]
+    """The line through the lane's centre as each robot sees it; None where too few pixels show it."""
+    first, eyes = _eyes(looks)
+    lanes = fastest(0).find_lanes(eyes, *seen.colours(first, robots))
+    return [Lane(offset, slope, int(count)) if count >= FEWEST else None for offset, slope, count in lanes.tolist()]
 
 
 def count_yellow(seen: Seen, looks: tuple[Markings, ...], robots: Sequence[int]) -> list[int]:
     """How many pixels of the dashed centre line there are."""
-    plan = _plan(looks)
-    yellow, _ = seen.colours(plan.first, robots)
-    return [int(np.count_nonzero(one)) for one in yellow > plan.yellow]
+    first, eyes = _eyes(looks)
+    yellow, _ = seen.colours(first, robots)
+    shown = (yellow > eyes.contrast[:, None]) & eyes.near[eyes.eye]
+    return [int(count) for count in np.count_nonzero(shown, axis=1)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -315,7 +206,7 @@ def weigh_edges(seen: Seen, looks: tuple[tuple[Lower, float], ...], robots: Sequ
     """Sums of the pulls of edges in the lower part, where brightness steps by more (of 255), and their numbers."""
     weighed = []
     for robot, (look, step) in zip(robots, looks, strict=True):
-        grey = seen.pictures(look.first)[robot, look.first_row :].astype(np.int16).sum(axis=-1) // 3
+        grey = seen.planes(look.first)[robot, :, look.first_row :].astype(np.int16).sum(axis=0) // 3
         edges = np.abs(np.diff(grey, axis=1)) > step
         weighed.append((float(np.where(edges, look.pull, 0.0).sum()), int(edges.sum())))
     return weighed
@@ -323,5 +214,4 @@ def weigh_edges(seen: Seen, looks: tuple[tuple[Lower, float], ...], robots: Sequ
 
 def take_picture(seen: Seen, looks: tuple[None, ...], robots: Sequence[int]) -> list[Picture]:
     """The pictures themselves."""
-    pictures = seen.pictures(0)
-    return [pictures[robot] for robot in robots]
+    return list(joined(seen.planes(0)[rows_of(robots)]))

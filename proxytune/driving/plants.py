@@ -93,7 +93,7 @@ class Drivetrain:
         Wheels are the speeds of the left and the right one, of a car the speed and the angle of those that steer, all
         as fractions of the full ones.
         """
-        figures, (left, right) = self.robot.figures, np.moveaxis(wheels, -1, 0)
+        figures, left, right = self.robot.figures, wheels[..., 0], wheels[..., 1]
         twists = np.zeros((*left.shape, 3))
         if self.robot.drive == "ackermann":
             twists[..., 0] = left * figures["full_speed"]

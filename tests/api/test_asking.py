@@ -94,7 +94,7 @@ def test_a_failed_simulation_is_kept_and_the_search_goes_on_elsewhere():
     assert box.best() == searched(9).best()
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(low=st.floats(-1e3, 1e3), width=st.floats(1e-3, 1e3), seed=st.integers(0, 2**32 - 1), initial=st.integers(1, 9))
 def test_every_ask_lies_in_the_box(low, width, seed, initial):
     box = SearchBox({"x": (low, low + width)}, seed=seed, initial=initial, engine="random")

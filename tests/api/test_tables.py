@@ -82,7 +82,7 @@ def test_weights_and_seed_are_those_of_the_command(by_command):
     assert found != documented(score(proxy=proxy, target=target, metrics=METRICS))
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(values=st.lists(st.floats(-1e6, 1e6), min_size=4, max_size=8, unique=True))
 def test_no_digit_of_a_score_is_lost_on_the_way(values):
     frame = pd.DataFrame({"agent": [f"a{place}" for place in range(len(values))], "distance": values})

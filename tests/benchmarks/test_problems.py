@@ -200,7 +200,7 @@ SEEDS = st.integers(0, 1000)
 UNITS = st.tuples(*[st.floats(0, 1)] * 4)
 
 
-@settings(derandomize=True, max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(seed=SEEDS, unit=UNITS)
 def test_the_score_is_a_whole_number_within_its_noise_of_the_regret_and_the_same_when_asked_again(seed, unit):
     values = from_unit(ANALYTIC.space, np.array(unit))
@@ -231,7 +231,7 @@ def test_there_are_plateaus_and_blur_is_hardly_seen_while_trim_is():
     assert moved(blur, pitch, delay, trim + 0.2) > moved(blur - 0.2, pitch, delay, trim) > 0.0
 
 
-@settings(derandomize=True, max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 1000), unit=st.tuples(*[st.floats(0, 1)] * 4))
 def test_the_score_is_prpv_of_its_episodes_and_what_is_composed_of_its_outcome(seed, unit):
     values = from_unit(RANKING.space, np.array(unit))
@@ -263,7 +263,7 @@ def test_the_noise_is_drawn_anew_at_every_point_and_seed():
 BOX_POINTS = [design_point(CALIBRATED.space, index, 7) for index in range(64)]
 
 
-@settings(derandomize=True, max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 1000), unit=st.tuples(*[st.floats(0, 1)] * 4))
 def test_the_score_is_what_its_outcome_is_composed_to_and_prpv_of_two_metrics(seed, unit):
     values = from_unit(CALIBRATED.space, np.array(unit))

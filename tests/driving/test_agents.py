@@ -16,6 +16,7 @@ from proxytune.driving.agents import (
     act_together,
     duties,
 )
+from proxytune.driving.optics import parted
 from proxytune.driving.perception import Markings, Seen, find_lanes, open_eye
 from proxytune.errors import ExtensionError
 from proxytune.testing.extension import check_agent
@@ -73,7 +74,7 @@ def test_the_agents_differ_from_each_other():
 )
 def test_the_lane_is_found_where_it_lies(left, turned):
     look = Markings(open_eye(ROBOT, reach_m=0.5), 60.0, 150.0)
-    (lane,) = find_lanes(Seen(seen_from(left, turned)[None]), (look,), (0,))
+    (lane,) = find_lanes(Seen(parted(seen_from(left, turned)[None])), (look,), (0,))
     assert lane is not None
     assert lane.slope == pytest.approx(-np.tan(turned), abs=0.12)
     assert lane.offset == pytest.approx(-left / np.cos(turned), abs=0.025)
@@ -81,7 +82,7 @@ def test_the_lane_is_found_where_it_lies(left, turned):
 
 def test_without_markings_there_is_no_lane():
     look = Markings(open_eye(ROBOT), 60.0, 150.0)
-    assert find_lanes(Seen(np.zeros_like(seen_from())[None]), (look,), (0,)) == [None]
+    assert find_lanes(Seen(parted(np.zeros_like(seen_from())[None])), (look,), (0,)) == [None]
 
 
 MORE = {
@@ -107,7 +108,7 @@ def scenes(seed):
 
 
 @given(st.permutations(list(MORE)), st.integers(1, len(MORE)), st.integers(0, 2**32 - 1))
-@settings(max_examples=20, derandomize=True, deadline=None)
+@settings(max_examples=20)
 def test_who_is_asked_beside_an_agent_does_not_matter_to_a_bit(names, count, seed):
     agents = [MORE[name] for name in names[:count]]
     alone = together = [agent.begin(ROBOT) for agent in agents]
@@ -146,7 +147,7 @@ def lane_by_the_book(picture, look):
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(0.0, 260.0), st.floats(0.0, 260.0), st.sampled_from([0.3, 0.5, 0.9]))
-@settings(max_examples=40, derandomize=True, deadline=None)
+@settings(max_examples=40)
 def test_lanes_of_many_pictures_are_those_of_one_picture_after_another(seed, contrast, brightness, reach):
     pictures = scenes(seed)[0]
     looks = [
@@ -155,12 +156,12 @@ def test_lanes_of_many_pictures_are_those_of_one_picture_after_another(seed, con
     ]
     asked = tuple(looks[robot % 2] for robot in range(len(pictures)))
     expected = [lane_by_the_book(*pair) for pair in zip(pictures, asked, strict=True)]
-    assert find_lanes(Seen(pictures), asked, range(len(pictures))) == expected
+    assert find_lanes(Seen(parted(pictures)), asked, range(len(pictures))) == expected
 
 
 def test_pictures_are_looked_at_once():
     agents, pictures = [AGENTS["wary"], AGENTS["braitenberg"], AGENTS["wary"]], scenes(1)[0][:3]
-    seen, memories = Seen(pictures), [agent.begin(ROBOT) for agent in agents]
+    seen, memories = Seen(parted(pictures)), [agent.begin(ROBOT) for agent in agents]
     once, _ = act_together(agents, seen, memories)
     pictures[:] = 0
     np.testing.assert_array_equal(act_together(agents, seen, memories)[0], once)

@@ -12,7 +12,7 @@ from proxytune.driving import lane_length, lane_point, lane_pose, off_map, shipp
 ROAD = shipped_map("small_loop")
 SIDE, TILE = ROAD.size[0], ROAD.width
 MIDDLE = np.array([SIDE / 2, SIDE / 2])
-quick = settings(derandomize=True, max_examples=50, deadline=None)
+quick = settings(max_examples=50)
 coordinates = st.floats(-0.5, SIDE + 0.5)
 points = st.tuples(coordinates, coordinates)
 headings = st.floats(-10, 10)

@@ -92,7 +92,7 @@ def test_figures_that_no_camera_has_are_refused_in_one_line(name, value):
 
 
 @given(st.floats(3.0, 60.0), st.floats(0.05, 0.2))
-@settings(max_examples=20, derandomize=True)
+@settings(max_examples=20)
 def test_the_middle_of_the_picture_looks_down_at_the_pitch(pitch, height):
     x, y = ground_points(replace(ONE_PIXEL, pitch_deg=pitch, height_m=height))[0, 0]
     assert x == pytest.approx(0.066 + height / math.tan(math.radians(pitch)))
@@ -142,7 +142,7 @@ def test_small_distortion_is_the_plumb_bob_models(k1):
 
 
 @given(st.floats(-0.4, 0.2))
-@settings(max_examples=20, derandomize=True)
+@settings(max_examples=20)
 def test_any_distortion_keeps_the_order_of_pixels(k1):
     points = ground_points(replace(NOMINAL, pitch_deg=90.0, k1=k1))
     assert (np.diff(points[..., 1], axis=1) < 0).all()
@@ -156,7 +156,7 @@ def test_a_lens_further_ahead_sees_the_floor_further_ahead():
 
 
 @given(st.floats(-0.25, 0.25), st.floats(-0.25, 0.25), st.floats(0.7, 1.4), st.floats(-0.4, 0.2))
-@settings(max_examples=25, derandomize=True)
+@settings(max_examples=25)
 def test_the_lens_looks_along_its_axis_through_its_centre_whatever_else_it_does(right, down, aspect, k1):
     """From the picture's middle, its centre is shares of the height to the right and down: 64 × 48 pixels."""
     figures = replace(NOMINAL, centre_right=right, centre_down=down, aspect=aspect, k1=k1)
@@ -166,7 +166,7 @@ def test_the_lens_looks_along_its_axis_through_its_centre_whatever_else_it_does(
 
 
 @given(st.floats(0.7, 1.4))
-@settings(max_examples=20, derandomize=True)
+@settings(max_examples=20)
 def test_things_look_wider_by_the_aspect_and_as_high_as_before(aspect):
     plain, wide = (ground_points(replace(NOMINAL, pitch_deg=90.0, aspect=one)) for one in (1.0, aspect))
     np.testing.assert_allclose(wide[..., 1] * aspect, plain[..., 1], atol=1e-9)
@@ -177,7 +177,7 @@ def test_things_look_wider_by_the_aspect_and_as_high_as_before(aspect):
 
 
 @given(POSES)
-@settings(max_examples=25, derandomize=True, deadline=None)
+@settings(max_examples=25)
 def test_a_pixel_shows_the_place_that_it_looks_at(pose):
     picture = GroundPlaneCamera(NOMINAL, GRADIENT).render(np.array([pose]))[0]
     places = on_map(ground_points(NOMINAL), pose)

@@ -232,7 +232,7 @@ ROADS = [*SHIPPED, plain("hexagon", (1.1, 0.4, 0.0), HEXAGON), plain("uneven", (
 every_road = pytest.mark.parametrize("road", ROADS, ids=lambda road: road.name)
 every_shipped = pytest.mark.parametrize("road", SHIPPED, ids=lambda road: road.name)
 both_lanes = pytest.mark.parametrize("outer", [True, False], ids=("outer", "inner"))
-quick = settings(derandomize=True, max_examples=60, deadline=None)
+quick = settings(max_examples=60)
 coordinates = st.floats(-0.5, 3.5)
 points = st.tuples(coordinates, coordinates)
 ways = st.floats(-12.0, 20.0)

@@ -70,7 +70,7 @@ def tolerance(here):
 
 
 @BOTH
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(seed=SEEDS)
 def test_distances_are_those_that_the_floor_is_painted_with(name, seed):
     road = ROADS[name]
@@ -81,7 +81,7 @@ def test_distances_are_those_that_the_floor_is_painted_with(name, seed):
 
 
 @BOTH
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(seed=SEEDS)
 def test_slopes_are_unit_vectors_that_finite_differences_agree_with(name, seed):
     places = beside(name, seed).places
@@ -99,7 +99,7 @@ def test_slopes_are_unit_vectors_that_finite_differences_agree_with(name, seed):
 
 
 @BOTH
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(seed=SEEDS)
 def test_side_is_the_derivative_by_a_shift_of_the_line_to_the_right(name, seed):
     """A line that moves right by a step is the same as a place that moves left by it; the ends of dashes move on."""
@@ -115,7 +115,7 @@ def test_side_is_the_derivative_by_a_shift_of_the_line_to_the_right(name, seed):
 
 
 @BOTH
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(seed=SEEDS)
 def test_the_left_line_lies_to_the_left_of_a_driver_who_goes_counter_clockwise(name, seed):
     road = beside(name, seed)
@@ -126,7 +126,7 @@ def test_the_left_line_lies_to_the_left_of_a_driver_who_goes_counter_clockwise(n
 
 
 @BOTH
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(seed=SEEDS)
 def test_yellow_is_nearest_to_its_side_or_to_the_end_of_a_dash(name, seed):
     road = beside(name, seed)
@@ -284,7 +284,7 @@ def test_a_corner_tile_has_its_dashes():
     assert whole == pytest.approx(expected, rel=0.03)
 
 
-@settings(max_examples=8, derandomize=True, deadline=None)
+@settings(max_examples=8)
 @given(st.integers(3, 5), st.floats(0.1, 0.3), st.floats(0.2, 1.0))
 def test_any_loop_has_a_margin_of_nothing_around_it(tiles, tile, bend):
     road = square(tiles, tile, bend_radius=bend * tile / 2, white_width=0.02, yellow_width=0.01)

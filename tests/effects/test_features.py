@@ -18,7 +18,7 @@ def test_a_hat_is_one_at_its_own_knot_and_nothing_at_the_others_and_at_rest():
 
 
 @given(value=st.floats(-1e6, 1e6))
-@settings(max_examples=50, derandomize=True, deadline=None)
+@settings(max_examples=50)
 def test_hats_never_add_up_to_more_than_one(value):
     row = hats(np.array([value]), (-2.0, -0.5, 1.0, 4.0))
     assert 0.0 <= row.min() <= row.sum() <= 1.0 + 1e-12
@@ -57,7 +57,7 @@ def test_the_time_is_counted_from_where_a_wheel_stood():
     np.testing.assert_allclose(moved_since(np.ones(2), np.array(0.5), 0.02, RATE_HZ), [0.6, 0.7])
 
 
-@settings(max_examples=50, derandomize=True, deadline=None)
+@settings(max_examples=50)
 @given(speed=st.lists(st.sampled_from((-0.5, 0.0, 0.2, 1.0)), min_size=2, max_size=20), cut=st.integers(1, 19))
 def test_cutting_a_signal_changes_nothing(speed, cut):
     whole = rolled_since(np.array(speed), np.zeros(()), RATE_HZ)

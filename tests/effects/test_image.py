@@ -30,7 +30,7 @@ def grey(level=100.0, count=1):
 
 
 @given(st.floats(0.0, 0.05))
-@settings(max_examples=25, derandomize=True)
+@settings(max_examples=25)
 def test_a_point_out_of_focus_is_a_spot_of_the_deviation_however_small_and_as_bright(deviation):
     """As a share of the height, along rows and columns alike: 0.05 of 41 rows are 2 pixels, 0.005 a fifth of one."""
     point = np.zeros((1, ROWS, COLUMNS, 3), dtype=np.float32)
@@ -55,7 +55,7 @@ def test_a_picture_of_one_colour_cannot_be_out_of_focus():
 
 
 @given(st.floats(0.0, 0.9))
-@settings(max_examples=25, derandomize=True)
+@settings(max_examples=25)
 def test_corners_lose_the_strength_and_the_middle_nothing(strength):
     share = run(Vignetting(strength), grey())[0] / 100.0
     assert share[20, 30] == pytest.approx(1.0)
@@ -107,7 +107,7 @@ def ages(effect):
 
 
 @given(SECONDS)
-@settings(max_examples=25, derandomize=True)
+@settings(max_examples=25)
 def test_a_picture_is_as_old_as_the_latency(latency):
     np.testing.assert_allclose(ages(CameraLatency(latency)), latency, atol=1e-5)
 
@@ -121,7 +121,7 @@ def test_a_latency_mixes_the_two_pictures_that_it_falls_between(latency, expecte
 
 
 @given(st.floats(0.0, 0.1))
-@settings(max_examples=25, derandomize=True)
+@settings(max_examples=25)
 def test_rows_are_the_older_the_higher_they_are_and_the_picture_by_half_the_readout(readout):
     found = ages(RollingShutter(readout))
     expected = readout * (1.0 - (np.arange(SHUTTER_ROWS) + 0.5) / SHUTTER_ROWS)
@@ -136,7 +136,7 @@ def test_blur_looks_like_a_latency_of_half_of_it_and_a_latency_adds_to_that():
 
 
 @given(SECONDS, st.floats(0.0, 0.1), st.floats(0.0, 0.2))
-@settings(max_examples=25, derandomize=True)
+@settings(max_examples=25)
 def test_it_does_not_matter_which_mixture_of_pictures_comes_first(latency, readout, blur):
     pictures = np.random.default_rng(3).uniform(0.0, 255.0, (20, SHUTTER_ROWS * SHUTTER_COLUMNS * 3)).astype(np.float32)
     one, other = pictures, pictures
@@ -153,7 +153,7 @@ def test_a_scene_that_stands_still_hides_the_shutter(effect):
 
 
 @given(st.floats(0.0, 0.9))
-@settings(max_examples=60, derandomize=True)
+@settings(max_examples=60)
 def test_the_mean_of_the_last_pictures_is_the_newest_blurred_one_to_the_last_bit(blur):
     pictures = np.random.default_rng(0).integers(0, 256, (12, 12)).astype(np.float32)
     weights = Chain((Blur(blur),)).mean_weights(RATE_HZ)

@@ -109,7 +109,7 @@ def test_weights_of_nothing_change_nothing(effect):
 
 @pytest.mark.parametrize("effect", EFFECTS)
 @given(cuts=st.lists(st.integers(1, 89), max_size=6), seed=st.integers(0, 99))
-@settings(max_examples=8, derandomize=True, deadline=None)
+@settings(max_examples=8)
 def test_cutting_the_motion_into_chunks_never_changes_the_result(effect, cuts, seed):
     signal = a_signal(seed)
     np.testing.assert_allclose(run(effect, signal, cuts), run(effect, signal), rtol=0, atol=1e-12)
@@ -296,7 +296,7 @@ def learnt(draw):
 
 @pytest.mark.slow
 @given(effect=learnt())
-@settings(max_examples=60, derandomize=True, deadline=None)
+@settings(max_examples=60)
 def test_a_learnt_effect_reads_back_from_a_model_file_exactly(effect, tmp_path_factory):
     theta = {"trim": 0.05, **learnt_theta(effect)}
     path = write(tmp_path_factory.mktemp("model"), model_text(Model("duckiebot", None, theta, {})))

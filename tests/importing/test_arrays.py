@@ -189,7 +189,7 @@ def test_arrays_are_known_by_content(tmp_path):
     assert not is_arrays(tmp_path)
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_whatever_happens_to_the_bytes_nothing_but_a_log_error_comes_out(tmp_path, data):
     buffer = io.BytesIO()

@@ -179,7 +179,7 @@ def test_one_wild_stamp_is_told_before_anything_of_its_size_is_made():
         check_units(replace(wild, poses=replace(wild.poses, times=times)), "table")
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.floats(-0.8, 0.8), st.integers(0, 1000))
 def test_a_lag_is_found_to_two_hundredths_of_a_second(lag, seed):
     assert lag_of(turning(lag, seed=seed)) == pytest.approx(lag, abs=0.02)

@@ -329,7 +329,7 @@ def test_tables_are_known_by_content(tmp_path, file):
     assert not is_csv_tables(tmp_path / "missing")
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_whatever_happens_to_the_bytes_nothing_but_a_log_error_comes_out(file, data):
     content = bytearray(BOTH.encode())
@@ -422,7 +422,7 @@ def test_a_folder_without_such_files_is_refused(tmp_path):
     assert "has no file such as Robot1_Groundtruth.dat" in complaint_of_mrclam(tmp_path)
 
 
-@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(place=st.integers(0, 400), value=st.integers(0, 255), end=st.integers(0, 2000))
 def test_mrclam_whatever_happens_to_the_bytes_nothing_but_a_log_error_comes_out(tmp_path, place, value, end):
     path = write_mrclam(tmp_path)
@@ -543,7 +543,7 @@ def test_trajectories_are_known_by_content(file_of_tum, tmp_path):
     assert not is_tum(tmp_path.parent)
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_tum_whatever_happens_to_the_bytes_nothing_but_a_log_error_comes_out(file_of_tum, data):
     content = bytearray(LINES.encode())

@@ -217,7 +217,7 @@ def test_the_first_count_is_enough_though_the_next_place_drawn_lies_beyond_it():
     assert needed.tolist() == [100.0, 160.0]
 
 
-@settings(derandomize=True, deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(st.lists(st.floats(-60, 60), min_size=4, max_size=4), st.floats(0, 60))
 def test_better_scores_never_need_more_samples(scores, more):
     assert crossed(*(np.array(scores) + more)) <= crossed(*scores) + 1e-9

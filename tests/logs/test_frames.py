@@ -187,7 +187,7 @@ def test_missing_pictures_are_counted_and_the_first_is_named(folder):
     )
 
 
-@settings(derandomize=True, deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(
     times=st.lists(st.lists(st.integers(0, 300), min_size=1, unique=True).map(sorted), min_size=1, max_size=3),
     start=st.integers(0, 999),
@@ -209,7 +209,7 @@ def test_instants_that_are_written_are_the_instants_that_are_read(tmp_path_facto
 
 
 @pytest.mark.slow
-@settings(derandomize=True, deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(text=st.one_of(st.text(max_size=60), st.text("ab,-0.159einf \n\"'", max_size=60).map(HEADER.__add__)))
 def test_no_text_leads_to_anything_but_frames_or_one_line(tmp_path_factory, text):
     home = tmp_path_factory.getbasetemp() / "fuzz_frames"
@@ -273,7 +273,7 @@ def test_every_pixel_of_a_wider_picture_counts_alike(frames_of):
     np.testing.assert_allclose(read_pictures(frames_of(picture), [0])[0], mean, atol=1.01)
 
 
-@settings(derandomize=True, deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(rows=st.integers(1, 300), columns=st.integers(161, 500))
 def test_a_width_that_is_no_multiple_is_averaged_all_the_same(tmp_path_factory, rows, columns):
     path, picture = tmp_path_factory.mktemp("odd") / "0.png", noise(rows, columns)
@@ -324,7 +324,7 @@ def test_a_picture_that_is_gone_is_named(frames_of):
     assert complaint_of_pictures(frames) == f"{frames.paths[0]}: no such file; add the picture"
 
 
-@settings(derandomize=True, deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(data=st.data(), ending=st.sampled_from(["png", "jpg"]))
 def test_a_damaged_file_is_one_line_or_another_picture(tmp_path_factory, data, ending):
     path = tmp_path_factory.getbasetemp() / f"damaged.{ending}"

@@ -106,7 +106,7 @@ def test_duties_beyond_full_are_refused_and_so_are_commands_of_still_frames(fold
     assert "there are no commands" in complaint(folder(description=TOML.replace("twist", "none")))
 
 
-@settings(derandomize=True, deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(
     text=st.one_of(
         st.text(max_size=80),
@@ -274,7 +274,7 @@ def test_missing_rows_hold_the_last_command_and_have_no_pose(folder_of_reading):
     assert np.isnan(second.poses).all(axis=1).tolist() == [False, True, False]
 
 
-@settings(derandomize=True, deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(kept=st.sets(st.integers(1, 40), min_size=5), jitter=st.floats(-0.02, 0.02))
 def test_rows_left_out_change_nothing_of_the_others(tmp_path_factory, kept, jitter):
     steps = [0, *sorted(kept)]

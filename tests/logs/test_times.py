@@ -114,7 +114,7 @@ def test_measured_wheel_speeds_are_held_between_their_rows(folder):
     np.testing.assert_array_equal(episode.wheels[[0, 3, 5, 6]], [[1, 2], [1, 2], [1, 2], [3, 4]])
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 10_000), st.floats(0.0, 0.02), st.floats(0.02, 0.2))
 def test_every_pose_lies_within_a_step_of_its_own_time(seed, by, usual):
     times = jittered(seed, 60, usual, min(by, 0.4 * usual))

@@ -8,7 +8,7 @@ from proxytune.space import Interval, Space
 SPACE = Space((Interval("delay", 0.0, 0.3), Interval("trim", -0.3, 0.3)))
 
 
-@settings(derandomize=True, max_examples=25)
+@settings(max_examples=25)
 @given(index=st.integers(0, 70), seed=st.integers(0, 2**53))
 def test_a_design_point_lies_in_the_box_and_is_given_by_index_and_seed(index, seed):
     values = design_point(SPACE, index, seed)
@@ -16,7 +16,7 @@ def test_a_design_point_lies_in_the_box_and_is_given_by_index_and_seed(index, se
     assert all(interval.low <= value <= interval.high for interval, value in zip(SPACE.intervals, values, strict=True))
 
 
-@settings(derandomize=True, max_examples=25)
+@settings(max_examples=25)
 @given(count=st.integers(1, 40), more=st.integers(0, 40), dimensions=st.integers(1, 8))
 def test_a_longer_design_begins_with_every_shorter_one(count, more, dimensions):
     longer = unit_points(dimensions, count + more, 3)
@@ -33,7 +33,7 @@ def test_other_seeds_give_other_points():
     assert design_point(SPACE, 0, 1) != design_point(SPACE, 0, 2)
 
 
-@settings(derandomize=True, max_examples=25)
+@settings(max_examples=25)
 @given(unit=st.tuples(st.floats(0, 1), st.floats(0, 1)))
 def test_the_unit_cube_and_the_box_are_one_another_s_inverse(unit):
     values = from_unit(SPACE, np.array(unit))

@@ -46,7 +46,7 @@ def test_more_noise_makes_it_flatter():
     assert sharp > 5.0 * flat
 
 
-@settings(derandomize=True, max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(1, 9), st.integers(0, 99))
 def test_copies_of_one_output_count_as_one(copies, seed):
     errors = np.random.default_rng(seed).normal(size=(200, 1))

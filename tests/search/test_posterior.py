@@ -172,7 +172,7 @@ def normal(centre, widths, correlation=0.0):
     return lambda points: -0.5 * np.einsum("ij,jk,ik->i", points - centre, inverse, points - centre)
 
 
-@settings(derandomize=True, max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.floats(0.005, 0.08), st.floats(0.005, 0.08), st.floats(0.3, 0.7))
 def test_of_a_normal_in_the_box_share_and_intervals_are_those_of_the_normal(first, second, middle):
     found = posterior_of(normal(np.array([middle, 1.0 - middle]), np.array([first, second])), 2)

@@ -13,7 +13,7 @@ from proxytune.search.engine import design_point
 from proxytune.search.surrogate import GaussianProcess
 
 
-@settings(derandomize=True, max_examples=4, deadline=None)
+@settings(max_examples=4)
 @given(order=st.permutations(range(12)))
 def test_a_proposal_does_not_depend_on_the_order_in_which_trials_are_told(order):
     trials = search(make_proposer("gp", 6), 12, seed=2)

@@ -45,7 +45,7 @@ def test_both_plants_drive_it_alike_without_touching_the_floor(tmp_path, figures
     assert abs(poses[-1, 2] - planar[-1, 2]) < 0.1
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(values=st.tuples(*[st.floats(0.01, 1.0) for _ in SIX]))
 def test_what_is_given_is_written_and_the_urdf_has_it_too(tmp_path_factory, values):
     figures = dict(zip(SIX, values, strict=True))

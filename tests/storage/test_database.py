@@ -404,7 +404,7 @@ def test_json_of_another_shape_is_a_store_error_also_where_its_digest_fits(tmp_p
 VALUES = some.lists(some.none() | some.integers() | some.floats() | some.text(), min_size=1, max_size=4)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(VALUES, VALUES)
 def test_other_values_have_another_digest(one, other):
     assert (digest_of(*one) == digest_of(*other)) == (ascii(one) == ascii(other))

@@ -100,7 +100,7 @@ KINDS = {
 
 @pytest.mark.parametrize("measure", MEASURES)
 @given(kind=st.sampled_from(sorted(KINDS)), seed=st.integers(0, 10**6), agents=st.integers(2, 100))
-@settings(max_examples=60, derandomize=True, deadline=None)
+@settings(max_examples=60)
 def test_sorting_gives_what_comparing_every_pair_gives(measure, kind, seed, agents):
     random = np.random.default_rng(seed)
     proxy, target = (KINDS[kind](random, (2, agents, 3)) for _ in range(2))
@@ -142,7 +142,7 @@ def test_drawing_for_a_few_agents_at_a_time_changes_nothing(labels, monkeypatch)
 SCORES = Path(__file__).parents[2] / "../shared/data/scores"
 PROXIES = ("base", "synthetic_tiles", "trim_plus_0.2", "delay_doubled", "blur_0.1", "trim_minus_0.2")
 M2 = (Metric("m"), Metric("n"))
-few = settings(max_examples=60, derandomize=True, deadline=None)
+few = settings(max_examples=60)
 
 
 @st.composite

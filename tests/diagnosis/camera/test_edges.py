@@ -68,7 +68,7 @@ def along_normal(edges, angle, offset):
 ANGLES, OFFSETS = st.floats(0.0, 2.0 * np.pi), st.floats(-4.0, 4.0)
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(ANGLES, OFFSETS)
 def test_a_straight_edge_is_found_within_a_tenth_of_a_pixel_at_any_angle(angle, offset):
     """Standard deviation, largest at 45°; the whole edge lies within a twentieth, single points within a fifth."""
@@ -82,7 +82,7 @@ def test_a_straight_edge_is_found_within_a_tenth_of_a_pixel_at_any_angle(angle, 
     assert np.abs(off).max() < 0.2
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(ANGLES, OFFSETS, st.booleans())
 def test_normals_are_unit_vectors_from_the_floor_into_the_marking(angle, offset, white):
     edges = find_edges(striped(angle, offset) if white else yellow_striped(angle, offset))

@@ -185,7 +185,7 @@ def test_cameras_are_compared_on_the_same_points():
 SUMS = st.lists(st.tuples(st.floats(0.0, 4.0), st.integers(1, 500)), min_size=4, max_size=60)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(SUMS, st.integers(0, 1000))
 def test_the_interval_holds_the_value_and_seeds_reproduce_it(rows, seed):
     means, counts = np.array(rows).T

@@ -145,7 +145,7 @@ def linear(seed, rows=40):
 EFFECTS = ("camera_pitch", "camera_roll", "lens_centre", "pixel_aspect")
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(st.integers(0, 2**32 - 1), st.integers(0, 3))
 def test_the_loss_is_what_refitting_costs_where_the_problem_is_linear(seed, size):
     fit, cost = linear(seed)
@@ -154,7 +154,7 @@ def test_the_loss_is_what_refitting_costs_where_the_problem_is_linear(seed, size
         assert one.loss == pytest.approx(refitted, rel=1e-6, abs=1e-6)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(st.integers(0, 2**32 - 1), st.integers(0, 4))
 def test_sets_come_with_the_best_first(seed, size):
     losses = [one.loss for one in rank_subsets(linear(seed)[0], (), size)]

@@ -15,7 +15,7 @@ from proxytune.effects import Cue
 SHORT = {"episodes": 3, "seconds": 30.0}
 
 
-@settings(derandomize=True, deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(
     signal=arrays(float, st.tuples(st.integers(1, 3), st.integers(2, 30)), elements=st.floats(-1e3, 1e3)),
     knots=st.integers(2, 9),

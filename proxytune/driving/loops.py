@@ -1,0 +1,182 @@
+"""The two inner loops of lane following: what pixels show of the floor, and the lane's line through what they show.
+
+By Numba where that pays, else by NumPy, to the same bit, so that which one is taken may change under way.
+"""
+
+import functools
+import sys
+from typing import Any, NamedTuple, Protocol, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxytune.arrays import Flags, Floats, SmallBuffers
+
+PAYS_OFF = 30_000
+"""So many pictures NumPy looks up before Numba, which takes 0.4 s to load and would have saved that."""
+
+_used = [0]
+
+HALF_LANE_M = 0.128
+"""From a lane's centre to the middle of the marking on either side of it [m]."""
+
+FEWEST = 6
+"""So many pixels it takes to see a lane."""
+
+RIDGE = 0.005
+"""For each pixel, it keeps a handful of them at one distance from spinning the line round [m²]."""
+
+
+class TexelTable(NamedTuple):
+    """For each of a camera's pixels, a point in the robot's frame and a square of texels that shows it.
+
+    Attributes:
+        plane: The point and 1, in texels a metre, (3, pixels): x ahead, y to the left, 1.
+        begin: The first column and row of the pixel's square, 0, (pixels,).
+        last: The last column and row of the pixel's square, (pixels,).
+        first: Index of the first texel of that square, (pixels,).
+        side: Texels along its side, (pixels,).
+        texels: All squares one after another, (texels,): red, green, blue and a spare byte in one number each.
+    """
+
+    plane: NDArray[np.float32]
+    begin: NDArray[np.float32]
+    last: NDArray[np.float32]
+    first: NDArray[np.int32]
+    side: NDArray[np.int32]
+    texels: NDArray[np.uint32]
+
+    def without(self, pixels: int) -> "TexelTable":
+        """The same but for the first pixels."""
+        cut: list[Any] = [np.ascontiguousarray(one[..., pixels:]) for one in self[:-1]]
+        return TexelTable._make((*cut, self.texels))
+
+
+Places = NDArray[np.float32]
+"""Robots' frames in that of the floor's picture, (n, 6): x and y of what is ahead, of what is to the left, and of the
+robot's place from the corner of the picture [m]."""
+
+
+def look_up(table: TexelTable, places: Places) -> NDArray[np.uint32]:
+    """The texels (n, pixels) that pixels show; what is beyond the floor shows its edge."""
+    with SmallBuffers():
+        ahead, left, place = places.T.reshape(3, 2, -1, 1)
+        # Not a matrix product: BLAS rounds differently from processor to processor, and so would the pictures
+        where = ahead * table.plane[0]
+        part = left * table.plane[1]
+        where += part
+        where += np.multiply(place, table.plane[2], out=part)
+        # Both at once, np.clip, takes twice as long, and so does a number instead of an array
+        np.maximum(where, table.begin, out=where)
+        np.minimum(where, table.last, out=where)
+        column, row = where.astype(np.int32)
+        row *= table.side
+        row += column
+        row += table.first
+        shown: NDArray[np.uint32] = table.texels.take(row, mode="wrap")
+    return shown
+
+
+def expose(table: TexelTable, places: Places, weights: NDArray[np.float32], planes: NDArray[Any]) -> None:
+    """Write what robots see as the ends of planes (n, 3, pixels): weighted means over their places (n · times, 6).
+
+    They are rounded if planes are of bytes, and exact for weights as `Blur` has them.
+    """
+    times, pixels = len(weights), len(table.last)
+    exact = np.empty((times, 4 * pixels), dtype=np.float32)
+    for robot, plane in enumerate(planes[..., -pixels:]):
+        shown = look_up(table, places[robot * times : (robot + 1) * times]).view(np.uint8)
+        mean: NDArray[Any] = shown[0]
+        if times > 1:
+            exact[...] = shown
+            mean = weights @ exact
+            if planes.dtype == np.uint8:
+                mean = np.rint(mean, out=mean).astype(np.uint8)
+        for colour in range(3):
+            plane[colour] = mean[colour::4]
+
+
+class Eyes(NamedTuple):
+    """The parts of pictures that robots look at for markings, and what they take for one.
+
+    Attributes:
+        near: Whether the nominal camera sees nearby floor there, (eyes, pixels).
+        ahead: How far ahead of the axle that lies [m], (eyes, pixels).
+        left: How far to the left [m], (eyes, pixels).
+        eye: Which eye each robot has, (robots,).
+        contrast: The yellow line is more yellow than this, (robots,).
+        brightness: The white line is brighter than this, (robots,).
+    """
+
+    near: Flags
+    ahead: Floats
+    left: Floats
+    eye: NDArray[np.int64]
+    contrast: NDArray[np.uint8]
+    brightness: NDArray[np.uint8]
+
+
+def find_lanes(eyes: Eyes, yellow: NDArray[np.uint8], bright: NDArray[np.uint8]) -> Floats:
+    """Fit a line through the lane's centre, right of the yellow line and left of the white one, by least squares.
+
+    White pixels to the left of the yellow ones belong to the other lane's edge and are left out.
+
+    Args:
+        eyes: Where and how the robots look.
+        yellow: How yellow what they see is, (robots, pixels).
+        bright: How bright, (robots, pixels).
+
+    Returns:
+        Offset [m], slope and number of pixels, (robots, 3); where these are fewer than FEWEST, they alone count.
+    """
+    lanes = np.zeros((len(yellow), 3))
+    for lane, number, golden, shining, contrast, brightness in zip(
+        lanes, eyes.eye, yellow, bright, *eyes[-2:], strict=True
+    ):
+        near, all_left = eyes.near[number], eyes.left[number]
+        line = ((golden > contrast) & near).nonzero()[0]
+        edge = ((shining > brightness) & near).nonzero()[0]
+        on_line, on_edge = all_left.take(line), all_left.take(edge)
+        right = on_edge < (float(np.add.reduce(on_line)) / len(on_line) if len(on_line) else HALF_LANE_M)
+        ahead = eyes.ahead[number].take(np.concatenate((line, edge[right])))
+        left = np.concatenate((on_line - HALF_LANE_M, on_edge[right] + HALF_LANE_M))
+        lane[2] = count = len(ahead)
+        if count >= FEWEST:
+            mean_ahead, mean_left = float(np.add.reduce(ahead)) / count, float(np.add.reduce(left)) / count
+            ahead -= mean_ahead
+            left *= ahead
+            ahead *= ahead
+            slope = float(np.add.reduce(left)) / (float(np.add.reduce(ahead)) + RIDGE * count)
+            lane[:2] = mean_left - slope * mean_ahead, slope
+    return lanes
+
+
+class Loops(Protocol):
+    """A way to go through them: this module, or the compiled one."""
+
+    def expose(self, table: TexelTable, places: Places, weights: NDArray[np.float32], planes: NDArray[Any]) -> None:
+        """Write what robots see as the ends of planes (n, 3, pixels): means over their places (n · times, 6)."""
+        ...
+
+    def find_lanes(self, eyes: Eyes, yellow: NDArray[np.uint8], bright: NDArray[np.uint8]) -> Floats:
+        """Offset [m], slope and number of pixels of lines through the lane's centre, (robots, 3)."""
+        ...
+
+
+def fastest(pictures: int) -> Loops:
+    """The way that takes least time for some more pictures, loading included: asked anew for every use."""
+    _used[0] += pictures
+    return by_numba() if _used[0] > PAYS_OFF else _BY_NUMPY
+
+
+@functools.cache
+def by_numba() -> Loops:
+    """The compiled way where it works, else that of NumPy."""
+    try:
+        from proxytune.driving import compiled
+    except Exception:  # Numba is not installed, does not know this NumPy, or finds no place for what it compiles
+        return _BY_NUMPY
+    return compiled
+
+
+_BY_NUMPY = cast(Loops, sys.modules[__name__])

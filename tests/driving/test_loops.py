@@ -64,9 +64,8 @@ def test_both_blur_to_the_same_picture(compiled, blur, places):
 
 
 def eyes(rng, robots, pixels):
-    floats = rng.uniform(-1.0, 1.0, (2, 3, pixels))
-    levels = rng.integers(0, 256, (2, robots), dtype=np.uint8)
-    return loops.Eyes(rng.random((3, pixels)) < 0.8, *floats, rng.integers(0, 3, robots), *levels)
+    places, levels = rng.uniform(-1.0, 1.0, (2, 3, pixels)), rng.integers(0, 256, (2, robots, pixels), dtype=np.uint8)
+    return loops.Eyes(*places, rng.integers(0, 3, robots), *levels)
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 5), st.sampled_from([1, 5, 7, 8, 60, 130, 700, 3000]))

@@ -75,8 +75,9 @@ def families_next_step(compared: ComparedFamilies) -> str:
 def prpv_text(fresh: Assessment) -> str:
     """PRPV with its interval."""
     ends = fresh.prpv_interval
-    known = ends.low is not None and ends.high is not None
-    return in_pairs(fresh.prpv.value, ends.low, ends.high) if known else str(fresh.prpv.value)
+    if ends.low is None or ends.high is None:
+        return str(fresh.prpv.value)
+    return in_pairs(fresh.prpv.value, ends.low, ends.high)
 
 
 def difference_text(one: Difference) -> str:

@@ -5,7 +5,8 @@ then finished; their trials and episodes are compared with those of a study that
 
 `commands`: each command is ended by so many `kill -9` at random moments, alone or with its processes, at most four in a
 row, and then run again to its end. Every file must then be what two undisturbed runs agree upon, and no draft be left.
-Commands may be chosen by the names of their table's first column.
+"Went on" counts the last runs that found something finished by the killed ones; no stage of a diagnosis that one of
+them has kept may be made again. Commands may be chosen by the names of their table's first column.
 
 `digits`, `bits`, `cuts`: so many times the study.db of a finished study is damaged in one place (a digit of a stored
 value is changed, a bit flipped, the end cut off) and read again. Each damage is told in one line, or changes nothing
@@ -45,6 +46,7 @@ import tiny_loop
 
 from proxytune.cli.main import main
 from proxytune.errors import ProxytuneError
+from proxytune.files import DRAFT, shipped
 from proxytune.search import ENGINE_NAMES
 from proxytune.storage import Store
 from proxytune.study import Study, open_study, result_of, stored_run
@@ -52,6 +54,7 @@ from proxytune.study import Study, open_study, result_of, stored_run
 KILLS = 4
 TIMES = re.compile(rb"\d{4}-\d\d-\d\d \d\d:\d\d|\d+(\.\d+)? m?s\b")
 """When a page was written, and how long it took."""
+STAGES = ".stages"
 TABLES = ("facts", "trials", "episodes", "instances")
 
 
@@ -59,7 +62,7 @@ def survive_kills(count: int, home: Path) -> str:
     """Kill studies of every engine, and compare what they come to."""
     cases = list(itertools.product([engine for engine in ENGINE_NAMES if engine != "tpe"], "12", range(count)))
     equal, kills = 0, 0
-    with launched.launching() as launcher:
+    with launched.launching("all") as launcher:
         for engine, jobs, number in cases:
             own = home / f"{engine}_{jobs}_{number}"
             own.mkdir()
@@ -80,23 +83,32 @@ COMMANDS = {
     "study, two jobs": "study fresh2",
     "study of families": "study several",
     "study by PLV": "study teachable",
+    "study of a bank": "study bank",
     "sweep": "sweep fresh --parameter trim --points 5",
     "teach": "teach taught",
     "score": "score --proxy proxy.csv --target target.csv --metric distance:max --output scored --table scored.csv",
     "plot": "plot done",
     "repair": "repair spoilt",
     "export": "export done --to optuna --output trials.sqlite3",
+    "export, skopt": "export done --to skopt --output trials.pkl",
     "export of a model": "export tiny/twin.toml --to filter --output filter.py",
+    "export into a file": "export tiny/twin.toml --into own.urdf --output patched.urdf",
     "new": "new study begun",
+    "new robot": "new robot rover",
     "import": "import table.csv imported --robot nobodys" + "".join(
         f" --figure {key}={value}" for key, value in foreign_robot.FIGURES.items()
     ),
     "record": "record tiny --model tiny/twin.toml --output recorded --seconds 5 --frames 4",
+    "record of a table": "record tiny --model tiny/twin.toml --output recorded --commands drive.csv",
     "measure": "measure tiny --model tiny/twin.toml --output measured.csv",
     "drive": "drive tiny --agent steady --output drive.png",
+    "drive, moving": "drive tiny --agent steady --output drive.gif",
     "predict": "predict tiny/twin.toml log --horizon 2 --output poses.csv",
-    "diagnose": "diagnose log --output found",
+    "predict of pictures": "predict tiny/twin.toml pictured --frames --output drawn",
+    "diagnose": "diagnose driven --output found",
     "loop": "loop tiny --log driven",
+    "list": "list effects",
+    "completion": "completion bash",
 }  # fmt: skip
 
 
@@ -105,6 +117,8 @@ def prepare(home: Path) -> None:
     make = conftest.study_maker(home)
     make("fresh", **SMALL)
     make("fresh2", jobs="2", **SMALL)
+    make("bank", target=None, preflight=None, **SMALL)
+    (home / "bank" / "target.csv").unlink()
     several.make_several(make, called="several", **SMALL)
     lessons = {**SMALL, "grid": [0, 20, 40], "starts": "1", "metrics": '["distance:max"]'}
     taught.make_taught(make, called="taught", **lessons)
@@ -124,10 +138,14 @@ def prepare(home: Path) -> None:
     tiny_loop.write_tiny(home / "tiny")
     drives = [foreign_robot.drive(1, seconds=45.0)]
     shutil.copy(foreign_robot.write_form(home / "made", "csv", drives) / "run0.csv", home / "table.csv")
-    twin, driven = str(home / "tiny" / "twin.toml"), str(home / "driven")
-    main(["record", str(home / "tiny"), "--model", twin, "--output", driven, "--repeats", "1", "--seconds", "15"])
+    for log, seconds, frames in (("driven", 11, 0), ("pictured", 5, 4)):
+        words = f"record {home}/tiny --model {home}/tiny/twin.toml --output {home}/{log} --repeats 1"
+        main([*words.split(), "--seconds", str(seconds), "--frames", str(frames)])
     (home / "log").mkdir()
     foreign_robot.write_own_times(home / "log", drives)
+    rows = [f"0,{0.05 * tick:.2f},{0.2 + 0.1 * (tick // 20 % 3)},{0.3}\n" for tick in range(200)]
+    (home / "drive.csv").write_text("episode,time,left,right\n" + "".join(rows))
+    shutil.copy(shipped("robots") / "duckiebot" / "duckiebot.urdf", home / "own.urdf")
 
 
 def survive_in_every_command(count: int, home: Path, chosen: Collection[str] = COMMANDS) -> str:
@@ -138,8 +156,8 @@ def survive_in_every_command(count: int, home: Path, chosen: Collection[str] = C
     os.environ["TMPDIR"] = str(home)
     work.mkdir()
     os.chdir(work)
-    lines = ["| command | kills | before its end | runs | came to the same |", "|---|---|---|---|---|"]
-    with launched.launching() as launcher:
+    lines = ["| command | kills | before its end | runs | went on | came to the same |", "|---|---|---|---|---|---|"]
+    with launched.launching("all") as launcher:
         for name in chosen:
             words = COMMANDS[name]
             whole, seconds = [], 0.0
@@ -150,24 +168,32 @@ def survive_in_every_command(count: int, home: Path, chosen: Collection[str] = C
                 assert status == 0, printed
                 seconds = time.monotonic() - begun
                 whole.append(left_in(work))
-            rng, sent, kills, runs, equal = random.Random(zlib.crc32(name.encode())), 0, 0, 0, 0
+            rng, sent, kills, runs, gone_on, equal = random.Random(zlib.crc32(name.encode())), 0, 0, 0, 0, 0
+            begun_with = {*left_in(start)}
             while sent < count:
                 renew(work, start)
+                again: list[str] = []
                 for _ in range(min(KILLS, count - sent)):
+                    before = stages_in(work)
                     process = launched.Launched(launcher, work, words.split())
                     time.sleep(rng.uniform(0.0, seconds))
                     with suppress(ProcessLookupError):
                         (os.kill if rng.random() < 0.4 else os.killpg)(process.pid, signal.SIGKILL)
                     sent, kills = sent + 1, kills + (process.end()[0] == -signal.SIGKILL)
+                    after_it = stages_in(work)
+                    # All are gone once the findings are written.
+                    again += [stage for stage in before if after_it and after_it.get(stage) != before[stage]]
+                found = {path for path in {*left_in(work)} - begun_with if not path.endswith(DRAFT)}
+                gone_on += bool(found) or any(left_in(work)[path] != left_in(start)[path] for path in begun_with)
                 status, printed = launched.Launched(launcher, work, words.split()).end()
                 after = left_in(work)
                 agreed = {path: content for path, content in whole[0].items() if whole[1][path] == content}
-                odd = [path for path in agreed if after.get(path) != agreed[path]]
+                odd = again + [path for path in agreed if after.get(path) != agreed[path]]
                 odd += sorted({*after} - {*whole[0]})
                 runs, equal = runs + 1, equal + (status == 0 and not odd)
                 if status or odd:
                     print(f"{name}: status {status}, {odd}: {printed[-200:]}", file=sys.stderr, flush=True)
-            lines.append(f"| {name} | {sent} | {kills} | {runs} | {equal} |")
+            lines.append(f"| {name} | {sent} | {kills} | {runs} | {gone_on} | {equal} |")
             print(lines[-1], file=sys.stderr, flush=True)
     return "\n".join(lines)
 
@@ -177,6 +203,11 @@ def renew(work: Path, start: Path) -> None:
     for path in work.iterdir():
         shutil.rmtree(path) if path.is_dir() else path.unlink()
     shutil.copytree(start, work, dirs_exist_ok=True)
+
+
+def stages_in(work: Path) -> dict[str, int]:
+    """The stages of a diagnosis that are kept, and when each was written."""
+    return {str(path): path.stat().st_mtime_ns for path in work.rglob(f"{STAGES}/*/*.pickle")}
 
 
 def left_in(folder: Path) -> dict[str, Any]:

@@ -30,6 +30,8 @@ def run() -> int:
     _on_signals(_end_before)
     for name in UNSET:
         os.environ.setdefault(name, "")
+    if os.path.lexists("matplotlibrc"):
+        load_matplotlib()
     with _Guard() as guard:
         try:
             from proxytune.cli.main import main
@@ -41,6 +43,17 @@ def run() -> int:
     status = guard.status
     _on_signals(lambda number, frame: _exit(status))
     return status
+
+
+def load_matplotlib() -> None:
+    """Load Matplotlib without settings of the current folder, which may be a stranger's: they can have LaTeX run."""
+    here = os.open(".", os.O_RDONLY)
+    os.chdir(os.path.dirname(os.path.abspath(__file__)))
+    try:
+        import matplotlib  # noqa: F401
+    finally:
+        os.fchdir(here)
+        os.close(here)
 
 
 def _open_descriptors() -> None:

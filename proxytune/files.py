@@ -1,7 +1,7 @@
 """Files and folders that are written whole or not at all: as a draft beside them, which takes their name at last.
 
-Also folders for the moment (`temporary_folder`), and those of robots and studies that travel with the package
-(`shipped`).
+Where that cannot be is told before the work that ends there (`check_place`). Also folders for the moment
+(`temporary_folder`), and those of robots and studies that travel with the package (`shipped`).
 """
 
 import contextlib
@@ -16,7 +16,35 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from proxytune.errors import SettingsError
+from proxytune.errors import InputError, SettingsError
+
+
+def check_place(path: Path, *, folder: bool = False, ours: bool = False) -> None:
+    """Refuse a file or folder that cannot be written, before the work begins that ends there.
+
+    That a disk gets full is not known beforehand.
+
+    Args:
+        path: The file or folder; it, and folders on the way, need not be there.
+        folder: Whether it is a folder.
+        ours: Whether its name is ours, in a folder that the user has given.
+
+    Raises:
+        InputError: If something else is there, or nothing may be written there.
+    """
+    whole = path.absolute()
+    there = next(place for place in (whole, *whole.parents) if os.path.lexists(place))
+    if there == whole and there.exists() and not (there.is_dir() if folder else there.is_file()):
+        what = "a folder" if there.is_dir() else "a file" if there.is_file() else "a device or a pipe"
+        other = "another folder" if folder else "the name of a file in it" if there.is_dir() else "that of a file"
+        raise InputError(f"{path}: is {what}; {'move it away' if ours else f'give {other}'}")
+    within = there if folder or there != whole else there.parent
+    if not within.is_dir():
+        remedy = "move that away" if ours else "choose another place"
+        raise InputError(f"{path}: cannot be written there, as {within} is no folder; {remedy}")
+    if not os.access(within, os.W_OK | os.X_OK):
+        remedy = "copy the study elsewhere" if ours else "choose another place"
+        raise InputError(f"{path}: cannot be written there, as {within} is closed to you; {remedy}")
 
 
 @contextlib.contextmanager
@@ -30,6 +58,8 @@ def draft_of(path: Path) -> Iterator[Path]:
     """
     draft = draft_path(path)
     try:
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            raise OSError(errno.EEXIST, "a device or a pipe is there", str(path))
         _clear_away(path)
         # What lies there may be left of a killed process, or a link that leads elsewhere.
         draft.unlink(missing_ok=True)

@@ -4,6 +4,7 @@ import contextlib
 import difflib
 import errno
 import math
+import os
 import re
 import stat
 import tomllib
@@ -14,19 +15,20 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from proxytune.errors import SettingsError
+from proxytune.errors import InputError, SettingsError
 
 PIPES = ("/dev/stdin", "/dev/fd/", "/proc/self/fd/")
 """Where a shell puts what another command prints."""
+LARGEST = "PROXYTUNE_LARGEST_MB"
+"""The environment variable that raises every limit of sizes [MB]."""
+TEXT_MB, SETTINGS_MB = 500, 20
+"""Of a table, and of TOML: what reads them takes many times as much memory."""
 MOST_DOTS = 100
 """In one key: the time to read a dotted key grows with the square of its parts."""
-
 GEOMETRY: Mapping[str, str] = MappingProxyType(
     {"wheel_radius_m": "wheel_radius", "baseline_m": "effective_baseline", "full_speed_m_s": "full_speed"}
 )
 """Keys of log.toml and model.toml for a robot's figures, and what its robot.toml calls these."""
-
-
 SIZES: Mapping[str, tuple[float, float, str]] = {
     "wheel_radius": (0.002, 1.5, "m"),
     "effective_baseline": (0.01, 6.0, "m"),
@@ -232,7 +234,7 @@ def read_settings(path: Path) -> Section:
         SettingsError: If the file is missing, unreadable or not TOML.
     """
     try:
-        text = read_text(path)
+        text = read_text(path, usual_mb=SETTINGS_MB)
         for number, line in enumerate(text.splitlines(), start=1):
             if line.count(".") > MOST_DOTS and max(part.count(".") for part in re.split("[,=]", line)) > MOST_DOTS:
                 raise ValueError(f"a key of more than {MOST_DOTS} parts (at line {number})")
@@ -247,20 +249,51 @@ def read_settings(path: Path) -> Section:
         raise SettingsError(f"{path}: is not valid TOML: {problem}") from None
 
 
-def read_text(path: Path, encoding: str = "utf-8") -> str:
+def read_text(path: Path, encoding: str = "utf-8", usual_mb: float = TEXT_MB) -> str:
     """The text of a file, or of what another command prints.
 
     Raises:
-        OSError: If it cannot be read, or is a device or a named pipe, which may have no end.
+        OSError: If `check_end` refuses it, or it cannot be read.
         UnicodeDecodeError: If it is no text.
     """
+    check_end(path, usual_mb)
+    return path.read_text(encoding=encoding)
+
+
+def check_end(path: Path, usual_mb: float = TEXT_MB) -> None:
+    """Refuse a file that has no end or, in a few kilobytes of a disk, is of gigabytes.
+
+    Args:
+        path: The file.
+        usual_mb: The most that it may have [MB], where nobody has raised it.
+
+    Raises:
+        OSError: If it is a device, a named pipe or larger than that, or is not there.
+        InputError: If what is to raise the limit is no number.
+    """
     try:
-        regular = stat.S_ISREG(path.stat().st_mode) or path.is_dir() or str(path).startswith(PIPES)
+        found = path.stat()
     except ValueError as problem:  # A character that no path has.
         raise OSError(errno.EINVAL, str(problem), str(path)) from None
-    if not regular:
+    if not (stat.S_ISREG(found.st_mode) or path.is_dir() or str(path).startswith(PIPES)):
         raise OSError(errno.EINVAL, "it is a device or a pipe, not a file", str(path))
-    return path.read_text(encoding=encoding)
+    if found.st_size > (most := allowed_bytes(usual_mb)):
+        size = f"it has {found.st_size / 1e6:.0f} MB, of {most / 1e6:.0f} MB at most"
+        remedy = f"if it is meant, allow as much by the environment variable {LARGEST}={int(found.st_size / 1e6) + 1}"
+        raise OSError(errno.EFBIG, f"{size}; {remedy}", str(path))
+
+
+def allowed_bytes(usual_mb: float) -> float:
+    """The bytes that something may have, or unpack to.
+
+    Raises:
+        InputError: If the environment variable that raises the limit is no number.
+    """
+    stated = os.environ.get(LARGEST, "0")
+    try:
+        return 1e6 * max(usual_mb, float(stated))
+    except ValueError:
+        raise InputError(f"{LARGEST}={stated}: must be a number of megabytes, as in {LARGEST}=4000") from None
 
 
 def is_finite(value: float) -> bool:

@@ -1,9 +1,8 @@
 """What is packed is measured before it is unpacked: a few kilobytes may say that they hold gigabytes.
 
-One limit of each kind, and one environment variable that raises them all.
+One limit of each kind, and one environment variable that raises them all, as it does those of plain files.
 """
 
-import os
 import warnings
 import zipfile
 from collections.abc import Callable, Iterator
@@ -16,17 +15,13 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from proxytune.errors import InputError
-
-LARGEST = "PROXYTUNE_LARGEST_MB"
-"""The environment variable that raises the limits [MB]."""
+from proxytune.settings import LARGEST, allowed_bytes
 
 ARRAYS_MB = 1000
 """All arrays of a file together, or all pictures of a log as they are kept: what reads them takes two or three times
 as much memory."""
-
 BAG_MB = 1000
 """What a bag unpacks to, or a hundred times its own size: no recording of a robot is denser."""
-
 PICTURE_MB = 200
 """One picture of red, green and blue: 66 megapixels."""
 
@@ -46,19 +41,6 @@ def check_unpacked(where: object, size: float, usual_mb: float) -> None:
     if size > most:
         remedy = f"if it is meant, allow as much by the environment variable {LARGEST}={int(size / 1e6) + 1}"
         raise InputError(f"{where}: unpacks to {size / 1e6:.0f} MB or more, of {most / 1e6:.0f} MB at most; {remedy}")
-
-
-def allowed_bytes(usual_mb: float) -> float:
-    """The bytes that something may unpack to.
-
-    Raises:
-        InputError: If the environment variable that raises the limit is no number.
-    """
-    stated = os.environ.get(LARGEST, "0")
-    try:
-        return 1e6 * max(usual_mb, float(stated))
-    except ValueError:
-        raise InputError(f"{LARGEST}={stated}: must be a number of megabytes, as in {LARGEST}=4000") from None
 
 
 def read_arrays(path: Path, usual_mb: float = ARRAYS_MB) -> dict[str, NDArray[Any]]:

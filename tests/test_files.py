@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from proxytune.errors import SettingsError
-from proxytune.files import draft_of, draft_path, folder_draft_of, shipped, temporary_folder
+from proxytune.errors import InputError, SettingsError
+from proxytune.files import check_place, draft_of, draft_path, folder_draft_of, shipped, temporary_folder
 
 
 def test_the_draft_takes_the_files_name_once_it_is_written(tmp_path):
@@ -24,6 +24,25 @@ def test_the_draft_takes_the_files_name_once_it_is_written(tmp_path):
         assert path.read_text() == "old"
     assert path.read_text() == "new"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_place_is_free_where_a_file_or_folder_may_come_to_be(tmp_path):
+    (tmp_path / "old.csv").write_text("old")
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "link.csv").symlink_to(tmp_path / "nowhere")
+    for name in ("old.csv", "new.csv", "link.csv", "folder/new.csv", "not/yet/new.csv"):
+        check_place(tmp_path / name)
+    for name in ("folder", "new", "folder/new", "not/yet/new"):
+        check_place(tmp_path / name, folder=True)
+    with pytest.raises(InputError, match=r"folder: is a folder; give the name of a file in it"):
+        check_place(tmp_path / "folder")
+
+
+def test_a_pipe_is_not_replaced(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(FileExistsError, match="a device or a pipe is there"), draft_of(tmp_path / "pipe"):
+        pass
+    assert [path.is_fifo() for path in tmp_path.iterdir()] == [True]
 
 
 @pytest.mark.parametrize("problem", [KeyboardInterrupt, OSError, ValueError])

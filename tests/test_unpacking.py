@@ -9,7 +9,8 @@ from PIL import Image
 
 from proxytune import unpacking
 from proxytune.errors import InputError
-from proxytune.unpacking import LARGEST, check_unpacked, open_picture, read_arrays
+from proxytune.settings import LARGEST
+from proxytune.unpacking import check_unpacked, open_picture, read_arrays
 
 
 def test_arrays_are_measured_before_they_are_unpacked(tmp_path, monkeypatch):

@@ -8,13 +8,16 @@ import numpy as np
 
 from proxytune.diagnosis import PICTURES, FilmedDrive, film, frames_text, log_text, record, samples_text
 from proxytune.driving import LaneFollowing, read_robot
-from proxytune.errors import InputError
+from proxytune.errors import InputError, LogError
 from proxytune.logs import Frames, Log, log_cautions, read_commands
 from proxytune.report import write_picture, write_text
 from proxytune.settings import Section
 from proxytune.study import StudySettings, bare_family, cautions_of
 
 Tell = Callable[[str], None]
+
+LONGEST_S = 3600.0
+"""A longer drive of a table is a slip of its times, and would never end."""
 
 
 @dataclass(frozen=True)
@@ -53,13 +56,6 @@ def record_log(
 ) -> tuple[Log, tuple[str, ...]]:
     """Drive every manoeuvre, and lanes where pictures are wanted, and write the log; without log.toml it is none.
 
-    Args:
-        settings: Of the study, for its [domain].
-        model: The model.toml of the domain.
-        folder: The log's folder to write.
-        wanted: What is to be driven.
-        tell: Hears how far it is.
-
     Returns:
         The log, and what is probably not meant in its domain or itself, a sentence each.
 
@@ -72,12 +68,21 @@ def record_log(
     family = recordable(settings, model)
     drives = film(family, wanted.frames, wanted.seed) if wanted.frames else ()
     table = None if wanted.commands is None else read_commands(wanted.commands)
+    for drive, (times, _) in () if table is None else table[1].items():
+        if (lasts := times[-1] - times[0]) > LONGEST_S:
+            raise LogError(
+                f"{wanted.commands}: drive '{drive}' lasts {lasts:g} s; cut it into drives of at most {LONGEST_S:g} s, "
+                "or check its times"
+            )
     repeats, seconds, seed = wanted.repeats, wanted.seconds, wanted.seed
     log = record(family, name=folder.name, repeats=repeats, seconds=seconds, seed=seed, table=table)
     if wanted.frames:
         road = _write_map(settings.domain, folder)
         log = _film(log, drives, road, folder, lambda taken: tell(f"driving: {taken} of {wanted.frames} frames"))
-    _write(log, folder, f"{model.name} on the {family.plant} plant, driven by proxytune")
+    write_text(folder / "samples.csv", samples_text(log))
+    if log.frames:
+        write_text(folder / "frames.csv", frames_text(log, log.frames, range(len(log.frames.paths)), "%.6f"))
+    write_text(folder / "log.toml", log_text(log, f"{model.name} on the {family.plant} plant, driven by proxytune"))
     found = (*cautions_of(family), *log_cautions(log, read_robot(family.robot, family.folder).figures))
     return log, tuple(dict.fromkeys(found))
 
@@ -106,11 +111,3 @@ def _film(log: Log, filmed: Iterable[FilmedDrive], road: str, folder: Path, tell
         tell(len(paths))
     frames = Frames(tuple(paths), np.array(drives), np.array(times), road)
     return replace(log, episodes=tuple(episodes), frames=frames)
-
-
-def _write(log: Log, folder: Path, source: str) -> None:
-    """Its tables, then log.toml: without that a folder is no log."""
-    write_text(folder / "samples.csv", samples_text(log))
-    if log.frames:
-        write_text(folder / "frames.csv", frames_text(log, log.frames, range(len(log.frames.paths)), "%.6f"))
-    write_text(folder / "log.toml", log_text(log, source))

@@ -15,6 +15,7 @@ from proxytune.cli.terminal import Answer, Steps
 from proxytune.diagnosis import LIMITS, Limits, diagnose_log, forget_stages, robot_of
 from proxytune.effects import Catalogue
 from proxytune.errors import InputError
+from proxytune.files import check_place
 from proxytune.importing import finite, open_log
 from proxytune.logs import Log
 from proxytune.report import diagnosis_text
@@ -34,7 +35,6 @@ MOTION = {
     "drawing": 0.96,
 }
 """The share of a diagnosis of motion that has usually passed when each of its steps begins."""
-
 CAMERA = {
     "reading frames": 0.0,
     "fitting the camera": 0.1,
@@ -44,7 +44,6 @@ CAMERA = {
     "drawing": 0.95,
 }
 """The same of a camera's."""
-
 MOTION_SHARE = 0.8
 """Of the time of both; the camera comes last."""
 
@@ -78,11 +77,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def limits_of(arguments: argparse.Namespace) -> Limits:
-    """Limits of the next drive.
-
-    Raises:
-        InputError: If one is none.
-    """
+    """Limits of the next drive."""
     room = None
     if arguments.room is not None:
         sides = [finite(side) for side in arguments.room.split("x")]
@@ -112,11 +107,14 @@ def run(arguments: argparse.Namespace) -> Answer:
 def _diagnosed(
     arguments: argparse.Namespace, limits: Limits, log: Log, test: Log | None, imported: Sequence[str]
 ) -> Answer:
+    here = arguments.log.resolve()
+    folder = arguments.output or Path(f"diagnosis_{here.stem if here.is_file() else here.name}")
+    check_place(folder, folder=True)
+    for name in ("diagnosis.json", "model.toml", "report.html"):
+        check_place(folder / name, ours=True)
     robot = robot_of(log, arguments.robot, Catalogue(Path.cwd(), names_in(arguments.effects)))
     declared = None if arguments.declared is None else names_in(arguments.declared)
     with Steps(shares(log)) as step:
-        here = arguments.log.resolve()
-        folder = arguments.output or Path(f"diagnosis_{here.stem if here.is_file() else here.name}")
         seed = arguments.seed
         found = diagnose_log(log, robot, declared, test=test, seed=seed, report=step, limits=limits, folder=folder)
         step("drawing")

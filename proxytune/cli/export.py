@@ -9,6 +9,7 @@ from rich.text import Text
 from proxytune.api import TRIALS, export
 from proxytune.cli.options import configure_effects
 from proxytune.cli.terminal import Answer
+from proxytune.files import check_place
 from proxytune.report import FILTER, FORMATS, IN_WHEELS
 
 
@@ -36,6 +37,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> Answer:
     """Write the file, and say what went where and what has no place."""
+    check_place(arguments.output)
     wheels, has = (tuple(filter(None, given.split(","))) for given in (arguments.wheels, arguments.has))
     report = export(arguments.model, arguments.output, to=arguments.to, into=arguments.into, wheels=wheels, has=has)
     cautions = (f"beware: {line}" for line in report.facts.get("cautions", ()))

@@ -10,6 +10,7 @@ from rich.text import Text
 from proxytune.api import import_log
 from proxytune.cli.options import configure_source, facts_of, take_late, wanted_of
 from proxytune.cli.terminal import Answer, waiting
+from proxytune.files import check_place
 from proxytune.importing import Source, Survey
 from proxytune.report import Column, Table, columns_of, percent, table_text
 
@@ -30,6 +31,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> Answer:
     """List what the source holds, and write the log."""
+    if arguments.output is not None:
+        check_place(arguments.output, folder=True)
     wanted, facts = wanted_of(arguments), facts_of(arguments)
     with waiting(f"reading {arguments.source}"):
         report = import_log(arguments.source, arguments.output, wanted=wanted, facts=facts)

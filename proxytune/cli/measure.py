@@ -9,6 +9,7 @@ from rich.text import Text
 from proxytune.api import measure
 from proxytune.cli.terminal import Answer
 from proxytune.errors import InputError
+from proxytune.files import check_place
 from proxytune.report import Table, WholeWords, columns_of, plain, table_text
 from proxytune.scores import ScoreTable
 from proxytune.seeds import TARGET_OFFSET
@@ -35,8 +36,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     """Score every agent from every start, and write the table."""
     if not arguments.output.absolute().parent.is_dir():
         raise InputError(f"{arguments.output}: its folder does not exist; create it first")
-    if arguments.output.is_dir():
-        raise InputError(f"--output {arguments.output}: is a folder; give the name of a file in it")
+    check_place(arguments.output)
     options = {"repeats": arguments.repeats, "seed": arguments.seed}
     found = measure(arguments.path, arguments.model, progress=True, **options)
     found.write(arguments.output)

@@ -8,6 +8,7 @@ from rich.text import Text
 from proxytune.api import PicturePrediction, predict
 from proxytune.cli.options import configure_effects, configure_source, facts_of, wanted_of
 from proxytune.cli.terminal import Answer, waiting
+from proxytune.files import check_place
 from proxytune.report import write_text
 
 
@@ -32,6 +33,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> Answer:
     """Predict poses or pictures, write them, and compare them with those measured."""
     folder = arguments.output if arguments.frames else None
+    check_place(arguments.output, folder=arguments.frames)
     wanted, facts = wanted_of(arguments), facts_of(arguments)
     with waiting("predicting") as tell:
         found = predict(

@@ -9,6 +9,7 @@ from rich.text import Text
 from proxytune.api import Wanted, record_log
 from proxytune.cli.terminal import Answer, waiting
 from proxytune.errors import InputError
+from proxytune.files import check_place
 from proxytune.logs import Log
 from proxytune.study import read_study_settings
 
@@ -36,6 +37,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     settings = read_study_settings(arguments.path)
     if not arguments.model.is_file():
         raise InputError(f"--model {arguments.model}: no such file; check the path")
+    check_place(arguments.output, folder=True)
     wanted = Wanted(arguments.repeats, arguments.seconds, arguments.frames, arguments.seed, arguments.commands)
     with waiting("driving") as tell:
         log, cautions = record_log(settings, arguments.model, arguments.output, wanted, tell)

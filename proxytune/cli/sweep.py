@@ -4,8 +4,9 @@ import argparse
 from pathlib import Path
 
 from proxytune.api import run_sweep
-from proxytune.cli.options import configure_cluster, on_its_cluster, study_folder, typed
+from proxytune.cli.options import check_made, configure_cluster, on_its_cluster, study_folder, typed
 from proxytune.cli.terminal import Answer
+from proxytune.files import check_place
 from proxytune.report import sweep_text
 
 
@@ -36,8 +37,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
 @on_its_cluster
 def run(arguments: argparse.Namespace) -> Answer:
     """Simulate what is missing of the sweeps, and draw them."""
+    folder = study_folder(arguments.path)
+    check_made(folder) if arguments.output is None else check_place(arguments.output, folder=True)
     report = run_sweep(
-        study_folder(arguments.path),
+        folder,
         arguments.parameter,
         points=arguments.points,
         at=arguments.at,

@@ -2,9 +2,9 @@
 
 Each stage is a function of what came before, of the log, the robot, the options and our code. All of these have one
 digest, under which the results of stages lie; with another digest they are other results, and those of before are
-removed. What is read again is the same to the last bit. Files are pickles of numbers and of our own classes alone:
-nothing else is made of them when they are read, for a folder of findings may be a stranger's. Robots and drives are not
-in them, but what stands for these.
+removed. What is read again is the same to the last bit: each file begins with a digest of what follows. Files are
+pickles of numbers and of our own classes alone: nothing else is made of them when they are read, for a folder of
+findings may be a stranger's. Robots and drives are not in them, but what stands for these.
 """
 
 import contextlib
@@ -14,6 +14,7 @@ import pickle
 import shutil
 from collections.abc import Callable, Mapping
 from enum import Enum
+from hashlib import sha256
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -29,10 +30,8 @@ Result = TypeVar("Result")
 
 ROOMS = ("logs", "effects", "driving", "diagnosis")
 """Rooms whose code a diagnosis of motion depends on."""
-
 FOLDER = ".stages"
 """Where stages lie in the folder of the findings until these are written."""
-
 NUMBERS = {
     ("numpy", "ndarray"),
     ("numpy", "dtype"),
@@ -44,7 +43,6 @@ NUMBERS = {
     ("numpy.core.numeric", "_frombuffer"),
 }
 """What arrays are made by."""
-
 SIGNALS = "proxytune.diagnosis.motion.signals"
 """Its functions, which only reckon, are bound to curves."""
 
@@ -71,15 +69,7 @@ def _plain(value: Any) -> object:
 
 
 class Stages:
-    """Results of stages in a folder; without one nothing is kept.
-
-    Args:
-        folder: Where the findings go, or None.
-        facts: What the stages depend on.
-
-    Raises:
-        RunError: If a symbolic link is in the place of the stages: what it leads to is not ours to remove.
-    """
+    """Results of stages in the folder of findings, without one not kept; a link in their place is refused."""
 
     def __init__(self, folder: Path | None = None, facts: str = "") -> None:
         self._folder = None if folder is None else folder / FOLDER / facts
@@ -96,23 +86,21 @@ class Stages:
         self._known |= things
 
     def keep(self, stage: str, make: Callable[[], Result]) -> Result:
-        """The result of a stage, made if it is not kept.
-
-        Raises:
-            RunError: If it cannot be written.
-        """
+        """The result of a stage, made if it is not kept."""
         if self._folder is None:
             return make()
         path = self._folder / f"{stage}.pickle"
         # What a disk has spoilt is made again.
         with contextlib.suppress(Exception):
-            return _Reader(io.BytesIO(path.read_bytes()), self._known).load()  # type: ignore[no-any-return]
-        result, content = make(), io.BytesIO()
-        _Writer(content, self._known).dump(result)
+            known, content = path.read_bytes().split(b"\n", 1)
+            if known == _digest_of(content):
+                return _Reader(io.BytesIO(content), self._known).load()  # type: ignore[no-any-return]
+        result, written = make(), io.BytesIO()
+        _Writer(written, self._known).dump(result)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             with draft_of(path) as draft:
-                draft.write_bytes(content.getvalue())
+                draft.write_bytes(_digest_of(written.getvalue()) + b"\n" + written.getvalue())
         except OSError as problem:
             raise RunError(f"{path}: cannot be written ({problem.strerror}); fix that and run again") from None
         return result
@@ -121,6 +109,10 @@ class Stages:
 def forget_stages(folder: Path) -> None:
     """Remove the stages of a diagnosis whose findings are written."""
     shutil.rmtree(folder / FOLDER, ignore_errors=True)
+
+
+def _digest_of(content: bytes) -> bytes:
+    return sha256(content).hexdigest().encode()
 
 
 class _Writer(pickle.Pickler):

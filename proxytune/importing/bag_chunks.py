@@ -12,7 +12,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any, NamedTuple, cast
 
-from proxytune.unpacking import BAG_MB, Decompressor, allowed_bytes, check_unpacked, unpacked_size
+from proxytune.settings import allowed_bytes
+from proxytune.unpacking import BAG_MB, Decompressor, check_unpacked, unpacked_size
 
 DENSEST = 100
 """Times its own size: pictures of a world that stands still pack so well, and hardly anything else."""

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from proxytune.arrays import Floats
 from proxytune.errors import LogError
 from proxytune.logs import COMMANDS, ENABLED
+from proxytune.settings import check_end
 
 EMPTY = ("", "nan", "NaN", "NAN", "na", "NA", "n/a", "N/A", "null", "NULL", "none", "None")
 """What stands in a cell in which there is nothing."""
@@ -129,6 +130,7 @@ def is_number(cell: str) -> bool:
 
 def _read_lines(path: Path) -> Lines:
     try:
+        check_end(path)
         text = path.read_bytes().decode("utf-8-sig")
     except FileNotFoundError:
         raise LogError(f"{path}: no such file; check the path") from None

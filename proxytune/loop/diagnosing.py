@@ -15,7 +15,7 @@ from typing import Any
 import tomlkit
 
 from proxytune.api import DiagnosisReport, Wanted, recordable
-from proxytune.diagnosis import camera_effects, diagnose_log, film, motion_effects, robot_of
+from proxytune.diagnosis import camera_effects, diagnose_log, film, forget_stages, motion_effects, robot_of
 from proxytune.driving import Robot
 from proxytune.effects import Catalogue, effect_of
 from proxytune.errors import RunError, SettingsError, StoreError
@@ -61,10 +61,12 @@ def diagnose_target(loop: Loop, source: Path, folder: Path, teller: Teller) -> N
             teller.say(note)
         robot = robot_of(log, loop.robot, Catalogue(loop.settings.folder.resolve()))
         with teller.diagnosis(log) as report:
-            found = diagnose_log(log, robot, declared_of(loop, robot, log), seed=loop.settings.seed, report=report)
+            declared, seed = declared_of(loop, robot, log), loop.settings.seed
+            found = diagnose_log(log, robot, declared, seed=seed, report=report, folder=folder)
             report("drawing")
             with figures_also_as(("svg",)):
                 DiagnosisReport(found).write(folder)
+            forget_stages(folder)
 
 
 def declared_of(loop: Loop, robot: Robot, log: Log) -> tuple[str, ...]:
@@ -167,7 +169,6 @@ def begin_anew_if_changed(study: Study) -> None:
 
 
 def _ignored(folder: str, names: list[str]) -> set[str]:
-    """The entries of a folder that are not copied."""
     made = shutil.ignore_patterns(*LEFT_OUT)(folder, names)
     own = {name for name in names if any(Path(folder, name, one).exists() for one in A_FOLDER_OF_ITS_OWN)}
     return made | own

@@ -74,10 +74,8 @@ def families_next_step(compared: ComparedFamilies) -> str:
 
 def prpv_text(fresh: Assessment) -> str:
     """PRPV with its interval."""
-    ends = fresh.prpv_interval
-    if ends.low is None or ends.high is None:
-        return str(fresh.prpv.value)
-    return in_pairs(fresh.prpv.value, ends.low, ends.high)
+    low, high = fresh.prpv_interval.low, fresh.prpv_interval.high
+    return str(fresh.prpv.value) if low is None or high is None else in_pairs(fresh.prpv.value, low, high)
 
 
 def difference_text(one: Difference) -> str:

@@ -33,7 +33,6 @@ from proxytune.space import Space
 
 STEP = 0.02
 """In widths of the box, to both sides."""
-
 Limit = Literal["trials", "starts"]
 
 
@@ -279,13 +278,9 @@ class Expected:
 
 
 def expect_of(space: Space, trials: Sequence[Trial], goal: Goal, seed: int = 0) -> Expected:
-    """Expect what a target will tell: trials are taken for one in turn, with a target's noise.
+    """Expect what a target will tell: simulated trials are taken for one in turn, with a target's noise.
 
-    Args:
-        space: The search box.
-        trials: Simulated trials, spread over it.
-        goal: The outputs and noise of a target; its values count for nothing where they are known.
-        seed: Seeds the noise.
+    The goal's values count for nothing where they are known.
 
     Raises:
         RunError: If no trial has an outcome.
@@ -321,10 +316,8 @@ def learn_theta(space: Space, trials: Sequence[Trial], goal: Goal, seed: int = 0
 
 POINTS = 2048
 """At most so many points for the posterior mean."""
-
 DRAWN_POINTS = 1024
 """At most so many for the functions drawn: these are drawn jointly, which takes the cube of their number."""
-
 DRAWS = 200
 LEVELS = (0.025, 0.975)
 JITTER = 1e-8
@@ -382,7 +375,6 @@ def _points(dimensions: int, most: int) -> Floats:
 
 
 def _draws(surrogate: Surrogate, points: Floats) -> Floats:
-    """Functions drawn from the posterior, at points of the unit cube: (draws, points)."""
     mean, covariance = surrogate.joint(points)
     scale = max(float(np.diag(covariance).mean()), JITTER)
     root = np.linalg.cholesky(covariance + JITTER * scale * np.eye(len(mean)))

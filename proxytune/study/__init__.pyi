@@ -4,7 +4,12 @@ from .answer import (
     run_stages as run_stages,
 )
 from .bank import WITHIN as WITHIN, Bank as Bank, bank_of as bank_of, run_bank as run_bank
-from .earlier import earlier_trials as earlier_trials, learn as learn, write_table as write_table
+from .earlier import (
+    BANK_FILE as BANK_FILE,
+    earlier_trials as earlier_trials,
+    learn as learn,
+    write_table as write_table,
+)
 from .facts import (
     check_facts as check_facts,
     describe as describe,

@@ -186,7 +186,13 @@ def result_of(run: StudyRun, scored_anew: Sequence[TrialRecord] | None = None) -
         answer = confirmation.answer.trial
     else:
         answer = answers[-1] if answers and answers[-1] else record(0, run.evaluation_of(finalists(trials, learnt)[0]))
-    best = _best(run, answer, learnt)
+    values = learnt.space.values(answer.theta)
+    _, deviation = learnt.scores([values])
+    proxy = run.evaluation_of(answer).proxy
+    assert proxy is not None
+    assessment = assess(proxy=proxy, target=run.study.target, metrics=run.settings.metrics)
+    mean = learnt.expected_of({values: answer.score or 0.0})[values]
+    best = Best(answer, mean, float(deviation[0]), assessment)
     return StudyResult(
         study=study,
         trials=trials,
@@ -246,16 +252,6 @@ def _answers(trials: tuple[TrialRecord, ...], learnt: Knowledge) -> tuple[TrialR
             best = trial
         found.append(best)
     return tuple(found)
-
-
-def _best(run: StudyRun, answer: TrialRecord, learnt: Knowledge) -> Best:
-    values = learnt.space.values(answer.theta)
-    _, deviation = learnt.scores([values])
-    proxy = run.evaluation_of(answer).proxy
-    assert proxy is not None
-    assessment = assess(proxy=proxy, target=run.study.target, metrics=run.settings.metrics)
-    mean = learnt.expected_of({values: answer.score or 0.0})[values]
-    return Best(answer, mean, float(deviation[0]), assessment)
 
 
 def _failures(run: StudyRun, trials: tuple[TrialRecord, ...]) -> tuple[str, ...]:

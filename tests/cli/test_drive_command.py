@@ -146,7 +146,7 @@ BAD = {
     "no such start": (["--start", "10"], "start 10: the family has 10; give 0 to 9"),
     "a negative seed": (["--seed", "-1"], "--seed must be at least 0, got -1"),
     "an unknown format": (["--output", "a.bmp"], "unknown format '.bmp'; end the name in .png, .gif or .mp4"),
-    "a folder that is a file": (["--output", f"{__file__}/a.png"], "cannot be written there; choose another place"),
+    "a folder that is a file": (["--output", f"{__file__}/a.png"], "cannot be written there, as "),
     "an unknown parameter": (["--theta", "trimm=0"], "θ: unknown parameter 'trimm'; did you mean 'trim'"),
     "a value out of bounds": (["--theta", "trim=7"], "θ: trim must lie within"),
     "a θ that is none": (["--theta", "well"], "--theta well: write NAME=VALUE,NAME=VALUE, best, nominal or a model"),

@@ -171,5 +171,5 @@ def test_the_same_export_again_is_no_error_as_a_killed_one_may_have_been_through
 def test_an_output_that_cannot_be_written_is_one_line(finished, tmp_path, capsys):
     (tmp_path / "file").write_text("")
     output = tmp_path / "file" / "trials.pkl"
-    assert main(["export", str(finished), "--to", "skopt", "--output", str(output)]) == 1
-    assert f"{output}: cannot be written (" in capsys.readouterr().err
+    assert main(["export", str(finished), "--to", "skopt", "--output", str(output)]) == 2
+    assert f"{output}: cannot be written there, as " in capsys.readouterr().err

@@ -4,8 +4,10 @@ import json
 import re
 import warnings
 
+import foreign_robot
 import pytest
 from processes import besides_progress
+from tiny_loop import TWIN, write_tiny
 
 from proxytune.cli.main import main
 from proxytune.report.writing import file_names
@@ -89,4 +91,37 @@ def test_what_would_never_end_is_not_begun(command, make_study, capsys):
 def test_a_folder_in_place_of_a_table_is_told_before_anything_is_simulated(make_study, tmp_path, capsys):
     (tmp_path / "m.toml").write_text("trim = 0.1\n")
     told = refused(capsys, "measure", make_study(), "--model", tmp_path / "m.toml", "--output", tmp_path)
-    assert re.search(r"--output .*: is a folder; give the name of a file in it", told)
+    assert re.search(r": is a folder; give the name of a file in it", told)
+
+
+SPARSE = {
+    "study.toml": ("study", "."),
+    "target.csv": ("study", "."),
+    "big.csv": ("score", "--proxy", "big.csv", "--target", "target.csv", "--metric", "distance:max"),
+    "table.csv": ("import", "table.csv"),
+    "log/samples.csv": ("diagnose", "log"),
+    "model.toml": ("predict", "model.toml", "log", "--output", "poses.csv"),
+    "mine.urdf": ("export", "good.toml", "--into", "mine.urdf", "--output", "patched.urdf"),
+    "commands.csv": ("record", "../tiny", "--model", "good.toml", "--commands", "commands.csv", "--output", "out"),
+}
+
+
+@pytest.mark.parametrize("name", SPARSE)
+def test_a_file_of_gigabytes_that_takes_no_place_on_a_disk_is_not_read(make_study, tmp_path, monkeypatch, capsys, name):
+    folder = make_study()
+    write_tiny(tmp_path / "tiny")
+    (folder / "good.toml").write_text(TWIN)
+    (folder / "log").mkdir()
+    foreign_robot.write_own_times(folder / "log", [foreign_robot.drive(1, seconds=12.0)])
+    monkeypatch.chdir(folder)
+    with open(name, "ab") as sparse:
+        sparse.truncate(3 << 30)
+    assert "it has 3221 MB, of " in refused(capsys, *SPARSE[name])
+
+
+def test_who_means_a_large_file_may_allow_it(make_study, monkeypatch, capsys):
+    monkeypatch.setattr("proxytune.settings.SETTINGS_MB", 1e-5)
+    folder = make_study()
+    assert "PROXYTUNE_LARGEST_MB=1" in refused(capsys, "repair", folder)
+    monkeypatch.setenv("PROXYTUNE_LARGEST_MB", "1")
+    assert "study.db: no such file; there is nothing to repair" in refused(capsys, "repair", folder)

@@ -44,7 +44,8 @@ def test_a_library_that_stumbles_over_too_few_descriptors_is_one_line(failing, c
     failing(problem)
     assert main(["list", "robots"]) == FAILED
     assert re.fullmatch(
-        r"proxytune list: the system refused something \(.*Too many open files\).*\n", capsys.readouterr().err
+        r"proxytune list: the system refused something \(.*Too many open files\); allow more open files .*\n",
+        capsys.readouterr().err,
     )
     problem.__context__ = OSError(errno.ENOENT, "a file that somebody looked for")
     with pytest.raises(UnboundLocalError):

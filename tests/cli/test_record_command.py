@@ -142,6 +142,7 @@ def test_a_table_of_commands_is_driven_as_it_is(recorded, tmp_path, kind):
     ("table", "said"),
     [
         ("episode,time,a,b\nnext,0,1,1\n", "has no columns of commands; name them as a log does"),
+        ("episode,time,left,right\nnext,0,1,1\nnext,1e5,1,1\n", "drive 'next' lasts 100000 s; cut it into drives"),
         ("episode,time,throttle,steering\nnext,0,1,1\n", "which drives by two wheels"),
         ("episode,time,v,omega\nnext,0,9,1\n", "more than the robot's full speed"),
         ("episode,time,left,right\nnext,0,1,nan\n", "column 'right'"),

@@ -100,6 +100,9 @@ STRANGERS = {
         installed("[numba_extensions]", "init = evil_mod:init", "[matplotlib.backend]", "agg = evil_mod"), here=True
     ),
     "a plug-in of Gymnasium": Stranger(installed("[gymnasium.envs]", "__root__ = evil_mod:register"), here=True),
+    "settings of Matplotlib that have LaTeX run": Stranger(
+        {"matplotlibrc": "text.usetex: True\ntext.latex.preamble: \\input{evil}\n"}, here=True
+    ),
     "settings of libraries": Stranger(
         {
             **modules("evil_mod"),
@@ -165,6 +168,16 @@ def test_a_study_that_names_no_code_runs_none_whatever_lies_beside_it(write, nam
     done = called(folder, stranger.here, "study", "." if stranger.here else str(folder), by_module=by_module)
     assert (done.returncode, signatures(folder)) == (stranger.status, []), done.stderr
     assert not (folder / "cache").exists()
+
+
+def test_settings_of_matplotlib_in_the_current_folder_are_not_read(tmp_path):
+    (tmp_path / "matplotlibrc").write_bytes(b"\xfftext.usetex: True\n")
+    code = "import proxytune.__main__ as m; m.load_matplotlib(); import os, matplotlib as n; "
+    done = subprocess.run(
+        [sys.executable, "-c", code + "print(n.rcParams['text.usetex'], os.getcwd())"],
+        cwd=tmp_path, capture_output=True, text=True, env=ENVIRONMENT, check=False,
+    )  # fmt: skip
+    assert done.stdout == f"False {tmp_path}\n", done.stderr
 
 
 def test_an_optional_package_is_found_where_a_study_names_code_as_the_last_place(write, capsys):

@@ -226,11 +226,14 @@ def sealed(half):
 def test_a_read_only_folder_is_told_and_the_study_goes_on_where_it_can_be_written(sealed, finished, capsys):
     folder, why = sealed
     before = (folder / "study.db").read_bytes()
-    line = f"{folder}: cannot be written ({why}); copy the study elsewhere\n"
-    assert run("study", folder, status=1) == f"proxytune study: {line}"
-    assert refused(capsys, 1, "study", folder / "study.toml") == f"proxytune study: {line}"
-    told = refused(capsys, 1, "sweep", folder, "--parameter", "trim", "--points", "2")
+    line = f"{folder / 'figures'}: cannot be written there, as {folder} is closed to you; copy the study elsewhere\n"
+    assert run("study", folder, status=2) == f"proxytune study: {line}"
+    assert refused(capsys, 2, "study", folder / "study.toml") == f"proxytune study: {line}"
+    told = refused(capsys, 2, "sweep", folder, "--parameter", "trim", "--points", "2")
     assert told == f"proxytune sweep: {line}"
+    elsewhere = ("--output", folder.parent / "curves")
+    told = refused(capsys, 1, "sweep", folder, "--parameter", "trim", "--points", "2", *elsewhere)
+    assert told == f"proxytune sweep: {folder}: cannot be written ({why}); copy the study elsewhere\n"
     figure = f"{folder / 'figures' / 'convergence.png'}: the figure cannot be written ({why}); fix that and run again"
     assert refused(capsys, 1, "plot", folder) == f"proxytune plot: {figure}\n"
     assert (folder / "study.db").read_bytes() == before

@@ -12,7 +12,7 @@ from planted import CALM, TRUTH, planted_log
 
 from proxytune.diagnosis import RULES, diagnose_log, forget_stages, robot_of
 from proxytune.diagnosis.answer import Estimate
-from proxytune.diagnosis.stages import FOLDER, Stages, facts_of
+from proxytune.diagnosis.stages import FOLDER, Stages, _digest_of, facts_of
 from proxytune.errors import RunError
 from proxytune.report import diagnosis_document
 
@@ -59,6 +59,15 @@ def test_other_facts_and_spoilt_files_are_made_again(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_a_digit_that_a_disk_has_changed_is_no_result(tmp_path):
+    Stages(tmp_path, "facts").keep("one", lambda: np.linspace(0.0, 1.0, 3))
+    (path,) = tmp_path.rglob("*.pickle")
+    content = path.read_bytes()
+    path.write_bytes(content.replace(np.float64(0.5).tobytes(), np.float64(0.25).tobytes()))
+    assert path.read_bytes() != content
+    assert Stages(tmp_path, "facts").keep("one", lambda: "made again") == "made again"
+
+
 class Harmful:
     def __reduce__(self):
         return os.mkdir, ("harm",)
@@ -68,7 +77,8 @@ def test_a_strangers_file_runs_nothing(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Stages(tmp_path, "facts").keep("one", lambda: 1)
     (path,) = tmp_path.rglob("*.pickle")
-    path.write_bytes(pickle.dumps(Harmful()))
+    content = pickle.dumps(Harmful())
+    path.write_bytes(_digest_of(content) + b"\n" + content)
     assert Stages(tmp_path, "facts").keep("one", lambda: 2) == 2
     assert not (tmp_path / "harm").exists()
 

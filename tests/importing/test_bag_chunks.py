@@ -9,7 +9,7 @@ from rosbags import rosbag1, rosbag2
 
 from proxytune.errors import InputError
 from proxytune.importing import Wanted, bag_chunks, read_source
-from proxytune.unpacking import LARGEST
+from proxytune.settings import LARGEST
 
 PACKINGS = {
     "ros1 bz2": ("ros1", lambda writer: writer.set_compression(rosbag1.Writer.CompressionFormat.BZ2)),

@@ -1,8 +1,15 @@
-"""The extended study is the study itself, by another proxy, from another folder."""
+"""The extended study is the study itself, by another proxy, from another folder; a killed diagnosis goes on."""
 
-from tiny_loop import FOUND, write_tiny
+from contextlib import nullcontext
 
-from proxytune.loop.diagnosing import write_extension
+import pytest
+from planted import TRUTH, planted_log
+from tiny_loop import FOUND, write_diagnosis, write_tiny
+
+from proxytune.diagnosis.stages import Stages
+from proxytune.loop import diagnosing
+from proxytune.loop.diagnosing import diagnose_target, write_extension
+from proxytune.loop.opening import open_loop
 from proxytune.study import load_family, read_study_settings
 
 
@@ -44,3 +51,41 @@ def test_what_a_study_may_read_lies_beside_the_extended_one_and_what_runs_made_d
     extended(tmp_path)
     there = {path.relative_to(folder / "loop" / "extended").as_posix() for path in (folder / "loop").rglob("*.*")}
     assert there == {"study.toml", "twin.toml", "found.toml", "mine.py", "robby/robot.toml"}
+
+
+class Killed(BaseException):
+    """As a signal that nothing can catch."""
+
+
+class Quiet:
+    def diagnosis(self, log):
+        return nullcontext(lambda line: None)
+
+
+class Written:
+    def __init__(self, found):
+        pass
+
+    def write(self, folder):
+        write_diagnosis(folder)
+
+
+def test_a_diagnosis_that_was_killed_goes_on_from_what_its_folder_keeps(tmp_path, monkeypatch):
+    made = []
+
+    def diagnose(log, robot, declared, *, seed, report, folder):
+        Stages(folder, "facts").keep("one", lambda: made.append("one") or 1)
+        if len(made) == 1:
+            made.append("killed")
+            raise Killed
+
+    monkeypatch.setattr(diagnosing, "diagnose_log", diagnose)
+    monkeypatch.setattr(diagnosing, "DiagnosisReport", Written)
+    monkeypatch.setattr(diagnosing, "open_log", lambda *_, **__: nullcontext((planted_log(TRUTH, episodes=1), ())))
+    loop = open_loop(write_tiny(tmp_path / "tiny"), log=None, twin=None)
+    folder = tmp_path / "diagnosed"
+    with pytest.raises(Killed):
+        diagnose_target(loop, tmp_path, folder, Quiet())
+    diagnose_target(loop, tmp_path, folder, Quiet())
+    assert made == ["one", "killed"], "the stage is not made again"
+    assert {path.name for path in folder.iterdir()} == {"diagnosis.json", "model.toml"}

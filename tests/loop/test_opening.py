@@ -8,7 +8,7 @@ import os
 import pytest
 from tiny_loop import write_tiny
 
-from proxytune.cli.main import BAD_INPUT, FAILED, main
+from proxytune.cli.main import BAD_INPUT, main
 from proxytune.errors import StoreError
 from proxytune.files import shipped
 from proxytune.loop import open_loop
@@ -106,7 +106,7 @@ def test_a_folder_without_permission_is_refused(tmp_path, capsys):
     folder = write_tiny(tmp_path / "tiny")
     folder.chmod(0o500)
     try:
-        assert "cannot be written" in refusal(capsys, folder, status=FAILED)
+        assert "cannot be written" in refusal(capsys, folder)
     finally:
         folder.chmod(0o700)
 
@@ -114,7 +114,7 @@ def test_a_folder_without_permission_is_refused(tmp_path, capsys):
 def test_a_folder_that_cannot_be_made_is_refused(tmp_path, capsys):
     folder = write_tiny(tmp_path / "tiny")
     (folder / "loop").write_text("a file")
-    assert "loop: cannot be written" in refusal(capsys, folder, status=FAILED)
+    assert "loop is no folder; move that away" in refusal(capsys, folder)
 
 
 def test_without_names_the_shipped_agents_that_no_tuning_sees_are_held_out(tmp_path):

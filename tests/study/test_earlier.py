@@ -12,7 +12,7 @@ from proxytune.cli.main import main
 from proxytune.errors import ProxytuneError
 from proxytune.storage import Store
 from proxytune.study import StudyRun, open_study, read_study_settings
-from proxytune.study.earlier import TABLE, earlier_trials
+from proxytune.study.earlier import BANK_FILE, earlier_trials
 from tests.conftest import MakeStudy
 
 BANK = {"target": None, "preflight": "true", "budget": "10", "engine": None}
@@ -94,21 +94,21 @@ def _cut_in_half(path: Path) -> None:
 def _edit_table(folder: Path, **changes: object) -> None:
     """Leave the source its table alone, in which these keys are others; a function changes what is there."""
     (folder / "study.db").unlink()
-    table = json.loads((folder / TABLE).read_text())
+    table = json.loads((folder / BANK_FILE).read_text())
     table |= {key: value(table[key]) if callable(value) else value for key, value in changes.items()}
-    (folder / TABLE).write_text(json.dumps(table))
+    (folder / BANK_FILE).write_text(json.dumps(table))
 
 
 def _other_code(folder: Path, shift: float) -> None:
     """Make the source's table one of other code, whose scores differ by so much."""
     (folder / "study.db").unlink()
-    table = json.loads((folder / TABLE).read_text())
+    table = json.loads((folder / BANK_FILE).read_text())
     table["facts"]["identity"] = "other"
     table["trials"] = [
         [theta, [[one and [value + shift for value in one] for one in row] for row in scores]]
         for theta, scores in table["trials"]
     ]
-    (folder / TABLE).write_text(json.dumps(table))
+    (folder / BANK_FILE).write_text(json.dumps(table))
 
 
 def test_other_code_that_plays_the_same_counts(beside: Path, make_study: MakeStudy) -> None:
@@ -124,7 +124,11 @@ BAD = {
     "fewer starts": ({"starts": "2"}, None, "has driven from 2 starts, and this study asks for 3"),
     "other code": ({}, lambda bank: _other_code(bank, 0.5), "its code or versions are others, and agent"),
     "half a database": ({}, lambda bank: _cut_in_half(bank / "study.db"), "study.db: "),
-    "half a table": ({}, lambda bank: ((bank / "study.db").unlink(), _cut_in_half(bank / TABLE)), "no table of trials"),
+    "half a table": (
+        {},
+        lambda bank: ((bank / "study.db").unlink(), _cut_in_half(bank / BANK_FILE)),
+        "no table of trials",
+    ),
     "a seed below 0": ({}, lambda bank: _edit_table(bank, facts=lambda own: own | {"seed": -1}), "no table of trials"),
     "other metrics": (
         {},
@@ -143,7 +147,7 @@ BAD = {
         ),
         "no table of trials",
     ),
-    "not run": ({}, lambda bank: [(bank / name).unlink() for name in ("study.db", TABLE)], "run it first"),
+    "not run": ({}, lambda bank: [(bank / name).unlink() for name in ("study.db", BANK_FILE)], "run it first"),
     "not there": ({}, lambda bank: shutil.rmtree(bank), "no such study or table of trials"),
 }
 
@@ -151,9 +155,9 @@ BAD = {
 def _set_fact(folder: Path, key: str, value: str) -> None:
     """Make the source's table one of another setting, and so of another identity."""
     (folder / "study.db").unlink()
-    table = json.loads((folder / TABLE).read_text())
+    table = json.loads((folder / BANK_FILE).read_text())
     table["facts"] |= {"identity": "other", key: value}
-    (folder / TABLE).write_text(json.dumps(table))
+    (folder / BANK_FILE).write_text(json.dumps(table))
 
 
 @pytest.mark.parametrize("case", BAD)

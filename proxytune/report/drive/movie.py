@@ -3,7 +3,6 @@
 import contextlib
 import importlib
 import logging
-import os
 import shutil
 import subprocess
 from collections.abc import Iterable, Iterator, Sequence
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from proxytune.errors import InputError, RunError
+from proxytune.files import check_place
 from proxytune.report.drive.animation import FRAME_HZ, Animation
 from proxytune.report.drive.figure import episode_figure
 from proxytune.report.writing import save_figure, write_movie
@@ -39,9 +39,7 @@ def check_episode_file(path: Path) -> None:
     """
     if path.suffix.lower() not in (STILL, GIF, MP4):
         raise InputError(f"--output {path}: unknown format '{path.suffix}'; end the name in {STILL}, {GIF} or {MP4}")
-    folder = next(parent for parent in path.absolute().parents if parent.exists())
-    if path.is_dir() or not folder.is_dir() or not os.access(folder, os.W_OK):
-        raise InputError(f"--output {path}: cannot be written there; choose another place")
+    check_place(path)
     if path.suffix.lower() == MP4:
         find_ffmpeg()
 

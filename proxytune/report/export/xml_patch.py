@@ -9,6 +9,7 @@ from xml.parsers import expat
 from xml.sax.saxutils import escape, quoteattr
 
 from proxytune.errors import InputError
+from proxytune.settings import SETTINGS_MB, check_end
 
 OPENING = re.compile(rb"""<[^'">]*(?:(?:"[^"]*"|'[^']*')[^'">]*)*>""")
 
@@ -31,6 +32,7 @@ class XmlPatch:
     def __init__(self, path: Path) -> None:
         self.path = path
         try:
+            check_end(path, SETTINGS_MB)
             self._bytes = path.read_bytes()
             self._before = self._bytes.decode("utf-8")
         except (OSError, UnicodeDecodeError) as problem:

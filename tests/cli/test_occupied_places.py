@@ -1,0 +1,132 @@
+"""A place where a command's answer cannot be written is told in one line before the work begins."""
+
+import os
+
+import foreign_robot
+import pytest
+from processes import besides_progress
+from several import make_several
+from tiny_loop import TWIN, write_tiny
+
+from proxytune.cli.main import main
+
+COMMANDS = {
+    "measure": ("measure tiny --model twin.toml --output there", "measure.measure"),
+    "predict": ("predict twin.toml log --output there", "predict.predict"),
+    "predict of pictures": ("predict twin.toml log --frames --output there", "predict.predict"),
+    "record": ("record tiny --model twin.toml --output there", "record.record_log"),
+    "drive": ("drive tiny --agent steady --output there", "drive.drive_side_by_side"),
+    "export": ("export twin.toml --to filter --output there", "export.export"),
+    "import": ("import log there --robot nobodys", "importing.import_log"),
+    "score": ("score --proxy p.csv --target p.csv --metric d:max --output there", "score.assess_each"),
+    "score's table": ("score --proxy p.csv --target p.csv --metric d:max --table there", "score.assess_each"),
+    "diagnose": ("diagnose log --output there", "diagnose.diagnose_log"),
+    "sweep": ("sweep tiny --parameter trim --output there", "sweep.run_sweep"),
+}
+TARGET = "agent,episode,distance,survival_time\n" + "".join(
+    f"{agent},{start},{start},2\n" for agent in ("steady", "brisk", "daredevil") for start in (0, 1)
+)
+ENDINGS = {"drive": "there.png", "score's table": "there.csv"}
+OF_FOLDERS = ("predict of pictures", "record", "import", "score", "diagnose", "sweep")
+IN_STUDIES = {
+    "study": ("study tiny", "study.run_opened", {"figures": "a file", "report.html": "a folder"}),
+    "study of families": ("study several", "study.run_opened_families", {"figures": "a file"}),
+    "study of a bank": ("study bank", "study.run_bank", {"bank.json": "a folder", "report.html": "a folder"}),
+    "sweep": ("sweep tiny --parameter trim", "sweep.run_sweep", {"figures": "a file"}),
+    "teach": ("teach tiny", "teach.teach", {"figures": "a file", "report.html": "a folder"}),
+    "loop": ("loop tiny", "loop.run_loop", {"loop/diagnosed": "a file", "loop/report.html": "a folder"}),
+    "diagnose": ("diagnose log --output tiny", "diagnose.diagnose_log", {"model.toml": "a folder"}),
+}
+
+
+@pytest.fixture
+def here(tmp_path, make_study, monkeypatch):
+    """A folder with all that the commands read."""
+    write_tiny(tmp_path / "tiny")
+    (tmp_path / "tiny" / "target.csv").write_text(TARGET)
+    (tmp_path / "twin.toml").write_text(TWIN)
+    (tmp_path / "p.csv").write_text("agent,d\nA,1\nB,2\nC,3\n")
+    (tmp_path / "log").mkdir()
+    foreign_robot.write_own_times(tmp_path / "log", [foreign_robot.drive(1, seconds=12.0)])
+    make_several(make_study, called="several")
+    make_study("bank", target=None, preflight=None)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def refused(capsys, monkeypatch):
+    """The one line of a command that is refused before it works."""
+
+    def run(words, work):
+        def begins(*_, **__):
+            pytest.fail("the work has begun")
+
+        monkeypatch.setattr(f"proxytune.cli.{work}", begins)
+        assert main(words.split()) == 2
+        out, told = capsys.readouterr()
+        told = besides_progress(told)
+        assert (out, told.count("\n")) == ("", 1)
+        return told
+
+    return run
+
+
+def put(path, what):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.mkdir() if what == "a folder" else os.mkfifo(path) if what == "a pipe" else path.write_text("")
+
+
+def wanted(name):
+    words, work = COMMANDS[name]
+    place = ENDINGS.get(name, "there")
+    return words.replace("there", place), work, place
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_what_is_of_another_kind_in_the_place_is_told_beforehand(here, refused, name):
+    words, work, place = wanted(name)
+    what = "a file" if name in OF_FOLDERS else "a folder"
+    put(here / place, what)
+    assert f"{place}: is {what}; give " in refused(words, work)
+
+
+@pytest.mark.parametrize("name", ["measure", "predict", "record", "export", "drive"])
+def test_a_pipe_or_a_device_is_not_replaced(here, refused, name):
+    words, work, place = wanted(name)
+    put(here / place, "a pipe")
+    assert f"{place}: is a device or a pipe; give " in refused(words, work)
+    assert (here / place).is_fifo()
+
+
+@pytest.mark.parametrize("name", [name for name in COMMANDS if name != "measure"])
+def test_a_file_on_the_way_is_told_beforehand(here, refused, name):
+    words, work, place = wanted(name)
+    (here / "on").write_text("")
+    told = refused(words.replace(place, f"on/the/{place}"), work)
+    assert f"on/the/{place}: cannot be written there, as {here / 'on'} is no folder; choose another place" in told
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_closed_folder_is_told_beforehand(here, refused, monkeypatch, name):
+    words, work, place = wanted(name)
+    monkeypatch.setattr(os, "access", lambda path, mode: path != here)
+    told = refused(words, work)
+    assert f"{place}: cannot be written there, as {here} is closed to you; choose another place" in told
+
+
+@pytest.mark.parametrize("name", IN_STUDIES)
+def test_what_is_in_the_way_in_a_folder_is_told_beforehand(here, refused, name):
+    words, work, places = IN_STUDIES[name]
+    folder = here / next(word for word in reversed(words.split()) if (here / word).is_dir())
+    for place, what in places.items():
+        put(folder / place, what)
+        assert f"{folder.name}/{place}: is {what}; move it away" in refused(words, work)
+        (folder / place).rmdir() if what == "a folder" else (folder / place).unlink()
+
+
+@pytest.mark.parametrize("name", ["study", "teach", "loop"])
+def test_a_closed_study_is_told_beforehand(here, refused, monkeypatch, name):
+    words, work, _ = IN_STUDIES[name]
+    monkeypatch.setattr(os, "access", lambda path, mode: path != here / "tiny")
+    assert f"as {here / 'tiny'} is closed to you; copy the study elsewhere" in refused(words, work)

@@ -104,7 +104,6 @@ thead .number { white-space: normal; }
 pre { background: var(--tint); padding: .6rem .9rem; overflow-x: auto; }
 code { font: .92em/1.5 ui-monospace, monospace; }
 code span { display: inline-block; }
-pre code { white-space: pre-wrap; }
 nav ol { columns: 16rem; column-gap: 3rem; padding-left: 1.8rem; }
 nav li { break-inside: avoid; }
 a { color: var(--accent); }
@@ -126,6 +125,7 @@ footer { margin-top: 3rem; border-top: 1px solid var(--line); }
   .number { white-space: normal; }
   img, svg.drawn { width: calc(.68 * var(--wide)) !important; max-height: 21cm; min-width: 0 !important; }
   figcaption { flex-basis: 5cm; }
+  pre { white-space: pre-wrap; }
   svg.drawn, svg.drawn image { filter: none !important; }
   figure, tr, p, li, .following { break-inside: avoid; }
   h2 { break-after: avoid; }
@@ -332,7 +332,7 @@ def _foot(foot: Foot, words: str) -> str:
     versions = ", ".join(f"{name} {version}" for name, version in foot.versions)
     parts = [_part(settings, "settings")] if foot.settings else []
     if foot.command:
-        command = f"<pre>{_code(html.escape(foot.command))}</pre>"
+        command = f"<pre><code>{html.escape(foot.command)}</code></pre>"
         parts.append(f'<section><h2 id="again">The command that makes this page</h2>{command}</section>')
     written = [f"Written {foot.date}"] * bool(foot.date) + [f"with {versions}"] * bool(versions)
     parts += [f'<section><h2 id="words">Words on this page</h2><dl>{words}</dl></section>'] if words else []

@@ -5,6 +5,7 @@ the scheduler, is waited for, and what it had is handed out again; which worker 
 """
 
 import logging
+import socket
 import sys
 import threading
 import time
@@ -22,6 +23,8 @@ from proxytune.running.workers import LOST, START_S, AwakeClock, elsewhere
 
 CONNECT_S, JOINED_S = 10.0, 30.0
 """So long it is waited for a connection, and for the first worker [s]."""
+LONGEST_GREETING = 1 << 20
+"""Bytes; a message begins with its length."""
 POLL_S, ANSWER_S = 1.0, 5.0
 """So often the scheduler is asked who is there, and so long it may take to answer [s]."""
 SILENT_S = 60.0
@@ -157,6 +160,32 @@ class _Patience:
             self._say(f"{what}; everything finished is kept")
 
 
+def _wait_for_scheduler(address: str) -> None:
+    """Wait until what listens there greets as a scheduler does: Dask's own client waits without end for what is none.
+
+    Raises:
+        OSError: If nothing does within CONNECT_S.
+        ValueError: If the address is none.
+    """
+    scheme, _, place = address.rpartition("://")
+    if scheme not in ("", "tcp"):
+        return
+    host, _, port = place.rpartition(":")
+    until, number = time.monotonic() + CONNECT_S, int(port)
+    while True:
+        try:
+            with socket.create_connection((host.strip("[]"), number), max(0.1, until - time.monotonic())) as line:
+                length = line.recv(8, socket.MSG_WAITALL)
+        except ConnectionRefusedError:
+            if time.monotonic() > until:
+                raise
+            time.sleep(POLL_S / 10.0)
+            continue
+        if not 0 < int.from_bytes(length, "little") < LONGEST_GREETING:
+            raise ConnectionError("what listens there is no scheduler")
+        return
+
+
 _UNDER_WAY, _AGAIN = object(), object()
 Key = tuple[str, str]
 """Which worker: its address and its own folder, as one that is started again may have the address of the one before."""
@@ -187,6 +216,7 @@ class Cluster:
                 logging.getLogger(name).setLevel(logging.CRITICAL + 1)
         self._killed: type[BaseException] = KilledWorker
         try:
+            _wait_for_scheduler(self._address)
             connect: Any = Client
             return connect(self._address, timeout=CONNECT_S, set_as_default=False)
         except (OSError, ValueError) as problem:

@@ -2,6 +2,8 @@
 
 import json
 import os
+import socket
+import threading
 from functools import partial
 
 import pytest
@@ -55,6 +57,17 @@ def test_where_nothing_answers_the_user_is_told_in_one_line(make_study, capsys, 
     assert main(["study", str(make_study()), "--backend", "dask", "--address", "tcp://127.0.0.1:9"]) == 2
     last = capsys.readouterr().err.strip().splitlines()[-1]
     assert "--address tcp://127.0.0.1:9: no scheduler answers" in last
+
+
+@pytest.mark.parametrize("greeting", [b"", b"SSH-2.0-OpenSSH_9.2\r\n"])
+def test_what_listens_and_is_no_scheduler_is_told_in_one_line(make_study, capsys, monkeypatch, greeting):
+    monkeypatch.setattr("proxytune.running.cluster.CONNECT_S", 0.5)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        if greeting:  # else it is silent
+            threading.Thread(target=lambda: server.accept()[0].sendall(greeting), daemon=True).start()
+        assert main(["study", str(make_study()), "--backend", "dask", "--address", address]) == 2
+    assert f"--address {address}: no scheduler answers" in capsys.readouterr().err.strip().splitlines()[-1]
 
 
 @pytest.mark.parametrize(

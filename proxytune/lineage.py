@@ -36,7 +36,7 @@ SAME_CODE = {
         "193fc67d257973b214825df8319b0a2bd8fa4f91d07b407e963e05f4ac01ae17",
         "beabf1b09de72cb09f039725e6a0a1f6a5c115ddf0d5d81fab482d31f20e64ce",
         "d25c5bcf4fd754c361049ef436a8d76af15abb1ee1438754a2baf5809ae11957",
-        "dbc78a20fae06e4523c272d466698ac659522d113f9ddbef85f94e04e5c0a79d",
+        "403d3586904f8c47aa0c58c330753a20fceba77b0d1576d5c0fdec913ba32c6c",
     ),
     "environments": (
         "f5b9c2c9586c29cd4dc2d6e27f44fd2731ecc2d27bf96a80c745aecd5a3ddb50",

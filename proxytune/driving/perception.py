@@ -144,7 +144,8 @@ def _eyes(looks: tuple[Markings, ...]) -> tuple[int, Eyes]:
     for robot, look in enumerate(looks):
         for marking, least in zip(levels, (look.contrast, look.brightness), strict=True):
             marking[robot, look.eye.first - first :][look.eye.near] = math.floor(min(max(least, 0.0), 255.0))
-    return first, Eyes(*places, np.array([distinct.index(look.eye) for look in looks]), *levels)
+    (ahead, left), (yellow, white) = places, levels
+    return first, Eyes(ahead, left, np.array([distinct.index(look.eye) for look in looks]), yellow, white)
 
 
 def find_lanes(seen: Seen, looks: tuple[Markings, ...], robots: Sequence[int]) -> list[Lane | None]:

@@ -141,7 +141,7 @@ def test_progress_is_shown_only_when_asked_for(make_study, monkeypatch):
     totals = []
 
     class Spy:
-        def __init__(self, total):
+        def __init__(self, total, unit):
             totals.append(total)
 
         def __enter__(self):
@@ -152,7 +152,7 @@ def test_progress_is_shown_only_when_asked_for(make_study, monkeypatch):
         def __exit__(self, *problem):
             pass
 
-    monkeypatch.setattr("proxytune.api.study.Bars", Spy)
+    monkeypatch.setattr("proxytune.running.progress.Bars", Spy)
     folder = make_study("shown", budget="2", initial="2")
     run_study(folder)
     assert totals == []

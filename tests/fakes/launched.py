@@ -20,6 +20,7 @@ class Launched:
     def __init__(self, launcher, folder, words=None):
         # What is left of a killed process, joblib's clean-up, may still print: into a file of its own.
         self.launcher, self.output = launcher, folder.with_name(f"{folder.name}_{time.monotonic_ns()}.txt")
+        self.output.touch()  # one that is killed at once makes none
         launcher.stdin.write(json.dumps([*(words or ["study", str(folder)]), "--json", str(self.output)]) + "\n")
         launcher.stdin.flush()
         self.pid = int(launcher.stdout.readline())

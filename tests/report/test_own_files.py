@@ -157,6 +157,8 @@ def test_a_patched_sdf_has_wheels_and_camera_where_they_were_found(model, tmp_pa
         ("mine.urdf", "<robot", "<robots", "is not XML"),
         ("mine.urdf", "robot", "rover", "begins with <rover>"),
         ("mine.urdf", 'xyz="0.02 0.08 0"', 'xyz="0.02 x 0"', "not sound"),
+        ("mine.urdf", 'xyz="0.02 0.08 0"', 'xyz="0.02 1e999 0"', "not sound"),
+        ("mine.sdf", "0.02 -0.08 -0.02 -1.5708", "0.02 -0.08 -0.02\n", "not sound"),
         ("mine.urdf", 'xyz="0.02 0.08 0"', 'xyz="0.02 -0.18 0"', "is not to the left of"),
         ("mine.sdf", 'relative_to="chassis"', 'relative_to="nowhere"', "not sound"),
         ("mine.xml", 'size="0.0318"', "", "states its own size"),

@@ -93,10 +93,12 @@ def patch(instance: Instance, path: Path, output: Path, wheels: Sequence[str] = 
     if reader is None:
         raise InputError(f"{path}: begins with <{xml.root.tag}>; give a URDF (<robot>), <sdf> or <mujoco>")
     try:
-        own = reader(xml, *_joints(xml, wheels))
-        has = set(_change_wheels(instance, own)) | set(_change_camera(instance, own))
-    except (ValueError, LookupError, RecursionError) as problem:
-        raise InputError(f"{path}: a number or a frame in it is not sound ({problem}); correct it") from None
+        with np.errstate(invalid="raise", over="raise"):
+            own = reader(xml, *_joints(xml, wheels))
+            has = set(_change_wheels(instance, own)) | set(_change_camera(instance, own))
+    except (ValueError, ArithmeticError, LookupError, RecursionError) as problem:
+        what = " ".join(str(problem).split())
+        raise InputError(f"{path}: a number or a frame in it is not sound ({what}); correct it") from None
     return Patched(xml.text(), xml.diff(output.name), frozenset(has))
 
 
@@ -358,4 +360,6 @@ def _angles(turned: Floats) -> tuple[float, float, float]:
 
 
 def _numbers(values: Sequence[float] | Floats) -> str:
+    if not np.isfinite(values).all():
+        raise ValueError("a number is infinite, or none")
     return " ".join(f"{round(float(value), 9) + 0.0:.9g}" for value in values)

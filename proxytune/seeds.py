@@ -30,10 +30,8 @@ AGAIN = 7
 """Tells the seeds of a pre-flight's noise from those of its places."""
 PROXY_LESSONS, TARGET_LESSONS, EXAM = range(3)
 """What a seed of a learning experiment is for."""
-
 ROUND = 17
 """Tells the seeds of the rounds in which a learner drives from those of an expert's lessons."""
-
 RESET, COURSE, ACTING = 11, 12, 13
 """Tell what an environment's states, its course and a random agent draw from apart."""
 

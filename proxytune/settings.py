@@ -25,13 +25,10 @@ TEXT_MB, SETTINGS_MB = 500, 20
 """Of a table, and of TOML: what reads them takes many times as much memory."""
 MOST_DOTS = 100
 """In one key: the time to read a dotted key grows with the square of its parts."""
-
 GEOMETRY: Mapping[str, str] = MappingProxyType(
     {"wheel_radius_m": "wheel_radius", "baseline_m": "effective_baseline", "full_speed_m_s": "full_speed"}
 )
 """Keys of log.toml and model.toml for a robot's figures, and what its robot.toml calls these."""
-
-
 SIZES: Mapping[str, tuple[float, float, str]] = {
     "wheel_radius": (0.002, 1.5, "m"),
     "effective_baseline": (0.01, 6.0, "m"),

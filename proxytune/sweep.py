@@ -56,11 +56,7 @@ def has_answer(study: Study) -> bool:
 
 
 def best_theta(study: Study, option: str = "--at") -> Theta:
-    """The best θ that the study has found so far; the option that asks for it is named in complaints.
-
-    Raises:
-        InputError: If no trial is finished, or the study was changed since.
-    """
+    """The best θ that the study has found so far; the option that asks for it is named in complaints."""
     if not has_answer(study):
         folder = study.settings.home
         raise InputError(f"{folder}: has no finished trial; run it first (python -m proxytune study {folder})")
@@ -74,7 +70,6 @@ def best_theta(study: Study, option: str = "--at") -> Theta:
 
 COMMANDS = 100
 """At most so many commands are replayed, 5 s at 20 Hz: later, two domains are far apart whatever their difference."""
-
 REPLAYED = "f1b2d6a3eda6bd6409dcf09bb3bf65753aad6648d68c23ac343b313fa66dcbc8"
 """Names how replays are compared: what is kept of them is found by it. Change it where they are compared otherwise."""
 METRICS = {"pod_pose": "m", "pod_image": "of full scale"}
@@ -105,12 +100,7 @@ class Replayable(DomainFamily, Protocol):
 
 @dataclass(frozen=True)
 class Discrepancy:
-    """A domain family whose episodes are replays in two others, and whose metrics are their discrepancies.
-
-    Attributes:
-        proxy: Where θ holds.
-        target: Fixed; the agent of the episode drives here, and what it issued is replayed in both.
-    """
+    """A family whose episodes are replays on both of what an agent issued on the target, scored by discrepancies."""
 
     proxy: Replayable
     target: Replayable
@@ -136,19 +126,11 @@ class Discrepancy:
         return self.proxy.starts
 
     def check_agent(self, name: str) -> None:
-        """Refuse an agent that the target cannot run.
-
-        Raises:
-            InputError: If there is no such agent.
-        """
+        """Refuse an agent that the target cannot run."""
         self.target.check_agent(name)
 
     def run(self, episode: Episode) -> Mapping[str, float]:
-        """Replay in both domains and compare, eq. (1), over the time until the first of them ends.
-
-        Raises:
-            EpisodeError: If the agent fails on the target.
-        """
+        """Replay in both domains and compare, eq. (1), over the time until the first of them ends."""
         commands, there = _on_target(self.target, replace(episode, theta=()))
         here = self.proxy.replay(episode, commands)
         poses, pictures = (min(map(len, both)) for both in ((here.poses, there.poses), (here.pictures, there.pictures)))
@@ -166,11 +148,7 @@ def _on_target(target: Replayable, episode: Episode) -> tuple[Any, Observed]:
 
 
 def discrepancy_study(study: Study, model: Path) -> Study:
-    """The study whose episodes are replays of its first agent's commands on the target that a model describes.
-
-    Raises:
-        InputError: If there is no such model, or the study's domain family cannot replay commands.
-    """
+    """The study whose episodes are replays of its first agent's commands on the target that a model describes."""
     if not model.is_file():
         raise InputError(f"--target-model {model}: no such file; check the path")
     proxy: Any = study.family
@@ -192,13 +170,7 @@ DECIMALS = 12
 
 @dataclass(frozen=True)
 class PodMean:
-    """A POD averaged over the starts.
-
-    Attributes:
-        value: In its own unit.
-        interval: Its bootstrap interval over the starts; None for a single start.
-        starts: How many starts worked.
-    """
+    """A POD in its own unit over the starts that worked; its interval is bootstrapped, None for a single start."""
 
     value: float
     interval: tuple[float, float] | None
@@ -249,11 +221,7 @@ class SweepCurve:
 
 
 def sweep_interval(study: Study, parameter: str) -> Interval:
-    """The interval of a sweep: the study's box, or all that a parameter may be where the study does not search it.
-
-    Raises:
-        InputError: If the family has no such parameter.
-    """
+    """The interval of a sweep: the study's box, or all that a parameter may be where the study does not search it."""
     boxes = {interval.name: interval for interval in study.settings.space.intervals}
     if parameter in boxes:
         return boxes[parameter]
@@ -262,11 +230,7 @@ def sweep_interval(study: Study, parameter: str) -> Interval:
 
 
 def check_base(study: Study, base: Theta) -> None:
-    """Refuse values that the family cannot take.
-
-    Raises:
-        InputError: With the parameter's name.
-    """
+    """Refuse values that the family cannot take."""
     for name, value in base.items():
         known = _parameter(study, name)
         if not known.low <= value <= known.high:
@@ -380,13 +344,7 @@ class SweepEstimate:
 
 @dataclass(frozen=True)
 class Series:
-    """One measure along the parameter.
-
-    Attributes:
-        measure: What is measured.
-        metric: Of which metric; ALL where there is one value for all metrics.
-        estimates: One per point, in rising order of the parameter.
-    """
+    """One measure along the parameter, ALL or of one metric: an estimate per point, in rising order."""
 
     measure: Measure
     metric: str
@@ -501,21 +459,25 @@ def describe_shape(series: Series, held: float | None) -> str:
     if shape.score is None:
         return f"{series.name}: undefined at every point"
     extreme = "highest" if series.higher_is_better else "lowest"
-    best, near = ", ".join(f"{value:.4g}" for value in shape.best), _listed(shape.near_best, series)
+    best, near = ", ".join(map(_number, shape.best)), _listed(shape.near_best, series)
     line = f"{series.name}: {extreme} ({shape.score:.3g}) at {best}; not worse beyond noise: {near}"
     if held is None:
         return line
     if "unseen" == shape.below == shape.above:
         return line
-    return f"{line}; from {held:.4g} downwards it {OUTWARDS[shape.below]}, upwards it {OUTWARDS[shape.above]}"
+    return f"{line}; from {_number(held)} downwards it {OUTWARDS[shape.below]}, upwards it {OUTWARDS[shape.above]}"
 
 
 def _listed(chosen: Sequence[float], series: Series) -> str:
     """The values as a range where they are one, by name where there are gaps."""
     between = [one.value for one in series.estimates if chosen[0] <= one.value <= chosen[-1] and one.score is not None]
     if len(chosen) > 1 and len(between) == len(chosen):
-        return f"{chosen[0]:.4g} to {chosen[-1]:.4g}"
-    return ", ".join(f"{value:.4g}" for value in chosen)
+        return f"{_number(chosen[0])} to {_number(chosen[-1])}"
+    return ", ".join(map(_number, chosen))
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}".replace("-", "−")
 
 
 def _cost(estimate: SweepEstimate, sign: float) -> _Cost | None:

@@ -20,10 +20,8 @@ from proxytune.settings import LARGEST, allowed_bytes
 ARRAYS_MB = 1000
 """All arrays of a file together, or all pictures of a log as they are kept: what reads them takes two or three times
 as much memory."""
-
 BAG_MB = 1000
 """What a bag unpacks to, or a hundred times its own size: no recording of a robot is denser."""
-
 PICTURE_MB = 200
 """One picture of red, green and blue: 66 megapixels."""
 

@@ -9,9 +9,8 @@
     logs         record_log
     transfer     import_log, measure, predict
     exporting    export; CommandFilter: a model before any simulator's step
-    driving      drive
+    driving      drive; θ as people give it
     search_box   SearchBox: the optimiser alone
-    theta        θ as people give it
 
 The command line is options, one of these functions, and text.
 """

@@ -1,6 +1,12 @@
 from .curves import SweepReport as SweepReport, TeachReport as TeachReport, run_sweep as run_sweep, teach as teach
 from .diagnosis import DiagnosisReport as DiagnosisReport, diagnose as diagnose
-from .driving import DrivenEpisode as DrivenEpisode, drive as drive
+from .driving import (
+    ChosenTheta as ChosenTheta,
+    DrivenEpisode as DrivenEpisode,
+    choose_theta as choose_theta,
+    drive as drive,
+    read_theta as read_theta,
+)
 from .exporting import TRIALS as TRIALS, CommandFilter as CommandFilter, ExportReport as ExportReport, export as export
 from .families import (
     FamiliesReport as FamiliesReport,
@@ -19,7 +25,6 @@ from .study import (
     run_opened as run_opened,
     run_study as run_study,
 )
-from .theta import ChosenTheta as ChosenTheta, choose_theta as choose_theta, read_theta as read_theta
 from .transfer import (
     ImportReport as ImportReport,
     Measurement as Measurement,

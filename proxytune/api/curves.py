@@ -1,7 +1,6 @@
 """Sweeps and learning curves from Python: usefulness along a parameter, and what a proxy saves in training."""
 
 from collections.abc import Mapping
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,7 +8,7 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure
 
-from proxytune.api.theta import read_theta
+from proxytune.api.driving import read_theta
 from proxytune.errors import InputError
 from proxytune.report import (
     Shown,
@@ -28,10 +27,10 @@ from proxytune.report import (
     write_sweep_page,
     write_teach_report,
 )
-from proxytune.running import Bars, Silent, Watcher
+from proxytune.running import watching
 from proxytune.space import Theta
 from proxytune.storage import Store, locked
-from proxytune.study import Study, StudyRun, StudySettings, family_catalogue, open_study
+from proxytune.study import StudyRun, StudySettings, family_catalogue, open_study
 from proxytune.sweep import (
     SweepCurve,
     best_theta,
@@ -162,7 +161,13 @@ def run_sweep(
     if not 2 <= points <= MOST_POINTS:
         raise InputError(f"--points must be between 2 and {MOST_POINTS}, got {points}")
     word = ("best" if has_answer(study) else "nominal") if at is None else at
-    base = _base(study, word)
+    if isinstance(word, Mapping):
+        base: Theta = word
+    elif word == "best":
+        base = best_theta(study)
+    else:
+        base = read_theta(word, family_catalogue(study.family, study.settings), "--at")
+    check_base(study, base)
     names = study.settings.space.names if parameter == "all" else (parameter,)
     sweeps = [plan_sweep(sweep_interval(study, name), base, points) for name in names]
     discrepancy = None
@@ -173,30 +178,13 @@ def run_sweep(
     total = sum(len(sweep.points) for sweep in sweeps) * per_point * study.settings.starts
     folder = study.settings.home
     with locked(folder), Store.open(folder) as store:
-        with _watching(progress, total) as watcher:
+        with watching(progress, total) as watcher:
             run = StudyRun(study, store, watcher)
             for sweep in sweeps:
                 run_planned(run, sweep, discrepancy)
         curves = tuple(curve for sweep in sweeps if (curve := curve_of(run, sweep)))
     chosen = word if word in ("best", "nominal") else "given"
     return SweepReport(study.settings, curves, str(chosen), sweeps[0].base, run.spent.episodes, study.truth)
-
-
-def _base(study: Study, word: str | Theta) -> Theta:
-    if isinstance(word, Mapping):
-        base: Theta = word
-    elif word == "best":
-        base = best_theta(study)
-    else:
-        base = read_theta(word, family_catalogue(study.family, study.settings), "--at")
-    check_base(study, base)
-    return base
-
-
-def _watching(progress: bool, total: int, unit: str = "") -> AbstractContextManager[Watcher]:
-    if not progress:
-        return nullcontext(Silent())
-    return Bars(total, unit) if unit else Bars(total)
 
 
 @dataclass(frozen=True, repr=False)
@@ -268,8 +256,8 @@ def teach(path: str | Path, *, progress: bool = False) -> TeachReport:
     proxies = setup.settings.proxies
     with locked(settings.home), Store.open(settings.home) as store:
         examinations = count_examinations(setup.settings, len(proxies) + 1)
-        with _watching(progress, examinations, "points of learning curves") as bars:
+        with watching(progress, examinations, "points of learning curves") as bars:
             experiment = run_experiment(settings, setup, bars)
-        with _watching(progress, len(settings.agents) * settings.starts * len(proxies)) as bars:
+        with watching(progress, len(settings.agents) * settings.starts * len(proxies)) as bars:
             prpv = predictivity(StudyRun(study, store, bars), proxies)
     return TeachReport(settings, experiment, prpv)

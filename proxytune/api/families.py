@@ -1,10 +1,10 @@
 """Several domain families from Python: each tuned in the same time, taught if that is asked for, and compared."""
 
 from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import pandas as pd
 from matplotlib.figure import Figure
@@ -21,7 +21,7 @@ from proxytune.report import (
     svg_of,
     write_families_report,
 )
-from proxytune.running import Bars, Silent, Watcher
+from proxytune.running import Watcher, watching
 from proxytune.storage import Store, locked
 from proxytune.study import (
     ComparedFamilies,
@@ -40,39 +40,10 @@ from proxytune.study import (
 )
 from proxytune.teaching import classrooms, teach_families
 
-
-class Teller(Protocol):
-    """Hears how several families are tuned and taught."""
-
-    def say(self, line: str) -> None:
-        """One line."""
-        ...
-
-    def tuning(self, study: Study) -> AbstractContextManager[Watcher]:
-        """Gives what hears of every episode of a family."""
-        ...
-
-    def teaching(self, points: int) -> AbstractContextManager[Watcher]:
-        """Gives what hears of so many points of learning curves."""
-        ...
-
-
-class Quiet:
-    """Tells nothing, or shows a bar with the time left."""
-
-    def __init__(self, progress: bool = False) -> None:
-        self._progress = progress
-
-    def say(self, line: str) -> None:
-        """Say nothing."""
-
-    def tuning(self, study: Study) -> AbstractContextManager[Watcher]:
-        """A bar of episodes."""
-        return Bars(most_episodes(study.settings)) if self._progress else nullcontext(Silent())
-
-    def teaching(self, points: int) -> AbstractContextManager[Watcher]:
-        """A bar of points."""
-        return Bars(points, "points of learning curves") if self._progress else nullcontext(Silent())
+Say = Callable[[str], None]
+Tuning = Callable[[Study], AbstractContextManager[Watcher]]
+"""Gives what hears of every episode of a family."""
+CURVE_POINTS = "points of learning curves"
 
 
 class Spending(NamedTuple):
@@ -155,7 +126,12 @@ def run_families(path: str | Path, *, progress: bool = False, jobs: int | None =
         InputError: If anything in the study cannot be used, or it is of one family.
         RunError: If no trial of a family works, or the machine fails; all that was finished is kept.
     """
-    return run_opened_families(_several(read_study_settings(Path(path))), Quiet(progress), Spending(jobs=jobs))
+    settings = _several(read_study_settings(Path(path)))
+
+    def tuning(study: Study) -> AbstractContextManager[Watcher]:
+        return watching(progress, most_episodes(study.settings))
+
+    return run_opened_families(settings, Spending(jobs=jobs), lambda line: None, tuning, progress=progress)
 
 
 def read_families(path: str | Path) -> FamiliesReport:
@@ -176,25 +152,22 @@ def read_families(path: str | Path) -> FamiliesReport:
     return FamiliesReport(ComparedFamilies(settings, families, still_so), Spent())
 
 
-def run_opened_families(settings: StudySettings, teller: Teller, spending: Spending) -> FamiliesReport:
+def run_opened_families(
+    settings: StudySettings, spending: Spending, say: Say, tuning: Tuning, *, progress: bool = True
+) -> FamiliesReport:
     """Tune the families one after the other, teach by them where the study has [teaching], and compare them.
 
-    All of them are opened before the first is tuned, so that a mistake is told at once.
-
-    Args:
-        settings: Of the study of all families.
-        teller: Hears how it goes.
-        spending: What is spent otherwise than study.toml says.
+    All of them are opened before the first is tuned, so that a mistake is told at once. Progress is of the teaching.
     """
     studies = {name: _open(one, spending) for name, one in settings.families.items()}
     classrooms(settings)
     reports: dict[str, StudyReport] = {}
     with locked(settings.home):
         for number, (name, study) in enumerate(studies.items(), start=1):
-            teller.say(f"family {number} of {len(studies)}: {name}")
-            reports[name] = _tune(name, study, teller, spending.retry_failed)
+            say(f"family {number} of {len(studies)}: {name}")
+            reports[name] = _tune(name, study, say, tuning(study), spending.retry_failed)
         families = tuple(_tuned(report) for report in reports.values())
-        lessons = _teach(settings, families, teller, spending)
+        lessons = _teach(settings, families, spending.jobs, say, progress)
     spent = sum((report.spent for report in reports.values()), Spent())
     return FamiliesReport(ComparedFamilies(settings, families, lessons), spent)
 
@@ -209,11 +182,9 @@ def _open(settings: StudySettings, spending: Spending) -> Study:
     return with_spending(open_settings(settings), budget=spending.budget, jobs=spending.jobs)
 
 
-def _tune(name: str, study: Study, teller: Teller, retry_failed: bool) -> StudyReport:
-    """Run what is left of a family's study, and write its page."""
-    warn: Callable[[str], None] = lambda line: teller.say(f"{name}: {line}")  # noqa: E731
+def _tune(name: str, study: Study, say: Say, bars: AbstractContextManager[Watcher], retry_failed: bool) -> StudyReport:
     try:
-        report = run_opened(study, teller.tuning(study), warn, retry_failed)
+        report = run_opened(study, bars, lambda line: say(f"{name}: {line}"), retry_failed)
     except RunError as problem:
         raise type(problem)(f"families.{name}: {problem}") from problem
     report.write()
@@ -227,12 +198,12 @@ def _tuned(report: StudyReport) -> TunedFamily:
 
 
 def _teach(
-    settings: StudySettings, families: tuple[TunedFamily, ...], teller: Teller, spending: Spending
+    settings: StudySettings, families: tuple[TunedFamily, ...], jobs: int | None, say: Say, progress: bool
 ) -> dict[str, Lesson]:
     if settings.teaching is None:
         return {}
-    teller.say("teaching by each at its best θ")
-    own = replace(settings, jobs=spending.jobs or settings.jobs)
-    lessons = teach_families(own, {one.name: one.theta for one in families}, teller.teaching)
+    say("teaching by each at its best θ")
+    own, thetas = replace(settings, jobs=jobs or settings.jobs), {one.name: one.theta for one in families}
+    lessons = teach_families(own, thetas, lambda points: watching(progress, points, CURVE_POINTS))
     save_lessons(settings, lessons)
     return lessons

@@ -56,13 +56,6 @@ def record_log(
 ) -> tuple[Log, tuple[str, ...]]:
     """Drive every manoeuvre, and lanes where pictures are wanted, and write the log; without log.toml it is none.
 
-    Args:
-        settings: Of the study, for its [domain].
-        model: The model.toml of the domain.
-        folder: The log's folder to write.
-        wanted: What is to be driven.
-        tell: Hears how far it is.
-
     Returns:
         The log, and what is probably not meant in its domain or itself, a sentence each.
 
@@ -86,7 +79,10 @@ def record_log(
     if wanted.frames:
         road = _write_map(settings.domain, folder)
         log = _film(log, drives, road, folder, lambda taken: tell(f"driving: {taken} of {wanted.frames} frames"))
-    _write(log, folder, f"{model.name} on the {family.plant} plant, driven by proxytune")
+    write_text(folder / "samples.csv", samples_text(log))
+    if log.frames:
+        write_text(folder / "frames.csv", frames_text(log, log.frames, range(len(log.frames.paths)), "%.6f"))
+    write_text(folder / "log.toml", log_text(log, f"{model.name} on the {family.plant} plant, driven by proxytune"))
     found = (*cautions_of(family), *log_cautions(log, read_robot(family.robot, family.folder).figures))
     return log, tuple(dict.fromkeys(found))
 
@@ -115,11 +111,3 @@ def _film(log: Log, filmed: Iterable[FilmedDrive], road: str, folder: Path, tell
         tell(len(paths))
     frames = Frames(tuple(paths), np.array(drives), np.array(times), road)
     return replace(log, episodes=tuple(episodes), frames=frames)
-
-
-def _write(log: Log, folder: Path, source: str) -> None:
-    """Its tables, then log.toml: without that a folder is no log."""
-    write_text(folder / "samples.csv", samples_text(log))
-    if log.frames:
-        write_text(folder / "frames.csv", frames_text(log, log.frames, range(len(log.frames.paths)), "%.6f"))
-    write_text(folder / "log.toml", log_text(log, source))

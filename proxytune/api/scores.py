@@ -140,12 +140,7 @@ class ScoreReport(Shown, Assessment):
 
 @dataclass(frozen=True, repr=False)
 class Ranking(Shown):
-    """Several proxies of one target: which is better beyond noise, by PRPV, by regret and by what it saves.
-
-    Attributes:
-        proxies: Each one's report, by name.
-        selection: Ranked by PRPV.
-    """
+    """Several proxies of one target: which is better beyond noise, by PRPV, by regret and by what it saves."""
 
     proxies: Mapping[str, ScoreReport]
     selection: Selection
@@ -287,7 +282,6 @@ def _metrics(metrics: str | Metric | Sequence[str | Metric] | None, header: Sequ
 
 
 def _header(scores: Scores | None) -> list[str]:
-    """The columns of a table, as far as they are known before it is read."""
     if isinstance(scores, pd.DataFrame):
         return [str(name) for name in scores.columns]
     if isinstance(scores, str | Path):
@@ -301,18 +295,14 @@ def _expanded(metric: str | Metric, header: Sequence[str]) -> Sequence[str | Met
 
 def _table(scores: Scores | None, side: Side, names: Sequence[str], columns: Mapping[str, str] | None) -> ScoreTable:
     if isinstance(scores, ScoreTable):
-        return _selected(scores, side, names)
+        try:
+            return scores.select(names)
+        except ScoresError as problem:
+            raise ScoresError(f"{side}: {problem}") from None
     if isinstance(scores, str | Path):
         return read_scores(scores, names, columns=columns, side=side)
     with as_files({side: _checked(scores, side, columns)}) as folder:
         return read_scores(folder / f"{side}.csv", names, columns=columns, side=side)
-
-
-def _selected(scores: ScoreTable, side: str, names: Sequence[str]) -> ScoreTable:
-    try:
-        return scores.select(names)
-    except ScoresError as problem:
-        raise ScoresError(f"{side}: {problem}") from None
 
 
 def _checked(scores: pd.DataFrame | None, side: str, columns: Mapping[str, str] | None) -> pd.DataFrame:

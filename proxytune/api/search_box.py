@@ -113,11 +113,7 @@ class SearchBox:
 
 
 def box_space(box: Mapping[str, tuple[float, float]]) -> Space:
-    """The box of these ends by name.
-
-    Raises:
-        InputError: If it is empty or inside out.
-    """
+    """The box of these ends by name."""
     if not box:
         raise InputError("the box is empty; give at least one parameter, as in {'trim': (-0.3, 0.3)}")
     return Space(tuple(_interval(name, box[name]) for name in sorted(box)))

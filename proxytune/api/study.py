@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,6 +11,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from proxytune.domain import Outcome
+from proxytune.errors import InputError
 from proxytune.report import (
     Shown,
     View,
@@ -21,7 +22,7 @@ from proxytune.report import (
     svg_of,
     write_study_report,
 )
-from proxytune.running import Bars, Silent, Watcher
+from proxytune.running import Watcher, watching
 from proxytune.search import History, optimize_result
 from proxytune.space import Theta
 from proxytune.storage import Store, locked
@@ -101,6 +102,24 @@ class StudyReport(Shown):
 
     to_frame = trials
 
+    def posterior(self, draws: int = 4000, seed: int = 0) -> pd.DataFrame:
+        """Draw θ from what is known of it: a column per parameter, in its unit; how they trade off is in the rows.
+
+        Each row is a θ that may have made the target, given every metric of every agent, drawn as often as it is
+        probable over the box. Run a simulator at some of them to see what is left open; of one column alone, the
+        central 95 % are the interval in the answer, but for the chance of the draws.
+
+        Args:
+            draws: How many rows.
+            seed: Of the draws.
+
+        Raises:
+            InputError: If the number of draws is not positive.
+        """
+        if draws < 1:
+            raise InputError(f"draws must be at least 1, got {draws}")
+        return pd.DataFrame(self.result.knowledge.draw(draws, seed), columns=list(self.result.knowledge.space.names))
+
     def figures(self) -> dict[str, Figure]:
         """Convergence, profiles, evaluations and importance, by name."""
         return study_figures(self.result)
@@ -170,31 +189,27 @@ def run_quietly(
     study: Study, progress: bool, known: Sequence[Outcome | Theta] = (), retry_failed: bool = False
 ) -> StudyReport:
     """Run a study that has been opened, as `run_study` does; what is to be known at once is a warning."""
-    watching = Bars(most_episodes(study.settings)) if progress else nullcontext(Silent())
-    return run_opened(study, watching, lambda line: warnings.warn(line, stacklevel=6), retry_failed, known)
+    bars = watching(progress, most_episodes(study.settings))
+    return run_opened(study, bars, lambda line: warnings.warn(line, stacklevel=6), retry_failed, known)
 
 
 def run_opened(
     study: Study,
-    watching: AbstractContextManager[Watcher],
+    bars: AbstractContextManager[Watcher],
     warn: Callable[[str], None] = lambda line: None,
     retry_failed: bool = False,
     known: Sequence[Outcome | Theta] = (),
 ) -> StudyReport:
-    """Search by predictivity from wherever it was left: pre-flight, trials, confirmation.
+    """Search by predictivity from where it was left: pre-flight, trials, confirmation; `known` is as in `run_stages`.
 
-    Args:
-        study: The study.
-        watching: Gives what hears of every episode.
-        warn: Hears, before the first trial, of another search than before and of parameters without effect.
-        retry_failed: Whether to drive every failed episode again, not only those whose code has changed.
-        known: As `run_stages` takes them.
+    Of another search than before, and of parameters without effect, it warns before the first trial. Failed episodes
+    are driven again where their code has changed, or all of them.
     """
     settings = study.settings
     with locked(settings.home), Store.open(settings.home) as store:
         if retry_failed:
             store.forget_failures()
-        with watching as watcher:
+        with bars as watcher:
             under_way = StudyRun(study, store, watcher)
             run_stages(under_way, warn, known)
         return StudyReport(result_of(under_way), under_way.spent)

@@ -34,7 +34,7 @@ from proxytune.importing import (
 )
 from proxytune.logs import Log, check_kind, log_cautions
 from proxytune.report import frame_html, write_picture, write_text
-from proxytune.running import Bars, Silent
+from proxytune.running import watching
 from proxytune.scores import ScoreTable, write_scores
 from proxytune.seeds import target_seed
 from proxytune.settings import GEOMETRY
@@ -112,7 +112,6 @@ def import_log(
 
 
 def _known_robot(name: str) -> Robot | None:
-    """A robot, if it is known here."""
     with suppress(InputError):
         return read_robot(name, Path.cwd()) if name in robot_names(Path.cwd()) else None
     return None
@@ -196,7 +195,7 @@ def measure(
         raise InputError(f"--model {path}: no such file; check the path")
     episodes = len(settings.agents) * settings.starts * repeats
     cautions = cautions_of(bare_family(settings, path))
-    with Bars(episodes) if progress else nullcontext(Silent()) as watcher:
+    with watching(progress, episodes) as watcher:
         return Measurement(measure_agents(settings, path, own, watcher, repeats), path, own, repeats, cautions)
 
 
@@ -227,7 +226,7 @@ class Prediction:
         """Say how far the predicted poses are from the measured ones."""
         rmse = self.error
         if not rmse.poses:
-            return "no drive has measured poses over a whole window"
+            return "nothing to compare with, for no drive has measured poses over a whole window"
         return f"RMSE {1e3 * rmse.place:.1f} mm, {np.degrees(rmse.turn):.2f}° over {rmse.poses} poses"
 
     def document(self) -> dict[str, Any]:
@@ -306,7 +305,17 @@ def predict(
     opened = nullcontext((log, ())) if isinstance(log, Log) else open_log(Path(log), wanted or Wanted(), named)
     with opened as (drives, _):
         if frames is not None:
-            return _predict_pictures(drives, _robot_of(fitted, drives, catalogue), fitted, Path(frames), tell)
+            folder = Path(frames)
+            numbers, errors = list[int](), list[float]()
+            for part in predict_pictures(drives, _robot_of(fitted, drives, catalogue), fitted.theta):
+                for number, picture in zip(part.numbers.tolist(), part.pictures, strict=True):
+                    write_picture(folder / (PICTURES % number), picture)
+                numbers += part.numbers.tolist()
+                errors += part.grey_errors.tolist()
+                tell(f"drawing: {len(numbers)} frames")
+            # It comes last, so that a list never names what is not there.
+            write_text(folder / "frames.csv", frames_text(drives, frames_of(drives), numbers))
+            return PicturePrediction(folder, len(numbers), float(np.mean(errors)))
         if drives.command == "none":
             hint = "" if drives.frames is None else ", or give --frames to predict those"
             raise InputError(f"{drives.name}: has no commands to predict poses from; give a log of drives{hint}")
@@ -314,21 +323,6 @@ def predict(
         table = predict_poses(drives, robot, fitted.theta, horizon_s)
         cautions = (*fitted.cautions, *log_cautions(drives, robot.figures))
         return Prediction(table, horizon_s, agreement(table, drives, horizon_s), cautions)
-
-
-def _predict_pictures(
-    log: Log, robot: Robot, model: Model, folder: Path, tell: Callable[[str], None]
-) -> PicturePrediction:
-    """Every frame as a picture; frames.csv comes last, so that a list never names what is not there."""
-    numbers, errors = list[int](), list[float]()
-    for part in predict_pictures(log, robot, model.theta):
-        for number, picture in zip(part.numbers.tolist(), part.pictures, strict=True):
-            write_picture(folder / (PICTURES % number), picture)
-        numbers += part.numbers.tolist()
-        errors += part.grey_errors.tolist()
-        tell(f"drawing: {len(numbers)} frames")
-    write_text(folder / "frames.csv", frames_text(log, frames_of(log), numbers))
-    return PicturePrediction(folder, len(numbers), float(np.mean(errors)))
 
 
 def _robot_of(model: Model, log: Log, catalogue: Catalogue) -> Robot:

@@ -23,7 +23,7 @@ from proxytune.errors import EpisodeError, InputError
 from proxytune.files import temporary_folder
 from proxytune.identity import digest, meaning_of_code
 from proxytune.report import write_text
-from proxytune.scores import Metric, ScoreTable, read_scores
+from proxytune.scores import Metric, read_scores
 from proxytune.settings import nearest
 from proxytune.space import Parameter, Space, Theta
 from proxytune.study import FILE_NAME, GIVEN, Study, open_settings, plan_episodes, read_study_settings
@@ -34,16 +34,7 @@ HEAD = "# Written by proxytune.tune, which writes it anew at every call.\n"
 
 @dataclass(frozen=True)
 class GivenFamily:
-    """A user's function as a domain family.
-
-    Attributes:
-        simulate: Called with θ and the agent's name; with start and seed too where it has such arguments.
-        parameters: Each of θ.
-        metrics: What it scores, with units.
-        agents: Whom it can run.
-        starts: How many starting conditions there are.
-        identity: A digest of its code.
-    """
+    """A user's function as a domain family: called with θ and the agent, and start and seed where it has these."""
 
     simulate: Simulate
     parameters: Mapping[str, Parameter]
@@ -53,20 +44,12 @@ class GivenFamily:
     identity: str
 
     def check_agent(self, name: str) -> None:
-        """Refuse an agent that has no policy.
-
-        Raises:
-            InputError: If it is unknown.
-        """
+        """Refuse an agent that has no policy."""
         if name not in self.agents:
             raise InputError(f"agent '{name}' is not given; {nearest(name, self.agents)}")
 
     def run(self, episode: Episode) -> Mapping[str, float]:
-        """The scores of one episode.
-
-        Raises:
-            EpisodeError: If it scores nothing, or one number where there are several metrics.
-        """
+        """The scores of one episode."""
         known = {"start": episode.start, "seed": episode.seed}
         named = {name: value for name, value in known.items() if name in _arguments(self.simulate)}
         scores = self.simulate(dict(episode.theta), episode.agent, **named)
@@ -127,7 +110,13 @@ def tune(
             raise InputError(f"simulator: {simulate!r} is no function; an environment needs agents={{name: policy}}")
         counted = int(table.counts.max()) if "start" in _arguments(simulate) else 1
         if repeated := starts is None and counted < table.counts.max():
-            target = _as_repeats(table, home)
+            rows = pd.DataFrame(
+                {"agent": agent, "episode": f"0/{place}", **dict(zip(table.metrics, values[place], strict=True))}
+                for agent, values in zip(table.agents, table.values, strict=True)
+                for place in np.flatnonzero(~np.isnan(values[:, 0]))
+            )
+            write_text(home / "target.csv", rows.to_csv(index=False, lineterminator="\n"))
+            target = home / "target.csv"
         stated = {
             "format": 1,
             "name": "tune" if folder is None else home.name,
@@ -143,7 +132,10 @@ def tune(
         }
         write_text(home / FILE_NAME, HEAD + tomlkit.dumps(stated))
         settings = read_study_settings(home)
-        own = {one.name: _parameter(one.name, one.low, one.high) for one in space.intervals}
+        own = {
+            one.name: Parameter(name=one.name, unit="", low=one.low, high=one.high, neutral=float("nan"))
+            for one in space.intervals
+        }
         code = (meaning_of_code(one) for one in (simulator, *(agents or {}).values()))
         identity = digest(*code, names, sorted((domain or {}).items()))
         family = GivenFamily(
@@ -153,17 +145,9 @@ def tune(
         return run_quietly(study, progress, _known(study, known))
 
 
-def _parameter(name: str, low: float, high: float) -> Parameter:
-    return Parameter(name=name, unit="", low=low, high=high, neutral=float("nan"))
-
-
 @contextmanager
 def _written(home: Path, scores: pd.DataFrame | str | Path) -> Iterator[Path]:
-    """The file of the target's scores, in the study's folder if they are a DataFrame.
-
-    Raises:
-        InputError: If the folder is that of another study; what else is raised leaves the folder's files as they were.
-    """
+    """The file of the target's scores, in the study's folder if they are a DataFrame."""
     path, table = home / FILE_NAME, home / "target.csv"
     before = {one: one.read_text(encoding="utf-8") for one in (path, table) if one.exists()}
     if not before.get(path, HEAD).startswith(HEAD):
@@ -179,23 +163,8 @@ def _written(home: Path, scores: pd.DataFrame | str | Path) -> Iterator[Path]:
         raise type(problem)(str(problem).replace(str(table), "scores").replace(f"{path}: ", where)) from None
 
 
-def _as_repeats(table: ScoreTable, home: Path) -> Path:
-    """The file of a target's scores, in the study's folder, in which every episode repeats start 0."""
-    rows = pd.DataFrame(
-        {"agent": agent, "episode": f"0/{place}", **dict(zip(table.metrics, values[place], strict=True))}
-        for agent, values in zip(table.agents, table.values, strict=True)
-        for place in np.flatnonzero(~np.isnan(values[:, 0]))
-    )
-    write_text(home / "target.csv", rows.to_csv(index=False, lineterminator="\n"))
-    return home / "target.csv"
-
-
 def _known(study: Study, known: pd.DataFrame | Iterable[Theta]) -> list[Outcome | Theta]:
-    """Known points as the study has them: θ, or the outcomes of its episodes.
-
-    Raises:
-        InputError: If one is no θ of the box, or an outcome is of no episode of the study.
-    """
+    """Known points as the study has them: θ, or the outcomes of its episodes."""
     settings, space = study.settings, study.settings.space
     rows: list[dict[Any, Any]]
     rows = known.reset_index().to_dict("records") if isinstance(known, pd.DataFrame) else [dict(one) for one in known]
@@ -234,11 +203,7 @@ def _arguments(simulate: Simulate) -> frozenset[str]:
 
 
 def _environment(simulator: Any, space: Space, agents: Mapping[str, Any], domain: Any, home: Path) -> Simulate:
-    """An environment as a function; Gymnasium is loaded for it alone.
-
-    Raises:
-        InputError: If Gymnasium, the environment, a parameter or a policy cannot be used.
-    """
+    """An environment as a function; Gymnasium is loaded for it alone."""
     from proxytune.environments import played_environment
 
     return played_environment(simulator, space, agents, domain or {}, home / FILE_NAME)

@@ -12,13 +12,8 @@ from typing import NamedTuple
 class Command(NamedTuple):
     """A command: its module, loaded only when it is asked for, and its line in the help.
 
-    Attributes:
-        module: Its name in this room.
-        summary: One line for people.
-        resumes: Whether it continues where it was interrupted.
-        kept: What an interruption leaves, in one phrase; everything finished, or nothing, where it does not say.
-        draws: Whether it writes figures.
-        runs_code: Whether it runs the code that a study names; else none runs, whatever a file names.
+    An interruption leaves everything finished, or nothing, where `kept` does not say; where `runs_code` is not set no
+    code runs, whatever a file names.
     """
 
     module: str
@@ -78,9 +73,7 @@ COMMANDS: dict[str, Command] = {
     ),
     "import": Command("importing", "make a log of a ROS bag, a CSV, a TUM trajectory or arrays, and say what is in it"),
     "measure": Command(
-        "measure",
-        "drive a study's agents in the domain of a model file and write their scores",
-        runs_code=True,
+        "measure", "drive a study's agents in the domain of a model file and write their scores", runs_code=True
     ),
     "record": Command(
         "record",
@@ -119,10 +112,7 @@ COMMANDS: dict[str, Command] = {
         "keep what is whole of a damaged study.db, and say what the study does again",
         kept="study.db is the old one or the repaired one",
     ),
-    "export": Command(
-        "export",
-        "write what was found for another simulator, the robot or another optimiser",
-    ),
+    "export": Command("export", "write what was found for another simulator, the robot or another optimiser"),
     "list": Command("listing", "list robots, maps, effects, agents, metrics, engines or measures"),
     "completion": Command("completion", "print a script that completes commands and options in your shell"),
 }
@@ -134,11 +124,7 @@ def names_in(given: str) -> tuple[str, ...]:
 
 
 EXAMPLES: Mapping[str, tuple[str, ...]] = {
-    "study": (
-        "study quickstart",
-        "study my_study --jobs 8 --budget 40",
-        "study my_study --retry-failed",
-    ),
+    "study": ("study quickstart", "study my_study --jobs 8 --budget 40", "study my_study --retry-failed"),
     "score": (
         "score --proxy sim.csv --target robot.csv --metric distance:max:5% --metric lane_error:min:0.01",
         "score --proxy old.csv --proxy new.csv --target robot.csv --metric distance:max --output figures",
@@ -155,10 +141,7 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
         "drive my_study --agent daredevil --theta best --against twin.toml --output daredevil.gif",
     ),
     "repair": ("repair my_study", "repair my_study --json"),
-    "loop": (
-        "loop my_study --log drive.bag",
-        "loop my_study --twin twin.toml",
-    ),
+    "loop": ("loop my_study --log drive.bag", "loop my_study --twin twin.toml"),
     "import": (
         "import drive.bag",
         "import drive.bag my_log --robot duckiebot",

@@ -22,11 +22,7 @@ def run(arguments: argparse.Namespace) -> Answer:
 
 
 def completion_script(shell: str) -> str:
-    """A script for a shell, made from the parser with every option that it has.
-
-    Raises:
-        InputError: If the library that writes it is not installed.
-    """
+    """A script for a shell, made from the parser with every option that it has."""
     from proxytune.cli.main import parser
 
     try:
@@ -41,7 +37,6 @@ def completion_script(shell: str) -> str:
 
 
 def _actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
-    """Every option and argument, those of subcommands too."""
     for action in parser._actions:
         yield action
         if isinstance(action, argparse._SubParsersAction):

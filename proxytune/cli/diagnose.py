@@ -35,7 +35,6 @@ MOTION = {
     "drawing": 0.96,
 }
 """The share of a diagnosis of motion that has usually passed when each of its steps begins."""
-
 CAMERA = {
     "reading frames": 0.0,
     "fitting the camera": 0.1,
@@ -45,7 +44,6 @@ CAMERA = {
     "drawing": 0.95,
 }
 """The same of a camera's."""
-
 MOTION_SHARE = 0.8
 """Of the time of both; the camera comes last."""
 
@@ -79,11 +77,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def limits_of(arguments: argparse.Namespace) -> Limits:
-    """Limits of the next drive.
-
-    Raises:
-        InputError: If one is none.
-    """
+    """Limits of the next drive."""
     room = None
     if arguments.room is not None:
         sides = [finite(side) for side in arguments.room.split("x")]

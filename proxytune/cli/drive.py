@@ -6,7 +6,7 @@ from pathlib import Path
 from rich.console import Group
 from rich.text import Text
 
-from proxytune.api import ChosenTheta, choose_theta
+from proxytune.api import choose_theta
 from proxytune.cli.options import study_folder
 from proxytune.cli.terminal import Answer, waiting
 from proxytune.domain import DomainFamily, make_episode
@@ -16,7 +16,6 @@ from proxytune.seeds import episode_seed
 from proxytune.space import Theta
 from proxytune.study import (
     SideBySide,
-    StudySettings,
     can_record,
     cautions_of,
     check_episode,
@@ -66,10 +65,14 @@ def run(arguments: argparse.Namespace) -> Answer:
     files = {"against": str(model) if model else None, "output": str(arguments.output) if arguments.output else None}
     cautions = list(dict.fromkeys(line for side in (family, target) if side for line in cautions_of(side)))
     document = {**episode_document(pair, seed), "theta_from": chosen.origin, **files, "cautions": cautions}
+    agent, start = pair.episode.agent, pair.episode.start
+    own = agent in settings.agents and start < settings.starts and seed == settings.seed
+    values = ", ".join(f"{name}={value:.4g}" for name, value in sorted(chosen.theta.items()))
+    words = {"best": "proxy: the study's best θ", "nominal": "proxy: the nominal θ", "given": "proxy: the θ given"}
     about = [
         *(f"beware: {line}" for line in cautions),
-        _say_episode(pair, settings, seed),
-        _say_theta(chosen),
+        f"{agent} from start {start} under seed {seed}, as in {'every' if own else 'no'} trial of this study",
+        f"{words[chosen.origin]}{': ' if values else ''}{values}",
         _say_target(model),
         "",
     ]
@@ -88,25 +91,12 @@ def _drive(
 
 
 def _check(arguments: argparse.Namespace, family: DomainFamily) -> None:
-    """Refuse what cannot be done before anything is simulated."""
     if arguments.seed is not None and arguments.seed < 0:
         raise InputError(f"--seed must be at least 0, got {arguments.seed}")
     if arguments.output:
         check_episode_file(arguments.output)
         if not can_record(family):
             raise InputError(f"--output {arguments.output}: {NO_PLACES}; leave the option out to see its metrics")
-
-
-def _say_episode(pair: SideBySide, settings: StudySettings, seed: int) -> str:
-    agent, start = pair.episode.agent, pair.episode.start
-    own = agent in settings.agents and start < settings.starts and seed == settings.seed
-    return f"{agent} from start {start} under seed {seed}, as in {'every' if own else 'no'} trial of this study"
-
-
-def _say_theta(chosen: ChosenTheta) -> str:
-    values = ", ".join(f"{name}={value:.4g}" for name, value in sorted(chosen.theta.items()))
-    words = {"best": "proxy: the study's best θ", "nominal": "proxy: the nominal θ", "given": "proxy: the θ given"}
-    return f"{words[chosen.origin]}{': ' if values else ''}{values}"
 
 
 def _say_target(model: Path | None) -> str:

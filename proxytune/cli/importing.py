@@ -12,7 +12,7 @@ from proxytune.cli.options import configure_source, facts_of, take_late, wanted_
 from proxytune.cli.terminal import Answer, waiting
 from proxytune.files import check_place
 from proxytune.importing import Source, Survey
-from proxytune.report import Column, Table, columns_of, table_text
+from proxytune.report import Column, Table, columns_of, percent, table_text
 
 MEASURES = ("drive", "time", "poses", "rate", "jitter", "lost", "gaps", "commands", "answers after")
 """The columns of the table of drives."""
@@ -54,4 +54,4 @@ def _row(one: Survey) -> tuple[str, ...]:
     gaps = f"{one.gaps} to {one.longest_gap_s:.1f} s" if one.gaps else "none"
     lag = "?" if one.lag_s is None else f"{one.lag_s:.2f} s"
     numbers = (f"{one.seconds:.1f} s", str(one.poses), f"{one.poses_hz:.1f} Hz", f"{1e3 * one.jitter_s:.1f} ms")
-    return (one.name, *numbers, f"{100.0 * one.lost:.1f} %", gaps, str(one.commands), lag)
+    return (one.name, *numbers, percent(one.lost), gaps, str(one.commands), lag)

@@ -32,11 +32,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> Answer:
-    """List one kind of thing, or tell all of one.
-
-    Raises:
-        InputError: If there is none of that name.
-    """
+    """List one kind of thing, or tell all of one."""
     kind, name, rows = arguments.kind, arguments.name, _KINDS[arguments.kind]()
     key = next(iter(rows[0]))
     if name is not None:

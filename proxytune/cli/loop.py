@@ -1,7 +1,6 @@
 """`loop`: tune, diagnose, extend, tune again, and compare before with after."""
 
 import argparse
-import shlex
 import sys
 import time
 from collections.abc import Callable
@@ -9,7 +8,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 
 from proxytune.cli.diagnose import shares
-from proxytune.cli.options import check_made, study_folder
+from proxytune.cli.options import check_made, study_folder, typed
 from proxytune.cli.terminal import Answer, Steps
 from proxytune.files import check_place
 from proxytune.logs import Log
@@ -39,7 +38,7 @@ def run(arguments: argparse.Namespace) -> Answer:
         check_place(folder / "loop" / name, folder=True, ours=True)
     check_place(folder / "loop" / "report.html", ours=True)
     report = run_loop(folder, log=arguments.log, twin=arguments.twin, teller=Terminal())
-    page = report.write(_command(arguments))
+    page = report.write(typed(arguments))
     document = report.document()
     document["files"] = {name: str(path) for name, path in _files(report.closed, page).items()}
     document["this_run"]["seconds"] = time.perf_counter() - begun
@@ -62,14 +61,7 @@ class Terminal:
         return Steps(shares(log))
 
 
-def _command(arguments: argparse.Namespace) -> str:
-    options = [("--log", arguments.log), ("--twin", arguments.twin)]
-    given = [word for option, value in options if value for word in (option, str(value))]
-    return shlex.join(["python", "-m", "proxytune", "loop", str(arguments.path), *given])
-
-
 def _files(closed: Closed, page: Path) -> dict[str, Path]:
-    """Files that were made, by name."""
     home = closed.loop.home
     found = {"model": home / "diagnosed" / "model.toml", "diagnosis": home / "diagnosed" / "diagnosis.json"}
     extended = {"extended": home / "extended" / "study.toml"} if closed.after else {}

@@ -83,12 +83,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
 
 
 def add_shared_options(parser: argparse.ArgumentParser, *, draws: bool) -> None:
-    """Add the options that commands have in common.
-
-    Args:
-        parser: The command's.
-        draws: Whether it writes figures.
-    """
+    """Add the options that commands have in common; figures have formats."""
     if draws:
         parser.add_argument(
             "--format", type=formats, default=(), metavar="svg,pdf", help="figures also as SVG or PDF [PNG alone]"
@@ -97,11 +92,7 @@ def add_shared_options(parser: argparse.ArgumentParser, *, draws: bool) -> None:
 
 
 def formats(text: str) -> tuple[str, ...]:
-    """The formats of figures beside PNG that a list names.
-
-    Raises:
-        ArgumentTypeError: If it names another.
-    """
+    """The formats of figures beside PNG that a list names."""
     named = tuple(dict.fromkeys(names_in(text)))
     for name in named:
         if name not in FORMATS:
@@ -134,16 +125,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def run_command(answer_of: Callable[[], Answer], arguments: argparse.Namespace, *, program: str, left: str) -> int:
-    """Run a command, and print its answer or, in one line, what came in between.
+    """Run a command, and print its answer or, in one line, what came in between; gives its exit status.
 
-    Args:
-        answer_of: The command.
-        arguments: Its options, those of add_shared_options among them.
-        program: Its name before that line.
-        left: What an interruption leaves, and what the same command does then.
-
-    Returns:
-        The exit status, as of `main`.
+    An interruption is told with what it leaves, and what the same command does then.
     """
     UNDER_WAY[:] = program, left
     with signals_as_interruptions(), lasting_stderr():

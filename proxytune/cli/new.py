@@ -60,12 +60,7 @@ def pasteable(command: str) -> str:
 
 
 def write_folder(folder: Path, skeleton: Skeleton) -> None:
-    """Write all files of a skeleton, or none.
-
-    Raises:
-        InputError: If something else is there.
-        RunError: If they cannot be written.
-    """
+    """Write all files of a skeleton, or none."""
     try:
         with folder_draft_of(folder) as draft:
             for name, text in skeleton.files.items():
@@ -77,11 +72,7 @@ def write_folder(folder: Path, skeleton: Skeleton) -> None:
 
 
 def read_figures(text: str | None) -> dict[str, float]:
-    """Figures from NAME=VALUE pairs.
-
-    Raises:
-        InputError: If the text is something else.
-    """
+    """Figures from NAME=VALUE pairs."""
     pairs = [pair.partition("=") for pair in text.split(",")] if text else []
     try:
         return {name.strip(): float(value) for name, _, value in pairs}

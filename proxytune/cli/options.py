@@ -1,11 +1,6 @@
-"""The command as it was typed.
+"""Options that several commands have, and what they mean: the cluster, one's own effects, what to take from a source.
 
-The options that say where episodes run, alike for every command that runs many.
-The option that names effects of one's own.
-The options that say what to take from a bag or a table, alike for every command that reads one.
-θ as people give it: values, a model.toml, the best that a study has found, or none.
-The folder that a PATH means: an existing one, or a copy of a study that comes with the package.
-What a study writes into it, checked beforehand.
+`typed` is the command as it was typed, `study_folder` what a PATH means: a folder, or a copy of a shipped study.
 """
 
 import argparse
@@ -117,27 +112,25 @@ def configure_source(parser: argparse.ArgumentParser) -> None:
 
 
 def wanted_of(arguments: argparse.Namespace) -> Wanted:
-    """Columns and topics to take.
-
-    Raises:
-        InputError: If the column map is none.
-    """
+    """Columns and topics to take."""
+    columns = {}
+    for part in (part.strip() for part in arguments.columns.split(",") if part.strip()):
+        ours, equals, theirs = part.partition("=")
+        if not (equals and ours.strip() and theirs.strip()):
+            raise InputError(f"--columns {part}: write OURS=THEIRS or OURS=THEIRS:UNIT, as in x=pos_x:mm")
+        columns[ours.strip()] = theirs.strip()
     return Wanted(
         commands=arguments.commands,
         poses=arguments.poses,
         frames=arguments.pictures,
         stamps=arguments.stamps,
-        columns=_columns(arguments.columns),
+        columns=columns,
         kind=arguments.kind,
     )
 
 
 def facts_of(arguments: argparse.Namespace) -> Facts:
-    """Facts that only the user knows.
-
-    Raises:
-        InputError: If a figure or the offset is no number.
-    """
+    """Facts that only the user knows."""
     offset = arguments.clock_offset
     if offset not in ("", "fit") and finite(offset) is None:
         raise InputError(f"--clock-offset {offset}: give seconds, as in -0.25, or fit")
@@ -146,43 +139,8 @@ def facts_of(arguments: argparse.Namespace) -> Facts:
     return Facts(arguments.robot or "", read_geometry(arguments.figure), road, offset)
 
 
-def _columns(text: str) -> dict[str, str]:
-    columns = {}
-    for part in (part.strip() for part in text.split(",") if part.strip()):
-        ours, equals, theirs = part.partition("=")
-        if not (equals and ours.strip() and theirs.strip()):
-            raise InputError(f"--columns {part}: write OURS=THEIRS or OURS=THEIRS:UNIT, as in x=pos_x:mm")
-        columns[ours.strip()] = theirs.strip()
-    return columns
-
-
 NOT_COPIED = (*MADE, "study.db*", "study.lock", "report.html", "__pycache__")
 """What running a study adds; not copied."""
-
-
-def study_folder(path: Path) -> Path:
-    """The study's folder, given as itself or as its study.toml; one of several families has its own in it.
-
-    Where there is none and its last part names a study that comes with the package, that study is copied there.
-
-    Raises:
-        InputError: If there is no such study.
-        StoreError: If the copy cannot be written.
-    """
-    folder = path.parent if path.name == FILE_NAME else path
-    if study_around(folder, FILE_NAME) is not None:
-        return folder
-    if folder.exists():
-        if not (folder / FILE_NAME).is_file():
-            raise InputError(f"{folder}: has no {FILE_NAME}; give the folder of a study")
-        return folder
-    studies = {home.name: home for home in shipped("studies").iterdir() if (home / FILE_NAME).is_file()}
-    if folder.name not in studies:
-        hint = nearest(folder.name, studies)
-        raise InputError(f"{folder}: no such folder, and no study of that name comes with proxytune; {hint}")
-    _copy(studies[folder.name], folder)
-    print(f"copied the study '{folder.name}', which comes with proxytune, to {folder}", file=sys.stderr)
-    return folder
 
 
 def check_made(folder: Path) -> None:
@@ -195,11 +153,27 @@ def check_made(folder: Path) -> None:
     check_place(folder / "report.html", ours=True)
 
 
-def _copy(source: Path, folder: Path) -> None:
-    """Copy the whole folder or nothing."""
+def study_folder(path: Path) -> Path:
+    """The study's folder, given as itself or as its study.toml; one of several families has its own in it.
+
+    Where there is none and its last part names a study that comes with the package, that study is copied there.
+    """
+    folder = path.parent if path.name == FILE_NAME else path
+    if study_around(folder, FILE_NAME) is not None:
+        return folder
+    if folder.exists():
+        if not (folder / FILE_NAME).is_file():
+            raise InputError(f"{folder}: has no {FILE_NAME}; give the folder of a study")
+        return folder
+    studies = {home.name: home for home in shipped("studies").iterdir() if (home / FILE_NAME).is_file()}
+    if folder.name not in studies:
+        hint = nearest(folder.name, studies)
+        raise InputError(f"{folder}: no such folder, and no study of that name comes with proxytune; {hint}")
     try:
         with folder_draft_of(folder) as draft:
-            shutil.copytree(source, draft, ignore=shutil.ignore_patterns(*NOT_COPIED), dirs_exist_ok=True)
+            shutil.copytree(studies[folder.name], draft, ignore=shutil.ignore_patterns(*NOT_COPIED), dirs_exist_ok=True)
     except (OSError, shutil.Error) as problem:
         reason = problem.strerror if isinstance(problem, OSError) and problem.strerror else "copying failed"
         raise StoreError(f"{folder}: cannot be written ({reason}); choose another place") from None
+    print(f"copied the study '{folder.name}', which comes with proxytune, to {folder}", file=sys.stderr)
+    return folder

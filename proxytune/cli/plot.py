@@ -57,10 +57,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> Answer:
-    """Draw the study's figures and every finished sweep, and write its report and tables.
-
-    With other metrics all that goes into a separate folder.
-    """
+    """Draw the figures of study and sweeps, and write report and tables; of other metrics into a folder of theirs."""
     metrics = [Metric.parse(text) for text in arguments.metric]
     settings = read_study_settings(arguments.path)
     if settings.families and not metrics:
@@ -69,7 +66,8 @@ def run(arguments: argparse.Namespace) -> Answer:
     with Store.read(settings.home) as store:
         run = open_read_only(settings, store)
         result, curves = _read(run, metrics)
-    folder = _folder(settings.home, metrics)
+    names = [re.sub(r"[^\w.-]+", "_", str(metric).replace("%", "percent")) for metric in metrics]
+    folder = settings.home / RESCORED / "+".join(names) if names else settings.home
     drawn = figures_of_sweep(curves, run.study.truth)
     figures = draw_curves(drawn, folder / "figures")
     shown = result.study.settings if result else settings
@@ -92,7 +90,6 @@ def run(arguments: argparse.Namespace) -> Answer:
 def _pages(
     settings: StudySettings, curves: Sequence[SweepCurve], figures: Mapping[str, Figure], folder: Path, command: str
 ) -> Iterator[Path]:
-    """Write a page of all sweeps that hold the others at the same values."""
     latest = list({curve_name(curve): curve for curve in curves}.values())
     for alike in held_alike(latest):
         yield write_sweep_page(settings, alike, figures, folder, held_values(alike[0].base), command)
@@ -104,12 +101,6 @@ def _read(run: StudyRun, metrics: Sequence[Metric]) -> tuple[StudyResult | None,
     if curves and not run.store.trials(run.study.objective.name):
         return None, curves
     return rescored(run, metrics) if metrics else result_of(run), curves
-
-
-def _folder(study: Path, metrics: Sequence[Metric]) -> Path:
-    """Folder of the figures: one for each choice of metrics."""
-    names = [re.sub(r"[^\w.-]+", "_", str(metric).replace("%", "percent")) for metric in metrics]
-    return study / RESCORED / "+".join(names) if names else study
 
 
 def _by_other_metrics(result: StudyResult, files: Text) -> RenderableType:

@@ -48,7 +48,8 @@ def run(arguments: argparse.Namespace) -> Answer:
     if isinstance(found, PicturePrediction):
         return Answer(found.document(), Text(f"{found.sentence}\n{arguments.output}"))
     write_text(arguments.output, found.poses.to_csv(index=False))
-    windows = f"{found.error.windows} windows of {arguments.horizon:g} s"
+    count = found.error.windows or len(found.poses.groupby(["episode", "start_time"]))
+    windows = f"{count} windows of {arguments.horizon:g} s"
     document = {"predictions": str(arguments.output), **found.document()}
     lines = [*(f"beware: {line}" for line in found.cautions), f"{windows}: {found.sentence}", str(arguments.output)]
     return Answer(document, Text("\n".join(lines)))

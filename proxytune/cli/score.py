@@ -1,7 +1,4 @@
-"""`score`: how useful proxies are as predictors, from tables of scores.
-
-The tables that `score` compares, as they are named on the command line.
-"""
+"""`score`: how useful proxies are as predictors, from tables of scores, as they are named on the command line."""
 
 import argparse
 from collections.abc import Mapping, Sequence
@@ -52,12 +49,13 @@ from proxytune.usefulness import (
 def read_sides(
     arguments: argparse.Namespace, metrics: Sequence[str]
 ) -> tuple[tuple[str, ScoreTable], dict[str, ScoreTable]]:
-    """The target with its name, and every proxy by name.
-
-    Raises:
-        InputError: If a table cannot be used, or a column that --columns names is in none of them.
-    """
-    columns = _columns(arguments.columns)
+    """The target with its name, and every proxy by name."""
+    columns: dict[str, str] = {}
+    for pair in filter(None, arguments.columns.split(",")):
+        name, equals, theirs = (part.strip() for part in pair.partition("="))
+        if not (name and equals and theirs):
+            raise InputError(f"--columns {arguments.columns}: write NAME=COLUMN,..., as in agent=policy,episode=trial")
+        columns[name] = theirs
     _check_columns(columns, [split_source(source)[0] for source in (*arguments.target, *arguments.proxy)])
     _check_other_column(arguments, metrics)
     target = _read_target(arguments.target, metrics, columns, both=arguments.target == arguments.proxy)
@@ -74,27 +72,8 @@ def _check_other_column(arguments: argparse.Namespace, metrics: Sequence[str]) -
         check_sides(source, header, metrics)
 
 
-def _sides_given(arguments: argparse.Namespace) -> None:
-    """Take one table for both sides, where there is one.
-
-    Raises:
-        InputError: If a side is missing.
-    """
-    if arguments.both is not None:
-        if arguments.proxy or arguments.target:
-            raise InputError(f"{arguments.both}: give one table of both sides, or --proxy and --target")
-        arguments.proxy = arguments.target = [arguments.both]
-    for side in ("proxy", "target"):
-        if not getattr(arguments, side):
-            raise InputError(f"--{side} is missing: name its scores, or one table of both sides: score TABLE")
-
-
 def _metrics_given(arguments: argparse.Namespace) -> list[str]:
-    """The metrics asked for with patterns resolved, or those that one table has of both sides.
-
-    Raises:
-        InputError: If there are none, or their direction cannot be guessed.
-    """
+    """The metrics asked for with patterns resolved, or those that one table has of both sides."""
     path, domain = split_source(arguments.target[0])
     known = arguments.metric or []
     if known and not any("*" in text or "?" in text for text in known):
@@ -116,16 +95,6 @@ def split_source(source: str) -> tuple[Path, str | None]:
     if not colon or Path(source).exists() or not path:
         return Path(source), None
     return Path(path), domain
-
-
-def _columns(text: str) -> dict[str, str]:
-    columns: dict[str, str] = {}
-    for pair in filter(None, text.split(",")):
-        name, equals, theirs = (part.strip() for part in pair.partition("="))
-        if not (name and equals and theirs):
-            raise InputError(f"--columns {text}: write NAME=COLUMN,..., as in agent=policy,episode=trial")
-        columns[name] = theirs
-    return columns
 
 
 def _check_columns(columns: Mapping[str, str], files: Sequence[Path]) -> None:
@@ -181,12 +150,7 @@ LARGEST_WEIGHT = 1e70
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the tables, the metrics and what is done with them."""
-    parser.add_argument(
-        "both",
-        nargs="?",
-        metavar="TABLE",
-        help="one table of both sides: Sim success, Real success",
-    )
+    parser.add_argument("both", nargs="?", metavar="TABLE", help="one table of both sides: Sim success, Real success")
     parser.add_argument(
         "--proxy",
         action="append",
@@ -223,19 +187,14 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--unpaired", action="store_true", help="treat episodes with equal labels as unrelated [as the same start]"
     )
     parser.add_argument(
-        "--decide-on",
-        default="",
-        metavar="NAME",
-        help="the metric to choose by, or mean [mean of shares, or first]",
+        "--decide-on", default="", metavar="NAME", help="the metric to choose by, or mean [mean of shares, or first]"
     )
     parser.add_argument(
         "--rollouts", type=int, metavar="N", help="rollouts behind each mean of the target, where it has means alone"
     )
     parser.add_argument("--regret", type=float, metavar="R", help="regret that is accepted, for what to do next [0.05]")
     parser.add_argument(
-        "--sequential",
-        action="store_true",
-        help="test after each rollout, in the target's order, which agent is best",
+        "--sequential", action="store_true", help="test after each rollout, in the target's order, which agent is best"
     )
     parser.add_argument("--resamples", type=int, default=1000, help="bootstrap resamples and permutations [1000]")
     parser.add_argument("--seed", type=int, default=0, help="seed of the resampling [0]")
@@ -243,6 +202,16 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--table", type=Path, metavar="FILE", help="also write all measures as .csv or, for LaTeX with booktabs, .tex"
     )
+
+
+def _sides_given(arguments: argparse.Namespace) -> None:
+    if arguments.both is not None:
+        if arguments.proxy or arguments.target:
+            raise InputError(f"{arguments.both}: give one table of both sides, or --proxy and --target")
+        arguments.proxy = arguments.target = [arguments.both]
+    for side in ("proxy", "target"):
+        if not getattr(arguments, side):
+            raise InputError(f"--{side} is missing: name its scores, or one table of both sides: score TABLE")
 
 
 def run(arguments: argparse.Namespace) -> Answer:
@@ -284,7 +253,6 @@ def run(arguments: argparse.Namespace) -> Answer:
 
 
 def _test(assessments: Mapping[str, Assessment], arguments: argparse.Namespace) -> Sequential:
-    """The test after each rollout, whose bets the proxy foretells."""
     if len(assessments) > 1:
         raise InputError("--sequential: takes one proxy; name the one to bet by")
     ((_, assessment),) = assessments.items()
@@ -300,7 +268,6 @@ def _answer(
     selection: Selection | None,
     tested: Sequential | None,
 ) -> Answer:
-    """Text that is printed: the sentence, the table and the notes."""
     lines = [*document["left_out"], *([f"sequential test: {sequential_sentence(tested)}"] if tested else ())]
     shown = score_text(assessments, selection, lines, target=document["target"])
     if selection is not None:
@@ -333,7 +300,6 @@ def _weights(texts: Sequence[str]) -> dict[str, float] | None:
 def _write(
     arguments: argparse.Namespace, assessments: Mapping[str, Assessment], selection: Selection | None, target: str
 ) -> dict[str, Any]:
-    """Draw the figures and write the page; their paths."""
     settings = [("metrics", ", ".join(arguments.metric)), ("resamples", str(arguments.resamples))]
     foot = foot_of(typed(arguments), [*settings, ("seed", str(arguments.seed))])
     figures, page = write_score_report(assessments, selection, arguments.output, foot, target=target)

@@ -1,9 +1,4 @@
-"""`study`: run or resume a study, and sum it up.
-
-A study's page while the study runs: written anew every few seconds, as its episodes end.
-`study` and `plot` of several families: each tuned in the same time, and compared.
-`study` with objective = "plv": the proxy whose samples save most on the target.
-"""
+"""`study`: run or resume a study, of several families, by PLV, or a bank, and sum it up; its page while it runs."""
 
 import argparse
 import sys
@@ -16,7 +11,6 @@ from typing import Any
 from proxytune.api import (
     FamiliesReport,
     Spending,
-    StudyReport,
     most_episodes,
     read_families,
     run_opened,
@@ -68,6 +62,7 @@ class LivePage:
         self._path = settings.home / "report.html"
         self._doing, self._due = "", 0.0
         self.written = False
+        self.best, self.finished, self.waiting = watcher.best, watcher.finished, watcher.waiting
 
     def begin(self, what: str, known: int) -> None:
         """Something begins."""
@@ -81,18 +76,6 @@ class LivePage:
             self.write(self._doing)
             self._due = time.monotonic() + RENEW_S
 
-    def best(self, score: float) -> None:
-        """The lowest score so far."""
-        self._watcher.best(score)
-
-    def finished(self, what: str) -> None:
-        """Something has ended."""
-        self._watcher.finished(what)
-
-    def waiting(self, episode: str, seconds: float) -> None:
-        """An episode has been under way for long."""
-        self._watcher.waiting(episode, seconds)
-
     def write(self, doing: str) -> None:
         """Write the page, and say at the first time where it is."""
         # The run is worth more than its page, and the page of the end says what is wrong with the place.
@@ -101,7 +84,7 @@ class LivePage:
                 trials = [one for one in store.trials(self._objective) if one.state != "open"]
             write_live_page(self._path, self._settings, self._objective, trials, doing)
             if not self.written:
-                print(f"proxytune study: page: {self._path} (renews itself while the study runs)", file=sys.stderr)
+                _say(f"page: {self._path} (renews itself while the study runs)")
             self.written = True
 
 
@@ -109,13 +92,7 @@ class LivePage:
 def renewed_page(
     settings: StudySettings, objective: str, watching: AbstractContextManager[Watcher]
 ) -> Iterator[Watcher]:
-    """A watcher that keeps the study's page up to date; a run that is stopped leaves a page that says so.
-
-    Args:
-        settings: The study's.
-        objective: The measure that its trials are searched by.
-        watching: Gives what else hears of every episode.
-    """
+    """A watcher that keeps the study's page up to date; a run that is stopped leaves a page that says so."""
     with watching as watcher:
         page = LivePage(settings, objective, watcher)
         try:
@@ -129,7 +106,7 @@ def renewed_page(
 def compare_families(settings: StudySettings, spending: Spending) -> Answer:
     """Run what is left of every family, and compare them; finished ones are summed up again without simulating."""
     begun = time.perf_counter()
-    report = run_opened_families(settings, Terminal(), spending)
+    report = run_opened_families(settings, spending, _say, _bars)
     seconds = {"total": time.perf_counter() - begun, "episodes": report.spent.seconds}
     return _answer(report, {"episodes": {"run": report.spent.episodes}, "seconds": seconds})
 
@@ -145,21 +122,13 @@ def _answer(report: FamiliesReport, spent: Mapping[str, Any]) -> Answer:
     return Answer(document, families_text(report.compared, {"figure": figure, "report": page}))
 
 
-class Terminal:
-    """Tells on standard error how it goes."""
+def _say(line: str) -> None:
+    print(f"proxytune study: {line}", file=sys.stderr, flush=True)
 
-    def say(self, line: str) -> None:
-        """One line."""
-        print(f"proxytune study: {line}", file=sys.stderr, flush=True)
 
-    def tuning(self, study: Study) -> AbstractContextManager[Watcher]:
-        """A bar of episodes, and the family's page while it is tuned."""
-        settings = study.settings
-        return renewed_page(settings, study.objective.name, Bars(most_episodes(settings)))
-
-    def teaching(self, points: int) -> AbstractContextManager[Watcher]:
-        """A bar of points of learning curves."""
-        return Bars(points, "points of learning curves")
+def _bars(study: Study) -> AbstractContextManager[Watcher]:
+    """A bar of episodes, and the study's page while it is tuned."""
+    return renewed_page(study.settings, study.objective.name, Bars(most_episodes(study.settings)))
 
 
 def search_by_plv(study: Study, folder: Path, by_prpv: Callable[[], StudyResult]) -> Answer:
@@ -200,10 +169,7 @@ def run_a_bank(settings: StudySettings, spending: Spending) -> Answer:
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the study."""
     parser.add_argument(
-        "path",
-        type=Path,
-        metavar="PATH",
-        help="a study's folder, or where to copy one that comes with proxytune",
+        "path", type=Path, metavar="PATH", help="a study's folder, or where to copy one that comes with proxytune"
     )
     parser.add_argument(
         "--retry-failed",
@@ -228,22 +194,13 @@ def run(arguments: argparse.Namespace) -> Answer:
         return run_a_bank(settings, Spending(arguments.budget, arguments.jobs, again))
     study = with_spending(open_settings(settings), budget=arguments.budget, jobs=arguments.jobs)
     if study.settings.objective == LEARNING:
-        return search_by_plv(study, folder, lambda: _search(study, again).result)
-    report = _search(study, again)
+        return search_by_plv(study, folder, lambda: run_opened(study, _bars(study), _say, again).result)
+    report = run_opened(study, _bars(study), _say, again)
     figures, page = report.write(folder)
     costs = _costs(report.result, report.spent, time.perf_counter() - begun)
     document = {**report.document(), **costs, "figures": [str(path) for path in figures], "report": str(page)}
     files = {"figures": figures[0].parent, "report": page}
     return Answer(document, study_text(report.result, _say_costs(costs), files))
-
-
-def _search(study: Study, retry_failed: bool) -> StudyReport:
-    watching = renewed_page(study.settings, study.objective.name, Bars(most_episodes(study.settings)))
-    return run_opened(study, watching, _warn, retry_failed)
-
-
-def _warn(line: str) -> None:
-    print(f"proxytune study: {line}", file=sys.stderr)
 
 
 def _costs(result: StudyResult, spent: Spent, total: float) -> dict[str, Any]:

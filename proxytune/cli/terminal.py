@@ -1,10 +1,7 @@
-"""Output of every command: one JSON document, and the same for people.
+"""Output of every command, one JSON document or the same for people, its progress, and the signals that end it.
 
-Ctrl-C, SIGTERM and SIGHUP end a command alike: everything finished is kept, and its processes end too.
-What stops a command that nobody nearer to it could name.
-Standard output holds a command's answer and nothing else: what agents print goes to standard error.
-Progress of a command whose length is not known: a spinner on a terminal, elsewhere a line for whatever is done.
-Progress of a command in several steps: a bar with the time left on a terminal, elsewhere a line per step.
+Standard output holds a command's answer and nothing else: what agents print goes to standard error. Progress of unknown
+length is a spinner on a terminal (`waiting`), of steps a bar (`Steps`); elsewhere it is lines.
 """
 
 import errno
@@ -29,12 +26,7 @@ from proxytune.starting import STOPPING
 
 @dataclass(frozen=True)
 class Answer:
-    """The result of a command.
-
-    Attributes:
-        document: What `--json` prints: plain numbers, texts, lists and dicts, None where undefined.
-        text: What a person reads on standard output; of a plain text no line is broken.
-    """
+    """What `--json` prints, plain values, and what a person reads; of a plain text no line is broken."""
 
     document: dict[str, Any]
     text: RenderableType
@@ -120,11 +112,7 @@ def _redirected() -> int | None:
 
 
 def print_answer(answer: Answer, *, as_json: bool) -> None:
-    """Print a command's answer; a reader that has gone is not an error, and letters that a terminal lacks are escaped.
-
-    Raises:
-        RunError: If it cannot be written.
-    """
+    """Print a command's answer; a reader that has gone is no error, and letters that a terminal lacks are escaped."""
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
@@ -136,7 +124,8 @@ def print_answer(answer: Answer, *, as_json: bool) -> None:
             Console().print(answer.text, crop=False)
         sys.stdout.flush()
     except OSError as problem:
-        _discard_the_rest()
+        # What is still in the buffer would raise once more when Python ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         if problem.errno in (errno.EPIPE, errno.EIO):  # The reader, or the terminal, has gone
             return
         raise RunError(f"standard output: cannot be written ({problem.strerror}); make room and run again") from None
@@ -150,11 +139,6 @@ def _json_text(document: dict[str, Any]) -> str:
     except UnicodeEncodeError:
         return json.dumps(document, indent=2, allow_nan=False)
     return text
-
-
-def _discard_the_rest() -> None:
-    """Drop what is still in the buffer, which would raise once more when Python ends."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 @contextmanager

@@ -25,12 +25,7 @@ class Estimate:
 
 
 def verdict(explained: bool | None, *, named: bool) -> str:
-    """Give one of five answers.
-
-    Args:
-        explained: Whether nothing is left over that is known to be no noise; None where that cannot be told.
-        named: Whether effects were added.
-    """
+    """Give one of five answers: whether noise alone is left (None: it cannot be told), and effects were named."""
     if explained is None:
         return "cannot be told"
     if explained:

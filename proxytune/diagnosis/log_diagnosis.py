@@ -112,7 +112,6 @@ def diagnose_log(
 
 
 def _or_refusal(house: Callable[[], House]) -> tuple[House | None, str]:
-    """The answer of a house, or why there is none."""
     try:
         return house(), ""
     except (LogError, SettingsError) as problem:
@@ -122,7 +121,6 @@ def _or_refusal(house: Callable[[], House]) -> tuple[House | None, str]:
 def _declared_by_kind(
     log: Log, robot: Robot, declared: Sequence[str] | None
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Declared effects on motion, and those on the camera and its pictures."""
     if declared is None:
         return declared_effects(robot), declared_camera_effects(robot)
     if log.frames is None:
@@ -154,14 +152,9 @@ class PredictedPictures(NamedTuple):
 
 
 def predict_pictures(log: Log, robot: Robot, theta: Theta) -> Iterator[PredictedPictures]:
-    """Draw every frame whose pose is known, a few at a time.
+    """Draw every frame whose pose is known, a few at a time; what θ does not name is the robot's.
 
     Where the log's exposure is automatic, each frame is compared at its own brightness, which no model knows.
-
-    Args:
-        log: With frames.
-        robot: Whose camera it is.
-        theta: The model; parameters of the camera that it does not name are the robot's.
 
     Raises:
         LogError: If the log has no frames, or no frame has a pose; while drawing, if a picture cannot be read.

@@ -15,7 +15,7 @@ import tomlkit
 from numpy.typing import NDArray
 
 from proxytune.diagnosis.motion.drives import Floats, duties_of
-from proxytune.diagnosis.motion.manoeuvres import LIBRARY, commands_of
+from proxytune.diagnosis.motion.manoeuvres import LIBRARY, commands_of, mirrored
 from proxytune.driving import (
     TICK_HZ,
     Course,
@@ -42,20 +42,16 @@ from proxytune.logs import COMMANDS, Frames, Log, LogEpisode
 POSITION_NOISE_M = 0.002
 HEADING_NOISE_RAD = 0.005
 """White noise of a measured pose, as a tracker above the floor has it."""
-
 HEADING_NOISE_DEG = math.degrees(HEADING_NOISE_RAD)
 
 PICTURES = "frames/%06d.png"
 """Where a log's pictures lie in its folder."""
-
 CAMERA = {
     "frames": PICTURES,
     "exposure": "fixed",
     "poses": {"position_m": POSITION_NOISE_M, "heading_deg": round(HEADING_NOISE_DEG, 4)},
 }
 """What log.toml states of the pictures: no effect adjusts the exposure from one to the next."""
-
-
 Table = tuple[str, Mapping[str, tuple[Floats, Floats]]]
 """Kind of commands, and each drive's times [s] and commands, as `proxytune.logs.read_commands` gives them."""
 
@@ -89,7 +85,7 @@ def record(
         else:
             sized = commands_of(LIBRARY[number % len(LIBRARY)][2], times, robot) * random.uniform(0.75, 1.0)
             if number // len(LIBRARY) % 2 == 1:
-                sized = sized * (1.0, -1.0) if robot.drive == "ackermann" else sized[:, ::-1]
+                sized = mirrored(sized, robot)
         commands = np.asarray(np.round(sized, 4), dtype=float)
         poses = _drive(family, commands, random, number)
         episodes.append(LogEpisode(str(number), times, commands, poses, None))
@@ -152,13 +148,10 @@ def frames_text(log: Log, frames: Frames, numbers: Sequence[int], float_format: 
 
 COLUMNS = 160
 """What agents are shown is too coarse for a diagnosis, so the camera is given so many columns where it has fewer."""
-
 FRAMES_HZ = 2.0
 """About how many pictures are taken in a second."""
-
 SHORTEST_S, LONGEST_S = 5.0, 20.0
 """How long a lane drive lasts [s]: in 5 s it comes from a straight into a bend, or out of one."""
-
 LANES = 1
 """Tells the seeds of lane drives from those of manoeuvres."""
 
@@ -187,12 +180,7 @@ class _Lap(NamedTuple):
 
 
 def film(family: LaneFollowing, frames: int, seed: int) -> Iterator[FilmedDrive]:
-    """Let the robot's expert drive from every start, then from each the other way, and take pictures.
-
-    Args:
-        family: The domain, whose expert drives in the right-hand lane with its disturbances.
-        frames: How many pictures there are in all.
-        seed: Of starts, disturbances and effects.
+    """Let the robot's expert drive from every start, then from each the other way, and take so many pictures in all.
 
     Raises:
         SettingsError: If the robot has no expert or no camera, before anything is driven.

@@ -30,10 +30,8 @@ Result = TypeVar("Result")
 
 ROOMS = ("logs", "effects", "driving", "diagnosis")
 """Rooms whose code a diagnosis of motion depends on."""
-
 FOLDER = ".stages"
 """Where stages lie in the folder of the findings until these are written."""
-
 NUMBERS = {
     ("numpy", "ndarray"),
     ("numpy", "dtype"),
@@ -45,7 +43,6 @@ NUMBERS = {
     ("numpy.core.numeric", "_frombuffer"),
 }
 """What arrays are made by."""
-
 SIGNALS = "proxytune.diagnosis.motion.signals"
 """Its functions, which only reckon, are bound to curves."""
 
@@ -72,15 +69,7 @@ def _plain(value: Any) -> object:
 
 
 class Stages:
-    """Results of stages in a folder; without one nothing is kept.
-
-    Args:
-        folder: Where the findings go, or None.
-        facts: What the stages depend on.
-
-    Raises:
-        RunError: If a symbolic link is in the place of the stages: what it leads to is not ours to remove.
-    """
+    """Results of stages in the folder of findings, without one not kept; a link in their place is refused."""
 
     def __init__(self, folder: Path | None = None, facts: str = "") -> None:
         self._folder = None if folder is None else folder / FOLDER / facts
@@ -97,11 +86,7 @@ class Stages:
         self._known |= things
 
     def keep(self, stage: str, make: Callable[[], Result]) -> Result:
-        """The result of a stage, made if it is not kept.
-
-        Raises:
-            RunError: If it cannot be written.
-        """
+        """The result of a stage, made if it is not kept."""
         if self._folder is None:
             return make()
         path = self._folder / f"{stage}.pickle"

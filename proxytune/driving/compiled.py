@@ -87,24 +87,21 @@ def _pairs(values, first, count):  # type: ignore[no-untyped-def]
     return total
 
 
-def _fit(  # type: ignore[no-untyped-def]  # noqa: C901
-    near, ahead, left, eyes, contrast, brightness, yellow, bright, lanes
-):
-    pixels = yellow.shape[1]
+def _fit(ahead, left, eyes, yellow, white, golden, shining, lanes):  # type: ignore[no-untyped-def]  # noqa: C901
+    pixels = golden.shape[1]
     line, edge, marked = np.empty(pixels, np.int64), np.empty(pixels, np.int64), np.empty(pixels, np.bool_)
     along, aside = np.empty(2 * pixels), np.empty(2 * pixels)
-    for robot in range(yellow.shape[0]):
-        golden, shining, more_yellow, brighter = yellow[robot], bright[robot], contrast[robot], brightness[robot]
+    for robot in range(golden.shape[0]):
         eye, on_line, on_edge = eyes[robot], 0, 0
-        floor = near[eye]
+        gold, shine, more, brighter = golden[robot], shining[robot], yellow[robot], white[robot]
         for pixel in range(pixels):  # by itself, so that many pixels are compared at once
-            marked[pixel] = floor[pixel] & ((golden[pixel] > more_yellow) | (shining[pixel] > brighter))
+            marked[pixel] = (gold[pixel] > more[pixel]) | (shine[pixel] > brighter[pixel])
         for pixel in range(pixels):
             if marked[pixel]:
-                if golden[pixel] > more_yellow:
+                if gold[pixel] > more[pixel]:
                     line[on_line] = pixel
                     on_line += 1
-                if shining[pixel] > brighter:
+                if shine[pixel] > brighter[pixel]:
                     edge[on_edge] = pixel
                     on_edge += 1
         for number in range(on_line):
@@ -132,5 +129,5 @@ _TABLE = "float32[:,::1], float32[::1], int32[::1], int32[::1], uint32[::1]"
 _look_up = numba.jit(f"void(float32[:,::1], {_TABLE}, uint32[:,::1])", **_compiled)(_find)
 _expose = numba.jit(f"void(float32[:,::1], float32[::1], {_TABLE}, uint8[:,:,::1])", **_compiled)(_mix)
 _sum = numba.jit("float64(float64[::1], int64, int64)", **_compiled)(_pairs)
-_EYES = "boolean[:,::1], float64[:,::1], float64[:,::1], int64[::1], uint8[::1], uint8[::1]"
+_EYES = "float64[:,::1], float64[:,::1], int64[::1], uint8[:,::1], uint8[:,::1]"
 _find_lanes = numba.jit(f"void({_EYES}, uint8[:,:], uint8[:,:], float64[:,::1])", **_compiled)(_fit)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Protocol, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.arrays import Flags, Floats, SmallBuffers
+from proxytune.arrays import Floats, SmallBuffers
 
 PAYS_OFF = 30_000
 """So many pictures NumPy looks up before Numba, which takes 0.4 s to load and would have saved that."""
@@ -100,20 +100,18 @@ class Eyes(NamedTuple):
     """The parts of pictures that robots look at for markings, and what they take for one.
 
     Attributes:
-        near: Whether the nominal camera sees nearby floor there, (eyes, pixels).
-        ahead: How far ahead of the axle that lies [m], (eyes, pixels).
+        ahead: How far ahead of the axle the floor lies that the nominal camera sees there [m], (eyes, pixels).
         left: How far to the left [m], (eyes, pixels).
         eye: Which eye each robot has, (robots,).
-        contrast: The yellow line is more yellow than this, (robots,).
-        brightness: The white line is brighter than this, (robots,).
+        yellow: More is the yellow line, (robots, pixels); 255 where it does not look.
+        white: More is the white line, (robots, pixels); 255 where it does not look.
     """
 
-    near: Flags
     ahead: Floats
     left: Floats
     eye: NDArray[np.int64]
-    contrast: NDArray[np.uint8]
-    brightness: NDArray[np.uint8]
+    yellow: NDArray[np.uint8]
+    white: NDArray[np.uint8]
 
 
 def find_lanes(eyes: Eyes, yellow: NDArray[np.uint8], bright: NDArray[np.uint8]) -> Floats:
@@ -130,24 +128,22 @@ def find_lanes(eyes: Eyes, yellow: NDArray[np.uint8], bright: NDArray[np.uint8])
         Offset [m], slope and number of pixels, (robots, 3); where these are fewer than FEWEST, they alone count.
     """
     lanes = np.zeros((len(yellow), 3))
-    for lane, number, golden, shining, contrast, brightness in zip(
-        lanes, eyes.eye, yellow, bright, *eyes[-2:], strict=True
-    ):
-        near, all_left = eyes.near[number], eyes.left[number]
-        line = ((golden > contrast) & near).nonzero()[0]
-        edge = ((shining > brightness) & near).nonzero()[0]
-        on_line, on_edge = all_left.take(line), all_left.take(edge)
+    golden, shining = yellow > eyes.yellow, bright > eyes.white
+    for robot, eye in enumerate(eyes.eye.tolist()):
+        line, edge, left_of = golden[robot].nonzero()[0], shining[robot].nonzero()[0], eyes.left[eye]
+        on_line, on_edge = left_of.take(line), left_of.take(edge)
         right = on_edge < (float(np.add.reduce(on_line)) / len(on_line) if len(on_line) else HALF_LANE_M)
-        ahead = eyes.ahead[number].take(np.concatenate((line, edge[right])))
+        ahead = eyes.ahead[eye].take(np.concatenate((line, edge[right])))
         left = np.concatenate((on_line - HALF_LANE_M, on_edge[right] + HALF_LANE_M))
-        lane[2] = count = len(ahead)
+        count, slope, offset = len(ahead), 0.0, 0.0
         if count >= FEWEST:
             mean_ahead, mean_left = float(np.add.reduce(ahead)) / count, float(np.add.reduce(left)) / count
             ahead -= mean_ahead
             left *= ahead
             ahead *= ahead
             slope = float(np.add.reduce(left)) / (float(np.add.reduce(ahead)) + RIDGE * count)
-            lane[:2] = mean_left - slope * mean_ahead, slope
+            offset = mean_left - slope * mean_ahead
+        lanes[robot] = offset, slope, count
     return lanes
 
 

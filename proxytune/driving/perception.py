@@ -137,12 +137,15 @@ def _eyes(looks: tuple[Markings, ...]) -> tuple[int, Eyes]:
     """The first pixel that any of them looks at, and the eyes that look."""
     distinct = list(dict.fromkeys(look.eye for look in looks))
     first, last = min(eye.first for eye in distinct), distinct[0].first + len(distinct[0].near)
-    near, ahead, left = np.zeros((len(distinct), last - first), dtype=bool), *np.zeros((2, len(distinct), last - first))
+    places = np.zeros((2, len(distinct), last - first))
     for number, eye in enumerate(distinct):
-        here = number, slice(eye.first - first, None)
-        near[here], ahead[here], left[here] = eye.near, eye.ahead, eye.left
-    levels = np.clip([(look.contrast, look.brightness) for look in looks], 0.0, 255.0).astype(np.uint8).T.copy()
-    return first, Eyes(near, ahead, left, np.array([distinct.index(look.eye) for look in looks]), *levels)
+        places[:, number, eye.first - first :] = eye.ahead, eye.left
+    levels = np.full((2, len(looks), last - first), 255, dtype=np.uint8)
+    for robot, look in enumerate(looks):
+        for marking, least in zip(levels, (look.contrast, look.brightness), strict=True):
+            marking[robot, look.eye.first - first :][look.eye.near] = math.floor(min(max(least, 0.0), 255.0))
+    (ahead, left), (yellow, white) = places, levels
+    return first, Eyes(ahead, left, np.array([distinct.index(look.eye) for look in looks]), yellow, white)
 
 
 def find_lanes(seen: Seen, looks: tuple[Markings, ...], robots: Sequence[int]) -> list[Lane | None]:
@@ -156,8 +159,7 @@ def count_yellow(seen: Seen, looks: tuple[Markings, ...], robots: Sequence[int])
     """How many pixels of the dashed centre line there are."""
     first, eyes = _eyes(looks)
     yellow, _ = seen.colours(first, robots)
-    shown = (yellow > eyes.contrast[:, None]) & eyes.near[eyes.eye]
-    return [int(count) for count in np.count_nonzero(shown, axis=1)]
+    return [int(np.count_nonzero(one)) for one in yellow > eyes.yellow]
 
 
 @dataclass(frozen=True, eq=False)

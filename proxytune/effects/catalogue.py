@@ -64,7 +64,6 @@ from proxytune.space import Parameter, Theta
 
 MEMBERS = ("name", "stage", "parameters", "trace", "begin", "apply")
 """What every effect has; see proxytune.effects.Effect."""
-
 TICKS, RATE_HZ = 8, 20.0
 
 
@@ -215,10 +214,8 @@ DRIVES: Mapping[str, Mapping[str, type[Effect]]] = MappingProxyType(
     {"differential": CATALOGUE, "ackermann": CAR_CATALOGUE}
 )
 """The shipped effects of robots by how they drive: with two wheels of their own speed, or with wheels that steer."""
-
 DECLARED: tuple[str, ...] = ("trim", "delay", "blur", "camera_pitch")
 """The effects that a domain family has before anything is found to be missing: θ of the paper."""
-
 DECLARED_OF_CARS: tuple[str, ...] = ("steering_offset", "delay", "blur", "camera_pitch")
 """The same of a car, whose trim is its steering's."""
 

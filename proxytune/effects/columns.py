@@ -17,7 +17,6 @@ from proxytune.effects.motors import BatterySag, DriverMap, Gain, MotorLag, Satu
 
 THROTTLE, STEERING = 0, 1
 """The columns of a car's commands and of what comes of them: speed, and angle of the front wheels."""
-
 UNEVEN = "imbalance"
 
 

@@ -37,7 +37,6 @@ class Cue(StrEnum):
 
 MOTIONS = ("forward", "sideways", "turn", "left", "right")
 """What a panel can show of the motion: of the body, or the speed of a wheel."""
-
 SIGNALS = ("", "x", "y", "heading", "left angle", "right angle", "bend", *MOTIONS)
 """What a panel can have along its axis: the signal of the cue, or one of these."""
 
@@ -153,7 +152,6 @@ class Trace:
 
 Signal = NDArray[Any]
 """An array of shape (…, time, channels); a value holds, or is the mean, over one sample interval."""
-
 Memory = Any
 """What a filter remembers from one chunk to the next; never changed in place."""
 

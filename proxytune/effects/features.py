@@ -53,7 +53,6 @@ class AskedMotion(NamedTuple):
 
 WIDEST_MESH_M = 2.0
 """The knots of a map of the floor lie on a lattice, no wider than this."""
-
 STANDS = 0.1
 """A wheel is to stand where it is asked to go slower than this share of its speed of late."""
 
@@ -184,10 +183,8 @@ def _of_wheels(unit: str, basis: Callable[[AskedMotion, Knots, int], Signal], en
 
 LEVEL = "level"
 """The one group that is no curve: beside others it takes back what fitted gains and trim have taken of theirs."""
-
 HEADING, PLACE = "heading", "place"
 """The groups that look at where the robot points, and at where it is."""
-
 GROUPS: Mapping[str, Group] = MappingProxyType(
     {
         LEVEL: Group("level", "at all speeds", _of_wheels("of its speed", level), 1e-3),
@@ -319,8 +316,6 @@ GROUPS: Mapping[str, Group] = MappingProxyType(
 )
 """Every group that a learnt effect can have. A map of the floor is 0 where the drives were not. How wheels are turned
 is no group: a study's start at another angle."""
-
-
 DAMPING = 0.25
 """Of the swings, as a share of critical damping."""
 

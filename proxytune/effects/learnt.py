@@ -262,10 +262,8 @@ def _direction(to: str, baseline: float) -> Signal:
 
 RANGE = "range"
 """The table of what the fit saw, beside those of the groups."""
-
 LARGEST = 100.0
 """No weight is larger: a curve that adds 100 m/s is a slip of the pen."""
-
 LABEL = "learnt from drives: not physics, and of no use beyond what they visited"
 
 

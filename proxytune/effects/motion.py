@@ -148,11 +148,8 @@ class YawLag(ShippedEffect):
 
 REST_SPEED = 0.02
 """Below this forward speed [m/s] static friction takes up more and more of the slope."""
-
 RIM_M = 0.1
 """A patch begins to be felt over this way: a robot is not a point."""
-
-
 SLOPE = Parameter(name="slope", unit="m/s", low=-0.3, high=0.3, neutral=0.0,
                   probes=(-0.1, -0.04, -0.015, 0.015, 0.04, 0.1),
                   source="speed that a small robot loses on a floor some degrees from level")  # fmt: skip

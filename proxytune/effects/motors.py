@@ -32,7 +32,6 @@ from proxytune.space import Parameter
 IMBALANCE = Parameter(name="imbalance", unit="", low=-1.0, high=1.0, neutral=0.0, probes=(-1.0, -0.5, 0.5, 1.0),
                       source="by definition: −1 is the left wheel alone, 1 the right one", shape=True)  # fmt: skip
 """How much more of an effect the right wheel has than the left one."""
-
 SLIGHT_IMBALANCE = replace(IMBALANCE, probes=(-0.5, -0.2, 0.2, 0.5))
 """The same where a wheel without any of the effect is no sensible guess."""
 

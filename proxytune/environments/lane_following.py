@@ -35,10 +35,8 @@ from proxytune.space import Parameter
 
 ROWS = 480
 """Height of what is rendered [pixel]."""
-
 WAY, ROBOT = (235, 70, 60), (70, 160, 255)
 """Colours of the robot's way and of the robot."""
-
 ARROW_M = 0.09
 """From the middle of the robot to the tip of what is drawn of it [m]."""
 
@@ -166,7 +164,6 @@ class Tally:
 
 OPTIONS = ("theta", "start", "episode_seed")
 """What `reset` may be told of the episode."""
-
 SEEDS = 2**32
 """How many seeds of episodes there are, as in a study."""
 

@@ -70,6 +70,23 @@ def clock_notes(drives: Sequence[Survey]) -> list[str]:
     ]
 
 
+def rows_notes(drives: Sequence[Drive]) -> list[str]:
+    """Tell how late commands may be that are known only where poses are: a row has the last one before it."""
+    apart = [
+        float(np.median(np.diff(one.poses.times)))
+        for one in drives
+        if one.commands is not None and np.isin(one.commands.times, one.poses.times).all()
+    ]
+    if not apart:
+        return []
+    late = max(apart)
+    return [
+        f"commands stand in the rows of poses, {late:.3g} s apart: one that was issued between two rows stands in the "
+        f"later one, on average {late / 2.0:.2g} s late, and delays come out that much too short; unless they were "
+        "issued as the rows were written, log them with times of their own (command_time=, or a commands.csv)"
+    ]
+
+
 class Form(NamedTuple):
     """A form that recordings come in: what tells it, and what reads it."""
 
@@ -124,7 +141,7 @@ def read_source(path: Path, wanted: Wanted, offset_s: float = 0.0) -> Source:
         )
     surveys = tuple(survey(drive) for drive in drives)
     if kinds != {"none"}:
-        notes += clock_notes(surveys)
+        notes += [*clock_notes(surveys), *rows_notes(drives)]
     return replace(source, drives=tuple(drives), notes=tuple(notes), surveys=surveys)
 
 

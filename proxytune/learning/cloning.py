@@ -20,16 +20,9 @@ from proxytune.learning.learner import Weights
 
 
 def grey_cells(pictures: NDArray[np.uint8], *, top: float, rows: int, columns: int) -> Floats:
-    """Grey cells (n, rows · columns) of pictures (n, rows, columns, 3), from −0.5 to 0.5.
+    """Grey cells (n, rows · columns), −0.5 to 0.5, of pictures (n, rows, columns, 3) but for a share at the top.
 
-    Args:
-        pictures: As the camera gives them.
-        top: Share of the picture's rows, from the top, that is not looked at.
-        rows: Cells above one another in the rest.
-        columns: Cells beside one another.
-
-    Raises:
-        LearnerError: If the pictures are no colour pictures or have fewer pixels than there are cells.
+    Refused if the pictures are no colour pictures or have fewer pixels than there are cells.
     """
     height, width = pictures.shape[1:3] if pictures.ndim == 4 else (0, 0)
     first = round(top * height)
@@ -90,11 +83,7 @@ class BehaviourCloning:
     penalty: float = 1e-4
 
     def train(self, samples: Demonstration, start: Weights | None, seed: int) -> Weights:
-        """Fit to the samples from scratch, or go on from weights learnt elsewhere.
-
-        Raises:
-            LearnerError: If there is no sample, or the weights are of other pictures or another network.
-        """
+        """Fit to the samples from scratch, or go on from weights learnt elsewhere."""
         if not len(samples.commands):
             raise LearnerError("there is no sample to learn from; collect some, or do not train")
         seen = self.features(samples.observations)
@@ -126,11 +115,7 @@ class BehaviourCloning:
         return commands
 
     def features(self, pictures: NDArray[np.uint8]) -> Floats:
-        """Grey cells (n, rows · columns) of pictures (n, rows, columns, 3), from −0.5 to 0.5.
-
-        Raises:
-            LearnerError: If the pictures are no colour pictures or have fewer pixels than there are cells.
-        """
+        """Grey cells (n, rows · columns) of pictures (n, rows, columns, 3), from −0.5 to 0.5."""
         return grey_cells(pictures, top=self.top, rows=self.rows, columns=self.columns)
 
     def _network(self, count: int, seed: int) -> MLPRegressor:

@@ -68,7 +68,6 @@ PRIORS: Mapping[str, tuple[float, float]] = {
     "noise": (0.3, 1.0),
 }
 """Median of each hyperparameter, and the spread of its logarithm; scores have standard deviation 1."""
-
 REPEATED = ("shared", "own", "drift")
 """Hyperparameters that only several repetitions tell."""
 LEVEL = 3.0
@@ -87,14 +86,7 @@ ROUNDS = 2
 
 @dataclass(frozen=True)
 class Examined:
-    """Examinations, one per row.
-
-    Attributes:
-        curve: Which learning curve, from 0 (examinations,).
-        repetition: Which repetition (examinations,).
-        place: How many target samples, as doublings (examinations,); see `places`.
-        score: The score (examinations,).
-    """
+    """Examinations, one per row: curve, repetition, target samples as doublings (see `places`), and score."""
 
     curve: NDArray[np.intp]
     repetition: NDArray[np.intp]
@@ -131,11 +123,7 @@ def counts_at(place: Floats, first: float) -> Floats:
 class CurveModel:
     """The process, fitted: what it says of the mean curves at any place.
 
-    Attributes:
-        marks: What it is fitted to.
-        values: Its hyperparameters by name.
-        centre: Mean of all scores.
-        unit: Their standard deviation.
+    Scores are centred and in units of their standard deviation.
     """
 
     marks: Examined
@@ -179,12 +167,7 @@ def fit_curve_model(marks: Examined) -> CurveModel:
     for _ in range(1 + ROUNDS):
         given = (marks, scaled, spread)
         found = minimize(
-            _negative_log_posterior,
-            start,
-            args=given,
-            method="L-BFGS-B",
-            bounds=bounds,
-            options={"maxiter": 40},
+            _negative_log_posterior, start, args=given, method="L-BFGS-B", bounds=bounds, options={"maxiter": 40}
         )
         start, values = found.x, _named(found.x)
         factor = cho_factor(_covariance(marks, values, spread), lower=True)
@@ -220,13 +203,11 @@ def _means(values: Mapping[str, float], same: NDArray[np.bool_], apart: Floats) 
 
 
 def _matern(apart: Floats, length: float) -> Floats:
-    """The Matérn kernel of smoothness 5/2."""
     scaled = np.sqrt(5.0) * apart / length
     return np.asarray((1.0 + scaled + scaled**2 / 3.0) * np.exp(-scaled))
 
 
 def _residuals(marks: Examined, values: Mapping[str, float], scaled: Floats, weights: Floats) -> Floats:
-    """The residuals of the scores about the mean curves, scaled."""
     return np.asarray(scaled - _means(values, marks.same, marks.apart) @ weights)
 
 
@@ -268,14 +249,7 @@ class CurveDraws:
 def draw_curves(
     curves: Mapping[str, LearningCurve], bounds: tuple[float, float], draws: int = POSTERIOR_DRAWS, seed: int = 0
 ) -> CurveDraws:
-    """Draw the mean curves that the examinations allow: a pure function of these.
-
-    Args:
-        curves: Scores by name of the learning curve.
-        bounds: Lowest and highest score there can be.
-        draws: How many.
-        seed: Of what is drawn.
-    """
+    """Draw the mean curves, within bounds, that the examinations allow: a pure function of these."""
     first = float(min(curve.counts[1] for curve in curves.values()))
     last = max(curve.counts[-1] for curve in curves.values())
     place = np.linspace(0.0, end := float(doublings(np.array(last), first)), 1 + round(STEPS * end))
@@ -293,7 +267,9 @@ def draw_curves(
     }
     sure = 1.0 / np.maximum(np.diag(covariance), LEAST_VARIANCE).reshape(len(curves), -1)
     scores = {
-        name: _rising(drawn[:, number], sure[number]) if rising[name] else drawn[:, number].copy()
+        name: np.array([isotonic_regression(one, weights=sure[number]).x for one in drawn[:, number]])
+        if rising[name]
+        else drawn[:, number].copy()
         for number, name in enumerate(curves)
     }
     for name, curve in curves.items():
@@ -321,23 +297,8 @@ def _may_rise_only(mean: Floats, covariance: Floats) -> bool:
     return bool(fall[early, late] <= DOUBT * np.sqrt(max(variance, 0.0)))
 
 
-def _rising(drawn: Floats, sure: Floats) -> Floats:
-    """The rising curves nearest to those drawn (draws, counts), where these are surest above all.
-
-    Projecting a draw of a Gaussian process is a draw of a posterior of rising curves (Lin and Dunson 2014).
-    """
-    return np.array([isotonic_regression(one, weights=sure).x for one in drawn])
-
-
 def crossing(counts: Floats, scores: Floats, threshold: Floats, first: float) -> Floats:
-    """η of each draw: the number of target samples from which on the mean score stays converged; infinite where none.
-
-    Args:
-        counts: Numbers of target samples (counts,).
-        scores: Mean scores (draws, counts); NaN where there is no learner yet.
-        threshold: The lowest score that counts (draws,).
-        first: The number of target samples after which there is a learner.
-    """
+    """η of each draw: the number of samples from which the mean score stays at its threshold; infinite where none."""
     above = scores - threshold[:, None]
     below = ~(above >= 0.0)
     last = np.where(below.any(axis=1), len(counts) - 1 - np.argmax(below[:, ::-1], axis=1), -1)

@@ -38,12 +38,7 @@ class Learner(Protocol):
 
 @dataclass(frozen=True)
 class Taught:
-    """A policy that also answers many observations at once.
-
-    Attributes:
-        act: Answers one.
-        act_many: Answers many.
-    """
+    """A policy that also answers many observations at once."""
 
     act: Policy
     act_many: Callable[[NDArray[Any]], NDArray[np.float64]]

@@ -33,16 +33,12 @@ from proxytune.unpacking import read_arrays
 
 EXPERT = "expert"
 """Who drives in a lesson, in place of an agent."""
-
 LESSONS_MB = 4000
 """Kept samples may be pictures."""
-
 LEAST_SHARE = 0.5
 """An expert that keeps to the road for less than this share of its lessons has nothing to teach."""
-
 LEAST_LABELLED = 0.01
 """An expert that labels less than this share of a learner's lessons has no label for where it drives."""
-
 TRIED = 10
 """Lessons after which that is judged."""
 
@@ -75,13 +71,7 @@ class Distribution:
 
 
 def collect_samples(
-    classroom: Classroom,
-    where: Distribution,
-    *,
-    count: int,
-    seed: int,
-    lesson_s: float,
-    policy: Policy | None = None,
+    classroom: Classroom, where: Distribution, *, count: int, seed: int, lesson_s: float, policy: Policy | None = None
 ) -> Demonstration:
     """Collect this many of the expert's samples, lesson by lesson; more samples begin with the same ones.
 
@@ -157,11 +147,6 @@ class Cache:
 
         A file is whole or not there at all, so several processes may use one cache, and a killed one leaves no harm.
 
-        Args:
-            kind: What they are, the beginning of the file's name.
-            facts: All that determines them, as JSON has it.
-            make: Makes them.
-
         Raises:
             StoreError: If the folder cannot be written, or a file in it is damaged.
         """
@@ -229,14 +214,9 @@ def examine_policy(classroom: Classroom, episodes: Sequence[Episode], policy: Po
 
 
 def mix_samples(new: Demonstration, earlier: Demonstration, share: float) -> Demonstration:
-    """The new samples, then so many of the earlier ones that these are this share of all, or all that there are.
+    """The new samples, then so many of the earlier ones that these are this share (below 1) of all, or all there are.
 
     Those taken lie evenly over the earlier ones, and so over their lessons.
-
-    Args:
-        new: Samples of the target.
-        earlier: Samples of the proxy.
-        share: Share of the earlier ones among all, from 0 to below 1.
     """
     wanted = min(len(earlier.commands), round(len(new.commands) * share / (1.0 - share)))
     rows = np.linspace(0, len(earlier.commands) - 1, wanted).round().astype(int)
@@ -270,35 +250,20 @@ class Costs:
 
 
 def read_costs(section: Section) -> Costs:
-    """Read the table [teaching.costs].
-
-    Raises:
-        SettingsError: With file, key and remedy.
-    """
+    """Read the table [teaching.costs]."""
     section.only(KEYS)
     return Costs(**{key: section.number(key, getattr(Costs, key), low=0.0) for key in KEYS})
 
 
 def split_samples(count: Floats | float, expert_drives: float) -> tuple[Floats, Floats]:
-    """On-policy and off-policy samples among so many, of which the expert drives for the first ones.
-
-    Args:
-        count: How many samples, of any shape.
-        expert_drives: The number from which on the learner drives itself; infinite where it never does.
-    """
+    """On-policy and off-policy samples among so many, of which the first ones, or all, are driven by the expert."""
     off = np.minimum(count, expert_drives)
     with np.errstate(invalid="ignore"):
         return np.where(off < count, np.subtract(count, off), 0.0), off
 
 
 def cost_saved(costs: Costs, *, without: tuple[Floats, Floats], with_proxy: tuple[Floats, Floats]) -> Floats:
-    """PLV in cost: what the target samples cost that are needed without a proxy, less those needed with it.
-
-    Args:
-        costs: Of one sample and label.
-        without: On-policy and off-policy samples needed without the proxy, as `split_samples` has them.
-        with_proxy: The same with it.
-    """
+    """PLV in cost: what on- and off-policy target samples cost without a proxy, less those needed with it."""
 
     def with_a_price(samples: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
         """Samples without those that cost nothing, of which there may be infinitely many."""

@@ -128,11 +128,7 @@ def general_plv(
 ) -> Samples:
     """PLV where samples gathered by the learner itself cost otherwise than an expert's (eq. 6, as we read it).
 
-    Args:
-        without: Target samples needed without the proxy: on-policy η_on, off-policy η_off.
-        with_proxy: The same with it.
-        cost_on: Cost of an on-policy sample.
-        cost_off: Cost of an off-policy sample; with on-policy samples none and cost 1, eq. 5.
+    Samples needed are η_on and η_off; with on-policy samples none and an off-policy cost of 1 it is eq. 5.
     """
     return cost_on * (without[0] - with_proxy[0]) + cost_off * (without[1] - with_proxy[1])  # eq. (6)
 
@@ -148,13 +144,8 @@ def sample_needs(
 ) -> SampleNeeds:
     """Infer the target samples that each learner needs, from the posterior of all learning curves together.
 
-    Args:
-        curves: Scores by name of the learning curve.
-        none: The name of the learner without a proxy.
-        best_score: The score of a flawless examination; none is expected beyond it, nor below its negative.
-        tolerance: How far below the level still counts as converged.
-        level: The score that counts as converged; None for what the learner without a proxy comes to.
-        draws: How many draws.
+    No score is expected beyond that of a flawless examination, nor below its negative. Without a level, what the
+    learner without a proxy comes to counts as converged, up to the tolerance.
     """
     # A family's own scores may lie beyond those of one that drives.
     scores = np.concatenate([curve.scores[np.isfinite(curve.scores)] for curve in curves.values()])
@@ -209,11 +200,7 @@ def estimate_figure(
 ) -> LearningEstimate:
     """A figure of what two learners need, with the ends of its 95 % interval that unreached η leave possible.
 
-    Args:
-        figure: From the η of both, draw by draw; it rises with the first and falls with the second.
-        needs: How many target samples each learner needs.
-        more: The name of the first learner.
-        less: The name of the second.
+    Draw by draw, it rises with the η of the one that needs more and falls with that of the other.
     """
     first, second, last = needs.needed[more], needs.needed[less], needs.last
     reached = np.isfinite(second)
@@ -327,16 +314,9 @@ def next_examinations(needs: SampleNeeds, names: Sequence[str], design: Adaptive
     """Choose the examinations that are expected to take most from the variance of all proxies' PLV, one by one.
 
     What a score would tell is taken from how the drawn mean curve there goes with the drawn PLVs, as in linear
-    regression; the next is chosen for what is left of the variance.
-
-    Args:
-        needs: What the scores known so far say.
-        names: The curves that may be examined. PLV is that of the proxies among them; without one, it is how many
-            samples are needed without a proxy that is to be known.
-        design: How examinations are spent.
-
-    Returns:
-        A batch of them; fewer where every repetition of every count has been examined.
+    regression; the next is chosen for what is left of the variance. PLV is that of the proxies among the names; without
+    one, it is how many samples are needed without a proxy that is to be known. There are fewer than a batch where every
+    repetition of every count has been examined.
     """
     cells = _cells(needs, names, design)
     # What is not reached is taken as some way beyond the grid.
@@ -400,13 +380,7 @@ KEYS = ("zero_shot", "samples", "reduction")
 
 @dataclass(frozen=True)
 class Published:
-    """A row of somebody's table.
-
-    Attributes:
-        zero_shot: The score in the target before any of its samples.
-        samples: The target samples that were needed to converge.
-        reduction: The share of samples that was saved.
-    """
+    """A row of somebody's table: score before any target sample, samples to converge, and the share saved."""
 
     zero_shot: float
     samples: int
@@ -414,11 +388,7 @@ class Published:
 
 
 def read_published(section: Section, known: Mapping[str, object], none: str) -> Mapping[str, Published]:
-    """Read the rows, each named as a proxy of the study or as learning without one.
-
-    Raises:
-        SettingsError: With file, key and remedy.
-    """
+    """Read the rows, each named as a proxy of the study or as learning without one."""
     section.only((none, *known))
     return {name: _row(section.section(name)) for name in section.values}
 

@@ -41,11 +41,7 @@ class RandomFeatures:
     penalty: float = 0.2
 
     def train(self, samples: Demonstration, start: Weights | None, seed: int) -> Weights:
-        """Fit to the samples from scratch, or to what weights learnt elsewhere leave of them.
-
-        Raises:
-            LearnerError: If there is no sample, or the weights are of other pictures or other features.
-        """
+        """Fit to the samples from scratch, or to what weights learnt elsewhere leave of them."""
         if not len(samples.commands):
             raise LearnerError("there is no sample to learn from; collect some, or do not train")
         before: Weights = start or {

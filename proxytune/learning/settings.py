@@ -107,6 +107,9 @@ def read_teaching(section: Section) -> TeachingSettings | None:
     if not target.is_file():
         raise section.error("target", f"no such file: {target}; give the target's model.toml")
     proxies = _proxies(section.section("proxies"))
+    value = section.values.get("narrow", False)
+    if not isinstance(value, bool):
+        raise section.error("narrow", f"must be true or false, got {value!r}")
     return TeachingSettings(
         target=target,
         learner=section.text("learner", DEFAULT_LEARNER),
@@ -121,7 +124,7 @@ def read_teaching(section: Section) -> TeachingSettings | None:
         if "examinations" in section.values
         else None,
         budget=section.whole("budget", 12, low=1, high=100_000),
-        narrow=_flag(section, "narrow"),
+        narrow=value,
         widths=_widths(section.section("width")),
         proxies=proxies,
         published=read_published(section.section("published"), proxies, NONE),
@@ -145,13 +148,6 @@ def _grid(section: Section) -> tuple[int, ...]:
     if len(counts) < 2 or any(later <= earlier for earlier, later in itertools.pairwise(counts)):
         raise section.error(key, f"must rise, over two numbers at least, got {counts}")
     return tuple(counts)
-
-
-def _flag(section: Section, key: str) -> bool:
-    value = section.values.get(key, False)
-    if not isinstance(value, bool):
-        raise section.error(key, f"must be true or false, got {value!r}")
-    return value
 
 
 def _widths(section: Section) -> Mapping[str, tuple[float, float]]:

@@ -15,7 +15,6 @@ from proxytune.settings import alike_caution, figure_cautions
 
 Figures = Mapping[str, float]
 """Of a robot, by the names of robot.toml: wheel_radius, effective_baseline [m], full_speed [m/s]."""
-
 CHORD_S = 0.2
 """Motion is taken along chords of this length: noise of poses is none."""
 MOVES = 0.3
@@ -24,24 +23,18 @@ TURNED = 0.8
 """Headings that point less alike than this (1: all the same way) can tell a mirrored axis."""
 FITS, MISFITS = 0.85, 0.5
 """Headings and courses belong together above the one, and do not below the other (1: exactly)."""
-
 LATEST_S = 1.5
 """Turning is looked for so long after its command."""
 AGAINST = 0.5
 """A correlation below its negative is turning the other way."""
-
 ASKEW_DEG = 40.0
 """Trackers' frames are turned by less where nobody meant it otherwise."""
-
 JUMP_M, JUMP = 0.5, 5.0
 """A chord that is longer, and so many times a fast one, was not driven."""
-
 FROZEN_S, STILL_M_S = 2.0, 0.02
 """Longer than a cut-out of the motors; slower than any drive."""
-
 SLOWEST_TURN, FASTEST_TURN = 0.1, 5.0
 """Skid steering loses less; degrees are 57 to a radian."""
-
 FASTER, SLOWER = 1.75, 0.5
 """Gains of motors, slip and dead bands stay within; a duty of another scale, or a speed in another unit, does not."""
 HELD_S = 0.7

@@ -23,13 +23,10 @@ COMMANDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 )
 """The columns of each kind of command: duties in [−1, 1], a speed [m/s] and yaw rate [rad/s], wheel speeds [rad/s];
 of a car throttle and steering in [−1, 1], left positive, or speed [m/s] and wheel angle [rad]."""
-
 CAR_COMMANDS = ("ackermann", "speed_steering")
 """Kinds of command that are a car's."""
-
 ENABLED = "enabled"
 """The column that says whether the motors are on (1) or cut by a switch (0)."""
-
 POSE = ("x", "y", "heading")
 WHEELS = ("wheel_left", "wheel_right")
 

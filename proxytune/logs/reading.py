@@ -21,10 +21,8 @@ KEYS = ("format", *TEXTS, "command", "rate_hz", "clock_offset_s", "measured", "c
 
 FIT = "fit"
 """What `clock_offset_s` says where the offset is to be fitted."""
-
 FURTHEST_S = 3600.0
 """Clocks may be declared to be an hour apart, as where one has another time zone's half hour."""
-
 Value = TypeVar("Value")
 
 

@@ -21,7 +21,6 @@ from proxytune.settings import nearest, read_text
 
 AT_ONCE = 10_000
 """So many rows are read at a time."""
-
 CHARACTERS = 1_000_000
 """At least so many characters of a text are split into lines at a time."""
 

@@ -18,7 +18,6 @@ from proxytune.logs.rows import Rows
 
 OFF_GRID = 0.25 + 1e-6
 """A row may be this far from its place on the grid of times, in samples."""
-
 SPARSEST = 10
 """A log with more missing rows than this for each row that it has states its times or its rate wrongly."""
 
@@ -146,10 +145,8 @@ def episodes_on_grid(
 
 STEPS_HZ = 60.0
 """The grid has about so many steps a second at least."""
-
 MISSED = 10
 """The rate is counted over intervals in which no more poses than this are missing."""
-
 REACH_S = 0.1
 """The motion round a pose is taken from so long before it to so long after."""
 

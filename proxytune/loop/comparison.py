@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from proxytune.effects import SHIPPED
@@ -20,12 +19,16 @@ from proxytune.report import (
     VERMILLION,
     Table,
     columns_of,
+    digits,
     dress,
     findings,
+    fixed,
+    in_pairs,
     listed,
     plain,
     short,
     short_span,
+    span,
     with_span,
     with_unit,
 )
@@ -39,14 +42,9 @@ Known = Mapping[str, tuple[float, Ends | None]]
 
 @dataclass(frozen=True)
 class Level:
-    """A measure of one proxy.
+    """A measure of one proxy, its 95 % interval, and what a perfect proxy and, mean and deviation, chance would have.
 
-    Attributes:
-        value: The measure.
-        interval: Its 95 % interval; None where there is none.
-        floor: What a perfect proxy would have; None where only a bracket, or nothing, is known.
-        floor_ends: The interval of that, or the bracket; None where there is none.
-        chance: Mean and standard deviation of what a ranking at random would have; None where chance has no meaning.
+    None where something is not known; where only a bracket of the floor is, its ends are.
     """
 
     value: float
@@ -58,16 +56,7 @@ class Level:
 
 @dataclass(frozen=True)
 class Compared:
-    """One measure, before and after.
-
-    Attributes:
-        key: What it is called in the JSON document.
-        title: What it is of, for people.
-        unit: Its unit; empty where it has none.
-        before: Without what was found.
-        after: With it; None where nothing was found.
-        most: The largest that it can be; None where there is no such value.
-    """
+    """One measure, before and after what was found; `key` is its name in JSON, `most` the largest that it can be."""
 
     key: str
     title: str
@@ -133,7 +122,6 @@ def _ends(low: float | None, high: float | None) -> Ends | None:
 MOST_NAMED = 5
 OPEN = ("partly explained", "unexplained", "cannot be told")
 """Verdicts after which more is to be found."""
-
 NEXT = " Next: "
 """What the sentence of a study has before its last part."""
 
@@ -163,20 +151,14 @@ def answer(diagnosis: Mapping[str, Any], rows: Sequence[Compared]) -> str:
 
 
 def theta_table(before: Known, after: Known | None, diagnosis: Mapping[str, Any]) -> Table:
-    """θ before and after: what scores alone told, what the log tells, and what the extended proxy has.
-
-    Args:
-        before: Values and 95 % intervals of the first study's best θ, by name.
-        after: Those of the extended study; None where nothing was found.
-        diagnosis: What `diagnose --json` prints.
-    """
+    """θ before and after: what scores alone told, what the log tells, and what the extended proxy has."""
     logged = {**diagnosis["extended"], **(diagnosis["camera"] or {}).get("extended", {})}
     measured = {name: (one["value"], one.get("interval")) for name, one in logged.items() if one["value"] is not None}
     extended = {} if after is None else {**{name: (value, None) for name, (value, _) in measured.items()}, **after}
     names = dict.fromkeys((*before, *measured, *extended))
     rows = tuple(
         (
-            with_unit(name, SHIPPED.parameters[name].unit if name in SHIPPED.parameters else ""),
+            with_unit(name.replace(".", " "), SHIPPED.parameters[name].unit if name in SHIPPED.parameters else ""),
             *(_known(side.get(name)) for side in (before, measured, extended)),
         )
         for name in names
@@ -186,18 +168,18 @@ def theta_table(before: Known, after: Known | None, diagnosis: Mapping[str, Any]
 
 
 def _known(known: tuple[float, Sequence[float | None] | None] | None) -> str:
-    return "–" if known is None else with_span(short(known[0]), *(known[1] or (None, None)))
+    if known is None:
+        return "–"
+    low, high = known[1] or (None, None)
+    if low is None or high is None or not low < high:
+        return short(known[0], 4)
+    # A value that is known to a part in a thousand needs no two figures of its interval.
+    places = max(0, digits((low, high)) - (high - low < 1e-3 * abs(known[0])))
+    return f"{fixed(known[0], places)} ({span((low, high), places)})"
 
 
 def following(diagnosis: Mapping[str, Any], studied: str, model: str, theta: Theta) -> str:
-    """Say what to do next.
-
-    Args:
-        diagnosis: What `diagnose --json` prints.
-        studied: The sentence of the last study that was run.
-        model: Where the model that was found lies; empty where nothing was found.
-        theta: The best θ of that study.
-    """
+    """Say what to do next, after the diagnosis and the last study that was run."""
     drive, step = diagnosis.get("next_manoeuvre"), studied.rpartition(NEXT)[2]
     if drive and diagnosis["verdict"] in OPEN:
         return f"Log {drive['name']} ({drive['description']}), and close the loop with that log."
@@ -217,6 +199,8 @@ def level_text(level: Level | None, unit: str) -> str:
     """A measure with its interval, as "28 (21 to 45)"."""
     if level is None:
         return "–"
+    if level.chance is not None and level.interval:
+        return in_pairs(level.value, *level.interval)
     return with_span(f"{short(level.value)}{unit and ' '}{unit}", *(level.interval or (None, None)))
 
 
@@ -227,6 +211,8 @@ def floor_text(level: Level | None, unit: str) -> str:
     if level.floor is None and level.floor_ends:
         return f"{short_span(*level.floor_ends)}{unit and ' '}{unit}"
     assert level.floor is not None
+    if level.chance is not None and level.floor_ends:
+        return in_pairs(level.floor, *level.floor_ends)
     return with_span(f"{short(level.floor)}{unit and ' '}{unit}", *(level.floor_ends or (None, None)))
 
 
@@ -258,7 +244,14 @@ def prpv_figure(rows: Sequence[Compared]) -> Figure:
         dress(axes)
         for place, (level, colour) in enumerate(((row.before, VERMILLION), (row.after, BLUE))):
             if level is not None:
-                _draw_level(axes, place, level, colour)
+                low, high = level.floor_ends or (0.0, 0.0)
+                axes.fill_between([place - HALF, place + HALF], low, high, color=LIGHT_GREY, lw=0)
+                if level.floor is not None:
+                    axes.plot([place - HALF, place + HALF], [level.floor] * 2, color=GREY, lw=1.0)
+                below, above = level.interval or (level.value, level.value)
+                spread = [[max(0.0, level.value - below)], [max(0.0, above - level.value)]]
+                axes.errorbar(place, level.value, yerr=spread, fmt="o", ms=5, color=colour, capsize=3, lw=1.2)
+                axes.annotate(f"{level.value:.3g}", (place + 0.1, level.value), fontsize=8, color=colour, va="center")
         axes.set_xlim(-0.6, 1.6)
         axes.set_xticks([0, 1], ["before", "after"], fontsize=7)
         axes.set_ylim(bottom=0.0)
@@ -266,16 +259,5 @@ def prpv_figure(rows: Sequence[Compared]) -> Figure:
     panels[0].set_ylabel("PRPV (lower is better)", fontsize=8)
     floor = rows[0].before.floor_ends
     if floor:
-        panels[0].annotate("noise floor", (-0.55, floor[1]), fontsize=6.5, color="0.3", va="bottom")
+        panels[0].annotate("noise floor", (-0.55, floor[1]), fontsize=7, color="0.3", va="bottom")
     return figure
-
-
-def _draw_level(axes: Axes, place: int, level: Level, colour: str) -> None:
-    low, high = level.floor_ends or (0.0, 0.0)
-    axes.fill_between([place - HALF, place + HALF], low, high, color=LIGHT_GREY, lw=0)
-    if level.floor is not None:
-        axes.plot([place - HALF, place + HALF], [level.floor] * 2, color=GREY, lw=1.0)
-    below, above = level.interval or (level.value, level.value)
-    spread = [[max(0.0, level.value - below)], [max(0.0, above - level.value)]]
-    axes.errorbar(place, level.value, yerr=spread, fmt="o", ms=5, color=colour, capsize=3, lw=1.2)
-    axes.annotate(f"{level.value:.3g}", (place + 0.1, level.value), fontsize=8, color=colour, va="center")

@@ -169,7 +169,6 @@ def begin_anew_if_changed(study: Study) -> None:
 
 
 def _ignored(folder: str, names: list[str]) -> set[str]:
-    """The entries of a folder that are not copied."""
     made = shutil.ignore_patterns(*LEFT_OUT)(folder, names)
     own = {name for name in names if any(Path(folder, name, one).exists() for one in A_FOLDER_OF_ITS_OWN)}
     return made | own

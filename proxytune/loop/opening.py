@@ -51,13 +51,8 @@ FEWEST = 3
 def held_out_of(settings: StudySettings, family: DomainFamily, *, driven: bool) -> tuple[str, ...]:
     """The agents that study.toml holds out, else shipped ones that it does not use; empty where they are too few.
 
-    Args:
-        settings: Of the study.
-        family: Its family.
-        driven: True if the target is driven; otherwise only agents that its table has can be held out.
-
-    Raises:
-        InputError: If one that study.toml names is tuned on, or has no rank: the target's table has no scores of it.
+    Where the target is not driven, only agents that its table has can be held out. One that study.toml names is refused
+    if it is tuned on, or has no rank.
     """
     named = read_settings(settings.path).texts(KEY, ())
     scored = scored_agents(settings)
@@ -74,15 +69,6 @@ def held_out_of(settings: StudySettings, family: DomainFamily, *, driven: bool) 
         scored = tuple(AGENTS) if lane_following else ()
     found = named or tuple(name for name in scored if name not in used and _is_known(family, name))
     return found if len(found) >= FEWEST else ()
-
-
-def check_held_out(settings: StudySettings, family: DomainFamily, names: tuple[str, ...]) -> None:
-    """Refuse agents that the family cannot run."""
-    for name in names:
-        try:
-            ask(f"check_agent('{name}') of {settings.family}", partial(family.check_agent, name))
-        except InputError as problem:
-            raise settings.error(KEY, str(problem)) from None
 
 
 def scored_agents(settings: StudySettings) -> tuple[str, ...]:
@@ -110,20 +96,8 @@ def held_out_settings(settings: StudySettings, names: tuple[str, ...], target: P
 def drive_held_out(study: Study, settings: StudySettings, theta: Theta, watcher: Watcher) -> tuple[Assessment, int]:
     """Drive held-out agents in the instance of a study's family, twice from each start, and assess it.
 
-    Episodes are kept in the study's own database, and those that are there are not driven again. The second time is
-    for the noise floor: what the instance scores against itself.
-
-    Args:
-        study: The proxy's study.
-        settings: Its settings with held-out agents, and the target's scores of them.
-        theta: The instance.
-        watcher: Hears of every episode.
-
-    Returns:
-        The assessment, and the number of episodes that were driven now.
-
-    Raises:
-        RunError: If an agent has no episode that works.
+    Episodes are kept in the study's own database, and those that are there are not driven again. The second time is for
+    the noise floor: what the instance scores against itself. Gives the assessment, and how many were driven now.
     """
     held = replace(study, settings=settings, target=read_target(settings, study.family)[0])
     seeds = [fresh_seed(settings.seed, repetition) for repetition in (1, 2)]
@@ -149,16 +123,7 @@ HOME = "loop"
 
 @dataclass(frozen=True)
 class Loop:
-    """A loop to be closed.
-
-    Attributes:
-        settings: What study.toml says.
-        family: The proxy's domain family.
-        robot: The robot that proxy and log are of.
-        twin: The model.toml of the target, where that is a simulator.
-        log: The target's log, a folder or what `import` reads; None: the twin is recorded.
-        held_out: Agents that the tuning does not see.
-    """
+    """A loop to be closed; the twin is a simulated target's model.toml, recorded where there is no log."""
 
     settings: StudySettings
     family: DomainFamily
@@ -180,12 +145,7 @@ class Loop:
 
 
 def open_loop(study: Path, twin: Path | None = None, log: Path | None = None) -> Loop:
-    """Read a study and check it, its twin, its log and its held-out agents.
-
-    Args:
-        study: The study's folder, or its study.toml.
-        twin: The model.toml of the target; the study's `truth` if not given.
-        log: The target's log; recorded of the twin if not given.
+    """Read a study and check it, its twin (its `truth` if not given), its log and its held-out agents.
 
     Raises:
         InputError: If any of them cannot be used.
@@ -202,9 +162,18 @@ def open_loop(study: Path, twin: Path | None = None, log: Path | None = None) ->
         raise settings.error("family", "`loop` diagnoses a robot's log, and this family names no robot")
     twin = _twin(settings, twin, robot)
     loop = Loop(settings, family, robot, twin, log, held_out_of(settings, family, driven=twin is not None))
-    check_held_out(settings, family, loop.held_out)
+    for name in loop.held_out:
+        try:
+            ask(f"check_agent('{name}') of {settings.family}", partial(family.check_agent, name))
+        except InputError as problem:
+            raise settings.error(KEY, str(problem)) from None
     _check_log(loop)
-    _check_folder(loop.home)
+    try:
+        loop.home.mkdir(exist_ok=True)
+    except OSError as problem:
+        raise StoreError(f"{loop.home}: cannot be written ({problem.strerror}); copy the study elsewhere") from None
+    if not os.access(loop.home, os.W_OK):
+        raise StoreError(f"{loop.home}: cannot be written (permission denied); copy the study elsewhere")
     return loop
 
 
@@ -238,15 +207,6 @@ def _check_log(loop: Loop) -> None:
         if log.robot != loop.robot:
             theirs = f"is of the robot '{log.robot}', the study of '{loop.robot}'"
             raise LogError(f"{loop.log}: {theirs}; give a log of '{loop.robot}'")
-
-
-def _check_folder(home: Path) -> None:
-    try:
-        home.mkdir(exist_ok=True)
-    except OSError as problem:
-        raise StoreError(f"{home}: cannot be written ({problem.strerror}); copy the study elsewhere") from None
-    if not os.access(home, os.W_OK):
-        raise StoreError(f"{home}: cannot be written (permission denied); copy the study elsewhere")
 
 
 FILE_NAME = "loop.json"

@@ -125,7 +125,6 @@ class _Closing:
         self.teller.say(f"step {place} of {len(STEPS)}, {STEPS[name]}{how and ': '}{how}")
 
     def _keep(self, name: str, inputs: str, output: Path, do: Callable[[], object]) -> None:
-        """Do a step unless it is done."""
         known = self.kept.has(name, inputs, output)
         self._begin(name, "kept" if known else "")
         if not known:
@@ -154,7 +153,6 @@ class _Closing:
         write_scores(scores, output)
 
     def _tune(self, name: str, study: Study) -> StudyReport:
-        """Run what is left of a study, and write its page."""
         self._begin(name)
         report = run_opened(study, self.teller.episodes(most_episodes(study.settings)), self.teller.say)
         self.episodes += report.spent.episodes
@@ -165,7 +163,6 @@ class _Closing:
         return report
 
     def _diagnose(self) -> Mapping[str, Any]:
-        """Diagnose the given log, or the twin's."""
         loop, home = self.loop, self.loop.home / "diagnosed"
         log, seen = self._record() if loop.log is None else (loop.log, digest_of_files(loop.log))
         if loop.log is not None:
@@ -188,7 +185,6 @@ class _Closing:
         return folder, inputs
 
     def _extend(self) -> Study:
-        """Write the extended study, and open it."""
         settings, home = self.settings, self.loop.home
         folder, model = home / "extended", home / "diagnosed" / "model.toml"
         files = [(path.name, digest_of_files(path)) for path in files_of(settings)]
@@ -200,7 +196,6 @@ class _Closing:
         return study
 
     def _held_out(self, before: StudyReport, after: StudyReport) -> tuple[Assessment, Assessment] | None:
-        """Drive the held-out agents in both tuned proxies."""
         names, name = self.loop.held_out, "held-out agents"
         if not names:
             self._begin(name, "there are none")
@@ -378,12 +373,7 @@ def rows_of(closed: Closed) -> list[Compared]:
 
 
 def text_of(closed: Closed, page: Path) -> Group:
-    """A closed loop as `loop` prints it.
-
-    Args:
-        closed: The loop.
-        page: Where its page is.
-    """
+    """A closed loop as `loop` prints it, with where its page is."""
     rows = rows_of(closed)
     sentence, table = Text(answer(closed.diagnosis, rows), style="bold"), _table(closed, rows)
     shown, theta = (table_text(one, ragged=True) for one in (replace(table, title=""), _theta_table(closed)))
@@ -426,7 +416,6 @@ def view_of(closed: Closed) -> View:
 
 
 def _links(closed: Closed) -> Paragraphs:
-    """The pages and files beside the loop's page that there are."""
     home = closed.loop.home
     beside = {"tuning without": "../report.html", "the diagnosis": "diagnosed/report.html"}
     beside |= {"tuning again": "extended/report.html", "the model that was found": "diagnosed/model.toml"}

@@ -115,10 +115,15 @@ from .view import (
     foot_of as foot_of,
 )
 from .wording import (
+    digits as digits,
+    fixed as fixed,
+    in_pairs as in_pairs,
     listed as listed,
+    percent as percent,
     plain as plain,
     short as short,
     short_span as short_span,
+    span as span,
     with_span as with_span,
     with_unit as with_unit,
 )

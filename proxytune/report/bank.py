@@ -9,21 +9,22 @@ from rich.console import Group
 from proxytune.report.html import write_page
 from proxytune.report.study.page import study_foot
 from proxytune.report.text import file_texts, group_texts, table_text
-from proxytune.report.view import Paragraphs, Table, View, columns_of
-from proxytune.report.wording import listed, plain, short
+from proxytune.report.view import Column, Table, View, columns_of
+from proxytune.report.wording import listed, percent, plain, short, with_unit
 from proxytune.study import WITHIN, Bank, settings_document
 
 MOST_NAMED = 3
 MEANING = (
-    "Some trials were taken for a target in turn, with a new placement's noise, and told from the others. The width "
-    "is that of the 95 % interval, on average. The starts needed bring it to a thirtieth of the box to either side."
+    "Some trials were taken for a target in turn, with a new placement's noise, and told from the others: ± "
+    "is half of the 95 % interval, on average. The starts needed bring it to a thirtieth of the box; where that is "
+    "not by starts, more of them would not, but other agents may."
 )
 
 
 def bank_sentence(bank: Bank) -> str:
     """Say which parameters these agents would tell, and how well."""
     widths = bank.widths(bank.settings.starts)
-    told = [f"{plain(name)} to ± {short(width / 2.0)}" for name, width in widths.items()]
+    told = [f"{plain(name)} to ± {short(width / 2.0)} {bank.units[name]}".rstrip() for name, width in widths.items()]
     best = [name for name, _ in bank.agents[:MOST_NAMED]]
     from_starts = f"{len(bank.settings.agents)} agents measured from {bank.settings.starts} starts"
     if not best:
@@ -60,13 +61,14 @@ def bank_table(bank: Bank) -> Table:
     rows = []
     for box in bank.settings.space.intervals:
         needed, one = bank.needed[box.name], told.get(box.name)
-        agents = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in one.agents[:MOST_NAMED]) if one else ""
-        metrics = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in one.metrics[:2]) if one else ""
-        widths = [short(bank.widths(count)[box.name]) for count in bank.expected]
-        within = f"± {short(WITHIN * (box.high - box.low))}: {needed or 'not by starts'}"
-        rows.append((box.name, *widths, within, agents, metrics))
-    heads = [f"width, {count} start{'s' if count > 1 else ''}" for count in bank.expected]
-    columns = columns_of(("parameter",), (*heads, "starts needed", "agents that tell", "metrics that tell"))
+        agents = ", ".join(f"{name} {percent(share)}" for name, share in one.agents[:MOST_NAMED]) if one else ""
+        metrics = ", ".join(f"{name} {percent(share)}" for name, share in one.metrics[:2]) if one else ""
+        reach = [f"± {short(bank.widths(count)[box.name] / 2.0)}" for count in bank.expected]
+        within = f"{needed or 'not by starts'} (± {short(WITHIN * (box.high - box.low))})"
+        rows.append((with_unit(box.name, bank.units[box.name]), *reach, within, agents, metrics))
+    heads = [f"by {count} start{'s' if count > 1 else ''}" for count in bank.expected]
+    who = map(Column, ("agents that tell", "metrics that tell"))
+    columns = (*columns_of(("parameter",), (*heads, "starts needed")), *who)
     return Table("What a target would tell", columns, tuple(rows), (MEANING,))
 
 
@@ -82,8 +84,8 @@ def write_bank_page(bank: Bank, table: Path) -> Path:
         RunError: If it cannot be written.
     """
     page = table.with_name("report.html")
-    learn = f'Measure these agents on the target and write learn_from = ["{table.parent.name}"] into its study.toml.'
-    parts = (bank_table(bank), Paragraphs("How to use it", (learn,)))
-    view = View(f"{bank.settings.name}: what can a target learn from this bank?", bank_sentence(bank), learn, parts)
+    learn = f'Measure these agents on the target and write `learn_from = ["{table.parent.name}"]` into its study.toml.'
+    title = f"{bank.settings.name}: what can a target learn from this bank?"
+    view = View(title, bank_sentence(bank), learn, (bank_table(bank),))
     write_page(page, view, study_foot(bank.settings))
     return page

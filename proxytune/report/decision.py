@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from proxytune.report.figure_style import BLUE, COLUMN, GREY, LIGHT_BLUE, dress
 from proxytune.report.view import Table, columns_of
-from proxytune.report.wording import listed, plain, short, with_span
+from proxytune.report.wording import listed, percent, plain, short, with_span
 from proxytune.usefulness import (
     Assessment,
     Decision,
@@ -36,7 +36,7 @@ def decision_sentence(assessment: Assessment, target: str) -> str:
     observed = _observed_sentence(decision.observed)
     if decision.probability_best is None:
         return f"By the means as published, {decision.winner} is the best {where}; {observed}."
-    risk = f"{_percent(decision.probability_best)} to be the best {where}, expected regret "
+    risk = f"{percent(min(decision.probability_best, 0.9999))} to be the best {where}, expected regret "
     risk += f"{short(decision.expected_regret[decision.winner], 2)} in {decision.chosen_on}"
     others = decision.not_told_apart
     rest = f"{_few(others)} cannot be told from it" if others else "no other agent can be as good with 95 %"
@@ -53,10 +53,6 @@ def _observed_sentence(observed: Panel) -> str:
 
 def _few(names: tuple[str, ...]) -> str:
     return listed(list(names)) if len(names) <= 4 else f"{', '.join(names[:3])} and {len(names) - 3} others"
-
-
-def _percent(share: float) -> str:
-    return "over 99.9 %" if share > 0.999 else f"{100.0 * share:.2g} %" if share < 0.995 else f"{100.0 * share:.1f} %"
 
 
 def saving_sentence(saving: Saving) -> str:
@@ -141,14 +137,14 @@ def decision_figure(decision: Decision) -> Figure:
         axes.plot(decision.expected_regret[agent], row, "o", color=colour, markersize=4, clip_on=False, zorder=3)
         if decision.best_probabilities is not None:
             text = f"{decision.best_probabilities[agent]:.2f}"
-            axes.text(1.02, row, text, transform=axes.get_yaxis_transform(), fontsize=6, va="center")
+            axes.text(1.02, row, text, transform=axes.get_yaxis_transform(), fontsize=7, va="center")
     axes.set_yticks(np.arange(len(order)), [name if len(name) <= 24 else f"…{name[-23:]}" for name in order])
     axes.set_ylim(len(order) - 0.5, -0.5)
     axes.set_xlim(left=0.0)
     dress(axes, f"regret in {plain(decision.chosen_on)[:44]}")
-    axes.tick_params(axis="y", labelsize=6, length=0)
+    axes.tick_params(axis="y", labelsize=7, length=0)
     if decision.best_probabilities is not None:
-        axes.text(1.02, 1.0, "P(best)", transform=axes.transAxes, fontsize=6, va="bottom")
+        axes.text(1.02, 1.0, "P(best)", transform=axes.transAxes, fontsize=7, va="bottom")
     return figure
 
 

@@ -20,7 +20,7 @@ from proxytune.report.study.sentence import KnownParameter, known_parameters
 from proxytune.report.teaching import UNKNOWN, count, estimate_document
 from proxytune.report.text import file_texts, group_texts, note_texts, section_text
 from proxytune.report.view import Paragraphs, Picture, Table, View, columns_of
-from proxytune.report.wording import fixed, listed, short, span, with_span
+from proxytune.report.wording import fixed, in_pairs, listed, short, span
 from proxytune.report.writing import save_figure, svg_of
 from proxytune.study import BestFamilies, ComparedFamilies, Lesson, TunedFamily, settings_document
 from proxytune.usefulness import Assessment, Difference
@@ -74,7 +74,8 @@ def families_next_step(compared: ComparedFamilies) -> str:
 
 def prpv_text(fresh: Assessment) -> str:
     """PRPV with its interval."""
-    return with_span(str(fresh.prpv.value), fresh.prpv_interval.low, fresh.prpv_interval.high)
+    low, high = fresh.prpv_interval.low, fresh.prpv_interval.high
+    return str(fresh.prpv.value) if low is None or high is None else in_pairs(fresh.prpv.value, low, high)
 
 
 def difference_text(one: Difference) -> str:
@@ -412,12 +413,16 @@ def _panels(compared: ComparedFamilies) -> list[Panel]:
     return [Panel("fresh PRPV\n[ordered pairs]", prpv, compared.predicts), *taught, costs]
 
 
+DECADE = 10.0
+"""A logarithmic axis of less than this factor has few powers of ten, or none."""
+
+
 def _draw(axes: Axes, panel: Panel, names: list[str]) -> None:
     for place, name in enumerate(names):
         value = panel.values.get(name)
         if value is None:
             axes.annotate(
-                "not known", (0.5, place), xycoords=("axes fraction", "data"), fontsize=6.5, ha="center", va="center",
+                "not known", (0.5, place), xycoords=("axes fraction", "data"), fontsize=7, ha="center", va="center",
                 color="0.3",
             )  # fmt: skip
             continue
@@ -430,6 +435,9 @@ def _draw(axes: Axes, panel: Panel, names: list[str]) -> None:
     axes.margins(x=0.15)
     if panel.ratios:
         axes.set_xscale("log")
+        low, high = axes.get_xlim()
+        if high < DECADE * low:
+            axes.xaxis.set_major_locator(MaxNLocator(2))
         # Exponents would be smaller than can be read.
         axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
         axes.xaxis.set_minor_formatter(NullFormatter())

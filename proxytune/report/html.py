@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 MANY = 12
 """A page of more parts than this has a table of contents."""
-SMALLEST = 0.47
-"""A picture is made no smaller than this share of its width, so that it can be read; beyond that it scrolls."""
+SMALLEST = 0.7
+"""A picture is made no smaller than this share of its width, so that 7 pt are 11 pixels; beyond that it scrolls."""
 ENLARGED = 160.0
 """Pixels of the page to an inch of a figure, where 7 pt are about the page's 16 pixels."""
 ABOUT = ("robot", "log", "target", "targets")
@@ -53,11 +53,11 @@ WORDS = {
 """What a page explains at its foot of the words that it uses."""
 STYLE = """
 :root { color-scheme: light dark; --paper: #fff; --ink: #1d2126; --soft: #5a626c; --line: #d9dde2; --tint: #f1f5f9;
-  --shade: #0003; --accent: #0072b2; }
+  --shade: #0003; --accent: #0072b2; --late: #c68900; }
 @media (prefers-color-scheme: dark) {
   :root { --paper: #15181c; --ink: #e6e8ea; --soft: #a3abb4; --line: #3a414a; --tint: #20262d;
-    --shade: #fff4; --accent: #6cc0f0; }
-  svg.drawn, svg.drawn image { filter: invert(1) hue-rotate(180deg); }
+    --shade: #fff4; --accent: #6cc0f0; --late: #e69f00; }
+  svg.drawn, svg.drawn image[id*="photo"] { filter: invert(1) hue-rotate(180deg); }
 }
 * { box-sizing: border-box; }
 html { -webkit-text-size-adjust: 100%; }
@@ -69,10 +69,11 @@ p, .notes, dl { max-width: 46rem; }
 h2 { font-size: 1.15rem; margin: 2.5rem 0 .5rem; }
 .answer { font-size: 1.15rem; margin: 0 0 1rem; }
 .following, .under-way { padding: .6rem .9rem; border-left: .25rem solid var(--accent); background: var(--tint); }
-.under-way { border-left-color: #e69f00; }
+.under-way { border-left-color: var(--late); }
 figure { margin: .5rem 0 0; display: flex; flex-wrap: wrap; gap: .6rem 1.5rem; align-items: flex-start; }
 figcaption { flex: 1 1 15rem; max-width: 40rem; }
-svg.drawn { display: block; max-width: 100%; height: auto; stroke-linejoin: round; stroke-linecap: butt; }
+svg.drawn { display: block; max-width: 100%; height: auto;
+  stroke-linejoin: round; stroke-linecap: butt; }
 dl { font-size: .93rem; color: var(--soft); }
 dt { font-weight: 600; float: left; margin-right: .5rem; }
 dt::after { content: ":"; }
@@ -96,26 +97,37 @@ tbody th { font-weight: 600; }
 tbody th.part { padding-left: 1rem; }
 td.prose { min-width: 11rem; }
 table:not(:has(thead)) td { overflow-wrap: anywhere; }
+tbody th.prose { min-width: 8rem; }
 .number { text-align: right; white-space: nowrap; }
 thead .number { white-space: normal; }
 .unseen { position: absolute; width: 1px; height: 1px; overflow: hidden; clip-path: inset(50%); white-space: nowrap; }
 pre { background: var(--tint); padding: .6rem .9rem; overflow-x: auto; }
 code { font: .92em/1.5 ui-monospace, monospace; }
-pre code { white-space: pre-wrap; }
+code span { display: inline-block; }
 nav ol { columns: 16rem; column-gap: 3rem; padding-left: 1.8rem; }
 nav li { break-inside: avoid; }
 a { color: var(--accent); }
 footer { margin-top: 3rem; border-top: 1px solid var(--line); }
+@media (max-width: 30rem) {
+  body { padding: 1rem .8rem 2rem; }
+  figure .scroll { margin: 0 -.4rem; max-width: none; }
+  th, td { padding-right: .7rem; }
+  td.prose { min-width: 9rem; }
+}
 @media print {
+  html { font-size: 10pt; }
   :root { color-scheme: light; --paper: #fff; --ink: #000; --soft: #333; --line: #bbb; --tint: #f4f4f4; }
-  body { max-width: none; padding: 0; font-size: 10pt; }
+  body { max-width: none; padding: 0; font-size: 1rem; }
   .scroll { overflow: visible; }
-  table { font-size: 8.5pt; }
+  table { font-size: .85rem; }
   th, td { padding-right: .6rem; }
   td.prose { min-width: 0; }
   .number { white-space: normal; }
-  img, svg.drawn { max-height: 7.5cm; width: auto; min-width: 0 !important; }
-  section, figure, tr, .following { break-inside: avoid; }
+  img, svg.drawn { width: calc(.68 * var(--wide)) !important; max-height: 21cm; min-width: 0 !important; }
+  figcaption { flex-basis: 5cm; }
+  pre { white-space: pre-wrap; }
+  svg.drawn, svg.drawn image { filter: none !important; }
+  figure, tr, p, li, .following { break-inside: avoid; }
   h2 { break-after: avoid; }
   thead { display: table-header-group; }
   nav, .under-way { display: none; }
@@ -250,7 +262,7 @@ def _picture(part: Picture, place: str) -> str:
         drawing = _inline_svg(part.image.decode("utf-8"), place, alt)
     else:
         source, width = _data_image(part.image)
-        size = f' width="{width}" style="min-width:{SMALLEST * width:.0f}px"' if width else ""
+        size = f' width="{width}" style="--wide:{width}px;min-width:{SMALLEST * width:.0f}px"' if width else ""
         drawing = f'<span class="card"><img alt="{alt}" src="{source}"{size}></span>'
     card = f'<div class="scroll" role="region" tabindex="0" aria-labelledby="{place}">{drawing}</div>'
     # The alternative text says the same, so that it is not read twice.
@@ -268,7 +280,9 @@ def _inline_svg(svg: str, place: str, alt: str) -> str:
     head, _, rest = body.partition(">")
     box = re.search(r'viewBox="[-\d.]+ [-\d.]+ ([\d.]+) ([\d.]+)"', head)
     width = float(box[1]) * ENLARGED / 72.0 if box else 0.0
-    size = f'{box[0]} style="width:{width:.0f}px;min-width:{SMALLEST * width:.0f}px"' if box else ""
+    size = (
+        f'{box[0]} style="--wide:{width:.0f}px;width:{width:.0f}px;min-width:{SMALLEST * width:.0f}px"' if box else ""
+    )
     return f'<svg class="drawn" role="img" aria-label="{alt}" {size}>{rest}'
 
 
@@ -298,7 +312,7 @@ def _table(table: Table, label: str) -> str:
 
 def _row(row: tuple[str, ...], columns: tuple[Column, ...]) -> str:
     first, *others = zip(row, columns, strict=True)
-    kind = ' class="part"' if first[0].startswith(" ") else _class(first[1])
+    kind = ' class="part"' if first[0].startswith(" ") else _class(first[1], len(first[0]))
     name = f'<th scope="row"{kind}>{_cell(first[0].strip(), first[1])}</th>'
     return name + "".join(f"<td{_class(one, len(cell))}>{_cell(cell, one)}</td>" for cell, one in others)
 
@@ -333,5 +347,15 @@ def _words(page: str) -> str:
 
 def _text(text: str) -> str:
     """A text with what is between backticks as code, and [words](a/file) beside the page as a link."""
-    linked = re.sub(r"\[([^\]\[]+)\]\((\w[\w./ -]*|\.\./[\w./ -]*)\)", r'<a href="\2">\1</a>', html.escape(text))
-    return re.sub(r"`([^`]+)`", r"<code>\1</code>", linked)
+    said = re.split(r"`([^`]+)`", html.escape(text))
+    return "".join(_code(one) if place % 2 else _linked(one) for place, one in enumerate(said))
+
+
+def _linked(text: str) -> str:
+    return re.sub(r"\[([^\]\[]+)\]\((\w[\w./ -]*|\.\./[\w./ -]*)\)", r'<a href="\2">\1</a>', text)
+
+
+def _code(command: str) -> str:
+    """A command as code, its options whole: a browser would break them after their hyphens."""
+    whole = re.sub(r"(?<!\S)(--?\w[^ ]+)", r"<span>\1</span>", command)
+    return f"<code>{whole}</code>"

@@ -12,7 +12,7 @@ from rich.console import Group
 from rich.text import Text
 
 from proxytune.learning import Distribution, describe_distribution
-from proxytune.report.figure_style import BLUE, COLUMN, VERMILLION, LineName, dress, legend_below, name_lines
+from proxytune.report.figure_style import BLUE, COLUMN, GREY, VERMILLION, LineName, dress, legend_below, name_lines
 from proxytune.report.html import write_page
 from proxytune.report.study.page import study_foot
 from proxytune.report.teaching import (
@@ -217,7 +217,7 @@ def plv_figure(study: PlvStudy) -> Figure:
     highest = np.maximum.accumulate(values)
     reached = np.isfinite(highest)
     axes.step(numbers[reached], highest[reached], where="post", color=VERMILLION, linewidth=1.5, label=HIGHEST.words)
-    axes.axhline(0.0, color="0.6", linewidth=0.8)
+    axes.axhline(0.0, color=GREY, linewidth=0.8)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     dress(axes, "trial", "PLV [target samples saved]")
     if reached.any():

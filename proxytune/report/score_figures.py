@@ -8,7 +8,17 @@ from matplotlib.patches import Patch
 from scipy.stats import rankdata
 
 from proxytune.arrays import Floats
-from proxytune.report.figure_style import BLUE, COLUMN, LIGHT_BLUE, LIGHT_GREY, ORANGE, VERMILLION, dress, spread_places
+from proxytune.report.figure_style import (
+    BLUE,
+    COLUMN,
+    GREY,
+    LIGHT_BLUE,
+    LIGHT_GREY,
+    ORANGE,
+    VERMILLION,
+    dress,
+    spread_places,
+)
 from proxytune.report.wording import plain
 from proxytune.scores import ScoreTable
 from proxytune.usefulness import Assessment, Comparison, Prpv
@@ -77,11 +87,11 @@ def _draw_pairs(axes: Axes, cells: Floats, *, named: bool) -> None:
 def _scatter_panel(axes: Axes, inputs: Comparison, column: int) -> None:
     proxy, target = (means[:, column] for means in inputs.means)
     errors = (_standard_errors(inputs.target)[:, column], _standard_errors(inputs.proxy)[:, column])
-    axes.errorbar(target, proxy, xerr=errors[0], yerr=errors[1], fmt="none", ecolor="0.7", elinewidth=0.8, zorder=1)
+    axes.errorbar(target, proxy, xerr=errors[0], yerr=errors[1], fmt="none", ecolor=GREY, elinewidth=0.8, zorder=1)
     axes.plot(target, proxy, "o", color=BLUE, markersize=4, zorder=2)
     axes.margins(0.1)
     limits = axes.axis()
-    axes.axline((0, 0), slope=1, color="0.6", linewidth=0.8, linestyle="--", zorder=0)
+    axes.axline((0, 0), slope=1, color=GREY, linewidth=0.8, linestyle="--", zorder=0)
     axes.axis(limits)
     name = plain(inputs.metrics[column].name)
     dress(axes, f"{name} on the target", f"{name} in the proxy")
@@ -106,7 +116,7 @@ def _name_points(axes: Axes, inputs: Comparison, column: int, apart: float) -> N
     for row, place in zip(shown, places, strict=True):
         axes.annotate(
             _short(inputs.agents[row]), (target[row], proxy[row]), (1.04, place), textcoords="axes fraction",
-            ha="left", va="center", fontsize=6, annotation_clip=False, arrowprops=look,
+            ha="left", va="center", fontsize=7, annotation_clip=False, arrowprops=look,
         )  # fmt: skip
 
 
@@ -131,11 +141,11 @@ def _name_agents(axes: Axes, order: list[str]) -> None:
     """Names beside the pairs, or ranks on the target where they are too many."""
     if len(order) <= MOST:
         ticks = np.arange(len(order)) + 0.5
-        axes.set_xticks(ticks[:-1], order[:-1], rotation=90, fontsize=6)
-        axes.set_yticks(ticks[1:], order[1:], fontsize=6)
+        axes.set_xticks(ticks[:-1], order[:-1], rotation=90, fontsize=7)
+        axes.set_yticks(ticks[1:], order[1:], fontsize=7)
     axes.invert_yaxis()
     axes.set_aspect("equal")
-    axes.tick_params(length=0, labelsize=6)
+    axes.tick_params(length=0, labelsize=7)
     axes.spines[:].set_visible(False)
     axes.set_xlabel("agent (best on the target first)", fontsize=8)
     axes.set_ylabel("agent", fontsize=8)

@@ -191,9 +191,11 @@ def write_score_report(
 
 def _tables(assessments: Assessments, selection: Selection | None, target: str) -> list[Table]:
     """Every measure of one proxy with success rates below, or proxies ranked; all cautions and notes once."""
-    every = assessments.values()
-    cautions = [f"beware: {line}" for line in dict.fromkeys(line for one in every for line in one.cautions)]
-    notes = (*cautions, *dict.fromkeys(note for one in every for note in one.notes))
+    notes = tuple(
+        f"{kind}{whose}: {line}".removeprefix(": ").lstrip()
+        for kind, lines in (("beware", "cautions"), ("", "notes"))
+        for line, whose in _said({name: getattr(one, lines) for name, one in assessments.items()}).items()
+    )
     if selection is not None:
         return [_ranking(assessments, selection, target, notes)]
     ((proxy, assessment),) = assessments.items()

@@ -19,10 +19,20 @@ from proxytune.report.study.page import study_foot
 from proxytune.report.sweep_figures import bars_figure, panels_figure, sweep_figure
 from proxytune.report.text import group_texts, table_text
 from proxytune.report.view import Paragraphs, Part, Picture, Table, View, columns_of
+from proxytune.report.wording import listed, plain, short
 from proxytune.report.writing import save_figure, svg_of, write_text
 from proxytune.space import Theta
 from proxytune.study import StudySettings
-from proxytune.sweep import METRICS, Series, SweepCurve, SweepPoint, describe_shape, series_of, shape_of
+from proxytune.sweep import (
+    METRICS,
+    OUTWARDS,
+    Series,
+    SweepCurve,
+    SweepPoint,
+    describe_shape,
+    series_of,
+    shape_of,
+)
 from proxytune.usefulness import MEASURES, PRPV
 
 OF_PRPV = ("prpv", "prpv_interval", "prpv_normalised", "expected_prpv")
@@ -149,6 +159,19 @@ def curve_lines(curve: SweepCurve) -> list[str]:
     return [f"{curve.parameter}: {describe_shape(series, held_at)}" for series in series_of(curve)]
 
 
+def shapes_note(curve: SweepCurve) -> str:
+    """Say in one sentence what all measures do away from where the parameter is held; those alike are told together."""
+    held = curve.base.get(curve.parameter)
+    alike = dict[str, list[str]]()
+    for series in series_of(curve):
+        shape = shape_of(series, held)
+        below, above = OUTWARDS[shape.below], OUTWARDS[shape.above]
+        course = f"on both sides {above}" if below == above else f"downwards {below}, upwards {above}"
+        alike.setdefault(course, []).append(plain(series.name))
+    at = "" if held is None else f"from {short(held, 4)} "
+    return "; ".join(f"{listed(names)}: {at}{course}" for course, names in alike.items())
+
+
 def say_failures(curves: Sequence[SweepCurve]) -> list[str]:
     """Say why points have no score, in one line each."""
     return [
@@ -215,10 +238,11 @@ def sweep_view(study: str, curves: Sequence[SweepCurve], figures: Mapping[str, b
     for curve in curves:
         if image := figures.get(curve_name(curve)):
             parts.append(Picture(f"Usefulness along {curve.parameter}", image, CAPTION))
-        parts += [table for table in curve_tables(curve) if table.columns[1:]]
+        first, second = curve_tables(curve)
+        parts += [replace(first, notes=(shapes_note(curve),)), *([second] if second.columns[1:] else [])]
     wrong = say_failures(curves)
     parts += [Paragraphs("What failed", tuple(wrong))] if wrong else []
-    names, answer = ", ".join(curve.parameter for curve in curves), " ".join(f"{_lowest(curve)}." for curve in curves)
+    names, answer = listed([curve.parameter for curve in curves]), " ".join(f"{_lowest(curve)}." for curve in curves)
     return View(
         f"{study}: how does usefulness depend on {names}?", f"{answer} {held}.", _next_step(curves), tuple(parts)
     )
@@ -230,7 +254,7 @@ def _lowest(curve: SweepCurve) -> str:
     shape = shape_of(prpv, curve.base.get(curve.parameter))
     if shape.score is None:
         return f"{curve.parameter}: {prpv.name} is undefined at every point"
-    best, points = ", ".join(f"{value:.4g}" for value in shape.best), len(curve.points)
+    best, points = listed([short(value, 4) for value in shape.best]), len(curve.points)
     worse = points - len(shape.near_best)
     beyond = f"worse beyond noise at {worse} of {points} values" if worse else "at no other value worse beyond noise"
     return f"{curve.parameter}: {prpv.name} is lowest ({shape.score:.3g}) at {best}, and {beyond}"

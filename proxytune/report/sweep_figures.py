@@ -150,7 +150,7 @@ def bar_points(curve: SweepCurve) -> tuple[list[int], int]:
 def _draw_bars(axes: Axes, spots: Sequence[float], chosen: Sequence[SweepPoint], held: SweepPoint) -> None:
     for spot, point in zip(spots, chosen, strict=True):
         if point.assessment is None:
-            axes.annotate("failed", (spot, 0), rotation=90, ha="center", va="bottom", fontsize=6)
+            axes.annotate("failed", (spot, 0), rotation=90, ha="center", va="bottom", fontsize=7)
             continue
         inner, score = point.assessment.prpv_interval, point.assessment.prpv.value
         colour, label = (BLUE, HELD) if point is held else (LIGHT_BLUE, BESIDE)

@@ -17,7 +17,7 @@ from proxytune.report.figure_style import BLUE, COLUMN, GREY, dress, legend_belo
 from proxytune.report.html import write_page
 from proxytune.report.text import file_texts, group_texts, table_text
 from proxytune.report.view import Foot, Paragraphs, Part, Picture, Table, View, columns_of
-from proxytune.report.wording import fixed, listed, short, span
+from proxytune.report.wording import fixed, listed, percent, short, span
 from proxytune.report.writing import save_figure, svg_of
 from proxytune.study import settings_document
 from proxytune.teaching import (
@@ -139,7 +139,7 @@ def _row(lesson: TeacherResult, prpv: Predictivity | None) -> tuple[str, ...]:
     predicts = "" if prpv is None else f"{prpv.prpv:g}" + (f" ({span(prpv.interval, 0)})" if prpv.interval else "")
     if worth is None:
         return (lesson.name, predicts, zero_shot, "", "", "")
-    reduction = "" if worth.reduction.value is None else f"{fixed(100.0 * worth.reduction.value, 0)} %"
+    reduction = "" if worth.reduction.value is None else percent(worth.reduction.value)
     return (lesson.name, predicts, zero_shot, count(worth.needed), count(worth.plv, UNKNOWN), reduction)
 
 
@@ -255,7 +255,7 @@ def _published(experiment: Experiment, rows: Sequence[tuple[str, ...]]) -> tuple
     cells = []
     for name, theirs in taught.published.items():
         _, _, zero_shot, needed, _, reduction, *_ = here[name]
-        published = (f"{theirs.zero_shot:g}", f"{theirs.samples}", f"{fixed(100.0 * theirs.reduction, 0)} %")
+        published = (f"{theirs.zero_shot:g}", f"{theirs.samples}", percent(theirs.reduction))
         cells.append((name, published[0], zero_shot, published[1], needed, published[2], reduction))
     notes = tuple(filter(None, [taught.published_in]))
     return (Table("Beside what was published", columns_of(("proxy",), PUBLISHED), tuple(cells), notes),)

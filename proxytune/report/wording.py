@@ -51,10 +51,14 @@ def in_pairs(value: float, low: float, high: float) -> str:
 
 
 def percent(share: float) -> str:
-    """A share of the box in per cent, of two significant figures."""
-    if share <= 0.0:
-        return "0 %"
-    return "under 0.001 %" if share < 1e-5 else f"{float(f'{100.0 * share:.2g}'):g} %"
+    """A share in per cent, of two significant figures; near all, or above, of three."""
+    if share < 0.0:
+        return f"−{percent(-share)}"
+    if 0.0 < share < 1e-5:
+        return "under 0.001 %"
+    if 0.999 < share < 1.0:
+        return "over 99.9 %"
+    return f"{float(f'{100.0 * share:.{3 if share >= 0.995 else 2}g}'):g} %"
 
 
 def probability(p_value: float) -> str:

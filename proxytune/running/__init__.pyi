@@ -9,7 +9,14 @@ from .fleets import (
     run_fleet as run_fleet,
     run_together as run_together,
 )
-from .progress import Bars as Bars, Lines as Lines, Silent as Silent, Watcher as Watcher, progress_bar as progress_bar
+from .progress import (
+    Bars as Bars,
+    Lines as Lines,
+    Silent as Silent,
+    Watcher as Watcher,
+    progress_bar as progress_bar,
+    watching as watching,
+)
 from .workers import (
     OVERRUN as OVERRUN,
     IsolatedWorker as IsolatedWorker,

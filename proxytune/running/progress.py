@@ -1,6 +1,7 @@
 """How far a command is: a bar on the terminal, a plain line for each trial, point or step anywhere else."""
 
 import time
+from contextlib import AbstractContextManager, nullcontext
 from typing import Protocol
 
 from rich.console import Console
@@ -99,6 +100,11 @@ class Bars:
             self._patience_s = 2.0 * seconds
             minutes = f"{seconds / 60.0:.0f} min"
             self._lines.put(f"{episode} has been under way for {minutes}; episode_timeout_s in study.toml would end it")
+
+
+def watching(progress: bool, total: int, unit: str = "episodes") -> AbstractContextManager[Watcher]:
+    """A bar of so many, if progress is to be shown; else silence."""
+    return Bars(total, unit) if progress else nullcontext(Silent())
 
 
 class Lines:

@@ -16,14 +16,12 @@ from proxytune.settings import alike_caution
 TIMES = re.compile(r"(^|_|\b)(time|seconds|duration|survival|lifetime|steps)(_|\b|$)", re.IGNORECASE)
 NO_TIMES = re.compile(r"diff|delta|advantage|gain|margin|offset|error|log|reward|per_|rate", re.IGNORECASE)
 """What names of metrics say that count from zero, and of those that may be below."""
-
 OTHER_UNIT = 8.0
 """Where all agents' scores differ by about one factor, this one is no longer a matter of physics."""
 ANY_UNIT = 100.0
 """Where they differ by this factor, they need not agree on it."""
 AGREED = 0.3
 """Agents agree on a factor: half of them within this many powers of ten."""
-
 SAME_LENGTH = 1.05
 CEILING = 0.1
 """A time limit is where at least this share of the episodes ends."""
@@ -34,13 +32,7 @@ DISTINCT = 0.8
 
 
 def score_cautions(*, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -> tuple[str, ...]:
-    """Sentences on what is probably not meant in two tables of the same agents.
-
-    Args:
-        proxy: Scores in the proxy.
-        target: Scores on the target, with the same agents in the same order.
-        metrics: How agents are compared, in the order of both tables' columns.
-    """
+    """Sentences on what is probably not meant in two tables of the same agents, in the same order as the metrics."""
     sides = {"the proxy": proxy, "the target": target}
     lines = [*_names(sides)]
     for side, table in sides.items():
@@ -124,7 +116,11 @@ def _lengths(proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -
         (most, limited), (other, other_limited) = (_longest(table, place) for table in (proxy, target))
         shorter = limited if most < other else other_limited
         factor = max(most, other) / min(most, other) if min(most, other) > 0.0 else 1.0
-        if shorter and factor > SAME_LENGTH and not _unit_of_time(factor):
+        if (
+            shorter
+            and factor > SAME_LENGTH
+            and not any(abs(factor / unit - 1.0) < 0.02 for unit in (60.0, 1e3, 1e6, 1e9))
+        ):
             yield (
                 f"episodes last up to {most:.4g} in the proxy and up to {other:.4g} on the target by {metric.name}; "
                 "give both sides one time limit, or scores that grow with time cannot be compared"
@@ -137,11 +133,6 @@ def _longest(table: ScoreTable, place: int) -> tuple[float, bool]:
     longest = float(times.max())
     ended = int((times >= longest - 1e-3 * abs(longest)).sum())
     return longest, ended >= max(FEWEST_AT_CEILING, CEILING * len(times))
-
-
-def _unit_of_time(factor: float) -> bool:
-    """A factor that is one of milliseconds or minutes, and hardly one of time limits."""
-    return any(abs(factor / unit - 1.0) < 0.02 for unit in (60.0, 1e3, 1e6, 1e9))
 
 
 def _units(proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric], *, alone: bool) -> Iterator[str]:

@@ -43,15 +43,7 @@ def is_form(path: Path) -> bool:
 
 
 def form_rows(path: Path, domain: str | None = None) -> tuple[list[str], list[Line]]:
-    """The columns and rows of a folder, a JSON file or a Python file.
-
-    Args:
-        path: Which.
-        domain: The dictionary in a Python file.
-
-    Raises:
-        ScoresError: If it holds no scores.
-    """
+    """The columns and rows of a folder, a JSON file or a Python file, of which `domain` is the dictionary."""
     if path.is_dir():
         files = sorted(path.glob("*/eval_info.json")) or sorted(path.glob("*.json"))
         if not files:
@@ -222,11 +214,7 @@ def percent_column(name: str, metric: str) -> bool:
 
 
 def counted(value: float, rollouts: str, where: str) -> tuple[int, int]:
-    """Successes of rollouts, from a share or a number of successes beside the number of rollouts.
-
-    Raises:
-        ScoresError: If that is no whole number of successes.
-    """
+    """Successes of rollouts, from a share or a number of successes beside the number of rollouts."""
     try:
         of = int(rollouts)
     except ValueError:

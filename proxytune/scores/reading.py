@@ -39,16 +39,10 @@ Columns = Mapping[str, str]
 
 @dataclass(frozen=True)
 class Cells:
-    """The cells of a file.
+    """The cells of a file, by column: labels and the metrics asked for; `header` has names here, `named` the file's.
 
-    Attributes:
-        path: The file.
-        named: Its columns, as the file names them.
-        header: The same, those of a column map by the names they have here.
-        lines: The line number of each row.
-        cells: The cells of each row by column: labels and the metrics asked for.
-        decimal: What numbers have before their fractions.
-        errors: Published standard errors of each row, by metric; of those that have some.
+    `lines` are the rows' numbers, `decimal` what numbers have before their fractions, `errors` published standard
+    errors.
     """
 
     path: Path
@@ -60,11 +54,7 @@ class Cells:
     errors: Mapping[str, Sequence[float]] = field(default_factory=dict)
 
     def label(self, name: str) -> Sequence[str]:
-        """The labels of this kind, one per row; empty ones where the file has no such column.
-
-        Raises:
-            ScoresError: If one is empty in the file.
-        """
+        """The labels of this kind, one per row; empty ones where the file has no such column."""
         labels = self.cells.get(name)
         if labels is None:
             return [""] * len(self.lines)
@@ -75,11 +65,7 @@ class Cells:
         return labels
 
     def numbers(self, columns: Sequence[str]) -> Floats:
-        """The numbers of these columns, shape (rows, columns).
-
-        Raises:
-            ScoresError: If one is none, or too large.
-        """
+        """The numbers of these columns, shape (rows, columns)."""
         values = np.empty((len(self.lines), len(columns)))
         for place, name in enumerate(columns):
             values[:, place] = [_number(cell.replace(self.decimal, ".")) for cell in self.cells[name]]
@@ -99,15 +85,9 @@ def read_cells(
 ) -> Cells:
     """Read a file of scores, in any form that is known.
 
-    Args:
-        path: CSV, its columns separated by commas, semicolons or tabs; with the latter two, decimals may have commas.
-        metrics: The columns that it must have besides that of the agents.
-        columns: What columns are called in the file; one that is not there may have its name from here.
-        side: Whose columns to take where the table has both sides'.
-        part: The dictionary in a Python file.
-
-    Raises:
-        ScoresError: If it cannot be read, or lacks a column.
+    A CSV's columns are separated by commas, semicolons or tabs; with the latter two, decimals may have commas. A column
+    that is not there under the name that it is given may have its name from here. `side` is whose columns to take where
+    a table has both sides', `part` the dictionary in a Python file.
     """
     separator = ","
     rows: Iterator[tuple[int, list[str]]]
@@ -180,12 +160,7 @@ def _plain_cells(
 
 
 def _read(
-    found: Cells,
-    own: Mapping[str, str],
-    name: str,
-    more: tuple[str | None, str | None],
-    in_percent: bool,
-    line: int,
+    found: Cells, own: Mapping[str, str], name: str, more: tuple[str | None, str | None], in_percent: bool, line: int
 ) -> tuple[str, float, tuple[int, int] | None]:
     """What a row says of a metric: its text, its standard error (0: not known), and successes of rollouts."""
     text, error, scale = own[name], 0.0, 100.0 if in_percent else 1.0
@@ -304,11 +279,7 @@ def _check_header(path: Path, header: Sequence[str], metrics: Sequence[str]) -> 
 
 
 def _decimal(found: Cells, metrics: Sequence[str]) -> str:
-    """The decimal sign of a file's numbers.
-
-    Raises:
-        ScoresError: If some have a comma and some a point: one of them may separate thousands.
-    """
+    """The decimal sign of a file's numbers."""
     numbers = [
         (line, name, cell) for name in metrics for line, cell in zip(found.lines, found.cells[name], strict=True)
     ]

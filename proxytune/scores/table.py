@@ -93,7 +93,6 @@ def varies(columns: Floats) -> NDArray[np.bool_]:
 
 LARGEST = 1e70
 """A score beyond this is no measurement, and its square would overflow."""
-
 MOST_CELLS = 10**8
 """More scores, driven or not, fit into no table: 0.8 GB."""
 

@@ -23,13 +23,7 @@ from proxytune.space import Space
 
 
 class Library(NamedTuple):
-    """A library that an engine needs and proxytune does not bring along.
-
-    Attributes:
-        modules: What is imported of it.
-        name: What people call it.
-        extra: The extra of proxytune that installs it.
-    """
+    """A library that an engine needs: the modules it is of, how people call it, and the extra that installs it."""
 
     modules: tuple[str, ...]
     name: str
@@ -74,10 +68,9 @@ class Engine:
 
 
 def unit_points(dimensions: int, count: int, seed: int) -> NDArray[np.float64]:
-    """The first points of the scrambled Sobol sequence with this seed.
+    """The first points (count, dimensions) of the scrambled Sobol sequence with this seed, within [0, 1).
 
-    Returns:
-        Array (count, dimensions) within [0, 1); a longer answer begins with every shorter one.
+    A longer answer begins with every shorter one.
     """
     exponent = max(0, math.ceil(math.log2(count)))
     points: NDArray[np.float64] = qmc.Sobol(dimensions, scramble=True, rng=np.random.default_rng(seed)).random_base2(
@@ -110,10 +103,6 @@ class AfterDesign:
 
     It is told of a failed trial as if that had the worst score seen. Where it proposes a pending point once more, the
     design goes on in its place: what is tried together differs.
-
-    Attributes:
-        inner: The proposer.
-        initial: How many trials come from the design.
     """
 
     inner: Proposer
@@ -131,22 +120,13 @@ class AfterDesign:
 
 @dataclass(frozen=True)
 class CheckedProposer:
-    """A proposer whose points are checked.
-
-    Attributes:
-        name: Of its engine.
-        inner: The proposer.
-    """
+    """A proposer whose points are checked, under its engine's name."""
 
     name: str
     inner: Proposer
 
     def propose(self, space: Space, trials: Sequence[Trial], seed: int) -> Values:
-        """Its next point.
-
-        Raises:
-            ExtensionError: If it raises, or proposes what is no point of the box.
-        """
+        """Its next point, refused if it is no point of the box."""
         values = ask(f"engine '{self.name}'", lambda: tuple(map(float, self.inner.propose(space, trials, seed))))
         sides = space.intervals
         if len(values) != len(sides) or not all(i.low <= v <= i.high for i, v in zip(sides, values, strict=True)):
@@ -156,11 +136,7 @@ class CheckedProposer:
 
 
 def outside_proposer(engine: Engine, goal: Goal | None) -> Proposer:
-    """The proposer of an engine that is not shipped.
-
-    Raises:
-        ExtensionError: If making it raises, or makes no proposer.
-    """
+    """The proposer of an engine that is not shipped, refused if making it raises or makes none."""
     try:
         made = engine.make(goal) if engine.learns_from == "outputs" else engine.make()
     except ProxytuneError:

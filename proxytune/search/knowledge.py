@@ -33,7 +33,6 @@ from proxytune.space import Space
 
 STEP = 0.02
 """In widths of the box, to both sides."""
-
 Limit = Literal["trials", "starts"]
 
 
@@ -148,6 +147,18 @@ class Knowledge:
         if self.misfit.dispersion == 1.0:
             return self._posterior_if_it_fits
         return posterior_of(self.log, len(self.space.intervals), REPORTED)
+
+    @cached_property
+    def values(self) -> Floats:
+        """The posterior's points in the parameters' own units (n, parameters), as probable as its weights say."""
+        low, high = np.transpose([(box.low, box.high) for box in self.space.intervals])
+        return np.asarray(low + (high - low) * self.posterior.points)
+
+    def draw(self, count: int, seed: int) -> Floats:
+        """Draw values of θ from the posterior (count, parameters): how parameters vary together is in them."""
+        weights = self.posterior.weights
+        rows = np.random.default_rng(seed).choice(len(weights), size=count, p=weights)
+        return np.asarray(self.values[rows])
 
     def _log_if_it_fits(self, points: Floats) -> Floats:
         return self.likelihood.log(points) / self.left_out.widening
@@ -267,13 +278,9 @@ class Expected:
 
 
 def expect_of(space: Space, trials: Sequence[Trial], goal: Goal, seed: int = 0) -> Expected:
-    """Expect what a target will tell: trials are taken for one in turn, with a target's noise.
+    """Expect what a target will tell: simulated trials are taken for one in turn, with a target's noise.
 
-    Args:
-        space: The search box.
-        trials: Simulated trials, spread over it.
-        goal: The outputs and noise of a target; its values count for nothing where they are known.
-        seed: Seeds the noise.
+    The goal's values count for nothing where they are known.
 
     Raises:
         RunError: If no trial has an outcome.
@@ -309,10 +316,8 @@ def learn_theta(space: Space, trials: Sequence[Trial], goal: Goal, seed: int = 0
 
 POINTS = 2048
 """At most so many points for the posterior mean."""
-
 DRAWN_POINTS = 1024
 """At most so many for the functions drawn: these are drawn jointly, which takes the cube of their number."""
-
 DRAWS = 200
 LEVELS = (0.025, 0.975)
 JITTER = 1e-8
@@ -370,7 +375,6 @@ def _points(dimensions: int, most: int) -> Floats:
 
 
 def _draws(surrogate: Surrogate, points: Floats) -> Floats:
-    """Functions drawn from the posterior, at points of the unit cube: (draws, points)."""
     mean, covariance = surrogate.joint(points)
     scale = max(float(np.diag(covariance).mean()), JITTER)
     root = np.linalg.cholesky(covariance + JITTER * scale * np.eye(len(mean)))

@@ -42,26 +42,18 @@ Rows = NDArray[np.intp]
 
 PRIOR_TRIALS = 4.0
 """The kernel's own variance of an output counts as so many trials beside those left out."""
-
 MOST_FOR_KERNEL = 128
 """At most so many trials, spread over the box, tell the kernel: its few numbers need no more; time is their cube."""
-
 FEWEST = 3
 """Trials that must know an output for it to be modelled."""
 
 
 @dataclass(frozen=True, eq=False)
 class OutputGroup:
-    """Outputs that are known at the same trials, and so share all that depends on these alone.
+    """Outputs (columns) known at the same trials (rows), and so sharing all that depends on these alone.
 
-    Attributes:
-        columns: Which outputs.
-        rows: Which trials know them.
-        visited: Where they are known, in the unit cube, shape (trials, parameters).
-        inverse: Inverse of the kernel's matrix there.
-        weights: That times the standardised outputs, shape (trials, columns).
-        middle: Mean of each output.
-        scale: Standard deviation of each output.
+    The kernel's matrix at these, in the unit cube, has the inverse; weights (trials, columns) are that times the
+    outputs, standardised by their middle and scale.
     """
 
     columns: Rows
@@ -85,14 +77,11 @@ class OutputGroup:
 
 @dataclass(frozen=True, eq=False)
 class OutputModel:
-    """The posterior of every output given the finished trials.
+    """The posterior of every output given the finished trials, in groups by where they are known.
 
-    Attributes:
-        space: The search box.
-        kernel: Covariance of a standardised output over the unit cube: its smooth course, and noise round that.
-        groups: The outputs, by where they are known.
-        constant: What each output is on average over the trials that know it, shape (outputs,); NaN where none does.
-        visited: All trials that know any output, in the unit cube, shape (trials, parameters).
+    The kernel is the covariance of a standardised output over the unit cube: its smooth course, and noise round that.
+    `constant` is each output's mean over the trials that know it (outputs,), NaN where none does; `visited` are all
+    trials that know any (trials, parameters).
     """
 
     space: Space
@@ -117,11 +106,7 @@ class OutputModel:
         return np.sort(np.concatenate([np.empty(0, dtype=np.intp), *(group.columns for group in self.groups)]))
 
     def predict(self, points: Floats) -> tuple[Floats, Floats]:
-        """Mean and variance of every modelled output's smooth course at points (n, parameters) of the unit cube.
-
-        Returns:
-            Two arrays (n, outputs), in the outputs' units; NaN for an output that is not modelled.
-        """
+        """Mean and variance (n, outputs) of every output's smooth course at points of the cube; NaN if not modelled."""
         mean, variance = (np.full((len(points), self.outputs), np.nan) for _ in range(2))
         smooth = self.kernel.k1
         with _libraries().limit(limits=1):
@@ -134,10 +119,7 @@ class OutputModel:
 
     @cached_property
     def left_out(self) -> Floats:
-        """Errors of predicting each trial from the others, in standard deviations as predicted, (trials, outputs).
-
-        NaN where the trial does not know the output.
-        """
+        """Errors of predicting each trial from the others, in deviations as predicted (trials, outputs), or NaN."""
         found = np.full((len(self.visited), self.outputs), np.nan)
         for group in self.groups:
             found[np.ix_(group.rows, group.columns)] = group.left_out / np.sqrt(group.inflation)
@@ -155,13 +137,7 @@ class OutputModel:
 def fit_outputs(space: Space, trials: Sequence[Trial], kernel: "Kernel | None" = None) -> OutputModel:
     """Fit the model to the trials that have outputs: same trials in any order, same model to the last bit.
 
-    Args:
-        space: The search box.
-        trials: Finished trials.
-        kernel: The kernel; without one it is fitted too.
-
-    Raises:
-        RunError: If no trial has an outcome.
+    Without a kernel, it is fitted too. Refused if no trial has an outcome.
     """
     known = sorted((trial.values, trial.outcome, trial.placement) for trial in trials if trial.outcome is not None)
     if not known:
@@ -241,19 +217,13 @@ def _group(kernel: "Kernel", visited: Floats, outputs: Floats, placement: Rows, 
 
 FREEDOM = 4.0
 """Degrees of freedom of Student's distribution: an output that is far off counts for less than a normal's would."""
-
 LEAST_NOISE = 1e-6
 """Of an output's variance over the trials: without any, a deterministic target would be a spike."""
 
 
 @dataclass(frozen=True, eq=False)
 class Likelihood:
-    """The tempered log likelihood of the target's outputs given θ.
-
-    Attributes:
-        model: What the trials say of every output.
-        goal: The target.
-    """
+    """The tempered log likelihood of the target's outputs given θ."""
 
     model: OutputModel
     goal: Goal
@@ -270,11 +240,7 @@ class Likelihood:
         return temper(self.model.left_out[:, self.columns])
 
     def standardised(self, points: Floats) -> tuple[Floats, Floats]:
-        """The distance of the target from what is predicted at points (n, parameters), and the variance of that.
-
-        Returns:
-            Two arrays (n, columns): the distance in standard deviations, and the variance in the outputs' units.
-        """
+        """The distance of the target from predictions (n, columns) in deviations, and their variance in units."""
         mean, variance = self.model.predict(points)
         chosen = self.columns
         least = LEAST_NOISE * self.model.rough[chosen] / self.model.roughness
@@ -294,13 +260,11 @@ def deviance(distance: Floats) -> Floats:
 
 
 def temper(errors: Floats) -> float:
-    """κ: how many outputs count as one, by the correlation of the errors of left-out trials.
+    """κ: how many outputs count as one, by the correlation of the errors of left-out trials (trials, outputs).
 
     With C the correlations of p outputs, κ = 1 + Σ_{j≠k} (C_jk² − 1/n_jk) / p, at least 1: n_jk trials know both, and
-    two independent outputs correlate with a mean square of 1/n_jk by chance.
-
-    Args:
-        errors: Shape (trials, outputs); NaN where a trial does not know an output.
+    two independent outputs correlate with a mean square of 1/n_jk by chance. Errors are NaN where a trial does not
+    know.
     """
     known = ~np.isnan(errors)
     filled = np.where(known, errors, 0.0)

@@ -19,7 +19,6 @@ from proxytune.space import Space
 
 Values = tuple[float, ...]
 """A point of the search box: one value per parameter, in the order of the box."""
-
 Compose = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 """Scores, shape (…,), of outcomes, shape (…, outputs)."""
 
@@ -56,11 +55,6 @@ def batch_at(index: int, size: int, initial: int) -> range:
     """The trials, counted from 0, that are proposed together with this one.
 
     The design makes batches of its own, the last of which may be short; those of the engine begin after it.
-
-    Args:
-        index: Of a trial.
-        size: How many trials make a batch.
-        initial: How many trials come from the design.
     """
     first = 0 if index < initial else initial
     base = index - (index - first) % size

@@ -33,28 +33,17 @@ class Composite:
     PRPV is a count of flipped pairs, but the metrics that it compares change smoothly with θ: each is modelled on its
     own (Astudillo and Frazier, Bayesian optimization of composite functions, ICML 2019). The improvement is measured
     from the lowest expected score of a visited point.
-
-    Attributes:
-        goal: The target.
     """
 
     goal: Goal
 
     def propose(self, space: Space, trials: Sequence[Trial], seed: int) -> Values:
-        """The next point, a function of the set of trials and the seed alone; never a point visited before.
-
-        Raises:
-            RunError: If no trial has an outcome.
-        """
+        """The next point, a function of the set of trials and the seed alone; never a point visited before."""
         return most_improving(space, trials, self.goal, proposal_seed(seed, len(trials)))
 
 
 def most_improving(space: Space, trials: Sequence[Trial], goal: Goal, seed: int) -> Values:
-    """The θ whose composed score is expected to improve most on the best visited one.
-
-    Raises:
-        RunError: If no trial has an outcome.
-    """
+    """The θ whose composed score is expected to improve most on the best visited one."""
     with threadpool_limits(limits=1):
         model = _with_pending(fit_outputs(space, trials), trials)
         return from_unit(space, _most_improving(model, trials, goal, seed)[0])
@@ -92,17 +81,9 @@ def _most_improving(model: OutputModel, trials: Sequence[Trial], goal: Goal, see
 
 
 def composed_scores(model: OutputModel, goal: Goal, seed: int) -> Callable[[Floats], Floats]:
-    """Draw scores anywhere.
+    """Draw scores anywhere: a function of points (n, parameters) of the unit cube gives them, shape (draws, n).
 
     An output that the trials do not change is what it was in them; one that none knows is the target's.
-
-    Args:
-        model: Of the outputs.
-        goal: The target, and how a score is composed.
-        seed: Seeds the draws.
-
-    Returns:
-        A function of points (n, parameters) of the unit cube that gives draws of their scores, shape (draws, n).
     """
     normal = np.random.default_rng(seed).standard_normal((DRAWS, 1, model.outputs))
 
@@ -140,20 +121,12 @@ COMPOSITE = Engine(
 
 @dataclass(frozen=True)
 class Outcomes:
-    """Proposes draws from the posterior of θ and the θ of highest expected improvement, in turn.
-
-    Attributes:
-        goal: The target.
-    """
+    """Proposes draws from the posterior of θ and the θ of highest expected improvement, in turn."""
 
     goal: Goal
 
     def propose(self, space: Space, trials: Sequence[Trial], seed: int) -> Values:
-        """The next point, a function of the trials and the seed alone.
-
-        Raises:
-            RunError: If no trial has an outcome.
-        """
+        """The next point, a function of the trials and the seed alone."""
         drawn = proposal_seed(seed, len(trials))
         with threadpool_limits(limits=1):
             if len(trials) % 2:

@@ -38,10 +38,8 @@ UNIDENTIFIED = 0.9
 class Posterior:
     """θ given the target's outputs, uniform over the box before: points of equal volume with their densities.
 
-    Attributes:
-        points: Of the unit cube, shape (n, parameters), evenly over the part of it that counts.
-        density: Logarithm of the density at each, up to a constant.
-        volume: The part's share of the cube.
+    Points (n, parameters) lie evenly over the part of the unit cube that counts, of this volume; densities are
+    logarithms up to a constant.
     """
 
     points: Floats
@@ -117,31 +115,20 @@ class Posterior:
 
 
 def posterior_of(log_density: Callable[[Floats], Floats], dimensions: int, count: int = REGION_POINTS) -> Posterior:
-    """Look at the whole box, then ever closer at the box round what counts.
-
-    Args:
-        log_density: Logarithm of the density (n,) at points (n, parameters) of the unit cube, up to a constant.
-        dimensions: How many parameters there are.
-        count: How many points each look takes.
-    """
+    """Look at the whole box, then ever closer at the box round what counts, by so many points each time."""
     low, high, cloud = np.zeros(dimensions), np.ones(dimensions), unit_points(dimensions, count, 0)
     for _ in range(ZOOMS):
         points = low + (high - low) * cloud
         density = log_density(points)
-        inner_low, inner_high = _what_counts(points, density, high - low)
-        inner_low, inner_high = np.maximum(low, inner_low), np.minimum(high, inner_high)
+        near = points[density > density.max() - DEPTH]
+        between = 0.5 * (high - low) / len(points) ** (1.0 / points.shape[1])
+        reach = PAD * np.ptp(near, axis=0) + between
+        inner_low, inner_high = np.maximum(low, near.min(axis=0) - reach), np.minimum(high, near.max(axis=0) + reach)
         if np.prod(inner_high - inner_low) > MOST_OF * np.prod(high - low):
             break
         low, high = inner_low, inner_high
     points = low + (high - low) * cloud
     return Posterior(points, log_density(points), float(np.prod(high - low)))
-
-
-def _what_counts(points: Floats, density: Floats, width: Floats) -> tuple[Floats, Floats]:
-    near = points[density > density.max() - DEPTH]
-    between = 0.5 * width / len(points) ** (1.0 / points.shape[1])
-    reach = PAD * np.ptp(near, axis=0) + between
-    return near.min(axis=0) - reach, near.max(axis=0) + reach
 
 
 MOST = 72
@@ -162,12 +149,7 @@ Of 46 searches of five engines for nine truths, regions held the truth in 40 wit
 
 @dataclass(frozen=True, eq=False)
 class AsTarget:
-    """A trial that is taken for a target, with a target's noise, as the other trials explain it.
-
-    Attributes:
-        theta: Its own θ, in the unit cube.
-        likelihood: Of its outputs.
-    """
+    """A trial that is taken for a target, with a target's noise, as the other trials explain it."""
 
     theta: Floats
     likelihood: Likelihood
@@ -192,9 +174,8 @@ class AsTarget:
 class LeftOut:
     """Trials that were left out, each as a target whose θ is known.
 
-    Attributes:
-        deviances: Mean deviance of each one's outputs at its most probable θ, shape (trials,).
-        above: Probability of all θ more probable than its own, by WIDENINGS, shape (trials, widenings).
+    `deviances` are mean ones at their most probable θ (trials,), `above` the probability of all θ more probable than
+    their own (trials, widenings).
     """
 
     deviances: Floats
@@ -218,11 +199,7 @@ class LeftOut:
 def leave_out(model: OutputModel, trials: Sequence[Trial], goal: Goal, seed: int) -> LeftOut:
     """Leave out trials that know every output, one at a time; a function of the set of trials and the seed.
 
-    Args:
-        model: Fitted to all trials; its kernel is kept.
-        trials: Finished trials.
-        goal: The target; outputs that it lacks tell nothing here either.
-        seed: Seeds the noise that each is given.
+    The model's kernel is kept; outputs that the target lacks tell nothing here either; the seed draws a target's noise.
     """
     return left_out_of(as_targets(model, trials, goal, seed))
 
@@ -292,11 +269,6 @@ def misfit_of(likelihood: Likelihood, posterior: Posterior, left_out: LeftOut) -
     """Hold the target's deviance at its most probable θ against that of trials left out.
 
     The logarithms of these are taken for normal, so the p-value is Student's for one more of them.
-
-    Args:
-        likelihood: Of the target.
-        posterior: Its θ.
-        left_out: What left-out trials say.
     """
     if not likelihood.columns.size:
         return Misfit(None, None, None)

@@ -44,7 +44,6 @@ def code_of(*modules: str) -> str:
 
 
 def _imported(path: Path) -> Iterator[str]:
-    """Names that a module imports, anywhere in it, in full."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -53,16 +52,8 @@ def _imported(path: Path) -> Iterator[str]:
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
 
 
-ENGINES: tuple[Engine, ...] = (
-    OUTCOMES,
-    COMPOSITE,
-    GAUSSIAN_PROCESS,
-    RANDOM,
-    SOBOL,
-    TREE_PARZEN,
-)
+ENGINES: tuple[Engine, ...] = (OUTCOMES, COMPOSITE, GAUSSIAN_PROCESS, RANDOM, SOBOL, TREE_PARZEN)
 """A new engine is a module of its own and a line here; each says all about itself (engine.py)."""
-
 ENGINE_NAMES = tuple(engine.name for engine in ENGINES)
 """What a study may name."""
 DEFAULT_ENGINE = OUTCOMES.name
@@ -71,11 +62,9 @@ SCORE_ENGINE = GAUSSIAN_PROCESS.name
 
 
 def engine_of(name: str, beside: Path | None = None) -> Engine:
-    """The engine of this name; every look-up goes through here.
+    """The engine of this name, shipped, of a plug-in or `module:attribute`; every look-up goes through here.
 
-    Args:
-        name: Of a shipped engine or of a plug-in, or `module:attribute` of one's own.
-        beside: The folder whose modules come before the installed ones.
+    Modules beside a study come before the installed ones.
 
     Raises:
         InputError: If there is no such engine, or it is none.
@@ -93,13 +82,7 @@ def engine_of(name: str, beside: Path | None = None) -> Engine:
 
 
 def why_not(name: str, *, composed: bool, beside: Path | None = None) -> str:
-    """Why an engine cannot be used, in one phrase; empty if it can.
-
-    Args:
-        name: Of the engine.
-        composed: Whether the score is computed from outcomes that are known.
-        beside: The folder whose modules come before the installed ones.
-    """
+    """Why an engine cannot be used, in one phrase; empty if it can. A score is composed where outcomes are known."""
     try:
         return why_not_engine(engine_of(name, beside), composed=composed)
     except InputError as problem:
@@ -127,10 +110,7 @@ def is_installed(engine: Engine) -> bool:
 def make_proposer(engine: str | Engine, initial: int, goal: Goal | None = None) -> Proposer:
     """The proposer of an engine, with so many trials from the quasi-random design first: all engines share it.
 
-    Args:
-        engine: The engine, or the name of a shipped one.
-        initial: How many trials come from the design.
-        goal: What the outputs of a trial are to come to; None where a score has no such parts.
+    Without a goal a score has no parts.
 
     Raises:
         InputError: If there is no such engine, or it cannot be used.

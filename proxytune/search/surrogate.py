@@ -31,16 +31,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Prior:
-    """The prior of a hyperparameter before any trial: log-normal, and within bounds.
+    """The prior of a hyperparameter before any trial: log-normal, of this median and spread, and within bounds.
 
     A few dozen steps of an integer score say little about seven hyperparameters. Fitted to the data alone they jump
     from bound to bound with every trial, between all noise and none; with a prior, predictions of held-out trials are
     better and far better calibrated.
-
-    Attributes:
-        median: Its median.
-        spread: The standard deviation of its logarithm.
-        bounds: Smallest and largest value.
     """
 
     median: float
@@ -50,10 +45,8 @@ class Prior:
 
 AMPLITUDE = Prior(1.0, 0.5, (0.05, 20.0))
 """Of the variance, relative to the scores' own."""
-
 LENGTH_SCALE = Prior(0.4, 0.4, (0.05, 20.0))
 """In widths of the box."""
-
 NOISE = Prior(0.1, 0.7, (1e-2, 1.0))
 """Of the noise variance, relative to the scores' own. The floor stands for the steps, which no smooth function
 follows, so the surrogate never threads them exactly."""
@@ -148,13 +141,7 @@ def prior_kernel(dimensions: int) -> "ConstantKernel":
 def most_probable(
     negative_log_likelihood: Callable[[Floats], tuple[float, Floats]], start: Floats, bounds: Floats
 ) -> tuple[Floats, float]:
-    """The hyperparameters' logarithms of highest posterior density, as the regressor's optimiser.
-
-    Args:
-        negative_log_likelihood: The marginal one, and its gradient.
-        start: The priors' medians, in the kernel's order: amplitude, length scales, noise.
-        bounds: Shape (hyperparameters, 2).
-    """
+    """The hyperparameters' logarithms of highest posterior density, as the regressor's optimiser, from the medians."""
     spread = np.array([AMPLITUDE.spread, *[LENGTH_SCALE.spread] * (len(start) - 2), NOISE.spread])
 
     def improbable(logarithms: Floats) -> tuple[float, Floats]:
@@ -183,11 +170,7 @@ class GaussianProcess:
     """
 
     def propose(self, space: Space, trials: Sequence[Trial], seed: int) -> Values:
-        """The next point, a function of the set of trials and the seed alone; never a point visited or pending.
-
-        Raises:
-            RunError: If no trial has a score.
-        """
+        """The next point, a function of the set of trials and the seed alone; never a point visited or pending."""
         with threadpool_limits(limits=1):
             return from_unit(
                 space, _most_promising(_fit_with_pending(space, trials), proposal_seed(seed, len(trials)))[0]
@@ -228,13 +211,7 @@ def _most_promising(surrogate: Surrogate, seed: int) -> tuple[Floats, float]:
 
 
 def maximise_gain(gain: Callable[[Floats], Floats], visited: Floats, seed: int) -> tuple[Floats, float]:
-    """The unvisited point of the unit cube that promises the highest gain, and that: a Sobol cloud, then closer looks.
-
-    Args:
-        gain: What points (n, parameters) promise, shape (n,).
-        visited: The points that are not to be proposed again, shape (trials, parameters).
-        seed: Seeds the clouds.
-    """
+    """The point of the unit cube not yet visited of highest gain, and that: a Sobol cloud, then closer looks."""
     dimensions = visited.shape[1]
     points = _unvisited(unit_points(dimensions, CLOUD, seed), visited)
     gains = gain(points)
@@ -249,7 +226,6 @@ def maximise_gain(gain: Callable[[Floats], Floats], visited: Floats, seed: int) 
 
 
 def _unvisited(points: Floats, visited: Floats) -> Floats:
-    """The points that are not the same as a visited one."""
     distances = np.abs(points[:, None, :] - visited[None, :, :]).max(axis=2)
     return np.asarray(points[distances.min(axis=1) > SAME / len(visited)])
 

@@ -40,10 +40,8 @@ def fill(template: str, **values: object) -> str:
 
 AROUND_DEG = 10.0
 """How far the box of the camera's pitch reaches to either side of the nominal one."""
-
 OFF_DEG = 4.0
 """How far the pitch that is to be found is from the nominal one."""
-
 HIGHEST_DEG = 45.0
 
 
@@ -129,7 +127,6 @@ GUESSES: Mapping[str, tuple[float, str]] = MappingProxyType(
     }
 )
 """What is written where nothing is known of a figure, and how to know it."""
-
 CAR_GUESSES: Mapping[str, tuple[float, str]] = MappingProxyType(
     {
         "wheelbase": (0.26, "from the rear axle to the front one"),
@@ -148,22 +145,18 @@ CAR_GUESSES: Mapping[str, tuple[float, str]] = MappingProxyType(
     }
 )
 """The same of a car, where it differs."""
-
 EIGHT = (
     *("wheelbase", "wheel_angle", "wheel_radius", "wheel_distance", "full_speed", "motor_time_constant"),
     *("camera_height", "camera_pitch"),
 )
 """What a car's body and model are made of."""
-
 SIX = ("wheel_radius", "wheel_distance", "full_speed", "motor_time_constant", "camera_height", "camera_pitch")
 """What a skeleton's body and model are made of; the rest can wait."""
-
 HIGHEST = {
     "motor_time_constant": PARAMETERS["motor_lag.time_constant"].high,
     "camera_pitch": PARAMETERS["camera_pitch"].high,
 }
 """The most that the effect of the same meaning may have."""
-
 LEAST_S = 0.05
 """A motor is taken to be no faster than that where its torque is guessed [s]."""
 

@@ -86,14 +86,10 @@ def _attach(run: StudyRun, known: Sequence[Outcome | Theta]) -> None:
 
 @dataclass(frozen=True)
 class Finalist:
-    """A θ that has been driven again.
+    """A θ that has been driven again: the trial that visited it, or its own episodes as a trial of number UNVISITED.
 
-    Attributes:
-        trial: The trial that visited it; its own episodes as a trial of number UNVISITED where none did.
-        fresh: The outcomes of each fresh repetition.
-        scores: The study's cost in each of them; None where an agent has no episode that worked.
-        assessment: How useful the proxy is there, over all fresh episodes; None of all but the answer, and if an agent
-            has none that worked.
+    `scores` are the study's cost in each fresh repetition, None where an agent has no episode that worked; the
+    assessment, over all fresh episodes, is the answer's alone.
     """
 
     trial: TrialRecord
@@ -130,12 +126,7 @@ class Confirmation:
 
 @dataclass(frozen=True)
 class Nominal:
-    """The simulator as it is.
-
-    Attributes:
-        theta: The nominal values of the parameters that are searched.
-        expected: What is expected of it.
-    """
+    """The simulator as it is: the nominal values of the parameters that are searched, and what is expected of it."""
 
     theta: Theta
     expected: Expectation
@@ -172,12 +163,7 @@ def nominal_of(run: StudyRun, confirmation: Confirmation | None) -> Nominal | No
 
 
 def run_confirmation(run: StudyRun) -> None:
-    """Simulate what is missing of the fresh episodes of a study that has come to its end.
-
-    Raises:
-        EpisodeError: If an episode fails and the study is to stop then.
-        RunError: If no trial has a score.
-    """
+    """Simulate what is missing of the fresh episodes of a study that has come to its end."""
     settings, trials = run.settings, run.finished_trials()
     # An answer that no trial visited needs episodes of its own, also without fresh ones.
     if not stopped(run, trials) or (trials and not settings.confirm):
@@ -198,13 +184,7 @@ def run_confirmation(run: StudyRun) -> None:
 
 
 def confirmation_of(run: StudyRun, trials: Sequence[TrialRecord], learnt: Knowledge) -> Confirmation | None:
-    """The answer of the fresh episodes of these trials; None if it is off, or an episode is still missing.
-
-    Args:
-        run: The study.
-        trials: Finished trials, one of them with a score.
-        learnt: What they say of θ.
-    """
+    """The answer of the fresh episodes of these trials; None if it is off, or an episode is still missing."""
     settings = run.settings
     driven = _driven(run, finalists(trials, learnt)) if settings.confirm else None
     if not driven:
@@ -228,11 +208,8 @@ def finalists(trials: Sequence[TrialRecord], learnt: Knowledge) -> list[TrialRec
     """The θ that are driven again, that of lowest expected PRPV first: a function of what was finished alone.
 
     Where no θ explains the target, the most probable one is worth little: then visited θ take the place of what no
-    trial visited, those not more than a standard deviation of a fresh score behind.
-
-    Args:
-        trials: Finished trials, one of them with a score, or none where earlier studies tell.
-        learnt: What they and those of earlier studies say of θ.
+    trial visited, those not more than a standard deviation of a fresh score behind. Without trials, earlier studies
+    tell.
     """
     # Of a pruned trial it is certain that it is none of the best.
     scored = {learnt.space.values(trial.theta): trial for trial in trials if trial.state == "finished"}

@@ -41,14 +41,7 @@ def users_agents(settings: StudySettings) -> list[str]:
 def find_apart(
     settings: StudySettings, family: DomainFamily, agents: Sequence[str], needed: Collection[str], watch: Watch
 ) -> dict[str, str]:
-    """Run two episodes of each of these agents side by side and one after the other.
-
-    Returns:
-        Why it is to be run by itself, by agent; nothing of one that may be run beside others.
-
-    Raises:
-        RunError: If the machine fails.
-    """
+    """Run two episodes of each agent side by side and one after the other: why some run by themselves, by agent."""
     if not agents or not can_run_together(family):
         return {}
     pairs = [(_episode(settings, agent, 0), _episode(settings, agent, 1)) for agent in agents]
@@ -83,18 +76,9 @@ def _why_apart(family: DomainFamily, needed: Collection[str], pair: Pair) -> tup
 
 
 def kept_apart(
-    store: Store,
-    settings: StudySettings,
-    family: DomainFamily,
-    code: str,
-    needed: Collection[str],
-    watch: Watch,
+    store: Store, settings: StudySettings, family: DomainFamily, code: str, needed: Collection[str], watch: Watch
 ) -> frozenset[str]:
-    """The study's agents that are run by themselves; those not tried yet, or in other code, are tried now and kept.
-
-    Raises:
-        RunError: If the machine fails.
-    """
+    """The study's agents that are run by themselves; those not tried yet, or in other code, are tried now and kept."""
     known = store.facts().get(APART, {})
     known = known if known.get("code") == code else {"code": code, "tried": [], "why": {}}
     missing = [agent for agent in users_agents(settings) if agent not in known["tried"]]

@@ -33,12 +33,14 @@ class Bank:
         trials: How many trials it has.
         expected: What a target measured from some first starts will tell, by their number.
         needed: How many starts tell each parameter to `WITHIN`; None where more starts than there are would not.
+        units: The parameters' units by their names; "" where one has none.
     """
 
     settings: StudySettings
     trials: int
     expected: Mapping[int, Expected]
     needed: Mapping[str, int | None]
+    units: Mapping[str, str]
 
     def widths(self, starts: int) -> dict[str, float]:
         """Mean width of each parameter's 95 % interval, by a target that is measured from so many starts."""
@@ -100,7 +102,9 @@ def bank_of(run: StudyRun) -> Bank:
         _starts_needed({n: one.widths[row] / 2.0 for n, one in expected.items()}, run.study.family.starts)
         for row in range(len(settings.space.names))
     ]
-    return Bank(settings, len(records), expected, dict(zip(settings.space.names, reach, strict=True)))
+    needed = dict(zip(settings.space.names, reach, strict=True))
+    units = {name: run.study.family.parameters[name].unit for name in settings.space.names}
+    return Bank(settings, len(records), expected, needed, units)
 
 
 def _starts_needed(reach: Mapping[int, float], most: int) -> int | None:

@@ -44,13 +44,7 @@ Scores = Mapping[tuple[str, int], Mapping[str, float]]
 
 @dataclass(frozen=True)
 class Source:
-    """An earlier study as its folder or table has it.
-
-    Attributes:
-        path: Where it is.
-        facts: What its trials depend on.
-        trials: The scores of each domain instance under the study's own placement, episodes that failed left out.
-    """
+    """An earlier study: what its trials depend on, and the scores of each domain instance, failed episodes left out."""
 
     path: Path
     facts: Mapping[str, Any]
@@ -118,12 +112,7 @@ def earlier_trials(run: StudyRun) -> tuple[Trial, ...]:
 
 
 def read_source(settings: StudySettings, name: str) -> Source:
-    """A study or table of trials that learn_from names, from this study's folder on; or a study that is shipped.
-
-    Raises:
-        InputError: If it is not there, was not run, is this study, or learns from it in turn.
-        StoreError: If its database or table is damaged.
-    """
+    """A study or table of trials that learn_from names, from this study's folder on; or a study that is shipped."""
     path = settings.folder / name
     path = shipped("studies") / name if not exists(path) and exists(shipped("studies") / name) else path
     if not exists(path):
@@ -217,7 +206,6 @@ def write_table(run: StudyRun) -> Path:
 
 
 def _check_same(run: StudyRun, source: Source) -> None:
-    """Refuse a source that is not of this domain, parameters, agents and starts."""
     settings, theirs, ours = run.settings, source.facts, study_facts(run.study)
     if not source.trials:
         raise _refused(settings, source.path, "has no finished trial; run it first, or remove it")

@@ -23,7 +23,6 @@ from proxytune.domain import DomainFamily
 from proxytune.errors import SettingsError, StoreError
 from proxytune.extensions import folders
 from proxytune.identity import digest, version_changes, versions_of
-from proxytune.scores import ScoreTable
 from proxytune.search import ENGINE_NAMES, Engine, engine_code, engine_of
 from proxytune.space import Parameter
 from proxytune.storage import Store
@@ -62,9 +61,11 @@ def study_facts(study: Study) -> dict[str, Any]:
     said = {key: getattr(settings, key) for key, value in UNSAID.items() if getattr(settings, key) != value}
     versions = getattr(study.family, "versions", None)
     compared = [metric.name for metric in settings.metrics]
+    table = study.target if learns else study.target.select(compared)
+    inner = table.select(sorted(table.metrics)).arrange(agents=sorted(table.agents), episodes=sorted(table.episodes))
     return {
         "family": settings.family,
-        "target": _table_digest(study.target if learns else study.target.select(compared)),
+        "target": digest(json.dumps([inner.agents, inner.episodes, inner.metrics, inner.values.tolist()])),
         "objective": settings.objective,
         "metrics": sorted(str(metric) for metric in settings.metrics),
         "agents": sorted(settings.agents),
@@ -83,18 +84,8 @@ def study_facts(study: Study) -> dict[str, Any]:
     }
 
 
-def _table_digest(table: ScoreTable) -> str:
-    """A digest that the order of agents, episodes and metrics does not change."""
-    inner = table.select(sorted(table.metrics)).arrange(agents=sorted(table.agents), episodes=sorted(table.episodes))
-    return digest(json.dumps([inner.agents, inner.episodes, inner.metrics, inner.values.tolist()]))
-
-
 def stored_facts(store: Store) -> dict[str, Any]:
-    """What the trials in a store depended on.
-
-    Raises:
-        StoreError: If that is not as we write it.
-    """
+    """What the trials in a store depended on."""
     stored = {key: value for key, value in store.facts().items() if key not in NOTED}
     if not isinstance(stored.get("versions", {}), dict):
         raise _unreadable(store, "versions")
@@ -196,11 +187,7 @@ def _unreadable(
 
 
 def note_search(study: Study, store: Store) -> str:
-    """Keep which code proposes trials from the next one on.
-
-    Returns:
-        One line if it is other code than before, or other packages; empty if not, or if no trial is left to propose.
-    """
+    """Keep which code proposes from the next trial on; tell if it is other code, or packages, than before."""
     engine, first = study.engine, len(store.trials(study.objective.name)) + 1
     if first > study.settings.budget:
         return ""
@@ -219,11 +206,6 @@ def note_search(study: Study, store: Store) -> str:
 
 
 def _searches(store: Store) -> list[dict[str, Any]]:
-    """The searches that have proposed trials so far, each with its first trial.
-
-    Raises:
-        StoreError: If that is not as we write it.
-    """
     known = store.facts().get(SEARCH, [])
     try:
         whole = all(int(one["first_trial"]) and one["code"] and dict(one["versions"]) for one in known)
@@ -263,7 +245,6 @@ def describe(study: Study, store: Store) -> None:
 def _described(
     settings: StudySettings, store: Store, described: Mapping[str, Any]
 ) -> tuple[DomainFamily, Engine, Mapping[str, float] | None]:
-    """The family, the engine and the truth of a study as they had been described."""
 
     def refuse(*_: Any) -> NoReturn:
         raise StoreError("a study that is only looked at proposes nothing")

@@ -36,10 +36,7 @@ ON_SEVERAL = ("run_many", "examine_together")
 class UserFamily:
     """A domain family whose members are asked for one by one; what one of them raises is one line.
 
-    Attributes:
-        family: The family.
-        name: Where it comes from, as a complaint names it.
-        aliases: Pairs of an agent's name in the study and the name by which the family loads it.
+    `name` is where it comes from, as a complaint has it; aliases pair an agent's name with that by which it is loaded.
     """
 
     family: Any
@@ -47,12 +44,7 @@ class UserFamily:
     aliases: tuple[tuple[str, str], ...] = ()
 
     def __getattr__(self, member: str) -> Any:
-        """Any member of the family.
-
-        Raises:
-            AttributeError: If it has no such member.
-            ExtensionError: If asking for it raises.
-        """
+        """Any member of the family; what asking for it raises is an ExtensionError."""
         if member.startswith("__"):
             raise AttributeError(member)
         value = ask(f"{member} of {self.name}", functools.partial(self._member, member))
@@ -73,11 +65,7 @@ class UserFamily:
         return digest(identity, sorted(self.aliases)) if self.aliases else identity
 
     def check_agent(self, name: str) -> None:
-        """Refuse an agent that the family cannot run.
-
-        Raises:
-            InputError: If there is no such agent, or looking for it raises.
-        """
+        """Refuse an agent that the family cannot run."""
         loaded = self._loaded(name)
         ask(f"check_agent('{loaded}') of {self.name}", functools.partial(self.family.check_agent, loaded))
 
@@ -106,7 +94,6 @@ MEMBERS: Mapping[str, tuple[type, str]] = {
     "starts": (Integral, "a whole number"),
 }
 """What a domain family tells of itself, and as what."""
-
 METHODS = ("check_agent", "run")
 Value = TypeVar("Value")
 
@@ -127,11 +114,7 @@ def load_family(settings: StudySettings, model: Path | None) -> DomainFamily:
 
 
 def given_family(settings: StudySettings, family: Any) -> DomainFamily:
-    """A family that is at hand, checked as one that a study names, behind the guard.
-
-    Raises:
-        InputError: As load_family.
-    """
+    """A family that is at hand, checked as one that a study names, behind the guard."""
     _check(settings, family)
     return cast(DomainFamily, UserFamily(family, "the simulator"))
 
@@ -162,7 +145,6 @@ def bare_family(settings: StudySettings, model: Path | None) -> DomainFamily:
 
 
 def _check_signature(settings: StudySettings, factory: Any, model: Path | None) -> None:
-    """Refuse a factory that cannot be called as a study calls it."""
     try:
         inspect.signature(factory).bind(settings.domain, model=model)
     except TypeError as problem:
@@ -187,7 +169,14 @@ def _asked(settings: StudySettings, what: str, ask: Callable[[], Value]) -> Valu
 
 
 def _check(settings: StudySettings, family: DomainFamily) -> None:
-    _check_members(settings, family)
+    lacks = [member for member in (*MEMBERS, *METHODS) if not has_member(family, member)]
+    if lacks:
+        raise settings.error("family", f"{settings.family} made no domain family: it lacks {', '.join(lacks)}")
+    for member, (kind, word) in MEMBERS.items():
+        value = _asked(settings, f"{member} of {settings.family}", functools.partial(getattr, family, member))
+        if not isinstance(value, kind):
+            name = type(value).__name__
+            raise settings.error("family", f"{member} of {settings.family} must be {word}, got {name}")
     for interval in settings.space.intervals:
         given = f"[{interval.low:g}, {interval.high:g}]"
         bounds = (interval.low, interval.high)
@@ -199,17 +188,6 @@ def _check(settings: StudySettings, family: DomainFamily) -> None:
             raise settings.error("metrics", f"unknown metric '{metric.name}'; {nearest(metric.name, family.metrics)}")
     for agent in settings.agents:
         _check_agent(settings, family, agent)
-
-
-def _check_members(settings: StudySettings, family: Any) -> None:
-    lacks = [member for member in (*MEMBERS, *METHODS) if not has_member(family, member)]
-    if lacks:
-        raise settings.error("family", f"{settings.family} made no domain family: it lacks {', '.join(lacks)}")
-    for member, (kind, word) in MEMBERS.items():
-        value = _asked(settings, f"{member} of {settings.family}", functools.partial(getattr, family, member))
-        if not isinstance(value, kind):
-            name = type(value).__name__
-            raise settings.error("family", f"{member} of {settings.family} must be {word}, got {name}")
 
 
 def _check_agent(settings: StudySettings, family: DomainFamily, agent: str) -> None:
@@ -226,16 +204,8 @@ def check_bounds(
 ) -> None:
     """Refuse values of a parameter that the family has not, or that lie beyond what it can be.
 
-    Args:
-        settings: Of the study.
-        family: Whose parameter it is.
-        key: Where the values stand in study.toml.
-        name: The parameter.
-        bounds: Lowest and highest of the values.
-        given: The values as text.
-
     Raises:
-        SettingsError: With the key and the remedy.
+        SettingsError: With the key, the values as they were given, and the remedy.
     """
     try:
         known = family.parameters.get(name)

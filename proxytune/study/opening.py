@@ -29,11 +29,7 @@ from proxytune.usefulness import MEASURES, Measure, compare, start_of, starts_of
 
 
 def with_scores(settings: StudySettings) -> tuple[StudySettings, tuple[str, ...]]:
-    """The study of those agents that the target has scores of, and who is left out on either side, in a line each.
-
-    Raises:
-        InputError: If fewer than two are left.
-    """
+    """The study of those agents that the target has scores of, and who is left out on either side, in a line each."""
     scored = _read(settings, [metric.name for metric in settings.metrics]).agents
     there = tuple(agent for agent in settings.agents if agent in scored)
     missing = [agent for agent in settings.agents if agent not in scored]
@@ -99,14 +95,7 @@ OfMeans = Callable[[Floats, Floats, Sequence[Metric]], Floats]
 
 @dataclass(frozen=True)
 class Objective:
-    """A measure as the objective of a study.
-
-    Attributes:
-        name: What study.toml calls it.
-        label: What people call it.
-        maximise: Whether more of it is better.
-        of_means: The measure.
-    """
+    """A measure as the objective of a study: as study.toml and as people call it, and whether more is better."""
 
     name: str
     label: str
@@ -119,11 +108,7 @@ class Objective:
         return -1.0 if self.maximise else 1.0
 
     def measure(self, *, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -> dict[str, float | None]:
-        """PRPV, PPV and this measure of a proxy, by name; None where one is undefined.
-
-        Raises:
-            ScoresError: If an agent is missing on one side, or a metric is unknown.
-        """
+        """PRPV, PPV and this measure of a proxy, by name; None where one is undefined."""
         means = compare(proxy=proxy, target=target, metrics=metrics).means
         kept = {self.name: self.of_means, **{name: one.of_means for name, one in KEPT.items()}}
         values = {name: float(of_means(*means, metrics)) for name, of_means in kept.items()}
@@ -135,11 +120,7 @@ TRIED = (4, 3, 2)
 
 
 def objective_of(settings: StudySettings) -> Objective:
-    """The measure that the trials of a study are scored by; a study of learning value is narrowed by PRPV.
-
-    Raises:
-        SettingsError: If there is no such measure, or it is no single number of mean scores.
-    """
+    """The measure that the trials of a study are scored by; a study of learning value is narrowed by PRPV."""
     name = settings.objective
     if name == LEARNING:
         return PRPV
@@ -155,11 +136,7 @@ def objective_of(settings: StudySettings) -> Objective:
 
 
 def measure_of(name: str, beside: Path | None = None) -> Measure:
-    """The measure that is not shipped: `module:attribute`, or the name of a plug-in.
-
-    Args:
-        name: Of the measure.
-        beside: The folder whose modules come before the installed ones.
+    """The measure that is not shipped: `module:attribute`, of this folder first, or the name of a plug-in.
 
     Raises:
         ExtensionError: If there is none.
@@ -283,11 +260,6 @@ def cautions_of(family: DomainFamily) -> tuple[str, ...]:
 
 
 def _engine(settings: StudySettings) -> Engine:
-    """The engine that a study names, which is installed and may be named.
-
-    Raises:
-        SettingsError: If it is not.
-    """
     try:
         engine = engine_of(settings.engine, settings.folder)
     except InputError as problem:

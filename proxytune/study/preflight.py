@@ -93,13 +93,7 @@ class Movement:
 
 
 def judge(interval: Interval, names: Sequence[str], values: Floats) -> Movement:
-    """Test a parameter, by the metric and the end that tell most.
-
-    Args:
-        interval: The parameter.
-        names: The metrics.
-        values: Shape (agents × places, 4, metrics): the base again, the base, the lower and the upper end.
-    """
+    """Test a parameter by the metric and end that tell most; of (…, 4, metrics), the base again, it, and both ends."""
 
     def likely(changes: Floats, noise: Floats) -> float:
         """The p-value of the signed ranks of |change| − |noise|, were neither the larger."""
@@ -130,15 +124,7 @@ Again = tuple[Episode, Mapping[str, float] | None]
 
 
 def check_repeatable(run: StudyRun, episodes: Sequence[Episode]) -> None:
-    """Drive episodes twice more, and keep which agents come to other scores; once for each study.
-
-    Args:
-        run: The study.
-        episodes: One of each agent, driven once; those that failed can tell nothing.
-
-    Raises:
-        RunError: If the machine fails.
-    """
+    """Drive an episode of each agent twice more, once for each study, and keep which come to other scores."""
     if NOT_REPEATABLE in run.store.facts():
         return
     known = {one: outcome.metrics for one, outcome in run.known(episodes).items() if outcome.metrics is not None}
@@ -175,15 +161,7 @@ def _lost(fleet: Fleet, end: WorkerExit) -> list[Again]:
 
 
 def check_some_work(outcomes: Collection[Outcome], where: str) -> None:
-    """Refuse to go on if every episode has failed of the same.
-
-    Args:
-        outcomes: Of every agent.
-        where: Whose episodes these are, as "the pre-flight".
-
-    Raises:
-        RunError: With the first failure.
-    """
+    """Refuse to go on if every episode, of whom `where` says, has failed of the same."""
 
     def kind(failed: Outcome) -> str:
         """The failure, whichever the agent and whatever the numbers."""
@@ -293,11 +271,9 @@ def _preflight(run: StudyRun, simulate: Callable[[int, Sequence[Episode]], None]
 
 
 def placement_pairs(run: StudyRun) -> Floats:
-    """The base of the pre-flight under its own and another placement.
+    """The base of the pre-flight under its own and another placement: (places, 2, agents, metrics), as the target's.
 
-    Returns:
-        Shape (places, 2, agents, metrics), in the order of the target's table; NaN where an episode failed or was not
-        driven; no places where there is no pre-flight.
+    NaN where an episode failed or was not driven; no places where there is no pre-flight.
     """
     study, settings, names = run.study, run.settings, run.study.target.metrics
     known = run.store.outcomes(study.identity, _base(settings)) if settings.preflight else {}
@@ -361,7 +337,6 @@ def _base_again(settings: StudySettings, agent: str, place: Place) -> Episode:
 
 
 def _movement(study: Study, look: int, interval: Interval, known: Mapping[Episode, Outcome]) -> Movement:
-    """Test one parameter on what is known at this look."""
     settings = study.settings
     base = _base(settings)
     instances = [base, *({**base, interval.name: end} for end in (interval.low, interval.high))]
@@ -378,19 +353,16 @@ def _movement(study: Study, look: int, interval: Interval, known: Mapping[Episod
 
 PRIOR_PAIRS = 2
 """An agent's own pairs are few, so the median over the agents counts as so many more."""
-
 UNKNOWN_NOISE = 0.1
 """Where nothing tells: standard deviation of a mean, as a share of the spread over agents."""
 
 
 @dataclass(frozen=True, eq=False)
 class NoiseVariance:
-    """Chance between the mean scores of proxy and target at the same θ.
+    """Variance of the difference of proxy's and target's mean scores at the same θ (agents, metrics).
 
-    Attributes:
-        variance: Of the difference of the two means, shape (agents, metrics).
-        caution: What is lost, in one line; empty where both sides drive from the same starts and a pre-flight has told
-            what placement does.
+    The caution says what is lost; empty where both drive from the same starts and a pre-flight told what placement
+    does.
     """
 
     variance: Floats
@@ -428,10 +400,7 @@ def shares_starts(study: Study) -> bool:
 
 
 def _shrunk(squares: Floats) -> Floats:
-    """Mean squares per agent and metric of squares (pairs, agents, metrics), NaN where one is missing.
-
-    Drawn towards the median over agents, since few pairs tell little of one agent.
-    """
+    """Mean squares (agents, metrics), drawn to their median: few pairs tell little of an agent."""
     counts = np.sum(~np.isnan(squares), axis=0)
     sums = np.nansum(squares, axis=0)
     with warnings.catch_warnings():

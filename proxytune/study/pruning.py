@@ -35,11 +35,8 @@ PRIOR_DISAGREEMENT = 1e-3
 class PruningRule:
     """The limit that the trials of a batch are held against: a function of the trials finished before it.
 
-    Attributes:
-        limit: The score above which one is not among the incumbents.
-        order: The agents in the order in which they are driven.
-        disagreement: Mean |α_proxy − α_target| of each pair over the scored trials, shape (agents, agents), in the
-            same order.
+    Agents are driven in this order, which is that of `disagreement`: mean |α_proxy − α_target| of pairs over scored
+    trials.
     """
 
     limit: float
@@ -49,13 +46,7 @@ class PruningRule:
 
 @dataclass(frozen=True)
 class Pruned:
-    """A trial that was stopped.
-
-    Attributes:
-        decided: The agents that had been driven from all starts.
-        bound: PRPV of their pairs, which PRPV of all cannot be below.
-        estimate: What PRPV of all is expected to be.
-    """
+    """A trial that was stopped: PRPV of the pairs decided is a bound, what is expected of all the estimate."""
 
     decided: tuple[str, ...]
     bound: float
@@ -80,7 +71,11 @@ def pruning_rule(run: StudyRun, done: Sequence[TrialRecord]) -> PruningRule | No
     agents = sorted(settings.agents)
     pairs = [run.evaluation_of(trial).disagreement for trial in scored]
     disagreement = PRIOR_DISAGREEMENT + np.mean([matrix for matrix in pairs if matrix is not None], axis=0)
-    rows = _telling_first(disagreement)
+    rows = [int(np.argmax(disagreement.max(axis=1)))]
+    while len(rows) < len(disagreement):
+        gains = disagreement[:, rows].sum(axis=1)
+        gains[rows] = -1.0
+        rows.append(int(np.argmax(gains)))
     limit = float(means.min()) + surrogate.noise_deviation
     return PruningRule(limit, tuple(agents[row] for row in rows), disagreement[np.ix_(rows, rows)])
 
@@ -89,9 +84,6 @@ def run_or_prune(run: StudyRun, trials: Sequence[TrialRecord], rule: PruningRule
     """Simulate what is missing of the trials until each is through or pruned.
 
     Episodes that other processes have begun by then are kept in the store, but no trial stands on them.
-
-    Raises:
-        EpisodeError: If an episode fails and the study is to stop then.
     """
     study, place = run.study, {agent: number for number, agent in enumerate(rule.order)}
     plans = [
@@ -166,13 +158,3 @@ def _pruned_at(
     bound = float(disagreement_of(study, score_table(worked), names).sum())
     share = rule.disagreement[:count, :count].sum() / rule.disagreement.sum()
     return Pruned(names, bound, float(bound / share)) if bound > rule.limit else None
-
-
-def _telling_first(disagreement: Floats) -> list[int]:
-    """Rows in the order in which their pairs disagree most, one added after the other."""
-    chosen = [int(np.argmax(disagreement.max(axis=1)))]
-    while len(chosen) < len(disagreement):
-        gains = disagreement[:, chosen].sum(axis=1)
-        gains[chosen] = -1.0
-        chosen.append(int(np.argmax(gains)))
-    return chosen

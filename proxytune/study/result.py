@@ -29,7 +29,7 @@ from proxytune.usefulness import Assessment, Estimate, Expectation, NoiseFloor, 
 FAILURES_TOLD = 10
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Best:
     """The answer: the θ that fresh episodes confirm, and until then the visited one of lowest expected PRPV.
 
@@ -48,8 +48,12 @@ class Best:
     posterior_deviation: float
     assessment: Assessment
 
+    def __repr__(self) -> str:
+        theta = ", ".join(f"{name}={value:.4g}" for name, value in self.trial.theta.items())
+        return f"Best: {theta}; {self.assessment!r} in its own episodes"
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class StudyResult:
     """A study as it stands.
 
@@ -85,6 +89,9 @@ class StudyResult:
     spared: tuple[int, float]
     failures: tuple[str, ...]
     cautions: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        return f"StudyResult of '{self.study.settings.name}': {len(self.trials)} trials; {self.best!r}"
 
     @property
     def unidentified(self) -> tuple[str, ...]:
@@ -179,7 +186,13 @@ def result_of(run: StudyRun, scored_anew: Sequence[TrialRecord] | None = None) -
         answer = confirmation.answer.trial
     else:
         answer = answers[-1] if answers and answers[-1] else record(0, run.evaluation_of(finalists(trials, learnt)[0]))
-    best = _best(run, answer, learnt)
+    values = learnt.space.values(answer.theta)
+    _, deviation = learnt.scores([values])
+    proxy = run.evaluation_of(answer).proxy
+    assert proxy is not None
+    assessment = assess(proxy=proxy, target=run.study.target, metrics=run.settings.metrics)
+    mean = learnt.expected_of({values: answer.score or 0.0})[values]
+    best = Best(answer, mean, float(deviation[0]), assessment)
     return StudyResult(
         study=study,
         trials=trials,
@@ -239,16 +252,6 @@ def _answers(trials: tuple[TrialRecord, ...], learnt: Knowledge) -> tuple[TrialR
             best = trial
         found.append(best)
     return tuple(found)
-
-
-def _best(run: StudyRun, answer: TrialRecord, learnt: Knowledge) -> Best:
-    values = learnt.space.values(answer.theta)
-    _, deviation = learnt.scores([values])
-    proxy = run.evaluation_of(answer).proxy
-    assert proxy is not None
-    assessment = assess(proxy=proxy, target=run.study.target, metrics=run.settings.metrics)
-    mean = learnt.expected_of({values: answer.score or 0.0})[values]
-    return Best(answer, mean, float(deviation[0]), assessment)
 
 
 def _failures(run: StudyRun, trials: tuple[TrialRecord, ...]) -> tuple[str, ...]:

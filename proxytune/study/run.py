@@ -32,23 +32,12 @@ from proxytune.study.opening import Objective
 from proxytune.study.preflight import check_some_work, noise_of
 from proxytune.study.pruning import Pruned, pruning_rule, run_or_prune
 from proxytune.study.settings import StopRules
-from proxytune.study.study_run import (
-    Evaluation,
-    StudyRun,
-    compose_of,
-    plan_episodes,
-    score_trials,
-)
+from proxytune.study.study_run import Evaluation, StudyRun, compose_of, plan_episodes, score_trials
 
 
 @dataclass(frozen=True)
 class AfterEarlier:
-    """A proposer that is told of earlier studies' trials as of its own: where there are enough, none is a design's.
-
-    Attributes:
-        inner: The proposer.
-        earlier: The trials.
-    """
+    """A proposer that is told of earlier studies' trials as of its own: where there are enough, none is a design's."""
 
     inner: Proposer
     earlier: tuple[Trial, ...]
@@ -62,9 +51,6 @@ def retry_failed(run: StudyRun) -> None:
     """Drive failed episodes of ended trials again where the user's code has changed since, and score these trials anew.
 
     Such a trial is driven in full, also if it was pruned before. θ of later trials stay what they are.
-
-    Raises:
-        EpisodeError: If an episode fails and the study is to stop then.
     """
     for trial in run.finished_trials():
         if trial.failed_episodes:
@@ -85,11 +71,7 @@ def goal_of(run: StudyRun) -> Goal:
 
 
 def knowledge_of(run: StudyRun, done: Iterable[TrialRecord]) -> Knowledge:
-    """All that finished trials say of θ, those of earlier studies too.
-
-    Raises:
-        RunError: If no trial has an outcome, or the store lacks episodes of one.
-    """
+    """All that finished trials say of θ, those of earlier studies too."""
     trials = [*earlier_trials(run), *(run.search_trial(trial) for trial in done)]
     return learn_theta(run.settings.space, trials, goal_of(run), run.settings.seed)
 
@@ -130,11 +112,7 @@ class StudyTrials:
         return [self._run.search_trial(trial) for trial in self._done]
 
     def ended(self) -> str:
-        """The reason why the study runs no further; empty while it does.
-
-        Raises:
-            RunError: If nothing has worked: more of the same would only burn time.
-        """
+        """The reason why the study runs no further; empty while it does."""
         why = stopped(self._run, self._done)
         failed = all(trial.state == "failed" for trial in self._done)
         if not why and failed and len(self._done) >= self._run.settings.initial:

@@ -35,14 +35,6 @@ def metrics_of(read: Section) -> tuple[Metric, ...]:
     return metrics
 
 
-def agents_of(read: Section) -> tuple[str, ...]:
-    """The agents, as tables have them."""
-    agents = tuple(aliases_of(read)) or read.texts("agents")
-    if len(agents) < 2:
-        raise read.error("agents", f"comparing takes at least two agents, got {len(agents)}")
-    return agents
-
-
 def targets_of(read: Section) -> tuple[str, ...]:
     """The file of the target's scores, or several; none of a bank."""
     if "target" not in read.values:
@@ -66,32 +58,16 @@ def texts_of(table: Section) -> dict[str, str]:
 class StopRules:
     """The rules that end a study before its budget is spent; None where one is not asked for.
 
-    Attributes:
-        wall_time_s: After the trial with which its episodes have taken so long [s], all runs together.
-        no_improvement: Once the most that any θ is expected to improve the score is less than this, in standard
-            deviations of the score's noise.
+    It ends when its episodes have taken so long [s], all runs together, or once the most that any θ is expected to
+    improve the score is less than so many standard deviations of the score's noise.
     """
 
     wall_time_s: float | None = None
     no_improvement: float | None = None
 
 
-def read_stop_rules(rules: Section) -> StopRules:
-    """The rules of a table [stop].
-
-    Raises:
-        SettingsError: With the key and the remedy.
-    """
-    rules.only(("wall_time_s", "no_improvement"))
-    return StopRules(positive(rules, "wall_time_s"), positive(rules, "no_improvement"))
-
-
 def positive(table: Section, key: str) -> float | None:
-    """A number above 0; None where it is missing.
-
-    Raises:
-        SettingsError: If it is none.
-    """
+    """A number above 0; None where it is missing."""
     if key not in table.values:
         return None
     value = table.number(key)
@@ -141,16 +117,7 @@ def study_around(folder: Path, file_name: str) -> Path | None:
 
 
 def family_tables(read: Section, family: str, name: str) -> dict[str, Section]:
-    """The study.toml of each family, by its name: the study's own keys, those of its table over them.
-
-    Args:
-        read: The study.toml.
-        family: The study's own domain family: of [domain], `proxy` and `truth` another one knows nothing.
-        name: What the study is called.
-
-    Raises:
-        SettingsError: With file, key and remedy.
-    """
+    """The study.toml of each family by name, its table over the study's keys; [domain] is that one family's alone."""
     if FAMILIES not in read.values:
         return {}
     tables = read.section(FAMILIES)
@@ -339,7 +306,6 @@ def _check_known(study: StudySettings) -> None:
 
 
 def _check_comparable(study: StudySettings) -> None:
-    """Refuse a study whose families could not be compared."""
     for key, has in (("target", bool(study.targets)), ("learn_from", not study.learn_from), ("budget", study.budget)):
         if not has:
             raise study.error(key, f"of a study of {FAMILIES}: needs a target, a budget, and trials of its own alone")
@@ -357,6 +323,11 @@ def _settings(read: Section) -> StudySettings:
     if read.whole("format", low=1) > FORMAT:
         raise read.error("format", f"this proxytune reads up to {FORMAT}; install a newer one")
     targets, objective = tuple(read.file("target", name) for name in targets_of(read)), read.text("objective", "prpv")
+    agents = tuple(aliases_of(read)) or read.texts("agents")
+    if len(agents) < 2:
+        raise read.error("agents", f"comparing takes at least two agents, got {len(agents)}")
+    rules = read.section("stop")
+    rules.only(("wall_time_s", "no_improvement"))
     return StudySettings(
         path=path,
         name=read.text("name", path.absolute().parent.name),
@@ -365,7 +336,7 @@ def _settings(read: Section) -> StudySettings:
         truth=read.file("truth") if "truth" in read.values else None,
         objective=objective,
         metrics=metrics_of(read),
-        agents=agents_of(read),
+        agents=agents,
         starts=read.whole("starts", low=1),
         budget=read.whole("budget", high=100_000),
         initial=read.whole("initial", 8, low=1, high=100_000),
@@ -378,7 +349,7 @@ def _settings(read: Section) -> StudySettings:
         preflight=read.flag("preflight", True),
         confirm=read.whole("confirm", 1, high=1000),
         cut_off=read.flag("cut_off", True),
-        stop=read_stop_rules(read.section("stop")),
+        stop=StopRules(positive(rules, "wall_time_s"), positive(rules, "no_improvement")),
         space=_space(read.section("parameters")),
         domain=read.section("domain"),
         teaching=read_teaching(read.section("teaching")),
@@ -400,6 +371,9 @@ def _space(parameters: Section) -> Space:
         raise SettingsError(f"{parameters.path}: {parameters.name}{problem}") from None
 
 
+PLAIN = ("starts", "budget", "initial", "batch", "engine", "seed", "jobs", "episode_timeout_s")
+
+
 def settings_document(settings: StudySettings) -> Mapping[str, Any]:
     """The settings as plain texts and numbers, for reports."""
     return {
@@ -411,14 +385,7 @@ def settings_document(settings: StudySettings) -> Mapping[str, Any]:
         "metrics": [str(metric) for metric in settings.metrics],
         "agents": list(settings.agents),
         "aliases": dict(settings.aliases),
-        "starts": settings.starts,
-        "budget": settings.budget,
-        "initial": settings.initial,
-        "batch": settings.batch,
-        "engine": settings.engine,
-        "seed": settings.seed,
-        "jobs": settings.jobs,
-        "episode_timeout_s": settings.episode_timeout_s,
+        **{key: getattr(settings, key) for key in PLAIN},
         "on_failure": "stop" if settings.stop_on_failure else "continue",
         "preflight": settings.preflight,
         "confirm": settings.confirm,

@@ -1,7 +1,4 @@
-"""One episode of a domain family, to look at: its scores, and what moved, was commanded and was seen.
-
-One episode in proxy and target: the same agent from the same start under the same seed.
-"""
+"""One episode to look at: its scores, and what moved, was commanded and was seen, in proxy and target alike."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -94,11 +91,8 @@ def can_record(family: DomainFamily) -> bool:
 def record_episode(family: DomainFamily, episode: Episode, *, filmed: bool = False) -> RecordedEpisode:
     """Run an episode and keep all that the family shows of it.
 
-    Args:
-        family: Where it runs.
-        episode: Which one.
-        filmed: Whether pictures are wanted. A family with `replay` gives them: the recorded commands are driven again,
-            which takes as long as the episode.
+    Where pictures are wanted, a family with `replay` gives them: the recorded commands are driven again, which takes as
+    long as the episode.
 
     Raises:
         EpisodeError: If the agent or the domain fails, or columns of its recording do not belong together.
@@ -127,7 +121,10 @@ class _Recorder:
         _check_columns("poses", self.kept.poses)
         _check_columns("commands", self.kept.commands)
         if self._filmed and hasattr(self._family, "replay"):
-            self.pictures = _pictures(self._family, episode, self.kept.commands)
+            issued = np.column_stack([column for name, column in self.kept.commands.items() if name != "time"])
+            pictures = np.asarray(self._family.replay(episode, issued).pictures)
+            coloured = pictures.dtype == np.uint8 and pictures.ndim == 4 and pictures.shape[-1] == 3
+            self.pictures = pictures if coloured and len(pictures) == len(issued) else None
         return self.kept.metrics
 
 
@@ -135,14 +132,6 @@ def _check_columns(what: str, columns: Columns) -> None:
     lengths = {len(column) for column in columns.values()}
     if columns and ("time" not in columns or len(lengths) > 1 or not min(lengths)):
         raise EpisodeError(f"record of the domain family: {what} need a column `time` and as many rows in every column")
-
-
-def _pictures(family: Any, episode: Episode, commands: Columns) -> NDArray[np.uint8] | None:
-    """The picture before each command; None if the answer has no pictures of red, green and blue."""
-    issued = np.column_stack([column for name, column in commands.items() if name != "time"])
-    pictures = np.asarray(family.replay(episode, issued).pictures)
-    coloured = pictures.dtype == np.uint8 and pictures.ndim == 4 and pictures.shape[-1] == 3
-    return pictures if coloured and len(pictures) == len(issued) else None
 
 
 APART_M = 0.05
@@ -201,13 +190,7 @@ def drive_side_by_side(
 
 
 def load_target(settings: StudySettings, proxy: DomainFamily, model: Path, option: str) -> DomainFamily:
-    """The study's domain as a model.toml describes it.
-
-    Args:
-        settings: Of the study.
-        proxy: The study's own family.
-        model: The model.toml.
-        option: What named it, for complaints.
+    """The study's domain as a model.toml describes it, which the option named.
 
     Raises:
         InputError: If there is no such model, or it is of another robot.

@@ -95,14 +95,6 @@ def longest_first(episodes: Sequence[Episode], seconds: Mapping[tuple[str, int],
     return sorted(episodes, key=lambda episode: -seconds.get((episode.agent, episode.start), float("inf")))
 
 
-def _split(episodes: list[Episode], least: int) -> tuple[list[Episode], list[Episode]]:
-    """The first so many episodes and the rest of their last agent's; and those after them."""
-    end = least
-    while 0 < end < len(episodes) and episodes[end].agent == episodes[end - 1].agent:
-        end += 1
-    return episodes[:end], episodes[end:]
-
-
 def evaluate_outcomes(study: Study, theta: Theta, outcomes: Sequence[Outcome]) -> Evaluation:
     """Compare the outcomes of a domain instance's episodes with the target; a pure function.
 
@@ -274,7 +266,6 @@ class StudyRun:
         known: dict[Episode, Outcome],
         enough: Enough | None,
     ) -> None:
-        """Simulate what is missing, and add it to what is known."""
         ended = {theta for theta in {episode.theta for episode in planned} if enough and enough(theta, known)}
         left, least = longest_first(missing, self.store.seconds()), len(missing)
         if enough:
@@ -285,7 +276,11 @@ class StudyRun:
         family, needed = self.study.family, needed_metrics(self.settings, self.study.family)
         with self.watched() as watch:
             while left:
-                wave, left = _split([one for one in left if one.theta not in ended], least)
+                episodes = [one for one in left if one.theta not in ended]
+                end = least
+                while 0 < end < len(episodes) and episodes[end].agent == episodes[end - 1].agent:
+                    end += 1
+                wave, left = episodes[:end], episodes[end:]
                 with running(family, wave, self.settings.jobs, lambda one: one.theta in ended, needed, watch) as fleets:
                     for outcomes in fleets:
                         self._keep(outcomes)

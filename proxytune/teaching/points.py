@@ -258,7 +258,6 @@ def equal_rounds(count: int, rounds: int) -> tuple[int, ...]:
 
 PUPIL = "pupil"
 """Who drives in an examination, in place of an agent."""
-
 PROXY_ROUNDS = 4
 """Rounds in which a proxy teaches where the learner drives in it."""
 
@@ -380,10 +379,8 @@ def _name_proxy_in_errors(point: CurvePoint) -> Iterator[None]:
 
 WIDTH = " width"
 """What the width of a parameter's distribution is called, after the parameter."""
-
 ROUNDING = 1e-9
 """Share of a box by which a width may be larger."""
-
 SLACK = 1.0 / 30.0
 """A parameter that PRPV has pinned down is still searched over this share of its box, to both sides."""
 

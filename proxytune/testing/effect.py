@@ -24,8 +24,6 @@ HELD = 3
 """Samples over which a command holds."""
 PICTURE = {"camera_columns": 4.0, "camera_rows": 3.0}
 """The size of the pictures that image effects are tried on: no two sides alike, so that none is taken for the other."""
-
-
 WAY = np.repeat(np.linspace(0.0, 21.0, 225), 2) * np.tile((1.0, -1.0), 225)
 PLACES = np.stack([axis for way in WAY for axis in ((way, 0.0), (0.0, way))])
 """Places [m] along both axes that reach beyond every patch, nearest first, to and fro, shape (places, 2)."""

@@ -200,7 +200,6 @@ MEMBERS = ("identity", "metrics", "parameters", "starts", "check_agent", "run")
 NOBODY = "nobody drives like this"
 STARTS = 3
 """A parameter has to change something from one of the first so many starts."""
-
 Scores = Mapping[str, float]
 
 

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from proxytune.arrays import Floats
 from proxytune.errors import ScoresError
 from proxytune.scores import Metric, ScoreTable, score_cautions
 from proxytune.usefulness.comparison import Comparison, compare
@@ -68,7 +67,7 @@ HALVES = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Assessment:
     """The usefulness of one proxy as a predictor of the target.
 
@@ -99,6 +98,11 @@ class Assessment:
     chance: Chance
     seed: int
     asked: Asked = ASKED
+
+    def __repr__(self) -> str:
+        low, high = self.prpv_interval.low, self.prpv_interval.high
+        ends = "" if low is None or high is None else f" ({low:.3g} to {high:.3g})"
+        return f"Assessment: PRPV {self.prpv.value}{ends} of at most {self.prpv.range[1]}"
 
     @cached_property
     def saves(self) -> Saving:
@@ -347,14 +351,10 @@ def select_proxy(
     # The same seed resamples the target alike for every proxy.
     means = {name: bootstrap_means(side, resamples=resamples, seed=seed) for name, side in inputs.items()}
     resampled = {name: prpv_in_blocks(*sides, metrics) for name, sides in means.items()}
-    half = _simultaneous(np.array([resampled[worse] - resampled[better] for better, worse in pairs]))
-    rows = zip(pairs, observed, half, strict=True)
-    return Selection(ranking, tuple(Difference(*pair, int(v), float(v - h), float(v + h)) for pair, v, h in rows))
-
-
-def _simultaneous(differences: Floats) -> Floats:
-    """Half widths that hold for all rows at once: shape (pairs, resamples) to (pairs,)."""
+    differences = np.array([resampled[worse] - resampled[better] for better, worse in pairs])
     deviation = differences.std(axis=1)
     centred = np.abs(differences - differences.mean(axis=1, keepdims=True))
     studentised = centred / np.where(deviation > 0, deviation, np.inf)[:, None]
-    return np.asarray(np.quantile(studentised.max(axis=0), CONFIDENCE) * deviation, dtype=np.float64)
+    half = np.asarray(np.quantile(studentised.max(axis=0), CONFIDENCE) * deviation, dtype=np.float64)
+    rows = zip(pairs, observed, half, strict=True)
+    return Selection(ranking, tuple(Difference(*pair, int(v), float(v - h), float(v + h)) for pair, v, h in rows))

@@ -165,17 +165,10 @@ def by_start(table: ScoreTable) -> ScoreTable:
 
 
 def split_repeats(driven: Flags, places: Whole, keys: Floats) -> tuple[Flags, Flags]:
-    """Split episodes into two sets that hold the same starts, each as often.
+    """Split episodes into two sets (agents, splits, episodes) that hold the same starts, each as often.
 
-    Where an agent has an odd number of repeats of a start, one is left out. Agents split the same repeats alike.
-
-    Args:
-        driven: Which agent drove which episode, shape (agents, episodes).
-        places: The place of each episode's start.
-        keys: Random numbers, shape (splits, episodes); the lower half of a start's repeats is the first set's.
-
-    Returns:
-        Two arrays of shape (agents, splits, episodes).
+    Where an agent has an odd number of repeats of a start, one is left out. Agents split the same repeats alike: the
+    lower half of the `keys`, random numbers (splits, episodes), is the first set's.
     """
     first, second = np.zeros((2, len(driven), *keys.shape), dtype=np.bool_)
     for place in range(places.max() + 1):

@@ -158,11 +158,7 @@ class Decision:
 def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed: int = 0) -> Decision:
     """Say which agent to deploy.
 
-    Args:
-        inputs: Both sides.
-        asked: What to choose by, and what is known beside the tables.
-        saving: What the proxy adds to the target's means where starts are paired; it counts where that is beyond noise.
-        seed: Seed of the draws.
+    What the proxy adds to the target's means where starts are paired (`saving`) counts where that is beyond noise.
 
     Raises:
         InputError: If the metric to choose by is not there.
@@ -240,11 +236,6 @@ def _most_regrets(centre: Floats, ends: Floats, rates: Floats) -> Floats:
 
     There the prior pulls draws away from rates that are at the end of what can be. The ends follow from those of both
     rates (Zou and Donner, 2008, "Construction of confidence limits about effect measures").
-
-    Args:
-        centre: Means, more being better (agents,).
-        ends: Intervals of these (agents, 2).
-        rates: The share that succeeded (agents,).
     """
     best, settled = int(centre.argmax()), (rates <= 0.0) | (rates >= 1.0)
     reach = np.hypot(ends[best, 1] - centre[best], centre - ends[:, 0])
@@ -397,15 +388,9 @@ def _means(
 
 @dataclass(frozen=True)
 class Choice:
-    """What choosing by one proxy instead of another gains on the target, or saves there.
+    """What choosing by one proxy instead of another is worth, on the target or in real rollouts, as `on` says.
 
-    Attributes:
-        better: The proxy whose winner has the lower expected regret, or which saves more.
-        worse: The other.
-        value: Expected score on the target of the better one's winner less that of the other's, or real rollouts of an
-            agent that the better one saves beyond the other.
-        interval: Its 95 % interval; None where nothing is known of the target's noise.
-        on: Of which of the two this is.
+    The interval is of 95 %; None where nothing is known of the target's noise.
     """
 
     better: str
@@ -421,11 +406,7 @@ class Choice:
 
 
 def compare_choices(inputs: Mapping[str, Comparison], asked: Asked, seed: int = 0) -> tuple[Choice, ...]:
-    """Compare every two proxies of one target by what their winners do there, by the target's rollouts alone.
-
-    Raises:
-        InputError: As in decide.
-    """
+    """Compare every two proxies of one target by what their winners do there, by the target's rollouts alone."""
     found = {name: decide(one, asked, None, seed) for name, one in inputs.items()}
     choices = []
     for pair in itertools.combinations(found, 2):
@@ -475,11 +456,7 @@ class Together:
 
 
 def use_two(inputs: Mapping[str, Comparison], savings: Mapping[str, Saving], asked: Asked, seed: int = 0) -> Together:
-    """Rectify the target by the two proxies that save most.
-
-    Raises:
-        InputError: As in decide.
-    """
+    """Rectify the target by the two proxies that save most."""
     names = sorted(savings, key=lambda name: -(savings[name].real_rollouts_worth or 0.0))[:2]
     one, other = (inputs[name] for name in names)
     saves = saving_of(one, chosen(one, asked.decide_on)[0][0], other)

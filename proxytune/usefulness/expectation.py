@@ -129,13 +129,9 @@ def _target_donors(target: ScoreTable) -> Donors:
 
 @dataclass(frozen=True)
 class Expected:
-    """One measure in more episodes.
+    """One measure in more episodes: what is expected of fresh ones, and what a perfect proxy scores on this target.
 
-    Attributes:
-        value: Expected of more fresh episodes against this target.
-        floor: What a perfect proxy scores against this target, with where 95 % of its scores lie; None if noise is not
-            known.
-        excess: By how much more is expected of this proxy than of a perfect one; None if noise is not known.
+    Floor (with where 95 % of its scores lie) and excess over it are None if noise is not known.
     """
 
     value: Estimate
@@ -167,12 +163,7 @@ def expect(
 ) -> Expectation:
     """What a proxy and a perfect one are expected to score against this target.
 
-    Args:
-        fresh: Scores in the proxy by repetition, which nothing was chosen by.
-        target: Scores on the target.
-        metrics: How agents are compared, in the order in which `donors` have them.
-        donors: What is known of noise.
-        seed: Seeds what is drawn.
+    The fresh tables, a repetition each, are of episodes that nothing was chosen by; metrics are in the donors' order.
 
     Raises:
         ScoresError: As in prpv.
@@ -180,7 +171,9 @@ def expect(
     rng, sides = np.random.default_rng(seed), [compare(proxy=one, target=target, metrics=metrics) for one in fresh]
     means, known = sides[0].target.means, len(donors.first) > 0
     proxies = np.stack([side.proxy.means for side in sides])
-    draws = [_again(side.proxy, donors, rng, _all(side.proxy)) for side in sides] if known else []
+    draws = (
+        [_again(side.proxy, donors, rng, np.arange(len(side.proxy.episodes))[None]) for side in sides] if known else []
+    )
     of_target = _target_donors(sides[0].target) if donors.still else donors
     perfect = _perfect(sides[0], of_target, rng) if len(of_target.first) else None
     weights = ppv(proxy=fresh[0], target=target, metrics=metrics).beta
@@ -229,11 +222,6 @@ def _expected(
     more, wide = middle - float(levels.mean()), NORMAL * np.sqrt(variance / m + levels.var())
     floor = Estimate(float(levels.mean()), *interval(levels))
     return Expected(value, floor, Estimate(more, more - wide, more + wide)), float(np.sqrt(variance))
-
-
-def _all(table: ScoreTable) -> Whole:
-    """Every episode of a table once, shape (1, episodes)."""
-    return np.arange(len(table.episodes))[None]
 
 
 def _again(table: ScoreTable, donors: Donors, rng: np.random.Generator, columns: Whole) -> Floats:

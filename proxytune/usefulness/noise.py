@@ -103,14 +103,8 @@ def floor_of_repeats(
 
     Each agent is compared over the starts that it drove both times, each start by the mean over its repeats. The
     interval is a bootstrap over starts, which both measurements share, and all agents too where none is missing. It
-    covers the mean PRPV of many such pairs, so like every bootstrap of PRPV it lies on the high side.
-
-    Args:
-        domain: Scores of the domain.
-        again: Its scores under other placement noise: the same agents, episodes labelled START or START/REPEAT.
-        metrics: How agents are compared.
-        resamples: How many to draw.
-        seed: Seed of the resampling.
+    covers the mean PRPV of many such pairs, so like every bootstrap of PRPV it lies on the high side. Episodes are
+    labelled START or START/REPEAT.
 
     Raises:
         ScoresError: As in prpv.
@@ -143,13 +137,7 @@ def _split_means(table: ScoreTable, rng: np.random.Generator, splits: int, same_
 
 
 def split_halves(driven: Flags, rng: np.random.Generator, splits: int) -> tuple[Flags, Flags]:
-    """Halves of the episodes, those in the first and those in the second, each of shape (agents, splits, episodes).
-
-    Args:
-        driven: Which agent drove which episode, shape (agents, episodes).
-        rng: Every agent is split at random by itself.
-        splits: How many times.
-    """
+    """Halves of the episodes (agents, splits, episodes), the first and the second; agents are split by themselves."""
     order = np.where(driven[:, None, :], rng.random((len(driven), splits, driven.shape[1])), np.inf)
     half = (driven.sum(axis=1) // 2)[:, None, None]
     first = order < np.take_along_axis(np.sort(order, axis=-1), half, axis=-1)
@@ -171,14 +159,7 @@ def _shared_starts(inputs: Comparison) -> tuple[ScoreTable, ScoreTable]:
 
 @dataclass(frozen=True)
 class Rate:
-    """The share of an agent's episodes that succeeded.
-
-    Attributes:
-        value: The share.
-        low: Lower end of Wilson's 95 % interval, which takes episodes for independent.
-        high: Upper end.
-        episodes: How many there were.
-    """
+    """The share of an agent's episodes that succeeded, with Wilson's 95 % interval: they are taken for independent."""
 
     value: float
     low: float

@@ -22,20 +22,16 @@ from proxytune.usefulness.comparison import Comparison, compare
 
 FEW_AGENTS = 128
 """Up to so many agents each pair is compared, in many tables at once, which is quicker for them."""
-
 Flip = Literal["reversed", "lost", "invented"]
 FLIPS: dict[tuple[float, float], Flip] = {(1.0, 0.0): "reversed", (1.0, 0.5): "lost", (0.5, 1.0): "invented"}
 
 
 @dataclass(frozen=True)
 class FlippedPair:
-    """Two agents that the proxy ranks unlike the target.
+    """Two agents that the proxy ranks unlike the target; `better` dominates there, or in the proxy if only that orders.
 
-    Attributes:
-        better: The one that dominates on the target, or in the proxy where the target has no order.
-        worse: The other.
-        flip: "reversed" if the proxy says the opposite, "lost" if it sees no order where the target has one,
-            "invented" if it sees one where the target has none.
+    It is "reversed" by the proxy, or "lost" where only the target has an order, "invented" where only the proxy has
+    one.
     """
 
     better: str
@@ -89,16 +85,7 @@ def prpv(*, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) ->
 
 
 def prpv_of_means(proxy: Floats, target: Floats, metrics: Sequence[Metric]) -> Floats:
-    """PRPV, eq. (4), of many pairs of tables at once.
-
-    Args:
-        proxy: Mean scores in the proxy, shape (…, agents, metrics).
-        target: Mean scores on the target, broadcastable to the same shape.
-        metrics: How each of the metrics compares.
-
-    Returns:
-        Shape (…).
-    """
+    """PRPV, eq. (4), of many pairs of tables of mean scores (…, agents, metrics), which broadcast: shape (…)."""
     if proxy.shape[-2] > FEW_AGENTS:
         return by_table(lambda one, other: prpv_of_table(one, other, metrics), proxy, target)
     # Each pair counts half in either order.
@@ -107,15 +94,10 @@ def prpv_of_means(proxy: Floats, target: Floats, metrics: Sequence[Metric]) -> F
 
 
 def dominance(means: Floats, metrics: Sequence[Metric]) -> Floats:
-    """α, eq. (3): who dominates whom.
+    """α, eq. (3), of mean scores (…, agents, metrics): who dominates whom, shape (…, agents, agents).
 
-    Args:
-        means: Mean scores, shape (…, agents, metrics).
-        metrics: How each of the metrics compares.
-
-    Returns:
-        Shape (…, agents, agents): 1 where row dominates column (better beyond tolerance on one metric, worse on
-        none), 0 where column dominates row, 0.5 where they are incomparable or tied.
+    It is 1 where row dominates column (better beyond tolerance on one metric, worse on none), 0 where column dominates
+    row, 0.5 where they are incomparable or tied.
     """
     first, second = np.triu_indices(means.shape[-2], 1)
     signs = 0.5 * _signs(means, metrics)
@@ -146,13 +128,7 @@ WORDS = 2**20
 
 @dataclass(frozen=True)
 class Standing:
-    """One column of scores, sorted: the agents that each one is ahead of.
-
-    Attributes:
-        order: Agents from the lowest score to the highest.
-        below: How many agents each is ahead of; these come first in the order.
-        reach: How many agents are not ahead of each; these come first in the order too.
-    """
+    """One column sorted: how many agents each is ahead of (first in the order), and how many are not ahead of it."""
 
     order: Whole
     below: Whole
@@ -169,12 +145,7 @@ class Standing:
 
 
 def stand(scores: Floats, tie: float) -> Standing:
-    """Sort a column.
-
-    Args:
-        scores: One per agent, finite.
-        tie: The largest difference that is still a tie.
-    """
+    """Sort a column (agents,), finite; differences up to `tie` are ties."""
     agents = len(scores)
     order = np.argsort(scores)
     ahead_of = _ahead_of(scores[order], tie)
@@ -215,16 +186,7 @@ def _ahead_of(ascending: Floats, tie: float) -> Whole:
 
 
 def by_table(measure: Callable[[Floats, Floats], float | Floats], proxy: Floats, target: Floats) -> Floats:
-    """Measure many pairs of tables one by one.
-
-    Args:
-        measure: Of two arrays of shape (agents, metrics).
-        proxy: Mean scores in the proxy, shape (…, agents, metrics).
-        target: Mean scores on the target, broadcastable to the same shape.
-
-    Returns:
-        Shape (…), followed by that of what is measured.
-    """
+    """Measure pairs of tables (…, agents, metrics), which broadcast, one by one: (…), and the shape of a measure."""
     proxy, target = np.broadcast_arrays(proxy, target)
     leading, table = proxy.shape[:-2], proxy.shape[-2:]
     tables = zip(proxy.reshape(-1, *table), target.reshape(-1, *table), strict=True)

@@ -51,16 +51,7 @@ class Ppv:
 
 
 def ppv_of_means(proxy: Floats, target: Floats, weights: Floats) -> Floats:
-    """PPV, eq. (2), of many pairs of tables at once.
-
-    Args:
-        proxy: Mean scores in the proxy, shape (…, agents, metrics).
-        target: Mean scores on the target, broadcastable to the same shape.
-        weights: β, one per metric, shape (…, metrics).
-
-    Returns:
-        Shape (…).
-    """
+    """PPV, eq. (2), of many pairs of tables (…, agents, metrics), which broadcast, by weights β (…, metrics): (…)."""
     return np.asarray((np.abs(proxy - target) @ weights[..., None])[..., 0].mean(axis=-1), dtype=np.float64)
 
 
@@ -90,13 +81,9 @@ def ppv(
 
 
 def weights_of_spread(target: Floats) -> Floats:
-    """One over the spread of the agents' mean scores on the target.
+    """One over the spread of the agents' mean scores (…, agents, metrics) on the target.
 
-    Args:
-        target: Mean scores, shape (…, agents, metrics).
-
-    Returns:
-        Shape (…, metrics), 0 where all agents score alike, or so nearly that squares of it are none.
+    It is 0 where all agents score alike, or so nearly that squares of the spread are none.
     """
     spreads = target.std(axis=-2, ddof=1)
     varied = varies(target) & (spreads > SMALLEST_SPREAD)
@@ -137,16 +124,7 @@ class Mmrv:
 
 
 def mmrv_of_means(proxy: Floats, target: Floats, metrics: Sequence[Metric]) -> Floats:
-    """MMRV of many pairs of tables at once.
-
-    Args:
-        proxy: Mean scores in the proxy, shape (…, agents, metrics).
-        target: Mean scores on the target, broadcastable to the same shape.
-        metrics: Which direction is better; tolerances play no part.
-
-    Returns:
-        Shape (…, metrics).
-    """
+    """MMRV (…, metrics) of many pairs of tables (…, agents, metrics), which broadcast; tolerances play no part."""
     signs = np.array([1.0 if metric.direction == "max" else -1.0 for metric in metrics])
     if proxy.shape[-2] > FEW_AGENTS:
         return np.asarray(by_table(violations_of_table, proxy * signs, target * signs).mean(axis=-2), dtype=np.float64)
@@ -194,15 +172,7 @@ class Correlation:
 
 
 def pearson_of_means(proxy: Floats, target: Floats) -> Floats:
-    """Pearson's coefficient between two domains.
-
-    Args:
-        proxy: Mean scores in the proxy, shape (…, agents, metrics).
-        target: Mean scores on the target, broadcastable to the same shape.
-
-    Returns:
-        Shape (…, metrics), from −1 to 1; NaN where all agents score alike in one of the domains.
-    """
+    """Pearson's coefficient (…, metrics) of tables (…, agents, metrics); NaN where all agents score alike in one."""
     one = proxy - proxy.mean(axis=-2, keepdims=True)
     other = target - target.mean(axis=-2, keepdims=True)
     norms = np.sqrt((one**2).sum(axis=-2) * (other**2).sum(axis=-2))

@@ -20,7 +20,6 @@ from proxytune.usefulness.predictivity import Ppv, kendall_of_means, mmrv_of_mea
 CONFIDENCE = 0.95
 BLOCK = 4_000_000
 """Most numbers held at once by a measure over many resamples."""
-
 Means = tuple[Floats, Floats]
 """Mean scores of resampled episodes, in the proxy and on the target, each of shape (resamples, agents, metrics)."""
 
@@ -75,18 +74,20 @@ def too_few(table: ScoreTable, name: str) -> str:
 
 
 def bootstrap_means(inputs: Comparison, *, resamples: int, seed: int) -> Means:
-    """Mean scores of resampled episodes, in the proxy and on the target.
+    """Mean scores of resampled episodes, in the proxy and on the target: (resamples, agents, metrics) each.
 
     Where all agents drove the same episodes, all get the same resample of their starts, each with all its repeats;
     where both domains have the same starts, both do.
-
-    Returns:
-        Two arrays of shape (resamples, agents, metrics).
     """
     rng = np.random.default_rng(seed)
     if inputs.paired:
         counts = draw_counts(inputs.target, rng, resamples)
-        return counted_means(inputs.proxy.values, _alike(inputs, counts)), counted_means(inputs.target.values, counts)
+        labels = inputs.target.episodes
+        columns = {start_of(label): column for column, label in enumerate(labels)}
+        columns |= {label: column for column, label in enumerate(labels)}
+        # The proxy's episodes are drawn with the target's of the same label or, of other repeats, of the same start.
+        alike = counts[..., [columns.get(label, columns[start_of(label)]) for label in inputs.proxy.episodes]]
+        return counted_means(inputs.proxy.values, alike), counted_means(inputs.target.values, counts)
     on_target = _means_of_draws(inputs.target, rng, resamples)
     return _means_of_draws(inputs.proxy, rng, resamples), on_target
 
@@ -137,14 +138,6 @@ def _draw_own(driven: NDArray[np.bool_], rng: np.random.Generator, resamples: in
     return np.stack(counts)
 
 
-def _alike(inputs: Comparison, target_counts: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The target's draws for the proxy's episodes: by label or, of other repeats, by start."""
-    labels = inputs.target.episodes
-    columns = {start_of(label): column for column, label in enumerate(labels)}
-    columns |= {label: column for column, label in enumerate(labels)}
-    return target_counts[..., [columns.get(label, columns[start_of(label)]) for label in inputs.proxy.episodes]]
-
-
 def counted_means(values: Floats, counts: NDArray[np.int64] | NDArray[np.bool_]) -> Floats:
     """Mean scores (agents, episodes, metrics) when episodes count as often as drawn: (resamples, agents, metrics)."""
     sums = counts.astype(np.float64) @ np.nan_to_num(values)
@@ -154,13 +147,9 @@ def counted_means(values: Floats, counts: NDArray[np.int64] | NDArray[np.bool_])
 def in_blocks(
     measure: Callable[[Floats, Floats], Floats], proxy: Floats, target: Floats, *, numbers: int | None = None
 ) -> Floats:
-    """Apply a measure to many tables without holding at once all that it takes.
+    """Apply a measure to many pairs of tables (tables, agents, metrics) without holding at once all that it takes.
 
-    Args:
-        measure: Of mean scores in the proxy and on the target, shape (…, agents, metrics).
-        proxy: Mean scores in the proxy, shape (tables, agents, metrics).
-        target: Mean scores on the target, same shape.
-        numbers: How many numbers the measure holds of one table; by default one for each pair of agents.
+    Of one table the measure holds so many numbers; by default one for each pair of agents.
     """
     size = max(1, BLOCK // (numbers or proxy.shape[-2] ** 2))
     starts = range(0, len(proxy), size)
@@ -205,13 +194,7 @@ class Intervals:
 
 
 def intervals(*, inputs: Comparison, error: Ppv, means: Means | None) -> Intervals | None:
-    """The interval of every measure at once; None where episodes are not repeated.
-
-    Args:
-        inputs: What is compared.
-        error: PPV, with the weights that it has.
-        means: Mean scores of resampled episodes, None where there are none.
-    """
+    """The interval of every measure, PPV with its weights, from resampled means; None without repeated episodes."""
     if means is None:
         return None
     weights = np.array([error.beta[metric.name] or 0.0 for metric in inputs.metrics])

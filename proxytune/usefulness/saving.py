@@ -76,10 +76,7 @@ def effective(counts: Floats, table: ScoreTable, starts: ScoreTable) -> Floats:
 def saving_of(inputs: Comparison, column: int = 0, *others: Comparison) -> Saving:
     """Say what the proxy's rollouts save on one metric: by paired starts, else by a model over agents.
 
-    Args:
-        inputs: The proxy and the target.
-        column: The metric.
-        others: Other proxies of that target, used together with the first.
+    Other proxies of that target are used together with the first.
     """
     every = (inputs, *others)
     real, simulated = float(inputs.target.counts.mean()), sum(float(one.proxy.counts.mean()) for one in every)
@@ -126,12 +123,7 @@ def is_rate(table: ScoreTable, column: int) -> bool:
 
 
 def rate_intervals(rates: Floats, counts: Floats) -> list[Ends]:
-    """The 95 % interval of each rate.
-
-    Args:
-        rates: The share that succeeded, shape (agents,).
-        counts: Rollouts that it rests on.
-    """
+    """The 95 % interval of each rate (agents,) that rests on so many rollouts."""
     from scipy.special import betaincinv
 
     tail = (1.0 - CONFIDENCE) / 2.0

@@ -65,11 +65,7 @@ class Plan:
 def plan(decision: Decision, *, bound: float | None, made: Floats, scale: float) -> Plan:
     """Say how many more rollouts each agent needs for a regret below a bound with 95 %.
 
-    Args:
-        decision: What is known.
-        bound: The regret; None for 5 % of the scale.
-        made: Rollouts made of each agent on the target.
-        scale: The scores' scale: 1 for rates, else their spread.
+    Without a bound it is 5 % of the scale, which is 1 for rates, else the scores' spread. Rollouts were made already.
     """
     bound = SCALE_SHARE * scale if bound is None else bound
     if decision.draws is None:
@@ -187,14 +183,10 @@ def _order(values: Floats, direction: str) -> Floats:
 
 
 def wealth_of(outcomes: Floats, foretold: Floats | None = None) -> Floats:
-    """Wealth against "the agent is no better than its rival", after each round.
+    """Wealth against "the agent is no better than its rival", after each round, of outcomes from 0 to 1.
 
-    Args:
-        outcomes: Shape (experiments, agents, rounds), from 0 to 1.
-        foretold: The proxy's rates, shape (agents,); None to bet without.
-
-    Returns:
-        Shape (experiments, rounds, agents, rivals); infinite against itself.
+    These are (experiments, agents, rounds), the proxy's rates (agents,), None to bet without; the answer is
+    (experiments, rounds, agents, rivals), infinite against itself.
     """
     starts = [np.full(outcomes.shape[1], 0.5)] if foretold is None else [np.full(outcomes.shape[1], 0.5), foretold]
     weights = [2.0 * PRIOR, PROXY_PRIOR]

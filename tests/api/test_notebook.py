@@ -33,6 +33,16 @@ def test_every_report_can_show_itself_in_a_notebook(name):
     assert inspect.isfunction(getattr(proxytune, name)._repr_html_)
 
 
+def test_what_hangs_at_a_study_is_shown_in_a_line(finished):
+    """A prompt shows a line, not every score."""
+    report = proxytune.read_study(finished)
+    for one in (report.best, report.best.assessment, report.result):
+        assert len(repr(one)) < 300
+        assert "\n" not in repr(one)
+    assert all(f"{name}={value:.4g}" in repr(report.best) for name, value in report.theta.items())
+    assert f"PRPV {report.best.assessment.prpv.value}" in repr(report.best.assessment)
+
+
 def test_a_study_shows_its_sentence_its_tables_and_its_figures(finished):
     report = proxytune.read_study(finished)
     page = report._repr_html_()

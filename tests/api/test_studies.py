@@ -3,6 +3,7 @@
 import json
 import warnings
 
+import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.figure import Figure
@@ -32,6 +33,23 @@ def journalled(make_study, **changes):
 
 def simulated(journal):
     return journal.read_text().splitlines() if journal.exists() else []
+
+
+def test_theta_is_drawn_from_the_posterior_as_the_answer_has_it(report):
+    """Rows are whole θ: their margins are the answer's intervals, and their correlation is the posterior's own."""
+    drawn, learnt = report.posterior(draws=20_000, seed=3), report.result.knowledge
+    assert list(drawn.columns) == list(learnt.space.names)
+    assert drawn.equals(report.posterior(draws=20_000, seed=3))
+    assert not drawn.equals(report.posterior(draws=20_000, seed=4))
+    for box in learnt.space.intervals:
+        ends = drawn[box.name].quantile([0.025, 0.975])
+        np.testing.assert_allclose(ends, learnt.intervals[box.name], atol=0.02 * (box.high - box.low))
+        assert drawn[box.name].between(box.low, box.high).all()
+    weights = learnt.posterior.weights
+    exact = np.cov(learnt.values.T, aweights=weights, ddof=0)
+    np.testing.assert_allclose(np.cov(drawn.to_numpy().T), exact, atol=0.05 * np.abs(exact).max())
+    with pytest.raises(InputError, match="draws must be at least 1, got 0"):
+        report.posterior(draws=0)
 
 
 def test_a_study_runs_and_run_again_it_simulates_nothing(make_study):
@@ -123,7 +141,7 @@ def test_progress_is_shown_only_when_asked_for(make_study, monkeypatch):
     totals = []
 
     class Spy:
-        def __init__(self, total):
+        def __init__(self, total, unit):
             totals.append(total)
 
         def __enter__(self):
@@ -134,7 +152,7 @@ def test_progress_is_shown_only_when_asked_for(make_study, monkeypatch):
         def __exit__(self, *problem):
             pass
 
-    monkeypatch.setattr("proxytune.api.study.Bars", Spy)
+    monkeypatch.setattr("proxytune.running.progress.Bars", Spy)
     folder = make_study("shown", budget="2", initial="2")
     run_study(folder)
     assert totals == []

@@ -9,9 +9,10 @@ from stopping import Stopping
 from taught import TEACHING
 
 from proxytune.api import Spending, read_families, run_opened_families
-from proxytune.api.families import Quiet, run_families
+from proxytune.api.families import run_families
 from proxytune.cli.main import main
 from proxytune.errors import InputError
+from proxytune.running import Silent
 from proxytune.study import read_study_settings
 
 FAST = "[families.fast]\n[families.slow.domain]\nsleep = 0.02\n"
@@ -121,24 +122,16 @@ def test_a_time_once_spent_stays_spent_and_a_longer_one_goes_on(make_study, caps
     assert more["seconds"] > slow["seconds"]
 
 
-class Interrupted(Quiet):
-    """Presses Ctrl-C after so many episodes of a family."""
-
-    def __init__(self, family, episodes):
-        super().__init__()
-        self.family, self.episodes = family, episodes
-
-    def tuning(self, study):
-        interrupts = study.settings.family_name == self.family
-        return nullcontext(Stopping(self.episodes)) if interrupts else super().tuning(study)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(("family", "episodes"), [("right", 1), ("right", 130), ("wrong", 40), ("wrong", 144)])
 def test_stopped_at_any_moment_it_goes_on_to_the_same_document(finished, make_study, family, episodes, capsys):
     folder = make_several(make_study)
+
+    def pressing_ctrl_c(study):
+        return nullcontext(Stopping(episodes) if study.settings.family_name == family else Silent())
+
     with pytest.raises(KeyboardInterrupt):
-        run_opened_families(read_study_settings(folder), Interrupted(family, episodes), Spending())
+        run_opened_families(read_study_settings(folder), Spending(), print, pressing_ctrl_c, progress=False)
     there, here = (without_costs(document_of(["study", str(one)], capsys)) for one in (finished, folder))
     text = json.dumps(there).replace(str(finished), str(folder))
     assert json.loads(text) == here

@@ -17,7 +17,7 @@ from one_line import complaint_of
 
 from proxytune.errors import InputError, LogError
 from proxytune.importing import Facts, Source, Wanted, open_log, read_geometry, read_source, reading, write_log
-from proxytune.importing.reading import FORMS, Form, clock_notes, survey
+from proxytune.importing.reading import FORMS, Form, clock_notes, rows_notes, survey
 from proxytune.importing.source import Drive, Pictures
 from proxytune.logs import read_log
 
@@ -131,6 +131,18 @@ def read_as(monkeypatch, tmp_path, *drives):
     source = Source("made by hand", drives, (), ("taken as it is",))
     monkeypatch.setattr(reading, "FORMS", (Form(lambda path: True, lambda path, wanted: source),))
     return read_source(tmp_path, Wanted())
+
+
+def test_commands_in_the_rows_of_poses_are_said_to_be_late():
+    """A command that was issued between two rows stands in the later one; with times of their own there is no such."""
+    turns = turning(0.1)
+    drive = replace(turns, commands=replace(turns.commands, times=turns.poses.times[: len(turns.commands.times)]))
+    (note,) = rows_notes([drive])
+    step = float(np.median(np.diff(drive.poses.times)))
+    assert f"{step:.3g} s apart" in note
+    assert f"{step / 2.0:.2g} s late" in note
+    assert rows_notes([replace(drive, commands=replace(drive.commands, times=drive.commands.times + 0.001))]) == []
+    assert rows_notes([replace(drive, commands=None)]) == []
 
 
 def test_what_was_found_of_stamps_and_clocks_joins_the_notes(monkeypatch, tmp_path):

@@ -55,6 +55,7 @@ from proxytune.report.diagnosis.error_figures import (
     strayed,
 )
 from proxytune.report.diagnosis.figures import JUDGES, SHOWN, learnt_figure, motion_figures, ranking_figure
+from proxytune.report.figure_style import VERMILLION
 
 WIDTH = 0.12
 AFTER = "with dead band"
@@ -398,7 +399,7 @@ def test_with_nothing_added_there_is_one_model_and_no_effect_to_draw(clean):
     assert "effect_curve" not in figures
     assert len([one for one in figures["error"].axes[0].containers if isinstance(one, ErrorbarContainer)]) == 1
     assert len(figures["residual_map"].axes) == 2
-    assert {one.get_color() for one in figures["residual_over_time"].axes[0].get_lines()} == {"#D55E00"}
+    assert {one.get_color() for one in figures["residual_over_time"].axes[0].get_lines()} == {VERMILLION}
 
 
 def test_an_unexplained_residual_is_drawn_over_each_signal_that_there_is(diagnosis):

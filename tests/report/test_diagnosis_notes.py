@@ -75,11 +75,19 @@ def test_every_verdict_is_told_with_its_meaning(verdict):
     assert motion_headline(diagnosis(verdict=verdict)) == f"run: {verdict}: {MEANINGS[verdict]}"
 
 
+def test_what_was_fitted_stands_beside_what_was_found_before_the_verdict():
+    """Where nothing is missing the declared values are the answer, so the first sentence has them."""
+    trim = ", with trim 0.043"
+    assert motion_headline(diagnosis(), "dead band: 0.1", trim).startswith(f"run: dead band: 0.1{trim}. Explained: ")
+    nothing = motion_headline(diagnosis(verdict="nothing missing"), "", trim)
+    assert nothing == "run: nothing missing, with trim 0.043: only noise is left"
+
+
 def test_an_effect_that_was_added_says_what_the_error_is_without_it():
     (note,) = motion_notes(diagnosis(effects=(BAND,), effect_sizes={"dead_band": MUCH}))
     assert note == (
         "added dead_band (left wheel): log-likelihood gain 900 nats, p = 0.002; "
-        "without it the error grows by 34 % (20 to +50) at 2 s"
+        "without it the error grows by 34 % (20 to 50) at 2 s"
     )
 
 

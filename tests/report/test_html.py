@@ -155,6 +155,13 @@ def test_without_anything_to_do_next_nothing_is_said():
 def test_commands_between_backticks_are_code():
     text = html_of(replace(VIEW, next_step="run `a < b`"))
     assert "run <code>a &lt; b</code>" in text
+    assert "a `b" in html_of(replace(VIEW, next_step="a `b"))
+
+
+def test_an_option_that_is_to_be_typed_is_broken_nowhere():
+    """Browsers break lines after hyphens."""
+    text = html_of(replace(VIEW, next_step="run `python -m proxytune study a --budget 2`"))
+    assert "python -m proxytune study a <span>--budget</span> 2</code>" in text
 
 
 def test_the_page_fits_phones_paper_and_the_dark():

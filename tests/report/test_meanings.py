@@ -7,9 +7,10 @@ import pytest
 from rich.console import Console
 
 from proxytune.cli.main import main
+from proxytune.diagnosis import Estimate
 from proxytune.effects import CATALOGUE, DRIVES, Catalogue
 from proxytune.report import Table, columns_of, table_text
-from proxytune.report.meanings import CLAUSES, finding, findings, what_it_does
+from proxytune.report.meanings import CLAUSES, finding, findings, fitted, what_it_does
 
 BAND = {
     "name": "dead_band",
@@ -51,6 +52,18 @@ def test_a_finding_has_name_meaning_size_with_interval_and_unit_and_what_it_is_w
         "without it predictions over 2 s are 13 % worse (8 to 19)"
     )
     assert findings([BAND, SLIP]) == f"{finding(BAND)}; {finding(SLIP)}"
+
+
+def test_what_was_declared_is_told_with_its_value_and_of_many_a_few():
+    """A declared trim that was found stands in the first sentence; what is in no θ and equal wheels are not told."""
+    trim, delay = Estimate(0.0433, (0.0421, 0.0446), ""), Estimate(0.12, (0.1, 0.14), "s")
+    assert fitted(("trim", "delay"), {"delay": delay, "trim": trim}) == (
+        ", with trim 0.043 (0.042 to 0.045) and delay 0.12 s (0.10 to 0.14)"
+    )
+    assert fitted(("trim", "motor_lag.imbalance"), {"motor_lag.imbalance": trim}) == ""
+    many = fitted((f"wheel_gain.{side}" for side in "abcdef"), {f"wheel_gain.{side}": trim for side in "abcdef"})
+    assert many.startswith(", with wheel gain a 0.043")
+    assert many.endswith(" and 2 more")
 
 
 def test_no_worth_is_claimed_where_none_was_shown():

@@ -98,6 +98,13 @@ def test_no_more_starts_are_asked_for_than_there_are():
     assert "add agents or metrics: all 4 starts are driven" in say_finding(replace(ABOVE, most_starts=4))
 
 
+def test_who_learns_from_earlier_studies_is_not_sent_beyond_their_starts():
+    """A bank of fewer starts than a study asks for is refused, so trials of its own are what brings more."""
+    told = say_finding(replace(ABOVE, learnt=True, budget=0))
+    assert "raise budget from 0 to 8" in told
+    assert "raise starts" not in told
+
+
 def test_a_proxy_that_lacks_something_is_sent_to_diagnose():
     text = say_finding(replace(ABOVE, fits=False, misfit=0.0042))
     assert text.startswith("The proxy lacks something: no θ explains the target's scores (p = 0.0042). PRPV (")

@@ -36,56 +36,40 @@ from proxytune.effects import PARAMETERS, effect_of
 
 Draw = Callable[[float, float], NDArray[Any]]
 """Draws all frames (N, rows, columns, 3) with a blur [s] and a defocus, a share of the picture's height."""
-
 STEP = 0.5
 """Between two points of an edge's profile [pixel]."""
-
 REACH = 24
 """Steps to both sides over which a profile goes: 12 pixels, half of what 0.1 s blurs at 240 pixel/s."""
-
 SHIFT = 8
 """Steps from its place within which an edge is looked for: tape and poses move it by up to 4 pixels."""
-
 SLOWER = 1.0 - 0.5 ** np.arange(1, 7)
 """Shares of the edges that are slower than each group but the first: few are fast, and these tell the most."""
-
 FOOT = 0.15
 """An edge ends where it is less steep than this share of its steepest."""
-
 FAINT = 0.35
 """Edges that the model draws with less than this share of the measured steepness are not the same ones."""
-
 MOST = 12000
 """Edge points that are enough."""
-
 DRAWS = 4
 """Times that the model is drawn: an edge's squared width is nearly linear in the squares of what is fitted."""
-
 RESPONSE = np.array([1.0, 0.5])
 """How much wider an edge gets than in theory: of a pixel's own width, part of a little defocus is not seen."""
-
 WIDER = 1.5
 """What the jackknife's intervals are too narrow by: they held 14 of 20 planted blurs, for a foot's end jumps."""
-
 ROUGH = 0.06
 """What widths of profiles half a pixel apart are wrong by, besides their scatter [pixel²]."""
-
 SLOW = 5.0
 """Edges that all move alike to this tell nothing of blur [pixel/s]."""
-
 WIDEST = (0.06, 0.01)
 """Intervals of blur [s] and defocus that still tell something."""
 
 
 @dataclass(frozen=True)
 class MovingEdges:
-    """Points on the edges of markings in measured frames.
+    """Points on the edges of markings in measured frames (P,), whose `normal` (P, 2) goes from dark to bright.
 
-    Attributes:
-        frame: Number of the frame (P,).
-        place: Column and row (P, 2) [pixel]; the first pixel's middle is at 0.5.
-        normal: Unit vector (P, 2) from dark to bright, columns and rows.
-        speed: How fast the edge moves through the picture along its normal (P,) [pixel/s]; 0 in still frames.
+    Places are columns and rows (P, 2) [pixel], 0.5 in the first pixel's middle; `speed` along the normal [pixel/s] is 0
+    in still frames.
     """
 
     frame: NDArray[np.intp]
@@ -96,12 +80,7 @@ class MovingEdges:
 
 @dataclass(frozen=True)
 class Sharpness:
-    """The softness of edges.
-
-    Attributes:
-        blur: How long an exposure lasts [s].
-        defocus: Standard deviation of the blur of poor focus, as a share of the picture's height.
-    """
+    """The softness of edges: how long an exposure lasts [s], and the blur of poor focus as a share of the height."""
 
     blur: Fitted
     defocus: Fitted
@@ -110,14 +89,8 @@ class Sharpness:
 def fit_sharpness(measured: Pictures, edges: MovingEdges, draw: Draw) -> Sharpness:
     """Fit motion blur and defocus: motion widens fast edges, poor focus widens all.
 
-    An edge's squared width is that of its drawing, plus defocus², plus blur² · speed² / 12. Read off directly it is
-    biased by pixels and narrow tape; so both are what gives the model's own frames the measured widths.
-
-    Args:
-        measured: Frames (N, rows, columns, 3) as logged.
-        edges: Points on the edges of markings.
-        draw: Draws the model's frames, best with the fitted light; the middle of each exposure is to be at the
-            instant of the frame's pose.
+    Read off directly, an edge's squared width is biased by pixels and narrow tape; so both are what gives the frames
+    that `draw` makes of the model the measured widths, best with the fitted light and at the middle of each exposure.
     """
     every = max(1, -(-len(edges.frame) // MOST))
     edges = MovingEdges(edges.frame[::every], edges.place[::every], edges.normal[::every], edges.speed[::every])
@@ -211,31 +184,24 @@ def _squared_width(profiles: Floats) -> Floats:
 
 BANDS = 6
 """Bands of rows that are compared: a floor's texture changes with distance, noise does not."""
-
 FEWEST = 500
 """Pixels of one paint that a band or a pair of frames needs."""
-
 ROUNDING = 1.0 / 12.0
 """Variance of rounding to whole grey levels."""
-
 STILL = 0.05
 """Mean difference of drawn frames between which the robot has not moved [grey level]."""
-
 STEADY = 2.0
 """Between a low and a high end of less than this ratio, noise is told from texture."""
-
 LITTLE = 0.5
 """Noise below this is none: rounding has a standard deviation of 0.3 [grey level]."""
 
 
 @dataclass(frozen=True)
 class Grain:
-    """The noise of pixels.
+    """The noise of pixels [grey level], from so many pairs of frames from the same place; 0 if it never stood.
 
-    Attributes:
-        noise: Standard deviation of a pixel as it is logged [grey level]. Where it is not identified, only the
-            interval's upper end says something: the floor's texture may be all that was seen.
-        still_pairs: How many pairs of frames from the same place it was taken from; 0 where the robot never stood.
+    Where it is not identified, only the interval's upper end says something: the floor's texture may be all that was
+    seen.
     """
 
     noise: Fitted
@@ -243,13 +209,7 @@ class Grain:
 
 
 def fit_grain(measured: Pictures, predicted: NDArray[Any], floor: NDArray[np.bool_]) -> Grain:
-    """Fit the noise, from frames between which the robot stood, else from the smoothest flat places.
-
-    Args:
-        measured: Frames (N, rows, columns, 3) as logged.
-        predicted: What the model draws (N, rows, columns, 3) without any image effect.
-        floor: Pixels (rows, columns) that look at the floor.
-    """
+    """Fit the noise, from frames between which the robot stood, else from the smoothest flat places."""
     paint = flat_places(predicted, floor)
     still = _still_variances(measured, predicted, paint)
     if still.size:
@@ -264,7 +224,6 @@ def fit_grain(measured: Pictures, predicted: NDArray[Any], floor: NDArray[np.boo
 
 
 def _noise(low: float, best: float, high: float) -> Fitted:
-    """The standard deviation, from variances with rounding."""
     ends = np.sqrt(np.clip(np.array([low, best, high]) - ROUNDING, 0.0, None))
     return Fitted(float(ends[1]), (float(ends[0]), float(ends[2])), bool(ends[2] < max(STEADY * ends[0], LITTLE)))
 
@@ -307,21 +266,13 @@ def _variance(values: Floats) -> float:
 
 SHARP_PX = 2.0
 """Edges that lie farther from the map's are not those that the model draws."""
-
 HORIZON_ROWS = 3
 """So many rows beneath the horizon are left out: what a pixel covers there is a metre long."""
 
 
 @dataclass(frozen=True)
 class Appearance:
-    """All figures of the pictures' look.
-
-    Attributes:
-        light: Exposure and vignetting.
-        grain: Noise.
-        sharpness: Blur and defocus.
-        blemishes: What is fixed to the camera in its pictures.
-    """
+    """All figures of the pictures' look."""
 
     light: Light
     grain: Grain
@@ -350,7 +301,6 @@ LEAST: Mapping[str, float] = {
     "blur": 0.01,
 }
 """How far from its neutral value a figure must lie to matter for what an agent sees."""
-
 NARROW = 0.12
 """Half of an interval of gain or gamma that is found only where every paint is as declared."""
 

@@ -44,7 +44,6 @@ from proxytune.logs import Log
 
 SURE = 3.0
 """A line is told to lie beside its place from so many standard deviations on."""
-
 WIDTHS = ("white lines", "yellow lines", "yellow dashes")
 
 
@@ -70,16 +69,7 @@ def describe_map(fit: CameraFit) -> LaidMap:
 def conclude(
     gathered: Gathered, weighed: Weighed, look: Appearance, declared: Sequence[str], notes: Sequence[str], seed: int
 ) -> CameraDiagnosis:
-    """Give the verdict, with everything that it goes by.
-
-    Args:
-        gathered: The frames.
-        weighed: The camera's fits, and the size of each effect.
-        look: Brightness and sharpness of the pictures.
-        declared: Effects that were tuned in any case.
-        notes: On how frames and poses match.
-        seed: Of the bootstrap.
-    """
+    """Give the verdict, with everything that it goes by."""
     named = weighed.named
     tuned = tuple(name for name, one in look.figures.items() if effect_of(name) in declared and one.identified)
     grey, on_look = _compare_look(gathered, named, look, declared, tuned, seed)
@@ -129,10 +119,7 @@ def _compare_look(
     tuned: Sequence[str],
     seed: int,
 ) -> tuple[Comparison, tuple[CameraEffect, ...]]:
-    """Brightness before and after, and the effects that were added for how pictures look.
-
-    Exposure is one of them where the error without it is larger. Floors may look like noise.
-    """
+    """Brightness before and after, and the effects added for how pictures look, if the error without is larger."""
     changed = tuple(effect for effect in changes(look) if effect not in declared)
     looks = (look_values(look, tuned), look_values(look, (*tuned, *_names(look, changed))))
     grey, ratios = compare_brightness(gathered, named, looks, seed)
@@ -151,7 +138,6 @@ def look_values(look: Appearance, names: Sequence[str]) -> dict[str, float]:
 
 
 def _told(weighed: Weighed, effect: str) -> CameraEffect:
-    """An effect on where things are in the picture, as it is told."""
     named = weighed.named
     names = tuple(name for name in named.full.names if effect_of(name) == effect)
     others = {one for rivals in named.rivals for one in rivals} - set(named.effects)
@@ -160,7 +146,6 @@ def _told(weighed: Weighed, effect: str) -> CameraEffect:
 
 
 def _names(look: Appearance, effects: Sequence[str]) -> tuple[str, ...]:
-    """Their figures by name in θ, effect by effect."""
     return tuple(name for effect in effects for name in look.figures if effect_of(name) == effect)
 
 
@@ -170,7 +155,6 @@ def _figures(look: Appearance, names: Sequence[str]) -> dict[str, Estimate]:
 
 
 def _estimates(fit: CameraFit, effects: Sequence[str]) -> dict[str, Estimate]:
-    """Values with their intervals, of the parameters that were free."""
     parameters = fit.views.optics.robot.catalogue.parameters
     return {
         name: estimate_of(fit.theta[name], sd, parameters[name].unit)

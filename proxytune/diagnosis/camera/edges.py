@@ -25,16 +25,12 @@ from proxytune.logs import Frames, Log, read_pictures
 
 SMOOTHING_PX = 1.0
 """Standard deviation of the Gaussian whose slope is the gradient [pixel]."""
-
 LEAST_SLOPE = 0.15
 """A weaker gradient of whiteness or yellowness, from 0 to 1, is none of a marking [1/pixel]."""
-
 YELLOW = 0.55
 """How far a yellow marking's blue lies below its red and green, as a share of the range from the floor to white."""
-
 SKY = 40
 """A pixel whose blue is so much above its red [grey levels] is sky; so are those within SKY_MARGIN pixels."""
-
 SKY_MARGIN = 3
 
 BORDER = 2
@@ -86,7 +82,6 @@ def _colour_maps(picture: NDArray[np.uint8]) -> tuple[Floats, Floats]:
 
 
 def _edges_of(number: int, white: bool, share: Floats) -> Edges:
-    """Edges of one colour in one picture."""
     known = np.isfinite(share)
     filled = np.where(known, share, 0.0)
     down = gaussian_filter(filled, SMOOTHING_PX, order=(1, 0), mode="nearest")
@@ -116,24 +111,22 @@ def _edges_of(number: int, white: bool, share: Floats) -> Edges:
 
 WINDOW_S = 0.5
 """Poses are smoothed by parabolas over windows so long, which tell the speed too."""
-
 ORDER = 2
 
 LONGEST_GAP_S = 0.25
 """Frames within a longer gap between poses are left out."""
-
 APART_S = 10.0
 """How far apart drives are put on the common axis of times, so that none reaches into the next."""
 
 
 @dataclass(frozen=True)
 class Tracks:
-    """The poses of N frames, and those shortly before and after.
+    """The poses of N frames, and those shortly before and after, on an axis of time on which drives follow each other.
 
     Attributes:
-        times: Times on an axis on which drives follow each other (K,) [s].
-        poses: Poses at these times (K, 3): x, y [m], heading [rad, unwrapped].
-        rates: Their rates (K, 3) [m/s, rad/s]; 0 where pictures were taken standing still.
+        times: Of poses and rates (K,) [s].
+        poses: x, y [m], heading [rad, unwrapped] (K, 3).
+        rates: Of these (K, 3) [m/s, rad/s]; 0 where pictures were taken standing still.
         instants: When each frame was taken, on the same axis (N,) [s].
         begins: When the drive of each frame begins, on the same axis (N,) [s].
         share: How much of the tracker's scatter is left after smoothing.
@@ -164,11 +157,7 @@ class Tracks:
 
 
 def track_frames(log: Log, frames: Frames) -> tuple[Tracks, NDArray[np.intp]]:
-    """The tracks of a log's frames, and the numbers of those frames whose pose is known.
-
-    Raises:
-        LogError: If no frame's pose is known.
-    """
+    """The tracks of a log's frames, and the numbers of those frames whose pose is known; refused if there is none."""
     still = log.rate_hz == 0.0
     parts, offset, instants, begins = [], 0.0, np.full(len(frames.times), np.nan), np.zeros(len(frames.times))
     for number, episode in enumerate(log.episodes):
@@ -214,26 +203,18 @@ LATENCY = "camera_latency"
 READOUT = "rolling_shutter"
 MOVING = (LATENCY, READOUT)
 """Effects that show where a marking lies in the picture only while the robot moves, by their names in θ."""
-
 DISTORTION = "lens_distortion"
 
 SPREAD = 0.4
 """Standard deviation that is expected of a parameter, as a share of the way to the farther end of its range: it decides
 what views cannot."""
-
 STEP = 1e-4
 """How far a parameter is moved for a derivative, as a share of its range."""
 
 
 @dataclass(frozen=True)
 class Optics:
-    """A robot's camera whose figures are set by θ.
-
-    Attributes:
-        robot: Whose camera.
-        rows: Height of the log's pictures [pixel].
-        columns: Width of the log's pictures [pixel].
-    """
+    """A robot's camera whose figures are set by θ, and the size of its pictures [pixel]."""
 
     robot: Robot
     rows: int
@@ -279,29 +260,20 @@ def effects_of(names: tuple[str, ...]) -> tuple[str, ...]:
 
 LEAST_SCATTER = (0.0005, np.radians(0.1))
 """No tracker is trusted beyond this: place [m] and heading [rad]."""
-
 LEAST_TAPE_M = 0.0001
 """No map is laid more exactly [m]."""
-
 MAP_SCATTER = np.array((0.03, 0.03, np.radians(1.0)))
 """How far the whole map may lie off, as standard deviations of x, y [m] and heading [rad]."""
-
 TILTED = 3
 """So many of LINES may lie askew; the ends of dashes cannot."""
 
 
 @dataclass(frozen=True)
 class Views:
-    """N pictures with n edge points.
+    """N pictures with n edge points, sorted by picture.
 
-    Attributes:
-        edges: Edge points, sorted by picture.
-        tracks: Where the robot was.
-        markings: Of the map.
-        optics: Of the camera.
-        position_m: Standard deviation of a tracked place after smoothing [m].
-        heading_rad: Standard deviation of a tracked heading after smoothing [rad].
-        tape_m: Standard deviation of where a line lies from where the map has it [m].
+    Scatter is standard deviations: of a tracked place [m] and heading [rad] after smoothing, and of where a line lies
+    from where the map has it [m].
     """
 
     edges: Edges
@@ -335,11 +307,7 @@ class Views:
 
 @dataclass(frozen=True)
 class Tape:
-    """The order of the tape's errors in one row of numbers.
-
-    Attributes:
-        stretches: Of the road.
-    """
+    """The order of the tape's errors in one row of numbers, by the road's stretches."""
 
     stretches: int
 
@@ -364,19 +332,14 @@ class Tape:
 
 MOST_FRAMES = 240
 """Of a longer log so many frames are used, evenly spread: more do not tell the camera better."""
-
 EVERY = 2
 """Every second edge point is enough: neighbours are not independent."""
-
 ASSUMED_M, ASSUMED_DEG = 0.005, 1.0
 """Scatter of a tracker that says nothing of it, to begin with."""
-
 COLOURED = 40
 """Two colours that are brighter than the third by so much make a pixel yellow, or cyan [grey level]."""
-
 LEAST_COLOURED, FAR_MORE = 0.001, 3.0
 """Blue comes first in pictures of which a larger share is cyan, so many times as much as yellow."""
-
 SWAPPED = "the pictures have blue first; they were taken as blue, green, red: save them as red, green, blue"
 
 FEWEST_POINTS = 30
@@ -386,15 +349,7 @@ FEWEST_FRAMES = 20
 
 @dataclass(frozen=True)
 class Gathered:
-    """Everything that a log shows of its camera.
-
-    Attributes:
-        views: Edges, poses and map.
-        numbers: Which of the log's frames they are (N,).
-        pictures: These frames (N, rows, columns, 3).
-        frames: All frames of the log.
-        notes: What is to be said of them, a line each.
-    """
+    """Everything that a log shows of its camera: its frames of these numbers (N,), and what is to be said of them."""
 
     views: Views
     numbers: NDArray[np.intp]
@@ -408,7 +363,6 @@ def gather_views(log: Log, frames: Frames, robot: Robot) -> Gathered:
 
     Raises:
         LogError: If too few show markings.
-        SettingsError: If the robot has no camera, or the map cannot be read.
     """
     robot.camera_figures()  # Refuses a robot without a camera before anything is read
     road = read_road(frames.road)
@@ -434,11 +388,7 @@ def gather_views(log: Log, frames: Frames, robot: Robot) -> Gathered:
 
 
 def read_road(name: str) -> Road:
-    """The map that frames show: one of the package's, or a file.
-
-    Raises:
-        SettingsError: If there is none, or it cannot be read.
-    """
+    """The map that frames show: one of the package's, or a file; refused if there is none, or it cannot be read."""
     return read_map(Path(name)) if name.endswith(".toml") else shipped_map(name)
 
 

@@ -23,12 +23,10 @@ from proxytune.effects import effect_of
 
 FOLDS = 3
 """Every frame is left out once, a third of them at a time."""
-
 SCALES = (2.0 * SCALE_PX, *(SCALE_PX,) * 4)
 POSE_STEPS = 4
 CAP_PX = 4.0
 """A marking that lies farther off counts as so far [pixel]: what is no marking has no distance."""
-
 DRAWS = 400
 """Bootstrap samples over frames."""
 
@@ -226,12 +224,6 @@ def compare_brightness(
 ) -> tuple[Comparison, dict[str, float]]:
     """Differences of brightness on the floor, of a third of the frames, and the error without each effect.
 
-    Args:
-        gathered: The measured pictures.
-        named: The cameras that were fitted.
-        looks: Effects on pictures before and after.
-        seed: Of the bootstrap.
-
     Returns:
         The errors before and after, and by effect that was added the error without it over the error with all.
     """
@@ -248,13 +240,9 @@ def compare_brightness(
 def grey_differences(
     measured: Pictures, drawn: Pictures, floor: NDArray[np.bool_], *, fixed_exposure: bool
 ) -> Pictures:
-    """Absolute differences on the floor (n, floor pixels, 3) [grey levels].
+    """Absolute differences on the floor (n, floor pixels, 3) of pictures (n, rows, columns, 3) [grey levels].
 
-    Args:
-        measured: Pictures (n, rows, columns, 3).
-        drawn: The same as a model has them.
-        floor: Pixels that look at the floor (rows, columns).
-        fixed_exposure: Whether pictures compare as they are; else each at its own brightness, which no model knows.
+    Where exposure is not fixed, each is compared at its own brightness, which no model knows.
     """
     measured, drawn = measured[:, floor], drawn[:, floor]
     if not fixed_exposure:
@@ -284,15 +272,10 @@ MATERIAL = 1.03
 
 @dataclass(frozen=True)
 class Weighed:
-    """A camera with those effects alone that matter.
+    """A camera with those effects alone that matter: errors on unseen frames, before and after.
 
-    Attributes:
-        named: The fits; the model's without what was dropped.
-        with_dropped: The model as it was named, with what was dropped.
-        pixels: Errors on unseen frames, before and after.
-        ratios: Error without each effect over the error with all that were named, the dropped ones too.
-        nats: What leaving each of these out costs.
-        dropped: Effects that there is evidence for, and which hardly change the error.
+    `ratios` are the errors without each named effect, dropped ones too, over that with all; `nats` what leaving it out
+    costs; `dropped` had evidence, and hardly change the error.
     """
 
     named: CameraSelection

@@ -27,18 +27,12 @@ from proxytune.diagnosis.camera.model import (
 
 EVIDENCE = 0.1
 """Edge points of a picture are not independent: so much of a point's evidence counts."""
-
 LEAST_WEIGHT = 1e-4
 """Edge points of less weight are left out of a fit: they would only cost time."""
 
 
 class Counted(NamedTuple):
-    """Edge points that count in a fit.
-
-    Attributes:
-        rows: Which (m,), in ascending order.
-        weight: Of each (m,), the share of its evidence that counts included.
-    """
+    """Edge points that count in a fit: which (m,), ascending, and the share of evidence of each that counts."""
 
     rows: NDArray[np.intp]
     weight: Floats
@@ -56,15 +50,7 @@ def count_points(
     frames: NDArray[np.bool_] | None = None,
     least: float = LEAST_WEIGHT,
 ) -> Counted:
-    """Weigh edge points by how far they lie from the map's markings.
-
-    Args:
-        views: Whose edge points these are.
-        there: Where they fall; those that are not valid have no weight.
-        scale_px: The loss' scale [pixel].
-        frames: Which frames count (N,); all if not given.
-        least: Points of less weight are left out.
-    """
+    """Weigh edge points of some frames by how far they lie from the map's markings; those of least weight are out."""
     valid = there.valid if frames is None else there.valid & frames[views.edges.frame]
     weight = np.where(valid, robust_weight(there.residual, scale_px), 0.0)
     rows = np.flatnonzero(weight >= least)
@@ -72,14 +58,9 @@ def count_points(
 
 
 class Marginal(NamedTuple):
-    """Normal equations of the common columns with every frame's pose eliminated.
+    """Normal equations of the common columns with every frame's pose eliminated: of each its block's inverse (N, 3, 3).
 
-    Attributes:
-        matrix: Of the common columns.
-        right: Their right side.
-        inverse: Of each pose's block (N, 3, 3).
-        coupling: How poses follow the common columns (N, 3, columns).
-        own: Where poses would go by themselves (N, 3).
+    `coupling` is how poses follow the common columns (N, 3, columns), `own` where they would go by themselves (N, 3).
     """
 
     matrix: Floats
@@ -97,14 +78,7 @@ def eliminate_poses(views: Views, state: State, there: Projection, points: Count
 
 
 def eliminate(own: Floats, across: Floats, inner: Floats, other: Floats) -> Floats:
-    """Eliminate all other unknowns from the normal equations of some: the Schur complement.
-
-    Args:
-        own: Block or right side of the unknowns that are kept.
-        across: Their part with the others.
-        inner: Block of the others.
-        other: The others' part with those kept, or their right side.
-    """
+    """Eliminate all other unknowns from the normal equations of some, or their right side: the Schur complement."""
     return np.asarray(own - across @ np.linalg.solve(inner, other))
 
 
@@ -117,13 +91,7 @@ class Normal(NamedTuple):
     weight: Floats
 
     def marginal(self, frame: NDArray[np.intp], corrections: Floats, scatter: Floats) -> Marginal:
-        """Eliminate every frame's pose under its prior.
-
-        Args:
-            frame: Of each row (n,), in ascending order.
-            corrections: What is added to each frame's tracked pose so far (N, 3).
-            scatter: Standard deviations of tracked poses (3,).
-        """
+        """Eliminate every frame's pose under its prior, corrected so far and of this scatter; frames ascend."""
         weighted = self.columns * self.weight[:, None]
         matrix, right = weighted.T @ self.columns, weighted.T @ self.residual
         count = len(corrections)
@@ -149,7 +117,6 @@ class Normal(NamedTuple):
 
 SCALE_PX = 1.0
 """Standard deviation of an edge point in the end; what is far beyond counts no more."""
-
 LARGEST_STEP = 0.75
 """No parameter of the camera moves farther in one step, in spreads of it."""
 
@@ -194,14 +161,9 @@ def fit_camera(
     scales_px: Sequence[float],
     frames: NDArray[np.bool_] | None = None,
 ) -> CameraFit:
-    """Fit by Gauss–Newton with a redescending loss.
+    """Fit the parameters of these names by Gauss–Newton with a redescending loss, of a scale [pixel] for each step.
 
-    Args:
-        views: Edge points.
-        state: Where to begin.
-        names: Free parameters by name in θ; those not named stay where they are.
-        scales_px: The loss' scale in each step, large ones first where the beginning is far off [pixel].
-        frames: Which frames count (N,); all if not given.
+    Those not named stay where they are; scales are large at first where the beginning is far off.
     """
     names, first, optics = tuple(names), len(names), views.optics
     camera_precision = _precisions(views, names)

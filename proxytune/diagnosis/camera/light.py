@@ -21,47 +21,31 @@ Pictures = NDArray[np.uint8]
 
 PAINTS = np.array([COLOURS[name] for name in ("asphalt", "white", "yellow")], dtype=float)
 """Red, green, blue of what is compared; what lies off the map is no paint that anyone declared."""
-
 MARGIN = 3
 """Pixels that flat places keep from edges and from the horizon: tape, poses and poor focus shift edges by 2 px."""
-
 RINGS = 6
 """Rings about the picture's middle in which brightness is averaged, even in squared radius."""
-
 BLOCKS = 12
 """Runs of frames that are left out in turn: neighbouring frames show the same piece of floor."""
-
 CLIPPED = (4.0, 246.0)
 """Means beyond these are of clipped pixels [grey level]."""
-
 FEW = 20.0
 """A mean over so many pixels weighs half as much as one over many, whose error is the floor's texture."""
-
 FEWEST_PIXELS = 8
 """Pixels that a mean needs."""
-
 ROUNDS = 40
 """Rounds of the fit: it changes by less than 0.0005 after thirty."""
-
 RANGES = ((0.2, 5.0), (0.3, 3.0), (-0.9, 0.9))
 """Gain, gamma and vignetting of any camera."""
-
 UNKNOWN = 0.3
 """Gamma is off by this share at most where paints are off by 30 % from what is declared."""
-
 WIDEST = (0.3, 0.3, 0.12)
 """Half an interval of gain, gamma or vignetting that still tells something."""
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """A fitted figure.
-
-    Attributes:
-        value: The best one.
-        interval: Holds the true one with 95 %.
-        identified: Whether the frames can tell it.
-    """
+    """A fitted figure with its 95 % interval, and whether the frames can tell it."""
 
     value: float
     interval: tuple[float, float]
@@ -72,15 +56,9 @@ class Fitted:
 class Light:
     """The light by which a drawn grey x is logged as 255 · gain · (x (1 − vignetting r²) / 255) ** gamma.
 
-    r is the distance from the picture's middle, 1 in its corners. Gain and gamma are relative to the declared paint:
-    they make the drawn frames match, and say little of the camera where the paint is not known. Vignetting does not
-    depend on the paint.
-
-    Attributes:
-        gain: Of all frames; where the exposure is automatic, the geometric mean of theirs.
-        gamma: Exponent.
-        vignetting: How much darker the corners are, as a share.
-        levels: Gain of each frame (N,) over that of all.
+    r is the distance from the picture's middle, 1 in its corners. Gain (`levels` are each frame's over it) and gamma
+    are relative to the declared paint: they make the drawn frames match, and say little of the camera where the paint
+    is not known. Vignetting, a share, does not depend on the paint.
     """
 
     gain: Fitted
@@ -121,14 +99,7 @@ def flat_places(predicted: NDArray[Any], floor: NDArray[np.bool_], margin: int =
 def fit_light(
     measured: Pictures, predicted: NDArray[Any], floor: NDArray[np.bool_], fixed_exposure: bool = False
 ) -> Light:
-    """Fit exposure and vignetting to flat places of the floor.
-
-    Args:
-        measured: Frames (N, rows, columns, 3) as logged.
-        predicted: What the model draws (N, rows, columns, 3) without any image effect.
-        floor: Pixels (rows, columns) that look at the floor.
-        fixed_exposure: Whether all frames have one gain.
-    """
+    """Fit exposure and vignetting to flat places of the floor; with a fixed exposure all frames have one gain."""
     means = _means(measured, predicted, floor)
     if means.frame.size == 0:
         gain, gamma, vignetting = (Fitted(*figure, False) for figure in zip((1.0, 1.0, 0.0), RANGES, strict=True))
@@ -240,45 +211,32 @@ Singles = NDArray[np.float32]
 
 WINDOW = 7
 """Side of the windows whose mean brightness is compared [pixel]: narrower ones miss tape that is 2 px off."""
-
 STEP = 2
 """Between the middles of two windows [pixel]."""
-
 AROUND = 31
 """Windows across the neighbourhood whose contrast is the usual one: poorly fitted light changes it slowly."""
-
 HORIZON = 6
 """Pixels to keep from what is not floor: the floor's far end is too thin to be judged."""
-
 DARKEST = 40.0
 """Less is drawn off the map [grey level], where nobody declared what there is to see."""
-
 VARIED = 12.0
 """Standard deviation of the drawn brightness over the frames that shows a contrast [grey level]."""
-
 FEWEST_FRAMES = 75
 """Frames that a window needs: with 60, two of five draws of photographed frames had false alarms."""
-
 HIDDEN = 0.75
 """Contrast below which something lies between lens and floor: photographed floors alone seldom go below 0.75."""
-
 SUBDUED = 0.65
 """Variation over the frames, against that of what is drawn, below which it does: tape that lies off and poses that
 scatter spoil the first contrast, not this one."""
-
 SURE = 3.0
 """Standard deviations by which the contrast must be below that."""
-
 PARTS = 3
 """Parts of the log, one after another, each of which must show that a place is hidden: one odd passage is none."""
-
 SMALLEST = 7
 """Windows that a blemish has at least."""
-
 LEAST_SHARE = 0.0022
 """Share of the picture that the largest blemish covers, half of a spot of 10 pixels across: smaller ones alone are
 stains of the floor that few passages showed."""
-
 REWEIGHTINGS = 5
 """Rounds of reweighting."""
 
@@ -307,12 +265,6 @@ def find_blemishes(
 
     Windows in which too few markings pass, near the horizon and at the sides, are not judged: what is hidden may reach
     farther than is said.
-
-    Args:
-        measured: Frames (N, rows, columns, 3) as logged.
-        predicted: What the model draws (N, rows, columns, 3) without any image effect.
-        floor: Pixels (rows, columns) that look at the floor.
-        light: What fit_light says.
     """
     contrast, error, variation = _contrast(measured, predicted, floor, light)
     if not np.isfinite(contrast).any():
@@ -353,8 +305,7 @@ def _contrast(
 ) -> tuple[Singles, Singles, Singles]:
     """Regress the measured brightness of each window on the expected one over the frames; NaN if unknown.
 
-    Returns:
-        The slope, its standard error, and the standard deviation of the measured over that of the expected.
+    Gives slopes, their standard errors, and the standard deviations of the measured over those of the expected.
     """
     green = np.ascontiguousarray(predicted[..., 1], dtype=np.float32)
     level = light.levels.astype(np.float32)[:, None, None]
@@ -373,7 +324,6 @@ def _contrast(
 
 
 def _spread(grey: Singles, weight: Singles) -> Singles:
-    """Standard deviation of each window over the frames."""
     total = np.maximum(weight.sum(axis=0), 1.0)
     off = grey - (weight * grey).sum(axis=0) / total
     return np.asarray(np.sqrt((weight * off**2).sum(axis=0) / total), dtype=np.float32)

@@ -19,24 +19,15 @@ from proxytune.effects import FilterContext, Stage, effects_from, stage_chain
 
 FARTHEST_M = 1.2
 """Edges farther ahead of the lens are too coarse to count [m]."""
-
 NARROWEST_PX = 2.5
 """A marking must be wider in the picture, else its two edges are one [pixel]."""
-
 ALIGNED = 0.5
 """The map's edge must run within 60° of the picture's, bright on the same side: this is the cosine."""
 
 
 @dataclass(frozen=True)
 class State:
-    """Everything that places an edge point.
-
-    Attributes:
-        theta: Of the camera, by name in θ.
-        tape: Errors of the tape, in the order of `Tape` [m].
-        offset: Of the whole map: x, y [m] and heading about its middle [rad] (3,).
-        poses: What is added to each frame's tracked pose (N, 3).
-    """
+    """What places an edge point: θ of the camera, errors of the `Tape` [m], offsets of map (3,) and poses (N, 3)."""
 
     theta: Mapping[str, float]
     tape: Floats
@@ -189,22 +180,14 @@ BLUR = "blur"
 NOISE = "image_noise"
 TIMED = (LATENCY, READOUT, BLUR)
 """Effects that say when a picture is taken: they are drawn by moving the camera."""
-
 SHOTS = 9
 """Pictures that the mean over an exposure is taken of; as many instants of a rolling shutter."""
 
 
 def draw_pictures(views: Views, state: State, theta: Mapping[str, float], frames: NDArray[np.intp]) -> Pictures:
-    """Draw what a model would have seen.
+    """Draw what a model would have seen in some frames: red, green and blue (n, rows, columns, 3), 0 to 255.
 
-    Args:
-        views: Where the robot was, and the map.
-        state: Camera, and what is added to the tracked poses.
-        theta: Values of effects on pictures by name in θ; noise is left out, since no model knows it.
-        frames: Which frames (n,).
-
-    Returns:
-        Red, green and blue (n, rows, columns, 3), 0 to 255.
+    θ is of effects on pictures; noise is left out, since no model knows it.
     """
     camera = GroundPlaneCamera(views.optics.figures(state.theta), draw_floor(views.markings.road))
     poses, rates = (each[frames] for each in views.tracks.at(state.theta.get(LATENCY, 0.0)))

@@ -36,22 +36,15 @@ from proxytune.errors import LogError
 
 LEAST_NATS = 6.0
 """An effect is needed if leaving it out costs more evidence; by chance one in 2000 does."""
-
 MOST = 4
 """No more than so many effects are named at once; a camera with more faults is better calibrated anew."""
-
 TRIED = 3
 """So many sets of equal size are fitted, those that promise most."""
 
 
 @dataclass(frozen=True)
 class Subset:
-    """A set of effects.
-
-    Attributes:
-        effects: Those besides what is declared.
-        loss: What leaving all others out costs, at the least [nats].
-    """
+    """A set of effects besides those declared, and what leaving all others out costs, at the least [nats]."""
 
     effects: tuple[str, ...]
     loss: float
@@ -81,16 +74,13 @@ def rank_subsets(full: CameraFit, declared: Sequence[str], size: int) -> list[Su
 
 FIRST = ("camera_pitch", "camera_roll", "camera_yaw", "camera_height", "field_of_view", "camera_latency")
 """What is fitted first, from far away: nothing of it stands in for something else."""
-
 FAR = tuple(16.0 * SCALE_PX * 2.0 ** (-step / 2.0) for step in range(7))
 NEAR = (3.0 * SCALE_PX, 2.0 * SCALE_PX, *(SCALE_PX,) * 4)
 AGAIN = (SCALE_PX,) * 2
 FROM_ALL = (4.0 * SCALE_PX, 2.0 * SCALE_PX, *(SCALE_PX,) * 5)
 """Scales of the loss: from far, near the answer, once more, and from the answer of all effects together [pixel]."""
-
 LEAST_SHARE = 0.01
 """Effects whose absence costs a smaller share of all cost are not needed either."""
-
 RIVAL_NATS = 3.0
 """Sets of effects that cost no more beyond the best are its rivals."""
 
@@ -119,14 +109,7 @@ class CameraSelection:
 
 
 def fit_everything(views: Views, names: Sequence[str], fixed: Mapping[str, float], *, learn_scatter: bool) -> CameraFit:
-    """Fit all parameters from far away.
-
-    Args:
-        views: What is fitted to; its pose scatter is replaced by what is found where that is to be learnt.
-        names: All parameters that may differ from neutral, by name in θ.
-        fixed: Values that are known.
-        learn_scatter: Whether the tracker's scatter is not known.
-    """
+    """Fit all parameters from far away, but those fixed; the tracker's scatter is learnt where it is not known."""
     theta = {name: views.optics.neutral(name) for name in (*views.optics.mounting, *MOVING)} | dict(fixed)
     start = neutral_state(views, theta)
     # From far away an edge may be taken for another: the tape must not follow it
@@ -183,16 +166,12 @@ def fit_set(full: CameraFit, effects: Sequence[str]) -> CameraFit:
 
 POWERS = tuple((right, down) for right in range(4) for down in range(4) if right + down <= 3)
 """The terms of a cubic polynomial of the place in the picture."""
-
 FIELD_PX = 1.0
 """Standard deviation that each term's coefficient is expected to have [pixel]."""
-
 FIELD_NATS = 2.5
 """A field that explains less on frames that it was not fitted to is chance."""
-
 FIELD_SHARE = 0.035
 """A field that explains a smaller share of the cost is of no matter."""
-
 LEAST_PX = 0.1
 """A smaller field is of no matter either [pixel, root mean square over the points]."""
 
@@ -274,16 +253,12 @@ def _terms(right: Floats, down: Floats) -> Floats:
 
 MATCHED_PX = 2.0
 """An edge that lies no farther from the map's is matched."""
-
 FEWEST_MATCHED = 0.2
 """Frames of which a smaller share of edges is matched do not belong to these poses, or to this map."""
-
 USUAL_MATCHED = 0.6
 """A smaller share is told."""
-
 LIKELY = 0.4
 """A mistake that, undone, brings this share to the map is the cause where hardly any match as they are."""
-
 ADVICE = (
     "check that frames and rows are the same instants, the map is the right one, heading is counter-clockwise in "
     "radians, and the pictures are not mirrored"
@@ -298,11 +273,7 @@ def matched_share(fit: CameraFit) -> float:
 
 
 def check_match(name: str, fit: CameraFit) -> tuple[str, ...]:
-    """Refuse frames that do not belong to the poses, and give a note on those that match poorly.
-
-    Raises:
-        LogError: If they do not belong to the poses, with what would make them, where that is found.
-    """
+    """Refuse frames that do not belong to the poses, with what would make them, or note that they match poorly."""
     share = matched_share(fit)
     if share >= USUAL_MATCHED:
         return ()
@@ -350,8 +321,6 @@ MISTAKES: Mapping[str, Callable[[Views], Views]] = MappingProxyType(
     }
 )
 """Usual mistakes in logs, and what undoes each."""
-
-
 ALWAYS: Mapping[str, str] = MappingProxyType(
     {"camera_yaw": "heading_offset", "camera_forward": "marker_offset", LATENCY: "clock offset"}
 )
@@ -359,12 +328,7 @@ ALWAYS: Mapping[str, str] = MappingProxyType(
 
 
 def hidden_effects(full: CameraFit, model: Sequence[str]) -> tuple[str, ...]:
-    """Geometric effects that these frames could not have shown at their smallest usual size.
-
-    Args:
-        full: The fit with every effect.
-        model: Effects of the model, beside which another one would have to show.
-    """
+    """Geometric effects that these frames could not show beside the model's, at their smallest usual size."""
     hidden = [] if full.views.tracks.moving else list(MOVING)
     kept = [name for name in full.names if effect_of(name) in model]
     for name in (one for one in full.names if one not in kept):
@@ -381,12 +345,7 @@ def hidden_effects(full: CameraFit, model: Sequence[str]) -> tuple[str, ...]:
 
 
 def next_views(hidden: Sequence[str], *, repeated: bool) -> tuple[str, ...]:
-    """Advise what to take to see what was hidden.
-
-    Args:
-        hidden: Effects that could not be seen.
-        repeated: Whether some frames were taken standing still at one place.
-    """
+    """Advise what to take to see what was hidden; repeated frames were taken standing still at one place."""
     views = []
     if {LATENCY, READOUT, "blur"} & set(hidden):
         views.append("frames while driving bends at 0.3 m/s and more, for what shows in motion alone")

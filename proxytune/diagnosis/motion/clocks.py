@@ -16,9 +16,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from proxytune.diagnosis.motion.drives import Drives, Floats, Whole, gather, number_of
+from proxytune.diagnosis.motion.drives import Drives, Floats, gather, number_of
 from proxytune.diagnosis.motion.latency import (
     LATENCY_BLOCK_S,
     LEAST_APART_S,
@@ -46,16 +45,12 @@ from proxytune.logs import Log, LogEpisode, Measured
 
 FURTHEST_S = 10.0
 """Clocks are looked for up to so far apart."""
-
 EARLIEST_S = 0.02
 """Motion must come so long before its command to be proof."""
-
 ASSUMED_DELAY_S = 0.05
 """The delay that is left to a robot whose nominal delay nobody states, once an offset is taken out."""
-
 RARE = 0.25
 """Clocks of no more than this share of the drives jump, or are others."""
-
 PROOF_BLOCK_S = 5.0
 """Two latencies are compared over such blocks."""
 
@@ -107,17 +102,7 @@ class Clocks:
 
 
 def read_clocks(log: Log, robot: Robot, like: Clocks | None = None) -> Clocks:
-    """Measure the latency of every drive of a log.
-
-    Args:
-        log: The log.
-        robot: What drove.
-        like: Clocks of another log of the same robot: where the latency differs from what is left of that one, the
-            clocks do too.
-
-    Raises:
-        LogError: If there is nothing to compare in the log.
-    """
+    """Measure the latency of every drive of a log; where it is not what is left of a log it is like, clocks differ."""
     drives = gather(log, robot, log.episodes)
     speeds = measured_speeds(drives)
     if not len(speeds.first):
@@ -196,15 +181,7 @@ def _reaction(drives: Drives, speeds: Speeds) -> tuple[Reaction, bool]:
 
 
 def put_in_step(drives: Drives, clocks: Clocks, episodes: Sequence[int]) -> Drives:
-    """Put drives on one clock: poses later, jumping stretches left out.
-
-    Poses move by whole ticks, and commands by the fraction of a tick that is left.
-
-    Args:
-        drives: The drives.
-        clocks: Those of their log.
-        episodes: Which of the log's episodes they are (E,).
-    """
+    """Put these drives of a log on one clock: poses by whole ticks, commands by the rest; what jumps is left out."""
     later = clocks.later_s[list(episodes)] * drives.tick_hz
     ticks = np.ceil(later - 1e-9).astype(int)
     begin, end = (clocks.kept_s[list(episodes)] * drives.tick_hz).T
@@ -236,10 +213,8 @@ def _lengthen(signal: Floats, ticks: int) -> Floats:
 
 LONGEST_S = 20.0
 """Rests are cut out if they last longer."""
-
 BEFORE_S, AFTER_S = 1.0, 3.0
 """So much of a rest is kept before the next command and after the last one: the robot comes to a stop in it."""
-
 REST = 1e-3
 """A command below this share of the largest is none."""
 
@@ -288,10 +263,8 @@ def _piece(episode: LogEpisode, begin: int, stop: int) -> LogEpisode:
 
 MOST = 6000
 """No more increments are fitted: beyond, they hardly sharpen what is found, and cost in proportion."""
-
 STRETCH_S = 6.0
 """Blocks are shortened no further than this, so that windows of prediction fit into them; else blocks are left out."""
-
 FEWEST_BLOCKS = 16
 
 JOINED_S = 0.1
@@ -306,7 +279,16 @@ def thin(drives: Drives) -> Drives:
     usual = float(np.median(drives.last - drives.first)) / drives.tick_hz
     shorter = join_increments(drives, min(-(-count // MOST), max(1, round(JOINED_S / usual))))
     least = round(STRETCH_S * drives.tick_hz / float(np.median(shorter.last - shorter.first)))
-    return shorter.only(_choose_stretches(shorter.block, MOST / len(shorter.episode), least))
+    # Of each block one piece, somewhere within it.
+    number = number_of(shorter.block)
+    size = np.bincount(number)
+    kept = np.minimum(size, np.maximum(np.ceil(min(1.0, MOST / len(shorter.episode)) * size).astype(int), least))
+    # Multiples of the golden ratio spread stretches evenly, in step with nothing that drives repeat.
+    spread = np.arange(len(size)) * 0.6180339887 % 1.0
+    begin = (spread * (size - kept)).astype(int)
+    chosen = spread < max(MOST / kept.sum(), FEWEST_BLOCKS / len(size))
+    place = np.arange(len(shorter.block)) - np.searchsorted(number, number)
+    return shorter.only(chosen[number] & (place >= begin[number]) & (place < (begin + kept)[number]))
 
 
 def join_increments(drives: Drives, times: int) -> Drives:
@@ -324,34 +306,16 @@ def join_increments(drives: Drives, times: int) -> Drives:
     return replace(whole, last=drives.last[ends], poses=poses, travel=travel, linked=drives.linked[begins], after=after)
 
 
-def _choose_stretches(block: Whole, share: float, least: int) -> NDArray[np.bool_]:
-    """This share of each block in one piece, somewhere within it, of no fewer than `least` increments (N,)."""
-    number = number_of(block)
-    size = np.bincount(number)
-    kept = np.minimum(size, np.maximum(np.ceil(min(1.0, share) * size).astype(int), least))
-    # Multiples of the golden ratio spread stretches evenly, in step with nothing that drives repeat.
-    spread = np.arange(len(size)) * 0.6180339887 % 1.0
-    begin = (spread * (size - kept)).astype(int)
-    chosen = spread < max(MOST / kept.sum(), FEWEST_BLOCKS / len(size))
-    place = np.arange(len(block)) - np.searchsorted(number, number)
-    return np.asarray(chosen[number] & (place >= begin[number]) & (place < (begin + kept)[number]))
-
-
 FEWEST_EPISODES = 6
 """With fewer, each episode is split by time: the first half is fitted, the second tested."""
-
 LEAST_MOTION_S = 20.0
 """Less measured motion than this is not enough to fit, and as much again to test."""
-
 MOST_S = 900.0
 """No more seconds are fitted where there are drives to choose from: every replay takes all of them."""
-
 MOST_TESTED_S = 1800.0
 """No more seconds are tested on in the same way: the bullet plant drives them all, twice."""
-
 BLOCKS = 16
 """Each part has at least about so many blocks, if they last BLOCK_S."""
-
 TEST_BLOCK_S = 4.0
 """Blocks are no shorter, unless episodes are."""
 
@@ -365,12 +329,6 @@ class Parts(NamedTuple):
 
 def split(log: Log, robot: Robot, test: Log | None, clocks: Sequence[Clocks] = ()) -> Parts:
     """Keep every third episode to test on, or the second half of each where there are few, or another log.
-
-    Args:
-        log: What to fit, and to test on.
-        robot: What drove.
-        test: Another log to test on.
-        clocks: Those of `log` and of `test`, to put their drives on one; none where they are.
 
     Raises:
         LogError: If there is too little to fit or to test on.
@@ -412,7 +370,6 @@ def all_drives(log: Log, robot: Robot, clocks: Clocks) -> Drives:
 
 
 def _gather_on_one_clock(log: Log, robot: Robot, chosen: Sequence[int], clocks: Sequence[Clocks]) -> Drives:
-    """Gather some of a log's drives, on one clock."""
     drives = gather(log, robot, [log.episodes[i] for i in chosen])
     return put_in_step(drives, clocks[0], chosen) if clocks else drives
 

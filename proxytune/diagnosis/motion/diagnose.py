@@ -70,10 +70,8 @@ from proxytune.space import Theta
 
 CONFIRMED_S = 2.0
 """The horizon at which errors are confirmed on the bullet plant."""
-
 PERIODIC = "time, again and again"
 """What a remainder with a period is said to depend on."""
-
 MAIN_S = 2.0
 """The horizon of the one error that stands for all."""
 
@@ -105,14 +103,7 @@ class Bracket(NamedTuple):
 
 
 def bracket(lower: float, reached: float, again: Repeated | None, rules: Rules = RULES) -> Bracket:
-    """Bracket the error of a right model; the lower end is an estimate too, and never above what a model reached.
-
-    Args:
-        lower: What the noise of poses makes [m].
-        reached: The lowest error of any model [m].
-        again: What drives from the same commands say.
-        rules: Of the diagnosis.
-    """
+    """Bracket the error of a right model [m]; the lower end, an estimate too, is never above what a model reached."""
     lower = min(lower, reached)
     upper = reached
     if again is not None:
@@ -123,14 +114,7 @@ def bracket(lower: float, reached: float, again: Repeated | None, rules: Rules =
 
 
 def is_explained(after: float, floor: Bracket, *, unnamed: bool, rules: Rules = RULES) -> bool | None:
-    """Tell whether the error that is left is no more than noise; None where it is larger, and shows no structure.
-
-    Args:
-        after: The error that is left [m].
-        floor: The floor's bracket at the same horizon.
-        unnamed: Whether a signal explains more of the rest than any named effect.
-        rules: Of the diagnosis.
-    """
+    """Tell whether the error left [m] is no more than noise; None where it is larger, and shows no structure."""
     if _is_at_floor(after, floor, unnamed, rules):
         return True
     repeats_more = floor.again is not None and floor.again.share.interval[1] < 1.0 / rules.floor_factor
@@ -184,13 +168,7 @@ class HorizonError:
 
 
 class KeptAside(NamedTuple):
-    """The drives kept aside, on which errors are measured.
-
-    Attributes:
-        drives: Drives that nothing was fitted to.
-        whole: All drives of their log, in which some may be repeats of others.
-        noise: The noise of their poses.
-    """
+    """The drives kept aside, on which errors are measured, with all of their log, and the noise of their poses."""
 
     drives: Drives
     whole: Drives
@@ -206,12 +184,7 @@ def horizon_error(
 ) -> HorizonError | None:
     """Measure the error at a horizon, None where too few blocks have a window of it.
 
-    Args:
-        found: The models.
-        tested: What they are tested on.
-        horizon_s: Length of the windows [s].
-        learnt: What the extended model was taught besides its named effects; empty where nothing was.
-        how: How a plant's poses are compared with measured ones.
+    What the extended model was `learnt` besides its names may lower what was reached; `how` is a plant's poses.
     """
     drives, rules = tested.drives, tested.drives.rules
     windows = cut(drives, horizon_s)
@@ -459,11 +432,7 @@ def declared_effects(robot: Robot) -> tuple[str, ...]:
 
 
 def declared_parameters(effects: Iterable[str], catalogue: Catalogue = SHIPPED) -> tuple[str, ...]:
-    """List the names in θ of declared effects' parameters.
-
-    Raises:
-        LogError: If an effect is unknown or does not act on motion.
-    """
+    """List the names in θ of declared effects' parameters; refuse those unknown, or not on motion."""
     names: list[str] = []
     for effect in effects:
         known = motion_effects(catalogue)

@@ -43,36 +43,26 @@ from proxytune.space import Theta
 
 RARE = 0.002
 """The range that was seen leaves out so much of the time at either end."""
-
 WHEEL_KNOTS, TURN_KNOTS, TIME_KNOTS = 9, 8, 6
 GRID = (4, 6)
 """Knots of a curve over a wheel's speed, over the yaw rate, over time or use, and over speed and yaw rate together."""
-
 OTHER_KNOTS = 5
 """Knots of a curve over the other wheel's speed."""
-
 MESHES_M, MOST_CORNERS = (0.25, 0.5, 1.0, 2.0), 64
 """Meshes of the lattices of a map of the floor, and how many corners it may have."""
-
 SAME_PLACE_M = 1e-3
 """Drives that begin in motion so near to each other did not begin at one place: their frames begin there."""
-
 TRANSIENTS_S = (0.04, 0.1, 0.25, 0.63, 1.6)
 STARTS_S = (0.05, 0.15, 0.5)
 """Time constants over which the memory of a start fades [s]."""
-
 RINGING_HZ = (0.4, 0.8, 1.6, 3.2)
 """Frequencies of swings."""
-
 PLAYS = (0.02, 0.05, 0.1, 0.2)
 """Half widths of plays, as shares of full speed."""
-
 REVERSALS_M = (0.003, 0.01, 0.03, 0.1, 0.3)
 """Ways over which the memory of a reversal fades [m]."""
-
 LOADS_S = (1.0, 4.5, 20.0)
 """Time constants of the low-passes."""
-
 APART = 0.02
 """Knots nearer to each other or to 0 than this share of the range are one."""
 
@@ -80,7 +70,11 @@ APART = 0.02
 def offer_curves(drives: Drives, theta: Theta) -> Learnt:
     """Offer every group of curves with knots for these drives, all weights 0."""
     asked = twists_of(drives, theta)
-    used = _ticks_in_motion(drives)
+    episodes, length = drives.duties.shape[:2]
+    edges = np.zeros((episodes, length + 1))
+    np.add.at(edges, (drives.episode, drives.first), 1.0)
+    np.add.at(edges, (drives.episode, drives.last), -1.0)
+    used = np.asarray(np.cumsum(edges, axis=1)[:, :-1] > 0.5)
     forward, yaw = asked[..., 0][used], asked[..., 2][used]
     turn = yaw * track_of(drives.robot.figures) / 2.0
     effort = (np.abs(forward - turn) + np.abs(forward + turn)) / 2.0 / drives.robot.figures["full_speed"]
@@ -130,15 +124,6 @@ def _lattice(places: Floats) -> Knots:
     return ()
 
 
-def _ticks_in_motion(drives: Drives) -> Floats:
-    """The ticks (E, T) that lie within measured motion."""
-    episodes, length = drives.duties.shape[:2]
-    edges = np.zeros((episodes, length + 1))
-    np.add.at(edges, (drives.episode, drives.first), 1.0)
-    np.add.at(edges, (drives.episode, drives.last), -1.0)
-    return np.asarray(np.cumsum(edges, axis=1)[:, :-1] > 0.5)
-
-
 def _ends(signal: Floats) -> tuple[float, float]:
     low, high = np.quantile(signal, (RARE, 1.0 - RARE)).tolist()
     return _round_knot(min(low, 0.0)), _round_knot(max(high, 0.0))
@@ -172,16 +157,12 @@ def _round_knot(value: float) -> float:
 
 RIDGES = (1e-3, 1e-2, 1e-1, 1.0)
 """Pulls towards no curve that are tried, as shares of what an average weight of the group is held by."""
-
 FIRMEST_ONLY = {"speed_and_turn": 0.1, "place": 0.01}
 """Curves over two signals are never pulled less than this: most of their knots are seldom visited."""
-
 MAP = "place"
 """The group with the most weights by far: where the guard refuses curves with it, they are fitted without it."""
-
 FREE = 1e-6
 """The level is hardly pulled."""
-
 ROBUST = 1.5
 """Errors beyond so many medians count less and less."""
 
@@ -206,14 +187,7 @@ class ChosenGroups(NamedTuple):
 
 
 def sum_squares(slopes: Slopes, weights: Floats, part: Whole, parts: int) -> Sums:
-    """Sum over the poses of each part; errors are counted from weights of 0.
-
-    Args:
-        slopes: Linearised round the weights.
-        weights: Those weights (weights,).
-        part: The part of each pose (M,).
-        parts: How many parts there are.
-    """
+    """Sum over the poses of each part, linearised round these weights; errors are counted from weights of 0."""
     errors = slopes.residuals + slopes.columns @ weights
     size = np.sqrt((slopes.residuals**2).sum(axis=1))
     trust = 1.0 / np.sqrt(1.0 + (size / (ROBUST * np.median(size) + 1e-12)) ** 2)
@@ -227,13 +201,7 @@ def sum_squares(slopes: Slopes, weights: Floats, part: Whole, parts: int) -> Sum
 
 
 def choose_groups(given: Sums, groups: Mapping[str, Whole], rules: Rules) -> ChosenGroups:
-    """Add groups one by one, the best first, as long as they pay on parts that are left out; the level is always there.
-
-    Args:
-        given: Sums over the parts.
-        groups: The columns of each group.
-        rules: Of the diagnosis.
-    """
+    """Add groups one by one, the best first, while they pay on parts left out; the level is always there."""
     mean = given.hessian.sum(axis=0).diagonal()
     pulls = {name: FREE for name in groups if name == LEVEL}
     gains: dict[str, float] = {}
@@ -276,16 +244,7 @@ def _try_group(
 def _penalise(
     groups: Mapping[str, Whole], choices: Sequence[Mapping[str, float]], mean: Floats
 ) -> tuple[Whole, Floats]:
-    """The columns of the groups that have a pull, and how hard each is pulled: alike within a group.
-
-    Args:
-        groups: The columns of each group.
-        choices: Pulls of the same groups (R,).
-        mean: The average curvature of each column.
-
-    Returns:
-        Columns (K,) and pulls (R, K).
-    """
+    """The columns (K,) of the groups that have a pull, and how hard each is pulled (R, K): alike within a group."""
     names = list(choices[0])
     columns = np.concatenate([np.empty(0, int), *(groups[name] for name in names)])
     sizes = np.array([len(groups[name]) for name in names], int)
@@ -304,10 +263,8 @@ def _held_out_losses(given: Sums, columns: Whole, penalties: Floats) -> Floats:
 
 PARTS = 16
 """No more parts are left out in turn."""
-
 FOLDS = 4
 """The whole fit, choice of groups included, is repeated so often for the guard, each time without one fold."""
-
 ROUNDS = 2
 """It is linearised and its weights are made robust so often."""
 
@@ -334,11 +291,7 @@ class Discrepancy:
 def fit_discrepancy(drives: Drives, theta: Theta, promises: Callable[[Floats], bool] = lambda _: True) -> Discrepancy:
     """Fit the discrepancy of a model over windows, and say whether that helps.
 
-    Args:
-        drives: What the model was fitted to.
-        theta: The model.
-        promises: Whether curves with these held-out squares (M,) are of use to who asks; if not, they are not guarded
-            and not used.
+    Curves whose held-out squares (M,) promise nothing to who asks are not guarded and not used.
     """
     windows = cut(drives, FITTED_S)
     blocks = len(np.unique(drives.block[windows.begin]))
@@ -426,7 +379,6 @@ def _cross_validate(drives: Drives, theta: Theta, folds: Sequence[Theta], window
 
 
 def _parts(drives: Drives) -> int:
-    """The number of parts that blocks are dealt out to."""
     return min(PARTS, int(drives.block.max()) + 1)
 
 
@@ -437,7 +389,6 @@ def _helps(guard: Mapping[float, Ratio], rules: Rules) -> bool:
 
 PROMISING = 3
 """So many forms are tuned, those whose probes gain most."""
-
 EVALUATIONS = 25
 """So often the windows are replayed to tune one."""
 
@@ -461,14 +412,7 @@ class MatchedEffect(NamedTuple):
 def match_named_effect(
     drives: Drives, theta: Theta, discrepancy: Discrepancy, taken: Iterable[str]
 ) -> MatchedEffect | None:
-    """Find the named effect that removes as much error as the learnt curves, if one keeps most of their gain.
-
-    Args:
-        drives: What both were fitted to.
-        theta: The model beside which the curves were learnt.
-        discrepancy: The curves.
-        taken: Names of effects that the model has.
-    """
+    """Find the named effect, not taken, that removes as much error as the curves, if one keeps most of their gain."""
     windows = cut(drives, FITTED_S)
 
     def loss(candidate: Candidate, values: Floats) -> float:
@@ -508,14 +452,7 @@ def _tune(
 
 
 class LearntError(NamedTuple):
-    """The error with names and learnt curves, on drives that were not fitted.
-
-    Attributes:
-        horizon_s: Length of the windows [s].
-        after: Position [m].
-        heading: Heading [rad].
-        ratio: Position, by that with names alone.
-    """
+    """The error over windows with names and learnt curves, on drives not fitted [m], [rad], and by that with names."""
 
     horizon_s: float
     after: Rmse
@@ -551,13 +488,7 @@ class Learning:
 
 
 def learn(found: Findings, tested: Drives, horizons_s: Iterable[float]) -> Learning:
-    """Learn what the named effects leave over, and test it.
-
-    Args:
-        found: The models, fitted.
-        tested: Drives that were not fitted.
-        horizons_s: Lengths of the windows that are told [s].
-    """
+    """Learn what the named effects leave over, and test it over windows of these lengths."""
     beside = fit_discrepancy(found.model.drives, found.model.theta)
     errors = [_error(found, beside, tested, horizon_s) for horizon_s in horizons_s] if beside.used else []
     known = tuple(error for error in errors if error is not None)

@@ -89,11 +89,7 @@ def duties_of(log: Log, robot: Robot, commands: Floats) -> Floats:
 
 
 def _steered(log: Log, robot: Robot, commands: Floats) -> Floats:
-    """Speeds with wheel angles, or twists (…, 2), as a car's throttle and steering.
-
-    Raises:
-        LogError: If they ask for more than full speed, or turn on the spot.
-    """
+    """Speeds with wheel angles, or twists (…, 2), as a car's throttle and steering; refused beyond full speed."""
     figures, speeds, angles = robot.figures, commands[..., 0], commands[..., 1]
     if log.command == "twist":
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -108,13 +104,7 @@ def _steered(log: Log, robot: Robot, commands: Floats) -> Floats:
 
 
 def commands_as(kind: str, robot: Robot, duties: Floats) -> Floats:
-    """Fractions of full wheel speed (…, 2), of a car throttle and steering, as a log's kind of commands (…, 2).
-
-    Args:
-        kind: One of the kinds that suit the robot.
-        robot: Whose figures count.
-        duties: What `duties_of` would make of the result.
-    """
+    """Fractions of full wheel speed (…, 2), of a car throttle and steering, as a log's kind of commands (…, 2)."""
     if kind in ("duty", "ackermann"):
         return duties
     figures, speeds = robot.figures, duties * robot.figures["full_speed"]
@@ -129,13 +119,9 @@ def commands_as(kind: str, robot: Robot, duties: Floats) -> Floats:
 
 
 class Commands(NamedTuple):
-    """An episode's commands.
+    """An episode's commands (M, 2), as fractions of full speed; times [s] count from the first sample.
 
-    Attributes:
-        times: When each was issued (M,) [s after the first sample]; earlier ones are below 0.
-        duties: As fractions of full speed (M, 2).
-        rest: What was in force before the first sample (2,).
-        ticks_each: Ticks that each lasts, where they go with the samples; else 0.
+    `rest` was in force before it; `ticks_each` is how long each lasts where commands go with the samples, else 0.
     """
 
     times: Floats
@@ -163,11 +149,7 @@ class Commands(NamedTuple):
 
 
 def commands_of(log: Log, robot: Robot, episode: LogEpisode, ticks: int) -> Commands:
-    """An episode's commands; `ticks` are a sample's.
-
-    Raises:
-        LogError: If it has none, or they ask for more than full speed.
-    """
+    """An episode's commands; `ticks` are a sample's. Refused if it has none, or they ask for more than full speed."""
     duties, rest = duties_of(log, robot, episode.commands), np.zeros(2)
     if episode.wheels is not None and robot.drive == "differential" and np.isfinite(episode.wheels[0]).all():
         rest = np.asarray(episode.wheels[0] * robot.figures["wheel_radius"] / robot.figures["full_speed"])
@@ -205,12 +187,7 @@ def as_measured(episode: LogEpisode) -> tuple[Floats, Floats]:
 
 
 def ends_of(episodes: Sequence[LogEpisode], samples: Sequence[Whole]) -> tuple[Floats, Floats]:
-    """Poses between which increments lie (N, 2, 3), as measured, and how long after their samples (N, 2) [s].
-
-    Args:
-        episodes: The drives (E,).
-        samples: The samples of each that have a pose of their own.
-    """
+    """Poses as measured between which increments lie (N, 2, 3), and how long after their samples [s]; by each drive."""
     measured = [as_measured(episode) for episode in episodes]
     poses, after = (
         np.concatenate([np.stack((e[part][s[:-1]], e[part][s[1:]]), 1) for e, s in zip(measured, samples, strict=True)])
@@ -221,10 +198,8 @@ def ends_of(episodes: Sequence[LogEpisode], samples: Sequence[Whole]) -> tuple[F
 
 TICK_HZ = 60.0
 """Effects are simulated at least this often."""
-
 HELD_S = 0.2
 """A pose that repeats exactly for up to so long is an older one shown again."""
-
 GAP_S = 1.0
 """Over longer gaps in the measured poses no motion is compared."""
 
@@ -311,14 +286,9 @@ class Drives:
         return float((self.last - self.first).sum() / self.tick_hz)
 
     def along(self, walked: Floats, path: Whole, increment: Whole, begin: Whole | int = 0, *, end: bool) -> Floats:
-        """Read paths (P, T + 1, 3) at the instants at which the poses of increments were measured (M, 3).
+        """Read paths (P, T + 1, 3) when the poses at beginnings or ends of increments (M,) were measured: (M, 3).
 
-        Args:
-            walked: Paths by their ticks.
-            path: Which path each increment belongs to (M,).
-            increment: The increments (M,).
-            begin: The tick at which its path begins (M,).
-            end: Whether it is the pose at the increment's end.
+        `path` is that of each increment (M,), which begins at this tick (M,).
         """
         tick = (self.last if end else self.first)[increment] - begin
         if self.after is None:
@@ -351,12 +321,8 @@ def relative(origin: Floats, pose: Floats) -> Floats:
     return np.stack((forward, left, difference[..., 2]), axis=-1)
 
 
-def gather(log: Log, robot: Robot, episodes: Sequence[LogEpisode]) -> Drives:
-    """A batch of a log's episodes, each command held from its own time.
-
-    Raises:
-        LogError: If there is nothing to compare in them.
-    """
+def gather(log: Log, robot: Robot, episodes: Sequence[LogEpisode], *, compared: bool = True) -> Drives:
+    """A batch of a log's episodes, each command held from its own time; `compared` ones need measured motion."""
     ticks = math.ceil(TICK_HZ / log.rate_hz)
     length = max(len(episode.times) for episode in episodes) * ticks
     tick_hz = log.rate_hz * ticks
@@ -364,10 +330,10 @@ def gather(log: Log, robot: Robot, episodes: Sequence[LogEpisode]) -> Drives:
     samples = [_samples(episode, log.rate_hz) for episode in episodes]
     rows = np.concatenate([np.stack((s[:-1], s[1:]), axis=1) for s in samples])
     number = np.repeat(np.arange(len(episodes)), [max(0, len(s) - 1) for s in samples])
-    if len(rows) == 0:
+    if compared and len(rows) == 0:
         raise LogError(f"{log.name}: no two measured poses in a row; nothing can be learnt from it")
     poses, after = ends_of(episodes, samples)
-    linked = np.concatenate(([False], (number[1:] == number[:-1]) & (rows[1:, 0] == rows[:-1, 1])))
+    linked = np.concatenate(([False], (number[1:] == number[:-1]) & (rows[1:, 0] == rows[:-1, 1])))[: len(rows)]
     drives = Drives(
         robot=robot,
         tick_hz=tick_hz,
@@ -391,7 +357,6 @@ def gather(log: Log, robot: Robot, episodes: Sequence[LogEpisode]) -> Drives:
 
 BEGINNING_S = 0.15
 """The first instants of a drive: long enough to see its speed, too short for a robot at rest to reach it."""
-
 IN_MOTION, STEADY = 0.15, 0.75
 """A drive begins in motion if its wheels go faster than this share of full speed, and than this share of later on."""
 
@@ -450,6 +415,8 @@ def _samples(episode: LogEpisode, rate_hz: float) -> Whole:
 
 def _travel(number: Whole, poses: Floats, rows: Whole, rate_hz: float) -> Floats:
     """The way of each increment, from the chord over half a second round it."""
+    if len(rows) == 0:
+        return np.zeros((0, 2))
     reach = max(1, round(0.25 * rate_hz / max(1.0, float(np.median(rows[:, 1] - rows[:, 0])))))
     index = np.arange(len(rows))
     ends = np.concatenate((np.flatnonzero(np.diff(number)), [len(rows) - 1]))

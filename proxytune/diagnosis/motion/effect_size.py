@@ -41,19 +41,16 @@ from proxytune.diagnosis.motion.multistep_fit import (
     noise_floor,
     pose_noise,
 )
-from proxytune.diagnosis.motion.prediction import Ratio, Windows, blocks_of, cut, motion_along, pose_errors, ratio, rmse
+from proxytune.diagnosis.motion.prediction import Ratio, Windows, blocks_of, cut, motion_in, pose_errors, ratio, rmse
 from proxytune.diagnosis.motion.random_effects import responses
-from proxytune.diagnosis.motion.screening import Candidate, candidates, motion_effects, project_out
+from proxytune.diagnosis.motion.screening import candidates, motion_effects, project_out
 
 FITTED_S = 2.0
 """Windows that models with and without an effect are fitted to, the longest that drives have up to this."""
-
 DRAWS = 10
 """How often the drives are replayed with a random effect drawn."""
-
 LARGEST_SHARE = 0.95
 """A random effect is said to make up no more of the error than this share, even if its draws stray further."""
-
 EffectSize = Mapping[float, Ratio]
 """The error without an effect by the error with it, by horizon [s]."""
 
@@ -80,11 +77,8 @@ class WeighedEffect(NamedTuple):
 def drop_negligible(found: Findings, seed: int, aside: Drives | None = None) -> Findings:
     """Drop the effects that are negligible for prediction, the weakest first.
 
-    Args:
-        found: What the search came to.
-        seed: Of the draws of random effects.
-        aside: Drives that nothing was fitted to: what is not shown to be worth anything on them is dropped. Without
-            them effects are weighed on the fitted drives, and have to be material.
+    On drives kept aside what is not shown to be worth anything is dropped. Without them effects are weighed on the
+    fitted drives, and have to be material.
     """
     drives = found.model.drives
     variant, kept = Variant(found.model.theta, found.model.free), list(found.adopted)
@@ -131,15 +125,7 @@ def _weigh_effects(
 def measure_effect_size(
     fitted: Drives, tested: Drives, variant: Variant, effect: AdoptedEffect, seed: int
 ) -> EffectSize:
-    """Measure the error without an effect by the error with it, on drives that nothing was fitted to.
-
-    Args:
-        fitted: Drives that the model with the effect, and the one without it, are fitted to.
-        tested: Drives that they predict.
-        variant: The model with it.
-        effect: The effect.
-        seed: Of the draws of random effects.
-    """
+    """Measure the error without an effect by the error with it, on drives that nothing was fitted to."""
     whole = _squares(fitted, tested, variant)
     if effect.free:
         return compare_errors(tested, _squares(fitted, tested, without_effect(variant, effect, fitted.rate_hz)), whole)
@@ -153,7 +139,6 @@ def _squares(fitted: Drives, tested: Drives, variant: Variant) -> dict[float, Fl
 
 
 def _length(drives: Drives) -> float:
-    """The length of the windows that are fitted to [s]."""
     return max((h for h in horizons(drives) if h <= FITTED_S), default=min(horizons(drives), default=FITTED_S))
 
 
@@ -178,10 +163,10 @@ def _size_of_draws(drives: Drives, variant: Variant, whole: Mapping[float, Float
 
 def _drawn_squares(drives: Drives, variant: Variant, windows: Windows, seed: int) -> Floats:
     """Mean squared distance [m²] of drawn and expected replays at every compared pose (M,)."""
-    expected = motion_along(drives, paths(drives, variant.theta), windows)
+    expected = motion_in(drives, paths(drives, variant.theta), windows, in_one_go=True)
     total = np.zeros(len(expected))
     for draw in range(DRAWS):
-        drawn = motion_along(drives, drawn_paths(drives, variant.theta, seed + draw), windows)
+        drawn = motion_in(drives, drawn_paths(drives, variant.theta, seed + draw), windows, in_one_go=True)
         total += np.square(drawn - expected)[:, :2].sum(axis=1)
     return total / DRAWS
 
@@ -195,7 +180,10 @@ def invisible_effects(model: Fit, taken: set[str]) -> tuple[str, ...]:
     for form in (form for form in forms if not form.form or form.effect not in plain):
         nats = 0.0
         if form.probes:
-            direction = trace_of(model, form, form.probes[len(form.probes) // 2])
+            moved = theta_at({**model.theta, **form.fixed}, form.free, np.array(form.probes[len(form.probes) // 2]))
+            change = increments(model.drives, model.theta) - increments(model.drives, moved)
+            column = model.whiten.whiten(change)[:, None]
+            direction = project_out(model.slopes, column, np.ones(len(column)))[:, 0]
             nats = 0.5 * float(direction @ direction)
         best[form.effect] = max(best.get(form.effect, 0.0), nats)
     strike = rules.struck_share * float(responses(model, np.empty((len(model.innovations), 0))).size.sum()) / 2.0
@@ -204,20 +192,11 @@ def invisible_effects(model: Fit, taken: set[str]) -> tuple[str, ...]:
     return tuple(name for name in motion_effects(robot.catalogue) if name not in taken and name not in seen)
 
 
-def trace_of(model: Fit, form: Candidate, values: tuple[float, ...]) -> Floats:
-    """The change of the innovations by a form of an effect that the free parameters cannot make (3N,)."""
-    moved = theta_at({**model.theta, **form.fixed}, form.free, np.array(values))
-    change = increments(model.drives, model.theta) - increments(model.drives, moved)
-    column = model.whiten.whiten(change)[:, None]
-    return project_out(model.slopes, column, np.ones(len(column)))[:, 0]
-
-
 GAINS: Mapping[str, Mapping[str, Coordinate]] = {
     "differential": {"left": ("wheel_gain.left",), "right": ("wheel_gain.right",)},
     "ackermann": {"driven": ("wheel_gain",), "steered": ("steering_gain",)},
 }
 """What tells robots apart, by how they drive."""
-
 AT_ONCE = 100_000
 """About so many increments are looked at together: what is computed of each takes a kilobyte."""
 

@@ -25,20 +25,12 @@ from proxytune.space import Theta
 
 REFITTED = 6
 """The number of effects that are fitted in full, the most promising first."""
-
 WORTH_FITTING = 0.1
 """Candidates that promise less than this share of the best one are not fitted."""
 
 
 class TriedEffect(NamedTuple):
-    """An effect that was tried.
-
-    Attributes:
-        effect: Its name.
-        form: The form's name; empty for the plain one.
-        gain: Held-out gain in log-likelihood [nats].
-        p_value: How often chance gains as much.
-    """
+    """An effect that was tried, in a form (empty: the plain one): its held-out gain [nats], and its chance."""
 
     effect: str
     form: str
@@ -119,14 +111,7 @@ class Findings:
 
 
 class FittedCandidate(NamedTuple):
-    """A model with one effect more, fitted in full; either `screened` or `random` is given.
-
-    Attributes:
-        gain: Evidence for the effect [nats].
-        fitted: The model with it.
-        screened: The candidate that it was fitted from, None for an effect that draws.
-        random: The effect that draws, None for any other.
-    """
+    """A model with one effect more, screened or random, fitted in full, and the evidence for it [nats]."""
 
     gain: float
     fitted: Fit
@@ -135,14 +120,7 @@ class FittedCandidate(NamedTuple):
 
 
 class Evidence(NamedTuple):
-    """Everything that speaks for a missing effect in what one model leaves over.
-
-    Attributes:
-        screened: Every candidate with its score test, best first.
-        fits: The best of them fitted in full, by label.
-        random: Effects that draw.
-        curves: Curves over every signal, best first.
-    """
+    """What speaks for a missing effect in what a model leaves over; `fits` are the best screened by label."""
 
     screened: list[ScreenedCandidate]
     fits: dict[str, FittedCandidate]
@@ -151,13 +129,7 @@ class Evidence(NamedTuple):
 
 
 def gather_evidence(model: Fit, taken: set[str], seed: int) -> Evidence:
-    """Weigh every effect that the model does not have yet on what it leaves over.
-
-    Args:
-        model: The model, fitted.
-        taken: Names of the effects that it has, or is not to have.
-        seed: Of the null distributions.
-    """
+    """Weigh every effect, but those taken, on what the model leaves over."""
     robot = model.drives.robot
     screened = screen(model, candidates(robot, model.theta, taken), seed)
     fits = _refit(model, _choose_best_forms(screened), {})

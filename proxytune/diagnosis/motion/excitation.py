@@ -30,41 +30,31 @@ from proxytune.diagnosis.motion.drives import Drives, Floats
 from proxytune.diagnosis.motion.evidence import AdoptedEffect, Findings
 from proxytune.diagnosis.motion.fitting import Fit, fit_theta, intervals, loss_of, slopes
 from proxytune.diagnosis.motion.innovations import Coordinate, increments, paths, span, theta_at, whitener
-from proxytune.diagnosis.motion.manoeuvres import LIBRARY, commands_of
+from proxytune.diagnosis.motion.manoeuvres import LIBRARY, commands_of, mirrored
 from proxytune.diagnosis.motion.screening import Candidate, candidates
 from proxytune.space import Theta
 
 REPEATS = 10
 """A drive is repeated so often to tell noise; and at most to tell rivals."""
-
 FEWEST = 3
 """A drive is repeated at least so often: some of the drives are kept aside."""
-
 ROUNDS = 2
 """A rival is fitted again so often to what was designed against it."""
-
 GENERATIONS = 10
 """Generations of each round."""
-
 KEPT, MADE = 12, 24
 """Sequences that live on, and that each generation makes of them."""
-
 MOST_HZ = 30.0
 """Designed commands, and the poses measured of them, come no oftener."""
-
 SIMPLER = 1.25
 """A manoeuvre of the library is taken if what was designed is not worth so many times as much."""
-
 CLEAR_NATS = 15.0
 """A drive is to be repeated until this is expected for an effect against its rival: with this expectation the evidence
 is above `rival_nats` 98 times in 100, its standard deviation being √(2 · 15)."""
-
 BODY_M = 0.1
 """The path keeps so far from the room's edge, for the robot has a body."""
-
 LEAST_ROOM_M = 0.6
 """A robot has at least so much floor, however little of it a log shows."""
-
 SCALES = (1.0, 0.5, 0.25)
 """The library's manoeuvres begin the search at these sizes, straight on and mirrored."""
 
@@ -89,14 +79,7 @@ LIMITS = Limits()
 
 
 class Course(NamedTuple):
-    """Where the next drive is driven: from the middle of a room, facing along its length.
-
-    Attributes:
-        limits: What bounds it.
-        room: Length and width [m].
-        start: Pose in the log's frame (3,).
-        drives: Those of the log, whose robot and rates it has.
-    """
+    """Where the next drive is driven: from the middle of a room [m], along it; `start` is in the log's frame."""
 
     limits: Limits
     room: tuple[float, float]
@@ -170,12 +153,7 @@ class Course(NamedTuple):
         return replace(batch, travel=np.stack((np.hypot(moved[:, 0], moved[:, 1]), moved[:, 2]), axis=1))
 
     def beyond(self, batch: Drives, drift: float) -> Floats:
-        """How far each drive's path comes out of the room, two standard deviations of its drift included (E,) [m].
-
-        Args:
-            batch: Imagined drives.
-            drift: Standard deviation of the heading after a metre [rad].
-        """
+        """How far each path comes out of the room, with two deviations of its drift [rad] after a metre (E,) [m]."""
         count = len(batch.duties)
         cosine, sine = math.cos(self.start[2]), math.sin(self.start[2])
         off = (batch.poses[:, 1, :2] - self.start[:2]) @ np.array(((cosine, -sine), (sine, cosine)))
@@ -198,12 +176,7 @@ def course_of(drives: Drives, limits: Limits) -> Course:
 
 
 class Told(NamedTuple):
-    """What a drive tells.
-
-    Attributes:
-        between: What it tells apart.
-        nats: How clearly a minute of it speaks.
-    """
+    """What a drive tells apart, and how clearly a minute of it speaks."""
 
     between: tuple[str, ...]
     nats: float
@@ -217,18 +190,10 @@ class RivalFit(NamedTuple):
 
 
 class Rivals:
-    """The question which of an effect and its rivals is there.
+    """The question which of an effect and its rivals is there; fewer nats a minute than `least` tell nothing.
 
     The effect counts at the size that was fitted and at half of it: a log that cannot tell it from rivals may not tell
     its size well.
-
-    Args:
-        course: Where drives are driven.
-        model: With the effect.
-        effect: The effect.
-
-    Attributes:
-        least: Fewer nats a minute tell nothing.
     """
 
     def __init__(self, course: Course, model: Fit, effect: AdoptedEffect) -> None:
@@ -302,16 +267,7 @@ def nats_apart(model: Fit, batch: Drives, rival: RivalFit) -> Floats:
 
 
 class Unknown:
-    """The question what is missing at all: parameters known badly, and effects that a log could not show.
-
-    Args:
-        course: Where drives are driven.
-        model: What is known.
-        unseen: Names of the effects.
-
-    Attributes:
-        least: Fewer nats a minute tell nothing.
-    """
+    """The question what is missing at all: parameters known badly, and effects that a log could not show."""
 
     def __init__(self, course: Course, model: Fit, unseen: Sequence[str]) -> None:
         self._course, self._model, self.least = course, model, 0.0
@@ -349,21 +305,12 @@ Worth = Callable[[Floats], Floats]
 
 
 class Sequences:
-    """Sequences of commands that evolve, those worth most kept.
-
-    Args:
-        course: Where they are driven.
-        model: Whose poses they have.
-        seed: Of all that is tried.
-    """
+    """Sequences of commands that evolve, those worth most kept."""
 
     def __init__(self, course: Course, model: Fit, seed: int) -> None:
         self._course, self._model = course, model
         self._random = np.random.default_rng(seed)
-        library = course.library
-        sides = (1.0, -1.0) if course.drives.robot.drive == "ackermann" else (1.0, 1.0)
-        order = slice(None) if course.drives.robot.drive == "ackermann" else slice(None, None, -1)
-        both = (*library, *(library[:, :, order] * sides))
+        both = (*course.library, *mirrored(course.library, course.drives.robot))
         self._living = np.stack([course.within(one * size) for one in both for size in SCALES])
 
     def evolve(self, worth: Worth) -> Floats:
@@ -462,12 +409,7 @@ def design_drive(
 ) -> NextDrive | None:
     """Design the drive that tells an adopted effect from its rivals, or noise from what is missing; None without both.
 
-    Args:
-        found: What the search came to.
-        again: Whether noise is to be told from what is missing: it is then driven REPEATS times.
-        limits: Of the drive.
-        unseen: Names of effects that the log could not show.
-        seed: Of the search.
+    Noise is told from what is missing `again`: by REPEATS drives. Effects that the log could not show are `unseen`.
     """
     course = course_of(found.model.drives, limits)
     contested = next((effect for effect in found.adopted if effect.rivals), None)

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.stats import t as student
 
 from proxytune.diagnosis.motion.drives import Drives, Floats, sum_by
 from proxytune.diagnosis.motion.innovations import (
@@ -35,18 +34,17 @@ from proxytune.diagnosis.motion.innovations import (
     theta_at,
     whitener,
 )
+from proxytune.diagnosis.motion.prediction import jackknife_half_width
+from proxytune.driving import Robot
 from proxytune.errors import LogError
 from proxytune.space import Theta
 
 ROUNDS = 3
 """Parameters and noise are fitted in turn so often."""
-
 STEP = 1e-3
 """Finite differences step by this fraction of a coordinate's range."""
-
 KEPT_SOLVABLE = 1e-6
 """Added to the Hessian of the loss, so that a coordinate without a slope does no harm."""
-
 SCANS = (np.geomspace(0.5, 1.8, 25), np.geomspace(0.95, 1.05, 15), np.geomspace(0.99, 1.01, 11))
 """Where a scan looks in each round, as multiples of the value it starts from."""
 
@@ -97,12 +95,7 @@ def fit_theta(
 ) -> Theta:
     """Fit free coordinates from where θ has them under frozen gains; those that change the motion by steps first.
 
-    Args:
-        drives: What is fitted to.
-        theta: Where to begin.
-        free: What is fitted.
-        whiten: Of the noise.
-        multiples: Where coordinates that act by steps are looked for, as multiples of their value.
+    Those are looked for at multiples of their value.
     """
     sloped = smooth_coordinates(free, drives.robot)
     rough = tuple(coordinate for coordinate in free if coordinate not in sloped)
@@ -185,14 +178,7 @@ def held_out_log_likelihood(fitted: Fit) -> Floats:
 
 
 def held_out_innovations(fitted: Fit, columns: Floats, sums: tuple[Floats, Floats], penalty: Floats) -> Floats:
-    """Give the innovations (3N,) once each block's columns (3N, columns) are weighted as all other blocks have it.
-
-    Args:
-        fitted: What was fitted without the columns.
-        columns: Change of the innovations per unit of each weight.
-        sums: Gradient and Hessian of each block along the columns.
-        penalty: Added to the Hessian: it pulls the weights to 0.
-    """
+    """Give the innovations (3N,) with each block's columns weighted, under a penalty, as all others have it."""
     gradient, hessian = sums
     rest = hessian.sum(axis=0) - hessian + penalty
     moved = -np.linalg.solve(rest, (gradient.sum(axis=0) - gradient)[:, :, None])[:, :, 0]
@@ -211,14 +197,15 @@ def derivatives_by_block(fitted: Fit, columns: Floats) -> tuple[Floats, Floats]:
 
 LOOKS = (np.geomspace(0.6, 1.6, 31), np.geomspace(0.97, 1.03, 31))
 """Where a coordinate that changes the motion by steps is looked at, as multiples of its value."""
-
 LEAST = 0.003
 """Half of such an interval is no less than this share of the value."""
 
 
 def intervals(fitted: Fit) -> dict[str, tuple[float, float]]:
     """Give 95 % intervals of the fitted parameters, from the scatter between blocks."""
-    known = _smooth_intervals(fitted)
+    gradients, hessian = derivatives_by_block(fitted, fitted.slopes)
+    inverse = np.linalg.inv(hessian.sum(axis=0) + KEPT_SOLVABLE * np.eye(len(fitted.free)))
+    known = sandwich_intervals(fitted.theta, fitted.free, fitted.drives.robot, gradients, inverse)
     for coordinate in fitted.free:
         if is_stepwise(coordinate, fitted.drives.robot):
             known |= dict.fromkeys(coordinate, _stepwise_interval(fitted, coordinate))
@@ -235,52 +222,42 @@ def _stepwise_interval(fitted: Fit, coordinate: Coordinate) -> tuple[float, floa
     left = (fitted.whiten.whiten(drives.measured - increments(drives, theta)) for theta in thetas)
     losses = np.stack([sum_by_block(drives, huber(innovations)) for innovations in left], axis=1)
     best = values[(losses.sum(axis=0) - losses).argmin(axis=1)]
-    count = len(best)
-    if count < 2:
-        return low, high
-    spread = np.sqrt((count - 1) / count * np.square(best - best.mean()).sum())
-    half = max(float(student.ppf(0.975, count - 1) * spread), LEAST * here)
+    half = max(jackknife_half_width(best), LEAST * here)
     return max(low, here - half), min(high, here + half)
 
 
-def _smooth_intervals(fitted: Fit) -> dict[str, tuple[float, float]]:
-    """From the spread between blocks (sandwich)."""
-    gradient, hessian = derivatives_by_block(fitted, fitted.slopes)
-    blocks, count = gradient.shape
-    inverse = np.linalg.inv(hessian.sum(axis=0) + KEPT_SOLVABLE * np.eye(count))
-    spread = inverse @ (gradient.T @ gradient) @ inverse * blocks / max(1, blocks - count)
-    found = {}
-    for coordinate, variance in zip(fitted.free, np.diag(spread), strict=True):
-        if is_stepwise(coordinate, fitted.drives.robot):
-            continue
-        low, high = span(coordinate, fitted.drives.robot)
+def sandwich_intervals(
+    theta: Theta, free: tuple[Coordinate, ...], robot: Robot, gradients: Floats, inverse: Floats
+) -> dict[str, tuple[float, float]]:
+    """95 % intervals from the spread of gradients between blocks (blocks, coordinates), and the Hessian's inverse."""
+    spread = inverse @ (gradients.T @ gradients) @ inverse * len(gradients) / max(1, len(gradients) - len(free))
+    found: dict[str, tuple[float, float]] = {}
+    for coordinate, variance in zip(free, np.diag(spread), strict=True):
+        low, high = span(coordinate, robot)
         half = 1.96 * float(np.sqrt(variance)) * (high - low)
-        for name in coordinate:
-            value = fitted.theta[name]
-            found[name] = (max(low, value - half), min(high, value + half))
+        found |= {name: (max(low, theta[name] - half), min(high, theta[name] + half)) for name in coordinate}
     return found
 
 
 LEAST_TRAVEL_M = 0.05
 LEAST_TURN_RAD = 0.2
 """A robot that got no further than both from where it was most of the time has shown nothing but noise."""
-
 MOST_TIMES = 6.0
 """A robot that drove so many times as far as it was told, or as much less, is in other units."""
-
 MOST_ASKEW_DEG = 60.0
 """A robot that drives further than this from its heading has another zero of the heading."""
 
 
 def check_motion(name: str, drives: Drives) -> None:
-    """Refuse a log in which the robot stands or is never told to move.
-
-    Raises:
-        LogError: Saying which.
-    """
+    """Refuse a log in which the robot stands or is never told to move, and say which."""
     if np.abs(drives.duties).max() < 1e-6:
         raise LogError(f"{name}: every command is zero; nothing can be learnt from a robot that is never told to move")
-    way, turn = _reach(drives)
+    furthest = np.zeros(2)
+    for episode in np.unique(drives.episode):
+        poses = drives.poses[drives.episode == episode, 1]
+        off = np.abs(poses - np.median(poses, axis=0))
+        furthest = np.maximum(furthest, np.quantile((np.hypot(off[:, 0], off[:, 1]), off[:, 2]), 0.9, axis=1))
+    way, turn = furthest
     if way < LEAST_TRAVEL_M and turn < LEAST_TURN_RAD:
         raise LogError(
             f"{name}: the robot got {way:.3f} m far and turned {turn:.2f} rad; nothing can be learnt from a robot that "
@@ -288,22 +265,8 @@ def check_motion(name: str, drives: Drives) -> None:
         )
 
 
-def _reach(drives: Drives) -> tuple[float, float]:
-    """The greatest distance from an episode's middle pose, outliers apart: [m], [rad]."""
-    furthest = np.zeros(2)
-    for episode in np.unique(drives.episode):
-        poses = drives.poses[drives.episode == episode, 1]
-        off = np.abs(poses - np.median(poses, axis=0))
-        furthest = np.maximum(furthest, np.quantile((np.hypot(off[:, 0], off[:, 1]), off[:, 2]), 0.9, axis=1))
-    return float(furthest[0]), float(furthest[1])
-
-
 def check_units(name: str, drives: Drives, theta: Theta) -> None:
-    """Refuse poses in other units or axes than the commands can have led to.
-
-    Raises:
-        LogError: Saying which.
-    """
+    """Refuse poses in other units or axes than the commands can have led to, and say which."""
     asked = increments(drives, theta)
     way, driven = float(np.abs(asked[:, 0]).sum()), float(drives.travel[:, 0].sum())
     if way > LEAST_TRAVEL_M and not 1.0 / MOST_TIMES < driven / way < MOST_TIMES:

@@ -37,23 +37,17 @@ from proxytune.space import Theta
 
 BAND = 6
 """Rows of a lower banded matrix with two blocks of three side by side."""
-
 TURN_WEIGHT = 0.1
 """A radian turned adds as much noise as this many metres driven."""
-
 JITTER = np.array((1e-5, 1e-5, 1e-5)) ** 2
 """Smallest variance of an increment [m², m², rad²]: keeps noise-free logs solvable."""
-
 THINNED = 2400
 RUN = 12
 """Noise is fitted to about so many increments, in runs of so many: more hardly sharpen five values, and cost most."""
-
 SMALLEST, LARGEST = 1e-6, 3.0
 """Noise lies between these, each value in its own unit."""
-
 STEP = 1e-4
 """Finite differences step by this in the logarithm of a value of the noise."""
-
 HUBER = 3.0
 """Innovations beyond so many standard deviations count linearly."""
 
@@ -199,17 +193,10 @@ def _fit_noise(drives: Drives, errors: Floats, start: Noise) -> tuple[float, Noi
 
 
 def integrate_twists(twists: Floats, tick_s: float) -> Floats:
-    """Dead-reckon planar poses from body twists: before the first tick and after each, from the origin on.
+    """Dead-reckon planar poses (…, time + 1, 3) from body twists held for a tick each; headings are unwrapped.
 
     They are those of the planar plant but for rounding. Episodes are driven by the plant itself: they stay what they
     were to the last bit.
-
-    Args:
-        twists: Twists (…, time, 3), each held for a tick.
-        tick_s: Length of a tick [s].
-
-    Returns:
-        Poses (…, time + 1, 3), headings unwrapped.
     """
     poses = np.zeros((*twists.shape[:-2], twists.shape[-2] + 1, 3))
     turns = twists[..., 2] * tick_s
@@ -252,16 +239,7 @@ def expected_theta(theta: Theta, rate_hz: float) -> dict[str, float]:
 
 
 def paths(drives: Drives, theta: Theta, duties: Floats | None = None) -> Floats:
-    """The measured poses that a model expects from the origin (E, T + 1, 3), each episode in one go.
-
-    Args:
-        drives: The commands.
-        theta: Values of effects besides the robot's nominal ones.
-        duties: Other commands instead (E, T, 2).
-
-    Raises:
-        SettingsError: If a value is out of its parameter's bounds.
-    """
+    """The measured poses that a model expects from the origin (E, T + 1, 3), each episode in one go."""
     train, measurement = _model(drives, theta)
     return _walk_and_track(drives, _twists(drives, train, duties), measurement)
 
@@ -314,13 +292,7 @@ def window_paths(drives: Drives, theta: Theta, begin: Whole, length: int) -> Flo
     """Measured poses from windows' beginnings on, each from the origin (W, length + 1, 3).
 
     A window starts from the measured pose, and from measured wheel speeds where there are any. The commands before it
-    count; nothing measured after it does.
-
-    Args:
-        drives: The commands.
-        theta: Values of effects besides the robot's nominal ones.
-        begin: The increments at whose beginnings the windows start (W,).
-        length: Ticks to go on for; commands after an episode's end are those at its end.
+    count; nothing measured after it does. Commands after an episode's end are those at its end.
     """
     train, measurement = _model(drives, theta)
     return _walk_and_track(drives, _window_twists(drives, train, begin, length), measurement)
@@ -362,8 +334,7 @@ def window_features(
 ) -> list[tuple[Floats, Floats]]:
     """Motion that each weight of a learnt effect beside a model adds in such windows, curve by curve.
 
-    Returns:
-        Features (W, length, knots) and the twist that one unit of them makes (3,).
+    That is features (W, length, knots), and the twist that one unit of them makes (3,).
     """
     whole = twists_of(drives, theta)
     past = learnt.recall(_window_setting(drives, begin, whole), whole, drives.episode[begin], drives.first[begin])

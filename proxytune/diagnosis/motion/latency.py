@@ -20,34 +20,22 @@ from proxytune.logs import Log
 
 SPAN_S = 0.2
 """Speeds are means over so long: pose noise is averaged out, and 0.05 s of latency is still clear."""
-
 MOST_SPANS = 8000
 """Of longer logs as many speeds are taken, evenly spread."""
-
 LONGEST_TIME_CONSTANT_S = 1.0
 TIME_CONSTANTS_S = (0.06, 0.25)
 """The longest motor lag that is reckoned with, and those of a first look."""
-
 STEP_S = 0.05
 """Latencies are tried in such steps; the best lies between them, at the vertex of a parabola."""
-
 ROUGH_STEP_S = 0.1
 THINNED = 2
 """The step of the first look, which one span in so many is enough for."""
-
 AT_ONCE = 300_000
 """About so many ticks go through the lag together: memory is not to grow with the number of drives."""
 
 
 class Speeds(NamedTuple):
-    """Measured forward speeds [m/s] and yaw rates [rad/s] over spans of time.
-
-    Attributes:
-        episode: Episode of each span (M,).
-        first: Tick at which it begins (M,).
-        last: Tick at which it ends (M,).
-        values: Forward speed and yaw rate (M, 2).
-    """
+    """Measured forward speeds [m/s] and yaw rates [rad/s] over spans of ticks (M, 2)."""
 
     episode: Whole
     first: Whole
@@ -56,14 +44,10 @@ class Speeds(NamedTuple):
 
 
 class Reaction(NamedTuple):
-    """The linear, first-order robot that follows its commands best.
+    """The linear, first-order robot that follows its commands best: what latency lies beyond the motor's lag [s].
 
-    Attributes:
-        latency_s: Time from command to motion beyond the motor's lag; negative where motion comes first [s].
-        time_constant_s: Of the motor [s].
-        gains: From commanded to measured forward speed and yaw rate (2, 2).
-        spread: What it leaves of either, standard deviation (2,).
-        squares: What it leaves of each span, in units of the whole log's (M,).
+    Gains go from commanded to measured forward speed and yaw rate (2, 2); `spread` is the deviation of what it leaves
+    of either, `squares` what it leaves of each span (M,), in units of the whole log's.
     """
 
     latency_s: float
@@ -254,37 +238,25 @@ def sum_in_blocks(seconds: float, drives: Drives, speeds: Speeds, values: Floats
 
 LATENCY_BLOCK_S = 2.0
 """Squares are summed over such blocks, whose scatter says how sure a latency is."""
-
 LEAST_APART_S = 0.04
 """Clocks less far apart are one."""
-
 SIDE = 4
 """A stretch between two jumps has at least so many blocks, and a drive of its own clock twice as many."""
-
 SURE, SURE_OF_A_JUMP = 5.0, 8.0
 """Standard deviations; a jump is looked for at every time, so more of them."""
-
 SURE_BESIDE_OTHERS, SHARE_BESIDE_OTHERS = 5.5, 0.15
 """The same where one side of the jump answers as the other drives do; NEAR_S apart, or two deviations, is the same."""
-
 NEAR_S = 0.02
 
 SHARE, SHARE_IF_FAR = 0.08, 0.7
 FAR_S = 1.0
 """The least share of what is left over that another clock takes away, and that one further off than FAR_S does. Drives
 in which a robot sticks or has play answer later than others, but another latency explains little of that."""
-
 MOST_JUMPS = 4
 
 
 class Jump(NamedTuple):
-    """A clock that jumps within a drive.
-
-    Attributes:
-        drive: The drive's name.
-        time_s: When, to within BLOCK_S [s, as in the log].
-        by_s: How much later poses are stamped from then on [s].
-    """
+    """A clock that jumps within a drive, at a time [s, of the log]: poses are stamped so much later from then [s]."""
 
     drive: str
     time_s: float
@@ -339,14 +311,7 @@ def _all_jumps(squares: Floats, latencies: Floats, usual: float | None) -> list[
 
 
 def _jumps(squares: Floats, latencies: Floats, most: int, usual: float | None) -> list[tuple[int, float]]:
-    """Blocks at which the latency jumps, and by how much [s]: the clearest first, then in what lies on either side.
-
-    Args:
-        squares: Of one drive, by block and latency (B, L).
-        latencies: At which they are given (L,) [s].
-        most: How often it is looked for another.
-        usual: The latency of most drives [s]; None where there are no others.
-    """
+    """Blocks at which one drive's latency jumps, and by how much [s]: the clearest first, then on either side of it."""
     if most == 0 or len(squares) < 2 * SIDE:
         return []
     before = np.cumsum(squares, axis=0)[SIDE - 1 : len(squares) - SIDE]
@@ -362,14 +327,7 @@ def _jumps(squares: Floats, latencies: Floats, most: int, usual: float | None) -
 
 
 def _is_jump(one: Latency, other: Latency, share: float, usual: float | None) -> bool:
-    """Tell whether the two sides of a block have clearly different latencies.
-
-    Args:
-        one: The latency before.
-        other: The latency after.
-        share: What each side's own latency takes away of what is left over at the other's, the lesser of the two.
-        usual: The latency of most drives [s], if there are others.
-    """
+    """Tell whether the two sides of a block have clearly different latencies, by the share that each takes away."""
     by = abs(other.value - one.value)
     sure = by / float(np.hypot(one.deviation, other.deviation))
     if by <= LEAST_APART_S or share < (SHARE if by < FAR_S else SHARE_IF_FAR):

@@ -65,9 +65,13 @@ LIBRARY: tuple[tuple[str, str, Callable[[Floats], Floats]], ...] = (
 
 BEND = 2.0
 """How far a car steers [full lock] where its wheels would differ by half of full speed."""
-
 ROLLING = 0.4
 """Throttle of a car in manoeuvres that turn on the spot, which it cannot."""
+
+
+def mirrored(commands: Floats, robot: Robot) -> Floats:
+    """Commands (…, 2) that bend the other way."""
+    return np.asarray(commands * (1.0, -1.0)) if robot.drive == "ackermann" else commands[..., ::-1]
 
 
 def commands_of(shape: Callable[[Floats], Floats], times: Floats, robot: Robot) -> Floats:

@@ -16,28 +16,18 @@ from proxytune.space import Theta
 
 HARMONICS = 3
 """The line and its multiples are summed up to this one: what is short has many."""
-
 LOWEST_HZ, HIGHEST_HZ = 0.05, 1.0
 """Lines are looked for between these, if a drive holds FEWEST of their periods."""
-
 FEWEST = 4
 ROUND = 61
 """Lines over which the spectrum's level is taken: it is coloured."""
-
 CHANCE, OWN_CHANCE = 1e-4, 1e-2
 """Chance of such a line in noise below which one is told, and in the commands above which it is not theirs."""
-
 BINS = 40
 
 
 class Period(NamedTuple):
-    """Something that slows the robot down again and again.
-
-    Attributes:
-        period_s: How often [s].
-        lost_s: As if it stood so long each time [s].
-        chance: Of a line so strong without anything periodic, over all lines.
-    """
+    """Something that slows the robot down every so often, as if it stood so long [s]; its chance over all lines."""
 
     period_s: float
     lost_s: float

@@ -7,7 +7,7 @@ with that noise from third differences of the residual path, E|Δ³|² = 20 σ²
 `bullet_pose_errors` measures on the bullet plant what the planar plant found.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from scipy.optimize import least_squares, nnls
 from scipy.stats import chi2
 
 from proxytune.diagnosis.motion.drives import Drives, Floats, Recent
-from proxytune.diagnosis.motion.fitting import STEP, Fit, evaluate
+from proxytune.diagnosis.motion.fitting import STEP, Fit, evaluate, sandwich_intervals
 from proxytune.diagnosis.motion.innovations import (
     Coordinate,
     increments,
@@ -42,28 +42,21 @@ from proxytune.space import Theta
 
 HORIZONS_S = (1.0, 2.0, 5.0)
 """Horizons at which errors are compared."""
-
 FITTED_S = (5.0, 2.0)
 """Windows of these lengths are fitted to."""
-
 FOLDS = 4
 """Blocks are dealt out to so many folds; each is predicted by what was fitted to the others."""
-
 ROBUST = 1.5
 """Misses beyond so many times the median count linearly."""
-
 MOST_WINDOWS = 400
 MOST_TRIALS = 20
 """A fit takes no more windows, and looks no more often: it stays within seconds on long logs."""
 
 
 class MultistepFit(NamedTuple):
-    """The result of fitting parameters to windows.
+    """The result of fitting parameters to windows: held-out error of the new values by the old ones', by horizon.
 
-    Attributes:
-        horizon_s: Length of the windows [s].
-        ratios: Held-out error of the new values by that of the old ones, by horizon [s].
-        intervals: 95 % intervals of the new values, by name in θ; none of what was not fitted to windows.
+    What was not fitted to windows has no interval.
     """
 
     horizon_s: float
@@ -79,14 +72,7 @@ def horizons(drives: Drives) -> tuple[float, ...]:
 
 
 def fit_windows(drives: Drives, theta: Theta, free: Sequence[Coordinate], windows: Windows) -> dict[str, float]:
-    """Fit the free coordinates of θ to these windows: where the model misses their poses least.
-
-    Args:
-        drives: The measured drives.
-        theta: Where to start.
-        free: What is fitted, except where it changes the motion by steps: single steps tell that far more sharply.
-        windows: Windows over the drives; long logs are thinned to MOST_WINDOWS of them.
-    """
+    """Fit the free coordinates to windows, but those that change the motion by steps; long logs are thinned."""
     fitted = smooth_coordinates(free, drives.robot)
     if not fitted or len(windows.begin) == 0:
         return dict(theta)
@@ -107,66 +93,50 @@ def fit_windows(drives: Drives, theta: Theta, free: Sequence[Coordinate], window
 
 
 class _Problem(NamedTuple):
-    """A least-squares problem in fractions of the coordinates' ranges."""
+    """A least-squares problem in fractions of the coordinates' ranges: θ, residuals and their slopes there."""
 
-    drives: Drives
-    theta: Theta
-    free: tuple[Coordinate, ...]
-    windows: Windows
-    measured: Floats
-    weights: Floats
-    recent: Recent[Floats]
-
-    @property
-    def start(self) -> Floats:
-        low, high = np.array([span(coordinate, self.drives.robot) for coordinate in self.free]).T
-        here = np.array([self.theta[coordinate[0]] for coordinate in self.free])
-        return np.asarray(np.clip((here - low) / (high - low), 1e-6, 1.0 - 1e-6))
-
-    @property
-    def scale(self) -> float:
-        return max(1e-6, ROBUST * float(np.median(np.abs(self.residuals(self.start)))))
-
-    def at(self, fractions: Floats) -> dict[str, float]:
-        low, high = np.array([span(coordinate, self.drives.robot) for coordinate in self.free]).T
-        return theta_at(self.theta, self.free, low + fractions * (high - low))
-
-    def residuals(self, fractions: Floats) -> Floats:
-        def make() -> Floats:
-            apart = predicted_motion(self.drives, self.at(fractions), self.windows) - self.measured
-            misses = np.asarray((apart * self.weights).ravel())
-            misses.setflags(write=False)
-            return misses
-
-        return self.recent.get(fractions.tobytes(), make)
-
-    def jacobian(self, fractions: Floats) -> Floats:
-        here, columns = self.residuals(fractions), []
-        for number in range(len(fractions)):
-            step = STEP if fractions[number] + STEP <= 1.0 else -STEP
-            moved = fractions.copy()
-            moved[number] += step
-            columns.append((self.residuals(moved) - here) / step)
-        return np.stack(columns, axis=1)
+    at: Callable[[Floats], dict[str, float]]
+    residuals: Callable[[Floats], Floats]
+    jacobian: Callable[[Floats], Floats]
+    start: Floats
+    scale: float
 
 
 def _problem(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], windows: Windows) -> _Problem:
     """The least-squares problem of these windows; a heading error counts as the way it makes over the median chord."""
-    measured = measured_motion(drives, windows)
-    chord = float(np.median(np.hypot(*measured[:, :2].T)))
-    return _Problem(drives, theta, free, windows, measured, np.array((1.0, 1.0, max(chord, 1e-3))), Recent())
+    measured, recent = measured_motion(drives, windows), Recent[Floats]()
+    weights = np.array((1.0, 1.0, max(float(np.median(np.hypot(*measured[:, :2].T))), 1e-3)))
+    low, high = np.array([span(coordinate, drives.robot) for coordinate in free]).T
+
+    def at(fractions: Floats) -> dict[str, float]:
+        return theta_at(theta, free, low + fractions * (high - low))
+
+    def residuals(fractions: Floats) -> Floats:
+        def make() -> Floats:
+            apart = predicted_motion(drives, at(fractions), windows) - measured
+            misses = np.asarray((apart * weights).ravel())
+            misses.setflags(write=False)
+            return misses
+
+        return recent.get(fractions.tobytes(), make)
+
+    def jacobian(fractions: Floats) -> Floats:
+        here, columns = residuals(fractions), []
+        for number in range(len(fractions)):
+            step = STEP if fractions[number] + STEP <= 1.0 else -STEP
+            moved = fractions.copy()
+            moved[number] += step
+            columns.append((residuals(moved) - here) / step)
+        return np.stack(columns, axis=1)
+
+    start = np.clip((np.array([theta[coordinate[0]] for coordinate in free]) - low) / (high - low), 1e-6, 1.0 - 1e-6)
+    return _Problem(at, residuals, jacobian, start, max(1e-6, ROBUST * float(np.median(np.abs(residuals(start))))))
 
 
 def held_out_squares(drives: Drives, theta: Theta, free: Sequence[Coordinate], fitted_s: float) -> dict[float, Floats]:
     """Predict every compared pose, by horizon [s]: its squared distance from the measured one [m²].
 
     No pose is predicted by what was fitted to its own fold.
-
-    Args:
-        drives: The measured drives.
-        theta: Where fits start.
-        free: What is fitted.
-        fitted_s: Length of the windows that are fitted to [s].
     """
     fold = np.asarray(drives.block % min(FOLDS, int(drives.block.max()) + 1))
     windows = cut(drives, fitted_s)
@@ -202,14 +172,8 @@ def fit_multistep(fitted: Fit) -> tuple[Fit, MultistepFit | None]:
         return fitted, None
     windows = cut(drives, best[1])
     theta = fit_windows(drives, fitted.theta, fitted.free, windows)
-    known = _intervals(drives, theta, smooth_coordinates(fitted.free, drives.robot), windows)
-    return evaluate(drives, theta, fitted.free, fitted.noise), MultistepFit(best[1], best[2], known)
-
-
-def _intervals(
-    drives: Drives, theta: Theta, free: tuple[Coordinate, ...], windows: Windows
-) -> dict[str, tuple[float, float]]:
-    """95 % intervals from the spread between blocks (sandwich)."""
+    # 95 % intervals come from the spread between blocks.
+    free = smooth_coordinates(fitted.free, drives.robot)
     problem = _problem(drives, theta, free, windows)
     here = problem.start
     left, slopes, scale = problem.residuals(here), problem.jacobian(here), problem.scale
@@ -217,25 +181,16 @@ def _intervals(
     hessian = (slopes / (1.0 + (left / scale) ** 2)[:, None] ** 1.5).T @ slopes
     _, block = np.unique(np.repeat(blocks_of(drives, windows), 3), return_inverse=True)
     sums = np.stack([np.bincount(block, column) for column in gradient.T], axis=1)
-    inverse = np.linalg.pinv(hessian, hermitian=True)
-    spread = inverse @ (sums.T @ sums) @ inverse * len(sums) / max(1, len(sums) - len(free))
-    found: dict[str, tuple[float, float]] = {}
-    for coordinate, variance in zip(free, np.diag(spread), strict=True):
-        low, high = span(coordinate, drives.robot)
-        half = 1.96 * float(np.sqrt(variance)) * (high - low)
-        found |= {name: (max(low, theta[name] - half), min(high, theta[name] + half)) for name in coordinate}
-    return found
+    known = sandwich_intervals(theta, free, drives.robot, sums, np.linalg.pinv(hessian, hermitian=True))
+    return evaluate(drives, theta, fitted.free, fitted.noise), MultistepFit(best[1], best[2], known)
 
 
 LAGS = (1, 2, 3, 4, 6)
 """Third differences are taken over so many samples."""
-
 NOISE_WEIGHT, WALK_WEIGHT = 20.0, 6.0
 """What third differences make of white noise and of a walk: 1² + 3² + 3² + 1², and of its steps 1² + 2² + 1²."""
-
 CUT = 9.0
 """Squares beyond so many times the median are cut: motion that a model misses for a moment is not noise."""
-
 FEWEST = 20
 """With fewer third differences a lag says nothing."""
 
@@ -251,11 +206,7 @@ def pose_noise(drives: Drives, theta: Theta) -> PoseNoise:
     """The noise of measured poses, from third differences of the path of what a model leaves over.
 
     A model's slow errors, and those of a robot that drifts, vanish in third differences or grow with the lag; the noise
-    of a pose does neither.
-
-    Args:
-        drives: The measured drives.
-        theta: The model that is taken off; the better it is, the fewer of its errors pass for noise.
+    of a pose does neither. The better the model, the fewer of its errors pass for noise.
     """
     left = drives.measured - increments(drives, theta)
     heading = drives.poses[:, 0, 2]

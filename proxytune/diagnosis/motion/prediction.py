@@ -42,20 +42,12 @@ from proxytune.space import Theta
 
 SHORTEST = 0.9
 """Windows that cover less of the horizon are left out: poses seldom end exactly at it, but a stub is no window."""
-
-
 AT_ONCE = 300_000
 """About so many ticks of episodes are replayed together: memory is not to grow with the number of drives."""
 
 
 class Windows(NamedTuple):
-    """Windows (W,) over measured increments, and the increments in them (M,).
-
-    Attributes:
-        begin: The increment at whose beginning each window starts (W,).
-        window: The window of each entry (M,).
-        increment: The increment whose end is compared (M,).
-    """
+    """Windows, begun by an increment (W,), and the increments in them whose ends are compared (M,)."""
 
     begin: Whole
     window: Whole
@@ -85,11 +77,6 @@ def select_windows(windows: Windows, kept: NDArray[np.bool_]) -> Windows:
 def blocks_of(drives: Drives, windows: Windows) -> Whole:
     """The block that each compared pose belongs to (M,)."""
     return np.asarray(drives.block[windows.begin][windows.window])
-
-
-def pose_differences(drives: Drives, theta: Theta, windows: Windows) -> Floats:
-    """The model's motion since each window's beginning less the measured one (M, 3): [m], [m], [rad]."""
-    return predicted_motion(drives, theta, windows) - measured_motion(drives, windows)
 
 
 def predicted_motion(drives: Drives, theta: Theta, windows: Windows) -> Floats:
@@ -123,33 +110,22 @@ def length_of(drives: Drives, windows: Windows) -> int:
     return int(ticks.max()) + (drives.after is not None)
 
 
-def motion_in(drives: Drives, walked: Floats, windows: Windows) -> Floats:
-    """Motion along windows' own paths (W, length + 1, 3) since each window's beginning (M, 3)."""
+def motion_in(drives: Drives, walked: Floats, windows: Windows, *, in_one_go: bool = False) -> Floats:
+    """Motion (M, 3) since windows' beginnings, along paths of their own (W, length + 1, 3) or episodes in one go."""
     begin = windows.begin[windows.window]
-    start = drives.first[begin]
-    return relative(
-        drives.along(walked, windows.window, begin, start, end=False),
-        drives.along(walked, windows.window, windows.increment, start, end=True),
-    )
+    path, start = (drives.episode[begin], 0) if in_one_go else (windows.window, drives.first[begin])
+    ends = ((begin, False), (windows.increment, True))
+    return relative(*(drives.along(walked, path, increment, start, end=end) for increment, end in ends))
 
 
 def pose_errors(drives: Drives, theta: Theta, windows: Windows) -> Floats:
     """Measure the errors of the model's poses (M, 2): distance [m], heading [rad]."""
-    return _lengths(pose_differences(drives, theta, windows))
+    return _lengths(predicted_motion(drives, theta, windows) - measured_motion(drives, windows))
 
 
 def pose_errors_along(drives: Drives, walked: Floats, windows: Windows) -> Floats:
     """The errors (M, 2) of paths that were driven in one go (E, T + 1, 3)."""
-    return _lengths(motion_along(drives, walked, windows) - measured_motion(drives, windows))
-
-
-def motion_along(drives: Drives, walked: Floats, windows: Windows) -> Floats:
-    """Motion along such paths since each window's beginning (M, 3)."""
-    begin = windows.begin[windows.window]
-    return relative(
-        drives.along(walked, drives.episode[begin], begin, end=False),
-        drives.along(walked, drives.episode[windows.increment], windows.increment, end=True),
-    )
+    return _lengths(motion_in(drives, walked, windows, in_one_go=True) - measured_motion(drives, windows))
 
 
 def measured_motion(drives: Drives, windows: Windows) -> Floats:
@@ -198,12 +174,12 @@ class Ratio(NamedTuple):
 
 def rmse(squares: Floats, blocks: Whole) -> Rmse:
     """The root mean square, with a t-interval on its logarithm from leaving blocks out in turn."""
-    return _root(float(np.log(squares.mean())), _half_width(_log_means_without_each(squares, blocks)))
+    return _root(float(np.log(squares.mean())), jackknife_half_width(_log_means_without_each(squares, blocks)))
 
 
 def ratio(after: Floats, before: Floats, blocks: Whole, shown_at: float = RULES.ratio_p_value) -> Ratio:
     """Divide two root mean squares over the same windows, with an interval and the chance of a ratio so far off 1."""
-    half = _half_width(_log_means_without_each(after, blocks) - _log_means_without_each(before, blocks))
+    half = jackknife_half_width(_log_means_without_each(after, blocks) - _log_means_without_each(before, blocks))
     value, interval = _root(float(np.log(after.mean() / before.mean())), half)
     return Ratio(value, interval, *_signed_ranks(after, before, blocks), shown_at)
 
@@ -225,7 +201,6 @@ def _root(log: float, half: float) -> Rmse:
 
 
 def _log_means_without_each(squares: Floats, blocks: Whole) -> Floats:
-    """Logarithm of the mean without each block."""
     _, label = np.unique(blocks, return_inverse=True)
     sums, counts = np.bincount(label, squares), np.bincount(label)
     if len(counts) < 2:
@@ -233,11 +208,12 @@ def _log_means_without_each(squares: Floats, blocks: Whole) -> Floats:
     return np.asarray(np.log((sums.sum() - sums) / (counts.sum() - counts)))
 
 
-def _half_width(logs: Floats) -> float:
-    count = len(logs)
+def jackknife_half_width(values: Floats) -> float:
+    """Half of the 95 % interval, from the values without each block in turn; infinite of one block alone."""
+    count = len(values)
     if count < 2:
         return float("inf")
-    spread = np.sqrt((count - 1) / count * ((logs - logs.mean()) ** 2).sum())
+    spread = np.sqrt((count - 1) / count * ((values - values.mean()) ** 2).sum())
     return float(student.ppf(0.975, count - 1) * spread)
 
 
@@ -246,7 +222,7 @@ def predict(log: Log, robot: Robot, theta: Theta, horizon_s: float) -> pd.DataFr
 
     In each window the model starts from the measured pose, and the measured wheel speeds where the log has them, and is
     driven by the recorded commands, those before the window included. Windows follow one another; each begins at the
-    first measured pose after the one before it.
+    first measured pose after the one before it. A drive with one pose alone is predicted from it, over one window.
 
     Returns:
         Columns `episode, start_time, time, x, y, heading` [s], [s], [s], [m], [m], [rad].
@@ -256,7 +232,7 @@ def predict(log: Log, robot: Robot, theta: Theta, horizon_s: float) -> pd.DataFr
     """
     if not horizon_s * log.rate_hz >= 1.0:
         raise LogError(f"{log.name}: a horizon of {horizon_s:g} s is shorter than a sample of {1.0 / log.rate_hz:g} s")
-    whole = gather(log, robot, log.episodes)
+    whole = gather(log, robot, log.episodes, compared=False)
     longest = max(len(episode.times) for episode in log.episodes)
     reach = int(np.floor(min(horizon_s * log.rate_hz, longest) + 1e-9))
     starts = [_starts(episode, reach) for episode in log.episodes]
@@ -347,14 +323,9 @@ class Agreement(NamedTuple):
 
 
 def agreement(table: pd.DataFrame, log: Log, horizon_s: float) -> Agreement:
-    """Compare predicted poses with those measured after each window's start.
+    """Compare predicted poses, as `predict` gives them, with those measured after each window's start.
 
     Windows in which measured poses reach no further than a stub of the horizon are left out.
-
-    Args:
-        table: What `predict` says of the log.
-        log: The log.
-        horizon_s: Length of the windows [s].
     """
     measured = pd.concat(
         [
@@ -377,21 +348,16 @@ def agreement(table: pd.DataFrame, log: Log, horizon_s: float) -> Agreement:
 
 FITTED_S = 2.0
 """What is learnt is fitted to windows of this length [s]."""
-
 POSES = 8
 """No more poses are compared in a window."""
-
 MOST_WINDOWS = 600
 """No more windows are fitted, spread evenly over the drives."""
 
 
 class Slopes(NamedTuple):
-    """Windows' poses as they are compared, in metres.
+    """Windows' poses (M, 3) as they are compared, in metres: forward, left, and heading times the median way.
 
-    Attributes:
-        residuals: Measured less predicted (M, 3): forward, left, and heading times the median way.
-        columns: Change of the prediction per weight (M, 3, weights), curve by curve.
-        block: The block of each pose (M,).
+    `columns` is the change of the prediction per weight (M, 3, weights), curve by curve.
     """
 
     residuals: Floats
@@ -411,13 +377,7 @@ def choose_windows(drives: Drives) -> Windows:
 
 
 def slopes_of(drives: Drives, theta: Theta, offered: Learnt) -> Slopes:
-    """Linearise windows in the weights of learnt curves, around a model that may have a learnt effect itself.
-
-    Args:
-        drives: What is fitted.
-        theta: The model.
-        offered: The curves whose weights may change.
-    """
+    """Linearise windows in the weights of the curves offered, around a model that may have a learnt effect itself."""
     windows = choose_windows(drives)
     begin, window = windows.begin, windows.window
     tick = drives.last[windows.increment] - drives.first[begin][window]
@@ -444,12 +404,7 @@ def _pose_slopes(
 ) -> Floats:
     """Change of compared poses (M, 3, weights) per weight of the curves, to first order; places as complex numbers.
 
-    Args:
-        twists: Those of the windows (W, length, 3).
-        walked: The tracked places along them (W, length + 1, 3).
-        features: What each weight of a curve adds in each tick (W, length, knots), and its unit, a twist (3,).
-        at: Window and tick after which each pose is compared, (M,) each.
-        tick_s: Length of a tick [s].
+    Features are what each weight adds in a tick, and its unit, a twist; `at` is the window and tick of each pose.
     """
     poses = integrate_twists(twists, tick_s)
     cosine, sine = cosine_and_sine(poses[:, 1:, 2] - twists[..., 2] * (tick_s / 2.0))
@@ -468,21 +423,17 @@ def _pose_slopes(
 
 FEWEST = 20
 """Of fewer windows that were driven several times nothing is said."""
-
 ALIKE = 1e-6
 """Commands that differ by less than this [duty] are the same."""
-
 ALIKE_AT_START = 0.1
 """Drives that begin in motion repeat each other if they begin about so equally fast [duty]."""
 
 
 class Repeated(NamedTuple):
-    """The scatter of drives from the same commands, beside the error of a model.
+    """The scatter of drives from the same commands: what they do not repeat, RMSE of position [m].
 
-    Attributes:
-        share: What they do not repeat, by the model's error over the same windows: at 1 it predicts all that repeats.
-        apart: What they do not repeat: RMSE of position [m].
-        part: The share of all windows that have repeats.
+    Its `share` of the model's error over the same windows is 1 where the model predicts all that repeats; `part` of all
+    windows have repeats.
     """
 
     share: Ratio
@@ -493,13 +444,8 @@ class Repeated(NamedTuple):
 def compare_repeats(drives: Drives, theta: Theta, horizon_s: float) -> Repeated | None:
     """Compare a model's error with what drives do not repeat; None where too little was driven twice.
 
-    Of windows driven n times the mean is taken off, and n/(n − 1) gives back
-    what that takes: for two drives, √(½ mean square of their difference).
-
-    Args:
-        drives: All drives of a log, each as one block, so that windows of repeats begin together.
-        theta: The model.
-        horizon_s: Length of the windows [s].
+    Of windows driven n times the mean is taken off, and n/(n − 1) gives back what that takes: for two drives, √(½ mean
+    square of their difference). Each drive of the log is one block: windows of repeats begin together.
     """
     windows = cut(drives, horizon_s)
     if len(windows.begin) < FEWEST:

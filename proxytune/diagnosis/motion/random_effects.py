@@ -33,21 +33,17 @@ from proxytune.effects import Draws, Lateness
 
 MEMORY_S = 2.5
 """A command moves nothing any more after so long."""
-
 GRID = 25
 """Sizes that are tried at first, evenly in their logarithm."""
-
 SHIFTS = 99
 """How often the null distribution is drawn."""
 
 
 class Responses(NamedTuple):
-    """Responses of the innovations to the loss of single commands: one row per command that changed anything.
+    """Responses of the innovations to the loss of single commands, a row per command that changed anything.
 
-    Attributes:
-        gradient: Inner product of the change of the innovations with the innovations.
-        size: Inner product of the change with itself.
-        others: The gradient had the innovations been others (columns, commands).
+    `gradient` and `size` are products of the change with the innovations and with itself; `others` the gradient with
+    other innovations (columns, commands).
     """
 
     gradient: Floats
@@ -56,15 +52,9 @@ class Responses(NamedTuple):
 
 
 class RandomEffect(NamedTuple):
-    """A random effect weighed.
+    """A random effect weighed: its likeliest size, and its gain beyond what chance gives on average [nats].
 
-    Attributes:
-        effect: Its name in the catalogue.
-        parameter: The name of its parameter in θ.
-        value: Its likeliest size.
-        interval: Where the size lies; all sizes that are looked for, until `infer_size_indirectly` narrows them.
-        gain: Its gain in log-likelihood beyond what chance gives on average [nats].
-        p_value: How often chance gains as much.
+    The interval is all sizes that are looked for, until `infer_size_indirectly` narrows it.
     """
 
     effect: str
@@ -126,19 +116,14 @@ def _mixture(late: Lateness, gradient: Floats, energy: Floats) -> Floats:
 
 
 def responses(fitted: Fit, others: Floats) -> Responses:
-    """Replay the drives with each command lost, and see what changes.
+    """Replay the drives with each command lost, and see what changes, and what would of other innovations.
 
     Commands far apart are lost together, so that one replay tells of many.
-
-    Args:
-        fitted: The model, and what it leaves over.
-        others: Other innovations, for which the same is asked (3N, columns).
     """
     drives = fitted.drives
     changed, phase = _changed_commands(drives)
     values = np.concatenate((fitted.innovations[:, None], others), axis=1)
-    heard = _Innovations(values, values**2)
-    found = [_respond_to_phase(fitted, changed[phase == number], heard) for number in np.unique(phase)]
+    found = [_respond_to_phase(fitted, changed[phase == number], values) for number in np.unique(phase)]
     if not found:
         return Responses(np.empty(0), np.empty(0), np.empty((others.shape[1], 0)))
     size, gradients = (np.concatenate(part) for part in zip(*found, strict=True))
@@ -168,14 +153,7 @@ def _lose_commands(drives: Drives, lost: Whole) -> Floats:
     return duties
 
 
-class _Innovations(NamedTuple):
-    """The innovations of a model and others beside them (3N, columns), and their squares."""
-
-    values: Floats
-    squares: Floats
-
-
-def _respond_to_phase(fitted: Fit, lost: Whole, heard: _Innovations) -> tuple[Floats, Floats]:
+def _respond_to_phase(fitted: Fit, lost: Whole, heard: Floats) -> tuple[Floats, Floats]:
     """The size of the response to each command of one phase (commands,), and its gradients (commands, columns)."""
     drives = fitted.drives
     without = increments_along(drives, paths(drives, fitted.theta, _lose_commands(drives, lost)))
@@ -186,47 +164,31 @@ def _respond_to_phase(fitted: Fit, lost: Whole, heard: _Innovations) -> tuple[Fl
     after = np.where((at >= 0) & (lost[np.maximum(at, 0), 0] == drives.episode), at, -1)
     label = np.repeat(after, 3)
     size = sum_by(label, change**2, len(lost))
-    gradients = sum_by(label, heard.values, len(lost), change)
-    return size, gradients / _loudness(label, change, heard, gradients / (size[:, None] + 1e-12))
-
-
-def _loudness(label: Whole, change: Floats, heard: _Innovations, share: Floats) -> Floats:
-    """Standard deviation of what the loss of a command does not explain, where it acts, at least 1 (commands, columns).
-
-    After a command all motion may be harder to predict: only what points its way speaks for its loss.
-    """
+    gradients = sum_by(label, heard, len(lost), change)
+    # After a command all motion may be harder to predict: only what points its way speaks for its loss.
+    share = gradients / (size[:, None] + 1e-12)
     weight, count = np.abs(change), len(share)
     total = sum_by(label, weight, count)[:, None] + 1e-12
-    along = sum_by(label, heard.values, count, weight * change)
+    along = sum_by(label, heard, count, weight * change)
     cubes = sum_by(label, weight, count, change**2)[:, None]
-    energy = sum_by(label, heard.squares, count, weight) - 2.0 * share * along + share**2 * cubes
-    return np.asarray(np.sqrt(np.maximum(1.0, energy / total)))
+    energy = sum_by(label, heard**2, count, weight) - 2.0 * share * along + share**2 * cubes
+    return size, gradients / np.sqrt(np.maximum(1.0, energy / total))
 
 
 SMALLEST, LARGEST, SIZES = 0.6, 3.0, 8
 """Simulated sizes lie between these multiples of the likeliest one."""
-
 DRAWS = 5
 """Drives are simulated so often for each size."""
-
 QUIETEST = 0.1
 """Noise has at least this share of the innovations' variance."""
-
 STEPS = 3
 """Newton steps of the free parameters: a lost command is an outlier, which a robust fit hardly follows."""
-
 WIDE = 2.2
 """Half an interval is so many standard deviations between simulated drives: 95 % for some thirty of them."""
 
 
 def infer_size_indirectly(model: Fit, effect: RandomEffect, seed: int) -> RandomEffect:
-    """Give the effect the size at which simulated drives say what the measured ones do, and its interval.
-
-    Args:
-        model: The model without the effect, whose delay has its mean lateness.
-        effect: The effect, as the likelihood of single commands has it.
-        seed: Of draws and noise.
-    """
+    """Give the effect the size at which simulated drives say what the measured ones do, and its interval."""
     draws, rate = RANDOM_EFFECTS[effect.effect], model.drives.rate_hz
     sizes = np.geomspace(SMALLEST * effect.value, min(LARGEST * effect.value, draws.sizes[1]), SIZES)
     simulated = [_simulate_innovations(model, effect, size, seed + n) for n in range(DRAWS) for size in sizes]

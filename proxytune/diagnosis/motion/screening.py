@@ -47,16 +47,7 @@ def motion_effects(catalogue: Catalogue) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Candidate:
-    """One form of an effect: what is free in it, what is fixed, and where a search starts.
-
-    Attributes:
-        effect: Its name in the catalogue.
-        form: The name of this form, `left wheel`; empty for the plain one.
-        free: Its coordinates.
-        fixed: Its other parameters.
-        neutral: Where the model has its coordinates.
-        probes: Where a search starts, one value per coordinate.
-    """
+    """One form of an effect: what is free in it, what is fixed, where the model has it, and where a search starts."""
 
     effect: str
     form: str
@@ -72,13 +63,7 @@ class Candidate:
 
 
 def candidates(robot: Robot, theta: Theta, taken: Iterable[str]) -> tuple[Candidate, ...]:
-    """List every form of every deterministic motion effect that is not taken.
-
-    Args:
-        robot: The robot, whose catalogue says what there is.
-        theta: Values of effects that the model has: a form starts from there.
-        taken: Names of effects that are declared or adopted.
-    """
+    """List every form of every deterministic motion effect that is not taken, from where θ has it."""
     left_out = {*taken, *RANDOM_EFFECTS}
     names = (name for name in motion_effects(robot.catalogue) if name not in left_out)
     return tuple(form for name in names for form in _forms(name, robot, theta))
@@ -119,17 +104,13 @@ def _candidate(effect: str, kind: type[Effect], form: Form, known: Mapping[str, 
 
 SIZES = 240
 """So many sizes of a step are tried: the loss over a step of the command is a spike 2 % wide."""
-
 SMALLEST_SHARE = 0.02
 """The smallest of them, as a share of the largest."""
-
 PART_S, STRETCH_S, WARM_UP_S = 60.0, 8.0, 2.0
 """They are tried on so much driving, in stretches of this length; the warm-up of each is not compared."""
-
 CELL_M = 0.3
 RADII_M = (0.4, 1.0)
 """Places lie so far apart, and patches of these radii are tried round each."""
-
 MOST_PLACES = 40
 
 LARGEST_STEP = 1.5
@@ -210,10 +191,8 @@ def cut_part(drives: Drives) -> Drives:
 
 FLIPS = 499
 """How often the null distribution is drawn."""
-
 FLIP_S = 1.0
 """Innovations keep their sign together for so long: longer than their correlation."""
-
 FURTHEST = 2.0
 """A step may go so many times as far as its probe."""
 
@@ -240,14 +219,8 @@ class ScreenedCandidate(NamedTuple):
     column: Floats
 
 
-@dataclass(frozen=True)
-class _Probe:
-    """One probe of one form: where it sets out from, and the change of the innovations along each coordinate."""
-
-    candidate: Candidate
-    begin: tuple[float, ...]
-    values: tuple[float, ...]
-    columns: Floats
+_Probe = tuple[Candidate, tuple[float, ...], tuple[float, ...], Floats]
+"""A form, where one of its probes sets out from and goes to, and the innovations' change along each coordinate."""
 
 
 def screen(base: Fit, forms: Sequence[Candidate], seed: int) -> list[ScreenedCandidate]:
@@ -256,7 +229,7 @@ def screen(base: Fit, forms: Sequence[Candidate], seed: int) -> list[ScreenedCan
     if not probes:
         return []
     weight, clipped = np.abs(base.innovations) < HUBER, clip_outliers(base.innovations)[:, None]
-    projected = [project_out(base.slopes, probe.columns, weight) for probe in probes]
+    projected = [project_out(base.slopes, columns, weight) for *_, columns in probes]
     stretch = number_stretches(base.drives)
     count = int(stretch.max()) + 1
     flips = np.random.default_rng(seed).choice((-1.0, 1.0), size=(FLIPS, count))
@@ -267,19 +240,18 @@ def screen(base: Fit, forms: Sequence[Candidate], seed: int) -> list[ScreenedCan
         hessian = columns.T @ (columns * weight[:, None])
         gain, step = _step(gradients.sum(axis=0), hessian)
         chance = np.maximum(chance, _gains(flips @ gradients, hessian))
-        old = best.get(probe.candidate.label)
-        if old is None or gain > old[0]:
-            best[probe.candidate.label] = (gain, step, probe, columns)
+        label = probe[0].label
+        if label not in best or gain > best[label][0]:
+            best[label] = (gain, step, probe, columns)
     plain = float(held_out_log_likelihood(base).sum())
     found = []
-    for gain, step, probe, columns in best.values():
+    for gain, step, (form, begin, values, _), columns in best.values():
         slopes = np.concatenate((base.slopes, columns), axis=1) if step.any() else base.slopes
         stepped = replace(base, innovations=base.innovations + columns @ step, slopes=slopes)
         p_value = float((1 + (chance >= gain).sum()) / (1 + FLIPS))
         held_out = float(held_out_log_likelihood(stepped).sum()) - plain
-        way = zip(probe.begin, probe.values, step, strict=True)
-        start = tuple(float(begin + m * (value - begin)) for begin, value, m in way)
-        found.append(ScreenedCandidate(probe.candidate, start, probe.values, gain, held_out, p_value, columns @ step))
+        start = tuple(float(one + m * (value - one)) for one, value, m in zip(begin, values, step, strict=True))
+        found.append(ScreenedCandidate(form, start, values, gain, held_out, p_value, columns @ step))
     return sorted(found, key=lambda one: -one.gain)
 
 
@@ -292,7 +264,7 @@ def _probes(base: Fit, form: Candidate) -> list[_Probe]:
         moved = [theta_at(start, form.free, np.array((*begin[:j], v, *begin[j + 1 :]))) for j, v in enumerate(values)]
         columns = np.stack([here - increments(base.drives, theta) for theta in moved], -1)
         if np.abs(columns).max() > 1e-9:
-            found.append(_Probe(form, begin, values, base.whiten.whiten(columns)))
+            found.append((form, begin, values, base.whiten.whiten(columns)))
     return found
 
 

@@ -55,11 +55,6 @@ def select_effects(base: Fit, seed: int, report: Progress) -> Findings:
 
     What was chosen beside an effect that does harm may be wrong. So the search is then made once more without that
     effect, and taken where it predicts no worse.
-
-    Args:
-        base: The model with declared parameters only, fitted.
-        seed: Of the null distributions and of draws.
-        report: Takes a line about each step, as it begins.
     """
     first, misled = _search_and_drop(base, seed, report, ())
     if not misled:
@@ -86,14 +81,7 @@ def _search_and_drop(
 
 
 def search(base: Fit, seed: int, report: Progress, without: Collection[str] = ()) -> Findings:
-    """Add what a model is missing, one effect at a time.
-
-    Args:
-        base: The model, fitted.
-        seed: Of the null distributions.
-        report: Takes a line about each step, as it begins.
-        without: Effects that are not to be added.
-    """
+    """Add what a model is missing, one effect at a time, but not those it is to be without."""
     rules = base.drives.rules
     declared = {effect_of(name) for coordinate in base.free for name in coordinate} | set(without)
     of_car = base.drives.robot.drive == "ackermann"
@@ -159,14 +147,7 @@ def drop_unconfirmed(
 
 
 def choose_best(model: Fit, evidence: Evidence, least: float, p_value: float | None = None) -> FittedCandidate | None:
-    """Choose the effect with most evidence, if that is more than chance and predicts no worse.
-
-    Args:
-        model: The model without it.
-        evidence: What speaks for each effect.
-        least: Evidence that it needs [nats].
-        p_value: Chance that it may have of being none, if not that of the rules.
-    """
+    """Choose the effect with most evidence, if that is more than chance and predicts no worse."""
     rules = model.drives.rules
     most = rules.p_value if p_value is None else p_value
     fits = [one for one in evidence.fits.values() if one.screened and one.screened.p_value <= most]
@@ -243,13 +224,7 @@ def predicts_no_worse(one: Fit, other: Fit) -> bool:
 
 
 def adopt(adopted: list[AdoptedEffect], best: FittedCandidate, evidence: Evidence) -> list[AdoptedEffect]:
-    """Add an effect to those of a model, with the rivals that the same evidence leaves it.
-
-    Args:
-        adopted: The effects so far.
-        best: The effect that is adopted.
-        evidence: What spoke for it and for all others.
-    """
+    """Add an effect to those of a model, with the rivals that the same evidence leaves it."""
     if (draw := best.random) is not None:
         rules = best.fitted.drives.rules
         least = min(draw.gain - rules.rival_nats, rules.rival_share * draw.gain)
@@ -261,10 +236,7 @@ def adopt(adopted: list[AdoptedEffect], best: FittedCandidate, evidence: Evidenc
     form = best.screened.candidate
     names = tuple(dict.fromkeys([name for coordinate in form.free for name in coordinate] + list(form.fixed)))
     rivals = _rivals(best, best.screened, evidence)
-    return [
-        *adopted,
-        AdoptedEffect(form.effect, form.form, names, form.free, best.gain, best.screened.p_value, rivals),
-    ]
+    return [*adopted, AdoptedEffect(form.effect, form.form, names, form.free, best.gain, best.screened.p_value, rivals)]
 
 
 def _rivals(best: FittedCandidate, chosen: ScreenedCandidate, evidence: Evidence) -> tuple[Candidate, ...]:

@@ -42,31 +42,16 @@ from proxytune.space import Theta
 
 KNOTS = 6
 """Corners of a curve over a signal."""
-
 PATCH_M = 0.3
 MOST_PATCHES = 14
 """Over a position, corners lie this far apart [m], but there are no more than so many."""
-
-
-class _Signal(NamedTuple):
-    """A signal (E, T), its unit, and the motion that depends on it, per basis function (E, T, 3, columns)."""
-
-    name: Cue
-    signal: Floats
-    unit: str
-    twists: Floats
+_Signal = tuple[Cue, Floats, str, Floats]
+"""A signal (E, T), its unit, and the motion that depends on it, per basis function (E, T, 3, columns)."""
 
 
 @dataclass(frozen=True)
 class SignalGroup:
-    """Flexible motion that depends on one signal.
-
-    Attributes:
-        name: What people call the signal.
-        signal: The signal over time, for drawing (E, T).
-        unit: Its unit.
-        make: Makes the motion that depends on it: of long drives it is too large to be kept.
-    """
+    """Flexible motion that depends on one signal (E, T); `make` makes it: of long drives it is too large to keep."""
 
     name: Cue
     signal: Floats
@@ -76,7 +61,7 @@ class SignalGroup:
     @property
     def twists(self) -> Floats:
         """Motion added to that of the model, per basis function (E, T, 3, columns): [m/s], [m/s], [rad/s]."""
-        return self.make().twists
+        return self.make()[-1]
 
 
 @dataclass(frozen=True)
@@ -101,9 +86,9 @@ def signal_groups(fitted: Fit) -> Iterator[SignalGroup]:
     )
     both = (_command_level, _transients, _after_reversal, _time, _use, _turning, _heading, _position, _direction)
     for maker in (*both, *((_steering,) if fitted.drives.robot.drive == "ackermann" else of_wheels)):
-        made = maker(motion)
-        if np.abs(made.twists).max() > 1e-9:
-            yield SignalGroup(made.name, made.signal, made.unit, partial(maker, motion))
+        name, signal, unit, twists = maker(motion)
+        if np.abs(twists).max() > 1e-9:
+            yield SignalGroup(name, signal, unit, partial(maker, motion))
 
 
 def _motion(fitted: Fit) -> _Motion:
@@ -153,19 +138,19 @@ def _command_level(motion: _Motion) -> _Signal:
     full = motion.drives.robot.figures["full_speed"]
     lagged = [side / full for side in (motion.left, motion.right)]
     columns = [hats(side, 9) * full for side in lagged]
-    return _Signal(Cue.WHEEL_COMMAND, lagged[0], "duty", _of_wheels(motion, *columns))
+    return Cue.WHEEL_COMMAND, lagged[0], "duty", _of_wheels(motion, *columns)
 
 
 def _wheel_difference(motion: _Motion) -> _Signal:
     signal = motion.commands[..., 1] - motion.commands[..., 0]
     columns = hats(signal)
-    return _Signal(Cue.COMMAND_DIFFERENCE, signal, "duty", _twists(columns, yaw=columns))
+    return Cue.COMMAND_DIFFERENCE, signal, "duty", _twists(columns, yaw=columns)
 
 
 def _steering(motion: _Motion) -> _Signal:
     signal = motion.commands[..., 1]
     columns = hats(signal, 9) * motion.forward[..., None]
-    return _Signal(Cue.STEERING, signal, "full lock", _twists(columns, yaw=columns))
+    return Cue.STEERING, signal, "full lock", _twists(columns, yaw=columns)
 
 
 def _transients(motion: _Motion) -> _Signal:
@@ -181,7 +166,7 @@ def _transients(motion: _Motion) -> _Signal:
         twists = _twists(parts[0] * full, yaw=parts[1] * motion.forward[..., None])
     else:
         twists = _of_wheels(motion, *(p * full for p in parts))
-    return _Signal(Cue.TRANSIENTS, signal, "duty", twists)
+    return Cue.TRANSIENTS, signal, "duty", twists
 
 
 def _smooth(signal: Floats, ticks: float) -> Floats:
@@ -195,7 +180,7 @@ def _after_reversal(motion: _Motion) -> _Signal:
         gone = _since_reversal(speed) / motion.drives.tick_hz
         columns.append(np.stack([np.exp(-gone / reach) for reach in (0.005, 0.015, 0.04, 0.12)], -1) * speed[..., None])
     signal = _since_reversal(motion.left) / motion.drives.tick_hz
-    return _Signal(Cue.REVERSAL, signal, "m", _of_wheels(motion, *columns))
+    return Cue.REVERSAL, signal, "m", _of_wheels(motion, *columns)
 
 
 def _since_reversal(speed: Floats) -> Floats:
@@ -214,14 +199,14 @@ def _time(motion: _Motion) -> _Signal:
     signal = np.broadcast_to(np.arange(motion.left.shape[1]) / motion.drives.tick_hz, motion.left.shape)
     columns = hats(signal)[..., 1:]
     wheels = _of_wheels(motion, columns * motion.left[..., None], columns * motion.right[..., None])
-    return _Signal(Cue.TIME, signal, "s", wheels)
+    return Cue.TIME, signal, "s", wheels
 
 
 def _use(motion: _Motion) -> _Signal:
     use = np.cumsum(np.abs(motion.commands).mean(axis=-1), axis=1) / motion.drives.tick_hz
     columns = hats(use)[..., 1:]
     twists = _twists(columns * motion.forward[..., None], yaw=columns * motion.yaw[..., None])
-    return _Signal(Cue.USE, use, "s at full duty", twists)
+    return Cue.USE, use, "s at full duty", twists
 
 
 def _turning(motion: _Motion) -> _Signal:
@@ -229,7 +214,7 @@ def _turning(motion: _Motion) -> _Signal:
     bend = hats(motion.forward * motion.yaw)
     sideways = np.concatenate((bend[..., :-1] - bend[..., 1:], columns), axis=-1)
     twists = _twists(columns * motion.forward[..., None], sideways, columns)
-    return _Signal(Cue.TURN_RATE, motion.yaw, "rad/s", twists)
+    return Cue.TURN_RATE, motion.yaw, "rad/s", twists
 
 
 def _heading(motion: _Motion) -> _Signal:
@@ -237,7 +222,7 @@ def _heading(motion: _Motion) -> _Signal:
     waves = np.stack([wave(k * angle) for k in (1, 2) for wave in (np.cos, np.sin)], axis=-1)
     moving = np.minimum(1.0, np.abs(motion.forward) / 0.02)[..., None]
     twists = _twists(waves * moving, waves * motion.forward[..., None], waves * np.abs(motion.forward)[..., None])
-    return _Signal(Cue.HEADING, np.mod(angle, 2.0 * np.pi), "rad", twists)
+    return Cue.HEADING, np.mod(angle, 2.0 * np.pi), "rad", twists
 
 
 def _position(motion: _Motion) -> _Signal:
@@ -251,7 +236,7 @@ def _position(motion: _Motion) -> _Signal:
     columns = np.concatenate(parts, axis=-1)
     forward, yaw = columns * motion.forward[..., None], columns * motion.yaw[..., None]
     twists = _twists(forward, yaw=np.concatenate((yaw, columns * np.abs(motion.forward)[..., None]), axis=-1))
-    return _Signal(Cue.POSITION, places[..., 0], "m", twists)
+    return Cue.POSITION, places[..., 0], "m", twists
 
 
 def _wheel_angle(motion: _Motion, side: int, name: Cue) -> _Signal:
@@ -259,7 +244,7 @@ def _wheel_angle(motion: _Motion, side: int, name: Cue) -> _Signal:
     speed = (motion.left, motion.right)[side]
     waves = np.stack([wave(k * angle) for k in (1, 2) for wave in (np.cos, np.sin)], axis=-1) * speed[..., None]
     own: Mapping[int, Floats] = {side: waves}
-    return _Signal(name, np.mod(angle, 2.0 * np.pi), "rad", _of_wheels(motion, own.get(0), own.get(1)))
+    return name, np.mod(angle, 2.0 * np.pi), "rad", _of_wheels(motion, own.get(0), own.get(1))
 
 
 def _direction(motion: _Motion) -> _Signal:
@@ -267,12 +252,11 @@ def _direction(motion: _Motion) -> _Signal:
     twists = _twists(
         back * motion.forward[..., None], yaw=np.concatenate((back * motion.yaw[..., None], back), axis=-1)
     )
-    return _Signal(Cue.DIRECTION, np.sign(motion.forward), "", twists)
+    return Cue.DIRECTION, np.sign(motion.forward), "", twists
 
 
 RIDGES = (1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0)
 """Pulls towards no curve at all that are tried, as fractions of what a basis function's weight is held by."""
-
 REFITTED = 3
 """How many groups are fitted again."""
 

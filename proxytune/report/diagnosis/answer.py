@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from rich.console import Group
 from rich.text import Text
 
-from proxytune.diagnosis import CameraDiagnosis, Diagnosis, Estimate, LogDiagnosis, PictureError
+from proxytune.diagnosis import CameraDiagnosis, Diagnosis, Estimate, LogDiagnosis, PictureError, Ratio, Rmse
 from proxytune.report.diagnosis.camera_figures import camera_figures
 from proxytune.report.diagnosis.camera_notes import camera_headline, camera_notes
 from proxytune.report.diagnosis.document import (
@@ -23,9 +23,10 @@ from proxytune.report.diagnosis.figures import motion_figures
 from proxytune.report.diagnosis.notes import motion_headline, motion_notes, next_drives
 from proxytune.report.export.player import commands_text, player_text
 from proxytune.report.html import write_page
-from proxytune.report.meanings import findings
+from proxytune.report.meanings import findings, fitted
 from proxytune.report.text import group_texts, table_text
 from proxytune.report.view import Paragraphs, Part, Picture, Table, View, columns_of, foot_of
+from proxytune.report.wording import fixed, short, span
 from proxytune.report.writing import save_figure, svg_of, write_text
 
 MOST_TRIED = 8
@@ -179,11 +180,13 @@ def diagnosis_headline(found: LogDiagnosis) -> str:
 
 
 def _motion_said(diagnosis: Diagnosis) -> str:
-    return motion_headline(diagnosis, findings(motion_effects(diagnosis), diagnosis.robot.catalogue))
+    found = findings(motion_effects(diagnosis), diagnosis.robot.catalogue)
+    return motion_headline(diagnosis, found, fitted(diagnosis.declared, diagnosis.theta))
 
 
 def _camera_said(log: str, diagnosis: CameraDiagnosis) -> str:
-    return camera_headline(log, diagnosis, findings(camera_effects(diagnosis)))
+    found = findings(camera_effects(diagnosis))
+    return camera_headline(log, diagnosis, found, fitted(diagnosis.declared, diagnosis.theta))
 
 
 def diagnosis_notes(found: LogDiagnosis) -> list[str]:
@@ -212,30 +215,25 @@ def diagnosis_pictures(figures: Mapping[str, bytes]) -> list[Picture]:
 def _motion_tables(diagnosis: Diagnosis) -> list[Table]:
     """Parameters, errors by length of the window, and the effects tried, best first."""
 
-    def millimetres(value: float, interval: tuple[float, float], heading: float) -> str:
-        return f"{1e3 * value:.1f} [{1e3 * interval[0]:.1f} … {1e3 * interval[1]:.1f}] ({57.2958 * heading:.2f})"
+    def with_ends(one: Rmse | Ratio, scale: float, decimals: int) -> str:
+        ends = span((scale * one.interval[0], scale * one.interval[1]), decimals)
+        return f"{fixed(scale * one.value, decimals)} ({ends})"
 
+    rows = list[tuple[str, ...]]()
     confirmed = [(diagnosis.confirmed, ", bullet")] if diagnosis.confirmed else []
-    errors = tuple(
-        (
-            f"{error.horizon_s:g} s{plant}",
-            millimetres(error.before.value, error.before.interval, error.heading_before.value),
-            millimetres(error.after.value, error.after.interval, error.heading_after.value),
-            f"{error.ratio.value:.2f} ({error.ratio.interval[0]:.2f} … {error.ratio.interval[1]:.2f})",
-            f"{1e3 * error.floor.lower:.1f} to {1e3 * error.floor.upper:.1f} ({57.2958 * error.heading_floor:.2f})",
-        )
-        for error, plant in [*((error, "") for error in diagnosis.errors), *confirmed]
-    )
+    for error, plant in [*((error, "") for error in diagnosis.errors), *confirmed]:
+        place = (with_ends(error.before, 1e3, 1), with_ends(error.after, 1e3, 1), with_ends(error.ratio, 1.0, 2))
+        floor = span((1e3 * error.floor.lower, 1e3 * error.floor.upper), 1)
+        headings = (error.heading_before.value, error.heading_after.value, error.heading_floor)
+        before, after, least = (fixed(float(np.degrees(one)), 2) for one in headings)
+        rows += [(f"{error.horizon_s:g} s{plant}", *place, floor), ("  heading [deg]", before, after, "", least)]
     tried = tuple(
         (one.effect, one.form, f"{one.gain:.1f}", f"{one.p_value:.3f}") for one in diagnosis.found.tried[:MOST_TRIED]
     )
-    title, heads = (
-        "Error on held-out drives: RMSE of position [mm] (heading [deg])",
-        ("before", "after", "after / before"),
-    )
+    title, heads = "Error on held-out drives: RMSE of position [mm]", ("before", "after", "after / before")
     return [
         _parameters_table("Fitted parameters", diagnosis.declared, diagnosis.theta),
-        Table(title, columns_of(("window",), (*heads, "noise floor")), errors),
+        Table(title, columns_of(("window",), (*heads, "noise floor")), tuple(rows)),
         Table("Effects tried, best first", columns_of(("effect", "form"), ("log-likelihood gain [nats]", "p")), tried),
     ]
 
@@ -244,8 +242,7 @@ def _camera_tables(diagnosis: CameraDiagnosis) -> list[Table]:
     """Parameters, and errors on frames kept aside."""
 
     def with_interval(error: PictureError, decimals: int) -> str:
-        low, high = error.interval
-        return f"{error.value:.{decimals}f} [{low:.{decimals}f} … {high:.{decimals}f}]"
+        return f"{fixed(error.value, decimals)} ({span(error.interval, decimals)})"
 
     rows = []
     for name, error, decimals in (("markings [px]", diagnosis.pixels, 2), ("brightness [grey]", diagnosis.grey, 1)):
@@ -266,7 +263,9 @@ def _parameters_table(title: str, declared: Mapping[str, Estimate], theta: Mappi
         if name.endswith(".imbalance") and after.value == 0.0:
             continue
         low, high = after.interval
-        old = f"{declared[name].value:.4g}" if name in declared else ""
-        rows.append((name, old, f"{after.value:.4g}", f"{low:.4g} … {high:.4g}" if low < high else "", after.unit))
+        old = short(declared[name].value, 4) if name in declared else ""
+        rows.append(
+            (name, old, short(after.value, 4), f"{short(low, 4)} to {short(high, 4)}" if low < high else "", after.unit)
+        )
     heads = columns_of(("parameter",), ("declared only", "effects added", "95 % interval"))
     return Table(title, (*heads, *columns_of(("unit",))), tuple(rows))

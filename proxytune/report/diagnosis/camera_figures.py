@@ -24,7 +24,17 @@ from proxytune.diagnosis import (
     rank_subsets,
 )
 from proxytune.report.diagnosis.error_figures import DECLARED_MODEL, with_effects
-from proxytune.report.figure_style import BLUE, COLUMN, GREEN, GREY, LIGHT_BLUE, VERMILLION, dress, legend_below
+from proxytune.report.figure_style import (
+    BLUE,
+    COLUMN,
+    GREEN,
+    GREY,
+    LIGHT_BLUE,
+    VERMILLION,
+    dress,
+    legend_below,
+    show_photo,
+)
 from proxytune.report.wording import plain
 
 LEAST_LOSS = 1.0
@@ -220,7 +230,7 @@ def markings_figure(diagnosis: CameraDiagnosis) -> Figure:
     panels = figure.subplots(down, across, squeeze=False)
     shown = product(frames, zip(models, COLOURS, strict=False))
     for axes, (frame, ((name, fit), colour)) in zip(panels.ravel(), shown, strict=True):
-        axes.imshow(diagnosis.gathered.pictures[frame], extent=(0, columns, rows, 0), interpolation="nearest")
+        show_photo(axes, diagnosis.gathered.pictures[frame], extent=(0, columns, rows, 0), interpolation="nearest")
         draw_outlines(axes, fit, frame, colour)
         axes.set_title(fill(f"{name}, frame {diagnosis.gathered.numbers[frame]}", TITLE), fontsize=7)
     label_places(panels)

@@ -22,9 +22,9 @@ RELATIVE = (
 )
 
 
-def camera_headline(log: str, diagnosis: CameraDiagnosis, found: str = "") -> str:
-    """What was found of the camera, then the verdict and what it means."""
-    return f"{log}: camera: {told(found, diagnosis.verdict)}: {CAMERA_MEANINGS[diagnosis.verdict]}"
+def camera_headline(log: str, diagnosis: CameraDiagnosis, found: str = "", beside: str = "") -> str:
+    """What was found and fitted of the camera, then the verdict and what it means."""
+    return f"{log}: camera: {told(found, beside, diagnosis.verdict)}: {CAMERA_MEANINGS[diagnosis.verdict]}"
 
 
 def camera_notes(diagnosis: CameraDiagnosis) -> list[str]:

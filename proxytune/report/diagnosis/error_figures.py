@@ -11,7 +11,17 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from proxytune.diagnosis import Diagnosis, Drives, Floats, Rmse, Whole, cut, pose_errors
-from proxytune.report.figure_style import BLUE, COLUMN, GREEN, GREY, VERMILLION, dress, legend_below, write_plain
+from proxytune.report.figure_style import (
+    BLUE,
+    COLUMN,
+    GREEN,
+    LIGHT_GREY,
+    SHADES,
+    VERMILLION,
+    dress,
+    legend_below,
+    write_plain,
+)
 from proxytune.report.wording import plain
 from proxytune.space import Theta
 
@@ -161,7 +171,7 @@ def _lines(axes: Axes, drives: Drives, strayed: Strayed, colour: str) -> list[tu
     centres = ((edges[:-1] + edges[1:]) / 2.0)[taken]
     axes.fill_between(centres, low, high, color=colour, alpha=0.18, linewidth=0)
     if not axes.get_legend_handles_labels()[1]:
-        axes.fill_between([], [], color=GREY, alpha=0.3, linewidth=0, label="10 to 90 % round the median")
+        axes.fill_between([], [], color=LIGHT_GREY, linewidth=0, label="10 to 90 % round the median")
     return [(centres, middle)]
 
 
@@ -228,7 +238,7 @@ def _panels(count: int, extent: Floats) -> tuple[Figure, list[Axes]]:
 def _paths(axes: Axes, drives: Drives, strayed: Strayed, scale: LogNorm) -> LineCollection:
     rows = np.split(strayed.increment, np.flatnonzero(np.diff(strayed.window)) + 1)
     lines = [np.concatenate((drives.poses[own[:1], 0, :2], drives.poses[own, 1, :2])) for own in rows]
-    paths = LineCollection(lines, array=strayed.rms, cmap="viridis", norm=scale, linewidths=1.2, capstyle="round")
+    paths = LineCollection(lines, array=strayed.rms, cmap=SHADES, norm=scale, linewidths=1.2, capstyle="round")
     axes.add_collection(paths)
     axes.autoscale_view()
     _arrows(axes, lines)
@@ -259,4 +269,4 @@ def _floor(axes: Axes, drives: Drives, strayed: Strayed, scale: LogNorm) -> Coll
     count = np.bincount(place, minlength=shape[0] * shape[1])
     total = np.bincount(place, strayed.rms[strayed.window], minlength=len(count))
     mean = np.ma.masked_array(total / np.maximum(1, count), count == 0).reshape(shape)
-    return axes.pcolormesh(*edges, mean.T, cmap="viridis", norm=scale, rasterized=True)
+    return axes.pcolormesh(*edges, mean.T, cmap=SHADES, norm=scale, rasterized=True)

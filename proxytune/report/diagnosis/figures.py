@@ -122,7 +122,7 @@ def _dots(axes: Axes, rows: Sequence[_Row]) -> None:
     axes.set_yticks(range(len(rows)), [row.name for row in rows])
     axes.set_ylim(len(rows) - 0.4, -0.6)
     dress(axes)
-    axes.tick_params(axis="y", labelsize=6.5)
+    axes.tick_params(axis="y", labelsize=7)
 
 
 SHOWN_AS = {

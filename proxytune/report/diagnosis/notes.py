@@ -16,7 +16,7 @@ from proxytune.diagnosis import (
     RobotClusters,
 )
 from proxytune.effects import PLACE, learnt_effect
-from proxytune.report.wording import fixed, listed
+from proxytune.report.wording import fixed, listed, percent
 from proxytune.space import Theta
 
 MEANINGS = {
@@ -31,8 +31,8 @@ AMPLE = 30.0
 """Log-likelihood gain [nats] in a minute above which one minute surely decides."""
 
 
-def motion_headline(diagnosis: Diagnosis, found: str = "") -> str:
-    """What was found, in the words of `meanings.findings`, then the verdict and what it means."""
+def motion_headline(diagnosis: Diagnosis, found: str = "", beside: str = "") -> str:
+    """What was found and fitted, in the words of `meanings`, then the verdict and what it means."""
     meaning = MEANINGS[diagnosis.verdict]
     if diagnosis.edges:
         end = f"{listed(diagnosis.edges)} at the end of the range"
@@ -40,12 +40,12 @@ def motion_headline(diagnosis: Diagnosis, found: str = "") -> str:
         stands = "stands" if len(diagnosis.edges) == 1 else "stand"
         meaning = f"{end} {stands} for something else, which no named effect explains{rest}"
     sure = f" (expected false names: at most {diagnosis.expected_false_names:.2f})" if diagnosis.effects else ""
-    return f"{diagnosis.log}: {told(found, diagnosis.verdict)}: {meaning}{sure}"
+    return f"{diagnosis.log}: {told(found, beside, diagnosis.verdict)}: {meaning}{sure}"
 
 
-def told(found: str, verdict: str) -> str:
-    """A verdict after what was found, as a sentence of its own where anything was."""
-    return f"{found}. {verdict.capitalize()}" if found else verdict
+def told(found: str, beside: str, verdict: str) -> str:
+    """A verdict after what was found, as a sentence of its own where anything was; what was fitted stands beside."""
+    return f"{found}{beside}. {verdict.capitalize()}" if found else f"{verdict}{beside}"
 
 
 def motion_notes(diagnosis: Diagnosis) -> list[str]:
@@ -132,7 +132,7 @@ def _label(effect: AdoptedEffect) -> str:
 
 def _ends(one: Ratio, decimals: int) -> str:
     low, high = per_cent(one)[1]
-    return f"{fixed(low, decimals)} to {'+' if high > 0.0 else ''}{fixed(high, decimals)}"
+    return f"{fixed(low, decimals)} to {'+' if low < 0.0 < high else ''}{fixed(high, decimals)}"
 
 
 def _cautions(diagnosis: Diagnosis) -> list[str]:
@@ -254,7 +254,7 @@ def _say_map(theta: Theta) -> list[str]:
                 here, there = float(weights[side].mean()), float(weights[~side].mean())
                 if abs(here) >= max(LEAST_SHARE, abs(there)):
                     kind = "slower" if here < 0.0 else "faster"
-                    words = f"{kind} by {abs(100.0 * here):.0f} % where {axis} {'>' if above else '<'} {line:.2g} m"
+                    words = f"{kind} by {percent(abs(here))} where {axis} {'>' if above else '<'} {line:.2g} m"
                     found.append((abs(here - there) * float(np.sqrt(side.mean() * (1.0 - side.mean()))), words))
     words = max(found)[1]
     return [f"as that map has it, the robot is {words}"] if words else []
@@ -264,7 +264,7 @@ def learnt_notes(learning: Learning) -> list[str]:
     """Say what was learnt; nothing where nothing was."""
     beside = learning.discrepancy
     notes = []
-    curves = ", ".join(f"{title} ({100.0 * beside.share[title]:.0f} %)" for title in beside.share)
+    curves = ", ".join(f"{title} ({percent(beside.share[title])})" for title in beside.share)
     if beside.used:
         worth = "; ".join(
             f"{error.horizon_s:g} s: {1e3 * error.after.value:.1f} mm, {error.ratio.value:.2f} "
@@ -278,9 +278,7 @@ def learnt_notes(learning: Learning) -> list[str]:
     if learning.looks_like is not None:
         like = learning.looks_like
         values = ", ".join(f"{name} {value:.3g}" for name, value in like.theta.items())
-        notes.append(
-            f"the curves look like {like.effect} ({values}), which alone keeps {100.0 * like.share:.0f} % of it"
-        )
+        notes.append(f"the curves look like {like.effect} ({values}), which alone keeps {percent(like.share)} of it")
     if learning.names_doubtful:
         notes.append(
             "beware: curves beside the declared model predict better than beside the named effects: the names are "

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure, SubFigure
 
 from proxytune.report.drive.scene import COLOURS, draw_map, draw_parting, draw_paths, map_aspect
-from proxytune.report.figure_style import COLUMN, GREY, LIGHT_GREY, dress
+from proxytune.report.figure_style import COLUMN, GREY, LIGHT_GREY, dress, show_photo
 from proxytune.report.text import WholeWords, table_text
 from proxytune.report.view import Table, columns_of
 from proxytune.report.wording import plain, short, with_unit
@@ -134,7 +134,7 @@ def _draw_pictures(pair: SideBySide, figure: SubFigure) -> None:
     for row, (side, episode) in zip(panels, filmed.items(), strict=True):
         assert episode.pictures is not None
         for axes, instant in zip(row, instants, strict=True):
-            axes.imshow(episode.pictures[np.argmin(np.abs(episode.commands["time"] - instant))])
+            show_photo(axes, episode.pictures[np.argmin(np.abs(episode.commands["time"] - instant))])
             axes.set(xticks=[], yticks=[])
             axes.spines[:].set_edgecolor(GREY)
         row[0].set_ylabel(side, color=COLOURS[side], fontsize=7)

@@ -10,8 +10,8 @@ from matplotlib.patheffects import Stroke, withStroke
 
 from proxytune.arrays import Floats
 from proxytune.driving import Road, draw_floor
-from proxytune.report.figure_style import BLUE, VERMILLION, dress
-from proxytune.study import SideBySide
+from proxytune.report.figure_style import BLUE, VERMILLION, dress, show_photo
+from proxytune.study import APART_M, SideBySide
 
 COLOURS: Mapping[str, str] = MappingProxyType({"proxy": BLUE, "target": VERMILLION})
 PALER = 0.6
@@ -54,7 +54,7 @@ def _draw_floor(axes: Axes, road: Road) -> None:
     end = floor.origin + len(floor.pixels) / floor.pixels_per_metre
     # Every other pixel shows the markings as well, at a quarter of the work
     paler = (255.0 - (255.0 - floor.pixels[::2, ::2]) * (1.0 - PALER)).astype(np.uint8)
-    axes.imshow(paler, extent=(floor.origin, end, floor.origin, end), origin="lower", interpolation="antialiased")
+    show_photo(axes, paler, extent=(floor.origin, end, floor.origin, end), origin="lower", interpolation="antialiased")
     axes.set(xlim=(0.0, road.size[0]), ylim=(0.0, road.size[1]))
 
 
@@ -78,9 +78,15 @@ def draw_paths(axes: Axes, pair: SideBySide) -> None:
     draw_start(axes, pair.proxy.places)
     edge: dict[str, Any] = {"markeredgecolor": "white", "markeredgewidth": 0.7, "clip_on": False, "zorder": 4}
     marks = {"start": ("black", pair.proxy.places[0])}
-    for side, episode in pair.sides.items():
-        marks[f"{side} ends"] = (COLOURS[side], episode.places[-1])
-        axes.plot(*episode.places[-1], "s", color=COLOURS[side], markersize=4.5, **edge)
+    ends = {side: episode.places[-1] for side, episode in pair.sides.items()}
+    for side, end in ends.items():
+        axes.plot(*end, "s", color=COLOURS[side], markersize=4.5, **edge)
+    together = len(ends) > 1 and np.ptp(list(ends.values()), axis=0).max() < APART_M
+    marks |= (
+        {"both end": ("black", ends["proxy"])}
+        if together
+        else {f"{side} ends": (COLOURS[side], end) for side, end in ends.items()}
+    )
     paths = np.concatenate([episode.places[::EVERY] for episode in pair.sides.values()])
     low, high = np.transpose([axes.get_xlim(), axes.get_ylim()])
     corners = corners_of(np.array([place for _, place in marks.values()]), paths, low, high)

@@ -17,7 +17,10 @@ from proxytune.report.figure_style import (
     BLUE,
     COLUMN,
     GREEN,
+    GREY,
     LIGHT_BLUE,
+    LIGHT_GREY,
+    SHADES,
     VERMILLION,
     LineName,
     dress,
@@ -64,8 +67,8 @@ def convergence_figure(result: StudyResult) -> Figure:
 def _draw_levels(axes: Axes, result: StudyResult) -> list[LineName]:
     """Chance, and the noise floor that a perfect proxy would score; with their names."""
     chance, floor = result.judged.chance, result.floor
-    named = [LineName(f"chance\n{chance.mean:.1f}", "0.45", chance.mean)]
-    axes.axhline(chance.mean, color="0.45", linewidth=1.0, linestyle=":", label=named[0].words)
+    named = [LineName(f"chance\n{chance.mean:.1f}", GREY, chance.mean)]
+    axes.axhline(chance.mean, color=GREY, linewidth=1.0, linestyle=":", label=named[0].words)
     if floor.value is not None and floor.low is not None and floor.high is not None:
         axes.axhspan(floor.low, floor.high, color=GREEN, alpha=0.15, linewidth=0)
         named.append(LineName(f"{floor_name(floor)}\n{floor.value:.1f}", GREEN, floor.value))
@@ -83,7 +86,7 @@ def _draw_trials(axes: Axes, result: StudyResult) -> None:
     if failed:
         axes.plot(failed, np.zeros(len(failed)), "x", color="black", markersize=4, label="failed")
     if bounds:
-        axes.plot(*zip(*bounds, strict=True), "^", color="0.45", markersize=4, label="stopped early, at least")
+        axes.plot(*zip(*bounds, strict=True), "^", color=GREY, markersize=4, label="stopped early, at least")
 
 
 def _draw_points(axes: Axes, points: list[tuple[int, float]], face: str, label: str) -> None:
@@ -150,7 +153,7 @@ def _draw_profile(axes: Axes, result: StudyResult, place: int) -> None:
     box, learnt = result.study.settings.space.intervals[place], result.knowledge
     low, high = learnt.intervals[box.name]
     for ends in ((box.low, low), (high, box.high)):
-        axes.axvspan(*ends, color="0.82", linewidth=0, label="excluded (95 %)")
+        axes.axvspan(*ends, color=LIGHT_GREY, linewidth=0, label="excluded (95 %)")
     values, density = density_of(result, place)
     axes.fill_between(values, density, color=BLUE, alpha=0.35, linewidth=0)
     axes.plot(values, density, color=BLUE, linewidth=1.2)
@@ -172,7 +175,7 @@ def density_of(result: StudyResult, place: int) -> tuple[Floats, Floats]:
     The density is per unit of the parameter; it is 0 where the posterior has no points at all.
     """
     box, posterior = result.study.settings.space.intervals[place], result.knowledge.posterior
-    values = box.low + (box.high - box.low) * posterior.points[:, place]
+    values = result.knowledge.values[:, place]
     heights, edges = np.histogram(values, bins=BINS, weights=posterior.weights, density=True)
     # Mirrored at its ends: at an end of the box nothing leaks out of it.
     smooth = gaussian_filter1d(heights, _reach(values, posterior.weights) / (edges[1] - edges[0]), mode="reflect")
@@ -189,7 +192,6 @@ def _reach(values: Floats, weights: Floats) -> float:
 
 PANEL = 0.92
 """Width in inches of a pair's panel, at least."""
-COLOURS = "viridis"
 CELLS, SMOOTH_SHADOW, EDGE, RIM = (6, 30), 1.0, 0.2, 0.2
 """The region's shadow: fewest and most cells across it, how many it is smoothed over, the level at which its edge is
 drawn, and how much of its width is left free round it."""
@@ -260,7 +262,7 @@ def _scatter_trials(axes: Axes, result: StudyResult, points: Floats, norm: Norma
     scored = np.array([trial.score is not None for trial in result.trials])
     scores = [trial.score for trial in result.trials if trial.score is not None]
     across, up = points[scored].T
-    axes.scatter(across, up, c=scores, cmap=COLOURS, norm=norm, s=14, linewidths=0, clip_on=False, zorder=2)
+    axes.scatter(across, up, c=scores, cmap=SHADES, norm=norm, s=14, linewidths=0, clip_on=False, zorder=2)
     cut = np.array([trial.state == "cut" for trial in result.trials])
     if cut.any():
         # Hollow: their colour is an estimate.
@@ -280,21 +282,18 @@ def _mark(axes: Axes, place: list[float], label: str) -> None:
 
 def _shadow(axes: Axes, result: StudyResult, places: tuple[int, int]) -> None:
     """Draw where the 95 % region lies, whatever the other parameters are."""
-    intervals, posterior = result.study.settings.space.intervals, result.knowledge.posterior
-    inside = posterior.points[posterior.inside][:, places]
+    intervals, learnt = result.study.settings.space.intervals, result.knowledge
+    inside = learnt.values[learnt.posterior.inside][:, places]
     low, high = inside.min(axis=0), inside.max(axis=0)
-    rim = RIM * (high - low) + 0.01
-    low, high = np.maximum(0.0, low - rim), np.minimum(1.0, high + rim)
+    ends = np.transpose([(intervals[place].low, intervals[place].high) for place in places])
+    rim = RIM * (high - low) + 0.01 * (ends[1] - ends[0])
+    low, high = np.maximum(ends[0], low - rim), np.minimum(ends[1], high + rim)
     cells = int(np.clip(1.5 * np.sqrt(len(inside)), *CELLS))
     edges = [np.linspace(low[side], high[side], cells + 1) for side in (0, 1)]
     counts, _, _ = np.histogram2d(inside[:, 0], inside[:, 1], bins=edges)
     smooth = np.pad(gaussian_filter(np.minimum(counts, 1.0), SMOOTH_SHADOW, mode="nearest"), 1, mode="edge")
     smooth /= smooth.max()
-    across, up = (
-        intervals[place].low
-        + (intervals[place].high - intervals[place].low) * np.concatenate([e[:1], 0.5 * (e[1:] + e[:-1]), e[-1:]])
-        for place, e in zip(places, edges, strict=True)
-    )
+    across, up = (np.concatenate([e[:1], 0.5 * (e[1:] + e[:-1]), e[-1:]]) for e in edges)
     axes.contourf(across, up, smooth.T, levels=[EDGE, 2.0], colors=[LIGHT_BLUE], alpha=0.35, zorder=0)
     axes.fill_between([], [], color=LIGHT_BLUE, alpha=0.35, linewidth=0, label=REGION)
 
@@ -321,7 +320,7 @@ def _key(axes: Axes, panels: Sequence[Axes], norm: Normalize, title: str) -> Non
     """The colours of PRPV and what the marks are, in the corner that the pairs leave free."""
     axes.set_axis_off()
     bar = axes.figure.colorbar(
-        ScalarMappable(norm, COLOURS), cax=axes.inset_axes((0.15, 0.8, 0.8, 0.08)), orientation="horizontal"
+        ScalarMappable(norm, SHADES), cax=axes.inset_axes((0.15, 0.8, 0.8, 0.08)), orientation="horizontal"
     )
     bar.ax.set_title(title, fontsize=7)
     bar.ax.tick_params(labelsize=7)
@@ -348,7 +347,7 @@ def importance_figure(result: StudyResult) -> Figure:
     axes.set_yticks(places, [plain(one.name) for one in ordered])
     axes.set_xlim(0.0, 1.0)
     axes.set_ylim(-0.6, len(ordered) - 0.4)
-    axes.xaxis.set_major_formatter(PercentFormatter(1.0))
+    axes.xaxis.set_major_formatter(PercentFormatter(1.0, symbol=" %"))
     dress(axes, "share in the variance of PRPV over the box")
     legend_below(figure, axes)
     return figure

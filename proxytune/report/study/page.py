@@ -89,7 +89,7 @@ def study_foot(settings: StudySettings, command: str | None = None) -> Foot:
         ("seed", str(settings.seed)),
     ]
     own = f"python -m proxytune study {shlex.quote(str(settings.home))}"
-    return foot_of(own if command is None else command, stated)
+    return foot_of(own if command is None else command, [(name, value) for name, value in stated if value])
 
 
 def _say_meaning(agents: int) -> str:

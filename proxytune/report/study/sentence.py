@@ -71,6 +71,7 @@ class Finding:
         starts: How many starts each agent drives from.
         most_starts: How many starts there are.
         confirm: How often the study drives its best θ again.
+        learnt: Whether it learns from earlier studies, which have no more starts than they have.
         declared: The effects on motion that θ belongs to, which `diagnose` is to tune in any case; None where the
             simulator is another, of which nobody knows whether its robot drives.
     """
@@ -95,6 +96,7 @@ class Finding:
     most_starts: int
     confirm: int
     declared: tuple[str, ...] | None
+    learnt: bool = False
 
     @property
     def least(self) -> KnownParameter:
@@ -211,7 +213,8 @@ def _say_what_to_add(finding: Finding) -> str:
         changes = f"whose scores change with {plain(finding.least.name)}"
         log = ", or a log for `diagnose`" if finding.declared is not None else ""
         return f"add an agent or a metric {changes}{best}{log}"
-    if finding.information is None or finding.information.limit != "starts":
+    # More starts than earlier studies were driven from would leave their trials out.
+    if finding.learnt or finding.information is None or finding.information.limit != "starts":
         return _more_trials(finding)
     if finding.starts == finding.most_starts:
         return f"add agents or metrics: all {finding.starts} starts are driven"
@@ -253,6 +256,7 @@ def finding_of(result: StudyResult) -> Finding:
         starts=settings.starts,
         most_starts=result.study.family.starts,
         confirm=settings.confirm,
+        learnt=bool(settings.learn_from),
         declared=declared_of(settings.space.names) if settings.family == DEFAULT_FAMILY else None,
     )
 

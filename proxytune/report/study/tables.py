@@ -194,7 +194,7 @@ def information_table(result: StudyResult) -> Table:
     """A row for every parameter of which the scores hold information, with shares of Fisher's information."""
 
     def largest(shares: Sequence[tuple[str, float]], count: int) -> str:
-        return ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in shares[:count] if share >= 0.005)
+        return ", ".join(f"{name} {percent(share)}" for name, share in shares[:count] if share >= 0.005)
 
     rows = tuple(
         (one.name, agents, largest(one.metrics, METRICS), one.limit)

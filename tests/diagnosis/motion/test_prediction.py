@@ -147,8 +147,18 @@ def test_a_horizon_shorter_than_a_sample_is_refused(log, horizon):
 
 def test_a_log_without_poses_is_refused(log):
     blind = replace(log, episodes=tuple(replace(e, poses=np.full_like(e.poses, np.nan)) for e in log.episodes))
-    with pytest.raises(LogError, match="no two measured poses"):
+    with pytest.raises(LogError, match="no measured pose to start a window from"):
         predict(blind, ROBOT, TRUTH, 2.0)
+
+
+def test_a_first_pose_and_commands_are_enough_for_a_whole_drive(log):
+    """The poses of each drive are what they are with all poses known; there is nothing to compare them with."""
+    first_alone = (np.where(np.arange(len(e.times))[:, None] > 0, np.nan, e.poses) for e in log.episodes)
+    alone = replace(log, episodes=tuple(replace(e, poses=p) for e, p in zip(log.episodes, first_alone, strict=True)))
+    told = predict(alone, ROBOT, TRUTH, 100.0)
+    np.testing.assert_allclose(told[["x", "y", "heading"]], predict(log, ROBOT, TRUTH, 100.0)[["x", "y", "heading"]])
+    assert len(told) == sum(len(one.times) for one in log.episodes)
+    assert agreement(told, alone, 100.0).windows == 0
 
 
 @pytest.mark.parametrize("known", [1, 2])

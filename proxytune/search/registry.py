@@ -52,7 +52,14 @@ def _imported(path: Path) -> Iterator[str]:
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
 
 
-ENGINES: tuple[Engine, ...] = (OUTCOMES, COMPOSITE, GAUSSIAN_PROCESS, RANDOM, SOBOL, TREE_PARZEN)
+ENGINES: tuple[Engine, ...] = (
+    OUTCOMES,
+    COMPOSITE,
+    GAUSSIAN_PROCESS,
+    RANDOM,
+    SOBOL,
+    TREE_PARZEN,
+)
 """A new engine is a module of its own and a line here; each says all about itself (engine.py)."""
 ENGINE_NAMES = tuple(engine.name for engine in ENGINES)
 """What a study may name."""

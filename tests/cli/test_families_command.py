@@ -131,7 +131,7 @@ def test_stopped_at_any_moment_it_goes_on_to_the_same_document(finished, make_st
         return nullcontext(Stopping(episodes) if study.settings.family_name == family else Silent())
 
     with pytest.raises(KeyboardInterrupt):
-        run_opened_families(read_study_settings(folder), Spending(), print, pressing_ctrl_c, progress=False)
+        run_opened_families(read_study_settings(folder), Spending(), lambda line: None, pressing_ctrl_c, progress=False)
     there, here = (without_costs(document_of(["study", str(one)], capsys)) for one in (finished, folder))
     text = json.dumps(there).replace(str(finished), str(folder))
     assert json.loads(text) == here

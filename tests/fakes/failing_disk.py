@@ -202,7 +202,8 @@ class Here:
 def only_search(arguments):
     """`study` without the answer and the figures, which write no database and take nine tenths of the time."""
     studies.result_of = lambda run: None
-    command._search(open_study(arguments.path), False)
+    study = open_study(arguments.path)
+    command.run_opened(study, command._bars(study), command._say, False)
     return Answer({}, "")
 
 

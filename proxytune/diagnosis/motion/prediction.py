@@ -442,7 +442,7 @@ class Repeated(NamedTuple):
 
 
 def compare_repeats(drives: Drives, theta: Theta, horizon_s: float) -> Repeated | None:
-    """Compare a model's error with what drives do not repeat; None where too little was driven twice.
+    """Compare a model's error with what drives do not repeat; None where too little was driven twice, or was copied.
 
     Of windows driven n times the mean is taken off, and n/(n − 1) gives back what that takes: for two drives, √(½ mean
     square of their difference). Each drive of the log is one block: windows of repeats begin together.
@@ -459,6 +459,9 @@ def compare_repeats(drives: Drives, theta: Theta, horizon_s: float) -> Repeated 
     mean = sum_by(label, moved, len(counts)) / counts[:, None]
     known = np.maximum(1, counts - 1)[label] / counts[label]
     apart = np.asarray(np.square(moved - mean[label]).sum(axis=1) / known)
+    if not apart[kept].any():
+        # Copies of drives to the last digit: they say nothing of what a robot does not repeat.
+        return None
     missed = pose_errors(drives, theta, windows)[:, 0] ** 2
     first = np.flatnonzero(np.diff(windows.window, prepend=-1))
     share = ratio(apart[kept], missed[kept], label[first][windows.window][kept])

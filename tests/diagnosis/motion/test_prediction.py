@@ -239,6 +239,13 @@ def test_of_drives_that_are_hardly_repeated_nothing_is_said(times, seconds):
     assert compare_repeats(again(times, seconds=seconds), TRUTH, 2.0) is None
 
 
+def test_copies_to_the_last_digit_say_nothing_of_what_is_not_repeated():
+    duties, starts = make_drives(3, 2, 600)
+    log = driven_log(TRUTH, duties, starts)
+    twice = repeated_drives(replace(log, episodes=(*log.episodes, *log.episodes)))
+    assert compare_repeats(twice, TRUTH, 1.0) is None
+
+
 def test_of_a_horizon_without_windows_nothing_is_said():
     assert compare_repeats(again(2, seconds=3.0), TRUTH, 5.0) is None
 

@@ -129,11 +129,7 @@ def _said(lines: Mapping[str, Sequence[str]]) -> dict[str, str]:
 
 
 def score_view(
-    assessments: Assessments,
-    selection: Selection | None,
-    figures: Sequence[Picture],
-    *,
-    target: str,
+    assessments: Assessments, selection: Selection | None, figures: Sequence[Picture], *, target: str
 ) -> View:
     """One proxy, or several ranked.
 

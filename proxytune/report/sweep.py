@@ -23,16 +23,7 @@ from proxytune.report.wording import listed, plain, short
 from proxytune.report.writing import save_figure, svg_of, write_text
 from proxytune.space import Theta
 from proxytune.study import StudySettings
-from proxytune.sweep import (
-    METRICS,
-    OUTWARDS,
-    Series,
-    SweepCurve,
-    SweepPoint,
-    describe_shape,
-    series_of,
-    shape_of,
-)
+from proxytune.sweep import METRICS, OUTWARDS, Series, SweepCurve, SweepPoint, describe_shape, series_of, shape_of
 from proxytune.usefulness import MEASURES, PRPV
 
 OF_PRPV = ("prpv", "prpv_interval", "prpv_normalised", "expected_prpv")

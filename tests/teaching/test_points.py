@@ -375,11 +375,7 @@ HANGING = {
         "none: the learner's examination in the target at start 0",
     ),
     "an examination": ({"target": room("exam:2:hangs")}, ALONE, EXAM),
-    "one of several at once": (
-        {"target": room("together:2:hangs", "exam:2:hangs", kind=StuckTogether)},
-        ALONE,
-        EXAM,
-    ),
+    "one of several at once": ({"target": room("together:2:hangs", "exam:2:hangs", kind=StuckTogether)}, ALONE, EXAM),
 }
 
 

@@ -5,16 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from proxytune.diagnosis import (
-    AdoptedEffect,
-    Clocks,
-    Diagnosis,
-    EffectSize,
-    Learning,
-    Offset,
-    Ratio,
-    RobotClusters,
-)
+from proxytune.diagnosis import AdoptedEffect, Clocks, Diagnosis, EffectSize, Learning, Offset, Ratio, RobotClusters
 from proxytune.effects import PLACE, learnt_effect
 from proxytune.report.wording import fixed, listed, percent
 from proxytune.space import Theta

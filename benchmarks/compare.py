@@ -170,9 +170,7 @@ def parser() -> argparse.ArgumentParser:
         "--initial", type=int, metavar="N", help=f"how many of these are the shared design [the study's, or {INITIAL}]"
     )
     parser.add_argument(
-        "--truths",
-        action="store_true",
-        help="with a study: simulate a new target for each seed, at a random θ",
+        "--truths", action="store_true", help="with a study: simulate a new target for each seed, at a random θ"
     )
     parser.add_argument(
         "--lacks",

@@ -64,12 +64,7 @@ class Scene(NamedTuple):
 
 
 def make_log(
-    case: Case,
-    *,
-    episodes: int = 12,
-    seconds: float = 60.0,
-    noiseless: bool = False,
-    late_s: Array | float = 0.0,
+    case: Case, *, episodes: int = 12, seconds: float = 60.0, noiseless: bool = False, late_s: Array | float = 0.0
 ) -> Log:
     """What would have been measured of this robot, 20 rows per second, from rest.
 

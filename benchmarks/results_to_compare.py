@@ -534,8 +534,7 @@ PARTS = (
         ),
     ),
     Part(
-        "study closing_the_camera_loop",
-        extended_studies("closing_the_camera_loop", "closing_the_camera_loop/extended"),
+        "study closing_the_camera_loop", extended_studies("closing_the_camera_loop", "closing_the_camera_loop/extended")
     ),
     Part("study truths, resumed and exported", resumed),
     # What an episode of each takes, drawn and in a table.

@@ -185,7 +185,7 @@ TARGET: Table = {  # speeds asked of the wheels (E, T, 2)
 }
 
 MOTOR: Table = {  # speeds of the wheels (E, T, 2): the mean over a step, or that at its beginning
-    "motor_lag": lambda w, run, tau, wheel="both": one_side(lagging(w, tau, run), lagging(w, MOTOR_LAG, run), wheel),
+    "motor_lag": lambda w, run, tau, wheel="both": one_side(lagging(w, tau, run), lagging(w, MOTOR_LAG, run), wheel)
 }
 
 

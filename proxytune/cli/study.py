@@ -8,14 +8,7 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from proxytune.api import (
-    FamiliesReport,
-    Spending,
-    most_episodes,
-    read_families,
-    run_opened,
-    run_opened_families,
-)
+from proxytune.api import FamiliesReport, Spending, most_episodes, read_families, run_opened, run_opened_families
 from proxytune.cli.options import check_made, configure_cluster, on_its_cluster, study_folder
 from proxytune.cli.terminal import Answer
 from proxytune.errors import ProxytuneError

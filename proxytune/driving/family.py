@@ -40,16 +40,7 @@ from proxytune.driving.plants import Plant, check_body, drivetrain
 from proxytune.driving.road import Arc, Road
 from proxytune.driving.road_picture import draw_floor
 from proxytune.driving.robot import Robot, catalogue_of, read_model_of, read_robot, robot_home, robot_names
-from proxytune.effects import (
-    Chain,
-    Effect,
-    FilterContext,
-    Signal,
-    Stage,
-    effects_from,
-    read_effects,
-    stage_chain,
-)
+from proxytune.effects import Chain, Effect, FilterContext, Signal, Stage, effects_from, read_effects, stage_chain
 from proxytune.errors import EpisodeError, InputError
 from proxytune.identity import digest, meaning_of, modules_beside, versions_of
 from proxytune.lineage import code_name

@@ -70,9 +70,7 @@ class Drivetrain:
         """Begin as if the resting command of `context` had been given for ever."""
         still = np.zeros((*np.shape(context.rest)[:-1], len(CHANNELS[Stage.MOTION])))
         return DrivetrainState(
-            self.command.begin(context),
-            self.actuation.begin(context),
-            self.motion.begin(replace(context, rest=still)),
+            self.command.begin(context), self.actuation.begin(context), self.motion.begin(replace(context, rest=still))
         )
 
     def apply(self, signal: Signal, memory: DrivetrainState) -> tuple[Signal, DrivetrainState]:

@@ -21,11 +21,7 @@ UNEVEN = "imbalance"
 
 
 def on_column(
-    wheels: type[Any],
-    column: int,
-    name: str,
-    does: str = "",
-    changed: Mapping[str, Any] | None = None,
+    wheels: type[Any], column: int, name: str, does: str = "", changed: Mapping[str, Any] | None = None
 ) -> type[Effect]:
     """An effect on wheels as one on a column.
 

@@ -54,7 +54,10 @@ def scatter_figure(assessment: Assessment) -> Figure:
 
 def flipped_pairs_figure(prpv: Prpv) -> Figure:
     """Draw which pairs of agents the proxy ranks unlike the target, agents in the target's order, best first."""
-    order = _target_order(prpv.inputs)
+    metrics, means = prpv.inputs.metrics, prpv.inputs.target.means
+    merits = [metric.merits(means[:, column])[0] for column, metric in enumerate(metrics)]
+    ranks = np.mean([(merit[:, None] < merit).sum(axis=1) for merit in merits], axis=0)
+    order = [prpv.inputs.agents[row] for row in np.argsort(ranks, kind="stable")]
     place = {agent: row for row, agent in enumerate(order)}
     kinds = list(FLIP_COLOURS)
     cells = np.full((len(order), len(order)), np.nan)
@@ -67,7 +70,10 @@ def flipped_pairs_figure(prpv: Prpv) -> Figure:
     _draw_pairs(axes, cells, named=len(order) <= MOST)
     _name_agents(axes, [_short(agent) for agent in order])
     axes.set_title(f"PRPV {prpv.value} of at most {prpv.range[1]}", fontsize=8)
-    axes.legend(handles=_legend(prpv), loc="upper right", fontsize=7, frameon=False)
+    counts = {kind: sum(pair.flip == kind for pair in prpv.pairs) for kind in FLIP_COLOURS}
+    counts["same"] = len(order) * (len(order) - 1) // 2 - len(prpv.pairs)
+    patches = [Patch(color=colour, label=f"{kind}: {counts[kind]}") for kind, colour in FLIP_COLOURS.items()]
+    axes.legend(handles=patches, loc="upper right", fontsize=7, frameon=False)
     return figure
 
 
@@ -107,7 +113,9 @@ def _standard_errors(table: ScoreTable) -> Floats:
 def _name_points(axes: Axes, inputs: Comparison, column: int, apart: float) -> None:
     """Name points right of the panel, each with a thin line to its point."""
     proxy, target = (means[:, column] for means in inputs.means)
-    shown = _to_name(proxy, target)
+    # Of many agents, those whose ranks in proxy and target differ most.
+    moved = np.abs(rankdata(proxy) - rankdata(target))
+    shown = [int(row) for row in np.argsort(-moved, kind="stable")[:MOST]]
     bottom, top = axes.get_ylim()
     # Points of one score in the proxy: those farther right on top, so that their lines cross less.
     shown = sorted(shown, key=lambda row: (proxy[row], target[row]))
@@ -120,21 +128,8 @@ def _name_points(axes: Axes, inputs: Comparison, column: int, apart: float) -> N
         )  # fmt: skip
 
 
-def _to_name(proxy: Floats, target: Floats) -> list[int]:
-    """The agents to name: all, or of many those whose ranks in proxy and target differ most."""
-    moved = np.abs(rankdata(proxy) - rankdata(target))
-    return [int(row) for row in np.argsort(-moved, kind="stable")[:MOST]]
-
-
 def _short(agent: str) -> str:
     return agent if len(agent) <= LONGEST else f"…{agent[1 - LONGEST :]}"
-
-
-def _target_order(inputs: Comparison) -> list[str]:
-    """Agents by their mean rank over the metrics on the target, best first."""
-    merits = [metric.merits(inputs.target.means[:, column])[0] for column, metric in enumerate(inputs.metrics)]
-    ranks = np.mean([(merit[:, None] < merit).sum(axis=1) for merit in merits], axis=0)
-    return [inputs.agents[row] for row in np.argsort(ranks, kind="stable")]
 
 
 def _name_agents(axes: Axes, order: list[str]) -> None:
@@ -149,10 +144,3 @@ def _name_agents(axes: Axes, order: list[str]) -> None:
     axes.spines[:].set_visible(False)
     axes.set_xlabel("agent (best on the target first)", fontsize=8)
     axes.set_ylabel("agent", fontsize=8)
-
-
-def _legend(prpv: Prpv) -> list[Patch]:
-    agents = len(prpv.inputs.agents)
-    counts = {kind: sum(pair.flip == kind for pair in prpv.pairs) for kind in FLIP_COLOURS}
-    counts["same"] = agents * (agents - 1) // 2 - len(prpv.pairs)
-    return [Patch(color=colour, label=f"{kind}: {counts[kind]}") for kind, colour in FLIP_COLOURS.items()]

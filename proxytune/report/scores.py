@@ -54,10 +54,8 @@ def score_sentence(assessments: Assessments, selection: Selection | None, *, tar
 def _say_prpv(assessment: Assessment, proxy: str, target: str) -> str:
     """Say how low PRPV is, and what that is worth."""
     prpv, inner, random = assessment.prpv, assessment.prpv_interval, assessment.chance
-    floor, chance = (
-        assessment.noise_floor,
-        f"{short(random.mean)} ± {short(random.deviation)}, p = {random.p_value:.2g}",
-    )
+    floor = assessment.noise_floor
+    chance = f"{short(random.mean)} ± {short(random.deviation)}, p = {random.p_value:.2g}"
     known = None not in (floor.value, floor.low, floor.high)
     level = with_span(floor.value, floor.low, floor.high) if known and floor.value is not None else ""
     if random.explains:
@@ -129,11 +127,7 @@ def _said(lines: Mapping[str, Sequence[str]]) -> dict[str, str]:
 
 
 def score_view(
-    assessments: Assessments,
-    selection: Selection | None,
-    figures: Sequence[Picture],
-    *,
-    target: str,
+    assessments: Assessments, selection: Selection | None, figures: Sequence[Picture], *, target: str
 ) -> View:
     """One proxy, or several ranked.
 
@@ -144,18 +138,11 @@ def score_view(
         target: Name of the target.
     """
     tables = _tables(assessments, selection, target)
-    one = f"{next(iter(assessments))}: how well does it predict {target}?"
-    choices = (
-        ()
-        if selection is None
-        else (Paragraphs("Which proxy to choose by", tuple(choices_sentences(assessments, selection, target))),)
-    )
-    return View(
-        one if selection is None else f"Which of {len(assessments)} proxies predicts {target} best?",
-        score_sentence(assessments, selection, target=target),
-        score_next_step(assessments, selection),
-        (*figures, *tables) if selection is None else (*tables, *choices, *figures),
-    )
+    said = score_sentence(assessments, selection, target=target), score_next_step(assessments, selection)
+    if selection is None:
+        return View(f"{next(iter(assessments))}: how well does it predict {target}?", *said, (*figures, *tables))
+    choices = Paragraphs("Which proxy to choose by", tuple(choices_sentences(assessments, selection, target)))
+    return View(f"Which of {len(assessments)} proxies predicts {target} best?", *said, (*tables, choices, *figures))
 
 
 def drawn_scores(assessment: Assessment) -> Iterator[tuple[str, Figure, str, str]]:
@@ -310,12 +297,8 @@ def write_score_table(assessments: Assessments, path: Path) -> None:
 
 def score_document(assessment: Assessment) -> dict[str, Any]:
     """Every figure of one proxy as plain JSON, whose keys are promises; None where undefined, and a note says why."""
-    inner, noise, random, inputs = (
-        assessment.prpv_interval,
-        assessment.noise_floor,
-        assessment.chance,
-        assessment.inputs,
-    )
+    inner, noise = assessment.prpv_interval, assessment.noise_floor
+    random, inputs = assessment.chance, assessment.inputs
     found = {measure: measure.measured(assessment) for measure in MEASURES}
     values = {measure.key: _per_metric(measure, one, lambda it: it.value) for measure, one in found.items()}
     intervals = {

@@ -1,7 +1,5 @@
 """Sweep along parameters: tables, CSV, JSON document, page, and the files of all that hold the same values."""
 
-import csv
-import io
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
@@ -17,22 +15,14 @@ from proxytune.report.html import write_page
 from proxytune.report.scores import score_document
 from proxytune.report.study.page import study_foot
 from proxytune.report.sweep_figures import bars_figure, panels_figure, sweep_figure
+from proxytune.report.table_files import Cell, csv_text
 from proxytune.report.text import group_texts, table_text
 from proxytune.report.view import Paragraphs, Part, Picture, Table, View, columns_of
 from proxytune.report.wording import listed, plain, short
 from proxytune.report.writing import save_figure, svg_of, write_text
 from proxytune.space import Theta
 from proxytune.study import StudySettings
-from proxytune.sweep import (
-    METRICS,
-    OUTWARDS,
-    Series,
-    SweepCurve,
-    SweepPoint,
-    describe_shape,
-    series_of,
-    shape_of,
-)
+from proxytune.sweep import METRICS, OUTWARDS, Series, SweepCurve, SweepPoint, describe_shape, series_of, shape_of
 from proxytune.usefulness import MEASURES, PRPV
 
 OF_PRPV = ("prpv", "prpv_interval", "prpv_normalised", "expected_prpv")
@@ -105,16 +95,14 @@ def curve_csv(curve: SweepCurve) -> str:
 
     Cells are empty where there is no score or no interval.
     """
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
     series = series_of(curve)
     keys = [key for one in series for key in (one.key, f"{one.key}_low", f"{one.key}_high")]
-    writer.writerow([curve.parameter, *keys, "failed_episodes"])
+    rows: list[list[Cell]] = []
     for row, point in enumerate(curve.points):
         found = [one.estimates[row] for one in series]
         cells = [cell for one in found for cell in (one.score, *(one.interval or (None, None)))]
-        writer.writerow([point.value, *cells, len(point.evaluation.failures)])
-    return text.getvalue()
+        rows.append([point.value, *cells, len(point.evaluation.failures)])
+    return csv_text([curve.parameter, *keys, "failed_episodes"], rows)
 
 
 def sweep_text(curves: Sequence[SweepCurve], episodes: int, files: Sequence[Path], held: str) -> Group:
@@ -271,7 +259,9 @@ def figures_of_sweep(curves: Sequence[SweepCurve], truth: Theta | None) -> dict[
     """One figure per curve, and two of all curves with the same values of the others, by name."""
     figures = {curve_name(curve): panels_figure(curve, truth) for curve in curves}
     for alike in held_alike(curves):
-        figures |= _figures_together(alike, truth)
+        if names := _names_together(alike):
+            last = list({curve.parameter: curve for curve in alike}.values())
+            figures |= dict(zip(names, (sweep_figure(last, truth), bars_figure(last)), strict=True))
     return figures
 
 
@@ -332,13 +322,6 @@ def held_values(base: Theta, whose: str = "") -> str:
     """Say what the others are held at, and whose values these are."""
     values = ", ".join(f"{name}={value:g}" for name, value in sorted(base.items()))
     return f"the others are held at {whose}{values}" if values else "the others are nominal"
-
-
-def _figures_together(alike: Sequence[SweepCurve], truth: Theta | None) -> dict[str, Figure]:
-    """The figures of several parameters, by name."""
-    last = list({curve.parameter: curve for curve in alike}.values())
-    names = _names_together(alike)
-    return dict(zip(names, (sweep_figure(last, truth), bars_figure(last)), strict=True)) if names else {}
 
 
 def _names_together(alike: Sequence[SweepCurve]) -> list[str]:

@@ -45,9 +45,7 @@ def sweep_figure(curves: Sequence[SweepCurve], truth: Theta | None = None) -> Fi
     figure = Figure(figsize=(COLUMN, HEIGHT * len(curves) + BELOW), layout="constrained")
     panels = figure.subplots(len(curves), 2, sharey="col", squeeze=False)
     for curve, row in zip(curves, panels, strict=True):
-        points = [(point.value, point.assessment) for point in curve.points if point.assessment is not None]
-        draw_prpv(row[0], points)
-        draw_ppv(row[1], points)
+        draw_prpv_and_ppv(row[0], row[1], curve)
         for axes in row:
             axes.set_xlabel(label_of(curve), fontsize=8)
             mark_values(axes, curve, truth)
@@ -68,10 +66,10 @@ def panels_figure(curve: SweepCurve, truth: Theta | None = None) -> Figure:
     series, rows = series_of(curve), 3 if curve.has_pod else 2
     figure = Figure(figsize=(COLUMN, HEIGHT * rows + BELOW), layout="constrained")
     prpv, ppv, srcc, key, *pod = figure.subplots(rows, 2).ravel()
-    points = [(point.value, point.assessment) for point in curve.points if point.assessment is not None]
-    draw_prpv(prpv, points)
-    draw_ppv(ppv, points)
-    _draw_srcc(srcc, series)
+    draw_prpv_and_ppv(prpv, ppv, curve)
+    chosen = [one for one in series if one.measure is SRCC]
+    for one, colour, marker in zip(chosen, cycle(COLOURS), cycle(MARKERS), strict=False):
+        draw_series(srcc, one, colour, marker, f"SRCC, {one.metric.replace('_', ' ')}")
     for axes, measure in zip(pod, POD_NAMES, strict=False):
         draw_series(axes, next(one for one in series if one.measure is measure), BLUE, "o", POD_NAMES[measure])
     for axes, name in zip((prpv, ppv, srcc, *pod), (PRPV, PPV, SRCC, *POD_NAMES), strict=False):
@@ -84,12 +82,6 @@ def panels_figure(curve: SweepCurve, truth: Theta | None = None) -> Figure:
     figure.supxlabel(label_of(curve), fontsize=8)
     explain(key, prpv, srcc)
     return figure
-
-
-def _draw_srcc(axes: Axes, series: Sequence[Series]) -> None:
-    chosen = [one for one in series if one.measure is SRCC]
-    for one, colour, marker in zip(chosen, cycle(COLOURS), cycle(MARKERS), strict=False):
-        draw_series(axes, one, colour, marker, f"SRCC, {one.metric.replace('_', ' ')}")
 
 
 BESIDE = "lower and higher value"
@@ -167,40 +159,24 @@ WIDEST = 20
 """Characters of a name that fit into the key."""
 
 
-def draw_series(axes: Axes, series: Series, colour: str, marker: str, label: str) -> None:
-    """A line through the scores, with its band of 95 % intervals."""
+def draw_series(axes: Axes, series: Series, colour: str, marker: str, label: str = "", band: str = "") -> None:
+    """A line through the scores, with its band of 95 % intervals, and names of both for a legend."""
     known = [(one.value, one.score) for one in series.estimates if one.score is not None]
     banded = [(one.value, *one.interval) for one in series.estimates if one.interval]
     if banded:
         places, lows, highs = np.array(banded).T
-        axes.fill_between(places, lows, highs, color=colour, alpha=0.18, linewidth=0)
+        axes.fill_between(places, lows, highs, color=colour, alpha=0.18, linewidth=0, label=band)
     values, scores = [value for value, _ in known], [score for _, score in known]
     axes.plot(values, scores, marker=marker, color=colour, ms=3, lw=1.2, label=label)
 
 
-def draw_prpv(axes: Axes, points: Sequence[tuple[float, Assessment]]) -> None:
-    """PRPV over the values of a parameter, with its band, the noise floor and chance."""
-    values = [value for value, _ in points]
-    found = [assessment for _, assessment in points]
-    if not found:
-        return
-    draw_levels(axes, found)
-    inner = [assessment.prpv_interval for assessment in found]
-    if all(one.low is not None for one in inner):
-        lows, highs = [one.low or 0.0 for one in inner], [one.high or 0.0 for one in inner]
-        axes.fill_between(values, lows, highs, color=BLUE, alpha=0.18, linewidth=0, label=INTERVAL)
-    scores = [assessment.prpv.value for assessment in found]
-    axes.plot(values, scores, "o-", color=BLUE, markersize=3, linewidth=1.2, label="PRPV")
-
-
-def draw_ppv(axes: Axes, points: Sequence[tuple[float, Assessment]]) -> None:
-    """PPV over the values of a parameter, with its band."""
-    known = [(value, found.ppv.value) for value, found in points if found.ppv.value is not None]
-    banded = [(value, *found.intervals.ppv) for value, found in points if found.intervals and found.intervals.ppv]
-    if banded:
-        values, lows, highs = np.array(banded).T
-        axes.fill_between(values, lows, highs, color=BLUE, alpha=0.18, linewidth=0)
-    axes.plot([value for value, _ in known], [score for _, score in known], "o-", color=BLUE, ms=3, lw=1.2)
+def draw_prpv_and_ppv(prpv: Axes, ppv: Axes, curve: SweepCurve) -> None:
+    """PRPV over the values of a parameter, with the noise floor and chance, and PPV; both with their bands."""
+    if found := [point.assessment for point in curve.points if point.assessment is not None]:
+        draw_levels(prpv, found)
+        of_prpv, of_ppv, *_ = series_of(curve)
+        draw_series(prpv, of_prpv, BLUE, "o", "PRPV", INTERVAL)
+        draw_series(ppv, of_ppv, BLUE, "o")
 
 
 def draw_levels(axes: Axes, found: Sequence[Assessment]) -> None:

@@ -59,16 +59,20 @@ def check_table_file(option: str, path: Path) -> None:
         raise InputError(f"{option} {path}: a table is written as {' or '.join(ENDINGS)}; name the file so")
 
 
+def csv_text(columns: Sequence[str], rows: Sequence[Sequence[Cell]]) -> str:
+    """A table as CSV; cells without a value are empty."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows([columns, *rows])
+    return text.getvalue()
+
+
 def write_csv(path: Path, columns: Sequence[str], rows: Sequence[Sequence[Cell]]) -> None:
-    """Write a table as CSV; cells without a value are empty.
+    """Write a table as CSV.
 
     Raises:
         RunError: If it cannot be written.
     """
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerows([columns, *rows])
-    write_text(path, text.getvalue())
+    write_text(path, csv_text(columns, rows))
 
 
 def write_latex(path: Path, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

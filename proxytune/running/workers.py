@@ -160,10 +160,7 @@ def awake() -> Iterator[AwakeClock]:
 
 @contextmanager
 def working(
-    work: Callable[[Piece], Result],
-    pieces: Iterable[Piece],
-    jobs: int,
-    rescue: Rescue[Piece, Result] | None = None,
+    work: Callable[[Piece], Result], pieces: Iterable[Piece], jobs: int, rescue: Rescue[Piece, Result] | None = None
 ) -> Iterator[Iterator[Result]]:
     """Do pieces of work and give each result as soon as it is there, in no particular order.
 

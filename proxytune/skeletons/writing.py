@@ -136,10 +136,7 @@ CAR_GUESSES: Mapping[str, tuple[float, str]] = MappingProxyType(
         "full_speed": (2.0, "straight ahead at full throttle"),
         "mass": (1.6, "of the whole car"),
         "camera_forward": (0.20, "of the lens ahead of the rear axle"),
-        "lane_width": (
-            0.495,
-            "of the lanes it is to follow, here car_loop's: shipped agents go by it",
-        ),
+        "lane_width": (0.495, "of the lanes it is to follow, here car_loop's: shipped agents go by it"),
         "expert_look_ahead": (0.45, "for `teach` alone"),
         "expert_speed": (0.45, "for `teach` alone"),
     }
@@ -176,10 +173,7 @@ def robot_skeleton(name: str, figures: Mapping[str, float], drive: str = "differ
     values = completed(figures, drive)
     body = _car_text(name, values) if drive == "ackermann" else fill("body.urdf.txt", name=name, **_dimensions(values))
     return Skeleton(
-        {
-            "robot.toml": robot_text(name, values, {"given to `new robot`": figures}, drive),
-            f"{name}.urdf": body,
-        },
+        {"robot.toml": robot_text(name, values, {"given to `new robot`": figures}, drive), f"{name}.urdf": body},
         then(name),
         (f"what is not known of {name} is marked EDIT in robot.toml; its wheels are in {name}.urdf too",),
     )

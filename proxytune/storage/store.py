@@ -27,6 +27,10 @@ from proxytune.storage.database import (
 from proxytune.storage.folder import refuse_links
 
 FILE_NAME = "study.db"
+OF_FAMILY = (
+    "SELECT theta, agent, start, seed FROM episodes JOIN instances ON instances.id = episodes.instance"
+    " WHERE identity = ?"
+)
 State = Literal["open", "finished", "failed", "cut"]
 Made = TypeVar("Made")
 
@@ -258,19 +262,11 @@ class Store:
 
     def failed_by(self, identity: str, how: str) -> set[Episode]:
         """The episodes of a domain family whose failure begins so."""
-        query = (
-            "SELECT theta, agent, start, seed FROM episodes JOIN instances ON instances.id = episodes.instance"
-            " WHERE identity = ? AND substr(failure, 1, ?) = ?"
-        )
-        return set(self._made(_episode, query, (identity, len(how), how)))
+        return set(self._made(_episode, f"{OF_FAMILY} AND substr(failure, 1, ?) = ?", (identity, len(how), how)))
 
     def failed_in_other_code(self, identity: str, code: str) -> set[Episode]:
         """The episodes that failed in other code than this; those of which the code is not known are left out."""
-        query = (
-            "SELECT theta, agent, start, seed FROM episodes JOIN instances ON instances.id = episodes.instance"
-            " WHERE identity = ? AND failure IS NOT NULL AND code <> ?"
-        )
-        return set(self._made(_episode, query, (identity, code)))
+        return set(self._made(_episode, f"{OF_FAMILY} AND failure IS NOT NULL AND code <> ?", (identity, code)))
 
     def forget_failures(self) -> None:
         """Make every failure one of other code, so that it is tried again."""

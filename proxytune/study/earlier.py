@@ -67,10 +67,11 @@ def learn(run: StudyRun) -> None:
         return
     sources = [read_source(settings, name) for name in settings.learn_from]
     places, rows, names = {settings.seed: 0}, [], sorted(_metrics(run))
+    box = settings.space.intervals
     for source in sources:
         _check_same(run, source)
         place = places.setdefault(source.facts["seed"], len(places))
-        inside = [theta for theta in source.trials if _is_inside(settings, theta)]
+        inside = [theta for theta in source.trials if all(b.low <= dict(theta)[b.name] <= b.high for b in box)]
         if not inside:
             raise _refused(settings, source.path, "has no trial in the box of [parameters]; widen it, or remove this")
         for theta in inside:
@@ -251,10 +252,6 @@ def _check_again(run: StudyRun, source: Source) -> None:
 
 def _metrics(run: StudyRun) -> set[str]:
     return {*run.study.family.metrics, *(metric.name for metric in run.settings.metrics)}
-
-
-def _is_inside(settings: StudySettings, theta: Instance) -> bool:
-    return all(box.low <= dict(theta)[box.name] <= box.high for box in settings.space.intervals)
 
 
 def _means(scores: Scores, settings: StudySettings, names: Sequence[str]) -> list[list[float | None]]:

@@ -239,9 +239,8 @@ class StudyRun:
 
         A failed episode counts as known where failures do not stop the study and the code that failed is still the
         same; else it is tried again, since something is expected to have been corrected. So is, once, one that an
-        earlier run gave too little time. Where it is asked whether what
-        is known of a domain instance is enough, agents begin in their order, each in all instances, and none more
-        begins in an instance after a yes.
+        earlier run gave too little time. Where it is asked whether what is known of a domain instance is enough, agents
+        begin in their order, each in all instances, and none more begins in an instance after a yes.
 
         Raises:
             EpisodeError: If an episode fails and the study is to stop then.

@@ -236,9 +236,7 @@ def classrooms(settings: StudySettings) -> dict[str, Classroom]:
 
 
 def teach_families(
-    settings: StudySettings,
-    thetas: Mapping[str, Theta],
-    watching: Callable[[int], AbstractContextManager[Watcher]],
+    settings: StudySettings, thetas: Mapping[str, Theta], watching: Callable[[int], AbstractContextManager[Watcher]]
 ) -> dict[str, Lesson]:
     """Teach a learner in each family at its best θ, from wherever an earlier run was left.
 

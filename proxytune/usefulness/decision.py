@@ -347,10 +347,8 @@ def draw_means(
             drawn, basis = means + errors * rng.standard_normal((draws, len(means))), "published standard errors"
         elif rollouts is not None and (means >= 0.0).all() and (means <= 1.0).all():
             counts = np.full(len(means), float(rollouts))
-            drawn, basis = (
-                _rates(means, counts, draws, rng),
-                f"{rollouts} rollouts behind each mean as stated, uniform prior",
-            )
+            drawn = _rates(means, counts, draws, rng)
+            basis = f"{rollouts} rollouts behind each mean as stated, uniform prior"
         else:
             return None
         if rectified is not None:

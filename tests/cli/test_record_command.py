@@ -74,10 +74,8 @@ def test_manoeuvres_are_the_same_with_frames_as_without(recorded, capsys):
 
 def test_the_renderer_of_a_study_takes_the_frames(recorded, monkeypatch):
     monkeypatch.setattr(filming, "COLUMNS", 64)
-    (_, rendered), (_, plain) = (
-        recorded("a", "--frames", "1", domain='camera = "renderer"\n'),
-        recorded("b", "--frames", "1"),
-    )
+    _, rendered = recorded("a", "--frames", "1", domain='camera = "renderer"\n')
+    _, plain = recorded("b", "--frames", "1")
     one, other = (read_pictures(read_log(home).frames, [0]).astype(float) for home in (rendered, plain))
     assert 0.0 < np.abs(one - other).mean() < 8.0
 

@@ -29,14 +29,7 @@ from hypothesis import given, settings, strategies as st
 from nominal_camera import CAMERA
 
 from proxytune.domain import make_episode
-from proxytune.driving import (
-    GroundPlaneCamera,
-    draw_floor,
-    ground_points,
-    lane_following,
-    read_robot,
-    shipped_map,
-)
+from proxytune.driving import GroundPlaneCamera, draw_floor, ground_points, lane_following, read_robot, shipped_map
 from proxytune.driving.cameras import Views
 from proxytune.driving.optics import joined
 from proxytune.effects import CATALOGUE, PARAMETERS, Blur, Chain, FilterContext, RollingShutter, Stage, theta_names

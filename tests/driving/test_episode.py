@@ -320,10 +320,7 @@ def test_a_proxy_drives_what_its_model_has_learnt(tmp_path, plant):
 ROBOT = read_robot("duckiebot")
 TICK_S = 1 / 60
 START = np.array([0.3, -0.2, 0.7])
-PLANTS = {
-    "bullet": lambda: BulletPlant(ROBOT, START, TICK_S),
-    "planar": lambda: PlanarPlant(START, TICK_S),
-}
+PLANTS = {"bullet": lambda: BulletPlant(ROBOT, START, TICK_S), "planar": lambda: PlanarPlant(START, TICK_S)}
 ON_THE_MOVE = {
     name: effect for name, effect in CATALOGUE.items() if effect.stage in (Stage.COMMAND, Stage.ACTUATION, Stage.MOTION)
 }

@@ -336,10 +336,8 @@ def test_a_guided_policys_steps_are_labelled_with_what_the_expert_would_do_there
 
 def test_a_policy_that_drives_as_the_expert_does_visits_what_it_is_shown():
     room = classroom(plant="planar")
-    shown, commands = (
-        lesson_of_teaching(room, episode(), 1.0).memory,
-        iter(lesson_of_teaching(room, episode(), 1.0).commands),
-    )
+    shown = lesson_of_teaching(room, episode(), 1.0).memory
+    commands = iter(lesson_of_teaching(room, episode(), 1.0).commands)
     samples, _ = room.guide(episode(), lambda picture: next(commands), 1.0)
     np.testing.assert_array_equal(samples.observations, np.array(shown.pictures))
     np.testing.assert_array_equal(samples.commands, np.array(shown.commands))

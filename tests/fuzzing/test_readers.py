@@ -185,11 +185,7 @@ READERS = {
     "target.csv": Reader(copy_finished, ("target.csv",), lambda home: open_study(home)),
     "study.db": Reader(copy_finished, ("study.db",), read_study),
     "model.toml": Reader(write("model.toml", MODEL), ("model.toml",), lambda home: read_model(home / "model.toml")),
-    "robot.toml": Reader(
-        copy_robot,
-        ("own/robot.toml", "own/duckiebot.urdf"),
-        read_own_robot,
-    ),
+    "robot.toml": Reader(copy_robot, ("own/robot.toml", "own/duckiebot.urdf"), read_own_robot),
     "map": Reader(
         copy(shipped("robots") / "maps"), ("small_loop.toml",), lambda home: read_map(home / "small_loop.toml")
     ),

@@ -78,10 +78,7 @@ CASES = {
     "y reversed": (moved(1, -1, 1), "places are mirrored against headings"),
     "x and y exchanged": (changed(exchanged), "places are mirrored against headings"),
     "a left-handed frame": (moved(1, -1, -1), "turns the other way than its commands say"),
-    "duties at half scale": (
-        commanded(0.5),
-        r"drives (1.9|2|2.1) times as fast as its largest commands say: ch",
-    ),
+    "duties at half scale": (commanded(0.5), r"drives (1.9|2|2.1) times as fast as its largest commands say: ch"),
     "a wheel in mm": (replace(LOG, geometry={"wheel_radius": 31.8}), "its wheel_radius is 31.8 m, and robots have"),
     "drives given three times": (thrice(), r"drive 'again' is a copy of '00' to the last digit \(and 1 more"),
     "an é in two forms": (named("\u00e9", "e\u0301"), "read the same and are taken for different ones"),

@@ -184,10 +184,7 @@ def test_every_frame_kept_aside_is_in_the_figure_of_errors(diagnosis, figures, c
 
 
 def test_a_line_beside_its_place_is_told_in_millimetres_and_by_side(diagnosis):
-    lines = (
-        LaidLine("yellow line", 3, -0.006, (-0.008, -0.004)),
-        LaidLine("yellow dashes", 1, 0.004, (0.002, 0.006)),
-    )
+    lines = (LaidLine("yellow line", 3, -0.006, (-0.008, -0.004)), LaidLine("yellow dashes", 1, 0.004, (0.002, 0.006)))
     none = Estimate(0.0, (-0.001, 0.001), "m")
     turned = Estimate(0.5, (0.4, 0.6), "deg")
     laid = LaidMap(

@@ -87,10 +87,8 @@ def test_two_wheels_are_told_velocities_and_their_own_commands_and_then_to_stop(
     twists = [one.twist if stamped else one for one in player.told["cmd_vel"]]
     expected = [*commands_as("twist", read_robot("duckiebot"), DUTIES), (0.0, 0.0)]
     np.testing.assert_allclose([(one.linear.x, one.angular.z) for one in twists], expected, rtol=1e-4)
-    told, (times, commands) = (
-        read_commands(tmp_path / "commands.csv")[0],
-        read_commands(tmp_path / "commands.csv")[1]["next"],
-    )
+    told, drives = read_commands(tmp_path / "commands.csv")
+    times, commands = drives["next"]
     assert told == kind
     np.testing.assert_allclose(times, (0.0, 0.05, 0.1))
     np.testing.assert_allclose([one.data for one in player.told["wheel_commands"]], [*commands, (0.0, 0.0)])

@@ -179,10 +179,7 @@ def shadow(learnt):
 
 
 def test_the_pair_has_every_trial_the_answer_the_failed_ones_and_the_truth(learnt):
-    failed = replace(
-        learnt,
-        trials=(*learnt.trials, TrialRecord(8, {"trim": 0.3, "delay": 0.3}, "failed")),
-    )
+    failed = replace(learnt, trials=(*learnt.trials, TrialRecord(8, {"trim": 0.3, "delay": 0.3}, "failed")))
     pair = evaluations_figure(replace(failed, truth={"trim": 0.1, "delay": 0.12})).axes[0]
     assert (pair.get_xlabel(), pair.get_ylabel()) == ("delay [s]", "trim")
     scored = next(one for one in pair.collections if one.get_array() is not None and one.get_zorder() == 2)
@@ -255,9 +252,7 @@ def test_a_study_has_the_importance_of_each_of_its_parameters(finished):
     assert [importance.name for importance in found] == ["delay", "trim"]
 
 
-def test_a_dot_is_the_share_a_stroke_what_is_alone_and_a_line_the_interval_most_important_on_top(
-    weighed,
-):
+def test_a_dot_is_the_share_a_stroke_what_is_alone_and_a_line_the_interval_most_important_on_top(weighed):
     (axes,) = importance_figure(weighed).axes
     assert [label.get_text() for label in axes.get_yticklabels()] == ["delay", "trim"]
     drawn = {line.get_label(): line.get_xydata().tolist() for line in axes.get_lines()}

@@ -6,14 +6,7 @@ from types import MappingProxyType, SimpleNamespace
 import numpy as np
 import pytest
 
-from proxytune.learning import (
-    Costs,
-    Distribution,
-    LearningCurve,
-    LearningEstimate,
-    TeachingValue,
-    sample_needs,
-)
+from proxytune.learning import Costs, Distribution, LearningCurve, LearningEstimate, TeachingValue, sample_needs
 from proxytune.learning.plv import Published
 from proxytune.report.plv_search import plv_answer, plv_next_step
 from proxytune.report.teaching import (

@@ -88,10 +88,7 @@ def test_each_worker_is_sent_a_fleet(cluster):
     episodes = [make_episode({}, agent=f"agent{number}", start=0, seed=number) for number in range(6)]
     known = {(one.agent, one.start): 0.1 for one in episodes}
     here = {one: run_episode(Convoy(), one).metrics for one in episodes}
-    with (
-        on_cluster(cluster.scheduler_address),
-        running(Convoy(), episodes, jobs=1, watch=Watch(known=known)) as fleets,
-    ):
+    with on_cluster(cluster.scheduler_address), running(Convoy(), episodes, jobs=1, watch=Watch(known=known)) as fleets:
         sent = list(fleets)
     assert [len(fleet) for fleet in sent] == [3, 3]
     assert {one.episode: one.metrics for fleet in sent for one in fleet} == here

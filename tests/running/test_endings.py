@@ -34,8 +34,7 @@ def but_last(outcomes):
 
 
 @pytest.mark.parametrize(
-    ("fault", "raised"),
-    [("exits", "SystemExit: 0"), ("own error", r"OwnError: of its own caf\udce9")],
+    ("fault", "raised"), [("exits", "SystemExit: 0"), ("own error", r"OwnError: of its own caf\udce9")]
 )
 def test_what_an_agent_raises_that_is_no_exception_fails_its_episode_alone(fault, raised):
     whole, found = run_all(()), run_all((f"agent2:2:{fault}",))

@@ -57,12 +57,7 @@ CASES = {
         r"agents 'agent\\u200b1' and 'agent1' read",
     ),
     "no pair left": (table(PROXY), table(TRUE), TIED, r"tolerance of distance, 1e\+06, leaves no two agents of"),
-    "copies": (
-        table(PROXY),
-        table(np.repeat(TRUE, 3, axis=1)),
-        METRICS,
-        r"of 144 episodes of the target only 48",
-    ),
+    "copies": (table(PROXY), table(np.repeat(TRUE, 3, axis=1)), METRICS, r"of 144 episodes of the target only 48"),
     "an é in two forms": (
         table(PROXY, ("\u00e9", *AGENTS[1:])),
         table(TRUE, ("\u00e9", "e\u0301", *AGENTS[2:])),

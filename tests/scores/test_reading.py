@@ -44,10 +44,7 @@ def test_domains_are_read_apart(csv):
         ("\n\n", "is empty"),
         ("agent,distance\n", "has no rows"),
         ("robot,distance\nA,1\n", "no column 'agent'"),
-        (
-            "name,trial,distance\nA,1,2\n",
-            "columns found: name, trial, distance; rename the one that names the agents",
-        ),
+        ("name,trial,distance\nA,1,2\n", "columns found: name, trial, distance; rename the one that names the agents"),
         ("name,trial,distance\nA,1,2\n", "or give its name: --columns agent=name (in study.toml: target_columns)"),
         ("agent;distance\nA;1,234.5\n", "'1,234.5' has a comma, but line 2 has '1,234.5'"),
         (

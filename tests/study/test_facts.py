@@ -43,10 +43,7 @@ def test_looking_at_a_study_edited_since_names_the_edit_alone(make_study, versio
     monkeypatch.setattr("wobbly.Wobbly.identity", "wobbly, other PyBullet")
     monkeypatch.setattr("wobbly.Wobbly.versions", {**NOW, "pybullet": "3.2.7"})
     make_study(seed="3")
-    with (
-        Store.read(finished) as store,
-        pytest.raises(SettingsError, match=r"trial: seed \(was 1\); put"),
-    ):
+    with Store.read(finished) as store, pytest.raises(SettingsError, match=r"trial: seed \(was 1\); put"):
         stored_run(open_study(finished), store)
 
 

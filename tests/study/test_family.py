@@ -38,10 +38,7 @@ def test_modules_in_the_study_s_folder_can_be_imported(make_study):
 BAD = {
     "no colon": ({"family": '"wobbly"'}, "family: family 'wobbly' is unknown (your own is written module:attribute)"),
     "no such module": ({"family": '"wobbli:wobbly"'}, "family 'wobbli:wobbly': no module 'wobbli' in "),
-    "no such factory": (
-        {"family": '"wobbly:wobly"'},
-        "'wobbly:wobly': wobbly has no 'wobly'; did you mean 'wobbly'?",
-    ),
+    "no such factory": ({"family": '"wobbly:wobly"'}, "'wobbly:wobly': wobbly has no 'wobly'; did you mean 'wobbly'?"),
     "a factory with a bug": (
         {"family": '"wobbly:broken_factory"'},
         "raised KeyError: 'robot' (wobbly.py, line 132); correct it",
@@ -97,10 +94,7 @@ def make(domain, *, model):
 """
 
 FAULTS = {
-    "parameters": (
-        "parameters = property(lambda self: 1 / 0)",
-        "parameters of faulty_{n}:make raised ZeroDiv",
-    ),
+    "parameters": ("parameters = property(lambda self: 1 / 0)", "parameters of faulty_{n}:make raised ZeroDiv"),
     "identity": ("identity = property(lambda self: self.gone)", "identity of faulty_{n}:make raised AttributeError"),
     "metrics": ("metrics = ['distance']", "metrics of faulty_{n}:make must be a mapping, got list"),
     "starts": ("starts = '5'", "starts of faulty_{n}:make must be a whole number, got str"),

@@ -48,10 +48,7 @@ def test_another_domain_family_knows_nothing_of_the_studys_domain_proxy_and_trut
         ("[families.a]\nplant = 1\n[families.b]\n", "families.a.plant: unknown key; known are: domain, family"),
         ("[families.a]\ndomain = 3\n[families.b]\n", "families.a.domain: must be a table"),
         ("[families.a]\nfamily = 3\n[families.b]\n", "families.a.family: must be text in quotes, got 3"),
-        (
-            "[families.a.parameters]\ntrim = 3\n[families.b]\n",
-            "families.a: parameters.trim: must be [low, high]",
-        ),
+        ("[families.a.parameters]\ntrim = 3\n[families.b]\n", "families.a: parameters.trim: must be [low, high]"),
     ],
 )
 def test_a_table_that_cannot_be_used_is_told_with_its_name(make_study, families, says):

@@ -198,10 +198,7 @@ def test_a_policy_that_gives_no_command_stops_the_run_and_keeps_the_rest(make_st
 @pytest.mark.parametrize(
     ("edit", "says"),
     [
-        (
-            ("schoolroom:Matrix", "schoolroom:Nothing"),
-            "teaching.learner: learner 'schoolroom:Nothing': schoolroom has",
-        ),
+        (("schoolroom:Matrix", "schoolroom:Nothing"), "teaching.learner: learner 'schoolroom:Nothing': schoolroom has"),
         (("schoolroom:Matrix", "wobbly:Wobbly"), "learner 'wobbly:Wobbly' "),
         (("schoolroom:schoolroom", "wobbly:wobbly"), "family: wobbly:wobbly cannot teach: it lacks best_score"),
         (("trim = -0.3\n", "trim = -0.4\n"), "teaching.proxies.wrong.trim: must lie within [-0.3, 0.3]"),

@@ -100,11 +100,8 @@ def test_a_fine_tuning_goes_over_the_proxys_samples_again_beside_the_targets(tmp
 
 def test_rehearsal_changes_fine_tunings_after_a_proxy_and_nothing_else(tmp_path):
     plain, rehearsing = setup(tmp_path), setup(tmp_path, rehearsal=0.6)
-    tuned, taught, alone = (
-        CurvePoint("near", PROXY, 0, 20),
-        CurvePoint("near", PROXY, 0, 0),
-        CurvePoint("none", None, 0, 20),
-    )
+    tuned, taught = CurvePoint("near", PROXY, 0, 20), CurvePoint("near", PROXY, 0, 0)
+    alone = CurvePoint("none", None, 0, 20)
     assert plain.exam_facts(tuned) != rehearsing.exam_facts(tuned)
     assert plain.exam_facts(tuned) != setup(tmp_path, rehearsal=0.5).exam_facts(tuned)
     for point in (taught, alone):
@@ -375,11 +372,7 @@ HANGING = {
         "none: the learner's examination in the target at start 0",
     ),
     "an examination": ({"target": room("exam:2:hangs")}, ALONE, EXAM),
-    "one of several at once": (
-        {"target": room("together:2:hangs", "exam:2:hangs", kind=StuckTogether)},
-        ALONE,
-        EXAM,
-    ),
+    "one of several at once": ({"target": room("together:2:hangs", "exam:2:hangs", kind=StuckTogether)}, ALONE, EXAM),
 }
 
 

@@ -134,12 +134,8 @@ def _write_next(found: LogDiagnosis, folder: Path) -> list[Path]:
 
 def diagnosis_view(found: LogDiagnosis, figures: Mapping[str, bytes]) -> View:
     """A diagnosis: the figures by their names, then the tables and all notes."""
-    notes = diagnosis_notes(found)
-    paragraphs = (
-        [Paragraphs("What else is to be known", tuple(f"{note[:1].upper()}{note[1:]}." for note in notes))]
-        if notes
-        else []
-    )
+    notes = tuple(f"{note[:1].upper()}{note[1:]}." for note in diagnosis_notes(found))
+    paragraphs = [Paragraphs("What else is to be known", notes)] if notes else []
     motion = [] if found.motion is None else _motion_tables(found.motion)
     camera = [] if found.camera is None else _camera_tables(found.camera)
     drives, part = [] if found.motion is None else next_drives(found.motion), found.motion or found.camera

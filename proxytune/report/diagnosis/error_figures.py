@@ -23,7 +23,6 @@ from proxytune.report.figure_style import (
     write_plain,
 )
 from proxytune.report.wording import plain
-from proxytune.space import Theta
 
 DECLARED_MODEL = "declared model"
 LONGEST = 45
@@ -133,14 +132,12 @@ def strayed(diagnosis: Diagnosis) -> dict[str, Strayed]:
     if diagnosis.effects:
         models[extended_name(diagnosis)] = found.model.theta
     horizon = min((error.horizon_s for error in diagnosis.errors), key=lambda length: abs(length - HORIZON_S))
-    return {name: _strayed(tested, theta, horizon) for name, theta in models.items()}
-
-
-def _strayed(drives: Drives, theta: Theta, horizon_s: float) -> Strayed:
-    windows = cut(drives, horizon_s)
-    distance = 1e3 * pose_errors(drives, dict(theta), windows)[:, 0]
-    rms = np.sqrt(np.bincount(windows.window, distance**2) / np.bincount(windows.window))
-    return Strayed(horizon_s, windows.window, windows.increment, distance, rms)
+    windows, both = cut(tested, horizon), dict[str, Strayed]()
+    for name, theta in models.items():
+        distance = 1e3 * pose_errors(tested, dict(theta), windows)[:, 0]
+        rms = np.sqrt(np.bincount(windows.window, distance**2) / np.bincount(windows.window))
+        both[name] = Strayed(horizon, windows.window, windows.increment, distance, rms)
+    return both
 
 
 def residual_over_time(drives: Drives, both: Mapping[str, Strayed]) -> Figure:

@@ -125,11 +125,7 @@ def _dots(axes: Axes, rows: Sequence[_Row]) -> None:
     axes.tick_params(axis="y", labelsize=7)
 
 
-SHOWN_AS = {
-    "m/s": (1e3, "mm/s"),
-    "rad/s": (180.0 / np.pi, "deg/s"),
-    "rad/m": (180.0 / np.pi, "deg/m"),
-}
+SHOWN_AS = {"m/s": (1e3, "mm/s"), "rad/s": (180.0 / np.pi, "deg/s"), "rad/m": (180.0 / np.pi, "deg/m")}
 """Units in which weights are told, by their own: a factor and its unit; shares in per cent."""
 FADING = {
     "changes": "time constant",

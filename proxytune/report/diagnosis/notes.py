@@ -5,16 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from proxytune.diagnosis import (
-    AdoptedEffect,
-    Clocks,
-    Diagnosis,
-    EffectSize,
-    Learning,
-    Offset,
-    Ratio,
-    RobotClusters,
-)
+from proxytune.diagnosis import AdoptedEffect, Clocks, Diagnosis, EffectSize, Learning, Offset, Ratio, RobotClusters
 from proxytune.effects import PLACE, learnt_effect
 from proxytune.report.wording import fixed, listed, percent
 from proxytune.space import Theta
@@ -188,11 +179,8 @@ def _say_offset(clocks: Clocks) -> list[str]:
     if not clocks.offset.value:
         return []
     latency, offset, assumed = clocks.latency, clocks.offset, clocks.assumed_delay_s
-    lag = (
-        f"motion comes {-latency.value:.2f} s before its command, which no robot does"
-        if latency.value < 0.0
-        else f"motion comes {latency.value:.2f} s after its command"
-    )
+    side = "before its command, which no robot does" if latency.value < 0.0 else "after its command"
+    lag = f"motion comes {abs(latency.value):.2f} s {side}"
     early = "early" if offset.value < 0.0 else "late"
     return [
         f"{lag}; poses are stamped {abs(offset.value):.2f} s too {early} ({_ends_s(offset)}) if the robot's delay "

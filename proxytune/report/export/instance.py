@@ -143,10 +143,8 @@ def export_lines(instance: Instance, form: str, has: Container[str] = ()) -> lis
     lines = []
     for name, value in sorted(instance.theta.items()):
         effect = effect_of(name)
-        parameter, place = (
-            parameters.get(name),
-            ("in the file" if effect in has else place_of(effect, form, instance.robot.drive)),
-        )
+        parameter = parameters.get(name)
+        place = "in the file" if effect in has else place_of(effect, form, instance.robot.drive)
         if place or parameter is None or isinstance(parameter.neutral, str) or value != parameter.neutral:
             unit = parameter.unit if parameter else ""
             lines.append(ExportLine(name, value, unit, instance.intervals.get(name), place))

@@ -17,6 +17,7 @@ from proxytune.arrays import Floats
 from proxytune.driving import link_pose, links_called, mounted_camera, orientation, origin_of, rotation
 from proxytune.errors import InputError
 from proxytune.report.export.instance import IN_WHEELS, Instance
+from proxytune.report.export.urdf import angles_of, end_of
 from proxytune.report.export.xml_patch import XmlPatch
 
 SMALL = 1e-9
@@ -169,8 +170,8 @@ def _urdf(xml: XmlPatch, left: ET.Element, right: ET.Element) -> OwnFile:
     root = xml.root
 
     def wheel(joint: ET.Element) -> Wheel:
-        link = _end(joint, "child")
-        turned = link_pose(root, _end(joint, "parent"))[:3, :3]
+        link = end_of(joint, "child")
+        turned = link_pose(root, end_of(joint, "parent"))[:3, :3]
         shapes = [one for body in links_called(root, link) for one in body.iterfind("*/geometry/*[@radius]")]
         meshes = [one for body in links_called(root, link) for one in body.iterfind("collision/geometry/mesh")]
 
@@ -188,17 +189,17 @@ def _urdf(xml: XmlPatch, left: ET.Element, right: ET.Element) -> OwnFile:
 
     links = (link.get("name", "") for link in root.iter("link"))
     cameras = [name for name in links if "camera" in name and "optical" not in name]
-    mounts = [one for one in root.iter("joint") if _end(one, "child") in cameras[:1]]
+    mounts = [one for one in root.iter("joint") if end_of(one, "child") in cameras[:1]]
 
     def aim(pose: Floats) -> None:
-        local = np.linalg.inv(link_pose(root, _end(mounts[0], "parent"))) @ pose
+        local = np.linalg.inv(link_pose(root, end_of(mounts[0], "parent"))) @ pose
         _set_origin(xml, mounts[0], local[:3, 3], local[:3, :3])
 
     return OwnFile((wheel(left), wheel(right)), aim if len(cameras) == len(mounts) == 1 else None)
 
 
 def _set_origin(xml: XmlPatch, joint: ET.Element, place: Floats, turned: Floats | None) -> None:
-    values = {"xyz": _numbers(place)} | ({} if turned is None else {"rpy": _numbers(_angles(turned))})
+    values = {"xyz": _numbers(place)} | ({} if turned is None else {"rpy": _numbers(angles_of(turned))})
     if (origin := joint.find("origin")) is None:
         xml.add(joint, "<origin " + " ".join(f'{name}="{value}"' for name, value in values.items()) + "/>")
         return
@@ -254,7 +255,7 @@ def _sdf(xml: XmlPatch, left: ET.Element, right: ET.Element) -> OwnFile:
 
     def aim(pose: Floats) -> None:
         local = np.linalg.inv(own.pose_of(link)) @ pose
-        values = _numbers([*local[:3, 3], *_angles(local[:3, :3])])
+        values = _numbers([*local[:3, 3], *angles_of(local[:3, :3])])
         if spot is None:
             xml.add(sensor, f"<pose>{values}</pose>")
         else:
@@ -346,17 +347,6 @@ READERS: dict[str, Callable[[XmlPatch, ET.Element, ET.Element], OwnFile]] = {
     "sdf": _sdf,
     "mujoco": _mjcf,
 }
-
-
-def _end(joint: ET.Element, end: str) -> str:
-    found = joint.find(end)
-    return "" if found is None else found.get("link", "")
-
-
-def _angles(turned: Floats) -> tuple[float, float, float]:
-    """Roll, pitch and yaw of a rotation (3, 3) [rad]."""
-    pitch = math.asin(max(-1.0, min(1.0, -turned[2, 0])))
-    return math.atan2(turned[2, 1], turned[2, 2]), pitch, math.atan2(turned[1, 0], turned[0, 0])
 
 
 def _numbers(values: Sequence[float] | Floats) -> str:

@@ -66,7 +66,7 @@ def _change(root: ET.Element, instance: Instance) -> None:
 
 def _set_wheel(root: ET.Element, joint: ET.Element, left_m: float, radius_m: float, gain: float) -> None:
     """Give a wheel its place and its radius; it goes on touching the floor."""
-    parent, link = _link(joint, "parent"), _link(joint, "child")
+    parent, link = end_of(joint, "parent"), end_of(joint, "child")
     above = link_pose(root, parent)
     centre = link_pose(root, link)
     centre[1, 3] = left_m
@@ -79,32 +79,26 @@ def _set_wheel(root: ET.Element, joint: ET.Element, left_m: float, radius_m: flo
 
 def _mount(root: ET.Element, link: str, mount: str, pose: Floats) -> None:
     """Fix a link to the robot at a pose in the root link's frame; where there is none of that name, add it."""
-    joints = [one for one in root.iter("joint") if _link(one, "child") == link]
+    joints = [one for one in root.iter("joint") if end_of(one, "child") == link]
     if joints:
-        _set_origin(joints[0], np.linalg.inv(link_pose(root, _link(joints[0], "parent"))) @ pose)
+        _set_origin(joints[0], np.linalg.inv(link_pose(root, end_of(joints[0], "parent"))) @ pose)
         return
     add_little_mass(ET.SubElement(root, "link", name=link))
     joint = ET.SubElement(root, "joint", name=mount, type="fixed")
-    ET.SubElement(joint, "parent", link=_root_link(root))
+    children = {end_of(one, "child") for one in root.iter("joint")}
+    names = (one.get("name", "") for one in root.findall("link"))
+    ET.SubElement(joint, "parent", link=next(name for name in names if name not in children))
     ET.SubElement(joint, "child", link=link)
     _set_origin(joint, pose)
-
-
-def _root_link(root: ET.Element) -> str:
-    children = {_link(joint, "child") for joint in root.iter("joint")}
-    return next(name for name in (link.get("name", "") for link in root.findall("link")) if name not in children)
 
 
 def _set_origin(joint: ET.Element, pose: Floats) -> None:
     """Write a pose as xyz and rpy, unless it is the one that stands there."""
     if np.allclose(origin_of(joint), pose, atol=1e-12):
         return
-    roll = math.atan2(pose[2, 1], pose[2, 2])
-    pitch = math.asin(max(-1.0, min(1.0, -pose[2, 0])))
-    yaw = math.atan2(pose[1, 0], pose[0, 0])
     origin = _part(joint, "origin")
     origin.set("xyz", _numbers(pose[:3, 3]))
-    origin.set("rpy", _numbers((roll, pitch, yaw)))
+    origin.set("rpy", _numbers(angles_of(pose[:3, :3])))
 
 
 def _part(element: ET.Element, tag: str, **otherwise: str) -> ET.Element:
@@ -112,9 +106,16 @@ def _part(element: ET.Element, tag: str, **otherwise: str) -> ET.Element:
     return ET.SubElement(element, tag, otherwise) if found is None else found
 
 
-def _link(joint: ET.Element, end: str) -> str:
+def end_of(joint: ET.Element, end: str) -> str:
+    """Name of the link at an end of a joint, its parent or child; empty where it has none."""
     found = joint.find(end)
     return "" if found is None else found.get("link", "")
+
+
+def angles_of(turned: Floats) -> tuple[float, float, float]:
+    """Roll, pitch and yaw of a rotation (3, 3) [rad]."""
+    pitch = math.asin(max(-1.0, min(1.0, -turned[2, 0])))
+    return math.atan2(turned[2, 1], turned[2, 2]), pitch, math.atan2(turned[1, 0], turned[0, 0])
 
 
 def _pose(rotation: Floats, place: tuple[float, float, float]) -> Floats:

@@ -67,10 +67,7 @@ def _worth(result: StudyResult) -> dict[str, Any]:
         "excess": _estimate(result.excess),
         "excess_ppv": _estimate(ppv.excess if ppv else None),
         "nominal": result.nominal
-        and {
-            "theta": dict(result.nominal.theta),
-            "expected_prpv": _estimate(result.nominal.expected.prpv.value),
-        },
+        and {"theta": dict(result.nominal.theta), "expected_prpv": _estimate(result.nominal.expected.prpv.value)},
         "cannot_be_told_from_perfect": bool(result.perfect),
     }
 

@@ -177,17 +177,14 @@ def density_of(result: StudyResult, place: int) -> tuple[Floats, Floats]:
     box, posterior = result.study.settings.space.intervals[place], result.knowledge.posterior
     values = result.knowledge.values[:, place]
     heights, edges = np.histogram(values, bins=BINS, weights=posterior.weights, density=True)
+    # The more points count, the less is smoothed.
+    deviation = np.sqrt(posterior.weights @ (values - posterior.weights @ values) ** 2)
+    reach = float(SMOOTH_PROFILE * deviation * (posterior.weights**2).sum() ** 0.2)
     # Mirrored at its ends: at an end of the box nothing leaks out of it.
-    smooth = gaussian_filter1d(heights, _reach(values, posterior.weights) / (edges[1] - edges[0]), mode="reflect")
+    smooth = gaussian_filter1d(heights, reach / (edges[1] - edges[0]), mode="reflect")
     centres = 0.5 * (edges[1:] + edges[:-1])
     places = np.concatenate([[box.low, edges[0]], centres, [edges[-1], box.high]])
     return places, np.concatenate([[0.0, smooth[0]], smooth, [smooth[-1], 0.0]])
-
-
-def _reach(values: Floats, weights: Floats) -> float:
-    """Part of its range over which a parameter's histogram is smoothed: the less, the more points count."""
-    deviation = np.sqrt(weights @ (values - weights @ values) ** 2)
-    return float(SMOOTH_PROFILE * deviation * (weights**2).sum() ** 0.2)
 
 
 PANEL = 0.92

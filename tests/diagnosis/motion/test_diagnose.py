@@ -226,12 +226,7 @@ def said_of(name, kind):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
-    [
-        "dead_band width 0.12",
-        "turn_slip gain 0.15",
-        "yaw_scrub baseline 0.13",
-        "dropped_commands probability 0.4",
-    ],
+    ["dead_band width 0.12", "turn_slip gain 0.15", "yaw_scrub baseline 0.13", "dropped_commands probability 0.4"],
 )
 def test_a_hidden_effect_is_named_and_nothing_else(name):
     row = said_of(name, "in form")

@@ -75,9 +75,7 @@ def test_the_group_that_gains_most_is_chosen_first():
 
 def test_a_few_wild_errors_hardly_move_the_weights():
     np.testing.assert_allclose(
-        choose_groups(summed(slopes(WEIGHTS, odd=12)), COLUMNS, RULES).weights,
-        WEIGHTS,
-        atol=0.05,
+        choose_groups(summed(slopes(WEIGHTS, odd=12)), COLUMNS, RULES).weights, WEIGHTS, atol=0.05
     )
 
 
@@ -87,11 +85,7 @@ def test_errors_are_counted_from_no_weights_wherever_they_were_linearised():
     np.testing.assert_allclose(
         summed(moved, WEIGHTS).gradient / PARTS, summed(plain).gradient / PARTS, rtol=1.0, atol=8.0
     )
-    np.testing.assert_allclose(
-        choose_groups(summed(moved, WEIGHTS), COLUMNS, RULES).weights,
-        WEIGHTS,
-        atol=0.02,
-    )
+    np.testing.assert_allclose(choose_groups(summed(moved, WEIGHTS), COLUMNS, RULES).weights, WEIGHTS, atol=0.02)
 
 
 def test_curves_over_two_signals_are_always_pulled_firmly():

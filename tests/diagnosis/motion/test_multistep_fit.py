@@ -109,10 +109,7 @@ def test_windows_lead_back_to_the_values_that_drove():
 
 def test_without_a_free_parameter_or_a_window_nothing_is_fitted(driven):
     assert fit_windows(driven, TRUTH, (), cut(driven, 2.0)) == TRUTH
-    assert fit_windows(driven, {"trim": 0.0, "delay": 0.1}, DECLARED, cut(driven, 100.0)) == {
-        "trim": 0.0,
-        "delay": 0.1,
-    }
+    assert fit_windows(driven, {"trim": 0.0, "delay": 0.1}, DECLARED, cut(driven, 100.0)) == {"trim": 0.0, "delay": 0.1}
 
 
 def test_a_few_wild_poses_do_not_bend_the_parameters(driven):

@@ -325,8 +325,8 @@ def relative(origin: Floats, pose: Floats) -> Floats:
 
 def gather(log: Log, robot: Robot, episodes: Sequence[LogEpisode], *, compared: bool = True) -> Drives:
     """A batch of a log's episodes, each command held from its own time; `compared` ones need measured motion."""
-    # A measured rate of 59.9998 Hz is 60 Hz: twice the ticks would tell nothing more. Published results of robots on two
-    # wheels were got without slack, and stay what they are.
+    # A measured rate of 59.9998 Hz is 60 Hz: twice the ticks would tell nothing more. Published results of robots on
+    # two wheels were got without slack, and stay what they are.
     slack = SLACK if robot.drive == "ackermann" else 0.0
     ticks = math.ceil(TICK_HZ / log.rate_hz - slack)
     length = max(len(episode.times) for episode in episodes) * ticks

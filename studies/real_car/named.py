@@ -19,6 +19,7 @@ from proxytune.diagnosis.motion.drives import Drives
 from proxytune.diagnosis.motion.fitting import Fit, fit, intervals
 from proxytune.diagnosis.motion.innovations import increments, log_likelihood
 from proxytune.diagnosis.motion.prediction import blocks_of, cut, pose_errors, ratio
+from proxytune.diagnosis.motion.random_effects import random_effects
 from proxytune.effects import effect_of
 from proxytune.logs import read_log
 
@@ -29,6 +30,7 @@ POSES, COMMANDS = ["x", "y", "heading"], ["throttle", "steering", "enabled"]
 EVERY = 5
 """One pose of so many is kept."""
 HORIZONS_S = (1.0, 2.0, 5.0)
+SEED = 1
 DELAY_S = 0.02
 """Where the delay is looked for from beside all effects."""
 INSTEAD: dict[tuple[str, ...], dict[str, float]] = {
@@ -89,6 +91,8 @@ def main(folder: Path, output: Path) -> None:
     with_all, rows = squares(kept, whole), []
     errors = zip(HORIZONS_S, with_all, strict=True)
     print("all effects:", *(f"{np.sqrt(one.mean()):.3f} m at {horizon:g} s" for horizon, one in errors))
+    for found in random_effects(whole, SEED):
+        print(f"{found.effect}: {found.gain:.0f} nats at {found.value:.2f}, and {found.left:.1f} deviations are left")
     for left_out, instead in INSTEAD.items():
         theta = {name: value for name, value in whole.theta.items() if effect_of(name) not in left_out} | instead
         less = fit(drives, theta, tuple((name,) for name in theta), whole.noise)

@@ -4,7 +4,10 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
+
+from proxytune.logs import read_log
 
 ROOT = Path(__file__).resolve().parents[1]
 STUDY, RECORDINGS = ROOT / "studies" / "real_car", ROOT.parent / "shared" / "data" / "dart"
@@ -48,3 +51,23 @@ def test_effects_beat_the_fitted_bicycle_on_free_driving_kept_aside():
     for horizon in (1.0, 2.0):
         assert error(model_of(found), kept, horizon) < 0.7 * error(fitted_bicycle(drives), kept, horizon)
         assert error(model_of(found), kept, horizon) < error(Physics(), kept, horizon)
+
+
+def test_a_log_has_every_command_at_its_own_time_and_every_fifth_pose(tmp_path):
+    """Commands of rows that are left out would stand in later rows: late by up to four of them."""
+    from named import LOGS, write_log
+
+    rows = np.arange(200)
+    table = pd.DataFrame(
+        {"vicon time": 100.0 + rows / 100.0, "vicon x": rows / 100.0, "vicon y": 0.0, "vicon yaw": 0.0}
+    )
+    table = table.assign(throttle=0.2 + 0.1 * (rows // 11 % 2), steering=0.0, safety_value=1.0)
+    for drive in LOGS["kept"]:
+        table.to_csv(tmp_path / f"{drive}.csv", index=False)
+    late = write_log(tmp_path, tmp_path, "kept")
+    log = read_log(tmp_path / "kept")
+    assert [episode.name for episode in log.episodes] == [*LOGS["kept"]]
+    for episode in log.episodes:
+        np.testing.assert_allclose(episode.issued - episode.times[0], np.arange(0, 200, 11) / 100.0, atol=1e-9)
+        assert len(episode.measured.times) == 40
+    np.testing.assert_allclose(np.unique(np.round(late, 6)), np.arange(5) / 100.0)

@@ -56,6 +56,10 @@ class Rules:
     least_random_gain_nats: float = 30.0
     """Evidence that a random effect needs: twice as much, for its chance is drawn from shifted innovations, roughly."""
 
+    most_left_of_commands: float = 2.5
+    """What a random effect of a car may leave of its commands' pulls [standard deviations]. Planted losses and jitter
+    leave 0.4 to 1.7; what else the model lacks pulls both ways, early and late, and much remains: 4 to 6 on DART."""
+
     most_effects: int = 5
     """Effects that may be adopted: a search that goes astray ends."""
 

@@ -37,6 +37,8 @@ GRID = 25
 """Sizes that are tried at first, evenly in their logarithm."""
 SHIFTS = 99
 """How often the null distribution is drawn."""
+SEEN = 1.0
+"""A command can be seen if its loss would move the innovations by a standard deviation."""
 
 
 class Responses(NamedTuple):
@@ -54,7 +56,8 @@ class Responses(NamedTuple):
 class RandomEffect(NamedTuple):
     """A random effect weighed: its likeliest size, and its gain beyond what chance gives on average [nats].
 
-    The interval is all sizes that are looked for, until `infer_size_indirectly` narrows it.
+    The interval is all sizes that are looked for, until `infer_size_indirectly` narrows it. `left` is what the
+    likeliest lateness of every command leaves of its pull on the innovations: about 1 if lateness is all that there is.
     """
 
     effect: str
@@ -63,6 +66,7 @@ class RandomEffect(NamedTuple):
     interval: tuple[float, float]
     gain: float
     p_value: float
+    left: float = 0.0
 
 
 def random_effects(fitted: Fit, seed: int) -> tuple[RandomEffect, ...]:
@@ -81,7 +85,18 @@ def _weigh(effect: str, draws: Draws, rate_hz: float, answered: Responses) -> Ra
     best, gain = likeliest_size(draws, rate_hz, answered.gradient, answered.size)
     chance = np.max([_ratio(draws, rate_hz, size, answered.others, answered.size) for size in _grid(draws)], axis=0)
     p_value = float((1 + (chance >= gain).sum()) / (1 + len(chance)))
-    return RandomEffect(effect, effect, best, draws.sizes, gain - max(0.0, float(chance.mean())), p_value)
+    left = _left(draws.lateness(best, rate_hz), answered.gradient, answered.size)
+    return RandomEffect(effect, effect, best, draws.sizes, gain - max(0.0, float(chance.mean())), p_value, left)
+
+
+def _left(late: Lateness, gradient: Floats, energy: Floats) -> float:
+    """What the likeliest lateness of every command that can be seen leaves [standard deviations, root mean square]."""
+    seen = energy > SEEN
+    if not seen.any():
+        return 0.0
+    gradient, energy = gradient[seen], energy[seen]
+    likeliest = late.commands[_ratios(late, gradient, energy).argmax(axis=0)]
+    return float(np.sqrt(np.mean((gradient + likeliest * energy) ** 2 / energy)))
 
 
 def likeliest_size(draws: Draws, rate_hz: float, gradient: Floats, energy: Floats) -> tuple[float, float]:
@@ -109,10 +124,15 @@ def _ratio(draws: Draws, rate_hz: float, size: float, gradient: Floats, energy: 
 
 def _mixture(late: Lateness, gradient: Floats, energy: Floats) -> Floats:
     """The log-likelihood ratio of each command's having been late by one of these times (commands,)."""
-    steps = np.stack((-late.commands, -0.5 * late.commands**2, late.log_weights), axis=1)
-    ratios = steps @ np.stack((gradient, energy, np.ones_like(gradient)))
+    ratios = _ratios(late, gradient, energy)
     most = ratios.max(axis=0)
     return np.asarray(most + np.log(np.exp(ratios - most).sum(axis=0)))
+
+
+def _ratios(late: Lateness, gradient: Floats, energy: Floats) -> Floats:
+    """The same of each time, with its weight (times, commands)."""
+    steps = np.stack((-late.commands, -0.5 * late.commands**2, late.log_weights), axis=1)
+    return np.asarray(steps @ np.stack((gradient, energy, np.ones_like(gradient))))
 
 
 def responses(fitted: Fit, others: Floats) -> Responses:

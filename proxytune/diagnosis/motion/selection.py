@@ -14,6 +14,7 @@ prediction (`effect_size`), and searches once more without one that did harm whi
 Every threshold is one of `rules.Rules`, as the drives carry them.
 """
 
+import math
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 
@@ -153,7 +154,9 @@ def choose_best(model: Fit, evidence: Evidence, least: float, p_value: float | N
     fits = [one for one in evidence.fits.values() if one.screened and one.screened.p_value <= most]
     named = [one for one in fits if not _is_everywhere(one)]
     rare = [effect for effect in evidence.random if effect.p_value <= rules.p_value]
-    clear = [effect for effect in rare if effect.gain >= rules.least_random_gain_nats]
+    # A car's motion is hidden by much else at first, which pulls commands early as well as late.
+    most_left = rules.most_left_of_commands if model.drives.robot.drive == "ackermann" else math.inf
+    clear = [effect for effect in rare if effect.gain >= rules.least_random_gain_nats and effect.left <= most_left]
     everything: list[FittedCandidate | RandomEffect] = [*named, *clear]
     ranked = sorted(everything, key=lambda one: -one.gain)
     # Generators: a random effect costs a fit, which is made only once its turn comes.

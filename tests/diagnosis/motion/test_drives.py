@@ -373,3 +373,18 @@ def test_commands_of_the_other_kind_of_drive_are_refused_in_one_line(robot, comm
 def test_a_car_asked_for_more_than_its_full_speed_is_refused():
     with pytest.raises(LogError, match="more than the full speed"):
         duties_of(Log("log", "car", "speed_steering", 20.0, {}, ()), CAR, np.array([[99.0, 0.0]]))
+
+
+@pytest.mark.parametrize(("robot", "command", "ticks"), [("car", "ackermann", 1), ("duckiebot", "duty", 2)])
+def test_a_rate_measured_just_below_that_of_ticks_takes_no_twice_as_many_of_a_car(robot, command, ticks):
+    """Of robots on two wheels it does: their published results stay what they are."""
+    rate_hz = 59.9998
+    drive = replace(episode(np.linspace(0.0, 1.0, 60)), times=np.arange(60) / rate_hz)
+    drives = gather(Log("yard", robot, command, rate_hz, {}, (drive,)), read_robot(robot), [drive])
+    assert drives.tick_hz == pytest.approx(ticks * rate_hz)
+    assert drives.last[-1] == 59 * ticks
+
+
+def test_a_car_is_simulated_no_less_often_than_its_rate_falls_short_by_a_little():
+    drive = replace(episode(np.linspace(0.0, 1.0, 60)), times=np.arange(60) / 50.0)
+    assert gather(Log("yard", "car", "ackermann", 50.0, {}, (drive,)), CAR, [drive]).tick_hz == 100.0

@@ -14,6 +14,7 @@ from proxytune.diagnosis import RANDOM_EFFECTS
 from proxytune.diagnosis.motion.random_effects import (
     _changed_commands,
     _invert,
+    _left,
     _lose_commands,
     _mixture,
     infer_size_indirectly,
@@ -183,3 +184,18 @@ def test_the_size_is_that_of_which_drives_say_what_is_measured():
     value, low, high = _invert(sizes, said, float(np.log(0.1)))
     assert value == pytest.approx(0.2)
     assert 0.1 < low < 0.2 < high < 0.4
+
+
+def test_lateness_that_is_all_there_is_leaves_noise_alone(lost, late):
+    assert lost["dropped_commands"].left < 1.5
+    assert late["delay_jitter"].left < 1.5
+
+
+def test_what_pulls_commands_early_as_well_as_late_is_left_over():
+    """All lost once leaves nothing; pulls of as much to either side leave those that are early."""
+    late, energy = RANDOM_EFFECTS["dropped_commands"].lateness(0.3, 10.0), np.full(50, 100.0)
+    lost_once = -late.commands[1] * energy
+    assert _left(late, lost_once, energy) == pytest.approx(0.0, abs=1e-9)
+    both = 8.0 * np.where(np.arange(50) % 2 == 0, lost_once, -lost_once)
+    assert _left(late, both, energy) > 2.0
+    assert _left(late, both, energy / 1000.0) == 0.0  # commands that nobody could see

@@ -299,3 +299,18 @@ def test_an_effect_is_listed_by_its_full_fit_where_it_has_one_and_random_effects
     evidence = Evidence([other, fitted], {"yaw_scrub": FittedCandidate(80.0, None, fitted)}, (lost,), [])
     listed = [(one.effect, one.gain, one.p_value) for one in list_tried(evidence)]
     assert listed == [("yaw_scrub", 80.0, 0.002), ("dropped_commands", 60.0, 0.01), ("turn_slip", 50.0, 0.3)]
+
+
+@pytest.mark.parametrize(
+    ("drive", "left", "chosen"), [("ackermann", 1.7, True), ("ackermann", 3.8, False), ("differential", 3.8, True)]
+)
+def test_no_random_effect_stands_for_what_a_car_lacks_beside_it(monkeypatch, drive, left, chosen):
+    """True ones leave up to 1.7 of what pulls commands. Robots on two wheels are judged as they always were."""
+    lost = RandomEffect("dropped_commands", "dropped_commands", 0.5, (0.0, 0.6), 2000.0, 0.01, left)
+    model = SimpleNamespace(drives=SimpleNamespace(rules=RULES, robot=SimpleNamespace(drive=drive)))
+    monkeypatch.setattr(
+        selection, "fit_random", lambda model, effect: FittedCandidate(effect.gain, model, random=effect)
+    )
+    monkeypatch.setattr(selection, "predicts_no_worse", lambda one, other: True)
+    best = choose_best(model, Evidence([], {}, (lost,), []), 15.0)
+    assert (best is not None) == chosen

@@ -12,3 +12,4 @@ from .log import (
 )
 from .reading import read_commands as read_commands, read_log as read_log
 from .repeats import rows_of_poses as rows_of_poses
+from .windows import join_windows as join_windows

@@ -12,6 +12,7 @@ import numpy as np
 from proxytune.arrays import Floats
 from proxytune.logs.log import Log, LogEpisode
 from proxytune.logs.repeats import repeats_note
+from proxytune.logs.windows import windows_note
 from proxytune.settings import alike_caution, figure_cautions
 
 Figures = Mapping[str, float]
@@ -63,6 +64,7 @@ def log_cautions(log: Log, figures: Figures) -> tuple[str, ...]:
         *([names] if names else []),
         *_copies(log),
         *repeats_note(log),
+        *windows_note(log),
     ]
     return tuple(found)
 

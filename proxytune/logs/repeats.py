@@ -48,9 +48,18 @@ def _runs(episode: LogEpisode) -> Runs:
     poses = episode.poses[known]
     fresh = np.append(len(known) > 0, (np.diff(poses, axis=0) != 0.0).any(axis=1))[: len(known)]
     at = np.flatnonzero(fresh)
-    steps = np.diff(poses[at], axis=0)
-    ways = np.hypot(steps[:, 0], steps[:, 1]) + LEVER_M * np.abs(steps[:, 2])
-    return Runs(known, fresh, np.diff(np.append(at, len(known))), ways / np.diff(episode.times[known[at]]))
+    speeds = ways(np.diff(poses[at], axis=0)) / np.diff(episode.times[known[at]])
+    return Runs(known, fresh, np.diff(np.append(at, len(known))), speeds)
+
+
+def ways(steps: Floats) -> Floats:
+    """Lengths of steps of poses (N, 3), turns counted as ways (N,) [m]."""
+    return np.asarray(np.hypot(steps[:, 0], steps[:, 1]) + LEVER_M * np.abs(steps[:, 2]))
+
+
+def speeds_between(episode: LogEpisode) -> Floats:
+    """Speeds from each pose of a drive to the next other one (N,) [m/s], turns counted as ways."""
+    return _runs(episode).speeds
 
 
 def _shown_again(runs: Runs, least_m_s: float, *, usual: bool) -> NDArray[np.bool_]:

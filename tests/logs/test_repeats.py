@@ -93,6 +93,6 @@ def test_a_skid_steer_robots_lidar_repeats_its_poses():
         pytest.skip("the measured log drive_husky is not here: it is not part of the project")
     husky = read_log(HUSKY)
     (line,) = [line for line in log_cautions(husky, {}) if "repeat" in line]
-    assert "(about 9.9 a second are measured)" in line
+    assert "(about 9.8 a second are measured)" in line
     found = rows_of_poses(husky, husky.episodes)
     assert 2 < sum(map(len, found)) / 603 / 2.0 < 11

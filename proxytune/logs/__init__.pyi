@@ -11,3 +11,5 @@ from .log import (
     check_kind as check_kind,
 )
 from .reading import read_commands as read_commands, read_log as read_log
+from .repeats import rows_of_poses as rows_of_poses
+from .windows import join_windows as join_windows

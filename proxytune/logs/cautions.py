@@ -11,6 +11,8 @@ import numpy as np
 
 from proxytune.arrays import Floats
 from proxytune.logs.log import Log, LogEpisode
+from proxytune.logs.repeats import repeats_note
+from proxytune.logs.windows import windows_note
 from proxytune.settings import alike_caution, figure_cautions
 
 Figures = Mapping[str, float]
@@ -61,6 +63,8 @@ def log_cautions(log: Log, figures: Figures) -> tuple[str, ...]:
         *([] if log.command == "none" else _obedience(log, chords, figures)),
         *([names] if names else []),
         *_copies(log),
+        *repeats_note(log),
+        *windows_note(log),
     ]
     return tuple(found)
 

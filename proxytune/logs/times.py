@@ -180,17 +180,27 @@ def episodes_at_own_times(
     for index, name in enumerate(samples.names):
         own = slice(firsts[index], firsts[index + 1])
         times, posed = samples.values["time"][own], placed[own]
-        steps = (times - times[0]) * rate_hz
-        known, rows = _free_steps(steps, np.flatnonzero(np.isfinite(posed[:, 0])))
-        length = int(max(np.rint(steps[-1]), rows.max(initial=0))) + 1
-        grid = times[0] + np.arange(length) / rate_hz
-        measured = Measured(times[known], posed[known], rows)
-        poses = np.full((length, 3), np.nan)
-        poses[rows] = moved(measured, grid[rows])
-        speeds = None if wheels is None else _held(wheels[own], np.rint(steps), length)
+        grid, poses, measured = on_own_grid(times, posed, rate_hz)
+        speeds = None if wheels is None else _held(wheels[own], np.rint((times - times[0]) * rate_hz), len(grid))
         when, given = issued.get(name, (times, commands[own]))
         episodes.append(LogEpisode(name, grid, given, poses, speeds, when, measured))
     return tuple(episodes), rate_hz
+
+
+def on_own_grid(times: Floats, poses: Floats, rate_hz: float) -> tuple[Floats, Floats, Measured]:
+    """Poses (N, 3) at times of their own (N,), NaN where none was measured, moved to a grid of steps.
+
+    Returns:
+        The grid's times (rows,) [s], poses on it (rows, 3), and those measured at times of their own.
+    """
+    steps = (times - times[0]) * rate_hz
+    known, rows = _free_steps(steps, np.flatnonzero(np.isfinite(poses[:, 0])))
+    length = int(max(np.rint(steps[-1]), rows.max(initial=0))) + 1
+    grid = times[0] + np.arange(length) / rate_hz
+    measured = Measured(times[known], poses[known], rows)
+    on_grid = np.full((length, 3), np.nan)
+    on_grid[rows] = moved(measured, grid[rows])
+    return grid, on_grid, measured
 
 
 def _check_density(samples: Rows, usual: float) -> None:

@@ -64,7 +64,7 @@ from proxytune.diagnosis.stages import Stages
 from proxytune.driving import Robot
 from proxytune.effects import SHIPPED, Catalogue, effect_of
 from proxytune.errors import LogError
-from proxytune.logs import Log
+from proxytune.logs import Log, join_windows
 from proxytune.settings import nearest
 from proxytune.space import Theta
 
@@ -339,7 +339,7 @@ def diagnose(
     """
     names, parameters = declared_parameters(declared, robot.catalogue), robot.catalogue.parameters
     start = {name: robot.theta.get(name, parameters[name].neutral_value(robot.figures)) for name in names}
-    log, test = cut_out_long_rests(log), cut_out_long_rests(test) if test is not None else None
+    log, test = cut_out_long_rests(join_windows(log)), test and cut_out_long_rests(join_windows(test))
     own = read_clocks(log, robot)
     clocks = (own,) if test is None else (own, read_clocks(test, robot, own))
     # An offset of clocks and a delay are one number: where an offset is taken out, the delay is fitted in any case.

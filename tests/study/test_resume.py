@@ -1,5 +1,6 @@
 """Real processes, stopped for real."""
 
+import itertools
 import json
 import os
 import signal
@@ -64,10 +65,9 @@ def stopped_and_resumed(folder, launcher, signals, random):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("jobs", ["1", "2"])
-@pytest.mark.parametrize("engine", ENGINE_NAMES)
+@pytest.mark.parametrize(("engine", "jobs"), list(zip(ENGINE_NAMES, itertools.cycle("12"), strict=False)))
 def test_a_study_stopped_at_any_moment_gives_the_trials_of_one_that_was_not(make_study, launcher, engine, jobs):
-    """To the last bit, with every engine, one job and two, by Ctrl-C, SIGTERM and `kill -9`."""
+    """To the last bit, with every engine, of one job or two, by Ctrl-C, SIGTERM and `kill -9`."""
     if engine == "tpe":
         pytest.importorskip("optuna")
     changes = {"engine": f'"{engine}"', "initial": "3"}

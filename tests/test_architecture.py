@@ -2,6 +2,7 @@
 
 import ast
 import importlib
+import re
 from pathlib import Path
 
 import pytest
@@ -21,6 +22,8 @@ ROOMS = {
     "argparse": {"cli"},
 }
 MODULES = sorted(PACKAGE.rglob("*.py"))
+DOORS = [path for path in MODULES if path.name == "__init__.py" and path.parent.name not in ("proxytune", "testing")]
+"""The tables of those two are of what they hand out, by subject."""
 
 
 def room_of(path):
@@ -96,6 +99,15 @@ def test_a_door_hands_out_what_others_take_and_no_name_of_a_module(door):
     assert set(importlib.import_module(room).__all__) == names
     for name in names:
         assert hasattr(importlib.import_module(room), name)
+
+
+@pytest.mark.parametrize("path", DOORS, ids=lambda path: path.parent.name)
+def test_a_doors_table_of_contents_has_its_modules_at_the_beginnings_of_lines(path):
+    for line in ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))).splitlines():
+        if entry := re.match(r"(\S.*?)  +\S", line.strip()):
+            names = [name.rstrip("/") for name in entry[1].split(", ")]
+            parts = {part.stem for part in path.parent.iterdir()}
+            assert parts.issuperset(names), f"{path}: {line}"
 
 
 def handed_out(door):

@@ -1,9 +1,10 @@
 """The measures beside PRPV: errors, costs of a wrong order and correlations of scores, and unlike observations.
 
-POD  = mean or Σ over time of ‖o(proxy) − o(target)‖, under the same commands        # eq. (1) PPV  = mean over agents
-of Σ_m β_m |M_m(proxy) − M_m(target)|                        # eq. (2) MMRV = mean over agents i of max_j |M_i(target) −
-M_j(target)| where i, j are ordered wrongly (SIMPLER) SRCC = Pearson's correlation of the agents' mean scores in proxy
-and target, per metric Kendall's τ-b = Σ sign(proxy) sign(target) / √(pairs untied in proxy · on target), per metric
+POD  = mean or Σ over time of ‖o(proxy) − o(target)‖, under the same commands        # eq. (1)
+PPV  = mean over agents of Σ_m β_m |M_m(proxy) − M_m(target)|                        # eq. (2)
+MMRV = mean over agents i of max_j |M_i(target) − M_j(target)| where i, j are ordered wrongly (SIMPLER)
+SRCC = Pearson's correlation of the agents' mean scores in proxy and target, per metric
+Kendall's τ-b = Σ sign(proxy) sign(target) / √(pairs untied in proxy · on target), per metric
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,6 +1,7 @@
 """The catalogue is in the order in which the signal meets the effects, and that order changes what comes out.
 
-What every effect promises, run over the whole catalogue. Each filter against what it should do by hand.
+What every effect promises, run over the whole catalogue.
+Each filter against what it should do by hand.
 """
 
 import numpy as np

@@ -1,7 +1,8 @@
 """Cosine and sine from the tangent of half the angle are those of numpy.
 
-Measured drives become arrays: what counts as an increment, and what a command is as a duty. What was asked for lately
-is not worked out again. A log_of_vehicle's robot is one of ours, or what its log_of_vehicle says of it.
+Measured drives become arrays: what counts as an increment, and what a command is as a duty.
+What was asked for lately is not worked out again.
+A log_of_vehicle's robot is one of ours, or what its log_of_vehicle says of it.
 """
 
 from dataclasses import replace

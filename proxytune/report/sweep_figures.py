@@ -174,9 +174,9 @@ def draw_prpv_and_ppv(prpv: Axes, ppv: Axes, curve: SweepCurve) -> None:
     """PRPV over the values of a parameter, with the noise floor and chance, and PPV; both with their bands."""
     if found := [point.assessment for point in curve.points if point.assessment is not None]:
         draw_levels(prpv, found)
-        of_prpv, of_ppv, *_ = series_of(curve)
-        draw_series(prpv, of_prpv, BLUE, "o", "PRPV", INTERVAL)
-        draw_series(ppv, of_ppv, BLUE, "o")
+        series = {one.measure: one for one in series_of(curve)}
+        draw_series(prpv, series[PRPV], BLUE, "o", "PRPV", INTERVAL)
+        draw_series(ppv, series[PPV], BLUE, "o")
 
 
 def draw_levels(axes: Axes, found: Sequence[Assessment]) -> None:

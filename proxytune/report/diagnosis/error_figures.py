@@ -132,7 +132,8 @@ def strayed(diagnosis: Diagnosis) -> dict[str, Strayed]:
     if diagnosis.effects:
         models[extended_name(diagnosis)] = found.model.theta
     horizon = min((error.horizon_s for error in diagnosis.errors), key=lambda length: abs(length - HORIZON_S))
-    windows, both = cut(tested, horizon), dict[str, Strayed]()
+    windows = cut(tested, horizon)
+    both = {}
     for name, theta in models.items():
         distance = 1e3 * pose_errors(tested, dict(theta), windows)[:, 0]
         rms = np.sqrt(np.bincount(windows.window, distance**2) / np.bincount(windows.window))

@@ -140,22 +140,31 @@ class AwakeClock:
         return self._seconds
 
 
+_kept_awake: set[AwakeClock] = set()
+_asking: threading.Thread | None = None
+
+
 @contextmanager
 def awake() -> Iterator[AwakeClock]:
     """A clock that is asked often enough meanwhile; read it afterwards."""
-    clock, over = AwakeClock(), threading.Event()
-
-    def ask() -> None:
-        while not over.wait(ASK_S):
-            clock.seconds()
-
-    asking = threading.Thread(target=ask, daemon=True)
-    asking.start()
+    global _asking
+    clock = AwakeClock()
+    _kept_awake.add(clock)
+    # One thread for good: to start and end one takes 5 ms, as long as many an episode. A forked process begins its own
+    if _asking is None or not _asking.is_alive():
+        _asking = threading.Thread(target=_ask, daemon=True)
+        _asking.start()
     try:
         yield clock
     finally:
-        over.set()
-        asking.join()
+        _kept_awake.remove(clock)
+
+
+def _ask() -> None:
+    while True:
+        time.sleep(ASK_S)
+        for clock in tuple(_kept_awake):
+            clock.seconds()
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+import threading
 import time
 
 import pytest
@@ -67,6 +68,23 @@ def test_an_episode_that_works_without_a_word_takes_its_time(monkeypatch):
     with awake() as clock:
         now[0], worked[0] = 60.0, 59.5
     assert clock.seconds() == 60.0
+
+
+def test_clocks_in_use_are_asked_meanwhile_by_one_thread_for_all(monkeypatch):
+    monkeypatch.setattr("proxytune.running.workers.ASK_S", 0.01)
+    with awake(), awake():  # the thread that is there may still nap for as long as before
+        begun, asked = threading.active_count(), []
+        monkeypatch.setattr(AwakeClock, "seconds", lambda clock: asked.append(clock))
+        with awake() as one, awake() as other:
+            while not {one, other} <= set(asked):
+                time.sleep(0.01)
+            assert threading.active_count() == begun
+    del asked[:]
+    with awake() as third:
+        while third not in asked:
+            time.sleep(0.01)
+    assert one not in asked
+    assert other not in asked
 
 
 def left(folder):

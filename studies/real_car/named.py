@@ -1,11 +1,10 @@
 """Say what each of DART's known faults is worth to a diagnosis, and write the two logs that it is given.
 
-    python studies/real_car/named.py FOLDER OUTPUT [MODEL]
+    python studies/real_car/named.py FOLDER OUTPUT
 
 FOLDER has the recordings that README.md names. OUTPUT gets the logs `fitted` and `kept`, with poses at every fifth row
 and every command at its own time, and worth.csv: all effects are fitted to `fitted` together, then all but some, and
-the errors of both are compared on `kept`. The fit begins near the authors' values; with a MODEL that `diagnose` wrote
-it begins where that has its effects and the others small, at three sizes, and the likeliest is taken.
+the errors of both are compared on `kept`.
 """
 
 import sys
@@ -21,7 +20,6 @@ from proxytune.diagnosis.motion.fitting import Fit, fit, intervals
 from proxytune.diagnosis.motion.innovations import increments, log_likelihood
 from proxytune.diagnosis.motion.prediction import blocks_of, cut, pose_errors, ratio
 from proxytune.diagnosis.motion.random_effects import random_effects
-from proxytune.driving import read_model_of
 from proxytune.effects import effect_of
 from proxytune.logs import read_log
 
@@ -35,12 +33,6 @@ HORIZONS_S = (1.0, 2.0, 5.0)
 SEED = 1
 DELAY_S = 0.02
 """Where the delay is looked for from beside all effects."""
-SIZES = (0.01, 0.05, 0.1)
-"""Where effects that a model has not begin, each in its own unit."""
-STRAIGHT = dict.fromkeys(("steering_offset", "marker_offset.left", "heading_offset"), 0.0)
-EVEN = dict.fromkeys(("steering_curve.left", "steering_curve.right"), ROBOT.figures["wheel_angle"])
-EVEN |= dict.fromkeys(("steering_curve.left_bend", "steering_curve.right_bend"), 1.0)
-"""What begins at the robot's own figures instead."""
 INSTEAD: dict[tuple[str, ...], dict[str, float]] = {
     ("dead_band",): {"rolling.friction": 3.0},
     ("motor_lag",): {},
@@ -86,24 +78,14 @@ def nats(fitted: Fit) -> float:
     return log_likelihood(fitted.drives.measured - increments(fitted.drives, fitted.theta), fitted.whiten)
 
 
-def fit_all(drives: Drives, model: Path | None) -> Fit:
-    """Fit all effects together, from near the authors' values or from a model that knows nothing of these."""
-    names, starts = (*START, "delay"), [{**START, "delay": DELAY_S}]
-    if model:
-        known = {name: value for name, value in read_model_of(model, None).theta.items() if value}
-        starts = [{name: ({name: size} | STRAIGHT | EVEN | known)[name] for name in names} for size in SIZES]
-    fits = [fit(drives, start, tuple((name,) for name in names)) for start in starts]
-    print("nats from each start:", *(f"{nats(one):.0f}" for one in fits))
-    return max(fits, key=nats)
-
-
-def main(folder: Path, output: Path, model: Path | None) -> None:
+def main(folder: Path, output: Path) -> None:
     """Write the logs; fit all effects, and all but some; print and write what is compared."""
     late = np.concatenate([write_log(folder, output, name) for name in LOGS])
     print(f"in every fifth row {len(late)} commands are late by {late.mean():.3f} ± {late.std():.3f} s")
     logs = {name: read_log(output / name) for name in LOGS}
     drives, kept = split(logs["fitted"], ROBOT, logs["kept"])
-    whole = fit_all(drives, model)
+    start = {**START, "delay": DELAY_S}
+    whole = fit(drives, start, tuple((name,) for name in start))
     for name, (low, high) in intervals(whole).items():
         print(f"{name:25} {whole.theta[name]:8.3f} ({low:.3f} to {high:.3f})")
     with_all, rows = squares(kept, whole), []
@@ -126,6 +108,6 @@ def main(folder: Path, output: Path, model: Path | None) -> None:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) not in (3, 4):
-        sys.exit("usage: python studies/real_car/named.py FOLDER OUTPUT [MODEL]")
-    main(Path(sys.argv[1]), Path(sys.argv[2]), Path(sys.argv[3]) if len(sys.argv) == 4 else None)
+    if len(sys.argv) != 3:
+        sys.exit("usage: python studies/real_car/named.py FOLDER OUTPUT")
+    main(Path(sys.argv[1]), Path(sys.argv[2]))

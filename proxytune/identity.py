@@ -15,7 +15,7 @@ import os
 import textwrap
 import tomllib
 import warnings
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import CodeType
@@ -98,7 +98,7 @@ def _meaning(suffix: str, content: bytes) -> str:
         if suffix == ".py":
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
-                known = "\n".join(_walk(ast.parse(content))).encode()
+                known = "\n".join(_walk(ast.parse(content), [])).encode()
         if suffix == ".toml":
             known = json.dumps(tomllib.loads(content.decode()), sort_keys=True, default=str).encode()
     except (SyntaxError, ValueError, RecursionError):
@@ -106,25 +106,26 @@ def _meaning(suffix: str, content: bytes) -> str:
     return hashlib.sha256(known).hexdigest()
 
 
-def _walk(node: Any) -> Iterator[str]:
-    """A syntax tree as lines; fields that are empty go unsaid, since newer versions of Python have more of them."""
+def _walk(node: Any, lines: list[str]) -> list[str]:
+    """Add a syntax tree to lines; fields that are empty go unsaid, since newer versions of Python have more of them."""
     if isinstance(node, list):
-        yield "["
+        lines.append("[")
         for one in node:
             # A string that is a statement of its own is a docstring, or describes an attribute.
             constant = one.value if isinstance(one, ast.Expr) else None
             if not (isinstance(constant, ast.Constant) and isinstance(constant.value, str)):
-                yield from _walk(one)
-        yield "]"
+                _walk(one, lines)
+        lines.append("]")
     elif isinstance(node, ast.AST):
-        yield f"({type(node).__name__}"
+        lines.append(f"({type(node).__name__}")
         for name, value in ast.iter_fields(node):
             if name not in LEFT_OUT and value is not None and value != []:
-                yield name
-                yield from _walk(value)
-        yield ")"
+                lines.append(name)
+                _walk(value, lines)
+        lines.append(")")
     else:
-        yield repr(node)
+        lines.append(repr(node))
+    return lines
 
 
 CALLED = {"numpy": "NumPy", "pybullet": "PyBullet", "scipy": "SciPy", "optuna": "Optuna"}

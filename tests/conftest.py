@@ -38,12 +38,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 @pytest.fixture(autouse=True)
 def _forget_folders() -> Iterator[None]:
     """Forget where a test's modules lay: a search for plug-ins looks at every folder that is still known."""
-    path = list(sys.path)
-    homes = {name for name in sys.modules if name.startswith("beside_")}
+    path, known = list(sys.path), set(sys.modules)
     yield
     sys.path[:] = path
-    for name in [name for name in sys.modules if name.startswith("beside_") and name not in homes]:
-        del sys.modules[name]
+    for name in sys.modules.keys() - known:
+        if name.startswith("beside_"):
+            del sys.modules[name]
 
 
 @pytest.fixture(autouse=not find_spec("pybullet"))

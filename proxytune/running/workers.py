@@ -131,13 +131,15 @@ class AwakeClock:
 
     def __init__(self) -> None:
         self._seconds, self._asked, self._worked = 0.0, time.monotonic(), time.process_time()
+        self._one_at_a_time = threading.Lock()
 
     def seconds(self) -> float:
-        """The seconds until now [s]."""
-        now, worked = time.monotonic(), time.process_time()
-        self._seconds += min(now - self._asked, NAP_S + worked - self._worked)
-        self._asked, self._worked = now, worked
-        return self._seconds
+        """The seconds until now [s]; whichever thread asks, none is counted twice."""
+        with self._one_at_a_time:
+            now, worked = time.monotonic(), time.process_time()
+            self._seconds += min(now - self._asked, NAP_S + worked - self._worked)
+            self._asked, self._worked = now, worked
+            return self._seconds
 
 
 _kept_awake: set[AwakeClock] = set()

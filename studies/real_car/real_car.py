@@ -25,7 +25,6 @@ from matplotlib import pyplot as plt
 FITTED = ("free_1", "circles_1", "circles_2", "ramp_left")
 KEPT = ("free_2", "ramp_right")
 OTHER_FLOOR = "tape_and_tiles"
-TOGETHER = " and ".join(KEPT)
 HORIZONS_S = (1.0, 2.0)
 MOVED_M = 0.05
 """Windows in which the car moves less are no prediction."""
@@ -162,7 +161,7 @@ def main(folder: Path, output: Path) -> None:
         "robot.toml alone": model_of({}),
         "with its effects": model_of(theta),
     }
-    judged = {name: [drive] for name, drive in drives.items()} | {TOGETHER: [drives[name] for name in KEPT]}
+    judged = {name: [drive] for name, drive in drives.items()} | {" and ".join(KEPT): [drives[name] for name in KEPT]}
     rows = [
         {"drive": name, "horizon_s": horizon, **{m: error(model, some, horizon) for m, model in models.items()}}
         for name, some in judged.items()

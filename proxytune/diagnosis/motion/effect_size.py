@@ -44,6 +44,7 @@ from proxytune.diagnosis.motion.multistep_fit import (
 from proxytune.diagnosis.motion.prediction import Ratio, Windows, blocks_of, cut, motion_in, pose_errors, ratio, rmse
 from proxytune.diagnosis.motion.random_effects import responses
 from proxytune.diagnosis.motion.screening import candidates, motion_effects, project_out
+from proxytune.space import Theta
 
 FITTED_S = 2.0
 """Windows that models with and without an effect are fitted to, the longest that drives have up to this."""
@@ -107,17 +108,14 @@ def _weigh_effects(
     drives: Drives, variant: Variant, effects: Sequence[AdoptedEffect], seed: int
 ) -> list[WeighedEffect]:
     """Weigh each effect of a model on the drives it was fitted to, with blocks left out in turn."""
-    length = _length(drives)
-    whole = held_out_squares(drives, variant.theta, variant.free, length)
+    whole = _held_out(drives, variant)[1]
     found = []
     for effect in effects:
         if effect.free:
-            theta, free = without_effect(variant, effect, drives.rate_hz)
-            size = compare_errors(drives, held_out_squares(drives, theta, free, length), whole)
+            size = compare_errors(drives, _held_out(drives, without_effect(variant, effect, drives.rate_hz))[1], whole)
         else:
             # Blocks left out add errors of the fit, which are no draws.
-            squares = {h: pose_errors(drives, variant.theta, cut(drives, h))[:, 0] ** 2 for h in whole}
-            size = _size_of_draws(drives, variant, squares, seed)
+            size = _size_of_draws(drives, variant, _plain_squares(drives, variant.theta), seed)
         found.append(WeighedEffect(effect, size, drives.rules))
     return found
 
@@ -133,9 +131,30 @@ def measure_effect_size(
 
 
 def _squares(fitted: Drives, tested: Drives, variant: Variant) -> dict[float, Floats]:
-    windows = cut(fitted, _length(fitted))
-    theta = fit_windows(fitted, variant.theta, variant.free, windows)
-    return {h: pose_errors(tested, theta, cut(tested, h))[:, 0] ** 2 for h in horizons(tested)}
+    """Squared errors on drives that nothing was fitted to, by horizon [s]."""
+    theta = _held_out(fitted, variant)[0] if fitted.robot.drive == "ackermann" else None
+    if theta is None:
+        theta = fit_windows(fitted, variant.theta, variant.free, cut(fitted, _length(fitted)))
+    return _plain_squares(tested, theta)
+
+
+def _held_out(drives: Drives, variant: Variant) -> tuple[Theta | None, dict[float, Floats]]:
+    """Squared held-out errors of a model that is fitted to windows, by horizon [s].
+
+    The many parameters of a car wander when they are fitted to windows. Where its θ that is fitted to single steps
+    predicts better, that is given too, with its errors.
+    """
+    length = _length(drives)
+    windows = held_out_squares(drives, variant.theta, variant.free, length)
+    if drives.robot.drive != "ackermann" or not windows:
+        return None, windows
+    theta = fit(drives, variant.theta, variant.free).theta
+    steps = _plain_squares(drives, theta)
+    return (theta, steps) if steps[length].mean() < windows[length].mean() else (None, windows)
+
+
+def _plain_squares(drives: Drives, theta: Theta) -> dict[float, Floats]:
+    return {h: pose_errors(drives, theta, cut(drives, h))[:, 0] ** 2 for h in horizons(drives)}
 
 
 def _length(drives: Drives) -> float:

@@ -38,8 +38,8 @@ from proxytune.diagnosis.motion.evidence import (
     list_tried,
     without_effect,
 )
-from proxytune.diagnosis.motion.fitting import Fit, fit, held_out_log_likelihood
-from proxytune.diagnosis.motion.innovations import at_edge, increments, lateness, log_likelihood
+from proxytune.diagnosis.motion.fitting import KEPT_SOLVABLE, Fit, fit, held_out_log_likelihood
+from proxytune.diagnosis.motion.innovations import HUBER, at_edge, increments, lateness, log_likelihood, span
 from proxytune.diagnosis.motion.prediction import blocks_of, cut, pose_errors, ratio
 from proxytune.diagnosis.motion.random_effects import RandomEffect, infer_size_indirectly
 from proxytune.diagnosis.motion.screening import Candidate, ScreenedCandidate, candidates, screen
@@ -75,7 +75,8 @@ def _search_and_drop(
 ) -> tuple[Findings, tuple[DroppedEffect, ...]]:
     """Search, drop what is negligible, and tell which effects did harm while others were chosen beside them."""
     found = search(base, seed, report, without)
-    if base.drives.robot.drive == "ackermann" and found.unnamed_curves:
+    left = max((curve.gain for curve in found.unnamed_curves), default=0.0)
+    if base.drives.robot.drive == "ackermann" and left > base.drives.rules.sure_gain_nats:
         together = eliminate(found, report, without)
         if together is not None:
             # Each was held against all others; taken out one after another they would make up for one another.
@@ -138,8 +139,8 @@ OF_CARS = (
 def eliminate(found: Findings, report: Progress, without: Collection[str] = ()) -> Findings | None:
     """Fit all that cars are modelled with and what was found together, and take out what is not sure.
 
-    The effect with least evidence goes first, all others fitted again. None where what is left is not surely more
-    likely than what was found, or predicts worse.
+    The effect of least evidence by Wald's statistic goes first, and all others are fitted again. None where what is
+    left is not surely more likely than what was found, or predicts worse.
     """
     base, rules = found.declared, found.declared.drives.rules
     robot, theta = base.drives.robot, dict(base.theta)
@@ -154,27 +155,37 @@ def eliminate(found: Findings, report: Progress, without: Collection[str] = ()) 
     report("fitting all that cars are modelled with together")
     free = base.free + tuple(coordinate for effect in effects for coordinate in effect.free)
     model = fit(base.drives, theta, free, base.noise)
-    while True:
-        gains, rests = list[float](), list[Fit]()
-        for effect in effects:
-            rest = without_effect(Variant(model.theta, model.free), effect, base.drives.rate_hz)
-            rests.append(fit(base.drives, rest.theta, rest.free, model.noise))
-            gains.append(_likelihood(model) - _likelihood(rests[-1]) if effect.free else effect.gain)
-            if gains[-1] < rules.least_gain_nats:
-                break
-        least = min(gains, default=rules.sure_gain_nats)
-        if least >= rules.sure_gain_nats:
-            break
-        gone = gains.index(least)
-        report(f"taking out {effects[gone].effect}")
-        model = rests[gone]
-        effects.pop(gone)
+    sure = list[AdoptedEffect]()
+    while doubtful := [effect for effect in effects if effect.free and effect not in sure]:
+        effect = min(doubtful, key=lambda one: _wald(model, one))
+        rest = without_effect(Variant(model.theta, model.free), effect, base.drives.rate_hz)
+        smaller = fit(base.drives, rest.theta, rest.free, model.noise)
+        gain = _likelihood(model) - _likelihood(smaller)
+        effects.remove(effect)
+        if gain < rules.sure_gain_nats:
+            report(f"taking out {effect.effect}")
+            model, sure = smaller, []
+        else:
+            sure.append(replace(effect, gain=gain))
+            effects.append(sure[-1])
     gained = _likelihood(model) - _likelihood(found.model)
     if gained < rules.sure_gain_nats or not predicts_no_worse(model, found.model):
         return None
-    adopted = tuple(replace(effect, gain=gain) for effect, gain in zip(effects, gains, strict=True))
-    curves = (curve for curve in fit_curves(model) if exceeds_names(curve, _least_gain(adopted, rules), rules))
-    return replace(found, model=model, adopted=adopted, unnamed_curves=tuple(curves))
+    curves = (curve for curve in fit_curves(model) if exceeds_names(curve, _least_gain(effects, rules), rules))
+    return replace(found, model=model, adopted=tuple(effects), unnamed_curves=tuple(curves))
+
+
+def _wald(model: Fit, effect: AdoptedEffect) -> float:
+    """Wald's statistic of an effect: what it would cost to have it at neutral, by the Hessian [nats]."""
+    robot, own = model.drives.robot, [model.free.index(coordinate) for coordinate in effect.free]
+    inner = model.slopes * (np.abs(model.innovations) < HUBER)[:, None]
+    covariance = np.linalg.inv(model.slopes.T @ inner + KEPT_SOLVABLE * np.eye(len(model.free)))
+    spans = [span(coordinate, robot) for coordinate in effect.free]
+    moved = [
+        (model.theta[name] - robot.catalogue.parameters[name].neutral_value(robot.figures)) / (high - low)
+        for (name, *_), (low, high) in zip(effect.free, spans, strict=True)
+    ]
+    return 0.5 * float(moved @ np.linalg.solve(covariance[np.ix_(own, own)], moved))
 
 
 def drop_unconfirmed(

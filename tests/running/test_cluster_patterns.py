@@ -182,23 +182,39 @@ class Loopback:
 
 
 def own_study(make_study, called, sleep, faults=(), **changes):
-    domain = {"sleep": sleep, "faults": str(list(faults)).replace("'", '"')}
+    domain = {"sleep": sleep, "faults": str([*faults]).replace("'", '"')}
     folder = make_study(called, family='"mine:family"', domain=domain, **changes)
     (folder / "mine.py").write_text(OWN_FAMILY)
     (folder / "helper.py").write_text(HELPER)
     return folder
 
 
+@pytest.fixture(scope="module")
+def undisturbed(make_studies):
+    """The trials and episodes of a study on this machine alone, run once for each of its kinds."""
+    known = {}
+
+    def run(faults, limit):
+        if (faults, limit) not in known:
+            changes = {"episode_timeout_s": limit} if limit else {}
+            called, jobs = f"alone{len(known)}", "2" if faults else "1"
+            folder = own_study(make_studies, called, "0.0", faults, jobs=jobs, **changes)
+            assert main(["study", str(folder), "--json"]) == 0
+            known[faults, limit] = trials(folder), episodes(folder)
+        return known[faults, limit]
+
+    return run
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="a worker's process is looked up in /proc")
 @pytest.mark.parametrize("pattern", PATTERNS)
-def test_whatever_becomes_of_a_cluster_a_study_comes_to_the_same(make_study, capsys, pattern):
+def test_whatever_becomes_of_a_cluster_a_study_comes_to_the_same(make_study, undisturbed, capsys, pattern):
     steps = PATTERNS[pattern].split(", ")
     told = {word: rest for word, _, rest in (step.partition(" ") for step in steps) if word in ("limit", "fault")}
     changes = {"episode_timeout_s": told["limit"]} if "limit" in told else {}
-    faults = [told["fault"]] if "fault" in told else []
-    alone = own_study(make_study, "alone", "0.0", faults, jobs="2" if faults else "1", **changes)
-    assert main(["study", str(alone), "--json"]) == 0
+    faults = (told["fault"],) if "fault" in told else ()
+    alone = undisturbed(faults, told.get("limit"))
     there = own_study(make_study, "there", "0.1", faults, **changes)
     cluster = Loopback(there)
     try:
@@ -212,5 +228,4 @@ def test_whatever_becomes_of_a_cluster_a_study_comes_to_the_same(make_study, cap
     said = cluster.log.read_text()
     assert status == 0, said
     assert "Traceback" not in said
-    assert trials(there) == trials(alone)
-    assert episodes(there) == episodes(alone)
+    assert (trials(there), episodes(there)) == alone

@@ -9,6 +9,7 @@ import numpy as np
 
 from proxytune.driving import CameraFigures, orientation
 from proxytune.report.export.instance import Instance, xml_comment
+from proxytune.report.writing import fill
 
 TIMESTEP_S = 0.0005
 """Short, and integrated explicitly: MuJoCo's implicit integrators push a robot with stiffly driven light wheels."""
@@ -31,37 +32,6 @@ OPEN_DIFFERENTIAL = """\
     <fixed name="rear"><joint joint="axle_left" coef="0.5"/><joint joint="axle_right" coef="0.5"/></fixed>
   </tendon>
 """
-MODEL = Template("""\
-<mujoco model="$name">
-  <!-- $comment -->
-  <!-- Control: $control, -1 to 1. Origin: middle of the driven axle, on the floor; x forward. -->
-  <option timestep="$timestep"/>
-  <worldbody>
-    <light pos="0 0 3"/>
-    <geom name="floor" type="plane" size="10 10 0.1" friction="1 0.005 0.0001"/>
-    <body name="$name">
-      <freejoint/>
-      <geom name="chassis" type="box" pos="$chassis_x 0 $chassis_z" size="$chassis_size" mass="$chassis_mass"/>
-$parts
-      <body name="wheel_left" pos="0 $half_baseline $radius">
-        <joint name="axle_left" type="hinge" axis="0 1 0"/>
-        <geom type="sphere" size="$radius" mass="$wheel_mass"/>
-      </body>
-      <body name="wheel_right" pos="0 -$half_baseline $radius">
-        <joint name="axle_right" type="hinge" axis="0 1 0"/>
-        <geom type="sphere" size="$radius" mass="$wheel_mass"/>
-      </body>
-    </body>
-  </worldbody>
-  <contact>
-    <exclude body1="$name" body2="wheel_left"/>
-    <exclude body1="$name" body2="wheel_right"/>
-$excluded  </contact>
-$tendons  <actuator>
-$actuators
-  </actuator>
-</mujoco>
-""")
 
 
 def mjcf_text(instance: Instance) -> str:
@@ -96,7 +66,8 @@ def mjcf_text(instance: Instance) -> str:
     name = escape(instance.robot.name, {'"': "&quot;"})
     said = {key: f"{number:.9g}" for key, number in numbers.items()}
     actuators = (_throttle, _steering) if wheelbase else (partial(_actuator, side=0), partial(_actuator, side=1))
-    return MODEL.substitute(
+    return fill(
+        "mujoco.xml.txt",
         said,
         name=name,
         comment=xml_comment(instance, "mjcf", 7),

@@ -11,6 +11,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
+from scipy.optimize import isotonic_regression
 
 from proxytune.usefulness import NoiseFloor
 
@@ -85,6 +86,24 @@ def legend_below(figure: Figure, *panels: Axes, without: Collection[str] = ()) -
         )
 
 
+class Role(NamedTuple):
+    """Meaning of a dot: its name in the legend, and the colours of edge and face."""
+
+    name: str
+    edge: str
+    face: str
+
+
+def draw_dots(axes: Axes, rows: Sequence[tuple[str, float, Role]], start: float = 0.0) -> None:
+    """Draw a row for each name, the first on top: a dot at its value, and a thin line from the start to it."""
+    for place, (_, value, role) in enumerate(rows):
+        axes.plot([start, value], [place, place], "-", color=role.edge, lw=0.9, alpha=0.6)
+        axes.plot([value], [place], "o", color=role.edge, mfc=role.face, ms=4, label=role.name)
+    axes.set_yticks(range(len(rows)), [name for name, _, _ in rows])
+    axes.set_ylim(len(rows) - 0.4, -0.6)
+    dress(axes)
+
+
 ONE_LINE = 0.05
 """Least distance between names of one line, as a share of the panel's height; two lines take more."""
 
@@ -117,13 +136,7 @@ def spread_places(places: Sequence[float], apart: float) -> list[float]:
     order = sorted(range(len(places)), key=lambda row: places[row])
     moved = np.array([places[row] for row in order])
     steps = apart * np.arange(len(moved))
-    # Least squares with the order kept: pools of places that touch share their mean.
-    pools: list[list[float]] = []
-    for value in moved - steps:
-        pools.append([float(value)])
-        while len(pools) > 1 and np.mean(pools[-2]) > np.mean(pools[-1]):
-            last = pools.pop()
-            pools[-1] += last
+    # Least squares with the order kept: places that would touch share the mean of theirs.
     most = max(0.0, 1.0 - apart * (len(moved) - 1))
-    found = np.concatenate([np.full(len(pool), np.clip(np.mean(pool), 0.0, most)) for pool in pools]) + steps
+    found = np.clip(isotonic_regression(moved - steps).x, 0.0, most) + steps
     return [float(found[order.index(row)]) for row in range(len(places))]

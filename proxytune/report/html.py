@@ -3,6 +3,7 @@
 import base64
 import html
 import re
+import tomllib
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -25,30 +26,7 @@ ABOUT = ("robot", "log", "target", "targets")
 """Settings that stand at the top of a page too."""
 PROSE = 28
 """A cell of more characters than this is wrapped, and kept wide enough to be read."""
-WORDS = {
-    "PRPV": "how many ordered pairs of agents the simulator ranks otherwise than the robot; 0 is best",
-    "θ": "the simulator’s parameters that are tuned, all together",
-    "noise floor": "what a perfect simulator would still score, since episodes differ from one another",
-    "chance": "what a simulator scores that ranks agents at random",
-    "held-out": "kept aside: nothing was tuned or fitted to it",
-    "nats": "evidence as a natural logarithm: 3 nats make something 20 times as likely",
-    "declared": "what the simulator had before anything was added: the robot as its files describe it",
-    "free curve": "a flexible curve over one signal, fitted without a physical model; it shows what room is left",
-    "innovations": "what a model could not predict from one measured pose to the next",
-    "RMSE": "root of the mean squared error",
-    "planar": "the simulator that moves the robot as a point on a plane, without contacts",
-    "bullet": "the simulator that moves the robot as a body with wheels and contacts (PyBullet)",
-    "unidentified": "nearly any value in the range that was searched fits",
-    "misfit": "how probable scores as far from the simulator’s are if some θ were right; a small p says that none is",
-    "PLV": "proxy learning value: the target’s samples that a learner saves by learning in the simulator first",
-    "PPV": "proxy predictivity value: how far the simulator’s scores are from the target’s; 0 is best",
-    "SRCC": "Spearman’s rank correlation of the agents’ scores on both sides; 1 is the same order",
-    "MMRV": "mean maximum rank violation: the score that the worst wrongly ordered pair costs; 0 is best",
-    "regret": "the score that is lost on the target by not choosing the agent that is best there",
-    "zero-shot": "on the target, after learning in the simulator alone",
-    "Sobol index": "the share of a measure’s variation that a parameter takes part in",
-    "nominal": "as the robot’s files have it, before tuning",
-}
+WORDS: dict[str, str] = tomllib.loads(fill("words.toml"))
 """What a page explains at its foot of the words that it uses."""
 STYLE = fill("page.css")
 
@@ -68,13 +46,6 @@ def write_page(path: Path, view: View, foot: Foot, renew_s: int = 0) -> None:
     write_text(path, page_html(view, foot, renew_s))
 
 
-def fragment_html(view: View) -> str:
-    """A view as a piece of HTML for a notebook: sentence, next step, tables, figures and notes."""
-    following = f"<p><strong>Next:</strong> {_text(view.next_step)}</p>" if view.next_step else ""
-    parts = "\n".join(_part(part, f"part-{number}") for number, part in enumerate(view.parts, start=1))
-    return f"<h3>{html.escape(view.title)}</h3>\n<p>{_text(view.sentence)}</p>\n{following}\n{parts}"
-
-
 class Shown:
     """What has a view shows itself in a notebook, and has a page."""
 
@@ -83,7 +54,9 @@ class Shown:
         raise NotImplementedError
 
     def _repr_html_(self) -> str:
-        return fragment_html(self.view())
+        view = self.view()
+        following = f"<p><strong>Next:</strong> {_text(view.next_step)}</p>" if view.next_step else ""
+        return f"<h3>{html.escape(view.title)}</h3>\n<p>{_text(view.sentence)}</p>\n{following}\n{_parts(view)}"
 
     def page(self, path: str | Path | None = None) -> str:
         """The page as HTML; also written where a path is given.
@@ -110,11 +83,12 @@ def page_html(view: View, foot: Foot, renew_s: int = 0) -> str:
     """
     renews = f"Under way: this page loads itself again every {renew_s} s."
     following = f'<p class="following"><strong>Next:</strong> {_text(view.next_step)}</p>\n'
-    parts = "\n".join(_part(part, f"part-{number}") for number, part in enumerate(view.parts, start=1))
+    stated, parts = dict(foot.settings), _parts(view)
+    about = [*(f"{name} {stated[name]}" for name in ABOUT if stated.get(name)), foot.date]
     return fill(
         "page.html.txt",
         title=html.escape(view.title),
-        about=_about(foot),
+        about=f'<p class="about">{html.escape(" · ".join(filter(None, about)))}</p>\n',
         style=STYLE,
         renew=f'<meta http-equiv="refresh" content="{renew_s}">\n' if renew_s else "",
         under_way=f'<p class="under-way" role="status">{renews}</p>\n' if renew_s else "",
@@ -126,16 +100,13 @@ def page_html(view: View, foot: Foot, renew_s: int = 0) -> str:
     )
 
 
-def _about(foot: Foot) -> str:
-    """What the page is about, at its top: robot, log, target and so on, and the date."""
-    stated = dict(foot.settings)
-    told = [*(f"{name} {stated[name]}" for name in ABOUT if stated.get(name)), foot.date]
-    return f'<p class="about">{html.escape(" · ".join(filter(None, told)))}</p>\n'
-
-
 def _contents(view: View) -> str:
     items = (f'<li><a href="#part-{n}">{html.escape(one.title)}</a></li>' for n, one in enumerate(view.parts, start=1))
     return f'<nav aria-label="Contents"><ol>{"".join(items)}</ol></nav>\n'
+
+
+def _parts(view: View) -> str:
+    return "\n".join(_part(part, f"part-{number}") for number, part in enumerate(view.parts, start=1))
 
 
 def _part(part: Part, place: str) -> str:
@@ -243,14 +214,9 @@ def _words(page: str) -> str:
 def _text(text: str) -> str:
     """A text with what is between backticks as code, and [words](a/file) beside the page as a link."""
     said = re.split(r"`([^`]+)`", html.escape(text))
-    return "".join(_code(one) if place % 2 else _linked(one) for place, one in enumerate(said))
-
-
-def _linked(text: str) -> str:
-    return re.sub(r"\[([^\]\[]+)\]\((\w[\w./ -]*|\.\./[\w./ -]*)\)", r'<a href="\2">\1</a>', text)
-
-
-def _code(command: str) -> str:
-    """A command as code, its options whole: a browser would break them after their hyphens."""
-    whole = re.sub(r"(?<!\S)(--?\w[^ ]+)", r"<span>\1</span>", command)
-    return f"<code>{whole}</code>"
+    link = r"\[([^\]\[]+)\]\((\w[\w./ -]*|\.\./[\w./ -]*)\)"
+    said[::2] = [re.sub(link, r'<a href="\2">\1</a>', one) for one in said[::2]]
+    # Options stay whole: a browser would break them after their hyphens.
+    whole = [re.sub(r"(?<!\S)(--?\w[^ ]+)", r"<span>\1</span>", one) for one in said[1::2]]
+    said[1::2] = [f"<code>{one}</code>" for one in whole]
+    return "".join(said)

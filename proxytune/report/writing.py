@@ -156,15 +156,6 @@ def write_picture(path: Path, picture: NDArray[np.uint8]) -> None:
     write_whole(path, "the picture ", lambda draft: Image.fromarray(picture).save(draft, format="png"))
 
 
-def write_movie(path: Path, write: Callable[[Path], object]) -> None:
-    """Write a moving picture by what can encode it, its folder made where missing; an interrupted write leaves the old.
-
-    Raises:
-        RunError: If the file cannot be written.
-    """
-    write_whole(path, "the animation ", write)
-
-
 def write_whole(path: Path, what: str, write: Callable[[Path], object]) -> None:
     """Have a draft written, its folder made where missing, and put it in the file's place once it is whole.
 

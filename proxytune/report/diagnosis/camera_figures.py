@@ -18,7 +18,6 @@ from proxytune.diagnosis import (
     CameraFit,
     Comparison,
     Edges,
-    ResidualField,
     effects_of,
     project,
     rank_subsets,
@@ -31,6 +30,8 @@ from proxytune.report.figure_style import (
     GREY,
     LIGHT_BLUE,
     VERMILLION,
+    Role,
+    draw_dots,
     dress,
     legend_below,
     show_photo,
@@ -60,20 +61,16 @@ def _ranking_figure(diagnosis: CameraDiagnosis) -> Figure | None:
     nothing = loss_of_nothing(diagnosis)
     figure = Figure(figsize=(COLUMN, 1.3 + 0.16 * len(tried)), layout="constrained")
     axes = figure.subplots()
-    for place, one in enumerate(tried):
-        name, colour = _role(diagnosis, one.effects)
-        loss = max(one.loss, 0.0)
-        axes.plot([loss, nothing], [place, place], "-", color=colour, lw=0.9, alpha=0.6)
-        axes.plot([loss], [place], "o", color=colour, ms=4, label=name)
+    named = [
+        (" and ".join(map(plain, one.effects)), max(one.loss, 0.0), _role(diagnosis, one.effects)) for one in tried
+    ]
+    draw_dots(axes, named, nothing)
     axes.axvline(max(nothing, 0.0), color=VERMILLION, lw=1.0, ls=":", label="nothing added")
     axes.axvline(LEAST_NATS, color="0.45", lw=1.0, ls=":", label=f"least that counts, {LEAST_NATS:g} nats")
-    axes.set_yticks(range(len(tried)), [" and ".join(map(plain, one.effects)) for one in tried])
-    axes.set_ylim(len(tried) - 0.4, -0.6)
     axes.set_xscale("symlog", linthresh=10.0 * LEAST_LOSS, linscale=0.7)
     axes.set_xlim(-0.5, 1.5 * max(10.0 * LEAST_LOSS, nothing, *(one.loss for one in tried)))
     label = "evidence lost if only this effect is added [nats]\n0: none against all effects"
     axes.set_xlabel(label, fontsize=8, loc="right")
-    dress(axes)
     legend_below(figure, axes)
     return figure
 
@@ -84,12 +81,12 @@ def loss_of_nothing(diagnosis: CameraDiagnosis) -> float:
     return rank_subsets(named.full, effects_of(named.declared.names), 0)[0].loss
 
 
-def _role(diagnosis: CameraDiagnosis, effects: Sequence[str]) -> tuple[str, str]:
+def _role(diagnosis: CameraDiagnosis, effects: Sequence[str]) -> Role:
     if set(effects) <= {effect.effect for effect in diagnosis.effects}:
-        return "added", BLUE
+        return Role("added", BLUE, BLUE)
     if set(effects) <= {rival for effect in diagnosis.effects for rival in effect.rivals}:
-        return "fits as well as what was added", LIGHT_BLUE
-    return "other effect", GREY
+        return Role("fits as well as what was added", LIGHT_BLUE, LIGHT_BLUE)
+    return Role("other effect", GREY, GREY)
 
 
 def _errors_figure(diagnosis: CameraDiagnosis) -> Figure:
@@ -148,14 +145,18 @@ def displacement_figure(diagnosis: CameraDiagnosis) -> Figure:
     models = camera_models(diagnosis)
     measured = [measured_displacements(fit) for fit in models.values()]
     gates = diagnosis.residual_fields if len(models) > 1 else diagnosis.residual_fields[1:]
-    arrows = [*measured, *(_field(diagnosis, gate, own.places) for gate, own in zip(gates, measured, strict=True))]
-    names = [*(fill(f"markings, {name}", TITLE) for name in models), *(_say(gate) for gate in gates)]
     rows, columns = diagnosis.gathered.pictures.shape[1:3]
+    arrows, names = [*measured], [fill(f"markings, {name}", TITLE) for name in models]
+    for gate, own in zip(gates, measured, strict=True):
+        right, down = (2.0 * own.places / (columns, rows) - 1.0).T
+        arrows.append(Arrows(own.places, gate.displacement(right, down)))
+        share = max(0.0, 100.0 * gate.share)
+        names.append(f"fixed to the camera:\n{gate.rms_px:.2f} px, {share:.0f} % of cost")
     top = max(0.0, min(float(one.places[:, 1].min(initial=rows)) for one in measured) - 2.0 * columns / ACROSS)
-    down = 2 if len(models) > 1 else 1
-    height = 0.45 + down * (0.35 + 1.45 * (rows - top) / columns)
+    lines = 2 if len(models) > 1 else 1
+    height = 0.45 + lines * (0.35 + 1.45 * (rows - top) / columns)
     figure = Figure(figsize=(COLUMN, height), layout="constrained")
-    panels = figure.subplots(down, 2, sharex=True, sharey=True, squeeze=False)
+    panels = figure.subplots(lines, 2, sharex=True, sharey=True, squeeze=False)
     longest = max(float(np.hypot(*one.lengths.T).max(initial=0.0)) for one in arrows)
     for number, (axes, one) in enumerate(zip(panels.ravel(), arrows, strict=True)):
         axes.set(xlim=(0, columns), ylim=(rows, top), aspect="equal")
@@ -187,17 +188,6 @@ def measured_displacements(fit: CameraFit) -> Arrows:
 
 def _sums(cell: NDArray[np.intp], values: Floats) -> Floats:
     return np.stack([np.bincount(cell, column) for column in values.T], axis=-1)
-
-
-def _field(diagnosis: CameraDiagnosis, gate: ResidualField, places: Floats) -> Arrows:
-    rows, columns = diagnosis.gathered.pictures.shape[1:3]
-    right, down = (2.0 * places / (columns, rows) - 1.0).T
-    return Arrows(places, gate.displacement(right, down))
-
-
-def _say(gate: ResidualField) -> str:
-    share = max(0.0, 100.0 * gate.share)
-    return f"fixed to the camera:\n{gate.rms_px:.2f} px, {share:.0f} % of cost"
 
 
 def _draw_arrows(axes: Axes, arrows: Arrows, colour: str, longest: float, room: float) -> None:

@@ -1,7 +1,6 @@
 """A complete MuJoCo model of a domain instance: a robot on a floor, controlled by its two commands."""
 
 import math
-from functools import partial
 from string import Template
 from xml.sax.saxutils import escape
 
@@ -65,7 +64,11 @@ def mjcf_text(instance: Instance) -> str:
     }
     name = escape(instance.robot.name, {'"': "&quot;"})
     said = {key: f"{number:.9g}" for key, number in numbers.items()}
-    actuators = (_throttle, _steering) if wheelbase else (partial(_actuator, side=0), partial(_actuator, side=1))
+    if wheelbase:  # A servo of the mean speed of the rear wheels, and one of the front wheel's angle
+        actuators = [_speed_servo(instance, 'name="throttle" tendon="rear"', 0, 2), _steering(instance)]
+    else:
+        sides = enumerate(("left", "right"))
+        actuators = [_speed_servo(instance, f'name="{one}" joint="axle_{one}"', side, 1) for side, one in sides]
     return fill(
         "mujoco.xml.txt",
         said,
@@ -76,7 +79,7 @@ def mjcf_text(instance: Instance) -> str:
         control="throttle and steering (left is above 0)" if wheelbase else "duties of the left and right wheels",
         excluded='    <exclude body1="$name" body2="wheel_front"/>\n'.replace("$name", name) if wheelbase else "",
         tendons=OPEN_DIFFERENTIAL if wheelbase else "",
-        actuators="\n".join(actuator(instance) for actuator in actuators),
+        actuators="\n".join(actuators),
     )
 
 
@@ -100,17 +103,6 @@ def _camera(figures: CameraFigures) -> str:
     size = f"{figures.columns} {figures.rows}"
     fovy = f"{figures.field_of_view_deg:.9g}"
     return f'<camera name="camera" pos="{place}" xyaxes="{axes}" fovy="{fovy}" resolution="{size}"/>'
-
-
-def _actuator(instance: Instance, side: int) -> str:
-    """A servo of one wheel's speed."""
-    place = f'name="{("left", "right")[side]}" joint="{("axle_left", "axle_right")[side]}"'
-    return _speed_servo(instance, place, side, 1)
-
-
-def _throttle(instance: Instance) -> str:
-    """A servo of the mean speed of a car's rear wheels."""
-    return _speed_servo(instance, 'name="throttle" tendon="rear"', 0, 2)
 
 
 def _speed_servo(instance: Instance, place: str, side: int, wheels: int) -> str:

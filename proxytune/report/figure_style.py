@@ -86,24 +86,6 @@ def legend_below(figure: Figure, *panels: Axes, without: Collection[str] = ()) -
         )
 
 
-class Role(NamedTuple):
-    """Meaning of a dot: its name in the legend, and the colours of edge and face."""
-
-    name: str
-    edge: str
-    face: str
-
-
-def draw_dots(axes: Axes, rows: Sequence[tuple[str, float, Role]], start: float = 0.0) -> None:
-    """Draw a row for each name, the first on top: a dot at its value, and a thin line from the start to it."""
-    for place, (_, value, role) in enumerate(rows):
-        axes.plot([start, value], [place, place], "-", color=role.edge, lw=0.9, alpha=0.6)
-        axes.plot([value], [place], "o", color=role.edge, mfc=role.face, ms=4, label=role.name)
-    axes.set_yticks(range(len(rows)), [name for name, _, _ in rows])
-    axes.set_ylim(len(rows) - 0.4, -0.6)
-    dress(axes)
-
-
 ONE_LINE = 0.05
 """Least distance between names of one line, as a share of the panel's height; two lines take more."""
 

@@ -30,8 +30,6 @@ from proxytune.report.figure_style import (
     GREY,
     LIGHT_BLUE,
     VERMILLION,
-    Role,
-    draw_dots,
     dress,
     legend_below,
     show_photo,
@@ -61,16 +59,20 @@ def _ranking_figure(diagnosis: CameraDiagnosis) -> Figure | None:
     nothing = loss_of_nothing(diagnosis)
     figure = Figure(figsize=(COLUMN, 1.3 + 0.16 * len(tried)), layout="constrained")
     axes = figure.subplots()
-    named = [
-        (" and ".join(map(plain, one.effects)), max(one.loss, 0.0), _role(diagnosis, one.effects)) for one in tried
-    ]
-    draw_dots(axes, named, nothing)
+    for place, one in enumerate(tried):
+        name, colour = _role(diagnosis, one.effects)
+        loss = max(one.loss, 0.0)
+        axes.plot([loss, nothing], [place, place], "-", color=colour, lw=0.9, alpha=0.6)
+        axes.plot([loss], [place], "o", color=colour, ms=4, label=name)
     axes.axvline(max(nothing, 0.0), color=VERMILLION, lw=1.0, ls=":", label="nothing added")
     axes.axvline(LEAST_NATS, color="0.45", lw=1.0, ls=":", label=f"least that counts, {LEAST_NATS:g} nats")
+    axes.set_yticks(range(len(tried)), [" and ".join(map(plain, one.effects)) for one in tried])
+    axes.set_ylim(len(tried) - 0.4, -0.6)
     axes.set_xscale("symlog", linthresh=10.0 * LEAST_LOSS, linscale=0.7)
     axes.set_xlim(-0.5, 1.5 * max(10.0 * LEAST_LOSS, nothing, *(one.loss for one in tried)))
     label = "evidence lost if only this effect is added [nats]\n0: none against all effects"
     axes.set_xlabel(label, fontsize=8, loc="right")
+    dress(axes)
     legend_below(figure, axes)
     return figure
 
@@ -81,12 +83,12 @@ def loss_of_nothing(diagnosis: CameraDiagnosis) -> float:
     return rank_subsets(named.full, effects_of(named.declared.names), 0)[0].loss
 
 
-def _role(diagnosis: CameraDiagnosis, effects: Sequence[str]) -> Role:
+def _role(diagnosis: CameraDiagnosis, effects: Sequence[str]) -> tuple[str, str]:
     if set(effects) <= {effect.effect for effect in diagnosis.effects}:
-        return Role("added", BLUE, BLUE)
+        return "added", BLUE
     if set(effects) <= {rival for effect in diagnosis.effects for rival in effect.rivals}:
-        return Role("fits as well as what was added", LIGHT_BLUE, LIGHT_BLUE)
-    return Role("other effect", GREY, GREY)
+        return "fits as well as what was added", LIGHT_BLUE
+    return "other effect", GREY
 
 
 def _errors_figure(diagnosis: CameraDiagnosis) -> Figure:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from math import ceil
 from textwrap import fill
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,7 +14,7 @@ from proxytune.diagnosis import Diagnosis, Findings, Learning, Rules
 from proxytune.effects import GROUPS, HEADING, LEVEL, PLACE, Learnt, LearntCurve, learnt_effect
 from proxytune.report.diagnosis.effect_figure import effect_curve
 from proxytune.report.diagnosis.error_figures import error_figure, residual_map, residual_over_time, strayed
-from proxytune.report.figure_style import BLUE, COLUMN, GREY, LIGHT_BLUE, PURPLE, Role, draw_dots, dress, legend_below
+from proxytune.report.figure_style import BLUE, COLUMN, GREY, LIGHT_BLUE, PURPLE, dress, legend_below
 from proxytune.report.wording import plain
 
 
@@ -45,12 +46,20 @@ ROW, ELSE = 0.145, 0.95
 """Height of a row, and of all else [inch]."""
 
 
-_Row = tuple[str, float, Role]
+class _Role(NamedTuple):
+    """Meaning of a dot."""
+
+    name: str
+    edge: str
+    face: str
+
+
+_Row = tuple[str, float, _Role]
 """A name, its evidence [nats], and what its dot stands for."""
-ADDED = Role("added", BLUE, BLUE)
-RIVAL = Role("fits as well as one added", LIGHT_BLUE, LIGHT_BLUE)
-OTHER = Role("not added", GREY, GREY)
-SIGNAL = Role("free curve", PURPLE, PURPLE)
+ADDED = _Role("added", BLUE, BLUE)
+RIVAL = _Role("fits as well as one added", LIGHT_BLUE, LIGHT_BLUE)
+OTHER = _Role("not added", GREY, GREY)
+SIGNAL = _Role("free curve", PURPLE, PURPLE)
 
 
 def ranking_figure(found: Findings, rules: Rules) -> Figure | None:
@@ -59,7 +68,7 @@ def ranking_figure(found: Findings, rules: Rules) -> Figure | None:
     The evidence of those added is that when they were added; of the others, alone, in the first round. Nothing is
     drawn where nothing was tried.
     """
-    chance, least = Role(f"not added, p > {rules.p_value:g}", GREY, "white"), rules.least_gain_nats
+    chance, least = _Role(f"not added, p > {rules.p_value:g}", GREY, "white"), rules.least_gain_nats
     rivals = {rival.effect for one in found.adopted for rival in one.rivals}
     forms = {(one.effect, one.form) for one in found.adopted}
     others = [one for one in found.tried if (one.effect, one.form) not in forms][:SHOWN]
@@ -75,7 +84,7 @@ def ranking_figure(found: Findings, rules: Rules) -> Figure | None:
     figure = Figure(figsize=(COLUMN, ELSE + ROW * sum(heights)), layout="constrained")
     panels = figure.subplots(len(parts), 1, sharex=True, height_ratios=heights)
     for axes, (title, rows) in zip(panels, parts.items(), strict=True):
-        draw_dots(axes, rows)
+        _dots(axes, rows)
         axes.axvline(least, color="0.45", lw=1.0, ls=":", label=f"least to be added: {least:g} nats")
         axes.set_title(title, fontsize=7, loc="left", pad=2)
     _scale(panels[-1], [gain for rows in parts.values() for _, gain, _ in rows], least)
@@ -98,6 +107,16 @@ def _scale(axes: Axes, gains: Sequence[float], least: float) -> None:
     axes.set_xlim(1.3 * low, 1.5 * high)
     axes.set_xticks([0.0, *(10.0**power for power in range(2, 9) if 10.0**power <= 1.5 * high)])
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}".replace(",", "\u2009")))
+
+
+def _dots(axes: Axes, rows: Sequence[_Row]) -> None:
+    for place, (_, gain, role) in enumerate(rows):
+        axes.plot([0.0, gain], [place, place], "-", color=role.edge, lw=0.9, alpha=0.6)
+        axes.plot([gain], [place], "o", color=role.edge, mfc=role.face, ms=4, label=role.name)
+    axes.set_yticks(range(len(rows)), [name for name, _, _ in rows])
+    axes.set_ylim(len(rows) - 0.4, -0.6)
+    dress(axes)
+    axes.tick_params(axis="y", labelsize=7)
 
 
 SHOWN_AS = {"m/s": (1e3, "mm/s"), "rad/s": (180.0 / np.pi, "deg/s"), "rad/m": (180.0 / np.pi, "deg/m")}

@@ -46,6 +46,7 @@ def test_robots_and_studies_are_in_the_wheel_and_databases_are_not(installed):
     assert "proxytune/py.typed" in names
     assert not [name for name in names if "benchmarks" in name or name.endswith("compare.md") or "truths" in name]
     assert {f"proxytune/skeletons/templates/{name}.txt" for name in ("body.urdf", "family.py", "study.toml")} <= names
+    assert {"proxytune/report/templates/page.css", "proxytune/cli/commands.toml"} <= names
     for study in ("quickstart", "known_answer", "duckiebot"):
         assert {f"proxytune/studies/{study}/study.toml", f"proxytune/studies/{study}/target.csv"} <= names
     assert not [name for name in names if name.endswith((".db", ".lock", "report.html"))]

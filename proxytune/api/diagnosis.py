@@ -173,7 +173,10 @@ def diagnose(
                 diagnose_log(drives, vehicle, declared, test=others, seed=seed, rules=rules, limits=limits)
             )
         except InputError as problem:
-            raise type(problem)(_in_python(str(problem))) from None
+            told = str(problem)
+            for option, argument in IN_PYTHON.items():
+                told = told.replace(option, argument)
+            raise type(problem)(told) from None
 
 
 @contextmanager
@@ -183,9 +186,3 @@ def _opened(log: Log | str | Path) -> Iterator[Log]:
     else:
         with open_log(Path(log)) as (opened, _):
             yield opened
-
-
-def _in_python(problem: str) -> str:
-    for option, argument in IN_PYTHON.items():
-        problem = problem.replace(option, argument)
-    return problem

@@ -159,7 +159,8 @@ def run_opened_families(
 
     All of them are opened before the first is tuned, so that a mistake is told at once. Progress is of the teaching.
     """
-    studies = {name: _open(one, spending) for name, one in settings.families.items()}
+    budgets = {"budget": spending.budget, "jobs": spending.jobs}
+    studies = {name: with_spending(open_settings(one), **budgets) for name, one in settings.families.items()}
     classrooms(settings)
     reports: dict[str, StudyReport] = {}
     with locked(settings.home):
@@ -176,10 +177,6 @@ def _several(settings: StudySettings) -> StudySettings:
     if not settings.families:
         raise settings.error("families", "is missing; name two at least, as in [families.planar], or use run_study")
     return settings
-
-
-def _open(settings: StudySettings, spending: Spending) -> Study:
-    return with_spending(open_settings(settings), budget=spending.budget, jobs=spending.jobs)
 
 
 def _tune(name: str, study: Study, say: Say, bars: AbstractContextManager[Watcher], retry_failed: bool) -> StudyReport:

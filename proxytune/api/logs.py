@@ -11,7 +11,6 @@ from proxytune.driving import LaneFollowing, read_robot
 from proxytune.errors import InputError, LogError
 from proxytune.logs import Frames, Log, log_cautions, read_commands
 from proxytune.report import write_picture, write_text
-from proxytune.settings import Section
 from proxytune.study import StudySettings, bare_family, cautions_of
 
 Tell = Callable[[str], None]
@@ -77,7 +76,11 @@ def record_log(
     repeats, seconds, seed = wanted.repeats, wanted.seconds, wanted.seed
     log = record(family, name=folder.name, repeats=repeats, seconds=seconds, seed=seed, table=table)
     if wanted.frames:
-        road = _write_map(settings.domain, folder)
+        road = settings.domain.text("map", "small_loop")
+        if road.endswith(".toml"):  # A user's own map is copied into the log
+            source = settings.domain.path.parent / road
+            write_text(folder / source.name, source.read_text(encoding="utf-8"))
+            road = str((folder / source.name).resolve())
         log = _film(log, drives, road, folder, lambda taken: tell(f"driving: {taken} of {wanted.frames} frames"))
     write_text(folder / "samples.csv", samples_text(log))
     if log.frames:
@@ -85,16 +88,6 @@ def record_log(
     write_text(folder / "log.toml", log_text(log, f"{model.name} on the {family.plant} plant, driven by proxytune"))
     found = (*cautions_of(family), *log_cautions(log, read_robot(family.robot, family.folder).figures))
     return log, tuple(dict.fromkeys(found))
-
-
-def _write_map(domain: Section, folder: Path) -> str:
-    """The map's name; a user's own file is copied into the log."""
-    name = domain.text("map", "small_loop")
-    if not name.endswith(".toml"):
-        return name
-    source = domain.path.parent / name
-    write_text(folder / source.name, source.read_text(encoding="utf-8"))
-    return str((folder / source.name).resolve())
 
 
 def _film(log: Log, filmed: Iterable[FilmedDrive], road: str, folder: Path, tell: Callable[[int], None]) -> Log:

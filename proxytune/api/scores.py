@@ -275,7 +275,9 @@ def _metrics(metrics: str | Metric | Sequence[str | Metric] | None, header: Sequ
     given = [metrics] if isinstance(metrics, str | Metric) else list(metrics or ())
     if not given:
         given = [f"{name}:max" for name in both_metrics(header) if "success" in name]
-    compared = [Metric.parse(one) if isinstance(one, str) else one for text in given for one in _expanded(text, header)]
+    compared = [
+        own for one in given for own in ([one] if isinstance(one, Metric) else map(Metric.parse, expand([one], header)))
+    ]
     if not compared:
         raise InputError("no metric is given; name at least one, as in 'success:max'")
     return compared
@@ -287,10 +289,6 @@ def _header(scores: Scores | None) -> list[str]:
     if isinstance(scores, str | Path):
         return column_names(Path(scores))
     return list(scores.metrics) if isinstance(scores, ScoreTable) else []
-
-
-def _expanded(metric: str | Metric, header: Sequence[str]) -> Sequence[str | Metric]:
-    return expand([metric], header) if isinstance(metric, str) else [metric]
 
 
 def _table(scores: Scores | None, side: Side, names: Sequence[str], columns: Mapping[str, str] | None) -> ScoreTable:
@@ -334,15 +332,11 @@ def log_of(samples: pd.DataFrame, description: Description, commands: pd.DataFra
         LogError: If it is no such log, with table, row and column.
     """
     frames = {"samples": samples} if commands is None else {"samples": samples, "commands": commands}
-    stated = {"name": "log", **description}
+    stated = {key: one.item() if isinstance(one, np.generic) else one for key, one in description.items()}
     with as_files(frames) as folder:
-        (folder / "log.toml").write_text(_toml(stated), encoding="utf-8")
+        try:
+            text = tomlkit.dumps({"name": "log", **stated})
+        except TypeError as problem:
+            raise LogError(f"log.toml: {problem}; give texts and numbers") from None
+        (folder / "log.toml").write_text(text, encoding="utf-8")
         return read_log(folder)
-
-
-def _toml(stated: Description) -> str:
-    plain = {key: value.item() if isinstance(value, np.generic) else value for key, value in stated.items()}
-    try:
-        return tomlkit.dumps(plain)
-    except TypeError as problem:
-        raise LogError(f"log.toml: {problem}; give texts and numbers") from None

@@ -116,12 +116,11 @@ def box_space(box: Mapping[str, tuple[float, float]]) -> Space:
     """The box of these ends by name."""
     if not box:
         raise InputError("the box is empty; give at least one parameter, as in {'trim': (-0.3, 0.3)}")
-    return Space(tuple(_interval(name, box[name]) for name in sorted(box)))
-
-
-def _interval(name: str, ends: tuple[float, float]) -> Interval:
-    try:
-        low, high = map(float, ends)
-    except (TypeError, ValueError):
-        raise InputError(f"{name}: must be (lowest, highest), as in (-0.3, 0.3), got {ends!r}") from None
-    return Interval(name, low, high)
+    intervals = []
+    for name, ends in sorted(box.items()):
+        try:
+            low, high = map(float, ends)
+        except (TypeError, ValueError):
+            raise InputError(f"{name}: must be (lowest, highest), as in (-0.3, 0.3), got {ends!r}") from None
+        intervals.append(Interval(name, low, high))
+    return Space(tuple(intervals))

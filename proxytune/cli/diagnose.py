@@ -1,8 +1,7 @@
 """`diagnose`: find the effect that the model lacks, from a log of measured drives and frames."""
 
 import argparse
-from collections.abc import Sequence
-from contextlib import ExitStack
+from contextlib import nullcontext
 from pathlib import Path
 
 from rich.console import Group
@@ -96,31 +95,23 @@ def run(arguments: argparse.Namespace) -> Answer:
     if arguments.seed < 0:
         raise InputError(f"--seed must be at least 0, got {arguments.seed}")
     limits = limits_of(arguments)
-    with ExitStack() as stack:
-        log, imported = stack.enter_context(open_log(arguments.log, wanted_of(arguments), facts_of(arguments)))
-        test = None
-        if arguments.test:
-            test, _ = stack.enter_context(open_log(arguments.test, wanted_of(arguments), facts_of(arguments)))
-        return _diagnosed(arguments, limits, log, test, imported)
-
-
-def _diagnosed(
-    arguments: argparse.Namespace, limits: Limits, log: Log, test: Log | None, imported: Sequence[str]
-) -> Answer:
-    here = arguments.log.resolve()
-    folder = arguments.output or Path(f"diagnosis_{here.stem if here.is_file() else here.name}")
-    check_place(folder, folder=True)
-    for name in ("diagnosis.json", "model.toml", "report.html"):
-        check_place(folder / name, ours=True)
-    robot = robot_of(log, arguments.robot, Catalogue(Path.cwd(), names_in(arguments.effects)))
-    declared = None if arguments.declared is None else names_in(arguments.declared)
-    with Steps(shares(log)) as step:
-        seed = arguments.seed
-        found = diagnose_log(log, robot, declared, test=test, seed=seed, report=step, limits=limits, folder=folder)
-        step("drawing")
-        report = DiagnosisReport(found)
-        files = [str(path) for path in report.write(folder, typed(arguments))]
-        forget_stages(folder)
+    wanted, facts, nothing = wanted_of(arguments), facts_of(arguments), nullcontext((None, ()))
+    other = open_log(arguments.test, wanted, facts) if arguments.test else nothing
+    with open_log(arguments.log, wanted, facts) as (log, imported), other as (test, _):
+        here = arguments.log.resolve()
+        folder = arguments.output or Path(f"diagnosis_{here.stem if here.is_file() else here.name}")
+        check_place(folder, folder=True)
+        for name in ("diagnosis.json", "model.toml", "report.html"):
+            check_place(folder / name, ours=True)
+        robot = robot_of(log, arguments.robot, Catalogue(Path.cwd(), names_in(arguments.effects)))
+        declared = None if arguments.declared is None else names_in(arguments.declared)
+        with Steps(shares(log)) as step:
+            seed = arguments.seed
+            found = diagnose_log(log, robot, declared, test=test, seed=seed, report=step, limits=limits, folder=folder)
+            step("drawing")
+            report = DiagnosisReport(found)
+            files = [str(path) for path in report.write(folder, typed(arguments))]
+            forget_stages(folder)
     lines = [*(f"{arguments.log.name}: {note}" for note in imported), *files]
     document = report.document() | {"files": files} | ({"imported": list(imported)} if imported else {})
     return Answer(document, Group(diagnosis_text(found), Text("\n".join(lines))))

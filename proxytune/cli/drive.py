@@ -13,9 +13,7 @@ from proxytune.domain import DomainFamily, make_episode
 from proxytune.errors import InputError
 from proxytune.report import NO_PLACES, check_episode_file, episode_document, episode_text, say_parting, write_episode
 from proxytune.seeds import episode_seed
-from proxytune.space import Theta
 from proxytune.study import (
-    SideBySide,
     can_record,
     cautions_of,
     check_episode,
@@ -58,7 +56,11 @@ def run(arguments: argparse.Namespace) -> Answer:
     target = load_target(settings, family, model, option) if model else None
     chosen = choose_theta(arguments.theta, settings, family, "--theta")
     seed = settings.seed if arguments.seed is None else arguments.seed
-    pair = _drive(family, target, arguments, chosen.theta, seed)
+    check_episode(family, arguments.agent, chosen.theta, arguments.start)
+    own_seed = episode_seed(seed, arguments.start)
+    episode = make_episode(chosen.theta, agent=arguments.agent, start=arguments.start, seed=own_seed)
+    with waiting("driving"):
+        pair = drive_side_by_side(family, target, episode, filmed=arguments.output is not None)
     compared = [metric.name for metric in settings.metrics]
     if arguments.output:
         write_episode(pair, compared, arguments.output)
@@ -67,27 +69,18 @@ def run(arguments: argparse.Namespace) -> Answer:
     document = {**episode_document(pair, seed), "theta_from": chosen.origin, **files, "cautions": cautions}
     agent, start = pair.episode.agent, pair.episode.start
     own = agent in settings.agents and start < settings.starts and seed == settings.seed
+    against = "none to drive in, as study.toml names no `truth`; --against MODEL gives one"
     values = ", ".join(f"{name}={value:.4g}" for name, value in sorted(chosen.theta.items()))
     words = {"best": "proxy: the study's best θ", "nominal": "proxy: the nominal θ", "given": "proxy: the θ given"}
     about = [
         *(f"beware: {line}" for line in cautions),
         f"{agent} from start {start} under seed {seed}, as in {'every' if own else 'no'} trial of this study",
         f"{words[chosen.origin]}{': ' if values else ''}{values}",
-        _say_target(model),
+        f"target: {f'{model}, under the same seed' if model else against}",
         "",
     ]
     below = ["", *(line for line in (say_parting(pair), files["output"]) if line)]
     return Answer(document, Group(Text("\n".join(about)), episode_text(pair, compared), Text("\n".join(below))))
-
-
-def _drive(
-    family: DomainFamily, target: DomainFamily | None, arguments: argparse.Namespace, theta: Theta, seed: int
-) -> SideBySide:
-    agent, start = arguments.agent, arguments.start
-    check_episode(family, agent, theta, start)
-    episode = make_episode(theta, agent=agent, start=start, seed=episode_seed(seed, start))
-    with waiting("driving"):
-        return drive_side_by_side(family, target, episode, filmed=arguments.output is not None)
 
 
 def _check(arguments: argparse.Namespace, family: DomainFamily) -> None:
@@ -97,9 +90,3 @@ def _check(arguments: argparse.Namespace, family: DomainFamily) -> None:
         check_episode_file(arguments.output)
         if not can_record(family):
             raise InputError(f"--output {arguments.output}: {NO_PLACES}; leave the option out to see its metrics")
-
-
-def _say_target(model: Path | None) -> str:
-    if model is None:
-        return "target: none to drive in, as study.toml names no `truth`; --against MODEL gives one"
-    return f"target: {model}, under the same seed"

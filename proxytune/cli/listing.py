@@ -4,7 +4,6 @@ import argparse
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import NoReturn
 
 from rich.console import Group
 from rich.text import Text
@@ -36,22 +35,15 @@ def run(arguments: argparse.Namespace) -> Answer:
     kind, name, rows = arguments.kind, arguments.name, _KINDS[arguments.kind]()
     key = next(iter(rows[0]))
     if name is not None:
-        rows = [row for row in rows if row[key] == name] or _unknown(kind, name, [str(row[key]) for row in rows])
-        return Answer({kind: rows}, _effect_text(name) if kind == "effects" else _all_of(rows))
+        known, rows = dict.fromkeys(str(row[key]) for row in rows), [row for row in rows if row[key] == name]
+        if not rows:
+            raise InputError(f"list {kind}: no '{name}'; {nearest(name, known)}")
+        lines = (f"{column.replace('_', ' ')}: {_cell(value)}" for row in rows for column, value in row.items())
+        return Answer({kind: rows}, _effect_text(name) if kind == "effects" else Group(*map(Text, lines)))
     if kind == "effects":
         return Answer({kind: rows}, _effects_text())
     heads = columns_of([column.replace("_", " ") for column in rows[0]])
     return Answer({kind: rows}, table_text(Table("", heads, tuple(tuple(map(_cell, row.values())) for row in rows))))
-
-
-def _unknown(kind: str, name: str, names: list[str]) -> NoReturn:
-    raise InputError(f"list {kind}: no '{name}'; {nearest(name, dict.fromkeys(names))}")
-
-
-def _all_of(rows: list[Row]) -> Group:
-    return Group(
-        *(Text(f"{column.replace('_', ' ')}: {_cell(value)}") for row in rows for column, value in row.items())
-    )
 
 
 def _effects_text() -> Group:

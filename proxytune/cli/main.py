@@ -65,7 +65,11 @@ def parser(words: Sequence[str] | None = None, prog: str = "") -> argparse.Argum
         )
         if words is None or name == asked:
             known.load().configure(command)
-        add_shared_options(command, draws=known.draws)
+        if known.draws:
+            command.add_argument(
+                "--format", type=formats, default=(), metavar="svg,pdf", help="figures also as SVG or PDF [PNG alone]"
+            )
+        command.add_argument("--json", action="store_true", help="print one JSON document instead of text")
         command.set_defaults(parser=command)
     return top
 
@@ -80,15 +84,6 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     if unknown:
         arguments.parser.error(f"unrecognized arguments: {' '.join(unknown)}")
     return arguments
-
-
-def add_shared_options(parser: argparse.ArgumentParser, *, draws: bool) -> None:
-    """Add the options that commands have in common; figures have formats."""
-    if draws:
-        parser.add_argument(
-            "--format", type=formats, default=(), metavar="svg,pdf", help="figures also as SVG or PDF [PNG alone]"
-        )
-    parser.add_argument("--json", action="store_true", help="print one JSON document instead of text")
 
 
 def formats(text: str) -> tuple[str, ...]:
@@ -139,16 +134,13 @@ def run_command(answer_of: Callable[[], Answer], arguments: argparse.Namespace, 
         except ProxytuneError as problem:
             _complain(program, str(problem))
             return BAD_INPUT if isinstance(problem, InputError) else FAILED
-        except (KeyboardInterrupt, SystemExit, MemoryError, OSError) as problem:
-            what, status = stopped_by(problem)
-            _complain(program, f"{what}; {left}")
-            return status
-        except Exception as problem:
+        except BaseException as problem:
+            stopping = KeyboardInterrupt | SystemExit | MemoryError | OSError
             # A library may stumble over what the system refused it, and raise something else
-            refused = _refused(problem)
-            if refused is None:
+            cause = problem if isinstance(problem, stopping) else _refused(problem)
+            if cause is None:
                 raise
-            what, status = stopped_by(refused)
+            what, status = stopped_by(cause)
             _complain(program, f"{what}; {left}")
             return status
     return DONE

@@ -10,8 +10,7 @@ from proxytune.api import measure
 from proxytune.cli.terminal import Answer
 from proxytune.errors import InputError
 from proxytune.files import check_place
-from proxytune.report import Table, WholeWords, columns_of, plain, table_text
-from proxytune.scores import ScoreTable
+from proxytune.report import Table, columns_of, plain, table_text
 from proxytune.seeds import TARGET_OFFSET
 
 
@@ -42,12 +41,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     found.write(arguments.output)
     document = {"scores": str(arguments.output), **found.document()}
     lines = [*(f"beware: {line}" for line in found.cautions), f"seed {found.seed}", str(arguments.output)]
-    return Answer(document, Group(_table(found.scores), Text("\n".join(lines))))
-
-
-def _table(scores: ScoreTable) -> WholeWords:
-    rows = tuple(
-        (str(agent), *(f"{value:.3f}" for value in means))
-        for agent, means in zip(scores.agents, scores.means, strict=True)
-    )
-    return table_text(Table("", columns_of(("agent",), [plain(name) for name in scores.metrics]), rows))
+    means = zip(found.scores.agents, found.scores.means, strict=True)
+    rows = tuple((str(agent), *(f"{value:.3f}" for value in own)) for agent, own in means)
+    table = Table("", columns_of(("agent",), [plain(name) for name in found.scores.metrics]), rows)
+    return Answer(document, Group(table_text(table), Text("\n".join(lines))))

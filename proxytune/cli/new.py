@@ -44,7 +44,14 @@ def run(arguments: argparse.Namespace) -> Answer:
     folder = Path(arguments.name)
     _check(arguments)
     skeleton = _skeleton(arguments)
-    write_folder(folder, skeleton)
+    try:
+        with folder_draft_of(folder) as draft:
+            for name, text in skeleton.files.items():
+                (draft / name).write_text(text, encoding="utf-8", newline="\n")
+    except (FileExistsError, NotADirectoryError):
+        raise InputError(f"{folder}: is there already; choose another name, or move it away") from None
+    except OSError as problem:
+        raise RunError(f"{folder}: cannot be written ({problem.strerror}); choose another place") from None
     files = [str(folder / name) for name in skeleton.files]
     document = {"kind": arguments.kind, "files": files, "notes": list(skeleton.notes), "next": list(skeleton.next)}
     lines = [*files, *skeleton.notes, "next:", *map(pasteable, skeleton.next)]
@@ -57,18 +64,6 @@ def pasteable(command: str) -> str:
         return f"  {command}"
     before, _, options = command.partition(" --")
     return f"  {before} \\\n      --{options}"
-
-
-def write_folder(folder: Path, skeleton: Skeleton) -> None:
-    """Write all files of a skeleton, or none."""
-    try:
-        with folder_draft_of(folder) as draft:
-            for name, text in skeleton.files.items():
-                (draft / name).write_text(text, encoding="utf-8", newline="\n")
-    except (FileExistsError, NotADirectoryError):
-        raise InputError(f"{folder}: is there already; choose another name, or move it away") from None
-    except OSError as problem:
-        raise RunError(f"{folder}: cannot be written ({problem.strerror}); choose another place") from None
 
 
 def read_figures(text: str | None) -> dict[str, float]:

@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from proxytune.api import StudyReport
+from proxytune.api import StudyReport, read_families
 from proxytune.cli.options import typed
-from proxytune.cli.study import redraw_families
+from proxytune.cli.study import families_answer
 from proxytune.cli.terminal import Answer
 from proxytune.report import (
     curve_name,
@@ -61,7 +61,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     metrics = [Metric.parse(text) for text in arguments.metric]
     settings = read_study_settings(arguments.path)
     if settings.families and not metrics:
-        return redraw_families(settings)
+        return families_answer(read_families(settings.path), {})
     settings.check_single()
     with Store.read(settings.home) as store:
         run = open_read_only(settings, store)
@@ -80,11 +80,14 @@ def run(arguments: argparse.Namespace) -> Answer:
         tables = [str(path) for path in write_study_tables(result, found.trials(), folder / "figures")]
         document = {**study_document(result), "report": str(report), "tables": tables}
     paths = [str(path) for path in figures]
-    files = Text("\n".join([*paths, *pages, *([*document["tables"], document["report"]] if result else [])]))
-    return Answer(
-        {**document, "figures": paths, "pages": pages},
-        _by_other_metrics(result, files) if result and metrics else files,
+    text: RenderableType = Text(
+        "\n".join([*paths, *pages, *document.get("tables", ()), *filter(None, [document.get("report")])])
     )
+    if result and metrics:
+        named = ", ".join(str(metric) for metric in shown.metrics)
+        note = f"none run; scored with {named}; the trials are still those that the study's own metrics led to"
+        text = Group(study_text(result, note, {}), text)
+    return Answer({**document, "figures": paths, "pages": pages}, text)
 
 
 def _pages(
@@ -101,9 +104,3 @@ def _read(run: StudyRun, metrics: Sequence[Metric]) -> tuple[StudyResult | None,
     if curves and not run.store.trials(run.study.objective.name):
         return None, curves
     return rescored(run, metrics) if metrics else result_of(run), curves
-
-
-def _by_other_metrics(result: StudyResult, files: Text) -> RenderableType:
-    named = ", ".join(str(metric) for metric in result.study.settings.metrics)
-    note = f"none run; scored with {named}; the trials are still those that the study's own metrics led to"
-    return Group(study_text(result, note, {}), files)

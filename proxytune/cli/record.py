@@ -1,7 +1,6 @@
 """`record`: the log of a simulated domain that is driven through manoeuvres, and along its lanes for pictures."""
 
 import argparse
-from collections.abc import Sequence
 from pathlib import Path
 
 from rich.text import Text
@@ -10,7 +9,6 @@ from proxytune.api import Wanted, record_log
 from proxytune.cli.terminal import Answer, waiting
 from proxytune.errors import InputError
 from proxytune.files import check_place
-from proxytune.logs import Log
 from proxytune.study import read_study_settings
 
 MOST_FRAMES = 1_000_000
@@ -41,7 +39,12 @@ def run(arguments: argparse.Namespace) -> Answer:
     wanted = Wanted(arguments.repeats, arguments.seconds, arguments.frames, arguments.seed, arguments.commands)
     with waiting("driving") as tell:
         log, cautions = record_log(settings, arguments.model, arguments.output, wanted, tell)
-    return _answer(log, cautions, arguments)
+    rows, frames = sum(len(episode.times) for episode in log.episodes), arguments.frames
+    document = {"log": str(arguments.output), "episodes": len(log.episodes), "rows": rows, "frames": frames}
+    pictures = f", {frames} frames" if frames else ""
+    text = f"{len(log.episodes)} drives, {rows} rows{pictures}\n{arguments.output}"
+    lines = [*(f"beware: {line}" for line in cautions), text]
+    return Answer({**document, "seed": arguments.seed, "cautions": list(cautions)}, Text("\n".join(lines)))
 
 
 def _check(arguments: argparse.Namespace) -> None:
@@ -50,12 +53,3 @@ def _check(arguments: argparse.Namespace) -> None:
         raise InputError(limits)
     if not 0 <= arguments.frames <= MOST_FRAMES:
         raise InputError(f"--frames must be between 0 and {MOST_FRAMES}, got {arguments.frames}")
-
-
-def _answer(log: Log, cautions: Sequence[str], arguments: argparse.Namespace) -> Answer:
-    rows, frames = sum(len(episode.times) for episode in log.episodes), arguments.frames
-    document = {"log": str(arguments.output), "episodes": len(log.episodes), "rows": rows, "frames": frames}
-    pictures = f", {frames} frames" if frames else ""
-    text = f"{len(log.episodes)} drives, {rows} rows{pictures}\n{arguments.output}"
-    lines = [*(f"beware: {line}" for line in cautions), text]
-    return Answer({**document, "seed": arguments.seed, "cautions": list(cautions)}, Text("\n".join(lines)))

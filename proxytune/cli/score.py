@@ -228,7 +228,11 @@ def run(arguments: argparse.Namespace) -> Answer:
     arguments.metric = _metrics_given(arguments)
     metrics = [Metric.parse(text) for text in arguments.metric]
     (target_name, target), proxies = read_sides(arguments, [metric.name for metric in metrics])
-    (target, proxies), left_out = _common(target, proxies) if arguments.common else ((target, proxies), ())
+    left_out: Sequence[str] = ()
+    if arguments.common:
+        sides = {"the target": target, **{f"the proxy {name}": one for name, one in proxies.items()}}
+        kept, left_out = in_common(sides)
+        target, proxies = kept.pop("the target"), dict(zip(proxies, kept.values(), strict=True))
     if arguments.unpaired:
         target = target.unpaired()
         proxies = {name: table.unpaired() for name, table in proxies.items()}
@@ -274,14 +278,6 @@ def _answer(
         return Answer(document | ranking_document(assessments, selection), shown)
     ((name, assessment),) = assessments.items()
     return Answer({"proxy": name, **document, **score_document(assessment)}, shown)
-
-
-def _common(
-    target: ScoreTable, proxies: Mapping[str, ScoreTable]
-) -> tuple[tuple[ScoreTable, dict[str, ScoreTable]], tuple[str, ...]]:
-    """All tables with the agents that all have, and a line on each table that has others."""
-    kept, lines = in_common({"the target": target, **{f"the proxy {name}": one for name, one in proxies.items()}})
-    return (kept.pop("the target"), dict(zip(proxies, kept.values(), strict=True))), lines
 
 
 def _weights(texts: Sequence[str]) -> dict[str, float] | None:

@@ -8,7 +8,7 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from proxytune.api import FamiliesReport, Spending, most_episodes, read_families, run_opened, run_opened_families
+from proxytune.api import FamiliesReport, Spending, most_episodes, run_opened, run_opened_families
 from proxytune.cli.options import check_made, configure_cluster, on_its_cluster, study_folder
 from proxytune.cli.terminal import Answer
 from proxytune.errors import ProxytuneError
@@ -31,7 +31,6 @@ from proxytune.storage import Store, locked
 from proxytune.study import (
     BANK_FILE,
     LEARNING,
-    Spent,
     Study,
     StudyResult,
     StudyRun,
@@ -96,20 +95,8 @@ def renewed_page(
             raise
 
 
-def compare_families(settings: StudySettings, spending: Spending) -> Answer:
-    """Run what is left of every family, and compare them; finished ones are summed up again without simulating."""
-    begun = time.perf_counter()
-    report = run_opened_families(settings, spending, _say, _bars)
-    seconds = {"total": time.perf_counter() - begun, "episodes": report.spent.seconds}
-    return _answer(report, {"episodes": {"run": report.spent.episodes}, "seconds": seconds})
-
-
-def redraw_families(settings: StudySettings) -> Answer:
-    """Draw the figure and the page of several families again; nothing is simulated."""
-    return _answer(read_families(settings.path), {})
-
-
-def _answer(report: FamiliesReport, spent: Mapping[str, Any]) -> Answer:
+def families_answer(report: FamiliesReport, spent: Mapping[str, Any]) -> Answer:
+    """Draw the figure and the page of several families, and say what was found and spent."""
     figure, page = report.write()
     document = {**report.document(), **spent, "figures": [str(figure)], "report": str(page)}
     return Answer(document, families_text(report.compared, {"figure": figure, "report": page}))
@@ -182,40 +169,25 @@ def run(arguments: argparse.Namespace) -> Answer:
     settings, again = read_study_settings(folder), arguments.retry_failed
     check_made(folder)
     if settings.families:
-        return compare_families(settings, Spending(arguments.budget, arguments.jobs, again))
+        report = run_opened_families(settings, Spending(arguments.budget, arguments.jobs, again), _say, _bars)
+        seconds = {"total": time.perf_counter() - begun, "episodes": report.spent.seconds}
+        return families_answer(report, {"episodes": {"run": report.spent.episodes}, "seconds": seconds})
     if not settings.targets:
         return run_a_bank(settings, Spending(arguments.budget, arguments.jobs, again))
     study = with_spending(open_settings(settings), budget=arguments.budget, jobs=arguments.jobs)
     if study.settings.objective == LEARNING:
         return search_by_plv(study, folder, lambda: run_opened(study, _bars(study), _say, again).result)
-    report = run_opened(study, _bars(study), _say, again)
-    figures, page = report.write(folder)
-    costs = _costs(report.result, report.spent, time.perf_counter() - begun)
-    document = {**report.document(), **costs, "figures": [str(path) for path in figures], "report": str(page)}
-    files = {"figures": figures[0].parent, "report": page}
-    return Answer(document, study_text(report.result, _say_costs(costs), files))
-
-
-def _costs(result: StudyResult, spent: Spent, total: float) -> dict[str, Any]:
-    """Episodes and seconds of this run; what is spent outside episodes includes waiting."""
-    jobs = result.study.settings.jobs
-    return {
-        "episodes": {
-            "run": spent.episodes,
-            "reused": result.episodes - (spent.episodes - spent.unused),
-            "failed": result.failed_episodes,
-        },
-        "seconds": {
-            "total": total,
-            "episodes": spent.seconds,
-            "outside_episodes": max(0.0, total - spent.seconds / jobs),
-        },
+    found = run_opened(study, _bars(study), _say, again)
+    figures, page = found.write(folder)
+    result, spent, total = found.result, found.spent, time.perf_counter() - begun
+    reused = result.episodes - (spent.episodes - spent.unused)
+    outside = max(0.0, total - spent.seconds / study.settings.jobs)  # Waiting included
+    document = {
+        **found.document(),
+        "episodes": {"run": spent.episodes, "reused": reused, "failed": result.failed_episodes},
+        "seconds": {"total": total, "episodes": spent.seconds, "outside_episodes": outside},
+        "figures": [str(path) for path in figures],
+        "report": str(page),
     }
-
-
-def _say_costs(costs: dict[str, Any]) -> str:
-    episodes, seconds = costs["episodes"], costs["seconds"]
-    return (
-        f"{episodes['run']} run, {episodes['reused']} reused; "
-        f"{seconds['total']:.0f} s, of which {seconds['outside_episodes']:.0f} s outside episodes"
-    )
+    costs = f"{spent.episodes} run, {reused} reused; {total:.0f} s, of which {outside:.0f} s outside episodes"
+    return Answer(document, study_text(result, costs, {"figures": figures[0].parent, "report": page}))

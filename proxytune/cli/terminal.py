@@ -11,7 +11,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, redirect_stdout
+from contextlib import contextmanager, redirect_stdout, suppress
 from dataclasses import dataclass
 from types import FrameType
 from typing import Any
@@ -91,7 +91,10 @@ OUT, ERR = 1, 2
 def prints_to_stderr() -> Iterator[None]:
     """Send to standard error whatever this process, and those that it starts, write to standard output meanwhile."""
     sys.stdout.flush()
-    kept = _redirected()
+    kept = None
+    with suppress(OSError):  # One of the two is closed: then nothing is to be parted
+        kept = os.dup(OUT)
+        os.dup2(ERR, OUT)
     try:
         with redirect_stdout(sys.stderr):
             yield
@@ -99,16 +102,6 @@ def prints_to_stderr() -> Iterator[None]:
         if kept is not None:
             os.dup2(kept, OUT)
             os.close(kept)
-
-
-def _redirected() -> int | None:
-    """A descriptor of what standard output was; None where one of the two is closed: then nothing is to be parted."""
-    try:
-        kept = os.dup(OUT)
-        os.dup2(ERR, OUT)
-    except OSError:
-        return None
-    return kept
 
 
 def print_answer(answer: Answer, *, as_json: bool) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from proxytune.report.figure_style import BLUE, COLUMN, GREY, LIGHT_BLUE, dress
+from proxytune.report.score_figures import MOST, short_name
 from proxytune.report.view import Table, columns_of
 from proxytune.report.wording import listed, percent, plain, short, with_span
 from proxytune.usefulness import (
@@ -21,8 +22,6 @@ from proxytune.usefulness import (
     mmrv_conventions,
 )
 
-MOST_NAMED = 28
-"""Agents that can be named at 85 mm: the best by expected regret."""
 CAPTION = (
     "Expected regret of deploying each agent with its 95 % interval, best on top: what it costs on the target if "
     "another is better. Blue is the agent to deploy, light blue those that cannot be told from the best; at the right "
@@ -33,7 +32,12 @@ CAPTION = (
 def decision_sentence(assessment: Assessment, target: str) -> str:
     """Say which agent to deploy, what it risks, and which others may be as good."""
     decision, where = assessment.decision, f"on {target}"
-    observed = _observed_sentence(decision.observed)
+    winners = _few(decision.observed.proxy_winners)
+    observed = f"the proxy's winner is the target's ({winners})"
+    if not decision.observed.agrees:
+        wins = "win" if len(decision.observed.proxy_winners) > 1 else "wins"
+        cost = short(decision.observed.regret, 2)
+        observed = f"in the proxy {winners} {wins}, which by the target's means costs {cost}"
     if decision.probability_best is None:
         return f"By the means as published, {decision.winner} is the best {where}; {observed}."
     risk = f"{percent(min(decision.probability_best, 0.9999))} to be the best {where}, expected regret "
@@ -41,14 +45,6 @@ def decision_sentence(assessment: Assessment, target: str) -> str:
     others = decision.not_told_apart
     rest = f"{_few(others)} cannot be told from it" if others else "no other agent can be as good with 95 %"
     return f"Deploy {decision.winner}: {risk}; {rest}. {observed[0].upper()}{observed[1:]}."
-
-
-def _observed_sentence(observed: Panel) -> str:
-    winners = _few(observed.proxy_winners)
-    if observed.agrees:
-        return f"the proxy's winner is the target's ({winners})"
-    wins = "win" if len(observed.proxy_winners) > 1 else "wins"
-    return f"in the proxy {winners} {wins}, which by the target's means costs {short(observed.regret, 2)}"
 
 
 def _few(names: tuple[str, ...]) -> str:
@@ -126,7 +122,7 @@ def decision_table(assessment: Assessment, target: str) -> Table:
 
 def decision_figure(decision: Decision) -> Figure:
     """Draw the expected regret of each agent with its interval, the best on top."""
-    order = sorted(decision.expected_regret, key=lambda agent: decision.expected_regret[agent])[:MOST_NAMED]
+    order = sorted(decision.expected_regret, key=lambda agent: decision.expected_regret[agent])[:MOST]
     figure = Figure(figsize=(COLUMN, 0.9 + 0.16 * max(4, len(order))), layout="constrained")
     axes = figure.subplots()
     for row, agent in enumerate(order):
@@ -138,7 +134,7 @@ def decision_figure(decision: Decision) -> Figure:
         if decision.best_probabilities is not None:
             text = f"{decision.best_probabilities[agent]:.2f}"
             axes.text(1.02, row, text, transform=axes.get_yaxis_transform(), fontsize=7, va="center")
-    axes.set_yticks(np.arange(len(order)), [name if len(name) <= 24 else f"…{name[-23:]}" for name in order])
+    axes.set_yticks(np.arange(len(order)), [short_name(agent) for agent in order])
     axes.set_ylim(len(order) - 0.5, -0.5)
     axes.set_xlim(left=0.0)
     dress(axes, f"regret in {plain(decision.chosen_on)[:44]}")
@@ -157,24 +153,27 @@ def _saves(saving: Saving) -> dict[str, Any]:
         "real_rollouts": saving.real,
         "simulated_rollouts": saving.simulated,
         "saved_share": saving.saved_share,
-        "scores": {agent: {"value": mean, "interval": list(ends)} for agent, (mean, ends) in saving.means.items()},
-        "scores_alone": {agent: {"value": m, "interval": list(ends)} for agent, (m, ends) in saving.alone.items()},
+        "scores": _scores(saving.means),
+        "scores_alone": _scores(saving.alone),
         "reason": saving.reason or None,
     }
 
 
+def _scores(scores: Mapping[str, tuple[float, tuple[float, float]]]) -> dict[str, Any]:
+    return {agent: {"value": mean, "interval": list(ends)} for agent, (mean, ends) in scores.items()}
+
+
 def _chosen(decision: Decision) -> dict[str, Any]:
+    ends, chances = decision.regret_interval, decision.best_probabilities
     return {
         "winner": decision.winner,
         "probability_best": decision.probability_best,
         "expected_regret": dict(decision.expected_regret),
-        "regret_interval": _ends(decision.regret_interval),
-        "probabilities_best": _plain(decision.best_probabilities),
+        "regret_interval": ends and {agent: list(own) for agent, own in ends.items()},
+        "probabilities_best": chances and dict(chances),
         "not_told_apart": list(decision.not_told_apart),
         "chosen_on": decision.chosen_on,
-        "scores": None
-        if decision.scores is None
-        else {agent: {"value": mean, "interval": list(ends)} for agent, (mean, ends) in decision.scores.items()},
+        "scores": decision.scores and _scores(decision.scores),
         "least_difference": decision.least_told,
         "basis": decision.basis or None,
         "notes": list(decision.notes),
@@ -277,13 +276,5 @@ def _panel(panel: Panel) -> dict[str, Any]:
         "agrees": panel.agrees,
         "proxy_winners": list(panel.proxy_winners),
         "target_winners": list(panel.target_winners),
-        "expected_regret": _plain(panel.expected_regret),
+        "expected_regret": panel.expected_regret and dict(panel.expected_regret),
     }
-
-
-def _plain(values: Mapping[str, float] | None) -> dict[str, float] | None:
-    return None if values is None else dict(values)
-
-
-def _ends(intervals: Mapping[str, tuple[float, float]] | None) -> dict[str, list[float]] | None:
-    return None if intervals is None else {agent: list(ends) for agent, ends in intervals.items()}

@@ -84,14 +84,10 @@ def difference_text(one: Difference) -> str:
     return f"+{one.value}{ends}"
 
 
-def seconds_text(value: float, low: float, high: float) -> str:
-    """Seconds, or a ratio, with its interval."""
-    return f"{_rounded(value)} ({_rounded(low)} to {_rounded(high)})"
-
-
-def _rounded(value: float) -> str:
-    """Two significant figures."""
-    return f"{float(f'{value:.2g}'):g}"
+def seconds_text(value: float, low: float, high: float, unit: str = "") -> str:
+    """Seconds, or a ratio, with its interval, to two significant figures."""
+    middle, *ends = (f"{float(f'{one:.2g}'):g}" for one in (value, low, high))
+    return f"{middle}{unit} ({' to '.join(ends)})"
 
 
 def more_text(lesson: Lesson) -> str:
@@ -148,11 +144,10 @@ def _behind(lesson: Lesson) -> str:
 def _say_cost(compared: ComparedFamilies) -> str:
     choice = compared.cheapest
     assert choice.best is not None
-    value, *ends = compared.seconds_per_episode()[choice.best]
+    seconds = seconds_text(*compared.seconds_per_episode()[choice.best], unit=" s per episode")
     times = {name: seconds_text(*one) for name, one in compared.times_cheapest(choice.best).items()}
     alike = [f"{name} {times[name]}" for name in choice.alike]
     worse = [f"{name} {time}" for name, time in times.items() if name not in (choice.best, *choice.alike)]
-    seconds = f"{_rounded(value)} s per episode ({_rounded(ends[0])} to {_rounded(ends[1])})"
     return _join_clauses(f"{choice.best}, {seconds}", "times as long", worse, alike)
 
 
@@ -319,7 +314,7 @@ def _choice_document(choice: BestFamilies) -> dict[str, Any]:
 
 
 def _family_document(one: TunedFamily, cost: tuple[float, float, float]) -> dict[str, Any]:
-    result = one.result
+    result, fresh = one.result, one.fresh
     settings = result.study.settings
     return {
         "family": settings.family,
@@ -327,7 +322,14 @@ def _family_document(one: TunedFamily, cost: tuple[float, float, float]) -> dict
         "theta": dict(one.theta),
         "theta_interval": intervals_document(result.knowledge.intervals),
         "prpv": round(result.best.trial.prpv or 0.0),
-        "fresh": _fresh_document(one),
+        "fresh": {
+            "prpv": fresh.prpv.value,
+            "prpv_interval": ends_document(fresh.prpv_interval.low, fresh.prpv_interval.high),
+            "noise_floor": fresh.noise_floor.value,
+            "chance": fresh.chance.mean,
+        }
+        if fresh
+        else dict.fromkeys(("prpv", "prpv_interval", "noise_floor", "chance")),
         "seconds_per_episode": cost[0],
         "seconds_per_episode_interval": list(cost[1:]),
         "trials": len(result.trials),
@@ -336,19 +338,6 @@ def _family_document(one: TunedFamily, cost: tuple[float, float, float]) -> dict
         "cannot_be_told_from_perfect": bool(result.perfect),
         "fits": result.knowledge.misfit.fits,
         "folder": str(settings.home),
-    }
-
-
-def _fresh_document(one: TunedFamily) -> dict[str, Any]:
-    fresh = one.fresh
-    if fresh is None:
-        return {"prpv": None, "prpv_interval": None, "noise_floor": None, "chance": None}
-    inner = fresh.prpv_interval
-    return {
-        "prpv": fresh.prpv.value,
-        "prpv_interval": ends_document(inner.low, inner.high),
-        "noise_floor": fresh.noise_floor.value,
-        "chance": fresh.chance.mean,
     }
 
 

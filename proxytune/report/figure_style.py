@@ -11,6 +11,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
+from scipy.optimize import isotonic_regression
 
 from proxytune.usefulness import NoiseFloor
 
@@ -117,13 +118,7 @@ def spread_places(places: Sequence[float], apart: float) -> list[float]:
     order = sorted(range(len(places)), key=lambda row: places[row])
     moved = np.array([places[row] for row in order])
     steps = apart * np.arange(len(moved))
-    # Least squares with the order kept: pools of places that touch share their mean.
-    pools: list[list[float]] = []
-    for value in moved - steps:
-        pools.append([float(value)])
-        while len(pools) > 1 and np.mean(pools[-2]) > np.mean(pools[-1]):
-            last = pools.pop()
-            pools[-1] += last
+    # Least squares with the order kept: places that would touch share the mean of theirs.
     most = max(0.0, 1.0 - apart * (len(moved) - 1))
-    found = np.concatenate([np.full(len(pool), np.clip(np.mean(pool), 0.0, most)) for pool in pools]) + steps
+    found = np.clip(isotonic_regression(moved - steps).x, 0.0, most) + steps
     return [float(found[order.index(row)]) for row in range(len(places))]

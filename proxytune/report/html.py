@@ -3,15 +3,15 @@
 import base64
 import html
 import re
+import tomllib
 from io import BytesIO
 from pathlib import Path
-from string import Template
 from typing import TYPE_CHECKING
 
 from PIL import Image
 
 from proxytune.report.view import Column, Foot, Paragraphs, Part, Picture, Table, View, foot_of
-from proxytune.report.writing import write_text
+from proxytune.report.writing import fill, write_text
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -26,137 +26,9 @@ ABOUT = ("robot", "log", "target", "targets")
 """Settings that stand at the top of a page too."""
 PROSE = 28
 """A cell of more characters than this is wrapped, and kept wide enough to be read."""
-WORDS = {
-    "PRPV": "how many ordered pairs of agents the simulator ranks otherwise than the robot; 0 is best",
-    "θ": "the simulator’s parameters that are tuned, all together",
-    "noise floor": "what a perfect simulator would still score, since episodes differ from one another",
-    "chance": "what a simulator scores that ranks agents at random",
-    "held-out": "kept aside: nothing was tuned or fitted to it",
-    "nats": "evidence as a natural logarithm: 3 nats make something 20 times as likely",
-    "declared": "what the simulator had before anything was added: the robot as its files describe it",
-    "free curve": "a flexible curve over one signal, fitted without a physical model; it shows what room is left",
-    "innovations": "what a model could not predict from one measured pose to the next",
-    "RMSE": "root of the mean squared error",
-    "planar": "the simulator that moves the robot as a point on a plane, without contacts",
-    "bullet": "the simulator that moves the robot as a body with wheels and contacts (PyBullet)",
-    "unidentified": "nearly any value in the range that was searched fits",
-    "misfit": "how probable scores as far from the simulator’s are if some θ were right; a small p says that none is",
-    "PLV": "proxy learning value: the target’s samples that a learner saves by learning in the simulator first",
-    "PPV": "proxy predictivity value: how far the simulator’s scores are from the target’s; 0 is best",
-    "SRCC": "Spearman’s rank correlation of the agents’ scores on both sides; 1 is the same order",
-    "MMRV": "mean maximum rank violation: the score that the worst wrongly ordered pair costs; 0 is best",
-    "regret": "the score that is lost on the target by not choosing the agent that is best there",
-    "zero-shot": "on the target, after learning in the simulator alone",
-    "Sobol index": "the share of a measure’s variation that a parameter takes part in",
-    "nominal": "as the robot’s files have it, before tuning",
-}
+WORDS: dict[str, str] = tomllib.loads(fill("words.toml"))
 """What a page explains at its foot of the words that it uses."""
-STYLE = """
-:root { color-scheme: light dark; --paper: #fff; --ink: #1d2126; --soft: #5a626c; --line: #d9dde2; --tint: #f1f5f9;
-  --shade: #0003; --accent: #0072b2; --late: #c68900; }
-@media (prefers-color-scheme: dark) {
-  :root { --paper: #15181c; --ink: #e6e8ea; --soft: #a3abb4; --line: #3a414a; --tint: #20262d;
-    --shade: #fff4; --accent: #6cc0f0; --late: #e69f00; }
-  svg.drawn, svg.drawn image[id*="photo"] { filter: invert(1) hue-rotate(180deg); }
-}
-* { box-sizing: border-box; }
-html { -webkit-text-size-adjust: 100%; }
-body { font: 16px/1.5 system-ui, sans-serif; max-width: 70rem; margin: 0 auto; padding: 1.5rem 1rem 3rem;
-  color: var(--ink); background: var(--paper); overflow-wrap: anywhere; }
-h1 { font-size: 1.6rem; line-height: 1.25; margin: 0 0 1rem; }
-p, .notes, dl { max-width: 46rem; }
-.about { color: var(--soft); margin: -.6rem 0 1rem; }
-h2 { font-size: 1.15rem; margin: 2.5rem 0 .5rem; }
-.answer { font-size: 1.15rem; margin: 0 0 1rem; }
-.following, .under-way { padding: .6rem .9rem; border-left: .25rem solid var(--accent); background: var(--tint); }
-.under-way { border-left-color: var(--late); }
-figure { margin: .5rem 0 0; display: flex; flex-wrap: wrap; gap: .6rem 1.5rem; align-items: flex-start; }
-figcaption { flex: 1 1 15rem; max-width: 40rem; }
-svg.drawn { display: block; max-width: 100%; height: auto;
-  stroke-linejoin: round; stroke-linecap: butt; }
-dl { font-size: .93rem; color: var(--soft); }
-dt { font-weight: 600; float: left; margin-right: .5rem; }
-dt::after { content: ":"; }
-dd { margin: 0 0 .3rem 1rem; }
-figcaption, .notes, footer { color: var(--soft); font-size: .93rem; }
-.notes { padding-left: 1.2rem; }
-.scroll { overflow-x: auto; width: fit-content; max-width: 100%; background:
-  linear-gradient(to right, var(--paper) 40%, transparent) 0 0 / 2.5rem 100% no-repeat local,
-  linear-gradient(to left, var(--paper) 40%, transparent) 100% 0 / 2.5rem 100% no-repeat local,
-  linear-gradient(to right, var(--shade), transparent) 0 0 / .8rem 100% no-repeat scroll,
-  linear-gradient(to left, var(--shade), transparent) 100% 0 / .8rem 100% no-repeat scroll; }
-.scroll:focus-visible { outline: 2px solid var(--accent); }
-.card { display: block; width: fit-content; max-width: 100%; min-width: min-content; background: #fff; padding: .5rem;
-  border: 1px solid var(--line); border-radius: .4rem; }
-img { display: block; max-width: 100%; height: auto; }
-table { border-collapse: collapse; font-size: .93rem; font-variant-numeric: tabular-nums; }
-th, td { text-align: left; vertical-align: top; padding: .25rem 1.1rem .25rem 0; border-bottom: 1px solid var(--line);
-  overflow-wrap: normal; }
-thead th { color: var(--soft); vertical-align: bottom; }
-tbody th { font-weight: 600; }
-tbody th.part { padding-left: 1rem; }
-td.prose { min-width: 11rem; }
-table:not(:has(thead)) td { overflow-wrap: anywhere; }
-tbody th.prose { min-width: 8rem; }
-.number { text-align: right; white-space: nowrap; }
-thead .number { white-space: normal; }
-.unseen { position: absolute; width: 1px; height: 1px; overflow: hidden; clip-path: inset(50%); white-space: nowrap; }
-pre { background: var(--tint); padding: .6rem .9rem; overflow-x: auto; }
-code { font: .92em/1.5 ui-monospace, monospace; }
-code span { display: inline-block; }
-nav ol { columns: 16rem; column-gap: 3rem; padding-left: 1.8rem; }
-nav li { break-inside: avoid; }
-a { color: var(--accent); }
-footer { margin-top: 3rem; border-top: 1px solid var(--line); }
-@media (max-width: 30rem) {
-  body { padding: 1rem .8rem 2rem; }
-  figure .scroll { margin: 0 -.4rem; max-width: none; }
-  th, td { padding-right: .7rem; }
-  td.prose { min-width: 9rem; }
-}
-@media print {
-  html { font-size: 10pt; }
-  :root { color-scheme: light; --paper: #fff; --ink: #000; --soft: #333; --line: #bbb; --tint: #f4f4f4; }
-  body { max-width: none; padding: 0; font-size: 1rem; }
-  .scroll { overflow: visible; }
-  table { font-size: .85rem; }
-  th, td { padding-right: .6rem; }
-  td.prose { min-width: 0; }
-  .number { white-space: normal; }
-  img, svg.drawn { width: calc(.68 * var(--wide)) !important; max-height: 21cm; min-width: 0 !important; }
-  figcaption { flex-basis: 5cm; }
-  pre { white-space: pre-wrap; }
-  svg.drawn, svg.drawn image { filter: none !important; }
-  figure, tr, p, li, .following { break-inside: avoid; }
-  h2 { break-after: avoid; }
-  thead { display: table-header-group; }
-  nav, .under-way { display: none; }
-}
-"""
-PAGE = Template("""<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta http-equiv="Content-Security-Policy" content="default-src 'none'; img-src data:; style-src 'unsafe-inline'">
-$renew<link rel="icon" href="data:,">
-<title>$title</title>
-<style>$style</style>
-</head>
-<body>
-<header>
-<h1>$title</h1>
-$about$under_way<p class="answer">$answer</p>
-$following</header>
-$contents<main>
-$parts
-</main>
-<footer>
-$foot
-</footer>
-</body>
-</html>
-""")
+STYLE = fill("page.css")
 
 
 def write_page(path: Path, view: View, foot: Foot, renew_s: int = 0) -> None:
@@ -174,13 +46,6 @@ def write_page(path: Path, view: View, foot: Foot, renew_s: int = 0) -> None:
     write_text(path, page_html(view, foot, renew_s))
 
 
-def fragment_html(view: View) -> str:
-    """A view as a piece of HTML for a notebook: sentence, next step, tables, figures and notes."""
-    following = f"<p><strong>Next:</strong> {_text(view.next_step)}</p>" if view.next_step else ""
-    parts = "\n".join(_part(part, f"part-{number}") for number, part in enumerate(view.parts, start=1))
-    return f"<h3>{html.escape(view.title)}</h3>\n<p>{_text(view.sentence)}</p>\n{following}\n{parts}"
-
-
 class Shown:
     """What has a view shows itself in a notebook, and has a page."""
 
@@ -189,7 +54,9 @@ class Shown:
         raise NotImplementedError
 
     def _repr_html_(self) -> str:
-        return fragment_html(self.view())
+        view = self.view()
+        following = f"<p><strong>Next:</strong> {_text(view.next_step)}</p>" if view.next_step else ""
+        return f"<h3>{html.escape(view.title)}</h3>\n<p>{_text(view.sentence)}</p>\n{following}\n{_parts(view)}"
 
     def page(self, path: str | Path | None = None) -> str:
         """The page as HTML; also written where a path is given.
@@ -216,10 +83,12 @@ def page_html(view: View, foot: Foot, renew_s: int = 0) -> str:
     """
     renews = f"Under way: this page loads itself again every {renew_s} s."
     following = f'<p class="following"><strong>Next:</strong> {_text(view.next_step)}</p>\n'
-    parts = "\n".join(_part(part, f"part-{number}") for number, part in enumerate(view.parts, start=1))
-    return PAGE.substitute(
+    stated, parts = dict(foot.settings), _parts(view)
+    about = [*(f"{name} {stated[name]}" for name in ABOUT if stated.get(name)), foot.date]
+    return fill(
+        "page.html.txt",
         title=html.escape(view.title),
-        about=_about(foot),
+        about=f'<p class="about">{html.escape(" · ".join(filter(None, about)))}</p>\n',
         style=STYLE,
         renew=f'<meta http-equiv="refresh" content="{renew_s}">\n' if renew_s else "",
         under_way=f'<p class="under-way" role="status">{renews}</p>\n' if renew_s else "",
@@ -231,16 +100,13 @@ def page_html(view: View, foot: Foot, renew_s: int = 0) -> str:
     )
 
 
-def _about(foot: Foot) -> str:
-    """What the page is about, at its top: robot, log, target and so on, and the date."""
-    stated = dict(foot.settings)
-    told = [*(f"{name} {stated[name]}" for name in ABOUT if stated.get(name)), foot.date]
-    return f'<p class="about">{html.escape(" · ".join(filter(None, told)))}</p>\n'
-
-
 def _contents(view: View) -> str:
     items = (f'<li><a href="#part-{n}">{html.escape(one.title)}</a></li>' for n, one in enumerate(view.parts, start=1))
     return f'<nav aria-label="Contents"><ol>{"".join(items)}</ol></nav>\n'
+
+
+def _parts(view: View) -> str:
+    return "\n".join(_part(part, f"part-{number}") for number, part in enumerate(view.parts, start=1))
 
 
 def _part(part: Part, place: str) -> str:
@@ -348,14 +214,9 @@ def _words(page: str) -> str:
 def _text(text: str) -> str:
     """A text with what is between backticks as code, and [words](a/file) beside the page as a link."""
     said = re.split(r"`([^`]+)`", html.escape(text))
-    return "".join(_code(one) if place % 2 else _linked(one) for place, one in enumerate(said))
-
-
-def _linked(text: str) -> str:
-    return re.sub(r"\[([^\]\[]+)\]\((\w[\w./ -]*|\.\./[\w./ -]*)\)", r'<a href="\2">\1</a>', text)
-
-
-def _code(command: str) -> str:
-    """A command as code, its options whole: a browser would break them after their hyphens."""
-    whole = re.sub(r"(?<!\S)(--?\w[^ ]+)", r"<span>\1</span>", command)
-    return f"<code>{whole}</code>"
+    link = r"\[([^\]\[]+)\]\((\w[\w./ -]*|\.\./[\w./ -]*)\)"
+    said[::2] = [re.sub(link, r'<a href="\2">\1</a>', one) for one in said[::2]]
+    # Options stay whole: a browser would break them after their hyphens.
+    whole = [re.sub(r"(?<!\S)(--?\w[^ ]+)", r"<span>\1</span>", one) for one in said[1::2]]
+    said[1::2] = [f"<code>{one}</code>" for one in whole]
+    return "".join(said)

@@ -102,18 +102,14 @@ def write_plv_report(study: PlvStudy, folder: Path) -> tuple[Path, Path]:
     figure, page = folder / "figures" / "plv.png", folder / "report.html"
     drawn = plv_figure(study)
     save_figure(drawn, figure)
-    write_page(page, plv_view(study, svg_of(drawn)), study_foot(study.settings))
-    return figure, page
-
-
-def plv_view(study: PlvStudy, figure: bytes) -> View:
-    """A search by PLV: the finalists, PLV of every trial, and the trials."""
     finals, tried = _tables(study)
     stopped = Paragraphs("Why the search ended", (f"{study.stopped}.", f"{PLV_MEANING}."))
-    picture = Picture("PLV of the proxies tried", figure, TRIALS)
+    picture = Picture("PLV of the proxies tried", svg_of(drawn), TRIALS)
     finalists = replace(finals, notes=(PLV_MEANING, *study.unable.values()))
     title = f"{study.settings.name}: in which simulator does a learner learn most?"
-    return View(title, plv_answer(study), plv_next_step(study), (finalists, picture, tried, stopped))
+    view = View(title, plv_answer(study), plv_next_step(study), (finalists, picture, tried, stopped))
+    write_page(page, view, study_foot(study.settings))
+    return figure, page
 
 
 def _tables(study: PlvStudy) -> tuple[Table, Table]:

@@ -26,8 +26,8 @@ from proxytune.usefulness import Assessment, Comparison, Prpv
 PANEL = 2.2
 """Height of a metric's panel, where names do not need more [inch]."""
 MOST = 28
-"""Agents that can be named at 85 mm. Of more, the scatter names those whose rank in the proxy is farthest from that on
-the target, and pairs are drawn over ranks on the target."""
+"""Agents that can be named at 85 mm. Of more, the decision names those of least regret, the scatter those whose rank in
+the proxy is farthest from that on the target, and pairs are drawn over ranks on the target."""
 LINE = 0.1
 """Height of a name [inch]."""
 LONGEST = 24
@@ -68,7 +68,7 @@ def flipped_pairs_figure(prpv: Prpv) -> Figure:
     figure = Figure(figsize=(COLUMN, COLUMN), layout="constrained")
     axes = figure.subplots()
     _draw_pairs(axes, cells, named=len(order) <= MOST)
-    _name_agents(axes, [_short(agent) for agent in order])
+    _name_agents(axes, [short_name(agent) for agent in order])
     axes.set_title(f"PRPV {prpv.value} of at most {prpv.range[1]}", fontsize=8)
     counts = {kind: sum(pair.flip == kind for pair in prpv.pairs) for kind in FLIP_COLOURS}
     counts["same"] = len(order) * (len(order) - 1) // 2 - len(prpv.pairs)
@@ -123,12 +123,13 @@ def _name_points(axes: Axes, inputs: Comparison, column: int, apart: float) -> N
     places = spread_places([(proxy[row] - bottom) / (top - bottom) for row in shown], apart)
     for row, place in zip(shown, places, strict=True):
         axes.annotate(
-            _short(inputs.agents[row]), (target[row], proxy[row]), (1.04, place), textcoords="axes fraction",
+            short_name(inputs.agents[row]), (target[row], proxy[row]), (1.04, place), textcoords="axes fraction",
             ha="left", va="center", fontsize=7, annotation_clip=False, arrowprops=look,
         )  # fmt: skip
 
 
-def _short(agent: str) -> str:
+def short_name(agent: str) -> str:
+    """An agent's name, of a long one its end."""
     return agent if len(agent) <= LONGEST else f"…{agent[1 - LONGEST :]}"
 
 

@@ -19,11 +19,11 @@ from proxytune.report.decision import (
 )
 from proxytune.report.html import write_page
 from proxytune.report.score_figures import MOST, flipped_pairs_figure, scatter_figure
-from proxytune.report.table_files import write_csv, write_latex
+from proxytune.report.table_files import csv_text, latex_text
 from proxytune.report.text import group_texts, note_texts, table_text
 from proxytune.report.view import Column, Foot, Paragraphs, Picture, Table, View, columns_of
 from proxytune.report.wording import listed, short, short_span, with_span
-from proxytune.report.writing import file_names, save_figure, svg_of
+from proxytune.report.writing import file_names, save_figure, svg_of, write_text
 from proxytune.usefulness import ALL, MEASURES, PPV, PRPV, Assessment, Measure, Measured, Selection, SuccessRates
 
 Row = tuple[str, str, str, str, str]
@@ -98,11 +98,7 @@ def score_text(
         left_out: Notes on agents that were left out.
         target: Name of the target.
     """
-    notes = [
-        f"{kind}{whose}: {line}"
-        for kind, lines in (("beware", "cautions"), ("note", "notes"))
-        for line, whose in _said({name: getattr(one, lines) for name, one in assessments.items()}).items()
-    ]
+    notes = _remarks(assessments, "note")
     if selection is None:
         ((_, assessment),) = assessments.items()
         notes += [f"decision: {line}" for line in decision_table(assessment, target).notes]
@@ -117,13 +113,18 @@ def score_text(
     return group_texts(f"{sentence}\n", *tables, *floor, *notes, *note_texts(left_out))
 
 
-def _said(lines: Mapping[str, Sequence[str]]) -> dict[str, str]:
-    """Each line once, with the proxies that it is said of, where it is not all."""
-    said: dict[str, list[str]] = {}
-    for name, own in lines.items():
-        for line in own:
-            said.setdefault(line, []).append(name)
-    return {line: "" if len(names) == len(lines) else f" ({', '.join(names)})" for line, names in said.items()}
+def _remarks(assessments: Assessments, note: str = "") -> list[str]:
+    """Cautions, then notes, each once, with the proxies that it is said of, where it is not all."""
+    remarks = list[str]()
+    for kind, lines in (("beware", "cautions"), (note, "notes")):
+        said: dict[str, list[str]] = {}
+        for name, one in assessments.items():
+            for line in getattr(one, lines):
+                said.setdefault(line, []).append(name)
+        for line, names in said.items():
+            whose = "" if len(names) == len(assessments) else f" ({', '.join(names)})"
+            remarks.append(f"{kind}{whose}: {line}".removeprefix(": ").lstrip())
+    return remarks
 
 
 def score_view(
@@ -178,11 +179,7 @@ def write_score_report(
 
 def _tables(assessments: Assessments, selection: Selection | None, target: str) -> list[Table]:
     """Every measure of one proxy with success rates below, or proxies ranked; all cautions and notes once."""
-    notes = tuple(
-        f"{kind}{whose}: {line}".removeprefix(": ").lstrip()
-        for kind, lines in (("beware", "cautions"), ("", "notes"))
-        for line, whose in _said({name: getattr(one, lines) for name, one in assessments.items()}).items()
-    )
+    notes = tuple(_remarks(assessments))
     if selection is not None:
         return [_ranking(assessments, selection, target, notes)]
     ((proxy, assessment),) = assessments.items()
@@ -282,7 +279,7 @@ def write_score_table(assessments: Assessments, path: Path) -> None:
             for name, all_found in measured.items()
             for measure, metric, found in all_found
         ]
-        write_csv(path, ("proxy", "measure", "value", "low", "high", "better"), rows)
+        write_text(path, csv_text(("proxy", "measure", "value", "low", "high", "better"), rows))
         return
     cells = {
         name: {
@@ -292,7 +289,8 @@ def write_score_table(assessments: Assessments, path: Path) -> None:
         for name, all_found in measured.items()
     }
     titles = next(iter(cells.values()))
-    write_latex(path, ("measure", *cells), [(title, *(texts[title] for texts in cells.values())) for title in titles])
+    rows_of_cells = [(title, *(texts[title] for texts in cells.values())) for title in titles]
+    write_text(path, latex_text(("measure", *cells), rows_of_cells))
 
 
 def score_document(assessment: Assessment) -> dict[str, Any]:

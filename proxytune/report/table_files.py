@@ -6,23 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from proxytune.errors import InputError
-from proxytune.report.writing import write_text
 
 ENDINGS = (".csv", ".tex")
-GREEK = {
-    "α": "alpha",
-    "β": "beta",
-    "δ": "delta",
-    "θ": "theta",
-    "λ": "lambda",
-    "μ": "mu",
-    "ρ": "rho",
-    "σ": "sigma",
-    "τ": "tau",
-    "φ": "varphi",
-    "ω": "omega",
-    "Θ": "Theta",
-}
+GREEK = ("alpha", "beta", "delta", "theta", "lambda", "mu", "rho", "sigma", "tau", "varphi", "omega", "Theta")
 IN_LATEX = {
     "\\": r"\textbackslash{}",
     **{character: f"\\{character}" for character in "&%$#_{}"},
@@ -43,7 +29,7 @@ IN_LATEX = {
     "≥": r"$\geq$",
     "→": r"$\rightarrow$",
     "∞": r"$\infty$",
-    **{letter: f"$\\{name}$" for letter, name in GREEK.items()},
+    **{letter: f"$\\{name}$" for letter, name in zip("αβδθλμρστφωΘ", GREEK, strict=True)},
 }
 """Characters that pdflatex would take for a command, or has no glyph for; accented letters it reads as they are."""
 Cell = str | float | None
@@ -66,31 +52,16 @@ def csv_text(columns: Sequence[str], rows: Sequence[Sequence[Cell]]) -> str:
     return text.getvalue()
 
 
-def write_csv(path: Path, columns: Sequence[str], rows: Sequence[Sequence[Cell]]) -> None:
-    """Write a table as CSV.
+def latex_text(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    r"""A table as LaTeX, to be taken in by `\input` between `\usepackage{booktabs}` and a caption.
 
-    Raises:
-        RunError: If it cannot be written.
+    It has the rules of booktabs; the first column is of names, the others of figures.
     """
-    write_text(path, csv_text(columns, rows))
-
-
-def write_latex(path: Path, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    r"""Write a table as LaTeX, to be taken in by `\input` between `\usepackage{booktabs}` and a caption.
-
-    Raises:
-        RunError: If it cannot be written.
-    """
-    write_text(path, booktabs(columns, rows))
-
-
-def booktabs(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A tabular with the rules of booktabs: the first column is of names, the others of figures."""
-    head, *body = (" & ".join(map(latex_text, row)) + r" \\" for row in (columns, *rows))
+    head, *body = (" & ".join(map(in_latex, row)) + r" \\" for row in (columns, *rows))
     lines = [rf"\begin{{tabular}}{{{'l' + 'r' * (len(columns) - 1)}}}", r"\toprule", head, r"\midrule"]
     return "\n".join([*lines, *body, r"\bottomrule", r"\end{tabular}"]) + "\n"
 
 
-def latex_text(text: str) -> str:
+def in_latex(text: str) -> str:
     """A text as LaTeX shows it."""
     return "".join(IN_LATEX.get(character, character) for character in text.strip())

@@ -379,7 +379,11 @@ def _draw_panel(axes: Axes, experiment: Experiment, lesson: TeacherResult) -> No
         _draw_curve(axes, experiment, name, look)
         if lesson.worth is not None:
             needed = lesson.worth.without if name == NONE else lesson.worth.needed
-            _draw_bar(axes, experiment, needed, look, height)
+            if needed.low is not None:
+                # The interval of the samples needed, off the line of convergence so that two bars stay apart
+                ends = np.array([needed.low, experiment.needs.last if needed.high is None else needed.high])
+                level, places = experiment.when.threshold + height, _places(experiment, ends)
+                axes.hlines(level, *places, color=look.colour, linewidth=2.5)
     axes.axhline(experiment.when.threshold, color="0.3", linewidth=0.8, linestyle=":", label="converged")
     grid = teaching_settings(experiment.settings).target_samples
     shown = [grid[place] for place in sorted({0, 1, (len(grid) + 1) // 2, len(grid) - 1})]
@@ -402,11 +406,3 @@ def _draw_curve(axes: Axes, experiment: Experiment, name: str, look: _Look) -> N
     examined = curve.examined
     places_ = _places(experiment, np.array(curve.counts, dtype=float))[examined[:, 1]]
     axes.plot(places_, curve.scores[tuple(examined.T)], look.mark, color=look.colour, markersize=2, alpha=0.35)
-
-
-def _draw_bar(axes: Axes, experiment: Experiment, needed: LearningEstimate, look: _Look, height: float) -> None:
-    """The interval of the samples needed, a little off the line of convergence so that two bars stay apart."""
-    if needed.low is None:
-        return
-    ends = np.array([needed.low, experiment.needs.last if needed.high is None else needed.high])
-    axes.hlines(experiment.when.threshold + height, *_places(experiment, ends), color=look.colour, linewidth=2.5)

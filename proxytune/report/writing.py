@@ -1,4 +1,4 @@
-"""Writing a file whole or not at all."""
+"""Writing a file whole or not at all; figures as PNG, SVG and PDF, and texts with values in them."""
 
 import contextlib
 import html
@@ -7,8 +7,10 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextvars import ContextVar
 from functools import partial
+from importlib.resources import files
 from io import BytesIO
 from pathlib import Path
+from string import Template
 from typing import Any
 
 import matplotlib as mpl
@@ -38,6 +40,12 @@ def figures_also_as(formats: Sequence[str]) -> Iterator[None]:
         yield
     finally:
         _beside.reset(before)
+
+
+def fill(template: str, values: Mapping[str, object] | None = None, **more: object) -> str:
+    """A file of templates/ with values in place of its $names."""
+    text = (files("proxytune.report") / "templates" / template).read_text(encoding="utf-8")
+    return Template(text).substitute(values or {}, **more)
 
 
 def write_text(path: Path, text: str) -> None:
@@ -146,15 +154,6 @@ def write_picture(path: Path, picture: NDArray[np.uint8]) -> None:
         RunError: If the file cannot be written.
     """
     write_whole(path, "the picture ", lambda draft: Image.fromarray(picture).save(draft, format="png"))
-
-
-def write_movie(path: Path, write: Callable[[Path], object]) -> None:
-    """Write a moving picture by what can encode it, its folder made where missing; an interrupted write leaves the old.
-
-    Raises:
-        RunError: If the file cannot be written.
-    """
-    write_whole(path, "the animation ", write)
 
 
 def write_whole(path: Path, what: str, write: Callable[[Path], object]) -> None:

@@ -11,7 +11,7 @@ import pytest
 from proxytune.diagnosis import NextDrive, commands_as
 from proxytune.driving import read_robot
 from proxytune.logs import read_commands
-from proxytune.report.export.player import commands_text, player_text
+from proxytune.report.export.nodes import commands_text, player_text
 
 DUTIES = np.array([[0.2, 0.4], [-0.5, 0.5], [0.9, 0.7]])
 

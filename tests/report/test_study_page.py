@@ -47,7 +47,7 @@ def test_it_begins_with_the_answer_and_the_next_step_which_are_the_sentence(resu
     heads = (f'class="answer">{first}</p>', after, ">95 % interval</th>", "<svg ", ">Trials</h2>")
     places = [text.index(one) for one in heads]
     assert places == sorted(places)
-    assert say_finding(finding) == f"{say_answer(finding)} Next: {say_next_step(finding)}"
+    assert say_finding(finding) == f"{say_answer(finding)} Next: {say_next_step(finding)}."
 
 
 def test_every_figure_has_a_caption_and_an_alternative_text_that_says_what_to_see(result, figures):

@@ -1,6 +1,7 @@
 """Answer of a diagnosis, of motion and camera: headline, tables, notes, figures with captions, next step."""
 
 import json
+import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -21,13 +22,13 @@ from proxytune.report.diagnosis.document import (
 )
 from proxytune.report.diagnosis.figures import motion_figures
 from proxytune.report.diagnosis.notes import motion_headline, motion_notes, next_drives
-from proxytune.report.export.player import commands_text, player_text
+from proxytune.report.export.nodes import commands_text, player_text
 from proxytune.report.html import write_page
 from proxytune.report.meanings import findings, fitted
 from proxytune.report.text import group_texts, table_text
 from proxytune.report.view import Paragraphs, Part, Picture, Table, View, columns_of, foot_of
 from proxytune.report.wording import fixed, short, span
-from proxytune.report.writing import save_figure, svg_of, write_text
+from proxytune.report.writing import fill, save_figure, svg_of, write_text
 
 MOST_TRIED = 8
 """So many effects that were tried are in the table."""
@@ -40,58 +41,7 @@ NEXT_STEPS = {
     "cannot be told": "drive the same commands several times, and diagnose the log with these drives in it.",
 }
 """Steps to do after each verdict, where no manoeuvre would tell more."""
-CAPTIONS = {
-    "error": (
-        "Error of predictions before and after",
-        "Errors on drives kept aside, with 95 % intervals, on logarithmic axes. The nearer the model with the effects "
-        "added is to the green noise floor, the less is missing. Whether an effect helps at a length is told by the "
-        "ratio in the table: its interval should stay below 1.",
-    ),
-    "effect_curve": (
-        "What was added, against what was measured",
-        "Grey is what was measured beyond the declared model. The line of the model with the effects added should "
-        "follow it; the declared one does not.",
-    ),
-    "ranking": (
-        "Evidence for each effect that was tried",
-        "The farther right, the more an effect explains of drives left out. On top those added, in this order, each "
-        "with what it explains beyond those above it; below them what others explain alone: light blue ones fit these "
-        "drives as well as one that was added. At the bottom: free curves over a signal, which need be no physics.",
-    ),
-    "learnt": (
-        "What was learnt where no named effect explains it",
-        "Each curve is what is added to the motion over one signal. It describes these drives and is no physics: "
-        "use it only within the range shown.",
-    ),
-    "residual_over_time": (
-        "Where in time predictions stray",
-        "On drives, or the later part of each, that nothing was fitted to. A curve that rises within the drives is "
-        "something that changes with time, as a battery; one that is level is not.",
-    ),
-    "residual_map": (
-        "Where on the floor predictions stray",
-        "Errors that keep to one place are of the floor or of the tracker there, others of the robot. The maps share "
-        "one logarithmic scale; arrows point where the robot drove.",
-    ),
-    "camera_markings": (
-        "Markings as the model sees them",
-        "Lines are the map's markings as the model projects them. They should lie on the edges in the frame.",
-    ),
-    "camera_displacement": (
-        "How far markings lie from their places",
-        "Arrows point from where the model has the markings to where they are. A pattern that is left over is "
-        "something fixed to the camera, as its lens or its mounting.",
-    ),
-    "camera_ranking": (
-        "Evidence lost with each effect alone",
-        "The farther left, the more an effect explains alone. Those beside the dotted line of “nothing added” "
-        "explain nothing.",
-    ),
-    "camera_error": (
-        "Error of the frames before and after",
-        "On frames kept aside. The effects added help where their points lie below the declared model's.",
-    ),
-}
+CAPTIONS = {name: (one["title"], one["caption"]) for name, one in tomllib.loads(fill("captions.toml")).items()}
 """Title and caption of each figure, in the order in which they are shown."""
 
 
@@ -110,7 +60,14 @@ def write_diagnosis(found: LogDiagnosis, folder: Path, command: str = "") -> lis
     text = json.dumps(diagnosis_document(found), indent=2, allow_nan=False, ensure_ascii=False)
     write_text(document, text)
     write_text(model, extended_model_text(found))
-    following = _write_next(found, folder / "next")
+    following = [folder / "next" / name for name in ("commands.csv", "play_commands.py")]
+    if found.motion is None or found.motion.next_drive is None:
+        for path in following:  # An earlier diagnosis may have had a drive
+            path.unlink(missing_ok=True)
+        following = []
+    else:
+        write_text(following[0], commands_text(found.motion))
+        write_text(following[1], player_text(found.motion))
     figures = {folder / f"{name}.png": figure for name, figure in diagnosis_figures(found).items()}
     for path, figure in figures.items():
         save_figure(figure, path)
@@ -120,45 +77,24 @@ def write_diagnosis(found: LogDiagnosis, folder: Path, command: str = "") -> lis
     return [document, model, *following, *figures, page]
 
 
-def _write_next(found: LogDiagnosis, folder: Path) -> list[Path]:
-    """Write the next drive, or take an earlier diagnosis' away."""
-    paths = [folder / "commands.csv", folder / "play_commands.py"]
-    if found.motion is None or found.motion.next_drive is None:
-        for path in paths:
-            path.unlink(missing_ok=True)
-        return []
-    for path, text in zip(paths, (commands_text(found.motion), player_text(found.motion)), strict=True):
-        write_text(path, text)
-    return paths
-
-
 def diagnosis_view(found: LogDiagnosis, figures: Mapping[str, bytes]) -> View:
     """A diagnosis: the figures by their names, then the tables and all notes."""
     notes = tuple(f"{note[:1].upper()}{note[1:]}." for note in diagnosis_notes(found))
     paragraphs = [Paragraphs("What else is to be known", notes)] if notes else []
-    motion = [] if found.motion is None else _motion_tables(found.motion)
-    camera = [] if found.camera is None else _camera_tables(found.camera)
     drives, part = [] if found.motion is None else next_drives(found.motion), found.motion or found.camera
     next_step = f"{'; '.join(drives)}." if drives else NEXT_STEPS[part.verdict] if part else ""
-    parts: tuple[Part, ...] = (*diagnosis_pictures(figures), *motion, *camera, *paragraphs)
-    return View(
-        f"{found.log}: what does the model of {found.robot.name} lack?",
-        f"{diagnosis_headline(found)}.",
-        next_step,
-        parts,
-    )
+    tables = [table for _, own, _ in _said(found) for table in own]
+    title = f"{found.log}: what does the model of {found.robot.name} lack?"
+    parts: tuple[Part, ...] = (*diagnosis_pictures(figures), *tables, *paragraphs)
+    return View(title, f"{diagnosis_headline(found)}.", next_step, parts)
 
 
 def diagnosis_text(found: LogDiagnosis) -> Group:
     """The diagnosis as `diagnose` prints it: of motion, then of the camera, a verdict, tables and notes."""
     parts: list[Group | Text] = []
-    if found.motion is not None:
-        motion, headline = map(table_text, _motion_tables(found.motion)), _motion_said(found.motion)
-        parts.append(group_texts(Text(headline, style="bold"), *motion, *motion_notes(found.motion)))
-    if found.camera is not None:
-        camera, headline = map(table_text, _camera_tables(found.camera)), _camera_said(found.log, found.camera)
+    for headline, tables, notes in _said(found):
         parts += [Text("")] if parts else []
-        parts.append(group_texts(Text(headline, style="bold"), *camera, *camera_notes(found.camera)))
+        parts.append(group_texts(Text(headline, style="bold"), *map(table_text, tables), *notes))
     return group_texts(*_say_cautions(found), *parts, *_say_refusals(found))
 
 
@@ -171,25 +107,25 @@ def diagnosis_figures(found: LogDiagnosis) -> dict[str, Figure]:
 
 def diagnosis_headline(found: LogDiagnosis) -> str:
     """What was found, each effect with its size and what it is worth; then the verdicts and what they mean."""
-    lines = [] if found.motion is None else [_motion_said(found.motion)]
-    return "; ".join([*lines, *([] if found.camera is None else [_camera_said(found.log, found.camera)])])
-
-
-def _motion_said(diagnosis: Diagnosis) -> str:
-    found = findings(motion_effects(diagnosis), diagnosis.robot.catalogue)
-    return motion_headline(diagnosis, found, fitted(diagnosis.declared, diagnosis.theta))
-
-
-def _camera_said(log: str, diagnosis: CameraDiagnosis) -> str:
-    found = findings(camera_effects(diagnosis))
-    return camera_headline(log, diagnosis, found, fitted(diagnosis.declared, diagnosis.theta))
+    return "; ".join(headline for headline, _, _ in _said(found))
 
 
 def diagnosis_notes(found: LogDiagnosis) -> list[str]:
     """Everything that the tables do not hold, a line each."""
-    motion = [] if found.motion is None else motion_notes(found.motion)
-    camera = [] if found.camera is None else camera_notes(found.camera)
-    return [*_say_cautions(found), *motion, *camera, *_say_refusals(found)]
+    notes = [note for _, _, own in _said(found) for note in own]
+    return [*_say_cautions(found), *notes, *_say_refusals(found)]
+
+
+def _said(found: LogDiagnosis) -> list[tuple[str, list[Table], list[str]]]:
+    """Headline, tables and notes of motion, then of the camera, as far as there are such."""
+    said = []
+    if (motion := found.motion) is not None:
+        beside = findings(motion_effects(motion), motion.robot.catalogue), fitted(motion.declared, motion.theta)
+        said.append((motion_headline(motion, *beside), _motion_tables(motion), motion_notes(motion)))
+    if (camera := found.camera) is not None:
+        beside = findings(camera_effects(camera)), fitted(camera.declared, camera.theta)
+        said.append((camera_headline(found.log, camera, *beside), _camera_tables(camera), camera_notes(camera)))
+    return said
 
 
 def _say_cautions(found: LogDiagnosis) -> list[str]:

@@ -18,7 +18,6 @@ from proxytune.diagnosis import (
     CameraFit,
     Comparison,
     Edges,
-    ResidualField,
     effects_of,
     project,
     rank_subsets,
@@ -148,14 +147,18 @@ def displacement_figure(diagnosis: CameraDiagnosis) -> Figure:
     models = camera_models(diagnosis)
     measured = [measured_displacements(fit) for fit in models.values()]
     gates = diagnosis.residual_fields if len(models) > 1 else diagnosis.residual_fields[1:]
-    arrows = [*measured, *(_field(diagnosis, gate, own.places) for gate, own in zip(gates, measured, strict=True))]
-    names = [*(fill(f"markings, {name}", TITLE) for name in models), *(_say(gate) for gate in gates)]
     rows, columns = diagnosis.gathered.pictures.shape[1:3]
+    arrows, names = [*measured], [fill(f"markings, {name}", TITLE) for name in models]
+    for gate, own in zip(gates, measured, strict=True):
+        right, down = (2.0 * own.places / (columns, rows) - 1.0).T
+        arrows.append(Arrows(own.places, gate.displacement(right, down)))
+        share = max(0.0, 100.0 * gate.share)
+        names.append(f"fixed to the camera:\n{gate.rms_px:.2f} px, {share:.0f} % of cost")
     top = max(0.0, min(float(one.places[:, 1].min(initial=rows)) for one in measured) - 2.0 * columns / ACROSS)
-    down = 2 if len(models) > 1 else 1
-    height = 0.45 + down * (0.35 + 1.45 * (rows - top) / columns)
+    lines = 2 if len(models) > 1 else 1
+    height = 0.45 + lines * (0.35 + 1.45 * (rows - top) / columns)
     figure = Figure(figsize=(COLUMN, height), layout="constrained")
-    panels = figure.subplots(down, 2, sharex=True, sharey=True, squeeze=False)
+    panels = figure.subplots(lines, 2, sharex=True, sharey=True, squeeze=False)
     longest = max(float(np.hypot(*one.lengths.T).max(initial=0.0)) for one in arrows)
     for number, (axes, one) in enumerate(zip(panels.ravel(), arrows, strict=True)):
         axes.set(xlim=(0, columns), ylim=(rows, top), aspect="equal")
@@ -187,17 +190,6 @@ def measured_displacements(fit: CameraFit) -> Arrows:
 
 def _sums(cell: NDArray[np.intp], values: Floats) -> Floats:
     return np.stack([np.bincount(cell, column) for column in values.T], axis=-1)
-
-
-def _field(diagnosis: CameraDiagnosis, gate: ResidualField, places: Floats) -> Arrows:
-    rows, columns = diagnosis.gathered.pictures.shape[1:3]
-    right, down = (2.0 * places / (columns, rows) - 1.0).T
-    return Arrows(places, gate.displacement(right, down))
-
-
-def _say(gate: ResidualField) -> str:
-    share = max(0.0, 100.0 * gate.share)
-    return f"fixed to the camera:\n{gate.rms_px:.2f} px, {share:.0f} % of cost"
 
 
 def _draw_arrows(axes: Axes, arrows: Arrows, colour: str, longest: float, room: float) -> None:

@@ -29,8 +29,7 @@ def camera_headline(log: str, diagnosis: CameraDiagnosis, found: str = "", besid
 
 def camera_notes(diagnosis: CameraDiagnosis) -> list[str]:
     """Everything that the tables do not hold, a line each."""
-    added = diagnosis.effects
-    lines = [_say_look(one) if one.nats is None else _say_moving(one, one.nats) for one in added]
+    lines = [_say_added(effect) for effect in diagnosis.effects]
     lines += [_say_immaterial(effect, diagnosis.dropped) for effect in diagnosis.negligible]
     lines += _say_left_over(diagnosis)
     rows, columns = diagnosis.gathered.pictures.shape[1:3]
@@ -43,10 +42,17 @@ def camera_notes(diagnosis: CameraDiagnosis) -> list[str]:
     return lines + list(diagnosis.notes)
 
 
-def _say_moving(effect: CameraEffect, nats: float) -> str:
-    beside = f"; these frames fit {', '.join(effect.rivals)} as well" if effect.rivals else ""
-    worth = f"log-likelihood gain {nats:.0f} nats, without it the displacement of markings grows by {_growth(effect)} %"
-    return f"added {effect.effect}: {worth}{beside}"
+def _say_added(effect: CameraEffect) -> str:
+    """Say what is known of an effect that bends the picture, or of one that changes its look alone."""
+    rivals, growth = ", ".join(effect.rivals), f"grows by {_growth(effect)} %"
+    if effect.nats is not None:
+        beside = f"; these frames fit {rivals} as well" if rivals else ""
+        gain = f"log-likelihood gain {effect.nats:.0f} nats"
+        return f"added {effect.effect}: {gain}, without it the displacement of markings {growth}{beside}"
+    beside = f"; {rivals} looks like it" if rivals else ""
+    if effect.error_without is None:
+        return f"added {effect.effect}, which no model can predict pixel by pixel{beside}"
+    return f"added {effect.effect}: without it the error in brightness {growth}{beside}"
 
 
 def _say_immaterial(effect: CameraEffect, values: Mapping[str, Estimate]) -> str:
@@ -54,13 +60,6 @@ def _say_immaterial(effect: CameraEffect, values: Mapping[str, Estimate]) -> str
     value = "".join(f" {short(one.value)} {one.unit}".rstrip() for one in known)
     change = f"without it the displacement of markings grows by {_growth(effect)} %"
     return f"detectable but immaterial: {effect.effect}{value}, {change}"
-
-
-def _say_look(effect: CameraEffect) -> str:
-    beside = f"; {', '.join(effect.rivals)} looks like it" if effect.rivals else ""
-    if effect.error_without is None:
-        return f"added {effect.effect}, which no model can predict pixel by pixel{beside}"
-    return f"added {effect.effect}: without it the error in brightness grows by {_growth(effect)} %{beside}"
 
 
 def _growth(effect: CameraEffect) -> str:

@@ -8,7 +8,6 @@ import numpy as np
 
 from proxytune.diagnosis import (
     AdoptedEffect,
-    Blemish,
     CameraDiagnosis,
     CameraEffect,
     Clocks,
@@ -17,7 +16,6 @@ from proxytune.diagnosis import (
     EffectSize,
     Estimate,
     HorizonError,
-    LaidMap,
     Learning,
     LogDiagnosis,
     Ratio,
@@ -79,11 +77,11 @@ def motion_document(diagnosis: Diagnosis) -> dict[str, Any]:
         "log": diagnosis.log,
         "robot": diagnosis.robot.name,
         "verdict": diagnosis.verdict,
-        "declared": {name: _estimate_document(estimate) for name, estimate in diagnosis.declared.items()},
+        "declared": estimates_document(diagnosis.declared),
         "effects": motion_effects(diagnosis),
         "expected_false_names": diagnosis.expected_false_names,
         "immaterial": [_immaterial_document(effect, diagnosis) for effect in diagnosis.negligible],
-        "extended": {name: _estimate_document(estimate) for name, estimate in diagnosis.theta.items()},
+        "extended": estimates_document(diagnosis.theta),
         "candidates": [
             {"name": tried.effect, "form": tried.form, "held_out_gain": tried.gain, "p_value": tried.p_value}
             for tried in diagnosis.found.tried
@@ -106,17 +104,28 @@ def motion_document(diagnosis: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _estimate_document(estimate: Estimate) -> dict[str, Any]:
-    return {"value": estimate.value, "interval": list(estimate.interval), "unit": estimate.unit}
+def estimates_document(estimates: Mapping[str, Estimate]) -> dict[str, Any]:
+    """Values with their intervals and units, by name; None where one is not finite."""
+    return {
+        name: {"value": _number(one.value), "interval": _interval(one.interval), "unit": one.unit}
+        for name, one in estimates.items()
+    }
+
+
+def _parameters_document(
+    effect: AdoptedEffect | CameraEffect, theta: Mapping[str, Estimate], catalogue: Catalogue
+) -> dict[str, Any]:
+    """The values of an effect that was added, by its own names of them."""
+    kind = catalogue.effect(effect.effect)
+    names = dict(zip(catalogue.theta_names(effect.effect), (one.name for one in kind.parameters), strict=True))
+    return estimates_document({names[name]: theta[name] for name in effect.names if name in theta})
 
 
 def _effect_document(effect: AdoptedEffect, theta: Mapping[str, Estimate], catalogue: Catalogue) -> dict[str, Any]:
-    kind = catalogue.effect(effect.effect)
-    names = dict(zip(catalogue.theta_names(effect.effect), (one.name for one in kind.parameters), strict=True))
     return {
         "name": effect.effect,
         "form": effect.form,
-        "parameters": {names[name]: _estimate_document(theta[name]) for name in effect.names if name in theta},
+        "parameters": _parameters_document(effect, theta, catalogue),
         "held_out_gain": effect.gain,
         "p_value": effect.p_value,
         "indistinguishable_from": [rival.effect for rival in effect.rivals],
@@ -125,13 +134,14 @@ def _effect_document(effect: AdoptedEffect, theta: Mapping[str, Estimate], catal
 
 def motion_effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """The effects of motion that were added, as `diagnose --json` has them."""
-    return [_added_document(effect, diagnosis) for effect in diagnosis.effects]
-
-
-def _added_document(effect: AdoptedEffect, diagnosis: Diagnosis) -> dict[str, Any]:
-    worth = {"worth": _worth_document(diagnosis.effect_sizes.get(effect.effect, {}))}
-    own = _effect_document(effect, diagnosis.theta, diagnosis.robot.catalogue)
-    return own | worth | {"at_edge": list(diagnosis.at_edge(effect))}
+    return [
+        {
+            **_effect_document(effect, diagnosis.theta, diagnosis.robot.catalogue),
+            "worth": _worth_document(diagnosis.effect_sizes.get(effect.effect, {})),
+            "at_edge": list(diagnosis.at_edge(effect)),
+        }
+        for effect in diagnosis.effects
+    ]
 
 
 def _immaterial_document(effect: AdoptedEffect, diagnosis: Diagnosis) -> dict[str, Any]:
@@ -192,7 +202,7 @@ def clocks_document(clocks: Sequence[Clocks]) -> dict[str, Any]:
         "assumed_delay_s": own.assumed_delay_s,
         "declared_offset_s": own.declared_s,
         "drives": {name: {"offset_s": one.value, "interval": list(one.interval)} for name, one in own.drives.items()},
-        "jumps": [{"drive": jump.drive, "time_s": jump.time_s, "by_s": jump.by_s} for jump in own.jumps],
+        "jumps": [jump._asdict() for jump in own.jumps],
     }
     return own_document | ({"test": clocks_document(test)} if test else {})
 
@@ -248,7 +258,7 @@ def ratios_document(ratios: Mapping[float, Ratio]) -> dict[str, dict[str, Any]]:
 
 def camera_document(diagnosis: CameraDiagnosis) -> dict[str, Any]:
     """Everything that `diagnose --json` prints of the camera: plain numbers, None where there is none."""
-    views = diagnosis.named.full.views
+    views, laid = diagnosis.named.full.views, diagnosis.laid
     place, turn = views.position_m / views.tracks.share, np.degrees(views.heading_rad) / views.tracks.share
     keys = ("nats", "share", "rms_px")
     left = [
@@ -259,18 +269,36 @@ def camera_document(diagnosis: CameraDiagnosis) -> dict[str, Any]:
         "verdict": diagnosis.verdict,
         "declared": estimates_document(diagnosis.declared),
         "effects": camera_effects(diagnosis),
-        "immaterial": [
-            _camera_effect_document(effect, diagnosis, diagnosis.dropped) for effect in diagnosis.negligible
-        ],
+        "immaterial": [_camera_effect_document(one, diagnosis, diagnosis.dropped) for one in diagnosis.negligible],
         "extended": estimates_document(diagnosis.theta),
         "candidates": [{"name": "+".join(one.effects), "loss": _number(one.loss)} for one in diagnosis.candidates],
         "error": _comparison_document(diagnosis.pixels),
         "grey_error": _comparison_document(diagnosis.grey),
         "fixed_to_camera": dict(zip(("before", "after"), left, strict=True)),
-        "blemishes": [_blemish_document(blemish) for blemish in diagnosis.blemishes],
+        "blemishes": [
+            {
+                "columns": [int(end) for end in one.columns],
+                "rows": [int(end) for end in one.rows],
+                "contrast": _number(one.contrast),
+                "share": _number(one.share),
+            }
+            for one in diagnosis.blemishes
+        ],
         "could_not_be_seen": list(diagnosis.could_not_be_seen),
         "next_views": list(diagnosis.next_views),
-        "map": _map_document(diagnosis.laid),
+        "map": {
+            "offset": estimates_document(laid.offset),
+            "lines": [
+                {
+                    "line": one.line,
+                    "stretch": int(one.stretch),
+                    "right_m": _number(one.right_m),
+                    "interval": _interval(one.interval),
+                }
+                for one in laid.lines
+            ],
+            "widths": estimates_document(laid.widths),
+        },
         "matched_share": _number(diagnosis.matched),
         "frames": {"used": len(diagnosis.gathered.numbers), "of": len(diagnosis.gathered.frames.paths)},
         # The tracker's, before its poses are smoothed, as log.toml states it.
@@ -284,11 +312,6 @@ def camera_effects(diagnosis: CameraDiagnosis) -> list[dict[str, Any]]:
     return [_camera_effect_document(effect, diagnosis, diagnosis.theta) for effect in diagnosis.effects]
 
 
-def estimates_document(estimates: Mapping[str, Estimate]) -> dict[str, Any]:
-    """Values with their intervals and units, by name."""
-    return {name: _finite_estimate(one) for name, one in estimates.items()}
-
-
 def _number(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
@@ -297,19 +320,12 @@ def _interval(ends: tuple[float, float]) -> list[float | None]:
     return [_number(end) for end in ends]
 
 
-def _finite_estimate(one: Estimate) -> dict[str, Any]:
-    return {"value": _number(one.value), "interval": _interval(one.interval), "unit": one.unit}
-
-
 def _camera_effect_document(
     effect: CameraEffect, diagnosis: CameraDiagnosis, theta: Mapping[str, Estimate]
 ) -> dict[str, Any]:
-    catalogue = diagnosis.named.full.views.optics.robot.catalogue
-    kind = catalogue.effect(effect.effect)
-    own = dict(zip(catalogue.theta_names(effect.effect), (one.name for one in kind.parameters), strict=True))
     return {
         "name": effect.effect,
-        "parameters": {own[name]: _finite_estimate(theta[name]) for name in effect.names if name in theta},
+        "parameters": _parameters_document(effect, theta, diagnosis.named.full.views.optics.robot.catalogue),
         "held_out_gain": None if effect.nats is None else _number(effect.nats),
         "indistinguishable_from": list(effect.rivals),
         "error_without": _number(effect.error_without) if effect.error_without is not None else None,
@@ -331,25 +347,3 @@ def _comparison_document(error: Comparison) -> dict[str, Any]:
         "unit": error.unit,
         "frames": int(np.isfinite(error.before.frames).sum()),
     }
-
-
-def _blemish_document(blemish: Blemish) -> dict[str, Any]:
-    return {
-        "columns": [int(end) for end in blemish.columns],
-        "rows": [int(end) for end in blemish.rows],
-        "contrast": _number(blemish.contrast),
-        "share": _number(blemish.share),
-    }
-
-
-def _map_document(laid: LaidMap) -> dict[str, Any]:
-    lines = [
-        {
-            "line": one.line,
-            "stretch": int(one.stretch),
-            "right_m": _number(one.right_m),
-            "interval": _interval(one.interval),
-        }
-        for one in laid.lines
-    ]
-    return {"offset": estimates_document(laid.offset), "lines": lines, "widths": estimates_document(laid.widths)}

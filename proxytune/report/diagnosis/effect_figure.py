@@ -177,30 +177,21 @@ def _steps_figure(diagnosis: Diagnosis) -> Figure:
     column, full, label = _shown(diagnosis)
     # An area, which no line on its edge can hide.
     axes.fill_between(times, duties[0, :, 0] * full, color=LIGHT_GREY, linewidth=0, zorder=0, label="command")
-    for fitted, colour, name in (
-        (found.declared, VERMILLION, DECLARED_MODEL),
-        (found.model, BLUE, extended_name(diagnosis)),
-    ):
-        draws = full * _responses(_driven(drives, duties), fitted.theta)[..., column]
-        _draw_responses(axes, times, draws, colour, name)
+    models = ((found.declared, VERMILLION, DECLARED_MODEL), (found.model, BLUE, extended_name(diagnosis)))
+    for fitted, colour, name in models:
+        driven = _driven(drives, duties)
+        if any(fitted.theta.get(one, 0.0) > 0.0 for one in RANDOM_EFFECTS):
+            speeds = np.stack([drawn_wheel_speeds(driven, fitted.theta, seed)[0] for seed in range(DRAWS)])
+        else:
+            speeds = wheel_speeds(driven, fitted.theta)
+        draws = full * speeds[..., column]
+        if len(draws) > 1:
+            axes.plot(times, draws.T, color=colour, lw=0.4, alpha=0.4)
+            name += " (thin: single draws)"
+        axes.plot(times, np.median(draws, axis=0), color=colour, lw=1.4, label=name)
     dress(axes, "time since the command [s]", label)
     legend_below(figure, axes)
     return figure
-
-
-def _draw_responses(axes: Axes, times: Floats, draws: Floats, colour: str, name: str) -> None:
-    """The median, and single draws where there are several."""
-    if len(draws) > 1:
-        axes.plot(times, draws.T, color=colour, lw=0.4, alpha=0.4)
-        name += " (thin: single draws)"
-    axes.plot(times, np.median(draws, axis=0), color=colour, lw=1.4, label=name)
-
-
-def _responses(drives: Drives, theta: Theta) -> Floats:
-    """Wheel speeds (draws, T, 2) as fractions of full speed: one draw unless the model has a random effect."""
-    if not any(theta.get(name, 0.0) > 0.0 for name in RANDOM_EFFECTS):
-        return wheel_speeds(drives, theta)
-    return np.stack([drawn_wheel_speeds(drives, theta, seed)[0] for seed in range(DRAWS)])
 
 
 BINS = 20

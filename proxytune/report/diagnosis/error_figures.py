@@ -198,7 +198,10 @@ def residual_map(drives: Drives, both: Mapping[str, Strayed]) -> Figure:
     before = next(iter(both.values()))
     extent = np.ptp(drives.poses[before.increment, 1, :2], axis=0)
     figure, panels = _panels(len(both), extent)
-    scale = _colour_scale(both)
+    # From the smallest distances of any model to the largest of all, but for a few; at least a factor of ten
+    low, high = np.quantile(np.concatenate([one.rms for one in both.values()]), (0.02, 0.98))
+    high = max(float(high), TINIEST_MM)
+    scale = LogNorm(max(min(float(low), high / 10.0), high / 1000.0), high)
     for axes, (name, one) in zip(panels, both.items(), strict=True):
         colours = (_paths if len(one.rms) <= MANY_WINDOWS else _floor)(axes, drives, one, scale)
         axes.set_title(textwrap.fill(name, TITLE), fontsize=7)
@@ -209,14 +212,6 @@ def residual_map(drives: Drives, both: Mapping[str, Strayed]) -> Figure:
     bar.set_label(f"distance to prediction in {before.horizon_s:g}-s windows [mm]", fontsize=8)
     bar.ax.tick_params(labelsize=7)
     return figure
-
-
-def _colour_scale(both: Mapping[str, Strayed]) -> LogNorm:
-    """From the smallest distances of any model to the largest of all, but for a few; at least a factor of ten."""
-    every = np.concatenate([one.rms for one in both.values()])
-    low, high = np.quantile(every, (0.02, 0.98))
-    high = max(float(high), TINIEST_MM)
-    return LogNorm(max(min(float(low), high / 10.0), high / 1000.0), high)
 
 
 def _panels(count: int, extent: Floats) -> tuple[Figure, list[Axes]]:

@@ -54,14 +54,8 @@ class _Role(NamedTuple):
     face: str
 
 
-class _Row(NamedTuple):
-    """A name, its evidence [nats], and what its dot stands for."""
-
-    name: str
-    gain: float
-    role: _Role
-
-
+_Row = tuple[str, float, _Role]
+"""A name, its evidence [nats], and what its dot stands for."""
 ADDED = _Role("added", BLUE, BLUE)
 RIVAL = _Role("fits as well as one added", LIGHT_BLUE, LIGHT_BLUE)
 OTHER = _Role("not added", GREY, GREY)
@@ -78,10 +72,10 @@ def ranking_figure(found: Findings, rules: Rules) -> Figure | None:
     rivals = {rival.effect for one in found.adopted for rival in one.rivals}
     forms = {(one.effect, one.form) for one in found.adopted}
     others = [one for one in found.tried if (one.effect, one.form) not in forms][:SHOWN]
-    added = [_Row(_name(one.effect, one.form), one.gain, ADDED) for one in found.adopted]
+    added = [(_name(one.effect, one.form), one.gain, ADDED) for one in found.adopted]
     roles = [RIVAL if one.effect in rivals else OTHER if one.p_value <= rules.p_value else chance for one in others]
-    tried = [_Row(_name(one.effect, one.form), one.gain, role) for one, role in zip(others, roles, strict=True)]
-    signals = [_Row(curve.group.name, curve.gain, SIGNAL) for curve in found.curves[:JUDGES]]
+    tried = [(_name(one.effect, one.form), one.gain, role) for one, role in zip(others, roles, strict=True)]
+    signals: list[_Row] = [(curve.group.name, curve.gain, SIGNAL) for curve in found.curves[:JUDGES]]
     if not tried or not signals:
         return None
     parts = {"added, in this order": added} if added else {}
@@ -93,7 +87,7 @@ def ranking_figure(found: Findings, rules: Rules) -> Figure | None:
         _dots(axes, rows)
         axes.axvline(least, color="0.45", lw=1.0, ls=":", label=f"least to be added: {least:g} nats")
         axes.set_title(title, fontsize=7, loc="left", pad=2)
-    _scale(panels[-1], [row.gain for rows in parts.values() for row in rows], least)
+    _scale(panels[-1], [gain for rows in parts.values() for _, gain, _ in rows], least)
     panels[-1].set_xlabel("evidence on drives left out [nats]", fontsize=8, loc="right")
     legend_below(figure, *panels, without=[ADDED.name, SIGNAL.name])
     return figure
@@ -119,7 +113,7 @@ def _dots(axes: Axes, rows: Sequence[_Row]) -> None:
     for place, (_, gain, role) in enumerate(rows):
         axes.plot([0.0, gain], [place, place], "-", color=role.edge, lw=0.9, alpha=0.6)
         axes.plot([gain], [place], "o", color=role.edge, mfc=role.face, ms=4, label=role.name)
-    axes.set_yticks(range(len(rows)), [row.name for row in rows])
+    axes.set_yticks(range(len(rows)), [name for name, _, _ in rows])
     axes.set_ylim(len(rows) - 0.4, -0.6)
     dress(axes)
     axes.tick_params(axis="y", labelsize=7)

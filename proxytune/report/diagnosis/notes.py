@@ -1,6 +1,6 @@
 """Sentences of a diagnosis of motion: each effect and its worth, what is left, clocks, what to drive next."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -95,13 +95,14 @@ def _say_added(diagnosis: Diagnosis, effect: AdoptedEffect) -> str:
     worth = diagnosis.effect_sizes.get(effect.effect, {})
     growth = [f"{fixed(per_cent(one)[0], 0)} % ({_ends(one, 0)}) at {h:g} s" for h, one in worth.items()]
     larger = f"; without it the error grows by {listed(growth)}" if growth else ""
-    return f"added {_label(effect)}: {_gain(effect)}, p = {effect.p_value:.3f}{larger}{beside}"
+    gain = f"log-likelihood gain {effect.gain:.0f} nats"
+    return f"added {_label(effect)}: {gain}, p = {effect.p_value:.3f}{larger}{beside}"
 
 
 def _say_immaterial(effect: AdoptedEffect, diagnosis: Diagnosis) -> str:
-    worth = diagnosis.effect_sizes.get(effect.effect, {})
+    worth, gain = diagnosis.effect_sizes.get(effect.effect, {}), f"log-likelihood gain {effect.gain:.0f} nats"
     if not worth:
-        return f"not shown to matter: {_label(effect)}, {_gain(effect)}"
+        return f"not shown to matter: {_label(effect)}, {gain}"
     horizon = decisive(worth)
     value, _ = per_cent(worth[horizon])
     kind = "not shown to matter" if may_matter(worth, diagnosis.rules.material_factor) else "detectable but immaterial"
@@ -110,11 +111,7 @@ def _say_immaterial(effect: AdoptedEffect, diagnosis: Diagnosis) -> str:
     dropped = (one for name, one in diagnosis.dropped_values.items() if name in effect.names)
     values = "".join(f" {one.value:.3g} {one.unit}".rstrip() for one in dropped)
     change = f"changes the error at {horizon:g} s by {fixed(value, 1)} % ({_ends(worth[horizon], 1)})"
-    return f"{kind}: {_label(effect)}{values}, {_gain(effect)}, {change}"
-
-
-def _gain(effect: AdoptedEffect) -> str:
-    return f"log-likelihood gain {effect.gain:.0f} nats"
+    return f"{kind}: {_label(effect)}{values}, {gain}, {change}"
 
 
 def _label(effect: AdoptedEffect) -> str:
@@ -160,8 +157,7 @@ def next_drives(diagnosis: Diagnosis) -> list[str]:
 
 def clocks_notes(log: str, clocks: Sequence[Clocks], theta: Mapping[str, Any]) -> list[str]:
     """Say what is wrong with the clocks and what to do; where a delay was fitted, that an offset looks the same."""
-    notes = [note for own in clocks for note in (*_say_offset(own), *_say_drives(own), *_say_jumps(own))]
-    notes = [f"clocks of {log}: {note}" for note in notes]
+    notes = [f"clocks of {log}: {note}" for own in clocks for note in _say_clocks(own)]
     declared = next((own.declared_s for own in clocks), None)
     if declared is not None:
         notes.append(
@@ -175,34 +171,28 @@ def clocks_notes(log: str, clocks: Sequence[Clocks], theta: Mapping[str, Any]) -
     return notes
 
 
-def _say_offset(clocks: Clocks) -> list[str]:
-    if not clocks.offset.value:
-        return []
+def _say_clocks(clocks: Clocks) -> Iterator[str]:
+    """Say what is wrong with all clocks, with those of single drives, and within a drive."""
     latency, offset, assumed = clocks.latency, clocks.offset, clocks.assumed_delay_s
-    side = "before its command, which no robot does" if latency.value < 0.0 else "after its command"
-    lag = f"motion comes {abs(latency.value):.2f} s {side}"
-    early = "early" if offset.value < 0.0 else "late"
-    return [
-        f"{lag}; poses are stamped {abs(offset.value):.2f} s too {early} ({_ends_s(offset)}) if the robot's delay "
-        f"is {assumed:.2f} s; this was corrected. Stamp both with one clock, or move the poses yourself"
-    ]
-
-
-def _say_drives(clocks: Clocks) -> list[str]:
-    return [
-        f"in drive {name} poses are stamped {abs(one.value):.2f} s {'earlier' if one.value < 0.0 else 'later'} "
-        f"({_ends_s(one)}) than in the others; this was corrected. Check how its clocks were set"
-        for name, one in clocks.drives.items()
-    ]
-
-
-def _say_jumps(clocks: Clocks) -> list[str]:
-    return [
-        f"in drive {jump.drive} the clock jumps at about {jump.time_s:.0f} s: poses are stamped {abs(jump.by_s):.2f} s "
-        f"{'earlier' if jump.by_s < 0.0 else 'later'} from then on; only the longest stretch without a jump was used. "
-        "Keep clocks from being set during a drive"
-        for jump in clocks.jumps
-    ]
+    if offset.value:
+        side = "before its command, which no robot does" if latency.value < 0.0 else "after its command"
+        lag = f"motion comes {abs(latency.value):.2f} s {side}"
+        early = "early" if offset.value < 0.0 else "late"
+        yield (
+            f"{lag}; poses are stamped {abs(offset.value):.2f} s too {early} ({_ends_s(offset)}) if the robot's delay "
+            f"is {assumed:.2f} s; this was corrected. Stamp both with one clock, or move the poses yourself"
+        )
+    for name, one in clocks.drives.items():
+        yield (
+            f"in drive {name} poses are stamped {abs(one.value):.2f} s {'earlier' if one.value < 0.0 else 'later'} "
+            f"({_ends_s(one)}) than in the others; this was corrected. Check how its clocks were set"
+        )
+    for drive, time_s, by_s in clocks.jumps:
+        yield (
+            f"in drive {drive} the clock jumps at about {time_s:.0f} s: poses are stamped {abs(by_s):.2f} s "
+            f"{'earlier' if by_s < 0.0 else 'later'} from then on; only the longest stretch without a jump was used. "
+            "Keep clocks from being set during a drive"
+        )
 
 
 def _ends_s(offset: Offset) -> str:

@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.image import AxesImage
@@ -68,12 +67,20 @@ class _View:
         draw_map(map_axes, pair.road, [episode.places for episode in pair.sides.values()])
         draw_start(map_axes, self._episode.places)
         map_axes.set_title(side, color=COLOURS[side], fontsize=11, fontweight="bold", loc="left")
-        self._path, self._robot, self._clock = _on_map(map_axes, COLOURS[side])
+        line: dict[str, Any] = {"color": COLOURS[side], "animated": True}
+        (self._path,) = map_axes.plot([], [], linewidth=1.8, solid_capstyle="round", **line)
+        (self._robot,) = map_axes.plot([], [], markersize=13, markeredgecolor="white", clip_on=False, **line)
+        # The time, right above the map
+        place = {"transform": map_axes.transAxes, "ha": "right", "va": "bottom"}
+        self._clock = map_axes.text(1.0, 1.02, "", fontsize=10, animated=True, **place)
         self._camera: AxesImage | None = None
         commanded = lower
         if self._episode.pictures is not None:
             camera, commanded = lower.subfigures(1, 2, width_ratios=(2.1, 1.3), squeeze=False)[0]
-            self._camera = _camera(camera, self._episode.pictures[0])
+            axes = camera.subplots()
+            axes.set(xticks=[], yticks=[])
+            axes.set_title("camera", fontsize=8, pad=3)
+            self._camera = axes.imshow(self._episode.pictures[0], interpolation="nearest", animated=True)
         self._bars = _bars(commanded, pair, side)
 
     def show(self, time: float) -> None:
@@ -88,31 +95,15 @@ class _View:
         self._clock.set_text(f"ended at {episode.seconds:.1f} s" if over else f"{time:.1f} s")
         for artist in (self._path, self._robot, self._clock):
             _redraw(artist)
-        if episode.channels:
-            self._show_command(_row(episode.commands["time"], time))
-
-    def _show_command(self, row: int) -> None:
-        if self._camera is not None and self._episode.pictures is not None:
-            self._camera.set_data(self._episode.pictures[row])
+        if not episode.channels:
+            return
+        row = _row(episode.commands["time"], time)
+        if self._camera is not None and episode.pictures is not None:
+            self._camera.set_data(episode.pictures[row])
             _redraw(self._camera)
         for channel, bar in self._bars.items():
-            bar.set_ydata((0.0, float(self._episode.commands[channel][row])))
+            bar.set_ydata((0.0, float(episode.commands[channel][row])))
             _redraw(bar)
-
-
-def _on_map(axes: Axes, colour: str) -> tuple[Line2D, Line2D, Text]:
-    """The path so far, the robot, and the time."""
-    (path,) = axes.plot([], [], color=colour, linewidth=1.8, solid_capstyle="round", animated=True)
-    (robot,) = axes.plot([], [], color=colour, markersize=13, markeredgecolor="white", clip_on=False, animated=True)
-    clock = axes.text(1.0, 1.02, "", transform=axes.transAxes, ha="right", va="bottom", fontsize=10, animated=True)
-    return path, robot, clock
-
-
-def _camera(figure: SubFigure, picture: NDArray[np.uint8]) -> AxesImage:
-    axes = figure.subplots()
-    axes.set(xticks=[], yticks=[])
-    axes.set_title("camera", fontsize=8, pad=3)
-    return axes.imshow(picture, interpolation="nearest", animated=True)
 
 
 def _bars(figure: SubFigure, pair: SideBySide, side: str) -> Mapping[str, Line2D]:

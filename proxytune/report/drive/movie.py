@@ -19,7 +19,7 @@ from proxytune.errors import InputError, RunError
 from proxytune.files import check_place
 from proxytune.report.drive.animation import FRAME_HZ, Animation
 from proxytune.report.drive.figure import episode_figure
-from proxytune.report.writing import save_figure, write_movie
+from proxytune.report.writing import save_figure, write_whole
 from proxytune.running import Bars, Watcher
 from proxytune.study import SideBySide
 
@@ -94,7 +94,7 @@ def write_gif(path: Path, frames: Iterable[Frame], samples: Sequence[Frame], fra
     pictures = (Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
     first = next(pictures)
     how = {"save_all": True, "append_images": pictures, "duration": round(1000.0 / frame_hz), "loop": 0}
-    write_movie(path, lambda draft: first.save(draft, format="GIF", optimize=True, **how))
+    write_whole(path, "the animation ", lambda draft: first.save(draft, format="GIF", optimize=True, **how))
 
 
 def find_ffmpeg() -> str:
@@ -121,7 +121,7 @@ def write_mp4(path: Path, frames: Iterable[Frame], frame_hz: float) -> None:
     """
     with matplotlib.rc_context({"animation.ffmpeg_path": find_ffmpeg()}), _quiet():
         try:
-            write_movie(path, lambda draft: _encode(draft, iter(frames), frame_hz))
+            write_whole(path, "the animation ", lambda draft: _encode(draft, iter(frames), frame_hz))
         except subprocess.CalledProcessError as problem:
             said = f"{problem.stderr}".strip().splitlines()[-1:] or [f"exit status {problem.returncode}"]
             raise RunError(f"{path}: ffmpeg cannot encode it ({said[0]}); write a .gif instead") from None

@@ -33,7 +33,13 @@ def draw_map(axes: Axes, road: Road | None, paths: Iterable[Floats]) -> None:
         paths: All that is going to be drawn on it, each (times, 2): x, y [m].
     """
     if road is not None:
-        _draw_floor(axes, road)
+        floor = draw_floor(road)
+        end = floor.origin + len(floor.pixels) / floor.pixels_per_metre
+        # Every other pixel shows the markings as well, at a quarter of the work
+        paler = (255.0 - (255.0 - floor.pixels[::2, ::2]) * (1.0 - PALER)).astype(np.uint8)
+        box = (floor.origin, end, floor.origin, end)
+        show_photo(axes, paler, extent=box, origin="lower", interpolation="antialiased")
+        axes.set(xlim=(0.0, road.size[0]), ylim=(0.0, road.size[1]))
     else:
         low, high = _bounds(paths)
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
@@ -47,15 +53,6 @@ def map_aspect(road: Road | None, paths: Iterable[Floats]) -> float:
     """Height of the map over its width."""
     width, height = road.size if road is not None else np.subtract(*_bounds(paths)[::-1])
     return float(np.clip(height / width, 0.4, 2.0))
-
-
-def _draw_floor(axes: Axes, road: Road) -> None:
-    floor = draw_floor(road)
-    end = floor.origin + len(floor.pixels) / floor.pixels_per_metre
-    # Every other pixel shows the markings as well, at a quarter of the work
-    paler = (255.0 - (255.0 - floor.pixels[::2, ::2]) * (1.0 - PALER)).astype(np.uint8)
-    show_photo(axes, paler, extent=(floor.origin, end, floor.origin, end), origin="lower", interpolation="antialiased")
-    axes.set(xlim=(0.0, road.size[0]), ylim=(0.0, road.size[1]))
 
 
 def _bounds(paths: Iterable[Floats]) -> tuple[Floats, Floats]:

@@ -3,13 +3,13 @@
 import re
 from collections.abc import Container, Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 
-from proxytune.driving import CAMERA, CameraFigures, Robot, mounted_camera
-from proxytune.effects import SMALLEST_LIMIT, Effect, effect_of, effects_from
+from proxytune.arrays import Floats
+from proxytune.driving import CAMERA, CameraFigures, Robot, mounted_camera, orientation, rotation
+from proxytune.effects import SHIPPED, SMALLEST_LIMIT, Effect, Stage, effect_of, effects_from
 from proxytune.errors import InputError
 from proxytune.space import Theta
 
@@ -106,6 +106,22 @@ class Instance:
         forward, left = (self.value("marker_offset", name, 0.0) for name in ("forward", "left"))
         return forward, left, float(np.radians(self.value("heading_offset", "angle", 0.0)))
 
+    @property
+    def mounts(self) -> Mapping[str, Floats]:
+        """Poses (4, 4) of camera and tracked point, where there are such, from the middle of the axle on the floor."""
+        poses = {}
+        if (camera := self.camera) is not None:
+            poses["camera"] = _pose(orientation(camera), (camera.forward_m, 0.0, camera.height_m))
+        if (tracked := self.tracked_point) is not None:
+            poses["tracked_point"] = _pose(rotation(0.0, 0.0, tracked[2]), (*tracked[:2], 0.0))
+        return poses
+
+
+def _pose(turned: Floats, place: tuple[float, float, float]) -> Floats:
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = turned, place
+    return pose
+
 
 @dataclass(frozen=True)
 class ExportLine:
@@ -201,59 +217,31 @@ class Places(NamedTuple):
 
 _MOUNT = Places("joint camera_mount", "camera pos and xyaxes", "static_transform base_link to camera")
 _MARKER = Places("link tracked_point", "site tracked_point", "static_transform base_link to tracked_point")
-_NOWHERE = Places()
-PLACES: Mapping[str, Places] = MappingProxyType(
-    {
-        "delay_jitter": _NOWHERE,
-        "dropped_commands": _NOWHERE,
-        "command_quantisation": _NOWHERE,
+_MOUNTED: Mapping[str, Places] = {
+    "marker_offset": _MARKER,
+    "heading_offset": _MARKER,
+    "camera_pitch": _MOUNT,
+    "camera_roll": _MOUNT,
+    "camera_yaw": _MOUNT,
+    "camera_height": _MOUNT,
+    "camera_forward": _MOUNT,
+    "field_of_view": Places(mjcf="camera fovy", ros="camera_info k, p"),
+    "lens_distortion": Places(ros="camera_info d"),
+    "lens_centre": Places(ros="camera_info k, p"),
+    "pixel_aspect": Places(ros="camera_info k, p"),
+}
+PLACES: Mapping[str, Mapping[str, Places]] = {
+    "differential": {
         "delay": Places(mjcf="actuator delay"),
         "slew_rate": Places(ros="max_acceleration"),
-        "driver_map": _NOWHERE,
-        "dead_band": _NOWHERE,
-        "stiction": _NOWHERE,
         "saturation": Places("joint limit velocity", "actuator ctrlrange", "max_velocity"),
         "trim": Places("wheel radii", "actuator gainprm", "wheel_radius_multiplier, max_velocity"),
         "wheel_gain": Places("wheel radii", "actuator gainprm", "wheel_radius_multiplier, max_velocity"),
-        "battery_sag": _NOWHERE,
-        "thermal_fade": _NOWHERE,
         "motor_lag": Places(mjcf="actuator dynprm"),
-        "backlash": _NOWHERE,
-        "wheel_ripple": _NOWHERE,
         "yaw_scrub": Places("wheel distance", "wheel distance", "wheel_separation_multiplier, max_velocity"),
-        "understeer": _NOWHERE,
-        "yaw_lag": _NOWHERE,
-        "turn_slip": _NOWHERE,
-        "lateral_slip": _NOWHERE,
-        "cross_coupling": _NOWHERE,
-        "floor_slope": _NOWHERE,
-        "slippery_patch": _NOWHERE,
-        "marker_offset": _MARKER,
-        "heading_offset": _MARKER,
-        "camera_pitch": _MOUNT,
-        "camera_roll": _MOUNT,
-        "camera_yaw": _MOUNT,
-        "camera_height": _MOUNT,
-        "camera_forward": _MOUNT,
-        "field_of_view": Places(mjcf="camera fovy", ros="camera_info k, p"),
-        "lens_distortion": Places(ros="camera_info d"),
-        "lens_centre": Places(ros="camera_info k, p"),
-        "pixel_aspect": Places(ros="camera_info k, p"),
-        "blur": _NOWHERE,
-        "rolling_shutter": _NOWHERE,
-        "camera_latency": _NOWHERE,
-        "defocus": _NOWHERE,
-        "vignetting": _NOWHERE,
-        "exposure": _NOWHERE,
-        "image_noise": _NOWHERE,
-    }
-)
-"""By effect of the catalogue; a user's own effect and what was learnt have no place anywhere."""
-
-
-CAR_PLACES: Mapping[str, Places] = MappingProxyType(
-    {
-        **dict(tuple(PLACES.items())[tuple(PLACES).index("marker_offset") :]),
+        **_MOUNTED,
+    },
+    "ackermann": {
         "delay": Places(mjcf="actuator delay"),
         "saturation": Places("joint limit velocity", "actuator ctrlrange"),
         "wheel_gain": Places("wheel radii", "actuator gainprm", "traction_wheels_radius"),
@@ -262,19 +250,17 @@ CAR_PLACES: Mapping[str, Places] = MappingProxyType(
         "steering_lag": Places(mjcf="actuator dynprm"),
         "steering_offset": Places("origins of the joints that steer", "actuator biasprm"),
         "steering_gain": Places(mjcf="actuator gainprm"),
-    }
-)
-"""Those of a car's effects that have a place."""
-
-
-FILTERED = tuple(PLACES)[: tuple(PLACES).index("marker_offset")]
+        **_MOUNTED,
+    },
+}
+"""By how the robot drives, the effects that have a place; a user's own and what was learnt have none."""
+BENT = (Stage.COMMAND, Stage.ACTUATION, Stage.MOTION)
 """Effects on commands, wheels and motion: what a filter bends."""
 
 
 def place_of(effect: str, form: str, drive: str = "differential") -> str:
     """Place of an effect of such robots in a format; empty where it has no place."""
     if form == FILTER:
-        return "the filter" if effect in FILTERED or effect not in PLACES else ""
-    places = PLACES if drive == "differential" else CAR_PLACES
-    place: str = getattr(places.get(effect, _NOWHERE), form)
+        return "the filter" if effect not in SHIPPED.shipped or SHIPPED.effect(effect).stage in BENT else ""
+    place: str = getattr(PLACES[drive].get(effect, Places()), form)
     return place

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from proxytune.arrays import Floats
-from proxytune.driving import link_pose, links_called, mounted_camera, orientation, origin_of, rotation
+from proxytune.driving import link_pose, links_called, mounted_camera, origin_of, rotation
 from proxytune.errors import InputError
 from proxytune.report.export.instance import IN_WHEELS, Instance
 from proxytune.report.export.urdf import angles_of, end_of
@@ -125,9 +125,8 @@ def _change_camera(instance: Instance, own: OwnFile) -> Iterator[str]:
     nominal = mounted_camera(instance.robot, ())
     floor = np.mean([wheel.centre for wheel in own.wheels], axis=0)
     floor[2] -= own.wheels[0].radius_m or instance.figure("wheel_radius")
-    pose = np.eye(4)
-    pose[:3, :3] = orientation(found)
-    pose[:3, 3] = floor + np.array((found.forward_m, 0.0, found.height_m))
+    pose = instance.mounts["camera"].copy()
+    pose[:3, 3] = floor + pose[:3, 3]
     names = ("pitch_deg", "roll_deg", "yaw_deg", "height_m", "forward_m")
     if own.aim is not None:
         if any(getattr(found, name) != getattr(nominal, name) for name in names):

@@ -1,7 +1,6 @@
 """A complete MuJoCo model of a domain instance: a robot on a floor, controlled by its two commands."""
 
 import math
-from functools import partial
 from string import Template
 from xml.sax.saxutils import escape
 
@@ -9,6 +8,7 @@ import numpy as np
 
 from proxytune.driving import CameraFigures, orientation
 from proxytune.report.export.instance import Instance, xml_comment
+from proxytune.report.writing import fill
 
 TIMESTEP_S = 0.0005
 """Short, and integrated explicitly: MuJoCo's implicit integrators push a robot with stiffly driven light wheels."""
@@ -31,37 +31,6 @@ OPEN_DIFFERENTIAL = """\
     <fixed name="rear"><joint joint="axle_left" coef="0.5"/><joint joint="axle_right" coef="0.5"/></fixed>
   </tendon>
 """
-MODEL = Template("""\
-<mujoco model="$name">
-  <!-- $comment -->
-  <!-- Control: $control, -1 to 1. Origin: middle of the driven axle, on the floor; x forward. -->
-  <option timestep="$timestep"/>
-  <worldbody>
-    <light pos="0 0 3"/>
-    <geom name="floor" type="plane" size="10 10 0.1" friction="1 0.005 0.0001"/>
-    <body name="$name">
-      <freejoint/>
-      <geom name="chassis" type="box" pos="$chassis_x 0 $chassis_z" size="$chassis_size" mass="$chassis_mass"/>
-$parts
-      <body name="wheel_left" pos="0 $half_baseline $radius">
-        <joint name="axle_left" type="hinge" axis="0 1 0"/>
-        <geom type="sphere" size="$radius" mass="$wheel_mass"/>
-      </body>
-      <body name="wheel_right" pos="0 -$half_baseline $radius">
-        <joint name="axle_right" type="hinge" axis="0 1 0"/>
-        <geom type="sphere" size="$radius" mass="$wheel_mass"/>
-      </body>
-    </body>
-  </worldbody>
-  <contact>
-    <exclude body1="$name" body2="wheel_left"/>
-    <exclude body1="$name" body2="wheel_right"/>
-$excluded  </contact>
-$tendons  <actuator>
-$actuators
-  </actuator>
-</mujoco>
-""")
 
 
 def mjcf_text(instance: Instance) -> str:
@@ -95,8 +64,13 @@ def mjcf_text(instance: Instance) -> str:
     }
     name = escape(instance.robot.name, {'"': "&quot;"})
     said = {key: f"{number:.9g}" for key, number in numbers.items()}
-    actuators = (_throttle, _steering) if wheelbase else (partial(_actuator, side=0), partial(_actuator, side=1))
-    return MODEL.substitute(
+    if wheelbase:  # A servo of the mean speed of the rear wheels, and one of the front wheel's angle
+        actuators = [_speed_servo(instance, 'name="throttle" tendon="rear"', 0, 2), _steering(instance)]
+    else:
+        sides = enumerate(("left", "right"))
+        actuators = [_speed_servo(instance, f'name="{one}" joint="axle_{one}"', side, 1) for side, one in sides]
+    return fill(
+        "mujoco.xml.txt",
         said,
         name=name,
         comment=xml_comment(instance, "mjcf", 7),
@@ -105,7 +79,7 @@ def mjcf_text(instance: Instance) -> str:
         control="throttle and steering (left is above 0)" if wheelbase else "duties of the left and right wheels",
         excluded='    <exclude body1="$name" body2="wheel_front"/>\n'.replace("$name", name) if wheelbase else "",
         tendons=OPEN_DIFFERENTIAL if wheelbase else "",
-        actuators="\n".join(actuator(instance) for actuator in actuators),
+        actuators="\n".join(actuators),
     )
 
 
@@ -129,17 +103,6 @@ def _camera(figures: CameraFigures) -> str:
     size = f"{figures.columns} {figures.rows}"
     fovy = f"{figures.field_of_view_deg:.9g}"
     return f'<camera name="camera" pos="{place}" xyaxes="{axes}" fovy="{fovy}" resolution="{size}"/>'
-
-
-def _actuator(instance: Instance, side: int) -> str:
-    """A servo of one wheel's speed."""
-    place = f'name="{("left", "right")[side]}" joint="{("axle_left", "axle_right")[side]}"'
-    return _speed_servo(instance, place, side, 1)
-
-
-def _throttle(instance: Instance) -> str:
-    """A servo of the mean speed of a car's rear wheels."""
-    return _speed_servo(instance, 'name="throttle" tendon="rear"', 0, 2)
 
 
 def _speed_servo(instance: Instance, place: str, side: int, wheels: int) -> str:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from proxytune.arrays import Floats
-from proxytune.driving import CameraFigures, orientation
+from proxytune.driving import CameraFigures
 from proxytune.report.export.instance import Instance, header
 
 TIMEOUT_S = 0.5
@@ -24,12 +24,8 @@ def ros_text(instance: Instance) -> str:
     lines = [f"# {line}" for line in header(instance, "ros")] + _controller(instance)
     if (camera := instance.camera) is not None:
         lines += _camera_info(camera)
-        lines += _transform("camera", (camera.forward_m, 0.0, camera.height_m), orientation(camera))
-    if (tracked := instance.tracked_point) is not None:
-        forward, left, angle = tracked
-        cosine, sine = math.cos(angle), math.sin(angle)
-        turned = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
-        lines += _transform("tracked_point", (forward, left, 0.0), turned)
+    for child, pose in instance.mounts.items():
+        lines += _transform(child, pose)
     return "\n".join(lines) + "\n"
 
 
@@ -97,20 +93,19 @@ def _camera_info(figures: CameraFigures) -> Rows:
     ]
 
 
-def _transform(child: str, place: tuple[float, float, float], rotation: Floats) -> Rows:
+def _transform(child: str, pose: Floats) -> Rows:
     """Parameters of tf2_ros' static_transform_publisher; base_link is the middle of the axle, on the floor."""
-    x, y, z, w = _quaternion(rotation)
+    # The quaternion of a rotation by less than half a turn
+    turned = pose[:3, :3]
+    w = math.sqrt(max(1e-12, 1.0 + float(np.trace(turned)))) / 2.0
+    skew = turned - turned.T
+    quaternion = (*(float(skew[at]) / 4.0 / w for at in ((2, 1), (0, 2), (1, 0))), w)
     rows = [f"{child}_transform:  # x forward, y left, z up, as base_link", "  ros__parameters:"]
     rows += ["    frame_id: base_link", f"    child_frame_id: {child}"]
-    rows += [f"    translation.{axis}: {_number(value)}" for axis, value in zip("xyz", place, strict=True)]
-    return rows + [f"    rotation.{axis}: {_number(value)}" for axis, value in zip("xyzw", (x, y, z, w), strict=True)]
-
-
-def _quaternion(rotation: Floats) -> tuple[float, float, float, float]:
-    """Quaternion of a rotation by less than half a turn, (x, y, z, w)."""
-    w = math.sqrt(max(1e-12, 1.0 + float(np.trace(rotation)))) / 2.0
-    skew = rotation - rotation.T
-    return float(skew[2, 1]) / 4.0 / w, float(skew[0, 2]) / 4.0 / w, float(skew[1, 0]) / 4.0 / w, w
+    rows += [
+        f"    translation.{axis}: {_number(value)}" for axis, value in zip("xyz", pose[:3, 3].tolist(), strict=True)
+    ]
+    return rows + [f"    rotation.{axis}: {_number(value)}" for axis, value in zip("xyzw", quaternion, strict=True)]
 
 
 def _number(value: float) -> str:

@@ -13,7 +13,6 @@ from proxytune.driving import (
     add_little_mass,
     link_pose,
     links_called,
-    orientation,
     origin_of,
     parse_urdf,
     read_body,
@@ -54,14 +53,8 @@ def _change(root: ET.Element, instance: Instance) -> None:
             pose = origin_of(joint)
             pose[:3, :3] = pose[:3, :3] @ turned
             _set_origin(joint, pose)
-    if (camera := instance.camera) is not None:
-        pose = _pose(orientation(camera), (camera.forward_m, 0.0, camera.height_m))
-        _mount(root, "camera", "camera_mount", pose)
-    if (tracked := instance.tracked_point) is not None:
-        forward, left, angle = tracked
-        cosine, sine = math.cos(angle), math.sin(angle)
-        turned = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
-        _mount(root, "tracked_point", "tracked_point_mount", _pose(turned, (forward, left, 0.0)))
+    for link, pose in instance.mounts.items():
+        _mount(root, link, pose)
 
 
 def _set_wheel(root: ET.Element, joint: ET.Element, left_m: float, radius_m: float, gain: float) -> None:
@@ -77,14 +70,14 @@ def _set_wheel(root: ET.Element, joint: ET.Element, left_m: float, radius_m: flo
             geometry.set("radius", f"{gain * float(geometry.get('radius', radius_m)):.9g}")
 
 
-def _mount(root: ET.Element, link: str, mount: str, pose: Floats) -> None:
+def _mount(root: ET.Element, link: str, pose: Floats) -> None:
     """Fix a link to the robot at a pose in the root link's frame; where there is none of that name, add it."""
     joints = [one for one in root.iter("joint") if end_of(one, "child") == link]
     if joints:
         _set_origin(joints[0], np.linalg.inv(link_pose(root, end_of(joints[0], "parent"))) @ pose)
         return
     add_little_mass(ET.SubElement(root, "link", name=link))
-    joint = ET.SubElement(root, "joint", name=mount, type="fixed")
+    joint = ET.SubElement(root, "joint", name=f"{link}_mount", type="fixed")
     children = {end_of(one, "child") for one in root.iter("joint")}
     names = (one.get("name", "") for one in root.findall("link"))
     ET.SubElement(joint, "parent", link=next(name for name in names if name not in children))
@@ -116,12 +109,6 @@ def angles_of(turned: Floats) -> tuple[float, float, float]:
     """Roll, pitch and yaw of a rotation (3, 3) [rad]."""
     pitch = math.asin(max(-1.0, min(1.0, -turned[2, 0])))
     return math.atan2(turned[2, 1], turned[2, 2]), pitch, math.atan2(turned[1, 0], turned[0, 0])
-
-
-def _pose(rotation: Floats, place: tuple[float, float, float]) -> Floats:
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = rotation, place
-    return pose
 
 
 def _numbers(values: Iterable[float]) -> str:

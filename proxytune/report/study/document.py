@@ -14,8 +14,9 @@ from proxytune.usefulness import Estimate
 
 def study_document(result: StudyResult) -> dict[str, Any]:
     """A study's result as plain JSON; None where a figure is undefined."""
+    settings, target = result.study.settings, result.study.target
     return {
-        "name": result.study.settings.name,
+        "name": settings.name,
         "sentence": study_sentence(result),
         "best": _best(result),
         **_worth(result),
@@ -32,8 +33,13 @@ def study_document(result: StudyResult) -> dict[str, Any]:
         "cut_off": {"trials": len(result.pruned), "episodes": result.spared[0], "seconds": result.spared[1]},
         "trials": [_trial(trial) for trial in result.trials],
         "failures": list(result.failures),
-        "target": _target(result),
-        "settings": dict(settings_document(result.study.settings)),
+        "target": {
+            "path": str(settings.target),
+            "files": [str(path) for path in settings.targets],
+            "agents": len(target.agents),
+            "episodes_per_agent": [int(target.counts.min()), int(target.counts.max())],
+        },
+        "settings": dict(settings_document(settings)),
     }
 
 
@@ -123,14 +129,6 @@ def _trial(trial: TrialRecord) -> dict[str, Any]:
         "failure": trial.failure or None,
         "cut_off": cut if trial.state == "cut" else None,
     }
-
-
-def _target(result: StudyResult) -> dict[str, Any]:
-    target = result.study.target
-    counts = [int(target.counts.min()), int(target.counts.max())]
-    settings = result.study.settings
-    files = {"path": str(settings.target), "files": [str(path) for path in settings.targets]}
-    return {**files, "agents": len(target.agents), "episodes_per_agent": counts}
 
 
 def knowledge_document(learnt: Knowledge) -> dict[str, Any]:

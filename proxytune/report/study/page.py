@@ -24,6 +24,12 @@ TITLES = {
     "importance": "Which parameters change PRPV most",
     "evaluations": "Where the trials were, and what they leave of the box",
 }
+MEANING = (
+    "PRPV, the proxy relative predictivity value, counts on how many ordered pairs of the {} agents proxy and target "
+    "disagree which is the better. The best θ is the most probable of those whose PRPV, by all trials and fresh "
+    "episodes, cannot be told from the lowest. The 95 % interval holds the values that agree with every agent's every "
+    "metric on the target; “by PRPV alone” those whose PRPV is as low as the best, within noise."
+)
 RENEW_S = 5
 WAIT = "wait for the end, which brings intervals and figures; `python -m proxytune plot` draws them as of now."
 CONTINUE = "run the same command to continue: everything finished is kept."
@@ -67,13 +73,12 @@ def study_view(result: StudyResult, figures: Mapping[str, bytes]) -> View:
         drawn.get("importance"),
         drawn.get("evaluations"),
         tables[SEARCH],
-        Paragraphs("What PRPV and the intervals are", (_say_meaning(len(settings.agents)),)),
+        Paragraphs("What PRPV and the intervals are", (MEANING.format(len(settings.agents)),)),
         trials_table(result.trials, settings.space.names),
     )
     present: tuple[Part, ...] = tuple(part for part in parts if part is not None)
-    return View(
-        f"{settings.name}: which θ makes the simulator useful?", say_answer(finding), say_next_step(finding), present
-    )
+    title = f"{settings.name}: which θ makes the simulator useful?"
+    return View(title, say_answer(finding), f"{say_next_step(finding)}.", present)
 
 
 def study_foot(settings: StudySettings, command: str | None = None) -> Foot:
@@ -90,16 +95,6 @@ def study_foot(settings: StudySettings, command: str | None = None) -> Foot:
     ]
     own = f"python -m proxytune study {shlex.quote(str(settings.home))}"
     return foot_of(own if command is None else command, [(name, value) for name, value in stated if value])
-
-
-def _say_meaning(agents: int) -> str:
-    return (
-        "PRPV, the proxy relative predictivity value, counts on how many ordered pairs of the "
-        f"{agents} agents proxy and target disagree which is the better. The best θ is the most probable of those "
-        "whose PRPV, by all trials and fresh episodes, cannot be told from the lowest. The 95 % interval holds the "
-        "values that agree with every agent's every metric on the target; “by PRPV alone” those whose PRPV is as low "
-        "as the best, within noise."
-    )
 
 
 def study_pictures(result: StudyResult, figures: Mapping[str, bytes]) -> dict[str, Picture]:

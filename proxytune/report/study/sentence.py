@@ -111,17 +111,12 @@ def study_sentence(result: StudyResult) -> str:
 
 def say_finding(finding: Finding) -> str:
     """Say what was found, how good the proxy is there, and what to do next."""
-    return f"{say_answer(finding)} Next: {say_next_step(finding)}"
+    return f"{say_answer(finding)} Next: {say_next_step(finding)}."
 
 
 def say_answer(finding: Finding) -> str:
     """Say what was found, and how good the proxy is there."""
     return f"{_say_theta(finding)} {_say_usefulness(finding)}"
-
-
-def say_next_step(finding: Finding) -> str:
-    """The one step that brings most."""
-    return f"{_choose_next_step(finding)}."
 
 
 def _say_theta(finding: Finding) -> str:
@@ -186,8 +181,8 @@ def _say_usefulness(finding: Finding) -> str:
     return f"{score}, {floor}: {told}{other}.{before}"
 
 
-def _choose_next_step(finding: Finding) -> str:
-    """The one step that brings most."""
+def say_next_step(finding: Finding) -> str:
+    """The one step that brings most, without a full stop."""
     if finding.left:
         return f"run the study again for the {finding.left} trials that are left"
     if finding.fits is False and finding.declared is None:

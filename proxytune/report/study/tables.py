@@ -8,7 +8,7 @@ import pandas as pd
 from rich.console import Group
 
 from proxytune.report.study.sentence import known_parameters, study_sentence
-from proxytune.report.table_files import write_latex
+from proxytune.report.table_files import latex_text
 from proxytune.report.text import file_texts, group_texts, section_text
 from proxytune.report.view import Column, Table, columns_of
 from proxytune.report.wording import (
@@ -266,5 +266,5 @@ def write_study_tables(result: StudyResult, trials: pd.DataFrame, folder: Path) 
         ("usefulness.tex", usefulness_table(result), 3),
     ):
         heads = [one.name for one in table.columns]
-        write_latex(folder / name, heads[:width], [row[:width] for row in table.rows])
+        write_text(folder / name, latex_text(heads[:width], [row[:width] for row in table.rows]))
     return [folder / name for name in ("trials.csv", "parameters.tex", "usefulness.tex")]

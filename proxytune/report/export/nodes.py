@@ -1,83 +1,41 @@
-"""A ROS 2 node that plays a designed drive: commands.csv beside it, told as velocities and as they stand."""
+"""ROS 2 nodes: one stands before the driver and bends commands as was found, one plays a designed drive."""
 
+from collections.abc import Sequence
 from pprint import pformat
-from string import Template
 
 import numpy as np
 
 from proxytune.diagnosis import Diagnosis, commands_as
-from proxytune.driving import Robot
+from proxytune.driving import REQUIRED, Robot
+from proxytune.effects import effect_of, is_learnt
 from proxytune.logs import CAR_COMMANDS, COMMANDS
+from proxytune.report.export.instance import BENT, FILTER, Instance, header
+from proxytune.report.writing import fill
 
-PLAYER = Template('''\
-#!/usr/bin/env python3
-"""Play commands.csv, the drive that proxytune designed, once, and stop.
-
-Drive it $times times: from the middle of a free floor of $room m, facing along its length; log commands and poses.
-Watch the robot, and stop this node (ctrl-C, which tells the robot to stop) where it comes near an edge.
-
-Run (nothing else of proxytune is needed):
-    python3 THIS_FILE --ros-args -r $topic:=/$topic$stamped
-$topic hears $message; wheel_commands hears the columns $columns of commands.csv as they stand, as Float64MultiArray.
-"""
-
-import csv
-from pathlib import Path
-
-import rclpy
-from $package import $kinds
-from rclpy.node import Node
-from std_msgs.msg import Float64MultiArray
-
-COLUMNS = $names
-TO_VELOCITY = $matrix  # $what, of each column
-RATE_HZ = $rate
+RATE_HZ = 60.0
+"""How often the node tells the driver a velocity; it is also the tick of proxytune's own plants."""
 
 
-class Player(Node):
-    """Tells a row of the table every 1 / RATE_HZ."""
-
-    def __init__(self):
-        super().__init__("proxytune_player")
-        with open(Path(__file__).with_name("commands.csv"), encoding="utf-8", newline="") as table:
-            self.rows = [tuple(float(row[name]) for name in COLUMNS) for row in csv.DictReader(table)]
-        self.next, self.done = 0, False
-$setup
-        self.raw = self.create_publisher(Float64MultiArray, "wheel_commands", 10)
-        self.create_timer(1.0 / RATE_HZ, self.play)
-
-    def play(self):
-        """Tell the next row; after the last one rest."""
-        self.done = self.next >= len(self.rows)
-        self.tell((0.0, 0.0) if self.done else self.rows[self.next])
-        self.next += 1
-
-    def tell(self, row):
-        """Tell the robot one row."""
-        first, second = (sum(share * one for share, one in zip(line, row)) for line in TO_VELOCITY)
-$fill
-        self.publisher.publish(message)
-        self.raw.publish(Float64MultiArray(data=list(row)))
+def node_text(instance: Instance, has: Sequence[str] = ()) -> str:
+    """The node as a Python file: all values in it, no other file needed."""
+    names = REQUIRED[instance.robot.drive]
+    kinds = instance.robot.catalogue
+    known = {
+        name: value
+        for name, value in sorted(instance.theta.items())
+        if is_learnt(name) or kinds.effect(effect_of(name)).stage in BENT
+    }
+    return fill(
+        "ackermann_filter.py.txt" if instance.steers else "cmd_vel_filter.py.txt",
+        head="\n".join(header(instance, FILTER, has)).replace("\\", "/").replace('"""', "'''"),
+        theta=pformat(known, sort_dicts=False),
+        figures=pformat({name: float(instance.figure(name)) for name in names}, sort_dicts=False),
+        has=repr(tuple(has)),
+        rate=RATE_HZ,
+        reverse=instance.robot.reverse,
+    )
 
 
-def main():
-    """Play the table."""
-    rclpy.init()
-    player = Player()
-    try:
-        while rclpy.ok() and not player.done:
-            rclpy.spin_once(player)
-    except KeyboardInterrupt:
-        pass
-    finally:
-        if rclpy.ok():
-            player.tell((0.0, 0.0))
-            rclpy.shutdown()
-
-
-if __name__ == "__main__":
-    main()
-''')
 TWIST = {
     "topic": "cmd_vel",
     "message": "Twist, or with `-p stamped:=true` TwistStamped",
@@ -117,7 +75,8 @@ def player_text(diagnosis: Diagnosis) -> str:
     drive, kind = diagnosis.next_drive, diagnosis.command
     assert drive is not None
     told = ACKERMANN if kind in CAR_COMMANDS else TWIST
-    return PLAYER.substitute(
+    return fill(
+        "player.py.txt",
         told,
         times=drive.times,
         room=" × ".join(f"{side:.1f}" for side in drive.room),

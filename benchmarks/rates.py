@@ -28,6 +28,7 @@ from joblib import Parallel, delayed
 import proxytune.diagnosis.motion.diagnose as diagnosing
 import proxytune.diagnosis.motion.evidence as looking
 from proxytune.diagnosis import RANDOM_EFFECTS, Diagnosis, Drives, Fit, cut
+from proxytune.diagnosis.motion import selection
 from proxytune.diagnosis.motion.diagnose import declared_effects, diagnose
 from proxytune.diagnosis.motion.drives import relative
 from proxytune.diagnosis.motion.random_effects import RandomEffect, random_effects
@@ -234,6 +235,7 @@ def _without(effect: str) -> Iterator[None]:
     with (
         mock.patch.object(looking, "candidates", forms),
         mock.patch.object(looking, "random_effects", chancy),
+        mock.patch.object(selection, "OF_CARS", tuple(name for name in selection.OF_CARS if name != effect)),
         mock.patch.object(diagnosing, "has_body", return_value=False),
     ):
         yield

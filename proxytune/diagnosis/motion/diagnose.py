@@ -29,9 +29,9 @@ from proxytune.diagnosis.motion.effect_size import (
     drop_negligible,
     find_robot_clusters,
     invisible_effects,
-    measure_effect_size,
+    measure_effect_sizes,
 )
-from proxytune.diagnosis.motion.evidence import AdoptedEffect, DroppedEffect, Findings, Variant
+from proxytune.diagnosis.motion.evidence import AdoptedEffect, Findings, Variant
 from proxytune.diagnosis.motion.excitation import LIMITS, Limits, NextDrive, design_drive
 from proxytune.diagnosis.motion.fitting import Fit, check_motion, check_units, intervals
 from proxytune.diagnosis.motion.innovations import Noise, at_edge
@@ -383,7 +383,9 @@ def diagnose(
     every = whole if test is None else replace(all_drives(log, robot, own), rules=rules)
     dropped = tuple(one.effect for one in found.negligible)
     beside = Variant(found.model.theta, found.model.free)
-    weighed = [DroppedEffect(effect, beside) for effect in found.adopted] + list(found.negligible)
+    sizes = measure_effect_sizes(found.model, parts.tested, beside, found.adopted, seed)
+    for effect, model_with, _ in found.negligible:
+        sizes += measure_effect_sizes(found.model, parts.tested, model_with, [effect], seed)
     report("designing the next drive")
     seen = {effect_of(name) for name in names} | {effect.effect for effect in (*found.adopted, *dropped)}
     unseen = invisible_effects(found.model, seen)
@@ -395,10 +397,7 @@ def diagnose(
         theta=estimates(found.model, found.adopted, after),
         effects=found.adopted,
         negligible=dropped,
-        effect_sizes={
-            effect.effect: measure_effect_size(parts.fitted, parts.tested, model_with, effect, seed)
-            for effect, model_with, _ in weighed
-        },
+        effect_sizes={effect.effect: size for effect, size in zip((*found.adopted, *dropped), sizes, strict=True)},
         multistep=after,
         residual_depends_on=learning.depends_on(
             [*([PERIODIC] if period else []), *(curve.group.name for curve in found.unnamed_curves)]

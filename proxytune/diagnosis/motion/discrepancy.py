@@ -255,8 +255,17 @@ def _penalise(
 def _held_out_losses(given: Sums, columns: Whole, penalties: Floats) -> Floats:
     """The squared error of each part with weights from all others, under each penalty (R, K): (R, P)."""
     hessian, gradient = given.hessian[:, columns[:, None], columns], given.gradient[:, columns]
-    rest = hessian.sum(axis=0) - hessian + penalties[:, None, :, None] * np.eye(len(columns))
-    weights = np.linalg.solve(rest, (gradient.sum(axis=0) - gradient)[:, :, None])[..., 0]
+    rest, pull = hessian.sum(axis=0) - hessian, gradient.sum(axis=0) - gradient
+    # Columns that are held alike under all penalties come first: they are solved for once, the others by Schur's
+    # complement.
+    count = int(np.argmin(np.append((penalties == penalties[0]).all(axis=0), False)))
+    across = rest[:, :count, count:]
+    right = np.concatenate((across, pull[:, :count, None]), axis=2)
+    alike = np.linalg.solve(rest[:, :count, :count] + np.diag(penalties[0, :count]), right)
+    inner = rest[:, count:, count:] - np.swapaxes(across, 1, 2) @ alike[..., :-1]
+    left = pull[:, count:, None] - np.swapaxes(across, 1, 2) @ alike[..., -1:]
+    last = np.linalg.solve(inner + penalties[:, None, count:, None] * np.eye(len(columns) - count), left)
+    weights = np.concatenate((alike[..., -1:] - alike[..., :-1] @ last, last), axis=2)[..., 0]
     bent = (weights * (hessian @ weights[..., None])[..., 0]).sum(axis=-1)
     return np.asarray(given.size - 2.0 * (weights * gradient).sum(axis=-1) + bent)
 

@@ -5,14 +5,14 @@ the effect, and b that of the model without it, all else fitted again, its size 
 that draws at random moves no mean: with s the distance of drawn and expected replays and e the error, the error without
 the draws would be √(e² − s²), and its size is e / √(e² − s²). `drop_negligible` drops effects whose size is not shown
 to be above `rules.material_factor`, on the fitted drives, each block predicted by what was fitted to others, so that
-the drives kept aside can tell what that came to (`measure_effect_size`).
+the drives kept aside can tell what that came to (`measure_effect_sizes`).
 
 The same traces of effects say which effects these drives could not have shown (`invisible_effects`), and the wheels'
 gains of single drives whether all are of one robot (`find_robot_clusters`).
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -44,6 +44,7 @@ from proxytune.diagnosis.motion.multistep_fit import (
 from proxytune.diagnosis.motion.prediction import Ratio, Windows, blocks_of, cut, motion_in, pose_errors, ratio, rmse
 from proxytune.diagnosis.motion.random_effects import responses
 from proxytune.diagnosis.motion.screening import candidates, motion_effects, project_out
+from proxytune.space import Theta
 
 FITTED_S = 2.0
 """Windows that models with and without an effect are fitted to, the longest that drives have up to this."""
@@ -85,11 +86,11 @@ def drop_negligible(found: Findings, seed: int, aside: Drives | None = None) -> 
     dropped: list[DroppedEffect] = []
     while kept and horizons(drives) and (aside is None or horizons(aside)):
         if aside is None:
-            weighed = _weigh_effects(drives, variant, kept, seed)
+            weighed = _weigh_effects(found.model, variant, kept, seed)
             negligible = [one for one in weighed if not one.material]
         else:
-            sizes = ((effect, measure_effect_size(drives, aside, variant, effect, seed)) for effect in kept)
-            weighed = [WeighedEffect(effect, size, drives.rules) for effect, size in sizes]
+            sizes = measure_effect_sizes(found.model, aside, variant, kept, seed)
+            weighed = [WeighedEffect(effect, size, drives.rules) for effect, size in zip(kept, sizes, strict=True)]
             negligible = [one for one in weighed if not any(size.above for size in one.size.values())]
         weakest = min(negligible, key=lambda one: max(size.value for size in one.size.values()), default=None)
         if weakest is None:
@@ -103,39 +104,59 @@ def drop_negligible(found: Findings, seed: int, aside: Drives | None = None) -> 
     return replace(found, model=model, adopted=tuple(kept), negligible=found.negligible + tuple(dropped))
 
 
-def _weigh_effects(
-    drives: Drives, variant: Variant, effects: Sequence[AdoptedEffect], seed: int
-) -> list[WeighedEffect]:
+def _weigh_effects(model: Fit, variant: Variant, effects: Sequence[AdoptedEffect], seed: int) -> list[WeighedEffect]:
     """Weigh each effect of a model on the drives it was fitted to, with blocks left out in turn."""
-    length = _length(drives)
-    whole = held_out_squares(drives, variant.theta, variant.free, length)
+    drives, whole = model.drives, _held_out(model, variant)[1]
     found = []
     for effect in effects:
         if effect.free:
-            theta, free = without_effect(variant, effect, drives.rate_hz)
-            size = compare_errors(drives, held_out_squares(drives, theta, free, length), whole)
+            size = compare_errors(drives, _held_out(model, without_effect(variant, effect, drives.rate_hz))[1], whole)
         else:
             # Blocks left out add errors of the fit, which are no draws.
-            squares = {h: pose_errors(drives, variant.theta, cut(drives, h))[:, 0] ** 2 for h in whole}
-            size = _size_of_draws(drives, variant, squares, seed)
+            size = _size_of_draws(drives, variant, _plain_squares(drives, variant.theta), seed)
         found.append(WeighedEffect(effect, size, drives.rules))
     return found
 
 
-def measure_effect_size(
-    fitted: Drives, tested: Drives, variant: Variant, effect: AdoptedEffect, seed: int
-) -> EffectSize:
-    """Measure the error without an effect by the error with it, on drives that nothing was fitted to."""
-    whole = _squares(fitted, tested, variant)
-    if effect.free:
-        return compare_errors(tested, _squares(fitted, tested, without_effect(variant, effect, fitted.rate_hz)), whole)
-    return _size_of_draws(tested, variant, whole, seed)
+def measure_effect_sizes(
+    model: Fit, tested: Drives, variant: Variant, effects: Iterable[AdoptedEffect], seed: int
+) -> list[EffectSize]:
+    """Measure the error without each effect by the error with all, on drives that nothing was fitted to."""
+    whole, rate_hz = _squares(model, tested, variant), model.drives.rate_hz
+    return [
+        compare_errors(tested, _squares(model, tested, without_effect(variant, effect, rate_hz)), whole)
+        if effect.free
+        else _size_of_draws(tested, variant, whole, seed)
+        for effect in effects
+    ]
 
 
-def _squares(fitted: Drives, tested: Drives, variant: Variant) -> dict[float, Floats]:
-    windows = cut(fitted, _length(fitted))
-    theta = fit_windows(fitted, variant.theta, variant.free, windows)
-    return {h: pose_errors(tested, theta, cut(tested, h))[:, 0] ** 2 for h in horizons(tested)}
+def _squares(model: Fit, tested: Drives, variant: Variant) -> dict[float, Floats]:
+    """Squared errors on drives that nothing was fitted to, by horizon [s]."""
+    fitted = model.drives
+    theta = _held_out(model, variant)[0] if fitted.robot.drive == "ackermann" else None
+    if theta is None:
+        theta = fit_windows(fitted, variant.theta, variant.free, cut(fitted, _length(fitted)))
+    return _plain_squares(tested, theta)
+
+
+def _held_out(model: Fit, variant: Variant) -> tuple[Theta | None, dict[float, Floats]]:
+    """Squared held-out errors of a variant of a model that is fitted to windows, by horizon [s].
+
+    The many parameters of a car wander when they are fitted to windows. Where its θ that is fitted to single steps
+    predicts better, that is given too, with its errors.
+    """
+    drives, length = model.drives, _length(model.drives)
+    windows = held_out_squares(drives, variant.theta, variant.free, length)
+    if drives.robot.drive != "ackermann" or not windows:
+        return None, windows
+    theta = fit(drives, variant.theta, variant.free, model.noise).theta
+    steps = _plain_squares(drives, theta)
+    return (theta, steps) if steps[length].mean() < windows[length].mean() else (None, windows)
+
+
+def _plain_squares(drives: Drives, theta: Theta) -> dict[float, Floats]:
+    return {h: pose_errors(drives, theta, cut(drives, h))[:, 0] ** 2 for h in horizons(drives)}
 
 
 def _length(drives: Drives) -> float:

@@ -8,7 +8,9 @@ From the model with declared parameters, fitted, each round of `search` goes thr
     adopt        the best of p ≤ p_value and G ≥ least_gain_nats that predicts no worse     choose_best, adopt
     drop         backwards: what pays no more beside the effect adopted last                drop_idle
 
-and looks again at what the new model leaves over, until nothing pays or a curve says far more than any name. Evidence
+and looks again at what the new model leaves over, until nothing pays or a curve says far more than any name. Effects
+of a car hide one another, and some pay together but not one at a time: where a curve is left over, all that cars are
+modelled with is fitted together, and what is not sure is taken out (`eliminate`, backward elimination). Evidence
 grows with the length of a log, usefulness does not: `select_effects` then drops the effects that are negligible for
 prediction (`effect_size`), and searches once more without one that did harm while others were chosen beside it.
 Every threshold is one of `rules.Rules`, as the drives carry them.
@@ -20,7 +22,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from proxytune.diagnosis.answer import Progress
+from proxytune.diagnosis.answer import Progress, Rules
 from proxytune.diagnosis.motion.drives import Drives
 from proxytune.diagnosis.motion.effect_size import drop_negligible
 from proxytune.diagnosis.motion.evidence import (
@@ -36,12 +38,12 @@ from proxytune.diagnosis.motion.evidence import (
     list_tried,
     without_effect,
 )
-from proxytune.diagnosis.motion.fitting import Fit, fit, held_out_log_likelihood
-from proxytune.diagnosis.motion.innovations import at_edge, lateness
+from proxytune.diagnosis.motion.fitting import KEPT_SOLVABLE, Fit, fit, held_out_log_likelihood
+from proxytune.diagnosis.motion.innovations import HUBER, at_edge, increments, lateness, log_likelihood, span
 from proxytune.diagnosis.motion.prediction import blocks_of, cut, pose_errors, ratio
 from proxytune.diagnosis.motion.random_effects import RandomEffect, infer_size_indirectly
 from proxytune.diagnosis.motion.screening import Candidate, ScreenedCandidate, candidates, screen
-from proxytune.diagnosis.motion.signals import SignalCurve
+from proxytune.diagnosis.motion.signals import SignalCurve, fit_curves
 from proxytune.effects import effect_of
 from proxytune.space import Theta
 
@@ -73,6 +75,12 @@ def _search_and_drop(
 ) -> tuple[Findings, tuple[DroppedEffect, ...]]:
     """Search, drop what is negligible, and tell which effects did harm while others were chosen beside them."""
     found = search(base, seed, report, without)
+    left = max((curve.gain for curve in found.unnamed_curves), default=0.0)
+    if base.drives.robot.drive == "ackermann" and left > base.drives.rules.sure_gain_nats:
+        together = eliminate(found, report, without)
+        if together is not None:
+            # Each was held against all others; taken out one after another they would make up for one another.
+            return together, ()
     report("weighing what each effect is worth")
     kept = drop_negligible(found, seed)
     order = [effect.effect for effect in found.adopted]
@@ -97,7 +105,7 @@ def search(base: Fit, seed: int, report: Progress, without: Collection[str] = ()
         evidence = gather_evidence(model, declared | {effect.effect for effect in adopted}, seed)
         tried = tried or list_tried(evidence)
         first_curves = first_curves or evidence.curves
-        least = max(rules.least_gain_nats, rules.least_gain_share * sum(effect.gain for effect in adopted))
+        least = _least_gain(adopted, rules)
         best = choose_best(model, evidence, least, 1.0 if of_car else rules.p_value)
         named = max(least, best.gain if best else 0.0)
         unnamed = [curve for curve in evidence.curves if exceeds_names(curve, named, rules)]
@@ -121,6 +129,65 @@ def search(base: Fit, seed: int, report: Progress, without: Collection[str] = ()
     return Findings(base, model, tuple(adopted), tuple(tried), tuple(unnamed), tuple(first_curves))
 
 
+OF_CARS = (
+    "dead_band", "motor_lag", "rolling", "steering_lag", "steering_curve", "steering_friction", "tyres",
+    "marker_offset", "heading_offset",
+)  # fmt: skip
+"""What every car has in some measure: a motor, a steering, tyres, and a place where it is tracked."""
+
+
+def eliminate(found: Findings, report: Progress, without: Collection[str] = ()) -> Findings | None:
+    """Fit all that cars are modelled with and what was found together, and take out what is not sure.
+
+    The effect of least evidence by Wald's statistic goes first, and all others are fitted again. None where what is
+    left is not surely more likely than what was found, or predicts worse.
+    """
+    base, rules = found.declared, found.declared.drives.rules
+    robot, theta = base.drives.robot, dict(base.theta)
+    present = {effect_of(name) for coordinate in base.free for name in coordinate}
+    effects = [effect for effect in found.adopted if effect.effect not in OF_CARS]
+    theta |= {name: found.model.theta[name] for effect in effects for name in effect.names}
+    for name in OF_CARS:
+        if name in robot.catalogue.names and name not in present and name not in without:
+            names = robot.catalogue.theta_names(name)
+            theta |= {one: robot.catalogue.parameters[one].neutral_value(robot.figures) for one in names}
+            effects.append(AdoptedEffect(name, "", names, tuple((one,) for one in names), 0.0, 0.0, ()))
+    report("fitting all that cars are modelled with together")
+    free = base.free + tuple(coordinate for effect in effects for coordinate in effect.free)
+    model = fit(base.drives, theta, free, base.noise)
+    sure = list[AdoptedEffect]()
+    while doubtful := [effect for effect in effects if effect.free and effect not in sure]:
+        effect = min(doubtful, key=lambda one: _wald(model, one))
+        rest = without_effect(Variant(model.theta, model.free), effect, base.drives.rate_hz)
+        smaller = fit(base.drives, rest.theta, rest.free, model.noise)
+        gain = _likelihood(model) - _likelihood(smaller)
+        effects.remove(effect)
+        if gain < rules.sure_gain_nats:
+            report(f"taking out {effect.effect}")
+            model, sure = smaller, []
+        else:
+            sure.append(replace(effect, gain=gain))
+            effects.append(sure[-1])
+    gained = _likelihood(model) - _likelihood(found.model)
+    if gained < rules.sure_gain_nats or not predicts_no_worse(model, found.model):
+        return None
+    curves = (curve for curve in fit_curves(model) if exceeds_names(curve, _least_gain(effects, rules), rules))
+    return replace(found, model=model, adopted=tuple(effects), unnamed_curves=tuple(curves))
+
+
+def _wald(model: Fit, effect: AdoptedEffect) -> float:
+    """Wald's statistic of an effect: what it would cost to have it at neutral, by the Hessian [nats]."""
+    robot, own = model.drives.robot, [model.free.index(coordinate) for coordinate in effect.free]
+    inner = model.slopes * (np.abs(model.innovations) < HUBER)[:, None]
+    covariance = np.linalg.inv(model.slopes.T @ inner + KEPT_SOLVABLE * np.eye(len(model.free)))
+    spans = [span(coordinate, robot) for coordinate in effect.free]
+    moved = [
+        (model.theta[name] - robot.catalogue.parameters[name].neutral_value(robot.figures)) / (high - low)
+        for (name, *_), (low, high) in zip(effect.free, spans, strict=True)
+    ]
+    return 0.5 * float(moved @ np.linalg.solve(covariance[np.ix_(own, own)], moved))
+
+
 def drop_unconfirmed(
     model: Fit, adopted: Sequence[AdoptedEffect], taken: set[str], seed: int
 ) -> tuple[Fit, list[AdoptedEffect]]:
@@ -137,7 +204,7 @@ def drop_unconfirmed(
         others = taken | {one.effect for one in kept if one is not effect}
         forms = [one for one in candidates(model.drives.robot, rest.theta, others) if one.effect == effect.effect]
         p_value = min((one.p_value for one in screen(without, forms, seed)), default=1.0)
-        gain = float(held_out_log_likelihood(model).sum() - held_out_log_likelihood(without).sum())
+        gain = _gain(model, without)
         place = kept.index(effect)
         if p_value > rules.p_value and gain < rules.sure_gain_nats:
             model = without
@@ -145,6 +212,21 @@ def drop_unconfirmed(
         else:
             kept[place] = replace(effect, p_value=p_value)
     return model, kept
+
+
+def _gain(one: Fit, other: Fit) -> float:
+    """The held-out evidence for one model over another [nats]."""
+    return float(held_out_log_likelihood(one).sum() - held_out_log_likelihood(other).sum())
+
+
+def _likelihood(model: Fit) -> float:
+    """The log-likelihood of the drives that a model was fitted to [nats]."""
+    return log_likelihood(model.drives.measured - increments(model.drives, model.theta), model.whiten)
+
+
+def _least_gain(adopted: Sequence[AdoptedEffect], rules: Rules) -> float:
+    """The evidence that one effect more needs beside those adopted [nats]."""
+    return max(rules.least_gain_nats, rules.least_gain_share * sum(effect.gain for effect in adopted))
 
 
 def choose_best(model: Fit, evidence: Evidence, least: float, p_value: float | None = None) -> FittedCandidate | None:
@@ -270,7 +352,6 @@ def drop_idle(model: Fit, adopted: Sequence[AdoptedEffect]) -> tuple[Fit, list[A
         if effect.free and len(adopted) > 1:
             rest = without_effect(Variant(model.theta, model.free), effect, model.drives.rate_hz)
             without = fit(model.drives, rest.theta, rest.free, model.noise)
-            gain = float(held_out_log_likelihood(model).sum() - held_out_log_likelihood(without).sum())
-            if gain < model.drives.rules.least_gain_nats:
+            if _gain(model, without) < model.drives.rules.least_gain_nats:
                 return without, [other for other in adopted if other is not effect]
     return model, list(adopted)

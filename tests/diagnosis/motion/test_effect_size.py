@@ -19,7 +19,7 @@ from proxytune.diagnosis.motion.effect_size import (
     drop_negligible,
     find_robot_clusters,
     invisible_effects,
-    measure_effect_size,
+    measure_effect_sizes,
 )
 from proxytune.diagnosis.motion.evidence import Variant, without_effect
 from proxytune.diagnosis.motion.fitting import evaluate
@@ -144,9 +144,8 @@ def test_drives_too_short_for_windows_drop_nothing():
 def test_worth_is_told_on_drives_that_were_not_fitted(drives):
     tested = planted_drives(MIXED, seed=2, episodes=4, seconds=20.0)
     variant = Variant(MIXED, (*DECLARED, *SCRUB, *SLIP))
-    much, little = (
-        measure_effect_size(drives, tested, variant, adopted(*one), 1) for one in (("yaw_scrub", SCRUB), ("s", SLIP))
-    )
+    effects = [adopted("yaw_scrub", SCRUB), adopted("s", SLIP)]
+    much, little = measure_effect_sizes(found(drives, MIXED, *effects).model, tested, variant, effects, 1)
     assert set(much) == set(little) == {1.0, 2.0, 5.0}
     assert max(one.interval[0] for one in much.values()) > 1.2
     assert max(one.value for one in much.values()) > 1.5

@@ -4,23 +4,27 @@ Of what was looked at, what has most evidence is chosen, unless it stands for so
 What was chosen beside an effect that does harm is searched for again without it.
 Named effects and curves are weighed against each other by one measure of evidence.
 The search adds effects one at a time, as long as each has evidence enough and no signal says far more.
+Effects of a car that hide one another are found together, where the search leaves much over.
 """
 
 from dataclasses import replace
 from types import SimpleNamespace
 
+import hidden_cars
 import numpy as np
 import pytest
 from planted import DECLARED, NOISE, ROBOT, TRUTH, planted_drives
 
 from proxytune.diagnosis import RULES, AdoptedEffect, Findings, SignalCurve
 from proxytune.diagnosis.motion import selection
+from proxytune.diagnosis.motion.clocks import all_drives, read_clocks
 from proxytune.diagnosis.motion.evidence import Evidence, FittedCandidate, exceeds_names, list_tried
 from proxytune.diagnosis.motion.fitting import evaluate, fit
 from proxytune.diagnosis.motion.innovations import at_edge
 from proxytune.diagnosis.motion.random_effects import RandomEffect
 from proxytune.diagnosis.motion.screening import ScreenedCandidate, candidates
-from proxytune.diagnosis.motion.selection import adopt, choose_best, drop_idle
+from proxytune.diagnosis.motion.selection import adopt, choose_best, drop_idle, eliminate, fit_declared
+from proxytune.driving import read_robot
 from proxytune.effects import CATALOGUE
 
 FORMS = {form.label: form for form in candidates(ROBOT, TRUTH, ())}
@@ -314,3 +318,60 @@ def test_no_random_effect_stands_for_what_a_car_lacks_beside_it(monkeypatch, dri
     monkeypatch.setattr(selection, "predicts_no_worse", lambda one, other: True)
     best = choose_best(model, Evidence([], {}, (lost,), []), 15.0)
     assert (best is not None) == chosen
+
+
+FAULTS = {"dead_band": 0.12, "steering_lag": 0.3, "steering_friction": 0.4, "marker_offset.forward": 0.1}
+
+
+@pytest.fixture(scope="module")
+def four_faults():
+    """What a search that names nothing leaves of a car with four faults; the steering's lag is 0.1 s by nature."""
+    hidden = ("dead_band", {"width": 0.12}), ("servo", {"figure": 0.3}), ("scrubbing", {"figure": 0.4}), (
+        "marker_offset", {"ahead": 0.1})  # fmt: skip
+    log = hidden_cars.make_log(
+        hidden_cars.Case("car with four faults", hidden, "normal", 5, 0.02, 0.1), episodes=4, seconds=20.0
+    )
+    car = read_robot("car")
+    drives = all_drives(log, car, read_clocks(log, car))
+    model = fit_declared(drives, {"steering_offset": 0.0, "delay": 0.0}, ("steering_offset", "delay"))
+    return Findings(model, model, (), (), (), ())
+
+
+@pytest.fixture(scope="module")
+def together(four_faults):
+    return eliminate(four_faults, lambda line: None)
+
+
+def test_all_faults_of_a_car_are_found_together_and_nothing_beside(together):
+    assert {effect.effect for effect in together.adopted} == {name.split(".")[0] for name in FAULTS}
+    assert {name: together.model.theta[name] for name in FAULTS} == pytest.approx(FAULTS, rel=0.05)
+    assert all(effect.gain > RULES.sure_gain_nats for effect in together.adopted)
+
+
+def test_what_a_second_search_is_to_do_without_is_not_fitted_together_either(four_faults, monkeypatch):
+    monkeypatch.setattr(selection, "OF_CARS", ("dead_band", "steering_lag"))
+    found = eliminate(four_faults, lambda line: None, without=("dead_band",))
+    assert [effect.effect for effect in found.adopted] == ["steering_lag"]
+
+
+def test_what_is_found_together_is_taken_only_where_it_is_surely_more_likely_and_predicts_no_worse(
+    four_faults, together, monkeypatch
+):
+    monkeypatch.setattr(selection, "OF_CARS", tuple(effect.effect for effect in together.adopted))
+    assert eliminate(replace(four_faults, model=together.model), lambda line: None) is None
+    monkeypatch.setattr(selection, "predicts_no_worse", lambda one, other: False)
+    assert eliminate(four_faults, lambda line: None) is None
+
+
+@pytest.mark.parametrize(
+    ("drive", "left", "asked"), [("ackermann", 400.0, 1), ("ackermann", 200.0, 0), ("differential", 400.0, 0)]
+)
+def test_a_car_of_which_the_search_leaves_much_over_is_fitted_with_all_that_cars_have(monkeypatch, drive, left, asked):
+    base = SimpleNamespace(drives=SimpleNamespace(rules=RULES, robot=SimpleNamespace(drive=drive)))
+    found = Findings(base, base, (), (), (curve_over_time(left),), ())
+    looks = []
+    monkeypatch.setattr(selection, "search", lambda base, seed, report, without=(): found)
+    monkeypatch.setattr(selection, "drop_negligible", lambda found, seed: found)
+    monkeypatch.setattr(selection, "eliminate", lambda found, report, without: looks.append(1))
+    assert selection.select_effects(base, 1, lambda line: None) is found
+    assert len(looks) == asked

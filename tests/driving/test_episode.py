@@ -511,15 +511,6 @@ def test_early_metrics_are_those_of_the_first_five_seconds_whatever_comes_after(
     assert result["speed"] == pytest.approx(0.4 / (len(whole) - 1) * 60)
 
 
-@pytest.mark.parametrize("start", [OUTER, INNER], ids=("outer", "inner"))
-def test_straight_on_in_the_lane_distance_is_what_was_driven(start):
-    result = score(drive(start, [(0.5, 0.0)]))
-    assert result["distance"] == pytest.approx(0.5, abs=1e-9)
-    assert result["survival_time"] == pytest.approx(0.5 / SPEED)
-    assert result["time_out_of_lane"] == 0
-    assert result["deviation"] == pytest.approx(0, abs=1e-9)
-
-
 @pytest.mark.parametrize(
     ("start", "lap", "outer"), [(OUTER, OUTER_LAP, True), (INNER, INNER_LAP, False)], ids=("outer", "inner")
 )
@@ -559,11 +550,6 @@ def test_driving_backwards_in_the_lane_counts_negative(start, lap, outer):
     assert result["time_out_of_lane"] == 0
 
 
-def test_back_and_forth_counts_the_net_way():
-    there_and_back = [(0.4, 0.0), (-0.3, 0.0)] * 2
-    assert score(drive(OUTER, there_and_back))["distance"] == pytest.approx(0.2, abs=1e-9)
-
-
 def test_a_stopped_robot_survives_and_gets_nowhere():
     result = score(np.tile(moved_left(OUTER, 0.05), (3601, 1)))
     assert result == {
@@ -575,11 +561,6 @@ def test_a_stopped_robot_survives_and_gets_nowhere():
         "early_offset": pytest.approx(0.05),
         "speed": 0,
     }
-
-
-def test_a_robot_stopped_outside_the_lane_is_out_of_it_all_the_time():
-    result = score(np.tile(moved_left(OUTER, ROAD.lane_width / 2 + 0.001), (601, 1)))
-    assert result["time_out_of_lane"] == result["survival_time"] == pytest.approx(10)
 
 
 def test_survival_ends_at_the_first_pose_off_the_map():
@@ -624,13 +605,6 @@ def zig_zag(amplitude):
     return np.column_stack((x, y, np.arctan2(np.gradient(y), np.gradient(x))))
 
 
-def test_a_zig_zag_in_the_lane_counts_only_its_way_along_the_lane():
-    result = score(zig_zag(0.1))
-    assert result["distance"] == pytest.approx(TILE, abs=1e-9)
-    assert result["time_out_of_lane"] == 0
-    assert result["deviation"] == pytest.approx(0.1 * 2 / pi, abs=0.001)
-
-
 def test_a_zig_zag_across_the_lanes_edges_counts_only_what_is_in_it():
     result = score(zig_zag(0.15))
     inside = 1 - 2 / pi * math.acos(ROAD.lane_width / 2 / 0.15)
@@ -660,12 +634,6 @@ def test_a_u_turn_counts_the_way_in_either_lane_and_no_jump():
     leaves = math.acos(1 - ROAD.lane_width / 2 / OFFSET)
     assert result["distance"] == pytest.approx(0.5 + 2 * OFFSET * math.sin(leaves), abs=0.001)
     assert result["time_out_of_lane"] == pytest.approx((pi - 2 * leaves) * OFFSET / SPEED, abs=0.005)
-
-
-def test_turning_on_the_spot_counts_nothing():
-    heading = np.linspace(0, 40 * pi, 3601)
-    poses = np.column_stack((np.full(3601, OUTER[0]), np.full(3601, TILE * 1.3), heading))
-    assert score(poses)["distance"] == pytest.approx(0, abs=1e-9)
 
 
 @pytest.mark.parametrize("middle", [0.0, 0.1])

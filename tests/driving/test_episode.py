@@ -636,6 +636,12 @@ def test_a_u_turn_counts_the_way_in_either_lane_and_no_jump():
     assert result["time_out_of_lane"] == pytest.approx((pi - 2 * leaves) * OFFSET / SPEED, abs=0.005)
 
 
+def test_turning_on_the_spot_counts_nothing():
+    heading = np.linspace(0, 40 * pi, 3601)
+    poses = np.column_stack((np.full(3601, OUTER[0]), np.full(3601, TILE * 1.3), heading))
+    assert score(poses)["distance"] == pytest.approx(0, abs=1e-9)
+
+
 @pytest.mark.parametrize("middle", [0.0, 0.1])
 def test_crossing_the_middle_of_the_map_counts_nothing_there(middle):
     way = np.linspace(TILE + 0.01, 2 * TILE - 0.01, 200)

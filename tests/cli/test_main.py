@@ -78,6 +78,11 @@ def test_a_mistyped_word_is_answered_with_the_one_that_was_probably_meant(capsys
     assert told.strip().endswith(problem)
 
 
+def test_people_see_a_table(capsys):
+    assert main(["list", "robots"]) == 0
+    assert "duckiebot" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("problem", "status"),
     [(SettingsError("a: b"), 2), (ScoresError("a: b"), 2), (StoreError("a: b"), 1), (EpisodeError("a: b"), 1)],

@@ -1,10 +1,13 @@
 """The command, `python benchmarks/compare.py`: runs are kept and judged, and bad input is one line."""
 
 import json
+import shutil
 import signal
 import subprocess
 import sys
 import time
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 
 import compared_engines
@@ -16,6 +19,7 @@ from processes import ENVIRONMENT, ROOT, besides_progress
 from runs import read_runs
 
 from proxytune.search import registry
+from tests.conftest import blank
 
 FIGURES_DRAWN = True  # also in the quick run: see conftest.py
 FEW = ("--engines", "random,sobol", "--seeds", "2", "--budget", "7", "--initial", "5")
@@ -25,10 +29,26 @@ def compare(*arguments):
     return main([*map(str, arguments)])
 
 
+@pytest.fixture(autouse=True)
+def _blank_from_now_on(monkeypatch):
+    """The first figure is drawn; what is drawn again is of no matter."""
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", blank)
+
+
+@pytest.fixture(scope="module")
+def compared(tmp_path_factory):
+    """The folder of a comparison that was made once, and its document."""
+    folder = tmp_path_factory.mktemp("compared") / "out"
+    with redirect_stdout(StringIO()) as printed:
+        assert compare("analytic", *FEW, "--output", folder, "--json") == 0
+    return folder, json.loads(printed.getvalue())
+
+
 @pytest.fixture
-def document(tmp_path, capsys):
-    assert compare("analytic", *FEW, "--output", tmp_path / "out", "--json") == 0
-    return json.loads(capsys.readouterr().out)
+def document(compared, tmp_path):
+    """The document, and the folder in a place of one's own."""
+    shutil.copytree(compared[0], tmp_path / "out")
+    return compared[1]
 
 
 def test_it_prints_one_document_with_every_engine_and_draws_the_figure(document, tmp_path):

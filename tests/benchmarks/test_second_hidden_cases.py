@@ -287,7 +287,7 @@ def test_every_case_says_what_is_right_or_what_its_effect_depends_on_and_half_ar
 
 
 def test_a_log_is_twelve_minutes_of_20_rows_a_second():
-    log = make_log(CASES["second floor_slope x 0.0 y 0.04"])
+    log = make_log(CLEAN[0])
     assert (log.robot, log.command, log.rate_hz, log.geometry, len(log.episodes)) == ("duckiebot", "duty", 20.0, {}, 12)
     for episode in log.episodes:
         np.testing.assert_allclose(episode.times, np.arange(1200) / 20)

@@ -6,10 +6,10 @@ from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 import pytest
-from circling import circling_log
 from pictured import add_frames, lane_poses, write_still_frames
-from planted import CALM, TRUTH, write_log
+from planted import CALM, RATE_HZ, TRUTH, driven_log, write_log
 
 from proxytune.cli.diagnose import shares as shares_of
 from proxytune.cli.main import main
@@ -71,6 +71,17 @@ def found(stills, tmp_path_factory):
     with redirect_stdout(out), redirect_stderr(err):
         assert main(["diagnose", str(stills), "--output", str(folder)]) == 0
     return Found(folder, json.loads((folder / "diagnosis.json").read_text()), out.getvalue(), err.getvalue())
+
+
+def circling_log(theta, *, noise, episodes=6, seconds=12.0, seed=1):
+    """Drives in small circles, one way round or the other, so that a camera sees markings all the time."""
+    random = np.random.default_rng(seed)
+    rows = round(seconds * RATE_HZ)
+    steps = random.normal(0.0, 0.06, (episodes, rows // 10 + 1, 2)).repeat(10, axis=1)[:, :rows]
+    turn = np.where(np.arange(episodes)[:, None] % 2 == 0, (0.2, 0.34), (0.34, 0.2))
+    places = np.array([(0.29, 0.88), (0.88, 0.29), (1.46, 0.88), (0.88, 1.46), (0.29, 0.5), (1.46, 1.2)])
+    starts = np.column_stack((places[np.arange(episodes) % len(places)], random.uniform(-np.pi, np.pi, episodes)))
+    return driven_log(theta, np.clip(turn[:, None] + steps, 0.0, 1.0), starts, seed=seed, noise=noise)
 
 
 def short_drives(folder):

@@ -143,12 +143,9 @@ def test_a_family_that_records_nothing_is_told_so_before_anything_is_driven(make
 
 BAD = {
     "an unknown agent": (["--agent", "wry"], "agent 'wry' is unknown (your own is written module:attribute)"),
-    "no such start": (["--start", "10"], "start 10: the family has 10; give 0 to 9"),
     "a negative seed": (["--seed", "-1"], "--seed must be at least 0, got -1"),
     "an unknown format": (["--output", "a.bmp"], "unknown format '.bmp'; end the name in .png, .gif or .mp4"),
     "a folder that is a file": (["--output", f"{__file__}/a.png"], "cannot be written there, as "),
-    "an unknown parameter": (["--theta", "trimm=0"], "θ: unknown parameter 'trimm'; did you mean 'trim'"),
-    "a value out of bounds": (["--theta", "trim=7"], "θ: trim must lie within"),
     "a θ that is none": (["--theta", "well"], "--theta well: write NAME=VALUE,NAME=VALUE, best, nominal or a model"),
     "a best θ before any trial": (["--theta", "best"], "has no finished trial; run it first"),
     "no such model": (["--against", "no.toml"], "--against no.toml: no such file; check the path"),

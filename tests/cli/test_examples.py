@@ -20,6 +20,9 @@ def test_every_example_is_understood(line):
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_help_shows_the_examples_as_they_are_typed(command, capsys):
-    with pytest.raises(SystemExit):
+    with pytest.raises(SystemExit) as end:
         main([command, "--help"])
-    assert epilog(command, "python -m proxytune") in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert end.value.code == 0
+    assert "--json" in told
+    assert epilog(command, "python -m proxytune") in told

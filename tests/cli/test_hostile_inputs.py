@@ -6,23 +6,15 @@ import warnings
 
 import foreign_robot
 import pytest
-from processes import besides_progress
+from processes import refused
 from tiny_loop import TWIN, write_tiny
 
 from proxytune.cli.main import main
 from proxytune.report.writing import file_names
+from tests.conftest import blank
 
 FIGURES_DRAWN = True  # also in the quick run: see conftest.py
 TABLE = "agent,episode,d\n" + "".join(f"{a},{e},{i + 0.1 * e}\n" for i, a in enumerate("ABC") for e in (0, 1))
-
-
-def refused(capsys, *words):
-    """The one line of a command that is refused as bad input."""
-    assert main([*map(str, words)]) == 2
-    out, told = capsys.readouterr()
-    told = besides_progress(told)
-    assert (out, told.count("\n")) == ("", 1)
-    return told
 
 
 @pytest.fixture
@@ -41,19 +33,21 @@ def table(tmp_path, monkeypatch):
     ],
 )
 def test_score_refuses_what_would_take_for_ever_or_overflow(table, capsys, words, says):
-    assert says in refused(capsys, *table, "d:max", *words)
+    assert says in refused(capsys, 2, *table, "d:max", *words)
 
 
-@pytest.mark.parametrize("name", [r"$\frac$", "a$b$", "tab\x01le", "p" * 500])
-def test_names_are_drawn_as_they_are_and_without_a_word(table, tmp_path, capsys, name):
-    (tmp_path / "t.csv").write_text(TABLE.replace("A,", f"{name},").replace("d\n", f"{name}\n", 1))
+@pytest.mark.parametrize("metric", [r"$\frac$", "p" * 500])
+def test_names_are_drawn_as_they_are_and_without_a_word(table, tmp_path, capsys, metric):
+    text = TABLE.replace("A,", "a$b$,").replace("B,", "tab\x01le,").replace("C,", f"{metric},")
+    (tmp_path / "t.csv").write_text(text.replace("d\n", f"{metric}\n", 1))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert main([*table, f"{name}:max", "--output", "F", "--resamples", "100"]) == 0
+        assert main([*table, f"{metric}:max", "--output", "F", "--resamples", "100"]) == 0
     assert capsys.readouterr().err == ""
 
 
-def test_names_that_are_alike_in_file_names_have_files_of_their_own(table, tmp_path, capsys):
+def test_names_that_are_alike_in_file_names_have_files_of_their_own(table, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", blank)
     assert file_names(["a b", "a/b", "a_b_2", "c"]) == {"a b": "a_b", "a/b": "a_b_2", "a_b_2": "a_b_2_2", "c": "c"}
     lines = TABLE.splitlines()
     both = [f"{domain},{line}" for domain in ("a b", "a/b") for line in lines[1:]]
@@ -67,7 +61,7 @@ def test_names_that_are_alike_in_file_names_have_files_of_their_own(table, tmp_p
 
 def test_scores_whose_squares_are_no_numbers_are_refused_or_have_no_spread(table, tmp_path, capsys):
     (tmp_path / "t.csv").write_text(TABLE.replace("0.1\n", "1e99\n", 1))
-    assert "got '1e99'; give it in another unit" in refused(capsys, *table, "d:max")
+    assert "got '1e99'; give it in another unit" in refused(capsys, 2, *table, "d:max")
     rows = [f"{agent},{number}e-320" for number, agent in enumerate("ABCD", start=1)]
     (tmp_path / "t.csv").write_text("\n".join(["agent,d", *rows]) + "\n")
     with warnings.catch_warnings():
@@ -85,12 +79,12 @@ ENDLESS = {
 @pytest.mark.parametrize("command", ENDLESS)
 def test_what_would_never_end_is_not_begun(command, make_study, capsys):
     words, says = ENDLESS[command]
-    assert says in refused(capsys, command, make_study(), *words)
+    assert says in refused(capsys, 2, command, make_study(), *words)
 
 
 def test_a_folder_in_place_of_a_table_is_told_before_anything_is_simulated(make_study, tmp_path, capsys):
     (tmp_path / "m.toml").write_text("trim = 0.1\n")
-    told = refused(capsys, "measure", make_study(), "--model", tmp_path / "m.toml", "--output", tmp_path)
+    told = refused(capsys, 2, "measure", make_study(), "--model", tmp_path / "m.toml", "--output", tmp_path)
     assert re.search(r": is a folder; give the name of a file in it", told)
 
 
@@ -116,12 +110,12 @@ def test_a_file_of_gigabytes_that_takes_no_place_on_a_disk_is_not_read(make_stud
     monkeypatch.chdir(folder)
     with open(name, "ab") as sparse:
         sparse.truncate(3 << 30)
-    assert "it has 3221 MB, of " in refused(capsys, *SPARSE[name])
+    assert "it has 3221 MB, of " in refused(capsys, 2, *SPARSE[name])
 
 
 def test_who_means_a_large_file_may_allow_it(make_study, monkeypatch, capsys):
     monkeypatch.setattr("proxytune.settings.SETTINGS_MB", 1e-5)
     folder = make_study()
-    assert "PROXYTUNE_LARGEST_MB=1" in refused(capsys, "repair", folder)
+    assert "PROXYTUNE_LARGEST_MB=1" in refused(capsys, 2, "repair", folder)
     monkeypatch.setenv("PROXYTUNE_LARGEST_MB", "1")
-    assert "study.db: no such file; there is nothing to repair" in refused(capsys, "repair", folder)
+    assert "study.db: no such file; there is nothing to repair" in refused(capsys, 2, "repair", folder)

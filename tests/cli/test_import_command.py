@@ -48,12 +48,6 @@ def test_the_log_reads_back_with_robot_figures_and_offset(capsys, table, tmp_pat
     assert (log.robot, log.command, log.clock_offset_s, len(log.episodes)) == ("nobodys", "twist", -0.25, 2)
 
 
-def test_two_clocks_are_told_before_anything_is_fitted(capsys, table):
-    found = document(capsys, str(table))
-    assert all(drive["lag_s"] < -0.05 for drive in found["drives"])
-    assert any("turn before they are told to" in note for note in found["notes"])
-
-
 def test_people_read_tables_of_what_there_is_and_of_the_drives(capsys, table):
     assert main(["import", str(table)]) == 0
     text = capsys.readouterr().out
@@ -97,13 +91,6 @@ def test_a_table_of_the_other_kind_of_drive_is_refused_before_anything_is_writte
     said = complaint(capsys, str(tmp_path / "drive.csv"), str(tmp_path / "log"), "--robot", robot)
     assert f"are not for robot '{robot}'" in said
     assert not (tmp_path / "log").exists()
-
-
-def test_an_output_that_is_there_is_left_alone(capsys, table, tmp_path):
-    (tmp_path / "log").mkdir()
-    (tmp_path / "log" / "mine").write_text("kept")
-    assert "is there already" in complaint(capsys, str(table), str(tmp_path / "log"))
-    assert [path.name for path in (tmp_path / "log").iterdir()] == ["mine"]
 
 
 @pytest.fixture

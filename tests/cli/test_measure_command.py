@@ -49,13 +49,6 @@ def test_repeats_are_labelled_and_one_gives_the_table_of_none_asked_for(measured
     assert (found.values[:, ::2] == read_scores(plain, ["distance"]).values).all()
 
 
-def test_no_repeat_at_all_is_refused(measured, capsys):
-    status, output = measured("one.csv", "--repeats", "0")
-    assert status == 2
-    assert "--repeats must be between 1 and 1000000, got 0" in capsys.readouterr().err
-    assert not output.exists()
-
-
 def test_the_document_names_the_seed_and_the_means(measured, capsys):
     measured("one.csv", "--json")
     document = json.loads(capsys.readouterr().out)

@@ -122,23 +122,15 @@ def test_bad_input_is_one_line_and_nothing_is_written(case, folder, model, tmp_p
     assert not (tmp_path / "p.csv").exists()
 
 
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
-        ("format = 1\n", "robot"),
-        ('format = 1\nrobot = "duckiebot"\n[effects.dead_bnd]\nwidth = 0.1\n', "no such effect"),
-        ('format = 1\nrobot = "duckiebot"\n[effects.trim]\ntrim = 7\n', "trim"),
-        ("format = \n", "model.toml"),
-    ],
-)
-def test_a_model_that_cannot_be_read_is_told_with_its_file(text, says, folder, tmp_path, capsys):
+def test_a_model_that_cannot_be_read_is_told_with_its_file(folder, tmp_path, capsys):
+    text = 'format = 1\nrobot = "duckiebot"\n[effects.dead_bnd]\nwidth = 0.1\n'
     (tmp_path / "model.toml").write_text(text, encoding="utf-8")
     output = tmp_path / "p.csv"
     assert main(["predict", str(tmp_path / "model.toml"), str(folder), "--output", str(output)]) == 2
     err = capsys.readouterr().err
     assert err.count("\n") == 1
     assert "model.toml" in err
-    assert says in err
+    assert "no such effect" in err
 
 
 def test_a_log_without_commands_cannot_be_predicted(model, tmp_path, capsys):

@@ -9,6 +9,7 @@ import pytest
 from pictured import lane_poses, pictures, write_still_frames
 from PIL import Image
 from planted import TRUTH, planted_log, write_log
+from processes import refused
 
 from proxytune.cli.main import main
 from proxytune.effects import Model, model_text
@@ -39,13 +40,6 @@ def model(folder, theta):
     path = folder / "model.toml"
     path.write_text(model_text(Model("duckiebot", None, theta, {})), encoding="utf-8")
     return path
-
-
-def refused(capsys, *words):
-    assert main(["predict", *map(str, words), "--json"]) == 2
-    out, err = capsys.readouterr()
-    assert (out, err.count("\n")) == ("", 1)
-    return err
 
 
 def test_the_true_model_draws_the_very_pictures_and_the_nominal_one_others(predicted, tmp_path):
@@ -84,12 +78,12 @@ def test_people_read_the_difference_in_grey_levels(stills, tmp_path, capsys):
 
 def test_a_log_without_frames_is_refused(tmp_path, capsys):
     folder = write_log(planted_log(TRUTH, episodes=1, seconds=5.0), tmp_path / "log")
-    line = refused(capsys, model(tmp_path, {}), folder, "--frames", "--output", tmp_path / "out")
+    line = refused(capsys, 2, "predict", model(tmp_path, {}), folder, "--frames", "--output", tmp_path / "out")
     assert "has no frames to predict; add [camera] to log.toml, or leave --frames out" in line
     assert not (tmp_path / "out").exists()
 
 
 def test_frames_alone_have_no_poses_to_predict(stills, tmp_path, capsys):
-    line = refused(capsys, model(tmp_path, {}), stills, "--output", tmp_path / "poses.csv")
+    line = refused(capsys, 2, "predict", model(tmp_path, {}), stills, "--output", tmp_path / "poses.csv")
     assert "has no commands to predict poses from; give a log of drives, or give --frames" in line
     assert not (tmp_path / "poses.csv").exists()

@@ -4,20 +4,9 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from processes import besides_progress, trials
+from processes import besides_progress, refused, trials
 
 from proxytune.cli.main import main
-
-
-def refused(capsys, status, *arguments):
-    """The one line on standard error of a command that is refused."""
-    assert main([str(argument) for argument in arguments]) == status
-    out, told = capsys.readouterr()
-    told = besides_progress(told)
-    assert out == ""
-    assert told.count("\n") == 1
-    assert "Traceback" not in told
-    return told
 
 
 def test_a_study_runs_and_prints_one_document_and_a_second_time_simulates_nothing(make_study, capsys):
@@ -50,16 +39,6 @@ def test_people_see_the_best_theta_and_where_the_figure_is(finished, capsys):
     assert f"figures: {finished / 'figures'}" in out.replace("\n", "")
     assert f"report: {finished / 'report.html'}" in out.replace("\n", "")
     assert told == ""
-
-
-def test_failed_episodes_are_said_at_the_end(make_study, capsys):
-    assert main(["study", str(make_study(domain={"faults": '["agent3:1:raises"]'}))]) == 0
-    assert "7 of 126 episodes; the first:" in capsys.readouterr().out
-
-
-def test_a_failure_that_stops_the_study_is_one_line_and_exit_1(make_study, capsys):
-    folder = make_study(domain={"faults": '["agent3:1:raises"]'}, on_failure='"stop"')
-    assert "agent 'agent3' failed from start 1" in refused(capsys, 1, "study", folder)
 
 
 def test_bad_input_is_one_line_and_exit_2(make_study, capsys):
@@ -102,12 +81,12 @@ def test_without_a_terminal_every_trial_is_a_plain_line_with_its_prpv_the_best_a
     assert main(["study", str(folder), "--json"]) == 0
     out, told = capsys.readouterr()
     lines = [line for line in told.splitlines() if "study: page: " not in line]
-    assert lines[0].endswith("pre-flight 1 of 2 begins; at most 216 episodes") or "pre-flight 1 of 2 begins" in lines[0]
+    assert "pre-flight 1 of 2 begins" in lines[0]
     said = [line.partition(" s: ")[2] for line in lines if " begins" not in line]
     found = json.loads(out)
     assert [line.partition(";")[0] for line in said[:2]] == ["pre-flight 1 of 2", "pre-flight 2 of 2"]
     trials = [line for line in said if line.startswith("trial ")]
-    assert len(trials) == found["trials"] if isinstance(found["trials"], int) else len(found["trials"])
+    assert len(trials) == len(found["trials"])
     assert all(
         re.fullmatch(r"trial \d of 7: .*PRPV .*, best so far \d+; \d+ of at most \d+ episodes", t) for t in trials
     )
@@ -131,7 +110,7 @@ def test_a_study_of_a_lowered_budget_goes_on_to_the_trials_it_would_have_had(mak
     assert trials(folder) == trials(finished)
 
 
-@pytest.mark.parametrize(("option", "value"), [("budget", "0"), ("budget", "100001"), ("jobs", "-1"), ("jobs", "1025")])
+@pytest.mark.parametrize(("option", "value"), [("budget", "0"), ("jobs", "1025")])
 def test_a_budget_or_jobs_out_of_bounds_are_refused(make_study, capsys, option, value):
     line = refused(capsys, 2, "study", make_study(), f"--{option}={value}")
     assert f"{option} must be between 1 and " in line
@@ -151,11 +130,6 @@ def test_why_a_study_has_ended_is_said(make_study, capsys):
 
 def test_a_folder_without_a_study_is_refused(tmp_path, capsys):
     assert "has no study.toml; give the folder of a study" in refused(capsys, 2, "study", tmp_path)
-
-
-def test_a_corrupt_database_is_one_line_and_exit_1(finished, capsys):
-    (finished / "study.db").write_bytes(b"x" * 5000)
-    assert "study.db: is damaged" in refused(capsys, 1, "study", finished)
 
 
 @pytest.fixture

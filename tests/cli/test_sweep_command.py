@@ -124,12 +124,10 @@ BAD = {
         ["--parameter", "trimm"],
         "no parameter 'trimm' in this study's domain family; did you mean",
     ),
-    "an unknown parameter held": (["--parameter", "trim", "--at", "dely=0.1"], "no parameter 'dely'"),
     "a value beyond its bounds": (
         ["--parameter", "trim", "--at", "delay=7"],
         "'delay': must lie within [0, 0.3], got 7",
     ),
-    "no such model": (["--parameter", "trim", "--target-model", "no.toml"], "--target-model no.toml: no such file"),
     "a family that cannot replay": (
         ["--parameter", "trim", "--target-model", __file__],
         "wobbly:wobbly has no `drive` and `replay`",

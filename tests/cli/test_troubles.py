@@ -6,9 +6,10 @@ import resource
 import shutil
 import sqlite3
 import subprocess
+from pathlib import Path
 
 import pytest
-from processes import besides_progress, episodes, start, trials
+from processes import besides_progress, episodes, refused, start, trials
 from stopping import Stopping
 
 from proxytune.cli.main import main
@@ -29,12 +30,17 @@ def interrupted_after(folder, count):
         run_trials(study_run, make_proposer("gp", study.settings.initial))
 
 
-@pytest.fixture
-def half(make_study):
-    """A study stopped in the middle of its fifth trial."""
-    folder = make_study("half")
+@pytest.fixture(scope="module")
+def half_once(make_studies):
+    folder = make_studies("half")
     interrupted_after(folder, 80)
     return folder
+
+
+@pytest.fixture
+def half(half_once, tmp_path):
+    """A study stopped in the middle of its fifth trial, where `make_study` edits it."""
+    return Path(shutil.copytree(half_once, tmp_path / "half"))
 
 
 def run(*words, status=0, **how):
@@ -45,15 +51,6 @@ def run(*words, status=0, **how):
     assert process.returncode == status, told
     if status == 0:
         return out
-    assert (out, told.count("\n")) == ("", 1)
-    return told
-
-
-def refused(capsys, status, *words):
-    """The one line of a command run in this process."""
-    assert main([*map(str, words)]) == status
-    out, told = capsys.readouterr()
-    told = besides_progress(told)
     assert (out, told.count("\n")) == ("", 1)
     return told
 
@@ -104,8 +101,8 @@ def test_a_folder_in_its_place_is_told(half, capsys):
     told_by_every_command(half, capsys, "is a folder, so no study's database; move it away")
 
 
-CUTS = [1, 4096, -4096, -1]
-MORE_CUTS = [50, 100, 512, 5000, 3 * 4096, -2 * 4096, -4095]
+CUTS = [4096, -1]
+MORE_CUTS = [1, 50, 100, 512, 5000, 3 * 4096, -2 * 4096, -4096, -4095]
 
 
 @pytest.mark.parametrize("cut", [*CUTS, *(pytest.param(cut, marks=slow) for cut in MORE_CUTS)])
@@ -130,7 +127,7 @@ def test_with_the_truncated_database_restored_the_study_goes_on(half, finished, 
     goes_on(half, finished)
 
 
-@pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.9, 0.999])
+@pytest.mark.parametrize("share", [0.0, 0.5, *(pytest.param(one, marks=slow) for one in (0.1, 0.9, 0.999))])
 def test_a_write_ahead_log_cut_off_by_a_crash_costs_only_what_was_cut_off(make_study, finished, share):
     """As a machine without power may leave it: what is lost is simulated again, to the same trials."""
     folder, crashed = make_study("half"), make_study("crashed")

@@ -27,15 +27,6 @@ CAMERA = GroundPlaneCamera(ROBOT.camera_figures(), draw_floor(SMALL_LOOP))
 EAST_LANE_X = 2.5 * SMALL_LOOP.width + SMALL_LOOP.lane_offset
 
 
-def pictures():
-    random = np.random.default_rng(0)
-    shape = (int(ROBOT.figures["camera_rows"]), int(ROBOT.figures["camera_columns"]), 3)
-    yield np.zeros(shape, dtype=np.uint8)
-    yield np.full(shape, 255, dtype=np.uint8)
-    yield random.integers(0, 256, shape, dtype=np.uint8)
-    yield from CAMERA.render(np.array([(EAST_LANE_X, 0.8, np.pi / 2), (0.9, 0.9, 0.3), (-0.5, 3.0, 1.0)]))
-
-
 def seen_from(left=0.0, turned=0.0):
     """The picture from the outer lane of the eastern straight, shifted to the left [m] and turned left [rad]."""
     return CAMERA.render(np.array([(EAST_LANE_X - left, 0.62, np.pi / 2 + turned)]))[0]
@@ -44,25 +35,6 @@ def seen_from(left=0.0, turned=0.0):
 @pytest.mark.parametrize("name", AGENTS)
 def test_every_agent_keeps_what_agents_promise(name):
     check_agent(AGENTS[name], robot=ROBOT)
-
-
-@pytest.mark.parametrize("name", AGENTS)
-def test_every_picture_is_answered_with_two_finite_duties(name):
-    memory = AGENTS[name].begin(ROBOT)
-    for picture in pictures():
-        command, memory = AGENTS[name].act(picture, memory)
-        assert command.shape == (2,)
-        assert np.isfinite(command).all()
-        assert np.abs(command).max() <= 1.0
-
-
-@pytest.mark.parametrize("name", AGENTS)
-def test_acting_leaves_agent_and_memory_as_they_were(name):
-    first = AGENTS[name].begin(ROBOT)
-    scenes = list(pictures())
-    once = [AGENTS[name].act(picture, first)[0] for picture in scenes]
-    again = [AGENTS[name].act(picture, first)[0] for picture in scenes]
-    np.testing.assert_array_equal(once, again)
 
 
 def test_the_agents_differ_from_each_other():

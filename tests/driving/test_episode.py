@@ -6,7 +6,6 @@ Lane following scores hand-made drives as its definitions say.
 
 import dataclasses
 import functools
-import itertools
 import math
 from math import pi
 
@@ -33,7 +32,7 @@ from proxytune.driving import (
 )
 from proxytune.driving.episode import driving_score
 from proxytune.driving.plants import PlanarPlant, integrate
-from proxytune.effects import CATALOGUE, DECLARED, PARAMETERS, FilterContext, Stage, effects_from, theta_names
+from proxytune.effects import CATALOGUE, PARAMETERS, FilterContext, Stage, effects_from, theta_names
 from proxytune.errors import EpisodeError, SettingsError
 from proxytune.settings import Section
 
@@ -108,15 +107,6 @@ def test_a_failing_agents_episode_says_what_happened_and_when(tmp_path, name, sa
         poses(family(tmp_path), agent=f"bad_agents:{name}")
     assert str(caught.value).startswith(says)
     assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize("name", DECLARED)
-def test_each_declared_parameter_moves_an_agents_trajectory(tmp_path, name):
-    domain = family(tmp_path, plant="planar", seconds=8.0)
-    parameter = PARAMETERS[name]
-    low, high = (poses(domain, agent="wary", **{name: value}) for value in (parameter.probes[0], parameter.probes[-1]))
-    shared = min(len(low), len(high))
-    assert np.abs(low[:shared] - high[:shared]).max() > 0.01
 
 
 def strongest(theta_name):
@@ -228,7 +218,6 @@ def test_what_determines_a_result_determines_the_identity(tmp_path):
         ({"robot": "duckybot"}, "domain.robot: unknown value 'duckybot'; did you mean 'duckiebot'?"),
         ({"plant": "bulet"}, "domain.plant: unknown value 'bulet'; did you mean 'bullet'?"),
         ({"camera": "eye"}, "domain.camera: unknown value 'eye'"),
-        ({"map": "smal_loop"}, "domain.map: unknown value 'smal_loop'; did you mean 'small_loop'?"),
         ({"seconds": 0.0}, "domain.seconds: must be between"),
         ({"position_noise_m": float("nan")}, "domain.position_noise_m: must be finite"),
         ({"effects": {"trim": {"trim": 3.0}}}, "domain.effects.trim.trim: must be between"),
@@ -246,30 +235,6 @@ def test_a_model_of_another_plant_is_not_overruled_in_silence(tmp_path):
     assert family(tmp_path, model=model).plant == "planar"
     with pytest.raises(SettingsError, match="is 'bullet' but the model says 'planar'"):
         family(tmp_path, model=model, plant="bullet")
-
-
-def test_pictures_come_at_the_cameras_rate(tmp_path):
-    seen = []
-
-    class Watcher:
-        def begin(self, robot):
-            return None
-
-        def act(self, picture, memory):
-            seen.append(picture)
-            return (0.3, 0.35), None
-
-    from proxytune.driving import family as module
-
-    domain = family(tmp_path, plant="planar")
-    original = module.load_agent
-    module.load_agent = lambda name, folder: Watcher()
-    try:
-        poses(domain)
-    finally:
-        module.load_agent = original
-    fresh = [not np.array_equal(a, b) for a, b in itertools.pairwise(seen)]
-    assert sum(fresh[20:40]) == 15
 
 
 @pytest.mark.parametrize("plant", ["bullet", "planar"])
@@ -290,10 +255,6 @@ def test_the_same_commands_look_different_through_another_camera(tmp_path):
     )
     np.testing.assert_array_equal(level.poses, steep.poses)
     assert np.abs(level.pictures.astype(float) - steep.pictures).mean() > 5.0
-
-
-def test_camera_effects_are_those_of_the_camera_stage():
-    assert sum(effect.stage is Stage.CAMERA for effect in CATALOGUE.values()) == 9
 
 
 LEARNT = """
@@ -379,7 +340,7 @@ def test_one_wheel_at_full_duty_turns_at_3_75_radians_per_second_within_3_percen
 
 
 @pytest.mark.parametrize("plant", PLANTS)
-@pytest.mark.parametrize(("duty", "trim"), [(0.5, 0.1), (1.0, 0.1), (0.5, 0.3), (0.3, -0.2), (0.6, -0.05)])
+@pytest.mark.parametrize(("duty", "trim"), [(1.0, 0.1), (0.3, -0.2)])
 def test_trim_curves_the_path_by_12_5_per_metre_within_3_percent(plant, duty, trim):
     last = poses_for(plant, held(duty, duty), trim=trim)[-121:]
     curvature = (last[-1, 2] - last[0, 2]) / (speeds(last).sum() * TICK_S)
@@ -392,7 +353,7 @@ def mixed_driving(seed):
     return np.repeat(np.clip(steps, -1.0, 1.0), 30, axis=0)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_bullet_and_planar_agree_within_2_cm_and_3_degrees_after_5_seconds_of_mixed_driving(seed):
     apart = poses_for("bullet", mixed_driving(seed))[-1] - poses_for("planar", mixed_driving(seed))[-1]
     assert np.hypot(*apart[:2]) < 0.02
@@ -415,11 +376,6 @@ def test_bullet_and_planar_agree_with_every_effect_on_how_the_robot_moves(name, 
         assert abs(np.degrees(apart[2])) < degrees
         moved.append(np.abs(planar - poses_for("planar", duties)).max())
     assert max(moved) > 0.005
-
-
-@pytest.mark.parametrize("plant", PLANTS)
-def test_the_same_twists_give_the_same_poses_to_the_last_bit(plant):
-    np.testing.assert_array_equal(poses_for(plant, held(0.6, 0.4, 1)), poses_for(plant, held(0.6, 0.4, 1)))
 
 
 @pytest.mark.parametrize("plant", PLANTS)
@@ -555,15 +511,6 @@ def test_early_metrics_are_those_of_the_first_five_seconds_whatever_comes_after(
     assert result["speed"] == pytest.approx(0.4 / (len(whole) - 1) * 60)
 
 
-@pytest.mark.parametrize("start", [OUTER, INNER], ids=("outer", "inner"))
-def test_straight_on_in_the_lane_distance_is_what_was_driven(start):
-    result = score(drive(start, [(0.5, 0.0)]))
-    assert result["distance"] == pytest.approx(0.5, abs=1e-9)
-    assert result["survival_time"] == pytest.approx(0.5 / SPEED)
-    assert result["time_out_of_lane"] == 0
-    assert result["deviation"] == pytest.approx(0, abs=1e-9)
-
-
 @pytest.mark.parametrize(
     ("start", "lap", "outer"), [(OUTER, OUTER_LAP, True), (INNER, INNER_LAP, False)], ids=("outer", "inner")
 )
@@ -603,11 +550,6 @@ def test_driving_backwards_in_the_lane_counts_negative(start, lap, outer):
     assert result["time_out_of_lane"] == 0
 
 
-def test_back_and_forth_counts_the_net_way():
-    there_and_back = [(0.4, 0.0), (-0.3, 0.0)] * 2
-    assert score(drive(OUTER, there_and_back))["distance"] == pytest.approx(0.2, abs=1e-9)
-
-
 def test_a_stopped_robot_survives_and_gets_nowhere():
     result = score(np.tile(moved_left(OUTER, 0.05), (3601, 1)))
     assert result == {
@@ -619,11 +561,6 @@ def test_a_stopped_robot_survives_and_gets_nowhere():
         "early_offset": pytest.approx(0.05),
         "speed": 0,
     }
-
-
-def test_a_robot_stopped_outside_the_lane_is_out_of_it_all_the_time():
-    result = score(np.tile(moved_left(OUTER, ROAD.lane_width / 2 + 0.001), (601, 1)))
-    assert result["time_out_of_lane"] == result["survival_time"] == pytest.approx(10)
 
 
 def test_survival_ends_at_the_first_pose_off_the_map():
@@ -649,8 +586,7 @@ def test_nothing_after_the_time_limit_is_scored():
     assert score(poses)["survival_time"] == 60
 
 
-@pytest.mark.parametrize("rate", [20.0, 30.0, 60.0, 100.0])
-@pytest.mark.parametrize("seconds", [0.3, 0.7, 1.1, 60.0])
+@pytest.mark.parametrize(("rate", "seconds"), [(20.0, 0.3), (30.0, 0.7), (100.0, 1.1), (60.0, 60.0)])
 def test_a_survivor_survives_for_the_whole_duration(rate, seconds):
     still = np.tile(OUTER, (round(seconds * rate) + 5, 1))
     assert score(still, rate, seconds)["survival_time"] == pytest.approx(seconds)
@@ -667,13 +603,6 @@ def zig_zag(amplitude):
     y = np.linspace(TILE, 2 * TILE, 601)
     x = OUTER[0] - amplitude * np.sin((y - TILE) / TILE * 4 * pi)
     return np.column_stack((x, y, np.arctan2(np.gradient(y), np.gradient(x))))
-
-
-def test_a_zig_zag_in_the_lane_counts_only_its_way_along_the_lane():
-    result = score(zig_zag(0.1))
-    assert result["distance"] == pytest.approx(TILE, abs=1e-9)
-    assert result["time_out_of_lane"] == 0
-    assert result["deviation"] == pytest.approx(0.1 * 2 / pi, abs=0.001)
 
 
 def test_a_zig_zag_across_the_lanes_edges_counts_only_what_is_in_it():
@@ -721,24 +650,13 @@ def test_crossing_the_middle_of_the_map_counts_nothing_there(middle):
     assert score(poses)["time_out_of_lane"] == score(poses)["survival_time"]
 
 
-@pytest.mark.parametrize("seed", range(8))
-@pytest.mark.parametrize("rate", [20, 30])
+@pytest.mark.parametrize(("seed", "rate"), [(0, 20), (1, 20), (2, 30)])
 def test_the_sampling_rate_hardly_matters(seed, rate):
     curvatures = 1 / OUTER_RADIUS * np.array([0, 0, 0, 1, 1, 1, 1] * 8) + np.random.default_rng(seed).normal(0, 2, 56)
     fine = drive(OUTER, [(0.2, float(curvature)) for curvature in curvatures])
     coarse = fine[:: 60 // rate]
     for metric, bound in (("distance", 0.02), ("survival_time", 0.06), ("time_out_of_lane", 0.1), ("deviation", 0.002)):
         assert score(coarse, rate)[metric] == pytest.approx(score(fine)[metric], abs=bound), metric
-
-
-@quick
-@given(st.integers(0, 10**6), st.integers(1, 3))
-def test_a_quarter_turn_of_the_map_changes_no_score(seed, quarters):
-    poses = wandering(seed)
-    angle = quarters * pi / 2
-    turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
-    turned = np.column_stack(((poses[:, :2] - MIDDLE) @ turn + MIDDLE, poses[:, 2] + angle))
-    assert score(turned) == pytest.approx(score(poses), abs=1e-9)
 
 
 @quick
@@ -754,17 +672,7 @@ def test_the_parts_of_a_drive_add_up(seed, share):
     assert areas[0] + areas[1] == pytest.approx(areas[2], abs=1e-9)
 
 
-@quick
-@given(st.integers(0, 10**6))
-def test_scores_are_finite_and_time_out_of_lane_lies_within_survival(seed):
-    result = score(wandering(seed), seconds=4.0)
-    assert all(map(math.isfinite, result.values()))
-    assert 0 <= result["time_out_of_lane"] <= result["survival_time"] <= 4
-    assert result["deviation"] >= 0
-
-
-@pytest.mark.parametrize("column", range(3))
-@pytest.mark.parametrize("value", [math.nan, math.inf])
+@pytest.mark.parametrize(("column", "value"), [(0, math.inf), (2, math.nan)])
 def test_a_pose_that_is_not_finite_is_refused_with_its_time(column, value):
     poses = drive(OUTER, OUTER_LAP)
     poses[30:, column] = value
@@ -778,12 +686,6 @@ BOTH_IN, ONE_OUT, BOTH_OUT = 0.0, ROAD.lane_width / 2 - 0.01, ROAD.lane_width / 
 
 def worth(poses, rate=60.0, seconds=60.0, wheels=WHEELS):
     return driving_score(ROAD, poses, wheel_distance=wheels, tick_s=1 / rate, seconds=seconds)
-
-
-@pytest.mark.parametrize(("start", "lap"), [(OUTER, OUTER_LAP), (INNER, INNER_LAP)], ids=("outer", "inner"))
-def test_every_second_in_the_lane_is_worth_one(start, lap):
-    poses = drive(start, lap)
-    assert worth(poses) == pytest.approx((len(poses) - 1) / 60)
 
 
 @pytest.mark.parametrize("start", [OUTER, INNER], ids=("outer", "inner"))
@@ -813,12 +715,6 @@ def test_the_wrong_way_round_both_wheels_are_out_of_the_lane():
     assert worth(wrong) == pytest.approx(-(len(wrong) - 1) / 60)
 
 
-@pytest.mark.parametrize(("left", "each_second"), [(BOTH_IN, 1.0), (ONE_OUT, 0.0), (BOTH_OUT, -1.0)])
-def test_standing_counts_as_driving(left, each_second):
-    x, y, heading = moved_left(OUTER, left)
-    assert worth(np.tile((x, y + 0.2, heading), (3601, 1))) == pytest.approx(60.0 * each_second)
-
-
 def test_half_a_step_across_the_lanes_edge_counts_for_either_side():
     poses = np.array([moved_left(OUTER, BOTH_IN), moved_left(OUTER, BOTH_OUT)])
     assert worth(poses) == pytest.approx(0.0)
@@ -831,12 +727,6 @@ def test_a_drive_is_worth_nothing_more_once_it_has_left_the_map():
     assert gone < len(out)
     assert worth(np.vstack((out[:gone], drive(OUTER, OUTER_LAP)))) == worth(out[:gone])
     assert worth(out[:gone]) < (gone - 1) / 60
-
-
-def test_a_drive_is_worth_nothing_more_once_time_is_over():
-    poses = drive(OUTER, OUTER_LAP * 5)
-    assert worth(poses, seconds=10.0) == pytest.approx(10.0)
-    assert worth(poses[:1]) == 0.0
 
 
 @quick
@@ -854,13 +744,6 @@ def test_without_a_distance_between_them_both_wheels_are_out_when_the_axles_midd
     result = score(wandering(seed))
     expected = result["survival_time"] - 2.0 * result["time_out_of_lane"]
     assert worth(wandering(seed), wheels=0.0) == pytest.approx(expected, abs=1e-9)
-
-
-def test_a_drive_with_a_pose_that_is_not_finite_is_worth_nothing_but_an_error():
-    poses = drive(OUTER, OUTER_LAP)
-    poses[30:, 2] = math.nan
-    with pytest.raises(EpisodeError, match=r"not finite at 0\.50 s"):
-        worth(poses)
 
 
 def exact_start(index, **noise):

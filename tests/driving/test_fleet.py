@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from proxytune.domain import BatchClassroom, Demonstration, make_episode
+from proxytune.domain import Demonstration, make_episode
 from proxytune.driving import LaneFollowing, drive, lane_following
 from proxytune.driving.expert import Pupil
 from proxytune.driving.fleet import AT_ONCE, drive_fleet, fleet_at, plant_at
@@ -72,7 +72,6 @@ def assert_same(alone, together):
 
 
 INSTANCES = {
-    "the twin of studies/teacher": {"model": TWIN},
     "noise in every picture": {"effects": {"image_noise": 9.0, "blur": 0.04}},
     "late and lost commands": {"effects": {"delay_jitter": 0.1, "dropped_commands": 0.2, "delay": 0.07}},
     "other pictures": {"effects": {"rolling_shutter": 0.03, "defocus": 0.01, "exposure.gamma": 1.3}},
@@ -82,9 +81,13 @@ INSTANCES = {
 
 @pytest.mark.parametrize("plant", [pytest.param("bullet", marks=pytest.mark.slow), "planar"])
 @pytest.mark.parametrize("how", INSTANCES.values(), ids=INSTANCES.keys())
+def test_each_robot_drives_to_the_bit_as_it_does_by_itself(plant, how):
+    assert_same(*alone_and_together(classroom(plant=plant, **how, seconds=1.5), episodes(3), lean))
+
+
 @pytest.mark.parametrize("policy", [lean, cloned()], ids=("one by one", "many at once"))
-def test_each_robot_drives_and_scores_to_the_bit_as_it_does_by_itself(plant, how, policy):
-    room, what = classroom(plant=plant, **how), episodes()
+def test_each_robot_drives_and_scores_to_the_bit_as_it_does_by_itself(policy):
+    room, what = classroom(plant="planar", model=TWIN), episodes()
     assert_same(*alone_and_together(room, what, policy))
     assert room.examine_together(what, policy) == [room.examine(one, policy) for one in what]
 
@@ -101,7 +104,7 @@ MOVING = [name for name, effect in CATALOGUE.items() if effect.stage not in (Sta
 def test_every_effect_of_the_catalogue_does_the_same_side_by_side(name):
     probes = [parameter.probes[-1] for parameter in CATALOGUE[name].parameters]
     effects = dict(zip(theta_names(CATALOGUE[name]), probes, strict=True))
-    assert_same(*alone_and_together(classroom(plant="planar", effects=effects, seconds=1.5), episodes(3), lean))
+    assert_same(*alone_and_together(classroom(plant="planar", effects=effects, seconds=1.0), episodes(2), lean))
 
 
 OWN = '''
@@ -121,23 +124,21 @@ class Wrong:
 
 def test_a_user_s_own_effect_is_asked_for_each_robot_by_itself(tmp_path):
     (tmp_path / "own.py").write_text(OWN)
-    room = classroom(tmp_path, plant="planar", effects={"own:Wrong": 0.5})
-    assert_same(*alone_and_together(room, episodes(), lean))
+    room = classroom(tmp_path, plant="planar", effects={"own:Wrong": 0.5}, seconds=1.0)
+    assert_same(*alone_and_together(room, episodes(3), lean))
 
 
-@both_plants
-def test_robots_drop_out_as_they_leave_the_map_and_the_others_go_on(plant):
-    room = classroom(plant=plant, seconds=9.0)
-    alone, together = alone_and_together(room, episodes(5), lambda picture: np.array((0.6, 0.6)))
+def test_robots_drop_out_as_they_leave_the_map_and_the_others_go_on():
+    room = classroom(plant="planar", seconds=9.0)
+    alone, together = alone_and_together(room, episodes(4), lambda picture: np.array((0.6, 0.6)))
     assert len({len(poses) for poses in together}) > 2
     assert_same(alone, together)
 
 
-def test_episodes_of_several_thetas_and_more_than_drive_at_once_score_as_each_does():
+def test_episodes_of_several_thetas_and_more_than_drive_at_once_score_as_each_does(monkeypatch):
+    monkeypatch.setitem(AT_ONCE, "planar", 2)
     room = classroom(plant="planar", seconds=1.0)
-    several = [*episodes(2), *episodes(2, trim=0.2), *episodes(1)]
-    many = [make_episode({}, agent="pupil", start=n % room.starts, seed=n) for n in range(AT_ONCE[room.plant] + 3)]
-    for what in (several, many, []):
+    for what in ([*episodes(2), *episodes(2, trim=0.2), *episodes(1)], episodes(5), []):
         assert room.examine_together(what, lean) == [room.examine(one, lean) for one in what]
 
 
@@ -163,17 +164,11 @@ def batch(policy):
 
 
 @pytest.mark.parametrize("form", [lambda policy: policy, batch], ids=("one by one", "many at once"))
-@pytest.mark.parametrize(
-    "answer", [lost, lambda p: np.full(2, np.nan), lambda p: np.zeros(3), lambda p: None], ids=range(4)
-)
+@pytest.mark.parametrize("answer", [lost, lambda p: np.full(2, np.nan), lambda p: np.zeros(3)], ids=range(3))
 def test_a_policy_that_fails_is_told_as_if_one_episode_followed_the_other(form, answer):
-    room, what = classroom(plant="planar", seconds=2.0), episodes()
-    firsts = [
-        alone_and_together(room, [one], lean)
-        and room.instance({}).camera.render(room.course(one, 2.0).start[None])[0].mean()
-        for one in what
-    ]
-    late = form(fails(answer, lambda picture: abs(picture.mean() - firsts[0]) > 0.5))
+    room, what = classroom(plant="planar", seconds=2.0), episodes(3)
+    first = room.instance({}).camera.render(room.course(what[0], 2.0).start[None])[0].mean()
+    late = form(fails(answer, lambda picture: abs(picture.mean() - first) > 0.5))
     with pytest.raises(EpisodeError) as one_by_one:
         [room.examine(one, late) for one in what]
     with pytest.raises(EpisodeError) as together:
@@ -184,7 +179,7 @@ def test_a_policy_that_fails_is_told_as_if_one_episode_followed_the_other(form, 
 
 @pytest.mark.parametrize("many", [lambda p: 1 / 0, lambda p: np.zeros(2), lambda p: np.full((len(p), 2), np.inf)])
 def test_a_policy_that_cannot_answer_many_as_it_should_is_asked_one_by_one(many):
-    room, what = classroom(plant="planar", seconds=1.0), episodes(3)
+    room, what = classroom(plant="planar", seconds=1.0), episodes(2)
     assert room.examine_together(what, Taught(lean, many)) == [room.examine(one, lean) for one in what]
 
 
@@ -195,12 +190,6 @@ def test_a_robot_that_cannot_be_examined_is_refused_in_the_same_line():
     with pytest.raises(SettingsError) as together:
         room.examine_together(episodes(2), lean)
     assert str(together.value) == str(alone.value)
-
-
-def test_lane_following_offers_what_a_classroom_of_many_has():
-    members = {name for name in vars(BatchClassroom) if not name.startswith("_")}
-    assert members == {"examine_together"}
-    assert all(callable(getattr(LaneFollowing, name)) for name in members)
 
 
 MIXED = (
@@ -222,11 +211,10 @@ def mixed(count=15):
 
 @pytest.mark.parametrize("plant", [pytest.param("bullet", marks=pytest.mark.slow), "planar"])
 def test_episodes_of_several_agents_starts_and_thetas_score_side_by_side_as_each_by_itself(plant):
-    room, what = classroom(plant=plant, seconds=2.0), mixed()
+    room, what = classroom(plant=plant, seconds=1.0), mixed()
     alone = [room.run(one) for one in what]
     assert room.run_many(what) == alone
     assert room.run_many(what[::-1]) == alone[::-1]
-    assert room.run_many(what[:5]) + room.run_many(what[5:7]) == alone[:7]
 
 
 @both_plants
@@ -281,7 +269,7 @@ class ManyLate(Late):
 def own(tmp_path):
     """A room whose folder has agents of one's own."""
     (tmp_path / "mine.py").write_text(AGENTS_OF_ONE_S_OWN)
-    return classroom(tmp_path, plant="planar", seconds=3.0)
+    return classroom(tmp_path, plant="planar", seconds=1.6)
 
 
 def of_agents(*agents):

@@ -166,9 +166,6 @@ def square(tiles=3, tile=TILE, **paint):
     )
 
 
-SMALL = square(tile=0.3, bend_radius=0.1)
-
-
 def texel(floor, x):
     return int((x - floor.origin) * floor.pixels_per_metre)
 
@@ -189,10 +186,6 @@ def cover(floor, colour):
 
 def metres(profile):
     return profile.sum() / FLOOR.pixels_per_metre
-
-
-def test_drawing_twice_gives_the_same_bytes():
-    assert draw_floor.__wrapped__(SMALL).pixels.tobytes() == draw_floor.__wrapped__(SMALL).pixels.tobytes()
 
 
 @pytest.mark.parametrize(
@@ -265,15 +258,6 @@ def test_lines_go_round_a_corner_on_arcs_about_one_centre(radius):
     assert 0.5 < yellow.mean() < 0.75
 
 
-def test_half_a_tile_of_corner_radius_gives_arcs_about_the_inner_corner():
-    road = square(bend_radius=TILE / 2)
-    angles = np.radians(np.linspace(1.0, 89.0, 200))
-    for distance in (ROAD.paint.white_width / 2, TILE - ROAD.paint.white_width / 2):
-        for angle in angles:
-            x, y = 2 * TILE + distance * np.cos(angle), 2 * TILE + distance * np.sin(angle)
-            assert colour_at(draw_floor(road), x, y) == COLOURS["white"]
-
-
 def test_a_corner_tile_has_its_dashes():
     yellow = cover(FLOOR, "yellow") > 0.5
     whole = yellow.sum() / FLOOR.pixels_per_metre**2 / ROAD.paint.yellow_width
@@ -284,7 +268,7 @@ def test_a_corner_tile_has_its_dashes():
     assert whole == pytest.approx(expected, rel=0.03)
 
 
-@settings(max_examples=8)
+@settings(max_examples=4)
 @given(st.integers(3, 5), st.floats(0.1, 0.3), st.floats(0.2, 1.0))
 def test_any_loop_has_a_margin_of_nothing_around_it(tiles, tile, bend):
     road = square(tiles, tile, bend_radius=bend * tile / 2, white_width=0.02, yellow_width=0.01)

@@ -3,10 +3,10 @@
 import random
 import shutil
 import sqlite3
+from contextlib import closing, contextmanager
 from dataclasses import replace
 
 import pytest
-from edited import edited
 from hypothesis import given, settings, strategies as some
 
 from proxytune.domain import Outcome, make_episode
@@ -24,6 +24,14 @@ from proxytune.storage.database import (
     transaction,
     write_row,
 )
+
+
+@contextmanager
+def edited(path):
+    """A connection to edit study.db with as a test needs it, with digests that fit, as if a study had been run so."""
+    with closing(open_file(path, writable=True)) as plain:
+        yield plain
+        seal(plain)
 
 
 def made(path):

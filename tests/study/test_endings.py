@@ -59,7 +59,7 @@ def test_an_agent_that_exits_or_interrupts_fails_and_the_study_goes_on(make_stud
     assert json.loads(capsys.readouterr().out)["episodes"]["failed"] == 2
 
 
-@pytest.mark.parametrize("jobs", ["1", "2"])
+@pytest.mark.parametrize("jobs", ["1", pytest.param("2", marks=pytest.mark.slow)])
 def test_what_the_machine_lacks_stops_the_study_and_is_not_kept(make_study, capsys, jobs):
     folder = make_study(domain=domain("memory"), jobs=jobs, **FAMILY)
     assert main(["study", str(folder)]) == 1

@@ -1,7 +1,4 @@
-"""A family asked through a guard, and agents by other names in tables than those that are loaded.
-
-A family asked through a guard, and agents by other names in tables than those that are loaded.
-"""
+"""A family asked through a guard, and agents by other names in tables than those that are loaded."""
 
 import sqlite3
 

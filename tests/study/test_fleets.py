@@ -221,7 +221,9 @@ def pruned(folder):
 
 
 @pytest.mark.parametrize("wave", [pytest.param(1, marks=pytest.mark.slow), 16, 1000])
-@pytest.mark.parametrize("keys", [{}, {"batch": "3"}, pytest.param({"jobs": "2"}, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "keys", [{}, *(pytest.param(one, marks=pytest.mark.slow) for one in ({"batch": "3"}, {"jobs": "2"}))]
+)
 def test_waves_of_any_size_prune_the_trials_that_agent_by_agent_prunes_at_the_same_agents(
     make_study, one_by_one, monkeypatch, wave, keys
 ):

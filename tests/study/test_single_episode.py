@@ -6,7 +6,7 @@ One episode to look at: what is kept of it, and what is no recording.
 import numpy as np
 import pytest
 from episodes import paired, recorded
-from hypothesis import given, strategies as st
+from hypothesis import given, settings, strategies as st
 
 from proxytune.domain import make_episode
 from proxytune.errors import EpisodeError, InputError
@@ -47,6 +47,7 @@ def test_another_proxy_starts_at_the_same_place_and_parts_later(lane, tmp_path):
     assert gaps[row] > APART_M >= gaps[:row].max()
 
 
+@settings(max_examples=20)
 @given(st.floats(0.03, 1.0))
 def test_they_part_at_the_first_time_that_is_further_apart_than_the_limit(speed):
     pair = paired(recorded(lambda time: speed * time), recorded(lambda time: 0.0 * time))

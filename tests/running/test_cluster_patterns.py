@@ -182,7 +182,7 @@ class Loopback:
 
 
 def own_study(make_study, called, sleep, faults=(), **changes):
-    domain = {"sleep": sleep, "faults": str([*faults]).replace("'", '"')}
+    domain = {"sleep": sleep, "faults": str(list(faults)).replace("'", '"')}
     folder = make_study(called, family='"mine:family"', domain=domain, **changes)
     (folder / "mine.py").write_text(OWN_FAMILY)
     (folder / "helper.py").write_text(HELPER)

@@ -38,8 +38,8 @@ from proxytune.diagnosis.motion.evidence import (
     list_tried,
     without_effect,
 )
-from proxytune.diagnosis.motion.fitting import KEPT_SOLVABLE, Fit, fit, held_out_log_likelihood
-from proxytune.diagnosis.motion.innovations import HUBER, at_edge, increments, lateness, log_likelihood, span
+from proxytune.diagnosis.motion.fitting import KEPT_SOLVABLE, Fit, derivatives_by_block, fit, held_out_log_likelihood
+from proxytune.diagnosis.motion.innovations import at_edge, huber, lateness, span
 from proxytune.diagnosis.motion.prediction import blocks_of, cut, pose_errors, ratio
 from proxytune.diagnosis.motion.random_effects import RandomEffect, infer_size_indirectly
 from proxytune.diagnosis.motion.screening import Candidate, ScreenedCandidate, candidates, screen
@@ -157,7 +157,7 @@ def eliminate(found: Findings, report: Progress, without: Collection[str] = ()) 
     model = fit(base.drives, theta, free, base.noise)
     sure = list[AdoptedEffect]()
     while doubtful := [effect for effect in effects if effect.free and effect not in sure]:
-        effect = min(doubtful, key=lambda one: _wald(model, one))
+        effect = _weakest(model, doubtful)
         rest = without_effect(Variant(model.theta, model.free), effect, base.drives.rate_hz)
         smaller = fit(base.drives, rest.theta, rest.free, model.noise)
         gain = _likelihood(model) - _likelihood(smaller)
@@ -175,17 +175,21 @@ def eliminate(found: Findings, report: Progress, without: Collection[str] = ()) 
     return replace(found, model=model, adopted=tuple(effects), unnamed_curves=tuple(curves))
 
 
-def _wald(model: Fit, effect: AdoptedEffect) -> float:
-    """Wald's statistic of an effect: what it would cost to have it at neutral, by the Hessian [nats]."""
-    robot, own = model.drives.robot, [model.free.index(coordinate) for coordinate in effect.free]
-    inner = model.slopes * (np.abs(model.innovations) < HUBER)[:, None]
-    covariance = np.linalg.inv(model.slopes.T @ inner + KEPT_SOLVABLE * np.eye(len(model.free)))
-    spans = [span(coordinate, robot) for coordinate in effect.free]
-    moved = [
-        (model.theta[name] - robot.catalogue.parameters[name].neutral_value(robot.figures)) / (high - low)
-        for (name, *_), (low, high) in zip(effect.free, spans, strict=True)
-    ]
-    return 0.5 * float(moved @ np.linalg.solve(covariance[np.ix_(own, own)], moved))
+def _weakest(model: Fit, effects: Sequence[AdoptedEffect]) -> AdoptedEffect:
+    """The effect of the least Wald statistic: what it would cost to have it at neutral, by the Hessian [nats]."""
+    robot, (_, hessian) = model.drives.robot, derivatives_by_block(model, model.slopes)
+    covariance = np.linalg.inv(hessian.sum(axis=0) + KEPT_SOLVABLE * np.eye(len(model.free)))
+
+    def wald(effect: AdoptedEffect) -> float:
+        own = [model.free.index(coordinate) for coordinate in effect.free]
+        spans = [span(coordinate, robot) for coordinate in effect.free]
+        moved = [
+            (model.theta[name] - robot.catalogue.parameters[name].neutral_value(robot.figures)) / (high - low)
+            for (name, *_), (low, high) in zip(effect.free, spans, strict=True)
+        ]
+        return 0.5 * float(moved @ np.linalg.solve(covariance[np.ix_(own, own)], moved))
+
+    return min(effects, key=wald)
 
 
 def drop_unconfirmed(
@@ -221,7 +225,7 @@ def _gain(one: Fit, other: Fit) -> float:
 
 def _likelihood(model: Fit) -> float:
     """The log-likelihood of the drives that a model was fitted to [nats]."""
-    return log_likelihood(model.drives.measured - increments(model.drives, model.theta), model.whiten)
+    return -float(huber(model.innovations).sum() + model.whiten.log_determinant.sum())
 
 
 def _least_gain(adopted: Sequence[AdoptedEffect], rules: Rules) -> float:

@@ -1,7 +1,7 @@
 """Files and folders that are written whole or not at all: as a draft beside them, which takes their name at last.
 
 Where that cannot be is told before the work that ends there (`check_place`). Also folders for the moment
-(`temporary_folder`), and those of robots and studies that travel with the package (`shipped`).
+(`temporary_folder`), and what travels with the package: robots and studies (`shipped`), templates (`fill_template`).
 """
 
 import contextlib
@@ -15,6 +15,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from string import Template
 
 from proxytune.errors import InputError, SettingsError
 
@@ -203,3 +204,9 @@ def shipped(kind: str) -> Path:
         if (home / kind).is_dir():
             return home / kind
     raise SettingsError(f"{package}: the folder '{kind}' is missing; install proxytune again")
+
+
+def fill_template(room: str, template: str, /, **values: object) -> str:
+    """The text of a file in a room's folder templates/, with values in place of its $names."""
+    text = (Path(__file__).parent / room / "templates" / template).read_text(encoding="utf-8")
+    return Template(text).substitute(values)

@@ -7,10 +7,8 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextvars import ContextVar
 from functools import partial
-from importlib.resources import files
 from io import BytesIO
 from pathlib import Path
-from string import Template
 from typing import Any
 
 import matplotlib as mpl
@@ -25,10 +23,11 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from proxytune.errors import RunError
-from proxytune.files import draft_of
+from proxytune.files import draft_of, fill_template
 
 UNDATED: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 """Metadata left out of files, so that the same figure gives the same bytes."""
+fill = partial(fill_template, "report")
 _beside: ContextVar[tuple[str, ...]] = ContextVar("beside", default=())
 
 
@@ -40,12 +39,6 @@ def figures_also_as(formats: Sequence[str]) -> Iterator[None]:
         yield
     finally:
         _beside.reset(before)
-
-
-def fill(template: str, values: Mapping[str, object] | None = None, **more: object) -> str:
-    """A file of templates/ with values in place of its $names."""
-    text = (files("proxytune.report") / "templates" / template).read_text(encoding="utf-8")
-    return Template(text).substitute(values or {}, **more)
 
 
 def write_text(path: Path, text: str) -> None:

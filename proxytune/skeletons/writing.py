@@ -7,13 +7,13 @@ a caster and a camera, for both plants, and what is not known of it is guessed a
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from importlib.resources import files
-from string import Template
+from functools import partial
 from types import MappingProxyType
 
 from proxytune.driving import UNITS, Robot
 from proxytune.effects import PARAMETERS
 from proxytune.errors import InputError, SettingsError
+from proxytune.files import fill_template
 from proxytune.settings import nearest
 
 
@@ -32,12 +32,7 @@ class Skeleton:
     notes: tuple[str, ...] = field(default=())
 
 
-def fill(template: str, **values: object) -> str:
-    """A file of templates/ with its $names replaced."""
-    text = (files("proxytune.skeletons") / "templates" / template).read_text(encoding="utf-8")
-    return Template(text).substitute(values)
-
-
+fill = partial(fill_template, "skeletons")
 AROUND_DEG = 10.0
 """How far the box of the camera's pitch reaches to either side of the nominal one."""
 OFF_DEG = 4.0

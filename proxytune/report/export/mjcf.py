@@ -71,7 +71,7 @@ def mjcf_text(instance: Instance) -> str:
         actuators = [_speed_servo(instance, f'name="{one}" joint="axle_{one}"', side, 1) for side, one in sides]
     return fill(
         "mujoco.xml.txt",
-        said,
+        **said,
         name=name,
         comment=xml_comment(instance, "mjcf", 7),
         chassis_size=f"{length / 2.0:.6g} {0.35 * baseline:.6g} {height / 2.0:.6g}",

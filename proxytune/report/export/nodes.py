@@ -77,7 +77,7 @@ def player_text(diagnosis: Diagnosis) -> str:
     told = ACKERMANN if kind in CAR_COMMANDS else TWIST
     return fill(
         "player.py.txt",
-        told,
+        **told,
         times=drive.times,
         room=" × ".join(f"{side:.1f}" for side in drive.room),
         columns=" and ".join(COMMANDS[kind]),

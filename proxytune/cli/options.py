@@ -98,6 +98,7 @@ def configure_source(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--kind", choices=[*COMMANDS], default="", help="kind of the commands, where the source is silent"
     )
+    group.add_argument("--vesc", default="", metavar="FILE", help="vesc.yaml of a car whose bag has a VESC's commands")
     group.add_argument(
         "--figure",
         action="append",
@@ -126,6 +127,7 @@ def wanted_of(arguments: argparse.Namespace) -> Wanted:
         stamps=arguments.stamps,
         columns=columns,
         kind=arguments.kind,
+        vesc=Path(arguments.vesc) if arguments.vesc else None,
     )
 
 

@@ -6,6 +6,7 @@ A source has drives with commands, poses and pictures, each at times of their ow
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -161,6 +162,7 @@ class Wanted:
         columns: Of a table or of arrays: our name to theirs, with the unit where it is not ours, as in
             {"time": "stamp_ns:ns", "x": "pos_x_mm:mm", "heading": "yaw_deg:deg", "v": "cmd_lin"}.
         kind: Kind of the commands, one of `proxytune.logs.COMMANDS`, where the source does not say.
+        vesc: The vesc.yaml of a car whose bag has what its VESC was sent.
     """
 
     commands: str = ""
@@ -169,6 +171,7 @@ class Wanted:
     stamps: str = "header"
     columns: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     kind: str = ""
+    vesc: Path | None = None
 
 
 @dataclass(frozen=True)

@@ -27,10 +27,16 @@ from proxytune.importing.bag import (
 from proxytune.importing.bag_scene import Transform, chain_of, choose_transform, read_pictures, read_transforms
 from proxytune.importing.checks import complaint, headings_and_tilts, no_rotation
 from proxytune.importing.source import Channel, Drive, Poses, Source, Wanted
+from proxytune.importing.vesc import KIND as VESC, pair_topics, read_vesc, servo_of
 from proxytune.logs import COMMANDS
 from proxytune.settings import nearest
 
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
+
+
+def short(kind: str) -> str:
+    """A type without its package: Twist of geometry_msgs/msg/Twist."""
+    return kind.rpartition("/")[2]
 
 
 @dataclass(frozen=True)
@@ -82,10 +88,13 @@ class Role:
         return f"{topic.kind} is none of {', '.join(self.ranks)}"
 
 
+KIND_OF = {name: kind for name, (kind, _) in COMMAND_TYPES.items()} | {short(VESC): "speed_steering"}
+"""The kind of command that a type of message says; empty where it says none."""
+
 COMMAND_ROLE = Role(
     "commands",
     "--commands",
-    {name: place for place, name in enumerate(COMMAND_TYPES)} | {"TwistStamped": 0, "Float64MultiArray": 3},
+    {name: place for place, name in enumerate(KIND_OF)} | {"TwistStamped": 0, "Float64MultiArray": 3},
     first=("cmd_vel", "cmd", "command"),
     asked=("JointState",),
 )
@@ -98,11 +107,6 @@ POSE_ROLE = Role(
     never=("goal", "target", "setpoint", "initialpose", "cmd", "command", "tf_static"),
 )
 PICTURE_ROLE = Role("pictures", "--pictures", {"Image": 0, "CompressedImage": 1}, never=("depth", "mask", "debug"))
-
-
-def short(kind: str) -> str:
-    """A type without its package: Twist of geometry_msgs/msg/Twist."""
-    return kind.rpartition("/")[2]
 
 
 @dataclass(frozen=True)
@@ -136,7 +140,7 @@ def choose(topics: tuple[Topic, ...], wanted: Wanted, where: str) -> Choice:
     without = "none" in (wanted.commands, wanted.kind)
     of_kind = COMMAND_ROLE
     if wanted.kind and not wanted.commands:
-        ranks = {name: rank for name, rank in COMMAND_ROLE.ranks.items() if COMMAND_TYPES[name][0] in ("", wanted.kind)}
+        ranks = {name: rank for name, rank in COMMAND_ROLE.ranks.items() if KIND_OF[name] in ("", wanted.kind)}
         of_kind = replace(COMMAND_ROLE, ranks=ranks)
     commands = None if without else _choose(of_kind, topics, wanted.commands, where)
     if not without and commands is None:
@@ -186,7 +190,7 @@ def _choose(role: Role, topics: tuple[Topic, ...], name: str, where: str) -> Top
 
 
 def _kind_of(topic: Topic, wanted: str, where: str) -> str:
-    said, _ = COMMAND_TYPES[short(topic.kind)]
+    said = KIND_OF[short(topic.kind)]
     if not said and not wanted:
         raise LogError(
             f"{where}: topic {topic.name} does not say what its two numbers are; add --kind duty, "
@@ -211,6 +215,8 @@ def _part(topic: Topic, choice: Choice) -> str:
             return role.name
     if choice.of_transforms and topic.kind in TRANSFORMS and topic.count:
         return POSE_ROLE.name
+    if choice.commands is not None and choice.commands.kind == VESC and topic.name == servo_of(choice.commands.name):
+        return COMMAND_ROLE.name
     fitting = [role for role, _ in roles if role.is_offered(topic)]
     if fitting:
         return f"left out: could be {fitting[0].name} as well ({fitting[0].option})"
@@ -306,7 +312,8 @@ def _list(path: Path, bags: dict[str, Path]) -> tuple[tuple[Topic, ...], list[st
             if not bag.defines_types:
                 notes.append(f"{bag_path.name} does not define its types of message: those of ROS 2 Humble were taken.")
     names = sorted({name for topics in listed for name in topics})
-    return tuple(_merge([topics[name] for topics in listed if name in topics], len(bags)) for name in names), notes
+    merged = (_merge([topics[name] for topics in listed if name in topics], len(bags)) for name in names)
+    return pair_topics(tuple(merged)), notes
 
 
 def _merge(topics: list[Topic], bags: int) -> Topic:
@@ -324,7 +331,10 @@ def _read_drive(name: str, path: Path, choice: Choice, wanted: Wanted) -> tuple[
     said: list[str] = []
     with open_bag(path) as bag:
         if choice.commands is not None:
-            commands, notes = read_commands(bag, choice.commands.name, choice.kind, wanted.stamps)
+            if choice.commands.kind == VESC:
+                commands, notes = read_vesc(bag, choice.commands.name, wanted.vesc)
+            else:
+                commands, notes = read_commands(bag, choice.commands.name, choice.kind, wanted.stamps)
             said += notes
         if choice.of_transforms:
             transforms, where = read_transforms(bag, _transform_topics(bag)), f"{bag.path}: {choice.poses.name}"

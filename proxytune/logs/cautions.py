@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from proxytune.arrays import Floats
-from proxytune.logs.log import Log, LogEpisode
+from proxytune.logs.log import CAR_COMMANDS, COMMANDS, Log, LogEpisode
 from proxytune.logs.repeats import repeats_note
 from proxytune.logs.windows import windows_note
 from proxytune.settings import alike_caution, figure_cautions
@@ -29,6 +29,8 @@ LATEST_S = 1.5
 """Turning is looked for so long after its command."""
 AGAINST = 0.5
 """A correlation below its negative is turning the other way."""
+EXCHANGED = 0.7
+"""A correlation above it is turning by the command that is not for turning."""
 ASKEW_DEG = 40.0
 """Trackers' frames are turned by less where nobody meant it otherwise."""
 JUMP_M, JUMP = 0.5, 5.0
@@ -205,10 +207,31 @@ def _commanded(log: Log, figures: Figures) -> list[tuple[Floats, Floats]]:
 
 
 def _turning(log: Log, drives: list[Chords]) -> Iterator[str]:
-    """Tell where it turns the other way than its commands ask, at any delay."""
+    """Tell where it turns the other way than its commands ask, or by the command that is not for turning."""
+    asked = _commanded(log, {})
+    strongest, gain = _correlation(log, drives, [turn for _, turn in asked])
+    if strongest > AGAINST and log.command == "twist" and not SLOWEST_TURN < gain < FASTEST_TURN:
+        yield f"the robot turns {gain:.2g} times as fast as its commands say: check the unit of omega, rad/s"
+    if strongest < -AGAINST:
+        yield (
+            f"the robot turns the other way than its commands say (correlation {strongest:.2f}): headings that grow "
+            "clockwise, a mirrored axis, or left and right exchanged"
+        )
+    if log.command in ("twist", *CAR_COMMANDS):
+        driving, turning = COMMANDS[log.command]
+        other, _ = _correlation(log, drives, [episode.held[:, 0] for episode in log.episodes])
+        if abs(other) > EXCHANGED and abs(strongest) < AGAINST:
+            yield (
+                f"the robot turns with {driving} (correlation {other:.2f}) and not with {turning} ({strongest:.2f}): "
+                "are the two exchanged?"
+            )
+
+
+def _correlation(log: Log, drives: list[Chords], turns: Sequence[Floats]) -> tuple[float, float]:
+    """Correlation of turning with a command at the delay where it is strongest, and rad/s for one of the command."""
     lags = np.arange(0.0, LATEST_S, 0.1)
     found = np.zeros((len(lags), 3))
-    for episode, chords, (_, turn) in zip(log.episodes, drives, _commanded(log, {}), strict=True):
+    for episode, chords, turn in zip(log.episodes, drives, turns, strict=True):
         if len(chords.times) < ENOUGH:
             continue
         asked = np.stack([np.interp(chords.times + CHORD_S / 2.0 - lag, episode.times, turn) for lag in lags])
@@ -217,18 +240,10 @@ def _turning(log: Log, drives: list[Chords]) -> Iterator[str]:
         found += np.stack((asked @ done, (asked**2).sum(axis=1), np.full(len(lags), done @ done)), axis=1)
     sizes = np.sqrt(found[:, 1] * found[:, 2])
     if not sizes.any():
-        return
+        return 0.0, 0.0
     correlation = found[:, 0] / np.where(sizes > 0.0, sizes, 1.0)
     at = int(np.argmax(np.abs(correlation)))
-    strongest = float(correlation[at])
-    gain = float(found[at, 0] / found[at, 1])
-    if strongest > AGAINST and log.command == "twist" and not SLOWEST_TURN < gain < FASTEST_TURN:
-        yield f"the robot turns {gain:.2g} times as fast as its commands say: check the unit of omega, rad/s"
-    if strongest < -AGAINST:
-        yield (
-            f"the robot turns the other way than its commands say (correlation {strongest:.2f}): headings that grow "
-            "clockwise, a mirrored axis, or left and right exchanged"
-        )
+    return float(correlation[at]), float(found[at, 0] / found[at, 1])
 
 
 def _speeds(log: Log, drives: list[Chords], asked: Sequence[tuple[Floats, Floats]]) -> Iterator[str]:

@@ -106,3 +106,28 @@ def test_without_poses_or_figures_nothing_is_said():
     lost = changed(lambda episode: replace(episode, poses=np.full_like(episode.poses, np.nan)))
     assert cautions(lost) == ()
     assert log_cautions(commanded(0.5), {}) == ()
+
+
+def drive_of_car(exchange):
+    """A kinematic car whose throttle and steering both change, its two columns exchanged or not."""
+    rng = np.random.default_rng(4)
+    times = np.arange(0.0, 30.0, 0.05)
+    held = np.repeat(rng.uniform((0.2, -0.6), (0.6, 0.6), (30, 2)), 20, axis=0)
+    speed, turn = 2.0 * held[:, 0], 2.0 * held[:, 0] * np.tan(0.42 * held[:, 1]) / 0.33
+    heading = np.concatenate(([0.0], np.cumsum(0.05 * turn)[:-1]))
+    x, y = (np.concatenate(([0.0], np.cumsum(0.05 * speed * of(heading))[:-1])) for of in (np.cos, np.sin))
+    drive = replace(
+        LOG.episodes[0],
+        times=times,
+        poses=np.column_stack((x, y, heading)),
+        commands=held[:, ::-1] if exchange else held,
+    )
+    return replace(LOG, command="ackermann", episodes=(drive,))
+
+
+def test_throttle_and_steering_exchanged_are_told_and_rightly_named_ones_are_not():
+    figures = read_robot("car").figures
+    assert log_cautions(drive_of_car(exchange=False), figures) == ()
+    (line,) = log_cautions(drive_of_car(exchange=True), figures)
+    assert line.startswith("the robot turns with throttle (correlation 0.9")
+    assert line.endswith("are the two exchanged?")

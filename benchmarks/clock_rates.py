@@ -38,7 +38,7 @@ class Planted(NamedTuple):
 
 
 def planted(kind: str, number: int, hidden: bool) -> Planted:
-    """The numbered case of a kind: one of `constant`, `one drive`, `jump`."""
+    """The numbered case of a kind: one of `constant`, `one drive`, `jump`, `drift`."""
     random = np.random.default_rng((number, len(kind), hidden))
     pool = (*IN_FORM, *OTHER_FORM, *OUTSIDE) if hidden else CLEAN
     case = pool[int(random.integers(len(pool)))]
@@ -47,6 +47,8 @@ def planted(kind: str, number: int, hidden: bool) -> Planted:
     late = np.zeros((EPISODES, ROWS))
     if kind == "constant":
         late[:] = by = -abs(by)
+    elif kind == "drift":
+        late[:] = by / ROWS * np.arange(ROWS)
     else:
         late[drive, round(at * 20.0) if kind == "jump" else 0 :] = by
     return Planted(kind, case, late, drive, by, at)
@@ -64,6 +66,8 @@ def told(one: Planted, found: Clocks) -> bool:
         return bool(found.offset.value) and abs(found.offset.value - one.by_s - one.case.delay + 0.15) < 0.05
     if found.offset.value:
         return False
+    if one.kind == "drift":
+        return abs(found.drift.value * ROWS / 20.0 - one.by_s) < 0.02 and not (found.drives or found.jumps)
     if one.kind == "one drive":
         return set(found.drives) == {name} and abs(found.drives[name].value - one.by_s) < 0.03 and not found.jumps
     right = [jump.drive == name and abs(jump.time_s - one.at_s) < 4.0 for jump in found.jumps]
@@ -81,7 +85,7 @@ def read(case: Case, late_s: np.ndarray | float) -> tuple[Clocks, float]:
 def main(cases: int, logs: Sequence[Path]) -> None:
     """Count and print."""
     seconds = []
-    for kind in ("constant", "one drive", "jump"):
+    for kind in ("constant", "one drive", "jump", "drift"):
         for hidden in (False, True):
             all_planted = [planted(kind, number, hidden) for number in range(3 * cases)]
             chosen = [one for one in all_planted if identifiable(one)][:cases]

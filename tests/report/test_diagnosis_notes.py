@@ -170,6 +170,7 @@ def test_the_document_has_what_was_promised_and_can_be_written():
     assert (told["offset_s"], told["interval"]) == (-0.26, [-0.27, -0.25])
     assert told["drives"] == {"b": {"offset_s": 0.3, "interval": [0.28, 0.32]}}
     assert told["jumps"] == [{"drive": "a", "time_s": 31.0, "by_s": -0.2}]
+    assert told["drift"] == {"rate": 0.0, "interval": [0.0, 0.0]}
     assert "test" not in told
     assert clocks_document((found, clocks()))["test"]["offset_s"] == 0.0
 
@@ -185,6 +186,10 @@ def test_one_clock_is_no_news_but_a_delay_is_said_to_be_one_number_with_an_offse
     [
         (clocks(-0.11, -0.26), "motion comes 0.11 s before its command, which no robot does"),
         (clocks(-0.11, -0.26), "stamped 0.26 s too early (0.27 to 0.25) if the robot's delay is 0.15 s"),
+        (
+            replace(clocks(), drift=Offset(-0.002, (-0.0022, -0.0018))),
+            "the poses' clock runs 0.2 % (0.18 to 0.22) slower than that of the commands; this was corrected",
+        ),
         (clocks(2.0, 1.85), "motion comes 2.00 s after its command; poses are stamped 1.85 s too late"),
         (clocks(drives={"b": Offset(0.3, (0.28, 0.32))}), "in drive b poses are stamped 0.30 s later (0.28 to 0.32)"),
         (

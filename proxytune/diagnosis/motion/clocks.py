@@ -1,12 +1,13 @@
 """The clocks of commands and poses, and drives put right, cut and kept aside for a diagnosis.
 
 Motion before its command is proof of two clocks; so is motion so late that no delay accounts for it, a drive that
-answers at another time than the others, and a drive that changes its time to answer in the middle. A constant offset
-that leaves a latency which a delay may have is no proof: delay and offset are one number.
+answers at another time than the others, a drive that changes its time to answer in the middle, and a time to answer
+that grows evenly through all drives. A constant offset that leaves a latency which a delay may have is no proof: delay
+and offset are one number.
 
-`read_clocks` measures all this, `put_in_step` puts drives on one clock. `cut_out_long_rests` cuts a log where it stands
-for long: an hour of rest says nothing of motion. `split` chooses which drives are fitted and which are kept aside, in
-blocks that are left out in turn, and `thin` makes long ones short enough to fit in seconds.
+`read_clocks` measures all this, `without_drift` and `put_in_step` put drives on one clock. `cut_out_long_rests` cuts a
+log where it stands for long: an hour of rest says nothing of motion. `split` chooses which drives are fitted and which
+are kept aside, in blocks that are left out in turn, and `thin` makes long ones short enough to fit in seconds.
 """
 
 import math
@@ -29,6 +30,7 @@ from proxytune.diagnosis.motion.latency import (
     Reaction,
     Speeds,
     blocks_within,
+    clock_drift,
     deviants,
     likeliest_latency,
     measured_speeds,
@@ -51,6 +53,8 @@ ASSUMED_DELAY_S = 0.05
 """The delay that is left to a robot whose nominal delay nobody states, once an offset is taken out."""
 RARE = 0.25
 """Clocks of no more than this share of the drives jump, or are others."""
+DRIFT_PASSES = 3
+"""The robot is fitted anew once commands are on the poses' clock, and what is left of a drift is found by that."""
 PROOF_BLOCK_S = 5.0
 """Two latencies are compared over such blocks."""
 
@@ -79,6 +83,7 @@ class Clocks:
         later_s: How much later the poses of each drive are put (E,) [s].
         kept_s: From when to when each drive is used (E, 2) [s after its beginning].
         declared_s: How much later poses are stamped, as log.toml declares; that was taken out beforehand [s], or None.
+        drift: How much later poses are stamped with every second [s/s]; all else is of what `without_drift` leaves.
     """
 
     latency: Offset
@@ -89,6 +94,7 @@ class Clocks:
     later_s: Floats
     kept_s: Floats
     declared_s: float | None = None
+    drift: Offset = NONE
 
     @property
     def left_s(self) -> float:
@@ -98,7 +104,7 @@ class Clocks:
     @property
     def differ(self) -> bool:
         """Tell whether any clock differs from another."""
-        return bool(self.offset.value or self.drives or self.jumps)
+        return bool(self.offset.value or self.drives or self.jumps or self.drift.value)
 
 
 def read_clocks(log: Log, robot: Robot, like: Clocks | None = None) -> Clocks:
@@ -110,6 +116,15 @@ def read_clocks(log: Log, robot: Robot, like: Clocks | None = None) -> Clocks:
         kept_s, later_s = np.tile((0.0, np.inf), (len(log.episodes), 1)), np.zeros(len(log.episodes))
         return Clocks(NONE, NONE, ASSUMED_DELAY_S, {}, (), later_s, kept_s, log.clock_offset_s)
     squares, latencies, apart = _squares(log, drives, speeds)
+    begin = np.array([episode.times[0] for episode in log.episodes])
+    drift = NONE
+    for _ in range(DRIFT_PASSES):
+        more = clock_drift(squares, begin[squares.episode] + (squares.number + 0.5) * LATENCY_BLOCK_S, latencies)
+        if more is None or not (drift.value or more.is_sure):
+            break
+        drift = _offset(Latency(drift.value + more.rate, more.deviation), 0.0)
+        log = without_drift(log, more.rate)
+        squares, latencies, apart = _squares(log, gather(log, robot, log.episodes), speeds)
     kept, jumps = stretches(log, squares, latencies)
     varied = not _is_rare(len({jump.drive for jump in jumps}), len(log.episodes))
     if varied:
@@ -137,7 +152,19 @@ def read_clocks(log: Log, robot: Robot, like: Clocks | None = None) -> Clocks:
         later_s=later,
         kept_s=np.array(kept, dtype=float),
         declared_s=log.clock_offset_s,
+        drift=drift,
     )
+
+
+def without_drift(log: Log, rate: float) -> Log:
+    """Put commands on the poses' clock, which is later by `rate` with every second from the log's first sample on."""
+    first = min(float(episode.times[0]) for episode in log.episodes)
+
+    def retime(episode: LogEpisode) -> LogEpisode:
+        issued = episode.times if episode.issued is None else episode.issued
+        return replace(episode, issued=issued + rate * (issued - first))
+
+    return replace(log, episodes=tuple(map(retime, log.episodes)))
 
 
 def _is_rare(count: int, drives: int) -> bool:

@@ -4,7 +4,8 @@ The measured speeds are compared with the commands, shifted in time and passed t
 constant. A lag only ever makes motion later and rounder, a shift alone moves its onset: so the two are told apart, and
 what is left of the latency is the pure one. Delay and the offset between two clocks are both pure latency: one number.
 
-`stretches` finds where a clock jumps within a drive, and `deviants` the drives that have another one.
+`clock_drift` finds two clocks that run at different rates, `stretches` where a clock jumps within a drive, and
+`deviants` the drives that have another one.
 """
 
 from collections.abc import Iterator, Sequence
@@ -255,20 +256,99 @@ in which a robot sticks or has play answer later than others, but another latenc
 MOST_JUMPS = 4
 
 
-class Jump(NamedTuple):
-    """A clock that jumps within a drive, at a time [s, of the log]: poses are stamped so much later from then [s]."""
-
-    drive: str
-    time_s: float
-    by_s: float
-
-
 class Blocks(NamedTuple):
     """Squares left over at each latency, by blocks of time: episode (B,), number in it (B,), squares (B, L)."""
 
     episode: Whole
     number: Whole
     squares: Floats
+
+
+FASTEST_DRIFT_S, DRIFT_STEP_S = 1.0, 0.025
+"""A drift is looked for that puts clocks so far apart over a log, in steps of as much at either end."""
+PIECE = 5
+"""Of logs of few drives, pieces of so many blocks vote on a drift, else each drive does."""
+ENOUGH_DRIVES, DRIFT_ITERATIONS = 4, 3
+LEAST_DRIFT_S = 0.02
+"""Clocks that come less far apart over a log keep one rate."""
+
+
+class Drift(NamedTuple):
+    """Two clocks that run at different rates: poses are stamped so much later with every second [s/s].
+
+    Attributes:
+        rate: How much later.
+        deviation: Its standard deviation.
+        span_s: How long the log lasts.
+    """
+
+    rate: float
+    deviation: float
+    span_s: float
+
+    @property
+    def is_sure(self) -> bool:
+        """True if it is no chance, and long enough to matter."""
+        return abs(self.rate) > SURE * self.deviation and abs(self.rate) * self.span_s > LEAST_DRIFT_S
+
+
+def clock_drift(blocks: Blocks, times: Floats, latencies: Floats) -> Drift | None:
+    """The rate at which latency grows over a log, one for all its drives; None where nothing tells it.
+
+    A grid of rates is looked through, and Gauss-Newton steps lead on from its best. Its deviation is that of the slopes
+    of single drives: where one drive alone grows late, its robot or its own clock does.
+
+    Args:
+        blocks: Squares left over at each latency, by blocks of time.
+        times: The middle of each block in the log's time (B,) [s].
+        latencies: Those latencies [s].
+    """
+    middle, step = times - times.mean(), float(latencies[1] - latencies[0])
+    span = float(np.ptp(times))
+    if span <= 0.0:
+        return None
+    steps = round(FASTEST_DRIFT_S / DRIFT_STEP_S)
+    rates = np.arange(-steps, steps + 1) * 2.0 * DRIFT_STEP_S / span
+    left = [_put_later(blocks.squares, latencies, rate * middle).sum(axis=0).min() for rate in rates]
+    rate, curve = float(rates[int(np.argmin(left))]), 0.0
+    slopes = np.zeros(len(times))
+    for _ in range(DRIFT_ITERATIONS):
+        squares = _put_later(blocks.squares, latencies, rate * middle)
+        total = squares.sum(axis=0)
+        at = int(np.clip(total.argmin(), 1, len(total) - 2))
+        curve = float(total[at - 1] - 2.0 * total[at] + total[at + 1]) / step**2 / len(times)
+        if curve <= 0.0:
+            return None
+        slopes = (squares[:, at + 1] - squares[:, at - 1]) / (2.0 * step)
+        further = -float(slopes @ middle) / (curve * float(middle @ middle))
+        rate += further
+    drives = len(np.unique(blocks.episode)) >= ENOUGH_DRIVES
+    piece = blocks.episode if drives else blocks.episode * len(times) + blocks.number // PIECE
+    _, label = np.unique(piece, return_inverse=True)
+    votes = np.bincount(label, (slopes - slopes.mean() + curve * further * middle) * middle)
+    if len(votes) < ENOUGH_DRIVES:
+        return None
+    lost = len(votes) / (len(votes) - 2.0)
+    deviation = float(np.sqrt(lost * (votes**2).sum())) / (curve * float(middle @ middle))
+    return Drift(rate, deviation, span)
+
+
+def _put_later(squares: Floats, latencies: Floats, later_s: Floats) -> Floats:
+    """Squares of blocks (B, L) at latencies that are later by so much in each block (B,), along parabolas."""
+    place = np.arange(len(latencies)) + (later_s / (latencies[1] - latencies[0]))[:, None]
+    nearest = np.clip(np.rint(place).astype(int), 1, len(latencies) - 2)
+    by = np.clip(place - nearest, -1.0, 1.0)
+    row = np.arange(len(squares))[:, None]
+    before, here, after = (squares[row, nearest + k] for k in (-1, 0, 1))
+    return np.asarray(here + by * (after - before) / 2.0 + by**2 * (after - 2.0 * here + before) / 2.0)
+
+
+class Jump(NamedTuple):
+    """A clock that jumps within a drive, at a time [s, of the log]: poses are stamped so much later from then [s]."""
+
+    drive: str
+    time_s: float
+    by_s: float
 
 
 def blocks_within(blocks: Blocks, episode: int, kept: tuple[float, float]) -> Whole:

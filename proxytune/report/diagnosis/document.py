@@ -201,6 +201,7 @@ def clocks_document(clocks: Sequence[Clocks]) -> dict[str, Any]:
         "latency_interval": list(own.latency.interval),
         "assumed_delay_s": own.assumed_delay_s,
         "declared_offset_s": own.declared_s,
+        "drift": {"rate": own.drift.value, "interval": list(own.drift.interval)},
         "drives": {name: {"offset_s": one.value, "interval": list(one.interval)} for name, one in own.drives.items()},
         "jumps": [jump._asdict() for jump in own.jumps],
     }

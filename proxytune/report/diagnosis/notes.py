@@ -182,6 +182,13 @@ def _say_clocks(clocks: Clocks) -> Iterator[str]:
             f"{lag}; poses are stamped {abs(offset.value):.2f} s too {early} ({_ends_s(offset)}) if the robot's delay "
             f"is {assumed:.2f} s; this was corrected. Stamp both with one clock, or move the poses yourself"
         )
+    if clocks.drift.value:
+        low, high = sorted(1e2 * abs(end) for end in clocks.drift.interval)
+        yield (
+            f"the poses' clock runs {1e2 * abs(clocks.drift.value):.2g} % ({low:.2g} to {high:.2g}) "
+            f"{'faster' if clocks.drift.value > 0.0 else 'slower'} than that of the commands; this was corrected. "
+            "Stamp both with one clock, or synchronise them"
+        )
     for name, one in clocks.drives.items():
         yield (
             f"in drive {name} poses are stamped {abs(one.value):.2f} s {'earlier' if one.value < 0.0 else 'later'} "

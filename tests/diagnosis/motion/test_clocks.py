@@ -26,6 +26,7 @@ from proxytune.diagnosis.motion.clocks import (
     read_clocks,
     split,
     thin,
+    without_drift,
 )
 from proxytune.diagnosis.motion.drives import gather
 from proxytune.diagnosis.motion.latency import Blocks, stretches
@@ -93,6 +94,38 @@ def test_a_clock_that_jumps_is_named_with_its_time_and_the_longer_stretch_is_kep
     low, high = found.kept_s[3]
     assert (low, high <= 25.0) == (0.0, True)
     assert np.isinf(found.kept_s[[0, 1, 2, 4, 5], 1]).all()
+
+
+DRIFTING = np.broadcast_to(np.arange(800) / 20.0, SHAPE)
+
+
+@pytest.mark.parametrize("rate", [-0.0035, 0.0012])
+def test_clocks_that_run_at_different_rates_are_told_with_the_rate_and_nothing_else(rate):
+    found = clocks(rate * DRIFTING)
+    low, high = found.drift.interval
+    assert low < rate < high
+    assert high - low < 0.0008
+    assert found.differ
+    assert (found.offset.value, found.drives, found.jumps) == (0.0, {}, ())
+
+
+def test_drift_of_drives_that_follow_each_other_is_one_line_through_all():
+    log = hidden.make_log(CASE, late_s=0.001 * (DRIFTING + 60.0 * np.arange(6)[:, None]), **SHORT)
+    following = (replace(episode, times=episode.times + 60.0 * e) for e, episode in enumerate(log.episodes))
+    found = read_clocks(replace(log, episodes=tuple(following)), ROBOT)
+    assert found.drift.value == pytest.approx(0.001, abs=1e-4)
+    assert found.drives == {}
+
+
+def test_without_drift_commands_are_when_poses_show_them():
+    rate = 0.003
+    log = without_drift(hidden.make_log(CASE, late_s=rate * DRIFTING, **SHORT), rate)
+    np.testing.assert_allclose(log.episodes[0].issued, (1.0 + rate) * log.episodes[0].times)
+    assert not read_clocks(log, ROBOT).differ
+
+
+def test_one_drive_that_grows_late_is_no_drift_of_the_clock():
+    assert clocks(0.003 * DRIFTING * (np.arange(6) == 3)[:, None]).drift.value == 0.0
 
 
 @pytest.mark.slow

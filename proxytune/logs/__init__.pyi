@@ -10,6 +10,7 @@ from .log import (
     Measured as Measured,
     check_kind as check_kind,
 )
+from .outliers import without_outliers as without_outliers
 from .reading import read_commands as read_commands, read_log as read_log
 from .repeats import rows_of_poses as rows_of_poses
 from .windows import join_windows as join_windows

@@ -11,6 +11,7 @@ import numpy as np
 
 from proxytune.arrays import Floats
 from proxytune.logs.log import CAR_COMMANDS, COMMANDS, Log, LogEpisode
+from proxytune.logs.outliers import outliers_note
 from proxytune.logs.repeats import repeats_note
 from proxytune.logs.windows import windows_note
 from proxytune.settings import alike_caution, figure_cautions
@@ -65,6 +66,7 @@ def log_cautions(log: Log, figures: Figures) -> tuple[str, ...]:
         *([] if log.command == "none" else _obedience(log, chords, figures)),
         *([names] if names else []),
         *_copies(log),
+        *outliers_note(log),
         *repeats_note(log),
         *windows_note(log),
     ]

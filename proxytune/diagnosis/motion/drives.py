@@ -20,7 +20,7 @@ from proxytune.diagnosis.answer import RULES, Rules
 from proxytune.driving import Robot, read_robot, robot_from_geometry, robot_names
 from proxytune.effects import SHIPPED, Catalogue, track_of
 from proxytune.errors import LogError
-from proxytune.logs import Log, LogEpisode, check_kind, rows_of_poses
+from proxytune.logs import Log, LogEpisode, check_kind, rows_of_poses, without_outliers
 from proxytune.settings import GEOMETRY, nearest
 
 
@@ -322,7 +322,11 @@ def relative(origin: Floats, pose: Floats) -> Floats:
 
 
 def gather(log: Log, robot: Robot, episodes: Sequence[LogEpisode], *, compared: bool = True) -> Drives:
-    """A batch of a log's episodes, each command held from its own time; `compared` ones need measured motion."""
+    """A batch of a log's episodes, each command held from its own time; `compared` ones need measured motion.
+
+    Poses that lie off the way for a sample or two are left out.
+    """
+    episodes = [without_outliers(episode) for episode in episodes]
     # A measured rate of 59.9998 Hz is 60 Hz: twice the ticks would tell nothing more. Published results of robots on
     # two wheels were got without slack, and stay what they are.
     slack = SLACK if robot.drive == "ackermann" else 0.0

@@ -1,0 +1,78 @@
+"""A pose that lies off the way for a sample or two is left out and counted; a drive without such stays what it is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hidden_cases import CLEAN, IN_FORM, make_log
+
+from proxytune.diagnosis import robot_of
+from proxytune.diagnosis.motion.drives import gather
+from proxytune.logs import LogEpisode, Measured, log_cautions, without_outliers
+from proxytune.logs.outliers import outliers
+
+LOG = make_log(CLEAN[0], episodes=2, seconds=30.0)
+DRIVE = LOG.episodes[0]
+
+
+def moved(rows, by):
+    poses = DRIVE.poses.copy()
+    poses[rows] += by
+    return replace(DRIVE, poses=poses)
+
+
+@pytest.mark.parametrize("rows", [[0], [200], [200, 201], [50, 300, 599]])
+@pytest.mark.parametrize("by", [(0.3, -0.2, 0.0), (0.0, 0.0, 2.5)])
+def test_poses_that_are_off_for_a_sample_or_two_are_left_out_and_no_others(rows, by):
+    off = moved(rows, by)
+    assert np.flatnonzero(outliers(off)).tolist() == rows
+    left = without_outliers(off).poses
+    assert np.isnan(left[rows]).all()
+    others = np.delete(np.arange(len(left)), rows)
+    np.testing.assert_allclose(left[others], DRIVE.poses[others], atol=1e-12)
+
+
+@pytest.mark.parametrize("case", [CLEAN[20], *IN_FORM[::9]], ids=lambda case: case.name)
+def test_a_drive_without_such_is_itself(case):
+    for drive in make_log(case, episodes=2, seconds=30.0).episodes:
+        assert without_outliers(drive) is drive
+
+
+def test_a_robot_that_was_carried_elsewhere_is_not_off():
+    assert not outliers(moved(np.arange(300, 600), (2.0, 0.0, 0.0))).any()
+
+
+def test_a_pose_after_a_gap_is_not_off():
+    poses = DRIVE.poses.copy()
+    poses[100:140] = np.nan
+    assert not outliers(replace(DRIVE, poses=poses)).any()
+
+
+def test_headings_that_were_unwrapped_along_a_wrong_one_are_unwrapped_anew():
+    wrong = DRIVE.poses.copy()
+    wrong[200, 2] += 3.0
+    wrong[201:, 2] += 2.0 * np.pi
+    left = without_outliers(replace(DRIVE, poses=wrong)).poses
+    np.testing.assert_allclose(np.delete(left, 200, 0), np.delete(DRIVE.poses, 200, 0), atol=1e-9)
+
+
+def test_poses_at_times_of_their_own_are_left_out_with_their_samples():
+    rows = np.arange(len(DRIVE.times))
+    off = moved([200], (0.4, 0.0, 0.0))
+    own = without_outliers(replace(off, measured=Measured(off.times + 0.004, off.poses, rows))).measured
+    assert own is not None
+    assert own.rows.tolist() == np.delete(rows, 200).tolist()
+    np.testing.assert_allclose(own.times, np.delete(off.times, 200) + 0.004)
+
+
+def test_they_are_told_and_no_motion_is_learnt_from_them():
+    log = replace(LOG, episodes=(moved([200, 400], (0.4, 0.0, 0.0)), LOG.episodes[1]))
+    robot = robot_of(log)
+    (line,) = log_cautions(log, robot.figures)
+    assert line.startswith("2 poses lie off the way for a sample or two (most in drive '00', 2)")
+    assert np.abs(gather(log, robot, log.episodes).measured[:, :2]).max() < 0.1
+
+
+def test_a_drive_of_few_poses_is_left_alone():
+    few = LogEpisode("few", DRIVE.times[:4], DRIVE.commands[:4], DRIVE.poses[:4], None)
+    assert without_outliers(few) is few

@@ -266,9 +266,9 @@ class Blocks(NamedTuple):
 
 FASTEST_DRIFT_S, DRIFT_STEP_S = 1.0, 0.025
 """A drift is looked for that puts clocks so far apart over a log, in steps of as much at either end."""
-PIECE = 5
-"""Of logs of few drives, pieces of so many blocks vote on a drift, else each drive does."""
-ENOUGH_DRIVES, DRIFT_ITERATIONS = 4, 3
+PIECE, FEWEST_PIECES = 5, 4
+"""Pieces of so many blocks vote on a drift."""
+DRIFT_ITERATIONS = 3
 LEAST_DRIFT_S = 0.02
 """Clocks that come less far apart over a log keep one rate."""
 
@@ -296,7 +296,7 @@ def clock_drift(blocks: Blocks, times: Floats, latencies: Floats) -> Drift | Non
     """The rate at which latency grows over a log, one for all its drives; None where nothing tells it.
 
     A grid of rates is looked through, and Gauss-Newton steps lead on from its best. Its deviation is that of the slopes
-    of single drives: where one drive alone grows late, its robot or its own clock does.
+    of pieces of the drives: where a part of them alone grows late, their robot or their own clock does.
 
     Args:
         blocks: Squares left over at each latency, by blocks of time.
@@ -322,11 +322,9 @@ def clock_drift(blocks: Blocks, times: Floats, latencies: Floats) -> Drift | Non
         slopes = (squares[:, at + 1] - squares[:, at - 1]) / (2.0 * step)
         further = -float(slopes @ middle) / (curve * float(middle @ middle))
         rate += further
-    drives = len(np.unique(blocks.episode)) >= ENOUGH_DRIVES
-    piece = blocks.episode if drives else blocks.episode * len(times) + blocks.number // PIECE
-    _, label = np.unique(piece, return_inverse=True)
+    _, label = np.unique(blocks.episode * len(times) + blocks.number // PIECE, return_inverse=True)
     votes = np.bincount(label, (slopes - slopes.mean() + curve * further * middle) * middle)
-    if len(votes) < ENOUGH_DRIVES:
+    if len(votes) < FEWEST_PIECES:
         return None
     lost = len(votes) / (len(votes) - 2.0)
     deviation = float(np.sqrt(lost * (votes**2).sum())) / (curve * float(middle @ middle))

@@ -22,6 +22,7 @@ import hidden_cases as hidden
 import numpy as np
 import second_hidden_cars
 import second_hidden_cases as second
+import third_hidden_cases as third
 from bullet_cases import BULLET, BulletCase, make_bullet_log
 from joblib import Parallel, delayed
 
@@ -40,6 +41,7 @@ from proxytune.space import Theta
 GENERATORS: dict[str, ModuleType] = {
     "first": hidden,
     "second": second,
+    "third": third,
     "car": hidden_cars,
     "second_car": second_hidden_cars,
 }
@@ -51,7 +53,7 @@ class Job:
     """A case to diagnose; `without` is taken out of the catalogue."""
 
     kind: str
-    case: hidden.Case | second.Case | hidden_cars.Case | second_hidden_cars.Case | BulletCase
+    case: hidden.Case | second.Case | third.Case | hidden_cars.Case | second_hidden_cars.Case | BulletCase
     without: str = ""
 
     @property
@@ -88,6 +90,7 @@ def _by_kind(cases: ModuleType) -> dict[str, list[Job]]:
         "outside": [Job("outside", case) for case in cases.OUTSIDE],
         "taken out": [Job("taken out", case, case.right[0][0]) for case in cases.IN_FORM],
         "clean": [Job("clean", case) for case in cases.CLEAN],
+        "physics": [Job("physics", case) for case in getattr(cases, "PHYSICS", ())],
     }
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from proxytune.arrays import Floats
 from proxytune.logs.log import CAR_COMMANDS, COMMANDS, Log, LogEpisode
-from proxytune.logs.outliers import outliers_note
+from proxytune.logs.outliers import outliers_note, without_outliers
 from proxytune.logs.repeats import repeats_note
 from proxytune.logs.windows import windows_note
 from proxytune.settings import alike_caution, figure_cautions
@@ -57,7 +57,7 @@ def log_cautions(log: Log, figures: Figures) -> tuple[str, ...]:
         log: The log.
         figures: Of the robot that drove it; without them nothing is said of how far its commands should take it.
     """
-    chords = [_chords(episode) for episode in log.episodes]
+    chords = [_chords(without_outliers(episode)) for episode in log.episodes]
     names = alike_caution("drives", (episode.name for episode in log.episodes))
     found = [
         *figure_cautions({**figures, **log.geometry}, f"robot {log.robot}"),

@@ -65,7 +65,7 @@ def test_poses_at_times_of_their_own_are_left_out_with_their_samples():
 
 
 def test_they_are_told_and_no_motion_is_learnt_from_them():
-    log = replace(LOG, episodes=(moved([200, 400], (0.4, 0.0, 0.0)), LOG.episodes[1]))
+    log = replace(LOG, episodes=(moved([200, 400], (0.9, 0.0, 0.0)), LOG.episodes[1]))
     robot = robot_of(log)
     (line,) = log_cautions(log, robot.figures)
     assert line.startswith("2 poses lie off the way for a sample or two (most in drive '00', 2)")

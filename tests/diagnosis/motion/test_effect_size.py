@@ -57,6 +57,7 @@ def test_drives_of_one_robot_are_alike(theta):
     assert unlike(planted_log({**TRUTH, **theta}, **SHORT)) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["dead_band width 0.12", "stiction breakaway 0.14", "dead_zone_that_jumps", "eccentric_wheel"]
 )
@@ -64,6 +65,7 @@ def test_what_one_robot_lacks_does_not_make_two_of_it(name):
     assert unlike(hidden.make_log(CASES[name], episodes=8, seconds=40.0)) is None
 
 
+@pytest.mark.slow
 def test_drives_on_two_floors_fall_in_two_groups_too():
     found = unlike(hidden.make_log(CASES["carpet"], episodes=8, seconds=40.0))
     assert sorted(found.gains) == pytest.approx([0.8, 1.0], abs=0.03)
@@ -195,8 +197,7 @@ def test_an_effect_does_harm_only_where_predictions_are_shown_to_be_better_witho
     assert not weighed(1.2, 1.1, 1.3).harmful
 
 
-@pytest.mark.parametrize("size", [0.05, 0.1])
-def test_draws_do_not_matter_where_the_noise_of_poses_leaves_no_room_for_them(size):
+def test_draws_do_not_matter_where_the_noise_of_poses_leaves_no_room_for_them(size=0.1):
     calm = planted_drives(TRUTH, episodes=6, seconds=20.0, noise=Noise((1e-6, 1e-6, 1e-6), (0.005, 0.01)))
     jittery = Variant({**TRUTH, "delay": TRUTH["delay"] - size / 2.0, "delay_jitter": size}, DECLARED)
     windows = cut(calm, 2.0)
@@ -246,6 +247,7 @@ def test_straight_drives_cannot_show_what_turning_costs():
     assert "turn_slip" in invisible_effects(swinging(0.3, 0.0), VISIBILITY_DECLARED)
 
 
+@pytest.mark.slow
 def test_rich_drives_show_nearly_everything():
     hidden = invisible_effects(fitted(planted_drives(TRUTH, episodes=6, seconds=30.0)), VISIBILITY_DECLARED)
     assert len(hidden) <= 3

@@ -342,6 +342,7 @@ def together(four_faults):
     return eliminate(four_faults, lambda line: None)
 
 
+@pytest.mark.slow
 def test_all_faults_of_a_car_are_found_together_and_nothing_beside(together):
     assert {effect.effect for effect in together.adopted} == {name.split(".")[0] for name in FAULTS}
     assert {name: together.model.theta[name] for name in FAULTS} == pytest.approx(FAULTS, rel=0.05)
@@ -354,6 +355,7 @@ def test_what_a_second_search_is_to_do_without_is_not_fitted_together_either(fou
     assert [effect.effect for effect in found.adopted] == ["steering_lag"]
 
 
+@pytest.mark.slow
 def test_what_is_found_together_is_taken_only_where_it_is_surely_more_likely_and_predicts_no_worse(
     four_faults, together, monkeypatch
 ):

@@ -53,9 +53,10 @@ def _skip_without_pybullet(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(autouse=True, scope="module")
 def _blank_figures(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Save figures blank in the quick run, where they cost half the time; not in tests/report or with FIGURES_DRAWN."""
-    quick = request.config.getoption("markexpr") == "not slow"
-    if not quick or "report" in request.path.parts or getattr(request.module, "FIGURES_DRAWN", False):
+    """Save figures blank in the quick run, where they cost half the time, unless FIGURES_DRAWN says otherwise."""
+    room = request.path.parent.name
+    slow = request.config.getoption("markexpr") != "not slow" and room not in ("running", "study", "teaching")
+    if room == "report" or getattr(request.module, "FIGURES_DRAWN", slow):
         yield
         return
     with pytest.MonkeyPatch.context() as patch:

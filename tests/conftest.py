@@ -5,13 +5,12 @@ import shutil
 import signal
 import sys
 from collections.abc import Callable, Iterator
+from importlib import import_module
 from importlib.util import find_spec
-from io import BytesIO
 from pathlib import Path
 
 import hypothesis
 import pytest
-from PIL import Image
 
 HERE = Path(__file__).resolve().parent
 # Stand-ins; and what the benchmarks have: cases with hidden effects, problems of a search.
@@ -61,18 +60,8 @@ def _blank_figures(request: pytest.FixtureRequest) -> Iterator[None]:
         yield
         return
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("matplotlib.figure.Figure.savefig", blank)
+        patch.setattr("matplotlib.figure.Figure.savefig", import_module("blank").blank)
         yield
-
-
-def blank(figure: object, where: Path | BytesIO, *, format: str, **how: object) -> None:
-    """Save a figure as `Figure.savefig` does, with nothing on it."""
-    image = BytesIO()
-    if format == "png":
-        Image.new("RGB", (4, 3)).save(image, "png")
-    else:
-        image.write(b'<svg xmlns="http://www.w3.org/2000/svg"></svg>' if format == "svg" else b"%PDF-1.4")
-    where.write_bytes(image.getvalue()) if isinstance(where, Path) else where.write(image.getvalue())
 
 
 STUDY = {

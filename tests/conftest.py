@@ -25,7 +25,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 hypothesis.settings.register_profile("fixed", derandomize=True, deadline=None)
 hypothesis.settings.load_profile("fixed")
 
-FUZZ = 500
+FUZZ = 100
 """How many files of each kind are spoilt in tests/fuzzing, if nobody says otherwise."""
 
 
@@ -61,6 +61,14 @@ def _blank_figures(request: pytest.FixtureRequest) -> Iterator[None]:
         return
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("matplotlib.figure.Figure.savefig", import_module("blank").blank)
+        yield
+
+
+@pytest.fixture(scope="module")
+def few_effects() -> Iterator[None]:
+    """Let a module's diagnoses look for few effects, where what becomes of their answers is tested."""
+    with pytest.MonkeyPatch.context() as patch:
+        import_module("planted").look_for_few(patch)
         yield
 
 

@@ -198,6 +198,7 @@ def test_a_mistake_in_the_last_family_is_told_before_the_first_is_tuned(make_stu
     assert not (folder / "families").exists()
 
 
+@pytest.mark.slow
 def test_a_family_in_which_nothing_works_is_named(make_study, capsys):
     faults = ", ".join(f'"agent{number}:*:raises"' for number in range(6))
     folder = make_several(make_study, families=f"[families.a]\n[families.b.domain]\nfaults = [{faults}]\n")
@@ -217,6 +218,7 @@ def test_what_changed_since_is_told_with_the_family_and_its_database(finished, t
     assert str(folder / "families" / "wrong" / "study.db") in said
 
 
+@pytest.mark.slow
 def test_from_python_one_asks_the_same(finished):
     report = read_families(finished)
     assert report.spent.episodes == 0

@@ -1,5 +1,6 @@
 """What `diagnose` says of real robots, where their logs are at hand."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,13 +14,19 @@ LOGS = Path(__file__).resolve().parents[2] / "../shared/data/logs"
 pytestmark = pytest.mark.slow
 
 
-def diagnosed(name):
+def diagnosed(name, part):
+    """The diagnosis of a part of a log."""
     folder = LOGS / name
     if not folder.is_dir():
         pytest.skip(f"the measured log {name} is not here: it is not part of the project")
-    log = read_log(folder)
+    log = part(read_log(folder))
     robot = robot_of(log)
     return diagnose(log, robot, declared_effects(robot))
+
+
+def _first_rows(episode, count):
+    columns = {name: getattr(episode, name)[:count] for name in ("times", "commands", "poses")}
+    return replace(episode, **columns)
 
 
 def error(diagnosis, horizon_s):
@@ -33,12 +40,14 @@ def learnt(diagnosis, horizon_s):
 
 @pytest.fixture(scope="module")
 def create():
-    return diagnosed("mrclam6_robot2")
+    """Of six minutes."""
+    return diagnosed("mrclam6_robot2", lambda log: replace(log, episodes=(_first_rows(*log.episodes, 9000),)))
 
 
 @pytest.fixture(scope="module")
 def husky():
-    return diagnosed("drive_husky")
+    """Of every third drive."""
+    return diagnosed("drive_husky", lambda log: replace(log, episodes=log.episodes[::3]))
 
 
 def named(diagnosis):

@@ -70,7 +70,7 @@ def test_where_noise_is_not_known_what_is_driven_is_driven_ten_times(drives, des
 
 
 @pytest.mark.parametrize(
-    ("effect", "rival"), [("dead_band", "stiction"), ("lateral_slip", "marker_offset"), ("turn_slip", "yaw_scrub")]
+    ("effect", "rival"), [("dead_band", "stiction"), pytest.param("turn_slip", "yaw_scrub", marks=pytest.mark.slow)]
 )
 def test_rivals_are_told_apart_within_the_room_and_the_robots_limits(drives, quick, effect, rival):
     findings = found(drives, effect, rival)

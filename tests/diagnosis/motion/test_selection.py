@@ -212,6 +212,7 @@ def test_an_effect_that_misled_is_left_out_of_a_second_search_and_still_told(bas
     assert [dropped.effect.effect for dropped in found.negligible] == ["lateral_slip"]
 
 
+@pytest.mark.slow
 def test_an_effect_that_does_no_harm_misled_nobody(base, monkeypatch):
     found, asked, _ = named(base, monkeypatch, SLIP, SCRUB, harmful=False)
     assert asked == [()]

@@ -63,18 +63,6 @@ def test_a_study_runs_and_run_again_it_simulates_nothing(make_study):
     pd.testing.assert_frame_equal(again.trials(), first.trials())
 
 
-@pytest.mark.slow
-def test_a_study_that_was_left_goes_on_and_no_episode_is_simulated_twice(make_study):
-    folder, journal = journalled(make_study, budget="3")
-    run_study(folder)
-    journalled(make_study, budget="6")
-    resumed = run_study(folder)
-    assert len(simulated(journal)) == len({line.rsplit(" ", 1)[0] for line in simulated(journal)}) == 6 * 6 * 3
-    assert resumed.spent.episodes == 3 * 6 * 3
-    whole = run_study(make_study("whole", budget="6"))
-    pd.testing.assert_frame_equal(resumed.trials(), whole.trials())
-
-
 def test_the_trials_are_a_table_of_theta_state_score_and_measures(report):
     trials = report.trials()
     assert list(trials.index) == [1, 2, 3, 4, 5, 6]

@@ -14,19 +14,16 @@ LOGS = Path(__file__).resolve().parents[2] / "../shared/data/logs"
 pytestmark = pytest.mark.slow
 
 
-def diagnosed(name, part):
-    """The diagnosis of a part of a log."""
+def diagnosed(name, rows=None, every=1):
+    """The diagnosis of the first rows of every so many-th drive."""
     folder = LOGS / name
     if not folder.is_dir():
         pytest.skip(f"the measured log {name} is not here: it is not part of the project")
-    log = part(read_log(folder))
+    log = read_log(folder)
+    kept = (replace(e, times=e.times[:rows], commands=e.commands[:rows], poses=e.poses[:rows]) for e in log.episodes)
+    log = replace(log, episodes=tuple(kept)[::every])
     robot = robot_of(log)
     return diagnose(log, robot, declared_effects(robot))
-
-
-def _first_rows(episode, count):
-    columns = {name: getattr(episode, name)[:count] for name in ("times", "commands", "poses")}
-    return replace(episode, **columns)
 
 
 def error(diagnosis, horizon_s):
@@ -40,14 +37,12 @@ def learnt(diagnosis, horizon_s):
 
 @pytest.fixture(scope="module")
 def create():
-    """Of six minutes."""
-    return diagnosed("mrclam6_robot2", lambda log: replace(log, episodes=(_first_rows(*log.episodes, 9000),)))
+    return diagnosed("mrclam6_robot2", rows=9000)
 
 
 @pytest.fixture(scope="module")
 def husky():
-    """Of every third drive."""
-    return diagnosed("drive_husky", lambda log: replace(log, episodes=log.episodes[::3]))
+    return diagnosed("drive_husky", every=3)
 
 
 def named(diagnosis):

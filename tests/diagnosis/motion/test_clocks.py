@@ -105,6 +105,12 @@ def test_a_jump_that_leaves_little_of_a_drive_is_clear_beside_what_the_others_sa
     assert jump.by_s == pytest.approx(one.by_s, abs=0.02)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("effect", [0, 12, 17, 21, 24])
+def test_hidden_effects_are_no_clock_problem(effect):
+    assert not clocks(0.0, hidden.IN_FORM[effect]).differ
+
+
 @pytest.mark.parametrize("theta", [{"delay": 0.3}, {"delay": 0.5, "motor_lag.time_constant": 0.8}, {"delay": 0.0}])
 def test_a_slow_or_late_robot_is_no_clock_problem(theta):
     assert not read_clocks(planted_log({"trim": 0.03, **theta}, episodes=4, seconds=40.0), ROBOT).differ

@@ -200,9 +200,8 @@ def test_an_effect_does_harm_only_where_predictions_are_shown_to_be_better_witho
 
 @pytest.mark.slow
 def test_draws_do_not_matter_where_the_noise_of_poses_leaves_no_room_for_them():
-    size = 0.1
     calm = planted_drives(TRUTH, episodes=6, seconds=20.0, noise=Noise((1e-6, 1e-6, 1e-6), (0.005, 0.01)))
-    jittery = Variant({**TRUTH, "delay": TRUTH["delay"] - size / 2.0, "delay_jitter": size}, DECLARED)
+    jittery = Variant({**TRUTH, "delay": TRUTH["delay"] - 0.05, "delay_jitter": 0.1}, DECLARED)
     windows = cut(calm, 2.0)
     errors = pose_errors(calm, jittery.theta, windows)[:, 0]
     drawn = np.sqrt(_drawn_squares(calm, jittery, windows, 1).mean())

@@ -28,21 +28,18 @@ def drives():
     return drives_of(driven_log(TRUTH, np.stack((0.5 - turn, 0.5 + turn), axis=1)[None], np.zeros((1, 3))))
 
 
-def hurry(patch):
-    patch.setattr(excitation, "GENERATIONS", 3)
-    patch.setattr(excitation, "ROUNDS", 1)
-
-
 @pytest.fixture
 def quick(monkeypatch):
-    hurry(monkeypatch)
+    monkeypatch.setattr(excitation, "GENERATIONS", 3)
+    monkeypatch.setattr(excitation, "ROUNDS", 1)
 
 
 @pytest.fixture(scope="module")
 def designed(drives):
     """A drive that tells two rivals apart, designed once."""
     with pytest.MonkeyPatch.context() as patch:
-        hurry(patch)
+        patch.setattr(excitation, "GENERATIONS", 3)
+        patch.setattr(excitation, "ROUNDS", 1)
         return design_drive(found(drives, "lateral_slip", "marker_offset"), limits=ROOM)
 
 

@@ -14,14 +14,14 @@ LOGS = Path(__file__).resolve().parents[2] / "../shared/data/logs"
 pytestmark = pytest.mark.slow
 
 
-def diagnosed(name, rows=None, every=1):
-    """The diagnosis of the first rows of every so many-th drive."""
+def diagnosed(name, rows=None):
+    """The diagnosis of the first rows of every drive."""
     folder = LOGS / name
     if not folder.is_dir():
         pytest.skip(f"the measured log {name} is not here: it is not part of the project")
     log = read_log(folder)
     kept = (replace(e, times=e.times[:rows], commands=e.commands[:rows], poses=e.poses[:rows]) for e in log.episodes)
-    log = replace(log, episodes=tuple(kept)[::every])
+    log = replace(log, episodes=tuple(kept))
     robot = robot_of(log)
     return diagnose(log, robot, declared_effects(robot))
 
@@ -42,7 +42,7 @@ def create():
 
 @pytest.fixture(scope="module")
 def husky():
-    return diagnosed("drive_husky", every=3)
+    return diagnosed("drive_husky")
 
 
 def named(diagnosis):

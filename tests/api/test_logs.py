@@ -27,12 +27,9 @@ def planted():
     return planted_log({**TRUTH, "yaw_scrub": 0.12}, episodes=4, seconds=12.0, noise=CALM)
 
 
-@pytest.fixture(scope="module")
-def report(planted, few_effects):
-    return diagnose(planted)
-
-
-def test_the_planted_effect_is_found_with_its_value(report):
+@pytest.mark.slow
+def test_what_is_found_is_told_drawn_and_written_as_the_command_does(planted, few_effects, tmp_path):
+    report = diagnose(planted)
     assert (report.verdict, report.effects) == ("explained", ("yaw_scrub",))
     row = report.parameters().loc["yaw_scrub"]
     assert row.low < row.value < row.high
@@ -42,26 +39,16 @@ def test_the_planted_effect_is_found_with_its_value(report):
     said = repr(report)
     assert said.startswith("DiagnosisReport of planted: yaw scrub: the robot turns as if its wheels were 0.1")
     assert ". Explained: with the effects added, only noise is left (expected false names: at most 0.0" in said
-
-
-def test_the_errors_are_those_of_the_document_by_horizon(report):
     errors = report.errors()
     assert list(errors.index) == [1.0, 2.0, 5.0]
     for one in report.document()["errors"]:
         row = errors.loc[one["horizon_s"]]
         assert (row.before, row.after, row.noise_floor) == (one["before"], one["after"], one["noise_floor"])
     assert (errors.after < 0.2 * errors.before).all()
-
-
-def test_what_is_found_is_drawn_and_written_as_the_command_does(report, tmp_path):
     assert all(isinstance(figure, Figure) for figure in report.figures().values())
     paths = report.write(str(tmp_path / "found"))
-    assert [path.name for path in paths] == [
-        "diagnosis.json",
-        "model.toml",
-        *(f"{name}.png" for name in report.figures()),
-        "report.html",
-    ]
+    names = ["diagnosis.json", "model.toml", *(f"{name}.png" for name in report.figures()), "report.html"]
+    assert [path.name for path in paths] == names
     assert json.loads(paths[0].read_text()) == json.loads(json.dumps(report.document()))
     assert read_model(paths[1]).theta["yaw_scrub"] == pytest.approx(report.parameters().value["yaw_scrub"])
     assert any("yaw_scrub" in note for note in report.notes)

@@ -39,6 +39,7 @@ def test_texture_is_no_noise():
     assert found.interval[0] == 0.0
 
 
+@pytest.mark.slow
 def test_the_bound_holds_the_noise_on_a_textured_floor():
     model, seen = scene()
     for noise in (2.0, 5.0):

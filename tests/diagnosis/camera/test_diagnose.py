@@ -272,6 +272,7 @@ def test_a_line_ten_millimetres_beside_its_place_is_told_first(line, by_m):
     assert low > 0.0 or high < 0.0
 
 
+@pytest.mark.slow
 def test_little_is_told_of_a_map_that_lies_where_it_should():
     laid = describe_map(everything())
     assert all(abs(line.right_m) < 0.004 for line in laid.lines)

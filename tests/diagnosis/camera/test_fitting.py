@@ -58,6 +58,7 @@ def test_all_figures_free_lie_within_three_standard_deviations_of_the_truth():
     assert abs(fit.theta["lens_distortion"] + 0.15) < 0.03
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "truth", "most"), [("camera_latency", 0.12, 0.006), ("rolling_shutter", 0.06, 0.012)])
 def test_figures_of_time_come_back_from_a_drive(name, truth, most):
     views = driven({name: truth})

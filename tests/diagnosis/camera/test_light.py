@@ -60,6 +60,7 @@ def test_the_largest_blemish_comes_first():
     assert first.columns[0] > 80 > second.columns[1]
 
 
+@pytest.mark.slow
 def test_a_clean_camera_has_no_blemishes_whatever_its_light():
     model, seen = scene()
     assert blemishes(logged(seen, 0.8, 1.3, 0.3, drift=0.1, noise=3.0), model) == ()

@@ -386,10 +386,12 @@ def test_frames_standing_still_hide_latency_and_shutter():
     assert not {"camera_pitch", "camera_roll", "camera_yaw", "lens_distortion"} & set(hidden)
 
 
+@pytest.mark.slow
 def test_a_drive_shows_latency():
     assert "camera_latency" not in hidden_effects(everything(count=40, moving=True), ("camera_pitch",))
 
 
+@pytest.mark.slow
 def test_a_readout_that_is_stated_is_not_hidden():
     full = fit_everything(
         driven(), (*OPTICS.mounting, "camera_latency"), {"rolling_shutter": 0.02}, learn_scatter=False

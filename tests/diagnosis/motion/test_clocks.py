@@ -156,6 +156,7 @@ def test_drives_put_in_step_are_those_of_one_clock():
     np.testing.assert_allclose(moved.headings[3, moved.first[own]], moved.poses[own, 0, 2], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_poses_put_before_the_first_command_are_left_out_and_so_is_what_lies_beyond_a_jump():
     found = clocks(in_one_drive(0.5, after=500))
     log = hidden.make_log(CASE, late_s=in_one_drive(0.5, after=500), **SHORT)

@@ -81,6 +81,7 @@ def test_rivals_are_told_apart_within_the_room_and_the_robots_limits(drives, qui
     assert (np.abs(places) <= (0.65, 0.5)).all(), "0.1 m of the robot itself stays off the edges"
 
 
+@pytest.mark.slow
 def test_what_is_expected_is_the_evidence_that_fits_of_both_models_have(designed):
     theta, starts = {**TRUTH, **SIZES["lateral_slip"]}, np.zeros((3, 3))
     log = driven_log(theta, np.repeat(designed.commands[None], 3, axis=0), starts, seed=5)
@@ -103,6 +104,7 @@ def test_a_design_is_worth_more_than_the_manoeuvres_that_keep_to_the_room(drives
     assert drive.nats_per_minute > 5.0 * drive.manoeuvre[1]
 
 
+@pytest.mark.slow
 def test_a_manoeuvre_that_is_worth_as_much_is_taken(drives, quick, monkeypatch):
     monkeypatch.setattr(excitation, "SIMPLER", 1e6)
     drive = design_drive(found(drives, "turn_slip", "yaw_scrub"), limits=ROOM)

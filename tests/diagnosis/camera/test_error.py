@@ -91,6 +91,7 @@ def test_the_added_effect_lowers_the_difference_of_brightness():
     assert grey.after.interval[0] < grey.after.value < grey.after.interval[1]
 
 
+@pytest.mark.slow
 def test_an_effect_on_pictures_counts_after_and_not_before():
     dark = np.rint(shown() * 0.7).astype(np.uint8)
     look = {"exposure.gain": 0.7, "exposure.gamma": 1.0}

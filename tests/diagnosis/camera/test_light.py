@@ -119,6 +119,7 @@ def test_exposure_and_vignetting_come_out_under_noise_and_drift():
     assert inside(light.vignetting, 0.3)
 
 
+@pytest.mark.slow
 def test_a_camera_without_faults_comes_out_neutral():
     model, seen = scene()
     light = fit_light(logged(seen), model, floor(), fixed_exposure=True)

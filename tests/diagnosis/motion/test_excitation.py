@@ -146,6 +146,7 @@ def test_imagined_drives_are_those_of_the_model_from_the_middle_of_the_room(driv
     assert batch.travel[:, 0].sum() == pytest.approx(np.abs(batch.measured[:, 0]).sum(), rel=0.02)
 
 
+@pytest.mark.slow
 def test_an_effect_is_told_from_itself_by_nothing(drives, quick):
     findings = found(drives, "turn_slip", "turn_slip")
     question = Rivals(course_of(drives, ROOM), findings.model, findings.adopted[0])

@@ -350,6 +350,7 @@ def test_all_faults_of_a_car_are_found_together_and_nothing_beside(together):
     assert all(effect.gain > RULES.sure_gain_nats for effect in together.adopted)
 
 
+@pytest.mark.slow
 def test_what_a_second_search_is_to_do_without_is_not_fitted_together_either(four_faults, monkeypatch):
     monkeypatch.setattr(selection, "OF_CARS", ("dead_band", "steering_lag"))
     found = eliminate(four_faults, lambda line: None, without=("dead_band",))

@@ -116,7 +116,7 @@ def export_it(home):
 
 
 def write_a_long_log(home, finished):
-    foreign_robot.write_own_times(home, [foreign_robot.drive(1, seconds=25.0)])
+    foreign_robot.write_own_times(home, [foreign_robot.drive(1, seconds=45.0)])
 
 
 def diagnose_it(home):

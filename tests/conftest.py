@@ -5,13 +5,12 @@ import shutil
 import signal
 import sys
 from collections.abc import Callable, Iterator
+from importlib import import_module
 from importlib.util import find_spec
-from io import BytesIO
 from pathlib import Path
 
 import hypothesis
 import pytest
-from PIL import Image
 
 HERE = Path(__file__).resolve().parent
 # Stand-ins; and what the benchmarks have: cases with hidden effects, problems of a search.
@@ -26,7 +25,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 hypothesis.settings.register_profile("fixed", derandomize=True, deadline=None)
 hypothesis.settings.load_profile("fixed")
 
-FUZZ = 500
+FUZZ = 100
 """How many files of each kind are spoilt in tests/fuzzing, if nobody says otherwise."""
 
 
@@ -54,24 +53,23 @@ def _skip_without_pybullet(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(autouse=True, scope="module")
 def _blank_figures(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Save figures blank in the quick run, where they cost half the time; not in tests/report or with FIGURES_DRAWN."""
-    quick = request.config.getoption("markexpr") == "not slow"
-    if not quick or "report" in request.path.parts or getattr(request.module, "FIGURES_DRAWN", False):
+    """Save figures blank in the quick run, where they cost half the time, unless FIGURES_DRAWN says otherwise."""
+    room = request.path.parent.name
+    slow = request.config.getoption("markexpr") != "not slow" and room not in ("running", "study", "teaching")
+    if room == "report" or getattr(request.module, "FIGURES_DRAWN", slow):
         yield
         return
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("matplotlib.figure.Figure.savefig", blank)
+        patch.setattr("matplotlib.figure.Figure.savefig", import_module("blank").blank)
         yield
 
 
-def blank(figure: object, where: Path | BytesIO, *, format: str, **how: object) -> None:
-    """Save a figure as `Figure.savefig` does, with nothing on it."""
-    image = BytesIO()
-    if format == "png":
-        Image.new("RGB", (4, 3)).save(image, "png")
-    else:
-        image.write(b'<svg xmlns="http://www.w3.org/2000/svg"></svg>' if format == "svg" else b"%PDF-1.4")
-    where.write_bytes(image.getvalue()) if isinstance(where, Path) else where.write(image.getvalue())
+@pytest.fixture(scope="module")
+def few_effects() -> Iterator[None]:
+    """Let a module's diagnoses look for few effects, where what becomes of their answers is tested."""
+    with pytest.MonkeyPatch.context() as patch:
+        import_module("planted").look_for_few(patch)
+        yield
 
 
 STUDY = {

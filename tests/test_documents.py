@@ -6,7 +6,6 @@ import json
 import os
 import re
 import shlex
-import shutil
 import subprocess
 import sys
 from operator import attrgetter
@@ -15,6 +14,7 @@ from pathlib import Path
 import pytest
 from compare import STAND_INS, parser as compare_parser
 from floors import floor
+from project import copy_studies
 
 import proxytune
 from proxytune.cli.main import BAD_INPUT, COMMANDS, DONE, FAILED, main, parser
@@ -46,13 +46,8 @@ LONGEST_README = 100
 LONGEST_ROW = 320
 """Characters of a table's row without the targets of its links: more cannot be read on GitHub."""
 RUN_ELSEWHERE = (
-    "cluster",
-    "extending",
-    "logs",
-    "own_robot",
-    "tune_a_simulator",
-    "find_what_it_lacks",
-    "judge_two_score_tables",
+    *("cluster", "extending", "logs", "own_robot"),
+    *("tune_a_simulator", "find_what_it_lacks", "judge_two_score_tables"),
 )
 """Pages whose commands need what comes before them; tests/test_pages.py and tests/test_extending.py run them."""
 SHARED = ("--json", "--format")
@@ -331,7 +326,7 @@ def test_every_name_of_the_package_is_on_the_page_of_the_api():
 @pytest.mark.slow
 @pytest.mark.parametrize("line", COMMAND_LINES)
 def test_the_commands_of_the_documents_run(line, tmp_path):
-    shutil.copytree(ROOT / "studies", tmp_path / "studies", ignore=shutil.ignore_patterns("study.db*", "figures"))
+    copy_studies(tmp_path)
     words = shlex.split(line)
     here = {**os.environ, "PYTHONPATH": str(ROOT)}
     done = subprocess.run([sys.executable, *words[1:]], capture_output=True, text=True, cwd=tmp_path, env=here)

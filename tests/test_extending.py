@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from planted import look_for_few
 
 from proxytune.cli.main import main
 from proxytune.driving import lane_following
@@ -19,6 +20,7 @@ from proxytune.extensions.door import GROUP
 from proxytune.settings import read_settings
 from proxytune.study import open_study
 
+FIGURES_DRAWN = False
 PAGE = (Path(__file__).resolve().parent.parent / "docs" / "how-to" / "extending.md").read_text(encoding="utf-8")
 INTRODUCTION, *CHAPTERS = re.split(r"^## ", PAGE, flags=re.MULTILINE)
 SECTIONS = {chapter.partition("\n")[0]: chapter for chapter in CHAPTERS}
@@ -84,7 +86,8 @@ def test_the_study_of_the_introduction_reads(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_the_effect_is_found_by_diagnose_and_written_to_its_model(follow, tmp_path):
+def test_the_effect_is_found_by_diagnose_and_written_to_its_model(follow, tmp_path, monkeypatch):
+    look_for_few(monkeypatch)
     found = follow("An effect")["diagnose log --effects weak_reverse:WeakReverse --output found"]
     assert [effect["name"] for effect in found["effects"]] == ["weak_reverse:WeakReverse"]
     model = read_model(tmp_path / "found" / "model.toml", Catalogue(tmp_path))

@@ -10,7 +10,6 @@ import json
 import os
 import re
 import shlex
-import shutil
 import socket
 import subprocess
 import sys
@@ -18,17 +17,19 @@ from pathlib import Path
 
 import foreign_robot
 import pytest
+from planted import look_for_few
 from processes import ENVIRONMENT
+from project import copy_studies
 
 import proxytune
 from proxytune.cli.main import main
 from proxytune.skeletons.writing import SIX
 
+FIGURES_DRAWN = False
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
 PYTHON = re.compile(r"```python\n(.*?)```(?:\n```text\n(.*?)```)?", flags=re.DOTALL)
-SMALL = {"budget = 24": "budget = 1", "seconds = 20.0": 'seconds = 1.0\nplant = "planar"', "initial = 8": "confirm = 0"}
 FIGURES = (
     "wheel_radius=0.033,wheel_distance=0.16,full_speed=0.5,motor_time_constant=0.1,camera_height=0.1,camera_pitch=20"
 )
@@ -121,14 +122,7 @@ def test_the_readme_shows_python_in_ten_lines_at_most():
 @pytest.mark.slow
 def test_the_python_of_the_readme_runs(tmp_path, monkeypatch):
     """On quickstart made small."""
-    made = shutil.ignore_patterns("study.db*", "figures", "*.md", "*.png")
-    shutil.copytree(ROOT / "studies", tmp_path / "studies", ignore=made)
-    settings = tmp_path / "studies" / "quickstart" / "study.toml"
-    text = settings.read_text(encoding="utf-8")
-    for whole, small in SMALL.items():
-        assert whole in text
-        text = text.replace(whole, small)
-    settings.write_text(f"preflight = false\n{text}", encoding="utf-8")
+    copy_studies(tmp_path)
     monkeypatch.chdir(tmp_path)
     ((printed, _),) = run_python(README)
     assert "trim" in printed
@@ -143,6 +137,7 @@ def test_the_page_about_python_runs_and_prints_what_it_shows(tmp_path, monkeypat
     assert all((tmp_path / name).stat().st_size for name in made)
 
 
+@pytest.mark.slow
 def test_the_blocks_about_the_gymnasium_environment_print_what_is_shown(tmp_path, monkeypatch):
     pytest.importorskip("gymnasium")
     monkeypatch.chdir(tmp_path)
@@ -166,9 +161,10 @@ def test_the_blocks_about_training_run_with_fewer_steps(tmp_path, monkeypatch):
 def test_every_command_about_logs_runs_and_a_bag_says_what_its_log_says(tmp_path, monkeypatch, capsys):
     """On a bag of a robot of nobody's."""
     pytest.importorskip("rosbags")
+    look_for_few(monkeypatch, "wheel_gain")
     monkeypatch.chdir(tmp_path)
     assert main(["new", "robot", "my_robot", "--figures", FIGURES]) == 0
-    made = foreign_robot.write_form(tmp_path, "ros1", [foreign_robot.drive(7, seconds=120.0)])
+    made = foreign_robot.write_form(tmp_path, "ros1", [foreign_robot.drive(7, seconds=60.0)])
     (made / "run0.bag").rename("my_drives.bag")
     capsys.readouterr()
     answers = []
@@ -190,6 +186,7 @@ def test_the_page_about_a_robot_of_one_s_own_states_the_six_figures_that_a_skele
 
 @pytest.mark.slow
 def test_every_command_about_a_robot_of_one_s_own_runs_and_the_dead_band_is_found(tmp_path, monkeypatch, capsys):
+    look_for_few(monkeypatch)
     monkeypatch.chdir(tmp_path)
     answers = {}
     for line in lines_of(page("own_robot")):

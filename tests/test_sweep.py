@@ -148,6 +148,7 @@ def test_a_sweep_stopped_before_its_last_replays_has_no_curve_yet(opened):
     assert swept(study, discrepancy)[0] == 3
 
 
+@pytest.mark.slow
 def test_several_processes_find_the_same(make_study, truth, opened):
     alone = swept(*opened)[1]
     study = open_study(make_study("other", family='"echo:echo"', jobs="2"))

@@ -2,6 +2,7 @@
 
 settings         what study.toml says
 family           the domain family that it names, and the code that a user brings
+guard            what stands between a user's family and the rest
 opening          a study ready to run: settings, family, target, objective, engine
 study_run        from θ to episodes, outcomes and PRPV, all kept in the store
 preflight        before the first trial: dead parameters, agents that are not repeatable, noise

@@ -11,7 +11,7 @@ import functools
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -36,7 +36,9 @@ from proxytune.learning import (
 from proxytune.running import check_machine, limited, was_ended_in
 from proxytune.seeds import exam_seed, proxy_lessons_seed, round_seed, target_lessons_seed
 from proxytune.space import Interval, Space, Theta
-from proxytune.study import StudySettings
+
+if TYPE_CHECKING:  # a process that scores points starts without it
+    from proxytune.study import StudySettings
 
 TOGETHER = " and the others beside it"
 """Ends the name of what several episodes do at once: which of them fails is not known then."""
@@ -386,7 +388,7 @@ SLACK = 1.0 / 30.0
 
 
 def search_space(
-    settings: StudySettings, widths: Mapping[str, tuple[float, float]], left: Mapping[str, tuple[float, float]]
+    settings: "StudySettings", widths: Mapping[str, tuple[float, float]], left: Mapping[str, tuple[float, float]]
 ) -> Space:
     """The box that is searched for PLV: centres where PRPV cannot tell θ from the best, and widths as asked for.
 
@@ -404,7 +406,7 @@ def search_space(
     return Space((*centres, *(Interval(name + WIDTH, *bounds) for name, bounds in sorted(widths.items()))))
 
 
-def _check_width(settings: StudySettings, name: str, widest: float) -> None:
+def _check_width(settings: "StudySettings", name: str, widest: float) -> None:
     key = f"teaching.width.{name}"
     box = next((box for box in settings.space.intervals if box.name == name), None)
     if box is None:

@@ -27,12 +27,9 @@ def planted():
     return planted_log({**TRUTH, "yaw_scrub": 0.12}, episodes=4, seconds=12.0, noise=CALM)
 
 
-@pytest.fixture(scope="module")
-def report(planted):
-    return diagnose(planted)
-
-
-def test_the_planted_effect_is_found_with_its_value(report):
+@pytest.mark.slow
+def test_what_is_found_is_told_drawn_and_written_as_the_command_does(planted, few_effects, tmp_path):
+    report = diagnose(planted)
     assert (report.verdict, report.effects) == ("explained", ("yaw_scrub",))
     row = report.parameters().loc["yaw_scrub"]
     assert row.low < row.value < row.high
@@ -42,26 +39,16 @@ def test_the_planted_effect_is_found_with_its_value(report):
     said = repr(report)
     assert said.startswith("DiagnosisReport of planted: yaw scrub: the robot turns as if its wheels were 0.1")
     assert ". Explained: with the effects added, only noise is left (expected false names: at most 0.0" in said
-
-
-def test_the_errors_are_those_of_the_document_by_horizon(report):
     errors = report.errors()
     assert list(errors.index) == [1.0, 2.0, 5.0]
     for one in report.document()["errors"]:
         row = errors.loc[one["horizon_s"]]
         assert (row.before, row.after, row.noise_floor) == (one["before"], one["after"], one["noise_floor"])
     assert (errors.after < 0.2 * errors.before).all()
-
-
-def test_what_is_found_is_drawn_and_written_as_the_command_does(report, tmp_path):
     assert all(isinstance(figure, Figure) for figure in report.figures().values())
     paths = report.write(str(tmp_path / "found"))
-    assert [path.name for path in paths] == [
-        "diagnosis.json",
-        "model.toml",
-        *(f"{name}.png" for name in report.figures()),
-        "report.html",
-    ]
+    names = ["diagnosis.json", "model.toml", *(f"{name}.png" for name in report.figures()), "report.html"]
+    assert [path.name for path in paths] == names
     assert json.loads(paths[0].read_text()) == json.loads(json.dumps(report.document()))
     assert read_model(paths[1]).theta["yaw_scrub"] == pytest.approx(report.parameters().value["yaw_scrub"])
     assert any("yaw_scrub" in note for note in report.notes)
@@ -100,38 +87,25 @@ def folder(tmp_path_factory):
     return write_still_frames(tmp_path_factory.mktemp("rolled") / "log", theta, lane_poses(30), columns=96)
 
 
-@pytest.fixture(scope="module")
-def report_of_diagnosing_frames(folder):
-    return diagnose(read_log(folder))
-
-
-def test_the_camera_speaks_where_there_is_no_motion(report_of_diagnosing_frames):
-    assert (report_of_diagnosing_frames.verdict, report_of_diagnosing_frames.effects) == ("explained", ("camera_roll",))
-    assert report_of_diagnosing_frames.diagnosis is None
-    assert report_of_diagnosing_frames.camera.verdict == "explained"
-    assert repr(report_of_diagnosing_frames).startswith(
-        "DiagnosisReport of pictured: camera: camera roll: the camera is tilted by 4."
-    )
-
-
-def test_parameters_and_errors_are_those_of_the_document(report_of_diagnosing_frames):
-    camera = report_of_diagnosing_frames.document()["camera"]
-    row = report_of_diagnosing_frames.parameters().loc["camera_roll"]
+@pytest.mark.slow
+def test_the_camera_speaks_where_there_is_no_motion(folder, tmp_path):
+    report = diagnose(read_log(folder))
+    assert (report.verdict, report.effects, report.diagnosis) == ("explained", ("camera_roll",), None)
+    assert report.camera.verdict == "explained"
+    assert repr(report).startswith("DiagnosisReport of pictured: camera: camera roll: the camera is tilted by 4.")
+    camera = report.document()["camera"]
+    row = report.parameters().loc["camera_roll"]
     told = camera["effects"][0]["parameters"]["camera_roll"]
     assert (row.value, [row.low, row.high], row.unit) == (told["value"], told["interval"], "deg")
-    errors = report_of_diagnosing_frames.camera_errors()
+    errors = report.camera_errors()
     assert errors.loc["markings", "after"] == camera["error"]["after"] < errors.loc["markings", "before"]
     assert errors.loc["brightness", "before"] == camera["grey_error"]["before"]
     assert list(errors.unit) == ["px", "grey levels"]
-    assert report_of_diagnosing_frames.errors().empty
-
-
-@pytest.mark.slow
-def test_what_is_written_is_what_is_said(report_of_diagnosing_frames, tmp_path):
-    paths = report_of_diagnosing_frames.write(tmp_path / "found")
-    assert json.loads(paths[0].read_text()) == json.loads(json.dumps(report_of_diagnosing_frames.document()))
-    assert {path.stem for path in paths[2:]} == {*report_of_diagnosing_frames.figures(), "report"}
-    assert any("camera_roll" in note for note in report_of_diagnosing_frames.notes)
+    assert report.errors().empty
+    paths = report.write(tmp_path / "found")
+    assert json.loads(paths[0].read_text()) == json.loads(json.dumps(report.document()))
+    assert {path.stem for path in paths[2:]} == {*report.figures(), "report"}
+    assert any("camera_roll" in note for note in report.notes)
 
 
 def test_errors_are_in_python_s_words(folder):

@@ -63,17 +63,6 @@ def test_a_study_runs_and_run_again_it_simulates_nothing(make_study):
     pd.testing.assert_frame_equal(again.trials(), first.trials())
 
 
-def test_a_study_that_was_left_goes_on_and_no_episode_is_simulated_twice(make_study):
-    folder, journal = journalled(make_study, budget="3")
-    run_study(folder)
-    journalled(make_study, budget="6")
-    resumed = run_study(folder)
-    assert len(simulated(journal)) == len({line.rsplit(" ", 1)[0] for line in simulated(journal)}) == 6 * 6 * 3
-    assert resumed.spent.episodes == 3 * 6 * 3
-    whole = run_study(make_study("whole", budget="6"))
-    pd.testing.assert_frame_equal(resumed.trials(), whole.trials())
-
-
 def test_the_trials_are_a_table_of_theta_state_score_and_measures(report):
     trials = report.trials()
     assert list(trials.index) == [1, 2, 3, 4, 5, 6]
@@ -116,6 +105,7 @@ def test_reading_a_study_that_was_not_run_is_one_line_and_makes_no_file(make_stu
     assert sorted(folder.iterdir()) == before
 
 
+@pytest.mark.slow
 def test_every_figure_is_drawn_and_written_where_asked(report, folder, tmp_path):
     assert set(report.figures()) == {"convergence", "profiles", "evaluations", "importance"}
     assert all(isinstance(figure, Figure) for figure in report.figures().values())
@@ -126,6 +116,7 @@ def test_every_figure_is_drawn_and_written_where_asked(report, folder, tmp_path)
     assert report.write().page.parent == folder
 
 
+@pytest.mark.slow
 def test_a_parameter_without_effect_is_a_warning_at_the_line_that_runs_the_study(make_study):
     family, box = '"partly_dead:partly_dead"', {"matters": "[-1, 1]", "dead": "[0, 1]"}
     folder = make_study("dead", parameters=box, family=family, budget="5", preflight="true")

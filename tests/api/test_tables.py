@@ -54,6 +54,7 @@ def test_the_numbers_of_two_dataframes_are_those_of_the_command(by_command):
     assert documented(score(proxy=str(paths[0]), target=paths[1], metrics=METRICS)) == found
 
 
+@pytest.mark.slow
 def test_several_proxies_by_name_are_those_of_the_command(by_command, tmp_path, capsys):
     proxy, target = table(1), table(2)
     _, paths = by_command(proxy, target)

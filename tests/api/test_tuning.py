@@ -33,6 +33,7 @@ def tuned(simulator=simulate, **options):
     return proxytune.tune(simulator, BOX, rows(TRUE, 9), **keys | options)
 
 
+@pytest.mark.slow
 def test_what_was_kept_in_a_folder_is_not_simulated_again_and_more_trials_follow(tmp_path):
     """A second call with a larger budget adds its trials to those of the first, which stay what they were."""
     calls = []
@@ -50,6 +51,7 @@ def test_what_was_kept_in_a_folder_is_not_simulated_again_and_more_trials_follow
     assert proxytune.read_study(tmp_path).theta == again.theta
 
 
+@pytest.mark.slow
 def test_known_points_come_first_and_known_scores_are_not_simulated():
     """θ that are given are the first trials; one whose episodes are all known calls no simulator."""
     near = {"gain": 1.1, "drag": 0.2}

@@ -160,6 +160,7 @@ def test_a_bend_moves_the_lower_half_as_far_as_it_says(form):
     assert np.quantile(moved[ROWS // 2 :], 0.95) == pytest.approx(3.0, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_straight_tape_lies_where_the_map_has_it():
     floor = draw_floor(SMALL_LOOP)
     places = floor.origin + (np.arange(len(floor.pixels)) + 0.5) / floor.pixels_per_metre
@@ -177,6 +178,7 @@ def test_laid_tape_lies_beside_its_place_by_its_tolerance():
     assert 0.003 < fine.shift.std() < 0.007
 
 
+@pytest.mark.slow
 def test_a_photographed_floor_is_the_map_with_texture(coarse):
     """Paint is where the map has it but for its edges, and no patch of asphalt is one grey."""
     floor = photographed_floor(SMALL_LOOP, 0.0, np.random.default_rng(1))
@@ -288,6 +290,7 @@ def test_the_same_seed_writes_the_same_set_and_its_truth(few_frames, tmp_path):
     assert told["outside"]["dirt"] == [asdict(spot) for spot in draw_case("dirt still small_loop", 4).sight.dirt]
 
 
+@pytest.mark.slow
 def test_worse_tape_comes_with_a_map_that_says_so(few_frames, tmp_path):
     from proxytune.driving import read_map
 

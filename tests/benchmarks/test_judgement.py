@@ -63,6 +63,7 @@ def test_the_reading_says_whether_region_and_intervals_hold_the_truth(judged, tr
     assert (judged.reading.p_value, judged.reading.fits) == (known.misfit.p_value, known.misfit.fits)
 
 
+@pytest.mark.slow
 def test_a_truth_far_from_all_that_fits_is_not_held():
     class Elsewhere(Calibrated):
         def truth(self, seed):

@@ -290,6 +290,7 @@ def test_a_course_passes_the_simulated_points_as_closely_as_their_roughness_says
     assert away[known.smooth > 0.0].min() > 0.0, "between the points seeds differ"
 
 
+@pytest.mark.slow
 def test_the_truth_scores_about_what_it_does_in_the_simulator_and_few_other_points_do():
     """There the proxy at 24 θ, against other placements of itself, scored 6.2 on average."""
     scores = [CALIBRATED.score(CALIBRATED.truth(seed), seed) for seed in range(40)]

@@ -223,6 +223,7 @@ def test_a_tracker_reports_what_was_worked_out_by_hand(effect, figures, seen):
     np.testing.assert_allclose(tracked((1.0, 2.0, np.pi / 2), (effect, figures)), seen, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 def test_what_is_hidden_moves_the_robot_by_more_than_the_noise(case):
     seconds = 12.0 if any(name in second.PLACES for name, _ in case.effects) else 30.0

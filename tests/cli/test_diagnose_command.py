@@ -15,25 +15,14 @@ from proxytune.cli.main import main
 from proxytune.effects import CATALOGUE, read_model
 from proxytune.study import open_study
 
+FIGURES_DRAWN = False
+pytestmark = pytest.mark.usefixtures("few_effects")
 KEYS = {
-    "verdict",
-    "declared",
-    "effects",
-    "immaterial",
-    "candidates",
-    "residual_depends_on",
-    "error",
-    "could_not_be_seen",
-    "next_manoeuvre",
+    *("verdict", "declared", "effects", "immaterial", "candidates", "residual_depends_on", "error"),
+    *("could_not_be_seen", "next_manoeuvre"),
 }
 ERROR_KEYS = {
-    "horizon_s",
-    "before",
-    "before_interval",
-    "after",
-    "after_interval",
-    "noise_floor",
-    "noise_floor_upper",
+    *("horizon_s", "before", "before_interval", "after", "after_interval", "noise_floor", "noise_floor_upper"),
     "unit",
 }
 SCRUBBING = {**TRUTH, "yaw_scrub": 0.12}
@@ -49,7 +38,7 @@ def home(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def printed(home):
+def printed(home, few_effects):
     """What was printed, diagnosing a small log once."""
     with pytest.MonkeyPatch.context() as patch:
         lines = []

@@ -16,23 +16,12 @@ from proxytune.cli.main import main
 from proxytune.effects import read_model
 from proxytune.logs import read_log
 
+FIGURES_DRAWN = False
+pytestmark = pytest.mark.usefixtures("few_effects")
 ROLLED = {"camera_pitch": 19.15, "camera_roll": 4.0}
 KEYS = {
-    "verdict",
-    "declared",
-    "effects",
-    "immaterial",
-    "candidates",
-    "error",
-    "grey_error",
-    "fixed_to_camera",
-    "blemishes",
-    "could_not_be_seen",
-    "next_views",
-    "map",
-    "matched_share",
-    "frames",
-    "pose_scatter",
+    *("verdict", "declared", "effects", "immaterial", "candidates", "error", "grey_error", "fixed_to_camera"),
+    *("blemishes", "could_not_be_seen", "next_views", "map", "matched_share", "frames", "pose_scatter"),
     "notes",
 }
 MEASURED = Path(__file__).resolve().parents[2] / "../shared/data/logs/gym_duckietown_frames"
@@ -180,6 +169,7 @@ def test_where_motion_is_refused_the_camera_still_comes_out(tmp_path, capsys):
     assert {Path(name).name for name in document["files"]} == names >= {"model.toml", "camera_markings.png"}
 
 
+@pytest.mark.slow
 def test_where_both_are_refused_both_reasons_are_told_in_one_line(tmp_path, capsys):
     log = circling_log(TRUTH, noise=CALM, episodes=2, seconds=6.0)
     folder = add_frames(write_log(log, tmp_path / "log"), log, ROLLED, every=20)

@@ -5,10 +5,12 @@ from dataclasses import replace
 
 import foreign_robot
 import pytest
+from planted import look_for_few
 
 from proxytune.cli.main import main
 from proxytune.logs import read_log
 
+FIGURES_DRAWN = False
 FIGURES = [word for key, value in foreign_robot.FIGURES.items() for word in ("--figure", f"{key}={value}")]
 
 
@@ -114,8 +116,9 @@ def test_predict_takes_a_table_as_it_is_at_its_poses_own_times(capsys, model, tm
 
 @pytest.mark.slow
 def test_diagnose_takes_a_folder_of_tables_and_names_what_the_robot_has(capsys, tmp_path, monkeypatch):
+    look_for_few(monkeypatch, "wheel_gain")
     monkeypatch.chdir(tmp_path)
-    drives = [foreign_robot.drive(100 + number, seconds=40.0, offset_s=-0.25) for number in range(6)]
+    drives = [foreign_robot.drive(100 + number, seconds=20.0, offset_s=-0.25) for number in range(6)]
     home = foreign_robot.write_form(tmp_path, "csv", drives)
     assert main(["diagnose", str(home), "--robot", "nobodys", *FIGURES, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
@@ -140,6 +143,7 @@ def test_the_folder_that_one_is_in_may_become_the_log(capsys, table, tmp_path, m
     assert read_log(tmp_path / "empty").name == "empty"
 
 
+@pytest.mark.slow
 def test_axes_in_a_mirror_and_a_wheel_in_millimetres_are_cautions(capsys, tmp_path):
     drives = [foreign_robot.drive(number, seconds=20.0) for number in range(2)]
     mirrored = [replace(one, poses=one.poses * (1.0, -1.0, 1.0)) for one in drives]
@@ -153,6 +157,7 @@ def test_axes_in_a_mirror_and_a_wheel_in_millimetres_are_cautions(capsys, tmp_pa
     assert "- beware: places are mirrored against headings" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_good_recording_draws_no_caution(capsys, table):
     assert document(capsys, str(table), *FIGURES)["cautions"] == []
 

@@ -30,7 +30,7 @@ def pose_at(episode, time):
     return np.array([np.interp(time, episode.times, column) for column in episode.poses.T])
 
 
-@pytest.mark.parametrize("frames", [1, 7, 20, 47])
+@pytest.mark.parametrize("frames", [7, pytest.param(47, marks=pytest.mark.slow)])
 def test_there_are_as_many_pictures_as_asked_for_each_at_an_instant_of_its_own(family, monkeypatch, frames):
     monkeypatch.setattr(filming, "SHORTEST_S", 0.5)
     drives = list(film(family, frames, 1))

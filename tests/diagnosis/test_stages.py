@@ -8,7 +8,7 @@ from dataclasses import replace
 import hidden_cases as hidden
 import numpy as np
 import pytest
-from planted import CALM, TRUTH, planted_log
+from planted import CALM, TRUTH, look_for_few, planted_log
 
 from proxytune.diagnosis import RULES, diagnose_log, forget_stages, robot_of
 from proxytune.diagnosis.answer import Estimate
@@ -83,6 +83,7 @@ def test_a_strangers_file_runs_nothing(tmp_path, monkeypatch):
     assert not (tmp_path / "harm").exists()
 
 
+@pytest.mark.slow
 def test_facts_are_the_log_the_robot_and_the_options():
     log = planted_log(TRUTH, episodes=2, seconds=3.0)
     robot = robot_of(log)
@@ -122,6 +123,7 @@ def test_a_diagnosis_that_is_killed_after_each_stage_comes_to_the_same_answer(tm
     else:
         log = planted_log({**TRUTH, "yaw_scrub": 0.12}, episodes=6, seconds=12.0, noise=CALM)
     robot, stages = robot_of(log), []
+    look_for_few(monkeypatch)
     undisturbed = diagnosis_document(diagnose_log(log, robot))
     interrupted(monkeypatch, stages)
     found = None

@@ -38,9 +38,9 @@ class Launched:
 
 
 @contextmanager
-def launching(*words):
-    """The process that forks the others; with "all" it has loaded everything."""
-    command = [sys.executable, str(FAKES / "launcher.py"), *words]
+def launching():
+    """The process that forks the others."""
+    command = [sys.executable, str(FAKES / "launcher.py")]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
     with subprocess.Popen(command, env=ENVIRONMENT, start_new_session=True, **pipes) as process:
         yield process

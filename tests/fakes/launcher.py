@@ -1,10 +1,11 @@
 """Loads proxytune once and forks for each command, so that a test can afford many real processes.
 
 Reads one JSON list per line, the words of a command and last the file for what it prints; writes its process id when it
-begins and its wait status when it has ended. With the word "all" every module of proxytune is loaded beforehand, and
-what that needs: then a command's time is that of its work.
+begins and its wait status when it has ended. Every module of proxytune is loaded beforehand, and what that needs, and
+figures are blank: a command's time is that of its work. joblib's processes import this file, and nothing by it.
 """
 
+import gc
 import json
 import os
 import signal
@@ -12,25 +13,30 @@ import sys
 from importlib import import_module
 from pkgutil import walk_packages
 
-import proxytune
-from proxytune.cli.main import main
+if __name__ == "__main__":
+    from blank import blank
+    from matplotlib.figure import Figure
 
-if "all" in sys.argv:
+    import proxytune
+    from proxytune.cli.main import main
+
+    Figure.savefig = blank
     for module in walk_packages(proxytune.__path__, "proxytune."):
         if module.name != "proxytune.__main__":
             import_module(module.name)
     for name in ("matplotlib.pyplot", "skopt", "sklearn.gaussian_process", "scipy.optimize", "scipy.stats"):
         import_module(name)
+    gc.freeze()
 
-for line in iter(sys.stdin.readline, ""):
-    *words, output = json.loads(line)
-    child = os.fork()
-    if child == 0:
-        os.setsid()
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-        descriptor = os.open(output, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
-        for stream in (1, 2):
-            os.dup2(descriptor, stream)
-        raise SystemExit(main(words))
-    print(child, flush=True)
-    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+    for line in iter(sys.stdin.readline, ""):
+        *words, output = json.loads(line)
+        child = os.fork()
+        if child == 0:
+            os.setsid()
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+            descriptor = os.open(output, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+            for stream in (1, 2):
+                os.dup2(descriptor, stream)
+            raise SystemExit(main(words))
+        print(child, flush=True)
+        print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)

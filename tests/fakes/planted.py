@@ -6,10 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pytest
 from manoeuvres import RATE_HZ, make_drives
 from numpy.typing import NDArray
 
 from proxytune.diagnosis import Drives, Fit
+from proxytune.diagnosis.motion import screening
 from proxytune.diagnosis.motion.clocks import cut_into_blocks
 from proxytune.diagnosis.motion.drives import gather
 from proxytune.diagnosis.motion.fitting import fit
@@ -31,6 +33,13 @@ CALM = Noise((0.002, 0.001, 0.008), (0.002, 0.005))
 
 DECLARED = (("trim",), ("delay",))
 TRUTH = {"trim": 0.03, "delay": 0.12}
+FEW = ("dead_band", "motor_lag", "stiction", "turn_slip", "yaw_scrub")
+
+
+def look_for_few(patch: pytest.MonkeyPatch, *more: str) -> None:
+    """Let diagnoses try FEW of the shipped effects and these, where what becomes of an answer is tested."""
+    tried, left_out = screening.motion_effects, set(screening.MOTION_EFFECTS) - {*FEW, *more}
+    patch.setattr(screening, "motion_effects", lambda every: tuple(one for one in tried(every) if one not in left_out))
 
 
 def planted_log(

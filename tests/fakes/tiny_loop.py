@@ -1,6 +1,6 @@
 """A loop on the planar plant that takes seconds: few agents, short episodes, a short log.
 
-Run as a script it is the command line, with the log that `loop` records of a twin made short.
+Run as a script it is the command line, with the log that `loop` records of a twin made short, and few effects to find.
 """
 
 import json
@@ -93,6 +93,8 @@ def write_diagnosis(folder, **changes):
 
 if __name__ == "__main__":
     from proxytune.cli.main import main
+    from proxytune.diagnosis.motion import screening
 
     diagnosing.Wanted = short
+    screening.motion_effects = lambda catalogue: ("dead_band", "motor_lag", "stiction")
     sys.exit(main())

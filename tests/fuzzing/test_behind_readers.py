@@ -39,6 +39,7 @@ from proxytune.study.earlier import earlier_trials, learn
 from tests.conftest import study_maker
 
 __all__ = ["inputs"]  # A fixture
+FIGURES_DRAWN = False
 
 TIMES = np.arange(0.0, ONE_DRIVE, 0.05)
 
@@ -234,19 +235,12 @@ BEHIND = {
     **{f"export into {name}": Reader(write_own_models, (name,), export_into_them(name)) for name in FILES},
     "drive": Reader(copy_robot, ("own/robot.toml", "own/duckiebot.urdf"), drive_it),
 }
-SHARE = {
-    "import ros1": 0.3,
-    "import sqlite3": 0.2,
-    "import mcap": 0.3,
-    "import npz": 0.5,
-    "diagnose": 0.002,
-    "drive": 0.2,
-}
-SHARE |= {"predict": 0.5, "predict of a log": 0.3, "record of a table": 0.1, "bank.json": 0.3}
+SHARE = {"diagnose": 0.01, "record of a table": 0.1, "drive": 0.2, "import sqlite3": 0.2, "predict of a log": 0.3}
 """What takes longer is done less often."""
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("few_effects")
 @pytest.mark.parametrize("name", BEHIND)
 def test_what_is_done_with_a_spoilt_file_is_done_or_told_in_one_line(name, inputs, tmp_path, finished_once):
     reader, home = BEHIND[name], tmp_path / "spoilt"

@@ -202,8 +202,6 @@ READERS = {
         write("loop.json", '{"format": 1, "steps": {"study": "0123456789abcdef", "log": "0123"}}'), ("loop.json",), Kept
     ),
 }
-SHARE = {"study.db": 0.3, "under way": 0.3, "log": 0.5, "table": 0.5}
-"""What takes longer to read is read less often."""
 
 
 def outcome(read: Callable[[Path], object], home: Path) -> Any:
@@ -249,4 +247,4 @@ def test_a_spoilt_file_is_read_or_told_of_in_one_line(name, inputs, tmp_path, fi
     home.mkdir()
     reader.make(home, finished_once)
     assert outcome(reader.read, home) is None
-    check_spoilt(name, reader, home, round(inputs * SHARE.get(name, 1.0)))
+    check_spoilt(name, reader, home, inputs)

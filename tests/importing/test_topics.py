@@ -249,6 +249,7 @@ POSES = np.random.default_rng(2).normal(size=(100, 3))
 READING_DRIVE = ((ISSUED, TWISTS), (READING_TIMES, POSES))
 
 
+@pytest.mark.slow
 @settings(max_examples=5)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 30), st.integers(1, 30))
 def test_every_storage_gives_the_same_numbers(seed, commands, poses):

@@ -17,6 +17,7 @@ from proxytune.cli.main import main
 from proxytune.loop import diagnosing, run as closing
 from proxytune.loop.run import STEPS
 
+FIGURES_DRAWN = False
 LINES = {name: f"step {number} of {len(STEPS)}," for number, name in enumerate(STEPS, start=1)}
 STUDIES = {"study": "tiny", "extended study": "tiny/loop/extended"}
 """These are killed in the middle: a few episodes are driven."""
@@ -120,6 +121,7 @@ def captions_of_episodes(folder):
     return [caption for caption in captions if "seed" in caption]
 
 
+@pytest.mark.slow
 def test_the_righted_agent_is_shown_beside_the_target_before_and_after(righting, capsys):
     folder, document = righting
     assert document["righted"]["agent"] == "yellow_only"
@@ -136,6 +138,7 @@ def test_the_righted_agent_is_shown_beside_the_target_before_and_after(righting,
         assert f"at {driven['parted_s']:.1f} s" in caption if driven["parted_s"] else "stay within 5 cm" in caption
 
 
+@pytest.mark.slow
 def test_without_a_twin_the_righted_agent_is_named_but_not_shown(righting, close):
     folder, document = righting
     study, target, held_out = folder / "study.toml", folder / "target.csv", folder / "loop" / "held_out.csv"
@@ -220,6 +223,7 @@ def test_what_depends_on_the_users_own_modules_is_done_again_when_they_change(cl
     assert close(closed)["this_run"]["steps"] == ["extension"]
 
 
+@pytest.mark.slow
 def test_scores_of_held_out_agents_in_the_targets_table_are_used(closed, closed_once, diagnosed, close):
     more = (closed / "loop" / "held_out.csv").read_text().partition("\n")[2]
     loop_json = closed / "loop" / "loop.json"

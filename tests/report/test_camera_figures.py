@@ -80,6 +80,7 @@ def test_every_number_of_the_document_is_plain_and_finite(diagnosis):
     assert sum(isinstance(leaf, float) for leaf in told) > 50
 
 
+@pytest.mark.slow
 def test_effects_that_do_not_matter_are_told_with_the_values_they_had(diagnosis, monkeypatch):
     monkeypatch.setattr(weighing, "MATERIAL", math.inf)
     weighed = weighing.weigh_effects(diagnosis.named, 1)

@@ -62,7 +62,7 @@ AFTER = "with dead band"
 
 
 @pytest.fixture(scope="module")
-def diagnosis():
+def diagnosis(few_effects):
     case = next(case for case in hidden.IN_FORM if case.effects == (("dead_band", {"width": WIDTH}),))
     found = diagnose(hidden.make_log(case, episodes=6, seconds=20.0), ROBOT, ("trim", "delay"))
     assert [effect.effect for effect in found.effects] == ["dead_band"]
@@ -402,6 +402,7 @@ def test_with_nothing_added_there_is_one_model_and_no_effect_to_draw(clean):
     assert {one.get_color() for one in figures["residual_over_time"].axes[0].get_lines()} == {VERMILLION}
 
 
+@pytest.mark.slow
 def test_an_unexplained_residual_is_drawn_over_each_signal_that_there_is(diagnosis):
     names = {group.name for group in signal_groups(diagnosis.found.declared)}
     assert names <= set(CUE_PANELS)

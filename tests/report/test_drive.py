@@ -206,6 +206,7 @@ def test_a_gif_has_every_frame_at_its_time_and_plays_for_ever(animation, tmp_pat
     assert [file.name for file in path.parent.iterdir()] == ["episode.gif"]
 
 
+@pytest.mark.slow
 def test_a_gif_that_fails_half_way_leaves_the_old_one(animation, tmp_path):
     path = tmp_path / "episode.gif"
     path.write_text("old")

@@ -106,7 +106,7 @@ def test_the_scatter_has_a_panel_per_metric_with_every_agent_named(assessment):
         assert sorted(text.get_text() for text in axes.texts) == sorted(assessment.inputs.agents)
 
 
-@pytest.mark.parametrize("agents", [6, MOST])
+@pytest.mark.parametrize("agents", [pytest.param(6, marks=pytest.mark.slow), MOST])
 def test_no_two_names_overlap_and_none_is_cut_at_85_millimetres(agents):
     values = np.round(np.random.default_rng(1).normal(size=(agents, 3, 2)), 1)
     values[: agents // 2] = 1.0

@@ -243,6 +243,7 @@ def test_what_was_cut_off_and_saved_is_told(result):
     assert found.episodes == result.episodes - 12
 
 
+@pytest.mark.slow
 def test_failed_episodes_are_told_with_the_first_of_them(make_study):
     folder = make_study(domain={"faults": '["agent3:1:raises"]'}, budget="6")
     with Store.open(folder) as store:

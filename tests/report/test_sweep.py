@@ -175,6 +175,7 @@ def test_without_pod_there_are_three_panels_and_the_key(swept):
     assert [axes.axison for axes in panels_figure(swept).axes] == [True, True, True, False]
 
 
+@pytest.mark.slow
 def test_the_target_s_own_value_is_marked_only_where_it_is_known(swept):
     def marks(figure):
         return [line.get_xdata()[0] for axes in figure.axes for line in axes.get_lines() if line.get_label() == "truth"]
@@ -184,6 +185,7 @@ def test_the_target_s_own_value_is_marked_only_where_it_is_known(swept):
     assert marks(panels_figure(swept)) == marks(sweep_figure([swept], {"delay": 0.1})) == []
 
 
+@pytest.mark.slow
 def test_figures_are_as_wide_as_a_column_with_type_of_six_points_and_more(with_pod, swept):
     for figure in (panels_figure(with_pod), panels_figure(swept), sweep_figure([swept] * 4), bars_figure([swept] * 4)):
         assert figure.get_figwidth() * 25.4 == pytest.approx(85.0)

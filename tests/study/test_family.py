@@ -11,7 +11,7 @@ from proxytune.cli.main import main
 from proxytune.domain import make_episode
 from proxytune.errors import ExtensionError, InputError, SettingsError
 from proxytune.study import load_family, open_study, read_study_settings, study_facts
-from proxytune.study.family import UserFamily
+from proxytune.study.guard import UserFamily
 
 
 def load(folder):

@@ -31,6 +31,7 @@ def test_a_picture_without_noise_has_none():
     assert found.value < 0.3
 
 
+@pytest.mark.slow
 def test_texture_is_no_noise():
     model, seen = scene()
     found = fit_grain(logged(seen), model, floor()).noise
@@ -38,6 +39,7 @@ def test_texture_is_no_noise():
     assert found.interval[0] == 0.0
 
 
+@pytest.mark.slow
 def test_the_bound_holds_the_noise_on_a_textured_floor():
     model, seen = scene()
     for noise in (2.0, 5.0):
@@ -72,6 +74,7 @@ def test_frames_without_floor_tell_nothing():
     assert found.interval == (0.0, np.inf)
 
 
+@pytest.mark.slow
 @needs_measured
 def test_photographs_without_noise_give_a_bound_of_a_grey_level():
     found = fit_grain(measured(), predicted(), floor()).noise

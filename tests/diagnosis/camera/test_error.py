@@ -82,6 +82,7 @@ def test_without_what_does_not_matter_the_model_is_as_if_it_had_not_been_named(m
     assert left.with_dropped is named().model
 
 
+@pytest.mark.slow
 def test_the_added_effect_lowers_the_difference_of_brightness():
     grey, _ = compare_brightness(gathered(shown()), named(), ({}, {}), 1)
     assert grey.unit == "grey levels"
@@ -90,6 +91,7 @@ def test_the_added_effect_lowers_the_difference_of_brightness():
     assert grey.after.interval[0] < grey.after.value < grey.after.interval[1]
 
 
+@pytest.mark.slow
 def test_an_effect_on_pictures_counts_after_and_not_before():
     dark = np.rint(shown() * 0.7).astype(np.uint8)
     look = {"exposure.gain": 0.7, "exposure.gamma": 1.0}
@@ -99,6 +101,7 @@ def test_an_effect_on_pictures_counts_after_and_not_before():
     assert fitting.before.value == plain.before.value
 
 
+@pytest.mark.slow
 def test_an_automatic_exposure_is_no_difference():
     levels = np.random.default_rng(1).uniform(0.6, 1.2, (COUNT, 1, 1, 1))
     drifting = np.clip(np.rint(shown() * levels), 0, 255).astype(np.uint8)
@@ -124,6 +127,7 @@ def fits(monkeypatch):
     return made
 
 
+@pytest.mark.slow
 def test_a_frame_left_out_does_not_change_the_camera_that_is_tested_on_it(fits):
     views = stood({"camera_roll": 4.0}, count=COUNT)
     state = at_truth(views, {"camera_roll": 4.0})

@@ -39,6 +39,7 @@ def test_a_planted_figure_comes_back(name):
     assert abs(fit.theta[name] - truth) < 3.0 * fit.sd[0]
 
 
+@pytest.mark.slow
 def test_three_figures_together_come_back_from_far_away():
     truth = {"camera_pitch": 23.0, "camera_roll": -5.0, "camera_height": 0.12}
     views = stood(truth)
@@ -57,6 +58,7 @@ def test_all_figures_free_lie_within_three_standard_deviations_of_the_truth():
     assert abs(fit.theta["lens_distortion"] + 0.15) < 0.03
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "truth", "most"), [("camera_latency", 0.12, 0.006), ("rolling_shutter", 0.06, 0.012)])
 def test_figures_of_time_come_back_from_a_drive(name, truth, most):
     views = driven({name: truth})
@@ -66,6 +68,7 @@ def test_figures_of_time_come_back_from_a_drive(name, truth, most):
     assert abs(fit.theta[name] - truth) < 3.0 * fit.sd[place]
 
 
+@pytest.mark.slow
 def test_poses_are_told_better_than_the_tracker_has_them():
     views = stood({"camera_roll": 4.0})
     fit = fit_camera(views, at_truth(views), ["camera_roll"], (*FAR, *NEAR))
@@ -75,6 +78,7 @@ def test_poses_are_told_better_than_the_tracker_has_them():
     assert (fit.pose_sd < (SCATTER[0], *SCATTER)).all()
 
 
+@pytest.mark.slow
 def test_one_colour_s_lines_that_lie_beside_their_places_are_taken_up_by_the_tape():
     """Not by the camera: a line shifted on every tile is a shift of every tile."""
     views = stood(noisy=False)
@@ -118,6 +122,7 @@ def test_what_is_not_named_stays_where_it_was():
     }
 
 
+@pytest.mark.slow
 def test_the_more_frames_the_less_is_left_open():
     few, many = (
         fit_camera(views, at_truth(views), ["camera_pitch", "camera_roll"], NEAR)

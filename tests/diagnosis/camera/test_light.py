@@ -51,6 +51,7 @@ def test_a_bumper_leaves_no_contrast_where_markings_pass():
     assert 0.02 < bumper.share < 0.11
 
 
+@pytest.mark.slow
 def test_the_largest_blemish_comes_first():
     model, seen = scene()
     spots = dirty(dirty(seen, 75, 40, diameter=12.0), 95, 110, diameter=26.0)
@@ -59,6 +60,7 @@ def test_the_largest_blemish_comes_first():
     assert first.columns[0] > 80 > second.columns[1]
 
 
+@pytest.mark.slow
 def test_a_clean_camera_has_no_blemishes_whatever_its_light():
     model, seen = scene()
     assert blemishes(logged(seen, 0.8, 1.3, 0.3, drift=0.1, noise=3.0), model) == ()
@@ -85,6 +87,7 @@ def test_frames_without_markings_cannot_be_judged():
     assert blemishes(logged(sky, noise=2.0), sky) == ()
 
 
+@pytest.mark.slow
 @needs_measured
 def test_measured_frames_of_the_nominal_camera_have_no_blemish():
     assert blemishes(measured(), predicted()) == ()
@@ -116,6 +119,7 @@ def test_exposure_and_vignetting_come_out_under_noise_and_drift():
     assert inside(light.vignetting, 0.3)
 
 
+@pytest.mark.slow
 def test_a_camera_without_faults_comes_out_neutral():
     model, seen = scene()
     light = fit_light(logged(seen), model, floor(), fixed_exposure=True)
@@ -133,6 +137,7 @@ def test_each_frame_has_a_level_where_the_exposure_is_automatic():
     assert np.log(half.levels).mean() == pytest.approx(0.0, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_unknown_paint_leaves_exposure_open_but_not_vignetting():
     model, seen = scene()
     near = np.abs(seen[..., None, :] - PAINTS.astype(np.float32)).sum(axis=-1).argmin(axis=-1)
@@ -193,6 +198,7 @@ def test_what_is_no_floor_is_no_flat_place():
     np.testing.assert_array_equal(flat[23:], 0)
 
 
+@pytest.mark.slow
 @needs_measured
 def test_measured_frames_of_the_nominal_camera_are_neutral():
     """Gain 0.97, gamma 1.01, vignetting 0.01."""

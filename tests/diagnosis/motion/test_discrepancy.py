@@ -173,6 +173,7 @@ def test_the_guard_and_the_held_out_errors_tell_of_blocks_that_were_not_fitted(f
     assert inside.mean() < learnt.held_out.mean()
 
 
+@pytest.mark.slow
 def test_curves_that_promise_nothing_to_who_asks_are_not_used(found):
     drives, learnt = found
     asked = []

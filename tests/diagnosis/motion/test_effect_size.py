@@ -57,6 +57,7 @@ def test_drives_of_one_robot_are_alike(theta):
     assert unlike(planted_log({**TRUTH, **theta}, **SHORT)) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["dead_band width 0.12", "stiction breakaway 0.14", "dead_zone_that_jumps", "eccentric_wheel"]
 )
@@ -64,6 +65,7 @@ def test_what_one_robot_lacks_does_not_make_two_of_it(name):
     assert unlike(hidden.make_log(CASES[name], episodes=8, seconds=40.0)) is None
 
 
+@pytest.mark.slow
 def test_drives_on_two_floors_fall_in_two_groups_too():
     found = unlike(hidden.make_log(CASES["carpet"], episodes=8, seconds=40.0))
     assert sorted(found.gains) == pytest.approx([0.8, 1.0], abs=0.03)
@@ -129,6 +131,7 @@ def test_where_everything_matters_nothing_changes(drives):
     assert drop_negligible(whole, 1) is whole
 
 
+@pytest.mark.slow
 def test_of_two_effects_that_stand_for_one_another_one_is_kept(drives):
     twins = (adopted("yaw_scrub", SCRUB), adopted("wheel_gain", (("wheel_gain.left", "wheel_gain.right"),)))
     theta = {**TRUTH, "yaw_scrub": 0.13, "wheel_gain.left": 1.0, "wheel_gain.right": 1.0}
@@ -195,10 +198,10 @@ def test_an_effect_does_harm_only_where_predictions_are_shown_to_be_better_witho
     assert not weighed(1.2, 1.1, 1.3).harmful
 
 
-@pytest.mark.parametrize("size", [0.05, 0.1])
-def test_draws_do_not_matter_where_the_noise_of_poses_leaves_no_room_for_them(size):
+@pytest.mark.slow
+def test_draws_do_not_matter_where_the_noise_of_poses_leaves_no_room_for_them():
     calm = planted_drives(TRUTH, episodes=6, seconds=20.0, noise=Noise((1e-6, 1e-6, 1e-6), (0.005, 0.01)))
-    jittery = Variant({**TRUTH, "delay": TRUTH["delay"] - size / 2.0, "delay_jitter": size}, DECLARED)
+    jittery = Variant({**TRUTH, "delay": TRUTH["delay"] - 0.05, "delay_jitter": 0.1}, DECLARED)
     windows = cut(calm, 2.0)
     errors = pose_errors(calm, jittery.theta, windows)[:, 0]
     drawn = np.sqrt(_drawn_squares(calm, jittery, windows, 1).mean())
@@ -234,10 +237,6 @@ def test_slow_drives_cannot_show_saturation(slow):
     assert "saturation" in slow
 
 
-def test_driving_below_the_limit_of_both_wheels_cannot_show_saturation():
-    assert "saturation" in invisible_effects(swinging(0.3, 0.05), VISIBILITY_DECLARED)
-
-
 def test_fast_drives_can():
     assert "saturation" not in invisible_effects(swinging(0.9, 0.1), VISIBILITY_DECLARED)
 
@@ -246,6 +245,7 @@ def test_straight_drives_cannot_show_what_turning_costs():
     assert "turn_slip" in invisible_effects(swinging(0.3, 0.0), VISIBILITY_DECLARED)
 
 
+@pytest.mark.slow
 def test_rich_drives_show_nearly_everything():
     hidden = invisible_effects(fitted(planted_drives(TRUTH, episodes=6, seconds=30.0)), VISIBILITY_DECLARED)
     assert len(hidden) <= 3
@@ -260,6 +260,7 @@ def test_unseen_effects_are_effects_of_motion_in_the_catalogues_order(slow):
     assert slow == tuple(name for name in MOTION_EFFECTS if name in slow)
 
 
+@pytest.mark.slow
 def test_commands_that_never_change_cannot_show_their_loss():
     steady = fitted(drives_of(driven_log(TRUTH, np.full((3, 600, 2), 0.4), np.zeros((3, 3)))))
     assert {"dropped_commands", "delay_jitter"} <= set(invisible_effects(steady, VISIBILITY_DECLARED))

@@ -46,6 +46,7 @@ def test_planted_trim_and_delay_lie_in_narrow_intervals(found):
     assert known["delay"][1] - known["delay"][0] < 0.03
 
 
+@pytest.mark.slow
 def test_intervals_cover_the_truth_most_of_the_time():
     covered = []
     for seed in range(10, 18):

@@ -61,7 +61,7 @@ def test_jittering_commands_are_found_with_their_spread(late):
     assert 0.07 < found.value < 0.3
 
 
-@pytest.mark.parametrize("seed", [3, 4])
+@pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.slow)])
 def test_clean_drives_have_neither(seed):
     for found in weighed({}, seed).values():
         assert found.gain < 10.0

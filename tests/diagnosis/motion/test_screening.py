@@ -120,6 +120,7 @@ def test_a_size_between_the_probes_is_met_within_one_percent():
     assert size[0] == pytest.approx(0.137, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_slippery_place_is_met_within_a_patch_width():
     patch = {"loss": 0.6, "x": 0.3, "y": 0.2, "radius": 0.7}
     (where,) = added("slippery_patch", {f"slippery_patch.{key}": value for key, value in patch.items()})
@@ -152,10 +153,10 @@ def leads_of(theta, *, base=None, **more):
     ("theta", "effect"),
     [
         ({"dead_band.width": 0.1}, "dead_band"),
-        ({"turn_slip": 0.15}, "turn_slip"),
-        ({"motor_lag.time_constant": 0.4}, "motor_lag"),
-        ({"floor_slope.x": 0.04}, "floor_slope"),
-        ({"lateral_slip": 0.1}, "lateral_slip"),
+        pytest.param({"turn_slip": 0.15}, "turn_slip", marks=pytest.mark.slow),
+        pytest.param({"motor_lag.time_constant": 0.4}, "motor_lag", marks=pytest.mark.slow),
+        pytest.param({"floor_slope.x": 0.04}, "floor_slope", marks=pytest.mark.slow),
+        pytest.param({"lateral_slip": 0.1}, "lateral_slip", marks=pytest.mark.slow),
     ],
 )
 def test_a_planted_effect_leads(theta, effect):
@@ -171,6 +172,7 @@ def leads_of_scrubbing():
     return leads_of({"yaw_scrub": 0.13})
 
 
+@pytest.mark.slow
 def test_leads_come_best_first_and_once_per_form():
     leads = leads_of_scrubbing()
     gains = [lead.gain for lead in leads]

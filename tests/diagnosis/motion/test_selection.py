@@ -212,6 +212,7 @@ def test_an_effect_that_misled_is_left_out_of_a_second_search_and_still_told(bas
     assert [dropped.effect.effect for dropped in found.negligible] == ["lateral_slip"]
 
 
+@pytest.mark.slow
 def test_an_effect_that_does_no_harm_misled_nobody(base, monkeypatch):
     found, asked, _ = named(base, monkeypatch, SLIP, SCRUB, harmful=False)
     assert asked == [()]
@@ -342,18 +343,21 @@ def together(four_faults):
     return eliminate(four_faults, lambda line: None)
 
 
+@pytest.mark.slow
 def test_all_faults_of_a_car_are_found_together_and_nothing_beside(together):
     assert {effect.effect for effect in together.adopted} == {name.split(".")[0] for name in FAULTS}
     assert {name: together.model.theta[name] for name in FAULTS} == pytest.approx(FAULTS, rel=0.05)
     assert all(effect.gain > RULES.sure_gain_nats for effect in together.adopted)
 
 
+@pytest.mark.slow
 def test_what_a_second_search_is_to_do_without_is_not_fitted_together_either(four_faults, monkeypatch):
     monkeypatch.setattr(selection, "OF_CARS", ("dead_band", "steering_lag"))
     found = eliminate(four_faults, lambda line: None, without=("dead_band",))
     assert [effect.effect for effect in found.adopted] == ["steering_lag"]
 
 
+@pytest.mark.slow
 def test_what_is_found_together_is_taken_only_where_it_is_surely_more_likely_and_predicts_no_worse(
     four_faults, together, monkeypatch
 ):

@@ -55,13 +55,16 @@ def test_no_curve_gains_much_where_nothing_is_missing(clean):
     assert fit_curves(clean)[0].gain < RULES.least_gain_nats
 
 
+SLOW = {"marks": pytest.mark.slow}
+
+
 @pytest.mark.parametrize(
     ("effect", "figures", "signals"),
     [
         ("carpet", {"factor": 0.8, "beyond": 0.0}, {"position"}),
-        pytest.param("eccentric_wheel", {"ripple": 0.25}, {"left wheel angle"}, marks=pytest.mark.slow),
-        pytest.param("weak_reverse", {"factor": 0.8}, {"direction of travel", "wheel command"}, marks=pytest.mark.slow),
-        ("slipping_hub", {"factor": 0.85, "after": 15.0}, {"time in the episode", "cumulated use"}),
+        pytest.param("eccentric_wheel", {"ripple": 0.25}, {"left wheel angle"}, **SLOW),
+        pytest.param("weak_reverse", {"factor": 0.8}, {"direction of travel", "wheel command"}, **SLOW),
+        pytest.param("slipping_hub", {"factor": 0.85, "after": 15.0}, {"time in the episode", "cumulated use"}, **SLOW),
     ],
 )
 def test_the_signal_that_the_motion_depends_on_leads(effect, figures, signals):

@@ -30,3 +30,11 @@ def test_every_tracker_spoils_what_it_says(tracker):
         "lagging": 0.3 * 0.01 < np.median(away[..., 0]) < 0.3 * 0.1,
     }
     assert share[tracker]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tracker", ["nothing else", "clock drifts", "clock jumps", "outliers"])
+def test_nothing_is_found_where_nothing_is(tracker):
+    row = false_names.diagnosed(tracker, "heavy", 0)
+    assert row["names"] == []
+    assert row["verdict"] in ("nothing missing", "cannot be told")

@@ -5,6 +5,7 @@ begins and its wait status when it has ended. Every module of proxytune is loade
 figures are blank: a command's time is that of its work. joblib's processes import this file, and nothing by it.
 """
 
+import fcntl
 import gc
 import json
 import os
@@ -35,6 +36,7 @@ if __name__ == "__main__":
             os.setsid()
             signal.signal(signal.SIGINT, signal.default_int_handler)
             descriptor = os.open(output, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+            fcntl.flock(descriptor, fcntl.LOCK_SH)
             for stream in (1, 2):
                 os.dup2(descriptor, stream)
             raise SystemExit(main(words))

@@ -6,29 +6,17 @@ figures are blank: a command's time is that of its work. joblib's processes impo
 """
 
 import fcntl
-import gc
 import json
 import os
 import signal
 import sys
-from importlib import import_module
-from pkgutil import walk_packages
 
 if __name__ == "__main__":
-    from blank import blank
-    from matplotlib.figure import Figure
+    import loaded
 
-    import proxytune
     from proxytune.cli.main import main
 
-    Figure.savefig = blank
-    for module in walk_packages(proxytune.__path__, "proxytune."):
-        if module.name != "proxytune.__main__":
-            import_module(module.name)
-    for name in ("matplotlib.pyplot", "skopt", "sklearn.gaussian_process", "scipy.optimize", "scipy.stats"):
-        import_module(name)
-    gc.freeze()
-
+    assert loaded
     for line in iter(sys.stdin.readline, ""):
         *words, output = json.loads(line)
         child = os.fork()

@@ -140,6 +140,15 @@ def make_studies(tmp_path_factory: pytest.TempPathFactory) -> MakeStudy:
 
 
 @pytest.fixture(scope="session")
+def launcher() -> Iterator[object]:
+    """The process that forks what is Launched."""
+    from launched import launching
+
+    with launching() as process:
+        yield process
+
+
+@pytest.fixture(scope="session")
 def finished_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A finished study, run once."""
     from proxytune.search import make_proposer

@@ -14,13 +14,6 @@ from proxytune.storage import Store
 FAMILY = {"family": '"deadly:deadly"', "budget": "2", "initial": "2"}
 
 
-def run(folder):
-    """The command's status, and what it says besides progress."""
-    process = start("study", folder, "--json")
-    out, told = process.communicate(timeout=300)
-    return process.returncode, out, besides_progress(told)
-
-
 def failures(folder):
     with Store.read(folder) as store:
         thetas = [trial.theta for trial in store.trials()]
@@ -35,21 +28,22 @@ def domain(fault):
 @pytest.mark.slow
 def test_an_agent_that_ends_the_study_s_own_process_is_named_by_the_next_run_which_goes_on(make_study):
     folder = make_study(domain=domain("dies"), **FAMILY)
-    status, out, told = run(folder)
-    assert (status, out) == (9, "")
-    assert told.startswith("proxytune study: code that is not proxytune's ended the process with status 9 (")
+    process = start("study", folder)
+    out, told = process.communicate(timeout=300)
+    assert (process.returncode, out) == (9, "")
+    ended = "proxytune study: code that is not proxytune's ended the process with status 9 ("
+    assert besides_progress(told).startswith(ended)
     assert not failures(folder)
-    status, out, _ = run(folder)
-    assert (status, json.loads(out)["episodes"]["failed"]) == (0, 2)
+    assert main(["study", str(folder)]) == 0
     assert failures(folder) == {("agent1", 1): "it ended its process twice (exit status 9)"}
 
 
 @pytest.mark.slow
-def test_an_agent_that_hangs_fails_where_the_study_limits_its_time(make_study):
-    folder = make_study(domain=domain("hangs"), episode_timeout_s="1.5", **FAMILY)
-    status, out, _ = run(folder)
-    assert (status, json.loads(out)["episodes"]["failed"]) == (0, 2)
-    assert failures(folder) == {("agent1", 1): "it took longer than 1.5 s"}
+def test_an_agent_that_hangs_fails_where_the_study_limits_its_time(make_study, capsys):
+    folder = make_study(domain=domain("hangs"), episode_timeout_s="1.0", **FAMILY)
+    assert main(["study", str(folder), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["episodes"]["failed"] == 2
+    assert failures(folder) == {("agent1", 1): "it took longer than 1 s"}
 
 
 @pytest.mark.parametrize("jobs", ["1", pytest.param("2", marks=pytest.mark.slow)])

@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 import pytest
-from launched import Launched, launching, never_stopped
+from launched import Launched, never_stopped
 from processes import besides_progress, episodes, finished_episodes, refused, trials, wait_for
 
 from proxytune.cli.main import COMMANDS, main
@@ -19,12 +19,6 @@ EPISODES = 7 * PER_TRIAL
 TOLD = {signal.SIGINT: (130, "interrupted"), signal.SIGTERM: (143, "terminated")}
 STOPS = ((signal.SIGINT, os.killpg), (signal.SIGTERM, os.kill), (signal.SIGTERM, os.killpg), (signal.SIGKILL, os.kill))
 """As they come in life: Ctrl-C reaches a terminal's every process, SIGTERM one or, of a scheduler, its workers too."""
-
-
-@pytest.fixture(scope="module")
-def launcher():
-    with launching() as process:
-        yield process
 
 
 def stop(process, number, send=os.kill):

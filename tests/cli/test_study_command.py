@@ -76,6 +76,7 @@ def test_a_parameter_that_does_nothing_is_said_before_the_study_and_recorded(mak
     assert told == "", "a finished study has no progress to tell of"
 
 
+@pytest.mark.slow
 def test_without_a_terminal_every_trial_is_a_plain_line_with_its_prpv_the_best_and_the_episodes(make_study, capsys):
     folder = make_study(preflight="true", confirm="1", cut_off="true")
     assert main(["study", str(folder), "--json"]) == 0

@@ -96,7 +96,9 @@ def test_every_engine_begins_with_the_same_design(engine):
     assert [trial.values for trial in trials] == [design_point(SPACE, index, 9) for index in range(4)]
 
 
-@pytest.mark.parametrize("engine", HERE)
+@pytest.mark.parametrize(
+    "engine", [pytest.param(name, marks=pytest.mark.slow) if name in ("gp", "composite") else name for name in HERE]
+)
 def test_every_engine_keeps_what_engines_promise(engine):
     check_engine(engine_of(engine))
 

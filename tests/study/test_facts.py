@@ -109,6 +109,7 @@ def test_a_search_that_proposed_nothing_is_forgotten(finished, make_study, code)
     assert searches(finished) == [(8, "one"), (10, "three")]
 
 
+@pytest.mark.slow
 def test_a_change_is_told_whatever_the_objective(make_study, code):
     folder = make_study(objective='"ppv"')
     noted(folder)

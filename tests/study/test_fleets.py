@@ -213,10 +213,8 @@ def pruned(folder):
         return store.trials(), run.spent
 
 
-OTHERS = (({}, 1), ({}, 1000), ({"batch": "3"}, 16), ({"jobs": "2"}, 16))
-
-
-@pytest.mark.parametrize(("keys", "wave"), [({}, 16), *(pytest.param(*one, marks=pytest.mark.slow) for one in OTHERS)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("keys", "wave"), [({}, 1), ({}, 16), ({}, 1000), ({"batch": "3"}, 16), ({"jobs": "2"}, 16)])
 def test_waves_of_any_size_prune_the_trials_that_agent_by_agent_prunes_at_the_same_agents(
     make_study, one_by_one, monkeypatch, wave, keys
 ):

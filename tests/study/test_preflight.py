@@ -202,7 +202,8 @@ def test_a_parameter_that_matters_is_not_looked_at_twice_and_nothing_is_simulate
     assert run(folder) == (replace(spent, episodes=0, seconds=0), found)
 
 
-@pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("jobs", [1, 2])
 def test_interrupted_anywhere_it_finds_the_same_and_simulates_nothing_twice(planted, jobs):
     _, whole = run(planted("whole"))
     folder = planted("stopped")
@@ -290,6 +291,7 @@ def test_what_is_wrong_with_a_parameter_and_what_to_do_is_one_line(planted):
     assert noise_sized.startswith("pre-flight: 'noise_sized' is not shown to change a metric across [0, 1]")
 
 
+@pytest.mark.slow
 def test_a_parameter_that_is_only_one_more_source_of_noise_is_said_to_matter_in_at_most_one_case_in_twenty():
     """Heavy tails too: whatever the noise, the test compares ranks."""
     rng, interval = np.random.default_rng(1), Interval("blur", 0.0, 1.0)

@@ -209,6 +209,7 @@ def test_it_is_a_whole_number_within_bounds_symmetric_and_zero_for_the_same(mean
     assert prpv_of_means(proxy, proxy, M2) == 0
 
 
+@pytest.mark.slow
 @few
 @given(pairs_of_means(), st.randoms(use_true_random=False))
 def test_the_order_of_the_agents_does_not_matter(means, random):

@@ -95,9 +95,7 @@ def test_a_whole_study_is_left_as_it_is(finished, capsys):
     assert (finished / "study.db").read_bytes() == before
 
 
-@pytest.mark.parametrize(
-    "share", [pytest.param(0.3, marks=pytest.mark.slow), pytest.param(0.6, marks=pytest.mark.slow), 0.95]
-)
+@pytest.mark.parametrize("share", [*(pytest.param(one, marks=pytest.mark.slow) for one in (0.3, 0.6)), 0.95])
 def test_a_database_that_was_cut_off_is_rebuilt_of_what_can_be_read(finished, finished_once, capsys, share):
     content = (finished / "study.db").read_bytes()
     (finished / "study.db").write_bytes(content[: int(share * len(content))])

@@ -177,13 +177,11 @@ def drawn(folder):
 
 
 @slow
-@pytest.mark.parametrize(("limit", "name"), [(33_500, "figures/convergence.png"), (120_000, "report.html")])
-def test_figures_and_report_on_a_full_disk_are_told_and_the_old_ones_stay(finished, capsys, limit, name):
+def test_figures_and_report_on_a_full_disk_are_told_and_the_old_ones_stay(finished):
     """The study is finished, its database needs no more room than it has."""
-    assert main(["study", str(finished), "--json"]) == 0
-    capsys.readouterr()
+    run("study", finished, "--json")
     before, known = drawn(finished), (trials(finished), episodes(finished))
-    for command in ("study", "plot"):
+    for command, limit, name in (("study", 33_500, "figures/convergence.png"), ("plot", 120_000, "report.html")):
         told = run(command, finished, status=1, **limited(limit))
         what = "the figure " if name.endswith("png") else ""
         place = f"{finished / name}: {what}cannot be written (File too large); fix that and run again"
@@ -191,7 +189,7 @@ def test_figures_and_report_on_a_full_disk_are_told_and_the_old_ones_stay(finish
         assert (trials(finished), episodes(finished)) == known
         assert drawn(finished) == before
     shutil.rmtree(finished / "figures")
-    assert main(["plot", str(finished)]) == 0
+    run("plot", finished)
     again = drawn(finished)
     assert {path: again[path] for path in before} == before
 

@@ -164,7 +164,8 @@ def _generators() -> bytes:
 
 def one_thread() -> AbstractContextManager[Any]:
     """Have libraries use one thread meanwhile."""
-    return _libraries(len(sys.modules)).limit(limits=1)
+    limited: AbstractContextManager[Any] = _libraries(len(sys.modules)).limit(limits=1)
+    return limited
 
 
 @functools.lru_cache(maxsize=1)

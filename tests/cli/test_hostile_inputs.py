@@ -6,12 +6,12 @@ import warnings
 
 import foreign_robot
 import pytest
+from blank import blank
 from processes import refused
 from tiny_loop import TWIN, write_tiny
 
 from proxytune.cli.main import main
 from proxytune.report.writing import file_names
-from tests.conftest import blank
 
 FIGURES_DRAWN = True  # also in the quick run: see conftest.py
 TABLE = "agent,episode,d\n" + "".join(f"{a},{e},{i + 0.1 * e}\n" for i, a in enumerate("ABC") for e in (0, 1))

@@ -65,6 +65,7 @@ SHORT = {
 """A study of three short trials on the road."""
 
 
+@pytest.mark.slow
 def test_the_best_theta_of_a_study_is_exported_with_its_intervals_whatever_its_agents_are_called(
     make_study, tmp_path, capsys
 ):

@@ -30,6 +30,7 @@ def test_a_study_runs_and_prints_one_document_and_a_second_time_simulates_nothin
     ]
 
 
+@pytest.mark.slow
 def test_people_see_the_best_theta_and_where_the_figure_is(finished, capsys):
     assert main(["study", str(finished)]) == 0
     out, told = capsys.readouterr()

@@ -64,6 +64,7 @@ def test_the_cameras_agree_along_the_loop(columns, rows, overlap, difference):
     assert np.abs(ours.astype(float) - reference)[:, rows_seen].mean() < difference
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "mounting",
     [

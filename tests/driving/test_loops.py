@@ -70,6 +70,7 @@ def eyes(rng, robots, pixels):
     return loops.Eyes(*places, rng.integers(0, 3, robots), *levels)
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**32 - 1), st.integers(1, 5), st.sampled_from([1, 5, 7, 8, 60, 130, 700, 3000]))
 @settings(max_examples=150)
 def test_both_find_the_same_lanes_in_noise(compiled, seed, robots, pixels):

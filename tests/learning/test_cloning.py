@@ -29,6 +29,7 @@ def test_the_same_seed_gives_the_same_weights_to_the_last_bit_and_another_does_n
     assert not np.array_equal(one["weight0"], other["weight0"])
 
 
+@pytest.mark.slow
 def test_its_answer_is_that_of_scikit_learns_network():
     weights = SMALL.train(pictures(80, 1), None, 1)
     network = MLPRegressor(hidden_layer_sizes=SMALL.hidden, random_state=0)

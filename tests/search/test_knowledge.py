@@ -150,6 +150,7 @@ def test_few_trials_limit_what_is_told_and_with_many_it_is_noise():
     assert {one.limit for one in known(3, count=48).information} == {"starts"}
 
 
+@pytest.mark.slow
 def test_the_order_of_trials_changes_nothing():
     one = known(5)
     other = learn_theta(SPACE, one.trials[::-1], one.goal, one.seed)

@@ -24,7 +24,8 @@ def history(maximise=False):
     return History("mine", SPACE, trials, maximise, answer=3)
 
 
-@pytest.mark.parametrize("maximise", [pytest.param(False, marks=pytest.mark.slow), True])
+@pytest.mark.slow
+@pytest.mark.parametrize("maximise", [False, True])
 def test_an_optuna_storage_has_every_trial_with_its_state_value_and_what_else_is_known(tmp_path, maximise):
     optuna = pytest.importorskip("optuna")
     path = tmp_path / "100% mine?.sqlite3"

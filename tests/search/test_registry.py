@@ -81,6 +81,7 @@ def test_studies_of_one_engine_outlast_an_edit_of_another_engine(tmp_path, monke
 
 
 HAS_OPTUNA = importlib.util.find_spec("optuna") is not None
+LONG = ("gp", "composite")
 HERE = [
     pytest.param(name, marks=[pytest.mark.skipif(bool(lacking(name)), reason=lacking(name))]) for name in ENGINE_NAMES
 ]
@@ -97,7 +98,8 @@ def test_every_engine_begins_with_the_same_design(engine):
 
 
 @pytest.mark.parametrize(
-    "engine", [pytest.param(name, marks=pytest.mark.slow) if name in ("gp", "composite") else name for name in HERE]
+    "engine",
+    [pytest.param(*one.values, marks=[*one.marks, *[pytest.mark.slow] * (one.values[0] in LONG)]) for one in HERE],
 )
 def test_every_engine_keeps_what_engines_promise(engine):
     check_engine(engine_of(engine))

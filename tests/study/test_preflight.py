@@ -330,6 +330,7 @@ def test_agents_that_remember_or_draw_unseeded_are_named_at_once_and_for_good(ma
     )
 
 
+@pytest.mark.slow
 def test_a_study_of_repeatable_agents_has_nothing_to_say(make_study, capsys):
     assert main(["study", str(make_study(preflight="true", budget="2", initial="2")), "--json"]) == 0
     assert "scores otherwise" not in "".join(capsys.readouterr())

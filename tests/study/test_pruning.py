@@ -257,6 +257,7 @@ RULES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rule", RULES)
 def test_a_rule_stops_a_study_also_when_it_is_run_again_and_without_it_the_trials_are_those_of_one_without(
     make_study, finished, rule

@@ -413,6 +413,7 @@ def test_failures_are_counted_and_the_first_are_told(make_study):
     assert found.failures[0].startswith("trial 1: agent 'agent2' failed from start 0: ")
 
 
+@pytest.mark.slow
 def test_an_open_trial_does_not_count(finished):
     study = open_study(finished)
     with Store.open(finished) as store:

@@ -48,6 +48,7 @@ def test_by_its_own_metrics_a_study_comes_to_its_own_result(finished):
     assert again.stopped == own.stopped
 
 
+@pytest.mark.slow
 def test_every_trial_is_scored_as_a_study_of_these_metrics_would_have(finished, make_study):
     again = found(finished, COARSE)
     folder = make_study("other", metrics='["distance:max:20%", "survival_time:max"]')

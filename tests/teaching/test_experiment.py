@@ -358,6 +358,7 @@ def predicting(values, poor=()):
 GOOD = {"slow starter": 60.0, "early bird": 30.0, "twin": 5.0}
 
 
+@pytest.mark.slow
 def test_a_proxy_that_starts_lower_and_saves_more_shows_that_a_zero_shot_score_does_not_measure_plv():
     found = observe(experiment(), predicting(GOOD, poor=("slow starter",)))
     assert found.zero_shot.reversed == (("slow starter", "early bird"),)
@@ -388,6 +389,7 @@ def test_a_single_proxy_is_not_ranked_but_may_teach_though_it_predicts_badly():
     assert "shown here, since slow starter saves samples" in only
 
 
+@pytest.mark.slow
 def test_where_plv_is_unknown_nothing_is_observed():
     assert observe(experiment(settled=False), predicting(GOOD)) is None
     assert observation_lines(None, experiment()) == ()

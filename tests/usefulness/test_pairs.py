@@ -126,6 +126,7 @@ def test_ties_of_a_metric_are_counted_once_per_pair():
     assert (rates.ties, rates.pairs) == ((3, 3), 6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("labels", ["012345", ["0/0", "0/1", "1/0", "1/1", "2/0", "2/1"]])
 def test_drawing_for_a_few_agents_at_a_time_changes_nothing(labels, monkeypatch):
     values = np.random.default_rng(0).normal(size=(2, 7, 6, 1))

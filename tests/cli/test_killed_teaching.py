@@ -17,9 +17,6 @@ SMALL = {"agents": '["agent0", "agent1"]', "metrics": '["distance:max"]', "start
 ROOM = {"family": '"mortal:mortal_schoolroom"', "grid": [0, 20, 40, 80, 160, 320]}
 ROPE = {"family": '"mortal:mortal_tightrope"', "grid": [0, 20, 40, 80, 160]}
 
-KILLED = [("1", "all"), ("2", "command")]
-"""With so many processes, what is killed: with "command", the others go on until they notice."""
-
 
 class Commands:
     """Runs commands in forks of one process that has loaded proxytune; each can be killed at a moment of its own."""
@@ -119,7 +116,7 @@ def taught(make_studies, commands):
 
 @pytest.mark.parametrize(
     ("name", "jobs", "whom"),
-    [("every count", *KILLED[0]), ("chosen", *KILLED[1]), ("learner drives", *KILLED[0])],
+    [("every count", "1", "all"), ("chosen", "2", "command"), ("learner drives", "1", "all")],
 )
 def test_teaching_killed_again_and_again_prints_the_same_document_to_the_byte(taught, commands, name, jobs, whom):
     folder, whole = taught(name, jobs)

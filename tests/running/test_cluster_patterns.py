@@ -189,16 +189,11 @@ def undisturbed(make_studies):
     return functools.cache(run)
 
 
-@pytest.fixture(autouse=True)
-def _paths(monkeypatch):
-    """Processes that start meanwhile find what clustered needs."""
-    monkeypatch.setenv("PYTHONPATH", PYTHONPATH)
-
-
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="a worker's process is looked up in /proc")
 @pytest.mark.parametrize("pattern", PATTERNS)
-def test_whatever_becomes_of_a_cluster_a_study_comes_to_the_same(make_study, undisturbed, capsys, pattern):
+def test_whatever_becomes_of_a_cluster_a_study_comes_to_the_same(make_study, undisturbed, monkeypatch, pattern):
+    monkeypatch.setenv("PYTHONPATH", PYTHONPATH)  # for the process that is forked
     steps = PATTERNS[pattern].split(", ")
     pairs = [(word, rest) for word, _, rest in (step.partition(" ") for step in steps)]
     told = tuple(pair for pair in pairs if pair[0] in ("fault", *LIMITS))

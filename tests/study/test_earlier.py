@@ -162,11 +162,7 @@ def _set_fact(folder: Path, key: str, value: str) -> None:
     (folder / BANK_FILE).write_text(json.dumps(table))
 
 
-RUN = ("fewer starts", "other agents")
-"""These are refused when a study has been run."""
-
-
-@pytest.mark.parametrize("case", [pytest.param(case, marks=pytest.mark.slow) if case in RUN else case for case in BAD])
+@pytest.mark.parametrize("case", BAD)
 def test_a_source_that_is_none_is_refused(case: str, tmp_path: Path, bank: Path, make_study: MakeStudy) -> None:
     """One line names the study.toml or the file, the source, what is wrong and what to do."""
     changes, spoil, words = BAD[case]

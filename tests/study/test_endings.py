@@ -38,14 +38,6 @@ def test_an_agent_that_ends_the_study_s_own_process_is_named_by_the_next_run_whi
     assert failures(folder) == {("agent1", 1): "it ended its process twice (exit status 9)"}
 
 
-@pytest.mark.slow
-def test_an_agent_that_hangs_fails_where_the_study_limits_its_time(make_study, capsys):
-    folder = make_study(domain=domain("hangs"), episode_timeout_s="1.0", **FAMILY)
-    assert main(["study", str(folder), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["episodes"]["failed"] == 2
-    assert failures(folder) == {("agent1", 1): "it took longer than 1 s"}
-
-
 @pytest.mark.parametrize(
     ("fault", "jobs"), [("exits", "1"), *(pytest.param("interrupts", jobs, marks=pytest.mark.slow) for jobs in "12")]
 )

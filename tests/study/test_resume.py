@@ -33,11 +33,6 @@ def stop(process, number, send=os.kill):
         assert (status, besides_progress(printed)) == (expected, line)
 
 
-def within_a_trial(folder):
-    """Whether a trial has some of its episodes and not all."""
-    return trials(folder)[-1][2] == "open" and finished_episodes(folder) % PER_TRIAL > 0
-
-
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_a_study_stopped_at_any_moment_gives_the_trials_of_one_that_was_not(make_study, launcher, jobs):
     """To the last bit, by Ctrl-C, SIGTERM and `kill -9`; and none of its processes lingers."""
@@ -51,7 +46,7 @@ def test_a_study_stopped_at_any_moment_gives_the_trials_of_one_that_was_not(make
         wait_for(folder, process, moment)
         stop(process, *STOPS[place])
         assert moment <= finished_episodes(folder) < EPISODES
-        within += within_a_trial(folder)
+        within += trials(folder)[-1][2] == "open" and finished_episodes(folder) % PER_TRIAL > 0
         assert (folder / "study.lock").exists() == (STOPS[place][0] == signal.SIGKILL)
         stopped.append(process)
     assert within > 0

@@ -15,6 +15,7 @@ import pytest
 HERE = Path(__file__).resolve().parent
 # Stand-ins; and what the benchmarks have: cases with hidden effects, problems of a search.
 sys.path += [str(HERE / "fakes"), str(HERE.parent / "benchmarks")]
+blank = import_module("blank").blank
 # Two processes whose linear algebra has two threads each wait for one another; NumPy is not imported yet.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 # A dumb terminal, as an editor's shell is, has no progress bars; tests of these mean one that has.
@@ -60,7 +61,7 @@ def _blank_figures(request: pytest.FixtureRequest) -> Iterator[None]:
         yield
         return
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("matplotlib.figure.Figure.savefig", import_module("blank").blank)
+        patch.setattr("matplotlib.figure.Figure.savefig", blank)
         yield
 
 
@@ -145,6 +146,15 @@ def make_study(tmp_path: Path) -> MakeStudy:
 def make_studies(tmp_path_factory: pytest.TempPathFactory) -> MakeStudy:
     """The same for studies that the tests of a module share."""
     return study_maker(tmp_path_factory.mktemp("studies"))
+
+
+@pytest.fixture(scope="session")
+def launcher() -> Iterator[object]:
+    """The process that forks what is Launched."""
+    from launched import launching
+
+    with launching() as process:
+        yield process
 
 
 @pytest.fixture(scope="session")

@@ -11,7 +11,7 @@ import pickle
 import random
 import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from typing import Any
 
 import numpy as np
@@ -58,7 +58,7 @@ def run_together(family: Any, episodes: Sequence[Episode], needed: Collection[st
     if not can_run_together(family):
         return None
     try:
-        with awake() as clock, _libraries(len(sys.modules)).limit(limits=1), _seeded(episodes[0].seed) as drawn:
+        with awake() as clock, one_thread(), _seeded(episodes[0].seed) as drawn:
             results = list(family.run_many(episodes))
             scored = [_judged(family, *pair, needed) for pair in zip(episodes, results, strict=True)]
             if drawn():
@@ -100,7 +100,7 @@ def run_episode(family: DomainFamily, episode: Episode, needed: Collection[str] 
     metrics: Mapping[str, float] | None = None
     failure, clock = "", AwakeClock()
     try:
-        with awake() as clock, _libraries(len(sys.modules)).limit(limits=1), _seeded(episode.seed):
+        with awake() as clock, one_thread(), _seeded(episode.seed):
             metrics = _checked(family, episode, family.run(episode), needed)
     except BaseException as problem:
         if is_users(problem):
@@ -160,6 +160,12 @@ def _seeded(seed: int) -> Iterator[Callable[[], bool]]:
 
 def _generators() -> bytes:
     return pickle.dumps((random.getstate(), np.random.get_state()))
+
+
+def one_thread() -> AbstractContextManager[Any]:
+    """Have libraries use one thread meanwhile."""
+    limited: AbstractContextManager[Any] = _libraries(len(sys.modules)).limit(limits=1)
+    return limited
 
 
 @functools.lru_cache(maxsize=1)

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from proxytune.domain import Classroom, Demonstration, Episode, OnPolicyClassroom, Policy, make_episode
 from proxytune.errors import EpisodeError, LearnerError, ProxytuneError
@@ -33,7 +32,7 @@ from proxytune.learning import (
     mix_samples,
     policy_of,
 )
-from proxytune.running import check_machine, limited, was_ended_in
+from proxytune.running import check_machine, limited, one_thread, was_ended_in
 from proxytune.seeds import exam_seed, proxy_lessons_seed, round_seed, target_lessons_seed
 from proxytune.space import Interval, Space, Theta
 
@@ -314,13 +313,13 @@ class TeachingSetup:
 
     def score(self, point: CurvePoint) -> float:
         """Mean score in the target over all starts; NaN where nothing has been learnt, so nothing can drive."""
-        with _name_proxy_in_errors(point), threadpool_limits(limits=1):
+        with _name_proxy_in_errors(point), one_thread():
             found = self.cache.get("exam", self.exam_facts(point), lambda: self._examine(point))
             return float(np.mean(found["scores"]))
 
     def prepare(self, point: CurvePoint) -> None:
         """Make what a point shares with others: what the proxy alone has taught, and the target's samples."""
-        with _name_proxy_in_errors(point), threadpool_limits(limits=1):
+        with _name_proxy_in_errors(point), one_thread():
             stage = self._stage(point)
             stage.weights(0)
             for number in stage.lessons.rounds(point.count):

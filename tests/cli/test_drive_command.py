@@ -105,7 +105,7 @@ def test_a_study_without_a_truth_has_no_target_until_one_is_given(make_study, tm
     assert document(capsys, folder, "--agent", "steady", "--against", tmp_path / "model.toml")["target"] is not None
 
 
-@pytest.mark.parametrize(("ending", "frames"), [("png", 1), ("gif", 2)])
+@pytest.mark.parametrize(("ending", "frames"), [("png", 1), pytest.param("gif", 2, marks=pytest.mark.slow)])
 def test_a_picture_is_written_and_named(lane, tmp_path, capsys, ending, frames):
     path = tmp_path / "new" / f"episode.{ending}"
     assert document(capsys, lane, "--agent", "steady", "--output", path)["output"] == str(path)

@@ -69,9 +69,14 @@ def files(folder):
     return {path.name for path in folder.iterdir() if not path.name.startswith(".report.html.")}
 
 
-def each_write(forker, begun, how, least):
-    """A study that stopped at its first write, at its second, and so on until a run ends before: folder and status."""
-    for last in itertools.count(1):
+def each_write(forker, begun, hows, least):
+    """A study that stopped at its first write, at its second, and so on until a run ends before: folder and status.
+
+    It stops in one way after the other; a write that has none is left out.
+    """
+    for last, how in zip(itertools.count(1), itertools.cycle(hows), strict=False):
+        if not how:
+            continue
         folder = begun(f"{how}{last}")
         status, changes = forker.run("study", folder, last=last, how=how)
         if changes < last:
@@ -88,10 +93,9 @@ def goes_on(forker, folder, whole):
     assert files(folder) == FILES
 
 
-@pytest.mark.parametrize("how", ["before", "within"])
-def test_a_study_killed_at_any_write_goes_on_to_the_same_trials(forker, small, driven, never_stopped, how):
+def test_a_study_killed_at_any_write_goes_on_to_the_same_trials(forker, small, driven, never_stopped):
     """Killed before a write is killed after the one before; within it, half of it is there."""
-    for folder, status in each_write(forker, small, how, 90):
+    for folder, status in each_write(forker, small, ("before", "within"), 90):
         assert status == -signal.SIGKILL, forker.printed
         goes_on(forker, folder, never_stopped)
         assert driven.read_text().count("\n") <= EPISODES + 1, "none is driven again but the one under way"
@@ -101,13 +105,13 @@ TOLD = re.compile(r"proxytune study: .*(disk (is )?full|No space left|cannot be 
 
 
 def test_a_disk_full_from_any_write_on_is_told_in_a_line_and_nothing_is_lost(forker, small, driven, never_stopped):
-    """Where it is full only for the page, or for tidying up, the study ends well."""
+    """Where it is full only for the page, or for tidying up, the study ends well. Full, it stays so: every third."""
     failed = 0
-    for folder, status in each_write(forker, small, "full", 90):
+    for folder, status in each_write(forker, small, ("", "full", ""), 90):
         failed += status
         assert status in (0, 1), forker.printed
         assert status == 0 or TOLD.fullmatch(besides_progress(forker.printed)), forker.printed
         assert not [path for path in folder.iterdir() if path.name.startswith(".")]
         goes_on(forker, folder, never_stopped)
         assert driven.read_text().count("\n") <= EPISODES + 1, "none is driven again but the one under way"
-    assert failed > 50
+    assert failed > 50 // 3

@@ -65,6 +65,7 @@ SHORT = {
 """A study of three short trials on the road."""
 
 
+@pytest.mark.slow
 def test_the_best_theta_of_a_study_is_exported_with_its_intervals_whatever_its_agents_are_called(
     make_study, tmp_path, capsys
 ):
@@ -133,6 +134,7 @@ def test_a_studys_trials_are_what_scikit_optimize_loads(finished, tmp_path, caps
     assert found.func_vals.tolist() == report.trials().score.tolist()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", [pytest.param("optuna", marks=pytest.mark.slow), "skopt"])
 def test_the_same_export_again_is_no_error_and_another_file_there_is_left_alone(finished, tmp_path, capsys, form):
     """A killed export may have been through."""

@@ -36,7 +36,7 @@ def test_score_refuses_what_would_take_for_ever_or_overflow(table, capsys, words
     assert says in refused(capsys, 2, *table, "d:max", *words)
 
 
-@pytest.mark.parametrize("metric", [r"$\frac$", "p" * 500])
+@pytest.mark.parametrize("metric", [r"$\frac$", pytest.param("p" * 500, marks=pytest.mark.slow)])
 def test_names_are_drawn_as_they_are_and_without_a_word(table, tmp_path, capsys, metric):
     text = TABLE.replace("A,", "a$b$,").replace("B,", "tab\x01le,").replace("C,", f"{metric},")
     (tmp_path / "t.csv").write_text(text.replace("d\n", f"{metric}\n", 1))

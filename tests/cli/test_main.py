@@ -195,6 +195,7 @@ def test_a_closed_pipe_is_no_error(tmp_path):
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 def test_bullet_starts_without_a_word(tmp_path):
     """PyBullet's own announcement of its build time would stand where people look for what went wrong."""
     code = "import proxytune.driving.family"

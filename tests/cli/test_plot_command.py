@@ -51,6 +51,7 @@ def test_a_study_that_has_not_been_run_is_told(make_study, capsys):
     assert told == f"proxytune plot: {folder / 'study.db'}: no such file; {hint}\n"
 
 
+@pytest.mark.slow
 def test_a_finished_study_can_be_drawn_when_the_family_s_code_has_changed(finished, monkeypatch, capsys):
     monkeypatch.setattr("wobbly.Wobbly.identity", "wobbly, a later version")
     assert main(["study", str(finished)]) == 2
@@ -131,6 +132,7 @@ def test_other_metrics_score_the_stored_episodes_anew_into_a_folder_of_their_own
     assert [trial["prpv"] for trial in other["trials"]] != [trial["prpv"] for trial in own["trials"]]
 
 
+@pytest.mark.slow
 def test_people_see_the_best_by_other_metrics_and_where_it_is_drawn(finished, capsys):
     assert main(["plot", str(finished), "--metric", "survival_time:max"]) == 0
     out = " ".join(capsys.readouterr().out.split())

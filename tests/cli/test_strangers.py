@@ -83,41 +83,31 @@ def robot_of(effects):
 
 PLUGINS = ("[proxytune]", "engine.evil = evil_mod:make", "measure.evil = evil_mod:make", "effect.evil = evil_mod:make",
            "agent.evil = evil_mod:make", "robot.evil = evil_mod:make", "family.evil = evil_mod:make")  # fmt: skip
+BESIDE = modules("sitecustomize", "usercustomize", "__main__", "study", "agents", "proxytune/__init__",
+                 "proxytune/driving")  # fmt: skip
+"""What Python runs by itself, and what has our own names."""
+SETTINGS = {
+    "matplotlibrc": "backend: module://evil_mod\nanimation.ffmpeg_path: ./evil\n",
+    ".numba_config.yaml": "cache_dir: cache\ncache_locator_classes: evil_mod.Locator\n",
+    "conftest.py": SIGN,
+    ".pth": "import evil_mod\n",
+}
+OTHERS = ("[numba_extensions]", "init = evil_mod:init", "[matplotlib.backend]", "agg = evil_mod", "[gymnasium.envs]",
+          "__root__ = evil_mod:register")  # fmt: skip
+HERE = {**modules(*OPTIONAL, *STANDARD, *USED), **installed(*PLUGINS, *OTHERS), **SETTINGS}
 STRANGERS = {
-    "optional packages": Stranger(modules(*OPTIONAL)),
-    "optional packages, one process": Stranger(modules(*OPTIONAL), {"jobs": 1}),
-    "optional packages as folders": Stranger(modules(*(f"{name}/__init__" for name in OPTIONAL))),
-    "in the folder itself": Stranger(modules(*OPTIONAL, *STANDARD, *USED), here=True),
-    "in the folder itself, one process": Stranger(modules(*OPTIONAL, *STANDARD, *USED), {"jobs": 1}, here=True),
-    "modules that Python runs by itself": Stranger(modules("sitecustomize", "usercustomize", "__main__", "study")),
-    "our own name": Stranger(modules("proxytune/__init__", "proxytune/driving", "study", "agents")),
+    "beside it": Stranger({**modules(*OPTIONAL), **BESIDE}),
+    "beside it as folders, one process": Stranger(modules(*(f"{name}/__init__" for name in OPTIONAL)), {"jobs": 1}),
+    "in the folder itself": Stranger(HERE, here=True),
+    "in the folder itself, one process": Stranger(HERE, {"jobs": 1}, here=True),
     "a plug-in's engine": Stranger(installed(*PLUGINS), {"engine": "evil"}, status=2),
-    "a plug-in's objective": Stranger(installed(*PLUGINS), {"objective": "evil"}, status=2),
-    "a plug-in's objective, here": Stranger(installed(*PLUGINS), {"objective": "evil"}, status=2, here=True),
+    "a plug-in's objective": Stranger(installed(*PLUGINS), {"objective": "evil"}, status=2, here=True),
     "a plug-in's robot": Stranger(installed(*PLUGINS), {"robot": "evil"}, status=2),
-    "a plug-in that nobody names": Stranger(installed(*PLUGINS), here=True),
-    "a plug-in of Numba and Matplotlib": Stranger(
-        installed("[numba_extensions]", "init = evil_mod:init", "[matplotlib.backend]", "agg = evil_mod"), here=True
-    ),
-    "a plug-in of Gymnasium": Stranger(installed("[gymnasium.envs]", "__root__ = evil_mod:register"), here=True),
-    "settings of Matplotlib that have LaTeX run": Stranger(
-        {"matplotlibrc": "text.usetex: True\ntext.latex.preamble: \\input{evil}\n"}, here=True
-    ),
-    "settings of libraries": Stranger(
-        {
-            **modules("evil_mod"),
-            "matplotlibrc": "backend: module://evil_mod\nanimation.ffmpeg_path: ./evil\n",
-            ".numba_config.yaml": "cache_dir: cache\ncache_locator_classes: evil_mod.Locator\n",
-            "conftest.py": SIGN,
-            ".pth": "import evil_mod\n",
-        },
-        here=True,
-    ),
     "a robot without code": Stranger(
         {"wolf/robot.toml": robot_of(".dead_band]\nwidth = 0.01"), **modules("wolf/optuna", "bottleneck")},
         {"robot": "wolf"},
     ),
-}  # fmt: skip
+}
 
 
 @pytest.fixture
@@ -156,8 +146,8 @@ def signatures(folder):
     return (folder / SIGNED).read_text().split() if (folder / SIGNED).exists() else []
 
 
-HOW = [(name, how) for how in (True, False) for name in STRANGERS if how or STRANGERS[name].here]
-"""Each by `python -m`, and those in the current folder by the installed command too."""
+HOW = [*((name, True) for name in STRANGERS), ("in the folder itself", False), ("a plug-in's objective", False)]
+"""Each by `python -m`, and of those in the current folder two by the installed command too."""
 
 
 @pytest.mark.slow

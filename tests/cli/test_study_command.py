@@ -30,6 +30,7 @@ def test_a_study_runs_and_prints_one_document_and_a_second_time_simulates_nothin
     ]
 
 
+@pytest.mark.slow
 def test_people_see_the_best_theta_and_where_the_figure_is(finished, capsys):
     assert main(["study", str(finished)]) == 0
     out, told = capsys.readouterr()
@@ -76,6 +77,7 @@ def test_a_parameter_that_does_nothing_is_said_before_the_study_and_recorded(mak
     assert told == "", "a finished study has no progress to tell of"
 
 
+@pytest.mark.slow
 def test_without_a_terminal_every_trial_is_a_plain_line_with_its_prpv_the_best_and_the_episodes(make_study, capsys):
     folder = make_study(preflight="true", confirm="1", cut_off="true")
     assert main(["study", str(folder), "--json"]) == 0

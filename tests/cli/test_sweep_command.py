@@ -40,6 +40,7 @@ def test_all_sweeps_every_parameter_of_the_study_and_draws_them_together(make_st
     assert "give --target-model" in out
 
 
+@pytest.mark.slow
 def test_a_target_model_adds_pod_and_keeps_its_own_files(make_study, tmp_path, capsys):
     folder, model = make_study(family='"echo:echo"'), tmp_path / "truth.toml"
     model.write_text("trim = 0.1\n")
@@ -72,6 +73,7 @@ def test_a_finished_study_is_swept_at_its_best_theta_and_says_so(finished, capsy
     assert document["curves"][0]["base"] == best
 
 
+@pytest.mark.slow
 def test_the_best_theta_is_told_in_words_too(finished, capsys):
     assert main(["sweep", str(finished), "--parameter", "trim", "--points", "2", "--at", "best"]) == 0
     assert "the others are held at the study's best θ: delay=" in " ".join(capsys.readouterr().out.split())
@@ -89,6 +91,7 @@ def test_a_study_that_has_not_run_is_swept_at_nominal_values(make_study, capsys)
     assert json.loads(capsys.readouterr().out)["at"] == {"chosen": "nominal", "theta": {}}
 
 
+@pytest.mark.slow
 def test_a_study_that_was_changed_since_has_no_best_theta_but_nominal_values(finished, make_study, capsys):
     make_study(seed="2")
     arguments = ["sweep", str(finished), "--parameter", "trim", "--points", "2"]

@@ -46,7 +46,10 @@ def below_horizon(figures):
     return on_floor & np.roll(on_floor, 1)
 
 
-@pytest.mark.parametrize(("columns", "rows", "overlap", "difference"), [(160, 120, 0.92, 1.0), (64, 48, 0.86, 2.0)])
+@pytest.mark.parametrize(
+    ("columns", "rows", "overlap", "difference"),
+    [pytest.param(160, 120, 0.92, 1.0, marks=pytest.mark.slow), (64, 48, 0.86, 2.0)],
+)
 def test_the_cameras_agree_along_the_loop(columns, rows, overlap, difference):
     """Below the horizon at 12 poses: intersection over union of markings and mean absolute difference in grey levels.
 
@@ -61,6 +64,7 @@ def test_the_cameras_agree_along_the_loop(columns, rows, overlap, difference):
     assert np.abs(ours.astype(float) - reference)[:, rows_seen].mean() < difference
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "mounting",
     [

@@ -95,6 +95,7 @@ def test_markings_overlap_the_independent_renderers(colour, bound):
     assert overlap(nominal(), colour) > bound
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("colour", "bound"), [("white", 0.85), ("yellow", 0.53), ("both", 0.74)])
 def test_straight_tiles_overlap_better_than_hand_taped_corners(colour, bound):
     """IoU on straight tiles: white 0.88, yellow 0.56, both 0.77; on corner tiles 0.67, 0.51 and 0.61."""
@@ -105,6 +106,7 @@ def test_straight_tiles_overlap_better_than_hand_taped_corners(colour, bound):
     assert straight > overlap(nominal(), colour, on_map & (near >= TILE / 2))
 
 
+@pytest.mark.slow
 def test_corners_are_bent_more_tightly_than_an_arc_of_half_a_tile():
     """IoU of both colours with arcs about the inner corner 0.44, with the map's corner radius 0.68."""
     arcs = overlap(ours(repainted(bend_radius=TILE / 2)), "both")
@@ -122,6 +124,7 @@ def test_nine_dashes_fit_a_straight_tile_better_than_any_other_number():
     assert max(fits, key=fits.__getitem__) == 9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "step"), [("pitch_deg", 1.0), ("height_m", 0.006), ("field_of_view_deg", 3.0), ("yaw_deg", 1.5)]
 )

@@ -92,6 +92,7 @@ def test_each_robot_drives_and_scores_to_the_bit_as_it_does_by_itself(policy):
     assert room.examine_together(what, policy) == [room.examine(one, policy) for one in what]
 
 
+@pytest.mark.slow
 def test_robots_that_the_renderer_shows_drive_to_the_bit_as_each_by_itself():
     room = classroom(plant="planar", camera="renderer", effects={"blur": 0.0}, seconds=1.0)
     assert_same(*alone_and_together(room, episodes(2), lean))

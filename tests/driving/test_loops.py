@@ -39,6 +39,7 @@ def exposed(way, table, places, weights, sky=5):
 near = st.floats(-1.0, 4.0)
 
 
+@pytest.mark.slow
 @given(st.lists(st.builds(place, near, near, st.floats(-7.0, 7.0)), min_size=1, max_size=5))
 @settings(max_examples=200)
 def test_both_show_the_same_texels_on_the_map_and_off_it(compiled, places):
@@ -55,6 +56,7 @@ def test_a_robot_that_is_nowhere_sees_something(compiled, wrong):
     assert np.isin(packed[:, 0] + (packed[:, 1] << 8) + (packed[:, 2] << 16), TABLE.texels & 0xFFFFFF).all()
 
 
+@pytest.mark.slow
 @given(st.floats(0.0, 0.2), st.lists(st.builds(place, near, near, st.floats(-7.0, 7.0)), min_size=13, max_size=13))
 @settings(max_examples=100)
 def test_both_blur_to_the_same_picture(compiled, blur, places):
@@ -68,6 +70,7 @@ def eyes(rng, robots, pixels):
     return loops.Eyes(*places, rng.integers(0, 3, robots), *levels)
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**32 - 1), st.integers(1, 5), st.sampled_from([1, 5, 7, 8, 60, 130, 700, 3000]))
 @settings(max_examples=150)
 def test_both_find_the_same_lanes_in_noise(compiled, seed, robots, pixels):

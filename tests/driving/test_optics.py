@@ -175,6 +175,7 @@ def test_things_look_wider_by_the_aspect_and_as_high_as_before(aspect):
 # what pixels show
 
 
+@pytest.mark.slow
 @given(POSES)
 @settings(max_examples=25)
 def test_a_pixel_shows_the_place_that_it_looks_at(pose):

@@ -324,7 +324,8 @@ def test_the_edge_lines_and_the_lanes_are_drawn_where_they_are_scored(road, oute
     assert (painted(road, road.lane_offset, outer) == COLOURS["asphalt"]).all()
 
 
-@pytest.mark.parametrize("road", [*(pytest.param(road, marks=pytest.mark.slow) for road in ROADS[:-1]), ROADS[-1]])
+@pytest.mark.slow
+@pytest.mark.parametrize("road", ROADS)
 def test_the_centre_line_is_dashed_all_the_way_round(road):
     yellow = (painted(road, 1e-6) == COLOURS["yellow"]).all(axis=1)
     assert 0.5 < yellow.mean() < 0.7

@@ -83,6 +83,7 @@ def test_every_public_name_can_be_had_without_pybullet(tmp_path):
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.slow
 def test_the_plant_and_the_camera_themselves_say_what_to_do(tmp_path):
     code = """
 import numpy as np

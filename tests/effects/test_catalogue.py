@@ -82,7 +82,9 @@ def subject(name):
     return Subject(CATALOGUE[name], ROBOT, name)
 
 
-@pytest.mark.parametrize("name", CATALOGUE)
+@pytest.mark.parametrize(
+    "name", [pytest.param(one, marks=pytest.mark.slow) if one == "slippery_patch" else one for one in CATALOGUE]
+)
 def test_every_effect_keeps_what_effects_promise(name):
     check_effect(CATALOGUE[name], robot=ROBOT)
 

@@ -171,6 +171,7 @@ def test_a_model_makes_it_the_target(tmp_path):
     np.testing.assert_array_equal(*poses)
 
 
+@pytest.mark.slow
 def test_a_map_and_an_effect_of_ones_own_lie_in_the_folder(tmp_path):
     page = "size = [2.4, 1.755]\nstarts = [[1.2, 0.17, 0.0], [1.2, 1.58, 180.0]]"
     (tmp_path / "oval.toml").write_text(OVAL.replace("SIZE", page))
@@ -230,6 +231,7 @@ def test_a_rendering_shows_the_picture_beside_the_map_with_the_way():
     assert make().render() is None
 
 
+@pytest.mark.slow
 def test_the_map_is_drawn_with_y_upwards(tmp_path):
     tall = "size = [2.4, 2.4]\nstarts = [[1.2, 0.17, 0.0]]"  # the road fills the lower part
     (tmp_path / "tall.toml").write_text(OVAL.replace("SIZE", tall))
@@ -260,6 +262,7 @@ def test_vector_environments_run_and_go_on_after_an_episode(vector):
     envs.close()
 
 
+@pytest.mark.slow
 def test_worlds_do_not_pile_up_and_closing_twice_does_no_harm():
     before, env = worlds(), make(plant="bullet", theta={"trim": [-0.1, 0.1]})
     for number in range(100):
@@ -275,6 +278,7 @@ def test_worlds_do_not_pile_up_and_closing_twice_does_no_harm():
     assert worlds() <= before + 2
 
 
+@pytest.mark.slow
 def test_cameras_of_many_theta_do_not_pile_up():
     before, env = worlds(), make(camera="renderer", theta={"camera_pitch": [10.0, 20.0]})
     for number in range(8):

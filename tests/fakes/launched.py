@@ -1,11 +1,12 @@
 """Studies as real processes that a test can afford: forked from one that has loaded proxytune, watched, and killed."""
 
+import fcntl
 import json
 import os
 import subprocess
 import sys
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 from processes import ENVIRONMENT, FAKES, episodes, trials
 
@@ -35,6 +36,16 @@ class Launched:
     def end(self):
         """Wait for its end: exit status, and what it printed."""
         return int(self.launcher.stdout.readline()), self.output.read_text()
+
+    def leaves_nothing(self):
+        """Whether its processes end too: as long as one of them could still print, the file is locked."""
+        with self.output.open() as file:
+            for _ in range(600):
+                with suppress(BlockingIOError):
+                    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    return True
+                time.sleep(0.05)
+        return False
 
 
 @contextmanager

@@ -5,29 +5,18 @@ begins and its wait status when it has ended. Every module of proxytune is loade
 figures are blank: a command's time is that of its work. joblib's processes import this file, and nothing by it.
 """
 
-import gc
+import fcntl
 import json
 import os
 import signal
 import sys
-from importlib import import_module
-from pkgutil import walk_packages
 
 if __name__ == "__main__":
-    from blank import blank
-    from matplotlib.figure import Figure
+    import loaded
 
-    import proxytune
     from proxytune.cli.main import main
 
-    Figure.savefig = blank
-    for module in walk_packages(proxytune.__path__, "proxytune."):
-        if module.name != "proxytune.__main__":
-            import_module(module.name)
-    for name in ("matplotlib.pyplot", "skopt", "sklearn.gaussian_process", "scipy.optimize", "scipy.stats"):
-        import_module(name)
-    gc.freeze()
-
+    assert loaded
     for line in iter(sys.stdin.readline, ""):
         *words, output = json.loads(line)
         child = os.fork()
@@ -35,6 +24,7 @@ if __name__ == "__main__":
             os.setsid()
             signal.signal(signal.SIGINT, signal.default_int_handler)
             descriptor = os.open(output, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+            fcntl.flock(descriptor, fcntl.LOCK_SH)
             for stream in (1, 2):
                 os.dup2(descriptor, stream)
             raise SystemExit(main(words))

@@ -84,10 +84,10 @@ class Wobbly:
         if self.journal:
             with open(self.journal, "a") as journal:
                 journal.write(f"{episode.agent} {episode.start} {episode.theta} {os.getpid()}\n")
-        time.sleep(self.sleep)
         fault = next((f.split(":")[2] for f in self.faults if self._hits(f, episode)), "")
-        if fault == "lingers":
-            time.sleep(0.3)
+        seconds = self.sleep + 0.3 * (fault == "lingers")
+        if seconds:  # a sleep of none gives the processor away
+            time.sleep(seconds)
         if fault == "raises":
             raise EpisodeError(f"agent '{episode.agent}' raised ValueError at 1.20 s: it lost its way")
         if fault == "crashes":

@@ -29,6 +29,7 @@ def test_the_same_seed_gives_the_same_weights_to_the_last_bit_and_another_does_n
     assert not np.array_equal(one["weight0"], other["weight0"])
 
 
+@pytest.mark.slow
 def test_its_answer_is_that_of_scikit_learns_network():
     weights = SMALL.train(pictures(80, 1), None, 1)
     network = MLPRegressor(hidden_layer_sizes=SMALL.hidden, random_state=0)
@@ -40,6 +41,7 @@ def test_its_answer_is_that_of_scikit_learns_network():
     assert SMALL.act(weights, picture) == pytest.approx(np.clip(expected, -1, 1), abs=1e-12)
 
 
+@pytest.mark.slow
 def test_starting_from_weights_a_few_samples_do_not_make_it_forget():
     start = SMALL.train(pictures(400, 1), None, 1)
     fresh = pictures(100, 2)
@@ -50,6 +52,7 @@ def test_starting_from_weights_a_few_samples_do_not_make_it_forget():
     assert error(SMALL, tuned, fresh) < 0.5 * error(SMALL, scratch, fresh)
 
 
+@pytest.mark.slow
 def test_starting_from_weights_it_follows_samples_that_say_otherwise():
     start = SMALL.train(pictures(400, 1), None, 1)
     turned = pictures(400, 4)

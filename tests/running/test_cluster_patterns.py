@@ -6,22 +6,26 @@ Each pattern says what happens, in order: `worker NAME` starts a worker (`nanny`
 the rest are signals. Whatever happened, the study comes to the trials and episodes of an undisturbed run, to the digit.
 """
 
+import functools
+import multiprocessing
 import os
 import signal
 import socket
-import subprocess
 import sys
 import time
 from contextlib import suppress
 from itertools import chain
 from pathlib import Path
 
+import clustered
 import pytest
-from processes import ENVIRONMENT, episodes, finished_episodes, heeding_ctrl_c, trials
+from processes import PYTHONPATH, episodes, finished_episodes, trials
 
 from proxytune.cli.main import main
 
 pytest.importorskip("distributed")
+CONTEXT = multiprocessing.get_context("forkserver")
+CONTEXT.set_forkserver_preload(clustered.PRELOAD)
 
 OWN_FAMILY = """
 from deadly import Deadly, deadly
@@ -37,16 +41,6 @@ def family(domain, *, model):
     return Mine(**vars(deadly(domain, model=model)))
 """
 HELPER = "def same(scores):\n    return scores\n"
-COMMAND = """
-import sys
-import proxytune.running.cluster as cluster
-cluster.SILENT_S, cluster.START_S, cluster.PATIENCE_S = 4.0, 3.0, 1.0
-from proxytune.cli.main import main
-sys.exit(main(sys.argv[1:]))
-"""
-SCHEDULER = "from distributed.cli.dask_scheduler import main; main()"
-WORKER = "from distributed.cli.dask_worker import main; main()"
-OTHER_WORKER = "import proxytune.running.sending as sending; sending.PACKAGES = ('numpy',); " + WORKER
 SIGNALS = {
     "kill": signal.SIGKILL,
     "term": signal.SIGTERM,
@@ -55,36 +49,26 @@ SIGNALS = {
     "interrupt": signal.SIGINT,
 }
 GONE = "no worker is there"
+LIMITS = {"limit": "episode_timeout_s", "budget": "budget"}
 PATTERNS = {
-    "nothing happens": "worker a, worker b, run",
-    "one worker, then a second, then only that": "worker a, run, 10, worker b, joined 2, 30, kill a",
-    "one of two ends in order": "worker a, worker b, joined 2, run, 20, term a",
-    "both are killed before the first episode": "worker a, worker b, joined 2, run, "
-    f"said page:, kill a, kill b, said {GONE}, worker c",
-    "each is killed in turn": "worker a, run, 10, worker b, joined 2, kill a, 30, worker c, joined 2, kill b, 50, "
-    "worker d, joined 2, kill c",
-    "its nanny starts a killed worker again": "nanny a, run, 20, kill child a, 60, kill child a",
-    "killed and there again at the same address": "same a, run, 20, kill a, same a, 60, kill a, same a",
-    "the scheduler ends in order and comes back": "worker a, run, 20, term scheduler, scheduler, worker b",
-    "the scheduler is killed twice": "worker a, run, 20, kill scheduler, scheduler, worker b, 50, kill scheduler, "
-    "said does not answer, scheduler, worker c",
-    "the scheduler stops for a while": "worker a, worker b, run, 20, stop scheduler, said does not answer, "
-    "go scheduler",
-    "one of two stops answering": "worker a, worker b, joined 2, run, 20, stop a",
-    "both stop for a while": "worker a, worker b, joined 2, run, 20, stop a, stop b, said not heard of, go a, go b",
-    "the only one stops, another comes": "worker a, run, 20, stop a, said not heard of, worker b",
-    "one with a limit stops, and its nanny ends it": "limit 2, nanny a, worker b, joined 2, run, 20, stop child a",
-    "the command stops for longer than its limit": "limit 2, worker a, run, 20, stop command, seconds 8, go command",
-    "a late worker has two threads": "worker a, run, 10, threads b, said has 2 threads",
-    "a late worker of other code is alone": "worker a, run, 10, kill a, other b, said it is not used, "
-    f"said {GONE}, worker c",
-    "the command is killed with the workers and begun again": "worker a, run, 20, kill command, kill a, worker b, run",
-    "ctrl-c while none is there, then on this machine": f"worker a, run, 20, kill a, said {GONE}, interrupt command, "
-    "alone",
-    "ctrl-c while there is no scheduler, then on this machine": "worker a, run, 20, kill scheduler, "
-    "said does not answer, interrupt command, alone",
-    "an episode ends its workers": "fault agent2:1:leaves, nanny a, nanny b, joined 2, run",
-    "an episode hangs": "limit 1, fault agent2:1:hangs, nanny a, nanny b, joined 2, run",
+    "workers are killed, end in order, and are there again at the same address": "same a, run, 8, worker b, joined 2, "
+    "kill a, 20, same a, joined 2, term b, 32, worker c, joined 2, kill a",
+    "both are killed before the first episode; late ones have two threads and other code": "worker a, worker b, "
+    f"joined 2, run, said page:, kill a, kill b, said {GONE}, threads c, said has 2 threads, other d, "
+    "said it is not used, worker e",
+    "its nanny starts a killed worker again": "nanny a, run, 10, kill child a, 25, kill child a",
+    "the scheduler stops, ends in order and is killed": "worker a, worker b, run, 8, stop scheduler, "
+    "said does not answer, go scheduler, said it goes on, 20, term scheduler, scheduler, worker c, 32, kill scheduler, "
+    "scheduler, worker d",
+    "both stop for a while, then for good": "worker a, worker b, joined 2, run, 8, stop a, stop b, said not heard of, "
+    "go a, go b, 24, stop a, stop b, worker c",
+    "the command stops for longer than its limit, then a worker whose nanny ends it": "limit 2, nanny a, worker b, "
+    "joined 2, run, 8, stop command, seconds 6, go command, 20, stop child a",
+    "the command is killed with its workers, interrupted without any, then without a scheduler": "worker a, run, 8, "
+    f"kill command, kill a, worker b, run, 20, kill b, said {GONE}, interrupt command, worker c, run, 32, "
+    "kill scheduler, said does not answer, interrupt command, alone",
+    "an episode ends its workers, another hangs": "limit 1, budget 2, fault agent2:1:leaves, fault agent4:0:hangs, "
+    "nanny a, nanny b, joined 2, run",
 }
 
 
@@ -101,22 +85,21 @@ class Loopback:
         self.log = folder.parent / "command.log"
         self.log.touch()
 
-    def start(self, name, code, *words, output=subprocess.DEVNULL):
-        command = [sys.executable, "-c", code, *map(str, words)]
-        scratch = {"DASK_TEMPORARY_DIRECTORY": str(self.folder.parent / "scratch")}
-        how = {"stdout": subprocess.DEVNULL, "stderr": output, "start_new_session": True, "preexec_fn": heeding_ctrl_c}
-        self.processes[name] = subprocess.Popen(command, env={**ENVIRONMENT, **scratch}, **how)
+    def start(self, name, kind, *words, output=os.devnull):
+        words = tuple(map(str, words))
+        self.processes[name] = CONTEXT.Process(target=clustered.begin, args=(kind, words, str(output)))
+        self.processes[name].start()
 
     def scheduler(self):
-        self.start("scheduler", SCHEDULER, "--host", "127.0.0.1", "--port", self.port, "--no-dashboard")
+        self.start("scheduler", "scheduler", "--host", "127.0.0.1", "--port", self.port, "--no-dashboard")
 
-    def worker(self, name, *words, code=WORKER, threads=1):
-        self.start(name, code, self.address, "--nthreads", threads, "--no-dashboard", *words)
+    def worker(self, name, *words, kind="worker", threads=1):
+        how = ("--nthreads", threads, "--no-dashboard", "--local-directory", self.folder.parent / "scratch")
+        self.start(name, kind, self.address, *how, *words)
 
     def run(self, *words):
         words = words or ("--backend", "dask", "--address", self.address)
-        with self.log.open("a") as log:
-            self.start("command", COMMAND, "study", self.folder, "--json", *words, output=log)
+        self.start("command", "command", self.folder, "--json", *words, output=self.log)
 
     def joined(self, count):
         from distributed import Client
@@ -142,13 +125,13 @@ class Loopback:
         else:
             os.killpg(self.processes[name].pid, SIGNALS[what])
         if what in ("kill", "term", "interrupt") and not name.startswith("child "):
-            self.processes.pop(name).wait(60)
+            self.processes.pop(name).join(60)
 
     def until(self, happened, what):
         for _ in range(1200):
             if happened():
                 return
-            assert self.processes["command"].poll() is None, f"it has ended, before {what}: {self.log.read_text()}"
+            assert self.processes["command"].exitcode is None, f"it has ended, before {what}: {self.log.read_text()}"
             time.sleep(0.05)
         raise AssertionError(f"never {what}: {self.log.read_text()}")
 
@@ -168,7 +151,7 @@ class Loopback:
                 "nanny": lambda: self.worker(rest),
                 "same": lambda: self.worker(rest, "--no-nanny", "--worker-port", self.same),
                 "threads": lambda: self.worker(rest, "--no-nanny", threads=2),
-                "other": lambda: self.worker(rest, "--no-nanny", code=OTHER_WORKER),
+                "other": lambda: self.worker(rest, "--no-nanny", kind="other"),
                 "joined": lambda: self.joined(int(rest)),
                 "seconds": lambda: time.sleep(float(rest)),
                 "alone": lambda: self.run("--jobs", "1"),
@@ -178,12 +161,17 @@ class Loopback:
         for process in self.processes.values():
             with suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
+            process.join()
 
 
-def own_study(make_study, called, sleep, faults=(), **changes):
-    domain = {"sleep": sleep, "faults": str(list(faults)).replace("'", '"')}
-    folder = make_study(called, family='"mine:family"', domain=domain, **changes)
+SMALL = {"budget": "4", "initial": "3"}
+
+
+def own_study(make_study, called, sleep, told):
+    faults = [rest for word, rest in told if word == "fault"]
+    domain = {"sleep": sleep, "faults": str(faults).replace("'", '"')}
+    limits = {LIMITS[word]: rest for word, rest in told if word in LIMITS}
+    folder = make_study(called, family='"mine:family"', domain=domain, **{**SMALL, **limits})
     (folder / "mine.py").write_text(OWN_FAMILY)
     (folder / "helper.py").write_text(HELPER)
     return folder
@@ -192,37 +180,32 @@ def own_study(make_study, called, sleep, faults=(), **changes):
 @pytest.fixture(scope="module")
 def undisturbed(make_studies):
     """The trials and episodes of a study on this machine alone, run once for each of its kinds."""
-    known = {}
 
-    def run(faults, limit):
-        if (faults, limit) not in known:
-            changes = {"episode_timeout_s": limit} if limit else {}
-            called, jobs = f"alone{len(known)}", "2" if faults else "1"
-            folder = own_study(make_studies, called, "0.0", faults, jobs=jobs, **changes)
-            assert main(["study", str(folder), "--json"]) == 0
-            known[faults, limit] = trials(folder), episodes(folder)
-        return known[faults, limit]
+    def run(told):
+        folder = own_study(make_studies, f"alone{len(told)}", "0.0", told)
+        assert main(["study", str(folder), "--json"]) == 0
+        return trials(folder), episodes(folder)
 
-    return run
+    return functools.cache(run)
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="a worker's process is looked up in /proc")
 @pytest.mark.parametrize("pattern", PATTERNS)
-def test_whatever_becomes_of_a_cluster_a_study_comes_to_the_same(make_study, undisturbed, capsys, pattern):
+def test_whatever_becomes_of_a_cluster_a_study_comes_to_the_same(make_study, undisturbed, monkeypatch, pattern):
+    monkeypatch.setenv("PYTHONPATH", PYTHONPATH)  # for the process that is forked
     steps = PATTERNS[pattern].split(", ")
-    told = {word: rest for word, _, rest in (step.partition(" ") for step in steps) if word in ("limit", "fault")}
-    changes = {"episode_timeout_s": told["limit"]} if "limit" in told else {}
-    faults = (told["fault"],) if "fault" in told else ()
-    alone = undisturbed(faults, told.get("limit"))
-    there = own_study(make_study, "there", "0.1", faults, **changes)
+    pairs = [(word, rest) for word, _, rest in (step.partition(" ") for step in steps)]
+    told = tuple(pair for pair in pairs if pair[0] in ("fault", *LIMITS))
+    alone = undisturbed(told)
+    there = own_study(make_study, "there", "0.05", told)
     cluster = Loopback(there)
     try:
         cluster.scheduler()
-        for step in steps:
-            if step.partition(" ")[0] not in told:
-                cluster.do(step)
-        status = cluster.processes["command"].wait(240)
+        for step in steps[len(told) :]:
+            cluster.do(step)
+        cluster.processes["command"].join(240)
+        status = cluster.processes["command"].exitcode
     finally:
         cluster.end()
     said = cluster.log.read_text()

@@ -184,7 +184,8 @@ def soon(monkeypatch):
     monkeypatch.setattr(episodes, "LONG_S", LONG_S)
 
 
-@pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("jobs", [1, 2])
 def test_it_is_told_which_episode_has_been_under_way_for_long(soon, jobs):
     said = told_of("agent1:0:lingers", jobs)
     assert "agent 'agent1' from start 0" in [what for what, _ in said]

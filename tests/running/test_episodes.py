@@ -86,7 +86,7 @@ def test_leaving_early_drops_the_episodes_not_yet_begun(tmp_path):
         assert len(journal.read_text().splitlines()) < 200
 
 
-@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_whether_an_episode_is_left_out_is_asked_when_it_is_about_to_begin(jobs, tmp_path):
     journal = tmp_path / "journal"
     journal.touch()

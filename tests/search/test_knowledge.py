@@ -138,16 +138,19 @@ def test_who_is_sensitive_to_a_parameter_tells_of_it():
         assert sum(share for _, share in one.agents) == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_a_parameter_of_which_no_output_tells_is_unidentified():
     assert known(3, count=32, lost=(1, 2, 3)).unidentified == ("trim",)
     assert known(3).unidentified == ()
 
 
+@pytest.mark.slow
 def test_few_trials_limit_what_is_told_and_with_many_it_is_noise():
     assert {one.limit for one in known(3, count=5).information} == {"trials"}
     assert {one.limit for one in known(3, count=48).information} == {"starts"}
 
 
+@pytest.mark.slow
 def test_the_order_of_trials_changes_nothing():
     one = known(5)
     other = learn_theta(SPACE, one.trials[::-1], one.goal, one.seed)

@@ -45,6 +45,7 @@ def test_the_points_of_a_batch_all_differ_and_a_smaller_batch_begins_as_a_larger
     assert batch[0] == proposer.propose(SPACE, finished, 2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", HERE)
 def test_the_points_of_a_batch_differ_also_where_the_best_is_at_a_corner(engine):
     proposer = make_proposer(engine, 3, WHOLE)

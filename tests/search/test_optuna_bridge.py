@@ -24,6 +24,7 @@ def history(maximise=False):
     return History("mine", SPACE, trials, maximise, answer=3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("maximise", [False, True])
 def test_an_optuna_storage_has_every_trial_with_its_state_value_and_what_else_is_known(tmp_path, maximise):
     optuna = pytest.importorskip("optuna")

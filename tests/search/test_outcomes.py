@@ -164,6 +164,7 @@ def test_outcomes_another_process_with_other_threads_proposes_the_same_to_the_la
         assert told.stdout.strip() == repr(Outcomes(WHOLE).propose(SPACE, trials, 4))
 
 
+@pytest.mark.slow
 def test_what_is_proposed_together_is_spread():
     truth = (0.1, 0.1)
     target = goal(flips(truth), outputs(truth), 1e-4)
@@ -175,7 +176,7 @@ def test_what_is_proposed_together_is_spread():
     assert together[0] == alone[0]
 
 
-@pytest.mark.parametrize("count", [6, 7])
+@pytest.mark.parametrize("count", [6, pytest.param(7, marks=pytest.mark.slow)])
 def test_a_trial_that_was_cut_off_tells_what_it_has(count):
     truth = (0.1, 0.1)
     target = goal(flips(truth), outputs(truth), 0.05)

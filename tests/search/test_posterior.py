@@ -39,6 +39,7 @@ def test_each_trial_is_told_how_probable_its_own_theta_is():
     assert (found.above <= 1.0 + 1e-9).all()
 
 
+@pytest.mark.slow
 def test_a_wider_density_holds_no_fewer_of_them():
     held = (left_out(trials(20)).above <= 0.95).sum(axis=0)
     assert (np.diff(held) >= 0).all()
@@ -146,6 +147,7 @@ def test_the_dispersion_is_one_unless_a_misfit_is_said(misfit, dispersion):
     assert misfit.dispersion == dispersion
 
 
+@pytest.mark.slow
 def test_the_same_trials_in_any_order_give_the_same_verdict():
     told = trials_of_misfit(1)
     target = goal(whole, outputs((0.1, 0.1), 5), SPREAD**2)

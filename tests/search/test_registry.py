@@ -81,6 +81,7 @@ def test_studies_of_one_engine_outlast_an_edit_of_another_engine(tmp_path, monke
 
 
 HAS_OPTUNA = importlib.util.find_spec("optuna") is not None
+LONG = ("gp", "composite")
 HERE = [
     pytest.param(name, marks=[pytest.mark.skipif(bool(lacking(name)), reason=lacking(name))]) for name in ENGINE_NAMES
 ]
@@ -96,7 +97,10 @@ def test_every_engine_begins_with_the_same_design(engine):
     assert [trial.values for trial in trials] == [design_point(SPACE, index, 9) for index in range(4)]
 
 
-@pytest.mark.parametrize("engine", HERE)
+@pytest.mark.parametrize(
+    "engine",
+    [pytest.param(*one.values, marks=[*one.marks, *[pytest.mark.slow] * (one.values[0] in LONG)]) for one in HERE],
+)
 def test_every_engine_keeps_what_engines_promise(engine):
     check_engine(engine_of(engine))
 

@@ -13,6 +13,7 @@ from proxytune.search.engine import design_point
 from proxytune.search.surrogate import GaussianProcess
 
 
+@pytest.mark.slow
 @settings(max_examples=4)
 @given(order=st.permutations(range(12)))
 def test_a_proposal_does_not_depend_on_the_order_in_which_trials_are_told(order):
@@ -35,6 +36,7 @@ def test_another_process_with_other_threads_proposes_the_same_to_the_last_bit():
     assert told.stdout.strip() == repr(GaussianProcess().propose(SPACE, trials, 4))
 
 
+@pytest.mark.slow
 def test_it_never_proposes_a_point_twice_even_on_a_flat_score():
     trials = search(make_proposer("gp", 4), 25, seed=1, score=lambda values: 3.0)
     units = np.array([[v / 0.3 for v in trial.values] for trial in trials])
@@ -50,6 +52,7 @@ def test_it_finds_the_lowest_step_that_the_design_alone_misses():
     assert max(lowest) <= 1
 
 
+@pytest.mark.slow
 def test_a_failed_trial_keeps_the_search_away():
     """Everything beyond 0.15 s fails; the search goes there less than the design would."""
     trials = search(make_proposer("gp", 6), 20, seed=1, score=lambda v: None if v[0] > 0.15 else steps(v))

@@ -12,6 +12,7 @@ from tests.conftest import MakeStudy
 BANK = {"target": None, "preflight": "true", "budget": "10", "engine": None}
 
 
+@pytest.mark.slow
 def test_a_bank_says_what_a_target_would_tell(make_study: MakeStudy, capsys: pytest.CaptureFixture[str]) -> None:
     """Its document has trials, widths, agents and starts in place of an answer, its folder a page and a table."""
     folder = make_study(**BANK)

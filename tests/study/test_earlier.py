@@ -46,6 +46,7 @@ def test_knowledge_alone_answers_without_a_trial(beside: Path, make_study: MakeS
     assert high - low < 0.3
 
 
+@pytest.mark.slow
 def test_a_study_with_knowledge_has_no_design(beside: Path, make_study: MakeStudy) -> None:
     """The first trial is proposed from what is known; the answer knows of earlier trials too."""
     known = run_study(make_study(**{**LEARNS, "budget": "2"})).document()
@@ -111,6 +112,7 @@ def _other_code(folder: Path, shift: float) -> None:
     (folder / BANK_FILE).write_text(json.dumps(table))
 
 
+@pytest.mark.slow
 def test_other_code_that_plays_the_same_counts(beside: Path, make_study: MakeStudy) -> None:
     """Twelve episodes of a source of other code are driven again; where they come out alike it counts."""
     _other_code(beside, 0.0)
@@ -214,6 +216,7 @@ def test_a_bank_is_for_study_alone(beside: Path) -> None:
         run_study(beside)
 
 
+@pytest.mark.slow
 def test_a_damaged_fact_is_told(beside: Path, make_study: MakeStudy) -> None:
     """What was learnt is not as it was written: one line, no traceback."""
     folder = make_study(**LEARNS)

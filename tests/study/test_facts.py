@@ -37,6 +37,7 @@ def test_another_version_of_a_package_is_told_by_its_name(make_study, versions, 
         assert stored_run(open_study(finished), store).study.identity == "wobbly 1 ()"
 
 
+@pytest.mark.slow
 def test_looking_at_a_study_edited_since_names_the_edit_alone(make_study, versions, monkeypatch):
     finished = make_study()
     resumed(finished)
@@ -94,6 +95,7 @@ def test_which_search_proposed_which_trials_is_kept_and_a_change_is_told_but_not
     assert len(resumed(folder)[1]) == 9
 
 
+@pytest.mark.slow
 def test_a_search_that_proposed_nothing_is_forgotten(finished, make_study, code):
     make_study(budget="8")
     noted(finished)
@@ -109,6 +111,7 @@ def test_a_search_that_proposed_nothing_is_forgotten(finished, make_study, code)
     assert searches(finished) == [(8, "one"), (10, "three")]
 
 
+@pytest.mark.slow
 def test_a_change_is_told_whatever_the_objective(make_study, code):
     folder = make_study(objective='"ppv"')
     noted(folder)

@@ -221,6 +221,7 @@ def test_a_study_with_aliases_is_the_study_without_but_for_the_names(aliased, ma
     assert named.document()["settings"]["aliases"]["a3"] == "agent3"
 
 
+@pytest.mark.slow
 def test_another_agent_behind_an_alias_is_another_study(aliased):
     folder = aliased(budget="5")
     run_study(folder)

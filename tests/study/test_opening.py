@@ -46,7 +46,7 @@ def own(make_study):
     return make
 
 
-@pytest.mark.parametrize("engine", ["gp", "outcomes"])
+@pytest.mark.parametrize("engine", [pytest.param("gp", marks=pytest.mark.slow), "outcomes"])
 def test_a_measure_of_one_s_own_is_made_large_and_kept_with_every_trial(own, engine):
     study_run, result = run(own(engine=f'"{engine}"'), engine)
     values = [trial.measures["mine:NEARNESS"] for trial in result.trials]
@@ -61,6 +61,7 @@ def test_a_measure_of_one_s_own_is_made_large_and_kept_with_every_trial(own, eng
     assert all(set(trial.measures) == {"mine:NEARNESS", "prpv", "ppv"} for trial in result.trials)
 
 
+@pytest.mark.slow
 def test_its_value_is_told_in_the_search_and_on_fresh_episodes(own):
     folder = own(confirm="1")
     study_run, _ = run(folder, "gp")
@@ -75,11 +76,13 @@ def test_its_value_is_told_in_the_search_and_on_fresh_episodes(own):
     assert searched[3] == "the objective, in the search's own episodes"
 
 
+@pytest.mark.slow
 def test_ppv_is_an_objective_too(make_study):
     _, result = run(make_study(objective='"ppv"'), "gp")
     assert [trial.score for trial in result.trials] == [trial.ppv for trial in result.trials]
 
 
+@pytest.mark.slow
 def test_no_trial_is_cut_off_by_another_objective_than_prpv(own):
     _, result = run(own(cut_off="true", budget="9"), "gp")
     assert {trial.state for trial in result.trials} == {"finished"}

@@ -61,6 +61,7 @@ def test_scored_by_a_metric_that_some_episodes_lack_these_count_as_failed(partly
     assert {trial["failed_episodes"] for trial in document["trials"]} == {6}, "every agent's from start 0"
 
 
+@pytest.mark.slow
 def test_scored_by_a_metric_that_no_episode_has_it_is_one_line(partly, capsys):
     folder = partly("never", "episode.start > 9", "outcomes")
     (folder / "partly.py").write_text(FAMILY.replace("episode.start or MISSING", "False"))

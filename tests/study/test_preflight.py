@@ -202,7 +202,8 @@ def test_a_parameter_that_matters_is_not_looked_at_twice_and_nothing_is_simulate
     assert run(folder) == (replace(spent, episodes=0, seconds=0), found)
 
 
-@pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("jobs", [1, 2])
 def test_interrupted_anywhere_it_finds_the_same_and_simulates_nothing_twice(planted, jobs):
     _, whole = run(planted("whole"))
     folder = planted("stopped")
@@ -290,6 +291,7 @@ def test_what_is_wrong_with_a_parameter_and_what_to_do_is_one_line(planted):
     assert noise_sized.startswith("pre-flight: 'noise_sized' is not shown to change a metric across [0, 1]")
 
 
+@pytest.mark.slow
 def test_a_parameter_that_is_only_one_more_source_of_noise_is_said_to_matter_in_at_most_one_case_in_twenty():
     """Heavy tails too: whatever the noise, the test compares ranks."""
     rng, interval = np.random.default_rng(1), Interval("blur", 0.0, 1.0)
@@ -328,6 +330,7 @@ def test_agents_that_remember_or_draw_unseeded_are_named_at_once_and_for_good(ma
     )
 
 
+@pytest.mark.slow
 def test_a_study_of_repeatable_agents_has_nothing_to_say(make_study, capsys):
     assert main(["study", str(make_study(preflight="true", budget="2", initial="2")), "--json"]) == 0
     assert "scores otherwise" not in "".join(capsys.readouterr())

@@ -106,6 +106,7 @@ def test_interrupted_anywhere_it_goes_on_to_the_same_trials(cutting, done, jobs)
     assert spent.episodes - spent.unused <= done[0].episodes - 181
 
 
+@pytest.mark.slow
 def test_episodes_run_in_vain_change_nothing(cutting, done):
     """All episodes of every trial are known beforehand, in which case nothing is simulated at all."""
     _, trials, _ = done
@@ -118,17 +119,20 @@ def test_episodes_run_in_vain_change_nothing(cutting, done):
     assert (spent.episodes, again) == (0, trials)
 
 
+@pytest.mark.slow
 def test_without_it_all_trials_are_driven_to_their_end(cutting):
     spent, trials, found = run(cutting(cut_off="false", budget="8"))
     assert {trial.state for trial in trials} == {"finished"}
     assert (spent.episodes, found.spared) == (8 * ALL, (0, 0.0))
 
 
+@pytest.mark.slow
 def test_where_a_tolerance_is_a_percentage_no_trial_is_cut_off(cutting):
     _, trials, _ = run(cutting(metrics='["distance:max:1%", "survival_time:max"]', budget="8"))
     assert {trial.state for trial in trials} == {"finished"}
 
 
+@pytest.mark.slow
 def test_an_agent_that_always_fails_is_a_failure_and_no_reason_to_cut_off(make_study):
     folder = make_study(cut_off="true", domain={"faults": '["agent3:1:raises"]'}, budget="9")
     _, trials, found = run(folder)
@@ -214,6 +218,7 @@ def test_of_a_trial_that_was_cut_off_the_search_has_the_decided_agents_outputs_e
     assert {agent for agent, is_known in zip(study.target.agents, known, strict=True) if is_known} == set(cut.decided)
 
 
+@pytest.mark.slow
 def test_by_other_metrics_a_cut_trial_is_bounded_by_its_own_agents_and_by_its_own_it_keeps_its_bound(done):
     _, trials, found = done
     with Store.read(found.study.settings.folder) as store:
@@ -252,6 +257,7 @@ RULES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rule", RULES)
 def test_a_rule_stops_a_study_also_when_it_is_run_again_and_without_it_the_trials_are_those_of_one_without(
     make_study, finished, rule

@@ -87,6 +87,7 @@ def test_the_answer_is_told_with_its_score_on_episodes_that_the_search_has_not_s
     assert {e.seed for e in set(known) - set(seen)}.isdisjoint(e.seed for e in seen)
 
 
+@pytest.mark.slow
 def test_a_second_time_nothing_is_simulated(once):
     *_, found = once
     spent, again = confirmed(found.study.settings.folder)
@@ -154,6 +155,7 @@ def test_what_is_expected_of_the_answer_is_the_mean_of_repetitions_that_nothing_
     assert found.excess.value == pytest.approx(value - found.floor.value)
 
 
+@pytest.mark.slow
 def test_the_nominal_theta_is_driven_once_beside_the_trials_and_told(finished):
     study = opened(finished)
     assert result_of_result(finished).nominal is None
@@ -176,6 +178,7 @@ def test_the_nominal_theta_is_driven_once_beside_the_trials_and_told(finished):
     assert usefulness_table(before).rows[-4][:2] == ("  nominal", f"{value:.0f}")
 
 
+@pytest.mark.slow
 def test_trials_do_not_depend_on_it(finished):
     with Store.read(finished) as store:
         before = store.trials()
@@ -211,6 +214,7 @@ def test_interrupted_anywhere_it_comes_to_the_same_answer(finished, jobs):
     assert last.expected.prpv == whole.confirmation.expected.prpv
 
 
+@pytest.mark.slow
 def test_every_repetition_has_episodes_and_a_score_of_its_own(finished):
     _, found = confirmed(finished, confirm=2)
     answer = found.confirmation.answer
@@ -219,6 +223,7 @@ def test_every_repetition_has_episodes_and_a_score_of_its_own(finished):
     assert answer.optimism == pytest.approx(sum(answer.scores) / 2 - answer.trial.prpv)
 
 
+@pytest.mark.slow
 def test_it_waits_for_the_end_of_the_study_which_a_rule_may_bring(make_study, finished):
     assert confirmed(finished, budget=8)[0].episodes == 0
     folder = make_study("ruled")
@@ -230,6 +235,7 @@ def test_it_waits_for_the_end_of_the_study_which_a_rule_may_bring(make_study, fi
     assert confirmed(folder, stop=StopRules(no_improvement=1e9))[0].episodes >= ONE
 
 
+@pytest.mark.slow
 def test_it_can_be_turned_off(finished):
     spent, found = confirmed(finished, confirm=0)
     assert (spent.episodes, found.confirmation) == (0, None)
@@ -247,6 +253,7 @@ def test_the_time_of_fresh_episodes_does_not_count_for_the_rule_to_stop(finished
     assert found.stopped == ""
 
 
+@pytest.mark.slow
 def test_an_agent_that_fails_in_all_fresh_episodes_leaves_the_answer_without_a_score(finished):
     study = opened(finished)
     with Store.open(finished) as store:
@@ -302,6 +309,7 @@ def test_the_document_has_the_answer_and_every_candidate(once):
     ]
 
 
+@pytest.mark.slow
 def test_perfect_is_only_what_neither_prpv_nor_any_other_output_tells_from_the_target(finished, monkeypatch):
     study = opened(finished)
     with Store.open(finished) as store:
@@ -397,6 +405,7 @@ def test_noise_floor_and_chance_are_those_of_the_target(finished):
     assert found.best.assessment.chance.mean == again.chance.mean
 
 
+@pytest.mark.slow
 def test_failures_are_counted_and_the_first_are_told(make_study):
     found = run(make_study(domain={"faults": '["agent3:1:raises", "agent2:0:nan"]'}))
     assert found.failed_episodes == 14
@@ -404,6 +413,7 @@ def test_failures_are_counted_and_the_first_are_told(make_study):
     assert found.failures[0].startswith("trial 1: agent 'agent2' failed from start 0: ")
 
 
+@pytest.mark.slow
 def test_an_open_trial_does_not_count(finished):
     study = open_study(finished)
     with Store.open(finished) as store:
@@ -430,6 +440,7 @@ def test_episodes_that_have_gone_missing_are_told(finished):
         result_of(StudyRun(replace(study, identity="another"), store))
 
 
+@pytest.mark.slow
 def test_a_study_can_be_summed_up_from_its_first_trial_on(make_study):
     for budget in ("1", "2"):
         found = run(make_study(budget=budget, initial="1"))

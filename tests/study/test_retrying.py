@@ -92,6 +92,7 @@ def test_failures_of_the_same_code_are_remembered_until_all_are_to_be_retried(ed
     assert run_study(folder).spent.episodes == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("episodes", [1, 3])
 def test_a_retry_that_is_stopped_within_a_trial_or_just_before_it_is_kept_goes_on_to_the_same_trials(edited, episodes):
     with pytest.raises(RunError, match="all trials failed"):

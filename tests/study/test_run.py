@@ -38,6 +38,7 @@ def scores(result):
     return [trial.prpv for trial in result.trials]
 
 
+@pytest.mark.slow
 def test_by_its_own_metrics_a_study_comes_to_its_own_result(finished):
     with Store.read(finished) as store:
         own = result_of(StudyRun(open_study(finished), store))
@@ -47,6 +48,7 @@ def test_by_its_own_metrics_a_study_comes_to_its_own_result(finished):
     assert again.stopped == own.stopped
 
 
+@pytest.mark.slow
 def test_every_trial_is_scored_as_a_study_of_these_metrics_would_have(finished, make_study):
     again = found(finished, COARSE)
     folder = make_study("other", metrics='["distance:max:20%", "survival_time:max"]')
@@ -68,6 +70,7 @@ def test_a_metric_may_be_taken_out_or_turned_round(finished):
     assert scores(found(finished, turned)) == scores(found(finished, OWN)), "both domains turn round alike"
 
 
+@pytest.mark.slow
 def test_why_a_study_has_stopped_is_not_judged_by_the_other_metrics(finished):
     study = open_study(finished)
     study = replace(study, settings=replace(study.settings, budget=9, stop=StopRules(no_improvement=1e9)))
@@ -126,6 +129,7 @@ def test_a_study_spends_its_budget_and_then_no_more(make_study):
     assert run(folder) == (0, trials)
 
 
+@pytest.mark.slow
 def test_two_jobs_give_the_trials_of_one(make_study, finished):
     assert run(make_study("two"), jobs=2)[1] == run(finished)[1]
 
@@ -255,6 +259,7 @@ def test_budget_jobs_name_and_what_failures_do_may_change(finished, make_study):
     assert run(finished)[1][:7] == trials
 
 
+@pytest.mark.slow
 def test_before_the_first_finished_trial_everything_may_change(make_study):
     folder = make_study()
     study = open_study(folder)

@@ -67,6 +67,7 @@ def cutting(make_studies):
     return folder, *run(folder)
 
 
+@pytest.mark.slow
 def test_the_thetas_of_a_batch_follow_from_the_trials_before_it(make_study):
     folder = make_study(batch=str(BATCH), budget="10", engine='"gp"')
     _, trials = run(folder)
@@ -90,6 +91,7 @@ def test_two_jobs_cut_off_the_same_trials_of_a_batch_at_the_same_agents_as_one(m
     assert one.unused == 0
 
 
+@pytest.mark.slow
 def test_each_trial_of_a_batch_is_held_against_the_trials_before_the_batch_by_its_own_agents(cutting):
     folder, _, trials = cutting
     study = open_study(folder)
@@ -110,6 +112,7 @@ def test_a_budget_raised_within_a_batch_gives_the_trials_of_one_that_was_so_from
     assert run(folder)[1] == cutting[2]
 
 
+@pytest.mark.slow
 def test_a_budget_lowered_within_an_open_batch_and_raised_again_changes_nothing(make_study, cutting):
     folder = ordered_study(make_study, "lowered", **KEYS)
     with pytest.raises(KeyboardInterrupt):

@@ -7,7 +7,8 @@ import threading
 import time
 
 import pytest
-from processes import episodes, start, trials, wait_for
+from launched import Launched, never_stopped
+from processes import episodes, trials, wait_for
 from wobbly import Wobbly
 
 from proxytune.cli.main import main
@@ -41,7 +42,7 @@ def slow(make_study):
     """A study of which one episode hangs so many times, with a limit of a second."""
 
     def make(called, times):
-        folder = make_study(called, family='"slow:make"', budget="5", episode_timeout_s="1.0")
+        folder = make_study(called, family='"slow:make"', budget="2", initial="2", episode_timeout_s="1.0")
         (folder / "slow.py").write_text(SLOW)
         (folder / "slow_times").write_text(str(times))
         return folder
@@ -141,29 +142,24 @@ def test_what_takes_too_long_in_two_runs_is_left_alone(slow, capsys):
     folder = slow("study", 100)
     first = told(folder, capsys)
     second = told(folder, capsys)
-    assert second["episodes"]["run"] == first["episodes"]["failed"] == 5
+    assert second["episodes"]["run"] == first["episodes"]["failed"] == 2
     assert any("; in two runs; study --retry-failed" in line for line in second["cautions"])
     third = told(folder, capsys)
-    assert (third["episodes"]["run"], third["episodes"]["failed"]) == (0, 5)
-    assert left(folder) == 100 - 4 * 5
+    assert (third["episodes"]["run"], third["episodes"]["failed"]) == (0, 2)
+    assert left(folder) == 100 - 4 * 2
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("jobs", [1, 2])
-def test_a_command_that_was_stopped_with_its_processes_comes_to_the_same(make_study, jobs):
+def test_a_command_that_was_stopped_with_its_processes_comes_to_the_same(make_study, launcher):
     """As by Ctrl-Z, by a paused container, or by a laptop that sleeps."""
-    folders = []
-    for called, sleep in (("whole", "0.0"), ("stopped", "0.05")):
-        folder = make_study(called, domain={"sleep": sleep}, jobs=str(jobs), episode_timeout_s="2.0")
-        process = start("study", folder)
-        if called == "stopped":
-            for episode in (10, 40):
-                wait_for(folder, process, episode)
-                os.killpg(process.pid, signal.SIGSTOP)
-                time.sleep(5.0)
-                os.killpg(process.pid, signal.SIGCONT)
-        assert process.wait(120) == 0, process.stderr.read()
-        folders.append(folder)
-    whole, stopped = folders
-    assert trials(stopped) == trials(whole)
-    assert episodes(stopped) == episodes(whole)
+    whole = never_stopped(make_study)
+    folder = make_study("stopped", domain={"sleep": "0.05"}, episode_timeout_s="1.0")
+    process = Launched(launcher, folder)
+    for episode in (10, 40):
+        wait_for(folder, process, episode)
+        os.killpg(process.pid, signal.SIGSTOP)
+        time.sleep(2.0)
+        os.killpg(process.pid, signal.SIGCONT)
+    status, printed = process.end()
+    assert status == 0, printed
+    assert (trials(folder), episodes(folder)) == whole

@@ -91,6 +91,7 @@ def test_more_examinations_go_on_after_the_very_same_ones(make_study, tmp_path):
         assert kept.items() <= more.items()
 
 
+@pytest.mark.slow
 def test_curves_whose_scores_are_known_are_not_examined_further(make_study):
     setup = load_setup(read_study_settings(make_taught(make_study, more=CHOSEN)))
     alone = examine_curves(setup, {NONE: None}, 1, Silent())

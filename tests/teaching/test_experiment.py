@@ -148,6 +148,7 @@ def test_more_seeds_add_to_what_was_done(make_study, tmp_path):
     assert len(journal.read_text().splitlines()) - driven < driven / 2
 
 
+@pytest.mark.slow
 def test_a_target_budget_too_small_to_converge_is_no_plv(make_study):
     found = run(make_taught(make_study, grid=[0, 3, 6]))
     assert not found.settled
@@ -172,6 +173,7 @@ def test_where_the_learner_drives_its_first_samples_without_a_proxy_cost_what_th
         assert one.cost.value == pytest.approx(one.worth.plv.value + 9.0 * GRID[1])
 
 
+@pytest.mark.slow
 def test_where_plv_is_unknown_so_is_its_cost(make_study):
     assert all(one.cost is None for one in run(make_taught(make_study, grid=[0, 3, 6])).teachers)
 
@@ -284,6 +286,7 @@ def test_the_learner_without_a_proxy_is_examined_once_for_all_and_nothing_is_mad
     assert journal.read_text() == before
 
 
+@pytest.mark.slow
 def test_a_family_whose_expert_cannot_drive_there_cannot_teach_and_the_others_can(taught):
     lessons = teach(taught(BLOCKED), RIGHT, RIGHT)
     assert lessons["right"].plv is not None
@@ -303,6 +306,7 @@ def test_a_family_that_is_no_classroom_is_refused_by_its_name(taught):
         classrooms(settings)
 
 
+@pytest.mark.slow
 def test_a_grid_too_short_to_converge_gives_no_plv(taught):
     lessons = teach(taught(grid=[0, 3, 6]), RIGHT, FAR)
     assert [(one.plv, one.more, one.failure) for one in lessons.values()] == [(None, None, "")] * 2
@@ -354,6 +358,7 @@ def predicting(values, poor=()):
 GOOD = {"slow starter": 60.0, "early bird": 30.0, "twin": 5.0}
 
 
+@pytest.mark.slow
 def test_a_proxy_that_starts_lower_and_saves_more_shows_that_a_zero_shot_score_does_not_measure_plv():
     found = observe(experiment(), predicting(GOOD, poor=("slow starter",)))
     assert found.zero_shot.reversed == (("slow starter", "early bird"),)
@@ -384,6 +389,7 @@ def test_a_single_proxy_is_not_ranked_but_may_teach_though_it_predicts_badly():
     assert "shown here, since slow starter saves samples" in only
 
 
+@pytest.mark.slow
 def test_where_plv_is_unknown_nothing_is_observed():
     assert observe(experiment(settled=False), predicting(GOOD)) is None
     assert observation_lines(None, experiment()) == ()

@@ -119,8 +119,8 @@ def run(folder, left=None, watcher=None):
 
 @pytest.mark.slow
 def test_it_prefers_a_proxy_from_which_the_target_is_learnt_with_fewest_samples(make_study):
-    found = run(make_taught(make_study, parameters=SEARCH_BOX, more="budget = 8", initial="4"))
-    assert len(found.trials) == 8
+    found = run(make_taught(make_study, parameters=SEARCH_BOX, more="budget = 6", initial="4"))
+    assert len(found.trials) == 6
     assert found.best.worth.plv.value == max(trial.worth.plv.value for trial in found.trials)
     assert found.best.worth.plv.value > min(trial.worth.plv.value for trial in found.trials)
     assert abs(found.best.theta["trim"] - 0.12) < 0.15
@@ -150,23 +150,23 @@ def test_a_raised_budget_goes_on_after_the_very_same_trials(make_study, tmp_path
     again = run(folder)
     assert len(journal.read_text().splitlines()) == driven
     path = folder / "study.toml"
-    path.write_text(path.read_text().replace("budget = 3", "budget = 5"))
+    path.write_text(path.read_text().replace("budget = 3", "budget = 4"))
     longer = run(folder)
     thetas = [[dict(trial.theta) for trial in found.trials] for found in (short, again, longer)]
     assert thetas[0] == thetas[1] == thetas[2][:3]
-    assert len(thetas[2]) == 5
+    assert len(thetas[2]) == 4
 
 
 @pytest.mark.slow
 def test_its_trials_are_kept_in_the_study_with_score_and_measures(make_study):
-    folder = make_taught(make_study, parameters=SEARCH_BOX, more="budget = 3", initial="2")
+    folder = make_taught(make_study, parameters=SEARCH_BOX, more="budget = 2", initial="2", grid=GRID[:4])
     found = run(folder)
     with Store.read(folder) as store:
         trials = store.trials(OBJECTIVE)
     assert [trial.theta for trial in trials] == [trial.theta for trial in found.trials]
     assert [trial.measures.get("plv") for trial in trials] == [trial.worth.plv.value for trial in found.trials]
     assert all(trial.score == -trial.measures["plv"] for trial in trials if trial.state == "finished")
-    assert found.stopped == "the budget of 3 proxies is spent"
+    assert found.stopped == "the budget of 2 proxies is spent"
 
 
 @pytest.mark.slow
@@ -176,12 +176,12 @@ def test_a_batch_of_proxies_is_proposed_together_and_resumed_exactly(make_study)
         head, teaching = path.read_text().split("[teaching]")
         path.write_text(f"{head}[teaching]{re.sub(r'budget = [0-9]+', f'budget = {count}', teaching)}")
 
-    keys = {"parameters": SEARCH_BOX, "more": "budget = 6", "initial": "2", "batch": "2"}
+    keys = {"parameters": SEARCH_BOX, "more": "budget = 4", "initial": "2", "batch": "2"}
     whole, cut = (make_taught(make_study, called=name, **keys) for name in ("whole", "cut"))
     expected = [trial.theta for trial in run(whole).trials]
     set_budget(cut, 3)
     assert [trial.theta for trial in run(cut).trials] == expected[:3]
-    set_budget(cut, 6)
+    set_budget(cut, 4)
     assert [trial.theta for trial in run(cut).trials] == expected
 
 
@@ -204,7 +204,7 @@ def test_a_rule_stops_it_and_without_the_rule_it_goes_on(make_study, rule, reaso
 
 @pytest.mark.slow
 def test_other_settings_of_teaching_begin_its_trials_afresh(make_study):
-    folder = make_taught(make_study, parameters=SEARCH_BOX, more="budget = 2", initial="2")
+    folder = make_taught(make_study, parameters=SEARCH_BOX, more="budget = 2", initial="2", grid=GRID[:4])
     first = run(folder)
     path = folder / "study.toml"
     path.write_text(path.read_text().replace("seeds = 3", "seeds = 2"))
@@ -216,7 +216,7 @@ def test_other_settings_of_teaching_begin_its_trials_afresh(make_study):
 @pytest.mark.slow
 def test_the_width_of_a_parameter_is_searched_beside_its_centre(make_study):
     width = "budget = 2\n[teaching.width]\ntrim = [0.0, 0.2]\n"
-    found = run(make_taught(make_study, parameters=SEARCH_BOX, more=width, initial="2"))
+    found = run(make_taught(make_study, parameters=SEARCH_BOX, more=width, initial="2", grid=GRID[:4]))
     assert found.space.names == ("trim", "trim width")
     for trial in found.trials:
         low, high = trial.proxy.bounds["trim"]

@@ -126,6 +126,7 @@ def test_ties_of_a_metric_are_counted_once_per_pair():
     assert (rates.ties, rates.pairs) == ((3, 3), 6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("labels", ["012345", ["0/0", "0/1", "1/0", "1/1", "2/0", "2/1"]])
 def test_drawing_for_a_few_agents_at_a_time_changes_nothing(labels, monkeypatch):
     values = np.random.default_rng(0).normal(size=(2, 7, 6, 1))
@@ -209,6 +210,7 @@ def test_it_is_a_whole_number_within_bounds_symmetric_and_zero_for_the_same(mean
     assert prpv_of_means(proxy, proxy, M2) == 0
 
 
+@pytest.mark.slow
 @few
 @given(pairs_of_means(), st.randoms(use_true_random=False))
 def test_the_order_of_the_agents_does_not_matter(means, random):

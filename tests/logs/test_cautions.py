@@ -92,7 +92,10 @@ def test_what_is_probably_not_meant_is_told_in_one_sentence(case):
     assert re.search(expected, line)
 
 
-@pytest.mark.parametrize("case", [CLEAN[0], *IN_FORM[::10], *OTHER_FORM[::7], *OUTSIDE[::3]], ids=lambda case: case.name)
+CALM = [CLEAN[0], *IN_FORM[::10], *OTHER_FORM[::7], *OUTSIDE[::3]]
+
+
+@pytest.mark.parametrize("case", CALM, ids=lambda case: case.name)
 def test_what_a_diagnosis_is_for_draws_no_caution(case):
     assert cautions(make_log(case, episodes=3, seconds=40.0)) == ()
 

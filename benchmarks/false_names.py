@@ -17,6 +17,7 @@ import hidden_cases as first
 import numpy as np
 import second_hidden_cases as second
 from joblib import Parallel, delayed
+from rates import FLAGGED
 from scipy.signal import lfilter
 
 import proxytune.diagnosis.motion.diagnose as diagnosing
@@ -119,15 +120,13 @@ def diagnosed(tracker: str, noise: str, number: int) -> dict[str, object]:
     robot = read_robot("duckiebot")
     with mock.patch.object(diagnosing, "has_body", return_value=False):  # Bullet confirms, it names nothing
         found = diagnosing.diagnose(make_log(tracker, noise, number), robot, diagnosing.declared_effects(robot))
-    names = [effect.effect for effect in found.effects]
-    bound = found.expected_false_names
     return {
         "tracker": tracker,
         "noise": noise,
         "number": number,
-        "names": names,
+        "names": [effect.effect for effect in found.effects],
         "verdict": found.verdict,
-        "at_most": bound,
+        "at_most": found.expected_false_names,
     }
 
 
@@ -146,7 +145,7 @@ def main(output: Path, logs: int, jobs: int) -> None:
     for tracker in (*TRACKERS, "all"):
         some = [row for row in rows if tracker in (row["tracker"], "all")]
         wrong = [row for row in some if row["names"]]
-        flagged = sum(row["verdict"] in ("partly explained", "unexplained") for row in some)
+        flagged = sum(row["verdict"] in FLAGGED for row in some)
         names = "; ".join(f"{row['noise']} {row['number']}: {', '.join(row['names'])}" for row in wrong)
         print(
             f"{tracker:16s} {len(some):4d} {len(wrong):18d}  {flagged:7d}  {names if tracker != 'all' else ''}".rstrip()

@@ -18,6 +18,7 @@ ROUND = 2
 LEAST = (0.05, 0.3)
 """What is no further off is noise: place [m], heading [rad]."""
 USUAL, STEPS, LOOSE = 10.0, 2.0, 1.5
+"""So many usual deviations, and steps of a fast robot, are off the way; samples further apart have a gap between."""
 
 
 def outliers(episode: LogEpisode) -> NDArray[np.bool_]:

@@ -158,6 +158,8 @@ def read_clocks(log: Log, robot: Robot, like: Clocks | None = None) -> Clocks:
 
 def without_drift(log: Log, rate: float) -> Log:
     """Put commands on the poses' clock, which is later by `rate` with every second from the log's first sample on."""
+    if rate == 0.0:
+        return log
     first = min(float(episode.times[0]) for episode in log.episodes)
 
     def retime(episode: LogEpisode) -> LogEpisode:

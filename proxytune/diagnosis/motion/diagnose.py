@@ -343,8 +343,7 @@ def diagnose(
     log, test = cut_out_long_rests(join_windows(log)), test and cut_out_long_rests(join_windows(test))
     own = read_clocks(log, robot)
     clocks = (own,) if test is None else (own, read_clocks(test, robot, own))
-    log = without_drift(log, own.drift.value) if own.drift.value else log
-    test = without_drift(test, clocks[-1].drift.value) if test and clocks[-1].drift.value else test
+    log, test = without_drift(log, own.drift.value), test and without_drift(test, clocks[-1].drift.value)
     # An offset of clocks and a delay are one number: where an offset is taken out, the delay is fitted in any case.
     if any(one.offset.value for one in clocks) and "delay" not in names:
         names, start = (*names, "delay"), {**start, "delay": own.assumed_delay_s}

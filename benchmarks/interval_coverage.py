@@ -1,10 +1,11 @@
-"""How often the intervals of a study's answer hold: `python benchmarks/interval_coverage.py TABLES [--splits 500]`.
+"""How often the intervals of a study's answer hold: `python benchmarks/interval_coverage.py TABLES [--plant bullet]`.
 
-Five targets of the planar plant, drawn at random, each with three proxies (itself, one near, one
+Five targets of the planar plant, or of Bullet, drawn at random, each with three proxies (itself, one near, one
 mediocre), are driven by quickstart's twelve agents again and again; TABLES (.npz) keeps the episodes and is made if it
-is not there, about six minutes of processor time. A split draws a study from them, each cell (agent, start) by itself:
-a target, own and fresh episodes of candidates, a pre-flight's pairs, and repetitions that nothing was chosen by. What
-the intervals claim to hold is the mean over all that the episodes can come to. Prints a table in Markdown.
+is not there, about six minutes of processor time (Bullet: half an hour). A split draws a study from them, each cell
+(agent, start) by itself: a target, own and fresh episodes of candidates, a pre-flight's pairs, and repetitions that
+nothing was chosen by. What the intervals claim to hold is the mean over all that the episodes can come to. Prints a
+table in Markdown.
 """
 
 import argparse
@@ -48,10 +49,10 @@ def read_tables(path: Path) -> dict[str, Floats]:
         return dict(known)
 
 
-def drive_tables(path: Path) -> None:
+def drive_tables(path: Path, plant: str) -> None:
     """Drive what is left, every θ again and again, and keep the metrics (repeats, agents, starts, metrics) of each."""
     study = open_study(QUICKSTART)
-    family = replace(study.family, plant="planar")  # type: ignore[type-var]
+    family = replace(study.family, plant=plant)  # type: ignore[type-var]
     settings = replace(study.settings, starts=STARTS)
     names = [metric.name for metric in settings.metrics]
 
@@ -180,9 +181,10 @@ def main() -> None:
     parser.add_argument("tables", type=Path)
     parser.add_argument("--splits", type=int, default=500)
     parser.add_argument("--starts", default="4,6,10")
+    parser.add_argument("--plant", choices=("planar", "bullet"), default="planar", help="whose episodes TABLES holds")
     parser.add_argument("--times", type=int, default=1, help="how often the target was measured")
     options = parser.parse_args()
-    drive_tables(options.tables)
+    drive_tables(options.tables, options.plant)
     kept = read_tables(options.tables)
     print("| starts | proxy | splits | PRPV | floor | excess | PPV | wrongly called imperfect | rightly |")
     print("|---|---|---|---|---|---|---|---|---|")

@@ -1,4 +1,4 @@
-"""How often a diagnosis is right: `python benchmarks/rates.py OUTPUT [--generator NAME] [--every N]`.
+"""How often a diagnosis is right: `python benchmarks/rates.py OUTPUT [--generator NAME] [--every N] [--kinds NAMES]`.
 
 Cases that OUTPUT has no line of yet are diagnosed, about half a minute of processor time each, and added to it one by
 one: a run that was stopped goes on where it was. At the end come the rates over everything in OUTPUT.
@@ -420,6 +420,9 @@ def arguments(words: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("output", type=Path, help="file of JSON lines, one a case, that is added to")
     parser.add_argument("--generator", choices=tuple(GENERATORS), default="first", help="whose cases")
     parser.add_argument("--every", type=int, default=1, help="every so many-th case of each kind; 0: count only")
+    parser.add_argument(
+        "--kinds", default="", help="only cases of these kinds, as in 'outside,other form'; all, if not said"
+    )
     parser.add_argument("--jobs", type=int, default=2, help="cases at a time")
     parser.add_argument("--episodes", type=int, default=12, help="drives of a log")
     parser.add_argument("--seconds", type=float, default=60.0, help="length of a drive")
@@ -429,7 +432,9 @@ def arguments(words: Sequence[str] | None = None) -> argparse.Namespace:
 def diagnose_all(asked: argparse.Namespace) -> None:
     """Add a row for each case that has none yet."""
     finished = {key(row.job) for row in read_rows(asked.output)}
-    wanted = [job for job in all_jobs(asked.every, asked.generator) if key(job) not in finished]
+    kinds = asked.kinds.split(",") if asked.kinds else None
+    jobs = (job for job in all_jobs(asked.every, asked.generator) if kinds is None or job.kind in kinds)
+    wanted = [job for job in jobs if key(job) not in finished]
     for number, row in enumerate(_rows(wanted, asked), 1):
         append(asked.output, row)
         print(f"{number} of {len(wanted)}: {row.text}", file=sys.stderr, flush=True)

@@ -46,6 +46,10 @@ from proxytune.study import (
 from proxytune.teaching import PlvSearch, load_setup, most_examinations, search_space
 
 
+MOST_ON_PAGE = 0.02
+"""No larger share of a run is spent on its page."""
+
+
 class LivePage:
     """Hears how a run goes, passes it on, and writes the study's page."""
 
@@ -64,9 +68,11 @@ class LivePage:
     def episode(self) -> None:
         """One more episode has been run; the page is written where the last time was long enough ago."""
         self._watcher.episode()
-        if time.monotonic() >= self._due:
+        begin = time.monotonic()
+        if begin >= self._due:
             self.write(self._doing)
-            self._due = time.monotonic() + RENEW_S
+            end = time.monotonic()
+            self._due = end + max(RENEW_S, (end - begin) / MOST_ON_PAGE)
 
     def write(self, doing: str) -> None:
         """Write the page, and say at the first time where it is."""

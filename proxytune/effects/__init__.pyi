@@ -30,7 +30,14 @@ from .effect import (
     Trace as Trace,
     WheelCurve as WheelCurve,
 )
-from .features import GROUPS as GROUPS, HEADING as HEADING, LEVEL as LEVEL, PLACE as PLACE, Knots as Knots
+from .features import (
+    GROUPS as GROUPS,
+    HEADING as HEADING,
+    LEVEL as LEVEL,
+    OF_PLACE as OF_PLACE,
+    PLACE as PLACE,
+    Knots as Knots,
+)
 from .image import Blur as Blur, RollingShutter as RollingShutter
 from .learnt import (
     FittedRange as FittedRange,

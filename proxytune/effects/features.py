@@ -75,12 +75,21 @@ def grid(asked: AskedMotion, knots: Knots) -> Signal:
     return np.asarray(parts[0] * parts[1])
 
 
-def floor_map(asked: AskedMotion, knots: Knots) -> Signal:
-    """Products of hats over x and y (…, knots): each 1 at its knot, 0 a mesh away from it, so 0 where no knot is."""
-    places = np.asarray(knots, dtype=float)
+def floor_map(asked: AskedMotion, knots: Knots, axes: slice = slice(None)) -> Signal:
+    """Products of hats over x and y, or one of them (…, knots): each 1 at its knot, 0 a mesh away and where none is."""
+    places = np.reshape(np.asarray(knots, dtype=float), (len(knots), -1))
     gaps = np.diff(np.sort(places, axis=0), axis=0)
     mesh = float(gaps[gaps > 0.0].min(initial=WIDEST_MESH_M))
-    return np.asarray(np.maximum(0.0, 1.0 - np.abs(asked.place[..., None, :] - places) / mesh).prod(axis=-1))
+    return np.asarray(np.maximum(0.0, 1.0 - np.abs(asked.place[..., None, axes] - places) / mesh).prod(axis=-1))
+
+
+def stretched(asked: AskedMotion, knots: Knots, axis: int, *, aside: bool) -> Signal:
+    """The motion forward, or aside, that a tracker adds whose map is stretched along an axis (…, knots)."""
+    to_axis, from_side = np.cos(asked.heading), -np.sin(asked.heading)
+    if axis:
+        to_axis, from_side = -from_side, to_axis
+    added = to_axis * (from_side if aside else to_axis) * asked.forward
+    return floor_map(asked, knots, slice(axis, axis + 1)) * added[..., None]
 
 
 def sign(asked: AskedMotion, wheel: int) -> Signal:
@@ -183,7 +192,29 @@ def _of_wheels(unit: str, basis: Callable[[AskedMotion, Knots, int], Signal], en
 
 LEVEL = "level"
 """The one group that is no curve: beside others it takes back what fitted gains and trim have taken of theirs."""
+
+
+def _of_place(unit: str, axes: slice) -> Group:
+    """Curves over where the robot is."""
+    channels = {
+        "forward": Channel("forward", "of the speed", lambda a, k: floor_map(a, k, axes) * a.forward[..., None]),
+        "yaw": Channel("yaw", "of the yaw rate", lambda a, k: floor_map(a, k, axes) * a.yaw[..., None]),
+        "veer": Channel("yaw", "rad/m", lambda a, k: floor_map(a, k, axes) * np.abs(a.forward)[..., None]),
+    }
+    return Group(f"{'place' if ',' in unit else 'xy'[axes.start]} on the floor", unit, channels)
+
+
+def _of_tracker(axis: int) -> Group:
+    """Curves over how far a tracker's map is stretched along an axis."""
+    channels = {
+        to: Channel(to, "of the speed", lambda a, k, aside=to == "sideways": stretched(a, k, axis, aside=aside))
+        for to in ("forward", "sideways")
+    }
+    return Group(f"the tracker's {'xy'[axis]}", "m", channels)
+
+
 HEADING, PLACE = "heading", "place"
+OF_PLACE = (PLACE, "x", "y", "tracker_x", "tracker_y")
 """The groups that look at where the robot points, and at where it is."""
 GROUPS: Mapping[str, Group] = MappingProxyType(
     {
@@ -298,20 +329,28 @@ GROUPS: Mapping[str, Group] = MappingProxyType(
                 "sideways_sin": Channel("sideways", "m/s", waves(np.sin)),
                 "veer_cos": Channel("yaw", "rad/m", lambda a, k: waves(np.cos)(a, k) * np.abs(a.forward)[..., None]),
                 "veer_sin": Channel("yaw", "rad/m", lambda a, k: waves(np.sin)(a, k) * np.abs(a.forward)[..., None]),
+                "ahead_cos": Channel(
+                    "forward", "of the speed", lambda a, k: waves(np.cos)(a, k) * a.forward[..., None]
+                ),
+                "ahead_sin": Channel(
+                    "forward", "of the speed", lambda a, k: waves(np.sin)(a, k) * a.forward[..., None]
+                ),
+                "aside_cos": Channel(
+                    "sideways", "of the speed", lambda a, k: waves(np.cos)(a, k) * a.forward[..., None]
+                ),
+                "aside_sin": Channel(
+                    "sideways", "of the speed", lambda a, k: waves(np.sin)(a, k) * a.forward[..., None]
+                ),
                 "yaw_cos": Channel("yaw", "of the yaw rate", lambda a, k: waves(np.cos)(a, k) * a.yaw[..., None]),
                 "yaw_sin": Channel("yaw", "of the yaw rate", lambda a, k: waves(np.sin)(a, k) * a.yaw[..., None]),
             },
             1.0,
         ),
-        PLACE: Group(
-            "place on the floor",
-            "m, m",
-            {
-                "forward": Channel("forward", "of the speed", lambda a, k: floor_map(a, k) * a.forward[..., None]),
-                "yaw": Channel("yaw", "of the yaw rate", lambda a, k: floor_map(a, k) * a.yaw[..., None]),
-                "veer": Channel("yaw", "rad/m", lambda a, k: floor_map(a, k) * a.forward[..., None]),
-            },
-        ),
+        PLACE: _of_place("m, m", slice(None)),
+        "x": _of_place("m", slice(0, 1)),
+        "y": _of_place("m", slice(1, 2)),
+        "tracker_x": _of_tracker(0),
+        "tracker_y": _of_tracker(1),
     }
 )
 """Every group that a learnt effect can have. A map of the floor is 0 where the drives were not. How wheels are turned

@@ -15,7 +15,7 @@ from proxytune.effects.effect import DeadReckoning, FilterContext, Signal, Stage
 from proxytune.effects.features import (
     GROUPS,
     HEADING,
-    PLACE,
+    OF_PLACE,
     AskedMotion,
     Group,
     Knot,
@@ -130,7 +130,7 @@ class Learnt:
         """Add what the curves say."""
         asked, after = self._asked(signal, memory)
         moved = signal + self._added(asked, memory.baseline, of_pose=False)
-        if self._constants(HEADING) or self._constants(PLACE):
+        if self._constants(HEADING) or self._knows_places:
             moved, bearing, spot = self._bent(moved, asked, memory)
             after = after._replace(bearing=bearing, spot=spot)
         return moved, after
@@ -142,7 +142,7 @@ class Learnt:
         bearing, spot, length = memory.bearing, memory.spot, moved.shape[-2]
         turns = any(one.group == HEADING and GROUPS[HEADING].channels[one.channel].to == "yaw" for one in self.curves)
         known = bearing.values.shape[-1] - bearing.next >= length or not turns
-        there = not self._constants(PLACE) or spot.known.shape[-2] - spot.next >= length
+        there = not self._knows_places or spot.known.shape[-2] - spot.next >= length
         step, out = length if known and there else 1, []
         for begin in range(0, length, step):
             here = slice(begin, begin + step)
@@ -218,11 +218,15 @@ class Learnt:
     def _added(self, asked: AskedMotion, baseline: float, *, of_pose: bool) -> Signal:
         added = np.zeros((*asked.forward.shape, 3))
         for curve in self.curves:
-            if (curve.group in (HEADING, PLACE)) == of_pose:
+            if (curve.group in (HEADING, *OF_PLACE)) == of_pose:
                 channel = GROUPS[curve.group].channels[curve.channel]
                 amount = channel.basis(asked, curve.knots) @ np.asarray(curve.weights)
                 added += amount[..., None] * _direction(channel.to, baseline)
         return added
+
+    @property
+    def _knows_places(self) -> bool:
+        return any(curve.group in OF_PLACE for curve in self.curves)
 
     def _constants(self, group: str) -> Knots:
         """The knots of a group, none where the effect has no such group."""

@@ -13,6 +13,7 @@ from hypothesis import given, settings, strategies as st
 from proxytune.driving import read_robot
 from proxytune.effects import (
     GROUPS,
+    OF_PLACE,
     FilterContext,
     FittedRange,
     Learnt,
@@ -49,6 +50,10 @@ KNOTS = {
     "other_wheel": (-0.3, 0.2, 0.5),
     "changes": (0.04, 0.2, 1.0),
     "place": ((-0.05, -0.05), (-0.05, 0.05), (0.05, -0.05), (0.05, 0.05), (0.15, 0.05)),
+    "x": (-0.05, 0.05, 0.15),
+    "y": (-0.05, 0.05),
+    "tracker_x": (-0.05, 0.05),
+    "tracker_y": (-0.05, 0.05, 0.15),
 }
 
 
@@ -154,7 +159,7 @@ def test_a_robot_that_has_not_moved_stays_where_it_is(effect):
     np.testing.assert_array_equal(run(effect, np.zeros((600, 3))), 0.0)
 
 
-@pytest.mark.parametrize("group", [group for group in GROUPS if group not in ("heading", "place")])
+@pytest.mark.parametrize("group", [group for group in GROUPS if group not in ("heading", *OF_PLACE)])
 def test_beyond_what_was_seen_what_is_added_is_what_it_was_at_the_edge(group):
     effect, edge = effect_of(group), np.tile((SEEN.forward[1], 0.0, SEEN.yaw[0]), (90, 1))
     beyond = edge * (3.0, 0.0, 2.0)

@@ -286,9 +286,19 @@ def test_what_slows_the_robot_down_again_and_again_is_told():
     assert "as if it stood for 0.3 s every 4.0 s" in note
 
 
-def test_a_map_of_the_floor_is_told_in_words():
-    knots = tuple((x, y) for x in (-0.75, -0.25, 0.25, 0.75) for y in (-0.25, 0.25))
-    curve = LearntCurve("place", "forward", knots, (0.0, 0.01, -0.02, 0.0, -0.5, -0.48, -0.52, -0.5))
+@pytest.mark.parametrize(
+    ("group", "knots", "weights"),
+    [
+        (
+            "place",
+            tuple((x, y) for x in (-0.75, -0.25, 0.25, 0.75) for y in (-0.25, 0.25)),
+            (0.0, 0.01, -0.02, 0.0, -0.5, -0.48, -0.52, -0.5),
+        ),
+        ("x", (-0.75, -0.25, 0.25, 0.75), (0.01, -0.02, -0.49, -0.51)),
+    ],
+)
+def test_a_map_of_the_floor_is_told_in_words(group, knots, weights):
+    curve = LearntCurve(group, "forward", knots, weights)
     theta = learnt_theta(Learnt(FittedRange((0.0, 1.0), (-1.0, 1.0)), (curve,)))
     notes = learnt_notes(Learning(Discrepancy(theta, {"place on the floor": 1.0}, {}, True), (), False))
     assert "slower by 50 % where x > 0 m" in notes[1]

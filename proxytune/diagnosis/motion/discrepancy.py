@@ -38,7 +38,19 @@ from proxytune.diagnosis.motion.prediction import (
 )
 from proxytune.diagnosis.motion.screening import Candidate, candidates
 from proxytune.driving import Robot
-from proxytune.effects import GROUPS, LEVEL, FittedRange, Knots, Learnt, LearntCurve, effect_of, learnt_theta, track_of
+from proxytune.effects import (
+    GROUPS,
+    LEVEL,
+    OF_PLACE,
+    PLACE,
+    FittedRange,
+    Knots,
+    Learnt,
+    LearntCurve,
+    effect_of,
+    learnt_theta,
+    track_of,
+)
 from proxytune.space import Theta
 
 RARE = 0.002
@@ -48,8 +60,9 @@ GRID = (4, 6)
 """Knots of a curve over a wheel's speed, over the yaw rate, over time or use, and over speed and yaw rate together."""
 OTHER_KNOTS = 5
 """Knots of a curve over the other wheel's speed."""
-MESHES_M, MOST_CORNERS = (0.25, 0.5, 1.0, 2.0), 64
-"""Meshes of the lattices of a map of the floor, and how many corners it may have."""
+MESHES_M = (0.25, 0.5, 1.0, 2.0)
+MOST_CORNERS, MOST_ON_AXIS, MOST_OF_TRACKER = 64, 16, 40
+"""Meshes of the lattices of a map of the floor, of curves over x or y, and of a tracker's map; their most corners."""
 SAME_PLACE_M = 1e-3
 """Drives that begin in motion so near to each other did not begin at one place: their frames begin there."""
 TRANSIENTS_S = (0.04, 0.1, 0.25, 0.63, 1.6)
@@ -97,13 +110,18 @@ def offer_curves(drives: Drives, theta: Theta) -> Learnt:
         "use": _steps(float(effort.mean()) * seconds / 60.0),
         "load": LOADS_S,
         "heading": (1.0, 2.0),
-        "place": () if _in_frames_of_their_own(drives) else _lattice(drives.places[used]),
     }
+    if not _in_frames_of_their_own(drives):
+        places = drives.places[used]
+        knots[PLACE] = _lattice(places, MOST_CORNERS)
+        for number, axis in enumerate("xy"):
+            knots[axis] = _lattice(places[:, number : number + 1], MOST_ON_AXIS)
+            knots[f"tracker_{axis}"] = _lattice(places[:, number : number + 1], MOST_OF_TRACKER)
     curves = [
         LearntCurve(group, channel, knots[group], (0.0,) * len(knots[group]))
         for group, kind in GROUPS.items()
         for channel in kind.channels
-        if knots[group]
+        if knots.get(group)
     ]
     return Learnt(FittedRange(_ends(forward), _ends(yaw)), tuple(curves))
 
@@ -114,13 +132,15 @@ def _in_frames_of_their_own(drives: Drives) -> bool:
     return len(begun) > 1 and bool(np.ptp(begun, axis=0).max() < SAME_PLACE_M)
 
 
-def _lattice(places: Floats) -> Knots:
-    """Corners of the meshes that were driven through, of a lattice as fine as so many corners allow."""
+def _lattice(places: Floats, most: int) -> Knots:
+    """Corners of the meshes that were driven through, in the plane or on an axis, as fine as so many corners allow."""
+    axes = places.shape[1]
     for mesh in MESHES_M:
         cells = np.unique(np.floor(places / mesh - 0.5), axis=0)
-        corners = np.unique(np.concatenate([cells + step for step in product((0, 1), repeat=2)]), axis=0)
-        if len(corners) <= MOST_CORNERS:
-            return tuple((float(x), float(y)) for x, y in (mesh * (corners + 0.5)).tolist())
+        corners = np.unique(np.concatenate([cells + step for step in product((0, 1), repeat=axes)]), axis=0)
+        if len(corners) <= most:
+            found = (mesh * (corners + 0.5)).tolist()
+            return tuple((x, y) for x, y in found) if axes == 2 else tuple(x for (x,) in found)
     return ()
 
 
@@ -157,10 +177,8 @@ def _round_knot(value: float) -> float:
 
 RIDGES = (1e-3, 1e-2, 1e-1, 1.0)
 """Pulls towards no curve that are tried, as shares of what an average weight of the group is held by."""
-FIRMEST_ONLY = {"speed_and_turn": 0.1, "place": 0.01}
+FIRMEST_ONLY = {"speed_and_turn": 0.1, PLACE: 0.01}
 """Curves over two signals are never pulled less than this: most of their knots are seldom visited."""
-MAP = "place"
-"""The group with the most weights by far: where the guard refuses curves with it, they are fitted without it."""
 FREE = 1e-6
 """The level is hardly pulled."""
 ROBUST = 1.5
@@ -308,7 +326,8 @@ def fit_discrepancy(drives: Drives, theta: Theta, promises: Callable[[Floats], b
     if blocks < drives.rules.discrepancy_blocks:
         return Discrepancy(held_out=before)
     offer = offer_curves(drives, theta)
-    for curves in (offer.curves, tuple(curve for curve in offer.curves if curve.group != MAP)):
+    # Maps have the most weights by far: where the guard refuses curves with them, they are fitted without.
+    for curves in (offer.curves, tuple(curve for curve in offer.curves if curve.group not in OF_PLACE)):
         learnt, gains, folds = _fit_curves(drives, theta, replace(offer, curves=curves))
         if not gains:
             return Discrepancy(held_out=before)
@@ -319,7 +338,7 @@ def fit_discrepancy(drives: Drives, theta: Theta, promises: Callable[[Floats], b
         total = sum(gains.values())
         share = {GROUPS[group].title: gain / total for group, gain in gains.items()}
         fitted = Discrepancy(learnt, share, guard, _helps(guard, drives.rules), after)
-        if fitted.used or MAP not in gains:
+        if fitted.used or not set(OF_PLACE) & set(gains):
             break
     return fitted
 

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from proxytune.diagnosis import Diagnosis, Findings, Learning, Rules
-from proxytune.effects import GROUPS, HEADING, LEVEL, PLACE, Learnt, LearntCurve, learnt_effect
+from proxytune.effects import GROUPS, HEADING, LEVEL, OF_PLACE, PLACE, Learnt, LearntCurve, learnt_effect
 from proxytune.report.diagnosis.effect_figure import effect_curve
 from proxytune.report.diagnosis.error_figures import error_figure, residual_map, residual_over_time, strayed
 from proxytune.report.figure_style import BLUE, COLUMN, GREY, LIGHT_BLUE, PURPLE, dress, legend_below
@@ -189,7 +189,7 @@ def _draw_learnt(axes: Axes, effect: Learnt, curve: LearntCurve) -> None:
 
 
 def _line(axes: Axes, curve: LearntCurve, factor: float) -> None:
-    """A curve through its knots, and through 0 at 0; what fades is points."""
+    """A curve through its knots, and through 0 at 0 but over places; what fades is points."""
     knots, weights = np.array(curve.knots), factor * np.array(curve.weights)
     if curve.group in FADING:
         axes.set_xscale("log")
@@ -198,7 +198,7 @@ def _line(axes: Axes, curve: LearntCurve, factor: float) -> None:
         axes.vlines(knots, 0.0, weights, color=BLUE, lw=1.0)
         axes.plot(knots, weights, "o", color=BLUE, ms=4)
         return
-    if curve.group != HEADING:
+    if curve.group not in (HEADING, *OF_PLACE):
         order = np.argsort(np.append(knots, 0.0))
         knots, weights = np.append(knots, 0.0)[order], np.append(weights, 0.0)[order]
     axes.plot(knots, weights, "-" if curve.group == HEADING else ".-", color=BLUE, lw=1.3, ms=5)

@@ -226,12 +226,15 @@ LEAST_SHARE = 0.05
 
 def _say_map(theta: Theta) -> list[str]:
     """Say on which side of a line along x or y a learnt map slows the robot down or speeds it up."""
-    effect = learnt_effect(theta) if any(f".{PLACE}." in name for name in theta) else None
-    curve = next((c for c in effect.curves if (c.group, c.channel) == (PLACE, "forward")), None) if effect else None
-    if curve is None:
-        return []
-    found, weights = [(0.0, "")], np.array(curve.weights)
-    for axis, places in zip("xy", np.array(curve.knots).T, strict=True):
+    effect = learnt_effect(theta)
+    maps = [one for one in effect.curves if one.group in (PLACE, *"xy") and one.channel == "forward"] if effect else []
+    along = [
+        (axis, places, np.array(curve.weights))
+        for curve in maps
+        for axis, places in zip("xy" if curve.group == PLACE else curve.group, np.c_[curve.knots].T, strict=True)
+    ]
+    found = [(0.0, "")]
+    for axis, places, weights in along:
         lines = np.unique(places)
         for line in (lines[1:] + lines[:-1]) / 2.0:
             for above in (True, False):

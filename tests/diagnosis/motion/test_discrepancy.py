@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from learnt_truth import TURNING, VEERING
 from manoeuvres import make_drives
-from planted import TRUTH, driven_log, drives_of, planted_drives
+from planted import TRUTH, driven_log, drives_of, planted_drives, planted_log
 
 from proxytune.diagnosis import RULES, AdoptedEffect, Findings, Learning, Ratio, cut, pose_errors
 from proxytune.diagnosis.motion import discrepancy
@@ -303,3 +303,25 @@ def test_windows_cut_from_a_drive_each_in_a_frame_of_its_own_get_no_map_of_the_f
     assert is_mapped(at_one_place)
     assert is_mapped(replace(apart, rest=moving))
     assert not is_mapped(replace(at_one_place, rest=moving))
+
+
+@pytest.mark.parametrize(
+    ("tracked", "share"),
+    [
+        (lambda poses: poses * (1.0, 0.8, 1.0), "the tracker's y"),
+        (lambda poses: poses + np.sin(2.0 * poses) * (0.0, 0.0, 0.15), "heading"),
+    ],
+)
+def test_what_a_tracker_does_to_places_and_headings_is_learnt_as_its_own(tracked, share):
+    def moved(log):
+        return replace(log, episodes=tuple(replace(one, poses=tracked(one.poses)) for one in log.episodes))
+
+    fitted, others = (drives_of(moved(planted_log(TRUTH, seed=seed, episodes=4, seconds=30.0))) for seed in (1, 2))
+    learnt = fit_discrepancy(fitted, TRUTH)
+    assert learnt.used
+    assert max(learnt.share, key=lambda title: learnt.share[title]) == share
+    windows = cut(others, 2.0)
+    before, after = (
+        float(np.mean(pose_errors(others, theta, windows)[:, 0] ** 2)) for theta in (TRUTH, {**TRUTH, **learnt.theta})
+    )
+    assert after < 0.5 * before

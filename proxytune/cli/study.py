@@ -45,7 +45,6 @@ from proxytune.study import (
 )
 from proxytune.teaching import PlvSearch, load_setup, most_examinations, search_space
 
-
 MOST_ON_PAGE = 0.02
 """No larger share of a run is spent on its page."""
 

@@ -35,7 +35,7 @@ from proxytune.driving.expert import Pupil
 from proxytune.driving.optics import joined
 from proxytune.driving.plants import Drivetrain, PlanarFleet, PlanarPlant, Plant
 from proxytune.driving.robot import Robot
-from proxytune.effects import DRIVES, Chain, Effect, FilterContext, Learnt, Memory, Signal, Stage, Trace
+from proxytune.effects import DRIVES, Chain, Effect, FilterContext, Learnt, LearntCommands, Memory, Signal, Stage, Trace
 from proxytune.errors import EpisodeError
 from proxytune.space import Parameter
 
@@ -89,7 +89,7 @@ def fleet_at(plant: str, robot: Robot, starts: Signal) -> Iterator[Fleet]:
         yield Plants([stack.enter_context(plant_at(plant, robot, start)) for start in starts])
 
 
-_OURS = frozenset((*(effect for effects in DRIVES.values() for effect in effects.values()), Learnt))
+_OURS = frozenset((*(effect for effects in DRIVES.values() for effect in effects.values()), Learnt, LearntCommands))
 """Effects that do to each robot of a batch, to the bit, what they do to one, unless they draw."""
 
 

@@ -13,6 +13,7 @@ from .catalogue import (
     problems as problems,
     theta_names as theta_names,
 )
+from .commanded import COMMAND_GROUPS as COMMAND_GROUPS, GROUPS as GROUPS, LearntCommands as LearntCommands
 from .effect import (
     CHANNELS as CHANNELS,
     TURN as TURN,
@@ -31,18 +32,17 @@ from .effect import (
     WheelCurve as WheelCurve,
 )
 from .features import (
-    GROUPS as GROUPS,
     HEADING as HEADING,
     LEVEL as LEVEL,
     OF_PLACE as OF_PLACE,
     PLACE as PLACE,
     Knots as Knots,
+    LearntCurve as LearntCurve,
 )
 from .image import Blur as Blur, RollingShutter as RollingShutter
 from .learnt import (
     FittedRange as FittedRange,
     Learnt as Learnt,
-    LearntCurve as LearntCurve,
     is_learnt as is_learnt,
     learnt_effect as learnt_effect,
     learnt_theta as learnt_theta,

@@ -363,7 +363,7 @@ SHIPPED = Catalogue()
 def effects_from(theta: Theta, nominal: Mapping[str, float], catalogue: Catalogue = SHIPPED) -> tuple[Effect, ...]:
     """The effects that θ names, in the catalogue's order; parameters of theirs that it leaves out are neutral.
 
-    What was learnt comes last: it looks at the motion that all named effects ask for.
+    What was learnt comes last: it looks at commands, and at the motion, as all named effects make them.
 
     Raises:
         SettingsError: If a name is not a parameter of the catalogue, its value is out of bounds, or it is left out and
@@ -382,7 +382,7 @@ def effects_from(theta: Theta, nominal: Mapping[str, float], catalogue: Catalogu
             pairs = zip(names, effect.parameters, strict=True)
             chosen.append(effect(*(_value(name, parameter, theta, nominal) for name, parameter in pairs)))
     learnt = learnt_effect(theta)
-    return tuple(chosen) if learnt is None else (*chosen, learnt)
+    return tuple(chosen) if learnt is None else (*chosen, *learnt.parts)
 
 
 def _value(name: str, parameter: Parameter, theta: Theta, nominal: Mapping[str, float]) -> float:

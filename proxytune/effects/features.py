@@ -1,12 +1,12 @@
 """Causal features of the motion that is asked for, in groups: what curves of unnamed motion are fitted over.
 
-`AskedMotion` is that motion with its past. A group of `GROUPS` names the signal, and for each channel of the body or of
-a wheel the basis functions over it, each 0 where the robot stands. The filters that make the past come last.
+`AskedMotion` is that motion with its past. A group of `MOTION_GROUPS` names the signal, and for each channel of the
+body or of a wheel the basis functions over it, each 0 where the robot stands. The filters that make the past come last.
 """
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -89,7 +89,7 @@ def stretched(asked: AskedMotion, knots: Knots, axis: int, *, aside: bool) -> Si
     if axis:
         to_axis, from_side = -from_side, to_axis
     added = to_axis * (from_side if aside else to_axis) * asked.forward
-    return floor_map(asked, knots, slice(axis, axis + 1)) * added[..., None]
+    return np.asarray(floor_map(asked, knots, slice(axis, axis + 1)) * added[..., None])
 
 
 def sign(asked: AskedMotion, wheel: int) -> Signal:
@@ -159,11 +159,20 @@ def waves(wave: Callable[[Signal], Signal]) -> Callable[[AskedMotion, Knots], Si
 
 
 class Channel(NamedTuple):
-    """Target of a group's curves: to the body's `forward`, `sideways` or `yaw`, or to the `left` or `right` wheel."""
+    """What curves add to: the body's `forward`, `sideways` or `yaw`, the `left` or `right` wheel, or either `duty`."""
 
     to: str
     unit: str
-    basis: Callable[[AskedMotion, Knots], Signal]
+    basis: Callable[[Any, Knots], Signal]
+
+
+class LearntCurve(NamedTuple):
+    """One channel of one group: a weight for each of its knots, in their order."""
+
+    group: str
+    channel: str
+    knots: Knots
+    weights: tuple[float, ...]
 
 
 class Group(NamedTuple):
@@ -207,8 +216,8 @@ def _of_place(unit: str, axes: slice) -> Group:
 def _of_tracker(axis: int) -> Group:
     """Curves over how far a tracker's map is stretched along an axis."""
     channels = {
-        to: Channel(to, "of the speed", lambda a, k, aside=to == "sideways": stretched(a, k, axis, aside=aside))
-        for to in ("forward", "sideways")
+        "forward": Channel("forward", "of the speed", lambda a, k: stretched(a, k, axis, aside=False)),
+        "sideways": Channel("sideways", "of the speed", lambda a, k: stretched(a, k, axis, aside=True)),
     }
     return Group(f"the tracker's {'xy'[axis]}", "m", channels)
 
@@ -216,7 +225,7 @@ def _of_tracker(axis: int) -> Group:
 HEADING, PLACE = "heading", "place"
 OF_PLACE = (PLACE, "x", "y", "tracker_x", "tracker_y")
 """The groups that look at where the robot points, and at where it is."""
-GROUPS: Mapping[str, Group] = MappingProxyType(
+MOTION_GROUPS: Mapping[str, Group] = MappingProxyType(
     {
         LEVEL: Group("level", "at all speeds", _of_wheels("of its speed", level), 1e-3),
         "wheel_speed": Group("wheel speed", "m/s", _of_wheels("m/s", lambda a, k, wheel: hats(a.wheels[wheel], k))),
@@ -248,6 +257,8 @@ GROUPS: Mapping[str, Group] = MappingProxyType(
                 **_of_wheels("of the change", lambda a, k, wheel: a.bands[wheel]),
                 **_of_wheels("of the change", slowing, "_slowing"),
                 **_of_wheels("of the change", stopping, "_stopping"),
+                "sideways": Channel("sideways", "of the change", lambda a, k: a.bands.mean(axis=0)),
+                "veer": Channel("yaw", "rad/m", lambda a, k: a.bands.mean(axis=0)),
             },
             1e-3,
         ),
@@ -353,8 +364,8 @@ GROUPS: Mapping[str, Group] = MappingProxyType(
         "tracker_y": _of_tracker(1),
     }
 )
-"""Every group that a learnt effect can have. A map of the floor is 0 where the drives were not. How wheels are turned
-is no group: a study's start at another angle."""
+"""Every group over the motion that is asked for. A map of the floor is 0 where the drives were not. How wheels are
+turned is no group: a study's start at another angle."""
 DAMPING = 0.25
 """Of the swings, as a share of critical damping."""
 

@@ -11,15 +11,17 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from proxytune.effects.commanded import GROUPS, LearntCommands
 from proxytune.effects.effect import DeadReckoning, FilterContext, Signal, Stage, Trace, reckon, start_reckoning
 from proxytune.effects.features import (
-    GROUPS,
     HEADING,
+    MOTION_GROUPS,
     OF_PLACE,
     AskedMotion,
     Group,
     Knot,
     Knots,
+    LearntCurve,
     low_passes,
     moved_since,
     play,
@@ -30,15 +32,6 @@ from proxytune.effects.motion import REST_SPEED, PoseReckoning, pose_after, star
 from proxytune.errors import SettingsError
 from proxytune.settings import Section, nearest
 from proxytune.space import Parameter, Theta
-
-
-class LearntCurve(NamedTuple):
-    """One channel of one group: a weight for each of its knots, in their order."""
-
-    group: str
-    channel: str
-    knots: Knots
-    weights: tuple[float, ...]
 
 
 class FittedRange(NamedTuple):
@@ -96,7 +89,8 @@ def track_of(nominal: Mapping[str, float]) -> float:
 class Learnt:
     """Adds to the twist the sum of curves over features of the twist that is asked for.
 
-    It vanishes where the robot stands, and beyond what the fit saw it is what it is at the edge.
+    It vanishes where the robot stands, and beyond what the fit saw it is what it is at the edge. Curves over commands
+    are no motion: `commands` are an effect of their own.
     """
 
     seen: FittedRange
@@ -105,6 +99,20 @@ class Learnt:
     stage: ClassVar[Stage] = Stage.MOTION
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     trace: ClassVar[Trace | None] = None
+
+    @property
+    def commands(self) -> LearntCommands:
+        """The effect of the curves over commands."""
+        return LearntCommands(tuple(curve for curve in self.curves if curve.group not in MOTION_GROUPS))
+
+    @property
+    def parts(self) -> tuple["LearntCommands | Learnt", ...]:
+        """The effects that it takes: one that has no curves is none."""
+        return (*([self.commands] if self.commands.curves else []), *([self] if self._of_motion else []))
+
+    @property
+    def _of_motion(self) -> list[LearntCurve]:
+        return [curve for curve in self.curves if curve.group in MOTION_GROUPS]
 
     def begin(self, context: FilterContext) -> LearntState:
         """At rest, unused."""
@@ -140,7 +148,8 @@ class Learnt:
     ) -> tuple[Signal, DeadReckoning, PoseReckoning]:
         """The motion with what depends on the pose: sample by sample where that leads to another pose."""
         bearing, spot, length = memory.bearing, memory.spot, moved.shape[-2]
-        turns = any(one.group == HEADING and GROUPS[HEADING].channels[one.channel].to == "yaw" for one in self.curves)
+        headings = MOTION_GROUPS[HEADING].channels
+        turns = any(one.group == HEADING and headings[one.channel].to == "yaw" for one in self.curves)
         known = bearing.values.shape[-1] - bearing.next >= length or not turns
         there = not self._knows_places or spot.known.shape[-2] - spot.next >= length
         step, out = length if known and there else 1, []
@@ -202,7 +211,7 @@ class Learnt:
         asked, _ = self._asked(signal, memory)
         course, _ = reckon(signal[..., 2], memory.bearing)
         asked = asked._replace(heading=course, place=self._places(signal, course, memory.spot))
-        channels = [(curve, GROUPS[curve.group].channels[curve.channel]) for curve in self.curves]
+        channels = [(curve, MOTION_GROUPS[curve.group].channels[curve.channel]) for curve in self._of_motion]
         return [(one.basis(asked, curve.knots), _direction(one.to, memory.baseline)) for curve, one in channels]
 
     def _places(self, signal: Signal, course: Signal, spot: PoseReckoning) -> Signal:
@@ -217,9 +226,9 @@ class Learnt:
 
     def _added(self, asked: AskedMotion, baseline: float, *, of_pose: bool) -> Signal:
         added = np.zeros((*asked.forward.shape, 3))
-        for curve in self.curves:
+        for curve in self._of_motion:
             if (curve.group in (HEADING, *OF_PLACE)) == of_pose:
-                channel = GROUPS[curve.group].channels[curve.channel]
+                channel = MOTION_GROUPS[curve.group].channels[curve.channel]
                 amount = channel.basis(asked, curve.knots) @ np.asarray(curve.weights)
                 added += amount[..., None] * _direction(channel.to, baseline)
         return added

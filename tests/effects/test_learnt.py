@@ -17,6 +17,7 @@ from proxytune.effects import (
     FilterContext,
     FittedRange,
     Learnt,
+    LearntCommands,
     LearntCurve,
     Model,
     effects_from,
@@ -25,6 +26,7 @@ from proxytune.effects import (
     model_text,
     read_model,
 )
+from proxytune.effects.features import MOTION_GROUPS
 from proxytune.effects.learnt import LABEL
 from proxytune.effects.motion import pose_after
 from proxytune.errors import SettingsError
@@ -67,8 +69,8 @@ def effect_of(*groups, size=0.3, seed=3):
     return Learnt(SEEN, tuple(curves))
 
 
-ALL = effect_of(*GROUPS)
-EFFECTS = [pytest.param(effect_of(group), id=group) for group in GROUPS] + [pytest.param(ALL, id="all")]
+ALL = effect_of(*MOTION_GROUPS)
+EFFECTS = [pytest.param(effect_of(group), id=group) for group in MOTION_GROUPS] + [pytest.param(ALL, id="all")]
 
 
 def a_signal(seed, length=90):
@@ -159,7 +161,7 @@ def test_a_robot_that_has_not_moved_stays_where_it_is(effect):
     np.testing.assert_array_equal(run(effect, np.zeros((600, 3))), 0.0)
 
 
-@pytest.mark.parametrize("group", [group for group in GROUPS if group not in ("heading", *OF_PLACE)])
+@pytest.mark.parametrize("group", [group for group in MOTION_GROUPS if group not in ("heading", *OF_PLACE)])
 def test_beyond_what_was_seen_what_is_added_is_what_it_was_at_the_edge(group):
     effect, edge = effect_of(group), np.tile((SEEN.forward[1], 0.0, SEEN.yaw[0]), (90, 1))
     beyond = edge * (3.0, 0.0, 2.0)
@@ -186,6 +188,16 @@ def test_features_times_weights_are_what_is_added_where_headings_are_known(effec
         for (basis, unit), curve in zip(parts, effect.curves, strict=True)
     )
     np.testing.assert_allclose(effect.apply(signal, memory)[0] - signal, total, rtol=0, atol=1e-12)
+
+
+def test_curves_over_commands_are_an_effect_of_their_own_which_motion_passes_by():
+    both = Learnt(SEEN, (*effect_of("time").curves, LearntCurve("duty", "duty", (0.5,), (0.1,))))
+    effects = effects_from(learnt_theta(both), ROBOT.figures)
+    assert [type(effect) for effect in effects] == [LearntCommands, Learnt]
+    assert [curve.group for curve in effects[0].curves] == ["duty"]
+    np.testing.assert_array_equal(run(effects[1], a_signal(2)), run(effect_of("time"), a_signal(2)))
+    alone = effects_from(learnt_theta(Learnt(SEEN, both.curves[-1:])), ROBOT.figures)
+    assert [type(effect) for effect in alone] == [LearntCommands]
 
 
 @pytest.mark.parametrize("effect", EFFECTS)

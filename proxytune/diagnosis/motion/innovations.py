@@ -48,6 +48,8 @@ SMALLEST, LARGEST = 1e-6, 3.0
 """Noise lies between these, each value in its own unit."""
 STEP = 1e-4
 """Finite differences step by this in the logarithm of a value of the noise."""
+SMALL_DUTY = 0.02
+"""What a unit of a learnt curve adds to commands is replayed with so much of it."""
 HUBER = 3.0
 """Innovations beyond so many standard deviations count linearly."""
 
@@ -303,8 +305,8 @@ def window_twists(drives: Drives, theta: Theta, begin: Whole, length: int) -> Fl
     return _window_twists(drives, _model(drives, theta)[0], begin, length)
 
 
-def _window_twists(drives: Drives, train: Drivetrain, begin: Whole, length: int) -> Floats:
-    whole, wheels = _window_wheels(drives, train, begin, length)
+def _window_twists(drives: Drives, train: Drivetrain, begin: Whole, length: int, added: Floats | float = 0.0) -> Floats:
+    whole, wheels = _window_wheels(drives, train, begin, length, added)
     if not train.motion.effects:
         return train.ideal(wheels)
     asked, driven = train.ideal(whole), replace(_setting(drives), rest=np.zeros((len(whole), 3)))
@@ -315,11 +317,16 @@ def _window_twists(drives: Drives, train: Drivetrain, begin: Whole, length: int)
     return np.asarray(train.motion.apply(train.ideal(wheels), past)[0])
 
 
-def _window_wheels(drives: Drives, train: Drivetrain, begin: Whole, length: int) -> tuple[Floats, Floats]:
-    """Wheel speeds in whole drives (E, T, 2), and in windows (W, length, 2), there from measured ones on if any are."""
+def _window_wheels(
+    drives: Drives, train: Drivetrain, begin: Whole, length: int, added: Floats | float
+) -> tuple[Floats, Floats]:
+    """Wheel speeds in whole drives (E, T, 2), and in windows (W, length, 2), there from measured ones on if any are.
+
+    Something may be added to the commands that arrive (E, T, 2).
+    """
     setting = _setting(drives)
     memory = train.begin(setting)
-    arrived = train.within_range(train.command.apply(drives.duties, memory.command)[0])
+    arrived = train.within_range(train.command.apply(drives.duties, memory.command)[0] + added)
     episode, start = drives.episode[begin], drives.first[begin]
     ticks = np.minimum(start[:, None] + np.arange(length), arrived.shape[1] - 1)
     whole = train.actuation.apply(arrived, memory.actuation)[0]
@@ -331,14 +338,24 @@ def _window_wheels(drives: Drives, train: Drivetrain, begin: Whole, length: int)
 
 def window_features(
     drives: Drives, theta: Theta, learnt: Learnt, begin: Whole, length: int
-) -> list[tuple[Floats, Floats]]:
+) -> list[list[tuple[Floats, Floats]]]:
     """Motion that each weight of a learnt effect beside a model adds in such windows, curve by curve.
 
-    That is features (W, length, knots), and the twist that one unit of them makes (3,).
+    That is features (W, length, knots), and the twist that one unit of them makes (3,), of which a curve may have some.
     """
     whole = twists_of(drives, theta)
     past = learnt.recall(_window_setting(drives, begin, whole), whole, drives.episode[begin], drives.first[begin])
-    return learnt.features(window_twists(drives, theta, begin, length), past)
+    of_motion = [[one] for one in learnt.features(window_twists(drives, theta, begin, length), past)]
+    train, _ = _model(drives, theta)
+    setting = _setting(drives)
+    arrived, _ = train.command.apply(drives.duties, train.command.begin(setting))
+    asked = _window_twists(drives, train, begin, length)
+    of_commands = []
+    for features in learnt.commands.features(arrived, learnt.commands.begin(setting)):
+        columns = [SMALL_DUTY * column for column in np.moveaxis(features, -1, 0)]
+        moved = np.stack([_window_twists(drives, train, begin, length, one) - asked for one in columns], axis=-1)
+        of_commands.append([(moved[..., n, :] / SMALL_DUTY, unit) for n, unit in enumerate(np.eye(3))])
+    return of_motion + of_commands
 
 
 def tracked_paths(drives: Drives, theta: Theta, twists: Floats) -> Floats:

@@ -400,11 +400,16 @@ def slopes_of(drives: Drives, theta: Theta, offered: Learnt) -> Slopes:
 
 
 def _pose_slopes(
-    twists: Floats, walked: Floats, features: Sequence[tuple[Floats, Floats]], at: tuple[Whole, Whole], tick_s: float
+    twists: Floats,
+    walked: Floats,
+    features: Sequence[Sequence[tuple[Floats, Floats]]],
+    at: tuple[Whole, Whole],
+    tick_s: float,
 ) -> Floats:
     """Change of compared poses (M, 3, weights) per weight of the curves, to first order; places as complex numbers.
 
-    Features are what each weight adds in a tick, and its unit, a twist; `at` is the window and tick of each pose.
+    Features are what each weight of a curve adds in a tick, and its unit, a twist, part by part; `at` is the window and
+    tick of each pose.
     """
     poses = integrate_twists(twists, tick_s)
     cosine, sine = cosine_and_sine(poses[:, 1:, 2] - twists[..., 2] * (tick_s / 2.0))
@@ -412,13 +417,14 @@ def _pose_slopes(
     # The way of 1 m/s within a tick; how far a turn of 1 rad/s in it moves places, less what a turn after it moves.
     along, about = (cosine + 1j * sine) * tick_s, (axle[..., 1] - 1j * axle[..., 0]) * tick_s
     after = 1j * walked[:, 1:, 0] - walked[:, 1:, 1]
-    parts = []
-    for basis, unit in features:
+
+    def change(basis: Floats, unit: Floats) -> Floats:
         place = (unit[0] + 1j * unit[1]) * along + unit[2] * about
         turned = np.cumsum(basis, axis=1)[at] * (unit[2] * tick_s)
         moved = np.cumsum(place[..., None] * basis, axis=1)[at] + after[at][:, None] * turned
-        parts.append(np.stack((moved.real, moved.imag, turned), axis=1))
-    return np.concatenate(parts, axis=-1)
+        return np.stack((moved.real, moved.imag, turned), axis=1)
+
+    return np.concatenate([sum(change(basis, unit) for basis, unit in parts) for parts in features], axis=-1)
 
 
 FEWEST = 20

@@ -226,12 +226,17 @@ LEAST_SHARE = 0.05
 
 def _say_map(theta: Theta) -> list[str]:
     """Say on which side of a line along x or y a learnt map slows the robot down or speeds it up."""
-    effect = learnt_effect(theta)
-    maps = [one for one in effect.curves if one.group in (PLACE, *"xy") and one.channel == "forward"] if effect else []
+    mapped = (PLACE, "x", "y")
+    effect = learnt_effect(theta) if any(f".{group}.forward@" in name for name in theta for group in mapped) else None
     along = [
         (axis, places, np.array(curve.weights))
-        for curve in maps
-        for axis, places in zip("xy" if curve.group == PLACE else curve.group, np.c_[curve.knots].T, strict=True)
+        for curve in (effect.curves if effect else ())
+        if curve.group in mapped and curve.channel == "forward"
+        for axis, places in zip(
+            "xy" if curve.group == PLACE else curve.group,
+            np.reshape(curve.knots, (len(curve.knots), -1)).T,
+            strict=True,
+        )
     ]
     found = [(0.0, "")]
     for axis, places, weights in along:

@@ -1,0 +1,201 @@
+"""Curves over commands and their past: what a driver, a receiver or a supply does to them that has no name.
+
+`LearntCommands` is the effect, beside `Learnt`, which looks at motion; both wheels are treated alike. `COMMAND_GROUPS`
+are its signals, each a function of the duties that reach the motors and of what was commanded before.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from proxytune.effects.effect import FilterContext, Signal, Stage, Trace
+from proxytune.effects.features import MOTION_GROUPS, Channel, Group, Knots, LearntCurve, hats, low_passes, play
+from proxytune.space import Parameter
+
+STILL = 0.02
+"""A duty smaller than this moves no wheel."""
+SAME = 1e-9
+"""Duties that differ by less are the same."""
+LONG_S = 1e6
+"""Before the start the resting command had been given for so long."""
+
+
+class Commands(NamedTuple):
+    """Duties and their past, wheel by wheel (…, time, 2) where nothing else is said.
+
+    Attributes:
+        duty: The duties that reach the motors.
+        seconds: Since the start [s].
+        held: Since either of them last changed [s].
+        begun: Since each last was still [s].
+        turned: Since each last took the other sign [s].
+        dragged: Each through plays of some widths (…, time, 2, widths).
+        slow: Low-passes of each (…, time, 2, time constants).
+    """
+
+    duty: Signal
+    seconds: Signal
+    held: Signal
+    begun: Signal
+    turned: Signal
+    dragged: Signal
+    slow: Signal
+
+
+class CommandState(NamedTuple):
+    """The past of the next chunk: as `Commands` has it, without the time, and the sign of each wheel's last motion."""
+
+    duty: Signal
+    sign: Signal
+    seconds: Signal
+    held: Signal
+    begun: Signal
+    turned: Signal
+    dragged: Signal
+    slow: Signal
+    rate_hz: float
+
+
+def _within(seconds: Signal, knots: Knots) -> Signal:
+    """1 until so long has passed, then 0 (…, knots)."""
+    return (seconds[..., None] < np.asarray(knots)).astype(float)
+
+
+def _moving(commands: Commands) -> Signal:
+    return np.minimum(1.0, np.abs(commands.duty) / STILL)[..., None]
+
+
+def _group(title: str, unit: str, low: float | None = 1e-3, **bases: Callable[[Commands, Knots], Signal]) -> Group:
+    """Curves that add to the duty of either wheel."""
+    return Group(title, unit, {name: Channel("duty", "duty", basis) for name, basis in bases.items()}, low)
+
+
+COMMAND_GROUPS: Mapping[str, Group] = MappingProxyType(
+    {
+        "duty": _group(
+            "size of the command",
+            "duty",
+            duty=lambda c, k: np.sign(c.duty)[..., None] * hats(np.abs(c.duty), k),
+        ),
+        "drawn": _group(
+            "sum of both commands",
+            "duty",
+            duty=lambda c, k: c.duty[..., None] * hats(np.abs(c.duty).sum(axis=-1, keepdims=True), k),
+        ),
+        "held": _group(
+            "time since a command changed",
+            "s",
+            duty=lambda c, k: c.duty[..., None] * (1.0 - _within(c.held, k)),
+        ),
+        "begun": _group(
+            "time since a command began",
+            "s",
+            share=lambda c, k: c.duty[..., None] * _within(c.begun, k),
+            push=lambda c, k: np.sign(c.duty)[..., None] * _moving(c) * _within(c.begun, k),
+        ),
+        "turned": _group(
+            "time since a command turned round",
+            "s",
+            duty=lambda c, k: c.duty[..., None] * _within(c.turned, k),
+        ),
+        "dragged": _group(
+            "way in which a command changes",
+            "duty",
+            duty=lambda c, k: c.dragged - c.duty[..., None],
+        ),
+        "clock": _group(
+            "time since the start",
+            "s",
+            duty=lambda c, k: c.duty[..., None] * hats(c.seconds, k),
+        ),
+        "ended": _group(
+            "time since a command ended",
+            "s",
+            duty=lambda c, k: c.slow * (np.abs(c.duty) < STILL)[..., None],
+        ),
+    }
+)
+"""Every group over commands. All are 0 where a command has been 0 from the start on."""
+GROUPS: Mapping[str, Group] = MappingProxyType({**MOTION_GROUPS, **COMMAND_GROUPS})
+"""Every group that a learnt effect can have."""
+
+
+@dataclass(frozen=True)
+class LearntCommands:
+    """Adds to each duty the sum of curves over the duties and their past: weight · feature. It is not physics."""
+
+    curves: tuple[LearntCurve, ...]
+    name: ClassVar[str] = "learnt"
+    stage: ClassVar[Stage] = Stage.COMMAND
+    parameters: ClassVar[tuple[Parameter, ...]] = ()
+    trace: ClassVar[Trace | None] = None
+
+    def begin(self, context: FilterContext) -> CommandState:
+        """The resting command has been given for ever."""
+        rest = np.asarray(context.rest, dtype=float)
+        long, begun = np.full(rest.shape, LONG_S), np.where(np.abs(rest) < STILL, 0.0, LONG_S)
+        dragged, slow = (np.repeat(rest[..., None], len(self._knots(name)), axis=-1) for name in ("dragged", "ended"))
+        return CommandState(
+            rest, np.sign(rest), np.zeros(rest.shape), long, begun, long, dragged, slow, context.rate_hz
+        )
+
+    def apply(self, signal: Signal, memory: CommandState) -> tuple[Signal, CommandState]:
+        """Add what the curves say."""
+        commands, after = self._recall(signal, memory)
+        added = sum(_basis(curve)(commands, curve.knots) @ np.asarray(curve.weights) for curve in self.curves)
+        return signal + added, after
+
+    def features(self, signal: Signal, memory: CommandState) -> list[Signal]:
+        """Features that weights scale, curve by curve (…, time, 2, knots)."""
+        commands, _ = self._recall(signal, memory)
+        return [_basis(curve)(commands, curve.knots) for curve in self.curves]
+
+    def _knots(self, group: str) -> Knots:
+        return next((curve.knots for curve in self.curves if curve.group == group), ())
+
+    def _recall(self, signal: Signal, past: CommandState) -> tuple[Commands, CommandState]:
+        """Duties with their past, and the past of the next chunk."""
+
+        def since(event: Signal, before: Signal) -> Signal:
+            """Time since an event (…, time, 2) [s], 0 while there is one."""
+            number = np.arange(1.0, signal.shape[-2] + 1.0)[:, None]
+            newest = np.maximum.accumulate(np.where(event, number, -before[..., None, :] * past.rate_hz), axis=-2)
+            return np.asarray((number - newest) / past.rate_hz)
+
+        before = np.concatenate((past.duty[..., None, :], signal), axis=-2)
+        changed = (np.abs(np.diff(before, axis=-2)) > SAME).any(axis=-1, keepdims=True)
+        signs = np.concatenate((past.sign[..., None, :], np.sign(signal)), axis=-2)
+        place = np.arange(signs.shape[-2])[:, None]
+        last = np.maximum.accumulate(np.where(signs != 0.0, place, 0), axis=-2)
+        course = np.take_along_axis(signs, last, axis=-2)
+        wheels = np.moveaxis(signal, -2, -1)
+        dragged = np.moveaxis(play(wheels, past.dragged, self._knots("dragged")), -2, -3)
+        slow = np.moveaxis(low_passes(wheels, past.slow, self._knots("ended"), past.rate_hz), -2, -3)
+        commands = Commands(
+            duty=signal,
+            seconds=past.seconds[..., None, :] + np.arange(1.0, signal.shape[-2] + 1.0)[:, None] / past.rate_hz,
+            held=since(np.broadcast_to(changed, signal.shape), past.held),
+            begun=since(np.abs(signal) < STILL, past.begun),
+            turned=since(np.diff(course, axis=-2) * course[..., :-1, :] != 0.0, past.turned),
+            dragged=dragged,
+            slow=slow,
+        )
+        after = CommandState(
+            duty=signal[..., -1, :],
+            sign=course[..., -1, :],
+            seconds=commands.seconds[..., -1, :],
+            held=commands.held[..., -1, :],
+            begun=commands.begun[..., -1, :],
+            turned=commands.turned[..., -1, :],
+            dragged=dragged[..., -1, :, :],
+            slow=slow[..., -1, :, :],
+            rate_hz=past.rate_hz,
+        )
+        return commands, after
+
+
+def _basis(curve: LearntCurve) -> Callable[[Commands, Knots], Signal]:
+    return COMMAND_GROUPS[curve.group].channels[curve.channel].basis

@@ -1,0 +1,151 @@
+"""Curves over commands: each sees what its group says, whatever a signal is cut into."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from proxytune.driving import read_robot
+from proxytune.effects import COMMAND_GROUPS, FilterContext, LearntCommands, LearntCurve
+
+FIGURES = read_robot("duckiebot").figures
+RATE_HZ = 20.0
+KNOTS = {
+    "duty": (0.2, 0.5, 1.0),
+    "drawn": (0.5, 1.0, 2.0),
+    "held": (0.3, 1.0),
+    "begun": (0.15, 0.4),
+    "turned": (0.2, 0.5),
+    "dragged": (0.05, 0.2),
+    "clock": (0.5, 1.5),
+    "ended": (0.1, 0.4),
+}
+
+
+def effect_of(*groups):
+    random = np.random.default_rng(3)
+    return LearntCommands(
+        tuple(
+            LearntCurve(group, channel, KNOTS[group], tuple(random.uniform(0.1, 0.3, len(KNOTS[group]))))
+            for group in groups
+            for channel in COMMAND_GROUPS[group].channels
+        )
+    )
+
+
+EFFECTS = [pytest.param(effect_of(group), id=group) for group in COMMAND_GROUPS]
+EFFECTS.append(pytest.param(effect_of(*COMMAND_GROUPS), id="all"))
+
+
+def commands(seed, length=80):
+    """Held, reversed, ended and begun again."""
+    random = np.random.default_rng(seed)
+    steps = random.choice((-0.7, -0.3, 0.0, 0.0, 0.4, 0.9), (length // 8, 2))
+    return np.repeat(steps, 8, axis=0)
+
+
+def run(effect, signal, cuts=()):
+    memory, out = effect.begin(FilterContext(RATE_HZ, np.zeros((*signal.shape[:-2], 2)), FIGURES)), []
+    for chunk in np.split(signal, sorted(cuts), axis=-2):
+        if chunk.shape[-2]:
+            moved, memory = effect.apply(chunk, memory)
+            out.append(moved)
+    return np.concatenate(out, axis=-2)
+
+
+def added(curve, signal):
+    return run(LearntCommands((curve,)), signal) - signal
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_every_group_changes_commands(effect):
+    assert np.abs(run(effect, commands(1)) - commands(1)).max() > 1e-3
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+@given(cuts=st.lists(st.integers(1, 79), max_size=6), seed=st.integers(0, 99))
+@settings(max_examples=8)
+def test_cutting_commands_into_chunks_never_changes_the_result(effect, cuts, seed):
+    np.testing.assert_allclose(run(effect, commands(seed), cuts), run(effect, commands(seed)), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_a_batch_is_filtered_like_its_members_to_the_bit(effect):
+    batch = np.stack([commands(seed) for seed in range(5)])
+    np.testing.assert_array_equal(run(effect, batch), np.stack([run(effect, one) for one in batch]))
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_a_robot_that_was_never_commanded_is_left_alone(effect):
+    np.testing.assert_array_equal(run(effect, np.zeros((200, 2))), 0.0)
+
+
+@pytest.mark.parametrize("group", [group for group in COMMAND_GROUPS if group != "dragged"])
+def test_a_robot_that_is_to_stand_for_long_stands(group):
+    signal = np.concatenate((commands(5), np.zeros((400, 2))))
+    np.testing.assert_allclose(run(effect_of(group), signal)[-20:], 0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_features_times_weights_are_what_is_added(effect):
+    signal = commands(6)[None]
+    memory = effect.begin(FilterContext(RATE_HZ, np.zeros((1, 2)), FIGURES))
+    features = effect.features(signal, memory)
+    total = sum(basis @ np.array(curve.weights) for basis, curve in zip(features, effect.curves, strict=True))
+    np.testing.assert_allclose(run(effect, signal) - signal, total, rtol=0, atol=1e-12)
+
+
+def test_the_size_of_a_command_counts_alike_both_ways():
+    curve = LearntCurve("duty", "duty", (0.4, 0.8), (0.1, -0.1))
+    np.testing.assert_allclose(added(curve, np.array([[0.4, -0.4], [0.2, -0.8]])), [[0.1, -0.1], [0.05, 0.1]])
+
+
+def test_what_both_wheels_draw_together_counts_for_either():
+    curve = LearntCurve("drawn", "duty", (1.0,), (-0.5,))
+    np.testing.assert_allclose(added(curve, np.array([[0.6, 0.4], [0.5, 0.0]])), [[-0.3, -0.2], [-0.125, 0.0]])
+
+
+def test_a_watchdog_counts_from_the_last_change_of_either_wheel():
+    signal = np.tile((0.5, 0.2), (20, 1))
+    signal[6:, 1] = 0.3
+    stopped = added(LearntCurve("held", "duty", (0.25,), (-1.0,)), signal)[:, 0] != 0.0
+    np.testing.assert_array_equal(np.flatnonzero(stopped), [5, *range(11, 20)])
+
+
+def test_a_kick_lasts_so_long_after_a_wheel_began():
+    signal = np.repeat([[0.0, 0.5], [-0.3, 0.5], [0.0, 0.5]], 10, axis=0)
+    kicked = added(LearntCurve("begun", "push", (0.2,), (0.6,)), signal)
+    np.testing.assert_allclose(kicked[10:13, 0], -0.6)
+    assert not kicked[13:, 0].any()
+    assert kicked[0, 1] == pytest.approx(0.6)
+    assert not kicked[5:, 1].any()
+
+
+def test_a_brake_counts_from_the_change_of_sign_though_the_wheel_rested_between():
+    signal = np.repeat([[0.5, 0.5], [0.0, 0.4], [-0.5, 0.3]], 8, axis=0)
+    braked = added(LearntCurve("turned", "duty", (0.2,), (-1.0,)), signal)
+    np.testing.assert_allclose(braked[16:20, 0], 0.5)
+    assert not braked[20:].any()
+    assert not braked[:, 1].any()
+
+
+def test_a_sticky_throttle_is_dragged_along_and_leaves_a_robot_creeping():
+    signal = np.repeat([[0.5, 0.0], [0.0, 0.0]], 5, axis=0)
+    stuck = added(LearntCurve("dragged", "duty", (0.1,), (1.0,)), signal)
+    np.testing.assert_allclose(stuck[:, 0], [-0.1] * 5 + [0.1] * 5)
+    assert not stuck[:, 1].any()
+
+
+def test_a_wheel_rolls_on_for_a_while_after_its_command_ended():
+    signal = np.repeat([[0.5, 0.5], [0.0, 0.5]], 40, axis=0)
+    rolling = added(LearntCurve("ended", "duty", (0.5,), (1.0,)), signal)
+    assert not rolling[:40].any()
+    assert not rolling[:, 1].any()
+    np.testing.assert_allclose(rolling[50, 0] / rolling[40, 0], np.exp(-1.0), rtol=1e-9)
+
+
+def test_what_depends_on_the_time_since_the_start_does_so_for_both_wheels():
+    steady = np.tile((0.4, -0.2), (60, 1))
+    np.testing.assert_allclose(
+        added(LearntCurve("clock", "duty", (1.0, 2.0), (0.5, 0.0)), steady)[[9, 19, 29]],
+        [[0.1, -0.05], [0.2, -0.1], [0.1, -0.05]],
+    )

@@ -10,8 +10,10 @@ and twists, dead-reckoned by the planar plant over whole batches of drives (`inc
 A coordinate of a fit is one or several parameters of θ that share a value, within their range.
 """
 
+import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import ModuleType
 
 import numpy as np
 from scipy.linalg import LinAlgError, cholesky_banded
@@ -157,6 +159,16 @@ def log_likelihood(errors: Floats, whiten: Whitener) -> float:
     return -float(huber(whiten.whiten(errors)).sum() + np.log(whiten.factor[0]).sum())
 
 
+@functools.cache
+def _by_numba() -> ModuleType | None:
+    """The inner loops, compiled: a diagnosis pays for loading them many times over, a prediction would not."""
+    try:
+        from proxytune.diagnosis.motion import compiled
+    except Exception:  # Numba is not installed, does not know this NumPy, or finds no place for what it compiles
+        return None
+    return compiled
+
+
 def fit_noise(drives: Drives, errors: Floats, start: Noise) -> Noise:
     """The noise under which errors (N, 3) are likeliest, looked for from `start` and from FIRST_GUESS.
 
@@ -176,13 +188,19 @@ def _fit_noise(drives: Drives, errors: Floats, start: Noise) -> tuple[float, Noi
     scale = np.concatenate((start.drive, start.pose))
     lowest, highest = np.log(SMALLEST / scale), np.log(LARGEST / scale)
     parts = np.stack([_covariance(drives, unit) for unit in np.eye(5)])
-
-    def negative_log_likelihood(logs: Floats) -> float:
-        return -log_likelihood(errors, _factor(np.square(scale * np.exp(logs)) @ parts)) / len(errors)
+    compiled = _by_numba()
 
     def with_slope(logs: Floats) -> tuple[float, Floats]:
-        here, steps = negative_log_likelihood(logs), np.where(logs + STEP <= highest, STEP, -STEP)
-        return here, np.array([negative_log_likelihood(moved) - here for moved in logs + np.diag(steps)]) / steps
+        steps = np.where(logs + STEP <= highest, STEP, -STEP)
+        covariances = np.square(scale * np.exp(logs + np.vstack((np.zeros(5), np.diag(steps))))) @ parts
+        if compiled:
+            bands = covariances.reshape(len(covariances), BAND, -1, 3)
+            bands[:, 0] += JITTER
+            losses = [compiled.loss(band, errors, HUBER) for band in bands]
+        else:
+            losses = [-log_likelihood(errors, _factor(covariance)) for covariance in covariances]
+        here, *moved = np.array(losses) / len(errors)
+        return here, (moved - here) / steps
 
     bounds = list(zip(lowest, highest, strict=True))
     found = minimize(
@@ -196,8 +214,10 @@ def integrate_twists(twists: Floats, tick_s: float) -> Floats:
     """Dead-reckon planar poses (…, time + 1, 3) from body twists held for a tick each; headings are unwrapped.
 
     They are those of the planar plant but for rounding. Episodes are driven by the plant itself: they stay what they
-    were to the last bit.
+    were to the last bit. The compiled way gives the same bits: it is taken once noise has been fitted.
     """
+    if _by_numba.cache_info().currsize and (compiled := _by_numba()):
+        return np.asarray(compiled.walk(twists, tick_s))
     poses = np.zeros((*twists.shape[:-2], twists.shape[-2] + 1, 3))
     turns = twists[..., 2] * tick_s
     headings = turns.cumsum(axis=-1)

@@ -11,7 +11,7 @@ A coordinate of a fit is one or several parameters of θ that share a value, wit
 """
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import ModuleType
 
@@ -21,7 +21,7 @@ from scipy.linalg.lapack import dtbtrs
 from scipy.optimize import minimize
 
 from proxytune.diagnosis.answer import RULES, Rules
-from proxytune.diagnosis.motion.drives import Drives, Floats, Whole, relative
+from proxytune.diagnosis.motion.drives import Drives, Floats, Whole, relative, rows_at
 from proxytune.driving import Drivetrain, Robot, drivetrain
 from proxytune.effects import (
     CATALOGUE,
@@ -270,8 +270,37 @@ def twists_of(drives: Drives, theta: Theta) -> Floats:
 
 
 def _twists(drives: Drives, train: Drivetrain, duties: Floats | None = None) -> Floats:
-    given = drives.duties if duties is None else duties
-    return np.asarray(train.apply(given, train.begin(_setting(drives)))[0])
+    setting = _setting(drives)
+    if duties is not None:
+        return np.asarray(train.apply(duties, train.begin(setting))[0])
+    still = replace(setting, rest=np.zeros((len(drives.rest), 3)))
+    return np.asarray(train.motion.apply(train.ideal(_wheels(drives, train)), train.motion.begin(still))[0])
+
+
+def _arrived(drives: Drives, train: Drivetrain) -> Floats:
+    """The commands that reach the motors (E, T, 2): many models differ in what comes after that."""
+
+    def make() -> Floats:
+        return np.asarray(train.command.apply(drives.duties, train.command.begin(_setting(drives)))[0])
+
+    return drives.arrivals.get(_values(train.command), make)
+
+
+def _wheels(drives: Drives, train: Drivetrain) -> Floats:
+    """The wheel speeds (E, T, 2), as fractions of full speed; read only."""
+
+    def make() -> Floats:
+        arrived = train.within_range(_arrived(drives, train))
+        wheels = np.asarray(train.actuation.apply(arrived, train.actuation.begin(_setting(drives)))[0])
+        wheels.setflags(write=False)
+        return wheels
+
+    return drives.turns.get((_values(train.command), _values(train.actuation)), make)
+
+
+def _values(chain: Chain) -> Hashable:
+    """What a chain does, in numbers: effects of users need not be hashable."""
+    return tuple((type(one), *(getattr(one, given.name) for given in one.parameters)) for one in chain.effects)
 
 
 def measured_paths(drives: Drives, theta: Theta, poses: Floats) -> Floats:
@@ -337,16 +366,14 @@ def _window_twists(drives: Drives, train: Drivetrain, begin: Whole, length: int)
 
 def _window_wheels(drives: Drives, train: Drivetrain, begin: Whole, length: int) -> tuple[Floats, Floats]:
     """Wheel speeds in whole drives (E, T, 2), and in windows (W, length, 2), there from measured ones on if any are."""
-    setting = _setting(drives)
-    memory = train.begin(setting)
-    arrived = train.within_range(train.command.apply(drives.duties, memory.command)[0])
+    whole = _wheels(drives, train)
     episode, start = drives.episode[begin], drives.first[begin]
-    ticks = np.minimum(start[:, None] + np.arange(length), arrived.shape[1] - 1)
-    whole = train.actuation.apply(arrived, memory.actuation)[0]
+    ticks = np.minimum(start[:, None] + np.arange(length), whole.shape[1] - 1)
     if drives.wheels is None:
-        return whole, whole[episode[:, None], ticks]
-    turning = replace(setting, rest=drives.wheels[episode, start])
-    return whole, train.actuation.apply(arrived[episode[:, None], ticks], train.actuation.begin(turning))[0]
+        return whole, rows_at(whole, episode[:, None], ticks)
+    arrived = train.within_range(_arrived(drives, train))
+    turning = replace(_setting(drives), rest=drives.wheels[episode, start])
+    return whole, train.actuation.apply(rows_at(arrived, episode[:, None], ticks), train.actuation.begin(turning))[0]
 
 
 def window_features(
@@ -380,14 +407,16 @@ def _window_setting(drives: Drives, begin: Whole, before: Floats) -> FilterConte
 
 def wheel_speeds(drives: Drives, theta: Theta) -> Floats:
     """The wheel speeds of a model (E, T, 2), as fractions of full speed."""
-    return _wheel_speeds(drives, _model(drives, theta)[0], _setting(drives))
+    return _wheels(drives, _model(drives, theta)[0])
 
 
 def drawn_wheel_speeds(drives: Drives, theta: Theta, seed: int) -> Floats:
     """The wheel speeds (E, T, 2) with random effects as one seed draws them, instead of as expected."""
     robot = drives.robot
     train = drivetrain(robot, effects_from({**robot.theta, **theta}, robot.figures, robot.catalogue))
-    return _wheel_speeds(drives, train, replace(_setting(drives), seed=seed))
+    memory = train.begin(replace(_setting(drives), seed=seed))
+    arrived, _ = train.command.apply(drives.duties, memory.command)
+    return np.asarray(train.actuation.apply(train.within_range(arrived), memory.actuation)[0])
 
 
 def drawn_paths(drives: Drives, theta: Theta, seed: int) -> Floats:
@@ -399,16 +428,9 @@ def drawn_paths(drives: Drives, theta: Theta, seed: int) -> Floats:
     return _walk_and_track(drives, np.asarray(twists), stage_chain(effects, Stage.MEASUREMENT))
 
 
-def _wheel_speeds(drives: Drives, train: Drivetrain, setting: FilterContext) -> Floats:
-    memory = train.begin(setting)
-    arrived, _ = train.command.apply(drives.duties, memory.command)
-    return np.asarray(train.actuation.apply(train.within_range(arrived), memory.actuation)[0])
-
-
 def arrived_commands(drives: Drives, theta: Theta) -> Floats:
     """The commands that reach the motors (E, T, 2)."""
-    train, _ = _model(drives, theta)
-    return np.asarray(train.command.apply(drives.duties, train.begin(_setting(drives)).command)[0])
+    return _arrived(drives, _model(drives, theta)[0])
 
 
 def _model(drives: Drives, theta: Theta) -> tuple[Drivetrain, Chain]:

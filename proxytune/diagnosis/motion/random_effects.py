@@ -165,10 +165,10 @@ def _changed_commands(drives: Drives) -> tuple[Whole, Whole]:
 
 def _lose_commands(drives: Drives, lost: Whole) -> Floats:
     """Duties without some commands: the one before stays in force until the next."""
-    duties = drives.duties.copy()
-    for episode, tick in lost:
-        later = np.flatnonzero(drives.issued[episode, tick + 1 :])
-        end = tick + 1 + int(later[0]) if len(later) else duties.shape[1]
+    duties, length = drives.duties.copy(), drives.duties.shape[1]
+    issued = np.flatnonzero(drives.issued)
+    later = np.append(issued, drives.issued.size)[np.searchsorted(issued, lost @ (length, 1), side="right")]
+    for (episode, tick), end in zip(lost, later - lost[:, 0] * length, strict=True):
         duties[episode, tick:end] = drives.rest[episode] if tick == 0 else drives.duties[episode, tick - 1]
     return duties
 

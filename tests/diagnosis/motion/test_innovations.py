@@ -207,6 +207,18 @@ def test_a_window_starts_from_the_measured_wheel_speeds_where_there_are_any(repl
     assert moved[1] == pytest.approx(0.6 / 60.0, rel=0.1)
 
 
+def test_what_models_share_is_kept_and_what_differs_is_not(replayed):
+    kept = {"delay": 0.05, "trim": 0.05, "motor_lag.time_constant": 0.2}
+    thetas = [kept, {**kept, "delay": 0.1}, {**kept, "trim": -0.05}, {**kept, "yaw_lag": 0.2}, kept]
+    found = [(increments(replayed, theta), wheel_speeds(replayed, theta)) for theta in thetas]
+    for theta, (moved, wheels) in zip(thetas, found, strict=True):
+        np.testing.assert_array_equal(moved, increments(replace(replayed), theta))
+        np.testing.assert_array_equal(wheels, wheel_speeds(replace(replayed), theta))
+    assert found[3][1] is found[0][1]
+    with pytest.raises(ValueError, match="read-only"):
+        found[0][1][:] = 0.0
+
+
 def test_a_window_past_the_end_goes_on_with_the_last_command(replayed):
     last = np.array([np.flatnonzero(replayed.episode == 0)[-1]])
     walked = window_paths(replayed, TRUTH, last, 200)

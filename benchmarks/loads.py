@@ -18,14 +18,14 @@ from io import StringIO
 from pathlib import Path
 
 import numpy as np
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "fakes"))
+
 from planted import ROBOT, TRUTH, planted_log
 
 from proxytune.cli.main import main as proxytune
 from proxytune.diagnosis.motion.diagnose import declared_effects, diagnose
 from proxytune.logs import Log, LogEpisode
-
-sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "fakes"))
-
 
 HOUR, SECONDS = 60, 60.0
 """Drives, and how long each takes [s]."""

@@ -4,6 +4,7 @@ drives          commands on a grid of ticks (zero-order hold), increments betwee
 latency         time from command to motion, any motor lag allowed
 clocks          whether both share a clock; drives put right, cut, and kept aside to test on
 innovations     increments of a model by replay, whitened by a Kalman filter in SE(2):  z = L⁻¹(measured − predicted)
+compiled        the likelihood of noise and dead reckoning by Numba
 fitting         θ and noise by least squares on Huber's loss of z; held-out likelihood block by block
 screening       score test of every candidate effect:  gain = −(gᵀm + ½ mᵀHm),  m = −H⁺g
 random_effects  likelihood of effects that strike at random, and their size by indirect inference

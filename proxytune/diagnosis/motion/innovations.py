@@ -10,8 +10,10 @@ and twists, dead-reckoned by the planar plant over whole batches of drives (`inc
 A coordinate of a fit is one or several parameters of θ that share a value, within their range.
 """
 
-from collections.abc import Mapping, Sequence
+import functools
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import ModuleType
 
 import numpy as np
 from scipy.linalg import LinAlgError, cholesky_banded
@@ -19,7 +21,7 @@ from scipy.linalg.lapack import dtbtrs
 from scipy.optimize import minimize
 
 from proxytune.diagnosis.answer import RULES, Rules
-from proxytune.diagnosis.motion.drives import Drives, Floats, Whole, relative
+from proxytune.diagnosis.motion.drives import Drives, Floats, Whole, relative, rows_at
 from proxytune.driving import Drivetrain, Robot, drivetrain
 from proxytune.effects import (
     CATALOGUE,
@@ -28,6 +30,7 @@ from proxytune.effects import (
     Draws,
     FilterContext,
     Learnt,
+    LearntCommands,
     Stage,
     effect_of,
     effects_from,
@@ -159,6 +162,16 @@ def log_likelihood(errors: Floats, whiten: Whitener) -> float:
     return -float(huber(whiten.whiten(errors)).sum() + np.log(whiten.factor[0]).sum())
 
 
+@functools.cache
+def _by_numba() -> ModuleType | None:
+    """The inner loops, compiled: a diagnosis pays for loading them many times over, a prediction would not."""
+    try:
+        from proxytune.diagnosis.motion import compiled
+    except Exception:  # Numba is not installed, does not know this NumPy, or finds no place for what it compiles
+        return None
+    return compiled
+
+
 def fit_noise(drives: Drives, errors: Floats, start: Noise) -> Noise:
     """The noise under which errors (N, 3) are likeliest, looked for from `start` and from FIRST_GUESS.
 
@@ -178,13 +191,19 @@ def _fit_noise(drives: Drives, errors: Floats, start: Noise) -> tuple[float, Noi
     scale = np.concatenate((start.drive, start.pose))
     lowest, highest = np.log(SMALLEST / scale), np.log(LARGEST / scale)
     parts = np.stack([_covariance(drives, unit) for unit in np.eye(5)])
-
-    def negative_log_likelihood(logs: Floats) -> float:
-        return -log_likelihood(errors, _factor(np.square(scale * np.exp(logs)) @ parts)) / len(errors)
+    compiled = _by_numba()
 
     def with_slope(logs: Floats) -> tuple[float, Floats]:
-        here, steps = negative_log_likelihood(logs), np.where(logs + STEP <= highest, STEP, -STEP)
-        return here, np.array([negative_log_likelihood(moved) - here for moved in logs + np.diag(steps)]) / steps
+        steps = np.where(logs + STEP <= highest, STEP, -STEP)
+        covariances = np.square(scale * np.exp(logs + np.vstack((np.zeros(5), np.diag(steps))))) @ parts
+        if compiled:
+            bands = covariances.reshape(len(covariances), BAND, -1, 3)
+            bands[:, 0] += JITTER
+            losses = [compiled.loss(band, errors, HUBER) for band in bands]
+        else:
+            losses = [-log_likelihood(errors, _factor(covariance)) for covariance in covariances]
+        here, *moved = np.array(losses) / len(errors)
+        return here, (moved - here) / steps
 
     bounds = list(zip(lowest, highest, strict=True))
     found = minimize(
@@ -198,8 +217,10 @@ def integrate_twists(twists: Floats, tick_s: float) -> Floats:
     """Dead-reckon planar poses (…, time + 1, 3) from body twists held for a tick each; headings are unwrapped.
 
     They are those of the planar plant but for rounding. Episodes are driven by the plant itself: they stay what they
-    were to the last bit.
+    were to the last bit. The compiled way gives the same bits: it is taken once noise has been fitted.
     """
+    if _by_numba.cache_info().currsize and (compiled := _by_numba()):
+        return np.asarray(compiled.walk(twists, tick_s))
     poses = np.zeros((*twists.shape[:-2], twists.shape[-2] + 1, 3))
     turns = twists[..., 2] * tick_s
     headings = turns.cumsum(axis=-1)
@@ -252,8 +273,45 @@ def twists_of(drives: Drives, theta: Theta) -> Floats:
 
 
 def _twists(drives: Drives, train: Drivetrain, duties: Floats | None = None) -> Floats:
-    given = drives.duties if duties is None else duties
-    return np.asarray(train.apply(given, train.begin(_setting(drives)))[0])
+    setting = _setting(drives)
+    if duties is not None:
+        return np.asarray(train.apply(duties, train.begin(setting))[0])
+    still = replace(setting, rest=np.zeros((len(drives.rest), 3)))
+    return np.asarray(train.motion.apply(train.ideal(_wheels(drives, train)), train.motion.begin(still))[0])
+
+
+def _arrived(drives: Drives, train: Drivetrain) -> Floats:
+    """The commands that reach the motors (E, T, 2): many models differ in what comes after that."""
+
+    def make() -> Floats:
+        return np.asarray(train.command.apply(drives.duties, train.command.begin(_setting(drives)))[0])
+
+    return drives.arrivals.get(_values(train.command), make)
+
+
+def _turned(drives: Drives, train: Drivetrain, arrived: Floats) -> Floats:
+    """The wheel speeds (E, T, 2) that commands which reached the motors make."""
+    memory = train.actuation.begin(_setting(drives))
+    return np.asarray(train.actuation.apply(train.within_range(arrived), memory)[0])
+
+
+def _wheels(drives: Drives, train: Drivetrain) -> Floats:
+    """The wheel speeds (E, T, 2), as fractions of full speed; read only."""
+
+    def make() -> Floats:
+        wheels = _turned(drives, train, _arrived(drives, train))
+        wheels.setflags(write=False)
+        return wheels
+
+    return drives.turns.get((_values(train.command), _values(train.actuation)), make)
+
+
+def _values(chain: Chain) -> Hashable:
+    """What a chain does, in numbers: effects of users need not be hashable, and what was learnt has no parameters."""
+    return tuple(
+        one if isinstance(one, LearntCommands) else (type(one), *(getattr(one, given.name) for given in one.parameters))
+        for one in chain.effects
+    )
 
 
 def measured_paths(drives: Drives, theta: Theta, poses: Floats) -> Floats:
@@ -305,7 +363,7 @@ def window_twists(drives: Drives, theta: Theta, begin: Whole, length: int) -> Fl
     return _window_twists(drives, _model(drives, theta)[0], begin, length)
 
 
-def _window_twists(drives: Drives, train: Drivetrain, begin: Whole, length: int, added: Floats | float = 0.0) -> Floats:
+def _window_twists(drives: Drives, train: Drivetrain, begin: Whole, length: int, added: Floats | None = None) -> Floats:
     whole, wheels = _window_wheels(drives, train, begin, length, added)
     if not train.motion.effects:
         return train.ideal(wheels)
@@ -318,22 +376,20 @@ def _window_twists(drives: Drives, train: Drivetrain, begin: Whole, length: int,
 
 
 def _window_wheels(
-    drives: Drives, train: Drivetrain, begin: Whole, length: int, added: Floats | float
+    drives: Drives, train: Drivetrain, begin: Whole, length: int, added: Floats | None
 ) -> tuple[Floats, Floats]:
     """Wheel speeds in whole drives (E, T, 2), and in windows (W, length, 2), there from measured ones on if any are.
 
     Something may be added to the commands that arrive (E, T, 2).
     """
-    setting = _setting(drives)
-    memory = train.begin(setting)
-    arrived = train.within_range(train.command.apply(drives.duties, memory.command)[0] + added)
+    whole = _wheels(drives, train) if added is None else _turned(drives, train, _arrived(drives, train) + added)
     episode, start = drives.episode[begin], drives.first[begin]
-    ticks = np.minimum(start[:, None] + np.arange(length), arrived.shape[1] - 1)
-    whole = train.actuation.apply(arrived, memory.actuation)[0]
+    ticks = np.minimum(start[:, None] + np.arange(length), whole.shape[1] - 1)
     if drives.wheels is None:
-        return whole, whole[episode[:, None], ticks]
-    turning = replace(setting, rest=drives.wheels[episode, start])
-    return whole, train.actuation.apply(arrived[episode[:, None], ticks], train.actuation.begin(turning))[0]
+        return whole, rows_at(whole, episode[:, None], ticks)
+    arrived = train.within_range(_arrived(drives, train) + (0.0 if added is None else added))
+    turning = replace(_setting(drives), rest=drives.wheels[episode, start])
+    return whole, train.actuation.apply(rows_at(arrived, episode[:, None], ticks), train.actuation.begin(turning))[0]
 
 
 def window_features(
@@ -347,11 +403,10 @@ def window_features(
     past = learnt.recall(_window_setting(drives, begin, whole), whole, drives.episode[begin], drives.first[begin])
     of_motion = [[one] for one in learnt.features(window_twists(drives, theta, begin, length), past)]
     train, _ = _model(drives, theta)
-    setting = _setting(drives)
-    arrived, _ = train.command.apply(drives.duties, train.command.begin(setting))
+    arrived = _arrived(drives, train)
     asked = _window_twists(drives, train, begin, length)
     of_commands = []
-    for features in learnt.commands.features(arrived, learnt.commands.begin(setting)):
+    for features in learnt.commands.features(arrived, learnt.commands.begin(_setting(drives))):
         columns = [SMALL_DUTY * column for column in np.moveaxis(features, -1, 0)]
         moved = np.stack([_window_twists(drives, train, begin, length, one) - asked for one in columns], axis=-1)
         of_commands.append([(moved[..., n, :] / SMALL_DUTY, unit) for n, unit in enumerate(np.eye(3))])
@@ -377,14 +432,16 @@ def _window_setting(drives: Drives, begin: Whole, before: Floats) -> FilterConte
 
 def wheel_speeds(drives: Drives, theta: Theta) -> Floats:
     """The wheel speeds of a model (E, T, 2), as fractions of full speed."""
-    return _wheel_speeds(drives, _model(drives, theta)[0], _setting(drives))
+    return _wheels(drives, _model(drives, theta)[0])
 
 
 def drawn_wheel_speeds(drives: Drives, theta: Theta, seed: int) -> Floats:
     """The wheel speeds (E, T, 2) with random effects as one seed draws them, instead of as expected."""
     robot = drives.robot
     train = drivetrain(robot, effects_from({**robot.theta, **theta}, robot.figures, robot.catalogue))
-    return _wheel_speeds(drives, train, replace(_setting(drives), seed=seed))
+    memory = train.begin(replace(_setting(drives), seed=seed))
+    arrived, _ = train.command.apply(drives.duties, memory.command)
+    return np.asarray(train.actuation.apply(train.within_range(arrived), memory.actuation)[0])
 
 
 def drawn_paths(drives: Drives, theta: Theta, seed: int) -> Floats:
@@ -396,16 +453,9 @@ def drawn_paths(drives: Drives, theta: Theta, seed: int) -> Floats:
     return _walk_and_track(drives, np.asarray(twists), stage_chain(effects, Stage.MEASUREMENT))
 
 
-def _wheel_speeds(drives: Drives, train: Drivetrain, setting: FilterContext) -> Floats:
-    memory = train.begin(setting)
-    arrived, _ = train.command.apply(drives.duties, memory.command)
-    return np.asarray(train.actuation.apply(train.within_range(arrived), memory.actuation)[0])
-
-
 def arrived_commands(drives: Drives, theta: Theta) -> Floats:
     """The commands that reach the motors (E, T, 2)."""
-    train, _ = _model(drives, theta)
-    return np.asarray(train.command.apply(drives.duties, train.begin(_setting(drives)).command)[0])
+    return _arrived(drives, _model(drives, theta)[0])
 
 
 def _model(drives: Drives, theta: Theta) -> tuple[Drivetrain, Chain]:

@@ -37,6 +37,8 @@ GRID = 25
 """Sizes that are tried at first, evenly in their logarithm."""
 SHIFTS = 99
 """How often the null distribution is drawn."""
+AT_ONCE = 4
+"""So many draws of it are weighed together: what is computed of more is slow to reach."""
 SEEN = 1.0
 """A command can be seen if its loss would move the innovations by a standard deviation."""
 
@@ -118,21 +120,24 @@ def _grid(draws: Draws) -> Floats:
 
 def _ratio(draws: Draws, rate_hz: float, size: float, gradient: Floats, energy: Floats) -> Floats:
     """The log-likelihood ratio of an effect of this size, over all commands (…,)."""
-    late = draws.lateness(size, rate_hz)
-    return np.asarray(np.apply_along_axis(lambda row: _mixture(late, row, energy).sum(), -1, gradient))
+    late, rows = draws.lateness(size, rate_hz), np.atleast_2d(gradient)
+    parts = (rows[first : first + AT_ONCE] for first in range(0, len(rows), AT_ONCE))
+    found = np.concatenate([_mixture(late, part, energy).sum(axis=-1) for part in parts])
+    return found.reshape(gradient.shape[:-1])
 
 
 def _mixture(late: Lateness, gradient: Floats, energy: Floats) -> Floats:
-    """The log-likelihood ratio of each command's having been late by one of these times (commands,)."""
+    """The log-likelihood ratio of each command's having been late by one of these times (…, commands)."""
     ratios = _ratios(late, gradient, energy)
     most = ratios.max(axis=0)
-    return np.asarray(most + np.log(np.exp(ratios - most).sum(axis=0)))
+    ratios -= most
+    return np.asarray(most + np.log(np.exp(ratios, out=ratios).sum(axis=0)))
 
 
 def _ratios(late: Lateness, gradient: Floats, energy: Floats) -> Floats:
-    """The same of each time, with its weight (times, commands)."""
-    steps = np.stack((-late.commands, -0.5 * late.commands**2, late.log_weights), axis=1)
-    return np.asarray(steps @ np.stack((gradient, energy, np.ones_like(gradient))))
+    """The same of each time, with its weight (times, …, commands)."""
+    by = late.commands.reshape(-1, *(1 for _ in gradient.shape))
+    return np.asarray(late.log_weights.reshape(by.shape) - 0.5 * by**2 * energy - by * gradient)
 
 
 def responses(fitted: Fit, others: Floats) -> Responses:
@@ -165,10 +170,10 @@ def _changed_commands(drives: Drives) -> tuple[Whole, Whole]:
 
 def _lose_commands(drives: Drives, lost: Whole) -> Floats:
     """Duties without some commands: the one before stays in force until the next."""
-    duties = drives.duties.copy()
-    for episode, tick in lost:
-        later = np.flatnonzero(drives.issued[episode, tick + 1 :])
-        end = tick + 1 + int(later[0]) if len(later) else duties.shape[1]
+    duties, length = drives.duties.copy(), drives.duties.shape[1]
+    issued = np.flatnonzero(drives.issued)
+    later = np.append(issued, drives.issued.size)[np.searchsorted(issued, lost @ (length, 1), side="right")]
+    for (episode, tick), end in zip(lost, later - lost[:, 0] * length, strict=True):
         duties[episode, tick:end] = drives.rest[episode] if tick == 0 else drives.duties[episode, tick - 1]
     return duties
 

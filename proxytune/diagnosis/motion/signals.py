@@ -78,6 +78,10 @@ class _Motion:
 
 def signal_groups(fitted: Fit) -> Iterator[SignalGroup]:
     """Every signal group of these drives, seen with the fitted model, as it is asked for."""
+    return (group for group, _ in _with_twists(fitted))
+
+
+def _with_twists(fitted: Fit) -> Iterator[tuple[SignalGroup, Floats]]:
     motion = _motion(fitted)
     of_wheels = (
         _wheel_difference,
@@ -88,7 +92,7 @@ def signal_groups(fitted: Fit) -> Iterator[SignalGroup]:
     for maker in (*both, *((_steering,) if fitted.drives.robot.drive == "ackermann" else of_wheels)):
         name, signal, unit, twists = maker(motion)
         if np.abs(twists).max() > 1e-9:
-            yield SignalGroup(name, signal, unit, partial(maker, motion))
+            yield SignalGroup(name, signal, unit, partial(maker, motion)), twists
 
 
 def _motion(fitted: Fit) -> _Motion:
@@ -281,7 +285,7 @@ def fit_curves(fitted: Fit) -> list[SignalCurve]:
     The best few are fitted again with the noise that they leave: a candidate's noise is fitted too.
     """
     plain = float(held_out_log_likelihood(fitted).sum())
-    found = [_fit_curve(fitted, group, _columns(fitted, group), plain) for group in signal_groups(fitted)]
+    found = [_fit_curve(fitted, group, _columns(fitted, added), plain) for group, added in _with_twists(fitted)]
     found.sort(key=lambda curve: -curve.gain)
     promising = [curve for curve in found[:REFITTED] if curve.gain > 0.0]
     again = [_fit_with_own_noise(fitted, curve, plain) for curve in promising]
@@ -289,7 +293,7 @@ def fit_curves(fitted: Fit) -> list[SignalCurve]:
 
 
 def _fit_with_own_noise(fitted: Fit, curve: SignalCurve, plain: float) -> SignalCurve:
-    changes = _columns(fitted, curve.group)
+    changes = _columns(fitted, curve.group.twists)
     errors = fitted.drives.measured - increments(fitted.drives, fitted.theta) + changes @ curve.weights
     noise = fit_noise(fitted.drives, errors, fitted.noise)
     quieter = evaluate(fitted.drives, fitted.theta, fitted.free, noise)
@@ -309,12 +313,11 @@ def _fit_curve(fitted: Fit, group: SignalGroup, changes: Floats, plain: float) -
     return SignalCurve(group, gain - plain, (weights / size)[flexible])
 
 
-def _columns(fitted: Fit, group: SignalGroup) -> Floats:
-    """Change of the errors per weight of each basis function (N, 3, columns)."""
+def _columns(fitted: Fit, added: Floats) -> Floats:
+    """Change of the errors (N, 3, columns) per weight of each basis function, motion (E, T, 3, columns)."""
     drives, theta = fitted.drives, fitted.theta
     twists = twists_of(drives, theta)
     here = increments_of_twists(drives, theta, twists)
-    added = group.twists
     parts = (added[..., column] for column in range(added.shape[-1]))
     return np.stack([here - increments_of_twists(drives, theta, twists + part) for part in parts], axis=-1)
 

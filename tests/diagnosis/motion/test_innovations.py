@@ -207,6 +207,18 @@ def test_a_window_starts_from_the_measured_wheel_speeds_where_there_are_any(repl
     assert moved[1] == pytest.approx(0.6 / 60.0, rel=0.1)
 
 
+def test_what_models_share_is_kept_and_what_differs_is_not(replayed):
+    kept = {"delay": 0.05, "trim": 0.05, "motor_lag.time_constant": 0.2}
+    thetas = [kept, {**kept, "delay": 0.1}, {**kept, "trim": -0.05}, {**kept, "yaw_lag": 0.2}, kept]
+    found = [(increments(replayed, theta), wheel_speeds(replayed, theta)) for theta in thetas]
+    for theta, (moved, wheels) in zip(thetas, found, strict=True):
+        np.testing.assert_array_equal(moved, increments(replace(replayed), theta))
+        np.testing.assert_array_equal(wheels, wheel_speeds(replace(replayed), theta))
+    assert found[3][1] is found[0][1]
+    with pytest.raises(ValueError, match="read-only"):
+        found[0][1][:] = 0.0
+
+
 def test_a_window_past_the_end_goes_on_with_the_last_command(replayed):
     last = np.array([np.flatnonzero(replayed.episode == 0)[-1]])
     walked = window_paths(replayed, TRUTH, last, 200)
@@ -308,3 +320,13 @@ def test_it_begins_at_the_origin_and_changes_no_twist():
     before = asked.copy()
     np.testing.assert_array_equal(integrate_twists(asked, TICK_S)[:, 0], 0.0)
     np.testing.assert_array_equal(asked, before)
+
+
+def test_models_that_differ_in_learnt_commands_alone_are_replayed_each_by_itself(drives):
+    seen = {
+        f"learnt.range.{of}@{end}": sign for of in ("forward", "yaw") for end, sign in (("low", -9.0), ("high", 9.0))
+    }
+    weak, strong = ({**TRUTH, **seen, "learnt.duty.duty@1.0": weight} for weight in (-0.1, -0.3))
+    first, second = (wheel_speeds(drives, theta) for theta in (weak, strong))
+    np.testing.assert_allclose(second - first, 2.0 * (first - wheel_speeds(drives, TRUTH)), atol=1e-9)
+    assert np.abs(second - first).max() > 0.01

@@ -141,18 +141,19 @@ def test_commands_at_times_of_their_own_are_no_jitter_of_the_robot_but_on_a_grid
 
 
 def test_a_command_that_is_lost_is_lost_until_the_next_one():
-    drives = drives_of(own_times_log(1, episodes=1, seconds=20.0, gridded=False))
+    drives = drives_of(own_times_log(1, episodes=2, seconds=20.0, gridded=False))
     changed, phase = _changed_commands(drives)
-    lost = changed[phase == phase[5]]
-    duties = _lose_commands(drives, lost)
-    issued = np.flatnonzero(drives.issued[0])
-    for _, tick in lost:
-        following = issued[issued > tick][0]
-        np.testing.assert_array_equal(
-            duties[0, tick:following], np.tile(drives.duties[0, tick - 1], (following - tick, 1))
-        )
-    assert np.any(duties != drives.duties)
-    assert np.diff(lost[:, 1]).min() > 2.0 * drives.tick_hz
+    lost = np.unique(np.concatenate((changed[phase == phase[5]], changed[[-1]])), axis=0)
+    expected = drives.duties.copy()
+    for episode, tick in lost:
+        issued = np.flatnonzero(drives.issued[episode])
+        following = [*issued[issued > tick], expected.shape[1]][0]
+        expected[episode, tick:following] = drives.duties[episode, tick - 1]
+    np.testing.assert_array_equal(_lose_commands(drives, lost), expected)
+    assert np.any(expected[1, -1] != drives.duties[1, -1])
+    assert np.any(expected[0] != drives.duties[0])
+    apart = np.diff(changed[phase == phase[5]], axis=0)
+    assert apart[apart[:, 0] == 0, 1].min() > 2.0 * drives.tick_hz
 
 
 def told(effect, size, seed):

@@ -68,9 +68,10 @@ def _moving(commands: Commands) -> Signal:
     return np.minimum(1.0, np.abs(commands.duty) / STILL)[..., None]
 
 
-def _group(title: str, unit: str, low: float | None = 1e-3, **bases: Callable[[Commands, Knots], Signal]) -> Group:
-    """Curves that add to the duty of either wheel."""
-    return Group(title, unit, {name: Channel("duty", "duty", basis) for name, basis in bases.items()}, low)
+def _group(title: str, unit: str, *, of: str = "of the command", **bases: Callable[[Commands, Knots], Signal]) -> Group:
+    """Curves that add to the duty of either wheel a share of something, or a push."""
+    channels = {to: Channel("duty", "duty" if to == "push" else of, basis) for to, basis in bases.items()}
+    return Group(title, unit, channels, 1e-3)
 
 
 COMMAND_GROUPS: Mapping[str, Group] = MappingProxyType(
@@ -78,6 +79,7 @@ COMMAND_GROUPS: Mapping[str, Group] = MappingProxyType(
         "duty": _group(
             "size of the command",
             "duty",
+            of="duty",
             duty=lambda c, k: np.sign(c.duty)[..., None] * hats(np.abs(c.duty), k),
         ),
         "drawn": _group(
@@ -104,6 +106,7 @@ COMMAND_GROUPS: Mapping[str, Group] = MappingProxyType(
         "dragged": _group(
             "way in which a command changes",
             "duty",
+            of="of the play",
             duty=lambda c, k: c.dragged - c.duty[..., None],
         ),
         "clock": _group(

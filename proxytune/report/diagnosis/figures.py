@@ -129,13 +129,19 @@ FADING = {
     "start": "fading over",
     "ringing": "frequency",
     "play": "half the play",
+    "held": "from then on",
+    "begun": "until then",
+    "turned": "until then",
+    "dragged": "half the play",
+    "ended": "time constant",
 }
-"""Groups whose weights are points, each of something that fades, and what their knots are."""
+"""Groups whose weights are points, each of something that fades or ends, and what their knots are."""
 PAIRS = {"speed_and_turn": ("forward speed [m/s]", "yaw rate [rad/s]"), "place": ("x [m]", "y [m]")}
 """Groups over two signals, and what their axes are called."""
 COLUMNS = 2
-WIDEST, HIGHEST = 24, 18
+WIDEST, HIGHEST = 20, 18
 """Characters in a line below a panel, and beside it."""
+MOST_TICKS = 5
 
 
 def learnt_figure(learning: Learning) -> Figure | None:
@@ -193,7 +199,8 @@ def _line(axes: Axes, curve: LearntCurve, factor: float) -> None:
     knots, weights = np.array(curve.knots), factor * np.array(curve.weights)
     if curve.group in FADING:
         axes.set_xscale("log")
-        axes.set_xticks(knots, [f"{knot:g}" for knot in knots])
+        shown = knots[:: ceil(len(knots) / MOST_TICKS)]
+        axes.set_xticks(shown, [f"{knot:g}" for knot in shown])
         axes.set_xticks([], minor=True)
         axes.vlines(knots, 0.0, weights, color=BLUE, lw=1.0)
         axes.plot(knots, weights, "o", color=BLUE, ms=4)

@@ -25,7 +25,7 @@ from proxytune.diagnosis.motion.discrepancy import Discrepancy, LearntError
 from proxytune.diagnosis.motion.moments import Period
 from proxytune.diagnosis.motion.multistep_fit import MultistepFit
 from proxytune.driving import read_robot
-from proxytune.effects import FittedRange, Learnt, LearntCurve, learnt_theta
+from proxytune.effects import GROUPS, FittedRange, Learnt, LearntCurve, learnt_theta
 from proxytune.report.diagnosis.document import clocks_document, learnt_document, unlike_document
 from proxytune.report.diagnosis.notes import (
     MEANINGS,
@@ -302,6 +302,19 @@ def test_a_map_of_the_floor_is_told_in_words(group, knots, weights):
     theta = learnt_theta(Learnt(FittedRange((0.0, 1.0), (-1.0, 1.0)), (curve,)))
     notes = learnt_notes(Learning(Discrepancy(theta, {"place on the floor": 1.0}, {}, True), (), False))
     assert "slower by 50 % where x > 0 m" in notes[1]
+
+
+@pytest.mark.parametrize(
+    ("group", "weights", "told"),
+    [
+        ("held", {0.5: -0.02, 0.75: -0.56, 1.0: -0.46, 2.0: 0.04}, "100 % less from 0.75 s after either last changed"),
+        ("turned", {0.2: 0.03, 0.5: -0.9}, "87 % less until 0.5 s after it turned round"),
+    ],
+)
+def test_what_commands_lose_after_a_while_is_told_in_words(group, weights, told):
+    theta = {f"learnt.{group}.duty@{knot}": weight for knot, weight in weights.items()}
+    notes = learnt_notes(Learning(Discrepancy(theta, {GROUPS[group].title: 1.0}, {}, True), (), False))
+    assert notes[1] == f"as that curve has it, a command counts {told}"
 
 
 def test_a_car_that_its_friction_keeps_at_rest_is_told_with_the_throttle_up_to_which_it_does():

@@ -253,6 +253,24 @@ def _say_map(theta: Theta) -> list[str]:
     return [f"as that map has it, the robot is {words}"] if words else []
 
 
+SAID_OF = {"held": "from {:g} s after either last changed", "turned": "until {:g} s after it turned round"}
+"""When a share of commands is added, by the group of the curve that adds it."""
+
+
+def _say_commands(theta: Theta) -> list[str]:
+    """Say when commands count more or less, where a learnt curve has it."""
+    lines = []
+    for group, when in SAID_OF.items():
+        start = f"learnt.{group}.duty@"
+        weights = {float(name.removeprefix(start)): value for name, value in theta.items() if name.startswith(start)}
+        share = sum(weights.values())
+        if abs(share) >= LEAST_SHARE:
+            most = max(weights, key=lambda knot: abs(weights[knot]))
+            much = f"{percent(abs(share))} {'less' if share < 0.0 else 'more'}"
+            lines.append(f"as that curve has it, a command counts {much} {when.format(most)}")
+    return lines
+
+
 def learnt_notes(learning: Learning) -> list[str]:
     """Say what was learnt; nothing where nothing was."""
     beside = learning.discrepancy
@@ -265,7 +283,7 @@ def learnt_notes(learning: Learning) -> list[str]:
             for error in learning.errors
         )
         notes.append(f"learnt, not physics: curves over {curves}; position error with them at {worth}")
-        notes += _say_map(learning.theta)
+        notes += _say_map(learning.theta) + _say_commands(learning.theta)
     elif beside.theta:
         notes.append(f"curves over {curves} were tried and dropped: they do not clearly help on drives left out")
     if learning.looks_like is not None:

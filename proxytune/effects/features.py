@@ -80,7 +80,8 @@ def floor_map(asked: AskedMotion, knots: Knots) -> Signal:
     places = np.asarray(knots, dtype=float)
     gaps = np.diff(np.sort(places, axis=0), axis=0)
     mesh = float(gaps[gaps > 0.0].min(initial=WIDEST_MESH_M))
-    return np.asarray(np.maximum(0.0, 1.0 - np.abs(asked.place[..., None, :] - places) / mesh).prod(axis=-1))
+    x, y = (np.maximum(0.0, 1.0 - np.abs(asked.place[..., [axis]] - places[:, axis]) / mesh) for axis in (0, 1))
+    return np.asarray(x * y)
 
 
 def sign(asked: AskedMotion, wheel: int) -> Signal:

@@ -442,7 +442,7 @@ def sum_by(labels: Whole, values: Floats, count: int, weights: Floats | None = N
     """Sums of values (M, …), weighted (M,), over those with one label each (count, …); no label is below 0."""
     own = labels >= 0
     share = np.ones(own.sum()) if weights is None else weights[own]
-    rows = sparse.csr_array((share, (labels[own], np.flatnonzero(own))), shape=(count, len(labels)))
+    rows = sparse.csc_array((share, labels[own], np.append(0, np.cumsum(own))), shape=(count, len(labels)))
     flat = values.reshape(len(values), -1)
     return np.asarray(rows @ flat).reshape(count, *values.shape[1:])
 

@@ -314,12 +314,12 @@ FEW = 8
 
 
 PAYS_OFF = 20_000_000
-"""So many samples SciPy filters before Numba, which takes up to 0.3 s to load and would have saved that."""
+"""So many samples NumPy and SciPy filter before Numba, which takes up to 0.3 s to load and would have saved that."""
 _filtered = [0]
 
 
-def _fastest(samples: int) -> ModuleType | None:
-    """The compiled low-pass once some more samples pay for loading it, where it works: to the same bit."""
+def fastest(samples: int) -> ModuleType | None:
+    """The compiled filters once some more samples pay for loading them, where they work: to the same bit."""
     _filtered[0] += samples
     return _by_numba() if _filtered[0] > PAYS_OFF else None
 
@@ -380,7 +380,7 @@ def low_pass(signal: Signal, state: LowPassState) -> tuple[Signal, LowPassState]
         for number in range(signal.shape[-2]):
             ends[..., number, :] = rest + gain * signal[..., number, :]
             rest = 0.0 * signal[..., number, :] + remainder * ends[..., number, :]
-    elif signal.dtype == float and (compiled := _fastest(signal.size)):
+    elif signal.dtype == float and (compiled := fastest(signal.size)):
         mean, last = compiled.low_pass(signal, value, remainder, mean_remainder)
         return mean, LowPassState(last, remainder, mean_remainder)
     else:

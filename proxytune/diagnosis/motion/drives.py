@@ -22,6 +22,7 @@ from proxytune.effects import SHIPPED, Catalogue, track_of
 from proxytune.errors import LogError
 from proxytune.logs import Log, LogEpisode, check_kind, rows_of_poses, without_outliers
 from proxytune.settings import GEOMETRY, nearest
+from proxytune.space import Theta
 
 
 def cosine_and_sine(angle: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -44,17 +45,21 @@ MOST = 6
 class Recent(Generic[Result]):
     """The latest few results: what is asked for again is not worked out again."""
 
-    def __init__(self) -> None:
+    def __init__(self, most: int = MOST) -> None:
         self._known: dict[Hashable, Result] = {}
+        self._most = most
 
     def get(self, key: Hashable, make: Callable[[], Result]) -> Result:
         """The result of a key, made if it is not kept; the one asked for longest ago is forgotten."""
         result = self._known.pop(key) if key in self._known else make()
         self._known[key] = result
-        if len(self._known) > MOST:
+        if len(self._known) > self._most:
             del self._known[next(iter(self._known))]
         return result
 
+
+SEVERAL = 40
+"""So many are kept of what is small: windows without each fold, of each length, with each effect and without."""
 
 Floats = NDArray[Any]
 
@@ -272,6 +277,11 @@ class Drives:
     def turns(self) -> Recent[Floats]:
         """The wheel speeds (E, T, 2) that models made of these drives lately."""
         return Recent()
+
+    @cached_property
+    def fits(self) -> Recent[Theta]:
+        """The values in θ that were fitted to windows of these drives lately."""
+        return Recent(SEVERAL)
 
     @cached_property
     def places(self) -> Floats:

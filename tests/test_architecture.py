@@ -12,7 +12,7 @@ from floors import floor
 PACKAGE = Path(__file__).resolve().parent.parent / "proxytune"
 ROOMS = {
     "pybullet": {"driving/bullet.py"},
-    "numba": {"driving/compiled.py", "diagnosis/motion/compiled.py"},
+    "numba": {"effects/compiled.py", "driving/compiled.py", "diagnosis/motion/compiled.py"},
     "skopt": {"search"},
     "optuna": {"search"},
     "gymnasium": {"environments"},

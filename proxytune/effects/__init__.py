@@ -1,6 +1,7 @@
 """Effects: causal filters that bend commands, motion or pictures, each with a value at which it vanishes.
 
 effect       what an effect is, what it says of the trace it leaves, and what filters share: low-pass, dead reckoning
+compiled     filters of long signals by Numba
 command      single messages between agent and motors: delayed, jittered, dropped, quantised
 motors       from a command to a wheel's speed: lag, slew rate, limits, gains, battery, heat
 friction     dead band, stiction, backlash, wheels that are out of round

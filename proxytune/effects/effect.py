@@ -6,9 +6,11 @@ measured motion. Filters share a first-order low-pass, exact for signals that ho
 of headings and angles beyond those that are known.
 """
 
+import functools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
+from types import ModuleType
 from typing import Any, ClassVar, NamedTuple, Protocol, TypeVar, dataclass_transform, runtime_checkable
 
 import numpy as np
@@ -311,6 +313,26 @@ FEW = 8
 """Up to so many samples, a control step, a loop over them is faster than to set up a filter."""
 
 
+PAYS_OFF = 20_000_000
+"""So many samples NumPy and SciPy filter before Numba, which takes up to 0.3 s to load and would have saved that."""
+_filtered = [0]
+
+
+def fastest(samples: int) -> ModuleType | None:
+    """The compiled filters once some more samples pay for loading them, where they work: to the same bit."""
+    _filtered[0] += samples
+    return _by_numba() if _filtered[0] > PAYS_OFF else None
+
+
+@functools.cache
+def _by_numba() -> ModuleType | None:
+    try:
+        from proxytune.effects import compiled
+    except Exception:  # Numba is not installed, does not know this NumPy, or finds no place for what it compiles
+        return None
+    return compiled
+
+
 class LowPassState(NamedTuple):
     """A first-order low-pass under way.
 
@@ -358,6 +380,9 @@ def low_pass(signal: Signal, state: LowPassState) -> tuple[Signal, LowPassState]
         for number in range(signal.shape[-2]):
             ends[..., number, :] = rest + gain * signal[..., number, :]
             rest = 0.0 * signal[..., number, :] + remainder * ends[..., number, :]
+    elif signal.dtype == float and (compiled := fastest(signal.size)):
+        mean, last = compiled.low_pass(signal, value, remainder, mean_remainder)
+        return mean, LowPassState(last, remainder, mean_remainder)
     else:
         ends = lfilter([gain], [1.0, -remainder], signal, axis=-2, zi=remainder * start)[0]
     starts = np.concatenate((start, ends[..., :-1, :]), axis=-2)

@@ -4,6 +4,7 @@
 body or of a wheel the basis functions over it, each 0 where the robot stands. The filters that make the past come last.
 """
 
+import functools
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -80,7 +81,9 @@ def floor_map(asked: AskedMotion, knots: Knots, axes: slice = slice(None)) -> Si
     places = np.reshape(np.asarray(knots, dtype=float), (len(knots), -1))
     gaps = np.diff(np.sort(places, axis=0), axis=0)
     mesh = float(gaps[gaps > 0.0].min(initial=WIDEST_MESH_M))
-    return np.asarray(np.maximum(0.0, 1.0 - np.abs(asked.place[..., None, axes] - places) / mesh).prod(axis=-1))
+    pairs = zip(np.moveaxis(asked.place[..., axes], -1, 0), places.T, strict=True)
+    parts = (np.maximum(0.0, 1.0 - np.abs(here[..., None] - at) / mesh) for here, at in pairs)
+    return np.asarray(functools.reduce(np.multiply, parts))
 
 
 def stretched(asked: AskedMotion, knots: Knots, axis: int, *, aside: bool) -> Signal:

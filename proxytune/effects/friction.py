@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.effects.effect import (
+    FEW,
     Cue,
     DeadReckoning,
     FilterContext,
@@ -22,6 +23,7 @@ from proxytune.effects.effect import (
     Trace,
     WheelCurve,
     effect,
+    fastest,
     like,
     parameter,
     reckon,
@@ -97,6 +99,9 @@ class Stiction(ShippedEffect):
 
     def apply(self, signal: Signal, memory: StictionState) -> tuple[Signal, StictionState]:
         """A Schmitt trigger on each wheel's duty."""
+        if signal.shape[-2] > FEW and signal.dtype == float and (compiled := fastest(signal.size)):
+            moved, moving = compiled.trigger(signal, np.stack(memory[:3]), memory.sample, memory.moving)
+            return moved, memory._replace(sample=signal[..., -1:, :], moving=moving)
         size = np.abs(signal)
         before = np.concatenate((memory.sample, signal[..., :-1, :]), axis=-2)
         starts = size >= memory.breakaway

@@ -3,11 +3,13 @@
 A first-order lag, exact for what holds over each sample.
 """
 
+import sys
+
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from proxytune.effects import FilterContext
+from proxytune.effects import FilterContext, compiled, effect
 from proxytune.effects.effect import FEW, low_pass, low_pass_at, reckon, start_reckoning
 
 
@@ -50,3 +52,32 @@ def test_a_few_samples_follow_to_the_last_bit_as_many_do(samples, lasts, before)
     means, ends = low_pass(signal[None], low_pass_at(value[None], lasts))
     assert mean.tobytes() == means[0].tobytes()
     assert end.value.tobytes() == ends.value[0].tobytes()
+
+
+@given(st.integers(FEW + 1, 40), st.integers(1, 3), st.sampled_from([(), (2,), (2, 3)]), st.floats(0.0, 40.0))
+@settings(max_examples=100)
+def test_many_samples_follow_to_the_last_bit_as_compiled(length, channels, batch, lasts):
+    random = np.random.default_rng(length)
+    signal = random.standard_normal((*batch, length, channels + 1))[..., 1:]
+    signal[..., : length // 2, :] = 0.0
+    state = low_pass_at(random.standard_normal((*batch, channels)), lasts)
+    ways = []
+    for used in (-np.inf, effect.PAYS_OFF):
+        with pytest.MonkeyPatch.context() as patched:
+            patched.setattr(effect, "_filtered", [used])
+            mean, end = low_pass(signal, state)
+        ways.append((mean.tobytes(), end.value.tobytes(), end.value.shape, end[1:]))
+    assert ways[0] == ways[1]
+
+
+def test_numba_filters_once_that_pays_off(monkeypatch):
+    monkeypatch.setattr(effect, "_filtered", [effect.PAYS_OFF - 20])
+    assert [effect.fastest(10) for _ in range(3)] == [None, None, compiled]
+
+
+@pytest.mark.parametrize("at_hand", [True, False])
+def test_scipy_filters_where_numba_does_not_work(monkeypatch, at_hand):
+    if not at_hand:
+        monkeypatch.delattr("proxytune.effects.compiled")
+        monkeypatch.setitem(sys.modules, "proxytune.effects.compiled", None)
+    assert effect._by_numba.__wrapped__() is (compiled if at_hand else None)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from filtered import filtered
 
-from proxytune.effects import FilterContext
+from proxytune.effects import FilterContext, effect
 from proxytune.effects.friction import Backlash, DeadBand, Stiction, WheelRipple
 
 NOMINAL = {"full_speed": 0.6, "wheel_radius": 0.03}
@@ -75,6 +75,21 @@ def test_stiction_is_the_trigger_written_as_a_loop():
     duties = np.repeat(np.random.default_rng(3).normal(0.0, 0.3, (400, 2)), 2, axis=0)
     expected = np.stack([schmitt(duties[:, side], width) for side, width in ((0, 0.12), (1, 0.36))], axis=-1)
     np.testing.assert_array_equal(run(Stiction(0.24, 0.5, 0.5, 1.0), *duties.T), expected)
+
+
+@pytest.mark.parametrize("batch", [(), (3,), (2, 3)])
+@pytest.mark.parametrize("reversal", [0.0, 0.5, 1.0])
+def test_stiction_is_to_the_last_bit_the_same_compiled(monkeypatch, batch, reversal):
+    signal = np.random.default_rng(4).normal(0.0, 0.3, (*batch, 300, 2)).round(1)
+    context = FilterContext(RATE_HZ, np.linspace(-0.4, 0.4, 2 * int(np.prod(batch))).reshape(*batch, 2), NOMINAL)
+    stiction = Stiction(0.3, 0.2, 0.5, reversal)
+    ways = []
+    for used in (-np.inf, effect.PAYS_OFF):
+        monkeypatch.setattr(effect, "_filtered", [used])
+        passed, state = stiction.apply(signal, stiction.begin(context))
+        ways.append([(one.shape, one.tobytes()) for one in (passed, *state)])
+    assert ways[0] == ways[1]
+    assert 0.1 < np.mean(passed == 0.0) < 0.9
 
 
 def test_a_gear_turns_half_its_gap_before_the_wheel_starts_and_all_of_it_when_it_reverses():

@@ -22,6 +22,7 @@ from proxytune.effects import SHIPPED, Catalogue, track_of
 from proxytune.errors import LogError
 from proxytune.logs import Log, LogEpisode, check_kind, rows_of_poses, without_outliers
 from proxytune.settings import GEOMETRY, nearest
+from proxytune.space import Theta
 
 
 def cosine_and_sine(angle: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -44,17 +45,21 @@ MOST = 6
 class Recent(Generic[Result]):
     """The latest few results: what is asked for again is not worked out again."""
 
-    def __init__(self) -> None:
+    def __init__(self, most: int = MOST) -> None:
         self._known: dict[Hashable, Result] = {}
+        self._most = most
 
     def get(self, key: Hashable, make: Callable[[], Result]) -> Result:
         """The result of a key, made if it is not kept; the one asked for longest ago is forgotten."""
         result = self._known.pop(key) if key in self._known else make()
         self._known[key] = result
-        if len(self._known) > MOST:
+        if len(self._known) > self._most:
             del self._known[next(iter(self._known))]
         return result
 
+
+SEVERAL = 40
+"""So many are kept of what is small: windows without each fold, of each length, with each effect and without."""
 
 Floats = NDArray[Any]
 
@@ -274,6 +279,11 @@ class Drives:
         return Recent()
 
     @cached_property
+    def fits(self) -> Recent[Theta]:
+        """The values in θ that were fitted to windows of these drives lately."""
+        return Recent(SEVERAL)
+
+    @cached_property
     def places(self) -> Floats:
         """Measured place at the start of each tick (E, T, 2) [m], interpolated."""
         return self._interpolated(self.poses[:, 0, :2])
@@ -442,7 +452,7 @@ def sum_by(labels: Whole, values: Floats, count: int, weights: Floats | None = N
     """Sums of values (M, …), weighted (M,), over those with one label each (count, …); no label is below 0."""
     own = labels >= 0
     share = np.ones(own.sum()) if weights is None else weights[own]
-    rows = sparse.csr_array((share, (labels[own], np.flatnonzero(own))), shape=(count, len(labels)))
+    rows = sparse.csc_array((share, labels[own], np.append(0, np.cumsum(own))), shape=(count, len(labels)))
     flat = values.reshape(len(values), -1)
     return np.asarray(rows @ flat).reshape(count, *values.shape[1:])
 

@@ -76,20 +76,25 @@ def fit_windows(drives: Drives, theta: Theta, free: Sequence[Coordinate], window
     fitted = smooth_coordinates(free, drives.robot)
     if not fitted or len(windows.begin) == 0:
         return dict(theta)
-    every = -(-len(windows.begin) // MOST_WINDOWS)
-    thinned = select_windows(windows, np.arange(len(windows.begin)) % every == 0)
-    problem = _problem(drives, theta, fitted, thinned)
-    found = least_squares(
-        problem.residuals,
-        problem.start,
-        problem.jacobian,
-        (0.0, 1.0),
-        loss="soft_l1",
-        f_scale=problem.scale,
-        ftol=1e-6,
-        max_nfev=MOST_TRIALS,
-    )
-    return problem.at(np.clip(found.x, 0.0, 1.0))
+
+    def make() -> Theta:
+        every = -(-len(windows.begin) // MOST_WINDOWS)
+        thinned = select_windows(windows, np.arange(len(windows.begin)) % every == 0)
+        problem = _problem(drives, theta, fitted, thinned)
+        found = least_squares(
+            problem.residuals,
+            problem.start,
+            problem.jacobian,
+            (0.0, 1.0),
+            loss="soft_l1",
+            f_scale=problem.scale,
+            ftol=1e-6,
+            max_nfev=MOST_TRIALS,
+        )
+        return problem.at(np.clip(found.x, 0.0, 1.0))
+
+    asked = (tuple(theta.items()), fitted, windows.begin.tobytes(), hash(windows.increment.tobytes()))
+    return dict(drives.fits.get(asked, make))
 
 
 class _Problem(NamedTuple):

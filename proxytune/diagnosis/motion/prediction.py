@@ -417,11 +417,17 @@ def _pose_slopes(
     # The way of 1 m/s within a tick; how far a turn of 1 rad/s in it moves places, less what a turn after it moves.
     along, about = (cosine + 1j * sine) * tick_s, (axle[..., 1] - 1j * axle[..., 0]) * tick_s
     after = 1j * walked[:, 1:, 0] - walked[:, 1:, 1]
+    # Sums over the ticks up to each pose as products of matrices, a window each.
+    window, tick = at
+    number = np.arange(len(window)) - np.searchsorted(window, window)
+    until = np.zeros((len(twists), int(number.max(initial=0)) + 1, twists.shape[1]))
+    until[window, number] = np.arange(twists.shape[1]) <= tick[:, None]
 
     def change(basis: Floats, unit: Floats) -> Floats:
-        place = (unit[0] + 1j * unit[1]) * along + unit[2] * about
-        turned = np.cumsum(basis, axis=1)[at] * (unit[2] * tick_s)
-        moved = np.cumsum(place[..., None] * basis, axis=1)[at] + after[at][:, None] * turned
+        place = ((unit[0] + 1j * unit[1]) * along + unit[2] * about)[:, None]
+        x, y, turned = ((until * weight @ basis)[window, number] for weight in (place.real, place.imag, 1.0))
+        turned *= unit[2] * tick_s
+        moved = x + 1j * y + after[at][:, None] * turned
         return np.stack((moved.real, moved.imag, turned), axis=1)
 
     return np.concatenate([sum(change(basis, unit) for basis, unit in parts) for parts in features], axis=-1)

@@ -126,8 +126,28 @@ def test_long_logs_are_thinned(driven, monkeypatch):
         "proxytune.diagnosis.motion.multistep_fit.predicted_motion",
         lambda d, t, w: asked.append(len(w.begin)) or np.zeros((len(w.window), 3)),
     )
-    fit_windows(driven, TRUTH, DECLARED, cut(driven, 2.0))
+    fit_windows(replace(driven), TRUTH, DECLARED, cut(driven, 2.0))
     assert 3 <= max(asked) <= 5
+
+
+def test_what_was_fitted_is_not_fitted_again_but_other_windows_and_starts_are(monkeypatch):
+    quiet, start = planted_drives(TRUTH, episodes=2, seconds=20.0, noise=None), {"trim": 0.0, "delay": 0.18}
+    windows = cut(quiet, 2.0)
+    found = fit_windows(quiet, start, DECLARED, windows)
+    known = dict(found)
+    found["trim"] = 9.0
+    asked = []
+    monkeypatch.setattr(
+        "proxytune.diagnosis.motion.multistep_fit.predicted_motion",
+        lambda d, t, w: asked.append(w) or np.zeros((len(w.window), 3)),
+    )
+    assert fit_windows(quiet, start, DECLARED, windows) == known
+    assert not asked
+    fewer = windows._replace(window=windows.window[:-1], increment=windows.increment[:-1])
+    for other in ((start, DECLARED, fewer), (start, DECLARED[:1], windows), (known, DECLARED, windows)):
+        asked.clear()
+        fit_windows(quiet, *other)
+        assert asked
 
 
 def test_no_pose_is_predicted_by_what_was_fitted_to_it(driven):

@@ -1,0 +1,65 @@
+"""Filters of long signals compiled by Numba: `effect.low_pass` and `friction.Stiction`, operation by operation."""
+
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+if vars(numba.config)["DISABLE_JIT"]:
+    raise ImportError("NUMBA_DISABLE_JIT is set: uncompiled, these loops take a thousand times as long")
+
+
+def low_pass(signal: NDArray[Any], value: NDArray[Any], remainder: float, mean_remainder: float) -> tuple[Any, Any]:
+    """Follow a signal (…, time, channels) from a value (…, channels): the mean over each sample, and the last value."""
+    mean, last = np.empty(signal.shape), np.array(value, dtype=float, order="C")
+    rows, ends = signal.reshape(-1, *signal.shape[-2:]), last.reshape(-1, signal.shape[-1])
+    _follow(rows, remainder, mean_remainder, ends, mean.reshape(rows.shape))
+    return mean, last
+
+
+def _filter(signal, remainder, mean_remainder, last, mean):  # type: ignore[no-untyped-def]
+    gain, rest = 1.0 - remainder, remainder * last
+    for row in range(signal.shape[0]):
+        for sample in range(signal.shape[1]):
+            for channel in range(signal.shape[2]):
+                new, was = signal[row, sample, channel], last[row, channel]
+                mean[row, sample, channel] = new + mean_remainder * (was - new)
+                end = rest[row, channel] + gain * new
+                rest[row, channel], last[row, channel] = 0.0 * new + remainder * end, end
+
+
+def trigger(
+    signal: NDArray[Any], thresholds: NDArray[Any], sample: NDArray[Any], moving: NDArray[np.bool_]
+) -> tuple[Any, Any]:
+    """Let a signal (…, time, channels) through while its trigger is on: that, and whether it is on at last.
+
+    Thresholds (3, channels) are those above which it goes on, below which it goes off, and below which it does so where
+    the sign changes; the sample before and whether it was on then are (…, 1, channels).
+    """
+    passed, on = np.empty(signal.shape), np.array(np.broadcast_to(moving, sample.shape))
+    rows, channels = signal.reshape(-1, *signal.shape[-2:]), signal.shape[-1]
+    before = np.array(sample, dtype=float, order="C").reshape(-1, channels)
+    _switch(rows, thresholds, before, on.reshape(-1, channels), passed.reshape(rows.shape))
+    return passed, on
+
+
+def _pass(signal, thresholds, before, on, passed):  # type: ignore[no-untyped-def]
+    for row in range(signal.shape[0]):
+        for sample in range(signal.shape[1]):
+            for channel in range(signal.shape[2]):
+                new, was = signal[row, sample, channel], before[row, channel]
+                size, turned = abs(new), new * was < 0.0
+                if size >= thresholds[0, channel]:
+                    on[row, channel] = True
+                elif size < thresholds[1, channel] or (turned and size < thresholds[2, channel]):
+                    on[row, channel] = False
+                passed[row, sample, channel] = new if on[row, channel] else 0.0
+                before[row, channel] = new
+
+
+# Signatures are compiled on import, which finds out whether Numba works here. No fast mathematics: it changes bits
+_compiled: dict[str, Any] = {"nopython": True, "nogil": True, "cache": True, "error_model": "numpy"}
+_ROWS, _LAST = "float64[:,:,:]", "float64[:,::1]"
+_follow = numba.jit(f"void({_ROWS}, float64, float64, {_LAST}, float64[:,:,::1])", **_compiled)(_filter)
+_switch = numba.jit(f"void({_ROWS}, {_LAST}, {_LAST}, boolean[:,::1], float64[:,:,::1])", **_compiled)(_pass)

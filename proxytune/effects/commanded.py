@@ -10,7 +10,6 @@ from types import MappingProxyType
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxytune.effects.effect import FilterContext, Signal, Stage, Trace
 from proxytune.effects.features import MOTION_GROUPS, Channel, Group, Knots, LearntCurve, hats, low_passes, play
@@ -35,7 +34,6 @@ class Commands(NamedTuple):
         turned: Since each last took the other sign [s].
         dragged: Each through plays of some widths (…, time, 2, widths).
         slow: Low-passes of each (…, time, 2, time constants).
-        late: Each as it was so long ago (…, time, 2, lags).
     """
 
     duty: Signal
@@ -45,7 +43,6 @@ class Commands(NamedTuple):
     turned: Signal
     dragged: Signal
     slow: Signal
-    late: Signal
 
 
 class CommandState(NamedTuple):
@@ -59,7 +56,6 @@ class CommandState(NamedTuple):
     turned: Signal
     dragged: Signal
     slow: Signal
-    late: Signal
     rate_hz: float
 
 
@@ -113,13 +109,6 @@ COMMAND_GROUPS: Mapping[str, Group] = MappingProxyType(
             of="of the play",
             duty=lambda c, k: c.dragged - c.duty[..., None],
         ),
-        "late": _group(
-            "commands of late",
-            "s",
-            of="of the change",
-            duty=lambda c, k: c.late - c.duty[..., None],
-            busy=lambda c, k: (c.late - c.duty[..., None]) * np.abs(c.duty).mean(axis=-1)[..., None, None],
-        ),
         "clock": _group(
             "time since the start",
             "s",
@@ -152,9 +141,8 @@ class LearntCommands:
         rest = np.asarray(context.rest, dtype=float)
         long, begun = np.full(rest.shape, LONG_S), np.where(np.abs(rest) < STILL, 0.0, LONG_S)
         dragged, slow = (np.repeat(rest[..., None], len(self._knots(name)), axis=-1) for name in ("dragged", "ended"))
-        line = np.repeat(rest[..., None, :], self._lags(context.rate_hz).max(initial=1), axis=-2)
         start, sign = np.zeros(rest.shape), np.sign(rest)
-        return CommandState(rest, sign, start, long, begun, long, dragged, slow, line, context.rate_hz)
+        return CommandState(rest, sign, start, long, begun, long, dragged, slow, context.rate_hz)
 
     def apply(self, signal: Signal, memory: CommandState) -> tuple[Signal, CommandState]:
         """Add what the curves say."""
@@ -166,10 +154,6 @@ class LearntCommands:
         """Features that weights scale, curve by curve (…, time, 2, knots)."""
         commands, _ = self._recall(signal, memory)
         return [_basis(curve)(commands, curve.knots) for curve in self.curves]
-
-    def _lags(self, rate_hz: float) -> NDArray[np.int64]:
-        """How many samples ago commands of late were."""
-        return np.rint(np.asarray(self._knots("late"), dtype=float) * rate_hz).astype(np.int64)
 
     def _knots(self, group: str) -> Knots:
         return next((curve.knots for curve in self.curves if curve.group == group), ())
@@ -192,11 +176,6 @@ class LearntCommands:
         wheels = np.moveaxis(signal, -2, -1)
         dragged = np.moveaxis(play(wheels, past.dragged, self._knots("dragged")), -2, -3)
         slow = np.moveaxis(low_passes(wheels, past.slow, self._knots("ended"), past.rate_hz), -2, -3)
-        joined = np.concatenate((past.late, signal), axis=-2)
-        lags, length, before_it = self._lags(past.rate_hz), signal.shape[-2], past.late.shape[-2]
-        late = np.empty((*signal.shape, len(lags)))
-        for number, lag in enumerate(lags):
-            late[..., number] = joined[..., before_it - lag : before_it - lag + length, :]
         commands = Commands(
             duty=signal,
             seconds=past.seconds[..., None, :] + np.arange(1.0, signal.shape[-2] + 1.0)[:, None] / past.rate_hz,
@@ -205,7 +184,6 @@ class LearntCommands:
             turned=since(np.diff(course, axis=-2) * course[..., :-1, :] != 0.0, past.turned),
             dragged=dragged,
             slow=slow,
-            late=late,
         )
         after = CommandState(
             duty=signal[..., -1, :],
@@ -216,7 +194,6 @@ class LearntCommands:
             turned=commands.turned[..., -1, :],
             dragged=dragged[..., -1, :, :],
             slow=slow[..., -1, :, :],
-            late=joined[..., length:, :],
             rate_hz=past.rate_hz,
         )
         return commands, after

@@ -17,7 +17,6 @@ KNOTS = {
     "turned": (0.2, 0.5),
     "dragged": (0.05, 0.2),
     "clock": (0.5, 1.5),
-    "late": (0.1, 0.25),
     "ended": (0.1, 0.4),
 }
 
@@ -150,12 +149,3 @@ def test_what_depends_on_the_time_since_the_start_does_so_for_both_wheels():
         added(LearntCurve("clock", "duty", (1.0, 2.0), (0.5, 0.0)), steady)[[9, 19, 29]],
         [[0.1, -0.05], [0.2, -0.1], [0.1, -0.05]],
     )
-
-
-def test_a_busy_computer_is_later_the_more_is_commanded():
-    signal = np.repeat([[0.0, 0.0], [0.8, 0.4], [0.2, 0.2]], 10, axis=0)
-    later = added(LearntCurve("late", "busy", (0.1,), (1.0,)), signal)
-    np.testing.assert_allclose(later[10:12], [[-0.48, -0.24]] * 2)
-    np.testing.assert_allclose(later[20:22], [[0.12, 0.04]] * 2)
-    assert not later[12:20].any()
-    np.testing.assert_allclose(added(LearntCurve("late", "duty", (0.1,), (0.5,)), signal)[10], (-0.4, -0.2))

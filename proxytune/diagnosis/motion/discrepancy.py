@@ -82,8 +82,7 @@ HELD_S = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0)
 SINCE_S = (0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 0.8, 1.2)
 DRAGS = (0.02, 0.05, 0.1, 0.2)
 ENDED_S = (0.1, 0.25, 0.63, 1.6)
-LATE_S = (0.05, 0.1, 0.15, 0.2, 0.3)
-"""Of commands: how long they are held, since they began or turned round, half widths of plays, time constants, lags."""
+"""Of commands: how long they are held, since they began or turned round, half widths of plays, time constants."""
 APART = 0.02
 """Knots nearer to each other or to 0 than this share of the range are one."""
 
@@ -129,7 +128,6 @@ def offer_curves(drives: Drives, theta: Theta) -> Learnt:
             "turned": SINCE_S,
             "dragged": DRAGS,
             "ended": ENDED_S,
-            "late": LATE_S,
         }
         knots["clock"] = tuple(2.0 * n for n in range(1, int(min(seconds, 80.0) / 2.0) + 1))
     if not _in_frames_of_their_own(drives):

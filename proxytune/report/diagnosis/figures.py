@@ -134,7 +134,6 @@ FADING = {
     "turned": "until then",
     "dragged": "half the play",
     "ended": "time constant",
-    "late": "so long ago",
 }
 """Groups whose weights are points, each of something that fades or ends, and what their knots are."""
 PAIRS = {"speed_and_turn": ("forward speed [m/s]", "yaw rate [rad/s]"), "place": ("x [m]", "y [m]")}

@@ -20,6 +20,9 @@ blank = import_module("blank").blank
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 # A dumb terminal, as an editor's shell is, has no progress bars; tests of these mean one that has.
 os.environ.pop("TERM", None)
+# Rewriting asserts is half of collecting them, so it is kept for the next run; what tests start keeps its bytecode too.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 # A run in the background ignores Ctrl-C; tests mean it to be heeded, as in a terminal.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 # The same examples in every run, however long they take.

@@ -57,10 +57,8 @@ def _skip_without_pybullet(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(autouse=True, scope="module")
 def _blank_figures(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Save figures blank in the quick run, where they cost half the time, unless FIGURES_DRAWN says otherwise."""
-    room = request.path.parent.name
-    slow = request.config.getoption("markexpr") != "not slow" and room not in ("running", "study", "teaching")
-    if room == "report" or getattr(request.module, "FIGURES_DRAWN", slow):
+    """Save figures blank, where they cost half the time, but for those of reports and where FIGURES_DRAWN says so."""
+    if request.path.parent.name == "report" or getattr(request.module, "FIGURES_DRAWN", False):
         yield
         return
     with pytest.MonkeyPatch.context() as patch:

@@ -25,7 +25,6 @@ import proxytune
 from proxytune.cli.main import main
 from proxytune.skeletons.writing import SIX
 
-FIGURES_DRAWN = False
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.md"))

@@ -10,7 +10,6 @@ from planted import look_for_few
 from proxytune.cli.main import main
 from proxytune.logs import read_log
 
-FIGURES_DRAWN = False
 FIGURES = [word for key, value in foreign_robot.FIGURES.items() for word in ("--figure", f"{key}={value}")]
 
 

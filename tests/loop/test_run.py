@@ -18,7 +18,6 @@ from proxytune.cli.main import main
 from proxytune.loop import diagnosing, run as closing
 from proxytune.loop.run import STEPS
 
-FIGURES_DRAWN = False
 LINES = {name: f"step {number} of {len(STEPS)}," for number, name in enumerate(STEPS, start=1)}
 STUDIES = {"study": "", "extended study": "loop/extended"}
 """These are killed in the middle: a few episodes are driven."""

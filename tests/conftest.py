@@ -1,5 +1,6 @@
 """What several rooms' tests share: a study of a domain family that is a formula."""
 
+import gc
 import os
 import shutil
 import signal
@@ -36,6 +37,11 @@ FUZZ = 100
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Let a nightly run spoil more files."""
     parser.addoption("--fuzz", type=int, default=FUZZ, metavar="N", help=f"spoilt files of each kind [{FUZZ}]")
+
+
+def pytest_collection_finish() -> None:
+    """Spare the garbage collector what stays until the end: thousands of tests."""
+    gc.freeze()
 
 
 @pytest.fixture(autouse=True)

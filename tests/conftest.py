@@ -1,5 +1,6 @@
 """What several rooms' tests share: a study of a domain family that is a formula."""
 
+import gc
 import os
 import shutil
 import signal
@@ -20,6 +21,9 @@ blank = import_module("blank").blank
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 # A dumb terminal, as an editor's shell is, has no progress bars; tests of these mean one that has.
 os.environ.pop("TERM", None)
+# Rewriting asserts is half of collecting them, so it is kept for the next run; what tests start keeps its bytecode too.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 # A run in the background ignores Ctrl-C; tests mean it to be heeded, as in a terminal.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 # The same examples in every run, however long they take.
@@ -33,6 +37,11 @@ FUZZ = 100
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Let a nightly run spoil more files."""
     parser.addoption("--fuzz", type=int, default=FUZZ, metavar="N", help=f"spoilt files of each kind [{FUZZ}]")
+
+
+def pytest_collection_finish() -> None:
+    """Spare the garbage collector what stays until the end: thousands of tests."""
+    gc.freeze()
 
 
 @pytest.fixture(autouse=True)
@@ -54,10 +63,8 @@ def _skip_without_pybullet(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(autouse=True, scope="module")
 def _blank_figures(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Save figures blank in the quick run, where they cost half the time, unless FIGURES_DRAWN says otherwise."""
-    room = request.path.parent.name
-    slow = request.config.getoption("markexpr") != "not slow" and room not in ("running", "study", "teaching")
-    if room == "report" or getattr(request.module, "FIGURES_DRAWN", slow):
+    """Save figures blank, where they cost half the time, but for those of reports and where FIGURES_DRAWN says so."""
+    if request.path.parent.name == "report" or getattr(request.module, "FIGURES_DRAWN", False):
         yield
         return
     with pytest.MonkeyPatch.context() as patch:

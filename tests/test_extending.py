@@ -20,7 +20,6 @@ from proxytune.extensions.door import GROUP
 from proxytune.settings import read_settings
 from proxytune.study import open_study
 
-FIGURES_DRAWN = False
 PAGE = (Path(__file__).resolve().parent.parent / "docs" / "how-to" / "extending.md").read_text(encoding="utf-8")
 INTRODUCTION, *CHAPTERS = re.split(r"^## ", PAGE, flags=re.MULTILINE)
 SECTIONS = {chapter.partition("\n")[0]: chapter for chapter in CHAPTERS}

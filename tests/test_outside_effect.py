@@ -15,7 +15,6 @@ from proxytune.errors import ExtensionError, InputError, SettingsError
 from proxytune.extensions.door import GROUP
 from proxytune.settings import Section
 
-FIGURES_DRAWN = False
 TABLE = f'format = 1\nrobot = "duckiebot"\n\n[effects."{NAME}"]\nloss = 0.3\n'
 TWO = WEAK_REVERSE.replace("    loss: float\n", "    loss: float\n    bias: float\n").replace(
     "        ),\n    )\n",

@@ -25,7 +25,6 @@ import proxytune
 from proxytune.cli.main import main
 from proxytune.skeletons.writing import SIX
 
-FIGURES_DRAWN = False
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
@@ -164,7 +163,7 @@ def test_every_command_about_logs_runs_and_a_bag_says_what_its_log_says(tmp_path
     look_for_few(monkeypatch, "wheel_gain")
     monkeypatch.chdir(tmp_path)
     assert main(["new", "robot", "my_robot", "--figures", FIGURES]) == 0
-    made = foreign_robot.write_form(tmp_path, "ros1", [foreign_robot.drive(7, seconds=60.0)])
+    made = foreign_robot.write_form(tmp_path, "ros1", [foreign_robot.drive(7, seconds=45.0)])
     (made / "run0.bag").rename("my_drives.bag")
     capsys.readouterr()
     answers = []

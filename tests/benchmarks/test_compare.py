@@ -21,7 +21,7 @@ from runs import read_runs
 
 from proxytune.search import registry
 
-FIGURES_DRAWN = True  # also in the quick run: see conftest.py
+FIGURES_DRAWN = True  # see conftest.py
 FEW = ("--engines", "random,sobol", "--seeds", "2", "--budget", "7", "--initial", "5")
 
 

@@ -15,7 +15,6 @@ from proxytune.cli.main import main
 from proxytune.effects import CATALOGUE, read_model
 from proxytune.study import open_study
 
-FIGURES_DRAWN = False
 pytestmark = pytest.mark.usefixtures("few_effects")
 KEYS = {
     *("verdict", "declared", "effects", "immaterial", "candidates", "residual_depends_on", "error"),

@@ -16,7 +16,6 @@ from proxytune.cli.main import main
 from proxytune.effects import read_model
 from proxytune.logs import read_log
 
-FIGURES_DRAWN = False
 pytestmark = pytest.mark.usefixtures("few_effects")
 ROLLED = {"camera_pitch": 19.15, "camera_roll": 4.0}
 KEYS = {

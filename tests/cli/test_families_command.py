@@ -17,7 +17,6 @@ from proxytune.errors import InputError
 from proxytune.running import Silent
 from proxytune.study import read_study_settings
 
-FIGURES_DRAWN = False
 FAST = "[families.fast]\n[families.slow.domain]\nsleep = 0.02\n"
 THIS_RUN = ("episodes", "seconds")
 """What differs when a study is run again."""

@@ -13,7 +13,7 @@ from tiny_loop import TWIN, write_tiny
 from proxytune.cli.main import main
 from proxytune.report.writing import file_names
 
-FIGURES_DRAWN = True  # also in the quick run: see conftest.py
+FIGURES_DRAWN = True  # see conftest.py
 TABLE = "agent,episode,d\n" + "".join(f"{a},{e},{i + 0.1 * e}\n" for i, a in enumerate("ABC") for e in (0, 1))
 
 

@@ -10,7 +10,6 @@ from planted import look_for_few
 from proxytune.cli.main import main
 from proxytune.logs import read_log
 
-FIGURES_DRAWN = False
 FIGURES = [word for key, value in foreign_robot.FIGURES.items() for word in ("--figure", f"{key}={value}")]
 
 
@@ -118,7 +117,7 @@ def test_predict_takes_a_table_as_it_is_at_its_poses_own_times(capsys, model, tm
 def test_diagnose_takes_a_folder_of_tables_and_names_what_the_robot_has(capsys, tmp_path, monkeypatch):
     look_for_few(monkeypatch, "wheel_gain")
     monkeypatch.chdir(tmp_path)
-    drives = [foreign_robot.drive(100 + number, seconds=20.0, offset_s=-0.25) for number in range(6)]
+    drives = [foreign_robot.drive(100 + number, seconds=20.0, offset_s=-0.25) for number in range(3)]
     home = foreign_robot.write_form(tmp_path, "csv", drives)
     assert main(["diagnose", str(home), "--robot", "nobodys", *FIGURES, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)

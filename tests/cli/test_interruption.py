@@ -30,7 +30,6 @@ def ended(process, number, command):
     assert (process.returncode, out) == (128 + number, "")
 
 
-FIGURES_DRAWN = False  # by the commands run in this process
 SWEPT = ("--parameter", "trim", "--points", "3", "--json")
 
 

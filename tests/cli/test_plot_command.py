@@ -5,6 +5,8 @@ import pytest
 
 from proxytune.cli.main import main
 
+FIGURES_DRAWN = True  # see conftest.py
+
 
 @pytest.mark.slow
 def test_every_figure_is_drawn_again_without_simulating(finished, capsys):

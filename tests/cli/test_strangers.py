@@ -96,17 +96,16 @@ OTHERS = ("[numba_extensions]", "init = evil_mod:init", "[matplotlib.backend]", 
           "__root__ = evil_mod:register")  # fmt: skip
 HERE = {**modules(*OPTIONAL, *STANDARD, *USED), **installed(*PLUGINS, *OTHERS), **SETTINGS}
 STRANGERS = {
-    "beside it": Stranger({**modules(*OPTIONAL), **BESIDE}),
+    "beside it and beside its robot": Stranger(
+        {**modules(*OPTIONAL, "wolf/optuna"), **BESIDE, "wolf/robot.toml": robot_of(".dead_band]\nwidth = 0.01")},
+        {"robot": "wolf"},
+    ),
     "beside it as folders, one process": Stranger(modules(*(f"{name}/__init__" for name in OPTIONAL)), {"jobs": 1}),
     "in the folder itself": Stranger(HERE, here=True),
     "in the folder itself, one process": Stranger(HERE, {"jobs": 1}, here=True),
     "a plug-in's engine": Stranger(installed(*PLUGINS), {"engine": "evil"}, status=2),
     "a plug-in's objective": Stranger(installed(*PLUGINS), {"objective": "evil"}, status=2, here=True),
     "a plug-in's robot": Stranger(installed(*PLUGINS), {"robot": "evil"}, status=2),
-    "a robot without code": Stranger(
-        {"wolf/robot.toml": robot_of(".dead_band]\nwidth = 0.01"), **modules("wolf/optuna", "bottleneck")},
-        {"robot": "wolf"},
-    ),
 }
 
 

@@ -13,8 +13,6 @@ from taught import GRID, make_taught
 
 from proxytune.cli.main import main
 
-FIGURES_DRAWN = False  # but for their names: see conftest.py
-
 
 @pytest.mark.slow
 def test_teach_prints_one_document_with_the_promised_keys_and_people_see_table_1(make_study, capsys):

@@ -18,7 +18,6 @@ from proxytune.storage import Store
 from proxytune.storage.database import FORMAT
 from proxytune.study import StudyRun, open_study, run_trials
 
-FIGURES_DRAWN = False  # by the commands run in this process: see conftest.py
 slow = pytest.mark.slow
 DAMAGED = r"is damaged \([^)]+\); restore a copy, or keep what is whole: python -m proxytune repair \S+"
 

@@ -129,8 +129,8 @@ def theta_of(theta_name):
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory):
-    """The measured poses of six seconds of an agent under a θ, each driven once."""
-    domain = family(tmp_path_factory.mktemp("seen"), plant="planar", seconds=6.0)
+    """The measured poses of four seconds of an agent under a θ, each driven once."""
+    domain = family(tmp_path_factory.mktemp("seen"), plant="planar", seconds=4.0)
 
     def drive(**theta):
         episode = make_episode(theta, agent="brisk", start=1, seed=5)

@@ -16,13 +16,18 @@ from proxytune.study import StudyRun, goal_of, open_study, run_trials
 
 
 class Launched:
-    """A study, or a command, run by a fork of a process that has loaded proxytune; one at a time."""
+    """A study, or a command, run by a fork of a process that has loaded proxytune; one at a time.
 
-    def __init__(self, launcher, folder, words=None):
+    A module of fakes may `change` something in it first.
+    """
+
+    def __init__(self, launcher, folder, words=None, changed=None):
         # What is left of a killed process, joblib's clean-up, may still print: into a file of its own.
         self.launcher, self.output = launcher, folder.with_name(f"{folder.name}_{time.monotonic_ns()}.txt")
         self.output.touch()  # one that is killed at once makes none
-        launcher.stdin.write(json.dumps([*(words or ["study", str(folder)]), "--json", str(self.output)]) + "\n")
+        launcher.stdin.write(
+            json.dumps([changed, *(words or ["study", str(folder)]), "--json", str(self.output)]) + "\n"
+        )
         launcher.stdin.flush()
         self.pid = int(launcher.stdout.readline())
 

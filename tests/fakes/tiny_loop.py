@@ -1,12 +1,12 @@
 """A loop on the planar plant that takes seconds: few agents, short episodes, a short log.
 
-Run as a script it is the command line, with the log that `loop` records of a twin made short, and few effects to find.
+Launched processes are changed by it: the log that `loop` records of a twin is short, and few effects are looked for.
 """
 
 import json
-import sys
 
 from proxytune.api import Wanted
+from proxytune.diagnosis.motion import diagnose as selecting, screening
 from proxytune.loop import diagnosing
 
 STUDY = """\
@@ -91,10 +91,8 @@ def write_diagnosis(folder, **changes):
     (folder / "diagnosis.json").write_text(json.dumps({**DIAGNOSIS, **changes}), encoding="utf-8")
 
 
-if __name__ == "__main__":
-    from proxytune.cli.main import main
-    from proxytune.diagnosis.motion import screening
-
+def change():
+    """In a process of its own."""
     diagnosing.Wanted = short
     screening.motion_effects = lambda catalogue: ("dead_band", "motor_lag", "stiction")
-    sys.exit(main())
+    selecting.has_body = lambda drives: False

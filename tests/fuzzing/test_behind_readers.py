@@ -39,7 +39,6 @@ from proxytune.study.earlier import earlier_trials, learn
 from tests.conftest import study_maker
 
 __all__ = ["inputs"]  # A fixture
-FIGURES_DRAWN = False
 
 TIMES = np.arange(0.0, ONE_DRIVE, 0.05)
 

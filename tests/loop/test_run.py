@@ -1,15 +1,16 @@
 """The whole loop: with a diagnosis that is given, then with the real one, killed in every step."""
 
 import json
+import os
 import re
 import shutil
 import signal
-import subprocess
-import sys
+import time
 from pathlib import Path
 
 import pytest
-from processes import ENVIRONMENT, FAKES, wait_for
+from launched import Launched
+from processes import wait_for
 from tiny_loop import RIGHTING, short, write_diagnosis, write_tiny
 
 from proxytune.api import StudyReport
@@ -17,9 +18,8 @@ from proxytune.cli.main import main
 from proxytune.loop import diagnosing, run as closing
 from proxytune.loop.run import STEPS
 
-FIGURES_DRAWN = False
 LINES = {name: f"step {number} of {len(STEPS)}," for number, name in enumerate(STEPS, start=1)}
-STUDIES = {"study": "tiny", "extended study": "tiny/loop/extended"}
+STUDIES = {"study": "", "extended study": "loop/extended"}
 """These are killed in the middle: a few episodes are driven."""
 
 
@@ -240,47 +240,36 @@ def test_scores_of_held_out_agents_in_the_targets_table_are_used(closed, closed_
     assert document["prpv"] == closed_once[1]["prpv"]
 
 
-def start(home):
-    command = [sys.executable, str(FAKES / "tiny_loop.py"), "loop", "tiny", "--json"]
-    with (home / "out.json").open("w") as out:
-        return subprocess.Popen(command, cwd=home, env=ENVIRONMENT, text=True, stdout=out, stderr=subprocess.PIPE)
+def start(launcher, folder):
+    return Launched(launcher, folder, ["loop", str(folder)], "tiny_loop")
 
 
-def finished(home):
-    """Run to the end: the document and the page, but for times."""
-    with start(home) as process:
-        _, told = process.communicate()
-    assert process.returncode == 0, told
-    page = (home / "tiny" / "loop" / "report.html").read_text()
-    document = json.loads((home / "out.json").read_text())
-    return {**document, "this_run": None}, re.sub(r"\d{4}-\d\d-\d\d \d\d:\d\d UTC", "", page), document["this_run"]
+def finished(launcher, folder):
+    """Run to the end: the document and the page, but for times and where it lies, and the steps of this run."""
+    status, printed = start(launcher, folder).end()
+    assert status == 0, printed
+    page = re.sub(r"\d{4}-\d\d-\d\d \d\d:\d\d UTC", "", (folder / "loop" / "report.html").read_text())
+    document = json.loads(printed[printed.index("\n{\n") :].replace(str(folder), ""))
+    return {**document, "this_run": None}, page.replace(str(folder), ""), document["this_run"]["steps"]
 
 
 @pytest.mark.slow
-def test_killed_in_every_step_it_goes_on_to_the_same_page(tmp_path):
-    whole, stopped = tmp_path / "whole", tmp_path / "stopped"
-    for home in (whole, stopped):
-        home.mkdir()
-        write_tiny(home / "tiny", RIGHTING)
-    expected = finished(whole)[:2]
-    assert expected[0]["righted"]
-    for name, line in LINES.items():
-        with start(stopped) as process:
-            for told in process.stderr:
-                if line in told:
-                    break
-            if name in STUDIES:
-                wait_for(stopped / STUDIES[name], process, 3)
-            process.send_signal(signal.SIGKILL)
-        assert process.returncode == -signal.SIGKILL
-    assert finished(stopped)[:2] == expected
-    assert finished(stopped)[2]["steps"] == []
-
-
-@pytest.mark.slow
-def test_a_real_diagnosis_names_what_the_proxy_lacks(tmp_path):
-    write_tiny(tmp_path / "tiny")
-    document, page, _ = finished(tmp_path)
+def test_killed_in_every_step_it_goes_on_to_the_same_page(tmp_path, launcher):
+    """With the real diagnosis, which names what the proxy lacks."""
+    whole, stopped = (write_tiny(tmp_path / name, RIGHTING) for name in ("whole", "stopped"))
+    document, page, _ = expected = finished(launcher, whole)
+    assert document["righted"]
     assert [effect["name"] for effect in document["effects"]] == ["dead_band"]
     assert document["errors"]["error"]["after"]["value"] < 0.2 * document["errors"]["error"]["before"]["value"]
-    assert page.count('<svg class="drawn"') == 3
+    assert page.count('<svg class="drawn"') == 5  # two show the righted agent
+    for name, line in LINES.items():
+        process = start(launcher, stopped)
+        while line not in process.output.read_text():
+            assert not process.poll()
+            time.sleep(0.005)
+        if name in STUDIES:
+            wait_for(stopped / STUDIES[name], process, 3)
+        os.kill(process.pid, signal.SIGKILL)
+        assert process.end()[0] == -signal.SIGKILL
+    assert finished(launcher, stopped)[:2] == expected[:2]
+    assert finished(launcher, stopped)[2] == []

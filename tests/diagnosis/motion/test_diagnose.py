@@ -9,7 +9,7 @@ from dataclasses import FrozenInstanceError, replace
 import hidden_cases as hidden
 import numpy as np
 import pytest
-from planted import CALM, ROBOT, TRUTH, driven_log, drives_of, fitted, planted_log, with_poses
+from planted import CALM, ROBOT, TRUTH, driven_log, drives_of, fitted, look_for_few, planted_log, with_poses
 from rates import CLEAR
 
 from proxytune.diagnosis import RULES, AdoptedEffect, Estimate, Findings, diagnose_log
@@ -171,14 +171,16 @@ def test_an_error_from_a_single_block_of_drives_can_be_written_as_json():
 
 
 @pytest.mark.slow
-def test_one_drive_is_enough_if_it_is_long():
+def test_one_drive_is_enough_if_it_is_long(monkeypatch):
+    look_for_few(monkeypatch)
     found = diagnose(planted_log(SCRUBBING, episodes=1, seconds=70.0), ROBOT, ("trim", "delay"))
     assert [effect.effect for effect in found.effects] == ["yaw_scrub"]
     assert found.robot_clusters is None
 
 
 @pytest.mark.slow
-def test_drives_that_all_begin_at_the_origin_and_stubs_among_them_give_a_result():
+def test_drives_that_all_begin_at_the_origin_and_stubs_among_them_give_a_result(monkeypatch):
+    look_for_few(monkeypatch)
     log = planted_log(SCRUBBING, episodes=6, seconds=12.0)
     at_origin = driven_log(SCRUBBING, np.stack([e.commands for e in log.episodes]), np.zeros((6, 3)))
     stubs = [
@@ -191,7 +193,8 @@ def test_drives_that_all_begin_at_the_origin_and_stubs_among_them_give_a_result(
 
 
 @pytest.mark.slow
-def test_an_hour_of_standing_with_a_minute_of_driving_gives_what_the_minute_gives():
+def test_an_hour_of_standing_with_a_minute_of_driving_gives_what_the_minute_gives(monkeypatch):
+    look_for_few(monkeypatch)
     duties = np.zeros((1, 20 * 3600, 2))
     duties[0, 36000:37400] = planted_log(SCRUBBING, episodes=1, seconds=70.0).episodes[0].commands
     found = diagnose(driven_log(SCRUBBING, duties, np.zeros((1, 3))), ROBOT, ("trim", "delay"))
@@ -242,7 +245,7 @@ HIDDEN = [
 @pytest.mark.slow
 @pytest.mark.parametrize("name", HIDDEN)
 def test_a_hidden_effect_is_the_first_to_be_added(name):
-    base = fitted(drives_of(hidden.make_log(CASES[name], episodes=6, seconds=30.0)))
+    base = fitted(drives_of(hidden.make_log(CASES[name], episodes=6, seconds=15.0)))
     evidence = gather_evidence(base, {"trim", "delay"}, 1)
     (added,) = adopt([], choose_best(base, evidence, RULES.least_gain_nats), evidence)
     (right,) = CASES[name].right

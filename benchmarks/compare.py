@@ -92,7 +92,7 @@ class WithinRun:
 @contextmanager
 def objective_of(arguments: argparse.Namespace, output: Path, engines: int) -> Iterator[Arena]:
     """The objective with all that a comparison on it needs, and a bar that shows how far it is."""
-    bars = Bars(engines * arguments.seeds, "runs")
+    bars = Bars(engines * len(arguments.seeds), "runs")
     if arguments.study in STAND_INS:
         with bars:
             yield Arena(STAND_INS[arguments.study], *_spending(arguments, BUDGET, INITIAL), 2, bars)
@@ -100,7 +100,7 @@ def objective_of(arguments: argparse.Namespace, output: Path, engines: int) -> I
     study = open_study(study_folder(Path(arguments.study)))
     budget, initial = _spending(arguments, study.settings.budget, study.settings.initial)
     per_run = _episodes_per_run(arguments, study.settings, budget)
-    episodes = per_run * arguments.seeds * engines
+    episodes = per_run * len(arguments.seeds) * engines
     print(f"compare: at most {episodes} episodes, {per_run} in each run", file=sys.stderr)
     with Store.open(output) as store, bars:
         yield Arena(_on_study(arguments, StudyRun(study, store, WithinRun(bars))), budget, initial, 1, bars)
@@ -137,6 +137,17 @@ def _spending(arguments: argparse.Namespace, budget: int, initial: int) -> tuple
     return budget, initial
 
 
+def seeds(text: str) -> range:
+    """So many seeds from 1 on, or those of FIRST:LAST:STEP."""
+    numbers = [int(number) for number in text.split(":")]
+    if len(numbers) == 1:
+        return range(1, numbers[0] + 1)
+    first, last, step = (*numbers, 1)[:3]
+    if len(numbers) > 3 or min(numbers) < 1:
+        raise ValueError(text)
+    return range(first, last + 1, step)
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Compare engines.
 
@@ -163,7 +174,11 @@ def parser() -> argparse.ArgumentParser:
         help=f"from {', '.join(NAMES)}; the others are compared with the first [all that a study can use]",
     )
     parser.add_argument(
-        "--seeds", type=int, default=30, metavar="N", help="runs per engine, with the same seeds for all [30]"
+        "--seeds",
+        type=seeds,
+        default=seeds("30"),
+        metavar="N",
+        help="runs per engine, with the same seeds for all; or which seeds, as FIRST:LAST:STEP [30]",
     )
     parser.add_argument("--budget", type=int, metavar="N", help=f"evaluations per run [the study's, or {BUDGET}]")
     parser.add_argument(
@@ -199,7 +214,7 @@ def run(arguments: argparse.Namespace) -> Answer:
         keys = _keys(objective, engines, arguments.seeds, arena.budget, arena.initial)
         runs = _finish_all(arena, keys, output / FILE_NAME, _beside(arguments))
     grouped = [[runs[key] for key in keys if key.engine == engine.name] for engine in engines]
-    summaries = [summarise(group, grouped[0], objective.tolerance) for group in grouped]
+    summaries = [summarise(group, grouped[0], objective.tolerance, objective.seconds) for group in grouped]
     return _answer(objective, summaries, grouped, output, _typed(arguments))
 
 
@@ -251,17 +266,18 @@ def _beside(arguments: argparse.Namespace) -> Path:
 
 
 def _check(arguments: argparse.Namespace) -> None:
+    given = {**vars(arguments), "seeds": len(arguments.seeds)}
     for name, least in (("seeds", 2), ("budget", 2), ("initial", 1)):
-        value = getattr(arguments, name)
+        value = given[name]
         if value is not None and not least <= value <= MOST:
             raise InputError(f"--{name} {value}: give at least {least} and at most {MOST}")
     check_truths(arguments)
 
 
-def _keys(objective: Objective, engines: Sequence[Engine], seeds: int, budget: int, initial: int) -> list[RunKey]:
+def _keys(objective: Objective, engines: Sequence[Engine], seeds: range, budget: int, initial: int) -> list[RunKey]:
     return [
         RunKey(objective.identity, engine.name, seed, budget, initial, engine_code(engine))
-        for seed in range(1, seeds + 1)
+        for seed in seeds
         for engine in engines
     ]
 

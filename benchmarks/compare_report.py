@@ -69,13 +69,22 @@ def compare_tables(name: str, summaries: Sequence[EngineSummary], budget: int) -
     first = summaries[0]
     good = _table(
         f"{name}: the answer after {budget} evaluations, {first.seeds} seeds",
-        ("fresh score", f"less {first.engine}'s", "θ error", "s per\nproposal"),
+        (
+            "fresh score",
+            "of the\ntruth's",
+            f"less {first.engine}'s",
+            "θ error",
+            f"less {first.engine}'s",
+            "s per\nproposal",
+        ),
         [
             (
                 one.engine,
                 with_interval(one.score, ".1f"),
+                with_interval(one.of_truth, ".2f"),
                 with_interval(one.regret_difference, ".1f"),
                 with_interval(one.error, ".2f"),
+                with_interval(one.error_difference, ".2f"),
                 _time(one),
             )
             for one in summaries
@@ -83,9 +92,15 @@ def compare_tables(name: str, summaries: Sequence[EngineSummary], budget: int) -
     )
     soon = _table(
         "evaluations needed to reach the noise floor",
-        ("reached", "median", f"{first.engine}'s share", f"saved by {first.engine}"),
+        ("reached", "median", f"{first.engine}'s share", f"saved by {first.engine}", "simulated s"),
         [
-            (one.engine, _of(one.reached, one.seeds), needed(one.evaluations, budget), *_paired(one))
+            (
+                one.engine,
+                _of(one.reached, one.seeds),
+                needed(one.evaluations, budget),
+                *_paired(one),
+                with_interval(one.simulated, ".0f"),
+            )
             for one in summaries
         ],
     )

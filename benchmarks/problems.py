@@ -50,6 +50,11 @@ class Objective(Protocol):
         ...
 
     @property
+    def seconds(self) -> float | None:
+        """Simulated seconds that an evaluation takes; None where nothing is simulated."""
+        ...
+
+    @property
     def identity(self) -> str:
         """What determines its figures; if that changes, finished runs lose their meaning."""
         ...
@@ -104,6 +109,7 @@ class Analytic:
     name: str = "analytic"
     space: Space = BOX
     tolerance: float = float(STEP)
+    seconds: float | None = None
     identity: str = "analytic 1"
 
     def truth(self, seed: int) -> Values:
@@ -168,6 +174,7 @@ class Ranking:
     name: str = "ranking"
     space: Space = BOX
     tolerance: float = 14.0
+    seconds: float | None = None
     identity: str = "ranking 1"
 
     def truth(self, seed: int) -> Values:

@@ -211,13 +211,17 @@ class EngineSummary:
         engine: Its name.
         seeds: How many runs.
         score: Mean score of the answers, free of the noise that the engine has seen; None if all failed.
+        of_truth: That over the truths' own mean score of the same fresh episodes; None where truth is not known, or
+            scores nothing.
         regret_difference: How much higher that is on average; the regret is higher by as much.
         regret: Median regret of the answer.
         reached: In how many runs a visited point was within the noise floor, or no worse than the truth.
         evaluations: Median number of evaluations to get there; a run that did not counts as one more than the budget.
         saved: Mean number of evaluations by which the first gets there sooner.
         ratio: Mean number of evaluations of the first, as a share of this engine's.
+        simulated: Mean simulated seconds to get there, counted likewise; None where nothing is simulated.
         error: Median error of θ in widths of the box; None where truth is not known.
+        error_difference: How much larger that is on average.
         region: What its points tell of θ; None where a score has no parts.
         seconds: Median time per proposal.
     """
@@ -225,21 +229,29 @@ class EngineSummary:
     engine: str
     seeds: int
     score: Estimate | None
+    of_truth: Estimate | None
     regret_difference: Estimate | None
     regret: Estimate
     reached: int
     evaluations: Estimate
     saved: Estimate | None
     ratio: Estimate | None
+    simulated: Estimate | None
     error: Estimate | None
+    error_difference: Estimate | None
     region: Region | None
     seconds: float
 
 
-def summarise(runs: Sequence[Run], first: Sequence[Run], tolerance: float) -> EngineSummary:
-    """Sum up the runs of one engine against those of the first on the same seeds, both in the order of the seeds."""
+def summarise(
+    runs: Sequence[Run], first: Sequence[Run], tolerance: float, seconds: float | None = None
+) -> EngineSummary:
+    """Sum up the runs of one engine against those of the first on the same seeds, both in the order of the seeds.
+
+    An evaluation takes so many simulated seconds, if any.
+    """
     needed, firsts = _needed(runs, tolerance), _needed(first, tolerance)
-    errors = [run.judgement.error for run in runs if run.judgement.error is not None]
+    errors, first_errors = _errors(runs), _errors(first)
     other = runs[0].key.engine != first[0].key.engine
     scores = [run.judgement.answer_score for run in runs if run.judgement.answer_score is not None]
     regrets = _regrets(runs)
@@ -247,13 +259,16 @@ def summarise(runs: Sequence[Run], first: Sequence[Run], tolerance: float) -> En
         engine=runs[0].key.engine,
         seeds=len(runs),
         score=estimate(np.array(scores), np.mean) if scores else None,
+        of_truth=_of_truth(runs),
         regret_difference=estimate(regrets - _regrets(first), np.mean) if other else None,
         regret=estimate(regrets, np.median),
         reached=sum(run.judgement.evaluations_to(tolerance) is not None for run in runs),
         evaluations=estimate(needed, np.median),
         saved=estimate(needed - firsts, np.mean) if other else None,
         ratio=ratio(firsts, needed) if other else None,
-        error=estimate(np.array(errors), np.median) if errors else None,
+        simulated=estimate(needed * seconds, np.mean) if seconds else None,
+        error=estimate(errors, np.median) if errors.size else None,
+        error_difference=estimate(errors - first_errors, np.mean) if other and errors.size else None,
         region=_region(runs),
         seconds=float(np.median([run.seconds for run in runs])),
     )
@@ -287,6 +302,22 @@ def _resampled(count: int) -> NDArray[np.int64]:
 
 def _needed(runs: Sequence[Run], tolerance: float) -> Floats:
     return np.array([run.judgement.evaluations_to(tolerance) or run.key.budget + 1 for run in runs], dtype=float)
+
+
+def _errors(runs: Sequence[Run]) -> Floats:
+    """Errors of θ, of all runs or of none."""
+    return np.array([run.judgement.error for run in runs if run.judgement.error is not None])
+
+
+def _of_truth(runs: Sequence[Run]) -> Estimate | None:
+    """The answers' scores as a share of the truths', of which their regret is the difference."""
+    found = [
+        (one.answer_score, one.answer_score - one.answer_regret)
+        for one in (run.judgement for run in runs)
+        if one.error is not None and one.answer_score is not None and one.answer_regret is not None
+    ]
+    answers, truths = np.array(found, dtype=float).reshape(-1, 2).T
+    return ratio(answers, truths) if truths.any() else None
 
 
 def _regrets(runs: Sequence[Run]) -> Floats:

@@ -58,6 +58,12 @@ class StudyObjective:
         return self.run.settings.space
 
     @property
+    def seconds(self) -> float | None:
+        """Simulated seconds of an evaluation, were every episode to last as long as it may; None where none is said."""
+        longest = getattr(self.run.study.family, "seconds", None)
+        return None if longest is None else longest * len(self.run.settings.agents) * self.run.settings.starts
+
+    @property
     def identity(self) -> str:
         """All that its figures depend on, apart from the seed."""
         return self.identity_without(())
@@ -156,6 +162,11 @@ class TruthObjective:
     def space(self) -> Space:
         """The study's box."""
         return self.run.settings.space
+
+    @property
+    def seconds(self) -> float | None:
+        """Simulated seconds of an evaluation; None where none is said."""
+        return StudyObjective(self.run, 0.0).seconds
 
     @property
     def identity(self) -> str:

@@ -14,7 +14,7 @@ import compared_engines
 import pytest
 import runs
 from blank import blank
-from compare import LEFT, main
+from compare import LEFT, main, seeds
 from judgement import judging_code
 from processes import ENVIRONMENT, ROOT, besides_progress
 from runs import read_runs
@@ -86,6 +86,18 @@ def test_runs_that_other_code_has_judged_are_judged_again_and_not_run_again(docu
     assert compare("analytic", *FEW, "--output", tmp_path / "out", "--json") == 0
     assert read_runs(path) == fresh
     assert json.loads(capsys.readouterr().out)["engines"] == document["engines"]
+
+
+def test_some_of_the_seeds_are_summed_up_and_those_that_are_there_are_not_run_again(
+    document, tmp_path, capsys, monkeypatch
+):
+    monkeypatch.setattr(runs, "run_engine", lambda objective, key, engine: pytest.fail(f"seed {key.seed} is run"))
+    assert compare("analytic", *FEW[:2], "--seeds", "1:2:1", *FEW[4:], "--output", tmp_path / "out", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["engines"] == document["engines"]
+    assert [list(seeds(text)) for text in ("3", "2:7:2", "4:5")] == [[1, 2, 3], [2, 4, 6], [4, 5]]
+    for wrong in ("few", "0:9", "1:9:0", "1:2:3:4"):
+        with pytest.raises(ValueError, match=r".+"):
+            seeds(wrong)
 
 
 @pytest.mark.slow
@@ -169,6 +181,7 @@ BAD = {
     "an unknown engine": (("--engines", "gp,tpr"), "--engines: unknown engine 'tpr'"),
     "no engine": (("--engines", ","), "--engines: names no engine; give some of outcomes"),
     "one seed": (("--seeds", "1"), "--seeds 1: give at least 2"),
+    "one seed of several": (("--seeds", "3:4:2"), "--seeds 1: give at least 2"),
     "no budget": (("--budget", "0"), "--budget 0: give at least 2"),
     "a budget of the design": (("--budget", "10"), "--budget 10: the design of 10 uses it up; raise it"),
 }

@@ -69,6 +69,7 @@ def test_every_engine_is_named_at_the_end_of_its_line_and_no_two_names_overlap()
 def test_the_engines_that_come_along_keep_their_colours():
     colours = {"outcomes": "#D55E00", "gp": "#0072B2", "composite": "#E69F00", "random": "0.55", "sobol": "0.55"}
     colours |= {"tpe": "#009E73", "skopt": "#CC79A7", "gpsampler": "#56B4E9", "qlognei": "0.15"}
+    colours |= {"botorch_composite": "0.15", "emulator": "#882255"}
     assert {name: look.colour for name, look in looks_of(NAMES).items()} == colours
 
 
@@ -91,7 +92,7 @@ def test_the_tables_tell_how_good_how_soon_and_what_is_known():
     engines = [runs("outcomes", [9.0, 4.0], [8.0, 0.0], reading=reading), runs("gp", [9.0, 8.0], [8.0, 7.0])]
     text = io.StringIO()
     console = Console(file=text, width=160)
-    for table in compare_tables("truths", [summarise(group, engines[0], 1.0) for group in engines], 2):
+    for table in compare_tables("truths", [summarise(group, engines[0], 1.0, 960.0) for group in engines], 2):
         console.print(table_text(table))
     told = text.getvalue()
     for expected in (
@@ -102,6 +103,10 @@ def test_the_tables_tell_how_good_how_soon_and_what_is_known():
         "delay 2",
         "trim 0",
         "0 of 2",
+        "1.40 (1.00 to 1.80)",  # of the truth's
+        "0.00 (0.00 to 0.00)",  # θ error less
+        "2400 (1920 to 2880)",  # simulated s
+        "2880 (2880 to 2880)",
     ):
         assert expected in told
 

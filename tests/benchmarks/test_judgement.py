@@ -180,6 +180,19 @@ def test_the_saving_is_paired_by_seed_and_a_run_beyond_the_budget_counts_as_one_
     assert found.score.value == 10.5
     assert found.ratio.value == 2.0 / 3.5
     assert (found.ratio.low, found.ratio.high) == (0.5, 2.0 / 3.0)
+    assert found.simulated is None
+    assert summarise(rival, default, 4.0, 960.0).simulated.value == 3.5 * 960.0
+
+
+def test_answers_are_measured_by_what_the_truth_scores_and_errors_of_theta_are_paired():
+    default = [made("gp", seed, [0.0], error=0.1) for seed in (1, 2)]
+    rival = [made("tpe", 1, [0.0], 2.0, error=0.2), made("tpe", 2, [0.0], None, error=0.4)]
+    found = summarise(rival, default, 4.0)
+    assert found.of_truth.value == 7.0 / 5.0, "of the answer that has a score; the truth's is 5"
+    assert found.error_difference.value == pytest.approx(0.2)
+    assert summarise(default, default, 4.0).error_difference is None
+    unknown = [made("gp", seed, [0.0], error=None) for seed in (1, 2)]
+    assert summarise(unknown, unknown, 4.0).of_truth is None
 
 
 def test_an_answer_that_failed_counts_as_the_worst_point_of_its_run():

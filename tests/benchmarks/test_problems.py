@@ -7,6 +7,7 @@ import pytest
 from calibrated import COMPARED, LONGEST, METRICS as OUTPUTS, Calibrated, course, replaced, simulated
 from hypothesis import given, settings, strategies as st
 from problems import AGENTS, CEILING, METRICS, NOISE, STEP, Analytic, Ranking
+from processes import ROOT
 from study_problems import TruthObjective, lacking_families
 
 from proxytune.errors import EpisodeError, InputError
@@ -194,6 +195,12 @@ def test_targets_are_driven_from_the_studys_starts(opened):
     theta = objective.space.theta(objective.truth(1))
     driven = objective.run.store.outcomes(objective.run.study.identity, theta)
     assert set(driven) == set(plan_episodes(objective.run.study.settings, theta, target_seed(1)))
+
+
+def test_an_evaluation_takes_the_simulated_time_of_all_its_episodes(opened, tmp_path):
+    assert ANALYTIC.seconds is opened().seconds is None, "neither says how long it drives"
+    with Store.open(tmp_path) as store:
+        assert TruthObjective(StudyRun(open_study(ROOT / "benchmarks" / "truths"), store)).seconds == 12 * 4 * 20.0
 
 
 SEEDS = st.integers(0, 1000)

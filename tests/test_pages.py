@@ -9,6 +9,7 @@ import io
 import json
 import os
 import re
+import runpy
 import shlex
 import socket
 import subprocess
@@ -65,14 +66,15 @@ def words(output):
 
 def followed(text, folder):
     """Write each file of a page and run each command, in their order; for each command, what it printed and shown."""
-    here = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "100"}
 
     def run(line):
-        done = subprocess.run(
-            [sys.executable, *shlex.split(line)[1:]], capture_output=True, text=True, cwd=folder, env=here
-        )
-        assert done.returncode == 0, f"{line}: {done.stderr}"
-        return done.stdout
+        given = shlex.split(line)[1:]
+        with contextlib.redirect_stdout(io.StringIO()) as printed:
+            if given[0] == "-m":
+                assert main(given[2:]) == 0, line
+            else:
+                runpy.run_path(given[0], run_name="__main__")
+        return printed.getvalue()
 
     for kind, block in re.findall(r"^```(\w+)\n(.*?)^```", text, flags=re.DOTALL | re.MULTILINE):
         name, _, content = block.partition("\n")
@@ -90,7 +92,9 @@ def followed(text, folder):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("tutorial", TUTORIALS, ids=lambda path: path.stem)
-def test_a_tutorial_followed_word_for_word_prints_what_it_shows(tutorial, tmp_path):
+def test_a_tutorial_followed_word_for_word_prints_what_it_shows(tutorial, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "100")
     commands = 0
     for printed, shown in followed(tutorial.read_text(encoding="utf-8"), tmp_path):
         commands += 1

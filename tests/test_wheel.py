@@ -63,7 +63,8 @@ def test_an_installed_proxytune_lists_its_robots_from_anywhere(installed, tmp_pa
 def test_a_study_that_travels_along_is_copied_and_run(installed, tmp_path):
     shipped = installed / "proxytune" / "studies" / "quickstart" / "study.toml"
     text = shipped.read_text(encoding="utf-8")
-    small = text.replace("budget = 24", "budget = 1").replace("seconds = 20.0", "seconds = 1.0")
+    small = text.replace("budget = 24", "budget = 1\npreflight = false\nconfirm = 0")
+    small = small.replace("seconds = 20.0", "seconds = 1.0")
     assert small != text
     shipped.write_text(small, encoding="utf-8")
     try:

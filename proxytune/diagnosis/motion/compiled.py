@@ -9,6 +9,7 @@ import numba
 import numpy as np
 
 from proxytune.diagnosis.motion.drives import Floats
+from proxytune.diagnosis.motion.innovations import SMALLEST_TURN
 
 if vars(numba.config)["DISABLE_JIT"]:
     raise ImportError("NUMBA_DISABLE_JIT is set: uncompiled, these loops take a thousand times as long")
@@ -33,7 +34,7 @@ def _head(twists, tick_s, middle, quarter, poses):  # type: ignore[no-untyped-de
             turn = twists[episode, tick, 2] * tick_s
             heading += turn
             poses[episode, tick + 1, 2] = heading
-            turn = turn if turn != 0.0 else EPSILON
+            turn = turn if abs(turn) > SMALLEST_TURN else EPSILON
             middle[episode, tick], quarter[episode, tick] = 0.5 * heading - 0.25 * turn, 0.25 * turn
 
 

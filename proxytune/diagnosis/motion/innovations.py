@@ -51,6 +51,8 @@ SMALLEST, LARGEST = 1e-6, 3.0
 """Noise lies between these, each value in its own unit."""
 STEP = 1e-4
 """Finite differences step by this in the logarithm of a value of the noise."""
+SMALLEST_TURN = 1e-300
+"""A smaller turn within a tick [rad] is none: a quarter of it might be 0. Lags leave such turns after minutes."""
 SMALL_DUTY = 0.02
 """What a unit of a learnt curve adds to commands is replayed with so much of it."""
 HUBER = 3.0
@@ -224,7 +226,7 @@ def integrate_twists(twists: Floats, tick_s: float) -> Floats:
     poses = np.zeros((*twists.shape[:-2], twists.shape[-2] + 1, 3))
     turns = twists[..., 2] * tick_s
     headings = turns.cumsum(axis=-1)
-    turns[turns == 0.0] = np.finfo(float).eps
+    turns[np.abs(turns) <= SMALLEST_TURN] = np.finfo(float).eps
     # Tangents of half the angles, for numpy has a fast tangent: cos α = (1 − t²)/(1 + t²), sin α = 2t/(1 + t²).
     middle, quarter = np.tan(0.5 * headings - 0.25 * turns), np.tan(0.25 * turns)
     square = middle * middle

@@ -34,6 +34,14 @@ def test_both_walk_to_the_last_bit_alike(uncompiled, turn, sideways):
     np.testing.assert_array_equal(compiled.walk(twists, 0.02), integrate_twists(twists, 0.02))
 
 
+def test_a_turn_that_a_lag_leaves_after_minutes_is_none(uncompiled):
+    twists = np.tile((0.5, 0.1, 5e-324), (1, 4, 1))
+    straight = twists * (1.0, 1.0, 0.0)
+    for walk in (compiled.walk, integrate_twists):
+        np.testing.assert_allclose(walk(twists, 1.0), walk(straight, 1.0), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(integrate_twists(twists, 1.0)[0, -1], (2.0, 0.4, 0.0), atol=1e-12)
+
+
 def test_what_walks_is_compiled_once_noise_was_fitted(monkeypatch, drives, errors):
     loaded = []
     monkeypatch.setattr(innovations, "_by_numba", cache(lambda: loaded.append(compiled) or compiled))

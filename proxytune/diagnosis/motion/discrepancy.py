@@ -39,6 +39,7 @@ from proxytune.diagnosis.motion.prediction import (
 from proxytune.diagnosis.motion.screening import Candidate, candidates
 from proxytune.driving import Robot
 from proxytune.effects import (
+    COMMAND_GROUPS,
     GROUPS,
     LEVEL,
     OF_PLACE,
@@ -345,8 +346,9 @@ def fit_discrepancy(drives: Drives, theta: Theta, promises: Callable[[Floats], b
     if blocks < drives.rules.discrepancy_blocks:
         return Discrepancy(held_out=before)
     offer = offer_curves(drives, theta)
-    # Maps have the most weights by far: where the guard refuses curves with them, they are fitted without.
-    for curves in (offer.curves, tuple(curve for curve in offer.curves if curve.group not in OF_PLACE)):
+
+    def fitted(left_out: Iterable[str] = ()) -> Discrepancy:
+        curves = tuple(curve for curve in offer.curves if curve.group not in left_out)
         learnt, gains, folds = _fit_curves(drives, theta, replace(offer, curves=curves))
         if not gains:
             return Discrepancy(held_out=before)
@@ -356,10 +358,22 @@ def fit_discrepancy(drives: Drives, theta: Theta, promises: Callable[[Floats], b
         guard = _guard(drives, theta, folds, {FITTED_S: (before, after)})
         total = sum(gains.values())
         share = {GROUPS[group].title: gain / total for group, gain in gains.items()}
-        fitted = Discrepancy(learnt, share, guard, _helps(guard, drives.rules), after)
-        if fitted.used or not set(OF_PLACE) & set(gains):
-            break
-    return fitted
+        return Discrepancy(learnt, share, guard, _helps(guard, drives.rules), after)
+
+    found = fitted()
+    # Maps have the most weights by far: where the guard refuses curves with them, they are fitted without.
+    if not found.used and _has(found, OF_PLACE):
+        found = fitted(OF_PLACE)
+    # Curves over motion were linearised without those over commands, and may get in each other's way.
+    if _has(found, COMMAND_GROUPS):
+        alone = fitted(COMMAND_GROUPS)
+        if alone.used and not (found.used and found.held_out.mean() < alone.held_out.mean()):
+            found = alone
+    return found
+
+
+def _has(found: Discrepancy, groups: Iterable[str]) -> bool:
+    return not {GROUPS[group].title for group in groups}.isdisjoint(found.share)
 
 
 def _fit_curves(drives: Drives, theta: Theta, offer: Learnt) -> tuple[Theta, Mapping[str, float], Sequence[Theta]]:

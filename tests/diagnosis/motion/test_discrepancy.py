@@ -325,3 +325,19 @@ def test_what_a_tracker_does_to_places_and_headings_is_learnt_as_its_own(tracked
         float(np.mean(pose_errors(others, theta, windows)[:, 0] ** 2)) for theta in (TRUTH, {**TRUTH, **learnt.theta})
     )
     assert after < 0.5 * before
+
+
+@pytest.mark.parametrize(("alone", "chosen"), [(0.5, "turn rate"), (2.0, "time since a command changed")])
+def test_curves_over_commands_are_left_out_where_motion_alone_predicts_better(drives, monkeypatch, alone, chosen):
+    def fit_curves(drives, theta, offer):
+        group = "held" if any(curve.group == "held" for curve in offer.curves) else "turn_rate"
+        return {group: 1.0}, {group: 1.0}, [{group: 1.0}]
+
+    def cross_validate(drives, theta, folds, windows):
+        return np.full(3, 1.0 if "held" in folds[0] else alone)
+
+    monkeypatch.setattr(discrepancy, "_fit_curves", fit_curves)
+    monkeypatch.setattr(discrepancy, "_cross_validate", cross_validate)
+    monkeypatch.setattr(discrepancy, "_guard", lambda *_: {})
+    monkeypatch.setattr(discrepancy, "_helps", lambda *_: True)
+    assert list(fit_discrepancy(drives, TRUTH).share) == [chosen]

@@ -366,8 +366,9 @@ def fit_discrepancy(drives: Drives, theta: Theta, promises: Callable[[Floats], b
         found = fitted(OF_PLACE)
     # Curves over motion were linearised without those over commands, and may get in each other's way.
     if _has(found, COMMAND_GROUPS):
-        alone = fitted(COMMAND_GROUPS)
-        if alone.used and not (found.used and found.held_out.mean() < alone.held_out.mean()):
+        alone, of = fitted(COMMAND_GROUPS), blocks_of(drives, windows)
+        surely = found.used and ratio(found.held_out, alone.held_out, of, drives.rules.ratio_p_value).below
+        if alone.used and not surely:
             found = alone
     return found
 

@@ -4,7 +4,7 @@
 are its signals, each a function of the duties that reach the motors and of what was commanded before.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import ClassVar, NamedTuple
@@ -150,10 +150,11 @@ class LearntCommands:
         added = sum(_basis(curve)(commands, curve.knots) @ np.asarray(curve.weights) for curve in self.curves)
         return signal + added, after
 
-    def features(self, signal: Signal, memory: CommandState) -> list[Signal]:
-        """Features that weights scale, curve by curve (…, time, 2, knots)."""
+    def features(self, signal: Signal, memory: CommandState) -> Iterator[Signal]:
+        """Features that weights scale, curve by curve (…, time, 2, knots), as they are asked for."""
         commands, _ = self._recall(signal, memory)
-        return [_basis(curve)(commands, curve.knots) for curve in self.curves]
+        for curve in self.curves:
+            yield _basis(curve)(commands, curve.knots)
 
     def _knots(self, group: str) -> Knots:
         return next((curve.knots for curve in self.curves if curve.group == group), ())

@@ -5,7 +5,7 @@
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
@@ -203,16 +203,18 @@ class Learnt:
             dragged=np.stack([before(one) for one in asked.played]),
         )
 
-    def features(self, signal: Signal, memory: LearntState) -> list[tuple[Signal, Signal]]:
+    def features(self, signal: Signal, memory: LearntState) -> Iterator[tuple[Signal, Signal]]:
         """Features that weights scale, curve by curve: the features (…, time, knots) and the twist of one unit (3,).
 
-        The heading is taken from what is known beforehand and from the twist that is asked for.
+        They are made as they are asked for: of long drives all together are large. The heading is taken from what is
+        known beforehand and from the twist that is asked for.
         """
         asked, _ = self._asked(signal, memory)
         course, _ = reckon(signal[..., 2], memory.bearing)
         asked = asked._replace(heading=course, place=self._places(signal, course, memory.spot))
         channels = [(curve, MOTION_GROUPS[curve.group].channels[curve.channel]) for curve in self._of_motion]
-        return [(one.basis(asked, curve.knots), _direction(one.to, memory.baseline)) for curve, one in channels]
+        for curve, one in channels:
+            yield one.basis(asked, curve.knots), _direction(one.to, memory.baseline)
 
     def _places(self, signal: Signal, course: Signal, spot: PoseReckoning) -> Signal:
         """Places at the start of each sample (…, time, 2): known ones, and beyond them where the motion leads."""

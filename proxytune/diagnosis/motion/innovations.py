@@ -11,7 +11,7 @@ A coordinate of a fit is one or several parameters of θ that share a value, wit
 """
 
 import functools
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import ModuleType
 
@@ -396,23 +396,21 @@ def _window_wheels(
 
 def window_features(
     drives: Drives, theta: Theta, learnt: Learnt, begin: Whole, length: int
-) -> list[list[tuple[Floats, Floats]]]:
+) -> Iterator[list[tuple[Floats, Floats]]]:
     """Motion that each weight of a learnt effect beside a model adds in such windows, curve by curve.
 
     That is features (W, length, knots), and the twist that one unit of them makes (3,), of which a curve may have some.
     """
     whole = twists_of(drives, theta)
     past = learnt.recall(_window_setting(drives, begin, whole), whole, drives.episode[begin], drives.first[begin])
-    of_motion = [[one] for one in learnt.features(window_twists(drives, theta, begin, length), past)]
+    yield from ([one] for one in learnt.features(window_twists(drives, theta, begin, length), past))
     train, _ = _model(drives, theta)
     arrived = _arrived(drives, train)
     asked = _window_twists(drives, train, begin, length)
-    of_commands = []
     for features in learnt.commands.features(arrived, learnt.commands.begin(_setting(drives))):
         columns = [SMALL_DUTY * column for column in np.moveaxis(features, -1, 0)]
         moved = np.stack([_window_twists(drives, train, begin, length, one) - asked for one in columns], axis=-1)
-        of_commands.append([(moved[..., n, :] / SMALL_DUTY, unit) for n, unit in enumerate(np.eye(3))])
-    return of_motion + of_commands
+        yield [(moved[..., n, :] / SMALL_DUTY, unit) for n, unit in enumerate(np.eye(3))]
 
 
 def tracked_paths(drives: Drives, theta: Theta, twists: Floats) -> Floats:

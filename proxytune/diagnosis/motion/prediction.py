@@ -6,7 +6,7 @@ the poses of any log. `slopes_of` linearises windows in the weights of learnt cu
 that were driven several times from the same commands: no model can predict what differs between them.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -402,7 +402,7 @@ def slopes_of(drives: Drives, theta: Theta, offered: Learnt) -> Slopes:
 def _pose_slopes(
     twists: Floats,
     walked: Floats,
-    features: Sequence[Sequence[tuple[Floats, Floats]]],
+    features: Iterable[Sequence[tuple[Floats, Floats]]],
     at: tuple[Whole, Whole],
     tick_s: float,
 ) -> Floats:

@@ -1,4 +1,7 @@
-"""Types of arrays, by what they hold, and how NumPy goes through them."""
+"""Types of arrays, by what they hold, and how they are gone through: by NumPy's buffers, or by compiled loops."""
+
+from importlib import import_module
+from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,6 +9,17 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int64]
 Flags = NDArray[np.bool_]
+
+
+def compiled_loops(module: str) -> ModuleType | None:
+    """A module of loops that Numba compiles on import.
+
+    None where Numba is not installed, does not know this NumPy, or finds no place for what it compiles.
+    """
+    try:
+        return import_module(module)
+    except Exception:
+        return None
 
 
 class SmallBuffers:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Protocol, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.arrays import Floats, SmallBuffers
+from proxytune.arrays import Floats, SmallBuffers, compiled_loops
 
 PAYS_OFF = 30_000
 """So many pictures NumPy looks up before Numba, which takes 0.4 s to load and would have saved that."""
@@ -168,11 +168,7 @@ def fastest(pictures: int) -> Loops:
 @functools.cache
 def by_numba() -> Loops:
     """The compiled way where it works, else that of NumPy."""
-    try:
-        from proxytune.driving import compiled
-    except Exception:  # Numba is not installed, does not know this NumPy, or finds no place for what it compiles
-        return _BY_NUMPY
-    return compiled
+    return cast(Loops, compiled_loops("proxytune.driving.compiled") or _BY_NUMPY)
 
 
 _BY_NUMPY = cast(Loops, sys.modules[__name__])

@@ -16,6 +16,7 @@ from typing import Any, ClassVar, NamedTuple, Protocol, TypeVar, dataclass_trans
 import numpy as np
 from numpy.typing import NDArray
 
+from proxytune.arrays import compiled_loops
 from proxytune.space import Parameter
 
 
@@ -326,11 +327,7 @@ def fastest(samples: int) -> ModuleType | None:
 
 @functools.cache
 def _by_numba() -> ModuleType | None:
-    try:
-        from proxytune.effects import compiled
-    except Exception:  # Numba is not installed, does not know this NumPy, or finds no place for what it compiles
-        return None
-    return compiled
+    return compiled_loops("proxytune.effects.compiled")
 
 
 class LowPassState(NamedTuple):

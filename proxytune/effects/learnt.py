@@ -212,9 +212,9 @@ class Learnt:
         asked, _ = self._asked(signal, memory)
         course, _ = reckon(signal[..., 2], memory.bearing)
         asked = asked._replace(heading=course, place=self._places(signal, course, memory.spot))
-        channels = [(curve, MOTION_GROUPS[curve.group].channels[curve.channel]) for curve in self._of_motion]
-        for curve, one in channels:
-            yield one.basis(asked, curve.knots), _direction(one.to, memory.baseline)
+        for curve in self._of_motion:
+            channel = MOTION_GROUPS[curve.group].channels[curve.channel]
+            yield channel.basis(asked, curve.knots), _direction(channel.to, memory.baseline)
 
     def _places(self, signal: Signal, course: Signal, spot: PoseReckoning) -> Signal:
         """Places at the start of each sample (…, time, 2): known ones, and beyond them where the motion leads."""

@@ -20,6 +20,7 @@ from scipy.linalg import LinAlgError, cholesky_banded
 from scipy.linalg.lapack import dtbtrs
 from scipy.optimize import minimize
 
+from proxytune.arrays import compiled_loops
 from proxytune.diagnosis.answer import RULES, Rules
 from proxytune.diagnosis.motion.drives import Drives, Floats, Whole, relative, rows_at
 from proxytune.driving import Drivetrain, Robot, drivetrain
@@ -167,11 +168,7 @@ def log_likelihood(errors: Floats, whiten: Whitener) -> float:
 @functools.cache
 def _by_numba() -> ModuleType | None:
     """The inner loops, compiled: a diagnosis pays for loading them many times over, a prediction would not."""
-    try:
-        from proxytune.diagnosis.motion import compiled
-    except Exception:  # Numba is not installed, does not know this NumPy, or finds no place for what it compiles
-        return None
-    return compiled
+    return compiled_loops("proxytune.diagnosis.motion.compiled")
 
 
 def fit_noise(drives: Drives, errors: Floats, start: Noise) -> Noise:

@@ -30,7 +30,7 @@ class Commands:
         if fate:
             self._fate.write_text(fate)
         self._moments.write_text("")
-        self._process.stdin.write(json.dumps([*map(str, words), "--json", str(self._output)]) + "\n")
+        self._process.stdin.write(json.dumps([None, *map(str, words), "--json", str(self._output)]) + "\n")
         self._process.stdin.flush()
         self._process.stdout.readline()  # its process id
         return int(self._process.stdout.readline())

@@ -38,6 +38,7 @@ SAME_CODE = {
         "d25c5bcf4fd754c361049ef436a8d76af15abb1ee1438754a2baf5809ae11957",
         "403d3586904f8c47aa0c58c330753a20fceba77b0d1576d5c0fdec913ba32c6c",
         "5a256e6ec043d1cd8bd6c39c387f8ea37e6beaf03642f97c9217605ae4f0830e",
+        "48665a9b3231cefcb9eed3821f65608d333e61afac35e3573c0aa3b03fb5853a",
     ),
     "environments": (
         "f5b9c2c9586c29cd4dc2d6e27f44fd2731ecc2d27bf96a80c745aecd5a3ddb50",
@@ -45,6 +46,7 @@ SAME_CODE = {
         "66964875fbf13cfa088ed0c037d223b9c23bf6430123e1d70b28b5655469b672",
         "cd8c3a2b25d594297615fc6aa9242767b05d6f953a175ac2c3de9b44cdf3a016",
         "d42c81e8a3875759a736db7235c5cf3a713e8edc7f9ca64e5164c3149d2becd5",
+        "35f274a742e46c7760fb644191cc25bd09dae0e6ba5204b7d0a14d765d5c5b85",
     ),
     "engine outcomes": ("94c0ba12f9bf", "169c7ef2065e", "bd67473b82b2", "79f5fa29af66", "bba8741ee1e0"),
     "engine composite": ("82865583b592", "169c7ef2065e", "bd67473b82b2", "79f5fa29af66", "bba8741ee1e0"),

@@ -142,8 +142,8 @@ class Rules:
 
     group_share: float = 0.02
     group_t: float = 2.3
-    """A group of learnt curves is added if it takes away this share of the held-out squared error, and so many
-    standard errors of that: of thirty groups of no use one is, every other time."""
+    """A group of learnt curves is added if it takes away this share of the held-out squared error, and its logarithm
+    falls by so many standard errors: of thirty groups of no use one is, every other time."""
 
     discrepancy_helps: float = 0.95
     discrepancy_harms: float = 1.02

@@ -28,16 +28,14 @@ class Commands(NamedTuple):
 
     Attributes:
         duty: The duties that reach the motors.
-        seconds: Since the start [s].
         held: Since either of them last changed [s].
-        begun: Since each last was still [s].
+        begun: Since each last was still, for more than a sample [s].
         turned: Since each last took the other sign [s].
         dragged: Each through plays of some widths (…, time, 2, widths).
         slow: Low-passes of each (…, time, 2, time constants).
     """
 
     duty: Signal
-    seconds: Signal
     held: Signal
     begun: Signal
     turned: Signal
@@ -46,11 +44,10 @@ class Commands(NamedTuple):
 
 
 class CommandState(NamedTuple):
-    """The past of the next chunk: as `Commands` has it, without the time, and the sign of each wheel's last motion."""
+    """The past of the next chunk: `Commands` without the time axis, and the sign of each wheel's last motion."""
 
     duty: Signal
     sign: Signal
-    seconds: Signal
     held: Signal
     begun: Signal
     turned: Signal
@@ -109,11 +106,6 @@ COMMAND_GROUPS: Mapping[str, Group] = MappingProxyType(
             of="of the play",
             duty=lambda c, k: c.dragged - c.duty[..., None],
         ),
-        "clock": _group(
-            "time since the start",
-            "s",
-            duty=lambda c, k: c.duty[..., None] * hats(c.seconds, k),
-        ),
         "ended": _group(
             "time since a command ended",
             "s",
@@ -141,8 +133,7 @@ class LearntCommands:
         rest = np.asarray(context.rest, dtype=float)
         long, begun = np.full(rest.shape, LONG_S), np.where(np.abs(rest) < STILL, 0.0, LONG_S)
         dragged, slow = (np.repeat(rest[..., None], len(self._knots(name)), axis=-1) for name in ("dragged", "ended"))
-        start, sign = np.zeros(rest.shape), np.sign(rest)
-        return CommandState(rest, sign, start, long, begun, long, dragged, slow, context.rate_hz)
+        return CommandState(rest, np.sign(rest), long, begun, long, dragged, slow, context.rate_hz)
 
     def apply(self, signal: Signal, memory: CommandState) -> tuple[Signal, CommandState]:
         """Add what the curves say."""
@@ -170,6 +161,8 @@ class LearntCommands:
 
         before = np.concatenate((past.duty[..., None, :], signal), axis=-2)
         changed = (np.abs(np.diff(before, axis=-2)) > SAME).any(axis=-1, keepdims=True)
+        # A delay that is no whole number of samples mixes two commands: one of each sign make no stop.
+        still = np.abs(before) < STILL
         signs = np.concatenate((past.sign[..., None, :], np.sign(signal)), axis=-2)
         place = np.arange(signs.shape[-2])[:, None]
         last = np.maximum.accumulate(np.where(signs != 0.0, place, 0), axis=-2)
@@ -179,9 +172,8 @@ class LearntCommands:
         slow = np.moveaxis(low_passes(wheels, past.slow, self._knots("ended"), past.rate_hz), -2, -3)
         commands = Commands(
             duty=signal,
-            seconds=past.seconds[..., None, :] + np.arange(1.0, signal.shape[-2] + 1.0)[:, None] / past.rate_hz,
             held=since(np.broadcast_to(changed, signal.shape), past.held),
-            begun=since(np.abs(signal) < STILL, past.begun),
+            begun=since(still[..., 1:, :] & still[..., :-1, :], past.begun),
             turned=since(np.diff(course, axis=-2) * course[..., :-1, :] != 0.0, past.turned),
             dragged=dragged,
             slow=slow,
@@ -189,7 +181,6 @@ class LearntCommands:
         after = CommandState(
             duty=signal[..., -1, :],
             sign=course[..., -1, :],
-            seconds=commands.seconds[..., -1, :],
             held=commands.held[..., -1, :],
             begun=commands.begun[..., -1, :],
             turned=commands.turned[..., -1, :],

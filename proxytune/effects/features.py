@@ -419,19 +419,25 @@ def moved_since(speed: Signal, before: Signal, rest_speed: float, rate_hz: float
     return np.asarray((number - np.maximum.accumulate(stood, axis=-1)) / rate_hz)
 
 
+LONG_M = 10.0
+"""A wheel that has not moved yet has rolled so far: a start is no reversal, for it may have gone either way before."""
+
+
 def rolled_since(speed: Signal, before: Signal, rate_hz: float) -> Signal:
     """Way that a wheel has rolled since it last turned the other way [m] (…, time), negative backwards.
 
     Args:
-        speed: Its speed [m/s] (…, time).
+        speed: Its speed [m/s] (…, time). Slower than REST_SPEED it turns no other way.
         before: How far it had rolled so before the first sample (…,), 0 where it has not moved yet.
         rate_hz: Samples per second.
     """
-    sign = np.concatenate((np.sign(before)[..., None], np.sign(speed)), axis=-1)
+    now = np.where(np.abs(speed) < REST_SPEED, 0.0, np.sign(speed))
+    sign = np.concatenate((np.sign(before)[..., None], now), axis=-1)
     place = np.arange(sign.shape[-1])
     newest = np.maximum.accumulate(np.where(sign != 0.0, place, 0), axis=-1)
     course = np.take_along_axis(sign, newest, axis=-1)
-    way = np.concatenate((np.abs(before)[..., None], np.abs(speed) / rate_hz), axis=-1).cumsum(axis=-1)
-    turned = course[..., 1:] != course[..., :-1]
+    start = np.where(before == 0.0, LONG_M, np.abs(before))
+    way = np.concatenate((start[..., None], np.abs(speed) / rate_hz), axis=-1).cumsum(axis=-1)
+    turned = course[..., 1:] * course[..., :-1] < 0.0
     since = np.maximum.accumulate(np.where(turned, way[..., :-1], 0.0), axis=-1)
     return np.asarray(course[..., 1:] * (way[..., 1:] - since))

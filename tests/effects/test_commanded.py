@@ -16,7 +16,6 @@ KNOTS = {
     "begun": (0.15, 0.4),
     "turned": (0.2, 0.5),
     "dragged": (0.05, 0.2),
-    "clock": (0.5, 1.5),
     "ended": (0.1, 0.4),
 }
 
@@ -143,9 +142,10 @@ def test_a_wheel_rolls_on_for_a_while_after_its_command_ended():
     np.testing.assert_allclose(rolling[50, 0] / rolling[40, 0], np.exp(-1.0), rtol=1e-9)
 
 
-def test_what_depends_on_the_time_since_the_start_does_so_for_both_wheels():
-    steady = np.tile((0.4, -0.2), (60, 1))
-    np.testing.assert_allclose(
-        added(LearntCurve("clock", "duty", (1.0, 2.0), (0.5, 0.0)), steady)[[9, 19, 29]],
-        [[0.1, -0.05], [0.2, -0.1], [0.1, -0.05]],
-    )
+def test_one_sample_between_two_signs_is_no_stop():
+    def pushed(between):
+        signal = np.concatenate((np.full(9, 0.4), between, np.full(9, -0.4)))
+        return added(LearntCurve("begun", "push", (0.3,), (1.0,)), np.stack((signal, signal), axis=1))[:, 0]
+
+    assert not pushed([0.0])[9:].any()
+    assert pushed([0.0, 0.0])[11:].any()

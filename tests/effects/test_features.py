@@ -43,8 +43,12 @@ def test_a_low_pass_goes_most_of_the_way_in_its_time_constant():
 
 def test_the_way_is_counted_from_where_a_wheel_turns_the_other_way():
     speed = np.array([1.0, 1.0, 0.0, 1.0, -2.0, -2.0, 0.0, -2.0, 1.0])
-    way = rolled_since(speed, np.zeros(()), RATE_HZ)
-    np.testing.assert_allclose(way, [0.1, 0.2, 0.2, 0.3, -0.2, -0.4, -0.4, -0.6, 0.1])
+    way = rolled_since(speed, np.array(5.0), RATE_HZ)
+    np.testing.assert_allclose(way, [5.1, 5.2, 5.2, 5.3, -0.2, -0.4, -0.4, -0.6, 0.1])
+
+
+def test_a_start_is_no_reversal_and_creeping_is_none():
+    assert np.all(np.abs(rolled_since(np.array([1.0, -0.01, 1.0]), np.zeros(()), RATE_HZ)) >= 10.0)
 
 
 def test_a_wheel_that_has_not_moved_has_no_way_behind_it():

@@ -56,9 +56,11 @@ from proxytune.space import Theta
 
 RARE = 0.002
 """The range that was seen leaves out so much of the time at either end."""
-WHEEL_KNOTS, TURN_KNOTS, TIME_KNOTS = 9, 8, 6
+WHEEL_KNOTS, TURN_KNOTS, USE_KNOTS = 9, 8, 6
 GRID = (4, 6)
-"""Knots of a curve over a wheel's speed, over the yaw rate, over time or use, and over speed and yaw rate together."""
+"""Knots of a curve over a wheel's speed, over the yaw rate, over use, and over speed and yaw rate together."""
+TIME_STEP_S, TIME_KNOTS = 2.0, 40
+"""Between the knots of a curve over time, farther apart where a drive is so long that these would be more."""
 OTHER_KNOTS = 5
 """Knots of a curve over the other wheel's speed."""
 MESHES_M = (0.25, 0.5, 1.0, 2.0)
@@ -77,7 +79,7 @@ REVERSALS_M = (0.003, 0.01, 0.03, 0.1, 0.3)
 """Ways over which the memory of a reversal fades [m]."""
 LOADS_S = (1.0, 4.5, 20.0)
 """Time constants of the low-passes."""
-DUTY_KNOTS, DRAWN_KNOTS = 40, 16
+DUTY_KNOTS, DRAWN_KNOTS = 100, 16
 """Knots over the size of a command, and over the sum of both."""
 HELD_S = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0)
 SINCE_S = (0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 0.8, 1.2)
@@ -114,8 +116,8 @@ def offer_curves(drives: Drives, theta: Theta) -> Learnt:
         "play": tuple(_round_knot(share * drives.robot.figures["full_speed"]) for share in PLAYS),
         "reversal": REVERSALS_M,
         "direction": (-1.0,) if float((forward < -0.01 * drives.robot.figures["full_speed"]).mean()) > RARE else (),
-        "time": _steps(seconds),
-        "use": _steps(float(effort.mean()) * seconds / 60.0),
+        "time": _steps(seconds, min(TIME_KNOTS, int(seconds / TIME_STEP_S))),
+        "use": _steps(float(effort.mean()) * seconds / 60.0, USE_KNOTS),
         "load": LOADS_S,
         "heading": (1.0, 2.0),
     }
@@ -130,7 +132,6 @@ def offer_curves(drives: Drives, theta: Theta) -> Learnt:
             "dragged": DRAGS,
             "ended": ENDED_S,
         }
-        knots["clock"] = tuple(2.0 * n for n in range(1, int(min(seconds, 80.0) / 2.0) + 1))
     if not _in_frames_of_their_own(drives):
         places = drives.places[used]
         knots[PLACE] = _lattice(places, MOST_CORNERS)
@@ -185,8 +186,8 @@ def _corners(signal: Floats, count: int) -> tuple[float, ...]:
     return tuple(kept)
 
 
-def _steps(last: float) -> tuple[float, ...]:
-    values = [_round_knot(last * number / TIME_KNOTS) for number in range(1, TIME_KNOTS + 1)]
+def _steps(last: float, count: int) -> tuple[float, ...]:
+    values = [_round_knot(last * number / count) for number in range(1, count + 1)]
     return tuple(dict.fromkeys(value for value in values if value > 1e-3))
 
 
@@ -240,7 +241,7 @@ def sum_squares(slopes: Slopes, weights: Floats, part: Whole, parts: int) -> Sum
 
 def choose_groups(given: Sums, groups: Mapping[str, Whole], rules: Rules) -> ChosenGroups:
     """Add groups one by one, the best first, while they pay on parts left out; the level is always there."""
-    mean = given.hessian.sum(axis=0).diagonal()
+    mean, nothing = given.hessian.sum(axis=0).diagonal(), 1e-12 * given.size.mean()
     pulls = {name: FREE for name in groups if name == LEVEL}
     gains: dict[str, float] = {}
     (losses,) = _held_out_losses(given, *_penalise(groups, [pulls], mean))
@@ -248,9 +249,10 @@ def choose_groups(given: Sums, groups: Mapping[str, Whole], rules: Rules) -> Cho
         tried = {name: _try_group(given, groups, pulls, name, mean) for name in groups if name not in pulls}
         paying = {}
         for name, found in tried.items():
-            gain = losses - found[1]
-            spread = float(gain.std(ddof=1)) * np.sqrt(len(gain))
-            if gain.sum() > rules.group_share * losses.sum() and gain.sum() > rules.group_t * spread:
+            # Errors of parts differ by orders of magnitude: each counts by its ratio.
+            less = -np.diff(np.log(np.maximum((losses, found[1]), nothing)), axis=0)[0]
+            sure = less.sum() > rules.group_t * np.sqrt(len(less)) * less.std(ddof=1)
+            if sure and found[1].sum() < (1.0 - rules.group_share) * losses.sum():
                 paying[name] = found
         if not paying:
             break

@@ -73,6 +73,15 @@ def test_the_group_that_gains_most_is_chosen_first():
     assert chosen.gains["other"] > chosen.gains["one"] > 0.0
 
 
+def test_a_group_that_helps_every_part_is_chosen_however_uneven_their_errors_are():
+    scale = np.repeat([30.0, *np.ones(PARTS - 1)], 40)
+    plain = slopes(WEIGHTS)
+    loud = Slopes(plain.residuals * scale[:, None], plain.columns * scale[:, None, None], plain.block)
+    given = summed(loud)
+    assert given.size.max() > 10.0 * given.size.sum() / PARTS * 0.5
+    assert list(choose_groups(given, COLUMNS, RULES).gains) == ["other"]
+
+
 def test_a_few_wild_errors_hardly_move_the_weights():
     np.testing.assert_allclose(
         choose_groups(summed(slopes(WEIGHTS, odd=12)), COLUMNS, RULES).weights, WEIGHTS, atol=0.05

@@ -8,9 +8,18 @@ import pytest
 from episodes import paired, recorded
 from hypothesis import given, settings, strategies as st
 
+from proxytune.api import drive, read_theta
 from proxytune.domain import make_episode
 from proxytune.errors import EpisodeError, InputError
-from proxytune.study import APART_M, drive_side_by_side, load_family, load_target, read_study_settings, record_episode
+from proxytune.study import (
+    APART_M,
+    check_episode,
+    drive_side_by_side,
+    load_family,
+    load_target,
+    read_study_settings,
+    record_episode,
+)
 
 LANE = {"robot": '"duckiebot"', "plant": '"planar"', "seconds": "2.0"}
 MODEL = 'format = 1\nrobot = "{}"\n[effects.trim]\ntrim = 0.2\n'
@@ -45,6 +54,22 @@ def test_another_proxy_starts_at_the_same_place_and_parts_later(lane, tmp_path):
     row = round(60 * pair.parted_s)
     gaps = np.hypot(*(pair.proxy.places - pair.target.places).T)
     assert gaps[row] > APART_M >= gaps[:row].max()
+
+
+CURVE = "[effects.learnt.range]\nforward = [-1, 1]\nyaw = [-9, 9]\n[effects.learnt.direction]\nknots = [1.0]\n"
+CURVE += "forward = [-0.5]\nyaw = [0]\nveer = [0]\n"
+
+
+def test_curves_of_a_model_are_driven_by_a_family_that_is_built_of_effects_and_by_no_other(lane, make_study, tmp_path):
+    (tmp_path / "model.toml").write_text(MODEL.format("duckiebot") + CURVE)
+    curved = read_theta(str(tmp_path / "model.toml"))
+    plain = {"trim": curved["trim"]}
+    distances = [drive(lane, "steady", theta).scores["distance"] for theta in (curved, plain)]
+    assert distances[0] < 0.7 * distances[1]
+    of_its_own = read_study_settings(make_study())
+    curves = {name: value for name, value in curved.items() if name != "trim"}
+    with pytest.raises(InputError, match=r"unknown parameter 'learnt\.range"):
+        check_episode(load_family(of_its_own, of_its_own.proxy), "agent0", curves, 0)
 
 
 @settings(max_examples=20)

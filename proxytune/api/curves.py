@@ -14,18 +14,17 @@ from proxytune.report import (
     Shown,
     View,
     curve_document,
-    draw_curves,
     figures_of_sweep,
     held_values,
+    save_figures,
     study_foot,
-    svg_of,
     sweep_view,
     teach_document,
     teach_figure,
     teach_view,
     write_curves,
+    write_page,
     write_sweep_page,
-    write_teach_report,
 )
 from proxytune.running import watching
 from proxytune.space import Theta
@@ -84,8 +83,7 @@ class SweepReport(Shown):
 
     def view(self) -> View:
         """What the page shows."""
-        figures = {name: svg_of(figure) for name, figure in self.figures().items()}
-        return sweep_view(self.settings.name, self.curves, figures, self.held)
+        return sweep_view(self.settings.name, self.curves, self.figures(), self.held)
 
     def figures(self) -> dict[str, Figure]:
         """A figure per parameter, and two of all, by name."""
@@ -129,7 +127,7 @@ class SweepReport(Shown):
         """
         output = self.settings.home / "figures" if folder is None else Path(folder)
         figures = self.figures()
-        drawn = draw_curves(figures, output)
+        drawn = save_figures(figures, output)
         page = write_sweep_page(self.settings, self.curves, figures, output, self.held, command)
         return drawn, [*write_curves(self.curves, output), page]
 
@@ -206,7 +204,7 @@ class TeachReport(Shown):
 
     def view(self) -> View:
         """What the page shows."""
-        return teach_view(self.experiment, self.prpv, svg_of(self.figures()["teach"]))
+        return teach_view(self.experiment, self.prpv, self.figures()["teach"])
 
     def figures(self) -> dict[str, Figure]:
         """The learning curves, by name."""
@@ -232,8 +230,11 @@ class TeachReport(Shown):
         Raises:
             RunError: If one cannot be written.
         """
-        figure = self.settings.home / "figures" / "teach.png"
-        return figure, write_teach_report(self.experiment, self.prpv, figure, study_foot(self.settings, command))
+        drawn = self.figures()
+        (figure,) = save_figures(drawn, self.settings.home / "figures")
+        page = figure.with_suffix(".html")
+        write_page(page, teach_view(self.experiment, self.prpv, drawn["teach"]), study_foot(self.settings, command))
+        return figure, page
 
 
 def teach(path: str | Path, *, progress: bool = False) -> TeachReport:

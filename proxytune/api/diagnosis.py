@@ -33,7 +33,6 @@ from proxytune.report import (
     diagnosis_headline,
     diagnosis_notes,
     diagnosis_view,
-    svg_of,
     write_diagnosis,
 )
 
@@ -56,7 +55,7 @@ class DiagnosisReport(Shown):
 
     def view(self) -> View:
         """What the page shows."""
-        return diagnosis_view(self.found, {name: svg_of(one) for name, one in self.figures().items()})
+        return diagnosis_view(self.found, self.figures())
 
     @property
     def diagnosis(self) -> Diagnosis | None:

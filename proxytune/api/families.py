@@ -18,8 +18,9 @@ from proxytune.report import (
     families_figure,
     families_sentence,
     families_view,
-    svg_of,
-    write_families_report,
+    save_figures,
+    study_foot,
+    write_page,
 )
 from proxytune.running import Watcher, watching
 from proxytune.storage import Store, locked
@@ -77,7 +78,7 @@ class FamiliesReport(Shown):
 
     def view(self) -> View:
         """What the page shows."""
-        return families_view(self.compared, svg_of(self.figure()))
+        return families_view(self.compared, self.figure())
 
     def figures(self) -> dict[str, Figure]:
         """The figure of all families, by name."""
@@ -111,7 +112,10 @@ class FamiliesReport(Shown):
         Raises:
             RunError: If one cannot be written.
         """
-        return write_families_report(self.compared)
+        settings, drawn = self.compared.settings, self.figures()
+        (figure,), page = save_figures(drawn, settings.home / "figures"), settings.home / "report.html"
+        write_page(page, families_view(self.compared, drawn["families"]), study_foot(settings))
+        return figure, page
 
 
 def run_families(path: str | Path, *, progress: bool = False, jobs: int | None = None) -> FamiliesReport:

@@ -19,7 +19,6 @@ from proxytune.errors import InputError, LogError, ScoresError
 from proxytune.files import temporary_folder
 from proxytune.logs import Log, read_log
 from proxytune.report import (
-    Picture,
     Shown,
     View,
     drawn_scores,
@@ -27,7 +26,6 @@ from proxytune.report import (
     score_document,
     score_sentence,
     score_view,
-    svg_of,
 )
 from proxytune.scores import (
     Metric,
@@ -104,7 +102,7 @@ class ScoreReport(Shown, Assessment):
 
     def view(self) -> View:
         """What the page shows."""
-        return _view(self._named, None, self.names[1])
+        return score_view(self._named, None, target=self.names[1])
 
     @property
     def _named(self) -> "dict[str, ScoreReport]":
@@ -153,7 +151,7 @@ class Ranking(Shown):
 
     def view(self) -> View:
         """What the page shows."""
-        return _view(self.proxies, self.selection, "target")
+        return score_view(self.proxies, self.selection, target="target")
 
     def figures(self) -> dict[str, Figure]:
         """The figures of every proxy, as "scatter: NAME"."""
@@ -173,15 +171,6 @@ class Ranking(Shown):
     def to_frame(self) -> pd.DataFrame:
         """One row per proxy, measure and metric: value, and the ends of its 95 % interval."""
         return pd.concat({name: one.to_frame() for name, one in self.proxies.items()}, names=["proxy"])
-
-
-def _view(reports: Mapping[str, ScoreReport], selection: Selection | None, target: str) -> View:
-    pictures = [
-        Picture(f"{head}: {name}" if selection else head, svg_of(figure), caption)
-        for name, report in reports.items()
-        for _, figure, head, caption in drawn_scores(report)
-    ]
-    return score_view(reports, selection, pictures, target=target)
 
 
 @overload

@@ -15,12 +15,13 @@ from proxytune.errors import InputError
 from proxytune.report import (
     Shown,
     View,
+    save_figures,
     study_document,
     study_figures,
+    study_foot,
     study_sentence,
     study_view,
-    svg_of,
-    write_study_report,
+    write_page,
 )
 from proxytune.running import Watcher, watching
 from proxytune.search import History, optimize_result
@@ -70,7 +71,7 @@ class StudyReport(Shown):
 
     def view(self) -> View:
         """What the page shows."""
-        return study_view(self.result, {name: svg_of(one) for name, one in self.figures().items()})
+        return study_view(self.result, self.figures())
 
     @property
     def sentence(self) -> str:
@@ -150,8 +151,11 @@ class StudyReport(Shown):
         Raises:
             RunError: If a file cannot be written.
         """
-        home = self.result.study.settings.home if folder is None else Path(folder)
-        return ReportFiles(*write_study_report(self.result, home, command))
+        settings, figures = self.result.study.settings, self.figures()
+        home = settings.home if folder is None else Path(folder)
+        files = ReportFiles(save_figures(figures, home / "figures"), home / "report.html")
+        write_page(files.page, study_view(self.result, figures), study_foot(settings, command or None))
+        return files
 
 
 def run_study(

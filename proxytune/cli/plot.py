@@ -16,10 +16,10 @@ from proxytune.cli.study import families_answer
 from proxytune.cli.terminal import Answer
 from proxytune.report import (
     curve_name,
-    draw_curves,
     figures_of_sweep,
     held_alike,
     held_values,
+    save_figures,
     study_document,
     study_text,
     write_study_tables,
@@ -69,7 +69,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     names = [re.sub(r"[^\w.-]+", "_", str(metric).replace("%", "percent")) for metric in metrics]
     folder = settings.home / RESCORED / "+".join(names) if names else settings.home
     drawn = figures_of_sweep(curves, run.study.truth)
-    figures = draw_curves(drawn, folder / "figures")
+    figures = save_figures(drawn, folder / "figures")
     shown = result.study.settings if result else settings
     pages = [str(page) for page in _pages(shown, curves, drawn, folder / "figures", typed(arguments))]
     document: dict[str, Any] = {}

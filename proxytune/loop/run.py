@@ -69,7 +69,6 @@ from proxytune.report import (
     group_texts,
     note_texts,
     study_foot,
-    svg_of,
     table_text,
     write_page,
 )
@@ -388,7 +387,7 @@ def view_of(closed: Closed) -> View:
     caption = "PRPV of the best θ on fresh episodes with 95 % intervals; grey: what a perfect proxy scores."
     home, shown = closed.loop.home, []
     if closed.after:
-        first = Picture("PRPV before and after", svg_of(prpv_figure(prpv)), caption)
+        first = Picture("PRPV before and after", prpv_figure(prpv), caption)
         shown = [first, *read_pictures(home)]
     found = (closed.diagnosis["effects"], (closed.diagnosis["camera"] or {}).get("effects"))
     for name, (title, text) in PICTURES.items():

@@ -39,7 +39,6 @@ from .families import (
     families_sentence as families_sentence,
     families_text as families_text,
     families_view as families_view,
-    write_families_report as write_families_report,
 )
 from .figure_style import (
     BLUE as BLUE,
@@ -75,14 +74,12 @@ from .study.page import (
     study_foot as study_foot,
     study_view as study_view,
     write_live_page as write_live_page,
-    write_study_report as write_study_report,
 )
 from .study.sentence import study_sentence as study_sentence
 from .study.tables import study_text as study_text, write_study_tables as write_study_tables
 from .sweep import (
     curve_document as curve_document,
     curve_name as curve_name,
-    draw_curves as draw_curves,
     figures_of_sweep as figures_of_sweep,
     held_alike as held_alike,
     held_values as held_values,
@@ -97,7 +94,6 @@ from .teaching import (
     teach_figure as teach_figure,
     teach_text as teach_text,
     teach_view as teach_view,
-    write_teach_report as write_teach_report,
 )
 from .text import (
     WholeWords as WholeWords,
@@ -130,6 +126,7 @@ from .wording import (
 from .writing import (
     figures_also_as as figures_also_as,
     save_figure as save_figure,
+    save_figures as save_figures,
     svg_of as svg_of,
     write_picture as write_picture,
     write_text as write_text,

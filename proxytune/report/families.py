@@ -3,7 +3,6 @@
 import os
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from matplotlib.axes import Axes
@@ -12,16 +11,13 @@ from matplotlib.ticker import MaxNLocator, NullFormatter
 from rich.console import Group
 
 from proxytune.report.figure_style import BLUE, COLUMN, VERMILLION, dress, legend_below
-from proxytune.report.html import write_page
 from proxytune.report.scores import differences_document, ends_document
 from proxytune.report.study.document import intervals_document
-from proxytune.report.study.page import study_foot
 from proxytune.report.study.sentence import KnownParameter, known_parameters
 from proxytune.report.teaching import UNKNOWN, count, estimate_document
 from proxytune.report.text import file_texts, group_texts, note_texts, section_text
 from proxytune.report.view import Paragraphs, Picture, Table, View, columns_of
 from proxytune.report.wording import fixed, in_pairs, listed, short, span
-from proxytune.report.writing import save_figure, svg_of
 from proxytune.study import BestFamilies, ComparedFamilies, Lesson, TunedFamily, settings_document
 from proxytune.usefulness import Assessment, Difference
 
@@ -239,27 +235,8 @@ def _say_family(one: TunedFamily) -> list[str]:
     return lines + ([early] if one.seconds < time else [])
 
 
-def write_families_report(compared: ComparedFamilies) -> tuple[Path, Path]:
-    """Draw the figure, and write the page, beside study.toml; the paths of both.
-
-    Raises:
-        RunError: If a file cannot be written.
-    """
-    settings = compared.settings
-    figure, page = settings.home / "figures" / "families.png", settings.home / "report.html"
-    drawn = families_figure(compared)
-    save_figure(drawn, figure)
-    write_page(page, families_view(compared, svg_of(drawn)), study_foot(settings))
-    return figure, page
-
-
-def families_view(compared: ComparedFamilies, figure: bytes) -> View:
-    """Several families: the figure, both tables, and where each family's own page is.
-
-    Args:
-        compared: The tuned families.
-        figure: The PNG.
-    """
+def families_view(compared: ComparedFamilies, figure: Figure) -> View:
+    """Several families: the figure, both tables, and where each family's own page is."""
     settings = compared.settings
     taught = (
         "PLV, the proxy learning value, counts the target samples that a learner saves by learning in the family at "

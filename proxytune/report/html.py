@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from PIL import Image
 
 from proxytune.report.view import Column, Foot, Paragraphs, Part, Picture, Table, View, foot_of
-from proxytune.report.writing import fill, write_text
+from proxytune.report.writing import fill, svg_of, write_text
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -124,10 +124,11 @@ def _part(part: Part, place: str) -> str:
 
 def _picture(part: Picture, place: str) -> str:
     alt = html.escape(f"{part.title}. {part.caption}".strip())
-    if b"<svg" in part.image[:1000]:
-        drawing = _inline_svg(part.image.decode("utf-8"), place, alt)
+    image = part.image if isinstance(part.image, bytes) else svg_of(part.image)
+    if b"<svg" in image[:1000]:
+        drawing = _inline_svg(image.decode("utf-8"), place, alt)
     else:
-        source, width = _data_image(part.image)
+        source, width = _data_image(image)
         size = f' width="{width}" style="--wide:{width}px;min-width:{SMALLEST * width:.0f}px"' if width else ""
         drawing = f'<span class="card"><img alt="{alt}" src="{source}"{size}></span>'
     card = f'<div class="scroll" role="region" tabindex="0" aria-labelledby="{place}">{drawing}</div>'

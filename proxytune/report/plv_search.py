@@ -28,7 +28,7 @@ from proxytune.report.teaching import (
 from proxytune.report.text import file_texts, group_texts, table_text
 from proxytune.report.view import Paragraphs, Picture, Table, View, columns_of
 from proxytune.report.wording import listed, short
-from proxytune.report.writing import save_figure, svg_of
+from proxytune.report.writing import save_figure
 from proxytune.study import settings_document
 from proxytune.teaching import Experiment, PlvStudy, PlvTrial, best_teacher, plv_or_worst, saves_more, why_unknown
 
@@ -104,7 +104,7 @@ def write_plv_report(study: PlvStudy, folder: Path) -> tuple[Path, Path]:
     save_figure(drawn, figure)
     finals, tried = _tables(study)
     stopped = Paragraphs("Why the search ended", (f"{study.stopped}.", f"{PLV_MEANING}."))
-    picture = Picture("PLV of the proxies tried", svg_of(drawn), TRIALS)
+    picture = Picture("PLV of the proxies tried", drawn, TRIALS)
     finalists = replace(finals, notes=(PLV_MEANING, *study.unable.values()))
     title = f"{study.settings.name}: in which simulator does a learner learn most?"
     view = View(title, plv_answer(study), plv_next_step(study), (finalists, picture, tried, stopped))

@@ -23,7 +23,7 @@ from proxytune.report.table_files import csv_text, latex_text
 from proxytune.report.text import group_texts, note_texts, table_text
 from proxytune.report.view import Column, Foot, Paragraphs, Picture, Table, View, columns_of
 from proxytune.report.wording import listed, short, short_span, with_span
-from proxytune.report.writing import file_names, save_figure, svg_of, write_text
+from proxytune.report.writing import file_names, save_figures, write_text
 from proxytune.usefulness import ALL, MEASURES, PPV, PRPV, Assessment, Measure, Measured, Selection, SuccessRates
 
 Row = tuple[str, str, str, str, str]
@@ -128,16 +128,10 @@ def _remarks(assessments: Assessments, note: str = "") -> list[str]:
 
 
 def score_view(
-    assessments: Assessments, selection: Selection | None, figures: Sequence[Picture], *, target: str
+    assessments: Assessments, selection: Selection | None, figures: Sequence[Picture] = (), *, target: str
 ) -> View:
-    """One proxy, or several ranked.
-
-    Args:
-        assessments: Of each proxy, by name.
-        selection: The proxies ranked; None where there is one.
-        figures: What was drawn.
-        target: Name of the target.
-    """
+    """One proxy, or several ranked; their figures are drawn unless they are given."""
+    figures = figures or [picture for *_, picture in _all_drawn(assessments, selection)]
     tables = _tables(assessments, selection, target)
     said = score_sentence(assessments, selection, target=target), score_next_step(assessments, selection)
     if selection is None:
@@ -157,6 +151,15 @@ def drawn_scores(assessment: Assessment) -> Iterator[tuple[str, Figure, str, str
     yield "decision", decision_figure(assessment.decision), "Regret of deploying each agent", CAPTION
 
 
+def _all_drawn(assessments: Assessments, selection: Selection | None) -> Iterator[tuple[str, Figure, Picture]]:
+    """The figures of every proxy: name of the file, figure, and what the page has of it."""
+    files = file_names(assessments)
+    for name, assessment in assessments.items():
+        file, title = ("", "") if selection is None else (f"_{files[name]}", f": {name}")
+        for kind, figure, head, caption in drawn_scores(assessment):
+            yield f"{kind}{file}", figure, Picture(f"{head}{title}", figure, caption)
+
+
 def write_score_report(
     assessments: Assessments, selection: Selection | None, folder: Path, foot: Foot, *, target: str
 ) -> tuple[list[Path], Path]:
@@ -165,15 +168,10 @@ def write_score_report(
     Raises:
         RunError: If a file cannot be written.
     """
-    paths, pictures, files = list[Path](), list[Picture](), file_names(assessments)
-    for name, assessment in assessments.items():
-        file, title = ("", "") if selection is None else (f"_{files[name]}", f": {name}")
-        for kind, figure, head, caption in drawn_scores(assessment):
-            paths.append(folder / f"{kind}{file}.png")
-            save_figure(figure, paths[-1])
-            pictures.append(Picture(f"{head}{title}", svg_of(figure), caption))
-    page = folder / "report.html"
-    write_page(page, score_view(assessments, selection, pictures, target=target), foot)
+    drawn, page = list(_all_drawn(assessments, selection)), folder / "report.html"
+    paths = save_figures({file: figure for file, figure, _ in drawn}, folder)
+    view = score_view(assessments, selection, [picture for *_, picture in drawn], target=target)
+    write_page(page, view, foot)
     return paths, page
 
 

@@ -17,9 +17,9 @@ from proxytune.report.study.page import study_foot
 from proxytune.report.sweep_figures import bars_figure, panels_figure, sweep_figure
 from proxytune.report.table_files import Cell, csv_text
 from proxytune.report.text import group_texts, table_text
-from proxytune.report.view import Paragraphs, Part, Picture, Table, View, columns_of
+from proxytune.report.view import Drawn, Paragraphs, Part, Picture, Table, View, columns_of
 from proxytune.report.wording import listed, plain, short
-from proxytune.report.writing import save_figure, svg_of, write_text
+from proxytune.report.writing import write_text
 from proxytune.space import Theta
 from proxytune.study import StudySettings
 from proxytune.sweep import METRICS, OUTWARDS, Series, SweepCurve, SweepPoint, describe_shape, series_of, shape_of
@@ -206,13 +206,13 @@ def _cell(series: Series, row: int) -> str:
     return f"{text} ({one.interval[0]:.0f} to {one.interval[1]:.0f})"
 
 
-def sweep_view(study: str, curves: Sequence[SweepCurve], figures: Mapping[str, bytes], held: str) -> View:
+def sweep_view(study: str, curves: Sequence[SweepCurve], figures: Mapping[str, Drawn], held: str) -> View:
     """Curves: the figures of all, then of each its figure and tables.
 
     Args:
         study: The study's name.
         curves: What was swept, at least one.
-        figures: PNG files by the name of the figure.
+        figures: By name.
         held: What the other parameters are held at, in a sentence.
     """
     own = {curve_name(curve): curve for curve in curves}
@@ -265,13 +265,6 @@ def figures_of_sweep(curves: Sequence[SweepCurve], truth: Theta | None) -> dict[
     return figures
 
 
-def draw_curves(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
-    """Write the figures of a sweep; return their paths."""
-    for name, figure in figures.items():
-        save_figure(figure, folder / f"{name}.png")
-    return [folder / f"{name}.png" for name in figures]
-
-
 def write_curves(curves: Sequence[SweepCurve], folder: Path) -> list[Path]:
     """Write each curve as CSV and as JSON; return the paths."""
     written = []
@@ -302,7 +295,7 @@ def write_sweep_page(
         command: The command that makes the page, as typed in a shell.
     """
     names = [*_names_together(curves), *map(curve_name, curves)]
-    drawn = {name: svg_of(figures[name]) for name in names}
+    drawn = {name: figures[name] for name in names}
     view = sweep_view(settings.name, curves, drawn, f"{held[0].upper()}{held[1:]}")
     path = folder / f"{names[0]}.html"
     write_page(path, view, study_foot(settings, command))

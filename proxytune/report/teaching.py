@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, astuple, replace
 from math import ceil
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,11 +13,9 @@ from rich.console import Group
 from proxytune.arrays import Floats
 from proxytune.learning import LEVELS, NONE, Costs, Distribution, LearningCurve, LearningEstimate, doublings
 from proxytune.report.figure_style import BLUE, COLUMN, GREY, dress, legend_below
-from proxytune.report.html import write_page
 from proxytune.report.text import file_texts, group_texts, table_text
-from proxytune.report.view import Foot, Paragraphs, Part, Picture, Table, View, columns_of
+from proxytune.report.view import Drawn, Paragraphs, Part, Picture, Table, View, columns_of
 from proxytune.report.wording import fixed, listed, percent, short, span
-from proxytune.report.writing import save_figure, svg_of
 from proxytune.study import settings_document
 from proxytune.teaching import (
     Experiment,
@@ -217,26 +214,7 @@ def _tau(found: RankAgreement, figure: str) -> str:
     return f"{figures}: of {found.proxies} proxies, {says}"
 
 
-def write_teach_report(experiment: Experiment, prpv: Predictivities, figure: Path, foot: Foot) -> Path:
-    """Draw the learning curves, and write the page beside them; the page's path.
-
-    Args:
-        experiment: What was taught.
-        prpv: How well each proxy predicts.
-        figure: Where the figure goes.
-        foot: How to come by the page again.
-
-    Raises:
-        RunError: If a file cannot be written.
-    """
-    drawn = teach_figure(experiment)
-    save_figure(drawn, figure)
-    page = figure.with_suffix(".html")
-    write_page(page, teach_view(experiment, prpv, svg_of(drawn)), foot)
-    return page
-
-
-def teach_view(experiment: Experiment, prpv: Predictivities, figure: bytes) -> View:
+def teach_view(experiment: Experiment, prpv: Predictivities, figure: Drawn) -> View:
     """A learning experiment: the paper's table 1 and observations, what others published, and the curves."""
     table, observations = teach_table(experiment, prpv), observation_lines(observe(experiment, prpv), experiment)
     said = [Paragraphs("The paper's two observations", observations)] if observations else []

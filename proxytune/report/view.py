@@ -7,9 +7,15 @@ import platform
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from typing import TYPE_CHECKING, TypeAlias
 
 from proxytune.identity import versions_of
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Drawn: TypeAlias = "bytes | Figure"
+"""The bytes of a PNG, GIF or SVG file, or a figure."""
 PACKAGES = ("proxytune", "numpy", "scipy", "pybullet")
 """Packages that results may depend on."""
 
@@ -50,12 +56,12 @@ class Picture:
 
     Attributes:
         title: What it is of, in a few words.
-        image: The bytes of a PNG, GIF or SVG file.
+        image: The figure, or the bytes of a PNG, GIF or SVG file.
         caption: What to see in it, a sentence or two.
     """
 
     title: str
-    image: bytes
+    image: Drawn
     caption: str
 
 

@@ -61,6 +61,17 @@ def save_figure(figure: Figure, path: Path) -> None:
         write_whole(path.with_suffix(f".{form}"), "the figure ", partial(_draw, figure, form))
 
 
+def save_figures(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
+    """Write figures as `save_figure` does, NAME.png each; their paths.
+
+    Raises:
+        RunError: If one cannot be written.
+    """
+    for name, figure in figures.items():
+        save_figure(figure, folder / f"{name}.png")
+    return [folder / f"{name}.png" for name in figures]
+
+
 def svg_of(figure: Figure) -> bytes:
     """A figure as an SVG for a page: without a background, and what a marker stands for as its title."""
     said = dict(_marks(figure))

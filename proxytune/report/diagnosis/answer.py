@@ -26,9 +26,9 @@ from proxytune.report.export.nodes import commands_text, player_text
 from proxytune.report.html import write_page
 from proxytune.report.meanings import findings, fitted
 from proxytune.report.text import group_texts, table_text
-from proxytune.report.view import Paragraphs, Part, Picture, Table, View, columns_of, foot_of
+from proxytune.report.view import Drawn, Paragraphs, Part, Picture, Table, View, columns_of, foot_of
 from proxytune.report.wording import fixed, short, span
-from proxytune.report.writing import fill, save_figure, svg_of, write_text
+from proxytune.report.writing import fill, save_figures, write_text
 
 MOST_TRIED = 8
 """So many effects that were tried are in the table."""
@@ -68,16 +68,13 @@ def write_diagnosis(found: LogDiagnosis, folder: Path, command: str = "") -> lis
     else:
         write_text(following[0], commands_text(found.motion))
         write_text(following[1], player_text(found.motion))
-    figures = {folder / f"{name}.png": figure for name, figure in diagnosis_figures(found).items()}
-    for path, figure in figures.items():
-        save_figure(figure, path)
-    drawn = {path.stem: svg_of(figure) for path, figure in figures.items()}
-    foot = foot_of(command, [("log", found.log), ("robot", found.robot.name)])
-    write_page(page, diagnosis_view(found, drawn), foot)
-    return [document, model, *following, *figures, page]
+    figures = diagnosis_figures(found)
+    drawn, foot = save_figures(figures, folder), foot_of(command, [("log", found.log), ("robot", found.robot.name)])
+    write_page(page, diagnosis_view(found, figures), foot)
+    return [document, model, *following, *drawn, page]
 
 
-def diagnosis_view(found: LogDiagnosis, figures: Mapping[str, bytes]) -> View:
+def diagnosis_view(found: LogDiagnosis, figures: Mapping[str, Drawn]) -> View:
     """A diagnosis: the figures by their names, then the tables and all notes."""
     notes = tuple(f"{note[:1].upper()}{note[1:]}." for note in diagnosis_notes(found))
     paragraphs = [Paragraphs("What else is to be known", notes)] if notes else []
@@ -138,7 +135,7 @@ def _say_refusals(found: LogDiagnosis) -> list[str]:
     return [f"{part}: {why}" for part, why in parts if why]
 
 
-def diagnosis_pictures(figures: Mapping[str, bytes]) -> list[Picture]:
+def diagnosis_pictures(figures: Mapping[str, Drawn]) -> list[Picture]:
     """The figures that there are, with captions; one without a caption comes last under its own name."""
     known = [Picture(title, figures[name], caption) for name, (title, caption) in CAPTIONS.items() if name in figures]
     return [*known, *(Picture(name, image, "") for name, image in figures.items() if name not in CAPTIONS)]

@@ -9,12 +9,10 @@ from matplotlib.ticker import MaxNLocator
 
 from proxytune.report.figure_style import BLUE, COLUMN, dress
 from proxytune.report.html import write_page
-from proxytune.report.study.figures import study_figures
 from proxytune.report.study.sentence import finding_of, say_answer, say_next_step
 from proxytune.report.study.tables import INFORMATION, MEASURES, SEARCH, THETA, USEFULNESS, study_tables, trials_table
-from proxytune.report.view import Foot, Paragraphs, Part, Picture, View, foot_of
+from proxytune.report.view import Drawn, Foot, Paragraphs, Part, Picture, View, foot_of
 from proxytune.report.wording import short
-from proxytune.report.writing import save_figure, svg_of
 from proxytune.storage import TrialRecord
 from proxytune.study import LEARNING, StudyResult, StudySettings
 
@@ -35,33 +33,8 @@ WAIT = "wait for the end, which brings intervals and figures; `python -m proxytu
 CONTINUE = "run the same command to continue: everything finished is kept."
 
 
-def write_study_report(result: StudyResult, folder: Path, command: str = "") -> tuple[list[Path], Path]:
-    """Write a study's figures and its page; the paths of both.
-
-    Args:
-        result: What the study has found.
-        folder: Where to.
-        command: What was typed; the study's own command where nothing is given.
-
-    Raises:
-        RunError: If a file cannot be written.
-    """
-    figures = {folder / "figures" / f"{name}.png": figure for name, figure in study_figures(result).items()}
-    for path, figure in figures.items():
-        save_figure(figure, path)
-    drawn, page = {path.stem: svg_of(figure) for path, figure in figures.items()}, folder / "report.html"
-    foot = study_foot(result.study.settings, command or None)
-    write_page(page, study_view(result, drawn), foot)
-    return list(figures), page
-
-
-def study_view(result: StudyResult, figures: Mapping[str, bytes]) -> View:
-    """A study: its tables, with the figures beside what they are of.
-
-    Args:
-        result: What it has found.
-        figures: PNG files by the name of the figure, those that there are.
-    """
+def study_view(result: StudyResult, figures: Mapping[str, Drawn]) -> View:
+    """A study: its tables, with those figures that there are, by name, beside what they are of."""
     finding, settings = finding_of(result), result.study.settings
     drawn, tables = study_pictures(result, figures), study_tables(result)
     parts = (
@@ -97,7 +70,7 @@ def study_foot(settings: StudySettings, command: str | None = None) -> Foot:
     return foot_of(own if command is None else command, [(name, value) for name, value in stated if value])
 
 
-def study_pictures(result: StudyResult, figures: Mapping[str, bytes]) -> dict[str, Picture]:
+def study_pictures(result: StudyResult, figures: Mapping[str, Drawn]) -> dict[str, Picture]:
     """Each figure that there is, by its name, with its caption."""
     truth = "" if result.truth is None else " The triangle is the θ that made the target."
     nothing = " Where almost nothing is grey, the parameter is unidentified: these trials exclude almost no value."
@@ -148,8 +121,7 @@ def live_view(settings: StudySettings, objective: str, trials: Sequence[TrialRec
     if trials:
         measures = tuple(dict.fromkeys((objective, *(MEASURES if objective != LEARNING else ()))))
         caption = "Each point is a trial; trials that failed or were stopped early have none. The best may be luck."
-        image = svg_of(_trials_figure(trials, objective))
-        picture = Picture(f"{objective.upper()} trial by trial", image, caption)
+        picture = Picture(f"{objective.upper()} trial by trial", _trials_figure(trials, objective), caption)
         shown = (picture, trials_table(trials, tuple(trials[0].theta), measures))
     sentence = f"{f'Under way: {doing}.' if doing else 'Stopped before its end.'} {_say_best(trials, objective)}"
     return View(f"{settings.name}: which θ makes the simulator useful?", sentence, WAIT if doing else CONTINUE, shown)

@@ -2,11 +2,10 @@
 
 import argparse
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from matplotlib.figure import Figure
 from rich.console import Group, RenderableType
 from rich.text import Text
 
@@ -31,7 +30,6 @@ from proxytune.study import (
     Spent,
     StudyResult,
     StudyRun,
-    StudySettings,
     open_read_only,
     read_study_settings,
     rescored,
@@ -71,11 +69,15 @@ def run(arguments: argparse.Namespace) -> Answer:
     drawn = figures_of_sweep(curves, run.study.truth)
     figures = save_figures(drawn, folder / "figures")
     shown = result.study.settings if result else settings
-    pages = [str(page) for page in _pages(shown, curves, drawn, folder / "figures", typed(arguments))]
+    latest, command = list({curve_name(curve): curve for curve in curves}.values()), typed(arguments)
+    pages = [
+        str(write_sweep_page(shown, alike, drawn, folder / "figures", held_values(alike[0].base), command))
+        for alike in held_alike(latest)
+    ]
     document: dict[str, Any] = {}
     if result:
         found = StudyReport(result, Spent())
-        own_figures, report = found.write(folder, typed(arguments) if metrics else "")
+        own_figures, report = found.write(folder, command if metrics else "")
         figures = [*own_figures, *figures]
         tables = [str(path) for path in write_study_tables(result, found.trials(), folder / "figures")]
         document = {**study_document(result), "report": str(report), "tables": tables}
@@ -88,14 +90,6 @@ def run(arguments: argparse.Namespace) -> Answer:
         note = f"none run; scored with {named}; the trials are still those that the study's own metrics led to"
         text = Group(study_text(result, note, {}), text)
     return Answer({**document, "figures": paths, "pages": pages}, text)
-
-
-def _pages(
-    settings: StudySettings, curves: Sequence[SweepCurve], figures: Mapping[str, Figure], folder: Path, command: str
-) -> Iterator[Path]:
-    latest = list({curve_name(curve): curve for curve in curves}.values())
-    for alike in held_alike(latest):
-        yield write_sweep_page(settings, alike, figures, folder, held_values(alike[0].base), command)
 
 
 def _read(run: StudyRun, metrics: Sequence[Metric]) -> tuple[StudyResult | None, Sequence[SweepCurve]]:

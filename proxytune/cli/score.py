@@ -2,6 +2,7 @@
 
 import argparse
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,6 @@ from proxytune.report import (
     ranking_document,
     score_document,
     score_text,
-    sequential_document,
     sequential_sentence,
     write_score_report,
     write_score_table,
@@ -252,7 +252,7 @@ def run(arguments: argparse.Namespace) -> Answer:
         write_score_table(assessments, arguments.table)
         document["table"] = str(arguments.table)
     if tested is not None:
-        document["sequential"] = sequential_document(tested)
+        document["sequential"] = asdict(tested)
     return _answer(document, assessments, selection, tested)
 
 

@@ -3,11 +3,10 @@
 A source is read, checked, put in numbers drive by drive, and written as a log's folder: whole, or not at all.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -87,21 +86,14 @@ def rows_notes(drives: Sequence[Drive]) -> list[str]:
     ]
 
 
-class Form(NamedTuple):
-    """A form that recordings come in: what tells it, and what reads it."""
-
-    recognise: Callable[[Path], bool]
-    read: Callable[[Path, Wanted], Source]
-
-
-FORMS = (
-    Form(is_bag, read_bag),
-    Form(is_arrays, read_arrays),
-    Form(is_mrclam, read_mrclam),
-    Form(is_tum, read_tum),
-    Form(is_csv_tables, read_csv_tables),
-)
-"""From what is told most surely to what takes any text."""
+FORMS: Mapping[Callable[[Path], bool], Callable[[Path, Wanted], Source]] = {
+    is_bag: read_bag,
+    is_arrays: read_arrays,
+    is_mrclam: read_mrclam,
+    is_tum: read_tum,
+    is_csv_tables: read_csv_tables,
+}
+"""What tells a form that recordings come in, and what reads it; from the surest to what takes any text."""
 
 KNOWN = "a ROS bag (.bag, .db3, .mcap or a folder of them), CSV, TUM or MRCLAM files, or arrays (.npz)"
 
@@ -122,12 +114,10 @@ def read_source(path: Path, wanted: Wanted, offset_s: float = 0.0) -> Source:
     if not (path.is_file() or path.is_dir()):
         # A pipe would be waited for, and a device never ends.
         raise LogError(f"{path}: is a device or a pipe; copy what it gives into a file, and give that")
-    for form in FORMS:
-        if form.recognise(path):
-            source = form.read(path, wanted)
-            break
-    else:
+    read = next((read for recognise, read in FORMS.items() if recognise(path)), None)
+    if read is None:
         raise LogError(f"{path}: is no recording that is known; give {KNOWN}")
+    source = read(path, wanted)
     drives, notes = [], list(source.notes)
     for drive in source.drives:
         one, found = checked_drive(drive, str(path), offset_s)
@@ -246,7 +236,6 @@ def _write_pictures(folder: Path, drives: list[tuple[str, Pictures]]) -> None:
 
 
 def _description(source: Source, name: str, facts: Facts, origin: str, *, with_pictures: bool) -> str:
-    """The text of log.toml."""
     kinds = {drive.commands.kind for drive in source.drives if drive.commands is not None}
     stated = {"format": 1, "name": name, "robot": facts.robot or name, "command": next(iter(kinds), "none")}
     stated |= {"source": f"{origin}, {source.form}"} | dict(facts.figures)

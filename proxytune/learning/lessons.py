@@ -47,8 +47,7 @@ TRIED = 10
 class Distribution:
     """p(θ): every parameter uniform within its bounds, or fixed where these are equal; S_θ where all are.
 
-    Attributes:
-        bounds: Lowest and highest value of each parameter that is not nominal, by name.
+    Those not named are nominal.
     """
 
     bounds: Mapping[str, tuple[float, float]]
@@ -75,13 +74,8 @@ def collect_samples(
 ) -> Demonstration:
     """Collect this many of the expert's samples, lesson by lesson; more samples begin with the same ones.
 
-    Args:
-        classroom: Where the lessons are; with a policy, an `OnPolicyClassroom`.
-        where: p(θ), drawn anew for every lesson.
-        count: How many samples.
-        seed: Of θ, of the starts and of the lessons.
-        lesson_s: How long a lesson takes [s].
-        policy: Who drives, and has what it visits labelled by the expert; None for the expert itself.
+    p(θ) is drawn anew for every lesson of so many seconds, and the seed is of θ, of the starts and of the lessons. With
+    a policy, which takes an `OnPolicyClassroom`, that drives, and has what it visits labelled by the expert.
 
     Raises:
         LearnerError: If the expert cannot drive there, or has no label where the policy drives.
@@ -134,11 +128,7 @@ FACTS = "facts"
 
 @dataclass(frozen=True)
 class Cache:
-    """A folder of `KIND-DIGEST.npz`, each with its arrays and, as JSON, what determines them.
-
-    Attributes:
-        folder: Where it is; made when first written to.
-    """
+    """A folder, made when first written to, of `KIND-DIGEST.npz`: arrays and, as JSON, what determines them."""
 
     folder: Path
 
@@ -231,12 +221,9 @@ KEYS = ("off_policy", "on_policy", "label")
 
 @dataclass(frozen=True)
 class Costs:
-    """The costs of one target sample, in any one unit.
+    """The costs of one target sample, in any one unit: by the expert's driving, or by the learner's own.
 
-    Attributes:
-        off_policy: One that the expert's driving gives.
-        on_policy: One that the learner's own driving gives.
-        label: One answer of the expert, on top of either.
+    A label is one answer of the expert, on top of either.
     """
 
     off_policy: float = 1.0

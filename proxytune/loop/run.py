@@ -400,6 +400,9 @@ def view_of(closed: Closed) -> View:
         f"Before: {closed.before.sentence}",
         *((f"After: {closed.after.sentence}",) if closed.after else ()),
     )
+    beside = {"tuning without": "../report.html", "the diagnosis": "diagnosed/report.html"}
+    beside |= {"tuning again": "extended/report.html", "the model that was found": "diagnosed/model.toml"}
+    links = (f"[{title}]({name})" for title, name in beside.items() if (home / name).is_file())
     return View(
         title=f"{closed.loop.settings.name}: what did the simulator lack, and what is it worth?",
         sentence=answer(closed.diagnosis, rows),
@@ -409,17 +412,9 @@ def view_of(closed: Closed) -> View:
             _theta_table(closed),
             *shown,
             Paragraphs("What each step said", said),
-            _links(closed),
+            Paragraphs("Pages and files", (" · ".join(links),)),
         ),
     )
-
-
-def _links(closed: Closed) -> Paragraphs:
-    home = closed.loop.home
-    beside = {"tuning without": "../report.html", "the diagnosis": "diagnosed/report.html"}
-    beside |= {"tuning again": "extended/report.html", "the model that was found": "diagnosed/model.toml"}
-    links = (f"[{title}]({name})" for title, name in beside.items() if (home / name).is_file())
-    return Paragraphs("Pages and files", (" · ".join(links),))
 
 
 def _table(closed: Closed, rows: list[Compared]) -> Table:

@@ -1,5 +1,5 @@
 from .bank import bank_document as bank_document, bank_text as bank_text, write_bank_page as write_bank_page
-from .decision import sequential_document as sequential_document, sequential_sentence as sequential_sentence
+from .decision import sequential_sentence as sequential_sentence
 from .diagnosis.answer import (
     diagnosis_figures as diagnosis_figures,
     diagnosis_headline as diagnosis_headline,

@@ -256,18 +256,6 @@ def choices_sentences(assessments: Mapping[str, Assessment], selection: Selectio
     return [*lines, f"{names} together: {saving_sentence(both.saves)}; {risk}"]
 
 
-def sequential_document(found: Sequential) -> dict[str, Any]:
-    """The sequential test as plain JSON."""
-    return {
-        "winner": found.winner,
-        "decided_at": found.decided_at,
-        "rounds": found.rounds,
-        "evidence": dict(found.evidence),
-        "threshold": found.threshold,
-        "expected_rounds": dict(found.expected_rounds),
-    }
-
-
 def _panel(panel: Panel) -> dict[str, Any]:
     return {
         "proxy_winner": panel.proxy_winners[0],

@@ -181,7 +181,10 @@ def families_tables(compared: ComparedFamilies) -> tuple[Table, Table]:
     known = [{one.name: one for one in known_parameters(family.result)} for family in compared.families]
     names = dict.fromkeys(name for one in known for name in one)
     theta = tuple((name, *(_theta_cell(one.get(name)) for one in known)) for name in names)
-    return Table(USES, columns, tuple(_use_rows(compared)), tuple(use_notes(compared))), Table(THETA, columns, theta)
+    notes = ["PRPV is of fresh episodes at the best θ, from the same starts and under the same seeds in every family"]
+    notes += [f"{one.name}: {line}" for one in compared.families for line in _say_family(one)]
+    notes += [f"{name}: {one.failure}" for name, one in compared.lessons.items() if one.failure]
+    return Table(USES, columns, tuple(_use_rows(compared)), tuple(notes)), Table(THETA, columns, theta)
 
 
 def _use_rows(compared: ComparedFamilies) -> list[Row]:
@@ -213,14 +216,6 @@ def _theta_cell(parameter: KnownParameter | None) -> str:
         return ""
     interval = span(parameter.interval) if parameter.identified else "unidentified"
     return f"{short(parameter.best, 4)} {parameter.unit}".strip() + f" ({interval})"
-
-
-def use_notes(compared: ComparedFamilies) -> list[str]:
-    """Notes on what the numbers are, and what a family's own study had to say of it."""
-    lines = ["PRPV is of fresh episodes at the best θ, from the same starts and under the same seeds in every family"]
-    lines += [f"{one.name}: {line}" for one in compared.families for line in _say_family(one)]
-    lines += [f"{name}: {one.failure}" for name, one in compared.lessons.items() if one.failure]
-    return lines
 
 
 def _say_family(one: TunedFamily) -> list[str]:
@@ -414,5 +409,4 @@ def _draw(axes: Axes, panel: Panel, names: list[str]) -> None:
 
 
 def _standing(panel: Panel, name: str) -> str:
-    """Standing of a family in a panel."""
     return BEST if name == panel.choice.best else ALIKE if name in panel.choice.alike else WORSE

@@ -30,7 +30,16 @@ from proxytune.report.view import Paragraphs, Picture, Table, View, columns_of
 from proxytune.report.wording import listed, short
 from proxytune.report.writing import save_figure
 from proxytune.study import settings_document
-from proxytune.teaching import Experiment, PlvStudy, PlvTrial, best_teacher, plv_or_worst, saves_more, why_unknown
+from proxytune.teaching import (
+    Experiment,
+    PlvStudy,
+    PlvTrial,
+    TeacherResult,
+    best_teacher,
+    plv_or_worst,
+    saves_more,
+    why_unknown,
+)
 
 MORE_PROXIES = "raise teaching.budget, or widen [parameters], so that other proxies are tried"
 CONFIRMED = "Finalists, taught anew with fresh lessons, learners and examinations"
@@ -119,29 +128,18 @@ def _tables(study: PlvStudy) -> tuple[Table, Table]:
         bounds = [proxy.bounds[name] for name in names]
         return [short(low) if low == high else f"{short(low)} to {short(high)}" for low, high in bounds]
 
+    def row(name: str, one: PlvTrial | TeacherResult) -> tuple[str, ...]:
+        worth = (count(one.worth.needed), count(one.worth.plv, UNKNOWN)) if one.worth else ("", UNKNOWN)
+        return (name, *spans(one.proxy), one_decimal(one.zero_shot), *worth)
+
     experiment, best, names = study.confirmed, best_teacher(study.confirmed), study.settings.space.names
     ordered = sorted(study.trials, key=lambda trial: (trial is not study.best, trial.number))
-    trials = tuple(
-        (
-            str(trial.number),
-            *spans(trial.proxy),
-            one_decimal(trial.zero_shot),
-            count(trial.worth.needed),
-            count(trial.worth.plv, UNKNOWN),
-        )
-        for trial in ordered
-    )
-    finals = tuple(
-        (
-            one.name,
-            *spans(one.proxy),
-            one_decimal(one.zero_shot),
-            count(one.worth.needed) if one.worth else "",
-            count(one.worth.plv, UNKNOWN) if one.worth else UNKNOWN,
-            count(saves_more(experiment, best.name, one.name), UNKNOWN) if best and best is not one else "",
-        )
+    trials = tuple(row(str(trial.number), trial) for trial in ordered)
+    leads = [
+        count(saves_more(experiment, best.name, one.name), UNKNOWN) if best and best is not one else ""
         for one in experiment.teachers
-    )
+    ]
+    finals = tuple((*row(one.name, one), lead) for one, lead in zip(experiment.teachers, leads, strict=True))
     heads = (*names, *SCORES)
     return (
         Table(CONFIRMED, columns_of(("finalist",), (*heads, "the best saves more by")), finals),

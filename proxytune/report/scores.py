@@ -52,7 +52,6 @@ def score_sentence(assessments: Assessments, selection: Selection | None, *, tar
 
 
 def _say_prpv(assessment: Assessment, proxy: str, target: str) -> str:
-    """Say how low PRPV is, and what that is worth."""
     prpv, inner, random = assessment.prpv, assessment.prpv_interval, assessment.chance
     floor = assessment.noise_floor
     chance = f"{short(random.mean)} ± {short(random.deviation)}, p = {random.p_value:.2g}"
@@ -192,7 +191,6 @@ def _tables(assessments: Assessments, selection: Selection | None, target: str) 
 
 
 def _rates(rates: SuccessRates) -> Table:
-    """The success rate of each agent on both sides."""
     rows = []
     for agent, target in rates.target.items():
         sides = [

@@ -132,7 +132,6 @@ def check_machine(whose: str, problem: BaseException | None, remedy: str) -> Non
 
 
 def _failure(problem: BaseException) -> str:
-    """Why an episode failed."""
     if isinstance(problem, EpisodeError):
         return f"{problem}{place_of(problem.__cause__)}"
     # What is no Exception, as of sys.exit, goes through every family, so it may be the agent's.

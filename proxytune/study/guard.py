@@ -35,7 +35,12 @@ class UserFamily:
         """Any member of the family; what asking for it raises is an ExtensionError."""
         if member.startswith("__"):
             raise AttributeError(member)
-        value = ask(f"{member} of {self.name}", functools.partial(self._member, member))
+        # A property that raises AttributeError is no missing one.
+
+        def found() -> Any:
+            return getattr(self.family, member) if has_member(self.family, member) else MISSING
+
+        value = ask(f"{member} of {self.name}", found)
         if value is MISSING:
             raise AttributeError(f"{self.name} has no '{member}'")
         if self.aliases and member in ON_EPISODES:
@@ -56,12 +61,6 @@ class UserFamily:
         """Refuse an agent that the family cannot run."""
         loaded = self._loaded(name)
         ask(f"check_agent('{loaded}') of {self.name}", functools.partial(self.family.check_agent, loaded))
-
-    def _member(self, member: str) -> Any:
-        # A property that raises AttributeError is no missing one.
-        if has_member(self.family, member):
-            return getattr(self.family, member)
-        return MISSING
 
     def _loaded(self, agent: str) -> str:
         return dict(self.aliases).get(agent, agent)

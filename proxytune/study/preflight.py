@@ -34,7 +34,7 @@ from scipy.stats import wilcoxon
 from proxytune.arrays import Floats
 from proxytune.domain import DomainFamily, Episode, Outcome, make_episode
 from proxytune.errors import RunError
-from proxytune.running import Fleet, Rescue, WorkerExit, run_fleet, working
+from proxytune.running import Fleet, Rescue, run_fleet, working
 from proxytune.seeds import preflight_noise_seed, preflight_seed
 from proxytune.space import Interval, Theta
 from proxytune.storage import Store
@@ -137,7 +137,10 @@ def check_repeatable(run: StudyRun, episodes: Sequence[Episode]) -> None:
     with run.watched() as watch:
         timeout_s = watch.timeout_s and 2.0 * watch.timeout_s
         rescue = Rescue[Fleet, list[Again]](
-            _lost, timeout_s, lambda fleet: any(map(watch.suspect, fleet)), watch.begins
+            lambda fleet, end: [(episode, None) for episode in fleet],
+            timeout_s,
+            lambda fleet: any(map(watch.suspect, fleet)),
+            watch.begins,
         )
         with working(drive, fleets, run.settings.jobs, rescue) as driven:
             others = {one.agent for again in driven for one, scores in again if scores != known[one]}
@@ -154,10 +157,6 @@ def not_repeatable(store: Store) -> tuple[str, ...]:
 def _drive_twice(family: DomainFamily, needed: Sequence[str], fleet: Fleet) -> list[Again]:
     both = run_fleet(family, fleet, needed) + run_fleet(family, fleet, needed)
     return [(outcome.episode, outcome.metrics) for outcome in both]
-
-
-def _lost(fleet: Fleet, end: WorkerExit) -> list[Again]:
-    return [(episode, None) for episode in fleet]
 
 
 def check_some_work(outcomes: Collection[Outcome], where: str) -> None:

@@ -71,15 +71,10 @@ CACHE = "teaching"
 
 @dataclass(frozen=True)
 class TeacherResult:
-    """The result of one proxy as a teacher.
+    """The result of one proxy as a teacher: p(θ), and scores after so many target samples, having learnt from it.
 
-    Attributes:
-        name: What it is called.
-        proxy: Its p(θ).
-        curve: Scores in the target after so many target samples, having learnt from the proxy first.
-        zero_shot: Mean score before any target sample.
-        worth: PLV and what it is made of; None where the learner without a proxy has not converged.
-        cost: PLV in cost, in the unit of [teaching.costs]; None likewise.
+    The zero-shot score is the mean before any target sample. What it is worth, and that in the unit of
+    [teaching.costs], is None where the learner without a proxy has not converged.
     """
 
     name: str
@@ -92,13 +87,10 @@ class TeacherResult:
 
 @dataclass(frozen=True)
 class Experiment:
-    """The result of a learning experiment.
+    """The result of a learning experiment: one teacher per proxy, in the order of study.toml.
 
-    Attributes:
-        settings: Of the study.
-        best_score: The score of a flawless examination.
-        needs: How many target samples each learner needs, from the posterior of all learning curves.
-        teachers: One per proxy, in the order of study.toml.
+    How many target samples each learner needs follows from the posterior of all learning curves; the best score is that
+    of a flawless examination.
     """
 
     settings: StudySettings
@@ -238,15 +230,10 @@ def classrooms(settings: StudySettings) -> dict[str, Classroom]:
 def teach_families(
     settings: StudySettings, thetas: Mapping[str, Theta], watching: Callable[[int], AbstractContextManager[Watcher]]
 ) -> dict[str, Lesson]:
-    """Teach a learner in each family at its best θ, from wherever an earlier run was left.
+    """Teach a learner in each family at its best θ, by name, from wherever an earlier run was left.
 
     The target is the study's own family, with its [domain] and the model that [teaching] names. The learner without a
-    proxy, its lessons and its examinations are the same for all.
-
-    Args:
-        settings: Of the study of all families.
-        thetas: The best θ of each, by name.
-        watching: Gives what hears of so many points.
+    proxy, its lessons and its examinations are the same for all. Watching gives what hears of so many points.
 
     Raises:
         LearnerError: If none can teach.
@@ -295,15 +282,10 @@ SURE = 0.95
 
 @dataclass(frozen=True)
 class RankAgreement:
-    """The agreement of two rankings of the same proxies.
+    """The agreement of two rankings of the same proxies: Kendall's τ with its 95 % interval, the median over draws.
 
-    Attributes:
-        tau: Kendall's τ, the median over draws: 1 the same ranking, −1 its reverse.
-        low: Lower end of its 95 % interval.
-        high: Upper end.
-        reversed: Pairs of proxies, by name, that the two figures order otherwise, each order sure; the first of a pair
-            is ahead by the second figure.
-        proxies: How many are ranked.
+    Reversed are pairs of proxies that the two figures order otherwise, each order sure; the first of a pair is ahead by
+    the second figure.
     """
 
     tau: float

@@ -75,12 +75,7 @@ def finalists(
 ) -> dict[str, Distribution]:
     """The distributions that are worth a closer look, by name; none twice.
 
-    Args:
-        setup: Of the learning experiment.
-        settings: Of the study, whose whole box is one of the finalists where widths are searched.
-        space: What was searched.
-        trials: Those that have ended.
-        by_prpv: The θ of lowest PRPV, None where that is not known.
+    The study's whole box is one of them where widths are searched, and the θ of lowest PRPV where that is known.
     """
     if all(trial.score is None for trial in trials):
         return {}
@@ -184,15 +179,9 @@ OBJECTIVE = "plv"
 
 @dataclass(frozen=True)
 class PlvTrial:
-    """One proxy tried as a teacher.
+    """One proxy tried as a teacher, counted from 1: learning curve, worth, and mean score before any target sample.
 
-    Attributes:
-        number: Counted from 1.
-        theta: Centre and, where searched, width of each parameter's distribution.
-        proxy: That p(θ).
-        curve: Its learning curve.
-        worth: What it is worth.
-        zero_shot: Its mean score before any target sample.
+    θ has the centre and, where searched, the width of each parameter's distribution.
     """
 
     number: int
@@ -205,17 +194,10 @@ class PlvTrial:
 
 @dataclass(frozen=True)
 class PlvStudy:
-    """The result of a study of learning value.
+    """The result of a study of learning value, with every proxy tried, in order, and why no further one was.
 
-    Attributes:
-        settings: Of the study.
-        space: The box that was searched: the study's, or what PRPV left of it, and the widths'.
-        without: The learning curve without a proxy.
-        when: When a learner counts as converged.
-        trials: Every proxy tried, in order.
-        stopped: Why no further one was.
-        confirmed: The finalists, taught anew under seeds that the search has not used.
-        unable: Why finalists cannot teach, by name of those.
+    The box that was searched is the study's, or what PRPV left of it, and the widths'. Finalists were taught anew under
+    seeds that the search has not used; some are unable to teach, which is told by name.
     """
 
     settings: StudySettings
@@ -246,15 +228,7 @@ def plv_or_worst(trial: PlvTrial) -> float:
 
 @dataclass(frozen=True)
 class PlvSearch:
-    """A search for the proxy of highest learning value: what its trials are a function of, and where they are kept.
-
-    Attributes:
-        settings: Of the study.
-        setup: Where learners are taught and examined.
-        store: Where trials are kept.
-        space: The box that is searched.
-        watcher: Hears of every point of a learning curve.
-    """
+    """A search for the proxy of highest learning value: what its trials are a function of, and where they are kept."""
 
     settings: StudySettings
     setup: TeachingSetup
@@ -265,9 +239,7 @@ class PlvSearch:
     def run(self, proposer: Proposer, by_prpv: Theta | None = None) -> PlvStudy:
         """Try proxies until the budget of [teaching] is spent or a rule says stop, from wherever it was left.
 
-        Args:
-            proposer: Proposes what is tried next.
-            by_prpv: The θ of lowest PRPV, where that is known: it is taught beside the finalists.
+        The θ of lowest PRPV, where that is known, is taught beside the finalists.
 
         Raises:
             RunError: If the learner does not converge without a proxy, so that PLV is not known.

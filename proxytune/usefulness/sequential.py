@@ -121,23 +121,23 @@ def _more(draws: Floats, worth: Floats, bound: float) -> Floats:
 
 @dataclass(frozen=True)
 class Sequential:
-    """The test that may be looked at after every rollout.
+    """The test that may be looked at after every rollout; JSON has the names of its attributes.
 
     Attributes:
         winner: The agent that is shown to be the target's best; None while none is.
+        decided_at: The round at which the winner was shown; None while none is.
+        rounds: Rollouts of every agent that were looked at, in the order of the table.
         evidence: The least wealth of each agent against its rivals; the agent is shown to be best at `threshold`.
         threshold: (K − 1)/α.
-        rounds: Rollouts of every agent that were looked at, in the order of the table.
-        decided_at: The round at which the winner was shown; None while none is.
         expected_rounds: Median of rounds to a decision, were the rates what they are, by bets with the proxy and
             without; None where more than half take beyond 1000.
     """
 
     winner: str | None
+    decided_at: int | None
+    rounds: int
     evidence: Mapping[str, float]
     threshold: float
-    rounds: int
-    decided_at: int | None
     expected_rounds: Mapping[str, int | None]
 
 
@@ -175,7 +175,7 @@ def sequential_test(inputs: Comparison, column: int = 0, *, seed: int = 0) -> Se
     expected = {
         name: expected_rounds(rates, bets, rng) for name, bets in (("with proxy", foretold), ("without proxy", None))
     }
-    return Sequential(winner, evidence, threshold, rounds, at, expected)
+    return Sequential(winner, at, rounds, evidence, threshold, expected)
 
 
 def _order(values: Floats, direction: str) -> Floats:

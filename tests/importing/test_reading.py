@@ -17,7 +17,7 @@ from one_line import complaint_of
 
 from proxytune.errors import InputError, LogError
 from proxytune.importing import Facts, Source, Wanted, open_log, read_geometry, read_source, reading, write_log
-from proxytune.importing.reading import FORMS, Form, clock_notes, rows_notes, survey
+from proxytune.importing.reading import FORMS, clock_notes, rows_notes, survey
 from proxytune.importing.source import Drive, Pictures
 from proxytune.logs import read_log
 
@@ -123,13 +123,13 @@ def test_a_folder_and_its_one_file_are_recognised_as_the_same_form(sources, form
         pytest.importorskip("rosbags")
     folder = sources[form]
     inside = next(path for path in sorted(folder.iterdir()) if "cmd" not in path.name)
-    first = [next(one.read for one in FORMS if one.recognise(path)) for path in (folder, inside)]
+    first = [next(read for recognise, read in FORMS.items() if recognise(path)) for path in (folder, inside)]
     assert first[0] is first[1]
 
 
 def read_as(monkeypatch, tmp_path, *drives):
     source = Source("made by hand", drives, (), ("taken as it is",))
-    monkeypatch.setattr(reading, "FORMS", (Form(lambda path: True, lambda path, wanted: source),))
+    monkeypatch.setattr(reading, "FORMS", {lambda path: True: lambda path, wanted: source})
     return read_source(tmp_path, Wanted())
 
 

@@ -143,15 +143,10 @@ def diagnosis_pictures(figures: Mapping[str, Drawn]) -> list[Picture]:
 
 def _motion_tables(diagnosis: Diagnosis) -> list[Table]:
     """Parameters, errors by length of the window, and the effects tried, best first."""
-
-    def with_ends(one: Rmse | Ratio, scale: float, decimals: int) -> str:
-        ends = span((scale * one.interval[0], scale * one.interval[1]), decimals)
-        return f"{fixed(scale * one.value, decimals)} ({ends})"
-
     rows = list[tuple[str, ...]]()
     confirmed = [(diagnosis.confirmed, ", bullet")] if diagnosis.confirmed else []
     for error, plant in [*((error, "") for error in diagnosis.errors), *confirmed]:
-        place = (with_ends(error.before, 1e3, 1), with_ends(error.after, 1e3, 1), with_ends(error.ratio, 1.0, 2))
+        place = (_with_ends(error.before, 1, 1e3), _with_ends(error.after, 1, 1e3), _with_ends(error.ratio, 2))
         floor = span((1e3 * error.floor.lower, 1e3 * error.floor.upper), 1)
         headings = (error.heading_before.value, error.heading_after.value, error.heading_floor)
         before, after, least = (fixed(float(np.degrees(one)), 2) for one in headings)
@@ -167,16 +162,17 @@ def _motion_tables(diagnosis: Diagnosis) -> list[Table]:
     ]
 
 
+def _with_ends(one: Rmse | Ratio | PictureError, decimals: int, scale: float = 1.0) -> str:
+    low, high = one.interval
+    return f"{fixed(scale * one.value, decimals)} ({span((scale * low, scale * high), decimals)})"
+
+
 def _camera_tables(diagnosis: CameraDiagnosis) -> list[Table]:
     """Parameters, and errors on frames kept aside."""
-
-    def with_interval(error: PictureError, decimals: int) -> str:
-        return f"{fixed(error.value, decimals)} ({span(error.interval, decimals)})"
-
     rows = []
     for name, error, decimals in (("markings [px]", diagnosis.pixels, 2), ("brightness [grey]", diagnosis.grey, 1)):
         floor, frames = camera_noise_floor(error), int(np.isfinite(error.before.frames).sum())
-        both = (with_interval(one, decimals) for one in (error.before, error.after))
+        both = (_with_ends(one, decimals) for one in (error.before, error.after))
         rows.append((name, *both, "" if floor is None else f"{floor:.{decimals}f}", str(frames)))
     heads = columns_of(("error",), ("before", "after", "floor", "frames"))
     return [

@@ -351,11 +351,6 @@ class Series:
         """Its name for people."""
         return self.measure.name_for(self.metric)
 
-    @property
-    def higher_is_better(self) -> bool:
-        """Its direction."""
-        return not self.measure.lower_is_better
-
 
 def series_of(curve: SweepCurve) -> tuple[Series, ...]:
     """Every measure of a curve; POD only where it was asked for."""
@@ -432,7 +427,7 @@ class _Cost:
 
 def shape_of(series: Series, held: float | None) -> Shape:
     """Describe one measure round the value at which its parameter is held, as a pure function."""
-    sign = -1.0 if series.higher_is_better else 1.0
+    sign = 1.0 if series.measure.lower_is_better else -1.0
     costs = [cost for estimate in series.estimates if (cost := _cost(estimate, sign))]
     if not costs:
         return Shape((), None, (), held, "unseen", "unseen")
@@ -449,7 +444,7 @@ def describe_shape(series: Series, held: float | None) -> str:
     shape = shape_of(series, held)
     if shape.score is None:
         return f"{series.name}: undefined at every point"
-    extreme = "highest" if series.higher_is_better else "lowest"
+    extreme = "lowest" if series.measure.lower_is_better else "highest"
     best, near = ", ".join(map(_number, shape.best)), _listed(shape.near_best, series)
     line = f"{series.name}: {extreme} ({shape.score:.3g}) at {best}; not worse beyond noise: {near}"
     if held is None:

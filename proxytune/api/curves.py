@@ -58,14 +58,11 @@ MOST_POINTS = 10_000
 
 @dataclass(frozen=True, repr=False)
 class SweepReport(Shown):
-    """Usefulness along one parameter or each of a study's.
+    """Usefulness along one parameter or each of a study's, a curve each; `.episodes` says how many this call has run.
 
     Attributes:
-        settings: Of the study.
-        curves: One for each parameter that was swept.
         chosen: What the others are held at: "best", "nominal" or "given".
         theta: Their values; those not named are nominal.
-        episodes: Number of episodes that this call has run.
         truth: The target's own θ, where it is known.
     """
 
@@ -189,10 +186,7 @@ def run_sweep(
 class TeachReport(Shown):
     """Learning curves and PLV, the proxy learning value (eq. 5): how many target samples each proxy saves.
 
-    Attributes:
-        settings: Of the study.
-        experiment: What was taught, and what it is worth.
-        prpv: How useful the same proxies are as predictors.
+    `.experiment` has what was taught and what it is worth, and `.prpv` how useful the same proxies are as predictors.
     """
 
     settings: StudySettings

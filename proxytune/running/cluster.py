@@ -67,14 +67,9 @@ def on_cluster(address: str, say: Callable[[str], None] = _say) -> Iterator[None
 
 @dataclass
 class _Worker:
-    """A worker as the scheduler last told of it.
+    """A worker as the scheduler last told of it, and whether it takes work.
 
-    Attributes:
-        address: Where it is.
-        told: When the scheduler last heard of it, by the scheduler's clock.
-        heard: When that was last seen to change, by ours [s].
-        unfit: Why it is not used; empty if it is.
-        running: Whether it takes work.
+    It was told of by the scheduler's clock, and that was last heard to change by ours [s]; unfit is why it is not used.
     """
 
     address: str

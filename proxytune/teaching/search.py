@@ -128,13 +128,7 @@ def _why_unable(setup: TeachingSetup, name: str, proxy: Distribution) -> str:
 
 def best_teacher(experiment: Experiment) -> TeacherResult | None:
     """The proxy of highest PLV, the first of them; None where no PLV is known."""
-    return max((one for one in experiment.teachers if np.isfinite(_plv(one))), key=_plv, default=None)
-
-
-def _plv(one: TeacherResult) -> float:
-    """PLV, minus infinity where it is not known."""
-    value = one.worth.plv.value if one.worth else None
-    return -np.inf if value is None else value
+    return max((one for one in experiment.teachers if np.isfinite(plv_or_worst(one))), key=plv_or_worst, default=None)
 
 
 def saves_more(experiment: Experiment, name: str, other: str) -> LearningEstimate:
@@ -220,10 +214,10 @@ class PlvStudy:
         return max(self.trials, key=lambda trial: (plv_or_worst(trial), -trial.number))
 
 
-def plv_or_worst(trial: PlvTrial) -> float:
-    """PLV, minus infinity where the learner did not converge."""
-    value = trial.worth.plv.value
-    return float("-inf") if value is None else value
+def plv_or_worst(one: PlvTrial | TeacherResult) -> float:
+    """PLV, minus infinity where it is not known."""
+    value = one.worth.plv.value if one.worth else None
+    return -np.inf if value is None else value
 
 
 @dataclass(frozen=True)

@@ -1,27 +1,6 @@
 """study.db: its tables, its format, and what tells that it is not as it was written.
 
-For plain SQL (`sqlite3 study.db`); the format is `PRAGMA user_version`:
-
-    facts      key, value (JSON)                  what determines the trials: settings, target and domain family
-    instances  id, identity, theta (JSON)         domain instances S_θ: the family's identity and the parameters
-    trials     objective, number (from 1)         which search it belongs to, and its place there
-               instance, state                    'open', 'finished', 'failed' or 'cut'
-               score                              what the search makes small (of one that was cut off: the estimate)
-               measures (JSON)                    every measure by name, the objective's among them
-               failed_episodes, failure           how many of its episodes failed; why it has no score
-               decided (JSON), bound              of one that was cut off: the agents driven, what its PRPV cannot be
-                                                  below
-               seconds                            how long it took, where its episodes do not tell
-    episodes   instance, agent, start, seed       what determines an episode: the key, so none is ever run twice
-               metrics (JSON) or failure          what it scored, or why it failed
-               seconds                            how long it took
-               code                               of a failure: digest of the user's code that failed; NULL if not known
-    sweeps     number, parameter, base (JSON), points (JSON), identity     the curves asked for, the last one last
-               target_model                       the target's model.toml as it was; empty without POD
-               replays                            identity of the instances whose episodes are POD's replays, or empty
-    under_way  place (from 1), identity           the episodes that run in the study's own process; no row between runs
-               theta (JSON), agent, start, seed
-    counts     name, rows                         how many rows each of these tables has
+The format is `PRAGMA user_version`; docs/reference/study_db.md says what its tables and columns are, for plain SQL.
 
 θ as JSON has its parameters sorted by name and every digit of its numbers. Each row but those of counts has a `digest`,
 the last column: BLAKE2 of its other values, as Python writes them in ASCII. So a changed value and a row that moved

@@ -179,10 +179,13 @@ class PodMean:
 
 @dataclass(frozen=True)
 class SweepPoint:
-    """One point of a curve: what the agents scored there, and how useful the proxy is.
+    """One point of a curve.
 
-    There is no assessment if an agent has no episode that worked. POD is "pod_pose" [m] and "pod_image" [of full
-    scale]; empty where it was not asked for or every replay failed.
+    Attributes:
+        value: The parameter, in its unit.
+        evaluation: What the agents scored there.
+        assessment: How useful the proxy is there; None if an agent has no episode that worked.
+        pod: "pod_pose" [m] and "pod_image" [of full scale]; empty where POD was not asked for or every replay failed.
     """
 
     value: float
@@ -193,9 +196,15 @@ class SweepPoint:
 
 @dataclass(frozen=True)
 class SweepCurve:
-    """Usefulness along one parameter, at points in rising order of it.
+    """Usefulness along one parameter.
 
-    What the others are held at is its base; those not named are nominal.
+    Attributes:
+        parameter: Its name.
+        unit: Its unit.
+        base: What the other parameters are held at; those not named are nominal.
+        metrics: How agents are compared.
+        points: In rising order of the parameter.
+        has_pod: Whether POD was asked for.
     """
 
     parameter: str

@@ -58,11 +58,14 @@ MOST_POINTS = 10_000
 
 @dataclass(frozen=True, repr=False)
 class SweepReport(Shown):
-    """Usefulness along one parameter or each of a study's, a curve each; `.episodes` says how many this call has run.
+    """Usefulness along one parameter or each of a study's.
 
     Attributes:
+        settings: Of the study.
+        curves: One for each parameter that was swept.
         chosen: What the others are held at: "best", "nominal" or "given".
         theta: Their values; those not named are nominal.
+        episodes: Number of episodes that this call has run.
         truth: The target's own θ, where it is known.
     """
 
@@ -186,7 +189,10 @@ def run_sweep(
 class TeachReport(Shown):
     """Learning curves and PLV, the proxy learning value (eq. 5): how many target samples each proxy saves.
 
-    `.experiment` has what was taught and what it is worth, and `.prpv` how useful the same proxies are as predictors.
+    Attributes:
+        settings: Of the study.
+        experiment: What was taught, and what it is worth.
+        prpv: How useful the same proxies are as predictors.
     """
 
     settings: StudySettings

@@ -48,9 +48,12 @@ CURVE_POINTS = "points of learning curves"
 
 
 class Spending(NamedTuple):
-    """Budgets of a call that differ from study.toml's: trials of a family at most, and processes that run episodes.
+    """Budgets of a call that differ from study.toml's.
 
-    It also says whether every failed episode is driven again.
+    Attributes:
+        budget: How many trials a family has at most.
+        jobs: How many processes run episodes.
+        retry_failed: Whether every failed episode is driven again.
     """
 
     budget: int | None = None
@@ -60,7 +63,12 @@ class Spending(NamedTuple):
 
 @dataclass(frozen=True, repr=False)
 class FamiliesReport(Shown):
-    """Comparison of tuned domain families: which to use, and for what; `.spent` is what this call has simulated."""
+    """Comparison of several domain families: which to use, and for what.
+
+    Attributes:
+        compared: The tuned families beside one another.
+        spent: What this call has simulated.
+    """
 
     compared: ComparedFamilies
     spent: Spent

@@ -91,7 +91,8 @@ Scores = pd.DataFrame | ScoreTable | str | Path
 class ScoreReport(Shown, Assessment):
     """How useful a proxy is, and which agent to deploy: every measure, `.decision`, figures and a page.
 
-    `.names` are what the proxy and the target are called.
+    Attributes:
+        names: What the proxy and the target are called.
     """
 
     names: tuple[str, str] = ("proxy", "target")

@@ -56,7 +56,12 @@ class ReportFiles(NamedTuple):
 
 @dataclass(frozen=True, repr=False)
 class StudyReport(Shown):
-    """Result of a study, all of it in `.result`; `.spent` says how many episodes and seconds this call simulated."""
+    """Result of a study.
+
+    Attributes:
+        result: All of it.
+        spent: What this call has simulated: `spent.episodes`, `spent.seconds`.
+    """
 
     result: StudyResult
     spent: Spent

@@ -240,9 +240,12 @@ class Prediction:
 
 @dataclass(frozen=True, repr=False)
 class PicturePrediction:
-    """Pictures of a log's camera as a fitted model draws them, so many, in a folder with frames.csv.
+    """Pictures of a log's camera as a fitted model draws them.
 
-    `.grey_error` is the mean absolute difference from the measured ones on the floor [grey levels].
+    Attributes:
+        folder: Where they and frames.csv are.
+        frames: Their number.
+        grey_error: Mean absolute difference from the measured ones on the floor [grey levels].
     """
 
     folder: Path

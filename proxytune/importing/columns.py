@@ -151,9 +151,13 @@ def _angle_contradiction(unit: Unit, values: Floats) -> str:
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table by the table's name, the field that it is taken for, and the unit of its values.
+    """A column of a table and what it is taken for.
 
-    The unit is known as "stated", "by its name", "by its size" or "assumed".
+    Attributes:
+        field: The package's name of it.
+        name: The table's name of it.
+        unit: The unit of its values.
+        known_by: How the unit is known: "stated", "by its name", "by its size" or "assumed".
     """
 
     field: str

@@ -20,9 +20,12 @@ from proxytune.settings import GEOMETRY
 
 @dataclass(frozen=True)
 class Commands:
-    """Commands as they were issued at M times (M,) [s], as stamped: values (M, 2) of a kind of `logs.COMMANDS`.
+    """Commands as they were issued, M of them.
 
-    That says what the two columns are; a third column is `enabled`, where the source has it.
+    Attributes:
+        kind: One of `proxytune.logs.COMMANDS`, which says what the two columns are.
+        times: When each was issued (M,) [s], as stamped.
+        values: What was commanded (M, 2); a third column is `enabled`, where the source has it.
     """
 
     kind: str
@@ -88,13 +91,19 @@ class Channel:
 
 @dataclass(frozen=True)
 class Survey:
-    """A drive in numbers, from its first pose to its last.
+    """A drive in numbers.
 
     Attributes:
+        name: What the log calls it.
+        seconds: From its first pose to its last [s].
+        poses: How many were measured.
         poses_hz: At the usual interval between them.
         lost: Share of the poses that dropped out, gaps apart.
         gaps: Times without a pose of more than half a second.
+        longest_gap_s: The longest of them [s].
         jitter_s: Standard deviation of the intervals between poses, drop-outs apart [s].
+        commands: How many were issued.
+        frames: How many pictures were taken.
         lag_s: How long after its command it turns [s]; below 0: before it. None where that cannot be told.
     """
 

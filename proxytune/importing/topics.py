@@ -41,9 +41,11 @@ def short(kind: str) -> str:
 
 @dataclass(frozen=True)
 class Role:
-    """Something that a log needs of a bag, the option that names its topic, and how that is found.
+    """Something that a log needs of a bag, and how its topic is found.
 
     Attributes:
+        name: What the topic is taken for.
+        option: The option that names the topic.
         ranks: Types of message that can be it, without their package; the lowest rank goes first.
         first: Parts of names that go first, the foremost first.
         never: Parts of names that are something else, whatever their type.

@@ -47,7 +47,8 @@ TRIED = 10
 class Distribution:
     """p(θ): every parameter uniform within its bounds, or fixed where these are equal; S_θ where all are.
 
-    Those not named are nominal.
+    Attributes:
+        bounds: Lowest and highest value of each parameter that is not nominal, by name.
     """
 
     bounds: Mapping[str, tuple[float, float]]
@@ -74,8 +75,13 @@ def collect_samples(
 ) -> Demonstration:
     """Collect this many of the expert's samples, lesson by lesson; more samples begin with the same ones.
 
-    p(θ) is drawn anew for every lesson of so many seconds, and the seed is of θ, of the starts and of the lessons. With
-    a policy, which takes an `OnPolicyClassroom`, that drives, and has what it visits labelled by the expert.
+    Args:
+        classroom: Where the lessons are; with a policy, an `OnPolicyClassroom`.
+        where: p(θ), drawn anew for every lesson.
+        count: How many samples.
+        seed: Of θ, of the starts and of the lessons.
+        lesson_s: How long a lesson takes [s].
+        policy: Who drives, and has what it visits labelled by the expert; None for the expert itself.
 
     Raises:
         LearnerError: If the expert cannot drive there, or has no label where the policy drives.
@@ -128,7 +134,11 @@ FACTS = "facts"
 
 @dataclass(frozen=True)
 class Cache:
-    """A folder, made when first written to, of `KIND-DIGEST.npz`: arrays and, as JSON, what determines them."""
+    """A folder of `KIND-DIGEST.npz`, each with its arrays and, as JSON, what determines them.
+
+    Attributes:
+        folder: Where it is; made when first written to.
+    """
 
     folder: Path
 
@@ -221,9 +231,12 @@ KEYS = ("off_policy", "on_policy", "label")
 
 @dataclass(frozen=True)
 class Costs:
-    """The costs of one target sample, in any one unit: by the expert's driving, or by the learner's own.
+    """The costs of one target sample, in any one unit.
 
-    A label is one answer of the expert, on top of either.
+    Attributes:
+        off_policy: One that the expert's driving gives.
+        on_policy: One that the learner's own driving gives.
+        label: One answer of the expert, on top of either.
     """
 
     off_policy: float = 1.0

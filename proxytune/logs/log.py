@@ -32,7 +32,13 @@ WHEELS = ("wheel_left", "wheel_right")
 
 
 def check_kind(command: str, robot: str, drive: str, where: str) -> None:
-    """Refuse commands of another kind than a robot takes, by its name and how it drives; a twist is for any.
+    """Refuse commands of another kind than a robot takes; a twist is for any.
+
+    Args:
+        command: Of COMMANDS.
+        robot: The robot's name.
+        drive: "differential" or "ackermann".
+        where: The log or file.
 
     Raises:
         LogError: If they are a car's and the robot is none, or the other way about.

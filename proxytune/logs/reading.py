@@ -29,8 +29,15 @@ Value = TypeVar("Value")
 class Description(NamedTuple):
     """The statements of log.toml.
 
-    Samples per second are 0 where poses have times of their own. Poses are stamped so much later than commands [s], or
-    that is to be fitted.
+    Attributes:
+        name: What the log is called.
+        robot: Name of the robot.
+        command: Kind of the commands.
+        rate_hz: Samples per second; 0 where poses have times of their own.
+        geometry: Figures of the robot that it states.
+        clock_offset_s: How much later poses are stamped than commands [s], or None.
+        fit_clock_offset: Whether that is to be fitted.
+        camera: What it says of pictures, or None.
     """
 
     name: str
@@ -97,11 +104,14 @@ LARGEST_DUTY = 1.0 + 1e-6
 
 
 def read_log(path: str | Path) -> Log:
-    """Read a log's folder, with log.toml, samples.csv and maybe commands.csv and frames.csv.
+    """Read a log's folder.
 
     Wrapped headings are unwrapped. Where log.toml states `rate_hz`, poses lie on that grid and missing rows are filled:
     the last command held, no pose. Where it does not, poses have times of their own. Where commands.csv lies beside
     samples.csv, commands have times of their own; frames.csv has those of the camera's pictures.
+
+    Args:
+        path: Folder with log.toml, samples.csv and maybe commands.csv and frames.csv.
 
     Raises:
         LogError: If the folder is not such a log, naming file, line and column.
@@ -136,9 +146,13 @@ def read_log(path: str | Path) -> Log:
 
 
 def read_commands(path: Path) -> tuple[str, dict[str, tuple[Floats, Floats]]]:
-    """Read a table of commands alone, as a log's commands.csv, whose columns tell their kind.
+    """Read a table of commands alone, whose columns tell their kind.
 
-    Gives that, and each episode's times (M,) [s] and commands (M, 2).
+    Args:
+        path: A CSV file as a log's commands.csv.
+
+    Returns:
+        Kind of the commands, and each episode's times (M,) [s] and commands (M, 2).
 
     Raises:
         LogError: If it is not such a table.

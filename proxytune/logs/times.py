@@ -190,7 +190,8 @@ def episodes_at_own_times(
 def on_own_grid(times: Floats, poses: Floats, rate_hz: float) -> tuple[Floats, Floats, Measured]:
     """Poses (N, 3) at times of their own (N,), NaN where none was measured, moved to a grid of steps.
 
-    Gives the grid's times (rows,) [s], poses on it (rows, 3), and those measured at times of their own.
+    Returns:
+        The grid's times (rows,) [s], poses on it (rows, 3), and those measured at times of their own.
     """
     steps = (times - times[0]) * rate_hz
     known, rows = _free_steps(steps, np.flatnonzero(np.isfinite(poses[:, 0])))

@@ -231,7 +231,12 @@ def _say_family(one: TunedFamily) -> list[str]:
 
 
 def families_view(compared: ComparedFamilies, figure: Figure) -> View:
-    """Several families: the figure, both tables, and where each family's own page is."""
+    """Several families: the figure, both tables, and where each family's own page is.
+
+    Args:
+        compared: The tuned families.
+        figure: The PNG.
+    """
     settings = compared.settings
     taught = (
         "PLV, the proxy learning value, counts the target samples that a learner saves by learning in the family at "

@@ -129,7 +129,14 @@ def _remarks(assessments: Assessments, note: str = "") -> list[str]:
 def score_view(
     assessments: Assessments, selection: Selection | None, figures: Sequence[Picture] = (), *, target: str
 ) -> View:
-    """One proxy, or several ranked; their figures are drawn unless they are given."""
+    """One proxy, or several ranked.
+
+    Args:
+        assessments: Of each proxy, by name.
+        selection: The proxies ranked; None where there is one.
+        figures: What was drawn.
+        target: Name of the target.
+    """
     figures = figures or [picture for *_, picture in _all_drawn(assessments, selection)]
     tables = _tables(assessments, selection, target)
     said = score_sentence(assessments, selection, target=target), score_next_step(assessments, selection)

@@ -67,9 +67,14 @@ def on_cluster(address: str, say: Callable[[str], None] = _say) -> Iterator[None
 
 @dataclass
 class _Worker:
-    """A worker as the scheduler last told of it, and whether it takes work.
+    """A worker as the scheduler last told of it.
 
-    It was told of by the scheduler's clock, and that was last heard to change by ours [s]; unfit is why it is not used.
+    Attributes:
+        address: Where it is.
+        told: When the scheduler last heard of it, by the scheduler's clock.
+        heard: When that was last seen to change, by ours [s].
+        unfit: Why it is not used; empty if it is.
+        running: Whether it takes work.
     """
 
     address: str

@@ -35,9 +35,13 @@ WITH_A_GAP_BEFORE = """
 
 @dataclass(frozen=True)
 class Salvage:
-    """Rows kept of a damaged database, by table, and those that were counted or could be read and are lost.
+    """Rows kept of a damaged database.
 
-    It says what was wrong in one line, and where the damaged one is now.
+    Attributes:
+        problem: What was wrong with it, in one line.
+        aside: Where the damaged one is now.
+        kept: Rows by table.
+        lost: Rows by table that were counted or could be read, and are not kept.
     """
 
     problem: str
@@ -49,7 +53,8 @@ class Salvage:
 def salvage(folder: Path) -> Salvage | None:
     """Put what is whole of a study's database in its place; to be held under the study's lock.
 
-    Gives what was kept; None if nothing was damaged, and nothing was done.
+    Returns:
+        What was kept; None if nothing was damaged, and nothing was done.
 
     Raises:
         InputError: If there is no database.

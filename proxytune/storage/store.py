@@ -83,10 +83,14 @@ class TrialRecord:
 
 @dataclass(frozen=True)
 class SweepRecord:
-    """A sweep that has been asked for: a parameter at points in rising order; the others not in the base are nominal.
+    """A sweep that has been asked for.
 
-    With POD, there are the target's model.toml as it was then, and the identity of the domain family whose episodes are
-    the replays; both are empty without.
+    Attributes:
+        parameter: What is swept.
+        base: Values of the others; those not named are nominal.
+        points: Where it is looked at, in rising order.
+        target_model: The target's model.toml as it was when POD was asked for; empty where it was not.
+        replays: Identity of the domain family whose episodes are POD's replays; empty without POD.
     """
 
     parameter: str

@@ -24,11 +24,13 @@ Columns = Mapping[str, NDArray[np.float64]]
 
 @dataclass(frozen=True, eq=False)
 class RecordedEpisode:
-    """What became of one episode: its scores by name, and columns by name.
+    """What became of one episode.
 
     Attributes:
-        poses: `time` [s] and, of a robot on a floor, x, y [m] and heading [rad]; none where the family keeps no poses.
-        commands: `time` [s] and a channel each; none likewise.
+        metrics: Its scores, by name.
+        poses: Columns by name: `time` [s] and, of a robot on a floor, x, y [m] and heading [rad]; none where the family
+            keeps no poses.
+        commands: Columns by name: `time` [s] and a channel each; none likewise.
         pictures: What the camera saw before each command, (commands, rows, columns, 3); None where nobody asked for
             pictures, or the family cannot give them.
     """

@@ -157,8 +157,15 @@ def examine_curves(
 ) -> dict[Examination, float]:
     """Examine learners of these proxies; what is cached is not made again.
 
-    p(θ) is None of the learner without a proxy. Known are scores of learners that are not examined further, the one
-    without a proxy among them; gives these and the new ones.
+    Args:
+        setup: Where they learn.
+        proxies: p(θ) by name; None of the learner without a proxy.
+        jobs: How many processes there are.
+        watcher: Hears of every examination.
+        known: Scores of learners that are not examined further, the one without a proxy among them.
+
+    Returns:
+        The known scores and the new ones.
     """
     taught, scores = setup.settings, dict(known or {})
     if taught.examinations is None:

@@ -71,10 +71,15 @@ CACHE = "teaching"
 
 @dataclass(frozen=True)
 class TeacherResult:
-    """The result of one proxy as a teacher: p(θ), and scores after so many target samples, having learnt from it.
+    """The result of one proxy as a teacher.
 
-    The zero-shot score is the mean before any target sample. What it is worth, and that in the unit of
-    [teaching.costs], is None where the learner without a proxy has not converged.
+    Attributes:
+        name: What it is called.
+        proxy: Its p(θ).
+        curve: Scores in the target after so many target samples, having learnt from the proxy first.
+        zero_shot: Mean score before any target sample.
+        worth: PLV and what it is made of; None where the learner without a proxy has not converged.
+        cost: PLV in cost, in the unit of [teaching.costs]; None likewise.
     """
 
     name: str
@@ -87,10 +92,13 @@ class TeacherResult:
 
 @dataclass(frozen=True)
 class Experiment:
-    """The result of a learning experiment: one teacher per proxy, in the order of study.toml.
+    """The result of a learning experiment.
 
-    How many target samples each learner needs follows from the posterior of all learning curves; the best score is that
-    of a flawless examination.
+    Attributes:
+        settings: Of the study.
+        best_score: The score of a flawless examination.
+        needs: How many target samples each learner needs, from the posterior of all learning curves.
+        teachers: One per proxy, in the order of study.toml.
     """
 
     settings: StudySettings
@@ -230,10 +238,15 @@ def classrooms(settings: StudySettings) -> dict[str, Classroom]:
 def teach_families(
     settings: StudySettings, thetas: Mapping[str, Theta], watching: Callable[[int], AbstractContextManager[Watcher]]
 ) -> dict[str, Lesson]:
-    """Teach a learner in each family at its best θ, by name, from wherever an earlier run was left.
+    """Teach a learner in each family at its best θ, from wherever an earlier run was left.
 
     The target is the study's own family, with its [domain] and the model that [teaching] names. The learner without a
-    proxy, its lessons and its examinations are the same for all. Watching gives what hears of so many points.
+    proxy, its lessons and its examinations are the same for all.
+
+    Args:
+        settings: Of the study of all families.
+        thetas: The best θ of each, by name.
+        watching: Gives what hears of so many points.
 
     Raises:
         LearnerError: If none can teach.
@@ -282,10 +295,15 @@ SURE = 0.95
 
 @dataclass(frozen=True)
 class RankAgreement:
-    """The agreement of two rankings of the same proxies: Kendall's τ with its 95 % interval, the median over draws.
+    """The agreement of two rankings of the same proxies.
 
-    Reversed are pairs of proxies that the two figures order otherwise, each order sure; the first of a pair is ahead by
-    the second figure.
+    Attributes:
+        tau: Kendall's τ, the median over draws: 1 the same ranking, −1 its reverse.
+        low: Lower end of its 95 % interval.
+        high: Upper end.
+        reversed: Pairs of proxies, by name, that the two figures order otherwise, each order sure; the first of a pair
+            is ahead by the second figure.
+        proxies: How many are ranked.
     """
 
     tau: float

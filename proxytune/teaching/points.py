@@ -65,9 +65,12 @@ def watching(what: str, timeout_s: float | None = None) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Supervised:
-    """A classroom of the "proxy" or "target" of which each lesson and examination is named where it fails.
+    """A classroom of which each lesson and examination is named where it fails, and ended where it takes too long.
 
-    It is ended where it takes longer than an episode may [s]; None for as long as it takes.
+    Attributes:
+        room: The classroom.
+        domain: What it is, "proxy" or "target".
+        timeout_s: How long an episode may take [s]; None for as long as it takes.
     """
 
     room: Any
@@ -180,10 +183,15 @@ class Lessons:
 
 @dataclass(frozen=True)
 class Stage:
-    """A stage of learning: what a trainee learns in one domain, after what it has learnt in another, or from scratch.
+    """A stage of learning: what a trainee learns in one domain, after what it has learnt in another.
 
-    Facts of what comes before enter those of what comes after as their digest: each key is short and complete. The
-    rehearsal is the share of that stage's samples among those it learns from here.
+    Facts of what comes before enter those of what comes after as their digest: each key is short and complete.
+
+    Attributes:
+        trainee: Who learns.
+        lessons: From what.
+        before: The stage from whose weights it goes on; None from scratch.
+        rehearsal: Share of that stage's samples among those it learns from here.
     """
 
     trainee: Trainee
@@ -257,10 +265,13 @@ PROXY_ROUNDS = 4
 
 @dataclass(frozen=True)
 class CurvePoint:
-    """One point of a learning curve under one seed: so many target samples come after what the proxy taught, if any.
+    """One point of a learning curve under one seed.
 
-    Learners with and without a proxy share the target samples of a repetition, from 0. The name is for error lines
-    only.
+    Attributes:
+        name: What the proxy is called, for error lines only.
+        proxy: p(θ) of the proxy that taught first, None without one.
+        repetition: Which repetition, from 0: learners with and without a proxy share its target samples.
+        count: How many target samples come after that.
     """
 
     name: str
@@ -273,8 +284,16 @@ class CurvePoint:
 class TeachingSetup:
     """A learning experiment ready to run: both domains, the learner, how much of what, and the cache.
 
-    The learner's identity is a digest of its code and settings. An episode of a lesson or an examination may take so
-    long [s]; None for as long as it takes.
+    Attributes:
+        proxy: The proxy's domain family.
+        target: The target's.
+        learner: What is trained.
+        learner_identity: A digest of its code and settings.
+        settings: Numbers of samples, seeds and seconds.
+        seed: The study's.
+        starts: Number of starts in an examination.
+        cache: Where samples, weights and scores are kept.
+        timeout_s: How long an episode of a lesson or an examination may take [s]; None for as long as it takes.
     """
 
     proxy: Classroom
@@ -370,9 +389,12 @@ SLACK = 1.0 / 30.0
 def search_space(
     settings: "StudySettings", widths: Mapping[str, tuple[float, float]], left: Mapping[str, tuple[float, float]]
 ) -> Space:
-    """The box that is searched for PLV: centres where PRPV cannot tell θ from the best, and widths within their bounds.
+    """The box that is searched for PLV: centres where PRPV cannot tell θ from the best, and widths as asked for.
 
-    Where the box is not narrowed, nothing is said of what PRPV cannot tell from the best.
+    Args:
+        settings: Of the study.
+        widths: Bounds of the width of each parameter's distribution, by parameter.
+        left: The ends of what PRPV cannot tell from the best, by parameter; empty where the box is not narrowed.
 
     Raises:
         SettingsError: If a width is of a parameter that is not searched, or wider than its box.

@@ -75,7 +75,12 @@ def finalists(
 ) -> dict[str, Distribution]:
     """The distributions that are worth a closer look, by name; none twice.
 
-    The study's whole box is one of them where widths are searched, and the θ of lowest PRPV where that is known.
+    Args:
+        setup: Of the learning experiment.
+        settings: Of the study, whose whole box is one of the finalists where widths are searched.
+        space: What was searched.
+        trials: Those that have ended.
+        by_prpv: The θ of lowest PRPV, None where that is not known.
     """
     if all(trial.score is None for trial in trials):
         return {}
@@ -173,9 +178,15 @@ OBJECTIVE = "plv"
 
 @dataclass(frozen=True)
 class PlvTrial:
-    """One proxy tried as a teacher, counted from 1: learning curve, worth, and mean score before any target sample.
+    """One proxy tried as a teacher.
 
-    θ has the centre and, where searched, the width of each parameter's distribution.
+    Attributes:
+        number: Counted from 1.
+        theta: Centre and, where searched, width of each parameter's distribution.
+        proxy: That p(θ).
+        curve: Its learning curve.
+        worth: What it is worth.
+        zero_shot: Its mean score before any target sample.
     """
 
     number: int
@@ -188,10 +199,17 @@ class PlvTrial:
 
 @dataclass(frozen=True)
 class PlvStudy:
-    """The result of a study of learning value, with every proxy tried, in order, and why no further one was.
+    """The result of a study of learning value.
 
-    The box that was searched is the study's, or what PRPV left of it, and the widths'. Finalists were taught anew under
-    seeds that the search has not used; some are unable to teach, which is told by name.
+    Attributes:
+        settings: Of the study.
+        space: The box that was searched: the study's, or what PRPV left of it, and the widths'.
+        without: The learning curve without a proxy.
+        when: When a learner counts as converged.
+        trials: Every proxy tried, in order.
+        stopped: Why no further one was.
+        confirmed: The finalists, taught anew under seeds that the search has not used.
+        unable: Why finalists cannot teach, by name of those.
     """
 
     settings: StudySettings
@@ -222,7 +240,15 @@ def plv_or_worst(one: PlvTrial | TeacherResult) -> float:
 
 @dataclass(frozen=True)
 class PlvSearch:
-    """A search for the proxy of highest learning value: what its trials are a function of, and where they are kept."""
+    """A search for the proxy of highest learning value: what its trials are a function of, and where they are kept.
+
+    Attributes:
+        settings: Of the study.
+        setup: Where learners are taught and examined.
+        store: Where trials are kept.
+        space: The box that is searched.
+        watcher: Hears of every point of a learning curve.
+    """
 
     settings: StudySettings
     setup: TeachingSetup
@@ -233,7 +259,9 @@ class PlvSearch:
     def run(self, proposer: Proposer, by_prpv: Theta | None = None) -> PlvStudy:
         """Try proxies until the budget of [teaching] is spent or a rule says stop, from wherever it was left.
 
-        The θ of lowest PRPV, where that is known, is taught beside the finalists.
+        Args:
+            proposer: Proposes what is tried next.
+            by_prpv: The θ of lowest PRPV, where that is known: it is taught beside the finalists.
 
         Raises:
             RunError: If the learner does not converge without a proxy, so that PLV is not known.

@@ -43,7 +43,9 @@ class Measure:
 
     Attributes:
         key: Its name in files; of a measure per metric, followed by the metric's.
-        name: Its name for people, which the title spells out.
+        name: Its name for people.
+        title: That name spelt out.
+        better: Which direction is better.
         meaning: Its range and unit in a few words.
         digits: How a value is formatted where there is little room.
         unit: Its unit; empty if it has none, or that of its metric.

@@ -34,7 +34,12 @@ CONTINUE = "run the same command to continue: everything finished is kept."
 
 
 def study_view(result: StudyResult, figures: Mapping[str, Drawn]) -> View:
-    """A study: its tables, with those figures that there are, by name, beside what they are of."""
+    """A study: its tables, with the figures beside what they are of.
+
+    Args:
+        result: What it has found.
+        figures: PNG files by the name of the figure, those that there are.
+    """
     finding, settings = finding_of(result), result.study.settings
     drawn, tables = study_pictures(result, figures), study_tables(result)
     parts = (

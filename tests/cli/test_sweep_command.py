@@ -73,12 +73,6 @@ def test_a_finished_study_is_swept_at_its_best_theta_and_says_so(finished, capsy
     assert document["curves"][0]["base"] == best
 
 
-@pytest.mark.slow
-def test_the_best_theta_is_told_in_words_too(finished, capsys):
-    assert main(["sweep", str(finished), "--parameter", "trim", "--points", "2", "--at", "best"]) == 0
-    assert "the others are held at the study's best θ: delay=" in " ".join(capsys.readouterr().out.split())
-
-
 def test_nominal_holds_the_robots_own_values_also_when_the_study_is_finished(finished, capsys):
     assert main(["sweep", str(finished), "--parameter", "trim", "--points", "2", "--at", "nominal", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)

@@ -131,14 +131,6 @@ def test_people_read_the_verdict_the_roll_and_both_errors(found):
     assert "fitting the camera" in found.err
 
 
-@pytest.mark.slow
-def test_what_is_declared_is_tuned_and_not_added(stills, tmp_path, capsys):
-    declared = "trim,camera_pitch,camera_roll"
-    document = diagnosed(capsys, stills, "--declared", declared, "--output", tmp_path / "out")
-    assert set(document["declared"]) == {"camera_pitch", "camera_roll"}
-    assert (document["verdict"], document["effects"]) == ("nothing missing", [])
-
-
 def test_an_unknown_effect_is_told_with_the_nearest_of_both_kinds(stills, tmp_path, capsys):
     line = refused(capsys, stills, "--declared", "camera_rol", "--output", tmp_path / "out")
     assert "--declared camera_rol: no effect on motion, camera or pictures has this name; did you mean" in line
@@ -149,12 +141,6 @@ def test_an_unknown_effect_is_told_with_the_nearest_of_both_kinds(stills, tmp_pa
 def test_a_log_to_test_on_is_refused_where_there_is_no_motion(stills, tmp_path, capsys):
     line = refused(capsys, stills, "--test", stills, "--output", tmp_path / "out")
     assert "--test: pictured has no commands" in line
-
-
-def test_too_few_frames_are_refused_in_one_line(tmp_path, capsys):
-    folder = write_still_frames(tmp_path / "few", ROLLED, lane_poses(8), columns=96)
-    assert "8 of 8 frames show markings; the camera needs 20" in refused(capsys, folder, "--output", tmp_path / "out")
-    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.slow

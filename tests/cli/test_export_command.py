@@ -111,21 +111,6 @@ def test_an_unknown_robot_is_refused_with_where_it_is_looked_for(tmp_path, capsy
     assert "its robot 'rover' is unknown here; go to the folder that rover lies in" in capsys.readouterr().err
 
 
-@pytest.mark.slow
-def test_a_studys_trials_go_into_an_optuna_storage_each_with_its_value(finished, tmp_path, capsys):
-    optuna = pytest.importorskip("optuna")
-    words = ["export", str(finished), "--to", "optuna", "--output", str(tmp_path / "new" / "trials.sqlite3")]
-    assert main([*words, "--json"]) == 0
-    document = json.loads(capsys.readouterr().out)
-    assert (document["name"], document["trials"], document["to"]) == ("wobbly", 7, "optuna")
-    study = optuna.load_study(study_name="wobbly", storage=f"sqlite:///{tmp_path}/new/trials.sqlite3")
-    table = read_study(finished).trials()
-    assert [trial.value for trial in study.trials] == table.prpv.tolist()
-    assert [trial.params["trim"] for trial in study.trials] == table.trim.tolist()
-    assert [trial.user_attrs["ppv"] for trial in study.trials] == table.ppv.tolist()
-    assert study.user_attrs["best_trial"] == read_study(finished).best.trial.number - 1
-
-
 def test_a_studys_trials_are_what_scikit_optimize_loads(finished, tmp_path, capsys):
     assert main(["export", str(finished), "--to", "skopt", "--output", str(tmp_path / "trials.pkl")]) == 0
     assert "7 trials of 'wobbly'" in capsys.readouterr().out
@@ -159,10 +144,3 @@ def test_a_model_has_no_trials_to_write(model, tmp_path, capsys, form):
     assert main(["export", str(model), "--to", form, "--output", str(tmp_path / "new")]) == 2
     assert "takes the trials of a study; give the study's folder" in capsys.readouterr().err
     assert not (tmp_path / "new").exists()
-
-
-def test_an_output_that_cannot_be_written_is_one_line(finished, tmp_path, capsys):
-    (tmp_path / "file").write_text("")
-    output = tmp_path / "file" / "trials.pkl"
-    assert main(["export", str(finished), "--to", "skopt", "--output", str(output)]) == 2
-    assert f"{output}: cannot be written there, as " in capsys.readouterr().err

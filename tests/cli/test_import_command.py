@@ -70,10 +70,6 @@ def test_a_wrong_option_is_one_line(capsys, table, words, says):
     assert says in complaint(capsys, str(table), *words)
 
 
-def test_a_source_that_is_none_is_one_line(capsys, tmp_path):
-    assert "no such folder" in complaint(capsys, str(tmp_path / "none"))
-
-
 def test_the_same_import_again_is_no_error_as_after_a_kill_at_the_very_end(capsys, table, tmp_path):
     words = ["import", str(table), str(tmp_path / "log"), "--json"]
     answers = []
@@ -154,11 +150,6 @@ def test_axes_in_a_mirror_and_a_wheel_in_millimetres_are_cautions(capsys, tmp_pa
         assert axes.startswith("places are mirrored against headings")
     assert main(["import", source, *figures]) == 0
     assert "- beware: places are mirrored against headings" in capsys.readouterr().out
-
-
-@pytest.mark.slow
-def test_a_good_recording_draws_no_caution(capsys, table):
-    assert document(capsys, str(table), *FIGURES)["cautions"] == []
 
 
 def test_options_may_stand_before_and_after_the_output(capsys, table, tmp_path):

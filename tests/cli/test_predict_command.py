@@ -56,16 +56,6 @@ def test_the_error_is_that_of_the_written_poses(folder, model, tmp_path, capsys)
     assert told["error"]["value"] > 0.005
 
 
-def test_a_longer_horizon_has_fewer_windows_and_a_larger_error(folder, model, tmp_path, capsys):
-    path = model({"trim": 0.1, "delay": 0.12})
-    short, long = (
-        predicted(path, folder, "--horizon", seconds, "--output", tmp_path / "p.csv", capsys=capsys)
-        for seconds in (1, 5)
-    )
-    assert long["windows"] < short["windows"]
-    assert long["error"]["value"] > short["error"]["value"]
-
-
 def test_people_read_the_error_in_millimetres(folder, model, tmp_path, capsys):
     assert main(["predict", str(model()), str(folder), "--output", str(tmp_path / "p.csv")]) == 0
     assert "10 windows of 2 s: RMSE 0.0 mm" in capsys.readouterr().out
@@ -120,32 +110,6 @@ def test_bad_input_is_one_line_and_nothing_is_written(case, folder, model, tmp_p
     assert err.startswith("proxytune predict: ")
     assert says in err
     assert not (tmp_path / "p.csv").exists()
-
-
-def test_a_model_that_cannot_be_read_is_told_with_its_file(folder, tmp_path, capsys):
-    text = 'format = 1\nrobot = "duckiebot"\n[effects.dead_bnd]\nwidth = 0.1\n'
-    (tmp_path / "model.toml").write_text(text, encoding="utf-8")
-    output = tmp_path / "p.csv"
-    assert main(["predict", str(tmp_path / "model.toml"), str(folder), "--output", str(output)]) == 2
-    err = capsys.readouterr().err
-    assert err.count("\n") == 1
-    assert "model.toml" in err
-    assert "no such effect" in err
-
-
-def test_a_log_without_commands_cannot_be_predicted(model, tmp_path, capsys):
-    log = planted_log(TRUTH, episodes=1, seconds=5.0, noise=None)
-    episodes = tuple(replace(e, commands=np.empty((len(e.times), 0))) for e in log.episodes)
-    folder = write_log(replace(log, command="none", episodes=episodes), tmp_path / "none")
-    assert main(["predict", str(model()), str(folder), "--output", str(tmp_path / "p.csv")]) == 2
-    assert "has no commands" in capsys.readouterr().err
-
-
-def test_an_output_needs_a_name(folder, model, capsys):
-    with pytest.raises(SystemExit) as caught:
-        main(["predict", str(model()), str(folder)])
-    assert caught.value.code == 2
-    assert "--output" in capsys.readouterr().err
 
 
 def test_an_interval_without_its_value_is_a_caution(folder, model, tmp_path, capsys):

@@ -102,9 +102,6 @@ def test_entries_of_info_are_metrics_of_a_study(tmp_path):
     assert scores == {"drive": pytest.approx(2.0 * 12)}
 
 
-pytest.importorskip("gymnasium")
-
-
 STUDY = """
 format = 1
 family = "proxytune.environments.family:gymnasium_family"

@@ -24,8 +24,9 @@ os.environ.pop("TERM", None)
 # Rewriting asserts is half of collecting them, so it is kept for the next run; what tests start keeps its bytecode too.
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-# A run in the background ignores Ctrl-C; tests mean it to be heeded, as in a terminal.
+# A run in the background ignores Ctrl-C, or the end of its terminal; tests mean both to be heeded, as in a terminal.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 # The same examples in every run, however long they take.
 hypothesis.settings.register_profile("fixed", derandomize=True, deadline=None)
 hypothesis.settings.load_profile("fixed")

@@ -5,6 +5,7 @@ import os
 import socket
 import threading
 from functools import partial
+from types import SimpleNamespace
 
 import pytest
 from convoy import Convoy
@@ -13,6 +14,7 @@ from proxytune.cli.main import main
 from proxytune.domain import make_episode
 from proxytune.errors import InputError
 from proxytune.running import Watch, on_cluster, run_episode, running, working
+from proxytune.running.cluster import Cluster
 from proxytune.running.sending import check_code, made_by
 
 distributed = pytest.importorskip("distributed")
@@ -50,6 +52,16 @@ def test_other_code_on_a_worker_is_refused_by_name():
     check_code(made_by())
     with pytest.raises(InputError, match=r"has NumPy [\d.]+ \(was 1\.0\); install the same there as here"):
         check_code({**made_by(), "numpy": "1.0"})
+
+
+def test_a_worker_that_does_not_start_again_holds_up_no_command_that_ends():
+    started, before = threading.Event(), set(threading.enumerate())
+    cluster = object.__new__(Cluster)
+    cluster._client = SimpleNamespace(restart_workers=lambda *workers, **how: started.wait(30.0))
+    cluster._restart(SimpleNamespace(address="tcp://h:1"))
+    (waiting,) = set(threading.enumerate()) - before
+    started.set()
+    assert waiting.daemon
 
 
 def test_where_nothing_answers_the_user_is_told_in_one_line(make_study, capsys, monkeypatch):

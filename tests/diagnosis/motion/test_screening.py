@@ -14,6 +14,7 @@ from planted import ROBOT, TRUTH, drives_of, fitted, planted_drives, planted_log
 from proxytune.diagnosis import RANDOM_EFFECTS, motion_effects, theta_at
 from proxytune.diagnosis.motion.screening import (
     candidates,
+    cut_part,
     number_stretches,
     project_out,
     screen,
@@ -220,6 +221,14 @@ def test_stretches_last_a_second_and_never_cross_episodes():
         own = number == one
         assert len(np.unique(drives.episode[own])) == 1
         assert np.ptp(drives.first[own]) < drives.tick_hz
+
+
+def test_a_part_of_drives_is_stretches_of_eight_seconds_to_their_ends_whose_first_two_warm_up_amid_a_drive():
+    drives = planted_drives(TRUTH, episodes=1, seconds=20.0)
+    part = cut_part(drives)
+    for stretch, first_s in ((0, 0.0), (1, 2.0)):
+        own = part.episode == stretch
+        assert (part.first[own].min(), part.last[own].max()) == (first_s * drives.tick_hz, 8.0 * drives.tick_hz)
 
 
 @pytest.mark.slow

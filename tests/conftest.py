@@ -178,6 +178,16 @@ def finished_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.fixture(scope="session")
+def result(finished_once: Path) -> object:
+    """What came of the finished study."""
+    from proxytune.storage import Store
+    from proxytune.study import StudyRun, open_study, result_of
+
+    with Store.read(finished_once) as store:
+        return result_of(StudyRun(open_study(finished_once), store))
+
+
 @pytest.fixture
 def finished(finished_once: Path, tmp_path: Path) -> Path:
     """A finished study of one's own, where `make_study` edits it."""

@@ -19,14 +19,7 @@ from proxytune.report.study.page import study_view
 from proxytune.report.study.tables import search_table
 from proxytune.report.wording import span
 from proxytune.search import Importance, Trial, learn_theta
-from proxytune.storage import Store, TrialRecord
-from proxytune.study import StudyRun, open_study, result_of
-
-
-@pytest.fixture(scope="module")
-def result(finished_once):
-    with Store.read(finished_once) as store:
-        return result_of(StudyRun(open_study(finished_once), store))
+from proxytune.storage import TrialRecord
 
 
 def lines(figure):
@@ -110,10 +103,9 @@ def test_without_a_noise_floor_none_is_drawn(result):
 
 
 @pytest.fixture(scope="module")
-def learnt(finished_once):
+def learnt(result):
     """θ is known to be delay 0.12 and trim 0.1."""
-    with Store.read(finished_once) as store:
-        return planted(result_of(StudyRun(open_study(finished_once), store)))
+    return planted(result)
 
 
 def test_the_density_is_highest_where_theta_is_known_to_be_and_adds_up_to_one(learnt):
@@ -228,17 +220,13 @@ def test_the_key_of_trials_names_the_region_and_the_answer(learnt):
 
 
 @pytest.fixture(scope="module")
-def weighed(finished_once):
-    with Store.read(finished_once) as store:
-        found = result_of(StudyRun(open_study(finished_once), store))
+def weighed(result):
     planted = (Importance("delay", 0.25, (0.1, 0.4), 0.125), Importance("trim", 0.75, (0.5, 1.0), 0.5))
-    return replace(found, importances=planted)
+    return replace(result, importances=planted)
 
 
-def test_a_study_has_the_importance_of_each_of_its_parameters(finished):
-    with Store.read(finished) as store:
-        found = result_of(StudyRun(open_study(finished), store)).importances
-    assert [importance.name for importance in found] == ["delay", "trim"]
+def test_a_study_has_the_importance_of_each_of_its_parameters(result):
+    assert [importance.name for importance in result.importances] == ["delay", "trim"]
 
 
 def test_a_dot_is_the_share_a_stroke_what_is_alone_and_a_line_the_interval_most_important_on_top(weighed):

@@ -1,6 +1,7 @@
 """What several rooms' tests share: a study of a domain family that is a formula."""
 
 import gc
+import json
 import os
 import shutil
 import signal
@@ -9,6 +10,7 @@ from collections.abc import Callable, Iterator
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import hypothesis
 import pytest
@@ -101,6 +103,7 @@ STUDY = {
 PARAMETERS = {"trim": "[-0.3, 0.3]", "delay": "[0.0, 0.3]"}
 TRUTH = {"trim": 0.1, "delay": 0.12}
 
+Answered = Callable[..., Any]
 MakeStudy = Callable[..., Path]
 """Writes a study's folder; call it again to edit the study.toml."""
 
@@ -154,6 +157,19 @@ def make_study(tmp_path: Path) -> MakeStudy:
 def make_studies(tmp_path_factory: pytest.TempPathFactory) -> MakeStudy:
     """The same for studies that the tests of a module share."""
     return study_maker(tmp_path_factory.mktemp("studies"))
+
+
+@pytest.fixture
+def answered(capsys: pytest.CaptureFixture[str]) -> Answered:
+    """Run a command in this process, which succeeds, and give the document that it prints."""
+    from proxytune.cli.main import main
+
+    def answer(*words: object) -> Any:
+        capsys.readouterr()
+        assert main([*map(str, words), "--json"]) == 0
+        return json.loads(capsys.readouterr().out)
+
+    return answer
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 
 from proxytune.api import read_study
 from proxytune.api.study import run_study
-from proxytune.cli.main import main
 from proxytune.errors import InputError, ProxytuneError
 
 
@@ -83,9 +82,8 @@ def test_a_report_shows_itself_in_the_words_of_the_command(report):
     assert repr(report) == f"StudyReport of 'wobbly': {report.document()['sentence']}"
 
 
-def test_the_document_is_what_the_command_prints(report, folder, capsys):
-    assert main(["study", str(folder), "--json"]) == 0
-    printed = json.loads(capsys.readouterr().out)
+def test_the_document_is_what_the_command_prints(report, folder, answered):
+    printed = answered("study", folder)
     document = json.loads(json.dumps(report.document()))
     assert {key: printed[key] for key in document} == document
 

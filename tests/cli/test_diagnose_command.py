@@ -121,13 +121,12 @@ def test_the_model_reads_back_with_what_was_found(document, home):
     assert set(model.theta) >= {"trim", "delay", "yaw_scrub"}
 
 
-def test_predicting_the_test_drives_with_the_model_reproduces_the_error(document, home, capsys):
+def test_predicting_the_test_drives_with_the_model_reproduces_the_error(document, home, answered):
     log = small_log()
     kept = replace(log, episodes=log.episodes[2::3])
     folder = write_log(kept, home / "kept")
     output = home / "kept.csv"
-    assert main(["predict", str(home / "out" / "model.toml"), str(folder), "--output", str(output), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
+    told = answered("predict", home / "out" / "model.toml", folder, "--output", output)
     assert told["error"]["value"] == pytest.approx(document["error"]["after"], rel=0.15)
     assert told["error"]["value"] < document["error"]["before"]
 
@@ -163,7 +162,7 @@ def test_an_effect_that_is_declared_is_not_missing_in_another_log_either(home, p
 
 
 @pytest.mark.slow
-def test_a_robot_of_the_logs_own_geometry_is_diagnosed_and_its_model_predicts(tmp_path, capsys):
+def test_a_robot_of_the_logs_own_geometry_is_diagnosed_and_its_model_predicts(tmp_path, capsys, answered):
     log = replace(small_log(), robot="my_robot")
     own = {"wheel_radius_m": 0.0318, "baseline_m": 0.16, "full_speed_m_s": 0.6}
     folder = write_log(log, tmp_path / "log", **own)
@@ -171,8 +170,7 @@ def test_a_robot_of_the_logs_own_geometry_is_diagnosed_and_its_model_predicts(tm
     capsys.readouterr()
     model = tmp_path / "o" / "model.toml"
     assert read_model(model).geometry == {"wheel_radius": 0.0318, "effective_baseline": 0.16, "full_speed": 0.6}
-    assert main(["predict", str(model), str(folder), "--output", str(tmp_path / "p.csv"), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["error"]["value"] < 0.02
+    assert answered("predict", model, folder, "--output", tmp_path / "p.csv")["error"]["value"] < 0.02
 
 
 def changed(change):

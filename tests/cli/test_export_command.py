@@ -34,11 +34,10 @@ def model(tmp_path):
 
 
 @pytest.mark.parametrize("form", ["urdf", "mjcf", "ros"])
-def test_every_value_is_told_with_its_place_or_that_it_has_none(model, tmp_path, capsys, form):
+def test_every_value_is_told_with_its_place_or_that_it_has_none(model, tmp_path, capsys, answered, form):
     output = tmp_path / "out" / "robot.txt"
     arguments = ["export", str(model), "--to", form, "--output", str(output)]
-    assert main([*arguments, "--json"]) == 0
-    document = json.loads(capsys.readouterr().out)
+    document = answered(*arguments)
     assert {
         "name": "dead_band.width",
         "value": 0.06,
@@ -67,14 +66,13 @@ SHORT = {
 
 @pytest.mark.slow
 def test_the_best_theta_of_a_study_is_exported_with_its_intervals_whatever_its_agents_are_called(
-    make_study, tmp_path, capsys
+    make_study, tmp_path, capsys, answered
 ):
     folder = make_study(agents=None, **SHORT)
     with (folder / "study.toml").open("a") as study:
         study.write('\n[agents]\nslow = "steady"\nwild = "daredevil"\n')
     (folder / "target.csv").write_text("agent,episode,distance\nslow,0,0.2\nwild,0,0.5\n")
-    assert main(["study", str(folder), "--json"]) == 0
-    best = json.loads(capsys.readouterr().out)["best"]["theta"]
+    best = answered("study", folder)["best"]["theta"]
     arguments = ["export", str(folder), "--to", "ros", "--output", str(tmp_path / "robot.yaml"), "--json"]
     assert main(arguments) == 0
     document = json.loads(capsys.readouterr().out)

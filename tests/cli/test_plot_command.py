@@ -9,17 +9,14 @@ FIGURES_DRAWN = True  # see conftest.py
 
 
 @pytest.mark.slow
-def test_every_figure_is_drawn_again_without_simulating(finished, capsys):
-    assert main(["study", str(finished), "--json"]) == 0
-    before = json.loads(capsys.readouterr().out)
+def test_every_figure_is_drawn_again_without_simulating(finished, answered):
+    before = answered("study", finished)
     assert main(["sweep", str(finished), "--parameter", "all", "--points", "2", "--at", "trim=0.1,delay=0.12"]) == 0
     content = (finished / "study.db").read_bytes()
     names = sorted(path.name for path in (finished / "figures").glob("*.png"))
     shutil.rmtree(finished / "figures")
     (finished / "report.html").unlink()
-    capsys.readouterr()
-    assert main(["plot", str(finished), "--json"]) == 0
-    document = json.loads(capsys.readouterr().out)
+    document = answered("plot", finished)
     tables = {"trials.csv", "parameters.tex", "usefulness.tex"}
     pages = {path.name for path in (finished / "figures").glob("*.html")}
     assert sorted({*names, *tables, *pages}) == sorted(path.name for path in (finished / "figures").iterdir())
@@ -82,25 +79,18 @@ def test_pod_is_drawn_again_without_the_target_model_also_after_the_code_has_cha
     assert drawn_again(folder, capsys) == before
 
 
-def drawn_by(folder, capsys, *texts):
-    arguments = [word for text in texts for word in ("--metric", text)]
-    assert main(["plot", str(folder), *arguments, "--json"]) == 0
-    return json.loads(capsys.readouterr().out)
-
-
 def forbidden(self, episode):
     raise AssertionError("simulated")
 
 
 @pytest.mark.slow
-def test_other_metrics_score_the_stored_episodes_anew_into_a_folder_of_their_own(finished, capsys, monkeypatch):
+def test_other_metrics_score_the_stored_episodes_anew_into_a_folder_of_their_own(finished, answered, monkeypatch):
     assert main(["study", str(finished), "--json"]) == 0
     assert main(["sweep", str(finished), "--parameter", "trim", "--points", "2"]) == 0
     monkeypatch.setattr("wobbly.Wobbly.run", forbidden)
-    capsys.readouterr()
-    own = drawn_by(finished, capsys)
+    own = answered("plot", finished)
     before = {path: path.read_bytes() for path in finished.rglob("*") if path.is_file()}
-    other = drawn_by(finished, capsys, "distance:max:20%", "survival_time:max")
+    other = answered("plot", finished, "--metric", "distance:max:20%", "--metric", "survival_time:max")
     assert {path: path.read_bytes() for path in before} == before, "study.db, figures and report stay as they were"
     folder = finished / "rescored" / "distance_max_20percent+survival_time_max"
     assert other["report"] == str(folder / "report.html")

@@ -8,15 +8,13 @@ from processes import besides_progress, refused
 from proxytune.cli.main import main
 
 
-def test_a_study_runs_and_prints_one_document_and_a_second_time_simulates_nothing(make_study, capsys):
+def test_a_study_runs_and_prints_one_document_and_a_second_time_simulates_nothing(make_study, answered):
     folder = make_study()
-    assert main(["study", str(folder), "--json"]) == 0
-    first = json.loads(capsys.readouterr().out)
+    first = answered("study", folder)
     assert first["episodes"] == {"run": 126, "reused": 0, "failed": 0}
     assert 0 < first["seconds"]["outside_episodes"] <= first["seconds"]["total"]
     assert [Path(path).exists() for path in (*first["figures"], first["report"])] == [True] * 5
-    assert main(["study", str(folder), "--json"]) == 0
-    second = json.loads(capsys.readouterr().out)
+    second = answered("study", folder)
     assert second["episodes"] == {"run": 0, "reused": 126, "failed": 0}
     costs = ("seconds", "episodes")
     assert {k: v for k, v in first.items() if k not in costs} == {k: v for k, v in second.items() if k not in costs}
@@ -86,11 +84,10 @@ def test_without_a_terminal_every_trial_is_a_plain_line_with_its_prpv_the_best_a
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("asked", "says"), [("7", "7 of 7"), ("5", "7 (budget 5)"), ("9", "9 of 9")])
-def test_a_budget_on_the_command_line_stands_over_study_toml(finished, capsys, asked, says):
+def test_a_budget_on_the_command_line_stands_over_study_toml(finished, capsys, answered, asked, says):
     assert main(["study", str(finished), "--budget", asked]) == 0
     assert f"trials {says}; best" in " ".join(capsys.readouterr().out.split())
-    assert main(["study", str(finished), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["settings"]["budget"] == 7, "study.toml stays as it is"
+    assert answered("study", finished)["settings"]["budget"] == 7, "study.toml stays as it is"
 
 
 @pytest.mark.parametrize(("option", "value"), [("budget", "0"), ("jobs", "1025")])

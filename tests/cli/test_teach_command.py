@@ -1,6 +1,5 @@
 """`teach` prints table 1 and one JSON document; `study` with the objective "plv" looks for the best teacher."""
 
-import json
 import re
 
 import pytest
@@ -11,10 +10,9 @@ from proxytune.cli.main import main
 
 
 @pytest.mark.slow
-def test_teach_prints_one_document_with_the_promised_keys_and_people_see_table_1(make_study, capsys):
+def test_teach_prints_one_document_with_the_promised_keys_and_people_see_table_1(make_study, capsys, answered):
     folder = make_taught(make_study)
-    assert main(["teach", str(folder), "--json"]) == 0
-    document = json.loads(capsys.readouterr().out)
+    document = answered("teach", folder)
     assert set(document["proxies"]) == {"right", "wrong", "wide"}
     right = document["proxies"]["right"]
     assert {"theta", "prpv", "zero_shot", "plv", "needed", "factor", "reduction", "scores"} <= set(right)
@@ -42,10 +40,9 @@ def test_teach_prints_one_document_with_the_promised_keys_and_people_see_table_1
 
 
 @pytest.mark.slow
-def test_a_study_of_learning_value_tells_its_best_proxy(make_study, capsys):
+def test_a_study_of_learning_value_tells_its_best_proxy(make_study, answered):
     folder = make_taught(make_study, objective='"plv"', parameters={"trim": "[-0.3, 0.3]"}, more="budget = 3")
-    assert main(["study", str(folder), "--json"]) == 0
-    document = json.loads(capsys.readouterr().out)
+    document = answered("study", folder)
     plvs = [trial["plv"]["value"] for trial in document["trials"]]
     assert len(plvs) == 3
     assert document["best"]["plv"]["value"] == max(plvs)
@@ -61,11 +58,10 @@ def test_a_study_of_learning_value_tells_its_best_proxy(make_study, capsys):
 
 
 @pytest.mark.slow
-def test_prpv_narrows_the_box_first_where_that_is_asked_for(make_study, capsys):
+def test_prpv_narrows_the_box_first_where_that_is_asked_for(make_study, answered):
     more = "budget = 2\nnarrow = true"
     folder = make_taught(make_study, objective='"plv"', parameters={"trim": "[-0.3, 0.3]"}, more=more)
-    assert main(["study", str(folder), "--json"]) == 0
-    document = json.loads(capsys.readouterr().out)
+    document = answered("study", folder)
     low, high = document["searched"]["trim"]
     assert document["narrowed_by_prpv"] is True
     assert -0.3 <= low < high <= 0.3
@@ -115,7 +111,7 @@ def test_an_expert_that_cannot_drive_is_one_line_and_nothing_is_drawn(make_study
 
 
 @pytest.mark.slow
-def test_what_hangs_is_ended_in_one_line_and_the_corrected_command_goes_on(make_study, capsys):
+def test_what_hangs_is_ended_in_one_line_and_the_corrected_command_goes_on(make_study, capsys, answered):
     small = {"grid": [0, 20, 40], "starts": "2", "jobs": "2", "family": '"stuck:stuck"', "episode_timeout_s": "1.0"}
     stuck = make_taught(make_study, called="stuck", domain={"faults": '["lesson:1:hangs"]'}, **small)
     assert main(["teach", str(stuck)]) == 1
@@ -126,6 +122,5 @@ def test_what_hangs_is_ended_in_one_line_and_the_corrected_command_goes_on(make_
     whole = make_taught(make_study, called="whole", **small)
     documents = []
     for folder in (make_taught(make_study, called="stuck", **small), whole):
-        assert main(["teach", str(folder), "--json"]) == 0
-        documents.append(json.loads(capsys.readouterr().out)["proxies"])
+        documents.append(answered("teach", folder)["proxies"])
     assert documents[0] == documents[1]

@@ -1,6 +1,5 @@
 """A Dask cluster gives the results of one machine, to the bit, whoever leaves or joins."""
 
-import json
 import os
 import socket
 import threading
@@ -127,15 +126,14 @@ def test_a_worker_of_several_threads_is_refused():
 
 
 @pytest.mark.slow
-def test_a_study_with_its_own_modules_gives_the_same_trials_while_a_worker_joins(cluster, make_study, capsys):
+def test_a_study_with_its_own_modules_gives_the_same_trials_while_a_worker_joins(cluster, make_study, answered):
     answers = []
     for name, words in (("here", ()), ("there", ("--backend", "dask", "--address", cluster.scheduler_address))):
         folder = make_study(name, family='"mine:family"')
         (folder / "mine.py").write_text(OWN_FAMILY)
         (folder / "helper.py").write_text(HELPER)
         cluster.scale(3 if words else 2)
-        assert main(["study", str(folder), "--json", *words]) == 0
-        answers.append(json.loads(capsys.readouterr().out))
+        answers.append(answered("study", folder, *words))
     here, there = answers
     assert here["best"] == there["best"]
     for key in ("number", "theta", "score"):

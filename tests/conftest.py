@@ -1,6 +1,7 @@
 """What several rooms' tests share: a study of a domain family that is a formula."""
 
 import gc
+import json
 import os
 import shutil
 import signal
@@ -9,6 +10,7 @@ from collections.abc import Callable, Iterator
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import hypothesis
 import pytest
@@ -24,8 +26,9 @@ os.environ.pop("TERM", None)
 # Rewriting asserts is half of collecting them, so it is kept for the next run; what tests start keeps its bytecode too.
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-# A run in the background ignores Ctrl-C; tests mean it to be heeded, as in a terminal.
+# A run in the background ignores Ctrl-C, or the end of its terminal; tests mean both to be heeded, as in a terminal.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 # The same examples in every run, however long they take.
 hypothesis.settings.register_profile("fixed", derandomize=True, deadline=None)
 hypothesis.settings.load_profile("fixed")
@@ -100,6 +103,7 @@ STUDY = {
 PARAMETERS = {"trim": "[-0.3, 0.3]", "delay": "[0.0, 0.3]"}
 TRUTH = {"trim": 0.1, "delay": 0.12}
 
+Answered = Callable[..., Any]
 MakeStudy = Callable[..., Path]
 """Writes a study's folder; call it again to edit the study.toml."""
 
@@ -155,6 +159,19 @@ def make_studies(tmp_path_factory: pytest.TempPathFactory) -> MakeStudy:
     return study_maker(tmp_path_factory.mktemp("studies"))
 
 
+@pytest.fixture
+def answered(capsys: pytest.CaptureFixture[str]) -> Answered:
+    """Run a command in this process, which succeeds, and give the document that it prints."""
+    from proxytune.cli.main import main
+
+    def answer(*words: object) -> Any:
+        capsys.readouterr()
+        assert main([*map(str, words), "--json"]) == 0
+        return json.loads(capsys.readouterr().out)
+
+    return answer
+
+
 @pytest.fixture(scope="session")
 def launcher() -> Iterator[object]:
     """The process that forks what is Launched."""
@@ -175,6 +192,16 @@ def finished_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with Store.open(folder) as store:
         run_trials(StudyRun(open_study(folder), store), make_proposer("gp", 5))
     return folder
+
+
+@pytest.fixture(scope="session")
+def result(finished_once: Path) -> object:
+    """What came of the finished study."""
+    from proxytune.storage import Store
+    from proxytune.study import StudyRun, open_study, result_of
+
+    with Store.read(finished_once) as store:
+        return result_of(StudyRun(open_study(finished_once), store))
 
 
 @pytest.fixture

@@ -2,7 +2,6 @@
 
 import argparse
 import importlib
-import json
 import os
 import re
 import shlex
@@ -17,7 +16,7 @@ from floors import floor
 from project import copy_studies
 
 import proxytune
-from proxytune.cli.main import BAD_INPUT, COMMANDS, DONE, FAILED, main, parser
+from proxytune.cli.main import BAD_INPUT, COMMANDS, DONE, FAILED, parser
 from proxytune.driving import AGENTS, METRICS, UNITS, map_names
 from proxytune.effects import CAR_CATALOGUE, CATALOGUE, GROUPS
 from proxytune.files import shipped
@@ -131,9 +130,8 @@ def test_every_engine_is_documented_with_what_it_learns_from_and_what_installs_i
     assert engine.needs is None or f'pip install ".[{engine.needs.extra}]"' in cells[-1]
 
 
-def test_every_engine_is_listed_with_how_it_proposes(capsys):
-    assert main(["list", "engines", "--json"]) == 0
-    listed = {row["name"]: row for row in json.loads(capsys.readouterr().out)["engines"]}
+def test_every_engine_is_listed_with_how_it_proposes(answered):
+    listed = {row["name"]: row for row in answered("list", "engines")["engines"]}
     assert list(listed) == [engine.name for engine in ENGINES]
     for engine in ENGINES:
         row = listed[engine.name]
@@ -220,9 +218,8 @@ def test_every_map_and_its_keys_are_documented(name):
         assert f"`{key}`" in maps, key
 
 
-def test_every_agent_is_listed_with_how_it_drives(capsys):
-    assert main(["list", "agents", "--json"]) == 0
-    listed = {row["name"]: row["how_it_drives"] for row in json.loads(capsys.readouterr().out)["agents"]}
+def test_every_agent_is_listed_with_how_it_drives(answered):
+    listed = {row["name"]: row["how_it_drives"] for row in answered("list", "agents")["agents"]}
     assert set(listed) == set(AGENTS)
     assert all("speed=" in how for how in listed.values())
 

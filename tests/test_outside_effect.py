@@ -1,6 +1,5 @@
 """A user's effect beside a study, or in a plug-in, is simulated, identified, written and read as a shipped one is."""
 
-import json
 from dataclasses import replace
 
 import planted
@@ -113,11 +112,10 @@ def test_a_domain_takes_it_from_its_table_from_theta_and_from_a_model(folder):
 
 
 @pytest.mark.slow
-def test_diagnose_tries_it_and_predict_and_a_study_read_what_it_wrote(folder, monkeypatch, capsys):
+def test_diagnose_tries_it_and_predict_and_a_study_read_what_it_wrote(folder, monkeypatch, answered):
     log = planted_log({NAME: 0.3}, folder, monkeypatch)
     monkeypatch.chdir(folder)
-    assert main(["diagnose", str(log), "--effects", NAME, "--json", "--output", "found"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = answered("diagnose", log, "--effects", NAME, "--output", "found")
     assert [effect["name"] for effect in found["effects"]] == [NAME]
     loss = found["effects"][0]["parameters"]["loss"]
     assert loss["value"] == pytest.approx(0.3, abs=0.03)
@@ -135,9 +133,8 @@ def test_a_plugin_s_effect_takes_part_by_itself(installed, folder):
     assert "[effects.slow_back]" in model_text(model, catalogue=catalogue)
 
 
-def test_list_shows_a_plugin_s_effect(installed, capsys):
-    assert main(["list", "effects", "--json"]) == 0
-    rows = json.loads(capsys.readouterr().out)["effects"]
+def test_list_shows_a_plugin_s_effect(installed, answered):
+    rows = answered("list", "effects")["effects"]
     (row,) = [row for row in rows if row["effect"] == "slow_back"]
     assert (row["parameter"], row["stage"], row["high"]) == ("slow_back", "motion", 0.9)
 

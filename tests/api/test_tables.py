@@ -55,14 +55,13 @@ def test_the_numbers_of_two_dataframes_are_those_of_the_command(by_command):
 
 
 @pytest.mark.slow
-def test_several_proxies_by_name_are_those_of_the_command(by_command, tmp_path, capsys):
+def test_several_proxies_by_name_are_those_of_the_command(by_command, tmp_path, answered):
     proxy, target = table(1), table(2)
     _, paths = by_command(proxy, target)
     table(3).to_csv(tmp_path / "other.csv", index=False)
     words = [word for metric in METRICS for word in ("--metric", metric)]
     words += ["--proxy", str(paths[0]), "--proxy", str(tmp_path / "other.csv"), "--target", str(paths[1])]
-    assert main(["score", *words, "--json"]) == 0
-    printed = json.loads(capsys.readouterr().out)
+    printed = answered("score", *words)
     found = score(proxy={"sim": proxy, "other": table(3)}, target=target, metrics=METRICS)
     document = json.loads(json.dumps(found.document))
     assert document == {key: printed[key] for key in document}

@@ -1,6 +1,5 @@
 """`completion` prints a script that the shell reads and that completes commands, options and files."""
 
-import json
 import shutil
 import subprocess
 import sys
@@ -12,14 +11,13 @@ from proxytune.cli.main import COMMANDS, main
 
 
 @pytest.mark.parametrize("shell", SHELLS)
-def test_every_command_is_in_the_script_of_every_shell(shell, capsys):
+def test_every_command_is_in_the_script_of_every_shell(shell, capsys, answered):
     pytest.importorskip("shtab")
     assert main(["completion", shell]) == 0
     script = capsys.readouterr().out
     assert all(command in script for command in COMMANDS)
     assert "python -m" not in script, "it is for the program's own name"
-    assert main(["completion", shell, "--json"]) == 0
-    assert json.loads(capsys.readouterr().out) == {"shell": shell, "script": script.removesuffix("\n")}
+    assert answered("completion", shell) == {"shell": shell, "script": script.removesuffix("\n")}
 
 
 def test_bash_completes_a_command_an_option_and_a_file(tmp_path, capsys):

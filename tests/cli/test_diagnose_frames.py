@@ -33,11 +33,6 @@ class Found(NamedTuple):
     err: str
 
 
-def diagnosed(capsys, *words):
-    assert main(["diagnose", *map(str, words), "--json"]) == 0
-    return json.loads(capsys.readouterr().out)
-
-
 def refused(capsys, *words):
     """The one line that a command ends with."""
     assert main(["diagnose", *map(str, words), "--json"]) == 2
@@ -131,14 +126,6 @@ def test_people_read_the_verdict_the_roll_and_both_errors(found):
     assert "fitting the camera" in found.err
 
 
-@pytest.mark.slow
-def test_what_is_declared_is_tuned_and_not_added(stills, tmp_path, capsys):
-    declared = "trim,camera_pitch,camera_roll"
-    document = diagnosed(capsys, stills, "--declared", declared, "--output", tmp_path / "out")
-    assert set(document["declared"]) == {"camera_pitch", "camera_roll"}
-    assert (document["verdict"], document["effects"]) == ("nothing missing", [])
-
-
 def test_an_unknown_effect_is_told_with_the_nearest_of_both_kinds(stills, tmp_path, capsys):
     line = refused(capsys, stills, "--declared", "camera_rol", "--output", tmp_path / "out")
     assert "--declared camera_rol: no effect on motion, camera or pictures has this name; did you mean" in line
@@ -151,16 +138,10 @@ def test_a_log_to_test_on_is_refused_where_there_is_no_motion(stills, tmp_path, 
     assert "--test: pictured has no commands" in line
 
 
-def test_too_few_frames_are_refused_in_one_line(tmp_path, capsys):
-    folder = write_still_frames(tmp_path / "few", ROLLED, lane_poses(8), columns=96)
-    assert "8 of 8 frames show markings; the camera needs 20" in refused(capsys, folder, "--output", tmp_path / "out")
-    assert not (tmp_path / "out").exists()
-
-
 @pytest.mark.slow
-def test_where_motion_is_refused_the_camera_still_comes_out(tmp_path, capsys):
+def test_where_motion_is_refused_the_camera_still_comes_out(tmp_path, answered):
     folder = short_drives(tmp_path / "log")
-    document = diagnosed(capsys, folder, "--output", tmp_path / "out")
+    document = answered("diagnose", folder, "--output", tmp_path / "out")
     assert "at least 20 s" in document["motion_refused"]
     assert [effect["name"] for effect in document["effects"]] == ["camera_roll"]
     assert not {"errors", "clocks"} & set(document)
@@ -178,10 +159,10 @@ def test_where_both_are_refused_both_reasons_are_told_in_one_line(tmp_path, caps
 
 
 @pytest.mark.slow
-def test_motion_and_camera_come_out_in_one_document_one_model_and_one_folder(tmp_path, capsys):
+def test_motion_and_camera_come_out_in_one_document_one_model_and_one_folder(tmp_path, answered):
     log = circling_log({**TRUTH, "yaw_scrub": 0.12}, noise=CALM)
     folder = add_frames(write_log(log, tmp_path / "log"), log, ROLLED, every=36)
-    document = diagnosed(capsys, folder, "--output", tmp_path / "out")
+    document = answered("diagnose", folder, "--output", tmp_path / "out")
     assert [effect["name"] for effect in document["effects"]] == ["yaw_scrub"]
     assert [effect["name"] for effect in document["camera"]["effects"]] == ["camera_roll"]
     assert set(document["declared"]) == {"trim", "delay"}
@@ -203,8 +184,8 @@ def test_progress_of_both_goes_from_motion_to_the_camera(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.skipif(not MEASURED.is_dir(), reason=f"needs measured data in {MEASURED.parent.name}/{MEASURED.name}")
-def test_nothing_is_missing_of_the_camera_that_took_the_measured_frames(tmp_path, capsys):
-    document = diagnosed(capsys, MEASURED, "--output", tmp_path / "out")
+def test_nothing_is_missing_of_the_camera_that_took_the_measured_frames(tmp_path, answered):
+    document = answered("diagnose", MEASURED, "--output", tmp_path / "out")
     assert (document["verdict"], document["effects"]) == ("nothing missing", [])
     low, high = document["declared"]["camera_pitch"]["interval"]
     assert low < 19.15 < high

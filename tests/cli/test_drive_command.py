@@ -1,7 +1,5 @@
 """`drive`: what it says and writes, and each bad input in one line."""
 
-import json
-
 import pytest
 from PIL import Image
 
@@ -23,12 +21,6 @@ def lane(make_studies):
     return folder
 
 
-def document(capsys, *words):
-    capsys.readouterr()
-    assert main(["drive", *map(str, words), "--json"]) == 0
-    return json.loads(capsys.readouterr().out)
-
-
 def complaint(capsys, *words):
     capsys.readouterr()
     assert main(["drive", *map(str, words)]) == 2
@@ -36,8 +28,8 @@ def complaint(capsys, *words):
     return line
 
 
-def test_the_document_has_both_scores_and_when_they_part(lane, capsys):
-    answer = document(capsys, lane, "--agent", "steady", "--theta", "trim=-0.2")
+def test_the_document_has_both_scores_and_when_they_part(lane, answered):
+    answer = answered("drive", lane, "--agent", "steady", "--theta", "trim=-0.2")
     keys = [
         "agent",
         "start",
@@ -59,17 +51,17 @@ def test_the_document_has_both_scores_and_when_they_part(lane, capsys):
     assert answer["cautions"] == []
 
 
-def test_an_interval_without_its_value_in_the_target_s_model_is_a_caution(lane, capsys):
+def test_an_interval_without_its_value_in_the_target_s_model_is_a_caution(lane, capsys, answered):
     (lane / "odd.toml").write_text(MODEL.format("duckiebot", "{ value = 0.2, interval = [0.01, 0.05] }"))
     words = (lane, "--agent", "steady", "--against", lane / "odd.toml")
-    (line,) = document(capsys, *words)["cautions"]
+    (line,) = answered("drive", *words)["cautions"]
     assert "the interval of trim, 0.01 to 0.05, does not hold its value 0.2" in line
     assert main(["drive", *map(str, words)]) == 0
     assert capsys.readouterr().out.startswith("beware: model of duckiebot: the interval of trim")
 
 
-def test_the_proxy_at_the_target_s_own_values_does_not_part_from_it(lane, capsys):
-    answer = document(capsys, lane, "--agent", "steady", "--theta", lane / "truth.toml", "--start", "2", "--seed", "7")
+def test_the_proxy_at_the_target_s_own_values_does_not_part_from_it(lane, answered):
+    answer = answered("drive", lane, "--agent", "steady", "--theta", lane / "truth.toml", "--start", "2", "--seed", "7")
     assert answer["proxy"] == answer["target"]
     assert (answer["parted_s"], answer["start"], answer["seed"]) == (None, 2, 7)
 
@@ -85,59 +77,59 @@ def test_people_see_which_episode_it_is_both_scores_and_when_they_part(lane, cap
     assert "brisk from start 0 under seed 1, as in no trial of this study" in capsys.readouterr().out
 
 
-def test_before_a_trial_is_finished_the_nominal_theta_drives(lane, capsys):
-    answer = document(capsys, lane, "--agent", "steady")
+def test_before_a_trial_is_finished_the_nominal_theta_drives(lane, answered):
+    answer = answered("drive", lane, "--agent", "steady")
     assert (answer["theta_from"], answer["theta"]) == ("nominal", {})
 
 
-def test_after_a_trial_the_best_theta_drives_unless_nominal_is_asked_for(finished, capsys):
-    best = document(capsys, finished, "--agent", "agent0")
+def test_after_a_trial_the_best_theta_drives_unless_nominal_is_asked_for(finished, answered):
+    best = answered("drive", finished, "--agent", "agent0")
     assert best["theta_from"] == "best"
     assert set(best["theta"]) == {"trim", "delay"}
-    assert document(capsys, finished, "--agent", "agent0", "--theta", "nominal")["theta"] == {}
+    assert answered("drive", finished, "--agent", "agent0", "--theta", "nominal")["theta"] == {}
 
 
-def test_a_study_without_a_truth_has_no_target_until_one_is_given(make_study, tmp_path, capsys):
+def test_a_study_without_a_truth_has_no_target_until_one_is_given(make_study, tmp_path, answered):
     folder = make_study(domain=DOMAIN, family=FAMILY, agents='["steady", "wary"]')
-    alone = document(capsys, folder, "--agent", "steady")
+    alone = answered("drive", folder, "--agent", "steady")
     assert (alone["target"], alone["parted_s"], alone["against"]) == (None, None, None)
     (tmp_path / "model.toml").write_text(MODEL.format("duckiebot", 0.2))
-    assert document(capsys, folder, "--agent", "steady", "--against", tmp_path / "model.toml")["target"] is not None
+    assert answered("drive", folder, "--agent", "steady", "--against", tmp_path / "model.toml")["target"] is not None
 
 
 @pytest.mark.parametrize(("ending", "frames"), [("png", 1), pytest.param("gif", 2, marks=pytest.mark.slow)])
-def test_a_picture_is_written_and_named(lane, tmp_path, capsys, ending, frames):
+def test_a_picture_is_written_and_named(lane, tmp_path, answered, ending, frames):
     path = tmp_path / "new" / f"episode.{ending}"
-    assert document(capsys, lane, "--agent", "steady", "--output", path)["output"] == str(path)
+    assert answered("drive", lane, "--agent", "steady", "--output", path)["output"] == str(path)
     with Image.open(path) as picture:
         assert picture.format == ending.upper()
         assert getattr(picture, "n_frames", 1) >= frames
     assert list(path.parent.iterdir()) == [path]
 
 
-def test_another_simulator_s_robot_is_drawn_where_it_records_places(make_study, tmp_path, capsys):
+def test_another_simulator_s_robot_is_drawn_where_it_records_places(make_study, tmp_path, answered):
     folder = make_study(family='"walking:walking"')
     (tmp_path / "model.toml").write_text("trim = 0.2\n")
     words = ["--agent", "agent0", "--against", tmp_path / "model.toml", "--output", tmp_path / "walk.png"]
-    assert document(capsys, folder, *words)["parted_s"] == pytest.approx(0.3)
+    assert answered("drive", folder, *words)["parted_s"] == pytest.approx(0.3)
     assert (tmp_path / "walk.png").exists()
 
 
 @pytest.mark.parametrize("family", ["wobbly:wobbly", "walking:walking"])
-def test_where_there_are_no_places_there_are_metrics_and_one_line(make_study, tmp_path, capsys, family):
+def test_where_there_are_no_places_there_are_metrics_and_one_line(make_study, tmp_path, capsys, answered, family):
     domain = {"columns": '"z"'} if family.startswith("walking") else {}
     folder = make_study(family=f'"{family}"', domain=domain)
-    assert document(capsys, folder, "--agent", "agent0")["proxy"]["metrics"]["distance"] > 0.0
+    assert answered("drive", folder, "--agent", "agent0")["proxy"]["metrics"]["distance"] > 0.0
     line = complaint(capsys, folder, "--agent", "agent0", "--output", tmp_path / "walk.png")
     assert "nothing can be drawn, as this study's domain family records no x and y; leave the option out" in line
     assert not (tmp_path / "walk.png").exists()
 
 
-def test_a_family_that_records_nothing_is_told_so_before_anything_is_driven(make_study, tmp_path, capsys):
+def test_a_family_that_records_nothing_is_told_so_before_anything_is_driven(make_study, tmp_path, capsys, answered):
     folder = make_study(domain={"journal": f'"{tmp_path / "journal"}"'})
     assert "nothing can be drawn" in complaint(capsys, folder, "--agent", "agent0", "--output", tmp_path / "walk.png")
     assert not (tmp_path / "journal").exists()
-    document(capsys, folder, "--agent", "agent0")
+    answered("drive", folder, "--agent", "agent0")
     assert (tmp_path / "journal").exists()
 
 

@@ -34,11 +34,10 @@ def model(tmp_path):
 
 
 @pytest.mark.parametrize("form", ["urdf", "mjcf", "ros"])
-def test_every_value_is_told_with_its_place_or_that_it_has_none(model, tmp_path, capsys, form):
+def test_every_value_is_told_with_its_place_or_that_it_has_none(model, tmp_path, capsys, answered, form):
     output = tmp_path / "out" / "robot.txt"
     arguments = ["export", str(model), "--to", form, "--output", str(output)]
-    assert main([*arguments, "--json"]) == 0
-    document = json.loads(capsys.readouterr().out)
+    document = answered(*arguments)
     assert {
         "name": "dead_band.width",
         "value": 0.06,
@@ -67,14 +66,13 @@ SHORT = {
 
 @pytest.mark.slow
 def test_the_best_theta_of_a_study_is_exported_with_its_intervals_whatever_its_agents_are_called(
-    make_study, tmp_path, capsys
+    make_study, tmp_path, capsys, answered
 ):
     folder = make_study(agents=None, **SHORT)
     with (folder / "study.toml").open("a") as study:
         study.write('\n[agents]\nslow = "steady"\nwild = "daredevil"\n')
     (folder / "target.csv").write_text("agent,episode,distance\nslow,0,0.2\nwild,0,0.5\n")
-    assert main(["study", str(folder), "--json"]) == 0
-    best = json.loads(capsys.readouterr().out)["best"]["theta"]
+    best = answered("study", folder)["best"]["theta"]
     arguments = ["export", str(folder), "--to", "ros", "--output", str(tmp_path / "robot.yaml"), "--json"]
     assert main(arguments) == 0
     document = json.loads(capsys.readouterr().out)
@@ -111,21 +109,6 @@ def test_an_unknown_robot_is_refused_with_where_it_is_looked_for(tmp_path, capsy
     assert "its robot 'rover' is unknown here; go to the folder that rover lies in" in capsys.readouterr().err
 
 
-@pytest.mark.slow
-def test_a_studys_trials_go_into_an_optuna_storage_each_with_its_value(finished, tmp_path, capsys):
-    optuna = pytest.importorskip("optuna")
-    words = ["export", str(finished), "--to", "optuna", "--output", str(tmp_path / "new" / "trials.sqlite3")]
-    assert main([*words, "--json"]) == 0
-    document = json.loads(capsys.readouterr().out)
-    assert (document["name"], document["trials"], document["to"]) == ("wobbly", 7, "optuna")
-    study = optuna.load_study(study_name="wobbly", storage=f"sqlite:///{tmp_path}/new/trials.sqlite3")
-    table = read_study(finished).trials()
-    assert [trial.value for trial in study.trials] == table.prpv.tolist()
-    assert [trial.params["trim"] for trial in study.trials] == table.trim.tolist()
-    assert [trial.user_attrs["ppv"] for trial in study.trials] == table.ppv.tolist()
-    assert study.user_attrs["best_trial"] == read_study(finished).best.trial.number - 1
-
-
 def test_a_studys_trials_are_what_scikit_optimize_loads(finished, tmp_path, capsys):
     assert main(["export", str(finished), "--to", "skopt", "--output", str(tmp_path / "trials.pkl")]) == 0
     assert "7 trials of 'wobbly'" in capsys.readouterr().out
@@ -159,10 +142,3 @@ def test_a_model_has_no_trials_to_write(model, tmp_path, capsys, form):
     assert main(["export", str(model), "--to", form, "--output", str(tmp_path / "new")]) == 2
     assert "takes the trials of a study; give the study's folder" in capsys.readouterr().err
     assert not (tmp_path / "new").exists()
-
-
-def test_an_output_that_cannot_be_written_is_one_line(finished, tmp_path, capsys):
-    (tmp_path / "file").write_text("")
-    output = tmp_path / "file" / "trials.pkl"
-    assert main(["export", str(finished), "--to", "skopt", "--output", str(output)]) == 2
-    assert f"{output}: cannot be written there, as " in capsys.readouterr().err

@@ -22,11 +22,6 @@ THIS_RUN = ("episodes", "seconds")
 """What differs when a study is run again."""
 
 
-def document_of(words, capsys):
-    assert main([*words, "--json"]) == 0
-    return json.loads(capsys.readouterr().out)
-
-
 def copied(folder, home):
     """A finished study of one's own."""
     return Path(shutil.copytree(folder, home / "study"))
@@ -59,8 +54,8 @@ def finished(make_studies, journal):
 
 
 @pytest.mark.slow
-def test_the_family_that_the_target_is_an_instance_of_predicts_best_and_the_document_has_its_keys(finished, capsys):
-    document = document_of(["study", str(finished)], capsys)
+def test_the_family_that_the_target_is_an_instance_of_predicts_best_and_the_document_has_its_keys(finished, answered):
+    document = answered("study", finished)
     assert document["best"]["predict"] == {"family": "right", "cannot_be_told_from": []}
     right, wrong = document["families"]["right"], document["families"]["wrong"]
     (difference,) = document["differences"]
@@ -82,11 +77,11 @@ def test_the_family_that_the_target_is_an_instance_of_predicts_best_and_the_docu
 
 
 @pytest.mark.slow
-def test_a_family_is_what_its_study_alone_would_be(finished, make_study, capsys):
-    document = document_of(["study", str(finished)], capsys)
+def test_a_family_is_what_its_study_alone_would_be(finished, make_study, answered):
+    document = answered("study", finished)
     alone = make_study("alone", parameters={"trim": "[-0.3, 0.3]"}, confirm="1", proxy='"held.toml"')
     (alone / "held.toml").write_text("delay = 0.3\n")
-    own = document_of(["study", str(alone)], capsys)
+    own = answered("study", alone)
     wrong = document["families"]["wrong"]
     assert wrong["theta"] == own["best"]["theta"]
     assert wrong["fresh"]["prpv"] == own["best"]["fresh"]["prpv"]
@@ -95,44 +90,46 @@ def test_a_family_is_what_its_study_alone_would_be(finished, make_study, capsys)
 
 
 @pytest.mark.slow
-def test_a_finished_one_is_summed_up_again_and_drawn_again_without_simulating(finished, journal, tmp_path, capsys):
+def test_a_finished_one_is_summed_up_again_and_drawn_again_without_simulating(finished, journal, tmp_path, answered):
     folder = copied(finished, tmp_path)
     driven = journal.read_text()
-    first = document_of(["study", str(folder)], capsys)
+    first = answered("study", folder)
     made = [folder / "report.html", folder / "figures" / "families.png"]
     for path in made:
         path.unlink()
     assert first["episodes"] == {"run": 0}
-    assert without_this_run(first) == document_of(["plot", str(folder)], capsys)
+    assert without_this_run(first) == answered("plot", folder)
     assert journal.read_text() == driven
     assert all(path.exists() for path in made)
 
 
 @pytest.mark.slow
-def test_a_time_once_spent_stays_spent_and_a_longer_one_goes_on(make_study, capsys):
+def test_a_time_once_spent_stays_spent_and_a_longer_one_goes_on(make_study, capsys, answered):
     folder = make_several(
         make_study, families=FAST, seconds=0.3, parameters={"trim": "[-0.3, 0.3]", "delay": "[0.0, 0.3]"}
     )
-    first = document_of(["study", str(folder)], capsys)
+    first = answered("study", folder)
     fast, slow = first["families"]["fast"], first["families"]["slow"]
     # One trial of 18 episodes takes the slow one 0.36 s.
     assert slow["trials"] == 1 < fast["trials"]
     assert slow["seconds"] >= 0.3
     assert "wall_time_s is 0.3" in slow["stopped"]
-    assert document_of(["study", str(folder)], capsys)["families"] == first["families"]
+    assert answered("study", folder)["families"] == first["families"]
     assert main(["plot", str(folder)]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "slow: 1 of the 5 trials of the design were run in its time: its θ is hardly tuned" in said
     path = folder / "study.toml"
     path.write_text(path.read_text().replace("wall_time_s = 0.3", "wall_time_s = 0.6"))
-    more = document_of(["study", str(folder)], capsys)["families"]["slow"]
+    more = answered("study", folder)["families"]["slow"]
     assert more["trials"] == 2
     assert more["seconds"] > slow["seconds"]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("family", "episodes"), [("right", 130), ("wrong", 40)])
-def test_stopped_at_any_moment_it_goes_on_to_the_same_document(finished, journal, make_study, family, episodes, capsys):
+def test_stopped_at_any_moment_it_goes_on_to_the_same_document(
+    finished, journal, make_study, family, episodes, answered
+):
     folder = make_several(make_study, domain={"journal": f'"{journal}"'})
 
     def pressing_ctrl_c(study):
@@ -140,7 +137,7 @@ def test_stopped_at_any_moment_it_goes_on_to_the_same_document(finished, journal
 
     with pytest.raises(KeyboardInterrupt):
         run_opened_families(read_study_settings(folder), Spending(), lambda line: None, pressing_ctrl_c, progress=False)
-    there, here = (without_costs(document_of(["study", str(one)], capsys)) for one in (finished, folder))
+    there, here = (without_costs(answered("study", one)) for one in (finished, folder))
     text = json.dumps(there).replace(str(finished), str(folder))
     assert json.loads(text) == here
 
@@ -246,8 +243,8 @@ def taught(make_studies):
 
 
 @pytest.mark.slow
-def test_where_there_is_teaching_each_teaches_at_its_best_theta(taught, capsys):
-    document = document_of(["study", str(taught)], capsys)
+def test_where_there_is_teaching_each_teaches_at_its_best_theta(taught, answered):
+    document = answered("study", taught)
     right, far = document["families"]["right"], document["families"]["far"]
     assert right["plv"] > far["plv"]
     assert right["plv_interval"][0] <= right["plv"] <= right["plv_interval"][1]
@@ -255,17 +252,17 @@ def test_where_there_is_teaching_each_teaches_at_its_best_theta(taught, capsys):
     assert far["more"]["value"] == pytest.approx(right["plv"] - far["plv"], abs=15.0)
     assert document["best"]["teach"]["family"] == "right"
     assert "To teach: " in document["sentence"]
-    assert document_of(["plot", str(taught)], capsys) == without_this_run(document)
+    assert answered("plot", taught) == without_this_run(document)
 
 
 @pytest.mark.slow
-def test_lessons_of_another_theta_or_that_are_none_are_not_shown(taught, tmp_path, capsys):
+def test_lessons_of_another_theta_or_that_are_none_are_not_shown(taught, tmp_path, capsys, answered):
     folder = copied(taught, tmp_path)
     lessons = folder / "families" / "lessons.json"
     known = json.loads(lessons.read_text())
     known["far"]["theta"]["trim"] = 0.0
     lessons.write_text(json.dumps(known))
-    drawn = document_of(["plot", str(folder)], capsys)["families"]
+    drawn = answered("plot", folder)["families"]
     assert drawn["right"]["plv"] is not None
     assert drawn["far"]["plv"] is None
     lessons.write_text("{]")

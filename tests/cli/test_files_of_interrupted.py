@@ -15,14 +15,6 @@ TABLE = "agent,episode,distance\n" + "".join(f"{agent},{k},{k + i}\n" for i, age
 MODEL = 'format = 1\nrobot = "duckiebot"\nplant = "planar"\n[effects.trim]\ntrim = 0.05\n'
 
 
-@pytest.fixture(autouse=True)
-def sigint_is_heard():
-    """A process in the background of a shell ignores SIGINT, and so would its tests."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
-
-
 @pytest.fixture
 def ctrl_c(monkeypatch):
     """Press Ctrl-C in the middle of writing the file of this number."""

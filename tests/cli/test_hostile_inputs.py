@@ -1,7 +1,6 @@
 """Inputs that nobody means: one line, at once, and never a number that is none."""
 
 import json
-import re
 import warnings
 
 import foreign_robot
@@ -80,12 +79,6 @@ ENDLESS = {
 def test_what_would_never_end_is_not_begun(command, make_study, capsys):
     words, says = ENDLESS[command]
     assert says in refused(capsys, 2, command, make_study(), *words)
-
-
-def test_a_folder_in_place_of_a_table_is_told_before_anything_is_simulated(make_study, tmp_path, capsys):
-    (tmp_path / "m.toml").write_text("trim = 0.1\n")
-    told = refused(capsys, 2, "measure", make_study(), "--model", tmp_path / "m.toml", "--output", tmp_path)
-    assert re.search(r": is a folder; give the name of a file in it", told)
 
 
 SPARSE = {

@@ -6,14 +6,13 @@ import pty
 import signal
 import subprocess
 import sys
-from contextlib import nullcontext, redirect_stdout
-from io import StringIO
+from contextlib import nullcontext
 
 import pytest
 from planted import planted_log, write_log
 from processes import ENVIRONMENT, besides_progress, finished_episodes, heeding_ctrl_c, start, wait_for
 
-from proxytune.cli.main import COMMANDS, main
+from proxytune.cli.main import COMMANDS
 from proxytune.cli.terminal import Terminated, signals_as_interruptions
 from proxytune.extensions import Interrupted
 from proxytune.starting import STOPPING
@@ -28,33 +27,6 @@ def ended(process, number, command):
     out, told = process.communicate(timeout=60)  # returns only when every process that holds its pipes has ended
     assert besides_progress(told) == f"proxytune {command}: {STOPPING[number]}; {COMMANDS[command].left}\n"
     assert (process.returncode, out) == (128 + number, "")
-
-
-SWEPT = ("--parameter", "trim", "--points", "3", "--json")
-
-
-@pytest.fixture(scope="module")
-def curves(make_studies):
-    """Of a sweep that was not stopped."""
-    folder = make_studies("whole")
-    with redirect_stdout(StringIO()) as printed:
-        assert main(["sweep", str(folder), *SWEPT]) == 0
-    return json.loads(printed.getvalue())["curves"]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("number", "jobs"), [(signal.SIGTERM, "1"), (signal.SIGINT, "2"), (signal.SIGHUP, "2")])
-def test_a_stopped_sweep_goes_on_to_the_same_curve(make_study, curves, capsys, number, jobs):
-    folder = make_study(domain=SLOWLY, jobs=jobs)
-    process = start("sweep", folder, *SWEPT)
-    wait_for(folder, process, 20)
-    ended(process, number, "sweep")
-    kept = finished_episodes(folder)
-    assert 20 <= kept < 3 * 18
-    assert main(["sweep", str(folder), *SWEPT]) == 0
-    document = json.loads(capsys.readouterr().out)
-    assert document["curves"] == curves
-    assert document["episodes"]["run"] == 3 * 18 - kept
 
 
 @pytest.mark.slow

@@ -143,7 +143,6 @@ def test_a_search_by_plv_killed_in_trials_and_finalists_prints_the_same_document
     shutil.rmtree(folder)
     folder = make_mortal(make_study, **PLV)
     ended = kill_at(commands, ("study", folder), SEARCHED, "all", lambda: len(trials(folder)))
-    print("ENDED", ended)
     assert ended[:2] == [0, 0], "before the first trial"
     assert {1, 2} & set(ended), "between the first and the last"
     assert ended[-2:] == [3, 3], "within the confirmation"
@@ -180,7 +179,6 @@ def test_families_killed_in_a_search_and_in_lessons_come_to_the_same_but_for_tim
     shutil.rmtree(folder)
     make_families(make_study)
     kept = kill_at(commands, ("study", folder), TUNED, "all", lambda: [finished_episodes(home) for home in homes])
-    print("KEPT", kept, of_right, of_far)
     assert kept[0] == [9, 0], "within the search of the first family"
     assert kept[1][0] == of_right, "within that of the second"
     assert 0 < kept[1][1] < of_far

@@ -19,7 +19,7 @@ def measured(make_study, tmp_path):
     return run
 
 
-def test_a_target_is_made_byte_for_byte_the_same_and_a_study_can_use_it(measured, make_study, capsys):
+def test_a_target_is_made_byte_for_byte_the_same_and_a_study_can_use_it(measured, make_study, capsys, answered):
     (status, one), (_, two) = measured("one.csv"), measured("two.csv", "--seed", "1001")
     assert status == 0
     assert one.read_bytes() == two.read_bytes()
@@ -28,8 +28,7 @@ def test_a_target_is_made_byte_for_byte_the_same_and_a_study_can_use_it(measured
     (folder / "target.csv").write_bytes(one.read_bytes())
     capsys.readouterr()
     at = "trim=0.1,delay=0.12"
-    assert main(["sweep", str(folder), "--parameter", "trim", "--points", "2", "--at", at, "--json"]) == 0
-    (curve,) = json.loads(capsys.readouterr().out)["curves"]
+    (curve,) = answered("sweep", folder, "--parameter", "trim", "--points", "2", "--at", at)["curves"]
     assert {point["value"]: point["prpv"] for point in curve["points"]}[0.1] == 0
 
 

@@ -9,17 +9,14 @@ FIGURES_DRAWN = True  # see conftest.py
 
 
 @pytest.mark.slow
-def test_every_figure_is_drawn_again_without_simulating(finished, capsys):
-    assert main(["study", str(finished), "--json"]) == 0
-    before = json.loads(capsys.readouterr().out)
+def test_every_figure_is_drawn_again_without_simulating(finished, answered):
+    before = answered("study", finished)
     assert main(["sweep", str(finished), "--parameter", "all", "--points", "2", "--at", "trim=0.1,delay=0.12"]) == 0
     content = (finished / "study.db").read_bytes()
     names = sorted(path.name for path in (finished / "figures").glob("*.png"))
     shutil.rmtree(finished / "figures")
     (finished / "report.html").unlink()
-    capsys.readouterr()
-    assert main(["plot", str(finished), "--json"]) == 0
-    document = json.loads(capsys.readouterr().out)
+    document = answered("plot", finished)
     tables = {"trials.csv", "parameters.tex", "usefulness.tex"}
     pages = {path.name for path in (finished / "figures").glob("*.html")}
     assert sorted({*names, *tables, *pages}) == sorted(path.name for path in (finished / "figures").iterdir())
@@ -53,14 +50,6 @@ def test_a_study_that_has_not_been_run_is_told(make_study, capsys):
     assert told == f"proxytune plot: {folder / 'study.db'}: no such file; {hint}\n"
 
 
-@pytest.mark.slow
-def test_a_finished_study_can_be_drawn_when_the_family_s_code_has_changed(finished, monkeypatch, capsys):
-    monkeypatch.setattr("wobbly.Wobbly.identity", "wobbly, a later version")
-    assert main(["study", str(finished)]) == 2
-    assert "changed since the first trial: the domain family" in capsys.readouterr().err
-    assert main(["plot", str(finished)]) == 0
-
-
 def swept_against(folder, model, capsys, *more):
     arguments = ["sweep", str(folder), "--points", "2", "--at", "trim=0.1,delay=0.12", "--parameter", *more]
     assert main([*arguments, "--target-model", str(model)]) == 0
@@ -90,36 +79,18 @@ def test_pod_is_drawn_again_without_the_target_model_also_after_the_code_has_cha
     assert drawn_again(folder, capsys) == before
 
 
-@pytest.mark.slow
-def test_the_sweep_asked_for_last_is_drawn_where_two_have_one_name(make_study, tmp_path, capsys):
-    folder, model = make_study(family='"echo:echo"'), tmp_path / "truth.toml"
-    model.write_text("trim = 0.1\n")
-    first = swept_against(folder, model, capsys, "trim")
-    swept_against(folder, model, capsys, "trim", "--points", "5")
-    assert drawn_again(folder, capsys) != first
-    assert swept_against(folder, model, capsys, "trim") == first
-    assert drawn_again(folder, capsys) == first
-
-
-def drawn_by(folder, capsys, *texts):
-    arguments = [word for text in texts for word in ("--metric", text)]
-    assert main(["plot", str(folder), *arguments, "--json"]) == 0
-    return json.loads(capsys.readouterr().out)
-
-
 def forbidden(self, episode):
     raise AssertionError("simulated")
 
 
 @pytest.mark.slow
-def test_other_metrics_score_the_stored_episodes_anew_into_a_folder_of_their_own(finished, capsys, monkeypatch):
+def test_other_metrics_score_the_stored_episodes_anew_into_a_folder_of_their_own(finished, answered, monkeypatch):
     assert main(["study", str(finished), "--json"]) == 0
     assert main(["sweep", str(finished), "--parameter", "trim", "--points", "2"]) == 0
     monkeypatch.setattr("wobbly.Wobbly.run", forbidden)
-    capsys.readouterr()
-    own = drawn_by(finished, capsys)
+    own = answered("plot", finished)
     before = {path: path.read_bytes() for path in finished.rglob("*") if path.is_file()}
-    other = drawn_by(finished, capsys, "distance:max:20%", "survival_time:max")
+    other = answered("plot", finished, "--metric", "distance:max:20%", "--metric", "survival_time:max")
     assert {path: path.read_bytes() for path in before} == before, "study.db, figures and report stay as they were"
     folder = finished / "rescored" / "distance_max_20percent+survival_time_max"
     assert other["report"] == str(folder / "report.html")
@@ -132,15 +103,6 @@ def test_other_metrics_score_the_stored_episodes_anew_into_a_folder_of_their_own
     assert other["settings"]["metrics"] == ["distance:max:20%", "survival_time:max"]
     assert [trial["theta"] for trial in other["trials"]] == [trial["theta"] for trial in own["trials"]]
     assert [trial["prpv"] for trial in other["trials"]] != [trial["prpv"] for trial in own["trials"]]
-
-
-@pytest.mark.slow
-def test_people_see_the_best_by_other_metrics_and_where_it_is_drawn(finished, capsys):
-    assert main(["plot", str(finished), "--metric", "survival_time:max"]) == 0
-    out = " ".join(capsys.readouterr().out.split())
-    assert "trials 7 of 7; best: trial" in out
-    assert "none run; scored with survival_time:max" in out
-    assert "rescored/survival_time_max/report.html" in out.replace(" ", "")
 
 
 def test_a_metric_that_is_not_there_is_one_line_and_draws_nothing(finished, capsys):

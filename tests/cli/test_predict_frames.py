@@ -62,14 +62,6 @@ def test_the_pictures_read_as_the_frames_of_the_log(predicted, stills, tmp_path)
     assert np.array_equal(frames.times, own.times)
 
 
-def test_effects_on_pictures_are_drawn_too(predicted, tmp_path):
-    predicted(ROLLED)
-    plain = np.asarray(Image.open(tmp_path / "out" / "frames" / "000000.png")).astype(float)
-    predicted({**ROLLED, "exposure.gain": 0.5})
-    dim = np.asarray(Image.open(tmp_path / "out" / "frames" / "000000.png")).astype(float)
-    assert dim.mean() == pytest.approx(0.5 * plain.mean(), rel=0.02)
-
-
 def test_people_read_the_difference_in_grey_levels(stills, tmp_path, capsys):
     words = ["predict", model(tmp_path, ROLLED), stills, "--frames", "--output", tmp_path / "out"]
     assert main([str(word) for word in words]) == 0

@@ -2,7 +2,6 @@ import json
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from proxytune.cli.main import main
 from proxytune.diagnosis import recording as filming
@@ -73,15 +72,6 @@ def test_manoeuvres_are_the_same_with_frames_as_without(recorded, capsys):
 
 
 @pytest.mark.slow
-def test_the_renderer_of_a_study_takes_the_frames(recorded, monkeypatch):
-    monkeypatch.setattr(filming, "COLUMNS", 64)
-    _, rendered = recorded("a", "--frames", "1", domain='camera = "renderer"\n')
-    _, plain = recorded("b", "--frames", "1")
-    one, other = (read_pictures(read_log(home).frames, [0]).astype(float) for home in (rendered, plain))
-    assert 0.0 < np.abs(one - other).mean() < 8.0
-
-
-@pytest.mark.slow
 def test_a_map_of_the_users_own_goes_with_the_log(recorded, tmp_path):
     (tmp_path / "yard.toml").write_bytes((shipped("robots") / "maps" / "small_loop.toml").read_bytes())
     status, home = recorded("log", "--frames", "1", changes=('"small_loop"', '"yard.toml"'))
@@ -112,12 +102,6 @@ def test_a_picture_that_cannot_be_written_leaves_no_log(recorded, capsys):
     assert status == 1
     assert "000000.png: the picture cannot be written" in capsys.readouterr().err
     assert not (home / "log.toml").exists()
-
-
-def test_pictures_are_png_files_of_the_robots_camera_at_160_columns(recorded):
-    _, home = recorded("log", "--frames", "1")
-    with Image.open(home / "frames" / "000000.png") as picture:
-        assert (picture.format, picture.mode, picture.size) == ("PNG", "RGB", (160, 120))
 
 
 @pytest.mark.parametrize("kind", ["duty", "twist"])

@@ -31,12 +31,6 @@ def damaged(folder, statement):
         plain.executescript(statement)
 
 
-def repaired(folder, capsys):
-    capsys.readouterr()
-    assert main(["repair", str(folder), "--json"]) == 0
-    return json.loads(capsys.readouterr().out)
-
-
 def goes_on_as_if_nothing_had_happened(folder, finished, capsys):
     """The episodes that were driven again."""
     capsys.readouterr()
@@ -50,21 +44,23 @@ def goes_on_as_if_nothing_had_happened(folder, finished, capsys):
     "damage",
     [damage if damage == "an episode" else pytest.param(damage, marks=pytest.mark.slow) for damage in DAMAGES],
 )
-def test_what_is_whole_is_kept_and_the_rest_is_made_again_to_the_last_bit(finished, finished_once, capsys, damage):
+def test_what_is_whole_is_kept_and_the_rest_is_made_again_to_the_last_bit(
+    finished, finished_once, capsys, answered, damage
+):
     statement, kept, again = DAMAGES[damage]
     damaged(finished, statement)
     before = (finished / "study.db").read_bytes()
     assert main(["study", str(finished)]) == 1
     assert f"python -m proxytune repair {finished}" in capsys.readouterr().err
-    found = repaired(finished, capsys)
+    found = answered("repair", finished)
     assert (found["damaged"], found["trials"]) == (True, kept)
     assert (finished / "study.db.damaged").read_bytes() == before
     assert goes_on_as_if_nothing_had_happened(finished, finished_once, capsys) == again
 
 
-def test_looking_at_a_study_whose_lost_episodes_are_not_driven_yet_says_how_to_drive_them(finished, capsys):
+def test_looking_at_a_study_whose_lost_episodes_are_not_driven_yet_says_how_to_drive_them(finished, capsys, answered):
     damaged(finished, DAMAGES["an episode"][0])
-    assert repaired(finished, capsys)["lost"]["episodes"] == 1
+    assert answered("repair", finished)["lost"]["episodes"] == 1
     assert main(["plot", str(finished)]) == 1
     line = "study.db: lacks episodes of trial 4; drive them again: python -m proxytune study"
     assert line in capsys.readouterr().err
@@ -96,28 +92,28 @@ def test_a_whole_study_is_left_as_it_is(finished, capsys):
 
 
 @pytest.mark.parametrize("share", [*(pytest.param(one, marks=pytest.mark.slow) for one in (0.3, 0.6)), 0.95])
-def test_a_database_that_was_cut_off_is_rebuilt_of_what_can_be_read(finished, finished_once, capsys, share):
+def test_a_database_that_was_cut_off_is_rebuilt_of_what_can_be_read(finished, finished_once, capsys, answered, share):
     content = (finished / "study.db").read_bytes()
     (finished / "study.db").write_bytes(content[: int(share * len(content))])
     assert main(["plot", str(finished)]) == 1
-    found = repaired(finished, capsys)
+    found = answered("repair", finished)
     assert found["damaged"]
     again = goes_on_as_if_nothing_had_happened(finished, finished_once, capsys)
     assert again == 7 * 18 - found["kept"]["episodes"]
 
 
 @pytest.mark.slow
-def test_a_spoilt_page_costs_what_is_on_it(finished, finished_once, capsys):
+def test_a_spoilt_page_costs_what_is_on_it(finished, finished_once, capsys, answered):
     content = bytearray((finished / "study.db").read_bytes())
     page = len(content) // 4096 // 2
     content[page * 4096 : (page + 1) * 4096] = b"?" * 4096
     (finished / "study.db").write_bytes(content)
-    found = repaired(finished, capsys)
+    found = answered("repair", finished)
     assert found["kept"]["episodes"] > 0
     goes_on_as_if_nothing_had_happened(finished, finished_once, capsys)
 
 
-def test_writes_that_are_still_in_the_log_are_kept_and_the_log_is_set_aside(finished, capsys):
+def test_writes_that_are_still_in_the_log_are_kept_and_the_log_is_set_aside(finished, answered):
     with Store.read(finished) as store:
         before = store.trials()
     plain = sqlite3.connect(finished / "study.db")
@@ -129,7 +125,7 @@ def test_writes_that_are_still_in_the_log_are_kept_and_the_log_is_set_aside(fini
     shutil.copytree(finished, copy)
     plain.close()
     assert (copy / "study.db-wal").stat().st_size
-    assert repaired(copy, capsys)["trials"] == 6
+    assert answered("repair", copy)["trials"] == 6
     assert (copy / "study.db.damaged-wal").exists()
     assert not (copy / "study.db-wal").exists()
     with Store.read(copy) as store:
@@ -137,10 +133,10 @@ def test_writes_that_are_still_in_the_log_are_kept_and_the_log_is_set_aside(fini
 
 
 @pytest.mark.slow
-def test_what_was_set_aside_before_is_kept(finished, capsys):
+def test_what_was_set_aside_before_is_kept(finished, answered):
     for _ in range(2):
         damaged(finished, "UPDATE trials SET score = score + 7 WHERE number = 3 OR number = 1")
-        repaired(finished, capsys)
+        answered("repair", finished)
         assert main(["study", str(finished)]) == 0
     assert {path.name for path in finished.glob("study.db.*")} == {"study.db.damaged", "study.db.damaged1"}
 

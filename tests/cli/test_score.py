@@ -12,7 +12,6 @@ from rich.console import Console
 from proxytune.cli import score
 from proxytune.errors import InputError, ScoresError
 
-SCORES = Path(__file__).parents[2] / "../shared/data/scores"
 SIM = "agent,episode,distance,time\n" + "".join(
     f"{agent},{episode},{base + 0.1 * ((episode * base) % 3)},{10 - base}\n"
     for base, agent in enumerate("ABCD")
@@ -112,24 +111,6 @@ def test_the_table_shows_each_measure_its_interval_and_the_notes(tables):
     assert "sim as a proxy of real: 4 agents, 3 proxy episodes and 3 target episodes each" in text
 
 
-def test_the_ranking_shows_every_proxy_and_names_with_brackets_survive(tables):
-    Path("sim[red].csv").write_text(SIM)
-    text = shown("--proxy", "sim.csv", "--proxy", "sim[red].csv", "--target", "real.csv", *METRIC)
-    assert "2 proxies of real" in text
-    assert "sim[red]" in text
-
-
-def test_single_rows_give_no_interval_but_a_note(tables):
-    rows = "agent,distance\nA,1\nB,2\nC,3\n"
-    for file in ("one.csv", "again.csv"):
-        Path(file).write_text(rows)
-    found = document("--proxy", "again.csv", "--target", "one.csv", "--metric", "distance:max")
-    assert found["prpv"] == 0
-    assert found["prpv_interval"] is found["noise_floor"] is found["intervals"] is None
-    assert any("no interval: each agent has one episode" in note for note in found["notes"])
-    assert "–" in shown("--proxy", "again.csv", "--target", "one.csv", "--metric", "distance:max")
-
-
 def test_a_rate_without_its_number_is_not_called_a_rollout(tables):
     Path("both.csv").write_text("Policy,Sim success (%),Real success (%),Real n\nA,48,40,20\nB,72,65,20\nC,81,45,20\n")
     text = " ".join(shown("both.csv").split())
@@ -153,13 +134,6 @@ def test_halves_are_called_halves_and_repeats_of_the_starts_a_noise_floor(tables
     assert "halves" not in text
     loose = document(*base, "twice.csv", *METRIC, "--unpaired")
     assert (loose["noise_floor_kind"], loose["at_noise_floor"]) == ("halves", None)
-
-
-def test_a_ranking_says_what_its_floor_is(tables):
-    Path("again.csv").write_text(Path("real.csv").read_text())
-    text = shown("--proxy", "sim.csv", "--proxy", "again.csv", "--target", "real.csv", *METRIC)
-    assert "halves 0" in text
-    assert "an upper bound of the noise floor" in text
 
 
 def test_a_constant_metric_is_null_with_a_note(tables):
@@ -232,26 +206,6 @@ def test_bad_input_gives_one_line_that_says_what_to_change(tables, words, compla
     assert "\n" not in str(problem.value)
 
 
-def test_a_missing_agent_is_named(tables):
-    Path("less.csv").write_text("\n".join(line for line in SIM.splitlines() if not line.startswith("B")))
-    with pytest.raises(ScoresError, match="the proxy lacks scores of B"):
-        run("--proxy", "less.csv", "--target", "real.csv", *METRIC)
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not SCORES.is_dir(), reason="the measured scores of ../shared/data are not here")
-def test_the_pilots_real_duckiebot_is_scored_from_its_episodes():
-    path = SCORES / "duckietown_pilot_episodes.csv"
-    metric = ("--metric", "distance:max", "--metric", "survival_time_s:max", "--metric", "time_out_of_lane_s:min")
-    found = document("--proxy", str(path), "--target", f"{path}:real", *metric)
-    assert [one["rank"] for one in found["proxies"]] == [1, 2, 3, 4, 5, 6]
-    assert {one["proxy"] for one in found["proxies"]} == {
-        "base", "synthetic_tiles", "trim_plus_0.2", "delay_doubled", "blur_0.1", "trim_minus_0.2",
-    }  # fmt: skip
-    assert all(one["prpv_interval"][0] <= one["prpv"] <= one["prpv_interval"][1] for one in found["proxies"])
-    assert any("leave out that the same start" in note for note in found["proxies"][0]["notes"])
-
-
 @pytest.fixture
 def own(tables):
     """A target in two files, with semicolons, decimal commas, names of its own and an agent of its own."""
@@ -313,18 +267,6 @@ def test_success_rates_stand_in_table_and_document_and_ties_are_told(tables):
     assert rate["low"] < 5 / 9 < rate["high"]
     assert "C      0.56 (0.27 to 0.81)         9  0.56 (0.27 to 0.81)         9" in shown(*words)
     assert "1 of 6 pairs of agents tie in the proxy, 1 on the target" in shown(*words)
-
-
-def test_with_three_agents_no_proxy_is_called_perfect(tables):
-    """Chance alone ranks three agents rightly in one case of six."""
-    labels = [f"{episode}/{repeat}" for episode in range(5) for repeat in (0, 1)]
-    again = [f"{agent},{label},{ord(agent)}" for agent in "ABC" for label in labels]
-    for file in ("three.csv", "again.csv"):
-        Path(file).write_text("\n".join(["agent,episode,distance", *again]) + "\n")
-    found = document("--proxy", "again.csv", "--target", "three.csv", "--metric", "distance:max")
-    assert (found["prpv"], found["noise_floor_kind"], found["at_noise_floor"]) == (0, "same starts", False)
-    assert any(note.startswith("PRPV is no better than chance") for note in found["notes"])
-    assert not any("no difference between proxy and target" in note for note in found["notes"])
 
 
 def test_all_measures_are_also_a_table_for_programs(tables):

@@ -290,15 +290,14 @@ def test_the_effect_that_a_model_names_runs_once_the_user_has_typed_it(tmp_path,
 
 
 @pytest.mark.slow
-def test_a_study_with_an_effect_of_its_own_is_drawn_without_it(tmp_path, capsys):
+def test_a_study_with_an_effect_of_its_own_is_drawn_without_it(tmp_path, answered):
     folder = tmp_path / "study"
     folder.mkdir()
     (folder / "mine.py").write_text(OWN)
     text = STUDY.format(**{**PLAIN, "jobs": 1}).replace("trim = ", '"mine:Mine" = ')
     (folder / "study.toml").write_text(text)
     (folder / "target.csv").write_text("agent,episode,distance\nsteady,0,1.0\ndaredevil,0,2.0\n")
-    assert main(["study", str(folder), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = answered("study", folder)
     (folder / "mine.py").write_text(SIGN.replace("{home!r}", repr(str(folder))))
     done = subprocess.run(
         [sys.executable, "-m", "proxytune", "plot", str(folder), "--json"], capture_output=True, text=True,
@@ -310,10 +309,9 @@ def test_a_study_with_an_effect_of_its_own_is_drawn_without_it(tmp_path, capsys)
     sys.path.remove(str(folder))
 
 
-def test_a_robot_that_cannot_be_read_hides_no_other(naming, monkeypatch, capsys):
+def test_a_robot_that_cannot_be_read_hides_no_other(naming, monkeypatch, answered):
     monkeypatch.chdir(naming("robot"))
-    assert main(["list", "robots", "--json"]) == 0
-    rows = {row["name"]: row["description"] for row in json.loads(capsys.readouterr().out)["robots"]}
+    rows = {row["name"]: row["description"] for row in answered("list", "robots")["robots"]}
     assert rows["wolf"].startswith("cannot be read: ")
     assert "module 'evil_mod' is code, and list runs none that a file names" in rows["wolf"]
     assert "duckiebot" in rows

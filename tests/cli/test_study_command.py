@@ -1,23 +1,20 @@
 import json
 import re
-import subprocess
 from pathlib import Path
 
 import pytest
-from processes import besides_progress, refused, trials
+from processes import besides_progress, refused
 
 from proxytune.cli.main import main
 
 
-def test_a_study_runs_and_prints_one_document_and_a_second_time_simulates_nothing(make_study, capsys):
+def test_a_study_runs_and_prints_one_document_and_a_second_time_simulates_nothing(make_study, answered):
     folder = make_study()
-    assert main(["study", str(folder), "--json"]) == 0
-    first = json.loads(capsys.readouterr().out)
+    first = answered("study", folder)
     assert first["episodes"] == {"run": 126, "reused": 0, "failed": 0}
     assert 0 < first["seconds"]["outside_episodes"] <= first["seconds"]["total"]
     assert [Path(path).exists() for path in (*first["figures"], first["report"])] == [True] * 5
-    assert main(["study", str(folder), "--json"]) == 0
-    second = json.loads(capsys.readouterr().out)
+    second = answered("study", folder)
     assert second["episodes"] == {"run": 0, "reused": 126, "failed": 0}
     costs = ("seconds", "episodes")
     assert {k: v for k, v in first.items() if k not in costs} == {k: v for k, v in second.items() if k not in costs}
@@ -46,16 +43,6 @@ def test_bad_input_is_one_line_and_exit_2(make_study, capsys):
     assert "budget: must be between" in refused(capsys, 2, "study", make_study(budget="-1"))
     assert "agents: no agent 'agnet1'" in refused(capsys, 2, "study", make_study(agents='["agent0", "agnet1"]'))
     assert not (make_study() / "study.db").exists()
-
-
-def test_an_engine_that_is_not_installed_is_refused_by_file_and_key_and_nothing_is_simulated(
-    make_study, capsys, monkeypatch
-):
-    monkeypatch.setattr("proxytune.search.registry.find_spec", lambda name: None)
-    folder = make_study(engine='"tpe"')
-    told = refused(capsys, 2, "study", folder)
-    assert f"{folder / 'study.toml'}: engine: 'tpe' needs Optuna, which is not installed" in told
-    assert not (folder / "study.db").exists()
 
 
 @pytest.mark.slow
@@ -97,19 +84,10 @@ def test_without_a_terminal_every_trial_is_a_plain_line_with_its_prpv_the_best_a
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("asked", "says"), [("7", "7 of 7"), ("5", "7 (budget 5)"), ("9", "9 of 9")])
-def test_a_budget_on_the_command_line_stands_over_study_toml(finished, capsys, asked, says):
+def test_a_budget_on_the_command_line_stands_over_study_toml(finished, capsys, answered, asked, says):
     assert main(["study", str(finished), "--budget", asked]) == 0
     assert f"trials {says}; best" in " ".join(capsys.readouterr().out.split())
-    assert main(["study", str(finished), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["settings"]["budget"] == 7, "study.toml stays as it is"
-
-
-@pytest.mark.slow
-def test_a_study_of_a_lowered_budget_goes_on_to_the_trials_it_would_have_had(make_study, finished, capsys):
-    folder = make_study("low")
-    assert main(["study", str(folder), "--budget", "6", "--jobs", "2"]) == 0
-    assert main(["study", str(folder)]) == 0
-    assert trials(folder) == trials(finished)
+    assert answered("study", finished)["settings"]["budget"] == 7, "study.toml stays as it is"
 
 
 @pytest.mark.parametrize(("option", "value"), [("budget", "0"), ("jobs", "1025")])
@@ -118,54 +96,8 @@ def test_a_budget_or_jobs_out_of_bounds_are_refused(make_study, capsys, option, 
     assert f"{option} must be between 1 and " in line
 
 
-@pytest.mark.slow
-def test_why_a_study_has_ended_is_said(make_study, capsys):
-    folder = make_study(stop="{ no_improvement = 1e9 }")
-    assert main(["study", str(folder)]) == 0
-    out = " ".join(capsys.readouterr().out.split())
-    assert "trials 5 of 7; best: trial " in out
-    assert "ended: no θ is expected to improve PRPV by more than" in out
-    make_study()
-    assert main(["study", str(folder)]) == 0
-    assert "ended: the budget of 7 trials is spent" in " ".join(capsys.readouterr().out.split())
-
-
 def test_a_folder_without_a_study_is_refused(tmp_path, capsys):
     assert "has no study.toml; give the folder of a study" in refused(capsys, 2, "study", tmp_path)
-
-
-@pytest.fixture
-def small_disk(tmp_path):
-    """A file system of 300 kB, where this process may mount one."""
-    disk = tmp_path / "disk"
-    disk.mkdir()
-    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=300k", "tmpfs", str(disk)], capture_output=True)
-    if mounted.returncode:
-        pytest.skip("this process may not mount a file system")
-    yield disk
-    subprocess.run(["umount", str(disk)], check=True)
-
-
-@pytest.mark.slow
-def test_a_full_disk_is_one_line_and_the_study_goes_on_when_there_is_room(make_study, small_disk, capsys):
-    whole = make_study("whole", budget="20")
-    assert main(["study", str(whole), "--json"]) == 0
-    expected = json.loads(capsys.readouterr().out)["trials"]
-    folder = small_disk / "study"
-    folder.mkdir()
-    for name in ("study.toml", "target.csv"):
-        (folder / name).write_bytes((whole / name).read_bytes())
-    ballast = small_disk / "ballast"
-    ballast.write_bytes(b"x" * 130_000)
-    told = refused(capsys, 1, "study", folder)
-    assert "disk" in told
-    assert str(folder) in told
-    ballast.unlink()
-    subprocess.run(["mount", "-o", "remount,size=3m", str(small_disk)], check=True)
-    assert main(["study", str(folder), "--json"]) == 0
-    document = json.loads(capsys.readouterr().out)
-    assert document["trials"] == expected
-    assert document["episodes"]["reused"] > 0
 
 
 @pytest.fixture

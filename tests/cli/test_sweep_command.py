@@ -41,12 +41,11 @@ def test_all_sweeps_every_parameter_of_the_study_and_draws_them_together(make_st
 
 
 @pytest.mark.slow
-def test_a_target_model_adds_pod_and_keeps_its_own_files(make_study, tmp_path, capsys):
+def test_a_target_model_adds_pod_and_keeps_its_own_files(make_study, tmp_path, answered):
     folder, model = make_study(family='"echo:echo"'), tmp_path / "truth.toml"
     model.write_text("trim = 0.1\n")
     arguments = ["sweep", str(folder), "--parameter", "trim", "--points", "2", "--at", "trim=0.1"]
-    assert main([*arguments, "--target-model", str(model), "--json"]) == 0
-    document = json.loads(capsys.readouterr().out)
+    document = answered(*arguments, "--target-model", model)
     assert document["episodes"] == {"run": 3 * 21}
     assert document["curves"][0]["points"][1]["pod"]["pod_pose"]["value"] == 0
     assert main(arguments) == 0
@@ -54,41 +53,34 @@ def test_a_target_model_adds_pod_and_keeps_its_own_files(make_study, tmp_path, c
 
 
 @pytest.mark.slow
-def test_trials_and_sweeps_share_episodes(finished, capsys):
-    assert main(["study", str(finished), "--json"]) == 0
-    theta = json.loads(capsys.readouterr().out)["trials"][0]["theta"]
+def test_trials_and_sweeps_share_episodes(finished, answered):
+    theta = answered("study", finished)["trials"][0]["theta"]
     at = ",".join(f"{name}={value!r}" for name, value in theta.items())
-    assert main(["sweep", str(finished), "--parameter", "trim", "--points", "2", "--at", at, "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["episodes"] == {"run": 2 * 18}
+    assert answered("sweep", finished, "--parameter", "trim", "--points", "2", "--at", at)["episodes"] == {
+        "run": 2 * 18
+    }
 
 
 @pytest.mark.slow
-def test_a_finished_study_is_swept_at_its_best_theta_and_says_so(finished, capsys):
-    assert main(["study", str(finished), "--json"]) == 0
-    best = json.loads(capsys.readouterr().out)["best"]["theta"]
+def test_a_finished_study_is_swept_at_its_best_theta_and_says_so(finished, answered):
+    best = answered("study", finished)["best"]["theta"]
     arguments = ["sweep", str(finished), "--parameter", "trim", "--points", "2"]
-    assert main([*arguments, "--json"]) == 0
-    document = json.loads(capsys.readouterr().out)
+    document = answered(*arguments)
     assert document["at"] == {"chosen": "best", "theta": best}
     assert document["curves"][0]["base"] == best
 
 
-@pytest.mark.slow
-def test_the_best_theta_is_told_in_words_too(finished, capsys):
-    assert main(["sweep", str(finished), "--parameter", "trim", "--points", "2", "--at", "best"]) == 0
-    assert "the others are held at the study's best θ: delay=" in " ".join(capsys.readouterr().out.split())
-
-
-def test_nominal_holds_the_robots_own_values_also_when_the_study_is_finished(finished, capsys):
-    assert main(["sweep", str(finished), "--parameter", "trim", "--points", "2", "--at", "nominal", "--json"]) == 0
-    document = json.loads(capsys.readouterr().out)
+def test_nominal_holds_the_robots_own_values_also_when_the_study_is_finished(finished, answered):
+    document = answered("sweep", finished, "--parameter", "trim", "--points", "2", "--at", "nominal")
     assert document["at"] == {"chosen": "nominal", "theta": {}}
     assert document["curves"][0]["base"] == {}
 
 
-def test_a_study_that_has_not_run_is_swept_at_nominal_values(make_study, capsys):
-    assert main(["sweep", str(make_study()), "--parameter", "trim", "--points", "2", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["at"] == {"chosen": "nominal", "theta": {}}
+def test_a_study_that_has_not_run_is_swept_at_nominal_values(make_study, answered):
+    assert answered("sweep", make_study(), "--parameter", "trim", "--points", "2")["at"] == {
+        "chosen": "nominal",
+        "theta": {},
+    }
 
 
 @pytest.mark.slow

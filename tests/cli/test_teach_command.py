@@ -1,13 +1,8 @@
 """`teach` prints table 1 and one JSON document; `study` with the objective "plv" looks for the best teacher."""
 
-import json
-import os
 import re
-import signal
-import time
 
 import pytest
-from launched import Launched
 from processes import besides_progress
 from taught import GRID, make_taught
 
@@ -15,10 +10,9 @@ from proxytune.cli.main import main
 
 
 @pytest.mark.slow
-def test_teach_prints_one_document_with_the_promised_keys_and_people_see_table_1(make_study, capsys):
+def test_teach_prints_one_document_with_the_promised_keys_and_people_see_table_1(make_study, capsys, answered):
     folder = make_taught(make_study)
-    assert main(["teach", str(folder), "--json"]) == 0
-    document = json.loads(capsys.readouterr().out)
+    document = answered("teach", folder)
     assert set(document["proxies"]) == {"right", "wrong", "wide"}
     right = document["proxies"]["right"]
     assert {"theta", "prpv", "zero_shot", "plv", "needed", "factor", "reduction", "scores"} <= set(right)
@@ -46,21 +40,9 @@ def test_teach_prints_one_document_with_the_promised_keys_and_people_see_table_1
 
 
 @pytest.mark.slow
-def test_a_budget_too_small_to_converge_is_said_and_gives_no_plv(make_study, capsys):
-    folder = make_taught(make_study, grid=[0, 3, 6])
-    assert main(["teach", str(folder), "--json"]) == 0
-    document = json.loads(capsys.readouterr().out)
-    assert document["convergence"]["settled"] is False
-    assert document["proxies"]["right"]["plv"] is None
-    assert main(["teach", str(folder)]) == 0
-    assert "raise teaching.target_samples" in " ".join(capsys.readouterr().out.split())
-
-
-@pytest.mark.slow
-def test_a_study_of_learning_value_tells_its_best_proxy(make_study, capsys):
+def test_a_study_of_learning_value_tells_its_best_proxy(make_study, answered):
     folder = make_taught(make_study, objective='"plv"', parameters={"trim": "[-0.3, 0.3]"}, more="budget = 3")
-    assert main(["study", str(folder), "--json"]) == 0
-    document = json.loads(capsys.readouterr().out)
+    document = answered("study", folder)
     plvs = [trial["plv"]["value"] for trial in document["trials"]]
     assert len(plvs) == 3
     assert document["best"]["plv"]["value"] == max(plvs)
@@ -76,11 +58,10 @@ def test_a_study_of_learning_value_tells_its_best_proxy(make_study, capsys):
 
 
 @pytest.mark.slow
-def test_prpv_narrows_the_box_first_where_that_is_asked_for(make_study, capsys):
+def test_prpv_narrows_the_box_first_where_that_is_asked_for(make_study, answered):
     more = "budget = 2\nnarrow = true"
     folder = make_taught(make_study, objective='"plv"', parameters={"trim": "[-0.3, 0.3]"}, more=more)
-    assert main(["study", str(folder), "--json"]) == 0
-    document = json.loads(capsys.readouterr().out)
+    document = answered("study", folder)
     low, high = document["searched"]["trim"]
     assert document["narrowed_by_prpv"] is True
     assert -0.3 <= low < high <= 0.3
@@ -122,51 +103,6 @@ def test_bad_input_is_one_line(make_study, capsys, before, after, says):
     assert refused("teach", folder, capsys).startswith(says)
 
 
-@pytest.mark.parametrize(
-    ("more", "says"),
-    [
-        ("examinations = 7", "teaching.examinations: must be between 8 and 1000000, got 7"),
-        ('target_lessons = "learner"', "teaching.target_lessons: schoolroom:schoolroom cannot teach a learner that"),
-        ('proxy_lessons = "learner"', "teaching.proxy_lessons: schoolroom:schoolroom cannot teach a learner that"),
-    ],
-)
-def test_a_bad_key_of_teaching_is_one_line(make_study, capsys, more, says):
-    folder = make_taught(make_study, more=more, objective='"plv"')
-    command = "study" if "examinations" in more else "teach"
-    assert refused(command, folder, capsys).startswith(says)
-
-
-def test_a_study_without_proxies_is_one_line(make_study, capsys):
-    folder = make_taught(make_study)
-    path = folder / "study.toml"
-    path.write_text(path.read_text().split("[teaching.proxies")[0])
-    assert refused("teach", folder, capsys).startswith("teaching.proxies: is missing; name at least one")
-
-
-@pytest.mark.parametrize(
-    ("width", "says"),
-    [
-        ("trim = [0.0, 0.7]", "teaching.width.trim: must be at most 0.4, all of its box in [parameters], got 0.7"),
-        ("delay = [0.0, 0.1]", "teaching.width.delay: is not among [parameters]; add it there"),
-    ],
-)
-def test_a_width_that_cannot_be_searched_is_one_line(make_study, capsys, width, says):
-    keys = {"parameters": {"trim": "[-0.2, 0.2]"}, "objective": '"plv"'}
-    folder = make_taught(make_study, more=f"[teaching.width]\n{width}", **keys)
-    assert refused("study", folder, capsys).startswith(says)
-
-
-def test_an_expert_without_labels_where_the_learner_drives_is_one_line_and_nothing_is_drawn(make_study, capsys):
-    keys = {"family": '"tightrope:tightrope"', "domain": {"silent": "true"}, "more": 'target_lessons = "learner"'}
-    folder = edited(make_taught(make_study, **keys), "schoolroom:Matrix", "tightrope:Cells")
-    assert main(["teach", str(folder), "--json"]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err.splitlines()[-1].startswith("proxytune teach: none: an expert without labels on the learner's states: ")
-    assert "Traceback" not in err
-    assert not (folder / "figures").exists()
-
-
 def test_an_expert_that_cannot_drive_is_one_line_and_nothing_is_drawn(make_study, capsys):
     folder = make_taught(make_study, domain={"blocked": "0.9"})
     assert main(["teach", str(folder)]) == 2
@@ -174,32 +110,8 @@ def test_an_expert_that_cannot_drive_is_one_line_and_nothing_is_drawn(make_study
     assert not (folder / "figures").exists()
 
 
-def made(folder):
-    """How many samples, weights and examinations are kept."""
-    return len(list((folder / "teaching").glob("*.npz")))
-
-
 @pytest.mark.slow
-def test_a_run_stopped_at_any_moment_comes_to_the_same_document_as_one_that_was_not(make_study, launcher, capsys):
-    """See test_killed_teaching.py for kill -9 at all its moments."""
-    documents = []
-    for called in ("whole", "stopped"):
-        folder = make_taught(make_study, called=called, grid=GRID[:5], jobs="2")
-        for number, status in ((signal.SIGINT, 130), (signal.SIGTERM, 143)) if called == "stopped" else ():
-            process, count = Launched(launcher, folder, ["teach", str(folder)]), made(folder) + 9
-            while made(folder) < count and not process.poll():
-                time.sleep(0.002)
-            os.kill(process.pid, number)
-            assert process.end()[0] == status
-        assert main(["teach", str(folder), "--json"]) == 0
-        document = json.loads(capsys.readouterr().out)
-        documents.append({key: document[key] for key in ("convergence", "without", "proxies")})
-        assert not list((folder / "teaching").glob("*.npz.*"))
-    assert documents[0] == documents[1]
-
-
-@pytest.mark.slow
-def test_what_hangs_is_ended_in_one_line_and_the_corrected_command_goes_on(make_study, capsys):
+def test_what_hangs_is_ended_in_one_line_and_the_corrected_command_goes_on(make_study, capsys, answered):
     small = {"grid": [0, 20, 40], "starts": "2", "jobs": "2", "family": '"stuck:stuck"', "episode_timeout_s": "1.0"}
     stuck = make_taught(make_study, called="stuck", domain={"faults": '["lesson:1:hangs"]'}, **small)
     assert main(["teach", str(stuck)]) == 1
@@ -210,6 +122,5 @@ def test_what_hangs_is_ended_in_one_line_and_the_corrected_command_goes_on(make_
     whole = make_taught(make_study, called="whole", **small)
     documents = []
     for folder in (make_taught(make_study, called="stuck", **small), whole):
-        assert main(["teach", str(folder), "--json"]) == 0
-        documents.append(json.loads(capsys.readouterr().out)["proxies"])
+        documents.append(answered("teach", folder)["proxies"])
     assert documents[0] == documents[1]

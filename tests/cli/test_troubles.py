@@ -4,7 +4,6 @@ import os
 import re
 import resource
 import shutil
-import sqlite3
 import subprocess
 from pathlib import Path
 
@@ -15,11 +14,9 @@ from stopping import Stopping
 from proxytune.cli.main import main
 from proxytune.search import make_proposer
 from proxytune.storage import Store
-from proxytune.storage.database import FORMAT
 from proxytune.study import StudyRun, open_study, run_trials
 
 slow = pytest.mark.slow
-DAMAGED = r"is damaged \([^)]+\); restore a copy, or keep what is whole: python -m proxytune repair \S+"
 
 
 def interrupted_after(folder, count):
@@ -60,71 +57,6 @@ def goes_on(folder, finished):
     assert main(["study", str(folder), "--json"]) == 0
     assert trials(folder) == trials(finished)
     assert episodes(folder) == episodes(finished)
-
-
-def told_by_every_command(folder, capsys, expected):
-    """The same line, and study.db as it was."""
-    path = folder / "study.db"
-    before = path.read_bytes() if path.is_file() else sorted(path.iterdir())
-    found = {
-        "study": refused(capsys, 1, "study", folder),
-        "sweep": refused(capsys, 1, "sweep", folder, "--parameter", "trim", "--points", "2"),
-        "plot": refused(capsys, 1, "plot", folder),
-    }
-    for command, line in found.items():
-        assert re.fullmatch(f"proxytune {command}: {re.escape(str(path))}: {expected}\n", line), line
-    assert before == (path.read_bytes() if path.is_file() else sorted(path.iterdir()))
-    assert sorted(file.name for file in folder.iterdir()) == ["study.db", "study.toml", "target.csv"]
-
-
-@pytest.mark.slow
-def test_a_newer_format_is_told_and_its_study_goes_on_where_that_is_known(half, finished, capsys):
-    with sqlite3.connect(half / "study.db") as plain:
-        plain.execute(f"PRAGMA user_version = {FORMAT + 1}")
-    expected = f"has format {FORMAT + 1}, this proxytune reads up to {FORMAT}; install a newer one"
-    told_by_every_command(half, capsys, expected)
-    with sqlite3.connect(half / "study.db") as plain:
-        plain.execute(f"PRAGMA user_version = {FORMAT}")
-    goes_on(half, finished)
-
-
-@slow
-def test_a_text_file_in_its_place_is_told(half, capsys):
-    (half / "study.db").write_text("trial,prpv\n" * 500)
-    told_by_every_command(half, capsys, DAMAGED)
-
-
-@slow
-def test_a_folder_in_its_place_is_told(half, capsys):
-    (half / "study.db").rename(half.parent / "aside")
-    (half / "study.db").mkdir()
-    told_by_every_command(half, capsys, "is a folder, so no study's database; move it away")
-
-
-CUTS = [4096, -1]
-MORE_CUTS = [1, 50, 100, 512, 5000, 3 * 4096, -2 * 4096, -4096, -4095]
-
-
-@pytest.mark.parametrize("cut", [*CUTS, *(pytest.param(cut, marks=slow) for cut in MORE_CUTS)])
-def test_a_truncated_database_is_told_wherever_it_is_cut(half, capsys, cut):
-    path = half / "study.db"
-    content = path.read_bytes()
-    path.write_bytes(content[:cut])
-    for words in (("study", half), ("sweep", half, "--parameter", "trim", "--points", "2"), ("plot", half)):
-        told = refused(capsys, 1, *words)
-        assert re.fullmatch(f"proxytune {words[0]}: {re.escape(str(path))}: {DAMAGED}\n", told), told
-        assert path.read_bytes() == content[:cut]
-    assert sorted(file.name for file in half.iterdir()) == ["study.db", "study.toml", "target.csv"]
-
-
-@slow
-def test_with_the_truncated_database_restored_the_study_goes_on(half, finished, capsys):
-    path = half / "study.db"
-    content = path.read_bytes()
-    path.write_bytes(content[: len(content) // 2])
-    told_by_every_command(half, capsys, DAMAGED)
-    path.write_bytes(content)
-    goes_on(half, finished)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, *(pytest.param(one, marks=slow) for one in (0.1, 0.9, 0.999))])
@@ -235,31 +167,6 @@ def test_a_read_only_folder_is_told_and_the_study_goes_on_where_it_can_be_writte
     elsewhere = shutil.copytree(folder, folder.parent / "elsewhere")
     elsewhere.chmod(0o755)
     goes_on(elsewhere, finished)
-
-
-@pytest.mark.slow
-def test_an_edited_study_is_refused_with_every_key_that_changed(half, make_study, finished, capsys):
-    (half / "model.toml").write_text("trim = 0.1\n")
-    changes = {"starts": "2", "seed": "2", "initial": "4", "engine": '"sobol"', "proxy": '"model.toml"'}
-    make_study("half", parameters={"trim": "[-0.2, 0.3]", "delay": "[0.0, 0.3]"}, **changes)
-    told = refused(capsys, 2, "study", half)
-    keys = (
-        'starts (was 3), initial (was 5), seed (was 1), engine (was "gp"), parameters.trim (was [-0.3, 0.3]), '
-        "the domain family (its code, its robot or the proxy's model)"
-    )
-    remedy = "put it back, or move study.db away to start again"
-    assert told == f"proxytune study: {half / 'study.toml'}: changed since the first trial: {keys}; {remedy}\n"
-    make_study("half", proxy=None)
-    goes_on(half, finished)
-
-
-@slow
-def test_budget_and_jobs_may_be_raised(half, make_study):
-    other = make_study("other", budget="9")
-    assert main(["study", str(other)]) == 0
-    make_study("half", budget="9", jobs="2")
-    goes_on(half, other)
-    assert len(trials(half)) == 9
 
 
 def test_a_lowered_budget_keeps_what_is_finished_and_says_so(finished, make_study, capsys):

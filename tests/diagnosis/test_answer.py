@@ -6,7 +6,7 @@ The verdict follows from the error that is left, against the bracket of the nois
 import pytest
 from planted import CALM, DECLARED, NOISE, TRUTH, planted_drives
 
-from proxytune.diagnosis import AdoptedEffect, Findings, Ratio, pose_errors
+from proxytune.diagnosis import AdoptedEffect, Findings, Ratio
 from proxytune.diagnosis.answer import verdict
 from proxytune.diagnosis.motion.diagnose import KeptAside, bracket, horizon_error, is_explained
 from proxytune.diagnosis.motion.evidence import DroppedEffect, Variant
@@ -23,11 +23,11 @@ def drives():
     return planted_drives(SCRUBBED, episodes=6, seconds=15.0, noise=CALM)
 
 
-def error(drives, *, model=TRUTH, dropped=(), learnt=None, horizon_s=2.0, how=pose_errors):
+def error(drives, *, model=TRUTH, dropped=(), learnt=None, horizon_s=2.0):
     declared, extended = (evaluate(drives, theta, DECLARED, NOISE) for theta in (TRUTH, model))
     findings = Findings(declared, extended, (), (), (), (), tuple(dropped))
     kept = KeptAside(drives, drives, pose_noise(drives, model))
-    return horizon_error(findings, kept, horizon_s, learnt or {}, how)
+    return horizon_error(findings, kept, horizon_s, learnt or {})
 
 
 def test_before_is_the_declared_model_and_after_the_extended_one(drives):
@@ -35,19 +35,6 @@ def test_before_is_the_declared_model_and_after_the_extended_one(drives):
     assert told.before.value > 3.0 * told.after.value
     assert told.ratio.value == pytest.approx(told.after.value / told.before.value)
     assert told.floor.reached == pytest.approx(told.after.value)
-
-
-@pytest.mark.parametrize(("model", "times"), [(TRUTH, 1), (SCRUBBED, 2)])
-def test_a_model_to_which_nothing_was_added_is_driven_once(drives, model, times):
-    driven = []
-
-    def drive(*given):
-        driven.append(given)
-        return pose_errors(*given)
-
-    told = error(drives, model=model, how=drive)
-    assert len(driven) == times
-    assert (told.before == told.after) == (times == 1)
 
 
 @pytest.mark.parametrize("how", [{"dropped": [DroppedEffect(SCRUB, Variant(SCRUBBED, DECLARED))]},

@@ -98,14 +98,6 @@ def test_looking_half_a_metre_ahead_cuts_the_corners_where_trim_and_delay_are_of
     assert score(lesson(0, SHIFTED)) == pytest.approx(SECONDS)
 
 
-def test_looking_half_a_metre_ahead_takes_a_wheel_out_of_the_lane_in_the_nominal_robot_too():
-    assert score(lesson(1, look_ahead=0.5)) < SECONDS - 1.0
-
-
-def test_the_robots_own_figures_are_those_that_keep_to_the_lane():
-    assert ROBOT.expert_figures() == (0.25, 0.2, 1.0, 0.1)
-
-
 @pytest.mark.parametrize("outer", [True, False])
 @pytest.mark.parametrize("left", [-0.06, 0.06])
 def test_off_the_centre_line_it_turns_back_to_it(outer, left):
@@ -173,13 +165,6 @@ def test_driven_commands_are_duties_however_hard_it_is_pushed():
     driven, memory = shown(expert(disturbance=5.0))
     assert np.abs(driven).max() == 1.0
     assert np.abs(memory.commands).max() < 1.0
-
-
-def test_the_same_lesson_is_the_same_to_the_last_bit_and_another_seed_is_another():
-    first, again, other = (lesson.__wrapped__(3, seconds=3.0, seed=s, disturbance=DISTURBANCE) for s in (1, 1, 2))
-    np.testing.assert_array_equal(first.poses, again.poses)
-    np.testing.assert_array_equal(first.memory.commands, again.memory.commands)
-    assert (first.commands != other.commands).all()
 
 
 def test_a_picture_a_shown_command_and_whether_on_the_road_belong_to_every_step():
@@ -261,15 +246,6 @@ def test_lane_following_has_every_member_of_a_classroom():
             assert parameters(given) == parameters(wanted), name
 
 
-def test_a_lesson_on_the_road_shows_a_picture_and_a_command_for_every_step():
-    samples, asked = classroom(plant="planar").demonstrate(episode(), 1.5)
-    assert asked == round(1.5 * RATE)
-    assert samples.observations.shape == (asked, 48, 64, 3)
-    assert samples.observations.dtype == np.uint8
-    assert samples.commands.shape == (asked, 2)
-    assert np.abs(samples.commands).max() <= 1.0
-
-
 @both_plants
 def test_the_same_lesson_shows_the_same_samples_to_the_last_bit(plant):
     room = classroom(plant=plant)
@@ -329,15 +305,6 @@ def test_a_guided_policys_steps_are_labelled_with_what_the_expert_would_do_there
     asked = [expert.act(Sight(None, pose), expert.begin(ROBOT))[1].commands[0] for pose in poses[:RATE]]
     np.testing.assert_array_equal(samples.commands, asked)
     assert np.abs(samples.commands - [lean(picture) for picture in samples.observations]).max() > 0.05
-
-
-def test_a_policy_that_drives_as_the_expert_does_visits_what_it_is_shown():
-    room = classroom(plant="planar")
-    shown = lesson_of_teaching(room, episode(), 1.0).memory
-    commands = iter(lesson_of_teaching(room, episode(), 1.0).commands)
-    samples, _ = room.guide(episode(), lambda picture: next(commands), 1.0)
-    np.testing.assert_array_equal(samples.observations, np.array(shown.pictures))
-    np.testing.assert_array_equal(samples.commands, np.array(shown.commands))
 
 
 def test_where_a_guided_policy_is_off_the_road_nothing_is_labelled():

@@ -71,20 +71,6 @@ def assert_same(alone, together):
         np.testing.assert_array_equal(one, other)
 
 
-INSTANCES = {
-    "noise in every picture": {"effects": {"image_noise": 9.0, "blur": 0.04}},
-    "late and lost commands": {"effects": {"delay_jitter": 0.1, "dropped_commands": 0.2, "delay": 0.07}},
-    "other pictures": {"effects": {"rolling_shutter": 0.03, "defocus": 0.01, "exposure.gamma": 1.3}},
-    "what was learnt": {"effects": LEARNT},
-}
-
-
-@pytest.mark.parametrize("plant", [pytest.param("bullet", marks=pytest.mark.slow), "planar"])
-@pytest.mark.parametrize("how", INSTANCES.values(), ids=INSTANCES.keys())
-def test_each_robot_drives_to_the_bit_as_it_does_by_itself(plant, how):
-    assert_same(*alone_and_together(classroom(plant=plant, **how, seconds=1.5), episodes(3), lean))
-
-
 @pytest.mark.parametrize("policy", [lean, cloned()], ids=("one by one", "many at once"))
 def test_each_robot_drives_and_scores_to_the_bit_as_it_does_by_itself(policy):
     room, what = classroom(plant="planar", model=TWIN), episodes()
@@ -301,10 +287,6 @@ def test_one_s_own_agents_have_a_memory_for_each_robot_however_they_are_asked(ow
     what = of_agents(f"mine:{agent}", "steady")
     assert own.run_many(what) == [own.run(one) for one in what]
     assert own.run_many(what)[:2] == own.run_many(of_agents("mine:Counting"))
-
-
-def test_no_robots_drive_nowhere():
-    assert classroom(plant="planar").run_many([]) == []
 
 
 def test_an_effect_of_one_s_own_is_asked_no_more_for_robots_that_have_left(tmp_path):

@@ -1,6 +1,5 @@
 """A robot's figures are sourced, enough to drive a log, and the same in robot.toml and URDF."""
 
-import math
 import shutil
 import xml.etree.ElementTree as ET
 from dataclasses import replace
@@ -174,30 +173,6 @@ def test_a_log_that_leaves_out_a_figure_of_its_robot_is_told_which(figure):
     known = {name: value for name, value in GEOMETRY.items() if name != figure}
     with pytest.raises(SettingsError, match=f"robot 'tractor' is unknown and its log states no {figure}; add "):
         robot_from_geometry("tractor", known, 25.0)
-
-
-def test_masses_of_the_body_add_up_to_the_robots():
-    masses = [float(mass.get("value")) for mass in BODY.iter("mass")]
-    assert sum(masses) == pytest.approx(ROBOT.figures["mass"], abs=1e-9)
-
-
-def test_wheels_of_the_body_lie_where_the_figures_say():
-    left, right = origin("axle_left"), origin("axle_right")
-    assert left[1] - right[1] == pytest.approx(ROBOT.figures["wheel_distance"])
-    assert left[2] == pytest.approx(ROBOT.figures["wheel_radius"])
-    assert left[0] == right[0] == 0.0
-
-
-def test_the_camera_of_the_body_is_where_the_figures_say():
-    x, y, z = origin("camera_mount")
-    assert (x, y, z) == (ROBOT.figures["camera_forward"], 0.0, ROBOT.figures["camera_height"])
-    pitch = BODY.find("joint[@name='camera_mount']/origin").get("rpy").split()[1]
-    assert float(pitch) == pytest.approx(math.radians(ROBOT.figures["camera_pitch"]), abs=1e-6)
-
-
-def test_wheel_torque_of_the_body_is_the_figures():
-    efforts = {float(limit.get("effort")) for limit in BODY.iter("limit")}
-    assert efforts == {ROBOT.figures["wheel_torque"]}
 
 
 def test_every_link_has_inertia():

@@ -84,20 +84,6 @@ def test_every_public_name_can_be_had_without_pybullet(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_plant_and_the_camera_themselves_say_what_to_do(tmp_path):
-    code = """
-import numpy as np
-from proxytune import InputError
-from proxytune.driving import BulletPlant, read_robot
-try:
-    BulletPlant(read_robot("duckiebot"), np.zeros(3), 1 / 60)
-except InputError as problem:
-    print(problem)
-"""
-    assert "use Python 3.11, or with a C++ compiler run `pip install pybullet`" in run(tmp_path, code).stdout
-
-
-@pytest.mark.slow
 def test_a_diagnosis_leaves_the_bullet_plant_out(tmp_path):
     code = """
 from types import SimpleNamespace

@@ -20,7 +20,7 @@ from proxytune.effects import (
     stage_chain,
 )
 from proxytune.effects.command import CommandQuantisation, Delay
-from proxytune.effects.motors import DriverMap, MotorLag, Trim, WheelGain, per_wheel
+from proxytune.effects.motors import DriverMap, MotorLag
 from proxytune.space import Parameter
 from proxytune.testing.effect import Subject, check_effect
 
@@ -183,20 +183,6 @@ def test_delay_is_continuous_in_its_value():
     assert np.abs(np.diff(outputs, axis=0)).max() < 2 * 0.001 * 10.0 + 1e-9
 
 
-def test_a_delayed_command_keeps_its_integral():
-    signal = np.zeros((30, 2))
-    signal[3:9] = 0.7
-    np.testing.assert_allclose(run(Delay(0.137), signal).sum(axis=0), signal.sum(axis=0))
-
-
-def test_trim_speeds_up_the_right_wheel():
-    np.testing.assert_allclose(run(Trim(0.1), step(1)), [[0.9, 1.1]])
-
-
-def test_wheel_gain_scales_each_wheel():
-    np.testing.assert_allclose(run(WheelGain(0.8, 1.2), step(1)), [[0.8, 1.2]])
-
-
 def test_driver_map_jumps_by_its_offset_and_is_odd():
     duty = np.array([[0.0, 0.005], [0.01, 1.0], [-0.5, 0.5]])
     offset = 60 / 255
@@ -214,21 +200,10 @@ def test_motor_lag_gives_the_mean_of_the_exact_step_response():
     )
 
 
-def test_motor_lag_does_not_depend_on_the_sample_rate():
-    coarse = run(MotorLag(0.2, 0.0), step(20), rate_hz=10.0).cumsum(axis=0)[-1] / 10.0
-    fine = run(MotorLag(0.2, 0.0), step(200), rate_hz=100.0).cumsum(axis=0)[-1] / 100.0
-    np.testing.assert_allclose(coarse, fine, atol=1e-12)
-
-
 def test_an_imbalance_lags_each_wheel_by_its_share():
     uneven = run(MotorLag(0.2, -0.5), step())
     np.testing.assert_allclose(uneven[:, 0], run(MotorLag(0.3, 0.0), step())[:, 0], atol=1e-12)
     np.testing.assert_allclose(uneven[:, 1], run(MotorLag(0.1, 0.0), step())[:, 1], atol=1e-12)
-
-
-@pytest.mark.parametrize(("value", "imbalance", "expected"), [(0.2, 0, (0.2, 0.2)), (0.2, 0.25, (0.15, 0.25))])
-def test_an_imbalance_gives_the_right_wheel_more(value, imbalance, expected):
-    np.testing.assert_allclose(per_wheel(value, imbalance), expected)
 
 
 def test_commands_are_rounded_to_multiples_of_the_step():
@@ -259,8 +234,3 @@ def test_blur_is_continuous_in_its_value():
     scene = np.random.default_rng(1).uniform(0, 255, (20, 4))
     outputs = np.array([run(Blur(value), scene)[10:] for value in np.linspace(0.01, 0.4, 800)])
     assert np.abs(np.diff(outputs, axis=0)).max() < 15.0
-
-
-def test_blur_of_a_still_scene_changes_nothing():
-    still = np.full((10, 6), 120.0)
-    np.testing.assert_allclose(run(Blur(0.33), still, rest=120.0), still, atol=1e-3)

@@ -48,12 +48,6 @@ def test_a_wheel_with_momentum_runs_through_its_reversal(reversal, turned):
     np.testing.assert_array_equal(run(Stiction(0.2, 0.0, 0.5, reversal), [0.3, -0.15, -0.09])[:, 0], [0.3, turned, 0.0])
 
 
-def test_stiction_of_one_wheel_leaves_the_other_free():
-    np.testing.assert_array_equal(
-        run(Stiction(0.2, 1.0, 0.5, 1.0), [0.1, 0.39, 0.4]), [[0.1, 0.0], [0.39, 0.0], [0.4, 0.4]]
-    )
-
-
 @pytest.mark.parametrize(("rest", "first"), [(0.3, 0.15), (0.12, 0.15), (-0.3, 0.0), (0.05, 0.0)])
 def test_a_wheel_that_turned_before_the_start_goes_on(rest, first):
     assert run(Stiction(0.2, 0.0, 0.5, 1.0), [0.15], rest=rest)[0, 0] == first
@@ -97,21 +91,6 @@ def test_a_gear_turns_half_its_gap_before_the_wheel_starts_and_all_of_it_when_it
     duties = np.array([0.05] * 4 + [-0.05] * 6)
     turned = run(Backlash(0.4, 0.0), duties)[:, 0].cumsum() * FULL_RAD_S / RATE_HZ
     np.testing.assert_allclose(turned, [0, 0, 0.1, 0.2, 0.2, 0.2, 0.2, 0.2, 0.1, 0.0], atol=1e-12)
-
-
-def test_the_play_may_end_within_a_sample():
-    turned = run(Backlash(0.5, 0.0), [0.05] * 4)[:, 0].cumsum() * FULL_RAD_S / RATE_HZ
-    np.testing.assert_allclose(turned, [0, 0, 0.05, 0.15], atol=1e-12)
-
-
-def test_a_gap_of_one_wheel_is_its_share():
-    turned = run(Backlash(0.2, 1.0), [0.05] * 4).cumsum(axis=0) * FULL_RAD_S / RATE_HZ
-    np.testing.assert_allclose(turned, [[0.1, 0], [0.2, 0], [0.3, 0.1], [0.4, 0.2]], atol=1e-12)
-
-
-def test_to_and_fro_within_the_play_moves_nothing():
-    moved = run(Backlash(0.4, 0.0), [0.05, 0.04, -0.1, -0.05, 0.1, 0.02])
-    np.testing.assert_allclose(moved, 0.0, atol=1e-15)
 
 
 def play(speeds, gap):

@@ -43,13 +43,6 @@ def test_a_point_out_of_focus_is_a_spot_of_the_deviation_however_small_and_as_br
         assert (spot * way).sum() / spot.sum() == pytest.approx(0.0, abs=1e-5)
 
 
-def test_two_defocused_lenses_are_one_whose_variance_is_the_sum():
-    pictures = np.random.default_rng(0).uniform(0.0, 255.0, (2, ROWS, COLUMNS, 3))
-    inside = np.s_[:, 12:-12, 12:-12]  # at the edges the picture goes on as it ends, each time anew
-    twice = run(Defocus(0.008), run(Defocus(0.006), pictures))
-    np.testing.assert_allclose(twice[inside], run(Defocus(0.010), pictures)[inside], atol=0.05)
-
-
 def test_a_picture_of_one_colour_cannot_be_out_of_focus():
     np.testing.assert_allclose(run(Defocus(0.05), grey()), grey(), rtol=1e-6)
 
@@ -80,13 +73,6 @@ def test_noise_is_white_has_its_deviation_and_is_drawn_anew_for_every_picture_an
         assert abs(np.corrcoef(noise.ravel(), np.roll(noise, 1, axis).ravel())[0, 1]) < 0.05
     other = run(ImageNoise(5.0), grey(count=4), seed=1) - grey(count=4)
     assert abs(np.corrcoef(noise.ravel(), other.ravel())[0, 1]) < 0.05
-
-
-def test_noise_does_not_depend_on_how_the_pictures_come_in():
-    pictures = grey(count=9)
-    whole = run(ImageNoise(3.0), pictures)
-    np.testing.assert_array_equal(run(ImageNoise(3.0), pictures, cuts=(1, 2, 6)), whole)
-    np.testing.assert_array_equal(run(ImageNoise(3.0), pictures[:5]), whole[:5])
 
 
 SHUTTER_ROWS, SHUTTER_COLUMNS, RATE_HZ = 6, 4, 10.0
@@ -144,12 +130,6 @@ def test_it_does_not_matter_which_mixture_of_pictures_comes_first(latency, reado
     for forwards, backwards in zip(effects, reversed(effects), strict=True):
         one, other = shown(forwards, one), shown(backwards, other)
     np.testing.assert_allclose(one, other, atol=1e-3)
-
-
-@pytest.mark.parametrize("effect", [CameraLatency(0.37), RollingShutter(0.1)])
-def test_a_scene_that_stands_still_hides_the_shutter(effect):
-    still = np.repeat(np.arange(SHUTTER_ROWS * SHUTTER_COLUMNS * 3, dtype=np.float32)[None], 12, axis=0)
-    np.testing.assert_allclose(shown(effect, still), still, atol=1e-4)
 
 
 @given(st.floats(0.0, 0.9))

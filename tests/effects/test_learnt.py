@@ -109,12 +109,6 @@ def test_every_group_changes_the_motion(effect):
 
 
 @pytest.mark.parametrize("effect", EFFECTS)
-def test_weights_of_nothing_change_nothing(effect):
-    still = Learnt(SEEN, tuple(curve._replace(weights=(0.0,) * len(curve.knots)) for curve in effect.curves))
-    np.testing.assert_array_equal(run(still, a_signal(1)), a_signal(1))
-
-
-@pytest.mark.parametrize("effect", EFFECTS)
 @given(cuts=st.lists(st.integers(1, 89), max_size=6), seed=st.integers(0, 99))
 @settings(max_examples=8)
 def test_cutting_the_motion_into_chunks_never_changes_the_result(effect, cuts, seed):

@@ -102,9 +102,6 @@ def test_entries_of_info_are_metrics_of_a_study(tmp_path):
     assert scores == {"drive": pytest.approx(2.0 * 12)}
 
 
-pytest.importorskip("gymnasium")
-
-
 STUDY = """
 format = 1
 family = "proxytune.environments.family:gymnasium_family"
@@ -258,6 +255,7 @@ def test_identity_follows_settings_files_and_versions_and_not_the_place(tmp_path
     before = here.identity
     assert family(tmp_path / "a", CART + "[arguments]\nnoise = 1.0\n").identity != before
     assert family(tmp_path / "a", CART, "[effects.delay]\ndelay = 0.1\n").identity != before
+    assert here.identity == before, "no code reads model.toml"
     (tmp_path / "a" / "body.xml").write_text("<mujoco/>")
     assert here.identity != before
     later = dataclasses.replace(there.spaces, packages=(("gymnasium", "99"), ("numpy", "99")))

@@ -125,9 +125,6 @@ def test_a_registered_environment_states_its_own_limit(tmp_path):
     assert family(tmp_path, 'environment = "toys:toys/Cart-v0"\nsteps = 4').spaces.steps == 4
 
 
-pytest.importorskip("gymnasium")
-
-
 def spaces(low=(-1.0, -1.0), high=(1.0, 1.0), picture=None):
     return Spaces(low, high, "", picture, "", "", 10.0, 5, ())
 

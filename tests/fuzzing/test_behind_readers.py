@@ -219,7 +219,7 @@ BEHIND = {
     "import sqlite3": Reader(write_bag("sqlite3"), ("a/a.db3", "a/metadata.yaml"), import_it("a")),
     "import mcap": Reader(write_bag("mcap"), ("a/a.mcap", "a/metadata.yaml"), import_it("a")),
     "import npz": Reader(write_npz, ("a.npz",), import_it("a.npz")),
-    "png": Reader(write_pictures("png"), ("frames/0.png", "frames/1.png"), read_frames),
+    "png": Reader(write_pictures("png"), ("frames/0.png", "frames/1.png", "frames.csv"), read_frames),
     "jpg": Reader(write_pictures("jpg"), ("frames/0.jpg", "frames/1.jpg"), read_frames, complains=False),
     "predict": Reader(write_model_and_log, ("model.toml",), predict_it),
     "predict of a log": Reader(

@@ -1,17 +1,12 @@
 """Arrays of gym-duckietown are known by their names, others by a column map; pickles are refused."""
 
-import io
-
 import numpy as np
 import pytest
-from drives import HEADINGS, PLACES, ROWS, SPEEDS, TIMES, write_arrays, write_csv
-from hypothesis import HealthCheck, given, settings, strategies as st
+from drives import HEADINGS, PLACES, ROWS, SPEEDS, TIMES, write_arrays
 from one_line import complaint_of
 
-from proxytune.errors import LogError
 from proxytune.importing import Wanted
 from proxytune.importing.arrays import is_arrays, read_arrays
-from proxytune.importing.tables import read_csv_tables
 
 FRAMES = np.arange(ROWS * 2 * 3 * 3, dtype=np.uint64).astype(np.uint8).reshape(ROWS, 2, 3, 3)
 POSE_MAP = {"x": "state[0]", "y": "state[1]", "heading": "state[2]"}
@@ -39,16 +34,6 @@ def test_gym_duckietown_s_arrays_are_duties_and_poses(tmp_path):
     np.testing.assert_array_equal(drive.commands.values, SPEEDS)
     assert "y is -positions[2]" in source.notes[1]
     assert "top left corner" in source.notes[1]
-
-
-def test_the_same_drive_as_csv_gives_the_same_arrays(tmp_path):
-    (theirs,) = read(write_arrays(tmp_path), kind="twist").drives
-    (ours,) = read_csv_tables(write_csv(tmp_path), Wanted()).drives
-    assert theirs.commands.kind == ours.commands.kind
-    np.testing.assert_allclose(theirs.poses.times, ours.poses.times, atol=1e-6)
-    np.testing.assert_allclose(theirs.poses.places, ours.poses.places, atol=1e-9)
-    np.testing.assert_allclose(theirs.poses.headings, ours.poses.headings, atol=1e-9)
-    np.testing.assert_allclose(theirs.commands.values, ours.commands.values, atol=1e-9)
 
 
 def test_a_map_s_height_puts_the_origin_at_the_bottom(tmp_path):
@@ -148,7 +133,6 @@ def test_without_commands_only_if_asked_for(tmp_path):
     ("changes", "wanted", "where"),
     [
         ({"timestamps": None}, {}, "which array (N,) holds the times is not clear; its arrays are: actions (60, 2)"),
-        ({"times": TIMES}, {}, "which array (N,) holds the times is not clear"),
         ({"timestamps": np.zeros(ROWS)}, {}, "all 60 stamps are 0 s"),
         ({"timestamps": np.zeros(0)}, {}, "its arrays are empty"),
         ({"actions": SPEEDS * 100}, {}, "is more than full duty; state its unit"),
@@ -187,21 +171,3 @@ def test_arrays_are_known_by_content(tmp_path):
     (tmp_path / "a.csv").write_text("x,y\n1,2\n")
     assert not is_arrays(tmp_path / "a.csv")
     assert not is_arrays(tmp_path)
-
-
-@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.data())
-def test_whatever_happens_to_the_bytes_nothing_but_a_log_error_comes_out(tmp_path, data):
-    buffer = io.BytesIO()
-    np.savez(buffer, time=TIMES[:4], x=TIMES[:4], y=TIMES[:4], heading=HEADINGS[:4])
-    content = bytearray(buffer.getvalue())
-    for _ in range(data.draw(st.integers(0, 4))):
-        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
-    path = tmp_path / "a.npz"
-    path.write_bytes(bytes(content[: data.draw(st.integers(len(content) // 2, len(content)))]))
-    said = ""
-    try:
-        read(path, commands="none")
-    except LogError as problem:
-        said = str(problem)
-    assert "\n" not in said

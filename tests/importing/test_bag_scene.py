@@ -4,12 +4,10 @@ Which pair of frames is the robot's pose, and the chain of transforms between tw
 """
 
 from io import BytesIO
-from types import SimpleNamespace
 
 import bags
 import numpy as np
 import pytest
-from hypothesis import given, strategies as st
 from moving_frames import TIMES, circle, moving, read
 from PIL import Image
 
@@ -51,15 +49,6 @@ def test_colours_stay_in_place_and_padding_is_left_out(tmp_path, storage, pad, e
 def test_grey_is_grey_in_all_colours(tmp_path):
     read_back = read_of_pictures(written(tmp_path, pictures=RGB[..., :1], encoding="mono8"))
     assert np.array_equal(np.array(list(read_back.read())), np.repeat(RGB[..., :1], 3, axis=3))
-
-
-@given(st.integers(1, 6), st.integers(1, 6), st.integers(0, 5), st.sampled_from(sorted(ENCODED)))
-def test_any_size_and_step_gives_back_the_pixels(rows, columns, pad, encoding):
-    rgb = np.random.default_rng(rows).integers(0, 256, (1, rows, columns, 3)).astype(np.uint8)
-    pixels = rgb[..., ::-1] if encoding.startswith("bgr") else rgb
-    pixels = np.concatenate((pixels, rgb[..., :1]), axis=3) if "a" in encoding else pixels
-    ((_, _, _, fields),) = bags.picture_messages(PICTURES_TIMES[:1], pixels, encoding=encoding, pad=pad)
-    assert np.array_equal(picture_of(SimpleNamespace(**fields)), rgb[0])
 
 
 @pytest.mark.parametrize("form", ["png", "jpeg"])

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, strategies as st
 
 from proxytune.errors import LogError
 from proxytune.importing.columns import UNITS, contradiction, epoch_unit, own_unit, split_ending, split_unit
@@ -112,16 +111,3 @@ def test_values_that_contradict_a_unit_are_told(unit, values, reason):
 )
 def test_values_that_fit_a_unit_pass(unit, values):
     assert contradiction(UNITS[unit], np.array(values)) == ""
-
-
-@pytest.mark.slow
-@given(st.text(max_size=30), st.sampled_from(["time", "length", "angle", "number"]))
-def test_any_entry_is_split_or_refused_in_one_line(entry, quantity):
-    written, said = entry, "here: "
-    try:
-        name, unit = split_unit(entry, quantity, ["x"], "here")
-        written = f"{name}:{unit.name}" if unit else name
-    except LogError as problem:
-        said = str(problem)
-    assert written == entry
-    assert said.startswith("here: ")

@@ -110,19 +110,12 @@ def test_a_source_may_be_where_one_is(forms, monkeypatch):
 TIMES = np.arange(0.0, 20.0, 0.05)
 
 
-@pytest.fixture(scope="module")
-def sources(tmp_path_factory):
-    home = tmp_path_factory.mktemp("sources")
-    recordings = [foreign_robot.drive(1, seconds=6.0)]
-    return {form: foreign_robot.write_form(home, form, recordings) for form in foreign_robot.FORMS}
-
-
 @pytest.mark.parametrize("form", foreign_robot.FORMS)
-def test_a_folder_and_its_one_file_are_recognised_as_the_same_form(sources, form):
+def test_a_folder_and_its_one_file_are_recognised_as_the_same_form(forms, form):
     if form in foreign_robot.BAGS:
         pytest.importorskip("rosbags")
-    folder = sources[form]
-    inside = next(path for path in sorted(folder.iterdir()) if "cmd" not in path.name)
+    folder = forms[form]
+    inside = next(path for path in sorted(folder.glob("run*")) if "cmd" not in path.name)
     first = [next(read for recognise, read in FORMS.items() if recognise(path)) for path in (folder, inside)]
     assert first[0] is first[1]
 

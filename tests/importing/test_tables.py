@@ -5,14 +5,10 @@ TUM trajectories are read with commands from a second file_of_tum; without them 
 """
 
 import numpy as np
-import pandas as pd
 import pytest
 from drives import HEADINGS, PLACES, SPEEDS, TIMES, write_csv, write_mrclam, write_tum
-from hypothesis import HealthCheck, given, settings, strategies as st
 from one_line import complaint_of
-from project import ROOT
 
-from proxytune.errors import LogError
 from proxytune.importing import Wanted
 from proxytune.importing.tables import is_csv_tables, is_mrclam, is_tum, read_csv_tables, read_mrclam, read_tum
 
@@ -249,13 +245,11 @@ def test_without_commands_only_if_asked_for(file):
     ("text", "where", "remedy"),
     [
         ("", "is empty", "a row for each sample"),
-        ("\n \n", "is empty", "a row for each sample"),
         ("time,x,y,heading\n", "no rows", "add one for each sample"),
         (b"\x89PNG\r\n\x1a\n\0\0", "not text", "save it as a text table"),
         ("a\0b,c\n1,2\n", "binary", "save it as a text table"),
         (POSES + "0.3,1,2\n", "line 5: has 3 cells, but there are 4 columns", "correct that line"),
         (POSES.replace("0.2,0,0.2", "0.2,oops,0.2"), "line 4, column 'y': must be a finite number", "'oops'"),
-        (POSES.replace("0.2,0,0.2", "0.2,inf,0.2"), "line 4, column 'y'", "'inf'"),
         (POSES.replace(",0,0.", ",,0."), "line 3, column 'y': is empty beside time, x, heading", "fill it"),
         ("0,0,0,0\n1,1,1,1\n", "line 1: holds numbers", "add a line of names"),
         ("time,x,x\n1,2,3\n", "names the column 'x' twice", "rename"),
@@ -329,26 +323,6 @@ def test_tables_are_known_by_content(tmp_path, file):
     assert not is_csv_tables(tmp_path / "missing")
 
 
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.data())
-def test_whatever_happens_to_the_bytes_nothing_but_a_log_error_comes_out(file, data):
-    content = bytearray(BOTH.encode())
-    for _ in range(data.draw(st.integers(1, 4))):
-        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
-    path = file(bytes(content[: data.draw(st.integers(0, len(content)))]))
-    is_csv_tables(path)
-    drives, said = (), ""
-    try:
-        drives = read(path).drives
-    except LogError as problem:
-        said = str(problem)
-    assert "\n" not in said
-    assert all(np.isfinite(drive.poses.places).all() for drive in drives)
-
-
-LOG = ROOT / "../shared/data/logs/mrclam6_robot1"
-
-
 def complaint_of_mrclam(path, **wanted):
     return complaint_of(read_mrclam, path, Wanted(**wanted))
 
@@ -366,15 +340,6 @@ def test_a_robot_s_two_files_are_a_drive(tmp_path):
     source = read_mrclam(write_mrclam(tmp_path), Wanted())
     holds_the_drive(source, "MRCLAM data set", "Robot1")
     assert source.channels[0].name == "Robot1_Groundtruth.dat: time"
-
-
-def test_the_same_drive_as_csv_gives_the_same_arrays(tmp_path):
-    (theirs,) = read_mrclam(write_mrclam(tmp_path), Wanted()).drives
-    (ours,) = read_csv_tables(write_csv(tmp_path), Wanted()).drives
-    np.testing.assert_allclose(theirs.poses.places, ours.poses.places, atol=1e-9)
-    np.testing.assert_allclose(theirs.poses.headings, ours.poses.headings, atol=1e-9)
-    np.testing.assert_allclose(theirs.commands.times, ours.commands.times, atol=1e-6)
-    np.testing.assert_allclose(theirs.commands.values, ours.commands.values, atol=1e-9)
 
 
 def test_either_file_or_a_folder_of_one_robot_will_do(tmp_path):
@@ -401,7 +366,6 @@ def test_commands_may_be_left_out(tmp_path):
 @pytest.mark.parametrize(
     ("text", "where"),
     [
-        ("", "is empty"),
         ("# Time x y heading\n", "is empty"),
         ("0 1 2\n", "line 1: has 3 cells, but there are 4 columns: time, x, y, heading"),
         ("0 1 2 north\n", "line 1, column 'heading': must be a finite number"),
@@ -422,35 +386,6 @@ def test_a_folder_without_such_files_is_refused(tmp_path):
     assert "has no file such as Robot1_Groundtruth.dat" in complaint_of_mrclam(tmp_path)
 
 
-@settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(place=st.integers(0, 400), value=st.integers(0, 255), end=st.integers(0, 2000))
-def test_mrclam_whatever_happens_to_the_bytes_nothing_but_a_log_error_comes_out(tmp_path, place, value, end):
-    path = write_mrclam(tmp_path)
-    content = bytearray(path.read_bytes())
-    content[place] = value
-    path.write_bytes(bytes(content[:end]))
-    drives, said = (), ""
-    try:
-        drives = read_mrclam(tmp_path, Wanted()).drives
-    except LogError as problem:
-        said = str(problem)
-    assert "\n" not in said
-    assert all(np.isfinite(drive.poses.places).all() for drive in drives)
-
-
-@pytest.mark.skipif(not LOG.is_dir(), reason=f"needs measured data in {LOG.parent.name}/{LOG.name}")
-def test_a_measured_drive_comes_back_as_it_was(tmp_path):
-    rows = pd.read_csv(LOG / "samples.csv").query("episode == 0")
-    poses, commands = rows[["time", "x", "y", "heading"]].dropna(), rows[["time", "v", "omega"]]
-    poses.to_csv(tmp_path / "Robot1_Groundtruth.dat", sep="\t", header=False, index=False)
-    commands.to_csv(tmp_path / "Robot1_Odometry.dat", sep="\t", header=False, index=False)
-    (drive,) = read_mrclam(tmp_path, Wanted()).drives
-    assert len(drive.poses.times) > 10_000
-    np.testing.assert_array_equal(np.column_stack((drive.poses.times, drive.poses.places[:, :2])), poses.iloc[:, :3])
-    np.testing.assert_array_equal(drive.poses.headings, poses["heading"])
-    np.testing.assert_array_equal(drive.commands.values, commands[["v", "omega"]])
-
-
 LINES = "# tracked at 20 Hz\n0 1 2 0 0 0 0 1\n0.05 1 2 0 0 0 0.6 0.8\n"
 
 
@@ -467,16 +402,6 @@ def test_a_trajectory_and_its_commands_are_read(tmp_path):
     source = read_tum(write_tum(tmp_path), Wanted())
     holds_the_drive(source, "TUM trajectory", "run1")
     assert [channel.role for channel in source.channels][:4] == ["time", "x", "y", "z"]
-
-
-def test_tum_the_same_drive_as_csv_gives_the_same_arrays(tmp_path):
-    (theirs,) = read_tum(write_tum(tmp_path), Wanted()).drives
-    (tmp_path / "run1_commands.csv").unlink()
-    (ours,) = read_csv_tables(write_csv(tmp_path), Wanted()).drives
-    np.testing.assert_allclose(theirs.poses.times, ours.poses.times, atol=1e-6)
-    np.testing.assert_allclose(theirs.poses.places, ours.poses.places, atol=1e-9)
-    np.testing.assert_allclose(theirs.poses.headings, ours.poses.headings, atol=1e-9)
-    np.testing.assert_allclose(theirs.commands.values, ours.commands.values, atol=1e-9)
 
 
 def test_commands_may_be_named_with_columns_and_units(file_of_tum):
@@ -505,7 +430,6 @@ def test_tilts_are_kept(file_of_tum):
 @pytest.mark.parametrize(
     ("text", "where"),
     [
-        ("", "is empty"),
         ("# nothing but this\n", "is empty"),
         (b"\xff\xfe\x00rubbish", "is not text in UTF-8"),
         (LINES + "0.1 1 2\n", "line 4: has 3 cells, but there are 8 columns: time, x, y, z, qx, qy, qz, qw"),
@@ -541,23 +465,6 @@ def test_trajectories_are_known_by_content(file_of_tum, tmp_path):
     assert not is_tum(file_of_tum("1 2 3\n", "b.txt"))
     assert is_tum(tmp_path), "a folder with such a file_of_tum"
     assert not is_tum(tmp_path.parent)
-
-
-@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.data())
-def test_tum_whatever_happens_to_the_bytes_nothing_but_a_log_error_comes_out(file_of_tum, data):
-    content = bytearray(LINES.encode())
-    for _ in range(data.draw(st.integers(1, 4))):
-        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
-    path = file_of_tum(bytes(content))
-    is_tum(path)
-    drives, said = (), ""
-    try:
-        drives = read_tum(path, Wanted(commands="none")).drives
-    except LogError as problem:
-        said = str(problem)
-    assert "\n" not in said
-    assert all(np.isfinite(drive.poses.headings).all() for drive in drives)
 
 
 CAR = "time,x,y,heading,gas,servo,switch\n0,0,0,0,0.3,0.5,1\n0.1,0.1,0,0.1,0.3,-0.5,0\n0.2,0.2,0,0.2,0.2,0,1\n"

@@ -5,13 +5,10 @@ A bag becomes drives: the same numbers from every storage, several bags as sever
 """
 
 import sqlite3
-import tempfile
-from pathlib import Path
 
 import bags
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
 from moving_frames import TIMES, circle, moving, read
 from scipy.spatial.transform import Rotation
 
@@ -247,29 +244,6 @@ READING_TIMES = 1.7e9 + np.arange(100) * 0.02
 TWISTS = np.random.default_rng(1).normal(size=(20, 2))
 POSES = np.random.default_rng(2).normal(size=(100, 3))
 READING_DRIVE = ((ISSUED, TWISTS), (READING_TIMES, POSES))
-
-
-@pytest.mark.slow
-@settings(max_examples=5)
-@given(st.integers(0, 2**32 - 1), st.integers(1, 30), st.integers(1, 30))
-def test_every_storage_gives_the_same_numbers(seed, commands, poses):
-    rng = np.random.default_rng(seed)
-    issued, times = (1.7e9 + np.sort(rng.uniform(0.0, 3.0, size)) for size in (commands, poses))
-    twists, turns = rng.normal(size=(commands, 2)), rng.normal(size=(poses, 7))
-    drives = []
-    with tempfile.TemporaryDirectory() as folder:
-        for storage in bags.STORAGES:
-            bag = Path(folder) / f"{storage}.bag"
-            bags.write_bag(bag, storage, (issued, twists), (times, turns), pose_clock_s=0.01)
-            drives += read_bag(bag, Wanted()).drives
-    for drive in drives:
-        assert np.array_equal(drive.commands.values, drives[0].commands.values)
-        assert np.array_equal(drive.commands.times, drives[0].commands.times)
-        for name in ("times", "places", "headings", "tilts"):
-            assert np.array_equal(getattr(drive.poses, name), getattr(drives[0].poses, name))
-    assert drives[0].commands.times == pytest.approx(issued, abs=1e-6)
-    assert drives[0].poses.times == pytest.approx(times + 0.01, abs=1e-6)
-    assert np.array_equal(drives[0].poses.places, turns[:, :3])
 
 
 @pytest.mark.parametrize("storage", bags.STORAGES)

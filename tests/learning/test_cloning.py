@@ -1,6 +1,6 @@
 """Behaviour cloning learns what pictures show, the same under the same seed, and goes on from other weights.
 
-What learners see of a picture is the mean grey of its cells.
+So does the other learner, random features. What they see of a picture is the mean grey of its cells.
 """
 
 from dataclasses import replace
@@ -13,20 +13,26 @@ from sklearn.neural_network import MLPRegressor
 from proxytune.domain import Demonstration
 from proxytune.errors import LearnerError
 from proxytune.learning.cloning import BehaviourCloning, grey_cells
+from proxytune.learning.ridge import RandomFeatures
 
 SMALL = BehaviourCloning(rows=3, columns=4, hidden=(12,), steps=600, passes=10)
+FEATURES = RandomFeatures(rows=3, columns=4, features=200)
+each = pytest.mark.parametrize("learner", [SMALL, FEATURES], ids=["cloning", "ridge"])
 
 
-def test_it_learns_a_planted_steering_far_better_than_a_constant_would():
-    weights = SMALL.train(pictures(400, 1), None, 1)
+@each
+def test_it_learns_a_planted_steering_far_better_than_a_constant_would(learner):
+    weights = learner.train(pictures(400, 1), None, 1)
     fresh = pictures(100, 2)
-    assert error(SMALL, weights, fresh) < 0.1 * np.abs(fresh.commands - 0.3).mean()
+    assert error(learner, weights, fresh) < 0.1 * np.abs(fresh.commands - 0.3).mean()
 
 
-def test_the_same_seed_gives_the_same_weights_to_the_last_bit_and_another_does_not():
-    one, again, other = (SMALL.train(pictures(60, 1), None, seed) for seed in (1, 1, 2))
+@each
+def test_the_same_seed_gives_the_same_weights_to_the_last_bit_and_another_does_not(learner):
+    one, again, other = (learner.train(pictures(60, 1), None, seed) for seed in (1, 1, 2))
     assert all(np.array_equal(one[name], again[name]) for name in one)
-    assert not np.array_equal(one["weight0"], other["weight0"])
+    varied = "slopes" if learner is FEATURES else "weight0"
+    assert not np.array_equal(one[varied], other[varied])
 
 
 @pytest.mark.slow
@@ -52,13 +58,12 @@ def test_starting_from_weights_a_few_samples_do_not_make_it_forget():
     assert error(SMALL, tuned, fresh) < 0.5 * error(SMALL, scratch, fresh)
 
 
-@pytest.mark.slow
-def test_starting_from_weights_it_follows_samples_that_say_otherwise():
-    start = SMALL.train(pictures(400, 1), None, 1)
+@pytest.mark.parametrize("learner", [pytest.param(replace(SMALL, passes=100), marks=pytest.mark.slow), FEATURES])
+def test_starting_from_weights_it_follows_samples_that_say_otherwise(learner):
+    start = learner.train(pictures(400, 1), None, 1)
     turned = pictures(400, 4)
     turned = turned._replace(commands=turned.commands[:, ::-1].copy())
-    tuned = replace(SMALL, passes=100).train(turned, start, 1)
-    assert error(SMALL, tuned, turned) < 0.3 * error(SMALL, start, turned)
+    assert error(learner, learner.train(turned, start, 1), turned) < 0.3 * error(learner, start, turned)
 
 
 def test_training_leaves_the_weights_it_started_from_as_they_were():
@@ -68,15 +73,22 @@ def test_training_leaves_the_weights_it_started_from_as_they_were():
     assert all(np.array_equal(start[name], before[name]) for name in before)
 
 
-def test_no_sample_is_nothing_to_learn_from():
+@each
+def test_no_sample_is_nothing_to_learn_from(learner):
     with pytest.raises(LearnerError, match="no sample"):
-        SMALL.train(Demonstration(np.zeros((0, 12, 16, 3), np.uint8), np.zeros((0, 2))), None, 1)
+        learner.train(Demonstration(np.zeros((0, 12, 16, 3), np.uint8), np.zeros((0, 2))), None, 1)
 
 
-def test_weights_of_another_network_are_refused_with_both_shapes():
-    other = BehaviourCloning(rows=3, columns=4, hidden=(7,), steps=50).train(pictures(30, 1), None, 1)
-    with pytest.raises(LearnerError, match=r"weight0 is \(12, 7\) where these samples need \(12, 12\)"):
-        SMALL.train(pictures(30, 1), other, 1)
+@pytest.mark.parametrize(
+    ("learner", "other", "says"),
+    [
+        (SMALL, replace(SMALL, hidden=(7,), steps=50), r"weight0 is \(12, 7\) where these samples need \(12, 12\)"),
+        (FEATURES, replace(FEATURES, features=50), r"slopes is \(50, 2\) where these samples need \(200, 2\)"),
+    ],
+)
+def test_weights_of_another_network_or_other_features_are_refused_with_both_shapes(learner, other, says):
+    with pytest.raises(LearnerError, match=says):
+        learner.train(pictures(30, 1), other.train(pictures(30, 1), None, 1), 1)
 
 
 def test_one_sample_can_be_learnt_from():

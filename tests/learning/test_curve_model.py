@@ -8,6 +8,7 @@ Drawn learning curves keep within bounds, rise where the data allow it, and cros
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
+from sklearn.gaussian_process.kernels import Matern
 
 from proxytune.errors import InputError
 from proxytune.learning import (
@@ -20,7 +21,7 @@ from proxytune.learning import (
     sample_needs,
     teaching_value,
 )
-from proxytune.learning.curve_model import Examined, counts_at, crossing, draw_curves, fit_curve_model
+from proxytune.learning.curve_model import Examined, _matern, counts_at, crossing, draw_curves, fit_curve_model
 
 GRID = (0, 50, 100, 200, 400, 800, 1600, 3200)
 STARTS, BEST, NONE, TOLERANCE = 10, 60.0, "none", 5.0
@@ -88,6 +89,11 @@ class MadeUpLearners:
         zero = 0.02 if alone else generator.uniform(0.02, 0.85)
         depth = 0.0 if alone or generator.random() < 0.5 else generator.uniform(0.0, 0.35)
         return rise, slope, zero, depth, generator.uniform(5.0, 7.0)
+
+
+def test_mean_curves_are_as_smooth_as_a_process_of_matern_with_5_2():
+    apart = np.linspace(0.0, 9.0, 20)
+    np.testing.assert_allclose(_matern(apart, 2.0), Matern(2.0, nu=2.5)(apart[:, None], [[0.0]])[:, 0])
 
 
 REPETITIONS = 8

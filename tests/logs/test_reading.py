@@ -49,15 +49,6 @@ def test_the_command_in_force_at_a_sample_is_the_newest_and_none_is_zero(folder)
     np.testing.assert_array_equal(second.held, [[0.1, 0.2]] * 2)
 
 
-def test_a_log_without_such_a_file_has_its_commands_with_its_samples(folder):
-    samples = "episode,time,v,omega,x,y,heading\na,0,1,2,0,0,0\na,0.1,3,4,0,0,0\n"
-    home = folder(samples=samples)
-    (home / "commands.csv").unlink()
-    (episode,) = read_log(home).episodes
-    assert episode.issued is None
-    np.testing.assert_array_equal(episode.held, [[1, 2], [3, 4]])
-
-
 @pytest.mark.parametrize("command", [kind for kind in COMMANDS if kind != "none"])
 def test_each_kind_of_command_has_columns_of_its_own(folder, command):
     home = folder(GOOD.replace("v,omega", ",".join(COMMANDS[command])), description=TOML.replace("twist", command))
@@ -74,7 +65,6 @@ def test_each_kind_of_command_has_columns_of_its_own(folder, command):
         (GOOD.replace(",omega", ""), "/commands.csv: line 1: no column 'omega'; commands of kind 'twist' need "),
         (GOOD.replace("0.6,0.2", "0.6"), "/commands.csv: line 4: has 3 cells"),
         (GOOD.replace("0.6,0.2", "0.6,"), "/commands.csv: line 4, column 'omega': must be a finite number, got ''"),
-        (GOOD.replace("5.127", "inf"), "/commands.csv: line 4, column 'time': must be a finite number"),
         (GOOD.replace("5.127", "5.013"), "/commands.csv: line 4, column 'time': 5.013 s does not come after"),
         (GOOD.replace("a,", "c,"), "/commands.csv: line 3, column 'episode': 'c' is not in samples.csv"),
         (GOOD.replace("b,0,0.1,0.2\n", ""), "/samples.csv: line 5, column 'episode': 'b' is not in commands.csv"),
@@ -104,31 +94,6 @@ def test_duties_beyond_full_are_refused_and_so_are_commands_of_still_frames(fold
     says = complaint(folder(GOOD.replace("v,omega", "left,right").replace("0.7,0.3", "0.7,1.3"), description=duty))
     assert says.startswith("/commands.csv: line 5, column 'right': a duty must be between -1 and 1, got 1.3")
     assert "there are no commands" in complaint(folder(description=TOML.replace("twist", "none")))
-
-
-@settings(max_examples=200)
-@given(
-    text=st.one_of(
-        st.text(max_size=80),
-        st.lists(st.text("ab,-0.159einf \n\"'\t", max_size=20), max_size=6).map(lambda rows: HEADER + "\n".join(rows)),
-    )
-)
-def test_no_text_leads_to_anything_but_a_log_or_one_line(tmp_path_factory, text):
-    home = tmp_path_factory.getbasetemp() / "fuzz"
-    home.mkdir(exist_ok=True)
-    for name, content in (("log.toml", TOML), ("samples.csv", SAMPLES), ("commands.csv", text)):
-        (home / name).write_text(content, encoding="utf-8", newline="")
-    log, problem = read(home)
-    assert "\n" not in problem
-    assert log is None or all(np.isfinite(episode.commands).all() for episode in log.episodes)
-
-
-def read(home):
-    """The log, or None and what is wrong with it."""
-    try:
-        return read_log(home), ""
-    except LogError as problem:
-        return None, str(problem)
 
 
 WRONG = """
@@ -187,14 +152,13 @@ def test_a_clock_offset_that_is_none_is_refused(described, value):
 
 
 DATA = Path(__file__).resolve().parents[2] / "../shared/data/logs"
-TWIST = 'format = 1\nname = "yard"\nrobot = "tractor"\ncommand = "twist"\nrate_hz = 10\n'
 READING_HEADER = "episode,time,v,omega,x,y,heading\n"
 READING_GOOD = READING_HEADER + "a,0.0,0.5,0.1,1,2,0.5\na,0.1,0.6,0.2,1.05,2,0.51\nb,3.0,0,0,0,0,0\nb,3.1,0.1,0,0,0,0\n"
 
 
 @pytest.fixture
 def folder_of_reading(tmp_path):
-    def write(samples=READING_GOOD, description=TWIST):
+    def write(samples=READING_GOOD, description=TOML):
         return write_files(tmp_path / "log", {"log.toml": description, "samples.csv": samples})
 
     return write
@@ -225,7 +189,7 @@ def test_commands_poses_and_times_are_read_as_written(folder_of_reading):
 
 
 def test_geometry_of_the_log_is_in_the_figures_of_a_robot(folder_of_reading):
-    text = TWIST + "wheel_radius_m = 0.05\nbaseline_m = 0.3\nfull_speed_m_s = 1.5\n"
+    text = TOML + "wheel_radius_m = 0.05\nbaseline_m = 0.3\nfull_speed_m_s = 1.5\n"
     figures = {"wheel_radius": 0.05, "effective_baseline": 0.3, "full_speed": 1.5}
     assert read_log(folder_of_reading(description=text)).geometry == figures
 
@@ -233,7 +197,7 @@ def test_geometry_of_the_log_is_in_the_figures_of_a_robot(folder_of_reading):
 @pytest.mark.parametrize("command", [kind for kind in COMMANDS if kind != "none"])
 def test_reading_each_kind_of_command_has_columns_of_its_own(folder_of_reading, command):
     samples = READING_GOOD.replace("v,omega", ",".join(COMMANDS[command]))
-    log = read_log(folder_of_reading(samples, TWIST.replace("twist", command)))
+    log = read_log(folder_of_reading(samples, TOML.replace("twist", command)))
     assert log.command == command
     np.testing.assert_array_equal(log.episodes[0].commands, [[0.5, 0.1], [0.6, 0.2]])
 
@@ -257,7 +221,7 @@ def test_still_frames_need_no_rate_and_no_commands(folder_of_reading):
 
 def test_headings_of_still_frames_are_not_compared_with_a_course(folder_of_reading):
     rows = pd.read_csv(io.StringIO(driven(degrees=True))).drop(columns=["v", "omega"])
-    log = read_log(folder_of_reading(rows.to_csv(index=False), TWIST.replace("twist", "none")))
+    log = read_log(folder_of_reading(rows.to_csv(index=False), TOML.replace("twist", "none")))
     assert len(log.episodes[0].poses) == len(rows)
 
 
@@ -280,7 +244,7 @@ def test_rows_left_out_change_nothing_of_the_others(tmp_path_factory, kept, jitt
     steps = [0, *sorted(kept)]
     rows = [f"a,{7 + k / 10 + (jitter if k else 0)},{k},{-k},{k / 50},0,0" for k in steps]
     home = tmp_path_factory.mktemp("log")
-    (home / "log.toml").write_text(TWIST, encoding="utf-8")
+    (home / "log.toml").write_text(TOML, encoding="utf-8")
     (home / "samples.csv").write_text(READING_HEADER + "\n".join(rows) + "\n", encoding="utf-8")
     (episode,) = read_log(home).episodes
     np.testing.assert_allclose(episode.times, 7 + np.arange(steps[-1] + 1) / 10)
@@ -296,14 +260,6 @@ def test_wrapped_headings_are_unwrapped_across_gaps_and_episodes_stay_apart(fold
     nan, turn = np.nan, 2 * np.pi
     np.testing.assert_allclose(first.poses[:, 2], [3.0, nan, turn - 3.0, nan, nan, turn - 2.5, 2.5])
     np.testing.assert_allclose(second.poses[:, 2], [-3.0, 3.0 - turn])
-
-
-def test_a_wrapped_heading_reads_as_the_unwrapped_one(folder_of_reading):
-    smooth = read_log(folder_of_reading(driven(turn=1.5))).episodes[0].poses
-    assert np.ptp(smooth[:, 2]) > 10
-    np.testing.assert_allclose(
-        read_log(folder_of_reading(driven(turn=1.5, wrapped=True))).episodes[0].poses, smooth, atol=1e-9
-    )
 
 
 def test_spreadsheets_marks_are_understood(folder_of_reading):
@@ -340,7 +296,7 @@ def test_spreadsheets_marks_are_understood(folder_of_reading):
     ],
 )
 def test_a_mistake_in_log_toml_is_one_line_with_file_and_key(folder_of_reading, change, says):
-    assert complaint(folder_of_reading(description=TWIST.replace(*change))).startswith(f"/log.toml: {says}")
+    assert complaint(folder_of_reading(description=TOML.replace(*change))).startswith(f"/log.toml: {says}")
 
 
 def test_a_folder_that_is_no_log_is_told_what_is_missing(folder_of_reading, tmp_path):
@@ -360,13 +316,8 @@ def test_a_folder_that_is_no_log_is_told_what_is_missing(folder_of_reading, tmp_
     [
         ("", ": is empty"),
         (READING_HEADER, ": has no rows"),
-        (READING_HEADER + "\n\n", ": has no rows"),
         (b"\x89PNG\r\n\x1a\n\xff", ": is not a CSV file"),
         (READING_GOOD.replace("a,0.1,", "a,0.1,7,"), ": line 3: has 8 cells, but the first line names 7"),
-        (
-            READING_GOOD.replace("a,0.1,0.6,0.2,1.05,2,0.51", "a,0.1,0.6"),
-            ": line 3: has 3 cells, but the first line names 7",
-        ),
         (READING_GOOD.replace(",1.05,2,0.51", ""), ": line 3: has 4 cells, but the first line names 7"),
         (READING_GOOD.replace("a,0.1", '"a,0.1'), ": is not a CSV file"),
         (READING_GOOD.replace(",", ";"), ": line 1: unknown column 'episode;time;v;omega;x;y;heading'"),
@@ -386,21 +337,12 @@ def test_a_folder_that_is_no_log_is_told_what_is_missing(folder_of_reading, tmp_
             READING_GOOD.replace("0.51", "nan"),
             ": line 3, column 'heading': must be a finite number, or empty where nothing",
         ),
-        (
-            READING_GOOD.replace("0.51", "inf"),
-            ": line 3, column 'heading': must be a finite number, or empty where nothing",
-        ),
         (READING_GOOD.replace("0.2,1.05", ",1.05"), ": line 3, column 'omega': must be a finite number, got ''"),
         (READING_GOOD.replace("0.2,1.05", "nan,1.05"), ": line 3, column 'omega': must be a finite number, got 'nan'"),
-        (
-            READING_GOOD.replace("0.2,1.05", "-inf,1.05"),
-            ": line 3, column 'omega': must be a finite number, got '-inf'",
-        ),
         (
             READING_GOOD.replace("0.2,1.05", "fast,1.05"),
             ": line 3, column 'omega': must be a finite number, got 'fast'",
         ),
-        (READING_GOOD.replace("a,0.1", "a,"), ": line 3, column 'time': must be a finite number, got ''"),
         (
             READING_GOOD.replace("\na,0.1", "\n\n\na,noon"),
             ": line 5, column 'time': must be a finite number, got 'noon'",
@@ -410,7 +352,6 @@ def test_a_folder_that_is_no_log_is_told_what_is_missing(folder_of_reading, tmp_
             READING_GOOD.replace("a,0.1", "a,0.0"),
             ": line 3, column 'time': 0 s does not come after 0 s of the row before",
         ),
-        (READING_GOOD.replace("a,0.1", "a,-0.1"), ": line 3, column 'time': -0.1 s does not come after 0 s"),
         (READING_GOOD.replace("a,0.1", "a,0.13"), ": line 3, column 'time': 0.13 s lies off the grid of 10 Hz"),
         (READING_GOOD + "b,3.11,0,0,,,\n", ": line 6, column 'time': 3.11 s lies off the grid of 10 Hz"),
         (
@@ -423,7 +364,6 @@ def test_a_folder_that_is_no_log_is_told_what_is_missing(folder_of_reading, tmp_
             READING_GOOD.replace("1.05,2,0.51", "1.05,,0.51"),
             ": line 3, column 'y': is empty, but not all of x, y, heading",
         ),
-        (READING_GOOD.replace("1.05,2,0.51", ",,0.51"), ": line 3, column 'x': is empty, but not all of x, y, heading"),
     ],
 )
 def test_a_mistake_in_samples_is_one_line_with_file_line_and_column(folder_of_reading, samples, says):
@@ -436,7 +376,7 @@ def test_a_half_measured_pair_of_wheels_is_refused(folder_of_reading):
 
 
 def test_duties_lie_between_full_backwards_and_full_ahead(folder_of_reading):
-    duty = TWIST.replace("twist", "duty")
+    duty = TOML.replace("twist", "duty")
     samples = READING_GOOD.replace("v,omega", "left,right")
     read_log(folder_of_reading(samples.replace("0.6,0.2", "-1,1.0000001"), duty))
     says = complaint(folder_of_reading(samples.replace("0.6,0.2", "0.6,-1.01"), duty))
@@ -460,18 +400,10 @@ def test_headings_in_degrees_are_found_out_and_radians_are_not(folder_of_reading
     assert "look like degrees; write headings in radians" in says
 
 
-@pytest.mark.parametrize("start", [0.3, 1.5708, 3.0])
-def test_degrees_of_a_straight_drive_are_found_out(folder_of_reading, start):
-    read_log(folder_of_reading(driven(turn=0.0, start=start)))
-    assert "look like degrees" in complaint(folder_of_reading(driven(turn=0.0, start=start, degrees=True)))
-
-
-def test_degrees_of_a_drive_that_hardly_turns_are_found_out(folder_of_reading):
-    table = pd.read_csv(io.StringIO(driven(turn=0.0015)))
-    assert table["heading"].abs().max() < np.radians(7)
-    read_log(folder_of_reading(table.to_csv(index=False)))
-    table["heading"] = np.degrees(table["heading"])
-    assert "look like degrees" in complaint(folder_of_reading(table.to_csv(index=False)))
+@pytest.mark.parametrize(("turn", "start"), [(0.0, 0.3), (0.0, 1.5708), (0.0, 3.0), (0.0015, 0.0)])
+def test_degrees_of_a_drive_that_hardly_turns_are_found_out(folder_of_reading, turn, start):
+    read_log(folder_of_reading(driven(turn=turn, start=start)))
+    assert "look like degrees" in complaint(folder_of_reading(driven(turn=turn, start=start, degrees=True)))
 
 
 def test_turns_counted_through_one_episode_but_not_the_next_are_no_degrees(folder_of_reading):

@@ -122,7 +122,7 @@ def captions_of_episodes(folder):
 
 
 @pytest.mark.slow
-def test_the_righted_agent_is_shown_beside_the_target_before_and_after(righting, capsys):
+def test_the_righted_agent_is_shown_beside_the_target_before_and_after(righting, answered):
     folder, document = righting
     assert document["righted"]["agent"] == "yellow_only"
     before, after = captions_of_episodes(folder)
@@ -130,8 +130,7 @@ def test_the_righted_agent_is_shown_beside_the_target_before_and_after(righting,
     assert "The same start and seed in the extended proxy." in after
     start = re.search(r"from start (\d), where of starts 0 to 1 the two are furthest apart", before)[1]
     for study, caption in ((folder, before), (folder / "loop" / "extended", after)):
-        assert main(["drive", str(study), "--agent", "yellow_only", "--start", start, "--json"]) == 0
-        driven = json.loads(capsys.readouterr().out)
+        driven = answered("drive", study, "--agent", "yellow_only", "--start", start)
         for side in ("proxy", "target"):
             scores = driven[side]["metrics"]
             assert f"distance {scores['distance']:.3g} m, survival time {scores['survival_time']:.3g} s" in caption

@@ -25,7 +25,6 @@ from proxytune.diagnosis import (
     Learning,
     cut,
     disturbed_increments,
-    increments,
     pose_errors,
 )
 from proxytune.diagnosis.motion.diagnose import diagnose
@@ -312,17 +311,6 @@ def test_the_curve_over_the_signal_and_the_measured_means_agree_with_the_effect(
     for label in (MEASURED, ANY):
         _, other = values(lower, label)
         assert np.abs(other - effect).max() < 0.35 * np.ptp(effect), label
-
-
-def test_measured_means_weigh_every_increment_once(diagnosis):
-    slip = with_effect(diagnosis, "yaw_scrub", "", {"yaw_scrub": 0.2})
-    (axes,) = effect_curve(slip).axes
-    places, means = values(axes, MEASURED)
-    drives = diagnosis.found.declared.drives
-    extra = (drives.measured - increments(drives, diagnosis.found.declared.theta))[:, 2]
-    rates = np.degrees(extra * drives.tick_hz / (drives.last - drives.first))
-    assert len(places) == 20
-    assert means.mean() == pytest.approx(rates.mean(), abs=0.05 * np.abs(means).max())
 
 
 def test_an_effect_on_one_wheel_bends_the_curves_of_that_wheel_alone(diagnosis):

@@ -206,21 +206,6 @@ def test_a_gif_has_every_frame_at_its_time_and_plays_for_ever(animation, tmp_pat
     assert [file.name for file in path.parent.iterdir()] == ["episode.gif"]
 
 
-@pytest.mark.slow
-def test_a_gif_that_fails_half_way_leaves_the_old_one(animation, tmp_path):
-    path = tmp_path / "episode.gif"
-    path.write_text("old")
-
-    def frames():
-        yield animation.frame(0.0)
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        write_gif(path, frames(), animation.samples(), FRAME_HZ)
-    assert path.read_text() == "old"
-    assert list(tmp_path.iterdir()) == [path]
-
-
 def test_an_mp4_is_every_pixel_of_every_frame_given_to_ffmpeg(program, tmp_path):
     program(ENCODER)
     frames = [np.full((6, 8, 3), grey, np.uint8) for grey in (0, 100, 200)]

@@ -1,16 +1,13 @@
 """A user's own URDF, SDF or MuJoCo model, patched, with the filter before it, moves as the model that was found."""
 
-import importlib.util
-import sys
-import types
 import xml.etree.ElementTree as ET
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 import pytest
 from export_truth import instance
 from own_models import FILES, MJCF, SDF, URDF
+from ros_stubs import Ackermann, Stamped, Twist, load_node
 
 from proxytune import CommandFilter, InputError, export
 from proxytune.cli.main import main
@@ -244,56 +241,12 @@ def test_the_users_own_file_is_never_overwritten(model, tmp_path):
         export(model, tmp_path / "mine.urdf", into=tmp_path / "mine.urdf")
 
 
-class Vector:
-    x = y = z = 0.0
-
-
-class Twist:
-    def __init__(self):
-        self.linear, self.angular = Vector(), Vector()
-
-
-class Stamped:
-    def __init__(self):
-        self.twist, self.header = Twist(), types.SimpleNamespace(stamp=None)
-
-
-class Node:
-    parameters: ClassVar = {}
-
-    def __init__(self, name):
-        self.told = []
-
-    def declare_parameter(self, name, value):
-        return types.SimpleNamespace(value=self.parameters.get(name, value))
-
-    def create_publisher(self, kind, topic, depth):
-        return types.SimpleNamespace(publish=self.told.append)
-
-    def create_subscription(self, kind, topic, hear, depth):
-        self.heard = hear
-
-    def create_timer(self, period, tell):
-        self.tick = tell
-
-    def get_clock(self):
-        return types.SimpleNamespace(now=lambda: types.SimpleNamespace(to_msg=lambda: "now"))
-
-
 @pytest.mark.parametrize("stamped", [False, True])
 def test_the_ros_node_tells_the_driver_what_the_python_class_answers_and_stops_after_silence(
     model, tmp_path, monkeypatch, stamped
 ):
     path = export(model, tmp_path / "bend.py", to="filter", has=("trim",)).output
-    modules = {"rclpy": {}, "rclpy.node": {"Node": Node}, "geometry_msgs": {}}
-    modules["geometry_msgs.msg"] = {"Twist": Twist, "TwistStamped": Stamped}
-    for name, content in modules.items():
-        monkeypatch.setitem(sys.modules, name, types.ModuleType(name))
-        vars(sys.modules[name]).update(content)
-    monkeypatch.setattr(Node, "parameters", {"stamped": stamped})
-    spec = importlib.util.spec_from_file_location("bend", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    module = load_node(path, monkeypatch, stamped=stamped)
     node, bent = module.CommandVelocityFilter(), CommandFilter(model, rate_hz=HZ, has=("trim",))
     said = Stamped() if stamped else Twist()
     twist = said.twist if stamped else said
@@ -301,7 +254,8 @@ def test_the_ros_node_tells_the_driver_what_the_python_class_answers_and_stops_a
     node.heard(said)
     for _ in range(300):
         node.tick()
-    told = [one.twist if stamped else one for one in node.told]
+    (answers,) = node.told.values()
+    told = [one.twist if stamped else one for one in answers]
     expected = [bent.step((0.3, 0.5)) for _ in range(30)]
     assert [(one.linear.x, one.linear.y, one.angular.z) for one in told[:30]] == pytest.approx(np.array(expected))
     assert abs(told[-1].linear.x) < 1e-6
@@ -337,33 +291,19 @@ def test_the_node_of_a_car_hears_and_tells_ackermann_drives(tmp_path, monkeypatc
     model = tmp_path / "model.toml"
     model.write_text(model_text(Model("dart", None, {"steering_offset": 0.1}, {}), (), CAR.catalogue))
     path = export(model, tmp_path / "bend.py", to="filter").output
-
-    class Message:
-        def __init__(self):
-            self.header = types.SimpleNamespace(stamp=None)
-            self.drive = types.SimpleNamespace(speed=0.0, steering_angle=0.0)
-
-    modules = {"rclpy": {}, "rclpy.node": {"Node": Node}, "ackermann_msgs": {}}
-    modules["ackermann_msgs.msg"] = {"AckermannDriveStamped": Message}
-    for name, content in modules.items():
-        monkeypatch.setitem(sys.modules, name, types.ModuleType(name))
-        vars(sys.modules[name]).update(content)
-    monkeypatch.setattr(Node, "parameters", {})
-    spec = importlib.util.spec_from_file_location("bend_car", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    node, said = module.AckermannFilter(), Message()
+    node, said = load_node(path, monkeypatch).AckermannFilter(), Ackermann()
     said.drive.speed, said.drive.steering_angle = 1.0, 0.1
     node.heard(said)
     for _ in range(60):
         node.tick()
-    assert node.told[9].drive.speed == pytest.approx(1.0)
-    assert node.told[9].drive.steering_angle == pytest.approx(0.1 + 0.1 * np.radians(25.0))
-    assert node.told[-1].drive.speed == pytest.approx(0.0)
+    (told,) = node.told.values()
+    assert told[9].drive.speed == pytest.approx(1.0)
+    assert told[9].drive.steering_angle == pytest.approx(0.1 + 0.1 * np.radians(25.0))
+    assert told[-1].drive.speed == pytest.approx(0.0)
     said.drive.speed = -1.0  # a car without reverse stays
     node.heard(said)
     node.tick()
-    assert node.told[-1].drive.speed == pytest.approx(0.0)
+    assert told[-1].drive.speed == pytest.approx(0.0)
 
 
 def test_a_users_own_car_is_patched_at_its_rear_wheels_and_has_their_gain():

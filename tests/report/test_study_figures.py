@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from confirmations import confirmed, planted
+from matplotlib.text import Text
 
 from proxytune.report.study.document import study_document
 from proxytune.report.study.figures import (
@@ -18,14 +19,7 @@ from proxytune.report.study.page import study_view
 from proxytune.report.study.tables import search_table
 from proxytune.report.wording import span
 from proxytune.search import Importance, Trial, learn_theta
-from proxytune.storage import Store, TrialRecord
-from proxytune.study import StudyRun, open_study, result_of
-
-
-@pytest.fixture(scope="module")
-def result(finished_once):
-    with Store.read(finished_once) as store:
-        return result_of(StudyRun(open_study(finished_once), store))
+from proxytune.storage import TrialRecord
 
 
 def lines(figure):
@@ -108,19 +102,10 @@ def test_without_a_noise_floor_none_is_drawn(result):
     assert not [label for label in drawn if label.startswith(("noise floor", "target's halves"))]
 
 
-def test_convergence_can_be_read_in_one_column_of_a_paper(result):
-    figure = convergence_figure(confirmed(result))
-    assert figure.get_figwidth() * 25.4 == pytest.approx(85.0)
-    (axes,) = figure.axes
-    texts = [axes.xaxis.label, axes.yaxis.label, *axes.get_xticklabels(), *figure.legends[0].get_texts()]
-    assert min(text.get_fontsize() for text in texts) >= 7.0
-
-
 @pytest.fixture(scope="module")
-def learnt(finished_once):
+def learnt(result):
     """θ is known to be delay 0.12 and trim 0.1."""
-    with Store.read(finished_once) as store:
-        return planted(result_of(StudyRun(open_study(finished_once), store)))
+    return planted(result)
 
 
 def test_the_density_is_highest_where_theta_is_known_to_be_and_adds_up_to_one(learnt):
@@ -164,11 +149,11 @@ def test_what_remains_is_written_above_and_an_unidentified_parameter_is_called_s
     assert titles == [f"unidentified: {ends[0]}", f"{ends[1]} remain"]
 
 
-def test_profiles_can_be_read_in_one_column_of_a_paper(learnt):
-    figure = profiles_figure(learnt)
+@pytest.mark.parametrize("draw", [convergence_figure, profiles_figure, evaluations_figure])
+def test_a_figure_can_be_read_in_one_column_of_a_paper(learnt, draw):
+    figure = draw(confirmed(learnt))
     assert figure.get_figwidth() * 25.4 == pytest.approx(85.0)
-    for axes in figure.axes:
-        assert min(text.get_fontsize() for text in (axes.xaxis.label, *axes.get_xticklabels())) >= 7.0
+    assert min(text.get_fontsize() for text in figure.findobj(Text) if text.get_text()) >= 7.0
 
 
 def shadow(learnt):
@@ -229,27 +214,19 @@ def test_one_parameter_alone_can_be_drawn(learnt):
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("delay [s]", "PRPV [ordered pairs]")
 
 
-def test_trials_and_their_key_can_be_read_in_one_column_of_a_paper(learnt):
-    figure = evaluations_figure(learnt)
-    assert figure.get_figwidth() * 25.4 == pytest.approx(85.0)
-    pair, key = figure.axes[:2]
-    texts = [pair.xaxis.label, pair.yaxis.label, *pair.get_xticklabels(), *key.get_legend().get_texts()]
-    assert min(text.get_fontsize() for text in texts) >= 7.0
+def test_the_key_of_trials_names_the_region_and_the_answer(learnt):
+    key = evaluations_figure(learnt).axes[1]
     assert [text.get_text() for text in key.get_legend().get_texts()] == ["95 % region", "answer"]
 
 
 @pytest.fixture(scope="module")
-def weighed(finished_once):
-    with Store.read(finished_once) as store:
-        found = result_of(StudyRun(open_study(finished_once), store))
+def weighed(result):
     planted = (Importance("delay", 0.25, (0.1, 0.4), 0.125), Importance("trim", 0.75, (0.5, 1.0), 0.5))
-    return replace(found, importances=planted)
+    return replace(result, importances=planted)
 
 
-def test_a_study_has_the_importance_of_each_of_its_parameters(finished):
-    with Store.read(finished) as store:
-        found = result_of(StudyRun(open_study(finished), store)).importances
-    assert [importance.name for importance in found] == ["delay", "trim"]
+def test_a_study_has_the_importance_of_each_of_its_parameters(result):
+    assert [importance.name for importance in result.importances] == ["delay", "trim"]
 
 
 def test_a_dot_is_the_share_a_stroke_what_is_alone_and_a_line_the_interval_most_important_on_top(weighed):

@@ -12,16 +12,8 @@ from proxytune.report.study.figures import convergence_figure
 from proxytune.report.study.page import RENEW_S, TITLES, live_view, study_foot, study_view, write_live_page
 from proxytune.report.study.sentence import finding_of, say_answer, say_finding, say_next_step
 from proxytune.report.writing import svg_of
-from proxytune.storage import Store
-from proxytune.study import StudyRun, open_study, result_of
 
 EVIL = "<script>alert(1)</script>"
-
-
-@pytest.fixture(scope="module")
-def result(finished_once):
-    with Store.read(finished_once) as store:
-        return result_of(StudyRun(open_study(finished_once), store))
 
 
 def text_of(result, figures=None):

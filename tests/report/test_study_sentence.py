@@ -9,8 +9,6 @@ from confirmations import LACKS, TOLD, planted
 from proxytune.report.study.sentence import Finding, KnownParameter, declared_of, finding_of, say_finding
 from proxytune.scores import Metric, ScoreTable
 from proxytune.search import Information
-from proxytune.storage import Store
-from proxytune.study import StudyRun, open_study, result_of
 from proxytune.usefulness import Chance, Estimate, NoiseFloor
 
 TRIM = KnownParameter("trim", "", 0.1213, (0.108, 0.146), 0.06, True)
@@ -84,11 +82,9 @@ def test_the_next_step_is_what_keeps_more_from_being_told(limit, inside, step):
     assert say_finding(found).endswith(f" Next: {step}, to get closer.")
 
 
-def test_where_a_rule_ended_the_search_a_larger_budget_would_not_help(finished):
+def test_where_a_rule_ended_the_search_a_larger_budget_would_not_help(result):
     found = replace(ABOVE, inside=False, ruled=True)
     assert say_finding(found).endswith("Next: loosen the rule under [stop] that ended the search, to get closer.")
-    with Store.read(finished) as store:
-        result = result_of(StudyRun(open_study(finished), store))
     assert finding_of(result).ruled is False
     assert finding_of(replace(result, trials=result.trials[:3])).ruled is True
 
@@ -183,9 +179,7 @@ def test_only_effects_on_motion_are_declared_to_diagnose_each_once():
     assert declared_of(names) == ("trim", "motor_lag", "wheel_gain")
 
 
-def test_a_study_s_finding_holds_what_the_study_knows(finished):
-    with Store.read(finished) as store:
-        result = result_of(StudyRun(open_study(finished), store))
+def test_a_study_s_finding_holds_what_the_study_knows(result):
     found = finding_of(planted(result, deviation=(3.0, 0.01), misfit=LACKS))
     assert [(known.name, known.unit, known.identified) for known in found.parameters] == [
         ("delay", "s", False),

@@ -28,12 +28,6 @@ from proxytune.study import Preflight, StudyRun, open_study, result_of, run_tria
 from proxytune.study.preflight import Movement
 
 
-@pytest.fixture(scope="module")
-def result(finished_once):
-    with Store.read(finished_once) as store:
-        return result_of(StudyRun(open_study(finished_once), store))
-
-
 def row_of(table, name):
     """The row of a name; None where there is none."""
     return next((row for row in table.rows if row[0] == name), None)
@@ -258,9 +252,8 @@ def test_failed_episodes_are_told_with_the_first_of_them(make_study):
 
 
 @pytest.fixture(scope="module")
-def known(finished_once):
-    with Store.read(finished_once) as store:
-        return planted(replace(result_of(StudyRun(open_study(finished_once), store)), cautions=()))
+def known(result):
+    return planted(replace(result, cautions=()))
 
 
 def test_a_row_has_the_best_value_its_interval_what_is_as_good_and_the_box(known):

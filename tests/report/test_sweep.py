@@ -109,9 +109,7 @@ def test_points_without_a_score_are_empty_and_told(make_study):
         figure.draw_without_rendering()
 
 
-def test_the_figure_shows_every_point_of_every_curve_within_its_axes(make_study):
-    folder = make_study()
-    curves = [curve(folder), curve(folder, "delay")]
+def test_the_figure_shows_every_point_of_every_curve_within_its_axes(curves):
     panels = np.reshape(sweep_figure(curves).axes, (2, 2))
     for row, swept in enumerate(curves):
         line = next(line for line in panels[row, 0].get_lines() if line.get_label() == "PRPV")
@@ -209,12 +207,11 @@ def legend(figure):
     return [text.get_text() for text in told.get_texts()]
 
 
-def test_every_line_band_and_bar_is_explained_once(with_pod, swept, make_study):
-    both = [swept, curve(make_study(), "delay")]
+def test_every_line_band_and_bar_is_explained_once(with_pod, curves):
     lines = ["target's halves", "chance", "95 % interval", "held value"]
-    assert legend(sweep_figure(both)) == lines
+    assert legend(sweep_figure(curves)) == lines
     assert legend(panels_figure(with_pod)) == [*lines, "SRCC, distance", "SRCC, survival time"]
-    assert sorted(legend(bars_figure(both))) == sorted([*lines, "lower and higher value"])
+    assert sorted(legend(bars_figure(curves))) == sorted([*lines, "lower and higher value"])
 
 
 def test_only_a_level_of_the_same_starts_is_called_the_noise_floor(swept):
@@ -249,13 +246,7 @@ EVIL = "<script>alert(1)</script>"
 @pytest.fixture(scope="module")
 def curves(make_studies):
     folder = make_studies("swept")
-    study = open_study(folder)
-    with Store.open(folder) as store:
-        run = StudyRun(study, store)
-        plans = [plan_sweep(sweep_interval(study, name), {"trim": 0.1, "delay": 0.12}, 4) for name in ("trim", "delay")]
-        for plan in plans:
-            run_sweep(run, plan, None)
-        return [curve_of(run, plan) for plan in plans]
+    return [curve(folder), curve(folder, "delay")]
 
 
 def view_of(curves, study="s"):

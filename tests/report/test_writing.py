@@ -8,7 +8,6 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from proxytune.errors import RunError
-from proxytune.files import draft_path
 from proxytune.report.writing import figures_also_as, save_figure, svg_of, write_picture, write_text
 
 
@@ -89,16 +88,6 @@ def test_a_failed_picture_keeps_the_old_file_and_is_told_in_one_line(tmp_path, m
         write_picture(path, np.zeros((6, 8, 3), dtype=np.uint8))
     assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]
-
-
-def test_a_draft_follows_no_link_that_lies_in_its_place(tmp_path):
-    victim = tmp_path / "precious"
-    victim.write_text("mine")
-    draft_path(tmp_path / "page.html").symlink_to(victim)
-    write_text(tmp_path / "page.html", "new")
-    assert victim.read_text() == "mine"
-    assert (tmp_path / "page.html").read_text() == "new"
-    assert not (tmp_path / "page.html").is_symlink()
 
 
 def test_a_file_is_on_disk_before_it_has_its_name(tmp_path, monkeypatch):

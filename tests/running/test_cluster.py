@@ -1,10 +1,10 @@
 """A Dask cluster gives the results of one machine, to the bit, whoever leaves or joins."""
 
-import json
 import os
 import socket
 import threading
 from functools import partial
+from types import SimpleNamespace
 
 import pytest
 from convoy import Convoy
@@ -13,6 +13,7 @@ from proxytune.cli.main import main
 from proxytune.domain import make_episode
 from proxytune.errors import InputError
 from proxytune.running import Watch, on_cluster, run_episode, running, working
+from proxytune.running.cluster import Cluster
 from proxytune.running.sending import check_code, made_by
 
 distributed = pytest.importorskip("distributed")
@@ -50,6 +51,16 @@ def test_other_code_on_a_worker_is_refused_by_name():
     check_code(made_by())
     with pytest.raises(InputError, match=r"has NumPy [\d.]+ \(was 1\.0\); install the same there as here"):
         check_code({**made_by(), "numpy": "1.0"})
+
+
+def test_a_worker_that_does_not_start_again_holds_up_no_command_that_ends():
+    started, before = threading.Event(), set(threading.enumerate())
+    cluster = object.__new__(Cluster)
+    cluster._client = SimpleNamespace(restart_workers=lambda *workers, **how: started.wait(30.0))
+    cluster._restart(SimpleNamespace(address="tcp://h:1"))
+    (waiting,) = set(threading.enumerate()) - before
+    started.set()
+    assert waiting.daemon
 
 
 def test_where_nothing_answers_the_user_is_told_in_one_line(make_study, capsys, monkeypatch):
@@ -115,15 +126,14 @@ def test_a_worker_of_several_threads_is_refused():
 
 
 @pytest.mark.slow
-def test_a_study_with_its_own_modules_gives_the_same_trials_while_a_worker_joins(cluster, make_study, capsys):
+def test_a_study_with_its_own_modules_gives_the_same_trials_while_a_worker_joins(cluster, make_study, answered):
     answers = []
     for name, words in (("here", ()), ("there", ("--backend", "dask", "--address", cluster.scheduler_address))):
         folder = make_study(name, family='"mine:family"')
         (folder / "mine.py").write_text(OWN_FAMILY)
         (folder / "helper.py").write_text(HELPER)
         cluster.scale(3 if words else 2)
-        assert main(["study", str(folder), "--json", *words]) == 0
-        answers.append(json.loads(capsys.readouterr().out))
+        answers.append(answered("study", folder, *words))
     here, there = answers
     assert here["best"] == there["best"]
     for key in ("number", "theta", "score"):

@@ -8,7 +8,7 @@ import pytest
 from convoy import Convoy
 
 from proxytune.domain import make_episode
-from proxytune.errors import EpisodeError, RunError
+from proxytune.errors import RunError
 from proxytune.running import Watch, run_episode, run_fleet, run_together, running
 from proxytune.running.episodes import MARGIN, MOST, MOST_S, UNKNOWN, in_fleets
 
@@ -59,13 +59,6 @@ def test_one_that_exits_has_the_fleet_run_one_by_one_and_is_named(fault, raised)
     found, _ = run_all((f"agent3:2:{fault}",))
     assert but_last(found) == but_last(by_itself())
     assert found[LAST].startswith(f"the agent or the domain family raised {raised}")
-
-
-@pytest.mark.slow
-def test_one_that_ends_its_process_is_named_and_the_others_go_on():
-    found, _ = run_all(("agent3:2:leaves",), jobs=2)
-    assert but_last(found) == but_last(by_itself())
-    assert found[LAST] == "it ended its process twice (exit status 9)"
 
 
 @pytest.mark.slow
@@ -187,8 +180,3 @@ def test_a_fleet_that_begins_in_this_process_is_told_as_a_whole():
     begun = []
     run_all(begins=begun.append)
     assert [len(fleet) for fleet in begun] == [12]
-
-
-def test_an_error_of_an_episode_is_as_run_raises_it():
-    with pytest.raises(EpisodeError, match="raised ValueError at 7 s"):
-        Convoy(faults=("agent3:2:raises",)).run(LAST)

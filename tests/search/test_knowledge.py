@@ -68,15 +68,6 @@ def test_after_a_few_trials_shares_are_still_shares(count):
         assert 0.0 <= importance.alone <= importance.share
 
 
-def test_the_same_trials_in_another_order_give_the_same_importances():
-    trials = [
-        Trial(point, planted(point)) for point in (design_point(IMPORTANCE_SPACE, index, 5) for index in range(9))
-    ]
-    assert importances(fit_surrogate(IMPORTANCE_SPACE, trials)) == importances(
-        fit_surrogate(IMPORTANCE_SPACE, trials[::-1])
-    )
-
-
 SENSITIVE = np.array([[3.0, 0.0], [0.0, 3.0], [2.0, 2.0], [1.0, -2.0]])
 """What an agent's output makes of each parameter: the first sees the delay alone, the second the trim alone."""
 
@@ -148,15 +139,6 @@ def test_a_parameter_of_which_no_output_tells_is_unidentified():
 def test_few_trials_limit_what_is_told_and_with_many_it_is_noise():
     assert {one.limit for one in known(3, count=5).information} == {"trials"}
     assert {one.limit for one in known(3, count=48).information} == {"starts"}
-
-
-@pytest.mark.slow
-def test_the_order_of_trials_changes_nothing():
-    one = known(5)
-    other = learn_theta(SPACE, one.trials[::-1], one.goal, one.seed)
-    assert other.intervals == one.intervals
-    assert other.misfit == one.misfit
-    assert other.as_good == one.as_good
 
 
 def test_fresh_scores_spread_round_what_is_expected():

@@ -147,13 +147,6 @@ def test_the_dispersion_is_one_unless_a_misfit_is_said(misfit, dispersion):
     assert misfit.dispersion == dispersion
 
 
-@pytest.mark.slow
-def test_the_same_trials_in_any_order_give_the_same_verdict():
-    told = trials_of_misfit(1)
-    target = goal(whole, outputs((0.1, 0.1), 5), SPREAD**2)
-    assert learn_theta(SPACE, told, target, 1).misfit == learn_theta(SPACE, told[::-1], target, 1).misfit
-
-
 @pytest.mark.parametrize("count", [4, 5])
 def test_with_too_few_trials_nothing_is_said(count):
     told = trials_of_misfit(1, count)

@@ -74,7 +74,7 @@ def test_the_trials_of_two_searches_in_one_study_are_kept_apart(tmp_path):
         store.save_trial("identity", of_plv, objective="plv")
         store.begin({"seed": 2}, "prpv")
     with Store.read(tmp_path) as store:
-        assert (store.trials(), store.trials("plv")) == ([], [of_plv])
+        assert (store.trials(), store.trials("plv"), store.searches()) == ([], [of_plv], ["plv"])
 
 
 def test_what_has_been_read_is_kept_up_with_what_is_written(tmp_path):

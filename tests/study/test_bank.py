@@ -1,23 +1,20 @@
 """A bank says before anything is measured what a target would tell."""
 
-import json
 from pathlib import Path
 
 import pytest
 
-from proxytune.cli.main import main
 from proxytune.study.bank import _starts_needed
-from tests.conftest import MakeStudy
+from tests.conftest import Answered, MakeStudy
 
 BANK = {"target": None, "preflight": "true", "budget": "10", "engine": None}
 
 
 @pytest.mark.slow
-def test_a_bank_says_what_a_target_would_tell(make_study: MakeStudy, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_bank_says_what_a_target_would_tell(make_study: MakeStudy, answered: Answered) -> None:
     """Its document has trials, widths, agents and starts in place of an answer, its folder a page and a table."""
     folder = make_study(**BANK)
-    assert main(["study", str(folder), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = answered("study", folder)
     bank = found["bank"]
     assert "best" not in found
     assert (bank["trials"], bank["starts"]) == (10, 3)
@@ -25,22 +22,17 @@ def test_a_bank_says_what_a_target_would_tell(make_study: MakeStudy, capsys: pyt
     assert 0.0 < bank["expected_interval"]["trim"] < 0.6
     assert Path(found["table"]).stat().st_size < 2**20
     assert "trim" in Path(found["report"]).read_text()
-    assert main(["study", str(folder), "--json"]) == 0
-    again = json.loads(capsys.readouterr().out)
+    again = answered("study", folder)
     assert again["episodes"]["run"] == 0
     assert again["bank"] == bank
 
 
-def test_more_trials_are_the_same_design_gone_on_with(
-    make_study: MakeStudy, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_more_trials_are_the_same_design_gone_on_with(make_study: MakeStudy, answered: Answered) -> None:
     """A budget that is raised keeps what is there."""
     folder = make_study(**{**BANK, "budget": "6"})
-    main(["study", str(folder), "--json"])
-    capsys.readouterr()
+    answered("study", folder)
     make_study(**{**BANK, "budget": "9"})
-    assert main(["study", str(folder), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["episodes"]["run"] == 3 * 6 * 3
+    assert answered("study", folder)["episodes"]["run"] == 3 * 6 * 3
 
 
 def test_starts_needed_follow_from_two_numbers_of_starts() -> None:

@@ -1,6 +1,5 @@
 """Studies whose agents end their process or never end: the real command, run again as a user would."""
 
-import json
 import re
 
 import pytest
@@ -41,9 +40,8 @@ def test_an_agent_that_ends_the_study_s_own_process_is_named_by_the_next_run_whi
 @pytest.mark.parametrize(
     ("fault", "jobs"), [("exits", "1"), *(pytest.param("interrupts", jobs, marks=pytest.mark.slow) for jobs in "12")]
 )
-def test_an_agent_that_exits_or_interrupts_fails_and_the_study_goes_on(make_study, capsys, fault, jobs):
-    assert main(["study", str(make_study(domain=domain(fault), jobs=jobs, **FAMILY)), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["episodes"]["failed"] == 2
+def test_an_agent_that_exits_or_interrupts_fails_and_the_study_goes_on(make_study, answered, fault, jobs):
+    assert answered("study", make_study(domain=domain(fault), jobs=jobs, **FAMILY))["episodes"]["failed"] == 2
 
 
 @pytest.mark.parametrize("jobs", ["1", pytest.param("2", marks=pytest.mark.slow)])

@@ -26,12 +26,6 @@ def test_a_factory_gets_the_domain_table_and_the_model(make_study):
     assert (family.version, family.theta) == ("7", (("trim", 0.2),))
 
 
-def test_modules_in_the_study_s_folder_can_be_imported(make_study):
-    folder = make_study(family='"my_own_family:make"')
-    (folder / "my_own_family.py").write_text("from wobbly import wobbly as make\n")
-    assert load(folder).starts == 5
-
-
 BAD = {
     "no colon": ({"family": '"wobbly"'}, "family: family 'wobbly' is unknown (your own is written module:attribute)"),
     "no such module": ({"family": '"wobbli:wobbly"'}, "family 'wobbli:wobbly': no module 'wobbli' in "),
@@ -109,24 +103,6 @@ def test_what_a_foreign_family_does_wrong_is_one_line_with_its_name(make_study, 
         load(folder)
     assert f"study.toml: family: {expected.format(n=number)}" in str(told.value).replace("parameters['delay'] ", "")
     assert "\n" not in str(told.value)
-
-
-def test_an_agent_check_that_raises_is_told_with_the_family_s_name(make_study):
-    folder = make_study(family='"checks_badly:make"')
-    text = "from wobbly import Wobbly, wobbly\n\n\n"
-    text += "class Bad(Wobbly):\n    def check_agent(self, name): import not_there\n\n\n"
-    text += "def make(domain, *, model):\n    return Bad(**vars(wobbly(domain, model=model)))\n"
-    (folder / "checks_badly.py").write_text(text)
-    expected = r"check_agent\('agent0'\) of checks_badly:make raised ModuleNotFoundError: .*not_there.*; correct it"
-    with pytest.raises(InputError, match=expected):
-        load(folder)
-
-
-def test_a_module_that_cannot_be_imported_is_told(make_study):
-    folder = make_study(family='"falls_over:make"')
-    (folder / "falls_over.py").write_text("1 / 0\n")
-    with pytest.raises(InputError, match="importing falls_over raised ZeroDivisionError: division by zero"):
-        load(folder)
 
 
 ALIASES = (("good", "agent0"), ("bad", "agent1"))

@@ -107,15 +107,6 @@ def test_what_was_found_of_an_agent_is_known_when_the_study_goes_on(make_study, 
     assert any(HIDES in line for line in found["cautions"])
 
 
-@pytest.mark.slow
-def test_an_agent_that_remembers_by_its_memory_alone_is_driven_beside_others(make_study, capsys):
-    folder = make_study(**FAMILY, **FEW)
-    assert HIDES not in str(document(folder, capsys))
-    with Store.read(folder) as store:
-        known = store.facts()["apart"]
-    assert (known["tried"], known["why"]) == ([f"agent{number}" for number in range(6)], {})
-
-
 def test_a_family_that_runs_one_episode_at_a_time_tries_no_agent(finished):
     with Store.read(finished) as store:
         assert "apart" not in store.facts()

@@ -1,7 +1,5 @@
 """Metrics that a study is not after may be missing in an episode."""
 
-import json
-
 import pytest
 
 from proxytune.api import read_study
@@ -53,11 +51,10 @@ def test_a_study_works_where_a_metric_beside_its_own_is_missing_here_and_there(p
 
 
 @pytest.mark.slow
-def test_scored_by_a_metric_that_some_episodes_lack_these_count_as_failed(partly, capsys):
+def test_scored_by_a_metric_that_some_episodes_lack_these_count_as_failed(partly, answered):
     folder = partly("plotted", "False", "gp")
     run_study(folder)
-    assert main(["plot", str(folder), "--json", "--metric", "survival_time:max"]) == 0
-    document = json.loads(capsys.readouterr().out)
+    document = answered("plot", folder, "--metric", "survival_time:max")
     assert {trial["failed_episodes"] for trial in document["trials"]} == {6}, "every agent's from start 0"
 
 

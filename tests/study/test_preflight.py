@@ -202,28 +202,6 @@ def test_a_parameter_that_matters_is_not_looked_at_twice_and_nothing_is_simulate
     assert run(folder) == (replace(spent, episodes=0, seconds=0), found)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("jobs", [1, 2])
-def test_interrupted_anywhere_it_finds_the_same_and_simulates_nothing_twice(planted, jobs):
-    _, whole = run(planted("whole"))
-    folder = planted("stopped")
-    study = open_study(folder)
-    study = replace(study, settings=replace(study.settings, jobs=jobs))
-    for episodes in (1, 50, 60):
-        with Store.open(folder) as store, pytest.raises(KeyboardInterrupt):
-            study_run = StudyRun(study, store, Stopping(episodes))
-            run_preflight(study_run)
-        assert run_free(folder) is None
-    spent, found = run(folder, jobs=jobs)
-    assert found == whole
-    assert spent.episodes == whole.episodes - 111
-
-
-def run_free(folder):
-    with Store.read(folder) as store:
-        return preflight_of(StudyRun(open_study(folder), store))
-
-
 def test_what_need_not_be_run_is_taken_off_the_bar(planted):
     study = open_study(planted())
     watcher = Stopping()
@@ -328,12 +306,6 @@ def test_agents_that_remember_or_draw_unseeded_are_named_at_once_and_for_good(ma
     assert named[0].removeprefix("pre-flight: ").split(";")[0].replace("'", "&#39;") in (
         (folder / "report.html").read_text().replace("&#x27;", "&#39;")
     )
-
-
-@pytest.mark.slow
-def test_a_study_of_repeatable_agents_has_nothing_to_say(make_study, capsys):
-    assert main(["study", str(make_study(preflight="true", budget="2", initial="2")), "--json"]) == 0
-    assert "scores otherwise" not in "".join(capsys.readouterr())
 
 
 @pytest.mark.parametrize("agent", ["agent2", "agent4"])

@@ -9,13 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from partly_dead import ordered_study
-from stopping import Stopping
 
 from proxytune.running import Silent
 from proxytune.scores import Metric
 from proxytune.search import make_proposer
 from proxytune.storage import Store, TrialRecord
-from proxytune.study import StudyRun, goal_of, open_study, rescored, result_of, run_trials, score_trials
+from proxytune.study import StudyRun, open_study, rescored, result_of, run_trials, score_trials
 from proxytune.study.pruning import pruning_rule, spared
 from proxytune.study.run import stopped
 from proxytune.study.settings import StopRules
@@ -95,18 +94,6 @@ def test_two_jobs_cut_off_the_same_trials_at_the_same_agents_as_one(cutting, don
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("jobs", [1, 2])
-def test_interrupted_anywhere_it_goes_on_to_the_same_trials(cutting, done, jobs):
-    folder = cutting("stopped", jobs=str(jobs))
-    for episodes in (130, 7, 1, 2, 11, 30):
-        with pytest.raises(KeyboardInterrupt):
-            run(folder, Stopping(episodes))
-    spent, trials, _ = run(folder)
-    assert trials == done[1]
-    assert spent.episodes - spent.unused <= done[0].episodes - 181
-
-
-@pytest.mark.slow
 def test_episodes_run_in_vain_change_nothing(cutting, done):
     """All episodes of every trial are known beforehand, in which case nothing is simulated at all."""
     _, trials, _ = done
@@ -117,13 +104,6 @@ def test_episodes_run_in_vain_change_nothing(cutting, done):
             StudyRun(study, store).evaluate(trial.theta, "")
     spent, again, _ = run(folder)
     assert (spent.episodes, again) == (0, trials)
-
-
-@pytest.mark.slow
-def test_without_it_all_trials_are_driven_to_their_end(cutting):
-    spent, trials, found = run(cutting(cut_off="false", budget="8"))
-    assert {trial.state for trial in trials} == {"finished"}
-    assert (spent.episodes, found.spared) == (8 * ALL, (0, 0.0))
 
 
 @pytest.mark.slow
@@ -195,16 +175,6 @@ def test_a_trial_stands_on_the_episodes_of_its_decided_agents(done):
     assert {episode.agent for episode in driven} == {"agent2", "agent5"}
     assert len(driven) == 6
     assert len(StudyRun(found.study, None).episodes_of(replace(trial, state="finished", decided=()))) == ALL
-
-
-@pytest.mark.slow
-def test_an_engine_that_learns_from_outputs_has_its_trials_cut_off_too(cutting):
-    folder = cutting(engine='"outcomes"')
-    study = open_study(folder)
-    with Store.open(folder) as store:
-        study_run = StudyRun(study, store)
-        run_trials(study_run, make_proposer("outcomes", 5, goal_of(StudyRun(study, store))))
-        assert "cut" in {trial.state for trial in store.trials()}
 
 
 def test_of_a_trial_that_was_cut_off_the_search_has_the_decided_agents_outputs_even_where_all_episodes_are_known(done):

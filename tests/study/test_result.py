@@ -195,26 +195,6 @@ def test_trials_do_not_depend_on_it(finished):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("jobs", [1, 2])
-def test_interrupted_anywhere_it_comes_to_the_same_answer(finished, jobs):
-    _, whole = confirmed(shutil.copytree(finished, finished.parent / "whole"), jobs=jobs, confirm=2)
-    study = opened(finished, jobs=jobs, confirm=2)
-    for episodes in (1, 20):
-        with Store.open(finished) as store:
-            with pytest.raises(KeyboardInterrupt):
-                study_run = StudyRun(study, store, Stopping(episodes))
-                run_confirmation(study_run)
-            assert result_of(StudyRun(study, store)).confirmation is None
-    spent, found = confirmed(finished, jobs=jobs, confirm=2)
-    last = found.confirmation
-    unvisited = sum(one.trial.number == 0 for one in last.candidates)
-    assert spent.episodes == ONE * (2 * len(last.candidates) + unvisited + last.repetitions) - 21
-    assert last.answer.scores == whole.confirmation.answer.scores
-    assert last.answer.trial.theta == whole.confirmation.answer.trial.theta
-    assert last.expected.prpv == whole.confirmation.expected.prpv
-
-
-@pytest.mark.slow
 def test_every_repetition_has_episodes_and_a_score_of_its_own(finished):
     _, found = confirmed(finished, confirm=2)
     answer = found.confirmation.answer

@@ -1,6 +1,5 @@
 """Real processes, stopped for real."""
 
-import json
 import os
 import signal
 import time
@@ -10,7 +9,7 @@ import pytest
 from launched import Launched, never_stopped
 from processes import besides_progress, episodes, finished_episodes, refused, trials, wait_for
 
-from proxytune.cli.main import COMMANDS, main
+from proxytune.cli.main import COMMANDS
 
 pytestmark = pytest.mark.slow
 
@@ -75,7 +74,9 @@ def test_a_study_killed_as_soon_as_it_begins_gives_the_trials_of_one_that_was_no
     assert (trials(folder), episodes(folder)) == whole
 
 
-def test_a_second_process_on_the_same_study_is_told_and_the_first_is_not_disturbed(make_study, launcher, capsys):
+def test_a_second_process_on_the_same_study_is_told_and_the_first_is_not_disturbed(
+    make_study, launcher, capsys, answered
+):
     """A sweep too; looking at it is for everybody."""
     folder = make_study(domain={"sleep": "0.05"}, budget="60")
     first = Launched(launcher, folder)
@@ -83,22 +84,20 @@ def test_a_second_process_on_the_same_study_is_told_and_the_first_is_not_disturb
     line = f"{folder}: another process (process {first.pid}) is running this study; wait for it or stop it\n"
     for words in (("study", folder), ("sweep", folder, "--parameter", "trim")):
         assert refused(capsys, 1, *words) == f"proxytune {words[0]}: {line}"
-    assert main(["plot", str(folder), "--json"]) == 0
-    assert len(json.loads(capsys.readouterr().out)["trials"]) >= 1
+    assert len(answered("plot", folder)["trials"]) >= 1
     wait_for(folder, first, finished_episodes(folder) + 2)
     stop(first, signal.SIGINT)  # it was running all the while
 
 
 @pytest.mark.parametrize(("engine", "jobs"), [("gp", "1"), ("outcomes", "2")])
 def test_pre_flight_batches_cut_trials_and_confirmation_survive_being_stopped(
-    make_study, launcher, engine, jobs, capsys
+    make_study, launcher, engine, jobs, answered
 ):
     """With several jobs, episodes under way when a trial is cut off are kept; no trial stands on them."""
     phases = {"preflight": "true", "confirm": "1", "cut_off": "true", "initial": "4", "budget": "9"}
     keys = {"engine": f'"{engine}"', "batch": "3", "seed": "6", **phases}
     whole = make_study("whole", **keys)
-    assert main(["study", str(whole), "--json"]) == 0
-    expected = json.loads(capsys.readouterr().out)
+    expected = answered("study", whole)
     folder = make_study("stopped", domain={"sleep": "0.01"}, jobs=jobs, **keys)
     opened = []
     for moment, number in ((40, signal.SIGKILL), (90, signal.SIGTERM), (155, signal.SIGKILL), (260, signal.SIGKILL)):
@@ -108,8 +107,7 @@ def test_pre_flight_batches_cut_trials_and_confirmation_survive_being_stopped(
         opened.append(sum(trial[2] == "open" for trial in trials(folder)))
     assert opened[0] == opened[3] == 0, "in the pre-flight and in the confirmation"
     assert opened[1:3] == [3, 3], "while a whole batch was open"
-    assert main(["study", str(folder), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = answered("study", folder)
     assert any(trial["prpv"] is None for trial in expected["trials"]), "something was cut off"
     assert trials(folder) == trials(whole)
     assert found["best"]["fresh"] is not None

@@ -13,7 +13,6 @@ from proxytune.study import (
     PRPV,
     StudyRun,
     check_facts,
-    goal_of,
     open_study,
     rescored,
     result_of,
@@ -127,18 +126,6 @@ def test_a_study_spends_its_budget_and_then_no_more(make_study):
     assert {trial.state for trial in trials} == {"finished"}
     assert episodes == 7 * 18
     assert run(folder) == (0, trials)
-
-
-@pytest.mark.slow
-def test_two_jobs_give_the_trials_of_one(make_study, finished):
-    assert run(make_study("two"), jobs=2)[1] == run(finished)[1]
-
-
-@pytest.mark.slow
-def test_a_raised_budget_goes_on_as_if_it_had_been_so_from_the_start(make_study):
-    short, long = make_study("short"), make_study("long")
-    run(short, budget=6)
-    assert run(short, budget=9)[1] == run(long, budget=9)[1]
 
 
 @pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.slow)])
@@ -268,28 +255,6 @@ def test_before_the_first_finished_trial_everything_may_change(make_study):
         run_trials(study_run, make_proposer("gp", 5))
     make_study(seed="2")
     assert len(run(folder)[1]) == 7
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("engine", ["outcomes", "gp", "composite", "random", "sobol", "tpe"])
-def test_with_every_engine_an_interrupted_study_goes_on_to_the_same_trials(make_study, engine):
-    if engine == "tpe":
-        pytest.importorskip("optuna")
-    folders = [make_study(called, engine=f'"{engine}"') for called in ("whole", "stopped")]
-    whole, stopped_one = (open_study(folder) for folder in folders)
-    with Store.open(folders[0]) as store:
-        study_run = StudyRun(whole, store)
-        run_trials(study_run, make_proposer(engine, 5, goal_of(StudyRun(whole, store))))
-        expected = store.trials()
-    for episodes in (30, 70):
-        with Store.open(folders[1]) as store, pytest.raises(KeyboardInterrupt):
-            study_run = StudyRun(stopped_one, store, Stopping(episodes))
-            run_trials(study_run, make_proposer(engine, 5, goal_of(StudyRun(whole, store))))
-    with Store.open(folders[1]) as store:
-        study_run = StudyRun(stopped_one, store)
-        run_trials(study_run, make_proposer(engine, 5, goal_of(StudyRun(whole, store))))
-        assert store.trials() == expected
-    assert len(expected) == 7
 
 
 def test_the_search_sees_failed_trials_without_a_score(make_study):

@@ -220,7 +220,6 @@ BAD = {
     "a later format": ({"format": "2"}, "format: this proxytune reads up to 1; install a newer one"),
     "no parameters": ({"parameters": {}}, "parameters: is missing"),
     "bounds reversed": ({"parameters": {"trim": "[0.3, -0.3]"}}, "parameters.trim: the lower bound must be below"),
-    "bounds equal": ({"parameters": {"trim": "[0.3, 0.3]"}}, "parameters.trim: the lower bound must be below"),
     "bounds that rounding makes one": (
         {"parameters": {"trim": "[0.1, 0.10000000000000002]"}},
         "parameters.trim: bounds must be further apart than rounding",
@@ -228,7 +227,6 @@ BAD = {
     "bounds infinitely far": ({"parameters": {"trim": "[-1e308, 1e308]"}}, "and not infinitely far"),
     "one bound": ({"parameters": {"trim": "[0.3]"}}, "parameters.trim: must be [low, high]"),
     "a NaN bound": ({"parameters": {"trim": "[nan, 0.3]"}}, "parameters.trim: bounds must be finite"),
-    "an infinite bound": ({"parameters": {"trim": "[0, inf]"}}, "parameters.trim: bounds must be finite"),
     "a bound as text": ({"parameters": {"trim": '["a", 1]'}}, "parameters.trim: must be [low, high]"),
 }
 
@@ -246,12 +244,6 @@ def test_every_mistake_gets_one_line_with_file_and_key(make_study, case):
 
 def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(SettingsError, match=r"study\.toml: no such file"):
-        read_study_settings(tmp_path)
-
-
-def test_a_file_that_is_not_toml_is_told_with_its_line(tmp_path):
-    (tmp_path / "study.toml").write_text("format = 1\nbudget = = 3\n")
-    with pytest.raises(SettingsError, match=r"is not valid TOML: .*line 2"):
         read_study_settings(tmp_path)
 
 

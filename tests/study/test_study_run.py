@@ -82,16 +82,6 @@ def test_the_thetas_of_a_batch_follow_from_the_trials_before_it(make_study):
 
 
 @pytest.mark.slow
-def test_two_jobs_cut_off_the_same_trials_of_a_batch_at_the_same_agents_as_one(make_study, cutting):
-    _, one, expected = cutting
-    two, trials = run(ordered_study(make_study, **KEYS, jobs="2"))
-    assert trials == expected
-    assert sum(trial.state == "cut" for trial in trials[5:8]) > 1, "of the first batch of the engine"
-    assert two.episodes - two.unused == one.episodes
-    assert one.unused == 0
-
-
-@pytest.mark.slow
 def test_each_trial_of_a_batch_is_held_against_the_trials_before_the_batch_by_its_own_agents(cutting):
     folder, _, trials = cutting
     study = open_study(folder)

@@ -1,6 +1,5 @@
 """What only waited has not failed; what took too long twice has, which is told, and tried once more by the next run."""
 
-import json
 import os
 import signal
 import threading
@@ -11,7 +10,6 @@ from launched import Launched, never_stopped
 from processes import episodes, trials, wait_for
 from wobbly import Wobbly
 
-from proxytune.cli.main import main
 from proxytune.domain import make_episode
 from proxytune.running import run_episode
 from proxytune.running.workers import NAP_S, AwakeClock, awake
@@ -103,48 +101,42 @@ def test_a_clock_counts_no_pause(monkeypatch):
     assert seconds == 0.75 + NAP_S
 
 
-def told(folder, capsys, *words):
-    """The document of one more run."""
-    assert main(["study", str(folder), "--json", *words]) == 0
-    return json.loads(capsys.readouterr().out)
-
-
 @pytest.mark.slow
-def test_what_takes_too_long_once_is_run_again_and_has_not_failed(slow, capsys):
+def test_what_takes_too_long_once_is_run_again_and_has_not_failed(slow, answered):
     folder, whole = slow("study", 1), slow("whole", 0)
-    document = told(folder, capsys)
+    document = answered("study", folder)
     assert (left(folder), document["episodes"]["failed"]) == (0, 0)
-    told(whole, capsys)
+    answered("study", whole)
     assert trials(folder) == trials(whole)
     assert not [line for line in document["cautions"] if "took longer" in line]
 
 
 @pytest.mark.slow
-def test_what_takes_too_long_twice_is_told_and_tried_again_by_the_next_run(slow, capsys):
+def test_what_takes_too_long_twice_is_told_and_tried_again_by_the_next_run(slow, answered):
     folder, whole = slow("study", 2), slow("whole", 0)
-    document = told(folder, capsys)
+    document = answered("study", folder)
     assert document["episodes"]["failed"] == 1
     line = (
         "episodes that failed because they took longer than episode_timeout_s: 1, of 'agent2'; the same command tries"
     )
     assert [one for one in document["cautions"] if one.startswith(line)]
-    again = told(folder, capsys)
+    again = answered("study", folder)
     assert (again["episodes"]["run"], again["episodes"]["failed"], again["cautions"]) == (
         1,
         0,
-        told(whole, capsys)["cautions"],
+        answered("study", whole)["cautions"],
     )
     assert trials(folder)[0] == trials(whole)[0]
 
 
 @pytest.mark.slow
-def test_what_takes_too_long_in_two_runs_is_left_alone(slow, capsys):
+def test_what_takes_too_long_in_two_runs_is_left_alone(slow, answered):
     folder = slow("study", 100)
-    first = told(folder, capsys)
-    second = told(folder, capsys)
+    first = answered("study", folder)
+    second = answered("study", folder)
     assert second["episodes"]["run"] == first["episodes"]["failed"] == 2
     assert any("; in two runs; study --retry-failed" in line for line in second["cautions"])
-    third = told(folder, capsys)
+    third = answered("study", folder)
     assert (third["episodes"]["run"], third["episodes"]["failed"]) == (0, 2)
     assert left(folder) == 100 - 4 * 2
 

@@ -1,10 +1,6 @@
 """The proxy teaches a car: the imitator learns throttle and steering from the expert, and PLV counts what it saved."""
 
-import json
-
 import pytest
-
-from proxytune.cli.main import main
 
 STUDY = """
 format = 1
@@ -43,12 +39,11 @@ TWIN = 'format = 1\nrobot = "car"\n[effects.steering_offset]\noffset = 0.05\n'
 
 
 @pytest.mark.slow
-def test_a_car_learns_in_the_proxy_what_it_needs_on_the_target(tmp_path, capsys):
+def test_a_car_learns_in_the_proxy_what_it_needs_on_the_target(tmp_path, answered):
     (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
     (tmp_path / "target.csv").write_text(TARGET, encoding="utf-8")
     (tmp_path / "twin.toml").write_text(TWIN, encoding="utf-8")
-    assert main(["teach", str(tmp_path), "--json"]) == 0
-    document = json.loads(capsys.readouterr().out)
+    document = answered("teach", tmp_path)
     right, wrong = (document["proxies"][name] for name in ("right", "wrong"))
     assert right["theta"] == {"steering_offset": 0.05}
     assert right["zero_shot"] > wrong["zero_shot"]

@@ -45,19 +45,14 @@ CHANGES = {
 }
 
 
-@pytest.mark.parametrize("count", [0, 20])
-@pytest.mark.parametrize("change", CHANGES)
-def test_a_used_cache_gives_what_an_empty_one_gives(tmp_path, change, count):
-    point = CurvePoint("near", PROXY, 0, count)
-    before = setup(tmp_path / "used").score(point)
-    fresh = setup(tmp_path / "empty", **CHANGES[change]).score(point)
-    assert fresh != before
-    assert setup(tmp_path / "used", **CHANGES[change]).score(point) == fresh
-
-
-@pytest.mark.parametrize("change", [change for change in CHANGES if "proxy" not in change])
-def test_without_a_proxy_a_used_cache_gives_what_an_empty_one_gives(tmp_path, change):
-    point = CurvePoint("none", None, 0, 20)
+@pytest.mark.parametrize(
+    ("change", "point"),
+    [
+        *((change, CurvePoint("near", PROXY, 0, count)) for change in CHANGES for count in (0, 20)),
+        *((change, CurvePoint("none", None, 0, 20)) for change in CHANGES if "proxy" not in change),
+    ],
+)
+def test_a_used_cache_gives_what_an_empty_one_gives(tmp_path, change, point):
     before = setup(tmp_path / "used").score(point)
     fresh = setup(tmp_path / "empty", **CHANGES[change]).score(point)
     assert fresh != before

@@ -14,7 +14,7 @@ from partly_dead import PartlyDead
 from wobbly import Wobbly
 
 from proxytune.driving import AGENTS
-from proxytune.effects import Cue, Effect, Means, Panel, Stage, WheelCurve
+from proxytune.effects import Cue, Effect, Stage, WheelCurve
 from proxytune.effects.effect import Trace
 from proxytune.errors import ConformanceError, InputError
 from proxytune.search import Engine
@@ -43,10 +43,6 @@ class Slow:
     def apply(self, signal, memory):
         before = np.concatenate((memory, signal[..., :-1, :]), axis=-2)
         return (1.0 - self.share) * signal + self.share * before, signal[..., -1:, :]
-
-
-def with_parameter(**changes):
-    return (Parameter(**{**vars(Slow.parameters[0]), **changes}),)
 
 
 class Forgetful(Slow):
@@ -105,23 +101,7 @@ class Raises(Slow):
 
 
 class NoProbes(Slow):
-    parameters = with_parameter(probes=())
-
-
-class FarNeutral(Slow):
-    parameters = with_parameter(neutral=2.0)
-
-
-class NoCue(Slow):
-    trace = Trace(cues=(), shown=WheelCurve.STEP)
-
-
-class NoFigure(Slow):
-    trace = Trace(cues=(Cue.TRANSIENTS,), shown="steps")
-
-
-class OddPanel(Slow):
-    trace = Trace(cues=(Cue.TIME,), shown=Means(Cue.TIME, (Panel("", "time [s]", "speed"),)))
+    parameters = (Parameter(name="share", unit="", low=0.0, high=0.9, neutral=0.0),)
 
 
 BROKEN_EFFECTS = {
@@ -136,10 +116,6 @@ BROKEN_EFFECTS = {
     OneByOne: "filters a batch unlike its members",
     Raises: "'slow' raised ValueError: too slow at .*; correct its begin and apply",
     NoProbes: "'share' has no probes, from which a search sets out",
-    FarNeutral: "neutral value 2.0 is not within",
-    NoCue: r"a trace with the cues \(\); give a tuple of at least one Cue",
-    NoFigure: "is to be shown by 'steps'; give its trace a WheelCurve, or Means",
-    OddPanel: "a panel of the motion 'speed'; take one of forward, sideways, turn, left, right",
     int: "effect 'int' lacks name|effect 'int' lacks stage",
 }
 
@@ -186,11 +162,6 @@ class Three(Agent):
         return (0.0, 0.0, 0.0), memory
 
 
-class Alone(Agent):
-    def act(self, picture, memory):
-        return (0.1, 0.1)[:1], memory
-
-
 class Single(Agent):
     def act(self, picture, memory):
         return np.zeros(2)
@@ -228,7 +199,6 @@ class Painting(Agent):
 BROKEN_AGENTS = {
     Impatient: r"answers picture 0 with \[2.0, 0.0\]; duties lie within",
     Three: "a command is two duties",
-    Alone: "a command is two duties",
     Single: "answers with ndarray; act must give a tuple",
     Counting: "drives otherwise the second time",
     Sharing: "is disturbed by another episode under way",
@@ -350,11 +320,6 @@ class Remembering(Proposer):
         return super().propose(space, [*trials, *trials[: self.calls]], seed)
 
 
-class Random(Proposer):
-    def propose(self, space, trials, seed):
-        return tuple(float(np.random.default_rng().uniform(side.low, side.high)) for side in space.intervals)
-
-
 class NeedsScores(Proposer):
     def propose(self, space, trials, seed):
         min(trial.score + 0.0 for trial in trials)
@@ -365,7 +330,6 @@ BROKEN_PROPOSERS = {
     Outside: r"'mine' proposed \(1.3, 1.3\); give one value for each of delay in \[0, 0.3\], trim in",
     Short: "give one value for each of delay",
     Remembering: "proposes otherwise when asked again; remember nothing",
-    Random: "proposes otherwise when asked again; remember nothing",
     NeedsScores: "'mine' raised TypeError: unsupported operand .*; correct it",
 }
 

@@ -15,11 +15,9 @@ from hypothesis import given, settings, strategies as st
 from pictured import PICTURES, ROBOT, lane_poses, pictures, write_pictures, write_still_frames
 from viewed import NEUTRAL, OPTICS, stood
 
-from proxytune.diagnosis import effects_of
 from proxytune.diagnosis.camera import edges as gathering
 from proxytune.diagnosis.camera.edges import (
     BORDER,
-    EVERY,
     LEAST_SCATTER,
     LEAST_TAPE_M,
     LONGEST_GAP_S,
@@ -270,11 +268,6 @@ def test_frames_of_another_clock_are_refused_in_one_line():
         track_frames(log_of(episode()), frames_at([1000.0, 1001.0]))
 
 
-def test_some_frames_of_a_track_are_those_frames():
-    tracks, _ = track_frames(log_of(episode()), frames_at([2.0, 3.0, 4.0]))
-    np.testing.assert_array_equal(tracks.only(np.array([2, 0])).at(0.0)[0], tracks.at(0.0)[0][[2, 0]])
-
-
 PARAMETERS = OPTICS.robot.catalogue.parameters
 MOUNTING = st.sampled_from(OPTICS.mounting)
 
@@ -308,29 +301,12 @@ def test_values_are_clipped_to_the_nearest_bound(name, value):
     assert clipped == value or clipped in (parameter.low, parameter.high)
 
 
-@given(MOUNTING)
-def test_a_step_is_a_small_part_of_a_spread_and_a_spread_lies_within_the_range(name):
-    parameter = PARAMETERS[name]
-    assert 0.0 < OPTICS.step(name, OPTICS.neutral(name)) < 0.01 * OPTICS.spread(name)
-    assert OPTICS.spread(name) < parameter.high - parameter.low
-
-
 @given(MOUNTING, st.floats(0.0, 1.0))
 def test_a_step_never_leaves_the_bounds(name, share):
     """A camera cannot be made beyond them."""
     parameter = PARAMETERS[name]
     value = OPTICS.clipped(name, parameter.low + share * (parameter.high - parameter.low))
     assert parameter.low <= value + OPTICS.step(name, value) <= parameter.high
-
-
-def test_parameters_of_one_effect_are_one_effect():
-    names = ("lens_centre.right", "camera_roll", "lens_centre.down", "exposure.gain")
-    assert effects_of(names) == ("lens_centre", "camera_roll", "exposure")
-
-
-def test_a_robot_without_such_a_parameter_is_a_key_error():
-    with pytest.raises(KeyError):
-        OPTICS.neutral("camera_nothing")
 
 
 @given(st.integers(1, 40))
@@ -380,14 +356,6 @@ def test_views_hold_what_the_log_says(log):
     assert (views.optics.rows, views.optics.columns) == (72, 96)
     assert (views.position_m, views.heading_rad) == pytest.approx((0.002, np.radians(0.3)))
     assert views.tape_m == views.markings.road.paint.tape_m == 0.005
-
-
-def test_every_second_edge_point_is_used_in_the_order_of_frames(log):
-    gathered = gather_views(log, log.frames, ROBOT)
-    edges, every = gathered.views.edges, find_edges(gathered.pictures)
-    assert len(edges.row) == -(-len(every.row) // EVERY)
-    np.testing.assert_array_equal(edges.column, every.column[::EVERY])
-    assert (np.diff(edges.frame) >= 0).all()
 
 
 def test_a_tracker_that_states_nothing_is_assumed_to_scatter_by_millimetres(log):

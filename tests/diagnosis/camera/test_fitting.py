@@ -122,15 +122,6 @@ def test_what_is_not_named_stays_where_it_was():
     }
 
 
-@pytest.mark.slow
-def test_the_more_frames_the_less_is_left_open():
-    few, many = (
-        fit_camera(views, at_truth(views), ["camera_pitch", "camera_roll"], NEAR)
-        for views in (stood(count=10), stood(count=50))
-    )
-    assert (many.sd < 0.8 * few.sd).all()
-
-
 def test_a_fit_with_eliminated_poses_is_the_full_one():
     """The dense problem of 2 common columns and the 3 poses of 5 frames, one of which shows nothing."""
     random, frames, rows = np.random.default_rng(4), 5, 60

@@ -10,7 +10,7 @@ import pytest
 from photographs import drawn, floor, logged, measured, needs_measured, on_the_road, predicted, scene, textured
 from scipy.ndimage import gaussian_filter
 
-from proxytune.diagnosis.camera.light import PAINTS, find_blemishes, fit_light, flat_places, squared_radius
+from proxytune.diagnosis.camera.light import PAINTS, find_blemishes, fit_light, flat_places
 from proxytune.driving.road_picture import Floor
 
 
@@ -181,21 +181,6 @@ def test_flat_places_keep_away_from_edges_and_horizon():
     for down, right in ((0, 0), (6, 0), (0, 6), (6, 6)):
         np.testing.assert_allclose(model[frame, row + down, column + right], model[frame, row + 3, column + 3], atol=4)
         assert floor()[row + down, column + right].all()
-
-
-def test_the_squared_radius_is_one_in_the_corners_of_the_picture():
-    radius = squared_radius(120, 160)
-    assert radius[0, 0] == pytest.approx(1.0, abs=0.02)
-    assert radius[60, 80] == pytest.approx(0.0, abs=1e-3)
-    np.testing.assert_allclose(radius, radius[::-1, ::-1])
-
-
-def test_what_is_no_floor_is_no_flat_place():
-    asphalt = np.tile(PAINTS[0].astype(np.float32), (1, 40, 40, 1))
-    below = np.arange(40)[:, None] * np.ones(40) >= 20
-    flat = flat_places(asphalt, below)[0]
-    np.testing.assert_array_equal(flat[:23], -1)
-    np.testing.assert_array_equal(flat[23:], 0)
 
 
 @pytest.mark.slow

@@ -19,7 +19,6 @@ from viewed import OPTICS, at_truth, driven, everything, pushed, still, stood, t
 from proxytune.diagnosis import ResidualField, project, rank_subsets
 from proxytune.diagnosis.camera.fitting import fit_camera
 from proxytune.diagnosis.camera.selection import (
-    ALWAYS,
     FEWEST_MATCHED,
     NEAR,
     USUAL_MATCHED,
@@ -179,12 +178,6 @@ def test_all_effects_together_lose_nothing_and_more_than_there_are_make_no_set()
     assert rank_subsets(linear(3)[0], (), len(EFFECTS) + 1) == []
 
 
-def test_the_best_single_effect_of_a_rolled_camera_is_its_roll():
-    best, second = rank_subsets(everything(ROLLED), ["camera_pitch"], 1)[:2]
-    assert best.effects == ("camera_roll",)
-    assert second.loss > 10.0 * best.loss
-
-
 def places(views):
     return 2.0 * views.edges.column / 160.0 - 1.0, 2.0 * views.edges.row / 120.0 - 1.0
 
@@ -262,11 +255,6 @@ def test_the_gate_opens_for_evidence_share_and_size_together():
     assert not ResidualField(2.0, 0.1, 0.3, field).significant
     assert not ResidualField(10.0, 0.02, 0.3, field).significant
     assert not ResidualField(10.0, 0.1, 0.05, field).significant
-
-
-def test_a_field_of_nought_displaces_nothing():
-    leftover = ResidualField(0.0, 0.0, 0.0, np.zeros((10, 2)))
-    np.testing.assert_array_equal(leftover.displacement(np.array([0.3]), np.array([-0.2])), np.zeros((1, 2)))
 
 
 DECLARED = ("camera_pitch",)
@@ -442,11 +430,3 @@ def test_the_next_views_are_those_that_show_what_was_hidden(hidden, words):
 def test_there_is_nothing_to_take_where_nothing_was_hidden():
     assert next_views((), repeated=False) == ()
     assert next_views(("image_noise",), repeated=True) == ()
-
-
-def test_what_a_tracker_does_is_always_a_rival():
-    assert ALWAYS == {
-        "camera_yaw": "heading_offset",
-        "camera_forward": "marker_offset",
-        "camera_latency": "clock offset",
-    }

@@ -21,7 +21,7 @@ from proxytune.diagnosis.motion.effect_size import (
     invisible_effects,
     measure_effect_sizes,
 )
-from proxytune.diagnosis.motion.evidence import Variant, without_effect
+from proxytune.diagnosis.motion.evidence import Variant
 from proxytune.diagnosis.motion.fitting import evaluate
 from proxytune.diagnosis.motion.innovations import Noise
 
@@ -163,13 +163,6 @@ def test_a_random_effect_matters_if_its_draws_make_up_the_error(size, matters):
     assert bool(kept.adopted) == matters
     if not matters:
         assert kept.model.theta["delay"] == pytest.approx(TRUTH["delay"], abs=0.01)
-
-
-def test_without_a_random_effect_its_mean_lateness_is_delay():
-    theta = {**TRUTH, "delay_jitter": 0.1}
-    lack = without_effect(Variant(theta, DECLARED), adopted("delay_jitter", names=("delay_jitter",)), 20.0)
-    assert lack.theta == pytest.approx({**TRUTH, "delay": TRUTH["delay"] + 0.05})
-    assert lack.free == DECLARED
 
 
 @pytest.mark.parametrize(

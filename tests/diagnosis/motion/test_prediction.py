@@ -77,12 +77,6 @@ def test_learnt_motion_is_predicted_with_its_past_before_each_window(log, extra)
     assert found.turn < 1e-9
 
 
-def test_another_model_does_not(log):
-    found = agreement(predict(log, ROBOT, {**TRUTH, "trim": 0.1}, 2.0), log, 2.0)
-    assert found.place > 0.005
-    assert found.turn > 0.02
-
-
 def test_each_window_starts_from_the_measured_pose(log):
     table = predict(log, ROBOT, {**TRUTH, "trim": 0.1}, 1.0)
     starts = table[table.time == table.start_time]
@@ -326,17 +320,6 @@ def test_a_horizon_that_does_not_divide_a_drive_leaves_no_stub(drives_of_windows
         ) / drives_of_windows.tick_hz >= 0.9 * horizon_s - 1e-9
 
 
-def test_some_windows_are_chosen_with_all_their_poses(drives_of_windows):
-    windows = cut(drives_of_windows, 2.0)
-    kept = np.arange(len(windows.begin)) % 3 == 1
-    some = select_windows(windows, kept)
-    assert np.array_equal(some.begin, windows.begin[kept])
-    assert np.array_equal(np.unique(some.window), np.arange(kept.sum()))
-    for number, window in enumerate(np.flatnonzero(kept)):
-        own = windows.increment[windows.window == window]
-        assert np.array_equal(some.increment[some.window == number], own)
-
-
 @pytest.mark.parametrize("horizon_s", [1.0, 2.0])
 @pytest.mark.parametrize("rows", [slice(50, 60), slice(100, 150)])
 def test_no_window_crosses_a_gap_a_block_or_an_episode(rows, horizon_s):
@@ -363,13 +346,6 @@ def test_a_model_does_not_stray_from_its_own_noiseless_drives():
     assert pose_errors(quiet, {**TRUTH, "trim": 0.1}, cut(quiet, 2.0))[:, 0].max() > 0.01
 
 
-def test_an_error_has_an_interval_round_it():
-    random = np.random.default_rng(1)
-    blocks = np.repeat(np.arange(12), 50)
-    found = rmse(random.chisquare(1, 600) * np.repeat(random.uniform(0.5, 1.5, 12), 50), blocks)
-    assert 0.8 < found.interval[0] < found.value < found.interval[1] < 1.25
-
-
 def test_intervals_cover_the_true_error_about_as_often_as_they_say():
     random = np.random.default_rng(2)
     blocks = np.repeat(np.arange(12), 20)
@@ -379,11 +355,6 @@ def test_intervals_cover_the_true_error_about_as_often_as_they_say():
         low, high = rmse(random.chisquare(1, 240) * size, blocks).interval
         covered += low <= 1.0 <= high
     assert 170 <= covered <= 199
-
-
-def test_the_ratio_of_an_error_with_itself_is_one():
-    squares, blocks = np.random.default_rng(1).random(100), np.repeat(np.arange(10), 10)
-    assert ratio(squares, squares, blocks)[:2] == (1.0, (1.0, 1.0))
 
 
 def test_a_ratio_is_surer_than_its_parts_where_both_vary_together():

@@ -1,4 +1,4 @@
-"""How good is the answer that a study gives? `python benchmarks/answers.py OUTPUT [--seeds 111:140] [--plant bullet]`.
+"""How good is the answer that a study gives? `python benchmarks/answers.py OUTPUT [--seeds 101:130] [--plant bullet]`.
 
 Every seed draws a θ* from the middle of the box of benchmarks/truths. Its target is driven there under other placement
 noise, and a whole study is run against it: search, then confirmation. θ* and the answer are then driven 20 times
@@ -69,7 +69,6 @@ def run_seed(objective: TruthObjective, folder: Path, seed: int) -> dict[str, An
         "visited": result.best.trial.number > 0,
         "holds": result.knowledge.holds(truth),
         "share": posterior.share,
-        "episodes": result.episodes,
     }
 
 
@@ -139,7 +138,7 @@ def main() -> None:
     """Run what is missing, and print what is known."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("output", type=Path)
-    parser.add_argument("--seeds", default="111:140", help="the first and the last, as 111:140")
+    parser.add_argument("--seeds", default="101:130", help="the first and the last")
     parser.add_argument("--plant", choices=("planar", "bullet"), default="planar")
     parser.add_argument("--before", type=Path, help="another OUTPUT, of the same seeds, to be compared with")
     given = parser.parse_args()

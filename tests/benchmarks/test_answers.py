@@ -24,7 +24,6 @@ def row(seed, own, found, away):
         "visited": seed > 1,
         "holds": seed > 1,
         "share": 0.01 * seed,
-        "episodes": 1,
     }
 
 

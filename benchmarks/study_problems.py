@@ -218,6 +218,11 @@ class TruthObjective:
         """Mean distance of the parameters from the true ones, in widths of the box."""
         return float(np.abs(to_unit(self.space, values) - to_unit(self.space, self.truth(seed))).mean())
 
+    def study(self, seed: int) -> Study:
+        """The study of this seed, its target measured at the truth."""
+        study = self._of(seed).run.study
+        return replace(study, settings=replace(study.settings, seed=seed))
+
     def _level(self, seed: int) -> float:
         truth = self.truth(seed)
         scores = [found for found in (self.score(truth, seed), self.fresh_score(truth, seed)) if found is not None]

@@ -12,7 +12,17 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from proxytune.effects.effect import FilterContext, Signal, Stage, Trace
-from proxytune.effects.features import MOTION_GROUPS, Channel, Group, Knots, LearntCurve, hats, low_passes, play
+from proxytune.effects.features import (
+    MOTION_GROUPS,
+    Channel,
+    Group,
+    Knots,
+    LearntCurve,
+    hats,
+    low_passes,
+    newest_signs,
+    play,
+)
 from proxytune.space import Parameter
 
 STILL = 0.02
@@ -163,24 +173,22 @@ class LearntCommands:
         changed = (np.abs(np.diff(before, axis=-2)) > SAME).any(axis=-1, keepdims=True)
         # A delay that is no whole number of samples mixes two commands: one of each sign make no stop.
         still = np.abs(before) < STILL
-        signs = np.concatenate((past.sign[..., None, :], np.sign(signal)), axis=-2)
-        place = np.arange(signs.shape[-2])[:, None]
-        last = np.maximum.accumulate(np.where(signs != 0.0, place, 0), axis=-2)
-        course = np.take_along_axis(signs, last, axis=-2)
         wheels = np.moveaxis(signal, -2, -1)
+        course = newest_signs(np.concatenate((past.sign[..., None], np.sign(wheels)), axis=-1))
+        turned = np.moveaxis(np.diff(course, axis=-1) * course[..., :-1] != 0.0, -1, -2)
         dragged = np.moveaxis(play(wheels, past.dragged, self._knots("dragged")), -2, -3)
         slow = np.moveaxis(low_passes(wheels, past.slow, self._knots("ended"), past.rate_hz), -2, -3)
         commands = Commands(
             duty=signal,
             held=since(np.broadcast_to(changed, signal.shape), past.held),
             begun=since(still[..., 1:, :] & still[..., :-1, :], past.begun),
-            turned=since(np.diff(course, axis=-2) * course[..., :-1, :] != 0.0, past.turned),
+            turned=since(turned, past.turned),
             dragged=dragged,
             slow=slow,
         )
         after = CommandState(
             duty=signal[..., -1, :],
-            sign=course[..., -1, :],
+            sign=course[..., -1],
             held=commands.held[..., -1, :],
             begun=commands.begun[..., -1, :],
             turned=commands.turned[..., -1, :],

@@ -419,6 +419,12 @@ def moved_since(speed: Signal, before: Signal, rest_speed: float, rate_hz: float
     return np.asarray((number - np.maximum.accumulate(stood, axis=-1)) / rate_hz)
 
 
+def newest_signs(signs: Signal) -> Signal:
+    """Signs (…, time), each 0 replaced by the newest before it that is none."""
+    place = np.where(signs != 0.0, np.arange(signs.shape[-1]), 0)
+    return np.take_along_axis(signs, np.maximum.accumulate(place, axis=-1), axis=-1)
+
+
 LONG_M = 10.0
 """A wheel that has not moved yet has rolled so far: a start is no reversal, for it may have gone either way before."""
 
@@ -432,10 +438,7 @@ def rolled_since(speed: Signal, before: Signal, rate_hz: float) -> Signal:
         rate_hz: Samples per second.
     """
     now = np.where(np.abs(speed) < REST_SPEED, 0.0, np.sign(speed))
-    sign = np.concatenate((np.sign(before)[..., None], now), axis=-1)
-    place = np.arange(sign.shape[-1])
-    newest = np.maximum.accumulate(np.where(sign != 0.0, place, 0), axis=-1)
-    course = np.take_along_axis(sign, newest, axis=-1)
+    course = newest_signs(np.concatenate((np.sign(before)[..., None], now), axis=-1))
     start = np.where(before == 0.0, LONG_M, np.abs(before))
     way = np.concatenate((start[..., None], np.abs(speed) / rate_hz), axis=-1).cumsum(axis=-1)
     turned = course[..., 1:] * course[..., :-1] < 0.0

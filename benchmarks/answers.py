@@ -152,7 +152,8 @@ def main() -> None:
     (given.output / "driven").mkdir(parents=True, exist_ok=True)
     with Store.open(given.output / "driven") as store:
         objective = TruthObjective(StudyRun(study, store))
-        for seed in [one for one in seeds if one not in read(given.output)]:
+        finished = read(given.output)
+        for seed in (one for one in seeds if one not in finished):
             row = run_seed(objective, given.output / str(seed), seed)
             with (given.output / "answers.jsonl").open("a", encoding="utf-8") as file:
                 file.write(json.dumps(row) + "\n")

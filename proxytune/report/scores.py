@@ -134,7 +134,7 @@ def score_view(
     Args:
         assessments: Of each proxy, by name.
         selection: The proxies ranked; None where there is one.
-        figures: What was drawn.
+        figures: What was drawn; all figures are, where none is given.
         target: Name of the target.
     """
     figures = figures or [picture for *_, picture in _all_drawn(assessments, selection)]

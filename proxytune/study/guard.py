@@ -35,12 +35,12 @@ class UserFamily:
         """Any member of the family; what asking for it raises is an ExtensionError."""
         if member.startswith("__"):
             raise AttributeError(member)
-        # A property that raises AttributeError is no missing one.
 
-        def found() -> Any:
+        def read() -> Any:
+            # A property that raises AttributeError is no missing one.
             return getattr(self.family, member) if has_member(self.family, member) else MISSING
 
-        value = ask(f"{member} of {self.name}", found)
+        value = ask(f"{member} of {self.name}", read)
         if value is MISSING:
             raise AttributeError(f"{self.name} has no '{member}'")
         if self.aliases and member in ON_EPISODES:

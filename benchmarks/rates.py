@@ -17,6 +17,7 @@ from types import ModuleType
 from typing import Any
 from unittest import mock
 
+import gym_dynamics_cases as gym
 import hidden_cars
 import hidden_cases as hidden
 import numpy as np
@@ -42,6 +43,7 @@ GENERATORS: dict[str, ModuleType] = {
     "first": hidden,
     "second": second,
     "third": third,
+    "gym": gym,
     "car": hidden_cars,
     "second_car": second_hidden_cars,
 }
@@ -53,7 +55,7 @@ class Job:
     """A case to diagnose; `without` is taken out of the catalogue."""
 
     kind: str
-    case: hidden.Case | second.Case | third.Case | hidden_cars.Case | second_hidden_cars.Case | BulletCase
+    case: hidden.Case | second.Case | third.Case | gym.Case | hidden_cars.Case | second_hidden_cars.Case | BulletCase
     without: str = ""
 
     @property

@@ -137,8 +137,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("folder", type=Path, metavar="DIR")
     parser.add_argument("--cases", type=int, default=0, help="how many; all that there are, if not said")
-    # The third has none of KINDS but clean ones.
-    named = ",".join(name for name in GENERATORS if name != "third")
+    # Where nothing is an effect there is none of KINDS but clean ones.
+    named = ",".join(name for name, cases in GENERATORS.items() if not hasattr(cases, "PHYSICS"))
     parser.add_argument("--generators", default=named, help="whose cases")
     parser.add_argument("--seed", type=int, default=1, help="of the draw")
     asked = parser.parse_args()

@@ -224,6 +224,11 @@ class Knowledge:
         return from_unit(self.space, self.posterior.mode)
 
     @property
+    def mean(self) -> Values:
+        """The posterior's mean, visited or not."""
+        return from_unit(self.space, self.posterior.mean)
+
+    @property
     def lowest_inside(self) -> Values:
         """The θ of the 95 % region whose composed PRPV is lowest, the most probable of several."""
         rows = np.flatnonzero(self.posterior.inside)

@@ -219,7 +219,9 @@ def as_targets(
     normal = np.random.default_rng(seed).standard_normal((len(known), len(goal.values)))
     places = np.unique(np.linspace(0, max(0, len(whole) - 1), most).round().astype(int)).tolist()
     for row in [whole[place] for place in places] if len(whole) >= FEWEST else []:
-        others = fit_outputs(model.space, [*known[:row], *known[row + 1 :]], model.kernel)
+        # Not of the same θ under another placement either, which would tell too much.
+        elsewhere = [trial for trial in known if trial.values != known[row].values]
+        others = fit_outputs(model.space, elsewhere, model.kernel)
         outcome = np.array(known[row].outcome) + normal[row] * np.sqrt(goal.noise)
         likelihood = Likelihood(others, replace(goal, values=np.where(np.isnan(goal.values), np.nan, outcome)))
         if likelihood.columns.size:

@@ -3,16 +3,15 @@
 All trials share the placement noise of the study's seed, so the θ that the search likes best also suits that noise.
 After the trials, finalists are driven under seeds that the search has not seen: the visited θ of lowest expected PRPV,
 and two that no trial need have visited, the most probable θ and the θ of the 95 % region whose PRPV is expected to be
-lowest. The answer is the most probable of those whose expected PRPV and fresh scores are, on average, not more than a
-standard deviation of a fresh score above the lowest. Its own fresh score was chosen by; so it is driven in repetitions
-that nothing is chosen by, as many as its interval needs (`_more`). Beside it stands the nominal θ. What was driven
+lowest. What they did counts like trials, under other placement noise, and all together tell θ. The answer is the
+posterior's mean, unless fresh episodes of a finalist speak against it (`_answers`). It is driven in repetitions that
+nothing is chosen by, as many as its interval needs (`_repetitions`). Beside it stands the nominal θ. What was driven
 twice from the same start, here and in the pre-flight, tells the noise of all that (`expect`). No trial depends on it.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from math import ceil
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from proxytune.arrays import Floats
 from proxytune.domain import Episode, Outcome, instance_of
 from proxytune.errors import EpisodeError
 from proxytune.scores import ScoreTable
-from proxytune.search import Knowledge, make_proposer
+from proxytune.search import Knowledge, Trial, learn_theta, make_proposer
 from proxytune.seeds import fresh_seed
 from proxytune.space import Theta
 from proxytune.storage import TrialRecord
@@ -30,7 +29,14 @@ from proxytune.study.opening import Study
 from proxytune.study.preflight import placement_pairs, run_preflight
 from proxytune.study.run import AfterEarlier, goal_of, knowledge_of, record, retry_failed, run_trials, stopped
 from proxytune.study.settings import StudySettings
-from proxytune.study.study_run import StudyRun, evaluate_outcomes, in_common, plan_episodes, score_table
+from proxytune.study.study_run import (
+    StudyRun,
+    evaluate_outcomes,
+    in_common,
+    outputs_of,
+    plan_episodes,
+    score_table,
+)
 from proxytune.usefulness import Assessment, Donors, Expectation, assess, donors_of, expect
 
 MOST_FINALISTS = 3
@@ -38,7 +44,7 @@ MOST_FINALISTS = 3
 UNVISITED = 0
 """Number of a finalist that no trial visited."""
 MOST_REPETITIONS = 5
-"""At most so many more of the answer, which nothing is chosen by."""
+"""At most so many of the answer, which nothing is chosen by; at least one."""
 NARROW = 1.0
 """Half an interval of PRPV [ordered pairs] that more repetitions need not make narrower."""
 
@@ -109,12 +115,12 @@ class Confirmation:
     """The answer of fresh episodes.
 
     Attributes:
-        answer: The finalist that is the answer.
-        candidates: All finalists, the search's own favourite first.
-        episodes: How many fresh episodes each was driven in.
-        expected: What is expected of the answer: by the repetitions that nothing was chosen by, or by its fresh
-            episodes where noise asks for none of these, or they are still missing; None if an agent failed in all.
-        repetitions: How many repetitions that nothing was chosen by were driven.
+        answer: The answer, its fresh episodes those of the repetitions that nothing was chosen by.
+        candidates: All finalists, the search's own favourite first; the answer may be none of them.
+        episodes: How many fresh episodes each of these was driven in.
+        expected: What is expected of the answer; None if an agent failed in all its fresh episodes.
+        repetitions: How many repetitions of it were driven.
+        knowledge: What is known of θ, by trials and finalists together.
     """
 
     answer: Finalist
@@ -122,6 +128,12 @@ class Confirmation:
     episodes: int
     expected: Expectation | None
     repetitions: int
+    knowledge: Knowledge
+
+    @property
+    def others(self) -> tuple[Finalist, ...]:
+        """The finalists that are not the answer."""
+        return tuple(one for one in self.candidates if dict(one.trial.theta) != dict(self.answer.trial.theta))
 
 
 @dataclass(frozen=True)
@@ -172,15 +184,18 @@ def run_confirmation(run: StudyRun) -> None:
     chosen = finalists(trials, learnt)
     planned = [_planned(settings, trial) for trial in chosen]
     most, each = most_confirmation_episodes(settings), len(settings.agents) * settings.starts
-    run.watcher.begin("fresh episodes", most - sum(map(len, planned)) - MOST_REPETITIONS * each)
+    run.watcher.begin("fresh episodes", most - sum(map(len, planned)) - (1 + MOST_REPETITIONS) * each)
     for number, episodes in enumerate(planned, start=1):
         what = f"fresh episodes {number} of {len(chosen)}"
         run.outcomes(episodes, what)
         run.watcher.finished(what)
     driven = _driven(run, chosen) if settings.confirm else None
-    more = _more(run, _answer(driven, learnt), _donors(run, driven)) if driven else []
-    run.watcher.begin("the answer again", (MOST_REPETITIONS - len(more)) * each)
-    run.outcomes([episode for repetition in more for episode in repetition], "the answer again")
+    for theta in _answers(driven, learnt, _learn_again(run, learnt, driven)) if driven else ():
+        planned = [plan_episodes(settings, theta, settings.seed), *_repetitions(run, theta, driven or ())]
+        run.watcher.begin("the answer", (1 + MOST_REPETITIONS - len(planned)) * each)
+        run.outcomes([episode for repetition in planned for episode in repetition], "the answer")
+        if (own := run.evaluation(theta)) and own.score is not None:
+            break
 
 
 def confirmation_of(run: StudyRun, trials: Sequence[TrialRecord], learnt: Knowledge) -> Confirmation | None:
@@ -189,19 +204,23 @@ def confirmation_of(run: StudyRun, trials: Sequence[TrialRecord], learnt: Knowle
     driven = _driven(run, finalists(trials, learnt)) if settings.confirm else None
     if not driven:
         return None
-    answer, donors, each = _answer(driven, learnt), _donors(run, driven), len(settings.agents) * settings.starts
-    whole = _assessed(run.study, answer.fresh)
-    tables, count = [table for one in answer.fresh if (table := _table(run.study, one))], 0
-    expected = None
-    if whole and tables:
-        known = [run.known(planned) for planned in _more(run, answer, donors)]
-        again = [table for one in known if len(one) == each and (table := _table(run.study, tuple(one.values())))]
-        chosen_by = _expect(run, tables, donors)
-        expected = _expect(run, again, donors) if again else chosen_by
-        inner = replace(whole.prpv_interval, low=chosen_by.prpv.value.low, high=chosen_by.prpv.value.high)
+    again, each = _learn_again(run, learnt, driven), len(settings.agents) * settings.starts
+    for theta in _answers(driven, learnt, again):
+        own = run.evaluation(theta)
+        known = [run.known(planned) for planned in _repetitions(run, theta, driven)]
+        if own is None or any(len(one) < each for one in known):
+            return None
+        if own.score is not None:
+            break
+    visited = (one.trial for one in driven if one.trial.number and dict(one.trial.theta) == dict(theta))
+    fresh = tuple(tuple(one.values()) for one in known)
+    answer = _finalist(run, next(visited, record(UNVISITED, own)), fresh)
+    tables = [table for one in fresh if (table := _table(run.study, one))]
+    expected = _expect(run, tables, _donors(run, driven)) if tables else None
+    if expected and (whole := _assessed(run.study, fresh)):
+        inner = replace(whole.prpv_interval, low=expected.prpv.value.low, high=expected.prpv.value.high)
         answer = replace(answer, assessment=replace(whole, prpv_interval=inner, noise_floor=expected.floor))
-        count = len(again)
-    return Confirmation(answer, tuple(driven), settings.confirm * each, expected, count)
+    return Confirmation(answer, tuple(driven), settings.confirm * each, expected, len(fresh), again)
 
 
 def finalists(trials: Sequence[TrialRecord], learnt: Knowledge) -> list[TrialRecord]:
@@ -244,38 +263,66 @@ def _driven(run: StudyRun, chosen: Sequence[TrialRecord]) -> list[Finalist] | No
             if len(known) < len(planned) or own is None:
                 return None
             fresh.append(tuple(known.values()))
-        scores = tuple(evaluate_outcomes(run.study, trial.theta, outcomes).score for outcomes in fresh)
-        found.append(Finalist(trial if trial.number or own is None else record(UNVISITED, own), tuple(fresh), scores))
+        found.append(_finalist(run, trial if trial.number or own is None else record(UNVISITED, own), tuple(fresh)))
     return [one for one in found if one.trial.score is not None]
 
 
-def _answer(driven: Sequence[Finalist], learnt: Knowledge) -> Finalist:
-    """The most probable of those that PRPV cannot tell from the best; the best itself where no θ explains the target.
+def _finalist(run: StudyRun, trial: TrialRecord, fresh: tuple[tuple[Outcome, ...], ...]) -> Finalist:
+    return Finalist(trial, fresh, tuple(evaluate_outcomes(run.study, trial.theta, one).score for one in fresh))
 
-    Each has as many fresh episodes, so what fresh noise does to all of them alike favours none.
+
+def _learn_again(run: StudyRun, learnt: Knowledge, driven: Sequence[Finalist]) -> Knowledge:
+    """What is known of θ by the trials and by what the finalists did: each repetition has a placement of its own.
+
+    On 30 targets whose θ was known its mean was 0.047 of the box off in the median, that of the trials alone 0.054.
+    """
+
+    def trial_of(one: Finalist, outcomes: Iterable[Outcome], placement: int) -> Trial:
+        values = learnt.space.values(one.trial.theta)
+        return Trial(values, None, outputs_of(run.study, list(outcomes)), placement=placement)
+
+    fresh = [trial_of(one, outcomes, -number) for one in driven for number, outcomes in enumerate(one.fresh, start=1)]
+    unvisited = [one for one in driven if one.trial.number == UNVISITED]
+    own = [run.known(plan_episodes(run.settings, one.trial.theta, run.settings.seed)).values() for one in unvisited]
+    fresh += [trial_of(one, outcomes, 0) for one, outcomes in zip(unvisited, own, strict=True)]
+    return learn_theta(learnt.space, [*learnt.trials, *fresh], learnt.goal, learnt.seed)
+
+
+def _answers(driven: Sequence[Finalist], learnt: Knowledge, again: Knowledge) -> list[Theta]:
+    """The answer, and which θ takes its place should an agent fail there.
+
+    Where no θ explains the target, the finalist of lowest PRPV; each has as many fresh episodes, so what fresh noise
+    does to all of them alike favours none. Else the mean of what is known again, if PRPV does not speak against it,
+    and the most probable of the finalists that PRPV cannot tell from the best.
     """
     by_values = {learnt.space.values(one.trial.theta): one for one in driven}
     own = learnt.expected_of({values: one.trial.score or 0.0 for values, one in by_values.items()})
-    mean = {
+    expected = {
         values: float(np.mean([own[values], *(score for score in one.scores if score is not None)]))
         for values, one in by_values.items()
     }
-    best = min(mean, key=mean.__getitem__)
-    if learnt.misfit.fits is False:
-        return by_values[best]
-    limit = mean[best] + float(learnt.fresh_scores(best).std())
-    return by_values[learnt.likeliest_of([values for values in mean if mean[values] <= limit])]
+    best = min(expected, key=expected.__getitem__)
+    limit = expected[best] + float(learnt.fresh_scores(best).std())
+    likeliest = again.likeliest_of([values for values in expected if expected[values] <= limit])
+    if again.misfit.fits is False:
+        chosen = [best]
+    elif again.holds(again.mean) and again.scores([again.mean])[0][0] <= limit:
+        chosen = [again.mean, likeliest]
+    else:
+        chosen = [likeliest]
+    return [learnt.space.theta(values) for values in chosen]
 
 
-def _more(run: StudyRun, answer: Finalist, donors: Donors) -> list[list[Episode]]:
-    """The repetitions of the answer that nothing is chosen by: as many as make its interval narrow."""
-    table = _table(run.study, answer.fresh[0])
-    if table is None:
-        return []
-    settings, reach = run.settings, 1.96 * _expect(run, [table], donors).deviation
-    count = min(MOST_REPETITIONS, ceil((reach / NARROW) ** 2))
+def _repetitions(run: StudyRun, theta: Theta, driven: Sequence[Finalist]) -> list[list[Episode]]:
+    """The repetitions of the answer that nothing is chosen by: as many as make its interval narrow.
+
+    What noise does to it is told by the finalists, which are near it.
+    """
+    settings, tables = run.settings, [table for one in driven if (table := _table(run.study, one.fresh[0]))]
+    reach = 1.96 * _expect(run, tables[:1], _donors(run, driven)).deviation if tables else np.inf
+    count = int(np.clip(np.ceil((reach / NARROW) ** 2), 1, MOST_REPETITIONS))
     seeds = [fresh_seed(settings.seed, settings.confirm + 1 + number) for number in range(count)]
-    return [plan_episodes(settings, answer.trial.theta, seed) for seed in seeds]
+    return [plan_episodes(settings, theta, seed) for seed in seeds]
 
 
 def _donors(run: StudyRun, driven: Sequence[Finalist]) -> Donors:
@@ -304,7 +351,7 @@ def _cells(run: StudyRun, outcomes: Iterable[Outcome]) -> Floats:
 
 def most_confirmation_episodes(settings: StudySettings) -> int:
     """The number of episodes that a confirmation takes at most, the nominal θ not counted."""
-    repetitions = MOST_FINALISTS * settings.confirm + MOST_FINALISTS - 1 + MOST_REPETITIONS
+    repetitions = MOST_FINALISTS * settings.confirm + MOST_FINALISTS + MOST_REPETITIONS
     return repetitions * len(settings.agents) * settings.starts if settings.confirm else 0
 
 

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, cast
 
+from proxytune.domain import instance_of
 from proxytune.errors import InputError, RunError
 from proxytune.running import ENDLESS
 from proxytune.scores import Metric
@@ -16,7 +17,7 @@ from proxytune.search import History, Importance, Knowledge, PastTrial, fit_surr
 from proxytune.settings import nearest
 from proxytune.space import Theta
 from proxytune.storage import TrialRecord
-from proxytune.study.answer import UNVISITED, Confirmation, Nominal, confirmation_of, finalists, nominal_of
+from proxytune.study.answer import Confirmation, Nominal, confirmation_of, finalists, nominal_of
 from proxytune.study.apart import apart_notes
 from proxytune.study.earlier import earlier_trials
 from proxytune.study.opening import Study, read_target
@@ -61,7 +62,8 @@ class StudyResult:
         study: Which one.
         trials: Its finished and failed trials, in order.
         best: The best of them.
-        knowledge: What is known of θ.
+        knowledge: What is known of θ, by trials, and by fresh episodes where there are any.
+        earlier: The number of trials of earlier studies that count.
         answers: After each trial, the visited θ of lowest expected PRPV as all trials judge it; None while none has
             a score.
         truth: The θ that made the target, where that is known.
@@ -79,6 +81,7 @@ class StudyResult:
     trials: tuple[TrialRecord, ...]
     best: Best
     knowledge: Knowledge
+    earlier: int
     answers: tuple[TrialRecord | None, ...]
     truth: Theta | None
     importances: tuple[Importance, ...]
@@ -134,11 +137,6 @@ class StudyResult:
         excess, fits = self.excess, self.knowledge.misfit.fits is not False and self.inside
         return excess is not None and excess.low <= 0.0 and not self.judged.chance.explains and fits
 
-    @property
-    def earlier(self) -> int:
-        """The number of trials of earlier studies that count."""
-        return len(self.knowledge.trials) - len(self.trials)
-
     def value_of(self, trial: TrialRecord) -> float | None:
         """The objective of a finished trial; None of any other."""
         return trial.measures.get(self.study.objective.name)
@@ -162,8 +160,10 @@ class StudyResult:
         each, last = len(settings.agents) * settings.starts, self.confirmation
         after = each if self.nominal else 0
         if last:
-            own = sum(one.trial.number == UNVISITED for one in last.candidates) + last.repetitions
-            after += last.episodes * len(last.candidates) + each * own
+            unvisited = {
+                instance_of(one.trial.theta) for one in (*last.candidates, last.answer) if not one.trial.number
+            }
+            after += last.episodes * len(last.candidates) + each * (len(unvisited) + last.repetitions)
         return before + trials + after
 
 
@@ -183,7 +183,7 @@ def result_of(run: StudyRun, scored_anew: Sequence[TrialRecord] | None = None) -
     confirmation = confirmation_of(run, trials, learnt)
     answers = _answers(trials, learnt)
     if confirmation:
-        answer = confirmation.answer.trial
+        answer, learnt = confirmation.answer.trial, confirmation.knowledge
     else:
         answer = answers[-1] if answers and answers[-1] else record(0, run.evaluation_of(finalists(trials, learnt)[0]))
     values = learnt.space.values(answer.theta)
@@ -198,6 +198,7 @@ def result_of(run: StudyRun, scored_anew: Sequence[TrialRecord] | None = None) -
         trials=trials,
         best=best,
         knowledge=learnt,
+        earlier=len(earlier),
         answers=answers,
         truth=study.truth,
         importances=importances(fit_surrogate(space, [*earlier, *score_trials(space, trials)])),

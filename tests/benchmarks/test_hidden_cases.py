@@ -329,7 +329,9 @@ def test_every_log_stops_creeps_reverses_spins_and_drives_at_nearly_full_duty():
         assert all(mask.sum() > 20 for mask in seen), (seed, [int(mask.sum()) for mask in seen])
 
 
-@pytest.mark.parametrize("module", ["hidden_cases.py", "manoeuvres.py", "third_hidden_cases.py"])
+@pytest.mark.parametrize(
+    "module", ["hidden_cases.py", "manoeuvres.py", "third_hidden_cases.py", "gym_dynamics_cases.py"]
+)
 def test_the_generator_knows_nothing_of_proxytune_but_the_log(module):
     tree = ast.parse((BENCHMARKS / module).read_text(encoding="utf-8"))
     names = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}

@@ -55,4 +55,4 @@ def confirmed(result, score=12, ends=(8.0, 20.0), **floor):
     # What else a candidate has is of no matter to a report.
     fields = dict.fromkeys(Finalist.__dataclass_fields__, ())
     answer = Finalist(**{**fields, "trial": result.best.trial, "scores": (score,), "assessment": fresh})
-    return replace(result, confirmation=Confirmation(answer, (answer,), 18, expected, 5))
+    return replace(result, confirmation=Confirmation(answer, (answer,), 18, expected, 5, result.knowledge))

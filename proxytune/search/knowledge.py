@@ -95,8 +95,6 @@ REPORTED = 16384
 """Points of the posterior that is reported: four times as many as a draw takes, so that small regions are smooth."""
 EXPECTED_FROM = 24
 """At most so many trials are taken for targets to expect what one will tell."""
-MOST_INSIDE = 2048
-"""At most so many of these are looked at for the lowest PRPV."""
 UPPER = 97.5
 """Percentile of fresh scores of the answer, up to which another θ cannot be told from it."""
 
@@ -227,14 +225,6 @@ class Knowledge:
     def mean(self) -> Values:
         """The posterior's mean, visited or not."""
         return from_unit(self.space, self.posterior.mean)
-
-    @property
-    def lowest_inside(self) -> Values:
-        """The θ of the 95 % region whose composed PRPV is lowest, the most probable of several."""
-        rows = np.flatnonzero(self.posterior.inside)
-        rows = rows[np.argsort(-self.posterior.density[rows], kind="stable")][:MOST_INSIDE]
-        points = self.posterior.points[rows]
-        return from_unit(self.space, points[int(np.argmin(self._drawn(points).mean(axis=0)))])
 
     def likeliest_of(self, points: Sequence[Values]) -> Values:
         """That of some θ which explains the target's outputs best."""

@@ -2,11 +2,12 @@
 
 All trials share the placement noise of the study's seed, so the θ that the search likes best also suits that noise.
 After the trials, finalists are driven under seeds that the search has not seen: the visited θ of lowest expected PRPV,
-and two that no trial need have visited, the most probable θ and the θ of the 95 % region whose PRPV is expected to be
-lowest. What they did counts like trials, under other placement noise, and all together tell θ. The answer is the
-posterior's mean, unless fresh episodes of a finalist speak against it (`_answers`). It is driven in repetitions that
-nothing is chosen by, as many as its interval needs (`_repetitions`). Beside it stands the nominal θ. What was driven
-twice from the same start, here and in the pre-flight, tells the noise of all that (`expect`). No trial depends on it.
+the most probable θ, visited or not, and the mean of what trials and these two tell of θ, whose fresh episodes count
+like trials under other placement noise. The answer is the mean, unless it scores worse than the best finalist by more
+than a standard deviation of a fresh score: then the most probable of those that do not. It is driven in repetitions
+that nothing was chosen by, as many as its interval needs (`_repetitions`). Beside it stands the nominal θ. What was
+driven twice from the same start, here and in the pre-flight, tells the noise of all that (`expect`). No trial depends
+on it.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -116,7 +117,7 @@ class Confirmation:
 
     Attributes:
         answer: The answer, its fresh episodes those of the repetitions that nothing was chosen by.
-        candidates: All finalists, the search's own favourite first; the answer may be none of them.
+        candidates: All finalists, the search's own favourite first.
         episodes: How many fresh episodes each of these was driven in.
         expected: What is expected of the answer; None if an agent failed in all its fresh episodes.
         repetitions: How many repetitions of it were driven.
@@ -129,11 +130,6 @@ class Confirmation:
     expected: Expectation | None
     repetitions: int
     knowledge: Knowledge
-
-    @property
-    def others(self) -> tuple[Finalist, ...]:
-        """The finalists that are not the answer."""
-        return tuple(one for one in self.candidates if dict(one.trial.theta) != dict(self.answer.trial.theta))
 
 
 @dataclass(frozen=True)
@@ -180,55 +176,51 @@ def run_confirmation(run: StudyRun) -> None:
     # An answer that no trial visited needs episodes of its own, also without fresh ones.
     if not stopped(run, trials) or (trials and not settings.confirm):
         return
-    learnt = knowledge_of(run, trials)
+    learnt, each = knowledge_of(run, trials), len(settings.agents) * settings.starts
     chosen = finalists(trials, learnt)
     planned = [_planned(settings, trial) for trial in chosen]
-    most, each = most_confirmation_episodes(settings), len(settings.agents) * settings.starts
-    run.watcher.begin("fresh episodes", most - sum(map(len, planned)) - (1 + MOST_REPETITIONS) * each)
+    after = (settings.confirm + 1 + MOST_REPETITIONS) * each
+    run.watcher.begin("fresh episodes", most_confirmation_episodes(settings) - sum(map(len, planned)) - after)
     for number, episodes in enumerate(planned, start=1):
         what = f"fresh episodes {number} of {len(chosen)}"
         run.outcomes(episodes, what)
         run.watcher.finished(what)
-    driven = _driven(run, chosen) if settings.confirm else None
-    for theta in _answers(driven, learnt, _learn_again(run, learnt, driven)) if driven else ():
-        planned = [plan_episodes(settings, theta, settings.seed), *_repetitions(run, theta, driven or ())]
-        run.watcher.begin("the answer", (1 + MOST_REPETITIONS - len(planned)) * each)
-        run.outcomes([episode for repetition in planned for episode in repetition], "the answer")
-        if (own := run.evaluation(theta)) and own.score is not None:
-            break
+    first = _driven(run, chosen) if settings.confirm else None
+    mean = [one for trial in _mean_of(run, learnt, first) for one in _planned(settings, trial)] if first else []
+    run.watcher.begin("fresh episodes of the mean", (settings.confirm + 1) * each - len(mean))
+    run.outcomes(mean, "fresh episodes of the mean")
+    driven = _all_driven(run, trials, learnt) if settings.confirm else None
+    again = driven and _learn_again(run, learnt, driven)
+    more = _repetitions(run, _answer(driven, learnt, again), driven) if driven and again else []
+    run.watcher.begin("the answer again", (MOST_REPETITIONS - len(more)) * each)
+    run.outcomes([episode for repetition in more for episode in repetition], "the answer again")
 
 
 def confirmation_of(run: StudyRun, trials: Sequence[TrialRecord], learnt: Knowledge) -> Confirmation | None:
     """The answer of the fresh episodes of these trials; None if it is off, or an episode is still missing."""
     settings = run.settings
-    driven = _driven(run, finalists(trials, learnt)) if settings.confirm else None
+    driven = _all_driven(run, trials, learnt) if settings.confirm else None
     if not driven:
         return None
     again, each = _learn_again(run, learnt, driven), len(settings.agents) * settings.starts
-    for theta in _answers(driven, learnt, again):
-        own = run.evaluation(theta)
-        known = [run.known(planned) for planned in _repetitions(run, theta, driven)]
-        if own is None or any(len(one) < each for one in known):
-            return None
-        if own.score is not None:
-            break
-    visited = (one.trial for one in driven if one.trial.number and dict(one.trial.theta) == dict(theta))
-    fresh = tuple(tuple(one.values()) for one in known)
-    answer = _finalist(run, next(visited, record(UNVISITED, own)), fresh)
-    tables = [table for one in fresh if (table := _table(run.study, one))]
+    answer = _answer(driven, learnt, again)
+    known = [run.known(planned) for planned in _repetitions(run, answer, driven)]
+    if any(len(one) < each for one in known):
+        return None
+    answer = _finalist(run, answer.trial, tuple(tuple(one.values()) for one in known))
+    tables = [table for one in answer.fresh if (table := _table(run.study, one))]
     expected = _expect(run, tables, _donors(run, driven)) if tables else None
-    if expected and (whole := _assessed(run.study, fresh)):
+    if expected and (whole := _assessed(run.study, answer.fresh)):
         inner = replace(whole.prpv_interval, low=expected.prpv.value.low, high=expected.prpv.value.high)
         answer = replace(answer, assessment=replace(whole, prpv_interval=inner, noise_floor=expected.floor))
-    return Confirmation(answer, tuple(driven), settings.confirm * each, expected, len(fresh), again)
+    return Confirmation(answer, tuple(driven), settings.confirm * each, expected, len(known), again)
 
 
 def finalists(trials: Sequence[TrialRecord], learnt: Knowledge) -> list[TrialRecord]:
-    """The θ that are driven again, that of lowest expected PRPV first: a function of what was finished alone.
+    """The θ that are driven again before the mean, that of lowest expected PRPV first, by what was finished alone.
 
-    Where no θ explains the target, the most probable one is worth little: then visited θ take the place of what no
-    trial visited, those not more than a standard deviation of a fresh score behind. Without trials, earlier studies
-    tell.
+    Where no θ explains the target, the most probable one and the mean are worth little: then visited θ take their
+    place, those not more than a standard deviation of a fresh score behind. Without trials, earlier studies tell.
     """
     # Of a pruned trial it is certain that it is none of the best.
     scored = {learnt.space.values(trial.theta): trial for trial in trials if trial.state == "finished"}
@@ -238,11 +230,18 @@ def finalists(trials: Sequence[TrialRecord], learnt: Knowledge) -> list[TrialRec
     best = min(expected, key=expected.__getitem__)
     noise = float(learnt.fresh_scores(best).std())
     near = [values for values, mean in expected.items() if mean - expected[best] <= noise]
-    inner = (
-        [learnt.likeliest_of(list(expected))] if learnt.misfit.fits is False else [learnt.mode, learnt.lowest_inside]
-    )
-    chosen = list(dict.fromkeys([near[0], *inner, *near[1:]]))[:MOST_FINALISTS]
+    lacks = learnt.misfit.fits is False
+    probable = learnt.likeliest_of(list(expected)) if lacks else learnt.mode
+    chosen = list(dict.fromkeys([near[0], probable, *near[1:]]))[: MOST_FINALISTS - (not lacks)]
     return [scored.get(values) or TrialRecord(UNVISITED, learnt.space.theta(values)) for values in chosen]
+
+
+def _mean_of(run: StudyRun, learnt: Knowledge, driven: Sequence[Finalist]) -> list[TrialRecord]:
+    """The mean of what trials and these finalists tell of θ, if it is worth being driven: none, or one."""
+    if learnt.misfit.fits is False:
+        return []
+    theta = learnt.space.theta(_learn_again(run, learnt, driven).mean)
+    return [] if theta in [dict(one.trial.theta) for one in driven] else [TrialRecord(UNVISITED, theta)]
 
 
 def _planned(settings: StudySettings, trial: TrialRecord) -> list[Episode]:
@@ -252,8 +251,15 @@ def _planned(settings: StudySettings, trial: TrialRecord) -> list[Episode]:
     return [episode for seed in seeds for episode in plan_episodes(settings, trial.theta, seed)]
 
 
+def _all_driven(run: StudyRun, trials: Sequence[TrialRecord], learnt: Knowledge) -> list[Finalist] | None:
+    """All finalists with their fresh episodes, as `_driven`, the mean last."""
+    first = _driven(run, finalists(trials, learnt))
+    last = _driven(run, _mean_of(run, learnt, first)) if first else []
+    return None if first is None or last is None else [*first, *last]
+
+
 def _driven(run: StudyRun, chosen: Sequence[TrialRecord]) -> list[Finalist] | None:
-    """The finalists with their fresh episodes; None while one is missing, and without θ that fail in their own."""
+    """These finalists with their fresh episodes; None while one is missing, and without θ that fail in their own."""
     found, settings = [], run.settings
     for trial in chosen:
         own, fresh = run.evaluation(trial.theta), []
@@ -288,12 +294,10 @@ def _learn_again(run: StudyRun, learnt: Knowledge, driven: Sequence[Finalist]) -
     return learn_theta(learnt.space, [*learnt.trials, *fresh], learnt.goal, learnt.seed)
 
 
-def _answers(driven: Sequence[Finalist], learnt: Knowledge, again: Knowledge) -> list[Theta]:
-    """The answer, and which θ takes its place should an agent fail there.
+def _answer(driven: Sequence[Finalist], learnt: Knowledge, again: Knowledge) -> Finalist:
+    """The mean, or the most probable, of those that PRPV cannot tell from the best; the best where no θ explains it.
 
-    Where no θ explains the target, the finalist of lowest PRPV; each has as many fresh episodes, so what fresh noise
-    does to all of them alike favours none. Else the mean of what is known again, if PRPV does not speak against it,
-    and the most probable of the finalists that PRPV cannot tell from the best.
+    Each has as many fresh episodes, so what fresh noise does to all of them alike favours none.
     """
     by_values = {learnt.space.values(one.trial.theta): one for one in driven}
     own = learnt.expected_of({values: one.trial.score or 0.0 for values, one in by_values.items()})
@@ -302,27 +306,21 @@ def _answers(driven: Sequence[Finalist], learnt: Knowledge, again: Knowledge) ->
         for values, one in by_values.items()
     }
     best = min(expected, key=expected.__getitem__)
+    if learnt.misfit.fits is False:
+        return by_values[best]
     limit = expected[best] + float(learnt.fresh_scores(best).std())
-    likeliest = again.likeliest_of([values for values in expected if expected[values] <= limit])
-    if again.misfit.fits is False:
-        chosen = [best]
-    elif again.holds(again.mean) and again.scores([again.mean])[0][0] <= limit:
-        chosen = [again.mean, likeliest]
-    else:
-        chosen = [likeliest]
-    return [learnt.space.theta(values) for values in chosen]
+    alike = [values for values in expected if expected[values] <= limit]
+    mean = list(by_values)[-1]
+    return by_values[mean if mean in alike else again.likeliest_of(alike)]
 
 
-def _repetitions(run: StudyRun, theta: Theta, driven: Sequence[Finalist]) -> list[list[Episode]]:
-    """The repetitions of the answer that nothing is chosen by: as many as make its interval narrow.
-
-    What noise does to it is told by the finalists, which are near it.
-    """
-    settings, tables = run.settings, [table for one in driven if (table := _table(run.study, one.fresh[0]))]
-    reach = 1.96 * _expect(run, tables[:1], _donors(run, driven)).deviation if tables else np.inf
+def _repetitions(run: StudyRun, answer: Finalist, driven: Sequence[Finalist]) -> list[list[Episode]]:
+    """The repetitions of the answer that nothing was chosen by: as many as make its interval narrow."""
+    settings, table = run.settings, _table(run.study, answer.fresh[0])
+    reach = 1.96 * _expect(run, [table], _donors(run, driven)).deviation if table else np.inf
     count = int(np.clip(np.ceil((reach / NARROW) ** 2), 1, MOST_REPETITIONS))
     seeds = [fresh_seed(settings.seed, settings.confirm + 1 + number) for number in range(count)]
-    return [plan_episodes(settings, theta, seed) for seed in seeds]
+    return [plan_episodes(settings, answer.trial.theta, seed) for seed in seeds]
 
 
 def _donors(run: StudyRun, driven: Sequence[Finalist]) -> Donors:
@@ -351,7 +349,7 @@ def _cells(run: StudyRun, outcomes: Iterable[Outcome]) -> Floats:
 
 def most_confirmation_episodes(settings: StudySettings) -> int:
     """The number of episodes that a confirmation takes at most, the nominal θ not counted."""
-    repetitions = MOST_FINALISTS * settings.confirm + MOST_FINALISTS + MOST_REPETITIONS
+    repetitions = MOST_FINALISTS * settings.confirm + MOST_FINALISTS - 1 + MOST_REPETITIONS
     return repetitions * len(settings.agents) * settings.starts if settings.confirm else 0
 
 

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, cast
 
-from proxytune.domain import instance_of
 from proxytune.errors import InputError, RunError
 from proxytune.running import ENDLESS
 from proxytune.scores import Metric
@@ -17,7 +16,7 @@ from proxytune.search import History, Importance, Knowledge, PastTrial, fit_surr
 from proxytune.settings import nearest
 from proxytune.space import Theta
 from proxytune.storage import TrialRecord
-from proxytune.study.answer import Confirmation, Nominal, confirmation_of, finalists, nominal_of
+from proxytune.study.answer import UNVISITED, Confirmation, Nominal, confirmation_of, finalists, nominal_of
 from proxytune.study.apart import apart_notes
 from proxytune.study.earlier import earlier_trials
 from proxytune.study.opening import Study, read_target
@@ -160,10 +159,8 @@ class StudyResult:
         each, last = len(settings.agents) * settings.starts, self.confirmation
         after = each if self.nominal else 0
         if last:
-            unvisited = {
-                instance_of(one.trial.theta) for one in (*last.candidates, last.answer) if not one.trial.number
-            }
-            after += last.episodes * len(last.candidates) + each * (len(unvisited) + last.repetitions)
+            own = sum(one.trial.number == UNVISITED for one in last.candidates) + last.repetitions
+            after += last.episodes * len(last.candidates) + each * own
         return before + trials + after
 
 

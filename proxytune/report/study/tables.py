@@ -159,9 +159,9 @@ def _prpv_rows(result: StudyResult) -> Rows:
     if expected is None:
         failed = "none on fresh episodes: an agent failed in all of them"
         return [("PRPV", "–", "", failed), (IN_SEARCH, value, "", pairs)]
-    optimism, others = confirmation.answer.optimism or 0.0, len(confirmation.others)
+    optimism, others = confirmation.answer.optimism or 0.0, len(confirmation.candidates) - 1
     luck = f"{optimism:.3g} lower by luck" if optimism > 0.0 else "no optimism"
-    rivals = f"; {others} other θ re-run as well" if others else ""
+    rivals = f"; {others} runner{'' if others == 1 else 's'}-up re-run as well" if others else ""
     count = f"in {expected.repetitions} more run{'s' if expected.repetitions > 1 else ''}"
     return [
         (

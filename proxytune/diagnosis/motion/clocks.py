@@ -136,10 +136,17 @@ def read_clocks(log: Log, robot: Robot, like: Clocks | None = None) -> Clocks:
     kept, jumps = stretches(log, squares, latencies)
     varied = not _is_rare(len({jump.drive for jump in jumps}), len(log.episodes))
     if varied:
-        kept, jumps = [(0.0, np.inf)] * len(log.episodes), ()
+        # Where poses step, it is the clock, however many drives have it.
+        proven, at_steps = stretches(log, squares, latencies, at_steps=True)
+        unproven = {jump.drive for jump in jumps} - {jump.drive for jump in at_steps}
+        varied = not _is_rare(len(unproven), len(log.episodes))
+        kept, jumps = (proven, at_steps) if varied else (kept, jumps)
+    jumped = {jump.drive for jump in jumps}
     own = [squares.squares[blocks_within(squares, e, kept[e])] for e in range(len(log.episodes))]
     common, others = deviants(own, latencies)
-    others = {} if varied or not _is_rare(len(others), len(log.episodes)) else others
+    whole = [e for e in others if log.episodes[e].name not in jumped]
+    if varied or not _is_rare(len(whole), len(log.episodes)):
+        others = {e: one for e, one in others.items() if e not in whole}
     latency = likeliest_latency(np.concatenate([part for e, part in enumerate(own) if e not in others]), latencies)
     assumed = like.left_s if like else max(robot.theta.get("delay", 0.0), ASSUMED_DELAY_S)
     unlike = like is not None and abs(latency.value - assumed) > max(LEAST_APART_S, SURE * latency.deviation)
@@ -173,7 +180,8 @@ def put_on_one_clock(log: Log, clocks: Clocks) -> Log:
         return log
 
     def retime(episode: LogEpisode, later_s: float, kept_s: Floats) -> LogEpisode:
-        episode = replace(episode, issued=_issued(episode) - later_s)
+        if later_s:
+            episode = replace(episode, issued=_issued(episode) - later_s)
         begin, end = episode.times[0] + np.maximum(kept_s, (-later_s, 0.0)) + (-1e-9, 1e-9)
         return _measured_within(episode, begin, end)
 

@@ -30,7 +30,7 @@ from proxytune.diagnosis.motion.clocks import (
     without_drift,
 )
 from proxytune.diagnosis.motion.drives import gather
-from proxytune.diagnosis.motion.latency import Blocks, stretches
+from proxytune.diagnosis.motion.latency import Blocks, _steps, stretches
 from proxytune.errors import LogError
 from proxytune.logs import Log, LogEpisode, Measured, read_log
 
@@ -95,6 +95,38 @@ def test_a_clock_that_jumps_is_named_with_its_time_and_the_longer_stretch_is_kep
     low, high = found.kept_s[3]
     assert (low, high <= 25.0) == (0.0, True)
     assert np.isinf(found.kept_s[[0, 1, 2, 4, 5], 1]).all()
+
+
+def test_a_clock_that_jumps_in_a_third_of_the_drives_is_told_where_poses_step():
+    late = in_one_drive(-0.3, after=500) + in_one_drive(0.2, drive=1, after=300)
+    found = clocks(late)
+    assert [(jump.drive, jump.time_s) for jump in found.jumps] == [
+        ("01", pytest.approx(15.0, abs=2.0)),
+        ("03", pytest.approx(25.0, abs=2.0)),
+    ]
+    np.testing.assert_allclose([jump.by_s for jump in found.jumps], (0.2, -0.3), atol=0.05)
+    # Of drive 01 the stretch after its jump is kept, on the clock of the others.
+    assert found.kept_s[1, 0] > 15.0
+    np.testing.assert_allclose(found.later_s, (0.0, -0.2, 0.0, 0.0, 0.0, 0.0), atol=0.02)
+
+
+def test_a_jump_too_small_for_its_latencies_alone_is_told_by_the_step_of_the_poses():
+    one = planted("jump", 154, hidden=False)
+    (jump,) = read_clocks(hidden.make_log(one.case, late_s=one.late_s), ROBOT).jumps
+    assert (one.case.noise, one.by_s, f"{one.drive:02d}") == ("double", -0.05, jump.drive)
+    assert jump.time_s == pytest.approx(one.at_s, abs=2.0)
+    assert jump.by_s == pytest.approx(-0.05, abs=0.015)
+
+
+def test_poses_that_step_alone_are_no_jump_of_the_clock():
+    log = hidden.make_log(CASE, **SHORT)
+
+    def moved_on(poses):
+        heading = poses[300, 2]
+        return poses + (np.arange(800) >= 300)[:, None] * (0.08 * np.cos(heading), 0.08 * np.sin(heading), 0.0)
+
+    assert len(_steps(with_poses(log, moved_on))[0]) > len(_steps(log)[0])
+    assert not read_clocks(with_poses(log, moved_on), ROBOT).jumps
 
 
 DRIFTING = np.broadcast_to(np.arange(800) / 20.0, SHAPE)

@@ -198,7 +198,8 @@ def _measured_within(episode: LogEpisode, begin: float, end: float) -> LogEpisod
     known = (begin <= episode.times) & (episode.times <= end)
     measured = episode.measured
     if measured is not None:
-        measured = Measured(*(part[known[measured.rows]] for part in measured))
+        own = known[measured.rows]
+        measured = Measured(measured.times[own], measured.poses[own], measured.rows[own])
     return replace(episode, poses=np.where(known[:, None], episode.poses, np.nan), measured=measured)
 
 

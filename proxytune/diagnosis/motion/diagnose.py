@@ -338,7 +338,7 @@ def diagnose(
     names, parameters = declared_parameters(declared, robot.catalogue), robot.catalogue.parameters
     start = {name: robot.theta.get(name, parameters[name].neutral_value(robot.figures)) for name in names}
     log, own = on_one_clock(log, robot)
-    clocks = (own,)
+    clocks: tuple[Clocks, ...] = (own,)
     if test is not None:
         test, other = on_one_clock(test, robot, own)
         clocks = (own, other)

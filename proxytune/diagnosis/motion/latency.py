@@ -255,7 +255,7 @@ SURE_AT_A_STEP, SHARE_AT_A_STEP = 4.0, 0.05
 """The same where poses step when the latency changes, as a jump of their clock makes them while the robot moves."""
 STEP_SPAN_S, STEP_NATS = 0.2, 8.0
 """Poses so long before and after show a step, and it is so much likelier than none."""
-LEAST_STEP_S, STEP_TOLERANCE = 0.03, 0.25
+LEAST_STEP_S, STEP_TOLERANCE = 0.03, 0.5
 """The least jump that a step tells, and the share to which it does besides chance."""
 
 SHARE, SHARE_IF_FAR = 0.08, 0.7
@@ -456,7 +456,7 @@ def _jump_at_a_step(drive: Blocks, latencies: Floats, steps: Sequence[Step], usu
             continue
         one, other, share = _sides(drive.squares[:at, near], drive.squares[after:, near], latencies[near])
         by, deviation = other.value - one.value, float(np.hypot(one.deviation, other.deviation))
-        apart = 2.0 * np.hypot(deviation, step.deviation) + STEP_TOLERANCE * abs(by)
+        apart = 2.0 * np.hypot(deviation, step.deviation) + STEP_TOLERANCE * abs(step.value)
         if abs(by - step.value) < apart and _is_jump(one, other, share, usual, at_a_step=True):
             found.append((nats + (by / deviation) ** 2 / 2.0, at, by))
     return max(found)[1:] if found else None
@@ -509,7 +509,7 @@ def _is_jump(one: Latency, other: Latency, share: float, usual: float | None, *,
         return False
     near, far = sorted((one, other), key=lambda side: abs(side.value - usual))
     as_others = abs(near.value - usual) < max(NEAR_S, 2.0 * near.deviation)
-    return as_others and abs(far.value - usual) > max(LEAST_APART_S, SURE_BESIDE_OTHERS * far.deviation)
+    return as_others and abs(far.value - usual) > max(LEAST_APART_S, enough * far.deviation)
 
 
 def _share(squares: Floats, latencies: Floats, elsewhere: float) -> float:

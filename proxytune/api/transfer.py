@@ -12,9 +12,11 @@ import pandas as pd
 from proxytune.diagnosis import (
     PICTURES,
     Agreement,
+    Clocks,
     agreement,
     frames_of,
     frames_text,
+    on_one_clock,
     predict as predict_poses,
     predict_pictures,
     robot_of,
@@ -33,7 +35,7 @@ from proxytune.importing import (
     write_log,
 )
 from proxytune.logs import Log, check_kind, log_cautions
-from proxytune.report import frame_html, write_picture, write_text
+from proxytune.report import clocks_document, clocks_notes, frame_html, write_picture, write_text
 from proxytune.running import watching
 from proxytune.scores import ScoreTable, write_scores
 from proxytune.seeds import target_seed
@@ -207,12 +209,16 @@ class Prediction:
         poses: One row per predicted pose: episode, start_time, time [s], x, y [m], heading [rad].
         horizon_s: Length of the windows [s].
         error: Root mean square error over the windows.
+        clocks: Those of the log, as `diagnose` reads and corrects them.
+        notes: What is wrong with them, a line each.
         cautions: What is probably not meant in the model or the log, a sentence each.
     """
 
     poses: pd.DataFrame
     horizon_s: float
     error: Agreement
+    clocks: Clocks
+    notes: tuple[str, ...] = ()
     cautions: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
@@ -235,7 +241,7 @@ class Prediction:
         heading = {"heading": rmse.turn, "heading_unit": "rad", "poses": rmse.poses}
         error = {"value": rmse.place, "unit": "m", **heading}
         facts = {"rows": len(self.poses), "windows": rmse.windows, "horizon_s": self.horizon_s}
-        return facts | {"error": error, "cautions": list(self.cautions)}
+        return facts | {"error": error, "clocks": clocks_document([self.clocks]), "cautions": list(self.cautions)}
 
 
 @dataclass(frozen=True, repr=False)
@@ -280,7 +286,8 @@ def predict(
 ) -> Prediction | PicturePrediction:
     """Predict the poses of a log, or with `frames` the pictures of its camera, by a fitted model.
 
-    In each window the model starts from the measured pose and is driven by the recorded commands.
+    In each window the model starts from the measured pose and is driven by the recorded commands, on one clock with the
+    poses: where clocks are apart, the log is corrected as for a diagnosis.
 
     Args:
         model: A model.toml.
@@ -320,9 +327,12 @@ def predict(
             hint = "" if drives.frames is None else ", or give --frames to predict those"
             raise InputError(f"{drives.name}: has no commands to predict poses from; give a log of drives{hint}")
         robot = _robot_of(fitted, drives, catalogue)
-        table = predict_poses(drives, robot, fitted.theta, horizon_s)
         cautions = (*fitted.cautions, *log_cautions(drives, robot.figures))
-        return Prediction(table, horizon_s, agreement(table, drives, horizon_s), cautions)
+        corrected, clocks = on_one_clock(drives, robot)
+        drives = corrected if clocks.differ else drives
+        table = predict_poses(drives, robot, fitted.theta, horizon_s)
+        notes = tuple(clocks_notes(drives.name, [clocks], {}))
+        return Prediction(table, horizon_s, agreement(table, drives, horizon_s), clocks, notes, cautions)
 
 
 def _robot_of(model: Model, log: Log, catalogue: Catalogue) -> Robot:

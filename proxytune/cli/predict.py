@@ -51,5 +51,6 @@ def run(arguments: argparse.Namespace) -> Answer:
     count = found.error.windows or len(found.poses.groupby(["episode", "start_time"]))
     windows = f"{count} windows of {arguments.horizon:g} s"
     document = {"predictions": str(arguments.output), **found.document()}
-    lines = [*(f"beware: {line}" for line in found.cautions), f"{windows}: {found.sentence}", str(arguments.output)]
+    cautions = [f"beware: {line}" for line in found.cautions]
+    lines = [*cautions, *found.notes, f"{windows}: {found.sentence}", str(arguments.output)]
     return Answer(document, Text("\n".join(lines)))

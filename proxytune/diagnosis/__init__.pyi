@@ -19,7 +19,7 @@ from .log_diagnosis import (
     frames_of as frames_of,
     predict_pictures as predict_pictures,
 )
-from .motion.clocks import Clocks as Clocks, Offset as Offset
+from .motion.clocks import Clocks as Clocks, Offset as Offset, on_one_clock as on_one_clock
 from .motion.diagnose import Diagnosis as Diagnosis, HorizonError as HorizonError, main_error as main_error
 from .motion.discrepancy import Learning as Learning, MatchedEffect as MatchedEffect
 from .motion.drives import (

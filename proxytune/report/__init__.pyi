@@ -8,7 +8,12 @@ from .diagnosis.answer import (
     diagnosis_view as diagnosis_view,
     write_diagnosis as write_diagnosis,
 )
-from .diagnosis.document import camera_noise_floor as camera_noise_floor, diagnosis_document as diagnosis_document
+from .diagnosis.document import (
+    camera_noise_floor as camera_noise_floor,
+    clocks_document as clocks_document,
+    diagnosis_document as diagnosis_document,
+)
+from .diagnosis.notes import clocks_notes as clocks_notes
 from .drive.figure import (
     episode_document as episode_document,
     episode_figure as episode_figure,

@@ -2,13 +2,17 @@
 
 from dataclasses import replace
 
+import hidden_cases as hidden
 import numpy as np
 import pandas as pd
 import pytest
 from planted import TRUTH, planted_log, with_poses, write_log
 
 from proxytune.cli.main import main
+from proxytune.diagnosis import on_one_clock, robot_of
 from proxytune.effects import Model, model_text
+from proxytune.logs import read_log
+from proxytune.report import clocks_document
 
 COLUMNS = ["episode", "start_time", "time", "x", "y", "heading"]
 
@@ -81,6 +85,24 @@ def test_a_log_without_a_pose_to_compare_with_is_still_predicted(model, tmp_path
     folder = write_log(with_poses(log, sparse), tmp_path / "sparse")
     told = answered("predict", model(), folder, "--horizon", 1, "--output", tmp_path / "p.csv")
     assert (told["windows"], told["error"]["poses"]) == (0, 0), "no window has a pose near its end"
+
+
+def test_a_log_whose_clock_jumps_is_judged_on_one_clock_as_a_diagnosis_does(model, tmp_path, answered, capsys):
+    case, late = hidden.CLEAN[2], np.zeros((6, 800))
+    late[3, 500:] = 0.5
+    path, errors = model({"trim": case.trim, "delay": case.delay}), {}
+    for name, late_s in (("apart", late), ("right", 0.0)):
+        folder = write_log(hidden.make_log(case, episodes=6, seconds=40.0, late_s=late_s), tmp_path / name)
+        told = answered("predict", path, folder, "--output", tmp_path / f"{name}.csv")
+        log = read_log(folder)
+        assert told["clocks"] == clocks_document([on_one_clock(log, robot_of(log))[1]])
+        errors[name] = told["error"]["value"]
+    assert errors["apart"] == pytest.approx(errors["right"], rel=0.1)
+    assert pd.read_csv(tmp_path / "apart.csv").query("episode == 3").start_time.max() < 25.0
+    capsys.readouterr()
+    assert main(["predict", str(path), str(tmp_path / "apart"), "--output", str(tmp_path / "p.csv")]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "in drive 03 the clock jumps at about 24 s: poses are stamped 0.4" in said
 
 
 BAD = {

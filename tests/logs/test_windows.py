@@ -126,11 +126,11 @@ def test_windows_whose_poses_have_times_of_their_own_are_joined(tmp_path):
 def test_a_diagnosis_is_of_the_drives_that_windows_make(monkeypatch):
     seen = []
 
-    def stop(log, robot):
+    def stop(log, robot, like):
         seen.append(log)
         raise LogError("seen enough")
 
-    monkeypatch.setattr("proxytune.diagnosis.motion.diagnose.read_clocks", stop)
+    monkeypatch.setattr("proxytune.diagnosis.motion.clocks.read_clocks", stop)
     with pytest.raises(LogError, match="seen enough"):
         diagnose(windows(), robot_of(WHOLE), ("trim", "delay"))
     assert_same(seen[0])

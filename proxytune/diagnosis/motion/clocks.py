@@ -5,9 +5,10 @@ answers at another time than the others, a drive that changes its time to answer
 that grows evenly through all drives. A constant offset that leaves a latency which a delay may have is no proof: delay
 and offset are one number.
 
-`read_clocks` measures all this, `without_drift` and `put_in_step` put drives on one clock. `cut_out_long_rests` cuts a
-log where it stands for long: an hour of rest says nothing of motion. `split` chooses which drives are fitted and which
-are kept aside, in blocks that are left out in turn, and `thin` makes long ones short enough to fit in seconds.
+`read_clocks` measures all this, `put_on_one_clock` corrects it in the log, and `on_one_clock` does both for whoever
+fits or judges a log. `cut_out_long_rests` cuts a log where it stands for long: an hour of rest says nothing of motion.
+`split` chooses which drives are fitted and which are kept aside, in blocks that are left out in turn, and `thin` makes
+long ones short enough to fit in seconds.
 """
 
 import math
@@ -43,7 +44,7 @@ from proxytune.diagnosis.motion.latency import (
 from proxytune.driving import Robot
 from proxytune.effects import PARAMETERS
 from proxytune.errors import LogError
-from proxytune.logs import Log, LogEpisode, Measured
+from proxytune.logs import Log, LogEpisode, Measured, join_windows
 
 FURTHEST_S = 10.0
 """Clocks are looked for up to so far apart."""
@@ -107,11 +108,18 @@ class Clocks:
         return bool(self.offset.value or self.drives or self.jumps or self.drift.value)
 
 
+def on_one_clock(log: Log, robot: Robot, like: Clocks | None = None) -> tuple[Log, Clocks]:
+    """A log as it is fitted and judged: windows joined, long rests cut out, on one clock; and what its clocks were."""
+    log = cut_out_long_rests(join_windows(log))
+    clocks = read_clocks(log, robot, like)
+    return put_on_one_clock(log, clocks), clocks
+
+
 def read_clocks(log: Log, robot: Robot, like: Clocks | None = None) -> Clocks:
     """Measure the latency of every drive of a log; where it is not what is left of a log it is like, clocks differ."""
-    drives = gather(log, robot, log.episodes)
-    speeds = measured_speeds(drives)
-    if not len(speeds.first):
+    drives = gather(log, robot, log.episodes, compared=False)
+    speeds = measured_speeds(drives) if len(drives.first) else None
+    if speeds is None or not len(speeds.first):
         # Drives too short to tell are taken to have one clock.
         kept_s, later_s = np.tile((0.0, np.inf), (len(log.episodes), 1)), np.zeros(len(log.episodes))
         return Clocks(NONE, NONE, ASSUMED_DELAY_S, {}, (), later_s, kept_s, log.clock_offset_s)
@@ -128,10 +136,17 @@ def read_clocks(log: Log, robot: Robot, like: Clocks | None = None) -> Clocks:
     kept, jumps = stretches(log, squares, latencies)
     varied = not _is_rare(len({jump.drive for jump in jumps}), len(log.episodes))
     if varied:
-        kept, jumps = [(0.0, np.inf)] * len(log.episodes), ()
+        # Where poses step, it is the clock, however many drives have it.
+        proven, at_steps = stretches(log, squares, latencies, at_steps=True)
+        unproven = {jump.drive for jump in jumps} - {jump.drive for jump in at_steps}
+        varied = not _is_rare(len(unproven), len(log.episodes))
+        kept, jumps = (proven, at_steps) if varied else (kept, jumps)
+    jumped = {jump.drive for jump in jumps}
     own = [squares.squares[blocks_within(squares, e, kept[e])] for e in range(len(log.episodes))]
     common, others = deviants(own, latencies)
-    others = {} if varied or not _is_rare(len(others), len(log.episodes)) else others
+    whole = [e for e in others if log.episodes[e].name not in jumped]
+    if varied or not _is_rare(len(whole), len(log.episodes)):
+        others = {e: one for e, one in others.items() if e not in whole}
     latency = likeliest_latency(np.concatenate([part for e, part in enumerate(own) if e not in others]), latencies)
     assumed = like.left_s if like else max(robot.theta.get("delay", 0.0), ASSUMED_DELAY_S)
     unlike = like is not None and abs(latency.value - assumed) > max(LEAST_APART_S, SURE * latency.deviation)
@@ -156,17 +171,45 @@ def read_clocks(log: Log, robot: Robot, like: Clocks | None = None) -> Clocks:
     )
 
 
+def put_on_one_clock(log: Log, clocks: Clocks) -> Log:
+    """Put commands on the poses' clock, and leave out poses beyond a jump or before the first command.
+
+    Poses keep their times: it is what a declared offset does.
+    """
+    if not clocks.differ:
+        return log
+
+    def retime(episode: LogEpisode, later_s: float, kept_s: Floats) -> LogEpisode:
+        if later_s:
+            episode = replace(episode, issued=_issued(episode) - later_s)
+        begin, end = episode.times[0] + np.maximum(kept_s, (-later_s, 0.0)) + (-1e-9, 1e-9)
+        return _measured_within(episode, begin, end)
+
+    episodes = without_drift(log, clocks.drift.value).episodes
+    return replace(log, episodes=tuple(map(retime, episodes, clocks.later_s, clocks.kept_s)))
+
+
+def _issued(episode: LogEpisode) -> Floats:
+    return episode.times if episode.issued is None else episode.issued
+
+
+def _measured_within(episode: LogEpisode, begin: float, end: float) -> LogEpisode:
+    """An episode of which no pose is known but those of these times [s]."""
+    known = (begin <= episode.times) & (episode.times <= end)
+    measured = episode.measured
+    if measured is not None:
+        own = known[measured.rows]
+        measured = Measured(measured.times[own], measured.poses[own], measured.rows[own])
+    return replace(episode, poses=np.where(known[:, None], episode.poses, np.nan), measured=measured)
+
+
 def without_drift(log: Log, rate: float) -> Log:
     """Put commands on the poses' clock, which is later by `rate` with every second from the log's first sample on."""
     if rate == 0.0:
         return log
     first = min(float(episode.times[0]) for episode in log.episodes)
-
-    def retime(episode: LogEpisode) -> LogEpisode:
-        issued = episode.times if episode.issued is None else episode.issued
-        return replace(episode, issued=issued + rate * (issued - first))
-
-    return replace(log, episodes=tuple(map(retime, log.episodes)))
+    issued = [(_issued(episode), episode) for episode in log.episodes]
+    return replace(log, episodes=tuple(replace(one, issued=own + rate * (own - first)) for own, one in issued))
 
 
 def _is_rare(count: int, drives: int) -> bool:
@@ -207,37 +250,6 @@ def _reaction(drives: Drives, speeds: Speeds) -> tuple[Reaction, bool]:
     _, _, better = sum_in_blocks(PROOF_BLOCK_S, drives, speeds, usual.squares - free.squares)
     sure = better.sum() > SURE * np.sqrt(len(better)) * better.std()
     return (free, True) if sure else (usual, False)
-
-
-def put_in_step(drives: Drives, clocks: Clocks, episodes: Sequence[int]) -> Drives:
-    """Put these drives of a log on one clock: poses by whole ticks, commands by the rest; what jumps is left out."""
-    later = clocks.later_s[list(episodes)] * drives.tick_hz
-    ticks = np.ceil(later - 1e-9).astype(int)
-    begin, end = (clocks.kept_s[list(episodes)] * drives.tick_hz).T
-    own = drives.episode
-    inside = (drives.first >= begin[own]) & (drives.last <= end[own]) & (drives.first + ticks[own] >= 0)
-    if not later.any():
-        return drives if inside.all() else drives.only(inside)
-    longer = max(0, int(ticks.max()))
-    fraction = (ticks - later)[:, None, None]
-    duties = _lengthen(drives.duties, longer)
-    before = np.concatenate((drives.rest[:, None], duties[:, :-1]), axis=1)
-    at = np.arange(duties.shape[1])
-    known = np.arange(drives.headings.shape[1])
-    moved = replace(
-        drives,
-        duties=(1.0 - fraction) * duties + fraction * before,
-        issued=np.pad(drives.issued, ((0, 0), (0, longer))),
-        headings=np.stack([np.interp(at - k, known, row) for k, row in zip(ticks, drives.headings, strict=True)]),
-        first=drives.first + ticks[own],
-        last=drives.last + ticks[own],
-        wheels=None if drives.wheels is None else _lengthen(drives.wheels, longer),
-    )
-    return moved.only(inside)
-
-
-def _lengthen(signal: Floats, ticks: int) -> Floats:
-    return np.concatenate((signal, np.repeat(signal[:, -1:], ticks, axis=1)), axis=1)
 
 
 LONGEST_S = 20.0
@@ -356,26 +368,19 @@ class Parts(NamedTuple):
     tested: Drives
 
 
-def split(log: Log, robot: Robot, test: Log | None, clocks: Sequence[Clocks] = ()) -> Parts:
+def split(log: Log, robot: Robot, test: Log | None) -> Parts:
     """Keep every third episode to test on, or the second half of each where there are few, or another log.
 
     Raises:
         LogError: If there is too little to fit or to test on.
     """
-    every = range(len(log.episodes))
     if test is not None:
-        parts = Parts(
-            _gather_on_one_clock(log, robot, every, clocks[:1]),
-            _gather_on_one_clock(test, robot, range(len(test.episodes)), clocks[1:]),
-        )
+        parts = Parts(*(gather(one, robot, one.episodes) for one in (log, test)))
     elif len(log.episodes) >= FEWEST_EPISODES:
-        fitted = _choose_some(log, [i for i in every if i % 3 != 2], MOST_S)
-        tested = _choose_some(log, every[2::3], MOST_TESTED_S)
-        parts = Parts(
-            _gather_on_one_clock(log, robot, fitted, clocks), _gather_on_one_clock(log, robot, tested, clocks)
-        )
+        fitted = _choose_some([e for i, e in enumerate(log.episodes) if i % 3 != 2], MOST_S)
+        parts = Parts(gather(log, robot, fitted), gather(log, robot, _choose_some(log.episodes[2::3], MOST_TESTED_S)))
     else:
-        parts = _halve(_gather_on_one_clock(log, robot, every, clocks))
+        parts = _halve(gather(log, robot, log.episodes))
     for name, drives in zip(("fit", "test on"), parts, strict=True):
         if drives.seconds < LEAST_MOTION_S:
             raise LogError(
@@ -385,22 +390,12 @@ def split(log: Log, robot: Robot, test: Log | None, clocks: Sequence[Clocks] = (
     return Parts(thin(cut_into_blocks(parts.fitted)), cut_into_blocks(parts.tested))
 
 
-def _choose_some(log: Log, chosen: Sequence[int], most_s: float) -> list[int]:
+def _choose_some(chosen: Sequence[LogEpisode], most_s: float) -> list[LogEpisode]:
     """Choose some of these drives, spread evenly, of about so many seconds; the rest is not needed."""
-    seconds = sum(float(log.episodes[i].times[-1] - log.episodes[i].times[0]) for i in chosen)
+    seconds = sum(float(episode.times[-1] - episode.times[0]) for episode in chosen)
     wanted = max(FEWEST_EPISODES, math.ceil(len(chosen) * min(1.0, most_s / max(seconds, 1.0))))
     count = min(len(chosen), wanted)
     return [chosen[number * len(chosen) // count] for number in range(count)]
-
-
-def all_drives(log: Log, robot: Robot, clocks: Clocks) -> Drives:
-    """All of a log's drives, on one clock, each as one block."""
-    return _gather_on_one_clock(log, robot, range(len(log.episodes)), (clocks,))
-
-
-def _gather_on_one_clock(log: Log, robot: Robot, chosen: Sequence[int], clocks: Sequence[Clocks]) -> Drives:
-    drives = gather(log, robot, [log.episodes[i] for i in chosen])
-    return put_in_step(drives, clocks[0], chosen) if clocks else drives
 
 
 def _halve(drives: Drives) -> Parts:

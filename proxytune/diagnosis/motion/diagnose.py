@@ -15,15 +15,12 @@ from proxytune.diagnosis.answer import RULES, Estimate, Progress, Rules, verdict
 from proxytune.diagnosis.motion.clocks import (
     Clocks,
     Parts,
-    all_drives,
     cut_into_blocks,
-    cut_out_long_rests,
-    read_clocks,
+    on_one_clock,
     split,
-    without_drift,
 )
 from proxytune.diagnosis.motion.discrepancy import Learning, learn
-from proxytune.diagnosis.motion.drives import Drives, Floats
+from proxytune.diagnosis.motion.drives import Drives, Floats, gather
 from proxytune.diagnosis.motion.effect_size import (
     EffectSize,
     RobotClusters,
@@ -65,7 +62,7 @@ from proxytune.diagnosis.stages import Stages
 from proxytune.driving import Robot
 from proxytune.effects import SHIPPED, Catalogue, effect_of
 from proxytune.errors import LogError
-from proxytune.logs import Log, join_windows
+from proxytune.logs import Log
 from proxytune.settings import nearest
 from proxytune.space import Theta
 
@@ -340,18 +337,19 @@ def diagnose(
     """
     names, parameters = declared_parameters(declared, robot.catalogue), robot.catalogue.parameters
     start = {name: robot.theta.get(name, parameters[name].neutral_value(robot.figures)) for name in names}
-    log, test = cut_out_long_rests(join_windows(log)), test and cut_out_long_rests(join_windows(test))
-    own = read_clocks(log, robot)
-    clocks = (own,) if test is None else (own, read_clocks(test, robot, own))
-    log, test = without_drift(log, own.drift.value), test and without_drift(test, clocks[-1].drift.value)
+    log, own = on_one_clock(log, robot)
+    clocks: tuple[Clocks, ...] = (own,)
+    if test is not None:
+        test, other = on_one_clock(test, robot, own)
+        clocks = (own, other)
     # An offset of clocks and a delay are one number: where an offset is taken out, the delay is fitted in any case.
     if any(one.offset.value for one in clocks) and "delay" not in names:
         names, start = (*names, "delay"), {**start, "delay": own.assumed_delay_s}
-    parts = Parts(*(replace(drives, rules=rules) for drives in split(log, robot, test, clocks)))
+    parts = Parts(*(replace(drives, rules=rules) for drives in split(log, robot, test)))
     check_motion(log.name, parts.fitted)
     check_units(log.name, parts.fitted, start)
     stages = stages or Stages()
-    whole = replace(all_drives(test or log, robot, clocks[-1]), rules=rules)
+    whole = replace(gather(test or log, robot, (test or log).episodes), rules=rules)
     stages.know(robot=robot, rules=rules, fitted=parts.fitted, tested=parts.tested, whole=whole)
     keep = stages.keep
     report("fitting what is declared")
@@ -382,7 +380,7 @@ def diagnose(
     if has_body(parts.tested):
         report("confirming on the bullet plant")
         confirmed = keep("bullet", lambda: horizon_error(found, tested, CONFIRMED_S, {}, bullet_pose_errors))
-    every = whole if test is None else replace(all_drives(log, robot, own), rules=rules)
+    every = whole if test is None else replace(gather(log, robot, log.episodes), rules=rules)
     dropped = tuple(one.effect for one in found.negligible)
     beside = Variant(found.model.theta, found.model.free)
     sizes = measure_effect_sizes(found.model, parts.tested, beside, found.adopted, seed)

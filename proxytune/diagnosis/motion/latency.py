@@ -5,17 +5,19 @@ constant. A lag only ever makes motion later and rounder, a shift alone moves it
 what is left of the latency is the pure one. Delay and the offset between two clocks are both pure latency: one number.
 
 `clock_drift` finds two clocks that run at different rates, `stretches` where a clock jumps within a drive, and
-`deviants` the drives that have another one.
+`deviants` the drives that have another one. A clock that jumps also puts poses on or back by the way of that time, if
+the robot moves: a step between two samples, where the latency changes by as much, is better proof than the latency.
 """
 
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy.optimize import minimize, minimize_scalar
 from scipy.signal import lfilter
 
-from proxytune.diagnosis.motion.drives import Drives, Floats, Whole, sum_by
+from proxytune.diagnosis.motion.drives import Drives, Floats, Whole, relative, sum_by
 from proxytune.driving import drivetrain
 from proxytune.logs import Log
 
@@ -249,6 +251,13 @@ SURE_BESIDE_OTHERS, SHARE_BESIDE_OTHERS = 5.5, 0.15
 """The same where one side of the jump answers as the other drives do; NEAR_S apart, or two deviations, is the same."""
 NEAR_S = 0.02
 
+SURE_AT_A_STEP, SHARE_AT_A_STEP = 4.0, 0.05
+"""The same where poses step when the latency changes, as a jump of their clock makes them while the robot moves."""
+STEP_SPAN_S, STEP_NATS = 0.2, 8.0
+"""Poses so long before and after show a step, and it is so much likelier than none."""
+LEAST_STEP_S, STEP_TOLERANCE = 0.03, 0.5
+"""The least jump that a step tells, and the share to which it does besides chance."""
+
 SHARE, SHARE_IF_FAR = 0.08, 0.7
 FAR_S = 1.0
 """The least share of what is left over that another clock takes away, and that one further off than FAR_S does. Drives
@@ -355,15 +364,61 @@ def blocks_within(blocks: Blocks, episode: int, kept: tuple[float, float]) -> Wh
     return np.flatnonzero((blocks.episode == episode) & (begin >= kept[0]) & (end <= kept[1]))
 
 
-def stretches(log: Log, blocks: Blocks, latencies: Floats) -> tuple[list[tuple[float, float]], tuple[Jump, ...]]:
-    """The longest stretch of each drive without a jump of its clock [s after its beginning], and all jumps."""
+class Step(NamedTuple):
+    """Poses that step as if their clock jumped by so much within a block, and how much likelier that is [nats]."""
+
+    number: int
+    by: Latency
+    nats: float
+
+
+def _steps(log: Log) -> list[list[Step]]:
+    """The clearest step of each block of each drive: a clock that jumps puts moving poses on or back between samples.
+
+    The way round it is a parabola over time; the step is as long as a jump's where way and turn have the same one.
+    """
+    count = max(3, round(STEP_SPAN_S * log.rate_hz))
+    at = np.arange(1 - count, count + 1) - 0.5
+    parabola = np.linalg.pinv(np.stack((np.ones(2 * count), at, at**2, at > 0.0), axis=1))
+    # From ways by samples to the increments between them.
+    filters = (parabola @ np.tri(2 * count, 2 * count - 1, -1))[[1, 3]].T * (log.rate_hz, 1.0)
+    moved = [relative(e.poses[:-1], e.poses[1:])[:, ::2] for e in log.episodes]
+    empty = np.empty((0, 2, 2))
+    seen = [sliding_window_view(m, 2 * count - 1, 0) @ filters if len(m) >= 2 * count - 1 else empty for m in moved]
+    every = np.abs(np.concatenate(seen)[..., 1])
+    every = every[np.isfinite(every).all(axis=1)]
+    # Robust: a tenth of all may be of starts and stops.
+    spread = np.quantile(every, 0.9, axis=0) / 1.645 + 1e-9 if len(every) else np.ones(2)
+    return [_clearest(count / log.rate_hz, one / spread[:, None], log.rate_hz) for one in seen]
+
+
+def _clearest(begin_s: float, seen: Floats, rate_hz: float) -> list[Step]:
+    """The clearest steps of a drive from its speeds and steps (N, 2, 2), in deviations of a step."""
+    speeds, steps = seen[..., 0], seen[..., 1]
+    size = (speeds**2).sum(axis=1) + 1e-9
+    by = -(speeds * steps).sum(axis=1) / size
+    nats = by**2 * size - (steps**2).sum(axis=1) / 2.0
+    number = ((begin_s + np.arange(len(by)) / rate_hz) / LATENCY_BLOCK_S).astype(int)
+    sure = np.flatnonzero((nats > STEP_NATS) & (np.abs(by) > LEAST_STEP_S))
+    best = {number[i]: i for i in sure[np.argsort(nats[sure])]}
+    return [Step(int(k), Latency(float(by[i]), float(size[i] ** -0.5)), float(nats[i])) for k, i in best.items()]
+
+
+def stretches(
+    log: Log, blocks: Blocks, latencies: Floats, *, at_steps: bool = False
+) -> tuple[list[tuple[float, float]], tuple[Jump, ...]]:
+    """The longest stretch of each drive without a jump of its clock [s after its beginning], and all jumps.
+
+    With `at_steps` only jumps at which poses step: a robot that changes makes none.
+    """
     kept: list[tuple[float, float]] = []
     jumps: list[Jump] = []
     judged = _judged([blocks.squares[blocks.episode == e] for e in range(len(log.episodes))], latencies)
     usual = _median(list(judged.values())) if len(judged) > 1 else None
-    for e, episode in enumerate(log.episodes):
+    for e, (episode, steps) in enumerate(zip(log.episodes, _steps(log), strict=True)):
         own = np.flatnonzero(blocks.episode == e)
-        found = _all_jumps(blocks.squares[own], latencies, usual)
+        drive = Blocks(*(part[own] for part in blocks))
+        found = _jumps_at_steps(drive, latencies, steps, usual, at_steps=at_steps)
         edges = [0.0, *(float(blocks.number[own[at]] * LATENCY_BLOCK_S) for at, _ in found), np.inf]
         margin = [0.0, *([LATENCY_BLOCK_S] * len(found)), 0.0]
         end = float(episode.times[-1] - episode.times[0])
@@ -374,6 +429,37 @@ def stretches(log: Log, blocks: Blocks, latencies: Floats) -> tuple[list[tuple[f
         kept.append(max(spans, key=lambda span: min(span[1], end) - span[0]))
         jumps += [Jump(episode.name, float(episode.times[0]) + edges[1 + k], by) for k, (_, by) in enumerate(found)]
     return kept, tuple(jumps)
+
+
+def _jumps_at_steps(
+    drive: Blocks, latencies: Floats, steps: Sequence[Step], usual: float | None, *, at_steps: bool
+) -> list[tuple[int, float]]:
+    """The jumps of a drive: the clearest at a step, then those on either side of it; others where there is no step."""
+    step = None if usual is None else _jump_at_a_step(drive, latencies, steps, usual)
+    if step is None:
+        return [] if at_steps else _all_jumps(drive.squares, latencies, usual)
+    sides = (slice(None, step[0]), slice(step[0] + 1, None))
+    earlier, later = (
+        _jumps_at_steps(Blocks(*(part[side] for part in drive)), latencies, steps, usual, at_steps=at_steps)
+        for side in sides
+    )
+    return [*earlier, step, *((step[0] + 1 + at, by) for at, by in later)]
+
+
+def _jump_at_a_step(drive: Blocks, latencies: Floats, steps: Sequence[Step], usual: float) -> tuple[int, float] | None:
+    """The block within which poses step and after which the latency is another by as much, the likeliest; and that."""
+    near = np.abs(latencies - usual) < FAR_S
+    found = []
+    for number, step, nats in steps:
+        at, after = (int(np.searchsorted(drive.number, number, side)) for side in ("left", "right"))
+        if min(at, len(drive.number) - after) < SIDE:
+            continue
+        one, other, share = _sides(drive.squares[:at, near], drive.squares[after:, near], latencies[near])
+        by, deviation = other.value - one.value, float(np.hypot(one.deviation, other.deviation))
+        apart = 2.0 * np.hypot(deviation, step.deviation) + STEP_TOLERANCE * abs(step.value)
+        if abs(by - step.value) < apart and _is_jump(one, other, share, usual, at_a_step=True):
+            found.append((nats + (by / deviation) ** 2 / 2.0, at, by))
+    return max(found)[1:] if found else None
 
 
 def _all_jumps(squares: Floats, latencies: Floats, usual: float | None) -> list[tuple[int, float]]:
@@ -395,28 +481,35 @@ def _jumps(squares: Floats, latencies: Floats, most: int, usual: float | None) -
     before = np.cumsum(squares, axis=0)[SIDE - 1 : len(squares) - SIDE]
     total = squares.sum(axis=0)
     at = int((before.min(axis=1) + (total - before).min(axis=1)).argmin()) + SIDE
-    one, other = (likeliest_latency(part, latencies) for part in (squares[:at], squares[at:]))
+    one, other, share = _sides(squares[:at], squares[at:], latencies)
     by = other.value - one.value
-    share = min(_share(part, latencies, away.value) for part, away in ((squares[:at], other), (squares[at:], one)))
     if not _is_jump(one, other, share, usual):
         return []
     earlier, later = (_jumps(part, latencies, most - 1, usual) for part in (squares[:at], squares[at:]))
     return [*earlier, (at, by), *((at + more, step) for more, step in later)]
 
 
-def _is_jump(one: Latency, other: Latency, share: float, usual: float | None) -> bool:
+def _sides(before: Floats, after: Floats, latencies: Floats) -> tuple[Latency, Latency, float]:
+    """The latencies before and after, and the least share of what is left over that each takes away from the other."""
+    one, other = likeliest_latency(before, latencies), likeliest_latency(after, latencies)
+    return one, other, min(_share(before, latencies, other.value), _share(after, latencies, one.value))
+
+
+def _is_jump(one: Latency, other: Latency, share: float, usual: float | None, *, at_a_step: bool = False) -> bool:
     """Tell whether the two sides of a block have clearly different latencies, by the share that each takes away."""
     by = abs(other.value - one.value)
     sure = by / float(np.hypot(one.deviation, other.deviation))
-    if by <= LEAST_APART_S or share < (SHARE if by < FAR_S else SHARE_IF_FAR):
+    least = SHARE_AT_A_STEP if at_a_step else SHARE
+    if by <= LEAST_APART_S or share < (least if by < FAR_S else SHARE_IF_FAR):
         return False
     if sure > SURE_OF_A_JUMP:
         return True
-    if usual is None or sure <= SURE_BESIDE_OTHERS or share < SHARE_BESIDE_OTHERS:
+    enough, least = (SURE_AT_A_STEP, least) if at_a_step else (SURE_BESIDE_OTHERS, SHARE_BESIDE_OTHERS)
+    if usual is None or sure <= enough or share < least:
         return False
     near, far = sorted((one, other), key=lambda side: abs(side.value - usual))
     as_others = abs(near.value - usual) < max(NEAR_S, 2.0 * near.deviation)
-    return as_others and abs(far.value - usual) > max(LEAST_APART_S, SURE_BESIDE_OTHERS * far.deviation)
+    return as_others and abs(far.value - usual) > max(LEAST_APART_S, enough * far.deviation)
 
 
 def _share(squares: Floats, latencies: Floats, elsewhere: float) -> float:

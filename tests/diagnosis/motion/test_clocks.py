@@ -22,14 +22,15 @@ from proxytune.diagnosis.motion.clocks import (
     cut_into_blocks,
     cut_out_long_rests,
     join_increments,
-    put_in_step,
+    on_one_clock,
+    put_on_one_clock,
     read_clocks,
     split,
     thin,
     without_drift,
 )
 from proxytune.diagnosis.motion.drives import gather
-from proxytune.diagnosis.motion.latency import Blocks, stretches
+from proxytune.diagnosis.motion.latency import Blocks, _steps, stretches
 from proxytune.errors import LogError
 from proxytune.logs import Log, LogEpisode, Measured, read_log
 
@@ -94,6 +95,38 @@ def test_a_clock_that_jumps_is_named_with_its_time_and_the_longer_stretch_is_kep
     low, high = found.kept_s[3]
     assert (low, high <= 25.0) == (0.0, True)
     assert np.isinf(found.kept_s[[0, 1, 2, 4, 5], 1]).all()
+
+
+def test_a_clock_that_jumps_in_a_third_of_the_drives_is_told_where_poses_step():
+    late = in_one_drive(-0.3, after=500) + in_one_drive(0.2, drive=1, after=300)
+    found = clocks(late)
+    assert [(jump.drive, jump.time_s) for jump in found.jumps] == [
+        ("01", pytest.approx(15.0, abs=2.0)),
+        ("03", pytest.approx(25.0, abs=2.0)),
+    ]
+    np.testing.assert_allclose([jump.by_s for jump in found.jumps], (0.2, -0.3), atol=0.05)
+    # Of drive 01 the stretch after its jump is kept, on the clock of the others.
+    assert found.kept_s[1, 0] > 15.0
+    np.testing.assert_allclose(found.later_s, (0.0, -0.2, 0.0, 0.0, 0.0, 0.0), atol=0.02)
+
+
+def test_a_jump_too_small_for_its_latencies_alone_is_told_by_the_step_of_the_poses():
+    one = planted("jump", 154, hidden=False)
+    (jump,) = read_clocks(hidden.make_log(one.case, late_s=one.late_s), ROBOT).jumps
+    assert (one.case.noise, one.by_s, f"{one.drive:02d}") == ("double", -0.05, jump.drive)
+    assert jump.time_s == pytest.approx(one.at_s, abs=2.0)
+    assert jump.by_s == pytest.approx(-0.05, abs=0.015)
+
+
+def test_poses_that_step_alone_are_no_jump_of_the_clock():
+    log = hidden.make_log(CASE, **SHORT)
+
+    def moved_on(poses):
+        heading = poses[300, 2]
+        return poses + (np.arange(800) >= 300)[:, None] * (0.08 * np.cos(heading), 0.08 * np.sin(heading), 0.0)
+
+    assert len(_steps(with_poses(log, moved_on))[0]) > len(_steps(log)[0])
+    assert not read_clocks(with_poses(log, moved_on), ROBOT).jumps
 
 
 DRIFTING = np.broadcast_to(np.arange(800) / 20.0, SHAPE)
@@ -172,34 +205,47 @@ def test_a_robot_that_is_stuck_at_first_is_no_clock_problem():
     assert stretches(log, blocks, latencies) == ([(0.0, np.inf)], ())
 
 
-def test_drives_put_in_step_are_those_of_one_clock():
+def test_commands_put_on_the_poses_clock_are_those_of_one_clock():
     late = in_one_drive(-0.3)
-    found = clocks(late)
     apart, right = (hidden.make_log(CASE, late_s=late_s, noiseless=True, **SHORT) for late_s in (late, 0.0))
-    moved = put_in_step(gather(apart, ROBOT, apart.episodes), found, range(6))
-    drives = gather(right, ROBOT, right.episodes)
-    shift = found.later_s[3] * drives.tick_hz
-    own, other = moved.episode == 3, drives.episode == 3
-    assert moved.first[own][0] == np.ceil(shift)
-    np.testing.assert_array_equal(moved.first[~own], drives.first[~other])
-    np.testing.assert_array_equal(moved.duties[0, :2400], drives.duties[0])
-    part = np.ceil(shift) - shift
-    expected = (1.0 - part) * drives.duties[3, 1:] + part * drives.duties[3, :-1]
-    np.testing.assert_allclose(moved.duties[3, 1:2400], expected)
-    np.testing.assert_allclose(moved.headings[3, moved.first[own]], moved.poses[own, 0, 2], atol=1e-9)
+    corrected, found = on_one_clock(apart, ROBOT)
+    shift = found.later_s[3]
+    assert shift == pytest.approx(0.3, abs=0.02)
+    np.testing.assert_allclose(corrected.episodes[3].issued, apart.episodes[3].times - shift)
+    moved, drives = gather(corrected, ROBOT, corrected.episodes), gather(right, ROBOT, right.episodes)
+    ticks, part = divmod(shift * drives.tick_hz, 1.0)
+    known = drives.duties[3, int(ticks) :]
+    np.testing.assert_allclose(moved.duties[3, : len(known) - 1], (1.0 - part) * known[:-1] + part * known[1:])
+    np.testing.assert_allclose(moved.duties[0], drives.duties[0])
+    np.testing.assert_array_equal(corrected.episodes[3].poses, apart.episodes[3].poses)
 
 
-@pytest.mark.slow
-def test_poses_put_before_the_first_command_are_left_out_and_so_is_what_lies_beyond_a_jump():
+def test_a_log_of_one_clock_is_left_as_it_is():
+    log = hidden.make_log(CASE, **SHORT)
+    assert on_one_clock(log, ROBOT)[0] is log
+
+
+def test_poses_before_the_first_command_are_left_out_and_so_is_what_lies_beyond_a_jump():
     found = clocks(in_one_drive(0.5, after=500))
     log = hidden.make_log(CASE, late_s=in_one_drive(0.5, after=500), **SHORT)
-    moved = put_in_step(gather(log, ROBOT, log.episodes), found, range(6))
-    assert moved.last[moved.episode == 3].max() <= found.kept_s[3, 1] * 60.0
-    late = clocks(2.0)
-    log = hidden.make_log(CASE, late_s=2.0, **SHORT)
-    moved = put_in_step(gather(log, ROBOT, log.episodes), late, range(6))
-    assert moved.first.min() >= 0
-    assert not moved.linked[0]
+    poses = [episode.poses for episode in put_on_one_clock(log, found).episodes]
+    assert np.isfinite(poses[3]).all(axis=1).sum() == pytest.approx(found.kept_s[3, 1] * 20.0, abs=1)
+    assert np.isnan(poses[3][500:]).all()
+    assert np.isfinite(poses[2]).all()
+    late = replace(found, later_s=np.full(6, -1.0))
+    for episode in put_on_one_clock(hidden.make_log(CASE, **SHORT), late).episodes:
+        assert np.isnan(episode.poses[:20]).all()
+        assert np.isfinite(episode.poses[20]).all()
+
+
+def test_of_poses_at_times_of_their_own_only_those_on_the_clock_are_kept():
+    log = hidden.make_log(CASE, late_s=in_one_drive(0.5, after=500), **SHORT)
+    found = read_clocks(log, ROBOT)
+    (own,) = (replace(e, measured=Measured(e.times[::2] + 0.01, e.poses[::2], np.arange(0, 800, 2)))
+              for e in log.episodes[3:4])  # fmt: skip
+    kept = put_on_one_clock(replace(log, episodes=(*log.episodes[:3], own, *log.episodes[4:])), found).episodes[3]
+    assert len(kept.measured.rows) == len(kept.measured.times) == pytest.approx(found.kept_s[3, 1] * 10.0, abs=1)
+    assert kept.measured.rows.max() < 500
 
 
 @pytest.mark.slow

@@ -17,7 +17,7 @@ from planted import DECLARED, NOISE, ROBOT, TRUTH, planted_drives
 
 from proxytune.diagnosis import RULES, AdoptedEffect, Findings, SignalCurve
 from proxytune.diagnosis.motion import selection
-from proxytune.diagnosis.motion.clocks import all_drives, read_clocks
+from proxytune.diagnosis.motion.drives import gather
 from proxytune.diagnosis.motion.evidence import Evidence, FittedCandidate, exceeds_names, list_tried
 from proxytune.diagnosis.motion.fitting import evaluate, fit
 from proxytune.diagnosis.motion.innovations import at_edge
@@ -333,7 +333,7 @@ def four_faults():
         hidden_cars.Case("car with four faults", hidden, "normal", 5, 0.02, 0.1), episodes=4, seconds=20.0
     )
     car = read_robot("car")
-    drives = all_drives(log, car, read_clocks(log, car))
+    drives = gather(log, car, log.episodes)
     model = fit_declared(drives, {"steering_offset": 0.0, "delay": 0.0}, ("steering_offset", "delay"))
     return Findings(model, model, (), (), (), ())
 

@@ -79,11 +79,6 @@ class Posterior:
         """The mean of θ."""
         return np.asarray(self.weights @ self.points)
 
-    @property
-    def deviation(self) -> Floats:
-        """The standard deviation of every parameter."""
-        return np.asarray(np.sqrt(self.weights @ (self.points - self.mean) ** 2))
-
     @cached_property
     def intervals(self) -> Floats:
         """The central 95 % of every parameter, shape (parameters, 2)."""

@@ -107,10 +107,11 @@ class Fleet:
     @cached_property
     def varies(self) -> Mapping[str, bool]:
         """Whether robots differ in a parameter by more than measurements of one do."""
-        own = [self._told(one.knowledge.unwidened.deviation[None], 0.0) for one in self.fitting]
-        return {
-            n: told.low > NOTICED * float(np.median([o[n].middle for o in own])) for n, told in self.deviation.items()
-        }
+        known = [one.knowledge.unwidened for one in self.fitting]
+        own = np.median([np.sqrt(one.weights @ (one.points - one.mean) ** 2) for one in known], axis=0)
+        widths = {box.name: box.high - box.low for box in self.settings.space.intervals}
+        limits = {name: NOTICED * widths[name] * float(one) for name, one in zip(widths, own, strict=True)}
+        return {name: told.low > limits[name] for name, told in self.deviation.items()}
 
     @property
     def correlations(self) -> Mapping[tuple[str, str], Told]:
@@ -166,17 +167,23 @@ def _known(settings: StudySettings) -> Iterator[StudyRun]:
 
 
 def _robots(run: StudyRun, targets: Sequence[Path]) -> Iterator[Robot]:
+    # All tables are read before any is learnt from.
+    measured = [_measured(run, path) for path in targets]
     first: Knowledge | None = None
-    for name, path in zip(_names(targets), targets, strict=True):
-        known, left_out = with_scores(replace(run.settings, targets=(path,)))
-        table, unused = read_target(known, run.study.family)
-        one = run.of(replace(run.study, settings=known, target=table))
+    for name, path, (one, left_out) in zip(_names(targets), targets, measured, strict=True):
         goal = goal_of(one)
         if first is None or goal.outputs != first.goal.outputs:
             first = own = knowledge_of(one, one.finished_trials())
         else:
             own = first.of(goal)
-        yield Robot(name, path, own, tuple(filter(None, (*left_out, *unused, noise_of(one).caution))))
+        yield Robot(name, path, own, tuple(filter(None, (*left_out, noise_of(one).caution))))
+
+
+def _measured(run: StudyRun, path: Path) -> tuple[StudyRun, tuple[str, ...]]:
+    """The study with this robot for its target, and what of its table is left out."""
+    known, left_out = with_scores(replace(run.settings, targets=(path,)))
+    table, unused = read_target(known, run.study.family)
+    return run.of(replace(run.study, settings=known, target=table)), (*left_out, *unused)
 
 
 def _names(targets: Sequence[Path]) -> list[str]:

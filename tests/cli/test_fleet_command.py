@@ -2,7 +2,7 @@
 
 import re
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,7 @@ from proxytune.errors import InputError
 from proxytune.files import shipped
 from proxytune.running import run_together
 from proxytune.scores import write_scores
+from proxytune.search import population
 from proxytune.seeds import target_seed
 from proxytune.study import open_bank, plan_episodes, read_study_settings, score_table
 from tests.conftest import Answered, MakeStudy
@@ -33,6 +34,15 @@ def write_robot(path: Path, theta: Mapping[str, float], seed: int, shift: float 
             lines.append(f"{agent},{start},{scores['distance'] + shift!r},{scores['survival_time'] + shift!r}")
     path.write_text("\n".join(lines) + "\n")
     return path
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _few_draws() -> Iterator[None]:
+    """Draw a tenth of what a user gets: tests/search counts how well it is told."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(population, "DRAWS", 400)
+        patch.setattr(population, "BURN_IN", 100)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -144,6 +154,15 @@ def test_a_study_with_a_target_knows_trials_too(make_study: MakeStudy, robots: l
     assert told.result.robots[0].knowledge.goal.values[0] != told.result.robots[1].knowledge.goal.values[0]
 
 
+def test_what_a_robot_says_depends_on_no_other(found: proxytune.FleetReport, bank: Path, robots: list[Path]) -> None:
+    """Calibration is shared, so the first of the tables is told as any other."""
+    few = proxytune.fleet(bank, [robots[3], robots[0]]).document()["robots"]
+    all_of_them = found.document()["robots"]
+    for name in ("robot3", "robot0"):
+        for key in ("theta_interval", "region_share", "p_value"):
+            assert few[name][key] == all_of_them[name][key]
+
+
 def test_names_that_are_alike_have_their_folders(found: proxytune.FleetReport, bank: Path, tmp_path: Path) -> None:
     """robot1/target.csv and robot2/target.csv are two robots."""
     paths = []
@@ -159,14 +178,20 @@ BAD = {
     "no such table": (lambda bank, robots, home: [robots[0], home / "none.csv"], "none.csv"),
     "other agents": (
         lambda bank, robots, home: [robots[0], _edited(robots[1], home, "agent", "driver")],
-        "has no scores of agent0",
+        "has no scores of agent",
     ),
     "another metric": (
         lambda bank, robots, home: [robots[0], _edited(robots[1], home, "survival_time", "score")],
         "survival_time",
     ),
-    "no trials": (lambda bank, robots, home: (bank / "study.db").unlink() or (bank / "bank.json").unlink(), "run it"),
+    "no trials": (lambda bank, robots, home: _unrun(bank, robots), "run the study first"),
 }
+
+
+def _unrun(bank: Path, robots: list[Path]) -> list[Path]:
+    for name in ("study.db", "bank.json"):
+        (bank / name).unlink()
+    return robots
 
 
 def _edited(path: Path, home: Path, before: str, after: str) -> Path:
@@ -182,8 +207,7 @@ def test_what_cannot_be_used_is_refused_in_one_line(
     """The line names the file and what is wrong; the exit status is 2."""
     own = Path(shutil.copytree(bank, tmp_path / "bank"))
     spoil, words = BAD[case]
-    tables = spoil(own, robots, tmp_path) or robots
-    assert main(["fleet", str(own), *map(str, tables)]) == 2
+    assert main(["fleet", str(own), *map(str, spoil(own, robots, tmp_path))]) == 2
     told = capsys.readouterr().err.splitlines()[-1]
     assert words in told
     assert told.startswith("proxytune fleet: ")

@@ -30,7 +30,7 @@ FEWEST = 2
 """Fewer robots have nothing between them."""
 FEW = 5
 """Of fewer the spread is mostly what was assumed of it before."""
-NOTICED = 0.1
+NOTICED = 0.25
 """Robots differ where the interval of their spread begins above this share of one robot's own deviation."""
 
 

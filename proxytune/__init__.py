@@ -2,6 +2,7 @@
 
     study        run_study, read_study, StudyReport; tune: without a folder or TOML
     simulators   run_families, read_families, FamiliesReport: several tuned in the same time
+    fleet        fleet, FleetReport: several robots of one kind
     sweep        run_sweep, SweepReport: usefulness along a parameter
     teaching     teach, TeachReport: what a proxy saves in training
     scores       score, ScoreReport, Assessment, Metric, ScoreTable, read_scores; measure, Measurement: a model's scores

@@ -3,6 +3,7 @@
     study        run_study, read_study: pre-flight, trials, confirmation
     tuning       tune: a study of a function or an environment, without a folder or TOML
     families     several simulators, each tuned in the same time
+    robots       fleet: several robots of one kind
     curves       run_sweep, teach
     scores       score, log_of: tables as DataFrames
     diagnosis    diagnose

@@ -16,6 +16,7 @@ from .families import (
     run_opened_families as run_opened_families,
 )
 from .logs import Wanted as Wanted, record_log as record_log, recordable as recordable
+from .robots import FleetReport as FleetReport, fleet as fleet
 from .scores import ScoreReport as ScoreReport, log_of as log_of, score as score
 from .search_box import SearchBox as SearchBox
 from .study import (

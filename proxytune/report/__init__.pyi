@@ -59,6 +59,13 @@ from .figure_style import (
     dress as dress,
     name_lines as name_lines,
 )
+from .fleet import (
+    fleet_document as fleet_document,
+    fleet_figure as fleet_figure,
+    fleet_sentence as fleet_sentence,
+    fleet_text as fleet_text,
+    fleet_view as fleet_view,
+)
 from .html import Shown as Shown, frame_html as frame_html, write_page as write_page
 from .meanings import clause_of as clause_of, findings as findings, what_it_does as what_it_does
 from .plv_search import plv_document as plv_document, plv_text as plv_text, write_plv_report as write_plv_report

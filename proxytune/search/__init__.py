@@ -7,6 +7,7 @@ likelihood       Gaussian processes of every output, and the likelihood of θ
 posterior        the posterior of θ, its 95 % credible region, and the misfit
 outcomes         the engines that learn from every output: `composite` and `outcomes`
 knowledge        what trials say of θ: the answer, its region, information, importances
+population       p(θ) over several robots of one kind
 optuna_bridge    the engine `tpe`, and trials as other optimisers keep them
 registry         the engines by name
 """

@@ -35,6 +35,7 @@ from .optuna_bridge import (
     write_skopt as write_skopt,
 )
 from .outcomes import expected_gain as expected_gain
+from .population import Population as Population, population_of as population_of, summary_of as summary_of
 from .registry import (
     DEFAULT_ENGINE as DEFAULT_ENGINE,
     ENGINE_NAMES as ENGINE_NAMES,

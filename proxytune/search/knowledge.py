@@ -6,7 +6,7 @@ answer; `importances` how much each parameter matters to the score over the whol
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
@@ -115,6 +115,17 @@ class Knowledge:
     trials: tuple[Trial, ...]
     seed: int
 
+    def of(self, goal: Goal) -> "Knowledge":
+        """What the same outputs of the same trials say of another target: calibrated once where noise is the same.
+
+        Scores of trials stay those against the first target: take θ from it, no answer.
+        """
+        other = replace(self, goal=goal)
+        both = ((one.noise, np.isnan(one.values)) for one in (goal, self.goal))
+        if all(np.array_equal(*pair) for pair in zip(*both, strict=True)):
+            vars(other)["left_out"] = self.left_out
+        return other
+
     @property
     def space(self) -> Space:
         """The search box."""
@@ -145,6 +156,14 @@ class Knowledge:
         if self.misfit.dispersion == 1.0:
             return self._posterior_if_it_fits
         return posterior_of(self.log, len(self.space.intervals), REPORTED)
+
+    @cached_property
+    def unwidened(self) -> Posterior:
+        """θ by the likelihood as it is, for sums in which errors that are told too large are not on the safe side.
+
+        Of 72 simulated robots, errors were 0.7 to 1.3 times the standard deviation that it gives, by parameter.
+        """
+        return posterior_of(self.likelihood.log, len(self.space.intervals), REPORTED)
 
     @cached_property
     def values(self) -> Floats:

@@ -11,6 +11,7 @@ facts            what trials depend on, and how a resume compares it with study.
 run              the stages of a study: trials, when they end, fresh episodes
 result           what was found; other metrics; trials for other optimisers
 families         several tuned families beside one another
+robots           several robots of one kind: θ of each, and p(θ) over them
 single_episode   one episode, to look at
 """
 

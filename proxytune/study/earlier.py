@@ -9,9 +9,11 @@ which `Trial.placement` tells the search.
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from os.path import exists
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -24,6 +26,8 @@ from proxytune.seeds import episode_seed
 from proxytune.settings import is_finite, read_text
 from proxytune.storage import FILE_NAME as DATABASE, Store
 from proxytune.study.facts import LEARNT, stored_facts, study_facts
+from proxytune.study.opening import Study
+from proxytune.study.preflight import PLACEMENT, placement_variance
 from proxytune.study.settings import LEARNING, StudySettings, read_study_settings
 from proxytune.study.study_run import StudyRun, compose_of
 
@@ -44,11 +48,15 @@ Scores = Mapping[tuple[str, int], Mapping[str, float]]
 
 @dataclass(frozen=True)
 class Source:
-    """An earlier study: what its trials depend on, and the scores of each domain instance, failed episodes left out."""
+    """An earlier study: what its trials depend on, and the scores of each domain instance, failed episodes left out.
+
+    A table knows the variance by placement too, of each agent and metric.
+    """
 
     path: Path
     facts: Mapping[str, Any]
     trials: Mapping[Instance, Scores]
+    placement: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     def episode(self, theta: Instance, agent: str, start: int) -> Episode:
         """An episode of it."""
@@ -63,13 +71,31 @@ def learn(run: StudyRun) -> None:
         StoreError: If its database is damaged.
     """
     settings = run.settings
-    if not settings.learn_from or LEARNT in run.store.facts():
-        return
-    sources = [read_source(settings, name) for name in settings.learn_from]
+    if settings.learn_from and LEARNT not in run.store.facts():
+        _keep(run, [read_source(settings, name) for name in settings.learn_from])
+
+
+@contextmanager
+def table_alone(study: Study) -> Iterator[StudyRun]:
+    """A bank of which nothing but its table is there, as a run that knows its trials; nothing is driven.
+
+    Raises:
+        InputError: If it has no table, or one of another study.
+        StoreError: If that is damaged.
+    """
+    settings = replace(study.settings, learn_from=(BANK_FILE,))
+    with TemporaryDirectory() as folder, Store.open(Path(folder)) as store:
+        run, source = StudyRun(replace(study, settings=settings), store), read_source(settings, BANK_FILE)
+        _keep(run, [source], again=False)
+        store.save_fact(PLACEMENT, dict(source.placement))
+        yield run
+
+
+def _keep(run: StudyRun, sources: Sequence[Source], *, again: bool = True) -> None:
+    settings, box = run.settings, run.settings.space.intervals
     places, rows, names = {settings.seed: 0}, [], sorted(_metrics(run))
-    box = settings.space.intervals
     for source in sources:
-        _check_same(run, source)
+        _check_same(run, source, again=again)
         place = places.setdefault(source.facts["seed"], len(places))
         inside = [theta for theta in source.trials if all(b.low <= dict(theta)[b.name] <= b.high for b in box)]
         if not inside:
@@ -174,11 +200,14 @@ def _of_table(path: Path) -> Source:
             if not all(is_finite(value) and abs(value) < LARGEST for value in values):
                 raise ValueError
             trials[instance_of(theta)] = found
+        placement = {agent: dict(one) for agent, one in kept.get("placement", {}).items()}
+        if not all(is_finite(v) and 0.0 <= v < LARGEST**2 for one in placement.values() for v in one.values()):
+            raise ValueError
     except OSError as problem:
         raise StoreError(f"{path}: cannot be read ({problem.strerror}); check it") from None
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise StoreError(f"{path}: is no table of trials as proxytune writes it; restore a copy") from None
-    return Source(path, facts, trials)
+    return Source(path, facts, trials, placement)
 
 
 def write_table(run: StudyRun) -> Path:
@@ -197,7 +226,14 @@ def write_table(run: StudyRun) -> Path:
         [dict(theta), [[cell(scores.get((agent, s))) for s in range(run.settings.starts)] for agent in agents]]
         for theta, scores in source.trials.items()
     ]
+    told, placed = run.study.target, placement_variance(run)
+    pairs = zip(told.agents, [] if placed is None else placed.tolist(), strict=False)
+    placement = {
+        agent: {name: float(f"{v:.{DIGITS}g}") for name, v in zip(told.metrics, one, strict=True)}
+        for agent, one in pairs
+    }
     table = {"format": FORMAT, "facts": dict(source.facts), "metrics": metrics, "agents": list(agents), "trials": rows}
+    table["placement"] = placement
     try:
         with draft_of(path) as draft:
             draft.write_text(json.dumps(table, separators=(",", ":"), allow_nan=False) + "\n", encoding="utf-8")
@@ -206,7 +242,7 @@ def write_table(run: StudyRun) -> Path:
     return path
 
 
-def _check_same(run: StudyRun, source: Source) -> None:
+def _check_same(run: StudyRun, source: Source, *, again: bool) -> None:
     settings, theirs, ours = run.settings, source.facts, study_facts(run.study)
     if not source.trials:
         raise _refused(settings, source.path, "has no finished trial; run it first, or remove it")
@@ -230,7 +266,7 @@ def _check_same(run: StudyRun, source: Source) -> None:
         if theirs.get(key) != ours.get(key):
             values = [value or "not given" for value in (theirs.get(key), ours.get(key))]
             raise _refused(settings, source.path, f"{key} is {values[0]} there and {values[1]} here; remove it")
-    if not same:
+    if again and not same:
         _check_again(run, source)
 
 

@@ -352,6 +352,8 @@ def _movement(study: Study, look: int, interval: Interval, known: Mapping[Episod
 
 PRIOR_PAIRS = 2
 """An agent's own pairs are few, so the median over the agents counts as so many more."""
+PLACEMENT = "placement"
+"""The fact with the variance that a bank's table knows, by agent and metric; of a run bank, its pre-flight tells."""
 UNKNOWN_NOISE = 0.1
 """Where nothing tells: standard deviation of a mean, as a share of the spread over agents."""
 
@@ -373,9 +375,9 @@ def noise_of(run: StudyRun) -> NoiseVariance:
     study = run.study
     driven = study.settings.starts
     measured = np.maximum(1, study.target.counts)[:, None]
-    pairs = placement_pairs(run)
-    if shares_starts(study) and pairs.size:
-        return NoiseVariance(_shrunk((pairs[:, 0] - pairs[:, 1]) ** 2) / 2.0 * (1.0 / driven + 1.0 / measured))
+    placed = placement_variance(run)
+    if shares_starts(study) and placed is not None:
+        return NoiseVariance(placed * (1.0 / driven + 1.0 / measured))
     remedy = "to know θ better, measure the target from the study's own starts and leave the pre-flight on"
     if study.target.counts.min() >= 2:
         values = study.target.values
@@ -388,6 +390,19 @@ def noise_of(run: StudyRun) -> NoiseVariance:
     spread = np.ptp(study.target.means, axis=0) * UNKNOWN_NOISE
     caution = f"noise is unknown and assumed to be {UNKNOWN_NOISE:.0%} of the spread between agents; {remedy}"
     return NoiseVariance(np.broadcast_to(spread**2, study.target.means.shape), caution)
+
+
+def placement_variance(run: StudyRun) -> Floats | None:
+    """Variance of an episode's metrics by its placement alone (agents, metrics), as the target has them.
+
+    By the pre-flight, or as the table of a bank has it; None where neither tells.
+    """
+    pairs, table = placement_pairs(run), run.study.target
+    if pairs.size:
+        return _shrunk((pairs[:, 0] - pairs[:, 1]) ** 2) / 2.0
+    known = run.store.facts().get(PLACEMENT, {})
+    found = np.array([[known.get(agent, {}).get(name, np.nan) for name in table.metrics] for agent in table.agents])
+    return None if np.isnan(found).any() else found
 
 
 def shares_starts(study: Study) -> bool:

@@ -267,7 +267,7 @@ def test_a_command_that_only_looks_runs_nothing_of_a_folder(naming, command, whe
 
 def test_commands_that_run_code_are_those_that_the_page_names():
     runs = [name for name, command in COMMANDS.items() if command.runs_code]
-    assert runs == ["study", "sweep", "teach", "drive", "measure", "record", "loop", "new"]
+    assert runs == ["study", "sweep", "teach", "fleet", "drive", "measure", "record", "loop", "new"]
 
 
 OWN = """

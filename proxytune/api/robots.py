@@ -1,0 +1,122 @@
+"""Several robots of one kind from Python: θ of each, and p(θ) over them; the command `fleet` is this and a terminal."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from proxytune.errors import InputError
+from proxytune.report import (
+    Shown,
+    View,
+    fleet_document,
+    fleet_figure,
+    fleet_sentence,
+    fleet_view,
+    save_figures,
+    study_foot,
+    write_page,
+)
+from proxytune.study import Fleet, Told, learn_fleet
+
+UNKNOWN = Told(np.nan, np.nan, np.nan)
+
+
+@dataclass(frozen=True, repr=False)
+class FleetReport(Shown):
+    """Several robots of one kind.
+
+    Attributes:
+        result: All of it.
+    """
+
+    result: Fleet
+
+    def __repr__(self) -> str:
+        return f"FleetReport of {len(self.result.robots)} robots by '{self.result.settings.name}': {self.sentence}"
+
+    @property
+    def sentence(self) -> str:
+        """Say in which parameters the robots differ, and by how much."""
+        return fleet_sentence(self.result)
+
+    def view(self) -> View:
+        """What the page shows."""
+        return fleet_view(self.result, self.figures()["fleet"])
+
+    def figures(self) -> dict[str, Figure]:
+        """Each robot's intervals and the population, by name."""
+        return {"fleet": fleet_figure(self.result)}
+
+    def robots(self) -> pd.DataFrame:
+        """One row per robot and parameter: the ends of 95 % by its own scores, and what it is given the fleet.
+
+        The latter are NaN for a robot that no θ explains.
+        """
+        rows = []
+        for robot in self.result.robots:
+            given = self.result.given.get(robot.name, {})
+            for name, (low, high) in robot.knowledge.intervals.items():
+                own = {"robot": robot.name, "parameter": name, "fits": robot.fits, "low": low, "high": high}
+                rows.append({**own, **_columns("fleet", given.get(name, UNKNOWN))})
+        return pd.DataFrame(rows).set_index(["robot", "parameter"])
+
+    to_frame = robots
+
+    def population(self) -> pd.DataFrame:
+        """One row per parameter: its mean, its standard deviation between robots, and a robot not measured yet.
+
+        Without rows where fewer than two robots can be explained.
+        """
+        told = self.result
+        rows = {
+            name: {
+                "varies": told.varies[name],
+                **_columns("mean", mean),
+                **_columns("deviation", told.deviation[name]),
+                **_columns("robots", told.next_robot[name]),
+            }
+            for name, mean in told.mean.items()
+        }
+        return pd.DataFrame.from_dict(rows, orient="index").rename_axis("parameter")
+
+    def document(self) -> dict[str, Any]:
+        """The JSON document of `fleet --json`, without the files."""
+        return fleet_document(self.result)
+
+    def write(self, folder: str | Path, command: str = "") -> tuple[Path, Path]:
+        """Write the figure and report.html into a folder; their paths.
+
+        Raises:
+            RunError: If a file cannot be written.
+        """
+        drawn, page = self.figures(), Path(folder) / "report.html"
+        (figure,) = save_figures(drawn, Path(folder))
+        write_page(page, fleet_view(self.result, drawn["fleet"]), study_foot(self.result.settings, command))
+        return figure, page
+
+
+def _columns(key: str, told: Told) -> dict[str, float]:
+    return {f"{key}_{end}": value for end, value in told._asdict().items()}
+
+
+def fleet(path: str | Path, targets: Sequence[str | Path]) -> FleetReport:
+    """Tell θ of several robots of one kind, and p(θ) over them, from the trials that a study or bank knows.
+
+    No episode is driven.
+
+    Args:
+        path: The study's or bank's folder, or its study.toml.
+        targets: The table of scores of each robot, measured with the study's agents.
+
+    Raises:
+        InputError: If the study knows no trial, or a table cannot be used.
+        RunError: If no trial has an outcome.
+    """
+    if isinstance(targets, str | Path):
+        raise InputError(f"targets: give a list of tables, one per robot, got {str(targets)!r}")
+    return FleetReport(learn_fleet(Path(path), [Path(one) for one in targets]))

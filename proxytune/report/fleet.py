@@ -1,0 +1,218 @@
+"""A fleet: θ of each robot and p(θ) over them, as sentence, tables, figure, page and JSON document."""
+
+from collections.abc import Mapping
+from math import ceil
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from rich.console import Group
+
+from proxytune.report.figure_style import BLUE, COLUMN, GREEN, LIGHT_GREY, VERMILLION, dress, legend_below
+from proxytune.report.study.document import intervals_document
+from proxytune.report.text import file_texts, group_texts, section_text
+from proxytune.report.view import Drawn, Paragraphs, Picture, Table, View, columns_of
+from proxytune.report.wording import digits, fixed, listed, percent, plain, probability, span, with_unit
+from proxytune.study import FEW, Fleet, Told
+
+MOST_NAMED = 40
+"""More robots than this are not named beside their lines."""
+NAME = 14
+"""Characters of a robot's name beside its line."""
+CAPTION = (
+    "A line is a robot's 95 % interval by its own scores, a dot what it is given the whole fleet. The band is the mean "
+    "of the fleet ± 2 standard deviations between robots, with what measurement adds taken out."
+)
+MEANING = (
+    "The standard deviation is between robots, with what measurement adds taken out; where robots differ no more than "
+    "measurements of one would, they may all be the same in it. “95 % of robots” holds a robot that has not been "
+    "measured, and allows for how little so many robots tell of mean and spread."
+)
+OWN, GIVEN = "θ of each robot by its own scores", "θ of each robot given the fleet"
+
+
+def fleet_sentence(fleet: Fleet) -> str:
+    """Say in which parameters the robots differ, and by how much."""
+    out = f" No θ explains {listed(fleet.left_out)}: left out of p(θ)." if fleet.left_out else ""
+    if fleet.population is None:
+        return f"Of {len(fleet.robots)} robots {len(fleet.fitting)} can be explained: too few for p(θ).{out}"
+    differ = [
+        f"{plain(name)} by {_told(spread)} {fleet.units[name]}".rstrip()
+        for name, spread in fleet.deviation.items()
+        if fleet.varies[name]
+    ]
+    alike = [plain(name) for name, varies in fleet.varies.items() if not varies]
+    told = f"differ in {listed(differ)} (standard deviation)" if differ else "do not differ beyond measurement"
+    same = f"; in {listed(alike)} no difference is told" if differ and alike else ""
+    return f"{len(fleet.fitting)} robots {told}{same}.{out}"
+
+
+def fleet_notes(fleet: Fleet) -> tuple[str, ...]:
+    """What is to be known beside the tables: cautions of every robot, each once."""
+    notes = [line for robot in fleet.robots for line in robot.cautions]
+    count = len(fleet.fitting)
+    if fleet.population is not None and count < FEW:
+        told = f"{count} robots hardly tell a spread: what is assumed before any is measured"
+        notes.append(f"{told} (uniform over the box) widens it; measure {FEW} or more")
+    for name in fleet.mean:
+        if 2 * sum(name in one.knowledge.unidentified for one in fleet.fitting) > count:
+            notes.append(f"{plain(name)}: unidentified by most robots, so p(θ) of it is what was assumed")
+    for pair, found in fleet.correlations.items():
+        notes.append(f"{listed([*map(plain, pair)])} go together between robots: correlation {_told(found)}")
+    return tuple(dict.fromkeys(notes))
+
+
+def fleet_lines(fleet: Fleet) -> tuple[str, ...]:
+    """The box that 95 % of robots of this kind lie in, in each parameter, as TOML; none where there is no p(θ)."""
+    return tuple(f"{name} = [{told.low:.4g}, {told.high:.4g}]" for name, told in fleet.next_robot.items())
+
+
+def fleet_tables(fleet: Fleet) -> tuple[Table, ...]:
+    """The population, and each robot by its own scores and given the fleet."""
+    heads = {name: with_unit(name, unit) for name, unit in fleet.units.items()}
+    own = tuple(
+        (
+            robot.name,
+            _fit(robot.knowledge.misfit.p_value, robot.fits),
+            percent(robot.knowledge.posterior.share),
+            *map(span, robot.knowledge.intervals.values()),
+        )
+        for robot in fleet.robots
+    )
+    by_robot = Table(OWN, columns_of(("robot", "proxy"), ("region", *heads.values())), own, fleet_notes(fleet))
+    if fleet.population is None:
+        return (by_robot,)
+    rows = tuple(
+        (
+            heads[name],
+            _told(fleet.mean[name]),
+            _told(fleet.deviation[name]),
+            span((next_one.low, next_one.high)),
+            "yes" if fleet.varies[name] else "not told",
+        )
+        for name, next_one in fleet.next_robot.items()
+    )
+    columns = ("mean", "standard deviation", "95 % of robots", "robots differ")
+    population = Table(f"p(θ) over {len(fleet.fitting)} robots", columns_of(("parameter",), columns), rows, (MEANING,))
+    given = tuple((name, *map(_told, told.values())) for name, told in fleet.given.items())
+    return population, by_robot, Table(GIVEN, columns_of(("robot",), [*heads.values()]), given)
+
+
+def _fit(p_value: float | None, fits: bool) -> str:
+    told = "" if p_value is None else f", {probability(p_value)}"
+    return f"{'fits' if fits else 'misfit'}{told}" if told else "too few trials to tell"
+
+
+def fleet_view(fleet: Fleet, figure: Drawn) -> View:
+    """What the page shows."""
+    lines, tables = fleet_lines(fleet), fleet_tables(fleet)
+    picture = Picture("Each robot, and the fleet", figure, CAPTION)
+    title = f"{fleet.settings.name}: how do {len(fleet.robots)} robots differ?"
+    if not lines:
+        following = "Find what the proxy lacks: `python -m proxytune diagnose`."
+        return View(title, fleet_sentence(fleet), following, (*tables, picture))
+    use = Paragraphs(
+        "To use p(θ)",
+        (
+            "To teach over the fleet, write into the study.toml of `teach`, below `[teaching.proxies.fleet]`: "
+            + ", ".join(f"`{line}`" for line in lines),
+            "The same lines below `[parameters]` are the box for the next robot of this kind.",
+        ),
+    )
+    following = "Randomise over 95 % of robots, or search the next one there: the lines are below."
+    return View(title, fleet_sentence(fleet), following, (tables[0], picture, use, *tables[1:]))
+
+
+def fleet_text(fleet: Fleet, files: Mapping[str, Any]) -> Group:
+    """A fleet as the command prints it."""
+    lines = fleet_lines(fleet)
+    paste = ["\n[teaching.proxies.fleet]   # or [parameters], for the next robot", *lines] if lines else []
+    tables = (part for table in fleet_tables(fleet) for part in section_text(table))
+    return group_texts(fleet_sentence(fleet), *tables, *paste, *file_texts(files))
+
+
+def _told(found: Told) -> str:
+    places = digits((found.low, found.high))
+    return f"{fixed(found.middle, places)} ({span((found.low, found.high))})"
+
+
+def _documents(told: Mapping[str, Told]) -> dict[str, Any]:
+    return {name: {"value": one.middle, "interval": [one.low, one.high]} for name, one in told.items()}
+
+
+def fleet_document(fleet: Fleet) -> dict[str, Any]:
+    """A fleet as plain JSON; its keys are promises."""
+    robots = {
+        robot.name: {
+            "target": str(robot.path),
+            "fits": robot.knowledge.misfit.fits,
+            "p_value": robot.knowledge.misfit.p_value,
+            "region_share": robot.knowledge.posterior.share,
+            "theta_interval": intervals_document(robot.knowledge.intervals),
+            "given_fleet": _documents(fleet.given[robot.name]) if robot.name in fleet.given else None,
+        }
+        for robot in fleet.robots
+    }
+    population = fleet.population and {
+        "robots": len(fleet.fitting),
+        "mean": _documents(fleet.mean),
+        "deviation": _documents(fleet.deviation),
+        "varies": dict(fleet.varies),
+        "next_robot": {name: [one.low, one.high] for name, one in fleet.next_robot.items()},
+        "correlations": [
+            {"parameters": [*pair], "value": r.middle, "interval": [r.low, r.high]}
+            for pair, r in fleet.correlations.items()
+        ],
+    }
+    said = {"study": fleet.settings.name, "sentence": fleet_sentence(fleet), "cautions": list(fleet_notes(fleet))}
+    return {**said, "population": population, "left_out": list(fleet.left_out), "robots": robots}
+
+
+def fleet_figure(fleet: Fleet) -> Figure:
+    """Draw each robot's intervals and the population, a panel a parameter."""
+    intervals, robots = fleet.settings.space.intervals, fleet.robots
+    columns = min(2, len(intervals))
+    rows = ceil(len(intervals) / columns)
+    figure = Figure(figsize=(COLUMN, rows * (0.7 + 0.1 * max(4, len(robots))) + 0.3), layout="constrained")
+    panels = figure.subplots(rows, columns, sharey=True, squeeze=False)
+    for row, axes in enumerate(panels.ravel()):
+        if row < len(intervals):
+            _draw(axes, fleet, row)
+        else:
+            axes.set_visible(False)
+    names = [robot.name if len(robot.name) <= NAME else f"{robot.name[: NAME - 1]}…" for robot in robots]
+    panels[0, 0].set_ylim(len(robots) - 0.5, -0.5)
+    panels[0, 0].set_yticks(range(len(robots)), names) if len(robots) <= MOST_NAMED else panels[0, 0].set_yticks([])
+    legend_below(figure, *panels.ravel()[: len(intervals)])
+    return figure
+
+
+def _draw(axes: Axes, fleet: Fleet, row: int) -> None:
+    box = fleet.settings.space.intervals[row]
+    if box.name in fleet.mean:
+        mean, reach = fleet.mean[box.name].middle, 2.0 * fleet.deviation[box.name].middle
+        axes.axvspan(mean - reach, mean + reach, color=GREEN, alpha=0.15, linewidth=0, label="fleet: mean ± 2 SD")
+        axes.axvline(mean, color=GREEN, linewidth=1.0, linestyle="--")
+    for place, robot in enumerate(fleet.robots):
+        label, colour = ("own scores (95 %)", LIGHT_GREY) if robot.fits else ("misfit, left out", VERMILLION)
+        axes.plot(
+            robot.knowledge.intervals[box.name],
+            [place, place],
+            color=colour,
+            linewidth=1.6,
+            solid_capstyle="butt",
+            label=label,
+        )
+        if robot.name in fleet.given:
+            axes.plot(
+                fleet.given[robot.name][box.name].middle,
+                place,
+                "o",
+                color=BLUE,
+                markersize=2.5,
+                label="given the fleet",
+            )
+    axes.set_xlim(box.low, box.high)
+    axes.xaxis.set_major_locator(MaxNLocator(3))
+    dress(axes, with_unit(box.name, fleet.units[box.name]))

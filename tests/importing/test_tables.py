@@ -392,11 +392,6 @@ def test_tum_without_commands_only_if_asked_for(file):
     assert read_tum(path, Wanted(commands="none")).drives[0].commands is None
 
 
-def test_tilts_are_kept(file):
-    poses = read_tum(file("0 0 0 0 0 0 0 1\n1 0 0 0 0.1 0 0 1\n"), Wanted(commands="none")).drives[0].poses
-    np.testing.assert_allclose(poses.tilts, [0.0, 2 * np.arctan(0.1)])
-
-
 @pytest.mark.parametrize(
     ("reader", "text", "where"),
     [
@@ -416,16 +411,6 @@ def test_bad_files_of_a_fixed_form_are_refused(tmp_path, file, reader, text, whe
     said = complaint(path, reader, commands="none")
     assert said.startswith(str(path))
     assert where in said
-
-
-def test_tum_bad_commands_are_refused(file):
-    path = file(LINES)
-    file("time,lin\n0,1\n", "commands.csv")
-    assert "no column found for commands (v and omega, or left and right); its columns are: time, lin" in complaint(
-        path, read_tum
-    )
-    assert "no such file of commands" in complaint(path, read_tum, commands="elsewhere.csv")
-    assert "unknown name 'velocity'" in complaint(path, read_tum, columns={"velocity": "lin"})
 
 
 def test_trajectories_are_known_by_content(file, tmp_path):

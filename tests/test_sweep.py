@@ -48,8 +48,8 @@ def opened(make_study, truth):
     return study, discrepancy_study(study, truth)
 
 
-def swept(study, discrepancy, points=4):
-    plan = plan_sweep(sweep_interval(study, "trim"), TRUTH, points)
+def swept(study, discrepancy, points=4, base=TRUTH, parameter="trim"):
+    plan = plan_sweep(sweep_interval(study, parameter), base, points)
     if discrepancy:
         plan = with_target(plan, study.settings.folder.parent / "truth.toml", discrepancy)
     with Store.open(study.settings.folder) as store:
@@ -170,11 +170,6 @@ def test_the_interval_over_starts_holds_the_mean_and_one_start_has_none():
     assert pod_mean([0.0, 0.0]).interval == (0.0, 0.0)
 
 
-def test_a_family_that_cannot_replay_is_refused_in_one_line(make_study, truth):
-    with pytest.raises(InputError, match="wobbly:wobbly has no `drive` and `replay`.*leave the option out"):
-        discrepancy_study(open_study(make_study()), truth)
-
-
 def test_a_missing_model_is_refused(opened, tmp_path):
     with pytest.raises(InputError, match="--target-model .*no.toml: no such file"):
         discrepancy_study(opened[0], tmp_path / "no.toml")
@@ -214,12 +209,7 @@ def test_a_lane_follower_s_pod_is_nothing_at_the_truth_and_grows_with_trim(tmp_p
 
 
 def swept_of_sweep(folder, base=TRUTH, parameter="trim", points=5):
-    study = open_study(folder)
-    plan = plan_sweep(sweep_interval(study, parameter), base, points)
-    with Store.open(folder) as store:
-        study_run = StudyRun(study, store)
-        run_sweep(study_run, plan)
-        return study_run.spent.episodes, curve_of(StudyRun(study, store), plan)
+    return swept(open_study(folder), None, points, base, parameter)
 
 
 def test_a_grid_has_both_ends_and_the_base_s_own_value_once():

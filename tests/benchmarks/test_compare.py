@@ -163,25 +163,17 @@ def test_targets_with_what_the_proxy_lacks_are_other_runs(make_study, tmp_path, 
     assert len({key.objective for key in runs}) == 2
 
 
-@pytest.mark.parametrize(
-    ("options", "expected"),
-    [
-        (("ranking", "--truths"), "--truths: 'ranking' has its own truth for every seed; leave the option out"),
-        (("analytic", "--lacks", "x.toml"), "--lacks: needs simulated targets; add --truths"),
-    ],
-)
-def test_truths_of_what_has_them_and_effects_without_truths_are_refused(tmp_path, capsys, options, expected):
-    assert compare(*options, "--output", tmp_path / "out") == 2
-    assert expected in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
-
-
 BAD = {
     "an engine of metrics where there are none": (("--engines", "composite"), "'composite' models what a score is"),
     "an unknown engine": (("--engines", "gp,tpr"), "--engines: unknown engine 'tpr'"),
     "no engine": (("--engines", ","), "--engines: names no engine; give some of outcomes"),
     "one seed": (("--seeds", "1"), "--seeds 1: give at least 2"),
     "one seed of several": (("--seeds", "3:4:2"), "--seeds 1: give at least 2"),
+    "truths of what has them": (
+        ("--truths",),
+        "--truths: 'analytic' has its own truth for every seed; leave the option",
+    ),
+    "what truths lack without them": (("--lacks", "x.toml"), "--lacks: needs simulated targets; add --truths"),
     "no budget": (("--budget", "0"), "--budget 0: give at least 2"),
     "a budget of the design": (("--budget", "10"), "--budget 10: the design of 10 uses it up; raise it"),
 }
@@ -196,6 +188,7 @@ def test_bad_input_is_one_line_and_exit_2(tmp_path, capsys, case):
     assert out == ""
     assert told.count("\n") == 1
     assert expected in told
+    assert list((tmp_path / "out").glob("*")) == []
 
 
 @pytest.mark.parametrize("engine", ["random", "gp"])

@@ -115,10 +115,8 @@ def test_another_simulator_s_robot_is_drawn_where_it_records_places(make_study, 
     assert (tmp_path / "walk.png").exists()
 
 
-@pytest.mark.parametrize("family", ["wobbly:wobbly", "walking:walking"])
-def test_where_there_are_no_places_there_are_metrics_and_one_line(make_study, tmp_path, capsys, answered, family):
-    domain = {"columns": '"z"'} if family.startswith("walking") else {}
-    folder = make_study(family=f'"{family}"', domain=domain)
+def test_where_there_are_no_places_there_are_metrics_and_one_line(make_study, tmp_path, capsys, answered):
+    folder = make_study(family='"walking:walking"', domain={"columns": '"z"'})
     assert answered("drive", folder, "--agent", "agent0")["proxy"]["metrics"]["distance"] > 0.0
     line = complaint(capsys, folder, "--agent", "agent0", "--output", tmp_path / "walk.png")
     assert "nothing can be drawn, as this study's domain family records no x and y; leave the option out" in line

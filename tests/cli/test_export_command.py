@@ -46,7 +46,8 @@ def test_every_value_is_told_with_its_place_or_that_it_has_none(model, tmp_path,
         "place": None,
     } in document["no_place"]
     assert [line["interval"] for line in document["written"] if line["name"] == "trim"] == [[0.04, 0.06]]
-    assert "dead_band.width 0.06 duty (0.05 to 0.07): NO PLACE" in output.read_text()
+    assert "dead_band.width 0.06 duty (0.05 to 0.07): NO PLACE, not in this file" in output.read_text()
+    assert "delay 0.15 s" in output.read_text()
     assert main(arguments) == 0
     told = " ".join(capsys.readouterr().out.split())
     assert "dead_band.width 0.06 duty (0.05 to 0.07): NO PLACE, not in this file" in told

@@ -92,6 +92,8 @@ def edited(folder, before, after):
     [
         ("[teaching]", "[teachings]", "teachings: unknown key; did you mean 'teaching'?"),
         ("schoolroom:Matrix", "schoolroom", "teaching.learner: learner 'schoolroom' is unknown"),
+        ("schoolroom:Matrix", "schoolroom:Nothing", "teaching.learner: learner 'schoolroom:Nothing': schoolroom has"),
+        ("schoolroom:Matrix", "wobbly:Wobbly", "teaching.learner: learner 'wobbly:Wobbly' "),
         ("schoolroom:schoolroom", "wobbly:wobbly", "family: wobbly:wobbly cannot teach: it lacks best_score"),
         ("trim = -0.3\n", "trim = -0.4\n", "teaching.proxies.wrong.trim: must lie within [-0.3, 0.3], got -0.4"),
         ("trim = [0.0, 0.3]", "trim = [0.0, 0.5]", "teaching.proxies.wide.trim: must lie within [-0.3, 0.3], got 0 to"),

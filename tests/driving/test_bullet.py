@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from nominal_camera import CAMERA
+from nominal_camera import CAMERA, loop_poses
 
 from proxytune.driving import GroundPlaneCamera, bullet as renderer, draw_floor, ground_points, shipped_map
 from proxytune.driving.bullet import BulletCamera
@@ -17,15 +17,6 @@ pybullet = pytest.importorskip("pybullet", reason="PyBullet is not installed")
 NOMINAL = replace(CAMERA, columns=64, rows=48)
 SMALL_LOOP = shipped_map("small_loop")
 FLOOR = draw_floor(SMALL_LOOP)
-
-
-def loop_poses(count):
-    """Poses along both lanes, in their directions, curves and straights."""
-    angles = np.linspace(0.0, 2 * np.pi, count, endpoint=False)
-    outer = np.arange(count) % 2 == 0
-    radius, middle = np.where(outer, 0.72, 0.46), SMALL_LOOP.size[0] / 2
-    heading = angles + np.where(outer, np.pi / 2, -np.pi / 2)
-    return np.stack((middle + radius * np.cos(angles), middle + radius * np.sin(angles), heading), axis=1)
 
 
 def markings(pictures):

@@ -429,9 +429,16 @@ ROAD = shipped_map("small_loop")
 SIDE, TILE, OFFSET, MIDDLE = ROAD.size[0], ROAD.width, ROAD.lane_offset, ROAD.size[0] / 2
 OUTER = (SIDE - TILE / 2 + OFFSET, TILE, pi / 2)  # lower end of the right side's straight, going up
 INNER = (SIDE - TILE / 2 - OFFSET, 2 * TILE, -pi / 2)  # its upper end, going down
-OUTER_RADIUS, INNER_RADIUS = TILE / 2 + OFFSET, TILE / 2 - OFFSET
-OUTER_LAP = ((TILE, 0.0), (OUTER_RADIUS * pi / 2, 1 / OUTER_RADIUS)) * 4
-INNER_LAP = ((TILE, 0.0), (INNER_RADIUS * pi / 2, -1 / INNER_RADIUS)) * 4
+
+
+def lap(outer, left=0.0):
+    """Pieces of a lap so far left of a lane's centre line [m]."""
+    radius = TILE / 2 + OFFSET - left if outer else TILE / 2 - OFFSET + left
+    return ((TILE, 0.0), (radius * pi / 2, (1 if outer else -1) / radius)) * 4
+
+
+OUTER_LAP, INNER_LAP = lap(True), lap(False)
+both_lanes = pytest.mark.parametrize(("start", "outer"), [(OUTER, True), (INNER, False)], ids=("outer", "inner"))
 SPEED = 0.3
 quick = settings(max_examples=30)
 
@@ -484,40 +491,28 @@ def test_early_metrics_are_those_of_the_first_five_seconds_whatever_comes_after(
     assert result["speed"] == pytest.approx(0.4 / (len(whole) - 1) * 60)
 
 
-@pytest.mark.parametrize(
-    ("start", "lap", "outer"), [(OUTER, OUTER_LAP, True), (INNER, INNER_LAP, False)], ids=("outer", "inner")
-)
+@both_lanes
 @pytest.mark.parametrize("laps", [1, 3])
-def test_laps_on_the_centre_line_count_their_length_to_a_millimetre(start, lap, outer, laps):
-    result = score(drive(start, lap * laps))
+@pytest.mark.parametrize("left", [-0.08, 0.0, 0.08])
+def test_laps_count_the_centre_lines_length_to_a_millimetre_wherever_in_the_lane(start, outer, laps, left):
+    result = score(drive(moved_left(start, left), lap(outer, left) * laps))
     assert result["distance"] == pytest.approx(laps * lane_length(ROAD, outer), abs=0.001)
     assert result["time_out_of_lane"] == 0
-    assert result["deviation"] == pytest.approx(0, abs=1e-9)
+    assert result["deviation"] == pytest.approx(abs(left), abs=1e-6)
 
 
-@pytest.mark.parametrize("left", [-0.08, 0.08])
-def test_a_lap_beside_the_centre_line_counts_the_centre_lines_length(left):
-    radius = OUTER_RADIUS - left
-    beside = ((TILE, 0.0), (radius * pi / 2, 1 / radius)) * 4
-    result = score(drive(moved_left(OUTER, left), beside))
-    assert result["distance"] == pytest.approx(lane_length(ROAD, True), abs=0.001)
-    assert result["deviation"] == pytest.approx(0.08, abs=1e-6)
-
-
-@pytest.mark.parametrize(("start", "lap"), [(OUTER, OUTER_LAP), (INNER, INNER_LAP)], ids=("outer", "inner"))
-def test_the_wrong_way_round_counts_nothing_and_is_all_out_of_lane(start, lap):
-    wrong = drive(start, lap)[::-1] + (0, 0, pi)
+@both_lanes
+def test_the_wrong_way_round_counts_nothing_and_is_all_out_of_lane(start, outer):
+    wrong = drive(start, lap(outer))[::-1] + (0, 0, pi)
     result = score(wrong)
     assert result["distance"] == 0
     assert result["time_out_of_lane"] == pytest.approx(result["survival_time"])
     assert result["deviation"] == pytest.approx(2 * OFFSET, abs=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("start", "lap", "outer"), [(OUTER, OUTER_LAP, True), (INNER, INNER_LAP, False)], ids=("outer", "inner")
-)
-def test_driving_backwards_in_the_lane_counts_negative(start, lap, outer):
-    backwards = [(-length, curvature) for length, curvature in reversed(lap)]
+@both_lanes
+def test_driving_backwards_in_the_lane_counts_negative(start, outer):
+    backwards = [(-length, curvature) for length, curvature in reversed(lap(outer))]
     result = score(drive(start, backwards))
     assert result["distance"] == pytest.approx(-lane_length(ROAD, outer), abs=0.001)
     assert result["time_out_of_lane"] == 0
@@ -543,13 +538,6 @@ def test_survival_ends_at_the_first_pose_off_the_map():
     result = score(out)
     assert result["survival_time"] == pytest.approx(first / 60)
     assert result["survival_time"] == pytest.approx((SIDE - x) / SPEED, abs=1.5 / 60)
-
-
-@pytest.mark.parametrize("heading", [0.0, pi / 2, pi, -pi / 2])
-def test_what_comes_after_leaving_the_map_is_not_scored(heading):
-    out = drive((MIDDLE, MIDDLE, heading), [(1.0, 0.0)])
-    gone = next(k for k, pose in enumerate(out) if off_map(ROAD, pose[0], pose[1])) + 1
-    assert score(np.vstack((out[:gone], drive(OUTER, OUTER_LAP)))) == score(out[:gone])
 
 
 def test_nothing_after_the_time_limit_is_scored():
@@ -664,12 +652,13 @@ def test_half_a_step_across_the_lanes_edge_counts_for_either_side():
     assert worth(poses[[0, 0, 1]]) == pytest.approx(1 / 60)
 
 
-def test_a_drive_is_worth_nothing_more_once_it_has_left_the_map():
-    out = drive((OUTER[0], OUTER[1], 0.0), [(1.0, 0.0)])
+@pytest.mark.parametrize("judged", [score, worth])
+@pytest.mark.parametrize("heading", [0.0, pi / 2, pi, -pi / 2])
+def test_what_comes_after_leaving_the_map_counts_nothing(judged, heading):
+    out = drive((MIDDLE, MIDDLE, heading), [(1.0, 0.0)])
     gone = next(k for k, pose in enumerate(out) if off_map(ROAD, pose[0], pose[1])) + 1
     assert gone < len(out)
-    assert worth(np.vstack((out[:gone], drive(OUTER, OUTER_LAP)))) == worth(out[:gone])
-    assert worth(out[:gone]) < (gone - 1) / 60
+    assert judged(np.vstack((out[:gone], drive(OUTER, OUTER_LAP)))) == judged(out[:gone])
 
 
 def exact_start(index, **noise):

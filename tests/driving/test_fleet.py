@@ -115,13 +115,6 @@ def test_a_user_s_own_effect_is_asked_for_each_robot_by_itself(tmp_path):
     assert_same(*alone_and_together(room, episodes(3), lean))
 
 
-def test_robots_drop_out_as_they_leave_the_map_and_the_others_go_on():
-    room = classroom(plant="planar", seconds=9.0)
-    alone, together = alone_and_together(room, episodes(4), lambda picture: np.array((0.6, 0.6)))
-    assert len({len(poses) for poses in together}) > 2
-    assert_same(alone, together)
-
-
 def test_episodes_of_several_thetas_and_more_than_drive_at_once_score_as_each_does(monkeypatch):
     monkeypatch.setitem(AT_ONCE, "planar", 2)
     room = classroom(plant="planar", seconds=1.0)

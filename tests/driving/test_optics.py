@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
-from nominal_camera import CAMERA
+from nominal_camera import CAMERA, loop_poses
 
 from proxytune.driving import (
     COLOURS,
@@ -45,14 +45,6 @@ def on_map(points, pose):
     return np.stack(
         (x + cos * points[..., 0] - sin * points[..., 1], y + sin * points[..., 0] + cos * points[..., 1]), -1
     )
-
-
-def loop_poses(count):
-    angles = np.linspace(0.0, 2 * np.pi, count, endpoint=False)
-    radius = np.where(np.arange(count) % 2, 0.72, 0.45)
-    middle = SMALL_LOOP.size[0] / 2
-    heading = angles + np.where(np.arange(count) % 2, np.pi / 2, -np.pi / 2)
-    return np.stack((middle + radius * np.cos(angles), middle + radius * np.sin(angles), heading), axis=1)
 
 
 # figures

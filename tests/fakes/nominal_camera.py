@@ -1,6 +1,8 @@
-"""The Duckiebot's camera as its makers state it."""
+"""The Duckiebot's camera as its makers state it, and where it looks from on the small loop."""
 
-from proxytune.driving import CameraFigures
+import numpy as np
+
+from proxytune.driving import CameraFigures, shipped_map
 
 CAMERA = CameraFigures(
     columns=160,
@@ -13,3 +15,12 @@ CAMERA = CameraFigures(
     field_of_view_deg=75.0,
     k1=0.0,
 )
+
+
+def loop_poses(count):
+    """Poses along both lanes of the small loop, in their directions, curves and straights."""
+    angles = np.linspace(0.0, 2 * np.pi, count, endpoint=False)
+    outer = np.arange(count) % 2 == 0
+    radius, middle = np.where(outer, 0.72, 0.46), shipped_map("small_loop").size[0] / 2
+    heading = angles + np.where(outer, np.pi / 2, -np.pi / 2)
+    return np.stack((middle + radius * np.cos(angles), middle + radius * np.sin(angles), heading), axis=1)

@@ -49,11 +49,6 @@ def stuck(section: Section, *, model: Path | None) -> StuckRoom:
     return StuckRoom(inner, own.get("blocked", 0.0), own.get("teaching_journal", ""))
 
 
-def stuck_together(section: Section, *, model: Path | None) -> StuckTogether:
-    """The same of one that examines several at once."""
-    return StuckTogether(**vars(stuck(section, model=model)))
-
-
 @dataclass(frozen=True)
 class StuckMatrix(Matrix):
     """A learner that meets an ending in training, or as it acts."""

@@ -1,7 +1,7 @@
 """CSV files of others are read by their columns' names or a map, and every complaint says where and what to do.
 
 The MRCLAM data set's own files are read, one robot at a time.
-TUM trajectories are read with commands from a second file_of_tum; without them only where that is asked for.
+TUM trajectories are read with commands from a second file; without them only where that is asked for.
 """
 
 import numpy as np
@@ -26,8 +26,8 @@ def read(path, **wanted):
     return read_csv_tables(path, Wanted(**wanted))
 
 
-def complaint(path, **wanted):
-    return complaint_of(read_csv_tables, path, Wanted(**wanted))
+def complaint(path, reader=read_csv_tables, **wanted):
+    return complaint_of(reader, path, Wanted(**wanted))
 
 
 def test_a_file_in_ns_mm_and_degrees_is_read_by_its_names(tmp_path):
@@ -323,10 +323,6 @@ def test_tables_are_known_by_content(tmp_path, file):
     assert not is_csv_tables(tmp_path / "missing")
 
 
-def complaint_of_mrclam(path, **wanted):
-    return complaint_of(read_mrclam, path, Wanted(**wanted))
-
-
 def holds_the_drive(source, form, name):
     (drive,) = source.drives
     assert (source.form, drive.name, drive.commands.kind) == (form, name, "twist")
@@ -351,51 +347,25 @@ def test_either_file_or_a_folder_of_one_robot_will_do(tmp_path):
 
 def test_of_several_robots_one_must_be_chosen(tmp_path):
     write_mrclam(tmp_path, "Robot1"), write_mrclam(tmp_path, "Robot3")
-    assert "several robots: Robot1, Robot3; choose one, as in --poses Robot1" in complaint_of_mrclam(tmp_path)
-    assert "has no robot 'Robot4'; did you mean" in complaint_of_mrclam(tmp_path, poses="Robot4")
+    assert "several robots: Robot1, Robot3; choose one, as in --poses Robot1" in complaint(tmp_path, read_mrclam)
+    assert "has no robot 'Robot4'; did you mean" in complaint(tmp_path, read_mrclam, poses="Robot4")
     assert read_mrclam(tmp_path, Wanted(poses="Robot3")).drives[0].name == "Robot3"
 
 
 def test_commands_may_be_left_out(tmp_path):
     path = write_mrclam(tmp_path)
     (tmp_path / "Robot1_Odometry.dat").unlink()
-    assert "Robot1_Odometry.dat: no such file" in complaint_of_mrclam(path)
+    assert "Robot1_Odometry.dat: no such file" in complaint(path, read_mrclam)
     assert read_mrclam(path, Wanted(commands="none")).drives[0].commands is None
-
-
-@pytest.mark.parametrize(
-    ("text", "where"),
-    [
-        ("# Time x y heading\n", "is empty"),
-        ("0 1 2\n", "line 1: has 3 cells, but there are 4 columns: time, x, y, heading"),
-        ("0 1 2 north\n", "line 1, column 'heading': must be a finite number"),
-        ("0 1 2 0\n0 1 3 0\n", "all 2 stamps are 0 s"),
-    ],
-)
-def test_bad_files_are_refused(tmp_path, text, where):
-    path = write_mrclam(tmp_path)
-    path.write_text(text)
-    said = complaint_of_mrclam(tmp_path)
-    assert said.startswith(str(path))
-    assert where in said
 
 
 def test_a_folder_without_such_files_is_refused(tmp_path):
     assert not is_mrclam(tmp_path)
     assert not is_mrclam(tmp_path / "Robot1_Odometry.dat")
-    assert "has no file such as Robot1_Groundtruth.dat" in complaint_of_mrclam(tmp_path)
+    assert "has no file such as Robot1_Groundtruth.dat" in complaint(tmp_path, read_mrclam)
 
 
 LINES = "# tracked at 20 Hz\n0 1 2 0 0 0 0 1\n0.05 1 2 0 0 0 0.6 0.8\n"
-
-
-@pytest.fixture
-def file_of_tum(write_file):
-    return lambda content, name="run1.tum": write_file(content, name)
-
-
-def complaint_of_tum(path, **wanted):
-    return complaint_of(read_tum, path, Wanted(**wanted))
 
 
 def test_a_trajectory_and_its_commands_are_read(tmp_path):
@@ -404,9 +374,9 @@ def test_a_trajectory_and_its_commands_are_read(tmp_path):
     assert [channel.role for channel in source.channels][:4] == ["time", "x", "y", "z"]
 
 
-def test_commands_may_be_named_with_columns_and_units(file_of_tum):
-    path = file_of_tum(LINES)
-    file_of_tum("stamp_ms;l;r\n10;50;-50\n", "joystick.txt")
+def test_commands_may_be_named_with_columns_and_units(file):
+    path = file(LINES)
+    file("stamp_ms;l;r\n10;50;-50\n", "joystick.txt")
     columns = {"left": "l:percent", "right": "r:percent"}
     (drive,) = read_tum(path, Wanted(commands="joystick.txt", columns=columns)).drives
     assert drive.commands.kind == "duty"
@@ -414,56 +384,41 @@ def test_commands_may_be_named_with_columns_and_units(file_of_tum):
     np.testing.assert_allclose(drive.commands.values, [[0.5, -0.5]])
 
 
-def test_tum_without_commands_only_if_asked_for(file_of_tum):
-    path = file_of_tum(LINES)
-    said = complaint_of_tum(path)
+def test_tum_without_commands_only_if_asked_for(file):
+    path = file(LINES)
+    said = complaint(path, read_tum)
     assert "lay run1_commands.csv (time, v, omega) beside it" in said
     assert "--commands none" in said
     assert read_tum(path, Wanted(commands="none")).drives[0].commands is None
 
 
-def test_tilts_are_kept(file_of_tum):
-    poses = read_tum(file_of_tum("0 0 0 0 0 0 0 1\n1 0 0 0 0.1 0 0 1\n"), Wanted(commands="none")).drives[0].poses
-    np.testing.assert_allclose(poses.tilts, [0.0, 2 * np.arctan(0.1)])
-
-
 @pytest.mark.parametrize(
-    ("text", "where"),
+    ("reader", "text", "where"),
     [
-        ("# nothing but this\n", "is empty"),
-        (b"\xff\xfe\x00rubbish", "is not text in UTF-8"),
-        (LINES + "0.1 1 2\n", "line 4: has 3 cells, but there are 8 columns: time, x, y, z, qx, qy, qz, qw"),
-        (LINES + "0.1 1 2 up 0 0 0 1\n", "line 4, column 'z': must be a finite number"),
-        (LINES + "0.1 1 2 0 0 0 0 0\n", "orientation 3 is the quaternion (0, 0, 0, 0), which is no rotation"),
-        ("0 1 2 0 0 0 0 1\n0 2 2 0 0 0 0 1\n", "all 2 stamps are 0 s"),
-        ("0 1 2 0 0 0 0 1\n", "has a single pose"),
-        ("nan 1 2 0 0 0 0 1\n1 1 2 0 0 0 0 1\n", "line 1, column 'time': is empty beside"),
+        (read_mrclam, "# Time x y heading\n", "is empty"),
+        (read_mrclam, "0 1 2\n", "line 1: has 3 cells, but there are 4 columns: time, x, y, heading"),
+        (read_mrclam, "0 1 2 north\n", "line 1, column 'heading': must be a finite number"),
+        (read_mrclam, "0 1 2 0\n0 1 3 0\n", "all 2 stamps are 0 s"),
+        (read_tum, b"\xff\xfe\x00rubbish", "is not text in UTF-8"),
+        (read_tum, LINES + "0.1 1 2\n", "line 4: has 3 cells, but there are 8 columns: time, x, y, z, qx, qy, qz, qw"),
+        (read_tum, LINES + "0.1 1 2 0 0 0 0 0\n", "orientation 3 is the quaternion (0, 0, 0, 0), which is no rotation"),
+        (read_tum, "0 1 2 0 0 0 0 1\n", "has a single pose"),
+        (read_tum, "nan 1 2 0 0 0 0 1\n1 1 2 0 0 0 0 1\n", "line 1, column 'time': is empty beside"),
     ],
 )
-def test_bad_trajectories_are_refused(file_of_tum, text, where):
-    path = file_of_tum(text)
-    said = complaint_of_tum(path, commands="none")
+def test_bad_files_of_a_fixed_form_are_refused(tmp_path, file, reader, text, where):
+    path = file(text, write_mrclam(tmp_path).name)
+    said = complaint(path, reader, commands="none")
     assert said.startswith(str(path))
     assert where in said
 
 
-def test_tum_bad_commands_are_refused(file_of_tum):
-    path = file_of_tum(LINES)
-    file_of_tum("time,lin\n0,1\n", "commands.csv")
-    assert (
-        "no column found for commands (v and omega, or left and right); its columns are: time, lin"
-        in complaint_of_tum(path)
-    )
-    assert "no such file of commands" in complaint_of_tum(path, commands="elsewhere.csv")
-    assert "unknown name 'velocity'" in complaint_of_tum(path, columns={"velocity": "lin"})
-
-
-def test_trajectories_are_known_by_content(file_of_tum, tmp_path):
-    assert is_tum(file_of_tum(LINES, "poses.txt"))
-    assert is_tum(file_of_tum("", "empty.tum"))
-    assert not is_tum(file_of_tum("time,x\n1,2\n", "a.csv"))
-    assert not is_tum(file_of_tum("1 2 3\n", "b.txt"))
-    assert is_tum(tmp_path), "a folder with such a file_of_tum"
+def test_trajectories_are_known_by_content(file, tmp_path):
+    assert is_tum(file(LINES, "poses.txt"))
+    assert is_tum(file("", "empty.tum"))
+    assert not is_tum(file("time,x\n1,2\n", "a.csv"))
+    assert not is_tum(file("1 2 3\n", "b.txt"))
+    assert is_tum(tmp_path), "a folder with such a file"
     assert not is_tum(tmp_path.parent)
 
 
@@ -491,16 +446,12 @@ def test_a_car_is_shown_how_its_own_columns_are_named(file):
 
 
 @pytest.mark.parametrize(
-    ("steering", "said"),
+    ("before", "after", "said"),
     [
-        ("28", "28 is more than full duty; if it is the wheels' angle, import a speed"),
-        ("1650", "servo pulses are made shares"),
+        ("0.5,1", "28,1", "28 is more than full duty; if it is the wheels' angle, import a speed"),
+        ("0.5,1", "1650,1", "servo pulses are made shares"),
+        ("0.3,", "30,", "30 is more than full duty; if it is in percent, --columns throttle=gas:percent"),
     ],
 )
-def test_steering_in_degrees_or_pulses_is_refused(file, steering, said):
-    assert said in complaint(file(CAR.replace("0.5,1", f"{steering},1")), columns=CAR_MAP)
-
-
-def test_throttle_in_percent_is_refused_with_its_unit(file):
-    said = complaint(file(CAR.replace("0.3,", "30,")), columns=CAR_MAP)
-    assert "30 is more than full duty; if it is in percent, --columns throttle=gas:percent" in said
+def test_throttle_in_percent_and_steering_in_degrees_or_pulses_are_refused(file, before, after, said):
+    assert said in complaint(file(CAR.replace(before, after)), columns=CAR_MAP)

@@ -335,15 +335,6 @@ def test_a_learner_that_falls_at_once_is_given_more_lessons():
     assert len(samples.commands) == 50
 
 
-def test_an_expert_without_labels_on_the_learners_states_is_one_line():
-    with pytest.raises(
-        LearnerError, match=r"^an expert without labels on the learner's states: it labelled 0.0% of 10"
-    ):
-        collect_samples(
-            Tightrope(Wobbly(), silent=True), Distribution({}), count=50, seed=1, lesson_s=2.0, policy=still
-        )
-
-
 def test_steps_off_the_road_are_made_up_for_by_further_lessons():
     samples = collect_samples(Schoolroom(Wobbly(), blocked=0.4), WIDE, count=50, seed=1, lesson_s=1.0)
     assert len(samples.commands) == 50

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
+from log_folders import write_files
 
 from proxytune.errors import LogError
 from proxytune.logs import Measured, read_log
@@ -18,9 +19,7 @@ COMMANDS = "episode,time,v,omega\na,3.5,0.5,0.0\n"
 @pytest.fixture
 def folder(tmp_path):
     def write(samples, commands=COMMANDS, description=TOML):
-        for name, text in (("log.toml", description), ("samples.csv", samples), ("commands.csv", commands)):
-            (tmp_path / name).write_text(text, encoding="utf-8")
-        return tmp_path
+        return write_files(tmp_path, {"log.toml": description, "samples.csv": samples, "commands.csv": commands})
 
     return write
 
@@ -120,9 +119,7 @@ def test_every_pose_lies_within_a_step_of_its_own_time(seed, by, usual):
     times = jittered(seed, 60, usual, min(by, 0.4 * usual))
     files = {"log.toml": TOML, "samples.csv": rows(times, circle(times)), "commands.csv": COMMANDS}
     with tempfile.TemporaryDirectory() as home:
-        for name, text in files.items():
-            (Path(home) / name).write_text(text, encoding="utf-8")
-        log = read_log(home)
+        log = read_log(write_files(Path(home), files))
     (episode,) = log.episodes
     apart = np.abs(episode.times[episode.measured.rows] - episode.measured.times)
     assert apart.max() <= 1.0 / log.rate_hz + 1e-9

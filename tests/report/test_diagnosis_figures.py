@@ -116,22 +116,14 @@ def test_figures_are_as_wide_as_a_column_with_type_of_six_points_and_more(figure
         assert min(text.get_fontsize() for text in figure.findobj(Text) if text.get_text()) >= 6.0
 
 
-def test_the_legend_lies_within_its_figure_and_on_no_label(figures):
-    for figure in figures.values():
-        labels = [label for axes in figure.axes for label in (axes.xaxis.label, axes.yaxis.label) if label.get_text()]
-        for legend in figure.legends:
-            box = legend.get_window_extent()
-            assert box.x0 >= 0
-            assert box.x1 <= figure.bbox.x1
-            assert not any(box.overlaps(label.get_window_extent()) for label in labels)
-
-
-def test_no_label_is_cut_by_the_figure_s_edge(figures):
+def test_no_label_is_cut_and_the_legend_lies_within_its_figure_and_on_none(figures):
     for name, figure in figures.items():
-        for axes in figure.axes:
-            for text in filter(Text.get_text, (axes.xaxis.label, axes.yaxis.label, axes.title)):
-                box = text.get_window_extent()
-                assert figure.bbox.x0 - 1 <= box.x0 <= box.x1 <= figure.bbox.x1 + 1, (name, text.get_text())
+        labels = [label for axes in figure.axes for label in (axes.xaxis.label, axes.yaxis.label, axes.title)]
+        boxes = [label.get_window_extent() for label in labels if label.get_text()]
+        legends = [legend.get_window_extent() for legend in figure.legends]
+        for box in (*boxes, *legends):
+            assert figure.bbox.x0 - 1 <= box.x0 <= box.x1 <= figure.bbox.x1 + 1, name
+        assert not any(legend.overlaps(box) for legend in legends for box in boxes), name
 
 
 def test_axes_say_what_they_show_in_which_unit(figures):

@@ -11,11 +11,11 @@ from hypothesis import given, strategies as st
 from PIL import Image
 
 from proxytune.driving import shipped_map
-from proxytune.errors import InputError, RunError
+from proxytune.errors import RunError
 from proxytune.report.drive import movie
 from proxytune.report.drive.animation import FRAME_HZ, LINGER_S, Animation
 from proxytune.report.drive.figure import episode_figure, say_parting
-from proxytune.report.drive.movie import find_ffmpeg, write_gif, write_mp4
+from proxytune.report.drive.movie import write_gif, write_mp4
 from proxytune.report.drive.scene import ARROWS, COLOURS, CORNERS, GAP, LEAST_M, SIZE, arrow_rows, corners_of
 from proxytune.report.figure_style import COLUMN
 
@@ -222,10 +222,3 @@ def test_an_encoder_that_fails_is_told_in_one_line_and_leaves_nothing(program, t
     )
     assert [path.name for path in tmp_path.iterdir()] == ["bin"]
     assert caplog.text == ""
-
-
-def test_without_an_encoder_it_is_said_what_to_install(monkeypatch):
-    monkeypatch.setattr("shutil.which", lambda name: None)
-    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    with pytest.raises(InputError, match=r"pip install imageio-ffmpeg, or write a \.gif"):
-        find_ffmpeg()

@@ -13,7 +13,7 @@ from proxytune.api.exporting import WRITERS
 from proxytune.driving import AXLES, drivetrain, orientation, read_body, read_robot
 from proxytune.driving.plants import PlanarPlant
 from proxytune.effects import CAR_CATALOGUE, CATALOGUE, FilterContext, effects_from, theta_names
-from proxytune.errors import InputError, SettingsError
+from proxytune.errors import SettingsError
 from proxytune.report import FORMATS, export_lines, mjcf_text, ros_text, urdf_text
 from proxytune.report.export.instance import PLACES, Instance, Places, place_of
 
@@ -26,31 +26,6 @@ FOUND = {
 }
 
 
-def planar(found):
-    robot = found.robot
-    train = drivetrain(robot, effects_from(found.theta, robot.figures))
-    twists, _ = train.apply(DUTIES, train.begin(FilterContext(60.0, np.zeros(2), robot.figures)))
-    return PlanarPlant(np.zeros(3), 1.0 / 60.0).move(twists)[0]
-
-
-@pytest.mark.parametrize("case", FOUND)
-def test_mujoco_drives_the_exported_model_as_the_planar_plant_drives_the_instance(case):
-    mujoco = pytest.importorskip("mujoco")
-    found = instance(**FOUND[case])
-    model = mujoco.MjModel.from_xml_string(mjcf_text(found))
-    data, poses = mujoco.MjData(model), []
-    for tick, duties in enumerate(DUTIES, start=1):
-        data.ctrl[:] = duties
-        while data.time < tick / 60.0 - 1e-9:
-            mujoco.mj_step(model, data)
-        w, _, _, z = data.qpos[3:7]
-        poses.append((*data.qpos[:2], 2.0 * np.arctan2(z, w)))
-    poses, expected = np.array(poses), planar(found)
-    driven = np.linalg.norm(np.diff(expected[:, :2], axis=0), axis=1).sum()
-    assert np.linalg.norm(poses[:, :2] - expected[:, :2], axis=1).max() < 0.015 * driven
-    assert abs(np.arctan2(*(f(poses[-1, 2] - expected[-1, 2]) for f in (np.sin, np.cos)))) < 0.03
-
-
 CAR = read_robot("car")
 HELD = np.repeat([[0.3, 0.0], [0.3, 0.8], [0.25, -0.6], [0.5, 0.1]], 60, axis=0)
 FOUND_OF_CARS = {
@@ -61,23 +36,36 @@ FOUND_OF_CARS = {
 }
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("case", FOUND_OF_CARS)
-def test_mujoco_drives_an_exported_car_as_the_planar_plant_drives_the_instance(case):
+@pytest.mark.parametrize(
+    ("robot", "theta", "commands", "share", "turned"),
+    [
+        *(pytest.param(ROBOT, theta, DUTIES, 0.015, 0.03, id=case) for case, theta in FOUND.items()),
+        *(
+            pytest.param(CAR, theta, HELD, 0.03, np.inf, id=f"car {case}", marks=pytest.mark.slow)
+            for case, theta in FOUND_OF_CARS.items()
+        ),
+    ],
+)
+def test_mujoco_drives_the_exported_model_as_the_planar_plant_drives_the_instance(
+    robot, theta, commands, share, turned
+):
     mujoco = pytest.importorskip("mujoco")
-    found = instance(CAR, **FOUND_OF_CARS[case])
-    train = drivetrain(CAR, effects_from(found.theta, CAR.figures, CAR.catalogue))
-    twists, _ = train.apply(HELD, train.begin(FilterContext(60.0, np.zeros(2), CAR.figures)))
+    found = instance(robot, **theta)
+    train = drivetrain(robot, effects_from(found.theta, robot.figures, robot.catalogue))
+    twists, _ = train.apply(commands, train.begin(FilterContext(60.0, np.zeros(2), robot.figures)))
     expected = PlanarPlant(np.zeros(3), 1.0 / 60.0).move(twists)[0]
     model = mujoco.MjModel.from_xml_string(mjcf_text(found))
     data, poses = mujoco.MjData(model), []
-    for tick, command in enumerate(HELD, start=1):
+    for tick, command in enumerate(commands, start=1):
         data.ctrl[:] = command
         while data.time < tick / 60.0 - 1e-9:
             mujoco.mj_step(model, data)
-        poses.append(data.qpos[:2].copy())
+        w, _, _, z = data.qpos[3:7]
+        poses.append((*data.qpos[:2], 2.0 * np.arctan2(z, w)))
+    poses = np.array(poses)
     driven = np.linalg.norm(np.diff(expected[:, :2], axis=0), axis=1).sum()
-    assert np.linalg.norm(np.array(poses) - expected[:, :2], axis=1).max() < 0.03 * driven
+    assert np.linalg.norm(poses[:, :2] - expected[:, :2], axis=1).max() < share * driven
+    assert abs(np.arctan2(*(f(poses[-1, 2] - expected[-1, 2]) for f in (np.sin, np.cos)))) < turned
 
 
 def test_an_exported_car_has_wheels_as_large_and_front_wheels_as_askew_as_was_found():
@@ -204,14 +192,6 @@ def test_names_with_signs_of_xml_give_a_file_that_can_be_read(form):
     assert form is urdf_text or root.get("model") == 'R&D "<b>"'
 
 
-def test_a_robot_that_lacks_what_a_format_needs_is_refused_by_name():
-    with pytest.raises(SettingsError, match="robot 'duckiebot' has no body"):
-        urdf_text(instance(replace(ROBOT, urdf=None)))
-    lighter = {name: value for name, value in ROBOT.figures.items() if name != "mass"}
-    with pytest.raises(InputError, match="states no mass; add it to its robot.toml"):
-        mjcf_text(instance(replace(ROBOT, figures=lighter)))
-
-
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "how-to" / "exporting.md"
 NEEDED = {
     "floor_slope.push": {"floor_slope.x": 0.1},
@@ -246,15 +226,6 @@ def test_a_value_changes_the_file_where_it_has_a_place_and_nowhere_else(form, ef
         for value in values
     ]
     assert (texts[0] != texts[1]) == bool(place_of(effect, form))
-
-
-@pytest.mark.parametrize("form", FORMATS)
-def test_what_has_no_place_stands_at_the_head_of_the_file_with_value_and_interval(form):
-    found = instance(intervals={"dead_band.width": (0.05, 0.07)}, dead_band__width=0.06)
-    head = WRITERS[form](found)
-    assert "dead_band.width 0.06 duty (0.05 to 0.07): NO PLACE, not in this file" in head
-    assert "delay 0.15 s" in head
-    assert "dead_band.width" in [line.name for line in export_lines(found, form) if not line.place]
 
 
 def test_neutral_values_that_have_no_place_are_not_told():

@@ -182,15 +182,6 @@ def test_a_database_with_a_spoilt_page_is_refused(tmp_path):
     refused(path, "is damaged")
 
 
-@pytest.mark.parametrize("share", [0.3, 0.6, 0.9])
-def test_a_truncated_database_is_refused(tmp_path, share):
-    path = filled(tmp_path / "study.db")
-    content = path.read_bytes()
-    path.write_bytes(content[: int(share * len(content))])
-    refused(path, "is damaged")
-    refused(path, "is damaged", writable=False)
-
-
 def test_a_folder_that_cannot_be_written_is_told(tmp_path):
     with pytest.raises(StoreError, match=r"cannot be written \(unable to open database file\)"):
         connect(tmp_path / "nowhere" / "study.db", writable=True)
@@ -280,19 +271,13 @@ def broken_off(tmp_path):
     return killed
 
 
-@pytest.mark.parametrize("writable", [True, False])
-def test_a_write_that_a_kill_broke_off_is_undone_also_by_who_only_looks(broken_off, writable):
-    connection = connect(broken_off, writable=writable)
+@pytest.mark.parametrize("first", ["write", "look", "repair"])
+def test_a_write_that_a_kill_broke_off_is_undone_also_by_who_only_looks_or_repairs(broken_off, first):
+    assert first != "repair" or salvage(broken_off.parent) is None
+    connection = connect(broken_off, writable=first == "write")
     assert connection.execute("SELECT count(*) FROM instances").fetchone() == (3000,)
     connection.close()
     assert salvage(broken_off.parent) is None, "nothing is damaged"
-
-
-def test_a_broken_off_write_is_no_damage_to_a_repair(broken_off):
-    assert salvage(broken_off.parent) is None
-    connection = connect(broken_off, writable=False)
-    assert connection.execute("SELECT count(*) FROM instances").fetchone() == (3000,)
-    connection.close()
 
 
 @pytest.mark.parametrize("writable", [True, False])
@@ -486,5 +471,7 @@ def test_a_database_that_was_cut_off_anywhere_is_told(tmp_path):
     content = path.read_bytes()
     for size in random.Random(1).sample(range(1, len(content)), 60):
         path.write_bytes(content[:size])
-        with pytest.raises(StoreError, match="is damaged|is not a study's database"):
-            opened(tmp_path, writable=False)
+        for writable in (False, True):
+            with pytest.raises(StoreError, match="is damaged|is not a study's database"):
+                opened(tmp_path, writable)
+            assert path.stat().st_size == size, "a refused database must stay as it was"

@@ -78,10 +78,6 @@ def test_what_makes_families_incomparable_is_told(make_study, changes, says):
 @pytest.mark.parametrize(
     ("families", "says"),
     [
-        (
-            "[families.a]\n[families.b.domain]\nslep = 1\n",
-            "families.b: domain.slep: unknown key; did you mean 'sleep'?",
-        ),
         ("[families.a]\n[families.b.parameters]\nblur = [0, 1]\n", "families.b: parameters.blur: unknown parameter"),
         ('[families.a]\n[families.b]\nfamily = "wobbly:wobly"\n', "families.b: family: family 'wobbly:wobly'"),
         ('[families.a]\n[families.b]\nproxy = "no.toml"\n', "families.b: proxy: no such file"),
@@ -129,12 +125,6 @@ def test_a_study_in_a_folder_of_that_name_is_a_study_of_its_own(make_study, tmp_
     inner = make_study("study/families/right")
     assert read_study_settings(inner).family_name == ""
     assert read_study_settings(inner).home == inner
-
-
-def test_where_one_study_is_needed_several_are_refused_with_what_to_give(make_study):
-    folder = make_several(make_study)
-    with pytest.raises(SettingsError, match=f"one is needed; give one, as {folder / 'families' / 'right'}"):
-        open_study(folder)
 
 
 def test_a_study_is_given_as_its_folder_or_its_file(make_study):

@@ -16,7 +16,7 @@ from several import make_several
 from taught import GRID, TEACHING, make_taught
 from telling import Telling
 
-from proxytune.errors import EpisodeError, InputError, LearnerError, SettingsError
+from proxytune.errors import EpisodeError, LearnerError, SettingsError
 from proxytune.learning import Costs, Distribution, LearningCurve, mean_score, more_needed, sample_needs, teaching_value
 from proxytune.report.teaching import observation_lines
 from proxytune.running import Silent
@@ -25,7 +25,6 @@ from proxytune.study import StudyRun, open_study, read_study_settings
 from proxytune.teaching import (
     Experiment,
     TeacherResult,
-    classrooms,
     load_setup,
     observe,
     predictivity,
@@ -148,11 +147,6 @@ def test_where_the_learner_drives_its_first_samples_without_a_proxy_cost_what_th
         assert one.cost.value == pytest.approx(one.worth.plv.value + 9.0 * GRID[1])
 
 
-def test_an_expert_that_cannot_drive_is_told_with_the_proxys_name(make_study):
-    with pytest.raises(LearnerError, match="cannot drive here"):
-        run(make_taught(make_study, domain={"blocked": "0.9"}))
-
-
 def test_a_policy_that_gives_no_command_stops_the_run_and_keeps_the_rest(make_study):
     folder = make_taught(make_study)
     path = folder / "study.toml"
@@ -165,25 +159,6 @@ def test_a_policy_that_gives_no_command_stops_the_run_and_keeps_the_rest(make_st
     with pytest.raises(EpisodeError, match="no command"):
         run(folder)
     assert list((folder / "teaching").glob("samples-*.npz"))
-
-
-@pytest.mark.parametrize(
-    ("edit", "says"),
-    [
-        (("schoolroom:Matrix", "schoolroom:Nothing"), "teaching.learner: learner 'schoolroom:Nothing': schoolroom has"),
-        (("schoolroom:Matrix", "wobbly:Wobbly"), "learner 'wobbly:Wobbly' "),
-        (("schoolroom:schoolroom", "wobbly:wobbly"), "family: wobbly:wobbly cannot teach: it lacks best_score"),
-        (("trim = -0.3\n", "trim = -0.4\n"), "teaching.proxies.wrong.trim: must lie within [-0.3, 0.3]"),
-        (("trim = -0.3\n", "tilt = 1.0\n"), "teaching.proxies.wrong.tilt: unknown parameter; did you mean 'trim'?"),
-    ],
-)
-def test_what_cannot_be_used_is_one_line_with_its_key(make_study, edit, says):
-    folder = make_taught(make_study)
-    path = folder / "study.toml"
-    path.write_text(path.read_text().replace(*edit))
-    with pytest.raises(InputError) as told:
-        run(folder)
-    assert says in str(told.value)
 
 
 def test_a_study_without_the_table_cannot_teach(make_study):
@@ -268,12 +243,6 @@ def test_where_none_can_teach_the_first_says_why(taught):
     both = BLOCKED.replace("[families.right]", "[families.shut.domain]\nblocked = 0.8")
     with pytest.raises(LearnerError, match="shut: the expert cannot drive here"):
         teach(taught(both), RIGHT, RIGHT)
-
-
-def test_a_family_that_is_no_classroom_is_refused_by_its_name(taught):
-    settings = taught('[families.right]\n[families.mute]\nfamily = "wobbly:wobbly"\n')
-    with pytest.raises(SettingsError, match=r"families\.mute: family: wobbly:wobbly cannot teach: it lacks best_score"):
-        classrooms(settings)
 
 
 @pytest.mark.slow

@@ -291,7 +291,11 @@ def _learn_again(run: StudyRun, learnt: Knowledge, driven: Sequence[Finalist]) -
     unvisited = [one for one in driven if one.trial.number == UNVISITED]
     own = [run.known(plan_episodes(run.settings, one.trial.theta, run.settings.seed)).values() for one in unvisited]
     fresh += [trial_of(one, outcomes, 0) for one, outcomes in zip(unvisited, own, strict=True)]
-    return learn_theta(learnt.space, [*learnt.trials, *fresh], learnt.goal, learnt.seed)
+    # A family that draws nothing does the same again, which tells nothing.
+    told = {(one.values, one.outcome) for one in learnt.trials}
+    new = {(one.values, one.outcome): one for one in fresh}
+    again = [one for key, one in new.items() if key not in told]
+    return learn_theta(learnt.space, [*learnt.trials, *again], learnt.goal, learnt.seed)
 
 
 def _answer(driven: Sequence[Finalist], learnt: Knowledge, again: Knowledge) -> Finalist:

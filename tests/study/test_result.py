@@ -156,6 +156,10 @@ def test_the_answer_is_the_mean_of_what_trials_and_finalists_tell_unless_prpv_sp
         1 + (one.trial.number == UNVISITED) for one in (*first, mean)
     )
     assert {one.placement for one in found.knowledge.trials} == {0, -1}
+    same = replace(first[0], fresh=(first[0].fresh[0],) * 3)
+    with Store.read(found.study.settings.folder) as store:
+        twice = _learn_again(StudyRun(found.study, store), learnt, [same, *first[1:]])
+    assert len(twice.trials) == len(before.trials), "what is driven again without any noise tells nothing"
     worse = replace(mean, scores=(1e9,))
     assert _answer([*first, worse], learnt, found.knowledge).trial in [one.trial for one in first]
 

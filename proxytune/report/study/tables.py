@@ -95,8 +95,9 @@ def _theta_notes(result: StudyResult) -> list[str]:
     space, learnt = result.study.settings.space, result.knowledge
     notes = []
     if learnt.unidentified:
-        few = f"{len(result.trials) + result.earlier} trials exclude almost no value of {listed(list(map(plain, learnt.unidentified)))}"
-        notes.append(f"{few}; unidentified: the interval fills more than 0.9 of the range")
+        few = f"{len(result.trials) + result.earlier} trials exclude almost no value of"
+        names = listed(list(map(plain, learnt.unidentified)))
+        notes.append(f"{few} {names}; unidentified: the interval fills more than 0.9 of the range")
     if not result.inside:
         notes.append("the best θ by PRPV is outside the 95 % region, which uses every metric of every agent")
     if result.truth is not None and set(space.names) <= set(result.truth):

@@ -189,6 +189,8 @@ def run_confirmation(run: StudyRun) -> None:
     mean = [one for trial in _mean_of(run, learnt, first) for one in _planned(settings, trial)] if first else []
     run.watcher.begin("fresh episodes of the mean", (settings.confirm + 1) * each - len(mean))
     run.outcomes(mean, "fresh episodes of the mean")
+    if mean:
+        run.watcher.finished("fresh episodes of the mean")
     driven = _all_driven(run, trials, learnt) if settings.confirm else None
     again = driven and _learn_again(run, learnt, driven)
     more = _repetitions(run, _answer(driven, learnt, again), driven) if driven and again else []
@@ -310,7 +312,7 @@ def _answer(driven: Sequence[Finalist], learnt: Knowledge, again: Knowledge) -> 
         for values, one in by_values.items()
     }
     best = min(expected, key=expected.__getitem__)
-    if learnt.misfit.fits is False:
+    if False in (learnt.misfit.fits, again.misfit.fits):
         return by_values[best]
     limit = expected[best] + float(learnt.fresh_scores(best).std())
     alike = [values for values in expected if expected[values] <= limit]

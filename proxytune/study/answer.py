@@ -20,7 +20,7 @@ from proxytune.arrays import Floats
 from proxytune.domain import Episode, Outcome, instance_of
 from proxytune.errors import EpisodeError
 from proxytune.scores import ScoreTable
-from proxytune.search import Knowledge, Trial, learn_theta, make_proposer
+from proxytune.search import Knowledge, Trial, make_proposer
 from proxytune.seeds import fresh_seed
 from proxytune.space import Theta
 from proxytune.storage import TrialRecord
@@ -297,7 +297,7 @@ def _learn_again(run: StudyRun, learnt: Knowledge, driven: Sequence[Finalist]) -
     told = {(one.values, one.outcome) for one in learnt.trials}
     new = {(one.values, one.outcome): one for one in fresh}
     again = [one for key, one in new.items() if key not in told]
-    return learn_theta(learnt.space, [*learnt.trials, *again], learnt.goal, learnt.seed)
+    return run.learn([*learnt.trials, *again], learnt.goal)
 
 
 def _answer(driven: Sequence[Finalist], learnt: Knowledge, again: Knowledge) -> Finalist:

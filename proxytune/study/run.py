@@ -22,7 +22,6 @@ from proxytune.search import (
     batch_at,
     expected_gain,
     expected_improvement,
-    learn_theta,
 )
 from proxytune.space import Space
 from proxytune.storage import State, TrialRecord
@@ -73,7 +72,7 @@ def goal_of(run: StudyRun) -> Goal:
 def knowledge_of(run: StudyRun, done: Iterable[TrialRecord]) -> Knowledge:
     """All that finished trials say of θ, those of earlier studies too."""
     trials = [*earlier_trials(run), *(run.search_trial(trial) for trial in done)]
-    return learn_theta(run.settings.space, trials, goal_of(run), run.settings.seed)
+    return run.learn(trials, goal_of(run))
 
 
 def run_trials(run: StudyRun, proposer: Proposer) -> None:

@@ -8,7 +8,7 @@ composed (`compose_of`). `measure_agents` scores the agents in one fixed domain:
 
 import itertools
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -21,7 +21,7 @@ from proxytune.domain import DomainFamily, Episode, Instance, Outcome, instance_
 from proxytune.errors import EpisodeError, InputError, RunError
 from proxytune.running import ENDED, ENDLESS, RAISED, Silent, Watch, Watcher, can_run_together, places, running
 from proxytune.scores import ScoreTable
-from proxytune.search import Compose, Trial, Values
+from proxytune.search import Compose, Goal, Knowledge, Trial, Values, learn_theta
 from proxytune.seeds import episode_seed, fresh_seed
 from proxytune.space import Space, Theta
 from proxytune.storage import Store, TrialRecord
@@ -204,6 +204,7 @@ class StudyRun:
         self.spent = Spent()
         self._evaluations: dict[Instance, Evaluation] = {}
         self._trials: dict[int, Trial] = {}
+        self._learnt: dict[Hashable, Knowledge] = {}
 
     @property
     def settings(self) -> StudySettings:
@@ -357,6 +358,19 @@ class StudyRun:
         """The episodes that a trial stands on: all, or those of the agents decided before it was pruned."""
         planned = plan_episodes(self.settings, trial.theta, self.settings.seed)
         return [episode for episode in planned if not trial.decided or episode.agent in trial.decided]
+
+    def learn(self, trials: Iterable[Trial], goal: Goal) -> Knowledge:
+        """What trials say of θ against a target; the last few answers are kept, since several stages ask for the same.
+
+        Raises:
+            RunError: If no trial has an outcome, or no output changes.
+        """
+        trials = tuple(trials)
+        asked = trials, goal.values.tobytes(), goal.noise.tobytes()
+        if asked not in self._learnt:
+            self._learnt = dict([*self._learnt.items()][-2:])
+            self._learnt[asked] = learn_theta(self.settings.space, trials, goal, self.settings.seed)
+        return self._learnt[asked]
 
     def search_trial(self, trial: TrialRecord) -> Trial:
         """A finished trial as the search sees it; of one that was pruned, the outputs of the agents driven until then.

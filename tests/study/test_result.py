@@ -151,6 +151,7 @@ def test_the_answer_is_the_mean_of_what_trials_and_finalists_tell_unless_prpv_sp
         run = StudyRun(found.study, store)
         learnt = knowledge_of(run, trials)
         before = _learn_again(run, learnt, first)
+        assert knowledge_of(run, trials) is learnt, "it is learnt once"
     assert before.space.theta(before.mean) == mean.trial.theta == found.best.trial.theta
     assert len(found.knowledge.trials) == len(trials) + sum(
         1 + (one.trial.number == UNVISITED) for one in (*first, mean)

@@ -4,6 +4,8 @@ A proxy that fits is not said to lack anything, and one that lacks something is.
 The posterior over the box: its share, its intervals and its draws are those of densities that are known.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
@@ -13,7 +15,7 @@ from steps import SPACE, goal, whole
 from proxytune.search import Trial, from_unit, learn_theta, to_unit
 from proxytune.search.engine import design_point
 from proxytune.search.likelihood import fit_outputs
-from proxytune.search.posterior import FEWEST, MARGIN, WIDENINGS, LeftOut, Misfit, leave_out, posterior_of
+from proxytune.search.posterior import FEWEST, MARGIN, WIDENINGS, LeftOut, Misfit, as_targets, leave_out, posterior_of
 
 AGENTS = np.random.default_rng(0).uniform(1.0, 4.0, (12, 2))
 
@@ -37,6 +39,13 @@ def test_each_trial_is_told_how_probable_its_own_theta_is():
     assert found.above.shape == (20, len(WIDENINGS))
     assert (found.above >= 0.0).all()
     assert (found.above <= 1.0 + 1e-9).all()
+
+
+def test_what_was_driven_under_another_placement_is_left_out_with_a_trial():
+    told = trials(8)
+    told += [replace(one, outcome=tuple(value + 0.01 for value in one.outcome), placement=-1) for one in told[:3]]
+    for one in as_targets(fit_outputs(SPACE, told), told, goal(whole, (0.5,) * 12, 1e-4), 1):
+        assert not np.isclose(one.likelihood.model.visited, one.theta).all(axis=1).any()
 
 
 @pytest.mark.slow

@@ -16,9 +16,9 @@ from zlib import crc32
 
 import numpy as np
 from numpy.typing import NDArray
-from second_hidden_cases import plan
+from second_hidden_cases import log_of, plan
 
-from proxytune.logs import Log, LogEpisode
+from proxytune.logs import Log
 
 Array = NDArray[np.float64]
 ROW_S, STEPS = 0.05, 10
@@ -48,9 +48,7 @@ def make_log(case: Case, *, episodes: int = 12, seconds: float = 60.0, noiseless
     poses = _driven(case, course.duties, course.starts)
     if not noiseless:
         poses = poses + np.random.default_rng([case.seed, 1]).standard_normal(poses.shape) * POSE_NOISE
-    times = np.arange(poses.shape[1]) * ROW_S
-    rows = (LogEpisode(f"{e:02d}", times, course.duties[e], poses[e], None) for e in range(episodes))
-    return Log(case.name, "duckiebot", "duty", 1.0 / ROW_S, {}, tuple(rows))
+    return log_of(case.name, course, poses)
 
 
 def _driven(case: Case, duties: Array, starts: Array) -> Array:

@@ -379,10 +379,15 @@ def make_log(case: Case, *, episodes: int = 12, seconds: float = 60.0, noiseless
     course = plan(case.seed, episodes, round(seconds / ROW_S))
     level = 0.0 if noiseless else LEVELS[case.noise.split()[0]]
     poses = _passed(TRACKED, case, driven(case, course, level))
-    seen = poses + level * noisy(case, poses.shape)
+    return log_of(case.name, course, poses + level * noisy(case, poses.shape))
+
+
+def log_of(name: str, course: Course, poses: Array) -> Log:
+    """The log of a course: its duties, and poses (episodes, rows, 3) as they were measured."""
     times = np.arange(poses.shape[1]) * ROW_S
-    rows = (LogEpisode(f"{e:02d}", times, course.duties[e], seen[e], None) for e in range(episodes))
-    return Log(case.name, "duckiebot", "duty", 1.0 / ROW_S, {}, tuple(rows))
+    pairs = enumerate(zip(course.duties, poses, strict=True))
+    rows = (LogEpisode(f"{e:02d}", times, duties, own, None) for e, (duties, own) in pairs)
+    return Log(name, "duckiebot", "duty", 1.0 / ROW_S, {}, tuple(rows))
 
 
 def driven(case: Case, course: Course, level: float) -> Array:

@@ -21,9 +21,10 @@ from proxytune.report import (
     study_foot,
     write_page,
 )
-from proxytune.study import Fleet, Told, learn_fleet
+from proxytune.study import Fleet, learn_fleet
+from proxytune.usefulness import Estimate
 
-UNKNOWN = Told(np.nan, np.nan, np.nan)
+UNKNOWN = Estimate(np.nan, np.nan, np.nan)
 
 
 @dataclass(frozen=True, repr=False)
@@ -100,8 +101,8 @@ class FleetReport(Shown):
         return figure, page
 
 
-def _columns(key: str, told: Told) -> dict[str, float]:
-    return {f"{key}_{end}": value for end, value in told._asdict().items()}
+def _columns(key: str, told: Estimate) -> dict[str, float]:
+    return {f"{key}_low": told.low, f"{key}_middle": told.value, f"{key}_high": told.high}
 
 
 def fleet(path: str | Path, targets: Sequence[str | Path]) -> FleetReport:

@@ -329,6 +329,7 @@ def predict(
         robot = _robot_of(fitted, drives, catalogue)
         cautions = (*fitted.cautions, *log_cautions(drives, robot.figures))
         corrected, clocks = on_one_clock(drives, robot)
+        # Else a log is predicted whole, as it was recorded, long rests and all.
         drives = corrected if clocks.differ else drives
         table = predict_poses(drives, robot, fitted.theta, horizon_s)
         notes = tuple(clocks_notes(drives.name, [clocks], {}))

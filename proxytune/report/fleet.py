@@ -10,11 +10,12 @@ from matplotlib.ticker import MaxNLocator
 from rich.console import Group
 
 from proxytune.report.figure_style import BLUE, COLUMN, GREEN, LIGHT_GREY, VERMILLION, dress, legend_below
-from proxytune.report.study.document import intervals_document
+from proxytune.report.study.document import estimate_document, intervals_document
 from proxytune.report.text import file_texts, group_texts, section_text
 from proxytune.report.view import Drawn, Paragraphs, Picture, Table, View, columns_of
 from proxytune.report.wording import digits, fixed, listed, percent, plain, probability, span, with_unit
-from proxytune.study import FEW, Fleet, Told
+from proxytune.study import FEW, Fleet
+from proxytune.usefulness import Estimate
 
 MOST_NAMED = 40
 """More robots than this are not named beside their lines."""
@@ -132,13 +133,13 @@ def fleet_text(fleet: Fleet, files: Mapping[str, Any]) -> Group:
     return group_texts(fleet_sentence(fleet), *tables, *paste, *file_texts(files))
 
 
-def _told(found: Told) -> str:
+def _told(found: Estimate) -> str:
     places = digits((found.low, found.high))
-    return f"{fixed(found.middle, places)} ({span((found.low, found.high))})"
+    return f"{fixed(found.value, places)} ({span((found.low, found.high))})"
 
 
-def _documents(told: Mapping[str, Told]) -> dict[str, Any]:
-    return {name: {"value": one.middle, "interval": [one.low, one.high]} for name, one in told.items()}
+def _documents(told: Mapping[str, Estimate]) -> dict[str, Any]:
+    return {name: estimate_document(one) for name, one in told.items()}
 
 
 def fleet_document(fleet: Fleet) -> dict[str, Any]:
@@ -161,8 +162,8 @@ def fleet_document(fleet: Fleet) -> dict[str, Any]:
         "varies": dict(fleet.varies),
         "next_robot": {name: [one.low, one.high] for name, one in fleet.next_robot.items()},
         "correlations": [
-            {"parameters": [*pair], "value": r.middle, "interval": [r.low, r.high]}
-            for pair, r in fleet.correlations.items()
+            {"parameters": [*pair], "value": found.value, "interval": [found.low, found.high]}
+            for pair, found in fleet.correlations.items()
         ],
     }
     said = {"study": fleet.settings.name, "sentence": fleet_sentence(fleet), "cautions": list(fleet_notes(fleet))}
@@ -191,7 +192,7 @@ def fleet_figure(fleet: Fleet) -> Figure:
 def _draw(axes: Axes, fleet: Fleet, row: int) -> None:
     box = fleet.settings.space.intervals[row]
     if box.name in fleet.mean:
-        mean, reach = fleet.mean[box.name].middle, 2.0 * fleet.deviation[box.name].middle
+        mean, reach = fleet.mean[box.name].value, 2.0 * fleet.deviation[box.name].value
         axes.axvspan(mean - reach, mean + reach, color=GREEN, alpha=0.15, linewidth=0, label="fleet: mean ± 2 SD")
         axes.axvline(mean, color=GREEN, linewidth=1.0, linestyle="--")
     for place, robot in enumerate(fleet.robots):
@@ -206,7 +207,7 @@ def _draw(axes: Axes, fleet: Fleet, row: int) -> None:
         )
         if robot.name in fleet.given:
             axes.plot(
-                fleet.given[robot.name][box.name].middle,
+                fleet.given[robot.name][box.name].value,
                 place,
                 "o",
                 color=BLUE,

@@ -92,7 +92,7 @@ def _mixture(posterior: Posterior) -> tuple[Floats, Floats]:
     weights, mean = posterior.weights, posterior.mean
     away = posterior.points - mean
     known = LEAST**2 * np.eye(len(mean))
-    covariance = (weights[:, None] * away).T @ away + known
+    covariance = posterior.covariance + known
     # At random: quasi-random points have a rhythm, and so would be chosen.
     drawn = away[np.random.default_rng(0).choice(len(weights), POINTS, p=weights)]
     drawn = drawn - drawn.mean(axis=0)

@@ -79,6 +79,12 @@ class Posterior:
         """The mean of θ."""
         return np.asarray(self.weights @ self.points)
 
+    @property
+    def covariance(self) -> Floats:
+        """The covariance of θ."""
+        away = self.points - self.mean
+        return np.asarray((self.weights[:, None] * away).T @ away)
+
     @cached_property
     def intervals(self) -> Floats:
         """The central 95 % of every parameter, shape (parameters, 2)."""
@@ -99,8 +105,7 @@ class Posterior:
     @property
     def trades(self) -> tuple[tuple[int, int, float], ...]:
         """Pairs of parameters that make up for each other, with their correlation."""
-        away = self.points - self.mean
-        covariance = (self.weights[:, None] * away).T @ away
+        covariance = self.covariance
         size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
         matrix = covariance / np.outer(size, size)
         pairs = [(i, j, float(matrix[i, j])) for i in range(len(size)) for j in range(i)]

@@ -58,7 +58,7 @@ from .result import (
     result_of as result_of,
     with_metrics as with_metrics,
 )
-from .robots import FEW as FEW, Fleet as Fleet, Told as Told, learn_fleet as learn_fleet
+from .robots import FEW as FEW, Fleet as Fleet, learn_fleet as learn_fleet
 from .run import (
     goal_of as goal_of,
     nothing_to_gain as nothing_to_gain,

@@ -120,7 +120,6 @@ class Confirmation:
         candidates: All finalists, the search's own favourite first.
         episodes: How many fresh episodes each of these was driven in.
         expected: What is expected of the answer; None if an agent failed in all its fresh episodes.
-        repetitions: How many repetitions of it were driven.
         knowledge: What is known of θ, by trials and finalists together.
     """
 
@@ -128,8 +127,12 @@ class Confirmation:
     candidates: tuple[Finalist, ...]
     episodes: int
     expected: Expectation | None
-    repetitions: int
     knowledge: Knowledge
+
+    @property
+    def repetitions(self) -> int:
+        """How many repetitions of the answer were driven."""
+        return len(self.answer.fresh)
 
 
 @dataclass(frozen=True)
@@ -186,14 +189,14 @@ def run_confirmation(run: StudyRun) -> None:
         run.outcomes(episodes, what)
         run.watcher.finished(what)
     first = _driven(run, chosen) if settings.confirm else None
-    mean = [one for trial in _mean_of(run, learnt, first) for one in _planned(settings, trial)] if first else []
-    run.watcher.begin("fresh episodes of the mean", (settings.confirm + 1) * each - len(mean))
-    run.outcomes(mean, "fresh episodes of the mean")
+    mean = _mean_of(run, learnt, first) if first else []
+    episodes = [one for trial in mean for one in _planned(settings, trial)]
+    run.watcher.begin("fresh episodes of the mean", (settings.confirm + 1) * each - len(episodes))
+    run.outcomes(episodes, "fresh episodes of the mean")
     if mean:
         run.watcher.finished("fresh episodes of the mean")
-    driven = _all_driven(run, trials, learnt) if settings.confirm else None
-    again = driven and _learn_again(run, learnt, driven)
-    more = _repetitions(run, _answer(driven, learnt, again), driven) if driven and again else []
+    driven = [*(first or ()), *(_driven(run, mean) or ())]
+    more = _repetitions(run, _answer(driven, learnt, _learn_again(run, learnt, driven)), driven) if driven else []
     run.watcher.begin("the answer again", (MOST_REPETITIONS - len(more)) * each)
     run.outcomes([episode for repetition in more for episode in repetition], "the answer again")
 
@@ -201,9 +204,11 @@ def run_confirmation(run: StudyRun) -> None:
 def confirmation_of(run: StudyRun, trials: Sequence[TrialRecord], learnt: Knowledge) -> Confirmation | None:
     """The answer of the fresh episodes of these trials; None if it is off, or an episode is still missing."""
     settings = run.settings
-    driven = _all_driven(run, trials, learnt) if settings.confirm else None
-    if not driven:
+    first = _driven(run, finalists(trials, learnt)) if settings.confirm else None
+    last = _driven(run, _mean_of(run, learnt, first)) if first else None
+    if first is None or last is None:
         return None
+    driven = [*first, *last]
     again, each = _learn_again(run, learnt, driven), len(settings.agents) * settings.starts
     answer = _answer(driven, learnt, again)
     known = [run.known(planned) for planned in _repetitions(run, answer, driven)]
@@ -215,7 +220,7 @@ def confirmation_of(run: StudyRun, trials: Sequence[TrialRecord], learnt: Knowle
     if expected and (whole := _assessed(run.study, answer.fresh)):
         inner = replace(whole.prpv_interval, low=expected.prpv.value.low, high=expected.prpv.value.high)
         answer = replace(answer, assessment=replace(whole, prpv_interval=inner, noise_floor=expected.floor))
-    return Confirmation(answer, tuple(driven), settings.confirm * each, expected, len(known), again)
+    return Confirmation(answer, tuple(driven), settings.confirm * each, expected, again)
 
 
 def finalists(trials: Sequence[TrialRecord], learnt: Knowledge) -> list[TrialRecord]:
@@ -251,13 +256,6 @@ def _planned(settings: StudySettings, trial: TrialRecord) -> list[Episode]:
     first = 1 if trial.number else 0
     seeds = [fresh_seed(settings.seed, repetition) for repetition in range(first, settings.confirm + 1)]
     return [episode for seed in seeds for episode in plan_episodes(settings, trial.theta, seed)]
-
-
-def _all_driven(run: StudyRun, trials: Sequence[TrialRecord], learnt: Knowledge) -> list[Finalist] | None:
-    """All finalists with their fresh episodes, as `_driven`, the mean last."""
-    first = _driven(run, finalists(trials, learnt))
-    last = _driven(run, _mean_of(run, learnt, first)) if first else []
-    return None if first is None or last is None else [*first, *last]
 
 
 def _driven(run: StudyRun, chosen: Sequence[TrialRecord]) -> list[Finalist] | None:

@@ -10,7 +10,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -25,6 +24,7 @@ from proxytune.study.preflight import noise_of
 from proxytune.study.run import goal_of, knowledge_of
 from proxytune.study.settings import LEARNING, StudySettings, read_study_settings
 from proxytune.study.study_run import StudyRun
+from proxytune.usefulness import Estimate
 
 FEWEST = 2
 """Fewer robots have nothing between them."""
@@ -32,14 +32,6 @@ FEW = 5
 """Of fewer the spread is mostly what was assumed of it before."""
 NOTICED = 0.25
 """Robots differ where the interval of their spread begins above this share of one robot's own deviation."""
-
-
-class Told(NamedTuple):
-    """A figure with its 95 % interval."""
-
-    low: float
-    middle: float
-    high: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,50 +76,54 @@ class Fleet:
         return tuple(robot.name for robot in self.robots if not robot.fits)
 
     @cached_property
-    def given(self) -> Mapping[str, Mapping[str, Told]]:
+    def given(self) -> Mapping[str, Mapping[str, Estimate]]:
         """θ of each robot that fits, given the whole fleet."""
         drawn = self.population.robots if self.population else np.empty((0, 0, 0))
         return {robot.name: self._told(drawn[:, row]) for row, robot in enumerate(self.fitting[: drawn.shape[1]])}
 
     @cached_property
-    def mean(self) -> Mapping[str, Told]:
+    def mean(self) -> Mapping[str, Estimate]:
         """The mean of each parameter over robots of this kind."""
         return self._told(self.population.mean) if self.population else {}
 
     @cached_property
-    def deviation(self) -> Mapping[str, Told]:
+    def deviation(self) -> Mapping[str, Estimate]:
         """Standard deviation of each parameter between robots, measurement taken out."""
         return self._told(self.population.deviation, 0.0) if self.population else {}
 
     @cached_property
-    def next_robot(self) -> Mapping[str, Told]:
+    def next_robot(self) -> Mapping[str, Estimate]:
         """A robot of this kind that has not been measured, cut off at the box."""
         return self._told(np.clip(self.population.next_robot, 0.0, 1.0)) if self.population else {}
 
     @cached_property
     def varies(self) -> Mapping[str, bool]:
         """Whether robots differ in a parameter by more than measurements of one do."""
-        known = [one.knowledge.unwidened for one in self.fitting]
-        own = np.median([np.sqrt(one.weights @ (one.points - one.mean) ** 2) for one in known], axis=0)
+        own = np.median([np.sqrt(np.diag(one.knowledge.unwidened.covariance)) for one in self.fitting], axis=0)
         widths = {box.name: box.high - box.low for box in self.settings.space.intervals}
         limits = {name: NOTICED * widths[name] * float(one) for name, one in zip(widths, own, strict=True)}
         return {name: told.low > limits[name] for name, told in self.deviation.items()}
 
     @property
-    def correlations(self) -> Mapping[tuple[str, str], Told]:
+    def correlations(self) -> Mapping[tuple[str, str], Estimate]:
         """Pairs of parameters that go together between robots beyond noise, with their correlation."""
         names, drawn = self.settings.space.names, self.population.correlation if self.population else None
         pairs = [(i, j) for j in range(len(names)) for i in range(j)] if drawn is not None else []
-        told = {(names[i], names[j]): Told(*summary_of(drawn[:, i, j]).tolist()) for i, j in pairs}  # type: ignore[index]
+        told = {(names[i], names[j]): _estimate(summary_of(drawn[:, i, j])) for i, j in pairs}  # type: ignore[index]
         return {pair: found for pair, found in told.items() if found.low * found.high > 0.0}
 
-    def _told(self, drawn: Floats, origin: float = 1.0) -> Mapping[str, Told]:
+    def _told(self, drawn: Floats, origin: float = 1.0) -> Mapping[str, Estimate]:
         """Sum up draws in the unit cube (draws, parameters), in the parameters' units; differences have no origin."""
         found, boxes = summary_of(drawn), self.settings.space.intervals
         return {
-            box.name: Told(*(origin * box.low + (box.high - box.low) * found[:, row]).tolist())
+            box.name: _estimate(origin * box.low + (box.high - box.low) * found[:, row])
             for row, box in enumerate(boxes)
         }
+
+
+def _estimate(summary: Floats) -> Estimate:
+    low, middle, high = summary.tolist()
+    return Estimate(middle, low, high)
 
 
 def learn_fleet(path: Path, targets: Sequence[Path]) -> Fleet:

@@ -53,6 +53,5 @@ def confirmed(result, score=12, ends=(8.0, 20.0), **floor):
     expected = Expectation(prpv, None, 5, 2.0, noise)
     fresh = replace(own, prpv=replace(own.prpv, value=score), prpv_interval=inner, noise_floor=noise)
     # What else a candidate has is of no matter to a report.
-    fields = dict.fromkeys(Finalist.__dataclass_fields__, ())
-    answer = Finalist(**{**fields, "trial": result.best.trial, "scores": (score,), "assessment": fresh})
-    return replace(result, confirmation=Confirmation(answer, (answer,), 18, expected, 5, result.knowledge))
+    answer = Finalist(result.best.trial, fresh=((),) * 5, scores=(score,), assessment=fresh)
+    return replace(result, confirmation=Confirmation(answer, (answer,), 18, expected, result.knowledge))

@@ -56,8 +56,8 @@ def _best(result: StudyResult) -> dict[str, Any]:
         **{key: measures[key] for key in shared},
         "objective": {"name": result.study.objective.name, "value": result.value_of(best.trial)},
         "fresh": _fresh(result.confirmation, by_prpv=result.study.objective == PRPV),
-        "expected_prpv": _estimate(result.expected.prpv.value if result.expected else None),
-        "expected_ppv": _estimate(ppv.value if ppv else None),
+        "expected_prpv": estimate_document(result.expected.prpv.value if result.expected else None),
+        "expected_ppv": estimate_document(ppv.value if ppv else None),
         "posterior_mean": best.posterior_mean,
         "posterior_deviation": best.posterior_deviation,
         "usefulness": measures,
@@ -67,18 +67,20 @@ def _best(result: StudyResult) -> dict[str, Any]:
 def _worth(result: StudyResult) -> dict[str, Any]:
     """Levels that PRPV of the answer is held against: of its fresh episodes where they were driven."""
     measures, ppv = score_document(result.judged), result.expected.ppv if result.expected else None
+    nominal = result.nominal
     levels = ("noise_floor", "noise_floor_interval", "noise_floor_kind", "at_noise_floor", "chance", "chance_deviation")
     return {
         **{key: measures[key] for key in (*levels, "p_value", "notes")},
-        "excess": _estimate(result.excess),
-        "excess_ppv": _estimate(ppv.excess if ppv else None),
-        "nominal": result.nominal
-        and {"theta": dict(result.nominal.theta), "expected_prpv": _estimate(result.nominal.expected.prpv.value)},
+        "excess": estimate_document(result.excess),
+        "excess_ppv": estimate_document(ppv.excess if ppv else None),
+        "nominal": nominal
+        and {"theta": dict(nominal.theta), "expected_prpv": estimate_document(nominal.expected.prpv.value)},
         "cannot_be_told_from_perfect": bool(result.perfect),
     }
 
 
-def _estimate(found: Estimate | None) -> dict[str, Any] | None:
+def estimate_document(found: Estimate | None) -> dict[str, Any] | None:
+    """A figure with its interval; None where it is not known."""
     return found and {"value": found.value, "interval": [found.low, found.high]}
 
 

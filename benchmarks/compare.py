@@ -20,8 +20,9 @@ from rich.text import Text
 from runs import EngineSummary, Run, RunKey, append_run, finished_run, read_runs, summarise
 from study_problems import StudyObjective, TruthObjective, lacking_families, noise_floor
 
+from proxytune.cli.commands import add_options
 from proxytune.cli.main import add_shared_options, run_command
-from proxytune.cli.options import configure_cluster, on_its_cluster, study_folder
+from proxytune.cli.options import on_its_cluster, study_folder
 from proxytune.cli.terminal import Answer
 from proxytune.errors import InputError, StoreError
 from proxytune.report import foot_of, save_figure, table_text, write_page, write_text
@@ -196,7 +197,7 @@ def parser() -> argparse.ArgumentParser:
         help="with --truths: a model.toml whose effects the targets have and the proxy lacks; repeat for several",
     )
     parser.add_argument("--output", type=Path, metavar="DIR", help="folder for runs and figure [./compare_STUDY]")
-    configure_cluster(parser)
+    add_options(parser, "cluster")
     add_shared_options(parser, draws=True)
     return parser
 

@@ -1,11 +1,15 @@
-"""Every command, as commands.toml has it: what it is called, does, leaves when it is stopped, and may run."""
+"""Every command, as commands.toml has it: what it is called, does, leaves when it is stopped, and may run.
 
+What it takes is in options.toml, which `add_options` tells a parser.
+"""
+
+import argparse
 import importlib
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 
 class Command(NamedTuple):
@@ -14,6 +18,7 @@ class Command(NamedTuple):
     module: str
     summary: str
     examples: Sequence[str]
+    shares: Sequence[str] = ()
     resumes: bool = False
     kept: str = ""
     draws: bool = False
@@ -30,8 +35,42 @@ class Command(NamedTuple):
         return importlib.import_module(f"proxytune.cli.{self.module}")
 
 
-TABLES = tomllib.loads(Path(__file__).with_name("commands.toml").read_text(encoding="utf-8"))
+TABLES, OPTIONS = (
+    tomllib.loads(Path(__file__).with_name(name).read_text(encoding="utf-8"))
+    for name in ("commands.toml", "options.toml")
+)
 COMMANDS = {name: Command(**{"module": name, **table}) for name, table in TABLES.items()}
+TYPES: Mapping[str, Callable[[str], object]] = {"int": int, "float": float, "path": Path}
+
+
+def add_options(parser: argparse.ArgumentParser, *tables: str) -> None:
+    """Add the options of these tables of options.toml, in their order."""
+    for table in tables:
+        for name, given in OPTIONS[table].items():
+            grouped = "help" not in given
+            to = parser.add_argument_group(name) if grouped else parser
+            for option, words in given.items() if grouped else ((name, given),):
+                known: dict[str, Any] = {key: value for key, value in words.items() if key != "late"}
+                if kind := TYPES.get(words.get("type", "")):
+                    known["type"] = kind
+                to.add_argument(option, **known)
+                if "late" in words:
+                    _take_late(parser, option, kind or str)
+
+
+def _take_late(parser: argparse.ArgumentParser, name: str, kind: Callable[[str], object]) -> None:
+    """Let options stand before a last argument that may be left out: argparse takes it for left out at the first."""
+    plain = parser.parse_known_args
+
+    def parse(
+        words: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
+    ) -> tuple[argparse.Namespace, list[str]]:
+        known, rest = plain(words, namespace)
+        if rest and getattr(known, name) is None and not rest[0].startswith("-"):
+            setattr(known, name, kind(rest.pop(0)))
+        return known, rest
+
+    parser.parse_known_args = parse  # type: ignore[method-assign, assignment]
 
 
 def names_in(given: str) -> tuple[str, ...]:

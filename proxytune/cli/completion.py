@@ -7,13 +7,6 @@ from pathlib import Path
 from proxytune.cli.terminal import Answer
 from proxytune.errors import InputError, to_install
 
-SHELLS = ("bash", "zsh", "tcsh")
-
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Add the shell."""
-    parser.add_argument("shell", choices=SHELLS, metavar="SHELL", help=", ".join(SHELLS))
-
 
 def run(arguments: argparse.Namespace) -> Answer:
     """Print the script."""

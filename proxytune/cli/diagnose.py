@@ -9,9 +9,9 @@ from rich.text import Text
 
 from proxytune.api import DiagnosisReport
 from proxytune.cli.commands import names_in
-from proxytune.cli.options import configure_effects, configure_source, facts_of, typed, wanted_of
+from proxytune.cli.options import facts_of, typed, wanted_of
 from proxytune.cli.terminal import Answer, Steps
-from proxytune.diagnosis import LIMITS, Limits, diagnose_log, forget_stages, robot_of
+from proxytune.diagnosis import Limits, diagnose_log, forget_stages, robot_of
 from proxytune.effects import Catalogue
 from proxytune.errors import InputError
 from proxytune.files import check_place
@@ -45,34 +45,6 @@ CAMERA = {
 """The same of a camera's."""
 MOTION_SHARE = 0.8
 """Of the time of both; the camera comes last."""
-
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Add the log, what is declared and where the findings go."""
-    parser.add_argument(
-        "log", type=Path, metavar="LOG", help="a log's folder (log.toml, samples.csv), or a bag, CSV or trajectory"
-    )
-    parser.add_argument(
-        "--declared",
-        metavar="NAMES",
-        help="effects tuned in any case, on motion and camera, as in trim,delay,camera_pitch [the robot's]",
-    )
-    configure_effects(parser, "your own effects to try too; plug-ins take part by themselves")
-    parser.add_argument("--robot", metavar="NAME", help="the robot, if not the one in log.toml")
-    parser.add_argument("--test", type=Path, metavar="LOG", help="another log to test motion on [part of LOG]")
-    parser.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the null distributions [1]")
-    parser.add_argument("--output", type=Path, metavar="DIR", help="folder for the findings [diagnosis_LOG]")
-    group = parser.add_argument_group("the next drive")
-    group.add_argument(
-        "--room", metavar="LxW", help="free floor for it, length x width [m], as in 4x3 [where the log's drives were]"
-    )
-    group.add_argument(
-        "--fastest", type=float, default=LIMITS.fastest, metavar="SHARE", help="its greatest command [1: full speed]"
-    )
-    group.add_argument(
-        "--drive-seconds", type=float, default=LIMITS.seconds, metavar="S", help="how long it lasts [20 s]"
-    )
-    configure_source(parser)
 
 
 def limits_of(arguments: argparse.Namespace) -> Limits:

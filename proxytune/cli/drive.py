@@ -1,7 +1,6 @@
 """`drive`: one episode to look at, in the proxy and beside it in the target, under the same seed."""
 
 import argparse
-from pathlib import Path
 
 from rich.console import Group
 from rich.text import Text
@@ -22,29 +21,6 @@ from proxytune.study import (
     load_target,
     read_study_settings,
 )
-
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Add the study, the episode, the target and the picture."""
-    parser.add_argument("path", type=Path, metavar="PATH", help="a study's folder")
-    parser.add_argument("--agent", required=True, metavar="NAME", help="who drives; any agent of the domain family")
-    parser.add_argument(
-        "--theta",
-        metavar="best|nominal|MODEL|NAME=VALUE,…",
-        help="θ of the proxy: the study's best, the robot's own, a model.toml's, or given"
-        " [best once a trial is finished, else nominal]",
-    )
-    parser.add_argument(
-        "--against", type=Path, metavar="MODEL", help="the target's model.toml [the study's `truth`, if it names one]"
-    )
-    parser.add_argument("--start", type=int, default=0, metavar="N", help="starting condition, from 0 [0]")
-    parser.add_argument("--seed", type=int, metavar="N", help="seed of everything random [the study's]")
-    parser.add_argument(
-        "--output",
-        type=Path,
-        metavar="FILE",
-        help="picture to write: .png shows the whole episode, .gif and .mp4 move [none]",
-    )
 
 
 def run(arguments: argparse.Namespace) -> Answer:

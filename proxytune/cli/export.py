@@ -1,38 +1,14 @@
 """`export`: what was found, for other simulators, into a user's own files, or for the robot; a study's trials."""
 
 import argparse
-from pathlib import Path
 
 from rich.console import Group
 from rich.text import Text
 
 from proxytune.api import TRIALS, export
-from proxytune.cli.options import configure_effects
 from proxytune.cli.terminal import Answer
 from proxytune.files import check_place
-from proxytune.report import FILTER, FORMATS, IN_WHEELS
-
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Add what is exported, as what, and where to."""
-    parser.add_argument("model", type=Path, metavar="MODEL", help="a model.toml, or a study's folder: its best θ")
-    parser.add_argument(
-        "--to",
-        default="",
-        choices=(*FORMATS, FILTER, *TRIALS),
-        help="URDF, MuJoCo model or ROS 2 parameters, or a ROS 2 node before a simulator's driver (filter); of a study "
-        "its trials: Optuna storage or skopt's OptimizeResult",
-    )
-    parser.add_argument("--into", type=Path, metavar="FILE", help="patch a copy of your own .urdf, .sdf or MuJoCo .xml")
-    parser.add_argument("--wheels", default="", metavar="LEFT,RIGHT", help="joints of its driven wheels [found]")
-    parser.add_argument(
-        "--has",
-        default="",
-        metavar="NAMES",
-        help="effects that the simulator behind the filter has already, as in trim",
-    )
-    parser.add_argument("--output", type=Path, required=True, metavar="FILE", help="the file to write")
-    configure_effects(parser)
+from proxytune.report import IN_WHEELS
 
 
 def run(arguments: argparse.Namespace) -> Answer:

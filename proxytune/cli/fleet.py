@@ -1,22 +1,12 @@
 """`fleet`: θ of several robots of one kind, and p(θ) over them."""
 
 import argparse
-from pathlib import Path
 
 from proxytune.api import fleet
 from proxytune.cli.options import study_folder, typed
 from proxytune.cli.terminal import Answer, waiting
 from proxytune.files import check_place
 from proxytune.report import fleet_text
-
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Add the study and the robots' tables."""
-    parser.add_argument("path", type=Path, metavar="PATH", help="a study's or bank's folder, whose trials are known")
-    parser.add_argument(
-        "targets", type=Path, nargs="+", metavar="TARGET", help="a robot's table of scores, two or more of them"
-    )
-    parser.add_argument("--output", type=Path, metavar="DIR", help="draw the figure and the page into this folder")
 
 
 def run(arguments: argparse.Namespace) -> Answer:

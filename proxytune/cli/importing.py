@@ -8,7 +8,7 @@ from rich.console import Group
 from rich.text import Text
 
 from proxytune.api import import_log
-from proxytune.cli.options import configure_source, facts_of, take_late, wanted_of
+from proxytune.cli.options import facts_of, wanted_of
 from proxytune.cli.terminal import Answer, waiting
 from proxytune.files import check_place
 from proxytune.importing import Source, Survey
@@ -16,17 +16,6 @@ from proxytune.report import Column, Table, columns_of, percent, table_text
 
 MEASURES = ("drive", "time", "poses", "rate", "jitter", "lost", "gaps", "commands", "answers after")
 """The columns of the table of drives."""
-
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Add the source, the log to write, and what to take."""
-    parser.add_argument(
-        "source", type=Path, metavar="SOURCE", help="a ROS bag, CSV, TUM, MRCLAM or .npz, file or folder"
-    )
-    parser.add_argument("output", type=Path, nargs="?", metavar="OUTPUT", help="the log's folder to write [list only]")
-    parser.add_argument("--robot", metavar="NAME", help="the robot, of list robots or your own [the log's name]")
-    configure_source(parser)
-    take_late(parser, "output", Path)
 
 
 def run(arguments: argparse.Namespace) -> Answer:

@@ -8,7 +8,6 @@ from pathlib import Path
 from rich.console import Group
 from rich.text import Text
 
-from proxytune.cli.options import take_late
 from proxytune.cli.terminal import Answer
 from proxytune.driving import AGENTS, METRICS, lane_length, load_agent, map_names, read_robot, robot_names, shipped_map
 from proxytune.effects import SHIPPED, Catalogue
@@ -21,13 +20,6 @@ from proxytune.study import measure_of
 from proxytune.usefulness import MEASURES, PODS
 
 Row = dict[str, object]
-
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Add what can be listed."""
-    parser.add_argument("kind", choices=list(_KINDS), help="what to list")
-    parser.add_argument("name", nargs="?", metavar="NAME", help="tell all of one [all of the kind, a line each]")
-    take_late(parser, "name", str)
 
 
 def run(arguments: argparse.Namespace) -> Answer:

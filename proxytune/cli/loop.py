@@ -16,19 +16,6 @@ from proxytune.loop import Closed, run_loop, text_of
 from proxytune.running import Bars, Watcher
 
 
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Add the study, its log and its twin."""
-    parser.add_argument(
-        "path", type=Path, metavar="STUDY", help="a study's folder, or where to copy one that comes with proxytune"
-    )
-    parser.add_argument(
-        "--log", type=Path, metavar="LOG", help="the target's log, or what `import` reads [the twin's is recorded]"
-    )
-    parser.add_argument(
-        "--twin", type=Path, metavar="MODEL", help="the target's model.toml, where it is a simulator [the key truth]"
-    )
-
-
 def run(arguments: argparse.Namespace) -> Answer:
     """Do every step that is not done, and write the page."""
     begun = time.perf_counter()

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import NoReturn
 
 import proxytune
-from proxytune.cli.commands import COMMANDS, epilog, names_in
+from proxytune.cli.commands import COMMANDS, add_options, epilog, names_in
 from proxytune.cli.terminal import FAILED, Answer, print_answer, prints_to_stderr, signals_as_interruptions, stopped_by
 from proxytune.errors import InputError, ProxytuneError
 from proxytune.extensions import running_none
@@ -64,7 +64,7 @@ def parser(words: Sequence[str] | None = None, prog: str = "") -> argparse.Argum
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
         if words is None or name == asked:
-            known.load().configure(command)
+            add_options(command, name, *known.shares)
         add_shared_options(command, draws=known.draws)
         command.set_defaults(parser=command)
     return top

@@ -13,30 +13,8 @@ from proxytune.errors import InputError, RunError
 from proxytune.files import folder_draft_of
 from proxytune.skeletons import Skeleton, family_skeleton, robot_from_urdf, robot_skeleton, study_skeleton
 
-KINDS = ("robot", "study", "family")
-
 NARROW = 76
 """Columns of a terminal that are left beside what commands are indented by."""
-
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Add what is new, its name, and what is known of it."""
-    parser.add_argument("kind", choices=KINDS, help="what to start")
-    parser.add_argument("name", metavar="NAME", help="its name, and that of its folder in the current one")
-    parser.add_argument(
-        "--figures",
-        metavar="NAME=VALUE,…",
-        help="of a robot: what you know, as wheel_radius=0.033,wheel_distance=0.16,full_speed=0.5,"
-        "motor_time_constant=0.1,camera_height=0.11,camera_pitch=20 (m, m/s, s, deg); "
-        "of a car also wheelbase=0.26,wheel_angle=26",
-    )
-    parser.add_argument(
-        "--urdf", type=Path, metavar="FILE", help="of a robot: its URDF; wheels, mass and camera are read"
-    )
-    parser.add_argument(
-        "--drive", choices=("differential", "ackermann"), help="of a robot: on two wheels, or a car [differential]"
-    )
-    parser.add_argument("--robot", metavar="ROBOT", help="of a study: the robot that drives in it [duckiebot]")
 
 
 def run(arguments: argparse.Namespace) -> Answer:

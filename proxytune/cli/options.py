@@ -1,4 +1,4 @@
-"""Options that several commands have, and what they mean: the cluster, one's own effects, what to take from a source.
+"""Meanings of options that several commands have: the cluster, what to take from a source.
 
 `typed` is the command as it was typed, `study_folder` what a PATH means: a folder, or a copy of a shipped study.
 """
@@ -7,7 +7,7 @@ import argparse
 import shlex
 import shutil
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import nullcontext
 from functools import wraps
 from pathlib import Path
@@ -16,7 +16,6 @@ from typing import TypeVar
 from proxytune.errors import InputError, StoreError
 from proxytune.files import check_place, folder_draft_of, shipped
 from proxytune.importing import Facts, Wanted, finite, read_geometry
-from proxytune.logs import COMMANDS
 from proxytune.running import on_cluster
 from proxytune.settings import nearest
 from proxytune.study import FILE_NAME, MADE, study_around
@@ -28,19 +27,8 @@ def typed(arguments: argparse.Namespace) -> str:
     return shlex.join(["python", "-m", "proxytune", *words]) if words else ""
 
 
-PROCESSES, DASK = "processes", "dask"
+DASK = "dask"
 Result = TypeVar("Result")
-
-
-def configure_cluster(parser: argparse.ArgumentParser) -> None:
-    """Add where episodes run."""
-    parser.add_argument(
-        "--backend",
-        choices=(PROCESSES, DASK),
-        default=PROCESSES,
-        help="where episodes run: processes of this machine, or the workers of a Dask cluster [processes]",
-    )
-    parser.add_argument("--address", metavar="URL", help="of the cluster's scheduler, as in tcp://127.0.0.1:8786")
 
 
 def on_its_cluster(run: Callable[[argparse.Namespace], Result]) -> Callable[[argparse.Namespace], Result]:
@@ -56,60 +44,6 @@ def on_its_cluster(run: Callable[[argparse.Namespace], Result]) -> Callable[[arg
             return run(arguments)
 
     return placed
-
-
-def configure_effects(parser: argparse.ArgumentParser, what: str = "your own effects that the model may name") -> None:
-    """Add effects whose code the user asks for: a command that only looks runs none that a file names."""
-    parser.add_argument("--effects", default="", metavar="NAMES", help=f"{what}; module:Attribute of this folder")
-
-
-def take_late(parser: argparse.ArgumentParser, name: str, kind: Callable[[str], object]) -> None:
-    """Let options stand before a last argument that may be left out: argparse takes it for left out at the first."""
-    plain = parser.parse_known_args
-
-    def parse(
-        words: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
-    ) -> tuple[argparse.Namespace, list[str]]:
-        known, rest = plain(words, namespace)
-        if rest and getattr(known, name) is None and not rest[0].startswith("-"):
-            setattr(known, name, kind(rest.pop(0)))
-        return known, rest
-
-    parser.parse_known_args = parse  # type: ignore[method-assign, assignment]
-
-
-def configure_source(parser: argparse.ArgumentParser) -> None:
-    """Add what to take and what only the user knows."""
-    group = parser.add_argument_group("a bag, table or trajectory as LOG")
-    group.add_argument(
-        "--commands", default="", metavar="TOPIC", help="topic or file of the commands, or none [chosen]"
-    )
-    group.add_argument(
-        "--poses", default="", metavar="TOPIC", help="topic of the poses, or PARENT>CHILD of a transform"
-    )
-    group.add_argument("--pictures", default="", metavar="TOPIC", help="topic of the pictures, or none [chosen]")
-    group.add_argument("--stamps", choices=("header", "receive"), default="header", help="whose times count [header]")
-    group.add_argument(
-        "--columns",
-        default="",
-        metavar="OURS=THEIRS:UNIT,…",
-        help="of a table, as in time=stamp_ns:ns,x=pos_x:mm,heading=yaw:deg,v=cmd_lin,omega=cmd_ang",
-    )
-    group.add_argument(
-        "--kind", choices=[*COMMANDS], default="", help="kind of the commands, where the source is silent"
-    )
-    group.add_argument("--vesc", default="", metavar="FILE", help="vesc.yaml of a car whose bag has a VESC's commands")
-    group.add_argument(
-        "--figure",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="of a robot without a folder: wheel_radius_m, baseline_m, full_speed_m_s (repeat it)",
-    )
-    group.add_argument("--map", default="", metavar="MAP", help="the map that pictures show, of list maps or a file")
-    group.add_argument(
-        "--clock-offset", default="", metavar="S", help="seconds that poses are stamped later than commands, or fit"
-    )
 
 
 def wanted_of(arguments: argparse.Namespace) -> Wanted:

@@ -3,7 +3,6 @@
 import argparse
 import re
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from rich.console import Group, RenderableType
@@ -39,19 +38,6 @@ from proxytune.study import (
 from proxytune.sweep import SweepCurve, all_curves
 
 RESCORED = "rescored"
-
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Add the study, and other metrics."""
-    parser.add_argument("path", type=Path, metavar="PATH", help="a study's folder; the study may still be running")
-    parser.add_argument(
-        "--metric",
-        action="append",
-        default=[],
-        metavar="NAME:max|min[:TOLERANCE]",
-        help="score every trial and sweep with this instead of the study's metrics; repeat for several; figures and"
-        f" report go to PATH/{RESCORED}/METRICS and the study's own stay unchanged",
-    )
 
 
 def run(arguments: argparse.Namespace) -> Answer:

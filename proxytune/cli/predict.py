@@ -1,33 +1,14 @@
 """`predict`: the poses of a log, or the pictures of its camera, predicted by a fitted model."""
 
 import argparse
-from pathlib import Path
 
 from rich.text import Text
 
 from proxytune.api import PicturePrediction, predict
-from proxytune.cli.options import configure_effects, configure_source, facts_of, wanted_of
+from proxytune.cli.options import facts_of, wanted_of
 from proxytune.cli.terminal import Answer, waiting
 from proxytune.files import check_place
 from proxytune.report import write_text
-
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Add the model, the log and the windows."""
-    parser.add_argument("model", type=Path, metavar="MODEL", help="a model.toml")
-    parser.add_argument("log", type=Path, metavar="LOG", help="a log's folder, or a bag, CSV or trajectory")
-    parser.add_argument("--robot", metavar="NAME", help="the robot of a bag or table [the model's]")
-    parser.add_argument("--horizon", type=float, default=2.0, metavar="S", help="length of the windows [2 s]")
-    parser.add_argument("--frames", action="store_true", help="predict what the camera sees instead of poses")
-    parser.add_argument(
-        "--output",
-        type=Path,
-        required=True,
-        metavar="PATH",
-        help="the CSV of predicted poses to write; with --frames the folder for frames.csv and pictures",
-    )
-    configure_effects(parser)
-    configure_source(parser)
 
 
 def run(arguments: argparse.Namespace) -> Answer:

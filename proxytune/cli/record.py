@@ -1,7 +1,6 @@
 """`record`: the log of a simulated domain that is driven through manoeuvres, and along its lanes for pictures."""
 
 import argparse
-from pathlib import Path
 
 from rich.text import Text
 
@@ -15,18 +14,6 @@ MOST_FRAMES = 1_000_000
 """As many as six digits number."""
 MOST_REPEATS = 10_000
 """Weeks of driving at the least."""
-
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Add the study, the model and the log to write."""
-    parser.add_argument("path", type=Path, metavar="PATH", help="a study's folder, for its [domain]")
-    parser.add_argument("--model", type=Path, required=True, metavar="MODEL", help="the model.toml of the domain")
-    parser.add_argument("--output", type=Path, required=True, metavar="DIR", help="the log's folder to write")
-    parser.add_argument("--repeats", type=int, default=2, metavar="N", help="drives of each manoeuvre or table [2]")
-    parser.add_argument("--seconds", type=float, default=60.0, metavar="S", help="length of a manoeuvre [60 s]")
-    parser.add_argument("--commands", type=Path, metavar="CSV", help="drive these commands instead of manoeuvres")
-    parser.add_argument("--frames", type=int, default=0, metavar="N", help="pictures, taken on lane drives [0: none]")
-    parser.add_argument("--seed", type=int, default=1, metavar="N", help="seed of manoeuvres, starts and noise [1]")
 
 
 def run(arguments: argparse.Namespace) -> Answer:

@@ -2,7 +2,6 @@
 
 import argparse
 from collections.abc import Mapping
-from pathlib import Path
 
 from proxytune.cli.terminal import Answer
 from proxytune.storage import Store, locked, salvage
@@ -10,11 +9,6 @@ from proxytune.study import LEARNING, PRPV, read_study_settings
 
 AGAIN = "a sweep that is lost is there again after the same sweep command, which drives only episodes that are lost"
 COUNTED = {"trials": "trial", "episodes": "episode", "sweeps": "sweep"}
-
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Add the study."""
-    parser.add_argument("path", type=Path, metavar="PATH", help="a study's folder")
 
 
 def run(arguments: argparse.Namespace) -> Answer:

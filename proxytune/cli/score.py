@@ -148,62 +148,6 @@ def _present(columns: Mapping[str, str], paths: Sequence[Path]) -> dict[str, str
 LARGEST_WEIGHT = 1e70
 
 
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Add the tables, the metrics and what is done with them."""
-    parser.add_argument("both", nargs="?", metavar="TABLE", help="one table of both sides: Sim success, Real success")
-    parser.add_argument(
-        "--proxy",
-        action="append",
-        metavar="CSV[:DOMAIN]",
-        help="scores in the proxy; repeat it, or give a file with several domains, to rank proxies",
-    )
-    parser.add_argument(
-        "--target",
-        action="append",
-        metavar="CSV[:DOMAIN]",
-        help="scores on the target; repeat it for a table in several files",
-    )
-    parser.add_argument(
-        "--columns",
-        default="",
-        metavar="NAME=COLUMN,...",
-        help="what columns are called in the files, as in agent=policy,episode=trial",
-    )
-    parser.add_argument("--common", action="store_true", help="leave out agents that one side has alone [refuse them]")
-    parser.add_argument(
-        "--metric",
-        action="append",
-        metavar="NAME:max|min[:TOLERANCE]",
-        help="a column to compare agents by, whether higher or lower is better, and the largest tie (0.5 or 5%%)",
-    )
-    parser.add_argument(
-        "--beta",
-        action="append",
-        default=[],
-        metavar="NAME:WEIGHT",
-        help="its weight in PPV, the proxy predictivity value [1/spread]",
-    )
-    parser.add_argument(
-        "--unpaired", action="store_true", help="treat episodes with equal labels as unrelated [as the same start]"
-    )
-    parser.add_argument(
-        "--decide-on", default="", metavar="NAME", help="the metric to choose by, or mean [mean of shares, or first]"
-    )
-    parser.add_argument(
-        "--rollouts", type=int, metavar="N", help="rollouts behind each mean of the target, where it has means alone"
-    )
-    parser.add_argument("--regret", type=float, metavar="R", help="regret that is accepted, for what to do next [0.05]")
-    parser.add_argument(
-        "--sequential", action="store_true", help="test after each rollout, in the target's order, which agent is best"
-    )
-    parser.add_argument("--resamples", type=int, default=1000, help="bootstrap resamples and permutations [1000]")
-    parser.add_argument("--seed", type=int, default=0, help="seed of the resampling [0]")
-    parser.add_argument("--output", type=Path, metavar="DIR", help="draw the figures into this folder")
-    parser.add_argument(
-        "--table", type=Path, metavar="FILE", help="also write all measures as .csv or, for LaTeX with booktabs, .tex"
-    )
-
-
 def _sides_given(arguments: argparse.Namespace) -> None:
     if arguments.both is not None:
         if arguments.proxy or arguments.target:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from proxytune.api import FamiliesReport, Spending, most_episodes, run_opened, run_opened_families
-from proxytune.cli.options import check_made, configure_cluster, on_its_cluster, study_folder
+from proxytune.cli.options import check_made, on_its_cluster, study_folder
 from proxytune.cli.terminal import Answer
 from proxytune.errors import ProxytuneError
 from proxytune.files import check_place
@@ -149,21 +149,6 @@ def run_a_bank(settings: StudySettings, spending: Spending) -> Answer:
     costs = {"episodes": {"run": run.spent.episodes}, "seconds": {"episodes": run.spent.seconds}}
     document = {**bank_document(bank), **costs, **{name: str(path) for name, path in files.items()}}
     return Answer(document, bank_text(bank, files))
-
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Add the study."""
-    parser.add_argument(
-        "path", type=Path, metavar="PATH", help="a study's folder, or where to copy one that comes with proxytune"
-    )
-    parser.add_argument(
-        "--retry-failed",
-        action="store_true",
-        help="drive every episode again that has failed [those whose code has changed since]",
-    )
-    parser.add_argument("--budget", type=int, metavar="N", help="how many trials [study.toml's]")
-    parser.add_argument("--jobs", type=int, metavar="N", help="how many processes run episodes [study.toml's]")
-    configure_cluster(parser)
 
 
 @on_its_cluster

@@ -1,20 +1,11 @@
 """`teach`: learning curves and PLV, how many target samples each proxy saves."""
 
 import argparse
-from pathlib import Path
 
 from proxytune.api import teach
-from proxytune.cli.options import check_made, configure_cluster, on_its_cluster, study_folder, typed
+from proxytune.cli.options import check_made, on_its_cluster, study_folder, typed
 from proxytune.cli.terminal import Answer
 from proxytune.report import teach_text
-
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Add the study."""
-    parser.add_argument(
-        "path", type=Path, metavar="PATH", help="a study's folder; its study.toml needs a [teaching] table"
-    )
-    configure_cluster(parser)
 
 
 @on_its_cluster

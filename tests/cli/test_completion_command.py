@@ -6,11 +6,11 @@ import sys
 
 import pytest
 
-from proxytune.cli.completion import SHELLS
+from proxytune.cli.commands import OPTIONS
 from proxytune.cli.main import COMMANDS, main
 
 
-@pytest.mark.parametrize("shell", SHELLS)
+@pytest.mark.parametrize("shell", OPTIONS["completion"]["shell"]["choices"])
 def test_every_command_is_in_the_script_of_every_shell(shell, capsys, answered):
     pytest.importorskip("shtab")
     assert main(["completion", shell]) == 0

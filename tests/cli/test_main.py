@@ -10,11 +10,18 @@ import sys
 import pytest
 
 import proxytune as proxytune_package
-from proxytune.cli import listing
-from proxytune.cli.main import BAD_INPUT, COMMANDS, DONE, FAILED, formats, main
+from proxytune.api import TRIALS
+from proxytune.cli import listing, plot
+from proxytune.cli.commands import OPTIONS
+from proxytune.cli.diagnose import limits_of
+from proxytune.cli.main import BAD_INPUT, COMMANDS, DONE, FAILED, formats, main, parse
 from proxytune.cli.terminal import Answer
+from proxytune.diagnosis import LIMITS
 from proxytune.errors import EpisodeError, ScoresError, SettingsError, StoreError
 from proxytune.extensions import Interrupted
+from proxytune.logs import COMMANDS as KINDS
+from proxytune.report import FILTER, FORMATS
+from proxytune.seeds import TARGET_OFFSET
 from proxytune.starting import STOPPING
 
 
@@ -51,6 +58,19 @@ def test_json_is_one_document_and_nothing_else(kind, capsys):
     out = capsys.readouterr()
     assert json.loads(out.out)[kind]
     assert out.err == ""
+
+
+def test_what_the_table_of_options_says_of_the_code_is_so():
+    assert OPTIONS["list"]["kind"]["choices"] == list(listing._KINDS)
+    assert OPTIONS["export"]["--to"]["choices"] == [*FORMATS, FILTER, *TRIALS]
+    assert OPTIONS["source"]["a bag, table or trajectory as LOG"]["--kind"]["choices"] == list(KINDS)
+    assert f"plus {TARGET_OFFSET}]" in OPTIONS["measure"]["--seed"]["help"]
+    assert f"PATH/{plot.RESCORED}/METRICS" in OPTIONS["plot"]["--metric"]["help"]
+    assert limits_of(parse(["diagnose", "log"])) == LIMITS
+
+
+def test_every_table_of_options_is_a_command_s_or_shared_by_some():
+    assert set(OPTIONS) == {*COMMANDS, *(name for one in COMMANDS.values() for name in one.shares)}
 
 
 def test_without_a_command_there_is_help(capsys):

@@ -10,6 +10,7 @@ import pytest
 from rich.console import Console
 
 from proxytune.cli import score
+from proxytune.cli.commands import add_options
 from proxytune.errors import InputError, ScoresError
 
 SIM = "agent,episode,distance,time\n" + "".join(
@@ -33,7 +34,7 @@ def tables(tmp_path, monkeypatch):
 
 def run(*words):
     parser = argparse.ArgumentParser()
-    score.configure(parser)
+    add_options(parser, "score")
     return score.run(parser.parse_args(list(words)))
 
 

@@ -60,14 +60,15 @@ from proxytune.loop.opening import (
     scored_agents,
 )
 from proxytune.report import (
+    CAPTIONS,
     Paragraphs,
-    Picture,
     Shown,
     Table,
     View,
     columns_of,
     group_texts,
     note_texts,
+    picture_of,
     study_foot,
     table_text,
     write_page,
@@ -241,19 +242,6 @@ class _Closing:
 
 
 COLUMNS = columns_of(("",), ("before", "after"))
-PICTURES = {
-    "effect_curve": ("The effect", "What was measured against what the simulator did without it, and with it."),
-    "learnt": ("What was learnt", "Curves over what the robot does, for what no named effect explains."),
-    "error": (
-        "Motion error",
-        "Error of predicted positions by how far ahead, on drives that were not fitted; lower is better.",
-    ),
-    "camera_markings": (
-        "Markings",
-        "The map's markings as the declared camera draws them on frames, and as the extended one does.",
-    ),
-}
-"""Figures of `diagnose` that the page shows where they are there: title and caption."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -384,17 +372,15 @@ def view_of(closed: Closed) -> View:
     """A closed loop: before and after, its figures, and what each step said."""
     rows = rows_of(closed)
     prpv = [row for row in rows if row.key in ("prpv", "held_out")]
-    caption = "PRPV of the best θ on fresh episodes with 95 % intervals; grey: what a perfect proxy scores."
     home, shown = closed.loop.home, []
     if closed.after:
-        first = Picture("PRPV before and after", prpv_figure(prpv), caption)
-        shown = [first, *read_pictures(home)]
+        shown = [picture_of("loop", "prpv", prpv_figure(prpv)), *read_pictures(home)]
     found = (closed.diagnosis["effects"], (closed.diagnosis["camera"] or {}).get("effects"))
-    for name, (title, text) in PICTURES.items():
+    for name in CAPTIONS["loop"]:
         # Of the camera there is a figure where it lacked nothing too
         file = home / "diagnosed" / f"{name}.svg"
         if file.is_file() and (found[1] or not name.startswith("camera")):
-            shown.append(Picture(title, file.read_bytes(), text))
+            shown.append(picture_of("loop", name, file.read_bytes()))
     said = (
         f"Found: {lacking(closed.diagnosis) or 'nothing that has a name'}; verdict: {closed.diagnosis['verdict']}.",
         f"Before: {closed.before.sentence}",

@@ -22,12 +22,6 @@ from proxytune.usefulness import (
     mmrv_conventions,
 )
 
-CAPTION = (
-    "Expected regret of deploying each agent with its 95 % interval, best on top: what it costs on the target if "
-    "another is better. Blue is the agent to deploy, light blue those that cannot be told from the best; at the right "
-    "the probability of being the best."
-)
-
 
 def decision_sentence(assessment: Assessment, target: str) -> str:
     """Say which agent to deploy, what it risks, and which others may be as good."""

@@ -16,8 +16,9 @@ from proxytune.report.study.document import intervals_document
 from proxytune.report.study.sentence import KnownParameter, known_parameters
 from proxytune.report.teaching import UNKNOWN, count, estimate_document
 from proxytune.report.text import file_texts, group_texts, note_texts, section_text
-from proxytune.report.view import Paragraphs, Picture, Table, View, columns_of
+from proxytune.report.view import Paragraphs, Table, View, columns_of
 from proxytune.report.wording import fixed, in_pairs, listed, short, span
+from proxytune.report.writing import picture_of
 from proxytune.study import BestFamilies, ComparedFamilies, Lesson, TunedFamily, settings_document
 from proxytune.usefulness import Assessment, Difference
 
@@ -26,12 +27,6 @@ Spread = tuple[float, float | None, float | None]
 """A value and the ends of its interval; None where an end is not known."""
 USES, THETA = "Which simulator, and for what (95 % intervals)", "Best θ of each"
 NOT_APART = "cannot be told from it"
-CAPTION = (
-    "A row per family, each at the best θ that was found in the same time; lines are 95 % intervals, without an end "
-    "that is not known. Filled circles are best, open ones cannot be told from them, squares are worse. Differences "
-    "are judged episode by episode (PRPV, time) or draw by draw of the learning curves (PLV), so that they can be told "
-    "though the lines overlap."
-)
 BEST, ALIKE, WORSE = "best", NOT_APART, "worse"
 LOOKS = {BEST: ("o", BLUE, BLUE), ALIKE: ("o", BLUE, "white"), WORSE: ("s", VERMILLION, VERMILLION)}
 """Marker, colour of its edge and of its face: told apart without colours too."""
@@ -256,7 +251,7 @@ def families_view(compared: ComparedFamilies, figure: Figure) -> View:
     homes = ((one.name, one.result.study.settings.home) for one in compared.families)
     pages = tuple(f"[{name}]({os.path.relpath(home, settings.home)}/report.html)" for name, home in homes)
     parts = (
-        Picture("What each family predicts, teaches and costs", figure, CAPTION),
+        picture_of("families", "families", figure),
         *families_tables(compared),
         Paragraphs("What the numbers are", meanings),
         Paragraphs("The page of each family", pages),

@@ -12,8 +12,9 @@ from rich.console import Group
 from proxytune.report.figure_style import BLUE, COLUMN, GREEN, LIGHT_GREY, VERMILLION, dress, legend_below
 from proxytune.report.study.document import estimate_document, intervals_document
 from proxytune.report.text import file_texts, group_texts, section_text
-from proxytune.report.view import Drawn, Paragraphs, Picture, Table, View, columns_of
+from proxytune.report.view import Drawn, Paragraphs, Table, View, columns_of
 from proxytune.report.wording import digits, fixed, listed, percent, plain, probability, span, with_unit
+from proxytune.report.writing import picture_of
 from proxytune.study import FEW, Fleet
 from proxytune.usefulness import Estimate
 
@@ -21,10 +22,6 @@ MOST_NAMED = 40
 """More robots than this are not named beside their lines."""
 NAME = 14
 """Characters of a robot's name beside its line."""
-CAPTION = (
-    "A line is a robot's 95 % interval by its own scores, a dot what it is given the whole fleet. The band is the mean "
-    "of the fleet ± 2 standard deviations between robots, with what measurement adds taken out."
-)
 MEANING = (
     "The standard deviation is between robots, with what measurement adds taken out; where robots differ no more than "
     "measurements of one would, they may all be the same in it. “95 % of robots” holds a robot that has not been "
@@ -108,7 +105,7 @@ def _fit(p_value: float | None, fits: bool) -> str:
 def fleet_view(fleet: Fleet, figure: Drawn) -> View:
     """What the page shows."""
     lines, tables = fleet_lines(fleet), fleet_tables(fleet)
-    picture = Picture("Each robot, and the fleet", figure, CAPTION)
+    picture = picture_of("fleet", "fleet", figure)
     title = f"{fleet.settings.name}: how do {len(fleet.robots)} robots differ?"
     if not lines:
         following = "Find what the proxy lacks: `python -m proxytune diagnose`."

@@ -26,9 +26,9 @@ from proxytune.report.teaching import (
     say_more_of_it,
 )
 from proxytune.report.text import file_texts, group_texts, table_text
-from proxytune.report.view import Paragraphs, Picture, Table, View, columns_of
+from proxytune.report.view import Paragraphs, Table, View, columns_of
 from proxytune.report.wording import listed, short
-from proxytune.report.writing import save_figure
+from proxytune.report.writing import picture_of, save_figure
 from proxytune.study import settings_document
 from proxytune.teaching import (
     Experiment,
@@ -44,10 +44,6 @@ from proxytune.teaching import (
 MORE_PROXIES = "raise teaching.budget, or widen [parameters], so that other proxies are tried"
 CONFIRMED = "Finalists, taught anew with fresh lessons, learners and examinations"
 SCORES = ("zero-shot score", "samples needed", "PLV")
-TRIALS = (
-    "PLV of each proxy tried, with its 95 % interval; crosses have not converged. Above 0 samples are saved. Where "
-    "intervals overlap, the order of the proxies is not known."
-)
 HIGHEST = LineName("highest\nso far", VERMILLION, 0.0)
 
 
@@ -113,7 +109,7 @@ def write_plv_report(study: PlvStudy, folder: Path) -> tuple[Path, Path]:
     save_figure(drawn, figure)
     finals, tried = _tables(study)
     stopped = Paragraphs("Why the search ended", (f"{study.stopped}.", f"{PLV_MEANING}."))
-    picture = Picture("PLV of the proxies tried", drawn, TRIALS)
+    picture = picture_of("teach", "plv", drawn)
     finalists = replace(finals, notes=(PLV_MEANING, *study.unable.values()))
     title = f"{study.settings.name}: in which simulator does a learner learn most?"
     view = View(title, plv_answer(study), plv_next_step(study), (finalists, picture, tried, stopped))

@@ -8,7 +8,6 @@ from matplotlib.figure import Figure
 from rich.console import Group
 
 from proxytune.report.decision import (
-    CAPTION,
     choices_document,
     choices_sentences,
     decision_document,
@@ -23,21 +22,14 @@ from proxytune.report.table_files import csv_text, latex_text
 from proxytune.report.text import group_texts, note_texts, table_text
 from proxytune.report.view import Column, Foot, Paragraphs, Picture, Table, View, columns_of
 from proxytune.report.wording import listed, short, short_span, with_span
-from proxytune.report.writing import file_names, save_figures, write_text
+from proxytune.report.writing import file_names, picture_of, save_figures, write_text
 from proxytune.usefulness import ALL, MEASURES, PPV, PRPV, Assessment, Measure, Measured, Selection, SuccessRates
 
 Row = tuple[str, str, str, str, str]
 Assessments = Mapping[str, Assessment]
 BESIDE_PRPV = tuple(measure for measure in MEASURES if measure is not PRPV)
-SCATTER = (
-    "A point is an agent: its mean score on the target (across) and in the proxy (up), with standard errors. On the "
-    "dashed line both agree; two points that fall from left to right are a pair ranked wrongly. Names are in "
-    "the proxy's order, highest score on top"
-)
-FLIPPED = (
-    "A square is a pair of agents, in the target's order, best first. Grey pairs are ranked as on the target; coloured "
-    "ones are what PRPV counts: reversed, lost (a tie in the proxy alone) or invented (a tie on the target alone)"
-)
+REST = {"scatter": "; those whose rank differs most are named", "flipped_pairs": "; the axes are ranks on the target"}
+"""What a caption ends with where agents are too many to be named."""
 
 
 def score_sentence(assessments: Assessments, selection: Selection | None, *, target: str) -> str:
@@ -146,24 +138,21 @@ def score_view(
     return View(f"Which of {len(assessments)} proxies predicts {target} best?", *said, (*tables, choices, *figures))
 
 
-def drawn_scores(assessment: Assessment) -> Iterator[tuple[str, Figure, str, str]]:
-    """The figures of one proxy: name, figure, title and caption."""
-    many = len(assessment.inputs.agents) > MOST
-    names = "; those whose rank differs most are named." if many else "."
-    yield "scatter", scatter_figure(assessment), "Scores in the proxy and on the target", SCATTER + names
-    axes = "; the axes are ranks on the target." if many else "."
-    flipped = flipped_pairs_figure(assessment.prpv)
-    yield "flipped_pairs", flipped, "Pairs of agents that the proxy ranks wrongly", FLIPPED + axes
-    yield "decision", decision_figure(assessment.decision), "Regret of deploying each agent", CAPTION
+def score_figures(assessment: Assessment) -> dict[str, Figure]:
+    """The figures of one proxy, by name."""
+    figures = {"scatter": scatter_figure(assessment), "flipped_pairs": flipped_pairs_figure(assessment.prpv)}
+    return {**figures, "decision": decision_figure(assessment.decision)}
 
 
 def _all_drawn(assessments: Assessments, selection: Selection | None) -> Iterator[tuple[str, Figure, Picture]]:
     """The figures of every proxy: name of the file, figure, and what the page has of it."""
     files = file_names(assessments)
     for name, assessment in assessments.items():
-        file, title = ("", "") if selection is None else (f"_{files[name]}", f": {name}")
-        for kind, figure, head, caption in drawn_scores(assessment):
-            yield f"{kind}{file}", figure, Picture(f"{head}{title}", figure, caption)
+        file, whose = ("", "") if selection is None else (f"_{files[name]}", f": {name}")
+        many = len(assessment.inputs.agents) > MOST
+        for kind, figure in score_figures(assessment).items():
+            rest = REST.get(kind, "") if many else ""
+            yield f"{kind}{file}", figure, picture_of("score", kind, figure, whose=whose, rest=rest)
 
 
 def write_score_report(

@@ -17,9 +17,9 @@ from proxytune.report.study.page import study_foot
 from proxytune.report.sweep_figures import bars_figure, panels_figure, sweep_figure
 from proxytune.report.table_files import Cell, csv_text
 from proxytune.report.text import group_texts, table_text
-from proxytune.report.view import Drawn, Paragraphs, Part, Picture, Table, View, columns_of
+from proxytune.report.view import Drawn, Paragraphs, Part, Table, View, columns_of
 from proxytune.report.wording import listed, plain, short
-from proxytune.report.writing import write_text
+from proxytune.report.writing import picture_of, write_text
 from proxytune.space import Theta
 from proxytune.study import StudySettings
 from proxytune.sweep import METRICS, OUTWARDS, Series, SweepCurve, SweepPoint, describe_shape, series_of, shape_of
@@ -35,20 +35,6 @@ KEYS = (
 )
 LEVELS = ("noise_floor", "noise_floor_interval", "noise_floor_kind")
 NO_POD = "POD was left out: give --target-model MODEL.toml, the model of the target"
-BANDS = "Bands are 95 % intervals: where they overlap, the values cannot be told apart."
-LINES = (
-    "The dashed vertical line is where the parameter is held when others are swept; the triangle, where the truth is "
-    "known, is the target's own value, where a good measure is at its best."
-)
-CAPTION = f"{BANDS} {LINES} PRPV, PPV and POD are better low, SRCC is better high."
-TOGETHER = (
-    f"Each row is a parameter; lower is better. {BANDS} Green is the noise floor or, as the key says, the target's "
-    f"halves; the dotted line is chance. {LINES}"
-)
-BARS = (
-    "PRPV at a lower, the held (dark) and a higher value of each parameter. Where the 95 % intervals (lines) of a "
-    "parameter's bars overlap, it is not shown to matter."
-)
 
 
 def curve_name(curve: SweepCurve) -> str:
@@ -217,15 +203,13 @@ def sweep_view(study: str, curves: Sequence[SweepCurve], figures: Mapping[str, D
     """
     own = {curve_name(curve): curve for curve in curves}
     parts: list[Part] = [
-        Picture("How much each parameter matters", image, BARS)
-        if name.startswith("sweep_bars")
-        else Picture("All parameters", image, TOGETHER)
+        picture_of("sweep", "bars" if name.startswith("sweep_bars") else "all", image)
         for name, image in figures.items()
         if name not in own
     ]
     for curve in curves:
         if image := figures.get(curve_name(curve)):
-            parts.append(Picture(f"Usefulness along {curve.parameter}", image, CAPTION))
+            parts.append(picture_of("sweep", "curve", image, parameter=curve.parameter))
         first, second = curve_tables(curve)
         parts += [replace(first, notes=(shapes_note(curve),)), *([second] if second.columns[1:] else [])]
     wrong = say_failures(curves)

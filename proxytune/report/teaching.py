@@ -14,8 +14,9 @@ from proxytune.arrays import Floats
 from proxytune.learning import LEVELS, NONE, Costs, Distribution, LearningCurve, LearningEstimate, doublings
 from proxytune.report.figure_style import BLUE, COLUMN, GREY, dress, legend_below
 from proxytune.report.text import file_texts, group_texts, table_text
-from proxytune.report.view import Drawn, Paragraphs, Part, Picture, Table, View, columns_of
+from proxytune.report.view import Drawn, Paragraphs, Part, Table, View, columns_of
 from proxytune.report.wording import fixed, listed, percent, short, span
+from proxytune.report.writing import picture_of
 from proxytune.study import settings_document
 from proxytune.teaching import (
     Experiment,
@@ -41,12 +42,6 @@ COST_MEANING = (
 )
 FIRST = "A zero-shot score does not measure PLV (the paper's first observation)"
 SECOND = "A proxy that predicts badly can still teach (the paper's second observation)"
-CURVES = (
-    "One panel per proxy, against the learner without one (grey): mean scores with their 95 % bands, from all "
-    "examinations together (dots). A proxy saves samples where its curve comes to the dotted line sooner and stays "
-    "above it; the bar at that line is the 95 % interval of how many it needs. The curve begins at the score before "
-    "any target sample."
-)
 PUBLISHED = tuple(
     head for name in ("zero-shot score", "samples needed", "reduction") for head in (f"{name}, published", "here")
 )
@@ -218,7 +213,7 @@ def teach_view(experiment: Experiment, prpv: Predictivities, figure: Drawn) -> V
     """A learning experiment: the paper's table 1 and observations, what others published, and the curves."""
     table, observations = teach_table(experiment, prpv), observation_lines(observe(experiment, prpv), experiment)
     said = [Paragraphs("The paper's two observations", observations)] if observations else []
-    picture = Picture("What each proxy saves, curve by curve", figure, CURVES)
+    picture = picture_of("teach", "teach", figure)
     title = f"{experiment.settings.name}: which proxy is worth learning in?"
     parts: tuple[Part, ...] = (table, *said, *_published(experiment, table.rows), picture)
     return View(title, teach_answer(experiment), teach_next_step(experiment), parts)

@@ -3,6 +3,7 @@
 import contextlib
 import html
 import re
+import tomllib
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextvars import ContextVar
@@ -24,10 +25,13 @@ from PIL import Image
 
 from proxytune.errors import RunError
 from proxytune.files import draft_of, fill_template
+from proxytune.report.view import Drawn, Picture
 
 UNDATED: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 """Metadata left out of files, so that the same figure gives the same bytes."""
 fill = partial(fill_template, "report")
+CAPTIONS: Mapping[str, Mapping[str, Mapping[str, str]]] = tomllib.loads(fill("captions.toml"))
+"""Title and caption of each figure, by its subject."""
 _beside: ContextVar[tuple[str, ...]] = ContextVar("beside", default=())
 
 
@@ -70,6 +74,12 @@ def save_figures(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
     for name, figure in figures.items():
         save_figure(figure, folder / f"{name}.png")
     return [folder / f"{name}.png" for name in figures]
+
+
+def picture_of(subject: str, name: str, image: Drawn, **words: str) -> Picture:
+    """A figure of a subject with its title and what to see in it, in which these words are filled in."""
+    said = CAPTIONS[subject][name]
+    return Picture(said["title"].format(**words), image, said["caption"].format(**words))
 
 
 def svg_of(figure: Figure) -> bytes:

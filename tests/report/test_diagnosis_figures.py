@@ -35,7 +35,7 @@ from proxytune.diagnosis.motion.signals import signal_groups
 from proxytune.effects import GROUPS, FittedRange, Learnt, LearntCurve, Means, Panel, learnt_theta, theta_names
 from proxytune.effects.catalogue import CATALOGUE
 from proxytune.effects.effect import MOTIONS, SIGNALS
-from proxytune.report.diagnosis.answer import CAPTIONS, diagnosis_pictures
+from proxytune.report.diagnosis.answer import diagnosis_pictures
 from proxytune.report.diagnosis.effect_figure import (
     ANY,
     CUE_PANELS,
@@ -55,6 +55,7 @@ from proxytune.report.diagnosis.error_figures import (
 )
 from proxytune.report.diagnosis.figures import JUDGES, SHOWN, learnt_figure, motion_figures, ranking_figure
 from proxytune.report.figure_style import VERMILLION
+from proxytune.report.writing import CAPTIONS
 
 WIDTH = 0.12
 AFTER = "with dead band"
@@ -482,10 +483,11 @@ def test_every_figure_that_is_drawn_has_a_title_and_a_caption():
     texts = [(FIGURES / name).read_text(encoding="utf-8") for name in ("figures.py", "camera_figures.py")]
     drawn = {name for text in texts for name in re.findall(r'^        "(\w+)": \w+\(', text, flags=re.M)}
     assert len(drawn) >= 10
-    assert drawn == CAPTIONS.keys()
-    assert all(title and len(caption) > 60 for title, caption in CAPTIONS.values())
+    captions = CAPTIONS["diagnosis"]
+    assert drawn == captions.keys()
+    assert all(one["title"] and len(one["caption"]) > 60 for one in captions.values())
 
 
 def test_figures_come_in_one_order_and_an_unknown_one_last():
     names = [one.title for one in diagnosis_pictures({"new": b"", "ranking": b"", "error": b""})]
-    assert names == [CAPTIONS["error"][0], CAPTIONS["ranking"][0], "new"]
+    assert names == [*(CAPTIONS["diagnosis"][name]["title"] for name in ("error", "ranking")), "new"]

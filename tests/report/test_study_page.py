@@ -9,9 +9,9 @@ from confirmations import TOLD, planted
 
 from proxytune.report.html import page_html
 from proxytune.report.study.figures import convergence_figure
-from proxytune.report.study.page import RENEW_S, TITLES, live_view, study_foot, study_view, write_live_page
+from proxytune.report.study.page import RENEW_S, live_view, study_foot, study_view, write_live_page
 from proxytune.report.study.sentence import finding_of, say_answer, say_finding, say_next_step
-from proxytune.report.writing import svg_of
+from proxytune.report.writing import CAPTIONS, svg_of
 
 EVIL = "<script>alert(1)</script>"
 
@@ -44,11 +44,12 @@ def test_it_begins_with_the_answer_and_the_next_step_which_are_the_sentence(resu
 
 def test_every_figure_has_a_caption_and_an_alternative_text_that_says_what_to_see(result, figures):
     image = figures["convergence"]
-    text = text_of(result, dict.fromkeys(TITLES, image))
-    for name, title in TITLES.items():
+    text = text_of(result, dict.fromkeys(CAPTIONS["study"], image))
+    for name, said in CAPTIONS["study"].items():
+        title = said["title"]
         (alt,) = re.findall(f'aria-label="({re.escape(html.escape(title))}[^"]*)"', text)
         assert len(alt) > len(title) + 40, name
-    assert text.count("<figcaption") == len(TITLES)
+    assert text.count("<figcaption") == len(CAPTIONS["study"])
 
 
 def test_it_has_a_row_for_every_trial_and_the_best_theta(result):

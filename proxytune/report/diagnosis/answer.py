@@ -1,7 +1,6 @@
 """Answer of a diagnosis, of motion and camera: headline, tables, notes, figures with captions, next step."""
 
 import json
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -28,7 +27,7 @@ from proxytune.report.meanings import findings, fitted
 from proxytune.report.text import group_texts, table_text
 from proxytune.report.view import Drawn, Paragraphs, Part, Picture, Table, View, columns_of, foot_of
 from proxytune.report.wording import fixed, short, span
-from proxytune.report.writing import fill, save_figures, write_text
+from proxytune.report.writing import CAPTIONS, picture_of, save_figures, write_text
 
 MOST_TRIED = 8
 """So many effects that were tried are in the table."""
@@ -41,8 +40,6 @@ NEXT_STEPS = {
     "cannot be told": "drive the same commands several times, and diagnose the log with these drives in it.",
 }
 """Steps to do after each verdict, where no manoeuvre would tell more."""
-CAPTIONS = {name: (one["title"], one["caption"]) for name, one in tomllib.loads(fill("captions.toml")).items()}
-"""Title and caption of each figure, in the order in which they are shown."""
 
 
 def write_diagnosis(found: LogDiagnosis, folder: Path, command: str = "") -> list[Path]:
@@ -137,8 +134,9 @@ def _say_refusals(found: LogDiagnosis) -> list[str]:
 
 def diagnosis_pictures(figures: Mapping[str, Drawn]) -> list[Picture]:
     """The figures that there are, with captions; one without a caption comes last under its own name."""
-    known = [Picture(title, figures[name], caption) for name, (title, caption) in CAPTIONS.items() if name in figures]
-    return [*known, *(Picture(name, image, "") for name, image in figures.items() if name not in CAPTIONS)]
+    captions = CAPTIONS["diagnosis"]
+    known = [picture_of("diagnosis", name, figures[name]) for name in captions if name in figures]
+    return [*known, *(Picture(name, image, "") for name, image in figures.items() if name not in captions)]
 
 
 def _motion_tables(diagnosis: Diagnosis) -> list[Table]:

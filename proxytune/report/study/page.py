@@ -13,15 +13,10 @@ from proxytune.report.study.sentence import finding_of, say_answer, say_next_ste
 from proxytune.report.study.tables import INFORMATION, MEASURES, SEARCH, THETA, USEFULNESS, study_tables, trials_table
 from proxytune.report.view import Drawn, Foot, Paragraphs, Part, Picture, View, foot_of
 from proxytune.report.wording import short
+from proxytune.report.writing import picture_of
 from proxytune.storage import TrialRecord
 from proxytune.study import LEARNING, StudyResult, StudySettings
 
-TITLES = {
-    "profiles": "What is left of each parameter's range",
-    "convergence": "How the answer improved over the trials",
-    "importance": "Which parameters change PRPV most",
-    "evaluations": "Where the trials were, and what they leave of the box",
-}
 MEANING = (
     "PRPV, the proxy relative predictivity value, counts on how many ordered pairs of the {} agents proxy and target "
     "disagree which is the better. The best θ is the most probable of those whose PRPV, by all trials and fresh "
@@ -77,28 +72,18 @@ def study_foot(settings: StudySettings, command: str | None = None) -> Foot:
 
 def study_pictures(result: StudyResult, figures: Mapping[str, Drawn]) -> dict[str, Picture]:
     """Each figure that there is, by its name, with its caption."""
-    truth = "" if result.truth is None else " The triangle is the θ that made the target."
     nothing = " Where almost nothing is grey, the parameter is unidentified: these trials exclude almost no value."
-    unidentified = nothing if result.knowledge.unidentified else ""
     fresh = " The diamond is the answer in episodes that the search has not seen: only that is free of luck."
-    fresh = fresh if result.expected else ""
-    fresh += " The square is the simulator as it is, at its nominal θ." if result.nominal else ""
-    floor = " What lies within the green band is within noise." if result.floor.value is not None else ""
-    cut = any(trial.bound is not None for trial in result.trials)
-    hollow = "; open ones were stopped early, and theirs is an estimate" if cut else ""
-    captions = {
-        "profiles": "Grey values are excluded (95 %), the others remain; the higher the curve, the more probable the "
-        f"value.{unidentified} The vertical line is the answer.{truth}",
-        "convergence": "The line is the answer so far, the θ of lowest expected score, which need not be the luckiest "
-        f"point.{fresh}{floor}",
-        "importance": "A dot is the share in the variance of PRPV over the box that a parameter takes part in; the "
-        "stroke is what it does alone. Lines are 95 % intervals: where they overlap, the order is not known. Where a "
-        "dot stands near the lower end of its line, the true share may well be larger, but hardly smaller.",
-        "evaluations": f"Each point’s colour is its PRPV, as the bar says{hollow}. The shadow is the 95 % region: "
-        "where it is long and slanting, two parameters make up for each other (correlation above it). The ring is the "
-        f"answer.{truth}",
+    hollow = "; open ones were stopped early, and theirs is an estimate"
+    words = {
+        "truth": " The triangle is the θ that made the target." if result.truth is not None else "",
+        "unidentified": nothing if result.knowledge.unidentified else "",
+        "fresh": fresh if result.expected else "",
+        "nominal": " The square is the simulator as it is, at its nominal θ." if result.nominal else "",
+        "floor": " What lies within the green band is within noise." if result.floor.value is not None else "",
+        "cut": hollow if any(trial.bound is not None for trial in result.trials) else "",
     }
-    return {name: Picture(TITLES[name], image, captions[name]) for name, image in figures.items()}
+    return {name: picture_of("study", name, image, **words) for name, image in figures.items()}
 
 
 def write_live_page(
@@ -125,8 +110,7 @@ def live_view(settings: StudySettings, objective: str, trials: Sequence[TrialRec
     shown: tuple[Part, ...] = ()
     if trials:
         measures = tuple(dict.fromkeys((objective, *(MEASURES if objective != LEARNING else ()))))
-        caption = "Each point is a trial; trials that failed or were stopped early have none. The best may be luck."
-        picture = Picture(f"{objective.upper()} trial by trial", _trials_figure(trials, objective), caption)
+        picture = picture_of("live", "trials", _trials_figure(trials, objective), measure=objective.upper())
         shown = (picture, trials_table(trials, tuple(trials[0].theta), measures))
     sentence = f"{f'Under way: {doing}.' if doing else 'Stopped before its end.'} {_say_best(trials, objective)}"
     return View(f"{settings.name}: which θ makes the simulator useful?", sentence, WAIT if doing else CONTINUE, shown)

@@ -1,7 +1,7 @@
 """A complete MuJoCo model of a domain instance: a robot on a floor, controlled by its two commands."""
 
 import math
-from string import Template
+import tomllib
 from xml.sax.saxutils import escape
 
 import numpy as np
@@ -14,23 +14,6 @@ TIMESTEP_S = 0.0005
 """Short, and integrated explicitly: MuJoCo's implicit integrators push a robot with stiffly driven light wheels."""
 SERVO_S = 0.01
 """Time constant of the wheels' servos, with which the robot's mass follows [s]; part of the motors' lag."""
-CASTER = Template("""\
-      <geom name="caster" type="sphere" pos="$caster_x 0 $caster" size="$caster" mass="$caster_mass"
-            condim="1" priority="1"/>""")
-FRONT_WHEEL = Template("""\
-      <body name="steered" pos="$wheelbase 0 $radius">
-        <joint name="steering" type="hinge" axis="0 0 1" armature="$armature" damping="$damping"/>
-        <geom type="sphere" size="0.001" mass="$caster_mass" contype="0" conaffinity="0"/>
-        <body name="wheel_front">
-          <joint name="axle_front" type="hinge" axis="0 1 0"/>
-          <geom type="sphere" size="$radius" mass="$wheel_mass"/>
-        </body>
-      </body>""")
-OPEN_DIFFERENTIAL = """\
-  <tendon>
-    <fixed name="rear"><joint joint="axle_left" coef="0.5"/><joint joint="axle_right" coef="0.5"/></fixed>
-  </tendon>
-"""
 
 
 def mjcf_text(instance: Instance) -> str:
@@ -64,6 +47,7 @@ def mjcf_text(instance: Instance) -> str:
     }
     name = escape(instance.robot.name, {'"': "&quot;"})
     said = {key: f"{number:.9g}" for key, number in numbers.items()}
+    own = tomllib.loads(fill("mujoco_parts.toml", **said))
     if wheelbase:  # A servo of the mean speed of the rear wheels, and one of the front wheel's angle
         actuators = [_speed_servo(instance, 'name="throttle" tendon="rear"', 0, 2), _steering(instance)]
     else:
@@ -75,10 +59,10 @@ def mjcf_text(instance: Instance) -> str:
         name=name,
         comment=xml_comment(instance, "mjcf", 7),
         chassis_size=f"{length / 2.0:.6g} {0.35 * baseline:.6g} {height / 2.0:.6g}",
-        parts="\n".join([(FRONT_WHEEL if wheelbase else CASTER).substitute(said), *_parts(instance)]),
+        parts="\n".join([own["front_wheel" if wheelbase else "caster"], *_parts(instance)]),
         control="throttle and steering (left is above 0)" if wheelbase else "duties of the left and right wheels",
         excluded='    <exclude body1="$name" body2="wheel_front"/>\n'.replace("$name", name) if wheelbase else "",
-        tendons=OPEN_DIFFERENTIAL if wheelbase else "",
+        tendons=own["open_differential"] if wheelbase else "",
         actuators="\n".join(actuators),
     )
 

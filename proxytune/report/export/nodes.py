@@ -1,5 +1,6 @@
 """ROS 2 nodes: one stands before the driver and bends commands as was found, one plays a designed drive."""
 
+import tomllib
 from collections.abc import Sequence
 from pprint import pformat
 
@@ -36,45 +37,11 @@ def node_text(instance: Instance, has: Sequence[str] = ()) -> str:
     )
 
 
-TWIST = {
-    "topic": "cmd_vel",
-    "message": "Twist, or with `-p stamped:=true` TwistStamped",
-    "stamped": " -p stamped:=true",
-    "package": "geometry_msgs.msg",
-    "kinds": "Twist, TwistStamped",
-    "what": "speed [m/s] and yaw rate [rad/s]",
-    "setup": """\
-        self.kind = TwistStamped if self.declare_parameter("stamped", False).value else Twist
-        self.publisher = self.create_publisher(self.kind, "cmd_vel", 10)""",
-    "fill": """\
-        message = self.kind()
-        twist = message.twist if self.kind is TwistStamped else message
-        if self.kind is TwistStamped:
-            message.header.stamp = self.get_clock().now().to_msg()
-        twist.linear.x, twist.angular.z = first, second""",
-}
-ACKERMANN = {
-    "topic": "drive",
-    "message": "AckermannDriveStamped",
-    "stamped": "",
-    "package": "ackermann_msgs.msg",
-    "kinds": "AckermannDriveStamped",
-    "what": "speed [m/s] and steering angle [rad]",
-    "setup": """\
-        self.publisher = self.create_publisher(AckermannDriveStamped, "drive", 10)""",
-    "fill": """\
-        message = AckermannDriveStamped()
-        message.header.stamp = self.get_clock().now().to_msg()
-        message.drive.speed, message.drive.steering_angle = first, second""",
-}
-"""What differs between robots that hear velocities and cars."""
-
-
 def player_text(diagnosis: Diagnosis) -> str:
     """The node for the next drive of a diagnosis that has one, as a Python file."""
     drive, kind = diagnosis.next_drive, diagnosis.command
     assert drive is not None
-    told = ACKERMANN if kind in CAR_COMMANDS else TWIST
+    told = tomllib.loads(fill("player.toml"))["ackermann" if kind in CAR_COMMANDS else "twist"]
     return fill(
         "player.py.txt",
         **told,

@@ -1,9 +1,9 @@
 """Domain instance in the figures that other simulators take, and where each effect goes in each format."""
 
 import re
+import tomllib
 from collections.abc import Container, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from proxytune.arrays import Floats
 from proxytune.driving import CAMERA, CameraFigures, Robot, mounted_camera, orientation, rotation
 from proxytune.effects import SHIPPED, SMALLEST_LIMIT, Effect, Stage, effect_of, effects_from
 from proxytune.errors import InputError
+from proxytune.report.writing import fill
 from proxytune.space import Theta
 
 Pair = tuple[float, float]
@@ -201,58 +202,7 @@ IN_WHEELS = ("trim", "wheel_gain", "yaw_scrub")
 """Effects that a patched file has by its wheels' radii and distance; what such a file has is undone by a filter."""
 
 
-class Places(NamedTuple):
-    """Places of an effect, by format; empty where it has no place.
-
-    Attributes:
-        urdf: In a URDF.
-        mjcf: In a MuJoCo model.
-        ros: In ROS parameters.
-    """
-
-    urdf: str = ""
-    mjcf: str = ""
-    ros: str = ""
-
-
-_MOUNT = Places("joint camera_mount", "camera pos and xyaxes", "static_transform base_link to camera")
-_MARKER = Places("link tracked_point", "site tracked_point", "static_transform base_link to tracked_point")
-_MOUNTED: Mapping[str, Places] = {
-    "marker_offset": _MARKER,
-    "heading_offset": _MARKER,
-    "camera_pitch": _MOUNT,
-    "camera_roll": _MOUNT,
-    "camera_yaw": _MOUNT,
-    "camera_height": _MOUNT,
-    "camera_forward": _MOUNT,
-    "field_of_view": Places(mjcf="camera fovy", ros="camera_info k, p"),
-    "lens_distortion": Places(ros="camera_info d"),
-    "lens_centre": Places(ros="camera_info k, p"),
-    "pixel_aspect": Places(ros="camera_info k, p"),
-}
-PLACES: Mapping[str, Mapping[str, Places]] = {
-    "differential": {
-        "delay": Places(mjcf="actuator delay"),
-        "slew_rate": Places(ros="max_acceleration"),
-        "saturation": Places("joint limit velocity", "actuator ctrlrange", "max_velocity"),
-        "trim": Places("wheel radii", "actuator gainprm", "wheel_radius_multiplier, max_velocity"),
-        "wheel_gain": Places("wheel radii", "actuator gainprm", "wheel_radius_multiplier, max_velocity"),
-        "motor_lag": Places(mjcf="actuator dynprm"),
-        "yaw_scrub": Places("wheel distance", "wheel distance", "wheel_separation_multiplier, max_velocity"),
-        **_MOUNTED,
-    },
-    "ackermann": {
-        "delay": Places(mjcf="actuator delay"),
-        "saturation": Places("joint limit velocity", "actuator ctrlrange"),
-        "wheel_gain": Places("wheel radii", "actuator gainprm", "traction_wheels_radius"),
-        "motor_lag": Places(mjcf="actuator dynprm"),
-        "steering_saturation": Places(mjcf="actuator ctrlrange"),
-        "steering_lag": Places(mjcf="actuator dynprm"),
-        "steering_offset": Places("origins of the joints that steer", "actuator biasprm"),
-        "steering_gain": Places(mjcf="actuator gainprm"),
-        **_MOUNTED,
-    },
-}
+PLACES = tomllib.loads(fill("places.toml"))
 """By how the robot drives, the effects that have a place; a user's own and what was learnt have none."""
 BENT = (Stage.COMMAND, Stage.ACTUATION, Stage.MOTION)
 """Effects on commands, wheels and motion: what a filter bends."""
@@ -262,5 +212,5 @@ def place_of(effect: str, form: str, drive: str = "differential") -> str:
     """Place of an effect of such robots in a format; empty where it has no place."""
     if form == FILTER:
         return "the filter" if effect not in SHIPPED.shipped or SHIPPED.effect(effect).stage in BENT else ""
-    place: str = getattr(PLACES[drive].get(effect, Places()), form)
-    return place
+    places: Mapping[str, str] = (PLACES[drive] | PLACES["mounted"]).get(effect, {})
+    return places.get(form, "")

@@ -15,7 +15,7 @@ from proxytune.driving.plants import PlanarPlant
 from proxytune.effects import CAR_CATALOGUE, CATALOGUE, FilterContext, effects_from, theta_names
 from proxytune.errors import SettingsError
 from proxytune.report import FORMATS, export_lines, mjcf_text, ros_text, urdf_text
-from proxytune.report.export.instance import PLACES, Instance, Places, place_of
+from proxytune.report.export.instance import PLACES, Instance, place_of
 
 DUTIES = np.repeat([[0.5, 0.5], [0.3, 0.6], [0.9, 0.9], [-0.2, 0.3]], 60, axis=0)
 FOUND = {
@@ -80,7 +80,7 @@ def test_an_exported_car_has_wheels_as_large_and_front_wheels_as_askew_as_was_fo
 @pytest.mark.parametrize("form", FORMATS)
 def test_what_a_car_has_a_place_for_changes_its_file_and_the_rest_is_named(form):
     for effect, kind in CAR_CATALOGUE.items():
-        own, wheels = (PLACES[drive].get(effect, Places()) for drive in ("ackermann", "differential"))
+        own, wheels = (PLACES[drive].get(effect) for drive in ("ackermann", "differential"))
         if effect in CATALOGUE and own == wheels:
             continue  # as on two wheels
         name, one = theta_names(kind)[0], kind.parameters[0]
@@ -239,11 +239,7 @@ def test_what_was_learnt_and_a_users_own_have_no_place():
 
 @pytest.mark.parametrize("name", CATALOGUE)
 def test_every_effect_is_in_the_table_of_the_page(name):
-    row = (
-        f"| `{name}` | "
-        + " | ".join(place or "no place" for place in PLACES["differential"].get(name, Places()))
-        + " |"
-    )
+    row = f"| `{name}` | {' | '.join(place_of(name, form) or 'no place' for form in FORMATS)} |"
     assert row in PAGE.read_text(encoding="utf-8").splitlines()
 
 

@@ -202,7 +202,9 @@ IN_WHEELS = ("trim", "wheel_gain", "yaw_scrub")
 """Effects that a patched file has by its wheels' radii and distance; what such a file has is undone by a filter."""
 
 
-PLACES = tomllib.loads(fill("places.toml"))
+_TABLES = tomllib.loads(fill("places.toml"))
+_MOUNTED = {effect: places for places in _TABLES.pop("mounted") for effect in places["effects"]}
+PLACES: Mapping[str, Mapping[str, Mapping[str, str]]] = {drive: own | _MOUNTED for drive, own in _TABLES.items()}
 """By how the robot drives, the effects that have a place; a user's own and what was learnt have none."""
 BENT = (Stage.COMMAND, Stage.ACTUATION, Stage.MOTION)
 """Effects on commands, wheels and motion: what a filter bends."""
@@ -212,5 +214,4 @@ def place_of(effect: str, form: str, drive: str = "differential") -> str:
     """Place of an effect of such robots in a format; empty where it has no place."""
     if form == FILTER:
         return "the filter" if effect not in SHIPPED.shipped or SHIPPED.effect(effect).stage in BENT else ""
-    places: Mapping[str, str] = (PLACES[drive] | PLACES["mounted"]).get(effect, {})
-    return places.get(form, "")
+    return PLACES[drive].get(effect, {}).get(form, "")

@@ -10,7 +10,7 @@ from confirmations import TOLD, planted
 from proxytune.report.html import page_html
 from proxytune.report.study.figures import convergence_figure
 from proxytune.report.study.page import RENEW_S, live_view, study_foot, study_view, write_live_page
-from proxytune.report.study.sentence import finding_of, say_answer, say_finding, say_next_step
+from proxytune.report.study.sentence import say_answer, say_next_step, study_sentence
 from proxytune.report.writing import CAPTIONS, svg_of
 
 EVIL = "<script>alert(1)</script>"
@@ -33,13 +33,12 @@ def test_the_page_needs_nothing_else_and_is_small(result, figures):
 
 
 def test_it_begins_with_the_answer_and_the_next_step_which_are_the_sentence(result, figures):
-    finding = finding_of(result)
     text = text_of(result, figures)
-    first, after = html.escape(say_answer(finding)), html.escape(say_next_step(finding)).split("`")[0]
+    first, after = html.escape(say_answer(result)), html.escape(say_next_step(result)).split("`")[0]
     heads = (f'class="answer">{first}</p>', after, ">95 % interval</th>", "<svg ", ">Trials</h2>")
     places = [text.index(one) for one in heads]
     assert places == sorted(places)
-    assert say_finding(finding) == f"{say_answer(finding)} Next: {say_next_step(finding)}."
+    assert study_sentence(result) == f"{say_answer(result)} Next: {say_next_step(result)}."
 
 
 def test_every_figure_has_a_caption_and_an_alternative_text_that_says_what_to_see(result, figures):

@@ -1,14 +1,17 @@
 """Sentence of a study."""
 
 from dataclasses import replace
+from types import SimpleNamespace as Namespace
 
 import numpy as np
 import pytest
 from confirmations import LACKS, TOLD, planted
 
-from proxytune.report.study.sentence import Finding, KnownParameter, declared_of, finding_of, say_finding
+from proxytune.report.study.sentence import KnownParameter, declared_of, known_parameters, say_answer, study_sentence
 from proxytune.scores import Metric, ScoreTable
 from proxytune.search import Information
+from proxytune.space import Interval
+from proxytune.study import DEFAULT_FAMILY
 from proxytune.usefulness import Chance, Estimate, NoiseFloor
 
 TRIM = KnownParameter("trim", "", 0.1213, (0.108, 0.146), 0.06, True)
@@ -17,34 +20,63 @@ BLUR = KnownParameter("blur", "s", 0.026, (0.005, 0.062), 0.57, True)
 DELAY = KnownParameter("delay", "s", 0.1, (0.001, 0.298), 0.99, False)
 TABLE = ScoreTable(("a", "b"), ("0",), ("distance",), np.array([[[1.0]], [[2.0]]]))
 FLOOR = NoiseFloor("same starts", 5.0, 1.0, 9.0, 1000, TABLE, (Metric("distance", "max"),))
-FOUND = Finding(
-    parameters=(TRIM, PITCH, BLUR),
-    region=0.0016,
-    inside=True,
-    prpv=Estimate(6.2, 2.6, 9.9),
-    fresh=True,
-    floor=FLOOR,
-    excess=Estimate(1.2, -5.3, 7.7),
-    nominal=None,
-    chance=Chance(65.8, 13.7, 0.001, 1000, None),
-    perfect=True,
-    misfit=0.4,
-    fits=True,
-    information=Information("blur", (("daredevil", 0.6), ("wary", 0.4)), (("distance", 1.0),), "starts"),
-    left=0,
-    budget=24,
-    ruled=False,
-    starts=4,
-    most_starts=10,
-    confirm=1,
-    declared=("trim", "delay"),
-)
-ABOVE = replace(FOUND, prpv=Estimate(16.0, 13.0, 19.0), excess=Estimate(11.0, 4.2, 17.8), perfect=False)
-BY_CHANCE = replace(ABOVE, prpv=Estimate(58.0, 50.2, 66.0), chance=Chance(65.8, 13.7, 0.3, 1000, None))
+PRPV = Estimate(6.2, 2.6, 9.9)
+EXCESS = Estimate(1.2, -5.3, 7.7)
+TOLD_BY_STARTS = Information("blur", (("daredevil", 0.6), ("wary", 0.4)), (("distance", 1.0),), "starts")
+CHANCE, EXPLAINING = (Chance(65.8, 13.7, p_value, 1000, None) for p_value in (0.001, 0.3))
+
+
+def box_of(known):
+    """The box of which an interval fills this share."""
+    return Interval(known.name, 0.0, (known.interval[1] - known.interval[0]) / known.share)
+
+
+def study(parameters=(TRIM, PITCH, BLUR), *, names=("trim", "delay"), family=DEFAULT_FAMILY, fresh=True, **changes):
+    """As much of a study as a sentence tells, with changes of it, of its settings or of what is known."""
+    settings = {"budget": 24, "starts": 4, "confirm": 1, "learn_from": ()}
+    known = {"fits": True, "p_value": 0.4, "information": (TOLD_BY_STARTS,), "share": 0.0016}
+    facts = {"perfect": True, "inside": True, "floor": FLOOR, "excess": EXCESS, "stopped": "the budget is spent"}
+    facts |= {"prpv": PRPV, "nominal": None, "chance": CHANCE, "trials": range(24), "most_starts": 10}
+    for given in (settings, known, facts):
+        given |= {key: changes.pop(key) for key in list(changes) if key in given}
+    assert not changes
+    prpv, nominal, chance, most_starts = (facts.pop(key) for key in ("prpv", "nominal", "chance", "most_starts"))
+    judged = Namespace(chance=chance, prpv=Namespace(value=prpv.value))
+    expected = Namespace(prpv=Namespace(value=prpv)) if fresh else None
+    space = Namespace(intervals=tuple(map(box_of, parameters)), names=names)
+    return Namespace(
+        **facts,
+        expected=expected,
+        nominal=nominal and Namespace(expected=Namespace(prpv=Namespace(value=nominal))),
+        study=Namespace(
+            settings=Namespace(space=space, family=family, **settings),
+            family=Namespace(starts=most_starts, parameters={one.name: one for one in parameters}),
+        ),
+        knowledge=Namespace(
+            intervals={one.name: one.interval for one in parameters},
+            unidentified=[one.name for one in parameters if not one.identified],
+            misfit=Namespace(fits=known["fits"], p_value=known["p_value"]),
+            information=known["information"],
+            posterior=Namespace(share=known["share"]),
+        ),
+        judged=judged,
+        best=Namespace(
+            trial=Namespace(theta={one.name: one.best for one in parameters}), assessment=None if fresh else judged
+        ),
+    )
+
+
+def said(*parameters, **changes):
+    """What is said of such a study."""
+    return study_sentence(study(*parameters, **changes))
+
+
+ABOVE = {"prpv": Estimate(16.0, 13.0, 19.0), "excess": Estimate(11.0, 4.2, 17.8), "perfect": False}
+BY_CHANCE = {**ABOVE, "prpv": Estimate(58.0, 50.2, 66.0), "chance": EXPLAINING}
 
 
 def test_theta_that_makes_a_perfect_proxy_is_found_and_the_least_known_parameter_comes_next():
-    assert say_finding(FOUND) == (
+    assert said() == (
         "θ found: trim 0.121 (0.108 to 0.146), camera pitch 13.0 deg (11.1 to 14.4), blur 0.026 s (0.005 to 0.062). "
         "PRPV (proxy relative predictivity value) is 6 (2 to 10), a perfect proxy's 5 (1 to 9): "
         "it cannot be told from a perfect proxy; at most 8 pairs worse. "
@@ -53,14 +85,15 @@ def test_theta_that_makes_a_perfect_proxy_is_found_and_the_least_known_parameter
 
 
 @pytest.mark.parametrize(
-    ("high", "said"), [(-0.5, "perfect proxy. Next"), (0.4, "at most 1 pair worse. "), (1.2, "at most 2 pairs worse. ")]
+    ("high", "told"),
+    [(-0.5, "perfect proxy. Next"), (0.4, "at most 1 pair worse. "), (1.2, "at most 2 pairs worse. ")],
 )
-def test_pairs_that_may_be_worse_are_counted_where_there_may_be_any(high, said):
-    assert said in say_finding(replace(FOUND, excess=Estimate(-8.0, -15.0, high)))
+def test_pairs_that_may_be_worse_are_counted_where_there_may_be_any(high, told):
+    assert told in said(excess=Estimate(-8.0, -15.0, high))
 
 
 def test_a_score_above_the_floor_is_not_called_found():
-    text = say_finding(ABOVE)
+    text = said(**ABOVE)
     assert text.startswith("θ narrowed down to 0.16 % of the box: trim 0.121 ")
     assert (
         "is 16 (13 to 19), a perfect proxy's 5 (1 to 9): better than chance, but a perfect proxy scores lower, " in text
@@ -78,98 +111,95 @@ def test_a_score_above_the_floor_is_not_called_found():
     ],
 )
 def test_the_next_step_is_what_keeps_more_from_being_told(limit, inside, step):
-    found = replace(ABOVE, inside=inside, information=replace(FOUND.information, limit=limit))
-    assert say_finding(found).endswith(f" Next: {step}, to get closer.")
+    text = said(**ABOVE, inside=inside, information=(replace(TOLD_BY_STARTS, limit=limit),))
+    assert text.endswith(f" Next: {step}, to get closer.")
 
 
-def test_where_a_rule_ended_the_search_a_larger_budget_would_not_help(result):
-    found = replace(ABOVE, inside=False, ruled=True)
-    assert say_finding(found).endswith("Next: loosen the rule under [stop] that ended the search, to get closer.")
-    assert finding_of(result).ruled is False
-    assert finding_of(replace(result, trials=result.trials[:3])).ruled is True
+def test_where_a_rule_ended_the_search_a_larger_budget_would_not_help():
+    text = said(**ABOVE, inside=False, trials=range(20))
+    assert text.endswith("Next: loosen the rule under [stop] that ended the search, to get closer.")
+    assert said(**ABOVE, inside=False).endswith("Next: raise budget from 24 to 48, to get closer.")
 
 
 def test_no_more_starts_are_asked_for_than_there_are():
-    assert "raise starts from 4 to 5 " in say_finding(replace(ABOVE, most_starts=5))
-    assert "add agents or metrics: all 4 starts are driven" in say_finding(replace(ABOVE, most_starts=4))
+    assert "raise starts from 4 to 5 " in said(**ABOVE, most_starts=5)
+    assert "add agents or metrics: all 4 starts are driven" in said(**ABOVE, most_starts=4)
 
 
 def test_who_learns_from_earlier_studies_is_not_sent_beyond_their_starts():
     """A bank of fewer starts than a study asks for is refused, so trials of its own are what brings more."""
-    told = say_finding(replace(ABOVE, learnt=True, budget=0))
+    told = said(**ABOVE, learn_from=("bank",), budget=0, trials=())
     assert "raise budget from 0 to 8" in told
     assert "raise starts" not in told
 
 
 def test_a_proxy_that_lacks_something_is_sent_to_diagnose():
-    text = say_finding(replace(ABOVE, fits=False, misfit=0.0042))
+    text = said(**ABOVE, fits=False, p_value=0.0042)
     assert text.startswith("The proxy lacks something: no θ explains the target's scores (p = 0.0042). PRPV (")
     assert text.endswith("run `python -m proxytune diagnose LOG --declared trim,delay`.")
-    assert "a perfect proxy scores lower" not in say_finding(replace(FOUND, fits=False, perfect=False))
-    assert say_finding(replace(ABOVE, fits=False, declared=())).endswith("run `python -m proxytune diagnose LOG`.")
+    assert "a perfect proxy scores lower" not in said(fits=False, perfect=False)
+    assert said(**ABOVE, fits=False, names=("blur",)).endswith("run `python -m proxytune diagnose LOG`.")
 
 
 def test_of_another_simulator_no_log_is_asked_for_unless_its_robot_drives():
-    lacking = say_finding(replace(ABOVE, fits=False, declared=None))
+    lacking = said(**ABOVE, fits=False, family="other:family")
     assert lacking.startswith("The proxy lacks something: no θ explains the target's scores")
     assert lacking.endswith("widen the box; of a robot on wheels a log tells (`diagnose`).")
-    unknown = replace(ABOVE, parameters=(TRIM, DELAY), information=TOLD[0], declared=None)
-    assert say_finding(unknown).endswith("whose scores change with delay (so far agent4's do most), to get closer.")
+    unknown = said((TRIM, DELAY), **ABOVE, information=TOLD, family="other:family")
+    assert unknown.endswith("whose scores change with delay (so far agent4's do most), to get closer.")
 
 
 def test_what_chance_explains_is_not_found_and_has_its_probability():
-    text = say_finding(BY_CHANCE)
+    text = said(**BY_CHANCE)
     assert text == (
         "No θ found. PRPV (proxy relative predictivity value) is 58 (50 to 66), no better than chance "
         "(65.8 ± 13.7, p = 0.3). Next: raise budget from 24 to 48, or add agents whose scores differ more."
     )
-    assert "diagnose LOG" in say_finding(replace(BY_CHANCE, fits=False))
-    assert "confirm" not in say_finding(replace(BY_CHANCE, fresh=False, confirm=0))
+    assert "diagnose LOG" in said(**BY_CHANCE, fits=False)
+    assert "confirm" not in said(**BY_CHANCE, fresh=False, confirm=0)
 
 
 def test_without_fresh_episodes_luck_is_named_and_they_are_the_next_step():
-    unconfirmed = replace(ABOVE, fresh=False, confirm=0)
-    assert "is 16 in the search's own episodes, which may be partly luck." in say_finding(unconfirmed)
-    assert say_finding(unconfirmed).endswith(
-        "Next: set confirm = 1 and run the study again, to drive the best θ afresh."
-    )
-    assert "set confirm" not in say_finding(replace(unconfirmed, confirm=1))
-    assert "perfect" not in say_finding(unconfirmed)
+    unconfirmed = said(**ABOVE, fresh=False, confirm=0)
+    assert "is 16 in the search's own episodes, which may be partly luck." in unconfirmed
+    assert unconfirmed.endswith("Next: set confirm = 1 and run the study again, to drive the best θ afresh.")
+    assert "set confirm" not in said(**ABOVE, fresh=False)
+    assert "perfect" not in unconfirmed
 
 
 def test_the_simulator_as_it_is_stands_beside_the_best():
-    text = say_finding(replace(FOUND, nominal=Estimate(31.0, 24.5, 37.2)))
+    text = said(nominal=Estimate(31.0, 24.5, 37.2))
     assert "8 pairs worse. The simulator as it is scores 31 (24 to 38). Next: " in text
 
 
 def test_where_noise_is_not_known_nothing_is_said_of_a_perfect_proxy():
-    text = say_finding(replace(ABOVE, excess=None))
+    text = said(**ABOVE | {"excess": None})
     assert "better than chance; what a perfect proxy scores is not known." in text
     assert "(1 to 9)" not in text
 
 
 def test_a_study_under_way_says_so_and_how_to_go_on():
-    text = say_finding(replace(ABOVE, left=10))
+    text = said(**ABOVE, stopped="", trials=range(14))
     assert text.startswith("14 of 24 trials so far. θ narrowed down")
     assert text.endswith("Next: run the study again for the 10 trials that are left.")
 
 
 def test_unidentified_parameters_are_named_without_an_interval_and_with_who_tells_of_them():
-    text = say_finding(replace(ABOVE, parameters=(TRIM, DELAY), information=TOLD[0]))
+    text = said((TRIM, DELAY), **ABOVE, information=TOLD)
     assert "trim 0.121 (0.108 to 0.146); delay is unidentified." in text
     assert "add an agent or a metric whose scores change with delay (so far agent4's do most), or a log" in text
-    nothing = say_finding(replace(ABOVE, parameters=(DELAY, replace(DELAY, name="blur")), information=None))
+    nothing = said((DELAY, replace(DELAY, name="blur")), **ABOVE, information=())
     assert nothing.startswith("θ is unknown: delay and blur are unidentified.")
 
 
 def test_a_best_value_outside_its_interval_is_not_shown_as_if_it_were_inside():
-    text = say_finding(replace(ABOVE, parameters=(replace(TRIM, best=0.2), PITCH)))
+    text = said((replace(TRIM, best=0.2), PITCH), **ABOVE)
     assert "trim 0.200 (95 % region: 0.108 to 0.146)" in text
 
 
 def test_of_many_parameters_only_some_are_named():
     many = tuple(replace(TRIM, name=f"gain{number}") for number in range(7))
-    text = say_finding(replace(FOUND, parameters=many))
+    text = said(many)
     assert "gain4 0.121 (0.108 to 0.146) and 2 more." in text
     assert "gain5" not in text
 
@@ -179,25 +209,26 @@ def test_only_effects_on_motion_are_declared_to_diagnose_each_once():
     assert declared_of(names) == ("trim", "motor_lag", "wheel_gain")
 
 
-def test_a_study_s_finding_holds_what_the_study_knows(result):
-    found = finding_of(planted(result, deviation=(3.0, 0.01), misfit=LACKS))
-    assert [(known.name, known.unit, known.identified) for known in found.parameters] == [
+def test_what_is_told_of_a_parameter_is_what_the_study_knows(result):
+    known = planted(result, deviation=(3.0, 0.01), misfit=LACKS)
+    delay, trim = known_parameters(known)
+    assert [(one.name, one.unit, one.identified) for one in (delay, trim)] == [
         ("delay", "s", False),
         ("trim", "", True),
     ]
-    trim = found.parameters[1]
     assert trim.interval == pytest.approx((0.1 - 0.6 * 0.0196, 0.1 + 0.6 * 0.0196), abs=0.002)
     assert trim.share == pytest.approx(4 * 0.0098, rel=0.1)
-    assert (found.least.name, found.information.name) == ("delay", "delay")
-    assert (found.fits, found.misfit, found.fresh, found.left) == (False, 0.002, False, 0)
-    assert (found.budget, found.starts, found.most_starts, found.confirm) == (7, 3, 5, 0)
+    assert say_answer(known).startswith("The proxy lacks something: no θ explains the target's scores (p = 0.002). ")
+    assert study_sentence(replace(result, stopped="", trials=result.trials[:3])).startswith("3 of 7 trials so far. ")
+
+
+def test_who_tells_nothing_of_the_least_known_parameter_is_not_named():
     silent = replace(TOLD[0], agents=(("agent0", 0.0),))
-    assert finding_of(planted(result, deviation=(3.0, 0.01), information=(silent, TOLD[1]))).information is None
-    assert finding_of(replace(result, stopped="", trials=result.trials[:3])).left == 4
+    assert "so far" not in said((TRIM, DELAY), **ABOVE, information=(silent, TOLD[1]))
 
 
 def test_a_score_at_the_floor_of_a_theta_that_other_scores_exclude_is_not_called_perfect():
-    text = say_finding(replace(FOUND, perfect=False, inside=False))
+    text = said(perfect=False, inside=False)
     assert text.startswith("θ narrowed down to 0.16 % of the box: ")
     assert "at most 8 pairs worse, but other scores of the agents differ from the target's." in text
     assert "no difference" not in text

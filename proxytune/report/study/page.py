@@ -9,7 +9,7 @@ from matplotlib.ticker import MaxNLocator
 
 from proxytune.report.figure_style import BLUE, COLUMN, dress
 from proxytune.report.html import write_page
-from proxytune.report.study.sentence import finding_of, say_answer, say_next_step
+from proxytune.report.study.sentence import say_answer, say_next_step
 from proxytune.report.study.tables import INFORMATION, MEASURES, SEARCH, THETA, USEFULNESS, study_tables, trials_table
 from proxytune.report.view import Drawn, Foot, Paragraphs, Part, Picture, View, foot_of
 from proxytune.report.wording import short
@@ -35,7 +35,7 @@ def study_view(result: StudyResult, figures: Mapping[str, Drawn]) -> View:
         result: What it has found.
         figures: PNG files by the name of the figure, those that there are.
     """
-    finding, settings = finding_of(result), result.study.settings
+    settings = result.study.settings
     drawn, tables = study_pictures(result, figures), study_tables(result)
     parts = (
         tables[THETA],
@@ -51,7 +51,7 @@ def study_view(result: StudyResult, figures: Mapping[str, Drawn]) -> View:
     )
     present: tuple[Part, ...] = tuple(part for part in parts if part is not None)
     title = f"{settings.name}: which θ makes the simulator useful?"
-    return View(title, say_answer(finding), f"{say_next_step(finding)}.", present)
+    return View(title, say_answer(result), f"{say_next_step(result)}.", present)
 
 
 def study_foot(settings: StudySettings, command: str | None = None) -> Foot:

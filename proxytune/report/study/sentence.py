@@ -18,9 +18,7 @@ from proxytune.report.wording import (
     short,
     span,
 )
-from proxytune.search import Information
 from proxytune.study import DEFAULT_FAMILY, StudyResult
-from proxytune.usefulness import Chance, Estimate, NoiseFloor
 
 MOST_NAMED = 5
 """At most this many parameters are named one by one."""
@@ -47,90 +45,36 @@ class KnownParameter:
     identified: bool
 
 
-@dataclass(frozen=True)
-class Finding:
-    """Figures that the sentence is made of.
-
-    Attributes:
-        parameters: In the order of the box.
-        region: The 95 % region's share of the box.
-        inside: Whether the best θ lies in it.
-        prpv: PRPV of the best θ: expected of more episodes, or without fresh ones that of its own.
-        fresh: Whether there are fresh ones.
-        floor: What a perfect proxy would score.
-        excess: By how much more is expected of this one than of that; None where it is not known.
-        nominal: PRPV expected of the simulator as it is; None where it has no nominal values.
-        chance: What a proxy that ranks at random would score.
-        perfect: Whether no difference between proxy and target can be seen, which takes fresh episodes.
-        misfit: p-value of the misfit test; None where there is none.
-        fits: Whether some θ explains the target's scores; None where that cannot be tested.
-        information: What informs the least known parameter; None where nothing does.
-        left: Trials still to be run; 0 where the search has ended.
-        budget: Trials that the study may take, or took where that was more.
-        ruled: Whether a rule ended the search before its budget.
-        starts: How many starts each agent drives from.
-        most_starts: How many starts there are.
-        confirm: How often the study drives its best θ again.
-        learnt: Whether it learns from earlier studies, which have no more starts than they have.
-        declared: The effects on motion that θ belongs to, which `diagnose` is to tune in any case; None where the
-            simulator is another, of which nobody knows whether its robot drives.
-    """
-
-    parameters: tuple[KnownParameter, ...]
-    region: float
-    inside: bool
-    prpv: Estimate
-    fresh: bool
-    floor: NoiseFloor
-    excess: Estimate | None
-    nominal: Estimate | None
-    chance: Chance
-    perfect: bool
-    misfit: float | None
-    fits: bool | None
-    information: Information | None
-    left: int
-    budget: int
-    ruled: bool
-    starts: int
-    most_starts: int
-    confirm: int
-    declared: tuple[str, ...] | None
-    learnt: bool = False
-
-    @property
-    def least(self) -> KnownParameter:
-        """The least known parameter."""
-        return max(self.parameters, key=lambda one: one.share)
-
-
 def study_sentence(result: StudyResult) -> str:
     """Say what a study found, how good the proxy is there, and what to do next."""
-    return say_finding(finding_of(result))
+    return f"{say_answer(result)} Next: {say_next_step(result)}."
 
 
-def say_finding(finding: Finding) -> str:
-    """Say what was found, how good the proxy is there, and what to do next."""
-    return f"{say_answer(finding)} Next: {say_next_step(finding)}."
-
-
-def say_answer(finding: Finding) -> str:
+def say_answer(result: StudyResult) -> str:
     """Say what was found, and how good the proxy is there."""
-    return f"{_say_theta(finding)} {_say_usefulness(finding)}"
+    return f"{_say_theta(result)} {_say_usefulness(result)}"
 
 
-def _say_theta(finding: Finding) -> str:
-    so_far = f"{finding.budget - finding.left} of {finding.budget} trials so far. " if finding.left else ""
-    if finding.chance.explains:
+def _say_theta(result: StudyResult) -> str:
+    parameters, misfit = known_parameters(result), result.knowledge.misfit
+    done, budget = len(result.trials), result.study.settings.budget
+    so_far = f"{done} of {budget} trials so far. " if _trials_left(result) else ""
+    if result.judged.chance.explains:
         return f"{so_far}No θ found."
-    if finding.fits is False:
-        misfit = "" if finding.misfit is None else f" ({probability(finding.misfit)})"
-        return f"{so_far}The proxy lacks something: no θ explains the target's scores{misfit}."
-    if finding.perfect:
-        return f"{so_far}θ found: {_say_parameters(finding.parameters)}."
-    if not any(one.identified for one in finding.parameters):
-        return f"{so_far}θ is unknown: {_say_parameters(finding.parameters)}."
-    return f"{so_far}θ narrowed down to {percent(finding.region)} of the box: {_say_parameters(finding.parameters)}."
+    if misfit.fits is False:
+        told = "" if misfit.p_value is None else f" ({probability(misfit.p_value)})"
+        return f"{so_far}The proxy lacks something: no θ explains the target's scores{told}."
+    if result.perfect:
+        return f"{so_far}θ found: {_say_parameters(parameters)}."
+    if not any(one.identified for one in parameters):
+        return f"{so_far}θ is unknown: {_say_parameters(parameters)}."
+    share = percent(result.knowledge.posterior.share)
+    return f"{so_far}θ narrowed down to {share} of the box: {_say_parameters(parameters)}."
+
+
+def _trials_left(result: StudyResult) -> int:
+    """Trials still to be run; 0 where the search has ended."""
+    return 0 if result.stopped else result.study.settings.budget - len(result.trials)
 
 
 def _say_parameters(parameters: Sequence[KnownParameter]) -> str:
@@ -153,21 +97,19 @@ def _say_value(parameter: KnownParameter) -> str:
     return f"{plain(parameter.name)} {fixed(parameter.best, places)}{parameter.unit and ' ' + parameter.unit} ({ends})"
 
 
-def _say_usefulness(finding: Finding) -> str:
+def _say_usefulness(result: StudyResult) -> str:
     """PRPV, beside what a perfect proxy, one that ranks at random and the simulator as it is score."""
-    name = "PRPV (proxy relative predictivity value)"
-    if not finding.fresh:
-        score = f"{name} is {short(finding.prpv.value)} in the search's own episodes"
-    else:
-        score = f"{name} is {in_pairs(*finding.prpv)}"
-    if finding.chance.explains:
-        at_random = f"{short(finding.chance.mean)} ± {short(finding.chance.deviation)}"
-        return f"{score}, no better than chance ({at_random}, {probability(finding.chance.p_value)})."
-    if not finding.fresh:
+    judged, chance = result.judged.prpv.value, result.judged.chance
+    value, low, high = result.expected.prpv.value if result.expected else (judged, judged, judged)
+    told = in_pairs(value, low, high) if _is_fresh(result) else f"{short(value)} in the search's own episodes"
+    score = f"PRPV (proxy relative predictivity value) is {told}"
+    if chance.explains:
+        at_random = f"{short(chance.mean)} ± {short(chance.deviation)}"
+        return f"{score}, no better than chance ({at_random}, {probability(chance.p_value)})."
+    if not _is_fresh(result):
         return f"{score}, which may be partly luck."
-    nominal = finding.nominal
-    before = f" The simulator as it is scores {in_pairs(*nominal)}." if nominal else ""
-    level, excess = finding.floor, finding.excess
+    nominal, level, excess = result.nominal, result.floor, result.excess
+    before = f" The simulator as it is scores {in_pairs(*nominal.expected.prpv.value)}." if nominal else ""
     if excess is None or level.value is None or level.low is None or level.high is None:
         return f"{score}, better than chance; what a perfect proxy scores is not known.{before}"
     floor = f"a perfect proxy's {in_pairs(level.value, level.low, level.high)}"
@@ -176,84 +118,64 @@ def _say_usefulness(finding: Finding) -> str:
         return f"{score}, {floor}: better than chance, but {lower}.{before}"
     most = ceil(excess.high)
     worse = f"; at most {most} {'pair' if most == 1 else 'pairs'} worse" if most > 0 else ""
-    told = f"it cannot be told from a perfect proxy{worse}"
-    other = "" if finding.perfect else ", but other scores of the agents differ from the target's"
-    return f"{score}, {floor}: {told}{other}.{before}"
+    alike = f"it cannot be told from a perfect proxy{worse}"
+    other = "" if result.perfect else ", but other scores of the agents differ from the target's"
+    return f"{score}, {floor}: {alike}{other}.{before}"
 
 
-def say_next_step(finding: Finding) -> str:
+def _is_fresh(result: StudyResult) -> bool:
+    """Whether it is judged by episodes that the search has not seen."""
+    return result.judged is not result.best.assessment
+
+
+def say_next_step(result: StudyResult) -> str:
     """The one step that brings most, without a full stop."""
-    if finding.left:
-        return f"run the study again for the {finding.left} trials that are left"
-    if finding.fits is False and finding.declared is None:
+    settings, fits = result.study.settings, result.knowledge.misfit.fits
+    if left := _trials_left(result):
+        return f"run the study again for the {left} trials that are left"
+    if fits is False and settings.family != DEFAULT_FAMILY:
         return "look for what the simulator lacks, or widen the box; of a robot on wheels a log tells (`diagnose`)"
-    if finding.fits is False:
-        declared = f" --declared {','.join(finding.declared)}" if finding.declared else ""
+    if fits is False:
+        effects = declared_of(settings.space.names)
+        declared = f" --declared {','.join(effects)}" if effects else ""
         return f"log drives of the target (a model's: `record`) and run `python -m proxytune diagnose LOG{declared}`"
-    if finding.chance.explains:
-        return f"{_more_trials(finding)}, or add agents whose scores differ more"
-    if not finding.fresh:
-        return f"{'' if finding.confirm else 'set confirm = 1 and '}run the study again, to drive the best θ afresh"
-    if finding.perfect:
-        return f"use this θ; to know {plain(finding.least.name)} better, {_say_what_to_add(finding)}"
+    if result.judged.chance.explains:
+        return f"{_more_trials(result)}, or add agents whose scores differ more"
+    if not _is_fresh(result):
+        return f"{'' if settings.confirm else 'set confirm = 1 and '}run the study again, to drive the best θ afresh"
+    if result.perfect:
+        return f"use this θ; to know {plain(_least_known(result).name)} better, {_say_what_to_add(result)}"
     # Where no trial has come into the region yet, starts are not what is missing.
-    return f"{_say_what_to_add(finding) if finding.inside else _more_trials(finding)}, to get closer"
+    return f"{_say_what_to_add(result) if result.inside else _more_trials(result)}, to get closer"
 
 
-def _say_what_to_add(finding: Finding) -> str:
+def _least_known(result: StudyResult) -> KnownParameter:
+    return max(known_parameters(result), key=lambda one: one.share)
+
+
+def _say_what_to_add(result: StudyResult) -> str:
     """Say what to add to learn more of the least known parameter."""
-    if not finding.least.identified:
-        informed = finding.information and finding.information.agents
-        best = f" (so far {informed[0][0]}'s do most)" if informed else ""
-        changes = f"whose scores change with {plain(finding.least.name)}"
-        log = ", or a log for `diagnose`" if finding.declared is not None else ""
-        return f"add an agent or a metric {changes}{best}{log}"
+    settings, least, most_starts = result.study.settings, _least_known(result), result.study.family.starts
+    told = (one for one in result.knowledge.information if one.name == least.name)
+    informed = next((one for one in told if any(share > 0.0 for _, share in one.agents)), None)
+    if not least.identified:
+        best = f" (so far {informed.agents[0][0]}'s do most)" if informed else ""
+        log = ", or a log for `diagnose`" if settings.family == DEFAULT_FAMILY else ""
+        return f"add an agent or a metric whose scores change with {plain(least.name)}{best}{log}"
     # More starts than earlier studies were driven from would leave their trials out.
-    if finding.learnt or finding.information is None or finding.information.limit != "starts":
-        return _more_trials(finding)
-    if finding.starts == finding.most_starts:
-        return f"add agents or metrics: all {finding.starts} starts are driven"
-    more = min(2 * finding.starts, finding.most_starts)
-    return f"raise starts from {finding.starts} to {more} and measure the target from them too"
+    if settings.learn_from or informed is None or informed.limit != "starts":
+        return _more_trials(result)
+    if settings.starts == most_starts:
+        return f"add agents or metrics: all {settings.starts} starts are driven"
+    more = min(2 * settings.starts, most_starts)
+    return f"raise starts from {settings.starts} to {more} and measure the target from them too"
 
 
-def _more_trials(finding: Finding) -> str:
-    more = f"raise budget from {finding.budget} to {2 * finding.budget or 8}"
-    return "loosen the rule under [stop] that ended the search" if finding.ruled else more
-
-
-def finding_of(result: StudyResult) -> Finding:
-    """Gather what the sentence of a study is made of."""
-    settings, learnt, judged = result.study.settings, result.knowledge, result.judged
-    parameters = known_parameters(result)
-    least, own = max(parameters, key=lambda one: one.share).name, float(judged.prpv.value)
-    prpv = result.expected.prpv.value if result.expected else Estimate(own, own, own)
-    return Finding(
-        parameters=parameters,
-        region=learnt.posterior.share,
-        inside=result.inside,
-        prpv=prpv,
-        fresh=judged is not result.best.assessment,
-        floor=result.floor,
-        excess=result.excess,
-        nominal=result.nominal.expected.prpv.value if result.nominal else None,
-        chance=judged.chance,
-        perfect=bool(result.perfect),
-        misfit=learnt.misfit.p_value,
-        fits=learnt.misfit.fits,
-        information=next(
-            (one for one in learnt.information if one.name == least and any(share > 0.0 for _, share in one.agents)),
-            None,
-        ),
-        left=0 if result.stopped else settings.budget - len(result.trials),
-        budget=max(settings.budget, len(result.trials)),
-        ruled=bool(result.stopped) and len(result.trials) < settings.budget,
-        starts=settings.starts,
-        most_starts=result.study.family.starts,
-        confirm=settings.confirm,
-        learnt=bool(settings.learn_from),
-        declared=declared_of(settings.space.names) if settings.family == DEFAULT_FAMILY else None,
-    )
+def _more_trials(result: StudyResult) -> str:
+    done, asked = len(result.trials), result.study.settings.budget
+    if result.stopped and done < asked:
+        return "loosen the rule under [stop] that ended the search"
+    return f"raise budget from {max(asked, done)} to {2 * max(asked, done) or 8}"
 
 
 def known_parameters(result: StudyResult) -> tuple[KnownParameter, ...]:

@@ -21,9 +21,9 @@ from proxytune.logs import Log, read_log
 from proxytune.report import (
     Shown,
     View,
+    figures_of_scores,
     ranking_document,
     score_document,
-    score_figures,
     score_sentence,
     score_view,
 )
@@ -124,7 +124,7 @@ class ScoreReport(Shown, Assessment):
 
     def figures(self) -> dict[str, Figure]:
         """The figures by name: scatter, flipped_pairs and decision."""
-        return score_figures(self)
+        return figures_of_scores(self)
 
     def sequential(self) -> Sequential:
         """Test after each rollout, in the order of the target's table, which agent is the best.

@@ -70,9 +70,9 @@ from .html import Shown as Shown, frame_html as frame_html, write_page as write_
 from .meanings import clause_of as clause_of, findings as findings, what_it_does as what_it_does
 from .plv_search import plv_document as plv_document, plv_text as plv_text, write_plv_report as write_plv_report
 from .scores import (
+    figures_of_scores as figures_of_scores,
     ranking_document as ranking_document,
     score_document as score_document,
-    score_figures as score_figures,
     score_sentence as score_sentence,
     score_text as score_text,
     score_view as score_view,

@@ -138,7 +138,7 @@ def score_view(
     return View(f"Which of {len(assessments)} proxies predicts {target} best?", *said, (*tables, choices, *figures))
 
 
-def score_figures(assessment: Assessment) -> dict[str, Figure]:
+def figures_of_scores(assessment: Assessment) -> dict[str, Figure]:
     """The figures of one proxy, by name."""
     figures = {"scatter": scatter_figure(assessment), "flipped_pairs": flipped_pairs_figure(assessment.prpv)}
     return {**figures, "decision": decision_figure(assessment.decision)}
@@ -150,7 +150,7 @@ def _all_drawn(assessments: Assessments, selection: Selection | None) -> Iterato
     for name, assessment in assessments.items():
         file, whose = ("", "") if selection is None else (f"_{files[name]}", f": {name}")
         many = len(assessment.inputs.agents) > MOST
-        for kind, figure in score_figures(assessment).items():
+        for kind, figure in figures_of_scores(assessment).items():
             rest = REST.get(kind, "") if many else ""
             yield f"{kind}{file}", figure, picture_of("score", kind, figure, whose=whose, rest=rest)
 

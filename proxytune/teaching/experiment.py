@@ -384,7 +384,7 @@ def _predictivity(run: StudyRun, name: str, proxy: Distribution) -> Predictivity
     if evaluation.proxy is None or evaluation.prpv is None:
         return None
     inputs = compare(proxy=evaluation.proxy, target=study.target, metrics=study.settings.metrics)
-    by_chance = chance(proxy=evaluation.proxy, target=study.target, metrics=study.settings.metrics)
+    by_chance = chance(inputs)
     if why_not_repeated(inputs):
         return Predictivity(evaluation.prpv, by_chance, None)
     means = bootstrap_means(inputs, resamples=POSTERIOR_DRAWS, seed=0)

@@ -214,21 +214,20 @@ def assess(
         InputError: If a weight of PPV is missing, unknown, negative or not finite.
     """
     inputs = compare(proxy=proxy, target=target, metrics=metrics)
-    one, other = inputs.proxy, inputs.target
-    error = ppv(proxy=one, target=other, metrics=metrics, beta=beta)
+    error = ppv(inputs, beta)
     repeated = not why_not_repeated(inputs)
     means = bootstrap_means(inputs, resamples=resamples, seed=seed) if repeated else None
     return Assessment(
         inputs=inputs,
-        prpv=prpv(proxy=one, target=other, metrics=metrics),
+        prpv=prpv(inputs),
         prpv_interval=prpv_interval(inputs, means),
         ppv=error,
-        srcc=srcc(proxy=one, target=other, metrics=metrics),
-        kendall_tau=kendall_tau(proxy=one, target=other, metrics=metrics),
-        mmrv=mmrv(proxy=one, target=other, metrics=metrics),
+        srcc=srcc(inputs),
+        kendall_tau=kendall_tau(inputs),
+        mmrv=mmrv(inputs),
         intervals=intervals(inputs=inputs, error=error, means=means),
-        noise_floor=floor or noise_floor(target=other, metrics=metrics, seed=seed),
-        chance=chance(proxy=one, target=other, metrics=metrics, permutations=resamples, seed=seed),
+        noise_floor=floor or noise_floor(target=inputs.target, metrics=metrics, seed=seed),
+        chance=chance(inputs, permutations=resamples, seed=seed),
         seed=seed,
         asked=asked,
     )

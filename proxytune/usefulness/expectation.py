@@ -176,7 +176,7 @@ def expect(
     )
     of_target = _target_donors(sides[0].target) if donors.still else donors
     perfect = _perfect(sides[0], of_target, rng) if len(of_target.first) else None
-    weights = ppv(proxy=fresh[0], target=target, metrics=metrics).beta
+    weights = ppv(sides[0]).beta
     beta = np.array([weights[metric.name] or 0.0 for metric in metrics])
 
     def prpv_of(tables: Floats) -> Floats:

@@ -257,17 +257,11 @@ class Chance:
         return self.p_value >= LEVEL
 
 
-def chance(
-    *, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric], permutations: int = 1000, seed: int = 0
-) -> Chance:
+def chance(inputs: Comparison, *, permutations: int = 1000, seed: int = 0) -> Chance:
     """Permute which agent got which of the proxy's scores; the metrics of one agent stay together.
 
     Of up to seven agents every order is looked at, and none is drawn.
-
-    Raises:
-        ScoresError: If an agent is missing on one side, there are fewer than two, or a metric is unknown.
     """
-    inputs = compare(proxy=proxy, target=target, metrics=metrics)
     in_proxy, on_target = inputs.means
     exact = len(in_proxy) <= MOST_ENUMERATED
     if exact:

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.arrays import Floats, Whole
-from proxytune.scores import ROUNDING, Metric, ScoreTable
-from proxytune.usefulness.comparison import Comparison, compare
+from proxytune.scores import ROUNDING, Metric
+from proxytune.usefulness.comparison import Comparison
 
 FEW_AGENTS = 128
 """Up to so many agents each pair is compared, in many tables at once, which is quicker for them."""
@@ -74,13 +74,8 @@ class Prpv:
         return tuple(FlippedPair(agents[i], agents[j], FLIPS[flip]) for i, j, flip in pairs)
 
 
-def prpv(*, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -> Prpv:
-    """Count how unlike the target the proxy ranks the agents, eqs. (3) and (4) of the paper.
-
-    Raises:
-        ScoresError: If an agent is missing on one side, there are fewer than two, or a metric is unknown.
-    """
-    inputs = compare(proxy=proxy, target=target, metrics=metrics)
+def prpv(inputs: Comparison) -> Prpv:
+    """Count how unlike the target the proxy ranks the agents, eqs. (3) and (4) of the paper."""
     return Prpv(round(float(prpv_of_means(*inputs.means, inputs.metrics))), inputs)
 
 

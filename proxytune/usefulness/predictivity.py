@@ -16,9 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from proxytune.arrays import Floats
 from proxytune.errors import InputError
-from proxytune.scores import ROUNDING, Metric, ScoreTable, varies
+from proxytune.scores import ROUNDING, Metric, varies
 from proxytune.settings import nearest
-from proxytune.usefulness.comparison import Comparison, compare
+from proxytune.usefulness.comparison import Comparison
 from proxytune.usefulness.pairs import FEW_AGENTS, by_table, kendall_of_table, violations_of_table
 
 SMALLEST_SPREAD = 1e-150
@@ -55,27 +55,22 @@ def ppv_of_means(proxy: Floats, target: Floats, weights: Floats) -> Floats:
     return np.asarray((np.abs(proxy - target) @ weights[..., None])[..., 0].mean(axis=-1), dtype=np.float64)
 
 
-def ppv(
-    *, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric], beta: Mapping[str, float] | None = None
-) -> Ppv:
+def ppv(inputs: Comparison, beta: Mapping[str, float] | None = None) -> Ppv:
     """Weigh how far the proxy's scores are from the target's, eq. (2) of the paper.
 
     The definition taken: Σ_m β_m |M_m(proxy) − M_m(target)|, averaged over the agents. Without β each metric weighs
     one over its spread on the target (standard deviation of the agents' means), so that PPV counts standard deviations.
 
     Args:
-        proxy: Scores in the proxy.
-        target: Scores on the target.
-        metrics: Which metrics count; direction and tolerance play no part.
+        inputs: Both sides; direction and tolerance of the metrics play no part.
         beta: A weight for every metric, in one over its unit.
 
     Raises:
-        ScoresError: If an agent is missing on one side, there are fewer than two, or a metric is unknown.
         InputError: If a weight is missing, unknown, negative or not finite.
     """
-    inputs = compare(proxy=proxy, target=target, metrics=metrics)
     weights = _given(inputs, beta) if beta is not None else weights_of_spread(inputs.target.means)
-    named = {m.name: float(weight) if weight > 0 or beta else None for m, weight in zip(metrics, weights, strict=True)}
+    each = zip(inputs.metrics, weights, strict=True)
+    named = {metric.name: float(weight) if weight > 0 or beta else None for metric, weight in each}
     value = float(ppv_of_means(*inputs.means, weights)) if any(w is not None for w in named.values()) else None
     return Ppv(value, named, inputs)
 
@@ -133,16 +128,12 @@ def mmrv_of_means(proxy: Floats, target: Floats, metrics: Sequence[Metric]) -> F
     return np.asarray(costs.max(axis=-2).mean(axis=-2), dtype=np.float64)
 
 
-def mmrv(*, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -> Mmrv:
+def mmrv(inputs: Comparison) -> Mmrv:
     """Average over agents the largest target difference among the pairs that the proxy orders wrongly.
 
     Of two agents that the proxy ties and the target does not, the better one counts as violated, as in SIMPLER's code.
     Source: Li et al., Evaluating Real-World Robot Manipulation Policies in Simulation (2024).
-
-    Raises:
-        ScoresError: If an agent is missing on one side, there are fewer than two, or a metric is unknown.
     """
-    inputs = compare(proxy=proxy, target=target, metrics=metrics)
     values = mmrv_of_means(*inputs.means, inputs.metrics)
     return Mmrv({m.name: float(value) for m, value in zip(inputs.metrics, values, strict=True)}, inputs)
 
@@ -190,23 +181,13 @@ def kendall_of_means(proxy: Floats, target: Floats) -> Floats:
     return np.asarray(concordant / np.sqrt(np.where(pairs > 0, pairs, np.nan)), dtype=np.float64)
 
 
-def srcc(*, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -> Correlation:
-    """Pearson's correlation of mean scores, the sim-to-real correlation coefficient of Kadian et al. (2020).
-
-    Raises:
-        ScoresError: If an agent is missing on one side, there are fewer than two, or a metric is unknown.
-    """
-    inputs = compare(proxy=proxy, target=target, metrics=metrics)
+def srcc(inputs: Comparison) -> Correlation:
+    """Pearson's correlation of mean scores, the sim-to-real correlation coefficient of Kadian et al. (2020)."""
     return _correlation("SRCC", pearson_of_means(*inputs.means), inputs)
 
 
-def kendall_tau(*, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -> Correlation:
-    """Kendall's τ-b of mean scores: how far the orders of the agents agree; tolerances play no part.
-
-    Raises:
-        ScoresError: As in srcc.
-    """
-    inputs = compare(proxy=proxy, target=target, metrics=metrics)
+def kendall_tau(inputs: Comparison) -> Correlation:
+    """Kendall's τ-b of mean scores: how far the orders of the agents agree; tolerances play no part."""
     return _correlation("Kendall's τ", kendall_of_means(*inputs.means), inputs)
 
 

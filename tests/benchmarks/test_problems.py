@@ -17,7 +17,7 @@ from proxytune.search.engine import design_point
 from proxytune.seeds import fresh_seed, target_seed
 from proxytune.storage import Store
 from proxytune.study import StudyRun, measure_agents, open_study, plan_episodes
-from proxytune.usefulness import prpv_of_means
+from proxytune.usefulness import compare, prpv_of_means
 from proxytune.usefulness.pairs import prpv
 
 ANALYTIC, RANKING, CALIBRATED = Analytic(), Ranking(), Calibrated()
@@ -244,7 +244,7 @@ def test_the_score_is_prpv_of_its_episodes_and_what_is_composed_of_its_outcome(s
     values = from_unit(RANKING.space, np.array(unit))
     score = RANKING.score(values, seed)
     tables = {"proxy": RANKING.table(values, seed), "target": RANKING.target(seed)}
-    assert score == prpv(**tables, metrics=METRICS).value == RANKING.score(values, seed)
+    assert score == prpv(compare(**tables, metrics=METRICS)).value == RANKING.score(values, seed)
     outcomes = np.array([RANKING.outcome(values, seed)] * 3).reshape(3, 1, -1)
     assert np.array_equal(RANKING.goal(seed).compose(outcomes), np.full((3, 1), score))
 

@@ -44,7 +44,7 @@ from proxytune.study.answer import (
 from proxytune.study.facts import NOMINAL
 from proxytune.study.run import knowledge_of
 from proxytune.study.settings import StopRules
-from proxytune.usefulness import assess
+from proxytune.usefulness import assess, compare
 from proxytune.usefulness.pairs import prpv
 
 ONE = 6 * 3
@@ -175,7 +175,7 @@ def test_what_is_expected_of_the_answer_is_the_mean_of_repetitions_that_nothing_
         for number in range(2, 2 + count):
             planned = plan_episodes(study.settings, answer.trial.theta, fresh_seed(study.settings.seed, number))
             proxy = score_table(list(study_run.known(planned).values()))
-            scores.append(prpv(proxy=proxy, target=study.target, metrics=study.settings.metrics).value)
+            scores.append(prpv(compare(proxy=proxy, target=study.target, metrics=study.settings.metrics)).value)
     value, low, high = found.expected.prpv.value
     assert value == pytest.approx(sum(scores) / count)
     assert low <= value <= high

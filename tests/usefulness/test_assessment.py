@@ -6,7 +6,7 @@ from score_tables import bootstrap_prpv, ordered, table_of
 
 from proxytune.errors import ScoresError
 from proxytune.scores import Metric, ScoreTable
-from proxytune.usefulness import assess, floor_of_repeats, resampling, select_proxy
+from proxytune.usefulness import assess, compare, floor_of_repeats, resampling, select_proxy
 from proxytune.usefulness.pairs import prpv
 from proxytune.usefulness.predictivity import kendall_tau, mmrv, ppv, srcc
 
@@ -16,10 +16,10 @@ M = (Metric("m"), Metric("n", "min"))
 def test_it_gathers_the_single_measures():
     sides = {"proxy": ordered(1), "target": ordered(2), "metrics": M}
     found = assess(**sides)
-    assert found.prpv.value == prpv(**sides).value == found.prpv_interval.value
-    assert found.ppv.value == ppv(**sides).value
+    assert found.prpv.value == prpv(compare(**sides)).value == found.prpv_interval.value
+    assert found.ppv.value == ppv(compare(**sides)).value
     for name, measure in (("srcc", srcc), ("kendall_tau", kendall_tau), ("mmrv", mmrv)):
-        assert getattr(found, name).value == measure(**sides).value
+        assert getattr(found, name).value == measure(compare(**sides)).value
 
 
 def test_every_measure_has_an_interval_around_it():
@@ -151,7 +151,7 @@ def test_a_good_proxy_beats_a_bad_one_beyond_noise_but_not_its_twin():
 def test_the_ranking_is_by_prpv_and_differences_are_of_prpv():
     proxies = {name: noisy(TRUTH, seed, noise=4.0) for seed, name in enumerate("abcd", 10)}
     selection = select_proxy(proxies=proxies, target=TARGET, metrics=CLEAR)
-    own = {name: prpv(proxy=proxy, target=TARGET, metrics=CLEAR).value for name, proxy in proxies.items()}
+    own = {name: prpv(compare(proxy=proxy, target=TARGET, metrics=CLEAR)).value for name, proxy in proxies.items()}
     assert dict(selection.ranking) == own
     assert [value for _, value in selection.ranking] == sorted(own.values())
     assert len(selection.differences) == 6

@@ -149,10 +149,10 @@ def test_what_cannot_be_asked_is_said(asked, complaint):
 def test_chance_of_up_to_seven_agents_is_exact_and_not_below_one_in_all_orders():
     for agents, orders in ((2, 2), (3, 6), (4, 24), (5, 120), (7, 5040)):
         table = means(["success"], **{f"a{row}": (row / 10,) for row in range(agents)})
-        found = chance(proxy=table, target=table, metrics=SUCCESS)
+        found = chance(compare(proxy=table, target=table, metrics=SUCCESS))
         assert (found.p_value, found.permutations, found.exact) == (pytest.approx(1 / orders), orders, True)
     table = means(["success"], **{f"a{row}": (row / 10,) for row in range(8)})
-    assert not chance(proxy=table, target=table, metrics=SUCCESS).exact
+    assert not chance(compare(proxy=table, target=table, metrics=SUCCESS)).exact
 
 
 def test_mmrv_has_every_published_convention():

@@ -23,7 +23,7 @@ SCORES = Path(__file__).parents[2] / "../shared/data/scores"
 def test_it_agrees_with_all_permutations_of_five_agents():
     proxy, target = np.random.default_rng(0).normal(size=(2, 5, 2))
     every = np.array([prpv_of_means(proxy[list(order)], target, M) for order in permutations(range(5))])
-    result = chance(proxy=of_means(*proxy), target=of_means(*target), metrics=M, permutations=4000)
+    result = chance(compare(proxy=of_means(*proxy), target=of_means(*target), metrics=M), permutations=4000)
     assert result.mean == pytest.approx(every.mean(), abs=0.2)
     assert result.deviation == pytest.approx(every.std(), abs=0.2)
     assert result.p_value == pytest.approx((every <= prpv_of_means(proxy, target, M)).mean(), abs=0.03)
@@ -31,10 +31,10 @@ def test_it_agrees_with_all_permutations_of_five_agents():
 
 def test_a_perfect_proxy_is_hardly_by_chance_and_a_useless_one_is():
     target = np.random.default_rng(2).normal(size=(8, 1)).repeat(2, axis=1)
-    assert chance(proxy=of_means(*target), target=of_means(*target), metrics=M).p_value == pytest.approx(
+    assert chance(compare(proxy=of_means(*target), target=of_means(*target), metrics=M)).p_value == pytest.approx(
         1 / 1001, abs=2e-3
     )
-    assert chance(proxy=of_means(*-target), target=of_means(*target), metrics=M).p_value == 1.0
+    assert chance(compare(proxy=of_means(*-target), target=of_means(*target), metrics=M)).p_value == 1.0
 
 
 def repeated(values, repeats):

@@ -148,7 +148,7 @@ def pairs_of_means(draw):
 
 def test_three_agents_by_hand():
     """Target A > B > C; proxy C > A > B: A–C and B–C are reversed, two each."""
-    result = prpv(proxy=of_means(2, 1, 3), target=of_means(3, 2, 1), metrics=M)
+    result = prpv(compare(proxy=of_means(2, 1, 3), target=of_means(3, 2, 1), metrics=M))
     assert result.value == 4
     assert result.pairs == (FlippedPair("A", "C", "reversed"), FlippedPair("B", "C", "reversed"))
 
@@ -157,7 +157,7 @@ def test_four_agents_and_two_metrics_by_hand():
     """Target: A dominates all, B and C incomparable, both dominate D; proxy: as worked out pair by pair."""
     target = of_means((4, 4), (3, 2), (2, 3), (1, 1))
     proxy = of_means((4, 1), (3, 3), (2, 2), (1, 4))
-    result = prpv(proxy=proxy, target=target, metrics=M2)
+    result = prpv(compare(proxy=proxy, target=target, metrics=M2))
     assert set(result.pairs) == {
         FlippedPair("A", "B", "lost"),
         FlippedPair("A", "C", "lost"),
@@ -171,7 +171,7 @@ def test_four_agents_and_two_metrics_by_hand():
 
 
 def test_a_result_carries_inputs_direction_and_range():
-    result = prpv(proxy=of_means((1, 1), (2, 2)), target=of_means((2, 2), (1, 1)), metrics=M2)
+    result = prpv(compare(proxy=of_means((1, 1), (2, 2)), target=of_means((2, 2), (1, 1)), metrics=M2))
     assert (result.value, result.range, result.better) == (2, (0, 2), "lower")
     assert (result.inputs.agents, result.inputs.target_episodes) == (("A", "B"), (1, 1))
 
@@ -247,7 +247,7 @@ needs_pilot = pytest.mark.skipif(not SCORES.is_dir(), reason="the measured score
 def test_the_pilots_published_figures_come_out_exactly(metrics, published):
     chosen = [Metric.parse(text) for text in metrics.split()]
     tables = read_domains(SCORES / "duckietown_pilot_published_means.csv", [metric.name for metric in chosen])
-    values = [prpv(proxy=tables[name], target=tables["real"], metrics=chosen).value for name in PROXIES]
+    values = [prpv(compare(proxy=tables[name], target=tables["real"], metrics=chosen)).value for name in PROXIES]
     assert values == published
 
 

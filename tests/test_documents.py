@@ -21,7 +21,7 @@ from proxytune.driving import AGENTS, METRICS, UNITS, map_names
 from proxytune.effects import CAR_CATALOGUE, CATALOGUE, GROUPS
 from proxytune.files import shipped
 from proxytune.learning.settings import KEYS as TEACHING_KEYS
-from proxytune.report.diagnosis.notes import MEANINGS
+from proxytune.report.diagnosis.notes import VERDICTS
 from proxytune.search import ENGINES
 from proxytune.settings import read_settings
 from proxytune.starting import STOPPING
@@ -235,7 +235,7 @@ def test_what_every_command_leaves_when_it_is_stopped_is_documented(command):
     assert f"`{command}`" in section(DOCS["how-to/trouble.md"], "When a command is stopped")
 
 
-@pytest.mark.parametrize("verdict", MEANINGS)
+@pytest.mark.parametrize("verdict", VERDICTS)
 def test_every_verdict_of_diagnose_is_documented(verdict):
     assert row_of("explanation/diagnosis.md", verdict)
 

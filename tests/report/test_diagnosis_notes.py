@@ -28,7 +28,7 @@ from proxytune.driving import read_robot
 from proxytune.effects import GROUPS, FittedRange, Learnt, LearntCurve, learnt_theta
 from proxytune.report.diagnosis.document import clocks_document, learnt_document, unlike_document
 from proxytune.report.diagnosis.notes import (
-    MEANINGS,
+    VERDICTS,
     clocks_notes,
     decisive,
     learnt_notes,
@@ -70,9 +70,9 @@ def diagnosis(**changes):
     return SimpleNamespace(**{**plain, **changes})
 
 
-@pytest.mark.parametrize("verdict", MEANINGS)
+@pytest.mark.parametrize("verdict", VERDICTS)
 def test_every_verdict_is_told_with_its_meaning(verdict):
-    assert motion_headline(diagnosis(verdict=verdict)) == f"run: {verdict}: {MEANINGS[verdict]}"
+    assert motion_headline(diagnosis(verdict=verdict)) == f"run: {verdict}: {VERDICTS[verdict]['motion']}"
 
 
 def test_what_was_fitted_stands_beside_what_was_found_before_the_verdict():

@@ -20,7 +20,7 @@ from proxytune.report.diagnosis.document import (
     motion_effects,
 )
 from proxytune.report.diagnosis.figures import motion_figures
-from proxytune.report.diagnosis.notes import motion_headline, motion_notes, next_drives
+from proxytune.report.diagnosis.notes import VERDICTS, motion_headline, motion_notes, next_drives
 from proxytune.report.export.nodes import commands_text, player_text
 from proxytune.report.html import write_page
 from proxytune.report.meanings import findings, fitted
@@ -31,15 +31,6 @@ from proxytune.report.writing import CAPTIONS, picture_of, save_figures, write_t
 
 MOST_TRIED = 8
 """So many effects that were tried are in the table."""
-NEXT_STEPS = {
-    "nothing missing": "use the fitted values: name model.toml as `proxy` in study.toml, or read it with "
-    "`python -m proxytune predict`.",
-    "explained": "name model.toml as `proxy` in study.toml and tune again with `python -m proxytune study`.",
-    "partly explained": "name model.toml as `proxy` in study.toml and tune again; log more varied drives for the rest.",
-    "unexplained": "log more varied drives, or try effects of your own with --effects.",
-    "cannot be told": "drive the same commands several times, and diagnose the log with these drives in it.",
-}
-"""Steps to do after each verdict, where no manoeuvre would tell more."""
 
 
 def write_diagnosis(found: LogDiagnosis, folder: Path, command: str = "") -> list[Path]:
@@ -76,7 +67,7 @@ def diagnosis_view(found: LogDiagnosis, figures: Mapping[str, Drawn]) -> View:
     notes = tuple(f"{note[:1].upper()}{note[1:]}." for note in diagnosis_notes(found))
     paragraphs = [Paragraphs("What else is to be known", notes)] if notes else []
     drives, part = [] if found.motion is None else next_drives(found.motion), found.motion or found.camera
-    next_step = f"{'; '.join(drives)}." if drives else NEXT_STEPS[part.verdict] if part else ""
+    next_step = f"{'; '.join(drives)}." if drives else VERDICTS[part.verdict]["next"] if part else ""
     tables = [table for _, own, _ in _said(found) for table in own]
     title = f"{found.log}: what does the model of {found.robot.name} lack?"
     parts: tuple[Part, ...] = (*diagnosis_pictures(figures), *tables, *paragraphs)

@@ -3,15 +3,9 @@
 from collections.abc import Mapping
 
 from proxytune.diagnosis import Blemish, CameraDiagnosis, CameraEffect, Estimate, LaidLine, LaidMap
-from proxytune.report.diagnosis.notes import told
+from proxytune.report.diagnosis.notes import VERDICTS, told
 from proxytune.report.wording import fixed, listed, short
 
-CAMERA_MEANINGS = {
-    "nothing missing": "the declared camera explains the frames",
-    "explained": "with the effects added, the camera explains the frames",
-    "partly explained": "the effects added explain a part; something fixed to the camera is left over",
-    "unexplained": "something fixed to the camera is left over, and no named effect explains it",
-}
 MOST_LINES = 3
 """So many lines of the map are told, the farthest from their places first."""
 WIDER_M = 0.002
@@ -24,7 +18,8 @@ RELATIVE = (
 
 def camera_headline(log: str, diagnosis: CameraDiagnosis, found: str = "", beside: str = "") -> str:
     """What was found and fitted of the camera, then the verdict and what it means."""
-    return f"{log}: camera: {told(found, beside, diagnosis.verdict)}: {CAMERA_MEANINGS[diagnosis.verdict]}"
+    meaning = VERDICTS[diagnosis.verdict]["camera"]
+    return f"{log}: camera: {told(found, beside, diagnosis.verdict)}: {meaning}"
 
 
 def camera_notes(diagnosis: CameraDiagnosis) -> list[str]:

@@ -1,5 +1,6 @@
 """Sentences of a diagnosis of motion: each effect and its worth, what is left, clocks, what to drive next."""
 
+import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -8,23 +9,18 @@ import numpy as np
 from proxytune.diagnosis import AdoptedEffect, Clocks, Diagnosis, EffectSize, Learning, Offset, Ratio, RobotClusters
 from proxytune.effects import PLACE, learnt_effect
 from proxytune.report.wording import fixed, listed, percent
+from proxytune.report.writing import fill
 from proxytune.space import Theta
 
-MEANINGS = {
-    "nothing missing": "only noise is left",
-    "explained": "with the effects added, only noise is left",
-    "partly explained": "the effects added explain a part; more than noise is left, and no named effect explains it",
-    "unexplained": "something is missing, and no named effect explains it",
-    "cannot be told": "the error is larger than the noise of the poses but shows no structure; how far two drives "
-    "from the same commands differ is not known",
-}
+VERDICTS: Mapping[str, Mapping[str, str]] = tomllib.loads(fill("verdicts.toml"))
+"""What each verdict means, of motion and of the camera, and the next step."""
 AMPLE = 30.0
 """Log-likelihood gain [nats] in a minute above which one minute surely decides."""
 
 
 def motion_headline(diagnosis: Diagnosis, found: str = "", beside: str = "") -> str:
     """What was found and fitted, in the words of `meanings`, then the verdict and what it means."""
-    meaning = MEANINGS[diagnosis.verdict]
+    meaning = VERDICTS[diagnosis.verdict]["motion"]
     if diagnosis.edges:
         end = f"{listed(diagnosis.edges)} at the end of the range"
         rest = "" if diagnosis.verdict == "partly explained" else f"; {meaning}"

@@ -11,14 +11,10 @@ from proxytune.report.study.page import study_foot
 from proxytune.report.text import file_texts, group_texts, table_text
 from proxytune.report.view import Column, Table, View, columns_of
 from proxytune.report.wording import listed, percent, plain, short, with_unit
+from proxytune.report.writing import ABOUT
 from proxytune.study import WITHIN, Bank, settings_document
 
 MOST_NAMED = 3
-MEANING = (
-    "Some trials were taken for a target in turn, with a new placement's noise, and told from the others: ± "
-    "is half of the 95 % interval, on average. The starts needed bring it to a thirtieth of the box; where that is "
-    "not by starts, more of them would not, but other agents may."
-)
 
 
 def bank_sentence(bank: Bank) -> str:
@@ -69,7 +65,7 @@ def bank_table(bank: Bank) -> Table:
     heads = [f"by {count} start{'s' if count > 1 else ''}" for count in bank.expected]
     who = map(Column, ("agents that tell", "metrics that tell"))
     columns = (*columns_of(("parameter",), (*heads, "starts needed")), *who)
-    return Table("What a target would tell", columns, tuple(rows), (MEANING,))
+    return Table("What a target would tell", columns, tuple(rows), (ABOUT["bank"],))
 
 
 def bank_text(bank: Bank, files: Mapping[str, Any]) -> Group:

@@ -12,13 +12,13 @@ from rich.console import Group
 
 from proxytune.report.figure_style import BLUE, COLUMN, VERMILLION, dress, legend_below
 from proxytune.report.scores import differences_document, ends_document
-from proxytune.report.study.document import intervals_document
+from proxytune.report.study.document import estimate_document, intervals_document
 from proxytune.report.study.sentence import KnownParameter, known_parameters
-from proxytune.report.teaching import UNKNOWN, count, estimate_document
+from proxytune.report.teaching import UNKNOWN, count
 from proxytune.report.text import file_texts, group_texts, note_texts, section_text
 from proxytune.report.view import Paragraphs, Table, View, columns_of
 from proxytune.report.wording import fixed, in_pairs, listed, short, span
-from proxytune.report.writing import picture_of
+from proxytune.report.writing import ABOUT, picture_of
 from proxytune.study import BestFamilies, ComparedFamilies, Lesson, TunedFamily, settings_document
 from proxytune.usefulness import Assessment, Difference
 
@@ -233,21 +233,9 @@ def families_view(compared: ComparedFamilies, figure: Figure) -> View:
         figure: The PNG.
     """
     settings = compared.settings
-    taught = (
-        "PLV, the proxy learning value, counts the target samples that a learner saves by learning in the family at "
-        "its best θ first.",
-    )
-    meanings = (
-        f"Each family was tuned until the episodes of its trials had taken {settings.stop.wall_time_s:g} s: the last "
-        "trial may take it beyond. Pre-flight and fresh episodes come on top, and so does the search itself. Intervals "
-        "are of the θ found: another seed may find another.",
-        "PRPV, the proxy relative predictivity value, counts on how many ordered pairs of the "
-        f"{len(settings.agents)} agents family and target disagree which is the better, in episodes that no search has "
-        "seen. The intervals of its differences hold for all pairs of families at once.",
-        *(taught if settings.teaching else ()),
-        "Time per episode is of the episodes at the best θ, every agent from every start, on this machine as busy as "
-        "it was then.",
-    )
+    told = ("tuned", "predicts", *(("teaches",) if settings.teaching else ()), "costs")
+    seconds, agents = settings.stop.wall_time_s, len(settings.agents)
+    meanings = tuple(ABOUT[f"families_{name}"].format(seconds=seconds, agents=agents) for name in told)
     homes = ((one.name, one.result.study.settings.home) for one in compared.families)
     pages = tuple(f"[{name}]({os.path.relpath(home, settings.home)}/report.html)" for name, home in homes)
     parts = (

@@ -1,6 +1,7 @@
 """Style that figures share: colours, axes, legends, and names of lines beside their ends."""
 
 from collections.abc import Collection, Iterable, Sequence
+from math import ceil
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,6 +29,25 @@ COLUMN = 85.0 / 25.4
 """Width in inches of a figure that is to be read at 85 mm, one column of a paper."""
 CHARACTERS_PER_INCH, HANDLE = 19, 8
 """Characters of a legend that fit into an inch, and the space that a line beside them takes, in characters."""
+
+
+def panel_grid(count: int, height: float, rest: float, **shared: bool) -> tuple[Figure, list[Axes]]:
+    """A figure of so many panels, two in a row, each so high, with so much for all else [inch]; and the panels."""
+    rows, columns = ceil(count / 2), min(2, count)
+    figure = Figure(figsize=(COLUMN, height * rows + rest), layout="constrained")
+    panels = figure.subplots(rows, columns, squeeze=False, **shared).ravel()
+    for axes in panels[count:]:
+        axes.set_visible(False)
+    return figure, list(panels[:count])
+
+
+def draw_noise_floor(axes: Axes, floor: NoiseFloor, label: str = "") -> bool:
+    """The noise floor, if there is one, as a line with the band of its interval; tells whether there is."""
+    if floor.value is None or floor.low is None or floor.high is None:
+        return False
+    axes.axhspan(floor.low, floor.high, color=GREEN, alpha=0.15, linewidth=0)
+    axes.axhline(floor.value, color=GREEN, linewidth=1.0, linestyle="--", label=label or floor_name(floor))
+    return True
 
 
 def floor_name(floor: NoiseFloor) -> str:

@@ -1,7 +1,6 @@
 """A fleet: θ of each robot and p(θ) over them, as sentence, tables, figure, page and JSON document."""
 
 from collections.abc import Mapping
-from math import ceil
 from typing import Any
 
 from matplotlib.axes import Axes
@@ -9,12 +8,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from rich.console import Group
 
-from proxytune.report.figure_style import BLUE, COLUMN, GREEN, LIGHT_GREY, VERMILLION, dress, legend_below
+from proxytune.report.figure_style import BLUE, GREEN, LIGHT_GREY, VERMILLION, dress, legend_below, panel_grid
 from proxytune.report.study.document import estimate_document, intervals_document
 from proxytune.report.text import file_texts, group_texts, section_text
 from proxytune.report.view import Drawn, Paragraphs, Table, View, columns_of
 from proxytune.report.wording import digits, fixed, listed, percent, plain, probability, span, with_unit
-from proxytune.report.writing import picture_of
+from proxytune.report.writing import ABOUT, picture_of
 from proxytune.study import FEW, Fleet
 from proxytune.usefulness import Estimate
 
@@ -22,11 +21,6 @@ MOST_NAMED = 40
 """More robots than this are not named beside their lines."""
 NAME = 14
 """Characters of a robot's name beside its line."""
-MEANING = (
-    "The standard deviation is between robots, with what measurement adds taken out; where robots differ no more than "
-    "measurements of one would, they may all be the same in it. “95 % of robots” holds a robot that has not been "
-    "measured, and allows for how little so many robots tell of mean and spread."
-)
 OWN, GIVEN = "θ of each robot by its own scores", "θ of each robot given the fleet"
 
 
@@ -92,7 +86,9 @@ def fleet_tables(fleet: Fleet) -> tuple[Table, ...]:
         for name, next_one in fleet.next_robot.items()
     )
     columns = ("mean", "standard deviation", "95 % of robots", "robots differ")
-    population = Table(f"p(θ) over {len(fleet.fitting)} robots", columns_of(("parameter",), columns), rows, (MEANING,))
+    population = Table(
+        f"p(θ) over {len(fleet.fitting)} robots", columns_of(("parameter",), columns), rows, (ABOUT["fleet"],)
+    )
     given = tuple((name, *map(_told, told.values())) for name, told in fleet.given.items())
     return population, by_robot, Table(GIVEN, columns_of(("robot",), [*heads.values()]), given)
 
@@ -170,19 +166,13 @@ def fleet_document(fleet: Fleet) -> dict[str, Any]:
 def fleet_figure(fleet: Fleet) -> Figure:
     """Draw each robot's intervals and the population, a panel a parameter."""
     intervals, robots = fleet.settings.space.intervals, fleet.robots
-    columns = min(2, len(intervals))
-    rows = ceil(len(intervals) / columns)
-    figure = Figure(figsize=(COLUMN, rows * (0.7 + 0.1 * max(4, len(robots))) + 0.3), layout="constrained")
-    panels = figure.subplots(rows, columns, sharey=True, squeeze=False)
-    for row, axes in enumerate(panels.ravel()):
-        if row < len(intervals):
-            _draw(axes, fleet, row)
-        else:
-            axes.set_visible(False)
+    figure, panels = panel_grid(len(intervals), 0.7 + 0.1 * max(4, len(robots)), 0.3, sharey=True)
+    for row, axes in enumerate(panels):
+        _draw(axes, fleet, row)
     names = [robot.name if len(robot.name) <= NAME else f"{robot.name[: NAME - 1]}…" for robot in robots]
-    panels[0, 0].set_ylim(len(robots) - 0.5, -0.5)
-    panels[0, 0].set_yticks(range(len(robots)), names) if len(robots) <= MOST_NAMED else panels[0, 0].set_yticks([])
-    legend_below(figure, *panels.ravel()[: len(intervals)])
+    panels[0].set_ylim(len(robots) - 0.5, -0.5)
+    panels[0].set_yticks(range(len(robots)), names) if len(robots) <= MOST_NAMED else panels[0].set_yticks([])
+    legend_below(figure, *panels)
     return figure
 
 
@@ -194,23 +184,11 @@ def _draw(axes: Axes, fleet: Fleet, row: int) -> None:
         axes.axvline(mean, color=GREEN, linewidth=1.0, linestyle="--")
     for place, robot in enumerate(fleet.robots):
         label, colour = ("own scores (95 %)", LIGHT_GREY) if robot.fits else ("misfit, left out", VERMILLION)
-        axes.plot(
-            robot.knowledge.intervals[box.name],
-            [place, place],
-            color=colour,
-            linewidth=1.6,
-            solid_capstyle="butt",
-            label=label,
-        )
+        ends = robot.knowledge.intervals[box.name]
+        axes.plot(ends, [place, place], color=colour, linewidth=1.6, solid_capstyle="butt", label=label)
         if robot.name in fleet.given:
-            axes.plot(
-                fleet.given[robot.name][box.name].value,
-                place,
-                "o",
-                color=BLUE,
-                markersize=2.5,
-                label="given the fleet",
-            )
+            given = fleet.given[robot.name][box.name].value
+            axes.plot(given, place, "o", color=BLUE, markersize=2.5, label="given the fleet")
     axes.set_xlim(box.low, box.high)
     axes.xaxis.set_major_locator(MaxNLocator(3))
     dress(axes, with_unit(box.name, fleet.units[box.name]))

@@ -14,6 +14,7 @@ from rich.text import Text
 from proxytune.learning import Distribution, describe_distribution
 from proxytune.report.figure_style import BLUE, COLUMN, GREY, VERMILLION, LineName, dress, legend_below, name_lines
 from proxytune.report.html import write_page
+from proxytune.report.study.document import estimate_document
 from proxytune.report.study.page import study_foot
 from proxytune.report.teaching import (
     CONVERGED,
@@ -21,7 +22,6 @@ from proxytune.report.teaching import (
     UNKNOWN,
     count,
     distribution_document,
-    estimate_document,
     one_decimal,
     say_more_of_it,
 )

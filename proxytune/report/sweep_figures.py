@@ -17,8 +17,8 @@ from proxytune.report.figure_style import (
     ORANGE,
     PURPLE,
     VERMILLION,
+    draw_noise_floor,
     dress,
-    floor_name,
     legend_below,
     mark_truth,
     named_handles,
@@ -181,10 +181,7 @@ def draw_prpv_and_ppv(prpv: Axes, ppv: Axes, curve: SweepCurve) -> None:
 
 def draw_levels(axes: Axes, found: Sequence[Assessment]) -> None:
     """The noise floor by its kind, and chance: its mean, since it varies a little with the proxy's own order."""
-    floor = found[0].noise_floor
-    if floor.value is not None and floor.low is not None and floor.high is not None:
-        axes.axhspan(floor.low, floor.high, color=GREEN, alpha=0.15, linewidth=0)
-        axes.axhline(floor.value, color=GREEN, linewidth=1.0, linestyle="--", label=floor_name(floor))
+    draw_noise_floor(axes, found[0].noise_floor)
     chance = float(np.mean([assessment.chance.mean for assessment in found]))
     axes.axhline(chance, color="0.45", linewidth=1.0, linestyle=":", label="chance")
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, astuple, replace
-from math import ceil
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +11,8 @@ from rich.console import Group
 
 from proxytune.arrays import Floats
 from proxytune.learning import LEVELS, NONE, Costs, Distribution, LearningCurve, LearningEstimate, doublings
-from proxytune.report.figure_style import BLUE, COLUMN, GREY, dress, legend_below
+from proxytune.report.figure_style import BLUE, GREY, dress, legend_below, panel_grid
+from proxytune.report.study.document import estimate_document
 from proxytune.report.text import file_texts, group_texts, table_text
 from proxytune.report.view import Drawn, Paragraphs, Part, Table, View, columns_of
 from proxytune.report.wording import fixed, listed, percent, short, span
@@ -286,11 +286,6 @@ def distribution_document(proxy: Distribution) -> dict[str, Any]:
     return {name: low if low == high else [low, high] for name, (low, high) in proxy.bounds.items()}
 
 
-def estimate_document(figure: LearningEstimate | None) -> dict[str, Any] | None:
-    """A figure with its interval; None where it was not to be had."""
-    return None if figure is None else {"value": figure.value, "interval": [figure.low, figure.high]}
-
-
 def _curve_document(curve: LearningCurve) -> dict[str, Any]:
     scores = [[None if score != score else score for score in row] for row in curve.scores.tolist()]
     return {"target_samples": list(curve.counts), "scores": scores, "examinations": len(curve.examined)}
@@ -310,9 +305,6 @@ def _settings_document(experiment: Experiment) -> dict[str, Any]:
     }
 
 
-PANELS = 2
-
-
 class _Look(NamedTuple):
     label: str
     colour: str
@@ -329,21 +321,16 @@ def teach_figure(experiment: Experiment) -> Figure:
     Above the dotted line a learner counts as converged; the bar on it says how many samples that takes.
     """
     lessons = experiment.teachers
-    columns = min(PANELS, len(lessons))
-    rows = ceil(len(lessons) / columns)
-    figure = Figure(figsize=(COLUMN, 1.25 * rows + 0.6), layout="constrained")
-    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
-    for axes, lesson in zip(panels, lessons, strict=False):
+    figure, panels = panel_grid(len(lessons), 1.25, 0.6, sharex=True, sharey=True)
+    for axes, lesson in zip(panels, lessons, strict=True):
         _draw_panel(axes, experiment, lesson)
-    for axes in panels[len(lessons) :]:
-        axes.set_visible(False)
-    for axes in panels[max(0, len(lessons) - columns) : len(lessons)]:
+    for axes in panels[-2:]:
         # Also where the panel below, which would have them, is empty.
         axes.tick_params(labelbottom=True)
         axes.set_xlabel("target samples", fontsize=8)
-    for axes in panels[: len(lessons) : columns]:
+    for axes in panels[::2]:
         axes.set_ylabel("score [s]", fontsize=8)
-    legend_below(figure, *panels[: len(lessons)])
+    legend_below(figure, *panels)
     return figure
 
 

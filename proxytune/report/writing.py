@@ -32,6 +32,8 @@ UNDATED: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDa
 fill = partial(fill_template, "report")
 CAPTIONS: Mapping[str, Mapping[str, Mapping[str, str]]] = tomllib.loads(fill("captions.toml"))
 """Title and caption of each figure, by its subject."""
+ABOUT: Mapping[str, str] = tomllib.loads(fill("about.toml"))
+"""What the numbers on a page are, by its subject."""
 _beside: ContextVar[tuple[str, ...]] = ContextVar("beside", default=())
 
 

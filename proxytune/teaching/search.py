@@ -62,14 +62,6 @@ CLOSER = 2
 """A finalist gets so many times the examinations of a trial, where these are chosen."""
 
 
-@dataclass(frozen=True)
-class TaughtFinalists:
-    """The finalists taught anew under fresh seeds beside the learner without a proxy, and why others cannot teach."""
-
-    experiment: Experiment
-    unable: Mapping[str, str]
-
-
 def finalists(
     setup: TeachingSetup, settings: StudySettings, space: Space, trials: Sequence[Trial], by_prpv: Theta | None
 ) -> dict[str, Distribution]:
@@ -111,15 +103,15 @@ def _closer(taught: TeachingSettings) -> TeachingSettings:
 
 def teach_finalists(
     settings: StudySettings, setup: TeachingSetup, named: Mapping[str, Distribution], watcher: Watcher
-) -> TaughtFinalists:
-    """Teach the finalists and the learner without a proxy under fresh seeds."""
+) -> tuple[Experiment, dict[str, str]]:
+    """Teach the finalists and the learner without a proxy under fresh seeds; gives why others cannot teach, by name."""
     taught = _closer(setup.settings)
     fresh = replace(setup, seed=fresh_seed(setup.seed, 1), settings=taught)
     unable = {name: reason for name, proxy in named.items() if (reason := _why_unable(fresh, name, proxy))}
     able = {name: proxy for name, proxy in named.items() if name not in unable}
     fresh = replace(fresh, settings=replace(taught, proxies=able))
     scores = examine_curves(fresh, {NONE: None, **able}, settings.jobs, watcher)
-    return TaughtFinalists(judge_curves(settings, fresh, curves_of(taught.target_samples, scores)), unable)
+    return judge_curves(settings, fresh, curves_of(taught.target_samples, scores)), unable
 
 
 def _why_unable(setup: TeachingSetup, name: str, proxy: Distribution) -> str:
@@ -280,11 +272,10 @@ class PlvSearch:
         self.watcher.begin("learning", count_examinations(taught, tried.done))
         Search(self.space, proposer, settings.seed, taught.budget, settings.initial, settings.batch).run(tried)
         named = finalists(self.setup, settings, self.space, tried.trials(), by_prpv)
-        last = teach_finalists(settings, self.setup, named, self.watcher)
+        confirmed, unable = teach_finalists(settings, self.setup, named, self.watcher)
         trials, ended = tuple(tried.tried()), tried.ended()
-        return PlvStudy(
-            settings, self.space, needs.curves[NONE], needs.when, trials, ended, last.experiment, last.unable
-        )
+        without, when = needs.curves[NONE], needs.when
+        return PlvStudy(settings, self.space, without, when, trials, ended, confirmed, unable)
 
     def facts(self) -> dict[str, Any]:
         """All that a trial depends on; if it changes, trials lose their meaning."""

@@ -76,7 +76,7 @@ def test_finalists_are_taught_with_lessons_and_examinations_that_the_search_has_
     }
     examine_curves(setup, {NONE: None, **named}, 1, Silent())
     before = set(journal.read_text().splitlines())
-    found = teach_finalists(settings, setup, named, Silent()).experiment
+    found, _ = teach_finalists(settings, setup, named, Silent())
     after = journal.read_text().splitlines()[len(before) :]
     assert not before & {line for line in after if line.startswith("exam")} - before
     assert best_teacher(found).name == "right"
@@ -98,11 +98,11 @@ def test_a_finalist_whose_expert_cannot_drive_is_left_out_with_the_reason(make_s
     settings = read_study_settings(folder)
     setup = load_setup(settings)
     other = load_setup(read_study_settings(make_taught(make_study, called="blocked", domain={"blocked": "0.9"})))
-    found = teach_finalists(
+    found, unable = teach_finalists(
         settings, replace(setup, proxy=other.proxy), {"right": Distribution({"trim": (0.12, 0.12)})}, Silent()
     )
-    assert found.experiment.teachers == ()
-    assert found.unable["right"].startswith("right: the expert cannot drive here")
+    assert found.teachers == ()
+    assert unable["right"].startswith("right: the expert cannot drive here")
 
 
 SEARCH_BOX = {"trim": "[-0.3, 0.3]"}

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from proxytune.learning import LearningEstimate
 from proxytune.report.scores import score_document
 from proxytune.report.study.sentence import study_sentence
 from proxytune.report.wording import Ends
@@ -79,9 +80,9 @@ def _worth(result: StudyResult) -> dict[str, Any]:
     }
 
 
-def estimate_document(found: Estimate | None) -> dict[str, Any] | None:
+def estimate_document(found: Estimate | LearningEstimate | None) -> dict[str, Any] | None:
     """A figure with its interval; None where it is not known."""
-    return found and {"value": found.value, "interval": [found.low, found.high]}
+    return None if found is None else {"value": found.value, "interval": [found.low, found.high]}
 
 
 def _fresh(confirmation: Confirmation | None, *, by_prpv: bool) -> dict[str, Any] | None:

@@ -1,7 +1,6 @@
 """Figures of a study: how the answer improved, what is left of each parameter, where the trials were, what matters."""
 
 from collections.abc import Sequence
-from math import ceil
 from textwrap import fill
 
 import numpy as np
@@ -23,12 +22,14 @@ from proxytune.report.figure_style import (
     SHADES,
     VERMILLION,
     LineName,
+    draw_noise_floor,
     dress,
     floor_name,
     legend_below,
     mark_truth,
     name_lines,
     named_handles,
+    panel_grid,
 )
 from proxytune.report.wording import fixed, plain, span, with_unit
 from proxytune.study import PRPV, StudyResult
@@ -69,11 +70,8 @@ def _draw_levels(axes: Axes, result: StudyResult) -> list[LineName]:
     chance, floor = result.judged.chance, result.floor
     named = [LineName(f"chance\n{chance.mean:.1f}", GREY, chance.mean)]
     axes.axhline(chance.mean, color=GREY, linewidth=1.0, linestyle=":", label=named[0].words)
-    if floor.value is not None and floor.low is not None and floor.high is not None:
-        axes.axhspan(floor.low, floor.high, color=GREEN, alpha=0.15, linewidth=0)
-        named.append(LineName(f"{floor_name(floor)}\n{floor.value:.1f}", GREEN, floor.value))
-        axes.axhline(floor.value, color=GREEN, linewidth=1.0, linestyle="--", label=named[-1].words)
-    return named
+    known = LineName(f"{floor_name(floor)}\n{floor.value or 0.0:.1f}", GREEN, floor.value or 0.0)
+    return [*named, known] if draw_noise_floor(axes, floor, known.words) else named
 
 
 def _draw_trials(axes: Axes, result: StudyResult) -> None:
@@ -121,7 +119,6 @@ def _draw_fresh(axes: Axes, result: StudyResult) -> None:
         )
 
 
-COLUMNS = 2
 BINS = 60
 """Bins of a parameter's histogram, over the part of its range that counts."""
 SMOOTH_PROFILE = 0.5
@@ -135,17 +132,12 @@ def profiles_figure(result: StudyResult) -> Figure:
     is the θ that made the target, where that is known.
     """
     intervals = result.study.settings.space.intervals
-    columns = min(COLUMNS, len(intervals))
-    rows = ceil(len(intervals) / columns)
-    figure = Figure(figsize=(COLUMN, 1.3 * rows + 0.45), layout="constrained")
-    panels = figure.subplots(rows, columns, squeeze=False)
-    for place in range(len(intervals)):
-        _draw_profile(panels.ravel()[place], result, place)
-    for axes in panels.ravel()[len(intervals) :]:
-        axes.set_visible(False)
-    for axes in panels[:, 0]:
+    figure, panels = panel_grid(len(intervals), 1.3, 0.45)
+    for place, axes in enumerate(panels):
+        _draw_profile(axes, result, place)
+    for axes in panels[::2]:
         axes.set_ylabel("probability", fontsize=8)
-    legend_below(figure, *panels.ravel()[: len(intervals)])
+    legend_below(figure, *panels)
     return figure
 
 

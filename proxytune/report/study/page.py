@@ -13,16 +13,10 @@ from proxytune.report.study.sentence import say_answer, say_next_step
 from proxytune.report.study.tables import INFORMATION, MEASURES, SEARCH, THETA, USEFULNESS, study_tables, trials_table
 from proxytune.report.view import Drawn, Foot, Paragraphs, Part, Picture, View, foot_of
 from proxytune.report.wording import short
-from proxytune.report.writing import picture_of
+from proxytune.report.writing import ABOUT, picture_of
 from proxytune.storage import TrialRecord
 from proxytune.study import LEARNING, StudyResult, StudySettings
 
-MEANING = (
-    "PRPV, the proxy relative predictivity value, counts on how many ordered pairs of the {} agents proxy and target "
-    "disagree which is the better. The best θ is the most probable of those whose PRPV, by all trials and fresh "
-    "episodes, cannot be told from the lowest. The 95 % interval holds the values that agree with every agent's every "
-    "metric on the target; “by PRPV alone” those whose PRPV is as low as the best, within noise."
-)
 RENEW_S = 5
 WAIT = "wait for the end, which brings intervals and figures; `python -m proxytune plot` draws them as of now."
 CONTINUE = "run the same command to continue: everything finished is kept."
@@ -46,7 +40,7 @@ def study_view(result: StudyResult, figures: Mapping[str, Drawn]) -> View:
         drawn.get("importance"),
         drawn.get("evaluations"),
         tables[SEARCH],
-        Paragraphs("What PRPV and the intervals are", (MEANING.format(len(settings.agents)),)),
+        Paragraphs("What PRPV and the intervals are", (ABOUT["study"].format(agents=len(settings.agents)),)),
         trials_table(result.trials, settings.space.names),
     )
     present: tuple[Part, ...] = tuple(part for part in parts if part is not None)

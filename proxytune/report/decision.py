@@ -203,21 +203,6 @@ def decision_document(assessment: Assessment) -> dict[str, Any]:
     }
 
 
-def choices_document(selection: Selection) -> list[dict[str, Any]]:
-    """What choosing by one proxy instead of another saves on the target, as plain JSON."""
-    return [
-        {
-            "better": one.better,
-            "worse": one.worse,
-            "difference": one.value,
-            "interval": list(one.interval) if one.interval else None,
-            "beyond_noise": one.beyond_noise,
-            "on": one.on,
-        }
-        for one in selection.choices
-    ]
-
-
 def together_document(both: Together) -> dict[str, Any]:
     """What the two best proxies save together, and the agent to deploy then, as plain JSON."""
     return {
@@ -237,7 +222,7 @@ def choices_sentences(assessments: Mapping[str, Assessment], selection: Selectio
     for choice in selection.choices:
         if choice.value > 0.0 or choice.on == "rollouts":
             told = {True: "beyond noise", False: "not beyond noise", None: "noise not known"}[choice.beyond_noise]
-            gain = with_span(short(choice.value, 2), *(choice.interval or (None, None)))
+            gain = with_span(short(choice.value, 2), choice.low, choice.high)
             if choice.on == "rollouts":
                 lines.append(f"{choice.better} saves {gain} real rollouts of an agent more than {choice.worse}, {told}")
             else:

@@ -264,7 +264,7 @@ def families_document(compared: ComparedFamilies) -> dict[str, Any]:
             one.name: {**_family_document(one, costs[one.name]), **_lesson_document(compared.lessons.get(one.name))}
             for one in compared.families
         },
-        "differences": differences_document(compared.selection),
+        "differences": differences_document(compared.selection.differences if compared.selection else ()),
         "settings": dict(settings_document(compared.settings)),
     }
 

@@ -8,7 +8,6 @@ from matplotlib.figure import Figure
 from rich.console import Group
 
 from proxytune.report.decision import (
-    choices_document,
     choices_sentences,
     decision_document,
     decision_figure,
@@ -23,7 +22,18 @@ from proxytune.report.text import group_texts, note_texts, table_text
 from proxytune.report.view import Column, Foot, Paragraphs, Picture, Table, View, columns_of
 from proxytune.report.wording import listed, short, short_span, with_span
 from proxytune.report.writing import file_names, picture_of, save_figures, write_text
-from proxytune.usefulness import ALL, MEASURES, PPV, PRPV, Assessment, Measure, Measured, Selection, SuccessRates
+from proxytune.usefulness import (
+    ALL,
+    MEASURES,
+    PPV,
+    PRPV,
+    Assessment,
+    Difference,
+    Measure,
+    Measured,
+    Selection,
+    SuccessRates,
+)
 
 Row = tuple[str, str, str, str, str]
 Assessments = Mapping[str, Assessment]
@@ -339,25 +349,26 @@ def ranking_document(assessments: Assessments, selection: Selection) -> dict[str
     ranked = enumerate(selection.ranking, start=1)
     return {
         "proxies": [{"proxy": name, "rank": rank, **score_document(assessments[name])} for rank, (name, _) in ranked],
-        "differences": differences_document(selection),
-        "choices": choices_document(selection),
+        "differences": differences_document(selection.differences),
+        "choices": differences_document(selection.choices),
         "together": together_document(selection.together) if selection.together else None,
         "cautions": list(dict.fromkeys(line for one in assessments.values() for line in one.cautions)),
         "notes": [f"no intervals of the differences: {selection.reason}"] if selection.reason else [],
     }
 
 
-def differences_document(selection: Selection | None) -> list[dict[str, Any]]:
-    """Differences of every two, the better first; the intervals hold for all at once."""
+def differences_document(differences: Sequence[Difference]) -> list[dict[str, Any]]:
+    """Differences of every two, the better first; by what else than PRPV one is better is told too."""
     return [
         {
-            "better": pair.better,
-            "worse": pair.worse,
-            "difference": pair.value,
-            "interval": ends_document(pair.low, pair.high),
-            "beyond_noise": pair.beyond_noise,
+            "better": one.better,
+            "worse": one.worse,
+            "difference": one.value,
+            "interval": ends_document(one.low, one.high),
+            "beyond_noise": one.beyond_noise,
+            **({"on": one.on} if one.on != "prpv" else {}),
         }
-        for pair in (selection.differences if selection else ())
+        for one in differences
     ]
 
 

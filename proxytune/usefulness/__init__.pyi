@@ -5,7 +5,6 @@ from .assessment import (
     PAIRED as PAIRED,
     PERFECT as PERFECT,
     Assessment as Assessment,
-    Difference as Difference,
     Selection as Selection,
     assess as assess,
     assess_each as assess_each,
@@ -33,6 +32,7 @@ from .comparison import (
 from .decision import (
     Asked as Asked,
     Decision as Decision,
+    Difference as Difference,
     Panel as Panel,
     Together as Together,
     chosen as chosen,

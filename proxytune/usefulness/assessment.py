@@ -22,8 +22,8 @@ from proxytune.usefulness.comparison import Comparison, compare
 from proxytune.usefulness.decision import (
     ASKED,
     Asked,
-    Choice,
     Decision,
+    Difference,
     Together,
     chosen,
     compare_choices,
@@ -243,30 +243,6 @@ def _scope(assessment: Assessment) -> list[str]:
 
 
 @dataclass(frozen=True)
-class Difference:
-    """The lead of one proxy over another.
-
-    Attributes:
-        better: The proxy with the lower PRPV.
-        worse: The other.
-        value: PRPV of the worse less PRPV of the better.
-        low: Lower end of its interval; None if episodes are too few.
-        high: Upper end of its interval; None if episodes are too few.
-    """
-
-    better: str
-    worse: str
-    value: int
-    low: float | None
-    high: float | None
-
-    @property
-    def beyond_noise(self) -> bool | None:
-        """True if the interval leaves out zero; None if there is none."""
-        return None if self.low is None else self.low > 0
-
-
-@dataclass(frozen=True)
 class Selection:
     """Proxies ranked by PRPV.
 
@@ -283,7 +259,7 @@ class Selection:
     differences: tuple[Difference, ...]
     reason: str = ""
     confidence: float = CONFIDENCE
-    choices: tuple[Choice, ...] = ()
+    choices: tuple[Difference, ...] = ()
     together: Together | None = None
 
 

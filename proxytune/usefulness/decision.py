@@ -385,25 +385,32 @@ def _means(
 
 
 @dataclass(frozen=True)
-class Choice:
-    """What choosing by one proxy instead of another is worth, on the target or in real rollouts, as `on` says.
+class Difference:
+    """The lead of one proxy over another.
 
-    The interval is of 95 %; None where nothing is known of the target's noise.
+    Attributes:
+        better: The better proxy.
+        worse: The other.
+        value: How much lower its PRPV is, or what choosing by it gains on the target or saves of real rollouts.
+        low: Lower end of the 95 % interval; None if nothing is known of noise.
+        high: Upper end of the same; None likewise.
+        on: By what it is better.
     """
 
     better: str
     worse: str
     value: float
-    interval: Ends | None
-    on: Literal["regret", "rollouts"] = "regret"
+    low: float | None
+    high: float | None
+    on: Literal["prpv", "regret", "rollouts"] = "prpv"
 
     @property
     def beyond_noise(self) -> bool | None:
         """True if the interval leaves out zero; None if there is none."""
-        return None if self.interval is None else self.interval[0] > 0.0
+        return None if self.low is None else self.low > 0
 
 
-def compare_choices(inputs: Mapping[str, Comparison], asked: Asked, seed: int = 0) -> tuple[Choice, ...]:
+def compare_choices(inputs: Mapping[str, Comparison], asked: Asked, seed: int = 0) -> tuple[Difference, ...]:
     """Compare every two proxies of one target by what their winners do there, by the target's rollouts alone."""
     found = {name: decide(one, asked, None, seed) for name, one in inputs.items()}
     choices = []
@@ -413,15 +420,15 @@ def compare_choices(inputs: Mapping[str, Comparison], asked: Asked, seed: int = 
         regrets = [found[pair[0]].expected_regret[agent] for agent in chosen_agents]
         better, worse = (0, 1) if regrets[0] <= regrets[1] else (1, 0)
         draws, agents = found[pair[0]].draws, inputs[pair[0]].agents
-        ends = None
+        ends: tuple[float | None, float | None] = (None, None)
         if draws is not None:
             lead, other = (draws[:, agents.index(chosen_agents[place])] for place in (better, worse))
             ends = interval(lead - other)
-        choices.append(Choice(pair[better], pair[worse], regrets[worse] - regrets[better], ends))
+        choices.append(Difference(pair[better], pair[worse], regrets[worse] - regrets[better], *ends, "regret"))
     return tuple(choices)
 
 
-def compare_savings(savings: Mapping[str, Saving]) -> tuple[Choice, ...]:
+def compare_savings(savings: Mapping[str, Saving]) -> tuple[Difference, ...]:
     """Compare every two proxies of one target by the real rollouts that they save, where both are known.
 
     The interval is made of those of both (Zou 2007), as if these were independent, which they are not: it is too wide.
@@ -434,7 +441,7 @@ def compare_savings(savings: Mapping[str, Saving]) -> tuple[Choice, ...]:
             continue
         low = math.hypot(more - ends[0], others[1] - less)
         high = math.hypot(ends[1] - more, less - others[0])
-        found.append(Choice(better, worse, more - less, (more - less - low, more - less + high), "rollouts"))
+        found.append(Difference(better, worse, more - less, more - less - low, more - less + high, "rollouts"))
     return tuple(found)
 
 

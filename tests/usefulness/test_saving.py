@@ -88,7 +88,7 @@ def test_which_of_two_proxies_saves_more_is_told_with_an_interval_that_is_that_o
     assert found["one", "other"].beyond_noise
     assert found["one", "again"].value == 0.0
     assert not found["one", "again"].beyond_noise
-    low, high = found["one", "again"].interval
+    low, high = found["one", "again"].low, found["one", "again"].high
     assert low == pytest.approx(-high)
 
 

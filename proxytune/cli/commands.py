@@ -44,7 +44,7 @@ TYPES: Mapping[str, Callable[[str], object]] = {"int": int, "float": float, "pat
 
 
 def add_options(parser: argparse.ArgumentParser, *tables: str) -> None:
-    """Add the options of these tables of options.toml, in their order."""
+    """Add the options of these tables of options.toml, in their order; a table within a table is a group."""
     for table in tables:
         for name, given in OPTIONS[table].items():
             grouped = "help" not in given

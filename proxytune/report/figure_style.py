@@ -31,11 +31,13 @@ CHARACTERS_PER_INCH, HANDLE = 19, 8
 """Characters of a legend that fit into an inch, and the space that a line beside them takes, in characters."""
 
 
-def panel_grid(count: int, height: float, rest: float, **shared: bool) -> tuple[Figure, list[Axes]]:
+def panel_grid(
+    count: int, height: float, rest: float, *, sharex: bool = False, sharey: bool = False
+) -> tuple[Figure, list[Axes]]:
     """A figure of so many panels, two in a row, each so high, with so much for all else [inch]; and the panels."""
     rows, columns = ceil(count / 2), min(2, count)
     figure = Figure(figsize=(COLUMN, height * rows + rest), layout="constrained")
-    panels = figure.subplots(rows, columns, squeeze=False, **shared).ravel()
+    panels = figure.subplots(rows, columns, squeeze=False, sharex=sharex, sharey=sharey).ravel()
     for axes in panels[count:]:
         axes.set_visible(False)
     return figure, list(panels[:count])

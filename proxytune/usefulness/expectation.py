@@ -188,12 +188,8 @@ def expect(
     most = float(len(means) * (len(means) - 1))
     counted, deviation = _expected(prpv_of, proxies, draws, perfect, most)
     level = counted.floor
-    chosen, reason = sides[0].target, "noise is not known: nothing was driven twice"
-    floor = (
-        NoiseFloor("same starts", *level, DRAWS, chosen, tuple(metrics))
-        if level
-        else NoiseFloor("none", None, None, None, 0, chosen, tuple(metrics), reason=reason)
-    )
+    unknown = NoiseFloor("none", reason="noise is not known: nothing was driven twice")
+    floor = NoiseFloor("same starts", *level) if level else unknown
     error = _expected(ppv_of, proxies, draws, perfect, np.inf)[0] if beta.any() else None
     return Expectation(counted, error, len(fresh), deviation, floor)
 

@@ -48,21 +48,13 @@ class NoiseFloor:
         value: Of the means, or the mean over splits; None if there is no noise floor.
         low: Lower end of the central 95 % of resamples or splits; None if there is no noise floor.
         high: Upper end of the same; None if there is no noise floor.
-        splits: How many resamples or random splits were made.
-        target: The scores of the domain.
-        metrics: How agents were compared.
-        again: The domain's scores when it was measured again; None where its episodes were split.
         reason: Why there is no noise floor, empty if there is one.
     """
 
     kind: FloorKind
-    value: float | None
-    low: float | None
-    high: float | None
-    splits: int
-    target: ScoreTable
-    metrics: tuple[Metric, ...]
-    again: ScoreTable | None = None
+    value: float | None = None
+    low: float | None = None
+    high: float | None = None
     reason: str = ""
 
     @property
@@ -89,11 +81,11 @@ def noise_floor(*, target: ScoreTable, metrics: Sequence[Metric], splits: int = 
     chosen = compare(proxy=target, target=target, metrics=metrics).target
     reason = too_few(chosen, "on the target")
     if reason:
-        return NoiseFloor("none", None, None, None, 0, chosen, tuple(metrics), reason=reason)
+        return NoiseFloor("none", reason=reason)
     same_starts = is_repeated(chosen)
     values = prpv_in_blocks(*_split_means(chosen, np.random.default_rng(seed), splits, same_starts), metrics)
     kind: FloorKind = "same starts" if same_starts else "halves"
-    return NoiseFloor(kind, float(values.mean()), *interval(values), splits, chosen, tuple(metrics))
+    return NoiseFloor(kind, float(values.mean()), *interval(values))
 
 
 def floor_of_repeats(
@@ -116,13 +108,12 @@ def floor_of_repeats(
         f"agent '{absent[0]}' drove no start both times" if absent else too_few(one, "from starts driven both times")
     )
     if reason:
-        return NoiseFloor("none", None, None, None, 0, inputs.target, inputs.metrics, inputs.proxy, reason)
+        return NoiseFloor("none", reason=reason)
     value = float(prpv_of_means(one.means, other.means, metrics))
     counts = draw_counts(one, np.random.default_rng(seed), resamples)
     means = counted_means(one.values, counts), counted_means(other.values, counts)
     low, high = interval(prpv_in_blocks(*means, metrics))
-    ends = min(low, value), max(high, value)
-    return NoiseFloor("same starts", value, *ends, resamples, inputs.target, inputs.metrics, inputs.proxy)
+    return NoiseFloor("same starts", value, min(low, value), max(high, value))
 
 
 def _split_means(table: ScoreTable, rng: np.random.Generator, splits: int, same_starts: bool) -> tuple[Floats, Floats]:

@@ -3,12 +3,10 @@
 from dataclasses import replace
 from types import SimpleNamespace as Namespace
 
-import numpy as np
 import pytest
 from confirmations import LACKS, TOLD, planted
 
 from proxytune.report.study.sentence import KnownParameter, declared_of, known_parameters, say_answer, study_sentence
-from proxytune.scores import Metric, ScoreTable
 from proxytune.search import Information
 from proxytune.space import Interval
 from proxytune.study import DEFAULT_FAMILY
@@ -18,8 +16,7 @@ TRIM = KnownParameter("trim", "", 0.1213, (0.108, 0.146), 0.06, True)
 PITCH = KnownParameter("camera_pitch", "deg", 13.04, (11.1, 14.4), 0.1, True)
 BLUR = KnownParameter("blur", "s", 0.026, (0.005, 0.062), 0.57, True)
 DELAY = KnownParameter("delay", "s", 0.1, (0.001, 0.298), 0.99, False)
-TABLE = ScoreTable(("a", "b"), ("0",), ("distance",), np.array([[[1.0]], [[2.0]]]))
-FLOOR = NoiseFloor("same starts", 5.0, 1.0, 9.0, 1000, TABLE, (Metric("distance", "max"),))
+FLOOR = NoiseFloor("same starts", 5.0, 1.0, 9.0)
 PRPV = Estimate(6.2, 2.6, 9.9)
 EXCESS = Estimate(1.2, -5.3, 7.7)
 TOLD_BY_STARTS = Information("blur", (("daredevil", 0.6), ("wary", 0.4)), (("distance", 1.0),), "starts")

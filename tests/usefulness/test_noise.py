@@ -121,7 +121,6 @@ def test_starts_are_paired_by_their_label_and_those_not_driven_both_times_left_o
     again = ScoreTable(again.agents, again.episodes, again.metrics, holes)
     found = floor_of_repeats(domain=table_of(one), again=again, metrics=FIRST)
     assert (found.value, found.low, found.high) == (0.0, 0.0, 0.0)
-    assert found.again.driven.sum() == again.driven.sum()
     loud = ScoreTable(again.agents, again.episodes, again.metrics, holes + rng.normal(size=holes.shape))
     assert floor_of_repeats(domain=table_of(one), again=loud, metrics=FIRST).value > 0.0
 

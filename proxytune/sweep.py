@@ -137,7 +137,7 @@ class Discrepancy:
         # The start is the same by construction, so it is no observation.
         pose = pod_of_poses(proxy=here.poses[1:poses], target=there.poses[1:poses])
         image = pod_of_images(proxy=here.pictures[:pictures], target=there.pictures[:pictures])
-        return {"pod_pose": pose.value, "pod_image": image.value}
+        return {"pod_pose": pose, "pod_image": image}
 
 
 @functools.lru_cache(maxsize=64)

@@ -1,6 +1,6 @@
 """The measures beside PRPV: errors, costs of a wrong order and correlations of scores, and unlike observations.
 
-POD  = mean or Σ over time of ‖o(proxy) − o(target)‖, under the same commands        # eq. (1)
+POD  = mean over time of ‖o(proxy) − o(target)‖, under the same commands        # eq. (1)
 PPV  = mean over agents of Σ_m β_m |M_m(proxy) − M_m(target)|                        # eq. (2)
 MMRV = mean over agents i of max_j |M_i(target) − M_j(target)| where i, j are ordered wrongly (SIMPLER)
 SRCC = Pearson's correlation of the agents' mean scores in proxy and target, per metric
@@ -9,7 +9,7 @@ Kendall's τ-b = Σ sign(proxy) sign(target) / √(pairs untied in proxy · on t
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -210,53 +210,12 @@ def _correlation(name: str, values: Floats, inputs: Comparison) -> Correlation:
     return Correlation(name, named, tuple(notes), inputs)
 
 
-Reduction = Literal["mean", "sum"]
-
-
-@dataclass(frozen=True)
-class Pod:
-    """A proxy observation discrepancy.
-
-    Attributes:
-        value: Mean or sum over time of the discrepancy of the observations, 0 or more.
-        unit: Its unit.
-        kind: What was observed, "pose" or "image".
-        norm: How two observations were compared.
-        reduction: Whether the discrepancies were averaged or added over time.
-        discrepancies: The discrepancy at each time, shape (…, time).
-    """
-
-    value: float
-    unit: str
-    kind: Literal["pose", "image"]
-    norm: str
-    reduction: Reduction
-    discrepancies: Floats
-    better: ClassVar[str] = "lower"
-
-    @property
-    def range(self) -> tuple[float, float | None]:
-        """Smallest and largest possible value; None where there is no bound."""
-        if self.kind == "pose":
-            return 0.0, None
-        return 0.0, 1.0 if self.reduction == "mean" else float(self.discrepancies.size)
-
-    @property
-    def observations(self) -> int:
-        """Number of pairs of observations that were compared."""
-        return self.discrepancies.size
-
-
-def pod_of_poses(
-    *, proxy: ArrayLike, target: ArrayLike, reduction: Reduction = "mean", metres_per_radian: float = 0.0
-) -> Pod:
-    """Compare poses under the same commands, eq. (1) of the paper: ‖(Δx, Δy, a·Δheading)‖₂ at each time.
+def pod_of_poses(*, proxy: ArrayLike, target: ArrayLike) -> float:
+    """Mean distance of places under the same commands [m], eq. (1) of the paper: ‖(Δx, Δy)‖₂ at each time.
 
     Args:
         proxy: Poses in the proxy, shape (…, time, 3): x [m], y [m], heading [rad].
         target: Poses on the target at the same times, same shape.
-        reduction: Average over time, or add up as in the paper.
-        metres_per_radian: The weight a of the heading; 0 compares positions alone. Headings differ by π at most.
 
     Raises:
         InputError: If the shapes differ or are none of poses, or a value is missing.
@@ -265,24 +224,19 @@ def pod_of_poses(
     if one.ndim < 2 or one.shape[-1] != 3:
         raise InputError(f"poses are arrays of shape (…, time, 3): x, y, heading; got {one.shape}")
     difference = one - other
-    turned = np.angle(np.exp(1j * difference[..., 2]))
-    discrepancies = np.sqrt(difference[..., 0] ** 2 + difference[..., 1] ** 2 + (metres_per_radian * turned) ** 2)
-    weighted = f"Euclidean norm of (x, y, {metres_per_radian:g} m/rad · heading)"
-    norm = weighted if metres_per_radian else "distance (x, y)"
-    return Pod(_reduce(discrepancies, reduction), "m", "pose", norm, reduction, discrepancies)
+    return float(np.sqrt(difference[..., 0] ** 2 + difference[..., 1] ** 2).mean())
 
 
-def pod_of_images(*, proxy: ArrayLike, target: ArrayLike, reduction: Reduction = "mean") -> Pod:
-    """Compare camera images under the same commands, eq. (1): root mean square over pixels and channels at each time.
+def pod_of_images(*, proxy: ArrayLike, target: ArrayLike) -> float:
+    """Mean difference of camera images under the same commands, eq. (1): root mean square over pixels at each time.
 
-    That is the Euclidean norm of the paper divided by the square root of the number of pixels, as a fraction of
-    full scale, so that it does not depend on the resolution.
+    That is the Euclidean norm of the paper divided by the square root of the number of pixels and channels, as a
+    fraction of full scale, so that it does not depend on the resolution.
 
     Args:
         proxy: Images in the proxy, shape (time, height, width) or (time, height, width, channels): whole numbers of
             0 to 255 or fractions of 0 to 1.
         target: Images on the target at the same times, same shape and type.
-        reduction: Average over time, or add up as in the paper.
 
     Raises:
         InputError: If shapes or types differ or are none of images, or a value is missing or beyond full scale.
@@ -296,9 +250,7 @@ def pod_of_images(*, proxy: ArrayLike, target: ArrayLike, reduction: Reduction =
     if min(one.min(), other.min()) < 0 or max(one.max(), other.max()) > full_scale:
         raise InputError(f"images must be within 0 and {full_scale:g}")
     squares = ((one - other) / full_scale) ** 2
-    discrepancies = np.sqrt(squares.reshape(len(squares), -1).mean(axis=1))
-    norm = "root mean square over pixels and channels"
-    return Pod(_reduce(discrepancies, reduction), "of full scale", "image", norm, reduction, discrepancies)
+    return float(np.sqrt(squares.reshape(len(squares), -1).mean(axis=1)).mean())
 
 
 def _pair(proxy: ArrayLike, target: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -310,7 +262,3 @@ def _pair(proxy: ArrayLike, target: ArrayLike) -> tuple[NDArray[np.float64], NDA
     if not (np.isfinite(one).all() and np.isfinite(other).all()):
         raise InputError("an observation is missing (NaN); leave out times at which either domain was not observed")
     return one, other
-
-
-def _reduce(discrepancies: Floats, reduction: Reduction) -> float:
-    return float(discrepancies.mean() if reduction == "mean" else discrepancies.sum())

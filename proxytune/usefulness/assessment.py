@@ -250,7 +250,6 @@ class Selection:
         ranking: Names and PRPV, best first.
         differences: Every two proxies, the better one first; the intervals hold for all of them at once.
         reason: Why there are no intervals, empty if there are.
-        confidence: How often such intervals all hold at once.
         choices: Every two compared by what choosing by them gains, and by what they save; none if not assessed.
         together: The two that save most, used at once; None likewise.
     """
@@ -258,7 +257,6 @@ class Selection:
     ranking: tuple[tuple[str, int], ...]
     differences: tuple[Difference, ...]
     reason: str = ""
-    confidence: float = CONFIDENCE
     choices: tuple[Difference, ...] = ()
     together: Together | None = None
 

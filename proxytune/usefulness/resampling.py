@@ -39,7 +39,6 @@ class PrpvInterval:
         resamples: How many were drawn.
         inputs: What was compared, with its sample sizes.
         reason: Why there is no interval, empty if there is one.
-        confidence: How often such an interval is meant to hold what it covers.
     """
 
     value: int
@@ -49,7 +48,6 @@ class PrpvInterval:
     resamples: int
     inputs: Comparison
     reason: str = ""
-    confidence: float = CONFIDENCE
 
 
 def why_not_repeated(inputs: Comparison) -> str:
@@ -161,9 +159,9 @@ def prpv_in_blocks(proxy: Floats, target: Floats, metrics: Sequence[Metric]) -> 
     return in_blocks(lambda one, other: prpv_of_means(one, other, metrics), proxy, target)
 
 
-def interval(values: Floats, confidence: float = CONFIDENCE) -> tuple[float, float]:
-    """The central interval that holds this share of the values."""
-    tail = (1 - confidence) / 2
+def interval(values: Floats) -> tuple[float, float]:
+    """The central interval that holds 95 % of the values."""
+    tail = (1 - CONFIDENCE) / 2
     low, high = np.quantile(values, [tail, 1 - tail])
     return float(low), float(high)
 

@@ -1,4 +1,4 @@
-"""How good is the answer that a study gives? `python benchmarks/answers.py OUTPUT [--seeds 101:130] [--plant bullet]`.
+"""How good is the answer that a study gives? `python benchmarks/answers.py OUTPUT [--seeds 101:130] [--budget 24]`.
 
 Every seed draws a θ* from the middle of the box of benchmarks/truths. Its target is driven there under other placement
 noise, and a whole study is run against it: search, then confirmation. θ* and the answer are then driven 20 times
@@ -140,12 +140,13 @@ def main() -> None:
     parser.add_argument("output", type=Path)
     parser.add_argument("--seeds", default="101:130", help="the first and the last")
     parser.add_argument("--plant", choices=("planar", "bullet"), default="planar")
+    parser.add_argument("--budget", type=int, default=24, help="trials of each search")
     parser.add_argument("--before", type=Path, help="another OUTPUT, of the same seeds, to be compared with")
     given = parser.parse_args()
     study = open_study(STUDY)
     family = replace(study.family, plant=given.plant)  # type: ignore[type-var]
     # As a user gets it: trials are cut off that cannot be among the best.
-    settings = replace(study.settings, jobs=1, cut_off=True)
+    settings = replace(study.settings, jobs=1, cut_off=True, budget=given.budget)
     study = replace(study, family=family, identity=family.identity, settings=settings)
     first, last = map(int, given.seeds.split(":"))
     seeds = range(first, last + 1)

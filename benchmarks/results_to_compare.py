@@ -538,7 +538,7 @@ PARTS = (
     ),
     Part("study truths, resumed and exported", resumed),
     # What an episode of each takes, drawn and in a table.
-    Part("study which_simulator", families, leaves_out=r"/families\.png$|/report\.html/(2[7-9]|3[0-3])$"),
+    Part("study which_simulator", families, leaves_out=r"/families\.png$|/report\.html/(3[7-9]|4[0-3])$"),
     Part("study teacher", taught),
     Part("study which_randomisation", randomised),
     Part("mujoco robot", mujoco_robot, ("gymnasium", "mujoco")),

@@ -110,12 +110,12 @@ class AfterDesign:
 
     def propose(self, space: Space, trials: Sequence[Trial], seed: int) -> Values:
         """The next point: of the design, or what the inner proposer says."""
-        told = with_failures_as_worst(trials)
-        if len(trials) < self.initial or not told:
-            return design_point(space, len(trials), seed)
+        told, count = with_failures_as_worst(trials), sum(not trial.low_fidelity for trial in trials)
+        if count < self.initial or not told:
+            return design_point(space, count, seed)
         values = self.inner.propose(space, told, seed)
         again = any(trial.pending and trial.values == values for trial in trials)
-        return design_point(space, len(trials), seed) if again else values
+        return design_point(space, count, seed) if again else values
 
 
 @dataclass(frozen=True)

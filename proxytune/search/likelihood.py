@@ -15,12 +15,16 @@ Outputs of one trial go up and down together (an agent that crashes early drives
 Taken for independent they would promise far too much: on simulated targets whose θ was known, a 95 % region then held
 it in 3 to 6 of 12 cases. The log likelihood is therefore tempered by κ, which follows from how errors of left-out
 trials correlate: with p outputs that are all one, κ is p.
+
+Where trials of a cheaper proxy are known too, the Gaussian processes are of the difference to what those predict
+(Kennedy and O'Hagan, Predicting the output from a complex computer code when fast approximations are available,
+Biometrika 87(1), 2000, with a scale of 1). Trials left out then say how far that can be trusted.
 """
 
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -81,7 +85,7 @@ class OutputModel:
 
     The kernel is the covariance of a standardised output over the unit cube: its smooth course, and noise round that.
     `constant` is each output's mean over the trials that know it (outputs,), NaN where none does; `visited` are all
-    trials that know any (trials, parameters).
+    trials that know any (trials, parameters). With a `base`, of a cheaper proxy, groups are of the difference to it.
     """
 
     space: Space
@@ -89,6 +93,7 @@ class OutputModel:
     groups: tuple[OutputGroup, ...]
     constant: Floats
     visited: Floats
+    base: "OutputModel | None" = None
 
     @property
     def outputs(self) -> int:
@@ -115,7 +120,16 @@ class OutputModel:
                 left = smooth.diag(points) - np.einsum("ij,jk,ik->i", near, group.inverse, near, optimize=True)
                 mean[:, group.columns] = group.middle + group.scale * (near @ group.weights)
                 variance[:, group.columns] = np.outer(np.maximum(left, 0.0), group.inflation * group.scale**2)
-        return mean, variance
+        return (mean + self.base.course(points) if self.base else mean), variance
+
+    def course(self, points: Floats) -> Floats:
+        """The mean of every output (n, outputs) at points of the cube; 0 if it is not modelled."""
+        mean = np.zeros((len(points), self.outputs))
+        with _libraries().limit(limits=1):
+            for group in self.groups:
+                near = self.kernel.k1(points, group.visited)
+                mean[:, group.columns] = group.middle + group.scale * (near @ group.weights)
+        return mean
 
     @cached_property
     def left_out(self) -> Floats:
@@ -137,20 +151,35 @@ class OutputModel:
 def fit_outputs(space: Space, trials: Sequence[Trial], kernel: "Kernel | None" = None) -> OutputModel:
     """Fit the model to the trials that have outputs: same trials in any order, same model to the last bit.
 
-    Without a kernel, it is fitted too. Refused if no trial has an outcome.
+    Without a kernel, it is fitted too. Refused if no trial of this proxy has an outcome.
     """
-    known = sorted((trial.values, trial.outcome, trial.placement) for trial in trials if trial.outcome is not None)
+    low = tuple(sorted((t.values, t.outcome, t.placement) for t in trials if t.low_fidelity and t.outcome is not None))
+    known = sorted((t.values, t.outcome, t.placement) for t in trials if not t.low_fidelity and t.outcome is not None)
     if not known:
         raise RunError("no trial has an outcome, so there is nothing to learn from")
+    return _fitted(space, known, kernel, _base(space, low) if low else None)
+
+
+Known = tuple[tuple[float, ...], tuple[float, ...], int]
+"""Where a trial was, what it came to, and under which placement."""
+
+
+@lru_cache(maxsize=8)
+def _base(space: Space, known: tuple[Known, ...]) -> OutputModel:
+    """The model of a cheaper proxy, the same all through a search."""
+    return _fitted(space, known, None, None)
+
+
+def _fitted(space: Space, known: Sequence[Known], kernel: "Kernel | None", base: OutputModel | None) -> OutputModel:
     visited, outputs = unit_array(space, [one[0] for one in known]), np.array([one[1] for one in known])
-    placement = np.array([one[2] for one in known])
+    placement, seen = np.array([one[2] for one in known]), ~np.isnan(outputs)
+    with np.errstate(invalid="ignore"):
+        constant = np.where(seen, outputs, 0.0).sum(axis=0) / seen.sum(axis=0)
+    outputs = outputs - base.course(visited) if base else outputs
     with threadpool_limits(limits=1):
         kernel = kernel or _fitted_kernel(visited, outputs)
         groups = _groups(kernel, visited, outputs, placement)
-    seen = ~np.isnan(outputs)
-    with np.errstate(invalid="ignore"):
-        constant = np.where(seen, outputs, 0.0).sum(axis=0) / seen.sum(axis=0)
-    return OutputModel(space, kernel, groups, constant, visited)
+    return OutputModel(space, kernel, groups, constant, visited, base)
 
 
 @cache

@@ -34,6 +34,7 @@ class Trial:
             where the score has no such parts.
         pending: Whether it has been proposed and is not finished.
         placement: Which placement noise it was driven under: trials with the same number share theirs, 0 the study's.
+        low_fidelity: Whether it is of a cheaper proxy, whose outputs tell of this one's and are not those.
     """
 
     values: Values
@@ -41,6 +42,7 @@ class Trial:
     outcome: Values | None = None
     pending: bool = False
     placement: int = 0
+    low_fidelity: bool = False
 
 
 class Proposer(Protocol):
@@ -74,13 +76,13 @@ def propose_batch(
 def with_failures_as_worst(trials: Sequence[Trial]) -> list[Trial]:
     """The trials, a failed one with score and outcome of the worst, so that a search moves away from it.
 
-    Pending ones stay as they are. None at all if no trial has a score.
+    Pending ones stay as they are, and those of a cheaper proxy. None at all if no trial has a score.
     """
     scored = [(trial.score, trial.values, trial.outcome) for trial in trials if trial.score is not None]
     if not scored:
         return []
     score, _, outcome = max(scored, key=lambda found: found[:2])
-    kept = [trial.pending or trial.score is not None for trial in trials]
+    kept = [trial.pending or trial.low_fidelity or trial.score is not None for trial in trials]
     pairs = zip(trials, kept, strict=True)
     return [trial if keep else replace(trial, score=score, outcome=outcome) for trial, keep in pairs]
 

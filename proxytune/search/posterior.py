@@ -220,12 +220,13 @@ def as_targets(
 ) -> Iterator[AsTarget]:
     """Take each of the trials that `leave_out` leaves out for a target, at most so many of them."""
     known = sorted((trial for trial in trials if trial.outcome is not None), key=lambda trial: trial.values)
-    whole = [row for row, trial in enumerate(known) if not np.isnan(trial.outcome or ()).any()]
+    own = [row for row, trial in enumerate(known) if not trial.low_fidelity]
+    whole = [row for row in own if not np.isnan(known[row].outcome or ()).any()]
     normal = np.random.default_rng(seed).standard_normal((len(known), len(goal.values)))
     places = np.unique(np.linspace(0, max(0, len(whole) - 1), most).round().astype(int)).tolist()
     for row in [whole[place] for place in places] if len(whole) >= FEWEST else []:
         # Not of the same θ under another placement either, which would tell too much.
-        elsewhere = [trial for trial in known if trial.values != known[row].values]
+        elsewhere = [trial for trial in known if trial.low_fidelity or trial.values != known[row].values]
         others = fit_outputs(model.space, elsewhere, model.kernel)
         outcome = np.array(known[row].outcome) + normal[row] * np.sqrt(goal.noise)
         likelihood = Likelihood(others, replace(goal, values=np.where(np.isnan(goal.values), np.nan, outcome)))

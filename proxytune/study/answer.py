@@ -24,7 +24,7 @@ from proxytune.search import Knowledge, Trial, make_proposer
 from proxytune.seeds import fresh_seed
 from proxytune.space import Theta
 from proxytune.storage import TrialRecord
-from proxytune.study.earlier import earlier_trials, learn
+from proxytune.study.earlier import known_trials, learn
 from proxytune.study.facts import NOMINAL, check_facts, note_search
 from proxytune.study.opening import Study
 from proxytune.study.preflight import placement_pairs, run_preflight
@@ -72,7 +72,7 @@ def run_stages(run: StudyRun, warn: Callable[[str], None], known: Sequence[Outco
         warn(warning)
     # The proposer allows for the noise that the pre-flight measured.
     proposer = make_proposer(run.study.engine, run.settings.initial, goal_of(run))
-    run_trials(run, AfterEarlier(proposer, earlier) if (earlier := earlier_trials(run)) else proposer)
+    run_trials(run, AfterEarlier(proposer, earlier) if (earlier := known_trials(run)) else proposer)
     run_nominal(run)
     run_confirmation(run)
 

@@ -4,7 +4,8 @@ A source is the folder of a study, or the table of trials that a bank writes (`w
 same domain family, settings, parameters and agents; where its code or versions are others, some of its episodes are
 driven again and must come out alike. `learn` copies what counts into study.db before the first trial, and from then on
 that is a fact (`earlier_trials`): a source may grow, move or go. Trials of another study seed share another placement,
-which `Trial.placement` tells the search.
+which `Trial.placement` tells the search. A source of `low_fidelity` is of another, cheaper proxy, and need share no
+more than agents, metrics, starts and parameters.
 """
 
 import json
@@ -25,7 +26,7 @@ from proxytune.search import Trial
 from proxytune.seeds import episode_seed
 from proxytune.settings import is_finite, read_text
 from proxytune.storage import FILE_NAME as DATABASE, Store
-from proxytune.study.facts import LEARNT, stored_facts, study_facts
+from proxytune.study.facts import COPIED, stored_facts, study_facts
 from proxytune.study.opening import Study
 from proxytune.study.preflight import PLACEMENT, placement_variance
 from proxytune.study.settings import LEARNING, StudySettings, read_study_settings
@@ -39,6 +40,7 @@ DIGITS = 5
 """Of each score in a table of trials."""
 LARGEST = 1e12
 """No θ or score is further from 0 than this; squares and sums of such are still numbers."""
+FULL, LOW = COPIED
 BANK_FILE = "bank.json"
 FORMAT = 1
 
@@ -70,9 +72,10 @@ def learn(run: StudyRun) -> None:
         InputError: If one of them is not there, or is none of this domain, with its name.
         StoreError: If its database is damaged.
     """
-    settings = run.settings
-    if settings.learn_from and LEARNT not in run.store.facts():
-        _keep(run, [read_source(settings, name) for name in settings.learn_from])
+    settings, known = run.settings, run.store.facts()
+    for key, fact in COPIED.items():
+        if (names := getattr(settings, key)) and fact not in known:
+            _keep(run, [read_source(settings, name, key) for name in names], key)
 
 
 @contextmanager
@@ -91,21 +94,24 @@ def table_alone(study: Study) -> Iterator[StudyRun]:
         yield run
 
 
-def _keep(run: StudyRun, sources: Sequence[Source], *, again: bool = True) -> None:
+def _keep(run: StudyRun, sources: Sequence[Source], key: str = FULL, *, again: bool = True) -> None:
     settings, box = run.settings, run.settings.space.intervals
     places, rows, names = {settings.seed: 0}, [], sorted(_metrics(run))
     for source in sources:
-        _check_same(run, source, again=again)
+        _check_like(run, source, key)
+        if key == FULL:
+            _check_same(run, source, again=again)
         place = places.setdefault(source.facts["seed"], len(places))
         inside = [theta for theta in source.trials if all(b.low <= dict(theta)[b.name] <= b.high for b in box)]
         if not inside:
-            raise _refused(settings, source.path, "has no trial in the box of [parameters]; widen it, or remove this")
+            told = "has no trial in the box of [parameters]; widen it, or remove this"
+            raise _refused(settings, key, source.path, told)
         for theta in inside:
             means = _means(source.trials[theta], settings, names)
             rows.append([place, list(settings.space.values(dict(theta))), means])
     unique = {json.dumps(row[:2]): row for row in rows}
     told = {"metrics": names, "agents": list(settings.agents), "trials": list(unique.values())}
-    run.store.save_fact(LEARNT, {**told, "sources": [str(source.path) for source in sources]})
+    run.store.save_fact(COPIED[key], {**told, "sources": [str(source.path) for source in sources]})
 
 
 def earlier_trials(run: StudyRun) -> tuple[Trial, ...]:
@@ -114,46 +120,62 @@ def earlier_trials(run: StudyRun) -> tuple[Trial, ...]:
     Raises:
         StoreError: If they are not as we write them.
     """
-    settings, table = run.settings, run.study.target
-    if not settings.learn_from:
+    if not run.settings.learn_from:
         return ()
+    copied, table = _copied(run, FULL), run.study.target
+    outputs = np.array([trial.outcome for trial in copied])
+    with np.errstate(invalid="ignore"):
+        middle = np.nansum(outputs, axis=0) / (~np.isnan(outputs)).sum(axis=0)
+    middle = np.where(np.isnan(middle), table.means.ravel(), middle)
+    scores = compose_of(run.study)(np.where(np.isnan(outputs), middle, outputs)).tolist()
+    return tuple(replace(trial, score=score) for trial, score in zip(copied, scores, strict=True))
+
+
+def known_trials(run: StudyRun) -> tuple[Trial, ...]:
+    """All that is known before the first trial: of earlier studies, and of a cheaper proxy, which has no score here.
+
+    Raises:
+        StoreError: If they are not as we write them.
+    """
+    cheap = _copied(run, LOW) if run.settings.low_fidelity else []
+    return (*earlier_trials(run), *(replace(trial, low_fidelity=True) for trial in cheap))
+
+
+def _copied(run: StudyRun, key: str) -> list[Trial]:
+    """The trials that the store holds for a key, with the outputs of this study's agents and metrics."""
+    table, fact = run.study.target, COPIED[key]
     try:
-        learnt = run.store.facts()[LEARNT]
+        learnt = run.store.facts()[fact]
         rows = [learnt["agents"].index(agent) for agent in table.agents]
         metrics = [learnt["metrics"].index(name) if name in learnt["metrics"] else -1 for name in table.metrics]
         shape = (len(learnt["trials"]), len(learnt["agents"]), len(learnt["metrics"]))
         values = np.array([means for _, _, means in learnt["trials"]], dtype=float).reshape(shape)
         placed = [(int(place), tuple(map(float, theta))) for place, theta, _ in learnt["trials"]]
     except (KeyError, TypeError, ValueError, AttributeError):
-        raise StoreError(f"{run.store.path}: '{LEARNT}' is not as proxytune writes it; restore a copy") from None
+        raise StoreError(f"{run.store.path}: '{fact}' is not as proxytune writes it; restore a copy") from None
     values = np.concatenate([values, np.full((*shape[:2], 1), np.nan)], axis=2)[:, rows][:, :, metrics]
-    outputs = values.reshape(len(values), -1)
-    with np.errstate(invalid="ignore"):
-        middle = np.nansum(outputs, axis=0) / (~np.isnan(outputs)).sum(axis=0)
-    middle = np.where(np.isnan(middle), table.means.ravel(), middle)
-    scores = compose_of(run.study)(np.where(np.isnan(outputs), middle, outputs)).tolist()
-    return tuple(
-        Trial(theta, score, tuple(row), placement=place)
-        for (place, theta), score, row in zip(placed, scores, outputs.tolist(), strict=True)
-    )
+    outputs = values.reshape(len(values), -1).tolist()
+    return [
+        Trial(theta, None, tuple(row), placement=place) for (place, theta), row in zip(placed, outputs, strict=True)
+    ]
 
 
-def read_source(settings: StudySettings, name: str) -> Source:
-    """A study or table of trials that learn_from names, from this study's folder on; or a study that is shipped."""
+def read_source(settings: StudySettings, name: str, key: str = FULL) -> Source:
+    """A study or table of trials that a key names, from this study's folder on; or a study that is shipped."""
     path = settings.folder / name
     path = shipped("studies") / name if not exists(path) and exists(shipped("studies") / name) else path
     if not exists(path):
-        raise _refused(settings, path, "no such study or table of trials; check the path")
+        raise _refused(settings, key, path, "no such study or table of trials; check the path")
     for home, learns in _chain(path):
         if home.resolve() == settings.folder.resolve():
             told = "learns from this study in turn" if learns else "is this very study"
-            raise _refused(settings, path, f"{told}; remove it")
+            raise _refused(settings, key, path, f"{told}; remove it")
     if path.is_dir() and (path / DATABASE).exists():
         return _of_study(path)
     table = path / BANK_FILE if path.is_dir() else path
     if not table.exists():
         told = f"has neither {DATABASE} nor {BANK_FILE}; run it first: python -m proxytune study {path}"
-        raise _refused(settings, path, told)
+        raise _refused(settings, key, path, told)
     return _of_table(table)
 
 
@@ -242,32 +264,50 @@ def write_table(run: StudyRun) -> Path:
     return path
 
 
-def _check_same(run: StudyRun, source: Source, *, again: bool) -> None:
+def _check_like(run: StudyRun, source: Source, used: str) -> None:
+    """Refuse a source whose trials do not have the outputs of this study's, or not at points of its box."""
     settings, theirs, ours = run.settings, source.facts, study_facts(run.study)
+
+    def refused(why: str) -> InputError:
+        return _refused(settings, used, source.path, why)
+
     if not source.trials:
-        raise _refused(settings, source.path, "has no finished trial; run it first, or remove it")
+        raise refused("has no finished trial; run it first, or remove it")
     agents = {agent for scores in source.trials.values() for agent, _ in scores}
     if lacks := [agent for agent in settings.agents if agent not in agents]:
-        raise _refused(settings, source.path, f"has not driven {', '.join(lacks)}; remove it")
+        raise refused(f"has not driven {', '.join(lacks)}; remove it")
     scored = {name for scores in source.trials.values() for one in scores.values() for name in one}
     if lacks := [metric.name for metric in settings.metrics if metric.name not in scored]:
-        raise _refused(settings, source.path, f"has no scores of {', '.join(lacks)}; remove it")
+        raise refused(f"has no scores of {', '.join(lacks)}; remove it")
     boxes = [sorted(name for name, _ in next(iter(source.trials))), sorted(settings.space.names)]
     if boxes[0] != boxes[1]:
-        told = f"its parameters are {', '.join(boxes[0])}, this study's {', '.join(boxes[1])}"
-        raise _refused(settings, source.path, f"{told}; remove it")
+        raise refused(f"its parameters are {', '.join(boxes[0])}, this study's {', '.join(boxes[1])}; remove it")
     if theirs["starts"] < settings.starts:
         told = f"has driven from {theirs['starts']} starts, and this study asks for {settings.starts}"
-        raise _refused(settings, source.path, f"{told}; lower starts, or remove it")
-    same = all(theirs.get(key) == ours.get(key) for key in ("identity", "versions"))
-    loaded = [f"agents.{agent}" for agent in settings.agents]
-    settled = [key for key in {**theirs, **ours} if key == "family" or key.startswith("domain.")] if not same else []
-    for key in (*settled, *loaded):
-        if theirs.get(key) != ours.get(key):
-            values = [value or "not given" for value in (theirs.get(key), ours.get(key))]
-            raise _refused(settings, source.path, f"{key} is {values[0]} there and {values[1]} here; remove it")
-    if again and not same:
+        raise refused(f"{told}; lower starts, or remove it")
+    for key in (f"agents.{agent}" for agent in settings.agents):
+        _check_value(run, source, used, key)
+    if used == LOW and theirs.get("identity") == ours["identity"]:
+        raise refused("is of this very proxy, so its trials count in full; name it in learn_from")
+
+
+def _check_same(run: StudyRun, source: Source, *, again: bool) -> None:
+    """Refuse a source of another domain: where code or versions differ, by what some of its episodes come to."""
+    theirs, ours = source.facts, study_facts(run.study)
+    if all(theirs.get(key) == ours.get(key) for key in ("identity", "versions")):
+        return
+    for key in {**theirs, **ours}:
+        if key == "family" or key.startswith("domain."):
+            _check_value(run, source, FULL, key)
+    if again:
         _check_again(run, source)
+
+
+def _check_value(run: StudyRun, source: Source, used: str, key: str) -> None:
+    values = [facts.get(key) for facts in (source.facts, study_facts(run.study))]
+    if values[0] != values[1]:
+        there, here = (value or "not given" for value in values)
+        raise _refused(run.settings, used, source.path, f"{key} is {there} there and {here} here; remove it")
 
 
 def _check_again(run: StudyRun, source: Source) -> None:
@@ -283,7 +323,8 @@ def _check_again(run: StudyRun, source: Source) -> None:
             again = now.get(name, float("inf")) if name in _metrics(run) else value
             if abs(again - value) > TOLERANCE * max(abs(value), TOLERANCE):
                 told = f"its code or versions are others, and {agent} from start {start} has {name} {value:.4g} there"
-                raise _refused(run.settings, source.path, f"{told} and {again:.4g} here; run it again, or remove it")
+                told = f"{told} and {again:.4g} here; run it again, or remove it"
+                raise _refused(run.settings, FULL, source.path, told)
 
 
 def _metrics(run: StudyRun) -> set[str]:
@@ -300,5 +341,5 @@ def _means(scores: Scores, settings: StudySettings, names: Sequence[str]) -> lis
     return [[mean(agent, name) for name in names] for agent in settings.agents]
 
 
-def _refused(settings: StudySettings, path: Path, why: str) -> InputError:
-    return settings.error("learn_from", f"{path}: {why}")
+def _refused(settings: StudySettings, key: str, path: Path, why: str) -> InputError:
+    return settings.error(key, f"{path}: {why}")

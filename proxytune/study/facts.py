@@ -39,11 +39,11 @@ SEARCH = "search"
 """Lists which code proposed trials: from which trial on, its digest and the versions of the packages it uses."""
 DESCRIBED = "described"
 """Tells what figures and tables need of a study's own code."""
-LEARNT = "learnt"
-"""Holds the trials of earlier studies, as they were when this one began."""
+COPIED = {"learn_from": "learnt", "low_fidelity": "learnt_low_fidelity"}
+"""Hold the trials that these keys of study.toml name, as they were when the study began."""
 NOMINAL = "nominal"
 """The nominal θ of the parameters that are searched, where the family knows it."""
-NOTED = (LEARNING, LEARNT, SEARCH, DESCRIBED, NOT_REPEATABLE, APART, NOMINAL)
+NOTED = (LEARNING, SEARCH, DESCRIBED, NOT_REPEATABLE, APART, NOMINAL, *COPIED.values())
 """Facts that trials do not depend on; LEARNING has those of a search for learning value."""
 UNSAID = {"batch": 1, "engine": "gp"}
 """Values that go without saying: a study.db that names none of these was run with them."""
@@ -75,7 +75,7 @@ def study_facts(study: Study) -> dict[str, Any]:
         **said,
         **({"preflight": settings.preflight} if learns else {}),
         **({"versions": dict(versions)} if versions else {}),
-        **({"learn_from": list(settings.learn_from)} if settings.learn_from else {}),
+        **{key: list(names) for key in COPIED if (names := getattr(settings, key))},
         "cut_off": settings.cut_off,
         **{f"agents.{name}": settings.aliases[name] for name in settings.agents if name in settings.aliases},
         **{f"parameters.{i.name}": [i.low, i.high] for i in settings.space.intervals},
@@ -126,7 +126,7 @@ def check_facts(run: StudyRun) -> None:
     if before != now:
         if set(store.searches()) - {LEARNING}:
             raise _changed(study, store, before, now)
-        noted = {key: value for key, value in store.facts().items() if key in NOTED and key != LEARNT}
+        noted = {key: value for key, value in store.facts().items() if key in NOTED and key not in COPIED.values()}
         store.begin({**now, **noted}, study.objective.name)
     describe(study, store)
 

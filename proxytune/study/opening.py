@@ -269,6 +269,9 @@ def _engine(settings: StudySettings) -> Engine:
     reason = why_not_engine(engine, composed=settings.objective != LEARNING)
     if reason:
         raise settings.error("engine", reason)
+    if settings.low_fidelity and (engine.learns_from == "scores" or engine.name not in ENGINE_NAMES):
+        told = f"engine '{engine.name}' cannot tell a cheaper proxy's trials from this one's; take 'outcomes'"
+        raise settings.error("low_fidelity", told)
     return engine
 
 

@@ -63,6 +63,7 @@ class StudyResult:
         best: The best of them.
         knowledge: What is known of θ, by trials, and by fresh episodes where there are any.
         earlier: The number of trials of earlier studies that count.
+        low_fidelity: The number of trials of a cheaper proxy.
         answers: After each trial, the visited θ of lowest expected PRPV as all trials judge it; None while none has
             a score.
         truth: The θ that made the target, where that is known.
@@ -81,6 +82,7 @@ class StudyResult:
     best: Best
     knowledge: Knowledge
     earlier: int
+    low_fidelity: int
     answers: tuple[TrialRecord | None, ...]
     truth: Theta | None
     importances: tuple[Importance, ...]
@@ -196,6 +198,7 @@ def result_of(run: StudyRun, scored_anew: Sequence[TrialRecord] | None = None) -
         best=best,
         knowledge=learnt,
         earlier=len(earlier),
+        low_fidelity=sum(trial.low_fidelity for trial in learnt.trials),
         answers=answers,
         truth=study.truth,
         importances=importances(fit_surrogate(space, [*earlier, *score_trials(space, trials)])),

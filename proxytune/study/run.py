@@ -25,7 +25,7 @@ from proxytune.search import (
 )
 from proxytune.space import Space
 from proxytune.storage import State, TrialRecord
-from proxytune.study.earlier import earlier_trials
+from proxytune.study.earlier import earlier_trials, known_trials
 from proxytune.study.facts import check_facts
 from proxytune.study.opening import Objective
 from proxytune.study.preflight import check_some_work, noise_of
@@ -71,7 +71,7 @@ def goal_of(run: StudyRun) -> Goal:
 
 def knowledge_of(run: StudyRun, done: Iterable[TrialRecord]) -> Knowledge:
     """All that finished trials say of θ, those of earlier studies too."""
-    trials = [*earlier_trials(run), *(run.search_trial(trial) for trial in done)]
+    trials = [*known_trials(run), *(run.search_trial(trial) for trial in done)]
     return run.learn(trials, goal_of(run))
 
 
@@ -236,7 +236,7 @@ def _gain(run: StudyRun, done: Sequence[TrialRecord]) -> tuple[float, float]:
     """The most that any θ is expected to improve the objective, and its noise, as the study's engine sees it."""
     settings = run.settings
     if run.study.engine.learns_from == "outputs":
-        trials = [*earlier_trials(run), *(run.search_trial(trial) for trial in done)]
+        trials = [*known_trials(run), *(run.search_trial(trial) for trial in done)]
         return expected_gain(settings.space, trials, goal_of(run), settings.seed)
     scored = [*earlier_trials(run), *score_trials(settings.space, done)]
     return expected_improvement(settings.space, scored, settings.seed)

@@ -150,9 +150,9 @@ FORMAT = 1
 LEARNING = "plv"
 """The objective that is not a measure of scores but of learning."""
 KEYS = (
-    "format", "name", "family", "proxy", "target", "target_columns", "truth", "learn_from", "objective", "metrics",
-    "agents", "starts", "budget", "initial", "batch", "engine", "seed", "jobs", "on_failure", "preflight", "confirm",
-    "cut_off", "stop", "parameters", "domain", "teaching", "held_out", "episode_timeout_s",
+    "format", "name", "family", "proxy", "target", "target_columns", "truth", "learn_from", "low_fidelity", "objective",
+    "metrics", "agents", "starts", "budget", "initial", "batch", "engine", "seed", "jobs", "on_failure", "preflight",
+    "confirm", "cut_off", "stop", "parameters", "domain", "teaching", "held_out", "episode_timeout_s",
     FAMILIES,
 )  # fmt: skip
 
@@ -188,6 +188,7 @@ class StudySettings:
         aliases: What is loaded for an agent whose name in tables is another.
         targets: The files that hold the target's scores; none of a bank, which simulates for other studies.
         learn_from: Studies and tables of trials whose trials are known before the first one, as study.toml has them.
+        low_fidelity: Such of a cheaper proxy, whose outputs this one's are modelled by their difference to.
         target_columns: What columns are called in the target's files where that is another name.
         episode_timeout_s: How long an episode may take before it counts as failed [s], if that is limited.
         families: The same study of each of several domain families, by their names; empty of a study of one.
@@ -220,6 +221,7 @@ class StudySettings:
     aliases: Mapping[str, str] = field(default_factory=dict)
     targets: tuple[Path, ...] = ()
     learn_from: tuple[str, ...] = ()
+    low_fidelity: tuple[str, ...] = ()
     target_columns: Mapping[str, str] = field(default_factory=dict)
     episode_timeout_s: float | None = None
     families: Mapping[str, "StudySettings"] = field(default_factory=dict)
@@ -294,19 +296,21 @@ def _check_known(study: StudySettings) -> None:
     if not study.targets:
         if study.objective == LEARNING:
             raise study.error("objective", f"'{LEARNING}' needs a target, and this is a bank; name a target")
-        if study.learn_from:
-            raise study.error("learn_from", "is for studies with a target, and this is a bank; name a target")
+        for key in (key for key in ("learn_from", "low_fidelity") if getattr(study, key)):
+            raise study.error(key, "is for studies with a target, and this is a bank; name a target")
         if not study.preflight:
             raise study.error("preflight", "is off, and tells a bank what placement does; leave it on")
-    if study.learn_from and study.objective == LEARNING:
-        raise study.error("learn_from", f"has scores, and '{LEARNING}' is not searched by them; remove it")
+    if study.objective == LEARNING:
+        for key in (key for key in ("learn_from", "low_fidelity") if getattr(study, key)):
+            raise study.error(key, f"has scores, and '{LEARNING}' is not searched by them; remove it")
     if not study.budget and not study.learn_from:
         nothing = "is 0, and nothing is known without a trial; name studies in learn_from, or make it 1 or more"
         raise study.error("budget", nothing)
 
 
 def _check_comparable(study: StudySettings) -> None:
-    for key, has in (("target", bool(study.targets)), ("learn_from", not study.learn_from), ("budget", study.budget)):
+    alone = {key: not getattr(study, key) for key in ("learn_from", "low_fidelity")}
+    for key, has in {"target": bool(study.targets), **alone, "budget": study.budget}.items():
         if not has:
             raise study.error(key, f"of a study of {FAMILIES}: needs a target, a budget, and trials of its own alone")
     if study.objective == LEARNING:
@@ -356,6 +360,7 @@ def _settings(read: Section) -> StudySettings:
         aliases=aliases_of(read),
         targets=targets,
         learn_from=read.texts("learn_from", ()),
+        low_fidelity=read.texts("low_fidelity", ()),
         target_columns=texts_of(read.section("target_columns")),
         episode_timeout_s=positive(read, "episode_timeout_s"),
     )
@@ -381,6 +386,7 @@ def settings_document(settings: StudySettings) -> Mapping[str, Any]:
         "family": settings.family,
         "proxy": str(settings.proxy) if settings.proxy else None,
         "learn_from": list(settings.learn_from),
+        "low_fidelity": list(settings.low_fidelity),
         "objective": settings.objective,
         "metrics": [str(metric) for metric in settings.metrics],
         "agents": list(settings.agents),

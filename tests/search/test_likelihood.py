@@ -141,3 +141,48 @@ def test_outputs_that_never_change_are_not_modelled_and_stop_nothing():
     model = fit_outputs(SPACE, [Trial(design_point(SPACE, index, 1), 1.0, (7.0,)) for index in range(6)])
     assert model.modelled.size == 0
     assert np.isnan(model.predict(np.array([[0.5, 0.5]]))[0]).all()
+
+
+def cheaper(values):
+    """A course that few trials do not tell."""
+    first, second = to_unit(SPACE, values)
+    return (np.sin(9.0 * first) + second, np.cos(8.0 * second) * first)
+
+
+def better(values):
+    """The same with a bias that is smooth."""
+    first, second = to_unit(SPACE, values)
+    return tuple(value + 0.5 + 0.4 * first - 0.3 * second for value in cheaper(values))
+
+
+def test_few_trials_correct_a_cheaper_proxy():
+    """Eight trials and what a cheaper proxy does predict better than eight alone, and say how well."""
+    own = [Trial(values, 1.0, better(values)) for values in (design_point(SPACE, index, 1) for index in range(8))]
+    points = [design_point(SPACE, index, 2) for index in range(64)]
+    low = [Trial(values, None, cheaper(values), low_fidelity=True) for values in points]
+    truth, unit = np.array([better(values) for values in HELD_OUT]), unit_array(SPACE, HELD_OUT)
+    alone, both = fit_outputs(SPACE, own).predict(unit)[0], fit_outputs(SPACE, [*low, *own])
+    mean, variance = both.predict(unit)
+    assert np.abs(mean - truth).mean() < 0.2 * np.abs(alone - truth).mean()
+    assert 0.1 < np.sqrt(((mean - truth) ** 2 / (variance + both.rough)).mean()) < 1.5
+    assert both.visited.shape == (8, 2)
+
+
+def test_a_cheaper_proxy_that_does_something_else_makes_no_promise():
+    """What it says is not believed: errors are as large as the model says."""
+    own = [Trial(values, 1.0, better(values)) for values in (design_point(SPACE, index, 1) for index in range(12))]
+    draws = np.random.default_rng(1).normal(0.0, 2.0, (64, 2))
+    low = [
+        Trial(design_point(SPACE, index, 2), None, tuple(row), low_fidelity=True)
+        for index, row in enumerate(draws.tolist())
+    ]
+    model = fit_outputs(SPACE, [*low, *own])
+    mean, variance = model.predict(unit_array(SPACE, HELD_OUT))
+    truth = np.array([better(values) for values in HELD_OUT])
+    assert np.sqrt(((mean - truth) ** 2 / (variance + model.rough)).mean()) < 1.5
+
+
+def test_a_cheaper_proxy_alone_is_no_knowledge():
+    """Without a trial of the proxy itself there is nothing to learn from."""
+    with pytest.raises(RunError, match="no trial has an outcome"):
+        fit_outputs(SPACE, [Trial(TRUTH, None, cheaper(TRUTH), low_fidelity=True)])

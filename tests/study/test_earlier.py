@@ -225,3 +225,53 @@ def test_a_damaged_fact_is_told(beside: Path, make_study: MakeStudy) -> None:
         store.save_fact("learnt", {"trials": 3})
     with pytest.raises(ProxytuneError, match="'learnt' is not as proxytune writes it"):
         run_study(folder)
+
+
+CHEAPER = {"low_fidelity": '["../bank"]', "engine": None, "budget": "6"}
+OTHER = {"version": '"2"'}
+"""The domain of a proxy which the bank is not of."""
+
+
+@pytest.mark.slow
+def test_trials_of_a_cheaper_proxy_are_known_and_are_no_trials(beside: Path, make_study: MakeStudy) -> None:
+    """The design is driven all the same; what was copied is a fact; one that does nearly the same tells a lot."""
+    folder = make_study(domain=OTHER, **CHEAPER)
+    first = run_study(folder).document()
+    alone = run_study(make_study("alone", domain=OTHER, **{**CHEAPER, "low_fidelity": None})).document()
+    assert (first["low_fidelity"], first["earlier"]) == (10, 0)
+    assert [one["theta"] for one in first["trials"][:5]] == [one["theta"] for one in alone["trials"][:5]]
+    assert first["trials"][5]["theta"] != alone["trials"][5]["theta"]
+    assert first["best"]["region_share"] < alone["best"]["region_share"]
+    shutil.rmtree(beside)
+    assert run_study(folder).document() == first == read_study(folder).document()
+
+
+@pytest.mark.slow
+def test_a_study_with_a_cheaper_proxy_goes_on_as_if_it_had_not_stopped(beside: Path, make_study: MakeStudy) -> None:
+    """Five trials and then three more are the same eight."""
+    folder = make_study(domain=OTHER, **{**CHEAPER, "budget": "5"})
+    run_study(folder)
+    in_two = run_study(make_study(domain=OTHER, **{**CHEAPER, "budget": "8"})).document()
+    at_once = run_study(make_study("at_once", domain=OTHER, **{**CHEAPER, "budget": "8"})).document()
+    assert in_two["trials"] == at_once["trials"]
+    assert in_two["best"] == at_once["best"]
+
+
+NO_CHEAPER = {
+    "the same proxy": ({}, {}, "low_fidelity: .*is of this very proxy, so its trials count in full"),
+    "other agents": ({"agents": '["agent0", "agent1", "agent7"]'}, OTHER, "no agent 'agent7'"),
+    "more starts": ({"starts": "5"}, OTHER, "low_fidelity: .*bank.* has driven from 3 starts"),
+    "an engine that learns from scores": ({"engine": '"gp"'}, OTHER, "low_fidelity: engine 'gp' cannot tell"),
+    "no trial of its own": ({"budget": "0"}, OTHER, "budget: is 0, and nothing is known"),
+    "a bank": ({"target": None, "preflight": "true"}, OTHER, "low_fidelity: is for studies with a target"),
+    "learning value": ({"objective": '"plv"'}, OTHER, "low_fidelity: has scores"),
+}
+
+
+@pytest.mark.parametrize("case", NO_CHEAPER)
+def test_a_cheaper_proxy_that_is_none_is_refused(case: str, beside: Path, make_study: MakeStudy) -> None:
+    """One line names the key, what is wrong and what to do."""
+    changes, domain, words = NO_CHEAPER[case]
+    with pytest.raises(ProxytuneError, match=words) as refused:
+        run_study(make_study(domain=domain, **{**CHEAPER, **changes}))
+    assert str(refused.value).count("\n") == 0

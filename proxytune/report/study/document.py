@@ -31,6 +31,7 @@ def study_document(result: StudyResult) -> dict[str, Any]:
         "preflight": _preflight(result.preflight),
         "stopped": result.stopped or None,
         "earlier": result.earlier,
+        "low_fidelity": result.low_fidelity,
         "cut_off": {"trials": len(result.pruned), "episodes": result.spared[0], "seconds": result.spared[1]},
         "trials": [_trial(trial) for trial in result.trials],
         "failures": list(result.failures),

@@ -214,6 +214,9 @@ def search_table(result: StudyResult, spent: str = "") -> Table:
     rows: Rows = [("trials", f"{number}; best: {best}{ended}")]
     if result.earlier:
         rows.append(("earlier", f"{result.earlier} trials of {', '.join(result.study.settings.learn_from)}"))
+    if result.low_fidelity:
+        names = ", ".join(result.study.settings.low_fidelity)
+        rows.append(("low fidelity", f"{result.low_fidelity} trials of {names}, corrected by this proxy's"))
     if result.preflight is not None:
         warnings = [line.removeprefix("pre-flight: ") for line in result.preflight.warnings]
         every = ["every parameter changes some metric beyond noise"]

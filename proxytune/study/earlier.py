@@ -104,8 +104,8 @@ def _keep(run: StudyRun, sources: Sequence[Source], key: str = FULL, *, again: b
         place = places.setdefault(source.facts["seed"], len(places))
         inside = [theta for theta in source.trials if all(b.low <= dict(theta)[b.name] <= b.high for b in box)]
         if not inside:
-            told = "has no trial in the box of [parameters]; widen it, or remove this"
-            raise _refused(settings, key, source.path, told)
+            why = "has no trial in the box of [parameters]; widen it, or remove this"
+            raise _refused(settings, key, source.path, why)
         for theta in inside:
             means = _means(source.trials[theta], settings, names)
             rows.append([place, list(settings.space.values(dict(theta))), means])

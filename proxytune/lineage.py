@@ -55,7 +55,7 @@ SAME_CODE = {
         "79f5fa29af66",
         "bba8741ee1e0",
         "4ae305889b1d",
-        "09663ed77513",
+        "cb79f534eabb",
     ),
     "engine composite": (
         "82865583b592",
@@ -64,7 +64,7 @@ SAME_CODE = {
         "79f5fa29af66",
         "bba8741ee1e0",
         "4ae305889b1d",
-        "09663ed77513",
+        "cb79f534eabb",
     ),
     "engine gp": ("231c6791b2b7", "1dae7f006157", "41a805e87825", "d952ced2ab68"),
     "engine random": ("0faabd65d4d9", "40019bb841cc", "aa9b7e2da380", "a00262704239"),

@@ -220,8 +220,7 @@ def as_targets(
 ) -> Iterator[AsTarget]:
     """Take each of the trials that `leave_out` leaves out for a target, at most so many of them."""
     known = sorted((trial for trial in trials if trial.outcome is not None), key=lambda trial: trial.values)
-    own = [row for row, trial in enumerate(known) if not trial.low_fidelity]
-    whole = [row for row in own if not np.isnan(known[row].outcome or ()).any()]
+    whole = [row for row, one in enumerate(known) if not one.low_fidelity and not np.isnan(one.outcome or ()).any()]
     normal = np.random.default_rng(seed).standard_normal((len(known), len(goal.values)))
     places = np.unique(np.linspace(0, max(0, len(whole) - 1), most).round().astype(int)).tolist()
     for row in [whole[place] for place in places] if len(whole) >= FEWEST else []:

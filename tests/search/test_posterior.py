@@ -223,3 +223,9 @@ def test_draws_are_those_of_the_density_and_in_the_box():
     assert draws[:, 1].std() == pytest.approx(0.1, abs=0.015)
     assert len({tuple(draw) for draw in draws}) == 400
     assert np.array_equal(found.draw(3), found.draw(3))
+
+
+def test_trials_of_a_cheaper_proxy_are_no_targets():
+    """They tell of those that are left out, and are not what a target looks like."""
+    low = [replace(trial, score=None, low_fidelity=True) for trial in trials(40)[8:]]
+    assert left_out([*low, *trials(8)]).deviances.shape == (8,)

@@ -29,10 +29,10 @@ from proxytune.errors import LogError
 from proxytune.logs import Frames, Log, LogEpisode, read_log
 
 SETS = (
-    ("none drive horseshoe 20mm_tape", 501, 60),
-    ("camera_latency", 504, 60),
-    ("vignetting", 505, 60),
-    ("camera_height+field_of_view", 506, 60),
+    ("none drive horseshoe 20mm_tape", 501, 40),
+    ("camera_latency", 504, 40),
+    ("vignetting", 505, 40),
+    ("camera_height+field_of_view", 506, 40),
     ("dirt", 507, 120),
 )
 """Sets whose seeds nothing was developed on, of what tests below leave out, with their frames: dirt needs all."""

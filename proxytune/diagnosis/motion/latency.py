@@ -262,6 +262,8 @@ SHARE, SHARE_IF_FAR = 0.08, 0.7
 FAR_S = 1.0
 """The least share of what is left over that another clock takes away, and that one further off than FAR_S does. Drives
 in which a robot sticks or has play answer later than others, but another latency explains little of that."""
+LEAST_SQUARES = 2.0
+"""Squares a block below this are next to nothing: another latency that takes them away explains nothing."""
 MOST_JUMPS = 4
 
 
@@ -515,7 +517,8 @@ def _is_jump(one: Latency, other: Latency, share: float, usual: float | None, *,
 def _share(squares: Floats, latencies: Floats, elsewhere: float) -> float:
     """The share of what is left over at another latency that the best one takes away."""
     total = squares.sum(axis=0)
-    return 1.0 - float(total.min() / total[int(np.abs(latencies - elsewhere).argmin())])
+    other = float(total[int(np.abs(latencies - elsewhere).argmin())])
+    return (other - float(total.min())) / max(other, LEAST_SQUARES * len(squares))
 
 
 def deviants(own: Sequence[Floats], latencies: Floats) -> tuple[float, dict[int, Latency]]:

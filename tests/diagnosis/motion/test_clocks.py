@@ -85,6 +85,11 @@ def test_a_drive_with_a_clock_of_its_own_is_named(by):
     assert (found.offset.value, found.jumps) == (0.0, ())
 
 
+def test_without_noise_a_drive_of_its_own_clock_makes_no_jump_in_another():
+    found = read_clocks(hidden.make_log(CASE, late_s=in_one_drive(-0.3), noiseless=True, **SHORT), ROBOT)
+    assert (list(found.drives), found.jumps) == (["03"], ())
+
+
 @pytest.mark.parametrize("by", [-0.3, 0.2])
 def test_a_clock_that_jumps_is_named_with_its_time_and_the_longer_stretch_is_kept(by):
     found = clocks(in_one_drive(by, after=500))

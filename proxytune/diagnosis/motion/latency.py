@@ -515,10 +515,15 @@ def _is_jump(one: Latency, other: Latency, share: float, usual: float | None, *,
 
 
 def _share(squares: Floats, latencies: Floats, elsewhere: float) -> float:
-    """The share of what is left over at another latency that the best one takes away."""
-    total = squares.sum(axis=0)
-    other = float(total[int(np.abs(latencies - elsewhere).argmin())])
-    return (other - float(total.min())) / max(other, LEAST_SQUARES * len(squares))
+    """The share of what is left over at another latency that the best one takes away.
+
+    Far off, one block alone is no proof: a tracker may put its map right within it.
+    """
+    best, other = int(squares.sum(axis=0).argmin()), int(np.abs(latencies - elsewhere).argmin())
+    gained = squares[:, other] - squares[:, best]
+    kept = np.ones(len(squares), dtype=bool)
+    kept[gained.argmax()] = abs(latencies[best] - elsewhere) < FAR_S
+    return float(gained[kept].sum() / max(squares[kept, other].sum(), LEAST_SQUARES * kept.sum()))
 
 
 def deviants(own: Sequence[Floats], latencies: Floats) -> tuple[float, dict[int, Latency]]:

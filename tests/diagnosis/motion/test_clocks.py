@@ -210,6 +210,19 @@ def test_a_robot_that_is_stuck_at_first_is_no_clock_problem():
     assert stretches(log, blocks, latencies) == ([(0.0, np.inf)], ())
 
 
+def test_one_block_of_a_robot_at_rest_is_no_proof_of_another_clock():
+    latencies = np.arange(-40, 41) * 0.25
+    own = 0.25 + 0.05 * np.sin(np.arange(24.0))
+    moving = 9.0 + np.minimum(50.0 * (latencies - own[:, None]) ** 2, 900.0)
+    # The map is put right while the robot rests, and long after there was a command that it looks like.
+    put_right = 9.0 + np.minimum(50.0 * (latencies + 9.52) ** 2, 180.0)
+    resting = 9.0 + 0.01 * (latencies + 9.5) ** 2 * np.ones((5, 1))
+    log = planted_log({}, episodes=1, seconds=60.0)
+    squares = np.concatenate((moving, put_right[None], resting))
+    blocks = Blocks(np.zeros(30, dtype=int), np.arange(30), squares)
+    assert stretches(log, blocks, latencies) == ([(0.0, np.inf)], ())
+
+
 def test_commands_put_on_the_poses_clock_are_those_of_one_clock():
     late = in_one_drive(-0.3)
     apart, right = (hidden.make_log(CASE, late_s=late_s, noiseless=True, **SHORT) for late_s in (late, 0.0))

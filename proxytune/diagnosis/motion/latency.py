@@ -504,6 +504,9 @@ def _is_jump(one: Latency, other: Latency, share: float, usual: float | None, *,
     least = SHARE_AT_A_STEP if at_a_step else SHARE
     if by <= LEAST_APART_S or share < (least if by < FAR_S else SHARE_IF_FAR):
         return False
+    # Where both sides are far off, a few seconds are only like what was asked long before or after.
+    if by > FAR_S and usual is not None and min(abs(side.value - usual) for side in (one, other)) > FAR_S:
+        return False
     if sure > SURE_OF_A_JUMP:
         return True
     enough, least = (SURE_AT_A_STEP, least) if at_a_step else (SURE_BESIDE_OTHERS, SHARE_BESIDE_OTHERS)

@@ -115,6 +115,13 @@ def test_a_clock_that_jumps_in_a_third_of_the_drives_is_told_where_poses_step():
     np.testing.assert_allclose(found.later_s, (0.0, -0.2, 0.0, 0.0, 0.0, 0.0), atol=0.02)
 
 
+@pytest.mark.slow
+def test_what_a_drive_does_in_its_last_seconds_is_no_second_jump_far_off():
+    one = planted("jump in a third", 4, hidden=False)
+    jumps = read_clocks(hidden.make_log(one.case, late_s=one.late_s), ROBOT).jumps
+    np.testing.assert_allclose([jump.by_s for jump in jumps], [-0.3] * 4, atol=0.02)
+
+
 def test_a_jump_too_small_for_its_latencies_alone_is_told_by_the_step_of_the_poses():
     one = planted("jump", 154, hidden=False)
     (jump,) = read_clocks(hidden.make_log(one.case, late_s=one.late_s), ROBOT).jumps

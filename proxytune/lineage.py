@@ -39,6 +39,7 @@ SAME_CODE = {
         "403d3586904f8c47aa0c58c330753a20fceba77b0d1576d5c0fdec913ba32c6c",
         "5a256e6ec043d1cd8bd6c39c387f8ea37e6beaf03642f97c9217605ae4f0830e",
         "94c2e672161e5eb3819043c1684c3859b44baa7e41800145b32c2bff9d44c7c4",
+        "d1c60aa93bdd77976fa65112071f591f3da28059d51ac2212d6e214e993ff820",
     ),
     "environments": (
         "f5b9c2c9586c29cd4dc2d6e27f44fd2731ecc2d27bf96a80c745aecd5a3ddb50",
@@ -47,6 +48,7 @@ SAME_CODE = {
         "cd8c3a2b25d594297615fc6aa9242767b05d6f953a175ac2c3de9b44cdf3a016",
         "d42c81e8a3875759a736db7235c5cf3a713e8edc7f9ca64e5164c3149d2becd5",
         "4c4c6938034f481691acea6d8729b71483aeae192fbc759109a77fd37c052dfa",
+        "3347db8c725fed99a9dab5513285b83255ba9d0d595e4b395fe48d69a8408fc7",
     ),
     "engine outcomes": (
         "94c0ba12f9bf",

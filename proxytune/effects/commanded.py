@@ -87,12 +87,12 @@ COMMAND_GROUPS: Mapping[str, Group] = MappingProxyType(
             "size of the command",
             "duty",
             of="duty",
-            duty=lambda c, k: np.sign(c.duty)[..., None] * hats(np.abs(c.duty), k),
+            duty=lambda c, k: hats(np.abs(c.duty), k, np.sign(c.duty)),
         ),
         "drawn": _group(
             "sum of both commands",
             "duty",
-            duty=lambda c, k: c.duty[..., None] * hats(np.abs(c.duty).sum(axis=-1, keepdims=True), k),
+            duty=lambda c, k: hats(np.abs(c.duty).sum(axis=-1, keepdims=True), k, c.duty),
         ),
         "held": _group(
             "time since a command changed",

@@ -58,11 +58,20 @@ STANDS = 0.1
 """A wheel is to stand where it is asked to go slower than this share of its speed of late."""
 
 
-def hats(signal: Signal, knots: Knots) -> Signal:
-    """Piecewise-linear functions (…, knots): each 1 at its knot, 0 at all others and at 0, level beyond the last."""
+def hats(signal: Signal, knots: Knots, height: Signal | float = 1.0) -> Signal:
+    """Piecewise-linear functions (…, knots): each 1, or so high, at its knot, 0 at others and at 0, level beyond."""
     corners = np.sort(np.array([0.0, *knots], dtype=float))
-    rows = np.eye(len(corners))[corners != 0.0]
-    return np.stack([np.interp(signal, corners, row) for row in rows], axis=-1)
+    signal, height = np.broadcast_arrays(signal, height)
+    flat = signal.ravel()
+    # All but the two next to the signal are 0 there: linear between these, level beyond the ends.
+    below = np.clip(np.searchsorted(corners, flat, side="right") - 1, 0, len(corners) - 2)
+    low, high = corners[below], corners[below + 1]
+    share = np.where(flat >= high, 1.0, 1.0 / (high - low) * np.maximum(flat - low, 0.0))
+    number, out = np.cumsum(corners != 0.0) - 1, np.zeros((flat.size, len(knots)))
+    for corner, value in ((below, (1.0 - share) * height.ravel()), (below + 1, share * height.ravel())):
+        own = np.flatnonzero(corners[corner])
+        out[own, number[corner[own]]] = value[own]
+    return out.reshape(*signal.shape, len(knots))
 
 
 def grid(asked: AskedMotion, knots: Knots) -> Signal:
@@ -239,8 +248,8 @@ MOTION_GROUPS: Mapping[str, Group] = MappingProxyType(
             "turn rate",
             "rad/s",
             {
-                "forward": Channel("forward", "of the speed", lambda a, k: hats(a.yaw, k) * a.forward[..., None]),
-                "sideways": Channel("sideways", "of the speed", lambda a, k: hats(a.yaw, k) * a.forward[..., None]),
+                "forward": Channel("forward", "of the speed", lambda a, k: hats(a.yaw, k, a.forward)),
+                "sideways": Channel("sideways", "of the speed", lambda a, k: hats(a.yaw, k, a.forward)),
                 "yaw": Channel("yaw", "rad/s", lambda a, k: hats(a.yaw, k)),
             },
         ),
@@ -318,13 +327,13 @@ MOTION_GROUPS: Mapping[str, Group] = MappingProxyType(
         "time": Group(
             "time in the episode",
             "s",
-            _of_wheels("of its speed", lambda a, k, wheel: hats(a.seconds, k) * a.wheels[wheel][..., None]),
+            _of_wheels("of its speed", lambda a, k, wheel: hats(a.seconds, k, a.wheels[wheel])),
             1e-3,
         ),
         "use": Group(
             "cumulated use",
             "min at full speed",
-            _of_wheels("of its speed", lambda a, k, wheel: hats(a.use, k) * a.wheels[wheel][..., None]),
+            _of_wheels("of its speed", lambda a, k, wheel: hats(a.use, k, a.wheels[wheel])),
             1e-6,
         ),
         "load": Group(
@@ -400,7 +409,7 @@ def play(signal: Signal, before: Signal, halves: Knots) -> Signal:
     half = np.asarray(halves)
     for step in range(signal.shape[-1] if len(halves) else 0):
         here = signal[..., step, None]
-        now = np.clip(now, here - half, here + half)
+        now = np.minimum(np.maximum(now, here - half), here + half)
         out[..., step, :] = now
     return out
 

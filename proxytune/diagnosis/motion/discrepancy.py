@@ -32,6 +32,7 @@ from proxytune.diagnosis.motion.prediction import (
     cut,
     pose_errors,
     ratio,
+    replay_commands,
     rmse,
     select_windows,
     slopes_of,
@@ -157,7 +158,8 @@ def _lattice(places: Floats, most: int) -> Knots:
     """Corners of the meshes that were driven through, in the plane or on an axis, as fine as so many corners allow."""
     axes = places.shape[1]
     for mesh in MESHES_M:
-        cells = np.unique(np.floor(places / mesh - 0.5), axis=0)
+        cells = np.floor(places / mesh - 0.5)
+        cells = np.unique(cells[np.diff(cells, axis=0, prepend=np.nan).any(axis=1)], axis=0)
         corners = np.unique(np.concatenate([cells + step for step in product((0, 1), repeat=axes)]), axis=0)
         if len(corners) <= most:
             found = (mesh * (corners + 0.5)).tolist()
@@ -207,15 +209,15 @@ ROBUST = 1.5
 
 
 class Sums(NamedTuple):
-    """Weighted squares by part (P, …): of the columns with each other, with the errors, and of the errors."""
+    """Weighted squares by part: of columns with each other, (K, K) each, with the errors (P, K), of the errors (P,)."""
 
-    hessian: Floats
+    hessian: Sequence[Floats]
     gradient: Floats
     size: Floats
 
     def only(self, chosen: Whole) -> "Sums":
         """Some of the parts."""
-        return Sums(self.hessian[chosen], self.gradient[chosen], self.size[chosen])
+        return Sums([self.hessian[number] for number in chosen], self.gradient[chosen], self.size[chosen])
 
 
 class ChosenGroups(NamedTuple):
@@ -236,17 +238,19 @@ def sum_squares(slopes: Slopes, weights: Floats, part: Whole, parts: int) -> Sum
         columns = slopes.columns[own].reshape(-1, slopes.columns.shape[2])
         hessian.append((columns * np.repeat(trust[own], 3)[:, None]).T @ columns)
     gradient = sum_by(part, np.einsum("mck,mc,m->mk", slopes.columns, errors, trust), parts)
-    return Sums(np.stack(hessian), gradient, sum_by(part, (errors**2).sum(axis=1) * trust, parts))
+    return Sums(hessian, gradient, sum_by(part, (errors**2).sum(axis=1) * trust, parts))
 
 
-def choose_groups(given: Sums, groups: Mapping[str, Whole], rules: Rules) -> ChosenGroups:
+def choose_groups(given: Sums, groups: Mapping[str, slice], rules: Rules) -> ChosenGroups:
     """Add groups one by one, the best first, while they pay on parts left out; the level is always there."""
-    mean, nothing = given.hessian.sum(axis=0).diagonal(), 1e-12 * given.size.mean()
-    pulls = {name: FREE for name in groups if name == LEVEL}
+    mean, nothing = np.sum([hessian.diagonal() for hessian in given.hessian], axis=0), 1e-12 * given.size.mean()
+    unit = {name: float(mean[own].mean()) for name, own in groups.items()}
+    pulls = {name: FREE * unit[name] + 1e-9 for name in groups if name == LEVEL}
     gains: dict[str, float] = {}
-    (losses,) = _held_out_losses(given, *_penalise(groups, [pulls], mean))
+    held = _hold(given, groups, pulls)
+    (losses,) = _held_out_losses(given, held, slice(0), np.zeros(1))
     while True:
-        tried = {name: _try_group(given, groups, pulls, name, mean) for name in groups if name not in pulls}
+        tried = {name: _try_group(given, held, groups[name], name, unit[name]) for name in groups if name not in pulls}
         paying = {}
         for name, found in tried.items():
             # Errors of parts differ by orders of magnitude: each counts by its ratio.
@@ -259,55 +263,65 @@ def choose_groups(given: Sums, groups: Mapping[str, Whole], rules: Rules) -> Cho
         best = min(paying, key=lambda name: float(paying[name][1].sum()))
         pulls[best], after = paying[best]
         gains[best] = float((losses - after).sum())
-        losses = after
+        losses, held = after, _hold(given, groups, pulls)
     weights = np.zeros(len(mean))
-    columns, (penalty,) = _penalise(groups, [pulls], mean)
-    total = given.hessian.sum(axis=0)[np.ix_(columns, columns)]
-    weights[columns] = np.linalg.solve(total + np.diag(penalty), given.gradient.sum(axis=0)[columns])
+    total = held.own[:, :, held.columns].sum(axis=0) + np.diag(held.penalty)
+    weights[held.columns] = np.linalg.solve(total, given.gradient.sum(axis=0)[held.columns])
     return ChosenGroups(weights, gains)
 
 
-def _try_group(
-    given: Sums, groups: Mapping[str, Whole], pulls: Mapping[str, float], name: str, mean: Floats
-) -> tuple[float, Floats]:
-    """The strongest ridge of a group within one standard error of its best, and the losses of the parts with it."""
-    ridges = [ridge for ridge in RIDGES if ridge >= FIRMEST_ONLY.get(name, 0.0)]
-    found = _held_out_losses(given, *_penalise(groups, [{**pulls, name: ridge} for ridge in ridges], mean))
+class _Held(NamedTuple):
+    """Columns held by penalties; their squares with all, each part's own and of others; and what they take of all."""
+
+    columns: Whole
+    penalty: Floats
+    own: Floats
+    rest: Floats
+    answer: Floats
+
+
+def _hold(given: Sums, groups: Mapping[str, slice], pulls: Mapping[str, float]) -> _Held:
+    """Hold the groups that have a pull: they are solved for once, for all that may come beside them."""
+    pulled = np.zeros(given.gradient.shape[1])
+    for name, pull in pulls.items():
+        pulled[groups[name]] = pull
+    columns = np.flatnonzero(pulled)
+    own = np.stack([hessian[columns] for hessian in given.hessian])
+    rest = _of_others(own)
+    right = np.concatenate((rest, _of_others(given.gradient)[:, columns, None]), axis=2)
+    answer = np.linalg.solve(rest[:, :, columns] + np.diag(pulled[columns]), right)
+    return _Held(columns, pulled[columns], own, rest, answer)
+
+
+def _of_others(own: Floats) -> Floats:
+    """The sums over all other parts, for each part (P, …)."""
+    return np.asarray(own.sum(axis=0) - own)
+
+
+def _try_group(given: Sums, held: _Held, own: slice, name: str, unit: float) -> tuple[float, Floats]:
+    """The hardest pull of a group within one standard error of its best, and the losses of the parts with it."""
+    pulls = np.array([ridge for ridge in RIDGES if ridge >= FIRMEST_ONLY.get(name, 0.0)]) * unit + 1e-9
+    found = _held_out_losses(given, held, own, pulls)
     best = min(found, key=lambda losses: float(losses.sum()))
-    for ridge, losses in zip(ridges[::-1], found[::-1], strict=True):
+    for pull, losses in zip(pulls[::-1].tolist(), found[::-1], strict=True):
         worse = losses - best
         if worse.sum() <= np.sqrt(len(worse)) * worse.std(ddof=1):
-            return ridge, losses
-    return ridges[-1], found[-1]
+            return pull, losses
+    return float(pulls[-1]), found[-1]
 
 
-def _penalise(
-    groups: Mapping[str, Whole], choices: Sequence[Mapping[str, float]], mean: Floats
-) -> tuple[Whole, Floats]:
-    """The columns (K,) of the groups that have a pull, and how hard each is pulled (R, K): alike within a group."""
-    names = list(choices[0])
-    columns = np.concatenate([np.empty(0, int), *(groups[name] for name in names)])
-    sizes = np.array([len(groups[name]) for name in names], int)
-    held = [[pulls[name] * mean[groups[name]].mean() + 1e-9 for name in names] for pulls in choices]
-    return columns, np.repeat(np.array(held), sizes, axis=1)
-
-
-def _held_out_losses(given: Sums, columns: Whole, penalties: Floats) -> Floats:
-    """The squared error of each part with weights from all others, under each penalty (R, K): (R, P)."""
-    hessian, gradient = given.hessian[:, columns[:, None], columns], given.gradient[:, columns]
-    rest, pull = hessian.sum(axis=0) - hessian, gradient.sum(axis=0) - gradient
-    # Columns that are held alike under all penalties come first: they are solved for once, the others by Schur's
-    # complement.
-    count = int(np.argmin(np.append((penalties == penalties[0]).all(axis=0), False)))
-    across = rest[:, :count, count:]
-    right = np.concatenate((across, pull[:, :count, None]), axis=2)
-    alike = np.linalg.solve(rest[:, :count, :count] + np.diag(penalties[0, :count]), right)
-    inner = rest[:, count:, count:] - np.swapaxes(across, 1, 2) @ alike[..., :-1]
-    left = pull[:, count:, None] - np.swapaxes(across, 1, 2) @ alike[..., -1:]
-    last = np.linalg.solve(inner + penalties[:, None, count:, None] * np.eye(len(columns) - count), left)
-    weights = np.concatenate((alike[..., -1:] - alike[..., :-1] @ last, last), axis=2)[..., 0]
-    bent = (weights * (hessian @ weights[..., None])[..., 0]).sum(axis=-1)
-    return np.asarray(given.size - 2.0 * (weights * gradient).sum(axis=-1) + bent)
+def _held_out_losses(given: Sums, held: _Held, own: slice, pulls: Floats) -> Floats:
+    """The squared error of each part with weights from all others, own columns under each pull (R,): (R, P)."""
+    # What is held already is eliminated by Schur's complement.
+    inside = np.stack([hessian[own, own] for hessian in given.hessian])
+    across, answer, alone = held.own[:, :, own], held.answer[:, :, own], held.answer[:, :, -1:]
+    back, gradient = np.swapaxes(held.rest[:, :, own], 1, 2), given.gradient[:, :, None]
+    penalty = pulls[:, None, None, None] * np.eye(inside.shape[1])
+    last = np.linalg.solve(_of_others(inside) - back @ answer + penalty, _of_others(gradient[:, own]) - back @ alone)
+    first = alone - answer @ last
+    bent = held.own[:, :, held.columns] @ first + 2.0 * (across @ last) - 2.0 * gradient[:, held.columns]
+    more = inside @ last - 2.0 * gradient[:, own]
+    return np.asarray(given.size + (first * bent).sum(axis=(2, 3)) + (last * more).sum(axis=(2, 3)))
 
 
 PARTS = 16
@@ -382,19 +396,20 @@ def _has(found: Discrepancy, groups: Iterable[str]) -> bool:
 def _fit_curves(drives: Drives, theta: Theta, offer: Learnt) -> tuple[Theta, Mapping[str, float], Sequence[Theta]]:
     """Fit the curves to all parts, with what each group gained, and without each fold in turn; by names in θ."""
     parts = _parts(drives)
-    names = np.array([curve.group for curve in offer.curves for _ in curve.knots])
-    groups = {name: np.flatnonzero(names == name) for name in dict.fromkeys(names.tolist())}
-    weights = np.zeros(sum(len(curve.knots) for curve in offer.curves))
+    names = [curve.group for curve in offer.curves for _ in curve.knots]
+    groups = {name: slice(names.index(name), names.index(name) + names.count(name)) for name in dict.fromkeys(names)}
+    weights = np.zeros(len(names))
     now: Mapping[str, float] = {}
+    replayed = replay_commands(drives, theta, offer)
     for _ in range(ROUNDS):
-        slopes = slopes_of(drives, {**theta, **now}, offer)
+        slopes = slopes_of(drives, {**theta, **now}, offer, replayed)
         given = sum_squares(slopes, weights, slopes.block % parts, parts)
         chosen = choose_groups(given, groups, drives.rules)
         weights, now = chosen.weights, _theta(offer, chosen)
         if not chosen.gains:
             break
     number = np.arange(parts) % FOLDS
-    without = [given.only(number != fold) for fold in range(FOLDS)] if now else []
+    without = [given.only(np.flatnonzero(number != fold)) for fold in range(FOLDS)] if now else []
     folds = [_theta(offer, choose_groups(some, groups, drives.rules)) for some in without]
     return now, chosen.gains, folds
 

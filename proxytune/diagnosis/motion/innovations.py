@@ -182,14 +182,15 @@ def fit_noise(drives: Drives, errors: Floats, start: Noise) -> Noise:
     kept = np.asarray(number * 0.6180339887 % 1.0 < THINNED / max(len(errors), 1))
     if not kept.all():
         drives, errors = drives.only(kept), errors[kept]
-    found = [_fit_noise(drives, errors, noise) for noise in dict.fromkeys((start, FIRST_GUESS))]
+    parts = np.stack([_covariance(drives, unit) for unit in np.eye(5)])
+    found = [_fit_noise(parts, errors, noise) for noise in dict.fromkeys((start, FIRST_GUESS))]
     return min(found, key=lambda pair: pair[0])[1]
 
 
-def _fit_noise(drives: Drives, errors: Floats, start: Noise) -> tuple[float, Noise]:
+def _fit_noise(parts: Floats, errors: Floats, start: Noise) -> tuple[float, Noise]:
+    """The same from one start, and what it loses; `parts` are what each variance of 1 adds to the covariance."""
     scale = np.concatenate((start.drive, start.pose))
     lowest, highest = np.log(SMALLEST / scale), np.log(LARGEST / scale)
-    parts = np.stack([_covariance(drives, unit) for unit in np.eye(5)])
     compiled = _by_numba()
 
     def with_slope(logs: Floats) -> tuple[float, Floats]:
@@ -391,23 +392,30 @@ def _window_wheels(
     return whole, train.actuation.apply(rows_at(arrived, episode[:, None], ticks), train.actuation.begin(turning))[0]
 
 
-def window_features(
-    drives: Drives, theta: Theta, learnt: Learnt, begin: Whole, length: int
-) -> Iterator[list[tuple[Floats, Floats]]]:
-    """Motion that each weight of a learnt effect beside a model adds in such windows, curve by curve.
+LearntMotion = list[tuple[Floats, Floats]]
+"""What weights of a curve add: features (W, length, knots), and the twist (3,) of one unit of them, part by part."""
 
-    That is features (W, length, knots), and the twist that one unit of them makes (3,), of which a curve may have some.
-    """
+
+def window_features(drives: Drives, theta: Theta, learnt: Learnt, begin: Whole, length: int) -> Iterator[LearntMotion]:
+    """Motion that each weight of a learnt effect beside a model adds in such windows, but those over commands."""
     whole = twists_of(drives, theta)
     past = learnt.recall(_window_setting(drives, begin, whole), whole, drives.episode[begin], drives.first[begin])
     yield from ([one] for one in learnt.features(window_twists(drives, theta, begin, length), past))
+
+
+def window_command_features(
+    drives: Drives, theta: Theta, learnt: Learnt, begin: Whole, length: int
+) -> Iterator[LearntMotion]:
+    """Motion that each weight over commands adds in such windows: every one is a replay of the drives."""
     train, _ = _model(drives, theta)
     arrived = _arrived(drives, train)
     asked = _window_twists(drives, train, begin, length)
     for features in learnt.commands.features(arrived, learnt.commands.begin(_setting(drives))):
-        columns = [SMALL_DUTY * column for column in np.moveaxis(features, -1, 0)]
-        moved = np.stack([_window_twists(drives, train, begin, length, one) - asked for one in columns], axis=-1)
-        yield [(moved[..., n, :] / SMALL_DUTY, unit) for n, unit in enumerate(np.eye(3))]
+        moved = np.empty((3, features.shape[-1], *asked.shape[:2]))
+        for number, column in enumerate(np.moveaxis(features, -1, 0)):
+            twists = _window_twists(drives, train, begin, length, SMALL_DUTY * column)
+            np.divide(np.moveaxis(twists - asked, -1, 0), SMALL_DUTY, out=moved[:, number])
+        yield [(np.moveaxis(part, 0, -1), unit) for part, unit in zip(moved, np.eye(3), strict=True)]
 
 
 def tracked_paths(drives: Drives, theta: Theta, twists: Floats) -> Floats:

@@ -17,7 +17,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scipy.optimize import minimize, minimize_scalar
 from scipy.signal import lfilter
 
-from proxytune.diagnosis.motion.drives import Drives, Floats, Whole, relative, sum_by
+from proxytune.diagnosis.motion.drives import Drives, Floats, Whole, relative, rows_at, sum_by
 from proxytune.driving import drivetrain
 from proxytune.logs import Log
 
@@ -141,7 +141,9 @@ class _CommandedSpeeds:
             for number, latency_s in enumerate(latencies_s):
                 late = self.pad - latency_s * self.drives.tick_hz
                 shift, part = int(np.floor(late)), late - np.floor(late)
-                first, last = ((1.0 - part) * gone[e, t + shift] + part * gone[e, t + shift + 1] for e, t in ends)
+                first, last = (
+                    (1.0 - part) * rows_at(gone, e, t + shift) + part * rows_at(gone, e, t + shift + 1) for e, t in ends
+                )
                 asked[number, own] = (last - first) / (speeds.last - speeds.first)[own, None]
         return asked
 

@@ -8,6 +8,7 @@ that were driven several times from the same commands: no model can predict what
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -28,8 +29,10 @@ from proxytune.diagnosis.motion.drives import (
     sum_by,
 )
 from proxytune.diagnosis.motion.innovations import (
+    LearntMotion,
     integrate_twists,
     tracked_paths,
+    window_command_features,
     window_features,
     window_paths,
     window_twists,
@@ -376,8 +379,17 @@ def choose_windows(drives: Drives) -> Windows:
     return Windows(windows.begin, windows.window[last], windows.increment[last])
 
 
-def slopes_of(drives: Drives, theta: Theta, offered: Learnt) -> Slopes:
-    """Linearise windows in the weights of the curves offered, around a model that may have a learnt effect itself."""
+def replay_commands(drives: Drives, theta: Theta, offered: Learnt) -> list[LearntMotion]:
+    """Motion that curves over commands add in the windows that are fitted: the same wherever these are linearised."""
+    windows = choose_windows(drives)
+    return list(window_command_features(drives, theta, offered, windows.begin, length_of(drives, windows)))
+
+
+def slopes_of(drives: Drives, theta: Theta, offered: Learnt, replayed: Sequence[LearntMotion] | None = None) -> Slopes:
+    """Linearise windows in the weights of the curves offered, around a model that may have a learnt effect itself.
+
+    Commands that are replayed already need not be again.
+    """
     windows = choose_windows(drives)
     begin, window = windows.begin, windows.window
     tick = drives.last[windows.increment] - drives.first[begin][window]
@@ -388,28 +400,27 @@ def slopes_of(drives: Drives, theta: Theta, offered: Learnt) -> Slopes:
     predicted = motion_in(drives, walked, windows)
     measured = measured_motion(drives, windows)
     way = float(np.median(np.hypot(measured[:, 0], measured[:, 1])))
-    features = window_features(drives, named, offered, begin, length)
+    commanded = replay_commands(drives, named, offered) if replayed is None else replayed
+    features = chain(window_features(drives, named, offered, begin, length), commanded)
     changes = _pose_slopes(twists, walked, features, (window, tick - 1), 1.0 / drives.tick_hz)
     # Seen from the frame in which each window's tracked place begins.
     cosine, sine = (part[:, None] for part in cosine_and_sine(-walked[window, 0, 2]))
     x = cosine * changes[:, 0] - sine * changes[:, 1]
     y = sine * changes[:, 0] + cosine * changes[:, 1]
-    columns = np.stack((x, y, changes[:, 2]), axis=1)
-    scale = np.array((1.0, 1.0, way))
-    return Slopes((measured - predicted) * scale, columns * scale[:, None], drives.block[begin[window]])
+    columns = np.stack((x, y, way * changes[:, 2]), axis=1)
+    return Slopes((measured - predicted) * (1.0, 1.0, way), columns, drives.block[begin[window]])
 
 
 def _pose_slopes(
     twists: Floats,
     walked: Floats,
-    features: Iterable[Sequence[tuple[Floats, Floats]]],
+    features: Iterable[LearntMotion],
     at: tuple[Whole, Whole],
     tick_s: float,
 ) -> Floats:
     """Change of compared poses (M, 3, weights) per weight of the curves, to first order; places as complex numbers.
 
-    Features are what each weight of a curve adds in a tick, and its unit, a twist, part by part; `at` is the window and
-    tick of each pose.
+    `at` is the window and tick of each pose.
     """
     poses = integrate_twists(twists, tick_s)
     cosine, sine = cosine_and_sine(poses[:, 1:, 2] - twists[..., 2] * (tick_s / 2.0))
@@ -424,9 +435,11 @@ def _pose_slopes(
     until[window, number] = np.arange(twists.shape[1]) <= tick[:, None]
 
     def change(basis: Floats, unit: Floats) -> Floats:
+        if not basis.any():
+            return np.zeros((len(window), 3, basis.shape[-1]))
         place = ((unit[0] + 1j * unit[1]) * along + unit[2] * about)[:, None]
-        x, y, turned = ((until * weight @ basis)[window, number] for weight in (place.real, place.imag, 1.0))
-        turned *= unit[2] * tick_s
+        x, y = ((until * weight @ basis)[window, number] for weight in (place.real, place.imag))
+        turned = (until @ basis)[window, number] * (unit[2] * tick_s) if unit[2] else np.zeros_like(x)
         moved = x + 1j * y + after[at][:, None] * turned
         return np.stack((moved.real, moved.imag, turned), axis=1)
 

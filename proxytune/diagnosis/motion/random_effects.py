@@ -137,7 +137,9 @@ def _mixture(late: Lateness, gradient: Floats, energy: Floats) -> Floats:
 def _ratios(late: Lateness, gradient: Floats, energy: Floats) -> Floats:
     """The same of each time, with its weight (times, …, commands)."""
     by = late.commands.reshape(-1, *(1 for _ in gradient.shape))
-    return np.asarray(late.log_weights.reshape(by.shape) - 0.5 * by**2 * energy - by * gradient)
+    ratios = np.asarray(by * gradient)
+    np.subtract(late.log_weights.reshape(by.shape) - 0.5 * by**2 * energy, ratios, out=ratios)
+    return ratios
 
 
 def responses(fitted: Fit, others: Floats) -> Responses:
@@ -148,7 +150,8 @@ def responses(fitted: Fit, others: Floats) -> Responses:
     drives = fitted.drives
     changed, phase = _changed_commands(drives)
     values = np.concatenate((fitted.innovations[:, None], others), axis=1)
-    found = [_respond_to_phase(fitted, changed[phase == number], values) for number in np.unique(phase)]
+    heard = values, values**2
+    found = [_respond_to_phase(fitted, changed[phase == number], *heard) for number in np.unique(phase)]
     if not found:
         return Responses(np.empty(0), np.empty(0), np.empty((others.shape[1], 0)))
     size, gradients = (np.concatenate(part) for part in zip(*found, strict=True))
@@ -178,7 +181,7 @@ def _lose_commands(drives: Drives, lost: Whole) -> Floats:
     return duties
 
 
-def _respond_to_phase(fitted: Fit, lost: Whole, heard: Floats) -> tuple[Floats, Floats]:
+def _respond_to_phase(fitted: Fit, lost: Whole, heard: Floats, squares: Floats) -> tuple[Floats, Floats]:
     """The size of the response to each command of one phase (commands,), and its gradients (commands, columns)."""
     drives = fitted.drives
     without = increments_along(drives, paths(drives, fitted.theta, _lose_commands(drives, lost)))
@@ -196,7 +199,7 @@ def _respond_to_phase(fitted: Fit, lost: Whole, heard: Floats) -> tuple[Floats, 
     total = sum_by(label, weight, count)[:, None] + 1e-12
     along = sum_by(label, heard, count, weight * change)
     cubes = sum_by(label, weight, count, change**2)[:, None]
-    energy = sum_by(label, heard**2, count, weight) - 2.0 * share * along + share**2 * cubes
+    energy = sum_by(label, squares, count, weight) - 2.0 * share * along + share**2 * cubes
     return size, gradients / np.sqrt(np.maximum(1.0, energy / total))
 
 

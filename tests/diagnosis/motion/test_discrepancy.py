@@ -35,7 +35,7 @@ from proxytune.driving import read_robot
 from proxytune.effects import GROUPS, learnt_effect, learnt_theta
 
 PARTS = 12
-COLUMNS = {"one": np.arange(3), "other": np.arange(3, 7), "speed_and_turn": np.arange(7, 15)}
+COLUMNS = {"one": slice(0, 3), "other": slice(3, 7), "speed_and_turn": slice(7, 15)}
 
 
 def slopes(truth, *, seed=1, noise=0.1, odd=0):

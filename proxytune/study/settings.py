@@ -343,7 +343,8 @@ def _settings(read: Section) -> StudySettings:
         agents=agents,
         starts=read.whole("starts", low=1),
         budget=read.whole("budget", high=100_000),
-        initial=read.whole("initial", 8, low=1, high=100_000),
+        # What a cheaper proxy tells takes the place of half a design.
+        initial=read.whole("initial", 4 if "low_fidelity" in read.values else 8, low=1, high=100_000),
         batch=read.whole("batch", 1, low=1, high=100_000),
         # Of learning value nothing is known but the score.
         engine=read.text("engine", SCORE_ENGINE if objective == LEARNING else DEFAULT_ENGINE),

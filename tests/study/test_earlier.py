@@ -275,3 +275,10 @@ def test_a_cheaper_proxy_that_is_none_is_refused(case: str, beside: Path, make_s
     with pytest.raises(ProxytuneError, match=words) as refused:
         run_study(make_study(domain=domain, **{**CHEAPER, **changes}))
     assert str(refused.value).count("\n") == 0
+
+
+def test_a_cheaper_proxy_takes_the_place_of_half_a_design(make_study: MakeStudy) -> None:
+    """The default of initial is 4 then, and what is written counts."""
+    written = [CHEAPER | {"initial": initial} for initial in (None, "6")]
+    assert [read_study_settings(make_study(**one)).initial for one in written] == [4, 6]
+    assert read_study_settings(make_study(initial=None)).initial == 8

@@ -64,7 +64,8 @@ def run_stages(run: StudyRun, warn: Callable[[str], None], known: Sequence[Outco
     check_facts(run)
     _attach(run, known)
     retry_failed(run)
-    learn(run)
+    for line in learn(run):
+        warn(line)
     if line := note_search(run.study, run.store):
         warn(line)
     learnt = run_preflight(run)

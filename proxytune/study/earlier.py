@@ -65,17 +65,33 @@ class Source:
         return Episode(theta, agent, start, episode_seed(self.facts["seed"], start))
 
 
-def learn(run: StudyRun) -> None:
+def learn(run: StudyRun) -> tuple[str, ...]:
     """Copy what earlier studies know into the store, unless it has been.
+
+    Returns:
+        One line on each cheaper proxy that was copied: what its domain has otherwise.
 
     Raises:
         InputError: If one of them is not there, or is none of this domain, with its name.
         StoreError: If its database is damaged.
     """
-    settings, known = run.settings, run.store.facts()
+    settings, known, notes = run.settings, run.store.facts(), list[str]()
     for key, fact in COPIED.items():
         if (names := getattr(settings, key)) and fact not in known:
-            _keep(run, [read_source(settings, name, key) for name in names], key)
+            sources = [read_source(settings, name, key) for name in names]
+            _keep(run, sources, key)
+            for source in sources if key == LOW else ():
+                told = ", ".join(_otherwise(run, source)) or "its code or its robot is another"
+                notes.append(f"{LOW}: {source.path}: {told}")
+    return tuple(notes)
+
+
+def _otherwise(run: StudyRun, source: Source, *keys: str) -> list[str]:
+    """What a source has otherwise of these facts, or of all that describe the domain: a phrase each."""
+    theirs, ours = source.facts, study_facts(run.study)
+    chosen = keys or [key for key in {**theirs, **ours} if key == "family" or key.startswith("domain.")]
+    pairs = [(key, theirs.get(key) or "not given", ours.get(key) or "not given") for key in chosen]
+    return [f"{key} is {there} there and {here} here" for key, there, here in pairs if there != here]
 
 
 @contextmanager
@@ -285,8 +301,8 @@ def _check_like(run: StudyRun, source: Source, used: str) -> None:
     if theirs["starts"] < settings.starts:
         told = f"has driven from {theirs['starts']} starts, and this study asks for {settings.starts}"
         raise refused(f"{told}; lower starts, or remove it")
-    for key in (f"agents.{agent}" for agent in settings.agents):
-        _check_value(run, source, used, key)
+    for told in _otherwise(run, source, *(f"agents.{agent}" for agent in settings.agents)):
+        raise refused(f"{told}; remove it")
     if used == LOW and theirs.get("identity") == ours["identity"]:
         raise refused("is of this very proxy, so its trials count in full; name it in learn_from")
 
@@ -296,18 +312,10 @@ def _check_same(run: StudyRun, source: Source, *, again: bool) -> None:
     theirs, ours = source.facts, study_facts(run.study)
     if all(theirs.get(key) == ours.get(key) for key in ("identity", "versions")):
         return
-    for key in {**theirs, **ours}:
-        if key == "family" or key.startswith("domain."):
-            _check_value(run, source, FULL, key)
+    for told in _otherwise(run, source):
+        raise _refused(run.settings, FULL, source.path, f"{told}; remove it")
     if again:
         _check_again(run, source)
-
-
-def _check_value(run: StudyRun, source: Source, used: str, key: str) -> None:
-    values = [facts.get(key) for facts in (source.facts, study_facts(run.study))]
-    if values[0] != values[1]:
-        there, here = (value or "not given" for value in values)
-        raise _refused(run.settings, used, source.path, f"{key} is {there} there and {here} here; remove it")
 
 
 def _check_again(run: StudyRun, source: Source) -> None:

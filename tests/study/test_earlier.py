@@ -12,7 +12,7 @@ from proxytune.cli.main import main
 from proxytune.errors import ProxytuneError
 from proxytune.storage import Store
 from proxytune.study import StudyRun, open_study, read_study_settings
-from proxytune.study.earlier import BANK_FILE, earlier_trials
+from proxytune.study.earlier import BANK_FILE, earlier_trials, learn
 from tests.conftest import MakeStudy
 
 BANK = {"target": None, "preflight": "true", "budget": "10", "engine": None}
@@ -282,3 +282,13 @@ def test_a_cheaper_proxy_takes_the_place_of_half_a_design(make_study: MakeStudy)
     written = [CHEAPER | {"initial": initial} for initial in (None, "6")]
     assert [read_study_settings(make_study(**one)).initial for one in written] == [4, 6]
     assert read_study_settings(make_study(initial=None)).initial == 8
+
+
+def test_what_the_domain_of_a_cheaper_proxy_has_otherwise_is_said_once(beside: Path, make_study: MakeStudy) -> None:
+    """One line when its trials are copied; then they are a fact."""
+    folder = make_study(domain=OTHER, **CHEAPER)
+    with Store.open(folder) as store:
+        run = StudyRun(open_study(folder), store)
+        (line,) = learn(run)
+        assert line.endswith('bank: domain.version is not given there and "2" here')
+        assert learn(run) == ()

@@ -21,6 +21,18 @@ from proxytune.identity import meaning_of
 PACKAGE = Path(__file__).resolve().parent
 ROOMS = {"driving": ("effects", "driving"), "environments": ("effects", "environments")}
 """Where the code lies that plays the episodes of a family: every module of these rooms counts."""
+ON_OUTPUTS = (
+    "169c7ef2065e",
+    "bd67473b82b2",
+    "79f5fa29af66",
+    "bba8741ee1e0",
+    "4ae305889b1d",
+    "cb79f534eabb",
+    "f82ad3cb55f6",
+)
+"""Code of the two engines that learn from outputs, which have a module in common."""
+ON_NOTHING = ("40019bb841cc", "aa9b7e2da380", "a00262704239")
+"""Code of the design, and of the engines that learn nothing and lie beside it."""
 SAME_CODE = {
     "driving": (
         "fe8ac42c83cd70a7928304e0df8b369a9dae86a3c4d198fb4e6a4bb7303b5e7f",
@@ -50,29 +62,13 @@ SAME_CODE = {
         "4c4c6938034f481691acea6d8729b71483aeae192fbc759109a77fd37c052dfa",
         "3347db8c725fed99a9dab5513285b83255ba9d0d595e4b395fe48d69a8408fc7",
     ),
-    "engine outcomes": (
-        "94c0ba12f9bf",
-        "169c7ef2065e",
-        "bd67473b82b2",
-        "79f5fa29af66",
-        "bba8741ee1e0",
-        "4ae305889b1d",
-        "cb79f534eabb",
-    ),
-    "engine composite": (
-        "82865583b592",
-        "169c7ef2065e",
-        "bd67473b82b2",
-        "79f5fa29af66",
-        "bba8741ee1e0",
-        "4ae305889b1d",
-        "cb79f534eabb",
-    ),
+    "engine outcomes": ("94c0ba12f9bf", *ON_OUTPUTS),
+    "engine composite": ("82865583b592", *ON_OUTPUTS),
     "engine gp": ("231c6791b2b7", "1dae7f006157", "41a805e87825", "d952ced2ab68"),
-    "engine random": ("0faabd65d4d9", "40019bb841cc", "aa9b7e2da380", "a00262704239"),
-    "engine sobol": ("225f0b0407fb", "40019bb841cc", "aa9b7e2da380", "a00262704239"),
+    "engine random": ("0faabd65d4d9", *ON_NOTHING),
+    "engine sobol": ("225f0b0407fb", *ON_NOTHING),
     "engine tpe": ("7bbfc93f55ba", "5004f0c9a482", "dab8e44a497a", "ddc23b002b6e", "126945151387", "36d1df1ab446"),
-    "design": ("3695c894b9c7", "40019bb841cc", "aa9b7e2da380", "a00262704239"),
+    "design": ("3695c894b9c7", *ON_NOTHING),
     "learner proxytune.learning.cloning": (
         "ceb19d953492d57f248e919c7553724e5616f3b383452117639093a35b2ce432",
         "e908368ec773370848637b0baa8b8544376386b4d32f31359ee98a12fd69dde0",

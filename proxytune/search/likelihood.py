@@ -68,6 +68,10 @@ class OutputGroup:
     middle: Floats
     scale: Floats
 
+    def mean(self, near: Floats) -> Floats:
+        """The outputs (n, columns) at points whose covariance with the trials is (n, trials)."""
+        return np.asarray(self.middle + self.scale * (near @ self.weights))
+
     @cached_property
     def left_out(self) -> Floats:
         """Errors of predicting each trial from the others, in the kernel's standard deviations, (trials, columns)."""
@@ -118,7 +122,7 @@ class OutputModel:
             for group in self.groups:
                 near = smooth(points, group.visited)
                 left = smooth.diag(points) - np.einsum("ij,jk,ik->i", near, group.inverse, near, optimize=True)
-                mean[:, group.columns] = group.middle + group.scale * (near @ group.weights)
+                mean[:, group.columns] = group.mean(near)
                 variance[:, group.columns] = np.outer(np.maximum(left, 0.0), group.inflation * group.scale**2)
         return (mean + self.base.course(points) if self.base else mean), variance
 
@@ -127,8 +131,7 @@ class OutputModel:
         mean = np.zeros((len(points), self.outputs))
         with _libraries().limit(limits=1):
             for group in self.groups:
-                near = self.kernel.k1(points, group.visited)
-                mean[:, group.columns] = group.middle + group.scale * (near @ group.weights)
+                mean[:, group.columns] = group.mean(self.kernel.k1(points, group.visited))
         return mean
 
     @cached_property
@@ -153,11 +156,11 @@ def fit_outputs(space: Space, trials: Sequence[Trial], kernel: "Kernel | None" =
 
     Without a kernel, it is fitted too. Refused if no trial of this proxy has an outcome.
     """
-    low = tuple(sorted((t.values, t.outcome, t.placement) for t in trials if t.low_fidelity and t.outcome is not None))
-    known = sorted((t.values, t.outcome, t.placement) for t in trials if not t.low_fidelity and t.outcome is not None)
+    with_outcome = [(t.low_fidelity, (t.values, t.outcome, t.placement)) for t in trials if t.outcome is not None]
+    known, low = (sorted(one for cheap, one in with_outcome if cheap == wanted) for wanted in (False, True))
     if not known:
         raise RunError("no trial has an outcome, so there is nothing to learn from")
-    return _fitted(space, known, kernel, _base(space, low) if low else None)
+    return _fitted(space, known, kernel, _base(space, tuple(low)) if low else None)
 
 
 Known = tuple[tuple[float, ...], tuple[float, ...], int]

@@ -76,8 +76,8 @@ def learn(run: StudyRun) -> tuple[str, ...]:
         StoreError: If its database is damaged.
     """
     settings, known, notes = run.settings, run.store.facts(), list[str]()
-    for key, fact in COPIED.items():
-        if (names := getattr(settings, key)) and fact not in known:
+    for key, names in settings.sources.items():
+        if COPIED[key] not in known:
             sources = [read_source(settings, name, key) for name in names]
             _keep(run, sources, key)
             for source in sources if key == LOW else ():

@@ -75,7 +75,7 @@ def study_facts(study: Study) -> dict[str, Any]:
         **said,
         **({"preflight": settings.preflight} if learns else {}),
         **({"versions": dict(versions)} if versions else {}),
-        **{key: list(names) for key in COPIED if (names := getattr(settings, key))},
+        **{key: list(names) for key, names in settings.sources.items()},
         "cut_off": settings.cut_off,
         **{f"agents.{name}": settings.aliases[name] for name in settings.agents if name in settings.aliases},
         **{f"parameters.{i.name}": [i.low, i.high] for i in settings.space.intervals},

@@ -240,6 +240,12 @@ class StudySettings:
         return self.targets[0]
 
     @property
+    def sources(self) -> dict[str, tuple[str, ...]]:
+        """What names trials that are known before the first one, by its key; no key that names none."""
+        named = {"learn_from": self.learn_from, "low_fidelity": self.low_fidelity}
+        return {key: names for key, names in named.items() if names}
+
+    @property
     def loaded_agents(self) -> tuple[str, ...]:
         """The name by which each agent is loaded."""
         return tuple(self.aliases.get(agent, agent) for agent in self.agents)
@@ -296,12 +302,12 @@ def _check_known(study: StudySettings) -> None:
     if not study.targets:
         if study.objective == LEARNING:
             raise study.error("objective", f"'{LEARNING}' needs a target, and this is a bank; name a target")
-        for key in (key for key in ("learn_from", "low_fidelity") if getattr(study, key)):
+        for key in study.sources:
             raise study.error(key, "is for studies with a target, and this is a bank; name a target")
         if not study.preflight:
             raise study.error("preflight", "is off, and tells a bank what placement does; leave it on")
     if study.objective == LEARNING:
-        for key in (key for key in ("learn_from", "low_fidelity") if getattr(study, key)):
+        for key in study.sources:
             raise study.error(key, f"has scores, and '{LEARNING}' is not searched by them; remove it")
     if not study.budget and not study.learn_from:
         nothing = "is 0, and nothing is known without a trial; name studies in learn_from, or make it 1 or more"
@@ -309,8 +315,8 @@ def _check_known(study: StudySettings) -> None:
 
 
 def _check_comparable(study: StudySettings) -> None:
-    alone = {key: not getattr(study, key) for key in ("learn_from", "low_fidelity")}
-    for key, has in {"target": bool(study.targets), **alone, "budget": study.budget}.items():
+    needed = {"target": bool(study.targets), **dict.fromkeys(study.sources, False), "budget": bool(study.budget)}
+    for key, has in needed.items():
         if not has:
             raise study.error(key, f"of a study of {FAMILIES}: needs a target, a budget, and trials of its own alone")
     if study.objective == LEARNING:
@@ -330,7 +336,7 @@ def _settings(read: Section) -> StudySettings:
     agents = tuple(aliases_of(read)) or read.texts("agents")
     if len(agents) < 2:
         raise read.error("agents", f"comparing takes at least two agents, got {len(agents)}")
-    rules = read.section("stop")
+    rules, low_fidelity = read.section("stop"), read.texts("low_fidelity", ())
     rules.only(("wall_time_s", "no_improvement"))
     return StudySettings(
         path=path,
@@ -344,7 +350,7 @@ def _settings(read: Section) -> StudySettings:
         starts=read.whole("starts", low=1),
         budget=read.whole("budget", high=100_000),
         # What a cheaper proxy tells takes the place of half a design.
-        initial=read.whole("initial", 4 if "low_fidelity" in read.values else 8, low=1, high=100_000),
+        initial=read.whole("initial", 4 if low_fidelity else 8, low=1, high=100_000),
         batch=read.whole("batch", 1, low=1, high=100_000),
         # Of learning value nothing is known but the score.
         engine=read.text("engine", SCORE_ENGINE if objective == LEARNING else DEFAULT_ENGINE),
@@ -361,7 +367,7 @@ def _settings(read: Section) -> StudySettings:
         aliases=aliases_of(read),
         targets=targets,
         learn_from=read.texts("learn_from", ()),
-        low_fidelity=read.texts("low_fidelity", ()),
+        low_fidelity=low_fidelity,
         target_columns=texts_of(read.section("target_columns")),
         episode_timeout_s=positive(read, "episode_timeout_s"),
     )

@@ -4,6 +4,7 @@ Pieces are handed out here, one to each worker: so it is known who has what. Wha
 the scheduler, is waited for, and what it had is handed out again; which worker does a piece never changes its result.
 """
 
+import asyncio
 import logging
 import socket
 import sys
@@ -11,7 +12,7 @@ import threading
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Generator, Iterator, Mapping
-from concurrent.futures import CancelledError
+from concurrent.futures import CancelledError, Future
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
@@ -86,17 +87,22 @@ class _Worker:
 
 @dataclass
 class _Held:
-    """A piece that a worker has, since when [s], and whether it has been given up or handed to another too."""
+    """A piece that a worker has, since when [s], and whether it has been given up or handed to another too.
+
+    Its result is fetched as soon as there is one: a worker may stop between ending a piece and handing it over, and
+    nobody else waits for that.
+    """
 
     number: int
     future: Any
+    result: Future[Any]
     since: float
     left_behind: bool = False
 
     @property
     def pending(self) -> bool:
         """Whether nothing has become of it yet, as far as is known."""
-        return bool(self.future.status == "pending")
+        return not self.result.done()
 
 
 class _Pieces:
@@ -295,9 +301,14 @@ class Cluster:
 
     def _submit(self, worker: _Worker, work: Callable[..., Any], *arguments: Any) -> Any:
         key = f"proxytune-{uuid4().hex}"
-        future = self._client.submit(work, *arguments, key=key, workers=[worker.address], pure=False)
-        future.add_done_callback(lambda _: self._woken.set())
-        return future
+        return self._client.submit(work, *arguments, key=key, workers=[worker.address], pure=False)
+
+    def _fetched(self, future: Any) -> Future[Any]:
+        """What becomes of submitted work, fetched meanwhile."""
+        fetching = self._client.gather(future, asynchronous=True)
+        result = asyncio.run_coroutine_threadsafe(fetching, self._client.loop.asyncio_loop)
+        result.add_done_callback(lambda _: self._woken.set())
+        return result
 
     def results(
         self, recipe: Recipe, numbered: Iterator[tuple[int, Any]], timeout_s: float | None
@@ -310,7 +321,7 @@ class Cluster:
                 for key in self._usable() if answers else ():
                     if key not in held and (given := pieces.next()):
                         future = self._submit(self._workers[key], do_sent, recipe, given[1])
-                        held[key] = _Held(given[0], future, self._clock.seconds())
+                        held[key] = _Held(given[0], future, self._fetched(future), self._clock.seconds())
                 patience.wait(self._waits_for(answers))
                 self._woken.wait(POLL_S)
                 self._woken.clear()
@@ -349,22 +360,19 @@ class Cluster:
 
     def _ended(self, key: Key, one: _Held) -> Any:
         """What became of a piece: its result, LOST, or that it is to be handed out again."""
-        worker, status = self._workers.get(key), one.future.status
-        if status == "finished":
-            # What a worker has not handed over may be lost with it.
-            with suppress(OSError, CancelledError):
-                return one.future.result(timeout=ANSWER_S)
-            return _UNDER_WAY if worker else _AGAIN
-        if status != "error":
-            return _AGAIN
-        problem = one.future.exception()
+        problem = CancelledError() if one.result.cancelled() else one.result.exception()
+        if problem is None:
+            return one.result.result()
         if isinstance(problem, OtherCodeError):
-            if worker:
+            if worker := self._workers.get(key):
                 worker.unfit = str(problem)
             self._say(f"{problem}; it is not used")
             return _AGAIN
         if isinstance(problem, self._killed):
             return LOST
+        # What a worker has not handed over may be lost with it.
+        if one.future.status != "error":
+            return _AGAIN
         raise problem
 
     def _restart(self, worker: _Worker) -> None:

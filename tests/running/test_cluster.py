@@ -1,9 +1,13 @@
 """A Dask cluster gives the results of one machine, to the bit, whoever leaves or joins."""
 
 import os
+import signal
 import socket
 import threading
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -45,6 +49,24 @@ def ends_its_worker_once(flag, piece):
         flag.touch()
         os._exit(1)
     return 2 * piece
+
+
+@dataclass
+class StopsItsWorkerOnce:
+    """A result that is a number where it arrives, and stops the process that first hands it over."""
+
+    number: int
+    flag: Path
+
+    def __reduce__(self):
+        if not self.flag.exists():
+            self.flag.write_text(str(os.getpid()))
+            os.kill(os.getpid(), signal.SIGSTOP)
+        return int, (self.number,)
+
+
+def doubled_and_stopped(flag, piece):
+    return StopsItsWorkerOnce(2 * piece, flag) if piece == 3 else 2 * piece
 
 
 def test_other_code_on_a_worker_is_refused_by_name():
@@ -113,6 +135,27 @@ def test_workers_do_all_pieces_and_one_that_dies_is_made_up_for(cluster, tmp_pat
         with working(partial(ends_its_worker_once, tmp_path / "flag"), range(20), jobs=1) as results:
             assert sorted(results) == [2 * piece for piece in range(20)]
     assert (tmp_path / "flag").exists()
+
+
+@pytest.mark.slow
+def test_nobody_waits_for_a_worker_that_stops_before_it_hands_over_what_it_has_done(cluster, tmp_path, monkeypatch):
+    monkeypatch.setattr("proxytune.running.cluster.SILENT_S", 4.0)
+    flag = tmp_path / "flag"
+
+    def results():
+        with (
+            on_cluster(cluster.scheduler_address),
+            working(partial(doubled_and_stopped, flag), range(20), jobs=1) as came,
+        ):
+            return list(came)
+
+    with ThreadPoolExecutor(1) as thread:
+        try:
+            came = thread.submit(results).result(timeout=60.0)
+        finally:
+            os.kill(int(flag.read_text()), signal.SIGCONT)
+    assert sorted(came) == [2 * piece for piece in range(20)]
+    assert came[-1] == 6
 
 
 @pytest.mark.slow

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from proxytune.errors import SettingsError
 
@@ -17,13 +17,14 @@ class Parameter:
     Attributes:
         name: What it is called within its effect.
         unit: Its unit, empty where it has none.
-        low: Smallest sensible value.
-        high: Largest sensible value.
+        low: Smallest value that it can have.
+        high: Largest value that it can have.
         neutral: The value at which the effect vanishes, or the name of the robot's nominal
             figure that the effect replaces.
         probes: Values that a search for a missing effect starts from.
         source: Where the bounds come from.
         shape: Whether it only shapes what the effect's first parameter does: alone it changes nothing.
+        usual: The range of most robots, in which a value is looked for first; None where it is all that there is.
     """
 
     name: str
@@ -34,6 +35,13 @@ class Parameter:
     probes: tuple[float, ...] = ()
     source: str = ""
     shape: bool = False
+    # Identities of episodes are digests of reprs, and no episode depends on where a value is looked for.
+    usual: tuple[float, float] | None = field(default=None, repr=False)
+
+    @property
+    def usual_range(self) -> tuple[float, float]:
+        """The range in which a value is looked for first."""
+        return self.usual or (self.low, self.high)
 
     def neutral_value(self, nominal: Mapping[str, float]) -> float:
         """The neutral value for a robot with these nominal figures."""

@@ -221,12 +221,11 @@ class SweepCurve:
 
 
 def sweep_interval(study: Study, parameter: str) -> Interval:
-    """The interval of a sweep: the study's box, or all that a parameter may be where the study does not search it."""
+    """The interval of a sweep: the study's box, or a parameter's usual range where the study does not search it."""
     boxes = {interval.name: interval for interval in study.settings.space.intervals}
     if parameter in boxes:
         return boxes[parameter]
-    known = _parameter(study, parameter)
-    return Interval(parameter, known.low, known.high)
+    return Interval(parameter, *_parameter(study, parameter).usual_range)
 
 
 def check_base(study: Study, base: Theta) -> None:

@@ -68,7 +68,8 @@ def _effect_text(name: str) -> Group:
         for theta_name, one in zip(catalogue.theta_names(name), effect.parameters, strict=True):
             unit = f" {one.unit}".rstrip()
             neutral = f"the robot's {plain(one.neutral)}" if isinstance(one.neutral, str) else f"{one.neutral:g}{unit}"
-            lines.append(f"\n{theta_name}, {one.low:g} to {one.high:g}{unit}, without effect at {neutral}")
+            usual = f" (of most robots {one.usual[0]:g} to {one.usual[1]:g})" if one.usual else ""
+            lines.append(f"\n{theta_name}, {one.low:g} to {one.high:g}{unit}{usual}, without effect at {neutral}")
             lines += [f"  meaning: {clause_of(theta_name, one.name.upper())}", f"  source: {one.source}"]
     return Group(*map(Text, lines))
 
@@ -107,7 +108,9 @@ def _effects() -> list[Row]:
         effect = catalogue.effect(name)
         for theta_name, parameter in zip(catalogue.theta_names(name), effect.parameters, strict=True):
             row: Row = {"effect": name, "stage": effect.stage.value, "parameter": theta_name, "unit": parameter.unit}
-            row |= {"low": parameter.low, "high": parameter.high, "neutral": parameter.neutral}
+            first, last = parameter.usual_range
+            row |= {"low": parameter.low, "high": parameter.high, "usual_low": first, "usual_high": last}
+            row |= {"neutral": parameter.neutral}
             row |= {"declared": "yes" if name in catalogue.declared else "", "source": parameter.source}
             rows.append(row | {"of": "" if catalogue is SHIPPED else "car"})
     return rows

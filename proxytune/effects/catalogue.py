@@ -110,6 +110,10 @@ def _wrong_parameter(parameter: Parameter) -> Iterator[str]:
     name, low, high, neutral = parameter.name, parameter.low, parameter.high, parameter.neutral
     if not (np.isfinite([low, high]).all() and low < high):
         yield f"has a parameter '{name}' from {low} to {high}; give a finite range, the lower end first"
+    first, last = parameter.usual_range
+    if not low <= first < last <= high:
+        usual = f"the usual range [{first}, {last}]"
+        yield f"has a parameter '{name}' with {usual}, which is not within [{low:g}, {high:g}]; widen that"
     if not isinstance(neutral, str) and not low <= neutral <= high:
         yield f"has a parameter '{name}' whose neutral value {neutral} is not within [{low:g}, {high:g}]; widen that"
     if beyond := [probe for probe in parameter.probes if not low <= probe <= high]:

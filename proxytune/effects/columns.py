@@ -99,15 +99,15 @@ THROTTLED: tuple[type[Effect], ...] = (
 
 STEERED: tuple[type[Effect], ...] = (
     on_column(SlewRate, STEERING, "steering_slew_rate", "The servo turns no faster than from the middle to full lock "
-              "within `rise_time`.", {"high": 1.0, "probes": (0.05, 0.1, 0.2, 0.4, 0.8),
+              "within `rise_time`.", {"high": 1.0, "usual": None, "probes": (0.05, 0.1, 0.2, 0.4, 0.8),
                                       "source": f"{_SERVO}: 60° in 0.1 to 0.2 s"}),
     on_column(DeadBand, STEERING, "steering_dead_band", "The servo does nothing for steering up to `width`, and by "
-              "that much less for more.", {"unit": "full lock", "high": 0.3, "probes": (0.02, 0.04, 0.08, 0.15),
-                                           "source": f"{_SERVO}: some hundredths of full lock"}),
+              "that much less for more.", {"unit": "full lock", "high": 0.3, "usual": None, "probes": (0.02, 0.04, 0.08,
+                                           0.15), "source": f"{_SERVO}: some hundredths of full lock"}),
     on_column(Saturation, STEERING, "steering_saturation", "The wheels stop at `limit`, whatever is asked.",
               {"unit": "full lock", "source": "stops of the linkage before those of the servo: 0.6 to 1"}),
     on_column(MotorLag, STEERING, "steering_lag", "The servo follows steering with a first-order lag.",
-              {"high": 0.6, "neutral": 0.0, "probes": (0.02, 0.05, 0.1, 0.2, 0.4),
+              {"high": 0.6, "usual": None, "neutral": 0.0, "probes": (0.02, 0.05, 0.1, 0.2, 0.4),
                "source": f"{_SERVO}: 0.05 to 0.2 s"}),
     on_column(Gain, STEERING, "steering_gain", "The wheels turn by more or less than nominal by a factor.",
               {"source": "linkages and servo horns other than nominal: some tenths more or less"}),

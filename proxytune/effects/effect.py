@@ -265,10 +265,11 @@ def parameter(
     probes: tuple[float, ...],
     source: str,
     shape: bool = False,
+    usual: tuple[float, float] | None = None,
 ) -> Any:
     """A field of an effect that is a parameter with these properties."""
     known = Parameter(
-        name="", unit=unit, low=low, high=high, neutral=neutral, probes=probes, source=source, shape=shape
+        name="", unit=unit, low=low, high=high, neutral=neutral, probes=probes, source=source, shape=shape, usual=usual
     )
     return like(known)
 

@@ -37,7 +37,7 @@ from proxytune.space import Parameter
 class DeadBand(ShippedEffect):
     """A wheel does not turn for duties up to `width`, and by that much less for larger ones."""
 
-    width: float = parameter("duty", 0.0, 0.5, probes=(0.02, 0.04, 0.08, 0.15, 0.3),
+    width: float = parameter("duty", 0.0, 0.95, probes=(0.02, 0.04, 0.08, 0.15, 0.3), usual=(0.0, 0.5),
         source="friction of small gear motors: 0.05 to 0.2 of full duty")  # fmt: skip
     imbalance: float = like(IMBALANCE)
     trace: ClassVar[Trace | None] = Trace(
@@ -71,7 +71,7 @@ class Stiction(ShippedEffect):
     going, at a `reversal` of 0, to what breaks it away, at 1.
     """
 
-    breakaway: float = parameter("duty", 0.0, 0.6, probes=(0.03, 0.06, 0.12, 0.2, 0.3, 0.45),
+    breakaway: float = parameter("duty", 0.0, 0.95, probes=(0.03, 0.06, 0.12, 0.2, 0.3, 0.45), usual=(0.0, 0.6),
         source="small gear motors start at 0.1 to 0.3 of full duty")  # fmt: skip
     imbalance: float = like(IMBALANCE)
     release: float = parameter("", 0.0, 1.0, 0.5, probes=(0.2, 0.35, 0.65, 0.8, 0.9, 1.0),
@@ -132,7 +132,7 @@ class BacklashState(NamedTuple):
 class Backlash(ShippedEffect):
     """The gear turns through a gap before it takes the wheel along, whenever it reverses."""
 
-    gap: float = parameter("rad", 0.0, 1.5, probes=(0.05, 0.1, 0.2, 0.4, 0.8, 1.5),
+    gap: float = parameter("rad", 0.0, 6.2, probes=(0.05, 0.1, 0.2, 0.4, 0.8, 1.5), usual=(0.0, 1.5),
         source="plastic gearboxes: some degrees, worn ones some tens")  # fmt: skip
     imbalance: float = like(IMBALANCE)
     trace: ClassVar[Trace | None] = Trace(

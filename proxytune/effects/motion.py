@@ -35,7 +35,8 @@ from proxytune.space import Parameter
 class YawScrub(ShippedEffect):
     """Tyres that scrub turn the robot as if its wheels were `baseline` apart."""
 
-    baseline: float = parameter("m", 0.03, 3.0, "effective_baseline", probes=(0.05, 0.08, 0.12, 0.2, 0.3, 0.5, 1.0),
+    baseline: float = parameter("m", 0.03, 30.0, "effective_baseline", probes=(0.05, 0.08, 0.12, 0.2, 0.3, 0.5, 1.0),
+        usual=(0.03, 3.0),
         source="wheel distance on hard tyres to a few times it with scrub: 0.16 m instead of 0.10 m on "
                "a Duckiebot")  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
@@ -55,7 +56,7 @@ class YawScrub(ShippedEffect):
 class TurnSlip(ShippedEffect):
     """Turning costs forward speed: it shrinks by the factor 1 − loss · |yaw rate|."""
 
-    loss: float = parameter("s/rad", 0.0, 1.5, probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8),
+    loss: float = parameter("s/rad", 0.0, 15.0, probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8), usual=(0.0, 1.5),
         source="tyres in a bend: some hundredths of the speed at 1 rad/s, tracks up to half")  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.TURN_RATE, Cue.COMMAND_DIFFERENCE),
@@ -72,7 +73,7 @@ class TurnSlip(ShippedEffect):
 class LateralSlip(ShippedEffect):
     """The robot slides outwards in bends, by `slip` times its forward speed and its yaw rate."""
 
-    slip: float = parameter("s", -0.5, 0.5, probes=(-0.2, -0.08, -0.03, 0.03, 0.08, 0.2),
+    slip: float = parameter("s", -5.0, 5.0, probes=(-0.2, -0.08, -0.03, 0.03, 0.08, 0.2), usual=(-0.5, 0.5),
         source="slip angle of some degrees at 1 rad/s; a pose that is not measured at the axle looks "
                "the same")  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
@@ -93,9 +94,10 @@ class CrossCoupling(ShippedEffect):
     The forward speed grows by `forward` times the square of the yaw rate, the yaw rate by `turn` times |forward speed|.
     """
 
-    forward: float = parameter("m·s/rad²", -0.2, 0.2, probes=(-0.03, -0.01, -0.003, 0.003, 0.01, 0.03),
+    forward: float = parameter("m·s/rad²", -2.0, 2.0, probes=(-0.03, -0.01, -0.003, 0.003, 0.01, 0.03),
+        usual=(-0.2, 0.2),
         source="a centre of turning some millimetres to centimetres off the middle of the axle")  # fmt: skip
-    turn: float = parameter("rad/m", -2.0, 2.0, probes=(-0.6, -0.2, -0.06, 0.06, 0.2, 0.6),
+    turn: float = parameter("rad/m", -20.0, 20.0, probes=(-0.6, -0.2, -0.06, 0.06, 0.2, 0.6), usual=(-2.0, 2.0),
         source="a dragging caster or a tyre that pulls: some degrees to tens of degrees a metre")  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.TURN_RATE, Cue.DIRECTION, Cue.COMMAND_DIFFERENCE),
@@ -113,7 +115,7 @@ class CrossCoupling(ShippedEffect):
 class Understeer(ShippedEffect):
     """The faster the robot drives the less it turns: the yaw rate is divided by 1 + gain · |forward speed|."""
 
-    gain: float = parameter("s/m", 0.0, 5.0, probes=(0.03, 0.1, 0.3, 0.8, 2.0),
+    gain: float = parameter("s/m", 0.0, 50.0, probes=(0.03, 0.1, 0.3, 0.8, 2.0), usual=(0.0, 5.0),
         source="tyres that slip sideways: some tenths of the turn at 1 m/s, small robots more")  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.TURN_RATE, Cue.COMMAND_DIFFERENCE),
@@ -130,7 +132,7 @@ class Understeer(ShippedEffect):
 class YawLag(ShippedEffect):
     """The yaw rate follows the one that the wheels ask for with a first-order lag; the forward speed does not."""
 
-    time_constant: float = parameter("s", 0.0, 1.0, probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8),
+    time_constant: float = parameter("s", 0.0, 10.0, probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8), usual=(0.0, 1.0),
         source="a body that has to be turned on tyres that give: some hundredths to tenths of a second")  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.TRANSIENTS, Cue.TURN_RATE), shown=Means(Cue.TURN_RATE, (Panel("turn", TURN, "turn"),))
@@ -150,7 +152,7 @@ REST_SPEED = 0.02
 """Below this forward speed [m/s] static friction takes up more and more of the slope."""
 RIM_M = 0.1
 """A patch begins to be felt over this way: a robot is not a point."""
-SLOPE = Parameter(name="slope", unit="m/s", low=-0.3, high=0.3, neutral=0.0,
+SLOPE = Parameter(name="slope", unit="m/s", low=-3.0, high=3.0, neutral=0.0, usual=(-0.3, 0.3),
                   probes=(-0.1, -0.04, -0.015, 0.015, 0.04, 0.1),
                   source="speed that a small robot loses on a floor some degrees from level")  # fmt: skip
 
@@ -266,7 +268,7 @@ def pose_after(pose: Signal, motion: Signal) -> Signal:
     return np.stack((x, y, pose[..., 2] + motion[..., 2]), axis=-1)
 
 
-ASIDE = Parameter(name="aside", unit="m", low=-0.3, high=0.3, neutral=0.0,
+ASIDE = Parameter(name="aside", unit="m", low=-3.0, high=3.0, neutral=0.0, usual=(-0.3, 0.3),
                   probes=(-0.1, -0.04, -0.015, 0.015, 0.04, 0.1),
                   source="a marker is anywhere on the robot: up to half its length")  # fmt: skip
 
@@ -295,7 +297,7 @@ class MarkerOffset(ShippedEffect):
 class HeadingOffset(ShippedEffect):
     """The marker is stuck on turned: measured headings are off by a constant angle."""
 
-    angle: float = parameter("deg", -45.0, 45.0, probes=(-20.0, -8.0, -3.0, 3.0, 8.0, 20.0),
+    angle: float = parameter("deg", -180.0, 180.0, probes=(-20.0, -8.0, -3.0, 3.0, 8.0, 20.0), usual=(-45.0, 45.0),
         source="a marker stuck on by hand: some degrees; more where its axes are another's")  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.TURN_RATE,), shown=Means(Cue.TURN_RATE, (Panel("forward", "forward speed [m/s]", "sideways"),))

@@ -83,8 +83,8 @@ class Trim(ShippedEffect):
         return signal * np.array((1.0 - self.trim, 1.0 + self.trim)), None
 
 
-GAIN = Parameter(name="gain", unit="", low=0.3, high=1.7, neutral=1.0, probes=(0.7, 0.85, 0.95, 1.05, 1.15, 1.3),
-                 source="31 calibrated Duckiebots: 1.01 ± 0.14")  # fmt: skip
+GAIN = Parameter(name="gain", unit="", low=0.03, high=10.0, neutral=1.0, probes=(0.7, 0.85, 0.95, 1.05, 1.15, 1.3),
+                 usual=(0.3, 1.7), source="31 calibrated Duckiebots: 1.01 ± 0.14")  # fmt: skip
 
 
 @effect("gain", Stage.ACTUATION)
@@ -120,8 +120,8 @@ class WheelGain(ShippedEffect):
 class MotorLag(ShippedEffect):
     """Wheels follow the speed asked of them with a first-order lag, τ dω/dt = ω* − ω."""
 
-    time_constant: float = parameter("s", 0.0, 1.0, "motor_time_constant", probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8),
-        source="gym-duckietown's dynamics fit: 0.20 s")  # fmt: skip
+    time_constant: float = parameter("s", 0.0, 10.0, "motor_time_constant", probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8),
+        usual=(0.0, 1.0), source="gym-duckietown's dynamics fit: 0.20 s")  # fmt: skip
     imbalance: float = like(SLIGHT_IMBALANCE)
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.TRANSIENTS, Cue.WHEEL_COMMAND), shown=WheelCurve.STEP, forms=wheel_forms("time_constant")
@@ -155,7 +155,7 @@ class SlewState(NamedTuple):
 class SlewRate(ShippedEffect):
     """The motor driver changes each wheel's duty no faster than from rest to full within `rise_time`."""
 
-    rise_time: float = parameter("s", 0.0, 3.0, probes=(0.05, 0.1, 0.2, 0.4, 0.8, 1.6),
+    rise_time: float = parameter("s", 0.0, 30.0, probes=(0.05, 0.1, 0.2, 0.4, 0.8, 1.6), usual=(0.0, 3.0),
         source="ramps of motor drivers: some tenths of a second to a few seconds from rest to full speed")  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(cues=(Cue.TRANSIENTS, Cue.WHEEL_COMMAND), shown=WheelCurve.STEP)
 
@@ -202,7 +202,7 @@ class ThermalFade(ShippedEffect):
 
     loss: float = parameter("", 0.0, 0.9, probes=(0.05, 0.1, 0.2, 0.4, 0.8),
         source="windings that are 80 °C warmer have a third more resistance")  # fmt: skip
-    time_constant: float = parameter("s", 0.5, 120.0, 8.0, probes=(2.0, 4.0, 15.0, 40.0),
+    time_constant: float = parameter("s", 0.5, 1200.0, 8.0, probes=(2.0, 4.0, 15.0, 40.0), usual=(0.5, 120.0),
         source="small motors warm up within seconds to minutes", shape=True)  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.USE, Cue.TIME),
@@ -266,9 +266,9 @@ class BatterySag(ShippedEffect):
 
     load: float = parameter("", 0.0, 0.8, probes=(0.03, 0.06, 0.12, 0.25, 0.5),
         source="inner resistance of small batteries: some hundredths at full load, old ones some tenths")  # fmt: skip
-    fade: float = parameter("1/min", 0.0, 1.0, probes=(0.03, 0.06, 0.12, 0.25, 0.5, 1.0),
+    fade: float = parameter("1/min", 0.0, 10.0, probes=(0.03, 0.06, 0.12, 0.25, 0.5, 1.0), usual=(0.0, 1.0),
         source="a battery that lasts minutes to an hour at full duty")  # fmt: skip
-    fade_with_time: float = parameter("1/min", 0.0, 1.0, probes=(0.03, 0.06, 0.12, 0.25, 0.5, 1.0),
+    fade_with_time: float = parameter("1/min", 0.0, 10.0, probes=(0.03, 0.06, 0.12, 0.25, 0.5, 1.0), usual=(0.0, 1.0),
         source="what else a battery feeds empties it too, driving or not")  # fmt: skip
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.USE, Cue.TIME),

@@ -152,7 +152,7 @@ class Rolling(ShippedEffect):
     faster it turns, as a motor does on a voltage that is switched, and without throttle it does not brake at all.
     """
 
-    inertia: float = parameter("s", 0.0, 3.0, probes=(0.1, 0.2, 0.4, 0.8, 1.6),
+    inertia: float = parameter("s", 0.0, 30.0, probes=(0.1, 0.2, 0.4, 0.8, 1.6), usual=(0.0, 3.0),
         source="full speed by the acceleration from rest: 0.2 to 1 s for model cars, seconds for large "
                "ones")  # fmt: skip
     freewheel: float = parameter("", 0.0, 1.0, probes=(0.25, 0.5, 0.75, 1.0),
@@ -239,9 +239,9 @@ class Tyres(ShippedEffect):
     tanh(slide · a) / slide, at most 1 / slide; and the rear axle slides by v · rear_slip · a.
     """
 
-    understeer: float = parameter("s²/m²", 0.0, 1.0, probes=(0.01, 0.03, 0.1, 0.3),
+    understeer: float = parameter("s²/m²", 0.0, 10.0, probes=(0.01, 0.03, 0.1, 0.3), usual=(0.0, 1.0),
         source="1 by the square of the speed at which a car turns half as far: 3 to 10 m/s for model cars")  # fmt: skip
-    slide: float = parameter("s²/m", 0.0, 1.0, probes=(0.07, 0.15, 0.3, 0.6),
+    slide: float = parameter("s²/m", 0.0, 10.0, probes=(0.07, 0.15, 0.3, 0.6), usual=(0.0, 1.0),
         source="1 by the lateral acceleration that tyres hold: 2 to 10 m/s²")  # fmt: skip
     rear_slip: float = parameter("s²/m", -0.1, 0.2, probes=(0.005, 0.015, 0.04, 0.1),
         source="slip angle of some degrees at 5 m/s²")  # fmt: skip

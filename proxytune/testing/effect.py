@@ -143,7 +143,7 @@ def check_effect(effect: type[Effect], *, robot: Robot | None = None, least: flo
 
     The same seed gives the same result; cutting a signal into chunks changes nothing; what is filtered does not depend
     on what comes later; memories and signals are never changed in place; a batch is filtered like its members; neutral
-    values change nothing; each parameter changes something all along its range; and the result is finite everywhere.
+    values change nothing; each parameter changes something all along its usual range; the result is finite everywhere.
 
     Args:
         effect: Its class.
@@ -200,9 +200,9 @@ def _of_the_robot(subject: Subject) -> Effect | None:
 
 
 def _claim_moves(subject: Subject, parameter: Parameter, least: float) -> None:
-    """Each step over its range changes the signal, and so does each probe."""
+    """Each step over its usual range changes the signal, and so does each probe."""
     signal = subject.signal(6, 2700)
-    steps = np.linspace(parameter.low, parameter.high, STEPS)
+    steps = np.linspace(*parameter.usual_range, STEPS)
     filtered = [subject.filtered(subject.moved(parameter, float(value)), signal) for value in steps]
     for (low, earlier), (high, later) in pairwise(zip(steps, filtered, strict=True)):
         line = f"is the same at {parameter.name} {low:g} and {high:g}; a parameter must matter all along its range"

@@ -283,7 +283,7 @@ class Diagnosis:
 
         The effect then stands for something else.
         """
-        return _at_edge({name: one.value for name, one in self.theta.items()}, effect, self.robot, self.rules)
+        return _at_edge({name: one.value for name, one in self.theta.items()}, effect, self.found.model.drives)
 
     @property
     def edges(self) -> tuple[str, ...]:
@@ -375,7 +375,8 @@ def diagnose(
     unnamed = bool(found.unnamed_curves) or learning.discrepancy.used or period is not None
     explained = is_explained(main.after.value, main.floor, unnamed=unnamed, rules=rules)
     # A value at an end of its range is no explanation, however small the error.
-    explained = explained and not any(_at_edge(found.model.theta, effect, robot, rules) for effect in found.adopted)
+    model = found.model
+    explained = explained and not any(_at_edge(model.theta, effect, model.drives) for effect in found.adopted)
     confirmed = None
     if has_body(parts.tested):
         report("confirming on the bullet plant")
@@ -419,10 +420,10 @@ def diagnose(
     )
 
 
-def _at_edge(theta: Theta, effect: AdoptedEffect, robot: Robot, rules: Rules) -> tuple[str, ...]:
+def _at_edge(theta: Theta, effect: AdoptedEffect, drives: Drives) -> tuple[str, ...]:
     fitted = {name for coordinate in effect.free for name in coordinate} or set(effect.names)
     known = (name for name in effect.names if name in fitted and name in theta)
-    return tuple(name for name in known if at_edge(name, theta[name], robot, rules))
+    return tuple(name for name in known if at_edge(name, theta[name], drives))
 
 
 def declared_effects(robot: Robot) -> tuple[str, ...]:

@@ -38,7 +38,6 @@ from proxytune.diagnosis.motion.prediction import (
     slopes_of,
 )
 from proxytune.diagnosis.motion.screening import Candidate, candidates
-from proxytune.driving import Robot
 from proxytune.effects import (
     COMMAND_GROUPS,
     GROUPS,
@@ -495,7 +494,7 @@ def match_named_effect(
     windows = cut(drives, FITTED_S)
 
     def loss(candidate: Candidate, values: Floats) -> float:
-        low, high = np.array([span(coordinate, drives.robot) for coordinate in candidate.free]).T
+        low, high = np.array([span(coordinate, drives) for coordinate in candidate.free]).T
         moved = theta_at({**theta, **candidate.fixed}, candidate.free, np.clip(values, low, high))
         return float(np.mean(pose_errors(drives, moved, windows)[:, 0] ** 2))
 
@@ -505,9 +504,7 @@ def match_named_effect(
         return None
     forms = candidates(drives.robot, theta, taken)
     probed = [min((loss(one, np.array(p)), number, p) for p in one.probes) for number, one in enumerate(forms)]
-    tuned = [
-        _tune(forms[number], np.array(probe), loss, drives.robot) for _, number, probe in sorted(probed)[:PROMISING]
-    ]
+    tuned = [_tune(forms[number], np.array(probe), loss, drives) for _, number, probe in sorted(probed)[:PROMISING]]
     least, form, values = min(tuned, key=lambda found: found[0])
     share = (plain - least) / gained
     found = theta_at(form.fixed, form.free, values)
@@ -515,10 +512,10 @@ def match_named_effect(
 
 
 def _tune(
-    form: Candidate, probe: Floats, loss: Callable[[Candidate, Floats], float], robot: Robot
+    form: Candidate, probe: Floats, loss: Callable[[Candidate, Floats], float], drives: Drives
 ) -> tuple[float, Candidate, Floats]:
     """The least loss of a form near a probe, and where it is."""
-    low, high = np.array([span(coordinate, robot) for coordinate in form.free]).T
+    low, high = np.array([span(coordinate, drives) for coordinate in form.free]).T
     start = (probe - low) / (high - low)
     simplex = np.vstack((start, start + np.eye(len(start)) * np.where(start < 0.9, 0.1, -0.1)))
 

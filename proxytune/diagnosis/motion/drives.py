@@ -7,8 +7,8 @@ samples: paths are then read at that instant. Drives carry the rules that a diag
 """
 
 import math
-from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Generic, NamedTuple, TypeVar
 
@@ -238,6 +238,7 @@ class Drives:
         after: How long after the ticks `first` and `last` its poses were measured, or before (N, 2) [ticks]; None
             where poses lie on ticks.
         rules: Of a diagnosis of them.
+        ranges: Where values of effects are looked for, by name in θ, if not in their usual ranges.
     """
 
     robot: Robot
@@ -257,6 +258,7 @@ class Drives:
     wheels: Floats | None
     after: Floats | None = None
     rules: Rules = RULES
+    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @cached_property
     def measured(self) -> Floats:

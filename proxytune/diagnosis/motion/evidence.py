@@ -168,7 +168,7 @@ def _refit(
         if form.label in done or not one.gain > least:
             continue
         theta = {**model.theta, **form.fixed}
-        low, high = np.array([span(coordinate, model.drives.robot) for coordinate in form.free]).T
+        low, high = np.array([span(coordinate, model.drives) for coordinate in form.free]).T
         starts = [theta_at(theta, form.free, np.clip(np.array(values), low, high)) for values in (one.start, one.probe)]
         start = min(starts, key=lambda start: loss_of(model.drives, start, model.whiten))
         fitted = fit(model.drives, start, model.free + form.free, model.noise)

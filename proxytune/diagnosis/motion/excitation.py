@@ -275,7 +275,7 @@ class Unknown:
         own = {form.effect: form for form in reversed(forms) if form.probes and form.effect in unseen}
         self._forms = tuple(own.values())
         known = intervals(model)
-        ranges = [(span(coordinate, model.drives.robot), known[coordinate[0]]) for coordinate in model.free]
+        ranges = [(span(coordinate, model.drives), known[coordinate[0]]) for coordinate in model.free]
         self._deviations = np.array([(most - least) / 3.92 / (high - low) for (low, high), (least, most) in ranges])
 
     def worth(self, commands: Floats) -> Floats:

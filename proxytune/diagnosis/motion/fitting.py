@@ -35,7 +35,6 @@ from proxytune.diagnosis.motion.innovations import (
     whitener,
 )
 from proxytune.diagnosis.motion.prediction import jackknife_half_width
-from proxytune.driving import Robot
 from proxytune.errors import LogError
 from proxytune.space import Theta
 
@@ -105,7 +104,7 @@ def fit_theta(
 def _fit_sloped(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], whiten: Whitener) -> Theta:
     if not free:
         return theta
-    low, high = np.array([span(coordinate, drives.robot) for coordinate in free]).T
+    low, high = np.array([span(coordinate, drives) for coordinate in free]).T
 
     def residuals(fractions: Floats) -> Floats:
         moved = theta_at(theta, free, low + fractions * (high - low))
@@ -127,7 +126,7 @@ def _scan(drives: Drives, theta: Theta, rough: tuple[Coordinate, ...], whiten: W
     goes the other way at a value a hair beside it.
     """
     for coordinate in rough:
-        low, high = span(coordinate, drives.robot)
+        low, high = span(coordinate, drives)
         here = theta[coordinate[0]]
         round_numbers = [float(f"{here:.{figures}g}") for figures in (1, 2, 3)]
         values = np.clip(np.concatenate((round_numbers, [here], here * multiples)), low, high)
@@ -154,7 +153,7 @@ def slopes(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], whiten: W
         if is_stepwise(coordinate, drives.robot):
             columns.append(np.zeros_like(here))
             continue
-        low, high = span(coordinate, drives.robot)
+        low, high = span(coordinate, drives)
         step = STEP if theta[coordinate[0]] + STEP * (high - low) <= high else -STEP
         there = theta_at(theta, (coordinate,), np.array([theta[coordinate[0]] + step * (high - low)]))
         columns.append((here - increments(drives, there)) / step)
@@ -205,7 +204,7 @@ def intervals(fitted: Fit) -> dict[str, tuple[float, float]]:
     """Give 95 % intervals of the fitted parameters, from the scatter between blocks."""
     gradients, hessian = derivatives_by_block(fitted, fitted.slopes)
     inverse = np.linalg.inv(hessian.sum(axis=0) + KEPT_SOLVABLE * np.eye(len(fitted.free)))
-    known = sandwich_intervals(fitted.theta, fitted.free, fitted.drives.robot, gradients, inverse)
+    known = sandwich_intervals(fitted.theta, fitted.free, fitted.drives, gradients, inverse)
     for coordinate in fitted.free:
         if is_stepwise(coordinate, fitted.drives.robot):
             known |= dict.fromkeys(coordinate, _stepwise_interval(fitted, coordinate))
@@ -214,7 +213,7 @@ def intervals(fitted: Fit) -> dict[str, tuple[float, float]]:
 
 def _stepwise_interval(fitted: Fit, coordinate: Coordinate) -> tuple[float, float]:
     """From the best values without each block in turn (jackknife)."""
-    low, high = span(coordinate, fitted.drives.robot)
+    low, high = span(coordinate, fitted.drives)
     here = fitted.theta[coordinate[0]]
     values = np.unique(np.clip(here * np.concatenate(([1.0], *LOOKS)), low, high))
     drives = fitted.drives
@@ -227,13 +226,13 @@ def _stepwise_interval(fitted: Fit, coordinate: Coordinate) -> tuple[float, floa
 
 
 def sandwich_intervals(
-    theta: Theta, free: tuple[Coordinate, ...], robot: Robot, gradients: Floats, inverse: Floats
+    theta: Theta, free: tuple[Coordinate, ...], drives: Drives, gradients: Floats, inverse: Floats
 ) -> dict[str, tuple[float, float]]:
     """95 % intervals from the spread of gradients between blocks (blocks, coordinates), and the Hessian's inverse."""
     spread = inverse @ (gradients.T @ gradients) @ inverse * len(gradients) / max(1, len(gradients) - len(free))
     found: dict[str, tuple[float, float]] = {}
     for coordinate, variance in zip(free, np.diag(spread), strict=True):
-        low, high = span(coordinate, robot)
+        low, high = span(coordinate, drives)
         half = 1.96 * float(np.sqrt(variance)) * (high - low)
         found |= {name: (max(low, theta[name] - half), min(high, theta[name] + half)) for name in coordinate}
     return found

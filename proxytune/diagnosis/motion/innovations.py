@@ -21,7 +21,6 @@ from scipy.linalg.lapack import dtbtrs
 from scipy.optimize import minimize
 
 from proxytune.arrays import compiled_loops
-from proxytune.diagnosis.answer import RULES, Rules
 from proxytune.diagnosis.motion.drives import Drives, Floats, Whole, relative, rows_at
 from proxytune.driving import Drivetrain, Robot, drivetrain
 from proxytune.effects import (
@@ -490,10 +489,10 @@ Coordinate = tuple[str, ...]
 """Parameters of θ that share one value."""
 
 
-def span(coordinate: Coordinate, robot: Robot) -> tuple[float, float]:
-    """Lowest and highest value of a coordinate."""
-    parameter = robot.catalogue.parameters[coordinate[0]]
-    return parameter.low, parameter.high
+def span(coordinate: Coordinate, drives: Drives) -> tuple[float, float]:
+    """Lowest and highest value that is looked for of a coordinate."""
+    name = coordinate[0]
+    return drives.ranges.get(name) or drives.robot.catalogue.parameters[name].usual_range
 
 
 def theta_at(theta: Theta, free: Sequence[Coordinate], values: Floats) -> dict[str, float]:
@@ -502,12 +501,24 @@ def theta_at(theta: Theta, free: Sequence[Coordinate], values: Floats) -> dict[s
     return {**theta, **given}
 
 
-def at_edge(name: str, value: float, robot: Robot, rules: Rules = RULES) -> bool:
+def at_edge(name: str, value: float, drives: Drives) -> bool:
     """Tell whether a value lies at an end of its parameter's range that is not neutral."""
-    parameter = robot.catalogue.parameters[name]
-    reach = rules.edge_share * (parameter.high - parameter.low)
-    ends = [end for end in (parameter.low, parameter.high) if end != parameter.neutral_value(robot.figures)]
-    return any(abs(value - end) <= reach for end in ends)
+    low, high = span((name,), drives)
+    neutral = drives.robot.catalogue.parameters[name].neutral_value(drives.robot.figures)
+    reach = drives.rules.edge_share * (high - low)
+    return any(abs(value - end) <= reach for end in (low, high) if end != neutral)
+
+
+def widened(drives: Drives, theta: Theta, free: Sequence[Coordinate]) -> Drives:
+    """The drives with ranges twice as wide where a value lies at an end of one, as far as physics allows."""
+    ranges = dict(drives.ranges)
+    for name in (name for names in free for name in names if at_edge(name, theta[name], drives)):
+        parameter, (low, high) = drives.robot.catalogue.parameters[name], span((name,), drives)
+        size, lower = high - low, theta[name] < 0.5 * (low + high)
+        ends = (max(parameter.low, low - size), high) if lower else (low, min(parameter.high, high + size))
+        if ends != (low, high):
+            ranges[name] = ends
+    return drives if ranges == drives.ranges else replace(drives, ranges=ranges)
 
 
 def is_stepwise(coordinate: Coordinate, robot: Robot) -> bool:

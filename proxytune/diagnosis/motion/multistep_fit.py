@@ -111,7 +111,7 @@ def _problem(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], windows
     """The least-squares problem of these windows; a heading error counts as the way it makes over the median chord."""
     measured, recent = measured_motion(drives, windows), Recent[Floats]()
     weights = np.array((1.0, 1.0, max(float(np.median(np.hypot(*measured[:, :2].T))), 1e-3)))
-    low, high = np.array([span(coordinate, drives.robot) for coordinate in free]).T
+    low, high = np.array([span(coordinate, drives) for coordinate in free]).T
 
     def at(fractions: Floats) -> dict[str, float]:
         return theta_at(theta, free, low + fractions * (high - low))
@@ -186,7 +186,7 @@ def fit_multistep(fitted: Fit) -> tuple[Fit, MultistepFit | None]:
     hessian = (slopes / (1.0 + (left / scale) ** 2)[:, None] ** 1.5).T @ slopes
     _, block = np.unique(np.repeat(blocks_of(drives, windows), 3), return_inverse=True)
     sums = np.stack([np.bincount(block, column) for column in gradient.T], axis=1)
-    known = sandwich_intervals(theta, free, drives.robot, sums, np.linalg.pinv(hessian, hermitian=True))
+    known = sandwich_intervals(theta, free, drives, sums, np.linalg.pinv(hessian, hermitian=True))
     return evaluate(drives, theta, fitted.free, fitted.noise), MultistepFit(best[1], best[2], known)
 
 

@@ -119,7 +119,7 @@ LARGEST_STEP = 1.5
 
 def with_dense_probes(base: Fit, forms: Sequence[Candidate]) -> list[Candidate]:
     """The forms, those of stepwise effects and of effects of a place with the best of many more probes."""
-    robot, traces = base.drives.robot, base.drives.robot.catalogue
+    traces = base.drives.robot.catalogue
     kinds = {form.effect: traces.effect(form.effect).trace for form in forms if not form.form}
     dense = [
         form
@@ -136,7 +136,7 @@ def with_dense_probes(base: Fit, forms: Sequence[Candidate]) -> list[Candidate]:
     for form in dense:
         trace = kinds[form.effect]
         if trace is not None and trace.stepwise:
-            high = span(form.free[0], robot)[1]
+            high = span(form.free[0], part.drives)[1]
             sizes = np.geomspace(SMALLEST_SHARE * high, high, SIZES).tolist()
             offers = [(size, *form.neutral[1:]) for size in sizes]
         else:

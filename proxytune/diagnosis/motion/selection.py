@@ -6,6 +6,7 @@ From the model with declared parameters, fitted, each round of `search` goes thr
     refit        the best few, together with the free parameters and the noise              evidence.gather_evidence
     weigh        the held-out gain G of each, and of curves over every signal [nats]        evidence.gather_evidence
     adopt        the best of p ≤ p_value and G ≥ least_gain_nats that predicts no worse     choose_best, adopt
+    widen        the range of a value at its end, which other robots than most may need     widen
     drop         backwards: what pays no more beside the effect adopted last                drop_idle
 
 and looks again at what the new model leaves over, until nothing pays or a curve says far more than any name. Effects
@@ -39,7 +40,7 @@ from proxytune.diagnosis.motion.evidence import (
     without_effect,
 )
 from proxytune.diagnosis.motion.fitting import KEPT_SOLVABLE, Fit, derivatives_by_block, fit, held_out_log_likelihood
-from proxytune.diagnosis.motion.innovations import at_edge, huber, lateness, span
+from proxytune.diagnosis.motion.innovations import at_edge, huber, lateness, span, widened
 from proxytune.diagnosis.motion.prediction import blocks_of, cut, pose_errors, ratio
 from proxytune.diagnosis.motion.random_effects import RandomEffect, infer_size_indirectly
 from proxytune.diagnosis.motion.screening import Candidate, ScreenedCandidate, candidates, screen
@@ -50,7 +51,13 @@ from proxytune.space import Theta
 
 def fit_declared(drives: Drives, theta: Theta, declared: tuple[str, ...]) -> Fit:
     """Fit the model with declared parameters only, from where θ has them."""
-    return fit(drives, theta, tuple((name,) for name in declared))
+    return widen(fit(drives, theta, tuple((name,) for name in declared)))
+
+
+def widen(model: Fit) -> Fit:
+    """Fit again in wider ranges while a value lies at an end that physics does not set: the optimum lies beyond."""
+    wider = widened(model.drives, model.theta, model.free)
+    return model if wider is model.drives else widen(fit(wider, model.theta, model.free, model.noise))
 
 
 def select_effects(base: Fit, seed: int, report: Progress) -> Findings:
@@ -123,6 +130,7 @@ def search(base: Fit, seed: int, report: Progress, without: Collection[str] = ()
         if best.random is not None:
             best = fit_random(model, infer_size_indirectly(model, best.random, seed))
         model, adopted = drop_idle(best.fitted, adopt(adopted, best, evidence))
+        model = widen(model)
     if of_car:
         report("holding each effect against chance")
         model, adopted = drop_unconfirmed(model, adopted, declared, seed)
@@ -154,7 +162,7 @@ def eliminate(found: Findings, report: Progress, without: Collection[str] = ()) 
             effects.append(AdoptedEffect(name, "", names, tuple((one,) for one in names), 0.0, 0.0, ()))
     report("fitting all that cars are modelled with together")
     free = base.free + tuple(coordinate for effect in effects for coordinate in effect.free)
-    model = fit(base.drives, theta, free, base.noise)
+    model = fit(found.model.drives, theta, free, base.noise)
     sure = list[AdoptedEffect]()
     while doubtful := [effect for effect in effects if effect.free and effect not in sure]:
         effect = _weakest(model, doubtful)
@@ -182,7 +190,7 @@ def _weakest(model: Fit, effects: Sequence[AdoptedEffect]) -> AdoptedEffect:
 
     def wald(effect: AdoptedEffect) -> float:
         own = [model.free.index(coordinate) for coordinate in effect.free]
-        spans = [span(coordinate, robot) for coordinate in effect.free]
+        spans = [span(coordinate, model.drives) for coordinate in effect.free]
         moved = [
             (model.theta[name] - robot.catalogue.parameters[name].neutral_value(robot.figures)) / (high - low)
             for (name, *_), (low, high) in zip(effect.free, spans, strict=True)
@@ -284,7 +292,7 @@ def _is_at_edge(one: FittedCandidate) -> bool:
     """Tell whether one of its values was fitted to an end of its range: the effect then stands for something else."""
     free = one.screened.candidate.free if one.screened else ()
     drives = one.fitted.drives
-    return any(at_edge(name, one.fitted.theta[name], drives.robot, drives.rules) for names in free for name in names)
+    return any(at_edge(name, one.fitted.theta[name], drives) for names in free for name in names)
 
 
 def _fitted(model: Fit, effect: FittedCandidate | RandomEffect) -> FittedCandidate:

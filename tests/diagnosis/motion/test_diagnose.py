@@ -197,6 +197,16 @@ def test_poses_a_quarter_second_early_are_told_and_no_effect_is_invented():
     assert found.theta["delay"].value == pytest.approx(0.15, abs=0.03)
 
 
+@pytest.mark.slow
+def test_what_no_usual_robot_has_is_found_with_its_value():
+    heavy = {**TRUTH, "motor_lag.time_constant": 1.6, "motor_lag.imbalance": 0.0}
+    found = diagnose(planted_log(heavy, episodes=6, seconds=20.0, noise=CALM), ROBOT, ("trim", "delay"))
+    assert (found.verdict, [effect.effect for effect in found.effects]) == ("explained", ["motor_lag"])
+    estimate = found.theta["motor_lag.time_constant"]
+    assert abs(estimate.value - 1.6) < np.ptp(estimate.interval) < 0.2
+    assert found.edges == ()
+
+
 def test_a_value_at_the_end_of_its_range_is_told_of_effects_that_draw_too(diagnosis):
     jitter = AdoptedEffect("delay_jitter", "", ("delay_jitter",), (), 50.0, 0.01, ())
     highest = Estimate(PARAMETERS["delay_jitter"].high, (0.2, 0.3), "s")

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import DECLARED, NOISE, ROBOT, TRUTH, drives_of, fitted, planted_drives, planted_log
+from planted import DECLARED, NOISE, TRUTH, drives_of, fitted, planted_drives, planted_log
 
 from proxytune.diagnosis import Fit, increments, span, theta_at
 from proxytune.diagnosis.motion import fitting
@@ -103,8 +103,8 @@ def test_the_threshold_of_stiction_lies_in_its_interval():
     assert low < 0.141 < high < low + 0.03
 
 
-def test_values_stay_within_their_bounds():
-    low, high = span(("delay",), ROBOT)
+def test_values_stay_within_their_bounds(drives):
+    low, high = span(("delay",), drives)
     edge = planted_drives({"trim": 0.0, "delay": high, "motor_lag.time_constant": 0.3}, episodes=3)
     known = fit(edge, {"trim": 0.0, "delay": high - 0.02}, DECLARED).theta
     assert low <= known["delay"] <= high
@@ -112,7 +112,7 @@ def test_values_stay_within_their_bounds():
 
 
 def test_slopes_foretell_a_small_change(found):
-    low, high = span(("trim",), ROBOT)
+    low, high = span(("trim",), found.drives)
     moved = theta_at(found.theta, (("trim",),), np.array([found.theta["trim"] + 1e-4 * (high - low)]))
     there = found.whiten.whiten(found.drives.measured - increments(found.drives, moved))
     change = found.slopes[:, 0] * 1e-4
@@ -121,7 +121,7 @@ def test_slopes_foretell_a_small_change(found):
 
 def test_slopes_at_the_highest_value_step_backwards(drives):
     whiten = whitener(drives, NOISE)
-    high = span(("delay",), ROBOT)[1]
+    high = span(("delay",), drives)[1]
     edge = slopes(drives, {"trim": 0.0, "delay": high}, (("delay",),), whiten)
     inside = slopes(drives, {"trim": 0.0, "delay": high - 0.001}, (("delay",),), whiten)
     assert np.corrcoef(edge[:, 0], inside[:, 0])[0, 1] > 0.9

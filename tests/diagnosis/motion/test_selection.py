@@ -20,7 +20,7 @@ from proxytune.diagnosis.motion import selection
 from proxytune.diagnosis.motion.drives import gather
 from proxytune.diagnosis.motion.evidence import Evidence, FittedCandidate, exceeds_names, list_tried
 from proxytune.diagnosis.motion.fitting import evaluate, fit
-from proxytune.diagnosis.motion.innovations import at_edge
+from proxytune.diagnosis.motion.innovations import at_edge, widened
 from proxytune.diagnosis.motion.random_effects import RandomEffect
 from proxytune.diagnosis.motion.screening import ScreenedCandidate, candidates
 from proxytune.diagnosis.motion.selection import adopt, choose_best, drop_idle, eliminate, fit_declared
@@ -162,10 +162,41 @@ def test_an_effect_within_its_range_is_preferred_to_one_at_its_end(drives, gain,
     assert chosen(drives, lag, ("yaw_scrub", {"yaw_scrub": 0.1601}, gain)) == wanted
 
 
-def test_only_an_end_that_is_not_neutral_is_an_edge():
-    assert at_edge("motor_lag.time_constant", 1.0, ROBOT)
-    assert not at_edge("dead_band.width", 0.0, ROBOT)
-    assert not at_edge("motor_lag.time_constant", 0.5, ROBOT)
+def test_only_an_end_that_is_not_neutral_is_an_edge(drives):
+    assert at_edge("motor_lag.time_constant", 1.0, drives)
+    assert not at_edge("dead_band.width", 0.0, drives)
+    assert not at_edge("motor_lag.time_constant", 0.5, drives)
+    wider = replace(drives, ranges={"motor_lag.time_constant": (0.0, 2.0)})
+    assert not at_edge("motor_lag.time_constant", 1.0, wider)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "range_after"),
+    [("lateral_slip", -0.5, (-1.5, 0.5)), ("lateral_slip", 0.1, None), ("dropped_commands", 0.9, None)],
+)
+def test_a_range_doubles_towards_a_value_at_its_end_as_far_as_physics_allows(drives, name, value, range_after):
+    assert widened(drives, {name: value}, ((name,),)).ranges.get(name) == range_after
+
+
+def test_what_a_heavy_robot_has_is_fitted_beyond_the_range_of_most():
+    heavy = {**TRUTH, "motor_lag.time_constant": 1.6, "motor_lag.imbalance": 0.0}
+    drives, names = planted_drives(heavy, episodes=4, seconds=20.0), ("trim", "delay", "motor_lag.time_constant")
+    found = fit_declared(drives, {**heavy, "motor_lag.time_constant": 0.1}, names)
+    assert found.theta["motor_lag.time_constant"] == pytest.approx(1.6, abs=0.05)
+    assert found.drives.ranges == {"motor_lag.time_constant": (0.0, 2.0)}
+
+
+def test_a_value_without_a_best_one_is_looked_for_no_further_than_physics_allows(drives, monkeypatch):
+    looked = []
+
+    def at_the_end(where, theta, free, noise):
+        looked.append(where.ranges["turn_slip"][1])
+        return SimpleNamespace(drives=where, theta={"turn_slip": looked[-1]}, free=free, noise=noise)
+
+    monkeypatch.setattr(selection, "fit", at_the_end)
+    first = SimpleNamespace(drives=drives, theta={"turn_slip": 1.5}, free=(("turn_slip",),), noise=NOISE)
+    assert selection.widen(first).theta == {"turn_slip": 15.0}
+    assert looked == [3.0, 6.0, 12.0, 15.0]
 
 
 MIXED = {**TRUTH, "yaw_scrub": 0.13, "lateral_slip": 0.002}

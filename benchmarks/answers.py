@@ -141,7 +141,7 @@ def main() -> None:
     parser.add_argument("--seeds", default="101:130", help="the first and the last")
     parser.add_argument("--plant", choices=("planar", "bullet"), default="planar")
     parser.add_argument("--budget", type=int, default=24, help="trials of each search")
-    parser.add_argument("--initial", type=int, default=8, help="trials of the design")
+    parser.add_argument("--initial", type=int, help="trials of the design: 8, or 4 beside --low-fidelity, if not said")
     parser.add_argument("--learn-from", type=Path, nargs="*", default=[], help="banks of the same proxy")
     parser.add_argument("--low-fidelity", type=Path, nargs="*", default=[], help="banks of a cheaper proxy")
     parser.add_argument("--before", type=Path, help="another OUTPUT, of the same seeds, to be compared with")
@@ -150,7 +150,7 @@ def main() -> None:
     family = replace(study.family, plant=given.plant)  # type: ignore[type-var]
     # As a user gets it: trials are cut off that cannot be among the best.
     banks = {key: tuple(str(path.resolve()) for path in getattr(given, key)) for key in ("learn_from", "low_fidelity")}
-    counts = {"budget": given.budget, "initial": given.initial}
+    counts = {"budget": given.budget, "initial": given.initial or (4 if given.low_fidelity else 8)}
     settings = replace(study.settings, jobs=1, cut_off=True, **counts, **banks)
     study = replace(study, family=family, identity=family.identity, settings=settings)
     first, last = map(int, given.seeds.split(":"))

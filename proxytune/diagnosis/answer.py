@@ -145,6 +145,10 @@ class Rules:
     """A group of learnt curves is added if it takes away this share of the held-out squared error, and its logarithm
     falls by so many standard errors: of thirty groups of no use one is, every other time."""
 
+    rare_group_share: float = 0.25
+    """Where nothing is learnt so, a group is added too that takes away this share: what acts in few drives is not sure
+    in most of them."""
+
     discrepancy_helps: float = 0.95
     discrepancy_harms: float = 1.02
     """Learnt curves are used if they bring the held-out error beneath the first share at some horizon, and above the

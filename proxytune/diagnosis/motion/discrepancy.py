@@ -240,23 +240,29 @@ def sum_squares(slopes: Slopes, weights: Floats, part: Whole, parts: int) -> Sum
     return Sums(hessian, gradient, sum_by(part, (errors**2).sum(axis=1) * trust, parts))
 
 
-def choose_groups(given: Sums, groups: Mapping[str, slice], rules: Rules) -> ChosenGroups:
-    """Add groups one by one, the best first, while they pay on parts left out; the level is always there."""
+def choose_groups(given: Sums, groups: Mapping[str, slice], rules: Rules, *, rare: bool = False) -> ChosenGroups:
+    """Add groups one by one, the best first, while they pay on parts left out; the level is always there.
+
+    A group pays if it surely makes the errors of most parts less; one of rare moments, if it takes much of all error.
+    """
     mean, nothing = np.sum([hessian.diagonal() for hessian in given.hessian], axis=0), 1e-12 * given.size.mean()
     unit = {name: float(mean[own].mean()) for name, own in groups.items()}
+
+    def pays(before: Floats, after: Floats) -> bool:
+        # Errors of parts differ by orders of magnitude: each counts by its ratio.
+        less = -np.diff(np.log(np.maximum((before, after), nothing)), axis=0)[0]
+        sure = less.sum() > rules.group_t * np.sqrt(len(less)) * less.std(ddof=1)
+        much = rare and after.sum() < (1.0 - rules.rare_group_share) * before.sum()
+        return bool((sure or much) and after.sum() < (1.0 - rules.group_share) * before.sum())
+
     pulls = {name: FREE * unit[name] + 1e-9 for name in groups if name == LEVEL}
     gains: dict[str, float] = {}
     held = _hold(given, groups, pulls)
     (losses,) = _held_out_losses(given, held, slice(0), np.zeros(1))
+    level = {LEVEL: float((given.size - losses).sum())} if pulls and pays(given.size, losses) else {}
     while True:
         tried = {name: _try_group(given, held, groups[name], name, unit[name]) for name in groups if name not in pulls}
-        paying = {}
-        for name, found in tried.items():
-            # Errors of parts differ by orders of magnitude: each counts by its ratio.
-            less = -np.diff(np.log(np.maximum((losses, found[1]), nothing)), axis=0)[0]
-            sure = less.sum() > rules.group_t * np.sqrt(len(less)) * less.std(ddof=1)
-            if sure and found[1].sum() < (1.0 - rules.group_share) * losses.sum():
-                paying[name] = found
+        paying = {name: found for name, found in tried.items() if pays(losses, found[1])}
         if not paying:
             break
         best = min(paying, key=lambda name: float(paying[name][1].sum()))
@@ -266,7 +272,7 @@ def choose_groups(given: Sums, groups: Mapping[str, slice], rules: Rules) -> Cho
     weights = np.zeros(len(mean))
     total = held.own[:, :, held.columns].sum(axis=0) + np.diag(held.penalty)
     weights[held.columns] = np.linalg.solve(total, given.gradient.sum(axis=0)[held.columns])
-    return ChosenGroups(weights, gains)
+    return ChosenGroups(weights, gains or level)
 
 
 class _Held(NamedTuple):
@@ -327,8 +333,8 @@ PARTS = 16
 """No more parts are left out in turn."""
 FOLDS = 4
 """The whole fit, choice of groups included, is repeated so often for the guard, each time without one fold."""
-ROUNDS = 2
-"""It is linearised and its weights are made robust so often."""
+ROUNDS, PATIENT_ROUNDS = 2, 4
+"""It is linearised and its weights are made robust so often; oftener where that came to nothing."""
 
 
 @dataclass(frozen=True)
@@ -362,9 +368,9 @@ def fit_discrepancy(drives: Drives, theta: Theta, promises: Callable[[Floats], b
         return Discrepancy(held_out=before)
     offer = offer_curves(drives, theta)
 
-    def fitted(left_out: Iterable[str] = ()) -> Discrepancy:
+    def fitted(left_out: Iterable[str] = (), *, patient: bool = False) -> Discrepancy:
         curves = tuple(curve for curve in offer.curves if curve.group not in left_out)
-        learnt, gains, folds = _fit_curves(drives, theta, replace(offer, curves=curves))
+        learnt, gains, folds = _fit_curves(drives, theta, replace(offer, curves=curves), patient)
         if not gains:
             return Discrepancy(held_out=before)
         after = _cross_validate(drives, theta, folds, windows)
@@ -379,6 +385,8 @@ def fit_discrepancy(drives: Drives, theta: Theta, promises: Callable[[Floats], b
     # Maps have the most weights by far: where the guard refuses curves with them, they are fitted without.
     if not found.used and _has(found, OF_PLACE):
         found = fitted(OF_PLACE)
+    if found.guard and not found.used or found.held_out is before:
+        found = fitted(patient=True)
     # Curves over motion were linearised without those over commands, and may get in each other's way.
     if _has(found, COMMAND_GROUPS):
         alone, of = fitted(COMMAND_GROUPS), blocks_of(drives, windows)
@@ -392,24 +400,29 @@ def _has(found: Discrepancy, groups: Iterable[str]) -> bool:
     return not {GROUPS[group].title for group in groups}.isdisjoint(found.share)
 
 
-def _fit_curves(drives: Drives, theta: Theta, offer: Learnt) -> tuple[Theta, Mapping[str, float], Sequence[Theta]]:
-    """Fit the curves to all parts, with what each group gained, and without each fold in turn; by names in θ."""
+def _fit_curves(
+    drives: Drives, theta: Theta, offer: Learnt, patient: bool
+) -> tuple[Theta, Mapping[str, float], Sequence[Theta]]:
+    """Fit the curves to all parts, with what each group gained, and without each fold in turn; by names in θ.
+
+    A patient fit takes more rounds, and looks for what matters in few parts alone.
+    """
     parts = _parts(drives)
     names = [curve.group for curve in offer.curves for _ in curve.knots]
     groups = {name: slice(names.index(name), names.index(name) + names.count(name)) for name in dict.fromkeys(names)}
     weights = np.zeros(len(names))
     now: Mapping[str, float] = {}
     replayed = replay_commands(drives, theta, offer)
-    for _ in range(ROUNDS):
+    for _ in range(PATIENT_ROUNDS if patient else ROUNDS):
         slopes = slopes_of(drives, {**theta, **now}, offer, replayed)
         given = sum_squares(slopes, weights, slopes.block % parts, parts)
-        chosen = choose_groups(given, groups, drives.rules)
+        chosen = choose_groups(given, groups, drives.rules, rare=patient)
         weights, now = chosen.weights, _theta(offer, chosen)
         if not chosen.gains:
             break
     number = np.arange(parts) % FOLDS
     without = [given.only(np.flatnonzero(number != fold)) for fold in range(FOLDS)] if now else []
-    folds = [_theta(offer, choose_groups(some, groups, drives.rules)) for some in without]
+    folds = [_theta(offer, choose_groups(some, groups, drives.rules, rare=patient)) for some in without]
     return now, chosen.gains, folds
 
 

@@ -104,13 +104,35 @@ def test_curves_over_two_signals_are_always_pulled_firmly():
     assert np.all(np.abs(weights[7:]) < 0.95 * 0.3)
 
 
-def test_the_level_is_always_there_and_never_a_gain():
+def test_a_group_of_rare_moments_is_chosen_by_what_it_takes_of_all_error_where_that_is_asked():
+    plain = slopes(WEIGHTS)
+    elsewhere = (plain.block > 1)[:, None]
+    quiet = Slopes(
+        np.where(elsewhere, slopes(np.zeros(15)).residuals, plain.residuals),
+        np.where(elsewhere[..., None], 1e-3, 1.0) * plain.columns,
+        plain.block,
+    )
+    given = summed(quiet)
+    assert not choose_groups(given, COLUMNS, RULES).gains
+    assert list(choose_groups(given, COLUMNS, RULES, rare=True).gains) == ["other"]
+    assert not choose_groups(given, COLUMNS, replace(RULES, rare_group_share=0.99), rare=True).gains
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_no_rare_moment_is_chosen_of_noise(seed):
+    assert not choose_groups(summed(slopes(np.zeros(15), seed=seed)), COLUMNS, RULES, rare=True).gains
+
+
+def test_the_level_is_always_there_and_a_gain_only_where_no_group_is():
     groups = {"level": COLUMNS["one"], "other": COLUMNS["other"]}
     truth = WEIGHTS + np.concatenate(((0.6, -0.4, 0.5), np.zeros(12)))
     chosen = choose_groups(summed(slopes(truth)), groups, RULES)
     assert list(chosen.gains) == ["other"]
     np.testing.assert_allclose(chosen.weights[:7], truth[:7], atol=0.02)
-    assert not choose_groups(summed(slopes(truth - WEIGHTS)), groups, RULES).gains
+    alone = choose_groups(summed(slopes(truth - WEIGHTS)), groups, RULES)
+    assert list(alone.gains) == ["level"]
+    np.testing.assert_allclose(alone.weights[:7], (truth - WEIGHTS)[:7], atol=0.02)
+    assert not choose_groups(summed(slopes(np.zeros(15))), groups, RULES).gains
 
 
 @pytest.fixture(scope="module")
@@ -196,6 +218,22 @@ def test_curves_that_promise_nothing_to_who_asks_are_not_used(found):
 def test_nothing_is_used_where_nothing_is_missing(seed):
     drives = planted_drives(TRUTH, episodes=6, seconds=12.0, seed=seed)
     assert not fit_discrepancy(drives, TRUTH).used
+
+
+def test_slow_wheels_are_learnt_without_any_other_curve():
+    drives = planted_drives({**TRUTH, "wheel_gain.left": 0.9, "wheel_gain.right": 0.9}, episodes=6, seconds=12.0)
+    learnt = fit_discrepancy(drives, TRUTH)
+    assert learnt.used
+    assert dict(learnt.share) == {"level": 1.0}
+
+
+def test_where_nothing_is_learnt_it_is_looked_once_more_for_what_matters_in_few_drives():
+    drives = planted_drives({**TRUTH, "understeer": 0.8}, episodes=6, seconds=12.0)
+    learnt = fit_discrepancy(drives, TRUTH)
+    assert learnt.used
+    assert learnt.guard[2.0].value < 0.7
+    strict = replace(drives, rules=replace(RULES, rare_group_share=0.9))
+    assert not fit_discrepancy(strict, TRUTH).used
 
 
 def test_too_few_blocks_teach_nothing():
@@ -338,7 +376,7 @@ def test_what_a_tracker_does_to_places_and_headings_is_learnt_as_its_own(tracked
 
 @pytest.mark.parametrize(("alone", "chosen"), [(1.0, "turn rate"), (2.0, "time since a command changed")])
 def test_curves_over_commands_are_left_out_where_motion_alone_predicts_as_well(drives, monkeypatch, alone, chosen):
-    def fit_curves(drives, theta, offer):
+    def fit_curves(drives, theta, offer, patient):
         group = "held" if any(curve.group == "held" for curve in offer.curves) else "turn_rate"
         return {group: 1.0}, {group: 1.0}, [{group: 1.0}]
 

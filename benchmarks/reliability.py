@@ -39,6 +39,7 @@ sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "fakes"))
 import conftest
 import foreign_robot
 import launched
+import pictured
 import processes
 import several
 import taught
@@ -62,7 +63,7 @@ def survive_kills(count: int, home: Path) -> str:
     """Kill studies of every engine, and compare what they come to."""
     cases = list(itertools.product([engine for engine in ENGINE_NAMES if engine != "tpe"], "12", range(count)))
     equal, kills = 0, 0
-    with launched.launching("all") as launcher:
+    with launched.launching() as launcher:
         for engine, jobs, number in cases:
             own = home / f"{engine}_{jobs}_{number}"
             own.mkdir()
@@ -106,6 +107,7 @@ COMMANDS = {
     "predict": "predict tiny/twin.toml log --horizon 2 --output poses.csv",
     "predict of pictures": "predict tiny/twin.toml pictured --frames --output drawn",
     "diagnose": "diagnose driven --output found",
+    "diagnose of a camera": "diagnose stills --output found",
     "loop": "loop tiny --log driven",
     "list": "list effects",
     "completion": "completion bash",
@@ -141,6 +143,8 @@ def prepare(home: Path) -> None:
     for log, seconds, frames in (("driven", 11, 0), ("pictured", 5, 4)):
         words = f"record {home}/tiny --model {home}/tiny/twin.toml --output {home}/{log} --repeats 1"
         main([*words.split(), "--seconds", str(seconds), "--frames", str(frames)])
+    rolled = {"camera_pitch": 19.15, "camera_roll": 4.0}
+    pictured.write_still_frames(home / "stills", rolled, pictured.lane_poses(30), columns=96)
     (home / "log").mkdir()
     foreign_robot.write_own_times(home / "log", drives)
     rows = [f"0,{0.05 * tick:.2f},{0.2 + 0.1 * (tick // 20 % 3)},{0.3}\n" for tick in range(200)]
@@ -157,7 +161,7 @@ def survive_in_every_command(count: int, home: Path, chosen: Collection[str] = C
     work.mkdir()
     os.chdir(work)
     lines = ["| command | kills | before its end | runs | went on | came to the same |", "|---|---|---|---|---|---|"]
-    with launched.launching("all") as launcher:
+    with launched.launching() as launcher:
         for name in chosen:
             words = COMMANDS[name]
             whole, seconds = [], 0.0

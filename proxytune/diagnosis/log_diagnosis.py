@@ -20,7 +20,6 @@ from proxytune.diagnosis.camera.model import draw_pictures, neutral_state
 from proxytune.diagnosis.motion.diagnose import Diagnosis, declared_effects, diagnose
 from proxytune.diagnosis.motion.excitation import LIMITS, Limits
 from proxytune.diagnosis.motion.screening import motion_effects
-from proxytune.diagnosis.stages import Stages, facts_of
 from proxytune.driving import Markings, Robot, ground_points
 from proxytune.effects import effect_of
 from proxytune.errors import LogError, SettingsError
@@ -77,8 +76,8 @@ def diagnose_log(
         report: Takes a line about each step, as it begins.
         rules: Thresholds of what is named, believed and told of motion.
         limits: Of the next drive.
-        folder: Where the findings go: what is known of motion is kept there on the way, and a diagnosis that was killed
-            goes on with it; None: nothing is kept.
+        folder: Where the findings go: what is known is kept there on the way, and a diagnosis that was killed goes on
+            with it; None: nothing is kept.
 
     Raises:
         LogError: If neither drives nor frames can bear the question, or a declared effect is unknown.
@@ -87,14 +86,12 @@ def diagnose_log(
     on_motion, on_camera = _declared_by_kind(log, robot, declared)
 
     def motion() -> Diagnosis:
-        options = (on_motion, seed, rules, limits)
-        stages = Stages(folder, facts_of(log, test, robot, *options) if folder else "")
         return diagnose(
-            log, robot, on_motion, test=test, seed=seed, report=report, rules=rules, limits=limits, stages=stages
+            log, robot, on_motion, test=test, seed=seed, report=report, rules=rules, limits=limits, folder=folder
         )
 
     def camera() -> CameraDiagnosis:
-        return diagnose_camera(log, robot, on_camera, seed=seed, report=report)
+        return diagnose_camera(log, robot, on_camera, seed=seed, report=report, folder=folder)
 
     cautions = log_cautions(log, robot.figures)
     if log.frames is None:

@@ -1,10 +1,10 @@
-"""Stages of a diagnosis of motion, kept as facts, so that one that was killed goes on where it was.
+"""Stages of a diagnosis, kept as facts, so that one that was killed goes on where it was.
 
 Each stage is a function of what came before, of the log, the robot, the options and our code. All of these have one
-digest, under which the results of stages lie; with another digest they are other results, and those of before are
-removed. What is read again is the same to the last bit: each file begins with a digest of what follows. Files are
-pickles of numbers and of our own classes alone: nothing else is made of them when they are read, for a folder of
-findings may be a stranger's. Robots and drives are not in them, but what stands for these.
+digest, under which the results of stages lie; with another digest they are other results. What is read again is the
+same to the last bit: each file begins with a digest of what follows. Files are pickles of numbers and of our own
+classes alone: nothing else is made of them when they are read, for a folder of findings may be a stranger's. Robots,
+drives and pictures are not in them, but what stands for these.
 """
 
 import contextlib
@@ -21,18 +21,19 @@ from typing import Any, TypeVar
 import numpy as np
 
 import proxytune
+from proxytune.diagnosis.answer import Progress
+from proxytune.driving import Robot
 from proxytune.errors import RunError
 from proxytune.files import draft_of
 from proxytune.identity import digest, meaning_of, meaning_of_code, versions_of
-from proxytune.logs import Log
 
 Result = TypeVar("Result")
 
 ROOMS = ("logs", "effects", "driving", "diagnosis")
-"""Rooms whose code a diagnosis of motion depends on."""
+"""Rooms whose code a diagnosis depends on."""
 FOLDER = ".stages"
 """Where stages lie in the folder of the findings until these are written."""
-NUMBERS = {
+MAKERS = {
     ("numpy", "ndarray"),
     ("numpy", "dtype"),
     ("numpy.core.multiarray", "_reconstruct"),
@@ -41,20 +42,21 @@ NUMBERS = {
     ("numpy._core.multiarray", "scalar"),
     ("numpy._core.numeric", "_frombuffer"),
     ("numpy.core.numeric", "_frombuffer"),
+    ("functools", "partial"),
 }
-"""What arrays are made by."""
+"""What arrays are made by, and what binds SIGNALS to curves."""
 SIGNALS = "proxytune.diagnosis.motion.signals"
-"""Its functions, which only reckon, are bound to curves."""
+"""Functions of this module only reckon."""
 
 
-def facts_of(log: Log, test: Log | None, robot: Any, *options: object) -> str:
-    """A digest of all that a diagnosis of motion depends on: logs, robot, options, and what our code means."""
+def facts_of(robot: Robot, *things: object) -> str:
+    """A digest of all that a diagnosis depends on: the robot, logs, pictures, options, and what our code means."""
     package = Path(proxytune.__file__).parent
     code = meaning_of((path for room in ROOMS for path in (package / room).rglob("*.py")), package)
     effects = [(name, meaning_of_code(robot.catalogue.effect(name))) for name in robot.catalogue.names]
-    built = (robot.name, robot.drive, robot.reverse, sorted(robot.figures.items()), sorted(robot.theta.items()))
-    versions = sorted(versions_of(("numpy", "scipy", "pybullet")).items())
-    return digest(_plain(log), None if test is None else _plain(test), built, effects, options, code, versions)
+    body = robot.urdf and robot.urdf.read_bytes()
+    built = (robot.name, robot.drive, robot.reverse, body, robot.figures, robot.theta)
+    return digest(_plain((things, built, effects, code, versions_of(("numpy", "scipy", "pybullet", "numba")))))
 
 
 def _plain(value: Any) -> object:
@@ -69,32 +71,28 @@ def _plain(value: Any) -> object:
 
 
 class Stages:
-    """Results of stages in the folder of findings, without one not kept; a link in their place is refused."""
+    """Results of stages in the folder of findings, without one not kept; a link in their place is refused.
 
-    def __init__(self, folder: Path | None = None, facts: str = "") -> None:
+    What is `known` is made anew each time, and results only refer to it.
+    """
+
+    def __init__(self, folder: Path | None, facts: str, report: Progress = lambda _: None, **known: Any) -> None:
         self._folder = None if folder is None else folder / FOLDER / facts
-        self._known: dict[str, Any] = {}
-        if folder is not None and (folder / FOLDER).is_dir():
-            if (folder / FOLDER).is_symlink():
-                raise RunError(f"{folder / FOLDER}: is a symbolic link; remove it, or give another folder")
-            for other in (folder / FOLDER).iterdir():
-                if other.name != facts:
-                    shutil.rmtree(other, ignore_errors=True)
-
-    def know(self, **things: Any) -> None:
-        """Name things that stages refer to and that are made anew each time."""
-        self._known |= things
+        self._report, self._known = report, known
+        if folder is not None and (folder / FOLDER).is_symlink():
+            raise RunError(f"{folder / FOLDER}: is a symbolic link; remove it, or give another folder")
 
     def keep(self, stage: str, make: Callable[[], Result]) -> Result:
         """The result of a stage, made if it is not kept."""
         if self._folder is None:
             return make()
         path = self._folder / f"{stage}.pickle"
-        # What a disk has spoilt is made again.
-        with contextlib.suppress(Exception):
-            known, content = path.read_bytes().split(b"\n", 1)
-            if known == _digest_of(content):
-                return _Reader(io.BytesIO(content), self._known).load()  # type: ignore[no-any-return]
+        if path.exists():
+            with contextlib.suppress(Exception):
+                known, content = path.read_bytes().split(b"\n", 1)
+                if known == _digest_of(content):
+                    return _Reader(io.BytesIO(content), self._known).load()  # type: ignore[no-any-return]
+            self._report(f"{path}: is damaged; it is made again")
         result, written = make(), io.BytesIO()
         _Writer(written, self._known).dump(result)
         try:
@@ -134,13 +132,11 @@ class _Reader(pickle.Unpickler):
 
     def find_class(self, module: str, name: str) -> Any:
         """Find numbers and our own classes of values; nothing else is made."""
-        if (module, name) in NUMBERS:
+        if (module, name) in MAKERS:
             return super().find_class(module, name)
         found = super().find_class(module, name) if module.startswith("proxytune.") and "." not in name else None
         if isinstance(found, type) and (dataclasses.is_dataclass(found) or issubclass(found, tuple | Enum)):
             return found
-        if (module, name) == ("functools", "partial"):
-            return super().find_class(module, name)
         if module == SIGNALS and getattr(found, "__module__", "") == SIGNALS:
             return found
         raise pickle.UnpicklingError(f"{module}.{name} is no value of a stage")

@@ -1,19 +1,28 @@
 """A diagnosis that is killed goes on with what it knew, to the same answer; what does not fit is made again."""
 
+import contextlib
 import json
 import os
 import pickle
-from dataclasses import replace
+import shutil
+from collections.abc import Mapping
+from dataclasses import is_dataclass, replace
+from pathlib import Path
 
 import hidden_cases as hidden
 import numpy as np
 import pytest
+from pictured import ROBOT, lane_poses, write_still_frames
+from PIL import Image
 from planted import CALM, TRUTH, look_for_few, planted_log
 
 from proxytune.diagnosis import RULES, diagnose_log, forget_stages, robot_of
 from proxytune.diagnosis.answer import Estimate
 from proxytune.diagnosis.stages import FOLDER, Stages, _digest_of, facts_of
+from proxytune.driving import Markings, Robot
 from proxytune.errors import RunError
+from proxytune.files import shipped
+from proxytune.logs import Frames, read_log
 from proxytune.report import diagnosis_document
 
 
@@ -41,20 +50,22 @@ def test_a_stage_is_made_once_and_read_as_it_was(tmp_path):
 def test_things_that_are_known_are_not_copied(tmp_path):
     thing = {"large": np.zeros(1000)}
     for _ in range(2):
-        stages = Stages(tmp_path, "facts")
-        stages.know(thing=thing)
+        stages = Stages(tmp_path, "facts", thing=thing)
         assert stages.keep("one", lambda: (thing, 1))[0] is thing
     (path,) = tmp_path.rglob("*.pickle")
     assert path.stat().st_size < 200
 
 
-def test_other_facts_and_spoilt_files_are_made_again(tmp_path):
-    assert Stages(tmp_path, "facts").keep("one", lambda: 1) == 1
-    (path,) = tmp_path.rglob("*.pickle")
+def test_other_facts_and_spoilt_files_are_made_again_and_what_is_spoilt_is_told(tmp_path):
+    said = []
+    assert Stages(tmp_path, "facts", said.append).keep("one", lambda: 1) == 1
+    assert Stages(tmp_path, "others", said.append).keep("one", lambda: 2) == 2
+    assert Stages(tmp_path, "facts", said.append).keep("one", lambda: 3) == 1
+    assert said == []
+    path = tmp_path / FOLDER / "facts" / "one.pickle"
     path.write_bytes(path.read_bytes()[:-2])
-    assert Stages(tmp_path, "facts").keep("one", lambda: 2) == 2
-    assert Stages(tmp_path, "others").keep("one", lambda: 3) == 3
-    assert [folder.name for folder in (tmp_path / FOLDER).iterdir()] == ["others"]
+    assert Stages(tmp_path, "facts", said.append).keep("one", lambda: 4) == 4
+    assert said == [f"{path}: is damaged; it is made again"]
     forget_stages(tmp_path)
     assert not list(tmp_path.iterdir())
 
@@ -84,20 +95,22 @@ def test_a_strangers_file_runs_nothing(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_facts_are_the_log_the_robot_and_the_options():
+def test_facts_are_the_log_the_robot_and_the_options(tmp_path):
     log = planted_log(TRUTH, episodes=2, seconds=3.0)
     robot = robot_of(log)
-    plain = facts_of(log, None, robot, 1, RULES)
-    assert plain == facts_of(planted_log(TRUTH, episodes=2, seconds=3.0), None, robot_of(log), 1, RULES)
+    plain = facts_of(robot, log, None, 1, RULES)
+    assert plain == facts_of(robot_of(log), planted_log(TRUTH, episodes=2, seconds=3.0), None, 1, RULES)
     moved = replace(log.episodes[0], poses=log.episodes[0].poses + 1e-12)
+    (tmp_path / "other.urdf").write_text("<robot/>")
     others = [
-        facts_of(replace(log, episodes=(moved, *log.episodes[1:])), None, robot, 1, RULES),
-        facts_of(log, log, robot, 1, RULES),
-        facts_of(log, None, replace(robot, figures={**robot.figures, "full_speed": 0.61}), 1, RULES),
-        facts_of(log, None, robot, 2, RULES),
-        facts_of(log, None, robot, 1, replace(RULES, p_value=0.02)),
+        facts_of(robot, replace(log, episodes=(moved, *log.episodes[1:])), None, 1, RULES),
+        facts_of(robot, log, log, 1, RULES),
+        facts_of(replace(robot, figures={**robot.figures, "full_speed": 0.61}), log, None, 1, RULES),
+        facts_of(replace(robot, urdf=tmp_path / "other.urdf"), log, None, 1, RULES),
+        facts_of(robot, log, None, 2, RULES),
+        facts_of(robot, log, None, 1, replace(RULES, p_value=0.02)),
     ]
-    assert len({plain, *others}) == 6
+    assert len({plain, *others}) == 7
 
 
 def interrupted(monkeypatch, whole):
@@ -115,6 +128,16 @@ def interrupted(monkeypatch, whole):
     monkeypatch.setattr(Stages, "keep", once)
 
 
+def made_one_by_one(monkeypatch, diagnose):
+    """The stages that are made and the answer, of a diagnosis that is killed after each stage and begun again."""
+    stages = []
+    interrupted(monkeypatch, stages)
+    for _ in range(20):
+        with contextlib.suppress(Killed):
+            return stages, diagnose()
+    return stages, None
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("curved", [False, True])
 def test_a_diagnosis_that_is_killed_after_each_stage_comes_to_the_same_answer(tmp_path, monkeypatch, curved):
@@ -122,16 +145,139 @@ def test_a_diagnosis_that_is_killed_after_each_stage_comes_to_the_same_answer(tm
         log = hidden.make_log(hidden.OUTSIDE[0], episodes=6, seconds=12.0)
     else:
         log = planted_log({**TRUTH, "yaw_scrub": 0.12}, episodes=6, seconds=12.0, noise=CALM)
-    robot, stages = robot_of(log), []
+    robot = robot_of(log)
     look_for_few(monkeypatch)
     undisturbed = diagnosis_document(diagnose_log(log, robot))
-    interrupted(monkeypatch, stages)
-    found = None
-    for _ in range(20):
-        try:
-            found = diagnose_log(log, robot, folder=tmp_path)
-            break
-        except Killed:
-            continue
+    stages, found = made_one_by_one(monkeypatch, lambda: diagnose_log(log, robot, folder=tmp_path))
     assert len(stages) == len(set(stages)) >= 9, "each stage is made once"
     assert json.dumps(diagnosis_document(found)) == json.dumps(undisturbed)
+
+
+OF_CAMERA = ["everything", "match", "named", "weighed", "look", "concluded"]
+
+
+def still_frames(folder):
+    """The folder of a log of few and small frames by a camera that is rolled."""
+    return write_still_frames(folder, {"camera_pitch": 19.15, "camera_roll": 4.0}, lane_poses(20), columns=64)
+
+
+def assert_same_to_the_bit(one, other):
+    """Compare all that a diagnosis holds but its robot."""
+    if isinstance(one, np.ndarray):
+        assert (one.dtype, one.shape, one.tobytes()) == (other.dtype, other.shape, other.tobytes())
+    elif isinstance(one, Mapping):
+        assert_same_to_the_bit(list(one.items()), list(other.items()))
+    elif isinstance(one, tuple | list):
+        assert len(one) == len(other)
+        for mine, yours in zip(one, other, strict=True):
+            assert_same_to_the_bit(mine, yours)
+    elif is_dataclass(one) and not isinstance(one, Robot):
+        assert_same_to_the_bit(list(vars(one).items()), list(vars(other).items()))
+    elif not isinstance(one, Robot | Markings):
+        assert repr(one) == repr(other)
+
+
+def test_of_a_camera_killed_after_each_stage_the_answer_is_the_same_to_the_bit(tmp_path, monkeypatch):
+    log = read_log(still_frames(tmp_path / "log"))
+    # Fits then have a scatter of their own.
+    log = replace(log, frames=replace(log.frames, position_m=None))
+    undisturbed = diagnose_log(log, ROBOT)
+    stages, found = made_one_by_one(monkeypatch, lambda: diagnose_log(log, ROBOT, folder=tmp_path / "found"))
+    assert stages == OF_CAMERA, "each stage is made once"
+    assert json.dumps(diagnosis_document(found)) == json.dumps(diagnosis_document(undisturbed))
+    assert_same_to_the_bit(found.camera, undisturbed.camera)
+
+
+def as_it_was(log, patch):
+    return log
+
+
+def elsewhere(log, patch):
+    """What is imported lies in another folder each time."""
+    home = log.frames.paths[0].parents[1]
+    return read_log(home.rename(home.with_name("moved")))
+
+
+def another_pixel(log, patch):
+    with Image.open(log.frames.paths[7]) as picture:
+        changed = np.array(picture)
+    changed[30, 30] += 1
+    Image.fromarray(changed).save(log.frames.paths[7])
+    return log
+
+
+def another_map(log, patch):
+    path = Path(log.frames.road)
+    path.write_text(path.read_text().replace("white_width = 0.048", "white_width = 0.049"))
+    return log
+
+
+def other_poses(log, patch):
+    log.episodes[0].poses[3, 0] += 1e-12
+    return log
+
+
+def other_statement(log, patch):
+    return replace(log, frames=replace(log.frames, rectified=True))
+
+
+def other_code(log, patch):
+    patch.setattr("proxytune.diagnosis.stages.meaning_of", lambda *_: "other")
+    return log
+
+
+@pytest.mark.parametrize(
+    ("change", "options", "next_made"),
+    [
+        (as_it_was, {}, OF_CAMERA[1]),
+        (elsewhere, {}, OF_CAMERA[1]),
+        (another_pixel, {}, OF_CAMERA[0]),
+        (another_map, {}, OF_CAMERA[0]),
+        (other_poses, {}, OF_CAMERA[0]),
+        (other_statement, {}, OF_CAMERA[0]),
+        (other_code, {}, OF_CAMERA[0]),
+        (as_it_was, {"seed": 2}, OF_CAMERA[0]),
+        (as_it_was, {"declared": ["camera_pitch", "camera_roll"]}, OF_CAMERA[0]),
+    ],
+)
+def test_a_stage_of_another_camera_log_other_options_or_code_is_made_again(
+    tmp_path, monkeypatch, change, options, next_made
+):
+    folder, stages = still_frames(tmp_path / "log"), []
+    shutil.copy(shipped("robots") / "maps" / "small_loop.toml", folder / "own.toml")
+    (folder / "log.toml").write_text((folder / "log.toml").read_text().replace('"small_loop"', '"own.toml"'))
+    log = read_log(folder)
+    interrupted(monkeypatch, stages)
+    with pytest.raises(Killed):
+        diagnose_log(log, ROBOT, folder=tmp_path / "found")
+    with pytest.raises(Killed):
+        diagnose_log(change(log, monkeypatch), ROBOT, folder=tmp_path / "found", **options)
+    assert stages == [OF_CAMERA[0], next_made]
+
+
+def test_stages_of_motion_are_the_same_wherever_the_pictures_of_a_log_lie(tmp_path, monkeypatch):
+    folders = set()
+
+    def only_look(self, stage, make):
+        folders.add(self._folder)
+        raise Killed
+
+    monkeypatch.setattr(Stages, "keep", only_look)
+    log, taken = planted_log(TRUTH), (np.zeros(1, dtype=int), np.zeros(1), "small_loop")
+    for home in ("first", "again"):
+        with pytest.raises(Killed):
+            diagnose_log(replace(log, frames=Frames((tmp_path / home,), *taken)), robot_of(log), folder=tmp_path)
+    assert len(folders) == 1
+
+
+def test_a_damaged_stage_of_a_camera_is_told_in_one_line_and_made_again(tmp_path, monkeypatch):
+    log, stages, said = read_log(still_frames(tmp_path / "log")), [], []
+    interrupted(monkeypatch, stages)
+    with pytest.raises(Killed):
+        diagnose_log(log, ROBOT, folder=tmp_path / "found")
+    (path,) = (tmp_path / "found").rglob("*.pickle")
+    path.write_bytes(path.read_bytes()[:100])
+    with pytest.raises(Killed):
+        diagnose_log(log, ROBOT, folder=tmp_path / "found", report=said.append)
+    assert stages == OF_CAMERA[:1] * 2
+    assert said == ["reading frames", "fitting the camera", f"{path}: is damaged; it is made again"]

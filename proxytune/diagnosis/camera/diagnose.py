@@ -6,6 +6,8 @@ how the map was laid, as the fit has it.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -37,6 +39,7 @@ from proxytune.diagnosis.camera.selection import (
     next_views,
     select_camera_effects,
 )
+from proxytune.diagnosis.stages import Stages, facts_of
 from proxytune.driving import LINES, Robot
 from proxytune.effects import PARAMETERS, Catalogue, Stage, effect_of
 from proxytune.errors import LogError
@@ -174,7 +177,13 @@ def declared_camera_effects(robot: Robot) -> tuple[str, ...]:
 
 
 def diagnose_camera(
-    log: Log, robot: Robot, declared: Sequence[str], *, seed: int = 1, report: Progress = lambda _: None
+    log: Log,
+    robot: Robot,
+    declared: Sequence[str],
+    *,
+    seed: int = 1,
+    report: Progress = lambda _: None,
+    folder: Path | None = None,
 ) -> CameraDiagnosis:
     """Tune what is declared of a camera, find what is missing, and test both on frames kept aside.
 
@@ -184,6 +193,7 @@ def diagnose_camera(
         declared: Effects whose parameters are tuned in any case; those on motion are left alone.
         seed: Of the bootstrap.
         report: Takes a line about each step, as it begins.
+        folder: Where results are kept on the way, so that a diagnosis that was killed goes on; None: nowhere.
 
     Raises:
         LogError: If the frames cannot bear the question: too few markings, or other poses than these.
@@ -193,18 +203,24 @@ def diagnose_camera(
         raise LogError(f"{log.name}: has no frames; add [camera] to log.toml")
     report("reading frames")
     gathered = gather_views(log, log.frames, robot)
+    views, stated = gathered.views, replace(log.frames, paths=(), road="")
+    seen = (gathered.pictures, views.tracks, views.markings.road, stated)
+    facts = facts_of(robot, seen, declared, seed) if folder else ""
+    keep = Stages(folder, facts, report, robot=robot, gathered=gathered, **vars(views)).keep
     report("fitting the camera")
-    views, readout_s = gathered.views, log.frames.readout_s
+    readout_s = stated.readout_s
     fixed = {} if readout_s is None else {READOUT: readout_s}
-    names = [name for name in views.optics.mounting if not (log.frames.rectified and name == DISTORTION)]
+    names = [name for name in views.optics.mounting if not (stated.rectified and name == DISTORTION)]
     names += [name for name in MOVING if views.tracks.moving and name not in fixed]
-    unknown = log.frames.position_m is None or log.frames.heading_deg is None
-    full = fit_everything(views, names, fixed, learn_scatter=unknown)
-    notes = check_match(log.name, full)
+    unknown = stated.position_m is None or stated.heading_deg is None
+    full = keep("everything", lambda: fit_everything(views, names, fixed, learn_scatter=unknown))
+    notes = keep("match", lambda: check_match(log.name, full))
     report("looking for what the camera lacks")
-    named = select_camera_effects(full, [effect for effect in declared if effect in effects_of(tuple(names))])
+    own = [effect for effect in declared if effect in effects_of(tuple(names))]
+    named = keep("named", lambda: select_camera_effects(full, own))
     report("testing on frames kept aside")
-    weighed = weigh_effects(named, seed)
+    weighed = keep("weighed", lambda: weigh_effects(named, seed))
     report("looking at brightness and sharpness")
-    look = look_at(gathered, weighed.named.model)
-    return conclude(gathered, weighed, look, tuple(declared), (*gathered.notes, *notes), seed)
+    look = keep("look", lambda: look_at(gathered, weighed.named.model))
+    every = (*gathered.notes, *notes)
+    return keep("concluded", lambda: conclude(gathered, weighed, look, tuple(declared), every, seed))

@@ -7,6 +7,7 @@ model could have: from what the noise of measured poses alone makes, to the lowe
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -58,7 +59,7 @@ from proxytune.diagnosis.motion.prediction import (
 )
 from proxytune.diagnosis.motion.screening import MOTION_EFFECTS, motion_effects
 from proxytune.diagnosis.motion.selection import fit_declared, select_effects
-from proxytune.diagnosis.stages import Stages
+from proxytune.diagnosis.stages import Stages, facts_of
 from proxytune.driving import Robot
 from proxytune.effects import SHIPPED, Catalogue, effect_of
 from proxytune.errors import LogError
@@ -316,7 +317,7 @@ def diagnose(
     report: Progress = lambda _: None,
     rules: Rules = RULES,
     limits: Limits = LIMITS,
-    stages: Stages | None = None,
+    folder: Path | None = None,
 ) -> Diagnosis:
     """Tune what is declared, find what is missing, and test both on drives kept aside.
 
@@ -329,7 +330,7 @@ def diagnose(
         report: Takes a line about each step, as it begins.
         rules: Thresholds of what is named, believed and told.
         limits: Of the next drive.
-        stages: Where results are kept on the way, so that a diagnosis that was killed goes on.
+        folder: Where results are kept on the way, so that a diagnosis that was killed goes on; None: nowhere.
 
     Raises:
         LogError: If the log cannot bear the question (too short, no motion, other units), or a declared effect is
@@ -348,10 +349,11 @@ def diagnose(
     parts = Parts(*(replace(drives, rules=rules) for drives in split(log, robot, test)))
     check_motion(log.name, parts.fitted)
     check_units(log.name, parts.fitted, start)
-    stages = stages or Stages()
     whole = replace(gather(test or log, robot, (test or log).episodes), rules=rules)
-    stages.know(robot=robot, rules=rules, fitted=parts.fitted, tested=parts.tested, whole=whole)
-    keep = stages.keep
+    logs = [one and replace(one, frames=None) for one in (log, test)]
+    facts = facts_of(robot, logs, names, seed, rules, limits) if folder else ""
+    known = {"robot": robot, "rules": rules, "fitted": parts.fitted, "tested": parts.tested, "whole": whole}
+    keep = Stages(folder, facts, report, **known).keep
     report("fitting what is declared")
     declared_alone = keep("declared", lambda: fit_declared(parts.fitted, start, names))
     selected = keep("selected", lambda: select_effects(declared_alone, seed, report))

@@ -385,7 +385,7 @@ def fit_discrepancy(drives: Drives, theta: Theta, promises: Callable[[Floats], b
     # Maps have the most weights by far: where the guard refuses curves with them, they are fitted without.
     if not found.used and _has(found, OF_PLACE):
         found = fitted(OF_PLACE)
-    if found.guard and not found.used or found.held_out is before:
+    if (found.guard and not found.used) or found.held_out is before:
         found = fitted(patient=True)
     # Curves over motion were linearised without those over commands, and may get in each other's way.
     if _has(found, COMMAND_GROUPS):

@@ -15,6 +15,7 @@ prediction      windows of open-loop prediction, ratios of their errors with int
 multistep_fit   θ refitted to windows; the noise floor of their errors; the bullet plant
 effect_size     error without an effect by the error with it; what could not be seen; two robots in one log
 discrepancy     what no name explains, learnt as curves and guarded
+curve_selection the groups of curves that pay on parts left out
 manoeuvres      a library of drives
 excitation      the drive to do next, designed:  T_ab = ½ min ‖z_a − z_b‖², or ½ log|I + DᵀD|
 diagnose        the whole, and its verdict

@@ -3,10 +3,10 @@
     e = Σ_k w_k φ_k(twists) + noise,    w = (Σ φᵀφ + Λ)⁻¹ Σ φᵀe,
 
 with e the errors of poses over windows, linearised in the weights w of curves φ. `offer_curves` lays knots where the
-drives have been; `choose_groups` adds groups of curves by forward selection with a ridge Λ of one scale a group, on
-parts that are left out; `fit_discrepancy` guards the whole by held-out windows (after Kennedy and O'Hagan's model
-discrepancy). `match_named_effect` reads what was learnt back into a name, and `learn` tells what the curves are worth
-on drives that were not fitted, and whether the names do worse than curves alone.
+drives have been; `curve_selection.choose_groups` adds groups of curves by forward selection with a ridge Λ of one
+scale a group, on parts that are left out; `fit_discrepancy` guards the whole by held-out windows (after Kennedy and
+O'Hagan's model discrepancy). `match_named_effect` reads what was learnt back into a name, and `learn` tells what the
+curves are worth on drives that were not fitted, and whether the names do worse than curves alone.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -18,7 +18,8 @@ import numpy as np
 from scipy.optimize import minimize
 
 from proxytune.diagnosis.answer import Rules
-from proxytune.diagnosis.motion.drives import Drives, Floats, Whole, sum_by
+from proxytune.diagnosis.motion.curve_selection import ChosenGroups, choose_groups, sum_squares
+from proxytune.diagnosis.motion.drives import Drives, Floats
 from proxytune.diagnosis.motion.evidence import Findings
 from proxytune.diagnosis.motion.innovations import span, theta_at, twists_of
 from proxytune.diagnosis.motion.multistep_fit import HORIZONS_S
@@ -26,7 +27,6 @@ from proxytune.diagnosis.motion.prediction import (
     FITTED_S,
     Ratio,
     Rmse,
-    Slopes,
     Windows,
     blocks_of,
     cut,
@@ -195,138 +195,6 @@ def _steps(last: float, count: int) -> tuple[float, ...]:
 def _round_knot(value: float) -> float:
     """Round a knot to three digits: more say nothing."""
     return float(f"{value:.3g}")
-
-
-RIDGES = (1e-3, 1e-2, 1e-1, 1.0)
-"""Pulls towards no curve that are tried, as shares of what an average weight of the group is held by."""
-FIRMEST_ONLY = {"speed_and_turn": 0.1, PLACE: 0.01}
-"""Curves over two signals are never pulled less than this: most of their knots are seldom visited."""
-FREE = 1e-6
-"""The level is hardly pulled."""
-ROBUST = 1.5
-"""Errors beyond so many medians count less and less."""
-
-
-class Sums(NamedTuple):
-    """Weighted squares by part: of columns with each other, (K, K) each, with the errors (P, K), of the errors (P,)."""
-
-    hessian: Sequence[Floats]
-    gradient: Floats
-    size: Floats
-
-    def only(self, chosen: Whole) -> "Sums":
-        """Some of the parts."""
-        return Sums([self.hessian[number] for number in chosen], self.gradient[chosen], self.size[chosen])
-
-
-class ChosenGroups(NamedTuple):
-    """The weights of all columns, 0 where a group was not chosen, and the squared error that each group took away."""
-
-    weights: Floats
-    gains: Mapping[str, float]
-
-
-def sum_squares(slopes: Slopes, weights: Floats, part: Whole, parts: int) -> Sums:
-    """Sum over the poses of each part, linearised round these weights; errors are counted from weights of 0."""
-    errors = slopes.residuals + slopes.columns @ weights
-    size = np.sqrt((slopes.residuals**2).sum(axis=1))
-    trust = 1.0 / np.sqrt(1.0 + (size / (ROBUST * np.median(size) + 1e-12)) ** 2)
-    hessian = []
-    for number in range(parts):
-        own = part == number
-        columns = slopes.columns[own].reshape(-1, slopes.columns.shape[2])
-        hessian.append((columns * np.repeat(trust[own], 3)[:, None]).T @ columns)
-    gradient = sum_by(part, np.einsum("mck,mc,m->mk", slopes.columns, errors, trust), parts)
-    return Sums(hessian, gradient, sum_by(part, (errors**2).sum(axis=1) * trust, parts))
-
-
-def choose_groups(given: Sums, groups: Mapping[str, slice], rules: Rules, *, rare: bool = False) -> ChosenGroups:
-    """Add groups one by one, the best first, while they pay on parts left out; the level is always there.
-
-    A group pays if it surely makes the errors of most parts less; one of rare moments, if it takes much of all error.
-    """
-    mean, nothing = np.sum([hessian.diagonal() for hessian in given.hessian], axis=0), 1e-12 * given.size.mean()
-    unit = {name: float(mean[own].mean()) for name, own in groups.items()}
-
-    def pays(before: Floats, after: Floats) -> bool:
-        # Errors of parts differ by orders of magnitude: each counts by its ratio.
-        less = -np.diff(np.log(np.maximum((before, after), nothing)), axis=0)[0]
-        sure = less.sum() > rules.group_t * np.sqrt(len(less)) * less.std(ddof=1)
-        much = rare and after.sum() < (1.0 - rules.rare_group_share) * before.sum()
-        return bool((sure or much) and after.sum() < (1.0 - rules.group_share) * before.sum())
-
-    pulls = {name: FREE * unit[name] + 1e-9 for name in groups if name == LEVEL}
-    gains: dict[str, float] = {}
-    held = _hold(given, groups, pulls)
-    (losses,) = _held_out_losses(given, held, slice(0), np.zeros(1))
-    level = {LEVEL: float((given.size - losses).sum())} if pulls and pays(given.size, losses) else {}
-    while True:
-        tried = {name: _try_group(given, held, groups[name], name, unit[name]) for name in groups if name not in pulls}
-        paying = {name: found for name, found in tried.items() if pays(losses, found[1])}
-        if not paying:
-            break
-        best = min(paying, key=lambda name: float(paying[name][1].sum()))
-        pulls[best], after = paying[best]
-        gains[best] = float((losses - after).sum())
-        losses, held = after, _hold(given, groups, pulls)
-    weights = np.zeros(len(mean))
-    total = held.own[:, :, held.columns].sum(axis=0) + np.diag(held.penalty)
-    weights[held.columns] = np.linalg.solve(total, given.gradient.sum(axis=0)[held.columns])
-    return ChosenGroups(weights, gains or level)
-
-
-class _Held(NamedTuple):
-    """Columns held by penalties; their squares with all, each part's own and of others; and what they take of all."""
-
-    columns: Whole
-    penalty: Floats
-    own: Floats
-    rest: Floats
-    answer: Floats
-
-
-def _hold(given: Sums, groups: Mapping[str, slice], pulls: Mapping[str, float]) -> _Held:
-    """Hold the groups that have a pull: they are solved for once, for all that may come beside them."""
-    pulled = np.zeros(given.gradient.shape[1])
-    for name, pull in pulls.items():
-        pulled[groups[name]] = pull
-    columns = np.flatnonzero(pulled)
-    own = np.stack([hessian[columns] for hessian in given.hessian])
-    rest = _of_others(own)
-    right = np.concatenate((rest, _of_others(given.gradient)[:, columns, None]), axis=2)
-    answer = np.linalg.solve(rest[:, :, columns] + np.diag(pulled[columns]), right)
-    return _Held(columns, pulled[columns], own, rest, answer)
-
-
-def _of_others(own: Floats) -> Floats:
-    """The sums over all other parts, for each part (P, …)."""
-    return np.asarray(own.sum(axis=0) - own)
-
-
-def _try_group(given: Sums, held: _Held, own: slice, name: str, unit: float) -> tuple[float, Floats]:
-    """The hardest pull of a group within one standard error of its best, and the losses of the parts with it."""
-    pulls = np.array([ridge for ridge in RIDGES if ridge >= FIRMEST_ONLY.get(name, 0.0)]) * unit + 1e-9
-    found = _held_out_losses(given, held, own, pulls)
-    best = min(found, key=lambda losses: float(losses.sum()))
-    for pull, losses in zip(pulls[::-1].tolist(), found[::-1], strict=True):
-        worse = losses - best
-        if worse.sum() <= np.sqrt(len(worse)) * worse.std(ddof=1):
-            return pull, losses
-    return float(pulls[-1]), found[-1]
-
-
-def _held_out_losses(given: Sums, held: _Held, own: slice, pulls: Floats) -> Floats:
-    """The squared error of each part with weights from all others, own columns under each pull (R,): (R, P)."""
-    # What is held already is eliminated by Schur's complement.
-    inside = np.stack([hessian[own, own] for hessian in given.hessian])
-    across, answer, alone = held.own[:, :, own], held.answer[:, :, own], held.answer[:, :, -1:]
-    back, gradient = np.swapaxes(held.rest[:, :, own], 1, 2), given.gradient[:, :, None]
-    penalty = pulls[:, None, None, None] * np.eye(inside.shape[1])
-    last = np.linalg.solve(_of_others(inside) - back @ answer + penalty, _of_others(gradient[:, own]) - back @ alone)
-    first = alone - answer @ last
-    bent = held.own[:, :, held.columns] @ first + 2.0 * (across @ last) - 2.0 * gradient[:, held.columns]
-    more = inside @ last - 2.0 * gradient[:, own]
-    return np.asarray(given.size + (first * bent).sum(axis=(2, 3)) + (last * more).sum(axis=(2, 3)))
 
 
 PARTS = 16

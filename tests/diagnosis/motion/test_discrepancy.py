@@ -1,6 +1,4 @@
-"""Groups are chosen if they pay on parts that they were not fitted to.
-
-What may be learnt has its knots where the drives have been.
+"""What may be learnt has its knots where the drives have been.
 What has no name is learnt, and used only where it is shown to help. It is tested on other drives, and says when names
 are in its way; curves that do what a named effect does are read back into its name.
 """
@@ -16,123 +14,18 @@ from planted import TRUTH, driven_log, drives_of, planted_drives, planted_log
 from proxytune.diagnosis import RULES, AdoptedEffect, Findings, Learning, Ratio, cut, pose_errors
 from proxytune.diagnosis.motion import discrepancy
 from proxytune.diagnosis.motion.discrepancy import (
-    FIRMEST_ONLY,
-    RIDGES,
     Discrepancy,
     _helps,
-    choose_groups,
     fit_discrepancy,
     learn,
     match_named_effect,
     offer_curves,
-    sum_squares,
 )
 from proxytune.diagnosis.motion.fitting import evaluate
 from proxytune.diagnosis.motion.innovations import FIRST_GUESS, twists_of
-from proxytune.diagnosis.motion.prediction import Slopes
 from proxytune.diagnosis.motion.screening import candidates
 from proxytune.driving import read_robot
 from proxytune.effects import GROUPS, learnt_effect, learnt_theta
-
-PARTS = 12
-COLUMNS = {"one": slice(0, 3), "other": slice(3, 7), "speed_and_turn": slice(7, 15)}
-
-
-def slopes(truth, *, seed=1, noise=0.1, odd=0):
-    """Errors that the true weights (15,) make, and white noise; some of them are wild."""
-    random = np.random.default_rng(seed)
-    columns = random.standard_normal((PARTS * 40, 3, 15))
-    left = columns @ truth + noise * random.standard_normal(columns.shape[:2])
-    left[:odd] += 50.0
-    return Slopes(left, columns, np.repeat(np.arange(PARTS), 40))
-
-
-def summed(given, weights=None):
-    return sum_squares(given, np.zeros(15) if weights is None else weights, given.block, PARTS)
-
-
-WEIGHTS = np.concatenate((np.zeros(3), (0.5, -0.3, 0.2, 0.4), np.zeros(8)))
-
-
-def test_the_group_that_is_there_is_chosen_alone_with_its_weights():
-    chosen = choose_groups(summed(slopes(WEIGHTS)), COLUMNS, RULES)
-    assert list(chosen.gains) == ["other"]
-    np.testing.assert_allclose(chosen.weights, WEIGHTS, atol=0.02)
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_nothing_is_chosen_of_noise(seed):
-    chosen = choose_groups(summed(slopes(np.zeros(15), seed=seed)), COLUMNS, RULES)
-    assert not chosen.gains
-    assert not chosen.weights.any()
-
-
-def test_the_group_that_gains_most_is_chosen_first():
-    chosen = choose_groups(summed(slopes(WEIGHTS + np.eye(15)[0] * 0.2)), COLUMNS, RULES)
-    assert list(chosen.gains) == ["other", "one"]
-    assert chosen.gains["other"] > chosen.gains["one"] > 0.0
-
-
-def test_a_group_that_helps_every_part_is_chosen_however_uneven_their_errors_are():
-    scale = np.repeat([30.0, *np.ones(PARTS - 1)], 40)
-    plain = slopes(WEIGHTS)
-    loud = Slopes(plain.residuals * scale[:, None], plain.columns * scale[:, None, None], plain.block)
-    given = summed(loud)
-    assert given.size.max() > 10.0 * given.size.sum() / PARTS * 0.5
-    assert list(choose_groups(given, COLUMNS, RULES).gains) == ["other"]
-
-
-def test_a_few_wild_errors_hardly_move_the_weights():
-    np.testing.assert_allclose(
-        choose_groups(summed(slopes(WEIGHTS, odd=12)), COLUMNS, RULES).weights, WEIGHTS, atol=0.05
-    )
-
-
-def test_errors_are_counted_from_no_weights_wherever_they_were_linearised():
-    plain = slopes(WEIGHTS)
-    moved = plain._replace(residuals=plain.residuals - plain.columns @ WEIGHTS)
-    np.testing.assert_allclose(
-        summed(moved, WEIGHTS).gradient / PARTS, summed(plain).gradient / PARTS, rtol=1.0, atol=8.0
-    )
-    np.testing.assert_allclose(choose_groups(summed(moved, WEIGHTS), COLUMNS, RULES).weights, WEIGHTS, atol=0.02)
-
-
-def test_curves_over_two_signals_are_always_pulled_firmly():
-    assert min(RIDGES) < FIRMEST_ONLY["speed_and_turn"] <= max(RIDGES)
-    truth = np.concatenate((np.zeros(7), 0.3 * np.ones(8)))
-    weights = choose_groups(summed(slopes(truth, noise=0.0)), COLUMNS, RULES).weights
-    assert np.all(np.abs(weights[7:]) < 0.95 * 0.3)
-
-
-def test_a_group_of_rare_moments_is_chosen_by_what_it_takes_of_all_error_where_that_is_asked():
-    plain = slopes(WEIGHTS)
-    elsewhere = (plain.block > 1)[:, None]
-    quiet = Slopes(
-        np.where(elsewhere, slopes(np.zeros(15)).residuals, plain.residuals),
-        np.where(elsewhere[..., None], 1e-3, 1.0) * plain.columns,
-        plain.block,
-    )
-    given = summed(quiet)
-    assert not choose_groups(given, COLUMNS, RULES).gains
-    assert list(choose_groups(given, COLUMNS, RULES, rare=True).gains) == ["other"]
-    assert not choose_groups(given, COLUMNS, replace(RULES, rare_group_share=0.99), rare=True).gains
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_no_rare_moment_is_chosen_of_noise(seed):
-    assert not choose_groups(summed(slopes(np.zeros(15), seed=seed)), COLUMNS, RULES, rare=True).gains
-
-
-def test_the_level_is_always_there_and_a_gain_only_where_no_group_is():
-    groups = {"level": COLUMNS["one"], "other": COLUMNS["other"]}
-    truth = WEIGHTS + np.concatenate(((0.6, -0.4, 0.5), np.zeros(12)))
-    chosen = choose_groups(summed(slopes(truth)), groups, RULES)
-    assert list(chosen.gains) == ["other"]
-    np.testing.assert_allclose(chosen.weights[:7], truth[:7], atol=0.02)
-    alone = choose_groups(summed(slopes(truth - WEIGHTS)), groups, RULES)
-    assert list(alone.gains) == ["level"]
-    np.testing.assert_allclose(alone.weights[:7], (truth - WEIGHTS)[:7], atol=0.02)
-    assert not choose_groups(summed(slopes(np.zeros(15))), groups, RULES).gains
 
 
 @pytest.fixture(scope="module")

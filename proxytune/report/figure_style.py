@@ -31,16 +31,25 @@ CHARACTERS_PER_INCH, HANDLE = 19, 8
 """Characters of a legend that fit into an inch, and the space that a line beside them takes, in characters."""
 
 
-def panel_grid(
-    count: int, height: float, rest: float, *, sharex: bool = False, sharey: bool = False
-) -> tuple[Figure, list[Axes]]:
+def grid_of(height: float, rows: int, columns: int, **how: Any) -> tuple[Figure, NDArray[np.object_]]:
+    """A figure for one column of a paper, so high [inch], and its panels (rows, columns), made as `subplots` does."""
+    figure = Figure(figsize=(COLUMN, height), layout="constrained")
+    return figure, figure.subplots(rows, columns, squeeze=False, **how)
+
+
+def one_panel(height: float) -> tuple[Figure, Axes]:
+    """A figure for one column of a paper, so high [inch], and its only panel."""
+    figure, panels = grid_of(height, 1, 1)
+    return figure, panels[0, 0]
+
+
+def panel_grid(count: int, height: float, rest: float, **how: Any) -> tuple[Figure, list[Axes]]:
     """A figure of so many panels, two in a row, each so high, with so much for all else [inch]; and the panels."""
-    rows, columns = ceil(count / 2), min(2, count)
-    figure = Figure(figsize=(COLUMN, height * rows + rest), layout="constrained")
-    panels = figure.subplots(rows, columns, squeeze=False, sharex=sharex, sharey=sharey).ravel()
-    for axes in panels[count:]:
-        axes.set_visible(False)
-    return figure, list(panels[:count])
+    rows = ceil(count / 2)
+    figure, panels = grid_of(height * rows + rest, rows, min(2, count), **how)
+    for axes in panels.flat[count:]:
+        axes.remove()
+    return figure, list(panels.flat[:count])
 
 
 def draw_noise_floor(axes: Axes, floor: NoiseFloor, label: str = "") -> bool:

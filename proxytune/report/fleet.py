@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from rich.console import Group
 
-from proxytune.report.figure_style import BLUE, GREEN, LIGHT_GREY, VERMILLION, dress, legend_below, panel_grid
+from proxytune.report import figure_style as style
 from proxytune.report.study.document import estimate_document, intervals_document
 from proxytune.report.text import file_texts, group_texts, section_text
 from proxytune.report.view import Drawn, Paragraphs, Table, View, columns_of
@@ -166,13 +166,13 @@ def fleet_document(fleet: Fleet) -> dict[str, Any]:
 def fleet_figure(fleet: Fleet) -> Figure:
     """Draw each robot's intervals and the population, a panel a parameter."""
     intervals, robots = fleet.settings.space.intervals, fleet.robots
-    figure, panels = panel_grid(len(intervals), 0.7 + 0.1 * max(4, len(robots)), 0.3, sharey=True)
+    figure, panels = style.panel_grid(len(intervals), 0.7 + 0.1 * max(4, len(robots)), 0.3, sharey=True)
     for row, axes in enumerate(panels):
         _draw(axes, fleet, row)
     names = [robot.name if len(robot.name) <= NAME else f"{robot.name[: NAME - 1]}…" for robot in robots]
     panels[0].set_ylim(len(robots) - 0.5, -0.5)
     panels[0].set_yticks(range(len(robots)), names) if len(robots) <= MOST_NAMED else panels[0].set_yticks([])
-    legend_below(figure, *panels)
+    style.legend_below(figure, *panels)
     return figure
 
 
@@ -180,15 +180,17 @@ def _draw(axes: Axes, fleet: Fleet, row: int) -> None:
     box = fleet.settings.space.intervals[row]
     if box.name in fleet.mean:
         mean, reach = fleet.mean[box.name].value, 2.0 * fleet.deviation[box.name].value
-        axes.axvspan(mean - reach, mean + reach, color=GREEN, alpha=0.15, linewidth=0, label="fleet: mean ± 2 SD")
-        axes.axvline(mean, color=GREEN, linewidth=1.0, linestyle="--")
+        axes.axvspan(mean - reach, mean + reach, color=style.GREEN, alpha=0.15, linewidth=0, label="fleet: mean ± 2 SD")
+        axes.axvline(mean, color=style.GREEN, linewidth=1.0, linestyle="--")
     for place, robot in enumerate(fleet.robots):
-        label, colour = ("own scores (95 %)", LIGHT_GREY) if robot.fits else ("misfit, left out", VERMILLION)
+        label, colour = (
+            ("own scores (95 %)", style.LIGHT_GREY) if robot.fits else ("misfit, left out", style.VERMILLION)
+        )
         ends = robot.knowledge.intervals[box.name]
         axes.plot(ends, [place, place], color=colour, linewidth=1.6, solid_capstyle="butt", label=label)
         if robot.name in fleet.given:
             given = fleet.given[robot.name][box.name].value
-            axes.plot(given, place, "o", color=BLUE, markersize=2.5, label="given the fleet")
+            axes.plot(given, place, "o", color=style.BLUE, markersize=2.5, label="given the fleet")
     axes.set_xlim(box.low, box.high)
     axes.xaxis.set_major_locator(MaxNLocator(3))
-    dress(axes, with_unit(box.name, fleet.units[box.name]))
+    style.dress(axes, with_unit(box.name, fleet.units[box.name]))

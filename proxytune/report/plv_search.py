@@ -12,7 +12,7 @@ from rich.console import Group
 from rich.text import Text
 
 from proxytune.learning import Distribution, describe_distribution
-from proxytune.report.figure_style import BLUE, COLUMN, GREY, VERMILLION, LineName, dress, legend_below, name_lines
+from proxytune.report import figure_style as style
 from proxytune.report.html import write_page
 from proxytune.report.study.document import estimate_document
 from proxytune.report.study.page import study_foot
@@ -44,7 +44,7 @@ from proxytune.teaching import (
 MORE_PROXIES = "raise teaching.budget, or widen [parameters], so that other proxies are tried"
 CONFIRMED = "Finalists, taught anew with fresh lessons, learners and examinations"
 SCORES = ("zero-shot score", "samples needed", "PLV")
-HIGHEST = LineName("highest\nso far", VERMILLION, 0.0)
+HIGHEST = style.LineName("highest\nso far", style.VERMILLION, 0.0)
 
 
 def plv_answer(study: PlvStudy) -> str:
@@ -191,8 +191,7 @@ def _confirmed_document(experiment: Experiment) -> dict[str, Any]:
 
 def plv_figure(study: PlvStudy) -> Figure:
     """Draw PLV with its 95 % interval trial by trial, and the highest so far; crosses did not converge."""
-    figure = Figure(figsize=(COLUMN, 2.7), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = style.one_panel(2.7)
     grid = study.without.counts[-1]
     for trial in study.trials:
         figures = trial.worth.plv
@@ -200,17 +199,19 @@ def plv_figure(study: PlvStudy) -> Figure:
             axes.plot(trial.number, 0.0, "x", color="black", markersize=5, label="not converged")
             continue
         low, high = (end if end is not None else far for end, far in ((figures.low, -grid), (figures.high, grid)))
-        axes.plot((trial.number, trial.number), (low, high), color=BLUE, linewidth=1.0, alpha=0.6)
-        axes.plot(trial.number, figures.value, "o", color=BLUE, markersize=4, label="PLV")
+        axes.plot((trial.number, trial.number), (low, high), color=style.BLUE, linewidth=1.0, alpha=0.6)
+        axes.plot(trial.number, figures.value, "o", color=style.BLUE, markersize=4, label="PLV")
     values = np.array([plv_or_worst(trial) for trial in study.trials])
     numbers = np.arange(1, len(values) + 1)
     highest = np.maximum.accumulate(values)
     reached = np.isfinite(highest)
-    axes.step(numbers[reached], highest[reached], where="post", color=VERMILLION, linewidth=1.5, label=HIGHEST.words)
-    axes.axhline(0.0, color=GREY, linewidth=0.8)
+    axes.step(
+        numbers[reached], highest[reached], where="post", color=style.VERMILLION, linewidth=1.5, label=HIGHEST.words
+    )
+    axes.axhline(0.0, color=style.GREY, linewidth=0.8)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    dress(axes, "trial", "PLV [target samples saved]")
+    style.dress(axes, "trial", "PLV [target samples saved]")
     if reached.any():
-        name_lines(axes, [HIGHEST._replace(end=float(highest[-1]))])
-    legend_below(figure, axes, without=[HIGHEST.words])
+        style.name_lines(axes, [HIGHEST._replace(end=float(highest[-1]))])
+    style.legend_below(figure, axes, without=[HIGHEST.words])
     return figure

@@ -9,26 +9,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from proxytune.report.figure_style import (
-    BLUE,
-    COLUMN,
-    GREEN,
-    LIGHT_BLUE,
-    ORANGE,
-    PURPLE,
-    VERMILLION,
-    draw_noise_floor,
-    dress,
-    legend_below,
-    mark_truth,
-    named_handles,
-)
+from proxytune.report import figure_style as style
 from proxytune.report.wording import short, with_unit
 from proxytune.space import Theta
 from proxytune.sweep import Series, SweepCurve, SweepPoint, series_of
 from proxytune.usefulness import POD_IMAGE, POD_POSE, PPV, PRPV, SRCC, Assessment, Measure
 
-COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE)
+COLOURS = (style.BLUE, style.VERMILLION, style.GREEN, style.PURPLE, style.ORANGE)
 MARKERS = "osD^v"
 POD_NAMES = {POD_POSE: "POD, pose [m]", POD_IMAGE: "POD, image [full scale]"}
 HEIGHT, BELOW = 1.2, 0.4
@@ -42,8 +29,7 @@ def sweep_figure(curves: Sequence[SweepCurve], truth: Theta | None = None) -> Fi
     chance. The dashed vertical line is where the parameter itself is held when others are swept, the triangle the θ
     that made the target, where that is known.
     """
-    figure = Figure(figsize=(COLUMN, HEIGHT * len(curves) + BELOW), layout="constrained")
-    panels = figure.subplots(len(curves), 2, sharey="col", squeeze=False)
+    figure, panels = style.grid_of(HEIGHT * len(curves) + BELOW, len(curves), 2, sharey="col")
     for curve, row in zip(curves, panels, strict=True):
         draw_prpv_and_ppv(row[0], row[1], curve)
         for axes in row:
@@ -53,7 +39,7 @@ def sweep_figure(curves: Sequence[SweepCurve], truth: Theta | None = None) -> Fi
     for axes, measure in zip(panels[0], (PRPV, PPV), strict=True):
         axes.set_ylim(bottom=-0.03 * axes.get_ylim()[1])
         axes.set_title(axis_of(measure), fontsize=8)
-    legend_below(figure, *panels.ravel(), without=["PRPV"])
+    style.legend_below(figure, *panels.ravel(), without=["PRPV"])
     return figure
 
 
@@ -64,14 +50,14 @@ def panels_figure(curve: SweepCurve, truth: Theta | None = None) -> Figure:
     the triangle the θ that made the target, where that is known.
     """
     series, rows = series_of(curve), 3 if curve.has_pod else 2
-    figure = Figure(figsize=(COLUMN, HEIGHT * rows + BELOW), layout="constrained")
-    prpv, ppv, srcc, key, *pod = figure.subplots(rows, 2).ravel()
+    figure, panels = style.grid_of(HEIGHT * rows + BELOW, rows, 2)
+    prpv, ppv, srcc, key, *pod = panels.flat
     draw_prpv_and_ppv(prpv, ppv, curve)
     chosen = [one for one in series if one.measure is SRCC]
     for one, colour, marker in zip(chosen, cycle(COLOURS), cycle(MARKERS), strict=False):
         draw_series(srcc, one, colour, marker, f"SRCC, {one.metric.replace('_', ' ')}")
     for axes, measure in zip(pod, POD_NAMES, strict=False):
-        draw_series(axes, next(one for one in series if one.measure is measure), BLUE, "o", POD_NAMES[measure])
+        draw_series(axes, next(one for one in series if one.measure is measure), style.BLUE, "o", POD_NAMES[measure])
     for axes, name in zip((prpv, ppv, srcc, *pod), (PRPV, PPV, SRCC, *POD_NAMES), strict=False):
         axes.set_title(POD_NAMES.get(name) or axis_of(name), fontsize=8)
         mark_values(axes, curve, truth)
@@ -99,8 +85,7 @@ def bars_figure(curves: Sequence[SweepCurve]) -> Figure:
     The values are where the parameter is held, and the grid points nearest to a third of its range below and above;
     the held one is darker.
     """
-    figure = Figure(figsize=(COLUMN, 2.9), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = style.one_panel(2.9)
     ticks: list[tuple[float, str]] = []
     for place, curve in enumerate(curves):
         indices, held = bar_points(curve)
@@ -116,8 +101,8 @@ def bars_figure(curves: Sequence[SweepCurve]) -> Figure:
     found = [point.assessment for curve in curves for point in curve.points if point.assessment is not None]
     if found:
         draw_levels(axes, found)
-        legend_below(figure, axes)
-    dress(axes, up=axis_of(PRPV))
+        style.legend_below(figure, axes)
+    style.dress(axes, up=axis_of(PRPV))
     axes.set_xticks([spot for spot, _ in ticks], [text for _, text in ticks], rotation=90)
     return figure
 
@@ -145,7 +130,7 @@ def _draw_bars(axes: Axes, spots: Sequence[float], chosen: Sequence[SweepPoint],
             axes.annotate("failed", (spot, 0), rotation=90, ha="center", va="bottom", fontsize=7)
             continue
         inner, score = point.assessment.prpv_interval, point.assessment.prpv.value
-        colour, label = (BLUE, HELD) if point is held else (LIGHT_BLUE, BESIDE)
+        colour, label = (style.BLUE, HELD) if point is held else (style.LIGHT_BLUE, BESIDE)
         axes.bar(spot, score, width=0.85, color=colour, label=label)
         if inner.low is not None and inner.high is not None:
             ends = [[score - inner.low], [inner.high - score]]
@@ -175,13 +160,13 @@ def draw_prpv_and_ppv(prpv: Axes, ppv: Axes, curve: SweepCurve) -> None:
     if found := [point.assessment for point in curve.points if point.assessment is not None]:
         draw_levels(prpv, found)
         series = {one.measure: one for one in series_of(curve)}
-        draw_series(prpv, series[PRPV], BLUE, "o", "PRPV", INTERVAL)
-        draw_series(ppv, series[PPV], BLUE, "o")
+        draw_series(prpv, series[PRPV], style.BLUE, "o", "PRPV", INTERVAL)
+        draw_series(ppv, series[PPV], style.BLUE, "o")
 
 
 def draw_levels(axes: Axes, found: Sequence[Assessment]) -> None:
     """The noise floor by its kind, and chance: its mean, since it varies a little with the proxy's own order."""
-    draw_noise_floor(axes, found[0].noise_floor)
+    style.draw_noise_floor(axes, found[0].noise_floor)
     chance = float(np.mean([assessment.chance.mean for assessment in found]))
     axes.axhline(chance, color="0.45", linewidth=1.0, linestyle=":", label="chance")
 
@@ -191,14 +176,14 @@ def mark_values(axes: Axes, curve: SweepCurve, truth: Theta | None) -> None:
     if curve.parameter in curve.base:
         axes.axvline(curve.base[curve.parameter], color="0.35", linewidth=0.9, linestyle=(0, (5, 2)), label=HELD)
     if truth is not None and curve.parameter in truth:
-        mark_truth(axes, truth[curve.parameter])
-    dress(axes)
+        style.mark_truth(axes, truth[curve.parameter])
+    style.dress(axes)
 
 
 def explain(axes: Axes, *panels: Axes) -> None:
     """Fill an empty panel with the key of others: each name once, the measure itself left to its axis."""
     axes.set_axis_off()
-    named = named_handles(panels)
+    named = style.named_handles(panels)
     named.pop("PRPV", None)
     names = [fill(name, WIDEST) for name in named]
     axes.legend(list(named.values()), names, loc="center", fontsize=7, frameon=False)

@@ -11,7 +11,7 @@ from rich.console import Group
 
 from proxytune.arrays import Floats
 from proxytune.learning import LEVELS, NONE, Costs, Distribution, LearningCurve, LearningEstimate, doublings
-from proxytune.report.figure_style import BLUE, GREY, dress, legend_below, panel_grid
+from proxytune.report import figure_style as style
 from proxytune.report.study.document import estimate_document
 from proxytune.report.text import file_texts, group_texts, table_text
 from proxytune.report.view import Drawn, Paragraphs, Part, Table, View, columns_of
@@ -312,7 +312,7 @@ class _Look(NamedTuple):
     mark: str
 
 
-WITHOUT, WITH = _Look("without a proxy", GREY, "--", "x"), _Look("with the proxy", BLUE, "-", "o")
+WITHOUT, WITH = _Look("without a proxy", style.GREY, "--", "x"), _Look("with the proxy", style.BLUE, "-", "o")
 
 
 def teach_figure(experiment: Experiment) -> Figure:
@@ -321,7 +321,7 @@ def teach_figure(experiment: Experiment) -> Figure:
     Above the dotted line a learner counts as converged; the bar on it says how many samples that takes.
     """
     lessons = experiment.teachers
-    figure, panels = panel_grid(len(lessons), 1.25, 0.6, sharex=True, sharey=True)
+    figure, panels = style.panel_grid(len(lessons), 1.25, 0.6, sharex=True, sharey=True)
     for axes, lesson in zip(panels, lessons, strict=True):
         _draw_panel(axes, experiment, lesson)
     for axes in panels[-2:]:
@@ -330,7 +330,7 @@ def teach_figure(experiment: Experiment) -> Figure:
         axes.set_xlabel("target samples", fontsize=8)
     for axes in panels[::2]:
         axes.set_ylabel("score [s]", fontsize=8)
-    legend_below(figure, *panels)
+    style.legend_below(figure, *panels)
     return figure
 
 
@@ -349,7 +349,7 @@ def _draw_panel(axes: Axes, experiment: Experiment, lesson: TeacherResult) -> No
     shown = [grid[place] for place in sorted({0, 1, (len(grid) + 1) // 2, len(grid) - 1})]
     axes.set_xticks(_places(experiment, np.array(shown, dtype=float)), [f"{count:g}" for count in shown])
     axes.set_title(lesson.name, fontsize=8)
-    dress(axes)
+    style.dress(axes)
 
 
 def _places(experiment: Experiment, counts: Floats) -> Floats:

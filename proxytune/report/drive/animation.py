@@ -12,8 +12,8 @@ from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from proxytune.arrays import Floats
+from proxytune.report import figure_style as style
 from proxytune.report.drive.scene import COLOURS, draw_map, draw_start
-from proxytune.report.figure_style import dress
 from proxytune.report.wording import plain
 from proxytune.study import RecordedEpisode, SideBySide
 
@@ -119,7 +119,7 @@ def _bars(figure: SubFigure, pair: SideBySide, side: str) -> Mapping[str, Line2D
     axes.axhline(0.0, color="black", linewidth=0.8)
     axes.set_xticks(range(len(channels)), [plain(channel) for channel in channels])
     axes.set_ylabel(f"command [{pair.command_unit}]" if pair.command_unit else "command", fontsize=8, labelpad=2)
-    dress(axes)
+    style.dress(axes)
     look: dict[str, Any] = {"color": COLOURS[side], "linewidth": 14, "solid_capstyle": "butt", "animated": True}
     return {channel: axes.plot([place] * 2, [0.0, 0.0], **look)[0] for place, channel in enumerate(channels)}
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure, SubFigure
 
+from proxytune.report import figure_style as style
 from proxytune.report.drive.scene import COLOURS, draw_map, draw_parting, draw_paths, map_aspect
-from proxytune.report.figure_style import COLUMN, GREY, LIGHT_GREY, dress, show_photo
 from proxytune.report.text import WholeWords, table_text
 from proxytune.report.view import Table, columns_of
 from proxytune.report.wording import plain, short, with_unit
@@ -72,14 +72,14 @@ def episode_figure(pair: SideBySide, metrics: Sequence[str]) -> Figure:
     """
     aspect = map_aspect(pair.road, [episode.places for episode in pair.sides.values()])
     parts: list[tuple[float, Callable[[SubFigure], None]]] = [
-        (0.85 * COLUMN * aspect + 0.35 + 2 * LINE_INCH, functools.partial(_draw_map, pair, metrics))
+        (0.85 * style.COLUMN * aspect + 0.35 + 2 * LINE_INCH, functools.partial(_draw_map, pair, metrics))
     ]
     if channels := pair.proxy.channels:
         parts.append((CHANNEL_INCH * len(channels) + 0.3, functools.partial(_draw_commands, pair)))
     if filmed := sum(episode.pictures is not None for episode in pair.sides.values()):
         parts.append((PICTURES_INCH * filmed + 0.2, functools.partial(_draw_pictures, pair)))
     heights = [inches for inches, _ in parts]
-    figure = Figure(figsize=(COLUMN, sum(heights)), layout="constrained")
+    figure = Figure(figsize=(style.COLUMN, sum(heights)), layout="constrained")
     panels = figure.subfigures(len(parts), 1, height_ratios=heights, squeeze=False)[:, 0]
     for panel, (_, draw) in zip(panels, parts, strict=True):
         draw(panel)
@@ -110,12 +110,12 @@ def _draw_commands(pair: SideBySide, figure: SubFigure) -> None:
             axes.step(
                 episode.commands["time"], episode.commands[channel], where="post", color=COLOURS[side], linewidth=width
             )
-        axes.axhline(0.0, color=LIGHT_GREY, linewidth=0.6, zorder=0)
+        axes.axhline(0.0, color=style.LIGHT_GREY, linewidth=0.6, zorder=0)
         if pair.parted_s is not None:
             axes.axvline(pair.parted_s, color="black", linewidth=0.8, linestyle=":")
         axes.set_ylabel(f"{plain(channel)}\n[{pair.command_unit}]" if pair.command_unit else plain(channel), fontsize=7)
         axes.margins(x=0.01)
-        dress(axes)
+        style.dress(axes)
     if pair.parted_s is not None:
         panels[0].annotate(
             f"{100 * APART_M:g} cm apart at {pair.parted_s:.1f} s (ring on the map)",
@@ -134,9 +134,9 @@ def _draw_pictures(pair: SideBySide, figure: SubFigure) -> None:
     for row, (side, episode) in zip(panels, filmed.items(), strict=True):
         assert episode.pictures is not None
         for axes, instant in zip(row, instants, strict=True):
-            show_photo(axes, episode.pictures[np.argmin(np.abs(episode.commands["time"] - instant))])
+            style.show_photo(axes, episode.pictures[np.argmin(np.abs(episode.commands["time"] - instant))])
             axes.set(xticks=[], yticks=[])
-            axes.spines[:].set_edgecolor(GREY)
+            axes.spines[:].set_edgecolor(style.GREY)
         row[0].set_ylabel(side, color=COLOURS[side], fontsize=7)
     for axes, instant in zip(panels[0], instants, strict=True):
         axes.set_title(f"{instant:.1f} s", fontsize=7, pad=2)

@@ -10,10 +10,10 @@ from matplotlib.patheffects import Stroke, withStroke
 
 from proxytune.arrays import Floats
 from proxytune.driving import Road, draw_floor
-from proxytune.report.figure_style import BLUE, VERMILLION, dress, show_photo
+from proxytune.report import figure_style as style
 from proxytune.study import APART_M, SideBySide
 
-COLOURS: Mapping[str, str] = MappingProxyType({"proxy": BLUE, "target": VERMILLION})
+COLOURS: Mapping[str, str] = MappingProxyType({"proxy": style.BLUE, "target": style.VERMILLION})
 PALER = 0.6
 """The floor is drawn this much nearer to white, so that paths stand out."""
 MARGIN_M = 0.2
@@ -38,13 +38,13 @@ def draw_map(axes: Axes, road: Road | None, paths: Iterable[Floats]) -> None:
         # Every other pixel shows the markings as well, at a quarter of the work
         paler = (255.0 - (255.0 - floor.pixels[::2, ::2]) * (1.0 - PALER)).astype(np.uint8)
         box = (floor.origin, end, floor.origin, end)
-        show_photo(axes, paler, extent=box, origin="lower", interpolation="antialiased")
+        style.show_photo(axes, paler, extent=box, origin="lower", interpolation="antialiased")
         axes.set(xlim=(0.0, road.size[0]), ylim=(0.0, road.size[1]))
     else:
         low, high = _bounds(paths)
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     axes.set_aspect("equal")
-    dress(axes)
+    style.dress(axes)
     axes.set_xlabel("x [m]", fontsize=7)
     axes.set_ylabel("y [m]", fontsize=7)
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from proxytune.report.figure_style import BLUE, COLUMN, dress
+from proxytune.report import figure_style as style
 from proxytune.report.html import write_page
 from proxytune.report.study.sentence import say_answer, say_next_step
 from proxytune.report.study.tables import INFORMATION, MEASURES, SEARCH, THETA, USEFULNESS, study_tables, trials_table
@@ -122,11 +122,10 @@ def _say_best(trials: Sequence[TrialRecord], measure: str) -> str:
 
 
 def _trials_figure(trials: Sequence[TrialRecord], measure: str) -> Figure:
-    figure = Figure(figsize=(COLUMN, 2.2), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = style.one_panel(2.2)
     points = [(trial.number, value) for trial in trials if (value := trial.measures.get(measure)) is not None]
-    axes.plot([number for number, _ in points], [value for _, value in points], "o", color=BLUE, markersize=4)
+    axes.plot([number for number, _ in points], [value for _, value in points], "o", color=style.BLUE, markersize=4)
     axes.set_xlim(0.5, len(trials) + 0.5)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    dress(axes, "trial", measure.upper())
+    style.dress(axes, "trial", measure.upper())
     return figure

@@ -35,8 +35,7 @@ from .export.instance import (
 )
 from .export.into import patch as patch
 from .export.mjcf import mjcf_text as mjcf_text
-from .export.nodes import node_text as node_text
-from .export.ros import ros_text as ros_text
+from .export.ros import node_text as node_text, ros_text as ros_text
 from .export.urdf import urdf_text as urdf_text
 from .families import (
     families_document as families_document,

@@ -21,7 +21,7 @@ from proxytune.report.diagnosis.document import (
 )
 from proxytune.report.diagnosis.figures import motion_figures
 from proxytune.report.diagnosis.notes import VERDICTS, motion_headline, motion_notes, next_drives
-from proxytune.report.export.nodes import commands_text, player_text
+from proxytune.report.export.ros import commands_text, player_text
 from proxytune.report.html import write_page
 from proxytune.report.meanings import findings, fitted
 from proxytune.report.text import group_texts, table_text

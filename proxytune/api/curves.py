@@ -212,10 +212,7 @@ class TeachReport(Shown):
 
     def table(self) -> pd.DataFrame:
         """One row per proxy: PLV, with the ends of its interval where they are known."""
-        rows = {
-            name: row.get("plv") if isinstance(row.get("plv"), dict) else {"value": row.get("plv")}
-            for name, row in self.document().get("proxies", {}).items()
-        }
+        rows = {name: one["plv"] or {"value": None} for name, one in self.document()["proxies"].items()}
         return pd.DataFrame.from_dict(rows, orient="index").rename_axis("proxy")
 
     to_frame = table

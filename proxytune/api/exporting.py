@@ -3,7 +3,7 @@
 import filecmp
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -161,13 +161,7 @@ def _export_trials(folder: Path, output: Path, to: str) -> ExportReport:
 
 def _row(line: ExportLine) -> dict[str, Any]:
     interval = list(line.interval) if line.interval else None
-    return {
-        "name": line.name,
-        "value": line.value,
-        "interval": interval,
-        "unit": line.unit,
-        "place": line.place or None,
-    }
+    return asdict(line) | {"interval": interval, "place": line.place or None}
 
 
 def _instance_of(path: Path) -> tuple[Instance, tuple[str, ...]]:

@@ -23,7 +23,6 @@ from proxytune.importing.bag import (
     header_ns,
     open_bag,
     pose_of,
-    whole,
 )
 from proxytune.importing.source import Pictures
 from proxytune.logs import BROKEN
@@ -64,7 +63,7 @@ def read_transforms(bag: Bag, topics: tuple[str, ...]) -> dict[str, Transform]:
     for name, some in rows.items():
         header, receive, values = zip(*some, strict=True)
         with complaints(bag.path, f"{name}: has stamps that are no times"):
-            stamps = Stamps(whole(list(header)), whole(list(receive)))
+            stamps = Stamps(*(np.array(one, dtype=np.int64) for one in (header, receive)))
         transforms[name] = Transform(name, stamps, np.array(values, dtype=np.float64))
     return transforms
 

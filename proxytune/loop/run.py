@@ -5,7 +5,6 @@ document and as one page.
 """
 
 from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -20,7 +19,6 @@ from proxytune.api import StudyReport, most_episodes, record_log, run_opened
 from proxytune.driving import robot_home
 from proxytune.errors import InputError
 from proxytune.identity import versions_of
-from proxytune.logs import Log
 from proxytune.loop.comparison import (
     Compared,
     Known,
@@ -73,7 +71,6 @@ from proxytune.report import (
     table_text,
     write_page,
 )
-from proxytune.running import Silent, Watcher
 from proxytune.scores import write_scores
 from proxytune.seeds import target_seed
 from proxytune.storage import locked
@@ -308,21 +305,6 @@ class LoopReport(Shown):
         return page
 
 
-class Quiet:
-    """Tells nothing of how a loop goes."""
-
-    def say(self, line: str) -> None:
-        """Say nothing."""
-
-    def episodes(self, total: int) -> AbstractContextManager[Watcher]:
-        """Count silently."""
-        return nullcontext(Silent())
-
-    def diagnosis(self, log: Log) -> AbstractContextManager[Callable[[str], None]]:
-        """Hear steps silently."""
-        return nullcontext(lambda step: None)
-
-
 def run_loop(
     path: str | Path, *, log: str | Path | None = None, twin: str | Path | None = None, teller: Teller | None = None
 ) -> LoopReport:
@@ -343,7 +325,7 @@ def run_loop(
     loop = open_loop(Path(path), *(Path(one) if one is not None else None for one in (twin, log)))
     check_camera(loop)
     with locked(loop.home):
-        return LoopReport(_Closing(loop, teller or Quiet(), Kept(loop.home)).run())
+        return LoopReport(_Closing(loop, teller or Teller(), Kept(loop.home)).run())
 
 
 def rows_of(closed: Closed) -> list[Compared]:

@@ -17,7 +17,7 @@ from proxytune.report.decision import (
 )
 from proxytune.report.html import write_page
 from proxytune.report.score_figures import MOST, flipped_pairs_figure, scatter_figure
-from proxytune.report.table_files import csv_text, latex_text
+from proxytune.report.table_files import Cell, csv_text, latex_text
 from proxytune.report.text import group_texts, note_texts, table_text
 from proxytune.report.view import Column, Foot, Paragraphs, Picture, Table, View, columns_of
 from proxytune.report.wording import listed, short, short_span, with_span
@@ -31,6 +31,7 @@ from proxytune.usefulness import (
     Difference,
     Measure,
     Measured,
+    Rate,
     Selection,
     SuccessRates,
 )
@@ -197,17 +198,14 @@ def _tables(assessments: Assessments, selection: Selection | None, target: str) 
 
 
 def _rates(rates: SuccessRates) -> Table:
-    rows = []
-    for agent, target in rates.target.items():
-        sides = [
-            cell
-            for one in (rates.proxy[agent], target)
-            for cell in (f"{one.value:.2f} ({one.low:.2f} to {one.high:.2f})", str(one.episodes))
-        ]
-        rows.append((agent, *sides))
+
+    def side(one: Rate) -> tuple[str, str]:
+        return f"{one.value:.2f} ({one.low:.2f} to {one.high:.2f})", str(one.episodes)
+
+    rows = tuple((agent, *side(rates.proxy[agent]), *side(target)) for agent, target in rates.target.items())
     title = f"{rates.metric}: success rates with their own 95 % intervals (Wilson)"
     heads = ("in the proxy", "episodes", "on the target", "episodes")
-    return Table(title, columns_of(("agent",), heads), tuple(rows))
+    return Table(title, columns_of(("agent",), heads), rows)
 
 
 def _ranking(assessments: Assessments, selection: Selection, target: str, notes: tuple[str, ...]) -> Table:
@@ -271,28 +269,16 @@ def write_score_table(assessments: Assessments, path: Path) -> None:
     Raises:
         RunError: If it cannot be written.
     """
-    measured = {
-        name: [(measure, *one) for measure in MEASURES for one in measure.measured(assessment).items()]
-        for name, assessment in assessments.items()
-    }
+    rows, cells = list[Sequence[Cell]](), dict[str, list[str]]()
+    for name, assessment in assessments.items():
+        for measure, (metric, found) in ((one, own) for one in MEASURES for own in one.measured(assessment).items()):
+            ends = found.interval or (None, None)
+            rows.append((name, measure.key_for(metric), found.value, *ends, measure.better))
+            cells.setdefault(measure.name_for(metric), []).append(with_span(_number(found.value), *ends))
     if path.suffix == ".csv":
-        rows = [
-            (name, measure.key_for(metric), found.value, *(found.interval or (None, None)), measure.better)
-            for name, all_found in measured.items()
-            for measure, metric, found in all_found
-        ]
         write_text(path, csv_text(("proxy", "measure", "value", "low", "high", "better"), rows))
-        return
-    cells = {
-        name: {
-            measure.name_for(metric): with_span(_number(found.value), *(found.interval or (None, None)))
-            for measure, metric, found in all_found
-        }
-        for name, all_found in measured.items()
-    }
-    titles = next(iter(cells.values()))
-    rows_of_cells = [(title, *(texts[title] for texts in cells.values())) for title in titles]
-    write_text(path, latex_text(("measure", *cells), rows_of_cells))
+    else:
+        write_text(path, latex_text(("measure", *assessments), [(title, *texts) for title, texts in cells.items()]))
 
 
 def score_document(assessment: Assessment) -> dict[str, Any]:

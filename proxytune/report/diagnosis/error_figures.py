@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import Collection, LineCollection
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
+from scipy.stats import binned_statistic_2d
 
 from proxytune.diagnosis import Diagnosis, Drives, Floats, Rmse, Whole, cut, pose_errors
 from proxytune.report import figure_style as style
@@ -244,10 +245,5 @@ def _floor(axes: Axes, drives: Drives, strayed: Strayed, scale: LogNorm) -> Coll
     places = drives.poses[strayed.increment, 1, :2]
     side = float(np.ptp(places, axis=0).max()) / SQUARES
     edges = [np.arange(along.min(), along.max() + 2.0 * side, side) for along in places.T]
-    place, shape = np.zeros(len(places), dtype=int), [len(edge) - 1 for edge in edges]
-    for along, edge, cells in zip(places.T, edges, shape, strict=True):
-        place = place * cells + np.clip(np.searchsorted(edge, along, side="right") - 1, 0, cells - 1)
-    count = np.bincount(place, minlength=shape[0] * shape[1])
-    total = np.bincount(place, strayed.rms[strayed.window], minlength=len(count))
-    mean = np.ma.masked_array(total / np.maximum(1, count), count == 0).reshape(shape)
+    mean = binned_statistic_2d(*places.T, strayed.rms[strayed.window], bins=edges).statistic
     return axes.pcolormesh(*edges, mean.T, cmap=style.SHADES, norm=scale, rasterized=True)

@@ -16,19 +16,7 @@ import numpy as np
 from proxytune.arrays import Floats
 from proxytune.errors import ScoresError
 from proxytune.files import draft_of
-from proxytune.scores.forms import (
-    LABELS,
-    Side,
-    agent_column,
-    beside,
-    counted,
-    form_rows,
-    is_form,
-    own_column,
-    percent_column,
-    read_cell,
-    spread_out,
-)
+from proxytune.scores import forms
 from proxytune.scores.table import LARGEST, ScoreTable
 from proxytune.settings import nearest, read_text
 
@@ -64,6 +52,11 @@ class Cells:
             )
         return labels
 
+    def published(self, columns: Sequence[str]) -> Floats:
+        """The standard errors of these columns, shape (rows, columns); 0 where they are not known."""
+        none = [0.0] * len(self.lines)
+        return np.reshape([self.errors.get(name, none) for name in columns], (len(columns), len(none))).T
+
     def numbers(self, columns: Sequence[str]) -> Floats:
         """The numbers of these columns, shape (rows, columns)."""
         values = np.empty((len(self.lines), len(columns)))
@@ -80,7 +73,7 @@ def read_cells(
     path: Path,
     metrics: Sequence[str],
     columns: Columns | None = None,
-    side: Side | None = None,
+    side: forms.Side | None = None,
     part: str | None = None,
 ) -> Cells:
     """Read a file of scores, in any form that is known.
@@ -91,8 +84,8 @@ def read_cells(
     """
     separator = ","
     rows: Iterator[tuple[int, list[str]]]
-    if is_form(path):
-        named, given = form_rows(path, part)
+    if forms.is_form(path):
+        named, given = forms.form_rows(path, part)
         rows = iter(given)
     else:
         text = _text(path)
@@ -100,25 +93,25 @@ def read_cells(
         rows = _rows(path, text, separator)
         named = _first(path, rows)
     ours = {theirs: name for name, theirs in (columns or {}).items() if theirs in named}
-    alias = agent_column(named)
+    alias = forms.agent_column(named)
     if alias is not None and "agent" not in {*named, *(columns or {})}:
         ours[alias] = "agent"
     # Another column that has such a name is out of the way.
     header = [ours.get(name, f"{name} of the file" if name in ours.values() else name) for name in named]
-    whose = {name: column for name in metrics if (column := own_column(name, header, side)) not in (None, name)}
+    whose = {name: column for name in metrics if (column := forms.own_column(name, header, side)) not in (None, name)}
     bare = {column: name for name, column in whose.items()}
     if len(bare) == len(whose):
         header = [bare.get(name, name) for name in header]
     _check_header(path, header, metrics)
-    more = {name: beside(name, name, header, side) for name in metrics}
-    wanted = {*LABELS, *metrics, *(column for pair in more.values() for column in pair if column is not None)}
+    more = {name: forms.beside(name, name, header, side) for name in metrics}
+    wanted = {*forms.LABELS, *metrics, *(column for pair in more.values() for column in pair if column is not None)}
     lines, cells = _columns(path, rows, header, wanted)
-    if is_form(path):  # an agent that a dictionary does not have is left out
+    if forms.is_form(path):  # an agent that a dictionary does not have is left out
         kept = [row for row in range(len(lines)) if all(cells[name][row] for name in metrics)]
         lines, cells = [lines[row] for row in kept], {name: [own[row] for row in kept] for name, own in cells.items()}
     found = Cells(path, named, header, lines, cells)
     found = found if separator == "," else replace(found, decimal=_decimal(found, metrics))
-    in_percent = {name: percent_column(whose.get(name) or name, name) for name in metrics}
+    in_percent = {name: forms.percent_column(whose.get(name) or name, name) for name in metrics}
     return _plain_cells(found, metrics, more, in_percent)
 
 
@@ -143,7 +136,7 @@ def _plain_cells(
         if done and (len(done) < len(metrics) or len({of for _, of in done}) > 1):
             where = f"{found.path}: line {line}: counts of rollouts"
             raise ScoresError(f"{where} must be one number an agent in every metric; give the metrics one by one")
-        for place, values in enumerate(spread_out(done) or [[one[0] for one in read.values()]]):
+        for place, values in enumerate(forms.spread_out(done) or [[one[0] for one in read.values()]]):
             lines.append(line)
             episode = f"{own['agent']} {label}#{place}" if done else label
             for name, value in (own | dict(zip(metrics, values, strict=True)) | {"episode": episode}).items():
@@ -164,7 +157,7 @@ def _read(
 ) -> tuple[str, float, tuple[int, int] | None]:
     """What a row says of a metric: its text, its standard error (0: not known), and successes of rollouts."""
     text, error, scale = own[name], 0.0, 100.0 if in_percent else 1.0
-    read, where = read_cell(text, found.decimal, in_percent), f"{found.path}: line {line}, column '{name}'"
+    read, where = forms.read_cell(text, found.decimal, in_percent), f"{found.path}: line {line}, column '{name}'"
     if read is not None:
         text, error = repr(read[0]).replace(".", found.decimal), read[1] or 0.0
         if read[2] is not None:
@@ -176,7 +169,7 @@ def _read(
     if math.isnan(value):
         raise ScoresError(f"{where}: must be a finite number, got {text!r}; write successes of rollouts as '18 of 25'")
     if counts is not None:
-        return text, error, counted(value, own[counts], where)
+        return text, error, forms.counted(value, own[counts], where)
     if errors is not None:
         error = _number(own[errors].replace(found.decimal, ".")) / scale
         if not 0.0 <= error < LARGEST:
@@ -198,8 +191,8 @@ def column_names(path: Path, part: str | None = None) -> list[str]:
     Raises:
         ScoresError: If it cannot be read.
     """
-    if is_form(path):
-        return form_rows(path, part)[0]
+    if forms.is_form(path):
+        return forms.form_rows(path, part)[0]
     text = _text(path)
     return _first(path, _rows(path, text, _separator(text)))
 
@@ -271,9 +264,9 @@ def _check_header(path: Path, header: Sequence[str], metrics: Sequence[str]) -> 
         raise ScoresError(f"{path}: no column 'agent'; {found}; {remedy}")
     for name in metrics:
         if name not in header:
-            others = [column for column in header if column not in LABELS]
+            others = [column for column in header if column not in forms.LABELS]
             raise ScoresError(f"{path}: no column '{name}'; {nearest(name, others)}")
-    for name in (*LABELS, *metrics):
+    for name in (*forms.LABELS, *metrics):
         if header.count(name) > 1:
             raise ScoresError(f"{path}: the first line names the column '{name}' twice; rename one")
 
@@ -304,7 +297,7 @@ def read_scores(
     metrics: Iterable[str],
     domain: str | None = None,
     columns: Columns | None = None,
-    side: Side | None = None,
+    side: forms.Side | None = None,
 ) -> ScoreTable:
     """Read the scores of one domain from a CSV file, or from several that make one table.
 
@@ -340,7 +333,7 @@ def read_domains(
     path: Files,
     metrics: Iterable[str],
     columns: Columns | None = None,
-    side: Side | None = None,
+    side: forms.Side | None = None,
     part: str | None = None,
 ) -> dict[str, ScoreTable]:
     """Read every domain of a CSV file or of several, in their order; without a domain column the only one is "".
@@ -362,25 +355,17 @@ def read_domains(
     )
     _check_single(files, list(zip(domain, agent, episode, strict=True)))
     values = np.concatenate([cells.numbers(names) for cells in files])
-    published = {
-        name: [one for cells in files for one in cells.errors.get(name, [0.0] * len(cells.lines))] for name in names
-    }
+    published = np.concatenate([cells.published(names) for cells in files])
     rows: dict[str, list[int]] = {}
     for row, name in enumerate(domain):
         rows.setdefault(name, []).append(row)
-    tables = {
-        name: ScoreTable.from_rows([agent[row] for row in own], [episode[row] for row in own], names, values[own])
-        for name, own in rows.items()
-    }
-    if not any(map(any, published.values())):
-        return tables
-    of_agent = {
-        (name, *one): error for name, own in published.items() for *one, error in zip(domain, agent, own, strict=True)
-    }
-    return {
-        name: replace(table, errors=np.array([[of_agent[one, name, who] for one in names] for who in table.agents]))
-        for name, table in tables.items()
-    }
+    tables = {}
+    for name, own in rows.items():
+        table = ScoreTable.from_rows([agent[row] for row in own], [episode[row] for row in own], names, values[own])
+        of_agent = {agent[row]: published[row] for row in own}
+        errors = np.array([of_agent[who] for who in table.agents]) if published.any() else None
+        tables[name] = replace(table, errors=errors)
+    return tables
 
 
 def _files(path: Files) -> list[Path]:
@@ -390,7 +375,7 @@ def _files(path: Files) -> list[Path]:
 
 def _check_alike(files: Sequence[Cells]) -> None:
     """Refuse files of which one numbers its episodes, or names domains, and another does not."""
-    for label, cells in [(label, cells) for label in LABELS for cells in files]:
+    for label, cells in [(label, cells) for label in forms.LABELS for cells in files]:
         other = next((one for one in files if label in one.header), None)
         if other and label not in cells.header:
             raise ScoresError(f"{cells.path}: has no column '{label}', which {other.path} has; add it")

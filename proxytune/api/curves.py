@@ -8,24 +8,9 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure
 
+from proxytune import report
 from proxytune.api.driving import read_theta
 from proxytune.errors import InputError
-from proxytune.report import (
-    Shown,
-    View,
-    curve_document,
-    figures_of_sweep,
-    held_values,
-    save_figures,
-    study_foot,
-    sweep_view,
-    teach_document,
-    teach_figure,
-    teach_view,
-    write_curves,
-    write_page,
-    write_sweep_page,
-)
 from proxytune.running import watching
 from proxytune.space import Theta
 from proxytune.storage import Store, locked
@@ -57,7 +42,7 @@ MOST_POINTS = 10_000
 
 
 @dataclass(frozen=True, repr=False)
-class SweepReport(Shown):
+class SweepReport(report.Shown):
     """Usefulness along one parameter or each of a study's.
 
     Attributes:
@@ -81,13 +66,13 @@ class SweepReport(Shown):
             f"SweepReport of '{self.settings.name}': {', '.join(curve.parameter for curve in self.curves)}; {self.held}"
         )
 
-    def view(self) -> View:
+    def view(self) -> report.View:
         """What the page shows."""
-        return sweep_view(self.settings.name, self.curves, self.figures(), self.held)
+        return report.sweep_view(self.settings.name, self.curves, self.figures(), self.held)
 
     def figures(self) -> dict[str, Figure]:
         """A figure per parameter, and two of all, by name."""
-        return figures_of_sweep(self.curves, self.truth)
+        return report.figures_of_sweep(self.curves, self.truth)
 
     def to_frame(self) -> pd.DataFrame:
         """All tables, one below the other: parameter, value, each measure."""
@@ -97,9 +82,9 @@ class SweepReport(Shown):
     def held(self) -> str:
         """Values at which the other parameters are held, in words."""
         if self.chosen == "best":
-            values = held_values(self.theta, whose="the study's best θ: ")
+            values = report.held_values(self.theta, whose="the study's best θ: ")
             return f"{values}; --at nominal holds the robot's own"
-        return "the others are nominal" if self.chosen == "nominal" else held_values(self.theta)
+        return "the others are nominal" if self.chosen == "nominal" else report.held_values(self.theta)
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """For each parameter, one row per value: each measure."""
@@ -114,7 +99,7 @@ class SweepReport(Shown):
     def document(self) -> dict[str, Any]:
         """The JSON document of `sweep --json`, without the files."""
         return {
-            "curves": [curve_document(curve) for curve in self.curves],
+            "curves": [report.curve_document(curve) for curve in self.curves],
             "episodes": {"run": self.episodes},
             "at": {"chosen": self.chosen, "theta": dict(self.theta)},
         }
@@ -127,9 +112,9 @@ class SweepReport(Shown):
         """
         output = self.settings.home / "figures" if folder is None else Path(folder)
         figures = self.figures()
-        drawn = save_figures(figures, output)
-        page = write_sweep_page(self.settings, self.curves, figures, output, self.held, command)
-        return drawn, [*write_curves(self.curves, output), page]
+        drawn = report.save_figures(figures, output)
+        page = report.write_sweep_page(self.settings, self.curves, figures, output, self.held, command)
+        return drawn, [*report.write_curves(self.curves, output), page]
 
 
 def run_sweep(
@@ -186,7 +171,7 @@ def run_sweep(
 
 
 @dataclass(frozen=True, repr=False)
-class TeachReport(Shown):
+class TeachReport(report.Shown):
     """Learning curves and PLV, the proxy learning value (eq. 5): how many target samples each proxy saves.
 
     Attributes:
@@ -200,15 +185,15 @@ class TeachReport(Shown):
     prpv: Mapping[str, Predictivity | None]
 
     def __repr__(self) -> str:
-        return f"TeachReport of '{self.settings.name}': {teach_view(self.experiment, self.prpv, b'').sentence}"
+        return f"TeachReport of '{self.settings.name}': {report.teach_view(self.experiment, self.prpv, b'').sentence}"
 
-    def view(self) -> View:
+    def view(self) -> report.View:
         """What the page shows."""
-        return teach_view(self.experiment, self.prpv, self.figures()["teach"])
+        return report.teach_view(self.experiment, self.prpv, self.figures()["teach"])
 
     def figures(self) -> dict[str, Figure]:
         """The learning curves, by name."""
-        return {"teach": teach_figure(self.experiment)}
+        return {"teach": report.teach_figure(self.experiment)}
 
     def table(self) -> pd.DataFrame:
         """One row per proxy: PLV, with the ends of its interval where they are known."""
@@ -219,7 +204,7 @@ class TeachReport(Shown):
 
     def document(self) -> dict[str, Any]:
         """The JSON document of `teach --json`, without the files."""
-        return teach_document(self.experiment, self.prpv)
+        return report.teach_document(self.experiment, self.prpv)
 
     def write(self, command: str = "") -> tuple[Path, Path]:
         """Write the figure and the page into the study's folder; their paths.
@@ -228,9 +213,13 @@ class TeachReport(Shown):
             RunError: If one cannot be written.
         """
         drawn = self.figures()
-        (figure,) = save_figures(drawn, self.settings.home / "figures")
+        (figure,) = report.save_figures(drawn, self.settings.home / "figures")
         page = figure.with_suffix(".html")
-        write_page(page, teach_view(self.experiment, self.prpv, drawn["teach"]), study_foot(self.settings, command))
+        report.write_page(
+            page,
+            report.teach_view(self.experiment, self.prpv, drawn["teach"]),
+            report.study_foot(self.settings, command),
+        )
         return figure, page
 
 

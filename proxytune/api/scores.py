@@ -15,18 +15,10 @@ import pandas as pd
 import tomlkit
 from matplotlib.figure import Figure
 
+from proxytune import report
 from proxytune.errors import InputError, LogError, ScoresError
 from proxytune.files import temporary_folder
 from proxytune.logs import Log, read_log
-from proxytune.report import (
-    Shown,
-    View,
-    figures_of_scores,
-    ranking_document,
-    score_document,
-    score_sentence,
-    score_view,
-)
 from proxytune.scores import (
     Metric,
     ScoreTable,
@@ -88,7 +80,7 @@ Scores = pd.DataFrame | ScoreTable | str | Path
 
 
 @dataclass(frozen=True)
-class ScoreReport(Shown, Assessment):
+class ScoreReport(report.Shown, Assessment):
     """How useful a proxy is, and which agent to deploy: every measure, `.decision`, figures and a page.
 
     Attributes:
@@ -100,9 +92,9 @@ class ScoreReport(Shown, Assessment):
     def __repr__(self) -> str:
         return f"ScoreReport: {self.sentence}"
 
-    def view(self) -> View:
+    def view(self) -> report.View:
         """What the page shows."""
-        return score_view(self._named, None, target=self.names[1])
+        return report.score_view(self._named, None, target=self.names[1])
 
     @property
     def _named(self) -> "dict[str, ScoreReport]":
@@ -111,12 +103,12 @@ class ScoreReport(Shown, Assessment):
     @property
     def sentence(self) -> str:
         """Say how low PRPV is, which agent to deploy, and what that risks."""
-        return score_sentence(self._named, None, target=self.names[1])
+        return report.score_sentence(self._named, None, target=self.names[1])
 
     @property
     def document(self) -> dict[str, Any]:
         """Plain numbers, texts, lists and dicts under the keys of `score --json`."""
-        return score_document(self)
+        return report.score_document(self)
 
     def to_frame(self) -> pd.DataFrame:
         """One row per measure and metric: value, and the ends of its 95 % interval."""
@@ -124,7 +116,7 @@ class ScoreReport(Shown, Assessment):
 
     def figures(self) -> dict[str, Figure]:
         """The figures by name: scatter, flipped_pairs and decision."""
-        return figures_of_scores(self)
+        return report.figures_of_scores(self)
 
     def sequential(self) -> Sequential:
         """Test after each rollout, in the order of the target's table, which agent is the best.
@@ -137,7 +129,7 @@ class ScoreReport(Shown, Assessment):
 
 
 @dataclass(frozen=True, repr=False)
-class Ranking(Shown):
+class Ranking(report.Shown):
     """Several proxies of one target: which is better beyond noise, by PRPV, by regret and by what it saves."""
 
     proxies: Mapping[str, ScoreReport]
@@ -149,9 +141,9 @@ class Ranking(Shown):
     def __repr__(self) -> str:
         return f"Ranking: {self.sentence}"
 
-    def view(self) -> View:
+    def view(self) -> report.View:
         """What the page shows."""
-        return score_view(self.proxies, self.selection, target="target")
+        return report.score_view(self.proxies, self.selection, target="target")
 
     def figures(self) -> dict[str, Figure]:
         """The figures of every proxy, as "scatter: NAME"."""
@@ -161,12 +153,12 @@ class Ranking(Shown):
     @property
     def sentence(self) -> str:
         """Say which proxy is the best, and whether that is beyond noise."""
-        return score_sentence(self.proxies, self.selection, target="target")
+        return report.score_sentence(self.proxies, self.selection, target="target")
 
     @property
     def document(self) -> dict[str, Any]:
         """Plain numbers, texts, lists and dicts under the keys of `score --json`."""
-        return ranking_document(self.proxies, self.selection)
+        return report.ranking_document(self.proxies, self.selection)
 
     def to_frame(self) -> pd.DataFrame:
         """One row per proxy, measure and metric: value, and the ends of its 95 % interval."""

@@ -8,21 +8,11 @@ from typing import Any
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from proxytune import report
 from proxytune.api import StudyReport, read_families
 from proxytune.cli.options import typed
 from proxytune.cli.study import families_answer
 from proxytune.cli.terminal import Answer
-from proxytune.report import (
-    curve_name,
-    figures_of_sweep,
-    held_alike,
-    held_values,
-    save_figures,
-    study_document,
-    study_text,
-    write_study_tables,
-    write_sweep_page,
-)
 from proxytune.scores import Metric
 from proxytune.storage import Store
 from proxytune.study import (
@@ -52,21 +42,21 @@ def run(arguments: argparse.Namespace) -> Answer:
         result, curves = _read(run, metrics)
     names = [re.sub(r"[^\w.-]+", "_", str(metric).replace("%", "percent")) for metric in metrics]
     folder = settings.home / RESCORED / "+".join(names) if names else settings.home
-    drawn = figures_of_sweep(curves, run.study.truth)
-    figures = save_figures(drawn, folder / "figures")
+    drawn = report.figures_of_sweep(curves, run.study.truth)
+    figures = report.save_figures(drawn, folder / "figures")
     shown = result.study.settings if result else settings
-    latest, command = list({curve_name(curve): curve for curve in curves}.values()), typed(arguments)
-    pages = [
-        str(write_sweep_page(shown, alike, drawn, folder / "figures", held_values(alike[0].base), command))
-        for alike in held_alike(latest)
-    ]
+    latest, command = list({report.curve_name(curve): curve for curve in curves}.values()), typed(arguments)
+    pages = []
+    for alike in report.held_alike(latest):
+        held = report.held_values(alike[0].base)
+        pages.append(str(report.write_sweep_page(shown, alike, drawn, folder / "figures", held, command)))
     document: dict[str, Any] = {}
     if result:
         found = StudyReport(result, Spent())
-        own_figures, report = found.write(folder, command if metrics else "")
+        own_figures, page = found.write(folder, command if metrics else "")
         figures = [*own_figures, *figures]
-        tables = [str(path) for path in write_study_tables(result, found.trials(), folder / "figures")]
-        document = {**study_document(result), "report": str(report), "tables": tables}
+        tables = [str(path) for path in report.write_study_tables(result, found.trials(), folder / "figures")]
+        document = {**report.study_document(result), "report": str(page), "tables": tables}
     paths = [str(path) for path in figures]
     text: RenderableType = Text(
         "\n".join([*paths, *pages, *document.get("tables", ()), *filter(None, [document.get("report")])])
@@ -74,7 +64,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     if result and metrics:
         named = ", ".join(str(metric) for metric in shown.metrics)
         note = f"none run; scored with {named}; the trials are still those that the study's own metrics led to"
-        text = Group(study_text(result, note, {}), text)
+        text = Group(report.study_text(result, note, {}), text)
     return Answer({**document, "figures": paths, "pages": pages}, text)
 
 

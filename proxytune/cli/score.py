@@ -6,20 +6,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from proxytune import report
 from proxytune.cli.options import typed
 from proxytune.cli.terminal import Answer
 from proxytune.errors import InputError
 from proxytune.files import check_place
-from proxytune.report import (
-    check_table_file,
-    foot_of,
-    ranking_document,
-    score_document,
-    score_text,
-    sequential_sentence,
-    write_score_report,
-    write_score_table,
-)
 from proxytune.scores import (
     LABELS,
     Metric,
@@ -164,7 +155,7 @@ def run(arguments: argparse.Namespace) -> Answer:
         between = f"{FEWEST_RESAMPLES} and {MOST_RESAMPLES}"
         raise InputError(f"--resamples must be between {between}, and --seed at least 0")
     if arguments.table:
-        check_table_file("--table", arguments.table)
+        report.check_table_file("--table", arguments.table)
         check_place(arguments.table)
     if arguments.output:
         check_place(arguments.output, folder=True)
@@ -193,7 +184,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     written = _write(arguments, assessments, selection, target_name) if arguments.output else {"figures": []}
     document = {"target": target_name, **written, "left_out": list(left_out)}
     if arguments.table:
-        write_score_table(assessments, arguments.table)
+        report.write_score_table(assessments, arguments.table)
         document["table"] = str(arguments.table)
     if tested is not None:
         document["sequential"] = asdict(tested)
@@ -216,12 +207,12 @@ def _answer(
     selection: Selection | None,
     tested: Sequential | None,
 ) -> Answer:
-    lines = [*document["left_out"], *([f"sequential test: {sequential_sentence(tested)}"] if tested else ())]
-    shown = score_text(assessments, selection, lines, target=document["target"])
+    lines = [*document["left_out"], *([f"sequential test: {report.sequential_sentence(tested)}"] if tested else ())]
+    shown = report.score_text(assessments, selection, lines, target=document["target"])
     if selection is not None:
-        return Answer(document | ranking_document(assessments, selection), shown)
+        return Answer(document | report.ranking_document(assessments, selection), shown)
     ((name, assessment),) = assessments.items()
-    return Answer({"proxy": name, **document, **score_document(assessment)}, shown)
+    return Answer({"proxy": name, **document, **report.score_document(assessment)}, shown)
 
 
 def _weights(texts: Sequence[str]) -> dict[str, float] | None:
@@ -241,6 +232,6 @@ def _write(
     arguments: argparse.Namespace, assessments: Mapping[str, Assessment], selection: Selection | None, target: str
 ) -> dict[str, Any]:
     settings = [("metrics", ", ".join(arguments.metric)), ("resamples", str(arguments.resamples))]
-    foot = foot_of(typed(arguments), [*settings, ("seed", str(arguments.seed))])
-    figures, page = write_score_report(assessments, selection, arguments.output, foot, target=target)
+    foot = report.foot_of(typed(arguments), [*settings, ("seed", str(arguments.seed))])
+    figures, page = report.write_score_report(assessments, selection, arguments.output, foot, target=target)
     return {"figures": [str(path) for path in figures], "report": str(page)}

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from rich.console import Group
 from rich.text import Text
 
+from proxytune import report
 from proxytune.api import StudyReport, most_episodes, record_log, run_opened
 from proxytune.driving import robot_home
 from proxytune.errors import InputError
@@ -56,20 +57,6 @@ from proxytune.loop.opening import (
     held_out_settings,
     open_loop,
     scored_agents,
-)
-from proxytune.report import (
-    CAPTIONS,
-    Paragraphs,
-    Shown,
-    Table,
-    View,
-    columns_of,
-    group_texts,
-    note_texts,
-    picture_of,
-    study_foot,
-    table_text,
-    write_page,
 )
 from proxytune.scores import write_scores
 from proxytune.seeds import target_seed
@@ -151,13 +138,13 @@ class _Closing:
 
     def _tune(self, name: str, study: Study) -> StudyReport:
         self._begin(name)
-        report = run_opened(study, self.teller.episodes(most_episodes(study.settings)), self.teller.say)
-        self.episodes += report.spent.episodes
-        if report.spent.episodes:
+        tuned = run_opened(study, self.teller.episodes(most_episodes(study.settings)), self.teller.say)
+        self.episodes += tuned.spent.episodes
+        if tuned.spent.episodes:
             self.done.append(name)
-        if report.spent.episodes or not (study.settings.folder / "report.html").exists():
-            report.write()
-        return report
+        if tuned.spent.episodes or not (study.settings.folder / "report.html").exists():
+            tuned.write()
+        return tuned
 
     def _diagnose(self) -> Mapping[str, Any]:
         loop, home = self.loop, self.loop.home / "diagnosed"
@@ -199,7 +186,7 @@ class _Closing:
             return None
         target = self._held_out_target(names)
         self._begin(name)
-        studies = [(report.result.study, report.theta) for report in (before, after)]
+        studies = [(one.result.study, one.theta) for one in (before, after)]
         with self.teller.episodes(4 * len(names) * self.settings.starts) as watcher:
             driven = [
                 drive_held_out(study, held_out_settings(study.settings, names, target), theta, watcher)
@@ -216,7 +203,7 @@ class _Closing:
             return
         name, twin, home = "righted agent", self.loop.twin, self.loop.home
         seen = twin and twin.read_text(encoding="utf-8"), digest_of_files(home / "diagnosed" / "model.toml")
-        thetas = [dict(report.theta) for report in (closed.before, closed.after)]
+        thetas = [dict(one.theta) for one in (closed.before, closed.after)]
         metrics = [metric.name for metric in self.settings.metrics]
         inputs = digest(name, righted(closed), seen, thetas, metrics, self._agents(self.settings.agents))
         self._keep(name, inputs, pictures_file(home), partial(write_pictures, closed))
@@ -238,11 +225,11 @@ class _Closing:
         return [names, dict(settings.aliases), settings.starts, settings.seed, dict(settings.domain.values), code]
 
 
-COLUMNS = columns_of(("",), ("before", "after"))
+COLUMNS = report.columns_of(("",), ("before", "after"))
 
 
 @dataclass(frozen=True, repr=False)
-class LoopReport(Shown):
+class LoopReport(report.Shown):
     """A closed loop: before and after.
 
     Attributes:
@@ -254,7 +241,7 @@ class LoopReport(Shown):
     def __repr__(self) -> str:
         return f"LoopReport: {view_of(self.closed).sentence}"
 
-    def view(self) -> View:
+    def view(self) -> report.View:
         """What the page shows."""
         return view_of(self.closed)
 
@@ -286,7 +273,7 @@ class LoopReport(Shown):
             "verdict": closed.diagnosis["verdict"],
             "effects": closed.diagnosis["effects"],
             "camera": {"verdict": camera["verdict"], "effects": camera["effects"]} if camera else None,
-            "theta": {side: None if report is None else report.theta for side, report in reports},
+            "theta": {side: None if one is None else one.theta for side, one in reports},
             "prpv": {**rows.pop("prpv"), "held_out": held_out},
             "error": closed.diagnosis.get("error"),
             "errors": rows,
@@ -301,7 +288,7 @@ class LoopReport(Shown):
             RunError: If it cannot be written.
         """
         page = self.closed.loop.home / "report.html"
-        write_page(page, view_of(self.closed), study_foot(self.closed.loop.settings, command))
+        report.write_page(page, view_of(self.closed), report.study_foot(self.closed.loop.settings, command))
         return page
 
 
@@ -345,24 +332,24 @@ def text_of(closed: Closed, page: Path) -> Group:
     """A closed loop as `loop` prints it, with where its page is."""
     rows = rows_of(closed)
     sentence, table = Text(answer(closed.diagnosis, rows), style="bold"), _table(closed, rows)
-    shown, theta = (table_text(one, ragged=True) for one in (replace(table, title=""), _theta_table(closed)))
+    shown, theta = (report.table_text(one, ragged=True) for one in (replace(table, title=""), _theta_table(closed)))
     following = f"Next: {_following(closed)}"
-    return group_texts(sentence, shown, *note_texts(table.notes), Text(), theta, following, str(page))
+    return report.group_texts(sentence, shown, *report.note_texts(table.notes), Text(), theta, following, str(page))
 
 
-def view_of(closed: Closed) -> View:
+def view_of(closed: Closed) -> report.View:
     """A closed loop: before and after, its figures, and what each step said."""
     rows = rows_of(closed)
     prpv = [row for row in rows if row.key in ("prpv", "held_out")]
     home, shown = closed.loop.home, []
     if closed.after:
-        shown = [picture_of("loop", "prpv", prpv_figure(prpv)), *read_pictures(home)]
+        shown = [report.picture_of("loop", "prpv", prpv_figure(prpv)), *read_pictures(home)]
     found = (closed.diagnosis["effects"], (closed.diagnosis["camera"] or {}).get("effects"))
-    for name in CAPTIONS["loop"]:
+    for name in report.CAPTIONS["loop"]:
         # Of the camera there is a figure where it lacked nothing too
         file = home / "diagnosed" / f"{name}.svg"
         if file.is_file() and (found[1] or not name.startswith("camera")):
-            shown.append(picture_of("loop", name, file.read_bytes()))
+            shown.append(report.picture_of("loop", name, file.read_bytes()))
     said = (
         f"Found: {lacking(closed.diagnosis) or 'nothing that has a name'}; verdict: {closed.diagnosis['verdict']}.",
         f"Before: {closed.before.sentence}",
@@ -371,7 +358,7 @@ def view_of(closed: Closed) -> View:
     beside = {"tuning without": "../report.html", "the diagnosis": "diagnosed/report.html"}
     beside |= {"tuning again": "extended/report.html", "the model that was found": "diagnosed/model.toml"}
     links = (f"[{title}]({name})" for title, name in beside.items() if (home / name).is_file())
-    return View(
+    return report.View(
         title=f"{closed.loop.settings.name}: what did the simulator lack, and what is it worth?",
         sentence=answer(closed.diagnosis, rows),
         next_step=_following(closed),
@@ -379,13 +366,13 @@ def view_of(closed: Closed) -> View:
             _table(closed, rows),
             _theta_table(closed),
             *shown,
-            Paragraphs("What each step said", said),
-            Paragraphs("Pages and files", (" · ".join(links),)),
+            report.Paragraphs("What each step said", said),
+            report.Paragraphs("Pages and files", (" · ".join(links),)),
         ),
     )
 
 
-def _table(closed: Closed, rows: list[Compared]) -> Table:
+def _table(closed: Closed, rows: list[Compared]) -> report.Table:
     """Every measure before and after, with its noise floor and chance."""
     cells, same = list[tuple[str, ...]](), list[str]()
     for row in rows:
@@ -409,17 +396,17 @@ def _table(closed: Closed, rows: list[Compared]) -> Table:
         )
     if same:
         notes.append(f"the same before and after: {'; '.join(same)}")
-    return Table("Before and after", COLUMNS, tuple(cells), tuple(notes))
+    return report.Table("Before and after", COLUMNS, tuple(cells), tuple(notes))
 
 
-def _theta_table(closed: Closed) -> Table:
+def _theta_table(closed: Closed) -> report.Table:
     after = None if closed.after is None else _known(closed.after)
     return theta_table(_known(closed.before), after, closed.diagnosis)
 
 
-def _known(report: StudyReport) -> Known:
-    ends = report.result.knowledge.intervals
-    return {name: (value, ends.get(name)) for name, value in report.theta.items()}
+def _known(tuned: StudyReport) -> Known:
+    ends = tuned.result.knowledge.intervals
+    return {name: (value, ends.get(name)) for name, value in tuned.theta.items()}
 
 
 def _following(closed: Closed) -> str:

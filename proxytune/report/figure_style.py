@@ -31,7 +31,7 @@ CHARACTERS_PER_INCH, HANDLE = 19, 8
 """Characters of a legend that fit into an inch, and the space that a line beside them takes, in characters."""
 
 
-def grid_of(height: float, rows: int, columns: int, **how: Any) -> tuple[Figure, NDArray[np.object_]]:
+def grid_of(height: float, rows: int, columns: int, **how: Any) -> tuple[Figure, NDArray[Any]]:
     """A figure for one column of a paper, so high [inch], and its panels (rows, columns), made as `subplots` does."""
     figure = Figure(figsize=(COLUMN, height), layout="constrained")
     return figure, figure.subplots(rows, columns, squeeze=False, **how)

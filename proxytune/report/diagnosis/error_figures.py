@@ -245,5 +245,6 @@ def _floor(axes: Axes, drives: Drives, strayed: Strayed, scale: LogNorm) -> Coll
     places = drives.poses[strayed.increment, 1, :2]
     side = float(np.ptp(places, axis=0).max()) / SQUARES
     edges = [np.arange(along.min(), along.max() + 2.0 * side, side) for along in places.T]
-    mean = binned_statistic_2d(*places.T, strayed.rms[strayed.window], bins=edges).statistic
+    x, y = places.T
+    mean = binned_statistic_2d(x, y, strayed.rms[strayed.window], bins=edges).statistic
     return axes.pcolormesh(*edges, mean.T, cmap=style.SHADES, norm=scale, rasterized=True)

@@ -15,7 +15,7 @@ import pandas as pd
 import tomlkit
 from matplotlib.figure import Figure
 
-from proxytune import report
+from proxytune import report, usefulness
 from proxytune.errors import InputError, LogError, ScoresError
 from proxytune.files import temporary_folder
 from proxytune.logs import Log, read_log
@@ -29,18 +29,6 @@ from proxytune.scores import (
     column_names,
     expand,
     read_scores,
-)
-from proxytune.usefulness import (
-    FEWEST_RESAMPLES,
-    MOST_RESAMPLES,
-    Asked,
-    Assessment,
-    Selection,
-    Sequential,
-    assess_each,
-    chosen,
-    in_common,
-    sequential_test,
 )
 
 LABELS = ("agent", "episode", "time")
@@ -80,7 +68,7 @@ Scores = pd.DataFrame | ScoreTable | str | Path
 
 
 @dataclass(frozen=True)
-class ScoreReport(report.Shown, Assessment):
+class ScoreReport(report.Shown, usefulness.Assessment):
     """How useful a proxy is, and which agent to deploy: every measure, `.decision`, figures and a page.
 
     Attributes:
@@ -118,14 +106,14 @@ class ScoreReport(report.Shown, Assessment):
         """The figures by name: scatter, flipped_pairs and decision."""
         return report.figures_of_scores(self)
 
-    def sequential(self) -> Sequential:
+    def sequential(self) -> usefulness.Sequential:
         """Test after each rollout, in the order of the target's table, which agent is the best.
 
         Raises:
             ScoresError: If scores are not within 0 and 1, an agent has one rollout, or outcomes are sorted.
         """
-        columns, _ = chosen(self.inputs, self.asked.decide_on)
-        return sequential_test(self.inputs, columns[0], seed=self.seed)
+        columns, _ = usefulness.chosen(self.inputs, self.asked.decide_on)
+        return usefulness.sequential_test(self.inputs, columns[0], seed=self.seed)
 
 
 @dataclass(frozen=True, repr=False)
@@ -133,7 +121,7 @@ class Ranking(report.Shown):
     """Several proxies of one target: which is better beyond noise, by PRPV, by regret and by what it saves."""
 
     proxies: Mapping[str, ScoreReport]
-    selection: Selection
+    selection: usefulness.Selection
 
     def __getitem__(self, name: str) -> ScoreReport:
         return self.proxies[name]
@@ -221,8 +209,10 @@ def score(  # type: ignore[misc]  # the options above are those below
     """
     if seed < 0:
         raise InputError(f"seed must be at least 0, got {seed}")
-    if not FEWEST_RESAMPLES <= resamples <= MOST_RESAMPLES:
-        raise InputError(f"resamples must be between {FEWEST_RESAMPLES} and {MOST_RESAMPLES}, got {resamples}")
+    if not usefulness.FEWEST_RESAMPLES <= resamples <= usefulness.MOST_RESAMPLES:
+        raise InputError(
+            f"resamples must be between {usefulness.FEWEST_RESAMPLES} and {usefulness.MOST_RESAMPLES}, got {resamples}"
+        )
     if (both is None) == (proxy is None) or (proxy is None) != (target is None):
         raise InputError("give the proxy's and the target's scores, or one table of both sides")
     names, header = ("proxy", "target") if both is None else ("sim", "real"), _header(target if both is None else both)
@@ -237,17 +227,17 @@ def score(  # type: ignore[misc]  # the options above are those below
     sides = {name: _table(one, "proxy", wanted, columns) for name, one in given.items()}
     sides["target"] = _table(target if both is None else both, "target", wanted, columns)
     if common:
-        sides = dict(zip(sides, in_common(sides)[0].values(), strict=True))
+        sides = dict(zip(sides, usefulness.in_common(sides)[0].values(), strict=True))
     if unpaired:
         sides = {side: table.unpaired() for side, table in sides.items()}
-    asked = Asked(decide_on, rollouts, regret)
+    asked = usefulness.Asked(decide_on, rollouts, regret)
     other = sides.pop("target")
-    found, selection = assess_each(
+    found, selection = usefulness.assess_each(
         proxies=sides, target=other, metrics=compared, beta=beta, asked=asked, resamples=resamples, seed=seed
     )
     reports = {}
     for name, one in found.items():
-        own = {each.name: getattr(one, each.name) for each in fields(Assessment)}
+        own = {each.name: getattr(one, each.name) for each in fields(usefulness.Assessment)}
         reports[name] = ScoreReport(**own, names=(name, names[1]))
     return reports[names[0]] if selection is None else Ranking(reports, selection)
 

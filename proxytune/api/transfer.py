@@ -9,18 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from proxytune.diagnosis import (
-    PICTURES,
-    Agreement,
-    Clocks,
-    agreement,
-    frames_of,
-    frames_text,
-    on_one_clock,
-    predict as predict_poses,
-    predict_pictures,
-    robot_of,
-)
+from proxytune import diagnosis
 from proxytune.driving import Robot, catalogue_of, read_model_of, read_robot, robot_from_geometry, robot_names
 from proxytune.effects import Catalogue, Model
 from proxytune.errors import InputError, LogError
@@ -216,8 +205,8 @@ class Prediction:
 
     poses: pd.DataFrame
     horizon_s: float
-    error: Agreement
-    clocks: Clocks
+    error: diagnosis.Agreement
+    clocks: diagnosis.Clocks
     notes: tuple[str, ...] = ()
     cautions: tuple[str, ...] = ()
 
@@ -314,30 +303,30 @@ def predict(
         if frames is not None:
             folder = Path(frames)
             numbers, errors = list[int](), list[float]()
-            for part in predict_pictures(drives, _robot_of(fitted, drives, catalogue), fitted.theta):
+            for part in diagnosis.predict_pictures(drives, _robot_of(fitted, drives, catalogue), fitted.theta):
                 for number, picture in zip(part.numbers.tolist(), part.pictures, strict=True):
-                    write_picture(folder / (PICTURES % number), picture)
+                    write_picture(folder / (diagnosis.PICTURES % number), picture)
                 numbers += part.numbers.tolist()
                 errors += part.grey_errors.tolist()
                 tell(f"drawing: {len(numbers)} frames")
             # It comes last, so that a list never names what is not there.
-            write_text(folder / "frames.csv", frames_text(drives, frames_of(drives), numbers))
+            write_text(folder / "frames.csv", diagnosis.frames_text(drives, diagnosis.frames_of(drives), numbers))
             return PicturePrediction(folder, len(numbers), float(np.mean(errors)))
         if drives.command == "none":
             hint = "" if drives.frames is None else ", or give --frames to predict those"
             raise InputError(f"{drives.name}: has no commands to predict poses from; give a log of drives{hint}")
         robot = _robot_of(fitted, drives, catalogue)
         cautions = (*fitted.cautions, *log_cautions(drives, robot.figures))
-        corrected, clocks = on_one_clock(drives, robot)
+        corrected, clocks = diagnosis.on_one_clock(drives, robot)
         # Else a log is predicted whole, as it was recorded, long rests and all.
         drives = corrected if clocks.differ else drives
-        table = predict_poses(drives, robot, fitted.theta, horizon_s)
+        table = diagnosis.predict(drives, robot, fitted.theta, horizon_s)
         notes = tuple(clocks_notes(drives.name, [clocks], {}))
-        return Prediction(table, horizon_s, agreement(table, drives, horizon_s), clocks, notes, cautions)
+        return Prediction(table, horizon_s, diagnosis.agreement(table, drives, horizon_s), clocks, notes, cautions)
 
 
 def _robot_of(model: Model, log: Log, catalogue: Catalogue) -> Robot:
     if model.robot in robot_names(catalogue.folder):
-        return robot_of(log, model.robot, catalogue)
+        return diagnosis.robot_of(log, model.robot, catalogue)
     robot = robot_from_geometry(model.robot, model.geometry or log.geometry, log.rate_hz)
     return replace(robot, catalogue=catalogue)

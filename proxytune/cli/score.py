@@ -6,7 +6,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from proxytune import report
+from proxytune import report, usefulness
 from proxytune.cli.options import typed
 from proxytune.cli.terminal import Answer
 from proxytune.errors import InputError
@@ -23,18 +23,6 @@ from proxytune.scores import (
     read_scores,
 )
 from proxytune.settings import nearest
-from proxytune.usefulness import (
-    FEWEST_RESAMPLES,
-    MOST_RESAMPLES,
-    Asked,
-    Assessment,
-    Selection,
-    Sequential,
-    assess_each,
-    chosen,
-    in_common,
-    sequential_test,
-)
 
 
 def read_sides(
@@ -151,8 +139,8 @@ def _sides_given(arguments: argparse.Namespace) -> None:
 
 def run(arguments: argparse.Namespace) -> Answer:
     """Score one proxy, or rank several."""
-    if not FEWEST_RESAMPLES <= arguments.resamples <= MOST_RESAMPLES or arguments.seed < 0:
-        between = f"{FEWEST_RESAMPLES} and {MOST_RESAMPLES}"
+    if not usefulness.FEWEST_RESAMPLES <= arguments.resamples <= usefulness.MOST_RESAMPLES or arguments.seed < 0:
+        between = f"{usefulness.FEWEST_RESAMPLES} and {usefulness.MOST_RESAMPLES}"
         raise InputError(f"--resamples must be between {between}, and --seed at least 0")
     if arguments.table:
         report.check_table_file("--table", arguments.table)
@@ -166,17 +154,17 @@ def run(arguments: argparse.Namespace) -> Answer:
     left_out: Sequence[str] = ()
     if arguments.common:
         sides = {"the target": target, **{f"the proxy {name}": one for name, one in proxies.items()}}
-        kept, left_out = in_common(sides)
+        kept, left_out = usefulness.in_common(sides)
         target, proxies = kept.pop("the target"), dict(zip(proxies, kept.values(), strict=True))
     if arguments.unpaired:
         target = target.unpaired()
         proxies = {name: table.unpaired() for name, table in proxies.items()}
-    assessments, selection = assess_each(
+    assessments, selection = usefulness.assess_each(
         proxies=proxies,
         target=target,
         metrics=metrics,
         beta=_weights(arguments.beta),
-        asked=Asked(arguments.decide_on, arguments.rollouts, arguments.regret),
+        asked=usefulness.Asked(arguments.decide_on, arguments.rollouts, arguments.regret),
         resamples=arguments.resamples,
         seed=arguments.seed,
     )
@@ -191,21 +179,21 @@ def run(arguments: argparse.Namespace) -> Answer:
     return _answer(document, assessments, selection, tested)
 
 
-def _test(assessments: Mapping[str, Assessment], arguments: argparse.Namespace) -> Sequential:
+def _test(assessments: Mapping[str, usefulness.Assessment], arguments: argparse.Namespace) -> usefulness.Sequential:
     if len(assessments) > 1:
         raise InputError("--sequential: takes one proxy; name the one to bet by")
     ((_, assessment),) = assessments.items()
-    columns, name = chosen(assessment.inputs, arguments.decide_on)
+    columns, name = usefulness.chosen(assessment.inputs, arguments.decide_on)
     if len(columns) > 1:
         raise InputError(f"--sequential: takes one metric, not the {name}; name it with --decide-on")
-    return sequential_test(assessment.inputs, columns[0], seed=arguments.seed)
+    return usefulness.sequential_test(assessment.inputs, columns[0], seed=arguments.seed)
 
 
 def _answer(
     document: dict[str, Any],
-    assessments: Mapping[str, Assessment],
-    selection: Selection | None,
-    tested: Sequential | None,
+    assessments: Mapping[str, usefulness.Assessment],
+    selection: usefulness.Selection | None,
+    tested: usefulness.Sequential | None,
 ) -> Answer:
     lines = [*document["left_out"], *([f"sequential test: {report.sequential_sentence(tested)}"] if tested else ())]
     shown = report.score_text(assessments, selection, lines, target=document["target"])
@@ -229,7 +217,10 @@ def _weights(texts: Sequence[str]) -> dict[str, float] | None:
 
 
 def _write(
-    arguments: argparse.Namespace, assessments: Mapping[str, Assessment], selection: Selection | None, target: str
+    arguments: argparse.Namespace,
+    assessments: Mapping[str, usefulness.Assessment],
+    selection: usefulness.Selection | None,
+    target: str,
 ) -> dict[str, Any]:
     settings = [("metrics", ", ".join(arguments.metric)), ("resamples", str(arguments.resamples))]
     foot = report.foot_of(typed(arguments), [*settings, ("seed", str(arguments.seed))])

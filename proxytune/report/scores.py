@@ -7,14 +7,7 @@ from typing import Any
 from matplotlib.figure import Figure
 from rich.console import Group
 
-from proxytune.report.decision import (
-    choices_sentences,
-    decision_document,
-    decision_figure,
-    decision_sentence,
-    decision_table,
-    together_document,
-)
+from proxytune.report import decision
 from proxytune.report.html import write_page
 from proxytune.report.score_figures import MOST, flipped_pairs_figure, scatter_figure
 from proxytune.report.table_files import Cell, csv_text, latex_text
@@ -47,7 +40,7 @@ def score_sentence(assessments: Assessments, selection: Selection | None, *, tar
     """Say how low PRPV is and what that is worth; of several proxies which is best, and than which beyond noise."""
     if selection is None:
         ((proxy, assessment),) = assessments.items()
-        return f"{_say_prpv(assessment, proxy, target)} {decision_sentence(assessment, target)}"
+        return f"{_say_prpv(assessment, proxy, target)} {decision.decision_sentence(assessment, target)}"
     best = selection.ranking[0][0]
     worse = [pair.worse for pair in selection.differences if pair.better == best and pair.beyond_noise]
     beyond = f"beyond noise better than {listed(worse)}" if worse else "not beyond noise better than any other"
@@ -103,9 +96,9 @@ def score_text(
     notes = _remarks(assessments, "note")
     if selection is None:
         ((_, assessment),) = assessments.items()
-        notes += [f"decision: {line}" for line in decision_table(assessment, target).notes]
+        notes += [f"decision: {line}" for line in decision.decision_table(assessment, target).notes]
     else:
-        notes += [f"decision: {line}" for line in choices_sentences(assessments, selection, target)]
+        notes += [f"decision: {line}" for line in decision.choices_sentences(assessments, selection, target)]
     noise, floor = next(iter(assessments.values())).noise_floor, []
     if selection is not None and noise.value is not None:
         ends = short_span(noise.low, noise.high)
@@ -145,14 +138,14 @@ def score_view(
     said = score_sentence(assessments, selection, target=target), score_next_step(assessments, selection)
     if selection is None:
         return View(f"{next(iter(assessments))}: how well does it predict {target}?", *said, (*figures, *tables))
-    choices = Paragraphs("Which proxy to choose by", tuple(choices_sentences(assessments, selection, target)))
+    choices = Paragraphs("Which proxy to choose by", tuple(decision.choices_sentences(assessments, selection, target)))
     return View(f"Which of {len(assessments)} proxies predicts {target} best?", *said, (*tables, choices, *figures))
 
 
 def figures_of_scores(assessment: Assessment) -> dict[str, Figure]:
     """The figures of one proxy, by name."""
     figures = {"scatter": scatter_figure(assessment), "flipped_pairs": flipped_pairs_figure(assessment.prpv)}
-    return {**figures, "decision": decision_figure(assessment.decision)}
+    return {**figures, "decision": decision.decision_figure(assessment.decision)}
 
 
 def _all_drawn(assessments: Assessments, selection: Selection | None) -> Iterator[tuple[str, Figure, Picture]]:
@@ -191,7 +184,7 @@ def _tables(assessments: Assessments, selection: Selection | None, target: str) 
     columns = (*columns_of(("measure",), ("value", "95 % interval")), *columns_of(("better", "what it says")))
     title = f"{proxy} as a proxy of {target}: {_sizes(assessment)}"
     return [
-        decision_table(assessment, target),
+        decision.decision_table(assessment, target),
         Table(title, columns, (*_prpv_rows(assessment), *beside), notes),
         *map(_rates, assessment.success_rates),
     ]
@@ -324,7 +317,7 @@ def score_document(assessment: Assessment) -> dict[str, Any]:
             "paired": inputs.paired,
             "resamples": inner.resamples,
         },
-        **decision_document(assessment),
+        **decision.decision_document(assessment),
         "cautions": list(assessment.cautions),
         "notes": list(assessment.notes),
     }
@@ -337,7 +330,7 @@ def ranking_document(assessments: Assessments, selection: Selection) -> dict[str
         "proxies": [{"proxy": name, "rank": rank, **score_document(assessments[name])} for rank, (name, _) in ranked],
         "differences": differences_document(selection.differences),
         "choices": differences_document(selection.choices),
-        "together": together_document(selection.together) if selection.together else None,
+        "together": decision.together_document(selection.together) if selection.together else None,
         "cautions": list(dict.fromkeys(line for one in assessments.values() for line in one.cautions)),
         "notes": [f"no intervals of the differences: {selection.reason}"] if selection.reason else [],
     }

@@ -8,35 +8,13 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure
 
-from proxytune import report
+from proxytune import report, sweep, teaching
 from proxytune.api.driving import read_theta
 from proxytune.errors import InputError
 from proxytune.running import watching
 from proxytune.space import Theta
 from proxytune.storage import Store, locked
 from proxytune.study import StudyRun, StudySettings, family_catalogue, open_study
-from proxytune.sweep import (
-    SweepCurve,
-    best_theta,
-    check_base,
-    curve_of,
-    discrepancy_study,
-    has_answer,
-    plan_sweep,
-    run_sweep as run_planned,
-    series_of,
-    sweep_interval,
-    with_target,
-)
-from proxytune.teaching import (
-    Experiment,
-    Predictivity,
-    check_proxies,
-    count_examinations,
-    load_setup,
-    predictivity,
-    run_experiment,
-)
 
 MOST_POINTS = 10_000
 
@@ -55,7 +33,7 @@ class SweepReport(report.Shown):
     """
 
     settings: StudySettings
-    curves: tuple[SweepCurve, ...]
+    curves: tuple[sweep.SweepCurve, ...]
     chosen: str
     theta: Theta
     episodes: int
@@ -90,7 +68,7 @@ class SweepReport(report.Shown):
         """For each parameter, one row per value: each measure."""
         return {
             curve.parameter: pd.DataFrame(
-                {one.key: [estimate.score for estimate in one.estimates] for one in series_of(curve)},
+                {one.key: [estimate.score for estimate in one.estimates] for one in sweep.series_of(curve)},
                 index=pd.Index([point.value for point in curve.points], name=curve.parameter),
             )
             for curve in self.curves
@@ -143,29 +121,29 @@ def run_sweep(
     study = open_study(Path(path))
     if not 2 <= points <= MOST_POINTS:
         raise InputError(f"--points must be between 2 and {MOST_POINTS}, got {points}")
-    word = ("best" if has_answer(study) else "nominal") if at is None else at
+    word = ("best" if sweep.has_answer(study) else "nominal") if at is None else at
     if isinstance(word, Mapping):
         base: Theta = word
     elif word == "best":
-        base = best_theta(study)
+        base = sweep.best_theta(study)
     else:
         base = read_theta(word, family_catalogue(study.family, study.settings), "--at")
-    check_base(study, base)
+    sweep.check_base(study, base)
     names = study.settings.space.names if parameter == "all" else (parameter,)
-    sweeps = [plan_sweep(sweep_interval(study, name), base, points) for name in names]
+    sweeps = [sweep.plan_sweep(sweep.sweep_interval(study, name), base, points) for name in names]
     discrepancy = None
     if target_model:
-        discrepancy = discrepancy_study(study, Path(target_model))
-        sweeps = [with_target(sweep, Path(target_model), discrepancy) for sweep in sweeps]
+        discrepancy = sweep.discrepancy_study(study, Path(target_model))
+        sweeps = [sweep.with_target(one, Path(target_model), discrepancy) for one in sweeps]
     per_point = len(study.settings.agents) + (discrepancy is not None)
-    total = sum(len(sweep.points) for sweep in sweeps) * per_point * study.settings.starts
+    total = sum(len(one.points) for one in sweeps) * per_point * study.settings.starts
     folder = study.settings.home
     with locked(folder), Store.open(folder) as store:
         with watching(progress, total) as watcher:
             run = StudyRun(study, store, watcher)
-            for sweep in sweeps:
-                run_planned(run, sweep, discrepancy)
-        curves = tuple(curve for sweep in sweeps if (curve := curve_of(run, sweep)))
+            for one in sweeps:
+                sweep.run_sweep(run, one, discrepancy)
+        curves = tuple(curve for one in sweeps if (curve := sweep.curve_of(run, one)))
     chosen = word if word in ("best", "nominal") else "given"
     return SweepReport(study.settings, curves, str(chosen), sweeps[0].base, run.spent.episodes, study.truth)
 
@@ -181,8 +159,8 @@ class TeachReport(report.Shown):
     """
 
     settings: StudySettings
-    experiment: Experiment
-    prpv: Mapping[str, Predictivity | None]
+    experiment: teaching.Experiment
+    prpv: Mapping[str, teaching.Predictivity | None]
 
     def __repr__(self) -> str:
         return f"TeachReport of '{self.settings.name}': {report.teach_view(self.experiment, self.prpv, b'').sentence}"
@@ -237,14 +215,14 @@ def teach(path: str | Path, *, progress: bool = False) -> TeachReport:
         RunError: If training fails; all that was finished is kept.
     """
     study = open_study(Path(path))
-    settings, setup = study.settings, load_setup(study.settings)
+    settings, setup = study.settings, teaching.load_setup(study.settings)
     # Before anything is written.
-    check_proxies(settings, setup)
+    teaching.check_proxies(settings, setup)
     proxies = setup.settings.proxies
     with locked(settings.home), Store.open(settings.home) as store:
-        examinations = count_examinations(setup.settings, len(proxies) + 1)
+        examinations = teaching.count_examinations(setup.settings, len(proxies) + 1)
         with watching(progress, examinations, "points of learning curves") as bars:
-            experiment = run_experiment(settings, setup, bars)
+            experiment = teaching.run_experiment(settings, setup, bars)
         with watching(progress, len(settings.agents) * settings.starts * len(proxies)) as bars:
-            prpv = predictivity(StudyRun(study, store, bars), proxies)
+            prpv = teaching.predictivity(StudyRun(study, store, bars), proxies)
     return TeachReport(settings, experiment, prpv)

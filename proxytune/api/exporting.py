@@ -10,18 +10,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from proxytune import report
+from proxytune import driving, report
 from proxytune.api.study import read_study
-from proxytune.driving import (
-    LaneFollowing,
-    Robot,
-    catalogue_of,
-    drivetrain,
-    read_model_of,
-    read_robot,
-    robot_from_geometry,
-    robot_names,
-)
 from proxytune.effects import Catalogue, FilterContext, effect_of
 from proxytune.errors import InputError
 from proxytune.extensions import is_ours
@@ -162,12 +152,12 @@ def _instance_of(path: Path) -> tuple[report.Instance, tuple[str, ...]]:
 
 def _of_model(path: Path) -> tuple[report.Instance, tuple[str, ...]]:
     """A model.toml, and its cautions; its robot and its own effects are looked for in the current folder."""
-    model = read_model_of(path, Path.cwd())
-    catalogue = catalogue_of(model.robot, Path.cwd())
-    if model.robot in robot_names(catalogue.folder):
-        robot = read_robot(model.robot, catalogue.folder)
+    model = driving.read_model_of(path, Path.cwd())
+    catalogue = driving.catalogue_of(model.robot, Path.cwd())
+    if model.robot in driving.robot_names(catalogue.folder):
+        robot = driving.read_robot(model.robot, catalogue.folder)
     elif model.geometry:
-        robot = robot_from_geometry(model.robot, model.geometry, NO_RATE_HZ)
+        robot = driving.robot_from_geometry(model.robot, model.geometry, NO_RATE_HZ)
     else:
         raise InputError(
             f"{path}: its robot '{model.robot}' is unknown here; go to the folder that {model.robot} lies in"
@@ -181,9 +171,9 @@ def _of_study(folder: Path) -> report.Instance:
     result = read_study(folder).result
     settings, region = result.study.settings, result.knowledge
     family = bare_family(settings, settings.proxy) if is_ours(settings.family) else None
-    if not isinstance(family, LaneFollowing):
+    if not isinstance(family, driving.LaneFollowing):
         raise InputError(f"{folder}: is a study of another simulator; only what drives here can be exported")
-    robot = read_robot(family.robot, family.folder)
+    robot = driving.read_robot(family.robot, family.folder)
     theta = {**robot.theta, **dict(family.effects), **result.best.trial.theta}
     return report.Instance(robot, theta, dict(region.intervals), f"the best θ of the study {settings.name}")
 
@@ -228,7 +218,7 @@ class CommandFilter:
             if figures is None:
                 raise InputError("figures: must be given where the model is values; take them from robot.toml")
             drive = "ackermann" if "wheelbase" in figures else "differential"
-            robot = Robot("given", "", dict(figures), {}, None, Catalogue(Path.cwd(), drive=drive), reverse)
+            robot = driving.Robot("given", "", dict(figures), {}, None, Catalogue(Path.cwd(), drive=drive), reverse)
             instance = report.Instance(robot, dict(model), {}, "given")
         else:
             instance, _ = _instance_of(Path(model))
@@ -238,7 +228,7 @@ class CommandFilter:
         _check_has(has, instance.robot.catalogue)
         left_out = set(has) - set(report.IN_WHEELS)
         effects = [one for name, one in instance.effects.items() if name not in left_out]
-        self._twist, self._train = command == "twist", drivetrain(instance.robot, effects)
+        self._twist, self._train = command == "twist", driving.drivetrain(instance.robot, effects)
         self._full, self._command, self._angle = instance.figure("full_speed"), command, 0.0
         if self._steers:
             self._wheelbase, self._lock = instance.figure("wheelbase"), math.radians(instance.figure("wheel_angle"))

@@ -13,16 +13,7 @@ from proxytune import diagnosis
 from proxytune.driving import Robot, catalogue_of, read_model_of, read_robot, robot_from_geometry, robot_names
 from proxytune.effects import Catalogue, Model
 from proxytune.errors import InputError, LogError
-from proxytune.importing import (
-    Facts,
-    Source,
-    Wanted,
-    as_log,
-    open_log,
-    read_source,
-    source_without_unnamed_pictures,
-    write_log,
-)
+from proxytune.importing import Facts, Source, Wanted, as_log, open_log, read_source, with_named_pictures, write_log
 from proxytune.logs import Log, check_kind, log_cautions
 from proxytune.report import clocks_document, clocks_notes, frame_html, write_picture, write_text
 from proxytune.running import watching
@@ -84,7 +75,7 @@ def import_log(
     """
     known, path = facts or Facts(), Path(source)
     whole = read_source(path, wanted or Wanted(), known.offset_s)
-    found = source_without_unnamed_pictures(whole, known)
+    found = with_named_pictures(whole, known)
     if output is not None:
         folder = Path(output)
         robot = _known_robot(known.robot or folder.resolve().name)  # Writing may replace the folder that one is in

@@ -8,23 +8,13 @@ from typing import Any
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from proxytune import report
+from proxytune import report, study
 from proxytune.api import StudyReport, read_families
 from proxytune.cli.options import typed
 from proxytune.cli.study import families_answer
 from proxytune.cli.terminal import Answer
 from proxytune.scores import Metric
 from proxytune.storage import Store
-from proxytune.study import (
-    Spent,
-    StudyResult,
-    StudyRun,
-    open_read_only,
-    read_study_settings,
-    rescored,
-    result_of,
-    with_metrics,
-)
 from proxytune.sweep import SweepCurve, all_curves
 
 RESCORED = "rescored"
@@ -33,12 +23,12 @@ RESCORED = "rescored"
 def run(arguments: argparse.Namespace) -> Answer:
     """Draw the figures of study and sweeps, and write report and tables; of other metrics into a folder of theirs."""
     metrics = [Metric.parse(text) for text in arguments.metric]
-    settings = read_study_settings(arguments.path)
+    settings = study.read_study_settings(arguments.path)
     if settings.families and not metrics:
         return families_answer(read_families(settings.path), {})
     settings.check_single()
     with Store.read(settings.home) as store:
-        run = open_read_only(settings, store)
+        run = study.open_read_only(settings, store)
         result, curves = _read(run, metrics)
     names = [re.sub(r"[^\w.-]+", "_", str(metric).replace("%", "percent")) for metric in metrics]
     folder = settings.home / RESCORED / "+".join(names) if names else settings.home
@@ -52,7 +42,7 @@ def run(arguments: argparse.Namespace) -> Answer:
         pages.append(str(report.write_sweep_page(shown, alike, drawn, folder / "figures", held, command)))
     document: dict[str, Any] = {}
     if result:
-        found = StudyReport(result, Spent())
+        found = StudyReport(result, study.Spent())
         own_figures, page = found.write(folder, command if metrics else "")
         figures = [*own_figures, *figures]
         tables = [str(path) for path in report.write_study_tables(result, found.trials(), folder / "figures")]
@@ -68,9 +58,9 @@ def run(arguments: argparse.Namespace) -> Answer:
     return Answer({**document, "figures": paths, "pages": pages}, text)
 
 
-def _read(run: StudyRun, metrics: Sequence[Metric]) -> tuple[StudyResult | None, Sequence[SweepCurve]]:
+def _read(run: study.StudyRun, metrics: Sequence[Metric]) -> tuple[study.StudyResult | None, Sequence[SweepCurve]]:
     """The study's result, if it has any trial or no sweep either, and its curves."""
-    curves = all_curves(run.of(with_metrics(run.study, metrics)) if metrics else run)
+    curves = all_curves(run.of(study.with_metrics(run.study, metrics)) if metrics else run)
     if curves and not run.store.trials(run.study.objective.name):
         return None, curves
-    return rescored(run, metrics) if metrics else result_of(run), curves
+    return study.rescored(run, metrics) if metrics else study.result_of(run), curves

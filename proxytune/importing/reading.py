@@ -263,7 +263,7 @@ def open_log(path: Path, wanted: Wanted = NOTHING, facts: Facts = NO_FACTS) -> I
         yield read_log(path), ()
         return
     source = read_source(path, wanted, facts.offset_s)
-    with as_log(source_without_unnamed_pictures(source, facts), facts, path) as log:
+    with as_log(with_named_pictures(source, facts), facts, path) as log:
         yield log, source.notes
 
 
@@ -285,7 +285,7 @@ def as_log(source: Source, facts: Facts, path: Path) -> Iterator[Log]:
         yield read_as(folder, path)
 
 
-def source_without_unnamed_pictures(source: Source, facts: Facts) -> Source:
+def with_named_pictures(source: Source, facts: Facts) -> Source:
     """The source without its pictures where nobody says which map they show, and a note of it."""
     if facts.road or all(drive.pictures is None for drive in source.drives):
         return source

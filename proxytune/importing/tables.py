@@ -34,17 +34,7 @@ from proxytune.importing.columns import (
     with_drives,
 )
 from proxytune.importing.source import Channel, Commands, Drive, Source, Wanted
-from proxytune.importing.text import (
-    COMMAND_FIELDS,
-    EXAMPLE,
-    PLACE,
-    POSE,
-    QUATERNION,
-    Table,
-    first_rows,
-    is_number,
-    read_text_table,
-)
+from proxytune.importing.text import COMMAND_FIELDS, EXAMPLE, POSE, Table, first_rows, is_number, read_text_table
 from proxytune.logs import COMMANDS, ENABLED
 from proxytune.settings import nearest
 
@@ -319,7 +309,7 @@ def _channels(table: Table, fields: tuple[str, ...], role: str) -> list[Channel]
     ]
 
 
-COLUMNS = ("time", *PLACE, *QUATERNION)
+COLUMNS = ("time", *(field for field in POSE if field != "heading"))
 
 
 def is_tum(path: Path) -> bool:

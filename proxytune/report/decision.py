@@ -10,17 +10,7 @@ from proxytune.report import figure_style as style
 from proxytune.report.score_figures import MOST, short_name
 from proxytune.report.view import Table, columns_of
 from proxytune.report.wording import listed, percent, plain, short, with_span
-from proxytune.usefulness import (
-    Assessment,
-    Decision,
-    Panel,
-    Plan,
-    Saving,
-    Selection,
-    Sequential,
-    Together,
-    mmrv_conventions,
-)
+from proxytune.usefulness import Assessment, Decision, Panel, Plan, Saving, Selection, Sequential, mmrv_conventions
 
 
 def decision_sentence(assessment: Assessment, target: str) -> str:
@@ -202,8 +192,10 @@ def decision_document(assessment: Assessment) -> dict[str, Any]:
     }
 
 
-def together_document(both: Together) -> dict[str, Any]:
-    """What the two best proxies save together, and the agent to deploy then, as plain JSON."""
+def together_document(selection: Selection) -> dict[str, Any] | None:
+    """What the two best proxies save together, and the agent to deploy then, as plain JSON; None where two are not."""
+    if (both := selection.together) is None:
+        return None
     return {
         "proxies": list(both.proxies),
         "saves": _saves(both.saves),

@@ -330,7 +330,7 @@ def ranking_document(assessments: Assessments, selection: Selection) -> dict[str
         "proxies": [{"proxy": name, "rank": rank, **score_document(assessments[name])} for rank, (name, _) in ranked],
         "differences": differences_document(selection.differences),
         "choices": differences_document(selection.choices),
-        "together": decision.together_document(selection.together) if selection.together else None,
+        "together": decision.together_document(selection),
         "cautions": list(dict.fromkeys(line for one in assessments.values() for line in one.cautions)),
         "notes": [f"no intervals of the differences: {selection.reason}"] if selection.reason else [],
     }

@@ -12,16 +12,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from proxytune.arrays import Floats
-from proxytune.diagnosis import (
-    LEAST_NATS,
-    CameraDiagnosis,
-    CameraFit,
-    Comparison,
-    Edges,
-    effects_of,
-    project,
-    rank_subsets,
-)
+from proxytune.diagnosis import LEAST_NATS, CameraDiagnosis, CameraFit, Edges, effects_of, project, rank_subsets
 from proxytune.report import figure_style as style
 from proxytune.report.diagnosis.error_figures import DECLARED_MODEL, with_effects
 from proxytune.report.wording import plain
@@ -85,19 +76,18 @@ def _errors_figure(diagnosis: CameraDiagnosis) -> Figure:
     figure, ((place, grey),) = style.grid_of(2.4, 1, 2)
     bent = [effect.effect for effect in diagnosis.effects if effect.nats is not None]
     every = [effect.effect for effect in diagnosis.effects]
-    _draw_frames(place, diagnosis.pixels, bent)
+    _draw_frames(place, diagnosis.pixels.before.frames, diagnosis.pixels.after.frames, bent)
     if diagnosis.pixels.floor is not None:
         place.axhline(diagnosis.pixels.floor.value, color=style.GREEN, lw=1.4, label="floor: any camera, mean")
-    _draw_frames(grey, diagnosis.grey, every)
+    _draw_frames(grey, diagnosis.grey.before.frames, diagnosis.grey.after.frames, every)
     place.set_ylabel("displacement\nof markings [px]", fontsize=8)
     grey.set_ylabel("difference in brightness\n[grey levels]", fontsize=8)
     style.legend_below(figure, place, grey)
     return figure
 
 
-def _draw_frames(axes: Axes, error: Comparison, effects: list[str]) -> None:
+def _draw_frames(axes: Axes, before: Floats, after: Floats, effects: list[str]) -> None:
     """Each frame's error before, and after where something was added, the largest error before last."""
-    before, after = error.before.frames, error.after.frames
     order = np.argsort(before)[: int(np.isfinite(before).sum())]
     spots = np.arange(1, len(order) + 1)
     if effects:

@@ -12,7 +12,7 @@ from proxytune.report import figure_style as style
 from proxytune.report.study.document import estimate_document, intervals_document
 from proxytune.report.text import file_texts, group_texts, section_text
 from proxytune.report.view import Drawn, Paragraphs, Table, View, columns_of
-from proxytune.report.wording import digits, fixed, listed, percent, plain, probability, span, with_unit
+from proxytune.report.wording import as_known, listed, percent, plain, probability, span, with_unit
 from proxytune.report.writing import ABOUT, picture_of
 from proxytune.study import FEW, Fleet
 from proxytune.usefulness import Estimate
@@ -127,8 +127,8 @@ def fleet_text(fleet: Fleet, files: Mapping[str, Any]) -> Group:
 
 
 def _told(found: Estimate) -> str:
-    places = digits((found.low, found.high))
-    return f"{fixed(found.value, places)} ({span((found.low, found.high))})"
+    ends = (found.low, found.high)
+    return f"{as_known(found.value, ends)} ({span(ends)})"
 
 
 def _documents(told: Mapping[str, Estimate]) -> dict[str, Any]:

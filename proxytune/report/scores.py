@@ -15,19 +15,7 @@ from proxytune.report.text import group_texts, note_texts, table_text
 from proxytune.report.view import Column, Foot, Paragraphs, Picture, Table, View, columns_of
 from proxytune.report.wording import listed, short, short_span, with_span
 from proxytune.report.writing import file_names, picture_of, save_figures, write_text
-from proxytune.usefulness import (
-    ALL,
-    MEASURES,
-    PPV,
-    PRPV,
-    Assessment,
-    Difference,
-    Measure,
-    Measured,
-    Rate,
-    Selection,
-    SuccessRates,
-)
+from proxytune.usefulness import ALL, MEASURES, PRPV, Assessment, Difference, Measure, Measured, Selection, SuccessRates
 
 Row = tuple[str, str, str, str, str]
 Assessments = Mapping[str, Assessment]
@@ -191,14 +179,13 @@ def _tables(assessments: Assessments, selection: Selection | None, target: str) 
 
 
 def _rates(rates: SuccessRates) -> Table:
-
-    def side(one: Rate) -> tuple[str, str]:
-        return f"{one.value:.2f} ({one.low:.2f} to {one.high:.2f})", str(one.episodes)
-
-    rows = tuple((agent, *side(rates.proxy[agent]), *side(target)) for agent, target in rates.target.items())
+    rows = []
+    for agent, target in rates.target.items():
+        proxy = rates.proxy[agent]
+        rows.append((agent, str(proxy), str(proxy.episodes), str(target), str(target.episodes)))
     title = f"{rates.metric}: success rates with their own 95 % intervals (Wilson)"
     heads = ("in the proxy", "episodes", "on the target", "episodes")
-    return Table(title, columns_of(("agent",), heads), rows)
+    return Table(title, columns_of(("agent",), heads), tuple(rows))
 
 
 def _ranking(assessments: Assessments, selection: Selection, target: str, notes: tuple[str, ...]) -> Table:
@@ -297,7 +284,7 @@ def score_document(assessment: Assessment) -> dict[str, Any]:
         "chance": random.mean,
         "chance_deviation": random.deviation,
         "p_value": random.p_value,
-        PPV.key: values[PPV.key],
+        "ppv": values["ppv"],
         "beta": dict(assessment.ppv.beta),
         **values,
         "intervals": intervals if assessment.intervals else None,

@@ -50,7 +50,6 @@ from .expectation import (
 from .noise import (
     Chance as Chance,
     NoiseFloor as NoiseFloor,
-    Rate as Rate,
     SuccessRates as SuccessRates,
     chance as chance,
     floor_of_repeats as floor_of_repeats,

@@ -150,6 +150,9 @@ class Rate:
     high: float
     episodes: int
 
+    def __str__(self) -> str:
+        return f"{self.value:.2f} ({self.low:.2f} to {self.high:.2f})"
+
 
 @dataclass(frozen=True)
 class SuccessRates:

@@ -11,19 +11,7 @@ from proxytune.report.study.sentence import known_parameters, study_sentence
 from proxytune.report.table_files import latex_text
 from proxytune.report.text import file_texts, group_texts, section_text
 from proxytune.report.view import Column, Table, columns_of
-from proxytune.report.wording import (
-    digits,
-    fixed,
-    listed,
-    pairs_span,
-    percent,
-    plain,
-    probability,
-    short,
-    short_span,
-    span,
-    with_span,
-)
+from proxytune.report.wording import fixed, listed, pairs_span, percent, plain, probability, short, span, with_span
 from proxytune.report.writing import write_text
 from proxytune.storage import TrialRecord
 from proxytune.study import PRPV, StudyResult
@@ -80,7 +68,7 @@ def theta_table(result: StudyResult) -> Table:
                 f"{short(known.best, 4)} {known.unit}".strip(),
                 span(known.interval) if known.identified else "unidentified",
                 *(() if truth is None else ("" if true is None else f"{short(true, 4)}{outside}",)),
-                span(as_good[known.name], digits(as_good[known.name])),
+                span(as_good[known.name]),
                 f"{short(box.low)} to {short(box.high)}",
             )
         )
@@ -122,9 +110,9 @@ def usefulness_table(result: StudyResult) -> Table:
     rows.append(("  chance", fixed(chance.mean, 1), f"± {fixed(chance.deviation, 1)}", as_low))
     meaning = "proxy predictivity value: error of the scores"
     if expected and expected.ppv:
-        found = expected.ppv
+        found, (value, low, high) = expected.ppv, expected.ppv.value
         more = f"; a perfect proxy's {with_span(*found.floor)}" if found.floor else ""
-        rows.append(("PPV", f"{found.value.value:.3g}", short_span(*found.value[1:]), meaning + more))
+        rows.append(("PPV", f"{value:.3g}", f"{short(low)} to {short(high)}", meaning + more))
     elif own.ppv.value is not None:
         rows.append(("PPV", f"{own.ppv.value:.3g}", "", meaning))
     misfit = result.knowledge.misfit

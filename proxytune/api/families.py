@@ -4,7 +4,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import pandas as pd
 from matplotlib.figure import Figure
@@ -35,20 +35,6 @@ Say = Callable[[str], None]
 Tuning = Callable[[Study], AbstractContextManager[Watcher]]
 """Gives what hears of every episode of a family."""
 CURVE_POINTS = "points of learning curves"
-
-
-class Spending(NamedTuple):
-    """Budgets of a call that differ from study.toml's.
-
-    Attributes:
-        budget: How many trials a family has at most.
-        jobs: How many processes run episodes.
-        retry_failed: Whether every failed episode is driven again.
-    """
-
-    budget: int | None = None
-    jobs: int | None = None
-    retry_failed: bool = False
 
 
 @dataclass(frozen=True, repr=False)
@@ -125,7 +111,7 @@ def run_families(path: str | Path, *, progress: bool = False, jobs: int | None =
     def tuning(study: Study) -> AbstractContextManager[Watcher]:
         return watching(progress, most_episodes(study.settings))
 
-    return run_opened_families(settings, Spending(jobs=jobs), lambda line: None, tuning, progress=progress)
+    return run_opened_families(settings, lambda line: None, tuning, jobs=jobs, progress=progress)
 
 
 def read_families(path: str | Path) -> FamiliesReport:
@@ -147,22 +133,29 @@ def read_families(path: str | Path) -> FamiliesReport:
 
 
 def run_opened_families(
-    settings: StudySettings, spending: Spending, say: Say, tuning: Tuning, *, progress: bool = True
+    settings: StudySettings,
+    say: Say,
+    tuning: Tuning,
+    *,
+    budget: int | None = None,
+    jobs: int | None = None,
+    retry_failed: bool = False,
+    progress: bool = True,
 ) -> FamiliesReport:
     """Tune the families one after the other, teach by them where the study has [teaching], and compare them.
 
     All of them are opened before the first is tuned, so that a mistake is told at once. Progress is of the teaching.
     """
-    budgets = {"budget": spending.budget, "jobs": spending.jobs}
-    studies = {name: with_spending(open_settings(one), **budgets) for name, one in settings.families.items()}
+    opened = {name: open_settings(one) for name, one in settings.families.items()}
+    studies = {name: with_spending(study, budget=budget, jobs=jobs) for name, study in opened.items()}
     classrooms(settings)
     reports: dict[str, StudyReport] = {}
     with locked(settings.home):
         for number, (name, study) in enumerate(studies.items(), start=1):
             say(f"family {number} of {len(studies)}: {name}")
-            reports[name] = _tune(name, study, say, tuning(study), spending.retry_failed)
+            reports[name] = _tune(name, study, say, tuning(study), retry_failed)
         families = tuple(map(_tuned, reports.values()))
-        lessons = _teach(settings, families, spending.jobs, say, progress)
+        lessons = _teach(settings, families, jobs, say, progress)
     spent = sum((one.spent for one in reports.values()), Spent())
     return FamiliesReport(ComparedFamilies(settings, families, lessons), spent)
 

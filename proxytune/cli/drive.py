@@ -22,11 +22,11 @@ def run(arguments: argparse.Namespace) -> Answer:
     _check(arguments, family)
     model, option = (arguments.against, "--against") if arguments.against else (settings.truth, "truth")
     target = study.load_target(settings, family, model, option) if model else None
-    chosen = choose_theta(arguments.theta, settings, family, "--theta")
+    theta, origin = choose_theta(arguments.theta, settings, family, "--theta")
     seed = settings.seed if arguments.seed is None else arguments.seed
-    study.check_episode(family, arguments.agent, chosen.theta, arguments.start)
+    study.check_episode(family, arguments.agent, theta, arguments.start)
     own_seed = episode_seed(seed, arguments.start)
-    episode = make_episode(chosen.theta, agent=arguments.agent, start=arguments.start, seed=own_seed)
+    episode = make_episode(theta, agent=arguments.agent, start=arguments.start, seed=own_seed)
     with waiting("driving"):
         pair = study.drive_side_by_side(family, target, episode, filmed=arguments.output is not None)
     compared = [metric.name for metric in settings.metrics]
@@ -34,16 +34,16 @@ def run(arguments: argparse.Namespace) -> Answer:
         write_episode(pair, compared, arguments.output)
     files = {"against": str(model) if model else None, "output": str(arguments.output) if arguments.output else None}
     cautions = list(dict.fromkeys(line for side in (family, target) if side for line in study.cautions_of(side)))
-    document = {**episode_document(pair, seed), "theta_from": chosen.origin, **files, "cautions": cautions}
+    document = {**episode_document(pair, seed), "theta_from": origin, **files, "cautions": cautions}
     agent, start = pair.episode.agent, pair.episode.start
     own = agent in settings.agents and start < settings.starts and seed == settings.seed
     against = "none to drive in, as study.toml names no `truth`; --against MODEL gives one"
-    values = ", ".join(f"{name}={value:.4g}" for name, value in sorted(chosen.theta.items()))
+    values = ", ".join(f"{name}={value:.4g}" for name, value in sorted(theta.items()))
     words = {"best": "proxy: the study's best θ", "nominal": "proxy: the nominal θ", "given": "proxy: the θ given"}
     about = [
         *(f"beware: {line}" for line in cautions),
         f"{agent} from start {start} under seed {seed}, as in {'every' if own else 'no'} trial of this study",
-        f"{words[chosen.origin]}{': ' if values else ''}{values}",
+        f"{words[origin]}{': ' if values else ''}{values}",
         f"target: {f'{model}, under the same seed' if model else against}",
         "",
     ]

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from proxytune import report
-from proxytune.api import FamiliesReport, Spending, most_episodes, run_opened, run_opened_families
+from proxytune.api import FamiliesReport, most_episodes, run_opened, run_opened_families
 from proxytune.cli.options import check_made, on_its_cluster, study_folder
 from proxytune.cli.terminal import Answer
 from proxytune.errors import ProxytuneError
@@ -124,12 +124,12 @@ def search_by_plv(study: Study, folder: Path, by_prpv: Callable[[], StudyResult]
     return Answer(document, report.plv_text(result, {"figure": figure, "report": page}))
 
 
-def run_a_bank(settings: StudySettings, spending: Spending) -> Answer:
+def run_a_bank(settings: StudySettings, arguments: argparse.Namespace) -> Answer:
     """Run what is left of a bank, and write its table of trials and its page."""
     check_place(settings.home / BANK_FILE, ours=True)
-    study = with_spending(open_bank(settings), budget=spending.budget, jobs=spending.jobs)
+    study = with_spending(open_bank(settings), budget=arguments.budget, jobs=arguments.jobs)
     with locked(settings.home), Store.open(settings.home) as store, Bars(most_episodes(study.settings)) as bars:
-        if spending.retry_failed:
+        if arguments.retry_failed:
             store.forget_failures()
         run = StudyRun(study, store, bars)
         run_bank(run)
@@ -148,11 +148,12 @@ def run(arguments: argparse.Namespace) -> Answer:
     settings, again = read_study_settings(folder), arguments.retry_failed
     check_made(folder)
     if settings.families:
-        several = run_opened_families(settings, Spending(arguments.budget, arguments.jobs, again), _say, _bars)
+        own = {"budget": arguments.budget, "jobs": arguments.jobs}
+        several = run_opened_families(settings, _say, _bars, retry_failed=again, **own)
         seconds = {"total": time.perf_counter() - begun, "episodes": several.spent.seconds}
         return families_answer(several, {"episodes": {"run": several.spent.episodes}, "seconds": seconds})
     if not settings.targets:
-        return run_a_bank(settings, Spending(arguments.budget, arguments.jobs, again))
+        return run_a_bank(settings, arguments)
     study = with_spending(open_settings(settings), budget=arguments.budget, jobs=arguments.jobs)
     if study.settings.objective == LEARNING:
         return search_by_plv(study, folder, lambda: run_opened(study, _bars(study), _say, again).result)

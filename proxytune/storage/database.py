@@ -171,7 +171,10 @@ def transaction(connection: sqlite3.Connection, path: Path) -> Iterator[sqlite3.
 
 
 def write_row(connection: sqlite3.Connection, table: str, row: Mapping[str, Any]) -> None:
-    """Write a whole row in place of the one with its key, with its digest, and count it; in a transaction."""
+    """Write a whole row in place of the one with its key, with its digest, and count it; in a transaction.
+
+    What the row has beside the table's columns is left out.
+    """
     delete, insert = _writing(table, FORMAT)
     replaced = connection.execute(delete, row).rowcount
     connection.execute(insert, row)

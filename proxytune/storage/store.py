@@ -172,18 +172,11 @@ class Store:
             for trial in trials:
                 row = {
                     "objective": objective,
-                    "number": trial.number,
                     "instance": self._instance(connection, identity, theta_json(trial.theta)),
-                    "state": trial.state,
-                    "score": trial.score,
                     "measures": json.dumps(dict(trial.measures), allow_nan=False),
-                    "failed_episodes": trial.failed_episodes,
-                    "failure": trial.failure,
                     "decided": json.dumps(trial.decided),
-                    "bound": trial.bound,
-                    "seconds": trial.seconds,
                 }
-                database.write_row(connection, "trials", row)
+                database.write_row(connection, "trials", vars(trial) | row)
         if objective in self._trials:
             self._trials[objective] |= {trial.number: trial for trial in trials}
 
@@ -195,15 +188,12 @@ class Store:
                 episode, works = outcome.episode, outcome.metrics is not None
                 row = {
                     "instance": self._instance(connection, identity, theta),
-                    "agent": episode.agent,
-                    "start": episode.start,
-                    "seed": episode.seed,
                     "metrics": json.dumps(dict(outcome.metrics or {}), allow_nan=False) if works else None,
                     "failure": None if works else outcome.failure,
                     "seconds": outcome.seconds,
                     "code": None if works else code,
                 }
-                database.write_row(connection, "episodes", row)
+                database.write_row(connection, "episodes", vars(episode) | row)
         for outcome, theta in zip(outcomes, thetas, strict=True):
             episode = outcome.episode
             if (identity, theta) in self._outcomes:
@@ -286,14 +276,11 @@ class Store:
         with self._transaction() as connection:
             row = {
                 "number": _next(connection, "number", "sweeps"),
-                "parameter": sweep.parameter,
                 "base": theta_json(sweep.base),
                 "points": json.dumps(sweep.points),
                 "identity": identity,
-                "target_model": sweep.target_model,
-                "replays": sweep.replays,
             }
-            database.write_row(connection, "sweeps", row)
+            database.write_row(connection, "sweeps", vars(sweep) | row)
 
     def sweeps(self) -> list[tuple[str, SweepRecord]]:
         """Every sweep that has been asked for, the last one last, with the identity of its domain family."""

@@ -9,7 +9,7 @@ Of metrics of zeros and ones each agent's rate has Wilson's interval, and the pa
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -134,10 +134,7 @@ def _shared_starts(inputs: Comparison) -> tuple[ScoreTable, ScoreTable]:
     shared = [start for start in one.episodes if start in other.episodes]
     one, other = (table.arrange(agents=inputs.agents, episodes=shared) for table in (one, other))
     both = (one.driven & other.driven)[..., None]
-    first, second = (
-        ScoreTable(inputs.agents, tuple(shared), table.metrics, np.where(both, table.values, np.nan))
-        for table in (one, other)
-    )
+    first, second = (replace(table, values=np.where(both, table.values, np.nan)) for table in (one, other))
     return first, second
 
 

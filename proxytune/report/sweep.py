@@ -19,8 +19,7 @@ from proxytune.report import figure_style as style
 from proxytune.report.html import write_page
 from proxytune.report.scores import score_document
 from proxytune.report.study.page import study_foot
-from proxytune.report.table_files import Cell, csv_text
-from proxytune.report.text import group_texts, table_text
+from proxytune.report.text import Cell, csv_text, group_texts, table_text
 from proxytune.report.view import Drawn, Paragraphs, Part, Table, View, columns_of
 from proxytune.report.wording import listed, plain, short, with_unit
 from proxytune.report.writing import picture_of, write_text

@@ -40,9 +40,8 @@ class SweepReport(report.Shown):
     truth: Theta | None
 
     def __repr__(self) -> str:
-        return (
-            f"SweepReport of '{self.settings.name}': {', '.join(curve.parameter for curve in self.curves)}; {self.held}"
-        )
+        swept = ", ".join(curve.parameter for curve in self.curves)
+        return f"SweepReport of '{self.settings.name}': {swept}; {self.held}"
 
     def view(self) -> report.View:
         """What the page shows."""
@@ -193,11 +192,8 @@ class TeachReport(report.Shown):
         drawn = self.figures()
         (figure,) = report.save_figures(drawn, self.settings.home / "figures")
         page = figure.with_suffix(".html")
-        report.write_page(
-            page,
-            report.teach_view(self.experiment, self.prpv, drawn["teach"]),
-            report.study_foot(self.settings, command),
-        )
+        foot = report.study_foot(self.settings, command)
+        report.write_page(page, report.teach_view(self.experiment, self.prpv, drawn["teach"]), foot)
         return figure, page
 
 

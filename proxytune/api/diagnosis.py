@@ -160,9 +160,8 @@ def diagnose(
     with _opened(log) as drives, nullcontext() if test is None else _opened(test) as others:
         try:
             vehicle = robot_of(drives, robot, Catalogue(Path.cwd(), tuple(effects)))
-            return DiagnosisReport(
-                diagnose_log(drives, vehicle, declared, test=others, seed=seed, rules=rules, limits=limits)
-            )
+            found = diagnose_log(drives, vehicle, declared, test=others, seed=seed, rules=rules, limits=limits)
+            return DiagnosisReport(found)
         except InputError as problem:
             told = str(problem)
             for option, argument in IN_PYTHON.items():

@@ -159,9 +159,8 @@ def _of_model(path: Path) -> tuple[report.Instance, tuple[str, ...]]:
     elif model.geometry:
         robot = driving.robot_from_geometry(model.robot, model.geometry, NO_RATE_HZ)
     else:
-        raise InputError(
-            f"{path}: its robot '{model.robot}' is unknown here; go to the folder that {model.robot} lies in"
-        )
+        remedy = f"go to the folder that {model.robot} lies in"
+        raise InputError(f"{path}: its robot '{model.robot}' is unknown here; {remedy}")
     cautions = (*model.cautions, *figure_cautions(robot.figures, f"robot {robot.name}"))
     return report.Instance(robot, {**robot.theta, **model.theta}, model.intervals, str(path)), cautions
 

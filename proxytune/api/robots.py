@@ -87,9 +87,8 @@ class FleetReport(report.Shown):
         """
         drawn, page = self.figures(), Path(folder) / "report.html"
         (figure,) = report.save_figures(drawn, Path(folder))
-        report.write_page(
-            page, report.fleet_view(self.result, drawn["fleet"]), report.study_foot(self.result.settings, command)
-        )
+        foot = report.study_foot(self.result.settings, command)
+        report.write_page(page, report.fleet_view(self.result, drawn["fleet"]), foot)
         return figure, page
 
 

@@ -144,9 +144,8 @@ class StudyReport(report.Shown):
         settings, figures = self.result.study.settings, self.figures()
         home = settings.home if folder is None else Path(folder)
         files = ReportFiles(report.save_figures(figures, home / "figures"), home / "report.html")
-        report.write_page(
-            files.page, report.study_view(self.result, figures), report.study_foot(settings, command or None)
-        )
+        foot = report.study_foot(settings, command or None)
+        report.write_page(files.page, report.study_view(self.result, figures), foot)
         return files
 
 

@@ -48,9 +48,8 @@ def run(arguments: argparse.Namespace) -> Answer:
         tables = [str(path) for path in report.write_study_tables(result, found.trials(), folder / "figures")]
         document = {**report.study_document(result), "report": str(page), "tables": tables}
     paths = [str(path) for path in figures]
-    text: RenderableType = Text(
-        "\n".join([*paths, *pages, *document.get("tables", ()), *filter(None, [document.get("report")])])
-    )
+    written = [*paths, *pages, *document.get("tables", ()), *filter(None, [document.get("report")])]
+    text: RenderableType = Text("\n".join(written))
     if result and metrics:
         named = ", ".join(str(metric) for metric in shown.metrics)
         note = f"none run; scored with {named}; the trials are still those that the study's own metrics led to"

@@ -236,9 +236,8 @@ def _clock_notes(header: Floats, received: Floats, where: str) -> tuple[str, ...
             "--stamps receive takes the bag's times."
         )
     if abs(drift) > DRIFT_S:
-        notes.append(
-            f"The clock of the headers of {where} drifts by {1e3 * drift:+.0f} ms against the bag's over the drive."
-        )
+        by = f"{1e3 * drift:+.0f} ms"
+        notes.append(f"The clock of the headers of {where} drifts by {by} against the bag's over the drive.")
     return tuple(notes)
 
 

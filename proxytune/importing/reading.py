@@ -126,9 +126,8 @@ def read_source(path: Path, wanted: Wanted, offset_s: float = 0.0) -> Source:
         notes += found
     kinds = {drive.commands.kind if drive.commands else "none" for drive in drives}
     if len(kinds) > 1:
-        raise LogError(
-            f"{path}: its drives have commands of several kinds ({', '.join(sorted(kinds))}); import them apart"
-        )
+        several = ", ".join(sorted(kinds))
+        raise LogError(f"{path}: its drives have commands of several kinds ({several}); import them apart")
     surveys = tuple(survey(drive) for drive in drives)
     if kinds != {"none"}:
         notes += [*clock_notes(surveys), *rows_notes(drives)]

@@ -135,20 +135,15 @@ def theta_table(before: Known, after: Known | None, diagnosis: Mapping[str, Any]
     logged = {**diagnosis["extended"], **(diagnosis["camera"] or {}).get("extended", {})}
     measured = {name: (one["value"], one.get("interval")) for name, one in logged.items() if one["value"] is not None}
     extended = {} if after is None else {**{name: (value, None) for name, (value, _) in measured.items()}, **after}
-    names = dict.fromkeys((*before, *measured, *extended))
-    rows = tuple(
-        (
-            report.with_unit(
-                name.replace(".", " "), SHIPPED.parameters[name].unit if name in SHIPPED.parameters else ""
-            ),
-            *(_known(side.get(name)) for side in (before, measured, extended)),
-        )
-        for name in names
-        if not (name.endswith(".imbalance") and name not in before and measured[name][0] == 0.0)
-    )
-    return report.Table(
-        "θ before and after", report.columns_of(("parameter",), ("before, by scores", "in the log", "after")), rows
-    )
+    rows = []
+    for name in dict.fromkeys((*before, *measured, *extended)):
+        if name.endswith(".imbalance") and name not in before and measured[name][0] == 0.0:
+            continue
+        unit = SHIPPED.parameters[name].unit if name in SHIPPED.parameters else ""
+        sides = (_known(side.get(name)) for side in (before, measured, extended))
+        rows.append((report.with_unit(name.replace(".", " "), unit), *sides))
+    heads = report.columns_of(("parameter",), ("before, by scores", "in the log", "after"))
+    return report.Table("θ before and after", heads, tuple(rows))
 
 
 def _known(known: tuple[float, Sequence[float | None] | None] | None) -> str:

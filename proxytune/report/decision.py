@@ -65,9 +65,8 @@ def sequential_sentence(found: Sequential) -> str:
     """Say what may be concluded after these rollouts, looked at after each."""
     times = [f"{name} {'over 1000' if n is None else n}" for name, n in found.expected_rounds.items()]
     if found.winner is not None:
-        return (
-            f"{found.winner} is shown to be the best, after {found.decided_at} of {found.rounds} rollouts of each agent"
-        )
+        when = f"after {found.decided_at} of {found.rounds} rollouts of each agent"
+        return f"{found.winner} is shown to be the best, {when}"
     lead = max(found.evidence, key=lambda agent: found.evidence[agent])
     wealth = f"{lead} has most evidence, {short(found.evidence[lead])} of {short(found.threshold)}"
     return f"none is shown to be the best after {found.rounds} rollouts of each ({wealth}); expect {', '.join(times)}"

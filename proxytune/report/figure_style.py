@@ -112,9 +112,8 @@ def legend_below(figure: Figure, *panels: Axes, without: Collection[str] = ()) -
     longest = max((len(name) for name in named), default=0) + HANDLE
     columns = max(1, min(3, int(figure.get_figwidth() * CHARACTERS_PER_INCH / longest)))
     if named:
-        figure.legend(
-            list(named.values()), list(named), loc="outside lower center", ncols=columns, fontsize=7, frameon=False
-        )
+        look: dict[str, Any] = {"loc": "outside lower center", "fontsize": 7, "frameon": False}
+        figure.legend(list(named.values()), list(named), ncols=columns, **look)
 
 
 ONE_LINE = 0.05
@@ -139,9 +138,7 @@ def name_lines(axes: Axes, names: Sequence[LineName], apart: float = ONE_LINE) -
     bottom, top = axes.get_ylim()
     places = spread_places([(min(max(name.end, bottom), top) - bottom) / (top - bottom) for name in names], apart)
     for name, place in zip(names, places, strict=True):
-        axes.text(
-            1.02, place, name.text, transform=axes.transAxes, fontsize=7, color=name.colour, va="center", ha="left"
-        )
+        axes.text(1.02, place, name.text, transform=axes.transAxes, fontsize=7, color=name.colour, va="center")
 
 
 def spread_places(places: Sequence[float], apart: float) -> list[float]:

@@ -63,33 +63,22 @@ def fleet_lines(fleet: Fleet) -> tuple[str, ...]:
 def fleet_tables(fleet: Fleet) -> tuple[Table, ...]:
     """The population, and each robot by its own scores and given the fleet."""
     heads = {name: with_unit(name, unit) for name, unit in fleet.units.items()}
-    own = tuple(
-        (
-            robot.name,
-            _fit(robot.knowledge.misfit.p_value, robot.fits),
-            percent(robot.knowledge.posterior.share),
-            *map(span, robot.knowledge.intervals.values()),
-        )
-        for robot in fleet.robots
-    )
-    by_robot = Table(OWN, columns_of(("robot", "proxy"), ("region", *heads.values())), own, fleet_notes(fleet))
+    own = []
+    for robot in fleet.robots:
+        learnt = robot.knowledge
+        fit, share = _fit(learnt.misfit.p_value, robot.fits), percent(learnt.posterior.share)
+        own.append((robot.name, fit, share, *map(span, learnt.intervals.values())))
+    by_robot = Table(OWN, columns_of(("robot", "proxy"), ("region", *heads.values())), tuple(own), fleet_notes(fleet))
     if fleet.population is None:
         return (by_robot,)
-    rows = tuple(
-        (
-            heads[name],
-            _told(fleet.mean[name]),
-            _told(fleet.deviation[name]),
-            span((next_one.low, next_one.high)),
-            "yes" if fleet.varies[name] else "not told",
-        )
-        for name, next_one in fleet.next_robot.items()
-    )
+    rows = []
+    for name, told in fleet.next_robot.items():
+        known = _told(fleet.mean[name]), _told(fleet.deviation[name]), span((told.low, told.high))
+        rows.append((heads[name], *known, "yes" if fleet.varies[name] else "not told"))
     columns = ("mean", "standard deviation", "95 % of robots", "robots differ")
-    population = Table(
-        f"p(θ) over {len(fleet.fitting)} robots", columns_of(("parameter",), columns), rows, (ABOUT["fleet"],)
-    )
-    given = tuple((name, *map(_told, told.values())) for name, told in fleet.given.items())
+    title = f"p(θ) over {len(fleet.fitting)} robots"
+    population = Table(title, columns_of(("parameter",), columns), tuple(rows), (ABOUT["fleet"],))
+    given = tuple((name, *map(_told, theta.values())) for name, theta in fleet.given.items())
     return population, by_robot, Table(GIVEN, columns_of(("robot",), [*heads.values()]), given)
 
 
@@ -183,9 +172,8 @@ def _draw(axes: Axes, fleet: Fleet, row: int) -> None:
         axes.axvspan(mean - reach, mean + reach, color=style.GREEN, alpha=0.15, linewidth=0, label="fleet: mean ± 2 SD")
         axes.axvline(mean, color=style.GREEN, linewidth=1.0, linestyle="--")
     for place, robot in enumerate(fleet.robots):
-        label, colour = (
-            ("own scores (95 %)", style.LIGHT_GREY) if robot.fits else ("misfit, left out", style.VERMILLION)
-        )
+        label = "own scores (95 %)" if robot.fits else "misfit, left out"
+        colour = style.LIGHT_GREY if robot.fits else style.VERMILLION
         ends = robot.knowledge.intervals[box.name]
         axes.plot(ends, [place, place], color=colour, linewidth=1.6, solid_capstyle="butt", label=label)
         if robot.name in fleet.given:

@@ -9,7 +9,6 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from rich.console import Group
-from rich.text import Text
 
 from proxytune import teaching
 from proxytune.learning import Distribution, describe_distribution
@@ -69,14 +68,9 @@ def plv_text(study: teaching.PlvStudy, files: Mapping[str, Any]) -> Group:
     head = f"{study.settings.name}: {len(study.trials)} proxies tried, the one of highest PLV first"
     box = ", ".join(f"{interval.name} [{interval.low:.4g}, {interval.high:.4g}]" for interval in study.space.intervals)
     by = " (narrowed to the θ whose PRPV is as low as the best, within noise)" if study.narrowed else ""
-    lines: list[str | Text] = [
-        f"searched: {box}{by}",
-        f"stopped: {study.stopped}",
-        PLV_MEANING,
-        CONVERGED.format(f"{study.when.threshold:.1f}"),
-        *file_texts(files),
-    ]
-    return group_texts(f"{plv_answer(study)}\n", head, tried, *lines, f"\n{CONFIRMED}:", finals, *study.unable.values())
+    above = (f"{plv_answer(study)}\n", head, tried, f"searched: {box}{by}", f"stopped: {study.stopped}", PLV_MEANING)
+    lines = (CONVERGED.format(f"{study.when.threshold:.1f}"), *file_texts(files), f"\n{CONFIRMED}:")
+    return group_texts(*above, *lines, finals, *study.unable.values())
 
 
 def write_plv_report(study: teaching.PlvStudy, folder: Path) -> tuple[Path, Path]:
@@ -188,9 +182,7 @@ def plv_figure(study: teaching.PlvStudy) -> Figure:
     numbers = np.arange(1, len(values) + 1)
     highest = np.maximum.accumulate(values)
     reached = np.isfinite(highest)
-    axes.step(
-        numbers[reached], highest[reached], where="post", color=style.VERMILLION, linewidth=1.5, label=HIGHEST.words
-    )
+    axes.step(numbers[reached], highest[reached], where="post", color=HIGHEST.colour, lw=1.5, label=HIGHEST.words)
     axes.axhline(0.0, color=style.GREY, linewidth=0.8)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     style.dress(axes, "trial", "PLV [target samples saved]")

@@ -82,9 +82,7 @@ def _draw_pairs(axes: Axes, cells: Floats, *, named: bool) -> None:
 def _scatter_panel(axes: Axes, inputs: Comparison, column: int) -> None:
     proxy, target = (means[:, column] for means in inputs.means)
     errors = (_standard_errors(inputs.target)[:, column], _standard_errors(inputs.proxy)[:, column])
-    axes.errorbar(
-        target, proxy, xerr=errors[0], yerr=errors[1], fmt="none", ecolor=style.GREY, elinewidth=0.8, zorder=1
-    )
+    axes.errorbar(target, proxy, xerr=errors[0], yerr=errors[1], fmt="none", ecolor=style.GREY, lw=0.8, zorder=1)
     axes.plot(target, proxy, "o", color=style.BLUE, markersize=4, zorder=2)
     axes.margins(0.1)
     limits = axes.axis()

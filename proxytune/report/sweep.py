@@ -29,13 +29,7 @@ from proxytune.sweep import METRICS, OUTWARDS, Series, SweepCurve, SweepPoint, d
 from proxytune.usefulness import MEASURES, POD_IMAGE, POD_POSE, PPV, PRPV, SRCC, Assessment, Measure
 
 OF_PRPV = ("prpv", "prpv_interval", "prpv_normalised", "expected_prpv")
-KEYS = (
-    *OF_PRPV,
-    *(measure.key for measure in MEASURES if measure is not PRPV),
-    "intervals",
-    "chance",
-    "at_noise_floor",
-)
+KEYS = (*OF_PRPV, *(one.key for one in MEASURES if one is not PRPV), "intervals", "chance", "at_noise_floor")
 LEVELS = ("noise_floor", "noise_floor_interval", "noise_floor_kind")
 NO_POD = "POD was left out: give --target-model MODEL.toml, the model of the target"
 
@@ -151,17 +145,10 @@ def shapes_note(curve: SweepCurve) -> str:
 
 def say_failures(curves: Sequence[SweepCurve]) -> list[str]:
     """Say why points have no score, in one line each."""
-    return [
-        f"{curve.parameter} {point.value:g}: {point.evaluation.failure}"
-        for curve in curves
-        for point in curve.points
-        if point.evaluation.failure
-    ] + [
-        f"{curve.parameter} {point.value:g}: no POD, since no replay of the target's commands worked"
-        for curve in curves
-        for point in curve.points
-        if curve.has_pod and not point.pod
-    ]
+    points = [(curve, point, f"{curve.parameter} {point.value:g}") for curve in curves for point in curve.points]
+    lines = [f"{which}: {point.evaluation.failure}" for _, point, which in points if point.evaluation.failure]
+    bare = [which for curve, point, which in points if curve.has_pod and not point.pod]
+    return lines + [f"{which}: no POD, since no replay of the target's commands worked" for which in bare]
 
 
 def _point_document(point: SweepPoint) -> dict[str, Any]:
@@ -218,9 +205,8 @@ def sweep_view(study: str, curves: Sequence[SweepCurve], figures: Mapping[str, D
     wrong = say_failures(curves)
     parts += [Paragraphs("What failed", tuple(wrong))] if wrong else []
     names, answer = listed([curve.parameter for curve in curves]), " ".join(f"{_lowest(curve)}." for curve in curves)
-    return View(
-        f"{study}: how does usefulness depend on {names}?", f"{answer} {held}.", _next_step(curves), tuple(parts)
-    )
+    title = f"{study}: how does usefulness depend on {names}?"
+    return View(title, f"{answer} {held}.", _next_step(curves), tuple(parts))
 
 
 def _lowest(curve: SweepCurve) -> str:
@@ -431,9 +417,7 @@ def _draw_bars(axes: Axes, spots: Sequence[float], chosen: Sequence[SweepPoint],
         axes.bar(spot, score, width=0.85, color=colour, label=label)
         if inner.low is not None and inner.high is not None:
             ends = [[score - inner.low], [inner.high - score]]
-            axes.errorbar(
-                [spot], [score], yerr=ends, fmt="none", ecolor="0.2", elinewidth=1.0, capsize=2, label=INTERVAL
-            )
+            axes.errorbar([spot], [score], yerr=ends, fmt="none", ecolor="0.2", lw=1.0, capsize=2, label=INTERVAL)
 
 
 HELD, INTERVAL = "held value", "95 % interval"

@@ -202,10 +202,8 @@ def _tau(found: teaching.RankAgreement, figure: str) -> str:
 
 def teach_view(experiment: teaching.Experiment, prpv: Predictivities, figure: Drawn) -> View:
     """A learning experiment: the paper's table 1 and observations, what others published, and the curves."""
-    table, observations = (
-        teach_table(experiment, prpv),
-        observation_lines(teaching.observe(experiment, prpv), experiment),
-    )
+    table, found = teach_table(experiment, prpv), teaching.observe(experiment, prpv)
+    observations = observation_lines(found, experiment)
     said = [Paragraphs("The paper's two observations", observations)] if observations else []
     picture = picture_of("teach", "teach", figure)
     title = f"{experiment.settings.name}: which proxy is worth learning in?"

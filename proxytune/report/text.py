@@ -32,9 +32,7 @@ class WholeWords:
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         columns, endless = self.table.columns, options.update(max_width=100_000)
-        cells = [
-            [measure_renderables(console, endless, [cell]) for cell in (one.header, *one.cells)] for one in columns
-        ]
+        cells = [[measure_renderables(console, endless, [it]) for it in (one.header, *one.cells)] for one in columns]
         widths = [max(cell.minimum for cell in column) for column in cells]
         left = options.max_width - sum(widths) - GAP * (len(widths) - 1)
         wanted = [max(cell.maximum for cell in column) - width for column, width in zip(cells, widths, strict=True)]
@@ -58,14 +56,8 @@ def table_text(table: Table, *, ragged: bool = False) -> WholeWords:
         ragged: Whether numbers begin together, as texts do, instead of ending together.
     """
     names = [one.name for one in table.columns]
-    shown = TerminalTable(
-        title=escape(table.title) if table.title else None,
-        title_justify="left",
-        title_style="bold",
-        box=None,
-        pad_edge=False,
-        show_header=any(names),
-    )
+    look: dict[str, Any] = {"title_justify": "left", "title_style": "bold", "box": None, "pad_edge": False}
+    shown = TerminalTable(title=escape(table.title) if table.title else None, show_header=any(names), **look)
     # Heads of one line stand beside the last line of others.
     vertical: Literal["top", "bottom"] = "bottom" if any("\n" in name for name in names) else "top"
     for one in table.columns:

@@ -47,9 +47,8 @@ class Cells:
         if labels is None:
             return [""] * len(self.lines)
         if "" in labels:
-            raise ScoresError(
-                f"{self.path}: line {self.lines[labels.index('')]}, column '{name}': is empty; fill it in"
-            )
+            line = self.lines[labels.index("")]
+            raise ScoresError(f"{self.path}: line {line}, column '{name}': is empty; fill it in")
         return labels
 
     def published(self, columns: Sequence[str]) -> Floats:
@@ -243,9 +242,8 @@ def _columns(
     lines = []
     for line, row in rows:
         if len(row) != len(header):
-            raise ScoresError(
-                f"{path}: line {line}: has {len(row)} cells, but the first line names {len(header)} columns"
-            )
+            named = f"the first line names {len(header)} columns"
+            raise ScoresError(f"{path}: line {line}: has {len(row)} cells, but {named}")
         lines.append(line)
         for name, place in places.items():
             cells[name].append(row[place].strip())
@@ -273,16 +271,14 @@ def _check_header(path: Path, header: Sequence[str], metrics: Sequence[str]) -> 
 
 def _decimal(found: Cells, metrics: Sequence[str]) -> str:
     """The decimal sign of a file's numbers."""
-    numbers = [
-        (line, name, cell) for name in metrics for line, cell in zip(found.lines, found.cells[name], strict=True)
-    ]
+    lines, cells = found.lines, found.cells
+    numbers = [(line, name, cell) for name in metrics for line, cell in zip(lines, cells[name], strict=True)]
     commas, points = (next((one for one in numbers if mark in one[2]), None) for mark in ",.")
     if commas and points:
         line, name, cell = commas
         other = f"line {points[0]} has {points[2]!r}"
-        raise ScoresError(
-            f"{found.path}: line {line}, column '{name}': {cell!r} has a comma, but {other}; write all alike"
-        )
+        where = f"line {line}, column '{name}'"
+        raise ScoresError(f"{found.path}: {where}: {cell!r} has a comma, but {other}; write all alike")
     return "," if commas else "."
 
 

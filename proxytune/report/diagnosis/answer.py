@@ -99,10 +99,8 @@ def _said(found: LogDiagnosis) -> list[tuple[str, list[Table], list[str]]]:
     """Headline, tables and notes of motion, then of the camera, as far as there are such."""
     said = []
     if (motion := found.motion) is not None:
-        beside = (
-            findings(document.motion_effects(motion), motion.robot.catalogue),
-            fitted(motion.declared, motion.theta),
-        )
+        found_of = findings(document.motion_effects(motion), motion.robot.catalogue)
+        beside = found_of, fitted(motion.declared, motion.theta)
         said.append((motion_headline(motion, *beside), _motion_tables(motion), motion_notes(motion)))
     if (camera := found.camera) is not None:
         beside = findings(document.camera_effects(camera)), fitted(camera.declared, camera.theta)
@@ -137,9 +135,8 @@ def _motion_tables(diagnosis: Diagnosis) -> list[Table]:
         headings = (error.heading_before.value, error.heading_after.value, error.heading_floor)
         before, after, least = (fixed(float(np.degrees(one)), 2) for one in headings)
         rows += [(f"{error.horizon_s:g} s{plant}", *place, floor), ("  heading [deg]", before, after, "", least)]
-    tried = tuple(
-        (one.effect, one.form, f"{one.gain:.1f}", f"{one.p_value:.3f}") for one in diagnosis.found.tried[:MOST_TRIED]
-    )
+    first = diagnosis.found.tried[:MOST_TRIED]
+    tried = tuple((one.effect, one.form, f"{one.gain:.1f}", f"{one.p_value:.3f}") for one in first)
     title, heads = "Error on held-out drives: RMSE of position [mm]", ("before", "after", "after / before")
     return [
         _parameters_table("Fitted parameters", diagnosis.declared, diagnosis.theta),
@@ -175,8 +172,7 @@ def _parameters_table(title: str, declared: Mapping[str, Estimate], theta: Mappi
             continue
         low, high = after.interval
         old = short(declared[name].value, 4) if name in declared else ""
-        rows.append(
-            (name, old, short(after.value, 4), f"{short(low, 4)} to {short(high, 4)}" if low < high else "", after.unit)
-        )
+        interval = f"{short(low, 4)} to {short(high, 4)}" if low < high else ""
+        rows.append((name, old, short(after.value, 4), interval, after.unit))
     heads = columns_of(("parameter",), ("declared only", "effects added", "95 % interval"))
     return Table(title, (*heads, *columns_of(("unit",))), tuple(rows))

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 from textwrap import fill
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -172,16 +172,9 @@ def _sums(cell: NDArray[np.intp], values: Floats) -> Floats:
 def _draw_arrows(axes: Axes, arrows: Arrows, colour: str, longest: float, room: float) -> None:
     """Arrows with one of a round length as their scale; the longest of all panels is as long as there is room."""
     key = max((one for one in KEYS_PX if one <= longest), default=KEYS_PX[0])
-    quiver = axes.quiver(
-        *arrows.places.T,
-        *arrows.lengths.T,
-        color=colour,
-        angles="xy",
-        scale_units="xy",
-        scale=max(longest, KEYS_PX[0]) / (1.5 * room),
-        width=0.006,
-        pivot="middle",
-    )
+    scale = max(longest, KEYS_PX[0]) / (1.5 * room)
+    look: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "width": 0.006, "pivot": "middle"}
+    quiver = axes.quiver(*arrows.places.T, *arrows.lengths.T, color=colour, scale=scale, **look)
     axes.quiverkey(quiver, 0.88, 0.93, key, f"{key:g} px", labelpos="S", fontproperties={"size": 7})
 
 
@@ -193,13 +186,12 @@ def markings_figure(diagnosis: CameraDiagnosis) -> Figure:
     """The frames on which the effects that were added change most, the outlines of the map's markings over them."""
     models, frames = list(camera_models(diagnosis).items()), telling_frames(diagnosis)
     down, across = (SHOWN, len(models)) if len(models) > 1 else (1, SHOWN)
-    rows, columns = diagnosis.gathered.pictures.shape[1:3]
+    pictures = diagnosis.gathered.pictures
+    rows, columns = pictures.shape[1:3]
     figure, panels = style.grid_of(0.35 + down * (0.2 + 1.4 * rows / columns), down, across)
     shown = product(frames, zip(models, COLOURS, strict=False))
     for axes, (frame, ((name, fit), colour)) in zip(panels.ravel(), shown, strict=True):
-        style.show_photo(
-            axes, diagnosis.gathered.pictures[frame], extent=(0, columns, rows, 0), interpolation="nearest"
-        )
+        style.show_photo(axes, pictures[frame], extent=(0, columns, rows, 0), interpolation="nearest")
         draw_outlines(axes, fit, frame, colour)
         axes.set_title(fill(f"{name}, frame {diagnosis.gathered.numbers[frame]}", TITLE), fontsize=7)
     label_places(panels)

@@ -89,9 +89,8 @@ def _car_figure(diagnosis: Diagnosis) -> Figure:
     commands = np.linspace(float(given.min()), float(given.max()), COMMANDS)
     pairs = np.stack([commands * (column == shown.column) for column in (0, 1)], axis=-1)
     models = {DECLARED_MODEL: found.declared.theta, extended_name(diagnosis): found.model.theta}
-    _draw_steady(
-        axes, commands, {n: shown.full * _steady(drives, t, pairs)[:, shown.column] for n, t in models.items()}
-    )
+    steady = {n: shown.full * _steady(drives, t, pairs)[:, shown.column] for n, t in models.items()}
+    _draw_steady(axes, commands, steady)
     style.dress(axes, ("throttle", "steering [full lock]")[shown.column], shown.label)
     style.legend_below(figure, axes)
     return figure

@@ -111,9 +111,7 @@ def _draw_commands(pair: SideBySide, figure: SubFigure) -> None:
     for axes, channel in zip(panels, channels, strict=True):
         for side, episode in reversed(pair.sides.items()):
             width = 1.6 if side == "target" else 0.8
-            axes.step(
-                episode.commands["time"], episode.commands[channel], where="post", color=COLOURS[side], linewidth=width
-            )
+            axes.step(episode.commands["time"], episode.commands[channel], where="post", color=COLOURS[side], lw=width)
         axes.axhline(0.0, color=style.LIGHT_GREY, linewidth=0.6, zorder=0)
         if pair.parted_s is not None:
             axes.axvline(pair.parted_s, color="black", linewidth=0.8, linestyle=":")
@@ -235,17 +233,12 @@ def _draw_path(axes: Axes, places: Floats, side: str) -> None:
     (line,) = axes.plot(*places.T, color=COLOURS[side], linewidth=WIDTHS[side], solid_capstyle="round")
     if side == "target":
         line.set_path_effects(list(CASING))
+    edge: dict[str, Any] = {"markeredgecolor": "white", "markeredgewidth": 0.5}
     for row in arrow_rows(places):
         # Along the path, not along the heading: a robot may drive backwards
         step = places[row] - places[row - 1]
-        axes.plot(
-            *places[row],
-            marker=(3, 0, np.degrees(np.arctan2(step[1], step[0])) - 90.0),
-            color=COLOURS[side],
-            markersize=5.5,
-            markeredgecolor="white",
-            markeredgewidth=0.5,
-        )
+        turned = float(np.degrees(np.arctan2(step[1], step[0]))) - 90.0
+        axes.plot(*places[row], marker=(3, 0, turned), color=COLOURS[side], markersize=5.5, **edge)
 
 
 def arrow_rows(places: Floats) -> list[int]:
@@ -263,18 +256,10 @@ def draw_start(axes: Axes, places: Floats) -> None:
 
 
 def _write(axes: Axes, place: Floats, text: str, colour: str, corner: tuple[int, int]) -> None:
-    axes.annotate(
-        text,
-        (float(place[0]), float(place[1])),
-        xytext=(5 * corner[0], 4 * corner[1]),
-        textcoords="offset points",
-        ha="left" if corner[0] > 0 else "right",
-        va="bottom" if corner[1] > 0 else "top",
-        color=colour,
-        fontsize=7,
-        path_effects=HALO,
-        annotation_clip=False,
-    )
+    aligned = {"ha": "left" if corner[0] > 0 else "right", "va": "bottom" if corner[1] > 0 else "top"}
+    look: dict[str, Any] = {"color": colour, "fontsize": 7, "path_effects": HALO, "annotation_clip": False}
+    spot, shift = (float(place[0]), float(place[1])), (5 * corner[0], 4 * corner[1])
+    axes.annotate(text, spot, xytext=shift, textcoords="offset points", **aligned, **look)
 
 
 SIZE = np.array((0.24, 0.06))

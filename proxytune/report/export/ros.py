@@ -109,9 +109,8 @@ def _transform(child: str, pose: Floats) -> Rows:
     quaternion = (*(float(skew[at]) / 4.0 / w for at in ((2, 1), (0, 2), (1, 0))), w)
     rows = [f"{child}_transform:  # x forward, y left, z up, as base_link", "  ros__parameters:"]
     rows += ["    frame_id: base_link", f"    child_frame_id: {child}"]
-    rows += [
-        f"    translation.{axis}: {_number(value)}" for axis, value in zip("xyz", pose[:3, 3].tolist(), strict=True)
-    ]
+    place = pose[:3, 3].tolist()
+    rows += [f"    translation.{axis}: {_number(value)}" for axis, value in zip("xyz", place, strict=True)]
     return rows + [f"    rotation.{axis}: {_number(value)}" for axis, value in zip("xyzw", quaternion, strict=True)]
 
 
@@ -181,7 +180,5 @@ def commands_text(diagnosis: Diagnosis) -> str:
     drive = diagnosis.next_drive
     assert drive is not None
     rows = commands_as(diagnosis.command, diagnosis.robot, drive.commands).tolist()
-    lines = [
-        f"next,{number / drive.rate_hz:.4f},{first:.7g},{second:.7g}" for number, (first, second) in enumerate(rows)
-    ]
+    lines = [f"next,{tick / drive.rate_hz:.4f},{first:.7g},{second:.7g}" for tick, (first, second) in enumerate(rows)]
     return "\n".join([",".join(("episode", "time", *COMMANDS[diagnosis.command])), *lines]) + "\n"

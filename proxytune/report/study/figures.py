@@ -95,9 +95,8 @@ def _draw_fresh(axes: Axes, result: StudyResult) -> None:
     for place, expected, colour, mark, label in told:
         value, low, high = expected.prpv.value
         reach = [[max(0.0, value - low)], [max(0.0, high - value)]]
-        axes.errorbar(
-            [place], [value], yerr=reach, fmt=mark, color=colour, markersize=5, capsize=2, zorder=4, label=label
-        )
+        look = {"markersize": 5, "capsize": 2, "zorder": 4}
+        axes.errorbar([place], [value], yerr=reach, fmt=mark, color=colour, label=label, **look)
 
 
 BINS = 60
@@ -295,9 +294,8 @@ def _key(axes: Axes, panels: Sequence[Axes], norm: Normalize, title: str) -> Non
     bar.ax.set_title(title, fontsize=7)
     bar.ax.tick_params(labelsize=7)
     named = style.named_handles(panels)
-    axes.legend(
-        list(named.values()), list(named), loc="upper center", bbox_to_anchor=(0.55, 0.62), fontsize=7, frameon=False
-    )
+    look = {"loc": "upper center", "fontsize": 7, "frameon": False}
+    axes.legend(list(named.values()), list(named), bbox_to_anchor=(0.55, 0.62), **look)
 
 
 def importance_figure(result: StudyResult) -> Figure:

@@ -66,16 +66,10 @@ def theta_table(result: StudyResult) -> Table:
         low, high = known.interval
         true = None if truth is None else truth.get(known.name)
         outside = "" if true is None or low <= true <= high else " (outside)"
-        rows.append(
-            (
-                known.name,
-                f"{short(known.best, 4)} {known.unit}".strip(),
-                span(known.interval) if known.identified else "unidentified",
-                *(() if truth is None else ("" if true is None else f"{short(true, 4)}{outside}",)),
-                span(as_good[known.name]),
-                f"{short(box.low)} to {short(box.high)}",
-            )
-        )
+        best, inner = f"{short(known.best, 4)} {known.unit}".strip(), span(known.interval)
+        told = () if truth is None else ("" if true is None else f"{short(true, 4)}{outside}",)
+        beside = (span(as_good[known.name]), f"{short(box.low)} to {short(box.high)}")
+        rows.append((known.name, best, inner if known.identified else "unidentified", *told, *beside))
     left = percent(result.knowledge.posterior.share)
     rows.append(("share of the box", "", left, *(() if truth is None else ("",)), percent(share), ""))
     heads = ("best", "95 % interval", *(() if truth is None else ("truth",)), "by PRPV alone", "box")
@@ -156,15 +150,8 @@ def _prpv_rows(result: StudyResult) -> Rows:
     luck = f"{optimism:.3g} lower by luck" if optimism > 0.0 else "no optimism"
     rivals = f"; {others} runner{'' if others == 1 else 's'}-up re-run as well" if others else ""
     count = f"in {expected.repetitions} more run{'s' if expected.repetitions > 1 else ''}"
-    return [
-        (
-            "PRPV",
-            fixed(expected.prpv.value.value, 0),
-            pairs_span(*expected.prpv.value[1:]),
-            f"{pairs}; expected, {count}",
-        ),
-        (IN_SEARCH, value, "", f"{luck}{rivals}"),
-    ]
+    told = fixed(expected.prpv.value.value, 0), pairs_span(*expected.prpv.value[1:])
+    return [("PRPV", *told, f"{pairs}; expected, {count}"), (IN_SEARCH, value, "", f"{luck}{rivals}")]
 
 
 def _level_rows(result: StudyResult) -> Rows:

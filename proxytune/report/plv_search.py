@@ -68,9 +68,10 @@ def plv_text(study: teaching.PlvStudy, files: Mapping[str, Any]) -> Group:
     head = f"{study.settings.name}: {len(study.trials)} proxies tried, the one of highest PLV first"
     box = ", ".join(f"{interval.name} [{interval.low:.4g}, {interval.high:.4g}]" for interval in study.space.intervals)
     by = " (narrowed to the θ whose PRPV is as low as the best, within noise)" if study.narrowed else ""
-    above = (f"{plv_answer(study)}\n", head, tried, f"searched: {box}{by}", f"stopped: {study.stopped}", PLV_MEANING)
-    lines = (CONVERGED.format(f"{study.when.threshold:.1f}"), *file_texts(files), f"\n{CONFIRMED}:")
-    return group_texts(*above, *lines, finals, *study.unable.values())
+    converged = CONVERGED.format(f"{study.when.threshold:.1f}")
+    said = (f"searched: {box}{by}", f"stopped: {study.stopped}", PLV_MEANING, converged)
+    first, last = f"{plv_answer(study)}\n", f"\n{CONFIRMED}:"
+    return group_texts(first, head, tried, *said, *file_texts(files), last, finals, *study.unable.values())
 
 
 def write_plv_report(study: teaching.PlvStudy, folder: Path) -> tuple[Path, Path]:

@@ -256,7 +256,7 @@ def draw_start(axes: Axes, places: Floats) -> None:
 
 
 def _write(axes: Axes, place: Floats, text: str, colour: str, corner: tuple[int, int]) -> None:
-    aligned = {"ha": "left" if corner[0] > 0 else "right", "va": "bottom" if corner[1] > 0 else "top"}
+    aligned: dict[str, Any] = {"ha": "left" if corner[0] > 0 else "right", "va": "bottom" if corner[1] > 0 else "top"}
     look: dict[str, Any] = {"color": colour, "fontsize": 7, "path_effects": HALO, "annotation_clip": False}
     spot, shift = (float(place[0]), float(place[1])), (5 * corner[0], 4 * corner[1])
     axes.annotate(text, spot, xytext=shift, textcoords="offset points", **aligned, **look)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from textwrap import fill
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -95,7 +96,7 @@ def _draw_fresh(axes: Axes, result: StudyResult) -> None:
     for place, expected, colour, mark, label in told:
         value, low, high = expected.prpv.value
         reach = [[max(0.0, value - low)], [max(0.0, high - value)]]
-        look = {"markersize": 5, "capsize": 2, "zorder": 4}
+        look: dict[str, Any] = {"markersize": 5, "capsize": 2, "zorder": 4}
         axes.errorbar([place], [value], yerr=reach, fmt=mark, color=colour, label=label, **look)
 
 
@@ -294,7 +295,7 @@ def _key(axes: Axes, panels: Sequence[Axes], norm: Normalize, title: str) -> Non
     bar.ax.set_title(title, fontsize=7)
     bar.ax.tick_params(labelsize=7)
     named = style.named_handles(panels)
-    look = {"loc": "upper center", "fontsize": 7, "frameon": False}
+    look: dict[str, Any] = {"loc": "upper center", "fontsize": 7, "frameon": False}
     axes.legend(list(named.values()), list(named), bbox_to_anchor=(0.55, 0.62), **look)
 
 

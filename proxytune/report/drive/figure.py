@@ -2,7 +2,6 @@
 
 import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -144,7 +143,7 @@ def _draw_pictures(pair: SideBySide, figure: SubFigure) -> None:
         axes.set_title(f"{instant:.1f} s", fontsize=7, pad=2)
 
 
-COLOURS: Mapping[str, str] = MappingProxyType({"proxy": style.BLUE, "target": style.VERMILLION})
+COLOURS: Mapping[str, str] = {"proxy": style.BLUE, "target": style.VERMILLION}
 PALER = 0.6
 """The floor is drawn this much nearer to white, so that paths stand out."""
 MARGIN_M = 0.2

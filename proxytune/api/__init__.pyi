@@ -1,7 +1,6 @@
 from .curves import SweepReport as SweepReport, TeachReport as TeachReport, run_sweep as run_sweep, teach as teach
 from .diagnosis import DiagnosisReport as DiagnosisReport, diagnose as diagnose
 from .driving import (
-    ChosenTheta as ChosenTheta,
     DrivenEpisode as DrivenEpisode,
     choose_theta as choose_theta,
     drive as drive,
@@ -10,7 +9,6 @@ from .driving import (
 from .exporting import TRIALS as TRIALS, CommandFilter as CommandFilter, ExportReport as ExportReport, export as export
 from .families import (
     FamiliesReport as FamiliesReport,
-    Spending as Spending,
     read_families as read_families,
     run_families as run_families,
     run_opened_families as run_opened_families,

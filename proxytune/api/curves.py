@@ -8,56 +8,19 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure
 
+from proxytune import report, sweep, teaching
 from proxytune.api.driving import read_theta
 from proxytune.errors import InputError
-from proxytune.report import (
-    Shown,
-    View,
-    curve_document,
-    figures_of_sweep,
-    held_values,
-    save_figures,
-    study_foot,
-    sweep_view,
-    teach_document,
-    teach_figure,
-    teach_view,
-    write_curves,
-    write_page,
-    write_sweep_page,
-)
 from proxytune.running import watching
 from proxytune.space import Theta
 from proxytune.storage import Store, locked
 from proxytune.study import StudyRun, StudySettings, family_catalogue, open_study
-from proxytune.sweep import (
-    SweepCurve,
-    best_theta,
-    check_base,
-    curve_of,
-    discrepancy_study,
-    has_answer,
-    plan_sweep,
-    run_sweep as run_planned,
-    series_of,
-    sweep_interval,
-    with_target,
-)
-from proxytune.teaching import (
-    Experiment,
-    Predictivity,
-    check_proxies,
-    count_examinations,
-    load_setup,
-    predictivity,
-    run_experiment,
-)
 
 MOST_POINTS = 10_000
 
 
 @dataclass(frozen=True, repr=False)
-class SweepReport(Shown):
+class SweepReport(report.Shown):
     """Usefulness along one parameter or each of a study's.
 
     Attributes:
@@ -70,24 +33,23 @@ class SweepReport(Shown):
     """
 
     settings: StudySettings
-    curves: tuple[SweepCurve, ...]
+    curves: tuple[sweep.SweepCurve, ...]
     chosen: str
     theta: Theta
     episodes: int
     truth: Theta | None
 
     def __repr__(self) -> str:
-        return (
-            f"SweepReport of '{self.settings.name}': {', '.join(curve.parameter for curve in self.curves)}; {self.held}"
-        )
+        swept = ", ".join(curve.parameter for curve in self.curves)
+        return f"SweepReport of '{self.settings.name}': {swept}; {self.held}"
 
-    def view(self) -> View:
+    def view(self) -> report.View:
         """What the page shows."""
-        return sweep_view(self.settings.name, self.curves, self.figures(), self.held)
+        return report.sweep_view(self.settings.name, self.curves, self.figures(), self.held)
 
     def figures(self) -> dict[str, Figure]:
         """A figure per parameter, and two of all, by name."""
-        return figures_of_sweep(self.curves, self.truth)
+        return report.figures_of_sweep(self.curves, self.truth)
 
     def to_frame(self) -> pd.DataFrame:
         """All tables, one below the other: parameter, value, each measure."""
@@ -97,15 +59,15 @@ class SweepReport(Shown):
     def held(self) -> str:
         """Values at which the other parameters are held, in words."""
         if self.chosen == "best":
-            values = held_values(self.theta, whose="the study's best θ: ")
+            values = report.held_values(self.theta, whose="the study's best θ: ")
             return f"{values}; --at nominal holds the robot's own"
-        return "the others are nominal" if self.chosen == "nominal" else held_values(self.theta)
+        return "the others are nominal" if self.chosen == "nominal" else report.held_values(self.theta)
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """For each parameter, one row per value: each measure."""
         return {
             curve.parameter: pd.DataFrame(
-                {one.key: [estimate.score for estimate in one.estimates] for one in series_of(curve)},
+                {one.key: [estimate.score for estimate in one.estimates] for one in sweep.series_of(curve)},
                 index=pd.Index([point.value for point in curve.points], name=curve.parameter),
             )
             for curve in self.curves
@@ -114,7 +76,7 @@ class SweepReport(Shown):
     def document(self) -> dict[str, Any]:
         """The JSON document of `sweep --json`, without the files."""
         return {
-            "curves": [curve_document(curve) for curve in self.curves],
+            "curves": [report.curve_document(curve) for curve in self.curves],
             "episodes": {"run": self.episodes},
             "at": {"chosen": self.chosen, "theta": dict(self.theta)},
         }
@@ -127,9 +89,9 @@ class SweepReport(Shown):
         """
         output = self.settings.home / "figures" if folder is None else Path(folder)
         figures = self.figures()
-        drawn = save_figures(figures, output)
-        page = write_sweep_page(self.settings, self.curves, figures, output, self.held, command)
-        return drawn, [*write_curves(self.curves, output), page]
+        drawn = report.save_figures(figures, output)
+        page = report.write_sweep_page(self.settings, self.curves, figures, output, self.held, command)
+        return drawn, [*report.write_curves(self.curves, output), page]
 
 
 def run_sweep(
@@ -158,35 +120,35 @@ def run_sweep(
     study = open_study(Path(path))
     if not 2 <= points <= MOST_POINTS:
         raise InputError(f"--points must be between 2 and {MOST_POINTS}, got {points}")
-    word = ("best" if has_answer(study) else "nominal") if at is None else at
+    word = ("best" if sweep.has_answer(study) else "nominal") if at is None else at
     if isinstance(word, Mapping):
         base: Theta = word
     elif word == "best":
-        base = best_theta(study)
+        base = sweep.best_theta(study)
     else:
         base = read_theta(word, family_catalogue(study.family, study.settings), "--at")
-    check_base(study, base)
+    sweep.check_base(study, base)
     names = study.settings.space.names if parameter == "all" else (parameter,)
-    sweeps = [plan_sweep(sweep_interval(study, name), base, points) for name in names]
+    sweeps = [sweep.plan_sweep(sweep.sweep_interval(study, name), base, points) for name in names]
     discrepancy = None
     if target_model:
-        discrepancy = discrepancy_study(study, Path(target_model))
-        sweeps = [with_target(sweep, Path(target_model), discrepancy) for sweep in sweeps]
+        discrepancy = sweep.discrepancy_study(study, Path(target_model))
+        sweeps = [sweep.with_target(one, Path(target_model), discrepancy) for one in sweeps]
     per_point = len(study.settings.agents) + (discrepancy is not None)
-    total = sum(len(sweep.points) for sweep in sweeps) * per_point * study.settings.starts
+    total = sum(len(one.points) for one in sweeps) * per_point * study.settings.starts
     folder = study.settings.home
     with locked(folder), Store.open(folder) as store:
         with watching(progress, total) as watcher:
             run = StudyRun(study, store, watcher)
-            for sweep in sweeps:
-                run_planned(run, sweep, discrepancy)
-        curves = tuple(curve for sweep in sweeps if (curve := curve_of(run, sweep)))
+            for one in sweeps:
+                sweep.run_sweep(run, one, discrepancy)
+        curves = tuple(curve for one in sweeps if (curve := sweep.curve_of(run, one)))
     chosen = word if word in ("best", "nominal") else "given"
     return SweepReport(study.settings, curves, str(chosen), sweeps[0].base, run.spent.episodes, study.truth)
 
 
 @dataclass(frozen=True, repr=False)
-class TeachReport(Shown):
+class TeachReport(report.Shown):
     """Learning curves and PLV, the proxy learning value (eq. 5): how many target samples each proxy saves.
 
     Attributes:
@@ -196,33 +158,30 @@ class TeachReport(Shown):
     """
 
     settings: StudySettings
-    experiment: Experiment
-    prpv: Mapping[str, Predictivity | None]
+    experiment: teaching.Experiment
+    prpv: Mapping[str, teaching.Predictivity | None]
 
     def __repr__(self) -> str:
-        return f"TeachReport of '{self.settings.name}': {teach_view(self.experiment, self.prpv, b'').sentence}"
+        return f"TeachReport of '{self.settings.name}': {report.teach_view(self.experiment, self.prpv, b'').sentence}"
 
-    def view(self) -> View:
+    def view(self) -> report.View:
         """What the page shows."""
-        return teach_view(self.experiment, self.prpv, self.figures()["teach"])
+        return report.teach_view(self.experiment, self.prpv, self.figures()["teach"])
 
     def figures(self) -> dict[str, Figure]:
         """The learning curves, by name."""
-        return {"teach": teach_figure(self.experiment)}
+        return {"teach": report.teach_figure(self.experiment)}
 
     def table(self) -> pd.DataFrame:
         """One row per proxy: PLV, with the ends of its interval where they are known."""
-        rows = {
-            name: row.get("plv") if isinstance(row.get("plv"), dict) else {"value": row.get("plv")}
-            for name, row in self.document().get("proxies", {}).items()
-        }
+        rows = {name: one["plv"] or {"value": None} for name, one in self.document()["proxies"].items()}
         return pd.DataFrame.from_dict(rows, orient="index").rename_axis("proxy")
 
     to_frame = table
 
     def document(self) -> dict[str, Any]:
         """The JSON document of `teach --json`, without the files."""
-        return teach_document(self.experiment, self.prpv)
+        return report.teach_document(self.experiment, self.prpv)
 
     def write(self, command: str = "") -> tuple[Path, Path]:
         """Write the figure and the page into the study's folder; their paths.
@@ -231,9 +190,10 @@ class TeachReport(Shown):
             RunError: If one cannot be written.
         """
         drawn = self.figures()
-        (figure,) = save_figures(drawn, self.settings.home / "figures")
+        (figure,) = report.save_figures(drawn, self.settings.home / "figures")
         page = figure.with_suffix(".html")
-        write_page(page, teach_view(self.experiment, self.prpv, drawn["teach"]), study_foot(self.settings, command))
+        foot = report.study_foot(self.settings, command)
+        report.write_page(page, report.teach_view(self.experiment, self.prpv, drawn["teach"]), foot)
         return figure, page
 
 
@@ -251,14 +211,14 @@ def teach(path: str | Path, *, progress: bool = False) -> TeachReport:
         RunError: If training fails; all that was finished is kept.
     """
     study = open_study(Path(path))
-    settings, setup = study.settings, load_setup(study.settings)
+    settings, setup = study.settings, teaching.load_setup(study.settings)
     # Before anything is written.
-    check_proxies(settings, setup)
+    teaching.check_proxies(settings, setup)
     proxies = setup.settings.proxies
     with locked(settings.home), Store.open(settings.home) as store:
-        examinations = count_examinations(setup.settings, len(proxies) + 1)
+        examinations = teaching.count_examinations(setup.settings, len(proxies) + 1)
         with watching(progress, examinations, "points of learning curves") as bars:
-            experiment = run_experiment(settings, setup, bars)
+            experiment = teaching.run_experiment(settings, setup, bars)
         with watching(progress, len(settings.agents) * settings.starts * len(proxies)) as bars:
-            prpv = predictivity(StudyRun(study, store, bars), proxies)
+            prpv = teaching.predictivity(StudyRun(study, store, bars), proxies)
     return TeachReport(settings, experiment, prpv)

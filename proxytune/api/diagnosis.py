@@ -9,6 +9,7 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure
 
+from proxytune import report
 from proxytune.diagnosis import (
     LIMITS,
     RULES,
@@ -24,24 +25,13 @@ from proxytune.effects import Catalogue
 from proxytune.errors import InputError
 from proxytune.importing import open_log
 from proxytune.logs import Log
-from proxytune.report import (
-    Shown,
-    View,
-    camera_noise_floor,
-    diagnosis_document,
-    diagnosis_figures,
-    diagnosis_headline,
-    diagnosis_notes,
-    diagnosis_view,
-    write_diagnosis,
-)
 
 IN_PYTHON = {"--robot": "robot=…", "--declared ": "declared: ", "--test": "test"}
 """What a complaint calls an option of the command, and what it is here."""
 
 
 @dataclass(frozen=True, repr=False)
-class DiagnosisReport(Shown):
+class DiagnosisReport(report.Shown):
     """Result of a diagnosis: what a log says of a model.
 
     Attributes:
@@ -51,11 +41,11 @@ class DiagnosisReport(Shown):
     found: LogDiagnosis
 
     def __repr__(self) -> str:
-        return f"DiagnosisReport of {diagnosis_headline(self.found)}"
+        return f"DiagnosisReport of {report.diagnosis_headline(self.found)}"
 
-    def view(self) -> View:
+    def view(self) -> report.View:
         """What the page shows."""
-        return diagnosis_view(self.found, self.figures())
+        return report.diagnosis_view(self.found, self.figures())
 
     @property
     def diagnosis(self) -> Diagnosis | None:
@@ -83,7 +73,7 @@ class DiagnosisReport(Shown):
     @property
     def notes(self) -> tuple[str, ...]:
         """Notes, a line each: what each effect is worth, what this log could not show."""
-        return tuple(diagnosis_notes(self.found))
+        return tuple(report.diagnosis_notes(self.found))
 
     @property
     def _parts(self) -> tuple[Diagnosis | CameraDiagnosis, ...]:
@@ -110,16 +100,18 @@ class DiagnosisReport(Shown):
     def camera_errors(self) -> pd.DataFrame:
         """Mean errors on frames kept aside, before, after, noise floor: `markings` [px], `brightness` [grey levels]."""
         both = () if self.camera is None else (("markings", self.camera.pixels), ("brightness", self.camera.grey))
-        rows = [(name, one.before.value, one.after.value, camera_noise_floor(one), one.unit) for name, one in both]
+        rows = [
+            (name, one.before.value, one.after.value, report.camera_noise_floor(one), one.unit) for name, one in both
+        ]
         return pd.DataFrame(rows, columns=["of", "before", "after", "noise_floor", "unit"]).set_index("of")
 
     def figures(self) -> dict[str, Figure]:
         """The figures that there is something to draw for, by name."""
-        return diagnosis_figures(self.found)
+        return report.diagnosis_figures(self.found)
 
     def document(self) -> dict[str, Any]:
         """The JSON document of `diagnose --json`."""
-        return diagnosis_document(self.found)
+        return report.diagnosis_document(self.found)
 
     def write(self, folder: str | Path, command: str = "") -> list[Path]:
         """Write diagnosis.json, model.toml (for `predict` and a study's `proxy`), next drive, figures and page; paths.
@@ -131,7 +123,7 @@ class DiagnosisReport(Shown):
         Raises:
             RunError: If a file cannot be written.
         """
-        return write_diagnosis(self.found, Path(folder), command)
+        return report.write_diagnosis(self.found, Path(folder), command)
 
 
 def diagnose(
@@ -168,9 +160,8 @@ def diagnose(
     with _opened(log) as drives, nullcontext() if test is None else _opened(test) as others:
         try:
             vehicle = robot_of(drives, robot, Catalogue(Path.cwd(), tuple(effects)))
-            return DiagnosisReport(
-                diagnose_log(drives, vehicle, declared, test=others, seed=seed, rules=rules, limits=limits)
-            )
+            found = diagnose_log(drives, vehicle, declared, test=others, seed=seed, rules=rules, limits=limits)
+            return DiagnosisReport(found)
         except InputError as problem:
             told = str(problem)
             for option, argument in IN_PYTHON.items():

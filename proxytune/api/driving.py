@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import pandas as pd
 
@@ -78,15 +77,10 @@ def drive(
     return DrivenEpisode(dict(kept.metrics), poses, commands)
 
 
-class ChosenTheta(NamedTuple):
-    """θ, and where it comes from: "best", "nominal" or "given"."""
+def choose_theta(text: str | None, settings: StudySettings, family: DomainFamily, option: str) -> tuple[Theta, str]:
+    """θ as an option has it, and where from: "best", "nominal" or "given".
 
-    theta: Theta
-    origin: str
-
-
-def choose_theta(text: str | None, settings: StudySettings, family: DomainFamily, option: str) -> ChosenTheta:
-    """θ as an option has it; without one the study's best, or the nominal one as long as no trial is finished.
+    Without an option it is the study's best, or the nominal one as long as no trial is finished.
 
     Raises:
         InputError: If the text is no θ, the model is of another robot, or the study has no best θ.
@@ -94,15 +88,14 @@ def choose_theta(text: str | None, settings: StudySettings, family: DomainFamily
     if text == "best" or (text is None and (settings.home / DATABASE).is_file()):
         study = open_settings(settings)
         if text == "best" or has_answer(study):
-            return ChosenTheta(best_theta(study, option), "best")
+            return best_theta(study, option), "best"
     if text is not None and text.endswith(".toml"):
         check_robot(family, Path(text), option)
-    own = getattr(family, "truth", None)
-    if own is not None and text is not None and text.endswith(".toml"):
-        # A family with parameters that are no effects reads them itself
-        return ChosenTheta(own(Path(text)), "given")
+        if (own := getattr(family, "truth", None)) is not None:
+            # A family with parameters that are no effects reads them itself
+            return own(Path(text)), "given"
     theta = read_theta(text, family_catalogue(family, settings), option)
-    return ChosenTheta(theta, "nominal" if text in (None, "nominal") else "given")
+    return theta, "nominal" if text in (None, "nominal") else "given"
 
 
 def read_theta(text: str | None, catalogue: Catalogue = SHIPPED, option: str = "--at") -> Theta:

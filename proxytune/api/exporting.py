@@ -3,42 +3,18 @@
 import filecmp
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from proxytune import driving, report
 from proxytune.api.study import read_study
-from proxytune.driving import (
-    LaneFollowing,
-    Robot,
-    catalogue_of,
-    drivetrain,
-    read_model_of,
-    read_robot,
-    robot_from_geometry,
-    robot_names,
-)
 from proxytune.effects import Catalogue, FilterContext, effect_of
 from proxytune.errors import InputError
 from proxytune.extensions import is_ours
-from proxytune.report import (
-    FILTER,
-    IN_WHEELS,
-    ExportLine,
-    Instance,
-    export_lines,
-    frame_html,
-    mjcf_text,
-    node_text,
-    patch,
-    ros_text,
-    urdf_text,
-    write_text,
-    write_whole,
-)
 from proxytune.search import History, write_optuna, write_skopt
 from proxytune.settings import figure_cautions, nearest
 from proxytune.space import Theta
@@ -46,7 +22,11 @@ from proxytune.study import FILE_NAME, bare_family
 
 TRIALS: Mapping[str, Callable[[History, Path], None]] = {"optuna": write_optuna, "skopt": write_skopt}
 """Formats that take the trials of a study, not what was found."""
-WRITERS: Mapping[str, Callable[[Instance], str]] = {"urdf": urdf_text, "mjcf": mjcf_text, "ros": ros_text}
+WRITERS: Mapping[str, Callable[[report.Instance], str]] = {
+    "urdf": report.urdf_text,
+    "mjcf": report.mjcf_text,
+    "ros": report.ros_text,
+}
 NO_RATE_HZ = 20.0
 """A robot without a folder has no rate of control; none of the formats states one."""
 COMMANDS = {"differential": ("twist", "duty"), "ackermann": ("twist", "ackermann", "speed_steering")}
@@ -67,14 +47,14 @@ class ExportReport:
 
     output: Path
     to: str
-    lines: Sequence[ExportLine]
+    lines: Sequence[report.ExportLine]
     facts: Mapping[str, Any]
 
     def __repr__(self) -> str:
         return f"ExportReport of {self.output} ({self.to})"
 
     def _repr_html_(self) -> str:
-        return frame_html(repr(self), self.table())
+        return report.frame_html(repr(self), self.table())
 
     def table(self) -> pd.DataFrame:
         """One row per parameter: value, interval, unit, and its place in the file."""
@@ -125,16 +105,16 @@ def export(
         given = Path(into)
         if file.resolve() == given.resolve():
             raise InputError(f"--output {file}: is the file to be patched; give another name, so that yours is kept")
-        patched = patch(instance, given, file, wheels)
-        write_text(file, patched.text)
+        patched = report.patch(instance, given, file, wheels)
+        report.write_text(file, patched.text)
         facts = told | {"into": str(given), "has": sorted(patched.has), "diff": patched.diff}
-        return ExportReport(file, given.suffix[1:], export_lines(instance, FILTER, patched.has), facts)
-    if to == FILTER:
+        return ExportReport(file, given.suffix[1:], report.export_lines(instance, report.FILTER, patched.has), facts)
+    if to == report.FILTER:
         _check_has(has, instance.robot.catalogue)
-        text, lines = node_text(instance, has), export_lines(instance, FILTER, has)
+        text, lines = report.node_text(instance, has), report.export_lines(instance, report.FILTER, has)
     else:
-        text, lines = WRITERS[to](instance), export_lines(instance, to)
-    write_text(file, text)
+        text, lines = WRITERS[to](instance), report.export_lines(instance, to)
+    report.write_text(file, text)
     return ExportReport(file, to, lines, told)
 
 
@@ -155,53 +135,46 @@ def _export_trials(folder: Path, output: Path, to: str) -> ExportReport:
         if output.exists() and not filecmp.cmp(output, draft, shallow=False):
             raise InputError(f"{output}: is there already; give another name, or move it away")
 
-    write_whole(output, "", write)
+    report.write_whole(output, "", write)
     return ExportReport(output, to, (), {"name": history.name, "trials": len(history.trials)})
 
 
-def _row(line: ExportLine) -> dict[str, Any]:
+def _row(line: report.ExportLine) -> dict[str, Any]:
     interval = list(line.interval) if line.interval else None
-    return {
-        "name": line.name,
-        "value": line.value,
-        "interval": interval,
-        "unit": line.unit,
-        "place": line.place or None,
-    }
+    return asdict(line) | {"interval": interval, "place": line.place or None}
 
 
-def _instance_of(path: Path) -> tuple[Instance, tuple[str, ...]]:
+def _instance_of(path: Path) -> tuple[report.Instance, tuple[str, ...]]:
     if (model := path / "model.toml").is_file() and not (path / FILE_NAME).exists():
         raise InputError(f"{path}: is no study's folder; give what was diagnosed, {model}")
     return (_of_study(path), ()) if path.is_dir() else _of_model(path)
 
 
-def _of_model(path: Path) -> tuple[Instance, tuple[str, ...]]:
+def _of_model(path: Path) -> tuple[report.Instance, tuple[str, ...]]:
     """A model.toml, and its cautions; its robot and its own effects are looked for in the current folder."""
-    model = read_model_of(path, Path.cwd())
-    catalogue = catalogue_of(model.robot, Path.cwd())
-    if model.robot in robot_names(catalogue.folder):
-        robot = read_robot(model.robot, catalogue.folder)
+    model = driving.read_model_of(path, Path.cwd())
+    catalogue = driving.catalogue_of(model.robot, Path.cwd())
+    if model.robot in driving.robot_names(catalogue.folder):
+        robot = driving.read_robot(model.robot, catalogue.folder)
     elif model.geometry:
-        robot = robot_from_geometry(model.robot, model.geometry, NO_RATE_HZ)
+        robot = driving.robot_from_geometry(model.robot, model.geometry, NO_RATE_HZ)
     else:
-        raise InputError(
-            f"{path}: its robot '{model.robot}' is unknown here; go to the folder that {model.robot} lies in"
-        )
+        remedy = f"go to the folder that {model.robot} lies in"
+        raise InputError(f"{path}: its robot '{model.robot}' is unknown here; {remedy}")
     cautions = (*model.cautions, *figure_cautions(robot.figures, f"robot {robot.name}"))
-    return Instance(robot, {**robot.theta, **model.theta}, model.intervals, str(path)), cautions
+    return report.Instance(robot, {**robot.theta, **model.theta}, model.intervals, str(path)), cautions
 
 
-def _of_study(folder: Path) -> Instance:
+def _of_study(folder: Path) -> report.Instance:
     """The best θ of a study, with its 95 % intervals."""
     result = read_study(folder).result
     settings, region = result.study.settings, result.knowledge
     family = bare_family(settings, settings.proxy) if is_ours(settings.family) else None
-    if not isinstance(family, LaneFollowing):
+    if not isinstance(family, driving.LaneFollowing):
         raise InputError(f"{folder}: is a study of another simulator; only what drives here can be exported")
-    robot = read_robot(family.robot, family.folder)
+    robot = driving.read_robot(family.robot, family.folder)
     theta = {**robot.theta, **dict(family.effects), **result.best.trial.theta}
-    return Instance(robot, theta, dict(region.intervals), f"the best θ of the study {settings.name}")
+    return report.Instance(robot, theta, dict(region.intervals), f"the best θ of the study {settings.name}")
 
 
 class CommandFilter:
@@ -244,17 +217,17 @@ class CommandFilter:
             if figures is None:
                 raise InputError("figures: must be given where the model is values; take them from robot.toml")
             drive = "ackermann" if "wheelbase" in figures else "differential"
-            robot = Robot("given", "", dict(figures), {}, None, Catalogue(Path.cwd(), drive=drive), reverse)
-            instance = Instance(robot, dict(model), {}, "given")
+            robot = driving.Robot("given", "", dict(figures), {}, None, Catalogue(Path.cwd(), drive=drive), reverse)
+            instance = report.Instance(robot, dict(model), {}, "given")
         else:
             instance, _ = _instance_of(Path(model))
         self._steers = instance.steers
         if command not in (kinds := COMMANDS[instance.robot.drive]):
             raise InputError(f"command='{command}': must be " + " or ".join(f"'{one}'" for one in kinds))
         _check_has(has, instance.robot.catalogue)
-        left_out = set(has) - set(IN_WHEELS)
+        left_out = set(has) - set(report.IN_WHEELS)
         effects = [one for name, one in instance.effects.items() if name not in left_out]
-        self._twist, self._train = command == "twist", drivetrain(instance.robot, effects)
+        self._twist, self._train = command == "twist", driving.drivetrain(instance.robot, effects)
         self._full, self._command, self._angle = instance.figure("full_speed"), command, 0.0
         if self._steers:
             self._wheelbase, self._lock = instance.figure("wheelbase"), math.radians(instance.figure("wheel_angle"))

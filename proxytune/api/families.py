@@ -4,24 +4,14 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import pandas as pd
 from matplotlib.figure import Figure
 
+from proxytune import report
 from proxytune.api.study import StudyReport, most_episodes, read_study, run_opened
 from proxytune.errors import RunError
-from proxytune.report import (
-    Shown,
-    View,
-    families_document,
-    families_figure,
-    families_sentence,
-    families_view,
-    save_figures,
-    study_foot,
-    write_page,
-)
 from proxytune.running import Watcher, watching
 from proxytune.storage import Store, locked
 from proxytune.study import (
@@ -47,22 +37,8 @@ Tuning = Callable[[Study], AbstractContextManager[Watcher]]
 CURVE_POINTS = "points of learning curves"
 
 
-class Spending(NamedTuple):
-    """Budgets of a call that differ from study.toml's.
-
-    Attributes:
-        budget: How many trials a family has at most.
-        jobs: How many processes run episodes.
-        retry_failed: Whether every failed episode is driven again.
-    """
-
-    budget: int | None = None
-    jobs: int | None = None
-    retry_failed: bool = False
-
-
 @dataclass(frozen=True, repr=False)
-class FamiliesReport(Shown):
+class FamiliesReport(report.Shown):
     """Comparison of several domain families: which to use, and for what.
 
     Attributes:
@@ -76,9 +52,9 @@ class FamiliesReport(Shown):
     def __repr__(self) -> str:
         return f"FamiliesReport of '{self.compared.settings.name}': {self.sentence}"
 
-    def view(self) -> View:
+    def view(self) -> report.View:
         """What the page shows."""
-        return families_view(self.compared, self.figure())
+        return report.families_view(self.compared, self.figure())
 
     def figures(self) -> dict[str, Figure]:
         """The figure of all families, by name."""
@@ -86,12 +62,12 @@ class FamiliesReport(Shown):
 
     def to_frame(self) -> pd.DataFrame:
         """One row per trial of each family."""
-        return pd.concat({name: report.trials() for name, report in self.studies.items()}, names=["family"])
+        return pd.concat({name: one.trials() for name, one in self.studies.items()}, names=["family"])
 
     @property
     def sentence(self) -> str:
         """Say which family predicts best, which teaches best, and which is the cheapest."""
-        return families_sentence(self.compared)
+        return report.families_sentence(self.compared)
 
     @property
     def studies(self) -> dict[str, StudyReport]:
@@ -100,11 +76,11 @@ class FamiliesReport(Shown):
 
     def document(self) -> dict[str, Any]:
         """The JSON document of `study --json`."""
-        return families_document(self.compared)
+        return report.families_document(self.compared)
 
     def figure(self) -> Figure:
         """Fresh PRPV, PLV and cost of each family."""
-        return families_figure(self.compared)
+        return report.families_figure(self.compared)
 
     def write(self) -> tuple[Path, Path]:
         """Write the figure and the page into the study's folder; their paths.
@@ -113,8 +89,8 @@ class FamiliesReport(Shown):
             RunError: If one cannot be written.
         """
         settings, drawn = self.compared.settings, self.figures()
-        (figure,), page = save_figures(drawn, settings.home / "figures"), settings.home / "report.html"
-        write_page(page, families_view(self.compared, drawn["families"]), study_foot(settings))
+        (figure,), page = report.save_figures(drawn, settings.home / "figures"), settings.home / "report.html"
+        report.write_page(page, report.families_view(self.compared, drawn["families"]), report.study_foot(settings))
         return figure, page
 
 
@@ -135,7 +111,7 @@ def run_families(path: str | Path, *, progress: bool = False, jobs: int | None =
     def tuning(study: Study) -> AbstractContextManager[Watcher]:
         return watching(progress, most_episodes(study.settings))
 
-    return run_opened_families(settings, Spending(jobs=jobs), lambda line: None, tuning, progress=progress)
+    return run_opened_families(settings, lambda line: None, tuning, jobs=jobs, progress=progress)
 
 
 def read_families(path: str | Path) -> FamiliesReport:
@@ -157,23 +133,30 @@ def read_families(path: str | Path) -> FamiliesReport:
 
 
 def run_opened_families(
-    settings: StudySettings, spending: Spending, say: Say, tuning: Tuning, *, progress: bool = True
+    settings: StudySettings,
+    say: Say,
+    tuning: Tuning,
+    *,
+    budget: int | None = None,
+    jobs: int | None = None,
+    retry_failed: bool = False,
+    progress: bool = True,
 ) -> FamiliesReport:
     """Tune the families one after the other, teach by them where the study has [teaching], and compare them.
 
     All of them are opened before the first is tuned, so that a mistake is told at once. Progress is of the teaching.
     """
-    budgets = {"budget": spending.budget, "jobs": spending.jobs}
-    studies = {name: with_spending(open_settings(one), **budgets) for name, one in settings.families.items()}
+    opened = {name: open_settings(one) for name, one in settings.families.items()}
+    studies = {name: with_spending(study, budget=budget, jobs=jobs) for name, study in opened.items()}
     classrooms(settings)
     reports: dict[str, StudyReport] = {}
     with locked(settings.home):
         for number, (name, study) in enumerate(studies.items(), start=1):
             say(f"family {number} of {len(studies)}: {name}")
-            reports[name] = _tune(name, study, say, tuning(study), spending.retry_failed)
-        families = tuple(_tuned(report) for report in reports.values())
-        lessons = _teach(settings, families, spending.jobs, say, progress)
-    spent = sum((report.spent for report in reports.values()), Spent())
+            reports[name] = _tune(name, study, say, tuning(study), retry_failed)
+        families = tuple(map(_tuned, reports.values()))
+        lessons = _teach(settings, families, jobs, say, progress)
+    spent = sum((one.spent for one in reports.values()), Spent())
     return FamiliesReport(ComparedFamilies(settings, families, lessons), spent)
 
 
@@ -185,17 +168,17 @@ def _several(settings: StudySettings) -> StudySettings:
 
 def _tune(name: str, study: Study, say: Say, bars: AbstractContextManager[Watcher], retry_failed: bool) -> StudyReport:
     try:
-        report = run_opened(study, bars, lambda line: say(f"{name}: {line}"), retry_failed)
+        tuned = run_opened(study, bars, lambda line: say(f"{name}: {line}"), retry_failed)
     except RunError as problem:
         raise type(problem)(f"families.{name}: {problem}") from problem
-    report.write()
-    return report
+    tuned.write()
+    return tuned
 
 
-def _tuned(report: StudyReport) -> TunedFamily:
-    study = report.result.study
+def _tuned(tuned: StudyReport) -> TunedFamily:
+    study = tuned.result.study
     with Store.read(study.settings.home) as store:
-        return tuned_family(StudyRun(study, store), report.result)
+        return tuned_family(StudyRun(study, store), tuned.result)
 
 
 def _teach(

@@ -9,18 +9,8 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from proxytune import report
 from proxytune.errors import InputError
-from proxytune.report import (
-    Shown,
-    View,
-    fleet_document,
-    fleet_figure,
-    fleet_sentence,
-    fleet_view,
-    save_figures,
-    study_foot,
-    write_page,
-)
 from proxytune.study import Fleet, learn_fleet
 from proxytune.usefulness import Estimate
 
@@ -28,7 +18,7 @@ UNKNOWN = Estimate(np.nan, np.nan, np.nan)
 
 
 @dataclass(frozen=True, repr=False)
-class FleetReport(Shown):
+class FleetReport(report.Shown):
     """Several robots of one kind.
 
     Attributes:
@@ -43,15 +33,15 @@ class FleetReport(Shown):
     @property
     def sentence(self) -> str:
         """Say in which parameters the robots differ, and by how much."""
-        return fleet_sentence(self.result)
+        return report.fleet_sentence(self.result)
 
-    def view(self) -> View:
+    def view(self) -> report.View:
         """What the page shows."""
-        return fleet_view(self.result, self.figures()["fleet"])
+        return report.fleet_view(self.result, self.figures()["fleet"])
 
     def figures(self) -> dict[str, Figure]:
         """Each robot's intervals and the population, by name."""
-        return {"fleet": fleet_figure(self.result)}
+        return {"fleet": report.fleet_figure(self.result)}
 
     def robots(self) -> pd.DataFrame:
         """One row per robot and parameter: the ends of 95 % by its own scores, and what it is given the fleet.
@@ -87,7 +77,7 @@ class FleetReport(Shown):
 
     def document(self) -> dict[str, Any]:
         """The JSON document of `fleet --json`, without the files."""
-        return fleet_document(self.result)
+        return report.fleet_document(self.result)
 
     def write(self, folder: str | Path, command: str = "") -> tuple[Path, Path]:
         """Write the figure and report.html into a folder; their paths.
@@ -96,8 +86,9 @@ class FleetReport(Shown):
             RunError: If a file cannot be written.
         """
         drawn, page = self.figures(), Path(folder) / "report.html"
-        (figure,) = save_figures(drawn, Path(folder))
-        write_page(page, fleet_view(self.result, drawn["fleet"]), study_foot(self.result.settings, command))
+        (figure,) = report.save_figures(drawn, Path(folder))
+        foot = report.study_foot(self.result.settings, command)
+        report.write_page(page, report.fleet_view(self.result, drawn["fleet"]), foot)
         return figure, page
 
 

@@ -15,18 +15,10 @@ import pandas as pd
 import tomlkit
 from matplotlib.figure import Figure
 
+from proxytune import report, usefulness
 from proxytune.errors import InputError, LogError, ScoresError
 from proxytune.files import temporary_folder
 from proxytune.logs import Log, read_log
-from proxytune.report import (
-    Shown,
-    View,
-    figures_of_scores,
-    ranking_document,
-    score_document,
-    score_sentence,
-    score_view,
-)
 from proxytune.scores import (
     Metric,
     ScoreTable,
@@ -37,18 +29,6 @@ from proxytune.scores import (
     column_names,
     expand,
     read_scores,
-)
-from proxytune.usefulness import (
-    FEWEST_RESAMPLES,
-    MOST_RESAMPLES,
-    Asked,
-    Assessment,
-    Selection,
-    Sequential,
-    assess_each,
-    chosen,
-    in_common,
-    sequential_test,
 )
 
 LABELS = ("agent", "episode", "time")
@@ -88,7 +68,7 @@ Scores = pd.DataFrame | ScoreTable | str | Path
 
 
 @dataclass(frozen=True)
-class ScoreReport(Shown, Assessment):
+class ScoreReport(report.Shown, usefulness.Assessment):
     """How useful a proxy is, and which agent to deploy: every measure, `.decision`, figures and a page.
 
     Attributes:
@@ -100,9 +80,9 @@ class ScoreReport(Shown, Assessment):
     def __repr__(self) -> str:
         return f"ScoreReport: {self.sentence}"
 
-    def view(self) -> View:
+    def view(self) -> report.View:
         """What the page shows."""
-        return score_view(self._named, None, target=self.names[1])
+        return report.score_view(self._named, None, target=self.names[1])
 
     @property
     def _named(self) -> "dict[str, ScoreReport]":
@@ -111,12 +91,12 @@ class ScoreReport(Shown, Assessment):
     @property
     def sentence(self) -> str:
         """Say how low PRPV is, which agent to deploy, and what that risks."""
-        return score_sentence(self._named, None, target=self.names[1])
+        return report.score_sentence(self._named, None, target=self.names[1])
 
     @property
     def document(self) -> dict[str, Any]:
         """Plain numbers, texts, lists and dicts under the keys of `score --json`."""
-        return score_document(self)
+        return report.score_document(self)
 
     def to_frame(self) -> pd.DataFrame:
         """One row per measure and metric: value, and the ends of its 95 % interval."""
@@ -124,24 +104,24 @@ class ScoreReport(Shown, Assessment):
 
     def figures(self) -> dict[str, Figure]:
         """The figures by name: scatter, flipped_pairs and decision."""
-        return figures_of_scores(self)
+        return report.figures_of_scores(self)
 
-    def sequential(self) -> Sequential:
+    def sequential(self) -> usefulness.Sequential:
         """Test after each rollout, in the order of the target's table, which agent is the best.
 
         Raises:
             ScoresError: If scores are not within 0 and 1, an agent has one rollout, or outcomes are sorted.
         """
-        columns, _ = chosen(self.inputs, self.asked.decide_on)
-        return sequential_test(self.inputs, columns[0], seed=self.seed)
+        columns, _ = usefulness.chosen(self.inputs, self.asked.decide_on)
+        return usefulness.sequential_test(self.inputs, columns[0], seed=self.seed)
 
 
 @dataclass(frozen=True, repr=False)
-class Ranking(Shown):
+class Ranking(report.Shown):
     """Several proxies of one target: which is better beyond noise, by PRPV, by regret and by what it saves."""
 
     proxies: Mapping[str, ScoreReport]
-    selection: Selection
+    selection: usefulness.Selection
 
     def __getitem__(self, name: str) -> ScoreReport:
         return self.proxies[name]
@@ -149,9 +129,9 @@ class Ranking(Shown):
     def __repr__(self) -> str:
         return f"Ranking: {self.sentence}"
 
-    def view(self) -> View:
+    def view(self) -> report.View:
         """What the page shows."""
-        return score_view(self.proxies, self.selection, target="target")
+        return report.score_view(self.proxies, self.selection, target="target")
 
     def figures(self) -> dict[str, Figure]:
         """The figures of every proxy, as "scatter: NAME"."""
@@ -161,12 +141,12 @@ class Ranking(Shown):
     @property
     def sentence(self) -> str:
         """Say which proxy is the best, and whether that is beyond noise."""
-        return score_sentence(self.proxies, self.selection, target="target")
+        return report.score_sentence(self.proxies, self.selection, target="target")
 
     @property
     def document(self) -> dict[str, Any]:
         """Plain numbers, texts, lists and dicts under the keys of `score --json`."""
-        return ranking_document(self.proxies, self.selection)
+        return report.ranking_document(self.proxies, self.selection)
 
     def to_frame(self) -> pd.DataFrame:
         """One row per proxy, measure and metric: value, and the ends of its 95 % interval."""
@@ -229,8 +209,10 @@ def score(  # type: ignore[misc]  # the options above are those below
     """
     if seed < 0:
         raise InputError(f"seed must be at least 0, got {seed}")
-    if not FEWEST_RESAMPLES <= resamples <= MOST_RESAMPLES:
-        raise InputError(f"resamples must be between {FEWEST_RESAMPLES} and {MOST_RESAMPLES}, got {resamples}")
+    if not usefulness.FEWEST_RESAMPLES <= resamples <= usefulness.MOST_RESAMPLES:
+        raise InputError(
+            f"resamples must be between {usefulness.FEWEST_RESAMPLES} and {usefulness.MOST_RESAMPLES}, got {resamples}"
+        )
     if (both is None) == (proxy is None) or (proxy is None) != (target is None):
         raise InputError("give the proxy's and the target's scores, or one table of both sides")
     names, header = ("proxy", "target") if both is None else ("sim", "real"), _header(target if both is None else both)
@@ -245,17 +227,17 @@ def score(  # type: ignore[misc]  # the options above are those below
     sides = {name: _table(one, "proxy", wanted, columns) for name, one in given.items()}
     sides["target"] = _table(target if both is None else both, "target", wanted, columns)
     if common:
-        sides = dict(zip(sides, in_common(sides)[0].values(), strict=True))
+        sides = dict(zip(sides, usefulness.in_common(sides)[0].values(), strict=True))
     if unpaired:
         sides = {side: table.unpaired() for side, table in sides.items()}
-    asked = Asked(decide_on, rollouts, regret)
+    asked = usefulness.Asked(decide_on, rollouts, regret)
     other = sides.pop("target")
-    found, selection = assess_each(
+    found, selection = usefulness.assess_each(
         proxies=sides, target=other, metrics=compared, beta=beta, asked=asked, resamples=resamples, seed=seed
     )
     reports = {}
     for name, one in found.items():
-        own = {each.name: getattr(one, each.name) for each in fields(Assessment)}
+        own = {each.name: getattr(one, each.name) for each in fields(usefulness.Assessment)}
         reports[name] = ScoreReport(**own, names=(name, names[1]))
     return reports[names[0]] if selection is None else Ranking(reports, selection)
 

@@ -95,9 +95,8 @@ class SearchBox:
 
     def _trial(self, place: int) -> Trial:
         score = self._scores.get(place)
-        return Trial(
-            self._asked[place], None if score is None else self._sign * score, pending=place not in self._scores
-        )
+        own = None if score is None else self._sign * score
+        return Trial(self._asked[place], own, pending=place not in self._scores)
 
     def _place(self, theta: Theta) -> int:
         """Index of this θ among those asked for, the first that has no score."""

@@ -10,19 +10,9 @@ from typing import Any, NamedTuple
 import pandas as pd
 from matplotlib.figure import Figure
 
+from proxytune import report
 from proxytune.domain import Outcome
 from proxytune.errors import InputError
-from proxytune.report import (
-    Shown,
-    View,
-    save_figures,
-    study_document,
-    study_figures,
-    study_foot,
-    study_sentence,
-    study_view,
-    write_page,
-)
 from proxytune.running import Watcher, watching
 from proxytune.search import History, optimize_result
 from proxytune.space import Theta
@@ -55,7 +45,7 @@ class ReportFiles(NamedTuple):
 
 
 @dataclass(frozen=True, repr=False)
-class StudyReport(Shown):
+class StudyReport(report.Shown):
     """Result of a study.
 
     Attributes:
@@ -69,14 +59,14 @@ class StudyReport(Shown):
     def __repr__(self) -> str:
         return f"StudyReport of '{self.result.study.settings.name}': {self.sentence}"
 
-    def view(self) -> View:
+    def view(self) -> report.View:
         """What the page shows."""
-        return study_view(self.result, self.figures())
+        return report.study_view(self.result, self.figures())
 
     @property
     def sentence(self) -> str:
         """Say what was found, how good the proxy is there, and what to do next."""
-        return study_sentence(self.result)
+        return report.study_sentence(self.result)
 
     @property
     def best(self) -> Best:
@@ -123,7 +113,7 @@ class StudyReport(Shown):
 
     def figures(self) -> dict[str, Figure]:
         """Convergence, profiles, evaluations and importance, by name."""
-        return study_figures(self.result)
+        return report.study_figures(self.result)
 
     def history(self) -> History:
         """Its trials as a search of any kind has them, for Optuna and scikit-optimize."""
@@ -139,7 +129,7 @@ class StudyReport(Shown):
 
     def document(self) -> dict[str, Any]:
         """The JSON document of `study --json`."""
-        return study_document(self.result)
+        return report.study_document(self.result)
 
     def write(self, folder: str | Path | None = None, command: str = "") -> ReportFiles:
         """Write the figures and report.html, into the study's folder unless another is given.
@@ -153,8 +143,9 @@ class StudyReport(Shown):
         """
         settings, figures = self.result.study.settings, self.figures()
         home = settings.home if folder is None else Path(folder)
-        files = ReportFiles(save_figures(figures, home / "figures"), home / "report.html")
-        write_page(files.page, study_view(self.result, figures), study_foot(settings, command or None))
+        files = ReportFiles(report.save_figures(figures, home / "figures"), home / "report.html")
+        foot = report.study_foot(settings, command or None)
+        report.write_page(files.page, report.study_view(self.result, figures), foot)
         return files
 
 

@@ -9,31 +9,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from proxytune.diagnosis import (
-    PICTURES,
-    Agreement,
-    Clocks,
-    agreement,
-    frames_of,
-    frames_text,
-    on_one_clock,
-    predict as predict_poses,
-    predict_pictures,
-    robot_of,
-)
+from proxytune import diagnosis
 from proxytune.driving import Robot, catalogue_of, read_model_of, read_robot, robot_from_geometry, robot_names
 from proxytune.effects import Catalogue, Model
 from proxytune.errors import InputError, LogError
-from proxytune.importing import (
-    Facts,
-    Source,
-    Wanted,
-    as_log,
-    open_log,
-    read_source,
-    source_without_unnamed_pictures,
-    write_log,
-)
+from proxytune.importing import Facts, Source, Wanted, as_log, open_log, read_source, with_named_pictures, write_log
 from proxytune.logs import Log, check_kind, log_cautions
 from proxytune.report import clocks_document, clocks_notes, frame_html, write_picture, write_text
 from proxytune.running import watching
@@ -95,7 +75,7 @@ def import_log(
     """
     known, path = facts or Facts(), Path(source)
     whole = read_source(path, wanted or Wanted(), known.offset_s)
-    found = source_without_unnamed_pictures(whole, known)
+    found = with_named_pictures(whole, known)
     if output is not None:
         folder = Path(output)
         robot = _known_robot(known.robot or folder.resolve().name)  # Writing may replace the folder that one is in
@@ -216,8 +196,8 @@ class Prediction:
 
     poses: pd.DataFrame
     horizon_s: float
-    error: Agreement
-    clocks: Clocks
+    error: diagnosis.Agreement
+    clocks: diagnosis.Clocks
     notes: tuple[str, ...] = ()
     cautions: tuple[str, ...] = ()
 
@@ -314,30 +294,30 @@ def predict(
         if frames is not None:
             folder = Path(frames)
             numbers, errors = list[int](), list[float]()
-            for part in predict_pictures(drives, _robot_of(fitted, drives, catalogue), fitted.theta):
+            for part in diagnosis.predict_pictures(drives, _robot_of(fitted, drives, catalogue), fitted.theta):
                 for number, picture in zip(part.numbers.tolist(), part.pictures, strict=True):
-                    write_picture(folder / (PICTURES % number), picture)
+                    write_picture(folder / (diagnosis.PICTURES % number), picture)
                 numbers += part.numbers.tolist()
                 errors += part.grey_errors.tolist()
                 tell(f"drawing: {len(numbers)} frames")
             # It comes last, so that a list never names what is not there.
-            write_text(folder / "frames.csv", frames_text(drives, frames_of(drives), numbers))
+            write_text(folder / "frames.csv", diagnosis.frames_text(drives, diagnosis.frames_of(drives), numbers))
             return PicturePrediction(folder, len(numbers), float(np.mean(errors)))
         if drives.command == "none":
             hint = "" if drives.frames is None else ", or give --frames to predict those"
             raise InputError(f"{drives.name}: has no commands to predict poses from; give a log of drives{hint}")
         robot = _robot_of(fitted, drives, catalogue)
         cautions = (*fitted.cautions, *log_cautions(drives, robot.figures))
-        corrected, clocks = on_one_clock(drives, robot)
+        corrected, clocks = diagnosis.on_one_clock(drives, robot)
         # Else a log is predicted whole, as it was recorded, long rests and all.
         drives = corrected if clocks.differ else drives
-        table = predict_poses(drives, robot, fitted.theta, horizon_s)
+        table = diagnosis.predict(drives, robot, fitted.theta, horizon_s)
         notes = tuple(clocks_notes(drives.name, [clocks], {}))
-        return Prediction(table, horizon_s, agreement(table, drives, horizon_s), clocks, notes, cautions)
+        return Prediction(table, horizon_s, diagnosis.agreement(table, drives, horizon_s), clocks, notes, cautions)
 
 
 def _robot_of(model: Model, log: Log, catalogue: Catalogue) -> Robot:
     if model.robot in robot_names(catalogue.folder):
-        return robot_of(log, model.robot, catalogue)
+        return diagnosis.robot_of(log, model.robot, catalogue)
     robot = robot_from_geometry(model.robot, model.geometry or log.geometry, log.rate_hz)
     return replace(robot, catalogue=catalogue)

@@ -138,9 +138,8 @@ def tune(
         }
         code = (meaning_of_code(one) for one in (simulator, *(agents or {}).values()))
         identity = digest(*code, names, sorted((domain or {}).items()))
-        family = GivenFamily(
-            simulate, own, {one.name: "" for one in settings.metrics}, names, settings.starts, identity
-        )
+        units = {one.name: "" for one in settings.metrics}
+        family = GivenFamily(simulate, own, units, names, settings.starts, identity)
         study = open_settings(settings, family)
         return run_quietly(study, progress, _known(study, known))
 
@@ -180,9 +179,7 @@ def _known(study: Study, known: pd.DataFrame | Iterable[Theta]) -> list[Outcome 
         if not isinstance(known, pd.DataFrame):
             found.append(theta)
             continue
-        episodes = {
-            (episode.agent, str(episode.start)): episode for episode in plan_episodes(settings, theta, settings.seed)
-        }
+        episodes = {(one.agent, str(one.start)): one for one in plan_episodes(settings, theta, settings.seed)}
         episode = episodes.get((str(row.get("agent")), str(row.get("episode", 0))))
         if episode is None:
             starts = f"episode 0 to {settings.starts - 1}"

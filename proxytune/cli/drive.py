@@ -5,6 +5,7 @@ import argparse
 from rich.console import Group
 from rich.text import Text
 
+from proxytune import study
 from proxytune.api import choose_theta
 from proxytune.cli.options import study_folder
 from proxytune.cli.terminal import Answer, waiting
@@ -12,46 +13,37 @@ from proxytune.domain import DomainFamily, make_episode
 from proxytune.errors import InputError
 from proxytune.report import NO_PLACES, check_episode_file, episode_document, episode_text, say_parting, write_episode
 from proxytune.seeds import episode_seed
-from proxytune.study import (
-    can_record,
-    cautions_of,
-    check_episode,
-    drive_side_by_side,
-    load_family,
-    load_target,
-    read_study_settings,
-)
 
 
 def run(arguments: argparse.Namespace) -> Answer:
     """Drive the episode on every side, and draw it if that is asked for."""
-    settings = read_study_settings(study_folder(arguments.path))
-    family = load_family(settings, settings.proxy)
+    settings = study.read_study_settings(study_folder(arguments.path))
+    family = study.load_family(settings, settings.proxy)
     _check(arguments, family)
     model, option = (arguments.against, "--against") if arguments.against else (settings.truth, "truth")
-    target = load_target(settings, family, model, option) if model else None
-    chosen = choose_theta(arguments.theta, settings, family, "--theta")
+    target = study.load_target(settings, family, model, option) if model else None
+    theta, origin = choose_theta(arguments.theta, settings, family, "--theta")
     seed = settings.seed if arguments.seed is None else arguments.seed
-    check_episode(family, arguments.agent, chosen.theta, arguments.start)
+    study.check_episode(family, arguments.agent, theta, arguments.start)
     own_seed = episode_seed(seed, arguments.start)
-    episode = make_episode(chosen.theta, agent=arguments.agent, start=arguments.start, seed=own_seed)
+    episode = make_episode(theta, agent=arguments.agent, start=arguments.start, seed=own_seed)
     with waiting("driving"):
-        pair = drive_side_by_side(family, target, episode, filmed=arguments.output is not None)
+        pair = study.drive_side_by_side(family, target, episode, filmed=arguments.output is not None)
     compared = [metric.name for metric in settings.metrics]
     if arguments.output:
         write_episode(pair, compared, arguments.output)
     files = {"against": str(model) if model else None, "output": str(arguments.output) if arguments.output else None}
-    cautions = list(dict.fromkeys(line for side in (family, target) if side for line in cautions_of(side)))
-    document = {**episode_document(pair, seed), "theta_from": chosen.origin, **files, "cautions": cautions}
+    cautions = list(dict.fromkeys(line for side in (family, target) if side for line in study.cautions_of(side)))
+    document = {**episode_document(pair, seed), "theta_from": origin, **files, "cautions": cautions}
     agent, start = pair.episode.agent, pair.episode.start
     own = agent in settings.agents and start < settings.starts and seed == settings.seed
     against = "none to drive in, as study.toml names no `truth`; --against MODEL gives one"
-    values = ", ".join(f"{name}={value:.4g}" for name, value in sorted(chosen.theta.items()))
+    values = ", ".join(f"{name}={value:.4g}" for name, value in sorted(theta.items()))
     words = {"best": "proxy: the study's best θ", "nominal": "proxy: the nominal θ", "given": "proxy: the θ given"}
     about = [
         *(f"beware: {line}" for line in cautions),
         f"{agent} from start {start} under seed {seed}, as in {'every' if own else 'no'} trial of this study",
-        f"{words[chosen.origin]}{': ' if values else ''}{values}",
+        f"{words[origin]}{': ' if values else ''}{values}",
         f"target: {f'{model}, under the same seed' if model else against}",
         "",
     ]
@@ -64,5 +56,5 @@ def _check(arguments: argparse.Namespace, family: DomainFamily) -> None:
         raise InputError(f"--seed must be at least 0, got {arguments.seed}")
     if arguments.output:
         check_episode_file(arguments.output)
-        if not can_record(family):
+        if not study.can_record(family):
             raise InputError(f"--output {arguments.output}: {NO_PLACES}; leave the option out to see its metrics")

@@ -12,7 +12,7 @@ from proxytune.cli.options import check_made, study_folder, typed
 from proxytune.cli.terminal import Answer, Steps
 from proxytune.files import check_place
 from proxytune.logs import Log
-from proxytune.loop import Closed, run_loop, text_of
+from proxytune.loop import Closed, Teller, run_loop, text_of
 from proxytune.running import Bars, Watcher
 
 
@@ -32,7 +32,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     return Answer(document, text_of(report.closed, page))
 
 
-class Terminal:
+class Terminal(Teller):
     """Tells on standard error how a loop goes."""
 
     def say(self, line: str) -> None:

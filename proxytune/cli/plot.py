@@ -8,33 +8,13 @@ from typing import Any
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from proxytune import report, study
 from proxytune.api import StudyReport, read_families
 from proxytune.cli.options import typed
 from proxytune.cli.study import families_answer
 from proxytune.cli.terminal import Answer
-from proxytune.report import (
-    curve_name,
-    figures_of_sweep,
-    held_alike,
-    held_values,
-    save_figures,
-    study_document,
-    study_text,
-    write_study_tables,
-    write_sweep_page,
-)
 from proxytune.scores import Metric
 from proxytune.storage import Store
-from proxytune.study import (
-    Spent,
-    StudyResult,
-    StudyRun,
-    open_read_only,
-    read_study_settings,
-    rescored,
-    result_of,
-    with_metrics,
-)
 from proxytune.sweep import SweepCurve, all_curves
 
 RESCORED = "rescored"
@@ -43,44 +23,43 @@ RESCORED = "rescored"
 def run(arguments: argparse.Namespace) -> Answer:
     """Draw the figures of study and sweeps, and write report and tables; of other metrics into a folder of theirs."""
     metrics = [Metric.parse(text) for text in arguments.metric]
-    settings = read_study_settings(arguments.path)
+    settings = study.read_study_settings(arguments.path)
     if settings.families and not metrics:
         return families_answer(read_families(settings.path), {})
     settings.check_single()
     with Store.read(settings.home) as store:
-        run = open_read_only(settings, store)
+        run = study.open_read_only(settings, store)
         result, curves = _read(run, metrics)
     names = [re.sub(r"[^\w.-]+", "_", str(metric).replace("%", "percent")) for metric in metrics]
     folder = settings.home / RESCORED / "+".join(names) if names else settings.home
-    drawn = figures_of_sweep(curves, run.study.truth)
-    figures = save_figures(drawn, folder / "figures")
+    drawn = report.figures_of_sweep(curves, run.study.truth)
+    figures = report.save_figures(drawn, folder / "figures")
     shown = result.study.settings if result else settings
-    latest, command = list({curve_name(curve): curve for curve in curves}.values()), typed(arguments)
-    pages = [
-        str(write_sweep_page(shown, alike, drawn, folder / "figures", held_values(alike[0].base), command))
-        for alike in held_alike(latest)
-    ]
+    latest, command = list({report.curve_name(curve): curve for curve in curves}.values()), typed(arguments)
+    pages = []
+    for alike in report.held_alike(latest):
+        held = report.held_values(alike[0].base)
+        pages.append(str(report.write_sweep_page(shown, alike, drawn, folder / "figures", held, command)))
     document: dict[str, Any] = {}
     if result:
-        found = StudyReport(result, Spent())
-        own_figures, report = found.write(folder, command if metrics else "")
+        found = StudyReport(result, study.Spent())
+        own_figures, page = found.write(folder, command if metrics else "")
         figures = [*own_figures, *figures]
-        tables = [str(path) for path in write_study_tables(result, found.trials(), folder / "figures")]
-        document = {**study_document(result), "report": str(report), "tables": tables}
+        tables = [str(path) for path in report.write_study_tables(result, found.trials(), folder / "figures")]
+        document = {**report.study_document(result), "report": str(page), "tables": tables}
     paths = [str(path) for path in figures]
-    text: RenderableType = Text(
-        "\n".join([*paths, *pages, *document.get("tables", ()), *filter(None, [document.get("report")])])
-    )
+    written = [*paths, *pages, *document.get("tables", ()), *filter(None, [document.get("report")])]
+    text: RenderableType = Text("\n".join(written))
     if result and metrics:
         named = ", ".join(str(metric) for metric in shown.metrics)
         note = f"none run; scored with {named}; the trials are still those that the study's own metrics led to"
-        text = Group(study_text(result, note, {}), text)
+        text = Group(report.study_text(result, note, {}), text)
     return Answer({**document, "figures": paths, "pages": pages}, text)
 
 
-def _read(run: StudyRun, metrics: Sequence[Metric]) -> tuple[StudyResult | None, Sequence[SweepCurve]]:
+def _read(run: study.StudyRun, metrics: Sequence[Metric]) -> tuple[study.StudyResult | None, Sequence[SweepCurve]]:
     """The study's result, if it has any trial or no sweep either, and its curves."""
-    curves = all_curves(run.of(with_metrics(run.study, metrics)) if metrics else run)
+    curves = all_curves(run.of(study.with_metrics(run.study, metrics)) if metrics else run)
     if curves and not run.store.trials(run.study.objective.name):
         return None, curves
-    return rescored(run, metrics) if metrics else result_of(run), curves
+    return study.rescored(run, metrics) if metrics else study.result_of(run), curves

@@ -15,17 +15,9 @@ def run(arguments: argparse.Namespace) -> Answer:
     """Predict poses or pictures, write them, and compare them with those measured."""
     folder = arguments.output if arguments.frames else None
     check_place(arguments.output, folder=arguments.frames)
-    wanted, facts = wanted_of(arguments), facts_of(arguments)
+    chosen = {"horizon_s": arguments.horizon, "wanted": wanted_of(arguments), "facts": facts_of(arguments)}
     with waiting("predicting") as tell:
-        found = predict(
-            arguments.model,
-            arguments.log,
-            horizon_s=arguments.horizon,
-            frames=folder,
-            wanted=wanted,
-            facts=facts,
-            tell=tell,
-        )
+        found = predict(arguments.model, arguments.log, frames=folder, tell=tell, **chosen)
     if isinstance(found, PicturePrediction):
         return Answer(found.document(), Text(f"{found.sentence}\n{arguments.output}"))
     write_text(arguments.output, found.poses.to_csv(index=False))

@@ -6,49 +6,17 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from proxytune import report, scores, usefulness
 from proxytune.cli.options import typed
 from proxytune.cli.terminal import Answer
 from proxytune.errors import InputError
 from proxytune.files import check_place
-from proxytune.report import (
-    check_table_file,
-    foot_of,
-    ranking_document,
-    score_document,
-    score_text,
-    sequential_sentence,
-    write_score_report,
-    write_score_table,
-)
-from proxytune.scores import (
-    LABELS,
-    Metric,
-    ScoreTable,
-    both_metrics,
-    check_sides,
-    column_names,
-    expand,
-    read_domains,
-    read_scores,
-)
 from proxytune.settings import nearest
-from proxytune.usefulness import (
-    FEWEST_RESAMPLES,
-    MOST_RESAMPLES,
-    Asked,
-    Assessment,
-    Selection,
-    Sequential,
-    assess_each,
-    chosen,
-    in_common,
-    sequential_test,
-)
 
 
 def read_sides(
     arguments: argparse.Namespace, metrics: Sequence[str]
-) -> tuple[tuple[str, ScoreTable], dict[str, ScoreTable]]:
+) -> tuple[tuple[str, scores.ScoreTable], dict[str, scores.ScoreTable]]:
     """The target with its name, and every proxy by name."""
     columns: dict[str, str] = {}
     for pair in filter(None, arguments.columns.split(",")):
@@ -66,10 +34,10 @@ def _check_other_column(arguments: argparse.Namespace, metrics: Sequence[str]) -
     """Refuse to compare a column with itself."""
     for source in set(arguments.target) & set(arguments.proxy):
         path, domain = split_source(source)
-        header = column_names(path, domain)
+        header = scores.column_names(path, domain)
         if domain is None and "domain" in header:
             continue
-        check_sides(source, header, metrics)
+        scores.check_sides(source, header, metrics)
 
 
 def _metrics_given(arguments: argparse.Namespace) -> list[str]:
@@ -78,12 +46,12 @@ def _metrics_given(arguments: argparse.Namespace) -> list[str]:
     known = arguments.metric or []
     if known and not any("*" in text or "?" in text for text in known):
         return list(known)
-    header = column_names(path, domain)
+    header = scores.column_names(path, domain)
     if known:
-        return expand(known, header)
-    found = both_metrics(header)
+        return scores.expand(known, header)
+    found = scores.both_metrics(header)
     if not found or not all("success" in name for name in found):
-        known = found or [name for name in header if name not in LABELS]
+        known = found or [name for name in header if name not in scores.LABELS]
         told = f"; the table has {', '.join(known)[:80]}" if known else ""
         raise InputError(f"--metric is missing: say what is compared and whether more is better, NAME:max{told}")
     return [f"{name}:max" for name in found]
@@ -98,7 +66,7 @@ def split_source(source: str) -> tuple[Path, str | None]:
 
 
 def _check_columns(columns: Mapping[str, str], files: Sequence[Path]) -> None:
-    found = list(dict.fromkeys(name for path in files for name in column_names(path))) if columns else []
+    found = list(dict.fromkeys(name for path in files for name in scores.column_names(path))) if columns else []
     for name, theirs in columns.items():
         if theirs not in found:
             raise InputError(f"--columns {name}={theirs}: no table has a column '{theirs}'; {nearest(theirs, found)}")
@@ -106,28 +74,28 @@ def _check_columns(columns: Mapping[str, str], files: Sequence[Path]) -> None:
 
 def _read_target(
     sources: Sequence[str], metrics: Sequence[str], columns: Mapping[str, str], *, both: bool
-) -> tuple[str, ScoreTable]:
+) -> tuple[str, scores.ScoreTable]:
     parts = [split_source(source) for source in sources]
     if len({domain for _, domain in parts}) > 1:
         raise InputError(f"--target {sources[1]}: several files make one table; give all of them one domain, or none")
     paths, domain = [path for path, _ in parts], parts[0][1]
     name = domain or ("real" if both else ", ".join(path.stem for path in paths))
-    return name, read_scores(paths, metrics, domain, _present(columns, paths), "target")
+    return name, scores.read_scores(paths, metrics, domain, _present(columns, paths), "target")
 
 
 def _read_proxies(
     sources: Sequence[str], target: Sequence[str], metrics: Sequence[str], columns: Mapping[str, str]
-) -> dict[str, ScoreTable]:
+) -> dict[str, scores.ScoreTable]:
     """Every proxy by name: its domain, or its file's name, or what was typed where those are not unique."""
     of_target = dict(map(split_source, target))
-    proxies: dict[str, ScoreTable] = {}
+    proxies: dict[str, scores.ScoreTable] = {}
     for source in sources:
         path, domain = split_source(source)
         here = _present(columns, [path])
         if domain:
-            tables = {domain: read_scores(path, metrics, domain, here, "proxy")}
+            tables = {domain: scores.read_scores(path, metrics, domain, here, "proxy")}
         else:
-            tables = read_domains(path, metrics, here, "proxy")
+            tables = scores.read_domains(path, metrics, here, "proxy")
         if not domain and len(tables) > 1 and of_target.get(path):
             tables.pop(of_target[path] or "", None)
         for label, table in tables.items():
@@ -141,7 +109,7 @@ def _read_proxies(
 
 def _present(columns: Mapping[str, str], paths: Sequence[Path]) -> dict[str, str]:
     """Those of the column map that these files have: another table may have the names of this program."""
-    found = {name for path in paths for name in column_names(path)} if columns else set()
+    found = {name for path in paths for name in scores.column_names(path)} if columns else set()
     return {name: theirs for name, theirs in columns.items() if theirs in found}
 
 
@@ -160,32 +128,32 @@ def _sides_given(arguments: argparse.Namespace) -> None:
 
 def run(arguments: argparse.Namespace) -> Answer:
     """Score one proxy, or rank several."""
-    if not FEWEST_RESAMPLES <= arguments.resamples <= MOST_RESAMPLES or arguments.seed < 0:
-        between = f"{FEWEST_RESAMPLES} and {MOST_RESAMPLES}"
+    if not usefulness.FEWEST_RESAMPLES <= arguments.resamples <= usefulness.MOST_RESAMPLES or arguments.seed < 0:
+        between = f"{usefulness.FEWEST_RESAMPLES} and {usefulness.MOST_RESAMPLES}"
         raise InputError(f"--resamples must be between {between}, and --seed at least 0")
     if arguments.table:
-        check_table_file("--table", arguments.table)
+        report.check_table_file("--table", arguments.table)
         check_place(arguments.table)
     if arguments.output:
         check_place(arguments.output, folder=True)
     _sides_given(arguments)
     arguments.metric = _metrics_given(arguments)
-    metrics = [Metric.parse(text) for text in arguments.metric]
+    metrics = [scores.Metric.parse(text) for text in arguments.metric]
     (target_name, target), proxies = read_sides(arguments, [metric.name for metric in metrics])
     left_out: Sequence[str] = ()
     if arguments.common:
         sides = {"the target": target, **{f"the proxy {name}": one for name, one in proxies.items()}}
-        kept, left_out = in_common(sides)
+        kept, left_out = usefulness.in_common(sides)
         target, proxies = kept.pop("the target"), dict(zip(proxies, kept.values(), strict=True))
     if arguments.unpaired:
         target = target.unpaired()
         proxies = {name: table.unpaired() for name, table in proxies.items()}
-    assessments, selection = assess_each(
+    assessments, selection = usefulness.assess_each(
         proxies=proxies,
         target=target,
         metrics=metrics,
         beta=_weights(arguments.beta),
-        asked=Asked(arguments.decide_on, arguments.rollouts, arguments.regret),
+        asked=usefulness.Asked(arguments.decide_on, arguments.rollouts, arguments.regret),
         resamples=arguments.resamples,
         seed=arguments.seed,
     )
@@ -193,35 +161,35 @@ def run(arguments: argparse.Namespace) -> Answer:
     written = _write(arguments, assessments, selection, target_name) if arguments.output else {"figures": []}
     document = {"target": target_name, **written, "left_out": list(left_out)}
     if arguments.table:
-        write_score_table(assessments, arguments.table)
+        report.write_score_table(assessments, arguments.table)
         document["table"] = str(arguments.table)
     if tested is not None:
         document["sequential"] = asdict(tested)
     return _answer(document, assessments, selection, tested)
 
 
-def _test(assessments: Mapping[str, Assessment], arguments: argparse.Namespace) -> Sequential:
+def _test(assessments: Mapping[str, usefulness.Assessment], arguments: argparse.Namespace) -> usefulness.Sequential:
     if len(assessments) > 1:
         raise InputError("--sequential: takes one proxy; name the one to bet by")
     ((_, assessment),) = assessments.items()
-    columns, name = chosen(assessment.inputs, arguments.decide_on)
+    columns, name = usefulness.chosen(assessment.inputs, arguments.decide_on)
     if len(columns) > 1:
         raise InputError(f"--sequential: takes one metric, not the {name}; name it with --decide-on")
-    return sequential_test(assessment.inputs, columns[0], seed=arguments.seed)
+    return usefulness.sequential_test(assessment.inputs, columns[0], seed=arguments.seed)
 
 
 def _answer(
     document: dict[str, Any],
-    assessments: Mapping[str, Assessment],
-    selection: Selection | None,
-    tested: Sequential | None,
+    assessments: Mapping[str, usefulness.Assessment],
+    selection: usefulness.Selection | None,
+    tested: usefulness.Sequential | None,
 ) -> Answer:
-    lines = [*document["left_out"], *([f"sequential test: {sequential_sentence(tested)}"] if tested else ())]
-    shown = score_text(assessments, selection, lines, target=document["target"])
+    lines = [*document["left_out"], *([f"sequential test: {report.sequential_sentence(tested)}"] if tested else ())]
+    shown = report.score_text(assessments, selection, lines, target=document["target"])
     if selection is not None:
-        return Answer(document | ranking_document(assessments, selection), shown)
+        return Answer(document | report.ranking_document(assessments, selection), shown)
     ((name, assessment),) = assessments.items()
-    return Answer({"proxy": name, **document, **score_document(assessment)}, shown)
+    return Answer({"proxy": name, **document, **report.score_document(assessment)}, shown)
 
 
 def _weights(texts: Sequence[str]) -> dict[str, float] | None:
@@ -238,9 +206,12 @@ def _weights(texts: Sequence[str]) -> dict[str, float] | None:
 
 
 def _write(
-    arguments: argparse.Namespace, assessments: Mapping[str, Assessment], selection: Selection | None, target: str
+    arguments: argparse.Namespace,
+    assessments: Mapping[str, usefulness.Assessment],
+    selection: usefulness.Selection | None,
+    target: str,
 ) -> dict[str, Any]:
     settings = [("metrics", ", ".join(arguments.metric)), ("resamples", str(arguments.resamples))]
-    foot = foot_of(typed(arguments), [*settings, ("seed", str(arguments.seed))])
-    figures, page = write_score_report(assessments, selection, arguments.output, foot, target=target)
+    foot = report.foot_of(typed(arguments), [*settings, ("seed", str(arguments.seed))])
+    figures, page = report.write_score_report(assessments, selection, arguments.output, foot, target=target)
     return {"figures": [str(path) for path in figures], "report": str(page)}

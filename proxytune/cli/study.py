@@ -8,23 +8,12 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from proxytune.api import FamiliesReport, Spending, most_episodes, run_opened, run_opened_families
+from proxytune import report
+from proxytune.api import FamiliesReport, most_episodes, run_opened, run_opened_families
 from proxytune.cli.options import check_made, on_its_cluster, study_folder
 from proxytune.cli.terminal import Answer
 from proxytune.errors import ProxytuneError
 from proxytune.files import check_place
-from proxytune.report import (
-    RENEW_S,
-    bank_document,
-    bank_text,
-    families_text,
-    plv_document,
-    plv_text,
-    study_text,
-    write_bank_page,
-    write_live_page,
-    write_plv_report,
-)
 from proxytune.running import Bars, Watcher
 from proxytune.search import make_proposer
 from proxytune.storage import Store, locked
@@ -71,7 +60,7 @@ class LivePage:
         if begin >= self._due:
             self.write(self._doing)
             end = time.monotonic()
-            self._due = end + max(RENEW_S, (end - begin) / MOST_ON_PAGE)
+            self._due = end + max(report.RENEW_S, (end - begin) / MOST_ON_PAGE)
 
     def write(self, doing: str) -> None:
         """Write the page, and say at the first time where it is."""
@@ -79,7 +68,7 @@ class LivePage:
         with suppress(ProxytuneError):
             with Store.read(self._settings.home) as store:
                 trials = [one for one in store.trials(self._objective) if one.state != "open"]
-            write_live_page(self._path, self._settings, self._objective, trials, doing)
+            report.write_live_page(self._path, self._settings, self._objective, trials, doing)
             if not self.written:
                 _say(f"page: {self._path} (renews itself while the study runs)")
             self.written = True
@@ -100,11 +89,11 @@ def renewed_page(
             raise
 
 
-def families_answer(report: FamiliesReport, spent: Mapping[str, Any]) -> Answer:
+def families_answer(several: FamiliesReport, spent: Mapping[str, Any]) -> Answer:
     """Draw the figure and the page of several families, and say what was found and spent."""
-    figure, page = report.write()
-    document = {**report.document(), **spent, "figures": [str(figure)], "report": str(page)}
-    return Answer(document, families_text(report.compared, {"figure": figure, "report": page}))
+    figure, page = several.write()
+    document = {**several.document(), **spent, "figures": [str(figure)], "report": str(page)}
+    return Answer(document, report.families_text(several.compared, {"figure": figure, "report": page}))
 
 
 def _say(line: str) -> None:
@@ -130,25 +119,25 @@ def search_by_plv(study: Study, folder: Path, by_prpv: Callable[[], StudyResult]
         search = PlvSearch(settings, setup, store, space, bars)
         chosen = predictive.best.trial.theta if predictive else None
         result = search.run(make_proposer(study.engine, settings.initial), chosen)
-    figure, page = write_plv_report(result, folder)
-    document = {**plv_document(result), "figure": str(figure), "report": str(page)}
-    return Answer(document, plv_text(result, {"figure": figure, "report": page}))
+    figure, page = report.write_plv_report(result, folder)
+    document = {**report.plv_document(result), "figure": str(figure), "report": str(page)}
+    return Answer(document, report.plv_text(result, {"figure": figure, "report": page}))
 
 
-def run_a_bank(settings: StudySettings, spending: Spending) -> Answer:
+def run_a_bank(settings: StudySettings, arguments: argparse.Namespace) -> Answer:
     """Run what is left of a bank, and write its table of trials and its page."""
     check_place(settings.home / BANK_FILE, ours=True)
-    study = with_spending(open_bank(settings), budget=spending.budget, jobs=spending.jobs)
+    study = with_spending(open_bank(settings), budget=arguments.budget, jobs=arguments.jobs)
     with locked(settings.home), Store.open(settings.home) as store, Bars(most_episodes(study.settings)) as bars:
-        if spending.retry_failed:
+        if arguments.retry_failed:
             store.forget_failures()
         run = StudyRun(study, store, bars)
         run_bank(run)
         bank, table = bank_of(run), write_table(run)
-    files = {"table": table, "report": write_bank_page(bank, table)}
+    files = {"table": table, "report": report.write_bank_page(bank, table)}
     costs = {"episodes": {"run": run.spent.episodes}, "seconds": {"episodes": run.spent.seconds}}
-    document = {**bank_document(bank), **costs, **{name: str(path) for name, path in files.items()}}
-    return Answer(document, bank_text(bank, files))
+    document = {**report.bank_document(bank), **costs, **{name: str(path) for name, path in files.items()}}
+    return Answer(document, report.bank_text(bank, files))
 
 
 @on_its_cluster
@@ -159,11 +148,12 @@ def run(arguments: argparse.Namespace) -> Answer:
     settings, again = read_study_settings(folder), arguments.retry_failed
     check_made(folder)
     if settings.families:
-        report = run_opened_families(settings, Spending(arguments.budget, arguments.jobs, again), _say, _bars)
-        seconds = {"total": time.perf_counter() - begun, "episodes": report.spent.seconds}
-        return families_answer(report, {"episodes": {"run": report.spent.episodes}, "seconds": seconds})
+        own = {"budget": arguments.budget, "jobs": arguments.jobs}
+        several = run_opened_families(settings, _say, _bars, retry_failed=again, **own)
+        seconds = {"total": time.perf_counter() - begun, "episodes": several.spent.seconds}
+        return families_answer(several, {"episodes": {"run": several.spent.episodes}, "seconds": seconds})
     if not settings.targets:
-        return run_a_bank(settings, Spending(arguments.budget, arguments.jobs, again))
+        return run_a_bank(settings, arguments)
     study = with_spending(open_settings(settings), budget=arguments.budget, jobs=arguments.jobs)
     if study.settings.objective == LEARNING:
         return search_by_plv(study, folder, lambda: run_opened(study, _bars(study), _say, again).result)
@@ -180,4 +170,4 @@ def run(arguments: argparse.Namespace) -> Answer:
         "report": str(page),
     }
     costs = f"{spent.episodes} run, {reused} reused; {total:.0f} s, of which {outside:.0f} s outside episodes"
-    return Answer(document, study_text(result, costs, {"figures": figures[0].parent, "report": page}))
+    return Answer(document, report.study_text(result, costs, {"figures": figures[0].parent, "report": page}))

@@ -14,14 +14,8 @@ def run(arguments: argparse.Namespace) -> Answer:
     """Simulate what is missing of the sweeps, and draw them."""
     folder = study_folder(arguments.path)
     check_made(folder) if arguments.output is None else check_place(arguments.output, folder=True)
-    report = run_sweep(
-        folder,
-        arguments.parameter,
-        points=arguments.points,
-        at=arguments.at,
-        target_model=arguments.target_model,
-        progress=True,
-    )
+    chosen = {"points": arguments.points, "at": arguments.at, "target_model": arguments.target_model}
+    report = run_sweep(folder, arguments.parameter, progress=True, **chosen)
     figures, files = report.write(arguments.output, typed(arguments))
     document = report.document()
     at = document.pop("at")

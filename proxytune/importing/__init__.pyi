@@ -2,7 +2,7 @@ from .reading import (
     as_log as as_log,
     open_log as open_log,
     read_source as read_source,
-    source_without_unnamed_pictures as source_without_unnamed_pictures,
+    with_named_pictures as with_named_pictures,
     write_log as write_log,
 )
 from .source import (

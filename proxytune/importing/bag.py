@@ -236,9 +236,8 @@ def _clock_notes(header: Floats, received: Floats, where: str) -> tuple[str, ...
             "--stamps receive takes the bag's times."
         )
     if abs(drift) > DRIFT_S:
-        notes.append(
-            f"The clock of the headers of {where} drifts by {1e3 * drift:+.0f} ms against the bag's over the drive."
-        )
+        by = f"{1e3 * drift:+.0f} ms"
+        notes.append(f"The clock of the headers of {where} drifts by {by} against the bag's over the drive.")
     return tuple(notes)
 
 
@@ -268,8 +267,8 @@ def collect(bag: Bag, topic: str, row_of: Callable[[Any], Row], *, finite: bool 
     if not rows:
         raise LogError(f"{bag.path}: {topic}: no messages; take another topic, or leave the bag out")
     with complaints(bag.path, f"{topic}: has stamps that are no times"):
-        stamped = None if headers[0] is None else whole(headers)
-        return Stamps(stamped, whole(receives)), np.array(rows, dtype=np.float64)
+        stamped = None if headers[0] is None else np.array(headers, dtype=np.int64)
+        return Stamps(stamped, np.array(receives, dtype=np.int64)), np.array(rows, dtype=np.float64)
 
 
 def read_commands(bag: Bag, topic: str, kind: str, stamps: str) -> tuple[Commands, tuple[str, ...]]:
@@ -303,11 +302,6 @@ def header_ns(message: Any) -> int | None:
     """The stamp in a message's header [ns], or None where the type has none."""
     header = getattr(message, "header", None)
     return None if header is None else int(header.stamp.sec) * 10**9 + int(header.stamp.nanosec)
-
-
-def whole(values: list[Any]) -> Whole:
-    """Whole numbers as an array."""
-    return np.array(values, dtype=np.int64)
 
 
 def frame_of(message: Any) -> str:

@@ -1,4 +1,7 @@
-"""Scene of a bag: frames that move against each other, the chain between two, and pictures as red, green and blue."""
+"""Scene of a bag: frames that move against each other, the chain between two, and pictures as red, green and blue.
+
+Poses out of a chain of transforms are composed, and interpolated where these come at different times.
+"""
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
@@ -10,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation, Slerp
 
 from proxytune.arrays import Floats
 from proxytune.errors import InputError, LogError
@@ -23,9 +27,9 @@ from proxytune.importing.bag import (
     header_ns,
     open_bag,
     pose_of,
-    whole,
 )
-from proxytune.importing.source import Pictures
+from proxytune.importing.checks import complaint, headings_and_tilts, no_rotation
+from proxytune.importing.source import Pictures, Poses
 from proxytune.logs import BROKEN
 from proxytune.unpacking import open_picture
 
@@ -64,7 +68,7 @@ def read_transforms(bag: Bag, topics: tuple[str, ...]) -> dict[str, Transform]:
     for name, some in rows.items():
         header, receive, values = zip(*some, strict=True)
         with complaints(bag.path, f"{name}: has stamps that are no times"):
-            stamps = Stamps(whole(list(header)), whole(list(receive)))
+            stamps = Stamps(*(np.array(one, dtype=np.int64) for one in (header, receive)))
         transforms[name] = Transform(name, stamps, np.array(values, dtype=np.float64))
     return transforms
 
@@ -90,6 +94,59 @@ def chain_of(transforms: dict[str, Transform], name: str, where: str) -> list[Tr
     if not any(transform.moves for transform in chain):
         raise LogError(f"{where}: {name} never moves; {_remedy(transforms)}")
     return chain
+
+
+def read_chain(transforms: dict[str, Transform], name: str, stamps: str, where: str) -> tuple[Poses, tuple[str, ...]]:
+    """Poses of a child in a parent ("map>base_link"), at the times of the transform between them that comes most often.
+
+    Other moving transforms are interpolated to these times; poses outside of what they cover are left out.
+    """
+    chain = chain_of(transforms, name, where)
+    for transform in chain:
+        _check_numbers(transform, where)
+    choices = {each.name: choose_times(each.stamps, stamps, each.name) for each in chain if each.moves}
+    times = {moving: of_it for moving, (of_it, _) in choices.items()}
+    most = max(times.values(), key=len)
+    first, last = max(other.min() for other in times.values()), min(other.max() for other in times.values())
+    common = most[(most >= first) & (most <= last)]
+    if not len(common):
+        raise LogError(f"{where}: the transforms of {name} share no time; name another pair by --poses")
+    place, turn = np.zeros((len(common), 3)), Rotation.identity(1)
+    for transform in chain:
+        step, rotation = _at(transform.values, times.get(transform.name), common)
+        place, turn = place + turn.apply(step), turn * rotation
+    said = (note for _, notes in choices.values() for note in notes)
+    poses = Poses(common, place, *headings_and_tilts(turn.as_quat(), f"{where}: {name}"))
+    parent, _, child = name.partition(">")
+    names, left_out = ", ".join(transform.name for transform in chain), len(most) - len(common)
+    outside = f"; {left_out} outside of what all of them cover are left out" if left_out else ""
+    return poses, (f"Poses of {child} in {parent} are composed of {names}{outside}.", *said)
+
+
+def _check_numbers(transform: Transform, where: str) -> None:
+    """Refuse numbers that are not finite and quaternions that are no rotation."""
+    finite = np.isfinite(transform.values).all(axis=1)
+    if not finite.all():
+        number = int(np.argmin(finite)) + 1
+        raise LogError(f"{where}: transform {transform.name}: number {number} is not finite; name another by --poses")
+    wrong = no_rotation(transform.values[:, 3:])
+    if wrong.any():
+        raise complaint(transform.values[:, 3:], wrong, f"{where}: transform {transform.name}")
+
+
+def _at(values: Floats, times: Floats | None, wanted: Floats) -> tuple[Floats, Rotation]:
+    """Places and rotations at wanted times: straight between two places, by the shortest turn between two rotations.
+
+    Without times, a transform stands still.
+    """
+    if times is None:
+        return values[:1, :3], Rotation.from_quat(values[:1, 3:])
+    if np.array_equal(times, wanted):
+        return values[:, :3], Rotation.from_quat(values[:, 3:])
+    stamps, order = np.unique(times, return_index=True)
+    places = np.stack([np.interp(wanted, stamps, column) for column in values[order, :3].T], axis=1)
+    rotations = Rotation.from_quat(values[order, 3:])
+    return places, Slerp(stamps, rotations)(wanted) if len(stamps) > 1 else rotations
 
 
 def _pairs(transforms: dict[str, Transform], parent: str, child: str) -> list[str]:

@@ -223,9 +223,8 @@ def with_drives(table: Table, columns: Columns) -> Columns:
         return {**columns, "episode": Column("episode", names[0], own_unit("number"), "where stamps go back")}
     either = f"take {' or '.join(names)}" if names else "add a column that names the drive of each row"
     remedy = f"{either}, as in --columns episode={names[0] if names else 'run'}"
-    raise table.error(
-        int(rows[back[0]]), columns["time"].name, f"stamps go back, as where another drive begins; {remedy}"
-    )
+    problem = f"stamps go back, as where another drive begins; {remedy}"
+    raise table.error(int(rows[back[0]]), columns["time"].name, problem)
 
 
 def _names_drives(table: Table, name: str, rows: NDArray[np.intp], back: NDArray[np.intp]) -> bool:

@@ -126,9 +126,8 @@ def read_source(path: Path, wanted: Wanted, offset_s: float = 0.0) -> Source:
         notes += found
     kinds = {drive.commands.kind if drive.commands else "none" for drive in drives}
     if len(kinds) > 1:
-        raise LogError(
-            f"{path}: its drives have commands of several kinds ({', '.join(sorted(kinds))}); import them apart"
-        )
+        several = ", ".join(sorted(kinds))
+        raise LogError(f"{path}: its drives have commands of several kinds ({several}); import them apart")
     surveys = tuple(survey(drive) for drive in drives)
     if kinds != {"none"}:
         notes += [*clock_notes(surveys), *rows_notes(drives)]
@@ -263,7 +262,7 @@ def open_log(path: Path, wanted: Wanted = NOTHING, facts: Facts = NO_FACTS) -> I
         yield read_log(path), ()
         return
     source = read_source(path, wanted, facts.offset_s)
-    with as_log(source_without_unnamed_pictures(source, facts), facts, path) as log:
+    with as_log(with_named_pictures(source, facts), facts, path) as log:
         yield log, source.notes
 
 
@@ -285,7 +284,7 @@ def as_log(source: Source, facts: Facts, path: Path) -> Iterator[Log]:
         yield read_as(folder, path)
 
 
-def source_without_unnamed_pictures(source: Source, facts: Facts) -> Source:
+def with_named_pictures(source: Source, facts: Facts) -> Source:
     """The source without its pictures where nobody says which map they show, and a note of it."""
     if facts.road or all(drive.pictures is None for drive in source.drives):
         return source

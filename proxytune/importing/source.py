@@ -7,7 +7,6 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -169,7 +168,7 @@ class Wanted:
     poses: str = ""
     frames: str = ""
     stamps: str = "header"
-    columns: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    columns: Mapping[str, str] = field(default_factory=dict)
     kind: str = ""
     vesc: Path | None = None
 
@@ -186,7 +185,7 @@ class Facts:
     """
 
     robot: str = ""
-    figures: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    figures: Mapping[str, float] = field(default_factory=dict)
     road: str = ""
     clock_offset: str = ""
 

@@ -34,17 +34,7 @@ from proxytune.importing.columns import (
     with_drives,
 )
 from proxytune.importing.source import Channel, Commands, Drive, Source, Wanted
-from proxytune.importing.text import (
-    COMMAND_FIELDS,
-    EXAMPLE,
-    PLACE,
-    POSE,
-    QUATERNION,
-    Table,
-    first_rows,
-    is_number,
-    read_text_table,
-)
+from proxytune.importing.text import COMMAND_FIELDS, EXAMPLE, POSE, Table, first_rows, is_number, read_text_table
 from proxytune.logs import COMMANDS, ENABLED
 from proxytune.settings import nearest
 
@@ -64,9 +54,8 @@ class CommandFile:
 
 def is_named_as_commands(path: Path) -> bool:
     """True if a file's name says that it holds commands: commands.csv, cmd_vel.csv, run1_commands.csv and so on."""
-    return path.suffix.lower() in COMMAND_SUFFIXES and any(
-        path.stem == stem or path.stem.endswith(f"_{stem}") for stem in STEMS
-    )
+    named = any(path.stem == stem or path.stem.endswith(f"_{stem}") for stem in STEMS)
+    return named and path.suffix.lower() in COMMAND_SUFFIXES
 
 
 def find_commands(path: Path, wanted: Wanted) -> Path | None:
@@ -91,9 +80,7 @@ def find_commands(path: Path, wanted: Wanted) -> Path | None:
 def read_commands(path: Path, wanted: Wanted) -> CommandFile:
     """Read a file of commands: a table with stamps and the columns of one kind of command."""
     table = read_text_table(path)
-    stated = {
-        field: entry for field, entry in wanted.columns.items() if field in COMMAND_FIELDS or named_in(table, entry)
-    }
+    stated = {ours: entry for ours, entry in wanted.columns.items() if ours in COMMAND_FIELDS or named_in(table, entry)}
     found = choose_columns(table, stated, ("time", "episode", *COMMAND_FIELDS))
     columns, kind = with_commands(found, wanted.kind, table)
     used = {field: columns[field] for field in ("time", "episode", *COMMANDS[kind], ENABLED) if field in columns}
@@ -314,12 +301,11 @@ def _choose(folder: Path, robot: str) -> str:
 
 
 def _channels(table: Table, fields: tuple[str, ...], role: str) -> list[Channel]:
-    return [
-        Channel(f"{table.path.name}: {c.name}", c.kind, c.count, role) for c in channels_of(table, own_columns(fields))
-    ]
+    own = channels_of(table, own_columns(fields))
+    return [Channel(f"{table.path.name}: {one.name}", one.kind, one.count, role) for one in own]
 
 
-COLUMNS = ("time", *PLACE, *QUATERNION)
+COLUMNS = ("time", *(field for field in POSE if field != "heading"))
 
 
 def is_tum(path: Path) -> bool:

@@ -10,7 +10,6 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 import pandas as pd
@@ -201,24 +200,22 @@ COMMAND_FIELDS = (*(field for pair in COMMANDS.values() for field in pair), ENAB
 EXAMPLE = "--columns time=stamp_ns:ns,x=pos_x_mm:mm,y=pos_y_mm:mm,heading=yaw_deg:deg,v=cmd_lin,omega=cmd_ang"
 """A column map, for complaints."""
 
-QUANTITIES: Mapping[str, str] = MappingProxyType(
-    {
-        "time": "time",
-        "command_time": "time",
-        "episode": "number",
-        **dict.fromkeys(PLACE, "length"),
-        "heading": "angle",
-        **dict.fromkeys(QUATERNION, "number"),
-        "v": "speed",
-        "omega": "turning speed",
-        **dict.fromkeys(COMMANDS["duty"], "duty"),
-        **dict.fromkeys(COMMANDS["wheel_speed"], "turning speed"),
-        **dict.fromkeys(COMMANDS["ackermann"], "duty"),
-        "speed": "speed",
-        "steering_angle": "angle",
-        ENABLED: "number",
-    }
-)
+QUANTITIES: Mapping[str, str] = {
+    "time": "time",
+    "command_time": "time",
+    "episode": "number",
+    **dict.fromkeys(PLACE, "length"),
+    "heading": "angle",
+    **dict.fromkeys(QUATERNION, "number"),
+    "v": "speed",
+    "omega": "turning speed",
+    **dict.fromkeys(COMMANDS["duty"], "duty"),
+    **dict.fromkeys(COMMANDS["wheel_speed"], "turning speed"),
+    **dict.fromkeys(COMMANDS["ackermann"], "duty"),
+    "speed": "speed",
+    "steering_angle": "angle",
+    ENABLED: "number",
+}
 """What each field measures; episodes and quaternions have no unit."""
 
 TIMES = "t time times stamp stamps timestamp timestamps headerstamp unixtime elapsed elapsedtime sec secs seconds"
@@ -243,25 +240,23 @@ def _filled(pattern: str, *parts: str) -> frozenset[str]:
     return frozenset(name for part in parts for name in pattern.replace("#", part).split())
 
 
-USUAL: Mapping[str, frozenset[str]] = MappingProxyType(
-    {
-        "time": _filled(TIMES, ""),
-        "command_time": frozenset(),  # to be stated
-        "episode": _filled(EPISODES, ""),
-        **{axis: _filled(PLACES, axis) for axis in PLACE},
-        "heading": _filled(HEADINGS, ""),
-        **{field: _filled(QUATERNIONS, field[1]) for field in QUATERNION},
-        "v": _filled(SPEEDS, ""),
-        "omega": _filled(TURNING_SPEEDS, ""),
-        "left": _filled(DUTIES, "left"),
-        "right": _filled(DUTIES, "right"),
-        "wheel_command_left": _filled(WHEEL_SPEEDS, "left"),
-        "wheel_command_right": _filled(WHEEL_SPEEDS, "right"),
-        "throttle": _filled("throttle cmdthrottle throttlecmd throttlecommand gas", ""),
-        "steering": _filled("steering steer cmdsteering steeringcmd steeringcommand", ""),
-        "speed": _filled("speed cmdspeed speedcmd drivespeed commandedspeed commandspeed", ""),
-        "steering_angle": _filled("steeringangle drivesteeringangle cmdsteeringangle steeringanglecmd", ""),
-        ENABLED: _filled("enabled enable motorsenabled motorenabled", ""),
-    }
-)
+USUAL: Mapping[str, frozenset[str]] = {
+    "time": _filled(TIMES, ""),
+    "command_time": frozenset(),  # to be stated
+    "episode": _filled(EPISODES, ""),
+    **{axis: _filled(PLACES, axis) for axis in PLACE},
+    "heading": _filled(HEADINGS, ""),
+    **{field: _filled(QUATERNIONS, field[1]) for field in QUATERNION},
+    "v": _filled(SPEEDS, ""),
+    "omega": _filled(TURNING_SPEEDS, ""),
+    "left": _filled(DUTIES, "left"),
+    "right": _filled(DUTIES, "right"),
+    "wheel_command_left": _filled(WHEEL_SPEEDS, "left"),
+    "wheel_command_right": _filled(WHEEL_SPEEDS, "right"),
+    "throttle": _filled("throttle cmdthrottle throttlecmd throttlecommand gas", ""),
+    "steering": _filled("steering steer cmdsteering steeringcmd steeringcommand", ""),
+    "speed": _filled("speed cmdspeed speedcmd drivespeed commandedspeed commandspeed", ""),
+    "steering_angle": _filled("steeringangle drivesteeringangle cmdsteeringangle steeringanglecmd", ""),
+    ENABLED: _filled("enabled enable motorsenabled motorenabled", ""),
+}
 """Usual names of each field, without underscores and units."""

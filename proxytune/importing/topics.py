@@ -1,32 +1,16 @@
 """A bag, or a folder of bags, as drives with commands, poses and pictures.
 
-A topic is taken by its type, its name and its number of messages, unless the user names it. Poses may come out of a
-chain of transforms: composed, and interpolated where these come at different times.
+A topic is taken by its type, its name and its number of messages, unless the user names it.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-from scipy.spatial.transform import Rotation, Slerp
-
-from proxytune.arrays import Floats
 from proxytune.errors import LogError
-from proxytune.importing.bag import (
-    COMMAND_TYPES,
-    Bag,
-    Topic,
-    bags_in,
-    choose_times,
-    form_of,
-    open_bag,
-    read_commands,
-    read_poses,
-)
-from proxytune.importing.bag_scene import Transform, chain_of, choose_transform, read_pictures, read_transforms
-from proxytune.importing.checks import complaint, headings_and_tilts, no_rotation
-from proxytune.importing.source import Channel, Drive, Poses, Source, Wanted
+from proxytune.importing.bag import COMMAND_TYPES, Bag, Topic, bags_in, form_of, open_bag, read_commands, read_poses
+from proxytune.importing.bag_scene import choose_transform, read_chain, read_pictures, read_transforms
+from proxytune.importing.source import Channel, Drive, Source, Wanted
 from proxytune.importing.vesc import KIND as VESC, pair_topics, read_vesc, servo_of
 from proxytune.logs import COMMANDS
 from proxytune.settings import nearest
@@ -222,59 +206,6 @@ def _part(topic: Topic, choice: Choice) -> str:
         return f"left out: could be {fitting[0].name} as well ({fitting[0].option})"
     near = [role for role, _ in roles if short(topic.kind) in role.ranks]
     return f"left out: {near[0].why_not(topic)}" if near else "left out: neither commands, poses nor pictures"
-
-
-def read_chain(transforms: dict[str, Transform], name: str, stamps: str, where: str) -> tuple[Poses, tuple[str, ...]]:
-    """Poses of a child in a parent ("map>base_link"), at the times of the transform between them that comes most often.
-
-    Other moving transforms are interpolated to these times; poses outside of what they cover are left out.
-    """
-    chain = chain_of(transforms, name, where)
-    for transform in chain:
-        _check(transform, where)
-    choices = {each.name: choose_times(each.stamps, stamps, each.name) for each in chain if each.moves}
-    times = {moving: of_it for moving, (of_it, _) in choices.items()}
-    most = max(times.values(), key=len)
-    first, last = max(other.min() for other in times.values()), min(other.max() for other in times.values())
-    common = most[(most >= first) & (most <= last)]
-    if not len(common):
-        raise LogError(f"{where}: the transforms of {name} share no time; name another pair by --poses")
-    place, turn = np.zeros((len(common), 3)), Rotation.identity(1)
-    for transform in chain:
-        step, rotation = _at(transform.values, times.get(transform.name), common)
-        place, turn = place + turn.apply(step), turn * rotation
-    said = (note for _, notes in choices.values() for note in notes)
-    poses = Poses(common, place, *headings_and_tilts(turn.as_quat(), f"{where}: {name}"))
-    parent, _, child = name.partition(">")
-    names, left_out = ", ".join(transform.name for transform in chain), len(most) - len(common)
-    outside = f"; {left_out} outside of what all of them cover are left out" if left_out else ""
-    return poses, (f"Poses of {child} in {parent} are composed of {names}{outside}.", *said)
-
-
-def _check(transform: Transform, where: str) -> None:
-    """Refuse numbers that are not finite and quaternions that are no rotation."""
-    finite = np.isfinite(transform.values).all(axis=1)
-    if not finite.all():
-        number = int(np.argmin(finite)) + 1
-        raise LogError(f"{where}: transform {transform.name}: number {number} is not finite; name another by --poses")
-    wrong = no_rotation(transform.values[:, 3:])
-    if wrong.any():
-        raise complaint(transform.values[:, 3:], wrong, f"{where}: transform {transform.name}")
-
-
-def _at(values: Floats, times: Floats | None, wanted: Floats) -> tuple[Floats, Rotation]:
-    """Places and rotations at wanted times: straight between two places, by the shortest turn between two rotations.
-
-    Without times, a transform stands still.
-    """
-    if times is None:
-        return values[:1, :3], Rotation.from_quat(values[:1, 3:])
-    if np.array_equal(times, wanted):
-        return values[:, :3], Rotation.from_quat(values[:, 3:])
-    stamps, order = np.unique(times, return_index=True)
-    places = np.stack([np.interp(wanted, stamps, column) for column in values[order, :3].T], axis=1)
-    rotations = Rotation.from_quat(values[order, 3:])
-    return places, Slerp(stamps, rotations)(wanted) if len(stamps) > 1 else rotations
 
 
 def read_bag(path: Path, wanted: Wanted) -> Source:

@@ -10,28 +10,8 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from proxytune import report
 from proxytune.effects import SHIPPED
-from proxytune.report import (
-    BLUE,
-    COLUMN,
-    GREY,
-    LIGHT_GREY,
-    VERMILLION,
-    Table,
-    columns_of,
-    digits,
-    dress,
-    findings,
-    fixed,
-    in_pairs,
-    listed,
-    plain,
-    short,
-    short_span,
-    span,
-    with_span,
-    with_unit,
-)
 from proxytune.space import Theta
 from proxytune.usefulness import Assessment
 
@@ -130,7 +110,7 @@ def lacking(diagnosis: Mapping[str, Any]) -> str:
     """List what the proxy lacks, as in "a dead band and a turn slip"; empty where it has no name."""
     camera = diagnosis["camera"] or {}
     names = [effect["name"] for effect in (*diagnosis["effects"], *camera.get("effects", ()))]
-    return listed([plain(name) for name in dict.fromkeys(names)])
+    return report.listed([report.plain(name) for name in dict.fromkeys(names)])
 
 
 def answer(diagnosis: Mapping[str, Any], rows: Sequence[Compared]) -> str:
@@ -140,7 +120,7 @@ def answer(diagnosis: Mapping[str, Any], rows: Sequence[Compared]) -> str:
         only = f"{rows[0].title}: {level_text(rows[0].before, rows[0].unit)}."
         return f"The log shows nothing to extend the simulator by (verdict: {verdict}). {only}"
     if effects:
-        lacked = f"The simulator lacked: {findings(effects)} (verdict: {verdict})."
+        lacked = f"The simulator lacked: {report.findings(effects)} (verdict: {verdict})."
     else:
         lacked = f"The simulator lacked what no named effect explains (verdict: {verdict}); curves stand in for it."
     chosen = {row.key: row for row in rows}
@@ -150,21 +130,20 @@ def answer(diagnosis: Mapping[str, Any], rows: Sequence[Compared]) -> str:
     return f"{lacked} With it, {'; '.join(_change(row) for row in shown if row)}."
 
 
-def theta_table(before: Known, after: Known | None, diagnosis: Mapping[str, Any]) -> Table:
+def theta_table(before: Known, after: Known | None, diagnosis: Mapping[str, Any]) -> report.Table:
     """θ before and after: what scores alone told, what the log tells, and what the extended proxy has."""
     logged = {**diagnosis["extended"], **(diagnosis["camera"] or {}).get("extended", {})}
     measured = {name: (one["value"], one.get("interval")) for name, one in logged.items() if one["value"] is not None}
     extended = {} if after is None else {**{name: (value, None) for name, (value, _) in measured.items()}, **after}
-    names = dict.fromkeys((*before, *measured, *extended))
-    rows = tuple(
-        (
-            with_unit(name.replace(".", " "), SHIPPED.parameters[name].unit if name in SHIPPED.parameters else ""),
-            *(_known(side.get(name)) for side in (before, measured, extended)),
-        )
-        for name in names
-        if not (name.endswith(".imbalance") and name not in before and measured[name][0] == 0.0)
-    )
-    return Table("θ before and after", columns_of(("parameter",), ("before, by scores", "in the log", "after")), rows)
+    rows = []
+    for name in dict.fromkeys((*before, *measured, *extended)):
+        if name.endswith(".imbalance") and name not in before and measured[name][0] == 0.0:
+            continue
+        unit = SHIPPED.parameters[name].unit if name in SHIPPED.parameters else ""
+        sides = (_known(side.get(name)) for side in (before, measured, extended))
+        rows.append((report.with_unit(name.replace(".", " "), unit), *sides))
+    heads = report.columns_of(("parameter",), ("before, by scores", "in the log", "after"))
+    return report.Table("θ before and after", heads, tuple(rows))
 
 
 def _known(known: tuple[float, Sequence[float | None] | None] | None) -> str:
@@ -172,10 +151,10 @@ def _known(known: tuple[float, Sequence[float | None] | None] | None) -> str:
         return "–"
     low, high = known[1] or (None, None)
     if low is None or high is None or not low < high:
-        return short(known[0], 4)
+        return report.short(known[0], 4)
     # A value that is known to a part in a thousand needs no two figures of its interval.
-    places = max(0, digits((low, high)) - (high - low < 1e-3 * abs(known[0])))
-    return f"{fixed(known[0], places)} ({span((low, high), places)})"
+    places = max(0, report.digits((low, high)) - (high - low < 1e-3 * abs(known[0])))
+    return f"{report.fixed(known[0], places)} ({report.span((low, high), places)})"
 
 
 def following(diagnosis: Mapping[str, Any], studied: str, model: str, theta: Theta) -> str:
@@ -184,14 +163,14 @@ def following(diagnosis: Mapping[str, Any], studied: str, model: str, theta: The
     if drive and diagnosis["verdict"] in OPEN:
         return f"Log {drive['name']} ({drive['description']}), and close the loop with that log."
     if not model and "diagnose" in step:
-        unseen = [plain(name) for name in diagnosis["could_not_be_seen"]]
-        shows = f" that can show {listed(unseen[:MOST_NAMED])}" if unseen else ", longer and more varied"
+        unseen = [report.plain(name) for name in diagnosis["could_not_be_seen"]]
+        shows = f" that can show {report.listed(unseen[:MOST_NAMED])}" if unseen else ", longer and more varied"
         return f"No θ explains the scores, and this log does not tell why: log drives{shows}."
     if not model:
         return f"{step[:1].upper()}{step[1:]}"
     known = {**diagnosis["extended"], **(diagnosis["camera"] or {}).get("extended", {})}
-    rest = [f"{plain(name)} {value:.4g}" for name, value in theta.items() if name not in known]
-    left = f"; what the log does not show is known from scores alone: {listed(rest)}" if rest else ""
+    rest = [f"{report.plain(name)} {value:.4g}" for name, value in theta.items() if name not in known]
+    left = f"; what the log does not show is known from scores alone: {report.listed(rest)}" if rest else ""
     return f"Run your simulator with {model}, which was fitted to the log{left}."
 
 
@@ -200,8 +179,8 @@ def level_text(level: Level | None, unit: str) -> str:
     if level is None:
         return "–"
     if level.chance is not None and level.interval:
-        return in_pairs(level.value, *level.interval)
-    return with_span(f"{short(level.value)}{unit and ' '}{unit}", *(level.interval or (None, None)))
+        return report.in_pairs(level.value, *level.interval)
+    return report.with_span(f"{report.short(level.value)}{unit and ' '}{unit}", *(level.interval or (None, None)))
 
 
 def floor_text(level: Level | None, unit: str) -> str:
@@ -209,11 +188,11 @@ def floor_text(level: Level | None, unit: str) -> str:
     if level is None or (level.floor is None and level.floor_ends is None):
         return "–"
     if level.floor is None and level.floor_ends:
-        return f"{short_span(*level.floor_ends)}{unit and ' '}{unit}"
+        return f"{report.short_span(*level.floor_ends)}{unit and ' '}{unit}"
     assert level.floor is not None
     if level.chance is not None and level.floor_ends:
-        return in_pairs(level.floor, *level.floor_ends)
-    return with_span(f"{short(level.floor)}{unit and ' '}{unit}", *(level.floor_ends or (None, None)))
+        return report.in_pairs(level.floor, *level.floor_ends)
+    return report.with_span(f"{report.short(level.floor)}{unit and ' '}{unit}", *(level.floor_ends or (None, None)))
 
 
 def chance_text(level: Level | None) -> str:
@@ -238,16 +217,16 @@ HALF = 0.3
 
 def prpv_figure(rows: Sequence[Compared]) -> Figure:
     """A panel per set of agents: PRPV before and after with 95 % intervals, over the bracket of the noise floor."""
-    figure = Figure(figsize=(COLUMN, 0.62 * COLUMN), layout="constrained")
+    figure = Figure(figsize=(report.COLUMN, 0.62 * report.COLUMN), layout="constrained")
     panels = figure.subplots(1, len(rows), squeeze=False)[0]
     for axes, row in zip(panels, rows, strict=True):
-        dress(axes)
-        for place, (level, colour) in enumerate(((row.before, VERMILLION), (row.after, BLUE))):
+        report.dress(axes)
+        for place, (level, colour) in enumerate(((row.before, report.VERMILLION), (row.after, report.BLUE))):
             if level is not None:
                 low, high = level.floor_ends or (0.0, 0.0)
-                axes.fill_between([place - HALF, place + HALF], low, high, color=LIGHT_GREY, lw=0)
+                axes.fill_between([place - HALF, place + HALF], low, high, color=report.LIGHT_GREY, lw=0)
                 if level.floor is not None:
-                    axes.plot([place - HALF, place + HALF], [level.floor] * 2, color=GREY, lw=1.0)
+                    axes.plot([place - HALF, place + HALF], [level.floor] * 2, color=report.GREY, lw=1.0)
                 below, above = level.interval or (level.value, level.value)
                 spread = [[max(0.0, level.value - below)], [max(0.0, above - level.value)]]
                 axes.errorbar(place, level.value, yerr=spread, fmt="o", ms=5, color=colour, capsize=3, lw=1.2)

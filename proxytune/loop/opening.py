@@ -8,11 +8,11 @@ import hashlib
 import json
 import os
 from collections.abc import Callable
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from proxytune.api import recordable
 from proxytune.domain import DomainFamily, Episode
@@ -22,7 +22,7 @@ from proxytune.extensions import ask
 from proxytune.importing import Facts, open_log
 from proxytune.logs import Log
 from proxytune.report import write_text
-from proxytune.running import Watcher
+from proxytune.running import Silent, Watcher
 from proxytune.scores import ScoreTable, read_scores
 from proxytune.seeds import fresh_seed
 from proxytune.settings import read_settings
@@ -212,20 +212,19 @@ def _check_log(loop: Loop) -> None:
 FILE_NAME = "loop.json"
 
 
-class Teller(Protocol):
-    """Hears how a loop goes."""
+class Teller:
+    """Hears how a loop goes, and tells nobody."""
 
     def say(self, line: str) -> None:
         """A step begins, or there is something to be known at once."""
-        ...
 
     def episodes(self, total: int) -> AbstractContextManager[Watcher]:
         """So many episodes at most are driven."""
-        ...
+        return nullcontext(Silent())
 
     def diagnosis(self, log: Log) -> AbstractContextManager[Callable[[str], None]]:
         """A log is diagnosed; gives what hears of each step of that."""
-        ...
+        return nullcontext(lambda step: None)
 
 
 class Kept:

@@ -5,7 +5,6 @@ document and as one page.
 """
 
 from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -16,64 +15,13 @@ from matplotlib.figure import Figure
 from rich.console import Group
 from rich.text import Text
 
+from proxytune import report
 from proxytune.api import StudyReport, most_episodes, record_log, run_opened
 from proxytune.driving import robot_home
 from proxytune.errors import InputError
 from proxytune.identity import versions_of
-from proxytune.logs import Log
-from proxytune.loop.comparison import (
-    Compared,
-    Known,
-    answer,
-    chance_text,
-    compare_errors,
-    compare_prpv,
-    floor_text,
-    following,
-    lacking,
-    level_text,
-    prpv_figure,
-    theta_table,
-)
-from proxytune.loop.diagnosing import (
-    adds_something,
-    begin_anew_if_changed,
-    check_camera,
-    declared_names,
-    diagnose_target,
-    extension_text,
-    files_of,
-    read_diagnosis,
-    wanted_of,
-    write_extension,
-)
+from proxytune.loop import comparison, diagnosing, opening
 from proxytune.loop.episodes import Closed, pictures_file, read_pictures, righted, write_pictures
-from proxytune.loop.opening import (
-    Kept,
-    Loop,
-    Teller,
-    digest,
-    digest_of_files,
-    drive_held_out,
-    held_out_settings,
-    open_loop,
-    scored_agents,
-)
-from proxytune.report import (
-    CAPTIONS,
-    Paragraphs,
-    Shown,
-    Table,
-    View,
-    columns_of,
-    group_texts,
-    note_texts,
-    picture_of,
-    study_foot,
-    table_text,
-    write_page,
-)
-from proxytune.running import Silent, Watcher
 from proxytune.scores import write_scores
 from proxytune.seeds import target_seed
 from proxytune.storage import locked
@@ -98,9 +46,9 @@ STEPS = {
 class _Closing:
     """A loop on its way."""
 
-    loop: Loop
-    teller: Teller
-    kept: Kept
+    loop: opening.Loop
+    teller: opening.Teller
+    kept: opening.Kept
     done: list[str] = field(default_factory=list)
     episodes: int = 0
 
@@ -113,7 +61,7 @@ class _Closing:
         before = self._tune("study", open_study(self.settings.path))
         diagnosis = self._diagnose()
         after, held_out = None, None
-        if adds_something(diagnosis):
+        if diagnosing.adds_something(diagnosis):
             after = self._tune("extended study", self._extend())
             held_out = self._held_out(before, after)
         closed = Closed(self.loop, before, diagnosis, after, held_out, (), self.episodes)
@@ -137,7 +85,7 @@ class _Closing:
         if twin is None or (settings.target.exists() and self.kept.inputs_of(name) is None):
             self._begin(name, "given")
             return
-        inputs = digest(name, twin.read_text(encoding="utf-8"), self._agents(settings.agents))
+        inputs = opening.digest(name, twin.read_text(encoding="utf-8"), self._agents(settings.agents))
         if settings.target.exists() and self.kept.inputs_of(name) != inputs:
             raise InputError(
                 f"{settings.target}: was measured of another model, or of other agents, starts, seed, [domain] or "
@@ -154,32 +102,32 @@ class _Closing:
 
     def _tune(self, name: str, study: Study) -> StudyReport:
         self._begin(name)
-        report = run_opened(study, self.teller.episodes(most_episodes(study.settings)), self.teller.say)
-        self.episodes += report.spent.episodes
-        if report.spent.episodes:
+        tuned = run_opened(study, self.teller.episodes(most_episodes(study.settings)), self.teller.say)
+        self.episodes += tuned.spent.episodes
+        if tuned.spent.episodes:
             self.done.append(name)
-        if report.spent.episodes or not (study.settings.folder / "report.html").exists():
-            report.write()
-        return report
+        if tuned.spent.episodes or not (study.settings.folder / "report.html").exists():
+            tuned.write()
+        return tuned
 
     def _diagnose(self) -> Mapping[str, Any]:
         loop, home = self.loop, self.loop.home / "diagnosed"
-        log, seen = self._record() if loop.log is None else (loop.log, digest_of_files(loop.log))
+        log, seen = self._record() if loop.log is None else (loop.log, opening.digest_of_files(loop.log))
         if loop.log is not None:
             self._begin("log", "given")
-        robot = digest_of_files(robot_home(loop.robot, self.settings.folder))
+        robot = opening.digest_of_files(robot_home(loop.robot, self.settings.folder))
         made_by = (robot, user_code(self.settings), versions_of(["proxytune"]))
-        inputs = digest("diagnosis", seen, declared_names(loop), self.settings.seed, made_by)
-        do = partial(diagnose_target, loop, log, home, self.teller)
+        inputs = opening.digest("diagnosis", seen, diagnosing.declared_names(loop), self.settings.seed, made_by)
+        do = partial(diagnosing.diagnose_target, loop, log, home, self.teller)
         self._keep("diagnosis", inputs, home / "diagnosis.json", do)
-        return read_diagnosis(home)
+        return diagnosing.read_diagnosis(home)
 
     def _record(self) -> tuple[Path, str]:
         """Record the twin; the log, and a digest of what it was made of."""
-        loop, folder, wanted = self.loop, self.loop.home / "log", wanted_of(self.loop)
+        loop, folder, wanted = self.loop, self.loop.home / "log", diagnosing.wanted_of(self.loop)
         assert loop.twin is not None
         twin, domain = loop.twin.read_text(encoding="utf-8"), self.settings.domain.values
-        inputs = digest("log", twin, domain, vars(wanted), user_code(self.settings), versions_of(["proxytune"]))
+        inputs = opening.digest("log", twin, domain, vars(wanted), user_code(self.settings), versions_of(["proxytune"]))
         do = partial(record_log, self.settings, loop.twin, folder, wanted, lambda line: None)
         self._keep("log", inputs, folder / "log.toml", do)
         return folder, inputs
@@ -187,12 +135,14 @@ class _Closing:
     def _extend(self) -> Study:
         settings, home = self.settings, self.loop.home
         folder, model = home / "extended", home / "diagnosed" / "model.toml"
-        files = [(path.name, digest_of_files(path)) for path in files_of(settings)]
-        inputs = digest("extension", extension_text(settings, model, folder), digest_of_files(model), files)
-        do = partial(write_extension, settings, model, folder)
+        files = [(path.name, opening.digest_of_files(path)) for path in diagnosing.files_of(settings)]
+        inputs = opening.digest(
+            "extension", diagnosing.extension_text(settings, model, folder), opening.digest_of_files(model), files
+        )
+        do = partial(diagnosing.write_extension, settings, model, folder)
         self._keep("extension", inputs, folder / FILE_NAME, do)
         study = open_study(folder)
-        begin_anew_if_changed(study)
+        diagnosing.begin_anew_if_changed(study)
         return study
 
     def _held_out(self, before: StudyReport, after: StudyReport) -> tuple[Assessment, Assessment] | None:
@@ -202,10 +152,10 @@ class _Closing:
             return None
         target = self._held_out_target(names)
         self._begin(name)
-        studies = [(report.result.study, report.theta) for report in (before, after)]
+        studies = [(one.result.study, one.theta) for one in (before, after)]
         with self.teller.episodes(4 * len(names) * self.settings.starts) as watcher:
             driven = [
-                drive_held_out(study, held_out_settings(study.settings, names, target), theta, watcher)
+                opening.drive_held_out(study, opening.held_out_settings(study.settings, names, target), theta, watcher)
                 for study, theta in studies
             ]
         episodes = sum(count for _, count in driven)
@@ -218,34 +168,34 @@ class _Closing:
         if closed.after is None:
             return
         name, twin, home = "righted agent", self.loop.twin, self.loop.home
-        seen = twin and twin.read_text(encoding="utf-8"), digest_of_files(home / "diagnosed" / "model.toml")
-        thetas = [dict(report.theta) for report in (closed.before, closed.after)]
+        seen = twin and twin.read_text(encoding="utf-8"), opening.digest_of_files(home / "diagnosed" / "model.toml")
+        thetas = [dict(one.theta) for one in (closed.before, closed.after)]
         metrics = [metric.name for metric in self.settings.metrics]
-        inputs = digest(name, righted(closed), seen, thetas, metrics, self._agents(self.settings.agents))
+        inputs = opening.digest(name, righted(closed), seen, thetas, metrics, self._agents(self.settings.agents))
         self._keep(name, inputs, pictures_file(home), partial(write_pictures, closed))
 
     def _held_out_target(self, names: tuple[str, ...]) -> Path | None:
         """The target's scores of held-out agents: a file of their own, or None where the study's table has them."""
         name, output = "held-out scores", self.loop.home / "held_out.csv"
-        if self.loop.twin is None or set(names) <= set(scored_agents(self.settings)):
+        if self.loop.twin is None or set(names) <= set(opening.scored_agents(self.settings)):
             self._begin(name, "given")
             return None
-        inputs = digest(name, self.loop.twin.read_text(encoding="utf-8"), self._agents(names))
-        do = partial(self._measure, held_out_settings(self.settings, names), output)
+        inputs = opening.digest(name, self.loop.twin.read_text(encoding="utf-8"), self._agents(names))
+        do = partial(self._measure, opening.held_out_settings(self.settings, names), output)
         self._keep(name, inputs, output, do)
         return output
 
     def _agents(self, names: tuple[str, ...]) -> list[Any]:
         """All that scores of a domain depend on besides its model."""
-        settings, code = self.settings, user_code(held_out_settings(self.settings, names))
+        settings, code = self.settings, user_code(opening.held_out_settings(self.settings, names))
         return [names, dict(settings.aliases), settings.starts, settings.seed, dict(settings.domain.values), code]
 
 
-COLUMNS = columns_of(("",), ("before", "after"))
+COLUMNS = report.columns_of(("",), ("before", "after"))
 
 
 @dataclass(frozen=True, repr=False)
-class LoopReport(Shown):
+class LoopReport(report.Shown):
     """A closed loop: before and after.
 
     Attributes:
@@ -257,13 +207,13 @@ class LoopReport(Shown):
     def __repr__(self) -> str:
         return f"LoopReport: {view_of(self.closed).sentence}"
 
-    def view(self) -> View:
+    def view(self) -> report.View:
         """What the page shows."""
         return view_of(self.closed)
 
     def figures(self) -> dict[str, Figure]:
         """PRPV before and after, by name."""
-        return {"prpv": prpv_figure([row for row in rows_of(self.closed) if row.key in ("prpv", "held_out")])}
+        return {"prpv": _prpv_figure(rows_of(self.closed))}
 
     def table(self) -> pd.DataFrame:
         """One row per measure: before, after; then noise floor and a random ranking."""
@@ -283,13 +233,13 @@ class LoopReport(Shown):
         reports = (("before", closed.before), ("after", closed.after))
         return {
             "study": closed.loop.settings.name,
-            "sentence": answer(closed.diagnosis, rows_of(closed)),
+            "sentence": comparison.answer(closed.diagnosis, rows_of(closed)),
             "next": _following(closed),
             "steps": list(STEPS) if closed.after else list(STEPS)[:4],
             "verdict": closed.diagnosis["verdict"],
             "effects": closed.diagnosis["effects"],
             "camera": {"verdict": camera["verdict"], "effects": camera["effects"]} if camera else None,
-            "theta": {side: None if report is None else report.theta for side, report in reports},
+            "theta": {side: None if one is None else one.theta for side, one in reports},
             "prpv": {**rows.pop("prpv"), "held_out": held_out},
             "error": closed.diagnosis.get("error"),
             "errors": rows,
@@ -304,27 +254,16 @@ class LoopReport(Shown):
             RunError: If it cannot be written.
         """
         page = self.closed.loop.home / "report.html"
-        write_page(page, view_of(self.closed), study_foot(self.closed.loop.settings, command))
+        report.write_page(page, view_of(self.closed), report.study_foot(self.closed.loop.settings, command))
         return page
 
 
-class Quiet:
-    """Tells nothing of how a loop goes."""
-
-    def say(self, line: str) -> None:
-        """Say nothing."""
-
-    def episodes(self, total: int) -> AbstractContextManager[Watcher]:
-        """Count silently."""
-        return nullcontext(Silent())
-
-    def diagnosis(self, log: Log) -> AbstractContextManager[Callable[[str], None]]:
-        """Hear steps silently."""
-        return nullcontext(lambda step: None)
-
-
 def run_loop(
-    path: str | Path, *, log: str | Path | None = None, twin: str | Path | None = None, teller: Teller | None = None
+    path: str | Path,
+    *,
+    log: str | Path | None = None,
+    twin: str | Path | None = None,
+    teller: opening.Teller | None = None,
 ) -> LoopReport:
     """Tune, diagnose, extend and tune again; every step that is done is kept.
 
@@ -340,20 +279,20 @@ def run_loop(
         InputError: If the study, the log or the twin cannot be used.
         RunError: If a step fails; all that was finished is kept.
     """
-    loop = open_loop(Path(path), *(Path(one) if one is not None else None for one in (twin, log)))
-    check_camera(loop)
+    loop = opening.open_loop(Path(path), *(Path(one) if one is not None else None for one in (twin, log)))
+    diagnosing.check_camera(loop)
     with locked(loop.home):
-        return LoopReport(_Closing(loop, teller or Quiet(), Kept(loop.home)).run())
+        return LoopReport(_Closing(loop, teller or opening.Teller(), opening.Kept(loop.home)).run())
 
 
-def rows_of(closed: Closed) -> list[Compared]:
+def rows_of(closed: Closed) -> list[comparison.Compared]:
     """Every measure before and after: PRPV, of held-out agents too, then the errors."""
     after = None if closed.after is None else closed.after.result.judged
-    rows = [compare_prpv("prpv", "the agents tuned on", closed.before.result.judged, after)]
+    rows = [comparison.compare_prpv("prpv", "the agents tuned on", closed.before.result.judged, after)]
     if closed.held_out:
         names = len(closed.loop.held_out)
-        rows.append(compare_prpv("held_out", f"{names} agents that no tuning saw", *closed.held_out))
-    errors = compare_errors(closed.diagnosis)
+        rows.append(comparison.compare_prpv("held_out", f"{names} agents that no tuning saw", *closed.held_out))
+    errors = comparison.compare_errors(closed.diagnosis)
     if closed.after is None:
         errors = [replace(row, after=None) for row in errors]
     return rows + errors
@@ -362,60 +301,64 @@ def rows_of(closed: Closed) -> list[Compared]:
 def text_of(closed: Closed, page: Path) -> Group:
     """A closed loop as `loop` prints it, with where its page is."""
     rows = rows_of(closed)
-    sentence, table = Text(answer(closed.diagnosis, rows), style="bold"), _table(closed, rows)
-    shown, theta = (table_text(one, ragged=True) for one in (replace(table, title=""), _theta_table(closed)))
+    sentence, table = Text(comparison.answer(closed.diagnosis, rows), style="bold"), _table(closed, rows)
+    shown, theta = (report.table_text(one, ragged=True) for one in (replace(table, title=""), _theta_table(closed)))
     following = f"Next: {_following(closed)}"
-    return group_texts(sentence, shown, *note_texts(table.notes), Text(), theta, following, str(page))
+    return report.group_texts(sentence, shown, *report.note_texts(table.notes), Text(), theta, following, str(page))
 
 
-def view_of(closed: Closed) -> View:
+def view_of(closed: Closed) -> report.View:
     """A closed loop: before and after, its figures, and what each step said."""
     rows = rows_of(closed)
-    prpv = [row for row in rows if row.key in ("prpv", "held_out")]
     home, shown = closed.loop.home, []
     if closed.after:
-        shown = [picture_of("loop", "prpv", prpv_figure(prpv)), *read_pictures(home)]
+        shown = [report.picture_of("loop", "prpv", _prpv_figure(rows)), *read_pictures(home)]
     found = (closed.diagnosis["effects"], (closed.diagnosis["camera"] or {}).get("effects"))
-    for name in CAPTIONS["loop"]:
+    for name in report.CAPTIONS["loop"]:
         # Of the camera there is a figure where it lacked nothing too
         file = home / "diagnosed" / f"{name}.svg"
         if file.is_file() and (found[1] or not name.startswith("camera")):
-            shown.append(picture_of("loop", name, file.read_bytes()))
+            shown.append(report.picture_of("loop", name, file.read_bytes()))
+    lacks = comparison.lacking(closed.diagnosis) or "nothing that has a name"
     said = (
-        f"Found: {lacking(closed.diagnosis) or 'nothing that has a name'}; verdict: {closed.diagnosis['verdict']}.",
+        f"Found: {lacks}; verdict: {closed.diagnosis['verdict']}.",
         f"Before: {closed.before.sentence}",
         *((f"After: {closed.after.sentence}",) if closed.after else ()),
     )
     beside = {"tuning without": "../report.html", "the diagnosis": "diagnosed/report.html"}
     beside |= {"tuning again": "extended/report.html", "the model that was found": "diagnosed/model.toml"}
     links = (f"[{title}]({name})" for title, name in beside.items() if (home / name).is_file())
-    return View(
+    return report.View(
         title=f"{closed.loop.settings.name}: what did the simulator lack, and what is it worth?",
-        sentence=answer(closed.diagnosis, rows),
+        sentence=comparison.answer(closed.diagnosis, rows),
         next_step=_following(closed),
         parts=(
             _table(closed, rows),
             _theta_table(closed),
             *shown,
-            Paragraphs("What each step said", said),
-            Paragraphs("Pages and files", (" · ".join(links),)),
+            report.Paragraphs("What each step said", said),
+            report.Paragraphs("Pages and files", (" · ".join(links),)),
         ),
     )
 
 
-def _table(closed: Closed, rows: list[Compared]) -> Table:
+def _prpv_figure(rows: list[comparison.Compared]) -> Figure:
+    return comparison.prpv_figure([row for row in rows if row.key in ("prpv", "held_out")])
+
+
+def _table(closed: Closed, rows: list[comparison.Compared]) -> report.Table:
     """Every measure before and after, with its noise floor and chance."""
     cells, same = list[tuple[str, ...]](), list[str]()
     for row in rows:
         title, sides = f"{row.title}, 0 to {row.most}" if row.most else row.title, (row.before, row.after)
-        shown = [level_text(one, row.unit) for one in sides]
+        shown = [comparison.level_text(one, row.unit) for one in sides]
         if not row.most and shown[0] == shown[1]:
             same.append(f"{row.title} {shown[0]}")
             continue
         cells.append((title, *shown))
         for name, texts in (
-            ("noise floor", [floor_text(one, row.unit) for one in sides]),
-            ("chance", list(map(chance_text, sides))),
+            ("noise floor", [comparison.floor_text(one, row.unit) for one in sides]),
+            ("chance", list(map(comparison.chance_text, sides))),
         ):
             if set(texts) != {"–"}:
                 cells.append((f"  {name}", *texts))
@@ -427,19 +370,19 @@ def _table(closed: Closed, rows: list[Compared]) -> Table:
         )
     if same:
         notes.append(f"the same before and after: {'; '.join(same)}")
-    return Table("Before and after", COLUMNS, tuple(cells), tuple(notes))
+    return report.Table("Before and after", COLUMNS, tuple(cells), tuple(notes))
 
 
-def _theta_table(closed: Closed) -> Table:
+def _theta_table(closed: Closed) -> report.Table:
     after = None if closed.after is None else _known(closed.after)
-    return theta_table(_known(closed.before), after, closed.diagnosis)
+    return comparison.theta_table(_known(closed.before), after, closed.diagnosis)
 
 
-def _known(report: StudyReport) -> Known:
-    ends = report.result.knowledge.intervals
-    return {name: (value, ends.get(name)) for name, value in report.theta.items()}
+def _known(tuned: StudyReport) -> comparison.Known:
+    ends = tuned.result.knowledge.intervals
+    return {name: (value, ends.get(name)) for name, value in tuned.theta.items()}
 
 
 def _following(closed: Closed) -> str:
     last, model = closed.after or closed.before, closed.loop.home / "diagnosed" / "model.toml"
-    return following(closed.diagnosis, last.sentence, str(model) if closed.after else "", last.theta)
+    return comparison.following(closed.diagnosis, last.sentence, str(model) if closed.after else "", last.theta)

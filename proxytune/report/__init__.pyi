@@ -35,8 +35,7 @@ from .export.instance import (
 )
 from .export.into import patch as patch
 from .export.mjcf import mjcf_text as mjcf_text
-from .export.nodes import node_text as node_text
-from .export.ros import ros_text as ros_text
+from .export.ros import node_text as node_text, ros_text as ros_text
 from .export.urdf import urdf_text as urdf_text
 from .families import (
     families_document as families_document,
@@ -84,11 +83,12 @@ from .study.figures import study_figures as study_figures
 from .study.page import (
     RENEW_S as RENEW_S,
     study_foot as study_foot,
+    study_text as study_text,
     study_view as study_view,
     write_live_page as write_live_page,
+    write_study_tables as write_study_tables,
 )
 from .study.sentence import study_sentence as study_sentence
-from .study.tables import study_text as study_text, write_study_tables as write_study_tables
 from .sweep import (
     curve_document as curve_document,
     curve_name as curve_name,
@@ -100,7 +100,6 @@ from .sweep import (
     write_curves as write_curves,
     write_sweep_page as write_sweep_page,
 )
-from .table_files import check_table_file as check_table_file
 from .teaching import (
     teach_document as teach_document,
     teach_figure as teach_figure,
@@ -109,6 +108,7 @@ from .teaching import (
 )
 from .text import (
     WholeWords as WholeWords,
+    check_table_file as check_table_file,
     group_texts as group_texts,
     note_texts as note_texts,
     table_text as table_text,

@@ -6,21 +6,11 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from proxytune.report.figure_style import BLUE, COLUMN, GREY, LIGHT_BLUE, dress
+from proxytune.report import figure_style as style
 from proxytune.report.score_figures import MOST, short_name
 from proxytune.report.view import Table, columns_of
 from proxytune.report.wording import listed, percent, plain, short, with_span
-from proxytune.usefulness import (
-    Assessment,
-    Decision,
-    Panel,
-    Plan,
-    Saving,
-    Selection,
-    Sequential,
-    Together,
-    mmrv_conventions,
-)
+from proxytune.usefulness import Assessment, Decision, Panel, Plan, Saving, Selection, Sequential, mmrv_conventions
 
 
 def decision_sentence(assessment: Assessment, target: str) -> str:
@@ -75,9 +65,8 @@ def sequential_sentence(found: Sequential) -> str:
     """Say what may be concluded after these rollouts, looked at after each."""
     times = [f"{name} {'over 1000' if n is None else n}" for name, n in found.expected_rounds.items()]
     if found.winner is not None:
-        return (
-            f"{found.winner} is shown to be the best, after {found.decided_at} of {found.rounds} rollouts of each agent"
-        )
+        when = f"after {found.decided_at} of {found.rounds} rollouts of each agent"
+        return f"{found.winner} is shown to be the best, {when}"
     lead = max(found.evidence, key=lambda agent: found.evidence[agent])
     wealth = f"{lead} has most evidence, {short(found.evidence[lead])} of {short(found.threshold)}"
     return f"none is shown to be the best after {found.rounds} rollouts of each ({wealth}); expect {', '.join(times)}"
@@ -117,11 +106,10 @@ def decision_table(assessment: Assessment, target: str) -> Table:
 def decision_figure(decision: Decision) -> Figure:
     """Draw the expected regret of each agent with its interval, the best on top."""
     order = sorted(decision.expected_regret, key=lambda agent: decision.expected_regret[agent])[:MOST]
-    figure = Figure(figsize=(COLUMN, 0.9 + 0.16 * max(4, len(order))), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = style.one_panel(0.9 + 0.16 * max(4, len(order)))
     for row, agent in enumerate(order):
         near = agent in decision.not_told_apart
-        colour = BLUE if agent == decision.winner else LIGHT_BLUE if near else GREY
+        colour = style.BLUE if agent == decision.winner else style.LIGHT_BLUE if near else style.GREY
         if decision.regret_interval is not None:
             axes.plot(decision.regret_interval[agent], (row, row), color=colour, linewidth=1.4, solid_capstyle="butt")
         axes.plot(decision.expected_regret[agent], row, "o", color=colour, markersize=4, clip_on=False, zorder=3)
@@ -131,7 +119,7 @@ def decision_figure(decision: Decision) -> Figure:
     axes.set_yticks(np.arange(len(order)), [short_name(agent) for agent in order])
     axes.set_ylim(len(order) - 0.5, -0.5)
     axes.set_xlim(left=0.0)
-    dress(axes, f"regret in {plain(decision.chosen_on)[:44]}")
+    style.dress(axes, f"regret in {plain(decision.chosen_on)[:44]}")
     axes.tick_params(axis="y", labelsize=7, length=0)
     if decision.best_probabilities is not None:
         axes.text(1.02, 1.0, "P(best)", transform=axes.transAxes, fontsize=7, va="bottom")
@@ -203,8 +191,10 @@ def decision_document(assessment: Assessment) -> dict[str, Any]:
     }
 
 
-def together_document(both: Together) -> dict[str, Any]:
-    """What the two best proxies save together, and the agent to deploy then, as plain JSON."""
+def together_document(selection: Selection) -> dict[str, Any] | None:
+    """What the two best proxies save together, and the agent to deploy then, as plain JSON; None where two are not."""
+    if (both := selection.together) is None:
+        return None
     return {
         "proxies": list(both.proxies),
         "saves": _saves(both.saves),

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, NullFormatter
 from rich.console import Group
 
-from proxytune.report.figure_style import BLUE, COLUMN, VERMILLION, dress, legend_below
+from proxytune.report import figure_style as style
 from proxytune.report.scores import differences_document, ends_document
 from proxytune.report.study.document import estimate_document, intervals_document
 from proxytune.report.study.sentence import KnownParameter, known_parameters
@@ -28,7 +28,11 @@ Spread = tuple[float, float | None, float | None]
 USES, THETA = "Which simulator, and for what (95 % intervals)", "Best θ of each"
 NOT_APART = "cannot be told from it"
 BEST, ALIKE, WORSE = "best", NOT_APART, "worse"
-LOOKS = {BEST: ("o", BLUE, BLUE), ALIKE: ("o", BLUE, "white"), WORSE: ("s", VERMILLION, VERMILLION)}
+LOOKS = {
+    BEST: ("o", style.BLUE, style.BLUE),
+    ALIKE: ("o", style.BLUE, "white"),
+    WORSE: ("s", style.VERMILLION, style.VERMILLION),
+}
 """Marker, colour of its edge and of its face: told apart without colours too."""
 LONGEST = 16
 """Characters of a name in one line."""
@@ -334,8 +338,7 @@ def families_figure(compared: ComparedFamilies) -> Figure:
     """Draw each family's fresh PRPV, PLV where there is [teaching], and seconds per episode, with 95 % intervals."""
     panels, names = _panels(compared), [one.name for one in compared.families]
     short_names = [name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…" for name in names]
-    figure = Figure(figsize=(COLUMN, 1.0 + 0.24 * len(names)), layout="constrained")
-    drawn = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
+    figure, (drawn,) = style.grid_of(1.0 + 0.24 * len(names), 1, len(panels), sharey=True)
     for axes, panel in zip(drawn, panels, strict=True):
         _draw(axes, panel, names)
     drawn[0].set_yticks(range(len(names)), short_names)
@@ -344,7 +347,7 @@ def families_figure(compared: ComparedFamilies) -> Figure:
     for label, (marker, edge, face) in LOOKS.items():
         if label in shown:
             drawn[0].plot([], [], marker, color=edge, markerfacecolor=face, markersize=4.5, label=label)
-    legend_below(figure, *drawn)
+    style.legend_below(figure, *drawn)
     return figure
 
 
@@ -380,7 +383,7 @@ def _draw(axes: Axes, panel: Panel, names: list[str]) -> None:
         ends = [middle if end is None else end for end in (low, high)]
         axes.plot(ends, [place, place], color=edge, linewidth=1.2)
         axes.plot([middle], [place], marker, color=edge, markerfacecolor=face, markersize=4.5)
-    dress(axes, panel.title)
+    style.dress(axes, panel.title)
     axes.margins(x=0.15)
     if panel.ratios:
         axes.set_xscale("log")

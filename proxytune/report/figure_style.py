@@ -31,16 +31,25 @@ CHARACTERS_PER_INCH, HANDLE = 19, 8
 """Characters of a legend that fit into an inch, and the space that a line beside them takes, in characters."""
 
 
-def panel_grid(
-    count: int, height: float, rest: float, *, sharex: bool = False, sharey: bool = False
-) -> tuple[Figure, list[Axes]]:
+def grid_of(height: float, rows: int, columns: int, **how: Any) -> tuple[Figure, NDArray[Any]]:
+    """A figure for one column of a paper, so high [inch], and its panels (rows, columns), made as `subplots` does."""
+    figure = Figure(figsize=(COLUMN, height), layout="constrained")
+    return figure, figure.subplots(rows, columns, squeeze=False, **how)
+
+
+def one_panel(height: float) -> tuple[Figure, Axes]:
+    """A figure for one column of a paper, so high [inch], and its only panel."""
+    figure, panels = grid_of(height, 1, 1)
+    return figure, panels[0, 0]
+
+
+def panel_grid(count: int, height: float, rest: float, **how: Any) -> tuple[Figure, list[Axes]]:
     """A figure of so many panels, two in a row, each so high, with so much for all else [inch]; and the panels."""
-    rows, columns = ceil(count / 2), min(2, count)
-    figure = Figure(figsize=(COLUMN, height * rows + rest), layout="constrained")
-    panels = figure.subplots(rows, columns, squeeze=False, sharex=sharex, sharey=sharey).ravel()
-    for axes in panels[count:]:
-        axes.set_visible(False)
-    return figure, list(panels[:count])
+    rows = ceil(count / 2)
+    figure, panels = grid_of(height * rows + rest, rows, min(2, count), **how)
+    for axes in panels.flat[count:]:
+        axes.remove()
+    return figure, list(panels.flat[:count])
 
 
 def draw_noise_floor(axes: Axes, floor: NoiseFloor, label: str = "") -> bool:
@@ -103,9 +112,8 @@ def legend_below(figure: Figure, *panels: Axes, without: Collection[str] = ()) -
     longest = max((len(name) for name in named), default=0) + HANDLE
     columns = max(1, min(3, int(figure.get_figwidth() * CHARACTERS_PER_INCH / longest)))
     if named:
-        figure.legend(
-            list(named.values()), list(named), loc="outside lower center", ncols=columns, fontsize=7, frameon=False
-        )
+        look: dict[str, Any] = {"loc": "outside lower center", "fontsize": 7, "frameon": False}
+        figure.legend(list(named.values()), list(named), ncols=columns, **look)
 
 
 ONE_LINE = 0.05
@@ -130,9 +138,7 @@ def name_lines(axes: Axes, names: Sequence[LineName], apart: float = ONE_LINE) -
     bottom, top = axes.get_ylim()
     places = spread_places([(min(max(name.end, bottom), top) - bottom) / (top - bottom) for name in names], apart)
     for name, place in zip(names, places, strict=True):
-        axes.text(
-            1.02, place, name.text, transform=axes.transAxes, fontsize=7, color=name.colour, va="center", ha="left"
-        )
+        axes.text(1.02, place, name.text, transform=axes.transAxes, fontsize=7, color=name.colour, va="center")
 
 
 def spread_places(places: Sequence[float], apart: float) -> list[float]:

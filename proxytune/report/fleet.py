@@ -8,11 +8,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from rich.console import Group
 
-from proxytune.report.figure_style import BLUE, GREEN, LIGHT_GREY, VERMILLION, dress, legend_below, panel_grid
+from proxytune.report import figure_style as style
 from proxytune.report.study.document import estimate_document, intervals_document
 from proxytune.report.text import file_texts, group_texts, section_text
 from proxytune.report.view import Drawn, Paragraphs, Table, View, columns_of
-from proxytune.report.wording import digits, fixed, listed, percent, plain, probability, span, with_unit
+from proxytune.report.wording import as_known, listed, percent, plain, probability, span, with_unit
 from proxytune.report.writing import ABOUT, picture_of
 from proxytune.study import FEW, Fleet
 from proxytune.usefulness import Estimate
@@ -63,33 +63,22 @@ def fleet_lines(fleet: Fleet) -> tuple[str, ...]:
 def fleet_tables(fleet: Fleet) -> tuple[Table, ...]:
     """The population, and each robot by its own scores and given the fleet."""
     heads = {name: with_unit(name, unit) for name, unit in fleet.units.items()}
-    own = tuple(
-        (
-            robot.name,
-            _fit(robot.knowledge.misfit.p_value, robot.fits),
-            percent(robot.knowledge.posterior.share),
-            *map(span, robot.knowledge.intervals.values()),
-        )
-        for robot in fleet.robots
-    )
-    by_robot = Table(OWN, columns_of(("robot", "proxy"), ("region", *heads.values())), own, fleet_notes(fleet))
+    own = []
+    for robot in fleet.robots:
+        learnt = robot.knowledge
+        fit, share = _fit(learnt.misfit.p_value, robot.fits), percent(learnt.posterior.share)
+        own.append((robot.name, fit, share, *map(span, learnt.intervals.values())))
+    by_robot = Table(OWN, columns_of(("robot", "proxy"), ("region", *heads.values())), tuple(own), fleet_notes(fleet))
     if fleet.population is None:
         return (by_robot,)
-    rows = tuple(
-        (
-            heads[name],
-            _told(fleet.mean[name]),
-            _told(fleet.deviation[name]),
-            span((next_one.low, next_one.high)),
-            "yes" if fleet.varies[name] else "not told",
-        )
-        for name, next_one in fleet.next_robot.items()
-    )
+    rows = []
+    for name, told in fleet.next_robot.items():
+        known = _told(fleet.mean[name]), _told(fleet.deviation[name]), span((told.low, told.high))
+        rows.append((heads[name], *known, "yes" if fleet.varies[name] else "not told"))
     columns = ("mean", "standard deviation", "95 % of robots", "robots differ")
-    population = Table(
-        f"p(θ) over {len(fleet.fitting)} robots", columns_of(("parameter",), columns), rows, (ABOUT["fleet"],)
-    )
-    given = tuple((name, *map(_told, told.values())) for name, told in fleet.given.items())
+    title = f"p(θ) over {len(fleet.fitting)} robots"
+    population = Table(title, columns_of(("parameter",), columns), tuple(rows), (ABOUT["fleet"],))
+    given = tuple((name, *map(_told, theta.values())) for name, theta in fleet.given.items())
     return population, by_robot, Table(GIVEN, columns_of(("robot",), [*heads.values()]), given)
 
 
@@ -127,8 +116,8 @@ def fleet_text(fleet: Fleet, files: Mapping[str, Any]) -> Group:
 
 
 def _told(found: Estimate) -> str:
-    places = digits((found.low, found.high))
-    return f"{fixed(found.value, places)} ({span((found.low, found.high))})"
+    ends = (found.low, found.high)
+    return f"{as_known(found.value, ends)} ({span(ends)})"
 
 
 def _documents(told: Mapping[str, Estimate]) -> dict[str, Any]:
@@ -166,13 +155,13 @@ def fleet_document(fleet: Fleet) -> dict[str, Any]:
 def fleet_figure(fleet: Fleet) -> Figure:
     """Draw each robot's intervals and the population, a panel a parameter."""
     intervals, robots = fleet.settings.space.intervals, fleet.robots
-    figure, panels = panel_grid(len(intervals), 0.7 + 0.1 * max(4, len(robots)), 0.3, sharey=True)
+    figure, panels = style.panel_grid(len(intervals), 0.7 + 0.1 * max(4, len(robots)), 0.3, sharey=True)
     for row, axes in enumerate(panels):
         _draw(axes, fleet, row)
     names = [robot.name if len(robot.name) <= NAME else f"{robot.name[: NAME - 1]}…" for robot in robots]
     panels[0].set_ylim(len(robots) - 0.5, -0.5)
     panels[0].set_yticks(range(len(robots)), names) if len(robots) <= MOST_NAMED else panels[0].set_yticks([])
-    legend_below(figure, *panels)
+    style.legend_below(figure, *panels)
     return figure
 
 
@@ -180,15 +169,16 @@ def _draw(axes: Axes, fleet: Fleet, row: int) -> None:
     box = fleet.settings.space.intervals[row]
     if box.name in fleet.mean:
         mean, reach = fleet.mean[box.name].value, 2.0 * fleet.deviation[box.name].value
-        axes.axvspan(mean - reach, mean + reach, color=GREEN, alpha=0.15, linewidth=0, label="fleet: mean ± 2 SD")
-        axes.axvline(mean, color=GREEN, linewidth=1.0, linestyle="--")
+        axes.axvspan(mean - reach, mean + reach, color=style.GREEN, alpha=0.15, linewidth=0, label="fleet: mean ± 2 SD")
+        axes.axvline(mean, color=style.GREEN, linewidth=1.0, linestyle="--")
     for place, robot in enumerate(fleet.robots):
-        label, colour = ("own scores (95 %)", LIGHT_GREY) if robot.fits else ("misfit, left out", VERMILLION)
+        label = "own scores (95 %)" if robot.fits else "misfit, left out"
+        colour = style.LIGHT_GREY if robot.fits else style.VERMILLION
         ends = robot.knowledge.intervals[box.name]
         axes.plot(ends, [place, place], color=colour, linewidth=1.6, solid_capstyle="butt", label=label)
         if robot.name in fleet.given:
             given = fleet.given[robot.name][box.name].value
-            axes.plot(given, place, "o", color=BLUE, markersize=2.5, label="given the fleet")
+            axes.plot(given, place, "o", color=style.BLUE, markersize=2.5, label="given the fleet")
     axes.set_xlim(box.low, box.high)
     axes.xaxis.set_major_locator(MaxNLocator(3))
-    dress(axes, with_unit(box.name, fleet.units[box.name]))
+    style.dress(axes, with_unit(box.name, fleet.units[box.name]))

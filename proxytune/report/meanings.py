@@ -51,17 +51,12 @@ def finding(effect: Mapping[str, Any], catalogue: Catalogue = SHIPPED) -> str:
     """
     name, known = str(effect["name"]), effect.get("parameters") or {}
     try:
-        own = dict(
-            zip((one.name for one in catalogue.effect(name).parameters), catalogue.theta_names(name), strict=True)
-        )
+        own = dict(zip((it.name for it in catalogue.effect(name).parameters), catalogue.theta_names(name), strict=True))
     except ExtensionError:
         own = {}
     sized = {key: one for key, one in known.items() if one["value"] is not None}
-    said = [
-        clause_of(own.get(key, key), _size(one))
-        for key, one in sized.items()
-        if key != "imbalance" or one["value"] != 0.0
-    ]
+    told = {key: one for key, one in sized.items() if key != "imbalance" or one["value"] != 0.0}
+    said = [clause_of(own.get(key, key), _size(one)) for key, one in told.items()]
     return f"{plain(name)}: {'; '.join([listed(said), *_worth(effect)])}" if said else plain(name)
 
 

@@ -8,17 +8,7 @@ from matplotlib.patches import Patch
 from scipy.stats import rankdata
 
 from proxytune.arrays import Floats
-from proxytune.report.figure_style import (
-    BLUE,
-    COLUMN,
-    GREY,
-    LIGHT_BLUE,
-    LIGHT_GREY,
-    ORANGE,
-    VERMILLION,
-    dress,
-    spread_places,
-)
+from proxytune.report import figure_style as style
 from proxytune.report.wording import plain
 from proxytune.scores import ScoreTable
 from proxytune.usefulness import Assessment, Comparison, Prpv
@@ -32,7 +22,7 @@ LINE = 0.1
 """Height of a name [inch]."""
 LONGEST = 24
 """Characters of a name; of a longer one its end is shown, which tells agents of one module apart."""
-FLIP_COLOURS = {"same": LIGHT_GREY, "lost": BLUE, "invented": ORANGE, "reversed": VERMILLION}
+FLIP_COLOURS = {"same": style.LIGHT_GREY, "lost": style.BLUE, "invented": style.ORANGE, "reversed": style.VERMILLION}
 
 
 def scatter_figure(assessment: Assessment) -> Figure:
@@ -43,8 +33,8 @@ def scatter_figure(assessment: Assessment) -> Figure:
     """
     metrics, agents = assessment.inputs.metrics, assessment.inputs.agents
     height = max(PANEL, LINE * min(MOST, len(agents)) + 0.6)
-    figure = Figure(figsize=(COLUMN, height * len(metrics)), layout="constrained")
-    for column, axes in enumerate(figure.subplots(len(metrics), 1, squeeze=False)[:, 0]):
+    figure, panels = style.grid_of(height * len(metrics), len(metrics), 1)
+    for column, axes in enumerate(panels.flat):
         _scatter_panel(axes, assessment.inputs, column)
         _name_points(axes, assessment.inputs, column, LINE / (height - 0.6))
         r = assessment.srcc.value[metrics[column].name]
@@ -65,8 +55,7 @@ def flipped_pairs_figure(prpv: Prpv) -> Figure:
     for pair in prpv.pairs:
         high, low = sorted((place[pair.better], place[pair.worse]))
         cells[low, high] = kinds.index(pair.flip)
-    figure = Figure(figsize=(COLUMN, COLUMN), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = style.one_panel(style.COLUMN)
     _draw_pairs(axes, cells, named=len(order) <= MOST)
     _name_agents(axes, [short_name(agent) for agent in order])
     axes.set_title(f"PRPV {prpv.value} of at most {prpv.range[1]}", fontsize=8)
@@ -93,14 +82,14 @@ def _draw_pairs(axes: Axes, cells: Floats, *, named: bool) -> None:
 def _scatter_panel(axes: Axes, inputs: Comparison, column: int) -> None:
     proxy, target = (means[:, column] for means in inputs.means)
     errors = (_standard_errors(inputs.target)[:, column], _standard_errors(inputs.proxy)[:, column])
-    axes.errorbar(target, proxy, xerr=errors[0], yerr=errors[1], fmt="none", ecolor=GREY, elinewidth=0.8, zorder=1)
-    axes.plot(target, proxy, "o", color=BLUE, markersize=4, zorder=2)
+    axes.errorbar(target, proxy, xerr=errors[0], yerr=errors[1], fmt="none", ecolor=style.GREY, lw=0.8, zorder=1)
+    axes.plot(target, proxy, "o", color=style.BLUE, markersize=4, zorder=2)
     axes.margins(0.1)
     limits = axes.axis()
-    axes.axline((0, 0), slope=1, color=GREY, linewidth=0.8, linestyle="--", zorder=0)
+    axes.axline((0, 0), slope=1, color=style.GREY, linewidth=0.8, linestyle="--", zorder=0)
     axes.axis(limits)
     name = plain(inputs.metrics[column].name)
-    dress(axes, f"{name} on the target", f"{name} in the proxy")
+    style.dress(axes, f"{name} on the target", f"{name} in the proxy")
 
 
 def _standard_errors(table: ScoreTable) -> Floats:
@@ -119,8 +108,8 @@ def _name_points(axes: Axes, inputs: Comparison, column: int, apart: float) -> N
     bottom, top = axes.get_ylim()
     # Points of one score in the proxy: those farther right on top, so that their lines cross less.
     shown = sorted(shown, key=lambda row: (proxy[row], target[row]))
-    look = {"arrowstyle": "-", "lw": 0.4, "color": LIGHT_BLUE, "shrinkA": 0, "shrinkB": 2, "relpos": (0, 0.5)}
-    places = spread_places([(proxy[row] - bottom) / (top - bottom) for row in shown], apart)
+    look = {"arrowstyle": "-", "lw": 0.4, "color": style.LIGHT_BLUE, "shrinkA": 0, "shrinkB": 2, "relpos": (0, 0.5)}
+    places = style.spread_places([(proxy[row] - bottom) / (top - bottom) for row in shown], apart)
     for row, place in zip(shown, places, strict=True):
         axes.annotate(
             short_name(inputs.agents[row]), (target[row], proxy[row]), (1.04, place), textcoords="axes fraction",

@@ -7,33 +7,14 @@ from typing import Any
 from matplotlib.figure import Figure
 from rich.console import Group
 
-from proxytune.report.decision import (
-    choices_sentences,
-    decision_document,
-    decision_figure,
-    decision_sentence,
-    decision_table,
-    together_document,
-)
+from proxytune.report import decision
 from proxytune.report.html import write_page
 from proxytune.report.score_figures import MOST, flipped_pairs_figure, scatter_figure
-from proxytune.report.table_files import csv_text, latex_text
-from proxytune.report.text import group_texts, note_texts, table_text
+from proxytune.report.text import Cell, csv_text, group_texts, latex_text, note_texts, table_text
 from proxytune.report.view import Column, Foot, Paragraphs, Picture, Table, View, columns_of
 from proxytune.report.wording import listed, short, short_span, with_span
 from proxytune.report.writing import file_names, picture_of, save_figures, write_text
-from proxytune.usefulness import (
-    ALL,
-    MEASURES,
-    PPV,
-    PRPV,
-    Assessment,
-    Difference,
-    Measure,
-    Measured,
-    Selection,
-    SuccessRates,
-)
+from proxytune.usefulness import ALL, MEASURES, PRPV, Assessment, Difference, Measure, Measured, Selection, SuccessRates
 
 Row = tuple[str, str, str, str, str]
 Assessments = Mapping[str, Assessment]
@@ -46,7 +27,7 @@ def score_sentence(assessments: Assessments, selection: Selection | None, *, tar
     """Say how low PRPV is and what that is worth; of several proxies which is best, and than which beyond noise."""
     if selection is None:
         ((proxy, assessment),) = assessments.items()
-        return f"{_say_prpv(assessment, proxy, target)} {decision_sentence(assessment, target)}"
+        return f"{_say_prpv(assessment, proxy, target)} {decision.decision_sentence(assessment, target)}"
     best = selection.ranking[0][0]
     worse = [pair.worse for pair in selection.differences if pair.better == best and pair.beyond_noise]
     beyond = f"beyond noise better than {listed(worse)}" if worse else "not beyond noise better than any other"
@@ -102,9 +83,9 @@ def score_text(
     notes = _remarks(assessments, "note")
     if selection is None:
         ((_, assessment),) = assessments.items()
-        notes += [f"decision: {line}" for line in decision_table(assessment, target).notes]
+        notes += [f"decision: {line}" for line in decision.decision_table(assessment, target).notes]
     else:
-        notes += [f"decision: {line}" for line in choices_sentences(assessments, selection, target)]
+        notes += [f"decision: {line}" for line in decision.choices_sentences(assessments, selection, target)]
     noise, floor = next(iter(assessments.values())).noise_floor, []
     if selection is not None and noise.value is not None:
         ends = short_span(noise.low, noise.high)
@@ -144,14 +125,14 @@ def score_view(
     said = score_sentence(assessments, selection, target=target), score_next_step(assessments, selection)
     if selection is None:
         return View(f"{next(iter(assessments))}: how well does it predict {target}?", *said, (*figures, *tables))
-    choices = Paragraphs("Which proxy to choose by", tuple(choices_sentences(assessments, selection, target)))
+    choices = Paragraphs("Which proxy to choose by", tuple(decision.choices_sentences(assessments, selection, target)))
     return View(f"Which of {len(assessments)} proxies predicts {target} best?", *said, (*tables, choices, *figures))
 
 
 def figures_of_scores(assessment: Assessment) -> dict[str, Figure]:
     """The figures of one proxy, by name."""
     figures = {"scatter": scatter_figure(assessment), "flipped_pairs": flipped_pairs_figure(assessment.prpv)}
-    return {**figures, "decision": decision_figure(assessment.decision)}
+    return {**figures, "decision": decision.decision_figure(assessment.decision)}
 
 
 def _all_drawn(assessments: Assessments, selection: Selection | None) -> Iterator[tuple[str, Figure, Picture]]:
@@ -190,7 +171,7 @@ def _tables(assessments: Assessments, selection: Selection | None, target: str) 
     columns = (*columns_of(("measure",), ("value", "95 % interval")), *columns_of(("better", "what it says")))
     title = f"{proxy} as a proxy of {target}: {_sizes(assessment)}"
     return [
-        decision_table(assessment, target),
+        decision.decision_table(assessment, target),
         Table(title, columns, (*_prpv_rows(assessment), *beside), notes),
         *map(_rates, assessment.success_rates),
     ]
@@ -199,12 +180,8 @@ def _tables(assessments: Assessments, selection: Selection | None, target: str) 
 def _rates(rates: SuccessRates) -> Table:
     rows = []
     for agent, target in rates.target.items():
-        sides = [
-            cell
-            for one in (rates.proxy[agent], target)
-            for cell in (f"{one.value:.2f} ({one.low:.2f} to {one.high:.2f})", str(one.episodes))
-        ]
-        rows.append((agent, *sides))
+        proxy = rates.proxy[agent]
+        rows.append((agent, str(proxy), str(proxy.episodes), str(target), str(target.episodes)))
     title = f"{rates.metric}: success rates with their own 95 % intervals (Wilson)"
     heads = ("in the proxy", "episodes", "on the target", "episodes")
     return Table(title, columns_of(("agent",), heads), tuple(rows))
@@ -271,28 +248,16 @@ def write_score_table(assessments: Assessments, path: Path) -> None:
     Raises:
         RunError: If it cannot be written.
     """
-    measured = {
-        name: [(measure, *one) for measure in MEASURES for one in measure.measured(assessment).items()]
-        for name, assessment in assessments.items()
-    }
+    rows, cells = list[Sequence[Cell]](), dict[str, list[str]]()
+    for name, assessment in assessments.items():
+        for measure, (metric, found) in ((one, own) for one in MEASURES for own in one.measured(assessment).items()):
+            ends = found.interval or (None, None)
+            rows.append((name, measure.key_for(metric), found.value, *ends, measure.better))
+            cells.setdefault(measure.name_for(metric), []).append(with_span(_number(found.value), *ends))
     if path.suffix == ".csv":
-        rows = [
-            (name, measure.key_for(metric), found.value, *(found.interval or (None, None)), measure.better)
-            for name, all_found in measured.items()
-            for measure, metric, found in all_found
-        ]
         write_text(path, csv_text(("proxy", "measure", "value", "low", "high", "better"), rows))
-        return
-    cells = {
-        name: {
-            measure.name_for(metric): with_span(_number(found.value), *(found.interval or (None, None)))
-            for measure, metric, found in all_found
-        }
-        for name, all_found in measured.items()
-    }
-    titles = next(iter(cells.values()))
-    rows_of_cells = [(title, *(texts[title] for texts in cells.values())) for title in titles]
-    write_text(path, latex_text(("measure", *cells), rows_of_cells))
+    else:
+        write_text(path, latex_text(("measure", *assessments), [(title, *texts) for title, texts in cells.items()]))
 
 
 def score_document(assessment: Assessment) -> dict[str, Any]:
@@ -318,7 +283,7 @@ def score_document(assessment: Assessment) -> dict[str, Any]:
         "chance": random.mean,
         "chance_deviation": random.deviation,
         "p_value": random.p_value,
-        PPV.key: values[PPV.key],
+        "ppv": values["ppv"],
         "beta": dict(assessment.ppv.beta),
         **values,
         "intervals": intervals if assessment.intervals else None,
@@ -338,7 +303,7 @@ def score_document(assessment: Assessment) -> dict[str, Any]:
             "paired": inputs.paired,
             "resamples": inner.resamples,
         },
-        **decision_document(assessment),
+        **decision.decision_document(assessment),
         "cautions": list(assessment.cautions),
         "notes": list(assessment.notes),
     }
@@ -351,7 +316,7 @@ def ranking_document(assessments: Assessments, selection: Selection) -> dict[str
         "proxies": [{"proxy": name, "rank": rank, **score_document(assessments[name])} for rank, (name, _) in ranked],
         "differences": differences_document(selection.differences),
         "choices": differences_document(selection.choices),
-        "together": together_document(selection.together) if selection.together else None,
+        "together": decision.together_document(selection),
         "cautions": list(dict.fromkeys(line for one in assessments.values() for line in one.cautions)),
         "notes": [f"no intervals of the differences: {selection.reason}"] if selection.reason else [],
     }

@@ -9,27 +9,18 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from rich.console import Group
 
+from proxytune import teaching
 from proxytune.arrays import Floats
 from proxytune.learning import LEVELS, NONE, Costs, Distribution, LearningCurve, LearningEstimate, doublings
-from proxytune.report.figure_style import BLUE, GREY, dress, legend_below, panel_grid
+from proxytune.report import figure_style as style
 from proxytune.report.study.document import estimate_document
 from proxytune.report.text import file_texts, group_texts, table_text
 from proxytune.report.view import Drawn, Paragraphs, Part, Table, View, columns_of
 from proxytune.report.wording import fixed, listed, percent, short, span
 from proxytune.report.writing import picture_of
 from proxytune.study import settings_document
-from proxytune.teaching import (
-    Experiment,
-    Observations,
-    Predictivity,
-    RankAgreement,
-    TeacherResult,
-    observe,
-    teaching_settings,
-    why_unknown,
-)
 
-Predictivities = Mapping[str, Predictivity | None]
+Predictivities = Mapping[str, teaching.Predictivity | None]
 """PRPV by proxy; None where it is not known."""
 HEADS = ("PRPV", "zero-shot score", "samples needed", "PLV", "reduction")
 """Heads of table 1 beside the proxy's name."""
@@ -48,9 +39,9 @@ PUBLISHED = tuple(
 SEARCH = '`study` with objective = "plv" looks for'
 
 
-def teach_answer(experiment: Experiment) -> str:
+def teach_answer(experiment: teaching.Experiment) -> str:
     """Say which proxies save target samples, which save none, and of which that is open."""
-    unknown = why_unknown(experiment.needs)
+    unknown = teaching.why_unknown(experiment.needs)
     if unknown and not experiment.settled:
         return f"PLV (proxy learning value) is unknown: {unknown.reason}."
     saves, none, both = sorted_by_worth(experiment.teachers)
@@ -62,31 +53,31 @@ def teach_answer(experiment: Experiment) -> str:
     return " ".join(filter(None, sentences))
 
 
-def sorted_by_worth(teachers: Sequence[TeacherResult]) -> tuple[list[TeacherResult], ...]:
+def sorted_by_worth(teachers: Sequence[teaching.TeacherResult]) -> tuple[list[teaching.TeacherResult], ...]:
     """The proxies whose whole interval of PLV lies above 0, those of which none of it does, and the others."""
     saves = [one for one in teachers if one.worth and one.worth.plv.above_zero]
     none = [one for one in teachers if one.worth and one.worth.plv.at_most_zero]
     return saves, none, [one for one in teachers if one not in (*saves, *none)]
 
 
-def _list_plv(lessons: Sequence[TeacherResult]) -> str:
+def _list_plv(lessons: Sequence[teaching.TeacherResult]) -> str:
     return "; ".join(f"{one.name}: {count(one.worth.plv, UNKNOWN)}" for one in lessons if one.worth)
 
 
-def teach_next_step(experiment: Experiment) -> str:
+def teach_next_step(experiment: teaching.Experiment) -> str:
     """The step that brings most."""
-    if unknown := why_unknown(experiment.needs):
+    if unknown := teaching.why_unknown(experiment.needs):
         return f"{unknown.remedy}: {unknown.reason}."
     saves, _, both = sorted_by_worth(experiment.teachers)
     if both:
-        more = f"{say_more_of_it(experiment)}, which narrows the intervals"
+        more = f"{say_more(experiment)}, which narrows the intervals"
         return f"{more}: {listed([one.name for one in both])} cannot be judged yet."
     if saves:
         return f"train in a proxy that saves samples, then on target samples; {SEARCH} a better one."
     return f"train without these proxies; {SEARCH} one that saves samples."
 
 
-def say_more_of_it(experiment: Experiment) -> str:
+def say_more(experiment: teaching.Experiment) -> str:
     """Say what to raise: the examinations that are chosen or, of a whole grid, its repetitions."""
     taught = experiment.settings.teaching
     if taught is not None and taught.examinations is not None:
@@ -95,7 +86,7 @@ def say_more_of_it(experiment: Experiment) -> str:
     return f"raise teaching.seeds from {seeds} to {2 * seeds}"
 
 
-def teach_text(experiment: Experiment, prpv: Predictivities, files: Mapping[str, Any]) -> Group:
+def teach_text(experiment: teaching.Experiment, prpv: Predictivities, files: Mapping[str, Any]) -> Group:
     """The result of a learning experiment as `teach` prints it.
 
     Args:
@@ -104,19 +95,19 @@ def teach_text(experiment: Experiment, prpv: Predictivities, files: Mapping[str,
         files: What was written.
     """
     table = teach_table(experiment, prpv)
-    observations = observation_lines(observe(experiment, prpv), experiment)
+    observations = observation_lines(teaching.observe(experiment, prpv), experiment)
     sentence = f"{teach_answer(experiment)}\n"
     return group_texts(sentence, table_text(replace(table, title="")), *table.notes, *observations, *file_texts(files))
 
 
-def teach_table(experiment: Experiment, prpv: Predictivities) -> Table:
+def teach_table(experiment: teaching.Experiment, prpv: Predictivities) -> Table:
     """Table 1: the learner without a proxy, then one row per proxy; PLV in cost is told where costs are stated."""
     worth = next((lesson.worth for lesson in experiment.teachers if lesson.worth), None)
     unseen = UNKNOWN if experiment.needs.gain is None else NOT_REACHED
     rows: list[tuple[str, ...]] = [(NONE, "", "", count(worth.without) if worth else unseen, "", "")]
     rows += [_row(lesson, prpv.get(lesson.name)) for lesson in experiment.teachers]
     heads: tuple[str, ...] = HEADS
-    notes, costs = [PLV_MEANING], teaching_settings(experiment.settings).costs
+    notes, costs = [PLV_MEANING], teaching.teaching_settings(experiment.settings).costs
     # Samples that cost one each are PLV itself.
     if costs != Costs():
         saved = [_with_ends(one.cost, UNKNOWN, short) if one.cost else "" for one in experiment.teachers]
@@ -126,7 +117,7 @@ def teach_table(experiment: Experiment, prpv: Predictivities) -> Table:
     return Table(title, columns_of(("proxy",), heads), tuple(rows), (*notes, *_convergence_notes(experiment)))
 
 
-def _row(lesson: TeacherResult, prpv: Predictivity | None) -> tuple[str, ...]:
+def _row(lesson: teaching.TeacherResult, prpv: teaching.Predictivity | None) -> tuple[str, ...]:
     worth, zero_shot = lesson.worth, one_decimal(lesson.zero_shot)
     predicts = "" if prpv is None else f"{prpv.prpv:g}" + (f" ({span(prpv.interval, 0)})" if prpv.interval else "")
     if worth is None:
@@ -135,10 +126,10 @@ def _row(lesson: TeacherResult, prpv: Predictivity | None) -> tuple[str, ...]:
     return (lesson.name, predicts, zero_shot, count(worth.needed), count(worth.plv, UNKNOWN), reduction)
 
 
-def _convergence_notes(experiment: Experiment) -> list[str]:
+def _convergence_notes(experiment: teaching.Experiment) -> list[str]:
     """Notes on what counts as converged, and by what each proxy divides the samples."""
     notes = [CONVERGED.format(f"{experiment.when.threshold:.1f} of {experiment.best_score:g}")]
-    if unknown := why_unknown(experiment.needs):
+    if unknown := teaching.why_unknown(experiment.needs):
         notes.append(f"{unknown.reason}, so PLV is not known; {unknown.remedy}")
     for lesson in experiment.teachers:
         factor = lesson.worth.factor if lesson.worth else None
@@ -170,7 +161,7 @@ def one_decimal(figure: LearningEstimate) -> str:
     return "" if figure.value is None else fixed(figure.value, 1)
 
 
-def observation_lines(found: Observations | None, experiment: Experiment) -> tuple[str, ...]:
+def observation_lines(found: teaching.Observations | None, experiment: teaching.Experiment) -> tuple[str, ...]:
     """Both observations, each with its evidence; none where PLV is unknown, and the first of several proxies only."""
     if found is None:
         return ()
@@ -179,7 +170,7 @@ def observation_lines(found: Observations | None, experiment: Experiment) -> tup
     return (*first, f"{SECOND}: {_second(found)}.")
 
 
-def _first(found: RankAgreement, starts: Mapping[str, str]) -> str:
+def _first(found: teaching.RankAgreement, starts: Mapping[str, str]) -> str:
     pairs = [
         f"{ahead} saves more than {behind} though it starts lower ({starts[ahead]} for {starts[behind]})"
         for ahead, behind in found.reversed
@@ -188,7 +179,7 @@ def _first(found: RankAgreement, starts: Mapping[str, str]) -> str:
     return f"{shown}; {_tau(found, 'zero-shot score')}"
 
 
-def _second(found: Observations) -> str:
+def _second(found: teaching.Observations) -> str:
     poor, shown = list(found.poor_predictors), "none of these proxies shows it"
     if poor:
         save = f"{listed(poor)} {'saves' if len(poor) == 1 else 'save'} samples"
@@ -196,7 +187,7 @@ def _second(found: Observations) -> str:
     return shown if found.prpv is None else f"{shown}; {_tau(found.prpv, 'PRPV')}"
 
 
-def _tau(found: RankAgreement, figure: str) -> str:
+def _tau(found: teaching.RankAgreement, figure: str) -> str:
     """Kendall's τ with its interval, and what it says."""
     interval = f"{fixed(found.low, 2)} to {fixed(found.high, 2)}"
     if found.low > 0.0:
@@ -209,9 +200,10 @@ def _tau(found: RankAgreement, figure: str) -> str:
     return f"{figures}: of {found.proxies} proxies, {says}"
 
 
-def teach_view(experiment: Experiment, prpv: Predictivities, figure: Drawn) -> View:
+def teach_view(experiment: teaching.Experiment, prpv: Predictivities, figure: Drawn) -> View:
     """A learning experiment: the paper's table 1 and observations, what others published, and the curves."""
-    table, observations = teach_table(experiment, prpv), observation_lines(observe(experiment, prpv), experiment)
+    table, found = teach_table(experiment, prpv), teaching.observe(experiment, prpv)
+    observations = observation_lines(found, experiment)
     said = [Paragraphs("The paper's two observations", observations)] if observations else []
     picture = picture_of("teach", "teach", figure)
     title = f"{experiment.settings.name}: which proxy is worth learning in?"
@@ -219,7 +211,7 @@ def teach_view(experiment: Experiment, prpv: Predictivities, figure: Drawn) -> V
     return View(title, teach_answer(experiment), teach_next_step(experiment), parts)
 
 
-def _published(experiment: Experiment, rows: Sequence[tuple[str, ...]]) -> tuple[Table, ...]:
+def _published(experiment: teaching.Experiment, rows: Sequence[tuple[str, ...]]) -> tuple[Table, ...]:
     """Published figures of these proxies, beside what is found here; nothing where nothing is given."""
     taught = experiment.settings.teaching
     if taught is None or not taught.published:
@@ -234,9 +226,9 @@ def _published(experiment: Experiment, rows: Sequence[tuple[str, ...]]) -> tuple
     return (Table("Beside what was published", columns_of(("proxy",), PUBLISHED), tuple(cells), notes),)
 
 
-def teach_document(experiment: Experiment, prpv: Predictivities) -> dict[str, Any]:
+def teach_document(experiment: teaching.Experiment, prpv: Predictivities) -> dict[str, Any]:
     """A learning experiment as plain JSON; None where a figure is undefined or was not reached."""
-    found = observe(experiment, prpv)
+    found = teaching.observe(experiment, prpv)
     return {
         "name": experiment.settings.name,
         "best_score": experiment.best_score,
@@ -257,7 +249,7 @@ def teach_document(experiment: Experiment, prpv: Predictivities) -> dict[str, An
     }
 
 
-def _agreement_document(found: RankAgreement | None) -> dict[str, Any] | None:
+def _agreement_document(found: teaching.RankAgreement | None) -> dict[str, Any] | None:
     """Agreement of a ranking with that by PLV."""
     if found is None:
         return None
@@ -265,11 +257,11 @@ def _agreement_document(found: RankAgreement | None) -> dict[str, Any] | None:
     return {"value": found.tau, "interval": [found.low, found.high], "contrary_pairs": pairs}
 
 
-def _lesson_document(lesson: TeacherResult, prpv: Predictivity | None) -> dict[str, Any]:
+def _lesson_document(lesson: teaching.TeacherResult, prpv: teaching.Predictivity | None) -> dict[str, Any]:
     worth = lesson.worth
     figures = ("without", "needed", "plv", "factor", "reduction")
     return {
-        "theta": distribution_document(lesson.proxy),
+        "theta": theta_document(lesson.proxy),
         "prpv": prpv.prpv if prpv else None,
         "prpv_interval": list(prpv.interval) if prpv and prpv.interval else None,
         "prpv_chance": {"mean": prpv.chance.mean, "p_value": prpv.chance.p_value} if prpv else None,
@@ -281,7 +273,7 @@ def _lesson_document(lesson: TeacherResult, prpv: Predictivity | None) -> dict[s
     }
 
 
-def distribution_document(proxy: Distribution) -> dict[str, Any]:
+def theta_document(proxy: Distribution) -> dict[str, Any]:
     """p(θ): a number where a parameter is fixed, else its bounds."""
     return {name: low if low == high else [low, high] for name, (low, high) in proxy.bounds.items()}
 
@@ -291,8 +283,8 @@ def _curve_document(curve: LearningCurve) -> dict[str, Any]:
     return {"target_samples": list(curve.counts), "scores": scores, "examinations": len(curve.examined)}
 
 
-def _settings_document(experiment: Experiment) -> dict[str, Any]:
-    taught = teaching_settings(experiment.settings)
+def _settings_document(experiment: teaching.Experiment) -> dict[str, Any]:
+    taught = teaching.teaching_settings(experiment.settings)
     names = ("learner", "proxy_samples", "seeds", "lesson_s", "level", "tolerance", "examinations")
     lessons = ("rehearsal", "proxy_lessons", "target_lessons")
     return {
@@ -312,16 +304,16 @@ class _Look(NamedTuple):
     mark: str
 
 
-WITHOUT, WITH = _Look("without a proxy", GREY, "--", "x"), _Look("with the proxy", BLUE, "-", "o")
+WITHOUT, WITH = _Look("without a proxy", style.GREY, "--", "x"), _Look("with the proxy", style.BLUE, "-", "o")
 
 
-def teach_figure(experiment: Experiment) -> Figure:
+def teach_figure(experiment: teaching.Experiment) -> Figure:
     """Draw the learning curve with each proxy against that without one, a panel each, with 95 % bands.
 
     Above the dotted line a learner counts as converged; the bar on it says how many samples that takes.
     """
     lessons = experiment.teachers
-    figure, panels = panel_grid(len(lessons), 1.25, 0.6, sharex=True, sharey=True)
+    figure, panels = style.panel_grid(len(lessons), 1.25, 0.6, sharex=True, sharey=True)
     for axes, lesson in zip(panels, lessons, strict=True):
         _draw_panel(axes, experiment, lesson)
     for axes in panels[-2:]:
@@ -330,11 +322,11 @@ def teach_figure(experiment: Experiment) -> Figure:
         axes.set_xlabel("target samples", fontsize=8)
     for axes in panels[::2]:
         axes.set_ylabel("score [s]", fontsize=8)
-    legend_below(figure, *panels)
+    style.legend_below(figure, *panels)
     return figure
 
 
-def _draw_panel(axes: Axes, experiment: Experiment, lesson: TeacherResult) -> None:
+def _draw_panel(axes: Axes, experiment: teaching.Experiment, lesson: teaching.TeacherResult) -> None:
     for name, look, height in ((NONE, WITHOUT, -1.2), (lesson.name, WITH, 1.2)):
         _draw_curve(axes, experiment, name, look)
         if lesson.worth is not None:
@@ -345,19 +337,19 @@ def _draw_panel(axes: Axes, experiment: Experiment, lesson: TeacherResult) -> No
                 level, places = experiment.when.threshold + height, _places(experiment, ends)
                 axes.hlines(level, *places, color=look.colour, linewidth=2.5)
     axes.axhline(experiment.when.threshold, color="0.3", linewidth=0.8, linestyle=":", label="converged")
-    grid = teaching_settings(experiment.settings).target_samples
+    grid = teaching.teaching_settings(experiment.settings).target_samples
     shown = [grid[place] for place in sorted({0, 1, (len(grid) + 1) // 2, len(grid) - 1})]
     axes.set_xticks(_places(experiment, np.array(shown, dtype=float)), [f"{count:g}" for count in shown])
     axes.set_title(lesson.name, fontsize=8)
-    dress(axes)
+    style.dress(axes)
 
 
-def _places(experiment: Experiment, counts: Floats) -> Floats:
+def _places(experiment: teaching.Experiment, counts: Floats) -> Floats:
     """Places of counts on the axis: as doublings, none at 0."""
     return doublings(counts, experiment.needs.draws.first)
 
 
-def _draw_curve(axes: Axes, experiment: Experiment, name: str, look: _Look) -> None:
+def _draw_curve(axes: Axes, experiment: teaching.Experiment, name: str, look: _Look) -> None:
     draws, curve = experiment.needs.draws, experiment.needs.curves[name]
     at, scores = _places(experiment, draws.counts), draws.scores[name]
     low, high = np.quantile(scores, LEVELS, axis=0)

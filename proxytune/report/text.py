@@ -1,7 +1,10 @@
-"""Views on the terminal: tables without lines, with their headings and notes."""
+"""Views on the terminal, tables without lines with their headings and notes; and tables as files, CSV and LaTeX."""
 
+import csv
+import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, Literal
 
 from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
@@ -10,6 +13,7 @@ from rich.measure import Measurement, measure_renderables
 from rich.table import Table as TerminalTable
 from rich.text import Text
 
+from proxytune.errors import InputError
 from proxytune.report.view import Table
 
 GAP = 2
@@ -28,9 +32,7 @@ class WholeWords:
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         columns, endless = self.table.columns, options.update(max_width=100_000)
-        cells = [
-            [measure_renderables(console, endless, [cell]) for cell in (one.header, *one.cells)] for one in columns
-        ]
+        cells = [[measure_renderables(console, endless, [it]) for it in (one.header, *one.cells)] for one in columns]
         widths = [max(cell.minimum for cell in column) for column in cells]
         left = options.max_width - sum(widths) - GAP * (len(widths) - 1)
         wanted = [max(cell.maximum for cell in column) - width for column, width in zip(cells, widths, strict=True)]
@@ -54,14 +56,8 @@ def table_text(table: Table, *, ragged: bool = False) -> WholeWords:
         ragged: Whether numbers begin together, as texts do, instead of ending together.
     """
     names = [one.name for one in table.columns]
-    shown = TerminalTable(
-        title=escape(table.title) if table.title else None,
-        title_justify="left",
-        title_style="bold",
-        box=None,
-        pad_edge=False,
-        show_header=any(names),
-    )
+    look: dict[str, Any] = {"title_justify": "left", "title_style": "bold", "box": None, "pad_edge": False}
+    shown = TerminalTable(title=escape(table.title) if table.title else None, show_header=any(names), **look)
     # Heads of one line stand beside the last line of others.
     vertical: Literal["top", "bottom"] = "bottom" if any("\n" in name for name in names) else "top"
     for one in table.columns:
@@ -95,3 +91,63 @@ def group_texts(*parts: RenderableType) -> Group:
         parts: Tables and texts; a text is shown as it is, without markup.
     """
     return Group(*(Text(part) if isinstance(part, str) else part for part in parts))
+
+
+ENDINGS = (".csv", ".tex")
+GREEK = ("alpha", "beta", "delta", "theta", "lambda", "mu", "rho", "sigma", "tau", "varphi", "omega", "Theta")
+IN_LATEX = {
+    "\\": r"\textbackslash{}",
+    **{character: f"\\{character}" for character in "&%$#_{}"},
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "<": "$<$",
+    ">": "$>$",
+    "−": "$-$",
+    "–": "--",
+    "…": r"\ldots{}",
+    "’": "'",
+    "°": r"$^\circ$",
+    "²": "$^2$",
+    "±": r"$\pm$",
+    "×": r"$\times$",
+    "·": r"$\cdot$",
+    "≤": r"$\leq$",
+    "≥": r"$\geq$",
+    "→": r"$\rightarrow$",
+    "∞": r"$\infty$",
+    **{letter: f"$\\{name}$" for letter, name in zip("αβδθλμρστφωΘ", GREEK, strict=True)},
+}
+"""Characters that pdflatex would take for a command, or has no glyph for; accented letters it reads as they are."""
+Cell = str | float | None
+
+
+def check_table_file(option: str, path: Path) -> None:
+    """Refuse a file of another kind before anything is worked out.
+
+    Raises:
+        InputError: If its name ends otherwise.
+    """
+    if path.suffix not in ENDINGS:
+        raise InputError(f"{option} {path}: a table is written as {' or '.join(ENDINGS)}; name the file so")
+
+
+def csv_text(columns: Sequence[str], rows: Sequence[Sequence[Cell]]) -> str:
+    """A table as CSV; cells without a value are empty."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows([columns, *rows])
+    return text.getvalue()
+
+
+def latex_text(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    r"""A table as LaTeX, to be taken in by `\input` between `\usepackage{booktabs}` and a caption.
+
+    It has the rules of booktabs; the first column is of names, the others of figures.
+    """
+    head, *body = (" & ".join(map(in_latex, row)) + r" \\" for row in (columns, *rows))
+    lines = [rf"\begin{{tabular}}{{{'l' + 'r' * (len(columns) - 1)}}}", r"\toprule", head, r"\midrule"]
+    return "\n".join([*lines, *body, r"\bottomrule", r"\end{tabular}"]) + "\n"
+
+
+def in_latex(text: str) -> str:
+    """A text as LaTeX shows it."""
+    return "".join(IN_LATEX.get(character, character) for character in text.strip())

@@ -29,6 +29,11 @@ def span(ends: Ends, decimals: int | None = None) -> str:
     return f"{fixed(ends[0], places)} to {fixed(ends[1], places)}"
 
 
+def as_known(value: float, ends: Ends) -> str:
+    """A number with the decimals that its interval allows."""
+    return fixed(value, digits(ends))
+
+
 def short_span(low: float | None, high: float | None) -> str:
     """An interval of three significant figures; empty where an end is not known."""
     return "" if low is None or high is None else f"{short(low)} to {short(high)}"

@@ -110,9 +110,7 @@ def _marks(figure: Figure) -> Iterator[tuple[str, list[str]]]:
 def _place(axis: Axis, value: float) -> str:
     """A value on an axis, by the axis' name; or the name that stands beside it."""
     if isinstance(axis.get_major_formatter(), FixedFormatter):
-        ticks = {
-            float(place): one.get_text() for place, one in zip(axis.get_ticklocs(), axis.get_ticklabels(), strict=True)
-        }
+        ticks = {float(at): one.get_text() for at, one in zip(axis.get_ticklocs(), axis.get_ticklabels(), strict=True)}
         return ticks.get(round(float(value)), "")
     return f"{axis.get_label().get_text()} {value:.4g}".replace("\n", " ").replace("-", "−").strip()
 
@@ -125,9 +123,7 @@ def _titled(group: str, said: Mapping[str, list[str]]) -> str:
         return group
     parts = iter(said[name])
     if len(uses) == len(said[name]):
-        group = re.sub(
-            r"(<use [^>]*)/>", lambda one: f"{one[1]}><title>{html.escape(next(parts))}</title></use>", group
-        )
+        group = re.sub(r"(<use [^>]*)/>", lambda it: f"{it[1]}><title>{html.escape(next(parts))}</title></use>", group)
     return group.replace(f' id="{name}"', "", 1)
 
 

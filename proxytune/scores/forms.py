@@ -124,9 +124,8 @@ def _literal(path: Path, name: str | None) -> Mapping[str, Any]:
     if not known:
         raise ScoresError(f"{path}: has none that is written out, {{task: {{agent: score}}}}")
     if name not in known:
-        asked = (
-            f"no dictionary '{name}'; {nearest(name, known)}" if name else f"has the dictionaries {', '.join(known)}"
-        )
+        choices = f"has the dictionaries {', '.join(known)}"
+        asked = f"no dictionary '{name}'; {nearest(name, known)}" if name else choices
         raise ScoresError(f"{path}: {asked}; choose one, as in {path}:{next(iter(known), 'NAME')}")
     return known[name]
 

@@ -16,19 +16,7 @@ import numpy as np
 from proxytune.arrays import Floats
 from proxytune.errors import ScoresError
 from proxytune.files import draft_of
-from proxytune.scores.forms import (
-    LABELS,
-    Side,
-    agent_column,
-    beside,
-    counted,
-    form_rows,
-    is_form,
-    own_column,
-    percent_column,
-    read_cell,
-    spread_out,
-)
+from proxytune.scores import forms
 from proxytune.scores.table import LARGEST, ScoreTable
 from proxytune.settings import nearest, read_text
 
@@ -59,10 +47,14 @@ class Cells:
         if labels is None:
             return [""] * len(self.lines)
         if "" in labels:
-            raise ScoresError(
-                f"{self.path}: line {self.lines[labels.index('')]}, column '{name}': is empty; fill it in"
-            )
+            line = self.lines[labels.index("")]
+            raise ScoresError(f"{self.path}: line {line}, column '{name}': is empty; fill it in")
         return labels
+
+    def published(self, columns: Sequence[str]) -> Floats:
+        """The standard errors of these columns, shape (rows, columns); 0 where they are not known."""
+        none = [0.0] * len(self.lines)
+        return np.reshape([self.errors.get(name, none) for name in columns], (len(columns), len(none))).T
 
     def numbers(self, columns: Sequence[str]) -> Floats:
         """The numbers of these columns, shape (rows, columns)."""
@@ -80,7 +72,7 @@ def read_cells(
     path: Path,
     metrics: Sequence[str],
     columns: Columns | None = None,
-    side: Side | None = None,
+    side: forms.Side | None = None,
     part: str | None = None,
 ) -> Cells:
     """Read a file of scores, in any form that is known.
@@ -91,8 +83,8 @@ def read_cells(
     """
     separator = ","
     rows: Iterator[tuple[int, list[str]]]
-    if is_form(path):
-        named, given = form_rows(path, part)
+    if forms.is_form(path):
+        named, given = forms.form_rows(path, part)
         rows = iter(given)
     else:
         text = _text(path)
@@ -100,25 +92,25 @@ def read_cells(
         rows = _rows(path, text, separator)
         named = _first(path, rows)
     ours = {theirs: name for name, theirs in (columns or {}).items() if theirs in named}
-    alias = agent_column(named)
+    alias = forms.agent_column(named)
     if alias is not None and "agent" not in {*named, *(columns or {})}:
         ours[alias] = "agent"
     # Another column that has such a name is out of the way.
     header = [ours.get(name, f"{name} of the file" if name in ours.values() else name) for name in named]
-    whose = {name: column for name in metrics if (column := own_column(name, header, side)) not in (None, name)}
+    whose = {name: column for name in metrics if (column := forms.own_column(name, header, side)) not in (None, name)}
     bare = {column: name for name, column in whose.items()}
     if len(bare) == len(whose):
         header = [bare.get(name, name) for name in header]
     _check_header(path, header, metrics)
-    more = {name: beside(name, name, header, side) for name in metrics}
-    wanted = {*LABELS, *metrics, *(column for pair in more.values() for column in pair if column is not None)}
+    more = {name: forms.beside(name, name, header, side) for name in metrics}
+    wanted = {*forms.LABELS, *metrics, *(column for pair in more.values() for column in pair if column is not None)}
     lines, cells = _columns(path, rows, header, wanted)
-    if is_form(path):  # an agent that a dictionary does not have is left out
+    if forms.is_form(path):  # an agent that a dictionary does not have is left out
         kept = [row for row in range(len(lines)) if all(cells[name][row] for name in metrics)]
         lines, cells = [lines[row] for row in kept], {name: [own[row] for row in kept] for name, own in cells.items()}
     found = Cells(path, named, header, lines, cells)
     found = found if separator == "," else replace(found, decimal=_decimal(found, metrics))
-    in_percent = {name: percent_column(whose.get(name) or name, name) for name in metrics}
+    in_percent = {name: forms.percent_column(whose.get(name) or name, name) for name in metrics}
     return _plain_cells(found, metrics, more, in_percent)
 
 
@@ -143,7 +135,7 @@ def _plain_cells(
         if done and (len(done) < len(metrics) or len({of for _, of in done}) > 1):
             where = f"{found.path}: line {line}: counts of rollouts"
             raise ScoresError(f"{where} must be one number an agent in every metric; give the metrics one by one")
-        for place, values in enumerate(spread_out(done) or [[one[0] for one in read.values()]]):
+        for place, values in enumerate(forms.spread_out(done) or [[one[0] for one in read.values()]]):
             lines.append(line)
             episode = f"{own['agent']} {label}#{place}" if done else label
             for name, value in (own | dict(zip(metrics, values, strict=True)) | {"episode": episode}).items():
@@ -164,7 +156,7 @@ def _read(
 ) -> tuple[str, float, tuple[int, int] | None]:
     """What a row says of a metric: its text, its standard error (0: not known), and successes of rollouts."""
     text, error, scale = own[name], 0.0, 100.0 if in_percent else 1.0
-    read, where = read_cell(text, found.decimal, in_percent), f"{found.path}: line {line}, column '{name}'"
+    read, where = forms.read_cell(text, found.decimal, in_percent), f"{found.path}: line {line}, column '{name}'"
     if read is not None:
         text, error = repr(read[0]).replace(".", found.decimal), read[1] or 0.0
         if read[2] is not None:
@@ -176,7 +168,7 @@ def _read(
     if math.isnan(value):
         raise ScoresError(f"{where}: must be a finite number, got {text!r}; write successes of rollouts as '18 of 25'")
     if counts is not None:
-        return text, error, counted(value, own[counts], where)
+        return text, error, forms.counted(value, own[counts], where)
     if errors is not None:
         error = _number(own[errors].replace(found.decimal, ".")) / scale
         if not 0.0 <= error < LARGEST:
@@ -198,8 +190,8 @@ def column_names(path: Path, part: str | None = None) -> list[str]:
     Raises:
         ScoresError: If it cannot be read.
     """
-    if is_form(path):
-        return form_rows(path, part)[0]
+    if forms.is_form(path):
+        return forms.form_rows(path, part)[0]
     text = _text(path)
     return _first(path, _rows(path, text, _separator(text)))
 
@@ -250,9 +242,8 @@ def _columns(
     lines = []
     for line, row in rows:
         if len(row) != len(header):
-            raise ScoresError(
-                f"{path}: line {line}: has {len(row)} cells, but the first line names {len(header)} columns"
-            )
+            named = f"the first line names {len(header)} columns"
+            raise ScoresError(f"{path}: line {line}: has {len(row)} cells, but {named}")
         lines.append(line)
         for name, place in places.items():
             cells[name].append(row[place].strip())
@@ -271,25 +262,23 @@ def _check_header(path: Path, header: Sequence[str], metrics: Sequence[str]) -> 
         raise ScoresError(f"{path}: no column 'agent'; {found}; {remedy}")
     for name in metrics:
         if name not in header:
-            others = [column for column in header if column not in LABELS]
+            others = [column for column in header if column not in forms.LABELS]
             raise ScoresError(f"{path}: no column '{name}'; {nearest(name, others)}")
-    for name in (*LABELS, *metrics):
+    for name in (*forms.LABELS, *metrics):
         if header.count(name) > 1:
             raise ScoresError(f"{path}: the first line names the column '{name}' twice; rename one")
 
 
 def _decimal(found: Cells, metrics: Sequence[str]) -> str:
     """The decimal sign of a file's numbers."""
-    numbers = [
-        (line, name, cell) for name in metrics for line, cell in zip(found.lines, found.cells[name], strict=True)
-    ]
+    lines, cells = found.lines, found.cells
+    numbers = [(line, name, cell) for name in metrics for line, cell in zip(lines, cells[name], strict=True)]
     commas, points = (next((one for one in numbers if mark in one[2]), None) for mark in ",.")
     if commas and points:
         line, name, cell = commas
         other = f"line {points[0]} has {points[2]!r}"
-        raise ScoresError(
-            f"{found.path}: line {line}, column '{name}': {cell!r} has a comma, but {other}; write all alike"
-        )
+        where = f"line {line}, column '{name}'"
+        raise ScoresError(f"{found.path}: {where}: {cell!r} has a comma, but {other}; write all alike")
     return "," if commas else "."
 
 
@@ -304,7 +293,7 @@ def read_scores(
     metrics: Iterable[str],
     domain: str | None = None,
     columns: Columns | None = None,
-    side: Side | None = None,
+    side: forms.Side | None = None,
 ) -> ScoreTable:
     """Read the scores of one domain from a CSV file, or from several that make one table.
 
@@ -340,7 +329,7 @@ def read_domains(
     path: Files,
     metrics: Iterable[str],
     columns: Columns | None = None,
-    side: Side | None = None,
+    side: forms.Side | None = None,
     part: str | None = None,
 ) -> dict[str, ScoreTable]:
     """Read every domain of a CSV file or of several, in their order; without a domain column the only one is "".
@@ -362,25 +351,17 @@ def read_domains(
     )
     _check_single(files, list(zip(domain, agent, episode, strict=True)))
     values = np.concatenate([cells.numbers(names) for cells in files])
-    published = {
-        name: [one for cells in files for one in cells.errors.get(name, [0.0] * len(cells.lines))] for name in names
-    }
+    published = np.concatenate([cells.published(names) for cells in files])
     rows: dict[str, list[int]] = {}
     for row, name in enumerate(domain):
         rows.setdefault(name, []).append(row)
-    tables = {
-        name: ScoreTable.from_rows([agent[row] for row in own], [episode[row] for row in own], names, values[own])
-        for name, own in rows.items()
-    }
-    if not any(map(any, published.values())):
-        return tables
-    of_agent = {
-        (name, *one): error for name, own in published.items() for *one, error in zip(domain, agent, own, strict=True)
-    }
-    return {
-        name: replace(table, errors=np.array([[of_agent[one, name, who] for one in names] for who in table.agents]))
-        for name, table in tables.items()
-    }
+    tables = {}
+    for name, own in rows.items():
+        table = ScoreTable.from_rows([agent[row] for row in own], [episode[row] for row in own], names, values[own])
+        of_agent = {agent[row]: published[row] for row in own}
+        errors = np.array([of_agent[who] for who in table.agents]) if published.any() else None
+        tables[name] = replace(table, errors=errors)
+    return tables
 
 
 def _files(path: Files) -> list[Path]:
@@ -390,7 +371,7 @@ def _files(path: Files) -> list[Path]:
 
 def _check_alike(files: Sequence[Cells]) -> None:
     """Refuse files of which one numbers its episodes, or names domains, and another does not."""
-    for label, cells in [(label, cells) for label in LABELS for cells in files]:
+    for label, cells in [(label, cells) for label in forms.LABELS for cells in files]:
         other = next((one for one in files if label in one.header), None)
         if other and label not in cells.header:
             raise ScoresError(f"{cells.path}: has no column '{label}', which {other.path} has; add it")

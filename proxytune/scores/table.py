@@ -208,9 +208,8 @@ class ScoreTable:
         rows, columns = _places(self.agents), _places(self.episodes)
         order = [rows[name] for name in agents]
         values = self.values[np.ix_(order, [columns[label] for label in labels])]
-        return ScoreTable(
-            tuple(agents), labels, self.metrics, values, None if self.errors is None else self.errors[order]
-        )
+        errors = None if self.errors is None else self.errors[order]
+        return ScoreTable(tuple(agents), labels, self.metrics, values, errors)
 
 
 def _places(names: Iterable[str]) -> dict[str, int]:

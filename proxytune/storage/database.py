@@ -171,7 +171,10 @@ def transaction(connection: sqlite3.Connection, path: Path) -> Iterator[sqlite3.
 
 
 def write_row(connection: sqlite3.Connection, table: str, row: Mapping[str, Any]) -> None:
-    """Write a whole row in place of the one with its key, with its digest, and count it; in a transaction."""
+    """Write a whole row in place of the one with its key, with its digest, and count it; in a transaction.
+
+    What the row has beside the table's columns is left out.
+    """
     delete, insert = _writing(table, FORMAT)
     replaced = connection.execute(delete, row).rowcount
     connection.execute(insert, row)
@@ -348,9 +351,8 @@ def _columns(version: int) -> Mapping[str, Mapping[str, str]]:
     """The columns of each table with digests in a format, with their types; instances before what belongs to them."""
     with closing(sqlite3.connect(":memory:", isolation_level=None)) as own:
         make_tables(own, version)
-        found = {
-            table: own.execute(f"SELECT name, type FROM pragma_table_info('{table}')").fetchall() for table in KEYS
-        }
+        query = "SELECT name, type FROM pragma_table_info(?)"
+        found = {table: own.execute(query, (table,)).fetchall() for table in KEYS}
     return {
         table: {name: kind for name, kind in columns if name != "digest"} for table, columns in found.items() if columns
     }

@@ -80,9 +80,8 @@ def _acquire(path: Path) -> int:
             holder = os.pread(descriptor, 32, 0).decode(errors="replace").strip()
             os.close(descriptor)
             whose = f" (process {holder})" if holder else ""
-            raise BusyError(
-                f"{path.parent}: another process{whose} is running this study; wait for it or stop it"
-            ) from None
+            running = f"another process{whose} is running this study"
+            raise BusyError(f"{path.parent}: {running}; wait for it or stop it") from None
         try:
             if os.path.samestat(os.fstat(descriptor), os.lstat(path)):
                 return descriptor

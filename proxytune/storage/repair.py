@@ -12,17 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from proxytune.errors import InputError, StoreError
-from proxytune.storage.database import (
-    DamagedError,
-    connect,
-    counted,
-    drop_damaged,
-    make_tables,
-    open_file,
-    readable_texts,
-    seal,
-    sqlite_errors_as_store_errors,
-)
+from proxytune.storage import database
 from proxytune.storage.folder import refuse_links
 from proxytune.storage.store import FILE_NAME
 
@@ -65,9 +55,9 @@ def salvage(folder: Path) -> Salvage | None:
     if not path.is_file():
         raise InputError(f"{path}: no such file; there is nothing to repair")
     try:
-        connect(path, writable=False).close()
-    except DamagedError as problem:
-        with sqlite_errors_as_store_errors(path):
+        database.connect(path, writable=False).close()
+    except database.DamagedError as problem:
+        with database.sqlite_errors_as_store_errors(path):
             return _rebuild(path, str(problem))
     return None
 
@@ -77,17 +67,20 @@ def _rebuild(path: Path, problem: str) -> Salvage:
     try:
         for left in (draft, draft.with_name(f"{draft.name}-journal")):
             left.unlink(missing_ok=True)
-        with closing(open_file(path, writable=False)) as damaged, closing(open_file(draft, writable=True)) as whole:
-            make_tables(whole)
+        with (
+            closing(database.open_file(path, writable=False)) as damaged,
+            closing(database.open_file(draft, writable=True)) as whole,
+        ):
+            database.make_tables(whole)
             whole.execute("BEGIN")
             there = _copy(damaged, whole)
-            drop_damaged(whole)
+            database.drop_damaged(whole)
             if whole.execute("SELECT count(*) FROM facts").fetchone()[0] < there["facts"]:
                 whole.execute("DELETE FROM facts")
                 whole.execute("DELETE FROM trials")
             whole.execute(f"DELETE FROM trials WHERE {WITH_A_GAP_BEFORE}")
-            seal(whole)
-            kept = {table: counted(whole)[table] for table in KEPT}
+            database.seal(whole)
+            kept = {table: database.counted(whole)[table] for table in KEPT}
             whole.execute("COMMIT")
         aside = _set_aside(path)
         draft.replace(path)
@@ -105,9 +98,9 @@ def _copy(damaged: sqlite3.Connection, whole: sqlite3.Connection) -> dict[str, i
     Where a page of a table is spoilt, the rows before it and those after it are read.
     """
     there = dict.fromkeys(KEPT, 0)
-    with readable_texts(damaged):
+    with database.readable_texts(damaged):
         with suppress(sqlite3.DatabaseError):
-            there |= {table: rows for table, rows in counted(damaged).items() if table in there}
+            there |= {table: rows for table, rows in database.counted(damaged).items() if table in there}
         for table in KEPT:
             found: dict[tuple[object, ...], None] = {}
             for order in ("1, 2", "1 DESC, 2 DESC"):

@@ -15,15 +15,7 @@ from proxytune.domain import Episode, Outcome
 from proxytune.errors import InputError, StoreError
 from proxytune.settings import is_finite
 from proxytune.space import Theta
-from proxytune.storage.database import (
-    connect,
-    disconnect,
-    seal,
-    sqlite_errors_as_store_errors,
-    transaction,
-    undo_broken_write,
-    write_row,
-)
+from proxytune.storage import database
 from proxytune.storage.folder import refuse_links
 
 FILE_NAME = "study.db"
@@ -116,11 +108,11 @@ class Store:
     def open(cls, folder: Path) -> Iterator["Store"]:
         """Open the study's database for writing, making it where there is none; to be held under the study's lock."""
         path = folder / FILE_NAME
-        connection = connect(path, writable=True)
+        connection = database.connect(path, writable=True)
         try:
             yield cls(path, connection)
         finally:
-            disconnect(connection)
+            database.disconnect(connection)
 
     @classmethod
     @contextmanager
@@ -133,7 +125,7 @@ class Store:
         path = folder / FILE_NAME
         if not path.exists():
             raise InputError(f"{path}: no such file; run the study first: python -m proxytune study {folder}")
-        connection = connect(path, writable=False)
+        connection = database.connect(path, writable=False)
         try:
             yield cls(path, connection)
         finally:
@@ -148,15 +140,15 @@ class Store:
         with self._transaction() as connection:
             connection.execute("DELETE FROM trials WHERE objective = ?", (objective,))
             connection.execute("DELETE FROM facts")
-            seal(connection, "trials", "facts")
+            database.seal(connection, "trials", "facts")
             for key, value in facts.items():
-                write_row(connection, "facts", {"key": key, "value": json.dumps(value, allow_nan=False)})
+                database.write_row(connection, "facts", {"key": key, "value": json.dumps(value, allow_nan=False)})
         self._trials.pop(objective, None)
 
     def save_fact(self, key: str, value: Any) -> None:
         """Write one more fact, over what it was before; trials are kept."""
         with self._transaction() as connection:
-            write_row(connection, "facts", {"key": key, "value": json.dumps(value, allow_nan=False)})
+            database.write_row(connection, "facts", {"key": key, "value": json.dumps(value, allow_nan=False)})
 
     def trials(self, objective: str = "prpv") -> list[TrialRecord]:
         """Every trial of a search, in order; the last ones may be open."""
@@ -180,18 +172,11 @@ class Store:
             for trial in trials:
                 row = {
                     "objective": objective,
-                    "number": trial.number,
                     "instance": self._instance(connection, identity, theta_json(trial.theta)),
-                    "state": trial.state,
-                    "score": trial.score,
                     "measures": json.dumps(dict(trial.measures), allow_nan=False),
-                    "failed_episodes": trial.failed_episodes,
-                    "failure": trial.failure,
                     "decided": json.dumps(trial.decided),
-                    "bound": trial.bound,
-                    "seconds": trial.seconds,
                 }
-                write_row(connection, "trials", row)
+                database.write_row(connection, "trials", vars(trial) | row)
         if objective in self._trials:
             self._trials[objective] |= {trial.number: trial for trial in trials}
 
@@ -203,15 +188,12 @@ class Store:
                 episode, works = outcome.episode, outcome.metrics is not None
                 row = {
                     "instance": self._instance(connection, identity, theta),
-                    "agent": episode.agent,
-                    "start": episode.start,
-                    "seed": episode.seed,
                     "metrics": json.dumps(dict(outcome.metrics or {}), allow_nan=False) if works else None,
                     "failure": None if works else outcome.failure,
                     "seconds": outcome.seconds,
                     "code": None if works else code,
                 }
-                write_row(connection, "episodes", row)
+                database.write_row(connection, "episodes", vars(episode) | row)
         for outcome, theta in zip(outcomes, thetas, strict=True):
             episode = outcome.episode
             if (identity, theta) in self._outcomes:
@@ -242,17 +224,17 @@ class Store:
         """Keep which episodes run in this very process, in place of those before: they may end the process."""
         with self._transaction() as connection:
             connection.execute("DELETE FROM under_way")
-            seal(connection, "under_way")
+            database.seal(connection, "under_way")
             for place, episode in enumerate(episodes, start=1):
                 which = {"theta": json.dumps(dict(episode.theta)), "agent": episode.agent}
                 row = {"place": place, "identity": identity, "start": episode.start, "seed": episode.seed}
-                write_row(connection, "under_way", row | which)
+                database.write_row(connection, "under_way", row | which)
 
     def end_episodes(self) -> None:
         """Keep that no episode is under way."""
         with self._transaction() as connection:
             connection.execute("DELETE FROM under_way")
-            seal(connection, "under_way")
+            database.seal(connection, "under_way")
 
     def agents_that_failed(self, *how: str) -> set[str]:
         """The agents with a failed episode, in any family, whose failure begins so."""
@@ -272,7 +254,7 @@ class Store:
         """Make every failure one of other code, so that it is tried again."""
         with self._transaction() as connection:
             connection.execute("UPDATE episodes SET code = '' WHERE failure IS NOT NULL")
-            seal(connection, "episodes")
+            database.seal(connection, "episodes")
 
     def seconds(self) -> dict[tuple[str, int], float]:
         """Mean time that the episodes of each agent and start took."""
@@ -294,14 +276,11 @@ class Store:
         with self._transaction() as connection:
             row = {
                 "number": _next(connection, "number", "sweeps"),
-                "parameter": sweep.parameter,
                 "base": theta_json(sweep.base),
                 "points": json.dumps(sweep.points),
                 "identity": identity,
-                "target_model": sweep.target_model,
-                "replays": sweep.replays,
             }
-            write_row(connection, "sweeps", row)
+            database.write_row(connection, "sweeps", vars(sweep) | row)
 
     def sweeps(self) -> list[tuple[str, SweepRecord]]:
         """Every sweep that has been asked for, the last one last, with the identity of its domain family."""
@@ -317,7 +296,7 @@ class Store:
         known = connection.execute(query, (identity, theta)).fetchone()
         if known is None:
             known = (_next(connection, "id", "instances"),)
-            write_row(connection, "instances", {"id": known[0], "identity": identity, "theta": theta})
+            database.write_row(connection, "instances", {"id": known[0], "identity": identity, "theta": theta})
         return int(known[0])
 
     def _made(self, make: Callable[..., Made], query: str, values: tuple[Any, ...] = ()) -> list[Made]:
@@ -331,11 +310,11 @@ class Store:
             raise StoreError(f"{self.path}: {line}") from None
 
     def _all(self, query: str, values: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
-        with sqlite_errors_as_store_errors(self.path):
+        with database.sqlite_errors_as_store_errors(self.path):
             return self._connection.execute(query, values).fetchall()
 
     def _transaction(self) -> AbstractContextManager[sqlite3.Connection]:
-        return transaction(self._connection, self.path)
+        return database.transaction(self._connection, self.path)
 
 
 def _next(connection: sqlite3.Connection, column: str, table: str) -> int:
@@ -346,7 +325,7 @@ def is_begun(folder: Path) -> bool:
     """Tell whether a study has a database; not where a kill came before its first table."""
     path = folder / FILE_NAME
     refuse_links(folder)
-    undo_broken_write(path)
+    database.undo_broken_write(path)
     return path.is_file() and path.stat().st_size > 0
 
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from proxytune.errors import ScoresError
 from proxytune.scores import Metric, ScoreTable, score_cautions
+from proxytune.usefulness import resampling
 from proxytune.usefulness.comparison import Comparison, compare
 from proxytune.usefulness.decision import (
     ASKED,
@@ -34,16 +35,6 @@ from proxytune.usefulness.decision import (
 from proxytune.usefulness.noise import Chance, NoiseFloor, SuccessRates, chance, noise_floor, success_rates
 from proxytune.usefulness.pairs import Prpv, prpv, prpv_of_means
 from proxytune.usefulness.predictivity import Correlation, Mmrv, Ppv, kendall_tau, mmrv, ppv, srcc
-from proxytune.usefulness.resampling import (
-    CONFIDENCE,
-    Intervals,
-    PrpvInterval,
-    bootstrap_means,
-    intervals,
-    prpv_in_blocks,
-    prpv_interval,
-    why_not_repeated,
-)
 from proxytune.usefulness.saving import Saving, saving_of
 from proxytune.usefulness.sequential import Plan, plan
 
@@ -88,12 +79,12 @@ class Assessment:
 
     inputs: Comparison
     prpv: Prpv
-    prpv_interval: PrpvInterval
+    prpv_interval: resampling.PrpvInterval
     ppv: Ppv
     srcc: Correlation
     kendall_tau: Correlation
     mmrv: Mmrv
-    intervals: Intervals | None
+    intervals: resampling.Intervals | None
     noise_floor: NoiseFloor
     chance: Chance
     seed: int
@@ -215,17 +206,17 @@ def assess(
     """
     inputs = compare(proxy=proxy, target=target, metrics=metrics)
     error = ppv(inputs, beta)
-    repeated = not why_not_repeated(inputs)
-    means = bootstrap_means(inputs, resamples=resamples, seed=seed) if repeated else None
+    repeated = not resampling.why_not_repeated(inputs)
+    means = resampling.bootstrap_means(inputs, resamples=resamples, seed=seed) if repeated else None
     return Assessment(
         inputs=inputs,
         prpv=prpv(inputs),
-        prpv_interval=prpv_interval(inputs, means),
+        prpv_interval=resampling.prpv_interval(inputs, means),
         ppv=error,
         srcc=srcc(inputs),
         kendall_tau=kendall_tau(inputs),
         mmrv=mmrv(inputs),
-        intervals=intervals(inputs=inputs, error=error, means=means),
+        intervals=resampling.intervals(inputs=inputs, error=error, means=means),
         noise_floor=floor or noise_floor(target=inputs.target, metrics=metrics, seed=seed),
         chance=chance(inputs, permutations=resamples, seed=seed),
         seed=seed,
@@ -317,17 +308,17 @@ def select_proxy(
     ranking = tuple(sorted(values.items(), key=lambda item: item[1]))
     pairs = list(combinations([name for name, _ in ranking], 2))
     observed = np.array([values[worse] - values[better] for better, worse in pairs])
-    reason = next(filter(None, map(why_not_repeated, inputs.values())), "")
+    reason = next(filter(None, map(resampling.why_not_repeated, inputs.values())), "")
     if reason or not pairs:
         bare = (Difference(*pair, int(value), None, None) for pair, value in zip(pairs, observed, strict=True))
         return Selection(ranking, tuple(bare), reason)
     # The same seed resamples the target alike for every proxy.
-    means = {name: bootstrap_means(side, resamples=resamples, seed=seed) for name, side in inputs.items()}
-    resampled = {name: prpv_in_blocks(*sides, metrics) for name, sides in means.items()}
+    means = {name: resampling.bootstrap_means(side, resamples=resamples, seed=seed) for name, side in inputs.items()}
+    resampled = {name: resampling.prpv_in_blocks(*sides, metrics) for name, sides in means.items()}
     differences = np.array([resampled[worse] - resampled[better] for better, worse in pairs])
     deviation = differences.std(axis=1)
     centred = np.abs(differences - differences.mean(axis=1, keepdims=True))
     studentised = centred / np.where(deviation > 0, deviation, np.inf)[:, None]
-    half = np.asarray(np.quantile(studentised.max(axis=0), CONFIDENCE) * deviation, dtype=np.float64)
+    half = np.asarray(np.quantile(studentised.max(axis=0), resampling.CONFIDENCE) * deviation, dtype=np.float64)
     rows = zip(pairs, observed, half, strict=True)
     return Selection(ranking, tuple(Difference(*pair, int(v), float(v - h), float(v + h)) for pair, v, h in rows))

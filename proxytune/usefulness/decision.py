@@ -179,9 +179,8 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
         each = _draws_by_start(inputs.target, [name for name, _, _ in parts], columns, signs, rng)
     places = range(len(parts) if len(parts) > 1 else 0)
     tasks = tuple(_part(agents, parts, each, [k]) for k in places)
-    without = tuple(
-        replace(_part(agents, parts, each, [k for k in places if k != out]), name=parts[out][0]) for out in places
-    )
+    rest = [(out, [k for k in places if k != out]) for out in places]
+    without = tuple(replace(_part(agents, parts, each, others), name=parts[out][0]) for out, others in rest)
     if known is None:
         regrets = sides[1].max() - sides[1]
         return Decision(

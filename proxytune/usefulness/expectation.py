@@ -171,9 +171,7 @@ def expect(
     rng, sides = np.random.default_rng(seed), [compare(proxy=one, target=target, metrics=metrics) for one in fresh]
     means, known = sides[0].target.means, len(donors.first) > 0
     proxies = np.stack([side.proxy.means for side in sides])
-    draws = (
-        [_again(side.proxy, donors, rng, np.arange(len(side.proxy.episodes))[None]) for side in sides] if known else []
-    )
+    draws = [_again(one.proxy, donors, rng, np.arange(len(one.proxy.episodes))[None]) for one in sides] if known else []
     of_target = _target_donors(sides[0].target) if donors.still else donors
     perfect = _perfect(sides[0], of_target, rng) if len(of_target.first) else None
     weights = ppv(sides[0]).beta

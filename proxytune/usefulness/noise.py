@@ -9,25 +9,16 @@ Of metrics of zeros and ones each agent's rate has Wilson's interval, and the pa
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from proxytune.arrays import Flags, Floats
 from proxytune.scores import Metric, ScoreTable
+from proxytune.usefulness import resampling
 from proxytune.usefulness.comparison import Comparison, by_start, compare, is_repeated, split_repeats, start_places
 from proxytune.usefulness.pairs import prpv_of_means, stand
-from proxytune.usefulness.resampling import (
-    CONFIDENCE,
-    agent_blocks,
-    counted_means,
-    draw_counts,
-    in_blocks,
-    interval,
-    prpv_in_blocks,
-    too_few,
-)
 
 FloorKind = Literal["same starts", "halves", "none"]
 MEANINGS: dict[FloorKind, str] = {
@@ -79,13 +70,13 @@ def noise_floor(*, target: ScoreTable, metrics: Sequence[Metric], splits: int = 
         ScoresError: If there are fewer than two agents or a metric is unknown.
     """
     chosen = compare(proxy=target, target=target, metrics=metrics).target
-    reason = too_few(chosen, "on the target")
+    reason = resampling.too_few(chosen, "on the target")
     if reason:
         return NoiseFloor("none", reason=reason)
     same_starts = is_repeated(chosen)
-    values = prpv_in_blocks(*_split_means(chosen, np.random.default_rng(seed), splits, same_starts), metrics)
+    values = resampling.prpv_in_blocks(*_split_means(chosen, np.random.default_rng(seed), splits, same_starts), metrics)
     kind: FloorKind = "same starts" if same_starts else "halves"
-    return NoiseFloor(kind, float(values.mean()), *interval(values))
+    return NoiseFloor(kind, float(values.mean()), *resampling.interval(values))
 
 
 def floor_of_repeats(
@@ -105,14 +96,16 @@ def floor_of_repeats(
     one, other = _shared_starts(inputs)
     absent = [agent for agent, count in zip(one.agents, one.counts, strict=True) if not count]
     reason = (
-        f"agent '{absent[0]}' drove no start both times" if absent else too_few(one, "from starts driven both times")
+        f"agent '{absent[0]}' drove no start both times"
+        if absent
+        else resampling.too_few(one, "from starts driven both times")
     )
     if reason:
         return NoiseFloor("none", reason=reason)
     value = float(prpv_of_means(one.means, other.means, metrics))
-    counts = draw_counts(one, np.random.default_rng(seed), resamples)
-    means = counted_means(one.values, counts), counted_means(other.values, counts)
-    low, high = interval(prpv_in_blocks(*means, metrics))
+    counts = resampling.draw_counts(one, np.random.default_rng(seed), resamples)
+    means = resampling.counted_means(one.values, counts), resampling.counted_means(other.values, counts)
+    low, high = resampling.interval(resampling.prpv_in_blocks(*means, metrics))
     return NoiseFloor("same starts", value, min(low, value), max(high, value))
 
 
@@ -120,9 +113,9 @@ def _split_means(table: ScoreTable, rng: np.random.Generator, splits: int, same_
     """Mean scores of two sets of each agent's episodes, each of shape (splits, agents, metrics)."""
     places, keys = start_places(table), rng.random((splits, len(table.episodes))) if same_starts else None
     means = []
-    for rows, driven in agent_blocks(table, splits):
+    for rows, driven in resampling.agent_blocks(table, splits):
         sets = split_halves(driven, rng, splits) if keys is None else split_repeats(driven, places, keys)
-        means.append([counted_means(table.values[rows], chosen) for chosen in sets])
+        means.append([resampling.counted_means(table.values[rows], chosen) for chosen in sets])
     first, second = (np.concatenate(parts, axis=1) for parts in zip(*means, strict=True))
     return first, second
 
@@ -141,10 +134,7 @@ def _shared_starts(inputs: Comparison) -> tuple[ScoreTable, ScoreTable]:
     shared = [start for start in one.episodes if start in other.episodes]
     one, other = (table.arrange(agents=inputs.agents, episodes=shared) for table in (one, other))
     both = (one.driven & other.driven)[..., None]
-    first, second = (
-        ScoreTable(inputs.agents, tuple(shared), table.metrics, np.where(both, table.values, np.nan))
-        for table in (one, other)
-    )
+    first, second = (replace(table, values=np.where(both, table.values, np.nan)) for table in (one, other))
     return first, second
 
 
@@ -156,6 +146,9 @@ class Rate:
     low: float
     high: float
     episodes: int
+
+    def __str__(self) -> str:
+        return f"{self.value:.2f} ({self.low:.2f} to {self.high:.2f})"
 
 
 @dataclass(frozen=True)
@@ -206,7 +199,7 @@ def _rates(table: ScoreTable, column: int) -> dict[str, Rate]:
     for row, agent in enumerate(table.agents):
         episodes = int(table.counts[row])
         test = binomtest(round(float(np.nansum(table.values[row, :, column]))), episodes)
-        ends = test.proportion_ci(CONFIDENCE, method="wilson")
+        ends = test.proportion_ci(resampling.CONFIDENCE, method="wilson")
         rates[agent] = Rate(float(test.statistic), float(ends.low), float(ends.high), episodes)
     return rates
 
@@ -261,7 +254,7 @@ def chance(inputs: Comparison, *, permutations: int = 1000, seed: int = 0) -> Ch
         rng = np.random.default_rng(seed)
         orders = np.stack([rng.permutation(len(in_proxy)) for _ in range(permutations)])
     shuffled = in_proxy[orders]
-    values = in_blocks(lambda proxy, _: prpv_of_means(proxy, on_target, inputs.metrics), shuffled, shuffled)
+    values = resampling.in_blocks(lambda proxy, _: prpv_of_means(proxy, on_target, inputs.metrics), shuffled, shuffled)
     as_low = (values <= prpv_of_means(in_proxy, on_target, inputs.metrics)).sum()
     # The proxy's own order is one of all, and is counted with those that are drawn.
     p_value = float(as_low / len(orders) if exact else (1 + as_low) / (1 + len(orders)))

@@ -86,9 +86,8 @@ def plan(decision: Decision, *, bound: float | None, made: Floats, scale: float)
     real = np.ceil(more * made / worth).astype(int)
     without = int(np.ceil(more + worth - made).clip(0).sum()) if (worth > made + 0.5).any() else None
     chosen = {agent: int(n) for agent, n in zip(agents, real, strict=True) if n > 0}
-    reason = (
-        f"beyond {MOST_ROLLOUTS} rollouts of an agent: agents are too much alike" if more.max() >= MOST_ROLLOUTS else ""
-    )
+    alike = f"beyond {MOST_ROLLOUTS} rollouts of an agent: agents are too much alike"
+    reason = alike if more.max() >= MOST_ROLLOUTS else ""
     return Plan(chosen, bound, now, without, reason)
 
 
@@ -154,9 +153,8 @@ def sequential_test(inputs: Comparison, column: int = 0, *, seed: int = 0) -> Se
     if len(agents) ** 2 * rounds > MOST_BETS:
         raise ScoresError(f"--sequential: {len(agents)} agents are too many to be bet on; test those that may be best")
     if min(row.min() for row in values) < 0.0 or max(row.max() for row in values) > 1.0:
-        raise ScoresError(
-            f"--sequential: {metric.name} goes beyond 0 and 1; give successes, or scores as shares of the best"
-        )
+        remedy = "give successes, or scores as shares of the best"
+        raise ScoresError(f"--sequential: {metric.name} goes beyond 0 and 1; {remedy}")
     if rounds < 2:
         raise ScoresError("--sequential: takes a row per rollout on the target; there is one row an agent")
     if is_sorted(inputs.target, column):
@@ -172,9 +170,8 @@ def sequential_test(inputs: Comparison, column: int = 0, *, seed: int = 0) -> Se
     evidence = dict(zip(agents, map(float, least[-1]), strict=True))
     rates = np.array([(row.sum() + PRIOR) / (len(row) + 2 * PRIOR) for row in values])
     rng = np.random.default_rng(seed)
-    expected = {
-        name: expected_rounds(rates, bets, rng) for name, bets in (("with proxy", foretold), ("without proxy", None))
-    }
+    bets = {"with proxy": foretold, "without proxy": None}
+    expected = {name: expected_rounds(rates, bet, rng) for name, bet in bets.items()}
     return Sequential(winner, at, rounds, evidence, threshold, expected)
 
 

@@ -10,7 +10,7 @@ from several import make_several
 from stopping import Stopping
 from taught import TEACHING
 
-from proxytune.api import Spending, read_families, run_opened_families
+from proxytune.api import read_families, run_opened_families
 from proxytune.api.families import run_families
 from proxytune.cli.main import main
 from proxytune.errors import InputError
@@ -136,7 +136,7 @@ def test_stopped_at_any_moment_it_goes_on_to_the_same_document(
         return nullcontext(Stopping(episodes) if study.settings.family_name == family else Silent())
 
     with pytest.raises(KeyboardInterrupt):
-        run_opened_families(read_study_settings(folder), Spending(), lambda line: None, pressing_ctrl_c, progress=False)
+        run_opened_families(read_study_settings(folder), lambda line: None, pressing_ctrl_c, progress=False)
     there, here = (without_costs(answered("study", one)) for one in (finished, folder))
     text = json.dumps(there).replace(str(finished), str(folder))
     assert json.loads(text) == here

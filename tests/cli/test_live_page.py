@@ -41,7 +41,7 @@ def test_the_page_is_there_after_the_first_episode_and_its_path_is_said_once(set
 
 def test_it_is_written_at_most_every_few_seconds(settings, monkeypatch):
     clock, written = Clock(monkeypatch), []
-    monkeypatch.setattr(live_page, "write_live_page", lambda path, *known: written.append(path))
+    monkeypatch.setattr(live_page.report, "write_live_page", lambda path, *known: written.append(path))
     page = LivePage(settings, "prpv", Silent())
     for _ in range(100):
         clock.now += 0.1
@@ -63,7 +63,7 @@ def test_a_page_that_cannot_be_written_does_not_stop_the_run(settings, monkeypat
     def refuse(path, *known):
         raise RunError("no room")
 
-    monkeypatch.setattr(live_page, "write_live_page", refuse)
+    monkeypatch.setattr(live_page.report, "write_live_page", refuse)
     with renewed_page(settings, "prpv", nullcontext(Silent())) as watcher:
         watcher.episode()
     assert capsys.readouterr().err == ""

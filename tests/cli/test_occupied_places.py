@@ -16,11 +16,14 @@ COMMANDS = {
     "predict": ("predict twin.toml log --output there", "predict.predict"),
     "predict of pictures": ("predict twin.toml log --frames --output there", "predict.predict"),
     "record": ("record tiny --model twin.toml --output there", "record.record_log"),
-    "drive": ("drive tiny --agent steady --output there", "drive.drive_side_by_side"),
+    "drive": ("drive tiny --agent steady --output there", "drive.study.drive_side_by_side"),
     "export": ("export twin.toml --to filter --output there", "export.export"),
     "import": ("import log there --robot nobodys", "importing.import_log"),
-    "score": ("score --proxy p.csv --target p.csv --metric d:max --output there", "score.assess_each"),
-    "score's table": ("score --proxy p.csv --target p.csv --metric d:max --table there", "score.assess_each"),
+    "score": ("score --proxy p.csv --target p.csv --metric d:max --output there", "score.usefulness.assess_each"),
+    "score's table": (
+        "score --proxy p.csv --target p.csv --metric d:max --table there",
+        "score.usefulness.assess_each",
+    ),
     "diagnose": ("diagnose log --output there", "diagnose.diagnose_log"),
     "sweep": ("sweep tiny --parameter trim --output there", "sweep.run_sweep"),
 }

@@ -15,7 +15,7 @@ from tiny_loop import RIGHTING, short, write_diagnosis, write_tiny
 
 from proxytune.api import StudyReport
 from proxytune.cli.main import main
-from proxytune.loop import diagnosing, run as closing
+from proxytune.loop import diagnosing
 from proxytune.loop.run import STEPS
 
 LINES = {name: f"step {number} of {len(STEPS)}," for number, name in enumerate(STEPS, start=1)}
@@ -31,7 +31,7 @@ def give_a_diagnosis(patch):
         found.append(source)
         write_diagnosis(folder, **changes)
 
-    patch.setattr(closing, "diagnose_target", diagnose)
+    patch.setattr(diagnosing, "diagnose_target", diagnose)
     patch.setattr(diagnosing, "Wanted", short)
     # Studies' own figures have tests of their own.
     patch.setattr(StudyReport, "write", lambda self: None)

@@ -13,10 +13,19 @@ from PIL import Image
 from proxytune.driving import shipped_map
 from proxytune.errors import RunError
 from proxytune.report.drive import movie
-from proxytune.report.drive.animation import FRAME_HZ, LINGER_S, Animation
-from proxytune.report.drive.figure import episode_figure, say_parting
-from proxytune.report.drive.movie import write_gif, write_mp4
-from proxytune.report.drive.scene import ARROWS, COLOURS, CORNERS, GAP, LEAST_M, SIZE, arrow_rows, corners_of
+from proxytune.report.drive.figure import (
+    ARROWS,
+    COLOURS,
+    CORNERS,
+    GAP,
+    LEAST_M,
+    SIZE,
+    arrow_rows,
+    corners_of,
+    episode_figure,
+    say_parting,
+)
+from proxytune.report.drive.movie import FRAME_HZ, LINGER_S, Animation, write_gif, write_mp4
 from proxytune.report.figure_style import COLUMN
 
 PICTURES = np.random.default_rng(1).integers(0, 256, (20, 6, 8, 3), dtype=np.uint8)

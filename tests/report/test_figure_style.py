@@ -13,7 +13,7 @@ HEAVY = ("pybullet", "skopt", "sklearn", "optuna", "torch", "proxytune.diagnosis
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("module", ["proxytune.report.study.figures", "proxytune.report.sweep_figures"])
+@pytest.mark.parametrize("module", ["proxytune.report.study.figures", "proxytune.report.sweep"])
 def test_a_figure_loads_no_simulator_no_library_of_models_and_no_diagnosis(module):
     line = f"import sys, {module}; print([name for name in {HEAVY} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", line], capture_output=True, text=True, check=True)

@@ -9,7 +9,7 @@ from ros_stubs import load_node
 from proxytune.diagnosis import NextDrive, commands_as
 from proxytune.driving import read_robot
 from proxytune.logs import read_commands
-from proxytune.report.export.nodes import commands_text, player_text
+from proxytune.report.export.ros import commands_text, player_text
 
 DUTIES = np.array([[0.2, 0.4], [-0.5, 0.5], [0.9, 0.7]])
 

@@ -15,8 +15,7 @@ from proxytune.report.study.figures import (
     importance_figure,
     profiles_figure,
 )
-from proxytune.report.study.page import study_view
-from proxytune.report.study.tables import search_table
+from proxytune.report.study.page import search_table, study_view
 from proxytune.report.wording import span
 from proxytune.search import Importance, Trial, learn_theta
 from proxytune.storage import TrialRecord

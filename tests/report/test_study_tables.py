@@ -10,7 +10,7 @@ from confirmations import LACKS, TOLD, UNTOLD, confirmed, planted
 from rich.console import Console
 
 from proxytune.report import study_document, study_sentence, study_text
-from proxytune.report.study.tables import (
+from proxytune.report.study.page import (
     INFORMATION,
     SEARCH,
     THETA,

@@ -14,16 +14,19 @@ from rich.console import Console
 
 from proxytune.report.html import page_html
 from proxytune.report.sweep import (
+    bar_points,
+    bars_figure,
     curve_csv,
     curve_document,
     curve_lines,
     curve_name,
     curve_tables,
     held_mark,
+    panels_figure,
     say_failures,
+    sweep_figure,
     sweep_view,
 )
-from proxytune.report.sweep_figures import bar_points, bars_figure, panels_figure, sweep_figure
 from proxytune.report.text import table_text
 from proxytune.report.view import foot_of
 from proxytune.storage import Store

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from proxytune.errors import InputError
-from proxytune.report.table_files import IN_LATEX, check_table_file, csv_text, in_latex, latex_text
+from proxytune.report.text import IN_LATEX, check_table_file, csv_text, in_latex, latex_text
 
 COLUMNS, ROWS = ("measure", "sim_1", "95 % interval"), [("SRCC d_x", "−0.5", "−1 to 1"), ("Kendall τ", "1", "")]
 

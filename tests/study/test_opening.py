@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from proxytune.errors import InputError, SettingsError
-from proxytune.report.study.tables import usefulness_table
+from proxytune.report.study.page import usefulness_table
 from proxytune.search import make_proposer
 from proxytune.storage import Store
 from proxytune.study import PRPV, StudyRun, goal_of, open_study, result_of, run_trials, study_facts

@@ -14,7 +14,7 @@ from stopping import Stopping
 from proxytune.domain import Outcome
 from proxytune.errors import EpisodeError, RunError
 from proxytune.report import study_document
-from proxytune.report.study.tables import usefulness_table
+from proxytune.report.study.page import usefulness_table
 from proxytune.running import Silent
 from proxytune.search import Knowledge, make_proposer
 from proxytune.search.posterior import Misfit

@@ -10,18 +10,12 @@ from rich.console import Group
 from rich.text import Text
 
 from proxytune.diagnosis import CameraDiagnosis, Diagnosis, Estimate, LogDiagnosis, PictureError, Ratio, Rmse
+from proxytune.report.diagnosis import document
 from proxytune.report.diagnosis.camera_figures import camera_figures
 from proxytune.report.diagnosis.camera_notes import camera_headline, camera_notes
-from proxytune.report.diagnosis.document import (
-    camera_effects,
-    camera_noise_floor,
-    diagnosis_document,
-    extended_model_text,
-    motion_effects,
-)
 from proxytune.report.diagnosis.figures import motion_figures
 from proxytune.report.diagnosis.notes import VERDICTS, motion_headline, motion_notes, next_drives
-from proxytune.report.export.nodes import commands_text, player_text
+from proxytune.report.export.ros import commands_text, player_text
 from proxytune.report.html import write_page
 from proxytune.report.meanings import findings, fitted
 from proxytune.report.text import group_texts, table_text
@@ -44,10 +38,10 @@ def write_diagnosis(found: LogDiagnosis, folder: Path, command: str = "") -> lis
     Raises:
         RunError: If a file cannot be written.
     """
-    document, model, page = (folder / name for name in ("diagnosis.json", "model.toml", "report.html"))
-    text = json.dumps(diagnosis_document(found), indent=2, allow_nan=False, ensure_ascii=False)
-    write_text(document, text)
-    write_text(model, extended_model_text(found))
+    whole, model, page = (folder / name for name in ("diagnosis.json", "model.toml", "report.html"))
+    text = json.dumps(document.diagnosis_document(found), indent=2, allow_nan=False, ensure_ascii=False)
+    write_text(whole, text)
+    write_text(model, document.extended_model_text(found))
     following = [folder / "next" / name for name in ("commands.csv", "play_commands.py")]
     if found.motion is None or found.motion.next_drive is None:
         for path in following:  # An earlier diagnosis may have had a drive
@@ -59,7 +53,7 @@ def write_diagnosis(found: LogDiagnosis, folder: Path, command: str = "") -> lis
     figures = diagnosis_figures(found)
     drawn, foot = save_figures(figures, folder), foot_of(command, [("log", found.log), ("robot", found.robot.name)])
     write_page(page, diagnosis_view(found, figures), foot)
-    return [document, model, *following, *drawn, page]
+    return [whole, model, *following, *drawn, page]
 
 
 def diagnosis_view(found: LogDiagnosis, figures: Mapping[str, Drawn]) -> View:
@@ -105,10 +99,11 @@ def _said(found: LogDiagnosis) -> list[tuple[str, list[Table], list[str]]]:
     """Headline, tables and notes of motion, then of the camera, as far as there are such."""
     said = []
     if (motion := found.motion) is not None:
-        beside = findings(motion_effects(motion), motion.robot.catalogue), fitted(motion.declared, motion.theta)
+        found_of = findings(document.motion_effects(motion), motion.robot.catalogue)
+        beside = found_of, fitted(motion.declared, motion.theta)
         said.append((motion_headline(motion, *beside), _motion_tables(motion), motion_notes(motion)))
     if (camera := found.camera) is not None:
-        beside = findings(camera_effects(camera)), fitted(camera.declared, camera.theta)
+        beside = findings(document.camera_effects(camera)), fitted(camera.declared, camera.theta)
         said.append((camera_headline(found.log, camera, *beside), _camera_tables(camera), camera_notes(camera)))
     return said
 
@@ -140,9 +135,8 @@ def _motion_tables(diagnosis: Diagnosis) -> list[Table]:
         headings = (error.heading_before.value, error.heading_after.value, error.heading_floor)
         before, after, least = (fixed(float(np.degrees(one)), 2) for one in headings)
         rows += [(f"{error.horizon_s:g} s{plant}", *place, floor), ("  heading [deg]", before, after, "", least)]
-    tried = tuple(
-        (one.effect, one.form, f"{one.gain:.1f}", f"{one.p_value:.3f}") for one in diagnosis.found.tried[:MOST_TRIED]
-    )
+    first = diagnosis.found.tried[:MOST_TRIED]
+    tried = tuple((one.effect, one.form, f"{one.gain:.1f}", f"{one.p_value:.3f}") for one in first)
     title, heads = "Error on held-out drives: RMSE of position [mm]", ("before", "after", "after / before")
     return [
         _parameters_table("Fitted parameters", diagnosis.declared, diagnosis.theta),
@@ -160,7 +154,7 @@ def _camera_tables(diagnosis: CameraDiagnosis) -> list[Table]:
     """Parameters, and errors on frames kept aside."""
     rows = []
     for name, error, decimals in (("markings [px]", diagnosis.pixels, 2), ("brightness [grey]", diagnosis.grey, 1)):
-        floor, frames = camera_noise_floor(error), int(np.isfinite(error.before.frames).sum())
+        floor, frames = document.camera_noise_floor(error), int(np.isfinite(error.before.frames).sum())
         both = (_with_ends(one, decimals) for one in (error.before, error.after))
         rows.append((name, *both, "" if floor is None else f"{floor:.{decimals}f}", str(frames)))
     heads = columns_of(("error",), ("before", "after", "floor", "frames"))
@@ -178,8 +172,7 @@ def _parameters_table(title: str, declared: Mapping[str, Estimate], theta: Mappi
             continue
         low, high = after.interval
         old = short(declared[name].value, 4) if name in declared else ""
-        rows.append(
-            (name, old, short(after.value, 4), f"{short(low, 4)} to {short(high, 4)}" if low < high else "", after.unit)
-        )
+        interval = f"{short(low, 4)} to {short(high, 4)}" if low < high else ""
+        rows.append((name, old, short(after.value, 4), interval, after.unit))
     heads = columns_of(("parameter",), ("declared only", "effects added", "95 % interval"))
     return Table(title, (*heads, *columns_of(("unit",))), tuple(rows))

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 from textwrap import fill
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,28 +12,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from proxytune.arrays import Floats
-from proxytune.diagnosis import (
-    LEAST_NATS,
-    CameraDiagnosis,
-    CameraFit,
-    Comparison,
-    Edges,
-    effects_of,
-    project,
-    rank_subsets,
-)
+from proxytune.diagnosis import LEAST_NATS, CameraDiagnosis, CameraFit, Edges, effects_of, project, rank_subsets
+from proxytune.report import figure_style as style
 from proxytune.report.diagnosis.error_figures import DECLARED_MODEL, with_effects
-from proxytune.report.figure_style import (
-    BLUE,
-    COLUMN,
-    GREEN,
-    GREY,
-    LIGHT_BLUE,
-    VERMILLION,
-    dress,
-    legend_below,
-    show_photo,
-)
 from proxytune.report.wording import plain
 
 LEAST_LOSS = 1.0
@@ -57,14 +38,13 @@ def _ranking_figure(diagnosis: CameraDiagnosis) -> Figure | None:
     if not tried:
         return None
     nothing = loss_of_nothing(diagnosis)
-    figure = Figure(figsize=(COLUMN, 1.3 + 0.16 * len(tried)), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = style.one_panel(1.3 + 0.16 * len(tried))
     for place, one in enumerate(tried):
         name, colour = _role(diagnosis, one.effects)
         loss = max(one.loss, 0.0)
         axes.plot([loss, nothing], [place, place], "-", color=colour, lw=0.9, alpha=0.6)
         axes.plot([loss], [place], "o", color=colour, ms=4, label=name)
-    axes.axvline(max(nothing, 0.0), color=VERMILLION, lw=1.0, ls=":", label="nothing added")
+    axes.axvline(max(nothing, 0.0), color=style.VERMILLION, lw=1.0, ls=":", label="nothing added")
     axes.axvline(LEAST_NATS, color="0.45", lw=1.0, ls=":", label=f"least that counts, {LEAST_NATS:g} nats")
     axes.set_yticks(range(len(tried)), [" and ".join(map(plain, one.effects)) for one in tried])
     axes.set_ylim(len(tried) - 0.4, -0.6)
@@ -72,8 +52,8 @@ def _ranking_figure(diagnosis: CameraDiagnosis) -> Figure | None:
     axes.set_xlim(-0.5, 1.5 * max(10.0 * LEAST_LOSS, nothing, *(one.loss for one in tried)))
     label = "evidence lost if only this effect is added [nats]\n0: none against all effects"
     axes.set_xlabel(label, fontsize=8, loc="right")
-    dress(axes)
-    legend_below(figure, axes)
+    style.dress(axes)
+    style.legend_below(figure, axes)
     return figure
 
 
@@ -85,40 +65,38 @@ def loss_of_nothing(diagnosis: CameraDiagnosis) -> float:
 
 def _role(diagnosis: CameraDiagnosis, effects: Sequence[str]) -> tuple[str, str]:
     if set(effects) <= {effect.effect for effect in diagnosis.effects}:
-        return "added", BLUE
+        return "added", style.BLUE
     if set(effects) <= {rival for effect in diagnosis.effects for rival in effect.rivals}:
-        return "fits as well as what was added", LIGHT_BLUE
-    return "other effect", GREY
+        return "fits as well as what was added", style.LIGHT_BLUE
+    return "other effect", style.GREY
 
 
 def _errors_figure(diagnosis: CameraDiagnosis) -> Figure:
     """Frame by frame on frames kept aside: displacement of markings, and brightness."""
-    figure = Figure(figsize=(COLUMN, 2.4), layout="constrained")
-    place, grey = figure.subplots(1, 2)
+    figure, ((place, grey),) = style.grid_of(2.4, 1, 2)
     bent = [effect.effect for effect in diagnosis.effects if effect.nats is not None]
     every = [effect.effect for effect in diagnosis.effects]
-    _draw_frames(place, diagnosis.pixels, bent)
+    _draw_frames(place, diagnosis.pixels.before.frames, diagnosis.pixels.after.frames, bent)
     if diagnosis.pixels.floor is not None:
-        place.axhline(diagnosis.pixels.floor.value, color=GREEN, lw=1.4, label="floor: any camera, mean")
-    _draw_frames(grey, diagnosis.grey, every)
+        place.axhline(diagnosis.pixels.floor.value, color=style.GREEN, lw=1.4, label="floor: any camera, mean")
+    _draw_frames(grey, diagnosis.grey.before.frames, diagnosis.grey.after.frames, every)
     place.set_ylabel("displacement\nof markings [px]", fontsize=8)
     grey.set_ylabel("difference in brightness\n[grey levels]", fontsize=8)
-    legend_below(figure, place, grey)
+    style.legend_below(figure, place, grey)
     return figure
 
 
-def _draw_frames(axes: Axes, error: Comparison, effects: list[str]) -> None:
+def _draw_frames(axes: Axes, before: Floats, after: Floats, effects: list[str]) -> None:
     """Each frame's error before, and after where something was added, the largest error before last."""
-    before, after = error.before.frames, error.after.frames
     order = np.argsort(before)[: int(np.isfinite(before).sum())]
     spots = np.arange(1, len(order) + 1)
     if effects:
-        axes.vlines(spots, before[order], after[order], color=GREY, lw=0.4, alpha=0.6)
-    axes.plot(spots, before[order], ".", color=VERMILLION, ms=3, label=DECLARED_MODEL)
+        axes.vlines(spots, before[order], after[order], color=style.GREY, lw=0.4, alpha=0.6)
+    axes.plot(spots, before[order], ".", color=style.VERMILLION, ms=3, label=DECLARED_MODEL)
     if effects:
-        axes.plot(spots, after[order], ".", color=BLUE, ms=3, label="with effects added")
+        axes.plot(spots, after[order], ".", color=style.BLUE, ms=3, label="with effects added")
     axes.set_ylim(bottom=0.0)
-    dress(axes, "frames kept aside,\nby error before")
+    style.dress(axes, "frames kept aside,\nby error before")
 
 
 ACROSS = 12
@@ -157,8 +135,7 @@ def displacement_figure(diagnosis: CameraDiagnosis) -> Figure:
     top = max(0.0, min(float(one.places[:, 1].min(initial=rows)) for one in measured) - 2.0 * columns / ACROSS)
     lines = 2 if len(models) > 1 else 1
     height = 0.45 + lines * (0.35 + 1.45 * (rows - top) / columns)
-    figure = Figure(figsize=(COLUMN, height), layout="constrained")
-    panels = figure.subplots(lines, 2, sharex=True, sharey=True, squeeze=False)
+    figure, panels = style.grid_of(height, lines, 2, sharex=True, sharey=True)
     longest = max(float(np.hypot(*one.lengths.T).max(initial=0.0)) for one in arrows)
     for number, (axes, one) in enumerate(zip(panels.ravel(), arrows, strict=True)):
         axes.set(xlim=(0, columns), ylim=(rows, top), aspect="equal")
@@ -195,16 +172,9 @@ def _sums(cell: NDArray[np.intp], values: Floats) -> Floats:
 def _draw_arrows(axes: Axes, arrows: Arrows, colour: str, longest: float, room: float) -> None:
     """Arrows with one of a round length as their scale; the longest of all panels is as long as there is room."""
     key = max((one for one in KEYS_PX if one <= longest), default=KEYS_PX[0])
-    quiver = axes.quiver(
-        *arrows.places.T,
-        *arrows.lengths.T,
-        color=colour,
-        angles="xy",
-        scale_units="xy",
-        scale=max(longest, KEYS_PX[0]) / (1.5 * room),
-        width=0.006,
-        pivot="middle",
-    )
+    scale = max(longest, KEYS_PX[0]) / (1.5 * room)
+    look: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "width": 0.006, "pivot": "middle"}
+    quiver = axes.quiver(*arrows.places.T, *arrows.lengths.T, color=colour, scale=scale, **look)
     axes.quiverkey(quiver, 0.88, 0.93, key, f"{key:g} px", labelpos="S", fontproperties={"size": 7})
 
 
@@ -216,13 +186,12 @@ def markings_figure(diagnosis: CameraDiagnosis) -> Figure:
     """The frames on which the effects that were added change most, the outlines of the map's markings over them."""
     models, frames = list(camera_models(diagnosis).items()), telling_frames(diagnosis)
     down, across = (SHOWN, len(models)) if len(models) > 1 else (1, SHOWN)
-    rows, columns = diagnosis.gathered.pictures.shape[1:3]
-    height = 0.35 + down * (0.2 + 1.4 * rows / columns)
-    figure = Figure(figsize=(COLUMN, height), layout="constrained")
-    panels = figure.subplots(down, across, squeeze=False)
+    pictures = diagnosis.gathered.pictures
+    rows, columns = pictures.shape[1:3]
+    figure, panels = style.grid_of(0.35 + down * (0.2 + 1.4 * rows / columns), down, across)
     shown = product(frames, zip(models, COLOURS, strict=False))
     for axes, (frame, ((name, fit), colour)) in zip(panels.ravel(), shown, strict=True):
-        show_photo(axes, diagnosis.gathered.pictures[frame], extent=(0, columns, rows, 0), interpolation="nearest")
+        style.show_photo(axes, pictures[frame], extent=(0, columns, rows, 0), interpolation="nearest")
         draw_outlines(axes, fit, frame, colour)
         axes.set_title(fill(f"{name}, frame {diagnosis.gathered.numbers[frame]}", TITLE), fontsize=7)
     label_places(panels)
@@ -262,7 +231,7 @@ def outline_field(fit: CameraFit, frame: int, white: bool) -> tuple[Floats, Floa
     return columns, rows, distance.reshape(columns.shape)
 
 
-COLOURS = (VERMILLION, BLUE)
+COLOURS = (style.VERMILLION, style.BLUE)
 """Colours of the declared model, and of the one with effects added."""
 
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from math import ceil
 from typing import NamedTuple
 
 import numpy as np
@@ -23,8 +22,8 @@ from proxytune.diagnosis import (
     wheel_speeds,
 )
 from proxytune.effects import TURN, Catalogue, Means, Panel, WheelCurve, track_of
+from proxytune.report import figure_style as style
 from proxytune.report.diagnosis.error_figures import DECLARED_MODEL, extended_name
-from proxytune.report.figure_style import BLUE, COLUMN, GREY, LIGHT_GREY, PURPLE, VERMILLION, dress, legend_below
 from proxytune.space import Theta
 
 HELD_S = 5.0
@@ -86,24 +85,21 @@ def _shown(diagnosis: Diagnosis) -> Shown:
 def _car_figure(diagnosis: Diagnosis) -> Figure:
     """A car's steady speed against throttle, or its wheels' angle against steering."""
     found, shown, drives = diagnosis.found, _shown(diagnosis), diagnosis.found.declared.drives
-    figure = Figure(figsize=(COLUMN, 2.4), layout="constrained")
-    axes, given = figure.subplots(), drives.duties[..., shown.column]
+    (figure, axes), given = style.one_panel(2.4), drives.duties[..., shown.column]
     commands = np.linspace(float(given.min()), float(given.max()), COMMANDS)
     pairs = np.stack([commands * (column == shown.column) for column in (0, 1)], axis=-1)
     models = {DECLARED_MODEL: found.declared.theta, extended_name(diagnosis): found.model.theta}
-    _draw_steady(
-        axes, commands, {n: shown.full * _steady(drives, t, pairs)[:, shown.column] for n, t in models.items()}
-    )
-    dress(axes, ("throttle", "steering [full lock]")[shown.column], shown.label)
-    legend_below(figure, axes)
+    steady = {n: shown.full * _steady(drives, t, pairs)[:, shown.column] for n, t in models.items()}
+    _draw_steady(axes, commands, steady)
+    style.dress(axes, ("throttle", "steering [full lock]")[shown.column], shown.label)
+    style.legend_below(figure, axes)
     return figure
 
 
 def _wheels_figure(diagnosis: Diagnosis) -> Figure:
     """Steady wheel speed against command above, what is added to the declared model beneath."""
     drives = diagnosis.found.declared.drives
-    figure = Figure(figsize=(COLUMN, 3.4), layout="constrained")
-    panels = figure.subplots(2, 2, sharex="col", sharey="row")
+    figure, panels = style.grid_of(3.4, 2, 2, sharex="col", sharey="row")
     rates = rates_of(diagnosis, _curve(diagnosis.found.curves, "wheel command"))
     commands = np.linspace(float(drives.duties.min()), float(drives.duties.max()), COMMANDS)
     models = _steady_models(diagnosis, commands)
@@ -116,7 +112,7 @@ def _wheels_figure(diagnosis: Diagnosis) -> Figure:
     for row, label in enumerate(("steady speed [m/s]", "speed − declared\n[mm/s]")):
         panels[row, 0].set_ylabel(label, fontsize=8)
         panels[row, 1].set_ylabel("")
-    legend_below(figure, *panels.ravel())
+    style.legend_below(figure, *panels.ravel())
     return figure
 
 
@@ -135,9 +131,9 @@ def _steady_models(diagnosis: Diagnosis, commands: Floats) -> dict[str, Floats]:
 
 def _draw_steady(axes: Axes, commands: Floats, models: Mapping[str, Floats]) -> None:
     for name, speeds in models.items():
-        style, colour = {DECLARED_MODEL: ("-", VERMILLION), ANY: ("--", PURPLE)}.get(name, ("-", BLUE))
-        axes.plot(commands, speeds, style, color=colour, lw=1.3, label=name)
-    dress(axes)
+        line, colour = {DECLARED_MODEL: ("-", style.VERMILLION), ANY: ("--", style.PURPLE)}.get(name, ("-", style.BLUE))
+        axes.plot(commands, speeds, line, color=colour, lw=1.3, label=name)
+    style.dress(axes)
 
 
 def _steady(drives: Drives, theta: Theta, commands: Floats) -> Floats:
@@ -166,8 +162,7 @@ def _flexible(diagnosis: Diagnosis, curve: SignalCurve, column: int) -> tuple[Fl
 def _steps_figure(diagnosis: Diagnosis) -> Figure:
     """Wheel speed after a step of the command and, for backlash, after its reversal."""
     found, drives = diagnosis.found, diagnosis.found.declared.drives
-    figure = Figure(figsize=(COLUMN, 2.4), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = style.one_panel(2.4)
     catalogue = diagnosis.robot.catalogue
     reverses = any(_curve_kind(one, catalogue) is WheelCurve.REVERSAL for one in found.adopted)
     lasts = STEPS_S if reverses else STEP_S
@@ -176,8 +171,8 @@ def _steps_figure(diagnosis: Diagnosis) -> Figure:
     duties = np.repeat(np.where(times < STEP_S, size, -size)[None, :, None], 2, axis=2)
     column, full, label = _shown(diagnosis)
     # An area, which no line on its edge can hide.
-    axes.fill_between(times, duties[0, :, 0] * full, color=LIGHT_GREY, linewidth=0, zorder=0, label="command")
-    models = ((found.declared, VERMILLION, DECLARED_MODEL), (found.model, BLUE, extended_name(diagnosis)))
+    axes.fill_between(times, duties[0, :, 0] * full, color=style.LIGHT_GREY, linewidth=0, zorder=0, label="command")
+    models = ((found.declared, style.VERMILLION, DECLARED_MODEL), (found.model, style.BLUE, extended_name(diagnosis)))
     for fitted, colour, name in models:
         driven = _driven(drives, duties)
         if any(fitted.theta.get(one, 0.0) > 0.0 for one in RANDOM_EFFECTS):
@@ -189,14 +184,13 @@ def _steps_figure(diagnosis: Diagnosis) -> Figure:
             axes.plot(times, draws.T, color=colour, lw=0.4, alpha=0.4)
             name += " (thin: single draws)"
         axes.plot(times, np.median(draws, axis=0), color=colour, lw=1.4, label=name)
-    dress(axes, "time since the command [s]", label)
-    legend_below(figure, axes)
+    style.dress(axes, "time since the command [s]", label)
+    style.legend_below(figure, axes)
     return figure
 
 
 BINS = 20
 """Values of the signal, equally often driven, over which means are taken."""
-COLUMNS = 2
 MEASURED, ANY = "measured", "free curve"
 DEGREES = 180.0 / np.pi
 CUE_PANELS: Mapping[str, tuple[Panel, ...]] = {
@@ -292,28 +286,27 @@ def _means(signal: Floats, added: Floats, share_of: Floats | None) -> tuple[Floa
 
 def means_figure(diagnosis: Diagnosis, curve: SignalCurve | None, panels: tuple[Panel, ...]) -> Figure:
     """Draw panels, two in a row; the curve is the flexible one, where there is one."""
-    rows = ceil(len(panels) / COLUMNS)
-    figure = Figure(figsize=(COLUMN, 1.7 * rows + 0.6), layout="constrained")
-    rates, across = rates_of(diagnosis, curve), min(COLUMNS, len(panels))
-    all_axes = [figure.add_subplot(rows, across, number + 1) for number in range(len(panels))]
+    figure, all_axes = style.panel_grid(len(panels), 1.7, 0.6)
+    rates = rates_of(diagnosis, curve)
     for axes, panel in zip(all_axes, panels, strict=True):
         signal = _signal(diagnosis.found.declared.drives, rates, curve, panel)
         draw_means(axes, rates, signal, panel)
         axes.set_xlabel(panel.label, fontsize=8)
-    legend_below(figure, *all_axes)
+    style.legend_below(figure, *all_axes)
     return figure
 
 
 def draw_means(axes: Axes, rates: Rates, signal: Floats, panel: Panel) -> None:
     """Draw means of what is added over a signal of the increments (N,)."""
     factor, unit = (1.0, "%") if panel.share else (DEGREES, "deg/s") if panel.motion == "turn" else (1e3, "mm/s")
-    axes.axhline(0.0, color=VERMILLION, lw=1.0, label=DECLARED_MODEL)
+    axes.axhline(0.0, color=style.VERMILLION, lw=1.0, label=DECLARED_MODEL)
     for name, added in rates.added.items():
         places, values = _means(signal, added[panel.motion], rates.declared[panel.motion] if panel.share else None)
-        style = {MEASURED: ("o", GREY, 3.0, 1), ANY: ("--", PURPLE, 0.0, 3)}.get(name, ("-", BLUE, 0.0, 2))
-        axes.plot(places, factor * values, style[0], color=style[1], ms=style[2], lw=1.4, zorder=style[3], label=name)
+        looks = {MEASURED: ("o", style.GREY, 3.0, 1), ANY: ("--", style.PURPLE, 0.0, 3)}
+        line, colour, size, order = looks.get(name, ("-", style.BLUE, 0.0, 2))
+        axes.plot(places, factor * values, line, color=colour, ms=size, lw=1.4, zorder=order, label=name)
     # A free curve may leave what was measured, where it says nothing
     seen = np.concatenate([line.get_ydata() for line in axes.lines if line.get_label() != ANY])
     room = 0.15 * (np.ptp(seen) or 1.0)
     axes.set_ylim(seen.min() - room, seen.max() + room)
-    dress(axes, up=f"{NAMES[panel.motion]}\n− declared [{unit}]")
+    style.dress(axes, up=f"{NAMES[panel.motion]}\n− declared [{unit}]")

@@ -9,19 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.collections import Collection, LineCollection
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
+from scipy.stats import binned_statistic_2d
 
 from proxytune.diagnosis import Diagnosis, Drives, Floats, Rmse, Whole, cut, pose_errors
-from proxytune.report.figure_style import (
-    BLUE,
-    COLUMN,
-    GREEN,
-    LIGHT_GREY,
-    SHADES,
-    VERMILLION,
-    dress,
-    legend_below,
-    write_plain,
-)
+from proxytune.report import figure_style as style
 from proxytune.report.wording import plain
 
 DECLARED_MODEL = "declared model"
@@ -42,33 +33,32 @@ def with_effects(effects: Sequence[str]) -> str:
 
 def error_figure(diagnosis: Diagnosis) -> Figure:
     """Draw errors of position and heading by horizon with 95 % intervals, on logarithmic axes, over the noise floor."""
-    figure = Figure(figsize=(COLUMN, 2.6), layout="constrained")
-    place, heading = figure.subplots(1, 2)
+    figure, ((place, heading),) = style.grid_of(2.6, 1, 2)
     errors, spots = diagnosis.errors, np.arange(len(diagnosis.errors))
     positions = [[error.before for error in errors], [error.after for error in errors]]
     headings = [[error.heading_before for error in errors], [error.heading_after for error in errors]]
     brackets = [(1e3 * error.floor.lower, 1e3 * error.floor.upper) for error in errors]
     level = [(np.degrees(error.heading_floor),) * 2 for error in errors]
-    models = [(DECLARED_MODEL, VERMILLION, "o", -0.1), (extended_name(diagnosis), BLUE, "s", 0.1)]
+    models = [(DECLARED_MODEL, style.VERMILLION, "o", -0.1), (extended_name(diagnosis), style.BLUE, "s", 0.1)]
     for axes, factor, both, floors in ((place, 1e3, positions, brackets), (heading, 180.0 / np.pi, headings, level)):
         for rms_errors, model in zip(both, models[: 2 if diagnosis.effects else 1], strict=False):
             _draw_errors(axes, rms_errors, factor, model)
         # A bar from the lower to the upper end, a line at the lower.
         lower, heights = [low for low, _ in floors], [high - low for low, high in floors]
-        axes.bar(spots, heights, 0.5, lower, color=GREEN, alpha=0.2, zorder=0)
+        axes.bar(spots, heights, 0.5, lower, color=style.GREEN, alpha=0.2, zorder=0)
         name = "noise floor: poses alone, to upper end"
-        axes.hlines(lower, spots - 0.25, spots + 0.25, color=GREEN, lw=1.4, label=name)
+        axes.hlines(lower, spots - 0.25, spots + 0.25, color=style.GREEN, lw=1.4, label=name)
         # Small errors are seen beside large ones, and the floor off the axis' end.
         axes.use_sticky_edges = False
         axes.margins(y=0.08)
         axes.set_yscale("log", nonpositive="clip")
-        write_plain(axes.yaxis)
+        style.write_plain(axes.yaxis)
         axes.set_xticks(range(len(errors)), [f"{error.horizon_s:g}" for error in errors])
         axes.set_xlim(-0.5, len(errors) - 0.5)
-        dress(axes, "prediction length [s]")
+        style.dress(axes, "prediction length [s]")
     place.set_ylabel("position error, RMS [mm]", fontsize=8)
     heading.set_ylabel("heading error, RMS [deg]", fontsize=8)
-    legend_below(figure, place)
+    style.legend_below(figure, place)
     return figure
 
 
@@ -143,17 +133,16 @@ def strayed(diagnosis: Diagnosis) -> dict[str, Strayed]:
 
 def residual_over_time(drives: Drives, both: Mapping[str, Strayed]) -> Figure:
     """Median and band where there are enough windows at a time, else a line per episode."""
-    figure = Figure(figsize=(COLUMN, 2.4), layout="constrained")
-    axes = figure.subplots()
-    for (name, one), colour, width in zip(both.items(), (VERMILLION, BLUE), (2.0, 1.2), strict=False):
+    figure, axes = style.one_panel(2.4)
+    for (name, one), colour, width in zip(both.items(), (style.VERMILLION, style.BLUE), (2.0, 1.2), strict=False):
         for number, (times, distance) in enumerate(_lines(axes, drives, one, colour)):
             axes.plot(times, distance, color=colour, lw=width, label=name if number == 0 else None)
     axes.set_ylim(bottom=0.0)
     # Why the axis does not begin at the start, where no drive is measured in the first quarter of the time.
     begins_late = drives.first.min() > 0.25 * drives.last.max()
     late = "\nlater part of each drive: the first was fitted" if begins_late else ""
-    dress(axes, f"time in the episode [s]{late}", f"distance to prediction\nin {one.horizon_s:g}-s windows [mm]")
-    legend_below(figure, axes)
+    style.dress(axes, f"time in the episode [s]{late}", f"distance to prediction\nin {one.horizon_s:g}-s windows [mm]")
+    style.legend_below(figure, axes)
     return figure
 
 
@@ -169,7 +158,7 @@ def _lines(axes: Axes, drives: Drives, strayed: Strayed, colour: str) -> list[tu
     centres = ((edges[:-1] + edges[1:]) / 2.0)[taken]
     axes.fill_between(centres, low, high, color=colour, alpha=0.18, linewidth=0)
     if not axes.get_legend_handles_labels()[1]:
-        axes.fill_between([], [], color=LIGHT_GREY, linewidth=0, label="10 to 90 % round the median")
+        axes.fill_between([], [], color=style.LIGHT_GREY, linewidth=0, label="10 to 90 % round the median")
     return [(centres, middle)]
 
 
@@ -206,9 +195,9 @@ def residual_map(drives: Drives, both: Mapping[str, Strayed]) -> Figure:
         colours = (_paths if len(one.rms) <= MANY_WINDOWS else _floor)(axes, drives, one, scale)
         axes.set_title(textwrap.fill(name, TITLE), fontsize=7)
         axes.set_aspect("equal")
-        dress(axes)
+        style.dress(axes)
     bar = figure.colorbar(colours, ax=list(panels), location="bottom", extend="both", aspect=30)
-    write_plain(bar.ax.xaxis)
+    style.write_plain(bar.ax.xaxis)
     bar.set_label(f"distance to prediction in {before.horizon_s:g}-s windows [mm]", fontsize=8)
     bar.ax.tick_params(labelsize=7)
     return figure
@@ -218,9 +207,9 @@ def _panels(count: int, extent: Floats) -> tuple[Figure, list[Axes]]:
     """Maps above each other, where the floor is long, or side by side."""
     stacked = count > 1 and extent[0] > WIDE * extent[1]
     across = 1 if stacked else count
-    tall = float(np.clip(extent[1] / max(extent[0], 1e-9), 0.4, 1.6)) * (COLUMN - 0.5) / across
-    figure = Figure(figsize=(COLUMN, min(tall, TALLEST) * (count // across) + 1.2), layout="constrained")
-    grid = figure.subplots(count // across, across, sharex=True, sharey=True, squeeze=False)
+    tall = float(np.clip(extent[1] / max(extent[0], 1e-9), 0.4, 1.6)) * (style.COLUMN - 0.5) / across
+    down = count // across
+    figure, grid = style.grid_of(min(tall, TALLEST) * down + 1.2, down, across, sharex=True, sharey=True)
     for axes in grid[:, 0]:
         axes.set_ylabel("y [m]", fontsize=8)
     for axes in grid[-1]:
@@ -231,7 +220,7 @@ def _panels(count: int, extent: Floats) -> tuple[Figure, list[Axes]]:
 def _paths(axes: Axes, drives: Drives, strayed: Strayed, scale: LogNorm) -> LineCollection:
     rows = np.split(strayed.increment, np.flatnonzero(np.diff(strayed.window)) + 1)
     lines = [np.concatenate((drives.poses[own[:1], 0, :2], drives.poses[own, 1, :2])) for own in rows]
-    paths = LineCollection(lines, array=strayed.rms, cmap=SHADES, norm=scale, linewidths=1.2, capstyle="round")
+    paths = LineCollection(lines, array=strayed.rms, cmap=style.SHADES, norm=scale, linewidths=1.2, capstyle="round")
     axes.add_collection(paths)
     axes.autoscale_view()
     _arrows(axes, lines)
@@ -256,10 +245,6 @@ def _floor(axes: Axes, drives: Drives, strayed: Strayed, scale: LogNorm) -> Coll
     places = drives.poses[strayed.increment, 1, :2]
     side = float(np.ptp(places, axis=0).max()) / SQUARES
     edges = [np.arange(along.min(), along.max() + 2.0 * side, side) for along in places.T]
-    place, shape = np.zeros(len(places), dtype=int), [len(edge) - 1 for edge in edges]
-    for along, edge, cells in zip(places.T, edges, shape, strict=True):
-        place = place * cells + np.clip(np.searchsorted(edge, along, side="right") - 1, 0, cells - 1)
-    count = np.bincount(place, minlength=shape[0] * shape[1])
-    total = np.bincount(place, strayed.rms[strayed.window], minlength=len(count))
-    mean = np.ma.masked_array(total / np.maximum(1, count), count == 0).reshape(shape)
-    return axes.pcolormesh(*edges, mean.T, cmap=SHADES, norm=scale, rasterized=True)
+    x, y = places.T
+    mean = binned_statistic_2d(x, y, strayed.rms[strayed.window], bins=edges).statistic
+    return axes.pcolormesh(*edges, mean.T, cmap=style.SHADES, norm=scale, rasterized=True)

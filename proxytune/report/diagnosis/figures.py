@@ -12,9 +12,9 @@ from matplotlib.ticker import FuncFormatter
 
 from proxytune.diagnosis import Diagnosis, Findings, Learning, Rules
 from proxytune.effects import GROUPS, HEADING, LEVEL, OF_PLACE, PLACE, Learnt, LearntCurve, learnt_effect
+from proxytune.report import figure_style as style
 from proxytune.report.diagnosis.effect_figure import effect_curve
 from proxytune.report.diagnosis.error_figures import error_figure, residual_map, residual_over_time, strayed
-from proxytune.report.figure_style import BLUE, COLUMN, GREY, LIGHT_BLUE, PURPLE, dress, legend_below
 from proxytune.report.wording import plain
 
 
@@ -56,10 +56,10 @@ class _Role(NamedTuple):
 
 _Row = tuple[str, float, _Role]
 """A name, its evidence [nats], and what its dot stands for."""
-ADDED = _Role("added", BLUE, BLUE)
-RIVAL = _Role("fits as well as one added", LIGHT_BLUE, LIGHT_BLUE)
-OTHER = _Role("not added", GREY, GREY)
-SIGNAL = _Role("free curve", PURPLE, PURPLE)
+ADDED = _Role("added", style.BLUE, style.BLUE)
+RIVAL = _Role("fits as well as one added", style.LIGHT_BLUE, style.LIGHT_BLUE)
+OTHER = _Role("not added", style.GREY, style.GREY)
+SIGNAL = _Role("free curve", style.PURPLE, style.PURPLE)
 
 
 def ranking_figure(found: Findings, rules: Rules) -> Figure | None:
@@ -68,7 +68,7 @@ def ranking_figure(found: Findings, rules: Rules) -> Figure | None:
     The evidence of those added is that when they were added; of the others, alone, in the first round. Nothing is
     drawn where nothing was tried.
     """
-    chance, least = _Role(f"not added, p > {rules.p_value:g}", GREY, "white"), rules.least_gain_nats
+    chance, least = _Role(f"not added, p > {rules.p_value:g}", style.GREY, "white"), rules.least_gain_nats
     rivals = {rival.effect for one in found.adopted for rival in one.rivals}
     forms = {(one.effect, one.form) for one in found.adopted}
     others = [one for one in found.tried if (one.effect, one.form) not in forms][:SHOWN]
@@ -81,15 +81,15 @@ def ranking_figure(found: Findings, rules: Rules) -> Figure | None:
     parts = {"added, in this order": added} if added else {}
     parts |= {"tried alone": tried, "any curve over": signals}
     heights = [len(rows) + 1.2 for rows in parts.values()]
-    figure = Figure(figsize=(COLUMN, ELSE + ROW * sum(heights)), layout="constrained")
-    panels = figure.subplots(len(parts), 1, sharex=True, height_ratios=heights)
+    figure, grid = style.grid_of(ELSE + ROW * sum(heights), len(parts), 1, sharex=True, height_ratios=heights)
+    panels = list(grid.flat)
     for axes, (title, rows) in zip(panels, parts.items(), strict=True):
         _dots(axes, rows)
         axes.axvline(least, color="0.45", lw=1.0, ls=":", label=f"least to be added: {least:g} nats")
         axes.set_title(title, fontsize=7, loc="left", pad=2)
     _scale(panels[-1], [gain for rows in parts.values() for _, gain, _ in rows], least)
     panels[-1].set_xlabel("evidence on drives left out [nats]", fontsize=8, loc="right")
-    legend_below(figure, *panels, without=[ADDED.name, SIGNAL.name])
+    style.legend_below(figure, *panels, without=[ADDED.name, SIGNAL.name])
     return figure
 
 
@@ -115,7 +115,7 @@ def _dots(axes: Axes, rows: Sequence[_Row]) -> None:
         axes.plot([gain], [place], "o", color=role.edge, mfc=role.face, ms=4, label=role.name)
     axes.set_yticks(range(len(rows)), [name for name, _, _ in rows])
     axes.set_ylim(len(rows) - 0.4, -0.6)
-    dress(axes)
+    style.dress(axes)
     axes.tick_params(axis="y", labelsize=7)
 
 
@@ -138,7 +138,6 @@ FADING = {
 """Groups whose weights are points, each of something that fades or ends, and what their knots are."""
 PAIRS = {"speed_and_turn": ("forward speed [m/s]", "yaw rate [rad/s]"), "place": ("x [m]", "y [m]")}
 """Groups over two signals, and what their axes are called."""
-COLUMNS = 2
 WIDEST, HIGHEST = 20, 18
 """Characters in a line below a panel, and beside it."""
 MOST_TICKS = 5
@@ -154,10 +153,9 @@ def learnt_figure(learning: Learning) -> Figure | None:
     groups = sorted(members, key=lambda group: order.index(GROUPS[group].title))
     by_group = [[curve for curve in effect.curves if curve.group == group] for group in groups]
     curves = [one for row in by_group for one in (_courses(row) if row[0].group == HEADING else row)]
-    rows, across = ceil(len(curves) / COLUMNS), min(COLUMNS, len(curves))
-    figure = Figure(figsize=(COLUMN, 1.65 * rows + 0.25), layout="constrained")
-    for place, curve in enumerate(curves):
-        _draw_learnt(figure.add_subplot(rows, across, place + 1), effect, curve)
+    figure, panels = style.panel_grid(len(curves), 1.65, 0.25)
+    for axes, curve in zip(panels, curves, strict=True):
+        _draw_learnt(axes, effect, curve)
     figure.suptitle("learnt from drives, not physics: what is added", fontsize=8)
     return figure
 
@@ -188,10 +186,10 @@ def _draw_learnt(axes: Axes, effect: Learnt, curve: LearntCurve) -> None:
         of = f"{group.title}, {FADING[curve.group]}" if curve.group in FADING else group.title
         axes.set_xlabel(fill(f"{of} [{'deg' if curve.group == HEADING else group.unit}]", WIDEST), fontsize=7)
         axes.set_ylabel(label, fontsize=8)
-        axes.axhline(0.0, color=GREY, lw=0.6)
+        axes.axhline(0.0, color=style.GREY, lw=0.6)
     if curve.group == "turn_rate":
-        axes.axvspan(*effect.seen.yaw, color=GREY, alpha=0.12, lw=0)
-    dress(axes)
+        axes.axvspan(*effect.seen.yaw, color=style.GREY, alpha=0.12, lw=0)
+    style.dress(axes)
 
 
 def _line(axes: Axes, curve: LearntCurve, factor: float) -> None:
@@ -202,13 +200,13 @@ def _line(axes: Axes, curve: LearntCurve, factor: float) -> None:
         shown = knots[:: ceil(len(knots) / MOST_TICKS)]
         axes.set_xticks(shown, [f"{knot:g}" for knot in shown])
         axes.set_xticks([], minor=True)
-        axes.vlines(knots, 0.0, weights, color=BLUE, lw=1.0)
-        axes.plot(knots, weights, "o", color=BLUE, ms=4)
+        axes.vlines(knots, 0.0, weights, color=style.BLUE, lw=1.0)
+        axes.plot(knots, weights, "o", color=style.BLUE, ms=4)
         return
     if curve.group not in (HEADING, *OF_PLACE):
         order = np.argsort(np.append(knots, 0.0))
         knots, weights = np.append(knots, 0.0)[order], np.append(weights, 0.0)[order]
-    axes.plot(knots, weights, "-" if curve.group == HEADING else ".-", color=BLUE, lw=1.3, ms=5)
+    axes.plot(knots, weights, "-" if curve.group == HEADING else ".-", color=style.BLUE, lw=1.3, ms=5)
 
 
 def _surface(axes: Axes, curve: LearntCurve, factor: float, label: str) -> None:

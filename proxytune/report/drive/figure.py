@@ -1,14 +1,17 @@
-"""Still picture of an episode, its scores in proxy and target, and when the two part."""
+"""Still picture of an episode, the map that a movie has too, the scores in proxy and target, and when the two part."""
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
+from matplotlib.patheffects import Stroke, withStroke
 
-from proxytune.report.drive.scene import COLOURS, draw_map, draw_parting, draw_paths, map_aspect
-from proxytune.report.figure_style import COLUMN, GREY, LIGHT_GREY, dress, show_photo
+from proxytune.arrays import Floats
+from proxytune.driving import Road, draw_floor
+from proxytune.report import figure_style as style
 from proxytune.report.text import WholeWords, table_text
 from proxytune.report.view import Table, columns_of
 from proxytune.report.wording import plain, short, with_unit
@@ -72,14 +75,14 @@ def episode_figure(pair: SideBySide, metrics: Sequence[str]) -> Figure:
     """
     aspect = map_aspect(pair.road, [episode.places for episode in pair.sides.values()])
     parts: list[tuple[float, Callable[[SubFigure], None]]] = [
-        (0.85 * COLUMN * aspect + 0.35 + 2 * LINE_INCH, functools.partial(_draw_map, pair, metrics))
+        (0.85 * style.COLUMN * aspect + 0.35 + 2 * LINE_INCH, functools.partial(_draw_map, pair, metrics))
     ]
     if channels := pair.proxy.channels:
         parts.append((CHANNEL_INCH * len(channels) + 0.3, functools.partial(_draw_commands, pair)))
     if filmed := sum(episode.pictures is not None for episode in pair.sides.values()):
         parts.append((PICTURES_INCH * filmed + 0.2, functools.partial(_draw_pictures, pair)))
     heights = [inches for inches, _ in parts]
-    figure = Figure(figsize=(COLUMN, sum(heights)), layout="constrained")
+    figure = Figure(figsize=(style.COLUMN, sum(heights)), layout="constrained")
     panels = figure.subfigures(len(parts), 1, height_ratios=heights, squeeze=False)[:, 0]
     for panel, (_, draw) in zip(panels, parts, strict=True):
         draw(panel)
@@ -107,15 +110,13 @@ def _draw_commands(pair: SideBySide, figure: SubFigure) -> None:
     for axes, channel in zip(panels, channels, strict=True):
         for side, episode in reversed(pair.sides.items()):
             width = 1.6 if side == "target" else 0.8
-            axes.step(
-                episode.commands["time"], episode.commands[channel], where="post", color=COLOURS[side], linewidth=width
-            )
-        axes.axhline(0.0, color=LIGHT_GREY, linewidth=0.6, zorder=0)
+            axes.step(episode.commands["time"], episode.commands[channel], where="post", color=COLOURS[side], lw=width)
+        axes.axhline(0.0, color=style.LIGHT_GREY, linewidth=0.6, zorder=0)
         if pair.parted_s is not None:
             axes.axvline(pair.parted_s, color="black", linewidth=0.8, linestyle=":")
         axes.set_ylabel(f"{plain(channel)}\n[{pair.command_unit}]" if pair.command_unit else plain(channel), fontsize=7)
         axes.margins(x=0.01)
-        dress(axes)
+        style.dress(axes)
     if pair.parted_s is not None:
         panels[0].annotate(
             f"{100 * APART_M:g} cm apart at {pair.parted_s:.1f} s (ring on the map)",
@@ -134,9 +135,173 @@ def _draw_pictures(pair: SideBySide, figure: SubFigure) -> None:
     for row, (side, episode) in zip(panels, filmed.items(), strict=True):
         assert episode.pictures is not None
         for axes, instant in zip(row, instants, strict=True):
-            show_photo(axes, episode.pictures[np.argmin(np.abs(episode.commands["time"] - instant))])
+            style.show_photo(axes, episode.pictures[np.argmin(np.abs(episode.commands["time"] - instant))])
             axes.set(xticks=[], yticks=[])
-            axes.spines[:].set_edgecolor(GREY)
+            axes.spines[:].set_edgecolor(style.GREY)
         row[0].set_ylabel(side, color=COLOURS[side], fontsize=7)
     for axes, instant in zip(panels[0], instants, strict=True):
         axes.set_title(f"{instant:.1f} s", fontsize=7, pad=2)
+
+
+COLOURS: Mapping[str, str] = {"proxy": style.BLUE, "target": style.VERMILLION}
+PALER = 0.6
+"""The floor is drawn this much nearer to white, so that paths stand out."""
+MARGIN_M = 0.2
+"""Round paths that no map bounds."""
+CASING = (Stroke(linewidth=2.6, foreground="white"), withStroke(linewidth=0.0))
+"""A white edge round thin lines."""
+HALO = (withStroke(linewidth=2.0, foreground="white"),)
+"""A white edge round letters."""
+
+
+def draw_map(axes: Axes, road: Road | None, paths: Iterable[Floats]) -> None:
+    """Draw the floor that the camera sees, from above, with axes in metres; without a road only the axes.
+
+    Args:
+        axes: Where.
+        road: The map, if there is one.
+        paths: All that is going to be drawn on it, each (times, 2): x, y [m].
+    """
+    if road is not None:
+        floor = draw_floor(road)
+        end = floor.origin + len(floor.pixels) / floor.pixels_per_metre
+        # Every other pixel shows the markings as well, at a quarter of the work
+        paler = (255.0 - (255.0 - floor.pixels[::2, ::2]) * (1.0 - PALER)).astype(np.uint8)
+        box = (floor.origin, end, floor.origin, end)
+        style.show_photo(axes, paler, extent=box, origin="lower", interpolation="antialiased")
+        axes.set(xlim=(0.0, road.size[0]), ylim=(0.0, road.size[1]))
+    else:
+        low, high = _bounds(paths)
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    axes.set_aspect("equal")
+    style.dress(axes)
+    axes.set_xlabel("x [m]", fontsize=7)
+    axes.set_ylabel("y [m]", fontsize=7)
+
+
+def map_aspect(road: Road | None, paths: Iterable[Floats]) -> float:
+    """Height of the map over its width."""
+    width, height = road.size if road is not None else np.subtract(*_bounds(paths)[::-1])
+    return float(np.clip(height / width, 0.4, 2.0))
+
+
+def _bounds(paths: Iterable[Floats]) -> tuple[Floats, Floats]:
+    places = np.concatenate(list(paths))
+    return places.min(axis=0) - MARGIN_M, places.max(axis=0) + MARGIN_M
+
+
+ARROWS, LEAST_M = 6, 0.5
+"""About so many arrows on a path, and at least so far apart [m]."""
+EVERY = 6
+"""One point in so many of a path is looked at when words are placed."""
+WIDTHS = {"proxy": 1.0, "target": 2.2}
+"""The target is drawn wider and below, so that both are seen where they agree."""
+
+
+def draw_paths(axes: Axes, pair: SideBySide) -> None:
+    """Draw every side's path, the common start, and where each ends."""
+    for side in reversed(pair.sides):
+        _draw_path(axes, pair.sides[side].places, side)
+    draw_start(axes, pair.proxy.places)
+    edge: dict[str, Any] = {"markeredgecolor": "white", "markeredgewidth": 0.7, "clip_on": False, "zorder": 4}
+    marks = {"start": ("black", pair.proxy.places[0])}
+    ends = {side: episode.places[-1] for side, episode in pair.sides.items()}
+    for side, end in ends.items():
+        axes.plot(*end, "s", color=COLOURS[side], markersize=4.5, **edge)
+    together = len(ends) > 1 and np.ptp(list(ends.values()), axis=0).max() < APART_M
+    marks |= (
+        {"both end": ("black", ends["proxy"])}
+        if together
+        else {f"{side} ends": (COLOURS[side], end) for side, end in ends.items()}
+    )
+    paths = np.concatenate([episode.places[::EVERY] for episode in pair.sides.values()])
+    low, high = np.transpose([axes.get_xlim(), axes.get_ylim()])
+    corners = corners_of(np.array([place for _, place in marks.values()]), paths, low, high)
+    for (text, (colour, place)), corner in zip(marks.items(), corners, strict=True):
+        _write(axes, place, text, colour, corner)
+
+
+def draw_parting(axes: Axes, pair: SideBySide) -> None:
+    """Ring the place at which proxy and target are first APART_M apart."""
+    if pair.parted_s is not None:
+        place = pair.proxy.places[np.searchsorted(pair.proxy.poses["time"], pair.parted_s)]
+        axes.plot(*place, "o", color="black", markersize=9, fillstyle="none", markeredgewidth=0.9)
+
+
+def _draw_path(axes: Axes, places: Floats, side: str) -> None:
+    (line,) = axes.plot(*places.T, color=COLOURS[side], linewidth=WIDTHS[side], solid_capstyle="round")
+    if side == "target":
+        line.set_path_effects(list(CASING))
+    edge: dict[str, Any] = {"markeredgecolor": "white", "markeredgewidth": 0.5}
+    for row in arrow_rows(places):
+        # Along the path, not along the heading: a robot may drive backwards
+        step = places[row] - places[row - 1]
+        turned = float(np.degrees(np.arctan2(step[1], step[0]))) - 90.0
+        axes.plot(*places[row], marker=(3, 0, turned), color=COLOURS[side], markersize=5.5, **edge)
+
+
+def arrow_rows(places: Floats) -> list[int]:
+    """Rows of a path (times, 2) at which an arrow shows the direction: evenly spaced along it, none at its ends."""
+    driven = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(places, axis=0).T))))
+    apart = max(LEAST_M, driven[-1] / (ARROWS + 1))
+    wanted = np.arange(apart / 2.0, driven[-1], apart)
+    return [int(row) for row in np.searchsorted(driven, wanted)]
+
+
+def draw_start(axes: Axes, places: Floats) -> None:
+    """Mark where a path (times, 2) starts."""
+    edge: dict[str, Any] = {"markeredgecolor": "black", "markeredgewidth": 1.0, "zorder": 4}
+    axes.plot(*places[0], "o", color="white", markersize=6, **edge)
+
+
+def _write(axes: Axes, place: Floats, text: str, colour: str, corner: tuple[int, int]) -> None:
+    aligned: dict[str, Any] = {"ha": "left" if corner[0] > 0 else "right", "va": "bottom" if corner[1] > 0 else "top"}
+    look: dict[str, Any] = {"color": colour, "fontsize": 7, "path_effects": HALO, "annotation_clip": False}
+    spot, shift = (float(place[0]), float(place[1])), (5 * corner[0], 4 * corner[1])
+    axes.annotate(text, spot, xytext=shift, textcoords="offset points", **aligned, **look)
+
+
+SIZE = np.array((0.24, 0.06))
+"""Width and height that a label takes, as shares of the map's width."""
+GAP = 0.02
+"""Between a mark and its label, likewise."""
+CORNERS = np.array(((1, 1), (-1, 1), (1, -1), (-1, -1)))
+"""To the right or left of its mark, and above or below."""
+OUTSIDE, HIDES = 1000, 100
+"""Costs of leaving the map, and of hiding a mark or another label, in points of a path that are hidden."""
+
+
+def corners_of(marks: Floats, paths: Floats, low: Floats, high: Floats) -> list[tuple[int, int]]:
+    """The corner of each mark at which its label stands, the first of those that hide least.
+
+    Args:
+        marks: What has a label, (marks, 2), in the map's unit.
+        paths: Points of what is not to be hidden if that can be avoided, (points, 2).
+        low: The map's lower left corner (2,).
+        high: Its upper right corner (2,).
+
+    Returns:
+        For each mark 1 or −1 for right or left, and for above or below.
+    """
+    width = high[0] - low[0]
+    half = SIZE * width / 2.0
+    chosen: list[tuple[int, int]] = []
+    labels: list[Floats] = []
+    for mark in marks:
+        centres = mark + CORNERS * (half + GAP * width)
+        costs = [_cost(centre, half, (marks, np.array(labels), paths), (low, high)) for centre in centres]
+        best = int(np.argmin(costs))
+        labels.append(centres[best])
+        chosen.append((int(CORNERS[best, 0]), int(CORNERS[best, 1])))
+    return chosen
+
+
+def _cost(centre: Floats, half: Floats, others: tuple[Floats, Floats, Floats], box: tuple[Floats, Floats]) -> int:
+    marks, labels, paths = others
+    outside = bool((centre - half < box[0]).any() or (centre + half > box[1]).any())
+    hidden = _within(marks, centre, half) + _within(labels, centre, 2.0 * half)
+    return OUTSIDE * outside + HIDES * hidden + _within(paths, centre, half)
+
+
+def _within(places: Floats, centre: Floats, half: Floats) -> int:
+    return int((np.abs(places - centre) < half).all(axis=-1).sum()) if len(places) else 0

@@ -131,15 +131,15 @@ class ExportLine:
     Attributes:
         name: Its name in θ.
         value: The value.
-        unit: Its unit.
         interval: Its interval, if it has one.
+        unit: Its unit.
         place: Where it went; empty where it has no place.
     """
 
     name: str
     value: float
-    unit: str
     interval: Pair | None
+    unit: str
     place: str
 
     def __str__(self) -> str:
@@ -164,7 +164,7 @@ def export_lines(instance: Instance, form: str, has: Container[str] = ()) -> lis
         place = "in the file" if effect in has else place_of(effect, form, instance.robot.drive)
         if place or parameter is None or isinstance(parameter.neutral, str) or value != parameter.neutral:
             unit = parameter.unit if parameter else ""
-            lines.append(ExportLine(name, value, unit, instance.intervals.get(name), place))
+            lines.append(ExportLine(name, value, instance.intervals.get(name), unit, place))
     return lines
 
 

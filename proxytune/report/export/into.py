@@ -86,9 +86,8 @@ def patch(instance: Instance, path: Path, output: Path, wheels: Sequence[str] = 
         InputError: If its wheels cannot be told, or something in it is beyond what is understood here.
     """
     if path.suffix == ".xacro":
-        raise InputError(
-            f"{path}: {XACRO.format(path.name, path.name.removesuffix('.xacro').removesuffix('.urdf') + '.urdf')}"
-        )
+        made = f"{path.name.removesuffix('.xacro').removesuffix('.urdf')}.urdf"
+        raise InputError(f"{path}: {XACRO.format(path.name, made)}")
     xml = XmlPatch(path)
     reader = READERS.get(xml.root.tag)
     if reader is None:
@@ -153,9 +152,8 @@ def _joints(xml: XmlPatch, wheels: Sequence[str]) -> tuple[ET.Element, ET.Elemen
     chosen = given or pairs
     if len(set(chosen)) != 1 or len(chosen[0]) != 2 or not set(chosen[0]) <= set(turning):
         known = ", ".join(filter(None, turning)) or "none"
-        raise InputError(
-            f"{xml.path}: the driven wheels cannot be told; name their joints: --wheels LEFT,RIGHT of {known}"
-        )
+        remedy = f"name their joints: --wheels LEFT,RIGHT of {known}"
+        raise InputError(f"{xml.path}: the driven wheels cannot be told; {remedy}")
     left, right = chosen[0]
     return turning[left], turning[right]
 
@@ -305,9 +303,8 @@ def _mjcf_wheel(xml: XmlPatch, joint: ET.Element) -> Wheel:
     def grow(factor: float) -> None:
         if not sizes:
             name = body.get("name", "")
-            raise InputError(
-                f"{xml.path}: body '{name}' has no sphere or cylinder that states its own size; give it one"
-            )
+            lacks = f"body '{name}' has no sphere or cylinder that states its own size"
+            raise InputError(f"{xml.path}: {lacks}; give it one")
         for geom, size in sizes.items():
             xml.set(geom, "size", " ".join([_numbers([factor * float(size[0])]), *size[1:]]))
 
@@ -341,11 +338,8 @@ def _place(element: ET.Element) -> Floats:
 
 TURNS = {"quat", "euler", "axisangle", "xyaxes", "zaxis"}
 """Attributes by which MuJoCo turns a body or camera."""
-READERS: dict[str, Callable[[XmlPatch, ET.Element, ET.Element], OwnFile]] = {
-    "robot": _urdf,
-    "sdf": _sdf,
-    "mujoco": _mjcf,
-}
+Reader = Callable[[XmlPatch, ET.Element, ET.Element], OwnFile]
+READERS: dict[str, Reader] = {"robot": _urdf, "sdf": _sdf, "mujoco": _mjcf}
 
 
 def _numbers(values: Sequence[float] | Floats) -> str:

@@ -6,19 +6,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from proxytune import driving
 from proxytune.arrays import Floats
-from proxytune.driving import (
-    AXLES,
-    STEERS,
-    add_little_mass,
-    link_pose,
-    links_called,
-    origin_of,
-    parse_urdf,
-    read_body,
-    rotation,
-    sound_urdf,
-)
 from proxytune.report.export.instance import Instance, xml_comment
 
 
@@ -31,9 +20,9 @@ def urdf_text(instance: Instance) -> str:
         SettingsError: If the robot has no URDF, its axles are not to be found there, or a number in it is none.
     """
     path = instance.robot.body()
-    root = parse_urdf(path)
-    read_body(root, path)
-    with sound_urdf(path):
+    root = driving.parse_urdf(path)
+    driving.read_body(root, path)
+    with driving.sound_urdf(path):
         _change(root, instance)
     ET.indent(root)
     comment = xml_comment(instance, "urdf", 5)
@@ -42,15 +31,15 @@ def urdf_text(instance: Instance) -> str:
 
 def _change(root: ET.Element, instance: Instance) -> None:
     """Give wheels, camera and tracked point what was found of them."""
-    for side, (axle, gain, limit) in enumerate(zip(AXLES, instance.gains, instance.limits, strict=True)):
+    for side, (axle, gain, limit) in enumerate(zip(driving.AXLES, instance.gains, instance.limits, strict=True)):
         joint = next(one for one in root.iter("joint") if one.get("name") == axle)
         _set_wheel(root, joint, (0.5 - side) * instance.baseline_m, instance.figure("wheel_radius"), gain)
         top_speed = limit * instance.figure("full_speed") / instance.figure("wheel_radius")
         _part(joint, "limit", effort="0").set("velocity", f"{top_speed:.6g}")
     if offset := instance.value("steering_offset", "offset", 0.0):
-        turned = rotation(0.0, 0.0, math.radians(offset * instance.figure("wheel_angle")))
-        for joint in (one for one in root.iter("joint") if one.get("name") in STEERS):
-            pose = origin_of(joint)
+        turned = driving.rotation(0.0, 0.0, math.radians(offset * instance.figure("wheel_angle")))
+        for joint in (one for one in root.iter("joint") if one.get("name") in driving.STEERS):
+            pose = driving.origin_of(joint)
             pose[:3, :3] = pose[:3, :3] @ turned
             _set_origin(joint, pose)
     for link, pose in instance.mounts.items():
@@ -60,12 +49,12 @@ def _change(root: ET.Element, instance: Instance) -> None:
 def _set_wheel(root: ET.Element, joint: ET.Element, left_m: float, radius_m: float, gain: float) -> None:
     """Give a wheel its place and its radius; it goes on touching the floor."""
     parent, link = end_of(joint, "parent"), end_of(joint, "child")
-    above = link_pose(root, parent)
-    centre = link_pose(root, link)
+    above = driving.link_pose(root, parent)
+    centre = driving.link_pose(root, link)
     centre[1, 3] = left_m
     centre[2, 3] += (gain - 1.0) * radius_m
     _set_origin(joint, np.linalg.inv(above) @ centre)
-    for element in links_called(root, link)[:1]:
+    for element in driving.links_called(root, link)[:1]:
         for geometry in (*element.iterfind("*/geometry/sphere"), *element.iterfind("*/geometry/cylinder")):
             geometry.set("radius", f"{gain * float(geometry.get('radius', radius_m)):.9g}")
 
@@ -74,9 +63,9 @@ def _mount(root: ET.Element, link: str, pose: Floats) -> None:
     """Fix a link to the robot at a pose in the root link's frame; where there is none of that name, add it."""
     joints = [one for one in root.iter("joint") if end_of(one, "child") == link]
     if joints:
-        _set_origin(joints[0], np.linalg.inv(link_pose(root, end_of(joints[0], "parent"))) @ pose)
+        _set_origin(joints[0], np.linalg.inv(driving.link_pose(root, end_of(joints[0], "parent"))) @ pose)
         return
-    add_little_mass(ET.SubElement(root, "link", name=link))
+    driving.add_little_mass(ET.SubElement(root, "link", name=link))
     joint = ET.SubElement(root, "joint", name=f"{link}_mount", type="fixed")
     children = {end_of(one, "child") for one in root.iter("joint")}
     names = (one.get("name", "") for one in root.findall("link"))
@@ -87,7 +76,7 @@ def _mount(root: ET.Element, link: str, pose: Floats) -> None:
 
 def _set_origin(joint: ET.Element, pose: Floats) -> None:
     """Write a pose as xyz and rpy, unless it is the one that stands there."""
-    if np.allclose(origin_of(joint), pose, atol=1e-12):
+    if np.allclose(driving.origin_of(joint), pose, atol=1e-12):
         return
     origin = _part(joint, "origin")
     origin.set("xyz", _numbers(pose[:3, 3]))

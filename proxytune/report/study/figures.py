@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from textwrap import fill
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,25 +13,7 @@ from matplotlib.ticker import MaxNLocator, PercentFormatter
 from scipy.ndimage import gaussian_filter, gaussian_filter1d
 
 from proxytune.arrays import Floats
-from proxytune.report.figure_style import (
-    BLUE,
-    COLUMN,
-    GREEN,
-    GREY,
-    LIGHT_BLUE,
-    LIGHT_GREY,
-    SHADES,
-    VERMILLION,
-    LineName,
-    draw_noise_floor,
-    dress,
-    floor_name,
-    legend_below,
-    mark_truth,
-    name_lines,
-    named_handles,
-    panel_grid,
-)
+from proxytune.report import figure_style as style
 from proxytune.report.wording import fixed, plain, span, with_unit
 from proxytune.study import PRPV, StudyResult
 
@@ -48,8 +31,7 @@ def convergence_figure(result: StudyResult) -> Figure:
     what PRPV of those cut off cannot be below. The diamond with its 95 % interval, right of the last trial, is
     the answer in episodes that nothing was chosen by; the square, left of the first, is the nominal θ.
     """
-    figure = Figure(figsize=(COLUMN, 2.9), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = style.one_panel(2.9)
     _draw_trials(axes, result)
     named, label = [_draw_answer(axes, result)], result.study.objective.label
     if result.study.objective == PRPV:
@@ -59,19 +41,19 @@ def convergence_figure(result: StudyResult) -> Figure:
         axes.set_ylim(bottom=min(-0.4, -0.02 * axes.get_ylim()[1]))
         axes.yaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    dress(axes, "trial", label)
-    name_lines(axes, named, TWO_LINES)
-    legend_below(figure, axes, without=[name.words for name in named])
+    style.dress(axes, "trial", label)
+    style.name_lines(axes, named, TWO_LINES)
+    style.legend_below(figure, axes, without=[name.words for name in named])
     return figure
 
 
-def _draw_levels(axes: Axes, result: StudyResult) -> list[LineName]:
+def _draw_levels(axes: Axes, result: StudyResult) -> list[style.LineName]:
     """Chance, and the noise floor that a perfect proxy would score; with their names."""
     chance, floor = result.judged.chance, result.floor
-    named = [LineName(f"chance\n{chance.mean:.1f}", GREY, chance.mean)]
-    axes.axhline(chance.mean, color=GREY, linewidth=1.0, linestyle=":", label=named[0].words)
-    known = LineName(f"{floor_name(floor)}\n{floor.value or 0.0:.1f}", GREEN, floor.value or 0.0)
-    return [*named, known] if draw_noise_floor(axes, floor, known.words) else named
+    named = [style.LineName(f"chance\n{chance.mean:.1f}", style.GREY, chance.mean)]
+    axes.axhline(chance.mean, color=style.GREY, linewidth=1.0, linestyle=":", label=named[0].words)
+    known = style.LineName(f"{style.floor_name(floor)}\n{floor.value or 0.0:.1f}", style.GREEN, floor.value or 0.0)
+    return [*named, known] if style.draw_noise_floor(axes, floor, known.words) else named
 
 
 def _draw_trials(axes: Axes, result: StudyResult) -> None:
@@ -80,20 +62,20 @@ def _draw_trials(axes: Axes, result: StudyResult) -> None:
     bounds = [(trial.number, trial.bound) for trial in result.trials if trial.bound is not None]
     initial = result.study.settings.initial
     _draw_points(axes, [point for point in scored if point[0] <= initial], "white", "design")
-    _draw_points(axes, [point for point in scored if point[0] > initial], BLUE, "proposed")
+    _draw_points(axes, [point for point in scored if point[0] > initial], style.BLUE, "proposed")
     if failed:
         axes.plot(failed, np.zeros(len(failed)), "x", color="black", markersize=4, label="failed")
     if bounds:
-        axes.plot(*zip(*bounds, strict=True), "^", color=GREY, markersize=4, label="stopped early, at least")
+        axes.plot(*zip(*bounds, strict=True), "^", color=style.GREY, markersize=4, label="stopped early, at least")
 
 
 def _draw_points(axes: Axes, points: list[tuple[int, float]], face: str, label: str) -> None:
     if points:
         numbers, scores = zip(*points, strict=True)
-        axes.plot(numbers, scores, "o", color=BLUE, markerfacecolor=face, markersize=4, zorder=3, label=label)
+        axes.plot(numbers, scores, "o", color=style.BLUE, markerfacecolor=face, markersize=4, zorder=3, label=label)
 
 
-def _draw_answer(axes: Axes, result: StudyResult) -> LineName:
+def _draw_answer(axes: Axes, result: StudyResult) -> style.LineName:
     """PRPV of the answer so far; where fresh episodes chose another in the end, the line ends at that one's.
 
     Returns:
@@ -102,21 +84,20 @@ def _draw_answer(axes: Axes, result: StudyResult) -> LineName:
     pairs = zip(result.trials, result.answers, strict=True)
     answers = [(trial.number, result.value_of(answer)) for trial, answer in pairs if answer is not None]
     ends = [*answers, (result.trials[-1].number + 1, result.value_of(result.best.trial))]
-    named = LineName("answer\nso far", VERMILLION, ends[-1][1] or 0.0)
-    axes.step(*zip(*ends, strict=True), where="post", color=VERMILLION, linewidth=1.5, label=named.words)
+    named = style.LineName("answer\nso far", style.VERMILLION, ends[-1][1] or 0.0)
+    axes.step(*zip(*ends, strict=True), where="post", color=style.VERMILLION, linewidth=1.5, label=named.words)
     return named
 
 
 def _draw_fresh(axes: Axes, result: StudyResult) -> None:
     last = result.trials[-1].number + 1
-    told = [(last, result.expected, VERMILLION, "D", "answer, fresh episodes")] if result.expected else []
+    told = [(last, result.expected, style.VERMILLION, "D", "answer, fresh episodes")] if result.expected else []
     told += [(0, result.nominal.expected, "black", "s", "simulator as it is")] if result.nominal else []
     for place, expected, colour, mark, label in told:
         value, low, high = expected.prpv.value
         reach = [[max(0.0, value - low)], [max(0.0, high - value)]]
-        axes.errorbar(
-            [place], [value], yerr=reach, fmt=mark, color=colour, markersize=5, capsize=2, zorder=4, label=label
-        )
+        look: dict[str, Any] = {"markersize": 5, "capsize": 2, "zorder": 4}
+        axes.errorbar([place], [value], yerr=reach, fmt=mark, color=colour, label=label, **look)
 
 
 BINS = 60
@@ -132,12 +113,12 @@ def profiles_figure(result: StudyResult) -> Figure:
     is the θ that made the target, where that is known.
     """
     intervals = result.study.settings.space.intervals
-    figure, panels = panel_grid(len(intervals), 1.3, 0.45)
+    figure, panels = style.panel_grid(len(intervals), 1.3, 0.45)
     for place, axes in enumerate(panels):
         _draw_profile(axes, result, place)
     for axes in panels[::2]:
         axes.set_ylabel("probability", fontsize=8)
-    legend_below(figure, *panels)
+    style.legend_below(figure, *panels)
     return figure
 
 
@@ -145,20 +126,20 @@ def _draw_profile(axes: Axes, result: StudyResult, place: int) -> None:
     box, learnt = result.study.settings.space.intervals[place], result.knowledge
     low, high = learnt.intervals[box.name]
     for ends in ((box.low, low), (high, box.high)):
-        axes.axvspan(*ends, color=LIGHT_GREY, linewidth=0, label="excluded (95 %)")
+        axes.axvspan(*ends, color=style.LIGHT_GREY, linewidth=0, label="excluded (95 %)")
     values, density = density_of(result, place)
-    axes.fill_between(values, density, color=BLUE, alpha=0.35, linewidth=0)
-    axes.plot(values, density, color=BLUE, linewidth=1.2)
-    axes.axvline(result.best.trial.theta[box.name], color=VERMILLION, linewidth=1.2, label="answer")
+    axes.fill_between(values, density, color=style.BLUE, alpha=0.35, linewidth=0)
+    axes.plot(values, density, color=style.BLUE, linewidth=1.2)
+    axes.axvline(result.best.trial.theta[box.name], color=style.VERMILLION, linewidth=1.2, label="answer")
     if result.truth is not None and box.name in result.truth:
-        mark_truth(axes, result.truth[box.name])
+        style.mark_truth(axes, result.truth[box.name])
     left = span((low, high))
     axes.set_title(f"unidentified: {left}" if box.name in learnt.unidentified else f"{left} remain", fontsize=7)
     axes.set_xlim(box.low, box.high)
     axes.set_ylim(0.0, 1.08 * density.max())
     axes.xaxis.set_major_locator(MaxNLocator(3))
     axes.set_yticks([])
-    dress(axes, with_unit(box.name, result.study.family.parameters[box.name].unit))
+    style.dress(axes, with_unit(box.name, result.study.family.parameters[box.name].unit))
 
 
 def density_of(result: StudyResult, place: int) -> tuple[Floats, Floats]:
@@ -187,7 +168,7 @@ drawn, and how much of its width is left free round it."""
 WIDEST = 18
 """Characters of a parameter's name that fit beside a panel; a longer one is broken."""
 REGION = "95 % region"
-MARKS = {"answer": (VERMILLION, "o", 8.0, "none"), "truth": ("black", "v", 4.5, "black")}
+MARKS = {"answer": (style.VERMILLION, "o", 8.0, "none"), "truth": ("black", "v", 4.5, "black")}
 """Colour, marker, size and filling."""
 
 
@@ -201,7 +182,7 @@ def evaluations_figure(result: StudyResult) -> Figure:
     count = len(result.study.settings.space.intervals)
     cells = max(1, count - 1)
     columns = max(2, cells)
-    width = max(COLUMN, PANEL * columns + 0.5)
+    width = max(style.COLUMN, PANEL * columns + 0.5)
     figure = Figure(figsize=(width, 0.9 * width * cells / columns + 0.25), layout="constrained")
     grid = figure.add_gridspec(cells, columns)
     scores = [trial.score for trial in result.trials if trial.score is not None]
@@ -211,7 +192,7 @@ def evaluations_figure(result: StudyResult) -> Figure:
         _pair(figure.add_subplot(grid[row - 1, column]), result, (column, row), norm)
     if not pairs:
         _alone(figure.add_subplot(grid[0, 0]), result, norm)
-    floor = "" if result.floor.value is None else f"\n{floor_name(result.floor)} {result.floor.value:.1f}"
+    floor = "" if result.floor.value is None else f"\n{style.floor_name(result.floor)} {result.floor.value:.1f}"
     _key(figure.add_subplot(grid[0, 1:]), figure.axes[: len(pairs) or 1], norm, f"PRPV [ordered pairs]{floor}")
     return figure
 
@@ -237,21 +218,21 @@ def _pair(axes: Axes, result: StudyResult, places: tuple[int, int], norm: Normal
 def _alone(axes: Axes, result: StudyResult, norm: Normalize) -> None:
     """PRPV of the trials over the range of a single parameter, on its 95 % interval."""
     (box,) = result.study.settings.space.intervals
-    axes.axvspan(*result.knowledge.intervals[box.name], color=LIGHT_BLUE, alpha=0.35, linewidth=0, label=REGION)
+    axes.axvspan(*result.knowledge.intervals[box.name], color=style.LIGHT_BLUE, alpha=0.35, linewidth=0, label=REGION)
     points = np.array([[trial.theta[box.name], trial.score or 0.0] for trial in result.trials])
     _scatter_trials(axes, result, points, norm)
     _mark(axes, [result.best.trial.theta[box.name], result.best.assessment.prpv.value], "answer")
     if result.truth is not None and box.name in result.truth:
         _mark(axes, [result.truth[box.name], 0.0], "truth")
     axes.set_xlim(box.low, box.high)
-    dress(axes, with_unit(box.name, result.study.family.parameters[box.name].unit), "PRPV [ordered pairs]")
+    style.dress(axes, with_unit(box.name, result.study.family.parameters[box.name].unit), "PRPV [ordered pairs]")
 
 
 def _scatter_trials(axes: Axes, result: StudyResult, points: Floats, norm: Normalize) -> None:
     scored = np.array([trial.score is not None for trial in result.trials])
     scores = [trial.score for trial in result.trials if trial.score is not None]
     across, up = points[scored].T
-    axes.scatter(across, up, c=scores, cmap=SHADES, norm=norm, s=14, linewidths=0, clip_on=False, zorder=2)
+    axes.scatter(across, up, c=scores, cmap=style.SHADES, norm=norm, s=14, linewidths=0, clip_on=False, zorder=2)
     cut = np.array([trial.state == "cut" for trial in result.trials])
     if cut.any():
         # Hollow: their colour is an estimate.
@@ -283,14 +264,14 @@ def _shadow(axes: Axes, result: StudyResult, places: tuple[int, int]) -> None:
     smooth = np.pad(gaussian_filter(np.minimum(counts, 1.0), SMOOTH_SHADOW, mode="nearest"), 1, mode="edge")
     smooth /= smooth.max()
     across, up = (np.concatenate([e[:1], 0.5 * (e[1:] + e[:-1]), e[-1:]]) for e in edges)
-    axes.contourf(across, up, smooth.T, levels=[EDGE, 2.0], colors=[LIGHT_BLUE], alpha=0.35, zorder=0)
-    axes.fill_between([], [], color=LIGHT_BLUE, alpha=0.35, linewidth=0, label=REGION)
+    axes.contourf(across, up, smooth.T, levels=[EDGE, 2.0], colors=[style.LIGHT_BLUE], alpha=0.35, zorder=0)
+    axes.fill_between([], [], color=style.LIGHT_BLUE, alpha=0.35, linewidth=0, label=REGION)
 
 
 def _name(axes: Axes, result: StudyResult, places: tuple[int, int]) -> None:
     """Names and figures only at the left and the bottom; three figures a side, which is what fits."""
     intervals, units = result.study.settings.space.intervals, result.study.family.parameters
-    dress(axes)
+    style.dress(axes)
     axes.xaxis.set_major_locator(MaxNLocator(2))
     axes.yaxis.set_major_locator(MaxNLocator(3))
     if places[1] == len(intervals) - 1:
@@ -309,14 +290,13 @@ def _key(axes: Axes, panels: Sequence[Axes], norm: Normalize, title: str) -> Non
     """The colours of PRPV and what the marks are, in the corner that the pairs leave free."""
     axes.set_axis_off()
     bar = axes.figure.colorbar(
-        ScalarMappable(norm, SHADES), cax=axes.inset_axes((0.15, 0.8, 0.8, 0.08)), orientation="horizontal"
+        ScalarMappable(norm, style.SHADES), cax=axes.inset_axes((0.15, 0.8, 0.8, 0.08)), orientation="horizontal"
     )
     bar.ax.set_title(title, fontsize=7)
     bar.ax.tick_params(labelsize=7)
-    named = named_handles(panels)
-    axes.legend(
-        list(named.values()), list(named), loc="upper center", bbox_to_anchor=(0.55, 0.62), fontsize=7, frameon=False
-    )
+    named = style.named_handles(panels)
+    look: dict[str, Any] = {"loc": "upper center", "fontsize": 7, "frameon": False}
+    axes.legend(list(named.values()), list(named), bbox_to_anchor=(0.55, 0.62), **look)
 
 
 def importance_figure(result: StudyResult) -> Figure:
@@ -325,20 +305,19 @@ def importance_figure(result: StudyResult) -> Figure:
     The dot is what it takes part in, alone or together with others; the stroke is what it does alone.
     """
     ordered = sorted(result.importances, key=lambda one: one.share)
-    figure = Figure(figsize=(COLUMN, 1.1 + 0.25 * len(ordered)), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = style.one_panel(1.1 + 0.25 * len(ordered))
     places = np.arange(len(ordered))
     shares, alone = (np.array([getattr(one, name) for one in ordered]) for name in ("share", "alone"))
     reach = np.abs(np.array([one.interval for one in ordered]).T - shares)
-    axes.errorbar(shares, places, xerr=reach, fmt="none", ecolor=BLUE, lw=1.0, capsize=2, label="95 % interval")
-    axes.plot(shares, places, "o", color=BLUE, markersize=5, label="alone or with others")
+    axes.errorbar(shares, places, xerr=reach, fmt="none", ecolor=style.BLUE, lw=1.0, capsize=2, label="95 % interval")
+    axes.plot(shares, places, "o", color=style.BLUE, markersize=5, label="alone or with others")
     axes.plot(alone, places, "|", color="black", markersize=7, markeredgewidth=1.4, label="alone")
     axes.set_yticks(places, [plain(one.name) for one in ordered])
     axes.set_xlim(0.0, 1.0)
     axes.set_ylim(-0.6, len(ordered) - 0.4)
     axes.xaxis.set_major_formatter(PercentFormatter(1.0, symbol=" %"))
-    dress(axes, "share in the variance of PRPV over the box")
-    legend_below(figure, axes)
+    style.dress(axes, "share in the variance of PRPV over the box")
+    style.legend_below(figure, axes)
     return figure
 
 

@@ -1,21 +1,257 @@
-"""Page of a study: what was found, what to do next, and all that it stands on; also while it runs."""
+"""A study for people: its tables, on the terminal and as files, and its page, also while it runs."""
 
 import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
+import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+from rich.console import Group
 
-from proxytune.report.figure_style import BLUE, COLUMN, dress
+from proxytune.report import figure_style as style
 from proxytune.report.html import write_page
-from proxytune.report.study.sentence import say_answer, say_next_step
-from proxytune.report.study.tables import INFORMATION, MEASURES, SEARCH, THETA, USEFULNESS, study_tables, trials_table
-from proxytune.report.view import Drawn, Foot, Paragraphs, Part, Picture, View, foot_of
-from proxytune.report.wording import short
-from proxytune.report.writing import ABOUT, picture_of
+from proxytune.report.study.sentence import known_parameters, say_answer, say_next_step, study_sentence
+from proxytune.report.text import file_texts, group_texts, latex_text, section_text
+from proxytune.report.view import Column, Drawn, Foot, Paragraphs, Part, Picture, Table, View, columns_of, foot_of
+from proxytune.report.wording import fixed, listed, pairs_span, percent, plain, probability, short, span, with_span
+from proxytune.report.writing import ABOUT, picture_of, write_text
 from proxytune.storage import TrialRecord
-from proxytune.study import LEARNING, StudyResult, StudySettings
+from proxytune.study import LEARNING, PRPV, StudyResult, StudySettings
+from proxytune.usefulness import LEFT_OUT, PAIRED, PERFECT
+
+Rows = list[tuple[str, ...]]
+THETA, USEFULNESS, INFORMATION, SEARCH = (
+    "Parameters",
+    "Usefulness at the best θ (lower is better; 95 % intervals)",
+    "What informs each parameter",
+    "Search",
+)
+IN_SEARCH, MISFIT = "  in search", "misfit (p)"
+AGENTS, METRICS = 2, 1
+"""Numbers of agents and metrics that are named of those that inform a parameter most."""
+MEASURES = ("prpv", "ppv")
+
+
+def study_text(result: StudyResult, spent: str, files: Mapping[str, Any]) -> Group:
+    """The result of a study as `study` prints it: one sentence, then one table per subject, a fact a row.
+
+    Args:
+        result: What it has found.
+        spent: Episodes and seconds of this run.
+        files: What was written.
+    """
+    sections = [part for table in study_tables(result, spent).values() for part in section_text(table)]
+    return group_texts(study_sentence(result), *sections, *file_texts(files))
+
+
+def study_tables(result: StudyResult, spent: str = "") -> dict[str, Table]:
+    """Tables by title: what is known of θ, how useful the proxy is there, what informs each parameter, the search.
+
+    Args:
+        result: What the study has found.
+        spent: Episodes and seconds of this run, if it is told.
+    """
+    informed = information_table(result)
+    tables = (theta_table(result), usefulness_table(result), informed, search_table(result, spent))
+    return {table.title: table for table in tables if table.rows}
+
+
+def theta_table(result: StudyResult) -> Table:
+    """A row per parameter, then the shares of the box that are left; the truth has a column only where it is known."""
+    share, as_good = result.knowledge.as_good
+    truth, rows = result.truth, Rows()
+    for known, box in zip(known_parameters(result), result.study.settings.space.intervals, strict=True):
+        low, high = known.interval
+        true = None if truth is None else truth.get(known.name)
+        outside = "" if true is None or low <= true <= high else " (outside)"
+        best, inner = f"{short(known.best, 4)} {known.unit}".strip(), span(known.interval)
+        told = () if truth is None else ("" if true is None else f"{short(true, 4)}{outside}",)
+        beside = (span(as_good[known.name]), f"{short(box.low)} to {short(box.high)}")
+        rows.append((known.name, best, inner if known.identified else "unidentified", *told, *beside))
+    left = percent(result.knowledge.posterior.share)
+    rows.append(("share of the box", "", left, *(() if truth is None else ("",)), percent(share), ""))
+    heads = ("best", "95 % interval", *(() if truth is None else ("truth",)), "by PRPV alone", "box")
+    return Table(THETA, columns_of(("parameter",), heads), tuple(rows), tuple(_theta_notes(result)))
+
+
+def _theta_notes(result: StudyResult) -> list[str]:
+    """Notes on what the table of θ does not hold, most needed first."""
+    space, learnt = result.study.settings.space, result.knowledge
+    notes = []
+    if learnt.unidentified:
+        few = f"{len(result.trials) + result.earlier} trials exclude almost no value of"
+        names = listed(list(map(plain, learnt.unidentified)))
+        notes.append(f"{few} {names}; unidentified: the interval fills more than 0.9 of the range")
+    if not result.inside:
+        notes.append("the best θ by PRPV is outside the 95 % region, which uses every metric of every agent")
+    if result.truth is not None and set(space.names) <= set(result.truth):
+        holds = learnt.holds(space.values(result.truth))
+        notes.append(f"the 95 % region {'contains' if holds else 'does not contain'} the truth")
+    notes += [
+        f"{plain(one)} and {plain(other)} trade off: a change of one makes up for the other "
+        f"(correlation {fixed(correlation, 1)})"
+        for one, other, correlation in sorted(learnt.trades, key=lambda pair: -abs(pair[2]))
+    ]
+    return [*notes, *result.cautions]
+
+
+def usefulness_table(result: StudyResult) -> Table:
+    """PRPV on fresh episodes and in the search, the noise floor, chance, PPV, and whether the model fits.
+
+    Its notes are not what the sentence says already, nor advice on the options of `score`.
+    """
+    own, chance, expected = result.best.assessment, result.judged.chance, result.expected
+    rows = [*_objective_rows(result), *_prpv_rows(result), *_level_rows(result)]
+    as_low = f"a random ranking; as low: {probability(chance.p_value)}"
+    rows.append(("  chance", fixed(chance.mean, 1), f"± {fixed(chance.deviation, 1)}", as_low))
+    meaning = "proxy predictivity value: error of the scores"
+    if expected and expected.ppv:
+        found, (value, low, high) = expected.ppv, expected.ppv.value
+        more = f"; a perfect proxy's {with_span(*found.floor)}" if found.floor else ""
+        rows.append(("PPV", f"{value:.3g}", f"{short(low)} to {short(high)}", meaning + more))
+    elif own.ppv.value is not None:
+        rows.append(("PPV", f"{own.ppv.value:.3g}", "", meaning))
+    misfit = result.knowledge.misfit
+    if misfit.p_value is None:
+        few = "too few complete trials to test whether any θ explains the target's scores"
+        rows.append((MISFIT, "–", "", few))
+    else:
+        fits = "some θ may explain" if misfit.fits else "no θ explains"
+        rows.append((MISFIT, f"{misfit.p_value:.2g}", "", f"{fits} the target's scores"))
+    columns = (*columns_of(("measure",), ("value", "interval")), Column("meaning"))
+    notes = tuple(note for note in result.judged.notes if note not in (PAIRED, PERFECT, LEFT_OUT))
+    return Table(USEFULNESS, columns, tuple(rows), notes)
+
+
+def _objective_rows(result: StudyResult) -> Rows:
+    """The study's objective at the best θ, in the search and on fresh episodes; nothing where it is PRPV."""
+    objective, value = result.study.objective, result.value_of(result.best.trial)
+    if objective == PRPV or value is None:
+        return []
+    rows: Rows = [(objective.label, f"{value:.4g}", "", "the objective, in the search's own episodes")]
+    scores = result.confirmation.answer.scores if result.confirmation else ()
+    fresh = [objective.sign * score for score in scores if score is not None]
+    return [*rows, ("  fresh", f"{sum(fresh) / len(fresh):.4g}", "", "on fresh episodes")] if fresh else rows
+
+
+def _prpv_rows(result: StudyResult) -> Rows:
+    """PRPV that is expected of the best θ, that of the fresh episodes that chose it, and of the search's own."""
+    own, confirmation, expected = result.best.assessment, result.confirmation, result.expected
+    pairs = f"wrongly ordered pairs, 0 to {own.prpv.range[1]}"
+    value = str(own.prpv.value)
+    if confirmation is None:
+        return [("PRPV", value, "", f"{pairs}; the search's own episodes")]
+    if expected is None:
+        failed = "none on fresh episodes: an agent failed in all of them"
+        return [("PRPV", "–", "", failed), (IN_SEARCH, value, "", pairs)]
+    optimism, others = confirmation.answer.optimism or 0.0, len(confirmation.candidates) - 1
+    luck = f"{optimism:.3g} lower by luck" if optimism > 0.0 else "no optimism"
+    rivals = f"; {others} runner{'' if others == 1 else 's'}-up re-run as well" if others else ""
+    count = f"in {expected.repetitions} more run{'s' if expected.repetitions > 1 else ''}"
+    told = fixed(expected.prpv.value.value, 0), pairs_span(*expected.prpv.value[1:])
+    return [("PRPV", *told, f"{pairs}; expected, {count}"), (IN_SEARCH, value, "", f"{luck}{rivals}")]
+
+
+def _level_rows(result: StudyResult) -> Rows:
+    """What a perfect proxy scores and how much more is expected of this one; what the simulator as it is scores."""
+    floor, excess, nominal = result.floor, result.excess, result.nominal
+    rows = Rows()
+    if floor.value is not None and floor.low is not None and floor.high is not None:
+        meaning = floor.meaning if result.expected is None else "what a perfect proxy scores against this target"
+        rows.append((f"  {floor.title}", fixed(floor.value, 0), pairs_span(floor.low, floor.high), meaning))
+    if excess:
+        told = "more than a perfect proxy" if excess.low > 0.0 else "more than a perfect proxy; may be none"
+        rows.append(("  excess", fixed(excess.value, 0), pairs_span(*excess[1:]), told))
+    if nominal:
+        level = nominal.expected.prpv.value
+        rows.append(("  nominal", fixed(level.value, 0), pairs_span(*level[1:]), "the simulator as it is"))
+    return rows
+
+
+def information_table(result: StudyResult) -> Table:
+    """A row for every parameter of which the scores hold information, with shares of Fisher's information."""
+
+    def largest(shares: Sequence[tuple[str, float]], count: int) -> str:
+        return ", ".join(f"{name} {percent(share)}" for name, share in shares[:count] if share >= 0.005)
+
+    rows = tuple(
+        (one.name, agents, largest(one.metrics, METRICS), one.limit)
+        for one in result.knowledge.information
+        if (agents := largest(one.agents, AGENTS))
+    )
+    return Table(INFORMATION, columns_of(("parameter", "most informative agents", "metric", "limited by")), rows)
+
+
+def search_table(result: StudyResult, spent: str = "") -> Table:
+    """Trials and why they ended, the pre-flight, trials stopped early, what PRPV depends on, what failed."""
+    count, budget = len(result.trials), result.study.settings.budget
+    number = f"{count} (budget {budget})" if count > budget else f"{count} of {budget}"
+    ended = f"; ended: {result.stopped}" if result.stopped else ""
+    best = f"trial {result.best.trial.number}" if result.best.trial.number else "a θ that no trial visited"
+    rows: Rows = [("trials", f"{number}; best: {best}{ended}")]
+    if result.earlier:
+        rows.append(("earlier", f"{result.earlier} trials of {', '.join(result.study.settings.learn_from)}"))
+    if result.low_fidelity:
+        names = ", ".join(result.study.settings.low_fidelity)
+        rows.append(("low fidelity", f"{result.low_fidelity} trials of {names}, corrected by this proxy's"))
+    if result.preflight is not None:
+        warnings = [line.removeprefix("pre-flight: ") for line in result.preflight.warnings]
+        every = ["every parameter changes some metric beyond noise"]
+        rows += [("pre-flight", line) for line in warnings or every]
+    if result.pruned:
+        episodes, seconds = result.spared
+        trials = f"{len(result.pruned)} trial{'' if len(result.pruned) == 1 else 's'} that could not be the best"
+        rows.append(("stopped early", f"{trials}; saved {episodes} episodes ({seconds:.3g} s)"))
+    ordered = sorted(result.importances, key=lambda one: -one.share)
+    shares = [f"{one.name} {one.share:.2f} ({one.interval[0]:.2f} to {one.interval[1]:.2f})" for one in ordered]
+    rows.append(("Sobol index", f"total, of PRPV over the box: {', '.join(shares)}"))
+    if result.failed_episodes:
+        failed = sum(trial.state == "failed" for trial in result.trials)
+        lost = f", and with them {failed} of {count} trials" if failed else ""
+        head = f"{result.failed_episodes} of {result.episodes} episodes{lost}; the first:"
+        rows += [("failed", head), *(("", line) for line in result.failures)]
+    if spent:
+        rows.append(("episodes", spent))
+    return Table(SEARCH, columns_of(("", "")), tuple(rows))
+
+
+def trials_table(trials: Sequence[TrialRecord], names: Sequence[str], measures: Sequence[str] = MEASURES) -> Table:
+    """Every trial that has ended: its θ, in the order of these names, and its measures, the first of which counts."""
+    rows = Rows()
+    for trial in trials:
+        first, *others = (trial.measures.get(name) for name in measures)
+        counts = "failed" if first is None else f"{first:g}"
+        if trial.bound is not None:
+            counts = f"stopped early, at least {trial.bound:g}"
+        theta = (f"{trial.theta[name]:.4g}" for name in names)
+        beside = ("" if value is None else f"{value:.3g}" for value in others)
+        rows.append((str(trial.number), *theta, counts, *beside, str(trial.failed_episodes)))
+    heads = ("trial", *names, *(name.upper() for name in measures), "failed episodes")
+    return Table("Trials", columns_of((), heads), tuple(rows))
+
+
+def write_study_tables(result: StudyResult, trials: pd.DataFrame, folder: Path) -> list[Path]:
+    """Write trials.csv, and as LaTeX parameters.tex and usefulness.tex; their paths.
+
+    Args:
+        result: What the study has found.
+        trials: One row per trial.
+        folder: Where to.
+
+    Raises:
+        RunError: If one cannot be written.
+    """
+    write_text(folder / "trials.csv", trials.to_csv(lineterminator="\n"))
+    for name, table, width in (
+        ("parameters.tex", theta_table(result), None),
+        ("usefulness.tex", usefulness_table(result), 3),
+    ):
+        heads = [one.name for one in table.columns]
+        write_text(folder / name, latex_text(heads[:width], [row[:width] for row in table.rows]))
+    return [folder / name for name in ("trials.csv", "parameters.tex", "usefulness.tex")]
+
 
 RENEW_S = 5
 WAIT = "wait for the end, which brings intervals and figures; `python -m proxytune plot` draws them as of now."
@@ -122,11 +358,10 @@ def _say_best(trials: Sequence[TrialRecord], measure: str) -> str:
 
 
 def _trials_figure(trials: Sequence[TrialRecord], measure: str) -> Figure:
-    figure = Figure(figsize=(COLUMN, 2.2), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = style.one_panel(2.2)
     points = [(trial.number, value) for trial in trials if (value := trial.measures.get(measure)) is not None]
-    axes.plot([number for number, _ in points], [value for _, value in points], "o", color=BLUE, markersize=4)
+    axes.plot([number for number, _ in points], [value for _, value in points], "o", color=style.BLUE, markersize=4)
     axes.set_xlim(0.5, len(trials) + 0.5)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    dress(axes, "trial", measure.upper())
+    style.dress(axes, "trial", measure.upper())
     return figure

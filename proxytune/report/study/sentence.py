@@ -5,19 +5,7 @@ from dataclasses import dataclass
 from math import ceil
 
 from proxytune.diagnosis import MOTION_EFFECTS
-from proxytune.report.wording import (
-    Ends,
-    digits,
-    fixed,
-    in_pairs,
-    listed,
-    pairs_span,
-    percent,
-    plain,
-    probability,
-    short,
-    span,
-)
+from proxytune.report.wording import as_known, in_pairs, listed, pairs_span, percent, plain, probability, short, span
 from proxytune.study import DEFAULT_FAMILY, StudyResult
 
 MOST_NAMED = 5
@@ -40,7 +28,7 @@ class KnownParameter:
     name: str
     unit: str
     best: float
-    interval: Ends
+    interval: tuple[float, float]
     share: float
     identified: bool
 
@@ -91,10 +79,9 @@ def _say_parameters(parameters: Sequence[KnownParameter]) -> str:
 
 def _say_value(parameter: KnownParameter) -> str:
     low, high = parameter.interval
-    places = digits(parameter.interval)
-    inside = low <= parameter.best <= high
-    ends = span(parameter.interval, places) if inside else f"95 % region: {span(parameter.interval, places)}"
-    return f"{plain(parameter.name)} {fixed(parameter.best, places)}{parameter.unit and ' ' + parameter.unit} ({ends})"
+    region = "" if low <= parameter.best <= high else "95 % region: "
+    best = f"{as_known(parameter.best, parameter.interval)} {parameter.unit}".rstrip()
+    return f"{plain(parameter.name)} {best} ({region}{span(parameter.interval)})"
 
 
 def _say_usefulness(result: StudyResult) -> str:

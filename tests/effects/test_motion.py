@@ -25,14 +25,11 @@ RATE_HZ = 60.0
 PATCH = SlipperyPatch(0.5, 1.0, 0.0, 0.3)
 
 
-def test_a_robot_across_a_slope_slides_downhill_by_the_push():
+def test_a_robot_across_a_slope_slides_downhill_by_the_push_and_one_at_rest_nowhere():
     (along,) = filtered(FloorSlope(0.1, 0.0, 0.5), [[0.4, 0.0, 0.0]])
     np.testing.assert_allclose(along, (0.3, 0.0, 0.0), atol=1e-12)
     (across,) = filtered(FloorSlope(0.1, 0.0, 0.5), [[0.4, 0.0, 0.0]], headings=(np.pi / 2,))
     np.testing.assert_allclose(across, (0.4, 0.05, 0.0), atol=1e-12)
-
-
-def test_a_robot_at_rest_slides_nowhere():
     np.testing.assert_array_equal(filtered(FloorSlope(0.1, 0.1, 1.0), [[0.0, 0.0, 1.0]]), [[0.0, 0.0, 1.0]])
 
 

@@ -161,9 +161,8 @@ def square(tiles=3, tile=TILE, **paint):
     """A square loop of so many tiles along a side."""
     edge = (Straight((tiles - 2) * tile), Arc(tile / 2, 90.0))
     begin = ((tiles - 0.5) * tile, tile, 90.0)
-    return replace(
-        ROAD, size=(tiles * tile,) * 2, begin=begin, segments=edge * 4, width=tile, paint=replace(ROAD.paint, **paint)
-    )
+    size, paint = (tiles * tile,) * 2, replace(ROAD.paint, **paint)
+    return replace(ROAD, size=size, begin=begin, segments=edge * 4, width=tile, paint=paint)
 
 
 def texel(floor, x):

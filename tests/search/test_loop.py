@@ -45,14 +45,6 @@ def test_the_points_of_a_batch_all_differ_and_a_smaller_batch_begins_as_a_larger
     assert batch[0] == proposer.propose(SPACE, finished, 2)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("engine", HERE)
-def test_the_points_of_a_batch_differ_also_where_the_best_is_at_a_corner(engine):
-    proposer = make_proposer(engine, 3, WHOLE)
-    finished = search(proposer, 8, seed=1, score=lambda values: -100 * values[0] - values[1])
-    assert len(set(propose_batch(proposer, SPACE, finished, 1, 4))) == 4
-
-
 @pytest.mark.parametrize("engine", HERE)
 def test_a_batch_of_the_design_is_the_design_also_while_all_has_failed(engine):
     proposer = make_proposer(engine, 6, WHOLE)

@@ -13,12 +13,13 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
+from one_line import complaint_of
 
 from proxytune.domain import make_episode
 from proxytune.driving import AGENTS, METRICS, read_robot
 from proxytune.environments import CAR_LANE_FOLLOWING, LANE_FOLLOWING
 from proxytune.environments.lane_following import LaneFollowingEnv
-from proxytune.errors import EpisodeError, InputError, SettingsError
+from proxytune.errors import EpisodeError, InputError
 
 pytest.importorskip("gymnasium")
 
@@ -68,10 +69,7 @@ def test_gymnasiums_checker_finds_nothing_to_warn_of(plant):
 @pytest.mark.parametrize(
     ("plant", "camera", "agent"),
     [
-        ("bullet", "ground_plane", "daredevil"),
-        ("bullet", "ground_plane", "smooth"),
-        ("planar", "ground_plane", "daredevil"),
-        ("planar", "ground_plane", "smooth"),
+        *((plant, "ground_plane", agent) for plant in ("bullet", "planar") for agent in ("daredevil", "smooth")),
         pytest.param("bullet", "renderer", "smooth", marks=pytest.mark.slow),
     ],
 )
@@ -149,10 +147,8 @@ def test_a_model_makes_it_the_target(tmp_path):
     model.write_text('format = 1\nrobot = "duckiebot"\nplant = "planar"\n[effects.trim]\ntrim = 0.2\n')
     modelled = LaneFollowingEnv(model=model, start=1, seconds=3.0)
     assert modelled.family.plant == "planar"
-    poses = [
-        episode_of(env, [(0.4, 0.4)] * 20, seed=0)[-1][1]["pose"]
-        for env in (modelled, make(theta={"trim": 0.2}, start=1))
-    ]
+    both = (modelled, make(theta={"trim": 0.2}, start=1))
+    poses = [episode_of(env, [(0.4, 0.4)] * 20, seed=0)[-1][1]["pose"] for env in both]
     np.testing.assert_array_equal(*poses)
 
 
@@ -290,10 +286,7 @@ def test_cameras_of_many_theta_do_not_pile_up():
     ],
 )
 def test_a_mistake_is_one_line(keys, says):
-    with pytest.raises((InputError, SettingsError)) as caught:
-        make(**keys)
-    assert says in str(caught.value)
-    assert "\n" not in str(caught.value)
+    assert says in complaint_of(lambda: make(**keys))
 
 
 @pytest.mark.parametrize(
@@ -306,9 +299,7 @@ def test_a_mistake_is_one_line(keys, says):
     ],
 )
 def test_a_mistake_in_the_options_is_one_line(options, says):
-    with pytest.raises(InputError) as caught:
-        make().reset(options=options)
-    assert says in str(caught.value)
+    assert says in complaint_of(lambda: make().reset(options=options))
 
 
 def test_an_action_that_is_no_command_is_refused_with_its_time():
@@ -338,7 +329,7 @@ def test_two_steps_never_share_a_picture():
 
 
 def printed(code):
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     return done.stdout.strip(), done.stderr
 
 
@@ -356,9 +347,8 @@ def test_gymnasium_makes_it(code):
 
 def test_without_gymnasium_it_says_what_to_install():
     _, errors = printed("import sys; sys.modules['gymnasium'] = None; import proxytune.environments")
-    assert errors.splitlines()[-1].endswith(
-        'gymnasium is not installed; pip install ".[gym]" in the checkout of proxytune'
-    )
+    remedy = 'pip install ".[gym]" in the checkout of proxytune'
+    assert errors.splitlines()[-1].endswith(f"gymnasium is not installed; {remedy}")
 
 
 def test_importing_proxytune_does_not_import_gymnasium():

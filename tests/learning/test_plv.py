@@ -197,10 +197,8 @@ def test_a_grid_from_few_samples_on_has_no_place_twice_and_none_before_the_first
     grid = (0, first, 8, 64, 512)
     spending = AdaptiveDesign("none", grid, 4, 12)
     scores = np.array([[np.nan, 1.0, 5.0, 30.0, 50.0], [np.nan, 3.0, 9.0, 35.0, 49.0]])
-    curves = {
-        "none": LearningCurve(grid, scores),
-        "proxy": LearningCurve(grid, np.where(np.isnan(scores), 0.0, scores + 1.0)),
-    }
+    taught = LearningCurve(grid, np.where(np.isnan(scores), 0.0, scores + 1.0))
+    curves = {"none": LearningCurve(grid, scores), "proxy": taught}
     found = sample_needs(curves, none="none", best_score=60.0, tolerance=5.0, draws=300)
     chosen = next_examinations(found, list(curves), spending)
     assert len(set(chosen)) == len(chosen) == spending.batch

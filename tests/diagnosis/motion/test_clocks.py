@@ -14,11 +14,9 @@ from clock_rates import planted
 from planted import ROBOT, TRUTH, driven_log, planted_drives, planted_log, with_poses
 from project import ROOT
 
-from proxytune.diagnosis import cut, increments
-from proxytune.diagnosis.motion import clocks as splitting, clocks as thinning
+from proxytune.diagnosis import cut, increments, robot_of
+from proxytune.diagnosis.motion import clocks as thinning
 from proxytune.diagnosis.motion.clocks import (
-    BLOCKS,
-    TEST_BLOCK_S,
     cut_into_blocks,
     cut_out_long_rests,
     join_increments,
@@ -122,12 +120,14 @@ def test_what_a_drive_does_in_its_last_seconds_is_no_second_jump_far_off():
     np.testing.assert_allclose([jump.by_s for jump in jumps], [-0.3] * 4, atol=0.02)
 
 
-def test_a_jump_too_small_for_its_latencies_alone_is_told_by_the_step_of_the_poses():
-    one = planted("jump", 154, hidden=False)
+@pytest.mark.parametrize("number", [154, *(pytest.param(number, marks=pytest.mark.slow) for number in (22, 23))])
+def test_a_jump_is_told_where_latencies_alone_show_too_little_and_where_it_leaves_little_of_a_drive(number):
+    """By the step of the poses: that of 154 is 0.05 s early in double noise. Else by what other drives say."""
+    one = planted("jump", number, hidden=False)
     (jump,) = read_clocks(hidden.make_log(one.case, late_s=one.late_s), ROBOT).jumps
-    assert (one.case.noise, one.by_s, f"{one.drive:02d}") == ("double", -0.05, jump.drive)
-    assert jump.time_s == pytest.approx(one.at_s, abs=2.0)
-    assert jump.by_s == pytest.approx(-0.05, abs=0.015)
+    assert jump.drive == f"{one.drive:02d}"
+    assert jump.time_s == pytest.approx(one.at_s, abs=2.0 if number == 154 else 4.0)
+    assert jump.by_s == pytest.approx(one.by_s, abs=0.015 if number == 154 else 0.02)
 
 
 def test_poses_that_step_alone_are_no_jump_of_the_clock():
@@ -173,31 +173,22 @@ def test_one_drive_that_grows_late_is_no_drift_of_the_clock():
     assert clocks(0.003 * DRIFTING * (np.arange(6) == 3)[:, None]).drift.value == 0.0
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("number", [22, 23])
-def test_a_jump_that_leaves_little_of_a_drive_is_clear_beside_what_the_others_say(number):
-    one = planted("jump", number, hidden=False)
-    (jump,) = read_clocks(hidden.make_log(one.case, late_s=one.late_s), ROBOT).jumps
-    assert jump.drive == f"{one.drive:02d}"
-    assert jump.time_s == pytest.approx(one.at_s, abs=4.0)
-    assert jump.by_s == pytest.approx(one.by_s, abs=0.02)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("effect", [0, 12, 17, 21, 24])
-def test_hidden_effects_are_no_clock_problem(effect):
-    assert not clocks(0.0, hidden.IN_FORM[effect]).differ
+@pytest.mark.parametrize(
+    "name",
+    [
+        "slew_rate rise 0.4",
+        "yaw_lag time_constant 0.25",
+        *(pytest.param(hidden.IN_FORM[number].name, marks=pytest.mark.slow) for number in (0, 12, 17, 21, 24)),
+    ],
+)
+def test_hidden_effects_are_no_clock_problem_even_a_lag_that_is_another_in_every_manoeuvre(name):
+    (case,) = (case for case in hidden.IN_FORM if case.name == name)
+    assert not clocks(0.0, case).differ
 
 
 @pytest.mark.parametrize("theta", [{"delay": 0.3}, {"delay": 0.5, "motor_lag.time_constant": 0.8}, {"delay": 0.0}])
 def test_a_slow_or_late_robot_is_no_clock_problem(theta):
     assert not read_clocks(planted_log({"trim": 0.03, **theta}, episodes=4, seconds=40.0), ROBOT).differ
-
-
-@pytest.mark.parametrize("name", ["slew_rate rise 0.4", "yaw_lag time_constant 0.25"])
-def test_a_lag_that_is_another_in_every_manoeuvre_is_no_clock_problem(name):
-    (case,) = (case for case in hidden.IN_FORM if case.name == name)
-    assert not clocks(0.0, case).differ
 
 
 def test_a_drive_that_repeats_itself_is_no_clock_problem():
@@ -286,8 +277,6 @@ def test_another_log_of_the_same_robot_is_put_on_the_same_latency():
 def test_measured_logs_are_on_one_clock(name):
     if not (LOGS / name).is_dir():
         pytest.skip(f"the measured log {name} is not here: it is not part of the project")
-    from proxytune.diagnosis import robot_of
-
     log = read_log(LOGS / name)
     assert not read_clocks(log, robot_of(log)).differ
 
@@ -384,11 +373,11 @@ def test_there_are_enough_blocks_to_leave_out_and_none_is_tiny(episodes, seconds
     for drives in split(planted_log(TRUTH, episodes=episodes, seconds=seconds), ROBOT, None):
         numbers = np.unique(drives.block)
         np.testing.assert_array_equal(numbers, np.arange(len(numbers)))
-        assert len(numbers) >= min(BLOCKS, drives.seconds / TEST_BLOCK_S) * 0.6
+        assert len(numbers) >= min(thinning.BLOCKS, drives.seconds / thinning.TEST_BLOCK_S) * 0.6
         for block in numbers:
             own = drives.block == block
             assert len(np.unique(drives.episode[own])) == 1
-            assert (drives.last[own].max() - drives.first[own].min()) / drives.tick_hz > 0.9 * TEST_BLOCK_S
+            assert (drives.last[own].max() - drives.first[own].min()) / drives.tick_hz > 0.9 * thinning.TEST_BLOCK_S
             assert not drives.linked[own][0]
 
 
@@ -406,7 +395,7 @@ def test_half_of_the_measured_motion_not_of_the_time_is_fitted():
 def test_of_very_many_drives_no_more_are_tested_on_than_needed_spread_over_all(monkeypatch):
     log = planted_log(TRUTH, episodes=36, seconds=10.0)
     whole = split(log, ROBOT, None).tested
-    monkeypatch.setattr(splitting, "MOST_TESTED_S", 60.0)
+    monkeypatch.setattr(thinning, "MOST_TESTED_S", 60.0)
     some = split(log, ROBOT, None).tested
     assert (len(whole.duties), len(some.duties)) == (12, 7)
     kept = [int(np.flatnonzero((whole.headings == own).all(axis=1))[0]) for own in some.headings]

@@ -6,21 +6,11 @@ from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
+import runs
 from calibrated import Calibrated
 from judgement import Judgement, Reading, judge, judgement_from, judging_code
 from problems import Analytic
-from runs import (
-    Run,
-    RunKey,
-    estimate,
-    judged_again,
-    median_curve,
-    read_runs,
-    run_document,
-    run_engine,
-    run_from,
-    summarise,
-)
+from runs import Run, RunKey, estimate, read_runs, run_document, run_engine, run_from, summarise
 
 from proxytune.search import Trial, engine_of, fit_surrogate, from_unit, learn_theta, unit_points
 from proxytune.search.engine import design_point
@@ -146,7 +136,7 @@ def test_a_run_judged_again_proposes_nothing_and_forgets_the_old_judgement(monke
     run = run_engine(Analytic(), KEY, SOBOL)
     stale = replace(run, judgement=replace(run.judgement, answer=(0.0,), code="old"))
     monkeypatch.setattr("runs.make_proposer", None)
-    assert judged_again(Analytic(), stale, SOBOL) == run
+    assert runs.judged_again(Analytic(), stale, SOBOL) == run
 
 
 def test_the_saving_is_paired_by_seed_and_a_run_beyond_the_budget_counts_as_one_more():
@@ -203,8 +193,8 @@ def test_an_interval_covers_the_truth_about_as_often_as_it_says():
 
 
 def test_the_curve_is_the_median_of_the_lowest_so_far_within_its_band():
-    runs = [made("gp", seed, regrets) for seed, regrets in enumerate([[9.0, 1.0], [7.0, 8.0], [5.0, 2.0]])]
-    middle, low, high = median_curve(runs)
+    three = [made("gp", seed, regrets) for seed, regrets in enumerate([[9.0, 1.0], [7.0, 8.0], [5.0, 2.0]])]
+    middle, low, high = runs.median_curve(three)
     assert middle.tolist() == [7.0, 2.0]
     assert (low <= middle).all()
     assert (middle <= high).all()

@@ -4,18 +4,17 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from proxytune.driving import AGENTS, Agent, GroundPlaneCamera, draw_floor, load_agent, read_robot, shipped_map
-from proxytune.driving.agents import (
-    Braitenberg,
-    EdgePilot,
-    Laggy,
-    LanePilot,
-    Leaning,
-    Smoothed,
-    Wary,
-    act_together,
-    duties,
+from proxytune.driving import (
+    AGENTS,
+    Agent,
+    GroundPlaneCamera,
+    agents as pilots,
+    draw_floor,
+    load_agent,
+    read_robot,
+    shipped_map,
 )
+from proxytune.driving.agents import Laggy, LanePilot, Leaning, Smoothed, Wary, act_together, duties
 from proxytune.driving.optics import parted
 from proxytune.driving.perception import Markings, Seen, find_lanes, open_eye
 from proxytune.errors import ExtensionError
@@ -56,8 +55,8 @@ MORE = {
     "eager": LanePilot(speed=0.2, offset_gain=8.0, slope_gain=2.0, contrast=0.0, brightness=0.0, reach_m=0.9),
     "blind": LanePilot(speed=0.2, offset_gain=8.0, slope_gain=2.0, contrast=300.0, brightness=255.0),
     "nested": Laggy(Wary(Smoothed(LanePilot(0.3, 8.0, 2.0, contrast=60.5), 0.3), contrast=99.0, crisp=9.0), steps=2),
-    "leaning_edges": Leaning(EdgePilot(speed=0.3, gain=4.0, step=20.5, first_row=0.1), bias=0.4),
-    "pushed": Braitenberg(speed=0.3, push=4.0, first_row=0.0),
+    "leaning_edges": Leaning(pilots.EdgePilot(speed=0.3, gain=4.0, step=20.5, first_row=0.1), bias=0.4),
+    "pushed": pilots.Braitenberg(speed=0.3, push=4.0, first_row=0.0),
 }
 
 

@@ -10,18 +10,11 @@ import pytest
 from one_line import complaint_of
 
 from proxytune.domain import make_episode
-from proxytune.driving import (
-    BulletPlant,
-    drivetrain,
-    has_pybullet,
-    lane_following,
-    lane_pose,
-    read_robot,
-    shipped_map,
-)
+from proxytune.driving import BulletPlant, drivetrain, has_pybullet, lane_following, read_robot, shipped_map
 from proxytune.driving.agents import AGENTS, AtTheWheel, throttle_and_steering
 from proxytune.driving.episode import driving_score
 from proxytune.driving.expert import lesson_driver
+from proxytune.driving.lane import lane_pose
 from proxytune.driving.plants import PlanarPlant, check_body
 from proxytune.driving.road import Arc
 from proxytune.driving.robot import catalogue_of, read_model_of

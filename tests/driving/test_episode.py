@@ -15,23 +15,11 @@ from hypothesis import given, settings, strategies as st
 from one_line import complaint_of
 
 from proxytune.domain import make_episode
-from proxytune.driving import (
-    METRICS,
-    TICK_HZ,
-    BulletPlant,
-    LaneFollowing,
-    bullet as worlds,
-    drivetrain,
-    lane_following,
-    lane_length,
-    off_map,
-    read_robot,
-    score_trajectory,
-    shipped_map,
-    start_pose,
-)
-from proxytune.driving.episode import driving_score
-from proxytune.driving.plants import PlanarPlant, integrate
+from proxytune.driving import METRICS, TICK_HZ, BulletPlant, LaneFollowing, bullet as worlds, lane_following, read_robot
+from proxytune.driving.episode import driving_score, score_trajectory, start_pose
+from proxytune.driving.lane import lane_length, off_map
+from proxytune.driving.maps import shipped_map
+from proxytune.driving.plants import PlanarPlant, drivetrain, integrate
 from proxytune.effects import CATALOGUE, PARAMETERS, FilterContext, Stage, effects_from, theta_names
 from proxytune.errors import EpisodeError, SettingsError
 from proxytune.settings import Section

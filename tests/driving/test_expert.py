@@ -13,23 +13,11 @@ import pytest
 from one_line import complaint_of
 
 from proxytune.domain import BatchClassroom, Classroom, DomainFamily, OnPolicyClassroom, make_episode
-from proxytune.driving import (
-    TICK_HZ,
-    Course,
-    Expert,
-    LaneFollowing,
-    Sight,
-    drive,
-    lane_following,
-    lane_point,
-    off_map,
-    read_robot,
-    shipped_map,
-    start_pose,
-)
-from proxytune.driving.episode import driving_score
+from proxytune.driving import TICK_HZ, Expert, LaneFollowing, drive, lane_following, read_robot, shipped_map
+from proxytune.driving.episode import Course, Sight, driving_score, start_pose
 from proxytune.driving.expert import MEMORY, Pupil
 from proxytune.driving.fleet import only
+from proxytune.driving.lane import lane_point, off_map
 from proxytune.driving.plants import PlanarPlant
 from proxytune.effects import Stage, stage_chain
 from proxytune.errors import EpisodeError

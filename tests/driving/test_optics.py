@@ -9,15 +9,8 @@ from hypothesis import given, settings, strategies as st
 from nominal_camera import CAMERA, loop_poses
 from one_line import complaint_of
 
-from proxytune.driving import (
-    COLOURS,
-    GroundPlaneCamera,
-    cameras as ground_plane,
-    draw_floor,
-    ground_points,
-    shipped_map,
-)
-from proxytune.driving.optics import CAMERA_CHANNELS, SKY, lens_rays
+from proxytune.driving import COLOURS, GroundPlaneCamera, cameras as ground_plane, draw_floor, shipped_map
+from proxytune.driving.optics import CAMERA_CHANNELS, SKY, ground_points, lens_rays
 from proxytune.driving.road_picture import Floor
 
 NOMINAL = replace(CAMERA, columns=64, rows=48)

@@ -17,29 +17,10 @@ from hypothesis import given, settings, strategies as st
 from one_line import complaint_of
 
 from proxytune.domain import make_episode
-from proxytune.driving import (
-    COLOURS,
-    TICK_HZ,
-    Course,
-    Expert,
-    Road,
-    Sight,
-    draw_floor,
-    drive,
-    lane_following,
-    lane_length,
-    lane_point,
-    lane_pose,
-    map_names,
-    off_map,
-    read_map,
-    read_robot,
-    robot_names,
-    score_trajectory,
-    shipped_map,
-)
-from proxytune.driving.episode import driving_score
-from proxytune.driving.lane import corners
+from proxytune.driving import COLOURS, TICK_HZ, Expert, Road, draw_floor, drive, lane_following, read_robot, robot_names
+from proxytune.driving.episode import Course, Sight, driving_score, score_trajectory
+from proxytune.driving.lane import corners, lane_length, lane_point, lane_pose, off_map
+from proxytune.driving.maps import map_names, read_map, shipped_map
 from proxytune.driving.road import Arc, Paint, Straight, length
 from proxytune.effects import Stage, stage_chain
 from proxytune.errors import SettingsError

@@ -8,19 +8,10 @@ import numpy as np
 import pytest
 from one_line import complaint_of
 
-from proxytune.driving import (
-    CAMERA,
-    UNITS,
-    BulletPlant,
-    drivetrain,
-    lane_following,
-    read_robot,
-    robot as module,
-    robot_from_geometry,
-    robot_names,
-)
-from proxytune.driving.plants import PlanarPlant
-from proxytune.driving.robot import REQUIRED
+from proxytune.driving import CAMERA, UNITS, lane_following, read_robot, robot as module, robot_names
+from proxytune.driving.bullet import BulletPlant
+from proxytune.driving.plants import PlanarPlant, drivetrain
+from proxytune.driving.robot import REQUIRED, robot_from_geometry
 from proxytune.effects import FilterContext, Stage, effects_from, theta_names
 from proxytune.errors import ExtensionError, SettingsError
 from proxytune.files import shipped

@@ -9,17 +9,9 @@ import pytest
 from filtered import filtered
 
 from proxytune.driving import read_robot
-from proxytune.effects import (
-    CAR_CATALOGUE,
-    CATALOGUE,
-    PARAMETERS,
-    Blur,
-    FilterContext,
-    Stage,
-    effects_from,
-    stage_chain,
-)
+from proxytune.effects import CAR_CATALOGUE, CATALOGUE, PARAMETERS, Blur, FilterContext, Stage, effects_from
 from proxytune.effects.command import CommandQuantisation, Delay
+from proxytune.effects.model import stage_chain
 from proxytune.effects.motors import DriverMap, MotorLag
 from proxytune.space import Parameter
 from proxytune.testing.effect import Subject, check_effect

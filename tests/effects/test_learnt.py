@@ -12,23 +12,10 @@ from hypothesis import given, settings, strategies as st
 from one_line import complaint_of
 
 from proxytune.driving import read_robot
-from proxytune.effects import (
-    GROUPS,
-    OF_PLACE,
-    FilterContext,
-    FittedRange,
-    Learnt,
-    LearntCommands,
-    LearntCurve,
-    Model,
-    effects_from,
-    learnt_effect,
-    learnt_theta,
-    model_text,
-    read_model,
-)
+from proxytune.effects import GROUPS, OF_PLACE, FilterContext, LearntCommands, LearntCurve, effects_from
 from proxytune.effects.features import MOTION_GROUPS
-from proxytune.effects.learnt import LABEL
+from proxytune.effects.learnt import LABEL, FittedRange, Learnt, learnt_effect, learnt_theta
+from proxytune.effects.model import Model, model_text, read_model
 from proxytune.effects.motion import pose_after
 from proxytune.errors import SettingsError
 from proxytune.testing.effect import Subject, _claim_chunks, _claim_filter

@@ -13,18 +13,8 @@ from hypothesis import given, strategies as st
 from one_line import complaint_of
 
 from proxytune.errors import LogError
-from proxytune.importing import Wanted
-from proxytune.importing.bag import (
-    Stamps,
-    bags_in,
-    choose_times,
-    form_of,
-    is_bag,
-    open_bag,
-    read_commands,
-    read_poses,
-    seconds,
-)
+from proxytune.importing import Wanted, bag as bag_module
+from proxytune.importing.bag import Stamps, bags_in, choose_times, is_bag, open_bag, read_commands, read_poses, seconds
 from proxytune.importing.topics import read_bag
 
 TIMES = 1.7e9 + np.arange(30) * 0.1
@@ -46,7 +36,7 @@ def test_a_bag_is_known_by_its_file_or_folder(tmp_path, storage):
     assert bags_in(bag) == {"run" if storage == "ros1" else "run.bag": bag}
     with open_bag(bag) as opened:
         assert len(opened.topics) == 2
-    assert form_of(bag) == {"ros1": "ROS 1 bag"}.get(storage, f"ROS 2 bag ({storage})")
+    assert bag_module.form_of(bag) == {"ros1": "ROS 1 bag"}.get(storage, f"ROS 2 bag ({storage})")
 
 
 def test_other_files_and_folders_are_no_bags(tmp_path):

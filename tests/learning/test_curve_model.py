@@ -11,17 +11,9 @@ from hypothesis import given, settings, strategies as st
 from sklearn.gaussian_process.kernels import Matern
 
 from proxytune.errors import InputError
-from proxytune.learning import (
-    AdaptiveDesign,
-    LearningCurve,
-    curves_of,
-    doublings,
-    first_examinations,
-    next_examinations,
-    sample_needs,
-    teaching_value,
-)
+from proxytune.learning import AdaptiveDesign, LearningCurve, doublings
 from proxytune.learning.curve_model import Examined, _matern, counts_at, crossing, draw_curves, fit_curve_model
+from proxytune.learning.plv import curves_of, first_examinations, next_examinations, sample_needs, teaching_value
 
 GRID = (0, 50, 100, 200, 400, 800, 1600, 3200)
 STARTS, BEST, NONE, TOLERANCE = 10, 60.0, "none", 5.0

@@ -23,18 +23,8 @@ from wobbly import Wobbly
 
 from proxytune.domain import Demonstration, make_episode
 from proxytune.errors import EpisodeError, LearnerError, StoreError
-from proxytune.learning import (
-    Cache,
-    Costs,
-    Distribution,
-    collect_samples,
-    examine_policy,
-    facts_digest,
-    learner_identity,
-    mix_samples,
-    policy_of,
-)
-from proxytune.learning.lessons import cost_saved, split_samples
+from proxytune.learning import Cache, Costs, Distribution, collect_samples, mix_samples, policy_of
+from proxytune.learning.lessons import cost_saved, examine_policy, facts_digest, learner_identity, split_samples
 from proxytune.learning.plv import plv
 from proxytune.learning.ridge import RandomFeatures
 

@@ -6,18 +6,8 @@ Examinations go where they tell most about PLV, by a rule that only the known sc
 import numpy as np
 import pytest
 
-from proxytune.learning import (
-    AdaptiveDesign,
-    Examination,
-    LearningCurve,
-    first_examinations,
-    mean_score,
-    more_needed,
-    next_examinations,
-    sample_needs,
-    teaching_value,
-)
-from proxytune.learning.plv import general_plv, plv
+from proxytune.learning import AdaptiveDesign, Examination, LearningCurve, first_examinations, mean_score
+from proxytune.learning.plv import general_plv, more_needed, next_examinations, plv, sample_needs, teaching_value
 
 GRID = (0, 100, 200, 400, 800)
 

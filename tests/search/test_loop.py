@@ -4,17 +4,9 @@ import pytest
 from hypothesis import given, strategies as st
 from steps import SPACE, WHOLE, search, steps
 
-from proxytune.search import (
-    ENGINE_NAMES,
-    Trial,
-    batch_at,
-    make_proposer,
-    propose_batch,
-    why_not,
-    with_failures_as_worst,
-)
+from proxytune.search import ENGINE_NAMES, Trial, batch_at, propose_batch, with_failures_as_worst
 from proxytune.search.engine import design_point
-from proxytune.search.registry import AfterDesign
+from proxytune.search.registry import AfterDesign, make_proposer, why_not
 from proxytune.search.surrogate import GaussianProcess
 
 HERE = [name for name in ENGINE_NAMES if not why_not(name, composed=True)]

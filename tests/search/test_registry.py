@@ -13,18 +13,9 @@ from one_line import complaint_of
 from steps import SPACE, WHOLE, lacking, search, steps
 
 from proxytune.errors import InputError, to_install
-from proxytune.search import (
-    ENGINE_NAMES,
-    ENGINES,
-    Trial,
-    code_of,
-    engine_code,
-    engine_of,
-    make_proposer,
-    registry,
-    why_not,
-)
+from proxytune.search import ENGINE_NAMES, ENGINES, Trial, code_of, registry
 from proxytune.search.engine import AfterDesign, design_point
+from proxytune.search.registry import engine_code, engine_of, make_proposer, why_not
 from proxytune.testing.extension import check_engine
 
 

@@ -22,16 +22,8 @@ from proxytune.report.teaching import observation_lines
 from proxytune.running import Silent
 from proxytune.storage import Store
 from proxytune.study import StudyRun, open_study, read_study_settings
-from proxytune.teaching import (
-    Experiment,
-    TeacherResult,
-    load_setup,
-    observe,
-    predictivity,
-    run_experiment,
-    teach_families,
-)
-from proxytune.teaching.experiment import agreement, judge_curves
+from proxytune.teaching import load_setup, observe, predictivity, teach_families
+from proxytune.teaching.experiment import Experiment, TeacherResult, agreement, judge_curves, run_experiment
 
 NAMES = ("low", "middle", "high")
 SURE = np.tile([1.0, 2.0, 3.0], (200, 1))

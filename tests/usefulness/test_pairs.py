@@ -13,23 +13,11 @@ from score_tables import bootstrap_prpv, of_means, table_of
 
 from proxytune.errors import ScoresError
 from proxytune.scores import Metric, ScoreTable, read_domains
-from proxytune.usefulness import (
-    assess,
-    bootstrap_means,
-    compare,
-    dominance,
-    in_common,
-    pairs,
-    predictivity,
-    prpv_of_means,
-    resampling,
-    start_of,
-    starts_of,
-)
-from proxytune.usefulness.comparison import by_start, is_repeated, split_repeats, start_places
-from proxytune.usefulness.pairs import FlippedPair, prpv, stand
+from proxytune.usefulness import assess, compare, dominance, pairs, predictivity, resampling, start_of, starts_of
+from proxytune.usefulness.comparison import by_start, in_common, is_repeated, split_repeats, start_places
+from proxytune.usefulness.pairs import FlippedPair, prpv, prpv_of_means, stand
 from proxytune.usefulness.predictivity import kendall_of_means, mmrv_of_means
-from proxytune.usefulness.resampling import draw_counts
+from proxytune.usefulness.resampling import bootstrap_means, draw_counts
 
 M = [Metric("m")]
 

@@ -13,12 +13,7 @@ from planted import DECLARED, NOISE, TRUTH, driven_log, drives_of, fitted, plant
 
 from proxytune.diagnosis import MOTION_EFFECTS, RULES, AdoptedEffect, Findings, Ratio, cut, pose_errors
 from proxytune.diagnosis.motion import effect_size as likeness
-from proxytune.diagnosis.motion.effect_size import (
-    WeighedEffect,
-    drop_negligible,
-    find_robot_clusters,
-    invisible_effects,
-)
+from proxytune.diagnosis.motion.effect_size import drop_negligible, find_robot_clusters, invisible_effects
 from proxytune.diagnosis.motion.evidence import Variant
 from proxytune.diagnosis.motion.fitting import evaluate
 from proxytune.diagnosis.motion.innovations import Noise
@@ -159,7 +154,7 @@ def test_a_random_effect_matters_if_its_draws_make_up_the_error(size, matters):
 def without(*ratios):
     """An effect without which errors are so many times as large, one horizon each."""
     told = {float(horizon): Ratio(value, ends) for horizon, (value, *ends) in enumerate(ratios)}
-    return WeighedEffect(adopted("lateral_slip", SLIP), told)
+    return likeness.WeighedEffect(adopted("lateral_slip", SLIP), told)
 
 
 def test_an_effect_matters_if_at_some_horizon_the_error_without_it_is_clearly_larger():
@@ -189,9 +184,9 @@ def test_draws_do_not_matter_where_the_noise_of_poses_leaves_no_room_for_them():
 def test_draws_matter_only_where_more_than_one_horizon_shows_them():
     shown, hidden = Ratio(1.14, (1.03, 1.26)), Ratio(1.04, (1.0, 1.1))
     lossy = adopted("dropped_commands", names=("dropped_commands",))
-    assert not WeighedEffect(lossy, {1.0: hidden, 2.0: hidden, 5.0: shown}).material
-    assert WeighedEffect(lossy, {1.0: hidden, 2.0: shown, 5.0: shown}).material
-    assert WeighedEffect(lossy, {2.0: shown}).material
+    assert not likeness.WeighedEffect(lossy, {1.0: hidden, 2.0: hidden, 5.0: shown}).material
+    assert likeness.WeighedEffect(lossy, {1.0: hidden, 2.0: shown, 5.0: shown}).material
+    assert likeness.WeighedEffect(lossy, {2.0: shown}).material
 
 
 VISIBILITY_DECLARED = {"trim", "delay"}

@@ -11,25 +11,9 @@ import pytest
 from planted import NOISE, TRUTH, planted_drives
 
 from proxytune.diagnosis import HUBER, disturbed_increments, increments, wheel_speeds
+from proxytune.diagnosis.motion import innovations
 from proxytune.diagnosis.motion.drives import relative
-from proxytune.diagnosis.motion.innovations import (
-    FIRST_GUESS,
-    JITTER,
-    TURN_WEIGHT,
-    Noise,
-    arrived_commands,
-    clip_outliers,
-    expected_theta,
-    fit_noise,
-    huber,
-    increments_along,
-    integrate_twists,
-    lateness,
-    log_likelihood,
-    paths,
-    whitener,
-    window_paths,
-)
+from proxytune.diagnosis.motion.innovations import Noise, fit_noise, integrate_twists, paths, whitener, window_paths
 from proxytune.driving.plants import integrate
 
 
@@ -65,8 +49,8 @@ def dense(drives, noise):
         )
         jacobian[:, column] = (there - back).ravel() / 2e-6
     white = np.tile(np.square((noise.pose[0], noise.pose[0], noise.pose[1])), len(poses))
-    way = drives.travel[:, 0] + TURN_WEIGHT * drives.travel[:, 1]
-    drive = np.square(noise.drive) * way[:, None] + JITTER
+    way = drives.travel[:, 0] + innovations.TURN_WEIGHT * drives.travel[:, 1]
+    drive = np.square(noise.drive) * way[:, None] + innovations.JITTER
     return jacobian @ np.diag(white) @ jacobian.T + np.diag(drive.ravel())
 
 
@@ -87,7 +71,7 @@ def test_the_log_likelihood_is_the_gaussian_one_where_nothing_is_an_outlier(few)
     errors = 0.3 * whiten.colour(np.random.default_rng(2).standard_normal(3 * len(few.episode)))
     flat = errors.ravel()
     wanted = -0.5 * flat @ np.linalg.solve(covariance, flat) - 0.5 * np.linalg.slogdet(covariance)[1]
-    assert log_likelihood(errors, whiten) == pytest.approx(wanted, rel=1e-5)
+    assert innovations.log_likelihood(errors, whiten) == pytest.approx(wanted, rel=1e-5)
 
 
 TENFOLD = Noise((0.2, 0.1, 0.8), (0.02, 0.05))
@@ -96,7 +80,7 @@ TENFOLD = Noise((0.2, 0.1, 0.8), (0.02, 0.05))
 @pytest.mark.parametrize(
     ("drive", "pose"), [((0.03, 0.015, 0.2), (0.003, 0.008)), ((0.01, 0.02, 0.05), (0.0015, 0.004))]
 )
-@pytest.mark.parametrize("start", [FIRST_GUESS, TENFOLD])
+@pytest.mark.parametrize("start", [innovations.FIRST_GUESS, TENFOLD])
 def test_planted_noise_is_found_again_from_a_start_ten_times_too_large_as_well(drives, drive, pose, start):
     z = np.random.default_rng(3).standard_normal(3 * len(drives.episode))
     found = fit_noise(drives, whitener(drives, Noise(drive, pose)).colour(z), start)
@@ -113,8 +97,9 @@ def test_the_innovations_of_a_model_that_is_right_are_white():
 
 def test_outliers_count_linearly_and_their_slope_is_cut():
     z = np.linspace(-8.0, 8.0, 1601)
-    np.testing.assert_allclose(np.gradient(huber(z), z)[1:-1], clip_outliers(z)[1:-1], atol=0.01)
-    assert np.diff(huber(np.array([HUBER, 5.0, 6.0, 7.0])))[1:].tolist() == [HUBER, HUBER]
+    slope = np.gradient(innovations.huber(z), z)
+    np.testing.assert_allclose(slope[1:-1], innovations.clip_outliers(z)[1:-1], atol=0.01)
+    assert np.diff(innovations.huber(np.array([HUBER, 5.0, 6.0, 7.0])))[1:].tolist() == [HUBER, HUBER]
 
 
 RICH = {
@@ -142,7 +127,7 @@ def test_increments_are_the_differences_of_paths(replayed, theta):
         episode, first, last = (int(row[index]) for row in (replayed.episode, replayed.first, replayed.last))
         step = relative(walked[episode, first], walked[episode, last])
         np.testing.assert_array_equal(increments(replayed, theta)[index], step)
-    np.testing.assert_array_equal(increments(replayed, theta), increments_along(replayed, walked))
+    np.testing.assert_array_equal(increments(replayed, theta), innovations.increments_along(replayed, walked))
 
 
 def test_the_model_that_drove_says_what_was_measured(replayed):
@@ -212,8 +197,8 @@ def test_nothing_measured_after_a_windows_start_changes_it(replayed):
     ],
 )
 def test_random_effects_make_commands_late_by_their_mean(theta, late):
-    assert lateness(theta, 20.0) == pytest.approx(late)
-    calm = expected_theta({"trim": 0.02, "delay": 0.1, **theta}, 20.0)
+    assert innovations.lateness(theta, 20.0) == pytest.approx(late)
+    calm = innovations.expected_theta({"trim": 0.02, "delay": 0.1, **theta}, 20.0)
     assert calm == pytest.approx({"trim": 0.02, "delay": 0.1 + late})
 
 
@@ -224,11 +209,11 @@ def test_the_mean_lateness_is_that_of_drawn_drives():
         return np.square(drawn.measured - increments(drawn, {"trim": TRUTH["trim"], "delay": delay}))[:, 0].sum()
 
     best = min(np.arange(0.1, 0.18, 0.004), key=strays)
-    assert best == pytest.approx(TRUTH["delay"] + lateness({"dropped_commands": 0.3}, 20.0), abs=0.012)
+    assert best == pytest.approx(TRUTH["delay"] + innovations.lateness({"dropped_commands": 0.3}, 20.0), abs=0.012)
 
 
 def test_a_random_effect_without_a_declared_delay_is_late_from_nothing():
-    assert expected_theta({"delay_jitter": 0.1}, 20.0) == {"delay": 0.05}
+    assert innovations.expected_theta({"delay_jitter": 0.1}, 20.0) == {"delay": 0.05}
 
 
 def test_what_is_added_to_the_twists_moves_the_robot(replayed):
@@ -240,8 +225,8 @@ def test_what_is_added_to_the_twists_moves_the_robot(replayed):
 
 
 def test_wheels_and_arrived_commands_have_the_shape_of_duties(replayed):
-    assert wheel_speeds(replayed, RICH).shape == arrived_commands(replayed, RICH).shape == replayed.duties.shape
-    late = arrived_commands(replayed, {"delay": 0.2})
+    arrived, late = (innovations.arrived_commands(replayed, theta) for theta in (RICH, {"delay": 0.2}))
+    assert wheel_speeds(replayed, RICH).shape == arrived.shape == replayed.duties.shape
     np.testing.assert_allclose(late[:, 12:], replayed.duties[:, :-12], atol=1e-9)
 
 

@@ -88,9 +88,7 @@ def test_runs_that_other_code_has_judged_are_judged_again_and_not_run_again(docu
     assert json.loads(capsys.readouterr().out)["engines"] == document["engines"]
 
 
-def test_some_of_the_seeds_are_summed_up_and_those_that_are_there_not_run_again(
-    document, tmp_path, capsys, monkeypatch
-):
+def test_some_of_the_seeds_are_summed_up_and_those_there_are_not_run_again(document, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(runs, "run_engine", lambda objective, key, engine: pytest.fail(f"seed {key.seed} is run"))
     assert compare("analytic", *FEW[:2], "--seeds", "1:2:1", *FEW[4:], "--output", tmp_path / "out", "--json") == 0
     assert json.loads(capsys.readouterr().out)["engines"] == document["engines"]

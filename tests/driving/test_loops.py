@@ -93,9 +93,8 @@ def test_an_episode_is_the_same_without_numba(compiled, tmp_path, monkeypatch, p
 
 def test_numpy_does_it_where_numba_is_told_not_to_compile():
     code = "from proxytune.driving.loops import by_numba; print(by_numba().__name__)"
-    told = subprocess.check_output(
-        [sys.executable, "-c", code], env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, text=True
-    )
+    off = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
+    told = subprocess.check_output([sys.executable, "-c", code], env=off, text=True)
     assert told == "proxytune.driving.loops\n"
 
 

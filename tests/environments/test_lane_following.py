@@ -30,9 +30,9 @@ make = functools.partial(LaneFollowingEnv, plant="planar", seconds=3.0)
 
 
 def episode_of(env, commands, **reset):
-    """Reset, then every step of some commands until the episode is over."""
+    """Reset, then every step of some commands, or by those of a shipped agent, until the episode is over."""
     steps = [(*env.reset(**reset), 0.0, False, False)]
-    for command in commands:
+    for command in answers_of(AGENTS[commands], steps) if isinstance(commands, str) else commands:
         picture, reward, terminated, truncated, info = env.step(command)
         steps.append((picture, info, reward, terminated, truncated))
         if terminated or truncated:
@@ -40,15 +40,12 @@ def episode_of(env, commands, **reset):
     return steps
 
 
-def driven_by(env, name, **reset):
-    """The episode that a shipped agent drives."""
-    agent, steps = AGENTS[name], [(*env.reset(**reset), 0.0, False, False)]
+def answers_of(agent, steps):
+    """An agent's answers to the last of some steps."""
     memory = agent.begin(read_robot("duckiebot"))
-    while not (steps[-1][3] or steps[-1][4]):
+    while True:
         command, memory = agent.act(steps[-1][0], memory)
-        picture, reward, terminated, truncated, info = env.step(command)
-        steps.append((picture, info, reward, terminated, truncated))
-    return steps
+        yield command
 
 
 def worlds():
@@ -75,7 +72,7 @@ def test_gymnasiums_checker_finds_nothing_to_warn_of(plant):
 )
 def test_an_agent_drives_in_the_environment_as_in_a_study_to_the_last_bit(plant, camera, agent):
     env = make(plant=plant, camera=camera, theta=THETA, start=4)
-    steps = driven_by(env, agent, seed=11)
+    steps = episode_of(env, agent, seed=11)
     told = steps[0][1]
     episode = make_episode(told["theta"], agent=agent, start=told["start"], seed=told["episode_seed"])
     recording = env.family.record(episode)
@@ -88,14 +85,14 @@ def test_an_agent_drives_in_the_environment_as_in_a_study_to_the_last_bit(plant,
 @pytest.mark.parametrize("seconds", [2.0, 1.23])
 @pytest.mark.parametrize(("agent", "start"), [("daredevil", 0), ("drifter", 3), ("edges", 4)])
 def test_rewards_add_up_to_the_distance_that_a_study_scores(agent, start, seconds):
-    steps = driven_by(make(seconds=seconds, theta={"trim": 0.2}), agent, seed=start, options={"start": start})
+    steps = episode_of(make(seconds=seconds, theta={"trim": 0.2}), agent, seed=start, options={"start": start})
     assert sum(reward for _, _, reward, *_ in steps) == pytest.approx(steps[-1][1]["distance"], abs=1e-12)
     assert abs(steps[-1][1]["distance"]) > 0.05
 
 
 def test_info_until_now_is_what_a_study_would_score_had_it_ended_there():
-    steps = driven_by(make(seconds=2.0), "brisk", seed=3)
-    short = driven_by(make(seconds=1.0), "brisk", seed=3)
+    steps = episode_of(make(seconds=2.0), "brisk", seed=3)
+    short = episode_of(make(seconds=1.0), "brisk", seed=3)
     for name in ("distance", "survival_time", "deviation"):
         assert steps[20][1][name] == pytest.approx(short[-1][1][name], abs=1e-12)
     assert steps[20][1].keys() == {"pose", "distance", "survival_time", "deviation"}

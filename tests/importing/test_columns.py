@@ -71,11 +71,9 @@ def test_a_column_may_have_a_colon_in_its_name():
     assert split_unit("imu:x:mm", "length", ["imu:x"], "here") == ("imu:x", UNITS["mm"])
 
 
-@pytest.mark.parametrize(
-    ("stamp", "unit"), [(1.7e18, "ns"), (1.7e15, "us"), (1.7e12, "ms"), (1.7e9, None), (5.0, None)]
-)
-def test_stamps_since_1970_show_their_unit_by_their_size(stamp, unit):
-    assert epoch_unit(np.array([stamp, np.nan])) == (UNITS[unit] if unit else None)
+@pytest.mark.parametrize(("time", "unit"), [(1.7e18, "ns"), (1.7e15, "us"), (1.7e12, "ms"), (1.7e9, None), (5.0, None)])
+def test_stamps_since_1970_show_their_unit_by_their_size(time, unit):
+    assert epoch_unit(np.array([time, np.nan])) == (UNITS[unit] if unit else None)
 
 
 @pytest.mark.parametrize(

@@ -444,9 +444,7 @@ def test_the_switch_cuts_both_wheels_or_a_car_s_motor_and_leaves_its_steering(wr
     ],
 )
 def test_what_no_car_can_be_told_is_refused_with_its_cell(written, before, after, kind, said):
-    names = ",".join(COMMANDS[kind])
-    told = complaint(
-        written(CAR.replace("throttle,steering", names).replace(before, after), TOML.replace("twist", kind))
-    )
+    rows = CAR.replace("throttle,steering", ",".join(COMMANDS[kind])).replace(before, after)
+    told = complaint(written(rows, TOML.replace("twist", kind)))
     assert told.startswith("/samples.csv: line 2")
     assert said in told

@@ -59,11 +59,8 @@ def test_counts_become_a_row_a_rollout(file, text):
 
 
 def test_standard_errors_are_read_from_cells_and_from_a_column(file):
-    for text in (
-        "policy,success\na,0.61 ± 0.05\nb,20 % +/- 4 %\n",
-        "policy,success,success se\na,0.61,0.05\nb,0.2,0.04\n",
-    ):
-        table = read_scores(file(text), ["success"])
+    for text in ("success\na,0.61 ± 0.05\nb,20 % +/- 4 %\n", "success,success se\na,0.61,0.05\nb,0.2,0.04\n"):
+        table = read_scores(file(f"policy,{text}"), ["success"])
         assert np.allclose(table.means[:, 0], [0.61, 0.2])
         assert np.allclose(table.errors[:, 0], [0.05, 0.04])
 

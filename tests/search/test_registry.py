@@ -74,9 +74,7 @@ def test_studies_of_one_engine_outlast_an_edit_of_another_engine(tmp_path, monke
 FAKES = Path(__file__).parent.parent / "fakes"
 HAS_OPTUNA = importlib.util.find_spec("optuna") is not None
 LONG = ("gp", "composite")
-HERE = [
-    pytest.param(name, marks=[pytest.mark.skipif(bool(lacking(name)), reason=lacking(name))]) for name in ENGINE_NAMES
-]
+HERE = [pytest.param(e, marks=[pytest.mark.skipif(bool(lacking(e)), reason=lacking(e))]) for e in ENGINE_NAMES]
 
 
 def made(engine, initial):

@@ -44,10 +44,8 @@ def test_without_effects_pictures_are_those_of_the_domain_s_camera(tmp_path):
     theta = {"camera_roll": 3.0, "camera_pitch": 21.0}
     instance = family.instance(theta)
     figures = robot.camera_figures()
-    views = scenes()[0]
-    views = replace(
-        views, tracks=still(poses), optics=replace(views.optics, rows=figures.rows, columns=figures.columns)
-    )
+    optics = replace(scenes()[0].optics, rows=figures.rows, columns=figures.columns)
+    views = replace(scenes()[0], tracks=still(poses), optics=optics)
     mine = draw_pictures(views, at_truth(views, theta), {}, FRAMES)
     np.testing.assert_array_equal(mine, instance.camera.render(poses))
     assert make_episode(theta, agent="none", start=0, seed=1).theta

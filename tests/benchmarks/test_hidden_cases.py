@@ -7,6 +7,7 @@ from pathlib import Path
 import hidden_cases as hidden
 import numpy as np
 import pytest
+import second_hidden_cases as second
 from bullet_cases import BULLET, make_bullet_log
 from hidden_cases import CLEAN, IN_FORM, OTHER_FORM, OUTSIDE, PAIRS, Case, make_log
 from manoeuvres import Drives, make_drives
@@ -248,8 +249,9 @@ def test_no_two_cases_share_a_name_or_a_seed():
     assert len(cases) == len(IN_FORM) + len(OTHER_FORM) + len(PAIRS) + len(OUTSIDE) + 40
 
 
-def test_a_log_is_twelve_minutes_of_20_rows_a_second_from_rest():
-    log = make_log(CLEAN[0], noiseless=True)
+@pytest.mark.parametrize("generator", [hidden, second])
+def test_a_log_is_twelve_minutes_of_20_rows_a_second_from_rest(generator):
+    log = generator.make_log(generator.CLEAN[0], noiseless=True)
     assert (log.robot, log.command, log.rate_hz, log.geometry, len(log.episodes)) == ("duckiebot", "duty", 20.0, {}, 12)
     for episode in log.episodes:
         np.testing.assert_allclose(episode.times, np.arange(1200) / 20)

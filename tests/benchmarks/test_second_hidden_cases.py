@@ -273,15 +273,6 @@ def test_every_case_says_what_is_right_or_what_its_effect_depends_on_and_half_ar
     assert {case.noise for case in CASES.values()} == set(NOISES)
 
 
-def test_a_log_is_twelve_minutes_of_20_rows_a_second():
-    log = make_log(CLEAN[0])
-    assert (log.robot, log.command, log.rate_hz, log.geometry, len(log.episodes)) == ("duckiebot", "duty", 20.0, {}, 12)
-    for episode in log.episodes:
-        np.testing.assert_allclose(episode.times, np.arange(1200) / 20)
-        assert episode.commands.shape == (1200, 2)
-        assert episode.poses.shape == (1200, 3)
-
-
 @pytest.mark.parametrize("name", ["second exponential_jitter mean 0.06", "second gusts", "second clean 3"])
 def test_the_same_seed_gives_the_same_log_and_another_seed_another(name):
     case, short = {**CASES, **{case.name: case for case in CLEAN}}[name], {"episodes": 2, "seconds": 5.0}

@@ -524,15 +524,11 @@ def test_an_episode_that_ends_at_once_has_survived_for_no_time():
     assert result == nothing | {"deviation": pytest.approx(0.05), "early_offset": pytest.approx(0.05)}
 
 
-def zig_zag(amplitude):
+def test_a_zig_zag_across_the_lanes_edges_counts_only_what_is_in_it():
     """Ten seconds up the outer lane's right side, a sine aside."""
     y = np.linspace(TILE, 2 * TILE, 601)
-    x = OUTER[0] - amplitude * np.sin((y - TILE) / TILE * 4 * pi)
-    return np.column_stack((x, y, np.arctan2(np.gradient(y), np.gradient(x))))
-
-
-def test_a_zig_zag_across_the_lanes_edges_counts_only_what_is_in_it():
-    result = score(zig_zag(0.15))
+    x = OUTER[0] - 0.15 * np.sin((y - TILE) / TILE * 4 * pi)
+    result = score(np.column_stack((x, y, np.arctan2(np.gradient(y), np.gradient(x)))))
     inside = 1 - 2 / pi * math.acos(ROAD.lane_width / 2 / 0.15)
     assert result["distance"] == pytest.approx(inside * TILE, abs=0.002)
     assert result["time_out_of_lane"] == pytest.approx((1 - inside) * 10, abs=0.04)

@@ -130,13 +130,6 @@ def test_a_policy_is_asked_only_when_a_picture_is_new():
     assert len(asked) == 15
 
 
-def fails(answer, when):
-    def policy(picture):
-        return answer(picture) if when(picture) else np.full(2, 0.3)
-
-    return policy
-
-
 def lost(picture):
     raise ValueError(f"lost at {picture.mean():.6f}")
 
@@ -150,7 +143,7 @@ def batch(policy):
 def test_a_policy_that_fails_is_told_as_if_one_episode_followed_the_other(form, answer):
     room, what = classroom(plant="planar", seconds=2.0), episodes(3)
     first = room.instance({}).camera.render(room.course(what[0], 2.0).start[None])[0].mean()
-    late = form(fails(answer, lambda picture: abs(picture.mean() - first) > 0.5))
+    late = form(lambda picture: answer(picture) if abs(picture.mean() - first) > 0.5 else np.full(2, 0.3))
     with pytest.raises(EpisodeError) as one_by_one:
         [room.examine(one, late) for one in what]
     with pytest.raises(EpisodeError) as together:

@@ -8,7 +8,7 @@ import dataclasses
 import functools
 import hashlib
 import re
-from math import pi
+from math import pi, remainder
 from pathlib import Path
 
 import numpy as np
@@ -192,10 +192,6 @@ points = st.tuples(coordinates, coordinates)
 ways = st.floats(-12.0, 20.0)
 
 
-def wrapped(way, lap):
-    return np.mod(way + lap / 2, lap) - lap / 2
-
-
 def lane(road, outer, spacing=0.002):
     """Points, and headings from each to the next, of a lane's centre line."""
     lap = float(lane_length(road, outer))
@@ -217,7 +213,7 @@ def test_the_point_so_far_along_a_lane_is_seen_so_far_along_it(road, outer, alon
     assert pose.counter_clockwise == outer
     assert pose.deviation == pytest.approx(0, abs=1e-11)
     assert pose.heading_error == pytest.approx(0, abs=1e-4)
-    assert wrapped(pose.along - along, lane_length(road, outer)) == pytest.approx(0, abs=1e-9)
+    assert remainder(pose.along - along, lane_length(road, outer)) == pytest.approx(0, abs=1e-9)
 
 
 @every_road

@@ -169,10 +169,6 @@ def texel(floor, x):
     return int((x - floor.origin) * floor.pixels_per_metre)
 
 
-def colour_at(floor, x, y):
-    return tuple(int(value) for value in floor.pixels[texel(floor, y), texel(floor, x)])
-
-
 def cover(floor, colour):
     """How much of each texel is painted in a colour that lies on asphalt."""
     asphalt, paint = (np.array(COLOURS[name], dtype=float) for name in ("asphalt", colour))
@@ -222,7 +218,7 @@ def along_bend(road, radius, off_centre):
     middle = 2.5 * TILE - radius
     angles = np.radians(np.linspace(2.0, 88.0, 400))
     points = middle + (radius + off_centre) * np.stack((np.cos(angles), np.sin(angles)), axis=1)
-    return np.array([colour_at(floor, *point) for point in points])
+    return np.array([floor.pixels[texel(floor, y), texel(floor, x)] for x, y in points])
 
 
 @pytest.mark.parametrize("radius", [BEND_RADIUS, TILE / 2])

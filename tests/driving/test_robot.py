@@ -21,10 +21,6 @@ ROBOT = read_robot("duckiebot")
 BODY = ET.parse(ROBOT.urdf).getroot()
 
 
-def origin(joint):
-    return [float(v) for v in BODY.find(f"joint[@name='{joint}']/origin").get("xyz").split()]
-
-
 def stated(name):
     return read_settings(shipped("robots") / name / "robot.toml").values
 

@@ -78,12 +78,9 @@ def integrate_twists(twists, tick_s, heading):
     return np.array(poses)
 
 
-def begin(effect, batch=(), headings=0.4):
-    return effect.begin(FilterContext(RATE_HZ, np.zeros((*batch, 3)), ROBOT.figures, headings=np.array([headings])))
-
-
 def run(effect, signal):
-    return effect.apply(signal, begin(effect))[0]
+    setting = FilterContext(RATE_HZ, np.zeros(3), ROBOT.figures, headings=np.array([0.4]))
+    return effect.apply(signal, effect.begin(setting))[0]
 
 
 @pytest.mark.parametrize("effect", EFFECTS)

@@ -165,9 +165,6 @@ def test_a_useless_parameter_costs_and_a_needed_one_pays(drives):
     assert gain(needed) == pytest.approx(0.5 * 0.04 * (model.slopes[:, 1] ** 2).sum(), rel=0.3)
 
 
-NOMINAL = {"trim": 0.0, "delay": 0.15}
-
-
 @pytest.fixture(scope="module")
 def log():
     return planted_log({"trim": 0.03, "delay": 0.12}, episodes=4, seconds=40.0)
@@ -175,7 +172,7 @@ def log():
 
 def test_an_honest_log_is_let_through(log):
     fitting.check_motion("yard", drives_of(log))
-    fitting.check_units("yard", drives_of(log), NOMINAL)
+    fitting.check_units("yard", drives_of(log), {"trim": 0.0, "delay": 0.15})
 
 
 def test_a_robot_that_is_never_told_to_move_is_refused(log):

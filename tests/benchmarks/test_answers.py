@@ -13,13 +13,11 @@ from proxytune.study import StudyRun, open_study
 
 def row(seed, own, found, away):
     """A truth whose PRPV and that of its answer are so, with an answer so far away in the first parameter."""
-    point = [0.5, 0.5]
+    point, both = [0.5, 0.5], {"truth": own, "answer": found}
     return {
         "seed": seed,
         "points": {"truth": point, "answer": [0.5 + away, 0.5], "mode": point, "mean": point},
-        "scores": {
-            name: {"known": [one] * 2, "held out": [2 * one] * 2} for name, one in (("truth", own), ("answer", found))
-        },
+        "scores": {name: {"known": [one] * 2, "held out": [2 * one] * 2} for name, one in both.items()},
         "expected": [found, 3.5, 100.0],
         "visited": seed > 1,
         "holds": seed > 1,
@@ -46,9 +44,7 @@ def small(monkeypatch):
     monkeypatch.setattr(answers, "HELD_OUT", ("agent4", "agent5"))
     monkeypatch.setattr(answers, "REPEATS", 2)
     # On so few agents PRPV is mostly 0.
-    monkeypatch.setattr(
-        answers, "prpv_of_means", lambda several, target, _: np.array([away(x, target) for x in several])
-    )
+    monkeypatch.setattr(answers, "prpv_of_means", lambda some, target, _: np.array([away(x, target) for x in some]))
 
 
 def away(one, other):

@@ -20,6 +20,7 @@ from hypothesis import given, strategies as st
 
 from proxytune.driving import COLOURS, CameraFigures, GroundPlaneCamera, draw_floor, lane_pose, shipped_map
 from proxytune.driving.optics import lens_rays
+from proxytune.effects import PARAMETERS
 
 SMALL_LOOP = shipped_map("small_loop")
 STARTS = np.array(SMALL_LOOP.starts[:2]) * (1.0, 1.0, np.pi / 180.0)
@@ -72,32 +73,22 @@ def pictures(sight, poses, middles=None):
     still = np.ones((1, ROWS))
     middles = poses if middles is None else middles
     with Pinhole(sight, draw_floor(SMALL_LOOP), sky(), moves=middles is not poses) as pinhole:
-        return np.stack(
-            [pinhole.expose(middle, pose[None], still) for middle, pose in zip(middles, poses, strict=True)]
-        )
+        pairs = zip(middles, poses, strict=True)
+        return np.stack([pinhole.expose(middle, pose[None], still) for middle, pose in pairs])
 
 
 @given(
-    roll=st.floats(-8, 8),
-    pitch=st.floats(5, 35),
-    yaw=st.floats(-10, 10),
-    k1=st.floats(-0.3, 0.15),
-    right=st.floats(-0.15, 0.15),
-    down=st.floats(-0.15, 0.15),
-    aspect=st.floats(0.85, 1.15),
-    view=st.floats(60, 90),
+    camera_roll=st.floats(-8, 8),
+    camera_pitch=st.floats(5, 35),
+    camera_yaw=st.floats(-10, 10),
+    lens_distortion=st.floats(-0.3, 0.15),
+    centre_right=st.floats(-0.15, 0.15),
+    centre_down=st.floats(-0.15, 0.15),
+    pixel_aspect=st.floats(0.85, 1.15),
+    field_of_view=st.floats(60, 90),
 )
-def test_rays_are_those_of_the_figures_definitions(roll, pitch, yaw, k1, right, down, aspect, view):
-    sight = Sight(
-        camera_roll=roll,
-        camera_pitch=pitch,
-        camera_yaw=yaw,
-        lens_distortion=k1,
-        centre_right=right,
-        centre_down=down,
-        pixel_aspect=aspect,
-        field_of_view=view,
-    )
+def test_rays_are_those_of_the_figures_definitions(**figures_):
+    sight = Sight(**figures_)
     up = lens_rays(figures(sight), *PLACES)
     assert np.allclose(rays(sight, *PLACES), up * (1.0, 1.0, -1.0), atol=1e-9)
 
@@ -210,14 +201,10 @@ def test_outside_effects_and_light_change_the_picture_where_they_should():
 
 @pytest.mark.parametrize("name", CASES)
 def test_a_case_changes_nothing_but_what_it_names(name):
-    allowed = {
-        "lens_centre": {"lens_centre.right", "lens_centre.down"},
-        "exposure": {"exposure.gain", "exposure.gamma"},
-    }
     for seed in range(5):
         case = draw_case(name, seed)
         changed, outside = set(case.sight.theta), set(case.sight.outside)
-        assert changed <= set().union(*(allowed.get(effect, {effect}) for effect in case.effects))
+        assert {key.split(".")[0] for key in changed} <= set(case.effects)
         assert len(case.effects) == len({key.split(".")[0] for key in changed}) + len(outside)
 
 
@@ -233,8 +220,6 @@ def test_a_case_that_nobody_knows_is_refused_by_name():
 
 
 def test_figures_have_the_public_names():
-    from proxytune.effects import PARAMETERS
-
     known = {*PARAMETERS, "camera_forward", "lens_centre.right", "lens_centre.down", "pixel_aspect", "camera_latency"}
     known |= {"rolling_shutter", "defocus", "vignetting", "exposure.gain", "exposure.gamma", "image_noise"}
     assert set(Sight().figures) <= known

@@ -1,22 +1,14 @@
 """The comparison of engines as figure, tables, JSON and page."""
 
 import io
+from dataclasses import replace
 from io import BytesIO
 
+import compare_report
 import compared_engines
 import numpy as np
 import pytest
-from compare_report import (
-    PALETTE,
-    SHARED,
-    compare_document,
-    compare_figure,
-    compare_lines,
-    compare_tables,
-    compare_view,
-    looks_of,
-    verdict,
-)
+from compare_report import compare_document, compare_figure, compare_lines, compare_tables, looks_of, verdict
 from compared_engines import ENGINES, NAMES
 from judgement import Judgement, Reading
 from PIL import Image
@@ -58,7 +50,7 @@ def test_every_engine_is_named_at_the_end_of_its_line_and_no_two_names_overlap()
     together = [runs(engine, [9.0, 5.0 + number % 3, 3.0]) for number, engine in enumerate(NAMES)]
     figure = compare_figure(together, 1.0)
     figure.draw_without_rendering()
-    names = [text for text in figure.axes[0].texts if text.get_text() != SHARED]
+    names = [text for text in figure.axes[0].texts if text.get_text() != compare_report.SHARED]
     boxes = [text.get_window_extent() for text in names]
     assert [text.get_text() for text in names] == [*NAMES, "noise floor"]
     assert not any(one.overlaps(other) for row, one in enumerate(boxes) for other in boxes[:row])
@@ -84,7 +76,7 @@ def test_engines_that_nobody_knows_are_drawn_apart_from_those_that_come_along_an
 def test_a_look_that_cannot_be_drawn_is_one_of_the_palette(wish, monkeypatch):
     odd = Engine("odd", "odd", "proposes oddly", Sobol, look=wish)
     monkeypatch.setattr(compared_engines, "PEERS", (odd,))
-    assert looks_of(["odd"])["odd"] in PALETTE
+    assert looks_of(["odd"])["odd"] in compare_report.PALETTE
 
 
 def test_the_tables_tell_how_good_how_soon_and_what_is_known():
@@ -113,14 +105,9 @@ def test_the_tables_tell_how_good_how_soon_and_what_is_known():
 
 def test_a_verdict_needs_an_interval_clear_of_zero():
     found = summarise(SOBOL, GP, 1.0)
-    cases = {
-        (0.5, 3.0): "needs significantly fewer",
-        (-3.0, -0.5): "significantly more",
-        (-0.5, 3.0): "no significantly",
-    }
-    for (low, high), expected in cases.items():
-        vars_ = {**vars(found), "saved": Estimate(1.0, low, high)}
-        assert expected in verdict(type(found)(**vars_))
+    cases = ((0.5, 3.0, "needs significantly fewer"), (-3.0, -0.5, "significantly more"), (-0.5, 3.0, "no signific"))
+    for low, high, expected in cases:
+        assert expected in verdict(replace(found, saved=Estimate(1.0, low, high)))
 
 
 def test_the_document_names_the_default_and_gives_every_engine_a_verdict():
@@ -141,7 +128,7 @@ def page_of(*grouped, tolerance=1.0):
     image = BytesIO()
     Image.fromarray(np.zeros((4, 4, 3), np.uint8)).save(image, format="png")
     summaries = [summarise(one, grouped[0], tolerance) for one in grouped]
-    return compare_view("<script>", summaries, 3, image.getvalue())
+    return compare_report.compare_view("<script>", summaries, 3, image.getvalue())
 
 
 def test_the_answer_is_what_the_terminal_says_of_each_engine():

@@ -16,9 +16,7 @@ HERE = [
     for engine in PEERS
     for why in [why_not(engine.name, composed=True)]
 ]
-FROM_SCORES, FROM_OUTPUTS = (
-    [one for one in HERE if engine_of(one.id).learns_from == what] for what in ("scores", "outputs")
-)
+FROM_SCORES, FROM_OUTPUTS = ([e for e in HERE if engine_of(e.id).learns_from == what] for what in ("scores", "outputs"))
 
 
 @pytest.mark.parametrize("engine", HERE)

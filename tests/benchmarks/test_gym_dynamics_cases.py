@@ -27,18 +27,16 @@ def test_the_vehicle_itself_lags_by_a_fifth_of_a_second_ahead_and_a_quarter_in_t
 
 @pytest.mark.parametrize("case", gym.PHYSICS[3:], ids=lambda case: case.name)
 def test_every_variant_drives_otherwise(case):
-    one, other = (
-        gym.make_log(own, episodes=2, seconds=15.0, noiseless=True) for own in (case, replace(case, changes={}))
-    )
+    short = {"episodes": 2, "seconds": 15.0, "noiseless": True}
+    one, other = (gym.make_log(own, **short) for own in (case, replace(case, changes={})))
     away = [a.poses[:, :2] - b.poses[:, :2] for a, b in zip(one.episodes, other.episodes, strict=True)]
     assert np.isfinite(away).all()
     assert np.hypot(*np.concatenate(away).T).max() > 2e-3
 
 
 def test_a_driver_adds_a_step_that_never_turns_a_wheel_against_its_duty():
-    np.testing.assert_allclose(
-        gym._voltages(np.array([-0.5, -0.02, 0.0, 0.02, 0.5]), 0.9, 0.1), [-0.55, -0.118, 0.0, 0.118, 0.55]
-    )
+    told = gym._voltages(np.array([-0.5, -0.02, 0.0, 0.02, 0.5]), 0.9, 0.1)
+    np.testing.assert_allclose(told, [-0.55, -0.118, 0.0, 0.118, 0.55])
     np.testing.assert_allclose(gym._voltages(np.array([-0.5, 0.02]), 1.0, -0.05), [-0.45, 0.0])
 
 

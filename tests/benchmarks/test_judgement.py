@@ -6,21 +6,11 @@ from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
+import runs
 from calibrated import Calibrated
 from judgement import Judgement, Reading, judge, judgement_from, judging_code
 from problems import Analytic
-from runs import (
-    Run,
-    RunKey,
-    estimate,
-    judged_again,
-    median_curve,
-    read_runs,
-    run_document,
-    run_engine,
-    run_from,
-    summarise,
-)
+from runs import Run, RunKey, estimate, read_runs, run_document, run_engine, run_from, summarise
 
 from proxytune.search import Trial, engine_of, fit_surrogate, from_unit, learn_theta, unit_points
 from proxytune.search.engine import design_point
@@ -56,44 +46,31 @@ def test_the_reading_says_whether_region_and_intervals_hold_the_truth(judged, tr
     known, truth = learn_theta(OBJECTIVE.space, trials, OBJECTIVE.goal(SEED), SEED), OBJECTIVE.truth(SEED)
     assert judged.reading.holds == known.holds(truth)
     assert judged.reading.share == known.posterior.share
-    held = {
-        name: low <= value <= high for value, (name, (low, high)) in zip(truth, known.intervals.items(), strict=True)
-    }
-    assert judged.reading.intervals_hold == held
+    pairs = zip(truth, known.intervals.items(), strict=True)
+    assert judged.reading.intervals_hold == {name: low <= value <= high for value, (name, (low, high)) in pairs}
     assert (judged.reading.p_value, judged.reading.fits) == (known.misfit.p_value, known.misfit.fits)
 
 
 @pytest.mark.slow
 def test_a_truth_far_from_all_that_fits_is_not_held():
     class Elsewhere(Calibrated):
+        goal = staticmethod(OBJECTIVE.goal)
+
         def truth(self, seed):
             return from_unit(self.space, 1.0 - unit_points(4, 1, 9)[0])
 
-        def goal(self, seed):
-            return Calibrated().goal(seed)
-
-    apart = Elsewhere()
-    truths = [judge(apart, VISITED, seed, by_outputs=True).reading for seed in (1, 2, 3)]
+    truths = [judge(Elsewhere(), VISITED, seed, by_outputs=True).reading for seed in (1, 2, 3)]
     assert not all(reading.holds for reading in truths)
     assert not all(all(reading.intervals_hold.values()) for reading in truths)
 
 
 def test_without_parts_there_is_no_reading_and_without_a_truth_nothing_holds_it():
     class Unknown(Calibrated):
+        regret, goal = staticmethod(OBJECTIVE.regret), staticmethod(OBJECTIVE.goal)
+        score, fresh_score = staticmethod(OBJECTIVE.score), staticmethod(OBJECTIVE.fresh_score)
+
         def truth(self, seed):
-            return Calibrated().truth(seed) if self.name == "inner" else None
-
-        def regret(self, values, seed, lowest=math.inf):
-            return Calibrated().regret(values, seed)
-
-        def goal(self, seed):
-            return Calibrated().goal(seed)
-
-        def score(self, values, seed):
-            return Calibrated().score(values, seed)
-
-        def fresh_score(self, values, seed):
-            return Calibrated().fresh_score(values, seed)
+            return None
 
         def error(self, values, seed):
             return None
@@ -141,17 +118,16 @@ def made(engine, seed, regrets, answer_regret=0.0, error=0.1, reading=None):
     return Run(key, ((0.0,),) * len(regrets), 0.5, found)
 
 
-def test_a_run_is_a_function_of_its_key_but_for_the_time_it_took():
+def test_a_run_is_a_function_of_its_key_but_for_the_time_it_took_and_comes_back_from_json_as_it_was():
     runs = [replace(run_engine(Analytic(), KEY, SOBOL), seconds=0.0) for _ in range(2)]
-    assert runs[0] == runs[1]
+    assert runs[0] == runs[1] == run_from(json.loads(json.dumps(run_document(runs[0]))))
     assert len(runs[0].visited) == len(runs[0].judgement.regrets) == 12
 
 
 @pytest.mark.parametrize("engine", ["random", "gp"])
 def test_runs_of_one_seed_share_the_design_and_no_more(engine):
-    one, other = (
-        run_engine(Analytic(), replace(KEY, engine=name, budget=7), engine_of(name)) for name in ("sobol", engine)
-    )
+    keys = (replace(KEY, engine=name, budget=7) for name in ("sobol", engine))
+    one, other = (run_engine(Analytic(), key, engine_of(key.engine)) for key in keys)
     assert one.visited[:4] == other.visited[:4]
     assert one.visited != other.visited
 
@@ -160,12 +136,7 @@ def test_a_run_judged_again_proposes_nothing_and_forgets_the_old_judgement(monke
     run = run_engine(Analytic(), KEY, SOBOL)
     stale = replace(run, judgement=replace(run.judgement, answer=(0.0,), code="old"))
     monkeypatch.setattr("runs.make_proposer", None)
-    assert judged_again(Analytic(), stale, SOBOL) == run
-
-
-def test_a_run_comes_back_from_json_as_it_was():
-    run = run_engine(Analytic(), KEY, SOBOL)
-    assert run_from(json.loads(json.dumps(run_document(run)))) == run
+    assert runs.judged_again(Analytic(), stale, SOBOL) == run
 
 
 def test_the_saving_is_paired_by_seed_and_a_run_beyond_the_budget_counts_as_one_more():
@@ -217,16 +188,13 @@ def test_where_truth_is_not_known_nothing_is_said_to_hold_it():
 
 def test_an_interval_covers_the_truth_about_as_often_as_it_says():
     generator = np.random.default_rng(1)
-    hits = [
-        abs(found.value - 5.0) >= 0 and found.low <= 5.0 <= found.high
-        for found in (estimate(generator.normal(5.0, 2.0, 30), np.mean) for _ in range(100))
-    ]
-    assert 86 <= sum(hits) <= 100
+    found = [estimate(generator.normal(5.0, 2.0, 30), np.mean) for _ in range(100)]
+    assert 86 <= sum(one.low <= 5.0 <= one.high for one in found) < 100
 
 
 def test_the_curve_is_the_median_of_the_lowest_so_far_within_its_band():
-    runs = [made("gp", seed, regrets) for seed, regrets in enumerate([[9.0, 1.0], [7.0, 8.0], [5.0, 2.0]])]
-    middle, low, high = median_curve(runs)
+    three = [made("gp", seed, regrets) for seed, regrets in enumerate([[9.0, 1.0], [7.0, 8.0], [5.0, 2.0]])]
+    middle, low, high = runs.median_curve(three)
     assert middle.tolist() == [7.0, 2.0]
     assert (low <= middle).all()
     assert (middle <= high).all()

@@ -87,9 +87,8 @@ def test_the_target_is_what_measure_makes_of_the_truth_under_seeds_that_the_stud
     truth = model(tmp_path, "".join(f"{name} = {value!r}\n" for name, value in theta.items()))
     expected = measure_agents(objective.run.study.settings, truth, target_seed(2), Silent())
     goal = objective.goal(2)
-    assert np.array_equal(
-        goal.values.reshape(expected.means.shape), expected.select(objective.run.study.target.metrics).means
-    )
+    chosen = expected.select(objective.run.study.target.metrics).means
+    assert np.array_equal(goal.values.reshape(expected.means.shape), chosen)
 
 
 def test_the_studys_own_target_is_not_looked_at(opened):
@@ -239,7 +238,7 @@ def test_there_are_plateaus_and_blur_is_hardly_seen_while_trim_is():
 
 
 @settings(max_examples=20)
-@given(seed=st.integers(0, 1000), unit=st.tuples(*[st.floats(0, 1)] * 4))
+@given(seed=SEEDS, unit=UNITS)
 def test_the_score_is_prpv_of_its_episodes_and_what_is_composed_of_its_outcome(seed, unit):
     values = from_unit(RANKING.space, np.array(unit))
     score = RANKING.score(values, seed)
@@ -271,7 +270,7 @@ BOX_POINTS = [design_point(CALIBRATED.space, index, 7) for index in range(64)]
 
 
 @settings(max_examples=15)
-@given(seed=st.integers(0, 1000), unit=st.tuples(*[st.floats(0, 1)] * 4))
+@given(seed=SEEDS, unit=UNITS)
 def test_the_score_is_what_its_outcome_is_composed_to_and_prpv_of_two_metrics(seed, unit):
     values = from_unit(CALIBRATED.space, np.array(unit))
     outcome, goal = np.array(CALIBRATED.outcome(values, seed)), CALIBRATED.goal(seed)

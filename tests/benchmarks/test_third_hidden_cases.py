@@ -50,10 +50,9 @@ def test_a_castor_slows_a_robot_that_turns_and_never_drives_it():
 @pytest.mark.slow
 def test_a_weak_motor_a_tired_battery_and_a_clock_do_what_they_say():
     assert driven(replace(PLAIN, changes={"weak_motor": 0.2}), (0.5, 0.5))[-1, 2] != 0.0
-    full = driven(PLAIN, (0.5, 0.5), 60.0)[-1, 0]
-    assert driven(replace(PLAIN, changes={"battery_fade": 0.2}), (0.5, 0.5), 60.0)[-1, 0] == pytest.approx(
-        0.9 * full, rel=0.02
-    )
+    tired = replace(PLAIN, changes={"battery_fade": 0.2})
+    full, faded = (driven(one, (0.5, 0.5), 60.0)[-1, 0] for one in (PLAIN, tired))
+    assert faded == pytest.approx(0.9 * full, rel=0.02)
     poses = np.zeros((1, 1200, 3))
     poses[0, :, 0] = np.arange(1200) * third.ROW_S
     seen = third.seen(replace(PLAIN, changes={"clock_rate": 0.004}), poses, plan(1, 1, 1200))

@@ -3,8 +3,10 @@
 The verdict follows from the error that is left, against the bracket of the noise floor.
 """
 
+from dataclasses import replace
+
 import pytest
-from planted import CALM, DECLARED, NOISE, TRUTH, planted_drives
+from planted import CALM, DECLARED, NOISE, TRUTH, drives_of, planted_drives, planted_log
 
 from proxytune.diagnosis import AdoptedEffect, Findings, Ratio
 from proxytune.diagnosis.answer import verdict
@@ -49,6 +51,9 @@ def test_no_error_is_told_where_fewer_than_three_blocks_have_a_window(drives):
     assert error(drives, horizon_s=100.0) is None
     assert error(drives.only(drives.block < 2)) is None
     assert error(drives.only(drives.block < 3)) is not None
+    short, long = planted_log(TRUTH, episodes=70, seconds=2.0), planted_log(TRUTH, episodes=1, seconds=9.0)
+    longest = replace(long.episodes[0], name="long")
+    assert error(drives_of(replace(short, episodes=(*short.episodes, longest))), horizon_s=5.0) is None
 
 
 KNOWN = Repeated(Ratio(0.97, (0.9, 1.05)), 0.0116, 0.8)

@@ -45,10 +45,6 @@ def husky():
     return diagnosed("drive_husky")
 
 
-def named(diagnosis):
-    return [effect.effect for effect in diagnosis.effects]
-
-
 def or_rivals(diagnosis):
     """The effects that were added, and those that the drives cannot tell from them."""
     return {name for effect in diagnosis.effects for name in (effect.effect, *(one.effect for one in effect.rivals))}
@@ -63,7 +59,7 @@ def test_a_create_is_late_at_times_or_always(create):
 
 
 def test_a_creates_wheels_are_alike(create):
-    assert not {"trim", "wheel_gain"} & set(named(create))
+    assert not {"trim", "wheel_gain"} & {effect.effect for effect in create.effects}
     assert not any("wheel" in effect.form for effect in create.effects)
 
 

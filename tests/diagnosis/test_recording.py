@@ -121,12 +121,9 @@ def test_a_drive_that_ends_before_its_pictures_are_taken_is_told_with_its_start(
         list(film(family, 1, 1))
 
 
-def test_a_robot_without_a_camera_is_refused_before_anything_is_driven(family):
+def test_a_robot_without_a_camera_or_an_expert_is_refused_before_anything_is_driven(family, tmp_path):
     with pytest.raises(SettingsError, match="has no camera"):
         film(replace(family, robot="irobot_create"), 1, 1)
-
-
-def test_a_robot_without_an_expert_is_refused_before_anything_is_driven(family, tmp_path):
     described = (shipped("robots") / "duckiebot" / "robot.toml").read_text(encoding="utf-8")
     kept = [line for line in described.splitlines() if not line.startswith(("expert_", "urdf"))]
     (tmp_path / "novice").mkdir()

@@ -4,18 +4,17 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from proxytune.driving import AGENTS, Agent, GroundPlaneCamera, draw_floor, load_agent, read_robot, shipped_map
-from proxytune.driving.agents import (
-    Braitenberg,
-    EdgePilot,
-    Laggy,
-    LanePilot,
-    Leaning,
-    Smoothed,
-    Wary,
-    act_together,
-    duties,
+from proxytune.driving import (
+    AGENTS,
+    Agent,
+    GroundPlaneCamera,
+    agents as pilots,
+    draw_floor,
+    load_agent,
+    read_robot,
+    shipped_map,
 )
+from proxytune.driving.agents import Laggy, LanePilot, Leaning, Smoothed, Wary, act_together, duties
 from proxytune.driving.optics import parted
 from proxytune.driving.perception import Markings, Seen, find_lanes, open_eye
 from proxytune.errors import ExtensionError
@@ -37,9 +36,7 @@ def test_every_agent_keeps_what_agents_promise(name):
     check_agent(AGENTS[name], robot=ROBOT)
 
 
-@pytest.mark.parametrize(
-    ("left", "turned"), [(0.0, 0.0), (0.05, 0.0), (-0.05, 0.0), (0.0, 0.2), (0.0, -0.2), (0.04, 0.1)]
-)
+@pytest.mark.parametrize(("left", "turned"), [(0, 0), (0.05, 0), (-0.05, 0), (0, 0.2), (0, -0.2), (0.04, 0.1)])
 def test_the_lane_is_found_where_it_lies(left, turned):
     look = Markings(open_eye(ROBOT, reach_m=0.5), 60.0, 150.0)
     (lane,) = find_lanes(Seen(parted(seen_from(left, turned)[None])), (look,), (0,))
@@ -57,11 +54,9 @@ MORE = {
     **AGENTS,
     "eager": LanePilot(speed=0.2, offset_gain=8.0, slope_gain=2.0, contrast=0.0, brightness=0.0, reach_m=0.9),
     "blind": LanePilot(speed=0.2, offset_gain=8.0, slope_gain=2.0, contrast=300.0, brightness=255.0),
-    "nested": Laggy(
-        Wary(Smoothed(LanePilot(0.3, 8.0, 2.0, contrast=60.5), share=0.3), contrast=99.0, crisp=9.0), steps=2
-    ),
-    "leaning_edges": Leaning(EdgePilot(speed=0.3, gain=4.0, step=20.5, first_row=0.1), bias=0.4),
-    "pushed": Braitenberg(speed=0.3, push=4.0, first_row=0.0),
+    "nested": Laggy(Wary(Smoothed(LanePilot(0.3, 8.0, 2.0, contrast=60.5), 0.3), contrast=99.0, crisp=9.0), steps=2),
+    "leaning_edges": Leaning(pilots.EdgePilot(speed=0.3, gain=4.0, step=20.5, first_row=0.1), bias=0.4),
+    "pushed": pilots.Braitenberg(speed=0.3, push=4.0, first_row=0.0),
 }
 
 
@@ -118,10 +113,8 @@ def lane_by_the_book(picture, look):
 @settings(max_examples=40)
 def test_lanes_of_many_pictures_are_those_of_one_picture_after_another(seed, contrast, brightness, reach):
     pictures = scenes(seed)[0]
-    looks = [
-        Markings(open_eye(ROBOT, reach_m=0.5), 60.0, 150.0),
-        Markings(open_eye(ROBOT, reach_m=reach), contrast, brightness),
-    ]
+    own = Markings(open_eye(ROBOT, reach_m=reach), contrast, brightness)
+    looks = [Markings(open_eye(ROBOT, reach_m=0.5), 60.0, 150.0), own]
     asked = tuple(looks[robot % 2] for robot in range(len(pictures)))
     expected = [lane_by_the_book(*pair) for pair in zip(pictures, asked, strict=True)]
     assert find_lanes(Seen(parted(pictures)), asked, range(len(pictures))) == expected
@@ -171,15 +164,9 @@ def commands(agent: Agent, steps: int) -> np.ndarray:
     return np.array(out)
 
 
-def test_laggy_waits_its_steps():
+def test_laggy_waits_its_steps_smoothed_goes_a_share_of_the_way_and_leaning_gives_the_right_wheel_more():
     np.testing.assert_allclose(commands(Laggy(Fixed(0.4, 0.5), steps=2), 4)[:, 0], [0.0, 0.0, 0.4, 0.4])
-
-
-def test_smoothed_goes_a_share_of_the_way():
     np.testing.assert_allclose(commands(Smoothed(Fixed(0.4, 0.4), share=0.5), 3)[:, 0], [0.2, 0.3, 0.35])
-
-
-def test_leaning_gives_the_right_wheel_more():
     np.testing.assert_allclose(commands(Leaning(Fixed(0.4, 0.4), bias=0.1), 1), [[0.36, 0.44]])
 
 

@@ -10,28 +10,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from one_line import complaint_of
 
 from proxytune.domain import BatchClassroom, Classroom, DomainFamily, OnPolicyClassroom, make_episode
-from proxytune.driving import (
-    TICK_HZ,
-    Course,
-    Expert,
-    LaneFollowing,
-    Sight,
-    drive,
-    lane_following,
-    lane_point,
-    off_map,
-    read_robot,
-    shipped_map,
-    start_pose,
-)
-from proxytune.driving.episode import driving_score
+from proxytune.driving import TICK_HZ, Expert, LaneFollowing, drive, lane_following, read_robot, shipped_map
+from proxytune.driving.episode import Course, Sight, driving_score, start_pose
 from proxytune.driving.expert import MEMORY, Pupil
 from proxytune.driving.fleet import only
+from proxytune.driving.lane import lane_point, off_map
 from proxytune.driving.plants import PlanarPlant
 from proxytune.effects import Stage, stage_chain
-from proxytune.errors import EpisodeError, SettingsError
+from proxytune.errors import EpisodeError
 from proxytune.settings import Section
 
 ROAD = shipped_map("small_loop")
@@ -326,9 +315,8 @@ def test_a_guided_policy_that_fails_is_told_with_the_time_in_one_line():
 @pytest.mark.parametrize("method", ["demonstrate", "guide"])
 def test_a_robot_without_an_expert_is_refused_in_one_line(tmp_path, method):
     room = LaneFollowing("irobot_create", "planar", "ground_plane", ROAD, 2.0, 0.01, 2.0, (), tmp_path)
-    with pytest.raises(SettingsError) as caught:
-        room.demonstrate(episode(), 1.0) if method == "demonstrate" else room.guide(episode(), lean, 1.0)
-    assert str(caught.value) == (
+    given = (episode(), 1.0) if method == "demonstrate" else (episode(), lean, 1.0)
+    assert complaint_of(getattr(room, method), *given) == (
         "robot 'irobot_create' has no expert: its robot.toml states no expert_look_ahead, expert_speed, expert_gain, "
         "expert_disturbance; add them, or teach with a robot that has one"
     )

@@ -7,7 +7,6 @@ import shutil
 from pathlib import Path
 
 import pytest
-from hypothesis import given, strategies as st
 
 from proxytune.driving import LaneFollowing, mounted_camera, read_robot, robot_from_geometry, shipped_map
 from proxytune.driving.family import robot_meaning
@@ -17,9 +16,8 @@ from proxytune.files import shipped
 
 
 def family(folder, plant="planar", camera="ground_plane"):
-    return LaneFollowing(
-        "duckiebot", plant, camera, shipped_map("small_loop"), 2.0, 0.01, 2.0, (("trim.trim", 0.1),), folder
-    )
+    road, effects = shipped_map("small_loop"), (("trim.trim", 0.1),)
+    return LaneFollowing("duckiebot", plant, camera, road, 2.0, 0.01, 2.0, effects, folder)
 
 
 def test_a_robot_counts_by_what_its_files_mean(tmp_path):
@@ -78,19 +76,8 @@ def mounted(theta):
     return mounted_camera(ROBOT, effects_from(theta, ROBOT.figures))
 
 
-def test_without_effects_the_camera_is_nominal():
+def test_the_camera_is_nominal_without_effects_and_with_those_on_motion_and_on_pictures():
     assert mounted({}) == NOMINAL
-
-
-@given(st.floats(0.0, 45.0), st.floats(-10.0, 10.0), st.floats(-0.4, 0.2))
-def test_each_camera_effect_sets_its_figure_alone(pitch, roll, k1):
-    camera = mounted({"camera_pitch": pitch, "camera_roll": roll, "lens_distortion": k1})
-    changed = {name for name in vars(camera) if getattr(camera, name) != getattr(NOMINAL, name)}
-    assert (camera.pitch_deg, camera.roll_deg, camera.k1) == (pitch, roll, k1)
-    assert changed <= {"pitch_deg", "roll_deg", "k1"}
-
-
-def test_effects_on_motion_and_on_pictures_leave_it_alone():
     assert mounted({"trim": 0.1, "blur": 0.05, "camera_latency": 0.1}) == NOMINAL
 
 

@@ -43,10 +43,8 @@ near = st.floats(-1.0, 4.0)
 @given(st.lists(st.builds(place, near, near, st.floats(-7.0, 7.0)), min_size=1, max_size=5))
 @settings(max_examples=200)
 def test_both_show_the_same_texels_on_the_map_and_off_it(compiled, places):
-    shown = [
-        exposed(way, NUMBERED, np.array(places, dtype=np.float32), np.ones(1, np.float32)) for way in (compiled, loops)
-    ]
-    np.testing.assert_array_equal(*shown)
+    where, once = np.array(places, dtype=np.float32), np.ones(1, np.float32)
+    np.testing.assert_array_equal(*(exposed(way, NUMBERED, where, once) for way in (compiled, loops)))
 
 
 @pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf, 1e30, 50.0])
@@ -95,14 +93,9 @@ def test_an_episode_is_the_same_without_numba(compiled, tmp_path, monkeypatch, p
 
 def test_numpy_does_it_where_numba_is_told_not_to_compile():
     code = "from proxytune.driving.loops import by_numba; print(by_numba().__name__)"
-    told = subprocess.run(
-        [sys.executable, "-c", code],
-        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert told.stdout == "proxytune.driving.loops\n"
+    off = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
+    told = subprocess.check_output([sys.executable, "-c", code], env=off, text=True)
+    assert told == "proxytune.driving.loops\n"
 
 
 @pytest.mark.parametrize("at_hand", [True, False])

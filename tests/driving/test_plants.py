@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from one_line import complaint_of
 
 from proxytune.driving import lane_following, parse_urdf, read_body, read_robot, robot_names
 from proxytune.driving.plants import check_body
@@ -44,9 +45,7 @@ def test_of_more_wheels_those_called_axles_are_driven():
     third += '<axis xyz="0 1 0"/></joint></robot>'
     assert body_of(TEXT.replace("</robot>", third)).left.joint == "axle_left"
     unnamed = TEXT.replace("axle_", "wheel_joint_").replace("</robot>", third)
-    with pytest.raises(
-        SettingsError, match="found wheel_joint_left, wheel_joint_right, rear; call the two driven joints"
-    ):
+    with pytest.raises(SettingsError, match="found wheel_joint_left, wheel_joint_right, rear; call the two driven"):
         body_of(unnamed)
 
 
@@ -63,9 +62,7 @@ def test_what_is_no_urdf_is_refused_in_a_line(tmp_path, case):
     path = tmp_path / "robot.urdf"
     if text is not None:
         path.write_text(text)
-    with pytest.raises(SettingsError, match=expected) as caught:
-        parse_urdf(path)
-    assert "\n" not in str(caught.value)
+    assert expected in complaint_of(parse_urdf, path)
 
 
 def test_words_for_numbers_are_refused_in_a_line():
@@ -114,9 +111,8 @@ def test_a_mesh_that_robots_collide_as_must_be_there(tmp_path):
 def test_a_study_of_such_a_robot_is_refused_before_the_first_episode(tmp_path):
     shutil.copytree(shipped("robots") / "duckiebot", tmp_path / "mine")
     described = tmp_path / "mine" / "robot.toml"
-    described.write_text(
-        described.read_text().replace('"duckiebot"', '"mine"').replace("value = 0.0318", "value = 0.05")
-    )
+    text = described.read_text().replace('"duckiebot"', '"mine"')
+    described.write_text(text.replace("value = 0.0318", "value = 0.05"))
     section = Section(tmp_path / "study.toml", "domain.", {"robot": "mine"})
     with pytest.raises(SettingsError, match=r"domain.robot: duckiebot.urdf: has the wheel_radius"):
         lane_following(section, model=None)

@@ -8,37 +8,19 @@ import dataclasses
 import functools
 import hashlib
 import re
-from math import pi
+from math import pi, remainder
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
+from one_line import complaint_of
 
 from proxytune.domain import make_episode
-from proxytune.driving import (
-    COLOURS,
-    TICK_HZ,
-    Course,
-    Expert,
-    Road,
-    Sight,
-    draw_floor,
-    drive,
-    lane_following,
-    lane_length,
-    lane_point,
-    lane_pose,
-    map_names,
-    off_map,
-    read_map,
-    read_robot,
-    robot_names,
-    score_trajectory,
-    shipped_map,
-)
-from proxytune.driving.episode import driving_score
-from proxytune.driving.lane import corners
+from proxytune.driving import COLOURS, TICK_HZ, Expert, Road, draw_floor, drive, lane_following, read_robot, robot_names
+from proxytune.driving.episode import Course, Sight, driving_score, score_trajectory
+from proxytune.driving.lane import corners, lane_length, lane_point, lane_pose, off_map
+from proxytune.driving.maps import map_names, read_map, shipped_map
 from proxytune.driving.road import Arc, Paint, Straight, length
 from proxytune.effects import Stage, stage_chain
 from proxytune.errors import SettingsError
@@ -69,10 +51,7 @@ def changed(text, old, new, times=1):
 def refusal(folder, text):
     """What is said of a map after its path, on one line."""
     path = written(folder, text)
-    with pytest.raises(SettingsError) as caught:
-        family(folder)
-    said = str(caught.value)
-    assert "\n" not in said
+    said = complaint_of(family, folder)
     assert said.startswith(f"{path}: ")
     return said.removeprefix(f"{path}: ")
 
@@ -117,13 +96,10 @@ def test_what_a_map_file_says_is_part_of_the_family(tmp_path):
     assert family(tmp_path).identity != before.identity
 
 
-def test_segments_are_read_in_their_order():
+def test_segments_are_read_in_their_order_and_bends_painted_on_their_own_radius_where_the_file_says_nothing(tmp_path):
     loop = shipped_map("small_loop")
     assert loop.segments == (Straight(0.585), Arc(0.2925, 90.0)) * 4
     assert loop.paint.bend_radius == 0.17
-
-
-def test_bends_are_painted_on_the_roads_own_radius_where_the_file_says_nothing(tmp_path):
     assert read_map(written(tmp_path, changed(LOOP, "bend_radius = 0.17\n", ""))).paint.bend_radius is None
 
 
@@ -146,16 +122,8 @@ def test_bends_are_painted_on_the_roads_own_radius_where_the_file_says_nothing(t
         ("turn = 90.0", "turn = 180.0", "road.segments[1].turn: must be between -90 and 90, got 180.0"),
         ("turn = 90.0", "turn = 0.0", "road.segments[1].turn: must not be 0; write { straight = M }"),
         ("radius = 0.2925, ", "", "road.segments[1].radius: is missing; add it"),
-        (
-            "radius = 0.2925",
-            "radius = 0.2",
-            "road.segments[1].radius: 0.2 m is too tight a bend for a road 0.585 m wide",
-        ),
-        (
-            "turn = 90.0",
-            "turn = 80.0",
-            "road.segments: the road does not close: its turns add up to 350°; make it 360°",
-        ),
+        ("radius = 0.2925", "radius = 0.2", "road.segments[1].radius: 0.2 m is too tight a bend for a road 0.585 m"),
+        ("turn = 90.0", "turn = 80.0", "road.segments: the road does not close: its turns add up to 350°; make it"),
         ("1.4625, 0.585, 90.0", "1.5, 0.585, 90.0", "road.segments: the road leaves the map at (1.7"),
         ("lane_width = 0.22", "lane_width = 0.3", "road.lane_width: the two lanes overlap at 0.3 m"),
         ("width = 0.585", "width = 0.4", "road.width: 0.4 m has no room for two lanes; at least 0.4774 m"),
@@ -171,10 +139,7 @@ def test_a_mistake_in_a_map_file_is_one_line_with_file_and_key(tmp_path, old, ne
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        (
-            changed(LOOP, "straight = 0.585", "straight = 0.7"),
-            "does not close: it ends at (1.462, 0.700), 0.115 m from",
-        ),
+        (changed(LOOP, "straight = 0.585", "straight = 0.7"), "does not close: it ends at (1.462, 0.700), 0.115 m"),
         (changed(LOOP, "turn = 90.0", "turn = -90.0", 4), "runs clockwise; lay it counter-clockwise"),
         (figure_eight(), "does not close: its turns add up to 0°; make it 360°"),
         (overlapping(), "overlaps itself at ("),
@@ -194,11 +159,10 @@ def test_a_map_file_that_is_not_there_is_one_line(tmp_path):
         family(tmp_path, "gone.toml")
 
 
-def test_a_map_by_an_unknown_name_is_told_of_both_kinds(tmp_path):
-    with pytest.raises(SettingsError) as caught:
-        family(Path(), "horse")
-    assert "domain.map: unknown value 'horse'; did you mean 'horseshoe'?" in str(caught.value)
-    assert "ends in .toml" in str(caught.value)
+def test_a_map_by_an_unknown_name_is_told_of_both_kinds():
+    told = complaint_of(family, Path(), "horse")
+    assert "domain.map: unknown value 'horse'; did you mean 'horseshoe'?" in told
+    assert "ends in .toml" in told
 
 
 HEXAGON = (Straight(0.4), Arc(0.3, 60.0), Straight(0.2)) * 6
@@ -228,10 +192,6 @@ points = st.tuples(coordinates, coordinates)
 ways = st.floats(-12.0, 20.0)
 
 
-def wrapped(way, lap):
-    return np.mod(way + lap / 2, lap) - lap / 2
-
-
 def lane(road, outer, spacing=0.002):
     """Points, and headings from each to the next, of a lane's centre line."""
     lap = float(lane_length(road, outer))
@@ -253,7 +213,7 @@ def test_the_point_so_far_along_a_lane_is_seen_so_far_along_it(road, outer, alon
     assert pose.counter_clockwise == outer
     assert pose.deviation == pytest.approx(0, abs=1e-11)
     assert pose.heading_error == pytest.approx(0, abs=1e-4)
-    assert wrapped(pose.along - along, lane_length(road, outer)) == pytest.approx(0, abs=1e-9)
+    assert remainder(pose.along - along, lane_length(road, outer)) == pytest.approx(0, abs=1e-9)
 
 
 @every_road

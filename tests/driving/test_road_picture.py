@@ -161,17 +161,12 @@ def square(tiles=3, tile=TILE, **paint):
     """A square loop of so many tiles along a side."""
     edge = (Straight((tiles - 2) * tile), Arc(tile / 2, 90.0))
     begin = ((tiles - 0.5) * tile, tile, 90.0)
-    return replace(
-        ROAD, size=(tiles * tile,) * 2, begin=begin, segments=edge * 4, width=tile, paint=replace(ROAD.paint, **paint)
-    )
+    size, paint = (tiles * tile,) * 2, replace(ROAD.paint, **paint)
+    return replace(ROAD, size=size, begin=begin, segments=edge * 4, width=tile, paint=paint)
 
 
 def texel(floor, x):
     return int((x - floor.origin) * floor.pixels_per_metre)
-
-
-def colour_at(floor, x, y):
-    return tuple(int(value) for value in floor.pixels[texel(floor, y), texel(floor, x)])
 
 
 def cover(floor, colour):
@@ -223,7 +218,7 @@ def along_bend(road, radius, off_centre):
     middle = 2.5 * TILE - radius
     angles = np.radians(np.linspace(2.0, 88.0, 400))
     points = middle + (radius + off_centre) * np.stack((np.cos(angles), np.sin(angles)), axis=1)
-    return np.array([colour_at(floor, *point) for point in points])
+    return np.array([floor.pixels[texel(floor, y), texel(floor, x)] for x, y in points])
 
 
 @pytest.mark.parametrize("radius", [BEND_RADIUS, TILE / 2])

@@ -6,20 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from one_line import complaint_of
 
-from proxytune.driving import (
-    CAMERA,
-    UNITS,
-    BulletPlant,
-    drivetrain,
-    lane_following,
-    read_robot,
-    robot as module,
-    robot_from_geometry,
-    robot_names,
-)
-from proxytune.driving.plants import PlanarPlant
-from proxytune.driving.robot import REQUIRED
+from proxytune.driving import CAMERA, UNITS, lane_following, read_robot, robot as module, robot_names
+from proxytune.driving.bullet import BulletPlant
+from proxytune.driving.plants import PlanarPlant, drivetrain
+from proxytune.driving.robot import REQUIRED, robot_from_geometry
 from proxytune.effects import FilterContext, Stage, effects_from, theta_names
 from proxytune.errors import ExtensionError, SettingsError
 from proxytune.files import shipped
@@ -27,10 +19,6 @@ from proxytune.settings import Section, read_settings
 
 ROBOT = read_robot("duckiebot")
 BODY = ET.parse(ROBOT.urdf).getroot()
-
-
-def origin(joint):
-    return [float(v) for v in BODY.find(f"joint[@name='{joint}']/origin").get("xyz").split()]
 
 
 def stated(name):
@@ -97,9 +85,8 @@ def test_neutral_drivetrain_effects_leave_every_robot_as_it_is(name):
     theta = {name: parameter.neutral_value(robot.figures) for name, parameter in parameters.items()}
     neutral = drivetrain(robot, effects_from(theta, robot.figures, robot.catalogue))
     setting = FilterContext(60.0, np.zeros(2), robot.figures)
-    np.testing.assert_allclose(
-        neutral.apply(held, neutral.begin(setting))[0], plain.apply(held, plain.begin(setting))[0], atol=1e-9
-    )
+    one, other = (train.apply(held, train.begin(setting))[0] for train in (neutral, plain))
+    np.testing.assert_allclose(one, other, atol=1e-9)
 
 
 DIFFERENTIAL = [name for name in robot_names() if read_robot(name).drive == "differential"]
@@ -119,20 +106,17 @@ def test_every_robot_drives_straight_at_full_speed_and_turns_by_its_baseline_on_
 
 @pytest.mark.parametrize("name", [name for name in robot_names() if "urdf" not in stated(name)])
 def test_a_robot_without_body_is_refused_on_bullet_in_one_line(name):
-    with pytest.raises(SettingsError) as caught:
-        BulletPlant(read_robot(name), np.zeros(3), 1 / 60)
-    assert str(caught.value) == f"robot '{name}' has no body: its robot.toml names no urdf; use plant = \"planar\""
+    told = complaint_of(BulletPlant, read_robot(name), np.zeros(3), 1 / 60)
+    assert told == f"robot '{name}' has no body: its robot.toml names no urdf; use plant = \"planar\""
 
 
 @pytest.mark.parametrize("plant", ["bullet", "planar"])
 @pytest.mark.parametrize("name", [name for name in robot_names() if "camera_rows" not in stated(name)["figures"]])
 def test_a_study_on_a_robot_without_camera_is_refused_before_it_starts(tmp_path, name, plant):
     section = Section(tmp_path / "study.toml", "domain.", {"robot": name, "plant": plant})
-    with pytest.raises(SettingsError) as caught:
-        lane_following(section, model=None)
-    assert str(caught.value).startswith(f"{tmp_path / 'study.toml'}: domain.robot: robot '{name}' has no camera: ")
-    assert "camera_rate" in str(caught.value)
-    assert "\n" not in str(caught.value)
+    told = complaint_of(lambda: lane_following(section, model=None))
+    assert told.startswith(f"{tmp_path / 'study.toml'}: domain.robot: robot '{name}' has no camera: ")
+    assert "camera_rate" in told
 
 
 def test_a_robot_with_camera_but_without_body_may_be_studied_on_the_planar_plant_only(tmp_path, monkeypatch):
@@ -206,9 +190,7 @@ def test_an_unknown_robot_is_told_with_the_nearest():
 def test_a_mistake_in_robot_toml_is_one_line(tmp_path, monkeypatch, before, after, says):
     copy_duckiebot(tmp_path, before, after)
     monkeypatch.setattr(module, "shipped", lambda kind: tmp_path)
-    with pytest.raises(SettingsError) as caught:
-        read_robot.__wrapped__("duckiebot")
-    assert says in str(caught.value)
+    assert says in complaint_of(read_robot.__wrapped__, "duckiebot")
 
 
 def test_a_robot_that_does_not_state_its_wheels_distance_cannot_be_examined():

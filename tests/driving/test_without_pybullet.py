@@ -39,9 +39,8 @@ seconds = 1.0
 
 def run(folder, code):
     """Run code where PyBullet cannot be found."""
-    return subprocess.run(
-        [sys.executable, "-c", HIDDEN + code], cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, timeout=300
-    )
+    how = {"cwd": folder, "env": ENVIRONMENT, "capture_output": True, "text": True, "timeout": 300}
+    return subprocess.run([sys.executable, "-c", HIDDEN + code], **how)
 
 
 def command(folder, *words):

@@ -4,16 +4,8 @@ import numpy as np
 import pytest
 
 from proxytune.driving import read_robot
-from proxytune.effects import (
-    CATALOGUE,
-    CHANNELS,
-    PARAMETERS,
-    FilterContext,
-    Stage,
-    effects_from,
-    stage_chain,
-    theta_names,
-)
+from proxytune.effects import CATALOGUE, CHANNELS, PARAMETERS, FilterContext, Stage, effects_from, theta_names
+from proxytune.effects.model import stage_chain
 
 ROBOT = read_robot("duckiebot")
 SETS = {

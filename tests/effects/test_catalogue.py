@@ -9,17 +9,9 @@ import pytest
 from filtered import filtered
 
 from proxytune.driving import read_robot
-from proxytune.effects import (
-    CAR_CATALOGUE,
-    CATALOGUE,
-    PARAMETERS,
-    Blur,
-    FilterContext,
-    Stage,
-    effects_from,
-    stage_chain,
-)
+from proxytune.effects import CAR_CATALOGUE, CATALOGUE, PARAMETERS, Blur, FilterContext, Stage, effects_from
 from proxytune.effects.command import CommandQuantisation, Delay
+from proxytune.effects.model import stage_chain
 from proxytune.effects.motors import DriverMap, MotorLag
 from proxytune.space import Parameter
 from proxytune.testing.effect import Subject, check_effect
@@ -61,17 +53,17 @@ def test_effects_come_in_the_order_of_the_catalogue_however_they_are_named():
     assert names == ["delay", "driver_map", "dead_band", "trim", "motor_lag"]
 
 
-def test_the_driver_raises_a_small_duty_over_the_dead_band_of_the_motor():
-    np.testing.assert_allclose(wheels({"driver_map": 0.3, "dead_band.width": 0.1}, 0.02), 0.314 - 0.1)
-
-
-def test_the_driver_limits_the_duty_before_the_trim_scales_the_wheels():
-    np.testing.assert_allclose(wheels({"saturation.limit": 0.5, "trim": 0.2}, 1.0), [0.4, 0.6])
-
-
-def test_friction_takes_its_part_before_the_gain_of_the_wheels():
-    theta = {"dead_band.width": 0.2, "wheel_gain.left": 0.5, "wheel_gain.right": 1.5}
-    assert wheels(theta, 0.6) == pytest.approx([0.2, 0.6])
+@pytest.mark.parametrize(
+    ("theta", "duty", "speeds"),
+    [
+        ({"driver_map": 0.3, "dead_band.width": 0.1}, 0.02, [0.314 - 0.1] * 2),
+        ({"saturation.limit": 0.5, "trim": 0.2}, 1.0, [0.4, 0.6]),
+        ({"dead_band.width": 0.2, "wheel_gain.left": 0.5, "wheel_gain.right": 1.5}, 0.6, [0.2, 0.6]),
+    ],
+    ids=["the driver, then friction", "the driver's limit, then trim", "friction, then gains"],
+)
+def test_the_order_changes_what_comes_out(theta, duty, speeds):
+    assert wheels(theta, duty) == pytest.approx(speeds)
 
 
 IMBALANCED = [name for name, effect in CATALOGUE.items() if f"{name}.imbalance" in PARAMETERS]
@@ -160,11 +152,8 @@ def test_parameters_are_given_by_keyword():
         Parameter("trim", "", -0.5, 0.5, 0.0)
 
 
-NOMINAL: dict[str, float] = {}
-
-
 def run(effect, signal, rest=0.0, rate_hz=10.0):
-    return filtered(effect, signal, rate_hz=rate_hz, rest=rest, nominal=NOMINAL)
+    return filtered(effect, signal, rate_hz=rate_hz, rest=rest, nominal={})
 
 
 def step(length=20):
@@ -195,9 +184,8 @@ def test_motor_lag_gives_the_mean_of_the_exact_step_response():
     time_constant, rate_hz = 0.2, 10.0
     edges = np.arange(21) / rate_hz
     travelled = edges + time_constant * np.exp(-edges / time_constant)  # integral of 1 - exp(-t/tau), plus a constant
-    np.testing.assert_allclose(
-        run(MotorLag(time_constant, 0.0), step())[:, 0], np.diff(travelled) * rate_hz, atol=1e-12
-    )
+    lagging = run(MotorLag(time_constant, 0.0), step())[:, 0]
+    np.testing.assert_allclose(lagging, np.diff(travelled) * rate_hz, atol=1e-12)
 
 
 def test_an_imbalance_lags_each_wheel_by_its_share():
@@ -223,7 +211,7 @@ def test_blur_is_the_mean_of_a_scene_that_changes_linearly(samples):
 def test_blur_adds_8_bit_pictures_exactly_in_any_order(samples):
     pictures = np.random.default_rng(2).integers(0, 256, (20, 50)).astype(np.float32)
     effect = Blur(samples / 10.0)
-    memory = effect.begin(FilterContext(10.0, pictures[0], NOMINAL))
+    memory = effect.begin(FilterContext(10.0, pictures[0], {}))
     weights = memory.weights.astype(np.float64)
     assert weights.sum() == 1.0
     exact = [weights @ pictures[row - len(weights) + 1 : row + 1].astype(np.float64) for row in range(13, 20)]

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
 
 from proxytune.driving import read_robot
 from proxytune.effects import COMMAND_GROUPS, FilterContext, LearntCommands, LearntCurve
+from proxytune.testing.effect import Subject, _claim_chunks, _claim_filter
 
-FIGURES = read_robot("duckiebot").figures
+ROBOT = read_robot("duckiebot")
 RATE_HZ = 20.0
 KNOTS = {
     "duty": (0.2, 0.5, 1.0),
@@ -35,20 +35,15 @@ EFFECTS = [pytest.param(effect_of(group), id=group) for group in COMMAND_GROUPS]
 EFFECTS.append(pytest.param(effect_of(*COMMAND_GROUPS), id="all"))
 
 
-def commands(seed, length=80):
+def commands(seed, length=90):
     """Held, reversed, ended and begun again."""
     random = np.random.default_rng(seed)
-    steps = random.choice((-0.7, -0.3, 0.0, 0.0, 0.4, 0.9), (length // 8, 2))
-    return np.repeat(steps, 8, axis=0)
+    steps = random.choice((-0.7, -0.3, 0.0, 0.0, 0.4, 0.9), (length // 9, 2))
+    return np.repeat(steps, 9, axis=0)
 
 
-def run(effect, signal, cuts=()):
-    memory, out = effect.begin(FilterContext(RATE_HZ, np.zeros((*signal.shape[:-2], 2)), FIGURES)), []
-    for chunk in np.split(signal, sorted(cuts), axis=-2):
-        if chunk.shape[-2]:
-            moved, memory = effect.apply(chunk, memory)
-            out.append(moved)
-    return np.concatenate(out, axis=-2)
+def run(effect, signal):
+    return effect.apply(signal, effect.begin(FilterContext(RATE_HZ, np.zeros(2), ROBOT.figures)))[0]
 
 
 def added(curve, signal):
@@ -60,17 +55,18 @@ def test_every_group_changes_commands(effect):
     assert np.abs(run(effect, commands(1)) - commands(1)).max() > 1e-3
 
 
-@pytest.mark.parametrize("effect", EFFECTS)
-@given(cuts=st.lists(st.integers(1, 79), max_size=6), seed=st.integers(0, 99))
-@settings(max_examples=8)
-def test_cutting_commands_into_chunks_never_changes_the_result(effect, cuts, seed):
-    np.testing.assert_allclose(run(effect, commands(seed), cuts), run(effect, commands(seed)), rtol=0, atol=1e-12)
+class Commanded(Subject):
+    """The robot that is told something here, for what every effect promises."""
+
+    def signal(self, seed, length=90):
+        return commands(seed, length)
 
 
 @pytest.mark.parametrize("effect", EFFECTS)
-def test_a_batch_is_filtered_like_its_members_to_the_bit(effect):
-    batch = np.stack([commands(seed) for seed in range(5)])
-    np.testing.assert_array_equal(run(effect, batch), np.stack([run(effect, one) for one in batch]))
+def test_it_is_a_filter_like_any_other(effect):
+    subject = Commanded(LearntCommands, ROBOT, "learnt")
+    _claim_filter(subject, effect, "learnt")
+    _claim_chunks(subject, effect, "learnt")
 
 
 @pytest.mark.parametrize("effect", EFFECTS)
@@ -87,10 +83,10 @@ def test_a_robot_that_is_to_stand_for_long_stands(group):
 @pytest.mark.parametrize("effect", EFFECTS)
 def test_features_times_weights_are_what_is_added(effect):
     signal = commands(6)[None]
-    memory = effect.begin(FilterContext(RATE_HZ, np.zeros((1, 2)), FIGURES))
+    memory = effect.begin(FilterContext(RATE_HZ, np.zeros((1, 2)), ROBOT.figures))
     features = effect.features(signal, memory)
     total = sum(basis @ np.array(curve.weights) for basis, curve in zip(features, effect.curves, strict=True))
-    np.testing.assert_allclose(run(effect, signal) - signal, total, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(effect.apply(signal, memory)[0] - signal, total, rtol=0, atol=1e-12)
 
 
 def test_the_size_of_a_command_counts_alike_both_ways():

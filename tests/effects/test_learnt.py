@@ -9,27 +9,16 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
+from one_line import complaint_of
 
 from proxytune.driving import read_robot
-from proxytune.effects import (
-    GROUPS,
-    OF_PLACE,
-    FilterContext,
-    FittedRange,
-    Learnt,
-    LearntCommands,
-    LearntCurve,
-    Model,
-    effects_from,
-    learnt_effect,
-    learnt_theta,
-    model_text,
-    read_model,
-)
+from proxytune.effects import GROUPS, OF_PLACE, FilterContext, LearntCommands, LearntCurve, effects_from
 from proxytune.effects.features import MOTION_GROUPS
-from proxytune.effects.learnt import LABEL
+from proxytune.effects.learnt import LABEL, FittedRange, Learnt, learnt_effect, learnt_theta
+from proxytune.effects.model import Model, model_text, read_model
 from proxytune.effects.motion import pose_after
 from proxytune.errors import SettingsError
+from proxytune.testing.effect import Subject, _claim_chunks, _claim_filter
 
 ROBOT = read_robot("duckiebot")
 RATE_HZ = 60.0
@@ -89,17 +78,9 @@ def integrate_twists(twists, tick_s, heading):
     return np.array(poses)
 
 
-def begin(effect, batch=(), headings=0.4):
-    return effect.begin(FilterContext(RATE_HZ, np.zeros((*batch, 3)), ROBOT.figures, headings=np.array([headings])))
-
-
-def run(effect, signal, cuts=()):
-    memory, out = begin(effect), []
-    for chunk in np.split(signal, sorted(cuts)):
-        if len(chunk):
-            moved, memory = effect.apply(chunk, memory)
-            out.append(moved)
-    return np.concatenate(out)
+def run(effect, signal):
+    setting = FilterContext(RATE_HZ, np.zeros(3), ROBOT.figures, headings=np.array([0.4]))
+    return effect.apply(signal, effect.begin(setting))[0]
 
 
 @pytest.mark.parametrize("effect", EFFECTS)
@@ -108,40 +89,21 @@ def test_every_group_changes_the_motion(effect):
     assert np.abs(run(effect, signal) - signal).max() > 1e-3
 
 
-@pytest.mark.parametrize("effect", EFFECTS)
-@given(cuts=st.lists(st.integers(1, 89), max_size=6), seed=st.integers(0, 99))
-@settings(max_examples=8)
-def test_cutting_the_motion_into_chunks_never_changes_the_result(effect, cuts, seed):
-    signal = a_signal(seed)
-    np.testing.assert_allclose(run(effect, signal, cuts), run(effect, signal), rtol=0, atol=1e-12)
+class Driven(Subject):
+    """The robot that is driven here, for what every effect promises."""
+
+    def signal(self, seed, length=90):
+        return a_signal(seed, length)
+
+    def context(self, rest, seed=7):
+        return FilterContext(RATE_HZ, rest, ROBOT.figures, headings=np.array([0.4]))
 
 
 @pytest.mark.parametrize("effect", EFFECTS)
-def test_what_is_added_never_depends_on_what_comes_later(effect):
-    signal = a_signal(3)
-    other = signal.copy()
-    other[45:] = other[45:] * 0.5 + 0.1
-    np.testing.assert_array_equal(run(effect, signal)[:45], run(effect, other)[:45])
-
-
-@pytest.mark.parametrize("effect", EFFECTS)
-def test_a_batch_is_filtered_like_its_members(effect):
-    batch = np.stack([a_signal(seed) for seed in range(6)]).reshape(2, 3, 90, 3)
-    first, memory = effect.apply(batch[..., :50, :], begin(effect, (2, 3)))
-    second, _ = effect.apply(batch[..., 50:, :], memory)
-    alone = [[run(effect, one) for one in row] for row in batch]
-    np.testing.assert_allclose(np.concatenate((first, second), axis=-2), alone, rtol=0, atol=1e-12)
-
-
-@pytest.mark.parametrize("effect", EFFECTS)
-def test_memories_are_never_changed_in_place(effect):
-    signal, memory = a_signal(4), begin(effect)
-    kept = signal.copy()
-    first, middle = effect.apply(signal, memory)
-    second, _ = effect.apply(signal, middle)
-    np.testing.assert_array_equal(effect.apply(signal, memory)[0], first)
-    np.testing.assert_array_equal(effect.apply(signal, middle)[0], second)
-    np.testing.assert_array_equal(signal, kept)
+def test_it_is_a_filter_like_any_other(effect):
+    subject = Driven(Learnt, ROBOT, "learnt")
+    _claim_filter(subject, effect, "learnt")
+    _claim_chunks(subject, effect, "learnt")
 
 
 @pytest.mark.parametrize("effect", EFFECTS)
@@ -219,9 +181,7 @@ def test_a_curve_over_wheel_speed_adds_to_that_wheel():
 
 
 def test_a_transient_fades_with_its_time_constant():
-    effect = Learnt(
-        SEEN, (LearntCurve("transients", "left", (0.5,), (1.0,)), LearntCurve("transients", "right", (0.5,), (1.0,)))
-    )
+    effect = Learnt(SEEN, tuple(LearntCurve("transients", side, (0.5,), (1.0,)) for side in ("left", "right")))
     step = np.tile((0.2, 0.0, 0.0), (120, 1))
     added = (run(effect, step) - step)[:, 0]
     np.testing.assert_allclose(added, 0.2 * np.exp(-np.arange(1, 121) / (0.5 * RATE_HZ)), rtol=1e-9)
@@ -229,9 +189,7 @@ def test_a_transient_fades_with_its_time_constant():
 
 
 def test_a_learnt_effect_comes_after_all_named_ones():
-    theta = {"learnt.range.forward@low": -1.0, "learnt.range.forward@high": 1.0}
-    theta |= {"learnt.range.yaw@low": -1.0, "learnt.range.yaw@high": 1.0, "learnt.turn_rate.yaw@1.0": 0.1}
-    names = [effect.name for effect in effects_from({**theta, "floor_slope.x": 0.1, "trim": 0.0}, ROBOT.figures)]
+    names = [effect.name for effect in effects_from({**WHOLE, "floor_slope.x": 0.1, "trim": 0.0}, ROBOT.figures)]
     assert names == ["trim", "floor_slope", "learnt"]
 
 
@@ -340,36 +298,19 @@ def test_a_theta_without_learnt_values_has_no_learnt_effect():
         ("[[0.0, 1.0], [0.2", "[0.0, [0.2", "speed_and_turn.knots: must be pairs [m/s, rad/s], got [0.0]"),
         ("yaw = [-3, 3.5]", "", "effects.learnt.range.yaw: is missing; add it"),
         ("yaw = [-3, 3.5]", "yaw = [1, 3.5]", "range.yaw: must be finite with 0 in it, got [1, 3.5]"),
-        (
-            "[effects.learnt.time]",
-            "[effects.learnt]\nturn = 1\n[effects.learnt.time]",
-            "effects.learnt.turn: unknown key",
-        ),
-        (
-            "[effects.learnt.range]",
-            "[effects.learned.range]",
-            "effects.learned: no such effect; did you mean 'learnt'?",
-        ),
+        ("[effects.learnt.time]", "[effects.learnt]\nturn = 1\n[effects.learnt.time]", "effects.learnt.turn: unknown"),
+        ("effects.learnt.range]", "effects.learned.range]", "effects.learned: no such effect; did you mean 'learnt'?"),
     ],
 )
 def test_a_mistake_is_one_line_with_file_and_key(tmp_path, before, after, says):
     assert before in GOOD
     path = write(tmp_path, GOOD.replace(before, after))
-    with pytest.raises(SettingsError) as caught:
-        read_model(path)
-    assert says in str(caught.value)
-    assert str(path) in str(caught.value)
-    assert "\n" not in str(caught.value)
+    told = complaint_of(read_model, path)
+    assert says in told
+    assert str(path) in told
 
 
-WHOLE = {
-    **{
-        f"learnt.range.{channel}@{end}": value
-        for channel in FittedRange._fields
-        for end, value in (("low", -1), ("high", 1))
-    },
-    "learnt.turn_rate.yaw@1.0": 0.1,
-}
+WHOLE = learnt_theta(Learnt(FittedRange((-1.0, 1.0), (-1.0, 1.0)), (LearntCurve("turn_rate", "yaw", (1.0,), (0.1,)),)))
 
 
 @pytest.mark.parametrize(
@@ -385,10 +326,7 @@ WHOLE = {
     ],
 )
 def test_a_wrong_name_in_theta_is_refused_in_one_line(changes, says):
-    with pytest.raises(SettingsError) as caught:
-        effects_from({**WHOLE, **changes}, read_robot("duckiebot").figures)
-    assert says in str(caught.value)
-    assert "\n" not in str(caught.value)
+    assert says in complaint_of(effects_from, {**WHOLE, **changes}, ROBOT.figures)
 
 
 def test_a_learnt_curve_without_a_range_is_refused():

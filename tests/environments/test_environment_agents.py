@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from gymnasium.spaces import Box, Dict, Discrete, MultiBinary, MultiDiscrete
+from one_line import complaint_of
 from toy_families import CART, SCREEN, family
 
 from proxytune.domain import make_episode
@@ -16,9 +17,10 @@ def run(kin, agent, seed=1):
     return kin.run(make_episode({}, agent=agent, start=0, seed=seed))
 
 
-@pytest.mark.parametrize(
-    "agent", ["random", "zero", "toys:ahead", "toys:homeward", "toys:Alternating", "toys:Recurrent"]
-)
+KINDS = ("random", "zero", "toys:ahead", "toys:homeward", "toys:Alternating", "toys:Recurrent")
+
+
+@pytest.mark.parametrize("agent", KINDS)
 def test_every_kind_of_agent_acts_and_acts_alike_again(tmp_path, agent):
     kin = family(tmp_path, CART)
     kin.check_agent(agent)
@@ -41,9 +43,7 @@ def test_a_state_that_a_policy_answers_with_is_handed_back(tmp_path):
     ],
 )
 def test_an_agent_that_cannot_act_is_refused(tmp_path, agent, line):
-    with pytest.raises(InputError) as refused:
-        family(tmp_path, CART).check_agent(agent)
-    assert line in str(refused.value)
+    assert line in complaint_of(family(tmp_path, CART).check_agent, agent)
 
 
 @pytest.mark.parametrize(

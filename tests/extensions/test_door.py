@@ -7,11 +7,14 @@ import importlib.util
 import os
 import pickle
 import py_compile
+import re
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
+from one_line import complaint_of
 from processes import ENVIRONMENT
 
 from proxytune.cli.terminal import signals_as_interruptions
@@ -74,16 +77,13 @@ def test_what_runs_is_what_the_file_says_though_its_time_and_size_are_as_before(
 def test_bytecode_that_claims_to_need_no_check_is_not_run(write):
     folder = write("study", family="size = 2\n", other="size = 1\n")
     cached = Path(importlib.util.cache_from_source(str(folder / "family.py")))
-    py_compile.compile(
-        str(folder / "other.py"), str(cached), invalidation_mode=py_compile.PycInvalidationMode.UNCHECKED_HASH
-    )
+    unchecked = py_compile.PycInvalidationMode.UNCHECKED_HASH
+    py_compile.compile(str(folder / "other.py"), str(cached), invalidation_mode=unchecked)
     assert load("family:size", kind="family", beside=folder) == 2
 
 
 def test_modules_of_one_name_in_two_folders_are_not_mixed_up(write):
-    family = (
-        "import helper\nfrom helper import size\n\n\ndef late():\n    import helper as again\n    return again.size\n"
-    )
+    family = "import helper\nfrom helper import size\ndef late():\n    import helper as again\n    return again.size\n"
     one, two = (write(name, helper=f"size = {n}\n", family=family) for n, name in ((1, "one"), (2, "two")))
     for folder, size in ((one, 1), (two, 2), (one, 1)):
         module = {"beside": folder, "kind": "family"}
@@ -94,13 +94,8 @@ def test_modules_of_one_name_in_two_folders_are_not_mixed_up(write):
 
 def test_packages_and_submodules_of_a_folder_import_one_another(write):
     folder = write("study", top="import tools.sharp\nfrom tools import sharp\nsame = tools.sharp is sharp\n")
-    tools = write(
-        "study/tools",
-        __init__="",
-        sharp="from . import blunt\nimport tools.blunt as b\nedge = b.edge\n",
-        blunt="edge = 3\n",
-    )
-    assert tools.is_dir()
+    sharp = "from . import blunt\nimport tools.blunt as b\nedge = b.edge\n"
+    assert write("study/tools", __init__="", sharp=sharp, blunt="edge = 3\n").is_dir()
     assert load("top:same", kind="agent", beside=folder) is True
     assert load("tools.sharp:edge", kind="agent", beside=folder) == 3
 
@@ -151,9 +146,8 @@ def test_what_cannot_be_used_is_told_in_one_line(write, case):
         odd="def (\n",
     )
     name, expected = MISTAKES[case]
-    with pytest.raises(ExtensionError, match=expected) as told:
-        load(name, kind="agent", beside=folder, needs=("begin", "act", "end"), shipped=dict.fromkeys(SHIPPED))
-    assert "\n" not in str(told.value)
+    asked = partial(load, kind="agent", beside=folder, needs=("begin", "act", "end"), shipped=dict.fromkeys(SHIPPED))
+    assert re.search(expected, complaint_of(asked, name))
 
 
 @pytest.mark.parametrize("name", ["pressed:x", "mine:factory"])
@@ -172,45 +166,36 @@ def test_a_class_or_factory_is_called_and_what_has_the_members_is_taken_as_it_is
     folder = write("study", mine=mine + made)
     for name in ("mine:Mine", "mine:ready", "mine:factory"):
         assert load(name, kind="agent", beside=folder, needs=("size",), call=True).size == 1
-    with pytest.raises(
-        ExtensionError, match=r"'mine:broken' raised ZeroDivisionError: division by zero \(mine.py, line 12\); correct"
-    ):
+    told = r"'mine:broken' raised ZeroDivisionError: division by zero \(mine.py, line 12\); correct"
+    with pytest.raises(ExtensionError, match=told):
         load("mine:broken", kind="agent", beside=folder, needs=("size",), call=True)
 
 
 def test_a_plugin_is_loaded_by_its_name_and_listed(install, write, tmp_path):
     install("fast_agents", "agent.quick = fast_agents_code:Quick", "effect.other = fast_agents_code:Other")
-    write(
-        "fast_agents",
-        fast_agents_code="class Quick:\n    def begin(self, robot): return 4\n    def act(self, p, m): ...\n",
-    )
+    quick = "class Quick:\n    def begin(self, robot): return 4\n    def act(self, p, m): ...\n"
+    write("fast_agents", fast_agents_code=quick)
     assert list(plugins("agent", AGENTS)) == ["quick"]
     assert load_agent("quick", tmp_path).begin(None) == 4
     with pytest.raises(ExtensionError, match="agent 'quik' is unknown .*; did you mean 'quick'"):
         load_agent("quik", tmp_path)
-    with pytest.raises(
-        ExtensionError, match="effect 'other': its plug-in fast_agents_code:Other raised AttributeError"
-    ):
+    with pytest.raises(ExtensionError, match="effect 'other': its plug-in fast_agents_code:Other raised Attribut"):
         load("other", kind="effect")
 
 
-def test_two_plugins_of_one_name_are_refused_with_both_packages(install):
-    install("fast_agents", "agent.quick = a:b")
-    install("slow_agents", "agent.quick = c:d")
-    with pytest.raises(ExtensionError, match="'agent.quick' is in both fast_agents and slow_agents; uninstall one"):
-        plugins("agent")
+CLASHES = {
+    "quick": "'agent.quick' is in both fast_agents and slow_agents; uninstall one",
+    "steady": "'agent.steady' of fast_agents has the name of a shipped agent; rename",
+    "very.quick": "'agent.very.quick' of fast_agents must be called agent.NAME, one word",
+}
 
 
-def test_a_plugin_with_the_name_of_something_shipped_is_refused(install):
-    install("fast_agents", "agent.steady = a:b")
-    with pytest.raises(ExtensionError, match="'agent.steady' of fast_agents has the name of a shipped agent; rename"):
-        load("steady", kind="agent", shipped=SHIPPED)
-
-
-def test_a_plugin_whose_name_could_not_be_written_as_one_word_is_refused(install):
-    install("fast_agents", "agent.very.quick = a:b")
-    with pytest.raises(ExtensionError, match="'agent.very.quick' of fast_agents must be called agent.NAME, one word"):
-        plugins("agent")
+@pytest.mark.parametrize("name", CLASHES)
+def test_a_plugin_is_refused_whose_name_another_or_something_shipped_has_or_that_is_no_one_word(install, name):
+    install("fast_agents", f"agent.{name} = a:b")
+    if name == "quick":
+        install("slow_agents", "agent.quick = c:d")
+    assert CLASHES[name] in complaint_of(partial(load, kind="agent", shipped=SHIPPED), name)
 
 
 ELSEWHERE = """

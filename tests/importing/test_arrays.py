@@ -69,12 +69,8 @@ def test_frames_of_another_form_are_left_out_or_refused_when_asked_for(tmp_path)
 
 def test_a_column_map_names_columns_of_arrays_with_units(tmp_path):
     arrays = {**OWN, "timestamps": None, "clock": TIMES * 1e3, "wheels": SPEEDS * 60.0}
-    columns = {
-        **POSE_MAP,
-        "time": "clock:ms",
-        "wheel_command_left": "wheels[0]:rpm",
-        "wheel_command_right": "wheels[1]:rpm",
-    }
+    columns = {**POSE_MAP, "time": "clock:ms"}
+    columns |= {f"wheel_command_{side}": f"wheels[{place}]:rpm" for place, side in enumerate(("left", "right"))}
     (drive,) = read(write_arrays(tmp_path, **arrays), columns=columns).drives
     np.testing.assert_allclose(drive.poses.times, TIMES)
     np.testing.assert_array_equal(drive.poses.places[:, :2], PLACES)
@@ -83,15 +79,8 @@ def test_a_column_map_names_columns_of_arrays_with_units(tmp_path):
 
 
 def test_places_of_a_column_map_are_in_the_user_s_own_frame(tmp_path):
-    path = write_arrays(tmp_path)
-    columns = {
-        "x": "positions[0]",
-        "y": "positions[2]",
-        "heading": "angles",
-        "left": "actions[0]",
-        "right": "actions[1]",
-    }
-    source = read(path, columns=columns)
+    columns = {"x": "positions[0]", "y": "positions[2]", "heading": "angles", "left": "actions[0]"}
+    source = read(write_arrays(tmp_path), columns={**columns, "right": "actions[1]"})
     np.testing.assert_array_equal(source.drives[0].poses.places[:, 1], -PLACES[:, 1])
     assert len(source.notes) == 1
 

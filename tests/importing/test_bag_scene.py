@@ -128,25 +128,16 @@ def test_a_transform_of_the_only_thing_that_moves_is_taken(tmp_path):
     ],
 )
 def test_no_plain_pose_is_told_with_what_there_is(tmp_path, poses, words):
-    others = moving("b", "c", [(0.0, 0.0, 0.0)], TIMES[:1] + 1, "/tf_static")
+    one, other = moving("stage", "a", circle()), moving("stage", "b", circle(), TIMES + 0.01)
+    static = moving("b", "c", [(0.0, 0.0, 0.0)], TIMES[:1] + 1, "/tf_static")
     with pytest.raises(LogError, match=words):
-        read(
-            tmp_path,
-            moving("stage", "a", circle()),
-            moving("stage", "b", circle(), TIMES + 0.01),
-            others,
-            wanted=Wanted(commands="none", poses=poses),
-        )
+        read(tmp_path, one, other, static, wanted=Wanted(commands="none", poses=poses))
 
 
 def test_transforms_in_a_circle_end(tmp_path):
     with pytest.raises(LogError, match="no transforms lead from 'c' to 'a'"):
-        read(
-            tmp_path,
-            moving("b", "a", circle()),
-            moving("a", "b", circle()),
-            wanted=Wanted(commands="none", poses="c>a"),
-        )
+        wanted = Wanted(commands="none", poses="c>a")
+        read(tmp_path, moving("b", "a", circle()), moving("a", "b", circle()), wanted=wanted)
 
 
 def test_a_static_transform_published_again_replaces_the_first(tmp_path):

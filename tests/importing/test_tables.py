@@ -88,9 +88,8 @@ def test_commands_may_have_a_second_clock_in_the_same_table(file):
 
 def test_a_clock_of_commands_that_are_in_another_file_is_refused(file):
     file(COMMANDS, "run1_commands.csv")
-    assert "command_time is the clock of commands in the same table" in complaint(
-        file(POSES), columns={"command_time": "time"}
-    )
+    told = complaint(file(POSES), columns={"command_time": "time"})
+    assert "command_time is the clock of commands in the same table" in told
 
 
 def test_rows_may_hold_commands_or_poses_alone(file):
@@ -145,16 +144,14 @@ def test_quaternions_give_headings_and_tilts(file):
 BOTH_TURNS = "t,x,y,yaw,qx,qy,qz,qw\n0,0,0,2,0,0,0,1\n1,1,0,2,0,0,0,1\n"
 
 
-def test_of_heading_and_quaternion_the_quaternion_is_taken(file):
-    source = read(file(BOTH_TURNS), commands="none")
-    np.testing.assert_array_equal(source.drives[0].poses.headings, 0.0)
-    assert [channel.role for channel in source.channels][3:] == ["left out", "qx", "qy", "qz", "qw"]
-
-
-def test_a_heading_that_is_mapped_goes_before_a_quaternion(file):
-    source = read(file(BOTH_TURNS), commands="none", columns={"heading": "yaw"})
-    np.testing.assert_array_equal(source.drives[0].poses.headings, 2.0)
-    assert [channel.role for channel in source.channels][3:] == ["heading", *["left out"] * 4]
+@pytest.mark.parametrize(
+    ("columns", "heading", "roles"),
+    [({}, 0.0, ["left out", "qx", "qy", "qz", "qw"]), ({"heading": "yaw"}, 2.0, ["heading", *["left out"] * 4])],
+)
+def test_a_quaternion_goes_before_a_heading_but_not_before_one_that_is_mapped(file, columns, heading, roles):
+    source = read(file(BOTH_TURNS), commands="none", columns=columns)
+    np.testing.assert_array_equal(source.drives[0].poses.headings, heading)
+    assert [channel.role for channel in source.channels][3:] == roles
 
 
 def test_a_column_that_is_mapped_is_nothing_else(file):
@@ -253,11 +250,7 @@ def test_without_commands_only_if_asked_for(file):
         (POSES.replace(",0,0.", ",,0."), "line 3, column 'y': is empty beside time, x, heading", "fill it"),
         ("0,0,0,0\n1,1,1,1\n", "line 1: holds numbers", "add a line of names"),
         ("time,x,x\n1,2,3\n", "names the column 'x' twice", "rename"),
-        (
-            "time,x,y\n0,1,2\n1,1,2\n",
-            "no column found for heading (or qx, qy, qz, qw); its columns are: time, x, y",
-            "=",
-        ),
+        ("time,x,y\n0,1,2\n1,1,2\n", "no column found for heading (or qx, qy, qz, qw); its columns are: time", "="),
         ("run,time,x,y,yaw\na,0,0,0,0\n,1,1,0,0\n", "line 3, column 'run': is empty", "name the drive"),
         ("time,stamp,x,y,yaw\n0,0,1,2,0\n", "time may be 'time' or 'stamp'", "--columns time=time"),
         ("time,x,y,heading\n0,0,0,0\n0,1,0,0\n0,2,0,0\n", "all 3 stamps are 0 s", "a clock that runs"),

@@ -189,21 +189,16 @@ def test_a_slower_transform_is_interpolated_within_what_it_covers(tmp_path):
     source = read(tmp_path, moving("map", "odom", drifting, slow), moving("odom", "base_link", circle()))
     poses = source.drives[0].poses
     assert poses.times == pytest.approx(TIMES[6:41], abs=1e-6)
-    assert any(
-        note.endswith("map>odom, odom>base_link; 15 outside of what all of them cover are left out.")
-        for note in source.notes
-    )
+    left_out = "map>odom, odom>base_link; 15 outside of what all of them cover are left out."
+    assert any(note.endswith(left_out) for note in source.notes)
     assert poses.places[:, 0] == pytest.approx(circle()[6:41, 0] + 0.1 * (TIMES[6:41] - TIMES[0]), abs=1e-6)
 
 
 def test_a_turning_transform_is_interpolated_by_the_shortest_turn(tmp_path):
     slow = TIMES[[0, -1]]
     turning = [(0.0, 0.0, np.pi - 0.1), (0.0, 0.0, -np.pi + 0.1)]
-    poses = (
-        read(tmp_path, moving("map", "odom", turning, slow), moving("odom", "base_link", circle() * [1, 1, 0]))
-        .drives[0]
-        .poses
-    )
+    ahead = moving("odom", "base_link", circle() * [1, 1, 0])
+    poses = read(tmp_path, moving("map", "odom", turning, slow), ahead).drives[0].poses
     turned = np.pi - 0.1 + 0.2 * (TIMES - TIMES[0]) / (TIMES[-1] - TIMES[0])
     assert np.unwrap(poses.headings) == pytest.approx(turned, abs=1e-5)
 
@@ -240,23 +235,23 @@ def test_a_bad_transform_elsewhere_does_no_harm(tmp_path):
 
 
 ISSUED = 1.7e9 + np.arange(20) * 0.1
-READING_TIMES = 1.7e9 + np.arange(100) * 0.02
+STAMPED = 1.7e9 + np.arange(100) * 0.02
 TWISTS = np.random.default_rng(1).normal(size=(20, 2))
 POSES = np.random.default_rng(2).normal(size=(100, 3))
-READING_DRIVE = ((ISSUED, TWISTS), (READING_TIMES, POSES))
+BOTH = ((ISSUED, TWISTS), (STAMPED, POSES))
 
 
 @pytest.mark.parametrize("storage", bags.STORAGES)
 def test_a_drive_has_commands_as_received_and_poses_as_stamped(tmp_path, storage):
     clocks = {"command_delay_s": 0.03, "pose_clock_s": -0.2, "pose_delay_s": np.linspace(0.0, 0.01, 100)}
     pictures = (ISSUED[:2], np.zeros((2, 4, 5, 3), dtype=np.uint8))
-    source = read_bag(bags.write_bag(tmp_path / "run.bag", storage, *READING_DRIVE, pictures, **clocks), Wanted())
+    source = read_bag(bags.write_bag(tmp_path / "run.bag", storage, *BOTH, pictures, **clocks), Wanted())
     (drive,) = source.drives
     assert drive.name == ("run" if storage == "ros1" else "run.bag")
     assert drive.commands.kind == "twist"
     assert np.array_equal(drive.commands.values, TWISTS)
     assert drive.commands.times == pytest.approx(ISSUED + 0.03, abs=1e-6)
-    assert drive.poses.times == pytest.approx(READING_TIMES - 0.2, abs=1e-6)
+    assert drive.poses.times == pytest.approx(STAMPED - 0.2, abs=1e-6)
     assert drive.poses.headings == pytest.approx(POSES[:, 2])
     assert [picture.shape for picture in drive.pictures.read()] == [(4, 5, 3)] * 2
     assert "/cmd_vel has no header: its times are when the bag received each message." in source.notes
@@ -265,15 +260,14 @@ def test_a_drive_has_commands_as_received_and_poses_as_stamped(tmp_path, storage
 
 
 def test_the_bags_times_are_taken_where_asked(tmp_path):
-    bag = bags.write_bag(tmp_path / "run", "mcap", *READING_DRIVE, pose_clock_s=-0.2, pose_delay_s=0.01)
-    assert read_bag(bag, Wanted(stamps="receive")).drives[0].poses.times == pytest.approx(
-        READING_TIMES + 0.01, abs=1e-6
-    )
+    bag = bags.write_bag(tmp_path / "run", "mcap", *BOTH, pose_clock_s=-0.2, pose_delay_s=0.01)
+    (one,) = read_bag(bag, Wanted(stamps="receive")).drives
+    assert one.poses.times == pytest.approx(STAMPED + 0.01, abs=1e-6)
 
 
 def test_bags_of_a_folder_are_drives_and_notes_say_of_which(tmp_path):
-    bags.write_bag(tmp_path / "b.bag", "ros1", *READING_DRIVE)
-    bags.write_bag(tmp_path / "a", "mcap", *READING_DRIVE, pose_clock_s=0.3)
+    bags.write_bag(tmp_path / "b.bag", "ros1", *BOTH)
+    bags.write_bag(tmp_path / "a", "mcap", *BOTH, pose_clock_s=0.3)
     source = read_bag(tmp_path, Wanted())
     assert [drive.name for drive in source.drives] == ["a", "b"]
     assert source.form == "2 bags: ROS 1 bag, ROS 2 bag (mcap)"
@@ -283,16 +277,16 @@ def test_bags_of_a_folder_are_drives_and_notes_say_of_which(tmp_path):
 
 def test_bags_of_a_folder_share_their_topics(tmp_path):
     """The second bag has no /mocap, so both are read from /pose."""
-    both = list(bags.pose_messages(*READING_DRIVE[1])) + list(bags.pose_messages(READING_TIMES, -POSES, topic="/mocap"))
-    bags.write_messages(tmp_path / "one.bag", "ros1", [*both, *bags.twist_messages(*READING_DRIVE[0])])
-    bags.write_bag(tmp_path / "two.bag", "ros1", *READING_DRIVE)
+    both = list(bags.pose_messages(*BOTH[1])) + list(bags.pose_messages(STAMPED, -POSES, topic="/mocap"))
+    bags.write_messages(tmp_path / "one.bag", "ros1", [*both, *bags.twist_messages(*BOTH[0])])
+    bags.write_bag(tmp_path / "two.bag", "ros1", *BOTH)
     for drive in read_bag(tmp_path, Wanted()).drives:
         assert np.array_equal(drive.poses.places[:, 0], POSES[:, 0])
 
 
 def test_transforms_of_the_first_bag_are_those_of_all(tmp_path):
     for name, child in (("one.bag", "base_link"), ("two.bag", "robot")):
-        bags.write_messages(tmp_path / name, "ros1", bags.transform_messages("map", child, POSES, READING_TIMES))
+        bags.write_messages(tmp_path / name, "ros1", bags.transform_messages("map", child, POSES, STAMPED))
     with pytest.raises(LogError, match="two.bag: /tf: no transforms lead from 'map' to 'base_link'"):
         read_bag(tmp_path, Wanted(commands="none"))
 
@@ -306,7 +300,7 @@ def test_a_bag_without_messages_is_told(tmp_path, storage):
 
 def test_a_bag_without_definitions_is_read_by_those_of_humble(tmp_path):
     wheels = ("/wheels", "wheel_msgs/msg/WheelsCmdStamped", ISSUED[0], {"vel_left": 1.0})
-    messages = [*bags.pose_messages(*READING_DRIVE[1]), *bags.twist_messages(*READING_DRIVE[0]), wheels]
+    messages = [*bags.pose_messages(*BOTH[1]), *bags.twist_messages(*BOTH[0]), wheels]
     bag = bags.write_messages(tmp_path / "run", "sqlite3", messages)
     with sqlite3.connect(bag / "run.db3") as table:
         table.execute("UPDATE schema SET schema_version = 3")
@@ -317,7 +311,7 @@ def test_a_bag_without_definitions_is_read_by_those_of_humble(tmp_path):
 
 
 def test_messages_that_only_the_metadata_know_are_missing(tmp_path):
-    bag = bags.write_bag(tmp_path / "run", "sqlite3", *READING_DRIVE)
+    bag = bags.write_bag(tmp_path / "run", "sqlite3", *BOTH)
     with sqlite3.connect(bag / "run.db3") as table:
         table.execute("DELETE FROM messages WHERE topic_id = (SELECT id FROM topics WHERE name = '/pose')")
     with pytest.raises(LogError, match="run: /pose: no messages; take another topic, or leave the bag out"):
@@ -327,14 +321,12 @@ def test_messages_that_only_the_metadata_know_are_missing(tmp_path):
 def test_several_publishers_of_a_topic_are_one_topic(tmp_path):
     """ROS 1 keeps a connection for each publisher."""
     store, path = bags.typestore("ros1"), tmp_path / "run.bag"
-    messages = [*bags.pose_messages(*READING_DRIVE[1]), *bags.twist_messages(*READING_DRIVE[0])]
+    messages = [*bags.pose_messages(*BOTH[1]), *bags.twist_messages(*BOTH[0])]
     with bags.rosbag1.Writer(path) as writer:
         for publisher in ("one", "two"):
             half = messages[publisher == "two" :: 2]
-            kinds = dict.fromkeys((topic, kind) for topic, kind, _, _ in half)
-            to = {
-                topic: writer.add_connection(topic, kind, typestore=store, callerid=publisher) for topic, kind in kinds
-            }
+            kinds, how = {topic: kind for topic, kind, _, _ in half}, {"typestore": store, "callerid": publisher}
+            to = {topic: writer.add_connection(topic, kind, **how) for topic, kind in kinds.items()}
             for topic, kind, time, fields in half:
                 raw = store.serialize_ros1(bags.make(store, kind, fields), kind)
                 writer.write(to[topic], bags.nanoseconds(time), raw)

@@ -11,17 +11,9 @@ from hypothesis import given, settings, strategies as st
 from sklearn.gaussian_process.kernels import Matern
 
 from proxytune.errors import InputError
-from proxytune.learning import (
-    AdaptiveDesign,
-    LearningCurve,
-    curves_of,
-    doublings,
-    first_examinations,
-    next_examinations,
-    sample_needs,
-    teaching_value,
-)
+from proxytune.learning import AdaptiveDesign, LearningCurve, doublings
 from proxytune.learning.curve_model import Examined, _matern, counts_at, crossing, draw_curves, fit_curve_model
+from proxytune.learning.plv import curves_of, first_examinations, next_examinations, sample_needs, teaching_value
 
 GRID = (0, 50, 100, 200, 400, 800, 1600, 3200)
 STARTS, BEST, NONE, TOLERANCE = 10, 60.0, "none", 5.0
@@ -63,9 +55,7 @@ class MadeUpLearners:
     def curves(self, repetitions):
         """All examinations of the grid."""
         return {
-            name: LearningCurve(
-                GRID, np.array([[self.score(name, row, n) for n in GRID] for row in range(repetitions)])
-            )
+            name: LearningCurve(GRID, np.array([[self.score(name, r, n) for n in GRID] for r in range(repetitions)]))
             for name in self.names
         }
 
@@ -162,14 +152,14 @@ def test_intervals_hold_the_truth_in_nine_of_ten_of_60_proxies_and_a_third_of_th
     assert all_of_it < third < 0.75 * np.median(bootstrap)
 
 
-CURVE_MODEL_REPETITIONS = 6
+ROUNDS = 6
 AT = np.array([0.0, 1.0, 2.0, 3.0, 4.0, 5.0])
 
 
 def marks(noise, curves=2, seed=0):
     """Curve 0 rises from 10 to 50, curve 1 is 30 everywhere; `noise` is that of each place."""
     generator = np.random.default_rng(seed)
-    rows = [(c, r, p) for c in range(curves) for r in range(CURVE_MODEL_REPETITIONS) for p in range(len(AT))]
+    rows = [(c, r, p) for c in range(curves) for r in range(ROUNDS) for p in range(len(AT))]
     curve, repetition, place = np.array(rows).T
     mean = np.where(curve == 0, 10.0 + 40.0 / (1.0 + np.exp(-2.0 * (AT[place] - 2.5))), 30.0)
     return Examined(curve, repetition, AT[place], mean + np.asarray(noise)[place] * generator.normal(size=len(rows)))
@@ -255,13 +245,13 @@ def test_examinations_and_the_repetitions_that_have_one_are_counted():
     assert curve.repetitions == 2
 
 
-POSTERIOR_GRID = (0, 100, 200, 400, 800)
+STEPS = (0, 100, 200, 400, 800)
 COUNTS = np.array([0.0, 100.0, 200.0, 400.0])
 
 
 def curve(*means, wobble=1.0, seeds=6):
-    noise = wobble * np.random.default_rng(2).normal(size=(seeds, len(POSTERIOR_GRID)))
-    return LearningCurve(POSTERIOR_GRID, np.array(means, dtype=float) + noise)
+    noise = wobble * np.random.default_rng(2).normal(size=(seeds, len(STEPS)))
+    return LearningCurve(STEPS, np.array(means, dtype=float) + noise)
 
 
 def crossed(*scores, threshold=45.0):

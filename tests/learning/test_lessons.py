@@ -12,6 +12,7 @@ import importlib
 import sys
 import zipfile
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,18 +23,8 @@ from wobbly import Wobbly
 
 from proxytune.domain import Demonstration, make_episode
 from proxytune.errors import EpisodeError, LearnerError, StoreError
-from proxytune.learning import (
-    Cache,
-    Costs,
-    Distribution,
-    collect_samples,
-    examine_policy,
-    facts_digest,
-    learner_identity,
-    mix_samples,
-    policy_of,
-)
-from proxytune.learning.lessons import cost_saved, split_samples
+from proxytune.learning import Cache, Costs, Distribution, collect_samples, mix_samples, policy_of
+from proxytune.learning.lessons import cost_saved, examine_policy, facts_digest, learner_identity, split_samples
 from proxytune.learning.plv import plv
 from proxytune.learning.ridge import RandomFeatures
 
@@ -129,12 +120,9 @@ def test_the_expert_drives_for_the_first_samples():
 
 def test_what_is_never_reached_costs_without_end():
     assert split_samples(np.inf, np.inf) == (0.0, np.inf)
-    nothing = (0.0, 0.0)
-    assert cost_saved(COSTS, without=split_samples(np.array([np.inf, 4.0]), np.inf), with_proxy=nothing).tolist() == [
-        np.inf,
-        13.0,
-    ]
-    assert cost_saved(COSTS, without=split_samples(np.inf, 10.0), with_proxy=nothing) == np.inf
+    never, off_policy = split_samples(np.inf, 10.0), split_samples(np.array([np.inf, 4.0]), np.inf)
+    assert cost_saved(COSTS, without=off_policy, with_proxy=(0.0, 0.0)).tolist() == [np.inf, 13.0]
+    assert cost_saved(COSTS, without=never, with_proxy=(0.0, 0.0)) == np.inf
 
 
 def test_what_costs_nothing_adds_nothing_however_many_samples_it_takes():
@@ -178,17 +166,6 @@ class Together(Schoolroom):
 
 
 @dataclass(frozen=True)
-class Unfinished:
-    """Has no finite score from one of its starts."""
-
-    inner: Wobbly
-    score: float
-
-    def examine(self, episode, policy):
-        return self.score if episode.start == 2 else 1.0
-
-
-@dataclass(frozen=True)
 class Manifold(Matrix):
     def act_many(self, weights, observations):
         return observations @ weights["matrix"]
@@ -209,7 +186,8 @@ def test_missing_scores_are_told_in_one_line():
 @pytest.mark.parametrize("score", [np.nan, np.inf, -np.inf])
 def test_a_score_that_is_no_finite_number_is_told_with_its_start(score):
     with pytest.raises(EpisodeError, match=r"the examination from start 2 gave -?(nan|inf); give a finite score"):
-        examine_policy(Unfinished(Wobbly(), score), EPISODES, policy_of(Matrix(), WEIGHTS))
+        unfinished = SimpleNamespace(examine=lambda episode, policy: score if episode.start == 2 else 1.0)
+        examine_policy(unfinished, EPISODES, policy_of(Matrix(), WEIGHTS))
 
 
 def test_a_policy_answers_many_observations_at_once_only_if_its_learner_does():
@@ -319,24 +297,18 @@ def still(observation):
 
 def test_a_guided_lesson_shows_what_the_policy_visits_with_the_experts_commands():
     room = Tightrope(Wobbly())
-    shown, guided = (
-        collect_samples(room, Distribution({}), count=30, seed=1, lesson_s=2.0, policy=policy)
-        for policy in (None, still)
-    )
+    how = {"count": 30, "seed": 1, "lesson_s": 2.0}
+    shown, guided = (collect_samples(room, Distribution({}), policy=policy, **how) for policy in (None, still))
     assert len(guided.commands) == 30
     assert np.array_equal(guided.commands, -1.2 * guided.observations)
     assert np.abs(guided.observations).max() > 2.0 * np.abs(shown.observations).max()
 
 
-def test_a_learner_that_falls_at_once_is_given_more_lessons():
-    samples = collect_samples(
-        Tightrope(Wobbly()), Distribution({}), count=50, seed=1, lesson_s=2.0, policy=lambda seen: np.ones(1) * 5.0
-    )
-    assert len(samples.commands) == 50
-
-
-def test_steps_off_the_road_are_made_up_for_by_further_lessons():
-    samples = collect_samples(Schoolroom(Wobbly(), blocked=0.4), WIDE, count=50, seed=1, lesson_s=1.0)
+@pytest.mark.parametrize(
+    ("room", "policy"), [(Tightrope(Wobbly()), lambda seen: np.full(1, 5.0)), (Schoolroom(Wobbly(), blocked=0.4), None)]
+)
+def test_where_a_learner_falls_at_once_or_the_road_is_left_further_lessons_make_up_for_it(room, policy):
+    samples = collect_samples(room, Distribution({}), count=50, seed=1, lesson_s=1.0, policy=policy)
     assert len(samples.commands) == 50
 
 

@@ -6,18 +6,8 @@ Examinations go where they tell most about PLV, by a rule that only the known sc
 import numpy as np
 import pytest
 
-from proxytune.learning import (
-    AdaptiveDesign,
-    Examination,
-    LearningCurve,
-    first_examinations,
-    mean_score,
-    more_needed,
-    next_examinations,
-    sample_needs,
-    teaching_value,
-)
-from proxytune.learning.plv import general_plv, plv
+from proxytune.learning import AdaptiveDesign, Examination, LearningCurve, first_examinations, mean_score
+from proxytune.learning.plv import general_plv, more_needed, next_examinations, plv, sample_needs, teaching_value
 
 GRID = (0, 100, 200, 400, 800)
 
@@ -197,10 +187,8 @@ def test_a_grid_from_few_samples_on_has_no_place_twice_and_none_before_the_first
     grid = (0, first, 8, 64, 512)
     spending = AdaptiveDesign("none", grid, 4, 12)
     scores = np.array([[np.nan, 1.0, 5.0, 30.0, 50.0], [np.nan, 3.0, 9.0, 35.0, 49.0]])
-    curves = {
-        "none": LearningCurve(grid, scores),
-        "proxy": LearningCurve(grid, np.where(np.isnan(scores), 0.0, scores + 1.0)),
-    }
+    taught = LearningCurve(grid, np.where(np.isnan(scores), 0.0, scores + 1.0))
+    curves = {"none": LearningCurve(grid, scores), "proxy": taught}
     found = sample_needs(curves, none="none", best_score=60.0, tolerance=5.0, draws=300)
     chosen = next_examinations(found, list(curves), spending)
     assert len(set(chosen)) == len(chosen) == spending.batch

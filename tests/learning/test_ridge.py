@@ -11,11 +11,6 @@ from proxytune.learning.ridge import RandomFeatures
 SMALL = RandomFeatures(rows=3, columns=4, features=200)
 
 
-def mirrored(samples):
-    """The same pictures, with the steering the other way round."""
-    return samples._replace(commands=samples.commands[:, ::-1].copy())
-
-
 def test_its_weights_are_the_least_of_squared_errors_and_penalty():
     samples = pictures(80, 1)
     weights = SMALL.train(samples, None, 1)
@@ -37,7 +32,7 @@ def test_starting_from_weights_few_samples_leave_the_answer_to_other_pictures_as
     start = SMALL.train(pictures(400, 1), None, 1)
     fresh = pictures(200, 2)
     right, left = (np.flatnonzero(side)[:20] for side in (fresh.commands[:, 1] > 0.37, fresh.commands[:, 1] < 0.23))
-    few = mirrored(Demonstration(fresh.observations[right], fresh.commands[right]))
+    few = Demonstration(fresh.observations[right], fresh.commands[right, ::-1].copy())  # steering to the other side
     others = Demonstration(fresh.observations[left], fresh.commands[left])
     tuned = SMALL.train(few, start, 1)
     assert error(SMALL, tuned, few) < 0.1 * error(SMALL, start, few)

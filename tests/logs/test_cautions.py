@@ -119,12 +119,8 @@ def drive_of_car(exchange):
     speed, turn = 2.0 * held[:, 0], 2.0 * held[:, 0] * np.tan(0.42 * held[:, 1]) / 0.33
     heading = np.concatenate(([0.0], np.cumsum(0.05 * turn)[:-1]))
     x, y = (np.concatenate(([0.0], np.cumsum(0.05 * speed * of(heading))[:-1])) for of in (np.cos, np.sin))
-    drive = replace(
-        LOG.episodes[0],
-        times=times,
-        poses=np.column_stack((x, y, heading)),
-        commands=held[:, ::-1] if exchange else held,
-    )
+    commands, poses = held[:, ::-1] if exchange else held, np.column_stack((x, y, heading))
+    drive = replace(LOG.episodes[0], times=times, poses=poses, commands=commands)
     return replace(LOG, command="ackermann", episodes=(drive,))
 
 

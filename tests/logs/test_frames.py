@@ -8,10 +8,10 @@ import pandas as pd
 import pytest
 from hypothesis import given, settings, strategies as st
 from log_folders import complaint, write_files
+from one_line import complaint_of
 from PIL import Image
 
 from proxytune.api import log_of
-from proxytune.errors import LogError
 from proxytune.logs import Frames, read_log, read_pictures
 
 BASE = 'format = 1\nrobot = "tractor"\ncommand = "twist"\nrate_hz = 10\n'
@@ -62,9 +62,8 @@ def test_a_global_shutter_takes_no_time_and_an_unstated_one_is_not_known(folder,
 
 
 def test_frames_before_the_first_pose_and_after_the_last_are_left_out(folder):
-    frames = read_log(
-        folder(HEADER + "7,a,4.9\n8,a,5.0\n9,a,5.4\n10,b,0.0\n11,b,0.1\n12,b,9\n", pictures=(8, 11))
-    ).frames
+    listed = HEADER + "7,a,4.9\n8,a,5.0\n9,a,5.4\n10,b,0.0\n11,b,0.1\n12,b,9\n"
+    frames = read_log(folder(listed, pictures=(8, 11))).frames
     assert [path.name for path in frames.paths] == ["0008.jpg", "0011.jpg"]
     assert frames.times.tolist() == [5.0, 0.1]
 
@@ -174,11 +173,8 @@ def test_frames_without_any_pose_are_refused(folder):
 
 
 def test_missing_pictures_are_counted_and_the_first_is_named(folder):
-    says = complaint(folder(pictures=(7,)))
-    assert (
-        says
-        == "/frames/0009.jpg: no such picture, 2 of 3 are missing; add them, or name those that there are in frames.csv"
-    )
+    remedy = "add them, or name those that there are in frames.csv"
+    assert complaint(folder(pictures=(7,))) == f"/frames/0009.jpg: no such picture, 2 of 3 are missing; {remedy}"
 
 
 def test_a_log_from_tables_has_no_frames():
@@ -200,13 +196,6 @@ def frames_of(tmp_path):
         return Frames(paths, np.zeros(len(paths), dtype=np.int64), np.arange(float(len(paths))), "small_loop")
 
     return write
-
-
-def complaint_of_pictures(frames, numbers=(0,)):
-    with pytest.raises(LogError) as caught:
-        read_pictures(frames, numbers)
-    assert "\n" not in str(caught.value)
-    return str(caught.value)
 
 
 def noise(rows, columns, seed=5):
@@ -261,26 +250,24 @@ def test_some_of_the_pictures_are_read_in_the_order_asked_for(frames_of):
 
 
 def test_pictures_of_two_sizes_are_refused_with_both(frames_of):
-    says = complaint_of_pictures(frames_of(noise(12, 16), noise(12, 16), noise(12, 20)), [0, 1, 2])
+    says = complaint_of(read_pictures, frames_of(noise(12, 16), noise(12, 16), noise(12, 20)), [0, 1, 2])
     assert says.endswith("2.png: is 20 × 12, but 0.png is 16 × 12; give all pictures one size")
 
 
 def test_sixteen_bits_a_pixel_are_refused(frames_of):
-    assert "more than 8 bits a pixel" in complaint_of_pictures(
-        frames_of(Image.fromarray(np.full((12, 16), 40000, dtype=np.uint16)))
-    )
+    deep = frames_of(Image.fromarray(np.full((12, 16), 40000, dtype=np.uint16)))
+    assert "more than 8 bits a pixel" in complaint_of(read_pictures, deep, [0])
 
 
 def test_a_picture_that_is_gone_is_named(frames_of):
     frames = frames_of(noise(12, 16))
     frames.paths[0].unlink()
-    assert complaint_of_pictures(frames) == f"{frames.paths[0]}: no such file; add the picture"
+    assert complaint_of(read_pictures, frames, [0]) == f"{frames.paths[0]}: no such file; add the picture"
 
 
 @pytest.mark.parametrize("ending", ["png", "jpg"])
 def test_a_picture_that_is_cut_off_is_refused(frames_of, ending):
     frames = frames_of(LARGE, ending=ending)
     frames.paths[0].write_bytes(frames.paths[0].read_bytes()[:2000])
-    assert complaint_of_pictures(frames).endswith(
-        f"0.{ending}: is not a whole PNG or JPEG picture; save it again or leave its frame out"
-    )
+    remedy = "save it again or leave its frame out"
+    assert complaint_of(read_pictures, frames, [0]).endswith(f"is not a whole PNG or JPEG picture; {remedy}")

@@ -46,9 +46,7 @@ def test_the_first_wrong_cell_of_the_first_wrong_column_is_told_from_however_far
 
 
 def test_a_row_with_a_cell_too_many_is_told_by_its_line(folder):
-    assert "line 9: has 8 cells, but the first line names 7 columns" in complaint(
-        folder(changed({7: (",2,", ",2,1,")}))
-    )
+    assert "line 9: has 8 cells, but the first line names 7" in complaint(folder(changed({7: (",2,", ",2,1,")})))
 
 
 def test_an_episode_that_comes_back_is_told_though_it_was_read_long_before(folder):

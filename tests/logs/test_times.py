@@ -18,8 +18,10 @@ COMMANDS = "episode,time,v,omega\na,3.5,0.5,0.0\n"
 
 @pytest.fixture
 def folder(tmp_path):
-    def write(samples, commands=COMMANDS, description=TOML):
-        return write_files(tmp_path, {"log.toml": description, "samples.csv": samples, "commands.csv": commands})
+    def write(samples, description=TOML):
+        """With commands at times of their own, unless the samples have some."""
+        commands = {} if ",v,omega" in samples else {"commands.csv": COMMANDS}
+        return write_files(tmp_path, {"log.toml": description, "samples.csv": samples, **commands})
 
     return write
 
@@ -79,9 +81,8 @@ def test_of_two_poses_at_one_step_the_later_takes_the_next(folder):
     (episode,) = read_log(folder(rows(times, circle(times)))).episodes
     np.testing.assert_array_equal(episode.measured.times, times)
     assert (np.diff(episode.measured.rows) > 0).all()
-    np.testing.assert_allclose(
-        episode.poses[episode.measured.rows], circle(episode.times[episode.measured.rows]), atol=1e-4
-    )
+    known = episode.measured.rows
+    np.testing.assert_allclose(episode.poses[known], circle(episode.times[known]), atol=1e-4)
 
 
 def test_poses_more_than_a_step_from_a_free_one_are_left_out(folder):
@@ -91,9 +92,8 @@ def test_poses_more_than_a_step_from_a_free_one_are_left_out(folder):
 
 
 def test_commands_beside_the_poses_are_issued_at_the_times_of_their_rows(folder):
-    home = folder("episode,time,v,omega,x,y,heading\na,0.0,0.5,0,0,0,0\na,0.013,0.6,0,0,0,0\na,0.031,0.7,0,0,0,0\n")
-    (home / "commands.csv").unlink()
-    (episode,) = read_log(home).episodes
+    text = "episode,time,v,omega,x,y,heading\na,0.0,0.5,0,0,0,0\na,0.013,0.6,0,0,0,0\na,0.031,0.7,0,0,0,0\n"
+    (episode,) = read_log(folder(text)).episodes
     np.testing.assert_array_equal(episode.issued, [0.0, 0.013, 0.031])
     np.testing.assert_array_equal(episode.commands[:, 0], [0.5, 0.6, 0.7])
 
@@ -134,15 +134,13 @@ def test_minutes_taken_for_seconds_are_refused_with_line_and_remedy(folder):
 
 def test_a_single_pose_a_drive_is_refused(folder):
     text = "episode,time,v,omega,x,y,heading\na,0.0,0.5,0,0,0,0\na,0.013,0.6,0,,,\n"
-    home = folder(text)
-    (home / "commands.csv").unlink()
     with pytest.raises(LogError, match="no drive has two measured poses"):
-        read_log(home)
+        read_log(folder(text))
 
 
 def test_a_declared_clock_offset_moves_the_commands_to_the_poses_clock(folder):
     times = jittered()
-    log = read_log(folder(rows(times, circle(times)), description=TOML + "clock_offset_s = -0.25\n"))
+    log = read_log(folder(rows(times, circle(times)), TOML + "clock_offset_s = -0.25\n"))
     assert (log.clock_offset_s, log.fit_clock_offset) == (-0.25, False)
     np.testing.assert_allclose(log.episodes[0].issued, [3.25])
     np.testing.assert_array_equal(log.episodes[0].measured.times, times)
@@ -150,7 +148,5 @@ def test_a_declared_clock_offset_moves_the_commands_to_the_poses_clock(folder):
 
 def test_commands_on_a_grid_get_times_of_their_own_by_a_clock_offset(folder):
     text = "episode,time,v,omega,x,y,heading\na,0.0,0.5,0,0,0,0\na,0.1,0.6,0,0,0,0\n"
-    home = folder(text, description=TOML + "rate_hz = 10\nclock_offset_s = 0.02\n")
-    (home / "commands.csv").unlink()
-    (episode,) = read_log(home).episodes
+    (episode,) = read_log(folder(text, TOML + "rate_hz = 10\nclock_offset_s = 0.02\n")).episodes
     np.testing.assert_allclose(episode.issued, [0.02, 0.12])

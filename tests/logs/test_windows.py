@@ -3,8 +3,10 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from hidden_cases import CLEAN, make_log
+from log_folders import write_files
 
 from proxytune.diagnosis import robot_of
 from proxytune.diagnosis.motion.diagnose import diagnose
@@ -77,9 +79,8 @@ def test_whole_drives_stay_as_they_are():
 
 def test_one_line_says_that_they_are_joined():
     (line,) = log_cautions(windows(), {})
-    assert line.startswith(
-        "18 of its 20 drives go on a sample after the one before, where that ended: they are windows"
-    )
+    assert line.startswith("18 of its 20 drives go on a sample after the one before, where that ended")
+    assert "they are windows" in line
     assert "of 2 drives" in line
 
 
@@ -96,18 +97,11 @@ def written(folder, names):
     drawn = np.random.default_rng(4)
     times = np.arange(400) / 20.0 + drawn.uniform(-0.005, 0.005, 400)
     poses = np.stack((0.3 * times, 0.1 * np.sin(times), 0.1 * np.cos(times)), axis=1)
-    rows = [
-        f"{name},{t!r},{x!r},{y!r},{h!r}"
-        for name, t, (x, y, h) in zip(names, times.tolist(), poses.tolist(), strict=True)
-    ]
-    sent = [
-        f"{name},{t!r},0.3,{float(0.1 * np.sin(t))!r}" for name, t in zip(names, (times - 0.013).tolist(), strict=True)
-    ]
-    folder.mkdir()
-    (folder / "samples.csv").write_text("\n".join(("episode,time,x,y,heading", *rows)))
-    (folder / "commands.csv").write_text("\n".join(("episode,time,v,omega", *sent)))
-    (folder / "log.toml").write_text('format = 1\nrobot = "duckiebot"\ncommand = "twist"\n')
-    return read_log(folder)
+    shown = {"episode": names, "time": times, **dict(zip(("x", "y", "heading"), poses.T, strict=True))}
+    sent = {"episode": names, "time": times - 0.013, "v": 0.3, "omega": 0.1 * np.sin(times - 0.013)}
+    tables = {"samples.csv": shown, "commands.csv": sent}
+    files = {name: pd.DataFrame(columns).to_csv(index=False) for name, columns in tables.items()}
+    return read_log(write_files(folder, {**files, "log.toml": 'format = 1\nrobot = "duckiebot"\ncommand = "twist"\n'}))
 
 
 def test_windows_whose_poses_have_times_of_their_own_are_joined(tmp_path):

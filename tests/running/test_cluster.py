@@ -105,10 +105,7 @@ def test_what_listens_and_is_no_scheduler_is_told_in_one_line(make_study, capsys
 
 @pytest.mark.parametrize(
     ("words", "complaint"),
-    [
-        (["--backend", "dask"], "--backend dask: give --address too"),
-        (["--address", "tcp://h:1"], "is for --backend dask"),
-    ],
+    [(["--backend", "dask"], "--backend dask: give --address"), (["--address", "tcp://h:1"], "is for --backend dask")],
 )
 def test_backend_and_address_go_together(make_study, capsys, words, complaint):
     assert main(["study", str(make_study()), *words]) == 2
@@ -143,10 +140,8 @@ def test_nobody_waits_for_a_worker_that_stops_before_it_hands_over_what_it_has_d
     flag = tmp_path / "flag"
 
     def results():
-        with (
-            on_cluster(cluster.scheduler_address),
-            working(partial(doubled_and_stopped, flag), range(20), jobs=1) as came,
-        ):
+        work = partial(doubled_and_stopped, flag)
+        with on_cluster(cluster.scheduler_address), working(work, range(20), jobs=1) as came:
             return list(came)
 
     with ThreadPoolExecutor(1) as thread:

@@ -41,13 +41,8 @@ def family(domain, *, model):
     return Mine(**vars(deadly(domain, model=model)))
 """
 HELPER = "def same(scores):\n    return scores\n"
-SIGNALS = {
-    "kill": signal.SIGKILL,
-    "term": signal.SIGTERM,
-    "stop": signal.SIGSTOP,
-    "go": signal.SIGCONT,
-    "interrupt": signal.SIGINT,
-}
+SIGNALS = {"kill": signal.SIGKILL, "term": signal.SIGTERM, "stop": signal.SIGSTOP, "go": signal.SIGCONT}
+SIGNALS["interrupt"] = signal.SIGINT
 GONE = "no worker is there"
 LIMITS = {"limit": "episode_timeout_s", "budget": "budget"}
 PATTERNS = {

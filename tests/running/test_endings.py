@@ -33,13 +33,14 @@ def but_last(outcomes):
     return {episode: outcome for episode, outcome in outcomes.items() if episode != LAST}
 
 
-@pytest.mark.parametrize(
-    ("fault", "raised"), [("exits", "SystemExit: 0"), ("own error", r"OwnError: of its own caf\udce9")]
-)
-def test_what_an_agent_raises_that_is_no_exception_fails_its_episode_alone(fault, raised):
+RAISED = {"exits": "SystemExit: 0", "own error": r"OwnError: of its own caf\udce9"}
+
+
+@pytest.mark.parametrize("fault", RAISED)
+def test_what_an_agent_raises_that_is_no_exception_fails_its_episode_alone(fault):
     whole, found = run_all(()), run_all((f"agent2:2:{fault}",))
     assert but_last(found) == but_last(whole)
-    assert found[LAST].startswith(f"the agent or the domain family raised {raised} (deadly.py, line ")
+    assert found[LAST].startswith(f"the agent or the domain family raised {RAISED[fault]} (deadly.py, line ")
 
 
 class Pressed(Deadly):

@@ -131,9 +131,8 @@ def test_where_a_fleet_as_a_whole_fails_its_episodes_are_run_one_by_one(family):
 
 def test_an_episode_without_a_metric_fails_in_a_fleet_as_by_itself():
     found, _ = run_all(family=Unlike)
-    assert set(found.values()) == {
-        f"agent '{one.agent}': the domain family gave no finite 'survival_time'" for one in EPISODES
-    }
+    lacks = "the domain family gave no finite 'survival_time'"
+    assert set(found.values()) == {f"agent '{one.agent}': {lacks}" for one in EPISODES}
 
 
 def test_the_time_of_a_fleet_is_shared_by_its_episodes(monkeypatch):
@@ -142,12 +141,10 @@ def test_the_time_of_a_fleet_is_shared_by_its_episodes(monkeypatch):
     assert [one.seconds for one in run_fleet(Convoy(), EPISODES[:6])] == [pytest.approx(0.1)] * 6
 
 
-def sizes(count, jobs, seconds=None, most_s=MOST_S, **how):
+def sizes(count, jobs, seconds=None, most_s=MOST_S):
     many = [make_episode({}, agent="agent0", start=0, seed=seed) for seed in range(count)]
     known = {} if seconds is None else {("agent0", 0): seconds}
-    cut = list(
-        in_fleets(many, jobs, **{"apart": lambda _: False, "skip": lambda _: False, **how}, known=known, most_s=most_s)
-    )
+    cut = list(in_fleets(many, jobs, lambda _: False, lambda _: False, known, most_s))
     assert len(set(itertools.chain.from_iterable(cut))) == sum(map(len, cut))
     return [len(fleet) for fleet in cut]
 

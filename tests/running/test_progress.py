@@ -11,10 +11,16 @@ STUDY = ("fresh episodes 2 of 3", "episodes", 3.25)
 TEACHING = ("demonstrations", "points of learning curves", None)
 
 
-def shown(terminal, monkeypatch, width=120, colours=None, what=("trial 2 of 2", "episodes", 4.0)):
+def written(monkeypatch, terminal=False, width=120, colours=None):
+    """What is written from now on."""
     text = io.StringIO()
     console = Console(file=text, force_terminal=terminal, width=width, color_system=colours)
     monkeypatch.setattr("proxytune.running.progress.Console", lambda stderr: console)
+    return text
+
+
+def shown(terminal, monkeypatch, width=120, colours=None, what=("trial 2 of 2", "episodes", 4.0)):
+    text = written(monkeypatch, terminal, width, colours)
     step, unit, best = what
     with Bars(1636, unit) as bars:
         bars.begin(step, 36)
@@ -71,9 +77,7 @@ def test_no_color_leaves_the_bar_without_colours(monkeypatch):
 
 @pytest.mark.parametrize("terminal", [True, False])
 def test_an_episode_that_waits_is_told_of_ever_more_rarely_on_a_terminal_too(monkeypatch, terminal):
-    text = io.StringIO()
-    console = Console(file=text, force_terminal=terminal, width=60, color_system=None)
-    monkeypatch.setattr("proxytune.running.progress.Console", lambda stderr: console)
+    text = written(monkeypatch, terminal, 60)
     with Bars(5) as bars:
         for seconds in (60.0, 66.0, 119.0, 121.0, 130.0, 245.0, 300.0):
             bars.waiting("agent 'one' from start 3", seconds)
@@ -85,8 +89,7 @@ def test_an_episode_that_waits_is_told_of_ever_more_rarely_on_a_terminal_too(mon
 
 
 def test_a_run_of_which_nothing_is_known_says_at_once_that_it_has_begun(monkeypatch):
-    text = io.StringIO()
-    monkeypatch.setattr("proxytune.running.progress.Console", lambda stderr: Console(file=text, width=120))
+    text = written(monkeypatch)
     with Bars(432) as bars:
         bars.begin("pre-flight 1 of 2", 0)
         bars.begin("pre-flight 2 of 2", 0)

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from one_line import complaint_of
 
 from proxytune.errors import ScoresError
 from proxytune.scores import both_metrics, expand, read_scores
@@ -58,11 +59,8 @@ def test_counts_become_a_row_a_rollout(file, text):
 
 
 def test_standard_errors_are_read_from_cells_and_from_a_column(file):
-    for text in (
-        "policy,success\na,0.61 ± 0.05\nb,20 % +/- 4 %\n",
-        "policy,success,success se\na,0.61,0.05\nb,0.2,0.04\n",
-    ):
-        table = read_scores(file(text), ["success"])
+    for text in ("success\na,0.61 ± 0.05\nb,20 % +/- 4 %\n", "success,success se\na,0.61,0.05\nb,0.2,0.04\n"):
+        table = read_scores(file(f"policy,{text}"), ["success"])
         assert np.allclose(table.means[:, 0], [0.61, 0.2])
         assert np.allclose(table.errors[:, 0], [0.05, 0.04])
 
@@ -93,11 +91,7 @@ def test_dictionaries_in_a_python_file_are_read_and_nothing_is_run(file, tmp_pat
         ("a.csv", "policy,success,n\na,0.5,x\n", "must be a whole number"),
         ("a.csv", "policy,success,n\na,0.333,4\n", "no whole number of successes"),
         ("a.csv", "policy,success\na,26 of 25\n", "must be a finite number, got '26 of 25'"),
-        (
-            "a.csv",
-            "policy,success\na,18 of 25\nb,x of 25\n",
-            "line 3, column 'success': must be a finite number, got 'x",
-        ),
+        ("a.csv", "policy,success\na,18 of 25\nb,x of 25\n", "line 3, column 'success': must be a finite number"),
         ("a.csv", "policy,success\na,18 of 25\nb,0.5\n", "line 3: has no counts of rollouts, as other lines have"),
         ("a.csv", "policy,success,success se\na,0.5,-1\n", "standard error must be zero or more"),
         ("a.json", "{", "not readable as JSON"),
@@ -110,14 +104,9 @@ def test_dictionaries_in_a_python_file_are_read_and_nothing_is_run(file, tmp_pat
     ],
 )
 def test_what_is_wrong_is_one_line(file, name, text, complaint):
-    with pytest.raises(ScoresError, match=complaint) as problem:
-        read_scores(file(text, name), ["success"])
-    assert "\n" not in str(problem.value)
+    assert complaint in complaint_of(read_scores, file(text, name), ["success"])
 
 
 def test_patterns_stand_for_columns():
-    assert expand(["task_*:max", "time:min"], ["agent", "task_a", "task_b", "time"]) == [
-        "task_a:max",
-        "task_b:max",
-        "time:min",
-    ]
+    expanded = expand(["task_*:max", "time:min"], ["agent", "task_a", "task_b", "time"])
+    assert expanded == ["task_a:max", "task_b:max", "time:min"]

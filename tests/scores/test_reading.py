@@ -1,6 +1,7 @@
 """Score tables are read strictly and written reproducibly."""
 
 import pytest
+from one_line import complaint_of
 
 from proxytune.errors import ScoresError
 from proxytune.scores import read_domains, read_scores, write_scores
@@ -47,10 +48,7 @@ def test_domains_are_read_apart(csv):
         ("name,trial,distance\nA,1,2\n", "columns found: name, trial, distance; rename the one that names the agents"),
         ("name,trial,distance\nA,1,2\n", "or give its name: --columns agent=name (in study.toml: target_columns)"),
         ("agent;distance\nA;1,234.5\n", "'1,234.5' has a comma, but line 2 has '1,234.5'"),
-        (
-            "agent;distance\nA;1,5\nB;1.5\n",
-            "line 2, column 'distance': '1,5' has a comma, but line 3 has '1.5'; write all",
-        ),
+        ("agent;distance\nA;1,5\nB;1.5\n", "line 2, column 'distance': '1,5' has a comma, but line 3 has '1.5'"),
         ("agent,distanc\nA,1\n", "no column 'distance'; did you mean 'distanc'?"),
         ("agent,distance,distance\nA,1,2\n", "column 'distance' twice"),
         ("agent,distance\nA,1\nB,nan\n", "line 3, column 'distance': must be a finite number, got 'nan'"),
@@ -75,11 +73,9 @@ def test_domains_are_read_apart(csv):
 )
 def test_a_bad_file_gives_one_line_with_file_place_and_remedy(csv, text, complaint):
     path = csv(text)
-    with pytest.raises(ScoresError) as problem:
-        read_scores(path, ["distance"])
-    assert str(problem.value).startswith(f"{path}: ")
-    assert complaint in str(problem.value)
-    assert "\n" not in str(problem.value)
+    told = complaint_of(read_scores, path, ["distance"])
+    assert told.startswith(f"{path}: ")
+    assert complaint in told
 
 
 def test_the_domain_must_be_chosen_and_known(csv, tmp_path):
@@ -101,9 +97,8 @@ def test_writing_gives_the_same_bytes_and_reading_the_same_values(csv, tmp_path)
     write_scores(table, tmp_path / "one.csv")
     write_scores(read_scores(tmp_path / "one.csv", ["distance", "time"]), tmp_path / "two.csv")
     assert (tmp_path / "one.csv").read_bytes() == (tmp_path / "two.csv").read_bytes()
-    assert (
-        tmp_path / "one.csv"
-    ).read_text() == "agent,episode,distance,time\nA,1,0.1,10.0\nA,2,2.5,20.0\nB,1,3.0,30.0\n"
+    written = "agent,episode,distance,time\nA,1,0.1,10.0\nA,2,2.5,20.0\nB,1,3.0,30.0\n"
+    assert (tmp_path / "one.csv").read_text() == written
 
 
 def test_a_table_that_cannot_be_written_leaves_nothing_behind(csv, tmp_path):
@@ -140,15 +135,10 @@ def test_a_name_in_a_column_map_that_no_file_has_is_refused(csv):
 
 def test_several_files_make_one_table(csv):
     whole = read_scores(csv(GOOD), ["distance"])
-    parts = [
-        csv("agent,episode,distance\nA,1,1.5\n", "one.csv"),
-        csv("agent;episode;distance\nA;2;2,5\nB;1;3\n", "two.csv"),
-    ]
-    table = read_scores(parts, ["distance"])
+    one, two = csv("agent,episode,distance\nA,1,1.5\n", "one.csv"), "agent;episode;distance\nA;2;2,5\nB;1;3\n"
+    table = read_scores([one, csv(two, "two.csv")], ["distance"])
     assert (table.agents, table.episodes, table.means.tolist()) == (whole.agents, whole.episodes, whole.means.tolist())
-    with pytest.raises(
-        ScoresError, match=r"two.csv: line 2: agent 'A' has episode '1' twice, once in .*one.csv; number"
-    ):
-        read_scores([parts[0], csv("agent,episode,distance\nA,1,2\n", "two.csv")], ["distance"])
+    with pytest.raises(ScoresError, match=r"two.csv: line 2: agent 'A' has episode '1' twice, once in .*one.csv; num"):
+        read_scores([one, csv("agent,episode,distance\nA,1,2\n", "two.csv")], ["distance"])
     with pytest.raises(ScoresError, match=r"two.csv: has no column 'episode', which .*one.csv has; add it"):
-        read_scores([parts[0], csv("agent,distance\nB,2\n", "two.csv")], ["distance"])
+        read_scores([one, csv("agent,distance\nB,2\n", "two.csv")], ["distance"])

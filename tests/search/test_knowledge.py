@@ -1,7 +1,4 @@
-"""What is known of θ after a search: the truth is inside, who tells what is told, and nothing depends on order.
-
-What is known of θ after a search: the truth is inside, who tells what is told, and nothing depends on order.
-"""
+"""What is known of θ after a search: the truth is inside, who tells what is told, and nothing depends on order."""
 
 import numpy as np
 import pytest

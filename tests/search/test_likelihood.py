@@ -73,7 +73,7 @@ def test_an_output_that_is_far_off_counts_for_less_than_a_normal_s_would():
     assert deviance(np.array([10.0]))[0] < 10.0
 
 
-def outputs_of_output_model(values):
+def five_outputs(values):
     """Two smooth outputs, a rough one, one that never changes, one that comes to its bound."""
     first, second = to_unit(SPACE, values)
     rough = np.random.default_rng([int(1e6 * first), int(1e6 * second)]).normal()
@@ -82,7 +82,7 @@ def outputs_of_output_model(values):
 
 def trials(count, seed=1):
     points = [design_point(SPACE, index, seed) for index in range(count)]
-    return [Trial(values, 1.0, outputs_of_output_model(values)) for values in points]
+    return [Trial(values, 1.0, five_outputs(values)) for values in points]
 
 
 HELD_OUT = [design_point(SPACE, index, 9) for index in range(64)]
@@ -91,7 +91,7 @@ HELD_OUT = [design_point(SPACE, index, 9) for index in range(64)]
 def test_smooth_outputs_are_predicted_where_no_trial_was_and_others_are_not_trusted():
     model = fit_outputs(SPACE, trials(32))
     mean, _ = model.predict(unit_array(SPACE, HELD_OUT))
-    truth = np.array([outputs_of_output_model(values) for values in HELD_OUT])
+    truth = np.array([five_outputs(values) for values in HELD_OUT])
     errors = np.sqrt(np.mean((mean - truth) ** 2, axis=0))
     assert errors[0] < 0.05
     assert errors[1] < 0.05
@@ -103,7 +103,7 @@ def test_smooth_outputs_are_predicted_where_no_trial_was_and_others_are_not_trus
 def test_each_output_s_errors_are_as_large_as_its_variance_says():
     model = fit_outputs(SPACE, trials(32))
     mean, variance = model.predict(unit_array(SPACE, HELD_OUT))
-    truth = np.array([outputs_of_output_model(values) for values in HELD_OUT])
+    truth = np.array([five_outputs(values) for values in HELD_OUT])
     squares = np.mean((truth - mean)[:, :3] ** 2 / (variance + model.rough)[:, :3], axis=0)
     assert (squares > 0.05).all()
     assert (squares < 5.0).all()
@@ -130,11 +130,6 @@ def test_the_order_of_trials_changes_no_bit():
     points = unit_array(SPACE, HELD_OUT)
     for one, other in zip(forwards.predict(points), backwards.predict(points), strict=True):
         assert np.array_equal(one, other, equal_nan=True)
-
-
-def test_without_an_outcome_it_says_so():
-    with pytest.raises(RunError, match="no trial has an outcome"):
-        fit_outputs(SPACE, [Trial((0.1, 0.1), 3.0)])
 
 
 def test_outputs_that_never_change_are_not_modelled_and_stop_nothing():
@@ -172,17 +167,15 @@ def test_a_cheaper_proxy_that_does_something_else_makes_no_promise():
     """What it says is not believed: errors are as large as the model says."""
     own = [Trial(values, 1.0, better(values)) for values in (design_point(SPACE, index, 1) for index in range(12))]
     draws = np.random.default_rng(1).normal(0.0, 2.0, (64, 2))
-    low = [
-        Trial(design_point(SPACE, index, 2), None, tuple(row), low_fidelity=True)
-        for index, row in enumerate(draws.tolist())
-    ]
+    points = [design_point(SPACE, index, 2) for index in range(64)]
+    low = [Trial(p, None, tuple(row), low_fidelity=True) for p, row in zip(points, draws.tolist(), strict=True)]
     model = fit_outputs(SPACE, [*low, *own])
     mean, variance = model.predict(unit_array(SPACE, HELD_OUT))
     truth = np.array([better(values) for values in HELD_OUT])
     assert np.sqrt(((mean - truth) ** 2 / (variance + model.rough)).mean()) < 1.5
 
 
-def test_a_cheaper_proxy_alone_is_no_knowledge():
-    """Without a trial of the proxy itself there is nothing to learn from."""
+@pytest.mark.parametrize("trial", [Trial(TRUTH, 3.0), Trial(TRUTH, None, cheaper(TRUTH), low_fidelity=True)])
+def test_without_an_outcome_of_the_proxy_itself_there_is_nothing_to_learn_from(trial):
     with pytest.raises(RunError, match="no trial has an outcome"):
-        fit_outputs(SPACE, [Trial(TRUTH, None, cheaper(TRUTH), low_fidelity=True)])
+        fit_outputs(SPACE, [trial])

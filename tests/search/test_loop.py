@@ -4,17 +4,9 @@ import pytest
 from hypothesis import given, strategies as st
 from steps import SPACE, WHOLE, search, steps
 
-from proxytune.search import (
-    ENGINE_NAMES,
-    Trial,
-    batch_at,
-    make_proposer,
-    propose_batch,
-    why_not,
-    with_failures_as_worst,
-)
+from proxytune.search import ENGINE_NAMES, Trial, batch_at, propose_batch, with_failures_as_worst
 from proxytune.search.engine import design_point
-from proxytune.search.registry import AfterDesign
+from proxytune.search.registry import AfterDesign, make_proposer, why_not
 from proxytune.search.surrogate import GaussianProcess
 
 HERE = [name for name in ENGINE_NAMES if not why_not(name, composed=True)]
@@ -43,14 +35,6 @@ def test_the_points_of_a_batch_all_differ_and_a_smaller_batch_begins_as_a_larger
     assert len({*batch, *(trial.values for trial in finished)}) == 4 + 6
     assert batch[:2] == propose_batch(proposer, SPACE, finished, 2, 2)
     assert batch[0] == proposer.propose(SPACE, finished, 2)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("engine", HERE)
-def test_the_points_of_a_batch_differ_also_where_the_best_is_at_a_corner(engine):
-    proposer = make_proposer(engine, 3, WHOLE)
-    finished = search(proposer, 8, seed=1, score=lambda values: -100 * values[0] - values[1])
-    assert len(set(propose_batch(proposer, SPACE, finished, 1, 4))) == 4
 
 
 @pytest.mark.parametrize("engine", HERE)

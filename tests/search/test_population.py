@@ -1,29 +1,26 @@
 """The population of a fleet: what was planted between robots is told, and what measurement adds is not."""
 
-from collections.abc import Sequence
-
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies
 
-from proxytune.arrays import Floats
 from proxytune.search import population, summary_of
 from proxytune.search.engine import unit_points
-from proxytune.search.population import Population, population_of
+from proxytune.search.population import population_of
 from proxytune.search.posterior import Posterior
 
 MEASURED = 0.05
 """Standard deviation of what is measured of each robot, in widths of the box."""
 
 
-def posterior(middle: Floats, deviation: float = MEASURED) -> Posterior:
+def posterior(middle, deviation=MEASURED):
     """What is known of a robot that is measured so: a normal distribution in the box."""
     low, high = np.clip(middle - 5.0 * deviation, 0.0, 1.0), np.clip(middle + 5.0 * deviation, 0.0, 1.0)
     points = low + (high - low) * unit_points(len(middle), 2048, 0)
     return Posterior(points, -0.5 * (((points - middle) / deviation) ** 2).sum(axis=1), float(np.prod(high - low)))
 
 
-def fleet(robots: int, spread: Sequence[float], seed: int = 0) -> tuple[Floats, Floats, Population]:
+def fleet(robots, spread, seed=0):
     """θ of robots that spread so round 0.5, what is measured of each, and what both together tell."""
     rng = np.random.default_rng(seed)
     theta = 0.5 + np.array(spread) * rng.standard_normal((robots, len(spread)))
@@ -32,12 +29,12 @@ def fleet(robots: int, spread: Sequence[float], seed: int = 0) -> tuple[Floats, 
 
 
 @pytest.fixture(scope="module")
-def planted() -> tuple[Floats, Floats, Population]:
+def planted():
     """Forty robots, of which one parameter spreads twice as far as is measured, and one not at all."""
     return fleet(40, (0.1, 0.0))
 
 
-def test_mean_and_spread_are_told(planted: tuple[Floats, Floats, Population]) -> None:
+def test_mean_and_spread_are_told(planted):
     """The truth lies in both 95 % intervals, and the spread's middle is within a quarter of it."""
     _, _, found = planted
     mean, deviation = summary_of(found.mean), summary_of(found.deviation)
@@ -46,9 +43,7 @@ def test_mean_and_spread_are_told(planted: tuple[Floats, Floats, Population]) ->
     assert deviation[1, 0] == pytest.approx(0.1, rel=0.25)
 
 
-def test_robots_that_are_alike_have_no_spread_of_their_measurements(
-    planted: tuple[Floats, Floats, Population],
-) -> None:
+def test_robots_that_are_alike_have_no_spread_of_their_measurements(planted):
     """Measured values spread by 0.05; between robots less than half of that is told, perhaps nothing."""
     _, measured, found = planted
     low, middle, high = summary_of(found.deviation)[:, 1]
@@ -58,7 +53,7 @@ def test_robots_that_are_alike_have_no_spread_of_their_measurements(
     assert high < MEASURED
 
 
-def test_the_fleet_makes_each_robot_better_known(planted: tuple[Floats, Floats, Population]) -> None:
+def test_the_fleet_makes_each_robot_better_known(planted):
     """Errors are smaller than each robot's own, far smaller where robots are alike; intervals hold 95 % of truths."""
     theta, measured, found = planted
     low, middle, high = summary_of(found.robots)
@@ -68,14 +63,14 @@ def test_the_fleet_makes_each_robot_better_known(planted: tuple[Floats, Floats, 
     assert ((low <= theta) & (theta <= high)).mean() > 0.88
 
 
-def test_the_next_robot_is_where_robots_are(planted: tuple[Floats, Floats, Population]) -> None:
+def test_the_next_robot_is_where_robots_are(planted):
     """Its interval is somewhat wider than that of the planted distribution, since mean and spread are not known."""
     low, _, high = summary_of(planted[2].next_robot)[:, 0]
     assert 2 * 1.96 * 0.075 < high - low < 2 * 1.96 * 0.15
 
 
 @pytest.mark.slow
-def test_few_robots_have_intervals_that_hold_the_truth(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_few_robots_have_intervals_that_hold_the_truth(monkeypatch):
     """Of 30 fleets of five robots, the intervals of spread and of mean hold the truth in nine of ten or more."""
     monkeypatch.setattr(population, "DRAWS", 1000)
     held = np.zeros(2)
@@ -87,7 +82,7 @@ def test_few_robots_have_intervals_that_hold_the_truth(monkeypatch: pytest.Monke
     assert np.all(held >= 27)
 
 
-def test_parameters_that_go_together_are_told() -> None:
+def test_parameters_that_go_together_are_told():
     """A planted correlation of 0.9 has an interval well above 0."""
     rng = np.random.default_rng(1)
     shared = rng.standard_normal((30, 1))
@@ -98,7 +93,7 @@ def test_parameters_that_go_together_are_told() -> None:
     assert middle == pytest.approx(0.9, abs=0.2)
 
 
-def test_what_no_robot_tells_stays_open() -> None:
+def test_what_no_robot_tells_stays_open():
     """Where every value in the box explains each robot, the mean may be anywhere and the spread as well be large."""
     found = population_of([posterior(np.array([0.4 + 0.05 * row, 0.5]), 2.0) for row in range(4)])
     low, _, high = summary_of(found.next_robot)[:, 1]
@@ -107,7 +102,7 @@ def test_what_no_robot_tells_stays_open() -> None:
 
 @settings(max_examples=6)
 @given(order=strategies.permutations(range(5)))
-def test_the_order_of_robots_does_not_matter(order: list[int]) -> None:
+def test_the_order_of_robots_does_not_matter(order):
     """Same draws to the last bit, each robot's its own."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(population, "BURN_IN", 5)

@@ -92,9 +92,8 @@ def test_wheels_that_are_meshes_need_their_radius(tmp_path):
     path = urdf(tmp_path, shape='<mesh filename="wheel.stl"/>')
     with pytest.raises(InputError, match="its wheels are meshes; state their radius: --figures wheel_radius=METRES"):
         robot_from_urdf("rover", path, {})
-    assert (
-        "wheel_radius = { value = 0.04," in robot_from_urdf("rover", path, {"wheel_radius": 0.04}).files["robot.toml"]
-    )
+    described = robot_from_urdf("rover", path, {"wheel_radius": 0.04}).files["robot.toml"]
+    assert "wheel_radius = { value = 0.04," in described
 
 
 def test_what_is_stated_goes_before_the_urdf_save_for_the_wheels(tmp_path):

@@ -8,7 +8,6 @@ from proxytune.driving import UNITS, BulletPlant, drivetrain, read_robot
 from proxytune.driving.plants import PlanarPlant, check_body
 from proxytune.effects import FilterContext, effects_from
 from proxytune.errors import InputError
-from proxytune.settings import read_settings
 from proxytune.skeletons import robot_skeleton
 from proxytune.skeletons.writing import GUESSES, SIX
 
@@ -17,10 +16,10 @@ SMALL = {"wheel_radius": 0.02, "wheel_distance": 0.09, "full_speed": 0.3, "mass"
 LARGE = {"wheel_radius": 0.1, "wheel_distance": 0.45, "full_speed": 1.2, "motor_time_constant": 0.25, "mass": 20.0}
 
 
-def write(folder, figures):
+def write(folder, figures, *drive):
     home = folder / "rover"
     home.mkdir()
-    for name, text in robot_skeleton("rover", figures).files.items():
+    for name, text in robot_skeleton("rover", figures, *drive).files.items():
         (home / name).write_text(text, encoding="utf-8")
     return read_robot("rover", folder)
 
@@ -54,10 +53,11 @@ def test_what_is_given_is_written_and_the_urdf_has_it_too(tmp_path_factory, valu
     check_body(robot)
 
 
-def test_guesses_alone_are_marked_to_be_edited(tmp_path):
+def test_guesses_alone_are_marked_to_be_edited_and_the_six_figures_stand_first():
     text = robot_skeleton("rover", {"wheel_radius": 0.04}).files["robot.toml"].partition("[effects")[0]
     lines = {line.split(" = ")[0]: line for line in text.splitlines() if line.split(" = ")[0] in UNITS}
     assert set(lines) == set(GUESSES)
+    assert tuple(lines)[:6] == SIX
     assert [name for name, line in lines.items() if "# EDIT" not in line] == ["wheel_radius"]
 
 
@@ -70,21 +70,13 @@ def test_a_figure_that_it_does_not_have_is_refused():
         robot_skeleton("rover", {"mass": 0.0})
 
 
-def test_the_six_figures_stand_first(tmp_path):
-    write(tmp_path, {})
-    assert tuple(read_settings(tmp_path / "rover" / "robot.toml").values["figures"])[:6] == SIX
-
-
 SMALL_CAR = {"wheelbase": 0.17, "wheel_distance": 0.12}
 ROAD_CAR = {"wheelbase": 2.6, "wheel_radius": 0.3, "wheel_distance": 1.5, "full_speed": 12.0, "mass": 1200.0}
 
 
 @pytest.mark.parametrize("figures", [SMALL_CAR, ROAD_CAR], ids=["small", "road"])
 def test_both_plants_drive_a_car_of_one_s_own_alike_without_touching_the_floor(tmp_path, figures):
-    (tmp_path / "rover").mkdir()
-    for name, text in robot_skeleton("rover", figures, "ackermann").files.items():
-        (tmp_path / "rover" / name).write_text(text, encoding="utf-8")
-    robot = read_robot("rover", tmp_path)
+    robot = write(tmp_path, figures, "ackermann")
     check_body(robot)
     commands = np.tile((0.15, 0.5), (180, 1))
     start = np.zeros(3)

@@ -37,13 +37,6 @@ def test_as_many_examinations_are_made_as_the_study_allows_and_counts_need_not_l
     assert all(set(GRID) <= set(each) for each in counts(found).values())
 
 
-@pytest.mark.slow
-def test_without_the_key_every_count_is_examined_in_every_repetition(make_study):
-    found = run(make_taught(make_study))
-    assert all(curve.counts == tuple(GRID) for curve in found.needs.curves.values())
-    assert all(np.isfinite(one.curve.scores).all() for one in found.teachers)
-
-
 class Killed(BaseException):
     """What stops a run without asking."""
 

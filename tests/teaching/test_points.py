@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
+from one_line import complaint_of
 from schoolroom import Matrix, Schoolroom
 from stuck import StuckRoom, StuckTogether, acts, trains
 from taught import PROXY, make_taught, setup
@@ -17,7 +18,7 @@ from tightrope import Cells, Tightrope
 from wobbly import Wobbly
 
 from proxytune.cli.terminal import signals_as_interruptions
-from proxytune.errors import EpisodeError, LearnerError, RunError, SettingsError
+from proxytune.errors import EpisodeError, LearnerError, RunError
 from proxytune.learning import Cache, Distribution, TeachingSettings, facts_digest
 from proxytune.running import Silent
 from proxytune.study import read_study_settings
@@ -101,10 +102,8 @@ def test_rehearsal_changes_fine_tunings_after_a_proxy_and_nothing_else(tmp_path)
     assert plain.exam_facts(tuned) != setup(tmp_path, rehearsal=0.5).exam_facts(tuned)
     for point in (taught, alone):
         assert plain.exam_facts(point) == rehearsing.exam_facts(point)
-    before = plain.score(tuned)
-    assert (
-        setup(tmp_path, rehearsal=0.6).score(tuned) == setup(tmp_path / "empty", rehearsal=0.6).score(tuned) != before
-    )
+    before, empty = plain.score(tuned), setup(tmp_path / "empty", rehearsal=0.6)
+    assert rehearsing.score(tuned) == empty.score(tuned) != before
 
 
 # The names that files had then
@@ -125,7 +124,7 @@ NEAR = Distribution({})
 ON_POLICY = 'target_lessons = "learner"\nproxy_lessons = "learner"'
 
 
-def setup_of_stages(folder, **changes):
+def staged(folder, **changes):
     """An experiment on the tightrope; the target's deviations grow faster than the proxy's."""
     settings = TeachingSettings(
         target=folder / "twin.toml",
@@ -169,12 +168,12 @@ def first_within(scores, tolerance):
 @pytest.mark.slow
 @pytest.mark.parametrize("proxy", [None, NEAR], ids=["without a proxy", "after a proxy"])
 def test_a_learner_that_errs_to_where_the_expert_never_is_needs_fewer_samples_of_its_own_driving(tmp_path, proxy):
-    off, on = (mean_scores(setup_of_stages(tmp_path / by, target_lessons=by), proxy) for by in ("expert", "learner"))
+    off, on = (mean_scores(staged(tmp_path / by, target_lessons=by), proxy) for by in ("expert", "learner"))
     assert 0 < first_within(on, 5.0) <= first_within(off, 5.0) / 4
 
 
 def test_a_proxy_teaches_better_where_the_learner_drives_in_it(tmp_path):
-    off, on = (mean_scores(setup_of_stages(tmp_path / by, proxy_lessons=by), NEAR) for by in ("expert", "learner"))
+    off, on = (mean_scores(staged(tmp_path / by, proxy_lessons=by), NEAR) for by in ("expert", "learner"))
     assert on[0] > off[0] + 20.0
 
 
@@ -186,15 +185,15 @@ def samples(made, count, proxy=None):
 @pytest.mark.parametrize("proxy", [None, NEAR], ids=["without a proxy", "after a proxy"])
 @pytest.mark.parametrize("count", [1, 20, 21, 71, 283])
 def test_more_samples_begin_with_the_same_ones_whatever_the_count(tmp_path, by, proxy, count):
-    whole = samples(setup_of_stages(tmp_path / "whole", target_lessons=by), 320, proxy)
-    first = samples(setup_of_stages(tmp_path / "first", target_lessons=by), count, proxy)
+    whole = samples(staged(tmp_path / "whole", target_lessons=by), 320, proxy)
+    first = samples(staged(tmp_path / "first", target_lessons=by), count, proxy)
     assert len(first.commands) == count
     np.testing.assert_array_equal(first.observations, whole.observations[:count])
     np.testing.assert_array_equal(first.commands, whole.commands[:count])
 
 
 def test_no_samples_are_those_of_no_round(tmp_path):
-    made = setup_of_stages(tmp_path, target_lessons="learner")
+    made = staged(tmp_path, target_lessons="learner")
     assert np.isnan(made.score(CurvePoint("none", None, 0, 0)))
     assert made.score(CurvePoint("near", NEAR, 0, 0)) > 0.0
     assert not any(line.startswith("guided") for line in (tmp_path / "journal").read_text().splitlines())
@@ -202,7 +201,7 @@ def test_no_samples_are_those_of_no_round(tmp_path):
 
 @pytest.mark.parametrize(("proxy", "first"), [(None, "lesson"), (NEAR, "guided")])
 def test_the_expert_drives_where_nothing_has_been_learnt_and_the_learner_ever_after(tmp_path, proxy, first):
-    made = setup_of_stages(tmp_path, target_lessons="learner")
+    made = staged(tmp_path, target_lessons="learner")
     for count, kind in ((20, first), (71, "guided"), (160, "guided")):
         samples(made, count, proxy)
         journal = (tmp_path / "journal").read_text().splitlines()
@@ -211,31 +210,25 @@ def test_the_expert_drives_where_nothing_has_been_learnt_and_the_learner_ever_af
 
 
 def test_each_round_has_lessons_of_its_own(tmp_path):
-    samples(setup_of_stages(tmp_path, target_lessons="learner"), 640)
+    samples(staged(tmp_path, target_lessons="learner"), 640)
     seeds = [line.split()[1] for line in (tmp_path / "journal").read_text().splitlines()]
     assert len(seeds) > 30
     assert len(set(seeds)) == len(seeds)
 
 
 def test_a_round_is_another_by_another_learner_proxy_or_repetition_and_not_by_what_comes_after_it(tmp_path):
-    made = setup_of_stages(tmp_path, target_lessons="learner")
-    facts = made._stage(CurvePoint("near", NEAR, 0, 0)).round_facts(2)
-    others = [
-        replace(made, learner_identity="others")._stage(CurvePoint("near", NEAR, 0, 0)),
-        made._stage(CurvePoint("far", Distribution({"trim": (0.2, 0.2)}), 0, 0)),
-        made._stage(CurvePoint("near", NEAR, 1, 0)),
-        made._stage(CurvePoint("none", None, 0, 0)),
-        setup_of_stages(tmp_path, target_lessons="learner", rehearsal=0.5)._stage(CurvePoint("near", NEAR, 0, 0)),
-        setup_of_stages(tmp_path, target_lessons="learner", proxy_lessons="learner")._stage(
-            CurvePoint("near", NEAR, 0, 0)
-        ),
-        setup_of_stages(tmp_path, target_lessons="learner", target_samples=(0, 20, 60, 80))._stage(
-            CurvePoint("near", NEAR, 0, 0)
-        ),
-    ]
-    assert all(other.round_facts(2) != facts for other in others)
-    longer = setup_of_stages(tmp_path, target_lessons="learner", target_samples=(*GRID, 2000))
-    assert longer._stage(CurvePoint("near", NEAR, 0, 0)).round_facts(2) == facts
+    made, first = staged(tmp_path, target_lessons="learner"), CurvePoint("near", NEAR, 0, 0)
+
+    def facts(made, point=first):
+        return made._stage(point).round_facts(2)
+
+    others = [facts(replace(made, learner_identity="others"))]
+    for point in (("far", Distribution({"trim": (0.2, 0.2)}), 0), ("near", NEAR, 1), ("none", None, 0)):
+        others.append(facts(made, CurvePoint(*point, 0)))
+    for change in ({"rehearsal": 0.5}, {"proxy_lessons": "learner"}, {"target_samples": (0, 20, 60, 80)}):
+        others.append(facts(staged(tmp_path, target_lessons="learner", **change)))
+    assert facts(made) not in others
+    assert facts(staged(tmp_path, target_lessons="learner", target_samples=(*GRID, 2000))) == facts(made)
 
 
 @pytest.mark.parametrize(
@@ -294,9 +287,7 @@ def test_an_expert_without_labels_where_the_learner_drives_is_one_line_with_the_
 @pytest.mark.parametrize("key", ["target_lessons", "proxy_lessons"])
 def test_a_family_that_cannot_guide_is_refused_where_the_learner_is_to_drive(make_study, key):
     folder = make_taught(make_study, more=f'{key} = "learner"')
-    with pytest.raises(SettingsError) as told:
-        load_setup(read_study_settings(folder))
-    assert str(told.value) == (
+    assert complaint_of(load_setup, read_study_settings(folder)) == (
         f"{folder / 'study.toml'}: teaching.{key}: schoolroom:schoolroom cannot teach a learner that drives: "
         "it lacks guide; add it, or take 'expert'"
     )
@@ -305,7 +296,7 @@ def test_a_family_that_cannot_guide_is_refused_where_the_learner_is_to_drive(mak
 POINT = CurvePoint("near", PROXY, 0, 20)
 ALONE = CurvePoint("none", None, 0, 20)
 LESSON = r"near: the expert's lesson in the proxy at trim = 0\.1\d+, start \d"
-EXAM = "none: the learner's examination in the target at start 2"
+FIRST, EXAM = (f"none: the learner's examination in the target at start {start}" for start in (0, 2))
 
 
 def room(*faults, kind=StuckRoom):
@@ -315,12 +306,12 @@ def room(*faults, kind=StuckRoom):
 MOMENTS = {
     "a lesson": ({"proxy": room("lesson:*:raises")}, POINT, LESSON),
     "a training": ({"learner": trains("raises")}, ALONE, "none: the learner's training"),
-    "an answer": ({"learner": acts("raises")}, ALONE, "none: the learner's examination in the target at start 0"),
+    "an answer": ({"learner": acts("raises")}, ALONE, FIRST),
     "an examination": ({"target": room("exam:2:raises")}, ALONE, EXAM),
     "examinations at once": (
         {"target": room("together:2:raises", kind=StuckTogether)},
         ALONE,
-        "none: the learner's examination in the target at start 0 and the others beside it",
+        f"{FIRST} and the others beside it",
     ),
 }
 
@@ -361,11 +352,7 @@ def test_what_is_no_score_is_named(tmp_path):
 
 HANGING = {
     "a lesson": ({"proxy": room("lesson:*:hangs")}, POINT, LESSON),
-    "a learner's answer": (
-        {"learner": acts("hangs in C")},
-        ALONE,
-        "none: the learner's examination in the target at start 0",
-    ),
+    "a learner's answer": ({"learner": acts("hangs in C")}, ALONE, FIRST),
     "an examination": ({"target": room("exam:2:hangs")}, ALONE, EXAM),
     "one of several at once": ({"target": room("together:2:hangs", "exam:2:hangs", kind=StuckTogether)}, ALONE, EXAM),
 }

@@ -128,9 +128,7 @@ def test_an_effect_that_keeps_every_promise_passes():
 @pytest.mark.parametrize("effect", BROKEN_EFFECTS, ids=lambda effect: effect.__name__)
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
 def test_a_broken_promise_is_named_in_one_line(effect):
-    with pytest.raises(ConformanceError, match=BROKEN_EFFECTS[effect]) as refused:
-        check_effect(effect)
-    assert "\n" not in str(refused.value)
+    refused(check_effect, effect, BROKEN_EFFECTS[effect])
 
 
 def test_it_is_bad_input_to_proxytune_and_a_failed_assertion_to_a_test_runner():
@@ -276,9 +274,7 @@ class Mixing(Convoy):
 
 def test_a_family_that_scores_episodes_otherwise_at_once_is_refused():
     assert check_family(Convoy(), agents=["agent0", "agent1"]) is None
-    refused(
-        check_family, Mixing(), "scores agent 'agent0', start 0 otherwise beside others", agents=["agent0", "agent1"]
-    )
+    refused(check_family, Mixing(), "scores agent 'agent0', start 0 otherwise beside", agents=["agent0", "agent1"])
 
 
 @pytest.mark.slow

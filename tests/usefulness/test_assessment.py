@@ -185,8 +185,7 @@ def test_equally_good_proxies_are_seldom_told_apart():
     false = 0
     for seed in range(0, 600, 4):
         proxies = {name: noisy(TRUTH / 4, seed + i, noise=1.0) for i, name in enumerate("abc")}
-        selection = select_proxy(
-            proxies=proxies, target=noisy(TRUTH / 4, seed + 3, noise=1.0), metrics=CLEAR, resamples=300, seed=seed
-        )
+        target = noisy(TRUTH / 4, seed + 3, noise=1.0)
+        selection = select_proxy(proxies=proxies, target=target, metrics=CLEAR, resamples=300, seed=seed)
         false += any(pair.beyond_noise for pair in selection.differences)
     assert false / 150 <= 0.10

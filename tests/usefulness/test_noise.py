@@ -31,10 +31,9 @@ def test_it_agrees_with_all_permutations_of_five_agents():
 
 def test_a_perfect_proxy_is_hardly_by_chance_and_a_useless_one_is():
     target = np.random.default_rng(2).normal(size=(8, 1)).repeat(2, axis=1)
-    assert chance(compare(proxy=of_means(*target), target=of_means(*target), metrics=M)).p_value == pytest.approx(
-        1 / 1001, abs=2e-3
-    )
-    assert chance(compare(proxy=of_means(*-target), target=of_means(*target), metrics=M)).p_value == 1.0
+    right, wrong = (compare(proxy=of_means(*one), target=of_means(*target), metrics=M) for one in (target, -target))
+    assert chance(right).p_value == pytest.approx(1 / 1001, abs=2e-3)
+    assert chance(wrong).p_value == 1.0
 
 
 def repeated(values, repeats):
@@ -73,8 +72,7 @@ def test_agents_with_the_same_episodes_are_split_alike():
 
 def test_one_episode_gives_no_floor_and_says_why():
     result = noise_floor(target=table_of(np.arange(3.0)[:, None]), metrics=FIRST)
-    assert result.value is None
-    assert result.kind == "none"
+    assert (result.value, result.kind) == (None, "none")
     assert "each agent has one episode on the target" in result.reason
 
 
@@ -183,17 +181,14 @@ def test_a_rate_has_wilson_s_interval():
 
 
 def test_pairs_that_tie_are_counted_and_told_once():
-    found = assess(
-        proxy=table_of_rates([3, 3, 5]), target=table_of_rates([2, 4, 6]), metrics=METRICS[:1], resamples=100
-    )
+    sides = {"target": table_of_rates([2, 4, 6]), "metrics": METRICS[:1], "resamples": 100}
+    found = assess(proxy=table_of_rates([3, 3, 5]), **sides)
     told = [note for note in found.notes if "tie" in note]
     expected = "success is a success rate: 1 of 3 pairs of agents tie in the proxy, 0 on the target; a tie counts half"
     assert len(told) == 1
     assert told[0].startswith(expected)
     assert found.prpv.value == 1
-    untied = assess(
-        proxy=table_of_rates([3, 4, 5]), target=table_of_rates([2, 4, 6]), metrics=METRICS[:1], resamples=100
-    )
+    untied = assess(proxy=table_of_rates([3, 4, 5]), **sides)
     assert not [note for note in untied.notes if "tie" in note]
 
 

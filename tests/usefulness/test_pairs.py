@@ -13,23 +13,11 @@ from score_tables import bootstrap_prpv, of_means, table_of
 
 from proxytune.errors import ScoresError
 from proxytune.scores import Metric, ScoreTable, read_domains
-from proxytune.usefulness import (
-    assess,
-    bootstrap_means,
-    compare,
-    dominance,
-    in_common,
-    pairs,
-    predictivity,
-    prpv_of_means,
-    resampling,
-    start_of,
-    starts_of,
-)
-from proxytune.usefulness.comparison import by_start, is_repeated, split_repeats, start_places
-from proxytune.usefulness.pairs import FlippedPair, prpv, stand
+from proxytune.usefulness import assess, compare, dominance, pairs, predictivity, resampling, start_of, starts_of
+from proxytune.usefulness.comparison import by_start, in_common, is_repeated, split_repeats, start_places
+from proxytune.usefulness.pairs import FlippedPair, prpv, prpv_of_means, stand
 from proxytune.usefulness.predictivity import kendall_of_means, mmrv_of_means
-from proxytune.usefulness.resampling import draw_counts
+from proxytune.usefulness.resampling import bootstrap_means, draw_counts
 
 M = [Metric("m")]
 
@@ -288,25 +276,21 @@ def test_an_agent_that_lost_a_repeat_is_split_over_its_other_starts():
 
 @pytest.mark.parametrize(
     ("labels", "expected"),
-    [
-        (labelled(2, 2), True),
-        (["0", "1", "2", "3"], False),
-        (["0/0", "0/1", "1/0", "2/0"], False),
-        (["0/0", "0/1", "1", "1/0"], True),
-    ],
+    [("0/0 0/1 1/0 1/1", True), ("0 1 2 3", False), ("0/0 0/1 1/0 2/0", False), ("0/0 0/1 1 1/0", True)],
 )
 def test_repeats_are_there_only_where_every_start_has_two(labels, expected):
-    assert is_repeated(table_of(np.zeros((2, 4)), labels)) is expected
+    assert is_repeated(table_of(np.zeros((2, 4)), labels.split())) is expected
 
 
-def test_labels_of_an_agent_s_own_are_no_starts():
-    values = [[0.0, 0.0, np.nan, np.nan], [np.nan, np.nan, 0.0, 0.0]]
-    assert not is_repeated(table_of(values, ["A0/0", "A0/1", "A1/0", "A1/1"]))
+OWN = [[0.0, 0.0, np.nan, np.nan], [np.nan, np.nan, 0.0, 0.0]]
+ONCE = [[0.0, np.nan, 0.0, np.nan], [0.0] * 4]
 
 
-def test_an_agent_without_any_start_twice_leaves_nothing_to_split():
-    values = [[0.0, np.nan, 0.0, np.nan], [0.0] * 4]
-    assert not is_repeated(table_of(values, labelled(2, 2)))
+@pytest.mark.parametrize(("values", "labels"), [(OWN, "A0/0 A0/1 A1/0 A1/1"), (ONCE, "0/0 0/1 1/0 1/1")])
+def test_labels_of_an_agent_s_own_are_no_starts_and_an_agent_without_any_start_twice_leaves_none_to_split(
+    values, labels
+):
+    assert not is_repeated(table_of(values, labels.split()))
 
 
 def test_by_start_takes_the_mean_over_the_repeats_that_were_driven():
@@ -324,12 +308,10 @@ def test_repeats_of_a_start_are_drawn_together_and_plain_episodes_as_ever():
 
 def test_of_one_start_alone_the_repeats_are_drawn_and_that_is_said():
     values = np.random.default_rng(0).normal(size=(4, 6))
-    counts = draw_counts(table_of(values, labelled(1, 6)), np.random.default_rng(0), 30)
-    assert len(np.unique(counts[0], axis=0)) > 10
-    assert not compare(
-        proxy=table_of(values[:, :3], labelled(1, 3)), target=table_of(values, labelled(1, 6)), metrics=M
-    ).paired
-    found = assess(proxy=table_of(values, "abcdef"), target=table_of(values, labelled(1, 6)), metrics=M)
+    target = table_of(values, labelled(1, 6))
+    assert len(np.unique(draw_counts(target, np.random.default_rng(0), 30)[0], axis=0)) > 10
+    assert not compare(proxy=table_of(values[:, :3], labelled(1, 3)), target=target, metrics=M).paired
+    found = assess(proxy=table_of(values, "abcdef"), target=target, metrics=M)
     assert any("from one start" in note for note in found.notes)
 
 

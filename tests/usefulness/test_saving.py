@@ -1,12 +1,7 @@
 """What simulation saves: pairs are used where they help beyond noise, and never make a score worse than that."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 from decisions import decisions, paired, plans, savings, tests as looked_at, wealth_of
 
 from proxytune.scores import Metric, ScoreTable

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from score_tables import table_of
 
 from proxytune.errors import ScoresError
-from proxytune.scores import Metric, ScoreTable
+from proxytune.scores import Metric
 from proxytune.usefulness import Asked, compare, decide, sequential_test
 from proxytune.usefulness.sequential import plan
 
@@ -14,9 +15,7 @@ SUCCESS = [Metric("success")]
 def rolled(rates, rollouts, seed=0):
     rng = np.random.default_rng(seed)
     values = (rng.random((len(rates), rollouts)) < np.array(rates)[:, None]).astype(float)
-    return ScoreTable(
-        tuple("abcdefgh"[: len(rates)]), tuple(map(str, range(rollouts))), ("success",), values[..., None]
-    )
+    return table_of(values, metrics=("success",))
 
 
 def looked_at(target, proxy):
@@ -26,7 +25,7 @@ def looked_at(target, proxy):
 def test_a_clear_winner_is_shown_before_the_end_and_a_tie_is_not():
     target = rolled([0.9, 0.3], 60)
     found = looked_at(target, target)
-    assert found.winner == "a"
+    assert found.winner == "A0"
     assert 5 < found.decided_at < 60
     target = rolled([0.5, 0.5], 60)
     assert looked_at(target, target).winner is None
@@ -46,22 +45,20 @@ def test_what_would_decide_sooner_is_expected_with_a_proxy_that_is_right():
     ],
 )
 def test_what_bears_no_test_is_refused(values, complaint):
-    labels = tuple(map(str, range(len(values[0]))))
-    table = ScoreTable(("a", "b"), labels, ("success",), np.array(values)[..., None])
+    table = table_of(values, metrics=("success",))
     with pytest.raises(ScoresError, match=complaint):
         looked_at(table, table)
 
 
 def planned(successes, of, bound):
-    values = np.array([[1.0] * done + [0.0] * (of - done) for done in successes])[..., None]
-    target = ScoreTable(tuple("abcd"[: len(successes)]), tuple(map(str, range(of))), ("success",), values)
+    target = table_of([[1.0] * done + [0.0] * (of - done) for done in successes], metrics=("success",))
     found = decide(compare(proxy=target, target=target, metrics=SUCCESS), Asked(), None)
     return plan(found, bound=bound, made=np.full(len(successes), float(of)), scale=1.0)
 
 
 def test_a_plan_asks_for_the_agents_that_may_be_best_and_for_none_when_it_is_decided():
     found = planned([2, 18, 20, 3], 25, 0.02)
-    assert set(found.rollouts) == {"b", "c"}
+    assert set(found.rollouts) == {"A1", "A2"}
     assert found.regret_bound > 0.02
     assert not planned([2, 25, 3, 3], 25, 0.05).rollouts
 

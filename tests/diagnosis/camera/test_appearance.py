@@ -32,16 +32,10 @@ def test_a_picture_without_noise_has_none():
 
 
 @pytest.mark.slow
-def test_texture_is_no_noise():
+def test_texture_is_no_noise_and_the_bound_holds_the_noise_on_it():
     model, seen = scene()
     found = fit_grain(logged(seen), model, floor()).noise
-    assert not found.identified
-    assert found.interval[0] == 0.0
-
-
-@pytest.mark.slow
-def test_the_bound_holds_the_noise_on_a_textured_floor():
-    model, seen = scene()
+    assert (found.identified, found.interval[0]) == (False, 0.0)
     for noise in (2.0, 5.0):
         assert fit_grain(logged(seen[:30], noise=noise), model[:30], floor()).noise.interval[1] >= noise
 

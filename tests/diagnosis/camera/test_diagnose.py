@@ -179,20 +179,13 @@ def drive_log(home, readout_s=None):
     """A drive by a camera whose rows take 0.06 s to read."""
     count = 30
     views = driven({"rolling_shutter": 0.06}, count)
-    tracks = views.tracks
+    tracks, state = views.tracks, neutral_state(views, {**NEUTRAL, "rolling_shutter": 0.06})
     home.mkdir()
-    write_pictures(home, _shown_on(count))
+    write_pictures(home, np.rint(draw_pictures(views, state, {}, np.arange(count))).astype(np.uint8))
     drive = LogEpisode("drive", tracks.times, np.zeros((len(tracks.times), 2)), tracks.poses, None)
     paths = tuple(home / (PICTURES % number) for number in range(count))
     frames = Frames(paths, np.zeros(count, dtype=int), tracks.instants, "small_loop", 0.002, 0.3, readout_s=readout_s)
     return Log("drive", "duckiebot", "duty", 20.0, {}, (drive,), replace(frames, fixed_exposure=True))
-
-
-@functools.cache
-def _shown_on(count):
-    views = driven({"rolling_shutter": 0.06}, count)
-    state = neutral_state(views, {**NEUTRAL, "rolling_shutter": 0.06})
-    return np.rint(draw_pictures(views, state, {}, np.arange(count))).astype(np.uint8)
 
 
 @pytest.mark.slow

@@ -13,17 +13,9 @@ from hypothesis import given, settings, strategies as st
 from pictured import lane_poses, pictures
 from viewed import at_truth, everything, stood
 
-from proxytune.diagnosis.camera import error as unseen, error as weighing
+from proxytune.diagnosis.camera import error as weighing
 from proxytune.diagnosis.camera.edges import Gathered
-from proxytune.diagnosis.camera.error import (
-    CAP_PX,
-    FOLDS,
-    compare_brightness,
-    error_over,
-    fit_poses,
-    pixel_errors,
-    unseen_residuals,
-)
+from proxytune.diagnosis.camera.error import CAP_PX, FOLDS, error_over, fit_poses, pixel_errors, unseen_residuals
 from proxytune.diagnosis.camera.selection import select_camera_effects
 
 ROLLED = {"camera_roll": 4.0}
@@ -84,7 +76,7 @@ def test_without_what_does_not_matter_the_model_is_as_if_it_had_not_been_named(m
 
 @pytest.mark.slow
 def test_the_added_effect_lowers_the_difference_of_brightness():
-    grey, _ = compare_brightness(gathered(shown()), named(), ({}, {}), 1)
+    grey, _ = weighing.compare_brightness(gathered(shown()), named(), ({}, {}), 1)
     assert grey.unit == "grey levels"
     assert grey.after.value < 0.7 * grey.before.value
     assert grey.after.frames.shape == (-(-COUNT // FOLDS),)
@@ -95,7 +87,9 @@ def test_the_added_effect_lowers_the_difference_of_brightness():
 def test_an_effect_on_pictures_counts_after_and_not_before():
     dark = np.rint(shown() * 0.7).astype(np.uint8)
     look = {"exposure.gain": 0.7, "exposure.gamma": 1.0}
-    (plain, _), (fitting, ratios) = (compare_brightness(gathered(dark), named(), ({}, one), 1) for one in ({}, look))
+    (plain, _), (fitting, ratios) = (
+        weighing.compare_brightness(gathered(dark), named(), ({}, one), 1) for one in ({}, look)
+    )
     assert ratios == {"exposure": pytest.approx(plain.after.value / fitting.after.value)}
     assert fitting.after.value < 0.7 * plain.after.value
     assert fitting.before.value == plain.before.value
@@ -105,9 +99,11 @@ def test_an_effect_on_pictures_counts_after_and_not_before():
 def test_an_automatic_exposure_is_no_difference():
     levels = np.random.default_rng(1).uniform(0.6, 1.2, (COUNT, 1, 1, 1))
     drifting = np.clip(np.rint(shown() * levels), 0, 255).astype(np.uint8)
-    fixed, free = (compare_brightness(gathered(drifting, one), named(), ({}, {}), 1)[0] for one in (True, False))
+    fixed, free = (
+        weighing.compare_brightness(gathered(drifting, one), named(), ({}, {}), 1)[0] for one in (True, False)
+    )
     assert free.after.value < 0.6 * fixed.after.value
-    right, _ = compare_brightness(gathered(shown()), named(), ({}, {}), 1)
+    right, _ = weighing.compare_brightness(gathered(shown()), named(), ({}, {}), 1)
     assert free.after.value == pytest.approx(right.after.value, rel=0.25)
 
 
@@ -117,13 +113,13 @@ NAMES = ("camera_pitch", "camera_roll")
 @pytest.fixture
 def fits(monkeypatch):
     """Every fit that is made, in order."""
-    made, fit_camera = [], unseen.fit_camera
+    made, fit_camera = [], weighing.fit_camera
 
     def spy(*given_):
         made.append(fit_camera(*given_))
         return made[-1]
 
-    monkeypatch.setattr(unseen, "fit_camera", spy)
+    monkeypatch.setattr(weighing, "fit_camera", spy)
     return made
 
 

@@ -117,9 +117,7 @@ def test_values_end_at_their_bounds_and_not_beyond(way):
 def test_what_is_not_named_stays_where_it_was():
     views = stood({"camera_roll": 4.0}, count=20)
     fit = fit_camera(views, at_truth(views, {"camera_height": 0.11}), ["camera_roll"], NEAR)
-    assert {name: value for name, value in fit.theta.items() if name != "camera_roll"} == {
-        name: value for name, value in {**NEUTRAL, "camera_height": 0.11}.items() if name != "camera_roll"
-    }
+    assert {**fit.theta, "camera_roll": 0.0} == {**NEUTRAL, "camera_height": 0.11, "camera_roll": 0.0}
 
 
 def test_a_fit_with_eliminated_poses_is_the_full_one():

@@ -44,9 +44,8 @@ def test_without_effects_pictures_are_those_of_the_domain_s_camera(tmp_path):
     theta = {"camera_roll": 3.0, "camera_pitch": 21.0}
     instance = family.instance(theta)
     figures = robot.camera_figures()
-    views = replace(
-        scenes()[0], tracks=still(poses), optics=replace(scenes()[0].optics, rows=figures.rows, columns=figures.columns)
-    )
+    optics = replace(scenes()[0].optics, rows=figures.rows, columns=figures.columns)
+    views = replace(scenes()[0], tracks=still(poses), optics=optics)
     mine = draw_pictures(views, at_truth(views, theta), {}, FRAMES)
     np.testing.assert_array_equal(mine, instance.camera.render(poses))
     assert make_episode(theta, agent="none", start=0, seed=1).theta
@@ -68,12 +67,10 @@ def test_effects_of_time_leave_frames_standing_still_alone():
 
 def test_a_latency_shows_what_was_there_so_long_before():
     views = scenes()[True]
-    tracks = views.tracks
-    before = replace(views, tracks=replace(tracks, instants=tracks.instants - 0.2))
-    np.testing.assert_array_equal(
-        drawn(True, theta={"camera_latency": 0.2}), draw_pictures(before, at_truth(before), {}, FRAMES)
-    )
-    assert np.abs(drawn(True, theta={"camera_latency": 0.2}) - drawn(True)).mean() > 1.0
+    before = replace(views, tracks=replace(views.tracks, instants=views.tracks.instants - 0.2))
+    late = drawn(True, theta={"camera_latency": 0.2})
+    np.testing.assert_array_equal(late, draw_pictures(before, at_truth(before), {}, FRAMES))
+    assert np.abs(late - drawn(True)).mean() > 1.0
 
 
 def test_blur_softens_a_drive_s_pictures_and_does_not_shift_them():
@@ -94,12 +91,9 @@ def test_a_rolling_shutter_shows_each_row_at_its_own_time():
 
 
 def test_a_readout_of_the_camera_counts_where_the_look_has_none():
-    np.testing.assert_array_equal(
-        drawn(True, theta={"rolling_shutter": 0.1}), drawn(True, look={"rolling_shutter": 0.1})
-    )
-    np.testing.assert_array_equal(
-        drawn(True, {"rolling_shutter": 0.0}, {"rolling_shutter": 0.1}), drawn(True, {"rolling_shutter": 0.0})
-    )
+    slow, at_once = {"rolling_shutter": 0.1}, {"rolling_shutter": 0.0}
+    np.testing.assert_array_equal(drawn(True, theta=slow), drawn(True, slow))
+    np.testing.assert_array_equal(drawn(True, at_once, slow), drawn(True, at_once))
 
 
 def test_defocus_softens_all_over_and_keeps_the_brightness():
@@ -185,20 +179,14 @@ def test_slopes_by_latency_and_readout_are_true(name):
     assert np.corrcoef(change[same], slope[same])[0, 1] > 0.98
 
 
+@pytest.mark.parametrize("of", ["poses", "offset"])
 @pytest.mark.parametrize("column", range(3))
-def test_slopes_by_the_pose_are_true(column):
+def test_slopes_by_the_pose_and_by_the_whole_map_are_true(of, column):
     views, state = scene()
-    by = 1e-6 * np.eye(3)[column]
-    moved = [replace(state, poses=state.poses + way * by) for way in (1.0, -1.0)]
-    check(views, state, *moved, 1e-6, pose_slopes(project(views, state))[:, column])
-
-
-@pytest.mark.parametrize("column", range(3))
-def test_slopes_by_the_whole_map_are_true(column):
-    views, state = scene()
-    by = 1e-6 * np.eye(3)[column]
-    moved = [replace(state, offset=state.offset + way * by) for way in (1.0, -1.0)]
-    check(views, state, *moved, 1e-6, map_slopes(views, state, project(views, state))[:, column])
+    by, there = 1e-6 * np.eye(3)[column], project(views, state)
+    moved = [replace(state, **{of: getattr(state, of) + way * by}) for way in (1.0, -1.0)]
+    slope = pose_slopes(there) if of == "poses" else map_slopes(views, state, there)
+    check(views, state, *moved, 1e-6, slope[:, column])
 
 
 def test_slopes_by_the_tape_are_exact():

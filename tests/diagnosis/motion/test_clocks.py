@@ -14,21 +14,9 @@ from clock_rates import planted
 from planted import ROBOT, TRUTH, driven_log, planted_drives, planted_log, with_poses
 from project import ROOT
 
-from proxytune.diagnosis import cut, increments
-from proxytune.diagnosis.motion import clocks as splitting, clocks as thinning
-from proxytune.diagnosis.motion.clocks import (
-    BLOCKS,
-    TEST_BLOCK_S,
-    cut_into_blocks,
-    cut_out_long_rests,
-    join_increments,
-    on_one_clock,
-    put_on_one_clock,
-    read_clocks,
-    split,
-    thin,
-    without_drift,
-)
+from proxytune.diagnosis import cut, increments, robot_of
+from proxytune.diagnosis.motion import clocks as timing
+from proxytune.diagnosis.motion.clocks import cut_into_blocks, cut_out_long_rests, read_clocks, split, thin
 from proxytune.diagnosis.motion.drives import gather
 from proxytune.diagnosis.motion.latency import Blocks, _steps, stretches
 from proxytune.errors import LogError
@@ -122,12 +110,14 @@ def test_what_a_drive_does_in_its_last_seconds_is_no_second_jump_far_off():
     np.testing.assert_allclose([jump.by_s for jump in jumps], [-0.3] * 4, atol=0.02)
 
 
-def test_a_jump_too_small_for_its_latencies_alone_is_told_by_the_step_of_the_poses():
-    one = planted("jump", 154, hidden=False)
+@pytest.mark.parametrize("number", [154, *(pytest.param(number, marks=pytest.mark.slow) for number in (22, 23))])
+def test_a_jump_is_told_where_latencies_alone_show_too_little_and_where_it_leaves_little_of_a_drive(number):
+    """By the step of the poses: that of 154 is 0.05 s early in double noise. Else by what other drives say."""
+    one = planted("jump", number, hidden=False)
     (jump,) = read_clocks(hidden.make_log(one.case, late_s=one.late_s), ROBOT).jumps
-    assert (one.case.noise, one.by_s, f"{one.drive:02d}") == ("double", -0.05, jump.drive)
-    assert jump.time_s == pytest.approx(one.at_s, abs=2.0)
-    assert jump.by_s == pytest.approx(-0.05, abs=0.015)
+    assert jump.drive == f"{one.drive:02d}"
+    assert jump.time_s == pytest.approx(one.at_s, abs=2.0 if number == 154 else 4.0)
+    assert jump.by_s == pytest.approx(one.by_s, abs=0.015 if number == 154 else 0.02)
 
 
 def test_poses_that_step_alone_are_no_jump_of_the_clock():
@@ -164,7 +154,7 @@ def test_drift_of_drives_that_follow_each_other_is_one_line_through_all():
 
 def test_without_drift_commands_are_when_poses_show_them():
     rate = 0.003
-    log = without_drift(hidden.make_log(CASE, late_s=rate * DRIFTING, **SHORT), rate)
+    log = timing.without_drift(hidden.make_log(CASE, late_s=rate * DRIFTING, **SHORT), rate)
     np.testing.assert_allclose(log.episodes[0].issued, (1.0 + rate) * log.episodes[0].times)
     assert not read_clocks(log, ROBOT).differ
 
@@ -173,31 +163,22 @@ def test_one_drive_that_grows_late_is_no_drift_of_the_clock():
     assert clocks(0.003 * DRIFTING * (np.arange(6) == 3)[:, None]).drift.value == 0.0
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("number", [22, 23])
-def test_a_jump_that_leaves_little_of_a_drive_is_clear_beside_what_the_others_say(number):
-    one = planted("jump", number, hidden=False)
-    (jump,) = read_clocks(hidden.make_log(one.case, late_s=one.late_s), ROBOT).jumps
-    assert jump.drive == f"{one.drive:02d}"
-    assert jump.time_s == pytest.approx(one.at_s, abs=4.0)
-    assert jump.by_s == pytest.approx(one.by_s, abs=0.02)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("effect", [0, 12, 17, 21, 24])
-def test_hidden_effects_are_no_clock_problem(effect):
-    assert not clocks(0.0, hidden.IN_FORM[effect]).differ
+@pytest.mark.parametrize(
+    "name",
+    [
+        "slew_rate rise 0.4",
+        "yaw_lag time_constant 0.25",
+        *(pytest.param(hidden.IN_FORM[number].name, marks=pytest.mark.slow) for number in (0, 12, 17, 21, 24)),
+    ],
+)
+def test_hidden_effects_are_no_clock_problem_even_a_lag_that_is_another_in_every_manoeuvre(name):
+    (case,) = (case for case in hidden.IN_FORM if case.name == name)
+    assert not clocks(0.0, case).differ
 
 
 @pytest.mark.parametrize("theta", [{"delay": 0.3}, {"delay": 0.5, "motor_lag.time_constant": 0.8}, {"delay": 0.0}])
 def test_a_slow_or_late_robot_is_no_clock_problem(theta):
     assert not read_clocks(planted_log({"trim": 0.03, **theta}, episodes=4, seconds=40.0), ROBOT).differ
-
-
-@pytest.mark.parametrize("name", ["slew_rate rise 0.4", "yaw_lag time_constant 0.25"])
-def test_a_lag_that_is_another_in_every_manoeuvre_is_no_clock_problem(name):
-    (case,) = (case for case in hidden.IN_FORM if case.name == name)
-    assert not clocks(0.0, case).differ
 
 
 def test_a_drive_that_repeats_itself_is_no_clock_problem():
@@ -233,7 +214,7 @@ def test_one_block_of_a_robot_at_rest_is_no_proof_of_another_clock():
 def test_commands_put_on_the_poses_clock_are_those_of_one_clock():
     late = in_one_drive(-0.3)
     apart, right = (hidden.make_log(CASE, late_s=late_s, noiseless=True, **SHORT) for late_s in (late, 0.0))
-    corrected, found = on_one_clock(apart, ROBOT)
+    corrected, found = timing.on_one_clock(apart, ROBOT)
     shift = found.later_s[3]
     assert shift == pytest.approx(0.3, abs=0.02)
     np.testing.assert_allclose(corrected.episodes[3].issued, apart.episodes[3].times - shift)
@@ -247,28 +228,28 @@ def test_commands_put_on_the_poses_clock_are_those_of_one_clock():
 
 def test_a_log_of_one_clock_is_left_as_it_is():
     log = hidden.make_log(CASE, **SHORT)
-    assert on_one_clock(log, ROBOT)[0] is log
+    assert timing.on_one_clock(log, ROBOT)[0] is log
 
 
 def test_poses_before_the_first_command_are_left_out_and_so_is_what_lies_beyond_a_jump():
     found = clocks(in_one_drive(0.5, after=500))
     log = hidden.make_log(CASE, late_s=in_one_drive(0.5, after=500), **SHORT)
-    poses = [episode.poses for episode in put_on_one_clock(log, found).episodes]
+    poses = [episode.poses for episode in timing.put_on_one_clock(log, found).episodes]
     assert np.isfinite(poses[3]).all(axis=1).sum() == pytest.approx(found.kept_s[3, 1] * 20.0, abs=1)
     assert np.isnan(poses[3][500:]).all()
     assert np.isfinite(poses[2]).all()
     late = replace(found, later_s=np.full(6, -1.0))
-    for episode in put_on_one_clock(hidden.make_log(CASE, **SHORT), late).episodes:
+    for episode in timing.put_on_one_clock(hidden.make_log(CASE, **SHORT), late).episodes:
         assert np.isnan(episode.poses[:20]).all()
         assert np.isfinite(episode.poses[20]).all()
 
 
 def test_of_poses_at_times_of_their_own_only_those_on_the_clock_are_kept():
     log = hidden.make_log(CASE, late_s=in_one_drive(0.5, after=500), **SHORT)
-    found = read_clocks(log, ROBOT)
-    (own,) = (replace(e, measured=Measured(e.times[::2] + 0.01, e.poses[::2], np.arange(0, 800, 2)))
-              for e in log.episodes[3:4])  # fmt: skip
-    kept = put_on_one_clock(replace(log, episodes=(*log.episodes[:3], own, *log.episodes[4:])), found).episodes[3]
+    found, drives = read_clocks(log, ROBOT), list(log.episodes)
+    measured = Measured(drives[3].times[::2] + 0.01, drives[3].poses[::2], np.arange(0, 800, 2))
+    drives[3] = replace(drives[3], measured=measured)
+    kept = timing.put_on_one_clock(replace(log, episodes=tuple(drives)), found).episodes[3]
     assert len(kept.measured.rows) == len(kept.measured.times) == pytest.approx(found.kept_s[3, 1] * 10.0, abs=1)
     assert kept.measured.rows.max() < 500
 
@@ -286,8 +267,6 @@ def test_another_log_of_the_same_robot_is_put_on_the_same_latency():
 def test_measured_logs_are_on_one_clock(name):
     if not (LOGS / name).is_dir():
         pytest.skip(f"the measured log {name} is not here: it is not part of the project")
-    from proxytune.diagnosis import robot_of
-
     log = read_log(LOGS / name)
     assert not read_clocks(log, robot_of(log)).differ
 
@@ -384,11 +363,11 @@ def test_there_are_enough_blocks_to_leave_out_and_none_is_tiny(episodes, seconds
     for drives in split(planted_log(TRUTH, episodes=episodes, seconds=seconds), ROBOT, None):
         numbers = np.unique(drives.block)
         np.testing.assert_array_equal(numbers, np.arange(len(numbers)))
-        assert len(numbers) >= min(BLOCKS, drives.seconds / TEST_BLOCK_S) * 0.6
+        assert len(numbers) >= min(timing.BLOCKS, drives.seconds / timing.TEST_BLOCK_S) * 0.6
         for block in numbers:
             own = drives.block == block
             assert len(np.unique(drives.episode[own])) == 1
-            assert (drives.last[own].max() - drives.first[own].min()) / drives.tick_hz > 0.9 * TEST_BLOCK_S
+            assert (drives.last[own].max() - drives.first[own].min()) / drives.tick_hz > 0.9 * timing.TEST_BLOCK_S
             assert not drives.linked[own][0]
 
 
@@ -406,7 +385,7 @@ def test_half_of_the_measured_motion_not_of_the_time_is_fitted():
 def test_of_very_many_drives_no_more_are_tested_on_than_needed_spread_over_all(monkeypatch):
     log = planted_log(TRUTH, episodes=36, seconds=10.0)
     whole = split(log, ROBOT, None).tested
-    monkeypatch.setattr(splitting, "MOST_TESTED_S", 60.0)
+    monkeypatch.setattr(timing, "MOST_TESTED_S", 60.0)
     some = split(log, ROBOT, None).tested
     assert (len(whole.duties), len(some.duties)) == (12, 7)
     kept = [int(np.flatnonzero((whole.headings == own).all(axis=1))[0]) for own in some.headings]
@@ -420,12 +399,12 @@ def drives():
 
 def test_short_drives_stay_as_they_are(drives):
     assert thin(drives) is drives
-    assert join_increments(drives, 1) is drives
+    assert timing.join_increments(drives, 1) is drives
 
 
 @pytest.mark.parametrize("times", [2, 3, 7])
 def test_joined_increments_lead_from_the_first_pose_to_the_last(drives, times):
-    few = join_increments(drives, times)
+    few = timing.join_increments(drives, times)
     assert (few.last - few.first).sum() == (drives.last - drives.first).sum()
     assert set(map(tuple, few.poses.reshape(-1, 3))) <= set(map(tuple, drives.poses.reshape(-1, 3)))
     assert few.travel.sum(axis=0) == pytest.approx(drives.travel.sum(axis=0))
@@ -434,33 +413,33 @@ def test_joined_increments_lead_from_the_first_pose_to_the_last(drives, times):
 
 
 def test_a_right_model_predicts_joined_increments_too(drives):
-    few = join_increments(drives, 3)
+    few = timing.join_increments(drives, 3)
     assert np.abs(few.measured - increments(few, TRUTH)).max() < 1e-9
 
 
 def test_a_block_is_shortened_and_none_is_lost(drives, monkeypatch):
-    monkeypatch.setattr(thinning, "MOST", 300)
-    monkeypatch.setattr(thinning, "STRETCH_S", 1.0)
+    monkeypatch.setattr(timing, "MOST", 300)
+    monkeypatch.setattr(timing, "STRETCH_S", 1.0)
     few = thin(drives)
     assert 250 <= len(few.episode) <= 300 + len(set(drives.block))
     assert set(few.block) == set(drives.block)
     usual = float(np.median(few.last - few.first)) / few.tick_hz
-    assert usual == pytest.approx(thinning.JOINED_S)
+    assert usual == pytest.approx(timing.JOINED_S)
     sizes = np.bincount(few.block)
     assert sizes.max() <= 2 * sizes.min()
     assert len(set(few.first[~few.linked])) > 1, "not always a block's beginning"
 
 
 def test_drives_of_two_seconds_stay_whole_and_fewer_are_taken(monkeypatch):
-    monkeypatch.setattr(thinning, "MOST", 300)
+    monkeypatch.setattr(timing, "MOST", 300)
     drives = cut_into_blocks(planted_drives(TRUTH, episodes=60, seconds=2.1, noise=None))
     few = thin(drives)
-    assert thinning.FEWEST_BLOCKS <= len(set(few.block)) < 60
+    assert timing.FEWEST_BLOCKS <= len(set(few.block)) < 60
     assert len(cut(few, 2.0).begin) == len(set(few.block))
 
 
 def test_poses_that_are_missing_stay_missing(drives):
     gaps = drives.only(np.arange(len(drives.episode)) % 50 > 4)
-    few = join_increments(gaps, 4)
+    few = timing.join_increments(gaps, 4)
     assert (few.last - few.first).max() <= 4 * (drives.last - drives.first).max()
     assert np.abs(few.measured - increments(few, TRUTH)).max() < 1e-9

@@ -12,16 +12,10 @@ import pytest
 from planted import CALM, ROBOT, TRUTH, driven_log, drives_of, fitted, look_for_few, planted_log, with_poses
 from rates import CLEAR
 
-from proxytune.diagnosis import RULES, AdoptedEffect, Estimate, Findings, diagnose_log
-from proxytune.diagnosis.motion.diagnose import (
-    KeptAside,
-    declared_effects,
-    declared_parameters,
-    diagnose,
-    horizon_error,
-)
+from proxytune.diagnosis import RULES, AdoptedEffect, Estimate, diagnose_log
+from proxytune.diagnosis.motion.diagnose import declared_effects, declared_parameters, diagnose
 from proxytune.diagnosis.motion.evidence import gather_evidence
-from proxytune.diagnosis.motion.multistep_fit import HORIZONS_S, PoseNoise
+from proxytune.diagnosis.motion.multistep_fit import HORIZONS_S
 from proxytune.diagnosis.motion.selection import adopt, choose_best
 from proxytune.driving import read_robot
 from proxytune.effects import PARAMETERS
@@ -136,23 +130,10 @@ def test_every_effect_says_what_it_is_worth_on_drives_that_were_not_fitted(diagn
 @pytest.mark.parametrize("level", [1e-6, 0.002])
 def test_a_stationary_robot_gets_no_answer(level):
     random = np.random.default_rng(1)
-    case = hidden.CLEAN[0]
-    log = with_poses(
-        hidden.make_log(case, episodes=6, seconds=12.0), lambda poses: random.normal(0.0, level, poses.shape)
-    )
+    driven = hidden.make_log(hidden.CLEAN[0], episodes=6, seconds=12.0)
+    log = with_poses(driven, lambda poses: random.normal(0.0, level, poses.shape))
     with pytest.raises(LogError, match="stands still"):
         diagnose(log, ROBOT, ("trim", "delay"))
-
-
-@pytest.mark.slow
-def test_an_error_from_a_single_block_of_drives_can_be_written_as_json():
-    short, long = planted_log(TRUTH, episodes=70, seconds=2.0), planted_log(TRUTH, episodes=1, seconds=9.0)
-    log = replace(short, episodes=(*short.episodes, replace(long.episodes[0], name="long")))
-    drives = drives_of(log)
-    model = fitted(drives)
-    tested = KeptAside(drives, drives, PoseNoise(0.002, 0.005))
-    error = horizon_error(Findings(model, model, (), (), (), ()), tested, 5.0, {})
-    assert error is None or np.isfinite((*error.before.interval, *error.ratio.interval)).all()
 
 
 @pytest.mark.slow
@@ -166,12 +147,9 @@ def test_one_drive_is_enough_if_it_is_long(monkeypatch):
 @pytest.mark.slow
 def test_drives_that_all_begin_at_the_origin_and_stubs_among_them_give_a_result(monkeypatch):
     look_for_few(monkeypatch)
-    log = planted_log(SCRUBBING, episodes=6, seconds=12.0)
-    at_origin = driven_log(SCRUBBING, np.stack([e.commands for e in log.episodes]), np.zeros((6, 3)))
-    stubs = [
-        replace(e, name=f"stub {e.name}", times=e.times[:3], commands=e.commands[:3], poses=e.poses[:3])
-        for e in log.episodes
-    ]
+    drives = planted_log(SCRUBBING, episodes=6, seconds=12.0).episodes
+    at_origin = driven_log(SCRUBBING, np.stack([e.commands for e in drives]), np.zeros((6, 3)))
+    stubs = [replace(e, name=2 * e.name, times=e.times[:3], commands=e.commands[:3], poses=e.poses[:3]) for e in drives]
     found = diagnose(replace(at_origin, episodes=(*at_origin.episodes, *stubs)), ROBOT, ("trim", "delay"))
     assert [effect.effect for effect in found.effects] == ["yaw_scrub"]
     assert not found.clocks[0].differ
@@ -217,8 +195,6 @@ def test_a_value_at_the_end_of_its_range_is_told_of_effects_that_draw_too(diagno
 
 
 CASES = {case.name: case for case in hidden.IN_FORM}
-
-
 HIDDEN = [
     "dead_band width 0.12",
     "turn_slip gain 0.15",

@@ -13,14 +13,7 @@ from planted import DECLARED, NOISE, TRUTH, driven_log, drives_of, fitted, plant
 
 from proxytune.diagnosis import MOTION_EFFECTS, RULES, AdoptedEffect, Findings, Ratio, cut, pose_errors
 from proxytune.diagnosis.motion import effect_size as likeness
-from proxytune.diagnosis.motion.effect_size import (
-    WeighedEffect,
-    _drawn_squares,
-    drop_negligible,
-    find_robot_clusters,
-    invisible_effects,
-    measure_effect_sizes,
-)
+from proxytune.diagnosis.motion.effect_size import drop_negligible, find_robot_clusters, invisible_effects
 from proxytune.diagnosis.motion.evidence import Variant
 from proxytune.diagnosis.motion.fitting import evaluate
 from proxytune.diagnosis.motion.innovations import Noise
@@ -109,17 +102,10 @@ def drives():
     return planted_drives(MIXED, episodes=6, seconds=20.0)
 
 
-@pytest.fixture(scope="module")
-def weighed(drives):
-    return drop_negligible(found(drives, MIXED, adopted("yaw_scrub", SCRUB), adopted("lateral_slip", SLIP)), 1)
-
-
-def test_what_matters_is_kept_and_what_does_not_is_dropped(weighed):
+def test_what_matters_is_kept_and_the_model_is_fitted_again_without_what_does_not(drives):
+    weighed = drop_negligible(found(drives, MIXED, adopted("yaw_scrub", SCRUB), adopted("lateral_slip", SLIP)), 1)
     assert [effect.effect for effect in weighed.adopted] == ["yaw_scrub"]
     assert [dropped.effect.effect for dropped in weighed.negligible] == ["lateral_slip"]
-
-
-def test_the_model_is_fitted_again_without_what_was_dropped(weighed):
     assert "lateral_slip" not in weighed.model.theta
     assert SLIP[0] not in weighed.model.free
     assert weighed.model.theta["yaw_scrub"] == pytest.approx(0.13, abs=0.005)
@@ -148,7 +134,7 @@ def test_worth_is_told_on_drives_that_were_not_fitted(drives):
     tested = planted_drives(MIXED, seed=2, episodes=4, seconds=20.0)
     variant = Variant(MIXED, (*DECLARED, *SCRUB, *SLIP))
     effects = [adopted("yaw_scrub", SCRUB), adopted("s", SLIP)]
-    much, little = measure_effect_sizes(found(drives, MIXED, *effects).model, tested, variant, effects, 1)
+    much, little = likeness.measure_effect_sizes(found(drives, MIXED, *effects).model, tested, variant, effects, 1)
     assert set(much) == set(little) == {1.0, 2.0, 5.0}
     assert max(one.interval[0] for one in much.values()) > 1.2
     assert max(one.value for one in much.values()) > 1.5
@@ -165,30 +151,22 @@ def test_a_random_effect_matters_if_its_draws_make_up_the_error(size, matters):
         assert kept.model.theta["delay"] == pytest.approx(TRUTH["delay"], abs=0.01)
 
 
-@pytest.mark.parametrize(
-    ("ratios", "material"),
-    [
-        ([(1.2, 1.1, 1.3)], True),
-        ([(1.2, 0.9, 1.6)], False),
-        ([(1.04, 1.02, 1.06)], False),
-        ([(0.8, 0.7, 0.9)], False),
-        ([(1.0, 0.9, 1.1), (1.06, 1.01, 1.1)], True),
-    ],
-)
-def test_an_effect_matters_if_at_some_horizon_the_error_without_it_is_clearly_larger(ratios, material):
-    one = WeighedEffect(adopted("x", SLIP), {float(h): Ratio(value, ends) for h, (value, *ends) in enumerate(ratios)})
-    assert one.material == material
+def without(*ratios):
+    """An effect without which errors are so many times as large, one horizon each."""
+    told = {float(horizon): Ratio(value, ends) for horizon, (value, *ends) in enumerate(ratios)}
+    return likeness.WeighedEffect(adopted("lateral_slip", SLIP), told)
+
+
+def test_an_effect_matters_if_at_some_horizon_the_error_without_it_is_clearly_larger():
+    assert without((1.2, 1.1, 1.3)).material
+    assert without((1.0, 0.9, 1.1), (1.06, 1.01, 1.1)).material
+    assert not any(without(one).material for one in ((1.2, 0.9, 1.6), (1.04, 1.02, 1.06), (0.8, 0.7, 0.9)))
     assert RULES.material_factor == 1.05
 
 
 def test_an_effect_does_harm_only_where_predictions_are_shown_to_be_better_without_it():
-    def weighed(value, low, high):
-        return WeighedEffect(adopted("lateral_slip", SLIP), {2.0: Ratio(value, (low, high))})
-
-    assert weighed(0.9, 0.85, 0.96).harmful
-    assert not weighed(0.9, 0.75, 1.02).harmful
-    assert not weighed(0.97, 0.95, 0.99).harmful
-    assert not weighed(1.2, 1.1, 1.3).harmful
+    assert without((0.9, 0.85, 0.96)).harmful
+    assert not any(without(one).harmful for one in ((0.9, 0.75, 1.02), (0.97, 0.95, 0.99), (1.2, 1.1, 1.3)))
 
 
 @pytest.mark.slow
@@ -197,7 +175,7 @@ def test_draws_do_not_matter_where_the_noise_of_poses_leaves_no_room_for_them():
     jittery = Variant({**TRUTH, "delay": TRUTH["delay"] - 0.05, "delay_jitter": 0.1}, DECLARED)
     windows = cut(calm, 2.0)
     errors = pose_errors(calm, jittery.theta, windows)[:, 0]
-    drawn = np.sqrt(_drawn_squares(calm, jittery, windows, 1).mean())
+    drawn = np.sqrt(likeness._drawn_squares(calm, jittery, windows, 1).mean())
     assert drawn > 0.4 * np.sqrt(np.mean(errors**2)), "by their size alone they would matter"
     kept = drop_negligible(found(calm, jittery.theta, adopted("delay_jitter", names=("delay_jitter",))), 1)
     assert kept.adopted == ()
@@ -206,9 +184,9 @@ def test_draws_do_not_matter_where_the_noise_of_poses_leaves_no_room_for_them():
 def test_draws_matter_only_where_more_than_one_horizon_shows_them():
     shown, hidden = Ratio(1.14, (1.03, 1.26)), Ratio(1.04, (1.0, 1.1))
     lossy = adopted("dropped_commands", names=("dropped_commands",))
-    assert not WeighedEffect(lossy, {1.0: hidden, 2.0: hidden, 5.0: shown}).material
-    assert WeighedEffect(lossy, {1.0: hidden, 2.0: shown, 5.0: shown}).material
-    assert WeighedEffect(lossy, {2.0: shown}).material
+    assert not likeness.WeighedEffect(lossy, {1.0: hidden, 2.0: hidden, 5.0: shown}).material
+    assert likeness.WeighedEffect(lossy, {1.0: hidden, 2.0: shown, 5.0: shown}).material
+    assert likeness.WeighedEffect(lossy, {2.0: shown}).material
 
 
 VISIBILITY_DECLARED = {"trim", "delay"}
@@ -226,11 +204,8 @@ def slow():
     return invisible_effects(swinging(0.15, 0.03), VISIBILITY_DECLARED)
 
 
-def test_slow_drives_cannot_show_saturation(slow):
+def test_slow_drives_cannot_show_saturation_and_fast_ones_can(slow):
     assert "saturation" in slow
-
-
-def test_fast_drives_can():
     assert "saturation" not in invisible_effects(swinging(0.9, 0.1), VISIBILITY_DECLARED)
 
 

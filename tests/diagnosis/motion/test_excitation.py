@@ -88,9 +88,8 @@ def test_what_is_expected_is_the_evidence_that_fits_of_both_models_have(designed
     driven = drives_of(log)
 
     def log_likelihood(form):
-        fitted = fit(
-            driven, {**TRUTH, **form.fixed, form.free[0][0]: 0.03, form.free[-1][0]: 0.03}, DECLARED + form.free
-        )
+        start = {**TRUTH, **form.fixed, form.free[0][0]: 0.03, form.free[-1][0]: 0.03}
+        fitted = fit(driven, start, DECLARED + form.free)
         return -huber(fitted.innovations).sum() - fitted.whiten.log_determinant.sum()
 
     gained = log_likelihood(FORMS["lateral_slip"]) - log_likelihood(FORMS["marker_offset"])

@@ -11,15 +11,7 @@ from planted import DECLARED, NOISE, TRUTH, drives_of, fitted, planted_drives, p
 
 from proxytune.diagnosis import Fit, increments, span, theta_at
 from proxytune.diagnosis.motion import fitting
-from proxytune.diagnosis.motion.fitting import (
-    check_motion,
-    check_units,
-    fit,
-    held_out_log_likelihood,
-    intervals,
-    loss_of,
-    slopes,
-)
+from proxytune.diagnosis.motion.fitting import fit, held_out_log_likelihood, intervals, loss_of, slopes
 from proxytune.diagnosis.motion.innovations import Whitener, whitener
 from proxytune.errors import LogError
 
@@ -160,21 +152,17 @@ def test_a_block_is_foretold_as_if_the_others_alone_had_been_fitted(drives):
         assert told[block] == pytest.approx(-surprise, rel=1e-5)
 
 
+def gain(model):
+    """What all parameters but the first are worth."""
+    alone = replace(model, slopes=model.slopes[:, :1])
+    return float(held_out_log_likelihood(model).sum() - held_out_log_likelihood(alone).sum())
+
+
 def test_a_useless_parameter_costs_and_a_needed_one_pays(drives):
     model = linear(drives, columns=3)
-    useless = float(
-        held_out_log_likelihood(model).sum() - held_out_log_likelihood(replace(model, slopes=model.slopes[:, :1])).sum()
-    )
-    assert useless < 2.0
+    assert gain(model) < 2.0
     needed = replace(model, innovations=model.innovations + 0.2 * model.slopes[:, 1])
-    gain = float(
-        held_out_log_likelihood(needed).sum()
-        - held_out_log_likelihood(replace(needed, slopes=needed.slopes[:, :1])).sum()
-    )
-    assert gain == pytest.approx(0.5 * 0.04 * (model.slopes[:, 1] ** 2).sum(), rel=0.3)
-
-
-NOMINAL = {"trim": 0.0, "delay": 0.15}
+    assert gain(needed) == pytest.approx(0.5 * 0.04 * (model.slopes[:, 1] ** 2).sum(), rel=0.3)
 
 
 @pytest.fixture(scope="module")
@@ -183,11 +171,11 @@ def log():
 
 
 def test_an_honest_log_is_let_through(log):
-    check_motion("yard", drives_of(log))
-    check_units("yard", drives_of(log), NOMINAL)
+    fitting.check_motion("yard", drives_of(log))
+    fitting.check_units("yard", drives_of(log), {"trim": 0.0, "delay": 0.15})
 
 
 def test_a_robot_that_is_never_told_to_move_is_refused(log):
-    quiet = replace(log, episodes=tuple(replace(e, commands=0.0 * e.commands) for e in log.episodes))
+    drives = drives_of(log)
     with pytest.raises(LogError, match="^yard: every command is zero"):
-        check_motion("yard", drives_of(quiet))
+        fitting.check_motion("yard", replace(drives, duties=0.0 * drives.duties))

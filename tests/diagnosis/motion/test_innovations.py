@@ -11,25 +11,9 @@ import pytest
 from planted import NOISE, TRUTH, planted_drives
 
 from proxytune.diagnosis import HUBER, disturbed_increments, increments, wheel_speeds
+from proxytune.diagnosis.motion import innovations
 from proxytune.diagnosis.motion.drives import relative
-from proxytune.diagnosis.motion.innovations import (
-    FIRST_GUESS,
-    JITTER,
-    TURN_WEIGHT,
-    Noise,
-    arrived_commands,
-    clip_outliers,
-    expected_theta,
-    fit_noise,
-    huber,
-    increments_along,
-    integrate_twists,
-    lateness,
-    log_likelihood,
-    paths,
-    whitener,
-    window_paths,
-)
+from proxytune.diagnosis.motion.innovations import Noise, fit_noise, integrate_twists, paths, whitener, window_paths
 from proxytune.driving.plants import integrate
 
 
@@ -65,8 +49,8 @@ def dense(drives, noise):
         )
         jacobian[:, column] = (there - back).ravel() / 2e-6
     white = np.tile(np.square((noise.pose[0], noise.pose[0], noise.pose[1])), len(poses))
-    way = drives.travel[:, 0] + TURN_WEIGHT * drives.travel[:, 1]
-    drive = np.square(noise.drive) * way[:, None] + JITTER
+    way = drives.travel[:, 0] + innovations.TURN_WEIGHT * drives.travel[:, 1]
+    drive = np.square(noise.drive) * way[:, None] + innovations.JITTER
     return jacobian @ np.diag(white) @ jacobian.T + np.diag(drive.ravel())
 
 
@@ -87,29 +71,21 @@ def test_the_log_likelihood_is_the_gaussian_one_where_nothing_is_an_outlier(few)
     errors = 0.3 * whiten.colour(np.random.default_rng(2).standard_normal(3 * len(few.episode)))
     flat = errors.ravel()
     wanted = -0.5 * flat @ np.linalg.solve(covariance, flat) - 0.5 * np.linalg.slogdet(covariance)[1]
-    assert log_likelihood(errors, whiten) == pytest.approx(wanted, rel=1e-5)
+    assert innovations.log_likelihood(errors, whiten) == pytest.approx(wanted, rel=1e-5)
 
 
 @pytest.mark.parametrize(
-    "noise", [Noise((0.03, 0.015, 0.2), (0.003, 0.008)), Noise((0.01, 0.02, 0.05), (0.0015, 0.004))]
+    ("drive", "pose"), [((0.03, 0.015, 0.2), (0.003, 0.008)), ((0.01, 0.02, 0.05), (0.0015, 0.004))]
 )
-def test_planted_noise_is_found_again(drives, noise):
+@pytest.mark.parametrize("start", [innovations.FIRST_GUESS, Noise((0.2, 0.1, 0.8), (0.02, 0.05))])
+def test_planted_noise_is_found_again_from_a_start_ten_times_too_large_as_well(drives, drive, pose, start):
     z = np.random.default_rng(3).standard_normal(3 * len(drives.episode))
-    found = fit_noise(drives, whitener(drives, noise).colour(z), FIRST_GUESS)
-    np.testing.assert_allclose(found.drive, noise.drive, rtol=0.25)
-    np.testing.assert_allclose(found.pose, noise.pose, rtol=0.1)
-
-
-def test_noise_is_found_from_a_start_ten_times_too_large(drives):
-    z = np.random.default_rng(3).standard_normal(3 * len(drives.episode))
-    start = replace(NOISE, drive=tuple(10.0 * s for s in NOISE.drive), pose=tuple(10.0 * s for s in NOISE.pose))
-    found = fit_noise(drives, whitener(drives, NOISE).colour(z), start)
-    np.testing.assert_allclose(found.pose, NOISE.pose, rtol=0.1)
+    found = fit_noise(drives, whitener(drives, Noise(drive, pose)).colour(z), start)
+    np.testing.assert_allclose(found.drive, drive, rtol=0.25)
+    np.testing.assert_allclose(found.pose, pose, rtol=0.1)
 
 
 def test_the_innovations_of_a_model_that_is_right_are_white():
-    from proxytune.diagnosis import increments
-
     drives = planted_drives({"trim": 0.03}, episodes=6, seconds=20.0)
     z = whitener(drives, NOISE).whiten(drives.measured - increments(drives, {"trim": 0.03})).reshape(-1, 3)
     np.testing.assert_allclose(z.std(axis=0), 1.0, atol=0.1)
@@ -118,8 +94,9 @@ def test_the_innovations_of_a_model_that_is_right_are_white():
 
 def test_outliers_count_linearly_and_their_slope_is_cut():
     z = np.linspace(-8.0, 8.0, 1601)
-    np.testing.assert_allclose(np.gradient(huber(z), z)[1:-1], clip_outliers(z)[1:-1], atol=0.01)
-    assert np.diff(huber(np.array([HUBER, 5.0, 6.0, 7.0])))[1:].tolist() == [HUBER, HUBER]
+    slope = np.gradient(innovations.huber(z), z)
+    np.testing.assert_allclose(slope[1:-1], innovations.clip_outliers(z)[1:-1], atol=0.01)
+    assert np.diff(innovations.huber(np.array([HUBER, 5.0, 6.0, 7.0])))[1:].tolist() == [HUBER, HUBER]
 
 
 RICH = {
@@ -145,10 +122,9 @@ def test_increments_are_the_differences_of_paths(replayed, theta):
     assert walked.shape == (3, replayed.duties.shape[1] + 1, 3)
     for index in (0, 7, 40, len(replayed.episode) - 1):
         episode, first, last = (int(row[index]) for row in (replayed.episode, replayed.first, replayed.last))
-        np.testing.assert_array_equal(
-            increments(replayed, theta)[index], relative(walked[episode, first], walked[episode, last])
-        )
-    np.testing.assert_array_equal(increments(replayed, theta), increments_along(replayed, walked))
+        step = relative(walked[episode, first], walked[episode, last])
+        np.testing.assert_array_equal(increments(replayed, theta)[index], step)
+    np.testing.assert_array_equal(increments(replayed, theta), innovations.increments_along(replayed, walked))
 
 
 def test_the_model_that_drove_says_what_was_measured(replayed):
@@ -157,11 +133,8 @@ def test_the_model_that_drove_says_what_was_measured(replayed):
 
 @pytest.mark.parametrize("theta", [TRUTH, RICH], ids=["declared", "rich"])
 def test_windows_from_an_episodes_start_are_its_path(replayed, theta):
-    begins = np.flatnonzero(
-        np.isin(np.arange(len(replayed.episode)), np.unique(replayed.episode, return_index=True)[1])
-    )
-    begins = begins[replayed.first[begins] == 0]
-    assert len(begins) == 3
+    begins = np.unique(replayed.episode, return_index=True)[1]
+    assert replayed.first[begins].tolist() == [0, 0, 0]
     walked = window_paths(replayed, theta, begins, 300)
     np.testing.assert_allclose(walked, paths(replayed, theta)[replayed.episode[begins], :301], atol=1e-9)
 
@@ -206,12 +179,9 @@ def test_a_window_past_the_end_goes_on_with_the_last_command(replayed):
 def test_nothing_measured_after_a_windows_start_changes_it(replayed):
     poses = replayed.poses.copy()
     poses[60:] += 5.0
-    later = replace(replayed, poses=poses)
-    begin = np.array([50])
-    np.testing.assert_array_equal(
-        window_paths(later, {**TRUTH, "floor_slope.x": 0.05}, begin, 90),
-        window_paths(replayed, {**TRUTH, "floor_slope.x": 0.05}, begin, 90),
-    )
+    sloped = {**TRUTH, "floor_slope.x": 0.05}
+    moved, plain = (window_paths(e, sloped, np.array([50]), 90) for e in (replace(replayed, poses=poses), replayed))
+    np.testing.assert_array_equal(moved, plain)
 
 
 @pytest.mark.parametrize(
@@ -224,8 +194,8 @@ def test_nothing_measured_after_a_windows_start_changes_it(replayed):
     ],
 )
 def test_random_effects_make_commands_late_by_their_mean(theta, late):
-    assert lateness(theta, 20.0) == pytest.approx(late)
-    calm = expected_theta({"trim": 0.02, "delay": 0.1, **theta}, 20.0)
+    assert innovations.lateness(theta, 20.0) == pytest.approx(late)
+    calm = innovations.expected_theta({"trim": 0.02, "delay": 0.1, **theta}, 20.0)
     assert calm == pytest.approx({"trim": 0.02, "delay": 0.1 + late})
 
 
@@ -236,11 +206,11 @@ def test_the_mean_lateness_is_that_of_drawn_drives():
         return np.square(drawn.measured - increments(drawn, {"trim": TRUTH["trim"], "delay": delay}))[:, 0].sum()
 
     best = min(np.arange(0.1, 0.18, 0.004), key=strays)
-    assert best == pytest.approx(TRUTH["delay"] + lateness({"dropped_commands": 0.3}, 20.0), abs=0.012)
+    assert best == pytest.approx(TRUTH["delay"] + innovations.lateness({"dropped_commands": 0.3}, 20.0), abs=0.012)
 
 
 def test_a_random_effect_without_a_declared_delay_is_late_from_nothing():
-    assert expected_theta({"delay_jitter": 0.1}, 20.0) == {"delay": 0.05}
+    assert innovations.expected_theta({"delay_jitter": 0.1}, 20.0) == {"delay": 0.05}
 
 
 def test_what_is_added_to_the_twists_moves_the_robot(replayed):
@@ -252,8 +222,8 @@ def test_what_is_added_to_the_twists_moves_the_robot(replayed):
 
 
 def test_wheels_and_arrived_commands_have_the_shape_of_duties(replayed):
-    assert wheel_speeds(replayed, RICH).shape == arrived_commands(replayed, RICH).shape == replayed.duties.shape
-    late = arrived_commands(replayed, {"delay": 0.2})
+    arrived, late = (innovations.arrived_commands(replayed, theta) for theta in (RICH, {"delay": 0.2}))
+    assert wheel_speeds(replayed, RICH).shape == arrived.shape == replayed.duties.shape
     np.testing.assert_allclose(late[:, 12:], replayed.duties[:, :-12], atol=1e-9)
 
 
@@ -271,25 +241,18 @@ def test_windows_with_measured_wheels_are_told_where_they_point(replayed):
 TICK_S = 1.0 / 60.0
 
 
-def twists(turn, sideways=0.3):
-    """Three drives of 400 ticks, straight ahead for a while, and standing at last."""
-    drawn = np.random.default_rng(1).standard_normal((3, 400, 3)) * (0.5, sideways, turn)
-    drawn[:, 100:150, 2], drawn[:, -50:] = 0.0, 0.0
-    return drawn
-
-
 @pytest.mark.parametrize("turn", [0.0, 1e-9, 3.0, 150.0])
 @pytest.mark.parametrize("sideways", [0.0, 0.3])
 def test_the_poses_are_those_of_the_planar_plant(turn, sideways):
-    asked = twists(turn, sideways)
+    """Of three drives of 400 ticks, straight ahead for a while, and standing at last."""
+    asked = np.random.default_rng(1).standard_normal((3, 400, 3)) * (0.5, sideways, turn)
+    asked[:, 100:150, 2], asked[:, -50:] = 0.0, 0.0
     walked = integrate_twists(asked, TICK_S)
     np.testing.assert_allclose(walked[:, 1:], integrate(np.zeros((3, 3)), asked, TICK_S), rtol=0.0, atol=1e-12)
 
 
 def test_models_that_differ_in_learnt_commands_alone_are_replayed_each_by_itself(drives):
-    seen = {
-        f"learnt.range.{of}@{end}": sign for of in ("forward", "yaw") for end, sign in (("low", -9.0), ("high", 9.0))
-    }
+    seen = {f"learnt.range.{of}@{end}": by for of in ("forward", "yaw") for end, by in (("low", -9.0), ("high", 9.0))}
     weak, strong = ({**TRUTH, **seen, "learnt.duty.duty@1.0": weight} for weight in (-0.1, -0.3))
     first, second = (wheel_speeds(drives, theta) for theta in (weak, strong))
     np.testing.assert_allclose(second - first, 2.0 * (first - wheel_speeds(drives, TRUTH)), atol=1e-9)

@@ -5,13 +5,7 @@ import pytest
 from planted import drives_of, planted_log, with_poses
 
 from proxytune.diagnosis.motion import latency
-from proxytune.diagnosis.motion.latency import (
-    likeliest_latency,
-    measured_speeds,
-    reaction,
-    reaction_at,
-    squares_by_latency,
-)
+from proxytune.diagnosis.motion.latency import likeliest_latency, measured_speeds, reaction, reaction_at
 
 
 def answered(theta, change=lambda poses: poses):
@@ -60,11 +54,8 @@ def test_the_vertex_between_steps_is_found_with_its_deviation():
     assert found.deviation == pytest.approx(np.sqrt((np.array([0.01, 0.01, 0, 0]) ** 2).sum()) / 4.0)
 
 
-def test_squares_that_do_not_depend_on_the_latency_tell_none():
+def test_squares_that_do_not_depend_on_the_latency_or_fall_to_the_end_of_what_was_tried_tell_none():
     assert likeliest_latency(np.ones((4, 9)), np.arange(9.0)).deviation == np.inf
-
-
-def test_squares_that_fall_to_the_end_of_what_was_tried_tell_none():
     latencies = np.arange(-4, 5) * 0.5
     for end in (-2.0, 2.0, 7.0):
         assert likeliest_latency((latencies - end) ** 2 * np.ones((6, 1)), latencies).deviation == np.inf
@@ -77,7 +68,7 @@ def test_a_few_drives_at_a_time_give_the_same_latency_to_the_bit(monkeypatch):
 
     def measured():
         best = reaction(few, speeds, 1.0)
-        return best, squares_by_latency(few, speeds, best, latencies, ends)
+        return best, latency.squares_by_latency(few, speeds, best, latencies, ends)
 
     whole, squares = measured()
     monkeypatch.setattr(latency, "AT_ONCE", 2 * few.duties.shape[1])

@@ -7,20 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import DECLARED, NOISE, TRUTH, drives_of, planted_drives, planted_log
+from planted import DECLARED, NOISE, TRUTH, drives_of, planted_drives, planted_log, with_poses
 
 from proxytune.diagnosis import RULES, cut, pose_errors
+from proxytune.diagnosis.motion import multistep_fit
 from proxytune.diagnosis.motion.fitting import evaluate
 from proxytune.diagnosis.motion.innovations import Noise
-from proxytune.diagnosis.motion.multistep_fit import (
-    PoseNoise,
-    fit_multistep,
-    fit_windows,
-    held_out_squares,
-    horizons,
-    noise_floor,
-    pose_noise,
-)
+from proxytune.diagnosis.motion.multistep_fit import PoseNoise, fit_multistep, fit_windows, noise_floor, pose_noise
 
 STILL = Noise((0.0, 0.0, 0.0), (0.003, 0.008))
 
@@ -47,15 +40,10 @@ def test_a_missing_effect_does_not_pass_for_noise_of_poses(drives):
     assert wrong.place == pytest.approx(0.003, rel=0.1)
 
 
-def test_outliers_do_not_pass_for_noise(drives):
+def test_outliers_do_not_pass_for_noise():
     log = planted_log(TRUTH, episodes=6, seconds=60.0, noise=STILL)
-
-    def jumping(episode):
-        poses = episode.poses.copy()
-        poses[::100, :2] += 0.5
-        return replace(episode, poses=poses)
-
-    jumped = pose_noise(drives_of(replace(log, episodes=tuple(map(jumping, log.episodes)))), TRUTH)
+    jumping = with_poses(log, lambda poses: poses + np.outer(np.arange(1200) % 100 == 0, (0.5, 0.5, 0.0)))
+    jumped = pose_noise(drives_of(jumping), TRUTH)
     assert jumped.place == pytest.approx(0.003, rel=0.25)
 
 
@@ -119,15 +107,18 @@ def test_a_few_wild_poses_do_not_bend_the_parameters(driven):
     assert found["trim"] == pytest.approx(TRUTH["trim"], abs=0.01)
 
 
+def without_predictions(patch):
+    """The windows that predictions are asked for from now on, none of which moves."""
+    asked, name = [], "predicted_motion"
+    patch.setattr(multistep_fit, name, lambda d, t, w: asked.append(w) or np.zeros((len(w.window), 3)))
+    return asked
+
+
 def test_long_logs_are_thinned(driven, monkeypatch):
-    asked = []
-    monkeypatch.setattr("proxytune.diagnosis.motion.multistep_fit.MOST_WINDOWS", 5)
-    monkeypatch.setattr(
-        "proxytune.diagnosis.motion.multistep_fit.predicted_motion",
-        lambda d, t, w: asked.append(len(w.begin)) or np.zeros((len(w.window), 3)),
-    )
+    asked = without_predictions(monkeypatch)
+    monkeypatch.setattr(multistep_fit, "MOST_WINDOWS", 5)
     fit_windows(replace(driven), TRUTH, DECLARED, cut(driven, 2.0))
-    assert 3 <= max(asked) <= 5
+    assert 3 <= max(len(windows.begin) for windows in asked) <= 5
 
 
 def test_what_was_fitted_is_not_fitted_again_but_other_windows_and_starts_are(monkeypatch):
@@ -136,11 +127,7 @@ def test_what_was_fitted_is_not_fitted_again_but_other_windows_and_starts_are(mo
     found = fit_windows(quiet, start, DECLARED, windows)
     known = dict(found)
     found["trim"] = 9.0
-    asked = []
-    monkeypatch.setattr(
-        "proxytune.diagnosis.motion.multistep_fit.predicted_motion",
-        lambda d, t, w: asked.append(w) or np.zeros((len(w.window), 3)),
-    )
+    asked = without_predictions(monkeypatch)
     assert fit_windows(quiet, start, DECLARED, windows) == known
     assert not asked
     fewer = windows._replace(window=windows.window[:-1], increment=windows.increment[:-1])
@@ -155,11 +142,11 @@ def test_no_pose_is_predicted_by_what_was_fitted_to_it(driven):
     own = driven.block % 4 == 0
     poses[own, :, 2] += np.linspace(0.0, 2.0, own.sum())[:, None]
     fitted = fit_windows(replace(driven, poses=poses), TRUTH, DECLARED, cut(driven, 2.0))
-    apart = held_out_squares(replace(driven, poses=poses), TRUTH, DECLARED, 2.0)
+    apart = multistep_fit.held_out_squares(replace(driven, poses=poses), TRUTH, DECLARED, 2.0)
     others = driven.block[cut(driven, 2.0).increment] % 4 == 0
     together = squares(replace(driven, poses=poses), fitted)
     assert apart[2.0][others].mean() > together[others].mean()
-    assert set(apart) == set(horizons(driven)) == {1.0, 2.0, 5.0}
+    assert set(apart) == set(multistep_fit.horizons(driven)) == {1.0, 2.0, 5.0}
 
 
 def test_values_that_predict_poorly_are_fitted_again(driven):
@@ -187,5 +174,5 @@ def test_values_that_would_do_harm_at_some_horizon_are_not_taken(driven):
 
 def test_drives_too_short_for_windows_in_three_blocks_are_not_fitted_to():
     few = model(planted_drives(TRUTH, episodes=2, seconds=4.0), trim=0.08)
-    assert horizons(few.drives) == ()
+    assert multistep_fit.horizons(few.drives) == ()
     assert fit_multistep(few) == (few, None)

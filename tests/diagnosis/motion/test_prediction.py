@@ -12,22 +12,12 @@ import pytest
 from foreign_robot import FOREIGN_TRUTH, drive, write_own_times
 from learnt_truth import MANY, TURNING
 from manoeuvres import make_drives
-from planted import ROBOT, TRUTH, driven_log, drives_of, planted_drives, planted_log
+from planted import ROBOT, TRUTH, driven_log, drives_of, planted_drives, planted_log, with_poses
 
 from proxytune.diagnosis import agreement, cut, pose_errors, predict, robot_of
 from proxytune.diagnosis.motion import prediction as windows_module
 from proxytune.diagnosis.motion.drives import gather
-from proxytune.diagnosis.motion.prediction import (
-    FITTED_S,
-    POSES,
-    SHORTEST,
-    choose_windows,
-    compare_repeats,
-    ratio,
-    rmse,
-    select_windows,
-    slopes_of,
-)
+from proxytune.diagnosis.motion.prediction import compare_repeats, ratio, rmse, select_windows, slopes_of
 from proxytune.effects import learnt_effect
 from proxytune.errors import LogError
 from proxytune.logs import read_log
@@ -38,6 +28,15 @@ COLUMNS = ["episode", "start_time", "time", "x", "y", "heading"]
 @pytest.fixture(scope="module")
 def log():
     return planted_log(TRUTH, episodes=2, seconds=10.0, noise=None)
+
+
+def without_poses(log, *rows):
+    """The log whose first drive was not measured in these rows."""
+    first = log.episodes[0]
+    poses = first.poses.copy()
+    for some in rows:
+        poses[some] = np.nan
+    return replace(log, episodes=(replace(first, poses=poses), *log.episodes[1:]))
 
 
 def test_windows_follow_one_another_and_cover_every_row(log):
@@ -90,7 +89,7 @@ def test_headings_go_on_over_a_whole_turn(log):
     for _, window in table.groupby(["episode", "start_time"]):
         assert np.abs(np.diff(window.heading)).max() < 0.5
     far = planted_log(TRUTH, episodes=1, seconds=10.0, noise=None)
-    turned = replace(far, episodes=tuple(replace(e, poses=e.poses + (0.0, 0.0, 40.0)) for e in far.episodes))
+    turned = with_poses(far, lambda poses: poses + (0.0, 0.0, 40.0))
     assert predict(turned, ROBOT, TRUTH, 5.0).heading.iloc[0] == pytest.approx(turned.episodes[0].poses[0, 2])
 
 
@@ -111,26 +110,18 @@ def test_a_marker_is_predicted_exactly():
         out[:, 2] += np.radians(3.0)
         return out
 
-    log = replace(plain, episodes=tuple(replace(e, poses=seen(e.poses)) for e in plain.episodes))
+    log = with_poses(plain, seen)
     assert agreement(predict(log, ROBOT, theta, 2.0), log, 2.0).place < 1e-6
 
 
 def test_a_window_begins_at_the_first_measured_pose_after_the_one_before(log):
-    first = log.episodes[0]
-    poses = first.poses.copy()
-    poses[:7] = np.nan
-    poses[44:60] = np.nan
-    broken = replace(log, episodes=(replace(first, poses=poses),))
-    starts = predict(broken, ROBOT, TRUTH, 2.0).start_time.unique()
-    assert list(starts) == pytest.approx([0.35, 3.0, 5.0, 7.0, 9.0])
+    table = predict(without_poses(log, slice(7), slice(44, 60)), ROBOT, TRUTH, 2.0)
+    assert list(table[table.episode == "00"].start_time.unique()) == pytest.approx([0.35, 3.0, 5.0, 7.0, 9.0])
 
 
 def test_poses_that_were_not_measured_are_not_compared(log):
-    first = log.episodes[0]
-    poses = first.poses.copy()
-    poses[50:60] = np.nan
-    broken = replace(log, episodes=(replace(first, poses=poses),))
-    assert agreement(predict(broken, ROBOT, TRUTH, 2.0), broken, 2.0).poses < 190
+    broken = without_poses(log, slice(50, 60))
+    assert agreement(predict(broken, ROBOT, TRUTH, 2.0), broken, 2.0).poses < 2 * 199 - 9
 
 
 @pytest.mark.parametrize("horizon", [0.0, 0.04, -1.0, float("nan")])
@@ -140,15 +131,14 @@ def test_a_horizon_shorter_than_a_sample_is_refused(log, horizon):
 
 
 def test_a_log_without_poses_is_refused(log):
-    blind = replace(log, episodes=tuple(replace(e, poses=np.full_like(e.poses, np.nan)) for e in log.episodes))
+    blind = with_poses(log, lambda poses: np.full_like(poses, np.nan))
     with pytest.raises(LogError, match="no measured pose to start a window from"):
         predict(blind, ROBOT, TRUTH, 2.0)
 
 
 def test_a_first_pose_and_commands_are_enough_for_a_whole_drive(log):
     """The poses of each drive are what they are with all poses known; there is nothing to compare them with."""
-    first_alone = (np.where(np.arange(len(e.times))[:, None] > 0, np.nan, e.poses) for e in log.episodes)
-    alone = replace(log, episodes=tuple(replace(e, poses=p) for e, p in zip(log.episodes, first_alone, strict=True)))
+    alone = with_poses(log, lambda poses: np.where(np.arange(len(poses))[:, None] > 0, np.nan, poses))
     told = predict(alone, ROBOT, TRUTH, 100.0)
     np.testing.assert_allclose(told[["x", "y", "heading"]], predict(log, ROBOT, TRUTH, 100.0)[["x", "y", "heading"]])
     assert len(told) == sum(len(one.times) for one in log.episodes)
@@ -157,11 +147,7 @@ def test_a_first_pose_and_commands_are_enough_for_a_whole_drive(log):
 
 @pytest.mark.parametrize("known", [1, 2])
 def test_an_episode_with_a_pose_or_two_is_predicted_from_it(log, known):
-    first = log.episodes[0]
-    poses = np.full_like(first.poses, np.nan)
-    poses[:known] = first.poses[:known]
-    broken = replace(log, episodes=(replace(first, poses=poses), log.episodes[1]))
-    table = predict(broken, ROBOT, TRUTH, 2.0)
+    table = predict(without_poses(log, slice(known, None)), ROBOT, TRUTH, 2.0)
     assert len(table[table.episode == "00"]) == 41
 
 
@@ -279,60 +265,51 @@ def test_a_model_that_is_right_leaves_nothing(drives):
 
 
 def test_windows_are_thinned_to_a_few_poses_that_reach_their_end(drives):
-    windows = choose_windows(drives)
+    windows = windows_module.choose_windows(drives)
     counts = np.bincount(windows.window)
-    assert counts.max() == POSES
+    assert counts.max() == windows_module.POSES
     lasts = (drives.last[windows.increment] - drives.first[windows.begin][windows.window]) / drives.tick_hz
-    assert lasts.max() == FITTED_S
+    assert lasts.max() == windows_module.FITTED_S
     assert np.all(np.diff(lasts)[np.diff(windows.window) == 0] > 0.0)
 
 
 @pytest.fixture(scope="module")
-def drives_of_windows():
+def long():
     return planted_drives(TRUTH, episodes=6, seconds=30.0)
 
 
-def with_gaps(rows):
-    log = planted_log(TRUTH, episodes=2, seconds=20.0)
-    first = log.episodes[0]
-    poses = first.poses.copy()
-    poses[rows] = np.nan
-    return drives_of(replace(log, episodes=(replace(first, poses=poses), *log.episodes[1:])))
-
-
 @pytest.mark.parametrize("horizon_s", [0.5, 1.0, 2.0, 5.0])
-def test_windows_cover_every_increment_once_but_for_short_ends(drives_of_windows, horizon_s):
-    windows = cut(drives_of_windows, horizon_s)
+def test_windows_cover_every_increment_once_but_for_short_ends(long, horizon_s):
+    windows = cut(long, horizon_s)
     assert len(np.unique(windows.increment)) == len(windows.increment)
-    left = np.setdiff1d(np.arange(len(drives_of_windows.episode)), windows.increment)
-    runs = int((~drives_of_windows.linked).sum())
-    assert len(left) <= runs * SHORTEST * horizon_s * 20.0
-    assert len(windows.begin) >= drives_of_windows.seconds / horizon_s * 0.6
+    left = np.setdiff1d(np.arange(len(long.episode)), windows.increment)
+    runs = int((~long.linked).sum())
+    assert len(left) <= runs * windows_module.SHORTEST * horizon_s * 20.0
+    assert len(windows.begin) >= long.seconds / horizon_s * 0.6
 
 
 @pytest.mark.parametrize("horizon_s", [0.7, 1.9, 4.0])
-def test_a_horizon_that_does_not_divide_a_drive_leaves_no_stub(drives_of_windows, horizon_s):
-    windows = cut(drives_of_windows, horizon_s)
+def test_a_horizon_that_does_not_divide_a_drive_leaves_no_stub(long, horizon_s):
+    windows = cut(long, horizon_s)
     for window, begin in enumerate(windows.begin):
         own = windows.increment[windows.window == window]
-        assert (
-            drives_of_windows.last[own[-1]] - drives_of_windows.first[begin]
-        ) / drives_of_windows.tick_hz >= 0.9 * horizon_s - 1e-9
+        lasts = (long.last[own[-1]] - long.first[begin]) / long.tick_hz
+        assert lasts >= 0.9 * horizon_s - 1e-9
 
 
 @pytest.mark.parametrize("horizon_s", [1.0, 2.0])
 @pytest.mark.parametrize("rows", [slice(50, 60), slice(100, 150)])
 def test_no_window_crosses_a_gap_a_block_or_an_episode(rows, horizon_s):
-    drives_of_windows = with_gaps(rows)
-    windows = cut(drives_of_windows, horizon_s)
+    long = drives_of(without_poses(planted_log(TRUTH, episodes=2, seconds=20.0), rows))
+    windows = cut(long, horizon_s)
     for window, begin in enumerate(windows.begin):
         own = windows.increment[windows.window == window]
         assert own[0] == begin
         assert np.array_equal(own, np.arange(begin, begin + len(own)))
-        assert drives_of_windows.linked[own[1:]].all()
-        assert len(np.unique(drives_of_windows.block[own])) == len(np.unique(drives_of_windows.episode[own])) == 1
-        lasts = (drives_of_windows.last[own[-1]] - drives_of_windows.first[begin]) / drives_of_windows.tick_hz
-        assert SHORTEST * horizon_s <= lasts <= horizon_s + 1e-9
+        assert long.linked[own[1:]].all()
+        assert len(np.unique(long.block[own])) == len(np.unique(long.episode[own])) == 1
+        lasts = (long.last[own[-1]] - long.first[begin]) / long.tick_hz
+        assert windows_module.SHORTEST * horizon_s <= lasts <= horizon_s + 1e-9
 
 
 def test_runs_shorter_than_most_of_the_horizon_have_no_window():
@@ -392,9 +369,9 @@ def test_a_ratio_of_few_blocks_or_of_errors_that_are_the_same_shows_nothing():
     assert not ratio(np.array([4.0, 9.0, 1.0]), np.array([1.0, 1.0, 0.9]), np.arange(3)).above
 
 
-def test_windows_of_a_few_episodes_at_a_time_have_the_same_errors_to_the_bit(drives_of_windows, monkeypatch):
+def test_windows_of_a_few_episodes_at_a_time_have_the_same_errors_to_the_bit(long, monkeypatch):
     theta = {**TRUTH, "dead_band.width": 0.1, "floor_slope.y": 0.02, "motor_lag.time_constant": 0.3}
-    gone = drives_of_windows.only((drives_of_windows.episode != 3) & (np.arange(len(drives_of_windows.episode)) != 150))
+    gone = long.only((long.episode != 3) & (np.arange(len(long.episode)) != 150))
     windows = cut(gone, 2.0)
     every_other = select_windows(windows, np.arange(len(windows.begin)) % 2 == 0)
     whole = pose_errors(gone, theta, every_other)
@@ -402,11 +379,11 @@ def test_windows_of_a_few_episodes_at_a_time_have_the_same_errors_to_the_bit(dri
     assert np.array_equal(pose_errors(gone, theta, every_other), whole)
 
 
-def test_no_more_episodes_are_replayed_at_a_time_than_memory_is_to_take(drives_of_windows, monkeypatch):
+def test_no_more_episodes_are_replayed_at_a_time_than_memory_is_to_take(long, monkeypatch):
     sizes, replay = [], windows_module.window_paths
     monkeypatch.setattr(
         windows_module, "window_paths", lambda some, *rest: sizes.append(len(some.duties)) or replay(some, *rest)
     )
-    monkeypatch.setattr(windows_module, "AT_ONCE", 2 * drives_of_windows.duties.shape[1])
-    pose_errors(drives_of_windows, TRUTH, cut(drives_of_windows, 2.0))
+    monkeypatch.setattr(windows_module, "AT_ONCE", 2 * long.duties.shape[1])
+    pose_errors(long, TRUTH, cut(long, 2.0))
     assert sizes == [2, 2, 2]

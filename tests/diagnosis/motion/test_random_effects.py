@@ -11,14 +11,8 @@ from own_times import own_times_log
 from planted import TRUTH, drives_of, fitted, planted_drives
 
 from proxytune.diagnosis import RANDOM_EFFECTS
-from proxytune.diagnosis.motion.random_effects import (
-    _invert,
-    _left,
-    _mixture,
-    infer_size_indirectly,
-    random_effects,
-    responses,
-)
+from proxytune.diagnosis.motion import random_effects as drawing
+from proxytune.diagnosis.motion.random_effects import _mixture, infer_size_indirectly, random_effects, responses
 
 SHORT = {"episodes": 4, "seconds": 25.0}
 
@@ -143,7 +137,7 @@ def test_intervals_hold_the_true_size(effect, size):
 def test_the_size_is_that_of_which_drives_say_what_is_measured():
     sizes = np.array([0.1, 0.2, 0.4])
     said = np.log(0.5 * sizes) + np.array([[-0.05], [0.05]])
-    value, low, high = _invert(sizes, said, float(np.log(0.1)))
+    value, low, high = drawing._invert(sizes, said, float(np.log(0.1)))
     assert value == pytest.approx(0.2)
     assert 0.1 < low < 0.2 < high < 0.4
 
@@ -157,7 +151,7 @@ def test_what_pulls_commands_early_as_well_as_late_is_left_over():
     """All lost once leaves nothing; pulls of as much to either side leave those that are early."""
     late, energy = RANDOM_EFFECTS["dropped_commands"].lateness(0.3, 10.0), np.full(50, 100.0)
     lost_once = -late.commands[1] * energy
-    assert _left(late, lost_once, energy) == pytest.approx(0.0, abs=1e-9)
+    assert drawing._left(late, lost_once, energy) == pytest.approx(0.0, abs=1e-9)
     both = 8.0 * np.where(np.arange(50) % 2 == 0, lost_once, -lost_once)
-    assert _left(late, both, energy) > 2.0
-    assert _left(late, both, energy / 1000.0) == 0.0  # commands that nobody could see
+    assert drawing._left(late, both, energy) > 2.0
+    assert drawing._left(late, both, energy / 1000.0) == 0.0  # commands that nobody could see

@@ -42,16 +42,18 @@ def screened_with(label, gain, p_value=0.002, column=(1.0, 1.0, 1.0)):
     return ScreenedCandidate(form, form.probes[0], form.probes[0], gain, gain, p_value, np.array(column))
 
 
+def adopted_with(name):
+    return AdoptedEffect(name, "", (name,), ((name,),), 60.0, 0.002, ())
+
+
 def curve_over_time(gain):
     return SignalCurve(SimpleNamespace(name="time", effects=()), gain, np.zeros(1))
 
 
 def rivals(drives, gain, theta, column=ACROSS):
     """The rivals of an effect of 100 nats beside a second one: its gain, its values and what it does."""
-    best, second = (
-        screened_with(effect, 100.0, column=way)
-        for effect, way in (("yaw_scrub", (1.0, 0.0, 0.0)), ("lateral_slip", column))
-    )
+    best = screened_with("yaw_scrub", 100.0, column=(1.0, 0.0, 0.0))
+    second = screened_with("lateral_slip", 100.0, column=column)
     model = evaluate(drives, {**TRUTH, "yaw_scrub": 0.16}, DECLARED, NOISE)
     fits = {"yaw_scrub": FittedCandidate(100.0, model, best)}
     if gain is not None:
@@ -87,10 +89,7 @@ def test_a_random_effect_has_the_other_as_rival_by_most_of_the_evidence(drives, 
 
 def test_an_effect_that_does_nothing_beside_the_last_one_is_dropped_and_one_that_pays_is_kept():
     drives = planted_drives({**TRUTH, "yaw_scrub": 0.13}, episodes=4, seconds=12.0)
-    idle, pays, last = (
-        AdoptedEffect(name, "", (name,), ((name,),), 60.0, 0.002, ())
-        for name in ("lateral_slip", "yaw_scrub", "turn_slip")
-    )
+    idle, pays, last = map(adopted_with, ("lateral_slip", "yaw_scrub", "turn_slip"))
     theta = {**TRUTH, "yaw_scrub": 0.13, "lateral_slip": 0.0, "turn_slip": 0.0}
     free = DECLARED + idle.free + pays.free + last.free
     model, kept = drop_idle(fit(drives, theta, free), [pays, idle, last])
@@ -200,7 +199,7 @@ def test_a_value_without_a_best_one_is_looked_for_no_further_than_physics_allows
 
 
 MIXED = {**TRUTH, "yaw_scrub": 0.13, "lateral_slip": 0.002}
-SLIP, SCRUB = (AdoptedEffect(name, "", (name,), ((name,),), 60.0, 0.002, ()) for name in ("lateral_slip", "yaw_scrub"))
+SLIP, SCRUB = map(adopted_with, ("lateral_slip", "yaw_scrub"))
 
 
 @pytest.fixture(scope="module")
@@ -266,11 +265,7 @@ def test_the_second_search_is_not_taken_where_it_predicts_worse(base, monkeypatc
     assert len(found.negligible) == 1
 
 
-SEARCH_FORMS = [
-    form
-    for form in candidates(ROBOT, TRUTH, ("trim", "delay"))
-    if not form.form and not CATALOGUE[form.effect].trace.placed
-]
+FREE = [f for f in candidates(ROBOT, TRUTH, ("trim", "delay")) if not f.form and not CATALOGUE[f.effect].trace.placed]
 
 
 @pytest.fixture(scope="module")
@@ -284,7 +279,7 @@ def adopted(clean, monkeypatch, *rounds):
 
     def gather_evidence(model, taken, seed):
         gain, curve = next(left, (0.0, 0.0))
-        form = next(form for form in SEARCH_FORMS if form.effect not in taken)
+        form = next(form for form in FREE if form.effect not in taken)
         neutral = {name: value for names, value in zip(form.free, form.neutral, strict=True) for name in names}
         screened, signal = screened_with(form.label, gain), curve_over_time(curve)
         fitted = replace(clean, theta={**clean.theta, **neutral})
@@ -344,9 +339,7 @@ def test_no_random_effect_stands_for_what_a_car_lacks_beside_it(monkeypatch, dri
     """True ones leave up to 1.7 of what pulls commands. Robots on two wheels are judged as they always were."""
     lost = RandomEffect("dropped_commands", "dropped_commands", 0.5, (0.0, 0.6), 2000.0, 0.01, left)
     model = SimpleNamespace(drives=SimpleNamespace(rules=RULES, robot=SimpleNamespace(drive=drive)))
-    monkeypatch.setattr(
-        selection, "fit_random", lambda model, effect: FittedCandidate(effect.gain, model, random=effect)
-    )
+    monkeypatch.setattr(selection, "fit_random", lambda model, one: FittedCandidate(one.gain, model, random=one))
     monkeypatch.setattr(selection, "predicts_no_worse", lambda one, other: True)
     best = choose_best(model, Evidence([], {}, (lost,), []), 15.0)
     assert (best is not None) == chosen
@@ -360,10 +353,8 @@ def four_faults():
     """What a search that names nothing leaves of a car with four faults; the steering's lag is 0.1 s by nature."""
     hidden = ("dead_band", {"width": 0.12}), ("servo", {"figure": 0.3}), ("scrubbing", {"figure": 0.4}), (
         "marker_offset", {"ahead": 0.1})  # fmt: skip
-    log = hidden_cars.make_log(
-        hidden_cars.Case("car with four faults", hidden, "normal", 5, 0.02, 0.1), episodes=4, seconds=20.0
-    )
-    car = read_robot("car")
+    case, car = hidden_cars.Case("car with four faults", hidden, "normal", 5, 0.02, 0.1), read_robot("car")
+    log = hidden_cars.make_log(case, episodes=4, seconds=20.0)
     drives = gather(log, car, log.episodes)
     model = fit_declared(drives, {"steering_offset": 0.0, "delay": 0.0}, ("steering_offset", "delay"))
     return Findings(model, model, (), (), (), ())
@@ -389,9 +380,7 @@ def test_what_a_second_search_is_to_do_without_is_not_fitted_together_either(fou
 
 
 @pytest.mark.slow
-def test_what_is_found_together_is_taken_only_where_it_is_surely_more_likely_and_predicts_no_worse(
-    four_faults, together, monkeypatch
-):
+def test_what_is_found_together_is_taken_only_if_surely_likelier_and_no_worse(four_faults, together, monkeypatch):
     monkeypatch.setattr(selection, "OF_CARS", tuple(effect.effect for effect in together.adopted))
     assert eliminate(replace(four_faults, model=together.model), lambda line: None) is None
     monkeypatch.setattr(selection, "predicts_no_worse", lambda one, other: False)

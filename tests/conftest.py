@@ -104,6 +104,7 @@ PARAMETERS = {"trim": "[-0.3, 0.3]", "delay": "[0.0, 0.3]"}
 TRUTH = {"trim": 0.1, "delay": 0.12}
 
 Answered = Callable[..., Any]
+Refused = Callable[..., str]
 MakeStudy = Callable[..., Path]
 """Writes a study's folder; call it again to edit the study.toml."""
 
@@ -170,6 +171,24 @@ def answered(capsys: pytest.CaptureFixture[str]) -> Answered:
         return json.loads(capsys.readouterr().out)
 
     return answer
+
+
+@pytest.fixture
+def refused(capsys: pytest.CaptureFixture[str]) -> Refused:
+    """Run a command in this process, which ends with this status, and give its one line on standard error."""
+    from processes import besides_progress
+
+    from proxytune.cli.main import main
+
+    def refuse(*words: object, status: int = 2) -> str:
+        capsys.readouterr()
+        assert main([*map(str, words)]) == status
+        out, told = capsys.readouterr()
+        told = besides_progress(told)
+        assert (out, told.count("\n")) == ("", 1)
+        return told
+
+    return refuse
 
 
 @pytest.fixture(scope="session")

@@ -19,7 +19,7 @@ from proxytune.scores import write_scores
 from proxytune.search import population
 from proxytune.seeds import target_seed
 from proxytune.study import open_bank, plan_episodes, read_study_settings, score_table
-from tests.conftest import Answered, MakeStudy
+from tests.conftest import Answered, MakeStudy, Refused
 
 BANK = {"target": None, "preflight": "true", "budget": "24", "engine": None}
 DELAY = 0.12
@@ -202,13 +202,12 @@ def _edited(path: Path, home: Path, before: str, after: str) -> Path:
 
 @pytest.mark.parametrize("case", BAD)
 def test_what_cannot_be_used_is_refused_in_one_line(
-    case: str, bank: Path, robots: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    case: str, bank: Path, robots: list[Path], tmp_path: Path, refused: Refused
 ) -> None:
     """The line names the file and what is wrong; the exit status is 2."""
     own = Path(shutil.copytree(bank, tmp_path / "bank"))
     spoil, words = BAD[case]
-    assert main(["fleet", str(own), *map(str, spoil(own, robots, tmp_path))]) == 2
-    told = capsys.readouterr().err.splitlines()[-1]
+    told = refused("fleet", own, *spoil(own, robots, tmp_path))
     assert words in told
     assert told.startswith("proxytune fleet: ")
 

@@ -84,10 +84,7 @@ def kill_at(commands, words, moments, whom, told=lambda: None):
 ON_POLICY = 'target_lessons = "learner"\nproxy_lessons = "learner"\nrehearsal = 0.5'
 TAUGHT = {
     "every count": (ROOM, ("lesson 9", "training 2", "exam 60", "episode 5")),
-    "chosen": (
-        {**ROOM, "more": "examinations = 17"},
-        ("lesson 9", "training 2", "exam 3", "rule 3"),
-    ),
+    "chosen": ({**ROOM, "more": "examinations = 17"}, ("lesson 9", "training 2", "exam 3", "rule 3")),
     "learner drives": (
         {**ROPE, "more": f"examinations = 17\n{ON_POLICY}"},
         ("guided 9", "training 5", "exam 9", "rule 3"),
@@ -115,8 +112,7 @@ def taught(make_studies, commands):
 
 
 @pytest.mark.parametrize(
-    ("name", "jobs", "whom"),
-    [("every count", "1", "all"), ("chosen", "2", "command"), ("learner drives", "1", "all")],
+    ("name", "jobs", "whom"), [("every count", "1", "all"), ("chosen", "2", "command"), ("learner drives", "1", "all")]
 )
 def test_teaching_killed_again_and_again_prints_the_same_document_to_the_byte(taught, commands, name, jobs, whom):
     folder, whole = taught(name, jobs)

@@ -7,23 +7,17 @@ from proxytune.cli.main import main
 from proxytune.errors import InputError
 
 
-def test_a_sweep_writes_its_curve_as_figure_csv_and_json_and_goes_on_where_it_was(make_study, tmp_path, capsys):
+def test_a_sweep_writes_its_curve_as_figure_csv_and_json_and_goes_on_where_it_was(make_study, tmp_path, answered):
     folder, output = make_study(), tmp_path / "curves"
-    arguments = ["sweep", str(folder), "--parameter", "trim", "--points", "4", "--at", "delay=0.12,trim=0.1", "--json"]
-    assert main([*arguments, "--output", str(output)]) == 0
-    document = json.loads(capsys.readouterr().out)
+    arguments = ("sweep", folder, "--parameter", "trim", "--points", "4", "--at", "delay=0.12,trim=0.1")
+    document = answered(*arguments, "--output", output)
     assert document["episodes"] == {"run": 72}
-    assert sorted(path.name for path in output.iterdir()) == [
-        "sweep_trim_4e3f5b.csv",
-        "sweep_trim_4e3f5b.html",
-        "sweep_trim_4e3f5b.json",
-        "sweep_trim_4e3f5b.png",
-    ]
+    endings = ("csv", "html", "json", "png")
+    assert {path.name for path in output.iterdir()} == {f"sweep_trim_4e3f5b.{ending}" for ending in endings}
     (curve,) = document["curves"]
     assert json.loads((output / "sweep_trim_4e3f5b.json").read_text()) == curve
     assert [point["prpv"] for point in curve["points"]][2] == 0
-    assert main(arguments) == 0
-    again = json.loads(capsys.readouterr().out)
+    again = answered(*arguments)
     assert again["episodes"] == {"run": 0}
     assert again["curves"] == document["curves"]
     assert (folder / "figures" / "sweep_trim_4e3f5b.png").exists()
@@ -84,13 +78,12 @@ def test_a_study_that_has_not_run_is_swept_at_nominal_values(make_study, answere
 
 
 @pytest.mark.slow
-def test_a_study_that_was_changed_since_has_no_best_theta_but_nominal_values(finished, make_study, capsys):
+def test_a_study_that_was_changed_since_has_no_best_theta_but_nominal_values(finished, make_study, refused, answered):
     make_study(seed="2")
-    arguments = ["sweep", str(finished), "--parameter", "trim", "--points", "2"]
-    assert main(arguments) == 2
-    assert "changed since the first trial: seed (was 1)" in (told := capsys.readouterr().err)
+    arguments = ("sweep", finished, "--parameter", "trim", "--points", "2")
+    assert "changed since the first trial: seed (was 1)" in (told := refused(*arguments))
     assert told.endswith("or hold other values: --at nominal\n")
-    assert main([*arguments, "--at", "nominal"]) == 0
+    assert answered(*arguments, "--at", "nominal")["curves"]
 
 
 def test_a_base_is_read_from_pairs_or_from_a_model(tmp_path):
@@ -136,9 +129,6 @@ BAD = {
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_bad_input_is_one_line_and_exit_2(make_study, capsys, case):
+def test_bad_input_is_one_line_and_exit_2(make_study, refused, case):
     options, expected = BAD[case]
-    assert main(["sweep", str(make_study()), *options]) == 2
-    out, told = capsys.readouterr()
-    assert expected in told
-    assert (out, told.count("\n")) == ("", 1)
+    assert expected in refused("sweep", make_study(), *options)

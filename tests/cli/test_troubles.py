@@ -8,7 +8,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from processes import besides_progress, episodes, refused, start, trials
+from processes import besides_progress, episodes, start, trials
 from stopping import Stopping
 
 from proxytune.cli.main import main
@@ -150,19 +150,19 @@ def sealed(half):
 
 
 @pytest.mark.slow
-def test_a_read_only_folder_is_told_and_the_study_goes_on_where_it_can_be_written(sealed, finished, capsys):
+def test_a_read_only_folder_is_told_and_the_study_goes_on_where_it_can_be_written(sealed, finished, refused, capsys):
     folder, why = sealed
     before = (folder / "study.db").read_bytes()
     line = f"{folder / 'figures'}: cannot be written there, as {folder} is closed to you; copy the study elsewhere\n"
-    assert refused(capsys, 2, "study", folder) == f"proxytune study: {line}"
-    assert refused(capsys, 2, "study", folder / "study.toml") == f"proxytune study: {line}"
-    told = refused(capsys, 2, "sweep", folder, "--parameter", "trim", "--points", "2")
+    assert refused("study", folder) == f"proxytune study: {line}"
+    assert refused("study", folder / "study.toml") == f"proxytune study: {line}"
+    told = refused("sweep", folder, "--parameter", "trim", "--points", "2")
     assert told == f"proxytune sweep: {line}"
     elsewhere = ("--output", folder.parent / "curves")
-    told = refused(capsys, 1, "sweep", folder, "--parameter", "trim", "--points", "2", *elsewhere)
+    told = refused("sweep", folder, "--parameter", "trim", "--points", "2", *elsewhere, status=1)
     assert told == f"proxytune sweep: {folder}: cannot be written ({why}); copy the study elsewhere\n"
     figure = f"{folder / 'figures' / 'convergence.png'}: the figure cannot be written ({why}); fix that and run again"
-    assert refused(capsys, 1, "plot", folder) == f"proxytune plot: {figure}\n"
+    assert refused("plot", folder, status=1) == f"proxytune plot: {figure}\n"
     assert (folder / "study.db").read_bytes() == before
     elsewhere = shutil.copytree(folder, folder.parent / "elsewhere")
     elsewhere.chmod(0o755)

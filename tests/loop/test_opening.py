@@ -8,7 +8,6 @@ import os
 import pytest
 from tiny_loop import write_tiny
 
-from proxytune.cli.main import BAD_INPUT, main
 from proxytune.errors import StoreError
 from proxytune.files import shipped
 from proxytune.loop import open_loop
@@ -21,16 +20,6 @@ TABLE = "agent,episode,distance,survival_time\n" + "".join(
 )
 
 
-def refusal(capsys, *words, status=BAD_INPUT):
-    """The one line that the command says."""
-    assert main(["loop", *map(str, words)]) == status
-    told = capsys.readouterr()
-    assert told.out == ""
-    lines = told.err.splitlines()
-    assert len(lines) == 1, told.err
-    return lines[0]
-
-
 def a_log(folder, text=LOG):
     folder.mkdir()
     (folder / "log.toml").write_text(text)
@@ -39,36 +28,36 @@ def a_log(folder, text=LOG):
     return folder
 
 
-def test_a_log_of_another_robot_is_refused(tmp_path, capsys):
-    line = refusal(capsys, write_tiny(tmp_path / "tiny"), "--log", a_log(tmp_path / "log"))
+def test_a_log_of_another_robot_is_refused(tmp_path, refused):
+    line = refused("loop", write_tiny(tmp_path / "tiny"), "--log", a_log(tmp_path / "log"))
     assert "is of the robot 'husky', the study of 'duckiebot'; give a log of 'duckiebot'" in line
     assert not (tmp_path / "tiny" / "study.db").exists()
 
 
-def test_a_twin_without_a_camera_is_refused(tmp_path, capsys):
+def test_a_twin_without_a_camera_is_refused(tmp_path, refused):
     folder = write_tiny(tmp_path / "tiny", ('robot = "duckiebot"\n', ""))
     blind = folder / "blind.toml"
     blind.write_text('format = 1\nrobot = "irobot_create"\nplant = "planar"\n')
-    line = refusal(capsys, folder, "--twin", blind)
+    line = refused("loop", folder, "--twin", blind)
     assert "--twin" in line
     assert "camera" in line
 
 
-def test_a_twin_of_another_robot_is_refused(tmp_path, capsys):
+def test_a_twin_of_another_robot_is_refused(tmp_path, refused):
     folder = write_tiny(tmp_path / "tiny")
     (folder / "twin.toml").write_text('format = 1\nrobot = "husky"\nplant = "planar"\n')
-    assert "is 'duckiebot' but the model says 'husky'" in refusal(capsys, folder)
+    assert "is 'duckiebot' but the model says 'husky'" in refused("loop", folder)
 
 
-def test_a_twin_that_is_not_there_is_refused(tmp_path, capsys):
-    line = refusal(capsys, write_tiny(tmp_path / "tiny"), "--twin", tmp_path / "none.toml")
+def test_a_twin_that_is_not_there_is_refused(tmp_path, refused):
+    line = refused("loop", write_tiny(tmp_path / "tiny"), "--twin", tmp_path / "none.toml")
     assert line.startswith(f"proxytune loop: --twin {tmp_path / 'none.toml'}: no such file")
 
 
-def test_an_agent_without_a_rank_is_refused(tmp_path, capsys):
+def test_an_agent_without_a_rank_is_refused(tmp_path, refused):
     folder = write_tiny(tmp_path / "tiny", NO_TRUTH)
     (folder / "target.csv").write_text(TABLE)
-    assert "held_out: the target's table has no scores of 'crawler'; measure them" in refusal(capsys, folder)
+    assert "held_out: the target's table has no scores of 'crawler'; measure them" in refused("loop", folder)
 
 
 @pytest.mark.parametrize(
@@ -79,42 +68,42 @@ def test_an_agent_without_a_rank_is_refused(tmp_path, capsys):
         ('["crawler", "laggy", "nobody"]', "nobody"),
     ],
 )
-def test_agents_that_cannot_be_held_out_are_refused(tmp_path, capsys, names, says):
+def test_agents_that_cannot_be_held_out_are_refused(tmp_path, refused, names, says):
     folder = write_tiny(tmp_path / "tiny", ('["crawler", "laggy", "edges"]', names))
-    line = refusal(capsys, folder)
+    line = refused("loop", folder)
     assert "held_out: " in line
     assert says in line
 
 
-def test_a_target_that_can_be_neither_read_nor_recorded_is_refused(tmp_path, capsys):
+def test_a_target_that_can_be_neither_read_nor_recorded_is_refused(tmp_path, refused):
     folder = write_tiny(tmp_path / "tiny", NO_TRUTH, ('held_out = ["crawler", "laggy", "edges"]\n', ""))
     (folder / "target.csv").write_text(TABLE)
-    assert "give a log of it by --log LOG, or its model.toml by --twin" in refusal(capsys, folder)
+    assert "give a log of it by --log LOG, or its model.toml by --twin" in refused("loop", folder)
 
 
-def test_a_family_without_a_robot_is_refused(make_study, capsys):
-    assert "names no robot" in refusal(capsys, make_study())
+def test_a_family_without_a_robot_is_refused(make_study, refused):
+    assert "names no robot" in refused("loop", make_study())
 
 
-def test_a_search_for_learning_value_is_refused(tmp_path, capsys):
+def test_a_search_for_learning_value_is_refused(tmp_path, refused):
     folder = write_tiny(tmp_path / "tiny", ('name = "tiny"', 'name = "tiny"\nobjective = "plv"'))
-    assert "objective: `loop` tunes by scores" in refusal(capsys, folder)
+    assert "objective: `loop` tunes by scores" in refused("loop", folder)
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
-def test_a_folder_without_permission_is_refused(tmp_path, capsys):
+def test_a_folder_without_permission_is_refused(tmp_path, refused):
     folder = write_tiny(tmp_path / "tiny")
     folder.chmod(0o500)
     try:
-        assert "cannot be written" in refusal(capsys, folder)
+        assert "cannot be written" in refused("loop", folder)
     finally:
         folder.chmod(0o700)
 
 
-def test_a_folder_that_cannot_be_made_is_refused(tmp_path, capsys):
+def test_a_folder_that_cannot_be_made_is_refused(tmp_path, refused):
     folder = write_tiny(tmp_path / "tiny")
     (folder / "loop").write_text("a file")
-    assert "loop is no folder; move that away" in refusal(capsys, folder)
+    assert "loop is no folder; move that away" in refused("loop", folder)
 
 
 def test_without_names_the_shipped_agents_that_no_tuning_sees_are_held_out(tmp_path):
@@ -148,7 +137,7 @@ def test_of_a_table_those_agents_are_held_out_that_it_has_beside_the_studys(tmp_
     assert open_loop(folder, log=log).held_out == ("edges", "laggy", "wary")
 
 
-def test_a_twin_of_which_no_frames_can_be_recorded_is_refused_before_anything_is_driven(tmp_path, capsys):
+def test_a_twin_of_which_no_frames_can_be_recorded_is_refused_before_anything_is_driven(tmp_path, refused):
     changes = (
         ('robot = "duckiebot"', 'robot = "robby"'),
         ("delay = [0.0, 0.3]", "delay = [0.0, 0.3]\nblur = [0.0, 0.1]"),
@@ -159,7 +148,7 @@ def test_a_twin_of_which_no_frames_can_be_recorded_is_refused_before_anything_is
     (folder / "robby").mkdir()
     own = [line.replace("duckiebot", "robby") for line in figures if not line.startswith(("expert_", "urdf"))]
     (folder / "robby" / "robot.toml").write_text("\n".join(own))
-    line = refusal(capsys, folder)
+    line = refused("loop", folder)
     assert "twin.toml: no frames can be recorded" in line
     assert "give a log of it by --log" in line
     assert not (folder / "study.db").exists()

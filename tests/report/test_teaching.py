@@ -10,13 +10,7 @@ from proxytune.learning import Costs, Distribution, LearningCurve, LearningEstim
 from proxytune.learning.plv import Published
 from proxytune.report.html import page_html
 from proxytune.report.plv_search import plv_answer, plv_next_step
-from proxytune.report.teaching import (
-    sorted_by_worth,
-    teach_answer,
-    teach_figure,
-    teach_next_step,
-    teach_view,
-)
+from proxytune.report.teaching import sorted_by_worth, teach_answer, teach_figure, teach_next_step, teach_view
 from proxytune.report.view import Column, foot_of
 from proxytune.teaching import Experiment, TeacherResult
 

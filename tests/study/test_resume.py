@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 from launched import Launched, never_stopped
-from processes import besides_progress, episodes, finished_episodes, refused, trials, wait_for
+from processes import besides_progress, episodes, finished_episodes, trials, wait_for
 
 from proxytune.cli.main import COMMANDS
 
@@ -75,7 +75,7 @@ def test_a_study_killed_as_soon_as_it_begins_gives_the_trials_of_one_that_was_no
 
 
 def test_a_second_process_on_the_same_study_is_told_and_the_first_is_not_disturbed(
-    make_study, launcher, capsys, answered
+    make_study, launcher, refused, answered
 ):
     """A sweep too; looking at it is for everybody."""
     folder = make_study(domain={"sleep": "0.05"}, budget="60")
@@ -83,7 +83,7 @@ def test_a_second_process_on_the_same_study_is_told_and_the_first_is_not_disturb
     wait_for(folder, first, PER_TRIAL + 2)
     line = f"{folder}: another process (process {first.pid}) is running this study; wait for it or stop it\n"
     for words in (("study", folder), ("sweep", folder, "--parameter", "trim")):
-        assert refused(capsys, 1, *words) == f"proxytune {words[0]}: {line}"
+        assert refused(*words, status=1) == f"proxytune {words[0]}: {line}"
     assert len(answered("plot", folder)["trials"]) >= 1
     wait_for(folder, first, finished_episodes(folder) + 2)
     stop(first, signal.SIGINT)  # it was running all the while

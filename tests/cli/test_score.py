@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from one_line import complaint_of
 from rich.console import Console
 
 from proxytune.cli import score
 from proxytune.cli.commands import add_options
-from proxytune.errors import InputError, ScoresError
 
 SIM = "agent,episode,distance,time\n" + "".join(
     f"{agent},{episode},{base + 0.1 * ((episode * base) % 3)},{10 - base}\n"
@@ -80,13 +80,11 @@ def test_several_proxies_are_ranked_with_their_differences(tables):
     assert difference["beyond_noise"] is (difference["interval"][0] > 0)
 
 
-def test_proxies_of_the_same_file_name_are_told_apart_and_the_same_one_is_refused(tables):
+def test_proxies_of_the_same_file_name_are_told_apart(tables):
     Path("other").mkdir()
     Path("other/sim.csv").write_text(SIM)
     found = document("--proxy", "sim.csv", "--proxy", "other/sim.csv", "--target", "real.csv", *METRIC)
     assert {one["proxy"] for one in found["proxies"]} == {"sim", str(Path("other/sim.csv"))}
-    with pytest.raises(InputError, match="given twice"):
-        run(*["--proxy", "sim.csv"] * 3, "--target", "real.csv", *METRIC)
 
 
 def test_a_file_with_a_colon_in_its_name_is_a_file(tables):
@@ -190,6 +188,11 @@ def test_figures_are_drawn_where_asked(tables):
         (("--proxy", "sim.csv", "--target", "real.csv", *METRIC, "--sequential"), "goes beyond 0 and 1"),
         (("--proxy", "both.csv:sm", "--target", "real.csv", *METRIC), "no domain 'sm'; did you mean 'sim'"),
         (("--proxy", "sim.csv", "--target", "both.csv", *METRIC), "choose one, as in both.csv:sim"),
+        (
+            ("--proxy", "sim.csv", "--target", "both.csv:real", "--target", "real.csv", *METRIC),
+            "several files make one table; give all of them one domain, or none",
+        ),
+        (("--proxy", "sim.csv", "--proxy", "sim.csv", "--target", "real.csv", *METRIC), "given twice"),
         (("--proxy", "sim.csv", "--target", "real.csv", "--metric", "distanc:max"), "did you mean 'distance'"),
         (("--proxy", "sim.csv", "--target", "real.csv", "--metric", "distance"), "write NAME:max"),
         (("--proxy", "sim.csv", "--target", "real.csv", *METRIC, "--resamples", "3"), "--resamples"),
@@ -201,10 +204,7 @@ def test_figures_are_drawn_where_asked(tables):
     ],
 )
 def test_bad_input_gives_one_line_that_says_what_to_change(tables, words, complaint):
-    with pytest.raises(InputError) as problem:
-        run(*words)
-    assert complaint in str(problem.value)
-    assert "\n" not in str(problem.value)
+    assert complaint in complaint_of(run, *words)
 
 
 @pytest.fixture
@@ -232,8 +232,7 @@ def test_a_target_as_people_keep_it_gives_the_figures_of_a_tidy_one(own):
 
 def test_agents_of_one_side_are_refused_by_name_or_left_out_and_said(own):
     words = (*OWN, "--target", "people.csv", *COLUMNS, *METRIC)
-    with pytest.raises(ScoresError, match=r"the proxy lacks scores of human, .* \(score --common\)"):
-        run(*words)
+    assert re.search(r"the proxy lacks scores of human, .* \(score --common\)", complaint_of(run, *words))
     assert document(*words, "--common")["left_out"] == ["left out, since not all sides have them: human of the target"]
     assert document(*words, "--common")["prpv"] == document(*OWN, *COLUMNS, *METRIC)["prpv"]
     assert "note: left out, since not all sides have them: human of the target" in shown(*words, "--common")
@@ -248,13 +247,7 @@ def test_agents_of_one_side_are_refused_by_name_or_left_out_and_said(own):
     ],
 )
 def test_a_column_map_that_cannot_be_is_one_line(own, columns, complaint):
-    with pytest.raises(InputError, match=complaint):
-        run(*OWN, "--columns", columns, *METRIC)
-
-
-def test_several_files_of_different_domains_make_no_table(own):
-    with pytest.raises(InputError, match="several files make one table; give all of them one domain, or none"):
-        run("--proxy", "sim.csv", "--target", "both.csv:real", "--target", "real.csv", *METRIC)
+    assert complaint in complaint_of(run, *OWN, "--columns", columns, *METRIC)
 
 
 def test_success_rates_stand_in_table_and_document_and_ties_are_told(tables):
@@ -290,8 +283,8 @@ def test_several_proxies_are_columns_of_a_latex_table(tables):
 
 
 def test_a_table_of_another_kind_is_refused_before_anything_is_written(tables):
-    with pytest.raises(InputError, match=r"--table t\.xlsx: a table is written as \.csv or \.tex"):
-        run("--proxy", "sim.csv", "--target", "real.csv", *METRIC, "--table", "t.xlsx", "--output", "out")
+    words = ("--proxy", "sim.csv", "--target", "real.csv", *METRIC, "--table", "t.xlsx", "--output", "out")
+    assert "--table t.xlsx: a table is written as .csv or .tex" in complaint_of(run, *words)
     assert not Path("out").exists()
 
 

@@ -1,16 +1,17 @@
 """A user's effect beside a study, or in a plug-in, is simulated, identified, written and read as a shipped one is."""
 
+import re
 from dataclasses import replace
 
 import planted
 import pytest
+from one_line import complaint_of
 from outside_effects import NAME, WEAK_REVERSE, WRONG
 
 from proxytune.cli.main import main
 from proxytune.diagnosis.motion.screening import motion_effects
 from proxytune.driving import lane_following
 from proxytune.effects import Catalogue, Model, effect_of, effects_from, model_text, read_model
-from proxytune.errors import ExtensionError, InputError, SettingsError
 from proxytune.extensions.door import GROUP
 from proxytune.settings import Section
 
@@ -65,8 +66,8 @@ def test_it_comes_after_the_shipped_effects_of_its_stage(folder):
     theta = {NAME: 0.3, "turn_slip": 0.01, "trim": 0.1}
     made = effects_from(theta, planted.ROBOT.figures, Catalogue(folder))
     assert [effect.name for effect in made] == ["trim", "turn_slip", "weak_reverse"]
-    with pytest.raises(SettingsError, match="must be between 0 and 0.9"):
-        effects_from({NAME: 1.0}, planted.ROBOT.figures, Catalogue(folder))
+    told = complaint_of(effects_from, {NAME: 1.0}, planted.ROBOT.figures, Catalogue(folder))
+    assert "must be between 0 and 0.9" in told
 
 
 def test_two_folders_have_effects_of_one_name_each_its_own(folder, tmp_path):
@@ -85,9 +86,8 @@ def test_model_toml_names_it_in_quotes_and_reads_back_the_same(folder):
     assert f'[effects."{NAME}"]' in path.read_text(encoding="utf-8")
     assert read_model(path, catalogue) == model
     path.write_text(TABLE.replace("weak_reverse:", "weak_revers:"), encoding="utf-8")
-    with pytest.raises(InputError, match="effects.weak_revers:WeakReverse: effect .* no module 'weak_revers'") as told:
-        read_model(path, catalogue)
-    assert "model.toml" in str(told.value)
+    told = complaint_of(read_model, path, catalogue)
+    assert re.search("model.toml: effects.weak_revers:WeakReverse: effect .* no module 'weak_revers'", told)
 
 
 @pytest.mark.parametrize("case", WRONG)
@@ -96,9 +96,7 @@ def test_an_effect_that_is_not_what_it_claims_is_refused_by_name(tmp_path, case)
     text = WEAK_REVERSE.replace(old, new)
     assert text != WEAK_REVERSE
     (tmp_path / "weak_reverse.py").write_text(text, encoding="utf-8")
-    with pytest.raises(ExtensionError, match=f"effect '{NAME}'.*{expected}") as told:
-        Catalogue(tmp_path).effect(NAME)
-    assert "\n" not in str(told.value)
+    assert re.search(f"effect '{NAME}'.*{expected}", complaint_of(Catalogue(tmp_path).effect, NAME))
 
 
 def test_a_domain_takes_it_from_its_table_from_theta_and_from_a_model(folder):
@@ -141,5 +139,5 @@ def test_list_shows_a_plugin_s_effect(installed, answered):
 
 def test_an_unknown_effect_is_told_with_the_way_to_name_one_s_own(folder):
     (folder / "model.toml").write_text(TABLE.replace(f'"{NAME}"', "weak_revers"), encoding="utf-8")
-    with pytest.raises(SettingsError, match="weak_revers: no such effect; .*your own is written module:Attribute"):
-        read_model(folder / "model.toml", Catalogue(folder))
+    told = complaint_of(read_model, folder / "model.toml", Catalogue(folder))
+    assert re.search("weak_revers: no such effect; .*your own is written module:Attribute", told)

@@ -1,16 +1,18 @@
 """A study from Python runs, resumes, and is looked at without simulating."""
 
 import json
+import re
 import warnings
 
 import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.figure import Figure
+from one_line import complaint_of
 
 from proxytune.api import read_study
 from proxytune.api.study import run_study
-from proxytune.errors import InputError, ProxytuneError
+from proxytune.errors import InputError
 
 
 @pytest.fixture(scope="module")
@@ -97,9 +99,7 @@ def test_reading_a_study_simulates_nothing_and_says_the_same(report, folder):
 def test_reading_a_study_that_was_not_run_is_one_line_and_makes_no_file(make_study):
     folder = make_study()
     before = sorted(folder.iterdir())
-    with pytest.raises(ProxytuneError, match="run") as problem:
-        read_study(folder)
-    assert "\n" not in str(problem.value)
+    assert "run" in complaint_of(read_study, folder)
     assert sorted(folder.iterdir()) == before
 
 
@@ -161,9 +161,7 @@ def test_progress_is_shown_only_when_asked_for(make_study, monkeypatch):
     ],
 )
 def test_what_cannot_be_used_is_one_line_with_the_key_and_what_to_do(make_study, changes, words):
-    with pytest.raises(InputError, match=words) as problem:
-        run_study(make_study("wrong", **changes))
-    assert "\n" not in str(problem.value)
+    assert re.search(words, complaint_of(run_study, make_study("wrong", **changes)))
 
 
 def test_a_report_is_an_optimize_result_of_the_measured_trials(report):

@@ -6,6 +6,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+from one_line import complaint_of
 
 from proxytune.api import read_study, run_study
 from proxytune.cli.main import main
@@ -206,8 +207,7 @@ SETTINGS = {
 def test_settings_that_know_nothing_are_refused(case: str, make_study: MakeStudy) -> None:
     """One line names the key and says what to do."""
     changes, words = SETTINGS[case]
-    with pytest.raises(ProxytuneError, match=re.escape(words)):
-        read_study_settings(make_study(**changes))
+    assert words in complaint_of(read_study_settings, make_study(**changes))
 
 
 def test_a_bank_is_for_study_alone(beside: Path) -> None:
@@ -272,9 +272,7 @@ NO_CHEAPER = {
 def test_a_cheaper_proxy_that_is_none_is_refused(case: str, beside: Path, make_study: MakeStudy) -> None:
     """One line names the key, what is wrong and what to do."""
     changes, domain, words = NO_CHEAPER[case]
-    with pytest.raises(ProxytuneError, match=words) as refused:
-        run_study(make_study(domain=domain, **{**CHEAPER, **changes}))
-    assert str(refused.value).count("\n") == 0
+    assert re.search(words, complaint_of(run_study, make_study(domain=domain, **{**CHEAPER, **changes})))
 
 
 def test_a_cheaper_proxy_takes_the_place_of_half_a_design(make_study: MakeStudy) -> None:

@@ -3,10 +3,13 @@
 The target's table as people have it: in several files, with names of its own.
 """
 
+import re
+
 import numpy as np
 import pytest
+from one_line import complaint_of
 
-from proxytune.errors import InputError, SettingsError
+from proxytune.errors import InputError
 from proxytune.report.study.tables import usefulness_table
 from proxytune.search import make_proposer
 from proxytune.storage import Store
@@ -118,10 +121,9 @@ def test_what_is_no_objective_or_engine_of_a_study_is_one_line_with_file_and_key
     name, expected = {"objective": BAD, "engine": ENGINES}[key][case]
     folder = make_study(**{key: name})
     (folder / "mine.py").write_text(OWN)
-    with pytest.raises(SettingsError, match=expected) as caught:
-        open_study(folder)
-    assert f"study.toml: {key}: " in str(caught.value)
-    assert "\n" not in str(caught.value)
+    told = complaint_of(open_study, folder)
+    assert f"study.toml: {key}: " in told
+    assert re.search(expected, told)
 
 
 WRONG = {
@@ -139,9 +141,8 @@ def test_what_a_measure_of_one_s_own_does_wrong_is_told_with_file_and_key_before
         f"def wrong(proxy, target, metrics):\n    return {formula}\n\n\n"
         'WRONG = Measure("wrong", "Wrong", "wrong", "lower", "", ".2f", on_means=wrong)\n'
     )
-    with pytest.raises(SettingsError, match=f"study.toml: objective: measure 'mine:WRONG' {WRONG[formula]}") as told:
-        open_study(folder)
-    assert "\n" not in str(told.value)
+    expected = f"study.toml: objective: measure 'mine:WRONG' {WRONG[formula]}"
+    assert re.search(expected, complaint_of(open_study, folder))
 
 
 STUDY_OPENING_BAD = {
@@ -160,15 +161,7 @@ def test_a_target_that_does_not_fit_is_refused_in_one_line(make_study, case):
     edit, expected = STUDY_OPENING_BAD[case]
     target = make_study() / "target.csv"
     target.write_text(edit(target.read_text()))
-    with pytest.raises(InputError) as told:
-        open_study(target.parent)
-    assert expected in str(told.value)
-    assert "\n" not in str(told.value)
-
-
-def test_a_missing_target_is_named(make_study):
-    with pytest.raises(InputError, match=r"nowhere\.csv: no such file"):
-        open_study(make_study(target='"nowhere.csv"'))
+    assert expected in complaint_of(open_study, target.parent)
 
 
 def test_agents_of_the_target_that_are_not_in_the_study_do_not_count(make_study):
@@ -287,11 +280,16 @@ def test_columns_have_the_target_s_own_names(make_study, rows):
 
 
 @pytest.mark.parametrize(
-    ("target", "complaint"), [("[]", "target: must be text"), ("3", "target: must be text"), ("[3]", "list of texts")]
+    ("target", "says"),
+    [
+        ("[]", "target: must be text"),
+        ("3", "target: must be text"),
+        ("[3]", "list of texts"),
+        ('"nowhere.csv"', "nowhere.csv: no such file"),
+    ],
 )
-def test_a_target_of_another_kind_is_refused(make_study, target, complaint):
-    with pytest.raises(InputError, match=complaint):
-        open_study(make_study(target=target))
+def test_a_target_of_another_kind_or_none_is_refused(make_study, target, says):
+    assert says in complaint_of(open_study, make_study(target=target))
 
 
 def test_agents_that_are_on_one_side_only_are_named_on_either(make_study, rows):

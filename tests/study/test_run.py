@@ -2,6 +2,7 @@ import sqlite3
 from dataclasses import replace
 
 import pytest
+from one_line import complaint_of
 from stopping import Stopping
 from telling import Telling
 
@@ -86,9 +87,7 @@ REFUSED = {
 @pytest.mark.parametrize("case", REFUSED)
 def test_a_metric_that_cannot_be_used_is_refused(finished, case):
     texts, line = REFUSED[case]
-    with pytest.raises(InputError) as told:
-        with_metrics(open_study(finished), [Metric.parse(text) for text in texts])
-    assert str(told.value) == line
+    assert complaint_of(with_metrics, open_study(finished), [Metric.parse(text) for text in texts]) == line
 
 
 def test_a_metric_that_the_target_was_not_measured_in_is_refused_by_file(finished):
@@ -180,7 +179,7 @@ def test_where_failures_stop_the_study_what_was_finished_is_kept(make_study):
 
 EDITS = {
     "the seed": ({"seed": "2"}, "seed (was 1)"),
-    "the starts": ({"starts": "2"}, "starts (was 3)"),
+    "the starts, and the seed": ({"starts": "2", "seed": "3"}, "starts (was 3), seed (was 1)"),
     "the design": ({"initial": "4"}, "initial (was 5)"),
     "the box": ({"parameters": {"trim": "[-0.2, 0.3]", "delay": "[0, 0.3]"}}, "parameters.trim (was [-0.3, 0.3])"),
     "another parameter": ({"parameters": {"trim": "[-0.3, 0.3]"}}, "parameters.delay (was [0.0, 0.3])"),
@@ -200,18 +199,9 @@ def test_an_edit_that_changes_what_a_trial_means_is_refused_by_name_and_nothing_
     changes, expected = EDITS[edit]
     _, trials = run(finished)
     make_study(**changes)
-    with pytest.raises(SettingsError) as told:
-        run(finished)
-    assert f"changed since the first trial: {expected}" in str(told.value)
-    assert "\n" not in str(told.value)
+    assert f"changed since the first trial: {expected}" in complaint_of(run, finished)
     make_study()
     assert run(finished) == (0, trials)
-
-
-def test_several_edits_are_all_named(finished, make_study):
-    make_study(seed="3", starts="2")
-    with pytest.raises(SettingsError, match=r"starts \(was 3\), seed \(was 1\)"):
-        run(finished)
 
 
 def test_a_changed_target_is_refused_but_not_what_the_study_does_not_use_of_it(finished, make_study):

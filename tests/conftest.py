@@ -203,24 +203,19 @@ def launcher() -> Iterator[object]:
 @pytest.fixture(scope="session")
 def finished_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A finished study, run once."""
-    from proxytune.search import make_proposer
-    from proxytune.storage import Store
-    from proxytune.study import StudyRun, open_study, run_trials
+    from searched import changed, searched
 
     folder = study_maker(tmp_path_factory.mktemp("finished"))()
-    with Store.open(folder) as store:
-        run_trials(StudyRun(open_study(folder), store), make_proposer("gp", 5))
+    searched(changed(folder))
     return folder
 
 
 @pytest.fixture(scope="session")
 def result(finished_once: Path) -> object:
     """What came of the finished study."""
-    from proxytune.storage import Store
-    from proxytune.study import StudyRun, open_study, result_of
+    from searched import changed, looked_at
 
-    with Store.read(finished_once) as store:
-        return result_of(StudyRun(open_study(finished_once), store))
+    return looked_at(changed(finished_once))
 
 
 @pytest.fixture

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from processes import besides_progress, episodes, start, trials
+from searched import searched
 from stopping import Stopping
 
 from proxytune.cli.main import main
@@ -19,18 +20,11 @@ from proxytune.study import StudyRun, open_study, run_trials
 slow = pytest.mark.slow
 
 
-def interrupted_after(folder, count):
-    """Run a study in this process until it has so many episodes."""
-    study = open_study(folder)
-    with Store.open(folder) as store, pytest.raises(KeyboardInterrupt):
-        study_run = StudyRun(study, store, Stopping(count))
-        run_trials(study_run, make_proposer("gp", study.settings.initial))
-
-
 @pytest.fixture(scope="module")
 def half_once(make_studies):
     folder = make_studies("half")
-    interrupted_after(folder, 80)
+    with pytest.raises(KeyboardInterrupt):
+        searched(open_study(folder), Stopping(80))
     return folder
 
 
@@ -75,10 +69,7 @@ def test_a_write_ahead_log_cut_off_by_a_crash_costs_only_what_was_cut_off(make_s
     os.truncate(log, int(share * log.stat().st_size))
     kept = len(episodes(crashed)) if share else 0
     assert (kept > 0) == (share > 0)
-    with Store.open(crashed) as store:
-        study_run = StudyRun(open_study(crashed), store)
-        run_trials(study_run, make_proposer("gp", 5))
-        spent = study_run.spent
+    spent, _ = searched(open_study(crashed))
     assert spent.episodes == 7 * 18 - kept
     assert (trials(crashed), episodes(crashed)) == (trials(finished), episodes(finished))
 

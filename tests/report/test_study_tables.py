@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from confirmations import LACKS, TOLD, UNTOLD, confirmed, planted
 from rich.console import Console
+from searched import looked_at, searched
 
 from proxytune.report import study_document, study_sentence, study_text
 from proxytune.report.study.tables import (
@@ -21,10 +22,8 @@ from proxytune.report.study.tables import (
     trials_table,
     usefulness_table,
 )
-from proxytune.search import make_proposer
 from proxytune.space import Interval
-from proxytune.storage import Store
-from proxytune.study import Preflight, StudyRun, open_study, result_of, run_trials
+from proxytune.study import Preflight, open_study
 from proxytune.study.preflight import Movement
 
 
@@ -239,11 +238,9 @@ def test_what_was_cut_off_and_saved_is_told(result):
 
 @pytest.mark.slow
 def test_failed_episodes_are_told_with_the_first_of_them(make_study):
-    folder = make_study(domain={"faults": '["agent3:1:raises"]'}, budget="6")
-    with Store.open(folder) as store:
-        study_run = StudyRun(open_study(folder), store)
-        run_trials(study_run, make_proposer("gp", 5))
-        result = result_of(StudyRun(open_study(folder), store))
+    study = open_study(make_study(domain={"faults": '["agent3:1:raises"]'}, budget="6"))
+    searched(study)
+    result = looked_at(study)
     table = search_table(result)
     head, first = row_of(table, "failed"), table.rows[table.rows.index(row_of(table, "failed")) + 1]
     assert head == ("failed", "6 of 108 episodes; the first:")

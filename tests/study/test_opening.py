@@ -8,12 +8,12 @@ import re
 import numpy as np
 import pytest
 from one_line import complaint_of
+from searched import looked_at, searched
 
 from proxytune.errors import InputError
 from proxytune.report.study.tables import usefulness_table
-from proxytune.search import make_proposer
 from proxytune.storage import Store
-from proxytune.study import PRPV, StudyRun, goal_of, open_study, result_of, run_trials, study_facts
+from proxytune.study import PRPV, StudyRun, open_study, result_of, study_facts
 from proxytune.study.answer import run_confirmation
 from proxytune.study.facts import changes
 
@@ -29,12 +29,9 @@ NEARNESS = Measure(key="nearness", name="nearness", title="largest error of a me
 """
 
 
-def run(folder, engine):
-    study = open_study(folder)
-    with Store.open(folder) as store:
-        study_run = StudyRun(study, store)
-        run_trials(study_run, make_proposer(engine, study.settings.initial, goal_of(study_run)))
-        return study_run, result_of(study_run)
+def run(folder):
+    searched(open_study(folder))
+    return looked_at(open_study(folder))
 
 
 @pytest.fixture
@@ -51,15 +48,15 @@ def own(make_study):
 
 @pytest.mark.parametrize("engine", [pytest.param("gp", marks=pytest.mark.slow), "outcomes"])
 def test_a_measure_of_one_s_own_is_made_large_and_kept_with_every_trial(own, engine):
-    study_run, result = run(own(engine=f'"{engine}"'), engine)
+    folder = own(engine=f'"{engine}"')
+    result = run(folder)
     values = [trial.measures["mine:NEARNESS"] for trial in result.trials]
     assert [trial.score for trial in result.trials] == [-value for value in values]
-    for trial, value in zip(result.trials, values, strict=True):
-        proxy = study_run.evaluation_of(trial).proxy.arrange(agents=study_run.study.target.agents)
-        assert (
-            value
-            == -np.abs(proxy.select(study_run.study.target.metrics[:2]).means - study_run.study.target.means).max()
-        )
+    target = result.study.target
+    with Store.read(folder) as store:
+        for trial, value in zip(result.trials, values, strict=True):
+            proxy = StudyRun(result.study, store).evaluation_of(trial).proxy.arrange(agents=target.agents)
+            assert value == -np.abs(proxy.select(target.metrics[:2]).means - target.means).max()
     assert max(values[5:]) > max(values[:5]), "the search gets nearer than its design"
     assert all(set(trial.measures) == {"mine:NEARNESS", "prpv", "ppv"} for trial in result.trials)
 
@@ -67,9 +64,9 @@ def test_a_measure_of_one_s_own_is_made_large_and_kept_with_every_trial(own, eng
 @pytest.mark.slow
 def test_its_value_is_told_in_the_search_and_on_fresh_episodes(own):
     folder = own(confirm="1")
-    study_run, _ = run(folder, "gp")
+    run(folder)
     with Store.open(folder) as store:
-        again = StudyRun(study_run.study, store)
+        again = StudyRun(open_study(folder), store)
         run_confirmation(again)
         result = result_of(again)
     searched, fresh = usefulness_table(result).rows[:2]
@@ -81,13 +78,13 @@ def test_its_value_is_told_in_the_search_and_on_fresh_episodes(own):
 
 @pytest.mark.slow
 def test_ppv_is_an_objective_too(make_study):
-    _, result = run(make_study(objective='"ppv"'), "gp")
+    result = run(make_study(objective='"ppv"'))
     assert [trial.score for trial in result.trials] == [trial.ppv for trial in result.trials]
 
 
 @pytest.mark.slow
 def test_no_trial_is_cut_off_by_another_objective_than_prpv(own):
-    _, result = run(own(cut_off="true", budget="9"), "gp")
+    result = run(own(cut_off="true", budget="9"))
     assert {trial.state for trial in result.trials} == {"finished"}
 
 
@@ -215,9 +212,7 @@ def test_agents_that_the_target_lacks_are_left_out_and_named(finished):
     target.write_text("\n".join(kept) + "\n")
     study = open_study(finished)
     assert study.settings.agents == study.target.agents == ("agent0", "agent1", "agent2", "agent3")
-    with Store.read(finished) as store:
-        cautions = result_of(StudyRun(study, store)).cautions
-    assert "the target has no scores of agent4, agent5: left out" in cautions
+    assert "the target has no scores of agent4, agent5: left out" in looked_at(study).cautions
 
 
 def test_the_truth_is_read_but_nothing_depends_on_it(make_study):

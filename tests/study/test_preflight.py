@@ -10,16 +10,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from moody import Moody
+from searched import changed, searched
 from stopping import Stopping
 
 from proxytune.cli.main import main
 from proxytune.domain import Outcome, make_episode
 from proxytune.errors import EpisodeError, RunError
 from proxytune.running import run_episode
-from proxytune.search import make_proposer
 from proxytune.space import Interval
 from proxytune.storage import Store
-from proxytune.study import StudyRun, goal_of, most_preflight_episodes, open_study, result_of, run_preflight, run_trials
+from proxytune.study import StudyRun, goal_of, most_preflight_episodes, open_study, result_of, run_preflight
 from proxytune.study.preflight import (
     LEVEL,
     LOOKS,
@@ -149,13 +149,11 @@ def test_failed_episodes_of_the_pre_flight_are_left_out(make_study):
 
 
 def run(folder, **changes):
-    study = open_study(folder)
-    study = replace(study, settings=replace(study.settings, **changes))
+    study = changed(folder, **changes)
     with Store.open(folder) as store:
         study_run = StudyRun(study, store)
         run_preflight(study_run)
-        spent = study_run.spent
-        return spent, preflight_of(StudyRun(study, store))
+        return study_run.spent, preflight_of(StudyRun(study, store))
 
 
 def told(folder, **changes):
@@ -215,13 +213,7 @@ def test_what_need_not_be_run_is_taken_off_the_bar(planted):
 def test_the_trials_are_those_of_a_study_without_it(make_study, finished):
     folder = make_study("checked", preflight="true")
     assert run(folder)[0].episodes > 0
-    trials = []
-    for one in (folder, finished):
-        with Store.open(one) as store:
-            study_run = StudyRun(open_study(one), store)
-            run_trials(study_run, make_proposer("gp", 5))
-            trials.append(store.trials())
-    assert trials[0] == trials[1]
+    assert searched(open_study(folder))[1] == searched(open_study(finished))[1]
 
 
 def test_a_study_whose_trials_have_begun_goes_on_without(finished, make_study):

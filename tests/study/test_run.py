@@ -3,12 +3,12 @@ from dataclasses import replace
 
 import pytest
 from one_line import complaint_of
+from searched import changed, looked_at, searched
 from stopping import Stopping
 from telling import Telling
 
 from proxytune.errors import EpisodeError, InputError, RunError, SettingsError
 from proxytune.scores import Metric
-from proxytune.search import make_proposer
 from proxytune.storage import Store, TrialRecord
 from proxytune.study import (
     PRPV,
@@ -17,7 +17,6 @@ from proxytune.study import (
     open_study,
     rescored,
     result_of,
-    run_trials,
     score_trials,
     stored_run,
     with_metrics,
@@ -40,9 +39,7 @@ def scores(result):
 
 @pytest.mark.slow
 def test_by_its_own_metrics_a_study_comes_to_its_own_result(finished):
-    with Store.read(finished) as store:
-        own = result_of(StudyRun(open_study(finished), store))
-    again = found(finished, OWN)
+    own, again = looked_at(open_study(finished)), found(finished, OWN)
     assert again.trials == own.trials
     assert again.best.trial == own.best.trial
     assert again.stopped == own.stopped
@@ -72,8 +69,7 @@ def test_a_metric_may_be_taken_out_or_turned_round(finished):
 
 @pytest.mark.slow
 def test_why_a_study_has_stopped_is_not_judged_by_the_other_metrics(finished):
-    study = open_study(finished)
-    study = replace(study, settings=replace(study.settings, budget=9, stop=StopRules(no_improvement=1e9)))
+    study = changed(finished, budget=9, stop=StopRules(no_improvement=1e9))
     with Store.read(finished) as store:
         assert rescored(StudyRun(study, store), COARSE).stopped == result_of(StudyRun(study, store)).stopped != ""
 
@@ -93,8 +89,7 @@ def test_a_metric_that_cannot_be_used_is_refused(finished, case):
 def test_a_metric_that_the_target_was_not_measured_in_is_refused_by_file(finished):
     rows = [line.rsplit(",", 1)[0] for line in (finished / "target.csv").read_text().splitlines()]
     (finished / "other.csv").write_text("\n".join(rows) + "\n")
-    study = open_study(finished)
-    study = replace(study, settings=replace(study.settings, targets=(finished / "other.csv",)))
+    study = changed(finished, targets=(finished / "other.csv",))
     with pytest.raises(InputError, match=r"other\.csv.*survival_time"):
         with_metrics(study, OWN)
 
@@ -109,13 +104,8 @@ def test_a_trial_that_lacks_episodes_is_told(finished):
 
 
 def run(folder, **changes):
-    study = open_study(folder)
-    study = replace(study, settings=replace(study.settings, **changes))
-    with Store.open(folder) as store:
-        study_run = StudyRun(study, store)
-        run_trials(study_run, make_proposer("gp", study.settings.initial))
-        spent = study_run.spent
-        return spent.episodes, store.trials()
+    spent, trials = searched(changed(folder, **changes))
+    return spent.episodes, trials
 
 
 def test_a_study_spends_its_budget_and_then_no_more(make_study):
@@ -134,12 +124,9 @@ def test_an_interrupted_study_loses_no_finished_episode_and_goes_on_to_the_same_
     _, whole = run(finished)
     journal = tmp_path / "journal"
     folder = make_study("stopped", domain={"journal": f'"{journal}"'})
-    study = open_study(folder)
-    study = replace(study, settings=replace(study.settings, jobs=jobs))
     for episodes in (5, 40, 40) if jobs == 1 else (85,):  # Processes take a second to begin
-        with Store.open(folder) as store, pytest.raises(KeyboardInterrupt):
-            study_run = StudyRun(study, store, Stopping(episodes))
-            run_trials(study_run, make_proposer("gp", 5))
+        with pytest.raises(KeyboardInterrupt):
+            searched(changed(folder, jobs=jobs), Stopping(episodes))
     with sqlite3.connect(folder / "study.db") as plain:
         assert plain.execute("SELECT count(*) FROM episodes").fetchone() == (85,)
     episodes, trials = run(folder, jobs=jobs)
@@ -239,10 +226,8 @@ def test_budget_jobs_name_and_what_failures_do_may_change(finished, make_study):
 @pytest.mark.slow
 def test_before_the_first_finished_trial_everything_may_change(make_study):
     folder = make_study()
-    study = open_study(folder)
-    with Store.open(folder) as store, pytest.raises(KeyboardInterrupt):
-        study_run = StudyRun(study, store, Stopping(4))
-        run_trials(study_run, make_proposer("gp", 5))
+    with pytest.raises(KeyboardInterrupt):
+        searched(open_study(folder), Stopping(4))
     make_study(seed="2")
     assert len(run(folder)[1]) == 7
 
@@ -269,11 +254,7 @@ def test_what_became_of_a_trial_is_one_phrase_whatever_the_objective():
 
 def test_every_trial_is_told_with_its_score_and_the_best_so_far(make_study):
     telling = Telling()
-    study = open_study(make_study())
-    with Store.open(study.settings.folder) as store:
-        under_way = StudyRun(study, store, telling)
-        run_trials(under_way, make_proposer("gp", 5))
-        scores = [trial.score for trial in under_way.finished_trials()]
+    scores = [trial.score for trial in searched(open_study(make_study()), telling)[1]]
     assert telling.lines == [
         f"trial {number} of 7: PRPV {score:g}, best so far {min(scores[:number]):g}"
         for number, score in enumerate(scores, start=1)

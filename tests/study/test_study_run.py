@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from partly_dead import ordered_study
 from processes import episodes as stored_episodes
+from searched import changed, searched
 from stopping import Stopping
 from taught import make_taught
 from telling import Telling
@@ -28,7 +29,6 @@ from proxytune.study import (
     open_study,
     plan_episodes,
     read_study_settings,
-    run_trials,
     study_facts,
     with_spending,
 )
@@ -46,19 +46,9 @@ KEYS = {"batch": str(BATCH), "seed": "4", "engine": '"gp"'}
 """Of a study two trials of one batch of which are cut off."""
 
 
-def changed(folder, **changes):
-    study = open_study(folder)
-    return replace(study, settings=replace(study.settings, **changes))
-
-
 def run(folder, watcher=None, **changes):
     """What it cost, and the trials."""
-    study = changed(folder, **changes)
-    with Store.open(folder) as store:
-        proposer = make_proposer(study.settings.engine, study.settings.initial, goal_of(StudyRun(study, store)))
-        study_run = StudyRun(study, store, watcher or Silent())
-        run_trials(study_run, proposer)
-        return study_run.spent, store.trials()
+    return searched(changed(folder, **changes), watcher)
 
 
 @pytest.fixture(scope="module")
@@ -422,12 +412,10 @@ def test_a_trial_s_outcome_composes_to_its_prpv(finished):
 @pytest.mark.parametrize("metrics", ['["survival_time:max"]', '["survival_time:max", "distance:min"]'])
 def test_an_outcome_has_the_study_s_metrics_in_their_order_and_the_target_s_agents(make_study, metrics):
     agents = '["agent5", "agent0", "agent3", "agent1", "agent2", "agent4"]'
-    folder = make_study(agents=agents, metrics=metrics, budget="6")
-    study = open_study(folder)
-    with Store.open(folder) as store:
-        study_run = StudyRun(study, store)
-        run_trials(study_run, make_proposer("sobol", 5))
-        told = [StudyRun(study, store).search_trial(trial) for trial in store.trials()]
+    study = open_study(make_study(agents=agents, metrics=metrics, budget="6", engine='"sobol"'))
+    _, trials = searched(study)
+    with Store.read(study.settings.folder) as store:
+        told = [StudyRun(study, store).search_trial(trial) for trial in trials]
         composed = goal_of(StudyRun(study, store)).compose(np.array([trial.outcome for trial in told]))
     assert np.array_equal(composed, [trial.score for trial in told])
 

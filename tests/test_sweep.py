@@ -4,11 +4,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
+from stopping import Stopping
 from telling import Telling
 
 from proxytune.domain import make_episode
 from proxytune.errors import InputError
-from proxytune.running import Silent
 from proxytune.space import Interval
 from proxytune.storage import Store
 from proxytune.study import StudyRun, open_study
@@ -132,17 +132,11 @@ def test_a_curve_has_pod_at_every_point_kept_like_other_episodes(opened):
 def test_a_sweep_stopped_before_its_last_replays_has_no_curve_yet(opened):
     study, discrepancy = opened
 
-    class Stopping(Silent):
-        def begin(self, what, known):
-            if what.startswith("POD, trim 4"):
-                raise KeyboardInterrupt
-
     model = study.settings.folder.parent / "truth.toml"
     plan = with_target(plan_sweep(sweep_interval(study, "trim"), TRUTH, 4), model, discrepancy)
     with Store.open(study.settings.folder) as store:
         with pytest.raises(KeyboardInterrupt):
-            study_run = StudyRun(study, store, Stopping())
-            run_sweep(study_run, plan, discrepancy)
+            run_sweep(StudyRun(study, store, Stopping(before="POD, trim 4")), plan, discrepancy)
         assert curve_of(StudyRun(study, store), plan) is None
         assert curve_of(StudyRun(study, store), replace(plan, replays="")) is not None, "only POD is missing"
     assert swept(study, discrepancy)[0] == 3
@@ -252,20 +246,13 @@ def test_every_point_is_told_with_its_place_value_and_prpv(make_study):
     assert telling.lines == expected
 
 
-class Stopping(Silent):
-    def begin(self, what, known):
-        if what.startswith("trim 3"):
-            raise KeyboardInterrupt
-
-
 def test_an_interrupted_sweep_goes_on_where_it_was(make_study):
     folder = make_study()
     study = open_study(folder)
     plan = plan_sweep(sweep_interval(study, "trim"), TRUTH, 5)
     with Store.open(folder) as store:
         with pytest.raises(KeyboardInterrupt):
-            study_run = StudyRun(study, store, Stopping())
-            run_sweep(study_run, plan)
+            run_sweep(StudyRun(study, store, Stopping(before="trim 3")), plan)
         assert curve_of(StudyRun(study, store), plan) is None
         assert all_curves(StudyRun(study, store)) == []
     assert swept_of_sweep(folder)[0] == 4 * 18
@@ -318,66 +305,52 @@ def series(scores, spread=0.0, higher=False):
     return Series(measure, ALL, tuple(found))
 
 
-def test_a_valley_at_the_held_value_worsens_on_both_sides():
-    shape = shape_of(series([9.0, 4.0, 1.0, 3.0, 8.0]), 2.0)
-    assert (shape.best, shape.score, shape.near_best) == ((2.0,), 1.0, (2.0,))
-    assert (shape.below, shape.above, shape.monotone) == ("worsens", "worsens", True)
+VALLEY = series([9.0, 4.0, 1.0, 3.0, 8.0])
+SHAPES = {
+    "a valley at the held value worsens on both sides": (VALLEY, 2.0, (2.0,), "worsens", "worsens", True),
+    "where higher is better the best is a peak": (
+        series([0.2, 0.5, 0.9, 0.6, 0.1], higher=True), 2.0, (2.0,), "worsens", "worsens", True,
+    ),
+    "a second valley is a turn on its side only": (
+        series([9.0, 4.0, 1.0, 6.0, 3.0]), 2.0, (2.0,), "worsens", "turns", False,
+    ),
+    "a best value beside the held one is a turn": (
+        series([9.0, 4.0, 2.0, 0.0, 8.0]), 2.0, (3.0,), "worsens", "turns", False,
+    ),
+    "a dip within noise is no turn": (
+        series([9.0, 4.0, 1.0, 6.0, 5.0], 0.6), 2.0, (2.0,), "worsens", "worsens", True,
+    ),
+    "a rise within noise is flat": (series([2.0, 1.5, 1.0, 1.5, 2.0], 0.6), 2.0, (2.0,), "flat", "flat", False),
+    "without intervals no side is judged": (series([9.0, 1.0, 8.0], None), 1.0, (1.0,), "unknown", "unknown", None),
+    "sides need a held value": (series([9.0, 1.0, 8.0]), None, (1.0,), "unseen", "unseen", None),
+    "it has to have been looked at": (series([9.0, 1.0, 8.0]), 7.0, (1.0,), "unseen", "unseen", None),
+    "at an end it has one side": (series([1.0, 2.0, 3.0]), 0.0, (0.0,), "unseen", "worsens", True),
+    "undefined points are passed over": (
+        series([9.0, None, 1.0, None, 8.0]), 2.0, (2.0,), "worsens", "worsens", True,
+    ),
+    "of undefined points alone none is best": (series([None, None]), 0.0, (), "unseen", "unseen", None),
+    "ties for the best are all named": (series([3.0, 1.0, 1.0, 2.0]), None, (1.0, 2.0), "unseen", "unseen", None),
+}  # fmt: skip
 
 
-def test_a_measure_of_which_higher_is_better_is_best_at_its_peak():
-    shape = shape_of(series([0.2, 0.5, 0.9, 0.6, 0.1], higher=True), 2.0)
-    assert (shape.best, shape.score, shape.monotone) == ((2.0,), 0.9, True)
+@pytest.mark.parametrize("case", SHAPES)
+def test_a_curve_has_a_best_value_and_a_shape_on_either_side_of_the_held_one(case):
+    curve, held, best, below, above, monotone = SHAPES[case]
+    shape = shape_of(curve, held)
+    assert (shape.best, shape.below, shape.above, shape.monotone) == (best, below, above, monotone)
 
 
-def test_a_second_valley_is_a_turn_on_its_side_only():
-    shape = shape_of(series([9.0, 4.0, 1.0, 6.0, 3.0]), 2.0)
-    assert (shape.below, shape.above, shape.monotone) == ("worsens", "turns", False)
-
-
-def test_a_best_value_beside_the_held_one_is_a_turn():
-    assert shape_of(series([9.0, 4.0, 2.0, 0.0, 8.0]), 2.0).above == "turns"
-
-
-def test_a_dip_within_noise_is_no_turn_and_a_rise_within_noise_is_flat():
-    assert shape_of(series([9.0, 4.0, 1.0, 6.0, 5.0], spread=0.6), 2.0).above == "worsens"
-    shape = shape_of(series([2.0, 1.5, 1.0, 1.5, 2.0], spread=0.6), 2.0)
-    assert (shape.below, shape.above, shape.monotone) == ("flat", "flat", False)
-    assert shape.near_best == (0.0, 1.0, 2.0, 3.0, 4.0)
-
-
-def test_without_intervals_no_side_is_judged():
-    shape = shape_of(series([9.0, 1.0, 8.0], spread=None), 1.0)
-    assert (shape.below, shape.above, shape.monotone) == ("unknown", "unknown", None)
-
-
-@pytest.mark.parametrize("held", [None, 7.0])
-def test_sides_need_a_held_value_that_was_looked_at(held):
-    shape = shape_of(series([9.0, 1.0, 8.0]), held)
-    assert (shape.below, shape.above, shape.monotone) == ("unseen", "unseen", None)
-    assert shape.best == (1.0,)
-
-
-def test_a_held_value_at_an_end_has_one_side():
-    shape = shape_of(series([1.0, 2.0, 3.0]), 0.0)
-    assert (shape.below, shape.above, shape.monotone) == ("unseen", "worsens", True)
-
-
-def test_undefined_points_are_passed_over():
-    shape = shape_of(series([9.0, None, 1.0, None, 8.0]), 2.0)
-    assert (shape.best, shape.monotone) == ((2.0,), True)
-    empty = series([None, None])
-    assert shape_of(empty, 0.0).best == ()
-    assert describe_shape(empty, 0.0) == "PRPV: undefined at every point"
-
-
-def test_ties_for_the_best_are_all_named():
-    assert shape_of(series([3.0, 1.0, 1.0, 2.0]), None).best == (1.0, 2.0)
+def test_the_score_of_a_shape_is_the_best_and_what_is_near_it_is_not_worse_beyond_noise():
+    assert (shape_of(VALLEY, 2.0).score, shape_of(VALLEY, 2.0).near_best) == (1.0, (2.0,))
+    assert shape_of(series([2.0, 1.5, 1.0, 1.5, 2.0], 0.6), 2.0).near_best == (0.0, 1.0, 2.0, 3.0, 4.0)
+    assert shape_of(series([0.2, 0.9, 0.1], higher=True), 1.0).score == 0.9
 
 
 def test_the_line_says_where_it_is_lowest_and_what_each_side_does():
     line = describe_shape(series([9.0, 4.0, 1.0, 6.0, 3.0]), 2.0)
     assert line.startswith("PRPV: lowest (1) at 2; not worse beyond noise: 2; from 2 downwards it worsens")
     assert "upwards it turns" in line
+    assert describe_shape(series([None, None]), 0.0) == "PRPV: undefined at every point"
     assert "from" not in describe_shape(series([9.0, 4.0, 1.0]), None)
     assert "not worse beyond noise: 0, 2" in describe_shape(series([1.0, 5.0, 1.0]), None)
 

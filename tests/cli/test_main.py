@@ -98,11 +98,6 @@ def test_a_mistyped_word_is_answered_with_the_one_that_was_probably_meant(capsys
     assert told.strip().endswith(problem)
 
 
-def test_people_see_a_table(capsys):
-    assert main(["list", "robots"]) == 0
-    assert "duckiebot" in capsys.readouterr().out
-
-
 @pytest.mark.parametrize(
     ("problem", "status"),
     [(SettingsError("a: b"), 2), (ScoresError("a: b"), 2), (StoreError("a: b"), 1), (EpisodeError("a: b"), 1)],
@@ -125,13 +120,6 @@ def test_an_interruption_says_whether_the_same_command_goes_on(failing, capsys, 
     monkeypatch.setitem(COMMANDS, "list", COMMANDS["list"]._replace(resumes=False, kept="half of it is there"))
     assert main(["list", "robots"]) == 130
     assert "half of it is there; run the same command to start again" in capsys.readouterr().err
-
-
-def test_help_loads_no_library_that_only_commands_need(tmp_path):
-    heavy = "pybullet", "sklearn", "skopt", "scipy", "pandas", "matplotlib", "numpy"
-    line = f"import sys, proxytune.cli.main as m; m.parser([]); print([n for n in {heavy} if n in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", line], capture_output=True, text=True, check=True, cwd=os.getcwd())
-    assert done.stdout == "[]\n"
 
 
 def test_what_is_not_json_is_a_defect_and_not_printed(monkeypatch):

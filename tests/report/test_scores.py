@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from proxytune.errors import RunError
 from proxytune.report.score_figures import FLIP_COLOURS, LONGEST, MOST, flipped_pairs_figure, scatter_figure
 from proxytune.report.scores import score_next_step, score_sentence, write_score_report
 from proxytune.report.view import foot_of
@@ -192,10 +191,3 @@ def test_constant_scores_and_two_agents_are_drawn_too(tmp_path):
     for name, figure in (("one", scatter_figure(found)), ("two", flipped_pairs_figure(found.prpv))):
         save_figure(figure, tmp_path / "new" / f"{name}.png")
         assert (tmp_path / "new" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_a_figure_that_cannot_be_written_leaves_nothing_behind(assessment, tmp_path):
-    (tmp_path / "map.png").mkdir()
-    with pytest.raises(RunError, match=r"map\.png: the figure cannot be written"):
-        save_figure(flipped_pairs_figure(assessment.prpv), tmp_path / "map.png")
-    assert [path.name for path in tmp_path.iterdir()] == ["map.png"]

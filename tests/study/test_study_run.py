@@ -151,21 +151,11 @@ def test_rules_to_stop_are_asked_where_a_batch_has_ended(make_study):
         assert stopped(StudyRun(study, store), trials[:BATCH]).startswith("episodes took")
 
 
-class Listening(Silent):
-    """Keeps what is begun."""
-
-    def __init__(self):
-        self.begun = []
-
-    def begin(self, what, known):
-        self.begun.append(what)
-
-
 def test_what_is_told_of_the_progress_names_the_trials_of_a_batch(make_study):
-    listening = Listening()
-    run(make_study(batch="4", budget="10"), listening)
+    telling = Telling()
+    run(make_study(batch="4", budget="10"), telling)
     expected = ["trials 1 to 4 of 10", "trial 5 of 10", "trials 6 to 9 of 10", "trial 10 of 10"]
-    assert list(dict.fromkeys(listening.begun)) == expected
+    assert list(dict.fromkeys(telling.begun)) == expected
 
 
 def test_a_study_from_before_there_were_batches_goes_on_one_trial_at_a_time_and_no_other_way(finished, make_study):

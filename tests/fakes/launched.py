@@ -53,11 +53,11 @@ class Launched:
 
 
 @contextmanager
-def launching():
-    """The process that forks the others."""
-    command = [sys.executable, str(FAKES / "launcher.py")]
+def launching(script="launcher.py", **environment):
+    """The process that forks the others, of a script among the fakes, with more in its environment."""
+    command = [sys.executable, str(FAKES / script)]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
-    with subprocess.Popen(command, env=ENVIRONMENT, start_new_session=True, **pipes) as process:
+    with subprocess.Popen(command, env=ENVIRONMENT | environment, start_new_session=True, **pipes) as process:
         yield process
         process.stdin.close()
 

@@ -28,66 +28,52 @@ def a_log(folder, text=LOG):
     return folder
 
 
-def test_a_log_of_another_robot_is_refused(tmp_path, refused):
-    line = refused("loop", write_tiny(tmp_path / "tiny"), "--log", a_log(tmp_path / "log"))
-    assert "is of the robot 'husky', the study of 'duckiebot'; give a log of 'duckiebot'" in line
+HELD_OUT = '["crawler", "laggy", "edges"]'
+NOBODY_HELD_OUT = (f"held_out = {HELD_OUT}\n", "")
+BLIND = 'format = 1\nrobot = "irobot_create"\nplant = "planar"\n'
+HUSKY = 'format = 1\nrobot = "husky"\nplant = "planar"\n'
+REFUSED = {
+    "a log of another robot": (
+        (), {}, "--log log", "is of the robot 'husky', the study of 'duckiebot'; give a log of 'duckiebot'",
+    ),
+    "a twin without a camera": (
+        (('robot = "duckiebot"\n', ""),), {"twin.toml": BLIND}, "--twin tiny/twin.toml", "camera",
+    ),
+    "a twin of another robot": ((), {"twin.toml": HUSKY}, "", "is 'duckiebot' but the model says 'husky'"),
+    "a twin that is not there": ((), {}, "--twin none.toml", "proxytune loop: --twin none.toml: no such file"),
+    "an agent without a rank": (
+        (NO_TRUTH,), {"target.csv": TABLE}, "", "held_out: the target's table has no scores of 'crawler'; measure them",
+    ),
+    "an agent that is tuned on": (
+        ((HELD_OUT, '["crawler", "laggy", "steady"]'),), {}, "", "held_out: 'steady' is among the agents that",
+    ),
+    "too few agents": (((HELD_OUT, '["crawler", "laggy"]'),), {}, "", "held_out: names 2 of at least 3 agents"),
+    "an agent that is none": (((HELD_OUT, '["crawler", "laggy", "nobody"]'),), {}, "", "held_out: agent 'nobody'"),
+    "a target that can be neither read nor recorded": (
+        (NO_TRUTH, NOBODY_HELD_OUT), {"target.csv": TABLE}, "", "give a log of it by --log LOG, or its model.toml by",
+    ),
+    "a search for learning value": (
+        (('name = "tiny"', 'name = "tiny"\nobjective = "plv"'),), {}, "", "objective: `loop` tunes by scores",
+    ),
+    "a folder that cannot be made": ((), {"loop": "a file"}, "", "loop is no folder; move that away"),
+}  # fmt: skip
+"""Changes of the study, files in its folder, words of the command, and what it says."""
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_cannot_be_used_is_refused_before_anything_is_driven(tmp_path, monkeypatch, refused, case):
+    changes, files, words, says = REFUSED[case]
+    monkeypatch.chdir(tmp_path)
+    write_tiny(tmp_path / "tiny", *changes)
+    a_log(tmp_path / "log")
+    for name, text in files.items():
+        (tmp_path / "tiny" / name).write_text(text)
+    assert says in refused("loop", "tiny", *words.split())
     assert not (tmp_path / "tiny" / "study.db").exists()
-
-
-def test_a_twin_without_a_camera_is_refused(tmp_path, refused):
-    folder = write_tiny(tmp_path / "tiny", ('robot = "duckiebot"\n', ""))
-    blind = folder / "blind.toml"
-    blind.write_text('format = 1\nrobot = "irobot_create"\nplant = "planar"\n')
-    line = refused("loop", folder, "--twin", blind)
-    assert "--twin" in line
-    assert "camera" in line
-
-
-def test_a_twin_of_another_robot_is_refused(tmp_path, refused):
-    folder = write_tiny(tmp_path / "tiny")
-    (folder / "twin.toml").write_text('format = 1\nrobot = "husky"\nplant = "planar"\n')
-    assert "is 'duckiebot' but the model says 'husky'" in refused("loop", folder)
-
-
-def test_a_twin_that_is_not_there_is_refused(tmp_path, refused):
-    line = refused("loop", write_tiny(tmp_path / "tiny"), "--twin", tmp_path / "none.toml")
-    assert line.startswith(f"proxytune loop: --twin {tmp_path / 'none.toml'}: no such file")
-
-
-def test_an_agent_without_a_rank_is_refused(tmp_path, refused):
-    folder = write_tiny(tmp_path / "tiny", NO_TRUTH)
-    (folder / "target.csv").write_text(TABLE)
-    assert "held_out: the target's table has no scores of 'crawler'; measure them" in refused("loop", folder)
-
-
-@pytest.mark.parametrize(
-    ("names", "says"),
-    [
-        ('["crawler", "laggy", "steady"]', "'steady' is among the agents that are tuned on"),
-        ('["crawler", "laggy"]', "names 2 of at least 3 agents"),
-        ('["crawler", "laggy", "nobody"]', "nobody"),
-    ],
-)
-def test_agents_that_cannot_be_held_out_are_refused(tmp_path, refused, names, says):
-    folder = write_tiny(tmp_path / "tiny", ('["crawler", "laggy", "edges"]', names))
-    line = refused("loop", folder)
-    assert "held_out: " in line
-    assert says in line
-
-
-def test_a_target_that_can_be_neither_read_nor_recorded_is_refused(tmp_path, refused):
-    folder = write_tiny(tmp_path / "tiny", NO_TRUTH, ('held_out = ["crawler", "laggy", "edges"]\n', ""))
-    (folder / "target.csv").write_text(TABLE)
-    assert "give a log of it by --log LOG, or its model.toml by --twin" in refused("loop", folder)
 
 
 def test_a_family_without_a_robot_is_refused(make_study, refused):
     assert "names no robot" in refused("loop", make_study())
-
-
-def test_a_search_for_learning_value_is_refused(tmp_path, refused):
-    folder = write_tiny(tmp_path / "tiny", ('name = "tiny"', 'name = "tiny"\nobjective = "plv"'))
-    assert "objective: `loop` tunes by scores" in refused("loop", folder)
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
@@ -100,14 +86,8 @@ def test_a_folder_without_permission_is_refused(tmp_path, refused):
         folder.chmod(0o700)
 
 
-def test_a_folder_that_cannot_be_made_is_refused(tmp_path, refused):
-    folder = write_tiny(tmp_path / "tiny")
-    (folder / "loop").write_text("a file")
-    assert "loop is no folder; move that away" in refused("loop", folder)
-
-
 def test_without_names_the_shipped_agents_that_no_tuning_sees_are_held_out(tmp_path):
-    folder = write_tiny(tmp_path / "tiny", ('held_out = ["crawler", "laggy", "edges"]\n', ""))
+    folder = write_tiny(tmp_path / "tiny", NOBODY_HELD_OUT)
     held_out = open_loop(folder).held_out
     assert {"crawler", "edges", "wary"} <= set(held_out)
     assert not {"steady", "brisk", "daredevil"} & set(held_out)
@@ -116,7 +96,7 @@ def test_without_names_the_shipped_agents_that_no_tuning_sees_are_held_out(tmp_p
 def test_shipped_agents_are_held_out_of_a_study_that_names_its_agents_otherwise(tmp_path):
     table = '[agents]\nslow = "steady"\nfast = "brisk"\nwild = "daredevil"\n\n[parameters]'
     changes = (
-        ('held_out = ["crawler", "laggy", "edges"]\n', ""),
+        NOBODY_HELD_OUT,
         ('agents = ["steady", "brisk", "daredevil"]\n', ""),
         ("[parameters]", table),
     )
@@ -126,7 +106,7 @@ def test_shipped_agents_are_held_out_of_a_study_that_names_its_agents_otherwise(
 
 
 def test_of_a_table_those_agents_are_held_out_that_it_has_beside_the_studys(tmp_path):
-    folder = write_tiny(tmp_path / "tiny", NO_TRUTH, ('held_out = ["crawler", "laggy", "edges"]\n', ""))
+    folder = write_tiny(tmp_path / "tiny", NO_TRUTH, NOBODY_HELD_OUT)
     log = a_log(tmp_path / "log", LOG.replace("husky", "duckiebot"))
     (folder / "target.csv").write_text(TABLE)
     assert open_loop(folder, log=log).held_out == ()

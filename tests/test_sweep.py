@@ -1,5 +1,6 @@
 import pickle
 from dataclasses import replace
+from unittest.mock import Mock, call
 
 import numpy as np
 import pytest
@@ -70,20 +71,10 @@ def test_pod_is_nothing_at_the_truth_and_something_beside_it(opened):
 
 def test_at_most_so_many_commands_are_replayed_and_fewer_where_the_episode_ended(opened):
     both = opened[1].family
-    counted = []
-
-    class Counting:
-        identity = "counting"
-
-        def drive(self, episode):
-            return both.target.drive(episode)
-
-        def replay(self, episode, commands):
-            counted.append(len(commands))
-            return both.target.replay(episode, commands)
-
+    counting = Mock(wraps=both.target, identity="counting")
     for start in (0, 2):
-        replace(both, proxy=Counting(), target=Counting()).run(make_episode({}, agent="agent0", start=start, seed=3))
+        replace(both, proxy=counting, target=counting).run(make_episode({}, agent="agent0", start=start, seed=3))
+    counted = [len(one.args[1]) for one in counting.replay.mock_calls]
     assert counted == [COMMANDS, COMMANDS, 3, 3], "target and proxy in turn"
 
 
@@ -94,20 +85,11 @@ def test_the_time_after_a_domain_has_ended_is_left_out(opened):
 
 
 def test_the_target_is_driven_once_per_start_however_many_points(opened):
-    drives = []
-
-    class Journal:
-        def drive(self, episode):
-            drives.append(episode)
-            return opened[1].family.target.drive(episode)
-
-        def replay(self, episode, commands):
-            return opened[1].family.target.replay(episode, commands)
-
-    both = replace(opened[1].family, target=Journal())
+    target = Mock(wraps=opened[1].family.target)
+    both = replace(opened[1].family, target=target)
     for trim in (-0.1, 0.0, 0.1):
         both.run(make_episode({"trim": trim}, agent="agent0", start=0, seed=3))
-    assert drives == [make_episode({}, agent="agent0", start=0, seed=3)]
+    assert target.drive.mock_calls == [call(make_episode({}, agent="agent0", start=0, seed=3))]
 
 
 def test_identity_tells_targets_and_proxies_apart_and_travels(opened, tmp_path):

@@ -3,6 +3,8 @@
 import json
 import re
 import warnings
+from contextlib import nullcontext
+from unittest.mock import Mock
 
 import numpy as np
 import pandas as pd
@@ -13,6 +15,7 @@ from one_line import complaint_of
 from proxytune.api import read_study
 from proxytune.api.study import run_study
 from proxytune.errors import InputError
+from proxytune.running import Silent
 
 
 @pytest.fixture(scope="module")
@@ -111,26 +114,13 @@ def test_a_parameter_without_effect_is_a_warning_at_the_line_that_runs_the_study
 
 
 def test_progress_is_shown_only_when_asked_for(make_study, monkeypatch):
-    totals = []
-
-    class Spy:
-        def __init__(self, total, unit):
-            totals.append(total)
-
-        def __enter__(self):
-            from proxytune.running import Silent
-
-            return Silent()
-
-        def __exit__(self, *problem):
-            pass
-
-    monkeypatch.setattr("proxytune.running.progress.Bars", Spy)
+    bars = Mock(side_effect=lambda total, unit: nullcontext(Silent()))
+    monkeypatch.setattr("proxytune.running.progress.Bars", bars)
     folder = make_study("shown", budget="2", initial="2")
     run_study(folder)
-    assert totals == []
+    bars.assert_not_called()
     run_study(folder, progress=True)
-    assert totals == [(2 + 1) * 6 * 3], "two trials and the nominal θ"
+    assert [one.args[0] for one in bars.mock_calls] == [(2 + 1) * 6 * 3], "two trials and the nominal θ"
 
 
 @pytest.mark.parametrize(

@@ -46,6 +46,7 @@ def test_repeats_are_labelled_and_one_gives_the_table_of_none_asked_for(measured
     found = read_scores(two, ["distance"])
     assert found.episodes == ("0/0", "0/1", "1/0", "1/1", "2/0", "2/1")
     assert (found.values[:, ::2] == read_scores(plain, ["distance"]).values).all()
+    assert all(len(set(agent[:, 0].tolist())) == 6 for agent in found.values), "each has noise of its own"
 
 
 def test_the_document_names_the_seed_and_the_means(measured, capsys):

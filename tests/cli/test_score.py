@@ -50,10 +50,11 @@ def shown(*words):
 
 
 METRIC = ("--metric", "distance:max", "--metric", "time:min")
+SIDES = ("--proxy", "sim.csv", "--target", "real.csv")
 
 
 def test_one_proxy_has_the_promised_keys_at_the_top_level(tables):
-    found = document("--proxy", "sim.csv", "--target", "real.csv", *METRIC)
+    found = document(*SIDES, *METRIC)
     assert found.keys() >= PROMISED
     assert (found["proxy"], found["target"], found["prpv"]) == ("sim", "real", 2)
     assert found["prpv_normalised"] == pytest.approx(2 / 12)
@@ -63,7 +64,7 @@ def test_one_proxy_has_the_promised_keys_at_the_top_level(tables):
 
 
 def test_domains_of_one_file_can_be_either_side(tables):
-    apart = document("--proxy", "sim.csv", "--target", "real.csv", *METRIC)
+    apart = document(*SIDES, *METRIC)
     together = document("--proxy", "both.csv:sim", "--target", "both.csv:real", *METRIC)
     assert apart == together
     assert document("--proxy", "both.csv", "--target", "both.csv:real", *METRIC) == apart
@@ -71,7 +72,7 @@ def test_domains_of_one_file_can_be_either_side(tables):
 
 def test_several_proxies_are_ranked_with_their_differences(tables):
     Path("worse.csv").write_text(SIM.replace("A,", "x,").replace("D,", "A,").replace("x,", "D,"))
-    found = document("--proxy", "worse.csv", "--proxy", "sim.csv", "--target", "real.csv", *METRIC)
+    found = document("--proxy", "worse.csv", *SIDES, *METRIC)
     assert [(one["rank"], one["proxy"]) for one in found["proxies"]] == [(1, "sim"), (2, "worse")]
     assert all(one.keys() >= PROMISED for one in found["proxies"])
     difference = found["differences"][0]
@@ -93,7 +94,7 @@ def test_a_file_with_a_colon_in_its_name_is_a_file(tables):
 
 
 def test_the_table_shows_each_measure_its_interval_and_the_notes(tables):
-    text = shown("--proxy", "sim.csv", "--target", "real.csv", *METRIC)
+    text = shown(*SIDES, *METRIC)
     for part in (
         "PRPV",
         "halves",
@@ -145,7 +146,7 @@ def test_a_constant_metric_is_null_with_a_note(tables):
 
 
 def test_weights_unpaired_episodes_and_the_seed_are_obeyed(tables):
-    base = ("--proxy", "sim.csv", "--target", "real.csv", *METRIC)
+    base = (*SIDES, *METRIC)
     weighted = document(*base, "--beta", "distance:2", "--beta", "time:0")
     assert weighted["beta"] == {"distance": 2.0, "time": 0.0}
     assert document(*base, "--unpaired")["episodes"]["paired"] is False
@@ -155,7 +156,7 @@ def test_weights_unpaired_episodes_and_the_seed_are_obeyed(tables):
 
 @pytest.mark.slow
 def test_figures_are_drawn_where_asked(tables):
-    found = document("--proxy", "sim.csv", "--target", "real.csv", *METRIC, "--output", "out")
+    found = document(*SIDES, *METRIC, "--output", "out")
     assert found["report"] == "out/report.html"
     assert "As a proxy of real, sim has a PRPV" in Path("out/report.html").read_text()
     assert [Path(path).name for path in found["figures"]] == ["scatter.png", "flipped_pairs.png", "decision.png"]
@@ -181,24 +182,24 @@ def test_figures_are_drawn_where_asked(tables):
         (("--proxy", "sim.csv", *METRIC), "--target is missing"),
         ((), "--proxy is missing"),
         (("sim.csv", "--proxy", "sim.csv", *METRIC), "give one table of both sides, or --proxy and --target"),
-        (("--proxy", "sim.csv", "--target", "real.csv"), "--metric is missing"),
-        (("--proxy", "sim.csv", "--target", "real.csv", *METRIC, "--regret", "-1"), "must be above 0"),
-        (("--proxy", "sim.csv", "--target", "real.csv", *METRIC, "--rollouts", "0"), "rollouts must be between"),
-        (("--proxy", "sim.csv", "--target", "real.csv", *METRIC, "--decide-on", "distanse"), "did you mean 'distance'"),
-        (("--proxy", "sim.csv", "--target", "real.csv", *METRIC, "--sequential"), "goes beyond 0 and 1"),
+        (SIDES, "--metric is missing"),
+        ((*SIDES, *METRIC, "--regret", "-1"), "must be above 0"),
+        ((*SIDES, *METRIC, "--rollouts", "0"), "rollouts must be between"),
+        ((*SIDES, *METRIC, "--decide-on", "distanse"), "did you mean 'distance'"),
+        ((*SIDES, *METRIC, "--sequential"), "goes beyond 0 and 1"),
         (("--proxy", "both.csv:sm", "--target", "real.csv", *METRIC), "no domain 'sm'; did you mean 'sim'"),
         (("--proxy", "sim.csv", "--target", "both.csv", *METRIC), "choose one, as in both.csv:sim"),
         (
             ("--proxy", "sim.csv", "--target", "both.csv:real", "--target", "real.csv", *METRIC),
             "several files make one table; give all of them one domain, or none",
         ),
-        (("--proxy", "sim.csv", "--proxy", "sim.csv", "--target", "real.csv", *METRIC), "given twice"),
-        (("--proxy", "sim.csv", "--target", "real.csv", "--metric", "distanc:max"), "did you mean 'distance'"),
-        (("--proxy", "sim.csv", "--target", "real.csv", "--metric", "distance"), "write NAME:max"),
-        (("--proxy", "sim.csv", "--target", "real.csv", *METRIC, "--resamples", "3"), "--resamples"),
-        (("--proxy", "sim.csv", "--target", "real.csv", *METRIC, "--beta", "distance"), "write NAME:WEIGHT"),
+        (("--proxy", "sim.csv", *SIDES, *METRIC), "given twice"),
+        ((*SIDES, "--metric", "distanc:max"), "did you mean 'distance'"),
+        ((*SIDES, "--metric", "distance"), "write NAME:max"),
+        ((*SIDES, *METRIC, "--resamples", "3"), "--resamples"),
+        ((*SIDES, *METRIC, "--beta", "distance"), "write NAME:WEIGHT"),
         (
-            ("--proxy", "sim.csv", "--target", "real.csv", *METRIC, "--beta", "distance:1"),
+            (*SIDES, *METRIC, "--beta", "distance:1"),
             "no weight is given for time",
         ),
     ],
@@ -224,7 +225,7 @@ OWN = ("--proxy", "sim.csv", "--target", "monday.csv", "--target", "tuesday.csv"
 def test_a_target_as_people_keep_it_gives_the_figures_of_a_tidy_one(own):
     found = document(*OWN, *COLUMNS, *METRIC)
     assert found.pop("target") == "monday, tuesday"
-    tidy = document("--proxy", "sim.csv", "--target", "real.csv", *METRIC)
+    tidy = document(*SIDES, *METRIC)
     assert tidy.pop("target") == "real"
     assert found == tidy
     assert found["left_out"] == []
@@ -264,7 +265,7 @@ def test_success_rates_stand_in_table_and_document_and_ties_are_told(tables):
 
 
 def test_all_measures_are_also_a_table_for_programs(tables):
-    found = document("--proxy", "sim.csv", "--target", "real.csv", *METRIC, "--table", "new/t.csv")
+    found = document(*SIDES, *METRIC, "--table", "new/t.csv")
     assert found["table"] == "new/t.csv"
     table = pd.read_csv("new/t.csv").set_index("measure")
     assert list(table.columns) == ["proxy", "value", "low", "high", "better"]
@@ -283,7 +284,7 @@ def test_several_proxies_are_columns_of_a_latex_table(tables):
 
 
 def test_a_table_of_another_kind_is_refused_before_anything_is_written(tables):
-    words = ("--proxy", "sim.csv", "--target", "real.csv", *METRIC, "--table", "t.xlsx", "--output", "out")
+    words = (*SIDES, *METRIC, "--table", "t.xlsx", "--output", "out")
     assert "--table t.xlsx: a table is written as .csv or .tex" in complaint_of(run, *words)
     assert not Path("out").exists()
 

@@ -1,16 +1,11 @@
 """The document, figures and sentences of a camera's diagnosis, on frames whose camera is known."""
 
 import math
-import sys
 import warnings
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
-
 from pictured import ROBOT, lane_poses, write_still_frames
 from readable import assert_readable
 

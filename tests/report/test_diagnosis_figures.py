@@ -1,18 +1,14 @@
 """Figures of a diagnosis of motion and their captions."""
 
 import re
-import sys
 import warnings
 from dataclasses import replace
 from pathlib import Path
 
+import hidden_cases as hidden
 import numpy as np
 import pytest
 from matplotlib.container import ErrorbarContainer
-
-sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
-
-import hidden_cases as hidden
 from planted import ROBOT, TRUTH, planted_drives
 from readable import assert_readable
 

@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 from one_line import complaint_of
@@ -103,14 +104,14 @@ def _edit_table(folder: Path, **changes: object) -> None:
 
 def _other_code(folder: Path, shift: float) -> None:
     """Make the source's table one of other code, whose scores differ by so much."""
-    (folder / "study.db").unlink()
-    table = json.loads((folder / BANK_FILE).read_text())
-    table["facts"]["identity"] = "other"
-    table["trials"] = [
-        [theta, [[one and [value + shift for value in one] for one in row] for row in scores]]
-        for theta, scores in table["trials"]
-    ]
-    (folder / BANK_FILE).write_text(json.dumps(table))
+
+    def shifted(trials: list[Any]) -> list[Any]:
+        return [
+            [theta, [[one and [value + shift for value in one] for one in row] for row in rows]]
+            for theta, rows in trials
+        ]
+
+    _edit_table(folder, facts=lambda own: own | {"identity": "other"}, trials=shifted)
 
 
 @pytest.mark.slow
@@ -122,7 +123,11 @@ def test_other_code_that_plays_the_same_counts(beside: Path, make_study: MakeStu
 
 
 BAD = {
-    "another robot": ({}, lambda bank: _set_fact(bank, "domain.robot", '"cart"'), "domain.robot is .*cart.* there"),
+    "another robot": (
+        {},
+        lambda bank: _edit_table(bank, facts=lambda own: own | {"identity": "other", "domain.robot": '"cart"'}),
+        "domain.robot is .*cart.* there",
+    ),
     "other agents": ({"agents": '["agent0", "agent1"]'}, None, "has not driven agent2, agent3"),
     "fewer starts": ({"starts": "2"}, None, "has driven from 2 starts, and this study asks for 3"),
     "other code": ({}, lambda bank: _other_code(bank, 0.5), "its code or versions are others, and agent"),
@@ -153,14 +158,6 @@ BAD = {
     "not run": ({}, lambda bank: [(bank / name).unlink() for name in ("study.db", BANK_FILE)], "run it first"),
     "not there": ({}, lambda bank: shutil.rmtree(bank), "no such study or table of trials"),
 }
-
-
-def _set_fact(folder: Path, key: str, value: str) -> None:
-    """Make the source's table one of another setting, and so of another identity."""
-    (folder / "study.db").unlink()
-    table = json.loads((folder / BANK_FILE).read_text())
-    table["facts"] |= {"identity": "other", key: value}
-    (folder / BANK_FILE).write_text(json.dumps(table))
 
 
 @pytest.mark.parametrize("case", BAD)

@@ -100,7 +100,6 @@ def test_a_model_of_another_robot_is_refused_with_both_names(lane, tmp_path):
         load_target(settings, load_family(settings, None), tmp_path / "none.toml", "--against")
 
 
-SINGLE_EPISODE_LANE = {"plant": '"planar"', "seconds": "1.0", "position_noise_m": "0.0"}
 WATCHER = """
 import numpy as np
 
@@ -118,33 +117,23 @@ def family_of(folder):
     return load_family(settings, settings.proxy)
 
 
-@pytest.fixture(scope="module")
-def lane_of_single_episode(make_studies):
-    """A study with an agent whose left duty is the brightness of the picture that it sees."""
-    folder = make_studies("lane_of_single_episode")
-    (folder / "watcher.py").write_text(WATCHER)
-    agents = '["steady", "watcher:Watcher"]'
-    return make_studies(
-        "lane_of_single_episode",
-        domain=SINGLE_EPISODE_LANE,
-        family='"proxytune.driving.family:lane_following"',
-        agents=agents,
-    )
+"""An agent whose left duty is the brightness of the picture that it sees."""
 
 
-def test_pictures_are_those_that_the_agent_saw_before_each_command(lane_of_single_episode):
+def test_pictures_are_those_that_the_agent_saw_before_each_command(lane):
+    (lane / "watcher.py").write_text(WATCHER)
     watched = make_episode({"blur": 0.05}, agent="watcher:Watcher", start=1, seed=3)
-    kept = record_episode(family_of(lane_of_single_episode), watched, filmed=True)
-    assert kept.pictures.shape[0] == len(kept.commands["time"]) == 20
+    kept = record_episode(family_of(lane), watched, filmed=True)
+    assert kept.pictures.shape[0] == len(kept.commands["time"]) > 20
     assert np.allclose(kept.commands["left"], kept.pictures.mean(axis=(1, 2, 3)) / 255.0)
     assert len(set(kept.commands["left"])) > 5, "the picture changes while it drives"
 
 
-def test_nobody_who_does_not_ask_waits_for_pictures(lane_of_single_episode):
-    kept = record_episode(family_of(lane_of_single_episode), make_episode({}, agent="steady", start=0, seed=3))
+def test_nobody_who_does_not_ask_waits_for_pictures(lane):
+    kept = record_episode(family_of(lane), make_episode({}, agent="steady", start=0, seed=3))
     assert kept.pictures is None
     assert kept.channels == ("left", "right")
-    assert kept.seconds == pytest.approx(1.0)
+    assert kept.seconds == pytest.approx(2.0)
 
 
 def test_a_family_that_records_nothing_gives_scores_alone(make_study):

@@ -356,18 +356,6 @@ def test_the_number_of_jobs_changes_nothing_and_the_seed_and_the_model_do(make_s
     assert (measure_agents(one, model, 1001, Silent()).values != table.values).any()
 
 
-def test_repeats_have_noise_of_their_own_and_the_first_is_what_one_alone_would_be(make_study, model):
-    settings = read_study_settings(make_study())
-    once, thrice = measure_agents(settings, model, 1001, Silent()), measure_agents(settings, model, 1001, Silent(), 3)
-    assert thrice.episodes == ("0/0", "0/1", "0/2", "1/0", "1/1", "1/2", "2/0", "2/1", "2/2")
-    assert thrice.complete
-    assert (thrice.values[:, ::3] == once.values).all()
-    for agent in thrice.values:
-        assert len(np.unique(agent[:, 0])) == 9
-    again = measure_agents(settings, model, 1001, Silent(), 3)
-    assert (again.values == thrice.values).all()
-
-
 def test_a_target_of_repeats_has_a_floor_of_the_same_starts(make_study, model):
     settings = read_study_settings(make_study())
     once, twice = (measure_agents(settings, model, 1001, Silent(), repeats) for repeats in (1, 2))

@@ -224,8 +224,8 @@ def finished(finished_once: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(finished_once, tmp_path / "study"))
 
 
-def write_target(path: Path) -> None:
-    """The scores of every agent at the truth, under other seeds than a study's."""
+def write_target(path: Path, theta: dict[str, float] = TRUTH, seed: int = 900, shift: float = 0.0) -> Path:
+    """The scores of every agent at the truth, under other seeds than a study's, off by so much."""
     from wobbly import AGENTS, formula
 
     from proxytune.domain import make_episode
@@ -233,6 +233,7 @@ def write_target(path: Path) -> None:
     lines = ["agent,episode,distance,survival_time"]
     for agent in AGENTS:
         for start in range(3):
-            scores = formula(TRUTH, make_episode(TRUTH, agent=agent, start=start, seed=900 + start))
-            lines.append(f"{agent},{start},{scores['distance']!r},{scores['survival_time']!r}")
+            scores = formula(theta, make_episode(theta, agent=agent, start=start, seed=seed + start))
+            lines.append(f"{agent},{start},{scores['distance'] + shift!r},{scores['survival_time'] + shift!r}")
     path.write_text("\n".join(lines) + "\n")
+    return path

@@ -5,11 +5,11 @@ from unittest.mock import Mock, call
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
+from one_line import complaint_of
 from stopping import Stopping
 from telling import Telling
 
 from proxytune.domain import make_episode
-from proxytune.errors import InputError
 from proxytune.space import Interval
 from proxytune.storage import Store
 from proxytune.study import StudyRun, open_study
@@ -147,8 +147,8 @@ def test_the_interval_over_starts_holds_the_mean_and_one_start_has_none():
 
 
 def test_a_missing_model_is_refused(opened, tmp_path):
-    with pytest.raises(InputError, match="--target-model .*no.toml: no such file"):
-        discrepancy_study(opened[0], tmp_path / "no.toml")
+    path = tmp_path / "no.toml"
+    assert f"--target-model {path}: no such file" in complaint_of(discrepancy_study, opened[0], path)
 
 
 REAL = """format = 1
@@ -263,8 +263,7 @@ def test_a_parameter_is_swept_over_the_study_s_box_or_else_over_all_it_may_be(ma
     study = open_study(make_study(parameters={"trim": "[-0.1, 0.2]"}))
     assert sweep_interval(study, "trim") == Interval("trim", -0.1, 0.2)
     assert sweep_interval(study, "delay") == Interval("delay", 0.0, 0.3)
-    with pytest.raises(InputError, match="no parameter 'dely' .*; did you mean 'delay'"):
-        sweep_interval(study, "dely")
+    assert "no parameter 'dely' in" in complaint_of(sweep_interval, study, "dely")
 
 
 @pytest.mark.parametrize(
@@ -272,8 +271,7 @@ def test_a_parameter_is_swept_over_the_study_s_box_or_else_over_all_it_may_be(ma
     [({"trimm": 0.1}, "did you mean 'trim'"), ({"trim": 0.5}, "must lie within"), ({"trim": float("nan")}, "got nan")],
 )
 def test_a_base_that_the_family_cannot_take_is_refused(make_study, base, expected):
-    with pytest.raises(InputError, match=expected):
-        check_base(open_study(make_study()), base)
+    assert expected in complaint_of(check_base, open_study(make_study()), base)
 
 
 def series(scores, spread=0.0, higher=False):

@@ -19,26 +19,28 @@ def versions(monkeypatch):
     monkeypatch.setattr("wobbly.Wobbly.versions", NOW, raising=False)
 
 
-def test_another_version_of_a_package_is_told_by_its_name(make_study, versions, monkeypatch):
-    finished = make_study()
-    searched(changed(finished))
+@pytest.fixture
+def other_pybullet(make_study, versions, monkeypatch):
+    """A finished study, since which there is another PyBullet."""
+    folder = make_study()
+    searched(changed(folder))
     monkeypatch.setattr("wobbly.Wobbly.identity", "wobbly, other PyBullet")
     monkeypatch.setattr("wobbly.Wobbly.versions", {**NOW, "pybullet": "3.2.7"})
+    return folder
+
+
+def test_another_version_of_a_package_is_told_by_its_name(other_pybullet):
     with pytest.raises(SettingsError, match=r"since the first trial: PyBullet 3\.2\.7 \(was 3\.2\.6\); put it back"):
-        searched(changed(finished))
-    with Store.read(finished) as store:
-        assert stored_run(open_study(finished), store).study.identity == "wobbly 1 ()"
+        searched(changed(other_pybullet))
+    with Store.read(other_pybullet) as store:
+        assert stored_run(open_study(other_pybullet), store).study.identity == "wobbly 1 ()"
 
 
 @pytest.mark.slow
-def test_looking_at_a_study_edited_since_names_the_edit_alone(make_study, versions, monkeypatch):
-    finished = make_study()
-    searched(changed(finished))
-    monkeypatch.setattr("wobbly.Wobbly.identity", "wobbly, other PyBullet")
-    monkeypatch.setattr("wobbly.Wobbly.versions", {**NOW, "pybullet": "3.2.7"})
+def test_looking_at_a_study_edited_since_names_the_edit_alone(other_pybullet, make_study):
     make_study(seed="3")
-    with Store.read(finished) as store, pytest.raises(SettingsError, match=r"trial: seed \(was 1\); put"):
-        stored_run(open_study(finished), store)
+    with Store.read(other_pybullet) as store, pytest.raises(SettingsError, match=r"trial: seed \(was 1\); put"):
+        stored_run(open_study(other_pybullet), store)
 
 
 def test_versions_of_a_family_that_is_told_something_else_go_without_saying(make_study, versions, monkeypatch):

@@ -222,13 +222,6 @@ def test_a_study_whose_trials_have_begun_goes_on_without(finished, make_study):
     assert (spent.episodes, found) == (0, None)
 
 
-def test_it_can_be_turned_off(make_study):
-    folder = make_study(preflight="false")
-    spent, found = run(folder)
-    assert (spent.episodes, found) == (0, None)
-    assert most_preflight_episodes(open_study(folder).settings) == 0
-
-
 def test_failed_episodes_are_left_out_of_the_comparison(make_study):
     found = told(make_study(preflight="true", domain={"faults": '["agent3:1:raises"]'}))
     assert {movement.pairs for movement in found.values()} <= {PAIRS // LOOKS - 1, PAIRS - 2}

@@ -205,12 +205,6 @@ def run_of_stopping(study):
     return searched(study)[1], looked_at(study).stopped
 
 
-def test_a_spent_budget_is_said(finished):
-    trials, reason = run_of_stopping(ruled(finished))
-    assert len(trials) == 7
-    assert reason == "the budget of 7 trials is spent"
-
-
 RULES = {
     "time": ({"wall_time_s": NEVER}, 1, "s and stop.wall_time_s is 1e-09; raise or remove it to continue"),
     "no gain": ({"no_improvement": ALWAYS}, 5, "stop.no_improvement is 1e+09; lower or remove it to continue"),

@@ -44,7 +44,7 @@ from proxytune.study.answer import (
 from proxytune.study.facts import NOMINAL
 from proxytune.study.run import knowledge_of
 from proxytune.study.settings import StopRules
-from proxytune.usefulness import assess, compare
+from proxytune.usefulness import compare
 from proxytune.usefulness.pairs import prpv
 
 ONE = 6 * 3
@@ -386,15 +386,6 @@ def test_the_best_is_the_surrogate_s_and_not_the_lowest_score(finished):
         StudyRun(study, store).evaluate(near, "")
         store.save_trial(study.identity, lucky)
     assert looked_at(open_study(finished)).best.trial.number not in (8, worst.number)
-
-
-def test_noise_floor_and_chance_are_those_of_the_target(finished):
-    found = looked_at(open_study(finished))
-    study = found.study
-    table = found.best.assessment.inputs.proxy
-    again = assess(proxy=table, target=study.target, metrics=study.settings.metrics)
-    assert found.best.assessment.noise_floor.value == again.noise_floor.value
-    assert found.best.assessment.chance.mean == again.chance.mean
 
 
 @pytest.mark.slow

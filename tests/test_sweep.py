@@ -169,11 +169,7 @@ seconds = 2.0
 
 def test_a_lane_follower_s_pod_is_nothing_at_the_truth_and_grows_with_trim(tmp_path):
     (tmp_path / "study.toml").write_text(REAL)
-    rows = [
-        f"{agent},{start},{1 + start}.{place},2.0"
-        for place, agent in enumerate(("steady", "drifter"))
-        for start in (0, 1)
-    ]
+    rows = [f"{agent},{start},{1 + start}.{n},2.0" for n, agent in enumerate(("steady", "drifter")) for start in (0, 1)]
     (tmp_path / "target.csv").write_text("\n".join(["agent,episode,distance,survival_time", *rows]) + "\n")
     (tmp_path / "truth.toml").write_text('format = 1\nrobot = "duckiebot"\n[effects.trim]\ntrim = 0.1\n')
     both = discrepancy_study(open_study(tmp_path), tmp_path / "truth.toml").family
@@ -291,12 +287,8 @@ SHAPES = {
     "where higher is better the best is a peak": (
         series([0.2, 0.5, 0.9, 0.6, 0.1], higher=True), 2.0, (2.0,), "worsens", "worsens", True,
     ),
-    "a second valley is a turn on its side only": (
-        series([9.0, 4.0, 1.0, 6.0, 3.0]), 2.0, (2.0,), "worsens", "turns", False,
-    ),
-    "a best value beside the held one is a turn": (
-        series([9.0, 4.0, 2.0, 0.0, 8.0]), 2.0, (3.0,), "worsens", "turns", False,
-    ),
+    "a second valley turns on its side": (series([9.0, 4.0, 1.0, 6.0, 3.0]), 2.0, (2.0,), "worsens", "turns", False),
+    "a best one beside the held one turns": (series([9.0, 4.0, 2.0, 0.0, 8.0]), 2.0, (3.0,), "worsens", "turns", False),
     "a dip within noise is no turn": (
         series([9.0, 4.0, 1.0, 6.0, 5.0], 0.6), 2.0, (2.0,), "worsens", "worsens", True,
     ),

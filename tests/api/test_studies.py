@@ -128,10 +128,7 @@ def test_progress_is_shown_only_when_asked_for(make_study, monkeypatch):
     [
         ({"engine": '"gpp"'}, "study.toml: engine: unknown engine 'gpp'.*did you mean 'gp'"),
         ({"metrics": '["distanc:max"]'}, "no column 'distanc'; did you mean 'distance'|unknown metric 'distanc'"),
-        (
-            {"objective": '"plv"'},
-            "objective: run_study has no search for 'plv'; run it with: python -m proxytune study",
-        ),
+        ({"objective": '"plv"'}, "objective: run_study has no search for 'plv'; run it with: python -m proxytune"),
     ],
 )
 def test_what_cannot_be_used_is_one_line_with_the_key_and_what_to_do(make_study, changes, words):

@@ -125,15 +125,9 @@ def spoilt(**changes):
 TWO_DOMAINS = pd.concat([table(1).assign(domain="sim"), table(2).assign(domain="real")])
 WRONG = {
     "a missing column": (table(1).drop(columns="distance"), "proxy: no column 'distance'"),
-    "no agents": (
-        table(1).drop(columns="agent"),
-        "proxy: no column 'agent'; columns are episode, distance, time; name",
-    ),
+    "no agents": (table(1).drop(columns="agent"), "proxy: no column 'agent'; columns are episode, distance, time"),
     "a missing agent": (table(1, "ABCD"), "the proxy lacks scores of E, which the target has; add or remove them"),
-    "an empty cell": (
-        spoilt(distance=(3, np.nan)),
-        r"proxy: row 3, column 'distance': must be a finite number, got ''",
-    ),
+    "a hole": (spoilt(distance=(3, np.nan)), r"proxy: row 3, column 'distance': must be a finite number, got ''"),
     "a word": (spoilt(distance=(0, "far")), "proxy: row 0, column 'distance': must be a finite number, got 'far'"),
     "an episode twice": (spoilt(episode=(1, 0)), "proxy: row 1: agent 'A' has episode '0' twice; number the episodes"),
     "several domains": (TWO_DOMAINS, r"proxy: has several domains; select one, as in scores\[scores.domain == 'sim'\]"),

@@ -197,10 +197,7 @@ BAD = {
         lambda folder: write_log(small_log(episodes=1, seconds=15.0), folder),
         "at least 20 s",
     ),
-    "commands that are zero": (
-        changed(lambda log: with_commands(log, lambda duties: 0.0 * duties)),
-        "every command is zero",
-    ),
+    "zero commands": (changed(lambda log: with_commands(log, lambda duties: 0.0 * duties)), "every command is zero"),
     "a stationary robot": (changed(still), "stands still"),
     "no folder": (lambda folder: None, "no such folder"),
 }

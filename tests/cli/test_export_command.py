@@ -113,9 +113,7 @@ def test_a_studys_trials_are_what_scikit_optimize_loads(finished, tmp_path, caps
 
 @pytest.mark.slow
 @pytest.mark.parametrize("form", ["optuna", "skopt"])
-def test_the_same_export_again_is_no_error_and_another_file_there_is_left_alone(
-    finished, tmp_path, answered, refused, form
-):
+def test_the_same_export_again_is_no_error_and_another_file_is_left_alone(finished, tmp_path, answered, refused, form):
     """A killed export may have been through."""
     if form == "optuna":
         pytest.importorskip("optuna")

@@ -127,9 +127,7 @@ def test_a_time_once_spent_stays_spent_and_a_longer_one_goes_on(make_study, caps
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("family", "episodes"), [("right", 130), ("wrong", 40)])
-def test_stopped_at_any_moment_it_goes_on_to_the_same_document(
-    finished, journal, make_study, family, episodes, answered
-):
+def test_stopped_anywhere_it_goes_on_to_the_same_document(finished, journal, make_study, family, episodes, answered):
     folder = make_several(make_study, domain={"journal": f'"{journal}"'})
 
     def pressing_ctrl_c(study):

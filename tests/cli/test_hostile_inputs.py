@@ -90,9 +90,7 @@ SPARSE = {
 
 
 @pytest.mark.parametrize("name", SPARSE)
-def test_a_file_of_gigabytes_that_takes_no_place_on_a_disk_is_not_read(
-    make_study, tmp_path, monkeypatch, refused, name
-):
+def test_a_file_of_gigabytes_that_takes_no_place_on_disk_is_not_read(make_study, tmp_path, monkeypatch, refused, name):
     folder = make_study()
     write_tiny(tmp_path / "tiny")
     (folder / "good.toml").write_text(TWIN)

@@ -66,11 +66,8 @@ def test_standard_output_is_back_after_an_error(capfd):
 
 
 TROUBLES = {
-    "an exit of code that is not ours": (
-        SystemExit(0),
-        "code that is not proxytune's ended the command (SystemExit: 0)",
-    ),
-    "an interruption by code that is not ours": (
+    "an exit of other code": (SystemExit(0), "code that is not proxytune's ended the command (SystemExit: 0)"),
+    "an interruption by other code": (
         KeyboardInterrupt("mine"),
         "code that is not proxytune's ended the command (KeyboardInterrupt: mine)",
     ),

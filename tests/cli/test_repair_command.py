@@ -46,9 +46,7 @@ def driven_again(finished, finished_once, answered):
 @pytest.mark.parametrize(
     "damage", [damage if damage == "an episode" else pytest.param(damage, marks=pytest.mark.slow) for damage in DAMAGES]
 )
-def test_what_is_whole_is_kept_and_the_rest_is_made_again_to_the_last_bit(
-    finished, driven_again, refused, answered, damage
-):
+def test_what_is_whole_is_kept_and_the_rest_is_made_again_to_the_bit(finished, driven_again, refused, answered, damage):
     statement, kept, again = DAMAGES[damage]
     damaged(finished, statement)
     before = (finished / "study.db").read_bytes()

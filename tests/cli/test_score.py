@@ -198,10 +198,7 @@ def test_figures_are_drawn_where_asked(tables):
         ((*SIDES, "--metric", "distance"), "write NAME:max"),
         ((*SIDES, *METRIC, "--resamples", "3"), "--resamples"),
         ((*SIDES, *METRIC, "--beta", "distance"), "write NAME:WEIGHT"),
-        (
-            (*SIDES, *METRIC, "--beta", "distance:1"),
-            "no weight is given for time",
-        ),
+        ((*SIDES, *METRIC, "--beta", "distance:1"), "no weight is given for time"),
     ],
 )
 def test_bad_input_gives_one_line_that_says_what_to_change(tables, words, complaint):

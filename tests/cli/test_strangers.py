@@ -244,12 +244,7 @@ def write_log(folder):
 
 @pytest.mark.parametrize(
     ("command", "where"),
-    [
-        (name, where)
-        for name, words in LOOKING.items()
-        for where in NAMING
-        if where == "robot" or words[1] == "{folder}"
-    ],
+    [(one, where) for one, words in LOOKING.items() for where in NAMING if where == "robot" or words[1] == "{folder}"],
 )
 def test_a_command_that_only_looks_runs_nothing_of_a_folder(naming, command, where, monkeypatch, capsys):
     folder = naming(where)

@@ -50,9 +50,7 @@ def test_a_target_model_adds_pod_and_keeps_its_own_files(make_study, tmp_path, a
 def test_trials_and_sweeps_share_episodes(finished, answered):
     theta = answered("study", finished)["trials"][0]["theta"]
     at = ",".join(f"{name}={value!r}" for name, value in theta.items())
-    assert answered("sweep", finished, "--parameter", "trim", "--points", "2", "--at", at)["episodes"] == {
-        "run": 2 * 18
-    }
+    assert answered("sweep", finished, "--parameter", "trim", "--points", "2", "--at", at)["episodes"]["run"] == 2 * 18
 
 
 @pytest.mark.slow
@@ -71,10 +69,8 @@ def test_nominal_holds_the_robots_own_values_also_when_the_study_is_finished(fin
 
 
 def test_a_study_that_has_not_run_is_swept_at_nominal_values(make_study, answered):
-    assert answered("sweep", make_study(), "--parameter", "trim", "--points", "2")["at"] == {
-        "chosen": "nominal",
-        "theta": {},
-    }
+    at = answered("sweep", make_study(), "--parameter", "trim", "--points", "2")["at"]
+    assert at == {"chosen": "nominal", "theta": {}}
 
 
 @pytest.mark.slow
@@ -95,26 +91,15 @@ def test_a_base_is_read_from_pairs_or_from_a_model(tmp_path):
 
 @pytest.mark.parametrize(
     ("text", "expected"),
-    [
-        ("trim", "write NAME=VALUE"),
-        ("trim=much", "write NAME=VALUE"),
-        ("trim=0.1,trim=0.2", "twice"),
-        ("no.toml", "no such"),
-    ],
+    [("trim", "write NAME="), ("trim=much", "write NAME="), ("trim=0.1,trim=0.2", "twice"), ("no.toml", "no such")],
 )
 def test_a_base_that_is_neither_is_refused(text, expected):
     assert expected in complaint_of(read_theta, text)
 
 
 BAD = {
-    "an unknown parameter": (
-        ["--parameter", "trimm"],
-        "no parameter 'trimm' in this study's domain family; did you mean",
-    ),
-    "a value beyond its bounds": (
-        ["--parameter", "trim", "--at", "delay=7"],
-        "'delay': must lie within [0, 0.3], got 7",
-    ),
+    "an unknown parameter": (["--parameter", "trimm"], "no parameter 'trimm' in this study's domain family"),
+    "a value out of bounds": (["--parameter", "trim", "--at", "delay=7"], "'delay': must lie within [0, 0.3], got 7"),
     "a family that cannot replay": (
         ["--parameter", "trim", "--target-model", __file__],
         "wobbly:wobbly has no `drive` and `replay`",

@@ -66,11 +66,7 @@ WRONG = {
         "return slowed, None",
         "makes a signal",
     ),
-    "no memory": (
-        "signal[..., 1:]), axis=-1), None",
-        "signal[..., 1:]), axis=-1)",
-        "answers with ndarray; apply must give",
-    ),
+    "no memory": ("signal[..., 1:]), axis=-1), None", "signal[..., 1:]), axis=-1)", "answers with ndarray; apply must"),
     "a bug": ("self.loss)", "self.lost)", "raised AttributeError: .*lost.*; correct its begin and apply"),
     "not neutral": ("(1.0 - self.loss)", "(0.9 - self.loss)", r"changes the signal at its neutral value \[0.0\]"),
     "chance": (
@@ -88,11 +84,7 @@ WRONG = {
     "no figure": ("shown=Means(", "shown=(", "is to be shown by .*; give its trace a WheelCurve, or Means with panels"),
     "a panel of no motion": ('"forward"),))', '"speed"),))', "has a panel of the motion 'speed'; take one of forward,"),
     "a panel of no signal": ('(Panel("forward"', '(Panel("speed"', "a panel of the signal 'speed'; leave it empty,"),
-    "no panel": (
-        '(Panel("forward", "forward speed [m/s]", "forward"),)',
-        "()",
-        "Means take a Cue and at least one Panel",
-    ),
+    "no panel": ('(Panel("forward", "forward speed [m/s]", "forward"),)', "()", "take a Cue and at least one Panel"),
     "a form of another": (
         "cues=(Cue.DIRECTION,),",
         'cues=(Cue.DIRECTION,), forms=(Form((("lost",),)),),',

@@ -95,11 +95,7 @@ def test_without_names_the_shipped_agents_that_no_tuning_sees_are_held_out(tmp_p
 
 def test_shipped_agents_are_held_out_of_a_study_that_names_its_agents_otherwise(tmp_path):
     table = '[agents]\nslow = "steady"\nfast = "brisk"\nwild = "daredevil"\n\n[parameters]'
-    changes = (
-        NOBODY_HELD_OUT,
-        ('agents = ["steady", "brisk", "daredevil"]\n', ""),
-        ("[parameters]", table),
-    )
+    changes = (NOBODY_HELD_OUT, ('agents = ["steady", "brisk", "daredevil"]\n', ""), ("[parameters]", table))
     held_out = open_loop(write_tiny(tmp_path / "tiny", *changes)).held_out
     assert {"crawler", "edges", "wary"} <= set(held_out)
     assert not {"steady", "brisk", "daredevil", "slow", "fast", "wild"} & set(held_out)

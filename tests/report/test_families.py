@@ -70,10 +70,7 @@ def test_without_fresh_episodes_nothing_is_claimed():
             {"bullet": lesson(300.0), "planar": lesson(290.0, (10.0, -50.0, 30.0))},
             "target samples saved; cannot be told from it: planar, 10 (−50 to 30) more samples.",
         ),
-        (
-            {"bullet": lesson(5.0), "planar": Lesson({}, failure="no")},
-            "To teach: none is shown to save target samples; ",
-        ),
+        ({"bullet": lesson(5.0), "planar": Lesson({}, failure="no")}, "To teach: none is shown to save target samples"),
         ({"bullet": lesson(50.0), "planar": Lesson({}, failure="no")}, "worse: planar, which cannot teach."),
         ({"bullet": Lesson({}, 1.0), "planar": Lesson({}, 1.0)}, "is not known, learners have not converged; raise "),
         ({}, "To teach: PLV (proxy learning value) is not known, nothing was taught yet."),

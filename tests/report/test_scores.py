@@ -163,21 +163,16 @@ def test_the_map_colours_each_pair_once_and_counts_them(assessment):
 
 
 def test_pairs_of_more_agents_than_can_be_named_are_a_picture_over_ranks_of_the_same_width():
-    found = assess(
-        proxy=drawn_at_random(4, agents=300),
-        target=drawn_at_random(5, agents=300),
-        metrics=BOTH,
-        resamples=2,
-    )
+    big = assess(proxy=drawn_at_random(4, agents=300), target=drawn_at_random(5, agents=300), metrics=BOTH, resamples=2)
     few, many = (
         flipped_pairs_figure(one.prpv)
-        for one in (assess(proxy=drawn_at_random(4), target=drawn_at_random(5), metrics=BOTH), found)
+        for one in (assess(proxy=drawn_at_random(4), target=drawn_at_random(5), metrics=BOTH), big)
     )
     assert few.get_figwidth() == many.get_figwidth()
     assert few.get_figwidth() * 25.4 == pytest.approx(85.0)
     (picture,) = many.axes[0].images
     reversed_ = list(FLIP_COLOURS).index("reversed")
-    assert (picture.get_array() == reversed_).sum() == sum(pair.flip == "reversed" for pair in found.prpv.pairs) > 0
+    assert (picture.get_array() == reversed_).sum() == sum(pair.flip == "reversed" for pair in big.prpv.pairs) > 0
     many.draw_without_rendering()
     assert not any("A" in label.get_text() for label in many.axes[0].get_yticklabels())
 

@@ -163,10 +163,7 @@ def spoil_a_page(path):
 
 NONE = {
     "somebody else's": (photos, "is not a study's database; move it away"),
-    "a text": (
-        lambda path: path.write_text("trial,prpv\n" * 200),
-        "is damaged (file is not a database); restore a copy",
-    ),
+    "text": (lambda path: path.write_text("trial,prpv\n" * 200), "is damaged (file is not a database); restore a copy"),
     "one without tables": (lambda path: path.write_bytes(b"S"), "is damaged (it has no tables)"),
     "one with a spoilt page": (spoil_a_page, "is damaged"),
 }

@@ -136,11 +136,7 @@ BAD = {
         "no table of trials",
     ),
     "a seed below 0": ({}, lambda bank: _edit_table(bank, facts=lambda own: own | {"seed": -1}), "no table of trials"),
-    "other metrics": (
-        {},
-        lambda bank: _edit_table(bank, metrics=["a", "b"]),
-        "has no scores of distance, survival_time",
-    ),
+    "metrics": ({}, lambda bank: _edit_table(bank, metrics=["a", "b"]), "has no scores of distance, survival_time"),
     "θ cut short": (
         {},
         lambda bank: _edit_table(bank, trials=lambda own: [*own[1:], [{"trim": 0.1}, own[0][1]]]),

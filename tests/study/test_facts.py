@@ -127,9 +127,7 @@ def test_nothing_is_said_or_kept_of_the_search_once_all_trials_are_proposed(fini
     ("fact", "value"),
     [(SEARCH, 7), (SEARCH, {"a": 1}), (SEARCH, [7]), (SEARCH, [{"first_trial": "x"}]), ("versions", [1])],
 )
-def test_what_code_a_study_was_made_by_is_refused_in_one_line_where_it_is_not_as_we_write_it(
-    finished, make_study, fact, value
-):
+def test_facts_of_the_code_that_are_not_as_we_write_them_are_refused_in_one_line(finished, make_study, fact, value):
     make_study(budget="9")
     with Store.open(finished) as store:
         store.save_fact(fact, value)

@@ -8,7 +8,6 @@ from wobbly import Wobbly
 
 from proxytune.api.driving import drive
 from proxytune.api.study import run_study
-from proxytune.cli.main import main
 from proxytune.domain import make_episode
 from proxytune.errors import ExtensionError, InputError, SettingsError
 from proxytune.study import load_family, open_study, read_study_settings, study_facts
@@ -216,12 +215,9 @@ def test_an_unknown_agent_behind_an_alias_is_told_with_its_key(aliased):
         open_study(aliased(TABLE.replace('"agent5"', "5")))
 
 
-def test_measuring_and_driving_know_the_aliases(aliased, tmp_path, capsys):
+def test_measuring_and_driving_know_the_aliases(aliased, tmp_path, answered):
     folder = aliased()
     (tmp_path / "model.toml").write_text("trim = 0.1\n")
-    assert (
-        main(["measure", str(folder), "--model", str(tmp_path / "model.toml"), "--output", str(tmp_path / "t.csv")])
-        == 0
-    )
+    answered("measure", folder, "--model", tmp_path / "model.toml", "--output", tmp_path / "t.csv")
     assert (tmp_path / "t.csv").read_text().splitlines()[1].startswith("a0,0,")
     assert drive(folder, "a3").scores == drive(folder, "agent3").scores

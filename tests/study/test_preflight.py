@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from moody import Moody
-from searched import changed, searched
+from searched import changed, looked_at, searched
 from stopping import Stopping
 
 from proxytune.cli.main import main
@@ -19,7 +19,7 @@ from proxytune.errors import EpisodeError, RunError
 from proxytune.running import run_episode
 from proxytune.space import Interval
 from proxytune.storage import Store
-from proxytune.study import StudyRun, goal_of, most_preflight_episodes, open_study, result_of, run_preflight
+from proxytune.study import StudyRun, goal_of, most_preflight_episodes, open_study, run_preflight
 from proxytune.study.preflight import (
     LEVEL,
     LOOKS,
@@ -117,10 +117,8 @@ def twice(rows):
 @pytest.mark.slow
 @pytest.mark.parametrize("edit", [means_only, other_starts, with_holes])
 def test_any_other_table_works_and_says_what_it_loses(finished, edit):
-    with Store.read(finished) as store:
-        before = result_of(StudyRun(open_study(finished), store))
-        assert len(before.cautions) == 1  # this study has no pre-flight
-        found = result_of(StudyRun(open_study(edited(finished, edit)), store))
+    assert len(looked_at(open_study(finished)).cautions) == 1  # this study has no pre-flight
+    found = looked_at(open_study(edited(finished, edit)))
     assert not shares_starts(found.study)
     (caution,) = found.cautions
     assert caution.startswith("noise is ")

@@ -74,9 +74,7 @@ def test_a_study_killed_as_soon_as_it_begins_gives_the_trials_of_one_that_was_no
     assert (trials(folder), episodes(folder)) == whole
 
 
-def test_a_second_process_on_the_same_study_is_told_and_the_first_is_not_disturbed(
-    make_study, launcher, refused, answered
-):
+def test_a_second_process_on_the_same_study_is_told_and_the_first_goes_on(make_study, launcher, refused, answered):
     """A sweep too; looking at it is for everybody."""
     folder = make_study(domain={"sleep": "0.05"}, budget="60")
     first = Launched(launcher, folder)
@@ -90,9 +88,7 @@ def test_a_second_process_on_the_same_study_is_told_and_the_first_is_not_disturb
 
 
 @pytest.mark.parametrize(("engine", "jobs"), [("gp", "1"), ("outcomes", "2")])
-def test_pre_flight_batches_cut_trials_and_confirmation_survive_being_stopped(
-    make_study, launcher, engine, jobs, answered
-):
+def test_pre_flight_batches_cut_trials_and_confirmation_survive_a_stop(make_study, launcher, engine, jobs, answered):
     """With several jobs, episodes under way when a trial is cut off are kept; no trial stands on them."""
     phases = {"preflight": "true", "confirm": "1", "cut_off": "true", "initial": "4", "budget": "9"}
     keys = {"engine": f'"{engine}"', "batch": "3", "seed": "6", **phases}

@@ -118,9 +118,7 @@ def test_a_study_spends_its_budget_and_then_no_more(make_study):
 
 
 @pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.slow)])
-def test_an_interrupted_study_loses_no_finished_episode_and_goes_on_to_the_same_trials(
-    make_study, finished, tmp_path, jobs
-):
+def test_an_interrupted_study_loses_no_episode_and_goes_on_to_the_same_trials(make_study, finished, tmp_path, jobs):
     _, whole = run(finished)
     journal = tmp_path / "journal"
     folder = make_study("stopped", domain={"journal": f'"{journal}"'})

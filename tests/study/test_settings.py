@@ -189,10 +189,7 @@ BAD = {
     "a metric without direction": ({"metrics": '["distance"]'}, "metrics: metric 'distance': write NAME:max"),
     "a metric twice": ({"metrics": '["distance:max", "distance:min"]'}, "metrics: names a metric twice"),
     "an unknown rule": ({"on_failure": '"stopp"'}, "on_failure: unknown value 'stopp'; did you mean 'stop'?"),
-    "an unknown rule to stop": (
-        {"stop": "{ wall_time = 5 }"},
-        "stop.wall_time: unknown key; did you mean 'wall_time_s'",
-    ),
+    "unknown rule to stop": ({"stop": "{ wall_time = 5 }"}, "stop.wall_time: unknown key; did you mean 'wall_time_s'"),
     "no time at all": ({"stop": "{ wall_time_s = 0 }"}, "stop.wall_time_s: must be above 0, got 0; remove it"),
     "a negative gain": ({"stop": "{ no_improvement = -1 }"}, "stop.no_improvement: must be above 0, got -1"),
     "a word for a flag": ({"preflight": '"no"'}, "preflight: must be true or false, without quotes, got 'no'"),

@@ -68,12 +68,3 @@ def test_every_report_of_a_page_gives_page_figures_and_a_table(name):
     """What a command writes can be had from Python by the same names everywhere."""
     for method in ("page", "figures", "to_frame"):
         assert inspect.isfunction(getattr(getattr(proxytune, name), method))
-
-
-@pytest.mark.slow
-def test_a_report_is_written_as_the_page_that_it_gives(finished, tmp_path):
-    """page(path) writes what it returns, and that reaches for nothing elsewhere."""
-    text = proxytune.read_study(finished).page(tmp_path / "mine.html")
-    assert (tmp_path / "mine.html").read_text(encoding="utf-8") == text
-    assert "<title>" in text
-    assert "://" not in text.replace("http://www.w3.org", "")

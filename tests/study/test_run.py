@@ -117,22 +117,20 @@ def test_a_study_spends_its_budget_and_then_no_more(make_study):
     assert run(folder) == (0, trials)
 
 
-@pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.slow)])
-def test_an_interrupted_study_loses_no_episode_and_goes_on_to_the_same_trials(make_study, finished, tmp_path, jobs):
+def test_an_interrupted_study_loses_no_episode_and_goes_on_to_the_same_trials(make_study, finished, tmp_path):
     _, whole = run(finished)
     journal = tmp_path / "journal"
     folder = make_study("stopped", domain={"journal": f'"{journal}"'})
-    for episodes in (5, 40, 40) if jobs == 1 else (85,):  # Processes take a second to begin
+    for episodes in (5, 40, 40):
         with pytest.raises(KeyboardInterrupt):
-            searched(changed(folder, jobs=jobs), Stopping(episodes))
+            searched(open_study(folder), Stopping(episodes))
     with sqlite3.connect(folder / "study.db") as plain:
         assert plain.execute("SELECT count(*) FROM episodes").fetchone() == (85,)
-    episodes, trials = run(folder, jobs=jobs)
+    episodes, trials = run(folder)
     assert episodes == 7 * 18 - 85
     assert trials == whole
-    if jobs == 1:
-        lines = journal.read_text().splitlines()
-        assert len(lines) == len(set(lines)) == 7 * 18
+    lines = journal.read_text().splitlines()
+    assert len(lines) == len(set(lines)) == 7 * 18
 
 
 def test_failing_trials_are_counted_and_the_study_goes_on(make_study):

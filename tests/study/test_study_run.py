@@ -103,9 +103,8 @@ def test_a_budget_lowered_within_an_open_batch_and_raised_again_changes_nothing(
     assert run(folder)[1] == cutting[2]
 
 
-@pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.slow)])
-def test_interrupted_within_batches_it_goes_on_to_the_same_trials_and_runs_no_episode_twice(make_study, cutting, jobs):
-    folder = ordered_study(make_study, "stopped", **KEYS, jobs=str(jobs))
+def test_interrupted_within_batches_it_goes_on_to_the_same_trials_and_runs_no_episode_twice(make_study, cutting):
+    folder = ordered_study(make_study, "stopped", **KEYS)
     run_before = 0
     for moment, open_ones in ((30, 3), (50, 2), (60, 3), (8, 3)):
         with pytest.raises(KeyboardInterrupt):
@@ -115,7 +114,7 @@ def test_interrupted_within_batches_it_goes_on_to_the_same_trials_and_runs_no_ep
             assert sum(trial.state == "open" for trial in store.trials()) == open_ones
     spent, trials = run(folder)
     assert trials == cutting[2]
-    assert spent.episodes - spent.unused <= cutting[1].episodes - run_before + (jobs > 1) * 9
+    assert spent.episodes <= cutting[1].episodes - run_before
     assert len(stored_episodes(folder)) == spent.episodes + run_before
 
 

@@ -147,9 +147,7 @@ STUDY_OPENING_BAD = {
         lambda text: "\n".join(line for line in text.splitlines() if line.startswith(("agent,", "agent4"))),
         "target.csv: has no scores of agent0, agent1, agent2, agent3, agent5; add them, or take them out of the study",
     ),
-    "a value is NaN": (lambda text: text.replace("agent2,1,", "agent2,1,nan,#"), "line"),
     "a metric is missing": (lambda text: text.replace("survival_time", "survival"), "no column 'survival_time'"),
-    "it is empty": (lambda text: "", "target.csv: is empty"),
 }
 
 
@@ -253,13 +251,6 @@ def test_a_target_in_several_files_is_the_one_that_it_would_be_in_one(make_study
     folder = make_study(target='["monday.csv", "tuesday.csv"]')
     write(folder, monday=[HEAD, *rows[:7]], tuesday=[HEAD, *rows[7:]])
     assert study_facts(open_study(folder)) == study_facts(whole)
-
-
-def test_an_episode_in_two_files_is_refused_with_both(make_study, rows):
-    folder = make_study(target='["monday.csv", "tuesday.csv"]')
-    write(folder, monday=[HEAD, *rows], tuesday=[HEAD, rows[0]])
-    with pytest.raises(InputError, match=r"tuesday.csv: line 2: agent 'agent0' has episode '0' twice, once in .*mon"):
-        open_study(folder)
 
 
 def test_columns_have_the_target_s_own_names(make_study, rows):

@@ -167,8 +167,10 @@ def answered(capsys: pytest.CaptureFixture[str]) -> Answered:
 
     def answer(*words: object) -> Any:
         capsys.readouterr()
-        assert main([*map(str, words), "--json"]) == 0
-        return json.loads(capsys.readouterr().out)
+        status = main([*map(str, words), "--json"])
+        out, told = capsys.readouterr()
+        assert status == 0, told
+        return json.loads(out)
 
     return answer
 

@@ -1,6 +1,5 @@
 """docs/how-to/extending.md works as it stands: its files are written, its commands run, a folder for each section."""
 
-import json
 import re
 import shlex
 import sys
@@ -59,18 +58,15 @@ def changed(text, lines):
 
 
 @pytest.fixture
-def follow(tmp_path, monkeypatch, capsys):
+def follow(tmp_path, monkeypatch, answered):
     """Writes the files of the introduction and of a section, runs its commands, and gives what each printed."""
 
     def followed(section):
         for block in (*blocks(INTRODUCTION), *blocks(SECTIONS[section])):
             put(block, tmp_path)
         monkeypatch.chdir(tmp_path)
-        answers = {}
-        for line in re.findall(rf"^{COMMAND}(.*)$", SECTIONS[section], flags=re.MULTILINE):
-            assert main([*shlex.split(line), "--json"]) == 0, f"{line}: {capsys.readouterr().err}"
-            answers[line] = json.loads(capsys.readouterr().out)
-        return answers
+        commands = re.findall(rf"^{COMMAND}(.*)$", SECTIONS[section], flags=re.MULTILINE)
+        return {line: answered(*shlex.split(line)) for line in commands}
 
     return followed
 
@@ -157,7 +153,7 @@ def test_what_the_page_makes_keeps_the_promises_that_its_tests_check(everything)
         test()
 
 
-def test_the_entry_points_of_the_page_are_listed_as_plug_ins(everything, monkeypatch, capsys):
+def test_the_entry_points_of_the_page_are_listed_as_plug_ins(everything, answered):
     (block,) = blocks(SECTIONS[PLUGINS])
     points = tomllib.loads(block.text)["project"]["entry-points"][GROUP]
     info = everything / "mine-1.0.dist-info"
@@ -166,6 +162,5 @@ def test_the_entry_points_of_the_page_are_listed_as_plug_ins(everything, monkeyp
     lines = [f"{name} = {value}" for name, value in points.items() if not name.startswith("robot")]
     (info / "entry_points.txt").write_text(f"[{GROUP}]\n" + "\n".join(lines) + "\n")
     for kind, name in {"effect": "weak_reverse", "agent": "grey", "engine": "halton", "measure": "worst"}.items():
-        assert main(["list", f"{kind}s", "--json"]) == 0
-        rows = json.loads(capsys.readouterr().out)[f"{kind}s"]
+        rows = answered("list", f"{kind}s")[f"{kind}s"]
         assert name in [row.get(kind, row.get("key" if kind == "measure" else "name")) for row in rows]

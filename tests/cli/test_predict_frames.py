@@ -1,6 +1,5 @@
 """`predict --frames` draws what a model's camera would have seen, as a log's frames, and says how far off it is."""
 
-import json
 import shutil
 
 import numpy as np
@@ -24,15 +23,10 @@ def stills(tmp_path_factory):
 
 
 @pytest.fixture
-def predicted(stills, tmp_path, capsys):
+def predicted(stills, tmp_path, answered):
     """Predict with these effects, and read the document."""
-
-    def run(theta):
-        path = model(tmp_path, theta)
-        assert main(["predict", str(path), str(stills), "--frames", "--output", str(tmp_path / "out"), "--json"]) == 0
-        return json.loads(capsys.readouterr().out)
-
-    return run
+    words = (stills, "--frames", "--output", tmp_path / "out")
+    return lambda theta: answered("predict", model(tmp_path, theta), *words)
 
 
 def model(folder, theta):

@@ -64,6 +64,17 @@ def model(tmp_path):
     return path
 
 
+@pytest.fixture
+def patched(model, tmp_path):
+    """Writes a model of one's own, and patches it with what was found."""
+
+    def patch(name, text, **more):
+        (tmp_path / name).write_text(text)
+        return export(model, tmp_path / "out" / name, into=tmp_path / name, **more)
+
+    return patch
+
+
 def extended(**more):
     """Poses of the model that was found, at each tick."""
     found = instance(**{name.replace(".", "__"): value for name, value in FOUND.items()})
@@ -117,11 +128,10 @@ def on_a_floor(mujoco, urdf):
 
 
 @pytest.mark.parametrize(("name", "text"), [("mine.xml", MJCF), ("mine.urdf", BODY)])
-def test_a_users_own_model_patched_and_filtered_drives_in_mujoco_as_the_twin_does(model, tmp_path, name, text):
+def test_a_users_own_model_patched_and_filtered_drives_in_mujoco_as_the_twin_does(model, patched, name, text):
     """The error against the twin is at most 1.5 % of the way, and a twentieth of that of the file as it was."""
     mujoco = pytest.importorskip("mujoco")
-    (tmp_path / name).write_text(text)
-    report = export(model, tmp_path / f"found_{name}", into=tmp_path / name)
+    report = patched(name, text)
     bent = CommandFilter(model, rate_hz=HZ, has=report.facts["has"])
     twin = extended()
     way = np.linalg.norm(np.diff(twin[:, :2], axis=0), axis=1).sum()
@@ -139,9 +149,8 @@ def test_a_users_own_model_patched_and_filtered_drives_in_mujoco_as_the_twin_doe
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_only_wheels_and_camera_of_a_file_change_and_the_diff_shows_them(model, tmp_path, name):
-    (tmp_path / name).write_text(FILES[name])
-    report = export(model, tmp_path / "out" / name, into=tmp_path / name)
+def test_only_wheels_and_camera_of_a_file_change_and_the_diff_shows_them(patched, tmp_path, name):
+    report = patched(name, FILES[name])
     before, after = (text.splitlines() for text in (FILES[name], report.output.read_text()))
     changed = [new for old, new in zip(before, after, strict=True) if old != new]
     assert 3 <= len(changed) <= 6
@@ -153,10 +162,8 @@ def test_only_wheels_and_camera_of_a_file_change_and_the_diff_shows_them(model, 
     assert (tmp_path / name).read_text() == FILES[name]
 
 
-def test_a_patched_urdf_has_wheels_and_camera_where_they_were_found(model, tmp_path):
-    (tmp_path / "mine.urdf").write_text(URDF)
-    export(model, tmp_path / "found.urdf", into=tmp_path / "mine.urdf")
-    root = parse_urdf(tmp_path / "found.urdf")
+def test_a_patched_urdf_has_wheels_and_camera_where_they_were_found(patched):
+    root = parse_urdf(patched("mine.urdf", URDF).output)
     left, right, camera = (link_pose(root, name) for name in ("wheel_l", "wheel_r", "camera_link"))
     assert left[1, 3] - right[1, 3] == pytest.approx(0.16 * 0.2 / 0.16)
     radii = [float(one.get("radius")) for one in root.iter("cylinder")]
@@ -167,10 +174,8 @@ def test_a_patched_urdf_has_wheels_and_camera_where_they_were_found(model, tmp_p
     assert root.find("gazebo/plugin/wheel_separation").text == "0.16"
 
 
-def test_a_patched_sdf_has_wheels_and_camera_where_they_were_found(model, tmp_path):
-    (tmp_path / "mine.sdf").write_text(SDF)
-    export(model, tmp_path / "found.sdf", into=tmp_path / "mine.sdf")
-    root = ET.fromstring((tmp_path / "found.sdf").read_text())
+def test_a_patched_sdf_has_wheels_and_camera_where_they_were_found(patched):
+    root = ET.fromstring(patched("mine.sdf", SDF).output.read_text())
     places = [[float(v) for v in root.find(f".//link[@name='{name}']/pose").text.split()] for name in ("lw", "rw")]
     assert places[0][1] - places[1][1] == pytest.approx(0.2)
     radii = [float(one.text) for one in root.iter("radius")]
@@ -197,28 +202,22 @@ def test_a_patched_sdf_has_wheels_and_camera_where_they_were_found(model, tmp_pa
     ],
 )
 def test_a_file_that_cannot_be_patched_is_refused_in_one_line_and_nothing_is_written(
-    model, tmp_path, name, before, after, said
+    patched, tmp_path, name, before, after, said
 ):
-    (tmp_path / name).write_text(FILES.get(name, URDF).replace(before, after))
-    assert said in complaint_of(export, model, tmp_path / "out.xml", into=tmp_path / name)
-    assert not (tmp_path / "out.xml").exists()
+    assert said in complaint_of(patched, name, FILES.get(name, URDF).replace(before, after))
+    assert not (tmp_path / "out").exists()
 
 
-def test_wheels_may_be_named(model, tmp_path):
-    (tmp_path / "mine.urdf").write_text(URDF.replace("left_wheel_joint", "port"))
-    export(model, tmp_path / "a.urdf", into=tmp_path / "mine.urdf", wheels=("port", "right_wheel_joint"))
+def test_wheels_may_be_named(patched):
+    patched("mine.urdf", URDF.replace("left_wheel_joint", "port"), wheels=("port", "right_wheel_joint"))
 
 
-def test_wheels_called_l_and_r_are_found(model, tmp_path):
-    (tmp_path / "mine.urdf").write_text(URDF)
-    (tmp_path / "short.urdf").write_text(
-        URDF.replace("left_wheel_joint", "wheel_l").replace("right_wheel_joint", "wheel_r")
-    )
-    for name in ("mine", "short"):
-        export(model, tmp_path / f"{name}_found.urdf", into=tmp_path / f"{name}.urdf")
-    renamed = (tmp_path / "mine_found.urdf").read_text()
-    renamed = renamed.replace("left_wheel_joint", "wheel_l").replace("right_wheel_joint", "wheel_r")
-    assert (tmp_path / "short_found.urdf").read_text() == renamed
+def test_wheels_called_l_and_r_are_found(patched):
+    def renamed(text):
+        return text.replace("left_wheel_joint", "wheel_l").replace("right_wheel_joint", "wheel_r")
+
+    short, mine = (patched("mine.urdf", text).output.read_text() for text in (renamed(URDF), URDF))
+    assert short == renamed(mine)
 
 
 def test_what_a_diagnosis_wrote_is_named_where_its_folder_is_given(model, tmp_path):

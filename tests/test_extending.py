@@ -13,10 +13,9 @@ from planted import look_for_few
 
 from proxytune.cli.main import main
 from proxytune.driving import lane_following
-from proxytune.effects import Catalogue, read_model
 from proxytune.extensions import load
 from proxytune.extensions.door import GROUP
-from proxytune.settings import read_settings
+from proxytune.settings import Section, read_settings
 from proxytune.study import open_study
 
 PAGE = (Path(__file__).resolve().parent.parent / "docs" / "how-to" / "extending.md").read_text(encoding="utf-8")
@@ -81,12 +80,21 @@ def test_the_study_of_the_introduction_reads(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_the_effect_is_found_by_diagnose_and_written_to_its_model(follow, tmp_path, monkeypatch):
+def test_the_effect_is_found_by_diagnose_and_predict_and_a_study_read_what_it_wrote(
+    follow, tmp_path, monkeypatch, answered
+):
     look_for_few(monkeypatch)
     found = follow("An effect")["diagnose log --effects weak_reverse:WeakReverse --output found"]
-    assert [effect["name"] for effect in found["effects"]] == ["weak_reverse:WeakReverse"]
-    model = read_model(tmp_path / "found" / "model.toml", Catalogue(tmp_path))
-    assert model.theta["weak_reverse:WeakReverse"] == pytest.approx(0.3, abs=0.02)
+    (effect,) = found["effects"]
+    value, (low, high) = effect["parameters"]["loss"]["value"], effect["parameters"]["loss"]["interval"]
+    assert effect["name"] == "weak_reverse:WeakReverse"
+    assert value == pytest.approx(0.3, abs=0.02)
+    assert low < value < high
+    assert any(name.endswith("effect_curve.png") for name in found["files"])
+    answered("predict", "found/model.toml", "log", "--output", "poses.csv")
+    domain = Section(tmp_path / "study.toml", "domain.", {"plant": "planar"})
+    family = lane_following(domain, model=tmp_path / "found" / "model.toml")
+    assert dict(family.effects)["weak_reverse:WeakReverse"] == pytest.approx(value)
 
 
 @pytest.mark.slow

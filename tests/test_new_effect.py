@@ -39,7 +39,7 @@ def folder(tmp_path_factory):
 
 @pytest.mark.slow
 def test_an_effect_that_is_added_in_one_place_is_listed_and_looked_for(folder):
-    """tests/test_outside_effect.py has one found, fitted and drawn."""
+    """tests/test_extending.py has one found, fitted and drawn."""
     rows = json.loads(run(folder, "-m", "proxytune", "list", "effects", "--json").stdout)["effects"]
     (row,) = [row for row in rows if row["effect"] == "weak_reverse"]
     assert (row["parameter"], row["stage"], row["source"]) == ("weak_reverse", "motion", "made up")

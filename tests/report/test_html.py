@@ -19,9 +19,9 @@ VOID = {"meta", "link", "img", "br"}
 EVIL = "<script>alert('\"&')</script>"
 
 
-def png(width=20, **more):
+def png(width=20, form="png", **more):
     image = BytesIO()
-    Image.new("RGB", (width, 10)).save(image, format="png", **more)
+    Image.new("P", (width, 10)).save(image, format=form, **more)
     return image.getvalue()
 
 
@@ -194,13 +194,9 @@ def test_pictures_are_drawn_at_160_pixels_to_the_inch(dpi, width):
     assert attrs["width"] == str(width)
 
 
-@pytest.mark.parametrize(("image", "kind"), [(b"GIF89a", "gif"), (png(), "png")])
-def test_pictures_are_data_of_their_own_kind(image, kind):
-    if kind == "gif":
-        file = BytesIO()
-        Image.new("P", (4, 4)).save(file, format="gif")
-        image = file.getvalue()
-    assert f'src="data:image/{kind};base64,' in html_of(replace(VIEW, parts=(Picture("P", image, "C"),)))
+@pytest.mark.parametrize("kind", ["gif", "png"])
+def test_pictures_are_data_of_their_own_kind(kind):
+    assert f'src="data:image/{kind};base64,' in html_of(replace(VIEW, parts=(Picture("P", png(form=kind), "C"),)))
 
 
 def test_what_is_no_picture_is_refused():

@@ -1,6 +1,8 @@
 """A study's trials, run in this process, and what came of them."""
 
+from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 
 from proxytune.running import Silent
 from proxytune.search import make_proposer
@@ -27,3 +29,11 @@ def looked_at(study):
     """What came of a study, looked at without a simulation."""
     with Store.read(study.settings.folder) as store:
         return result_of(StudyRun(study, store))
+
+
+@contextmanager
+def running(study):
+    """The run of a study, or of the study in a folder."""
+    study = open_study(study) if isinstance(study, Path) else study
+    with Store.open(study.settings.folder) as store:
+        yield StudyRun(study, store)

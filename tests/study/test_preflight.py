@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from moody import Moody
-from searched import changed, looked_at, searched
+from searched import changed, looked_at, running, searched
 from stopping import Stopping
 
 from proxytune.cli.main import main
@@ -57,13 +57,6 @@ def test_anything_else_goes_on(outcomes):
     check_some_work(outcomes, "the pre-flight")
 
 
-def opened(folder, store):
-    study = open_study(folder)
-    study_run = StudyRun(study, store)
-    run_preflight(study_run)
-    return study
-
-
 def edited(folder, edit):
     target = folder / "target.csv"
     head, *rows = target.read_text().splitlines()
@@ -86,10 +79,9 @@ def with_holes(rows):
 
 
 def test_with_shared_starts_noise_is_what_another_placement_changes(make_study):
-    folder = make_study(preflight="true")
-    with Store.open(folder) as store:
-        study = opened(folder, store)
-        found, pairs = noise_of(StudyRun(study, store)), placement_pairs(StudyRun(study, store))
+    with running(make_study(preflight="true")) as study_run:
+        run_preflight(study_run)
+        found, pairs = noise_of(study_run), placement_pairs(study_run)
     assert found.caution == ""
     assert pairs.shape[1:] == (2, 6, 2)
     # Wobbly's scores wobble by 0.15, so a difference of two means over three starts has a variance of 2 · 0.15² / 3.
@@ -99,12 +91,13 @@ def test_with_shared_starts_noise_is_what_another_placement_changes(make_study):
 
 def test_repeats_of_a_start_on_the_target_make_its_noise_less(make_study):
     folder = make_study(preflight="true")
-    with Store.open(folder) as store:
-        once = noise_of(StudyRun(opened(folder, store), store))
+    with running(folder) as study_run:
+        run_preflight(study_run)
+        once = noise_of(study_run)
         edited(folder, twice)
         study = open_study(folder)
         assert shares_starts(study)
-        again = noise_of(StudyRun(study, store))
+        again = noise_of(StudyRun(study, study_run.store))
     assert again.variance == pytest.approx(0.75 * once.variance)
 
 
@@ -129,29 +122,26 @@ def test_any_other_table_works_and_says_what_it_loses(finished, edit):
 
 
 def test_the_spread_between_starts_is_taken_for_noise_only_where_nothing_better_is_known(make_study):
-    folder = make_study(preflight="true")
-    with Store.open(folder) as store:
-        known = noise_of(StudyRun(opened(folder, store), store))
-        unknown = noise_of(StudyRun(open_study(make_study(preflight="false")), store))
+    with running(make_study(preflight="true")) as study_run:
+        run_preflight(study_run)
+        known = noise_of(study_run)
+        unknown = noise_of(StudyRun(open_study(make_study(preflight="false")), study_run.store))
     assert known.caution == ""
     assert unknown.caution.startswith("noise is estimated from the spread between the target's episodes")
 
 
 def test_failed_episodes_of_the_pre_flight_are_left_out(make_study):
-    folder = make_study(domain={"faults": '["agent3:1:raises"]'}, preflight="true")
-    with Store.open(folder) as store:
-        study = opened(folder, store)
-        found = noise_of(StudyRun(study, store))
-        assert np.array_equal(goal_of(StudyRun(study, store)).noise, found.variance.ravel())
+    with running(make_study(domain={"faults": '["agent3:1:raises"]'}, preflight="true")) as study_run:
+        run_preflight(study_run)
+        found = noise_of(study_run)
+        assert np.array_equal(goal_of(study_run).noise, found.variance.ravel())
     assert np.isfinite(found.variance).all()
 
 
 def run(folder, **changes):
-    study = changed(folder, **changes)
-    with Store.open(folder) as store:
-        study_run = StudyRun(study, store)
+    with running(changed(folder, **changes)) as study_run:
         run_preflight(study_run)
-        return study_run.spent, preflight_of(StudyRun(study, store))
+        return study_run.spent, preflight_of(StudyRun(study_run.study, study_run.store))
 
 
 def told(folder, **changes):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from partly_dead import ordered_study
 from processes import episodes as stored_episodes
-from searched import changed, searched
+from searched import changed, running, searched
 from stopping import Stopping
 from taught import make_taught
 from telling import Telling
@@ -173,12 +173,9 @@ THETA = {"trim": 0.05, "delay": 0.1}
 
 
 def simulated(folder, theta=THETA):
-    study = open_study(folder)
-    with Store.open(folder) as store:
-        study_run = StudyRun(study, store)
-        study_run.evaluate(theta, "")
-        spent = study_run.spent
-        return spent, StudyRun(study, store).evaluation(theta)
+    with running(folder) as run:
+        run.evaluate(theta, "")
+        return run.spent, StudyRun(run.study, run.store).evaluation(theta)
 
 
 def test_every_agent_drives_from_every_start_under_common_random_numbers(make_study):
@@ -249,10 +246,8 @@ def test_scoring_does_not_depend_on_the_order_of_the_outcomes(make_study):
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_after_enough_no_further_episode_begins_and_those_under_way_are_kept(make_study, jobs):
-    study = open_study(make_study(jobs=str(jobs)))
-    planned = plan_episodes(study.settings, THETA, 1)
-    with Store.open(study.settings.folder) as store:
-        study_run = StudyRun(study, store)
+    with running(make_study(jobs=str(jobs))) as study_run:
+        planned = plan_episodes(study_run.settings, THETA, 1)
         known = study_run.outcomes(planned, "", lambda _, known: len(known) >= 5)
         assert known == study_run.known(planned)
         assert study_run.spent.episodes == len(known)
@@ -265,12 +260,11 @@ def test_after_enough_no_further_episode_begins_and_those_under_way_are_kept(mak
 
 def test_where_it_may_be_enough_agents_are_driven_in_their_order(make_study, tmp_path):
     journal = tmp_path / "journal"
-    study = open_study(make_study(domain={"journal": f'"{journal}"'}))
-    planned = plan_episodes(study.settings, THETA, 1)[::-1]
-    with Store.open(study.settings.folder) as store:
-        StudyRun(study, store).evaluate({"trim": 0.0, "delay": 0.0}, "")  # tells which episodes take longest
+    with running(make_study(domain={"journal": f'"{journal}"'})) as study_run:
+        planned = plan_episodes(study_run.settings, THETA, 1)[::-1]
+        study_run.evaluate({"trim": 0.0, "delay": 0.0}, "")  # tells which episodes take longest
         journal.unlink()
-        StudyRun(study, store).outcomes(planned, "", lambda _, known: False)
+        study_run.outcomes(planned, "", lambda _, known: False)
     driven = [line.split()[0] for line in journal.read_text().splitlines()]
     assert driven == [episode.agent for episode in planned]
 
@@ -284,8 +278,7 @@ def test_where_one_instance_has_enough_the_others_go_on_and_agents_begin_in_all_
     def enough(instance, known):
         return instance == short and sum(episode.theta == short for episode in known) >= 7
 
-    with Store.open(study.settings.folder) as store:
-        study_run = StudyRun(study, store)
+    with running(study) as study_run:
         known = study_run.outcomes(planned, "", enough)
     assert study_run.spent.episodes == 18 + 7 + 18
     assert [sum(episode in known for episode in one) for one in plans] == [18, 7, 18]
@@ -295,13 +288,13 @@ def test_where_one_instance_has_enough_the_others_go_on_and_agents_begin_in_all_
 
 def test_where_failures_stop_the_study_an_old_failure_is_not_enough(make_study):
     folder = make_study(domain={"faults": '["agent3:1:raises"]'})
-    study = open_study(folder)
-    planned = plan_episodes(study.settings, THETA, 1)
-    with Store.open(folder) as store:
-        StudyRun(study, store).outcomes(planned, "")
-        stopping = replace(study, settings=replace(study.settings, stop_on_failure=True))
+    with running(folder) as study_run:
+        planned = plan_episodes(study_run.settings, THETA, 1)
+        study_run.outcomes(planned, "")
         with pytest.raises(EpisodeError, match="agent 'agent3'"):
-            StudyRun(stopping, store).outcomes(planned, "", lambda _, known: len(known) == len(planned))
+            StudyRun(changed(folder, stop_on_failure=True), study_run.store).outcomes(
+                planned, "", lambda _, known: len(known) == len(planned)
+            )
 
 
 @pytest.fixture
@@ -372,25 +365,18 @@ def test_an_outcome_has_the_study_s_metrics_in_their_order_and_the_target_s_agen
 
 
 def test_a_trial_whose_agent_has_no_episode_lacks_that_agent_s_outputs_alone(make_study):
-    folder = make_study(domain={"faults": '["agent3:*:raises"]'}, budget="6")
-    study = open_study(folder)
-    with Store.open(folder) as store:
-        theta = {"delay": 0.1, "trim": 0.1}
-        StudyRun(study, store).evaluate(theta, "")
-        told = StudyRun(study, store).search_trial(TrialRecord(1, theta, "failed"))
+    with running(make_study(domain={"faults": '["agent3:*:raises"]'})) as study_run:
+        study_run.evaluate(THETA, "")
+        told = study_run.search_trial(TrialRecord(1, THETA, "failed"))
     known = ~np.isnan(told.outcome).reshape(6, 2)
     assert told.score is None
     assert known.all(axis=1).tolist() == [True, True, True, False, True, True]
 
 
 def test_a_trial_without_any_episode_that_worked_has_no_outcome(make_study):
-    folder = make_study(domain={"faults": str([f"agent{n}:*:raises" for n in range(6)])})
-    study = open_study(folder)
-    with Store.open(folder) as store:
-        StudyRun(study, store).evaluate({"delay": 0.1, "trim": 0.1}, "")
-        assert (
-            StudyRun(study, store).search_trial(TrialRecord(1, {"delay": 0.1, "trim": 0.1}, "failed")).outcome is None
-        )
+    with running(make_study(domain={"faults": str([f"agent{n}:*:raises" for n in range(6)])})) as study_run:
+        study_run.evaluate(THETA, "")
+        assert study_run.search_trial(TrialRecord(1, THETA, "failed")).outcome is None
 
 
 def test_the_search_is_told_every_metric_that_both_sides_have_and_prpv_counts_the_study_s_own(finished):

@@ -46,9 +46,7 @@ FOUND_OF_CARS = {
         ),
     ],
 )
-def test_mujoco_drives_the_exported_model_as_the_planar_plant_drives_the_instance(
-    robot, theta, commands, share, turned
-):
+def test_mujoco_drives_the_exported_model_as_the_planar_plant_the_instance(robot, theta, commands, share, turned):
     mujoco = pytest.importorskip("mujoco")
     found = instance(robot, **theta)
     train = drivetrain(robot, effects_from(found.theta, robot.figures, robot.catalogue))

@@ -44,7 +44,6 @@ SLIP = AdoptedEffect("lateral_slip", "", ("lateral_slip",), (("lateral_slip",),)
 BAND = AdoptedEffect("dead_band", "left wheel", ("dead_band.width",), (("dead_band.width",),), 900.0, 0.002, ())
 LITTLE = {2.0: Ratio(0.999, (0.98, 1.02)), 5.0: Ratio(1.01, (0.942, 1.083))}
 SURE = {2.0: Ratio(1.001, (0.98, 1.02)), 5.0: Ratio(1.01, (0.99, 1.03))}
-TIMES = np.arange(20) / 20.0
 MUCH = {2.0: Ratio(1.34, (1.2, 1.5))}
 
 

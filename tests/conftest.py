@@ -104,6 +104,7 @@ PARAMETERS = {"trim": "[-0.3, 0.3]", "delay": "[0.0, 0.3]"}
 TRUTH = {"trim": 0.1, "delay": 0.12}
 
 Answered = Callable[..., Any]
+Refused = Callable[..., str]
 MakeStudy = Callable[..., Path]
 """Writes a study's folder; call it again to edit the study.toml."""
 
@@ -166,10 +167,30 @@ def answered(capsys: pytest.CaptureFixture[str]) -> Answered:
 
     def answer(*words: object) -> Any:
         capsys.readouterr()
-        assert main([*map(str, words), "--json"]) == 0
-        return json.loads(capsys.readouterr().out)
+        status = main([*map(str, words), "--json"])
+        out, told = capsys.readouterr()
+        assert status == 0, told
+        return json.loads(out)
 
     return answer
+
+
+@pytest.fixture
+def refused(capsys: pytest.CaptureFixture[str]) -> Refused:
+    """Run a command in this process, which ends with this status, and give its one line on standard error."""
+    from processes import besides_progress
+
+    from proxytune.cli.main import main
+
+    def refuse(*words: object, status: int = 2) -> str:
+        capsys.readouterr()
+        assert main([*map(str, words)]) == status
+        out, told = capsys.readouterr()
+        told = besides_progress(told)
+        assert (out, told.count("\n")) == ("", 1)
+        return told
+
+    return refuse
 
 
 @pytest.fixture(scope="session")
@@ -184,24 +205,19 @@ def launcher() -> Iterator[object]:
 @pytest.fixture(scope="session")
 def finished_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A finished study, run once."""
-    from proxytune.search import make_proposer
-    from proxytune.storage import Store
-    from proxytune.study import StudyRun, open_study, run_trials
+    from searched import changed, searched
 
     folder = study_maker(tmp_path_factory.mktemp("finished"))()
-    with Store.open(folder) as store:
-        run_trials(StudyRun(open_study(folder), store), make_proposer("gp", 5))
+    searched(changed(folder))
     return folder
 
 
 @pytest.fixture(scope="session")
 def result(finished_once: Path) -> object:
     """What came of the finished study."""
-    from proxytune.storage import Store
-    from proxytune.study import StudyRun, open_study, result_of
+    from searched import changed, looked_at
 
-    with Store.read(finished_once) as store:
-        return result_of(StudyRun(open_study(finished_once), store))
+    return looked_at(changed(finished_once))
 
 
 @pytest.fixture
@@ -210,8 +226,8 @@ def finished(finished_once: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(finished_once, tmp_path / "study"))
 
 
-def write_target(path: Path) -> None:
-    """The scores of every agent at the truth, under other seeds than a study's."""
+def write_target(path: Path, theta: dict[str, float] = TRUTH, seed: int = 900, shift: float = 0.0) -> Path:
+    """The scores of every agent at the truth, under other seeds than a study's, off by so much."""
     from wobbly import AGENTS, formula
 
     from proxytune.domain import make_episode
@@ -219,6 +235,7 @@ def write_target(path: Path) -> None:
     lines = ["agent,episode,distance,survival_time"]
     for agent in AGENTS:
         for start in range(3):
-            scores = formula(TRUTH, make_episode(TRUTH, agent=agent, start=start, seed=900 + start))
-            lines.append(f"{agent},{start},{scores['distance']!r},{scores['survival_time']!r}")
+            scores = formula(theta, make_episode(theta, agent=agent, start=start, seed=seed + start))
+            lines.append(f"{agent},{start},{scores['distance'] + shift!r},{scores['survival_time'] + shift!r}")
     path.write_text("\n".join(lines) + "\n")
+    return path

@@ -15,7 +15,7 @@ import proxytune
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 NAMES = [name for name in proxytune.__all__ if name != "__version__"]
-HEAVY = {"numpy", "pandas", "matplotlib", "pybullet", "sklearn", "skopt", "torch"}
+HEAVY = {"numpy", "pandas", "matplotlib", "pybullet", "scipy", "sklearn", "skopt", "torch"}
 
 
 def loaded(code):
@@ -84,13 +84,6 @@ def test_the_help_of_the_commands_loads_no_library():
         "import runpy, sys; sys.argv = ['proxytune', '--help']\ntry: runpy.run_module('proxytune', run_name='__main__')"
     )
     assert loaded(f"{code}\nexcept SystemExit: pass") == set()
-
-
-@pytest.mark.slow
-def test_drawing_convergence_loads_no_simulator_and_no_search():
-    drawn = loaded("from proxytune.report.study.figures import convergence_figure")
-    assert drawn & {"pybullet", "sklearn", "skopt", "torch"} == set()
-    assert "matplotlib" in drawn
 
 
 @pytest.mark.slow

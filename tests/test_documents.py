@@ -122,9 +122,7 @@ def test_every_option_is_documented(command, option):
 
 @pytest.mark.parametrize("engine", ENGINES, ids=lambda engine: engine.name)
 def test_every_engine_is_documented_with_what_it_learns_from_and_what_installs_it(engine):
-    lines = DOCS["reference/engines.md"].splitlines()
-    row = next((line for line in lines if line.startswith(f"| `{engine.name}` |")), "")
-    assert row, f"docs/reference/engines.md has no row for the engine '{engine.name}'"
+    row = row_of("reference/engines.md", f"`{engine.name}`")
     cells = [cell.strip() for cell in row.strip("|").split("|")]
     assert cells[1] == engine.learns_from
     assert engine.needs is None or f'pip install ".[{engine.needs.extra}]"' in cells[-1]

@@ -1,6 +1,5 @@
 """docs/how-to/extending.md works as it stands: its files are written, its commands run, a folder for each section."""
 
-import json
 import re
 import shlex
 import sys
@@ -14,10 +13,9 @@ from planted import look_for_few
 
 from proxytune.cli.main import main
 from proxytune.driving import lane_following
-from proxytune.effects import Catalogue, read_model
 from proxytune.extensions import load
 from proxytune.extensions.door import GROUP
-from proxytune.settings import read_settings
+from proxytune.settings import Section, read_settings
 from proxytune.study import open_study
 
 PAGE = (Path(__file__).resolve().parent.parent / "docs" / "how-to" / "extending.md").read_text(encoding="utf-8")
@@ -59,18 +57,15 @@ def changed(text, lines):
 
 
 @pytest.fixture
-def follow(tmp_path, monkeypatch, capsys):
+def follow(tmp_path, monkeypatch, answered):
     """Writes the files of the introduction and of a section, runs its commands, and gives what each printed."""
 
     def followed(section):
         for block in (*blocks(INTRODUCTION), *blocks(SECTIONS[section])):
             put(block, tmp_path)
         monkeypatch.chdir(tmp_path)
-        answers = {}
-        for line in re.findall(rf"^{COMMAND}(.*)$", SECTIONS[section], flags=re.MULTILINE):
-            assert main([*shlex.split(line), "--json"]) == 0, f"{line}: {capsys.readouterr().err}"
-            answers[line] = json.loads(capsys.readouterr().out)
-        return answers
+        commands = re.findall(rf"^{COMMAND}(.*)$", SECTIONS[section], flags=re.MULTILINE)
+        return {line: answered(*shlex.split(line)) for line in commands}
 
     return followed
 
@@ -85,12 +80,21 @@ def test_the_study_of_the_introduction_reads(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_the_effect_is_found_by_diagnose_and_written_to_its_model(follow, tmp_path, monkeypatch):
+def test_the_effect_is_found_by_diagnose_and_predict_and_a_study_read_what_it_wrote(
+    follow, tmp_path, monkeypatch, answered
+):
     look_for_few(monkeypatch)
     found = follow("An effect")["diagnose log --effects weak_reverse:WeakReverse --output found"]
-    assert [effect["name"] for effect in found["effects"]] == ["weak_reverse:WeakReverse"]
-    model = read_model(tmp_path / "found" / "model.toml", Catalogue(tmp_path))
-    assert model.theta["weak_reverse:WeakReverse"] == pytest.approx(0.3, abs=0.02)
+    (effect,) = found["effects"]
+    value, (low, high) = effect["parameters"]["loss"]["value"], effect["parameters"]["loss"]["interval"]
+    assert effect["name"] == "weak_reverse:WeakReverse"
+    assert value == pytest.approx(0.3, abs=0.02)
+    assert low < value < high
+    assert any(name.endswith("effect_curve.png") for name in found["files"])
+    answered("predict", "found/model.toml", "log", "--output", "poses.csv")
+    domain = Section(tmp_path / "study.toml", "domain.", {"plant": "planar"})
+    family = lane_following(domain, model=tmp_path / "found" / "model.toml")
+    assert dict(family.effects)["weak_reverse:WeakReverse"] == pytest.approx(value)
 
 
 @pytest.mark.slow
@@ -157,7 +161,7 @@ def test_what_the_page_makes_keeps_the_promises_that_its_tests_check(everything)
         test()
 
 
-def test_the_entry_points_of_the_page_are_listed_as_plug_ins(everything, monkeypatch, capsys):
+def test_the_entry_points_of_the_page_are_listed_as_plug_ins(everything, answered):
     (block,) = blocks(SECTIONS[PLUGINS])
     points = tomllib.loads(block.text)["project"]["entry-points"][GROUP]
     info = everything / "mine-1.0.dist-info"
@@ -166,6 +170,5 @@ def test_the_entry_points_of_the_page_are_listed_as_plug_ins(everything, monkeyp
     lines = [f"{name} = {value}" for name, value in points.items() if not name.startswith("robot")]
     (info / "entry_points.txt").write_text(f"[{GROUP}]\n" + "\n".join(lines) + "\n")
     for kind, name in {"effect": "weak_reverse", "agent": "grey", "engine": "halton", "measure": "worst"}.items():
-        assert main(["list", f"{kind}s", "--json"]) == 0
-        rows = json.loads(capsys.readouterr().out)[f"{kind}s"]
+        rows = answered("list", f"{kind}s")[f"{kind}s"]
         assert name in [row.get(kind, row.get("key" if kind == "measure" else "name")) for row in rows]

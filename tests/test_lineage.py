@@ -75,9 +75,7 @@ def test_code_that_learns_is_decided_upon(learner, monkeypatch):
 
 
 @pytest.mark.parametrize(("family", "module"), ONE_OF_EACH)
-def test_a_changed_comment_in_our_code_leaves_the_identity_and_a_changed_line_does_not(
-    package, family, module, tmp_path
-):
+def test_a_changed_comment_in_our_code_leaves_the_identity_and_a_changed_line_not(package, family, module, tmp_path):
     kin, path = FAMILIES[family](tmp_path / "study"), package / module
     before = kin.identity
     path.write_text(f"# a comment\n{path.read_text()}")

@@ -39,7 +39,7 @@ def folder(tmp_path_factory):
 
 @pytest.mark.slow
 def test_an_effect_that_is_added_in_one_place_is_listed_and_looked_for(folder):
-    """tests/test_outside_effect.py has one found, fitted and drawn."""
+    """tests/test_extending.py has one found, fitted and drawn."""
     rows = json.loads(run(folder, "-m", "proxytune", "list", "effects", "--json").stdout)["effects"]
     (row,) = [row for row in rows if row["effect"] == "weak_reverse"]
     assert (row["parameter"], row["stage"], row["source"]) == ("weak_reverse", "motion", "made up")
@@ -49,15 +49,7 @@ def test_an_effect_that_is_added_in_one_place_is_listed_and_looked_for(folder):
 
 @pytest.mark.slow
 def test_an_effect_without_a_row_in_the_documents_is_refused_in_words(folder):
-    answer = run(
-        folder,
-        "-m",
-        "pytest",
-        "-n",
-        "0",
-        "tests/test_documents.py",
-        "-k",
-        "every_effect_and_its_parameters and weak_reverse",
-    )
+    command = ["-m", "pytest", "-n", "0", "tests/test_documents.py", "-k"]
+    answer = run(folder, *command, "every_effect_and_its_parameters and weak_reverse")
     assert answer.returncode == 1
     assert "docs/reference/effects.md has no row for the effect 'weak_reverse'" in answer.stdout

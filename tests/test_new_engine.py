@@ -48,4 +48,4 @@ def test_a_seventh_engine_is_listed_and_refused_where_it_is_not_documented(folde
     ]
     answer = run(folder, "-m", "pytest", "-n", "0", "tests/test_documents.py", "-k", "every_engine_is_documented")
     assert answer.returncode == 1
-    assert "docs/reference/engines.md has no row for the engine 'spiral'" in answer.stdout
+    assert "docs/reference/engines.md has no row for `spiral`" in answer.stdout

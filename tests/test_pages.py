@@ -6,7 +6,6 @@ tests/test_extending.py does the same for docs/how-to/extending.md.
 import ast
 import contextlib
 import io
-import json
 import os
 import re
 import runpy
@@ -161,20 +160,16 @@ def test_the_blocks_about_training_run_with_fewer_steps(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_every_command_about_logs_runs_and_a_bag_says_what_its_log_says(tmp_path, monkeypatch, capsys):
+def test_every_command_about_logs_runs_and_a_bag_says_what_its_log_says(tmp_path, monkeypatch, answered):
     """On a bag of a robot of nobody's."""
     pytest.importorskip("rosbags")
     look_for_few(monkeypatch, "wheel_gain")
     monkeypatch.chdir(tmp_path)
-    assert main(["new", "robot", "my_robot", "--figures", FIGURES]) == 0
+    answered("new", "robot", "my_robot", "--figures", FIGURES)
     made = foreign_robot.write_form(tmp_path, "ros1", [foreign_robot.drive(7, seconds=45.0)])
     (made / "run0.bag").rename("my_drives.bag")
-    capsys.readouterr()
-    answers = []
-    for line in lines_of(page("logs")):
-        assert main([*shlex.split(line, comments=True)[3:], "--json"]) == 0, f"{line}: {capsys.readouterr().err}"
-        answers.append(json.loads(capsys.readouterr().out))
-    listed, imported, of_the_log, of_the_bag = answers
+    commands = [shlex.split(line, comments=True)[3:] for line in lines_of(page("logs"))]
+    listed, imported, of_the_log, of_the_bag = (answered(*words) for words in commands)
     assert listed != imported
     assert of_the_log["verdict"] == of_the_bag["verdict"]
     assert of_the_log["effects"] == of_the_bag["effects"]
@@ -188,14 +183,13 @@ def test_the_page_about_a_robot_of_one_s_own_states_the_six_figures_that_a_skele
 
 
 @pytest.mark.slow
-def test_every_command_about_a_robot_of_one_s_own_runs_and_the_dead_band_is_found(tmp_path, monkeypatch, capsys):
+def test_every_command_about_a_robot_of_one_s_own_runs_and_the_dead_band_is_found(tmp_path, monkeypatch, answered):
     look_for_few(monkeypatch)
     monkeypatch.chdir(tmp_path)
     answers = {}
     for line in lines_of(page("own_robot")):
         given = shlex.split(line)[3:]
-        assert main([*given, "--json"]) == 0, f"{line}: {capsys.readouterr().err}"
-        answers[given[0]] = json.loads(capsys.readouterr().out)
+        answers[given[0]] = answered(*given)
         if given[:2] == ["new", "study"]:
             study = tmp_path / "rover_study" / "study.toml"
             text = study.read_text()

@@ -4,8 +4,8 @@ import os
 from pathlib import Path
 
 import pytest
+from one_line import complaint_of
 
-from proxytune.errors import SettingsError
 from proxytune.settings import Section, nearest, read_settings, read_text
 
 
@@ -38,11 +38,9 @@ def section(path, **values):
 def test_a_mistake_names_file_key_and_remedy(tmp_path, call, says):
     values = {"n": 3, "text": "x", "yes": True, "nan": float("nan"), "half": 0.5, "twice": ["a", "a"]}
     values |= {"reversed": [2, 1], "open": [0, float("inf")]}
-    with pytest.raises(SettingsError) as caught:
-        call(section(tmp_path / "study.toml", **values))
-    assert says in str(caught.value)
-    assert str(caught.value).startswith(str(tmp_path / "study.toml"))
-    assert "\n" not in str(caught.value)
+    told = complaint_of(call, section(tmp_path / "study.toml", **values))
+    assert says in told
+    assert told.startswith(str(tmp_path / "study.toml"))
 
 
 def test_good_values_are_taken_as_they_are(tmp_path):
@@ -62,14 +60,11 @@ def test_a_file_that_is_not_toml_is_one_line(tmp_path, content, says):
     path = tmp_path / "study.toml"
     if content is not None:
         path.write_bytes(content)
-    with pytest.raises(SettingsError, match=says) as caught:
-        read_settings(path)
-    assert "\n" not in str(caught.value)
+    assert says in complaint_of(read_settings, path)
 
 
 def test_a_folder_in_place_of_a_file_is_one_line(tmp_path):
-    with pytest.raises(SettingsError, match="cannot be read"):
-        read_settings(tmp_path)
+    assert "cannot be read" in complaint_of(read_settings, tmp_path)
 
 
 def test_the_nearest_name_is_suggested_and_otherwise_all():
@@ -82,15 +77,14 @@ def test_a_section_reads_like_a_mapping_of_plain_values():
     assert dict(section) == {**section} == dict(section.items()) == section.values
     assert (list(section), len(section), "gain" in section, "mass" in section) == (["gain", "body"], 2, True, False)
     assert (section["body"], section.get("gain"), section.get("mass", 3)) == ({"mass": 1.0}, 2.0, 3)
-    with pytest.raises(SettingsError, match=r"study.toml: domain.mass: is missing; add it"):
-        section["mass"]
+    assert "study.toml: domain.mass: is missing; add it" in complaint_of(section.__getitem__, "mass")
 
 
 TRAPS = {
     "more digits than Python reads": ("x = " + "9" * 5000, "is not valid TOML: Exceeds the limit"),
     "brackets in brackets": ("x = " + "[" * 20_000, "is nested too deeply"),
-    "a key of very many parts": (".".join("a" * 100_000) + " = 1", r"a key of more than 100 parts \(at line 1\)"),
-    "a table of very many parts": ("[" + ".".join("a" * 100_000) + "]", r"a key of more than 100 parts \(at line 1\)"),
+    "a key of very many parts": (".".join("a" * 100_000) + " = 1", "a key of more than 100 parts (at line 1)"),
+    "a table of very many parts": ("[" + ".".join("a" * 100_000) + "]", "a key of more than 100 parts (at line 1)"),
 }
 
 
@@ -99,8 +93,7 @@ def test_a_trap_in_toml_is_one_line_at_once(tmp_path, trap):
     text, says = TRAPS[trap]
     path = tmp_path / "study.toml"
     path.write_text(text)
-    with pytest.raises(SettingsError, match=says):
-        read_settings(path)
+    assert says in complaint_of(read_settings, path)
 
 
 def test_long_rows_of_numbers_are_no_long_keys(tmp_path):
@@ -130,8 +123,7 @@ def test_numbers_too_large_for_a_float_and_texts_that_no_file_can_have_are_refus
         (lambda: section.file("long"), "long: no file can have so long a name; shorten it"),
         (lambda: section.file("far"), "far: no file can have so long a name; shorten it"),
     ):
-        with pytest.raises(SettingsError, match=says):
-            read()
+        assert says in complaint_of(read)
 
 
 def test_devices_and_named_pipes_are_no_files_but_what_a_shell_pipes_in_is(tmp_path):

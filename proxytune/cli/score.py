@@ -89,6 +89,7 @@ def _read_proxies(
     """Every proxy by name: its domain, or its file's name, or what was typed where those are not unique."""
     of_target = dict(map(split_source, target))
     proxies: dict[str, scores.ScoreTable] = {}
+    given: set[tuple[Path, str]] = set()
     for source in sources:
         path, domain = split_source(source)
         here = _present(columns, [path])
@@ -101,9 +102,10 @@ def _read_proxies(
         for label, table in tables.items():
             name = label or ("sim" if source in target else path.stem)
             name = name if name not in proxies else f"{path}:{label}" if label else str(path)
-            if name in proxies:
+            if name in proxies or (path, label) in given:
                 raise InputError(f"--proxy {source}: is given twice; give each proxy once")
             proxies[name] = table
+            given.add((path, label))
     return proxies
 
 

@@ -1,12 +1,13 @@
 """A search box is asked and told: it finds an optimum, repeats itself, and refuses what was not asked."""
 
 import math
+import re
 
 import pytest
 from hypothesis import given, settings, strategies as st
+from one_line import complaint_of
 
 from proxytune.api.search_box import SearchBox
-from proxytune.errors import InputError
 from proxytune.search import ENGINES, Engine
 from proxytune.search.engine import RandomPoints
 
@@ -111,8 +112,8 @@ def test_an_engine_of_one_s_own_proposes():
 
 @pytest.mark.parametrize("engine", [one.name for one in ENGINES if one.learns_from == "outputs"])
 def test_an_engine_that_needs_outputs_is_refused_with_one_that_does_not(engine):
-    with pytest.raises(InputError, match=f"'{engine}' models what a score is computed from.*use 'gp'"):
-        SearchBox(BOX, engine=engine)
+    told = complaint_of(SearchBox, BOX, engine=engine)
+    assert re.search(f"'{engine}' models what a score is computed from.*use 'gp'", told)
 
 
 WRONG = {
@@ -129,25 +130,17 @@ WRONG = {
 @pytest.mark.parametrize("name", WRONG)
 def test_a_box_that_cannot_be_searched_is_refused(name):
     changes, words = WRONG[name]
-    arguments = {"box": BOX, **changes}
-    with pytest.raises(InputError, match=words) as problem:
-        SearchBox(arguments.pop("box"), **arguments)
-    assert "\n" not in str(problem.value)
+    assert re.search(words, complaint_of(SearchBox, **{"box": BOX, **changes}))
 
 
 def test_only_a_theta_that_was_asked_for_can_be_told_and_only_once():
     box = SearchBox(BOX)
-    with pytest.raises(InputError, match="no score has been told; ask"):
-        box.best()
+    assert "no score has been told; ask" in complaint_of(box.best)
     theta = box.ask()
-    with pytest.raises(InputError, match="was not asked for; tell what `ask` gave"):
-        box.tell({**theta, "trim": 0.0}, 1.0)
-    with pytest.raises(InputError, match="θ names trim; the box has delay, trim"):
-        box.tell({"trim": 0.0}, 1.0)
+    assert "was not asked for; tell what `ask` gave" in complaint_of(box.tell, {**theta, "trim": 0.0}, 1.0)
+    assert "θ names trim; the box has delay, trim" in complaint_of(box.tell, {"trim": 0.0}, 1.0)
     for wrong in (math.nan, math.inf):
-        with pytest.raises(InputError, match="a score must be a finite number, or None"):
-            box.tell(theta, wrong)
+        assert "a score must be a finite number, or None" in complaint_of(box.tell, theta, wrong)
     box.tell(theta, 1.0)
-    with pytest.raises(InputError, match="has a score already; ask for the next"):
-        box.tell(theta, 1.0)
+    assert "has a score already; ask for the next" in complaint_of(box.tell, theta, 1.0)
     assert box.trials().score.tolist() == [1.0]

@@ -1,15 +1,16 @@
 """Usefulness from DataFrames is what the command says of the same tables, and complaints name side, row and column."""
 
 import json
+import re
 
 import numpy as np
 import pandas as pd
 import pytest
 from hypothesis import given, settings, strategies as st
+from one_line import complaint_of
 
 from proxytune.api.scores import score
 from proxytune.cli.main import main
-from proxytune.errors import InputError, ScoresError
 from proxytune.report import score_document
 from proxytune.scores import Metric, read_scores
 
@@ -70,8 +71,7 @@ def test_several_proxies_by_name_are_those_of_the_command(by_command, tmp_path, 
     assert repr(found).startswith("Ranking: ")
     assert "together: " in found._repr_html_()
     assert set(found.to_frame().index.get_level_values("proxy")) == {"sim", "other"}
-    with pytest.raises(InputError, match="two tables or more"):
-        score(proxy={"sim": proxy}, target=target, metrics=METRICS)
+    assert "two tables or more" in complaint_of(score, proxy={"sim": proxy}, target=target, metrics=METRICS)
 
 
 def test_weights_and_seed_are_those_of_the_command(by_command):
@@ -111,8 +111,8 @@ def test_a_table_that_was_read_before_may_be_either_side(by_command):
     read = read_scores(str(paths[0]), ["time", "distance"])
     mixed = score(proxy=read, target=target, metrics=METRICS)
     assert documented(mixed) == documented(score(proxy=proxy, target=target, metrics=METRICS))
-    with pytest.raises(ScoresError, match="^proxy: no metric 'speed'"):
-        score(proxy=read, target=target, metrics="speed:max")
+    told = complaint_of(score, proxy=read, target=target, metrics="speed:max")
+    assert told.startswith("proxy: no metric 'speed'")
 
 
 def spoilt(**changes):
@@ -125,15 +125,9 @@ def spoilt(**changes):
 TWO_DOMAINS = pd.concat([table(1).assign(domain="sim"), table(2).assign(domain="real")])
 WRONG = {
     "a missing column": (table(1).drop(columns="distance"), "proxy: no column 'distance'"),
-    "no agents": (
-        table(1).drop(columns="agent"),
-        "proxy: no column 'agent'; columns are episode, distance, time; name",
-    ),
+    "no agents": (table(1).drop(columns="agent"), "proxy: no column 'agent'; columns are episode, distance, time"),
     "a missing agent": (table(1, "ABCD"), "the proxy lacks scores of E, which the target has; add or remove them"),
-    "an empty cell": (
-        spoilt(distance=(3, np.nan)),
-        r"proxy: row 3, column 'distance': must be a finite number, got ''",
-    ),
+    "a hole": (spoilt(distance=(3, np.nan)), r"proxy: row 3, column 'distance': must be a finite number, got ''"),
     "a word": (spoilt(distance=(0, "far")), "proxy: row 0, column 'distance': must be a finite number, got 'far'"),
     "an episode twice": (spoilt(episode=(1, 0)), "proxy: row 1: agent 'A' has episode '0' twice; number the episodes"),
     "several domains": (TWO_DOMAINS, r"proxy: has several domains; select one, as in scores\[scores.domain == 'sim'\]"),
@@ -146,18 +140,15 @@ WRONG = {
 @pytest.mark.parametrize("name", WRONG)
 def test_what_cannot_be_used_is_one_line_with_the_side(name):
     proxy, words = WRONG[name]
-    with pytest.raises(InputError, match=words) as problem:
-        score(proxy=proxy, target=table(2), metrics=METRICS)
-    assert "\n" not in str(problem.value)
-    assert "tmp" not in str(problem.value)
-    assert ".csv" not in str(problem.value) or name == "no file"
+    told = complaint_of(score, proxy=proxy, target=table(2), metrics=METRICS)
+    assert re.search(words, told)
+    assert "tmp" not in told
+    assert ".csv" not in told or name == "no file"
 
 
 def test_the_target_is_named_where_it_is_the_target_that_lacks_something():
-    with pytest.raises(
-        ScoresError, match="^target: no column 'time'; did you mean|^target: no column 'time'; known are"
-    ):
-        score(proxy=table(1), target=table(2).drop(columns="time"), metrics=METRICS)
+    told = complaint_of(score, proxy=table(1), target=table(2).drop(columns="time"), metrics=METRICS)
+    assert re.match("target: no column 'time'; (did you mean|known are)", told)
 
 
 @pytest.mark.parametrize(
@@ -170,9 +161,7 @@ def test_the_target_is_named_where_it_is_the_target_that_lacks_something():
     ],
 )
 def test_wrong_arguments_are_one_line(changes, words):
-    with pytest.raises(InputError, match=words) as problem:
-        score(**{"proxy": table(1), "target": table(2), "metrics": METRICS, **changes})
-    assert "\n" not in str(problem.value)
+    assert words in complaint_of(score, **{"proxy": table(1), "target": table(2), "metrics": METRICS, **changes})
 
 
 def test_one_table_of_both_sides_gives_a_decision_figures_a_page_and_frames(tmp_path):
@@ -191,10 +180,7 @@ def test_one_table_of_both_sides_gives_a_decision_figures_a_page_and_frames(tmp_
 
 def test_one_column_is_not_compared_with_itself_and_sides_are_given_whole():
     table = pd.DataFrame({"agent": ["a", "b"], "success": [0.1, 0.2]})
-    with pytest.raises(InputError, match="would be both proxy and target"):
-        score(table, metrics="success:max")
+    assert "would be both proxy and target" in complaint_of(score, table, metrics="success:max")
     for sides in ({}, {"proxy": table}):
-        with pytest.raises(InputError, match="or one table of both sides"):
-            score(**sides, metrics="success:max")
-    with pytest.raises(InputError, match="no metric is given"):
-        score(proxy=table, target=table)
+        assert "or one table of both sides" in complaint_of(score, **sides, metrics="success:max")
+    assert "no metric is given" in complaint_of(score, proxy=table, target=table)

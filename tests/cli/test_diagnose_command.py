@@ -150,11 +150,10 @@ def test_a_study_takes_the_model_as_its_proxy(printed, home):
 
 
 @pytest.mark.slow
-def test_an_effect_that_is_declared_is_not_missing_in_another_log_either(home, printed, capsys):
+def test_an_effect_that_is_declared_is_not_missing_in_another_log_either(home, printed, answered):
     test = write_log(small_log(seed=2), home / "test")
-    words = ["--declared", "trim, delay,yaw_scrub", "--test", str(test), "--output", str(home / "declared"), "--json"]
-    assert main(["diagnose", str(home / "log"), *words]) == 0
-    told = json.loads(capsys.readouterr().out)
+    words = ("--declared", "trim, delay,yaw_scrub", "--test", test, "--output", home / "declared")
+    told = answered("diagnose", home / "log", *words)
     assert (told["verdict"], told["effects"]) == ("nothing missing", [])
     assert told["declared"]["yaw_scrub"]["value"] == pytest.approx(0.12, abs=0.01)
     assert told["error"]["after"] == told["error"]["before"]
@@ -162,12 +161,11 @@ def test_an_effect_that_is_declared_is_not_missing_in_another_log_either(home, p
 
 
 @pytest.mark.slow
-def test_a_robot_of_the_logs_own_geometry_is_diagnosed_and_its_model_predicts(tmp_path, capsys, answered):
+def test_a_robot_of_the_logs_own_geometry_is_diagnosed_and_its_model_predicts(tmp_path, answered):
     log = replace(small_log(), robot="my_robot")
     own = {"wheel_radius_m": 0.0318, "baseline_m": 0.16, "full_speed_m_s": 0.6}
     folder = write_log(log, tmp_path / "log", **own)
-    assert main(["diagnose", str(folder), "--declared", "trim,delay,motor_lag", "--output", str(tmp_path / "o")]) == 0
-    capsys.readouterr()
+    answered("diagnose", folder, "--declared", "trim,delay,motor_lag", "--output", tmp_path / "o")
     model = tmp_path / "o" / "model.toml"
     assert read_model(model).geometry == {"wheel_radius": 0.0318, "effective_baseline": 0.16, "full_speed": 0.6}
     assert answered("predict", model, folder, "--output", tmp_path / "p.csv")["error"]["value"] < 0.02
@@ -199,26 +197,19 @@ BAD = {
         lambda folder: write_log(small_log(episodes=1, seconds=15.0), folder),
         "at least 20 s",
     ),
-    "commands that are zero": (
-        changed(lambda log: with_commands(log, lambda duties: 0.0 * duties)),
-        "every command is zero",
-    ),
+    "zero commands": (changed(lambda log: with_commands(log, lambda duties: 0.0 * duties)), "every command is zero"),
     "a stationary robot": (changed(still), "stands still"),
     "no folder": (lambda folder: None, "no such folder"),
 }
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_data_that_cannot_bear_an_answer_is_refused_in_one_line_and_nothing_is_written(case, tmp_path, capsys):
+def test_data_that_cannot_bear_an_answer_is_refused_in_one_line_and_nothing_is_written(case, tmp_path, refused):
     make, says = BAD[case]
     make(tmp_path / "log")
-    assert main(["diagnose", str(tmp_path / "log"), "--output", str(tmp_path / "out"), "--json"]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    line = [text for text in err.splitlines() if text.strip()][-1]
+    line = refused("diagnose", tmp_path / "log", "--output", tmp_path / "out")
     assert line.startswith("proxytune diagnose: ")
     assert says in line
-    assert err.count("proxytune diagnose") == 1
     assert not (tmp_path / "out").exists()
 
 
@@ -232,11 +223,8 @@ def test_data_that_cannot_bear_an_answer_is_refused_in_one_line_and_nothing_is_w
         (["--test", "nowhere"], "nowhere: no such folder"),
     ],
 )
-def test_wrong_options_are_told_in_one_line(words, says, home, printed, capsys, tmp_path):
-    assert main(["diagnose", str(home / "log"), *words, "--output", str(tmp_path / "out")]) == 2
-    err = capsys.readouterr().err
-    assert says in err
-    assert "Traceback" not in err
+def test_wrong_options_are_told_in_one_line(words, says, home, printed, refused, tmp_path):
+    assert says in refused("diagnose", home / "log", *words, "--output", tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 

@@ -33,15 +33,6 @@ class Found(NamedTuple):
     err: str
 
 
-def refused(capsys, *words):
-    """The one line that a command ends with."""
-    assert main(["diagnose", *map(str, words), "--json"]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err.count("proxytune diagnose: ") == 1
-    return err.splitlines()[-1]
-
-
 @pytest.fixture(scope="module")
 def stills(tmp_path_factory):
     return write_still_frames(tmp_path_factory.mktemp("stills") / "log", ROLLED, lane_poses(30), columns=96)
@@ -126,15 +117,15 @@ def test_people_read_the_verdict_the_roll_and_both_errors(found):
     assert "fitting the camera" in found.err
 
 
-def test_an_unknown_effect_is_told_with_the_nearest_of_both_kinds(stills, tmp_path, capsys):
-    line = refused(capsys, stills, "--declared", "camera_rol", "--output", tmp_path / "out")
+def test_an_unknown_effect_is_told_with_the_nearest_of_both_kinds(stills, tmp_path, refused):
+    line = refused("diagnose", stills, "--declared", "camera_rol", "--output", tmp_path / "out")
     assert "--declared camera_rol: no effect on motion, camera or pictures has this name; did you mean" in line
     assert "'camera_roll'" in line
     assert not (tmp_path / "out").exists()
 
 
-def test_a_log_to_test_on_is_refused_where_there_is_no_motion(stills, tmp_path, capsys):
-    line = refused(capsys, stills, "--test", stills, "--output", tmp_path / "out")
+def test_a_log_to_test_on_is_refused_where_there_is_no_motion(stills, tmp_path, refused):
+    line = refused("diagnose", stills, "--test", stills, "--output", tmp_path / "out")
     assert "--test: pictured has no commands" in line
 
 
@@ -150,10 +141,10 @@ def test_where_motion_is_refused_the_camera_still_comes_out(tmp_path, answered):
 
 
 @pytest.mark.slow
-def test_where_both_are_refused_both_reasons_are_told_in_one_line(tmp_path, capsys):
+def test_where_both_are_refused_both_reasons_are_told_in_one_line(tmp_path, refused):
     log = circling_log(TRUTH, noise=CALM, episodes=2, seconds=6.0)
     folder = add_frames(write_log(log, tmp_path / "log"), log, ROLLED, every=20)
-    line = refused(capsys, folder, "--output", tmp_path / "out")
+    line = refused("diagnose", folder, "--output", tmp_path / "out")
     assert "at least 20 s" in line
     assert "camera: pictured: frames: 9 of 12 frames show markings" in line
 

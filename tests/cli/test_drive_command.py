@@ -21,29 +21,10 @@ def lane(make_studies):
     return folder
 
 
-def complaint(capsys, *words):
-    capsys.readouterr()
-    assert main(["drive", *map(str, words)]) == 2
-    (line,) = capsys.readouterr().err.strip().splitlines()
-    return line
-
-
 def test_the_document_has_both_scores_and_when_they_part(lane, answered):
     answer = answered("drive", lane, "--agent", "steady", "--theta", "trim=-0.2")
-    keys = [
-        "agent",
-        "start",
-        "seed",
-        "theta",
-        "proxy",
-        "target",
-        "parted_s",
-        "theta_from",
-        "against",
-        "output",
-        "cautions",
-    ]
-    assert list(answer) == keys
+    keys = "agent start seed theta proxy target parted_s theta_from against output cautions"
+    assert list(answer) == keys.split()
     assert (answer["agent"], answer["start"], answer["seed"], answer["theta"]) == ("steady", 0, 1, {"trim": -0.2})
     assert answer["proxy"]["metrics"]["distance"] != answer["target"]["metrics"]["distance"]
     assert 0.0 < answer["parted_s"] < 2.0
@@ -115,17 +96,17 @@ def test_another_simulator_s_robot_is_drawn_where_it_records_places(make_study, 
     assert (tmp_path / "walk.png").exists()
 
 
-def test_where_there_are_no_places_there_are_metrics_and_one_line(make_study, tmp_path, capsys, answered):
+def test_where_there_are_no_places_there_are_metrics_and_one_line(make_study, tmp_path, refused, answered):
     folder = make_study(family='"walking:walking"', domain={"columns": '"z"'})
     assert answered("drive", folder, "--agent", "agent0")["proxy"]["metrics"]["distance"] > 0.0
-    line = complaint(capsys, folder, "--agent", "agent0", "--output", tmp_path / "walk.png")
+    line = refused("drive", folder, "--agent", "agent0", "--output", tmp_path / "walk.png")
     assert "nothing can be drawn, as this study's domain family records no x and y; leave the option out" in line
     assert not (tmp_path / "walk.png").exists()
 
 
-def test_a_family_that_records_nothing_is_told_so_before_anything_is_driven(make_study, tmp_path, capsys, answered):
+def test_a_family_that_records_nothing_is_told_so_before_anything_is_driven(make_study, tmp_path, refused, answered):
     folder = make_study(domain={"journal": f'"{tmp_path / "journal"}"'})
-    assert "nothing can be drawn" in complaint(capsys, folder, "--agent", "agent0", "--output", tmp_path / "walk.png")
+    assert "nothing can be drawn" in refused("drive", folder, "--agent", "agent0", "--output", tmp_path / "walk.png")
     assert not (tmp_path / "journal").exists()
     answered("drive", folder, "--agent", "agent0")
     assert (tmp_path / "journal").exists()
@@ -143,19 +124,19 @@ BAD = {
 
 
 @pytest.mark.parametrize("fault", BAD)
-def test_bad_input_is_told_in_one_line(lane, capsys, fault):
+def test_bad_input_is_told_in_one_line(lane, refused, fault):
     words, line = BAD[fault]
-    assert line in complaint(capsys, lane, "--agent", "steady", *words)
+    assert line in refused("drive", lane, "--agent", "steady", *words)
 
 
 @pytest.mark.parametrize("option", ["--against", "--theta"])
-def test_a_model_of_another_robot_is_refused(lane, capsys, option):
-    line = complaint(capsys, lane, "--agent", "steady", option, lane / "other.toml")
+def test_a_model_of_another_robot_is_refused(lane, refused, option):
+    line = refused("drive", lane, "--agent", "steady", option, lane / "other.toml")
     assert f"{option} {lane / 'other.toml'}: is of the robot 'irobot_create'; give a model of 'duckiebot'" in line
 
 
-def test_a_movie_without_its_writer_is_refused_before_anything_is_driven(lane, tmp_path, capsys, monkeypatch):
+def test_a_movie_without_its_writer_is_refused_before_anything_is_driven(lane, tmp_path, refused, monkeypatch):
     monkeypatch.setattr("shutil.which", lambda name: None)
     monkeypatch.setitem(__import__("sys").modules, "imageio_ffmpeg", None)
-    line = complaint(capsys, lane, "--agent", "steady", "--output", tmp_path / "a.mp4")
-    assert line == "proxytune drive: an .mp4 takes ffmpeg: pip install imageio-ffmpeg, or write a .gif"
+    line = refused("drive", lane, "--agent", "steady", "--output", tmp_path / "a.mp4")
+    assert line == "proxytune drive: an .mp4 takes ffmpeg: pip install imageio-ffmpeg, or write a .gif\n"

@@ -2,16 +2,13 @@
 
 import re
 import shutil
-from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
 import pytest
-from wobbly import AGENTS, formula
 
 import proxytune
 from proxytune.cli.main import main
-from proxytune.domain import make_episode
 from proxytune.errors import InputError
 from proxytune.files import shipped
 from proxytune.running import run_together
@@ -19,25 +16,14 @@ from proxytune.scores import write_scores
 from proxytune.search import population
 from proxytune.seeds import target_seed
 from proxytune.study import open_bank, plan_episodes, read_study_settings, score_table
-from tests.conftest import Answered, MakeStudy
+from tests.conftest import write_target
 
 BANK = {"target": None, "preflight": "true", "budget": "24", "engine": None}
 DELAY = 0.12
 
 
-def write_robot(path: Path, theta: Mapping[str, float], seed: int, shift: float = 0.0) -> Path:
-    """The scores of every agent on a robot, all metrics off by so much."""
-    lines = ["agent,episode,distance,survival_time"]
-    for agent in AGENTS:
-        for start in range(3):
-            scores = formula(theta, make_episode(theta, agent=agent, start=start, seed=seed + start))
-            lines.append(f"{agent},{start},{scores['distance'] + shift!r},{scores['survival_time'] + shift!r}")
-    path.write_text("\n".join(lines) + "\n")
-    return path
-
-
 @pytest.fixture(scope="module", autouse=True)
-def _few_draws() -> Iterator[None]:
+def _few_draws():
     """Draw a tenth of what a user gets: tests/search counts how well it is told."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(population, "DRAWS", 400)
@@ -46,7 +32,7 @@ def _few_draws() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def bank(make_studies: MakeStudy) -> Path:
+def bank(make_studies):
     """A bank that has been run."""
     folder = make_studies("bank", **BANK)
     assert main(["study", str(folder), "--json"]) == 0
@@ -54,28 +40,28 @@ def bank(make_studies: MakeStudy) -> Path:
 
 
 @pytest.fixture(scope="module")
-def trims() -> list[float]:
+def trims():
     """The trim of eight robots, whose delay is one and the same."""
     return (0.02 + 0.08 * np.random.default_rng(5).standard_normal(8)).tolist()
 
 
 @pytest.fixture(scope="module")
-def robots(trims: list[float], tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+def robots(trims, tmp_path_factory):
     """Their tables of scores."""
     home = tmp_path_factory.mktemp("robots")
     return [
-        write_robot(home / f"robot{row}.csv", {"trim": trim, "delay": DELAY}, 900 + 10 * row)
+        write_target(home / f"robot{row}.csv", {"trim": trim, "delay": DELAY}, 900 + 10 * row)
         for row, trim in enumerate(trims)
     ]
 
 
 @pytest.fixture(scope="module")
-def found(bank: Path, robots: list[Path]) -> proxytune.FleetReport:
+def found(bank, robots):
     """What is told of them."""
     return proxytune.fleet(bank, robots)
 
 
-def test_what_was_planted_is_told(found: proxytune.FleetReport, trims: list[float]) -> None:
+def test_what_was_planted_is_told(found, trims):
     """Each robot's θ lies in its intervals, p(θ) holds mean and spread; the delay, which is one, differs by less."""
     told = found.robots()
     assert told["fits"].all()
@@ -94,9 +80,7 @@ def test_what_was_planted_is_told(found: proxytune.FleetReport, trims: list[floa
     assert max(trims) < trim["robots_high"]
 
 
-def test_the_command_says_the_same_and_drives_nothing(
-    found: proxytune.FleetReport, bank: Path, robots: list[Path], tmp_path: Path, answered: Answered
-) -> None:
+def test_the_command_says_the_same_and_drives_nothing(found, bank, robots, tmp_path, answered):
     """Its document is the report's, with figure and page; study.db stays what it is."""
     before = (bank / "study.db").read_bytes()
     document = answered("fleet", bank, *robots, "--output", tmp_path / "out")
@@ -109,7 +93,7 @@ def test_the_command_says_the_same_and_drives_nothing(
     assert set(document["robots"]) == {f"robot{row}" for row in range(8)}
 
 
-def test_a_person_reads_the_lines_to_paste(bank: Path, robots: list[Path], capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_person_reads_the_lines_to_paste(bank, robots, capsys):
     """They are a table of [teaching.proxies]; with few robots a note says what cannot be told."""
     assert main(["fleet", str(bank), *map(str, robots[:3])]) == 0
     told = capsys.readouterr().out
@@ -118,11 +102,9 @@ def test_a_person_reads_the_lines_to_paste(bank: Path, robots: list[Path], capsy
     assert "3 robots hardly tell a spread" in " ".join(told.split())
 
 
-def test_a_robot_that_no_theta_explains_is_left_out_by_name(
-    found: proxytune.FleetReport, bank: Path, robots: list[Path], tmp_path: Path
-) -> None:
+def test_a_robot_that_no_theta_explains_is_left_out_by_name(found, bank, robots, tmp_path):
     """p(θ) is what it is without it; its own intervals are still told."""
-    odd = write_robot(tmp_path / "odd.csv", {"trim": 0.0, "delay": DELAY}, 990, shift=40.0)
+    odd = write_target(tmp_path / "odd.csv", {"trim": 0.0, "delay": DELAY}, 990, shift=40.0)
     document = proxytune.fleet(bank, [*robots, odd]).document()
     assert document["left_out"] == ["odd"]
     assert document["robots"]["odd"]["given_fleet"] is None
@@ -133,9 +115,7 @@ def test_a_robot_that_no_theta_explains_is_left_out_by_name(
     assert "<table" in alone._repr_html_()
 
 
-def test_the_table_of_a_bank_will_do(
-    found: proxytune.FleetReport, bank: Path, robots: list[Path], tmp_path: Path
-) -> None:
+def test_the_table_of_a_bank_will_do(found, bank, robots, tmp_path):
     """Without study.db it says the same, noise included, to the digits that it has."""
     alone = Path(shutil.copytree(bank, tmp_path / "alone"))
     (alone / "study.db").unlink()
@@ -145,7 +125,7 @@ def test_the_table_of_a_bank_will_do(
     assert trim[0] == pytest.approx(trim[1], rel=0.1)
 
 
-def test_a_study_with_a_target_knows_trials_too(make_study: MakeStudy, robots: list[Path]) -> None:
+def test_a_study_with_a_target_knows_trials_too(make_study, robots):
     """What it has learnt from a bank counts, whatever its own target is."""
     folder = make_study(budget="12", initial="12", engine=None)
     proxytune.run_study(folder)
@@ -154,7 +134,7 @@ def test_a_study_with_a_target_knows_trials_too(make_study: MakeStudy, robots: l
     assert told.result.robots[0].knowledge.goal.values[0] != told.result.robots[1].knowledge.goal.values[0]
 
 
-def test_what_a_robot_says_depends_on_no_other(found: proxytune.FleetReport, bank: Path, robots: list[Path]) -> None:
+def test_what_a_robot_says_depends_on_no_other(found, bank, robots):
     """Calibration is shared, so the first of the tables is told as any other."""
     few = proxytune.fleet(bank, [robots[3], robots[0]]).document()["robots"]
     all_of_them = found.document()["robots"]
@@ -163,7 +143,7 @@ def test_what_a_robot_says_depends_on_no_other(found: proxytune.FleetReport, ban
             assert few[name][key] == all_of_them[name][key]
 
 
-def test_names_that_are_alike_have_their_folders(found: proxytune.FleetReport, bank: Path, tmp_path: Path) -> None:
+def test_names_that_are_alike_have_their_folders(found, bank, tmp_path):
     """robot1/target.csv and robot2/target.csv are two robots."""
     paths = []
     for name in ("robot1", "robot2"):
@@ -188,32 +168,29 @@ BAD = {
 }
 
 
-def _unrun(bank: Path, robots: list[Path]) -> list[Path]:
+def _unrun(bank, robots):
     for name in ("study.db", "bank.json"):
         (bank / name).unlink()
     return robots
 
 
-def _edited(path: Path, home: Path, before: str, after: str) -> Path:
+def _edited(path, home, before, after):
     edited = home / "edited.csv"
     edited.write_text(path.read_text().replace(before, after).replace(f"{after},episode", "agent,episode"))
     return edited
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_what_cannot_be_used_is_refused_in_one_line(
-    case: str, bank: Path, robots: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_cannot_be_used_is_refused_in_one_line(case, bank, robots, tmp_path, refused):
     """The line names the file and what is wrong; the exit status is 2."""
     own = Path(shutil.copytree(bank, tmp_path / "bank"))
     spoil, words = BAD[case]
-    assert main(["fleet", str(own), *map(str, spoil(own, robots, tmp_path))]) == 2
-    told = capsys.readouterr().err.splitlines()[-1]
+    told = refused("fleet", own, *spoil(own, robots, tmp_path))
     assert words in told
     assert told.startswith("proxytune fleet: ")
 
 
-def test_learning_value_tells_no_theta(make_study: MakeStudy, robots: list[Path]) -> None:
+def test_learning_value_tells_no_theta(make_study, robots):
     """A study by PLV is refused, and so is one table in place of a list."""
     with pytest.raises(InputError, match="'plv' is not searched by scores"):
         proxytune.fleet(make_study(objective='"plv"'), robots)
@@ -222,7 +199,7 @@ def test_learning_value_tells_no_theta(make_study: MakeStudy, robots: list[Path]
 
 
 @pytest.mark.slow
-def test_a_fleet_on_the_planar_plant_is_told_by_the_shipped_bank(tmp_path: Path) -> None:
+def test_a_fleet_on_the_planar_plant_is_told_by_the_shipped_bank(tmp_path):
     """Ten robots whose trim and delay are drawn from normal distributions: p(θ) holds mean and spread of both."""
     home = shipped("studies") / "duckiebot_bank"
     study, rng = open_bank(read_study_settings(home)), np.random.default_rng(11)

@@ -4,11 +4,10 @@ import json
 import re
 import shutil
 import signal
-import subprocess
-import sys
 
 import pytest
-from processes import ENVIRONMENT, FAKES, finished_episodes, trials
+from launched import Launched, launching
+from processes import finished_episodes, trials
 from several import make_several
 from taught import TEACHING, make_taught
 
@@ -22,45 +21,28 @@ class Commands:
     """Runs commands in forks of one process that has loaded proxytune; each can be killed at a moment of its own."""
 
     def __init__(self, process, fate):
-        self._process, self._fate = process, fate
+        self._process, self._fate, self.printed = process, fate, ""
 
     def run(self, *words, fate=None):
         """A command killed at a moment, or never: its status."""
         self._fate.unlink(missing_ok=True)
         if fate:
             self._fate.write_text(fate)
-        self._moments.write_text("")
-        self._process.stdin.write(json.dumps([None, *map(str, words), "--json", str(self._output)]) + "\n")
-        self._process.stdin.flush()
-        self._process.stdout.readline()  # its process id
-        return int(self._process.stdout.readline())
-
-    @property
-    def printed(self):
-        return self._output.read_text()
+        self._fate.with_name("moments").write_text("")
+        status, self.printed = Launched(self._process, self._fate, map(str, words)).end()
+        return status
 
     @property
     def document(self):
         """What the last command printed on standard output, as it stands there."""
         return re.search(r"^\{.*\}$", self.printed, re.DOTALL | re.MULTILINE)[0]
 
-    @property
-    def _moments(self):
-        return self._fate.with_name("moments")
-
-    @property
-    def _output(self):
-        return self._fate.with_name("printed")
-
 
 @pytest.fixture(scope="module")
 def commands(tmp_path_factory):
     fate = tmp_path_factory.mktemp("mortal") / "fate"
-    command, pipes = [sys.executable, str(FAKES / "mortal.py")], {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
-    environment = {**ENVIRONMENT, "FATE": str(fate)}
-    with subprocess.Popen(command, env=environment, text=True, start_new_session=True, **pipes) as process:
+    with launching("mortal.py", FATE=str(fate)) as process:
         yield Commands(process, fate)
-        process.stdin.close()
 
 
 def make_mortal(make_study, **changes):
@@ -84,10 +66,7 @@ def kill_at(commands, words, moments, whom, told=lambda: None):
 ON_POLICY = 'target_lessons = "learner"\nproxy_lessons = "learner"\nrehearsal = 0.5'
 TAUGHT = {
     "every count": (ROOM, ("lesson 9", "training 2", "exam 60", "episode 5")),
-    "chosen": (
-        {**ROOM, "more": "examinations = 17"},
-        ("lesson 9", "training 2", "exam 3", "rule 3"),
-    ),
+    "chosen": ({**ROOM, "more": "examinations = 17"}, ("lesson 9", "training 2", "exam 3", "rule 3")),
     "learner drives": (
         {**ROPE, "more": f"examinations = 17\n{ON_POLICY}"},
         ("guided 9", "training 5", "exam 9", "rule 3"),
@@ -115,8 +94,7 @@ def taught(make_studies, commands):
 
 
 @pytest.mark.parametrize(
-    ("name", "jobs", "whom"),
-    [("every count", "1", "all"), ("chosen", "2", "command"), ("learner drives", "1", "all")],
+    ("name", "jobs", "whom"), [("every count", "1", "all"), ("chosen", "2", "command"), ("learner drives", "1", "all")]
 )
 def test_teaching_killed_again_and_again_prints_the_same_document_to_the_byte(taught, commands, name, jobs, whom):
     folder, whole = taught(name, jobs)

@@ -2,6 +2,7 @@
 
 from contextlib import nullcontext
 from pathlib import Path
+from unittest.mock import Mock, call
 
 import pytest
 
@@ -70,25 +71,12 @@ def test_a_page_that_cannot_be_written_does_not_stop_the_run(settings, monkeypat
 
 
 def test_what_else_watches_hears_all(settings):
-    heard = []
-
-    class Spy:
-        def begin(self, what, known):
-            heard.append((what, known))
-
-        def episode(self):
-            heard.append("episode")
-
-        def best(self, score):
-            heard.append(score)
-
-        finished = waiting = best
-
-    page = LivePage(settings, "prpv", Spy())
+    heard = Mock()
+    page = LivePage(settings, "prpv", heard)
     page.begin("a", 2)
     page.episode()
     page.best(3.0)
-    assert heard == [("a", 2), "episode", 3.0]
+    assert heard.mock_calls == [call.begin("a", 2), call.episode(), call.best(3.0)]
 
 
 def test_a_finished_study_has_its_own_page_in_the_end_and_nothing_is_said_on_the_way(finished, capsys):

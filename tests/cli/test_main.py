@@ -98,40 +98,39 @@ def test_a_mistyped_word_is_answered_with_the_one_that_was_probably_meant(capsys
     assert told.strip().endswith(problem)
 
 
-def test_people_see_a_table(capsys):
-    assert main(["list", "robots"]) == 0
-    assert "duckiebot" in capsys.readouterr().out
+FOREIGN = "code that is not proxytune's ended the command"
 
 
 @pytest.mark.parametrize(
-    ("problem", "status"),
-    [(SettingsError("a: b"), 2), (ScoresError("a: b"), 2), (StoreError("a: b"), 1), (EpisodeError("a: b"), 1)],
+    ("problem", "status", "told"),
+    [
+        (SettingsError("a: b"), BAD_INPUT, "a: b\n"),
+        (ScoresError("a: b"), BAD_INPUT, "a: b\n"),
+        (StoreError("a: b"), FAILED, "a: b\n"),
+        (EpisodeError("a: b"), FAILED, "a: b\n"),
+        (SystemExit(0), FAILED, f"{FOREIGN} (SystemExit: 0)"),
+        (KeyboardInterrupt("mine"), FAILED, f"{FOREIGN} (KeyboardInterrupt: mine)"),
+        (MemoryError("7.28 TiB"), FAILED, "memory ran out (MemoryError: 7.28 TiB); ask for less"),
+        (OSError(36, "File name too long", "a\nb"), FAILED, "the system refused something (OSError: "),
+    ],
 )
-def test_a_mistake_is_one_line_on_standard_error(failing, capsys, problem, status):
+def test_a_mistake_and_a_trouble_that_nobody_named_are_one_line(failing, refused, problem, status, told):
     failing(problem)
-    assert main(["list", "robots", "--json"]) == status
-    out = capsys.readouterr()
-    assert out.out == ""
-    assert out.err == "proxytune list: a: b\n"
+    assert refused("list", "robots", "--json", status=status).startswith(f"proxytune list: {told}")
 
 
-def test_an_interruption_says_whether_the_same_command_goes_on(failing, capsys, monkeypatch):
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({}, "nothing was written; run the same command to start again"),
+        ({"resumes": True}, "everything finished is kept; run the same command to continue"),
+        ({"kept": "half of it is there"}, "half of it is there; run the same command to start again"),
+    ],
+)
+def test_an_interruption_says_whether_the_same_command_goes_on(failing, refused, monkeypatch, changes, told):
     failing(Interrupted())
-    assert main(["list", "robots"]) == 130
-    assert "nothing was written; run the same command to start again" in capsys.readouterr().err
-    monkeypatch.setitem(COMMANDS, "list", COMMANDS["list"]._replace(resumes=True))
-    assert main(["list", "robots"]) == 130
-    assert "everything finished is kept; run the same command to continue" in capsys.readouterr().err
-    monkeypatch.setitem(COMMANDS, "list", COMMANDS["list"]._replace(resumes=False, kept="half of it is there"))
-    assert main(["list", "robots"]) == 130
-    assert "half of it is there; run the same command to start again" in capsys.readouterr().err
-
-
-def test_help_loads_no_library_that_only_commands_need(tmp_path):
-    heavy = "pybullet", "sklearn", "skopt", "scipy", "pandas", "matplotlib", "numpy"
-    line = f"import sys, proxytune.cli.main as m; m.parser([]); print([n for n in {heavy} if n in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", line], capture_output=True, text=True, check=True, cwd=os.getcwd())
-    assert done.stdout == "[]\n"
+    monkeypatch.setitem(COMMANDS, "list", COMMANDS["list"]._replace(**changes))
+    assert told in refused("list", "robots", status=130)
 
 
 def test_what_is_not_json_is_a_defect_and_not_printed(monkeypatch):

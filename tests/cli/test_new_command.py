@@ -1,12 +1,10 @@
 """`new` writes folders that work as they are, and nothing over what is there."""
 
-import json
 import shlex
 import sys
 
 import pytest
 
-from proxytune.cli.main import main
 from proxytune.cli.new import pasteable, read_figures
 from proxytune.errors import InputError
 from proxytune.extensions import load
@@ -15,16 +13,10 @@ SIX = "wheel_radius=0.04,wheel_distance=0.2,full_speed=0.4,motor_time_constant=0
 
 
 @pytest.fixture
-def typed(tmp_path, monkeypatch, capsys):
+def typed(tmp_path, monkeypatch, answered):
     """Runs a command in an empty folder and gives its document."""
     monkeypatch.chdir(tmp_path)
-
-    def run(line):
-        words = shlex.split(line.removeprefix("python -m proxytune "))
-        assert main([*words, "--json"]) == 0, capsys.readouterr().err
-        return json.loads(capsys.readouterr().out)
-
-    return run
+    return lambda line: answered(*shlex.split(line.removeprefix("python -m proxytune ")))
 
 
 def shorten(path, *pairs):
@@ -68,34 +60,31 @@ def test_a_new_family_runs_by_the_commands_that_are_named_and_keeps_every_promis
         sys.modules.pop(module, None)
 
 
-def test_a_family_follows_its_truth_and_refuses_what_it_does_not_know(typed, tmp_path, capsys):
+def test_a_family_follows_its_truth_and_refuses_what_it_does_not_know(typed, tmp_path, refused):
     typed("new family sleds")
     (tmp_path / "sleds" / "truth.toml").write_text("grip = 1.0\n")
-    line = ["measure", "sleds", "--model", "sleds/truth.toml", "--output", "sleds/target.csv"]
-    assert main(line) == 2
-    assert "truth.toml: grip: unknown key" in capsys.readouterr().err
+    line = ("measure", "sleds", "--model", "sleds/truth.toml", "--output", "sleds/target.csv")
+    assert "truth.toml: grip: unknown key" in refused(*line)
 
 
 @pytest.mark.parametrize("words", ["robot rover", "study mine", "family sleighs"])
-def test_the_same_again_is_no_error_until_something_was_edited(typed, tmp_path, words):
+def test_the_same_again_is_no_error_until_something_was_edited(typed, tmp_path, refused, words):
     for _ in range(2):
         typed(f"new {words}")
     (tmp_path / words.split()[1] / "mine.txt").write_text("mine")
-    assert main(["new", *words.split()]) == 2
-
-
-def test_nothing_is_written_over_what_is_there(typed, tmp_path, capsys):
-    (tmp_path / "rover").mkdir()
-    (tmp_path / "rover" / "mine.txt").write_text("mine")
-    assert main(["new", "robot", "rover"]) == 2
-    assert "rover: is there already; choose another name, or move it away" in capsys.readouterr().err
-    assert [path.name for path in (tmp_path / "rover").iterdir()] == ["mine.txt"]
+    name = words.split()[1]
+    assert f"{name}: is there already; choose another name, or move it away" in refused("new", *words.split())
+    assert (tmp_path / name / "mine.txt").read_text() == "mine"
 
 
 BAD = {
     "a path": ("robot sub/rover", "a name has letters, digits, _ and -"),
     "a robot that comes with proxytune": ("robot duckiebot", "a robot of this name comes with proxytune"),
     "a family that is no module": ("family my-family", "a family is a Python module; write _ for -"),
+    **{
+        name: (f"family {name}", f"'{name}': a family is a Python module that is imported by its name")
+        for name in ("class", "None", "_carts")
+    },
     "a family that would hide a module": ("family numpy", "a Python module of this name is installed"),
     "an unknown robot": ("study mine --robot rover", "robot 'rover' is unknown"),
     "a robot without a camera": ("study mine --robot husky", "robot 'husky' has no camera"),
@@ -106,13 +95,10 @@ BAD = {
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_bad_input_is_one_line_and_leaves_nothing(tmp_path, monkeypatch, capsys, case):
+def test_bad_input_is_one_line_and_leaves_nothing(tmp_path, monkeypatch, refused, case):
     line, expected = BAD[case]
     monkeypatch.chdir(tmp_path)
-    assert main(["new", *shlex.split(line)]) == 2
-    out, said = capsys.readouterr()
-    assert expected in said
-    assert (out, said.count("\n")) == ("", 1)
+    assert expected in refused("new", *shlex.split(line))
     assert not list(tmp_path.iterdir())
 
 
@@ -128,10 +114,3 @@ def test_a_long_command_is_broken_so_that_it_can_be_pasted():
     lines = pasteable(command).split("\n")
     assert max(map(len, lines)) <= 80
     assert shlex.split("".join(line.removesuffix("\\") for line in lines)) == shlex.split(command)
-
-
-@pytest.mark.parametrize("name", ["class", "None", "_carts"])
-def test_a_family_that_cannot_be_imported_by_its_name_is_refused(typed, tmp_path, capsys, name):
-    assert main(["new", "family", name]) == 2
-    assert f"'{name}': a family is a Python module that is imported by its name" in capsys.readouterr().err
-    assert not (tmp_path / name).exists()

@@ -5,11 +5,8 @@ import shutil
 
 import foreign_robot
 import pytest
-from processes import besides_progress
 from several import make_several
 from tiny_loop import TWIN, write_tiny
-
-from proxytune.cli.main import main
 
 COMMANDS = {
     "measure": ("measure tiny --model twin.toml --output there", "measure.measure"),
@@ -66,19 +63,12 @@ def here(made_once, tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def refused(capsys, monkeypatch):
+def beforehand(refused, monkeypatch):
     """The one line of a command that is refused before it works."""
 
     def run(words, work):
-        def begins(*_, **__):
-            pytest.fail("the work has begun")
-
-        monkeypatch.setattr(f"proxytune.cli.{work}", begins)
-        assert main(words.split()) == 2
-        out, told = capsys.readouterr()
-        told = besides_progress(told)
-        assert (out, told.count("\n")) == ("", 1)
-        return told
+        monkeypatch.setattr(f"proxytune.cli.{work}", lambda *_, **__: pytest.fail("the work has begun"))
+        return refused(*words.split())
 
     return run
 
@@ -95,49 +85,49 @@ def wanted(name):
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_what_is_of_another_kind_in_the_place_is_told_beforehand(here, refused, name):
+def test_what_is_of_another_kind_in_the_place_is_told_beforehand(here, beforehand, name):
     words, work, place = wanted(name)
     what = "a file" if name in OF_FOLDERS else "a folder"
     put(here / place, what)
-    assert f"{place}: is {what}; give " in refused(words, work)
+    assert f"{place}: is {what}; give " in beforehand(words, work)
 
 
 @pytest.mark.parametrize("name", ["measure", "record"])
-def test_a_pipe_or_a_device_is_not_replaced(here, refused, name):
+def test_a_pipe_or_a_device_is_not_replaced(here, beforehand, name):
     words, work, place = wanted(name)
     put(here / place, "a pipe")
-    assert f"{place}: is a device or a pipe; give " in refused(words, work)
+    assert f"{place}: is a device or a pipe; give " in beforehand(words, work)
     assert (here / place).is_fifo()
 
 
 @pytest.mark.parametrize("name", ["export", "record", "score"])
-def test_a_file_on_the_way_is_told_beforehand(here, refused, name):
+def test_a_file_on_the_way_is_told_beforehand(here, beforehand, name):
     words, work, place = wanted(name)
     (here / "on").write_text("")
-    told = refused(words.replace(place, f"on/the/{place}"), work)
+    told = beforehand(words.replace(place, f"on/the/{place}"), work)
     assert f"on/the/{place}: cannot be written there, as {here / 'on'} is no folder; choose another place" in told
 
 
 @pytest.mark.parametrize("name", ["measure", "record", "score"])
-def test_a_closed_folder_is_told_beforehand(here, refused, monkeypatch, name):
+def test_a_closed_folder_is_told_beforehand(here, beforehand, monkeypatch, name):
     words, work, place = wanted(name)
     monkeypatch.setattr(os, "access", lambda path, mode: path != here)
-    told = refused(words, work)
+    told = beforehand(words, work)
     assert f"{place}: cannot be written there, as {here} is closed to you; choose another place" in told
 
 
 @pytest.mark.parametrize("name", IN_STUDIES)
-def test_what_is_in_the_way_in_a_folder_is_told_beforehand(here, refused, name):
+def test_what_is_in_the_way_in_a_folder_is_told_beforehand(here, beforehand, name):
     words, work, places = IN_STUDIES[name]
     folder = here / next(word for word in reversed(words.split()) if (here / word).is_dir())
     for place, what in places.items():
         put(folder / place, what)
-        assert f"{folder.name}/{place}: is {what}; move it away" in refused(words, work)
+        assert f"{folder.name}/{place}: is {what}; move it away" in beforehand(words, work)
         (folder / place).rmdir() if what == "a folder" else (folder / place).unlink()
 
 
 @pytest.mark.parametrize("name", ["study", "teach", "loop"])
-def test_a_closed_study_is_told_beforehand(here, refused, monkeypatch, name):
+def test_a_closed_study_is_told_beforehand(here, beforehand, monkeypatch, name):
     words, work, _ = IN_STUDIES[name]
     monkeypatch.setattr(os, "access", lambda path, mode: path != here / "tiny")
-    assert f"as {here / 'tiny'} is closed to you; copy the study elsewhere" in refused(words, work)
+    assert f"as {here / 'tiny'} is closed to you; copy the study elsewhere" in beforehand(words, work)

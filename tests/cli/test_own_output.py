@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from proxytune.cli import listing
-from proxytune.cli.main import FAILED, main
+from proxytune.cli.main import main
 from proxytune.cli.terminal import Answer, prints_to_stderr
 
 CHATTER = """
@@ -63,31 +63,3 @@ def test_standard_output_is_back_after_an_error(capfd):
         raise ValueError("x")
     os.write(1, b"here")
     assert capfd.readouterr().out == "here"
-
-
-TROUBLES = {
-    "an exit of code that is not ours": (
-        SystemExit(0),
-        "code that is not proxytune's ended the command (SystemExit: 0)",
-    ),
-    "an interruption by code that is not ours": (
-        KeyboardInterrupt("mine"),
-        "code that is not proxytune's ended the command (KeyboardInterrupt: mine)",
-    ),
-    "too little memory": (MemoryError("7.28 TiB"), "memory ran out (MemoryError: 7.28 TiB); ask for less"),
-    "a refusal of the system": (OSError(36, "File name too long", "a\nb"), "the system refused something (OSError: "),
-}
-
-
-@pytest.mark.parametrize("trouble", TROUBLES)
-def test_a_trouble_that_nobody_named_is_one_line_and_a_failure(trouble, monkeypatch, capsys):
-    problem, told = TROUBLES[trouble]
-
-    def run(arguments):
-        raise problem
-
-    monkeypatch.setattr(listing, "run", run)
-    assert main(["list", "maps"]) == FAILED
-    out, err = capsys.readouterr()
-    assert (out, err.count("\n")) == ("", 1)
-    assert err.startswith(f"proxytune list: {told}")

@@ -1,4 +1,3 @@
-import json
 import shutil
 
 import pytest
@@ -29,54 +28,43 @@ def test_every_figure_is_drawn_again_without_simulating(finished, answered):
     assert (finished / "study.db").read_bytes() == content
 
 
-def test_sweeps_are_drawn_also_where_the_study_itself_has_not_been_run(make_study, capsys):
+def test_sweeps_are_drawn_also_where_the_study_itself_has_not_been_run(make_study, answered):
     folder = make_study()
-    assert main(["sweep", str(folder), "--parameter", "trim", "--points", "2"]) == 0
-    capsys.readouterr()
-    assert main(["plot", str(folder), "--json"]) == 0
+    answered("sweep", folder, "--parameter", "trim", "--points", "2")
     home = folder / "figures"
     drawn = {"figures": [str(home / "sweep_trim.png")], "pages": [str(home / "sweep_trim.html")]}
-    assert json.loads(capsys.readouterr().out) == drawn
+    assert answered("plot", folder) == drawn
     page = (home / "sweep_trim.html").read_text()
     assert f"python -m proxytune plot {folder}" in page
     assert "The others are nominal." in page
 
 
-def test_a_study_that_has_not_been_run_is_told(make_study, capsys):
+def test_a_study_that_has_not_been_run_is_told(make_study, refused):
     folder = make_study()
-    assert main(["plot", str(folder)]) == 2
-    told = capsys.readouterr().err
     hint = f"run the study first: python -m proxytune study {folder}"
-    assert told == f"proxytune plot: {folder / 'study.db'}: no such file; {hint}\n"
+    assert refused("plot", folder) == f"proxytune plot: {folder / 'study.db'}: no such file; {hint}\n"
 
 
-def swept_against(folder, model, capsys, *more):
-    arguments = ["sweep", str(folder), "--points", "2", "--at", "trim=0.1,delay=0.12", "--parameter", *more]
-    assert main([*arguments, "--target-model", str(model)]) == 0
-    capsys.readouterr()
+def figures_of(folder):
     return {path.name: path.read_bytes() for path in (folder / "figures").glob("*.png")}
-
-
-def drawn_again(folder, capsys):
-    shutil.rmtree(folder / "figures")
-    assert main(["plot", str(folder), "--json"]) == 0
-    named = json.loads(capsys.readouterr().out)["figures"]
-    drawn = {path.name: path.read_bytes() for path in (folder / "figures").glob("*.png")}
-    assert sorted(named) == sorted(str(folder / "figures" / name) for name in drawn)
-    return drawn
 
 
 @pytest.mark.slow
 def test_pod_is_drawn_again_without_the_target_model_also_after_the_code_has_changed(
-    make_study, tmp_path, capsys, monkeypatch
+    make_study, tmp_path, answered, monkeypatch
 ):
     folder, model = make_study(family='"echo:echo"'), tmp_path / "truth.toml"
     model.write_text("trim = 0.1\ndelay = 0.12\n")
-    before = swept_against(folder, model, capsys, "all")
+    base = ("--points", "2", "--at", "trim=0.1,delay=0.12")
+    answered("sweep", folder, *base, "--parameter", "all", "--target-model", model)
+    before = figures_of(folder)
     assert {"sweep_trim_4e3f5b_pod.png", "sweep_delay_4e3f5b_pod.png"} < before.keys()
     model.unlink()
     monkeypatch.setattr("wobbly.Wobbly.identity", "code of another day")
-    assert drawn_again(folder, capsys) == before
+    shutil.rmtree(folder / "figures")
+    named = answered("plot", folder)["figures"]
+    assert sorted(named) == sorted(str(folder / "figures" / name) for name in before)
+    assert figures_of(folder) == before
 
 
 def forbidden(self, episode):
@@ -105,10 +93,9 @@ def test_other_metrics_score_the_stored_episodes_anew_into_a_folder_of_their_own
     assert [trial["prpv"] for trial in other["trials"]] != [trial["prpv"] for trial in own["trials"]]
 
 
-def test_a_metric_that_is_not_there_is_one_line_and_draws_nothing(finished, capsys):
-    assert main(["plot", str(finished), "--metric", "distance:max", "--metric", "speed:max"]) == 2
-    told = capsys.readouterr().err
+def test_a_metric_that_is_not_there_is_one_line_and_draws_nothing(finished, refused):
+    told = refused("plot", finished, "--metric", "distance:max", "--metric", "speed:max")
     assert told == "proxytune plot: --metric speed: no such metric; known are: distance, survival_time\n"
-    assert main(["plot", str(finished), "--metric", "distance"]) == 2
-    assert capsys.readouterr().err.startswith("proxytune plot: metric 'distance': write NAME:max or NAME:min")
+    told = refused("plot", finished, "--metric", "distance")
+    assert told.startswith("proxytune plot: metric 'distance': write NAME:max or NAME:min")
     assert not (finished / "rescored").exists()

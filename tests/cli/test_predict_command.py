@@ -59,7 +59,7 @@ def test_people_read_the_error_in_millimetres(folder, model, tmp_path, capsys):
     assert "10 windows of 2 s: RMSE 0.0 mm" in capsys.readouterr().out
 
 
-def test_a_robot_of_its_own_needs_geometry_in_the_model_or_the_log(model, tmp_path, capsys, answered):
+def test_a_robot_of_its_own_needs_geometry_in_the_model_or_the_log(model, tmp_path, refused, answered):
     log = replace(planted_log(TRUTH, episodes=2, seconds=10.0, noise=None), robot="my_robot")
     own = {"wheel_radius": 0.0318, "effective_baseline": 0.16, "full_speed": 0.6}
     theta = {**TRUTH, "motor_lag.time_constant": 0.2}
@@ -69,8 +69,8 @@ def test_a_robot_of_its_own_needs_geometry_in_the_model_or_the_log(model, tmp_pa
     stated = write_log(log, tmp_path / "stated", wheel_radius_m=0.0318, baseline_m=0.16, full_speed_m_s=0.6)
     told = answered("predict", model(theta, "my_robot"), stated, "--output", tmp_path / "p.csv")
     assert told["error"]["value"] < 1e-6
-    assert main(["predict", str(model(theta, "my_robot")), str(bare), "--output", str(tmp_path / "q.csv")]) == 2
-    assert "robot 'my_robot' is unknown" in capsys.readouterr().err
+    line = refused("predict", model(theta, "my_robot"), bare, "--output", tmp_path / "q.csv")
+    assert "robot 'my_robot' is unknown" in line
     assert not (tmp_path / "q.csv").exists()
 
 
@@ -116,15 +116,13 @@ BAD = {
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_bad_input_is_one_line_and_nothing_is_written(case, folder, model, tmp_path, capsys):
+def test_bad_input_is_one_line_and_nothing_is_written(case, folder, model, tmp_path, refused):
     words, says = BAD[case]
     path = model()
     given = [word.format(home=tmp_path, log=folder, model=path) for word in words]
-    assert main(["predict", *given, "--output", str(tmp_path / "p.csv"), "--json"]) == 2
-    out, err = capsys.readouterr()
-    assert (out, err.count("\n")) == ("", 1)
-    assert err.startswith("proxytune predict: ")
-    assert says in err
+    line = refused("predict", *given, "--output", tmp_path / "p.csv")
+    assert line.startswith("proxytune predict: ")
+    assert says in line
     assert not (tmp_path / "p.csv").exists()
 
 

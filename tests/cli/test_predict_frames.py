@@ -1,6 +1,5 @@
 """`predict --frames` draws what a model's camera would have seen, as a log's frames, and says how far off it is."""
 
-import json
 import shutil
 
 import numpy as np
@@ -9,7 +8,6 @@ import pytest
 from pictured import lane_poses, pictures, write_still_frames
 from PIL import Image
 from planted import TRUTH, planted_log, write_log
-from processes import refused
 
 from proxytune.cli.main import main
 from proxytune.effects import Model, model_text
@@ -25,15 +23,10 @@ def stills(tmp_path_factory):
 
 
 @pytest.fixture
-def predicted(stills, tmp_path, capsys):
+def predicted(stills, tmp_path, answered):
     """Predict with these effects, and read the document."""
-
-    def run(theta):
-        path = model(tmp_path, theta)
-        assert main(["predict", str(path), str(stills), "--frames", "--output", str(tmp_path / "out"), "--json"]) == 0
-        return json.loads(capsys.readouterr().out)
-
-    return run
+    words = (stills, "--frames", "--output", tmp_path / "out")
+    return lambda theta: answered("predict", model(tmp_path, theta), *words)
 
 
 def model(folder, theta):
@@ -68,14 +61,14 @@ def test_people_read_the_difference_in_grey_levels(stills, tmp_path, capsys):
     assert "65 frames: mean absolute difference on the floor 0.0 grey levels" in capsys.readouterr().out
 
 
-def test_a_log_without_frames_is_refused(tmp_path, capsys):
+def test_a_log_without_frames_is_refused(tmp_path, refused):
     folder = write_log(planted_log(TRUTH, episodes=1, seconds=5.0), tmp_path / "log")
-    line = refused(capsys, 2, "predict", model(tmp_path, {}), folder, "--frames", "--output", tmp_path / "out")
+    line = refused("predict", model(tmp_path, {}), folder, "--frames", "--output", tmp_path / "out")
     assert "has no frames to predict; add [camera] to log.toml, or leave --frames out" in line
     assert not (tmp_path / "out").exists()
 
 
-def test_frames_alone_have_no_poses_to_predict(stills, tmp_path, capsys):
-    line = refused(capsys, 2, "predict", model(tmp_path, {}), stills, "--output", tmp_path / "poses.csv")
+def test_frames_alone_have_no_poses_to_predict(stills, tmp_path, refused):
+    line = refused("predict", model(tmp_path, {}), stills, "--output", tmp_path / "poses.csv")
     assert "has no commands to predict poses from; give a log of drives, or give --frames" in line
     assert not (tmp_path / "poses.csv").exists()

@@ -1,6 +1,5 @@
 """What is whole of a damaged study is kept, and the study ends as if nothing had happened."""
 
-import json
 import shutil
 import sqlite3
 
@@ -31,55 +30,51 @@ def damaged(folder, statement):
         plain.executescript(statement)
 
 
-def goes_on_as_if_nothing_had_happened(folder, finished, capsys):
-    """The episodes that were driven again."""
-    capsys.readouterr()
-    assert main(["study", str(folder), "--json"]) == 0
-    assert trials(folder) == trials(finished)
-    assert episodes(folder) == episodes(finished)
-    return json.loads(capsys.readouterr().out)["episodes"]["run"]
+@pytest.fixture
+def driven_again(finished, finished_once, answered):
+    """Runs the study, which goes on as if nothing had happened; how many episodes were driven again."""
+
+    def run():
+        document = answered("study", finished)
+        assert trials(finished) == trials(finished_once)
+        assert episodes(finished) == episodes(finished_once)
+        return document["episodes"]["run"]
+
+    return run
 
 
 @pytest.mark.parametrize(
-    "damage",
-    [damage if damage == "an episode" else pytest.param(damage, marks=pytest.mark.slow) for damage in DAMAGES],
+    "damage", [damage if damage == "an episode" else pytest.param(damage, marks=pytest.mark.slow) for damage in DAMAGES]
 )
-def test_what_is_whole_is_kept_and_the_rest_is_made_again_to_the_last_bit(
-    finished, finished_once, capsys, answered, damage
-):
+def test_what_is_whole_is_kept_and_the_rest_is_made_again_to_the_bit(finished, driven_again, refused, answered, damage):
     statement, kept, again = DAMAGES[damage]
     damaged(finished, statement)
     before = (finished / "study.db").read_bytes()
-    assert main(["study", str(finished)]) == 1
-    assert f"python -m proxytune repair {finished}" in capsys.readouterr().err
+    assert f"python -m proxytune repair {finished}" in refused("study", finished, status=1)
     found = answered("repair", finished)
     assert (found["damaged"], found["trials"]) == (True, kept)
     assert (finished / "study.db.damaged").read_bytes() == before
-    assert goes_on_as_if_nothing_had_happened(finished, finished_once, capsys) == again
+    assert driven_again() == again
 
 
-def test_looking_at_a_study_whose_lost_episodes_are_not_driven_yet_says_how_to_drive_them(finished, capsys, answered):
+def test_looking_at_a_study_whose_lost_episodes_are_not_driven_yet_says_how_to_drive_them(finished, refused, answered):
     damaged(finished, DAMAGES["an episode"][0])
     assert answered("repair", finished)["lost"]["episodes"] == 1
-    assert main(["plot", str(finished)]) == 1
     line = "study.db: lacks episodes of trial 4; drive them again: python -m proxytune study"
-    assert line in capsys.readouterr().err
+    assert line in refused("plot", finished, status=1)
 
 
 @pytest.mark.slow
-def test_a_sweep_that_was_deleted_is_told_and_there_again_after_the_same_command(finished, capsys):
-    sweep = ["sweep", str(finished), "--parameter", "trim", "--points", "2", "--json"]
-    assert main(sweep) == 0
-    whole = json.loads(capsys.readouterr().out)["curves"]
+def test_a_sweep_that_was_deleted_is_told_and_there_again_after_the_same_command(finished, capsys, refused, answered):
+    sweep = ("sweep", finished, "--parameter", "trim", "--points", "2")
+    whole = answered(*sweep)["curves"]
     damaged(finished, "DELETE FROM sweeps")
-    for command in (["plot", str(finished)], sweep):
-        assert main(command) == 1
-        assert "is damaged, or was edited by hand: 1 sweep; run: " in capsys.readouterr().err
+    for command in (("plot", finished), sweep):
+        assert "is damaged, or was edited by hand: 1 sweep; run: " in refused(*command, status=1)
     assert main(["repair", str(finished)]) == 0
     said = capsys.readouterr().out
     assert "lost: 1 sweep\na sweep that is lost is there again after the same sweep command" in said
-    assert main(sweep) == 0
-    again = json.loads(capsys.readouterr().out)
+    again = answered(*sweep)
     assert (again["curves"], again["episodes"]["run"]) == (whole, 0)
 
 
@@ -92,25 +87,24 @@ def test_a_whole_study_is_left_as_it_is(finished, capsys):
 
 
 @pytest.mark.parametrize("share", [*(pytest.param(one, marks=pytest.mark.slow) for one in (0.3, 0.6)), 0.95])
-def test_a_database_that_was_cut_off_is_rebuilt_of_what_can_be_read(finished, finished_once, capsys, answered, share):
+def test_a_database_that_was_cut_off_is_rebuilt_of_what_can_be_read(finished, driven_again, refused, answered, share):
     content = (finished / "study.db").read_bytes()
     (finished / "study.db").write_bytes(content[: int(share * len(content))])
-    assert main(["plot", str(finished)]) == 1
+    refused("plot", finished, status=1)
     found = answered("repair", finished)
     assert found["damaged"]
-    again = goes_on_as_if_nothing_had_happened(finished, finished_once, capsys)
-    assert again == 7 * 18 - found["kept"]["episodes"]
+    assert driven_again() == 7 * 18 - found["kept"]["episodes"]
 
 
 @pytest.mark.slow
-def test_a_spoilt_page_costs_what_is_on_it(finished, finished_once, capsys, answered):
+def test_a_spoilt_page_costs_what_is_on_it(finished, driven_again, answered):
     content = bytearray((finished / "study.db").read_bytes())
     page = len(content) // 4096 // 2
     content[page * 4096 : (page + 1) * 4096] = b"?" * 4096
     (finished / "study.db").write_bytes(content)
     found = answered("repair", finished)
     assert found["kept"]["episodes"] > 0
-    goes_on_as_if_nothing_had_happened(finished, finished_once, capsys)
+    driven_again()
 
 
 def test_writes_that_are_still_in_the_log_are_kept_and_the_log_is_set_aside(finished, answered):
@@ -141,11 +135,9 @@ def test_what_was_set_aside_before_is_kept(finished, answered):
     assert {path.name for path in finished.glob("study.db.*")} == {"study.db.damaged", "study.db.damaged1"}
 
 
-def test_somebody_else_s_database_and_none_are_refused(finished, make_study, capsys):
+def test_somebody_else_s_database_and_none_are_refused(finished, refused):
     (finished / "study.db").unlink()
-    assert main(["repair", str(finished)]) == 2
-    assert "no such file; there is nothing to repair" in capsys.readouterr().err
+    assert "no such file; there is nothing to repair" in refused("repair", finished)
     with sqlite3.connect(finished / "study.db") as plain:
         plain.execute("CREATE TABLE photos (name TEXT)")
-    assert main(["repair", str(finished)]) == 1
-    assert "is not a study's database" in capsys.readouterr().err
+    assert "is not a study's database" in refused("repair", finished, status=1)

@@ -169,12 +169,11 @@ def test_settings_of_matplotlib_in_the_current_folder_are_not_read(tmp_path):
     assert done.stdout == f"False {tmp_path}\n", done.stderr
 
 
-def test_an_optional_package_is_found_where_a_study_names_code_as_the_last_place(write, capsys):
+def test_an_optional_package_is_found_where_a_study_names_code_as_the_last_place(write, refused):
     """The modules do sign: this shows that the test above can fail."""
     folder = write(Stranger({**modules("numexpr_not_installed", "json"), "mine.py": "import numexpr_not_installed\n"}))
     (folder / "study.toml").write_text(STUDY.format(**{**PLAIN, "more": ""}).replace('"steady"', '"mine:Agent"'))
-    assert main(["study", str(folder)]) == 2
-    assert "importing mine raised ImportError: not here" in capsys.readouterr().err
+    assert "importing mine raised ImportError: not here" in refused("study", folder)
     assert [name.split(".")[-1] for name in signatures(folder)] == ["numexpr_not_installed"]
     assert sys.path[-1] == str(folder)
     sys.path.remove(str(folder))
@@ -245,12 +244,7 @@ def write_log(folder):
 
 @pytest.mark.parametrize(
     ("command", "where"),
-    [
-        (name, where)
-        for name, words in LOOKING.items()
-        for where in NAMING
-        if where == "robot" or words[1] == "{folder}"
-    ],
+    [(one, where) for one, words in LOOKING.items() for where in NAMING if where == "robot" or words[1] == "{folder}"],
 )
 def test_a_command_that_only_looks_runs_nothing_of_a_folder(naming, command, where, monkeypatch, capsys):
     folder = naming(where)
@@ -276,16 +270,14 @@ from proxytune.effects.motors import Trim as Mine
 """
 
 
-def test_the_effect_that_a_model_names_runs_once_the_user_has_typed_it(tmp_path, monkeypatch, capsys):
-    words = ["export", "model.toml", "--to", "ros", "--output", "out.yaml"]
+def test_the_effect_that_a_model_names_runs_once_the_user_has_typed_it(tmp_path, monkeypatch, refused, answered):
+    words = ("export", "model.toml", "--to", "ros", "--output", "out.yaml")
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.py").write_text(OWN)
     (tmp_path / "model.toml").write_text('format = 1\nrobot = "duckiebot"\n[effects."mine:Mine"]\ntrim = 0.1\n')
-    assert main(words) == 2
-    told = capsys.readouterr().err
+    told = refused(*words)
     assert "module 'mine' is code, and export runs none that a file names; install it as a plug-in, or name it" in told
-    assert told.count("\n") == 1
-    assert main([*words, "--effects", "mine:Mine"]) == 0
+    answered(*words, "--effects", "mine:Mine")
     sys.path.remove(str(tmp_path))
 
 

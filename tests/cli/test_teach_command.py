@@ -3,7 +3,6 @@
 import re
 
 import pytest
-from processes import besides_progress
 from taught import GRID, make_taught
 
 from proxytune.cli.main import main
@@ -69,24 +68,6 @@ def test_prpv_narrows_the_box_first_where_that_is_asked_for(make_study, answered
     assert (folder / "study.db").exists()
 
 
-def refused(command, folder, capsys):
-    """A command ends with one line on bad input and has written nothing; what it says."""
-    before = sorted(folder.rglob("*"))
-    assert main([command, str(folder)]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert len(err.splitlines()) == 1
-    assert sorted(folder.rglob("*")) == before
-    return err.removeprefix(f"proxytune {command}: {folder / 'study.toml'}: ")
-
-
-def edited(folder, before, after):
-    path = folder / "study.toml"
-    assert before in path.read_text()
-    path.write_text(path.read_text().replace(before, after))
-    return folder
-
-
 @pytest.mark.parametrize(
     ("before", "after", "says"),
     [
@@ -100,29 +81,28 @@ def edited(folder, before, after):
         ("trim = -0.3\n", "tilt = 1.0\n", "teaching.proxies.wrong.tilt: unknown parameter; did you mean 'trim'?"),
     ],
 )
-def test_bad_input_is_one_line(make_study, capsys, before, after, says):
-    folder = edited(make_taught(make_study), before, after)
-    assert refused("teach", folder, capsys).startswith(says)
+def test_bad_input_is_one_line_and_nothing_is_written(make_study, refused, before, after, says):
+    folder = make_taught(make_study)
+    path, there = folder / "study.toml", sorted(folder.rglob("*"))
+    assert before in path.read_text()
+    path.write_text(path.read_text().replace(before, after))
+    assert refused("teach", folder).startswith(f"proxytune teach: {path}: {says}")
+    assert sorted(folder.rglob("*")) == there
 
 
-def test_an_expert_that_cannot_drive_is_one_line_and_nothing_is_drawn(make_study, capsys):
+def test_an_expert_that_cannot_drive_is_one_line_and_nothing_is_drawn(make_study, refused):
     folder = make_taught(make_study, domain={"blocked": "0.9"})
-    assert main(["teach", str(folder)]) == 2
-    assert "the expert cannot drive here" in capsys.readouterr().err
+    assert "the expert cannot drive here" in refused("teach", folder)
     assert not (folder / "figures").exists()
 
 
 @pytest.mark.slow
-def test_what_hangs_is_ended_in_one_line_and_the_corrected_command_goes_on(make_study, capsys, answered):
+def test_what_hangs_is_ended_in_one_line_and_the_corrected_command_goes_on(make_study, refused, answered):
     small = {"grid": [0, 20, 40], "starts": "2", "jobs": "2", "family": '"stuck:stuck"', "episode_timeout_s": "1.0"}
     stuck = make_taught(make_study, called="stuck", domain={"faults": '["lesson:1:hangs"]'}, **small)
-    assert main(["teach", str(stuck)]) == 1
-    told = besides_progress(capsys.readouterr().err)
+    told = refused("teach", stuck, status=1)
     assert re.match(r"proxytune teach: .*: the expert's lesson in the (proxy|target) at .*start 1 took longer", told)
     assert told.endswith("or raise episode_timeout_s, and run again to continue\n")
-    assert told.count("\n") == 1
     whole = make_taught(make_study, called="whole", **small)
-    documents = []
-    for folder in (make_taught(make_study, called="stuck", **small), whole):
-        documents.append(answered("teach", folder)["proxies"])
-    assert documents[0] == documents[1]
+    corrected = make_taught(make_study, called="stuck", **small)
+    assert answered("teach", corrected)["proxies"] == answered("teach", whole)["proxies"]

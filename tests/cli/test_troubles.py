@@ -8,7 +8,8 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from processes import besides_progress, episodes, refused, start, trials
+from processes import besides_progress, episodes, start, trials
+from searched import searched
 from stopping import Stopping
 
 from proxytune.cli.main import main
@@ -19,18 +20,11 @@ from proxytune.study import StudyRun, open_study, run_trials
 slow = pytest.mark.slow
 
 
-def interrupted_after(folder, count):
-    """Run a study in this process until it has so many episodes."""
-    study = open_study(folder)
-    with Store.open(folder) as store, pytest.raises(KeyboardInterrupt):
-        study_run = StudyRun(study, store, Stopping(count))
-        run_trials(study_run, make_proposer("gp", study.settings.initial))
-
-
 @pytest.fixture(scope="module")
 def half_once(make_studies):
     folder = make_studies("half")
-    interrupted_after(folder, 80)
+    with pytest.raises(KeyboardInterrupt):
+        searched(open_study(folder), Stopping(80))
     return folder
 
 
@@ -75,10 +69,7 @@ def test_a_write_ahead_log_cut_off_by_a_crash_costs_only_what_was_cut_off(make_s
     os.truncate(log, int(share * log.stat().st_size))
     kept = len(episodes(crashed)) if share else 0
     assert (kept > 0) == (share > 0)
-    with Store.open(crashed) as store:
-        study_run = StudyRun(open_study(crashed), store)
-        run_trials(study_run, make_proposer("gp", 5))
-        spent = study_run.spent
+    spent, _ = searched(open_study(crashed))
     assert spent.episodes == 7 * 18 - kept
     assert (trials(crashed), episodes(crashed)) == (trials(finished), episodes(finished))
 
@@ -150,19 +141,19 @@ def sealed(half):
 
 
 @pytest.mark.slow
-def test_a_read_only_folder_is_told_and_the_study_goes_on_where_it_can_be_written(sealed, finished, capsys):
+def test_a_read_only_folder_is_told_and_the_study_goes_on_where_it_can_be_written(sealed, finished, refused, capsys):
     folder, why = sealed
     before = (folder / "study.db").read_bytes()
     line = f"{folder / 'figures'}: cannot be written there, as {folder} is closed to you; copy the study elsewhere\n"
-    assert refused(capsys, 2, "study", folder) == f"proxytune study: {line}"
-    assert refused(capsys, 2, "study", folder / "study.toml") == f"proxytune study: {line}"
-    told = refused(capsys, 2, "sweep", folder, "--parameter", "trim", "--points", "2")
+    assert refused("study", folder) == f"proxytune study: {line}"
+    assert refused("study", folder / "study.toml") == f"proxytune study: {line}"
+    told = refused("sweep", folder, "--parameter", "trim", "--points", "2")
     assert told == f"proxytune sweep: {line}"
     elsewhere = ("--output", folder.parent / "curves")
-    told = refused(capsys, 1, "sweep", folder, "--parameter", "trim", "--points", "2", *elsewhere)
+    told = refused("sweep", folder, "--parameter", "trim", "--points", "2", *elsewhere, status=1)
     assert told == f"proxytune sweep: {folder}: cannot be written ({why}); copy the study elsewhere\n"
     figure = f"{folder / 'figures' / 'convergence.png'}: the figure cannot be written ({why}); fix that and run again"
-    assert refused(capsys, 1, "plot", folder) == f"proxytune plot: {figure}\n"
+    assert refused("plot", folder, status=1) == f"proxytune plot: {figure}\n"
     assert (folder / "study.db").read_bytes() == before
     elsewhere = shutil.copytree(folder, folder.parent / "elsewhere")
     elsewhere.chmod(0o755)

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from walled import Walled
 from wobbly import Wobbly, wobbly
 
 from proxytune.domain import Episode
@@ -29,15 +30,10 @@ class Seen(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Echo:
-    """A wobbly family, wrapped; a journal tells what was driven and how many commands were replayed."""
+class Echo(Walled):
+    """A wobbly family, wrapped; it drives and replays."""
 
     inner: Wobbly
-
-    def __getattr__(self, name):
-        if name.startswith("__"):
-            raise AttributeError(name)
-        return getattr(object.__getattribute__(self, "inner"), name)
 
     def drive(self, episode: Episode) -> Driven:
         if any(fault.startswith(f"{episode.agent}:{episode.start}:") for fault in self.inner.faults):

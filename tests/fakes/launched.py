@@ -9,10 +9,9 @@ import time
 from contextlib import contextmanager, suppress
 
 from processes import ENVIRONMENT, FAKES, episodes, trials
+from searched import searched
 
-from proxytune.search import make_proposer
-from proxytune.storage import Store
-from proxytune.study import StudyRun, goal_of, open_study, run_trials
+from proxytune.study import open_study
 
 
 class Launched:
@@ -54,11 +53,11 @@ class Launched:
 
 
 @contextmanager
-def launching():
-    """The process that forks the others."""
-    command = [sys.executable, str(FAKES / "launcher.py")]
+def launching(script="launcher.py", **environment):
+    """The process that forks the others, of a script among the fakes, with more in its environment."""
+    command = [sys.executable, str(FAKES / script)]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
-    with subprocess.Popen(command, env=ENVIRONMENT, start_new_session=True, **pipes) as process:
+    with subprocess.Popen(command, env=ENVIRONMENT | environment, start_new_session=True, **pipes) as process:
         yield process
         process.stdin.close()
 
@@ -66,9 +65,5 @@ def launching():
 def never_stopped(make_study, **changes):
     """The study run in this process, in one go: its trials and episodes."""
     folder = make_study("whole", **changes)
-    study = open_study(folder)
-    with Store.open(folder) as store:
-        proposer = make_proposer(study.settings.engine, study.settings.initial, goal_of(StudyRun(study, store)))
-        study_run = StudyRun(study, store)
-        run_trials(study_run, proposer)
+    searched(open_study(folder))
     return trials(folder), episodes(folder)

@@ -8,9 +8,9 @@ import pytest
 from proxytune.errors import InputError
 
 
-def complaint_of(call: Callable[..., Any], *given: Any) -> str:
+def complaint_of(call: Callable[..., Any], *given: Any, **more: Any) -> str:
     """What a call complains of: bad input, in one line."""
     with pytest.raises(InputError) as caught:
-        call(*given)
+        call(*given, **more)
     assert "\n" not in str(caught.value)
     return str(caught.value)

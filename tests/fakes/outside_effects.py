@@ -42,11 +42,7 @@ class WeakReverse:
 NAME = "weak_reverse:WeakReverse"
 
 WRONG = {
-    "no trace": (
-        "    trace: ClassVar[Trace | None] = ",
-        "    track = ",
-        "lacks trace; add",
-    ),
+    "no trace": ("    trace: ClassVar[Trace | None] = ", "    track = ", "lacks trace; add"),
     "a stage in words": (
         "stage: ClassVar[Stage] = Stage.MOTION",
         'stage = "motion"',
@@ -70,11 +66,7 @@ WRONG = {
         "return slowed, None",
         "makes a signal",
     ),
-    "no memory": (
-        "signal[..., 1:]), axis=-1), None",
-        "signal[..., 1:]), axis=-1)",
-        "answers with ndarray; apply must give",
-    ),
+    "no memory": ("signal[..., 1:]), axis=-1), None", "signal[..., 1:]), axis=-1)", "answers with ndarray; apply must"),
     "a bug": ("self.loss)", "self.lost)", "raised AttributeError: .*lost.*; correct its begin and apply"),
     "not neutral": ("(1.0 - self.loss)", "(0.9 - self.loss)", r"changes the signal at its neutral value \[0.0\]"),
     "chance": (
@@ -88,23 +80,11 @@ WRONG = {
         "forward = signal[..., :1] if self.loss < 0.9 else None\n",
         r"raised TypeError: .* at \[0.9\]; correct its begin and apply",
     ),
-    "no cue": (
-        "cues=(Cue.DIRECTION,),",
-        "cues=(),",
-        r"a trace with the cues \(\); give a tuple of at least one",
-    ),
+    "no cue": ("cues=(Cue.DIRECTION,),", "cues=(),", r"a trace with the cues \(\); give a tuple of at least one"),
     "no figure": ("shown=Means(", "shown=(", "is to be shown by .*; give its trace a WheelCurve, or Means with panels"),
     "a panel of no motion": ('"forward"),))', '"speed"),))', "has a panel of the motion 'speed'; take one of forward,"),
-    "a panel of no signal": (
-        '(Panel("forward"',
-        '(Panel("speed"',
-        "a panel of the signal 'speed'; leave it empty,",
-    ),
-    "no panel": (
-        '(Panel("forward", "forward speed [m/s]", "forward"),)',
-        "()",
-        "Means take a Cue and at least one Panel",
-    ),
+    "a panel of no signal": ('(Panel("forward"', '(Panel("speed"', "a panel of the signal 'speed'; leave it empty,"),
+    "no panel": ('(Panel("forward", "forward speed [m/s]", "forward"),)', "()", "take a Cue and at least one Panel"),
     "a form of another": (
         "cues=(Cue.DIRECTION,),",
         'cues=(Cue.DIRECTION,), forms=(Form((("lost",),)),),',

@@ -64,15 +64,3 @@ def episodes(folder):
     with closing(sqlite3.connect(folder / "study.db")) as plain:
         query = "SELECT theta, agent, start, seed, metrics FROM episodes JOIN instances ON instances.id = instance"
         return sorted(plain.execute(query).fetchall())
-
-
-def refused(capsys, status, *words):
-    """The one line on standard error of a command that is run in this process and refused."""
-    from proxytune.cli.main import main
-
-    assert main([str(word) for word in words]) == status
-    out, told = capsys.readouterr()
-    told = besides_progress(told)
-    assert (out, told.count("\n")) == ("", 1)
-    assert "Traceback" not in told
-    return told

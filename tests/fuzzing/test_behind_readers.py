@@ -222,9 +222,7 @@ BEHIND = {
     "png": Reader(write_pictures("png"), ("frames/0.png", "frames/1.png", "frames.csv"), read_frames),
     "jpg": Reader(write_pictures("jpg"), ("frames/0.jpg", "frames/1.jpg"), read_frames, complains=False),
     "predict": Reader(write_model_and_log, ("model.toml",), predict_it),
-    "predict of a log": Reader(
-        write_model_and_log, ("log/log.toml", "log/samples.csv", "log/commands.csv"), predict_it
-    ),
+    "predict of a log": Reader(write_model_and_log, LOG, predict_it),
     "export": Reader(write_model_and_log, ("model.toml",), export_it),
     "diagnose": Reader(write_a_long_log, ("log.toml", "samples.csv", "commands.csv"), diagnose_it),
     "stages": Reader(write_stage, ("one.pickle",), read_stage, complains=False),

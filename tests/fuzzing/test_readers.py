@@ -186,9 +186,7 @@ READERS = {
     "study.db": Reader(copy_finished, ("study.db",), read_study),
     "model.toml": Reader(write("model.toml", MODEL), ("model.toml",), lambda home: read_model(home / "model.toml")),
     "robot.toml": Reader(copy_robot, ("own/robot.toml", "own/duckiebot.urdf"), read_own_robot),
-    "map": Reader(
-        copy(shipped("robots") / "maps"), ("small_loop.toml",), lambda home: read_map(home / "small_loop.toml")
-    ),
+    "map": Reader(copy(shipped("robots") / "maps"), (MAP,), lambda home: read_map(home / MAP)),
     "log": Reader(write_a_log, ("log.toml", "samples.csv", "commands.csv"), read_log),
     "scores": Reader(write("scores.csv", SCORES), ("scores.csv",), read_both),
     "table": Reader(write_tables("csv"), ("run0.csv",), lambda home: read_source(home / "run0.csv", Wanted())),

@@ -8,7 +8,6 @@ import os
 import pytest
 from tiny_loop import write_tiny
 
-from proxytune.cli.main import BAD_INPUT, main
 from proxytune.errors import StoreError
 from proxytune.files import shipped
 from proxytune.loop import open_loop
@@ -21,16 +20,6 @@ TABLE = "agent,episode,distance,survival_time\n" + "".join(
 )
 
 
-def refusal(capsys, *words, status=BAD_INPUT):
-    """The one line that the command says."""
-    assert main(["loop", *map(str, words)]) == status
-    told = capsys.readouterr()
-    assert told.out == ""
-    lines = told.err.splitlines()
-    assert len(lines) == 1, told.err
-    return lines[0]
-
-
 def a_log(folder, text=LOG):
     folder.mkdir()
     (folder / "log.toml").write_text(text)
@@ -39,86 +28,66 @@ def a_log(folder, text=LOG):
     return folder
 
 
-def test_a_log_of_another_robot_is_refused(tmp_path, capsys):
-    line = refusal(capsys, write_tiny(tmp_path / "tiny"), "--log", a_log(tmp_path / "log"))
-    assert "is of the robot 'husky', the study of 'duckiebot'; give a log of 'duckiebot'" in line
+HELD_OUT = '["crawler", "laggy", "edges"]'
+NOBODY_HELD_OUT = (f"held_out = {HELD_OUT}\n", "")
+BLIND = 'format = 1\nrobot = "irobot_create"\nplant = "planar"\n'
+HUSKY = 'format = 1\nrobot = "husky"\nplant = "planar"\n'
+REFUSED = {
+    "a log of another robot": (
+        (), {}, "--log log", "is of the robot 'husky', the study of 'duckiebot'; give a log of 'duckiebot'",
+    ),
+    "a twin without a camera": (
+        (('robot = "duckiebot"\n', ""),), {"twin.toml": BLIND}, "--twin tiny/twin.toml", "camera",
+    ),
+    "a twin of another robot": ((), {"twin.toml": HUSKY}, "", "is 'duckiebot' but the model says 'husky'"),
+    "a twin that is not there": ((), {}, "--twin none.toml", "proxytune loop: --twin none.toml: no such file"),
+    "an agent without a rank": (
+        (NO_TRUTH,), {"target.csv": TABLE}, "", "held_out: the target's table has no scores of 'crawler'; measure them",
+    ),
+    "an agent that is tuned on": (
+        ((HELD_OUT, '["crawler", "laggy", "steady"]'),), {}, "", "held_out: 'steady' is among the agents that",
+    ),
+    "too few agents": (((HELD_OUT, '["crawler", "laggy"]'),), {}, "", "held_out: names 2 of at least 3 agents"),
+    "an agent that is none": (((HELD_OUT, '["crawler", "laggy", "nobody"]'),), {}, "", "held_out: agent 'nobody'"),
+    "a target that can be neither read nor recorded": (
+        (NO_TRUTH, NOBODY_HELD_OUT), {"target.csv": TABLE}, "", "give a log of it by --log LOG, or its model.toml by",
+    ),
+    "a search for learning value": (
+        (('name = "tiny"', 'name = "tiny"\nobjective = "plv"'),), {}, "", "objective: `loop` tunes by scores",
+    ),
+    "a folder that cannot be made": ((), {"loop": "a file"}, "", "loop is no folder; move that away"),
+}  # fmt: skip
+"""Changes of the study, files in its folder, words of the command, and what it says."""
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_cannot_be_used_is_refused_before_anything_is_driven(tmp_path, monkeypatch, refused, case):
+    changes, files, words, says = REFUSED[case]
+    monkeypatch.chdir(tmp_path)
+    write_tiny(tmp_path / "tiny", *changes)
+    a_log(tmp_path / "log")
+    for name, text in files.items():
+        (tmp_path / "tiny" / name).write_text(text)
+    assert says in refused("loop", "tiny", *words.split())
     assert not (tmp_path / "tiny" / "study.db").exists()
 
 
-def test_a_twin_without_a_camera_is_refused(tmp_path, capsys):
-    folder = write_tiny(tmp_path / "tiny", ('robot = "duckiebot"\n', ""))
-    blind = folder / "blind.toml"
-    blind.write_text('format = 1\nrobot = "irobot_create"\nplant = "planar"\n')
-    line = refusal(capsys, folder, "--twin", blind)
-    assert "--twin" in line
-    assert "camera" in line
-
-
-def test_a_twin_of_another_robot_is_refused(tmp_path, capsys):
-    folder = write_tiny(tmp_path / "tiny")
-    (folder / "twin.toml").write_text('format = 1\nrobot = "husky"\nplant = "planar"\n')
-    assert "is 'duckiebot' but the model says 'husky'" in refusal(capsys, folder)
-
-
-def test_a_twin_that_is_not_there_is_refused(tmp_path, capsys):
-    line = refusal(capsys, write_tiny(tmp_path / "tiny"), "--twin", tmp_path / "none.toml")
-    assert line.startswith(f"proxytune loop: --twin {tmp_path / 'none.toml'}: no such file")
-
-
-def test_an_agent_without_a_rank_is_refused(tmp_path, capsys):
-    folder = write_tiny(tmp_path / "tiny", NO_TRUTH)
-    (folder / "target.csv").write_text(TABLE)
-    assert "held_out: the target's table has no scores of 'crawler'; measure them" in refusal(capsys, folder)
-
-
-@pytest.mark.parametrize(
-    ("names", "says"),
-    [
-        ('["crawler", "laggy", "steady"]', "'steady' is among the agents that are tuned on"),
-        ('["crawler", "laggy"]', "names 2 of at least 3 agents"),
-        ('["crawler", "laggy", "nobody"]', "nobody"),
-    ],
-)
-def test_agents_that_cannot_be_held_out_are_refused(tmp_path, capsys, names, says):
-    folder = write_tiny(tmp_path / "tiny", ('["crawler", "laggy", "edges"]', names))
-    line = refusal(capsys, folder)
-    assert "held_out: " in line
-    assert says in line
-
-
-def test_a_target_that_can_be_neither_read_nor_recorded_is_refused(tmp_path, capsys):
-    folder = write_tiny(tmp_path / "tiny", NO_TRUTH, ('held_out = ["crawler", "laggy", "edges"]\n', ""))
-    (folder / "target.csv").write_text(TABLE)
-    assert "give a log of it by --log LOG, or its model.toml by --twin" in refusal(capsys, folder)
-
-
-def test_a_family_without_a_robot_is_refused(make_study, capsys):
-    assert "names no robot" in refusal(capsys, make_study())
-
-
-def test_a_search_for_learning_value_is_refused(tmp_path, capsys):
-    folder = write_tiny(tmp_path / "tiny", ('name = "tiny"', 'name = "tiny"\nobjective = "plv"'))
-    assert "objective: `loop` tunes by scores" in refusal(capsys, folder)
+def test_a_family_without_a_robot_is_refused(make_study, refused):
+    assert "names no robot" in refused("loop", make_study())
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
-def test_a_folder_without_permission_is_refused(tmp_path, capsys):
+def test_a_folder_without_permission_is_refused(tmp_path, refused):
     folder = write_tiny(tmp_path / "tiny")
     folder.chmod(0o500)
     try:
-        assert "cannot be written" in refusal(capsys, folder)
+        assert "cannot be written" in refused("loop", folder)
     finally:
         folder.chmod(0o700)
 
 
-def test_a_folder_that_cannot_be_made_is_refused(tmp_path, capsys):
-    folder = write_tiny(tmp_path / "tiny")
-    (folder / "loop").write_text("a file")
-    assert "loop is no folder; move that away" in refusal(capsys, folder)
-
-
 def test_without_names_the_shipped_agents_that_no_tuning_sees_are_held_out(tmp_path):
-    folder = write_tiny(tmp_path / "tiny", ('held_out = ["crawler", "laggy", "edges"]\n', ""))
+    folder = write_tiny(tmp_path / "tiny", NOBODY_HELD_OUT)
     held_out = open_loop(folder).held_out
     assert {"crawler", "edges", "wary"} <= set(held_out)
     assert not {"steady", "brisk", "daredevil"} & set(held_out)
@@ -126,18 +95,14 @@ def test_without_names_the_shipped_agents_that_no_tuning_sees_are_held_out(tmp_p
 
 def test_shipped_agents_are_held_out_of_a_study_that_names_its_agents_otherwise(tmp_path):
     table = '[agents]\nslow = "steady"\nfast = "brisk"\nwild = "daredevil"\n\n[parameters]'
-    changes = (
-        ('held_out = ["crawler", "laggy", "edges"]\n', ""),
-        ('agents = ["steady", "brisk", "daredevil"]\n', ""),
-        ("[parameters]", table),
-    )
+    changes = (NOBODY_HELD_OUT, ('agents = ["steady", "brisk", "daredevil"]\n', ""), ("[parameters]", table))
     held_out = open_loop(write_tiny(tmp_path / "tiny", *changes)).held_out
     assert {"crawler", "edges", "wary"} <= set(held_out)
     assert not {"steady", "brisk", "daredevil", "slow", "fast", "wild"} & set(held_out)
 
 
 def test_of_a_table_those_agents_are_held_out_that_it_has_beside_the_studys(tmp_path):
-    folder = write_tiny(tmp_path / "tiny", NO_TRUTH, ('held_out = ["crawler", "laggy", "edges"]\n', ""))
+    folder = write_tiny(tmp_path / "tiny", NO_TRUTH, NOBODY_HELD_OUT)
     log = a_log(tmp_path / "log", LOG.replace("husky", "duckiebot"))
     (folder / "target.csv").write_text(TABLE)
     assert open_loop(folder, log=log).held_out == ()
@@ -148,7 +113,7 @@ def test_of_a_table_those_agents_are_held_out_that_it_has_beside_the_studys(tmp_
     assert open_loop(folder, log=log).held_out == ("edges", "laggy", "wary")
 
 
-def test_a_twin_of_which_no_frames_can_be_recorded_is_refused_before_anything_is_driven(tmp_path, capsys):
+def test_a_twin_of_which_no_frames_can_be_recorded_is_refused_before_anything_is_driven(tmp_path, refused):
     changes = (
         ('robot = "duckiebot"', 'robot = "robby"'),
         ("delay = [0.0, 0.3]", "delay = [0.0, 0.3]\nblur = [0.0, 0.1]"),
@@ -159,7 +124,7 @@ def test_a_twin_of_which_no_frames_can_be_recorded_is_refused_before_anything_is
     (folder / "robby").mkdir()
     own = [line.replace("duckiebot", "robby") for line in figures if not line.startswith(("expert_", "urdf"))]
     (folder / "robby" / "robot.toml").write_text("\n".join(own))
-    line = refusal(capsys, folder)
+    line = refused("loop", folder)
     assert "twin.toml: no frames can be recorded" in line
     assert "give a log of it by --log" in line
     assert not (folder / "study.db").exists()

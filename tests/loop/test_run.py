@@ -1,5 +1,6 @@
 """The whole loop: with a diagnosis that is given, then with the real one, killed in every step."""
 
+import functools
 import json
 import os
 import re
@@ -66,16 +67,9 @@ def closed(closed_once, tmp_path):
 
 
 @pytest.fixture
-def close(capsys):
+def close(answered):
     """Run the command; its document."""
-
-    def run(*words):
-        status = main(["loop", *map(str, words), "--json"])
-        told = capsys.readouterr()
-        assert status == 0, told.err
-        return json.loads(told.out)
-
-    return run
+    return functools.partial(answered, "loop")
 
 
 def but_for_times(document):
@@ -202,18 +196,16 @@ def test_where_nothing_is_missing_the_loop_says_so_and_ends(tmp_path, diagnosed,
     assert not (tmp_path / "tiny" / "loop" / "extended").exists()
 
 
-def test_a_target_measured_of_another_twin_is_told_of(closed, capsys):
+def test_a_target_measured_of_another_twin_is_told_of(closed, refused):
     twin = closed / "twin.toml"
     twin.write_text(twin.read_text().replace("0.15", "0.10"))
-    assert main(["loop", str(closed)]) == 2
-    assert "target.csv: was measured of another model" in capsys.readouterr().err
+    assert "target.csv: was measured of another model" in refused("loop", closed)
 
 
 @pytest.mark.slow
-def test_what_depends_on_the_users_own_modules_is_done_again_when_they_change(closed, diagnosed, close, capsys):
+def test_what_depends_on_the_users_own_modules_is_done_again_when_they_change(closed, diagnosed, close, refused):
     (closed / "mine.py").write_text("GAIN = 1.0\n")
-    assert main(["loop", str(closed)]) == 2
-    assert "target.csv: was measured of another model" in capsys.readouterr().err
+    assert "target.csv: was measured of another model" in refused("loop", closed)
     for name in ("target.csv", "study.db"):
         (closed / name).unlink()
     assert {"target", "log", "diagnosis", "held-out scores"} <= set(close(closed)["this_run"]["steps"])

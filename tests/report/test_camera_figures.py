@@ -1,18 +1,13 @@
 """The document, figures and sentences of a camera's diagnosis, on frames whose camera is known."""
 
 import math
-import sys
 import warnings
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.text import Text
-
-sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
-
 from pictured import ROBOT, lane_poses, write_still_frames
+from readable import assert_readable
 
 from proxytune.diagnosis import Blemish, CameraEffect, Estimate, LaidLine, LaidMap
 from proxytune.diagnosis.camera import error as weighing
@@ -101,18 +96,7 @@ def test_brightness_has_no_floor_where_none_is_known(diagnosis):
 
 def test_there_are_four_figures_for_a_column(figures):
     assert set(figures) == {"camera_markings", "camera_displacement", "camera_ranking", "camera_error"}
-    assert all(figure.get_figwidth() * 25.4 == pytest.approx(85.0) for figure in figures.values())
-    texts = [text for figure in figures.values() for text in figure.findobj(Text) if text.get_text()]
-    assert min(text.get_fontsize() for text in texts) >= 6.0
-
-
-def test_no_label_is_cut_and_the_legend_stands_on_none(figures):
-    for figure in figures.values():
-        labels = [label for axes in figure.axes for label in (axes.xaxis.label, axes.yaxis.label, axes.title)]
-        boxes = [label.get_window_extent() for label in labels if label.get_text()]
-        assert all(figure.bbox.x0 - 1 <= box.x0 <= box.x1 <= figure.bbox.x1 + 1 for box in boxes)
-        for legend in figure.legends:
-            assert not any(legend.get_window_extent().overlaps(box) for box in boxes)
+    assert_readable(*figures.values())
 
 
 def test_axes_say_what_they_show_in_which_unit(figures):

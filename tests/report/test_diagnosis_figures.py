@@ -1,20 +1,16 @@
 """Figures of a diagnosis of motion and their captions."""
 
 import re
-import sys
 import warnings
 from dataclasses import replace
 from pathlib import Path
 
+import hidden_cases as hidden
 import numpy as np
 import pytest
 from matplotlib.container import ErrorbarContainer
-from matplotlib.text import Text
-
-sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
-
-import hidden_cases as hidden
 from planted import ROBOT, TRUTH, planted_drives
+from readable import assert_readable
 
 import proxytune
 from proxytune.diagnosis import (
@@ -46,13 +42,7 @@ from proxytune.report.diagnosis.effect_figure import (
     effect_curve,
     refit_beside_curve,
 )
-from proxytune.report.diagnosis.error_figures import (
-    DECLARED_MODEL,
-    MANY_WINDOWS,
-    residual_map,
-    residual_over_time,
-    strayed,
-)
+from proxytune.report.diagnosis.error_figures import DECLARED_MODEL, residual_map, residual_over_time, strayed
 from proxytune.report.diagnosis.figures import JUDGES, SHOWN, learnt_figure, motion_figures, ranking_figure
 from proxytune.report.figure_style import VERMILLION
 from proxytune.report.writing import CAPTIONS
@@ -111,20 +101,8 @@ def test_every_figure_is_drawn_without_a_warning(figures):
     assert set(figures) == {"residual_over_time", "residual_map", "ranking", "effect_curve", "error"}
 
 
-def test_figures_are_as_wide_as_a_column_with_type_of_six_points_and_more(figures):
-    for figure in figures.values():
-        assert figure.get_figwidth() * 25.4 == pytest.approx(85.0)
-        assert min(text.get_fontsize() for text in figure.findobj(Text) if text.get_text()) >= 6.0
-
-
-def test_no_label_is_cut_and_the_legend_lies_within_its_figure_and_on_none(figures):
-    for name, figure in figures.items():
-        labels = [label for axes in figure.axes for label in (axes.xaxis.label, axes.yaxis.label, axes.title)]
-        boxes = [label.get_window_extent() for label in labels if label.get_text()]
-        legends = [legend.get_window_extent() for legend in figure.legends]
-        for box in (*boxes, *legends):
-            assert figure.bbox.x0 - 1 <= box.x0 <= box.x1 <= figure.bbox.x1 + 1, name
-        assert not any(legend.overlaps(box) for legend in legends for box in boxes), name
+def test_figures_can_be_read_in_a_column(figures):
+    assert_readable(*figures.values())
 
 
 def test_axes_say_what_they_show_in_which_unit(figures):
@@ -235,7 +213,6 @@ def test_more_paths_than_can_be_told_apart_become_means_by_place(diagnosis, monk
     assert 0 < len(shown) <= len(both[DECLARED_MODEL].increment)
     rms, rounding = both[DECLARED_MODEL].rms, 1e-12
     assert rms.min() * (1.0 - rounding) <= shown.min() <= shown.max() <= rms.max() * (1.0 + rounding)
-    assert MANY_WINDOWS > 3
 
 
 def dots(axes):

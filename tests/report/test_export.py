@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from export_truth import ROBOT, instance
+from export_truth import ROBOT, driven_by, instance
 
 from proxytune.api.exporting import WRITERS
 from proxytune.driving import AXLES, drivetrain, orientation, read_body, read_robot
@@ -46,23 +46,14 @@ FOUND_OF_CARS = {
         ),
     ],
 )
-def test_mujoco_drives_the_exported_model_as_the_planar_plant_drives_the_instance(
-    robot, theta, commands, share, turned
-):
+def test_mujoco_drives_the_exported_model_as_the_planar_plant_the_instance(robot, theta, commands, share, turned):
     mujoco = pytest.importorskip("mujoco")
     found = instance(robot, **theta)
     train = drivetrain(robot, effects_from(found.theta, robot.figures, robot.catalogue))
     twists, _ = train.apply(commands, train.begin(FilterContext(60.0, np.zeros(2), robot.figures)))
     expected = PlanarPlant(np.zeros(3), 1.0 / 60.0).move(twists)[0]
     model = mujoco.MjModel.from_xml_string(mjcf_text(found))
-    data, poses = mujoco.MjData(model), []
-    for tick, command in enumerate(commands, start=1):
-        data.ctrl[:] = command
-        while data.time < tick / 60.0 - 1e-9:
-            mujoco.mj_step(model, data)
-        w, _, _, z = data.qpos[3:7]
-        poses.append((*data.qpos[:2], 2.0 * np.arctan2(z, w)))
-    poses = np.array(poses)
+    poses = driven_by(mujoco, model, commands)
     driven = np.linalg.norm(np.diff(expected[:, :2], axis=0), axis=1).sum()
     assert np.linalg.norm(poses[:, :2] - expected[:, :2], axis=1).max() < share * driven
     assert abs(np.arctan2(*(f(poses[-1, 2] - expected[-1, 2]) for f in (np.sin, np.cos)))) < turned

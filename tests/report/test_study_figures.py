@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from confirmations import confirmed, planted
-from matplotlib.text import Text
+from readable import assert_readable
 
 from proxytune.report.study.document import study_document
 from proxytune.report.study.figures import (
@@ -150,9 +150,7 @@ def test_what_remains_is_written_above_and_an_unidentified_parameter_is_called_s
 
 @pytest.mark.parametrize("draw", [convergence_figure, profiles_figure, evaluations_figure])
 def test_a_figure_can_be_read_in_one_column_of_a_paper(learnt, draw):
-    figure = draw(confirmed(learnt))
-    assert figure.get_figwidth() * 25.4 == pytest.approx(85.0)
-    assert min(text.get_fontsize() for text in figure.findobj(Text) if text.get_text()) >= 7.0
+    assert_readable(draw(confirmed(learnt)), points=7.0)
 
 
 def shadow(learnt):

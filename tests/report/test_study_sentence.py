@@ -82,8 +82,7 @@ def test_theta_that_makes_a_perfect_proxy_is_found_and_the_least_known_parameter
 
 
 @pytest.mark.parametrize(
-    ("high", "told"),
-    [(-0.5, "perfect proxy. Next"), (0.4, "at most 1 pair worse. "), (1.2, "at most 2 pairs worse. ")],
+    ("high", "told"), [(-0.5, "perfect proxy. Next"), (0.4, "at most 1 pair worse. "), (1.2, "at most 2 pairs worse. ")]
 )
 def test_pairs_that_may_be_worse_are_counted_where_there_may_be_any(high, told):
     assert told in said(excess=Estimate(-8.0, -15.0, high))

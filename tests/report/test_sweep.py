@@ -8,11 +8,10 @@ from io import BytesIO
 
 import numpy as np
 import pytest
-from matplotlib.text import Text
 from PIL import Image
+from readable import assert_readable
 from rich.console import Console
 
-from proxytune.report.html import page_html
 from proxytune.report.sweep import (
     bar_points,
     bars_figure,
@@ -28,7 +27,6 @@ from proxytune.report.sweep import (
     sweep_view,
 )
 from proxytune.report.text import table_text
-from proxytune.report.view import foot_of
 from proxytune.storage import Store
 from proxytune.study import StudyRun, open_study
 from proxytune.sweep import curve_of, discrepancy_study, plan_sweep, run_sweep, sweep_interval, with_target
@@ -188,10 +186,8 @@ def test_the_target_s_own_value_is_marked_only_where_it_is_known(swept):
 
 @pytest.mark.slow
 def test_figures_are_as_wide_as_a_column_with_type_of_six_points_and_more(with_pod, swept):
-    for figure in (panels_figure(with_pod), panels_figure(swept), sweep_figure([swept] * 4), bars_figure([swept] * 4)):
-        assert figure.get_figwidth() * 25.4 == pytest.approx(85.0)
-        figure.draw_without_rendering()
-        assert min(text.get_fontsize() for text in figure.findobj(Text) if text.get_text()) >= 6.0
+    many = sweep_figure([swept] * 4), bars_figure([swept] * 4)
+    assert_readable(panels_figure(with_pod), panels_figure(swept), *many)
 
 
 def test_the_bars_stand_at_the_held_value_and_a_third_of_the_range_beside(make_study, swept):
@@ -243,20 +239,17 @@ def test_axes_name_parameters_in_words_and_bars_write_a_true_minus(swept):
     assert [text.get_text() for text in bars_figure([swept]).axes[0].get_xticklabels()] == ["−0.1", "0.1", "0.3"]
 
 
-EVIL = "<script>alert(1)</script>"
-
-
 @pytest.fixture(scope="module")
 def curves(make_studies):
     folder = make_studies("swept")
     return [curve(folder), curve(folder, "delay")]
 
 
-def view_of(curves, study="s"):
+def view_of(curves):
     image = BytesIO()
     Image.fromarray(np.zeros((4, 4, 3), np.uint8)).save(image, format="png")
     figures = {name: image.getvalue() for name in (*map(curve_name, curves), "sweep_all_x", "sweep_bars_x")}
-    return sweep_view(study, curves, figures, "The others are nominal")
+    return sweep_view("s", curves, figures, "The others are nominal")
 
 
 def test_the_answer_says_where_prpv_is_lowest_and_what_the_others_are_held_at(curves):
@@ -280,7 +273,3 @@ def test_a_flat_curve_asks_for_more_starts_and_claims_no_optimum(curves):
     assert "and at no other value worse beyond noise" in page.sentence
     assert page.next_step.startswith("raise starts, or add agents whose scores change with trim")
     assert "search all parameters" in view_of(curves).next_step
-
-
-def test_names_are_not_taken_for_markup(curves):
-    assert "<script" not in page_html(view_of([replace(curves[0], unit=EVIL)], EVIL), foot_of("sweep"))

@@ -72,26 +72,23 @@ def test_it_can_be_read_while_it_is_written(tmp_path):
     disconnect(writer)
 
 
-def test_an_empty_file_left_by_a_kill_becomes_a_database(tmp_path):
+def test_an_empty_file_left_by_a_kill_says_to_run_the_study_and_becomes_a_database(tmp_path):
     (tmp_path / "study.db").touch()
+    with pytest.raises(StoreError, match="is empty; run the study first"):
+        connect(tmp_path / "study.db", writable=False)
     connection = connect(tmp_path / "study.db", writable=True)
     assert connection.execute("SELECT count(*) FROM trials").fetchone() == (0,)
     connection.close()
 
 
-def test_reading_an_empty_file_says_to_run_the_study(tmp_path):
-    (tmp_path / "study.db").touch()
-    with pytest.raises(StoreError, match="is empty; run the study first"):
-        connect(tmp_path / "study.db", writable=False)
-
-
 def refused(path, expected, writable=True):
     before = path.read_bytes()
-    with pytest.raises(StoreError) as told_error:
+    with pytest.raises(StoreError) as caught:
         connect(path, writable=writable)
-    assert expected in str(told_error.value)
-    assert str(path) in str(told_error.value)
-    assert "\n" not in str(told_error.value)
+    told = str(caught.value)
+    assert expected in told
+    assert str(path) in told
+    assert "\n" not in told
     assert path.read_bytes() == before, "a refused database must stay as it was"
 
 
@@ -153,15 +150,30 @@ def test_the_next_format_takes_nothing_that_is_damaged_from_this_one(with_next_f
         refused(with_next_format, "is damaged, or was edited by hand: 1 fact", writable)
 
 
-def test_somebody_else_s_database_is_refused(tmp_path):
-    with sqlite3.connect(tmp_path / "study.db") as plain:
+def photos(path):
+    with sqlite3.connect(path) as plain:
         plain.execute("CREATE TABLE photos (name TEXT)")
-    refused(tmp_path / "study.db", "is not a study's database; move it away")
 
 
-def test_a_text_file_is_refused(tmp_path):
-    (tmp_path / "study.db").write_text("trial,prpv\n" * 200)
-    refused(tmp_path / "study.db", "is damaged (file is not a database); restore a copy")
+def spoil_a_page(path):
+    content = bytearray(filled(path).read_bytes())
+    content[15 * 4096 : 16 * 4096] = b"?" * 4096
+    path.write_bytes(content)
+
+
+NONE = {
+    "somebody else's": (photos, "is not a study's database; move it away"),
+    "text": (lambda path: path.write_text("trial,prpv\n" * 200), "is damaged (file is not a database); restore a copy"),
+    "one without tables": (lambda path: path.write_bytes(b"S"), "is damaged (it has no tables)"),
+    "one with a spoilt page": (spoil_a_page, "is damaged"),
+}
+
+
+@pytest.mark.parametrize("case", NONE)
+def test_what_is_no_whole_database_is_refused_and_not_begun_anew(tmp_path, case):
+    make, expected = NONE[case]
+    make(tmp_path / "study.db")
+    refused(tmp_path / "study.db", expected)
 
 
 def filled(path):
@@ -172,14 +184,6 @@ def filled(path):
         seal(connection)
     disconnect(connection)
     return path
-
-
-def test_a_database_with_a_spoilt_page_is_refused(tmp_path):
-    path = filled(tmp_path / "study.db")
-    content = bytearray(path.read_bytes())
-    content[15 * 4096 : 16 * 4096] = b"?" * 4096
-    path.write_bytes(content)
-    refused(path, "is damaged")
 
 
 def test_a_folder_that_cannot_be_written_is_told(tmp_path):
@@ -234,11 +238,6 @@ def test_a_part_of_a_page_is_refused_but_not_beside_the_log_that_has_the_whole_o
     assert reader.execute("SELECT count(*) FROM instances").fetchall() == [(3000,)]
     reader.close()
     writer.close()
-
-
-def test_a_file_without_tables_is_refused_and_not_begun_anew(tmp_path):
-    (tmp_path / "study.db").write_bytes(b"S")
-    refused(tmp_path / "study.db", "is damaged (it has no tables)")
 
 
 def test_a_folder_is_refused(tmp_path):

@@ -4,7 +4,7 @@ from dataclasses import replace
 import pytest
 
 from proxytune.domain import Outcome, make_episode
-from proxytune.errors import InputError, StoreError
+from proxytune.errors import StoreError
 from proxytune.storage import Store, SweepRecord, TrialRecord
 from proxytune.storage.store import theta_json
 
@@ -146,11 +146,6 @@ def test_a_sweep_keeps_the_target_model_of_its_pod_beside_the_same_without(tmp_p
         store.save_sweep("identity", SWEEP)
     with Store.read(tmp_path) as store:
         assert store.sweeps() == [("identity", against), ("identity", SWEEP)]
-
-
-def test_a_study_that_has_not_been_run_is_told_how_to_run_it(tmp_path):
-    with pytest.raises(InputError, match=r"study\.db: no such file; run the study first"), Store.read(tmp_path):
-        pass
 
 
 def test_what_cannot_be_written_leaves_everything_as_it_was(tmp_path):

@@ -5,13 +5,12 @@ from pathlib import Path
 import pytest
 
 from proxytune.study.bank import _starts_needed
-from tests.conftest import Answered, MakeStudy
 
 BANK = {"target": None, "preflight": "true", "budget": "10", "engine": None}
 
 
 @pytest.mark.slow
-def test_a_bank_says_what_a_target_would_tell(make_study: MakeStudy, answered: Answered) -> None:
+def test_a_bank_says_what_a_target_would_tell(make_study, answered):
     """Its document has trials, widths, agents and starts in place of an answer, its folder a page and a table."""
     folder = make_study(**BANK)
     found = answered("study", folder)
@@ -27,7 +26,7 @@ def test_a_bank_says_what_a_target_would_tell(make_study: MakeStudy, answered: A
     assert again["bank"] == bank
 
 
-def test_more_trials_are_the_same_design_gone_on_with(make_study: MakeStudy, answered: Answered) -> None:
+def test_more_trials_are_the_same_design_gone_on_with(make_study, answered):
     """A budget that is raised keeps what is there."""
     folder = make_study(**{**BANK, "budget": "6"})
     answered("study", folder)
@@ -35,7 +34,7 @@ def test_more_trials_are_the_same_design_gone_on_with(make_study: MakeStudy, ans
     assert answered("study", folder)["episodes"]["run"] == 3 * 6 * 3
 
 
-def test_starts_needed_follow_from_two_numbers_of_starts() -> None:
+def test_starts_needed_follow_from_two_numbers_of_starts():
     """What trials leave unknown no start makes less."""
     assert _starts_needed({1: 0.1, 4: 0.05}, 20) == 10
     assert _starts_needed({1: 0.1, 4: 0.1}, 20) is None

@@ -6,6 +6,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+from one_line import complaint_of
 
 from proxytune.api import read_study, run_study
 from proxytune.cli.main import main
@@ -13,14 +14,13 @@ from proxytune.errors import ProxytuneError
 from proxytune.storage import Store
 from proxytune.study import StudyRun, open_study, read_study_settings
 from proxytune.study.earlier import BANK_FILE, earlier_trials, learn
-from tests.conftest import MakeStudy
 
 BANK = {"target": None, "preflight": "true", "budget": "10", "engine": None}
 LEARNS = {"learn_from": '["../bank"]', "budget": "0", "engine": None, "confirm": "1"}
 
 
 @pytest.fixture(scope="module")
-def bank(make_studies: MakeStudy) -> Path:
+def bank(make_studies):
     """A bank that has been run."""
     folder = make_studies("bank", **BANK)
     assert main(["study", str(folder), "--json"]) == 0
@@ -28,12 +28,12 @@ def bank(make_studies: MakeStudy) -> Path:
 
 
 @pytest.fixture
-def beside(bank: Path, tmp_path: Path) -> Path:
+def beside(bank, tmp_path):
     """The same bank beside a test's own studies."""
     return Path(shutil.copytree(bank, tmp_path / "bank"))
 
 
-def test_knowledge_alone_answers_without_a_trial(beside: Path, make_study: MakeStudy) -> None:
+def test_knowledge_alone_answers_without_a_trial(beside, make_study):
     """With budget = 0 the document has posterior, answer, misfit and confirmation, and no trial was run."""
     found = run_study(make_study(**LEARNS)).document()
     assert found["trials"] == []
@@ -47,7 +47,7 @@ def test_knowledge_alone_answers_without_a_trial(beside: Path, make_study: MakeS
 
 
 @pytest.mark.slow
-def test_a_study_with_knowledge_has_no_design(beside: Path, make_study: MakeStudy) -> None:
+def test_a_study_with_knowledge_has_no_design(beside, make_study):
     """The first trial is proposed from what is known; the answer knows of earlier trials too."""
     known = run_study(make_study(**{**LEARNS, "budget": "2"})).document()
     alone = run_study(make_study("alone", engine=None, budget="2")).document()
@@ -58,7 +58,7 @@ def test_a_study_with_knowledge_has_no_design(beside: Path, make_study: MakeStud
 
 
 @pytest.mark.slow
-def test_what_is_learnt_is_a_fact(beside: Path, make_study: MakeStudy) -> None:
+def test_what_is_learnt_is_a_fact(beside, make_study):
     """A source that grows, or goes, changes nothing of a study that has learnt from it."""
     folder = make_study(**LEARNS)
     first = run_study(folder).document()
@@ -70,7 +70,7 @@ def test_what_is_learnt_is_a_fact(beside: Path, make_study: MakeStudy) -> None:
 
 
 @pytest.mark.slow
-def test_a_table_knows_what_its_study_knows(beside: Path, make_study: MakeStudy) -> None:
+def test_a_table_knows_what_its_study_knows(beside, make_study):
     """The table that a bank writes gives the same answer as its database, to the digits that it has."""
     first = run_study(make_study(**LEARNS)).document()["best"]["theta_interval"]
     (beside / "study.db").unlink()
@@ -79,7 +79,7 @@ def test_a_table_knows_what_its_study_knows(beside: Path, make_study: MakeStudy)
 
 
 @pytest.mark.slow
-def test_trials_of_another_seed_are_another_placement(beside: Path, make_study: MakeStudy) -> None:
+def test_trials_of_another_seed_are_another_placement(beside, make_study):
     """Trials that share the study's seed have its placement, 0; others one of their own."""
     for seed, placement in (("1", 0), ("2", 1)):
         folder = make_study(f"seed{seed}", **{**LEARNS, "seed": seed})
@@ -88,11 +88,11 @@ def test_trials_of_another_seed_are_another_placement(beside: Path, make_study: 
             assert {one.placement for one in earlier_trials(StudyRun(open_study(folder), store))} == {placement}
 
 
-def _cut_in_half(path: Path) -> None:
+def _cut_in_half(path):
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
 
 
-def _edit_table(folder: Path, **changes: object) -> None:
+def _edit_table(folder, **changes):
     """Leave the source its table alone, in which these keys are others; a function changes what is there."""
     (folder / "study.db").unlink()
     table = json.loads((folder / BANK_FILE).read_text())
@@ -100,20 +100,20 @@ def _edit_table(folder: Path, **changes: object) -> None:
     (folder / BANK_FILE).write_text(json.dumps(table))
 
 
-def _other_code(folder: Path, shift: float) -> None:
+def _other_code(folder, shift):
     """Make the source's table one of other code, whose scores differ by so much."""
-    (folder / "study.db").unlink()
-    table = json.loads((folder / BANK_FILE).read_text())
-    table["facts"]["identity"] = "other"
-    table["trials"] = [
-        [theta, [[one and [value + shift for value in one] for one in row] for row in scores]]
-        for theta, scores in table["trials"]
-    ]
-    (folder / BANK_FILE).write_text(json.dumps(table))
+
+    def shifted(trials):
+        return [
+            [theta, [[one and [value + shift for value in one] for one in row] for row in rows]]
+            for theta, rows in trials
+        ]
+
+    _edit_table(folder, facts=lambda own: own | {"identity": "other"}, trials=shifted)
 
 
 @pytest.mark.slow
-def test_other_code_that_plays_the_same_counts(beside: Path, make_study: MakeStudy) -> None:
+def test_other_code_that_plays_the_same_counts(beside, make_study):
     """Twelve episodes of a source of other code are driven again; where they come out alike it counts."""
     _other_code(beside, 0.0)
     report = run_study(make_study(**LEARNS))
@@ -121,7 +121,11 @@ def test_other_code_that_plays_the_same_counts(beside: Path, make_study: MakeStu
 
 
 BAD = {
-    "another robot": ({}, lambda bank: _set_fact(bank, "domain.robot", '"cart"'), "domain.robot is .*cart.* there"),
+    "another robot": (
+        {},
+        lambda bank: _edit_table(bank, facts=lambda own: own | {"identity": "other", "domain.robot": '"cart"'}),
+        "domain.robot is .*cart.* there",
+    ),
     "other agents": ({"agents": '["agent0", "agent1"]'}, None, "has not driven agent2, agent3"),
     "fewer starts": ({"starts": "2"}, None, "has driven from 2 starts, and this study asks for 3"),
     "other code": ({}, lambda bank: _other_code(bank, 0.5), "its code or versions are others, and agent"),
@@ -132,11 +136,7 @@ BAD = {
         "no table of trials",
     ),
     "a seed below 0": ({}, lambda bank: _edit_table(bank, facts=lambda own: own | {"seed": -1}), "no table of trials"),
-    "other metrics": (
-        {},
-        lambda bank: _edit_table(bank, metrics=["a", "b"]),
-        "has no scores of distance, survival_time",
-    ),
+    "metrics": ({}, lambda bank: _edit_table(bank, metrics=["a", "b"]), "has no scores of distance, survival_time"),
     "θ cut short": (
         {},
         lambda bank: _edit_table(bank, trials=lambda own: [*own[1:], [{"trim": 0.1}, own[0][1]]]),
@@ -154,16 +154,8 @@ BAD = {
 }
 
 
-def _set_fact(folder: Path, key: str, value: str) -> None:
-    """Make the source's table one of another setting, and so of another identity."""
-    (folder / "study.db").unlink()
-    table = json.loads((folder / BANK_FILE).read_text())
-    table["facts"] |= {"identity": "other", key: value}
-    (folder / BANK_FILE).write_text(json.dumps(table))
-
-
 @pytest.mark.parametrize("case", BAD)
-def test_a_source_that_is_none_is_refused(case: str, tmp_path: Path, bank: Path, make_study: MakeStudy) -> None:
+def test_a_source_that_is_none_is_refused(case, tmp_path, bank, make_study):
     """One line names the study.toml or the file, the source, what is wrong and what to do."""
     changes, spoil, words = BAD[case]
     if changes:
@@ -176,13 +168,13 @@ def test_a_source_that_is_none_is_refused(case: str, tmp_path: Path, bank: Path,
     assert "bank" in str(refused.value)
 
 
-def test_a_name_longer_than_a_path_is_refused(make_study: MakeStudy) -> None:
+def test_a_name_longer_than_a_path_is_refused(make_study):
     """No system has such a path: one line, as of any that is not there."""
     with pytest.raises(ProxytuneError, match="no such study or table of trials"):
         run_study(make_study(**{**LEARNS, "learn_from": json.dumps(["a" * 5000])}))
 
 
-def test_a_study_learns_neither_from_itself_nor_in_a_circle(make_study: MakeStudy) -> None:
+def test_a_study_learns_neither_from_itself_nor_in_a_circle(make_study):
     """Both are refused by name."""
     folder = make_study(**{**LEARNS, "learn_from": '["../study"]'})
     with pytest.raises(ProxytuneError, match="is this very study"):
@@ -203,21 +195,20 @@ SETTINGS = {
 
 
 @pytest.mark.parametrize("case", SETTINGS)
-def test_settings_that_know_nothing_are_refused(case: str, make_study: MakeStudy) -> None:
+def test_settings_that_know_nothing_are_refused(case, make_study):
     """One line names the key and says what to do."""
     changes, words = SETTINGS[case]
-    with pytest.raises(ProxytuneError, match=re.escape(words)):
-        read_study_settings(make_study(**changes))
+    assert words in complaint_of(read_study_settings, make_study(**changes))
 
 
-def test_a_bank_is_for_study_alone(beside: Path) -> None:
+def test_a_bank_is_for_study_alone(beside):
     """Commands that need a target refuse it in one line."""
     with pytest.raises(ProxytuneError, match="target: is missing, so this is a bank"):
         run_study(beside)
 
 
 @pytest.mark.slow
-def test_a_damaged_fact_is_told(beside: Path, make_study: MakeStudy) -> None:
+def test_a_damaged_fact_is_told(beside, make_study):
     """What was learnt is not as it was written: one line, no traceback."""
     folder = make_study(**LEARNS)
     run_study(folder)
@@ -233,7 +224,7 @@ OTHER = {"version": '"2"'}
 
 
 @pytest.mark.slow
-def test_trials_of_a_cheaper_proxy_are_known_and_are_no_trials(beside: Path, make_study: MakeStudy) -> None:
+def test_trials_of_a_cheaper_proxy_are_known_and_are_no_trials(beside, make_study):
     """The design is driven all the same; what was copied is a fact; one that does nearly the same tells a lot."""
     folder = make_study(domain=OTHER, **CHEAPER)
     first = run_study(folder).document()
@@ -247,7 +238,7 @@ def test_trials_of_a_cheaper_proxy_are_known_and_are_no_trials(beside: Path, mak
 
 
 @pytest.mark.slow
-def test_a_study_with_a_cheaper_proxy_goes_on_as_if_it_had_not_stopped(beside: Path, make_study: MakeStudy) -> None:
+def test_a_study_with_a_cheaper_proxy_goes_on_as_if_it_had_not_stopped(beside, make_study):
     """Five trials and then three more are the same eight."""
     folder = make_study(domain=OTHER, **{**CHEAPER, "budget": "5"})
     run_study(folder)
@@ -269,22 +260,20 @@ NO_CHEAPER = {
 
 
 @pytest.mark.parametrize("case", NO_CHEAPER)
-def test_a_cheaper_proxy_that_is_none_is_refused(case: str, beside: Path, make_study: MakeStudy) -> None:
+def test_a_cheaper_proxy_that_is_none_is_refused(case, beside, make_study):
     """One line names the key, what is wrong and what to do."""
     changes, domain, words = NO_CHEAPER[case]
-    with pytest.raises(ProxytuneError, match=words) as refused:
-        run_study(make_study(domain=domain, **{**CHEAPER, **changes}))
-    assert str(refused.value).count("\n") == 0
+    assert re.search(words, complaint_of(run_study, make_study(domain=domain, **{**CHEAPER, **changes})))
 
 
-def test_a_cheaper_proxy_takes_the_place_of_half_a_design(make_study: MakeStudy) -> None:
+def test_a_cheaper_proxy_takes_the_place_of_half_a_design(make_study):
     """The default of initial is 4 then, and what is written counts."""
     written = [CHEAPER | {"initial": initial} for initial in (None, "6")]
     assert [read_study_settings(make_study(**one)).initial for one in written] == [4, 6]
     assert read_study_settings(make_study(initial=None)).initial == 8
 
 
-def test_what_the_domain_of_a_cheaper_proxy_has_otherwise_is_said_once(beside: Path, make_study: MakeStudy) -> None:
+def test_what_the_domain_of_a_cheaper_proxy_has_otherwise_is_said_once(beside, make_study):
     """One line when its trials are copied; then they are a fact."""
     folder = make_study(domain=OTHER, **CHEAPER)
     with Store.open(folder) as store:

@@ -3,10 +3,9 @@
 import re
 
 import pytest
-from processes import besides_progress, start, trials
+from processes import besides_progress, start
 
 from proxytune.cli.main import main
-from proxytune.domain import make_episode
 from proxytune.running import episodes
 from proxytune.storage import Store
 
@@ -51,15 +50,6 @@ def test_what_the_machine_lacks_stops_the_study_and_is_not_kept(make_study, caps
     told = besides_progress(capsys.readouterr().err)
     assert re.fullmatch(r"proxytune study: agent 'agent1' from start 1: the machine failed \(MemoryError.*\n", told)
     assert not failures(folder)
-
-
-@pytest.mark.slow
-def test_an_episode_under_way_when_the_study_was_killed_becomes_what_it_would_have_been(make_study, finished):
-    folder = make_study("killed")
-    with Store.open(folder) as store:
-        store.begin_episode("wobbly 1 ()", make_episode({}, agent="agent0", start=0, seed=1))
-    assert main(["study", str(folder)]) == 0
-    assert trials(folder) == trials(finished)
 
 
 @pytest.mark.slow

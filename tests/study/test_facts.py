@@ -3,11 +3,11 @@
 import sqlite3
 
 import pytest
+from searched import changed, searched
 
 from proxytune.errors import SettingsError, StoreError
-from proxytune.search import make_proposer
 from proxytune.storage import Store
-from proxytune.study import StudyRun, check_facts, open_study, run_trials, stored_run, study_facts
+from proxytune.study import StudyRun, check_facts, open_study, stored_run, study_facts
 from proxytune.study.facts import SEARCH, changes, note_search
 
 NOW = {"numpy": "2.0", "pybullet": "3.2.6"}
@@ -19,33 +19,28 @@ def versions(monkeypatch):
     monkeypatch.setattr("wobbly.Wobbly.versions", NOW, raising=False)
 
 
-def resumed(folder):
-    with Store.open(folder) as store:
-        study_run = StudyRun(open_study(folder), store)
-        run_trials(study_run, make_proposer("gp", 5))
-        return study_run.spent, store.trials()
-
-
-def test_another_version_of_a_package_is_told_by_its_name(make_study, versions, monkeypatch):
-    finished = make_study()
-    resumed(finished)
+@pytest.fixture
+def other_pybullet(make_study, versions, monkeypatch):
+    """A finished study, since which there is another PyBullet."""
+    folder = make_study()
+    searched(changed(folder))
     monkeypatch.setattr("wobbly.Wobbly.identity", "wobbly, other PyBullet")
     monkeypatch.setattr("wobbly.Wobbly.versions", {**NOW, "pybullet": "3.2.7"})
+    return folder
+
+
+def test_another_version_of_a_package_is_told_by_its_name(other_pybullet):
     with pytest.raises(SettingsError, match=r"since the first trial: PyBullet 3\.2\.7 \(was 3\.2\.6\); put it back"):
-        resumed(finished)
-    with Store.read(finished) as store:
-        assert stored_run(open_study(finished), store).study.identity == "wobbly 1 ()"
+        searched(changed(other_pybullet))
+    with Store.read(other_pybullet) as store:
+        assert stored_run(open_study(other_pybullet), store).study.identity == "wobbly 1 ()"
 
 
 @pytest.mark.slow
-def test_looking_at_a_study_edited_since_names_the_edit_alone(make_study, versions, monkeypatch):
-    finished = make_study()
-    resumed(finished)
-    monkeypatch.setattr("wobbly.Wobbly.identity", "wobbly, other PyBullet")
-    monkeypatch.setattr("wobbly.Wobbly.versions", {**NOW, "pybullet": "3.2.7"})
+def test_looking_at_a_study_edited_since_names_the_edit_alone(other_pybullet, make_study):
     make_study(seed="3")
-    with Store.read(finished) as store, pytest.raises(SettingsError, match=r"trial: seed \(was 1\); put"):
-        stored_run(open_study(finished), store)
+    with Store.read(other_pybullet) as store, pytest.raises(SettingsError, match=r"trial: seed \(was 1\); put"):
+        stored_run(open_study(other_pybullet), store)
 
 
 def test_versions_of_a_family_that_is_told_something_else_go_without_saying(make_study, versions, monkeypatch):
@@ -82,7 +77,7 @@ def code(monkeypatch):
 def test_which_search_proposed_which_trials_is_kept_and_a_change_is_told_but_not_refused(make_study, code, monkeypatch):
     folder = make_study()
     assert (noted(folder), searches(folder)) == ("", [(1, "one")])
-    resumed(folder)
+    searched(changed(folder))
     make_study(budget="9")
     assert (noted(folder), searches(folder)) == ("", [(1, "one")])
     code("two")
@@ -92,7 +87,7 @@ def test_which_search_proposed_which_trials_is_kept_and_a_change_is_told_but_not
     assert searches(folder) == [(1, "one"), (8, "two")]
     monkeypatch.setattr("proxytune.study.facts.versions_of", lambda packages: dict.fromkeys(packages, "9"))
     assert "scikit-learn 9 (was " in noted(folder)
-    assert len(resumed(folder)[1]) == 9
+    assert len(searched(changed(folder))[1]) == 9
 
 
 @pytest.mark.slow
@@ -100,7 +95,7 @@ def test_a_search_that_proposed_nothing_is_forgotten(finished, make_study, code)
     make_study(budget="8")
     noted(finished)
     make_study(budget="9")
-    resumed(finished)
+    searched(changed(finished))
     make_study(budget="10")
     code("two")
     noted(finished)
@@ -115,7 +110,7 @@ def test_a_search_that_proposed_nothing_is_forgotten(finished, make_study, code)
 def test_a_change_is_told_whatever_the_objective(make_study, code):
     folder = make_study(objective='"ppv"')
     noted(folder)
-    resumed(folder)
+    searched(changed(folder))
     make_study(objective='"ppv"', budget="9")
     code("two")
     assert noted(folder).startswith("trials from 8 on are proposed by another search")
@@ -132,9 +127,7 @@ def test_nothing_is_said_or_kept_of_the_search_once_all_trials_are_proposed(fini
     ("fact", "value"),
     [(SEARCH, 7), (SEARCH, {"a": 1}), (SEARCH, [7]), (SEARCH, [{"first_trial": "x"}]), ("versions", [1])],
 )
-def test_what_code_a_study_was_made_by_is_refused_in_one_line_where_it_is_not_as_we_write_it(
-    finished, make_study, fact, value
-):
+def test_facts_of_the_code_that_are_not_as_we_write_them_are_refused_in_one_line(finished, make_study, fact, value):
     make_study(budget="9")
     with Store.open(finished) as store:
         store.save_fact(fact, value)

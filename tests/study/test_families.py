@@ -47,8 +47,3 @@ def test_the_highest_plv_teaches_best_and_more_samples_beyond_noise_are_worse():
         "cannot": Lesson({}, failure="the expert cannot drive here"),
     }
     assert compared(family("best"), lessons=lessons).teaches == BestFamilies("best", ("near",))
-
-
-def test_without_a_known_plv_nobody_teaches_best():
-    assert compared(family("a"), lessons={"a": Lesson({}, 1.0)}).teaches == BestFamilies()
-    assert compared(family("a")).teaches == BestFamilies()

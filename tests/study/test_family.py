@@ -3,11 +3,11 @@
 import sqlite3
 
 import pytest
+from one_line import complaint_of
 from wobbly import Wobbly
 
 from proxytune.api.driving import drive
 from proxytune.api.study import run_study
-from proxytune.cli.main import main
 from proxytune.domain import make_episode
 from proxytune.errors import ExtensionError, InputError, SettingsError
 from proxytune.study import load_family, open_study, read_study_settings, study_facts
@@ -60,11 +60,9 @@ BAD = {
 @pytest.mark.parametrize("case", BAD)
 def test_every_mistake_gets_one_line_with_file_and_key(make_study, case):
     changes, expected = BAD[case]
-    with pytest.raises(InputError) as told:
-        load(make_study(**changes))
-    assert expected in str(told.value)
-    assert "study.toml: " in str(told.value)
-    assert "\n" not in str(told.value)
+    told = complaint_of(load, make_study(**changes))
+    assert expected in told
+    assert "study.toml: " in told
 
 
 FAULTY = """
@@ -99,10 +97,8 @@ def test_what_a_foreign_family_does_wrong_is_one_line_with_its_name(make_study, 
     number = list(FAULTS).index(case)
     folder = make_study(family=f'"faulty_{number}:make"')
     (folder / f"faulty_{number}.py").write_text(FAULTY.format(fault=fault))
-    with pytest.raises(InputError) as told:
-        load(folder)
-    assert f"study.toml: family: {expected.format(n=number)}" in str(told.value).replace("parameters['delay'] ", "")
-    assert "\n" not in str(told.value)
+    told = complaint_of(load, folder).replace("parameters['delay'] ", "")
+    assert f"study.toml: family: {expected.format(n=number)}" in told
 
 
 ALIASES = (("good", "agent0"), ("bad", "agent1"))
@@ -219,12 +215,9 @@ def test_an_unknown_agent_behind_an_alias_is_told_with_its_key(aliased):
         open_study(aliased(TABLE.replace('"agent5"', "5")))
 
 
-def test_measuring_and_driving_know_the_aliases(aliased, tmp_path, capsys):
+def test_measuring_and_driving_know_the_aliases(aliased, tmp_path, answered):
     folder = aliased()
     (tmp_path / "model.toml").write_text("trim = 0.1\n")
-    assert (
-        main(["measure", str(folder), "--model", str(tmp_path / "model.toml"), "--output", str(tmp_path / "t.csv")])
-        == 0
-    )
+    answered("measure", folder, "--model", tmp_path / "model.toml", "--output", tmp_path / "t.csv")
     assert (tmp_path / "t.csv").read_text().splitlines()[1].startswith("a0,0,")
     assert drive(folder, "a3").scores == drive(folder, "agent3").scores

@@ -12,12 +12,12 @@ import pytest
 from launched import Launched
 from partly_dead import ordered_study
 from processes import besides_progress, episodes, finished_episodes, trials, wait_for
+from searched import searched
 
 from proxytune.cli.main import main
 from proxytune.running import Silent
-from proxytune.search import make_proposer
 from proxytune.storage import Store
-from proxytune.study import StudyRun, open_study, read_study_settings, run_trials
+from proxytune.study import open_study, read_study_settings
 from proxytune.study.study_run import measure_agents
 
 FAMILY = {"family": '"convoy:convoy"'}
@@ -191,17 +191,10 @@ def test_killed_in_the_middle_of_a_fleet_nothing_finished_is_driven_again_and_th
 
 @pytest.fixture(scope="module")
 def one_by_one(make_studies):
-    """The trials of a study with pruning, agent by agent, and what it cost, by its changes; run once for each."""
-    return functools.cache(lambda **keys: pruned(ordered_study(make_studies, f"alone{len(keys)}", **keys)))
-
-
-def pruned(folder):
-    """The trials of a study with pruning, and how many episodes it took."""
-    study = open_study(folder)
-    with Store.open(folder) as store:
-        run = StudyRun(study, store)
-        run_trials(run, make_proposer("gp", study.settings.initial))
-        return store.trials(), run.spent
+    """What a study with pruning cost, agent by agent, and its trials, by its changes; run once for each."""
+    return functools.cache(
+        lambda **keys: searched(open_study(ordered_study(make_studies, f"alone{len(keys)}", **keys)))
+    )
 
 
 @pytest.mark.slow
@@ -210,9 +203,9 @@ def test_waves_of_any_size_prune_the_trials_that_agent_by_agent_prunes_at_the_sa
     make_study, one_by_one, monkeypatch, wave, keys
 ):
     """Those beside the last agent that was needed are driven in vain, and no trial stands on them."""
-    expected, least = one_by_one(**{key: value for key, value in keys.items() if key != "jobs"})
+    least, expected = one_by_one(**{key: value for key, value in keys.items() if key != "jobs"})
     monkeypatch.setattr("proxytune.study.study_run.WAVE", wave)
-    found, spent = pruned(ordered_study(make_study, family='"partly_dead:ordered_fleet"', **keys))
+    spent, found = searched(open_study(ordered_study(make_study, family='"partly_dead:ordered_fleet"', **keys)))
     assert found == expected
     assert any(trial.state == "cut" for trial in found)
     assert spent.episodes - spent.unused == least.episodes - least.unused

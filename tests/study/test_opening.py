@@ -3,14 +3,17 @@
 The target's table as people have it: in several files, with names of its own.
 """
 
+import re
+
 import numpy as np
 import pytest
+from one_line import complaint_of
+from searched import looked_at, searched
 
-from proxytune.errors import InputError, SettingsError
+from proxytune.errors import InputError
 from proxytune.report.study.page import usefulness_table
-from proxytune.search import make_proposer
 from proxytune.storage import Store
-from proxytune.study import PRPV, StudyRun, goal_of, open_study, result_of, run_trials, study_facts
+from proxytune.study import PRPV, StudyRun, open_study, result_of, study_facts
 from proxytune.study.answer import run_confirmation
 from proxytune.study.facts import changes
 
@@ -26,12 +29,9 @@ NEARNESS = Measure(key="nearness", name="nearness", title="largest error of a me
 """
 
 
-def run(folder, engine):
-    study = open_study(folder)
-    with Store.open(folder) as store:
-        study_run = StudyRun(study, store)
-        run_trials(study_run, make_proposer(engine, study.settings.initial, goal_of(study_run)))
-        return study_run, result_of(study_run)
+def run(folder):
+    searched(open_study(folder))
+    return looked_at(open_study(folder))
 
 
 @pytest.fixture
@@ -48,15 +48,15 @@ def own(make_study):
 
 @pytest.mark.parametrize("engine", [pytest.param("gp", marks=pytest.mark.slow), "outcomes"])
 def test_a_measure_of_one_s_own_is_made_large_and_kept_with_every_trial(own, engine):
-    study_run, result = run(own(engine=f'"{engine}"'), engine)
+    folder = own(engine=f'"{engine}"')
+    result = run(folder)
     values = [trial.measures["mine:NEARNESS"] for trial in result.trials]
     assert [trial.score for trial in result.trials] == [-value for value in values]
-    for trial, value in zip(result.trials, values, strict=True):
-        proxy = study_run.evaluation_of(trial).proxy.arrange(agents=study_run.study.target.agents)
-        assert (
-            value
-            == -np.abs(proxy.select(study_run.study.target.metrics[:2]).means - study_run.study.target.means).max()
-        )
+    target = result.study.target
+    with Store.read(folder) as store:
+        for trial, value in zip(result.trials, values, strict=True):
+            proxy = StudyRun(result.study, store).evaluation_of(trial).proxy.arrange(agents=target.agents)
+            assert value == -np.abs(proxy.select(target.metrics[:2]).means - target.means).max()
     assert max(values[5:]) > max(values[:5]), "the search gets nearer than its design"
     assert all(set(trial.measures) == {"mine:NEARNESS", "prpv", "ppv"} for trial in result.trials)
 
@@ -64,9 +64,9 @@ def test_a_measure_of_one_s_own_is_made_large_and_kept_with_every_trial(own, eng
 @pytest.mark.slow
 def test_its_value_is_told_in_the_search_and_on_fresh_episodes(own):
     folder = own(confirm="1")
-    study_run, _ = run(folder, "gp")
+    run(folder)
     with Store.open(folder) as store:
-        again = StudyRun(study_run.study, store)
+        again = StudyRun(open_study(folder), store)
         run_confirmation(again)
         result = result_of(again)
     searched, fresh = usefulness_table(result).rows[:2]
@@ -78,13 +78,13 @@ def test_its_value_is_told_in_the_search_and_on_fresh_episodes(own):
 
 @pytest.mark.slow
 def test_ppv_is_an_objective_too(make_study):
-    _, result = run(make_study(objective='"ppv"'), "gp")
+    result = run(make_study(objective='"ppv"'))
     assert [trial.score for trial in result.trials] == [trial.ppv for trial in result.trials]
 
 
 @pytest.mark.slow
 def test_no_trial_is_cut_off_by_another_objective_than_prpv(own):
-    _, result = run(own(cut_off="true", budget="9"), "gp")
+    result = run(own(cut_off="true", budget="9"))
     assert {trial.state for trial in result.trials} == {"finished"}
 
 
@@ -118,10 +118,9 @@ def test_what_is_no_objective_or_engine_of_a_study_is_one_line_with_file_and_key
     name, expected = {"objective": BAD, "engine": ENGINES}[key][case]
     folder = make_study(**{key: name})
     (folder / "mine.py").write_text(OWN)
-    with pytest.raises(SettingsError, match=expected) as caught:
-        open_study(folder)
-    assert f"study.toml: {key}: " in str(caught.value)
-    assert "\n" not in str(caught.value)
+    told = complaint_of(open_study, folder)
+    assert f"study.toml: {key}: " in told
+    assert re.search(expected, told)
 
 
 WRONG = {
@@ -139,9 +138,8 @@ def test_what_a_measure_of_one_s_own_does_wrong_is_told_with_file_and_key_before
         f"def wrong(proxy, target, metrics):\n    return {formula}\n\n\n"
         'WRONG = Measure("wrong", "Wrong", "wrong", "lower", "", ".2f", on_means=wrong)\n'
     )
-    with pytest.raises(SettingsError, match=f"study.toml: objective: measure 'mine:WRONG' {WRONG[formula]}") as told:
-        open_study(folder)
-    assert "\n" not in str(told.value)
+    expected = f"study.toml: objective: measure 'mine:WRONG' {WRONG[formula]}"
+    assert re.search(expected, complaint_of(open_study, folder))
 
 
 STUDY_OPENING_BAD = {
@@ -149,9 +147,7 @@ STUDY_OPENING_BAD = {
         lambda text: "\n".join(line for line in text.splitlines() if line.startswith(("agent,", "agent4"))),
         "target.csv: has no scores of agent0, agent1, agent2, agent3, agent5; add them, or take them out of the study",
     ),
-    "a value is NaN": (lambda text: text.replace("agent2,1,", "agent2,1,nan,#"), "line"),
     "a metric is missing": (lambda text: text.replace("survival_time", "survival"), "no column 'survival_time'"),
-    "it is empty": (lambda text: "", "target.csv: is empty"),
 }
 
 
@@ -160,15 +156,7 @@ def test_a_target_that_does_not_fit_is_refused_in_one_line(make_study, case):
     edit, expected = STUDY_OPENING_BAD[case]
     target = make_study() / "target.csv"
     target.write_text(edit(target.read_text()))
-    with pytest.raises(InputError) as told:
-        open_study(target.parent)
-    assert expected in str(told.value)
-    assert "\n" not in str(told.value)
-
-
-def test_a_missing_target_is_named(make_study):
-    with pytest.raises(InputError, match=r"nowhere\.csv: no such file"):
-        open_study(make_study(target='"nowhere.csv"'))
+    assert expected in complaint_of(open_study, target.parent)
 
 
 def test_agents_of_the_target_that_are_not_in_the_study_do_not_count(make_study):
@@ -222,9 +210,7 @@ def test_agents_that_the_target_lacks_are_left_out_and_named(finished):
     target.write_text("\n".join(kept) + "\n")
     study = open_study(finished)
     assert study.settings.agents == study.target.agents == ("agent0", "agent1", "agent2", "agent3")
-    with Store.read(finished) as store:
-        cautions = result_of(StudyRun(study, store)).cautions
-    assert "the target has no scores of agent4, agent5: left out" in cautions
+    assert "the target has no scores of agent4, agent5: left out" in looked_at(study).cautions
 
 
 def test_the_truth_is_read_but_nothing_depends_on_it(make_study):
@@ -267,13 +253,6 @@ def test_a_target_in_several_files_is_the_one_that_it_would_be_in_one(make_study
     assert study_facts(open_study(folder)) == study_facts(whole)
 
 
-def test_an_episode_in_two_files_is_refused_with_both(make_study, rows):
-    folder = make_study(target='["monday.csv", "tuesday.csv"]')
-    write(folder, monday=[HEAD, *rows], tuesday=[HEAD, rows[0]])
-    with pytest.raises(InputError, match=r"tuesday.csv: line 2: agent 'agent0' has episode '0' twice, once in .*mon"):
-        open_study(folder)
-
-
 def test_columns_have_the_target_s_own_names(make_study, rows):
     whole = open_study(make_study())
     columns = '{ agent = "policy", episode = "trial", distance = "dist_m" }'
@@ -287,11 +266,16 @@ def test_columns_have_the_target_s_own_names(make_study, rows):
 
 
 @pytest.mark.parametrize(
-    ("target", "complaint"), [("[]", "target: must be text"), ("3", "target: must be text"), ("[3]", "list of texts")]
+    ("target", "says"),
+    [
+        ("[]", "target: must be text"),
+        ("3", "target: must be text"),
+        ("[3]", "list of texts"),
+        ('"nowhere.csv"', "nowhere.csv: no such file"),
+    ],
 )
-def test_a_target_of_another_kind_is_refused(make_study, target, complaint):
-    with pytest.raises(InputError, match=complaint):
-        open_study(make_study(target=target))
+def test_a_target_of_another_kind_or_none_is_refused(make_study, target, says):
+    assert says in complaint_of(open_study, make_study(target=target))
 
 
 def test_agents_that_are_on_one_side_only_are_named_on_either(make_study, rows):

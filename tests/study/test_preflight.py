@@ -10,16 +10,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from moody import Moody
+from searched import changed, looked_at, running, searched
 from stopping import Stopping
 
 from proxytune.cli.main import main
 from proxytune.domain import Outcome, make_episode
 from proxytune.errors import EpisodeError, RunError
 from proxytune.running import run_episode
-from proxytune.search import make_proposer
 from proxytune.space import Interval
 from proxytune.storage import Store
-from proxytune.study import StudyRun, goal_of, most_preflight_episodes, open_study, result_of, run_preflight, run_trials
+from proxytune.study import StudyRun, goal_of, most_preflight_episodes, open_study, run_preflight
 from proxytune.study.preflight import (
     LEVEL,
     LOOKS,
@@ -57,13 +57,6 @@ def test_anything_else_goes_on(outcomes):
     check_some_work(outcomes, "the pre-flight")
 
 
-def opened(folder, store):
-    study = open_study(folder)
-    study_run = StudyRun(study, store)
-    run_preflight(study_run)
-    return study
-
-
 def edited(folder, edit):
     target = folder / "target.csv"
     head, *rows = target.read_text().splitlines()
@@ -86,10 +79,9 @@ def with_holes(rows):
 
 
 def test_with_shared_starts_noise_is_what_another_placement_changes(make_study):
-    folder = make_study(preflight="true")
-    with Store.open(folder) as store:
-        study = opened(folder, store)
-        found, pairs = noise_of(StudyRun(study, store)), placement_pairs(StudyRun(study, store))
+    with running(make_study(preflight="true")) as study_run:
+        run_preflight(study_run)
+        found, pairs = noise_of(study_run), placement_pairs(study_run)
     assert found.caution == ""
     assert pairs.shape[1:] == (2, 6, 2)
     # Wobbly's scores wobble by 0.15, so a difference of two means over three starts has a variance of 2 · 0.15² / 3.
@@ -99,12 +91,13 @@ def test_with_shared_starts_noise_is_what_another_placement_changes(make_study):
 
 def test_repeats_of_a_start_on_the_target_make_its_noise_less(make_study):
     folder = make_study(preflight="true")
-    with Store.open(folder) as store:
-        once = noise_of(StudyRun(opened(folder, store), store))
+    with running(folder) as study_run:
+        run_preflight(study_run)
+        once = noise_of(study_run)
         edited(folder, twice)
         study = open_study(folder)
         assert shares_starts(study)
-        again = noise_of(StudyRun(study, store))
+        again = noise_of(StudyRun(study, study_run.store))
     assert again.variance == pytest.approx(0.75 * once.variance)
 
 
@@ -117,10 +110,8 @@ def twice(rows):
 @pytest.mark.slow
 @pytest.mark.parametrize("edit", [means_only, other_starts, with_holes])
 def test_any_other_table_works_and_says_what_it_loses(finished, edit):
-    with Store.read(finished) as store:
-        before = result_of(StudyRun(open_study(finished), store))
-        assert len(before.cautions) == 1  # this study has no pre-flight
-        found = result_of(StudyRun(open_study(edited(finished, edit)), store))
+    assert len(looked_at(open_study(finished)).cautions) == 1  # this study has no pre-flight
+    found = looked_at(open_study(edited(finished, edit)))
     assert not shares_starts(found.study)
     (caution,) = found.cautions
     assert caution.startswith("noise is ")
@@ -131,31 +122,26 @@ def test_any_other_table_works_and_says_what_it_loses(finished, edit):
 
 
 def test_the_spread_between_starts_is_taken_for_noise_only_where_nothing_better_is_known(make_study):
-    folder = make_study(preflight="true")
-    with Store.open(folder) as store:
-        known = noise_of(StudyRun(opened(folder, store), store))
-        unknown = noise_of(StudyRun(open_study(make_study(preflight="false")), store))
+    with running(make_study(preflight="true")) as study_run:
+        run_preflight(study_run)
+        known = noise_of(study_run)
+        unknown = noise_of(StudyRun(open_study(make_study(preflight="false")), study_run.store))
     assert known.caution == ""
     assert unknown.caution.startswith("noise is estimated from the spread between the target's episodes")
 
 
 def test_failed_episodes_of_the_pre_flight_are_left_out(make_study):
-    folder = make_study(domain={"faults": '["agent3:1:raises"]'}, preflight="true")
-    with Store.open(folder) as store:
-        study = opened(folder, store)
-        found = noise_of(StudyRun(study, store))
-        assert np.array_equal(goal_of(StudyRun(study, store)).noise, found.variance.ravel())
+    with running(make_study(domain={"faults": '["agent3:1:raises"]'}, preflight="true")) as study_run:
+        run_preflight(study_run)
+        found = noise_of(study_run)
+        assert np.array_equal(goal_of(study_run).noise, found.variance.ravel())
     assert np.isfinite(found.variance).all()
 
 
 def run(folder, **changes):
-    study = open_study(folder)
-    study = replace(study, settings=replace(study.settings, **changes))
-    with Store.open(folder) as store:
-        study_run = StudyRun(study, store)
+    with running(changed(folder, **changes)) as study_run:
         run_preflight(study_run)
-        spent = study_run.spent
-        return spent, preflight_of(StudyRun(study, store))
+        return study_run.spent, preflight_of(StudyRun(study_run.study, study_run.store))
 
 
 def told(folder, **changes):
@@ -215,26 +201,13 @@ def test_what_need_not_be_run_is_taken_off_the_bar(planted):
 def test_the_trials_are_those_of_a_study_without_it(make_study, finished):
     folder = make_study("checked", preflight="true")
     assert run(folder)[0].episodes > 0
-    trials = []
-    for one in (folder, finished):
-        with Store.open(one) as store:
-            study_run = StudyRun(open_study(one), store)
-            run_trials(study_run, make_proposer("gp", 5))
-            trials.append(store.trials())
-    assert trials[0] == trials[1]
+    assert searched(open_study(folder))[1] == searched(open_study(finished))[1]
 
 
 def test_a_study_whose_trials_have_begun_goes_on_without(finished, make_study):
     make_study(preflight="true")
     spent, found = run(finished)
     assert (spent.episodes, found) == (0, None)
-
-
-def test_it_can_be_turned_off(make_study):
-    folder = make_study(preflight="false")
-    spent, found = run(folder)
-    assert (spent.episodes, found) == (0, None)
-    assert most_preflight_episodes(open_study(folder).settings) == 0
 
 
 def test_failed_episodes_are_left_out_of_the_comparison(make_study):

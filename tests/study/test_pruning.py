@@ -9,12 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from partly_dead import ordered_study
+from searched import changed, looked_at, searched
 
-from proxytune.running import Silent
 from proxytune.scores import Metric
-from proxytune.search import make_proposer
 from proxytune.storage import Store, TrialRecord
-from proxytune.study import StudyRun, open_study, rescored, result_of, run_trials, score_trials
+from proxytune.study import StudyRun, open_study, rescored, score_trials
 from proxytune.study.pruning import pruning_rule, spared
 from proxytune.study.run import stopped
 from proxytune.study.settings import StopRules
@@ -43,14 +42,9 @@ def done(done_once, tmp_path):
     return spent, trials, replace(found, study=open_study(folder))
 
 
-def run(folder, watcher=None, **changes):
-    study = open_study(folder)
-    study = replace(study, settings=replace(study.settings, **changes))
-    with Store.open(folder) as store:
-        study_run = StudyRun(study, store, watcher or Silent())
-        run_trials(study_run, make_proposer("gp", study.settings.initial))
-        spent = study_run.spent
-        return spent, store.trials(), result_of(StudyRun(study, store))
+def run(folder, **changes):
+    study = changed(folder, **changes)
+    return *searched(study), looked_at(study)
 
 
 def test_trials_are_cut_off_after_the_design_and_no_other_episode_is_run(done):
@@ -203,22 +197,12 @@ NEVER, ALWAYS = 1e-9, 1e9
 
 
 def ruled(folder, **rules):
-    study = open_study(folder)
-    return replace(study, settings=replace(study.settings, stop=StopRules(**rules)))
+    return changed(folder, stop=StopRules(**rules))
 
 
 def run_of_stopping(study):
     """The trials, and why there are no more."""
-    with Store.open(study.settings.folder) as store:
-        study_run = StudyRun(study, store)
-        run_trials(study_run, make_proposer("gp", study.settings.initial))
-        return store.trials(), stopped(StudyRun(study, store), store.trials())
-
-
-def test_a_spent_budget_is_said(finished):
-    trials, reason = run_of_stopping(ruled(finished))
-    assert len(trials) == 7
-    assert reason == "the budget of 7 trials is spent"
+    return searched(study)[1], looked_at(study).stopped
 
 
 RULES = {
@@ -257,8 +241,8 @@ def test_time_counts_over_all_runs_and_is_shared_among_jobs(finished):
         taken = sum(outcome.seconds for outcomes in known for outcome in outcomes.values())
         assert stopped(StudyRun(ruled(finished, wall_time_s=0.9 * taken), store), trials)
         assert not stopped(StudyRun(ruled(finished, wall_time_s=1.1 * taken), store), trials)
-        twice = ruled(finished, wall_time_s=0.9 * taken)
-        assert not stopped(StudyRun(replace(twice, settings=replace(twice.settings, jobs=2)), store), trials)
+        twice = changed(finished, stop=StopRules(wall_time_s=0.9 * taken), jobs=2)
+        assert not stopped(StudyRun(twice, store), trials)
 
 
 def test_where_all_trials_failed_nothing_is_said_of_a_gain(finished):

@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 from launched import Launched, never_stopped
-from processes import besides_progress, episodes, finished_episodes, refused, trials, wait_for
+from processes import besides_progress, episodes, finished_episodes, trials, wait_for
 
 from proxytune.cli.main import COMMANDS
 
@@ -74,25 +74,21 @@ def test_a_study_killed_as_soon_as_it_begins_gives_the_trials_of_one_that_was_no
     assert (trials(folder), episodes(folder)) == whole
 
 
-def test_a_second_process_on_the_same_study_is_told_and_the_first_is_not_disturbed(
-    make_study, launcher, capsys, answered
-):
+def test_a_second_process_on_the_same_study_is_told_and_the_first_goes_on(make_study, launcher, refused, answered):
     """A sweep too; looking at it is for everybody."""
     folder = make_study(domain={"sleep": "0.05"}, budget="60")
     first = Launched(launcher, folder)
     wait_for(folder, first, PER_TRIAL + 2)
     line = f"{folder}: another process (process {first.pid}) is running this study; wait for it or stop it\n"
     for words in (("study", folder), ("sweep", folder, "--parameter", "trim")):
-        assert refused(capsys, 1, *words) == f"proxytune {words[0]}: {line}"
+        assert refused(*words, status=1) == f"proxytune {words[0]}: {line}"
     assert len(answered("plot", folder)["trials"]) >= 1
     wait_for(folder, first, finished_episodes(folder) + 2)
     stop(first, signal.SIGINT)  # it was running all the while
 
 
 @pytest.mark.parametrize(("engine", "jobs"), [("gp", "1"), ("outcomes", "2")])
-def test_pre_flight_batches_cut_trials_and_confirmation_survive_being_stopped(
-    make_study, launcher, engine, jobs, answered
-):
+def test_pre_flight_batches_cut_trials_and_confirmation_survive_a_stop(make_study, launcher, engine, jobs, answered):
     """With several jobs, episodes under way when a trial is cut off are kept; no trial stands on them."""
     phases = {"preflight": "true", "confirm": "1", "cut_off": "true", "initial": "4", "budget": "9"}
     keys = {"engine": f'"{engine}"', "batch": "3", "seed": "6", **phases}

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from partly_dead import ordered_study
 from processes import episodes as stored_episodes
+from searched import changed, running, searched
 from stopping import Stopping
 from taught import make_taught
 from telling import Telling
@@ -28,7 +29,6 @@ from proxytune.study import (
     open_study,
     plan_episodes,
     read_study_settings,
-    run_trials,
     study_facts,
     with_spending,
 )
@@ -46,19 +46,9 @@ KEYS = {"batch": str(BATCH), "seed": "4", "engine": '"gp"'}
 """Of a study two trials of one batch of which are cut off."""
 
 
-def changed(folder, **changes):
-    study = open_study(folder)
-    return replace(study, settings=replace(study.settings, **changes))
-
-
 def run(folder, watcher=None, **changes):
     """What it cost, and the trials."""
-    study = changed(folder, **changes)
-    with Store.open(folder) as store:
-        proposer = make_proposer(study.settings.engine, study.settings.initial, goal_of(StudyRun(study, store)))
-        study_run = StudyRun(study, store, watcher or Silent())
-        run_trials(study_run, proposer)
-        return study_run.spent, store.trials()
+    return searched(changed(folder, **changes), watcher)
 
 
 @pytest.fixture(scope="module")
@@ -113,9 +103,8 @@ def test_a_budget_lowered_within_an_open_batch_and_raised_again_changes_nothing(
     assert run(folder)[1] == cutting[2]
 
 
-@pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.slow)])
-def test_interrupted_within_batches_it_goes_on_to_the_same_trials_and_runs_no_episode_twice(make_study, cutting, jobs):
-    folder = ordered_study(make_study, "stopped", **KEYS, jobs=str(jobs))
+def test_interrupted_within_batches_it_goes_on_to_the_same_trials_and_runs_no_episode_twice(make_study, cutting):
+    folder = ordered_study(make_study, "stopped", **KEYS)
     run_before = 0
     for moment, open_ones in ((30, 3), (50, 2), (60, 3), (8, 3)):
         with pytest.raises(KeyboardInterrupt):
@@ -125,7 +114,7 @@ def test_interrupted_within_batches_it_goes_on_to_the_same_trials_and_runs_no_ep
             assert sum(trial.state == "open" for trial in store.trials()) == open_ones
     spent, trials = run(folder)
     assert trials == cutting[2]
-    assert spent.episodes - spent.unused <= cutting[1].episodes - run_before + (jobs > 1) * 9
+    assert spent.episodes <= cutting[1].episodes - run_before
     assert len(stored_episodes(folder)) == spent.episodes + run_before
 
 
@@ -161,21 +150,11 @@ def test_rules_to_stop_are_asked_where_a_batch_has_ended(make_study):
         assert stopped(StudyRun(study, store), trials[:BATCH]).startswith("episodes took")
 
 
-class Listening(Silent):
-    """Keeps what is begun."""
-
-    def __init__(self):
-        self.begun = []
-
-    def begin(self, what, known):
-        self.begun.append(what)
-
-
 def test_what_is_told_of_the_progress_names_the_trials_of_a_batch(make_study):
-    listening = Listening()
-    run(make_study(batch="4", budget="10"), listening)
+    telling = Telling()
+    run(make_study(batch="4", budget="10"), telling)
     expected = ["trials 1 to 4 of 10", "trial 5 of 10", "trials 6 to 9 of 10", "trial 10 of 10"]
-    assert list(dict.fromkeys(listening.begun)) == expected
+    assert list(dict.fromkeys(telling.begun)) == expected
 
 
 def test_a_study_from_before_there_were_batches_goes_on_one_trial_at_a_time_and_no_other_way(finished, make_study):
@@ -194,12 +173,9 @@ THETA = {"trim": 0.05, "delay": 0.1}
 
 
 def simulated(folder, theta=THETA):
-    study = open_study(folder)
-    with Store.open(folder) as store:
-        study_run = StudyRun(study, store)
-        study_run.evaluate(theta, "")
-        spent = study_run.spent
-        return spent, StudyRun(study, store).evaluation(theta)
+    with running(folder) as run:
+        run.evaluate(theta, "")
+        return run.spent, StudyRun(run.study, run.store).evaluation(theta)
 
 
 def test_every_agent_drives_from_every_start_under_common_random_numbers(make_study):
@@ -219,22 +195,6 @@ def test_the_score_is_what_the_usefulness_room_says_of_the_tables(make_study):
     assert found.prpv == prpv(compare(**sides)).value > 0
     assert found.measures["ppv"] == ppv(compare(**sides)).value
     assert found.failures == ()
-
-
-def test_an_episode_that_is_known_is_not_run_again(make_study, tmp_path):
-    folder = make_study(domain={"journal": f'"{tmp_path / "journal"}"'})
-    first, found = simulated(folder)
-    again, same = simulated(folder)
-    assert (first.episodes, again.episodes) == (18, 0)
-    assert (found.prpv, found.measures["ppv"]) == (same.prpv, same.measures["ppv"])
-    assert len((tmp_path / "journal").read_text().splitlines()) == 18
-
-
-def test_an_instance_that_lacks_an_episode_has_no_evaluation_yet(make_study):
-    folder = make_study()
-    simulated(folder)
-    with Store.open(folder) as store:
-        assert StudyRun(open_study(folder), store).evaluation({"trim": 0.0, "delay": 0.0}) is None
 
 
 def test_a_failed_episode_is_left_out_and_none_is_made_up_for_it(make_study):
@@ -286,10 +246,8 @@ def test_scoring_does_not_depend_on_the_order_of_the_outcomes(make_study):
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_after_enough_no_further_episode_begins_and_those_under_way_are_kept(make_study, jobs):
-    study = open_study(make_study(jobs=str(jobs)))
-    planned = plan_episodes(study.settings, THETA, 1)
-    with Store.open(study.settings.folder) as store:
-        study_run = StudyRun(study, store)
+    with running(make_study(jobs=str(jobs))) as study_run:
+        planned = plan_episodes(study_run.settings, THETA, 1)
         known = study_run.outcomes(planned, "", lambda _, known: len(known) >= 5)
         assert known == study_run.known(planned)
         assert study_run.spent.episodes == len(known)
@@ -302,12 +260,11 @@ def test_after_enough_no_further_episode_begins_and_those_under_way_are_kept(mak
 
 def test_where_it_may_be_enough_agents_are_driven_in_their_order(make_study, tmp_path):
     journal = tmp_path / "journal"
-    study = open_study(make_study(domain={"journal": f'"{journal}"'}))
-    planned = plan_episodes(study.settings, THETA, 1)[::-1]
-    with Store.open(study.settings.folder) as store:
-        StudyRun(study, store).evaluate({"trim": 0.0, "delay": 0.0}, "")  # tells which episodes take longest
+    with running(make_study(domain={"journal": f'"{journal}"'})) as study_run:
+        planned = plan_episodes(study_run.settings, THETA, 1)[::-1]
+        study_run.evaluate({"trim": 0.0, "delay": 0.0}, "")  # tells which episodes take longest
         journal.unlink()
-        StudyRun(study, store).outcomes(planned, "", lambda _, known: False)
+        study_run.outcomes(planned, "", lambda _, known: False)
     driven = [line.split()[0] for line in journal.read_text().splitlines()]
     assert driven == [episode.agent for episode in planned]
 
@@ -321,8 +278,7 @@ def test_where_one_instance_has_enough_the_others_go_on_and_agents_begin_in_all_
     def enough(instance, known):
         return instance == short and sum(episode.theta == short for episode in known) >= 7
 
-    with Store.open(study.settings.folder) as store:
-        study_run = StudyRun(study, store)
+    with running(study) as study_run:
         known = study_run.outcomes(planned, "", enough)
     assert study_run.spent.episodes == 18 + 7 + 18
     assert [sum(episode in known for episode in one) for one in plans] == [18, 7, 18]
@@ -332,13 +288,13 @@ def test_where_one_instance_has_enough_the_others_go_on_and_agents_begin_in_all_
 
 def test_where_failures_stop_the_study_an_old_failure_is_not_enough(make_study):
     folder = make_study(domain={"faults": '["agent3:1:raises"]'})
-    study = open_study(folder)
-    planned = plan_episodes(study.settings, THETA, 1)
-    with Store.open(folder) as store:
-        StudyRun(study, store).outcomes(planned, "")
-        stopping = replace(study, settings=replace(study.settings, stop_on_failure=True))
+    with running(folder) as study_run:
+        planned = plan_episodes(study_run.settings, THETA, 1)
+        study_run.outcomes(planned, "")
         with pytest.raises(EpisodeError, match="agent 'agent3'"):
-            StudyRun(stopping, store).outcomes(planned, "", lambda _, known: len(known) == len(planned))
+            StudyRun(changed(folder, stop_on_failure=True), study_run.store).outcomes(
+                planned, "", lambda _, known: len(known) == len(planned)
+            )
 
 
 @pytest.fixture
@@ -376,18 +332,6 @@ def test_the_number_of_jobs_changes_nothing_and_the_seed_and_the_model_do(make_s
     assert (measure_agents(one, model, 1001, Silent()).values != table.values).any()
 
 
-def test_repeats_have_noise_of_their_own_and_the_first_is_what_one_alone_would_be(make_study, model):
-    settings = read_study_settings(make_study())
-    once, thrice = measure_agents(settings, model, 1001, Silent()), measure_agents(settings, model, 1001, Silent(), 3)
-    assert thrice.episodes == ("0/0", "0/1", "0/2", "1/0", "1/1", "1/2", "2/0", "2/1", "2/2")
-    assert thrice.complete
-    assert (thrice.values[:, ::3] == once.values).all()
-    for agent in thrice.values:
-        assert len(np.unique(agent[:, 0])) == 9
-    again = measure_agents(settings, model, 1001, Silent(), 3)
-    assert (again.values == thrice.values).all()
-
-
 def test_a_target_of_repeats_has_a_floor_of_the_same_starts(make_study, model):
     settings = read_study_settings(make_study())
     once, twice = (measure_agents(settings, model, 1001, Silent(), repeats) for repeats in (1, 2))
@@ -407,51 +351,32 @@ def test_a_failing_episode_leaves_no_table(make_study, model):
         measure_agents(settings, model, 1, Silent())
 
 
-def test_a_trial_s_outcome_composes_to_its_prpv(finished):
-    study = open_study(finished)
-    with Store.read(finished) as store:
-        done = store.trials()
-        told = [StudyRun(study, store).search_trial(trial) for trial in done]
-        composed = goal_of(StudyRun(study, store)).compose(np.array([trial.outcome for trial in told]))
-    assert [trial.score for trial in told] == [trial.prpv for trial in done]
-    assert [trial.values for trial in told] == [study.settings.space.values(trial.theta) for trial in done]
-    assert np.array_equal(composed, [trial.prpv for trial in done])
-    assert len(set(composed)) > 1
-
-
 @pytest.mark.parametrize("metrics", ['["survival_time:max"]', '["survival_time:max", "distance:min"]'])
 def test_an_outcome_has_the_study_s_metrics_in_their_order_and_the_target_s_agents(make_study, metrics):
     agents = '["agent5", "agent0", "agent3", "agent1", "agent2", "agent4"]'
-    folder = make_study(agents=agents, metrics=metrics, budget="6")
-    study = open_study(folder)
-    with Store.open(folder) as store:
-        study_run = StudyRun(study, store)
-        run_trials(study_run, make_proposer("sobol", 5))
-        told = [StudyRun(study, store).search_trial(trial) for trial in store.trials()]
+    study = open_study(make_study(agents=agents, metrics=metrics, budget="6", engine='"sobol"'))
+    _, trials = searched(study)
+    with Store.read(study.settings.folder) as store:
+        told = [StudyRun(study, store).search_trial(trial) for trial in trials]
         composed = goal_of(StudyRun(study, store)).compose(np.array([trial.outcome for trial in told]))
-    assert np.array_equal(composed, [trial.score for trial in told])
+    assert [trial.score for trial in told] == [trial.prpv for trial in trials] == composed.tolist()
+    assert [trial.values for trial in told] == [study.settings.space.values(trial.theta) for trial in trials]
+    assert len(set(composed)) > 1
 
 
 def test_a_trial_whose_agent_has_no_episode_lacks_that_agent_s_outputs_alone(make_study):
-    folder = make_study(domain={"faults": '["agent3:*:raises"]'}, budget="6")
-    study = open_study(folder)
-    with Store.open(folder) as store:
-        theta = {"delay": 0.1, "trim": 0.1}
-        StudyRun(study, store).evaluate(theta, "")
-        told = StudyRun(study, store).search_trial(TrialRecord(1, theta, "failed"))
+    with running(make_study(domain={"faults": '["agent3:*:raises"]'})) as study_run:
+        study_run.evaluate(THETA, "")
+        told = study_run.search_trial(TrialRecord(1, THETA, "failed"))
     known = ~np.isnan(told.outcome).reshape(6, 2)
     assert told.score is None
     assert known.all(axis=1).tolist() == [True, True, True, False, True, True]
 
 
 def test_a_trial_without_any_episode_that_worked_has_no_outcome(make_study):
-    folder = make_study(domain={"faults": str([f"agent{n}:*:raises" for n in range(6)])})
-    study = open_study(folder)
-    with Store.open(folder) as store:
-        StudyRun(study, store).evaluate({"delay": 0.1, "trim": 0.1}, "")
-        assert (
-            StudyRun(study, store).search_trial(TrialRecord(1, {"delay": 0.1, "trim": 0.1}, "failed")).outcome is None
-        )
+    with running(make_study(domain={"faults": str([f"agent{n}:*:raises" for n in range(6)])})) as study_run:
+        study_run.evaluate(THETA, "")
+        assert study_run.search_trial(TrialRecord(1, THETA, "failed")).outcome is None
 
 
 def test_the_search_is_told_every_metric_that_both_sides_have_and_prpv_counts_the_study_s_own(finished):

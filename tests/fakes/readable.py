@@ -1,0 +1,17 @@
+"""Figures as the column of a paper takes them."""
+
+import pytest
+from matplotlib.text import Text
+
+
+def assert_readable(*figures, points=6.0):
+    """They are a column wide, with letters of so many points; no label is cut, and no legend stands on one."""
+    for figure in figures:
+        figure.draw_without_rendering()
+        assert figure.get_figwidth() * 25.4 == pytest.approx(85.0)
+        assert min(text.get_fontsize() for text in figure.findobj(Text) if text.get_text()) >= points
+        labels = [label for axes in figure.axes for label in (axes.xaxis.label, axes.yaxis.label, axes.title)]
+        boxes = [label.get_window_extent() for label in labels if label.get_text()]
+        legends = [legend.get_window_extent() for legend in figure.legends]
+        assert all(figure.bbox.x0 - 1 <= box.x0 <= box.x1 <= figure.bbox.x1 + 1 for box in (*boxes, *legends))
+        assert not any(legend.overlaps(box) for legend in legends for box in boxes)

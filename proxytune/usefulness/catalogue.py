@@ -219,7 +219,13 @@ POD_IMAGE = Measure(
     in_paper=True,
 )
 
-MEASURES: tuple[Measure, ...] = (PRPV, PPV, SRCC, KENDALL_TAU, MMRV)
+MEASURES: tuple[Measure, ...] = (
+    PRPV,
+    PPV,
+    SRCC,
+    KENDALL_TAU,
+    MMRV,
+)
 """Those of score tables, in the order in which they are reported; a new one is a module of its own and a line here."""
 PODS = (POD_POSE, POD_IMAGE)
 """Those of the same commands in both domains, which a sweep replays."""

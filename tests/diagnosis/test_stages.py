@@ -139,12 +139,17 @@ def made_one_by_one(monkeypatch, diagnose):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("curved", [False, True])
-def test_a_diagnosis_that_is_killed_after_each_stage_comes_to_the_same_answer(tmp_path, monkeypatch, curved):
-    if curved:
-        log = hidden.make_log(hidden.OUTSIDE[0], episodes=6, seconds=12.0)
-    else:
-        log = planted_log({**TRUTH, "yaw_scrub": 0.12}, episodes=6, seconds=12.0, noise=CALM)
+@pytest.mark.parametrize(
+    "make_log",
+    [
+        lambda: hidden.make_log(hidden.OUTSIDE[0], episodes=6, seconds=12.0),
+        lambda: planted_log({**TRUTH, "yaw_scrub": 0.12}, episodes=6, seconds=12.0, noise=CALM),
+        lambda: planted_log({**TRUTH, "motor_lag.time_constant": 1.6}, episodes=6, seconds=12.0, noise=CALM),
+    ],
+    ids=["curves", "a name", "a value beyond the usual range"],
+)
+def test_a_diagnosis_that_is_killed_after_each_stage_comes_to_the_same_answer(tmp_path, monkeypatch, make_log):
+    log = make_log()
     robot = robot_of(log)
     look_for_few(monkeypatch)
     undisturbed = diagnosis_document(diagnose_log(log, robot))

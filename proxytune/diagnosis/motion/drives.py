@@ -8,7 +8,7 @@ samples: paths are then read at that instant. Drives carry the rules that a diag
 
 import math
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any, Generic, NamedTuple, TypeVar
 
@@ -259,6 +259,10 @@ class Drives:
     after: Floats | None = None
     rules: Rules = RULES
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but what is only remembered, so that drives in wider ranges can be kept as a stage."""
+        return {one.name: getattr(self, one.name) for one in fields(self)}
 
     @cached_property
     def measured(self) -> Floats:

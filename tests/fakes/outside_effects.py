@@ -59,6 +59,11 @@ WRONG = {
         r"parameter 'loss' whose neutral value 1.5 is not within \[0, 0.9\]",
     ),
     "a range upside down": ("low=0.0", "low=2.0", "parameter 'loss' from 2.0 to 0.9; give a finite range"),
+    "a usual range beyond what can be": (
+        "neutral=0.0,",
+        "neutral=0.0, usual=(0.0, 1.0),",
+        r"parameter 'loss' with the usual range \[0.0, 1.0\], which is not within \[0, 0.9\]; widen that",
+    ),
     "no probes": ("probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8),", "", "has a trace, but 'loss' has no probes"),
     "another field": ("    loss: float", "    lost: float", "has the fields lost; its parameters are loss"),
     "another shape": (

@@ -21,7 +21,7 @@ from proxytune.diagnosis.answer import Rules
 from proxytune.diagnosis.motion.curve_selection import ChosenGroups, choose_groups, sum_squares
 from proxytune.diagnosis.motion.drives import Drives, Floats
 from proxytune.diagnosis.motion.evidence import Findings
-from proxytune.diagnosis.motion.innovations import span, theta_at, twists_of
+from proxytune.diagnosis.motion.innovations import LearntMotion, spans, theta_at, twists_of
 from proxytune.diagnosis.motion.multistep_fit import HORIZONS_S
 from proxytune.diagnosis.motion.prediction import (
     FITTED_S,
@@ -235,10 +235,12 @@ def fit_discrepancy(drives: Drives, theta: Theta, promises: Callable[[Floats], b
     if blocks < drives.rules.discrepancy_blocks:
         return Discrepancy(held_out=before)
     offer = offer_curves(drives, theta)
+    replayed = replay_commands(drives, theta, offer)
 
     def fitted(left_out: Iterable[str] = (), *, patient: bool = False) -> Discrepancy:
         curves = tuple(curve for curve in offer.curves if curve.group not in left_out)
-        learnt, gains, folds = _fit_curves(drives, theta, replace(offer, curves=curves), patient)
+        commanded = replayed if any(curve.group in COMMAND_GROUPS for curve in curves) else ()
+        learnt, gains, folds = _fit_curves(drives, theta, replace(offer, curves=curves), commanded, patient)
         if not gains:
             return Discrepancy(held_out=before)
         after = _cross_validate(drives, theta, folds, windows)
@@ -253,6 +255,7 @@ def fit_discrepancy(drives: Drives, theta: Theta, promises: Callable[[Floats], b
     # Maps have the most weights by far: where the guard refuses curves with them, they are fitted without.
     if not found.used and _has(found, OF_PLACE):
         found = fitted(OF_PLACE)
+    # What was learnt and promises nothing to who asks is not tried again.
     if (found.guard and not found.used) or found.held_out is before:
         found = fitted(patient=True)
     # Curves over motion were linearised without those over commands, and may get in each other's way.
@@ -269,20 +272,19 @@ def _has(found: Discrepancy, groups: Iterable[str]) -> bool:
 
 
 def _fit_curves(
-    drives: Drives, theta: Theta, offer: Learnt, patient: bool
+    drives: Drives, theta: Theta, offer: Learnt, commanded: Sequence[LearntMotion], patient: bool
 ) -> tuple[Theta, Mapping[str, float], Sequence[Theta]]:
     """Fit the curves to all parts, with what each group gained, and without each fold in turn; by names in θ.
 
-    A patient fit takes more rounds, and looks for what matters in few parts alone.
+    Curves over commands were replayed before; a patient fit takes more rounds, and looks for what matters in few parts.
     """
     parts = _parts(drives)
     names = [curve.group for curve in offer.curves for _ in curve.knots]
     groups = {name: slice(names.index(name), names.index(name) + names.count(name)) for name in dict.fromkeys(names)}
     weights = np.zeros(len(names))
     now: Mapping[str, float] = {}
-    replayed = replay_commands(drives, theta, offer)
     for _ in range(PATIENT_ROUNDS if patient else ROUNDS):
-        slopes = slopes_of(drives, {**theta, **now}, offer, replayed)
+        slopes = slopes_of(drives, {**theta, **now}, offer, commanded)
         given = sum_squares(slopes, weights, slopes.block % parts, parts)
         chosen = choose_groups(given, groups, drives.rules, rare=patient)
         weights, now = chosen.weights, _theta(offer, chosen)
@@ -375,7 +377,7 @@ def match_named_effect(
     windows = cut(drives, FITTED_S)
 
     def loss(candidate: Candidate, values: Floats) -> float:
-        low, high = np.array([span(coordinate, drives) for coordinate in candidate.free]).T
+        low, high = spans(candidate.free, drives)
         moved = theta_at({**theta, **candidate.fixed}, candidate.free, np.clip(values, low, high))
         return float(np.mean(pose_errors(drives, moved, windows)[:, 0] ** 2))
 
@@ -396,7 +398,7 @@ def _tune(
     form: Candidate, probe: Floats, loss: Callable[[Candidate, Floats], float], drives: Drives
 ) -> tuple[float, Candidate, Floats]:
     """The least loss of a form near a probe, and where it is."""
-    low, high = np.array([span(coordinate, drives) for coordinate in form.free]).T
+    low, high = spans(form.free, drives)
     start = (probe - low) / (high - low)
     simplex = np.vstack((start, start + np.eye(len(start)) * np.where(start < 0.9, 0.1, -0.1)))
 

@@ -30,7 +30,7 @@ from proxytune.diagnosis.motion.innovations import (
     drawn_paths,
     increments,
     paths,
-    span,
+    spans,
     theta_at,
 )
 from proxytune.diagnosis.motion.multistep_fit import (
@@ -269,7 +269,7 @@ def _own_gains(drives: Drives, model: Fit) -> tuple[Floats, Floats]:
     loud = np.maximum(1.0, sum_by(label, clip_outliers(z) ** 2, count) / np.bincount(label))
     inverse = np.linalg.inv(hessian)
     step = -np.einsum("eij,ej->ei", inverse, gradient)
-    low, high = np.array([span(coordinate, drives) for coordinate in coordinates]).T
+    low, high = spans(coordinates, drives)
     here = np.array([whole.theta[name] for (name,) in coordinates])
     variances = np.diagonal(inverse, axis1=1, axis2=2) * loud[:, None]
     return here + step * (high - low), np.sqrt(variances) * (high - low)

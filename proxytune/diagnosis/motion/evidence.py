@@ -17,7 +17,7 @@ import numpy as np
 
 from proxytune.diagnosis.answer import Rules
 from proxytune.diagnosis.motion.fitting import Fit, fit, held_out_log_likelihood, loss_of
-from proxytune.diagnosis.motion.innovations import RANDOM_EFFECTS, Coordinate, lateness, span, theta_at
+from proxytune.diagnosis.motion.innovations import RANDOM_EFFECTS, Coordinate, lateness, spans, theta_at
 from proxytune.diagnosis.motion.random_effects import RandomEffect, random_effects
 from proxytune.diagnosis.motion.screening import Candidate, ScreenedCandidate, candidates, screen
 from proxytune.diagnosis.motion.signals import SignalCurve, fit_curves
@@ -168,7 +168,7 @@ def _refit(
         if form.label in done or not one.gain > least:
             continue
         theta = {**model.theta, **form.fixed}
-        low, high = np.array([span(coordinate, model.drives) for coordinate in form.free]).T
+        low, high = spans(form.free, model.drives)
         starts = [theta_at(theta, form.free, np.clip(np.array(values), low, high)) for values in (one.start, one.probe)]
         start = min(starts, key=lambda start: loss_of(model.drives, start, model.whiten))
         fitted = fit(model.drives, start, model.free + form.free, model.noise)

@@ -31,6 +31,7 @@ from proxytune.diagnosis.motion.innovations import (
     is_stepwise,
     smooth_coordinates,
     span,
+    spans,
     theta_at,
     whitener,
 )
@@ -104,7 +105,7 @@ def fit_theta(
 def _fit_sloped(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], whiten: Whitener) -> Theta:
     if not free:
         return theta
-    low, high = np.array([span(coordinate, drives) for coordinate in free]).T
+    low, high = spans(free, drives)
 
     def residuals(fractions: Floats) -> Floats:
         moved = theta_at(theta, free, low + fractions * (high - low))

@@ -495,6 +495,11 @@ def span(coordinate: Coordinate, drives: Drives) -> tuple[float, float]:
     return drives.ranges.get(name) or drives.robot.catalogue.parameters[name].usual_range
 
 
+def spans(free: Sequence[Coordinate], drives: Drives) -> Floats:
+    """Lowest and highest values that are looked for (2, coordinates)."""
+    return np.array([span(coordinate, drives) for coordinate in free]).T
+
+
 def theta_at(theta: Theta, free: Sequence[Coordinate], values: Floats) -> dict[str, float]:
     """θ with its free coordinates at these values."""
     given = {name: float(value) for names, value in zip(free, values, strict=True) for name in names}

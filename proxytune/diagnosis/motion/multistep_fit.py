@@ -21,7 +21,7 @@ from proxytune.diagnosis.motion.innovations import (
     increments,
     measured_paths,
     smooth_coordinates,
-    span,
+    spans,
     theta_at,
     twists_of,
 )
@@ -111,7 +111,7 @@ def _problem(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], windows
     """The least-squares problem of these windows; a heading error counts as the way it makes over the median chord."""
     measured, recent = measured_motion(drives, windows), Recent[Floats]()
     weights = np.array((1.0, 1.0, max(float(np.median(np.hypot(*measured[:, :2].T))), 1e-3)))
-    low, high = np.array([span(coordinate, drives) for coordinate in free]).T
+    low, high = spans(free, drives)
 
     def at(fractions: Floats) -> dict[str, float]:
         return theta_at(theta, free, low + fractions * (high - low))

@@ -31,7 +31,7 @@ from proxytune.diagnosis.motion.innovations import (
     huber,
     increments,
     increments_of_twists,
-    span,
+    spans,
     theta_at,
     twists_of,
     wheel_speeds,
@@ -340,6 +340,6 @@ def refit_beside_curve(declared: Fit, curve: SignalCurve) -> Theta:
     left = declared.innovations - declared.whiten.whiten(moved)
     inner = np.abs(left) < HUBER
     step = -np.linalg.lstsq(declared.slopes[inner], left[inner], rcond=None)[0]
-    low, high = np.array([span(coordinate, drives) for coordinate in declared.free]).T
+    low, high = spans(declared.free, drives)
     here = np.array([theta[coordinate[0]] for coordinate in declared.free])
     return theta_at(theta, declared.free, np.clip(here + step * (high - low), low, high))

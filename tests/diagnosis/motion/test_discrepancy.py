@@ -246,7 +246,7 @@ def test_what_a_tracker_does_to_places_and_headings_is_learnt_as_its_own(tracked
 
 @pytest.mark.parametrize(("alone", "chosen"), [(1.0, "turn rate"), (2.0, "time since a command changed")])
 def test_curves_over_commands_are_left_out_where_motion_alone_predicts_as_well(drives, monkeypatch, alone, chosen):
-    def fit_curves(drives, theta, offer, patient):
+    def fit_curves(drives, theta, offer, commanded, patient):
         group = "held" if any(curve.group == "held" for curve in offer.curves) else "turn_rate"
         return {group: 1.0}, {group: 1.0}, [{group: 1.0}]
 

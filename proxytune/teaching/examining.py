@@ -15,23 +15,8 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from proxytune import learning
 from proxytune.errors import EpisodeError, RunError
-from proxytune.learning import (
-    LEARNER,
-    NONE,
-    POSTERIOR_DRAWS,
-    AdaptiveDesign,
-    Distribution,
-    Examination,
-    ExaminationScores,
-    LearningCurve,
-    SampleNeeds,
-    TeachingSettings,
-    curves_of,
-    first_examinations,
-    next_examinations,
-    sample_needs,
-)
 from proxytune.running import OVERRUN, IsolatedWorker, Rescue, TracedTask, Watcher, WorkerExit, working
 from proxytune.teaching.points import TOGETHER, CurvePoint, TeachingSetup
 
@@ -118,7 +103,7 @@ class _Loss:
         raise RunError(f"{what} ended its process ({end.how}{why}); correct that, and run again to continue")
 
 
-def _shared(settings: TeachingSettings, points: Sequence[CurvePoint]) -> list[CurvePoint]:
+def _shared(settings: learning.TeachingSettings, points: Sequence[CurvePoint]) -> list[CurvePoint]:
     """Points whose preparation makes all that these share.
 
     Where the learner drives in the target, its samples are shared by the points of one learning curve and repetition;
@@ -134,7 +119,7 @@ def _shared(settings: TeachingSettings, points: Sequence[CurvePoint]) -> list[Cu
                 first.append((kind, point))
         return [point for _, point in first]
 
-    if settings.target_lessons == LEARNER:
+    if settings.target_lessons == learning.LEARNER:
         return first_of_each(sorted(points, key=lambda point: -point.count))
     last = settings.target_samples[-1]
     repetitions = sorted({point.repetition for point in points})
@@ -150,11 +135,11 @@ DRAWS = 500
 
 def examine_curves(
     setup: TeachingSetup,
-    proxies: Mapping[str, Distribution | None],
+    proxies: Mapping[str, learning.Distribution | None],
     jobs: int,
     watcher: Watcher,
-    known: ExaminationScores | None = None,
-) -> dict[Examination, float]:
+    known: learning.ExaminationScores | None = None,
+) -> dict[learning.Examination, float]:
     """Examine learners of these proxies; what is cached is not made again.
 
     Args:
@@ -170,41 +155,45 @@ def examine_curves(
     taught, scores = setup.settings, dict(known or {})
     if taught.examinations is None:
         grid = [
-            Examination(name, repetition, count)
+            learning.Examination(name, repetition, count)
             for name in proxies
             for repetition in range(taught.seeds)
             for count in taught.target_samples
         ]
         return {**scores, **_examine(setup, proxies, grid, jobs, watcher)}
     wanted = len(scores) + count_examinations(taught, len(proxies))
-    design = AdaptiveDesign(NONE, taught.target_samples, taught.seeds, BATCH)
-    batch = first_examinations(list(proxies), design)
+    design = learning.AdaptiveDesign(learning.NONE, taught.target_samples, taught.seeds, BATCH)
+    batch = learning.first_examinations(list(proxies), design)
     while batch and len(scores) < wanted:
         scores |= _examine(setup, proxies, batch[: wanted - len(scores)], jobs, watcher)
         if len(scores) < wanted:
-            needs = needs_of(setup, curves_of(taught.target_samples, scores), DRAWS)
-            batch = next_examinations(needs, list(proxies), design)
+            needs = needs_of(setup, learning.curves_of(taught.target_samples, scores), DRAWS)
+            batch = learning.next_examinations(needs, list(proxies), design)
     return scores
 
 
-def count_examinations(taught: TeachingSettings, curves: int) -> int:
+def count_examinations(taught: learning.TeachingSettings, curves: int) -> int:
     """The number of examinations that this many learning curves take."""
     return curves * (taught.examinations or taught.seeds * len(taught.target_samples))
 
 
-def needs_of(setup: TeachingSetup, curves: Mapping[str, LearningCurve], draws: int = POSTERIOR_DRAWS) -> SampleNeeds:
+def needs_of(
+    setup: TeachingSetup, curves: Mapping[str, learning.LearningCurve], draws: int = learning.POSTERIOR_DRAWS
+) -> learning.SampleNeeds:
     """The target samples that each learner needs, by what [teaching] says of convergence."""
     taught, best = setup.settings, setup.target.best_score
-    return sample_needs(curves, none=NONE, best_score=best, tolerance=taught.tolerance, level=taught.level, draws=draws)
+    return learning.sample_needs(
+        curves, none=learning.NONE, best_score=best, tolerance=taught.tolerance, level=taught.level, draws=draws
+    )
 
 
 def _examine(
     setup: TeachingSetup,
-    proxies: Mapping[str, Distribution | None],
-    batch: list[Examination],
+    proxies: Mapping[str, learning.Distribution | None],
+    batch: list[learning.Examination],
     jobs: int,
     watcher: Watcher,
-) -> dict[Examination, float]:
+) -> dict[learning.Examination, float]:
     points = {one: CurvePoint(one.curve, proxies[one.curve], one.repetition, one.samples) for one in batch}
     missing = [point for point in points.values() if not setup.is_cached(point)]
     watcher.begin("demonstrations", len(points) - len(missing))

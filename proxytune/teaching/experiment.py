@@ -14,32 +14,11 @@ from typing import cast
 
 import numpy as np
 
+from proxytune import learning, usefulness
 from proxytune.arrays import Floats
 from proxytune.domain import Classroom
 from proxytune.errors import InputError, LearnerError
 from proxytune.extensions import load
-from proxytune.learning import (
-    EXPERT,
-    LEARNER,
-    LEVELS,
-    NONE,
-    POSTERIOR_DRAWS,
-    Cache,
-    Convergence,
-    Distribution,
-    Learner,
-    LearningCurve,
-    LearningEstimate,
-    SampleNeeds,
-    TeachingSettings,
-    TeachingValue,
-    curves_of,
-    estimate_figure,
-    learner_identity,
-    mean_score,
-    more_needed,
-    teaching_value,
-)
 from proxytune.running import Watcher
 from proxytune.space import Theta
 from proxytune.study import (
@@ -54,16 +33,6 @@ from proxytune.study import (
 )
 from proxytune.teaching.examining import count_examinations, examine_curves, needs_of
 from proxytune.teaching.points import TeachingSetup
-from proxytune.usefulness import (
-    Chance,
-    bootstrap_means,
-    chance,
-    compare,
-    in_blocks,
-    interval,
-    prpv_of_means,
-    why_not_repeated,
-)
 
 CACHE = "teaching"
 """The folder, within a study's, where all that was taught is kept."""
@@ -83,11 +52,11 @@ class TeacherResult:
     """
 
     name: str
-    proxy: Distribution
-    curve: LearningCurve
-    zero_shot: LearningEstimate
-    worth: TeachingValue | None
-    cost: LearningEstimate | None
+    proxy: learning.Distribution
+    curve: learning.LearningCurve
+    zero_shot: learning.LearningEstimate
+    worth: learning.TeachingValue | None
+    cost: learning.LearningEstimate | None
 
 
 @dataclass(frozen=True)
@@ -103,16 +72,16 @@ class Experiment:
 
     settings: StudySettings
     best_score: float
-    needs: SampleNeeds
+    needs: learning.SampleNeeds
     teachers: tuple[TeacherResult, ...]
 
     @property
-    def without(self) -> LearningCurve:
+    def without(self) -> learning.LearningCurve:
         """The learning curve without a proxy."""
-        return self.needs.curves[NONE]
+        return self.needs.curves[learning.NONE]
 
     @property
-    def when(self) -> Convergence:
+    def when(self) -> learning.Convergence:
         """The rule by which a learner counts as converged."""
         return self.needs.when
 
@@ -138,12 +107,12 @@ def load_setup(settings: StudySettings) -> TeachingSetup:
         settings=taught,
         seed=settings.seed,
         starts=settings.starts,
-        cache=Cache(settings.home / CACHE),
+        cache=learning.Cache(settings.home / CACHE),
         timeout_s=settings.episode_timeout_s,
     )
 
 
-def teaching_settings(settings: StudySettings) -> TeachingSettings:
+def teaching_settings(settings: StudySettings) -> learning.TeachingSettings:
     """The [teaching] table of a study.
 
     Raises:
@@ -162,25 +131,29 @@ def run_experiment(settings: StudySettings, setup: TeachingSetup, watcher: Watch
         RunError: If a domain, the learner or the machine fails; all that was finished is kept.
     """
     check_proxies(settings, setup)
-    scores = examine_curves(setup, {NONE: None, **setup.settings.proxies}, settings.jobs, watcher)
-    return judge_curves(settings, setup, curves_of(setup.settings.target_samples, scores))
+    scores = examine_curves(setup, {learning.NONE: None, **setup.settings.proxies}, settings.jobs, watcher)
+    return judge_curves(settings, setup, learning.curves_of(setup.settings.target_samples, scores))
 
 
-def judge_curves(settings: StudySettings, setup: TeachingSetup, curves: Mapping[str, LearningCurve]) -> Experiment:
+def judge_curves(
+    settings: StudySettings, setup: TeachingSetup, curves: Mapping[str, learning.LearningCurve]
+) -> Experiment:
     """Judge each proxy by the learning curves: a pure function of them and of what counts as converged."""
     needs = needs_of(setup, curves)
     teachers = [_teacher(setup.settings, needs, name, proxy) for name, proxy in setup.settings.proxies.items()]
     return Experiment(settings, setup.target.best_score, needs, tuple(teachers))
 
 
-def _teacher(taught: TeachingSettings, needs: SampleNeeds, name: str, proxy: Distribution) -> TeacherResult:
-    zero_shot, curve = mean_score(needs, name, 0), needs.curves[name]
+def _teacher(
+    taught: learning.TeachingSettings, needs: learning.SampleNeeds, name: str, proxy: learning.Distribution
+) -> TeacherResult:
+    zero_shot, curve = learning.mean_score(needs, name, 0), needs.curves[name]
     if not needs.settled:
         return TeacherResult(name, proxy, curve, zero_shot, None, None)
-    worth = teaching_value(needs, none=NONE, proxy=name)
+    worth = learning.teaching_value(needs, none=learning.NONE, proxy=name)
     # PLV in cost (eq. 6)
-    cost = estimate_figure(
-        lambda without, needed: taught.cost_saved(without=without, needed=needed), needs, more=NONE, less=name
+    cost = learning.estimate_figure(
+        lambda without, needed: taught.cost_saved(without=without, needed=needed), needs, more=learning.NONE, less=name
     )
     return TeacherResult(name, proxy, curve, zero_shot, worth, cost)
 
@@ -205,22 +178,20 @@ def classroom(settings: StudySettings, model: Path | None, lessons: str) -> Clas
     lacks = [member for member in ("best_score", "demonstrate", "examine") if not hasattr(family, member)]
     if lacks:
         raise settings.error("family", f"{settings.family} cannot teach: it lacks {', '.join(lacks)}")
-    if getattr(teaching_settings(settings), lessons) == LEARNER and not hasattr(family, "guide"):
-        raise settings.error(
-            f"teaching.{lessons}",
-            f"{settings.family} cannot teach a learner that drives: it lacks guide; add it, or take '{EXPERT}'",
-        )
+    if getattr(teaching_settings(settings), lessons) == learning.LEARNER and not hasattr(family, "guide"):
+        problem = f"{settings.family} cannot teach a learner that drives: it lacks guide"
+        raise settings.error(f"teaching.{lessons}", f"{problem}; add it, or take '{learning.EXPERT}'")
     return cast(Classroom, family)
 
 
-def _load_learner(settings: StudySettings, name: str) -> tuple[Learner, str]:
+def _load_learner(settings: StudySettings, name: str) -> tuple[learning.Learner, str]:
     """The learner and a digest of what its code means and of its settings."""
     try:
         made = load(name, kind="learner", beside=settings.folder, needs=("train", "act"), call=True)
     except InputError as problem:
         raise settings.error("teaching.learner", str(problem)) from None
-    learner = cast(Learner, made)
-    return learner, learner_identity(learner)
+    learner = cast(learning.Learner, made)
+    return learner, learning.learner_identity(learner)
 
 
 def classrooms(settings: StudySettings) -> dict[str, Classroom]:
@@ -257,35 +228,35 @@ def teach_families(
         return {}
     setup = load_setup(settings)
     with watching(count_examinations(setup.settings, 1)) as watcher:
-        alone = examine_curves(setup, {NONE: None}, settings.jobs, watcher)
+        alone = examine_curves(setup, {learning.NONE: None}, settings.jobs, watcher)
     scores, failed = dict(alone), dict[str, LearnerError]()
     for name, room in rooms.items():
         there = replace(setup, proxy=room)
         try:
             with watching(count_examinations(setup.settings, 1)) as watcher:
-                proxy = Distribution({one: (value, value) for one, value in sorted(thetas[name].items())})
+                proxy = learning.Distribution({one: (value, value) for one, value in sorted(thetas[name].items())})
                 scores |= examine_curves(there, {name: proxy}, settings.jobs, watcher, alone)
         except LearnerError as problem:
             failed[name] = problem
     if len(failed) == len(rooms):
         raise next(iter(failed.values()))
-    needs = needs_of(setup, curves_of(setup.settings.target_samples, scores))
+    needs = needs_of(setup, learning.curves_of(setup.settings.target_samples, scores))
     lessons = {name: _lesson(needs, name, thetas[name]) for name in rooms if name not in failed}
     best = best_teaching_family(lessons)
     if best is not None:
         lessons = {
-            name: lesson if name == best else replace(lesson, more=more_needed(needs, more=name, less=best))
+            name: lesson if name == best else replace(lesson, more=learning.more_needed(needs, more=name, less=best))
             for name, lesson in lessons.items()
         }
     lessons |= {name: Lesson(thetas[name], failure=str(problem)) for name, problem in failed.items()}
     return {name: lessons[name] for name in thetas if name in lessons}
 
 
-def _lesson(needs: SampleNeeds, name: str, theta: Theta) -> Lesson:
-    zero_shot = mean_score(needs, name, 0).value or 0.0
+def _lesson(needs: learning.SampleNeeds, name: str, theta: Theta) -> Lesson:
+    zero_shot = learning.mean_score(needs, name, 0).value or 0.0
     if not needs.settled:
         return Lesson(theta, zero_shot)
-    worth = teaching_value(needs, none=NONE, proxy=name)
+    worth = learning.teaching_value(needs, none=learning.NONE, proxy=name)
     return Lesson(theta, zero_shot, worth.needed, worth.plv)
 
 
@@ -321,7 +292,7 @@ def agreement(names: Sequence[str], first: Floats, second: Floats) -> RankAgreem
     taus = pairs.sum(axis=1) / np.sqrt(_untied(one[:, above, below]) * _untied(other[:, above, below]))
     contrary = _sure(one) * _sure(other) < 0
     ahead = np.argwhere(contrary & (_sure(other) > 0))
-    low, middle, high = np.quantile(taus, (LEVELS[0], 0.5, LEVELS[1]))
+    low, middle, high = np.quantile(taus, (learning.LEVELS[0], 0.5, learning.LEVELS[1]))
     named = tuple((names[better], names[worse]) for better, worse in ahead)
     return RankAgreement(float(middle), float(low), float(high), named, len(names))
 
@@ -352,7 +323,7 @@ class Predictivity:
     """
 
     prpv: float
-    chance: Chance
+    chance: usefulness.Chance
     resampled: Floats | None = field(repr=False, compare=False)
 
     @property
@@ -360,11 +331,11 @@ class Predictivity:
         """The 95 % interval of PRPV, which holds the value."""
         if self.resampled is None:
             return None
-        low, high = interval(self.resampled)
+        low, high = usefulness.interval(self.resampled)
         return min(low, self.prpv), max(high, self.prpv)
 
 
-def predictivity(run: StudyRun, proxies: Mapping[str, Distribution]) -> dict[str, Predictivity | None]:
+def predictivity(run: StudyRun, proxies: Mapping[str, learning.Distribution]) -> dict[str, Predictivity | None]:
     """PRPV of every proxy, by name; None where an agent failed there from every start.
 
     A proxy that draws θ anew for every lesson draws it anew for every start, the same for all agents.
@@ -375,7 +346,7 @@ def predictivity(run: StudyRun, proxies: Mapping[str, Distribution]) -> dict[str
     return {name: _predictivity(run, name, proxy) for name, proxy in proxies.items()}
 
 
-def _predictivity(run: StudyRun, name: str, proxy: Distribution) -> Predictivity | None:
+def _predictivity(run: StudyRun, name: str, proxy: learning.Distribution) -> Predictivity | None:
     study, settings = run.study, run.settings
     drawn = [plan_episodes(settings, proxy.draw(start), settings.seed) for start in range(settings.starts)]
     planned = [episode for start, each in enumerate(drawn) for episode in each if episode.start == start]
@@ -383,12 +354,12 @@ def _predictivity(run: StudyRun, name: str, proxy: Distribution) -> Predictivity
     evaluation = evaluate_outcomes(study, proxy.centre, [found[episode] for episode in planned])
     if evaluation.proxy is None or evaluation.prpv is None:
         return None
-    inputs = compare(proxy=evaluation.proxy, target=study.target, metrics=study.settings.metrics)
-    by_chance = chance(inputs)
-    if why_not_repeated(inputs):
+    inputs = usefulness.compare(proxy=evaluation.proxy, target=study.target, metrics=study.settings.metrics)
+    by_chance = usefulness.chance(inputs)
+    if usefulness.why_not_repeated(inputs):
         return Predictivity(evaluation.prpv, by_chance, None)
-    means = bootstrap_means(inputs, resamples=POSTERIOR_DRAWS, seed=0)
-    resampled = in_blocks(lambda here, there: prpv_of_means(here, there, inputs.metrics), *means)
+    means = usefulness.bootstrap_means(inputs, resamples=learning.POSTERIOR_DRAWS, seed=0)
+    resampled = usefulness.in_blocks(lambda here, there: usefulness.prpv_of_means(here, there, inputs.metrics), *means)
     return Predictivity(evaluation.prpv, by_chance, resampled)
 
 
@@ -436,6 +407,6 @@ def _agreement(experiment: Experiment, figures: Mapping[str, Floats]) -> RankAgr
     if len(names) < 2:
         return None
     # A PLV that is not reached is the worst there is.
-    alone = np.minimum(needed[NONE], experiment.needs.last)
+    alone = np.minimum(needed[learning.NONE], experiment.needs.last)
     plv = np.column_stack([alone - needed[name] for name in names])
     return agreement(names, np.column_stack(list(figures.values())), plv)

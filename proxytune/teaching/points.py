@@ -15,23 +15,10 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from proxytune import learning
 from proxytune.domain import Classroom, Demonstration, Episode, OnPolicyClassroom, Policy, make_episode
 from proxytune.errors import EpisodeError, LearnerError, ProxytuneError
 from proxytune.extensions import describe, is_users, place_of
-from proxytune.learning import (
-    LEARNER,
-    Arrays,
-    Cache,
-    Distribution,
-    Learner,
-    TeachingSettings,
-    Weights,
-    collect_samples,
-    examine_policy,
-    facts_digest,
-    mix_samples,
-    policy_of,
-)
 from proxytune.running import check_machine, limited, one_thread, was_ended_in
 from proxytune.seeds import exam_seed, proxy_lessons_seed, round_seed, target_lessons_seed
 from proxytune.space import Interval, Space, Theta
@@ -116,10 +103,10 @@ class Supervised:
 class Trainee:
     """A learner, a digest of its code and settings, the seed of its weights and of its samples' order; its cache."""
 
-    learner: Learner
+    learner: learning.Learner
     identity: str
     seed: int
-    cache: Cache
+    cache: learning.Cache
 
 
 @dataclass(frozen=True)
@@ -139,7 +126,7 @@ class Lessons:
 
     room: Classroom
     domain: str
-    where: Distribution
+    where: learning.Distribution
     seed: int
     lesson_s: float
     grid: tuple[int, ...]
@@ -148,7 +135,7 @@ class Lessons:
     @property
     def on_policy(self) -> bool:
         """True if the learner drives."""
-        return self.by == LEARNER
+        return self.by == learning.LEARNER
 
     @property
     def ends(self) -> tuple[int, ...]:
@@ -176,7 +163,7 @@ class Lessons:
     def collect(self, number: int, policy: Policy | None) -> Demonstration:
         """A round's samples: of the policy's driving, labelled by the expert, or without one of the expert's own."""
         facts, lesson_s = self.facts(number), self.lesson_s
-        return collect_samples(
+        return learning.collect_samples(
             self.room, self.where, count=facts["count"], seed=facts["seed"], lesson_s=lesson_s, policy=policy
         )
 
@@ -207,13 +194,13 @@ class Stage:
         return {
             "learner": self.trainee.identity,
             "seed": self.trainee.seed,
-            "start": facts_digest(start) if start else None,
-            "samples": facts_digest(self.round_facts(self.lessons.rounds(count)[-1])),
+            "start": learning.facts_digest(start) if start else None,
+            "samples": learning.facts_digest(self.round_facts(self.lessons.rounds(count)[-1])),
             "count": count,
             **({"rehearsal": self.rehearsal} if self.before and self.rehearsal else {}),
         }
 
-    def weights(self, count: int) -> Weights | None:
+    def weights(self, count: int) -> learning.Weights | None:
         """The weights after so many samples; None where nothing has been learnt."""
         if not count:
             return self.before.weights(self.before.lessons.ends[-1]) if self.before else None
@@ -230,23 +217,23 @@ class Stage:
     def round_facts(self, number: int) -> dict[str, Any]:
         """All that determines a round's samples: the policy that drives stands for the rounds before."""
         policy = self.weights_facts(self.lessons.begin(number)) if self.lessons.on_policy else None
-        return {**self.lessons.facts(number), **({"policy": facts_digest(policy)} if policy else {})}
+        return {**self.lessons.facts(number), **({"policy": learning.facts_digest(policy)} if policy else {})}
 
     def collect(self, number: int) -> Demonstration:
         """The samples of a round."""
 
-        def make() -> Arrays:
+        def make() -> learning.Arrays:
             weights = self.weights(self.lessons.begin(number)) if self.lessons.on_policy else None
-            policy = None if weights is None else policy_of(self.trainee.learner, weights)
+            policy = None if weights is None else learning.policy_of(self.trainee.learner, weights)
             with watching("a lesson"):
                 return self.lessons.collect(number, policy)._asdict()
 
         return Demonstration(**self.trainee.cache.get("samples", self.round_facts(number), make))
 
-    def _train(self, count: int) -> Weights:
+    def _train(self, count: int) -> learning.Weights:
         samples = self.samples(count)
         if self.before and self.rehearsal:
-            samples = mix_samples(samples, self.before.samples(self.before.lessons.ends[-1]), self.rehearsal)
+            samples = learning.mix_samples(samples, self.before.samples(self.before.lessons.ends[-1]), self.rehearsal)
         start = self.weights(0)
         with watching("the learner's training"):
             return self.trainee.learner.train(samples, start, self.trainee.seed)
@@ -275,7 +262,7 @@ class CurvePoint:
     """
 
     name: str
-    proxy: Distribution | None
+    proxy: learning.Distribution | None
     repetition: int
     count: int
 
@@ -298,12 +285,12 @@ class TeachingSetup:
 
     proxy: Classroom
     target: Classroom
-    learner: Learner
+    learner: learning.Learner
     learner_identity: str
-    settings: TeachingSettings
+    settings: learning.TeachingSettings
     seed: int
     starts: int
-    cache: Cache
+    cache: learning.Cache
     timeout_s: float | None = None
 
     @functools.cached_property
@@ -336,7 +323,7 @@ class TeachingSetup:
             "target": self.identities[1],
             "starts": self.starts,
             "seed": exam_seed(self.seed, 0),
-            "weights": facts_digest(weights) if weights else None,
+            "weights": learning.facts_digest(weights) if weights else None,
         }
 
     def _stage(self, point: CurvePoint) -> Stage:
@@ -346,7 +333,7 @@ class TeachingSetup:
         before = None if in_proxy is None else Stage(trainee, in_proxy)
         return Stage(trainee, self._target_lessons(point.repetition), before, self.settings.rehearsal)
 
-    def _proxy_lessons(self, proxy: Distribution, repetition: int) -> Lessons:
+    def _proxy_lessons(self, proxy: learning.Distribution, repetition: int) -> Lessons:
         by, count = self.settings.proxy_lessons, self.settings.proxy_samples
         seed, ends = proxy_lessons_seed(self.seed, repetition), equal_rounds(count, PROXY_ROUNDS)
         room = cast(OnPolicyClassroom, Supervised(self.proxy, "proxy", self.timeout_s))
@@ -354,19 +341,19 @@ class TeachingSetup:
 
     def _target_lessons(self, repetition: int) -> Lessons:
         by, ends = self.settings.target_lessons, self.settings.target_samples[1:]
-        seed, nominal = target_lessons_seed(self.seed, repetition), Distribution({})
+        seed, nominal = target_lessons_seed(self.seed, repetition), learning.Distribution({})
         room = cast(OnPolicyClassroom, Supervised(self.target, "target", self.timeout_s))
         return Lessons(room, self.identities[1], nominal, seed, self.settings.lesson_s, ends, by)
 
-    def _examine(self, point: CurvePoint) -> Arrays:
+    def _examine(self, point: CurvePoint) -> learning.Arrays:
         weights = self._stage(point).weights(point.count)
         if weights is None:
             return {"scores": np.full(self.starts, np.nan)}
         seeds = [exam_seed(self.seed, start) for start in range(self.starts)]
         episodes = [make_episode({}, agent=PUPIL, start=start, seed=seed) for start, seed in enumerate(seeds)]
-        room, policy = Supervised(self.target, "target", self.timeout_s), policy_of(self.learner, weights)
+        room, policy = Supervised(self.target, "target", self.timeout_s), learning.policy_of(self.learner, weights)
         with watching("an examination"):
-            return {"scores": np.array(examine_policy(cast(Classroom, room), episodes, policy))}
+            return {"scores": np.array(learning.examine_policy(cast(Classroom, room), episodes, policy))}
 
 
 @contextmanager
@@ -424,11 +411,11 @@ def _narrowed(box: Interval, left: tuple[float, float] | None) -> Interval:
     return Interval(box.name, max(box.low, left[0] - slack), min(box.high, left[1] + slack), box.unit)
 
 
-def distribution(setup: TeachingSetup, theta: Theta) -> Distribution:
+def distribution(setup: TeachingSetup, theta: Theta) -> learning.Distribution:
     """p(θ) with these centres and widths, cut off at what each parameter can be."""
     bounds = {}
     for name, centre in theta.items():
         if not name.endswith(WIDTH):
             half, known = theta.get(name + WIDTH, 0.0) / 2.0, setup.proxy.parameters[name]
             bounds[name] = (max(known.low, centre - half), min(known.high, centre + half))
-    return Distribution(bounds)
+    return learning.Distribution(bounds)

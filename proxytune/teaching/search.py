@@ -17,23 +17,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from proxytune import learning
 from proxytune.arrays import Floats
 from proxytune.errors import LearnerError, RunError
-from proxytune.learning import (
-    NONE,
-    Convergence,
-    Distribution,
-    ExaminationScores,
-    LearningCurve,
-    LearningEstimate,
-    SampleNeeds,
-    TeachingSettings,
-    TeachingValue,
-    curves_of,
-    mean_score,
-    more_needed,
-    teaching_value,
-)
 from proxytune.running import Watcher
 from proxytune.search import (
     BatchPoints,
@@ -64,7 +50,7 @@ CLOSER = 2
 
 def finalists(
     setup: TeachingSetup, settings: StudySettings, space: Space, trials: Sequence[Trial], by_prpv: Theta | None
-) -> dict[str, Distribution]:
+) -> dict[str, learning.Distribution]:
     """The distributions that are worth a closer look, by name; none twice.
 
     Args:
@@ -85,24 +71,24 @@ def finalists(
     named = {SINGLE: distribution(setup, {name: one for name, one in single.items() if not name.endswith(WIDTH)})}
     if widths.any():
         whole = {box.name: (box.low, box.high) for box in settings.space.intervals}
-        named = {BEST: distribution(setup, _lowest(surrogate, points)), **named, BOX: Distribution(whole)}
+        named = {BEST: distribution(setup, _lowest(surrogate, points)), **named, BOX: learning.Distribution(whole)}
     if by_prpv is not None:
         named[BY_PRPV] = distribution(setup, by_prpv)
     return {name: one for name, one in named.items() if name == next(first for first in named if named[first] == one)}
 
 
-def most_examinations(taught: TeachingSettings) -> int:
+def most_examinations(taught: learning.TeachingSettings) -> int:
     """The most that a search by PLV takes: every trial, four finalists, and the learner without a proxy beside both."""
     return count_examinations(taught, taught.budget + 1) + count_examinations(_closer(taught), 5)
 
 
-def _closer(taught: TeachingSettings) -> TeachingSettings:
+def _closer(taught: learning.TeachingSettings) -> learning.TeachingSettings:
     """The settings by which finalists are examined."""
     return replace(taught, examinations=taught.examinations and CLOSER * taught.examinations)
 
 
 def teach_finalists(
-    settings: StudySettings, setup: TeachingSetup, named: Mapping[str, Distribution], watcher: Watcher
+    settings: StudySettings, setup: TeachingSetup, named: Mapping[str, learning.Distribution], watcher: Watcher
 ) -> tuple[Experiment, dict[str, str]]:
     """Teach the finalists and the learner without a proxy under fresh seeds; gives why others cannot teach, by name."""
     taught = _closer(setup.settings)
@@ -110,11 +96,11 @@ def teach_finalists(
     unable = {name: reason for name, proxy in named.items() if (reason := _why_unable(fresh, name, proxy))}
     able = {name: proxy for name, proxy in named.items() if name not in unable}
     fresh = replace(fresh, settings=replace(taught, proxies=able))
-    scores = examine_curves(fresh, {NONE: None, **able}, settings.jobs, watcher)
-    return judge_curves(settings, fresh, curves_of(taught.target_samples, scores)), unable
+    scores = examine_curves(fresh, {learning.NONE: None, **able}, settings.jobs, watcher)
+    return judge_curves(settings, fresh, learning.curves_of(taught.target_samples, scores)), unable
 
 
-def _why_unable(setup: TeachingSetup, name: str, proxy: Distribution) -> str:
+def _why_unable(setup: TeachingSetup, name: str, proxy: learning.Distribution) -> str:
     """The reason why a proxy cannot teach, empty if it can: nobody has driven in it before."""
     try:
         prepare_points(setup, [CurvePoint(name, proxy, 0, 0)], jobs=1)
@@ -128,9 +114,9 @@ def best_teacher(experiment: Experiment) -> TeacherResult | None:
     return max((one for one in experiment.teachers if np.isfinite(plv_or_worst(one))), key=plv_or_worst, default=None)
 
 
-def saves_more(experiment: Experiment, name: str, other: str) -> LearningEstimate:
+def saves_more(experiment: Experiment, name: str, other: str) -> learning.LearningEstimate:
     """The target samples that one proxy saves more than another: what the other needs less what the one needs."""
-    return more_needed(experiment.needs, more=other, less=name)
+    return learning.more_needed(experiment.needs, more=other, less=name)
 
 
 def _lowest(surrogate: Surrogate, points: Floats) -> Theta:
@@ -148,7 +134,7 @@ class PlvUnknown(NamedTuple):
     remedy: str
 
 
-def why_unknown(needs: SampleNeeds) -> PlvUnknown | None:
+def why_unknown(needs: learning.SampleNeeds) -> PlvUnknown | None:
     """The reason why nothing is known of PLV, or no more than a bound; None where it is known."""
     last, tolerance = f"{needs.last:g}", f"{needs.when.tolerance:g}"
     if needs.gain is None:
@@ -159,7 +145,7 @@ def why_unknown(needs: SampleNeeds) -> PlvUnknown | None:
             f"without a proxy the score still rises by more than {tolerance} over the last doubling to {last} samples"
         )
         return PlvUnknown(reason, RAISE)
-    if not np.isfinite(np.median(needs.needed[NONE])):
+    if not np.isfinite(np.median(needs.needed[learning.NONE])):
         reason = f"without a proxy the score does not come to {needs.when.threshold:g} within {last} samples"
         return PlvUnknown(reason, f"lower teaching.level, or {RAISE}")
     return None
@@ -183,10 +169,10 @@ class PlvTrial:
 
     number: int
     theta: Theta
-    proxy: Distribution
-    curve: LearningCurve
-    worth: TeachingValue
-    zero_shot: LearningEstimate
+    proxy: learning.Distribution
+    curve: learning.LearningCurve
+    worth: learning.TeachingValue
+    zero_shot: learning.LearningEstimate
 
 
 @dataclass(frozen=True)
@@ -206,8 +192,8 @@ class PlvStudy:
 
     settings: StudySettings
     space: Space
-    without: LearningCurve
-    when: Convergence
+    without: learning.LearningCurve
+    when: learning.Convergence
     trials: tuple[PlvTrial, ...]
     stopped: str
     confirmed: Experiment
@@ -260,8 +246,8 @@ class PlvSearch:
             LearnerError: If an expert cannot drive somewhere in the box.
         """
         settings, taught = self.settings, self.setup.settings
-        alone = examine_curves(self.setup, {NONE: None}, settings.jobs, self.watcher)
-        needs = needs_of(self.setup, curves_of(taught.target_samples, alone))
+        alone = examine_curves(self.setup, {learning.NONE: None}, settings.jobs, self.watcher)
+        needs = needs_of(self.setup, learning.curves_of(taught.target_samples, alone))
         if unknown := why_unknown(needs):
             raise RunError(f"{settings.path}: {unknown.reason}, so PLV is not known; {unknown.remedy}")
         # Trials that were made under other facts are begun afresh; what was taught is kept, so little is lost.
@@ -274,7 +260,7 @@ class PlvSearch:
         named = finalists(self.setup, settings, self.space, tried.trials(), by_prpv)
         confirmed, unable = teach_finalists(settings, self.setup, named, self.watcher)
         trials, ended = tuple(tried.tried()), tried.ended()
-        without, when = needs.curves[NONE], needs.when
+        without, when = needs.curves[learning.NONE], needs.when
         return PlvStudy(settings, self.space, without, when, trials, ended, confirmed, unable)
 
     def facts(self) -> dict[str, Any]:
@@ -294,7 +280,7 @@ class PlvSearch:
 class ProxyTrials:
     """The proxies tried, as the search loop evaluates them."""
 
-    def __init__(self, search: PlvSearch, alone: ExaminationScores) -> None:
+    def __init__(self, search: PlvSearch, alone: learning.ExaminationScores) -> None:
         self._search, self._alone = search, alone
         self._records = [trial for trial in search.store.trials(OBJECTIVE) if trial.state != "open"]
 
@@ -343,9 +329,9 @@ class ProxyTrials:
         search, name = self._search, f"trial {number}"
         setup, proxy = search.setup, distribution(search.setup, theta)
         scores = examine_curves(setup, {name: proxy}, search.settings.jobs, search.watcher, self._alone)
-        needs = needs_of(setup, curves_of(setup.settings.target_samples, scores))
-        worth = teaching_value(needs, none=NONE, proxy=name)
-        return PlvTrial(number, theta, proxy, needs.curves[name], worth, mean_score(needs, name, 0))
+        needs = needs_of(setup, learning.curves_of(setup.settings.target_samples, scores))
+        worth = learning.teaching_value(needs, none=learning.NONE, proxy=name)
+        return PlvTrial(number, theta, proxy, needs.curves[name], worth, learning.mean_score(needs, name, 0))
 
 
 def _record(trial: PlvTrial, seconds: float) -> TrialRecord:

@@ -14,27 +14,9 @@ import pandas as pd
 import tomlkit
 from numpy.typing import NDArray
 
+from proxytune import driving
 from proxytune.diagnosis.motion.drives import Floats, duties_of
 from proxytune.diagnosis.motion.manoeuvres import LIBRARY, commands_of, mirrored
-from proxytune.driving import (
-    TICK_HZ,
-    Course,
-    Drive,
-    Expert,
-    Instance,
-    LaneFollowing,
-    Road,
-    Robot,
-    Sight,
-    drive,
-    follow,
-    lane_point,
-    lane_pose,
-    measured,
-    off_map,
-    read_robot,
-    start_pose,
-)
 from proxytune.effects import Blur, RollingShutter
 from proxytune.errors import EpisodeError
 from proxytune.logs import COMMANDS, Frames, Log, LogEpisode
@@ -57,7 +39,7 @@ Table = tuple[str, Mapping[str, tuple[Floats, Floats]]]
 
 
 def record(
-    family: LaneFollowing, *, name: str, repeats: int, seconds: float, seed: int, table: Table | None = None
+    family: driving.LaneFollowing, *, name: str, repeats: int, seconds: float, seed: int, table: Table | None = None
 ) -> Log:
     """Drive every manoeuvre so many times, each time at another size and to the other side; or the drives of a table.
 
@@ -72,7 +54,7 @@ def record(
     Raises:
         LogError: If the table's commands are not for the robot.
     """
-    robot = read_robot(family.robot, family.folder)
+    robot = driving.read_robot(family.robot, family.folder)
     rate = robot.figures["control_rate"]
     times = np.arange(round(seconds * rate)) / rate
     own = [] if table is None else _duties(Log(name, family.robot, table[0], rate, {}, ()), robot, table[1])
@@ -92,7 +74,7 @@ def record(
     return Log(name, family.robot, KIND[robot.drive], rate, {}, tuple(episodes))
 
 
-def _duties(log: Log, robot: Robot, drives: Mapping[str, tuple[Floats, Floats]]) -> list[Floats]:
+def _duties(log: Log, robot: driving.Robot, drives: Mapping[str, tuple[Floats, Floats]]) -> list[Floats]:
     """The drives of a table as what the robot is given at each control step (rows, 2); the last command lasts one."""
     found = []
     for times, commands in drives.values():
@@ -105,11 +87,11 @@ KIND = {"differential": "duty", "ackermann": "ackermann"}
 """Kind of the commands that robots are given, by how they drive."""
 
 
-def _drive(family: LaneFollowing, duties: Floats, random: np.random.Generator, number: int) -> Floats:
+def _drive(family: driving.LaneFollowing, duties: Floats, random: np.random.Generator, number: int) -> Floats:
     start = np.array((0.0, 0.0, random.uniform(-np.pi, np.pi)))
     instance = family.instance({})
     with family.plant_at(instance.robot, start) as plant:
-        poses = follow(instance, plant, start, duties, number)
+        poses = driving.follow(instance, plant, start, duties, number)
     return tracked(poses, random)
 
 
@@ -179,7 +161,7 @@ class _Lap(NamedTuple):
     frames: int
 
 
-def film(family: LaneFollowing, frames: int, seed: int) -> Iterator[FilmedDrive]:
+def film(family: driving.LaneFollowing, frames: int, seed: int) -> Iterator[FilmedDrive]:
     """Let the robot's expert drive from every start, then from each the other way, and take so many pictures in all.
 
     Raises:
@@ -201,38 +183,38 @@ def _laps(frames: int, starts: int) -> Iterator[_Lap]:
         yield _Lap(number, number % starts, number // starts % 2 == 1, share)
 
 
-def _film_drive(family: LaneFollowing, instance: Instance, lap: _Lap, seed: int) -> FilmedDrive:
+def _film_drive(family: driving.LaneFollowing, instance: driving.Instance, lap: _Lap, seed: int) -> FilmedDrive:
     random = np.random.default_rng((seed, lap.number, LANES))
     own = int(random.integers(2**32))
     noise = {"position_noise_m": family.position_noise_m, "heading_noise_deg": family.heading_noise_deg}
-    start = np.array(start_pose(family.map, lap.start, seed=own, **noise))
+    start = np.array(driving.start_pose(family.map, lap.start, seed=own, **noise))
     start = _in_other_lane(family.map, start) if lap.turned else start
     seconds = max(SHORTEST_S, lap.frames / FRAMES_HZ)
-    course = Course(start, seconds, own, functools.partial(off_map, family.map))
-    expert = Expert(family.map, *instance.robot.expert_figures(), seed=own)
+    course = driving.Course(start, seconds, own, functools.partial(driving.off_map, family.map))
+    expert = driving.Expert(family.map, *instance.robot.expert_figures(), seed=own)
     with family.plant_at(instance.robot, start) as plant:
-        driven = drive(instance, plant, expert, course, Sight)
+        driven = driving.drive(instance, plant, expert, course, driving.Sight)
     steps, times = _instants(instance, driven, lap)
     rate, rows = instance.robot.figures["control_rate"], len(driven.commands)
-    poses = tracked(measured(instance, driven.poses, own)[:: round(TICK_HZ / rate)][:rows], random)
+    poses = tracked(driving.measured(instance, driven.poses, own)[:: round(driving.TICK_HZ / rate)][:rows], random)
     episode = LogEpisode(f"lane_{lap.number}", np.arange(rows) / rate, driven.commands, poses, None)
     return FilmedDrive(episode, times, np.stack([driven.memory.pictures[step] for step in steps]))
 
 
-def _in_other_lane(road: Road, pose: Floats) -> Floats:
+def _in_other_lane(road: driving.Road, pose: Floats) -> Floats:
     """The pose turned round, in the middle of the lane that it then looks along."""
     heading = pose[2] + math.pi
-    other = lane_pose(road, pose[:2], heading)
-    return np.array((*lane_point(road, other.counter_clockwise, other.along), heading))
+    other = driving.lane_pose(road, pose[:2], heading)
+    return np.array((*driving.lane_point(road, other.counter_clockwise, other.along), heading))
 
 
-def _instants(instance: Instance, driven: Drive, lap: _Lap) -> tuple[list[int], Floats]:
+def _instants(instance: driving.Instance, driven: driving.Drive, lap: _Lap) -> tuple[list[int], Floats]:
     """Control steps at which the newest picture is another one, spread over the drive, and when it was exposed [s]."""
-    hold, every = (round(TICK_HZ / instance.robot.figures[rate]) for rate in ("control_rate", "camera_rate"))
+    hold, every = (round(driving.TICK_HZ / instance.robot.figures[rate]) for rate in ("control_rate", "camera_rate"))
     finished = np.arange(len(driven.commands)) * hold // every * every
     fresh = np.flatnonzero(np.diff(finished, prepend=0) > 0)
     if len(fresh) < lap.frames:
-        seconds = len(driven.commands) * hold / TICK_HZ
+        seconds = len(driven.commands) * hold / driving.TICK_HZ
         raise EpisodeError(
             f"lane drive from start {lap.start} ended after {seconds:.2f} s with {len(fresh)} of {lap.frames} "
             "pictures; record fewer frames, or correct the model"
@@ -241,4 +223,4 @@ def _instants(instance: Instance, driven: Drive, lap: _Lap) -> tuple[list[int], 
     # The middle of a picture's exposure, that of its middle row, is half of both before it is finished.
     lasting = {Blur.name: "blur", RollingShutter.name: "readout"}
     parts = [getattr(effect, lasting[effect.name]) for effect in instance.image.effects if effect.name in lasting]
-    return steps.tolist(), finished[steps] / TICK_HZ - float(sum(parts)) / 2.0
+    return steps.tolist(), finished[steps] / driving.TICK_HZ - float(sum(parts)) / 2.0

@@ -9,7 +9,6 @@ from proxytune.driving.robot import Robot
 
 Picture = NDArray[np.uint8]
 """One camera picture, (rows, columns, 3): red, green, blue."""
-
 Command = NDArray[np.float64]
 """Duties of the left and the right wheel, each in [−1, 1]."""
 

@@ -36,7 +36,6 @@ from proxytune.extensions import load
 
 Look = tuple[Kind, Any]
 """What an agent asks of its newest picture: how, and what of."""
-
 Decision = Generator[Look, Any, tuple[Any, Any]]
 """Looks, until the answers lead to a command and the memory for the next picture."""
 
@@ -75,14 +74,10 @@ def act_together(
     Returns:
         The commands (n, 2), and the memories for the next pictures.
     """
-    commands, after = _decide(agents, pictures if isinstance(pictures, Seen) else Seen(parted(pictures)), memories)
-    return np.array(commands, dtype=float), after
-
-
-def _decide(agents: Sequence[Deciding], seen: Seen, memories: Sequence[Any]) -> tuple[list[Any], list[Any]]:
+    seen = pictures if isinstance(pictures, Seen) else Seen(parted(pictures))
     if len(agents) == 1:
         command, memory = _decide_alone(agents[0], seen, memories[0])
-        return [command], [memory]
+        return np.array([command], dtype=float), [memory]
     decisions = [agent.decide(memory) for agent, memory in zip(agents, memories, strict=True)]
     commands: list[Any] = [None] * len(agents)
     after: list[Any] = [None] * len(agents)
@@ -100,7 +95,7 @@ def _decide(agents: Sequence[Deciding], seen: Seen, memories: Sequence[Any]) -> 
                     asked[robot] = decisions[robot].send(answer)
                 except StopIteration as decided:
                     commands[robot], after[robot] = decided.value
-    return commands, after
+    return np.array(commands, dtype=float), after
 
 
 def _decide_alone(agent: Deciding, seen: Seen, memory: Any) -> tuple[Any, Any]:

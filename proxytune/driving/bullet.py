@@ -77,17 +77,14 @@ def leave_world(world: int) -> None:
 
 SUBSTEPS = 4
 """Physics steps in a tick: 240 Hz at 60 ticks per second."""
-
 SOLVER_ITERATIONS = 20
 """Enough for one robot on a floor: 50, PyBullet's default, moves it by less than a millimetre a metre."""
 
 
 SLOWEST = 0.01
 """Below this speed [m/s] a car's front wheels stay as they are."""
-
 SERVO_TORQUE = 100.0
 """Servos hold their wheels whatever the floor does [N m]: how they follow is the steering effects' part."""
-
 _SPEED: Any = getattr(pybullet, "VELOCITY_CONTROL", None)
 _WHERE: Any = getattr(pybullet, "getBasePositionAndOrientation", None)
 _GAINS = (0.1, 1.0, 0.0)
@@ -197,10 +194,8 @@ class BulletPlant:
 
 OVERSAMPLING = 4
 """Rendered pixels along a side of a pixel, averaged: the renderer itself does nothing against aliasing."""
-
 NEAR, FAR, HORIZON = 0.01, 100.0, 50.0
 """What the renderer draws, and how far the floor goes on around the map [m]: at 50 m it ends 0.1° below the horizon."""
-
 WIDEST = math.tan(math.radians(80.0))
 """How far off its axis a lens that distorts can look, to either side: beyond, pictures without distortion are huge."""
 

@@ -114,7 +114,6 @@ class _Copies:
 
 OCTAVES = 6
 """How often the width of the blur doubles: 64 pixels of the floor's picture are a quarter of a tile."""
-
 FINENESS = 4
 """Texels across the width of a copy's blur: with one, a look-up is off by half of what the pixel covers."""
 

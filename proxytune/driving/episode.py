@@ -271,7 +271,6 @@ METRICS: Mapping[str, str] = MappingProxyType(
     }
 )
 """What an episode yields, with units."""
-
 EARLY_S = 5.0
 """What the first so many seconds show, no crash has cut off yet: of all that is measured it says most of θ."""
 

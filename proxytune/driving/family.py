@@ -72,7 +72,6 @@ def robot_meaning(robot: Path) -> str:
 
 NO_SETTINGS = ("folder", "cautions")
 """Fields that no episode depends on."""
-
 _RATE_HZ = 60.0
 """Camera effects hold for good: no rate changes what they do."""
 

@@ -43,7 +43,6 @@ PLANTS = ("bullet", "planar")
 
 AT_ONCE = {"bullet": 4, "planar": 48}
 """So many robots drive side by side on a plant: each world of Bullet takes 33 MB, and joblib ends what grows by 300."""
-
 Result = TypeVar("Result")
 
 

@@ -14,15 +14,12 @@ from proxytune.arrays import Floats, SmallBuffers, compiled_loops
 
 PAYS_OFF = 30_000
 """So many pictures NumPy looks up before Numba, which takes 0.4 s to load and would have saved that."""
-
 _used = [0]
 
 HALF_LANE_M = 0.128
 """From a lane's centre to the middle of the marking on either side of it [m]."""
-
 FEWEST = 6
 """So many pixels it takes to see a lane."""
-
 RIDGE = 0.005
 """For each pixel, it keeps a handful of them at one distance from spinning the line round [m²]."""
 

@@ -20,10 +20,8 @@ from proxytune.settings import Section, is_finite, nearest, read_settings
 
 LARGEST_M = 10.0
 """Longest side of a map [m]: its floor is drawn at 2.5 mm a pixel."""
-
 STEP_M = 0.01
 """How far apart the points of the road's edges are that are looked at [m]."""
-
 TOLERANCE = 1e-4
 """How far off a road may be from where it should be [m]."""
 
@@ -102,7 +100,6 @@ def _check_starts(road: Road, settings: Section) -> None:
 
 SHORTEST_M = 0.001
 """Shortest length that a map may state [m]."""
-
 MOST_DEG = 90.0
 """Farthest that one arc turns [deg]."""
 

@@ -12,7 +12,6 @@ from proxytune.errors import SettingsError
 
 CAMERA_CHANNELS = CHANNELS[Stage.CAMERA]
 """The figures that camera effects act on, in the order of their signal."""
-
 SKY = (115, 209, 255)
 """What a pixel above the horizon shows: gym-duckietown's sky, red, green, blue."""
 

@@ -113,13 +113,10 @@ def drivetrain(robot: Robot, effects: Iterable[Effect]) -> Drivetrain:
 
 AXLES = ("axle_left", "axle_right")
 """How the bullet plant calls the joints that it drives."""
-
 STEERS = ("steer_left", "steer_right")
 """How it calls those that it turns the front wheels of a car by."""
-
 AGREES = 0.01
 """How far, relatively, a URDF may be from robot.toml."""
-
 ACROSS = 0.9
 """An axle points to the left, or to the right, by so much of its length."""
 

@@ -19,10 +19,8 @@ from proxytune.driving.road import Paint, Road, Segment, Straight, length, tight
 
 PIXELS_PER_METRE = 400
 """2.5 mm a pixel: a twentieth of a white line, finer than what 64 × 48 pixels see at the robot's wheels."""
-
 MARGIN = 64
 """Fewest pixels of OFF_MAP on every side; the picture's side is a whole multiple of it."""
-
 COLOURS = MappingProxyType(
     {
         "off_map": (21, 21, 21),
@@ -32,10 +30,8 @@ COLOURS = MappingProxyType(
     }
 )
 """Red, green, blue, 0 to 255: means over the frames of gym-duckietown's photographed tiles."""
-
 STRIP = 8
 """Rows that are drawn at once, to stay small in memory; divides MARGIN."""
-
 DASH_PER_GAP = 2.0
 """Length of a yellow dash over the length of a gap."""
 

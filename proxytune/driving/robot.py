@@ -44,19 +44,15 @@ UNITS: Mapping[str, str] = MappingProxyType(
     }
 )
 """Every figure that a robot.toml may state, with its unit."""
-
 REQUIRED = {
     "differential": ("wheel_radius", "effective_baseline", "full_speed", "motor_time_constant", "control_rate"),
     "ackermann": ("wheel_radius", "wheelbase", "wheel_angle", "full_speed", "motor_time_constant", "control_rate"),
 }
 """What every robot states by how it drives: enough to drive a log on the planar plant."""
-
 COLUMNS = {"differential": ("left", "right"), "ackermann": ("throttle", "steering")}
 """What the two columns of commands are by how the robot drives, both from −1 to 1; steering is positive to the left."""
-
 BODY = ("wheel_distance", "wheel_torque")
 """What the bullet plant needs besides the URDF."""
-
 CAMERA = (
     "camera_rate",
     "camera_columns",
@@ -67,13 +63,10 @@ CAMERA = (
     "field_of_view",
 )
 """What an agent's view needs."""
-
 EXPERT = ("expert_look_ahead", "expert_speed", "expert_gain", "expert_disturbance")
 """What the expert that teaches to drive it needs."""
-
 WHEELS = ("wheel_distance",)
 """What an examination needs, which looks where each wheel is."""
-
 WITHOUT_BODY = 'use plant = "planar"'
 
 

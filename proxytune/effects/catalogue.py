@@ -15,19 +15,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from proxytune.effects.camera import (
-    CameraForward,
-    CameraHeight,
-    CameraPitch,
-    CameraRoll,
-    CameraYaw,
-    FieldOfView,
-    LensCentre,
-    LensDistortion,
-    PixelAspect,
-)
+from proxytune.effects import camera, command, friction, image, motion, motors, steering
 from proxytune.effects.columns import QUANTISATION, STEERED, STEERED_COMMANDS, THROTTLED
-from proxytune.effects.command import CommandQuantisation, Delay, DelayJitter, DroppedCommands
 from proxytune.effects.effect import (
     CHANNELS,
     MOTIONS,
@@ -40,23 +29,7 @@ from proxytune.effects.effect import (
     Trace,
     WheelCurve,
 )
-from proxytune.effects.friction import Backlash, DeadBand, Stiction, WheelRipple
-from proxytune.effects.image import Blur, CameraLatency, Defocus, Exposure, ImageNoise, RollingShutter, Vignetting
 from proxytune.effects.learnt import is_learnt, learnt_effect
-from proxytune.effects.motion import (
-    CrossCoupling,
-    FloorSlope,
-    HeadingOffset,
-    LateralSlip,
-    MarkerOffset,
-    SlipperyPatch,
-    TurnSlip,
-    Understeer,
-    YawLag,
-    YawScrub,
-)
-from proxytune.effects.motors import BatterySag, DriverMap, MotorLag, Saturation, SlewRate, ThermalFade, Trim, WheelGain
-from proxytune.effects.steering import Rolling, SteeringBacklash, SteeringCurve, SteeringFriction, SteeringOffset, Tyres
 from proxytune.errors import ExtensionError, SettingsError
 from proxytune.extensions import describe, load, plugins
 from proxytune.settings import nearest
@@ -188,25 +161,29 @@ def _signal(stage: Stage) -> Any:
 
 
 _TRACKER_AND_CAMERA: tuple[type[Effect], ...] = (
-    MarkerOffset, HeadingOffset,
-    CameraPitch, CameraRoll, CameraYaw, CameraHeight, CameraForward, FieldOfView, LensDistortion, LensCentre,
-    PixelAspect,
+    motion.MarkerOffset, motion.HeadingOffset,
+    camera.CameraPitch, camera.CameraRoll, camera.CameraYaw, camera.CameraHeight, camera.CameraForward,
+    camera.FieldOfView, camera.LensDistortion, camera.LensCentre, camera.PixelAspect,
     # Mixtures of pictures commute; blur is exact on 8-bit pictures alone, so it comes first
-    Blur, RollingShutter, CameraLatency, Defocus, Vignetting, Exposure, ImageNoise,
+    image.Blur, image.RollingShutter, image.CameraLatency,
+    image.Defocus, image.Vignetting, image.Exposure, image.ImageNoise,
 )  # fmt: skip
 
 _ALL: tuple[type[Effect], ...] = (
-    DelayJitter, DroppedCommands, CommandQuantisation, Delay,
-    SlewRate, DriverMap, DeadBand, Stiction, Saturation, Trim, WheelGain, BatterySag, ThermalFade, MotorLag, Backlash,
-    WheelRipple, YawScrub, Understeer, YawLag, TurnSlip, LateralSlip, CrossCoupling, FloorSlope, SlipperyPatch,
+    command.DelayJitter, command.DroppedCommands, command.CommandQuantisation, command.Delay,
+    motors.SlewRate, motors.DriverMap, friction.DeadBand, friction.Stiction, motors.Saturation, motors.Trim,
+    motors.WheelGain, motors.BatterySag, motors.ThermalFade, motors.MotorLag, friction.Backlash,
+    friction.WheelRipple, motion.YawScrub, motion.Understeer, motion.YawLag, motion.TurnSlip,
+    motion.LateralSlip, motion.CrossCoupling, motion.FloorSlope, motion.SlipperyPatch,
     *_TRACKER_AND_CAMERA,
 )  # fmt: skip
 
 # What bends the angle of the wheels goes before what is lost by it, and the mass comes last
 _OF_CARS: tuple[type[Effect], ...] = (
-    DelayJitter, DroppedCommands, QUANTISATION, Delay, *STEERED_COMMANDS,
-    *STEERED, SteeringBacklash, SteeringOffset, SteeringCurve, *THROTTLED, SteeringFriction, Rolling,
-    Tyres, YawLag, TurnSlip, FloorSlope, SlipperyPatch,
+    command.DelayJitter, command.DroppedCommands, QUANTISATION, command.Delay, *STEERED_COMMANDS,
+    *STEERED, steering.SteeringBacklash, steering.SteeringOffset, steering.SteeringCurve,
+    *THROTTLED, steering.SteeringFriction, steering.Rolling,
+    steering.Tyres, motion.YawLag, motion.TurnSlip, motion.FloorSlope, motion.SlipperyPatch,
     *_TRACKER_AND_CAMERA,
 )  # fmt: skip
 

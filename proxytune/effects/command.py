@@ -7,7 +7,7 @@ each message of the robot's control rate, found by the message's number: the sam
 import functools
 import math
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +45,7 @@ class Delay(ShippedEffect):
 
     delay: float = parameter("s", 0.0, 0.6, probes=(0.02, 0.04, 0.08, 0.15, 0.3),
         source="Duckiebot image-to-motor latency about 0.14 s; box of the paper 0 to 0.30 s")  # fmt: skip
-    trace: ClassVar[Trace | None] = Trace(cues=(Cue.TRANSIENTS,), shown=WheelCurve.STEP)
+    trace = Trace((Cue.TRANSIENTS,), WheelCurve.STEP)
 
     def begin(self, context: FilterContext) -> DelayLine:
         """Begin as if the robot had been at rest for ever."""
@@ -68,7 +68,7 @@ class CommandQuantisation(ShippedEffect):
 
     step: float = parameter("duty", 0.0, 0.5, probes=(0.02, 0.05, 0.1, 0.2, 0.4),
         source="8 bits: 0.008; drivers with a few speed levels: 0.1 to 0.3")  # fmt: skip
-    trace: ClassVar[Trace | None] = Trace(cues=(Cue.WHEEL_COMMAND,), shown=WheelCurve.STEADY, stepwise=True)
+    trace = Trace((Cue.WHEEL_COMMAND,), WheelCurve.STEADY, stepwise=True)
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Round each sample, halves to the even multiple."""
@@ -157,9 +157,7 @@ class DelayJitter(ShippedEffect):
 
     spread: float = parameter("s", 0.0, 0.3, probes=(0.02, 0.04, 0.08, 0.15, 0.3),
         source="wireless links: tens of milliseconds, now and then some tenths of a second")  # fmt: skip
-    trace: ClassVar[Trace | None] = Trace(
-        cues=(Cue.TRANSIENTS,), shown=WheelCurve.STEP, draws=Draws(_jittered, (2e-3, 0.3))
-    )
+    trace = Trace((Cue.TRANSIENTS,), WheelCurve.STEP, draws=Draws(_jittered, (2e-3, 0.3)))
 
     def begin(self, context: FilterContext) -> JitterState:
         """Begin as if the robot had been at rest for ever."""
@@ -209,9 +207,7 @@ class DroppedCommands(ShippedEffect):
 
     probability: float = parameter("", 0.0, 0.9, probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.7),
         source="wireless links: some in a hundred, in bad places half")  # fmt: skip
-    trace: ClassVar[Trace | None] = Trace(
-        cues=(Cue.TRANSIENTS,), shown=WheelCurve.STEP, draws=Draws(_lost, (1e-3, 0.6))
-    )
+    trace = Trace((Cue.TRANSIENTS,), WheelCurve.STEP, draws=Draws(_lost, (1e-3, 0.6)))
 
     def begin(self, context: FilterContext) -> LastReceived:
         """At rest until the first command arrives."""

@@ -235,7 +235,7 @@ class Effect(Protocol):
         ...
 
 
-class ShippedEffect:
+class ShippedEffect(Effect):
     """A shipped effect, which `effect` completes: without a trace, and without memory, unless it says so."""
 
     name: ClassVar[str]

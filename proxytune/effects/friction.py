@@ -4,7 +4,7 @@ Dead band, stiction and backlash depend on how a wheel's duty came about; ripple
 """
 
 import math
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,9 +40,7 @@ class DeadBand(ShippedEffect):
     width: float = parameter("duty", 0.0, 0.95, probes=(0.02, 0.04, 0.08, 0.15, 0.3), usual=(0.0, 0.5),
         source="friction of small gear motors: 0.05 to 0.2 of full duty")  # fmt: skip
     imbalance: float = like(IMBALANCE)
-    trace: ClassVar[Trace | None] = Trace(
-        cues=(Cue.WHEEL_COMMAND,), shown=WheelCurve.STEADY, forms=wheel_forms("width")
-    )
+    trace = Trace((Cue.WHEEL_COMMAND,), WheelCurve.STEADY, forms=wheel_forms("width"))
 
     def begin(self, context: FilterContext) -> Signal:
         """The width on each wheel (2,)."""
@@ -80,9 +78,9 @@ class Stiction(ShippedEffect):
     reversal: float = parameter("", 0.0, 1.0, 1.0, probes=(0.0, 0.25, 0.5, 0.75),
         source="1: friction catches a slow wheel as it passes rest; 0: a wheel with momentum runs through",
         shape=True)  # fmt: skip
-    trace: ClassVar[Trace | None] = Trace(
-        cues=(Cue.WHEEL_COMMAND, Cue.REVERSAL),
-        shown=WheelCurve.STEADY,
+    trace = Trace(
+        (Cue.WHEEL_COMMAND, Cue.REVERSAL),
+        WheelCurve.STEADY,
         forms=(
             *wheel_forms("breakaway", "release"),
             Form((("breakaway",), ("release",)), "runs through reversals", fixed={"reversal": 0.0}),
@@ -135,9 +133,7 @@ class Backlash(ShippedEffect):
     gap: float = parameter("rad", 0.0, 6.2, probes=(0.05, 0.1, 0.2, 0.4, 0.8, 1.5), usual=(0.0, 1.5),
         source="plastic gearboxes: some degrees, worn ones some tens")  # fmt: skip
     imbalance: float = like(IMBALANCE)
-    trace: ClassVar[Trace | None] = Trace(
-        cues=(Cue.REVERSAL, Cue.TRANSIENTS), shown=WheelCurve.REVERSAL, forms=wheel_forms("gap")
-    )
+    trace = Trace((Cue.REVERSAL, Cue.TRANSIENTS), WheelCurve.REVERSAL, forms=wheel_forms("gap"))
 
     def begin(self, context: FilterContext) -> BacklashState:
         """In the middle of the play."""
@@ -208,9 +204,9 @@ class WheelRipple(ShippedEffect):
     left_cosine: float = like(RIPPLE)
     right_sine: float = like(RIPPLE)
     right_cosine: float = like(RIPPLE)
-    trace: ClassVar[Trace | None] = Trace(
-        cues=(Cue.LEFT_ANGLE, Cue.RIGHT_ANGLE),
-        shown=Means(
+    trace = Trace(
+        (Cue.LEFT_ANGLE, Cue.RIGHT_ANGLE),
+        Means(
             Cue.LEFT_ANGLE,
             tuple(
                 Panel(f"{side} angle", f"angle of the {side} wheel [rad]", side, share=True)

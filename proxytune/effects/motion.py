@@ -4,7 +4,7 @@ First how forward speed, sideways speed and yaw rate change each other; then wha
 last how the pose that is tracked differs from that of the axle's middle.
 """
 
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,9 +39,7 @@ class YawScrub(ShippedEffect):
         usual=(0.03, 3.0),
         source="wheel distance on hard tyres to a few times it with scrub: 0.16 m instead of 0.10 m on "
                "a Duckiebot")  # fmt: skip
-    trace: ClassVar[Trace | None] = Trace(
-        cues=(Cue.TURN_RATE, Cue.COMMAND_DIFFERENCE), shown=Means(Cue.TURN_RATE, (Panel("turn", TURN, "turn"),))
-    )
+    trace = Trace((Cue.TURN_RATE, Cue.COMMAND_DIFFERENCE), Means(Cue.TURN_RATE, (Panel("turn", TURN, "turn"),)))
 
     def begin(self, context: FilterContext) -> float:
         """The factor on the yaw rate."""
@@ -58,9 +56,8 @@ class TurnSlip(ShippedEffect):
 
     loss: float = parameter("s/rad", 0.0, 15.0, probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8), usual=(0.0, 1.5),
         source="tyres in a bend: some hundredths of the speed at 1 rad/s, tracks up to half")  # fmt: skip
-    trace: ClassVar[Trace | None] = Trace(
-        cues=(Cue.TURN_RATE, Cue.COMMAND_DIFFERENCE),
-        shown=Means(Cue.TURN_RATE, (Panel("turn", TURN, "forward", share=True),)),
+    trace = Trace(
+        (Cue.TURN_RATE, Cue.COMMAND_DIFFERENCE), Means(Cue.TURN_RATE, (Panel("turn", TURN, "forward", share=True),))
     )
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
@@ -76,9 +73,8 @@ class LateralSlip(ShippedEffect):
     slip: float = parameter("s", -5.0, 5.0, probes=(-0.2, -0.08, -0.03, 0.03, 0.08, 0.2), usual=(-0.5, 0.5),
         source="slip angle of some degrees at 1 rad/s; a pose that is not measured at the axle looks "
                "the same")  # fmt: skip
-    trace: ClassVar[Trace | None] = Trace(
-        cues=(Cue.TURN_RATE,),
-        shown=Means(Cue.TURN_RATE, (Panel("bend", "forward speed times turn rate [m/s²]", "sideways"),)),
+    trace = Trace(
+        (Cue.TURN_RATE,), Means(Cue.TURN_RATE, (Panel("bend", "forward speed times turn rate [m/s²]", "sideways"),))
     )
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
@@ -99,9 +95,9 @@ class CrossCoupling(ShippedEffect):
         source="a centre of turning some millimetres to centimetres off the middle of the axle")  # fmt: skip
     turn: float = parameter("rad/m", -20.0, 20.0, probes=(-0.6, -0.2, -0.06, 0.06, 0.2, 0.6), usual=(-2.0, 2.0),
         source="a dragging caster or a tyre that pulls: some degrees to tens of degrees a metre")  # fmt: skip
-    trace: ClassVar[Trace | None] = Trace(
-        cues=(Cue.TURN_RATE, Cue.DIRECTION, Cue.COMMAND_DIFFERENCE),
-        shown=Means(Cue.TURN_RATE, (Panel("turn", TURN, "forward"), Panel("forward", "forward speed [m/s]", "turn"))),
+    trace = Trace(
+        (Cue.TURN_RATE, Cue.DIRECTION, Cue.COMMAND_DIFFERENCE),
+        Means(Cue.TURN_RATE, (Panel("turn", TURN, "forward"), Panel("forward", "forward speed [m/s]", "turn"))),
     )
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
@@ -117,9 +113,9 @@ class Understeer(ShippedEffect):
 
     gain: float = parameter("s/m", 0.0, 50.0, probes=(0.03, 0.1, 0.3, 0.8, 2.0), usual=(0.0, 5.0),
         source="tyres that slip sideways: some tenths of the turn at 1 m/s, small robots more")  # fmt: skip
-    trace: ClassVar[Trace | None] = Trace(
-        cues=(Cue.TURN_RATE, Cue.COMMAND_DIFFERENCE),
-        shown=Means(Cue.TURN_RATE, (Panel("forward", "forward speed [m/s]", "turn", share=True),)),
+    trace = Trace(
+        (Cue.TURN_RATE, Cue.COMMAND_DIFFERENCE),
+        Means(Cue.TURN_RATE, (Panel("forward", "forward speed [m/s]", "turn", share=True),)),
     )
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
@@ -134,9 +130,7 @@ class YawLag(ShippedEffect):
 
     time_constant: float = parameter("s", 0.0, 10.0, probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8), usual=(0.0, 1.0),
         source="a body that has to be turned on tyres that give: some hundredths to tenths of a second")  # fmt: skip
-    trace: ClassVar[Trace | None] = Trace(
-        cues=(Cue.TRANSIENTS, Cue.TURN_RATE), shown=Means(Cue.TURN_RATE, (Panel("turn", TURN, "turn"),))
-    )
+    trace = Trace((Cue.TRANSIENTS, Cue.TURN_RATE), Means(Cue.TURN_RATE, (Panel("turn", TURN, "turn"),)))
 
     def begin(self, context: FilterContext) -> LowPassState:
         """The resting yaw rate has been reached."""
@@ -170,11 +164,9 @@ class FloorSlope(ShippedEffect):
     push: float = parameter("", 0.0, 2.0, probes=(0.25, 0.5, 1.0, 1.0, 0.5, 0.25),
         source="0 for tyres that hold sideways, 1 for a robot that slides as easily across as along",
         shape=True)  # fmt: skip
-    trace: ClassVar[Trace | None] = Trace(
-        cues=(Cue.HEADING,),
-        shown=Means(
-            Cue.HEADING, tuple(Panel("heading", "heading [deg]", motion) for motion in ("forward", "sideways"))
-        ),
+    trace = Trace(
+        (Cue.HEADING,),
+        Means(Cue.HEADING, tuple(Panel("heading", "heading [deg]", motion) for motion in ("forward", "sideways"))),
     )
 
     def begin(self, context: FilterContext) -> DeadReckoning:
@@ -229,9 +221,9 @@ class SlipperyPatch(ShippedEffect):
     y: float = like(PLACE)
     radius: float = parameter("m", 0.1, 5.0, 0.5, probes=(0.3, 0.8, 1.5, 2.5), source="from a puddle to a carpet",
         shape=True)  # fmt: skip
-    trace: ClassVar[Trace | None] = Trace(
-        cues=(Cue.POSITION,),
-        shown=Means(Cue.POSITION, tuple(Panel(axis, f"{axis} [m]", "forward", share=True) for axis in ("x", "y"))),
+    trace = Trace(
+        (Cue.POSITION,),
+        Means(Cue.POSITION, tuple(Panel(axis, f"{axis} [m]", "forward", share=True) for axis in ("x", "y"))),
         placed=True,
     )
 
@@ -279,9 +271,8 @@ class MarkerOffset(ShippedEffect):
 
     forward: float = like(ASIDE)
     left: float = like(ASIDE)
-    trace: ClassVar[Trace | None] = Trace(
-        cues=(Cue.TURN_RATE,),
-        shown=Means(Cue.TURN_RATE, (Panel("turn", TURN, "forward"), Panel("turn", TURN, "sideways"))),
+    trace = Trace(
+        (Cue.TURN_RATE,), Means(Cue.TURN_RATE, (Panel("turn", TURN, "forward"), Panel("turn", TURN, "sideways")))
     )
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
@@ -299,9 +290,7 @@ class HeadingOffset(ShippedEffect):
 
     angle: float = parameter("deg", -180.0, 180.0, probes=(-20.0, -8.0, -3.0, 3.0, 8.0, 20.0), usual=(-45.0, 45.0),
         source="a marker stuck on by hand: some degrees; more where its axes are another's")  # fmt: skip
-    trace: ClassVar[Trace | None] = Trace(
-        cues=(Cue.TURN_RATE,), shown=Means(Cue.TURN_RATE, (Panel("forward", "forward speed [m/s]", "sideways"),))
-    )
+    trace = Trace((Cue.TURN_RATE,), Means(Cue.TURN_RATE, (Panel("forward", "forward speed [m/s]", "sideways"),)))
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Add the angle to each heading."""

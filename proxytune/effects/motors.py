@@ -5,7 +5,7 @@ right. `wheel_forms` are the forms in which a diagnosis tries such an effect: bo
 """
 
 from dataclasses import replace
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -61,7 +61,7 @@ class DriverMap(ShippedEffect):
 
     offset: float = parameter("duty", 0.0, 0.4, probes=(0.02, 0.04, 0.08, 0.15, 0.3),
         source="Duckiebot motor driver: (195|u| + 60)/255 above a duty of 0.01")  # fmt: skip
-    trace: ClassVar[Trace | None] = Trace(cues=(Cue.WHEEL_COMMAND,), shown=WheelCurve.STEADY)
+    trace = Trace((Cue.WHEEL_COMMAND,), WheelCurve.STEADY)
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Map each sample on its own."""
@@ -76,7 +76,7 @@ class Trim(ShippedEffect):
 
     trim: float = parameter("", -0.5, 0.5, probes=(-0.2, -0.1, -0.05, 0.05, 0.1, 0.2),
         source="31 calibrated Duckiebots: −0.014 ± 0.057; box of the paper ±0.3")  # fmt: skip
-    trace: ClassVar[Trace | None] = Trace(cues=(Cue.WHEEL_COMMAND,), shown=WheelCurve.STEADY)
+    trace = Trace((Cue.WHEEL_COMMAND,), WheelCurve.STEADY)
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Scale the two wheels apart."""
@@ -92,7 +92,7 @@ class Gain(ShippedEffect):
     """Both wheels turn faster or slower than nominal by one factor: on a single column, all that a gain is."""
 
     gain: float = like(GAIN)
-    trace: ClassVar[Trace | None] = Trace(cues=(Cue.WHEEL_COMMAND,), shown=WheelCurve.STEADY)
+    trace = Trace((Cue.WHEEL_COMMAND,), WheelCurve.STEADY)
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Scale both."""
@@ -105,9 +105,9 @@ class WheelGain(ShippedEffect):
 
     left: float = like(GAIN)
     right: float = like(GAIN)
-    trace: ClassVar[Trace | None] = Trace(
-        cues=(Cue.WHEEL_COMMAND,),
-        shown=WheelCurve.STEADY,
+    trace = Trace(
+        (Cue.WHEEL_COMMAND,),
+        WheelCurve.STEADY,
         forms=(Form((("left", "right"),)), Form((("left",),), "left wheel"), Form((("right",),), "right wheel")),
     )
 
@@ -123,9 +123,7 @@ class MotorLag(ShippedEffect):
     time_constant: float = parameter("s", 0.0, 10.0, "motor_time_constant", probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8),
         usual=(0.0, 1.0), source="gym-duckietown's dynamics fit: 0.20 s")  # fmt: skip
     imbalance: float = like(SLIGHT_IMBALANCE)
-    trace: ClassVar[Trace | None] = Trace(
-        cues=(Cue.TRANSIENTS, Cue.WHEEL_COMMAND), shown=WheelCurve.STEP, forms=wheel_forms("time_constant")
-    )
+    trace = Trace((Cue.TRANSIENTS, Cue.WHEEL_COMMAND), WheelCurve.STEP, forms=wheel_forms("time_constant"))
 
     def begin(self, context: FilterContext) -> tuple[LowPassState, ...]:
         """Wheels turn at the speed asked of them before time zero."""
@@ -157,7 +155,7 @@ class SlewRate(ShippedEffect):
 
     rise_time: float = parameter("s", 0.0, 30.0, probes=(0.05, 0.1, 0.2, 0.4, 0.8, 1.6), usual=(0.0, 3.0),
         source="ramps of motor drivers: some tenths of a second to a few seconds from rest to full speed")  # fmt: skip
-    trace: ClassVar[Trace | None] = Trace(cues=(Cue.TRANSIENTS, Cue.WHEEL_COMMAND), shown=WheelCurve.STEP)
+    trace = Trace((Cue.TRANSIENTS, Cue.WHEEL_COMMAND), WheelCurve.STEP)
 
     def begin(self, context: FilterContext) -> SlewState:
         """The resting duty has been reached."""
@@ -204,9 +202,8 @@ class ThermalFade(ShippedEffect):
         source="windings that are 80 °C warmer have a third more resistance")  # fmt: skip
     time_constant: float = parameter("s", 0.5, 1200.0, 8.0, probes=(2.0, 4.0, 15.0, 40.0), usual=(0.5, 120.0),
         source="small motors warm up within seconds to minutes", shape=True)  # fmt: skip
-    trace: ClassVar[Trace | None] = Trace(
-        cues=(Cue.USE, Cue.TIME),
-        shown=Means(Cue.USE, (Panel("", "use so far [s at full duty]", "forward", share=True),)),
+    trace = Trace(
+        (Cue.USE, Cue.TIME), Means(Cue.USE, (Panel("", "use so far [s at full duty]", "forward", share=True),))
     )
 
     def begin(self, context: FilterContext) -> LowPassState:
@@ -231,9 +228,7 @@ class Saturation(ShippedEffect):
     limit: float = parameter("duty", 0.1, 1.0, 1.0, probes=(0.15, 0.25, 0.4, 0.6, 0.8, 0.9),
         source="drivers that cap the duty, batteries run down: 0.5 to 1")  # fmt: skip
     imbalance: float = like(IMBALANCE)
-    trace: ClassVar[Trace | None] = Trace(
-        cues=(Cue.WHEEL_COMMAND,), shown=WheelCurve.STEADY, forms=wheel_forms("limit")
-    )
+    trace = Trace((Cue.WHEEL_COMMAND,), WheelCurve.STEADY, forms=wheel_forms("limit"))
 
     def begin(self, context: FilterContext) -> Signal:
         """The limit of each wheel (2,)."""
@@ -270,9 +265,9 @@ class BatterySag(ShippedEffect):
         source="a battery that lasts minutes to an hour at full duty")  # fmt: skip
     fade_with_time: float = parameter("1/min", 0.0, 10.0, probes=(0.03, 0.06, 0.12, 0.25, 0.5, 1.0), usual=(0.0, 1.0),
         source="what else a battery feeds empties it too, driving or not")  # fmt: skip
-    trace: ClassVar[Trace | None] = Trace(
-        cues=(Cue.USE, Cue.TIME),
-        shown=WheelCurve.STEADY,
+    trace = Trace(
+        (Cue.USE, Cue.TIME),
+        WheelCurve.STEADY,
         forms=(
             Form((("load",),), "load"),
             Form((("fade",),), "fade", shown=_fading(Cue.USE, "use so far [s at full duty]")),

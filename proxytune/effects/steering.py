@@ -5,7 +5,7 @@ motion that these ask of the body.
 """
 
 import math
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from proxytune.effects.effect import (
     like,
     parameter,
 )
+from proxytune.effects.features import newest_signs
 from proxytune.effects.friction import taken_along
 from proxytune.space import Parameter
 
@@ -40,7 +41,7 @@ class SteeringBacklash(ShippedEffect):
 
     gap: float = parameter("full lock", 0.0, 0.4, probes=(0.02, 0.05, 0.1, 0.2),
         source="ball joints and plastic knuckles: some degrees of the wheels, worn ones more")  # fmt: skip
-    trace: ClassVar[Trace | None] = Trace(cues=(Cue.STEERING, Cue.TRANSIENTS), shown=WheelCurve.REVERSAL)
+    trace = Trace((Cue.STEERING, Cue.TRANSIENTS), WheelCurve.REVERSAL)
 
     def begin(self, context: FilterContext) -> Signal:
         """With the wheels where the servo rests."""
@@ -58,7 +59,7 @@ class SteeringOffset(ShippedEffect):
 
     offset: float = parameter("full lock", -0.4, 0.4, probes=(-0.2, -0.08, -0.03, 0.03, 0.08, 0.2),
         source="servo horns have some 25 teeth: up to 7° of the horn off; DART: 0.027 of full lock")  # fmt: skip
-    trace: ClassVar[Trace | None] = Trace(cues=(Cue.STEERING,), shown=WheelCurve.STEADY)
+    trace = Trace((Cue.STEERING,), WheelCurve.STEADY)
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Add it."""
@@ -83,9 +84,9 @@ class SteeringCurve(ShippedEffect):
     right: float = like(LOCK)
     left_bend: float = like(BEND)
     right_bend: float = like(BEND)
-    trace: ClassVar[Trace | None] = Trace(
-        cues=(Cue.STEERING,),
-        shown=WheelCurve.STEADY,
+    trace = Trace(
+        (Cue.STEERING,),
+        WheelCurve.STEADY,
         forms=(
             Form((("left",), ("right",)), "sides", moved=("left", "right")),
             Form((("left",), ("right",), ("left_bend", "right_bend")), "sides bent alike"),
@@ -113,9 +114,7 @@ class SteeringFriction(ShippedEffect):
 
     loss: float = parameter("", 0.0, 0.9, probes=(0.05, 0.1, 0.2, 0.4),
         source="front tyres that scrub: some tenths of the speed at full lock")  # fmt: skip
-    trace: ClassVar[Trace | None] = Trace(
-        cues=(Cue.STEERING,), shown=Means(Cue.TURN_RATE, (Panel("turn", TURN, "forward", share=True),))
-    )
+    trace = Trace((Cue.STEERING,), Means(Cue.TURN_RATE, (Panel("turn", TURN, "forward", share=True),)))
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Slow the car down by how far its wheels are turned, at most to a stop."""
@@ -162,9 +161,9 @@ class Rolling(ShippedEffect):
         source="rolling friction of model cars: 0.2 to 1 m/s²; DART: 0.74 m/s²", shape=True)  # fmt: skip
     drag: float = parameter("1/s", 0.0, 2.0, probes=(0.05, 0.1, 0.2, 0.5, 1.0),
         source="gears, bearings and air: some tenths of the speed in a second", shape=True)  # fmt: skip
-    trace: ClassVar[Trace | None] = Trace(
-        cues=(Cue.TRANSIENTS, Cue.WHEEL_COMMAND),
-        shown=WheelCurve.STEP,
+    trace = Trace(
+        (Cue.TRANSIENTS, Cue.WHEEL_COMMAND),
+        WheelCurve.STEP,
         forms=(
             Form((("inertia",),), moved=("inertia",)),
             Form((("inertia",), ("friction",)), "rolls on", fixed={"freewheel": 1.0}, moved=("inertia", "friction")),
@@ -184,7 +183,8 @@ class Rolling(ShippedEffect):
             return signal, memory
         motor = signal[..., THROTTLE]
         speed = np.broadcast_to(memory.speed, motor.shape[:-1])
-        ahead = _last_sign(motor, memory.ahead)
+        before = np.broadcast_to(memory.ahead, motor.shape[:-1])[..., None]
+        ahead = newest_signs(np.concatenate((before, np.sign(motor)), axis=-1))[..., 1:]
         rate = (1.0 - self.freewheel + self.freewheel * np.abs(motor)) / self.inertia + self.drag
         rate = np.maximum(rate, 1e-9)
         push = motor / self.inertia - ahead * memory.friction
@@ -197,13 +197,6 @@ class Rolling(ShippedEffect):
         mean = goal + (starts - goal) * (1.0 - kept) / (rate * memory.sample_s)
         rolled = np.stack((np.clip(mean, low, high), signal[..., STEERING]), axis=-1)
         return rolled, memory._replace(speed=ends[..., -1], ahead=ahead[..., -1])
-
-
-def _last_sign(motor: Signal, before: Signal) -> Signal:
-    """The sign of each sample (…, time), or of the last one before it that was not 0."""
-    signs = np.concatenate((np.broadcast_to(before, motor.shape[:-1])[..., None], np.sign(motor)), axis=-1)
-    latest = np.maximum.accumulate(np.where(signs != 0.0, np.arange(signs.shape[-1]), 0), axis=-1)
-    return np.asarray(np.take_along_axis(signs, latest, axis=-1)[..., 1:])
 
 
 def _follow(steps: Signal, start: Signal) -> Signal:
@@ -245,9 +238,9 @@ class Tyres(ShippedEffect):
         source="1 by the lateral acceleration that tyres hold: 2 to 10 m/s²")  # fmt: skip
     rear_slip: float = parameter("s²/m", -0.1, 0.2, probes=(0.005, 0.015, 0.04, 0.1),
         source="slip angle of some degrees at 5 m/s²")  # fmt: skip
-    trace: ClassVar[Trace | None] = Trace(
-        cues=(Cue.TURN_RATE,),
-        shown=Means(Cue.TURN_RATE, (Panel("bend", "forward speed times turn rate [m/s²]", "turn", share=True),)),
+    trace = Trace(
+        (Cue.TURN_RATE,),
+        Means(Cue.TURN_RATE, (Panel("bend", "forward speed times turn rate [m/s²]", "turn", share=True),)),
         forms=(
             Form((("understeer",),), "understeer", moved=("understeer",)),
             Form((("slide",),), "slide", moved=("slide",)),

@@ -14,20 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
+from proxytune import driving
 from proxytune.domain import Episode, make_episode
-from proxytune.driving import (
-    TICK_HZ,
-    Course,
-    Picture,
-    Plant,
-    Plants,
-    Road,
-    Rollouts,
-    check_command,
-    draw_floor,
-    lane_following,
-    score_trajectory,
-)
 from proxytune.effects import Signal, parameter_hint
 from proxytune.errors import InputError
 from proxytune.settings import Section, nearest
@@ -41,7 +29,7 @@ ARROW_M = 0.09
 """From the middle of the robot to the tip of what is drawn of it [m]."""
 
 
-def render(picture: Picture, road: Road, poses: Signal) -> NDArray[np.uint8]:
+def render(picture: driving.Picture, road: driving.Road, poses: Signal) -> NDArray[np.uint8]:
     """A picture beside the map.
 
     Args:
@@ -63,9 +51,9 @@ def render(picture: Picture, road: Road, poses: Signal) -> NDArray[np.uint8]:
     return np.concatenate((np.asarray(seen), np.asarray(above)), axis=1)
 
 
-def _map(road: Road) -> Image.Image:
+def _map(road: driving.Road) -> Image.Image:
     """The map seen from above, north up."""
-    floor = draw_floor(road)
+    floor = driving.draw_floor(road)
     columns, rows = (
         slice(*(round((end - floor.origin) * floor.pixels_per_metre) for end in (0.0, s))) for s in road.size
     )
@@ -117,7 +105,7 @@ def _numbers(value: Any) -> list[float]:
         return []
 
 
-TICK_S = 1.0 / TICK_HZ
+TICK_S = 1.0 / driving.TICK_HZ
 
 
 class Tally:
@@ -129,7 +117,7 @@ class Tally:
         start: Starting pose (3,): x [m], y [m], heading [rad].
     """
 
-    def __init__(self, road: Road, seconds: float, start: Signal) -> None:
+    def __init__(self, road: driving.Road, seconds: float, start: Signal) -> None:
         self._road, self._seconds = road, seconds
         self._parts: list[Signal] = [start[None]]
         self._ticks, self._distance, self._aside = 0, 0.0, 0.0
@@ -159,7 +147,7 @@ class Tally:
         return self._score(self.poses, self._seconds)
 
     def _score(self, poses: Signal, seconds: float) -> dict[str, float]:
-        return score_trajectory(self._road, poses, tick_s=TICK_S, seconds=seconds)
+        return driving.score_trajectory(self._road, poses, tick_s=TICK_S, seconds=seconds)
 
 
 OPTIONS = ("theta", "start", "episode_seed")
@@ -171,13 +159,13 @@ SEEDS = 2**32
 class _EpisodeUnderWay(NamedTuple):
     """An episode under way."""
 
-    plant: Plant
-    course: Course
-    rollouts: Rollouts
+    plant: driving.Plant
+    course: driving.Course
+    rollouts: driving.Rollouts
     tally: Tally
 
 
-class LaneFollowingEnv(gymnasium.Env[Picture, NDArray[Any]]):
+class LaneFollowingEnv(gymnasium.Env[driving.Picture, NDArray[Any]]):
     """One robot that is to follow its lane: the episodes that a study scores, one control step at a time.
 
     Observation: the camera's newest picture, (rows, columns, 3), uint8. Action: duties of the left and right wheel, of
@@ -219,7 +207,7 @@ class LaneFollowingEnv(gymnasium.Env[Picture, NDArray[Any]]):
     ) -> None:
         plain = {key: str(value) if isinstance(value, Path) else value for key, value in domain.items()}
         table = Section(Path(folder) / LaneFollowingEnv.__name__, "", plain)
-        self.family = lane_following(table, model=Path(model) if model else None)
+        self.family = driving.lane_following(table, model=Path(model) if model else None)
         self._theta = read_theta(theta or {}, self.family.parameters)
         self._start = None if start is None else _whole("start", start, self.family.starts)
         if render_mode not in (None, *self.metadata["render_modes"]):
@@ -236,7 +224,7 @@ class LaneFollowingEnv(gymnasium.Env[Picture, NDArray[Any]]):
 
     def reset(
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
-    ) -> tuple[Picture, dict[str, Any]]:
+    ) -> tuple[driving.Picture, dict[str, Any]]:
         """Put the robot down for another episode.
 
         Args:
@@ -254,13 +242,13 @@ class LaneFollowingEnv(gymnasium.Env[Picture, NDArray[Any]]):
         course = self.family.course(episode, self.family.seconds)
         plant = self.family.plant_at(instance.robot, course.start)
         tally = Tally(self.family.map, self.family.seconds, course.start)
-        rollouts = Rollouts([instance], [course], Plants([plant]))
+        rollouts = driving.Rollouts([instance], [course], driving.Plants([plant]))
         self._drive = _EpisodeUnderWay(plant, course, rollouts, tally)
         self._step, self._over = 0, False
         told = {"theta": dict(episode.theta), "start": episode.start, "episode_seed": episode.seed}
         return self._picture(), {**self._info(), **told}
 
-    def step(self, action: NDArray[Any]) -> tuple[Picture, float, bool, bool, dict[str, Any]]:
+    def step(self, action: NDArray[Any]) -> tuple[driving.Picture, float, bool, bool, dict[str, Any]]:
         """Hold two duties for one control step.
 
         Raises:
@@ -271,7 +259,7 @@ class LaneFollowingEnv(gymnasium.Env[Picture, NDArray[Any]]):
         if self._over:
             raise InputError("the episode is over; call reset() for another one")
         command = np.asarray(action, dtype=float)
-        check_command(command, self._step / self._control_hz)
+        driving.check_command(command, self._step / self._control_hz)
         drive.rollouts.step(command[None])
         self._step += 1
         [poses], [crashed] = drive.rollouts.poses, drive.rollouts.crashed
@@ -313,7 +301,7 @@ class LaneFollowingEnv(gymnasium.Env[Picture, NDArray[Any]]):
             raise InputError("no episode is under way; call reset() first")
         return self._drive
 
-    def _picture(self) -> Picture:
+    def _picture(self) -> driving.Picture:
         """A copy: the camera is slower than the commands, so two steps may see one picture."""
         return np.array(self._under_way().rollouts.pictures()[0])
 

@@ -180,10 +180,8 @@ def _name_of(bag: Path) -> str:
 
 UNSET_NS = 10**8 * 10**9
 """Stamps before 1973 are no date: a driver left them at zero, or counted from its own start."""
-
 APART_S = 0.05
 """Clocks whose stamps differ by more in the median are worth a note."""
-
 DRIFT_S = 0.02
 """Clocks that run apart by more are worth a note."""
 

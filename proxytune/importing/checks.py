@@ -17,18 +17,14 @@ from proxytune.importing.source import Commands, Drive, Poses
 
 FASTEST_M_S = 40.0
 """No wheeled robot drives faster."""
-
 FASTEST_WHEEL_RAD_S = 2000.0
 
 SHORTEST_S = 1.0
 """A drive that takes less is one whose times are in another unit."""
-
 CHORD_S = 0.2
 """Speeds are taken over so long: noise of poses is none."""
-
 APART = 50.0
 """Commanded and measured ways may differ by slip and gears, but not by such a factor."""
-
 MOVED_M = 0.1
 
 SPARSEST = 20.0
@@ -89,7 +85,6 @@ def _usual_speed(poses: Poses) -> float:
 
 LEAST_NORM = 1e-3
 """A shorter quaternion is no orientation: drivers publish zeros before they know one."""
-
 MOST_LACKING = 0.1
 """A tracker that loses its markers now and then lacks no more of its poses than this share."""
 
@@ -128,13 +123,10 @@ def complaint(quaternions: Floats, wrong: NDArray[np.bool_], where: str) -> LogE
 
 FURTHEST_BACK_S = 0.5
 """Messages may arrive in another order than they were stamped in; a longer step back is a clock set anew."""
-
 TILT_DEG = 25.0
 """No wheeled robot leans so far for most of a drive: its frame, or the world's, is not z-up."""
-
 FLAT_M = 0.3
 """No floor goes up and down by more: heights that do are another axis."""
-
 PLAUSIBLE_S = 946684800.0
 """2000-01-01: stamps between a day after 1970 and this are of a clock that was never set."""
 
@@ -248,10 +240,8 @@ def _check_overlap(commands: Floats, poses: Floats, about: str) -> None:
 STEP_S = 0.01
 FURTHEST_S = 2.0
 """Answers are looked for so far from their commands."""
-
 CLEAR = 0.4
 """A correlation below this tells no lag."""
-
 SMOOTH_S = 0.1
 """Measured turns are taken over so long."""
 

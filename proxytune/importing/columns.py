@@ -43,7 +43,6 @@ UNITS = {
     for name, factor in units.items()
 }
 """Every unit by its name; the first of each quantity is the package's own."""
-
 ENDINGS = {unit.name.replace("/", "_"): unit for unit in UNITS.values() if unit.name not in ("duty", "number")} | {
     "sec": UNITS["s"],
     "nsec": UNITS["ns"],
@@ -55,16 +54,12 @@ ENDINGS = {unit.name.replace("/", "_"): unit for unit in UNITS.values() if unit.
     "pct": UNITS["percent"],
 }
 """What a column's name may end in after an underscore, blank or bracket, as in stamp_ns, pos_x [mm], v_m_s."""
-
 EPOCHS = ((1e17, UNITS["ns"]), (1e14, UNITS["us"]), (1e11, UNITS["ms"]))
 """From which value on a stamp is no date in a greater unit: 1e11 s lie in the year 5138, 1e11 ms in 1973."""
-
 LARGEST = {"speed": 30.0, "turning speed": 300.0, "length": 1000.0}
 """Beyond these [m/s, rad/s, m from end to end] a unit that nobody stated is doubted."""
-
 PULSES = (900.0, 2200.0)
 """Lengths of servo pulses [us]."""
-
 SHORTEST_STEP_S, LONGEST_STEP_S = 1e-5, 10.0
 """Median step of stamps outside of which a unit that nobody stated is doubted."""
 

@@ -94,7 +94,6 @@ FORMS: Mapping[Callable[[Path], bool], Callable[[Path, Wanted], Source]] = {
     is_csv_tables: read_csv_tables,
 }
 """What tells a form that recordings come in, and what reads it; from the surest to what takes any text."""
-
 KNOWN = "a ROS bag (.bag, .db3, .mcap or a folder of them), CSV, TUM or MRCLAM files, or arrays (.npz)"
 
 

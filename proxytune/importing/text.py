@@ -79,7 +79,6 @@ class Table:
 
 HEAD_BYTES = 65536
 """How much of a file is looked at to recognise it."""
-
 Lines = list[tuple[int, str]]
 
 
@@ -199,7 +198,6 @@ COMMAND_FIELDS = (*(field for pair in COMMANDS.values() for field in pair), ENAB
 
 EXAMPLE = "--columns time=stamp_ns:ns,x=pos_x_mm:mm,y=pos_y_mm:mm,heading=yaw_deg:deg,v=cmd_lin,omega=cmd_ang"
 """A column map, for complaints."""
-
 QUANTITIES: Mapping[str, str] = {
     "time": "time",
     "command_time": "time",
@@ -217,7 +215,6 @@ QUANTITIES: Mapping[str, str] = {
     ENABLED: "number",
 }
 """What each field measures; episodes and quaternions have no unit."""
-
 TIMES = "t time times stamp stamps timestamp timestamps headerstamp unixtime elapsed elapsedtime sec secs seconds"
 EPISODES = "episode run drive trial trajectory"
 HEADINGS = "heading yaw theta psi θ ψ headingangle yawangle posetheta poseyaw poseheading"

@@ -74,7 +74,6 @@ class Role:
 
 KIND_OF = {name: kind for name, (kind, _) in COMMAND_TYPES.items()} | {short(VESC): "speed_steering"}
 """The kind of command that a type of message says; empty where it says none."""
-
 COMMAND_ROLE = Role(
     "commands",
     "--commands",

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from proxytune.diagnosis.answer import Estimate, Progress, verdict
+from proxytune.diagnosis.camera import selection
 from proxytune.diagnosis.camera.appearance import Appearance, changes, look_at
 from proxytune.diagnosis.camera.edges import DISTORTION, MOVING, READOUT, Gathered, Tape, effects_of, gather_views
 from proxytune.diagnosis.camera.error import (
@@ -27,18 +28,6 @@ from proxytune.diagnosis.camera.error import (
     weigh_effects,
 )
 from proxytune.diagnosis.camera.fitting import CameraFit
-from proxytune.diagnosis.camera.selection import (
-    ALWAYS,
-    CameraSelection,
-    ResidualField,
-    check_match,
-    fit_everything,
-    fit_residual_field,
-    hidden_effects,
-    matched_share,
-    next_views,
-    select_camera_effects,
-)
 from proxytune.diagnosis.stages import Stages, facts_of
 from proxytune.driving import LINES, Robot
 from proxytune.effects import PARAMETERS, Catalogue, Stage, effect_of
@@ -77,9 +66,9 @@ def conclude(
     tuned = tuple(name for name, one in look.figures.items() if effect_of(name) in declared and one.identified)
     grey, on_look = _compare_look(gathered, named, look, declared, tuned, seed)
     effects = tuple(_told(weighed, effect) for effect in named.effects) + on_look
-    fields = (fit_residual_field(named.declared), fit_residual_field(named.model))
+    fields = (selection.fit_residual_field(named.declared), selection.fit_residual_field(named.model))
     fitted = effects_of(named.model.names)
-    unseen = [effect for effect in hidden_effects(named.full, fitted) if effect not in fitted]
+    unseen = [effect for effect in selection.hidden_effects(named.full, fitted) if effect not in fitted]
     dark = [name for name, figure in look.figures.items() if not figure.identified]
     changed = changes(look)
     hidden = effects_of(tuple(name for name in (*unseen, *dark) if effect_of(name) not in changed))
@@ -100,23 +89,23 @@ def conclude(
         residual_fields=fields,
         blemishes=look.blemishes,
         could_not_be_seen=hidden,
-        next_views=next_views(hidden, repeated=look.grain.still_pairs > 0),
+        next_views=selection.next_views(hidden, repeated=look.grain.still_pairs > 0),
         laid=describe_map(named.model),
-        matched=matched_share(named.model),
+        matched=selection.matched_share(named.model),
         notes=tuple(notes),
         named=named,
         gathered=gathered,
     )
 
 
-def is_explained(field: ResidualField, look: Appearance) -> bool:
+def is_explained(field: selection.ResidualField, look: Appearance) -> bool:
     """Tell whether nothing fixed to the camera is left over, and nothing covers the picture."""
     return not (field.significant or look.blemishes)
 
 
 def _compare_look(
     gathered: Gathered,
-    named: CameraSelection,
+    named: selection.CameraSelection,
     look: Appearance,
     declared: Sequence[str],
     tuned: Sequence[str],
@@ -144,7 +133,7 @@ def _told(weighed: Weighed, effect: str) -> CameraEffect:
     named = weighed.named
     names = tuple(name for name in named.full.names if effect_of(name) == effect)
     others = {one for rivals in named.rivals for one in rivals} - set(named.effects)
-    always = (ALWAYS[effect],) if effect in ALWAYS else ()
+    always = (selection.ALWAYS[effect],) if effect in selection.ALWAYS else ()
     return CameraEffect(effect, names, weighed.nats[effect], weighed.ratios[effect], (*always, *sorted(others)))
 
 
@@ -213,11 +202,11 @@ def diagnose_camera(
     names = [name for name in views.optics.mounting if not (stated.rectified and name == DISTORTION)]
     names += [name for name in MOVING if views.tracks.moving and name not in fixed]
     unknown = stated.position_m is None or stated.heading_deg is None
-    full = keep("everything", lambda: fit_everything(views, names, fixed, learn_scatter=unknown))
-    notes = keep("match", lambda: check_match(log.name, full))
+    full = keep("everything", lambda: selection.fit_everything(views, names, fixed, learn_scatter=unknown))
+    notes = keep("match", lambda: selection.check_match(log.name, full))
     report("looking for what the camera lacks")
     own = [effect for effect in declared if effect in effects_of(tuple(names))]
-    named = keep("named", lambda: select_camera_effects(full, own))
+    named = keep("named", lambda: selection.select_camera_effects(full, own))
     report("testing on frames kept aside")
     weighed = keep("weighed", lambda: weigh_effects(named, seed))
     report("looking at brightness and sharpness")

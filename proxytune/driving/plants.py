@@ -186,7 +186,18 @@ def read_body(root: ET.Element, path: Path) -> Body:
         SettingsError: If its two driven wheels cannot be told, or a number in it is none.
     """
     with sound_urdf(path):
-        return _read_body(root, path)
+        wheels = [_wheel(root, joint) for joint in root.iter("joint") if joint.get("type") == "continuous"]
+        across = [wheel for wheel in wheels if abs(wheel.axis[1]) > ACROSS]
+        named = [wheel for wheel in across if wheel.joint in AXLES]
+        pair = sorted(named or across, key=lambda wheel: -wheel.centre[1])
+        if len(pair) != 2 or pair[0].centre[1] <= pair[1].centre[1]:
+            found = ", ".join(wheel.joint for wheel in across) or "none"
+            remedy = f"found {found}; call the two driven joints {' and '.join(AXLES)}"
+            raise SettingsError(f"{path}: the axles must be two continuous joints, left and right; {remedy}")
+        masses = (float(mass.get("value", 0.0)) for mass in root.findall("link/inertial/mass"))
+        names = (link.get("name", "") for link in root.iter("link"))
+        camera = next((name for name in names if "camera" in name and "optical" not in name), None)
+        return Body(pair[0], pair[1], sum(masses), link_pose(root, camera) if camera else None)
 
 
 @contextmanager
@@ -200,21 +211,6 @@ def sound_urdf(path: Path) -> Iterator[None]:
         yield
     except (ValueError, RecursionError) as problem:
         raise SettingsError(f"{path}: is no sound URDF ({problem}); correct it") from None
-
-
-def _read_body(root: ET.Element, path: Path) -> Body:
-    wheels = [_wheel(root, joint) for joint in root.iter("joint") if joint.get("type") == "continuous"]
-    across = [wheel for wheel in wheels if abs(wheel.axis[1]) > ACROSS]
-    named = [wheel for wheel in across if wheel.joint in AXLES]
-    pair = sorted(named or across, key=lambda wheel: -wheel.centre[1])
-    if len(pair) != 2 or pair[0].centre[1] <= pair[1].centre[1]:
-        found = ", ".join(wheel.joint for wheel in across) or "none"
-        remedy = f"call the two driven joints {' and '.join(AXLES)}"
-        raise SettingsError(f"{path}: the axles must be two continuous joints, left and right; found {found}; {remedy}")
-    masses = (float(mass.get("value", 0.0)) for mass in root.findall("link/inertial/mass"))
-    names = (link.get("name", "") for link in root.iter("link"))
-    camera = next((name for name in names if "camera" in name and "optical" not in name), None)
-    return Body(pair[0], pair[1], sum(masses), link_pose(root, camera) if camera else None)
 
 
 def links_called(root: ET.Element, name: str) -> list[ET.Element]:

@@ -22,12 +22,7 @@ PIXELS_PER_METRE = 400
 MARGIN = 64
 """Fewest pixels of OFF_MAP on every side; the picture's side is a whole multiple of it."""
 COLOURS = MappingProxyType(
-    {
-        "off_map": (21, 21, 21),
-        "asphalt": (59, 56, 50),
-        "white": (203, 200, 198),
-        "yellow": (195, 184, 60),
-    }
+    {"off_map": (21, 21, 21), "asphalt": (59, 56, 50), "white": (203, 200, 198), "yellow": (195, 184, 60)}
 )
 """Red, green, blue, 0 to 255: means over the frames of gym-duckietown's photographed tiles."""
 STRIP = 8

@@ -139,14 +139,6 @@ class JitterState(NamedTuple):
     messages: Messages
 
 
-class HoldIntervals(NamedTuple):
-    """Zero-order-hold intervals, one message in force: first sample, length [samples], and the sample of its value."""
-
-    firsts: NDArray[np.int64]
-    lengths: Signal
-    sources: NDArray[np.int64]
-
-
 @effect("delay_jitter", Stage.COMMAND)
 class DelayJitter(ShippedEffect):
     """Every command is late by an extra time of its own, drawn evenly from 0 to `spread`.
@@ -166,31 +158,24 @@ class DelayJitter(ShippedEffect):
         return JitterState(0, np.repeat(rest, math.ceil(spread), axis=-2), spread, messages(context))
 
     def apply(self, signal: Signal, memory: JitterState) -> tuple[Signal, JitterState]:
-        """The mean over each sample of the commands in force."""
-        length, past = signal.shape[-2], memory.samples.shape[-2]
+        """The mean over each sample of the commands in force: the same messages for all members of a batch."""
+        begin, end, past, sent = memory.next, memory.next + signal.shape[-2], memory.samples.shape[-2], memory.messages
+        late = math.ceil((memory.spread + 1.0) * sent.per_sample) + 1
+        newest = int(sent.numbers(np.array(end - 1)))
+        # Twice: a message in force at the beginning may have waited for one that was as late as can be
+        oldest = max(0, int(sent.numbers(np.array(begin))) - 2 * late)
+        starts = sent.starts(np.arange(oldest, newest + 2))
+        times = np.maximum.accumulate(starts[:-1] + memory.spread * sent.draws(oldest, newest + 1))
+        # Each sample is cut where another message comes into force
+        inside = times[(times > begin) & (times < end)]
+        edges = np.sort(np.concatenate((np.arange(begin, end + 1), inside)))
+        # A message's own samples pass as they are, for the delay before may have blended two messages in one sample
+        lasts = np.concatenate(([starts[0] - 1], starts[1:] - 1))[np.searchsorted(times, edges[:-1], side="right")]
+        sources = np.minimum(np.floor(edges[:-1]).astype(np.int64), lasts)
         joined = np.concatenate((memory.samples, signal), axis=-2)
-        arrivals = _arrivals(memory, length)
-        values = np.take(joined, arrivals.sources + (past - memory.next), axis=-2) * arrivals.lengths[:, None]
-        arrived = np.add.reduceat(values, arrivals.firsts, axis=-2)
-        return arrived, memory._replace(next=memory.next + length, samples=joined[..., length:, :])
-
-
-def _arrivals(memory: JitterState, length: int) -> HoldIntervals:
-    """Messages in force over the next samples; the same for all members of a batch."""
-    begin, end, sent = memory.next, memory.next + length, memory.messages
-    late = math.ceil((memory.spread + 1.0) * sent.per_sample) + 1
-    newest = int(sent.numbers(np.array(end - 1)))
-    # Twice: a message in force at the beginning may have waited for one that was as late as can be
-    oldest = max(0, int(sent.numbers(np.array(begin))) - 2 * late)
-    drawn = sent.draws(oldest, newest + 1)
-    starts = sent.starts(np.arange(oldest, newest + 2))
-    times = np.maximum.accumulate(starts[:-1] + memory.spread * drawn)
-    inside = times[(times > begin) & (times < end)]
-    edges = np.sort(np.concatenate((np.arange(begin, end + 1), inside)))
-    # A message's own samples pass as they are, for the delay before may have blended two messages in one sample
-    lasts = np.concatenate(([starts[0] - 1], starts[1:] - 1))[np.searchsorted(times, edges[:-1], side="right")]
-    sources = np.minimum(np.floor(edges[:-1]).astype(np.int64), lasts)
-    return HoldIntervals(np.searchsorted(edges[:-1], np.arange(begin, end)), np.diff(edges), sources)
+        values = np.take(joined, sources + (past - begin), axis=-2) * np.diff(edges)[:, None]
+        arrived = np.add.reduceat(values, np.searchsorted(edges[:-1], np.arange(begin, end)), axis=-2)
+        return arrived, memory._replace(next=end, samples=joined[..., end - begin :, :])
 
 
 class LastReceived(NamedTuple):

@@ -84,10 +84,7 @@ def _group(title: str, unit: str, *, of: str = "of the command", **bases: Callab
 COMMAND_GROUPS: Mapping[str, Group] = MappingProxyType(
     {
         "duty": _group(
-            "size of the command",
-            "duty",
-            of="duty",
-            duty=lambda c, k: hats(np.abs(c.duty), k, np.sign(c.duty)),
+            "size of the command", "duty", of="duty", duty=lambda c, k: hats(np.abs(c.duty), k, np.sign(c.duty))
         ),
         "drawn": _group(
             "sum of both commands",
@@ -95,9 +92,7 @@ COMMAND_GROUPS: Mapping[str, Group] = MappingProxyType(
             duty=lambda c, k: hats(np.abs(c.duty).sum(axis=-1, keepdims=True), k, c.duty),
         ),
         "held": _group(
-            "time since a command changed",
-            "s",
-            duty=lambda c, k: c.duty[..., None] * (1.0 - _within(c.held, k)),
+            "time since a command changed", "s", duty=lambda c, k: c.duty[..., None] * (1.0 - _within(c.held, k))
         ),
         "begun": _group(
             "time since a command began",
@@ -106,20 +101,13 @@ COMMAND_GROUPS: Mapping[str, Group] = MappingProxyType(
             push=lambda c, k: np.sign(c.duty)[..., None] * _moving(c) * _within(c.begun, k),
         ),
         "turned": _group(
-            "time since a command turned round",
-            "s",
-            duty=lambda c, k: c.duty[..., None] * _within(c.turned, k),
+            "time since a command turned round", "s", duty=lambda c, k: c.duty[..., None] * _within(c.turned, k)
         ),
         "dragged": _group(
-            "way in which a command changes",
-            "duty",
-            of="of the play",
-            duty=lambda c, k: c.dragged - c.duty[..., None],
+            "way in which a command changes", "duty", of="of the play", duty=lambda c, k: c.dragged - c.duty[..., None]
         ),
         "ended": _group(
-            "time since a command ended",
-            "s",
-            duty=lambda c, k: c.slow * (np.abs(c.duty) < STILL)[..., None],
+            "time since a command ended", "s", duty=lambda c, k: c.slow * (np.abs(c.duty) < STILL)[..., None]
         ),
     }
 )

@@ -30,14 +30,7 @@ from proxytune.study.opening import Study
 from proxytune.study.preflight import placement_pairs, run_preflight
 from proxytune.study.run import AfterEarlier, goal_of, knowledge_of, record, retry_failed, run_trials, stopped
 from proxytune.study.settings import StudySettings
-from proxytune.study.study_run import (
-    StudyRun,
-    evaluate_outcomes,
-    in_common,
-    outputs_of,
-    plan_episodes,
-    score_table,
-)
+from proxytune.study.study_run import StudyRun, evaluate_outcomes, in_common, outputs_of, plan_episodes, score_table
 from proxytune.usefulness import Assessment, Donors, Expectation, assess, donors_of, expect
 
 MOST_FINALISTS = 3

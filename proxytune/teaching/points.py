@@ -28,6 +28,12 @@ if TYPE_CHECKING:  # a process that scores points starts without it
 
 TOGETHER = " and the others beside it"
 """Ends the name of what several episodes do at once: which of them fails is not known then."""
+DRIVING = {
+    "demonstrate": "the expert's lesson",
+    "guide": "the learner's lesson",
+    "examine": "the learner's examination",
+}
+"""What a classroom's methods do whose first argument is an episode."""
 
 
 @contextmanager
@@ -65,30 +71,23 @@ class Supervised:
     timeout_s: float | None
 
     def __getattr__(self, member: str) -> Any:
-        """Any other member of the classroom."""
+        """A member of the classroom; one that drives an episode is named, and ended."""
         if member.startswith("__") or member == "room":
             raise AttributeError(member)
-        return getattr(self.room, member)
+        found = getattr(self.room, member)
+        if member not in DRIVING:
+            return found
 
-    def demonstrate(self, episode: Episode, seconds: float) -> tuple[Demonstration, int]:
-        """As the classroom does."""
-        with watching(self._named("the expert's lesson", episode), self.timeout_s):
-            return self.room.demonstrate(episode, seconds)  # type: ignore[no-any-return]
+        def drive(episode: Episode, *rest: Any) -> Any:
+            with watching(self._named(DRIVING[member], episode), self.timeout_s):
+                return found(episode, *rest)
 
-    def guide(self, episode: Episode, policy: Policy, seconds: float) -> tuple[Demonstration, int]:
-        """As the classroom does."""
-        with watching(self._named("the learner's lesson", episode), self.timeout_s):
-            return self.room.guide(episode, policy, seconds)  # type: ignore[no-any-return]
-
-    def examine(self, episode: Episode, policy: Policy) -> float:
-        """As the classroom does."""
-        with watching(self._named("the learner's examination", episode), self.timeout_s):
-            return self.room.examine(episode, policy)  # type: ignore[no-any-return]
+        return drive
 
     def examine_together(self, episodes: Sequence[Episode], policy: Policy) -> Sequence[float]:
         """As the classroom does, in so many times as long; where that ended a process, one after the other."""
         together = getattr(self.room, "examine_together", None)
-        what = self._named("the learner's examination", episodes[0]) + TOGETHER
+        what = self._named(DRIVING["examine"], episodes[0]) + TOGETHER
         if together is None or was_ended_in(what):
             return [self.examine(episode, policy) for episode in episodes]
         with watching(what, self.timeout_s and self.timeout_s * len(episodes)):
@@ -97,16 +96,6 @@ class Supervised:
     def _named(self, what: str, episode: Episode) -> str:
         theta = "".join(f"{name} = {value:.3g}, " for name, value in episode.theta)
         return f"{what} in the {self.domain} at {theta}start {episode.start}"
-
-
-@dataclass(frozen=True)
-class Trainee:
-    """A learner, a digest of its code and settings, the seed of its weights and of its samples' order; its cache."""
-
-    learner: learning.Learner
-    identity: str
-    seed: int
-    cache: learning.Cache
 
 
 @dataclass(frozen=True)
@@ -160,31 +149,24 @@ class Lessons:
             "lesson_s": self.lesson_s,
         }
 
-    def collect(self, number: int, policy: Policy | None) -> Demonstration:
-        """A round's samples: of the policy's driving, labelled by the expert, or without one of the expert's own."""
-        facts, lesson_s = self.facts(number), self.lesson_s
-        return learning.collect_samples(
-            self.room, self.where, count=facts["count"], seed=facts["seed"], lesson_s=lesson_s, policy=policy
-        )
-
 
 @dataclass(frozen=True)
 class Stage:
-    """A stage of learning: what a trainee learns in one domain, after what it has learnt in another.
+    """A stage of learning: what a learner learns in one domain, after what it has learnt in another.
 
     Facts of what comes before enter those of what comes after as their digest: each key is short and complete.
 
     Attributes:
-        trainee: Who learns.
+        setup: Who learns, what is rehearsed, and where all is kept.
+        seed: Of the learner's weights and of its samples' order.
         lessons: From what.
         before: The stage from whose weights it goes on; None from scratch.
-        rehearsal: Share of that stage's samples among those it learns from here.
     """
 
-    trainee: Trainee
+    setup: "TeachingSetup"
+    seed: int
     lessons: Lessons
     before: "Stage | None" = None
-    rehearsal: float = 0.0
 
     def weights_facts(self, count: int) -> dict[str, Any] | None:
         """All that determines the weights after so many samples; None where nothing has been learnt."""
@@ -192,12 +174,12 @@ class Stage:
         if not count:
             return start
         return {
-            "learner": self.trainee.identity,
-            "seed": self.trainee.seed,
+            "learner": self.setup.learner_identity,
+            "seed": self.seed,
             "start": learning.facts_digest(start) if start else None,
             "samples": learning.facts_digest(self.round_facts(self.lessons.rounds(count)[-1])),
             "count": count,
-            **({"rehearsal": self.rehearsal} if self.before and self.rehearsal else {}),
+            **({"rehearsal": self.setup.settings.rehearsal} if self.before and self.setup.settings.rehearsal else {}),
         }
 
     def weights(self, count: int) -> learning.Weights | None:
@@ -206,7 +188,7 @@ class Stage:
             return self.before.weights(self.before.lessons.ends[-1]) if self.before else None
         facts = self.weights_facts(count)
         assert facts is not None
-        return self.trainee.cache.get("weights", facts, lambda: self._train(count))
+        return self.setup.cache.get("weights", facts, lambda: self._train(count))
 
     def samples(self, count: int) -> Demonstration:
         """The first samples, so many; more of them begin with the same ones."""
@@ -224,19 +206,21 @@ class Stage:
 
         def make() -> learning.Arrays:
             weights = self.weights(self.lessons.begin(number)) if self.lessons.on_policy else None
-            policy = None if weights is None else learning.policy_of(self.trainee.learner, weights)
+            policy = None if weights is None else learning.policy_of(self.setup.learner, weights)
+            given = self.lessons
+            asked = {name: given.facts(number)[name] for name in ("count", "seed", "lesson_s")}
             with watching("a lesson"):
-                return self.lessons.collect(number, policy)._asdict()
+                return learning.collect_samples(given.room, given.where, policy=policy, **asked)._asdict()
 
-        return Demonstration(**self.trainee.cache.get("samples", self.round_facts(number), make))
+        return Demonstration(**self.setup.cache.get("samples", self.round_facts(number), make))
 
     def _train(self, count: int) -> learning.Weights:
-        samples = self.samples(count)
-        if self.before and self.rehearsal:
-            samples = learning.mix_samples(samples, self.before.samples(self.before.lessons.ends[-1]), self.rehearsal)
+        samples, share = self.samples(count), self.setup.settings.rehearsal
+        if self.before and share:
+            samples = learning.mix_samples(samples, self.before.samples(self.before.lessons.ends[-1]), share)
         start = self.weights(0)
         with watching("the learner's training"):
-            return self.trainee.learner.train(samples, start, self.trainee.seed)
+            return self.setup.learner.train(samples, start, self.seed)
 
 
 def equal_rounds(count: int, rounds: int) -> tuple[int, ...]:
@@ -328,22 +312,21 @@ class TeachingSetup:
 
     def _stage(self, point: CurvePoint) -> Stage:
         """The stage in which a point's learner learns in the target, after its proxy if it has one."""
-        trainee = Trainee(self.learner, self.learner_identity, point.repetition, self.cache)
-        in_proxy = None if point.proxy is None else self._proxy_lessons(point.proxy, point.repetition)
-        before = None if in_proxy is None else Stage(trainee, in_proxy)
-        return Stage(trainee, self._target_lessons(point.repetition), before, self.settings.rehearsal)
+        taught, repetition, before = self.settings, point.repetition, None
+        if point.proxy is not None:
+            seed, ends = proxy_lessons_seed(self.seed, repetition), equal_rounds(taught.proxy_samples, PROXY_ROUNDS)
+            before = Stage(self, repetition, self._lessons("proxy", point.proxy, seed, ends, taught.proxy_lessons))
+        seed, ends = target_lessons_seed(self.seed, repetition), taught.target_samples[1:]
+        lessons = self._lessons("target", learning.Distribution({}), seed, ends, taught.target_lessons)
+        return Stage(self, repetition, lessons, before)
 
-    def _proxy_lessons(self, proxy: learning.Distribution, repetition: int) -> Lessons:
-        by, count = self.settings.proxy_lessons, self.settings.proxy_samples
-        seed, ends = proxy_lessons_seed(self.seed, repetition), equal_rounds(count, PROXY_ROUNDS)
-        room = cast(OnPolicyClassroom, Supervised(self.proxy, "proxy", self.timeout_s))
-        return Lessons(room, self.identities[0], proxy, seed, self.settings.lesson_s, ends, by)
+    def _lessons(self, domain: str, where: learning.Distribution, seed: int, ends: tuple[int, ...], by: str) -> Lessons:
+        room, identity = self._room(domain), self.identities[int(domain == "target")]
+        return Lessons(room, identity, where, seed, self.settings.lesson_s, ends, by)
 
-    def _target_lessons(self, repetition: int) -> Lessons:
-        by, ends = self.settings.target_lessons, self.settings.target_samples[1:]
-        seed, nominal = target_lessons_seed(self.seed, repetition), learning.Distribution({})
-        room = cast(OnPolicyClassroom, Supervised(self.target, "target", self.timeout_s))
-        return Lessons(room, self.identities[1], nominal, seed, self.settings.lesson_s, ends, by)
+    def _room(self, domain: str) -> OnPolicyClassroom:
+        family = self.proxy if domain == "proxy" else self.target
+        return cast(OnPolicyClassroom, Supervised(family, domain, self.timeout_s))
 
     def _examine(self, point: CurvePoint) -> learning.Arrays:
         weights = self._stage(point).weights(point.count)
@@ -351,9 +334,9 @@ class TeachingSetup:
             return {"scores": np.full(self.starts, np.nan)}
         seeds = [exam_seed(self.seed, start) for start in range(self.starts)]
         episodes = [make_episode({}, agent=PUPIL, start=start, seed=seed) for start, seed in enumerate(seeds)]
-        room, policy = Supervised(self.target, "target", self.timeout_s), learning.policy_of(self.learner, weights)
+        policy = learning.policy_of(self.learner, weights)
         with watching("an examination"):
-            return {"scores": np.array(learning.examine_policy(cast(Classroom, room), episodes, policy))}
+            return {"scores": np.array(learning.examine_policy(self._room("target"), episodes, policy))}
 
 
 @contextmanager

@@ -162,11 +162,7 @@ def read_commands(path: Path) -> tuple[str, dict[str, tuple[Floats, Floats]]]:
     if not kind:
         known = "; ".join(f"{kind}: {', '.join(columns)}" for kind, columns in COMMANDS.items() if columns)
         raise LogError(f"{path}: has no columns of commands; name them as a log does ({known})")
-    rows = read_rows(path, Layout(COMMANDS[kind], (), (), (ENABLED,), 1, f"commands of kind '{kind}'"))
-    _check_sizes(rows, kind)
-    cuts = rows.firsts[1:]
-    parts = zip(rows.names, np.split(rows.values["time"], cuts), np.split(_commands(rows, kind), cuts), strict=True)
-    return kind, {name: (times, commands) for name, times, commands in parts}
+    return kind, _issued(path, kind)[1]
 
 
 def _episodes(samples: Rows, stated: Description, issued: Mapping[str, Issued]) -> tuple[tuple[LogEpisode, ...], float]:
@@ -210,15 +206,18 @@ def _read_commands(path: Path, stated: Description, samples: Rows) -> dict[str, 
     command = stated.command
     if command == "none":
         raise LogError(f"{path}: log.toml states that there are no commands; state their kind, or take this file out")
-    rows = read_rows(path, Layout(COMMANDS[command], (), (), (ENABLED,), 1, f"commands of kind '{command}'"))
-    _check_sizes(rows, command)
+    rows, issued = _issued(path, command)
     check_known_episodes(rows, samples.names)
-    times, columns = rows.values["time"], _commands(rows, command)
-    cuts = rows.firsts[1:]
-    parts = zip(rows.names, np.split(times, cuts), np.split(columns, cuts), strict=True)
-    issued: dict[str, Issued] = {name: (own, values) for name, own, values in parts}
     _check_overlap(samples, rows, issued, stated.clock_offset_s or 0.0)
     return issued
+
+
+def _issued(path: Path, command: str) -> tuple[Rows, dict[str, Issued]]:
+    """A table of commands of a kind, and every episode's with their times."""
+    rows = read_rows(path, Layout(COMMANDS[command], (), (), (ENABLED,), 1, f"commands of kind '{command}'"))
+    _check_sizes(rows, command)
+    columns = (np.split(each, rows.firsts[1:]) for each in (rows.values["time"], _commands(rows, command)))
+    return rows, dict(zip(rows.names, zip(*columns, strict=True), strict=True))
 
 
 def _check_overlap(samples: Rows, rows: Rows, issued: Mapping[str, Issued], offset_s: float) -> None:

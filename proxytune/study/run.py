@@ -10,19 +10,8 @@ until a trial is pruned (pruning.py), and come to PRPV in `evaluate_outcomes`. A
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
+from proxytune import search
 from proxytune.errors import RunError
-from proxytune.search import (
-    BatchPoints,
-    Goal,
-    Knowledge,
-    Proposer,
-    Search,
-    Trial,
-    Values,
-    batch_at,
-    expected_gain,
-    expected_improvement,
-)
 from proxytune.space import Space
 from proxytune.storage import State, TrialRecord
 from proxytune.study.earlier import earlier_trials, known_trials
@@ -38,10 +27,10 @@ from proxytune.study.study_run import Evaluation, StudyRun, compose_of, plan_epi
 class AfterEarlier:
     """A proposer that is told of earlier studies' trials as of its own: where there are enough, none is a design's."""
 
-    inner: Proposer
-    earlier: tuple[Trial, ...]
+    inner: search.Proposer
+    earlier: tuple[search.Trial, ...]
 
-    def propose(self, space: Space, trials: Sequence[Trial], seed: int) -> Values:
+    def propose(self, space: Space, trials: Sequence[search.Trial], seed: int) -> search.Values:
         """The next point."""
         return self.inner.propose(space, [*self.earlier, *trials], seed)
 
@@ -62,20 +51,20 @@ def retry_failed(run: StudyRun) -> None:
                 run.save_trials(record(trial.number, run.evaluation_of(trial)))
 
 
-def goal_of(run: StudyRun) -> Goal:
+def goal_of(run: StudyRun) -> search.Goal:
     """The target as the study's search is after it; a function of the pre-flight and the target's table."""
     table = run.study.target
     outputs = tuple((agent, metric) for agent in table.agents for metric in table.metrics)
-    return Goal(outputs, table.means.ravel(), noise_of(run).variance.ravel(), compose_of(run.study))
+    return search.Goal(outputs, table.means.ravel(), noise_of(run).variance.ravel(), compose_of(run.study))
 
 
-def knowledge_of(run: StudyRun, done: Iterable[TrialRecord]) -> Knowledge:
+def knowledge_of(run: StudyRun, done: Iterable[TrialRecord]) -> search.Knowledge:
     """All that finished trials say of θ, those of earlier studies too."""
     trials = [*known_trials(run), *(run.search_trial(trial) for trial in done)]
     return run.learn(trials, goal_of(run))
 
 
-def run_trials(run: StudyRun, proposer: Proposer) -> None:
+def run_trials(run: StudyRun, proposer: search.Proposer) -> None:
     """Run a study's trials to the end of its budget, or until a rule stops it, from wherever it was left.
 
     The next batch is a function of the seed and the trials before it alone, and an episode that has been simulated is
@@ -95,8 +84,8 @@ def run_trials(run: StudyRun, proposer: Proposer) -> None:
         # A damaged study.db may have lost some of its episodes.
         if len(run.known(planned)) < len(planned):
             run.outcomes(planned, f"trial {trial.number} again")
-    search = Search(settings.space, proposer, settings.seed, settings.budget, settings.initial, settings.batch)
-    search.run(StudyTrials(run))
+    tried = StudyTrials(run)
+    search.Search(settings.space, proposer, settings.seed, settings.budget, settings.initial, settings.batch).run(tried)
 
 
 class StudyTrials:
@@ -106,7 +95,7 @@ class StudyTrials:
         self._run = run
         self._done = run.finished_trials()
 
-    def trials(self) -> Sequence[Trial]:
+    def trials(self) -> Sequence[search.Trial]:
         """The finished trials, in order."""
         return [self._run.search_trial(trial) for trial in self._done]
 
@@ -118,7 +107,7 @@ class StudyTrials:
             raise RunError(f"all {len(self._done)} trials failed; the first: {self._done[0].failure}")
         return why
 
-    def evaluate(self, batch: range, propose: BatchPoints) -> None:
+    def evaluate(self, batch: range, propose: search.BatchPoints) -> None:
         """Simulate what is left of a batch, all its trials together, and keep how they ended."""
         run, trials = self._run, self._open(batch, propose)
         first, last, budget = trials[0].number, trials[-1].number, run.settings.budget
@@ -139,7 +128,7 @@ class StudyTrials:
         self._done += ended
         self._tell(ended)
 
-    def _open(self, batch: range, propose: BatchPoints) -> list[TrialRecord]:
+    def _open(self, batch: range, propose: search.BatchPoints) -> list[TrialRecord]:
         """The trials that are left of a batch: open in the store, or else proposed, and in the store from now on."""
         done = len(self._done)
         trials = [trial for trial in self._run.open_trials() if done < trial.number <= batch.stop]
@@ -195,7 +184,7 @@ def stopped(run: StudyRun, done: Sequence[TrialRecord]) -> str:
     if len(done) >= settings.budget:
         kept = f"; all {len(done)} that are finished count" if len(done) > settings.budget else ""
         return f"the budget of {settings.budget} trials is spent{kept}"
-    if batch_at(len(done), settings.batch, settings.initial).start < len(done):
+    if search.batch_at(len(done), settings.batch, settings.initial).start < len(done):
         return ""
     if rules.wall_time_s is not None and (late := out_of_time(seconds_of(run, done), rules)):
         return late
@@ -237,6 +226,6 @@ def _gain(run: StudyRun, done: Sequence[TrialRecord]) -> tuple[float, float]:
     settings = run.settings
     if run.study.engine.learns_from == "outputs":
         trials = [*known_trials(run), *(run.search_trial(trial) for trial in done)]
-        return expected_gain(settings.space, trials, goal_of(run), settings.seed)
+        return search.expected_gain(settings.space, trials, goal_of(run), settings.seed)
     scored = [*earlier_trials(run), *score_trials(settings.space, done)]
-    return expected_improvement(settings.space, scored, settings.seed)
+    return search.expected_improvement(settings.space, scored, settings.seed)

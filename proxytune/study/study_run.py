@@ -154,21 +154,16 @@ def outputs_of(study: Study, outcomes: Collection[Outcome]) -> Values | None:
     None where no episode tells of any. Where an agent failed from some starts, its mean is over the others; where some
     episodes lack a metric, that mean is over the others too.
     """
-    means = _means(study, outcomes)
-    return None if np.isnan(means).all() else tuple(means.ravel().tolist())
-
-
-def _means(study: Study, outcomes: Collection[Outcome]) -> Floats:
-    names = study.target.metrics
-    rows = {agent: row for row, agent in enumerate(study.target.agents)}
-    sums, counts = np.zeros(study.target.means.shape), np.zeros(study.target.means.shape)
+    names, rows = study.target.metrics, {agent: row for row, agent in enumerate(study.target.agents)}
+    sums, counts = np.zeros((2, *study.target.means.shape))
     # In the order of the starts, so that a sum has the same last bit whatever came in first.
     for outcome in sorted(outcomes, key=lambda one: one.episode.start):
         if outcome.metrics is not None:
-            row, known = rows[outcome.episode.agent], [name in outcome.metrics for name in names]
+            row = rows[outcome.episode.agent]
             sums[row] += [outcome.metrics.get(name, 0.0) for name in names]
-            counts[row] += known
-    return np.where(counts > 0.0, sums / np.maximum(counts, 1.0), np.nan)
+            counts[row] += [name in outcome.metrics for name in names]
+    means = np.where(counts > 0.0, sums / np.maximum(counts, 1.0), np.nan)
+    return None if np.isnan(means).all() else tuple(means.ravel().tolist())
 
 
 def compose_of(study: Study) -> Compose:

@@ -14,23 +14,13 @@ from typing import cast
 
 import numpy as np
 
-from proxytune import learning, usefulness
+from proxytune import learning, study, usefulness
 from proxytune.arrays import Floats
 from proxytune.domain import Classroom
 from proxytune.errors import InputError, LearnerError
 from proxytune.extensions import load
 from proxytune.running import Watcher
 from proxytune.space import Theta
-from proxytune.study import (
-    Lesson,
-    StudyRun,
-    StudySettings,
-    best_teaching_family,
-    check_bounds,
-    evaluate_outcomes,
-    load_family,
-    plan_episodes,
-)
 from proxytune.teaching.examining import count_examinations, examine_curves, needs_of
 from proxytune.teaching.points import TeachingSetup
 
@@ -70,7 +60,7 @@ class Experiment:
         teachers: One per proxy, in the order of study.toml.
     """
 
-    settings: StudySettings
+    settings: study.StudySettings
     best_score: float
     needs: learning.SampleNeeds
     teachers: tuple[TeacherResult, ...]
@@ -91,19 +81,23 @@ class Experiment:
         return self.needs.settled
 
 
-def load_setup(settings: StudySettings) -> TeachingSetup:
+def load_setup(settings: study.StudySettings) -> TeachingSetup:
     """Load both domain families and the learner that a study's [teaching] table names.
 
     Raises:
         InputError: If any of it cannot be used, with file, key and remedy.
     """
     taught = teaching_settings(settings)
-    learner, identity = _load_learner(settings, taught.learner)
+    try:
+        found = load(taught.learner, kind="learner", beside=settings.folder, needs=("train", "act"), call=True)
+    except InputError as problem:
+        raise settings.error("teaching.learner", str(problem)) from None
+    learner = cast(learning.Learner, found)
     return TeachingSetup(
         proxy=classroom(settings, settings.proxy, "proxy_lessons"),
         target=classroom(settings, taught.target, "target_lessons"),
         learner=learner,
-        learner_identity=identity,
+        learner_identity=learning.learner_identity(learner),
         settings=taught,
         seed=settings.seed,
         starts=settings.starts,
@@ -112,7 +106,7 @@ def load_setup(settings: StudySettings) -> TeachingSetup:
     )
 
 
-def teaching_settings(settings: StudySettings) -> learning.TeachingSettings:
+def teaching_settings(settings: study.StudySettings) -> learning.TeachingSettings:
     """The [teaching] table of a study.
 
     Raises:
@@ -123,7 +117,7 @@ def teaching_settings(settings: StudySettings) -> learning.TeachingSettings:
     return settings.teaching
 
 
-def run_experiment(settings: StudySettings, setup: TeachingSetup, watcher: Watcher) -> Experiment:
+def run_experiment(settings: study.StudySettings, setup: TeachingSetup, watcher: Watcher) -> Experiment:
     """Teach every proxy's learner and the one without, from wherever an earlier run was left.
 
     Raises:
@@ -136,7 +130,7 @@ def run_experiment(settings: StudySettings, setup: TeachingSetup, watcher: Watch
 
 
 def judge_curves(
-    settings: StudySettings, setup: TeachingSetup, curves: Mapping[str, learning.LearningCurve]
+    settings: study.StudySettings, setup: TeachingSetup, curves: Mapping[str, learning.LearningCurve]
 ) -> Experiment:
     """Judge each proxy by the learning curves: a pure function of them and of what counts as converged."""
     needs = needs_of(setup, curves)
@@ -158,7 +152,7 @@ def _teacher(
     return TeacherResult(name, proxy, curve, zero_shot, worth, cost)
 
 
-def check_proxies(settings: StudySettings, setup: TeachingSetup) -> None:
+def check_proxies(settings: study.StudySettings, setup: TeachingSetup) -> None:
     """Refuse a study without proxies, a parameter that the family has not, or a value beyond its bounds.
 
     Raises:
@@ -169,12 +163,12 @@ def check_proxies(settings: StudySettings, setup: TeachingSetup) -> None:
     for proxy, where in setup.settings.proxies.items():
         for name, (low, high) in where.bounds.items():
             key, given = f"teaching.proxies.{proxy}.{name}", f"{low:g} to {high:g}"
-            check_bounds(settings, setup.proxy, key, name, (low, high), given)
+            study.check_bounds(settings, setup.proxy, key, name, (low, high), given)
 
 
-def classroom(settings: StudySettings, model: Path | None, lessons: str) -> Classroom:
+def classroom(settings: study.StudySettings, model: Path | None, lessons: str) -> Classroom:
     """The domain family that a study names, with a model: one that can teach, for lessons as their key has them."""
-    family = load_family(settings, model)
+    family = study.load_family(settings, model)
     lacks = [member for member in ("best_score", "demonstrate", "examine") if not hasattr(family, member)]
     if lacks:
         raise settings.error("family", f"{settings.family} cannot teach: it lacks {', '.join(lacks)}")
@@ -184,17 +178,7 @@ def classroom(settings: StudySettings, model: Path | None, lessons: str) -> Clas
     return cast(Classroom, family)
 
 
-def _load_learner(settings: StudySettings, name: str) -> tuple[learning.Learner, str]:
-    """The learner and a digest of what its code means and of its settings."""
-    try:
-        made = load(name, kind="learner", beside=settings.folder, needs=("train", "act"), call=True)
-    except InputError as problem:
-        raise settings.error("teaching.learner", str(problem)) from None
-    learner = cast(learning.Learner, made)
-    return learner, learning.learner_identity(learner)
-
-
-def classrooms(settings: StudySettings) -> dict[str, Classroom]:
+def classrooms(settings: study.StudySettings) -> dict[str, Classroom]:
     """Every family of a study as one that can teach; none where the study has no [teaching].
 
     Raises:
@@ -207,8 +191,10 @@ def classrooms(settings: StudySettings) -> dict[str, Classroom]:
 
 
 def teach_families(
-    settings: StudySettings, thetas: Mapping[str, Theta], watching: Callable[[int], AbstractContextManager[Watcher]]
-) -> dict[str, Lesson]:
+    settings: study.StudySettings,
+    thetas: Mapping[str, Theta],
+    watching: Callable[[int], AbstractContextManager[Watcher]],
+) -> dict[str, study.Lesson]:
     """Teach a learner in each family at its best θ, from wherever an earlier run was left.
 
     The target is the study's own family, with its [domain] and the model that [teaching] names. The learner without a
@@ -242,22 +228,22 @@ def teach_families(
         raise next(iter(failed.values()))
     needs = needs_of(setup, learning.curves_of(setup.settings.target_samples, scores))
     lessons = {name: _lesson(needs, name, thetas[name]) for name in rooms if name not in failed}
-    best = best_teaching_family(lessons)
+    best = study.best_teaching_family(lessons)
     if best is not None:
         lessons = {
             name: lesson if name == best else replace(lesson, more=learning.more_needed(needs, more=name, less=best))
             for name, lesson in lessons.items()
         }
-    lessons |= {name: Lesson(thetas[name], failure=str(problem)) for name, problem in failed.items()}
+    lessons |= {name: study.Lesson(thetas[name], failure=str(problem)) for name, problem in failed.items()}
     return {name: lessons[name] for name in thetas if name in lessons}
 
 
-def _lesson(needs: learning.SampleNeeds, name: str, theta: Theta) -> Lesson:
+def _lesson(needs: learning.SampleNeeds, name: str, theta: Theta) -> study.Lesson:
     zero_shot = learning.mean_score(needs, name, 0).value or 0.0
     if not needs.settled:
-        return Lesson(theta, zero_shot)
+        return study.Lesson(theta, zero_shot)
     worth = learning.teaching_value(needs, none=learning.NONE, proxy=name)
-    return Lesson(theta, zero_shot, worth.needed, worth.plv)
+    return study.Lesson(theta, zero_shot, worth.needed, worth.plv)
 
 
 SURE = 0.95
@@ -335,7 +321,7 @@ class Predictivity:
         return min(low, self.prpv), max(high, self.prpv)
 
 
-def predictivity(run: StudyRun, proxies: Mapping[str, learning.Distribution]) -> dict[str, Predictivity | None]:
+def predictivity(run: study.StudyRun, proxies: Mapping[str, learning.Distribution]) -> dict[str, Predictivity | None]:
     """PRPV of every proxy, by name; None where an agent failed there from every start.
 
     A proxy that draws θ anew for every lesson draws it anew for every start, the same for all agents.
@@ -346,15 +332,15 @@ def predictivity(run: StudyRun, proxies: Mapping[str, learning.Distribution]) ->
     return {name: _predictivity(run, name, proxy) for name, proxy in proxies.items()}
 
 
-def _predictivity(run: StudyRun, name: str, proxy: learning.Distribution) -> Predictivity | None:
-    study, settings = run.study, run.settings
-    drawn = [plan_episodes(settings, proxy.draw(start), settings.seed) for start in range(settings.starts)]
+def _predictivity(run: study.StudyRun, name: str, proxy: learning.Distribution) -> Predictivity | None:
+    settings, target = run.settings, run.study.target
+    drawn = [study.plan_episodes(settings, proxy.draw(start), settings.seed) for start in range(settings.starts)]
     planned = [episode for start, each in enumerate(drawn) for episode in each if episode.start == start]
     found = run.outcomes(planned, f"agents in {name}")
-    evaluation = evaluate_outcomes(study, proxy.centre, [found[episode] for episode in planned])
+    evaluation = study.evaluate_outcomes(run.study, proxy.centre, [found[episode] for episode in planned])
     if evaluation.proxy is None or evaluation.prpv is None:
         return None
-    inputs = usefulness.compare(proxy=evaluation.proxy, target=study.target, metrics=study.settings.metrics)
+    inputs = usefulness.compare(proxy=evaluation.proxy, target=target, metrics=settings.metrics)
     by_chance = usefulness.chance(inputs)
     if usefulness.why_not_repeated(inputs):
         return Predictivity(evaluation.prpv, by_chance, None)

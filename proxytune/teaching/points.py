@@ -369,21 +369,16 @@ def search_space(
     Raises:
         SettingsError: If a width is of a parameter that is not searched, or wider than its box.
     """
+    boxes = {box.name: box.high - box.low for box in settings.space.intervals}
     for name, (_, widest) in widths.items():
-        _check_width(settings, name, widest)
+        key, whole = f"teaching.width.{name}", boxes.get(name)
+        if whole is None:
+            raise settings.error(key, "is not among [parameters]; add it there, or take this out")
+        # 0.3 − 0.1 is a little less than 0.2.
+        if widest > whole * (1.0 + ROUNDING):
+            raise settings.error(key, f"must be at most {whole:g}, all of its box in [parameters], got {widest:g}")
     centres = [_narrowed(box, left.get(box.name)) for box in settings.space.intervals]
     return Space((*centres, *(Interval(name + WIDTH, *bounds) for name, bounds in sorted(widths.items()))))
-
-
-def _check_width(settings: "StudySettings", name: str, widest: float) -> None:
-    key = f"teaching.width.{name}"
-    box = next((box for box in settings.space.intervals if box.name == name), None)
-    if box is None:
-        raise settings.error(key, "is not among [parameters]; add it there, or take this out")
-    whole = box.high - box.low
-    # 0.3 − 0.1 is a little less than 0.2.
-    if widest > whole * (1.0 + ROUNDING):
-        raise settings.error(key, f"must be at most {whole:g}, all of its box in [parameters], got {widest:g}")
 
 
 def _narrowed(box: Interval, left: tuple[float, float] | None) -> Interval:

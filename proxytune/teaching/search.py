@@ -17,23 +17,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from proxytune import learning
+from proxytune import learning, search
 from proxytune.arrays import Floats
 from proxytune.errors import LearnerError, RunError
 from proxytune.running import Watcher
-from proxytune.search import (
-    BatchPoints,
-    Proposer,
-    Search,
-    Surrogate,
-    Trial,
-    expected_improvement,
-    fit_surrogate,
-    from_unit,
-    unit_array,
-    unit_points,
-    with_failures_as_worst,
-)
 from proxytune.seeds import fresh_seed, proposal_seed
 from proxytune.space import Space, Theta
 from proxytune.storage import Store, TrialRecord
@@ -49,7 +36,7 @@ CLOSER = 2
 
 
 def finalists(
-    setup: TeachingSetup, settings: StudySettings, space: Space, trials: Sequence[Trial], by_prpv: Theta | None
+    setup: TeachingSetup, settings: StudySettings, space: Space, trials: Sequence[search.Trial], by_prpv: Theta | None
 ) -> dict[str, learning.Distribution]:
     """The distributions that are worth a closer look, by name; none twice.
 
@@ -62,11 +49,13 @@ def finalists(
     """
     if all(trial.score is None for trial in trials):
         return {}
-    surrogate = fit_surrogate(space, with_failures_as_worst(trials))
+    surrogate = search.fit_surrogate(space, search.with_failures_as_worst(trials))
     widths = np.array([name.endswith(WIDTH) for name in space.names])
     # The best is looked for in a cloud over the unit cube, and at the points tried.
-    tried = unit_array(space, [trial.values for trial in surrogate.visited])
-    points = np.concatenate((tried, unit_points(tried.shape[1], CLOUD, proposal_seed(settings.seed, len(tried)))))
+    tried = search.unit_array(space, [trial.values for trial in surrogate.visited])
+    points = np.concatenate(
+        (tried, search.unit_points(tried.shape[1], CLOUD, proposal_seed(settings.seed, len(tried))))
+    )
     single = _lowest(surrogate, np.where(widths, 0.0, points))
     named = {SINGLE: distribution(setup, {name: one for name, one in single.items() if not name.endswith(WIDTH)})}
     if widths.any():
@@ -119,9 +108,9 @@ def saves_more(experiment: Experiment, name: str, other: str) -> learning.Learni
     return learning.more_needed(experiment.needs, more=other, less=name)
 
 
-def _lowest(surrogate: Surrogate, points: Floats) -> Theta:
+def _lowest(surrogate: search.Surrogate, points: Floats) -> Theta:
     """The θ of the point with the lowest posterior mean score, which is PLV with its sign turned."""
-    return surrogate.space.theta(from_unit(surrogate.space, points[int(np.argmin(surrogate.mean(points)))]))
+    return surrogate.space.theta(search.from_unit(surrogate.space, points[int(np.argmin(surrogate.mean(points)))]))
 
 
 RAISE = "raise teaching.target_samples"
@@ -234,7 +223,7 @@ class PlvSearch:
     space: Space
     watcher: Watcher
 
-    def run(self, proposer: Proposer, by_prpv: Theta | None = None) -> PlvStudy:
+    def run(self, proposer: search.Proposer, by_prpv: Theta | None = None) -> PlvStudy:
         """Try proxies until the budget of [teaching] is spent or a rule says stop, from wherever it was left.
 
         Args:
@@ -256,7 +245,7 @@ class PlvSearch:
             self.store.begin({**stored, OBJECTIVE: self.facts()}, OBJECTIVE)
         tried = ProxyTrials(self, alone)
         self.watcher.begin("learning", count_examinations(taught, tried.done))
-        Search(self.space, proposer, settings.seed, taught.budget, settings.initial, settings.batch).run(tried)
+        search.Search(self.space, proposer, settings.seed, taught.budget, settings.initial, settings.batch).run(tried)
         named = finalists(self.setup, settings, self.space, tried.trials(), by_prpv)
         confirmed, unable = teach_finalists(settings, self.setup, named, self.watcher)
         trials, ended = tuple(tried.tried()), tried.ended()
@@ -280,33 +269,33 @@ class PlvSearch:
 class ProxyTrials:
     """The proxies tried, as the search loop evaluates them."""
 
-    def __init__(self, search: PlvSearch, alone: learning.ExaminationScores) -> None:
-        self._search, self._alone = search, alone
-        self._records = [trial for trial in search.store.trials(OBJECTIVE) if trial.state != "open"]
+    def __init__(self, plv: PlvSearch, alone: learning.ExaminationScores) -> None:
+        self._search, self._alone = plv, alone
+        self._records = [trial for trial in plv.store.trials(OBJECTIVE) if trial.state != "open"]
 
     @property
     def done(self) -> int:
         """The number of proxies that have been tried."""
         return len(self._records)
 
-    def trials(self) -> Sequence[Trial]:
+    def trials(self) -> Sequence[search.Trial]:
         """The finished trials, in order."""
         return score_trials(self._search.space, self._records)
 
     def ended(self) -> str:
         """The reason why no further proxy is tried; empty while one is."""
-        search, done = self._search, self._records
-        if len(done) >= search.setup.settings.budget:
-            return f"the budget of {search.setup.settings.budget} proxies is spent"
-        rules = search.settings.stop
+        plv, done = self._search, self._records
+        if len(done) >= plv.setup.settings.budget:
+            return f"the budget of {plv.setup.settings.budget} proxies is spent"
+        rules = plv.settings.stop
         late = out_of_time(sum(record.seconds for record in done), rules)
-        if late or rules.no_improvement is None or len(done) < search.settings.initial:
+        if late or rules.no_improvement is None or len(done) < plv.settings.initial:
             return late
         if not any(record.state == "finished" for record in done):
             return ""
-        return nothing_to_gain("PLV", expected_improvement(search.space, self.trials(), search.settings.seed), rules)
+        return nothing_to_gain("PLV", search.expected_improvement(plv.space, self.trials(), plv.settings.seed), rules)
 
-    def evaluate(self, batch: range, propose: BatchPoints) -> None:
+    def evaluate(self, batch: range, propose: search.BatchPoints) -> None:
         """Teach from what is left of a batch of proxies, all together, and keep what each was worth."""
         begun = time.perf_counter()
         points = list(zip(batch, propose(), strict=True))[len(self._records) - batch.start :]
@@ -326,9 +315,9 @@ class ProxyTrials:
 
     def _try(self, number: int, theta: Theta) -> PlvTrial:
         """Teach from one proxy: what that comes to depends on no other trial."""
-        search, name = self._search, f"trial {number}"
-        setup, proxy = search.setup, distribution(search.setup, theta)
-        scores = examine_curves(setup, {name: proxy}, search.settings.jobs, search.watcher, self._alone)
+        plv, name = self._search, f"trial {number}"
+        setup, proxy = plv.setup, distribution(plv.setup, theta)
+        scores = examine_curves(setup, {name: proxy}, plv.settings.jobs, plv.watcher, self._alone)
         needs = needs_of(setup, learning.curves_of(setup.settings.target_samples, scores))
         worth = learning.teaching_value(needs, none=learning.NONE, proxy=name)
         return PlvTrial(number, theta, proxy, needs.curves[name], worth, learning.mean_score(needs, name, 0))

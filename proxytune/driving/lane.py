@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from proxytune.arrays import Floats
+from proxytune.arrays import Flags, Floats
 from proxytune.driving.road import Road, RoadSection, Segment, repeats_of, road_sections
 
 Begin = tuple[float, float, float]
@@ -185,7 +185,7 @@ class _View(NamedTuple):
     out: Floats
     straight: Floats
     past: Floats
-    in_bend: NDArray[np.bool_]
+    in_bend: Flags
     outside: Floats
 
 
@@ -210,9 +210,6 @@ def _nearest_section(layout: RoadLayout, places: Floats) -> Numbers:
     beyond = np.where(view.in_bend, layout.radius[order] * over, np.abs(view.past))
     distance = np.abs(view.outside) + beyond + BEYOND * (beyond > 0.0)
     return np.asarray(order[np.argmin(distance, axis=-1)])
-
-
-Flags = NDArray[np.bool_]
 
 
 class LanePose(NamedTuple):

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Protocol, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.arrays import Floats, SmallBuffers, compiled_loops
+from proxytune.arrays import Floats, SmallBuffers, Whole, compiled_loops
 
 PAYS_OFF = 30_000
 """So many pictures NumPy looks up before Numba, which takes 0.4 s to load and would have saved that."""
@@ -106,7 +106,7 @@ class Eyes(NamedTuple):
 
     ahead: Floats
     left: Floats
-    eye: NDArray[np.int64]
+    eye: Whole
     yellow: NDArray[np.uint8]
     white: NDArray[np.uint8]
 

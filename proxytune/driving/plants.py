@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import NamedTuple, Protocol, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from proxytune.arrays import Floats
 from proxytune.driving.optics import rotation
 from proxytune.driving.robot import Robot
 from proxytune.effects import CHANNELS, Chain, Effect, FilterContext, Memory, Signal, Stage, stage_chain
@@ -134,8 +134,8 @@ class Wheel:
     """
 
     joint: str
-    centre: NDArray[np.float64]
-    axis: NDArray[np.float64]
+    centre: Floats
+    axis: Floats
     radius_m: float | None
     effort: float
 
@@ -154,7 +154,7 @@ class Body:
     left: Wheel
     right: Wheel
     mass_kg: float
-    camera: NDArray[np.float64] | None
+    camera: Floats | None
 
     @property
     def wheel_distance(self) -> float:
@@ -218,7 +218,7 @@ def links_called(root: ET.Element, name: str) -> list[ET.Element]:
     return [link for link in root.findall("link") if link.get("name") == name]
 
 
-def link_pose(root: ET.Element, link: str) -> NDArray[np.float64]:
+def link_pose(root: ET.Element, link: str) -> Floats:
     """Pose (4, 4) of a link in the root link's frame, every joint at 0."""
     for joint in root.iter("joint"):
         child, parent = joint.find("child"), joint.find("parent")
@@ -234,7 +234,7 @@ def add_little_mass(link: ET.Element) -> None:
     ET.SubElement(inertial, "inertia", ixx="1e-7", ixy="0", ixz="0", iyy="1e-7", iyz="0", izz="1e-7")
 
 
-def origin_of(element: ET.Element) -> NDArray[np.float64]:
+def origin_of(element: ET.Element) -> Floats:
     """The transform (4, 4) of an element's <origin>, roll first, then pitch, then yaw."""
     origin = element.find("origin")
     xyz, rpy = ((origin.get(key, "0 0 0") if origin is not None else "0 0 0").split() for key in ("xyz", "rpy"))

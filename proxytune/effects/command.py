@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from proxytune.arrays import Whole
 from proxytune.effects.effect import (
     Cue,
     Draws,
@@ -93,11 +93,11 @@ class Messages:
     per_sample: float
     seed: int
 
-    def numbers(self, samples: Signal) -> NDArray[np.int64]:
+    def numbers(self, samples: Signal) -> Whole:
         """The message that each sample belongs to."""
         return np.floor(samples * self.per_sample + 1e-9).astype(np.int64)
 
-    def starts(self, numbers: Signal) -> NDArray[np.int64]:
+    def starts(self, numbers: Signal) -> Whole:
         """The first sample of each message."""
         return np.ceil((numbers - 1e-9) / self.per_sample).astype(np.int64)
 

@@ -6,6 +6,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from proxytune.arrays import Flags
+
 if vars(numba.config)["DISABLE_JIT"]:
     raise ImportError("NUMBA_DISABLE_JIT is set: uncompiled, these loops take a thousand times as long")
 
@@ -29,9 +31,7 @@ def _filter(signal, remainder, mean_remainder, last, mean):  # type: ignore[no-u
                 rest[row, channel], last[row, channel] = 0.0 * new + remainder * end, end
 
 
-def trigger(
-    signal: NDArray[Any], thresholds: NDArray[Any], sample: NDArray[Any], moving: NDArray[np.bool_]
-) -> tuple[Any, Any]:
+def trigger(signal: NDArray[Any], thresholds: NDArray[Any], sample: NDArray[Any], moving: Flags) -> tuple[Any, Any]:
     """Let a signal (…, time, channels) through while its trigger is on: that, and whether it is on at last.
 
     Thresholds (3, channels) are those above which it goes on, below which it goes off, and below which it does so where

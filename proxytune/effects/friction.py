@@ -7,8 +7,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from proxytune.arrays import Flags
 from proxytune.effects.effect import (
     FEW,
     Cue,
@@ -58,7 +58,7 @@ class StictionState(NamedTuple):
     stop: Signal
     turn: Signal
     sample: Signal
-    moving: NDArray[np.bool_]
+    moving: Flags
 
 
 @effect("stiction", Stage.ACTUATION)
@@ -108,7 +108,7 @@ class Stiction(ShippedEffect):
         return np.where(moving, signal, 0.0), memory._replace(sample=signal[..., -1:, :], moving=moving[..., -1:, :])
 
 
-def _latest(on: NDArray[np.bool_], off: NDArray[np.bool_], first: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _latest(on: Flags, off: Flags, first: Flags) -> Flags:
     """Tell whether the latest event was an `on`, sample by sample: a sample's number, doubled, leaves a bit for it."""
     numbers = 2 * np.arange(1, on.shape[-2] + 1)[:, None]
     events = np.where(on | off, numbers + on, 0)

@@ -8,10 +8,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import correlate1d
 from scipy.special import ive
 
+from proxytune.arrays import Whole
 from proxytune.effects.effect import FilterContext, ShippedEffect, Signal, Stage, effect, parameter, skip_nothing
 from proxytune.seeds import picture_generator
 
@@ -147,7 +147,7 @@ class DelayedPictures(NamedTuple):
     """The newest past pictures, and how old each of their equal parts, from above, is: whole samples and a fraction."""
 
     pictures: Signal
-    whole: NDArray[np.int64]
+    whole: Whole
     fraction: Signal
 
 

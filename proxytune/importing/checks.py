@@ -8,10 +8,9 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import correlate, correlation_lags
 
-from proxytune.arrays import Floats
+from proxytune.arrays import Flags, Floats
 from proxytune.errors import LogError
 from proxytune.importing.source import Commands, Drive, Poses
 
@@ -104,14 +103,14 @@ def headings_and_tilts(quaternions: Floats, where: str) -> tuple[Floats, Floats]
     return headings, tilts
 
 
-def no_rotation(quaternions: Floats) -> NDArray[np.bool_]:
+def no_rotation(quaternions: Floats) -> Flags:
     """True for quaternions that are not finite or of length zero (N,)."""
     with np.errstate(over="ignore", invalid="ignore"):
         norms = np.linalg.norm(quaternions, axis=1)
     return np.asarray(~(np.isfinite(norms) & (norms > LEAST_NORM)))
 
 
-def complaint(quaternions: Floats, wrong: NDArray[np.bool_], where: str) -> LogError:
+def complaint(quaternions: Floats, wrong: Flags, where: str) -> LogError:
     """The complaint about the first of those that are wrong."""
     number = int(np.argmax(wrong))
     values = ", ".join(f"{value:g}" for value in quaternions[number])

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import isotonic_regression, minimize
 
-from proxytune.arrays import Floats
+from proxytune.arrays import Flags, Floats
 from proxytune.errors import InputError
 
 
@@ -94,12 +94,12 @@ class Examined:
     score: Floats
 
     @cached_property
-    def same(self) -> NDArray[np.bool_]:
+    def same(self) -> Flags:
         """True where two are of one curve (examinations, examinations)."""
         return np.asarray(self.curve[:, None] == self.curve)
 
     @cached_property
-    def together(self) -> NDArray[np.bool_]:
+    def together(self) -> Flags:
         """True where two are of one repetition."""
         return np.asarray(self.repetition[:, None] == self.repetition)
 
@@ -197,7 +197,7 @@ def _covariance(marks: Examined, values: Mapping[str, float], spread: Floats) ->
     return np.asarray(_means(values, marks.same, marks.apart) + spread[:, None] * spread * about + sure)
 
 
-def _means(values: Mapping[str, float], same: NDArray[np.bool_], apart: Floats) -> Floats:
+def _means(values: Mapping[str, float], same: Flags, apart: Floats) -> Floats:
     """Prior covariance of mean curves."""
     return np.asarray(LEVEL**2 + values["amplitude"] ** 2 * same * _matern(apart, values["length"]))
 

@@ -8,9 +8,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from proxytune.arrays import Floats
+from proxytune.arrays import Flags, Floats
 from proxytune.logs.log import Log, LogEpisode
 
 ROUND = 2
@@ -21,7 +20,7 @@ USUAL, STEPS, LOOSE = 10.0, 2.0, 1.5
 """So many usual deviations, and steps of a fast robot, are off the way; samples further apart have a gap between."""
 
 
-def outliers(episode: LogEpisode) -> NDArray[np.bool_]:
+def outliers(episode: LogEpisode) -> Flags:
     """Tell which samples of a drive have a pose that lies off its way (rows,)."""
     known = np.flatnonzero(np.isfinite(episode.poses).all(axis=1))
     found = np.zeros(len(episode.poses), dtype=bool)

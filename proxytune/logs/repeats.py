@@ -9,9 +9,8 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from proxytune.arrays import Floats, Whole
+from proxytune.arrays import Flags, Floats, Whole
 from proxytune.logs.log import Log, LogEpisode
 
 HELD_S = 0.2
@@ -38,7 +37,7 @@ class Runs(NamedTuple):
     """
 
     known: Whole
-    fresh: NDArray[np.bool_]
+    fresh: Flags
     counts: Whole
     speeds: Floats
 
@@ -62,7 +61,7 @@ def speeds_between(episode: LogEpisode) -> Floats:
     return _runs(episode).speeds
 
 
-def _shown_again(runs: Runs, least_m_s: float, *, usual: bool) -> NDArray[np.bool_]:
+def _shown_again(runs: Runs, least_m_s: float, *, usual: bool) -> Flags:
     """Tell which poses were shown again while the robot moved (N,); the last is, where that is `usual`, if it moved."""
     speeds = runs.speeds
     if not len(speeds):

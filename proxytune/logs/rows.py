@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from proxytune.arrays import Floats, Whole
+from proxytune.arrays import Flags, Floats, Whole
 from proxytune.errors import LogError
 from proxytune.settings import nearest, read_text
 
@@ -93,7 +93,7 @@ class Rows:
         return np.cumsum(begins)
 
     @property
-    def follows(self) -> NDArray[np.bool_]:
+    def follows(self) -> Flags:
         """True for each row from the second on that is of the same episode as the one before (N − 1,)."""
         return np.asarray(np.diff(self.episode) == 0)
 

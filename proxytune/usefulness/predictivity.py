@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from proxytune.arrays import Floats
 from proxytune.errors import InputError
@@ -253,7 +253,7 @@ def pod_of_images(*, proxy: ArrayLike, target: ArrayLike) -> float:
     return float(np.sqrt(squares.reshape(len(squares), -1).mean(axis=1)).mean())
 
 
-def _pair(proxy: ArrayLike, target: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _pair(proxy: ArrayLike, target: ArrayLike) -> tuple[Floats, Floats]:
     one, other = np.asarray(proxy, dtype=np.float64), np.asarray(target, dtype=np.float64)
     if one.shape != other.shape:
         raise InputError(f"proxy and target must be observed at the same times: shapes {one.shape} and {other.shape}")

@@ -9,9 +9,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from proxytune.arrays import Floats
+from proxytune.arrays import Flags, Floats, Whole
 from proxytune.scores import Metric, ScoreTable
 from proxytune.usefulness.comparison import Comparison, start_of, start_places
 from proxytune.usefulness.pairs import prpv_of_means
@@ -98,7 +97,7 @@ def _means_of_draws(table: ScoreTable, rng: np.random.Generator, resamples: int)
     return np.concatenate(means, axis=1)
 
 
-def agent_blocks(table: ScoreTable, draws: int) -> Iterator[tuple[slice, NDArray[np.bool_]]]:
+def agent_blocks(table: ScoreTable, draws: int) -> Iterator[tuple[slice, Flags]]:
     """Agents of which episodes are drawn together, and what they drove.
 
     Where all drove the same episodes these are all agents, with one row for them; otherwise as many as memory takes.
@@ -111,7 +110,7 @@ def agent_blocks(table: ScoreTable, draws: int) -> Iterator[tuple[slice, NDArray
         yield slice(start, start + size), table.driven[start : start + size]
 
 
-def draw_counts(table: ScoreTable, rng: np.random.Generator, resamples: int) -> NDArray[np.int64]:
+def draw_counts(table: ScoreTable, rng: np.random.Generator, resamples: int) -> Whole:
     """Count how often each episode is drawn: shape (agents, or 1 if all share the draw; resamples, episodes).
 
     Starts are drawn, and with a start all its repeats: these are no new starts. Of one start alone, repeats are drawn.
@@ -124,7 +123,7 @@ def draw_counts(table: ScoreTable, rng: np.random.Generator, resamples: int) -> 
     return _draw_own(table.driven, rng, resamples)
 
 
-def _draw_own(driven: NDArray[np.bool_], rng: np.random.Generator, resamples: int) -> NDArray[np.int64]:
+def _draw_own(driven: Flags, rng: np.random.Generator, resamples: int) -> Whole:
     """Count how often each agent's each episode is drawn of its own, shape (agents, resamples, episodes)."""
     episodes, counts = driven.shape[1], []
     for own in driven:
@@ -136,7 +135,7 @@ def _draw_own(driven: NDArray[np.bool_], rng: np.random.Generator, resamples: in
     return np.stack(counts)
 
 
-def counted_means(values: Floats, counts: NDArray[np.int64] | NDArray[np.bool_]) -> Floats:
+def counted_means(values: Floats, counts: Whole | Flags) -> Floats:
     """Mean scores (agents, episodes, metrics) when episodes count as often as drawn: (resamples, agents, metrics)."""
     sums = counts.astype(np.float64) @ np.nan_to_num(values)
     return np.asarray(np.swapaxes(sums / counts.sum(axis=-1)[..., None], 0, 1), dtype=np.float64)

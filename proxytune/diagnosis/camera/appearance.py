@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d, map_coordinates
 
-from proxytune.arrays import Floats
+from proxytune.arrays import Flags, Floats
 from proxytune.diagnosis.camera.edges import Gathered
 from proxytune.diagnosis.camera.fitting import CameraFit
 from proxytune.diagnosis.camera.light import (
@@ -208,7 +208,7 @@ class Grain:
     still_pairs: int
 
 
-def fit_grain(measured: Pictures, predicted: NDArray[Any], floor: NDArray[np.bool_]) -> Grain:
+def fit_grain(measured: Pictures, predicted: NDArray[Any], floor: Flags) -> Grain:
     """Fit the noise, from frames between which the robot stood, else from the smoothest flat places."""
     paint = flat_places(predicted, floor)
     still = _still_variances(measured, predicted, paint)
@@ -328,7 +328,7 @@ def look_at(gathered: Gathered, fit: CameraFit) -> Appearance:
     return Appearance(light, grain, sharpness, blemishes)
 
 
-def floor_pixels(fit: CameraFit) -> NDArray[np.bool_]:
+def floor_pixels(fit: CameraFit) -> Flags:
     """Pixels (rows, columns) that look at the floor, a little beneath the horizon."""
     on_floor = np.isfinite(ground_points(fit.views.optics.figures(fit.theta))[..., 0])
     below = np.ones_like(on_floor)

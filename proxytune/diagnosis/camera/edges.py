@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, gaussian_filter, map_coordinates
 from scipy.signal import savgol_coeffs, savgol_filter
 
-from proxytune.arrays import Floats
+from proxytune.arrays import Flags, Floats
 from proxytune.driving import LINES, CameraFigures, Markings, Road, Robot, mounted_camera, read_map, shipped_map
 from proxytune.effects import Stage, effect_of, effects_from
 from proxytune.errors import LogError
@@ -49,7 +49,7 @@ class Edges(NamedTuple):
     """
 
     frame: NDArray[np.intp]
-    white: NDArray[np.bool_]
+    white: Flags
     column: Floats
     row: Floats
     normal: Floats
@@ -191,7 +191,7 @@ def _samples(rate_hz: float) -> int:
     return max(2 * round(WINDOW_S * rate_hz / 2.0) + 1, ORDER + 3)
 
 
-def _within_poses(times: Floats, known: Floats, still: bool) -> NDArray[np.bool_]:
+def _within_poses(times: Floats, known: Floats, still: bool) -> Flags:
     after = np.searchsorted(known, times)
     gap = known[np.clip(after, 0, len(known) - 1)] - known[np.clip(after - 1, 0, len(known) - 1)]
     inside = (times >= known[0]) & (times <= known[-1])
@@ -324,7 +324,7 @@ class Tape:
         """Place of how much farther right it lies at the stretch's end than in its middle [m]."""
         return self.stretches * len(LINES) + stretch * TILTED + np.minimum(line, TILTED - 1)
 
-    def width(self, white: NDArray[np.bool_], line: NDArray[np.intp]) -> NDArray[np.intp]:
+    def width(self, white: Flags, line: NDArray[np.intp]) -> NDArray[np.intp]:
         """Place of how much wider white lines, wider yellow lines or longer dashes are [m]."""
         kind = np.where(white, 0, np.where(line == len(LINES) - 1, 2, 1))
         return self.stretches * (len(LINES) + TILTED) + kind

@@ -9,9 +9,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from proxytune.arrays import Floats
+from proxytune.arrays import Flags, Floats
 from proxytune.diagnosis.answer import Estimate
 from proxytune.diagnosis.camera.appearance import floor_pixels
 from proxytune.diagnosis.camera.edges import Gathered, Views, effects_of
@@ -61,7 +60,7 @@ def unseen_residuals(views: Views, state: State, names: Sequence[str]) -> Floats
     return residuals
 
 
-def fit_poses(views: Views, state: State, frames: NDArray[np.bool_]) -> State:
+def fit_poses(views: Views, state: State, frames: Flags) -> State:
     """Fit the poses of some frames (N,), everything else held."""
     state = replace(state, poses=np.where(frames[:, None], 0.0, state.poses))
     for scale in np.geomspace(4.0 * SCALE_PX, SCALE_PX, POSE_STEPS):
@@ -237,9 +236,7 @@ def compare_brightness(
     return Comparison(before, after, None, "grey levels"), ratios
 
 
-def grey_differences(
-    measured: Pictures, drawn: Pictures, floor: NDArray[np.bool_], *, fixed_exposure: bool
-) -> Pictures:
+def grey_differences(measured: Pictures, drawn: Pictures, floor: Flags, *, fixed_exposure: bool) -> Pictures:
     """Absolute differences on the floor (n, floor pixels, 3) of pictures (n, rows, columns, 3) [grey levels].
 
     Where exposure is not fixed, each is compared at its own brightness, which no model knows.
@@ -252,7 +249,7 @@ def grey_differences(
 
 
 def _grey_errors(
-    gathered: Gathered, fit: CameraFit, looks: Sequence[Look], out: NDArray[np.bool_], seed: int
+    gathered: Gathered, fit: CameraFit, looks: Sequence[Look], out: Flags, seed: int
 ) -> list[PictureError]:
     """Errors of frames left out (N,), by a camera that was fitted without them, for each look."""
     views, frames = fit.views, np.flatnonzero(out)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.arrays import Floats
+from proxytune.arrays import Flags, Floats
 from proxytune.diagnosis.camera.edges import MAP_SCATTER, Tape, Views
 from proxytune.diagnosis.camera.model import (
     Projection,
@@ -44,11 +44,7 @@ def robust_weight(residual: Floats, scale_px: float) -> Floats:
 
 
 def count_points(
-    views: Views,
-    there: Projection,
-    scale_px: float,
-    frames: NDArray[np.bool_] | None = None,
-    least: float = LEAST_WEIGHT,
+    views: Views, there: Projection, scale_px: float, frames: Flags | None = None, least: float = LEAST_WEIGHT
 ) -> Counted:
     """Weigh edge points of some frames by how far they lie from the map's markings; those of least weight are out."""
     valid = there.valid if frames is None else there.valid & frames[views.edges.frame]
@@ -155,11 +151,7 @@ class CameraFit:
 
 
 def fit_camera(
-    views: Views,
-    state: State,
-    names: Sequence[str],
-    scales_px: Sequence[float],
-    frames: NDArray[np.bool_] | None = None,
+    views: Views, state: State, names: Sequence[str], scales_px: Sequence[float], frames: Flags | None = None
 ) -> CameraFit:
     """Fit the parameters of these names by Gauss–Newton with a redescending loss, of a scale [pixel] for each step.
 

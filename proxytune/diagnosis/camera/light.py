@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import find_objects, label, maximum_filter, median_filter, minimum_filter, uniform_filter
 from scipy.stats import t as student
 
-from proxytune.arrays import Floats
+from proxytune.arrays import Flags, Floats
 from proxytune.driving import COLOURS
 
 Pictures = NDArray[np.uint8]
@@ -85,7 +85,7 @@ def squared_radius(rows: int, columns: int) -> Floats:
     return np.asarray((across**2 + down[:, None] ** 2) / (columns**2 / 4.0 + rows**2 / 4.0))
 
 
-def flat_places(predicted: NDArray[Any], floor: NDArray[np.bool_], margin: int = MARGIN) -> NDArray[np.int8]:
+def flat_places(predicted: NDArray[Any], floor: Flags, margin: int = MARGIN) -> NDArray[np.int8]:
     """The number in PAINTS that a pixel (N, rows, columns) shows with its neighbours; −1 near edges and off floor."""
     paint = np.full(predicted.shape[:3], -1, dtype=np.int8)
     for number, colour in enumerate(PAINTS):
@@ -96,9 +96,7 @@ def flat_places(predicted: NDArray[Any], floor: NDArray[np.bool_], margin: int =
     return np.where(alike & (paint >= 0), paint, np.int8(-1))
 
 
-def fit_light(
-    measured: Pictures, predicted: NDArray[Any], floor: NDArray[np.bool_], fixed_exposure: bool = False
-) -> Light:
+def fit_light(measured: Pictures, predicted: NDArray[Any], floor: Flags, fixed_exposure: bool = False) -> Light:
     """Fit exposure and vignetting to flat places of the floor; with a fixed exposure all frames have one gain."""
     means = _means(measured, predicted, floor)
     if means.frame.size == 0:
@@ -144,12 +142,12 @@ class _Means(NamedTuple):
     log_grey: Floats
     weight: Floats
 
-    def without(self, drop: NDArray[np.bool_]) -> Self:
+    def without(self, drop: Flags) -> Self:
         kept: Any = (values[~drop] for values in self)
         return type(self)(*kept)
 
 
-def _means(measured: Pictures, predicted: NDArray[Any], floor: NDArray[np.bool_]) -> _Means:
+def _means(measured: Pictures, predicted: NDArray[Any], floor: Flags) -> _Means:
     """Every mean over at least FEWEST pixels that are not clipped."""
     paint, radius = flat_places(predicted, floor), squared_radius(*floor.shape)
     ring = np.minimum((radius * RINGS).astype(int), RINGS - 1)
@@ -258,9 +256,7 @@ class Blemish:
     share: float
 
 
-def find_blemishes(
-    measured: Pictures, predicted: NDArray[Any], floor: NDArray[np.bool_], light: Light
-) -> tuple[Blemish, ...]:
+def find_blemishes(measured: Pictures, predicted: NDArray[Any], floor: Flags, light: Light) -> tuple[Blemish, ...]:
     """Find where brightness does not follow the drawn frames', the largest place first.
 
     Windows in which too few markings pass, near the horizon and at the sides, are not judged: what is hidden may reach
@@ -301,7 +297,7 @@ def _against_usual(contrast: Singles) -> Singles:
 
 
 def _contrast(
-    measured: Pictures, predicted: NDArray[Any], floor: NDArray[np.bool_], light: Light, fewest: int = FEWEST_FRAMES
+    measured: Pictures, predicted: NDArray[Any], floor: Flags, light: Light, fewest: int = FEWEST_FRAMES
 ) -> tuple[Singles, Singles, Singles]:
     """Regress the measured brightness of each window on the expected one over the frames; NaN if unknown.
 

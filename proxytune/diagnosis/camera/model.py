@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.arrays import Floats
+from proxytune.arrays import Flags, Floats
 from proxytune.diagnosis.camera.edges import LATENCY, READOUT, Tape, Views
 from proxytune.driving import LINES, CameraFigures, GroundPlaneCamera, Marks, draw_floor, floor_points
 from proxytune.effects import FilterContext, Stage, effects_from, stage_chain
@@ -52,8 +52,8 @@ class Projection(NamedTuple):
     """
 
     residual: Floats
-    near: NDArray[np.bool_]
-    valid: NDArray[np.bool_]
+    near: Flags
+    valid: Flags
     slope: Floats
     lever: Floats
     place: Floats

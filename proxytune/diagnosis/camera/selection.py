@@ -14,9 +14,8 @@ from itertools import combinations
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
-from proxytune.arrays import Floats
+from proxytune.arrays import Flags, Floats
 from proxytune.diagnosis.camera.edges import LATENCY, MAP_SCATTER, MOVING, READOUT, Views, effects_of
 from proxytune.diagnosis.camera.fitting import (
     EVIDENCE,
@@ -221,7 +220,7 @@ def fit_residual_field(fit: CameraFit) -> ResidualField:
     return ResidualField(float(nats), float(nats / max(cost, 1e-9)), rms, field)
 
 
-def _system(fit: CameraFit, there: Projection, half: NDArray[np.bool_]) -> tuple[Floats, Floats, float]:
+def _system(fit: CameraFit, there: Projection, half: Flags) -> tuple[Floats, Floats, float]:
     """Normal equations of the field on some frames, all else eliminated, and those frames' cost [nats]."""
     views, names = fit.views, fit.names
     points = count_points(views, there, SCALE_PX, half)

@@ -14,6 +14,7 @@ from .lessons import (
 )
 from .plv import (
     LEVELS as LEVELS,
+    NONE as NONE,
     AdaptiveDesign as AdaptiveDesign,
     Convergence as Convergence,
     Examination as Examination,
@@ -33,7 +34,6 @@ from .plv import (
 from .settings import (
     EXPERT as EXPERT,
     LEARNER as LEARNER,
-    NONE as NONE,
     TeachingSettings as TeachingSettings,
     read_teaching as read_teaching,
 )

@@ -22,6 +22,8 @@ from proxytune.arrays import Floats
 from proxytune.learning.curve_model import POSTERIOR_DRAWS, CurveDraws, LearningCurve, crossing, doublings, draw_curves
 from proxytune.settings import Section
 
+NONE = "none"
+"""The name of the learner without a proxy, which no proxy may have; it knows nothing before its first target sample."""
 LEVELS = (0.025, 0.975)
 """Ends of a 95 % interval, as quantiles of draws."""
 ROUNDING = 1e-9
@@ -136,7 +138,6 @@ def general_plv(
 def sample_needs(
     curves: Mapping[str, LearningCurve],
     *,
-    none: str,
     best_score: float,
     tolerance: float,
     level: float | None = None,
@@ -151,7 +152,7 @@ def sample_needs(
     scores = np.concatenate([curve.scores[np.isfinite(curve.scores)] for curve in curves.values()])
     bounds = float(min(-best_score, scores.min())), float(max(best_score, scores.max()))
     drawn = draw_curves(curves, bounds, draws)
-    alone = drawn.scores[none]
+    alone = drawn.scores[NONE]
     levels = alone[:, -1] if level is None else np.full(len(alone), level)
     needed = {
         name: crossing(drawn.counts, drawn.scores[name], levels - tolerance, drawn.first) for name in drawn.scores
@@ -169,17 +170,17 @@ def _last_gain(drawn: CurveDraws, alone: Floats) -> float | None:
     return float(alone[:, -1].mean() - alone[:, half].mean())
 
 
-def teaching_value(needs: SampleNeeds, *, none: str, proxy: str) -> TeachingValue:
+def teaching_value(needs: SampleNeeds, proxy: str) -> TeachingValue:
     """The worth of a proxy as a teacher, with 95 % intervals.
 
     Where convergence is not reached, η is known to lie beyond the largest count: ends that this leaves open are None.
     """
     return TeachingValue(
-        without=samples_needed(needs, none),
+        without=samples_needed(needs, NONE),
         needed=samples_needed(needs, proxy),
-        plv=more_needed(needs, more=none, less=proxy),
-        factor=estimate_figure(lambda alone, taught: alone / taught, needs, more=none, less=proxy),
-        reduction=estimate_figure(lambda alone, taught: 1.0 - taught / alone, needs, more=none, less=proxy),
+        plv=more_needed(needs, more=NONE, less=proxy),
+        factor=estimate_figure(lambda alone, taught: alone / taught, needs, more=NONE, less=proxy),
+        reduction=estimate_figure(lambda alone, taught: 1.0 - taught / alone, needs, more=NONE, less=proxy),
     )
 
 
@@ -258,13 +259,11 @@ class AdaptiveDesign:
     """The adaptive design of examinations.
 
     Attributes:
-        none: The name of the learner without a proxy, which knows nothing before its first target sample.
         counts: The grid of numbers of target samples, rising from 0; any number from its second on may be examined.
         repetitions: The most repetitions there may be.
         batch: How many examinations are chosen at once.
     """
 
-    none: str
     counts: tuple[int, ...]
     repetitions: int
     batch: int
@@ -306,7 +305,7 @@ def first_examinations(names: Sequence[str], design: AdaptiveDesign) -> list[Exa
         Examination(name, repetition, count)
         for repetition in range(min(FIRST_REPETITIONS, design.repetitions))
         for name in names
-        for count in spread(first=int(name == design.none))
+        for count in spread(first=int(name == NONE))
     ]
 
 
@@ -321,8 +320,8 @@ def next_examinations(needs: SampleNeeds, names: Sequence[str], design: Adaptive
     cells = _cells(needs, names, design)
     # What is not reached is taken as some way beyond the grid.
     needed = {name: np.minimum(samples, BEYOND * needs.last) for name, samples in needs.needed.items()}
-    alone = needed[design.none]
-    wanted = np.column_stack([alone - needed[name] for name in names if name != design.none] or [alone])
+    alone = needed[NONE]
+    wanted = np.column_stack([alone - needed[name] for name in names if name != NONE] or [alone])
     targets = wanted.shape[1]
     joint = np.cov(np.column_stack((wanted, cells.drawn)), rowvar=False)
     noise = needs.draws.model.noise_at(cells.number, doublings(cells.count.astype(float), needs.draws.first))
@@ -359,7 +358,7 @@ def _cells(needs: SampleNeeds, names: Collection[str], design: AdaptiveDesign) -
         (number, name, place)
         for number, name in enumerate(needs.curves)
         for count, place in open_.items()
-        if name in names and (count or name != design.none) and np.isfinite(scores[name][0, place])
+        if name in names and (count or name != NONE) and np.isfinite(scores[name][0, place])
     ]
     drawn = np.column_stack([scores[name][:, place] for _, name, place in cells])
     at = np.array([place for _, _, place in cells])
@@ -387,9 +386,9 @@ class Published:
     reduction: float
 
 
-def read_published(section: Section, known: Mapping[str, object], none: str) -> Mapping[str, Published]:
+def read_published(section: Section, known: Mapping[str, object]) -> Mapping[str, Published]:
     """Read the rows, each named as a proxy of the study or as learning without one."""
-    section.only((none, *known))
+    section.only((NONE, *known))
     return {name: _row(section.section(name)) for name in section.values}
 
 

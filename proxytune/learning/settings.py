@@ -9,7 +9,7 @@ from typing import Any
 
 from proxytune.arrays import Floats
 from proxytune.learning.lessons import Costs, Distribution, cost_saved, read_costs, split_samples
-from proxytune.learning.plv import FIRST_COUNTS, FIRST_REPETITIONS, Published, read_published
+from proxytune.learning.plv import FIRST_COUNTS, FIRST_REPETITIONS, NONE, Published, read_published
 from proxytune.settings import Section
 
 DEFAULT_LEARNER = "proxytune.learning.cloning:BehaviourCloning"
@@ -24,8 +24,6 @@ LATER = ("rehearsal", "proxy_lessons", "target_lessons")
 """Keys of what is taught that came later: facts name them only where they are set, so that what was kept stays."""
 MOST_REHEARSAL = 0.99
 """Beyond it hardly anything of the target would be learnt."""
-NONE = "none"
-"""The name of the learner without a proxy, which no proxy may have."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +125,7 @@ def read_teaching(section: Section) -> TeachingSettings | None:
         narrow=value,
         widths=_widths(section.section("width")),
         proxies=proxies,
-        published=read_published(section.section("published"), proxies, NONE),
+        published=read_published(section.section("published"), proxies),
         published_in=section.text("published_in", ""),
         rehearsal=section.number("rehearsal", 0.0, low=0.0, high=MOST_REHEARSAL),
         proxy_lessons=section.text("proxy_lessons", EXPERT, choices=(EXPERT, LEARNER)),

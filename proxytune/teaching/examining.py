@@ -162,7 +162,7 @@ def examine_curves(
         ]
         return {**scores, **_examine(setup, proxies, grid, jobs, watcher)}
     wanted = len(scores) + count_examinations(taught, len(proxies))
-    design = learning.AdaptiveDesign(learning.NONE, taught.target_samples, taught.seeds, BATCH)
+    design = learning.AdaptiveDesign(taught.target_samples, taught.seeds, BATCH)
     batch = learning.first_examinations(list(proxies), design)
     while batch and len(scores) < wanted:
         scores |= _examine(setup, proxies, batch[: wanted - len(scores)], jobs, watcher)
@@ -182,9 +182,7 @@ def needs_of(
 ) -> learning.SampleNeeds:
     """The target samples that each learner needs, by what [teaching] says of convergence."""
     taught, best = setup.settings, setup.target.best_score
-    return learning.sample_needs(
-        curves, none=learning.NONE, best_score=best, tolerance=taught.tolerance, level=taught.level, draws=draws
-    )
+    return learning.sample_needs(curves, best_score=best, tolerance=taught.tolerance, level=taught.level, draws=draws)
 
 
 def _examine(

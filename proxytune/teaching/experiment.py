@@ -144,7 +144,7 @@ def _teacher(
     zero_shot, curve = learning.mean_score(needs, name, 0), needs.curves[name]
     if not needs.settled:
         return TeacherResult(name, proxy, curve, zero_shot, None, None)
-    worth = learning.teaching_value(needs, none=learning.NONE, proxy=name)
+    worth = learning.teaching_value(needs, name)
     # PLV in cost (eq. 6)
     cost = learning.estimate_figure(
         lambda without, needed: taught.cost_saved(without=without, needed=needed), needs, more=learning.NONE, less=name
@@ -242,7 +242,7 @@ def _lesson(needs: learning.SampleNeeds, name: str, theta: Theta) -> study.Lesso
     zero_shot = learning.mean_score(needs, name, 0).value or 0.0
     if not needs.settled:
         return study.Lesson(theta, zero_shot)
-    worth = learning.teaching_value(needs, none=learning.NONE, proxy=name)
+    worth = learning.teaching_value(needs, name)
     return study.Lesson(theta, zero_shot, worth.needed, worth.plv)
 
 

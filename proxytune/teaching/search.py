@@ -319,7 +319,7 @@ class ProxyTrials:
         setup, proxy = plv.setup, distribution(plv.setup, theta)
         scores = examine_curves(setup, {name: proxy}, plv.settings.jobs, plv.watcher, self._alone)
         needs = needs_of(setup, learning.curves_of(setup.settings.target_samples, scores))
-        worth = learning.teaching_value(needs, none=learning.NONE, proxy=name)
+        worth = learning.teaching_value(needs, name)
         return PlvTrial(number, theta, proxy, needs.curves[name], worth, learning.mean_score(needs, name, 0))
 
 

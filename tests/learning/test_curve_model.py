@@ -93,12 +93,12 @@ WHOLE = 5 * REPETITIONS * len(GRID)
 
 
 def needs_of(curves, draws=2000):
-    return sample_needs(curves, none=NONE, best_score=BEST, tolerance=TOLERANCE, draws=draws)
+    return sample_needs(curves, best_score=BEST, tolerance=TOLERANCE, draws=draws)
 
 
 def spend(learners, examinations):
     """The curves after so many examinations that were chosen."""
-    spending, scores = AdaptiveDesign(NONE, GRID, REPETITIONS, 12), {}
+    spending, scores = AdaptiveDesign(GRID, REPETITIONS, 12), {}
     batch = first_examinations(learners.names, spending)
     while True:
         for one in batch[: examinations - len(scores)]:
@@ -114,7 +114,7 @@ def judged(learners, curves):
     needs, alone = needs_of(curves), learners.needed(NONE)
     found = []
     for name in learners.names[1:]:
-        plv = teaching_value(needs, none=NONE, proxy=name).plv
+        plv = teaching_value(needs, name).plv
         low, high = -np.inf if plv.low is None else plv.low, np.inf if plv.high is None else plv.high
         truth = alone - learners.needed(name)
         # Where η is not reached, PLV is known to lie below what the largest count leaves.

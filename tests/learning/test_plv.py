@@ -21,11 +21,11 @@ WITHOUT = curve(np.nan, 10, 20, 50, 50)
 
 
 def judged(level=None, **curves):
-    return sample_needs({"none": WITHOUT, **curves}, none="none", best_score=60.0, tolerance=5.0, level=level)
+    return sample_needs({"none": WITHOUT, **curves}, best_score=60.0, tolerance=5.0, level=level)
 
 
 def worth(proxy, level=None):
-    return teaching_value(judged(proxy=proxy, level=level), none="none", proxy="proxy")
+    return teaching_value(judged(proxy=proxy, level=level), "proxy")
 
 
 def test_a_proxy_that_helps_has_a_plv_above_zero_and_one_that_harms_below():
@@ -67,25 +67,25 @@ def test_a_level_that_the_learner_without_a_proxy_does_not_reach_leaves_plv_unkn
 def test_a_learner_counts_as_settled_where_the_last_doubling_gains_no_more_than_the_tolerance():
     rising = curve(np.nan, 10, 20, 30, 50)
     assert judged(proxy=curve(0, 10, 20, 30, 40)).settled
-    assert not sample_needs({"none": rising}, none="none", best_score=60.0, tolerance=5.0).settled
+    assert not sample_needs({"none": rising}, best_score=60.0, tolerance=5.0).settled
 
 
 def test_a_grid_whose_first_count_is_beyond_half_its_last_tells_no_gain():
     alone = LearningCurve((0, 500, 800), np.array([[np.nan, 50.0, 50.0], [np.nan, 49.0, 51.0]]))
-    needs = sample_needs({"none": alone}, none="none", best_score=60.0, tolerance=5.0)
+    needs = sample_needs({"none": alone}, best_score=60.0, tolerance=5.0)
     assert (needs.gain, needs.settled) == (None, False)
 
 
 @pytest.mark.parametrize("grid", [(0, 400, 800), (0, 3, 6), (0, 50, 100)])
 def test_a_grid_that_begins_at_half_its_last_tells_the_gain(grid):
     alone = LearningCurve(grid, np.array([[np.nan, 20.0, 50.0], [np.nan, 19.0, 51.0], [np.nan, 21.0, 50.5]]))
-    needs = sample_needs({"none": alone}, none="none", best_score=60.0, tolerance=5.0)
+    needs = sample_needs({"none": alone}, best_score=60.0, tolerance=5.0)
     assert 20.0 < needs.gain < 35.0
 
 
 def test_what_is_needed_without_a_proxy_does_not_depend_on_which_proxy_it_is_held_against():
     needs = judged(good=curve(20, 48, 50, 50, 50), never=curve(0, 0, 0, 0, 0))
-    good, never = (teaching_value(needs, none="none", proxy=name) for name in ("good", "never"))
+    good, never = (teaching_value(needs, name) for name in ("good", "never"))
     assert good.without == never.without
     assert good.without.low > 200.0
 
@@ -98,9 +98,9 @@ def test_a_reduction_is_bounded_but_not_known_where_the_learner_without_a_proxy_
 
 def test_scores_beyond_the_best_and_its_negative_are_no_other_scores():
     lower = {"none": curve(np.nan, -900, -600, -200, -190), "proxy": curve(-500, -200, -190, -190, -190)}
-    needs = sample_needs(lower, none="none", best_score=0.0, tolerance=20.0)
+    needs = sample_needs(lower, best_score=0.0, tolerance=20.0)
     assert -195.0 < needs.when.level < -185.0
-    assert 200.0 < teaching_value(needs, none="none", proxy="proxy").without.value < 800.0
+    assert 200.0 < teaching_value(needs, "proxy").without.value < 800.0
 
 
 def test_two_proxies_are_compared_by_what_the_one_needs_more_than_the_other():
@@ -124,7 +124,7 @@ def test_general_plv_with_unit_costs_and_an_expert_only_is_plv():
 
 
 SPENDING_GRID = (0, 100, 200, 400, 800, 1600)
-SPENDING = AdaptiveDesign("none", SPENDING_GRID, 6, 12)
+SPENDING = AdaptiveDesign(SPENDING_GRID, 6, 12)
 KNOWN = (SPENDING_GRID.index(100), SPENDING_GRID.index(400), SPENDING_GRID.index(1600))
 
 
@@ -143,7 +143,7 @@ CURVES = {
 
 
 def needs(curves=CURVES):
-    return sample_needs(curves, none="none", best_score=60.0, tolerance=5.0, draws=300)
+    return sample_needs(curves, best_score=60.0, tolerance=5.0, draws=300)
 
 
 def test_the_first_examinations_span_the_grid_in_two_repetitions_and_none_is_of_who_has_learnt_nothing():
@@ -185,11 +185,11 @@ def test_the_learner_without_a_proxy_alone_is_examined_for_how_many_samples_it_n
 @pytest.mark.parametrize("first", [1, 2, 7])
 def test_a_grid_from_few_samples_on_has_no_place_twice_and_none_before_the_first(first):
     grid = (0, first, 8, 64, 512)
-    spending = AdaptiveDesign("none", grid, 4, 12)
+    spending = AdaptiveDesign(grid, 4, 12)
     scores = np.array([[np.nan, 1.0, 5.0, 30.0, 50.0], [np.nan, 3.0, 9.0, 35.0, 49.0]])
     taught = LearningCurve(grid, np.where(np.isnan(scores), 0.0, scores + 1.0))
     curves = {"none": LearningCurve(grid, scores), "proxy": taught}
-    found = sample_needs(curves, none="none", best_score=60.0, tolerance=5.0, draws=300)
+    found = sample_needs(curves, best_score=60.0, tolerance=5.0, draws=300)
     chosen = next_examinations(found, list(curves), spending)
     assert len(set(chosen)) == len(chosen) == spending.batch
     # The crossing lies between 8 and 512
@@ -197,7 +197,7 @@ def test_a_grid_from_few_samples_on_has_no_place_twice_and_none_before_the_first
 
 
 def test_where_every_repetition_of_every_count_is_done_fewer_or_none_are_left():
-    one_repetition = AdaptiveDesign("none", SPENDING_GRID, 2, 500)
+    one_repetition = AdaptiveDesign(SPENDING_GRID, 2, 500)
     chosen = next_examinations(needs(), list(CURVES), one_repetition)
     assert 0 < len(chosen) < 500
     assert {one.repetition for one in chosen} == {0, 1}

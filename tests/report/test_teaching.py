@@ -46,7 +46,7 @@ LESSONS = (
 def experiment(lessons=LESSONS, gain=1.0, published=NOBODY, examinations=None, costs=COSTS):
     without = LearningCurve(COUNTS, np.array([[np.nan, 5.0, 20.0, 40.0, 50.0]] * 3))
     curves = {"none": without, **{one.name: one.curve for one in lessons}}
-    needs = sample_needs(curves, none="none", best_score=60.0, tolerance=5.0, level=50.0, draws=60)
+    needs = sample_needs(curves, best_score=60.0, tolerance=5.0, level=50.0, draws=60)
     taught = {"published": published, "published_in": "a paper", "examinations": examinations, "costs": costs}
     teaching = SimpleNamespace(target_samples=COUNTS, **taught)
     settings = SimpleNamespace(name=EVIL, teaching=teaching)

@@ -253,11 +253,11 @@ def curve(means):
 
 def experiment(settled=True, names=()):
     curves = {name: curve(means) for name, means in MEANS.items()}
-    needs = sample_needs(curves, none="none", best_score=60.0, tolerance=5.0)
+    needs = sample_needs(curves, best_score=60.0, tolerance=5.0)
     needs = replace(needs, gain=0.0 if settled else 5.1)
 
     def taught(name):
-        worth = teaching_value(needs, none="none", proxy=name)
+        worth = teaching_value(needs, name)
         return TeacherResult(name, Distribution({}), needs.curves[name], mean_score(needs, name, 0), worth, None)
 
     return Experiment(SimpleNamespace(), 60.0, needs, tuple(map(taught, names or list(MEANS)[1:])))

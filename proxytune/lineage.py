@@ -53,7 +53,7 @@ SAME_CODE = {
         "94c2e672161e5eb3819043c1684c3859b44baa7e41800145b32c2bff9d44c7c4",
         "d1c60aa93bdd77976fa65112071f591f3da28059d51ac2212d6e214e993ff820",
         "dc47375fd36dc4589301ccaf4a331ee5a1b35a76593fbed672df4954e55f1a4e",
-        "9a21999c54f7a5426cadad0746637571852356031df2402e72d887c07cd7b6cb",
+        "7cc040dd4b2ed23a23e4ae52efb99f8af0f50ac71baf4020cc3daa36e7215773",
     ),
     "environments": (
         "f5b9c2c9586c29cd4dc2d6e27f44fd2731ecc2d27bf96a80c745aecd5a3ddb50",
@@ -64,7 +64,7 @@ SAME_CODE = {
         "4c4c6938034f481691acea6d8729b71483aeae192fbc759109a77fd37c052dfa",
         "3347db8c725fed99a9dab5513285b83255ba9d0d595e4b395fe48d69a8408fc7",
         "c5523b5296a6a48b0e23a40895df9c52c004cedb3bdc378686ace873eaa8c948",
-        "bb7d198ae230873cb96699def5cab2a34bca372b7dd9b6892f348bd9b8c219e5",
+        "7b1377a6ec258c1bea2a574971443617373b3a160033133da9b9d47341aaa819",
     ),
     "engine outcomes": ("94c0ba12f9bf", *ON_OUTPUTS),
     "engine composite": ("82865583b592", *ON_OUTPUTS),

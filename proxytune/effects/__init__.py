@@ -5,6 +5,7 @@ compiled     filters of long signals by Numba
 command      single messages between agent and motors: delayed, jittered, dropped, quantised
 motors       from a command to a wheel's speed: lag, slew rate, limits, gains, battery, heat
 friction     dead band, stiction, backlash, wheels that are out of round
+cars         what only a car has, and effects of wheels on its throttle or its steering
 motion       from wheels to the body: scrub, slip, coupling, slopes, patches; and where its pose is measured
 camera       how a camera is mounted and what its lens draws
 image        how a picture comes out: blur, rolling shutter, latency, focus, light, noise

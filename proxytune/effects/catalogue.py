@@ -15,8 +15,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from proxytune.effects import camera, command, friction, image, motion, motors, steering
-from proxytune.effects.columns import QUANTISATION, STEERED, STEERED_COMMANDS, THROTTLED
+from proxytune.effects import camera, cars, command, friction, image, motion, motors
 from proxytune.effects.effect import (
     CHANNELS,
     MOTIONS,
@@ -180,10 +179,10 @@ _ALL: tuple[type[Effect], ...] = (
 
 # What bends the angle of the wheels goes before what is lost by it, and the mass comes last
 _OF_CARS: tuple[type[Effect], ...] = (
-    command.DelayJitter, command.DroppedCommands, QUANTISATION, command.Delay, *STEERED_COMMANDS,
-    *STEERED, steering.SteeringBacklash, steering.SteeringOffset, steering.SteeringCurve,
-    *THROTTLED, steering.SteeringFriction, steering.Rolling,
-    steering.Tyres, motion.YawLag, motion.TurnSlip, motion.FloorSlope, motion.SlipperyPatch,
+    command.DelayJitter, command.DroppedCommands, cars.QUANTISATION, command.Delay, *cars.STEERED_COMMANDS,
+    *cars.STEERED, cars.SteeringBacklash, cars.SteeringOffset, cars.SteeringCurve,
+    *cars.THROTTLED, cars.SteeringFriction, cars.Rolling,
+    cars.Tyres, motion.YawLag, motion.TurnSlip, motion.FloorSlope, motion.SlipperyPatch,
     *_TRACKER_AND_CAMERA,
 )  # fmt: skip
 

@@ -1,2 +1,1 @@
-from .family import agent_of as agent_of
-from .given import played_environment as played_environment
+from .family import agent_of as agent_of, played_environment as played_environment

@@ -2,6 +2,7 @@
 
 An agent is a function, what has `predict`, or one of two that need no code. One episode: it acts through effects until
 the environment or the time ends it. `agent_of` goes the other way: a policy trained elsewhere drives our robot.
+`played_environment` makes a function of θ, agent, start and seed of an environment that is at hand.
 """
 
 import inspect
@@ -12,11 +13,12 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Protocol
 
+import gymnasium
 import numpy as np
 
-from proxytune.domain import Episode
+from proxytune.domain import Episode, make_episode
 from proxytune.driving import Command, Picture, Robot
-from proxytune.effects import Catalogue, effects_from, is_learnt
+from proxytune.effects import PARAMETERS, Catalogue, effects_from, is_learnt
 from proxytune.environments.making import EnvironmentSettings, EpisodeMetric, make_environment, read_domain, read_values
 from proxytune.environments.signals import Actuators, EnvironmentParameters, Sensors, Spaces, figures, look_at
 from proxytune.errors import EpisodeError, ExtensionError, InputError, SettingsError
@@ -25,7 +27,7 @@ from proxytune.identity import digest, files_beside, meaning_of
 from proxytune.lineage import code_name
 from proxytune.seeds import acting_seed, course_generator, reset_seed
 from proxytune.settings import Section, nearest
-from proxytune.space import Theta
+from proxytune.space import Space, Theta
 
 
 class Predictor(Protocol):
@@ -358,3 +360,57 @@ def _check(table: Section, values: Theta, settings: EnvironmentSettings, spaces:
             # What vanishes does no harm: a model of two wheels alike states an imbalance of 0
             if is_learnt(name) or catalogue.parameters[name].neutral != value:
                 raise table.error(name, str(problem)) from None
+
+
+@dataclass(frozen=True)
+class PlayedEnvironment:
+    """An environment as a function: its family plays it, and what has no registered name is made by `make`."""
+
+    family: GymnasiumFamily
+    name: str
+    make: Callable[..., Any] | None
+
+    def __call__(self, theta: Theta, agent: str, start: int, seed: int) -> Mapping[str, float]:
+        """The metrics of one episode."""
+        _register(self.name, self.make)
+        return self.family.run(make_episode(theta, agent=agent, start=start, seed=seed))
+
+
+def played_environment(
+    given: Any, space: Space, policies: Mapping[str, Any], domain: Mapping[str, Any], path: Path
+) -> PlayedEnvironment:
+    """The function that plays an environment's episodes.
+
+    Args:
+        given: A registered name, or what makes the environment.
+        space: What is tuned: effects by name, attributes with a point, else arguments of the constructor.
+        policies: Agents by name.
+        domain: Other keys of a `[domain]` table.
+        path: The file that complaints name.
+
+    Raises:
+        InputError: If the environment, a parameter or a policy cannot be used.
+    """
+    make = None if isinstance(given, str) else given
+    name = given if make is None else f"proxytune_tune/{getattr(make, '__name__', type(make).__name__).strip('<>')}-v0"
+    _register(name, make)
+    own = {
+        one.name: {
+            "attribute" if "." in one.name else "argument": one.name,
+            "low": one.low,
+            "high": one.high,
+            "neutral": 0.5 * (one.low + one.high),
+        }
+        for one in space.intervals
+        if one.name not in PARAMETERS
+    }
+    section = Section(path, "domain.", {"environment": name, "parameters": own, **domain})
+    return PlayedEnvironment(gymnasium_family(section, model=None, policies=policies), name, make)
+
+
+def _register(name: str, make: Callable[..., Any] | None) -> None:
+    """Have Gymnasium know what makes an environment, in this process; once is enough."""
+    known = gymnasium.registry.get(name)
+    if make is not None and (known is None or known.entry_point is not make):
+        gymnasium.registry.pop(name, None)
+        gymnasium.register(name, entry_point=make)

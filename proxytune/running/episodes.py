@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from proxytune.domain import DomainFamily, Episode, Outcome
 from proxytune.errors import RunError
 from proxytune.running.fleets import RAISED, Fleet, can_run_together, run_fleet
-from proxytune.running.workers import Rescue, WorkerExit, places, working
+from proxytune.running.workers import Rescue, Result, WorkerExit, places, working
 
 ENDED, ENDLESS = "it ended its process", "it took longer than"
 """How failures begin of episodes that end their process, and of those that do not end themselves."""
@@ -56,6 +56,11 @@ class Watch:
     waits: Callable[[str, float], None] = lambda what, seconds: None
     alone: Collection[str] = ()
     known: Seconds = field(default_factory=dict)
+
+    def rescue(self, times: float, lost: Callable[[Fleet, WorkerExit], Result]) -> Rescue[Fleet, Result]:
+        """The rescue of fleets that are watched so too, and may take so many times as long as an episode."""
+        limit_s = self.timeout_s and times * self.timeout_s
+        return Rescue(lost, limit_s, lambda fleet: any(map(self.suspect, fleet)), self.begins)
 
 
 UNWATCHED = Watch()

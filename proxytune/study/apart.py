@@ -6,11 +6,11 @@ which is kept in study.db (`APART`). The agents that proxytune brings are known 
 """
 
 import functools
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 
 from proxytune.domain import DomainFamily, Episode, make_episode
 from proxytune.extensions import plugins
-from proxytune.running import RAISED, Rescue, Watch, can_run_together, run_episode, run_together, working
+from proxytune.running import RAISED, Fleet, Watch, can_run_together, run_episode, run_together, working
 from proxytune.seeds import preflight_seed
 from proxytune.storage import Store
 from proxytune.study.family import is_users_family
@@ -24,7 +24,6 @@ WHY = {
     "remembers in its memory, not in its class or in globals, and draw from a generator of its own",
     ENDS: "ends what is driven beside it, so it is driven alone, which takes longer; let it raise an Exception instead",
 }
-Pair = tuple[Episode, Episode]
 
 
 def users_agents(settings: StudySettings) -> list[str]:
@@ -44,15 +43,9 @@ def find_apart(
     """Run two episodes of each agent side by side and one after the other: why some run by themselves, by agent."""
     if not agents or not can_run_together(family):
         return {}
-    pairs = [(_episode(settings, agent, 0), _episode(settings, agent, 1)) for agent in agents]
-    rescue = Rescue[Pair, tuple[str, str]](
-        lambda pair, end: (pair[0].agent, ENDS),
-        watch.timeout_s and 4.0 * watch.timeout_s,
-        lambda pair: any(map(watch.suspect, pair)),
-        watch.begins,
-    )
-    work: Callable[[Pair], tuple[str, str]] = functools.partial(_why_apart, family, tuple(needed))
-    with working(work, pairs, settings.jobs, rescue) as tried:
+    pairs: list[Fleet] = [(_episode(settings, agent, 0), _episode(settings, agent, 1)) for agent in agents]
+    rescue = watch.rescue(4.0, lambda pair, end: (pair[0].agent, ENDS))
+    with working(functools.partial(_why_apart, family, tuple(needed)), pairs, settings.jobs, rescue) as tried:
         why = dict(tried)
     return {agent: why[agent] for agent in agents if why[agent]}
 
@@ -63,7 +56,7 @@ def _episode(settings: StudySettings, agent: str, turn: int) -> Episode:
     return make_episode(theta, agent=agent, start=start, seed=preflight_seed(settings.seed, start, turn))
 
 
-def _why_apart(family: DomainFamily, needed: Collection[str], pair: Pair) -> tuple[str, str]:
+def _why_apart(family: DomainFamily, needed: Collection[str], pair: Fleet) -> tuple[str, str]:
     together = run_together(family, pair, needed)
     single = [run_episode(family, episode, needed) for episode in pair]
     if any(one.failure.startswith(RAISED) for one in single):

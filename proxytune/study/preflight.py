@@ -135,13 +135,7 @@ def check_repeatable(run: StudyRun, episodes: Sequence[Episode]) -> None:
     needed = tuple(needed_metrics(run.settings, run.study.family))
     drive: Callable[[Fleet], list[Again]] = functools.partial(_drive_twice, run.study.family, needed)
     with run.watched() as watch:
-        timeout_s = watch.timeout_s and 2.0 * watch.timeout_s
-        rescue = Rescue[Fleet, list[Again]](
-            lambda fleet, end: [(episode, None) for episode in fleet],
-            timeout_s,
-            lambda fleet: any(map(watch.suspect, fleet)),
-            watch.begins,
-        )
+        rescue: Rescue[Fleet, list[Again]] = watch.rescue(2.0, lambda fleet, _: [(one, None) for one in fleet])
         with working(drive, fleets, run.settings.jobs, rescue) as driven:
             others = {one.agent for again in driven for one, scores in again if scores != known[one]}
     told = [agent for agent in run.settings.agents if agent in others]

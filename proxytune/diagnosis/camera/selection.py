@@ -292,14 +292,13 @@ def check_match(name: str, fit: CameraFit) -> tuple[str, ...]:
     return (f"{100 * share:.0f} % of the markings' edges match ({usual}): poses or map are off by centimetres",)
 
 
-def _turned_pictures(right: float, down: float) -> Callable[[Views], Views]:
-    """Mirror pictures left to right where `right` is −1, top to bottom where `down` is."""
+def _mirrored(down: float) -> Callable[[Views], Views]:
+    """Mirror pictures left to right, and top to bottom too where `down` is −1."""
 
     def turn(views: Views) -> Views:
         edges, optics = views.edges, views.optics
-        column = optics.columns - edges.column if right < 0.0 else edges.column
-        row = optics.rows - edges.row if down < 0.0 else edges.row
-        return replace(views, edges=edges._replace(column=column, row=row, normal=edges.normal * (right, down)))
+        column, row = optics.columns - edges.column, optics.rows - edges.row if down < 0.0 else edges.row
+        return replace(views, edges=edges._replace(column=column, row=row, normal=edges.normal * (-1.0, down)))
 
     return turn
 
@@ -310,8 +309,8 @@ def _posed(change: Callable[[Floats], Floats]) -> Callable[[Views], Views]:
 
 MISTAKES: Mapping[str, Callable[[Views], Views]] = MappingProxyType(
     {
-        "the pictures are mirrored": _turned_pictures(-1.0, 1.0),
-        "the pictures are upside down": _turned_pictures(-1.0, -1.0),
+        "the pictures are mirrored": _mirrored(1.0),
+        "the pictures are upside down": _mirrored(-1.0),
         "heading is clockwise": _posed(lambda poses: poses * (1.0, 1.0, -1.0)),
         "headings are in degrees": _posed(lambda poses: poses * (1.0, 1.0, np.radians(1.0))),
         "x and y are swapped": _posed(lambda poses: poses[:, (1, 0, 2)]),

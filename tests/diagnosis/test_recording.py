@@ -77,7 +77,7 @@ def test_more_pictures_make_no_drive_longer_than_twenty_seconds(family, monkeypa
 def test_a_picture_is_the_one_that_an_agent_is_shown_when_it_is_finished(family, monkeypatch):
     """Blur over 0.07 s and all: the same as rendering every tick of the drive and filtering it in one go."""
     driven = []
-    monkeypatch.setattr(filming, "drive", lambda *given: driven.append(drive(*given)) or driven[-1])
+    monkeypatch.setattr(filming.driving, "drive", lambda *given: driven.append(drive(*given)) or driven[-1])
     (taken,) = film(family, 1, 3)
     instance = family.instance({}, columns=160)
     ticks = instance.camera.render(driven[0].poses)
@@ -116,7 +116,7 @@ def test_the_same_seed_gives_the_same_drives_and_another_seed_others(family):
 
 
 def test_a_drive_that_ends_before_its_pictures_are_taken_is_told_with_its_start(family, monkeypatch):
-    monkeypatch.setattr(filming, "off_map", lambda road, x, y: True)
+    monkeypatch.setattr(filming.driving, "off_map", lambda road, x, y: True)
     with pytest.raises(EpisodeError, match=r"^lane drive from start 0 ended after 0\.05 s with 0 of 1 pictures; "):
         list(film(family, 1, 1))
 

@@ -161,7 +161,12 @@ def predict_pictures(log: Log, robot: Robot, theta: Theta) -> Iterator[Predicted
     robot.camera_figures()
     sight = set(camera_effects(robot.catalogue))
     own = {name: value for name, value in {**robot.theta, **theta}.items() if effect_of(name) in sight}
-    views, numbers = _views(log, frames, robot)
+    tracks, numbers = track_frames(log, frames)
+    rows, columns = read_pictures(frames, numbers[:1].tolist()).shape[1:3]
+    no_edge, nowhere = np.empty(0, dtype=np.intp), np.empty(0)
+    none = Edges(no_edge, no_edge.astype(bool), nowhere, nowhere, np.empty((0, 2)))
+    road = read_road(frames.road)
+    views = Views(none, tracks, Markings(road), Optics(robot, rows, columns), 0.0, 0.0, road.paint.tape_m)
     return _draw(frames, views, numbers, own)
 
 
@@ -174,16 +179,6 @@ def frames_of(log: Log) -> Frames:
     if log.frames is None:
         raise LogError(f"{log.name}: has no frames to predict; add [camera] to log.toml, or leave --frames out")
     return log.frames
-
-
-def _views(log: Log, frames: Frames, robot: Robot) -> tuple[Views, NDArray[np.intp]]:
-    """Poses and optics for drawing, without edges, and the numbers of the frames whose pose is known."""
-    tracks, numbers = track_frames(log, frames)
-    rows, columns = read_pictures(frames, numbers[:1].tolist()).shape[1:3]
-    no_edge, nowhere = np.empty(0, dtype=np.intp), np.empty(0)
-    none = Edges(no_edge, no_edge.astype(bool), nowhere, nowhere, np.empty((0, 2)))
-    road = read_road(frames.road)
-    return Views(none, tracks, Markings(road), Optics(robot, rows, columns), 0.0, 0.0, road.paint.tape_m), numbers
 
 
 def _draw(frames: Frames, views: Views, numbers: NDArray[np.intp], theta: Theta) -> Iterator[PredictedPictures]:

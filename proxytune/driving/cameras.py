@@ -143,11 +143,6 @@ def _blur_octaves(figures: CameraFigures, floor: Floor) -> NDArray[np.int64]:
     return octaves
 
 
-def _ticks(context: FilterContext) -> int:
-    """How many there are from one picture to the next."""
-    return round(context.rate_hz / context.nominal["camera_rate"])
-
-
 class _Exposed:
     """Film on which a picture is a weighted mean of what the camera saw at the last ticks, which is all that blur does.
 
@@ -256,7 +251,7 @@ class Views:
         else:
             self._film = _Averaged(camera, weights, contexts, level)
         self._memories = [self._alone.begin(one) for one in developed]
-        self._every = _ticks(contexts[0])
+        self._every = round(contexts[0].rate_hz / contexts[0].nominal["camera_rate"])  # ticks from picture to picture
         self._under_way = list(range(len(contexts)))
         self._waiting, self._unseen = rests[:, None], 0
         self._shown: NDArray[np.uint8] | None = None

@@ -154,7 +154,11 @@ def taken_along(gear: Signal, half: Signal) -> Signal:
 
     Clips of clips are clips: bounds are composed within √time blocks side by side, then the blocks follow each other.
     """
-    blocks = _blocks(gear)
+    size = math.isqrt(gear.shape[-2])
+    # Blocks side by side (time in block, …, block, 2), the last value held to fill up
+    filled = np.concatenate((gear, np.repeat(gear[..., -1:, :], -gear.shape[-2] % size, axis=-2)), axis=-2)
+    cut = filled.reshape(*gear.shape[:-2], -1, size, gear.shape[-1])
+    blocks = np.ascontiguousarray(np.moveaxis(cut, -2, 0))
     low, high = blocks - half, blocks + half
     for inside in range(1, len(blocks)):
         bounds = low[inside], high[inside]
@@ -169,15 +173,6 @@ def taken_along(gear: Signal, half: Signal) -> Signal:
 def _within(angle: Signal, low: Signal, high: Signal) -> Signal:
     """The same as numpy's clip, in less time."""
     return np.asarray(np.minimum(np.maximum(angle, low), high))
-
-
-def _blocks(angles: Signal) -> Signal:
-    """Angles (…, time, 2) cut into blocks side by side (time in block, …, block, 2), the last value held to fill up."""
-    size = math.isqrt(angles.shape[-2])
-    rest = np.repeat(angles[..., -1:, :], -angles.shape[-2] % size, axis=-2)
-    filled = np.concatenate((angles, rest), axis=-2)
-    cut = filled.reshape(*angles.shape[:-2], -1, size, angles.shape[-1])
-    return np.ascontiguousarray(np.moveaxis(cut, -2, 0))
 
 
 class RippleState(NamedTuple):

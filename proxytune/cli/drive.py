@@ -21,7 +21,9 @@ def run(arguments: argparse.Namespace) -> Answer:
     family = study.load_family(settings, settings.proxy)
     _check(arguments, family)
     model, option = (arguments.against, "--against") if arguments.against else (settings.truth, "truth")
-    target = study.load_target(settings, family, model, option) if model else None
+    if model:
+        study.check_robot(family, model, option)
+    target = study.load_family(settings, model) if model else None
     theta, origin = choose_theta(arguments.theta, settings, family, "--theta")
     seed = settings.seed if arguments.seed is None else arguments.seed
     study.check_episode(family, arguments.agent, theta, arguments.start)

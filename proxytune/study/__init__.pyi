@@ -83,7 +83,6 @@ from .single_episode import (
     check_episode as check_episode,
     check_robot as check_robot,
     drive_side_by_side as drive_side_by_side,
-    load_target as load_target,
     record_episode as record_episode,
 )
 from .study_run import (

@@ -50,10 +50,15 @@ def find_apart(
     return {agent: why[agent] for agent in agents if why[agent]}
 
 
+def centre_of(settings: StudySettings) -> dict[str, float]:
+    """The domain instance in the centre of the box."""
+    return {box.name: 0.5 * (box.low + box.high) for box in settings.space.intervals}
+
+
 def _episode(settings: StudySettings, agent: str, turn: int) -> Episode:
     start = turn % settings.starts
-    theta = {box.name: 0.5 * (box.low + box.high) for box in settings.space.intervals}
-    return make_episode(theta, agent=agent, start=start, seed=preflight_seed(settings.seed, start, turn))
+    seed = preflight_seed(settings.seed, start, turn)
+    return make_episode(centre_of(settings), agent=agent, start=start, seed=seed)
 
 
 def _why_apart(family: DomainFamily, needed: Collection[str], pair: Fleet) -> tuple[str, str]:

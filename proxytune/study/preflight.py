@@ -20,11 +20,11 @@ a pre-flight, there is the spread between episodes only, which is far larger: st
 """
 
 import functools
+import itertools
 import re
 import warnings
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from math import ceil
 from typing import NamedTuple
 
@@ -38,7 +38,7 @@ from proxytune.running import Fleet, Rescue, run_fleet, working
 from proxytune.seeds import preflight_noise_seed, preflight_seed
 from proxytune.space import Interval, Theta
 from proxytune.storage import Store
-from proxytune.study.apart import users_agents
+from proxytune.study.apart import centre_of, users_agents
 from proxytune.study.opening import Study
 from proxytune.study.settings import StudySettings
 from proxytune.study.study_run import StudyRun, needed_metrics
@@ -219,7 +219,7 @@ def run_preflight(run: StudyRun) -> Preflight | None:
     """
     if run.finished_trials():
         return None
-    learnt = _preflight(run, partial(_simulate, run))
+    learnt = _preflight(run, functools.partial(_simulate, run))
     if learnt is None or learnt.failure:
         return learnt
     first = _places(run.settings, 0)[0]
@@ -260,7 +260,7 @@ def _preflight(run: StudyRun, simulate: Callable[[int, Sequence[Episode]], None]
     moved = tuple(movements[name] for name in settings.space.names)
     failures = [outcome.failure for outcome in driven.values() if outcome.metrics is None]
     failure = failures[0] if failures and len(failures) == len(driven) else ""
-    return Preflight(_base(settings), moved, len(driven), failure, not_repeatable(run.store))
+    return Preflight(centre_of(settings), moved, len(driven), failure, not_repeatable(run.store))
 
 
 def placement_pairs(run: StudyRun) -> Floats:
@@ -269,12 +269,12 @@ def placement_pairs(run: StudyRun) -> Floats:
     NaN where an episode failed or was not driven; no places where there is no pre-flight.
     """
     study, settings, names = run.study, run.settings, run.study.target.metrics
-    known = run.store.outcomes(study.identity, _base(settings)) if settings.preflight else {}
+    known = run.store.outcomes(study.identity, centre_of(settings)) if settings.preflight else {}
     found = np.full((len(_places(settings, LOOKS - 1)), 2, *study.target.means.shape), np.nan)
     for row, place in enumerate(_places(settings, LOOKS - 1)):
         for column, agent in enumerate(settings.agents):
-            both = (_episode(settings, _base(settings), agent, place), _base_again(settings, agent, place))
-            for side, episode in enumerate(both):
+            again, base = _group(settings, agent, place, ())
+            for side, episode in enumerate((base, again)):
                 metrics = known[episode].metrics if episode in known else None
                 if metrics is not None:
                     found[row, side, column] = [metrics.get(name, np.nan) for name in names]
@@ -298,46 +298,32 @@ def _places(settings: StudySettings, look: int) -> list[Place]:
     return [Place(k % settings.starts, k // settings.starts) for k in range(half * (look + 1))]
 
 
-def _base(settings: StudySettings) -> dict[str, float]:
-    return {i.name: 0.5 * (i.low + i.high) for i in settings.space.intervals}
-
-
 def _plan(settings: StudySettings, places: Sequence[Place], undecided: Sequence[Interval]) -> list[Episode]:
-    """Place by place: the base, the base under another seed, the ends of the undecided; nothing if there are none."""
-    if not undecided:
-        return []
-    base = _base(settings)
-    instances = [base, *({**base, i.name: end} for i in undecided for end in (i.low, i.high))]
-    return [
-        episode
-        for place in places
-        for agent in settings.agents
-        for episode in (
-            _base_again(settings, agent, place),
-            *(_episode(settings, theta, agent, place) for theta in instances),
-        )
-    ]
+    """Place by place, and agent by agent, the groups of the undecided parameters; nothing if there are none."""
+    pairs = itertools.product(places if undecided else (), settings.agents)
+    return [episode for place, agent in pairs for episode in _group(settings, agent, place, undecided)]
+
+
+def _group(settings: StudySettings, agent: str, place: Place, moved: Sequence[Interval]) -> list[Episode]:
+    """The base with a new seed, to measure the noise, the base, and each parameter that is moved at its two ends.
+
+    The new seed is the agent's own: agents that shared it would share one draw of the noise.
+    """
+    base = centre_of(settings)
+    seed = preflight_noise_seed(settings.seed, *place, sorted(settings.agents).index(agent))
+    again = make_episode(base, agent=agent, start=place.start, seed=seed)
+    instances = [base, *({**base, i.name: end} for i in moved for end in (i.low, i.high))]
+    return [again, *(_episode(settings, one, agent, place) for one in instances)]
 
 
 def _episode(settings: StudySettings, theta: Theta, agent: str, place: Place) -> Episode:
     return make_episode(theta, agent=agent, start=place.start, seed=preflight_seed(settings.seed, *place))
 
 
-def _base_again(settings: StudySettings, agent: str, place: Place) -> Episode:
-    """The base with a new seed, to measure the noise: agents that shared it would share one draw of it."""
-    seed = preflight_noise_seed(settings.seed, *place, sorted(settings.agents).index(agent))
-    return make_episode(_base(settings), agent=agent, start=place.start, seed=seed)
-
-
 def _movement(study: Study, look: int, interval: Interval, known: Mapping[Episode, Outcome]) -> Movement:
     settings = study.settings
-    base = _base(settings)
-    instances = [base, *({**base, interval.name: end} for end in (interval.low, interval.high))]
-    driven = [
-        [known[_base_again(settings, agent, place)], *(known[_episode(settings, t, agent, place)] for t in instances)]
-        for place in _places(settings, look)
-        for agent in settings.agents
-    ]
+    pairs = itertools.product(_places(settings, look), settings.agents)
+    driven = [[known[one] for one in _group(settings, agent, place, [interval])] for place, agent in pairs]
     whole = [group for group in driven if all(outcome.metrics is not None for outcome in group)]
     names = [metric.name for metric in settings.metrics]
     values = np.array([[[(o.metrics or {})[name] for name in names] for o in group] for group in whole])

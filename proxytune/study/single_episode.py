@@ -15,8 +15,6 @@ from proxytune.extensions import describe
 from proxytune.running import run_episode
 from proxytune.settings import read_settings
 from proxytune.space import Theta
-from proxytune.study.family import load_family
-from proxytune.study.settings import StudySettings
 from proxytune.study.study_run import failure_of
 
 Columns = Mapping[str, NDArray[np.float64]]
@@ -189,16 +187,6 @@ def drive_side_by_side(
     there = None if target is None else record_episode(target, replace(episode, theta=()), filmed=filmed)
     here = record_episode(proxy, episode, filmed=filmed)
     return SideBySide(episode, proxy.metrics, unit, road, here, there)
-
-
-def load_target(settings: StudySettings, proxy: DomainFamily, model: Path, option: str) -> DomainFamily:
-    """The study's domain as a model.toml describes it, which the option named.
-
-    Raises:
-        InputError: If there is no such model, or it is of another robot.
-    """
-    check_robot(proxy, model, option)
-    return load_family(settings, model)
 
 
 def check_robot(family: DomainFamily, model: Path, option: str) -> None:

@@ -145,79 +145,33 @@ def _held_as(name: str) -> Callable[[Assessment], Mapping[str, Measured]]:
 
 
 PRPV = Measure(
-    key="prpv",
-    name="PRPV",
-    title="proxy relative predictivity value",
-    better="lower",
-    meaning="0 (same order)",
-    digits=".0f",
-    unit="ordered pairs",
-    in_paper=True,
-    on_means=prpv_of_means,
-    read=_prpv,
-)
+    "prpv", "PRPV", "proxy relative predictivity value", "lower", "0 (same order)", ".0f", "ordered pairs",
+    in_paper=True, on_means=prpv_of_means, read=_prpv,
+)  # fmt: skip
 PPV = Measure(
-    key="ppv",
-    name="PPV",
-    title="proxy predictivity value",
-    better="lower",
-    meaning="weighted error of an agent's scores, from 0",
-    digits=".3g",
-    in_paper=True,
-    on_means=_ppv_of_means,
-    read=_held_as("ppv"),
-)
+    "ppv", "PPV", "proxy predictivity value", "lower", "weighted error of an agent's scores, from 0", ".3g",
+    in_paper=True, on_means=_ppv_of_means, read=_held_as("ppv"),
+)  # fmt: skip
 SRCC = Measure(
-    key="srcc",
-    name="SRCC",
-    title="sim-to-real correlation coefficient",
-    better="higher",
-    meaning="Pearson, −1 to 1",
-    digits=".2f",
-    per_metric=True,
-    in_paper=True,
-    read=_held_as("srcc"),
-)
+    "srcc", "SRCC", "sim-to-real correlation coefficient", "higher", "Pearson, −1 to 1", ".2f",
+    per_metric=True, in_paper=True, read=_held_as("srcc"),
+)  # fmt: skip
 KENDALL_TAU = Measure(
-    key="kendall_tau",
-    name="Kendall τ",
-    title="Kendall's rank correlation, τ-b",
-    better="higher",
-    meaning="−1 to 1",
-    digits=".2f",
-    per_metric=True,
-    read=_held_as("kendall_tau"),
-)
+    "kendall_tau", "Kendall τ", "Kendall's rank correlation, τ-b", "higher", "−1 to 1", ".2f",
+    per_metric=True, read=_held_as("kendall_tau"),
+)  # fmt: skip
 MMRV = Measure(
-    key="mmrv",
-    name="MMRV",
-    title="mean maximum rank violation",
-    better="lower",
-    meaning="in the metric's unit, from 0",
-    digits=".3g",
-    per_metric=True,
-    read=_held_as("mmrv"),
-)
+    "mmrv", "MMRV", "mean maximum rank violation", "lower", "in the metric's unit, from 0", ".3g",
+    per_metric=True, read=_held_as("mmrv"),
+)  # fmt: skip
 POD_POSE = Measure(
-    key="pod_pose",
-    name="POD pose",
-    title="proxy observation discrepancy of poses",
-    better="lower",
-    meaning="mean distance under the same commands, from 0",
-    digits=".3g",
-    unit="m",
-    in_paper=True,
-)
+    "pod_pose", "POD pose", "proxy observation discrepancy of poses", "lower",
+    "mean distance under the same commands, from 0", ".3g", "m", in_paper=True,
+)  # fmt: skip
 POD_IMAGE = Measure(
-    key="pod_image",
-    name="POD image",
-    title="proxy observation discrepancy of images",
-    better="lower",
-    meaning="mean difference under the same commands, 0 to 1",
-    digits=".3g",
-    unit="of full scale",
-    in_paper=True,
-)
+    "pod_image", "POD image", "proxy observation discrepancy of images", "lower",
+    "mean difference under the same commands, 0 to 1", ".3g", "of full scale", in_paper=True,
+)  # fmt: skip
 
 MEASURES: tuple[Measure, ...] = (
     PRPV,

@@ -16,7 +16,6 @@ from proxytune.study import (
     check_episode,
     drive_side_by_side,
     load_family,
-    load_target,
     read_study_settings,
     record_episode,
 )
@@ -36,7 +35,7 @@ def side_by_side(folder, theta, tmp_path):
     settings = read_study_settings(folder)
     proxy = load_family(settings, settings.proxy)
     (tmp_path / "model.toml").write_text(MODEL)
-    target = load_target(settings, proxy, tmp_path / "model.toml", "--against")
+    target = load_family(settings, tmp_path / "model.toml")
     return drive_side_by_side(proxy, target, make_episode(theta, agent="steady", start=1, seed=5))
 
 

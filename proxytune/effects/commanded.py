@@ -22,6 +22,7 @@ from proxytune.effects.features import (
     low_passes,
     newest_signs,
     play,
+    ramp,
 )
 from proxytune.space import Parameter
 
@@ -43,6 +44,7 @@ class Commands(NamedTuple):
         turned: Since each last took the other sign [s].
         dragged: Each through plays of some widths (…, time, 2, widths).
         slow: Low-passes of each (…, time, 2, time constants).
+        ramped: Each where its size grows and shrinks no faster than in such times (…, time, 2, pairs of times).
     """
 
     duty: Signal
@@ -51,6 +53,7 @@ class Commands(NamedTuple):
     turned: Signal
     dragged: Signal
     slow: Signal
+    ramped: Signal
 
 
 class CommandState(NamedTuple):
@@ -63,6 +66,7 @@ class CommandState(NamedTuple):
     turned: Signal
     dragged: Signal
     slow: Signal
+    ramped: Signal
     rate_hz: float
 
 
@@ -78,7 +82,7 @@ def _moving(commands: Commands) -> Signal:
 def _group(title: str, unit: str, *, of: str = "of the command", **bases: Callable[[Commands, Knots], Signal]) -> Group:
     """Curves that add to the duty of either wheel a share of something, or a push."""
     channels = {to: Channel("duty", "duty" if to == "push" else of, basis) for to, basis in bases.items()}
-    return Group(title, unit, channels, 1e-3)
+    return Group(title, unit, channels, 0.0 if "," in unit else 1e-3)
 
 
 COMMAND_GROUPS: Mapping[str, Group] = MappingProxyType(
@@ -106,6 +110,12 @@ COMMAND_GROUPS: Mapping[str, Group] = MappingProxyType(
         "dragged": _group(
             "way in which a command changes", "duty", of="of the play", duty=lambda c, k: c.dragged - c.duty[..., None]
         ),
+        "ramped": _group(
+            "how fast a command grows and shrinks",
+            "s, s",
+            of="of how far it is behind",
+            duty=lambda c, k: c.ramped - c.duty[..., None],
+        ),
         "ended": _group(
             "time since a command ended", "s", duty=lambda c, k: c.slow * (np.abs(c.duty) < STILL)[..., None]
         ),
@@ -130,8 +140,10 @@ class LearntCommands:
         """The resting command has been given for ever."""
         rest = np.asarray(context.rest, dtype=float)
         long, begun = np.full(rest.shape, LONG_S), np.where(np.abs(rest) < STILL, 0.0, LONG_S)
-        dragged, slow = (np.repeat(rest[..., None], len(self._knots(name)), axis=-1) for name in ("dragged", "ended"))
-        return CommandState(rest, np.sign(rest), long, begun, long, dragged, slow, context.rate_hz)
+        dragged, slow, ramped = (
+            np.repeat(rest[..., None], len(self._knots(name)), axis=-1) for name in ("dragged", "ended", "ramped")
+        )
+        return CommandState(rest, np.sign(rest), long, begun, long, dragged, slow, ramped, context.rate_hz)
 
     def apply(self, signal: Signal, memory: CommandState) -> tuple[Signal, CommandState]:
         """Add what the curves say."""
@@ -166,6 +178,8 @@ class LearntCommands:
         turned = np.moveaxis(np.diff(course, axis=-1) * course[..., :-1] != 0.0, -1, -2)
         dragged = np.moveaxis(play(wheels, past.dragged, self._knots("dragged")), -2, -3)
         slow = np.moveaxis(low_passes(wheels, past.slow, self._knots("ended"), past.rate_hz), -2, -3)
+        fewest = np.maximum(np.reshape(self._knots("ramped"), (-1, 2)) * past.rate_hz, 1.0 / LONG_S)
+        ramped = np.moveaxis(ramp(wheels, past.ramped, *(1.0 / fewest.T)), -2, -3)
         commands = Commands(
             duty=signal,
             held=since(np.broadcast_to(changed, signal.shape), past.held),
@@ -173,6 +187,7 @@ class LearntCommands:
             turned=since(turned, past.turned),
             dragged=dragged,
             slow=slow,
+            ramped=ramped,
         )
         after = CommandState(
             duty=signal[..., -1, :],
@@ -182,6 +197,7 @@ class LearntCommands:
             turned=commands.turned[..., -1, :],
             dragged=dragged[..., -1, :, :],
             slow=slow[..., -1, :, :],
+            ramped=ramped[..., -1, :, :],
             rate_hz=past.rate_hz,
         )
         return commands, after

@@ -414,6 +414,16 @@ def play(signal: Signal, before: Signal, halves: Knots) -> Signal:
     return out
 
 
+def ramp(signal: Signal, before: Signal, grows: Signal, shrinks: Signal) -> Signal:
+    """Value that follows a signal (…, time) by at most so much a sample, as that is larger or not (…, time, limits)."""
+    out, now = np.empty((*signal.shape, len(grows))), before
+    for step in range(signal.shape[-1] if len(grows) else 0):
+        here = signal[..., step, None]
+        most = np.where(np.abs(here) > np.abs(now), grows, shrinks)
+        out[..., step, :] = now = now + np.clip(here - now, -most, most)
+    return out
+
+
 def moved_since(speed: Signal, before: Signal, rest_speed: float, rate_hz: float) -> Signal:
     """Time since a wheel last stood [s] (…, time), 0 while it does.
 

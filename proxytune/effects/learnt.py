@@ -413,8 +413,8 @@ def _check_knots(curve: LearntCurve, where: str, group: Group, problem: Callable
             raise problem(where, "must be finite")
         if not any(values):
             raise problem(where, "0 is no knot: nothing is added there; take it out")
-        if group.low is not None and values[0] < group.low:
-            raise problem(where, f"must be at least {group.low:g} {group.unit}, got {values[0]:g}")
+        if group.low is not None and min(values) < group.low:
+            raise problem(where, f"must be at least {group.low:g} {group.unit}, got {min(values):g}")
     if list(curve.knots) != sorted(set(curve.knots)):
         raise problem(where, "must be in ascending order, each once")
 

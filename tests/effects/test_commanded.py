@@ -17,6 +17,7 @@ KNOTS = {
     "turned": (0.2, 0.5),
     "dragged": (0.05, 0.2),
     "ended": (0.1, 0.4),
+    "ramped": ((0.0, 0.3), (0.6, 0.0), (0.6, 1.2)),
 }
 
 
@@ -136,6 +137,14 @@ def test_a_wheel_rolls_on_for_a_while_after_its_command_ended():
     assert not rolling[:40].any()
     assert not rolling[:, 1].any()
     np.testing.assert_allclose(rolling[50, 0] / rolling[40, 0], np.exp(-1.0), rtol=1e-9)
+
+
+def test_a_command_grows_and_shrinks_no_faster_than_its_ramp():
+    signal = np.repeat([[0.4, 0.4], [0.1, -0.3]], 12, axis=0)
+    curve = LearntCurve("ramped", "duty", ((0.5, 2.0),), (1.0,))
+    held = signal + added(curve, signal)
+    np.testing.assert_allclose(held[:5], np.outer([0.1, 0.2, 0.3, 0.4, 0.4], [1.0, 1.0]))
+    np.testing.assert_allclose(held[12:17], np.stack((0.4 - 0.025 * np.arange(1, 6), [0.375, 0.35, 0.325, 0.3, 0.2])).T)
 
 
 def test_one_sample_between_two_signs_is_no_stop():

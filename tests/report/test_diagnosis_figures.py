@@ -393,6 +393,7 @@ def test_without_a_candidate_there_is_no_ranking(diagnosis):
 
 KNOTS = {"speed_and_turn": ((-0.2, -1.0), (0.2, 1.0)), "direction": (-1.0,), "heading": (1.0, 2.0)}
 KNOTS["place"] = ((-0.25, 0.25), (0.25, -0.25), (0.25, 0.25))
+KNOTS["ramped"] = ((0.0, 0.5), (0.5, 0.0), (0.5, 0.5))
 KNOTS |= dict.fromkeys(("x", "y", "tracker_x", "tracker_y"), (-0.25, 0.25))
 
 

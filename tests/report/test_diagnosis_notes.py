@@ -202,7 +202,7 @@ ERROR = LearntError(2.0, Rmse(0.01, (0.009, 0.011)), Rmse(0.02, (0.01, 0.03)), R
 THETA = {"learnt.turn_rate.yaw@1.0": 0.1}
 SHARE = {"heading": 0.25, "turn rate": 0.75}
 USED = Learning(Discrepancy(THETA, SHARE, {2.0: RATIO}, True), (ERROR,), False)
-REFUSED = Learning(Discrepancy(THETA, SHARE, {2.0: RATIO}, False), (), True)
+REFUSED = Learning(Discrepancy(THETA, SHARE, {2.0: RATIO}, False), (), False)
 
 
 def test_the_document_has_groups_shares_and_ratios_by_horizon():
@@ -218,7 +218,6 @@ def test_what_is_refused_has_no_groups_but_its_guard_is_told():
     told = learnt_document(REFUSED)
     assert (told["used"], told["groups"], told["share"], told["ratio"]) == (False, [], {}, {})
     assert told["guard"]["2"]["value"] == 0.5
-    assert told["names_doubtful"] is True
 
 
 def test_a_note_says_what_it_is_worth_and_that_it_is_no_physics():
@@ -228,10 +227,17 @@ def test_a_note_says_what_it_is_worth_and_that_it_is_no_physics():
     assert "2 s: 10.0 mm, 0.50 (0.40 … 0.60)" in note
 
 
-def test_what_was_tried_and_left_out_is_told_and_doubtful_names_are_warned_of():
-    first, second = learnt_notes(REFUSED)
-    assert "left out" in first
-    assert "names are likely wrong" in second
+def test_what_was_tried_and_left_out_is_told():
+    (note,) = learnt_notes(REFUSED)
+    assert "left out" in note
+
+
+def test_doubtful_names_are_warned_of_and_values_that_moved_with_the_curves_are_told():
+    moved = replace(USED, discrepancy=replace(USED.discrepancy, theta={**THETA, "delay": 0.1}), names_doubtful=True)
+    _, own, warning = learnt_notes(moved)
+    assert own == "fitted along with the curves: delay 0.1"
+    assert "names are likely wrong" in warning
+    assert learnt_document(moved)["names_doubtful"] is True
 
 
 def test_nothing_is_said_where_nothing_was_found():

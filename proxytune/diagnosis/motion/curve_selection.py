@@ -5,7 +5,7 @@ weights of the groups that pay. Nothing is replayed here: leaving a part out is 
 """
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,8 +18,10 @@ RIDGES = (1e-3, 1e-2, 1e-1, 1.0)
 """Pulls towards no curve that are tried, as shares of what an average weight of the group is held by."""
 FIRMEST_ONLY = {"speed_and_turn": 0.1, PLACE: 0.01}
 """Curves over two signals are never pulled less than this: most of their knots are seldom visited."""
-FREE = 1e-6
-"""The level is hardly pulled."""
+FREE, MODEL_PULL = 1e-6, 1e-2
+"""The level is hardly pulled; the model's own values are, so that the level takes what both could."""
+MODEL = "model"
+"""The columns of the model's own values, which move along with the curves: a curve takes back no delay."""
 ROBUST = 1.5
 """Errors beyond so many medians count less and less."""
 
@@ -58,7 +60,7 @@ def sum_squares(slopes: Slopes, weights: Floats, part: Whole, parts: int) -> Sum
 
 
 def choose_groups(given: Sums, groups: Mapping[str, slice], rules: Rules, *, rare: bool = False) -> ChosenGroups:
-    """Add groups one by one, the best first, while they pay on parts left out; the level is always there.
+    """Add groups one by one, the best first, while they pay on parts left out; level and model are always there.
 
     A group pays if it surely makes the errors of most parts less; one of rare moments, if it takes much of all error.
     """
@@ -72,11 +74,12 @@ def choose_groups(given: Sums, groups: Mapping[str, slice], rules: Rules, *, rar
         much = rare and after.sum() < (1.0 - rules.rare_group_share) * before.sum()
         return bool((sure or much) and after.sum() < (1.0 - rules.group_share) * before.sum())
 
-    pulls = {name: FREE * unit[name] + 1e-9 for name in groups if name == LEVEL}
+    always = {LEVEL: FREE * unit.get(LEVEL, 0.0), MODEL: MODEL_PULL * mean[groups.get(MODEL, slice(0))]}
+    pulls: dict[str, Any] = {name: pull + 1e-9 for name, pull in always.items() if name in groups}
     gains: dict[str, float] = {}
     held = _hold(given, groups, pulls)
     (losses,) = _held_out_losses(given, held, slice(0), np.zeros(1))
-    level = {LEVEL: float((given.size - losses).sum())} if pulls and pays(given.size, losses) else {}
+    level = {LEVEL: float((given.size - losses).sum())} if LEVEL in pulls and pays(given.size, losses) else {}
     while True:
         tried = {name: _try_group(given, held, groups[name], name, unit[name]) for name in groups if name not in pulls}
         paying = {name: found for name, found in tried.items() if pays(losses, found[1])}
@@ -102,8 +105,8 @@ class _Held(NamedTuple):
     answer: Floats
 
 
-def _hold(given: Sums, groups: Mapping[str, slice], pulls: Mapping[str, float]) -> _Held:
-    """Hold the groups that have a pull: they are solved for once, for all that may come beside them."""
+def _hold(given: Sums, groups: Mapping[str, slice], pulls: Mapping[str, Any]) -> _Held:
+    """Hold the groups that have a pull, or one for each column: they are solved for once, for all that may come."""
     pulled = np.zeros(given.gradient.shape[1])
     for name, pull in pulls.items():
         pulled[groups[name]] = pull

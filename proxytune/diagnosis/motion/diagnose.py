@@ -183,7 +183,7 @@ def horizon_error(
 ) -> HorizonError | None:
     """Measure the error at a horizon, None where too few blocks have a window of it.
 
-    What the extended model was `learnt` besides its names may lower what was reached; `how` is a plant's poses.
+    The model that was `learnt`, where there is one, may lower what was reached; `how` is a plant's poses.
     """
     drives, rules = tested.drives, tested.drives.rules
     windows = cut(drives, horizon_s)
@@ -196,7 +196,7 @@ def horizon_error(
     lower, turn = noise_floor(drives, windows, tested.noise)
     besides = [one.beside.theta for one in found.negligible]
     if learnt:
-        besides.append({**found.model.theta, **learnt})
+        besides.append(learnt)
     others = [pose_errors(drives, theta, windows) ** 2 for theta in besides]
     reached = min(float(np.sqrt(squares[:, 0].mean())) for squares in (before, after, *others))
     return HorizonError(
@@ -368,7 +368,7 @@ def diagnose(
     learning = keep("learnt", lambda: learn(found, parts.tested, HORIZONS_S))
     report("testing on drives kept aside")
     tested = KeptAside(parts.tested, whole, pose_noise(parts.tested, found.model.theta))
-    told = [keep(f"error_{h:g}", lambda h=h: horizon_error(found, tested, h, learning.theta)) for h in HORIZONS_S]  # type: ignore[misc]
+    told = [keep(f"error_{h:g}", lambda h=h: horizon_error(found, tested, h, learning.model)) for h in HORIZONS_S]  # type: ignore[misc]
     errors = tuple(error for error in told if error is not None)
     if not errors:
         raise LogError(f"{log.name}: no second of unbroken poses to test on; record longer drives")

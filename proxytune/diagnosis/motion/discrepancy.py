@@ -2,7 +2,8 @@
 
     e = Σ_k w_k φ_k(twists) + noise,    w = (Σ φᵀφ + Λ)⁻¹ Σ φᵀe,
 
-with e the errors of poses over windows, linearised in the weights w of curves φ. `offer_curves` lays knots where the
+with e the errors of poses over windows, linearised in the weights w of curves φ; the model's own values move along,
+since a curve can add latency but not take away what was fitted without it. `offer_curves` lays knots where the
 drives have been; `curve_selection.choose_groups` adds groups of curves by forward selection with a ridge Λ of one
 scale a group, on parts that are left out; `fit_discrepancy` guards the whole by held-out windows (after Kennedy and
 O'Hagan's model discrepancy). `match_named_effect` reads what was learnt back into a name, and `learn` tells what the
@@ -18,10 +19,10 @@ import numpy as np
 from scipy.optimize import minimize
 
 from proxytune.diagnosis.answer import Rules
-from proxytune.diagnosis.motion.curve_selection import ChosenGroups, choose_groups, sum_squares
+from proxytune.diagnosis.motion.curve_selection import MODEL, ChosenGroups, choose_groups, sum_squares
 from proxytune.diagnosis.motion.drives import Drives, Floats
 from proxytune.diagnosis.motion.evidence import Findings
-from proxytune.diagnosis.motion.innovations import LearntMotion, spans, theta_at, twists_of
+from proxytune.diagnosis.motion.innovations import Coordinate, smooth_coordinates, spans, theta_at, twists_of
 from proxytune.diagnosis.motion.multistep_fit import HORIZONS_S
 from proxytune.diagnosis.motion.prediction import (
     FITTED_S,
@@ -32,7 +33,6 @@ from proxytune.diagnosis.motion.prediction import (
     cut,
     pose_errors,
     ratio,
-    replay_commands,
     rmse,
     select_windows,
     slopes_of,
@@ -85,7 +85,9 @@ HELD_S = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0)
 SINCE_S = (0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 0.8, 1.2)
 DRAGS = (0.02, 0.05, 0.1, 0.2)
 ENDED_S = (0.1, 0.25, 0.63, 1.6)
-"""Of commands: how long they are held, since they began or turned round, half widths of plays, time constants."""
+RAMPS_S = (0.0, 0.1, 0.18, 0.32, 0.56, 1.0, 1.8)
+"""Of commands: how long they are held, since they began or turned round, half widths of plays, time constants, and how
+long growing from 0 to 1 and shrinking back takes."""
 APART = 0.02
 """Knots nearer to each other or to 0 than this share of the range are one."""
 
@@ -131,6 +133,7 @@ def offer_curves(drives: Drives, theta: Theta) -> Learnt:
             "turned": SINCE_S,
             "dragged": DRAGS,
             "ended": ENDED_S,
+            "ramped": tuple(product(RAMPS_S, RAMPS_S))[1:],
         }
     if not _in_frames_of_their_own(drives):
         places = drives.places[used]
@@ -201,8 +204,11 @@ PARTS = 16
 """No more parts are left out in turn."""
 FOLDS = 4
 """The whole fit, choice of groups included, is repeated so often for the guard, each time without one fold."""
-ROUNDS, PATIENT_ROUNDS = 2, 4
-"""It is linearised and its weights are made robust so often; oftener where that came to nothing."""
+ROUNDS, SETTLED = 8, 0.99
+"""It is linearised and its weights are made robust so often, or until two times leave more than this share of the
+error."""
+FARTHEST = 0.15
+"""In a round the model's own values move by no more than this share of their range."""
 
 
 @dataclass(frozen=True)
@@ -210,7 +216,8 @@ class Discrepancy:
     """The discrepancy of a model, as curves were fitted to it.
 
     Attributes:
-        theta: Its values by their names in θ, empty where no group pays.
+        theta: Its values by their names in θ, with those of the model's own that moved along; empty where no group
+            pays.
         share: The share of each chosen group, by its title, in what is gained on blocks that are left out.
         guard: By horizon, the error with it over that without, each block predicted by a fit to others.
         used: Whether the guard lets it in.
@@ -224,8 +231,13 @@ class Discrepancy:
     held_out: Floats = field(default_factory=lambda: np.empty(0))
 
 
-def fit_discrepancy(drives: Drives, theta: Theta, promises: Callable[[Floats], bool] = lambda _: True) -> Discrepancy:
-    """Fit the discrepancy of a model over windows, and say whether that helps.
+def fit_discrepancy(
+    drives: Drives,
+    theta: Theta,
+    free: Sequence[Coordinate] = (),
+    promises: Callable[[Floats], bool] = lambda _: True,
+) -> Discrepancy:
+    """Fit the discrepancy of a model over windows, and say whether that helps; its free coordinates move along.
 
     Curves whose held-out squares (M,) promise nothing to who asks are not guarded and not used.
     """
@@ -234,13 +246,12 @@ def fit_discrepancy(drives: Drives, theta: Theta, promises: Callable[[Floats], b
     before = pose_errors(drives, theta, windows)[:, 0] ** 2 if blocks else np.empty(0)
     if blocks < drives.rules.discrepancy_blocks:
         return Discrepancy(held_out=before)
-    offer = offer_curves(drives, theta)
-    replayed = replay_commands(drives, theta, offer)
+    offer, moving = offer_curves(drives, theta), smooth_coordinates(free, drives.robot)
 
-    def fitted(left_out: Iterable[str] = (), *, patient: bool = False) -> Discrepancy:
+    def fitted(left_out: Iterable[str] = (), *, moves: bool = True, patient: bool = False) -> Discrepancy:
         curves = tuple(curve for curve in offer.curves if curve.group not in left_out)
-        commanded = replayed if any(curve.group in COMMAND_GROUPS for curve in curves) else ()
-        learnt, gains, folds = _fit_curves(drives, theta, replace(offer, curves=curves), commanded, patient)
+        own = moving if moves else ()
+        learnt, gains, folds = _fit_curves(drives, theta, replace(offer, curves=curves), own, patient)
         if not gains:
             return Discrepancy(held_out=before)
         after = _cross_validate(drives, theta, folds, windows)
@@ -255,6 +266,8 @@ def fit_discrepancy(drives: Drives, theta: Theta, promises: Callable[[Floats], b
     # Maps have the most weights by far: where the guard refuses curves with them, they are fitted without.
     if not found.used and _has(found, OF_PLACE):
         found = fitted(OF_PLACE)
+    if found.guard and not found.used and moving:
+        found = fitted(moves=False)
     # What was learnt and promises nothing to who asks is not tried again.
     if (found.guard and not found.used) or found.held_out is before:
         found = fitted(patient=True)
@@ -272,36 +285,47 @@ def _has(found: Discrepancy, groups: Iterable[str]) -> bool:
 
 
 def _fit_curves(
-    drives: Drives, theta: Theta, offer: Learnt, commanded: Sequence[LearntMotion], patient: bool
+    drives: Drives, theta: Theta, offer: Learnt, moving: Sequence[Coordinate], patient: bool
 ) -> tuple[Theta, Mapping[str, float], Sequence[Theta]]:
     """Fit the curves to all parts, with what each group gained, and without each fold in turn; by names in θ.
 
-    Curves over commands were replayed before; a patient fit takes more rounds, and looks for what matters in few parts.
+    The moving coordinates of the model are fitted along. A patient fit looks for what matters in few parts.
     """
     parts = _parts(drives)
-    names = [curve.group for curve in offer.curves for _ in curve.knots]
+    names = [curve.group for curve in offer.curves for _ in curve.knots] + [MODEL] * len(moving)
     groups = {name: slice(names.index(name), names.index(name) + names.count(name)) for name in dict.fromkeys(names)}
-    weights = np.zeros(len(names))
-    now: Mapping[str, float] = {}
-    for _ in range(PATIENT_ROUNDS if patient else ROUNDS):
-        slopes = slopes_of(drives, {**theta, **now}, offer, commanded)
+    weights, own, (low, high) = np.zeros(len(names)), groups.get(MODEL, slice(0)), spans(moving, drives)
+    now, left = dict[str, float](), list[float]()
+
+    def stepped(chosen: ChosenGroups) -> dict[str, float]:
+        """The chosen curves, and the moving coordinates a step further."""
+        if not chosen.gains:
+            return {}
+        here = np.array([{**theta, **now}[coordinate[0]] for coordinate in moving])
+        step = np.clip(chosen.weights[own], -FARTHEST, FARTHEST) * (high - low)
+        return {**theta_at({}, moving, np.clip(here + step, low, high)), **_theta(offer, chosen)}
+
+    for number in range(ROUNDS):
+        slopes = slopes_of(drives, {**theta, **now}, offer, moving)
+        weights[own] = 0.0
         given = sum_squares(slopes, weights, slopes.block % parts, parts)
         chosen = choose_groups(given, groups, drives.rules, rare=patient)
-        weights, now = chosen.weights, _theta(offer, chosen)
         if not chosen.gains:
+            return {}, {}, ()
+        left.append(float(np.linalg.norm(slopes.residuals, axis=1).mean()))
+        if number == ROUNDS - 1 or min(left[-2:]) > SETTLED * min(left[:-2], default=np.inf):
             break
-    number = np.arange(parts) % FOLDS
-    without = [given.only(np.flatnonzero(number != fold)) for fold in range(FOLDS)] if now else []
-    folds = [_theta(offer, choose_groups(some, groups, drives.rules, rare=patient)) for some in without]
-    return now, chosen.gains, folds
+        weights, now = chosen.weights, stepped(chosen)
+    fold = np.arange(parts) % FOLDS
+    without = [given.only(np.flatnonzero(fold != one)) for one in range(FOLDS)]
+    folds = [stepped(choose_groups(some, groups, drives.rules, rare=patient)) for some in without]
+    return stepped(chosen), chosen.gains, folds
 
 
 def _theta(offer: Learnt, choice: ChosenGroups) -> dict[str, float]:
     """The chosen groups with their weights, by their names in θ."""
-    if not choice.gains:
-        return {}
-    ends = np.cumsum([len(curve.knots) for curve in offer.curves])[:-1]
-    parts = zip(offer.curves, np.split(choice.weights, ends), strict=True)
+    ends = np.cumsum([len(curve.knots) for curve in offer.curves])
+    parts = zip(offer.curves, np.split(choice.weights, ends)[:-1], strict=True)
     curves = tuple(
         curve._replace(weights=tuple(weights.tolist()))
         for curve, weights in parts
@@ -426,14 +450,17 @@ class Learning:
     Attributes:
         discrepancy: The curves, beside all named effects.
         errors: What they are worth, by horizon, shortest first; empty where they are not used.
-        names_doubtful: Whether curves beside what is declared alone predict clearly better: then the names are wrong.
+        names_doubtful: Whether curves beside what is declared alone predict clearly better: then the names are wrong,
+            and the curves are these.
         looks_like: The named effect that would do nearly as well as the curves, or None.
+        model: All values of the model with the curves, by name in θ; empty where they are not used.
     """
 
     discrepancy: Discrepancy
     errors: tuple[LearntError, ...]
     names_doubtful: bool
     looks_like: MatchedEffect | None = None
+    model: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def theta(self) -> Mapping[str, float]:
@@ -448,28 +475,32 @@ class Learning:
 
 def learn(found: Findings, tested: Drives, horizons_s: Iterable[float]) -> Learning:
     """Learn what the named effects leave over, and test it over windows of these lengths."""
-    beside = fit_discrepancy(found.model.drives, found.model.theta)
-    errors = [_error(found, beside, tested, horizon_s) for horizon_s in horizons_s] if beside.used else []
-    known = tuple(error for error in errors if error is not None)
-    taken = {effect_of(name) for name in found.model.theta}
-    like = match_named_effect(found.model.drives, found.model.theta, beside, taken) if beside.used else None
-    return Learning(beside, known, _names_are_doubtful(found, beside), like)
+    names = found.model
+    curves = fit_discrepancy(names.drives, names.theta, names.free)
+    alone = _beside_declared(found, curves)
+    base, curves = (found.declared, alone) if alone else (names, curves)
+    if not curves.used:
+        return Learning(curves, (), False)
+    model = {**base.theta, **curves.theta}
+    errors = (_error(names.theta, model, tested, horizon_s) for horizon_s in horizons_s)
+    like = match_named_effect(base.drives, base.theta, curves, {effect_of(name) for name in names.theta})
+    return Learning(curves, tuple(error for error in errors if error), alone is not None, like, model)
 
 
-def _error(found: Findings, beside: Discrepancy, drives: Drives, horizon_s: float) -> LearntError | None:
+def _error(names: Theta, model: Theta, drives: Drives, horizon_s: float) -> LearntError | None:
     windows = cut(drives, horizon_s)
     blocks = blocks_of(drives, windows)
     if len(np.unique(blocks)) < 2:
         return None
-    names = pose_errors(drives, found.model.theta, windows) ** 2
-    both = pose_errors(drives, {**found.model.theta, **beside.theta}, windows) ** 2
-    compared = ratio(both[:, 0], names[:, 0], blocks, drives.rules.ratio_p_value)
-    return LearntError(horizon_s, rmse(both[:, 0], blocks), rmse(both[:, 1], blocks), compared)
+    before, after = (pose_errors(drives, theta, windows) ** 2 for theta in (names, model))
+    compared = ratio(after[:, 0], before[:, 0], blocks, drives.rules.ratio_p_value)
+    return LearntError(horizon_s, rmse(after[:, 0], blocks), rmse(after[:, 1], blocks), compared)
 
 
-def _names_are_doubtful(found: Findings, beside: Discrepancy) -> bool:
+def _beside_declared(found: Findings, beside: Discrepancy) -> Discrepancy | None:
+    """Curves beside what is declared alone, if there are names and these predict clearly better without them."""
     if not found.adopted or not len(beside.held_out):
-        return False
+        return None
     drives = found.model.drives
     blocks = blocks_of(drives, cut(drives, FITTED_S))
 
@@ -477,4 +508,5 @@ def _names_are_doubtful(found: Findings, beside: Discrepancy) -> bool:
         compared = ratio(alone, beside.held_out, blocks, drives.rules.ratio_p_value)
         return compared.value < drives.rules.doubtful_names and compared.below
 
-    return fit_discrepancy(drives, found.declared.theta, does_better).used
+    alone = fit_discrepancy(drives, found.declared.theta, found.declared.free, does_better)
+    return alone if alone.used else None

@@ -497,7 +497,7 @@ def span(coordinate: Coordinate, drives: Drives) -> tuple[float, float]:
 
 def spans(free: Sequence[Coordinate], drives: Drives) -> Floats:
     """Lowest and highest values that are looked for (2, coordinates)."""
-    return np.array([span(coordinate, drives) for coordinate in free]).T
+    return np.reshape([span(coordinate, drives) for coordinate in free], (-1, 2)).T
 
 
 def theta_at(theta: Theta, free: Sequence[Coordinate], values: Floats) -> dict[str, float]:

@@ -29,8 +29,11 @@ from proxytune.diagnosis.motion.drives import (
     sum_by,
 )
 from proxytune.diagnosis.motion.innovations import (
+    Coordinate,
     LearntMotion,
     integrate_twists,
+    spans,
+    theta_at,
     tracked_paths,
     window_command_features,
     window_features,
@@ -355,12 +358,14 @@ POSES = 8
 """No more poses are compared in a window."""
 MOST_WINDOWS = 600
 """No more windows are fitted, spread evenly over the drives."""
+STEP = 5e-3
+"""Slopes of the model's own values come from steps of this share of their range."""
 
 
 class Slopes(NamedTuple):
     """Windows' poses (M, 3) as they are compared, in metres: forward, left, and heading times the median way.
 
-    `columns` is the change of the prediction per weight (M, 3, weights), curve by curve.
+    `columns` is the change of the prediction per weight (M, 3, weights), curve by curve, free coordinates last.
     """
 
     residuals: Floats
@@ -379,36 +384,46 @@ def choose_windows(drives: Drives) -> Windows:
     return Windows(windows.begin, windows.window[last], windows.increment[last])
 
 
-def replay_commands(drives: Drives, theta: Theta, offered: Learnt) -> list[LearntMotion]:
-    """Motion that curves over commands add in the windows that are fitted: the same wherever these are linearised."""
-    windows = choose_windows(drives)
-    return list(window_command_features(drives, theta, offered, windows.begin, length_of(drives, windows)))
-
-
-def slopes_of(drives: Drives, theta: Theta, offered: Learnt, replayed: Sequence[LearntMotion] | None = None) -> Slopes:
+def slopes_of(
+    drives: Drives,
+    theta: Theta,
+    offered: Learnt,
+    free: Sequence[Coordinate] = (),
+) -> Slopes:
     """Linearise windows in the weights of the curves offered, around a model that may have a learnt effect itself.
 
-    Commands that are replayed already need not be again.
+    Columns of free coordinates come last, by the share of their range.
     """
     windows = choose_windows(drives)
     begin, window = windows.begin, windows.window
     tick = drives.last[windows.increment] - drives.first[begin][window]
     length = length_of(drives, windows)
     named = {name: value for name, value in theta.items() if not is_learnt(name)}
-    twists = window_twists(drives, theta, begin, length)
-    walked = tracked_paths(drives, theta, twists)
-    predicted = motion_in(drives, walked, windows)
+
+    def walk(values: Theta) -> tuple[Floats, Floats, Floats]:
+        twists = window_twists(drives, values, begin, length)
+        walked = tracked_paths(drives, values, twists)
+        return twists, walked, motion_in(drives, walked, windows)
+
+    twists, walked, predicted = walk(theta)
     measured = measured_motion(drives, windows)
     way = float(np.median(np.hypot(measured[:, 0], measured[:, 1])))
-    commanded = replay_commands(drives, named, offered) if replayed is None else replayed
-    features = chain(window_features(drives, named, offered, begin, length), commanded)
+    features = chain(
+        window_features(drives, named, offered, begin, length),
+        window_command_features(drives, named, offered, begin, length),
+    )
     changes = _pose_slopes(twists, walked, features, (window, tick - 1), 1.0 / drives.tick_hz)
     # Seen from the frame in which each window's tracked place begins.
     cosine, sine = (part[:, None] for part in cosine_and_sine(-walked[window, 0, 2]))
     x = cosine * changes[:, 0] - sine * changes[:, 1]
     y = sine * changes[:, 0] + cosine * changes[:, 1]
-    columns = np.stack((x, y, way * changes[:, 2]), axis=1)
-    return Slopes((measured - predicted) * (1.0, 1.0, way), columns, drives.block[begin[window]])
+    columns, scale = [np.stack((x, y, way * changes[:, 2]), axis=1)], (1.0, 1.0, way)
+    for coordinate, low, high in zip(free, *spans(free, drives), strict=True):
+        here = theta[coordinate[0]]
+        step = STEP * (high - low) if here + STEP * (high - low) <= high else -STEP * (high - low)
+        moved = walk(theta_at(theta, (coordinate,), np.array([here + step])))[2]
+        columns.append(((moved - predicted) * scale * ((high - low) / step))[..., None])
+    return Slopes((measured - predicted) * scale, np.concatenate(columns, axis=2), drives.block[begin[window]])
 
 
 def _pose_slopes(

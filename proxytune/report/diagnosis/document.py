@@ -23,7 +23,7 @@ from proxytune.diagnosis import (
     main_error,
 )
 from proxytune.driving import robot_names
-from proxytune.effects import Catalogue, Model, model_text
+from proxytune.effects import Catalogue, Model, is_learnt, model_text
 from proxytune.report.diagnosis.notes import decisive, may_matter, per_cent
 from proxytune.settings import GEOMETRY
 
@@ -47,9 +47,18 @@ def extended_model_text(found: LogDiagnosis) -> str:
     """The extended model of both as model.toml."""
     robot, parts = found.robot, [part for part in (found.motion, found.camera) if part is not None]
     estimates = {name: one for part in parts for name, one in part.theta.items()}
-    theta = {name: robot.catalogue.parameters[name].clipped(float(one.value)) for name, one in estimates.items()}
-    theta |= {} if found.motion is None else dict(found.motion.learning.theta)
-    bounds = {name: (float(one.interval[0]), float(one.interval[1])) for name, one in estimates.items()}
+    # Values moved along with learnt curves, which take the place of doubtful names.
+    motion = found.motion
+    learnt = motion.learning.model if motion else {}
+    gone = motion.theta.keys() - learnt.keys() if motion and learnt else set()
+    values = {name: float(learnt.get(name, one.value)) for name, one in estimates.items() if name not in gone}
+    theta = {name: robot.catalogue.parameters[name].clipped(value) for name, value in values.items()}
+    theta |= {name: value for name, value in learnt.items() if is_learnt(name)}
+    bounds = {
+        name: (float(one.interval[0]), float(one.interval[1]))
+        for name, one in estimates.items()
+        if values.get(name) == float(one.value)
+    }
     in_robots = robot.name in robot_names(robot.catalogue.folder)
     geometry = {} if in_robots else {figure: robot.figures[figure] for figure in GEOMETRY.values()}
     comments = []

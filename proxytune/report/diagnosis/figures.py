@@ -136,7 +136,11 @@ FADING = {
     "ended": "time constant",
 }
 """Groups whose weights are points, each of something that fades or ends, and what their knots are."""
-PAIRS = {"speed_and_turn": ("forward speed [m/s]", "yaw rate [rad/s]"), "place": ("x [m]", "y [m]")}
+PAIRS = {
+    "speed_and_turn": ("forward speed [m/s]", "yaw rate [rad/s]"),
+    "place": ("x [m]", "y [m]"),
+    "ramped": ("from 0 to 1 [s]", "back to 0 [s]"),
+}
 """Groups over two signals, and what their axes are called."""
 WIDEST, HIGHEST = 20, 18
 """Characters in a line below a panel, and beside it."""

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from proxytune.diagnosis import AdoptedEffect, Clocks, Diagnosis, EffectSize, Learning, Offset, Ratio, RobotClusters
-from proxytune.effects import PLACE, learnt_effect
+from proxytune.effects import PLACE, is_learnt, learnt_effect
 from proxytune.report.wording import fixed, listed, percent
 from proxytune.report.writing import fill
 from proxytune.space import Theta
@@ -279,6 +279,8 @@ def learnt_notes(learning: Learning) -> list[str]:
             for error in learning.errors
         )
         notes.append(f"learnt, not physics: curves over {curves}; position error with them at {worth}")
+        own = ", ".join(f"{name} {value:.3g}" for name, value in learning.theta.items() if not is_learnt(name))
+        notes += [f"fitted along with the curves: {own}"] if own else []
         notes += _say_map(learning.theta) + _say_commands(learning.theta)
     elif beside.theta:
         notes.append(f"curves over {curves} were tried and dropped: they do not clearly help on drives left out")
@@ -289,6 +291,6 @@ def learnt_notes(learning: Learning) -> list[str]:
     if learning.names_doubtful:
         notes.append(
             "beware: curves beside the declared model predict better than beside the named effects: the names are "
-            "likely wrong"
+            "likely wrong, and the model with curves is without them"
         )
     return notes

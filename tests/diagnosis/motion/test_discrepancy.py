@@ -18,7 +18,10 @@ from proxytune.diagnosis.motion.fitting import evaluate
 from proxytune.diagnosis.motion.innovations import FIRST_GUESS, twists_of
 from proxytune.diagnosis.motion.screening import candidates
 from proxytune.driving import read_robot
-from proxytune.effects import GROUPS, learnt_effect, learnt_theta
+from proxytune.effects import GROUPS, FittedRange, Learnt, LearntCurve, learnt_effect, learnt_theta
+
+RAMP = (0.7, 0.7)
+"""Seconds in which a command grows from 0 to 1, and shrinks back."""
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +100,7 @@ def test_the_guard_and_the_held_out_errors_tell_of_blocks_that_were_not_fitted(f
 def test_curves_that_promise_nothing_to_who_asks_are_not_used(found):
     drives, learnt = found
     asked = []
-    refused = fit_discrepancy(drives, TRUTH, lambda held_out: asked.append(held_out))
+    refused = fit_discrepancy(drives, TRUTH, (), lambda held_out: asked.append(held_out))
     assert (refused.used, dict(refused.guard), dict(refused.theta)) == (False, {}, {})
     np.testing.assert_array_equal(asked, [learnt.held_out])
     np.testing.assert_array_equal(refused.held_out, learnt.held_out)
@@ -123,6 +126,20 @@ def test_where_nothing_is_learnt_it_is_looked_once_more_for_what_matters_in_few_
     assert learnt.guard[2.0].value < 0.7
     strict = replace(drives, rules=replace(RULES, rare_group_share=0.9))
     assert not fit_discrepancy(strict, TRUTH).used
+
+
+def test_a_delay_that_stood_for_slow_commands_gives_way_to_them():
+    slow = learnt_theta(
+        Learnt(FittedRange((-1.0, 1.0), (-6.0, 6.0)), (LearntCurve("ramped", "duty", (RAMP,), (1.0,)),))
+    )
+    drives = planted_drives({**TRUTH, **slow}, episodes=6, seconds=15.0)
+    before = {**TRUTH, "delay": TRUTH["delay"] + 0.15}
+    alone, along = (fit_discrepancy(drives, before, free) for free in ((), (("delay",),)))
+    assert along.used
+    assert max(along.share, key=lambda title: along.share[title]) == GROUPS["ramped"].title
+    assert along.theta["delay"] == pytest.approx(TRUTH["delay"], abs=0.06)
+    assert "delay" not in alone.theta
+    assert along.held_out.mean() < 0.5 * alone.held_out.mean()
 
 
 def test_too_few_blocks_teach_nothing():
@@ -159,13 +176,19 @@ def test_the_error_with_names_and_curves_is_told_beside_that_with_names_alone(be
     assert [error.horizon_s for error in learning.errors] == [1.0, 2.0]
     assert all(error.ratio.value < 0.7 and error.ratio.interval[1] < 1.0 for error in learning.errors)
     assert learning.theta == learning.discrepancy.theta
+    assert learning.model == {**TRUTH, **learning.theta}
     assert not learning.names_doubtful
 
 
 @pytest.mark.slow
-def test_names_that_hide_what_curves_could_say_are_doubtful(bent, tested):
-    learning = discrepancy.learn(findings(bent, {"saturation.limit": 0.25}, (WRONG,)), tested, (2.0,))
+def test_names_that_hide_what_curves_could_say_are_doubtful_and_left_out_of_the_model_with_curves(bent, tested):
+    names = {"saturation.limit": 0.25}
+    learning = discrepancy.learn(findings(bent, names, (WRONG,)), tested, (2.0,))
     assert learning.names_doubtful
+    assert not names.keys() & learning.model.keys()
+    (error,) = learning.errors
+    assert error.after.value == pytest.approx(np.sqrt(squares(tested, learning.model)))
+    assert error.ratio.value == pytest.approx(error.after.value / np.sqrt(squares(tested, {**TRUTH, **names})))
 
 
 def test_what_the_guard_refuses_is_neither_told_nor_driven():

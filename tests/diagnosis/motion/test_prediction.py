@@ -17,6 +17,7 @@ from planted import ROBOT, TRUTH, driven_log, drives_of, planted_drives, planted
 from proxytune.diagnosis import agreement, cut, pose_errors, predict, robot_of
 from proxytune.diagnosis.motion import prediction as windows_module
 from proxytune.diagnosis.motion.drives import gather
+from proxytune.diagnosis.motion.innovations import span
 from proxytune.diagnosis.motion.prediction import compare_repeats, ratio, rmse, select_windows, slopes_of
 from proxytune.effects import learnt_effect
 from proxytune.errors import LogError
@@ -258,6 +259,19 @@ def test_the_change_per_weight_is_that_of_replays(drives, extra, named):
         moved = slopes_of(drives, {**theta, **extra, **none, name: SIZE}, offered)
         seen = (still.residuals - moved.residuals) / SIZE
         np.testing.assert_allclose(still.columns[..., column], seen, rtol=0, atol=2e-3 * np.abs(seen).max() + 1e-6)
+
+
+def test_the_change_per_share_of_a_coordinates_range_is_that_of_replays(drives):
+    offered, free = learnt_effect(TURNING), (("delay",), ("trim",))
+    theta = {**TRUTH, **TURNING}
+    still = slopes_of(drives, theta, offered, free)
+    np.testing.assert_array_equal(still.columns[..., :-2], slopes_of(drives, theta, offered).columns)
+    share = 1e-3
+    for column, (name,) in zip((-2, -1), free, strict=True):
+        low, high = span((name,), drives)
+        moved = slopes_of(drives, {**theta, name: theta[name] + share * (high - low)}, offered)
+        seen = (still.residuals - moved.residuals) / share
+        np.testing.assert_allclose(still.columns[..., column], seen, rtol=0, atol=0.1 * np.abs(seen).max())
 
 
 def test_a_model_that_is_right_leaves_nothing(drives):

@@ -78,22 +78,16 @@ def test_an_effect_that_was_added_says_what_the_error_is_without_it():
     )
 
 
-def test_an_effect_that_is_shown_not_to_matter_is_called_immaterial():
+def test_an_effect_is_immaterial_only_where_that_is_shown():
     (note,) = motion_notes(diagnosis(negligible=(SLIP,), effect_sizes={"lateral_slip": SURE}))
     assert note == (
         "detectable but immaterial: lateral_slip 0.0024 s, log-likelihood gain 75 nats, "
         "changes the error at 5 s by 1.0 % (−1.0 to +3.0)"
     )
-
-
-def test_an_effect_that_may_matter_is_not_called_immaterial():
     (note,) = motion_notes(diagnosis(negligible=(SLIP,), effect_sizes={"lateral_slip": LITTLE}))
     assert note.startswith(
         "not shown to matter: lateral_slip 0.0024 s, log-likelihood gain 75 nats, changes the error at 5 s by 1.0 % "
     )
-
-
-def test_an_effect_that_could_not_be_weighed_is_not_shown_to_matter():
     assert motion_notes(diagnosis(negligible=(SLIP,))) == [
         "not shown to matter: lateral_slip, log-likelihood gain 75 nats"
     ]
@@ -126,12 +120,9 @@ def test_a_ratio_is_told_as_what_it_adds():
     assert not may_matter(SURE, RULES.material_factor)
 
 
-def test_a_value_at_the_end_of_its_range_is_no_physics():
+def test_the_headline_warns_of_values_at_an_end_and_of_false_names():
     ends = diagnosis(effects=(BAND,), edges=BAND.names, verdict="partly explained")
     assert "dead_band.width at the end of the range stands for something else" in motion_headline(ends)
-
-
-def test_a_name_is_told_with_how_many_false_ones_chance_adds():
     assert "expected false names: at most 0.02" in motion_headline(diagnosis(effects=(BAND,)))
     assert "false names" not in motion_headline(diagnosis())
 
@@ -205,36 +196,27 @@ USED = Learning(Discrepancy(THETA, SHARE, {2.0: RATIO}, True), (ERROR,), False)
 REFUSED = Learning(Discrepancy(THETA, SHARE, {2.0: RATIO}, False), (), True)
 
 
-def test_the_document_has_groups_shares_and_ratios_by_horizon():
+def test_the_document_has_groups_shares_and_ratios_and_of_what_is_refused_its_guard():
     told = json.loads(json.dumps(learnt_document(USED)))
     assert told["used"] is True
     assert told["groups"] == ["turn rate", "heading"]
     assert told["share"] == SHARE
     assert told["ratio"] == {"2": {"value": 0.5, "interval": [0.4, 0.6]}}
     assert told["errors"][0]["after"] == 0.01
-
-
-def test_what_is_refused_has_no_groups_but_its_guard_is_told():
     told = learnt_document(REFUSED)
     assert (told["used"], told["groups"], told["share"], told["ratio"]) == (False, [], {}, {})
     assert told["guard"]["2"]["value"] == 0.5
     assert told["names_doubtful"] is True
 
 
-def test_a_note_says_what_it_is_worth_and_that_it_is_no_physics():
+def test_what_is_learnt_is_told_with_its_worth_as_no_physics_and_doubtful_names_are_warned_of():
     (note,) = learnt_notes(USED)
     assert "not physics" in note
     assert "turn rate (75 %)" in note
     assert "2 s: 10.0 mm, 0.50 (0.40 … 0.60)" in note
-
-
-def test_what_was_tried_and_left_out_is_told_and_doubtful_names_are_warned_of():
     first, second = learnt_notes(REFUSED)
     assert "left out" in first
     assert "names are likely wrong" in second
-
-
-def test_nothing_is_said_where_nothing_was_found():
     assert learnt_notes(Learning(Discrepancy(), (), False)) == []
 
 
@@ -249,7 +231,7 @@ FOUND = RobotClusters("left", (0.88, 1.02), ((0, 2), (1, 3)))
 NAMES = ("a", "b", "c", "d")
 
 
-def test_both_groups_are_told_with_their_gains():
+def test_groups_of_drives_are_told_with_their_gains_and_only_where_they_differ():
     told = json.loads(json.dumps(unlike_document(FOUND, NAMES)))
     assert told == {
         "wheel": "left",
@@ -258,9 +240,6 @@ def test_both_groups_are_told_with_their_gains():
     (note,) = unlike_notes(FOUND, NAMES)
     assert "0.88 in a, c but 1.02 in b, d" in note
     assert "diagnose each group alone" in note
-
-
-def test_drives_that_are_alike_are_no_news():
     assert unlike_document(None, NAMES) is None
     assert unlike_notes(None, NAMES) == []
 

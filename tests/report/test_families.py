@@ -96,13 +96,10 @@ def test_the_figure_has_a_panel_per_use_and_tells_best_alike_and_worse_apart():
     assert_readable(figure)
 
 
-def test_an_interval_of_which_one_end_is_not_known_is_drawn_to_the_other():
+def test_the_figure_draws_open_intervals_and_has_no_panel_of_teaching_without_it():
     lessons = {"a": lesson(-20.0), "b": replace(lesson(-30.0), plv=LearningEstimate(-30.0, None, 5.0))}
     plv = families_figure(compared(family("a"), family("b"), lessons=lessons)).axes[1]
     assert [-30.0, 5.0] in [list(line.get_xdata()) for line in plv.lines]
-
-
-def test_without_teaching_the_figure_has_no_panel_of_it_and_a_long_name_is_shortened():
     figure = families_figure(compared(family("a" * 40), family("b", 2)))
     assert len(figure.axes) == 2
     assert figure.axes[0].get_yticklabels()[0].get_text() == f"{'a' * 15}…"

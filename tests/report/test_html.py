@@ -106,14 +106,11 @@ def test_nothing_is_loaded_from_elsewhere_and_no_script_may_run():
     assert "script-src" not in policy
 
 
-def test_headings_come_in_order_one_of_them_the_first():
+def test_headings_come_in_order_and_tables_have_scopes_captions_and_regions_that_the_keyboard_reaches():
     tags = [tag for tag, _ in Reader(html_of(VIEW)).elements if re.fullmatch(r"h\d", tag)]
     assert tags[0] == "h1"
     assert tags.count("h1") == 1
     assert set(tags[1:]) == {"h2"}
-
-
-def test_tables_have_scopes_and_captions_and_scroll_in_a_region_that_the_keyboard_reaches():
     elements = Reader(html_of(VIEW))
     assert {attrs.get("scope") for attrs in elements.all("th")} == {"row", "col"}
     assert len(elements.all("caption")) == len(elements.all("table")) == 2
@@ -123,15 +120,12 @@ def test_tables_have_scopes_and_captions_and_scroll_in_a_region_that_the_keyboar
     assert all(one["tabindex"] == "0" and one["role"] == "region" and one["aria-labelledby"] in ids for one in regions)
 
 
-def test_columns_of_numbers_end_together_and_texts_begin_together():
+def test_columns_of_numbers_end_together_texts_begin_together_and_long_cells_are_wrapped():
     columns = (Column("value", numbers=True), Column("text"))
     text = html_of(replace(VIEW, parts=(replace(TABLE, columns=columns, rows=(("1", "2"), ("2", "x"))),)))
     assert '<th scope="col" class="number">value</th><th scope="col">text</th>' in text
     assert '<th scope="row" class="number">1</th><td>2</td>' in text
     assert '<td class="number">−2 (−3 to 1)</td>' in html_of(VIEW)
-
-
-def test_a_long_cell_is_wrapped_also_among_numbers_and_a_head_is_one_line():
     columns = columns_of(("a\nb",), ("value",))
     text = html_of(replace(VIEW, parts=(replace(TABLE, columns=columns, rows=(("x", "w" * 29),)),)))
     assert '<td class="prose">www' in text
@@ -147,26 +141,19 @@ def test_a_table_of_contents_is_there_only_for_many_parts_and_leads_to_each():
     assert {link.removeprefix("#") for link in links} <= ids
 
 
-def test_only_a_page_under_way_renews_itself():
+def test_only_a_page_under_way_renews_itself_and_only_one_with_a_next_step_says_it():
     assert 'http-equiv="refresh"' not in html_of(VIEW)
     text = page_html(VIEW, FOOT, 7)
     assert '<meta http-equiv="refresh" content="7">' in text
     assert "loads itself again every 7 s" in text
-
-
-def test_without_anything_to_do_next_nothing_is_said():
     assert "Next:" in html_of(VIEW)
     assert "Next:" not in html_of(replace(VIEW, next_step=""))
 
 
-def test_commands_between_backticks_are_code():
+def test_commands_between_backticks_are_code_whose_options_are_broken_nowhere():
     text = html_of(replace(VIEW, next_step="run `a < b`"))
     assert "run <code>a &lt; b</code>" in text
     assert "a `b" in html_of(replace(VIEW, next_step="a `b"))
-
-
-def test_an_option_that_is_to_be_typed_is_broken_nowhere():
-    """Browsers break lines after hyphens."""
     text = html_of(replace(VIEW, next_step="run `python -m proxytune study a --budget 2`"))
     assert "python -m proxytune study a <span>--budget</span> 2</code>" in text
 

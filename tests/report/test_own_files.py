@@ -208,11 +208,9 @@ def test_a_file_that_cannot_be_patched_is_refused_in_one_line_and_nothing_is_wri
     assert not (tmp_path / "out").exists()
 
 
-def test_wheels_may_be_named(patched):
+def test_wheels_may_be_named_and_those_called_l_and_r_are_found(patched):
     patched("mine.urdf", URDF.replace("left_wheel_joint", "port"), wheels=("port", "right_wheel_joint"))
 
-
-def test_wheels_called_l_and_r_are_found(patched):
     def renamed(text):
         return text.replace("left_wheel_joint", "wheel_l").replace("right_wheel_joint", "wheel_r")
 

@@ -111,19 +111,12 @@ def test_the_next_step_is_what_keeps_more_from_being_told(limit, inside, step):
     assert text.endswith(f" Next: {step}, to get closer.")
 
 
-def test_where_a_rule_ended_the_search_a_larger_budget_would_not_help():
+def test_the_next_step_asks_for_no_more_trials_or_starts_than_help():
     text = said(**ABOVE, inside=False, trials=range(20))
     assert text.endswith("Next: loosen the rule under [stop] that ended the search, to get closer.")
     assert said(**ABOVE, inside=False).endswith("Next: raise budget from 24 to 48, to get closer.")
-
-
-def test_no_more_starts_are_asked_for_than_there_are():
     assert "raise starts from 4 to 5 " in said(**ABOVE, most_starts=5)
     assert "add agents or metrics: all 4 starts are driven" in said(**ABOVE, most_starts=4)
-
-
-def test_who_learns_from_earlier_studies_is_not_sent_beyond_their_starts():
-    """A bank of fewer starts than a study asks for is refused, so trials of its own are what brings more."""
     told = said(**ABOVE, learn_from=("bank",), budget=0, trials=())
     assert "raise budget from 0 to 8" in told
     assert "raise starts" not in told
@@ -180,12 +173,14 @@ def test_a_study_under_way_says_so_and_how_to_go_on():
     assert text.endswith("Next: run the study again for the 10 trials that are left.")
 
 
-def test_unidentified_parameters_are_named_without_an_interval_and_with_who_tells_of_them():
+def test_unidentified_parameters_have_no_interval_and_only_who_tells_of_them_is_named():
     text = said((TRIM, DELAY), **ABOVE, information=TOLD)
     assert "trim 0.121 (0.108 to 0.146); delay is unidentified." in text
     assert "add an agent or a metric whose scores change with delay (so far agent4's do most), or a log" in text
     nothing = said((DELAY, replace(DELAY, name="blur")), **ABOVE, information=())
     assert nothing.startswith("θ is unknown: delay and blur are unidentified.")
+    silent = replace(TOLD[0], agents=(("agent0", 0.0),))
+    assert "so far" not in said((TRIM, DELAY), **ABOVE, information=(silent, TOLD[1]))
 
 
 def test_a_best_value_outside_its_interval_is_not_shown_as_if_it_were_inside():
@@ -216,11 +211,6 @@ def test_what_is_told_of_a_parameter_is_what_the_study_knows(result):
     assert trim.share == pytest.approx(4 * 0.0098, rel=0.1)
     assert say_answer(known).startswith("The proxy lacks something: no θ explains the target's scores (p = 0.002). ")
     assert study_sentence(replace(result, stopped="", trials=result.trials[:3])).startswith("3 of 7 trials so far. ")
-
-
-def test_who_tells_nothing_of_the_least_known_parameter_is_not_named():
-    silent = replace(TOLD[0], agents=(("agent0", 0.0),))
-    assert "so far" not in said((TRIM, DELAY), **ABOVE, information=(silent, TOLD[1]))
 
 
 def test_a_score_at_the_floor_of_a_theta_that_other_scores_exclude_is_not_called_perfect():

@@ -86,16 +86,14 @@ def test_the_next_step_is_more_seeds_while_something_is_open():
     assert "train without these proxies" in teach_next_step(experiment(LESSONS[1:2]))
 
 
-def test_without_convergence_plv_is_unknown_and_more_samples_are_next():
+def test_without_convergence_or_a_rise_at_the_end_plv_is_unknown_and_the_next_step_says_why():
     rising = experiment(gain=5.1)
     assert "is unknown: without a proxy the score still rises by more than 5" in teach_answer(rising)
     assert teach_next_step(rising).startswith("raise teaching.target_samples: ")
-
-
-def test_a_grid_that_shows_no_rise_at_its_end_is_not_said_to_rise():
     coarse = experiment(gain=None)
     assert "is unknown: teaching.target_samples has no number from 1 to half of 400" in teach_answer(coarse)
     assert "add numbers between 0 and 400" in teach_next_step(coarse)
+    assert "raise teaching.examinations from 20 to 40" in teach_next_step(experiment(examinations=20))
 
 
 def test_plv_in_cost_is_a_column_where_costs_are_stated_and_only_there():
@@ -129,11 +127,7 @@ def test_where_the_finalists_cannot_be_judged_the_next_step_says_why():
     assert plv_next_step(study).startswith("raise teaching.target_samples: without a proxy the score still rises")
 
 
-def test_where_examinations_are_chosen_more_of_them_are_next():
-    assert "raise teaching.examinations from 20 to 40" in teach_next_step(experiment(examinations=20))
-
-
-def test_each_proxy_has_a_panel_of_its_own_against_no_proxy_with_what_each_needs():
+def test_each_proxy_has_a_panel_of_its_own_in_a_figure_that_fits_a_column():
     drawn = experiment()
     panels = [axes for axes in teach_figure(drawn).axes if axes.get_visible()]
     assert [axes.get_title() for axes in panels] == [one.name for one in LESSONS]
@@ -146,9 +140,6 @@ def test_each_proxy_has_a_panel_of_its_own_against_no_proxy_with_what_each_needs
         assert sum(len(line.get_ydata()) for line in dots) == 3 * 5 + 3 * 4
         ends = [path.vertices[:, 0].tolist() for bars in axes.collections[2:] for path in bars.get_paths()]
         assert ends[-1][0] < ends[-1][1]
-
-
-def test_the_figure_fits_a_column():
     assert teach_figure(experiment()).get_figwidth() * 25.4 <= 86.0
 
 

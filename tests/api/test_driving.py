@@ -27,21 +27,15 @@ def driven(lane):
     return drive(lane, "steady", THETA)
 
 
-def test_poses_have_times_sixty_a_second_from_the_start_to_the_end(driven):
+def test_poses_and_commands_have_times_and_scores_are_of_the_same_drive(driven):
     assert list(driven.poses.columns) == ["time", "x", "y", "heading"]
     assert np.allclose(np.diff(driven.poses.time), 1 / 60)
     assert driven.poses.time.iloc[[0, -1]].tolist() == [0.0, pytest.approx(2.0)]
     start = driven.poses.iloc[0]
     assert [start.x, start.y] == [0.4237, 0.702]
-
-
-def test_commands_are_the_duties_of_both_wheels_twenty_a_second(driven):
     assert list(driven.commands.columns) == ["time", "left", "right"]
     assert np.allclose(driven.commands.time, np.arange(40) / 20)
     assert driven.commands[["left", "right"]].abs().to_numpy().max() <= 1.0
-
-
-def test_poses_and_scores_are_of_one_drive(driven):
     steps = np.hypot(driven.poses.x.diff(), driven.poses.y.diff())[1:]
     assert driven.scores["survival_time"] == 2.0
     assert driven.scores["speed"] == pytest.approx(steps.sum() / 2.0)

@@ -58,12 +58,11 @@ def test_people_see_which_episode_it_is_both_scores_and_when_they_part(lane, cap
     assert "brisk from start 0 under seed 1, as in no trial of this study" in capsys.readouterr().out
 
 
-def test_before_a_trial_is_finished_the_nominal_theta_drives(lane, answered):
+def test_theta_is_nominal_before_a_trial_is_finished_then_the_best_unless_nominal_is_asked_for(
+    lane, answered, finished
+):
     answer = answered("drive", lane, "--agent", "steady")
     assert (answer["theta_from"], answer["theta"]) == ("nominal", {})
-
-
-def test_after_a_trial_the_best_theta_drives_unless_nominal_is_asked_for(finished, answered):
     best = answered("drive", finished, "--agent", "agent0")
     assert best["theta_from"] == "best"
     assert set(best["theta"]) == {"trim", "delay"}

@@ -22,18 +22,6 @@ def test_a_study_runs_and_prints_one_document_and_a_second_time_simulates_nothin
     assert {path.name for path in folder.iterdir()} == set(names.split())
 
 
-@pytest.mark.slow
-def test_people_see_the_best_theta_and_where_the_figure_is(finished, capsys):
-    assert main(["study", str(finished)]) == 0
-    out, told = capsys.readouterr()
-    assert "7 of 7; best: trial " in out
-    assert "trim" in out
-    assert "0 run, 126 reused" in out
-    assert f"figures: {finished / 'figures'}" in out.replace("\n", "")
-    assert f"report: {finished / 'report.html'}" in out.replace("\n", "")
-    assert told == ""
-
-
 def test_bad_input_is_one_line_and_exit_2(make_study, refused):
     assert "budget: must be between" in refused("study", make_study(budget="-1"))
     assert "agents: no agent 'agnet1'" in refused("study", make_study(agents='["agent0", "agnet1"]'))

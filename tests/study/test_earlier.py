@@ -168,14 +168,10 @@ def test_a_source_that_is_none_is_refused(case, tmp_path, bank, make_study):
     assert "bank" in str(refused.value)
 
 
-def test_a_name_longer_than_a_path_is_refused(make_study):
+def test_a_source_that_is_none_a_bank_without_a_target_and_a_circle_are_refused(make_study):
     """No system has such a path: one line, as of any that is not there."""
     with pytest.raises(ProxytuneError, match="no such study or table of trials"):
         run_study(make_study(**{**LEARNS, "learn_from": json.dumps(["a" * 5000])}))
-
-
-def test_a_study_learns_neither_from_itself_nor_in_a_circle(make_study):
-    """Both are refused by name."""
     folder = make_study(**{**LEARNS, "learn_from": '["../study"]'})
     with pytest.raises(ProxytuneError, match="is this very study"):
         run_study(folder)

@@ -159,16 +159,6 @@ def test_a_target_that_does_not_fit_is_refused_in_one_line(make_study, case):
     assert expected in complaint_of(open_study, target.parent)
 
 
-def test_agents_of_the_target_that_are_not_in_the_study_do_not_count(make_study):
-    folder = make_study(agents='["agent5", "agent1"]')
-    with open(folder / "target.csv", "a") as target:
-        target.write("agent77,only_its_own,1.0,2.0\n")
-    study = open_study(folder)
-    assert study.target.agents == ("agent5", "agent1")
-    assert study.target.episodes == ("0", "1", "2")
-    assert study.target.complete
-
-
 def test_the_engine_is_a_fact_but_that_of_before_there_was_a_choice_goes_without_saying(make_study):
     """Trials of then stay valid."""
     before, other = study_facts(open_study(make_study())), study_facts(open_study(make_study(engine=None)))
@@ -190,12 +180,9 @@ def test_what_the_search_learns_from_is_a_fact(make_study):
     assert study_facts(open_study(make_study(**by_score))) == score
 
 
-def test_rules_to_stop_are_no_facts(make_study):
+def test_rules_to_stop_and_the_order_of_agents_and_metrics_are_no_facts(make_study):
     plain = study_facts(open_study(make_study()))
     assert study_facts(open_study(make_study(stop="{ wall_time_s = 5, no_improvement = 0.1 }"))) == plain
-
-
-def test_the_order_of_agents_and_lines_is_no_fact(make_study):
     one = study_facts(open_study(make_study()))
     agents = '["agent5", "agent4", "agent3", "agent2", "agent1", "agent0"]'
     metrics = '["survival_time:max", "distance:max"]'
@@ -278,7 +265,7 @@ def test_a_target_of_another_kind_or_none_is_refused(make_study, target, says):
     assert says in complaint_of(open_study, make_study(target=target))
 
 
-def test_agents_that_are_on_one_side_only_are_named_on_either(make_study, rows):
+def test_only_what_both_sides_have_is_compared_and_what_is_left_out_is_named(make_study, rows):
     folder = make_study(target='"real.csv"')
     write(folder, real=[HEAD, *(row for row in rows if "agent5" not in row), "human,0,1,2", "human,1,1,2"])
     study = open_study(folder)
@@ -287,6 +274,13 @@ def test_agents_that_are_on_one_side_only_are_named_on_either(make_study, rows):
         "the target has no scores of agent5: left out",
         "the target has scores of human, no agents of this study: left out",
     )
+    folder = make_study(agents='["agent5", "agent1"]')
+    with open(folder / "target.csv", "a") as target:
+        target.write("agent77,only_its_own,1.0,2.0\n")
+    study = open_study(folder)
+    assert study.target.agents == ("agent5", "agent1")
+    assert study.target.episodes == ("0", "1", "2")
+    assert study.target.complete
 
 
 def test_where_no_name_agrees_a_table_of_names_is_the_remedy(make_study, rows):

@@ -130,12 +130,14 @@ def test_the_spread_between_starts_is_taken_for_noise_only_where_nothing_better_
     assert unknown.caution.startswith("noise is estimated from the spread between the target's episodes")
 
 
-def test_failed_episodes_of_the_pre_flight_are_left_out(make_study):
+def test_failed_episodes_are_left_out_of_noise_and_comparison(make_study):
     with running(make_study(domain={"faults": '["agent3:1:raises"]'}, preflight="true")) as study_run:
         run_preflight(study_run)
         found = noise_of(study_run)
         assert np.array_equal(goal_of(study_run).noise, found.variance.ravel())
     assert np.isfinite(found.variance).all()
+    found = told(make_study(preflight="true", domain={"faults": '["agent3:1:raises"]'}))
+    assert {movement.pairs for movement in found.values()} <= {PAIRS // LOOKS - 1, PAIRS - 2}
 
 
 def run(folder, **changes):
@@ -198,21 +200,13 @@ def test_what_need_not_be_run_is_taken_off_the_bar(planted):
     assert spent.episodes + watcher.off == most_preflight_episodes(study.settings)
 
 
-def test_the_trials_are_those_of_a_study_without_it(make_study, finished):
+def test_the_trials_are_those_of_a_study_without_it_also_where_they_have_begun(make_study, finished):
     folder = make_study("checked", preflight="true")
     assert run(folder)[0].episodes > 0
     assert searched(open_study(folder))[1] == searched(open_study(finished))[1]
-
-
-def test_a_study_whose_trials_have_begun_goes_on_without(finished, make_study):
     make_study(preflight="true")
     spent, found = run(finished)
     assert (spent.episodes, found) == (0, None)
-
-
-def test_failed_episodes_are_left_out_of_the_comparison(make_study):
-    found = told(make_study(preflight="true", domain={"faults": '["agent3:1:raises"]'}))
-    assert {movement.pairs for movement in found.values()} <= {PAIRS // LOOKS - 1, PAIRS - 2}
 
 
 def test_where_every_agent_fails_everywhere_it_says_so_once_and_of_what(make_study):
@@ -235,11 +229,16 @@ def test_where_failures_stop_the_study_they_stop_it_here(make_study):
         run(make_study(preflight="true", domain={"faults": '["agent3:1:raises"]'}, on_failure='"stop"'))
 
 
-def test_what_is_wrong_with_a_parameter_and_what_to_do_is_one_line(planted):
+def test_one_line_says_what_is_wrong_with_a_parameter_and_one_metric_that_moves_is_enough(planted):
     _, found = run(planted())
     dead, noise_sized = found.warnings
     assert dead.startswith("pre-flight: 'dead' changes nothing at all across [0, 1]; remove it from")
     assert noise_sized.startswith("pre-flight: 'noise_sized' is not shown to change a metric across [0, 1]")
+    values = np.random.default_rng(1).normal(size=(PAIRS, 4, 2))
+    values[:, 3, 1] += 10.0
+    found = judge(Interval("blur", 0.0, 1.0), ["a", "b"], values)
+    assert found.moves
+    assert found.metric == "b"
 
 
 @pytest.mark.slow
@@ -248,14 +247,6 @@ def test_a_parameter_that_is_only_one_more_source_of_noise_is_said_to_matter_in_
     rng, interval = np.random.default_rng(1), Interval("blur", 0.0, 1.0)
     found = [judge(interval, ["a", "b"], rng.standard_t(2, (PAIRS, 4, 2))) for _ in range(400)]
     assert 0 < sum(movement.moves for movement in found) * LOOKS <= 400 * LEVEL + 9
-
-
-def test_one_metric_that_a_parameter_moves_is_enough_and_it_is_named():
-    values = np.random.default_rng(1).normal(size=(PAIRS, 4, 2))
-    values[:, 3, 1] += 10.0
-    found = judge(Interval("blur", 0.0, 1.0), ["a", "b"], values)
-    assert found.moves
-    assert found.metric == "b"
 
 
 EPISODE = make_episode({}, agent="agent2", start=0, seed=2**40 + 3)

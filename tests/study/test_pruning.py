@@ -69,11 +69,18 @@ def test_a_trial_that_was_cut_off_would_have_scored_no_less_than_its_bound_and_a
                 assert trial.estimate >= trial.bound
 
 
-def test_the_search_is_told_the_estimate_of_a_trial_that_was_cut_off(done):
+def test_a_cut_trial_is_told_by_its_estimate_in_the_search_and_in_plain_sql(done):
     _, trials, found = done
     told = score_trials(found.study.settings.space, trials)
     assert [one.score for one in told] == [t.estimate if t.state == "cut" else t.prpv for t in trials]
     assert found.best.trial.state == "finished"
+    with sqlite3.connect(found.study.settings.folder / "study.db") as plain:
+        rows = plain.execute(
+            "SELECT number, measures, decided, bound, score FROM trials WHERE state = 'cut'"
+        ).fetchall()
+    assert [(row[0], row[1], tuple(json.loads(row[2])), *row[3:]) for row in rows] == [
+        (trial.number, "{}", trial.decided, trial.bound, trial.estimate) for trial in trials if trial.state == "cut"
+    ]
 
 
 @pytest.mark.parametrize("engine", [pytest.param(name, marks=pytest.mark.slow) for name in ("gp", "random", "sobol")])
@@ -149,17 +156,6 @@ def test_what_was_spared_is_the_time_of_the_like_of_what_was_not_driven(done):
     ]
     assert episodes == len(missing)
     assert spared_seconds == pytest.approx(sum(missing))
-
-
-def test_a_cut_trial_is_told_in_the_database_in_plain_sql(done):
-    _, trials, found = done
-    with sqlite3.connect(found.study.settings.folder / "study.db") as plain:
-        rows = plain.execute(
-            "SELECT number, measures, decided, bound, score FROM trials WHERE state = 'cut'"
-        ).fetchall()
-    assert [(row[0], row[1], tuple(json.loads(row[2])), *row[3:]) for row in rows] == [
-        (trial.number, "{}", trial.decided, trial.bound, trial.estimate) for trial in trials if trial.state == "cut"
-    ]
 
 
 def test_a_trial_stands_on_the_episodes_of_its_decided_agents(done):

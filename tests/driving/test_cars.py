@@ -42,15 +42,12 @@ def held(throttle, steering, ticks=300):
     return np.tile((throttle, steering), (ticks, 1))
 
 
-def test_a_car_drives_straight_at_full_speed_and_the_circle_of_its_wheels_angle():
+def test_a_car_drives_straight_at_full_speed_in_the_circle_of_its_wheels_and_throttle_begins_at_nothing():
     np.testing.assert_allclose(twists(CAR, held(1.0, 0.0))[-1], (3.0, 0.0, 0.0))
     forward, _, yaw = twists(CAR, held(0.5, 1.0))[-1]
     assert forward / yaw == pytest.approx(CAR.least_radius)
     assert CAR.least_radius == pytest.approx(0.33 / np.tan(np.radians(24.0)))
     assert twists(CAR, held(-0.5, 1.0))[-1, 2] == pytest.approx(-yaw)
-
-
-def test_throttle_begins_at_nothing_where_there_is_no_reverse():
     assert twists(DART, held(-1.0, 0.3))[-1, 0] == 0.0
     assert twists(CAR, held(-1.0, 0.3))[-1, 0] == -3.0
 
@@ -81,13 +78,10 @@ def test_the_same_effect_bends_throttle_or_steering_and_leaves_the_other():
     assert step[11, 0] == pytest.approx(plain[0] * (1.0 - np.exp(-1.0)), rel=0.05)
 
 
-def test_the_delay_of_the_steering_comes_on_top_of_that_of_the_message():
+def test_the_delay_of_the_steering_comes_on_top_and_its_curve_has_sides_of_its_own():
     moved = twists(CAR, held(0.2, 1.0), delay=0.1, steering_delay=0.2)
     assert np.flatnonzero(moved[:, 0])[0] == 6
     assert np.flatnonzero(moved[:, 2])[0] == 18
-
-
-def test_the_steering_s_curve_has_sides_of_its_own():
     theta = {"steering_curve__left": 20.0, "steering_curve__right": 30.0, "steering_curve__left_bend": 1.4}
     for steering, angle in ((1.0, 20.0), (-1.0, -30.0), (0.5, 20.0 * np.tanh(0.7) / np.tanh(1.4)), (-0.5, -15.0)):
         forward, _, yaw = twists(DART, held(0.5, steering), **theta)[-1]
@@ -166,14 +160,11 @@ def test_the_expert_keeps_all_wheels_of_a_car_in_its_lane(tmp_path):
     assert whole == pytest.approx(5.9)
 
 
-def test_an_effect_of_two_wheels_is_refused_on_a_car_in_a_line():
+def test_an_effect_of_another_drive_is_refused_in_a_line(tmp_path):
     told = complaint_of(effects_from, {"trim": 0.1}, CAR.figures, CAR.catalogue)
     assert 'only a robot with drive = "differential" has it, this one is "ackermann"' in told
     told = complaint_of(effects_from, {"dead_band.width": 0.1}, CAR.figures, CAR.catalogue)
     assert "did you mean 'dead_band'" in told
-
-
-def test_an_effect_of_a_car_is_refused_on_two_wheels_in_a_line(tmp_path):
     with pytest.raises(SettingsError, match='only a robot with drive = "ackermann" has it'):
         effects_from({"steering_offset": 0.1}, read_robot("duckiebot").figures)
     model = tmp_path / "model.toml"
@@ -183,6 +174,8 @@ def test_an_effect_of_a_car_is_refused_on_two_wheels_in_a_line(tmp_path):
     model.write_text(model.read_text(encoding="utf-8").replace("duckiebot", "car"), encoding="utf-8")
     assert read_model_of(model, tmp_path).theta == {"steering_offset": 0.1}
     assert catalogue_of("car", tmp_path) == Catalogue(tmp_path, drive="ackermann")
+    assert parameter_hint("trim", family(tmp_path).parameters).startswith('only a robot with drive = "differential"')
+    assert parameter_hint("steering_ofset", family(tmp_path).parameters) == "did you mean 'steering_offset'?"
 
 
 BAD = {
@@ -212,8 +205,3 @@ def test_a_body_whose_front_wheels_do_not_steer_is_refused_in_a_line(tmp_path):
         (tmp_path / "mine" / file).write_text(text.replace("steer_left", "turn_left"), encoding="utf-8")
     with pytest.raises(SettingsError, match="has no joint steer_left; the front wheels of a car hang on two revolute"):
         check_body(read_robot("mine", tmp_path))
-
-
-def test_a_study_of_a_car_that_tunes_a_trim_is_told_whose_it_is(tmp_path):
-    assert parameter_hint("trim", family(tmp_path).parameters).startswith('only a robot with drive = "differential"')
-    assert parameter_hint("steering_ofset", family(tmp_path).parameters) == "did you mean 'steering_offset'?"

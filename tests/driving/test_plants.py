@@ -34,13 +34,10 @@ def test_the_duckiebots_wheels_mass_and_camera_are_read():
     assert math.degrees(math.asin(-body.camera[2, 0])) == pytest.approx(ROBOT.figures["camera_pitch"], abs=1e-4)
 
 
-def test_turned_wheel_joints_and_fixed_joints_between_are_followed():
+def test_wheels_are_read_turned_fixed_and_by_their_names_where_there_are_more():
     turned = TEXT.replace('xyz="0 0.05 0.0318"', 'xyz="0 0.05 0.0318" rpy="-1.5707963 0 0"')
     turned = turned.replace('<axis xyz="0 1 0"/>', '<axis xyz="0 0 1"/>', 1)
     assert body_of(turned).left.axis == pytest.approx((0.0, 1.0, 0.0), abs=1e-6)
-
-
-def test_of_more_wheels_those_called_axles_are_driven():
     third = '<link name="w"/><joint name="rear" type="continuous"><parent link="chassis"/><child link="w"/>'
     third += '<axis xyz="0 1 0"/></joint></robot>'
     assert body_of(TEXT.replace("</robot>", third)).left.joint == "axle_left"

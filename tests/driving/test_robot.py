@@ -159,19 +159,19 @@ def test_a_log_that_leaves_out_a_figure_of_its_robot_is_told_which(figure):
         robot_from_geometry("tractor", known, 25.0)
 
 
-def test_every_link_has_inertia():
+def test_links_have_inertia_and_nominal_effects_agree_with_the_figures():
     assert all(link.find("inertial/inertia") is not None for link in BODY.iter("link"))
-
-
-def test_nominal_effects_agree_with_the_figures():
     lag = next(effect for effect in effects_from(ROBOT.theta, ROBOT.figures) if effect.name == "motor_lag")
     assert lag.time_constant == ROBOT.figures["motor_time_constant"]
     assert ROBOT.theta["camera_pitch"] == ROBOT.figures["camera_pitch"]
 
 
-def test_an_unknown_robot_is_told_with_the_nearest():
+def test_a_robot_by_an_unknown_or_another_name_is_refused(tmp_path):
     with pytest.raises(SettingsError, match="robot 'duckybot' is unknown .*; did you mean 'duckiebot'"):
         read_robot("duckybot")
+    shutil.copytree(shipped("robots") / "husky", tmp_path / "wolf")
+    with pytest.raises(SettingsError, match="name: unknown value 'husky'; known are: wolf"):
+        read_robot("wolf", tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -213,12 +213,6 @@ def test_a_robot_beside_the_study_comes_before_a_shipped_one(tmp_path):
         assert family.instance({}).robot.urdf == home / "duckiebot.urdf"
     assert read_robot("duckiebot").figures["wheel_radius"] == 0.0318
     assert robot_names(tmp_path) == ("car", "dart", "duckiebot", "husky", "irobot_create", "my_robot")
-
-
-def test_a_robot_whose_toml_has_another_name_than_its_folder_is_refused(tmp_path):
-    shutil.copytree(shipped("robots") / "husky", tmp_path / "wolf")
-    with pytest.raises(SettingsError, match="name: unknown value 'husky'; known are: wolf"):
-        read_robot("wolf", tmp_path)
 
 
 def test_a_plugin_s_robot_is_read_from_the_folder_that_it_names(tmp_path, monkeypatch):

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from moody import Moody
+from deadly import Deadly
 from searched import changed, looked_at, running, searched
 from stopping import Stopping
 
@@ -249,13 +249,17 @@ def test_a_parameter_that_is_only_one_more_source_of_noise_is_said_to_matter_in_
     assert 0 < sum(movement.moves for movement in found) * LOOKS <= 400 * LEVEL + 9
 
 
+MOODY = Deadly(
+    faults=("agent1:*:remembers", "agent2:*:draws by NumPy", "agent3:*:draws", "agent4:*:draws by Python"),
+)
 EPISODE = make_episode({}, agent="agent2", start=0, seed=2**40 + 3)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_agents_that_remember_or_draw_unseeded_are_named_at_once_and_for_good(make_study, capsys, jobs):
-    folder = make_study(family='"moody:moody"', preflight="true", jobs=jobs, budget="3", initial="3")
+    domain = {"faults": str(list(MOODY.faults))}
+    folder = make_study(family='"deadly:deadly"', domain=domain, preflight="true", jobs=jobs, budget="3", initial="3")
     named = [
         f"pre-flight: agent '{agent}' scores otherwise in the same episode; {REMEDY}" for agent in ("agent1", "agent3")
     ]
@@ -276,10 +280,10 @@ def test_agents_that_remember_or_draw_unseeded_are_named_at_once_and_for_good(ma
 def test_draws_from_the_generators_of_the_process_follow_from_the_episode_s_seed(agent):
     episode, another = (make_episode({}, agent=agent, start=0, seed=seed) for seed in (2**40 + 3, 5))
     np.random.seed(1)
-    first, other = run_episode(Moody(), episode).metrics, run_episode(Moody(), another).metrics
+    first, other = run_episode(MOODY, episode).metrics, run_episode(MOODY, another).metrics
     np.random.seed(2)
     random.seed(2)
-    assert run_episode(Moody(), episode).metrics == first != other
+    assert run_episode(MOODY, episode).metrics == first != other
 
 
 def test_the_generators_of_the_process_go_on_as_if_no_episode_had_been_driven():
@@ -288,5 +292,5 @@ def test_the_generators_of_the_process_go_on_as_if_no_episode_had_been_driven():
     expected = np.random.normal(), random.random()
     np.random.seed(1)
     random.seed(1)
-    run_episode(Moody(), EPISODE)
+    run_episode(MOODY, EPISODE)
     assert (np.random.normal(), random.random()) == expected

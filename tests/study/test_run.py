@@ -94,6 +94,15 @@ def test_a_metric_that_the_target_was_not_measured_in_is_refused_by_file(finishe
         with_metrics(study, OWN)
 
 
+def test_a_trial_that_lacks_episodes_is_told(finished):
+    with Store.open(finished) as store:
+        store.save_trial(
+            open_study(finished).identity, TrialRecord(7, {"trim": 0.0, "delay": 0.1}, "finished", 3.0, {"prpv": 3.0})
+        )
+    with pytest.raises(RunError, match=r"study\.db: lacks episodes of trial 7"):
+        found(finished, COARSE)
+
+
 def run(folder, **changes):
     spent, trials = searched(changed(folder, **changes))
     return spent.episodes, trials

@@ -72,28 +72,20 @@ def test_an_error_at_the_noise_of_the_poses_is_explained(unnamed):
     assert said(0.0045, 0.004, unnamed=unnamed, named=False) == "nothing missing"
 
 
-def test_an_error_that_nothing_lowers_within_a_narrow_bracket_is_explained():
+def test_an_error_that_nothing_lowers_or_drives_do_not_repeat_is_explained():
     assert said(0.0055, 0.004) == "explained"
     assert said(0.0065, 0.004) == "cannot be told"
     assert said(0.0055, 0.004, reached=0.005) == "cannot be told"
-
-
-def test_an_error_that_drives_do_not_repeat_is_explained():
     assert said(0.012, 0.004, repeated=KNOWN) == "explained"
     assert said(0.012, 0.004, repeated=KNOWN, named=False) == "nothing missing"
 
 
-def test_few_repeats_whose_scatter_leaves_the_floor_wide_explain_nothing():
+def test_few_or_unlike_repeats_explain_nothing_while_an_effect_is_missing():
     assert said(0.012, 0.0005, repeated=KNOWN._replace(part=0.03)) == "cannot be told"
     assert said(0.012, 0.0005, repeated=KNOWN) == "explained"
-
-
-def test_repeats_of_a_manoeuvre_that_never_meets_what_is_missing_explain_nothing():
     assert said(0.029, 0.004, repeated=KNOWN) == "cannot be told"
-
-
-def test_nothing_is_explained_while_a_named_effect_lowers_the_error():
     assert said(0.012, 0.004, repeated=KNOWN, reached=0.0105) == "cannot be told"
+    assert said(0.0055, 0.004, repeated=BEYOND) == "partly explained"
 
 
 @pytest.mark.parametrize(("named", "answer"), [(True, "partly explained"), (False, "unexplained")])
@@ -106,10 +98,6 @@ def test_an_error_that_drives_repeat_or_a_signal_explains_is_not_explained(named
 def test_what_the_noise_is_cannot_be_told_from_few_repeats_or_none():
     assert said(0.012, 0.004) == "cannot be told"
     assert said(0.012, 0.004, repeated=UNSURE) == "cannot be told"
-
-
-def test_a_narrow_bracket_does_not_explain_what_drives_repeat():
-    assert said(0.0055, 0.004, repeated=BEYOND) == "partly explained"
 
 
 def test_the_floor_lies_between_the_noise_of_poses_and_what_a_model_reached():

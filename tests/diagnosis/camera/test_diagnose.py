@@ -251,7 +251,7 @@ def test_little_is_told_of_a_map_that_lies_where_it_should():
         assert laid.offset[name].value == pytest.approx(0.0, abs=within)
 
 
-def test_a_whole_map_fifteen_millimetres_and_a_degree_off_is_told():
+def test_a_whole_map_that_lies_off_and_wider_lines_are_told():
     """Poses are those of a tracker whose frame has the map 15 mm to the right, 10 mm down and 1° turned."""
     views = stood()
     middle, by, turn = np.array(ROAD.size) / 2.0, np.array((0.015, -0.01)), np.radians(1.0)
@@ -266,9 +266,6 @@ def test_a_whole_map_fifteen_millimetres_and_a_degree_off_is_told():
         low, high = laid.offset[name].interval
         assert low < truth < high
     assert [laid.offset[name].unit for name in ("x_m", "y_m", "heading_deg")] == ["m", "m", "deg"]
-
-
-def test_wider_white_lines_are_told_as_such():
     views = replace(stood(noisy=False), tape_m=0.005)
     there = project(views, at_truth(views))
     out = np.where(views.edges.white & there.near, -0.002 / there.metres, 0.0)

@@ -97,14 +97,11 @@ def test_nothing_is_found_in_a_flat_picture_nor_in_one_of_nothing_but_sky(colour
     assert [len(field) for field in edges] == [0] * 5
 
 
-def test_faint_noise_is_no_edge():
+def test_noise_the_sky_and_the_picture_s_border_have_no_edges():
     noise = np.random.default_rng(1).normal(0.0, 2.0, (1, ROWS, COLUMNS, 3))
     shown = np.clip(striped(0.3, 0.0) + noise, 0, 255).astype(np.uint8)
     away, _ = along_normal(find_edges(shown), 0.3, 0.0)
     assert np.abs(np.abs(away) - 6.0).max() < 0.4
-
-
-def test_edges_of_the_sky_are_left_out():
     shown = striped(0.0, 0.0)
     shown[:, :20] = SKY
     edges = find_edges(shown)
@@ -113,9 +110,6 @@ def test_edges_of_the_sky_are_left_out():
     away, outward = along_normal(edges, 0.0, 0.0)
     assert np.abs(np.abs(away) - 6.0).max() < 0.1
     assert (np.abs(outward) > 0.99).all()
-
-
-def test_edges_at_the_picture_s_border_are_left_out():
     edges = find_edges(striped(np.pi / 2.0, -27.0, half_width=2.5))
     assert edges.row.min() >= gathering.BORDER
     assert len(find_edges(striped(0.0, -COLUMNS / 2.0, half_width=1.0)).row) == 0
@@ -203,24 +197,17 @@ def test_a_latency_looks_up_the_pose_of_so_long_before():
     np.testing.assert_allclose(np.linalg.norm((now - late)[:, :2], axis=1), SPEED * 0.13, rtol=0.02)
 
 
-def test_frames_standing_still_keep_their_poses_to_the_last_digit():
+def test_frames_standing_still_keep_their_poses_and_those_between_two_or_in_a_long_gap_are_left_out():
     times = np.arange(25.0)
     poses = np.random.default_rng(3).normal(size=(25, 3))
     still = LogEpisode("stills", times, np.zeros((25, 0)), poses, None)
     tracks, numbers = track_frames(log_of(still, rate=0.0), frames_at(times[::2]))
     np.testing.assert_array_equal(tracks.at(0.0)[0], poses[::2])
     assert (tracks.share, tracks.moving, len(numbers)) == (1.0, False, 13)
-
-
-def test_frames_standing_still_between_two_poses_are_left_out():
-    """However close they are in time: the robot was moved in between."""
     times = 0.1 * np.arange(25.0)
     still = LogEpisode("stills", times, np.zeros((25, 0)), circle(times), None)
     _, numbers = track_frames(log_of(still, rate=0.0), frames_at([0.3, 0.35, 0.4]))
     np.testing.assert_array_equal(numbers, [0, 2])
-
-
-def test_frames_within_a_long_gap_between_poses_are_left_out():
     drive = episode()
     gap = (drive.times > 4.0) & (drive.times < 4.0 + 2.0 * gathering.LONGEST_GAP_S)
     drive.poses[gap] = np.nan
@@ -228,21 +215,15 @@ def test_frames_within_a_long_gap_between_poses_are_left_out():
     np.testing.assert_array_equal(numbers, [0, 3])
 
 
-def test_a_missing_pose_is_bridged():
+def test_a_missing_pose_is_bridged_and_each_frame_looked_up_in_its_own_drive():
     drive = episode()
     drive.poses[80] = np.nan
     tracks, numbers = track_frames(log_of(drive), frames_at([4.0]))
     assert len(numbers) == 1
     np.testing.assert_allclose(tracks.at(0.0)[0], circle([4.0]), atol=1e-3)
-
-
-def test_each_frame_is_looked_up_in_its_own_drive():
     first, second = episode(), episode(begin=100.0)
     tracks, _ = track_frames(log_of(first, second), frames_at([5.0, 105.0, 5.5], [0, 1, 0]))
     np.testing.assert_allclose(tracks.at(0.0)[0], circle([5.0, 105.0, 5.5]), atol=1e-3)
-
-
-def test_a_drive_without_a_pose_is_passed_over():
     empty = episode()
     empty.poses[:] = np.nan
     tracks, numbers = track_frames(log_of(empty, episode()), frames_at([5.0, 5.0], [0, 1]))

@@ -80,9 +80,13 @@ def test_lamps_over_the_floor_are_not_fixed_to_the_camera():
     assert blemishes(logged(drawn(on_the_road(), unevenly_lit()), noise=2.0), model) == ()
 
 
-def test_frames_without_markings_cannot_be_judged():
+def test_without_markings_or_floor_nothing_can_be_told():
     sky = np.full((40, 120, 160, 3), 200.0, dtype=np.float32)
     assert blemishes(logged(sky, noise=2.0), sky) == ()
+    sky = np.full((5, 120, 160, 3), 200.0, dtype=np.float32)
+    light = fit_light(logged(sky), sky, floor())
+    assert (light.gain.value, light.gamma.value, light.vignetting.value) == (1.0, 1.0, 0.0)
+    assert not any(figure.identified for figure in (light.gain, light.gamma, light.vignetting))
 
 
 @pytest.mark.slow
@@ -153,13 +157,6 @@ def test_one_paint_tells_neither_gain_nor_gamma():
     assert not light.gain.identified
     assert not light.gamma.identified
     assert light.vignetting.value == pytest.approx(0.4, abs=0.03)
-
-
-def test_frames_without_floor_tell_nothing():
-    sky = np.full((5, 120, 160, 3), 200.0, dtype=np.float32)
-    light = fit_light(logged(sky), sky, floor())
-    assert (light.gain.value, light.gamma.value, light.vignetting.value) == (1.0, 1.0, 0.0)
-    assert not any(figure.identified for figure in (light.gain, light.gamma, light.vignetting))
 
 
 def test_shining_the_fitted_light_gives_the_logged_brightness():

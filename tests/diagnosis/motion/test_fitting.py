@@ -45,12 +45,9 @@ def test_intervals_cover_the_truth_most_of_the_time():
     assert sum(covered) >= 12
 
 
-def test_the_noise_is_found_with_the_parameters(found):
+def test_the_noise_is_found_with_the_parameters_and_nothing_free_leaves_them_alone(found, drives):
     np.testing.assert_allclose(found.noise.drive, NOISE.drive, rtol=0.3)
     np.testing.assert_allclose(found.noise.pose, NOISE.pose, rtol=0.15)
-
-
-def test_nothing_free_leaves_the_parameters_alone(drives):
     assert fit(drives, TRUTH, ()).theta == TRUTH
 
 
@@ -103,23 +100,17 @@ def test_values_stay_within_their_bounds(drives):
     assert known["delay"] == pytest.approx(high, abs=1e-3)
 
 
-def test_slopes_foretell_a_small_change(found):
+def test_slopes_foretell_a_small_change_also_backwards_and_the_fitted_model_loses_least(found, drives):
     low, high = span(("trim",), found.drives)
     moved = theta_at(found.theta, (("trim",),), np.array([found.theta["trim"] + 1e-4 * (high - low)]))
     there = found.whiten.whiten(found.drives.measured - increments(found.drives, moved))
     change = found.slopes[:, 0] * 1e-4
     assert np.linalg.norm(there - found.innovations - change) < 0.01 * np.linalg.norm(change)
-
-
-def test_slopes_at_the_highest_value_step_backwards(drives):
     whiten = whitener(drives, NOISE)
     high = span(("delay",), drives)[1]
     edge = slopes(drives, {"trim": 0.0, "delay": high}, (("delay",),), whiten)
     inside = slopes(drives, {"trim": 0.0, "delay": high - 0.001}, (("delay",),), whiten)
     assert np.corrcoef(edge[:, 0], inside[:, 0])[0, 1] > 0.9
-
-
-def test_the_fitted_model_loses_least(found):
     here = loss_of(found.drives, found.theta, found.whiten)
     for name, step in (("trim", 0.01), ("delay", 0.01)):
         for sign in (-1.0, 1.0):
@@ -170,12 +161,9 @@ def log():
     return planted_log({"trim": 0.03, "delay": 0.12}, episodes=4, seconds=40.0)
 
 
-def test_an_honest_log_is_let_through(log):
+def test_a_robot_that_is_never_told_to_move_is_refused_and_an_honest_log_is_not(log):
     fitting.check_motion("yard", drives_of(log))
     fitting.check_units("yard", drives_of(log), {"trim": 0.0, "delay": 0.15})
-
-
-def test_a_robot_that_is_never_told_to_move_is_refused(log):
     drives = drives_of(log)
     with pytest.raises(LogError, match="^yard: every command is zero"):
         fitting.check_motion("yard", replace(drives, duties=0.0 * drives.duties))

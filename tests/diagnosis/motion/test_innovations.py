@@ -168,15 +168,12 @@ def test_what_models_share_is_kept_and_what_differs_is_not(replayed):
         found[0][1][:] = 0.0
 
 
-def test_a_window_past_the_end_goes_on_with_the_last_command(replayed):
+def test_windows_go_on_with_the_last_command_and_what_is_measured_later_changes_nothing(replayed):
     last = np.array([np.flatnonzero(replayed.episode == 0)[-1]])
     walked = window_paths(replayed, TRUTH, last, 200)
     steps = np.diff(walked[0], axis=0)
     np.testing.assert_allclose(np.hypot(*steps[-1, :2]), np.hypot(*steps[-50, :2]), rtol=0.2)
     assert np.isfinite(walked).all()
-
-
-def test_nothing_measured_after_a_windows_start_changes_it(replayed):
     poses = replayed.poses.copy()
     poses[60:] += 5.0
     sloped = {**TRUTH, "floor_slope.x": 0.05}

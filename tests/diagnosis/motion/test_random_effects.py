@@ -63,13 +63,10 @@ def answers(base):
     return responses(base, np.random.default_rng(1).standard_normal((len(base.innovations), 1)))
 
 
-def test_a_model_that_explains_everything_is_pulled_nowhere():
+def test_commands_that_never_change_or_a_model_that_explains_all_show_no_random_effect():
     base = fitted(planted_drives(TRUTH, episodes=2, seconds=10.0, noise=None))
     found = answers(base)
     assert np.median(np.abs(found.gradient) / found.size) < 0.1
-
-
-def test_a_robot_whose_command_never_changes_has_no_responses():
     drives = planted_drives(TRUTH, episodes=2, seconds=10.0)
     still = replace(drives, duties=np.full_like(drives.duties, 0.4), rest=np.full_like(drives.rest, 0.4))
     base = fitted(still)

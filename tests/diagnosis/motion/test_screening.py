@@ -27,13 +27,10 @@ def forms(effect, theta=TRUTH, taken=()):
     return {form.form: form for form in candidates(ROBOT, theta, taken) if form.effect == effect}
 
 
-def test_motion_can_show_every_effect_but_those_of_the_camera_and_its_pictures():
+def test_every_effect_of_motion_can_be_shown_in_a_form_unless_it_draws():
     unseen = {name for name, kind in CATALOGUE.items() if kind.stage in (Stage.CAMERA, Stage.IMAGE)}
     assert list(MOTION_EFFECTS) == [name for name in CATALOGUE if name not in unseen]
     assert {"camera_pitch", "blur"} <= unseen
-
-
-def test_every_effect_of_motion_that_does_not_draw_has_a_form():
     known = {form.effect for form in candidates(ROBOT, {}, ())}
     assert known == set(MOTION_EFFECTS) - set(RANDOM_EFFECTS)
 
@@ -55,17 +52,11 @@ def test_an_effect_of_wheels_may_be_on_one_of_them_alone(effect):
     assert known[""].label == effect
 
 
-def test_an_effect_of_wheels_that_the_model_has_may_be_uneven():
+def test_wheels_may_be_uneven_alone_or_together():
     known = forms("dead_band", {**TRUTH, "dead_band.width": 0.1, "dead_band.imbalance": 0.0})
     assert set(known) == {"", "uneven wheels"}
     assert known["uneven wheels"].free == (("dead_band.width",), ("dead_band.imbalance",))
-
-
-def test_a_lag_that_every_robot_has_may_be_uneven():
     assert set(forms("motor_lag")) == {"", "uneven wheels"}
-
-
-def test_a_gain_is_of_both_wheels_together_or_of_one():
     known = forms("wheel_gain")
     assert known[""].free == (("wheel_gain.left", "wheel_gain.right"),)
     assert known["left wheel"].free == (("wheel_gain.left",),)

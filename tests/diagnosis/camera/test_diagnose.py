@@ -63,7 +63,6 @@ def test_what_a_camera_lacks_is_named_and_what_no_name_explains_is_flagged(capsy
 
 COUNT, COLUMNS = 30, 96
 DECLARED = ("camera_pitch", "blur")
-ROLLED = {"camera_roll": 4.0}
 SCATTER = (0.002, np.radians(0.3))
 
 
@@ -111,7 +110,6 @@ def waved():
 
 LOGS = {
     "nominal": nominal,
-    "rolled": lambda: write("rolled", shown(tuple(ROLLED.items()))),
     "waved": lambda: write("waved", waved()),
     "rectified": lambda: write("rectified", shown((("lens_distortion", -0.25),)), rectified=True),
     "bent": lambda: write("bent", shown((("lens_distortion", -0.25),))),
@@ -127,19 +125,6 @@ def test_nothing_is_missing_of_a_nominal_camera():
     assert set(found.declared) == set(found.theta) == {"camera_pitch"}
     assert found.matched > 0.9
     assert found.notes == ()
-
-
-@pytest.mark.slow
-def test_a_rolled_camera_is_explained_by_its_roll():
-    found = diagnosed_frames("rolled")
-    (effect,) = found.effects
-    assert (found.verdict, effect.effect, effect.names) == ("explained", "camera_roll", ("camera_roll",))
-    assert found.theta["camera_roll"].interval[0] < 4.0 < found.theta["camera_roll"].interval[1]
-    assert effect.nats > 6.0
-    assert effect.error_without > 1.5
-    assert found.pixels.after.value < 0.6 * found.pixels.before.value
-    assert [gate.significant for gate in found.residual_fields] == [True, False]
-    assert found.candidates[0].effects == ("camera_roll",)
 
 
 @pytest.mark.slow

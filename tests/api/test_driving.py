@@ -67,13 +67,14 @@ def test_a_family_that_keeps_no_poses_gives_scores_alone(make_study):
     assert driven.scores["distance"] > 0.0
 
 
-def test_an_episode_that_fails_ends_in_one_line(make_study):
+def test_an_episode_that_fails_and_a_folder_that_is_no_study_are_one_line(make_study, tmp_path):
     folder = make_study(domain={"faults": '["agent1:2:raises"]'})
     with pytest.raises(EpisodeError) as problem:
         drive(folder, "agent1", start=2)
     words = "agent 'agent1' failed from start 2: agent 'agent1' raised ValueError at 1.20 s: it lost its way"
     assert str(problem.value) == words
     assert isinstance(problem.value, RunError)
+    assert "study.toml: no such file" in complaint_of(drive, tmp_path, "steady")
 
 
 @pytest.mark.parametrize(
@@ -89,7 +90,3 @@ def test_an_episode_that_fails_ends_in_one_line(make_study):
 )
 def test_what_the_family_has_not_is_refused_with_what_it_has(make_study, arguments, changes, words):
     assert re.search(words, complaint_of(drive, make_study(), *arguments, **changes))
-
-
-def test_a_folder_that_is_no_study_is_refused(tmp_path):
-    assert "study.toml: no such file" in complaint_of(drive, tmp_path, "steady")

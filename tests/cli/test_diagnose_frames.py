@@ -114,14 +114,11 @@ def test_people_read_the_verdict_the_roll_and_both_errors(found):
     assert "fitting the camera" in found.err
 
 
-def test_an_unknown_effect_is_told_with_the_nearest_of_both_kinds(stills, tmp_path, refused):
+def test_an_unknown_effect_and_a_log_to_test_on_are_refused_in_one_line(stills, tmp_path, refused):
     line = refused("diagnose", stills, "--declared", "camera_rol", "--output", tmp_path / "out")
     assert "--declared camera_rol: no effect on motion, camera or pictures has this name; did you mean" in line
     assert "'camera_roll'" in line
     assert not (tmp_path / "out").exists()
-
-
-def test_a_log_to_test_on_is_refused_where_there_is_no_motion(stills, tmp_path, refused):
     line = refused("diagnose", stills, "--test", stills, "--output", tmp_path / "out")
     assert "--test: pictured has no commands" in line
 

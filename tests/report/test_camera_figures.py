@@ -114,7 +114,7 @@ def test_the_markings_are_drawn_before_and_after_on_two_frames(figures, clean):
     assert len(camera_figures(clean)["camera_markings"].axes) == 2
 
 
-def test_outlines_of_the_fitted_camera_lie_on_the_edges_of_the_picture(diagnosis):
+def test_outlines_lie_on_the_edges_and_displaced_edges_are_drawn_where_they_went(diagnosis):
     edges, distances = diagnosis.named.full.views.edges, {}
     for name, fit in camera_models(diagnosis).items():
         own = (edges.frame == 4) & ~edges.white
@@ -122,9 +122,6 @@ def test_outlines_of_the_fitted_camera_lie_on_the_edges_of_the_picture(diagnosis
         at = np.abs(field[edges.row[own].astype(int), edges.column[own].astype(int)])
         distances[name] = np.nanmedian(at)
     assert 4.0 * distances[AFTER] < 2.0 < distances[DECLARED_MODEL]
-
-
-def test_displaced_edges_are_drawn_where_they_went(diagnosis):
     fit = diagnosis.named.model
     edges = fit.views.edges
     moved = replace(fit, views=replace(fit.views, edges=edges._replace(row=edges.row + 0.5)))

@@ -70,12 +70,16 @@ def test_what_was_fitted_stands_beside_what_was_found_before_the_verdict():
     assert nothing == "run: nothing missing, with trim 0.043: only noise is left"
 
 
-def test_an_effect_that_was_added_says_what_the_error_is_without_it():
+def test_an_effect_that_was_added_says_its_worth_and_windows_what_they_did():
     (note,) = motion_notes(diagnosis(effects=(BAND,), effect_sizes={"dead_band": MUCH}))
     assert note == (
         "added dead_band (left wheel): log-likelihood gain 900 nats, p = 0.002; "
         "without it the error grows by 34 % (20 to 50) at 2 s"
     )
+    polish = MultistepFit(2.0, {1.0: Ratio(0.95, (0.9, 1.0)), 2.0: Ratio(0.8, (0.7, 0.9))}, {})
+    (note,) = motion_notes(diagnosis(multistep=polish))
+    assert "fitted to windows of 2 s" in note
+    assert "1 s: 0.95, 2 s: 0.80" in note
 
 
 def test_an_effect_is_immaterial_only_where_that_is_shown():
@@ -103,13 +107,6 @@ def test_the_next_drive_is_told_with_what_it_tells_and_how_often_to_drive_it():
     assert told(50.0, "a", "b") == [f"to tell a from b, {often} (one minute is ample): so"]
     assert told(3.0, "a", "b", "c") == [f"to tell a from b from c, {often} (expected gain 3 nats a minute): so"]
     assert told(50.0, "a", "b", verdict="cannot be told")[1] == "the same drives tell noise from what is missing"
-
-
-def test_parameters_fitted_to_windows_are_told_with_what_that_did():
-    polish = MultistepFit(2.0, {1.0: Ratio(0.95, (0.9, 1.0)), 2.0: Ratio(0.8, (0.7, 0.9))}, {})
-    (note,) = motion_notes(diagnosis(multistep=polish))
-    assert "fitted to windows of 2 s" in note
-    assert "1 s: 0.95, 2 s: 0.80" in note
 
 
 def test_a_ratio_is_told_as_what_it_adds():
@@ -153,10 +150,14 @@ def test_the_document_has_what_was_promised_and_can_be_written():
     assert clocks_document((found, clocks()))["test"]["offset_s"] == 0.0
 
 
-def test_one_clock_is_no_news_but_a_delay_is_said_to_be_one_number_with_an_offset():
+def test_one_clock_is_no_news_and_a_declared_offset_is_told_instead_of_a_doubt():
     assert clocks_notes("yard", (clocks(),), {}) == []
     (note,) = clocks_notes("yard", (clocks(),), {"delay": 0.1})
     assert "one number" in note
+    declared = replace(clocks(), declared_s=-0.25)
+    assert clocks_document((declared,))["declared_offset_s"] == -0.25
+    (note,) = clocks_notes("yard", (declared,), {"delay": 0.1})
+    assert note == "poses of yard are stamped -0.25 s later than commands, as it declares; that was taken out"
 
 
 @pytest.mark.parametrize(
@@ -179,13 +180,6 @@ def test_what_is_wrong_is_one_sentence_with_what_to_do(found, says):
     assert says in note
     assert "\n" not in note
     assert any(word in note for word in ("Stamp both", "Check how", "Keep clocks"))
-
-
-def test_an_offset_that_the_log_declares_is_told_instead_of_a_doubt():
-    declared = replace(clocks(), declared_s=-0.25)
-    assert clocks_document((declared,))["declared_offset_s"] == -0.25
-    (note,) = clocks_notes("yard", (declared,), {"delay": 0.1})
-    assert note == "poses of yard are stamped -0.25 s later than commands, as it declares; that was taken out"
 
 
 RATIO = Ratio(0.5, (0.4, 0.6))

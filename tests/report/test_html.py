@@ -158,14 +158,11 @@ def test_commands_between_backticks_are_code_whose_options_are_broken_nowhere():
     assert "python -m proxytune study a <span>--budget</span> 2</code>" in text
 
 
-def test_the_page_fits_phones_paper_and_the_dark():
+def test_a_page_fits_every_screen_and_its_foot_says_how_to_come_by_it():
     text = html_of(VIEW)
     assert 'name="viewport" content="width=device-width' in text
     for words in ("@media print", "@media (prefers-color-scheme: dark)", ".card { display: block;", "background: #fff"):
         assert words in text
-
-
-def test_the_foot_says_how_to_come_by_it_again():
     foot = html_of(VIEW).split("<footer>")[1]
     for words in ("python -m proxytune study a", "seed", "numpy 2", "Written 2026-01-01"):
         assert words in foot
@@ -186,12 +183,9 @@ def test_pictures_are_data_of_their_own_kind(kind):
     assert f'src="data:image/{kind};base64,' in html_of(replace(VIEW, parts=(Picture("P", png(form=kind), "C"),)))
 
 
-def test_what_is_no_picture_is_refused():
+def test_what_is_no_picture_is_refused_and_a_page_written_as_it_is_shown(tmp_path):
     with pytest.raises(ValueError, match="no PNG, GIF or SVG"):
         html_of(replace(VIEW, parts=(Picture("P", b"MZ", "C"),)))
-
-
-def test_a_page_is_written_as_it_is_shown(tmp_path):
     write_page(tmp_path / "new" / "report.html", VIEW, FOOT)
     assert (tmp_path / "new" / "report.html").read_text(encoding="utf-8") == html_of(VIEW)
 
@@ -214,17 +208,13 @@ def test_a_figure_is_part_of_the_page_and_its_markers_say_their_values():
     assert 'role="img"' in page
 
 
-def test_two_figures_on_a_page_share_no_names():
+def test_figures_share_no_names_and_names_in_them_are_text():
     """Whatever a figure refers to is its own, so that no figure changes another."""
     page = html_of(replace(VIEW, parts=(Picture("P", drawn(), "C"), Picture("Q", drawn(), "C"))))
     names = re.findall(r' id="([^"]+)"', page)
     assert len(names) == len(set(names))
     wanted = set(re.findall(r'(?:href="#|url\(#)([^")]+)', page))
     assert wanted <= set(names)
-
-
-def test_a_name_in_a_figure_is_text_and_nothing_else():
-    """What a user calls an agent or a metric cannot become a tag."""
     page = html_of(replace(VIEW, parts=(Picture("P", drawn("<script>x</script>--><b>", "<i>&"), "C"),)))
     assert "<script" not in page
     assert "<b>" not in page

@@ -35,16 +35,6 @@ def test_it_shows_every_trial_the_floor_by_its_kind_and_chance(result):
     assert drawn[f"chance {chance.mean:.1f}"].get_ydata()[0] == chance.mean
 
 
-def test_the_line_is_the_answer_so_far_and_not_the_luckiest_trial(result):
-    first, second, third, *rest = result.trials
-    answers = (None, second, second, third, third, third, second)
-    told = replace(result, answers=answers, best=replace(result.best, trial=third))
-    line = lines(convergence_figure(told))["answer so far"]
-    assert list(line.get_xdata()) == [2, 3, 4, 5, 6, 7, 8]
-    assert list(line.get_ydata()) == [answer.prpv for answer in (*answers[1:], third)]
-    assert {first.prpv, *(one.prpv for one in rest)} != set(line.get_ydata())
-
-
 def test_the_answer_s_fresh_score_stands_after_the_last_trial_with_its_interval(result):
     assert not convergence_figure(result).axes[0].containers
     (bar,) = convergence_figure(confirmed(result)).axes[0].containers
@@ -84,11 +74,18 @@ def test_failed_trials_are_crosses_and_those_cut_off_stand_at_what_they_cannot_b
     assert "stopped early, at least" not in lines(convergence_figure(result))
 
 
-def test_without_a_noise_floor_none_is_drawn(result):
+def test_without_a_floor_none_is_drawn_and_the_line_is_the_answer_so_far(result):
     assessment = result.best.assessment
     silent = replace(assessment, noise_floor=replace(assessment.noise_floor, value=None, low=None, high=None))
     drawn = lines(convergence_figure(replace(result, best=replace(result.best, assessment=silent))))
     assert not [label for label in drawn if label.startswith(("noise floor", "target's halves"))]
+    first, second, third, *rest = result.trials
+    answers = (None, second, second, third, third, third, second)
+    told = replace(result, answers=answers, best=replace(result.best, trial=third))
+    line = lines(convergence_figure(told))["answer so far"]
+    assert list(line.get_xdata()) == [2, 3, 4, 5, 6, 7, 8]
+    assert list(line.get_ydata()) == [answer.prpv for answer in (*answers[1:], third)]
+    assert {first.prpv, *(one.prpv for one in rest)} != set(line.get_ydata())
 
 
 @pytest.fixture(scope="module")

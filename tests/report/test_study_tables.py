@@ -81,14 +81,11 @@ def test_what_is_known_of_theta_is_in_the_document(result):
     assert study_document(planted(result, misfit=UNTOLD))["misfit"]["fits"] is None
 
 
-def test_pairs_that_trade_are_in_the_document(result):
+def test_the_document_tells_floor_pairs_that_trade_and_whether_it_is_perfect(result):
     (trade,) = study_document(planted(result, (0.5, 0.5), (0.1, 0.1), correlation=-0.9))["trades"]
     assert trade[:2] == ["delay", "trim"]
     assert trade[2] == pytest.approx(-0.9, abs=0.05)
     assert study_document(planted(result))["trades"] == []
-
-
-def test_the_document_tells_the_floor_s_kind_and_whether_the_proxy_is_as_good_as_perfect(result):
     document = study_document(result)
     floor = result.floor
     assert (document["noise_floor_kind"], document["cannot_be_told_from_perfect"]) == ("halves", False)

@@ -53,14 +53,11 @@ def experiment(lessons=LESSONS, gain=1.0, published=NOBODY, examinations=None, c
     return Experiment(settings, 60.0, replace(needs, gain=gain), lessons)
 
 
-def test_a_proxy_saves_samples_only_if_its_whole_interval_says_so():
+def test_a_proxy_saves_samples_only_if_its_whole_interval_says_so_and_is_named_there():
     saves, none, unknown = sorted_by_worth(LESSONS)
     assert [one.name for one in saves] == ["sure", "far"]
     assert [one.name for one in none] == ["harmful", EVIL]
     assert [one.name for one in unknown] == ["wide", "reaching"]
-
-
-def test_the_answer_names_each_proxy_with_its_interval_where_it_belongs():
     answer = teach_answer(experiment())
     shown, rest = answer.split(" None saved: ")
     assert "sure: 300 (100 to 350)" in shown

@@ -19,11 +19,14 @@ def load(folder):
     return load_family(settings, settings.proxy)
 
 
-def test_a_factory_gets_the_domain_table_and_the_model(make_study):
+def test_facts_and_factories_get_what_study_toml_says(make_study):
     folder = make_study(domain={"version": '"7"'}, proxy='"model.toml"')
     (folder / "model.toml").write_text("trim = 0.2\n")
     family = load(folder)
     assert (family.version, family.theta) == ("7", (("trim", 0.2),))
+    known = study_facts(open_study(make_study()))
+    assert known["agents"] == [f"agent{number}" for number in range(6)]
+    assert not any(key.startswith("agents.") for key in known)
 
 
 BAD = {
@@ -194,12 +197,6 @@ def test_another_agent_behind_an_alias_is_another_study(aliased):
     changed = aliased(TABLE.replace('a5 = "agent5"', 'a5 = "agent0"'), budget="5")
     with pytest.raises(SettingsError, match=r'changed since the first trial: agents.a5 \(was "agent5"\); put it back'):
         run_study(changed)
-
-
-def test_facts_of_a_study_without_aliases_are_what_they_were(make_study):
-    known = study_facts(open_study(make_study()))
-    assert known["agents"] == [f"agent{number}" for number in range(6)]
-    assert not any(key.startswith("agents.") for key in known)
 
 
 def test_an_unknown_agent_behind_an_alias_is_told_with_its_key(aliased):

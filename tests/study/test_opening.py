@@ -210,13 +210,19 @@ def test_the_truth_is_read_but_nothing_depends_on_it(make_study):
         open_study(make_study(truth='"untruth.toml"'))
 
 
-def test_of_a_target_with_more_starts_the_study_s_own_are_compared(make_study):
+def test_starts_of_both_sides_are_compared_and_others_left_out(make_study, rows):
     """So that both sides drive from the same starts; where it lacks one of them, all its episodes count."""
     whole = open_study(make_study())
     fewer = open_study(make_study(starts="2"))
     assert (whole.target.episodes, fewer.target.episodes) == (("0", "1", "2"), ("0", "1"))
     assert fewer.target.means.tolist() == whole.target.values[:, :2].mean(axis=1).tolist()
     assert open_study(make_study(starts="5")).target.episodes == ("0", "1", "2")
+    folder = make_study(target='"real.csv"')
+    write(folder, real=[HEAD, *rows, *(f"agent{number},17,1,2" for number in range(6))])
+    study = open_study(folder)
+    assert "17" not in study.target.episodes
+    (line,) = [one for one in study.cautions if "taken for this study's starts" in one]
+    assert "and 1 of others are left out; raise starts to use them" in line
 
 
 HEAD = "agent,episode,distance,survival_time"
@@ -233,15 +239,11 @@ def write(folder, **files):
         (folder / f"{name}.csv").write_text("\n".join(lines) + "\n")
 
 
-def test_a_target_in_several_files_is_the_one_that_it_would_be_in_one(make_study, rows):
+def test_targets_of_several_files_and_names_are_as_one(make_study, rows):
     whole = open_study(make_study())
     folder = make_study(target='["monday.csv", "tuesday.csv"]')
     write(folder, monday=[HEAD, *rows[:7]], tuesday=[HEAD, *rows[7:]])
     assert study_facts(open_study(folder)) == study_facts(whole)
-
-
-def test_columns_have_the_target_s_own_names(make_study, rows):
-    whole = open_study(make_study())
     columns = '{ agent = "policy", episode = "trial", distance = "dist_m" }'
     folder = make_study(target='"real.csv"', target_columns=columns)
     european = [row.replace(",", ";").replace(".", ",") for row in rows]
@@ -288,12 +290,3 @@ def test_where_no_name_agrees_a_table_of_names_is_the_remedy(make_study, rows):
     write(folder, real=[HEAD, *(row.replace("agent", "a") for row in rows)])
     with pytest.raises(InputError, match=r"its agents are a0, a1.*by a table \[agents\] in study.toml: a0 = 'agent0'"):
         open_study(folder)
-
-
-def test_episodes_that_are_no_starts_of_the_study_are_left_out_and_that_is_said(make_study, rows):
-    folder = make_study(target='"real.csv"')
-    write(folder, real=[HEAD, *rows, *(f"agent{number},17,1,2" for number in range(6))])
-    study = open_study(folder)
-    assert "17" not in study.target.episodes
-    (line,) = [one for one in study.cautions if "taken for this study's starts" in one]
-    assert "and 1 of others are left out; raise starts to use them" in line

@@ -78,7 +78,7 @@ def with_holes(rows):
     return [row for row in rows if not row.startswith("agent2,1,")]
 
 
-def test_with_shared_starts_noise_is_what_another_placement_changes(make_study):
+def test_noise_is_that_of_placement_and_less_with_repeats(make_study):
     with running(make_study(preflight="true")) as study_run:
         run_preflight(study_run)
         found, pairs = noise_of(study_run), placement_pairs(study_run)
@@ -87,9 +87,6 @@ def test_with_shared_starts_noise_is_what_another_placement_changes(make_study):
     # Wobbly's scores wobble by 0.15, so a difference of two means over three starts has a variance of 2 · 0.15² / 3.
     assert np.median(found.variance) == pytest.approx(2 * 0.15**2 / 3, rel=0.8)
     assert (found.variance > 0.0).all()
-
-
-def test_repeats_of_a_start_on_the_target_make_its_noise_less(make_study):
     folder = make_study(preflight="true")
     with running(folder) as study_run:
         run_preflight(study_run)
@@ -99,6 +96,12 @@ def test_repeats_of_a_start_on_the_target_make_its_noise_less(make_study):
         assert shares_starts(study)
         again = noise_of(StudyRun(study, study_run.store))
     assert again.variance == pytest.approx(0.75 * once.variance)
+    with running(make_study(preflight="true")) as study_run:
+        run_preflight(study_run)
+        known = noise_of(study_run)
+        unknown = noise_of(StudyRun(open_study(make_study(preflight="false")), study_run.store))
+    assert known.caution == ""
+    assert unknown.caution.startswith("noise is estimated from the spread between the target's episodes")
 
 
 def twice(rows):
@@ -119,15 +122,6 @@ def test_any_other_table_works_and_says_what_it_loses(finished, edit):
     assert found.best.trial in found.trials
     for low, high in found.knowledge.intervals.values():
         assert low < high
-
-
-def test_the_spread_between_starts_is_taken_for_noise_only_where_nothing_better_is_known(make_study):
-    with running(make_study(preflight="true")) as study_run:
-        run_preflight(study_run)
-        known = noise_of(study_run)
-        unknown = noise_of(StudyRun(open_study(make_study(preflight="false")), study_run.store))
-    assert known.caution == ""
-    assert unknown.caution.startswith("noise is estimated from the spread between the target's episodes")
 
 
 def test_failed_episodes_are_left_out_of_noise_and_comparison(make_study):

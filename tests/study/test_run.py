@@ -86,15 +86,12 @@ def test_a_metric_that_cannot_be_used_is_refused(finished, case):
     assert complaint_of(with_metrics, open_study(finished), [Metric.parse(text) for text in texts]) == line
 
 
-def test_a_metric_that_the_target_was_not_measured_in_is_refused_by_file(finished):
+def test_metrics_that_no_trial_or_target_has_are_refused(finished):
     rows = [line.rsplit(",", 1)[0] for line in (finished / "target.csv").read_text().splitlines()]
     (finished / "other.csv").write_text("\n".join(rows) + "\n")
     study = changed(finished, targets=(finished / "other.csv",))
     with pytest.raises(InputError, match=r"other\.csv.*survival_time"):
         with_metrics(study, OWN)
-
-
-def test_a_trial_that_lacks_episodes_is_told(finished):
     with Store.open(finished) as store:
         store.save_trial(
             open_study(finished).identity, TrialRecord(7, {"trim": 0.0, "delay": 0.1}, "finished", 3.0, {"prpv": 3.0})

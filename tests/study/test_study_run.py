@@ -322,14 +322,11 @@ def test_the_number_of_jobs_changes_nothing_and_the_seed_and_the_model_do(make_s
     assert (measure_agents(one, model, 1001, Silent()).values != table.values).any()
 
 
-def test_a_target_of_repeats_has_a_floor_of_the_same_starts(make_study, model):
+def test_a_target_of_repeats_has_a_floor_and_a_failing_episode_leaves_no_table(make_study, model):
     settings = read_study_settings(make_study())
     once, twice = (measure_agents(settings, model, 1001, Silent(), repeats) for repeats in (1, 2))
     assert noise_floor(target=twice, metrics=settings.metrics).kind == "same starts"
     assert noise_floor(target=once, metrics=settings.metrics).kind == "halves"
-
-
-def test_a_failing_episode_leaves_no_table(make_study, model):
     settings = read_study_settings(make_study(domain={"faults": '["agent3:1:raises"]'}))
     with pytest.raises(EpisodeError, match="agent 'agent3' failed from start 1"):
         measure_agents(settings, model, 1, Silent())
@@ -379,16 +376,13 @@ def test_the_search_is_told_every_metric_that_both_sides_have_and_prpv_counts_th
     assert open_study(folder).target.metrics == ("survival_time",)
 
 
-def test_only_what_is_given_changes_and_no_trial_depends_on_it(make_study):
+def test_budget_and_jobs_alone_change_and_learning_value_has_its_budget_elsewhere(make_study):
     study = open_study(make_study())
     assert with_spending(study) == study
     other = with_spending(study, budget=40, jobs=3)
     assert (other.settings.budget, other.settings.jobs) == (40, 3)
     assert replace(other.settings, budget=7, jobs=1) == study.settings
     assert study_facts(other) == study_facts(study)
-
-
-def test_a_search_for_learning_value_has_its_budget_elsewhere(make_study):
     study = open_study(make_taught(make_study, objective='"plv"', engine='"gp"'))
     with pytest.raises(InputError, match=r"study.toml: budget: .*set teaching.budget in this file instead"):
         with_spending(study, budget=4)

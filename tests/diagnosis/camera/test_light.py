@@ -91,12 +91,6 @@ def test_without_markings_or_floor_nothing_can_be_told():
 
 @pytest.mark.slow
 @needs_measured
-def test_measured_frames_of_the_nominal_camera_have_no_blemish():
-    assert blemishes(measured(), predicted()) == ()
-
-
-@pytest.mark.slow
-@needs_measured
 def test_dirt_and_a_bumper_before_measured_frames_are_found():
     hidden = dirty(measured().astype(float), 85, 60, diameter=14.0)
     hidden[:, 110:] = (30.0, 30.0, 35.0)
@@ -176,14 +170,3 @@ def test_flat_places_keep_away_from_edges_and_horizon():
     for down, right in ((0, 0), (6, 0), (0, 6), (6, 6)):
         np.testing.assert_allclose(model[frame, row + down, column + right], model[frame, row + 3, column + 3], atol=4)
         assert floor()[row + down, column + right].all()
-
-
-@pytest.mark.slow
-@needs_measured
-def test_measured_frames_of_the_nominal_camera_are_neutral():
-    """Gain 0.97, gamma 1.01, vignetting 0.01."""
-    light = fit_light(measured(), predicted(), floor())
-    assert inside(light.gain, 1.0)
-    assert inside(light.gamma, 1.0)
-    assert abs(light.vignetting.value) < 0.03
-    assert inside(light.vignetting, 0.0)

@@ -227,16 +227,13 @@ def write(folder, text):
     return path
 
 
-def test_weights_are_read_by_their_names_in_theta(tmp_path):
+def test_weights_are_read_by_their_names_and_labelled_as_no_physics(tmp_path):
     theta = read_model(write(tmp_path, GOOD)).theta
     assert theta["learnt.turn_rate.yaw@-1.25"] == 0.1
     assert theta["learnt.speed_and_turn.sideways@0.2,-1.0"] == 0.02
     assert theta["learnt.range.yaw@high"] == 3.5
     assert len(theta) == 4 + 8 + 2 + 2
     assert [effect.name for effect in effects_from(theta, read_robot("duckiebot").figures)] == ["learnt"]
-
-
-def test_what_was_learnt_is_labelled_as_no_physics(tmp_path):
     text = model_text(read_model(write(tmp_path, GOOD)))
     assert f"# {LABEL}" in text
     assert "not physics" in LABEL

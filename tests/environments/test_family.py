@@ -174,22 +174,16 @@ def test_what_is_random_within_an_episode_comes_from_its_seed(tmp_path):
     assert run(kin, "random", seed=1) == run(kin, "random", seed=1)
 
 
-def test_a_model_gives_effects_and_values_of_the_environments_own(tmp_path):
+def test_a_model_gives_effects_and_values_before_those_of_the_table(tmp_path):
     named = family(tmp_path, PENDULUM, "[parameters]\nmass = 1.7\n[effects.delay]\ndelay = 0.1\n")
     plain, agent = family(tmp_path, PENDULUM), "toys:Wobble"
     assert run(named, agent) == run(plain, agent, mass=1.7, delay=0.1)
     assert run(named, agent, mass=1.0, delay=0.0) == run(plain, agent)
     assert run(named, agent) != run(plain, agent)
-
-
-def test_a_models_values_go_before_those_of_the_table(tmp_path):
     table = PENDULUM + "[effects.delay]\ndelay = 0.2\n"
     given = family(tmp_path, table, 'format = 1\nrobot = "any"\n[effects.delay]\ndelay = 0.1\n')
     assert dict(given.held) == {"delay": 0.1}
     assert dict(family(tmp_path, table).held) == {"delay": 0.2}
-
-
-def test_an_effect_that_vanishes_may_stand_in_a_model(tmp_path):
     kin = family(tmp_path, PENDULUM, "[effects.dead_band]\nwidth = 0.1\nimbalance = 0.0\n")
     assert run(kin, "toys:Wobble") == run(family(tmp_path, PENDULUM), "toys:Wobble", **{"dead_band.width": 0.1})
 

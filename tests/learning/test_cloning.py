@@ -106,16 +106,13 @@ def test_many_pictures_are_answered_to_the_bit_as_each_by_itself(learner):
         np.testing.assert_array_equal(answered, alone[:count])
 
 
-def test_a_cell_is_the_mean_grey_of_its_pixels_and_the_top_is_not_looked_at():
+def test_cells_are_means_of_grey_also_of_unequal_size():
     picture = np.zeros((1, 12, 16, 3), dtype=np.uint8)
     picture[0, :3] = 255
     picture[0, 3:6, :4] = (255, 0, 0)
     cells = grey_cells(picture, top=0.25, rows=3, columns=4)[0].reshape(3, 4)
     assert cells[0, 0] == pytest.approx(1 / 3 - 0.5)
     assert (np.delete(cells.ravel(), 0) == -0.5).all()
-
-
-def test_cells_may_be_of_unequal_size():
     picture = np.zeros((1, 5, 3, 3), dtype=np.uint8)
     picture[0, :2, :2] = 255
     assert grey_cells(picture, top=0.0, rows=2, columns=2)[0] == pytest.approx([0.5, -0.5, -0.5, -0.5])

@@ -64,13 +64,10 @@ def test_a_level_that_the_learner_without_a_proxy_does_not_reach_leaves_plv_unkn
     assert found.plv.low > 0.0
 
 
-def test_a_learner_counts_as_settled_where_the_last_doubling_gains_no_more_than_the_tolerance():
+def test_a_grid_is_settled_by_its_last_doubling_alone():
     rising = curve(np.nan, 10, 20, 30, 50)
     assert judged(proxy=curve(0, 10, 20, 30, 40)).settled
     assert not sample_needs({"none": rising}, none="none", best_score=60.0, tolerance=5.0).settled
-
-
-def test_a_grid_whose_first_count_is_beyond_half_its_last_tells_no_gain():
     alone = LearningCurve((0, 500, 800), np.array([[np.nan, 50.0, 50.0], [np.nan, 49.0, 51.0]]))
     needs = sample_needs({"none": alone}, none="none", best_score=60.0, tolerance=5.0)
     assert (needs.gain, needs.settled) == (None, False)
@@ -155,26 +152,16 @@ def test_the_first_examinations_span_the_grid_in_two_repetitions_and_none_is_of_
     assert len(first) == len(set(first)) == 2 * (4 + 4)
 
 
-def test_a_proxy_whose_crossing_is_sure_is_examined_less_than_one_whose_is_open():
+def test_examinations_go_where_they_tell_most_and_nothing_twice():
     chosen = next_examinations(needs(), list(CURVES), SPENDING)
     often = {name: sum(one.curve == name for one in chosen) for name in CURVES}
     assert len(chosen) == SPENDING.batch
     assert often["sure"] < min(often["open"], often["none"])
-
-
-def test_nothing_is_examined_twice_and_new_repetitions_come_first():
-    chosen = next_examinations(needs(), list(CURVES), SPENDING)
     done = {Examination(name, int(r), SPENDING_GRID[c]) for name, one in CURVES.items() for r, c in one.examined}
     assert len(set(chosen)) == len(chosen)
     assert not set(chosen) & done
     assert chosen[0].repetition == 2
-
-
-def test_only_curves_that_are_asked_for_are_examined():
     assert {one.curve for one in next_examinations(needs(), ["open"], SPENDING)} == {"open"}
-
-
-def test_the_learner_without_a_proxy_alone_is_examined_for_how_many_samples_it_needs():
     alone = {"none": CURVES["none"]}
     chosen = next_examinations(needs(alone), ["none"], SPENDING)
     assert len(chosen) == SPENDING.batch

@@ -149,7 +149,7 @@ def sizes(count, jobs, seconds=None, most_s=MOST_S):
     return [len(fleet) for fleet in cut]
 
 
-def test_fleets_are_as_large_as_seconds_and_processes_allow():
+def test_fleets_are_as_large_as_seconds_and_processes_allow_and_small_at_first():
     assert sizes(48, 1, 0.1) == [MOST]
     assert sizes(48, 2, 0.1) == [24, 24]
     assert sizes(200, 2, 0.1) == [34, 34, 33, 33, 33, 33]
@@ -158,9 +158,6 @@ def test_fleets_are_as_large_as_seconds_and_processes_allow():
     assert sizes(5, 1, 100.0) == [1] * 5
     assert sizes(6, 100, 0.1) == [1] * 6
     assert sizes(0, 2, 0.1) == []
-
-
-def test_as_long_as_nothing_is_known_fleets_are_small():
     assert sizes(10, 2) == [UNKNOWN, UNKNOWN, 2]
 
 

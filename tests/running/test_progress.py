@@ -59,12 +59,9 @@ def test_on_a_narrow_terminal_the_bar_goes_first(monkeypatch, width, bar, unit):
     assert ("1250/1600 episodes" in text) == unit
 
 
-def test_anything_else_sees_a_plain_line_for_what_is_finished(monkeypatch):
+def test_lines_are_plain_unbroken_and_of_what_is_finished(monkeypatch):
     lines = shown(False, monkeypatch).splitlines()
     assert [line.partition(" s: ")[2] for line in lines] == ["trial 2 of 2: PRPV 4; 1250 of at most 1600 episodes"]
-
-
-def test_a_line_is_never_broken_and_no_brackets_are_taken_for_markup(monkeypatch):
     what = (f"trial 1 of 2 [red]{'x' * 100}", "episodes", None)
     assert f"[red]{'x' * 100}: PRPV 4; 1250" in shown(False, monkeypatch, 44, what=what)
 

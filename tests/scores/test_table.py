@@ -32,19 +32,13 @@ def test_a_malformed_metric_is_refused_by_name(text):
         Metric.parse(text)
 
 
-def test_a_percentage_is_of_the_largest_value_of_each_table():
+def test_percentages_merits_and_rounding_are_of_each_table():
     merits, tie = Metric.parse("a:max:10%").merits(np.array([[1.0, 4.0], [10.0, 20.0]]))
     np.testing.assert_allclose(merits, [[0.25, 1.0], [0.5, 1.0]])
     np.testing.assert_allclose(tie, [[0.1], [0.1]])
-
-
-def test_where_less_is_better_merits_are_reversed():
     for text in ("a:min", "a:min:10%"):
         merits, _ = Metric.parse(text).merits(np.array([1.0, 4.0]))
         assert merits[0] > merits[1]
-
-
-def test_rounding_is_no_variation():
     assert varies(np.array([[0.3, 1.0], [0.1 + 0.2, 2.0]])).tolist() == [False, True]
 
 

@@ -50,9 +50,14 @@ def test_the_incumbent_is_not_the_luckiest_score():
     assert mean < 5
 
 
-def test_the_noise_never_vanishes_even_on_scores_without_any():
+def test_noise_never_vanishes_and_the_posterior_is_surer_where_trials_are():
     surrogate = fit_surrogate(SPACE, visited(30, lambda values: 10 * values[0]))
     assert surrogate.model.noise_ > 0.0099
+    trials = [trial for trial in visited(30) if trial.values[0] < 0.15]
+    surrogate = fit_surrogate(SPACE, trials)
+    _, at_trials = surrogate.at_visited()
+    _, elsewhere = surrogate.predict(np.array([[1.0, 0.0], [1.0, 1.0]]))
+    assert at_trials.max() < elsewhere.min()
 
 
 def test_a_few_trials_do_not_send_the_length_scales_to_their_bounds():
@@ -64,14 +69,6 @@ def test_a_few_trials_do_not_send_the_length_scales_to_their_bounds():
         assert 0.1 < min(scales) <= max(scales) < 1.6
 
 
-def test_the_posterior_is_surer_where_trials_are():
-    trials = [trial for trial in visited(30) if trial.values[0] < 0.15]
-    surrogate = fit_surrogate(SPACE, trials)
-    _, at_trials = surrogate.at_visited()
-    _, elsewhere = surrogate.predict(np.array([[1.0, 0.0], [1.0, 1.0]]))
-    assert at_trials.max() < elsewhere.min()
-
-
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_a_few_trials_or_equal_scores_still_give_finite_predictions(count):
     for score in (steps, lambda values: 4.0):
@@ -80,12 +77,9 @@ def test_a_few_trials_or_equal_scores_still_give_finite_predictions(count):
         assert np.isfinite(deviation).all()
 
 
-def test_failed_trials_are_left_out():
+def test_failed_trials_are_left_out_and_without_a_score_it_says_so():
     trials = visited(9)
     assert len(fit_surrogate(SPACE, [*trials, Trial((0.1, 0.1), None)]).visited) == 9
-
-
-def test_without_a_single_score_it_says_so():
     with pytest.raises(RunError, match="no trial has a score"):
         fit_surrogate(SPACE, [Trial((0.1, 0.1), None)])
 

@@ -66,16 +66,13 @@ def test_wheels_mass_and_camera_are_read_and_the_bullet_plant_drives_it_ahead(tm
     assert poses[-1, 0] == pytest.approx(0.4, abs=0.02)
 
 
-def test_only_what_a_urdf_cannot_know_is_to_be_edited(tmp_path):
+def test_what_was_read_is_said_and_what_a_urdf_cannot_know_is_to_be_edited(tmp_path):
     lines = robot_from_urdf("rover", urdf(tmp_path), {"full_speed": 0.4}).files["robot.toml"].splitlines()
     figures = {line.split(" = ")[0]: line for line in lines if " = { value" in line}
     assert "read from turtle.urdf" in figures["wheel_radius"]
     assert "given to" in figures["full_speed"]
     assert not [n for n in ("wheel_radius", "wheel_distance", "mass", "camera_height") if "EDIT" in figures[n]]
     assert "# EDIT" in figures["motor_time_constant"]
-
-
-def test_it_says_what_was_read_and_what_was_changed(tmp_path):
     notes = robot_from_urdf("rover", urdf(tmp_path), {}).notes
     assert notes[0].startswith("read from turtle.urdf: wheel_radius 0.033, wheel_distance 0.16, mass 0.91")
     for said in ("wheel_left_joint is now called axle_left", "moved by 0.01 0 -0.01 m", "1 meshes of its looks"):

@@ -19,16 +19,13 @@ def test_theta_is_stored_in_one_form_with_every_digit():
     assert theta_json(THETA) == '{"delay": 0.3333333333333333, "trim": 0.1}'
 
 
-def test_an_outcome_comes_back_to_the_last_bit(tmp_path):
+def test_an_outcome_comes_back_to_the_last_bit_and_is_there_for_others_at_once(tmp_path):
     with Store.open(tmp_path) as store:
         store.save_outcome("identity", WORKED)
     with Store.read(tmp_path) as store:
         assert store.outcomes("identity", THETA) == {EPISODE: WORKED}
         assert store.outcomes("another identity", THETA) == {}
         assert store.outcomes("identity", {"trim": 0.1}) == {}
-
-
-def test_an_outcome_is_there_for_others_at_once(tmp_path):
     with Store.open(tmp_path) as store:
         store.save_outcome("identity", WORKED)
         with sqlite3.connect(tmp_path / "study.db") as plain:
@@ -99,15 +96,12 @@ def test_beginning_afresh_drops_trials_but_no_episode(tmp_path):
         assert store.outcomes("identity", THETA) == {EPISODE: WORKED}
 
 
-def test_seconds_are_averaged_over_domain_instances(tmp_path):
+def test_seconds_are_averaged_over_instances_and_trials_have_those_of_their_own(tmp_path):
     with Store.open(tmp_path) as store:
         store.save_outcome("identity", WORKED)
         elsewhere = make_episode({"trim": 0.2}, agent="agent1", start=2, seed=11)
         store.save_outcome("identity", Outcome(elsewhere, {"distance": 1.0}, "", 0.5))
         assert store.seconds() == {("agent1", 2): 1.0}
-
-
-def test_the_time_of_trials_is_that_of_their_own_episodes(tmp_path):
     elsewhere = make_episode({"trim": 0.2}, agent="agent1", start=2, seed=11)
     with Store.open(tmp_path) as store:
         assert store.seconds_of_trials("prpv", 9, {11}) == 0.0

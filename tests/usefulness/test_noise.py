@@ -52,7 +52,7 @@ def interleaved(one, two):
     return np.stack([one, two], axis=2).reshape(len(one), -1)
 
 
-def test_halves_are_disjoint_and_take_all_episodes_of_each_agent():
+def test_halves_are_disjoint_and_agents_with_the_same_episodes_split_alike():
     values = np.zeros((3, 5))
     values[0, 4], values[1, :2] = np.nan, np.nan
     uneven = table_of(values)
@@ -62,18 +62,17 @@ def test_halves_are_disjoint_and_take_all_episodes_of_each_agent():
     assert not first[0, :, 4].any()
     assert not first[1, :, :2].any()
     assert len(np.unique(first[2], axis=0)) > 1
-
-
-def test_agents_with_the_same_episodes_are_split_alike():
-    """Scores that depend on the start alone leave the order as it is in both halves."""
     starts = np.random.default_rng(0).normal(size=(1, 4))
     assert noise_floor(target=table_of(starts + np.arange(3.0)[:, None]), metrics=FIRST).high == 0.0
 
 
-def test_one_episode_gives_no_floor_and_says_why():
+def test_without_a_second_episode_or_a_start_in_common_there_is_no_floor():
     result = noise_floor(target=table_of(np.arange(3.0)[:, None]), metrics=FIRST)
     assert (result.value, result.kind) == (None, "none")
     assert "each agent has one episode on the target" in result.reason
+    (one, two), _ = planted(5)
+    other = table_of(two, "abcdef")
+    assert "both times" in floor_of_repeats(domain=table_of(one), again=other, metrics=FIRST).reason
 
 
 @given(seed=st.integers(0, 10_000), starts=st.integers(2, 5), repeats=st.integers(2, 5))
@@ -139,12 +138,6 @@ def test_an_agent_with_less_than_two_starts_driven_both_times_gives_no_floor_but
     found = floor_of_repeats(domain=table_of(one), again=table_of(two), metrics=FIRST)
     assert (found.kind, found.value, found.high) == ("none", None, None)
     assert told in found.reason
-
-
-def test_tables_without_a_start_in_common_give_no_floor():
-    (one, two), _ = planted(5)
-    other = table_of(two, "abcdef")
-    assert "both times" in floor_of_repeats(domain=table_of(one), again=other, metrics=FIRST).reason
 
 
 @pytest.mark.skipif(not SCORES.is_dir(), reason="the measured scores of ../shared/data are not here")

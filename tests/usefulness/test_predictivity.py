@@ -17,7 +17,7 @@ SCORES = Path(__file__).parents[2] / "../shared/data/scores"
 M = [Metric("m"), Metric("n")]
 
 
-def test_both_agree_with_scipy_also_where_there_are_ties():
+def test_correlations_agree_with_scipy_and_are_undefined_of_constants():
     rng = np.random.default_rng(1)
     proxy, target = rng.integers(0, 4, size=(2, 50, 8, 2)).astype(float)
     pearson, kendall = pearson_of_means(proxy, target), kendall_of_means(proxy, target)
@@ -25,9 +25,6 @@ def test_both_agree_with_scipy_also_where_there_are_ties():
         one, other = proxy[i, :, column], target[i, :, column]
         assert pearson[i, column] == pytest.approx(stats.pearsonr(one, other).statistic, abs=1e-7)
         assert kendall[i, column] == pytest.approx(stats.kendalltau(one, other).statistic, abs=1e-12)
-
-
-def test_a_constant_metric_is_undefined_and_said_so():
     proxy, target = of_means((1, 5), (2, 5), (3, 5)), of_means((1, 1), (2, 2), (2, 3))
     for measure in (srcc, predictivity.kendall_tau):
         result = measure(compare(proxy=proxy, target=target, metrics=M))
@@ -35,9 +32,6 @@ def test_a_constant_metric_is_undefined_and_said_so():
         assert result.value["m"] > 0
         assert [note for note in result.notes if "n: " in note and "alike in the proxy" in note]
         assert (result.better, result.range) == ("higher", (-1, 1))
-
-
-def test_two_agents_correlate_perfectly_which_means_nothing():
     result = srcc(compare(proxy=of_means((1, 1), (2, 2)), target=of_means((1, 2), (2, 1)), metrics=M))
     assert result.value == {"m": pytest.approx(1.0), "n": pytest.approx(-1.0)}
     assert "of two agents" in result.notes[0]
@@ -127,21 +121,15 @@ def test_observations_that_cannot_be_compared_are_refused(measure, proxy, target
 TARGET = of_means((1.0, 10.0), (2.0, 20.0), (3.0, 30.0))
 
 
-def test_given_weights_by_hand():
+def test_without_weights_a_metric_counts_in_its_spread_on_the_target():
     proxy = of_means((2.0, 10.0), (2.0, 20.0), (1.0, 36.0))
     result = ppv(compare(proxy=proxy, target=TARGET, metrics=M), beta={"m": 1.0, "n": 0.5})
     assert result.value == pytest.approx((1 + 0 + 2 + 0.5 * 6) / 3)
     assert result.better == "lower"
-
-
-def test_without_weights_a_metric_counts_in_its_spread_on_the_target():
     proxy = of_means((2.0, 20.0), (3.0, 30.0), (4.0, 40.0))
     result = ppv(compare(proxy=proxy, target=TARGET, metrics=M))
     assert result.beta == {"m": pytest.approx(1.0), "n": pytest.approx(0.1)}
     assert result.value == pytest.approx(2.0)
-
-
-def test_a_metric_constant_on_the_target_is_left_out_and_said_so():
     flat = of_means((1.0, 5.0), (2.0, 5.0), (3.0, 5.0))
     result = ppv(compare(proxy=TARGET, target=flat, metrics=M))
     assert (result.value, result.beta["n"]) == (0.0, None)

@@ -25,14 +25,14 @@ def test_paired_rollouts_that_correlate_are_worth_real_ones():
         assert high - low < found.alone[agent][1][1] - found.alone[agent][1][0]
 
 
-def test_a_proxy_that_does_not_correlate_is_left_out_and_that_is_said():
+def test_a_proxy_saves_by_correlation_of_pairs_alone():
     found = saved(0.0)
     assert (found.real_rollouts_worth, found.rectified) == (0.0, {})
     assert "beyond noise" in found.reason
-
-
-def test_the_same_starts_alone_save_nothing():
     assert "simulate more" in saved(0.7, simulated=25).reason
+    values = np.array([[1.0] * done + [0.0] * (20 - done) for done in (5, 10, 15, 8)])[..., None]
+    table = ScoreTable(tuple("abcd"), tuple(map(str, range(20))), ("success",), values)
+    assert saving_of(compare(proxy=table, target=table, metrics=SUCCESS)).kind == "policies"
 
 
 def test_the_rectified_mean_is_the_control_variate():
@@ -94,12 +94,6 @@ def test_without_pairs_a_model_over_agents_says_so():
     assert found.real_rollouts_worth > 1.0
     few = [side.arrange(agents=side.agents[:3]).unpaired() for side in (proxy, target)]
     assert "fewer than 4" in saving_of(compare(proxy=few[0], target=few[1], metrics=SUCCESS)).reason
-
-
-def test_sorted_outcomes_are_no_pairs():
-    values = np.array([[1.0] * done + [0.0] * (20 - done) for done in (5, 10, 15, 8)])[..., None]
-    table = ScoreTable(tuple("abcd"), tuple(map(str, range(20))), ("success",), values)
-    assert saving_of(compare(proxy=table, target=table, metrics=SUCCESS)).kind == "policies"
 
 
 @pytest.mark.slow

@@ -63,9 +63,6 @@ def test_a_plan_asks_for_the_agents_that_may_be_best_and_for_none_when_it_is_dec
     assert not planned([2, 25, 3, 3], 25, 0.05).rollouts
 
 
-def test_a_smaller_bound_takes_more_rollouts():
+def test_a_smaller_bound_takes_more_rollouts_and_agents_too_much_alike_are_told():
     assert planned([11, 14], 25, 0.02).total > planned([11, 14], 25, 0.05).total > 0
-
-
-def test_agents_too_much_alike_are_told():
     assert "too much alike" in planned([2500, 2500], 5000, 1e-6).reason

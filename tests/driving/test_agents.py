@@ -174,12 +174,9 @@ def test_laggy_waits_its_steps_smoothed_goes_a_share_of_the_way_and_leaning_give
     np.testing.assert_allclose(commands(Leaning(Fixed(0.4, 0.4), bias=0.1), 1), [[0.36, 0.44]])
 
 
-def test_an_unknown_agent_is_told_with_the_nearest(tmp_path):
+def test_agents_are_loaded_by_their_names_or_from_a_folder(tmp_path):
     with pytest.raises(ExtensionError, match="agent 'stead' is unknown .*; did you mean 'steady'"):
         load_agent("stead", tmp_path)
-
-
-def test_a_users_agent_is_loaded_from_its_folder(tmp_path):
     (tmp_path / "mine_agents.py").write_text(
         "class Mine:\n    def begin(self, robot): return 0\n"
         "    def act(self, picture, memory): return (0.1, 0.1), memory\n"

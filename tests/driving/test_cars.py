@@ -88,7 +88,7 @@ def test_the_delay_of_the_steering_comes_on_top_and_its_curve_has_sides_of_its_o
         assert np.degrees(np.arctan(yaw / forward * 0.1735)) == pytest.approx(angle)
 
 
-def test_a_car_with_mass_and_friction_does_what_its_equation_says():
+def test_a_car_with_mass_does_what_its_equation_says_and_slides_beyond_its_tyres():
     theta = {"rolling__inertia": 0.35, "rolling__freewheel": 1.0, "rolling__friction": 0.74, "rolling__drag": 0.2}
     throttle = np.repeat((0.0, 0.4, 0.1, 0.0), 200)
     moved = twists(DART, np.stack((throttle, 0.0 * throttle), axis=1), rate_hz=60.0, **theta)[:, 0] / 4.5
@@ -99,9 +99,6 @@ def test_a_car_with_mass_and_friction_does_what_its_equation_says():
         steps.append(speed)
     np.testing.assert_allclose(moved, np.mean(np.reshape(steps, (-1, 40)), axis=1), atol=2e-3)
     assert moved[-1] == 0.0
-
-
-def test_tyres_hold_no_more_than_so_much_and_let_the_rear_slide_outwards():
     forward, sideways, yaw = twists(CAR, held(1.0, 1.0), tyres__slide=0.25, tyres__rear_slip=0.01)[-1]
     assert forward * yaw == pytest.approx(4.0 * np.tanh(3.0**2 / CAR.least_radius * 0.25))
     assert sideways == pytest.approx(-0.01 * forward * forward * yaw)

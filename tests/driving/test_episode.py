@@ -433,13 +433,10 @@ def wandering(seed, samples=400):
     return np.column_stack(((x, y) + np.cumsum(way, axis=0), heading))
 
 
-def test_a_drive_is_scored_by_every_metric_in_order():
+def test_a_drive_is_scored_by_every_metric_and_early_ones_by_its_first_seconds():
     assert list(score(np.tile(OUTER, (2, 1)))) == list(METRICS)
     early = {"early_distance": "m", "early_offset": "m", "speed": "m/s"}
     assert {"distance": "m", "survival_time": "s", "time_out_of_lane": "s", "deviation": "m"} | early == METRICS
-
-
-def test_early_metrics_are_those_of_the_first_five_seconds_whatever_comes_after():
     short = drive(moved_left(OUTER, 0.03), [(0.4, 0.0)])
     still = np.repeat(short[-1:], 60 * 20, axis=0)
     whole = np.concatenate((short, still))

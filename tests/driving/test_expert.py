@@ -156,15 +156,6 @@ def test_the_road_ends_with_the_outer_edges_of_its_two_lanes(heading, side):
     assert shown(expert(), poses)[1].on_road == (True, True, False)
 
 
-def test_a_lesson_that_leaves_the_road_says_at_which_steps():
-    driven = lesson(1, (("trim", 0.5),))
-    middles = driven.poses[:-1:3, :2]
-    inside = np.abs(middles - ROAD.size[0] / 2).max(axis=1)
-    assert len(driven.memory.on_road) == len(driven.commands)
-    assert not all(driven.memory.on_road)
-    assert not any(driven.memory.on_road[step] for step in np.flatnonzero(inside < 0.2))
-
-
 RATE = int(ROBOT.figures["control_rate"])
 both_plants = pytest.mark.parametrize("plant", ["bullet", "planar"])
 
@@ -227,13 +218,19 @@ def test_the_same_lesson_shows_the_same_samples_to_the_last_bit(plant):
     np.testing.assert_array_equal(first.commands, again.commands)
 
 
-def test_another_seed_start_or_theta_shows_other_samples():
+def test_another_seed_start_or_theta_shows_other_samples_and_a_lesson_off_the_road_says_where():
     room = classroom(plant="planar")
     lessons = [episode(), episode(seed=6), episode(start=4), episode(trim=0.1)]
     shown = [room.demonstrate(one, 1.0)[0] for one in lessons]
     for other in shown[1:]:
         assert (other.commands != shown[0].commands).any()
         assert (other.observations != shown[0].observations).any()
+    driven = lesson(1, (("trim", 0.5),))
+    middles = driven.poses[:-1:3, :2]
+    inside = np.abs(middles - ROAD.size[0] / 2).max(axis=1)
+    assert len(driven.memory.on_road) == len(driven.commands)
+    assert not all(driven.memory.on_road)
+    assert not any(driven.memory.on_road[step] for step in np.flatnonzero(inside < 0.2))
 
 
 @both_plants

@@ -62,9 +62,14 @@ def test_what_is_no_urdf_is_refused_in_a_line(tmp_path, case):
     assert expected in complaint_of(parse_urdf, path)
 
 
-def test_words_for_numbers_are_refused_in_a_line():
+def test_a_robot_with_words_for_numbers_or_without_its_mesh_is_refused(tmp_path):
     with pytest.raises(SettingsError, match="is no sound URDF .*'wide'"):
         body_of(TEXT.replace("0 0.05 0.0318", "0 wide 0.0318"))
+    path = tmp_path / "robot.urdf"
+    mesh = '<collision><geometry><mesh filename="m.stl"/></geometry></collision>'
+    path.write_text(TEXT.replace("</link>", f"{mesh}</link>", 1))
+    with pytest.raises(SettingsError, match=r"names m.stl, which is not there; add it beside the URDF"):
+        check_body(replace(ROBOT, urdf=path))
 
 
 CHANGES = {
@@ -94,14 +99,6 @@ def test_what_a_urdf_names_must_be_a_file(tmp_path, named):
     mesh = f'<visual><geometry><mesh filename="{named}"/></geometry></visual>'
     path.write_text(TEXT.replace("</link>", f"{mesh}</link>", 1))
     with pytest.raises(SettingsError, match=r"robot.urdf: names .*which is a folder, a device or a pipe"):
-        check_body(replace(ROBOT, urdf=path))
-
-
-def test_a_mesh_that_robots_collide_as_must_be_there(tmp_path):
-    path = tmp_path / "robot.urdf"
-    mesh = '<collision><geometry><mesh filename="m.stl"/></geometry></collision>'
-    path.write_text(TEXT.replace("</link>", f"{mesh}</link>", 1))
-    with pytest.raises(SettingsError, match=r"names m.stl, which is not there; add it beside the URDF"):
         check_body(replace(ROBOT, urdf=path))
 
 

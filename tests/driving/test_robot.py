@@ -130,13 +130,6 @@ def test_a_robot_with_camera_but_without_body_may_be_studied_on_the_planar_plant
         lane_following(Section(path, "domain.", {"plant": "bullet"}), model=None)
 
 
-def test_a_body_without_its_figures_is_refused(tmp_path, monkeypatch):
-    folder = copy_duckiebot(tmp_path, "wheel_torque = {", "# wheel_torque = {")
-    monkeypatch.setattr(module, "shipped", lambda kind: tmp_path)
-    with pytest.raises(SettingsError, match=r"has no body: its robot.toml states no wheel_torque; use plant"):
-        read_robot.__wrapped__(folder.name).body()
-
-
 GEOMETRY = {"wheel_radius": 0.05, "effective_baseline": 0.3, "full_speed": 1.5}
 
 
@@ -193,12 +186,16 @@ def test_a_mistake_in_robot_toml_is_one_line(tmp_path, monkeypatch, before, afte
     assert says in complaint_of(read_robot.__wrapped__, "duckiebot")
 
 
-def test_a_robot_that_does_not_state_its_wheels_distance_cannot_be_examined():
+def test_a_robot_is_examined_only_with_its_wheels_distance_and_a_body_of_its_figures(tmp_path, monkeypatch):
     robot = read_robot("duckiebot")
     assert robot.wheel_distance() == robot.figures["wheel_distance"]
     figures = {name: value for name, value in robot.figures.items() if name != "wheel_distance"}
     with pytest.raises(SettingsError, match="states no wheel_distance; add it"):
         replace(robot, figures=figures).wheel_distance()
+    folder = copy_duckiebot(tmp_path, "wheel_torque = {", "# wheel_torque = {")
+    monkeypatch.setattr(module, "shipped", lambda kind: tmp_path)
+    with pytest.raises(SettingsError, match=r"has no body: its robot.toml states no wheel_torque; use plant"):
+        read_robot.__wrapped__(folder.name).body()
 
 
 def test_a_robot_beside_the_study_comes_before_a_shipped_one(tmp_path):

@@ -193,7 +193,7 @@ class Half:
 """
 
 
-def test_a_rendering_shows_the_picture_beside_the_map_with_the_way():
+def test_one_picture_and_one_way_are_drawn_where_the_robot_is():
     env = make(render_mode="rgb_array", start=1)
     picture, _ = env.reset(seed=0)
     before = env.render()
@@ -204,6 +204,10 @@ def test_a_rendering_shows_the_picture_beside_the_map_with_the_way():
     after = env.render()
     assert 0 < (before[:, 640:] != after[:, 640:]).any(axis=-1).mean() < 0.02
     assert make().render() is None
+    x, y, _ = env.reset(seed=0)[1]["pose"]
+    above, per_metre = env.render()[:, 640:], 480 / 1.755
+    assert tuple(above[round(480 - y * per_metre), round(x * per_metre)]) == (70, 160, 255)
+    assert env.metadata["render_fps"] == 20
 
 
 @pytest.mark.slow
@@ -215,14 +219,6 @@ def test_the_map_is_drawn_with_y_upwards(tmp_path):
     white = (env.render()[:, 640:] > 150).all(axis=-1).any(axis=1)
     assert not white[:120].any()
     assert white[-30:].any()
-
-
-def test_the_robot_is_drawn_where_it_is():
-    env = make(render_mode="rgb_array", start=1)
-    x, y, _ = env.reset(seed=0)[1]["pose"]
-    above, per_metre = env.render()[:, 640:], 480 / 1.755
-    assert tuple(above[round(480 - y * per_metre), round(x * per_metre)]) == (70, 160, 255)
-    assert env.metadata["render_fps"] == 20
 
 
 @pytest.mark.parametrize("vector", [SyncVectorEnv, AsyncVectorEnv])

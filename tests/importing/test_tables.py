@@ -274,10 +274,13 @@ def test_a_bad_column_map_is_refused(file, columns, where):
     assert where in complaint(file(POSES), columns=columns)
 
 
-def test_missing_files_are_told(tmp_path, file):
+def test_missing_files_and_folders_without_any_are_told(tmp_path, file):
     assert "no such file" in complaint(tmp_path / "none.csv")
     assert "no such file of commands" in complaint(file(POSES), commands="other.csv")
     assert "has no CSV file with poses" in complaint(tmp_path, commands="run1.csv")
+    assert not is_mrclam(tmp_path)
+    assert not is_mrclam(tmp_path / "Robot1_Odometry.dat")
+    assert "has no file such as Robot1_Groundtruth.dat" in complaint(tmp_path, read_mrclam)
 
 
 def test_tables_are_known_by_content(tmp_path, file):
@@ -311,24 +314,15 @@ def test_either_file_or_a_folder_of_one_robot_will_do(tmp_path):
         assert read_mrclam(path, Wanted()).drives[0].name == "Robot3"
 
 
-def test_of_several_robots_one_must_be_chosen(tmp_path):
+def test_several_robots_are_chosen_from_and_commands_left_out(tmp_path):
     write_mrclam(tmp_path, "Robot1"), write_mrclam(tmp_path, "Robot3")
     assert "several robots: Robot1, Robot3; choose one, as in --poses Robot1" in complaint(tmp_path, read_mrclam)
     assert "has no robot 'Robot4'; did you mean" in complaint(tmp_path, read_mrclam, poses="Robot4")
     assert read_mrclam(tmp_path, Wanted(poses="Robot3")).drives[0].name == "Robot3"
-
-
-def test_commands_may_be_left_out(tmp_path):
     path = write_mrclam(tmp_path)
     (tmp_path / "Robot1_Odometry.dat").unlink()
     assert "Robot1_Odometry.dat: no such file" in complaint(path, read_mrclam)
     assert read_mrclam(path, Wanted(commands="none")).drives[0].commands is None
-
-
-def test_a_folder_without_such_files_is_refused(tmp_path):
-    assert not is_mrclam(tmp_path)
-    assert not is_mrclam(tmp_path / "Robot1_Odometry.dat")
-    assert "has no file such as Robot1_Groundtruth.dat" in complaint(tmp_path, read_mrclam)
 
 
 LINES = "# tracked at 20 Hz\n0 1 2 0 0 0 0 1\n0.05 1 2 0 0 0 0.6 0.8\n"

@@ -172,16 +172,13 @@ def test_no_samples_the_first_count_and_each_doubling_are_about_one_apart_and_tu
     assert counts_at(doublings(counts, 50.0), 50.0) == pytest.approx(counts)
 
 
-def test_the_mean_curves_are_where_the_scores_are_and_surer_there_than_between_curves():
+def test_scores_are_surer_where_they_are_and_differ_more_where_they_do():
     model = fit_curve_model(marks(np.full(6, 2.0)))
     mean, covariance = model.mean_curves(np.array([0, 0, 1]), np.array([0.0, 5.0, 2.5]))
     assert mean == pytest.approx([10.3, 49.7, 30.0], abs=2.5)
     assert np.sqrt(np.diag(covariance)).max() < 2.0
     _, far = model.mean_curves(np.array([0]), np.array([9.0]))
     assert far[0, 0] > 4.0 * covariance.diagonal().max()
-
-
-def test_one_more_score_is_expected_to_differ_more_where_scores_do():
     model = fit_curve_model(marks([0.5, 0.5, 8.0, 8.0, 0.5, 0.5]))
     quiet, loud = model.noise_at(np.array([0, 0]), np.array([0.0, 2.5]))
     assert loud > 4.0 * quiet

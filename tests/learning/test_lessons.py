@@ -153,14 +153,16 @@ class Manifold(Matrix):
         return observations @ weights["matrix"]
 
 
-def test_a_classroom_is_asked_for_all_episodes_at_once_if_it_can_and_else_for_each():
+def test_classrooms_and_policies_are_asked_for_many_at_once_only_if_they_can():
     policy = policy_of(Matrix(), WEIGHTS)
     alone = [Schoolroom(Wobbly()).examine(episode, policy) for episode in EPISODES]
     assert examine_policy(Schoolroom(Wobbly()), EPISODES, policy) == alone
     assert examine_policy(Together(Wobbly()), EPISODES, policy) == [score + 1.0 for score in alone]
-
-
-def test_missing_scores_are_told_in_one_line():
+    seen = np.arange(12.0).reshape(4, 3)
+    one, many = policy_of(Matrix(), WEIGHTS), policy_of(Manifold(), WEIGHTS)
+    assert not hasattr(one, "act_many")
+    np.testing.assert_array_equal(many.act_many(seen), [one(row) for row in seen])
+    np.testing.assert_array_equal(many(seen[0]), one(seen[0]))
     with pytest.raises(EpisodeError, match="examine_together gave 3 scores for 4 episodes; give each its own"):
         examine_policy(Together(Wobbly(), lost=1), EPISODES, policy_of(Matrix(), WEIGHTS))
 
@@ -170,14 +172,6 @@ def test_a_score_that_is_no_finite_number_is_told_with_its_start(score):
     with pytest.raises(EpisodeError, match=r"the examination from start 2 gave -?(nan|inf); give a finite score"):
         unfinished = SimpleNamespace(examine=lambda episode, policy: score if episode.start == 2 else 1.0)
         examine_policy(unfinished, EPISODES, policy_of(Matrix(), WEIGHTS))
-
-
-def test_a_policy_answers_many_observations_at_once_only_if_its_learner_does():
-    seen = np.arange(12.0).reshape(4, 3)
-    one, many = policy_of(Matrix(), WEIGHTS), policy_of(Manifold(), WEIGHTS)
-    assert not hasattr(one, "act_many")
-    np.testing.assert_array_equal(many.act_many(seen), [one(row) for row in seen])
-    np.testing.assert_array_equal(many(seen[0]), one(seen[0]))
 
 
 MINE = """
@@ -238,7 +232,7 @@ def test_lessons_of_more_begin_with_those_of_fewer_and_others_are_of_another_see
     assert not np.array_equal(one.commands, other.commands)
 
 
-def test_theta_is_drawn_anew_for_every_lesson_and_only_where_it_is_free(tmp_path):
+def test_thetas_are_drawn_for_every_lesson_where_they_are_free(tmp_path):
     thetas = []
 
     class Spying(Schoolroom):
@@ -251,9 +245,6 @@ def test_theta_is_drawn_anew_for_every_lesson_and_only_where_it_is_free(tmp_path
     assert {theta["trim"] for theta in thetas} == {0.1}
     assert len(set(delays)) == len(delays) == 20
     assert 0.0 <= min(delays) < 0.1 < 0.2 < max(delays) <= 0.3
-
-
-def test_a_distribution_without_width_is_one_theta():
     fixed = Distribution({"trim": (0.1, 0.1)})
     assert fixed.fixed
     assert not WIDE.fixed

@@ -44,24 +44,21 @@ def test_the_samples_needed_lie_between_the_counts_where_the_curve_crosses():
     assert 200.0 < found.without.low < found.without.value < found.without.high < 400.0
 
 
-def test_where_the_target_needs_no_sample_at_all_the_reduction_is_whole_and_the_factor_unbounded():
+def test_where_no_or_all_samples_are_needed_plv_has_a_bound():
     found = worth(curve(50, 50, 50, 50, 50))
     assert (found.needed.value, found.reduction.value, found.factor.value) == (0.0, 1.0, None)
-
-
-def test_a_proxy_with_which_the_learner_never_converges_has_no_plv_but_a_bound_of_it():
     found = worth(curve(0, 0, 0, 0, 0))
     assert (found.needed.value, found.needed.low, found.needed.high) == (None, pytest.approx(800.0), None)
     assert (found.plv.value, found.plv.low, found.factor.value) == (None, None, None)
     assert found.plv.high < 0.0
     assert found.plv.high == pytest.approx(found.without.high - 800.0)
-
-
-def test_a_level_that_the_learner_without_a_proxy_does_not_reach_leaves_plv_unknown():
     found = worth(curve(55, 58, 59, 59, 59), level=59.0)
     assert found.without.value is None
     assert found.plv.value is None
     assert found.plv.low > 0.0
+    found = worth(curve(40, 50, 58, 59, 59), level=59.0).reduction
+    assert found.value is None
+    assert 0.0 < found.low < found.high == 1.0
 
 
 def test_a_grid_is_settled_by_its_last_doubling_alone():
@@ -80,17 +77,15 @@ def test_a_grid_that_begins_at_half_its_last_tells_the_gain(grid):
     assert 20.0 < needs.gain < 35.0
 
 
-def test_what_is_needed_without_a_proxy_does_not_depend_on_which_proxy_it_is_held_against():
+def test_proxies_are_compared_by_what_they_need_whatever_beside():
     needs = judged(good=curve(20, 48, 50, 50, 50), never=curve(0, 0, 0, 0, 0))
     good, never = (teaching_value(needs, none="none", proxy=name) for name in ("good", "never"))
     assert good.without == never.without
     assert good.without.low > 200.0
-
-
-def test_a_reduction_is_bounded_but_not_known_where_the_learner_without_a_proxy_does_not_get_there():
-    found = worth(curve(40, 50, 58, 59, 59), level=59.0).reduction
-    assert found.value is None
-    assert 0.0 < found.low < found.high == 1.0
+    needs = judged(good=curve(20, 48, 50, 50, 50), poor=curve(0, 10, 20, 48, 50))
+    more = more_needed(needs, more="poor", less="good")
+    assert 0.0 < more.low < more.value < more.high
+    assert more_needed(needs, more="good", less="good").value == 0.0
 
 
 def test_scores_beyond_the_best_and_its_negative_are_no_other_scores():
@@ -98,13 +93,6 @@ def test_scores_beyond_the_best_and_its_negative_are_no_other_scores():
     needs = sample_needs(lower, none="none", best_score=0.0, tolerance=20.0)
     assert -195.0 < needs.when.level < -185.0
     assert 200.0 < teaching_value(needs, none="none", proxy="proxy").without.value < 800.0
-
-
-def test_two_proxies_are_compared_by_what_the_one_needs_more_than_the_other():
-    needs = judged(good=curve(20, 48, 50, 50, 50), poor=curve(0, 10, 20, 48, 50))
-    more = more_needed(needs, more="poor", less="good")
-    assert 0.0 < more.low < more.value < more.high
-    assert more_needed(needs, more="good", less="good").value == 0.0
 
 
 def test_the_mean_score_before_any_target_sample_has_an_interval_and_without_a_proxy_there_is_none():

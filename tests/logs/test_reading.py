@@ -179,11 +179,6 @@ def test_each_kind_of_command_has_columns_of_its_own(written, command):
     np.testing.assert_array_equal(log.episodes[0].commands, [[0.5, 0.1], [0.6, 0.2]])
 
 
-def test_measured_wheel_speeds_are_read_and_may_be_empty(written):
-    (episode,) = read_log(written(WHEELS + "a,0,0,0,0,0,0,3,4\na,0.1,0,0,0,0,0,,\n")).episodes
-    np.testing.assert_array_equal(episode.wheels, [[3, 4], [np.nan, np.nan]])
-
-
 def test_still_frames_need_no_rate_and_no_commands_and_headings_no_course(written):
     description = 'format = 1\nrobot = "duckiebot"\ncommand = "none"\nframes = "frames/%04d.png"\nmap = "small_loop"\n'
     samples = "episode,time,x,y,heading\n0,0,0.8,1.5,3.2\n0,1.7,1.5,0.5,-1.3\n"
@@ -310,12 +305,14 @@ def test_a_mistake_in_samples_is_one_line_with_file_line_and_column(written, sam
     assert complaint(written(samples)).startswith(f"/samples.csv{says}")
 
 
-def test_duties_lie_between_full_backwards_and_full_ahead(written):
+def test_duties_and_wheel_speeds_are_read_within_what_they_can_be(written):
     duty = TOML.replace("twist", "duty")
     samples = ROWS.replace("v,omega", "left,right")
     read_log(written(samples.replace("0.6,0.2", "-1,1.0000001"), duty))
     says = complaint(written(samples.replace("0.6,0.2", "0.6,-1.01"), duty))
     assert says.startswith("/samples.csv: line 3, column 'right': a duty must be between -1 and 1, got -1.01")
+    (episode,) = read_log(written(WHEELS + "a,0,0,0,0,0,0,3,4\na,0.1,0,0,0,0,0,,\n")).episodes
+    np.testing.assert_array_equal(episode.wheels, [[3, 4], [np.nan, np.nan]])
 
 
 def test_rows_within_a_quarter_of_a_sample_are_on_the_grid(written):

@@ -90,14 +90,11 @@ def test_a_fleet_is_expected_to_take_a_good_deal_less_than_an_episode_may():
     assert run_all(timeout_s=3.0, known=dict.fromkeys(KNOWN, 0.5)) == (by_itself(), [2] * 6)
 
 
-def test_what_draws_from_the_process_s_generators_is_run_by_itself():
+def test_what_draws_or_is_to_be_alone_is_run_by_itself():
     faults = ("agent1:*:draws",)
     assert run_together(Convoy(faults=faults), EPISODES) is None
     assert run_together(Convoy(), EPISODES) is not None
     assert told(run_fleet(Convoy(faults=faults), EPISODES)) == by_itself(faults)
-
-
-def test_an_agent_that_is_to_be_alone_is_beside_nobody():
     _, sizes = run_all(alone=["agent1"])
     assert sizes == [1, 1, 1, 9]
 
@@ -135,10 +132,13 @@ def test_an_episode_without_a_metric_fails_in_a_fleet_as_by_itself():
     assert set(found.values()) == {f"agent '{one.agent}': {lacks}" for one in EPISODES}
 
 
-def test_the_time_of_a_fleet_is_shared_by_its_episodes(monkeypatch):
+def test_fleets_share_their_time_and_are_told_as_a_whole(monkeypatch):
     clock = SimpleNamespace(seconds=lambda: 0.6)
     monkeypatch.setattr("proxytune.running.fleets.awake", lambda: nullcontext(clock))
     assert [one.seconds for one in run_fleet(Convoy(), EPISODES[:6])] == [pytest.approx(0.1)] * 6
+    begun = []
+    run_all(begins=begun.append)
+    assert [len(fleet) for fleet in begun] == [12]
 
 
 def sizes(count, jobs, seconds=None, most_s=MOST_S):
@@ -168,9 +168,3 @@ def test_what_is_not_needed_any_more_is_cut_before_its_fleet_begins():
     assert [one.seed for one in next(fleets)] == [0, 2, 4, 6]
     cut.update((1, 3, 5))
     assert [[one.seed for one in fleet] for fleet in fleets] == [[7]]
-
-
-def test_a_fleet_that_begins_in_this_process_is_told_as_a_whole():
-    begun = []
-    run_all(begins=begun.append)
-    assert [len(fleet) for fleet in begun] == [12]

@@ -43,15 +43,12 @@ def add_fact(connection, key, value):
     write_row(connection, "facts", {"key": key, "value": value})
 
 
-def test_a_database_is_made_with_its_format_and_plain_tables(tmp_path):
+def test_a_database_is_made_and_left_clean_as_one_file(tmp_path):
     path = made(tmp_path / "study.db")
     with sqlite3.connect(path) as plain:
         assert plain.execute("PRAGMA user_version").fetchone() == (FORMAT,)
         names = {name for (name,) in plain.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
     assert names == {"facts", "instances", "trials", "episodes", "sweeps", "under_way", "counts"}
-
-
-def test_a_clean_end_leaves_the_one_file(tmp_path):
     connection = connect(tmp_path / "study.db", writable=True)
     add_fact(connection, "seed", "1")
     disconnect(connection)

@@ -237,10 +237,14 @@ def test_it_searches_only_what_prpv_has_left(make_study):
     assert pinned.intervals[0].high - pinned.intervals[0].low == pytest.approx(0.04)
 
 
-def test_a_width_without_its_parameter_is_one_line(make_study):
+def test_widths_without_a_parameter_or_plv_without_a_target_are_refused(make_study):
     settings = read_study_settings(make_taught(make_study, parameters=BOXED))
     with pytest.raises(SettingsError, match=r"teaching\.width\.delay: is not among \[parameters\]"):
         search_space(settings, {"delay": (0.0, 0.1)}, {})
+    with pytest.raises(RunError, match=r"still rises by more than 6 .* PLV is not known; raise teaching\.target"):
+        run(make_taught(make_study, parameters=BOXED, grid=[0, 3, 6]))
+    with pytest.raises(RunError, match=r"does not come to 64 within 640 samples, .* lower teaching\.level"):
+        run(make_taught(make_study, parameters=BOXED, more="level = 70.0"))
 
 
 @pytest.mark.parametrize(("widest", "wide"), [(0.2001, "0.2001"), (600.0, "600")])
@@ -250,13 +254,3 @@ def test_a_width_beyond_the_parameters_box_is_one_line(make_study, widest, wide)
     told = complaint_of(search_space, settings, {"trim": (0.0, widest)}, {})
     assert told == f"{path}: teaching.width.trim: {says}"
     assert search_space(settings, {"trim": (0.0, 0.2)}, {}).names == ("trim", "trim width")
-
-
-def test_where_the_target_alone_is_not_learnt_there_is_no_plv_to_search_for(make_study):
-    with pytest.raises(RunError, match=r"still rises by more than 6 .* PLV is not known; raise teaching\.target"):
-        run(make_taught(make_study, parameters=BOXED, grid=[0, 3, 6]))
-
-
-def test_a_level_that_is_not_reached_without_a_proxy_is_told_before_any_proxy_is_tried(make_study):
-    with pytest.raises(RunError, match=r"does not come to 64 within 640 samples, .* lower teaching\.level"):
-        run(make_taught(make_study, parameters=BOXED, more="level = 70.0"))

@@ -120,13 +120,10 @@ def test_a_tie_in_the_proxy_is_told_and_costs_what_the_worse_costs():
     assert observed.regret == pytest.approx(0.2)
 
 
-def test_published_standard_errors_are_taken():
+def test_standard_errors_are_those_published_or_shared():
     target = ScoreTable(("a", "b"), ("1",), ("success",), np.array([[[0.5]], [[0.7]]]), np.array([[0.1], [0.1]]))
     found = decided(means(["success"], a=(0.5,), b=(0.7,)), target)
     assert found.probability_best == pytest.approx(0.921, abs=0.01)  # Φ(0.2 / (0.1 √2))
-
-
-def test_means_of_few_episodes_share_their_spread():
     rng = np.random.default_rng(3)
     values = np.array([0.0, 0.0, 3.0])[:, None, None] + rng.normal(size=(3, 2, 1))
     target = ScoreTable(("a", "b", "c"), ("1", "2"), ("success",), values).unpaired()

@@ -138,15 +138,11 @@ def pairs_of_means(draw):
     return np.array(draw(scores), dtype=float).reshape(2, agents, 2)
 
 
-def test_three_agents_by_hand():
+def test_prpv_of_a_few_agents_is_that_by_hand():
     """Target A > B > C; proxy C > A > B: A–C and B–C are reversed, two each."""
     result = prpv(compare(proxy=of_means(2, 1, 3), target=of_means(3, 2, 1), metrics=M))
     assert result.value == 4
     assert result.pairs == (FlippedPair("A", "C", "reversed"), FlippedPair("B", "C", "reversed"))
-
-
-def test_four_agents_and_two_metrics_by_hand():
-    """Target: A dominates all, B and C incomparable, both dominate D; proxy: as worked out pair by pair."""
     target = of_means((4, 4), (3, 2), (2, 3), (1, 1))
     proxy = of_means((4, 1), (3, 3), (2, 2), (1, 4))
     result = prpv(compare(proxy=proxy, target=target, metrics=M2))
@@ -160,9 +156,6 @@ def test_four_agents_and_two_metrics_by_hand():
     }
     assert result.value == 6
     assert result.normalised == 0.5
-
-
-def test_a_result_carries_inputs_direction_and_range():
     result = prpv(compare(proxy=of_means((1, 1), (2, 2)), target=of_means((2, 2), (1, 1)), metrics=M2))
     assert (result.value, result.range, result.better) == (2, (0, 2), "lower")
     assert (result.inputs.agents, result.inputs.target_episodes) == (("A", "B"), (1, 1))

@@ -37,16 +37,13 @@ GP = runs("gp", [9.0, 4.0, 0.0], [8.0, 3.0, 0.0])
 SOBOL = runs("sobol", [9.0, 8.0, 8.0], [8.0, 8.0, 9.0])
 
 
-def test_every_engine_has_its_median_and_the_floor_is_drawn():
+def test_every_engine_has_its_median_and_its_name_at_the_end_of_its_line():
     (axes,) = compare_figure([GP, SOBOL], 1.0).axes
     drawn = {line.get_label(): line for line in axes.get_lines()}
     assert list(drawn["gp (2 seeds)"].get_ydata()) == [8.5, 3.5, 0.0, 0.0]
     assert list(drawn["sobol (2 seeds)"].get_ydata()) == [8.5, 8.0, 8.0, 8.0]
     assert list(drawn["noise floor"].get_ydata()) == [1.0, 1.0]
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("evaluations", "lowest regret so far [ordered pairs]")
-
-
-def test_every_engine_is_named_at_the_end_of_its_line_and_no_two_names_overlap():
     together = [runs(engine, [9.0, 5.0 + number % 3, 3.0]) for number, engine in enumerate(NAMES)]
     figure = compare_figure(together, 1.0)
     figure.draw_without_rendering()

@@ -32,11 +32,17 @@ def error(drives, *, model=TRUTH, dropped=(), learnt=None, horizon_s=2.0):
     return horizon_error(findings, kept, horizon_s, learnt or {})
 
 
-def test_before_is_the_declared_model_and_after_the_extended_one(drives):
+def test_before_is_the_declared_model_where_blocks_enough_have_a_window(drives):
     told = error(drives, model=SCRUBBED)
     assert told.before.value > 3.0 * told.after.value
     assert told.ratio.value == pytest.approx(told.after.value / told.before.value)
     assert told.floor.reached == pytest.approx(told.after.value)
+    assert error(drives, horizon_s=100.0) is None
+    assert error(drives.only(drives.block < 2)) is None
+    assert error(drives.only(drives.block < 3)) is not None
+    short, long = planted_log(TRUTH, episodes=70, seconds=2.0), planted_log(TRUTH, episodes=1, seconds=9.0)
+    longest = replace(long.episodes[0], name="long")
+    assert error(drives_of(replace(short, episodes=(*short.episodes, longest))), horizon_s=5.0) is None
 
 
 @pytest.mark.parametrize("how", [{"dropped": [DroppedEffect(SCRUB, Variant(SCRUBBED, DECLARED))]},
@@ -45,15 +51,6 @@ def test_what_a_dropped_effect_or_learnt_curves_reached_lowers_the_floor(drives,
     plain, lower = error(drives), error(drives, **how)
     assert plain.floor.reached == plain.after.value == lower.after.value
     assert lower.floor.reached < plain.floor.reached / 3.0
-
-
-def test_no_error_is_told_where_fewer_than_three_blocks_have_a_window(drives):
-    assert error(drives, horizon_s=100.0) is None
-    assert error(drives.only(drives.block < 2)) is None
-    assert error(drives.only(drives.block < 3)) is not None
-    short, long = planted_log(TRUTH, episodes=70, seconds=2.0), planted_log(TRUTH, episodes=1, seconds=9.0)
-    longest = replace(long.episodes[0], name="long")
-    assert error(drives_of(replace(short, episodes=(*short.episodes, longest))), horizon_s=5.0) is None
 
 
 KNOWN = Repeated(Ratio(0.97, (0.9, 1.05)), 0.0116, 0.8)
@@ -100,14 +97,11 @@ def test_what_the_noise_is_cannot_be_told_from_few_repeats_or_none():
     assert said(0.012, 0.004, repeated=UNSURE) == "cannot be told"
 
 
-def test_the_floor_lies_between_the_noise_of_poses_and_what_a_model_reached():
+def test_the_floor_lies_between_noise_and_what_a_model_reached_or_repeats():
     floor = bracket(0.004, 0.012, None)
     assert floor.lower == 0.004
     assert 0.012 < floor.upper < 0.0125
     assert bracket(0.013, 0.012, None).lower == 0.012
-
-
-def test_repeats_lower_the_upper_end_but_not_beneath_the_lower():
     alone = bracket(0.004, 0.012, None).upper
     most = 0.006 * 0.6 / 0.5
     assert bracket(0.004, 0.012, BEYOND._replace(part=1.0)).upper == pytest.approx(alone * most / 0.012)

@@ -54,8 +54,9 @@ def driven(effect, signal, **known):
     return filtered(effect, signal, rate_hz=10.0, nominal=NOMINAL, **known)
 
 
-def test_a_baseline_twice_as_wide_halves_the_yaw_rate():
+def test_baselines_and_markers_turn_what_they_say_alone():
     np.testing.assert_allclose(driven(motion.YawScrub(0.32), [[0.5, 0.1, 2.0]]), [[0.5, 0.1, 1.0]])
+    np.testing.assert_allclose(driven(motion.HeadingOffset(-30.0), [[1.0, 2.0, 0.5]]), [[1.0, 2.0, 0.5 - np.pi / 6]])
 
 
 @pytest.mark.parametrize(("yaw", "forward"), [(0.0, 0.5), (2.0, 0.3), (-2.0, 0.3), (9.0, 0.0)])
@@ -100,10 +101,6 @@ def test_headings_known_beforehand_are_used_and_beyond_them_the_robot_turns_on(h
 @pytest.mark.parametrize(("heading", "x", "y"), [(0.0, 1.1, 2.02), (np.pi / 2, 0.98, 2.1), (np.pi, 0.9, 1.98)])
 def test_the_tracked_point_lies_ahead_of_the_axle_and_to_its_left(heading, x, y):
     np.testing.assert_allclose(driven(motion.MarkerOffset(0.1, 0.02), [[1.0, 2.0, heading]]), [[x, y, heading]])
-
-
-def test_a_turned_marker_adds_to_the_heading_alone():
-    np.testing.assert_allclose(driven(motion.HeadingOffset(-30.0), [[1.0, 2.0, 0.5]]), [[1.0, 2.0, 0.5 - np.pi / 6]])
 
 
 @pytest.mark.parametrize("yaw", [2.0, -2.0])

@@ -159,15 +159,12 @@ def test_pictures_and_the_effects_on_them_keep_every_promise(tmp_path):
     check_family(kin, agents=["toys:Brightness"])
 
 
-def test_the_same_start_is_the_same_state_in_every_instance_and_under_every_seed(tmp_path):
+def test_starts_are_the_same_states_and_chance_comes_from_the_seed(tmp_path):
     kin = family(tmp_path, CART.replace("12", "1"))
     first = run(kin, "zero", start=3)
     assert run(kin, "zero", start=3, seed=2) == first
     assert run(kin, "zero", start=3, **{"delay": 0.1}) == first
     assert run(kin, "zero", start=4) != first
-
-
-def test_what_is_random_within_an_episode_comes_from_its_seed(tmp_path):
     kin = family(tmp_path, CART + "[arguments]\nnoise = 1.0\n")
     assert run(kin, seed=1) == run(kin, seed=1)
     assert run(kin, seed=1) != run(kin, seed=2)
@@ -213,7 +210,7 @@ def test_effects_of_the_table_are_checked_too(tmp_path):
         family(tmp_path, PENDULUM + "[effects.blur]\nblur = 0.1\n")
 
 
-def test_environments_are_closed_after_episodes_that_fail_too(tmp_path):
+def test_environments_are_closed_whatever_fails(tmp_path):
     kin = family(tmp_path, CART)
     cart = load("toys:Cart", kind="environment", beside=tmp_path)
     run(kin)
@@ -221,9 +218,6 @@ def test_environments_are_closed_after_episodes_that_fail_too(tmp_path):
         run(kin, "toys:fails")
     kin.check_agent("zero")
     assert cart.open == 0
-
-
-def test_an_environment_that_cannot_be_made_with_a_value_fails_its_episode_alone(tmp_path):
     mass = 'mass = { argument = "mass", low = 0, high = 2, neutral = 1 }\n'
     kin = family(tmp_path, f'environment = "toys:heavy"\nsteps = 3\n[parameters]\n{mass}')
     with pytest.raises(EpisodeError, match="too heavy"):

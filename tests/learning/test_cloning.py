@@ -66,11 +66,13 @@ def test_starting_from_weights_it_follows_samples_that_say_otherwise(learner):
     assert error(learner, learner.train(turned, start, 1), turned) < 0.3 * error(learner, start, turned)
 
 
-def test_training_leaves_the_weights_it_started_from_as_they_were():
+def test_training_leaves_what_it_started_from_and_one_sample_is_enough():
     start = SMALL.train(pictures(60, 1), None, 1)
     before = {name: values.copy() for name, values in start.items()}
     SMALL.train(pictures(60, 2), start, 1)
     assert all(np.array_equal(start[name], before[name]) for name in before)
+    weights = SMALL.train(pictures(1, 1), None, 1)
+    assert np.isfinite(SMALL.act(weights, pictures(1, 1).observations[0])).all()
 
 
 @each
@@ -89,11 +91,6 @@ def test_no_sample_is_nothing_to_learn_from(learner):
 def test_weights_of_another_network_or_other_features_are_refused_with_both_shapes(learner, other, says):
     with pytest.raises(LearnerError, match=says):
         learner.train(pictures(30, 1), other.train(pictures(30, 1), None, 1), 1)
-
-
-def test_one_sample_can_be_learnt_from():
-    weights = SMALL.train(pictures(1, 1), None, 1)
-    assert np.isfinite(SMALL.act(weights, pictures(1, 1).observations[0])).all()
 
 
 @pytest.mark.parametrize("learner", [SMALL, replace(SMALL, hidden=(7, 5)), replace(SMALL, rows=5, columns=7)])

@@ -28,7 +28,7 @@ def worth(proxy, level=None):
     return teaching_value(judged(proxy=proxy, level=level), none="none", proxy="proxy")
 
 
-def test_a_proxy_that_helps_has_a_plv_above_zero_and_one_that_harms_below():
+def test_a_proxy_is_worth_the_samples_between_crossings():
     helped, harmed = worth(curve(20, 48, 50, 50, 50)), worth(curve(-9, -9, 10, 20, 50))
     assert 0.0 < helped.plv.low < helped.plv.value < helped.plv.high
     assert helped.factor.low > 1.0
@@ -36,9 +36,6 @@ def test_a_proxy_that_helps_has_a_plv_above_zero_and_one_that_harms_below():
     assert harmed.plv.low < harmed.plv.value < harmed.plv.high < 0.0
     assert harmed.factor.high < 1.0
     assert harmed.reduction.high < 0.0
-
-
-def test_the_samples_needed_lie_between_the_counts_where_the_curve_crosses():
     found = worth(curve(0, 40, 47, 50, 50))
     assert 100.0 < found.needed.low < found.needed.value < found.needed.high < 200.0
     assert 200.0 < found.without.low < found.without.value < found.without.high < 400.0
@@ -88,11 +85,13 @@ def test_proxies_are_compared_by_what_they_need_whatever_beside():
     assert more_needed(needs, more="good", less="good").value == 0.0
 
 
-def test_scores_beyond_the_best_and_its_negative_are_no_other_scores():
+def test_scores_beyond_the_best_are_no_others_and_unit_costs_are_plv():
     lower = {"none": curve(np.nan, -900, -600, -200, -190), "proxy": curve(-500, -200, -190, -190, -190)}
     needs = sample_needs(lower, none="none", best_score=0.0, tolerance=20.0)
     assert -195.0 < needs.when.level < -185.0
     assert 200.0 < teaching_value(needs, none="none", proxy="proxy").without.value < 800.0
+    assert general_plv(without=(0.0, 900.0), with_proxy=(0.0, 100.0)) == plv(without=900.0, with_proxy=100.0) == 800.0
+    assert general_plv(without=(10.0, 5.0), with_proxy=(4.0, 1.0), cost_on=2.0, cost_off=3.0) == 24.0
 
 
 def test_the_mean_score_before_any_target_sample_has_an_interval_and_without_a_proxy_there_is_none():
@@ -101,11 +100,6 @@ def test_the_mean_score_before_any_target_sample_has_an_interval_and_without_a_p
     assert found.low < 20.0 < found.high
     assert found.high - found.low < 5.0
     assert mean_score(needs, "none", 0).value is None
-
-
-def test_general_plv_with_unit_costs_and_an_expert_only_is_plv():
-    assert general_plv(without=(0.0, 900.0), with_proxy=(0.0, 100.0)) == plv(without=900.0, with_proxy=100.0) == 800.0
-    assert general_plv(without=(10.0, 5.0), with_proxy=(4.0, 1.0), cost_on=2.0, cost_off=3.0) == 24.0
 
 
 SPENDING_GRID = (0, 100, 200, 400, 800, 1600)

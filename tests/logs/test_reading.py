@@ -154,7 +154,7 @@ def driven(*, degrees=False, wrapped=False, seconds=60.0, turn=0.5, backwards=Fa
     return pd.DataFrame(rows).to_csv(index=False)
 
 
-def test_commands_poses_and_times_are_read_as_written(written):
+def test_what_is_written_is_read_with_the_geometry_of_the_log(written):
     log = read_log(written())
     assert (log.name, log.robot, log.command, log.rate_hz, log.geometry) == ("yard", "tractor", "twist", 10.0, {})
     first, second = log.episodes
@@ -163,9 +163,6 @@ def test_commands_poses_and_times_are_read_as_written(written):
     np.testing.assert_array_equal(first.poses, [[1, 2, 0.5], [1.05, 2, 0.51]])
     np.testing.assert_allclose(second.times, [3.0, 3.1])
     assert first.wheels is None
-
-
-def test_geometry_of_the_log_is_in_the_figures_of_a_robot(written):
     text = TOML + "wheel_radius_m = 0.05\nbaseline_m = 0.3\nfull_speed_m_s = 1.5\n"
     figures = {"wheel_radius": 0.05, "effective_baseline": 0.3, "full_speed": 1.5}
     assert read_log(written(description=text)).geometry == figures

@@ -49,7 +49,7 @@ def test_what_has_no_name_or_was_not_measured_is_told_as_that():
     assert [row.key for row in compare_errors({**DIAGNOSIS, "camera": CAMERA})] == ["error", "markings_error"]
 
 
-def test_motion_and_camera_are_told_together():
+def test_motion_and_camera_are_told_together_above_a_floor():
     both = {**DIAGNOSIS, "camera": CAMERA}
     told = answer(both, [prpv(HIGH, LOW), *compare_errors(both)])
     assert "The simulator lacked: dead band and field of view" in told
@@ -57,9 +57,6 @@ def test_motion_and_camera_are_told_together():
     assert "displacement of markings falls from 2.94 px (2.8 to 3.07) to 0.23 px (0.21 to 0.26)" in told
     unchanged = {**both, "camera": {**CAMERA, "effects": []}}
     assert "markings" not in answer(unchanged, [prpv(HIGH, LOW), *compare_errors(unchanged)])
-
-
-def test_a_floor_is_a_value_with_an_interval_or_a_bracket():
     position, markings = compare_errors({**DIAGNOSIS, "camera": CAMERA})
     assert floor_text(position.before, position.unit) == "3.9 to 4.2 mm"
     assert floor_text(markings.before, markings.unit) == "0.23 px"

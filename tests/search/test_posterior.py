@@ -33,15 +33,12 @@ def left_out(told, values=(0.5,) * 12):
     return leave_out(fit_outputs(SPACE, told), told, goal(whole, values, 1e-4), 1)
 
 
-def test_each_trial_is_told_how_probable_its_own_theta_is():
+def test_theta_of_each_trial_is_told_but_for_other_placements():
     found = left_out(trials(20))
     assert found.deviances.shape == (20,)
     assert found.above.shape == (20, len(WIDENINGS))
     assert (found.above >= 0.0).all()
     assert (found.above <= 1.0 + 1e-9).all()
-
-
-def test_what_was_driven_under_another_placement_is_left_out_with_a_trial():
     told = trials(8)
     told += [replace(one, outcome=tuple(value + 0.01 for value in one.outcome), placement=-1) for one in told[:3]]
     for one in as_targets(fit_outputs(SPACE, told), told, goal(whole, (0.5,) * 12, 1e-4), 1):

@@ -39,7 +39,7 @@ def test_the_posterior_is_the_same_to_the_last_bit_in_whatever_order_trials_are_
     assert np.array_equal(there.predict(np.eye(2)), back.predict(np.eye(2)))
 
 
-def test_the_incumbent_is_not_the_luckiest_score():
+def test_the_incumbent_is_not_the_luckiest_and_points_are_of_the_unit_cube():
     """One freak zero among high scores does not win over a valley of low ones."""
     trials = visited(40)
     far = max(trials, key=lambda trial: trial.score)
@@ -48,6 +48,8 @@ def test_the_incumbent_is_not_the_luckiest_score():
     assert values != lucky.values
     assert steps(values) <= 3
     assert mean < 5
+    assert np.allclose(unit_array(SPACE, [(0.0, -0.3), (0.3, 0.0)]), [[0.0, 0.0], [1.0, 0.5]])
+    assert unit_array(SPACE, []).shape == (0, 2)
 
 
 def test_noise_never_vanishes_and_the_posterior_is_surer_where_trials_are():
@@ -82,8 +84,3 @@ def test_failed_trials_are_left_out_and_without_a_score_it_says_so():
     assert len(fit_surrogate(SPACE, [*trials, Trial((0.1, 0.1), None)]).visited) == 9
     with pytest.raises(RunError, match="no trial has a score"):
         fit_surrogate(SPACE, [Trial((0.1, 0.1), None)])
-
-
-def test_points_become_rows_of_the_unit_cube():
-    assert np.allclose(unit_array(SPACE, [(0.0, -0.3), (0.3, 0.0)]), [[0.0, 0.0], [1.0, 0.5]])
-    assert unit_array(SPACE, []).shape == (0, 2)

@@ -87,7 +87,7 @@ def test_what_has_been_read_is_kept_up_with_what_is_written(tmp_path):
         assert store.seconds() == {("agent1", 2): 1.0}
 
 
-def test_beginning_afresh_drops_trials_but_no_episode(tmp_path):
+def test_facts_are_added_and_beginning_afresh_drops_trials_alone(tmp_path):
     with Store.open(tmp_path) as store:
         store.save_trial("identity", TrialRecord(1, THETA))
         store.save_outcome("identity", WORKED)
@@ -95,6 +95,13 @@ def test_beginning_afresh_drops_trials_but_no_episode(tmp_path):
         assert store.trials() == []
         assert store.facts() == {"seed": 2, "parameters.trim": [-0.3, 0.3]}
         assert store.outcomes("identity", THETA) == {EPISODE: WORKED}
+    with Store.open(tmp_path) as store:
+        store.begin({"seed": 2})
+        store.save_trial("identity", TrialRecord(1, THETA))
+        store.save_fact("versions", {"numpy": "2.0"})
+        store.save_fact("versions", {"numpy": "2.1"})
+        assert store.facts() == {"seed": 2, "versions": {"numpy": "2.1"}}
+        assert store.trials() == [TrialRecord(1, THETA)]
 
 
 def test_seconds_are_averaged_over_instances_and_trials_have_those_of_their_own(tmp_path):
@@ -156,16 +163,6 @@ def test_what_cannot_be_written_leaves_everything_and_reading_cannot_write(tmp_p
         store.save_outcome("identity", WORKED)
     with Store.read(tmp_path) as store, pytest.raises(StoreError, match="cannot be written"):
         store.save_outcome("identity", WORKED)
-
-
-def test_a_fact_is_added_and_written_over_without_a_trial_lost(tmp_path):
-    with Store.open(tmp_path) as store:
-        store.begin({"seed": 2})
-        store.save_trial("identity", TrialRecord(1, THETA))
-        store.save_fact("versions", {"numpy": "2.0"})
-        store.save_fact("versions", {"numpy": "2.1"})
-        assert store.facts() == {"seed": 2, "versions": {"numpy": "2.1"}}
-        assert store.trials() == [TrialRecord(1, THETA)]
 
 
 RUNNING = [replace(EPISODE, start=start) for start in (0, 1)]

@@ -13,16 +13,13 @@ from proxytune.usefulness.predictivity import kendall_tau, mmrv, ppv, srcc
 M = (Metric("m"), Metric("n", "min"))
 
 
-def test_it_gathers_the_single_measures():
+def test_it_gathers_measures_each_with_an_interval():
     sides = {"proxy": ordered(1), "target": ordered(2), "metrics": M}
     found = assess(**sides)
     assert found.prpv.value == prpv(compare(**sides)).value == found.prpv_interval.value
     assert found.ppv.value == ppv(compare(**sides)).value
     for name, measure in (("srcc", srcc), ("kendall_tau", kendall_tau), ("mmrv", mmrv)):
         assert getattr(found, name).value == measure(compare(**sides)).value
-
-
-def test_every_measure_has_an_interval_around_it():
     found = assess(proxy=ordered(1, 20), target=ordered(2, 20), metrics=M)
     assert found.intervals.ppv[0] < found.ppv.value < found.intervals.ppv[1]
     for name in ("srcc", "kendall_tau", "mmrv"):
@@ -141,7 +138,7 @@ def test_a_good_proxy_beats_a_bad_one_beyond_noise_but_not_its_twin():
     assert next(value for pair, value in beyond.items() if set(pair) == {"good", "twin"}) is False
 
 
-def test_the_ranking_is_by_prpv_and_differences_are_of_prpv():
+def test_differences_are_of_prpv_and_none_of_a_proxy_with_itself():
     proxies = {name: noisy(TRUTH, seed, noise=4.0) for seed, name in enumerate("abcd", 10)}
     selection = select_proxy(proxies=proxies, target=TARGET, metrics=CLEAR)
     own = {name: prpv(compare(proxy=proxy, target=TARGET, metrics=CLEAR)).value for name, proxy in proxies.items()}
@@ -151,9 +148,6 @@ def test_the_ranking_is_by_prpv_and_differences_are_of_prpv():
     for pair in selection.differences:
         assert pair.value == own[pair.worse] - own[pair.better] >= 0
         assert pair.low <= pair.value <= pair.high
-
-
-def test_a_proxy_against_itself_differs_by_nothing():
     same = noisy(TRUTH, 5, noise=3.0)
     selection = select_proxy(proxies={"a": same, "b": same}, target=TARGET, metrics=CLEAR)
     assert (selection.differences[0].low, selection.differences[0].high) == (0.0, 0.0)

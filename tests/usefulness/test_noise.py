@@ -20,16 +20,13 @@ FIRST = M[:1]
 SCORES = Path(__file__).parents[2] / "../shared/data/scores"
 
 
-def test_it_agrees_with_all_permutations_of_five_agents():
+def test_chance_agrees_with_all_permutations_and_tells_perfect_from_useless():
     proxy, target = np.random.default_rng(0).normal(size=(2, 5, 2))
     every = np.array([prpv_of_means(proxy[list(order)], target, M) for order in permutations(range(5))])
     result = chance(compare(proxy=of_means(*proxy), target=of_means(*target), metrics=M), permutations=4000)
     assert result.mean == pytest.approx(every.mean(), abs=0.2)
     assert result.deviation == pytest.approx(every.std(), abs=0.2)
     assert result.p_value == pytest.approx((every <= prpv_of_means(proxy, target, M)).mean(), abs=0.03)
-
-
-def test_a_perfect_proxy_is_hardly_by_chance_and_a_useless_one_is():
     target = np.random.default_rng(2).normal(size=(8, 1)).repeat(2, axis=1)
     right, wrong = (compare(proxy=of_means(*one), target=of_means(*target), metrics=M) for one in (target, -target))
     assert chance(right).p_value == pytest.approx(1 / 1001, abs=2e-3)
@@ -110,7 +107,7 @@ def test_the_floor_is_what_a_perfect_proxy_scores():
     assert np.mean(within) >= 0.93
 
 
-def test_starts_are_paired_by_their_label_and_those_not_driven_both_times_left_out():
+def test_starts_are_paired_by_their_label_on_both_sides():
     (one, _), rng = planted(2)
     again = table_of(one).arrange(agents=table_of(one).agents, episodes=tuple("543210"))
     holes = again.values.copy()
@@ -120,9 +117,6 @@ def test_starts_are_paired_by_their_label_and_those_not_driven_both_times_left_o
     assert (found.value, found.low, found.high) == (0.0, 0.0, 0.0)
     loud = ScoreTable(again.agents, again.episodes, again.metrics, holes + rng.normal(size=holes.shape))
     assert floor_of_repeats(domain=table_of(one), again=loud, metrics=FIRST).value > 0.0
-
-
-def test_both_sides_may_have_repeats():
     (one, _), _ = planted(3)
     domain, again = repeated(one.repeat(2, axis=1), 2), repeated(one.repeat(3, axis=1), 3)
     assert floor_of_repeats(domain=domain, again=again, metrics=FIRST).high == 0.0

@@ -186,13 +186,10 @@ def test_a_stated_readout_is_used_and_not_named(tmp_path):
     assert "rolling_shutter" in open_.named.full.names
 
 
-def test_a_log_without_frames_is_refused_in_one_line():
+def test_effects_are_those_on_camera_and_pictures_and_a_log_needs_frames():
     log = replace(nominal(), frames=None)
     with pytest.raises(LogError, match=r"^pictured: has no frames; add \[camera\] to log.toml$"):
         diagnose_camera(log, ROBOT, DECLARED)
-
-
-def test_effects_of_the_camera_are_those_on_camera_and_pictures():
     effects = camera_effects(ROBOT.catalogue)
     assert {"camera_pitch", "blur", "exposure", "camera_latency"} <= set(effects)
     assert not {"trim", "delay", "yaw_scrub"} & set(effects)

@@ -80,7 +80,7 @@ def test_normals_are_unit_vectors_from_the_floor_into_the_marking(angle, offset,
     assert (-np.sign(away) * outward > np.cos(np.radians(8.0))).all()
 
 
-def test_a_yellow_stripe_has_yellow_edges_as_far_out_on_either_side():
+def test_yellow_edges_are_told_by_their_colour_on_either_side():
     """Strong yellow is not clipped, which would move its edges outwards by 0.2 pixels and make the tape look wider."""
     edges = find_edges(yellow_striped(0.3, 1.0))
     yellow = edges.only(~edges.white)
@@ -89,6 +89,15 @@ def test_a_yellow_stripe_has_yellow_edges_as_far_out_on_either_side():
     sides = [np.abs(away[way * away > 0.0]).mean() - 6.0 for way in (-1.0, 1.0)]
     assert sides == pytest.approx([0.0, 0.0], abs=0.03)
     assert sides[0] == pytest.approx(sides[1], abs=0.03)
+    shown = pictures({}, lane_poses(6))
+    right, swapped = find_edges(shown), find_edges(np.ascontiguousarray(shown[..., ::-1]))
+    floor_only = swapped.only(swapped.row > 50)
+    assert (~right.only(right.row > 50).white).sum() > 100
+    assert (~floor_only.white).sum() == 0
+    white = right.only(right.white & (right.row > 50))
+    known = {(int(f), round(float(c), 1), round(float(r), 1)) for f, _, c, r, _ in zip(*white, strict=True)}
+    again = {(int(f), round(float(c), 1), round(float(r), 1)) for f, _, c, r, _ in zip(*floor_only, strict=True)}
+    assert len(known & again) > 0.6 * len(known)
 
 
 @pytest.mark.parametrize("colour", [0, 20, 128, 255, SKY], ids=str)
@@ -115,7 +124,7 @@ def test_noise_the_sky_and_the_picture_s_border_have_no_edges():
     assert len(find_edges(striped(0.0, -COLUMNS / 2.0, half_width=1.0)).row) == 0
 
 
-def test_points_are_sorted_by_picture_and_each_picture_counts_for_itself():
+def test_points_are_sorted_by_picture_and_brightness_does_not_move_them():
     shown = pictures({}, lane_poses(4), columns=96)
     edges = find_edges(shown)
     assert (np.diff(edges.frame) >= 0).all()
@@ -123,21 +132,6 @@ def test_points_are_sorted_by_picture_and_each_picture_counts_for_itself():
     alone, own = find_edges(shown[2:3]), edges.only(edges.frame == 2)
     np.testing.assert_array_equal(alone.column, own.column)
     np.testing.assert_array_equal(alone.white, own.white)
-
-
-def test_pictures_with_red_and_blue_swapped_keep_the_white_edges_and_lose_the_yellow_ones():
-    shown = pictures({}, lane_poses(6))
-    right, swapped = find_edges(shown), find_edges(np.ascontiguousarray(shown[..., ::-1]))
-    floor_only = swapped.only(swapped.row > 50)
-    assert (~right.only(right.row > 50).white).sum() > 100
-    assert (~floor_only.white).sum() == 0
-    white = right.only(right.white & (right.row > 50))
-    known = {(int(f), round(float(c), 1), round(float(r), 1)) for f, _, c, r, _ in zip(*white, strict=True)}
-    again = {(int(f), round(float(c), 1), round(float(r), 1)) for f, _, c, r, _ in zip(*floor_only, strict=True)}
-    assert len(known & again) > 0.6 * len(known)
-
-
-def test_brightness_does_not_move_edges():
     shown = striped(0.4, 1.0)
     dark = (shown * 0.4).astype(np.uint8)
     away, _ = along_normal(find_edges(dark), 0.4, 1.0)
@@ -168,7 +162,7 @@ def frames_at(times, drives=None):
     return Frames((), np.zeros(len(times), dtype=int) if drives is None else np.array(drives), times, "small_loop")
 
 
-def test_a_drive_round_a_circle_has_its_poses_and_rates():
+def test_a_drive_is_looked_up_smoothed_at_its_latency():
     times = np.linspace(1.0, 8.0, 30)
     tracks, numbers = track_frames(log_of(episode()), frames_at(times))
     poses, rates = tracks.at(0.0)
@@ -178,18 +172,12 @@ def test_a_drive_round_a_circle_has_its_poses_and_rates():
     course = np.column_stack((SPEED * np.cos(heading), SPEED * np.sin(heading), np.full(30, SPEED / RADIUS)))
     np.testing.assert_allclose(rates, course, atol=2e-3)
     assert tracks.moving
-
-
-def test_smoothing_leaves_the_share_of_the_scatter_that_it_says():
     times = np.arange(1.0, 9.0, 0.5)
     drives = (log_of(episode(noise=0.01, seed=seed)) for seed in range(40))
     errors = [track_frames(drive, frames_at(times))[0].at(0.0)[0] - circle(times) for drive in drives]
     share = track_frames(log_of(episode()), frames_at(times))[0].share
     assert share < 0.6
     assert np.std(errors) == pytest.approx(0.01 * share, rel=0.1)
-
-
-def test_a_latency_looks_up_the_pose_of_so_long_before():
     times = np.linspace(2.0, 8.0, 20)
     tracks, _ = track_frames(log_of(episode()), frames_at(times))
     np.testing.assert_allclose(tracks.at(0.13)[0], circle(times - 0.13), atol=6e-4)
@@ -315,7 +303,7 @@ def log(folder):
     return read_log(folder)
 
 
-def test_views_hold_what_the_log_says(log):
+def test_what_a_log_says_of_its_tracker_is_held_and_else_assumed(log):
     gathered = gather_views(log, log.frames, ROBOT)
     views = gathered.views
     np.testing.assert_array_equal(gathered.numbers, np.arange(COUNT))
@@ -324,9 +312,6 @@ def test_views_hold_what_the_log_says(log):
     assert (views.optics.rows, views.optics.columns) == (72, 96)
     assert (views.position_m, views.heading_rad) == pytest.approx((0.002, np.radians(0.3)))
     assert views.tape_m == views.markings.road.paint.tape_m == 0.005
-
-
-def test_a_tracker_that_states_nothing_is_assumed_to_scatter_by_millimetres(log):
     frames = replace(log.frames, position_m=None, heading_deg=None)
     views = gather_views(log, frames, ROBOT).views
     assert (views.position_m, views.heading_rad) == pytest.approx((0.005, np.radians(1.0)))

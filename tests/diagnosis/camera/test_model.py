@@ -59,15 +59,12 @@ def test_frames_are_drawn_in_the_order_asked_for_from_where_the_camera_was():
     np.testing.assert_array_equal(drawn(look={"blur": 0.1, "rolling_shutter": 0.03}), drawn())
 
 
-def test_a_latency_shows_what_was_there_so_long_before():
+def test_a_latency_shows_what_was_there_before_and_blur_shifts_nothing():
     views = scenes()[True]
     before = replace(views, tracks=replace(views.tracks, instants=views.tracks.instants - 0.2))
     late = drawn(True, theta={"camera_latency": 0.2})
     np.testing.assert_array_equal(late, draw_pictures(before, at_truth(before), {}, FRAMES))
     assert np.abs(late - drawn(True)).mean() > 1.0
-
-
-def test_blur_softens_a_drive_s_pictures_and_does_not_shift_them():
     sharp, soft, softer = (drawn(True, {"blur": seconds}) for seconds in (0.0, 0.05, 0.15))
     assert sharpness(sharp) > sharpness(soft) > sharpness(softer)
     assert soft.mean() == pytest.approx(sharp.mean(), rel=0.01)

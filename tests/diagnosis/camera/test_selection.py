@@ -84,14 +84,10 @@ def test_poses_three_centimetres_off_are_told():
     assert note.endswith("% of the markings' edges match (60 % or more is usual): poses or map are off by centimetres")
 
 
-def test_nothing_is_said_of_frames_that_belong_to_their_poses():
+def test_frames_that_belong_to_their_poses_match_by_edges_near_markings():
     full = everything(ROLLED)
     assert selection.check_match("log", full) == ()
     assert selection.matched_share(full) > selection.USUAL_MATCHED
-
-
-def test_the_share_counts_edges_near_markings_only():
-    full = everything(ROLLED)
     edges = full.views.edges
     above = edges._replace(row=np.where(edges.frame == 0, 3.0, edges.row))
     less = replace(full, views=replace(full.views, edges=above))
@@ -301,14 +297,11 @@ def test_an_effect_is_named_by_a_tracker_that_states_no_scatter():
     assert select_camera_effects(full, DECLARED).effects == ("camera_roll",)
 
 
-def test_a_set_of_effects_leaves_all_others_neutral():
+def test_costs_are_least_with_everything_free_and_others_stay_neutral():
     fit = fit_set(everything(ROLLED), ("camera_pitch", "lens_centre"))
     assert fit.names == ("camera_pitch", "lens_centre.right", "lens_centre.down")
     assert fit.theta["camera_roll"] == 0.0
     assert fit.theta["camera_height"] == ROBOT.camera_figures().height_m
-
-
-def test_the_cost_is_least_with_everything_free():
     full = everything(ROLLED)
     none, right = (fit_set(full, (*DECLARED, *named)) for named in ((), ROLLED))
     assert selection.cost_of(full) < selection.cost_of(none)

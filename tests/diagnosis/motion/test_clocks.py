@@ -197,7 +197,7 @@ def test_a_robot_that_repeats_itself_is_stuck_or_rests_is_no_clock_problem():
     assert stretches(log, blocks, latencies) == ([(0.0, np.inf)], ())
 
 
-def test_commands_put_on_the_poses_clock_are_those_of_one_clock():
+def test_one_clock_is_left_and_commands_are_put_on_that_of_the_poses():
     late = in_one_drive(-0.3)
     apart, right = (hidden.make_log(CASE, late_s=late_s, noiseless=True, **SHORT) for late_s in (late, 0.0))
     corrected, found = timing.on_one_clock(apart, ROBOT)
@@ -210,9 +210,6 @@ def test_commands_put_on_the_poses_clock_are_those_of_one_clock():
     np.testing.assert_allclose(moved.duties[3, : len(known) - 1], (1.0 - part) * known[:-1] + part * known[1:])
     np.testing.assert_allclose(moved.duties[0], drives.duties[0])
     np.testing.assert_array_equal(corrected.episodes[3].poses, apart.episodes[3].poses)
-
-
-def test_a_log_of_one_clock_is_left_as_it_is():
     log = hidden.make_log(CASE, **SHORT)
     assert timing.on_one_clock(log, ROBOT)[0] is log
 
@@ -303,7 +300,7 @@ def test_drives_without_commands_to_move_or_without_any_are_left_to_others():
     assert cut_out_long_rests(frames) is frames
 
 
-def test_every_third_of_many_episodes_is_tested_and_not_fitted():
+def test_drives_are_split_by_motion_and_another_log_may_be_tested_on():
     log = planted_log(TRUTH, episodes=7, seconds=15.0)
     fitted, tested = split(log, ROBOT, None)
     assert fitted.duties.shape[0] == 5
@@ -311,6 +308,19 @@ def test_every_third_of_many_episodes_is_tested_and_not_fitted():
     np.testing.assert_array_equal(tested.duties[0, ::3], log.episodes[2].commands)
     for row, episode in enumerate((0, 1, 3, 4, 6)):
         np.testing.assert_array_equal(fitted.duties[row, ::3], log.episodes[episode].commands)
+    log, other = (planted_log(TRUTH, seed=seed, episodes=2, seconds=15.0) for seed in (1, 2))
+    fitted, tested = split(log, ROBOT, other)
+    assert (fitted.duties.shape[0], tested.duties.shape[0]) == (2, 2)
+    np.testing.assert_array_equal(tested.duties[1, ::3], other.episodes[1].commands)
+
+    def lost(poses):
+        poses = poses.copy()
+        poses[400:1400] = np.nan
+        return poses
+
+    fitted, tested = split(with_poses(planted_log(TRUTH, episodes=1, seconds=120.0), lost), ROBOT, None)
+    assert fitted.seconds == pytest.approx(tested.seconds, abs=0.2)
+    assert len(np.unique(fitted.block)) >= 6
 
 
 @pytest.mark.parametrize("episodes", [1, 2, 5])
@@ -320,13 +330,6 @@ def test_few_episodes_are_split_by_time(episodes):
     for episode in range(episodes):
         assert fitted.last[fitted.episode == episode].max() <= tested.first[tested.episode == episode].min()
         assert not tested.linked[tested.episode == episode][0]
-
-
-def test_another_log_may_be_tested_on():
-    log, other = (planted_log(TRUTH, seed=seed, episodes=2, seconds=15.0) for seed in (1, 2))
-    fitted, tested = split(log, ROBOT, other)
-    assert (fitted.duties.shape[0], tested.duties.shape[0]) == (2, 2)
-    np.testing.assert_array_equal(tested.duties[1, ::3], other.episodes[1].commands)
 
 
 @pytest.mark.parametrize(("episodes", "seconds"), [(1, 30.0), (3, 10.0), (6, 6.0)])
@@ -346,17 +349,6 @@ def test_there_are_enough_blocks_to_leave_out_and_none_is_tiny(episodes, seconds
             assert len(np.unique(drives.episode[own])) == 1
             assert (drives.last[own].max() - drives.first[own].min()) / drives.tick_hz > 0.9 * timing.TEST_BLOCK_S
             assert not drives.linked[own][0]
-
-
-def test_half_of_the_measured_motion_not_of_the_time_is_fitted():
-    def lost(poses):
-        poses = poses.copy()
-        poses[400:1400] = np.nan
-        return poses
-
-    fitted, tested = split(with_poses(planted_log(TRUTH, episodes=1, seconds=120.0), lost), ROBOT, None)
-    assert fitted.seconds == pytest.approx(tested.seconds, abs=0.2)
-    assert len(np.unique(fitted.block)) >= 6
 
 
 def test_of_very_many_drives_no_more_are_tested_on_than_needed_spread_over_all(monkeypatch):

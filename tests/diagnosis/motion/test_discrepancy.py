@@ -84,11 +84,17 @@ def test_a_hidden_curve_is_learnt_by_its_signal_and_lowers_the_error_of_other_dr
     assert after < 1.5 * squares(tested, {**TRUTH, **TURNING})
 
 
-def test_the_guard_and_the_held_out_errors_tell_of_blocks_that_were_not_fitted(found):
+def test_the_guard_tells_of_blocks_that_were_not_fitted_and_wants_a_sure_gain(found):
     drives, learnt = found
     assert set(learnt.guard) == {1.0, 2.0, 5.0}
     assert np.sqrt(learnt.held_out.mean() / squares(drives, TRUTH)) == pytest.approx(learnt.guard[2.0].value)
     assert squares(drives, {**TRUTH, **learnt.theta}) < learnt.held_out.mean()
+    assert DULL.value < RULES.discrepancy_harms < BAD.value
+    assert GOOD.value < RULES.discrepancy_helps < DULL.value
+    assert discrepancy._helps({1.0: GOOD, 2.0: DULL}, RULES)
+    for guard in ((GOOD, BAD), (DULL, DULL), (UNSURE, DULL), ()):
+        assert not discrepancy._helps(dict(enumerate(guard)), RULES), guard
+    assert not Discrepancy().used
 
 
 @pytest.mark.slow
@@ -125,15 +131,6 @@ def test_where_nothing_is_learnt_it_is_looked_once_more_for_what_matters_in_few_
 
 GOOD, DULL = Ratio(0.8, (0.7, 0.9)), Ratio(1.0, (0.9, 1.1))
 BAD, UNSURE = Ratio(1.1, (0.9, 1.3)), Ratio(0.8, (0.6, 1.01))
-
-
-def test_the_guard_wants_a_sure_gain_somewhere_and_a_loss_nowhere():
-    assert DULL.value < RULES.discrepancy_harms < BAD.value
-    assert GOOD.value < RULES.discrepancy_helps < DULL.value
-    assert discrepancy._helps({1.0: GOOD, 2.0: DULL}, RULES)
-    for guard in ((GOOD, BAD), (DULL, DULL), (UNSURE, DULL), ()):
-        assert not discrepancy._helps(dict(enumerate(guard)), RULES), guard
-    assert not Discrepancy().used
 
 
 WRONG = AdoptedEffect("saturation", "", ("saturation.limit",), (), 100.0, 0.001, ())

@@ -26,10 +26,14 @@ def test_they_are_those_of_numpy_for_any_angle(reach):
     np.testing.assert_allclose(cosine_and_sine(angle), (np.cos(angle), np.sin(angle)), rtol=0.0, atol=1e-14)
 
 
-def test_of_right_angles_and_of_zero_they_are_exact():
+def test_right_angles_are_exact_and_ticks_at_least_60_per_second():
     cosine, sine = cosine_and_sine(np.arange(-6, 7) * np.pi / 2.0)
     np.testing.assert_allclose(cosine + 1j * sine, 1j ** np.arange(-6, 7), rtol=0.0, atol=1e-14)
     assert [part.item() for part in cosine_and_sine(np.zeros(()))] == [1.0, 0.0]
+    drives = gathered(episode([0.0, 0.1, 0.2]))
+    assert (drives.tick_hz, drives.rate_hz) == (60.0, 20.0)
+    slow = replace(log(episode([0.0, 0.1, 0.2])), rate_hz=7.0)
+    assert gather(slow, ROBOT, slow.episodes).tick_hz == 63.0
 
 
 SPEED_PER_RAD = 0.0318 / 0.6
@@ -62,20 +66,19 @@ def test_poses_that_repeat_are_older_ones_and_a_robot_that_stands_shows_one_ever
     assert rows_of(gathered(episode([0.0] * 10))) == [(0, 4), (4, 8)]
 
 
-def test_ticks_are_at_least_60_per_second():
-    drives = gathered(episode([0.0, 0.1, 0.2]))
-    assert (drives.tick_hz, drives.rate_hz) == (60.0, 20.0)
-    slow = replace(log(episode([0.0, 0.1, 0.2])), rate_hz=7.0)
-    assert gather(slow, ROBOT, slow.episodes).tick_hz == 63.0
-
-
-def test_an_increment_spans_missing_poses_up_to_a_second_and_no_longer():
+def test_increments_span_missing_poses_and_break_where_left_out():
     second = [0.0, *[None] * 19, 1.0, 1.1]
     assert rows_of(gathered(episode(second))) == [(0, 20), (20, 21)]
     longer = [0.0, 0.1, *[None] * 20, 1.0, 1.1]
     drives = gathered(episode(longer))
     assert rows_of(drives) == [(0, 1), (22, 23)]
     assert drives.linked.tolist() == [False, False]
+    drives = gathered(episode([0.0, 0.1, 0.2, 0.3, 0.4]), episode([0.0, 0.1, 0.2], name="b"))
+    some = drives.only(np.array([True, True, False, True, False, True]))
+    assert some.linked.tolist() == [False, True, False, False]
+    assert some.block.tolist() == [0, 0, 0, 1]
+    assert rows_of(some) == [(0, 1), (1, 2), (3, 4), (1, 2)]
+    assert drives.only(drives.episode == 1).block.tolist() == [0, 0]
 
 
 def test_increments_are_linked_within_an_episode_and_need_two_poses_and_commands():
@@ -89,21 +92,17 @@ def test_increments_are_linked_within_an_episode_and_need_two_poses_and_commands
     np.testing.assert_allclose(seen, [3.0, 0.5, 3.0 - np.pi / 2], atol=1e-12)
 
 
-def test_leaving_increments_out_breaks_the_links_over_them_and_renumbers_blocks():
-    drives = gathered(episode([0.0, 0.1, 0.2, 0.3, 0.4]), episode([0.0, 0.1, 0.2], name="b"))
-    some = drives.only(np.array([True, True, False, True, False, True]))
-    assert some.linked.tolist() == [False, True, False, False]
-    assert some.block.tolist() == [0, 0, 0, 1]
-    assert rows_of(some) == [(0, 1), (1, 2), (3, 4), (1, 2)]
-    assert drives.only(drives.episode == 1).block.tolist() == [0, 0]
-
-
-def test_episodes_of_different_length_go_on_with_their_last_command():
+def test_episodes_of_different_length_and_headings_between_are_filled():
     long = episode([0.0, 0.1, 0.2], commands=[[0.1, 0.2]] * 3)
     short = episode([0.0, 0.1], commands=[[0.3, 0.4], [0.5, 0.6]], name="b")
     duties = gathered(long, short).duties
     assert duties.shape == (2, 9, 2)
     np.testing.assert_array_equal(duties[1, ::3], [[0.3, 0.4], [0.5, 0.6], [0.5, 0.6]])
+    one = episode([0.0, None, 0.2])
+    poses = one.poses.copy()
+    poses[[0, 2], 2] = (1.0, 2.0)
+    drives = gathered(replace(one, poses=poses))
+    np.testing.assert_allclose(drives.headings[0, :7], 1.0 + np.arange(7) / 6.0)
 
 
 def test_logs_without_two_poses_in_a_row_or_commands_are_refused():
@@ -149,14 +148,6 @@ def test_wheel_speeds_are_used_where_all_episodes_have_them_without_a_gap():
     steady = gathered(episode(0.01 * np.arange(40)))
     np.testing.assert_allclose(steady.rest[0], 0.2 / ROBOT.figures["full_speed"])
     np.testing.assert_array_equal(gathered(episode(0.004 * np.arange(40) ** 2 / 40)).rest[0], 0.0)
-
-
-def test_headings_between_measured_ones_are_interpolated():
-    one = episode([0.0, None, 0.2])
-    poses = one.poses.copy()
-    poses[[0, 2], 2] = (1.0, 2.0)
-    drives = gathered(replace(one, poses=poses))
-    np.testing.assert_allclose(drives.headings[0, :7], 1.0 + np.arange(7) / 6.0)
 
 
 def test_travel_is_the_way_without_what_noise_adds():

@@ -75,7 +75,7 @@ def test_of_steps_that_are_as_good_a_round_one_is_taken(drives, monkeypatch):
     assert fitting._scan(drives, theta, ((name,),), None, np.array([0.9, 1.1]))[name] == 0.25
 
 
-def test_a_step_is_found_with_an_interval_round_it():
+def test_steps_and_thresholds_are_found_with_intervals():
     truth = {**TRUTH, "command_quantisation": 0.25}
     free = (*DECLARED, ("command_quantisation",))
     found = fit(planted_drives(truth), {**truth, "command_quantisation": 0.2503}, free)
@@ -83,9 +83,6 @@ def test_a_step_is_found_with_an_interval_round_it():
     assert not found.slopes[:, 2].any()
     low, high = intervals(found)["command_quantisation"]
     assert 0.24 < low < 0.25 < high < 0.26
-
-
-def test_the_threshold_of_stiction_lies_in_its_interval():
     truth = {**TRUTH, "stiction.breakaway": 0.141, "stiction.imbalance": 0.0}
     found = fit(planted_drives(truth), {**truth, "stiction.breakaway": 0.15}, (*DECLARED, ("stiction.breakaway",)))
     low, high = intervals(found)["stiction.breakaway"]
@@ -130,7 +127,7 @@ def linear(drives, columns=2, seed=4):
     return Fit(drives, {}, free, NOISE, Whitener(factor), z, slope)
 
 
-def test_a_block_is_foretold_as_if_the_others_alone_had_been_fitted(drives):
+def test_blocks_are_foretold_and_useless_parameters_cost(drives):
     few = drives.only(np.isin(drives.block, (0, 3, 4, 7)) & (np.arange(len(drives.block)) % 5 == 0))
     model = linear(few)
     told = held_out_log_likelihood(model)
@@ -141,19 +138,16 @@ def test_a_block_is_foretold_as_if_the_others_alone_had_been_fitted(drives):
         left = model.innovations[own] + model.slopes[own] @ refit
         surprise = 0.5 * left @ left + np.log(model.whiten.factor[0][own]).sum()
         assert told[block] == pytest.approx(-surprise, rel=1e-5)
+    model = linear(drives, columns=3)
+    assert gain(model) < 2.0
+    needed = replace(model, innovations=model.innovations + 0.2 * model.slopes[:, 1])
+    assert gain(needed) == pytest.approx(0.5 * 0.04 * (model.slopes[:, 1] ** 2).sum(), rel=0.3)
 
 
 def gain(model):
     """What all parameters but the first are worth."""
     alone = replace(model, slopes=model.slopes[:, :1])
     return float(held_out_log_likelihood(model).sum() - held_out_log_likelihood(alone).sum())
-
-
-def test_a_useless_parameter_costs_and_a_needed_one_pays(drives):
-    model = linear(drives, columns=3)
-    assert gain(model) < 2.0
-    needed = replace(model, innovations=model.innovations + 0.2 * model.slopes[:, 1])
-    assert gain(needed) == pytest.approx(0.5 * 0.04 * (model.slopes[:, 1] ** 2).sum(), rel=0.3)
 
 
 @pytest.fixture(scope="module")

@@ -128,7 +128,7 @@ def test_what_was_fitted_is_not_fitted_again_but_other_windows_and_starts_are(mo
         assert asked
 
 
-def test_no_pose_is_predicted_by_what_was_fitted_to_it(driven):
+def test_what_predicts_poorly_is_fitted_again_by_poses_not_fitted_to(driven):
     poses = driven.poses.copy()
     own = driven.block % 4 == 0
     poses[own, :, 2] += np.linspace(0.0, 2.0, own.sum())[:, None]
@@ -138,9 +138,6 @@ def test_no_pose_is_predicted_by_what_was_fitted_to_it(driven):
     together = squares(replace(driven, poses=poses), fitted)
     assert apart[2.0][others].mean() > together[others].mean()
     assert set(apart) == set(multistep_fit.horizons(driven)) == {1.0, 2.0, 5.0}
-
-
-def test_values_that_predict_poorly_are_fitted_again(driven):
     poor = model(driven, trim=0.08, delay=0.2)
     better, polish = fit_multistep(poor)
     assert squares(driven, better.theta).mean() < 0.5 * squares(driven, poor.theta).mean()

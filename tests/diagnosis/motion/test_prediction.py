@@ -39,7 +39,7 @@ def without_poses(log, *rows):
     return replace(log, episodes=(replace(first, poses=poses), *log.episodes[1:]))
 
 
-def test_windows_follow_one_another_and_cover_every_row(log):
+def test_windows_cover_every_row_and_headings_go_on(log):
     table = predict(log, ROBOT, TRUTH, 2.0)
     assert list(table.columns) == COLUMNS
     for name, own in table.groupby("episode"):
@@ -47,13 +47,34 @@ def test_windows_follow_one_another_and_cover_every_row(log):
         assert sorted(own.start_time.unique()) == pytest.approx([0.0, 2.0, 4.0, 6.0, 8.0])
         assert sorted(own.time.unique()) == pytest.approx(np.arange(200) / 20.0)
         assert (own.groupby("start_time").time.count() <= 41).all()
+    table = predict(log, ROBOT, TRUTH, 5.0)
+    for _, window in table.groupby(["episode", "start_time"]):
+        assert np.abs(np.diff(window.heading)).max() < 0.5
+    far = planted_log(TRUTH, episodes=1, seconds=10.0, noise=None)
+    turned = with_poses(far, lambda poses: poses + (0.0, 0.0, 40.0))
+    assert predict(turned, ROBOT, TRUTH, 5.0).heading.iloc[0] == pytest.approx(turned.episodes[0].poses[0, 2])
 
 
-def test_a_model_agrees_with_its_own_noiseless_log(log):
+def test_exact_models_predict_noiseless_logs_slopes_and_markers(log):
     found = agreement(predict(log, ROBOT, TRUTH, 2.0), log, 2.0)
     assert found.place < 1e-9
     assert found.turn < 1e-9
     assert (found.poses, found.windows) == (2 * 199, 10)
+    theta = {**TRUTH, "floor_slope.x": 0.04, "floor_slope.y": -0.02}
+    log = planted_log(theta, episodes=3, seconds=10.0, noise=None)
+    assert agreement(predict(log, ROBOT, theta, 2.0), log, 2.0).place < 1e-6
+    assert agreement(predict(log, ROBOT, TRUTH, 2.0), log, 2.0).place > 0.01
+    theta = {**TRUTH, "marker_offset.forward": 0.05, "heading_offset": 3.0}
+    plain = planted_log(TRUTH, episodes=2, seconds=10.0, noise=None)
+
+    def seen(poses):
+        out = poses.copy()
+        out[:, :2] += 0.05 * np.stack((np.cos(poses[:, 2]), np.sin(poses[:, 2])), axis=1)
+        out[:, 2] += np.radians(3.0)
+        return out
+
+    log = with_poses(plain, seen)
+    assert agreement(predict(log, ROBOT, theta, 2.0), log, 2.0).place < 1e-6
 
 
 def test_a_stub_at_a_drives_end_is_not_counted_as_a_window(log):
@@ -74,36 +95,6 @@ def test_learnt_motion_is_predicted_with_its_past_before_each_window(log, extra)
     found = agreement(predict(driven, ROBOT, {**TRUTH, **extra}, 2.0), driven, 2.0)
     assert found.place < 1e-9
     assert found.turn < 1e-9
-
-
-def test_headings_go_on_over_a_whole_turn(log):
-    table = predict(log, ROBOT, TRUTH, 5.0)
-    for _, window in table.groupby(["episode", "start_time"]):
-        assert np.abs(np.diff(window.heading)).max() < 0.5
-    far = planted_log(TRUTH, episodes=1, seconds=10.0, noise=None)
-    turned = with_poses(far, lambda poses: poses + (0.0, 0.0, 40.0))
-    assert predict(turned, ROBOT, TRUTH, 5.0).heading.iloc[0] == pytest.approx(turned.episodes[0].poses[0, 2])
-
-
-def test_a_slope_is_predicted_exactly_whatever_the_heading():
-    theta = {**TRUTH, "floor_slope.x": 0.04, "floor_slope.y": -0.02}
-    log = planted_log(theta, episodes=3, seconds=10.0, noise=None)
-    assert agreement(predict(log, ROBOT, theta, 2.0), log, 2.0).place < 1e-6
-    assert agreement(predict(log, ROBOT, TRUTH, 2.0), log, 2.0).place > 0.01
-
-
-def test_a_marker_is_predicted_exactly():
-    theta = {**TRUTH, "marker_offset.forward": 0.05, "heading_offset": 3.0}
-    plain = planted_log(TRUTH, episodes=2, seconds=10.0, noise=None)
-
-    def seen(poses):
-        out = poses.copy()
-        out[:, :2] += 0.05 * np.stack((np.cos(poses[:, 2]), np.sin(poses[:, 2])), axis=1)
-        out[:, 2] += np.radians(3.0)
-        return out
-
-    log = with_poses(plain, seen)
-    assert agreement(predict(log, ROBOT, theta, 2.0), log, 2.0).place < 1e-6
 
 
 def test_windows_begin_at_measured_poses_and_others_are_not_compared(log):
@@ -182,13 +173,10 @@ def test_a_model_that_is_right_misses_only_what_is_not_repeated(times, horizon_s
     assert found.interval[0] < 1.0 < found.interval[1] + 0.1
 
 
-def test_a_model_that_lacks_something_misses_more_than_is_not_repeated():
+def test_repeats_show_what_a_model_lacks_as_far_as_drives_go():
     found = compare_repeats(again(3, theta={**TRUTH, "yaw_scrub": 0.12}), TRUTH, 2.0).share
     assert found.value < 0.7
     assert found.interval[1] < 0.9
-
-
-def test_drives_that_end_earlier_are_repeats_as_far_as_they_go():
     duties, starts = make_drives(3, 1, 600)
     log = driven_log(TRUTH, np.repeat(duties, 2, axis=0), np.repeat(starts, 2, axis=0))
     one, other = log.episodes
@@ -248,13 +236,15 @@ def test_a_right_model_leaves_nothing_and_does_not_stray_from_noiseless_drives(d
     assert pose_errors(quiet, {**TRUTH, "trim": 0.1}, cut(quiet, 2.0))[:, 0].max() > 0.01
 
 
-def test_windows_are_thinned_to_a_few_poses_that_reach_their_end(drives):
+def test_windows_are_thinned_and_short_runs_have_none(drives):
     windows = windows_module.choose_windows(drives)
     counts = np.bincount(windows.window)
     assert counts.max() == windows_module.POSES
     lasts = (drives.last[windows.increment] - drives.first[windows.begin][windows.window]) / drives.tick_hz
     assert lasts.max() == windows_module.FITTED_S
     assert np.all(np.diff(lasts)[np.diff(windows.window) == 0] > 0.0)
+    few = planted_drives(TRUTH, episodes=2, seconds=4.0)
+    assert len(cut(few, 10.0).begin) == 0
 
 
 @pytest.fixture(scope="module")
@@ -294,11 +284,6 @@ def test_no_window_crosses_a_gap_a_block_or_an_episode(rows, horizon_s):
         assert len(np.unique(long.block[own])) == len(np.unique(long.episode[own])) == 1
         lasts = (long.last[own[-1]] - long.first[begin]) / long.tick_hz
         assert windows_module.SHORTEST * horizon_s <= lasts <= horizon_s + 1e-9
-
-
-def test_runs_shorter_than_most_of_the_horizon_have_no_window():
-    few = planted_drives(TRUTH, episodes=2, seconds=4.0)
-    assert len(cut(few, 10.0).begin) == 0
 
 
 def test_intervals_cover_the_true_error_about_as_often_as_they_say():
@@ -341,7 +326,7 @@ def test_a_ratio_is_shown_by_many_blocks_on_one_side_though_a_few_weigh_most():
     assert not smaller.above
 
 
-def test_windows_of_a_few_episodes_at_a_time_have_the_same_errors_to_the_bit(long, monkeypatch):
+def test_errors_are_the_same_however_few_episodes_are_replayed_at_a_time(long, monkeypatch):
     theta = {**TRUTH, "dead_band.width": 0.1, "floor_slope.y": 0.02, "motor_lag.time_constant": 0.3}
     gone = long.only((long.episode != 3) & (np.arange(len(long.episode)) != 150))
     windows = cut(gone, 2.0)
@@ -349,9 +334,6 @@ def test_windows_of_a_few_episodes_at_a_time_have_the_same_errors_to_the_bit(lon
     whole = pose_errors(gone, theta, every_other)
     monkeypatch.setattr(windows_module, "AT_ONCE", gone.duties.shape[1])
     assert np.array_equal(pose_errors(gone, theta, every_other), whole)
-
-
-def test_no_more_episodes_are_replayed_at_a_time_than_memory_is_to_take(long, monkeypatch):
     sizes, replay = [], windows_module.window_paths
     monkeypatch.setattr(
         windows_module, "window_paths", lambda some, *rest: sizes.append(len(some.duties)) or replay(some, *rest)

@@ -112,6 +112,7 @@ def test_drafts_of_other_users_count_and_a_number_beyond_all_is_no_process(tmp_p
     with draft_of(path) as draft:
         draft.write_text("new")
     assert list(tmp_path.iterdir()) == [path]
+
     draft_path(path).with_name(draft_path(path).name.replace(str(os.getpid()), "1")).write_text("theirs")
 
     def forbidden(process, signal):

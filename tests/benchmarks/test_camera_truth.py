@@ -302,11 +302,13 @@ def test_sets_are_counted_by_names_alarms_and_flags():
     assert counted["geometric: named, nothing beside"].hits == 2
     assert counted["geometric: named by itself, no rival"].hits == 1
     assert counted["geometric: wrong without a flag"].hits == 2
+
     quiet = [answer(case, said("nothing missing")) for case in ("none", "camera_pitch", "blur")]
     loud = [answer("none", said("explained", "camera_yaw")), answer("none", said("partly explained"))]
     counted = rates([*quiet, *loud, answer("none", problem="LogError: no frames")])
     assert counted["nothing missing: false alarms"] == Rate(2, 5)
     assert counted["failed"] == Rate(1, 6)
+
     blemish = {**said("nothing missing"), "blemishes": [{"column": 3}]}
     answers = [answer("dirt", said("explained")), answer("dirt", said("unexplained")), answer("dirt", blemish)]
     counted = rates(answers)

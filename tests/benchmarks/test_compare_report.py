@@ -44,6 +44,7 @@ def test_every_engine_has_its_median_and_its_name_at_the_end_of_its_line():
     assert list(drawn["sobol (2 seeds)"].get_ydata()) == [8.5, 8.0, 8.0, 8.0]
     assert list(drawn["noise floor"].get_ydata()) == [1.0, 1.0]
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("evaluations", "lowest regret so far [ordered pairs]")
+
     together = [runs(engine, [9.0, 5.0 + number % 3, 3.0]) for number, engine in enumerate(NAMES)]
     figure = compare_figure(together, 1.0)
     figure.draw_without_rendering()

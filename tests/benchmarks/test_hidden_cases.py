@@ -120,15 +120,18 @@ def test_motors_lag_by_time_constants_of_their_own_and_break_away_or_wait_for_th
     forward = twists(duties, ("uneven_motor", {"rising": 0.4, "falling": 0.1}))[:, 0]
     assert forward[96] == pytest.approx(0.6 * (1.0 - np.exp(-1.0)), abs=2e-3)
     assert forward[960 + 24] == pytest.approx(0.6 * np.exp(-1.0), abs=5e-3)
+
     duties = np.repeat(np.array((0.1, 0.2, 0.1, 0.05, 0.1)), 60)[None, :, None] * np.ones(2)
     forward = twists(duties, ("stiction", {"breakaway": 0.15}))[::720, 0]
     ends = twists(duties, ("stiction", {"breakaway": 0.15}))[719::720, 0]
     assert forward[0] == 0.0
     np.testing.assert_allclose(ends, (0.0, 0.12, 0.06, 0.0), atol=1e-4)
+
     duties = held(0.5, 0.5, seconds=8.0)
     duties[:, 80:] = -0.5
     moved = driven(duties, ("backlash", {"gap": 0.6}))[:, 0] - driven(duties)[:, 0]
     np.testing.assert_allclose(moved[[79, 159]], (-0.3 * 0.0318, 0.3 * 0.0318), atol=1e-6)
+
     forward = twists(held(0.5, 0.5, seconds=60.0), ("battery_sag", {"fade": 0.5}))[-1, 0]
     assert forward == pytest.approx(0.3 * np.exp(-0.25), rel=1e-2)
     forward = twists(held(0.5, 0.5, seconds=60.0), ("sag_with_time", {"rate": 0.2}))[-1, 0]

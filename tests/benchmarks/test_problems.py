@@ -232,8 +232,10 @@ def test_there_are_plateaus_and_few_points_within_the_floor():
 
     assert moved(blur, pitch, delay, trim + 0.01) == 0.0
     assert moved(blur, pitch, delay, trim + 0.2) > moved(blur - 0.2, pitch, delay, trim) > 0.0
+
     scores = [RANKING.score(RANKING.truth(seed), seed) for seed in range(60)]
     assert np.mean(scores) == pytest.approx(RANKING.tolerance, rel=0.3)
+
     regrets = [RANKING.regret(design_point(RANKING.space, index, 7), seed) for seed in (1, 2) for index in range(64)]
     assert np.mean(np.array(regrets) <= RANKING.tolerance) < 0.05
     assert AGENTS * (AGENTS - 1) / 6 < np.median(regrets) < AGENTS * (AGENTS - 1) / 2

@@ -50,11 +50,13 @@ def test_a_hidden_effect_counts_as_named_if_it_or_its_rival_was_added_and_else_i
     assert row("pair", "explained", ("dead_band",), ("stiction", "motor_lag"), right=hidden).right
     assert not row("pair", "explained", ("dead_band",), right=hidden).right
     assert row("clean", "nothing missing").right
+
     hidden = (("dead_band",),)
     assert row("in form", "explained", ("dead_band",), ("turn_slip",), right=hidden).wrong
     assert not row("in form", "explained", ("stiction", "dead_band"), right=hidden).wrong
     assert not row("in form", "partly explained", ("turn_slip",), right=hidden).wrong
     assert row("taken out", "explained", ("dead_band",), right=hidden).wrong
+
     with rates._without("dead_band"):
         forms = rates.looking.candidates(rates.read_robot("duckiebot"), {}, ())
     assert "stiction" in {form.effect for form in forms}

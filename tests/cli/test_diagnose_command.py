@@ -73,6 +73,7 @@ def test_the_effect_is_named_with_its_parameter_interval_unit_and_worth(document
     assert parameter["unit"] == "m"
     assert parameter["interval"][0] < parameter["value"] < parameter["interval"][1]
     assert abs(parameter["value"] - 0.12) < np.ptp(parameter["interval"])
+
     assert set(effect["worth"]) == {"1", "2", "5"}
     for worth in effect["worth"].values():
         assert worth["unit"] == "%"

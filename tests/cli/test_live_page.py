@@ -48,6 +48,7 @@ def test_it_is_written_at_most_every_few_seconds_and_what_else_watches_hears_all
         clock.now += 0.1
         page.episode()
     assert len(written) == 2
+
     heard = Mock()
     page = LivePage(settings, "prpv", heard)
     page.begin("a", 2)

@@ -42,6 +42,7 @@ def test_every_window_is_written_and_the_error_is_that_of_the_written_poses(fold
     assert told["error"]["value"] < 1e-6
     assert told["error"]["unit"] == "m"
     assert told["error"]["poses"] == 2 * 199
+
     told = answered("predict", model({"trim": 0.1, "delay": 0.12}), folder, "--output", tmp_path / "poses.csv")
     table = pd.read_csv(tmp_path / "poses.csv")
     measured = pd.read_csv(folder / "samples.csv")[["episode", "time", "x", "y"]]

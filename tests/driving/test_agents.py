@@ -177,6 +177,7 @@ def test_laggy_waits_its_steps_smoothed_goes_a_share_of_the_way_and_leaning_give
 def test_agents_are_loaded_by_their_names_or_from_a_folder(tmp_path):
     with pytest.raises(ExtensionError, match="agent 'stead' is unknown .*; did you mean 'steady'"):
         load_agent("stead", tmp_path)
+
     (tmp_path / "mine_agents.py").write_text(
         "class Mine:\n    def begin(self, robot): return 0\n"
         "    def act(self, picture, memory): return (0.1, 0.1), memory\n"

@@ -99,6 +99,7 @@ def test_a_car_with_mass_does_what_its_equation_says_and_slides_beyond_its_tyres
         steps.append(speed)
     np.testing.assert_allclose(moved, np.mean(np.reshape(steps, (-1, 40)), axis=1), atol=2e-3)
     assert moved[-1] == 0.0
+
     forward, sideways, yaw = twists(CAR, held(1.0, 1.0), tyres__slide=0.25, tyres__rear_slip=0.01)[-1]
     assert forward * yaw == pytest.approx(4.0 * np.tanh(3.0**2 / CAR.least_radius * 0.25))
     assert sideways == pytest.approx(-0.01 * forward * forward * yaw)
@@ -162,6 +163,7 @@ def test_an_effect_of_another_drive_is_refused_in_a_line(tmp_path):
     assert 'only a robot with drive = "differential" has it, this one is "ackermann"' in told
     told = complaint_of(effects_from, {"dead_band.width": 0.1}, CAR.figures, CAR.catalogue)
     assert "did you mean 'dead_band'" in told
+
     with pytest.raises(SettingsError, match='only a robot with drive = "ackermann" has it'):
         effects_from({"steering_offset": 0.1}, read_robot("duckiebot").figures)
     model = tmp_path / "model.toml"
@@ -171,6 +173,7 @@ def test_an_effect_of_another_drive_is_refused_in_a_line(tmp_path):
     model.write_text(model.read_text(encoding="utf-8").replace("duckiebot", "car"), encoding="utf-8")
     assert read_model_of(model, tmp_path).theta == {"steering_offset": 0.1}
     assert catalogue_of("car", tmp_path) == Catalogue(tmp_path, drive="ackermann")
+
     assert parameter_hint("trim", family(tmp_path).parameters).startswith('only a robot with drive = "differential"')
     assert parameter_hint("steering_ofset", family(tmp_path).parameters) == "did you mean 'steering_offset'?"
 

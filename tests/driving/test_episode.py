@@ -485,6 +485,7 @@ def test_a_stopped_robot_survives_and_one_that_ends_at_once_does_not():
         "early_offset": pytest.approx(0.05),
         "speed": 0,
     }
+
     result = score(np.array([moved_left(OUTER, 0.05)]))
     nothing = dict.fromkeys(("distance", "survival_time", "time_out_of_lane", "early_distance", "speed"), 0)
     assert result == nothing | {"deviation": pytest.approx(0.05), "early_offset": pytest.approx(0.05)}
@@ -608,12 +609,14 @@ def exact_start(index, **noise):
 def test_placement_has_the_spread_it_was_given_and_depends_on_seed_and_index_alone():
     for index, (x, y, degrees) in enumerate(ROAD.starts):
         assert exact_start(index) == pytest.approx((x, y, math.radians(degrees)))
+
     noise = {"position_noise_m": 0.01, "heading_noise_deg": 2.0}
     assert exact_start(3, **noise) == exact_start(3, **noise)
     assert exact_start(3, **noise) != exact_start(3, **noise, seed=2)
     twice = dataclasses.replace(ROAD, starts=ROAD.starts[:1] * 2)
     first, second = (start_pose(twice, index, seed=1, **noise) for index in (0, 1))
     assert all(one != other for one, other in zip(first, second, strict=True))
+
     noise = {"position_noise_m": 0.02, "heading_noise_deg": 3.0}
     x, y, degrees = ROAD.starts[5]
     errors = np.array([exact_start(5, **noise, seed=seed) for seed in range(500)]) - (x, y, math.radians(degrees))

@@ -190,11 +190,13 @@ def test_lines_are_as_wide_as_stated_and_dashes_even():
     assert metres(inner) == pytest.approx(ROAD.paint.white_width, abs=0.001)
     assert FLOOR.origin + first / FLOOR.pixels_per_metre == pytest.approx(2 * TILE, abs=0.0026)
     assert metres(row) == pytest.approx(4 * ROAD.paint.white_width, abs=0.003)
+
     across = cover(FLOOR, "yellow")[texel(FLOOR, 1.5 * TILE)]
     right = np.arange(across.size) > across.size // 2
     places = FLOOR.origin + (np.arange(across.size) + 0.5) / FLOOR.pixels_per_metre
     assert metres(across[right]) == pytest.approx(ROAD.paint.yellow_width, abs=0.001)
     assert np.average(places[right], weights=across[right]) == pytest.approx(2.5 * TILE, abs=0.0005)
+
     column = cover(FLOOR, "yellow")[texel(FLOOR, TILE) : texel(FLOOR, 2 * TILE), texel(FLOOR, 2.5 * TILE)]
     painted = column > 0.5
     starts = np.flatnonzero(~painted[:-1] & painted[1:])

@@ -175,14 +175,17 @@ def test_commands_and_motors_answer_by_their_formulas():
     low, half = offset + 0.01 * (1 - offset), offset + 0.5 * (1 - offset)
     expected = [[0.0, 0.0], [low, 1.0], [-half, half]]
     np.testing.assert_allclose(run(DriverMap(offset), duty), expected)
+
     time_constant, rate_hz = 0.2, 10.0
     edges = np.arange(21) / rate_hz
     travelled = edges + time_constant * np.exp(-edges / time_constant)  # integral of 1 - exp(-t/tau), plus a constant
     lagging = run(MotorLag(time_constant, 0.0), step())[:, 0]
     np.testing.assert_allclose(lagging, np.diff(travelled) * rate_hz, atol=1e-12)
+
     uneven = run(MotorLag(0.2, -0.5), step())
     np.testing.assert_allclose(uneven[:, 0], run(MotorLag(0.3, 0.0), step())[:, 0], atol=1e-12)
     np.testing.assert_allclose(uneven[:, 1], run(MotorLag(0.1, 0.0), step())[:, 1], atol=1e-12)
+
     duties = np.array([[0.0, 0.09], [0.11, 0.31], [-0.34, 1.0]])
     expected = [[0.0, 0.0], [0.2, 0.4], [-0.4, 1.0]]
     np.testing.assert_allclose(run(CommandQuantisation(0.2), duties), expected)

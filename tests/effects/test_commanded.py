@@ -101,17 +101,20 @@ def test_times_of_commands_count_from_changes_starts_and_turns():
     signal[6:, 1] = 0.3
     stopped = added(LearntCurve("held", "duty", (0.25,), (-1.0,)), signal)[:, 0] != 0.0
     np.testing.assert_array_equal(np.flatnonzero(stopped), [5, *range(11, 20)])
+
     signal = np.repeat([[0.0, 0.5], [-0.3, 0.5], [0.0, 0.5]], 10, axis=0)
     kicked = added(LearntCurve("begun", "push", (0.2,), (0.6,)), signal)
     np.testing.assert_allclose(kicked[10:13, 0], -0.6)
     assert not kicked[13:, 0].any()
     assert kicked[0, 1] == pytest.approx(0.6)
     assert not kicked[5:, 1].any()
+
     signal = np.repeat([[0.5, 0.5], [0.0, 0.4], [-0.5, 0.3]], 8, axis=0)
     braked = added(LearntCurve("turned", "duty", (0.2,), (-1.0,)), signal)
     np.testing.assert_allclose(braked[16:20, 0], 0.5)
     assert not braked[20:].any()
     assert not braked[:, 1].any()
+
     signal = np.repeat([[0.5, 0.5], [0.0, 0.5]], 40, axis=0)
     rolling = added(LearntCurve("ended", "duty", (0.5,), (1.0,)), signal)
     assert not rolling[:40].any()

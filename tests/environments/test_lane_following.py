@@ -201,6 +201,7 @@ def test_one_picture_and_one_way_are_drawn_where_the_robot_is():
     after = env.render()
     assert 0 < (before[:, 640:] != after[:, 640:]).any(axis=-1).mean() < 0.02
     assert make().render() is None
+
     x, y, _ = env.reset(seed=0)[1]["pose"]
     above, per_metre = env.render()[:, 640:], 480 / 1.755
     assert tuple(above[round(480 - y * per_metre), round(x * per_metre)]) == (70, 160, 255)

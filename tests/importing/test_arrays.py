@@ -53,6 +53,7 @@ def test_frames_are_read_with_their_times_and_left_out_without(tmp_path):
     np.testing.assert_array_equal(np.stack(list(pictures.read())), FRAMES)
     assert source.channels[-1].role == "frames"
     assert read(tmp_path / "run1.npz", frames="none").drives[0].pictures is None
+
     unknown = np.arange(ROWS) == 2
     arrays = {"timestamps": np.where(unknown, np.nan, TIMES), "observations": FRAMES}
     arrays |= {"positions": np.where(unknown[:, None], np.nan, 1.0) * np.ones(3), "actions": None}

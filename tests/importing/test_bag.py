@@ -252,14 +252,17 @@ def test_headers_count_unless_the_bags_times_are_asked_for_or_both_count_otherwi
     assert received - header == pytest.approx(0.01, abs=1e-6)
     assert notes == ()
     assert "as asked" in said[0]
+
     header = np.arange(1, 101) * 10**7
     times, notes = choose_times(Stamps(header, header + 10**6), "header", "/pose")
     assert np.array_equal(times, seconds(header))
     assert notes == ()
+
     header = RECEIVE.copy()
     header[6] = 0
     with pytest.raises(LogError, match="/pose: the header of message 7 has no time stamp; take --stamps receive"):
         choose_times(Stamps(header, RECEIVE), "header", "/pose")
+
     with pytest.raises(LogError, match="/pose: unknown stamps 'headers'; did you mean 'header'"):
         choose_times(both(0), "headers", "/pose")
 

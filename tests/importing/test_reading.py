@@ -161,6 +161,7 @@ def test_drop_outs_are_counted_apart_from_gaps_and_jitter_is_the_scatter_of_inte
     assert (one.poses, one.commands, one.frames, one.gaps) == (200, 100, 0, 0)
     assert (one.seconds, one.poses_hz) == pytest.approx((9.95, 20.0))
     assert (one.lost, one.jitter_s) == pytest.approx((0.0, 0.0), abs=1e-9)
+
     times = np.delete(np.arange(400) * 0.05, [*range(50, 60), *range(200, 300)])
     one = survey(drive(times, np.arange(200) * 0.1))
     assert (one.gaps, one.longest_gap_s) == (2, pytest.approx(5.05))
@@ -168,6 +169,7 @@ def test_drop_outs_are_counted_apart_from_gaps_and_jitter_is_the_scatter_of_inte
     one = survey(drive(times, np.arange(200) * 0.1))
     assert one.gaps == 0
     assert one.lost == pytest.approx(4 / 400, abs=1e-4)
+
     random = np.random.default_rng(1)
     times = np.arange(2000) * 0.05 + random.normal(0.0, 0.002, 2000)
     one = survey(drive(times, np.arange(200) * 0.1))

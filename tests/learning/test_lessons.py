@@ -245,6 +245,7 @@ def test_thetas_are_drawn_for_every_lesson_where_they_are_free(tmp_path):
     assert {theta["trim"] for theta in thetas} == {0.1}
     assert len(set(delays)) == len(delays) == 20
     assert 0.0 <= min(delays) < 0.1 < 0.2 < max(delays) <= 0.3
+
     fixed = Distribution({"trim": (0.1, 0.1)})
     assert fixed.fixed
     assert not WIDE.fixed

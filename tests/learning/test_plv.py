@@ -44,15 +44,18 @@ def test_a_proxy_is_worth_the_samples_between_crossings():
 def test_where_no_or_all_samples_are_needed_plv_has_a_bound():
     found = worth(curve(50, 50, 50, 50, 50))
     assert (found.needed.value, found.reduction.value, found.factor.value) == (0.0, 1.0, None)
+
     found = worth(curve(0, 0, 0, 0, 0))
     assert (found.needed.value, found.needed.low, found.needed.high) == (None, pytest.approx(800.0), None)
     assert (found.plv.value, found.plv.low, found.factor.value) == (None, None, None)
     assert found.plv.high < 0.0
     assert found.plv.high == pytest.approx(found.without.high - 800.0)
+
     found = worth(curve(55, 58, 59, 59, 59), level=59.0)
     assert found.without.value is None
     assert found.plv.value is None
     assert found.plv.low > 0.0
+
     found = worth(curve(40, 50, 58, 59, 59), level=59.0).reduction
     assert found.value is None
     assert 0.0 < found.low < found.high == 1.0
@@ -139,11 +142,14 @@ def test_examinations_go_where_they_tell_most_and_nothing_twice():
     often = {name: sum(one.curve == name for one in chosen) for name in CURVES}
     assert len(chosen) == SPENDING.batch
     assert often["sure"] < min(often["open"], often["none"])
+
     done = {Examination(name, int(r), SPENDING_GRID[c]) for name, one in CURVES.items() for r, c in one.examined}
     assert len(set(chosen)) == len(chosen)
     assert not set(chosen) & done
     assert chosen[0].repetition == 2
+
     assert {one.curve for one in next_examinations(needs(), ["open"], SPENDING)} == {"open"}
+
     alone = {"none": CURVES["none"]}
     chosen = next_examinations(needs(alone), ["none"], SPENDING)
     assert len(chosen) == SPENDING.batch

@@ -34,6 +34,7 @@ def test_what_it_starts_from_is_kept_with_its_features():
     tuned = SMALL.train(few, start, 1)
     assert error(SMALL, tuned, few) < 0.1 * error(SMALL, start, few)
     assert error(SMALL, tuned, others) < 0.1 * error(SMALL, start, few)
+
     start = SMALL.train(pictures(60, 1), None, 1)
     before = {name: values.copy() for name, values in start.items()}
     one, other = (SMALL.train(pictures(60, 2), start, seed) for seed in (1, 2))

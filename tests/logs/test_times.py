@@ -47,10 +47,12 @@ def test_poses_keep_their_times_and_rate_and_gaps_stay_gaps(folder):
     (episode,) = read_log(folder(rows(times, circle(times)))).episodes
     np.testing.assert_array_equal(episode.measured.times, times)
     np.testing.assert_array_equal(episode.measured.poses, circle(times))
+
     times = jittered(by=0.002)
     log = read_log(folder(rows(times, circle(times))))
     assert log.poses_hz == pytest.approx(20.0, rel=0.02)
     assert log.rate_hz == pytest.approx(60.0, rel=0.02)
+
     times = np.concatenate((jittered(count=50), jittered(count=50) + 4.0))
     (episode,) = read_log(folder(rows(times, circle(times)))).episodes
     inside = (episode.times > times[49] + 0.05) & (episode.times < times[50] - 0.05)

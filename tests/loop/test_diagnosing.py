@@ -30,6 +30,7 @@ def test_the_extended_study_differs_by_name_proxy_and_effects_diagnosed(tmp_path
         assert getattr(after, key) == getattr(before, key)
     assert dict(after.domain) == dict(before.domain)
     assert dict(load_family(after, after.proxy).effects)["dead_band.width"] == 0.149
+
     proxy = ('truth = "twin.toml"', 'truth = "twin.toml"\nproxy = "proxy.toml"')
     effects = ('plant = "planar"\n', 'plant = "planar"\neffects = { delay = { delay = 0.1 } }\n')
     folder = write_tiny(tmp_path / "tiny")

@@ -91,11 +91,13 @@ def test_agents_that_no_tuning_sees_are_held_out_whatever_they_are_called(tmp_pa
     held_out = open_loop(folder).held_out
     assert {"crawler", "edges", "wary"} <= set(held_out)
     assert not {"steady", "brisk", "daredevil"} & set(held_out)
+
     table = '[agents]\nslow = "steady"\nfast = "brisk"\nwild = "daredevil"\n\n[parameters]'
     changes = (NOBODY_HELD_OUT, ('agents = ["steady", "brisk", "daredevil"]\n', ""), ("[parameters]", table))
     held_out = open_loop(write_tiny(tmp_path / "tiny", *changes)).held_out
     assert {"crawler", "edges", "wary"} <= set(held_out)
     assert not {"steady", "brisk", "daredevil", "slow", "fast", "wild"} & set(held_out)
+
     folder = write_tiny(tmp_path / "tiny", NO_TRUTH, NOBODY_HELD_OUT)
     log = a_log(tmp_path / "log", LOG.replace("husky", "duckiebot"))
     (folder / "target.csv").write_text(TABLE)
@@ -142,7 +144,9 @@ def test_a_step_is_done_as_long_as_inputs_and_output_are_there(tmp_path):
     assert done == ["a"]
     assert Kept(tmp_path).has(*first)
     assert not Kept(tmp_path).has(*step(tmp_path, "b")[0])
+
     first, doing, _ = step(tmp_path)
+
     Kept(tmp_path).run(*doing)
     (tmp_path / "log").unlink()
     assert not Kept(tmp_path).has(*first)
@@ -156,6 +160,7 @@ def test_a_step_is_done_as_long_as_inputs_and_output_are_there(tmp_path):
     assert (tmp_path / "log").exists()
     assert not Kept(tmp_path).has(*first)
     assert not Kept(tmp_path).has(*step(tmp_path, "b")[0])
+
     kept, steps = Kept(tmp_path), [step(tmp_path), step(tmp_path, name="diagnosis")]
     for _, doing, _ in steps:
         kept.run(*doing)
@@ -180,6 +185,7 @@ def test_a_digest_of_files_changes_with_content_names_and_a_single_hidden_file(t
     changed = digest_of_files(tmp_path)
     (tmp_path / "one").rename(tmp_path / "two")
     assert len({before, changed, digest_of_files(tmp_path)}) == 3
+
     model = tmp_path / ".model.toml"
     model.write_text("1")
     before = digest_of_files(model)

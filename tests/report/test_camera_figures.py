@@ -171,19 +171,23 @@ def test_what_was_found_is_told_with_its_place_its_size_and_what_fits_as_well(di
     assert "the yellow dashes of stretch 1 lie 4 mm (2 to 6) ahead of their place, driving counter-clockwise" in told
     assert "white lines are 3.0 mm narrower than on the map" in told
     assert "the whole map lies off by 0.50° in heading" in told
+
     told = camera_notes(replace(diagnosis, blemishes=(Blemish((60, 95), (60, 71), 0.0, 0.05),)))
     assert "something covers the lower right of the picture: columns 60 to 95, rows 60 to 71 of 96 × 72" in told
+
     gate = replace(diagnosis.residual_fields[0], nats=100.0, share=0.2)
     still_open = replace(diagnosis, residual_fields=(gate, gate))
     (note,) = [line for line in camera_notes(still_open) if line.startswith("left over")]
     assert f"{diagnosis.residual_fields[0].rms_px:.2f} px" in note
     assert "no physics yet" in note
+
     sizes = {"defocus": 1.25, "vignetting": 1.5, "image_noise": None}
     looks = tuple(CameraEffect(name, (name,), None, size, ()) for name, size in sizes.items())
     told = camera_notes(replace(diagnosis, effects=(*diagnosis.effects, *looks)))
     assert "added defocus: without it the error in brightness grows by 25 %" in told
     assert "added vignetting: without it the error in brightness grows by 50 %" in told
     assert "added image_noise, which no model can predict pixel by pixel" in told
+
     (roll,) = diagnosis.effects
     told = camera_notes(replace(diagnosis, effects=(replace(roll, rivals=("camera_yaw", "heading_offset")),)))
     assert told[0].endswith("; these frames fit camera_yaw, heading_offset as well")

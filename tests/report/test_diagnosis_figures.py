@@ -129,6 +129,7 @@ def test_the_error_figure_holds_the_errors_on_logarithmic_axes_with_the_floor_of
     assert np.ravel(bars) == pytest.approx(
         np.ravel([(1e3 * error.floor.lower, 1e3 * error.floor.upper) for error in diagnosis.errors])
     )
+
     for axes, floors in zip(
         figures["error"].axes,
         ([1e3 * e.floor.lower for e in diagnosis.errors], [np.degrees(e.heading_floor) for e in diagnosis.errors]),
@@ -176,6 +177,7 @@ def test_paths_on_the_maps_are_where_windows_were_measured_in_one_scale_and_equa
     both = strayed(diagnosis)
     assert list(one.get_array()) == pytest.approx(both[DECLARED_MODEL].rms)
     assert list(other.get_array()) == pytest.approx(both[AFTER].rms)
+
     drives = diagnosis.parts.tested
     windows = cut(drives, 2.0)
     path = figures["residual_map"].axes[0].collections[0].get_segments()[3]

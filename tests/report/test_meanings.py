@@ -52,9 +52,11 @@ def test_a_finding_has_name_meaning_size_and_the_worth_that_was_shown_and_an_own
         "without it predictions over 2 s are 13 % worse (8 to 19)"
     )
     assert findings([BAND, SLIP]) == f"{finding(BAND)}; {finding(SLIP)}"
+
     doubtful = {**SLIP, "worth": {"2": {"value": 0.0, "interval": [-2.0, 2.0], "unit": "%"}}}
     assert "without it" not in finding(doubtful)
     assert findings([{"name": "dead_band"}, {"name": "trim"}]) == "dead band and trim"
+
     own = {"name": "gone:Wheel", "parameters": {"shrink": {"value": 0.25, "interval": [0.25, 0.25], "unit": "m"}}}
     assert finding(own) == "gone:Wheel: shrink 0.25 m"
 

@@ -101,6 +101,7 @@ def test_points_names_and_bars_of_a_scatter_are_those_of_the_scores(assessment):
         np.testing.assert_array_equal(points.get_xdata(), assessment.inputs.target.means[:, column])
         np.testing.assert_array_equal(points.get_ydata(), assessment.inputs.proxy.means[:, column])
         assert sorted(text.get_text() for text in axes.texts) == sorted(assessment.inputs.agents)
+
     axes = scatter_figure(assessment).axes[0]
     means = assessment.inputs.proxy.means[:, 0]
     top_down = sorted(axes.texts, key=lambda text: -text.get_position()[1])
@@ -108,6 +109,7 @@ def test_points_names_and_bars_of_a_scatter_are_those_of_the_scores(assessment):
     for text in axes.texts:
         row = int(text.get_text()[1:])
         assert text.xy == (assessment.inputs.target.means[row, 0], means[row])
+
     bars = axes.collections[0].get_segments()
     values = assessment.inputs.target.values[0, :, 0]
     half = np.ptp(bars[0][:, 0]) / 2

@@ -66,6 +66,7 @@ def test_failed_trials_are_crosses_and_those_cut_off_stand_at_what_they_cannot_b
     )
     assert list(lines(convergence_figure(failed))["failed"].get_xdata()) == [8]
     assert "failed" not in lines(convergence_figure(result))
+
     cut = TrialRecord(8, result.trials[0].theta, "cut", decided=("agent0", "agent1"), bound=14.0, score=20.0)
     told = replace(result, trials=(*result.trials, cut), answers=(*result.answers, result.answers[-1]))
     drawn = lines(convergence_figure(told))
@@ -158,6 +159,7 @@ def test_the_pair_has_a_point_for_every_trial_and_its_key_the_region_and_the_ans
     theta = learnt.best.trial.theta
     assert marks == {"answer": (theta["delay"], theta["trim"]), "truth": (0.12, 0.1)}
     assert "truth" not in [line.get_label() for line in evaluations_figure(learnt).axes[0].get_lines()]
+
     key = evaluations_figure(learnt).axes[1]
     assert [text.get_text() for text in key.get_legend().get_texts()] == ["95 % region", "answer"]
 

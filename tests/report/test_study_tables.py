@@ -48,6 +48,7 @@ def test_the_document_has_the_promised_keys_in_json_s_own_types(result):
         "episodes_per_agent": [3, 3],
     }
     assert document["settings"]["parameters"] == {"delay": [0.0, 0.3], "trim": [-0.3, 0.3]}
+
     assert of_plain_types(study_document(result))
     assert not of_plain_types({"share": np.float64(0.5)})
 

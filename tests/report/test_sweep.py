@@ -134,10 +134,12 @@ def test_every_measure_is_in_document_csv_and_lines_with_its_interval(with_pod):
     assert document["shapes"]["pod_pose"]["best"] == (0.1,)
     assert document["shapes"]["pod_pose"]["worsens_on_both_sides"] is True
     assert curve_name(with_pod) == "sweep_trim_4e3f5b_pod"
+
     rows = list(csv.DictReader(io.StringIO(curve_csv(with_pod))))
     for key in ("prpv", "ppv", "srcc_distance", "kendall_tau_distance", "mmrv_survival_time", "pod_pose", "pod_image"):
         assert all(float(row[f"{key}_low"]) <= float(row[f"{key}_high"]) for row in rows if row[f"{key}_low"])
         assert all(row[key] for row in rows)
+
     lines = curve_lines(with_pod)
     assert len(lines) == 2 + 3 * 2 + 2
     assert lines[0].startswith("trim: PRPV: lowest (0) at 0.1")

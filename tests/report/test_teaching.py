@@ -137,6 +137,7 @@ def test_each_proxy_has_a_panel_of_its_own_in_a_figure_that_fits_a_column():
         assert sum(len(line.get_ydata()) for line in dots) == 3 * 5 + 3 * 4
         ends = [path.vertices[:, 0].tolist() for bars in axes.collections[2:] for path in bars.get_paths()]
         assert ends[-1][0] < ends[-1][1]
+
     assert teach_figure(experiment()).get_figwidth() * 25.4 <= 86.0
 
 

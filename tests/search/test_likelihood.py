@@ -56,12 +56,15 @@ def test_holes_and_outputs_far_off_or_still_change_little():
     holes = np.where(np.random.default_rng(1).random(errors.shape) < 0.3, np.nan, errors)
     assert temper(errors) == pytest.approx(4.0, abs=0.3)
     assert temper(holes) == pytest.approx(4.0, abs=0.6)
+
     assert deviance(np.array([0.0]))[0] == 0.0
     assert deviance(np.array([1.0]))[0] == pytest.approx(0.5, abs=0.1)
     assert deviance(np.array([10.0]))[0] < 10.0
+
     model = fit_outputs(SPACE, [Trial(design_point(SPACE, index, 1), 1.0, (7.0,)) for index in range(6)])
     assert model.modelled.size == 0
     assert np.isnan(model.predict(np.array([[0.5, 0.5]]))[0]).all()
+
     forwards, backwards = fit_outputs(SPACE, trials(12)), fit_outputs(SPACE, trials(12)[::-1])
     points = unit_array(SPACE, HELD_OUT)
     for one, other in zip(forwards.predict(points), backwards.predict(points), strict=True):

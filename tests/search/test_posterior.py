@@ -123,6 +123,7 @@ def test_the_density_is_wider_only_where_no_theta_explains_the_target():
     assert found.log(points) == pytest.approx(narrow / dispersion)
     as_if_it_fits = posterior_of(lambda some: found.log(some) * dispersion, 2)
     assert found.posterior.share > 1.5 * as_if_it_fits.share
+
     found = learnt(0, 0.0)
     assert found.misfit.fits is True
     assert found.log(points).tolist() == (found.likelihood.log(points) / found.left_out.widening).tolist()

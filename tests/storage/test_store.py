@@ -66,6 +66,7 @@ def test_trials_come_back_in_order_and_searches_are_kept_apart(tmp_path):
         store.save_trial("identity", TrialRecord(1, THETA))
         store.save_trial("identity", finished)
         assert store.trials() == [finished, TrialRecord(2, {"trim": 0.2, "delay": 0.0})]
+
     of_plv = TrialRecord(1, {"trim": 0.2}, "finished", -400.0, {"plv": 400.0, "zero_shot": None}, seconds=2.5)
     with Store.open(tmp_path) as store:
         store.save_trial("identity", TrialRecord(1, THETA))
@@ -95,6 +96,7 @@ def test_facts_are_added_and_beginning_afresh_drops_trials_alone(tmp_path):
         assert store.trials() == []
         assert store.facts() == {"seed": 2, "parameters.trim": [-0.3, 0.3]}
         assert store.outcomes("identity", THETA) == {EPISODE: WORKED}
+
     with Store.open(tmp_path) as store:
         store.begin({"seed": 2})
         store.save_trial("identity", TrialRecord(1, THETA))
@@ -110,6 +112,7 @@ def test_seconds_are_averaged_over_instances_and_trials_have_those_of_their_own(
         elsewhere = make_episode({"trim": 0.2}, agent="agent1", start=2, seed=11)
         store.save_outcome("identity", Outcome(elsewhere, {"distance": 1.0}, "", 0.5))
         assert store.seconds() == {("agent1", 2): 1.0}
+
     elsewhere = make_episode({"trim": 0.2}, agent="agent1", start=2, seed=11)
     with Store.open(tmp_path) as store:
         assert store.seconds_of_trials("prpv", 9, {11}) == 0.0

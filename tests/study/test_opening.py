@@ -276,6 +276,7 @@ def test_only_what_both_sides_have_is_compared_and_what_is_left_out_is_named(mak
         "the target has no scores of agent5: left out",
         "the target has scores of human, no agents of this study: left out",
     )
+
     folder = make_study(agents='["agent5", "agent1"]')
     with open(folder / "target.csv", "a") as target:
         target.write("agent77,only_its_own,1.0,2.0\n")

@@ -87,6 +87,7 @@ def test_noise_is_that_of_placement_and_less_with_repeats(make_study):
     # Wobbly's scores wobble by 0.15, so a difference of two means over three starts has a variance of 2 · 0.15² / 3.
     assert np.median(found.variance) == pytest.approx(2 * 0.15**2 / 3, rel=0.8)
     assert (found.variance > 0.0).all()
+
     folder = make_study(preflight="true")
     with running(folder) as study_run:
         run_preflight(study_run)
@@ -96,6 +97,7 @@ def test_noise_is_that_of_placement_and_less_with_repeats(make_study):
         assert shares_starts(study)
         again = noise_of(StudyRun(study, study_run.store))
     assert again.variance == pytest.approx(0.75 * once.variance)
+
     with running(make_study(preflight="true")) as study_run:
         run_preflight(study_run)
         known = noise_of(study_run)

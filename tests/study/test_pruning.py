@@ -149,6 +149,7 @@ def test_trials_stand_on_decided_agents_and_what_was_spared_is_counted(done):
     assert {episode.agent for episode in driven} == {"agent2", "agent5"}
     assert len(driven) == 6
     assert len(StudyRun(found.study, None).episodes_of(replace(trial, state="finished", decided=()))) == ALL
+
     _, trials, found = done
     with Store.open(found.study.settings.folder) as store:
         seconds = store.seconds()

@@ -365,6 +365,7 @@ def test_the_best_theta_is_visited_and_not_the_luckiest(finished):
     assert found.best.assessment.prpv.value == found.best.trial.prpv
     assert found.best.assessment.ppv.value == found.best.trial.ppv
     assert (found.episodes, found.failed_episodes, found.failures) == (7 * 18, 0, ())
+
     study = open_study(finished)
     with Store.open(finished) as store:
         worst = max(store.trials(), key=lambda trial: trial.prpv)

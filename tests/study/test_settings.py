@@ -132,6 +132,7 @@ def test_what_is_written_is_what_is_read_and_rules_to_stop_each_on_their_own(mak
     assert settings_document(settings)["on_failure"] == "stop"
     assert settings_document(settings)["preflight"] is settings.preflight is False
     assert settings.stop == StopRules()
+
     settings = read_study_settings(make_study(stop="{ wall_time_s = 60 }"))
     assert settings.stop == StopRules(wall_time_s=60.0)
     settings = read_study_settings(make_study(stop="{ no_improvement = 0.2 }"))

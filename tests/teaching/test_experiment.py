@@ -36,16 +36,20 @@ def noisy(spread, seed):
 def test_orders_are_compared_pair_by_pair_unless_tied_or_open():
     assert agreement(NAMES, SURE, 10.0 * SURE).tau == 1.0
     assert agreement(NAMES, SURE, -SURE).tau == -1.0
+
     found = agreement(NAMES, SURE, np.tile([1.0, 3.0, 2.0], (200, 1)))
     assert found.reversed == (("middle", "high"),)
     assert found.tau == pytest.approx(1.0 / 3.0)
+
     found = agreement(NAMES, noisy(3.0, 1), -noisy(3.0, 2))
     assert found.reversed == ()
     assert found.low < found.tau < found.high
     assert found.high - found.low > 1.0
+
     found = agreement(NAMES, SURE, np.tile([1.0, 2.0, 2.0], (200, 1)))
     assert found.tau == pytest.approx(2.0 / np.sqrt(3.0 * 2.0))
     assert agreement(NAMES, SURE, np.full_like(SURE, -np.inf)).tau == 0.0
+
     unreached = SURE.copy()
     unreached[:, 2] = -np.inf
     assert agreement(NAMES, SURE, unreached).reversed == (("low", "high"), ("middle", "high"))
@@ -275,8 +279,10 @@ def test_what_contradicts_a_figure_is_told_only_where_it_is_shown():
     _, second = observation_lines(found, experiment())
     assert "slow starter saves samples though a random ranking would predict as well" in second
     assert "Kendall's τ between PRPV and PLV is 0.33" in second
+
     found = observe(experiment(), predicting(GOOD))
     assert "none of these proxies shows it" in observation_lines(found, experiment())[1]
+
     alone = experiment(names=["slow starter"])
     found = observe(alone, predicting(GOOD, poor=("slow starter",)))
     assert (found.zero_shot, found.prpv, found.poor_predictors) == (None, None, ("slow starter",))

@@ -148,6 +148,7 @@ def test_differences_are_of_prpv_and_none_of_a_proxy_with_itself():
     for pair in selection.differences:
         assert pair.value == own[pair.worse] - own[pair.better] >= 0
         assert pair.low <= pair.value <= pair.high
+
     same = noisy(TRUTH, 5, noise=3.0)
     selection = select_proxy(proxies={"a": same, "b": same}, target=TARGET, metrics=CLEAR)
     assert (selection.differences[0].low, selection.differences[0].high) == (0.0, 0.0)

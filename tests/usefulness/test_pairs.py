@@ -143,6 +143,7 @@ def test_prpv_of_a_few_agents_is_that_by_hand():
     result = prpv(compare(proxy=of_means(2, 1, 3), target=of_means(3, 2, 1), metrics=M))
     assert result.value == 4
     assert result.pairs == (FlippedPair("A", "C", "reversed"), FlippedPair("B", "C", "reversed"))
+
     target = of_means((4, 4), (3, 2), (2, 3), (1, 1))
     proxy = of_means((4, 1), (3, 3), (2, 2), (1, 4))
     result = prpv(compare(proxy=proxy, target=target, metrics=M2))
@@ -156,6 +157,7 @@ def test_prpv_of_a_few_agents_is_that_by_hand():
     }
     assert result.value == 6
     assert result.normalised == 0.5
+
     result = prpv(compare(proxy=of_means((1, 1), (2, 2)), target=of_means((2, 2), (1, 1)), metrics=M2))
     assert (result.value, result.range, result.better) == (2, (0, 2), "lower")
     assert (result.inputs.agents, result.inputs.target_episodes) == (("A", "B"), (1, 1))

@@ -25,6 +25,7 @@ def test_correlations_agree_with_scipy_and_are_undefined_of_constants():
         one, other = proxy[i, :, column], target[i, :, column]
         assert pearson[i, column] == pytest.approx(stats.pearsonr(one, other).statistic, abs=1e-7)
         assert kendall[i, column] == pytest.approx(stats.kendalltau(one, other).statistic, abs=1e-12)
+
     proxy, target = of_means((1, 5), (2, 5), (3, 5)), of_means((1, 1), (2, 2), (2, 3))
     for measure in (srcc, predictivity.kendall_tau):
         result = measure(compare(proxy=proxy, target=target, metrics=M))
@@ -32,6 +33,7 @@ def test_correlations_agree_with_scipy_and_are_undefined_of_constants():
         assert result.value["m"] > 0
         assert [note for note in result.notes if "n: " in note and "alike in the proxy" in note]
         assert (result.better, result.range) == ("higher", (-1, 1))
+
     result = srcc(compare(proxy=of_means((1, 1), (2, 2)), target=of_means((1, 2), (2, 1)), metrics=M))
     assert result.value == {"m": pytest.approx(1.0), "n": pytest.approx(-1.0)}
     assert "of two agents" in result.notes[0]
@@ -60,12 +62,14 @@ def test_simplers_figures_come_out_by_its_double_loop():
     assert result.value["m"] == pytest.approx((0 + 0.3 + 0.3) / 3)
     assert result.range["m"] == (0.0, pytest.approx(0.6))
     assert result.better == "lower"
+
     rng = np.random.default_rng(0)
     proxy, target = rng.integers(0, 4, size=(2, 40, 5, 1)).astype(float)
     for direction, sign in (("max", 1), ("min", -1)):
         values = mmrv_of_means(proxy, target, [Metric("m", direction)])[:, 0]
         expected = [simplers_loop(sign * p[:, 0], sign * t[:, 0]) for p, t in zip(proxy, target, strict=True)]
         np.testing.assert_allclose(values, expected, atol=1e-12)
+
     tied, target = of_means(0.5, 0.5, 0.5), of_means(0.1, 0.4, 0.9)
     higher, lower = (compare(proxy=tied, target=target, metrics=[Metric("m", way)]) for way in ("max", "min"))
     assert mmrv(higher).value["m"] == pytest.approx((0 + 0.3 + 0.8) / 3)
@@ -117,10 +121,12 @@ def test_without_weights_a_metric_counts_in_its_spread_on_the_target():
     result = ppv(compare(proxy=proxy, target=TARGET, metrics=M), beta={"m": 1.0, "n": 0.5})
     assert result.value == pytest.approx((1 + 0 + 2 + 0.5 * 6) / 3)
     assert result.better == "lower"
+
     proxy = of_means((2.0, 20.0), (3.0, 30.0), (4.0, 40.0))
     result = ppv(compare(proxy=proxy, target=TARGET, metrics=M))
     assert result.beta == {"m": pytest.approx(1.0), "n": pytest.approx(0.1)}
     assert result.value == pytest.approx(2.0)
+
     flat = of_means((1.0, 5.0), (2.0, 5.0), (3.0, 5.0))
     result = ppv(compare(proxy=TARGET, target=flat, metrics=M))
     assert (result.value, result.beta["n"]) == (0.0, None)

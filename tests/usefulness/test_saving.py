@@ -46,6 +46,7 @@ def test_rectified_means_use_one_proxy_or_two():
     dx, dy = x[:, :10] - x[:, :10].mean(1, keepdims=True), y - y.mean(1, keepdims=True)
     slope = (dx * dy).sum() / (dx**2).sum()
     assert means == pytest.approx(y.mean(1) - slope * (x[:, :10].mean(1) - x.mean(1)))
+
     one, other = two_halves()
     alone, both = saving_of(one), saving_of(one, 0, other)
     assert both.real_rollouts_worth > 2.0 * max(alone.real_rollouts_worth, saving_of(other).real_rollouts_worth)

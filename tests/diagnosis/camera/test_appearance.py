@@ -50,11 +50,13 @@ def test_noise_is_told_from_texture_only_where_frames_are_another_each():
     assert grain.still_pairs == 3
     assert grain.noise.identified
     assert grain.noise.value == pytest.approx(2.0, rel=0.05)
+
     model, seen = scene()
     twice = np.repeat(np.arange(10), 2)
     grain = fit_grain(logged(seen, noise=3.0)[twice], model[twice], floor())
     assert grain.still_pairs == 0
     assert grain.noise.interval[1] >= 3.0
+
     sky = np.full((5, 120, 160, 3), 200.0, dtype=np.float32)
     sky += np.arange(5, dtype=np.float32)[:, None, None, None]
     found = fit_grain(logged(sky, noise=3.0), sky, floor()).noise

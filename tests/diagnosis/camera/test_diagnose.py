@@ -248,6 +248,7 @@ def test_a_whole_map_that_lies_off_and_wider_lines_are_told():
         low, high = laid.offset[name].interval
         assert low < truth < high
     assert [laid.offset[name].unit for name in ("x_m", "y_m", "heading_deg")] == ["m", "m", "deg"]
+
     views = replace(stood(noisy=False), tape_m=0.005)
     there = project(views, at_truth(views))
     out = np.where(views.edges.white & there.near, -0.002 / there.metres, 0.0)

@@ -89,6 +89,7 @@ def test_yellow_edges_are_told_by_their_colour_on_either_side():
     sides = [np.abs(away[way * away > 0.0]).mean() - 6.0 for way in (-1.0, 1.0)]
     assert sides == pytest.approx([0.0, 0.0], abs=0.03)
     assert sides[0] == pytest.approx(sides[1], abs=0.03)
+
     shown = pictures({}, lane_poses(6))
     right, swapped = find_edges(shown), find_edges(np.ascontiguousarray(shown[..., ::-1]))
     floor_only = swapped.only(swapped.row > 50)
@@ -111,6 +112,7 @@ def test_noise_the_sky_and_the_picture_s_border_have_no_edges():
     shown = np.clip(striped(0.3, 0.0) + noise, 0, 255).astype(np.uint8)
     away, _ = along_normal(find_edges(shown), 0.3, 0.0)
     assert np.abs(np.abs(away) - 6.0).max() < 0.4
+
     shown = striped(0.0, 0.0)
     shown[:, :20] = SKY
     edges = find_edges(shown)
@@ -119,6 +121,7 @@ def test_noise_the_sky_and_the_picture_s_border_have_no_edges():
     away, outward = along_normal(edges, 0.0, 0.0)
     assert np.abs(np.abs(away) - 6.0).max() < 0.1
     assert (np.abs(outward) > 0.99).all()
+
     edges = find_edges(striped(np.pi / 2.0, -27.0, half_width=2.5))
     assert edges.row.min() >= gathering.BORDER
     assert len(find_edges(striped(0.0, -COLUMNS / 2.0, half_width=1.0)).row) == 0
@@ -172,12 +175,14 @@ def test_a_drive_is_looked_up_smoothed_at_its_latency():
     course = np.column_stack((SPEED * np.cos(heading), SPEED * np.sin(heading), np.full(30, SPEED / RADIUS)))
     np.testing.assert_allclose(rates, course, atol=2e-3)
     assert tracks.moving
+
     times = np.arange(1.0, 9.0, 0.5)
     drives = (log_of(episode(noise=0.01, seed=seed)) for seed in range(40))
     errors = [track_frames(drive, frames_at(times))[0].at(0.0)[0] - circle(times) for drive in drives]
     share = track_frames(log_of(episode()), frames_at(times))[0].share
     assert share < 0.6
     assert np.std(errors) == pytest.approx(0.01 * share, rel=0.1)
+
     times = np.linspace(2.0, 8.0, 20)
     tracks, _ = track_frames(log_of(episode()), frames_at(times))
     np.testing.assert_allclose(tracks.at(0.13)[0], circle(times - 0.13), atol=6e-4)
@@ -192,10 +197,12 @@ def test_frames_standing_still_keep_their_poses_and_those_between_two_or_in_a_lo
     tracks, numbers = track_frames(log_of(still, rate=0.0), frames_at(times[::2]))
     np.testing.assert_array_equal(tracks.at(0.0)[0], poses[::2])
     assert (tracks.share, tracks.moving, len(numbers)) == (1.0, False, 13)
+
     times = 0.1 * np.arange(25.0)
     still = LogEpisode("stills", times, np.zeros((25, 0)), circle(times), None)
     _, numbers = track_frames(log_of(still, rate=0.0), frames_at([0.3, 0.35, 0.4]))
     np.testing.assert_array_equal(numbers, [0, 2])
+
     drive = episode()
     gap = (drive.times > 4.0) & (drive.times < 4.0 + 2.0 * gathering.LONGEST_GAP_S)
     drive.poses[gap] = np.nan
@@ -209,9 +216,11 @@ def test_a_missing_pose_is_bridged_and_each_frame_looked_up_in_its_own_drive():
     tracks, numbers = track_frames(log_of(drive), frames_at([4.0]))
     assert len(numbers) == 1
     np.testing.assert_allclose(tracks.at(0.0)[0], circle([4.0]), atol=1e-3)
+
     first, second = episode(), episode(begin=100.0)
     tracks, _ = track_frames(log_of(first, second), frames_at([5.0, 105.0, 5.5], [0, 1, 0]))
     np.testing.assert_allclose(tracks.at(0.0)[0], circle([5.0, 105.0, 5.5]), atol=1e-3)
+
     empty = episode()
     empty.poses[:] = np.nan
     tracks, numbers = track_frames(log_of(empty, episode()), frames_at([5.0, 5.0], [0, 1]))

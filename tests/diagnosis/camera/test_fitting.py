@@ -101,9 +101,11 @@ def test_only_named_values_are_fitted_to_the_frames_that_count():
     assert fit.theta == again.theta
     assert fit.theta != fit_camera(spoilt, at_truth(spoilt), ["camera_roll"], NEAR).theta
     np.testing.assert_array_equal(fit.state.poses[~first], 0.0)
+
     views = stood({"camera_roll": 4.0}, count=20)
     fit = fit_camera(views, at_truth(views, {"camera_height": 0.11}), ["camera_roll"], NEAR)
     assert {**fit.theta, "camera_roll": 0.0} == {**NEUTRAL, "camera_height": 0.11, "camera_roll": 0.0}
+
     views = stood(count=20)
     fit = fit_everything(views, OPTICS.mounting, {}, learn_scatter=False)
     assert (fit.views.position_m, fit.views.heading_rad) == (views.position_m, views.heading_rad)

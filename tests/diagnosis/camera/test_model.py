@@ -88,13 +88,17 @@ def test_effects_on_pictures_change_sharpness_corners_and_brightness_within_0_an
     sharp, soft = drawn(), drawn(look={"defocus": 0.02})
     assert sharpness(soft) < 0.7 * sharpness(sharp)
     assert soft.mean() == pytest.approx(sharp.mean(), rel=0.02)
+
     ratio = (drawn(look={"vignetting": 0.4}) / np.maximum(drawn(), 1.0)).mean(axis=(0, 3))
     assert ratio[-1, 0] == pytest.approx(0.6, abs=0.02)
     assert ratio[59:61, 79:81].mean() == pytest.approx(1.0, abs=0.01)
+
     before = drawn()
     after = drawn(look={"exposure.gain": 1.2, "exposure.gamma": 1.5})
     np.testing.assert_allclose(after, np.clip(255.0 * 1.2 * (before / 255.0) ** 1.5, 0.0, 255.0), atol=0.01)
+
     np.testing.assert_array_equal(drawn(look={"image_noise": 10.0}), drawn())
+
     bright = drawn(look={"exposure.gain": 4.0, "exposure.gamma": 1.0})
     assert bright.max() == 255.0
     assert bright.dtype == np.float32

@@ -180,6 +180,7 @@ def test_a_robot_that_repeats_itself_is_stuck_or_rests_is_no_clock_problem():
     turn = 0.2 * np.sin(2.0 * np.pi * times / 6.0)
     duties = np.tile(np.stack((0.5 - turn, 0.5 + turn), axis=1), (4, 1, 1))
     assert not read_clocks(driven_log({}, duties, np.zeros((4, 3))), ROBOT).differ
+
     latencies = np.arange(-40, 41) * 0.25
     moving = np.minimum((latencies - 0.25) ** 2, 4.0)
     stuck = np.minimum((10.0 - latencies) ** 2, 1.0) * 4.0
@@ -187,6 +188,7 @@ def test_a_robot_that_repeats_itself_is_stuck_or_rests_is_no_clock_problem():
     squares = np.concatenate((np.tile(stuck, (11, 1)), np.tile(moving, (19, 1))))
     blocks = Blocks(np.zeros(30, dtype=int), np.arange(30), squares)
     assert stretches(log, blocks, latencies) == ([(0.0, np.inf)], ())
+
     own = 0.25 + 0.05 * np.sin(np.arange(24.0))
     moving = 9.0 + np.minimum(50.0 * (latencies - own[:, None]) ** 2, 900.0)
     # The map is put right while the robot rests, and long after there was a command that it looks like.
@@ -210,6 +212,7 @@ def test_one_clock_is_left_and_commands_are_put_on_that_of_the_poses():
     np.testing.assert_allclose(moved.duties[3, : len(known) - 1], (1.0 - part) * known[:-1] + part * known[1:])
     np.testing.assert_allclose(moved.duties[0], drives.duties[0])
     np.testing.assert_array_equal(corrected.episodes[3].poses, apart.episodes[3].poses)
+
     log = hidden.make_log(CASE, **SHORT)
     assert timing.on_one_clock(log, ROBOT)[0] is log
 
@@ -273,8 +276,10 @@ def test_each_stretch_between_long_rests_is_a_drive_with_its_commands_and_poses(
     np.testing.assert_array_equal(first.poses[:, 0], first.times)
     np.testing.assert_array_equal(second.commands, second.wheels)
     np.testing.assert_array_equal(second.commands, whole.episodes[0].commands[2380:3060])
+
     whole = log((10.0, 80.0), (95.0, 190.0))
     assert cut_out_long_rests(whole) is whole
+
     whole = log()
     issued = np.array([0.0, 50.0, 60.0, 150.0, 170.0])
     commands = np.array([[0, 0], [0.5, 0.5], [0, 0], [0.2, 0.2], [0, 0]])
@@ -284,6 +289,7 @@ def test_each_stretch_between_long_rests_is_a_drive_with_its_commands_and_poses(
     np.testing.assert_array_equal(second.issued, [60.0, 150.0, 170.0])
     np.testing.assert_array_equal(second.held[[0, -1]], [[0, 0], [0, 0]])
     np.testing.assert_array_equal(second.commands, commands[2:])
+
     whole = log((30.0, 50.0), (60.0, 70.0), (120.0, 150.0))
     (episode,) = whole.episodes
     rows = np.arange(0, 4000, 3)
@@ -308,6 +314,7 @@ def test_drives_are_split_by_motion_and_another_log_may_be_tested_on():
     np.testing.assert_array_equal(tested.duties[0, ::3], log.episodes[2].commands)
     for row, episode in enumerate((0, 1, 3, 4, 6)):
         np.testing.assert_array_equal(fitted.duties[row, ::3], log.episodes[episode].commands)
+
     log, other = (planted_log(TRUTH, seed=seed, episodes=2, seconds=15.0) for seed in (1, 2))
     fitted, tested = split(log, ROBOT, other)
     assert (fitted.duties.shape[0], tested.duties.shape[0]) == (2, 2)

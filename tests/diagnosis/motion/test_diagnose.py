@@ -40,10 +40,12 @@ def test_the_planted_effect_is_found_with_its_value_and_its_worth_first_of_all_c
     assert abs(estimate.value - 0.12) < np.ptp(estimate.interval)
     assert estimate.unit == "m"
     assert np.ptp(estimate.interval) < 0.02
+
     gains = [tried.gain for tried in diagnosis.found.tried]
     assert gains == sorted(gains, reverse=True)
     assert diagnosis.found.tried[0].effect == "yaw_scrub"
     assert 0.0 < diagnosis.found.tried[0].p_value <= 0.01
+
     assert set(diagnosis.effect_sizes) == {"yaw_scrub"}
     assert set(diagnosis.effect_sizes["yaw_scrub"]) == set(HORIZONS_S)
     assert diagnosis.effect_sizes["yaw_scrub"][2.0].interval[0] > 1.5

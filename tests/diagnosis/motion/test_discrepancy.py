@@ -31,12 +31,14 @@ def test_groups_are_offered_in_their_order_with_knots_within_what_was_driven(dri
     assert {curve.group for curve in offer.curves} == set(GROUPS)
     assert learnt_effect(learnt_theta(offer)) == offer
     assert not any(any(curve.weights) for curve in offer.curves)
+
     offer, asked = discrepancy.offer_curves(drives, TRUTH), twists_of(drives, TRUTH)
     for bounds, signal in zip(offer.seen, (asked[..., 0], asked[..., 2]), strict=True):
         assert signal.min() <= bounds[0] < 0.0 < bounds[1] <= 1.01 * signal.max()
     knots = {curve.group: np.array(curve.knots) for curve in offer.curves}
     assert offer.seen.yaw[0] <= knots["turn_rate"].min() < 0.0 < knots["turn_rate"].max() <= offer.seen.yaw[1]
     assert knots["time"].max() <= 20.1
+
     ahead = replace(drives, duties=np.abs(drives.duties[..., :1]).repeat(2, axis=-1))
     groups = {curve.group for curve in discrepancy.offer_curves(ahead, {**TRUTH, "trim": 0.0}).curves}
     assert "direction" not in groups

@@ -138,13 +138,16 @@ def test_wheel_speeds_are_used_where_all_episodes_have_them_without_a_gap():
     assert drives.wheels is None
     assert drives.rest[0, 0] == pytest.approx(3.0 * SPEED_PER_RAD)
     assert gathered(episode([0.0, 0.1], wheels=[[np.nan, np.nan], [5.0, 6.0]])).rest.tolist() == [[0.0, 0.0]]
+
     assert gathered(episode([0.0, 0.1], wheels=np.ones((2, 2))), episode([0.0, 0.1], name="b")).wheels is None
+
     still = episode([0.0, 0.1])
     turning = episode([0.0, 0.1], wheels=[[3.0, 4.0], [5.0, 6.0]])
     np.testing.assert_array_equal(gathered(still).rest, [[0.0, 0.0]])
     drives = gathered(turning)
     np.testing.assert_allclose(drives.rest, [[3.0 * SPEED_PER_RAD, 4.0 * SPEED_PER_RAD]])
     np.testing.assert_allclose(drives.wheels[0, 3:, 1], 6.0 * SPEED_PER_RAD)
+
     steady = gathered(episode(0.01 * np.arange(40)))
     np.testing.assert_allclose(steady.rest[0], 0.2 / ROBOT.figures["full_speed"])
     np.testing.assert_array_equal(gathered(episode(0.004 * np.arange(40) ** 2 / 40)).rest[0], 0.0)
@@ -176,10 +179,12 @@ def test_commands_are_held_from_their_own_times_also_from_before_the_first_sampl
     np.testing.assert_allclose(drives.duties[0, :8, 0], [0, 0.3, 0.6, 0.6, 0.6, 0.6, 0, 0], atol=1e-12)
     assert np.flatnonzero(drives.issued[0]).tolist() == [1, 6]
     assert drives.rate_hz == pytest.approx(1.0 / 0.075)
+
     drives = at_own_times([-0.4, -0.2, 0.05], [[0.9, 0.9], [0.6, 0.3], [0.0, 0.2]])
     np.testing.assert_allclose(drives.rest, [[0.6, 0.3]])
     np.testing.assert_allclose(drives.duties[0, :4, 1], [0.3, 0.3, 0.3, 0.2])
     assert np.flatnonzero(drives.issued[0]).tolist() == [3]
+
     rows = [[0.1, 0.2], [0.3, 0.1], [0.0, 0.0], [0.5, 0.5]]
     plain = gathered(episode([0.0, 0.1, 0.2, 0.3], commands=rows))
     own = at_own_times([0.0, 0.05, 0.1, 0.15], rows)

@@ -130,6 +130,7 @@ def test_drives_are_imagined_from_the_middle_of_the_room_and_paths_beyond_it_mea
     assert beyond[0] == pytest.approx(-0.9)
     assert beyond[1] == pytest.approx(reach - 0.9)
     assert course.beyond(batch, 0.1)[1] > beyond[1] + 0.05, "drift counts"
+
     course = course_of(drives, ROOM)
     commands = course.library[:2]
     batch = course.imagine(commands, TRUTH)

@@ -103,11 +103,13 @@ def test_slopes_foretell_a_small_change_also_backwards_and_the_fitted_model_lose
     there = found.whiten.whiten(found.drives.measured - increments(found.drives, moved))
     change = found.slopes[:, 0] * 1e-4
     assert np.linalg.norm(there - found.innovations - change) < 0.01 * np.linalg.norm(change)
+
     whiten = whitener(drives, NOISE)
     high = span(("delay",), drives)[1]
     edge = slopes(drives, {"trim": 0.0, "delay": high}, (("delay",),), whiten)
     inside = slopes(drives, {"trim": 0.0, "delay": high - 0.001}, (("delay",),), whiten)
     assert np.corrcoef(edge[:, 0], inside[:, 0])[0, 1] > 0.9
+
     here = loss_of(found.drives, found.theta, found.whiten)
     for name, step in (("trim", 0.01), ("delay", 0.01)):
         for sign in (-1.0, 1.0):
@@ -138,6 +140,7 @@ def test_blocks_are_foretold_and_useless_parameters_cost(drives):
         left = model.innovations[own] + model.slopes[own] @ refit
         surprise = 0.5 * left @ left + np.log(model.whiten.factor[0][own]).sum()
         assert told[block] == pytest.approx(-surprise, rel=1e-5)
+
     model = linear(drives, columns=3)
     assert gain(model) < 2.0
     needed = replace(model, innovations=model.innovations + 0.2 * model.slopes[:, 1])

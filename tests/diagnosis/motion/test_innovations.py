@@ -72,10 +72,12 @@ def test_innovations_of_a_right_model_are_white_gaussian_and_outliers_count_line
     flat = errors.ravel()
     wanted = -0.5 * flat @ np.linalg.solve(covariance, flat) - 0.5 * np.linalg.slogdet(covariance)[1]
     assert innovations.log_likelihood(errors, whiten) == pytest.approx(wanted, rel=1e-5)
+
     drives = planted_drives({"trim": 0.03}, episodes=6, seconds=20.0)
     z = whitener(drives, NOISE).whiten(drives.measured - increments(drives, {"trim": 0.03})).reshape(-1, 3)
     np.testing.assert_allclose(z.std(axis=0), 1.0, atol=0.1)
     assert np.abs(np.mean(z[1:] * z[:-1], axis=0)).max() < 0.08
+
     z = np.linspace(-8.0, 8.0, 1601)
     slope = np.gradient(innovations.huber(z), z)
     np.testing.assert_allclose(slope[1:-1], innovations.clip_outliers(z)[1:-1], atol=0.01)

@@ -138,6 +138,7 @@ def test_what_predicts_poorly_is_fitted_again_by_poses_not_fitted_to(driven):
     together = squares(replace(driven, poses=poses), fitted)
     assert apart[2.0][others].mean() > together[others].mean()
     assert set(apart) == set(multistep_fit.horizons(driven)) == {1.0, 2.0, 5.0}
+
     poor = model(driven, trim=0.08, delay=0.2)
     better, polish = fit_multistep(poor)
     assert squares(driven, better.theta).mean() < 0.5 * squares(driven, poor.theta).mean()

@@ -47,6 +47,7 @@ def test_windows_cover_every_row_and_headings_go_on(log):
         assert sorted(own.start_time.unique()) == pytest.approx([0.0, 2.0, 4.0, 6.0, 8.0])
         assert sorted(own.time.unique()) == pytest.approx(np.arange(200) / 20.0)
         assert (own.groupby("start_time").time.count() <= 41).all()
+
     table = predict(log, ROBOT, TRUTH, 5.0)
     for _, window in table.groupby(["episode", "start_time"]):
         assert np.abs(np.diff(window.heading)).max() < 0.5
@@ -60,10 +61,12 @@ def test_exact_models_predict_noiseless_logs_slopes_and_markers(log):
     assert found.place < 1e-9
     assert found.turn < 1e-9
     assert (found.poses, found.windows) == (2 * 199, 10)
+
     theta = {**TRUTH, "floor_slope.x": 0.04, "floor_slope.y": -0.02}
     log = planted_log(theta, episodes=3, seconds=10.0, noise=None)
     assert agreement(predict(log, ROBOT, theta, 2.0), log, 2.0).place < 1e-6
     assert agreement(predict(log, ROBOT, TRUTH, 2.0), log, 2.0).place > 0.01
+
     theta = {**TRUTH, "marker_offset.forward": 0.05, "heading_offset": 3.0}
     plain = planted_log(TRUTH, episodes=2, seconds=10.0, noise=None)
 
@@ -305,9 +308,11 @@ def test_ratios_are_shown_by_many_blocks_and_not_by_few():
     assert found.value == pytest.approx(0.5, rel=0.02)
     assert found.interval[0] < 0.5 < found.interval[1]
     assert np.ptp(found.interval) < 0.1 * np.ptp(rmse(before, blocks).interval)
+
     found = rmse(np.ones(5), np.zeros(5, dtype=int))
     assert found.value == 1.0
     assert not np.isfinite(found.interval[1])
+
     squares, blocks = np.arange(1.0, 9.0), np.arange(8)
     assert not ratio(squares, squares, blocks).above
     assert not ratio(np.append(squares, 0.0), np.append(squares, 0.0), np.arange(9)).below
@@ -334,6 +339,7 @@ def test_errors_are_the_same_however_few_episodes_are_replayed_at_a_time(long, m
     whole = pose_errors(gone, theta, every_other)
     monkeypatch.setattr(windows_module, "AT_ONCE", gone.duties.shape[1])
     assert np.array_equal(pose_errors(gone, theta, every_other), whole)
+
     sizes, replay = [], windows_module.window_paths
     monkeypatch.setattr(
         windows_module, "window_paths", lambda some, *rest: sizes.append(len(some.duties)) or replay(some, *rest)

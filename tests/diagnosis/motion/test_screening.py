@@ -189,6 +189,7 @@ def test_free_parameters_are_projected_out_of_stretches_within_episodes():
     np.testing.assert_allclose(slopes[weight].T @ left[weight], 0.0, atol=1e-9)
     np.testing.assert_allclose(project_out(slopes, slopes @ random.random((2, 1)), weight), 0.0, atol=1e-9)
     assert project_out(np.empty((60, 0)), columns, weight) is columns
+
     drives = planted_drives(TRUTH, episodes=2, seconds=5.0)
     number = screening.number_stretches(drives)
     assert len(np.unique(number)) == 10

@@ -90,14 +90,6 @@ def test_the_answer_is_told_with_its_score_on_episodes_that_the_search_has_not_s
     assert {e.seed for e in set(known) - set(seen)}.isdisjoint(e.seed for e in seen)
 
 
-@pytest.mark.slow
-def test_a_second_time_nothing_is_simulated(once):
-    *_, found = once
-    spent, again = confirmed(found.study.settings.folder)
-    assert spent.episodes == 0
-    assert study_document(again) == study_document(found)
-
-
 def test_candidates_are_the_lowest_expected_scores_within_the_noise_with_the_likeliest_and_few(finished):
     study = opened(finished)
     with Store.read(finished) as store:
@@ -231,14 +223,6 @@ def test_it_waits_for_the_end_of_the_study_which_a_rule_may_bring(make_study, fi
     folder = make_study("ruled")
     assert len(searched(opened(folder, stop=StopRules(no_improvement=1e9)))[1]) == 5
     assert confirmed(folder, stop=StopRules(no_improvement=1e9))[0].episodes >= ONE
-
-
-@pytest.mark.slow
-def test_it_can_be_turned_off(finished):
-    spent, found = confirmed(finished, confirm=0)
-    assert (spent.episodes, found.confirmation) == (0, None)
-    assert "  in search" not in [row[0] for row in usefulness_table(found).rows]
-    assert study_document(found)["best"]["fresh"] is None
 
 
 @pytest.mark.slow

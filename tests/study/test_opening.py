@@ -191,15 +191,6 @@ def test_rules_to_stop_and_the_order_of_agents_and_metrics_are_no_facts(make_stu
     assert changes(one, other) == []
 
 
-def test_agents_that_the_target_lacks_are_left_out_and_named(finished):
-    target = finished / "target.csv"
-    kept = [line for line in target.read_text().splitlines() if not line.startswith(("agent4", "agent5"))]
-    target.write_text("\n".join(kept) + "\n")
-    study = open_study(finished)
-    assert study.settings.agents == study.target.agents == ("agent0", "agent1", "agent2", "agent3")
-    assert "the target has no scores of agent4, agent5: left out" in looked_at(study).cautions
-
-
 def test_the_truth_is_read_but_nothing_depends_on_it(make_study):
     plain = open_study(make_study())
     (make_study() / "truth.toml").write_text('format = 1\nrobot = "duckiebot"\n[effects.trim]\ntrim = 0.1\n')

@@ -152,17 +152,6 @@ def test_what_may_be_left_out_has_a_default(make_study):
     assert read_study_settings(make_study("plv", objective='"plv"', engine=None)).engine == "gp"
 
 
-@pytest.mark.parametrize("engine", ["gp", "composite", "random", "sobol", "tpe"])
-def test_a_study_names_its_engine(make_study, engine):
-    assert settings_document(read_study_settings(make_study(engine=f'"{engine}"')))["engine"] == engine
-
-
-def test_the_box_does_not_depend_on_the_order_of_its_lines(make_study):
-    one = read_study_settings(make_study(parameters={"trim": "[-0.3, 0.3]", "delay": "[0, 0.3]"}))
-    other = read_study_settings(make_study(parameters={"delay": "[0, 0.3]", "trim": "[-0.3, 0.3]"}))
-    assert one.space == other.space
-
-
 BAD = {
     "an unknown key": ({"bugdet": "5"}, "bugdet: unknown key; did you mean 'budget'?"),
     "a missing key": ({"budget": None}, "budget: is missing"),

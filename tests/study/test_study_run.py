@@ -132,11 +132,6 @@ def test_with_every_engine_an_interrupted_batch_goes_on_to_the_same_trials(make_
     assert run(make_study("stopped", **keys))[1] == whole
 
 
-def test_a_batch_beyond_the_budget_is_cut_short_by_it(make_study):
-    _, trials = run(make_study(batch="100"))
-    assert [trial.state for trial in trials] == ["finished"] * 7
-
-
 def test_rules_to_stop_are_asked_where_a_batch_has_ended(make_study):
     """The same rule stops a study by one trial at a time after its first."""
     folder = make_study(batch=str(BATCH))

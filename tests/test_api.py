@@ -26,9 +26,12 @@ def loaded(code):
     return set(json.loads(done.stdout.splitlines()[-1]))
 
 
-def test_the_names_are_sorted_and_can_all_be_listed():
+def test_names_are_sorted_listed_and_unknown_ones_refused_with_the_nearest():
     assert proxytune.__all__ == sorted(proxytune.__all__)
     assert dir(proxytune) == proxytune.__all__
+    with pytest.raises(AttributeError, match=r"no attribute 'run_studdy'; did you mean 'run_study'\?"):
+        _ = proxytune.run_studdy
+    assert not hasattr(proxytune, "nothing_like_it")
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -58,28 +61,16 @@ def test_every_name_is_on_the_page_about_python(name):
     assert f"`{name}`" in (ROOT / "docs" / "how-to" / "python.md").read_text(encoding="utf-8")
 
 
-def test_the_package_says_that_it_is_typed_and_the_wheel_holds_that():
+def test_the_package_is_typed_and_of_the_version_of_the_project():
     assert (ROOT / "proxytune" / "py.typed").is_file()
     included = PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["include"]
     assert any(fnmatch.fnmatch("/proxytune/py.typed", f"{pattern}*") for pattern in included)
-
-
-def test_the_version_is_that_of_the_project():
     assert proxytune.__version__ == PROJECT["project"]["version"]
 
 
-def test_an_unknown_name_is_refused_with_the_nearest_one():
-    with pytest.raises(AttributeError, match=r"no attribute 'run_studdy'; did you mean 'run_study'\?"):
-        _ = proxytune.run_studdy
-    assert not hasattr(proxytune, "nothing_like_it")
-
-
-def test_importing_proxytune_loads_no_library():
+def test_loading_the_package_or_the_help_loads_no_library():
     assert loaded("import proxytune") == set()
     assert loaded("from proxytune import InputError") == set()
-
-
-def test_the_help_of_the_commands_loads_no_library():
     code = (
         "import runpy, sys; sys.argv = ['proxytune', '--help']\ntry: runpy.run_module('proxytune', run_name='__main__')"
     )

@@ -120,6 +120,41 @@ def test_every_option_is_documented(command, option):
     assert re.search(rf"`{option}[ `]", about) or of_a_source
 
 
+STUDY_KEYS = (*KEYS, "robot", "plant", "camera", "map", "seconds", "position_noise_m", "effects")
+STATUSES = [row.split("|")[1] for row in COMMANDS_PAGE.splitlines() if re.match(r"\| \d", row)]
+DOCUMENTED = {
+    "problem of the comparison": (STAND_INS, lambda one: f"compare.py {one} " in DOCUMENTS["benchmarks/compare.md"]),
+    "option of the comparison": (
+        [flag for action in compare_parser()._actions for flag in action.option_strings if len(flag) > 2],
+        lambda flag: f"`{flag}" in BENCHMARKS or flag == "--help",
+    ),
+    "key of a study": (STUDY_KEYS, lambda key: re.search(rf"^\| `\[?{key}\]?` |^## \[{key}\]$", STUDY, re.MULTILINE)),
+    "key of teaching": (TEACHING_KEYS, lambda key: f"\n| `{key}` " in section(STUDY, "[teaching]")),
+    "group that can be learnt, with its channels": (
+        GROUPS,
+        lambda group: all(f"`{one}`" in row_of("reference/model.md", f"`{group}`") for one in GROUPS[group].channels),
+    ),
+    "metric": (METRICS, lambda metric: row_of("reference/measures.md", f"`{metric}` [{METRICS[metric]}]")),
+    "figure of a robot": (UNITS, lambda figure: f"`{figure}`" in ROBOTS),
+    "exit status": (
+        [DONE, FAILED, BAD_INPUT, *(128 + number for number in STOPPING)],
+        lambda status: any(re.search(rf"\b{status}\b", cell) for cell in STATUSES),
+    ),
+    "command, with what it leaves when it is stopped": (
+        [name for name in COMMANDS if name not in ("list", "completion")],
+        lambda name: f"`{name}`" in section(DOCS["how-to/trouble.md"], "When a command is stopped"),
+    ),
+    "verdict of diagnose": (VERDICTS, lambda verdict: row_of("explanation/diagnosis.md", verdict)),
+}
+"""What there is of each kind, and whether one is documented."""
+
+
+@pytest.mark.parametrize("kind", DOCUMENTED)
+def test_every_one_of_a_kind_is_documented(kind):
+    there, is_documented = DOCUMENTED[kind]
+    assert [one for one in there if not is_documented(one)] == []
+
+
 @pytest.mark.parametrize("engine", ENGINES, ids=lambda engine: engine.name)
 def test_every_engine_is_documented_with_what_it_learns_from_and_what_installs_it(engine):
     row = row_of("reference/engines.md", f"`{engine.name}`")
@@ -155,26 +190,6 @@ def test_every_benchmark_that_a_page_names_is_there_and_each_has_a_row_in_their_
     assert runs <= {name for row in rows for name in re.findall(r" benchmarks/(\w+\.py)", row)}
 
 
-@pytest.mark.parametrize("name", STAND_INS)
-def test_every_problem_of_the_comparison_is_documented_with_what_came_out(name):
-    assert f"compare.py {name} " in DOCUMENTS["benchmarks/compare.md"]
-
-
-def test_every_option_of_the_comparison_is_documented():
-    options = [flag for action in compare_parser()._actions for flag in action.option_strings if flag.startswith("--")]
-    assert [option for option in options if f"`{option}" not in BENCHMARKS and option != "--help"] == []
-
-
-@pytest.mark.parametrize("key", [*KEYS, "robot", "plant", "camera", "map", "seconds", "position_noise_m", "effects"])
-def test_every_study_key_is_documented(key):
-    assert re.search(rf"^\| `\[?{key}\]?` |^## \[{key}\]$", STUDY, flags=re.MULTILINE)
-
-
-@pytest.mark.parametrize("key", TEACHING_KEYS)
-def test_every_key_of_teaching_is_documented(key):
-    assert re.search(rf"^\| `{key}` ", section(STUDY, "[teaching]"), flags=re.MULTILINE)
-
-
 @pytest.mark.parametrize("name", CATALOGUE)
 def test_every_effect_and_its_parameters_are_documented(name):
     effect = CATALOGUE[name]
@@ -191,22 +206,6 @@ def test_every_effect_of_a_car_and_its_parameters_are_documented(name):
     assert all(f"`{parameter.name}`" in row for parameter in CAR_CATALOGUE[name].parameters)
 
 
-@pytest.mark.parametrize("group", GROUPS)
-def test_every_group_that_can_be_learnt_and_its_channels_are_documented(group):
-    row = row_of("reference/model.md", f"`{group}`")
-    assert all(f"`{channel}`" in row for channel in GROUPS[group].channels)
-
-
-@pytest.mark.parametrize("metric", METRICS)
-def test_every_metric_is_documented(metric):
-    assert row_of("reference/measures.md", f"`{metric}` [{METRICS[metric]}]")
-
-
-@pytest.mark.parametrize("figure", UNITS)
-def test_every_figure_of_a_robot_is_documented(figure):
-    assert f"`{figure}`" in ROBOTS
-
-
 @pytest.mark.parametrize("name", map_names())
 def test_every_map_and_its_keys_are_documented(name):
     maps = section(ROBOTS, "Maps")
@@ -220,22 +219,6 @@ def test_every_agent_is_listed_with_how_it_drives(answered):
     listed = {row["name"]: row["how_it_drives"] for row in answered("list", "agents")["agents"]}
     assert set(listed) == set(AGENTS)
     assert all("speed=" in how for how in listed.values())
-
-
-@pytest.mark.parametrize("status", [DONE, FAILED, BAD_INPUT, *(128 + number for number in STOPPING)])
-def test_every_exit_status_is_documented(status):
-    rows = [line for line in COMMANDS_PAGE.splitlines() if re.match(r"\| \d", line)]
-    assert any(re.search(rf"\b{status}\b", row.split("|")[1]) for row in rows)
-
-
-@pytest.mark.parametrize("command", [name for name in COMMANDS if name not in ("list", "completion")])
-def test_what_every_command_leaves_when_it_is_stopped_is_documented(command):
-    assert f"`{command}`" in section(DOCS["how-to/trouble.md"], "When a command is stopped")
-
-
-@pytest.mark.parametrize("verdict", VERDICTS)
-def test_every_verdict_of_diagnose_is_documented(verdict):
-    assert row_of("explanation/diagnosis.md", verdict)
 
 
 @pytest.mark.parametrize("measure", ["PRPV", "PPV", "SRCC", "MMRV", "POD", "PLV"])

@@ -106,16 +106,13 @@ def test_what_others_write_is_left_alone(tmp_path):
     assert {entry.name for entry in tmp_path.iterdir()} == {path.name, *theirs}
 
 
-def test_a_process_number_beyond_all_is_no_process(tmp_path):
+def test_drafts_of_other_users_count_and_a_number_beyond_all_is_no_process(tmp_path, monkeypatch):
     path = tmp_path / "table.csv"
     draft_path(path).with_name(draft_path(path).name.replace(str(os.getpid()), "9" * 30)).write_text("nobody's")
     with draft_of(path) as draft:
         draft.write_text("new")
     assert list(tmp_path.iterdir()) == [path]
 
-
-def test_another_users_process_still_writes(tmp_path, monkeypatch):
-    path = tmp_path / "table.csv"
     draft_path(path).with_name(draft_path(path).name.replace(str(os.getpid()), "1")).write_text("theirs")
 
     def forbidden(process, signal):
@@ -201,10 +198,7 @@ def test_a_temporary_folder_goes_with_its_process_or_when_the_next_is_made(tmp_p
     assert not another.exists()
 
 
-def test_robots_are_found():
+def test_shipped_folders_are_found_or_told_in_one_line():
     assert (shipped("robots") / "duckiebot" / "robot.toml").is_file()
-
-
-def test_a_lost_folder_is_one_line():
     with pytest.raises(SettingsError, match="'unicorns' is missing; install proxytune again"):
         shipped("unicorns")

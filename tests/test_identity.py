@@ -74,11 +74,8 @@ def test_comments_of_toml_do_not_count_but_its_values_and_their_kind_do(tmp_path
     assert one != meaning(tmp_path, a__toml="b = { d = 2, c = 1.0 }\n")
 
 
-def test_other_files_count_by_their_bytes(tmp_path):
+def test_other_files_count_by_their_bytes_and_names_in_any_order(tmp_path):
     assert meaning(tmp_path, a__urdf="<robot/>") != meaning(tmp_path, a__urdf="<robot/> ")
-
-
-def test_the_order_in_which_files_are_given_does_not_count_but_their_names_do(tmp_path):
     one = meaning(tmp_path, a__py="x = 1", b_in_c__py="y = 2")
     assert one == meaning(tmp_path, b_in_c__py="y = 2", a__py="x = 1")
     assert one != meaning(tmp_path, a__py="y = 2", b_in_c__py="x = 1")
@@ -104,15 +101,9 @@ def test_modules_are_those_of_the_folder_and_of_what_can_be_a_package_within(tmp
     assert tmp_path / "weights" / "net.npz" in files_beside(tmp_path)
 
 
-def test_the_version_is_that_of_what_is_installed():
+def test_versions_are_those_of_what_is_installed_told_by_the_names_that_people_use():
     assert versions_of(("numpy",)) == {"numpy": np.__version__}
-
-
-def test_a_package_that_is_not_installed_has_an_unknown_version():
     assert versions_of(("no-such-package-at-all",)) == {"no-such-package-at-all": "unknown"}
-
-
-def test_changes_are_told_in_the_name_that_people_use():
     before, after = {"pybullet": "3.2.5", "numpy": "2.0"}, {"pybullet": "3.2.6", "numpy": "2.0", "optuna": "4.0"}
     assert version_changes(before, after) == ["PyBullet 3.2.6 (was 3.2.5)", "Optuna 4.0 (was not used)"]
     assert version_changes(before, before) == []

@@ -22,21 +22,15 @@ def circle(speed=1.0, turn=0.5, seconds=6.0):
     return Drive(poses, np.full(len(poses), 0.3), np.full(len(poses), 0.2))
 
 
-def test_constant_velocity_leaves_a_circle_by_its_tangent():
+def test_constant_velocity_and_the_bicycle_go_where_they_should():
     drive, starts = circle(), np.array([100])
     predicted = constant_velocity(drive, starts, 100)
     along = predicted[0, :2] - drive.poses[100, :2]
     assert np.hypot(*along) == pytest.approx(1.0, rel=1e-3)
     assert np.arctan2(along[1], along[0]) == pytest.approx(drive.poses[100, 2], abs=1e-3)
-
-
-def test_the_fitted_bicycle_follows_a_circle():
     drive, starts = circle(), np.arange(50, 400, 50)
     predicted = fitted_bicycle([drive])(drive, starts, 100)
     assert np.hypot(*(predicted - drive.poses[starts + 100])[:, :2].T).max() < 0.03
-
-
-def test_the_authors_car_stands_where_its_motor_does_nothing():
     still = Drive(np.zeros((300, 3)), np.full(300, 0.1), np.zeros(300))
     assert np.abs(Physics()(still, np.array([50]), 200)).max() < 1e-6
 

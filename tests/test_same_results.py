@@ -24,13 +24,10 @@ def test_a_difference_is_told_by_its_path(before, after, where):
     assert [path for path, _, _ in same_results.differences(before, after)] == [where]
 
 
-def test_what_differs_by_nature_is_left_out_at_any_depth_and_nothing_else_is():
+def test_what_differs_by_nature_is_left_out_and_masked_and_nothing_else():
     before = {"cut_off": {"seconds": 1.0, "trials": 2}, "value": float("nan")}
     assert not list(same_results.differences(before, {"cut_off": {"seconds": 9.0, "trials": 2}, "value": float("nan")}))
     assert list(same_results.differences(before, {"cut_off": {"seconds": 1.0, "trials": 3}, "value": float("nan")}))
-
-
-def test_seconds_in_a_sentence_are_masked_and_its_numbers_are_not():
     assert same_results.same("saved 2 episodes (0.149 s)", "saved 2 episodes (0.235 s)")
     assert not same_results.same("saved 2 episodes (0.149 s)", "saved 3 episodes (0.149 s)")
     assert not same_results.same("delay 0.107 s (0.092 s)", "delay 0.107 s (0.093 s)")

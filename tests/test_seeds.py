@@ -41,13 +41,10 @@ def test_a_generator_draws_what_it_has_always_drawn():
     assert seeds.course_generator(5, 2).standard_normal() == 0.08497980447159015
 
 
-def test_what_shares_a_name_space_is_what_the_module_says():
+def test_what_shares_a_name_space_is_what_the_module_says_and_noise_shares_no_seed_with_places():
     assert seeds.episode_seed(3, 4) == seeds.proposal_seed(3, 4) == seeds.preflight_seed(3, 4, 0)
     lessons_and_exam = (seeds.proxy_lessons_seed(3, 2), seeds.target_lessons_seed(3, 2), seeds.exam_seed(3, 2))
     assert lessons_and_exam == tuple(seeds.preflight_seed(3, start, 2) for start in range(3))
-
-
-def test_the_noise_of_a_preflight_shares_no_seed_with_its_places():
     places = {seeds.preflight_seed(1, start, turn) for start in range(10) for turn in range(5)}
     noise = {seeds.preflight_noise_seed(1, s, t, agent) for s in range(10) for t in range(5) for agent in range(10)}
     assert len(places) == 50

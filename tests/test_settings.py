@@ -63,8 +63,11 @@ def test_a_file_that_is_not_toml_is_one_line(tmp_path, content, says):
     assert says in complaint_of(read_settings, path)
 
 
-def test_a_folder_in_place_of_a_file_is_one_line(tmp_path):
+def test_a_file_is_looked_for_beside_and_a_folder_is_none(tmp_path):
     assert "cannot be read" in complaint_of(read_settings, tmp_path)
+    section = Section(Path("/some/study.toml"), "", {"target": "../target.csv"})
+    assert section.file("target") == Path("/some/../target.csv")
+    assert section.file("target", "other.csv") == Path("/some/other.csv")
 
 
 def test_the_nearest_name_is_suggested_and_otherwise_all():
@@ -103,12 +106,6 @@ def test_long_rows_of_numbers_are_no_long_keys(tmp_path):
 
 
 LONG = {"long": f"{'a' * 300}.csv", "far": "a/" * 4000}
-
-
-def test_a_file_is_looked_for_beside_the_one_that_names_it():
-    section = Section(Path("/some/study.toml"), "", {"target": "../target.csv"})
-    assert section.file("target") == Path("/some/../target.csv")
-    assert section.file("target", "other.csv") == Path("/some/other.csv")
 
 
 def test_numbers_too_large_for_a_float_and_texts_that_no_file_can_have_are_refused():

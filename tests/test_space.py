@@ -20,12 +20,9 @@ def test_bounds_that_cannot_be_searched_are_refused_by_name(bounds):
         Interval("trim", *bounds)
 
 
-def test_a_neutral_value_may_be_the_robots_own_figure():
+def test_values_are_clipped_to_bounds_and_neutral_ones_may_be_the_robots_own():
     parameter = Parameter(name="camera_height", unit="m", low=0.05, high=0.2, neutral="camera_height")
     assert parameter.neutral_value({"camera_height": 0.108}) == 0.108
     assert Parameter(name="trim", unit="", low=-1.0, high=1.0, neutral=0.0).neutral_value({}) == 0.0
-
-
-def test_a_value_beyond_the_bounds_is_clipped_to_the_nearest():
     parameter = Parameter(name="trim", unit="", low=-1.0, high=0.5, neutral=0.0)
     assert [parameter.clipped(value) for value in (-2.0, 0.25, 2.0)] == [-1.0, 0.25, 0.5]

@@ -69,17 +69,13 @@ def test_pod_is_nothing_at_the_truth_and_something_beside_it(opened):
     assert off["pod_image"] == pytest.approx(20 / 255), "100 and 120 of 255 grey"
 
 
-def test_at_most_so_many_commands_are_replayed_and_fewer_where_the_episode_ended(opened):
+def test_replays_end_with_the_commands_or_the_episode_of_either_domain(opened):
     both = opened[1].family
     counting = Mock(wraps=both.target, identity="counting")
     for start in (0, 2):
         replace(both, proxy=counting, target=counting).run(make_episode({}, agent="agent0", start=start, seed=3))
     counted = [len(one.args[1]) for one in counting.replay.mock_calls]
     assert counted == [COMMANDS, COMMANDS, 3, 3], "target and proxy in turn"
-
-
-def test_the_time_after_a_domain_has_ended_is_left_out(opened):
-    both = opened[1].family
     found = both.run(make_episode({"trim": 0.3}, agent="agent0", start=0, seed=3))
     assert np.isfinite(list(found.values())).all()
 
@@ -193,12 +189,14 @@ def test_a_grid_has_both_ends_and_the_base_s_own_value_once():
     assert plan_sweep(Interval("trim", -0.3, 0.3), {}, 3).points == (-0.3, 0.0, 0.3)
 
 
-def test_prpv_is_at_its_floor_at_the_truth_and_higher_away_from_it(make_study):
+def test_the_others_are_nominal_unless_said_and_prpv_is_at_its_floor_at_the_truth(make_study):
     _, curve = swept_of_sweep(make_study())
     scores = {point.value: point.assessment.prpv.value for point in curve.points}
     assert curve.unit == ""
     assert list(scores) == [-0.3, -0.15, 0.0, 0.1, 0.15, 0.3]
     assert scores[0.1] == 0 < min(scores[-0.3], scores[0.3])
+    _, curve = swept_of_sweep(make_study(), base={})
+    assert {tuple(point.evaluation.theta) for point in curve.points} == {("trim",)}
 
 
 def test_what_is_known_is_not_simulated_again_and_truth_is_shared_between_curves(make_study):
@@ -206,11 +204,6 @@ def test_what_is_known_is_not_simulated_again_and_truth_is_shared_between_curves
     assert swept_of_sweep(folder)[0] == 6 * 18
     assert swept_of_sweep(folder)[0] == 0
     assert swept_of_sweep(folder, parameter="delay", points=3)[0] == 3 * 18, "four points, of which the truth is known"
-
-
-def test_the_others_are_nominal_where_nothing_is_said(make_study):
-    _, curve = swept_of_sweep(make_study(), base={})
-    assert {tuple(point.evaluation.theta) for point in curve.points} == {("trim",)}
 
 
 def test_every_point_is_told_with_its_place_value_and_prpv(make_study):
@@ -312,13 +305,10 @@ def test_a_curve_has_a_best_value_and_a_shape_on_either_side_of_the_held_one(cas
     assert (shape.best, shape.below, shape.above, shape.monotone) == (best, below, above, monotone)
 
 
-def test_the_score_of_a_shape_is_the_best_and_what_is_near_it_is_not_worse_beyond_noise():
+def test_the_score_of_a_shape_and_its_line_say_what_each_side_does():
     assert (shape_of(VALLEY, 2.0).score, shape_of(VALLEY, 2.0).near_best) == (1.0, (2.0,))
     assert shape_of(series([2.0, 1.5, 1.0, 1.5, 2.0], 0.6), 2.0).near_best == (0.0, 1.0, 2.0, 3.0, 4.0)
     assert shape_of(series([0.2, 0.9, 0.1], higher=True), 1.0).score == 0.9
-
-
-def test_the_line_says_where_it_is_lowest_and_what_each_side_does():
     line = describe_shape(series([9.0, 4.0, 1.0, 6.0, 3.0]), 2.0)
     assert line.startswith("PRPV: lowest (1) at 2; not worse beyond noise: 2; from 2 downwards it worsens")
     assert "upwards it turns" in line

@@ -27,21 +27,15 @@ def driven(lane):
     return drive(lane, "steady", THETA)
 
 
-def test_poses_have_times_sixty_a_second_from_the_start_to_the_end(driven):
+def test_poses_and_commands_have_times_and_scores_are_of_the_same_drive(driven):
     assert list(driven.poses.columns) == ["time", "x", "y", "heading"]
     assert np.allclose(np.diff(driven.poses.time), 1 / 60)
     assert driven.poses.time.iloc[[0, -1]].tolist() == [0.0, pytest.approx(2.0)]
     start = driven.poses.iloc[0]
     assert [start.x, start.y] == [0.4237, 0.702]
-
-
-def test_commands_are_the_duties_of_both_wheels_twenty_a_second(driven):
     assert list(driven.commands.columns) == ["time", "left", "right"]
     assert np.allclose(driven.commands.time, np.arange(40) / 20)
     assert driven.commands[["left", "right"]].abs().to_numpy().max() <= 1.0
-
-
-def test_poses_and_scores_are_of_one_drive(driven):
     steps = np.hypot(driven.poses.x.diff(), driven.poses.y.diff())[1:]
     assert driven.scores["survival_time"] == 2.0
     assert driven.scores["speed"] == pytest.approx(steps.sum() / 2.0)
@@ -73,13 +67,14 @@ def test_a_family_that_keeps_no_poses_gives_scores_alone(make_study):
     assert driven.scores["distance"] > 0.0
 
 
-def test_an_episode_that_fails_ends_in_one_line(make_study):
+def test_an_episode_that_fails_and_a_folder_that_is_no_study_are_one_line(make_study, tmp_path):
     folder = make_study(domain={"faults": '["agent1:2:raises"]'})
     with pytest.raises(EpisodeError) as problem:
         drive(folder, "agent1", start=2)
     words = "agent 'agent1' failed from start 2: agent 'agent1' raised ValueError at 1.20 s: it lost its way"
     assert str(problem.value) == words
     assert isinstance(problem.value, RunError)
+    assert "study.toml: no such file" in complaint_of(drive, tmp_path, "steady")
 
 
 @pytest.mark.parametrize(
@@ -95,7 +90,3 @@ def test_an_episode_that_fails_ends_in_one_line(make_study):
 )
 def test_what_the_family_has_not_is_refused_with_what_it_has(make_study, arguments, changes, words):
     assert re.search(words, complaint_of(drive, make_study(), *arguments, **changes))
-
-
-def test_a_folder_that_is_no_study_is_refused(tmp_path):
-    assert "study.toml: no such file" in complaint_of(drive, tmp_path, "steady")

@@ -138,15 +138,9 @@ def same(one, other):
     )
 
 
-def test_a_log_of_dataframes_is_the_log_of_the_files(folder_of_logs, samples):
+def test_a_log_of_dataframes_is_the_log_of_the_files_however_they_are_indexed(folder_of_logs, samples):
     assert same(log_of(samples, {**DESCRIPTION, "name": "planted"}), read_log(str(folder_of_logs)))
-
-
-def test_a_log_without_a_name_has_one(samples):
     assert log_of(samples, DESCRIPTION).name == "log"
-
-
-def test_episode_and_time_may_be_the_index_and_numbers_may_be_numpy_s(samples):
     description = {**DESCRIPTION, "rate_hz": np.int64(20)}
     assert same(log_of(samples.set_index(["episode", "time"]), description), log_of(samples, DESCRIPTION))
 

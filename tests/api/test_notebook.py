@@ -37,15 +37,12 @@ def test_what_hangs_at_a_study_is_shown_in_a_line(finished):
     assert f"PRPV {report.best.assessment.prpv.value}" in repr(report.best.assessment)
 
 
-def test_a_study_shows_its_sentence_its_tables_and_its_figures(finished):
+def test_reports_show_their_sentence_tables_and_figures_in_a_notebook(finished):
     report = proxytune.read_study(finished)
     page = report._repr_html_()
     assert report.sentence[:12] in page
     assert "<table" in page
     assert page.count("<svg") == len(report.figures())
-
-
-def test_scores_show_every_measure_in_a_table():
     table = pd.DataFrame({"agent": list("abc"), "way": [1.0, 2.0, 3.0]})
     found = proxytune.score(proxy=table, target=table, metrics="way:max")
     assert found.table().loc["PRPV", "value"] == 0

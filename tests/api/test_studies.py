@@ -7,7 +7,6 @@ from contextlib import nullcontext
 from unittest.mock import Mock
 
 import numpy as np
-import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 from one_line import complaint_of
@@ -45,13 +44,7 @@ def test_theta_is_drawn_from_the_posterior_as_the_answer_has_it(report):
         report.posterior(draws=0)
 
 
-def test_a_study_that_is_run_again_simulates_nothing(report, folder):
-    again = run_study(str(folder / "study.toml"))
-    assert (again.spent.episodes, again.theta) == (0, report.theta)
-    pd.testing.assert_frame_equal(again.trials(), report.trials())
-
-
-def test_the_trials_are_a_table_of_theta_state_score_and_measures(report):
+def test_the_trials_are_a_table_and_the_best_theta_is_that_of_the_trial_that_it_names_or_of_none(report):
     trials = report.trials()
     assert list(trials.index) == [1, 2, 3, 4, 5, 6]
     assert trials.index.name == "trial"
@@ -59,19 +52,13 @@ def test_the_trials_are_a_table_of_theta_state_score_and_measures(report):
     assert set(trials.state) == {"finished"}
     assert (trials.score == trials.prpv).all()
     assert trials.delay.between(0.0, 0.3).all()
-
-
-def test_the_best_theta_is_that_of_the_trial_that_it_names_or_of_none(report):
     visited = report.trials()[["delay", "trim"]].to_dict("index")
     number = report.document()["best"]["index"]
     assert [trial for trial, theta in visited.items() if theta == report.theta] == ([number] if number else [])
 
 
-def test_a_report_shows_itself_in_the_words_of_the_command(report):
+def test_a_report_has_the_document_and_the_words_of_the_command(report, folder, answered):
     assert repr(report) == f"StudyReport of 'wobbly': {report.document()['sentence']}"
-
-
-def test_the_document_is_what_the_command_prints(report, folder, answered):
     printed = answered("study", folder)
     document = json.loads(json.dumps(report.document()))
     assert {key: printed[key] for key in document} == document
@@ -81,13 +68,6 @@ def test_reading_a_study_simulates_nothing_and_says_the_same(report, folder):
     seen = read_study(folder)
     assert seen.spent.episodes == 0
     assert seen.document() == report.document()
-
-
-def test_reading_a_study_that_was_not_run_is_one_line_and_makes_no_file(make_study):
-    folder = make_study()
-    before = sorted(folder.iterdir())
-    assert "run" in complaint_of(read_study, folder)
-    assert sorted(folder.iterdir()) == before
 
 
 @pytest.mark.slow
@@ -141,12 +121,3 @@ def test_a_report_is_an_optimize_result_of_the_measured_trials(report):
     assert found.func_vals.tolist() == trials.score.tolist()
     assert found.x_iters == trials[["delay", "trim"]].to_numpy().tolist()
     assert found.fun == trials.score[trials[["delay", "trim"]].to_numpy().tolist().index(list(found.x)) + 1]
-
-
-@pytest.mark.slow
-def test_budget_and_jobs_stand_over_study_toml(make_study):
-    report = run_study(make_study("over"), budget=6, jobs=2)
-    assert len(report.trials()) == 6
-    assert report.result.study.settings.jobs == 2
-    with pytest.raises(InputError, match="budget must be between 1 and 100000, got 0"):
-        run_study(make_study("over"), budget=0)

@@ -89,16 +89,12 @@ def test_no_digit_of_a_score_is_lost_on_the_way(values):
     assert score(proxy=frame, target=frame, metrics="distance:max").inputs.proxy.means[:, 0].tolist() == values
 
 
-def test_one_metric_may_be_given_as_text_or_as_a_metric():
+def test_one_metric_may_be_text_and_agents_the_index(tmp_path):
     proxy, target = table(1), table(2)
     metric = Metric("distance", tolerance=0.1)
     one = score(proxy=proxy, target=target, metrics="distance:max:0.1")
     assert documented(one) == documented(score(proxy=proxy, target=target, metrics=metric))
     assert documented(one) == documented(score(proxy=proxy, target=target, metrics=[metric]))
-
-
-def test_agents_and_episodes_may_be_the_index(tmp_path):
-    proxy, target = table(1), table(2)
     plain = documented(score(proxy=proxy, target=target, metrics=METRICS))
     indexed = proxy.set_index(["agent", "episode"])
     assert documented(score(proxy=indexed, target=target.set_index("agent"), metrics=METRICS)) == plain

@@ -128,17 +128,13 @@ def test_what_cannot_be_used_is_one_line(options, said):
     assert "study.toml" not in told
 
 
-def test_another_function_is_refused_and_leaves_the_folder_as_it_was(tmp_path):
+def test_another_function_is_refused_and_leaves_folder_and_study_as_they_were(tmp_path):
     """Trials of other code are not mixed up, and what was found before can still be read."""
     before = tuned(folder=tmp_path)
     told = complaint_of(tuned, lambda theta, agent, start, seed: {"distance": 1.0, "time": 2.0}, folder=tmp_path)
     assert "changed since the first trial: the domain family" in told
     assert proxytune.read_study(tmp_path).theta == before.theta
     assert "call proxytune.tune again with this folder" in complaint_of(proxytune.run_study, tmp_path)
-
-
-def test_a_study_that_tune_did_not_write_is_left_alone(tmp_path):
-    """A user's own study.toml is never overwritten."""
     (tmp_path / "study.toml").write_text("mine")
     assert "tune did not write" in complaint_of(tuned, folder=tmp_path)
     assert (tmp_path / "study.toml").read_text() == "mine"

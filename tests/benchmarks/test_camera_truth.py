@@ -208,18 +208,12 @@ def test_a_case_changes_nothing_but_what_it_names(name):
         assert len(case.effects) == len({key.split(".")[0] for key in changed}) + len(outside)
 
 
-def test_settings_that_a_case_states_hold():
+def test_a_case_that_nobody_knows_is_refused_and_what_others_state_holds():
     case = draw_case("camera_yaw drive horseshoe 20mm_tape 10mm walls fixed", 3)
     assert (case.moves, case.road, case.tape_m, case.scatter) == (True, "horseshoe", 0.02, "10mm")
     assert (case.walls, case.fixed) == (True, True)
-
-
-def test_a_case_that_nobody_knows_is_refused_by_name():
     with pytest.raises(ValueError, match="no case 'camera_rol'; effects: camera_pitch"):
         draw_case("camera_rol", 1)
-
-
-def test_figures_have_the_public_names():
     known = {*PARAMETERS, "camera_forward", "lens_centre.right", "lens_centre.down", "pixel_aspect", "camera_latency"}
     known |= {"rolling_shutter", "defocus", "vignetting", "exposure.gain", "exposure.gamma", "image_noise"}
     assert set(Sight().figures) <= known
@@ -298,7 +292,7 @@ def said(verdict, *names, declared=None, **parameters):
     return {"verdict": verdict, "declared": declared or {}, "effects": effects}
 
 
-def test_a_right_name_counts_and_so_does_one_that_cannot_be_told_from_it():
+def test_sets_are_counted_by_names_alarms_and_flags():
     rival = said("explained", "camera_yaw")
     rival["effects"][0]["indistinguishable_from"] = ["camera_roll"]
     answers = [answer(camera=said("explained", name)) for name in ("camera_roll", "camera_yaw")]
@@ -309,16 +303,12 @@ def test_a_right_name_counts_and_so_does_one_that_cannot_be_told_from_it():
     assert counted["geometric: named by itself, no rival"].hits == 1
     assert counted["geometric: wrong without a flag"].hits == 2
 
-
-def test_false_alarms_are_counted_on_sets_that_lack_nothing():
     quiet = [answer(case, said("nothing missing")) for case in ("none", "camera_pitch", "blur")]
     loud = [answer("none", said("explained", "camera_yaw")), answer("none", said("partly explained"))]
     counted = rates([*quiet, *loud, answer("none", problem="LogError: no frames")])
     assert counted["nothing missing: false alarms"] == Rate(2, 5)
     assert counted["failed"] == Rate(1, 6)
 
-
-def test_outside_sets_are_flagged_by_the_verdict_or_by_a_place_in_the_picture():
     blemish = {**said("nothing missing"), "blemishes": [{"column": 3}]}
     answers = [answer("dirt", said("explained")), answer("dirt", said("unexplained")), answer("dirt", blemish)]
     counted = rates(answers)
@@ -326,7 +316,7 @@ def test_outside_sets_are_flagged_by_the_verdict_or_by_a_place_in_the_picture():
     assert counted["outside: called explained or nothing missing"] == Rate(1, 3)
 
 
-def test_coverage_compares_each_interval_with_its_own_truth():
+def test_coverage_holds_intervals_and_figures_against_their_own_truth():
     true = draw_case("lens_centre still", 1).sight.figures["lens_centre.right"]
     right = {"lens_centre.right": {"value": true, "interval": [true - 0.01, true + 0.01], "unit": ""}}
     pitch = {"camera_pitch": {"value": 25.0, "interval": [24.0, 26.0], "unit": "deg"}}
@@ -335,9 +325,6 @@ def test_coverage_compares_each_interval_with_its_own_truth():
     counted = coverage([answer("lens_centre still", {**said("explained", "lens_centre"), **extended})])
     assert (counted["lens_centre.right"], counted["camera_pitch"]) == (Rate(1, 1), Rate(0, 1))
     assert counted["all"] == Rate(1, 2)
-
-
-def test_a_figure_is_near_the_truth_within_what_is_asked_for():
     true = draw_case("camera_roll still", 1).sight.figures["camera_roll"]
     told = [{"camera_roll": {"value": true + off, "interval": [-9.0, 9.0], "unit": "deg"}} for off in (0.29, 0.31)]
     answers = [answer(camera={**said("explained", "camera_roll"), "extended": one}) for one in told]

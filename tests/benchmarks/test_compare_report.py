@@ -37,7 +37,7 @@ GP = runs("gp", [9.0, 4.0, 0.0], [8.0, 3.0, 0.0])
 SOBOL = runs("sobol", [9.0, 8.0, 8.0], [8.0, 8.0, 9.0])
 
 
-def test_every_engine_has_its_median_and_the_floor_is_drawn():
+def test_every_engine_has_its_median_and_its_name_at_the_end_of_its_line():
     (axes,) = compare_figure([GP, SOBOL], 1.0).axes
     drawn = {line.get_label(): line for line in axes.get_lines()}
     assert list(drawn["gp (2 seeds)"].get_ydata()) == [8.5, 3.5, 0.0, 0.0]
@@ -45,8 +45,6 @@ def test_every_engine_has_its_median_and_the_floor_is_drawn():
     assert list(drawn["noise floor"].get_ydata()) == [1.0, 1.0]
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("evaluations", "lowest regret so far [ordered pairs]")
 
-
-def test_every_engine_is_named_at_the_end_of_its_line_and_no_two_names_overlap():
     together = [runs(engine, [9.0, 5.0 + number % 3, 3.0]) for number, engine in enumerate(NAMES)]
     figure = compare_figure(together, 1.0)
     figure.draw_without_rendering()
@@ -58,14 +56,11 @@ def test_every_engine_is_named_at_the_end_of_its_line_and_no_two_names_overlap()
     assert figure.get_figwidth() * 25.4 <= 86.0
 
 
-def test_the_engines_that_come_along_keep_their_colours():
+def test_engines_keep_colours_of_their_own_whether_known_or_not():
     colours = {"outcomes": "#D55E00", "gp": "#0072B2", "composite": "#E69F00", "random": "0.55", "sobol": "0.55"}
     colours |= {"tpe": "#009E73", "skopt": "#CC79A7", "gpsampler": "#56B4E9", "qlognei": "0.15"}
     colours |= {"botorch_composite": "0.15", "emulator": "#882255"}
     assert {name: look.colour for name, look in looks_of(NAMES).items()} == colours
-
-
-def test_engines_that_nobody_knows_are_drawn_apart_from_those_that_come_along_and_from_each_other():
     strangers = [f"stranger{number}" for number in range(9)]
     looks = looks_of([*NAMES, *strangers])
     assert len(set(looks.values())) == len(NAMES) + len(strangers)
@@ -131,21 +126,15 @@ def page_of(*grouped, tolerance=1.0):
     return compare_report.compare_view("<script>", summaries, 3, image.getvalue())
 
 
-def test_the_answer_is_what_the_terminal_says_of_each_engine():
+def test_the_page_tells_each_engine_s_answer_and_takes_no_name_for_markup():
     page = page_of(GP, SOBOL)
     assert page.sentence.startswith("gp needs significantly fewer evaluations than sobol")
     assert page.next_step == "keep gp."
     assert 'set engine = "gp" in study.toml' in page_of(SOBOL, GP).next_step
-
-
-def test_where_no_engine_reached_the_floor_nothing_is_said_of_which_is_sooner():
     page = page_of(SOBOL, runs("gp", [9.0, 9.0, 9.0], [8.0, 8.0, 8.0]))
     assert page.sentence.startswith("No engine reached the noise floor in 3 evaluations")
     assert "significantly" not in page.sentence
     assert "raise --budget" in page.next_step
-
-
-def test_names_are_not_taken_for_markup_and_every_table_is_there():
     text = page_html(page_of(GP, SOBOL), foot_of("compare"))
     assert "<script" not in text
     assert text.count("<table>") == 2

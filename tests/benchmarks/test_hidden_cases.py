@@ -114,30 +114,24 @@ def test_motor_lag_is_the_time_constant_of_the_wheels_that_have_it(tau, sides, w
         assert reached == pytest.approx(tau if slow else 0.2, abs=1 / 240)
 
 
-def test_an_uneven_motor_speeds_up_and_slows_down_with_time_constants_of_their_own():
+def test_motors_lag_by_time_constants_of_their_own_and_break_away_or_wait_for_their_gap():
     duties = held(1.0, 1.0, seconds=8.0)
     duties[:, 80:] = 0.0
     forward = twists(duties, ("uneven_motor", {"rising": 0.4, "falling": 0.1}))[:, 0]
     assert forward[96] == pytest.approx(0.6 * (1.0 - np.exp(-1.0)), abs=2e-3)
     assert forward[960 + 24] == pytest.approx(0.6 * np.exp(-1.0), abs=5e-3)
 
-
-def test_a_wheel_that_moves_goes_on_until_half_the_breakaway():
     duties = np.repeat(np.array((0.1, 0.2, 0.1, 0.05, 0.1)), 60)[None, :, None] * np.ones(2)
     forward = twists(duties, ("stiction", {"breakaway": 0.15}))[::720, 0]
     ends = twists(duties, ("stiction", {"breakaway": 0.15}))[719::720, 0]
     assert forward[0] == 0.0
     np.testing.assert_allclose(ends, (0.0, 0.12, 0.06, 0.0), atol=1e-4)
 
-
-def test_backlash_takes_the_gap_from_the_way_back():
     duties = held(0.5, 0.5, seconds=8.0)
     duties[:, 80:] = -0.5
     moved = driven(duties, ("backlash", {"gap": 0.6}))[:, 0] - driven(duties)[:, 0]
     np.testing.assert_allclose(moved[[79, 159]], (-0.3 * 0.0318, 0.3 * 0.0318), atol=1e-6)
 
-
-def test_a_battery_fades_with_minutes_of_full_duty():
     forward = twists(held(0.5, 0.5, seconds=60.0), ("battery_sag", {"fade": 0.5}))[-1, 0]
     assert forward == pytest.approx(0.3 * np.exp(-0.25), rel=1e-2)
     forward = twists(held(0.5, 0.5, seconds=60.0), ("sag_with_time", {"rate": 0.2}))[-1, 0]
@@ -152,14 +146,11 @@ def test_jitter_makes_messages_late_by_the_stated_mean(effect, seconds):
     assert late.min() >= 0.0
 
 
-def test_a_late_message_never_replaces_a_newer_one():
+def test_messages_keep_their_order_however_late_they_are():
     duties = np.linspace(0.0, 1.0, 1200)[None, :, None] * np.ones(2)
     arrived = hidden._arrived(robot(("overtaking_jitter", {"spread": 0.3})), duties)[0, :, 0]
     assert np.all(np.diff(arrived) >= 0.0)
     assert np.any(np.diff(arrived) > 1.5 / 1199)
-
-
-def test_delay_jitter_keeps_the_order_of_the_messages_and_is_never_later_than_its_spread():
     issued = np.arange(2000)[None] / 20
     scene = hidden.Scene(np.random.default_rng(1), np.zeros(1), np.zeros(1))
     arrival = hidden.ARRIVAL["delay_jitter"](issued, scene, spread=0.2)
@@ -186,28 +177,16 @@ def test_a_slope_takes_speed_uphill_and_gives_it_downhill(heading, speed):
     assert np.hypot(*(moved[-1] - moved[-21])[:2]) == pytest.approx(speed, abs=1e-6)
 
 
-def test_a_robot_at_rest_does_not_roll_down_a_slope():
+def test_floors_and_wheels_take_speed_where_they_say():
     assert not driven(held(0.0, 0.0), ("floor_slope", {"x": 0.05, "y": 0.02})).any()
-
-
-def test_a_carpet_slows_down_beyond_its_edge_only():
     moved = np.diff(driven(held(0.5, 0.5, 8.0), ("carpet", {"factor": 0.8, "beyond": 1.0}))[:, 0]) * 20
     assert moved[40] == pytest.approx(0.3, rel=1e-3)
     assert moved[-1] == pytest.approx(0.24, rel=1e-3)
-
-
-def test_a_bent_floor_turns_the_robot_where_its_wave_is_high():
     moved = driven(held(0.5, 0.5, 2.0), ("bent_floor", {"gain": 0.1, "waves": 4.0}))
     assert moved[-1, 2] == pytest.approx(0.1 / 4.0 * (1.0 - np.cos(4.0 * moved[-1, 0])), abs=1e-4)
-
-
-def test_an_eccentric_wheel_runs_fast_and_slow_within_a_turn():
     forward = twists(held(0.5, 0.5), ("eccentric_wheel", {"ripple": 0.2}))[480:, 0]
     assert forward.max() == pytest.approx(0.33, abs=1e-3)
     assert forward.min() == pytest.approx(0.27, abs=1e-3)
-
-
-def test_a_hub_slips_from_its_second_on():
     yaw = twists(held(0.5, 0.5, 8.0), ("slipping_hub", {"factor": 0.8, "after": 4.0}))[:, 2]
     assert not yaw[:959].any()
     assert yaw[-1] == pytest.approx(0.375)
@@ -238,12 +217,9 @@ def test_a_case_says_which_names_of_the_catalogue_are_right_or_what_its_effect_d
     assert len(case.right) == (0 if case.depends_on else len(case.effects))
 
 
-def test_every_effect_of_motion_is_hidden_in_two_or_three_sizes():
+def test_every_effect_of_motion_is_hidden_in_sizes_and_no_two_cases_share_a_name_or_a_seed():
     counts = {name: sum(name in case.right[0] for case in IN_FORM) for name in CATALOGUE}
     assert all(2 <= count <= 8 for count in counts.values()), counts
-
-
-def test_no_two_cases_share_a_name_or_a_seed():
     cases = (*CASES.values(), *CLEAN)
     assert len({case.seed for case in cases}) == len({case.name for case in cases}) == len(cases)
     assert len(cases) == len(IN_FORM) + len(OTHER_FORM) + len(PAIRS) + len(OUTSIDE) + 40
@@ -275,7 +251,7 @@ def test_a_pose_has_2_millimetres_and_5_milliradians_of_white_noise(noise, times
     assert not np.array_equal(seen, hidden.measured(np.zeros((20, 1000, 3)), replace(PLAIN, seed=6), 1.0))
 
 
-def test_motion_has_coloured_noise_of_its_stated_size_and_correlation_and_none_at_rest():
+def test_noise_of_motion_has_its_size_and_correlation_and_is_three_percent_in_two_seconds():
     steady = np.tile((0.4, 0.0, 1.0), (100, 4800, 1))
     noise = hidden.disturbed(steady, PLAIN, 2.0) - steady
     np.testing.assert_allclose(noise.std(axis=(0, 1)), (0.02, 0.0048, 2 * (0.025 + 0.04)), rtol=0.05)
@@ -283,22 +259,16 @@ def test_motion_has_coloured_noise_of_its_stated_size_and_correlation_and_none_a
     np.testing.assert_allclose(kept, np.exp(-1.0), atol=0.05)
     np.testing.assert_allclose(noise[:, 0].std(axis=0), noise.std(axis=(0, 1)), rtol=0.25)
     assert not hidden.disturbed(np.zeros((2, 240, 3)), PLAIN, 2.0).any()
-
-
-def test_the_noise_of_two_seconds_is_about_three_percent_of_their_motion():
     quiet, loud = (over_two_seconds(poses(CLEAN[0], noiseless=flag)) for flag in (True, False))
     share = np.sqrt(np.mean((loud - quiet)[..., :2] ** 2) / np.mean(quiet[..., :2] ** 2))
     assert 0.02 < share < 0.045
 
 
-def test_a_circle_has_the_radius_and_the_chords_of_a_circle():
+def test_paths_are_circles_of_their_radius_stepped_or_integrated():
     before, after = driven(held(0.0, 1.0))[[40, 50]]
     chord, turned = complex(*(after - before)[:2]), after[2] - before[2]
     assert abs(chord) == pytest.approx(2.0 * 0.08 * np.sin(turned / 2.0), rel=1e-3)
     assert np.angle(chord * np.exp(-0.5j * (before[2] + after[2]))) == pytest.approx(0.0, abs=1e-3)
-
-
-def test_stepping_and_integrating_give_the_same_path():
     drives = make_drives(3, 2, 100)
     level_floor = robot(("floor_slope", {"x": 0.0, "y": 0.0}), delay=0.1)
     level, plain = (hidden.true_poses(one, drives, 1.0) for one in (level_floor, robot(delay=0.1)))

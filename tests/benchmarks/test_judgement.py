@@ -30,13 +30,10 @@ def trials():
     return [Trial(values, OBJECTIVE.score(values, SEED), OBJECTIVE.outcome(values, SEED)) for values in VISITED]
 
 
-def test_the_answer_of_an_engine_that_learns_from_outputs_is_what_a_study_would_report(judged, trials):
+def test_the_answer_of_an_engine_is_what_a_study_reports_or_where_its_model_is_lowest(judged, trials):
     known = learn_theta(OBJECTIVE.space, trials, OBJECTIVE.goal(SEED), SEED)
     assert judged.answer == known.answer
     assert judged.answer_score == OBJECTIVE.fresh_score(known.answer, SEED)
-
-
-def test_that_of_any_other_engine_is_where_the_model_of_the_score_is_lowest(judged, trials):
     found = judge(OBJECTIVE, VISITED, SEED, by_outputs=False)
     assert found.answer == fit_surrogate(OBJECTIVE.space, trials).incumbent()[0]
     assert found.reading == judged.reading, "what points tell does not depend on who chose them"
@@ -102,10 +99,13 @@ def test_evaluations_are_counted_to_the_first_point_within_the_floor():
     assert found.evaluations_to(-1.0) is None
 
 
-def test_a_judgement_comes_back_from_json_as_it_was(judged):
+def test_judgements_and_runs_come_back_from_json_as_they_were(judged):
     for one in (judged, replace(judged, reading=None)):
         assert judgement_from(json.loads(json.dumps(asdict(one)))) == one
     assert judged.code == judging_code()
+    runs = [replace(run_engine(Analytic(), KEY, SOBOL), seconds=0.0) for _ in range(2)]
+    assert runs[0] == runs[1] == run_from(json.loads(json.dumps(run_document(runs[0]))))
+    assert len(runs[0].visited) == len(runs[0].judgement.regrets) == 12
 
 
 SOBOL = engine_of("sobol")
@@ -116,12 +116,6 @@ def made(engine, seed, regrets, answer_regret=0.0, error=0.1, reading=None):
     key, score = RunKey("o", engine, seed, len(regrets), 1, ""), None if answer_regret is None else answer_regret + 5.0
     found = Judgement(tuple(regrets), (0.0,), score, answer_regret, error, reading, "")
     return Run(key, ((0.0,),) * len(regrets), 0.5, found)
-
-
-def test_a_run_is_a_function_of_its_key_but_for_the_time_it_took_and_comes_back_from_json_as_it_was():
-    runs = [replace(run_engine(Analytic(), KEY, SOBOL), seconds=0.0) for _ in range(2)]
-    assert runs[0] == runs[1] == run_from(json.loads(json.dumps(run_document(runs[0]))))
-    assert len(runs[0].visited) == len(runs[0].judgement.regrets) == 12
 
 
 @pytest.mark.parametrize("engine", ["random", "gp"])
@@ -171,16 +165,13 @@ def test_an_answer_that_failed_counts_as_the_worst_point_of_its_run():
     assert summarise(runs, runs, 4.0).regret.value == 9.0
 
 
-def test_readings_are_counted_over_seeds_and_parameters():
+def test_readings_are_counted_only_where_the_truth_is_known():
     held = [{"delay": True, "trim": False}, {"delay": True, "trim": True}]
     readings = [Reading(share, share < 0.2, one, 0.5, share < 0.2) for share, one in zip((0.1, 0.3), held, strict=True)]
     runs = [made("gp", seed, [9.0, 0.0], reading=reading) for seed, reading in enumerate(readings)]
     region = summarise(runs, runs, 4.0).region
     assert (region.covered, region.misfits, region.intervals_covered) == (1, 1, {"delay": 2, "trim": 1})
     assert region.share.value == pytest.approx(0.2)
-
-
-def test_where_truth_is_not_known_nothing_is_said_to_hold_it():
     runs = [made("gp", seed, [9.0, 0.0], reading=Reading(0.1, None, None, None, None)) for seed in (1, 2)]
     region = summarise(runs, runs, 4.0).region
     assert (region.covered, region.misfits, region.intervals_covered) == (None, 0, None)

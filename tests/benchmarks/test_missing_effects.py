@@ -68,11 +68,15 @@ def test_an_entry_is_scored_as_worked_out_by_hand(folder):
     assert "| entry | 1 of 2 | 0.50 | 5.00, 5.00 | 5.00, 5.00 | 2.50, 2.50 | 3.0 |" in text
 
 
-def test_an_entry_that_names_nothing_and_a_case_without_a_floor_are_said_to_be_so(folder):
+def test_an_entry_is_scored_also_where_it_names_nothing_and_refused_where_it_is_not_there(folder):
     truths = read_truths(folder)
     found = score(enter(folder, None), (replace(truths[0], floor=None), truths[1]))
     assert found[0].ratios is None
     assert "| entry | names none |  | 5.00, 5.00" in table({"entry": found})
+    with pytest.raises(FormatError, match="is no folder"):
+        score(folder / "nobody", read_truths(folder))
+    with pytest.raises(FormatError, match="has no cases"):
+        read_truths(folder / "nowhere")
 
 
 def test_errors_are_seen_from_where_each_window_begins():
@@ -129,13 +133,6 @@ def test_a_bad_entry_is_refused_in_one_line_that_names_the_file(folder, file, sp
     assert said.startswith("error: ")
     assert file in said
     assert told in said
-
-
-def test_an_entry_or_cases_that_are_not_there_are_refused(folder):
-    with pytest.raises(FormatError, match="is no folder"):
-        score(folder / "nobody", read_truths(folder))
-    with pytest.raises(FormatError, match="has no cases"):
-        read_truths(folder / "nowhere")
 
 
 @pytest.mark.parametrize("generator", [name for name, cases in GENERATORS.items() if not hasattr(cases, "PHYSICS")])

@@ -91,12 +91,16 @@ def test_the_target_is_what_measure_makes_of_the_truth_under_seeds_that_the_stud
     assert np.array_equal(goal.values.reshape(expected.means.shape), chosen)
 
 
-def test_the_studys_own_target_is_not_looked_at(opened):
+def test_targets_are_driven_from_the_studys_starts_whose_own_target_is_not_looked_at(opened):
     objective = opened()
     other = replace(objective.run.study.target, values=objective.run.study.target.values[::-1])
     blind = replace(objective, run=objective.run.of(replace(objective.run.study, target=other)), objectives={})
     assert blind.identity == objective.identity
     assert blind.score(point(objective), 1) == objective.score(point(objective), 1)
+    objective.score(point(objective), 1)
+    theta = objective.space.theta(objective.truth(1))
+    driven = objective.run.store.outcomes(objective.run.study.identity, theta)
+    assert set(driven) == set(plan_episodes(objective.run.study.settings, theta, target_seed(1)))
 
 
 def test_a_regret_above_the_truths_level_simulates_nothing_more(opened, driven_so_far):
@@ -176,24 +180,13 @@ def test_targets_have_the_effects_that_the_proxy_lacks_by_turns(opened, tmp_path
     assert lacking.identity != fitting.identity
 
 
-def test_a_proxy_with_a_model_and_targets_with_another_are_refused(opened, tmp_path):
+def test_a_target_with_a_hole_or_another_model_is_none(opened, tmp_path, make_study):
     proxy = model(tmp_path, "delay = 0.1\n")
     with pytest.raises(InputError, match="proxy: is given, and a target cannot have two models"):
         opened([proxy], proxy=f'"{proxy}"')
-
-
-def test_a_target_with_a_hole_is_no_target(make_study, tmp_path):
     study = open_study(make_study(domain={"faults": '["agent2:1:raises"]'}))
     with Store.open(tmp_path) as store, pytest.raises(EpisodeError, match="target of seed 1: agent 'agent2' failed"):
         TruthObjective(StudyRun(study, store)).score((0.1, 0.1), 1)
-
-
-def test_targets_are_driven_from_the_studys_starts(opened):
-    objective = opened()
-    objective.score(point(objective), 1)
-    theta = objective.space.theta(objective.truth(1))
-    driven = objective.run.store.outcomes(objective.run.study.identity, theta)
-    assert set(driven) == set(plan_episodes(objective.run.study.settings, theta, target_seed(1)))
 
 
 def test_an_evaluation_takes_the_simulated_time_of_all_its_episodes(opened, tmp_path):
@@ -218,15 +211,19 @@ def test_the_score_is_a_whole_number_within_its_noise_of_the_regret_and_the_same
     assert regret % STEP == 0
 
 
-def test_the_noise_takes_all_its_values_alike():
+def test_noise_takes_all_its_values_anew_at_every_point_and_seed():
     points = [design_point(ANALYTIC.space, index, 5) for index in range(500)]
     noise = [ANALYTIC.score(point, 3) - ANALYTIC.regret(point, 3) - NOISE for point in points]
     counts = [noise.count(float(value)) for value in range(-NOISE, NOISE + 1)]
     assert sum(counts) == 500
     assert min(counts) > 60
+    one, other = ((0.05, 20.0, 0.1, trim) for trim in (0.1, 0.1 + 1e-12))
+    noise = [RANKING.table(values, 1).means - RANKING.means(values, 1) for values in (one, other)]
+    assert np.abs(noise[0] - noise[1]).min() > 0
+    assert RANKING.truth(1) != RANKING.truth(2)
 
 
-def test_there_are_plateaus_and_blur_is_hardly_seen_while_trim_is():
+def test_there_are_plateaus_and_few_points_within_the_floor():
     seed = 4
     blur, pitch, delay, trim = to_unit(ANALYTIC.space, ANALYTIC.truth(seed))
 
@@ -235,6 +232,13 @@ def test_there_are_plateaus_and_blur_is_hardly_seen_while_trim_is():
 
     assert moved(blur, pitch, delay, trim + 0.01) == 0.0
     assert moved(blur, pitch, delay, trim + 0.2) > moved(blur - 0.2, pitch, delay, trim) > 0.0
+
+    scores = [RANKING.score(RANKING.truth(seed), seed) for seed in range(60)]
+    assert np.mean(scores) == pytest.approx(RANKING.tolerance, rel=0.3)
+
+    regrets = [RANKING.regret(design_point(RANKING.space, index, 7), seed) for seed in (1, 2) for index in range(64)]
+    assert np.mean(np.array(regrets) <= RANKING.tolerance) < 0.05
+    assert AGENTS * (AGENTS - 1) / 6 < np.median(regrets) < AGENTS * (AGENTS - 1) / 2
 
 
 @settings(max_examples=20)
@@ -246,24 +250,6 @@ def test_the_score_is_prpv_of_its_episodes_and_what_is_composed_of_its_outcome(s
     assert score == prpv(compare(**tables, metrics=METRICS)).value == RANKING.score(values, seed)
     outcomes = np.array([RANKING.outcome(values, seed)] * 3).reshape(3, 1, -1)
     assert np.array_equal(RANKING.goal(seed).compose(outcomes), np.full((3, 1), score))
-
-
-def test_the_floor_is_about_what_the_optimum_scores_on_its_episodes():
-    scores = [RANKING.score(RANKING.truth(seed), seed) for seed in range(60)]
-    assert np.mean(scores) == pytest.approx(RANKING.tolerance, rel=0.3)
-
-
-def test_few_points_of_the_box_are_within_the_floor_and_most_are_far_off():
-    regrets = [RANKING.regret(design_point(RANKING.space, index, 7), seed) for seed in (1, 2) for index in range(64)]
-    assert np.mean(np.array(regrets) <= RANKING.tolerance) < 0.05
-    assert AGENTS * (AGENTS - 1) / 6 < np.median(regrets) < AGENTS * (AGENTS - 1) / 2
-
-
-def test_the_noise_is_drawn_anew_at_every_point_and_seed():
-    one, other = ((0.05, 20.0, 0.1, trim) for trim in (0.1, 0.1 + 1e-12))
-    noise = [RANKING.table(values, 1).means - RANKING.means(values, 1) for values in (one, other)]
-    assert np.abs(noise[0] - noise[1]).min() > 0
-    assert RANKING.truth(1) != RANKING.truth(2)
 
 
 BOX_POINTS = [design_point(CALIBRATED.space, index, 7) for index in range(64)]

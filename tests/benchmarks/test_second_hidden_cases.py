@@ -110,12 +110,6 @@ def test_an_exact_motor_covers_the_way_of_the_formula_and_an_exact_circle_closes
     assert np.hypot(*(after - before)[:2]) == pytest.approx(2.0 * 0.16 * np.sin(0.75), abs=1e-6)
 
 
-def test_trim_and_delay_are_those_of_the_case():
-    forward, _, yaw = twists(held(0.5, 0.5, 6.0), trim=0.1)[-1]
-    assert yaw / forward == pytest.approx(1.25)
-    assert np.flatnonzero(twists(held(0.5, 0.5), delay=0.135)[:, 0])[0] == 54
-
-
 @pytest.mark.parametrize(("tau", "wheel", "reached"), [(0.5, "both", (0.5, 0.5)), (0.4, "left", (0.4, 0.2))])
 def test_motor_lag_is_the_time_constant_of_its_wheels(tau, wheel, reached):
     forward, _, yaw = twists(held(1.0, 1.0), ("motor_lag", {"tau": tau, "wheel": wheel})).T
@@ -124,17 +118,17 @@ def test_motor_lag_is_the_time_constant_of_its_wheels(tau, wheel, reached):
         assert np.flatnonzero(speed > 0.6 * (1.0 - np.exp(-1.0)))[0] / 400 == pytest.approx(seconds, abs=0.003)
 
 
-def test_an_overshooting_motor_overshoots_by_the_formula():
+def test_motors_overshoot_and_coast_by_their_formulas():
     forward = twists(held(1.0, 1.0), ("overshooting_motor", {"hz": 0.9, "damping": 0.25}))[:, 0]
     share = np.exp(-np.pi * 0.25 / np.sqrt(1.0 - 0.25**2))
     assert forward.max() == pytest.approx(0.6 * (1.0 + share), abs=1e-4)
-
-
-def test_a_coasting_robot_rolls_on_by_its_own_time_constant():
     duties = held(1.0, 1.0, 8.0)
     duties[:, 80:] = 0.0
     forward = twists(duties, ("coasting", {"tau": 0.9}))[:, 0]
     assert forward[1600 + 360] == pytest.approx(0.6 * np.exp(-1.0), rel=5e-3)
+    forward, _, yaw = twists(held(0.5, 0.5, 6.0), trim=0.1)[-1]
+    assert yaw / forward == pytest.approx(1.25)
+    assert np.flatnonzero(twists(held(0.5, 0.5), delay=0.135)[:, 0])[0] == 54
 
 
 def test_a_driver_brakes_before_reversing_and_kicks_after_a_rest():
@@ -148,15 +142,12 @@ def test_a_driver_brakes_before_reversing_and_kicks_after_a_rest():
     np.testing.assert_allclose(kicked[2400:], plain[2400:], atol=2e-3)
 
 
-def test_a_caster_turns_the_robot_after_a_reversal_only():
+def test_casters_and_tails_turn_the_robot_after_changes_only():
     duties = held(0.5, 0.5, 8.0)
     duties[:, 80:] = -0.5
     heading = moved(duties, ("caster_flip", {"kick": 4.0, "metres": 0.15}))[:, 2]
     assert not heading[:80].any()
     assert heading[-1] == pytest.approx(-4.0 * 0.15, rel=0.02)
-
-
-def test_a_tail_swings_by_the_change_of_speed():
     assert moved(held(0.5, 0.5), ("tail_swing", {"gain": 0.1}))[-1, 1] == pytest.approx(0.03, rel=1e-3)
 
 

@@ -64,7 +64,7 @@ def test_the_document_has_what_the_design_promises(document):
         assert estimate["interval"][0] <= estimate["value"] <= estimate["interval"][1]
 
 
-def test_the_effect_is_named_with_its_parameter_interval_and_unit(document):
+def test_the_effect_is_named_with_its_parameter_interval_unit_and_worth(document):
     (effect,) = document["effects"]
     assert effect["name"] == "yaw_scrub"
     assert effect["indistinguishable_from"] == []
@@ -74,6 +74,13 @@ def test_the_effect_is_named_with_its_parameter_interval_and_unit(document):
     assert parameter["interval"][0] < parameter["value"] < parameter["interval"][1]
     assert abs(parameter["value"] - 0.12) < np.ptp(parameter["interval"])
 
+    assert set(effect["worth"]) == {"1", "2", "5"}
+    for worth in effect["worth"].values():
+        assert worth["unit"] == "%"
+        assert worth["interval"][0] < worth["value"] < worth["interval"][1]
+    assert effect["worth"]["2"]["interval"][0] > 50.0
+    assert document["immaterial"] == []
+
 
 def test_every_effect_tried_is_told_best_first(document):
     gains = [candidate["held_out_gain"] for candidate in document["candidates"]]
@@ -81,16 +88,6 @@ def test_every_effect_tried_is_told_best_first(document):
     assert all(set(candidate) >= {"name", "held_out_gain", "p_value"} for candidate in document["candidates"])
     names = {candidate["name"] for candidate in document["candidates"]}
     assert {"yaw_scrub", "dead_band", "stiction", "dropped_commands", "delay_jitter"} <= names <= set(CATALOGUE)
-
-
-def test_the_effect_says_what_it_is_worth_in_per_cent_of_the_error(document):
-    (effect,) = document["effects"]
-    assert set(effect["worth"]) == {"1", "2", "5"}
-    for worth in effect["worth"].values():
-        assert worth["unit"] == "%"
-        assert worth["interval"][0] < worth["value"] < worth["interval"][1]
-    assert effect["worth"]["2"]["interval"][0] > 50.0
-    assert document["immaterial"] == []
 
 
 def test_what_is_printed_is_what_is_written(document, home):

@@ -92,16 +92,13 @@ def test_where_there_is_no_motion_the_top_of_the_document_is_the_camera_s(found)
     assert document["motion_refused"] is None
 
 
-def test_model_toml_holds_the_camera_with_intervals_and_says_the_verdict(found):
+def test_model_toml_holds_the_camera_and_figures_are_those_of_the_camera_alone(found):
     model = read_model(found.folder / "model.toml")
     told = found.document["camera"]["effects"][0]["parameters"]["camera_roll"]
     assert model.theta["camera_roll"] == pytest.approx(told["value"])
     assert model.intervals["camera_roll"] == pytest.approx(tuple(told["interval"]))
     comment = "# camera: explained: fitted to pictured; added to what was declared: camera_roll"
     assert comment in (found.folder / "model.toml").read_text().splitlines()
-
-
-def test_figures_of_the_camera_are_written_and_none_of_motion(found):
     pictures = {path.name for path in found.folder.glob("*.png")}
     assert pictures == {f"camera_{name}.png" for name in ("markings", "displacement", "ranking", "error")}
 
@@ -117,14 +114,11 @@ def test_people_read_the_verdict_the_roll_and_both_errors(found):
     assert "fitting the camera" in found.err
 
 
-def test_an_unknown_effect_is_told_with_the_nearest_of_both_kinds(stills, tmp_path, refused):
+def test_an_unknown_effect_and_a_log_to_test_on_are_refused_in_one_line(stills, tmp_path, refused):
     line = refused("diagnose", stills, "--declared", "camera_rol", "--output", tmp_path / "out")
     assert "--declared camera_rol: no effect on motion, camera or pictures has this name; did you mean" in line
     assert "'camera_roll'" in line
     assert not (tmp_path / "out").exists()
-
-
-def test_a_log_to_test_on_is_refused_where_there_is_no_motion(stills, tmp_path, refused):
     line = refused("diagnose", stills, "--test", stills, "--output", tmp_path / "out")
     assert "--test: pictured has no commands" in line
 

@@ -58,12 +58,11 @@ def test_people_see_which_episode_it_is_both_scores_and_when_they_part(lane, cap
     assert "brisk from start 0 under seed 1, as in no trial of this study" in capsys.readouterr().out
 
 
-def test_before_a_trial_is_finished_the_nominal_theta_drives(lane, answered):
+def test_theta_is_nominal_before_a_trial_is_finished_then_the_best_unless_nominal_is_asked_for(
+    lane, answered, finished
+):
     answer = answered("drive", lane, "--agent", "steady")
     assert (answer["theta_from"], answer["theta"]) == ("nominal", {})
-
-
-def test_after_a_trial_the_best_theta_drives_unless_nominal_is_asked_for(finished, answered):
     best = answered("drive", finished, "--agent", "agent0")
     assert best["theta_from"] == "best"
     assert set(best["theta"]) == {"trim", "delay"}
@@ -96,15 +95,14 @@ def test_another_simulator_s_robot_is_drawn_where_it_records_places(make_study, 
     assert (tmp_path / "walk.png").exists()
 
 
-def test_where_there_are_no_places_there_are_metrics_and_one_line(make_study, tmp_path, refused, answered):
+def test_where_there_are_no_places_to_draw_metrics_are_told_before_anything_is_driven(
+    make_study, tmp_path, refused, answered
+):
     folder = make_study(family='"walking:walking"', domain={"columns": '"z"'})
     assert answered("drive", folder, "--agent", "agent0")["proxy"]["metrics"]["distance"] > 0.0
     line = refused("drive", folder, "--agent", "agent0", "--output", tmp_path / "walk.png")
     assert "nothing can be drawn, as this study's domain family records no x and y; leave the option out" in line
     assert not (tmp_path / "walk.png").exists()
-
-
-def test_a_family_that_records_nothing_is_told_so_before_anything_is_driven(make_study, tmp_path, refused, answered):
     folder = make_study(domain={"journal": f'"{tmp_path / "journal"}"'})
     assert "nothing can be drawn" in refused("drive", folder, "--agent", "agent0", "--output", tmp_path / "walk.png")
     assert not (tmp_path / "journal").exists()

@@ -79,10 +79,14 @@ def test_the_best_theta_of_a_study_is_exported_with_its_intervals_whatever_its_a
     assert values["motor_lag.time_constant"]["value"] == 0.2
 
 
-def test_a_study_of_another_simulator_is_refused(finished, tmp_path, refused):
+def test_a_study_of_another_simulator_and_an_unknown_robot_are_refused(finished, tmp_path, refused):
     line = refused("export", finished, "--to", "ros", "--output", tmp_path / "robot.yaml")
     assert "is a study of another simulator" in line
     assert not (tmp_path / "robot.yaml").exists()
+    path = tmp_path / "model.toml"
+    path.write_text('format = 1\nrobot = "rover"\n')
+    line = refused("export", path, "--to", "ros", "--output", tmp_path / "out.yaml")
+    assert "its robot 'rover' is unknown here; go to the folder that rover lies in" in line
 
 
 def test_a_robot_without_a_folder_has_ros_parameters_but_no_body(tmp_path, answered, refused):
@@ -94,13 +98,6 @@ def test_a_robot_without_a_folder_has_ros_parameters_but_no_body(tmp_path, answe
     for form, expected in {"urdf": "has no body", "mjcf": "states no mass"}.items():
         assert expected in refused("export", path, "--to", form, "--output", output)
         assert not output.exists()
-
-
-def test_an_unknown_robot_is_refused_with_where_it_is_looked_for(tmp_path, refused):
-    path = tmp_path / "model.toml"
-    path.write_text('format = 1\nrobot = "rover"\n')
-    line = refused("export", path, "--to", "ros", "--output", tmp_path / "out.yaml")
-    assert "its robot 'rover' is unknown here; go to the folder that rover lies in" in line
 
 
 def test_a_studys_trials_are_what_scikit_optimize_loads(finished, tmp_path, capsys):

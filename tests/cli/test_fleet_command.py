@@ -134,17 +134,15 @@ def test_a_study_with_a_target_knows_trials_too(make_study, robots):
     assert told.result.robots[0].knowledge.goal.values[0] != told.result.robots[1].knowledge.goal.values[0]
 
 
-def test_what_a_robot_says_depends_on_no_other(found, bank, robots):
+def test_what_a_robot_says_depends_on_no_other_and_names_that_are_alike_have_their_folders(
+    found, bank, robots, tmp_path
+):
     """Calibration is shared, so the first of the tables is told as any other."""
     few = proxytune.fleet(bank, [robots[3], robots[0]]).document()["robots"]
     all_of_them = found.document()["robots"]
     for name in ("robot3", "robot0"):
         for key in ("theta_interval", "region_share", "p_value"):
             assert few[name][key] == all_of_them[name][key]
-
-
-def test_names_that_are_alike_have_their_folders(found, bank, tmp_path):
-    """robot1/target.csv and robot2/target.csv are two robots."""
     paths = []
     for name in ("robot1", "robot2"):
         (tmp_path / name).mkdir()

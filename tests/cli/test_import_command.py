@@ -18,7 +18,9 @@ def table(tmp_path_factory):
     return foreign_robot.write_form(tmp_path_factory.mktemp("source"), "csv", drives)
 
 
-def test_without_an_output_it_lists_and_writes_nothing(answered, table, tmp_path, monkeypatch):
+def test_importing_without_an_output_lists_what_there_is_and_writes_nothing(
+    answered, table, tmp_path, monkeypatch, capsys
+):
     monkeypatch.chdir(tmp_path)
     found = answered("import", table)
     assert found["log"] is None
@@ -26,6 +28,10 @@ def test_without_an_output_it_lists_and_writes_nothing(answered, table, tmp_path
     assert {one["name"]: one["role"] for one in found["channels"]}["yaw_deg"] == "heading"
     assert [one["name"] for one in found["drives"]] == ["run0", "run1"]
     assert list(tmp_path.iterdir()) == []
+    assert main(["import", str(table)]) == 0
+    text = capsys.readouterr().out
+    for part in ("yaw_deg", "heading", "run1", "answers after", "give OUTPUT to write the log"):
+        assert part in text
 
 
 def test_the_log_reads_back_with_robot_figures_and_offset(answered, table, tmp_path):
@@ -33,13 +39,6 @@ def test_the_log_reads_back_with_robot_figures_and_offset(answered, table, tmp_p
     assert answered("import", *words)["log"] == str(tmp_path / "log")
     log = read_log(tmp_path / "log")
     assert (log.robot, log.command, log.clock_offset_s, len(log.episodes)) == ("nobodys", "twist", -0.25, 2)
-
-
-def test_people_read_tables_of_what_there_is_and_of_the_drives(capsys, table):
-    assert main(["import", str(table)]) == 0
-    text = capsys.readouterr().out
-    for part in ("yaw_deg", "heading", "run1", "answers after", "give OUTPUT to write the log"):
-        assert part in text
 
 
 @pytest.mark.parametrize(

@@ -40,7 +40,7 @@ def test_the_page_is_there_after_the_first_episode_and_its_path_is_said_once(set
     assert said == f"proxytune study: page: {path} (renews itself while the study runs)\n"
 
 
-def test_it_is_written_at_most_every_few_seconds(settings, monkeypatch):
+def test_it_is_written_at_most_every_few_seconds_and_what_else_watches_hears_all(settings, monkeypatch):
     clock, written = Clock(monkeypatch), []
     monkeypatch.setattr(live_page.report, "write_live_page", lambda path, *known: written.append(path))
     page = LivePage(settings, "prpv", Silent())
@@ -48,6 +48,13 @@ def test_it_is_written_at_most_every_few_seconds(settings, monkeypatch):
         clock.now += 0.1
         page.episode()
     assert len(written) == 2
+
+    heard = Mock()
+    page = LivePage(settings, "prpv", heard)
+    page.begin("a", 2)
+    page.episode()
+    page.best(3.0)
+    assert heard.mock_calls == [call.begin("a", 2), call.episode(), call.best(3.0)]
 
 
 def test_a_run_that_is_stopped_leaves_a_page_that_says_so_and_no_longer_renews(settings):
@@ -68,15 +75,6 @@ def test_a_page_that_cannot_be_written_does_not_stop_the_run(settings, monkeypat
     with renewed_page(settings, "prpv", nullcontext(Silent())) as watcher:
         watcher.episode()
     assert capsys.readouterr().err == ""
-
-
-def test_what_else_watches_hears_all(settings):
-    heard = Mock()
-    page = LivePage(settings, "prpv", heard)
-    page.begin("a", 2)
-    page.episode()
-    page.best(3.0)
-    assert heard.mock_calls == [call.begin("a", 2), call.episode(), call.best(3.0)]
 
 
 def test_a_finished_study_has_its_own_page_in_the_end_and_nothing_is_said_on_the_way(finished, capsys):

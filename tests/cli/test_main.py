@@ -60,22 +60,23 @@ def test_json_is_one_document_and_nothing_else(kind, capsys):
     assert out.err == ""
 
 
-def test_what_the_table_of_options_says_of_the_code_is_so():
+def test_every_table_of_options_is_a_command_s_and_says_of_the_code_what_is_so():
     assert OPTIONS["list"]["kind"]["choices"] == list(listing._KINDS)
     assert OPTIONS["export"]["--to"]["choices"] == [*FORMATS, FILTER, *TRIALS]
     assert OPTIONS["source"]["a bag, table or trajectory as LOG"]["--kind"]["choices"] == list(KINDS)
     assert f"plus {TARGET_OFFSET}]" in OPTIONS["measure"]["--seed"]["help"]
     assert f"PATH/{plot.RESCORED}/METRICS" in OPTIONS["plot"]["--metric"]["help"]
     assert limits_of(parse(["diagnose", "log"])) == LIMITS
-
-
-def test_every_table_of_options_is_a_command_s_or_shared_by_some():
     assert set(OPTIONS) == {*COMMANDS, *(name for one in COMMANDS.values() for name in one.shares)}
 
 
-def test_without_a_command_there_is_help(capsys):
+def test_without_a_command_there_is_help_and_the_version_is_that_of_the_package(capsys):
     assert main([]) == DONE
     assert "diagnose" in capsys.readouterr().out
+    with pytest.raises(SystemExit) as caught:
+        main(["--version"])
+    assert caught.value.code == 0
+    assert capsys.readouterr().out == f"proxytune {proxytune_package.__version__}\n"
 
 
 @pytest.mark.parametrize(
@@ -137,13 +138,6 @@ def test_what_is_not_json_is_a_defect_and_not_printed(monkeypatch):
     monkeypatch.setattr(listing, "run", lambda arguments: Answer({"value": float("nan")}, ""))
     with pytest.raises(ValueError, match="JSON"):
         main(["list", "robots", "--json"])
-
-
-def test_the_version_is_that_of_the_package(capsys):
-    with pytest.raises(SystemExit) as caught:
-        main(["--version"])
-    assert caught.value.code == 0
-    assert capsys.readouterr().out == f"proxytune {proxytune_package.__version__}\n"
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,9 @@ def measured(words, answered, tmp_path):
     return run
 
 
-def test_a_target_is_made_byte_for_byte_the_same_and_a_study_can_use_it(measured, make_study, answered):
+def test_a_target_is_made_byte_for_byte_the_same_named_with_its_seed_and_a_study_can_use_it(
+    measured, make_study, answered, words
+):
     one, two = measured("one.csv"), measured("two.csv", "--seed", "1001")
     assert one.read_bytes() == two.read_bytes() != measured("other.csv", "--seed", "7").read_bytes()
     assert read_scores(one, ["distance", "survival_time"]).complete
@@ -31,6 +33,9 @@ def test_a_target_is_made_byte_for_byte_the_same_and_a_study_can_use_it(measured
     at = "trim=0.1,delay=0.12"
     (curve,) = answered("sweep", folder, "--parameter", "trim", "--points", "2", "--at", at)["curves"]
     assert {point["value"]: point["prpv"] for point in curve["points"]}[0.1] == 0
+    document = answered(*words("one.csv"))
+    assert (document["seed"], document["episodes"]) == (1001, 3)
+    assert set(document["means"]["agent0"]) == {"distance", "survival_time"}
 
 
 def test_repeats_are_labelled_and_one_gives_the_table_of_none_asked_for(measured, words, answered, tmp_path):
@@ -42,12 +47,6 @@ def test_repeats_are_labelled_and_one_gives_the_table_of_none_asked_for(measured
     assert found.episodes == ("0/0", "0/1", "1/0", "1/1", "2/0", "2/1")
     assert (found.values[:, ::2] == read_scores(plain, ["distance"]).values).all()
     assert all(len(set(agent[:, 0].tolist())) == 6 for agent in found.values), "each has noise of its own"
-
-
-def test_the_document_names_the_seed_and_the_means(words, answered):
-    document = answered(*words("one.csv"))
-    assert (document["seed"], document["episodes"]) == (1001, 3)
-    assert set(document["means"]["agent0"]) == {"distance", "survival_time"}
 
 
 @pytest.mark.parametrize(

@@ -102,14 +102,11 @@ def test_bad_input_is_one_line_and_leaves_nothing(tmp_path, monkeypatch, refused
     assert not list(tmp_path.iterdir())
 
 
-def test_figures_are_read_from_pairs():
+def test_figures_are_read_from_pairs_and_a_long_command_is_broken_so_that_it_can_be_pasted():
     assert read_figures("wheel_radius=0.03, mass=2") == {"wheel_radius": 0.03, "mass": 2.0}
     assert read_figures(None) == {}
     with pytest.raises(InputError, match="write NAME=VALUE"):
         read_figures("mass")
-
-
-def test_a_long_command_is_broken_so_that_it_can_be_pasted():
     command = "python -m proxytune measure rover_study --model rover_study/truth.toml --output rover_study/target.csv"
     lines = pasteable(command).split("\n")
     assert max(map(len, lines)) <= 80

@@ -53,12 +53,9 @@ def test_a_path_that_is_no_utf_8_is_json_all_the_same(monkeypatch, capsys):
     assert json.loads(capsys.readouterr().out.encode("utf-8")) == {"path": "caf\udce9"}
 
 
-def test_a_closed_standard_output_is_no_trouble_before_the_answer():
+def test_standard_output_is_the_answer_alone_also_closed_or_after_an_error(capfd):
     code = "import os; os.close(1); from proxytune.cli.terminal import prints_to_stderr as p\nwith p(): pass"
     assert run(code).returncode == 0
-
-
-def test_standard_output_is_back_after_an_error(capfd):
     with pytest.raises(ValueError, match="x"), prints_to_stderr():
         raise ValueError("x")
     os.write(1, b"here")

@@ -32,7 +32,7 @@ def model(tmp_path):
     return write
 
 
-def test_every_window_is_written_and_compared_with_what_was_measured(folder, model, tmp_path, answered):
+def test_every_window_is_written_and_the_error_is_that_of_the_written_poses(folder, model, tmp_path, answered):
     told = answered("predict", model(), folder, "--horizon", 2, "--output", tmp_path / "poses.csv")
     table = pd.read_csv(tmp_path / "poses.csv", dtype={"episode": str})
     assert list(table.columns) == COLUMNS
@@ -43,8 +43,6 @@ def test_every_window_is_written_and_compared_with_what_was_measured(folder, mod
     assert told["error"]["unit"] == "m"
     assert told["error"]["poses"] == 2 * 199
 
-
-def test_the_error_is_that_of_the_written_poses(folder, model, tmp_path, answered):
     told = answered("predict", model({"trim": 0.1, "delay": 0.12}), folder, "--output", tmp_path / "poses.csv")
     table = pd.read_csv(tmp_path / "poses.csv")
     measured = pd.read_csv(folder / "samples.csv")[["episode", "time", "x", "y"]]

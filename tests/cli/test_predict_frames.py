@@ -61,14 +61,11 @@ def test_people_read_the_difference_in_grey_levels(stills, tmp_path, capsys):
     assert "65 frames: mean absolute difference on the floor 0.0 grey levels" in capsys.readouterr().out
 
 
-def test_a_log_without_frames_is_refused(tmp_path, refused):
+def test_a_log_without_frames_and_frames_without_commands_are_refused(tmp_path, refused, stills):
     folder = write_log(planted_log(TRUTH, episodes=1, seconds=5.0), tmp_path / "log")
     line = refused("predict", model(tmp_path, {}), folder, "--frames", "--output", tmp_path / "out")
     assert "has no frames to predict; add [camera] to log.toml, or leave --frames out" in line
     assert not (tmp_path / "out").exists()
-
-
-def test_frames_alone_have_no_poses_to_predict(stills, tmp_path, refused):
     line = refused("predict", model(tmp_path, {}), stills, "--output", tmp_path / "poses.csv")
     assert "has no commands to predict poses from; give a log of drives, or give --frames" in line
     assert not (tmp_path / "poses.csv").exists()

@@ -78,12 +78,17 @@ def test_a_sweep_that_was_deleted_is_told_and_there_again_after_the_same_command
     assert (again["curves"], again["episodes"]["run"]) == (whole, 0)
 
 
-def test_a_whole_study_is_left_as_it_is(finished, capsys):
+def test_a_whole_study_is_left_as_it_is_and_somebody_else_s_refused(finished, capsys, refused):
     before = (finished / "study.db").read_bytes()
     assert main(["repair", str(finished)]) == 0
     assert "study.db is whole; nothing was changed" in capsys.readouterr().out
     assert sorted(path.name for path in finished.iterdir()) == ["study.db", "study.toml", "target.csv"]
     assert (finished / "study.db").read_bytes() == before
+    (finished / "study.db").unlink()
+    assert "no such file; there is nothing to repair" in refused("repair", finished)
+    with sqlite3.connect(finished / "study.db") as plain:
+        plain.execute("CREATE TABLE photos (name TEXT)")
+    assert "is not a study's database" in refused("repair", finished, status=1)
 
 
 @pytest.mark.parametrize("share", [*(pytest.param(one, marks=pytest.mark.slow) for one in (0.3, 0.6)), 0.95])
@@ -133,11 +138,3 @@ def test_what_was_set_aside_before_is_kept(finished, answered):
         answered("repair", finished)
         assert main(["study", str(finished)]) == 0
     assert {path.name for path in finished.glob("study.db.*")} == {"study.db.damaged", "study.db.damaged1"}
-
-
-def test_somebody_else_s_database_and_none_are_refused(finished, refused):
-    (finished / "study.db").unlink()
-    assert "no such file; there is nothing to repair" in refused("repair", finished)
-    with sqlite3.connect(finished / "study.db") as plain:
-        plain.execute("CREATE TABLE photos (name TEXT)")
-    assert "is not a study's database" in refused("repair", finished, status=1)

@@ -81,14 +81,11 @@ def test_several_proxies_are_ranked_with_their_differences(tables):
     assert difference["beyond_noise"] is (difference["interval"][0] > 0)
 
 
-def test_proxies_of_the_same_file_name_are_told_apart(tables):
+def test_proxies_and_files_are_told_apart_by_their_paths(tables):
     Path("other").mkdir()
     Path("other/sim.csv").write_text(SIM)
     found = document("--proxy", "sim.csv", "--proxy", "other/sim.csv", "--target", "real.csv", *METRIC)
     assert {one["proxy"] for one in found["proxies"]} == {"sim", str(Path("other/sim.csv"))}
-
-
-def test_a_file_with_a_colon_in_its_name_is_a_file(tables):
     Path("run:1.csv").write_text(SIM)
     assert document("--proxy", "run:1.csv", "--target", "real.csv", *METRIC)["proxy"] == "run:1"
 

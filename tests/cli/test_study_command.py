@@ -22,22 +22,11 @@ def test_a_study_runs_and_prints_one_document_and_a_second_time_simulates_nothin
     assert {path.name for path in folder.iterdir()} == set(names.split())
 
 
-@pytest.mark.slow
-def test_people_see_the_best_theta_and_where_the_figure_is(finished, capsys):
-    assert main(["study", str(finished)]) == 0
-    out, told = capsys.readouterr()
-    assert "7 of 7; best: trial " in out
-    assert "trim" in out
-    assert "0 run, 126 reused" in out
-    assert f"figures: {finished / 'figures'}" in out.replace("\n", "")
-    assert f"report: {finished / 'report.html'}" in out.replace("\n", "")
-    assert told == ""
-
-
-def test_bad_input_is_one_line_and_exit_2(make_study, refused):
+def test_bad_input_is_one_line_and_exit_2(make_study, refused, tmp_path):
     assert "budget: must be between" in refused("study", make_study(budget="-1"))
     assert "agents: no agent 'agnet1'" in refused("study", make_study(agents='["agent0", "agnet1"]'))
     assert not (make_study() / "study.db").exists()
+    assert "has no study.toml; give the folder of a study" in refused("study", tmp_path)
 
 
 @pytest.mark.slow
@@ -91,10 +80,6 @@ def test_a_budget_or_jobs_out_of_bounds_are_refused(make_study, refused, option,
     assert f"{option} must be between 1 and " in line
 
 
-def test_a_folder_without_a_study_is_refused(tmp_path, refused):
-    assert "has no study.toml; give the folder of a study" in refused("study", tmp_path)
-
-
 @pytest.fixture
 def travelling(make_study, tmp_path, monkeypatch):
     """A study that comes with the package."""
@@ -120,14 +105,11 @@ def test_a_study_that_comes_with_the_package_is_copied_and_that_is_said(travelli
     assert capsys.readouterr().err == ""
 
 
-def test_an_unknown_study_is_refused_with_the_nearest_name(travelling, tmp_path, refused):
+def test_an_unknown_study_or_a_place_that_cannot_be_written_is_told(travelling, tmp_path, refused):
     assert "no study of that name comes with proxytune; did you mean 'quickstart'?" in refused(
         "study", tmp_path / "quickstrat"
     )
     assert not (tmp_path / "quickstrat").exists()
-
-
-def test_where_a_copy_cannot_be_written_it_says_so(travelling, tmp_path, refused):
     (tmp_path / "file").touch()
     told = refused("study", tmp_path / "file" / "quickstart", status=1)
     assert "cannot be written" in told

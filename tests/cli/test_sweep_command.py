@@ -62,14 +62,13 @@ def test_a_finished_study_is_swept_at_its_best_theta_and_says_so(finished, answe
     assert document["curves"][0]["base"] == best
 
 
-def test_nominal_holds_the_robots_own_values_also_when_the_study_is_finished(finished, answered):
+def test_nominal_holds_the_robots_own_values_in_a_finished_study_and_one_that_has_not_run(
+    finished, answered, make_study
+):
     document = answered("sweep", finished, "--parameter", "trim", "--points", "2", "--at", "nominal")
     assert document["at"] == {"chosen": "nominal", "theta": {}}
     assert document["curves"][0]["base"] == {}
-
-
-def test_a_study_that_has_not_run_is_swept_at_nominal_values(make_study, answered):
-    at = answered("sweep", make_study(), "--parameter", "trim", "--points", "2")["at"]
+    at = answered("sweep", make_study("other"), "--parameter", "trim", "--points", "2")["at"]
     assert at == {"chosen": "nominal", "theta": {}}
 
 

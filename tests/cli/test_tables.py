@@ -2,10 +2,8 @@
 
 import io
 
-import foreign_robot
 import pytest
 from rich.console import Console
-from taught import make_taught
 
 from proxytune.cli.main import COMMANDS, parser
 from proxytune.report import Table, columns_of, table_text
@@ -50,29 +48,6 @@ def test_the_scores_of_one_proxy_and_of_several_are_whole(tmp_path):
     for proxies in ((f"{path}:another_simulator",), (path,)):
         words = [word for proxy in proxies for word in ("--proxy", proxy)]
         assert_whole(shown("score", *words, "--target", f"{path}:the_target", *metrics))
-
-
-@pytest.mark.slow
-def test_a_study_and_its_sweep_are_whole(finished):
-    assert_whole(shown("study", finished))
-    assert_whole(shown("sweep", finished, "--parameter", "trim", "--points", "2"))
-    assert_whole(shown("plot", finished, "--metric", "survival_time:max"))
-
-
-def test_the_scores_of_a_twin_are_whole(make_study, tmp_path):
-    (tmp_path / "model.toml").write_text("trim = 0.1\ndelay = 0.12\n")
-    words = ("--model", tmp_path / "model.toml", "--output", tmp_path / "out.csv")
-    assert_whole(shown("measure", make_study(), *words))
-
-
-@pytest.mark.slow
-def test_learning_curves_are_whole(make_study):
-    assert_whole(shown("teach", make_taught(make_study)))
-
-
-def test_what_a_source_holds_is_whole(tmp_path):
-    source = foreign_robot.write_form(tmp_path, "csv", [foreign_robot.drive(0, seconds=20.0)])
-    assert_whole(shown("import", source))
 
 
 def test_tables_of_a_diagnosis_are_whole():

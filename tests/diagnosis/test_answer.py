@@ -32,11 +32,17 @@ def error(drives, *, model=TRUTH, dropped=(), learnt=None, horizon_s=2.0):
     return horizon_error(findings, kept, horizon_s, learnt or {})
 
 
-def test_before_is_the_declared_model_and_after_the_extended_one(drives):
+def test_before_is_the_declared_model_where_blocks_enough_have_a_window(drives):
     told = error(drives, model=SCRUBBED)
     assert told.before.value > 3.0 * told.after.value
     assert told.ratio.value == pytest.approx(told.after.value / told.before.value)
     assert told.floor.reached == pytest.approx(told.after.value)
+    assert error(drives, horizon_s=100.0) is None
+    assert error(drives.only(drives.block < 2)) is None
+    assert error(drives.only(drives.block < 3)) is not None
+    short, long = planted_log(TRUTH, episodes=70, seconds=2.0), planted_log(TRUTH, episodes=1, seconds=9.0)
+    longest = replace(long.episodes[0], name="long")
+    assert error(drives_of(replace(short, episodes=(*short.episodes, longest))), horizon_s=5.0) is None
 
 
 @pytest.mark.parametrize("how", [{"dropped": [DroppedEffect(SCRUB, Variant(SCRUBBED, DECLARED))]},
@@ -45,15 +51,6 @@ def test_what_a_dropped_effect_or_learnt_curves_reached_lowers_the_floor(drives,
     plain, lower = error(drives), error(drives, **how)
     assert plain.floor.reached == plain.after.value == lower.after.value
     assert lower.floor.reached < plain.floor.reached / 3.0
-
-
-def test_no_error_is_told_where_fewer_than_three_blocks_have_a_window(drives):
-    assert error(drives, horizon_s=100.0) is None
-    assert error(drives.only(drives.block < 2)) is None
-    assert error(drives.only(drives.block < 3)) is not None
-    short, long = planted_log(TRUTH, episodes=70, seconds=2.0), planted_log(TRUTH, episodes=1, seconds=9.0)
-    longest = replace(long.episodes[0], name="long")
-    assert error(drives_of(replace(short, episodes=(*short.episodes, longest))), horizon_s=5.0) is None
 
 
 KNOWN = Repeated(Ratio(0.97, (0.9, 1.05)), 0.0116, 0.8)
@@ -72,28 +69,20 @@ def test_an_error_at_the_noise_of_the_poses_is_explained(unnamed):
     assert said(0.0045, 0.004, unnamed=unnamed, named=False) == "nothing missing"
 
 
-def test_an_error_that_nothing_lowers_within_a_narrow_bracket_is_explained():
+def test_an_error_that_nothing_lowers_or_drives_do_not_repeat_is_explained():
     assert said(0.0055, 0.004) == "explained"
     assert said(0.0065, 0.004) == "cannot be told"
     assert said(0.0055, 0.004, reached=0.005) == "cannot be told"
-
-
-def test_an_error_that_drives_do_not_repeat_is_explained():
     assert said(0.012, 0.004, repeated=KNOWN) == "explained"
     assert said(0.012, 0.004, repeated=KNOWN, named=False) == "nothing missing"
 
 
-def test_few_repeats_whose_scatter_leaves_the_floor_wide_explain_nothing():
+def test_few_or_unlike_repeats_explain_nothing_while_an_effect_is_missing():
     assert said(0.012, 0.0005, repeated=KNOWN._replace(part=0.03)) == "cannot be told"
     assert said(0.012, 0.0005, repeated=KNOWN) == "explained"
-
-
-def test_repeats_of_a_manoeuvre_that_never_meets_what_is_missing_explain_nothing():
     assert said(0.029, 0.004, repeated=KNOWN) == "cannot be told"
-
-
-def test_nothing_is_explained_while_a_named_effect_lowers_the_error():
     assert said(0.012, 0.004, repeated=KNOWN, reached=0.0105) == "cannot be told"
+    assert said(0.0055, 0.004, repeated=BEYOND) == "partly explained"
 
 
 @pytest.mark.parametrize(("named", "answer"), [(True, "partly explained"), (False, "unexplained")])
@@ -108,18 +97,11 @@ def test_what_the_noise_is_cannot_be_told_from_few_repeats_or_none():
     assert said(0.012, 0.004, repeated=UNSURE) == "cannot be told"
 
 
-def test_a_narrow_bracket_does_not_explain_what_drives_repeat():
-    assert said(0.0055, 0.004, repeated=BEYOND) == "partly explained"
-
-
-def test_the_floor_lies_between_the_noise_of_poses_and_what_a_model_reached():
+def test_the_floor_lies_between_noise_and_what_a_model_reached_or_repeats():
     floor = bracket(0.004, 0.012, None)
     assert floor.lower == 0.004
     assert 0.012 < floor.upper < 0.0125
     assert bracket(0.013, 0.012, None).lower == 0.012
-
-
-def test_repeats_lower_the_upper_end_but_not_beneath_the_lower():
     alone = bracket(0.004, 0.012, None).upper
     most = 0.006 * 0.6 / 0.5
     assert bracket(0.004, 0.012, BEYOND._replace(part=1.0)).upper == pytest.approx(alone * most / 0.012)

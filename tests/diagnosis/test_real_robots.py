@@ -50,20 +50,11 @@ def or_rivals(diagnosis):
     return {name for effect in diagnosis.effects for name in (effect.effect, *(one.effect for one in effect.rivals))}
 
 
-def test_a_create_loses_speed_in_turns(create):
+def test_a_create_loses_speed_in_turns_is_late_and_has_wheels_alike(create):
     assert "turn_slip" in or_rivals(create)
-
-
-def test_a_create_is_late_at_times_or_always(create):
     assert {"motor_lag", "delay", "delay_jitter"} & or_rivals(create)
-
-
-def test_a_creates_wheels_are_alike(create):
     assert not {"trim", "wheel_gain"} & {effect.effect for effect in create.effects}
     assert not any("wheel" in effect.form for effect in create.effects)
-
-
-def test_a_creates_error_falls_on_the_unseen_half(create):
     five = error(create, 5.0)
     assert five.ratio.value < 0.7
     assert five.ratio.interval[1] < 0.85
@@ -71,13 +62,10 @@ def test_a_creates_error_falls_on_the_unseen_half(create):
     assert learnt(create, 5.0) < 0.55 * five.before.value
 
 
-def test_a_husky_is_predicted_far_better_by_all_that_was_found(husky):
+def test_a_husky_is_predicted_far_better_and_not_called_explained(husky):
     two = error(husky, 2.0)
     assert two.before.value > 0.4
     assert two.after.value < 0.25
     assert learnt(husky, 2.0) < 0.2
-
-
-def test_what_is_left_of_a_husky_is_not_called_explained(husky):
     assert husky.verdict in ("partly explained", "unexplained")
     assert husky.residual_depends_on

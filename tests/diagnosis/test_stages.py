@@ -70,28 +70,24 @@ def test_other_facts_and_spoilt_files_are_made_again_and_what_is_spoilt_is_told(
     assert not list(tmp_path.iterdir())
 
 
-def test_a_digit_that_a_disk_has_changed_is_no_result(tmp_path):
+def test_what_a_disk_or_a_stranger_has_changed_is_no_result(tmp_path, monkeypatch):
     Stages(tmp_path, "facts").keep("one", lambda: np.linspace(0.0, 1.0, 3))
     (path,) = tmp_path.rglob("*.pickle")
     content = path.read_bytes()
     path.write_bytes(content.replace(np.float64(0.5).tobytes(), np.float64(0.25).tobytes()))
     assert path.read_bytes() != content
     assert Stages(tmp_path, "facts").keep("one", lambda: "made again") == "made again"
+    monkeypatch.chdir(tmp_path)
+    Stages(tmp_path, "facts").keep("one", lambda: 1)
+    content = pickle.dumps(Harmful())
+    path.write_bytes(_digest_of(content) + b"\n" + content)
+    assert Stages(tmp_path, "facts").keep("one", lambda: 2) == 2
+    assert not (tmp_path / "harm").exists()
 
 
 class Harmful:
     def __reduce__(self):
         return os.mkdir, ("harm",)
-
-
-def test_a_strangers_file_runs_nothing(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    Stages(tmp_path, "facts").keep("one", lambda: 1)
-    (path,) = tmp_path.rglob("*.pickle")
-    content = pickle.dumps(Harmful())
-    path.write_bytes(_digest_of(content) + b"\n" + content)
-    assert Stages(tmp_path, "facts").keep("one", lambda: 2) == 2
-    assert not (tmp_path / "harm").exists()
 
 
 @pytest.mark.slow

@@ -45,9 +45,13 @@ def test_the_lane_is_found_where_it_lies(left, turned):
     assert lane.offset == pytest.approx(-left / np.cos(turned), abs=0.025)
 
 
-def test_without_markings_there_is_no_lane():
+def test_the_lane_is_nowhere_without_markings_and_wary_slows_down_where_nothing_is_crisp():
     look = Markings(open_eye(ROBOT), 60.0, 150.0)
     assert find_lanes(Seen(parted(np.zeros_like(seen_from())[None])), (look,), (0,)) == [None]
+    wary = Wary(Fixed(0.5, 0.5), contrast=254.0, crisp=5.0, slowest=0.3)
+    np.testing.assert_allclose(commands(wary, 3)[:, 0], 0.15)
+    sure = Wary(Fixed(0.5, 0.5), contrast=30.0, crisp=5.0, slowest=0.3)
+    assert commands(sure, 60)[-1, 0] > 0.49
 
 
 MORE = {
@@ -170,19 +174,10 @@ def test_laggy_waits_its_steps_smoothed_goes_a_share_of_the_way_and_leaning_give
     np.testing.assert_allclose(commands(Leaning(Fixed(0.4, 0.4), bias=0.1), 1), [[0.36, 0.44]])
 
 
-def test_wary_slows_down_where_nothing_is_crisp():
-    wary = Wary(Fixed(0.5, 0.5), contrast=254.0, crisp=5.0, slowest=0.3)
-    np.testing.assert_allclose(commands(wary, 3)[:, 0], 0.15)
-    sure = Wary(Fixed(0.5, 0.5), contrast=30.0, crisp=5.0, slowest=0.3)
-    assert commands(sure, 60)[-1, 0] > 0.49
-
-
-def test_an_unknown_agent_is_told_with_the_nearest(tmp_path):
+def test_agents_are_loaded_by_their_names_or_from_a_folder(tmp_path):
     with pytest.raises(ExtensionError, match="agent 'stead' is unknown .*; did you mean 'steady'"):
         load_agent("stead", tmp_path)
 
-
-def test_a_users_agent_is_loaded_from_its_folder(tmp_path):
     (tmp_path / "mine_agents.py").write_text(
         "class Mine:\n    def begin(self, robot): return 0\n"
         "    def act(self, picture, memory): return (0.1, 0.1), memory\n"

@@ -143,17 +143,13 @@ def test_an_image_effect_stays_while_one_of_its_values_is_not_neutral(tmp_path, 
     assert [effect.name for effect in family(tmp_path).instance(theta).image.effects] == [name.split(".")[0]]
 
 
-def test_noise_is_the_same_for_the_same_seed_and_another_for_another(tmp_path):
+def test_noise_is_that_of_its_seed_and_pictures_are_clipped_once_all_effects_have_met(tmp_path):
     domain = family(tmp_path)
     noisy = {"image_noise": 20.0}
     np.testing.assert_array_equal(driven(domain, **noisy), driven(domain, **noisy))
     pictures = [observed(domain, seed, **noisy).pictures for seed in (5, 5, 6)]
     np.testing.assert_array_equal(pictures[0], pictures[1])
     assert np.abs(pictures[0].astype(float) - pictures[2]).mean() > 10.0
-
-
-def test_pictures_are_clipped_only_once_all_effects_have_met_them(tmp_path):
-    """Noise cannot be seen on a sky that is four times as bright as a picture can show."""
     sky = np.s_[:, 0, :, 2]
     noisy, bright = {"image_noise": 10.0}, {"exposure.gain": 4.0}
     assert (observed(family(tmp_path), **noisy).pictures[sky] < 255).any()

@@ -42,15 +42,12 @@ def held(throttle, steering, ticks=300):
     return np.tile((throttle, steering), (ticks, 1))
 
 
-def test_a_car_drives_straight_at_full_speed_and_the_circle_of_its_wheels_angle():
+def test_a_car_drives_straight_at_full_speed_in_the_circle_of_its_wheels_and_throttle_begins_at_nothing():
     np.testing.assert_allclose(twists(CAR, held(1.0, 0.0))[-1], (3.0, 0.0, 0.0))
     forward, _, yaw = twists(CAR, held(0.5, 1.0))[-1]
     assert forward / yaw == pytest.approx(CAR.least_radius)
     assert CAR.least_radius == pytest.approx(0.33 / np.tan(np.radians(24.0)))
     assert twists(CAR, held(-0.5, 1.0))[-1, 2] == pytest.approx(-yaw)
-
-
-def test_throttle_begins_at_nothing_where_there_is_no_reverse():
     assert twists(DART, held(-1.0, 0.3))[-1, 0] == 0.0
     assert twists(CAR, held(-1.0, 0.3))[-1, 0] == -3.0
 
@@ -81,20 +78,17 @@ def test_the_same_effect_bends_throttle_or_steering_and_leaves_the_other():
     assert step[11, 0] == pytest.approx(plain[0] * (1.0 - np.exp(-1.0)), rel=0.05)
 
 
-def test_the_delay_of_the_steering_comes_on_top_of_that_of_the_message():
+def test_the_delay_of_the_steering_comes_on_top_and_its_curve_has_sides_of_its_own():
     moved = twists(CAR, held(0.2, 1.0), delay=0.1, steering_delay=0.2)
     assert np.flatnonzero(moved[:, 0])[0] == 6
     assert np.flatnonzero(moved[:, 2])[0] == 18
-
-
-def test_the_steering_s_curve_has_sides_of_its_own():
     theta = {"steering_curve__left": 20.0, "steering_curve__right": 30.0, "steering_curve__left_bend": 1.4}
     for steering, angle in ((1.0, 20.0), (-1.0, -30.0), (0.5, 20.0 * np.tanh(0.7) / np.tanh(1.4)), (-0.5, -15.0)):
         forward, _, yaw = twists(DART, held(0.5, steering), **theta)[-1]
         assert np.degrees(np.arctan(yaw / forward * 0.1735)) == pytest.approx(angle)
 
 
-def test_a_car_with_mass_and_friction_does_what_its_equation_says():
+def test_a_car_with_mass_does_what_its_equation_says_and_slides_beyond_its_tyres():
     theta = {"rolling__inertia": 0.35, "rolling__freewheel": 1.0, "rolling__friction": 0.74, "rolling__drag": 0.2}
     throttle = np.repeat((0.0, 0.4, 0.1, 0.0), 200)
     moved = twists(DART, np.stack((throttle, 0.0 * throttle), axis=1), rate_hz=60.0, **theta)[:, 0] / 4.5
@@ -106,8 +100,6 @@ def test_a_car_with_mass_and_friction_does_what_its_equation_says():
     np.testing.assert_allclose(moved, np.mean(np.reshape(steps, (-1, 40)), axis=1), atol=2e-3)
     assert moved[-1] == 0.0
 
-
-def test_tyres_hold_no_more_than_so_much_and_let_the_rear_slide_outwards():
     forward, sideways, yaw = twists(CAR, held(1.0, 1.0), tyres__slide=0.25, tyres__rear_slip=0.01)[-1]
     assert forward * yaw == pytest.approx(4.0 * np.tanh(3.0**2 / CAR.least_radius * 0.25))
     assert sideways == pytest.approx(-0.01 * forward * forward * yaw)
@@ -166,14 +158,12 @@ def test_the_expert_keeps_all_wheels_of_a_car_in_its_lane(tmp_path):
     assert whole == pytest.approx(5.9)
 
 
-def test_an_effect_of_two_wheels_is_refused_on_a_car_in_a_line():
+def test_an_effect_of_another_drive_is_refused_in_a_line(tmp_path):
     told = complaint_of(effects_from, {"trim": 0.1}, CAR.figures, CAR.catalogue)
     assert 'only a robot with drive = "differential" has it, this one is "ackermann"' in told
     told = complaint_of(effects_from, {"dead_band.width": 0.1}, CAR.figures, CAR.catalogue)
     assert "did you mean 'dead_band'" in told
 
-
-def test_an_effect_of_a_car_is_refused_on_two_wheels_in_a_line(tmp_path):
     with pytest.raises(SettingsError, match='only a robot with drive = "ackermann" has it'):
         effects_from({"steering_offset": 0.1}, read_robot("duckiebot").figures)
     model = tmp_path / "model.toml"
@@ -183,6 +173,9 @@ def test_an_effect_of_a_car_is_refused_on_two_wheels_in_a_line(tmp_path):
     model.write_text(model.read_text(encoding="utf-8").replace("duckiebot", "car"), encoding="utf-8")
     assert read_model_of(model, tmp_path).theta == {"steering_offset": 0.1}
     assert catalogue_of("car", tmp_path) == Catalogue(tmp_path, drive="ackermann")
+
+    assert parameter_hint("trim", family(tmp_path).parameters).startswith('only a robot with drive = "differential"')
+    assert parameter_hint("steering_ofset", family(tmp_path).parameters) == "did you mean 'steering_offset'?"
 
 
 BAD = {
@@ -212,8 +205,3 @@ def test_a_body_whose_front_wheels_do_not_steer_is_refused_in_a_line(tmp_path):
         (tmp_path / "mine" / file).write_text(text.replace("steer_left", "turn_left"), encoding="utf-8")
     with pytest.raises(SettingsError, match="has no joint steer_left; the front wheels of a car hang on two revolute"):
         check_body(read_robot("mine", tmp_path))
-
-
-def test_a_study_of_a_car_that_tunes_a_trim_is_told_whose_it_is(tmp_path):
-    assert parameter_hint("trim", family(tmp_path).parameters).startswith('only a robot with drive = "differential"')
-    assert parameter_hint("steering_ofset", family(tmp_path).parameters) == "did you mean 'steering_offset'?"

@@ -62,13 +62,10 @@ def test_the_same_episode_gives_the_same_trajectory_to_the_last_bit(tmp_path, pl
     np.testing.assert_array_equal(poses(domain), poses(domain))
 
 
-def test_another_seed_puts_the_robot_down_elsewhere_and_an_episode_lasts_its_time_when_nothing_goes_wrong(tmp_path):
+def test_another_seed_puts_the_robot_down_elsewhere_and_it_drives_until_its_time_or_the_map_ends(tmp_path):
     first, second = (poses(family(tmp_path, plant="planar"), seed=seed) for seed in (1, 2))
     assert 0.0 < np.hypot(*(first - second)[0, :2]) < 0.08
     assert len(first) == 3 * TICK_HZ + 1
-
-
-def test_an_episode_ends_when_the_robot_leaves_the_map(tmp_path):
     (tmp_path / "bad_agents.py").write_text(BAD_AGENTS, encoding="utf-8")
     metrics = family(tmp_path, seconds=20.0).run(make_episode({}, agent="bad_agents:straight", start=1, seed=0))
     assert 1.0 < metrics["survival_time"] < 6.0
@@ -155,13 +152,10 @@ def test_a_slope_is_felt_along_the_heading_that_the_robot_starts_with(tmp_path):
     assert 0.05 < level - climbed < 0.1
 
 
-def test_naming_a_nominal_value_changes_nothing(tmp_path):
+def test_naming_nominal_values_changes_nothing_and_theta_goes_before_effects_of_section_and_model(tmp_path):
     domain = family(tmp_path, plant="planar")
     nominal = {"trim": 0, "delay": 0.15, "blur": 0.05, "camera_pitch": 19.15, "wheel_gain.left": 1, "driver_map": 0}
     np.testing.assert_array_equal(poses(domain, **nominal), poses(domain))
-
-
-def test_theta_goes_before_the_sections_effects_and_those_before_the_models(tmp_path):
     model = tmp_path / "model.toml"
     model.write_text('robot = "duckiebot"\n[effects.trim]\ntrim = 0.1\n[effects.delay]\ndelay = 0.1\n')
     domain = family(tmp_path, model=model, effects={"trim": {"trim": 0.2}})
@@ -439,13 +433,10 @@ def wandering(seed, samples=400):
     return np.column_stack(((x, y) + np.cumsum(way, axis=0), heading))
 
 
-def test_a_drive_is_scored_by_every_metric_in_order():
+def test_a_drive_is_scored_by_every_metric_and_early_ones_by_its_first_seconds():
     assert list(score(np.tile(OUTER, (2, 1)))) == list(METRICS)
     early = {"early_distance": "m", "early_offset": "m", "speed": "m/s"}
     assert {"distance": "m", "survival_time": "s", "time_out_of_lane": "s", "deviation": "m"} | early == METRICS
-
-
-def test_early_metrics_are_those_of_the_first_five_seconds_whatever_comes_after():
     short = drive(moved_left(OUTER, 0.03), [(0.4, 0.0)])
     still = np.repeat(short[-1:], 60 * 20, axis=0)
     whole = np.concatenate((short, still))
@@ -483,7 +474,7 @@ def test_driving_backwards_in_the_lane_counts_negative(start, outer):
     assert result["time_out_of_lane"] == 0
 
 
-def test_a_stopped_robot_survives_and_gets_nowhere():
+def test_a_stopped_robot_survives_and_one_that_ends_at_once_does_not():
     result = score(np.tile(moved_left(OUTER, 0.05), (3601, 1)))
     assert result == {
         "distance": 0,
@@ -495,17 +486,18 @@ def test_a_stopped_robot_survives_and_gets_nowhere():
         "speed": 0,
     }
 
+    result = score(np.array([moved_left(OUTER, 0.05)]))
+    nothing = dict.fromkeys(("distance", "survival_time", "time_out_of_lane", "early_distance", "speed"), 0)
+    assert result == nothing | {"deviation": pytest.approx(0.05), "early_offset": pytest.approx(0.05)}
 
-def test_survival_ends_at_the_first_pose_off_the_map():
+
+def test_survival_ends_off_the_map_or_at_the_time_limit():
     x, y, _ = OUTER
     out = drive((x, y, 0.0), [(3.0, 0.0)])
     first = next(k for k, pose in enumerate(out) if off_map(ROAD, pose[0], pose[1]))
     result = score(out)
     assert result["survival_time"] == pytest.approx(first / 60)
     assert result["survival_time"] == pytest.approx((SIDE - x) / SPEED, abs=1.5 / 60)
-
-
-def test_nothing_after_the_time_limit_is_scored():
     poses = drive(OUTER, OUTER_LAP * 6)
     assert len(poses) > 3601
     assert score(poses) == score(poses[:3601])
@@ -516,12 +508,6 @@ def test_nothing_after_the_time_limit_is_scored():
 def test_a_survivor_survives_for_the_whole_duration(rate, seconds):
     still = np.tile(OUTER, (round(seconds * rate) + 5, 1))
     assert score(still, rate, seconds)["survival_time"] == pytest.approx(seconds)
-
-
-def test_an_episode_that_ends_at_once_has_survived_for_no_time():
-    result = score(np.array([moved_left(OUTER, 0.05)]))
-    nothing = dict.fromkeys(("distance", "survival_time", "time_out_of_lane", "early_distance", "speed"), 0)
-    assert result == nothing | {"deviation": pytest.approx(0.05), "early_offset": pytest.approx(0.05)}
 
 
 def test_a_zig_zag_across_the_lanes_edges_counts_only_what_is_in_it():
@@ -595,19 +581,13 @@ def test_each_second_a_wheel_out_of_the_lane_takes_one_and_both_take_two(start, 
     assert worth(poses) == pytest.approx(each_second * 0.5 / SPEED, abs=1e-9)
 
 
-def test_where_the_wheels_are_depends_on_the_heading():
+def test_what_is_in_the_lane_counts_by_where_the_wheels_are():
     x, y, heading = moved_left(OUTER, ONE_OUT)
     askew = np.tile((x, y + 0.2, heading + 1.55), (61, 1))
     straight = np.tile((x, y + 0.2, heading), (61, 1))
     assert (worth(askew), worth(straight)) == (pytest.approx(1.0), pytest.approx(0.0))
-
-
-def test_the_wrong_way_round_both_wheels_are_out_of_the_lane():
     wrong = drive(OUTER, OUTER_LAP)[::-1] + (0, 0, pi)
     assert worth(wrong) == pytest.approx(-(len(wrong) - 1) / 60)
-
-
-def test_half_a_step_across_the_lanes_edge_counts_for_either_side():
     poses = np.array([moved_left(OUTER, BOTH_IN), moved_left(OUTER, BOTH_OUT)])
     assert worth(poses) == pytest.approx(0.0)
     assert worth(poses[[0, 0, 1]]) == pytest.approx(1 / 60)
@@ -626,12 +606,10 @@ def exact_start(index, **noise):
     return start_pose(ROAD, index, **{"seed": 1, "position_noise_m": 0.0, "heading_noise_deg": 0.0, **noise})
 
 
-def test_without_noise_a_start_is_the_papers():
+def test_placement_has_the_spread_it_was_given_and_depends_on_seed_and_index_alone():
     for index, (x, y, degrees) in enumerate(ROAD.starts):
         assert exact_start(index) == pytest.approx((x, y, math.radians(degrees)))
 
-
-def test_the_same_seed_and_index_put_the_robot_down_alike_and_others_elsewhere():
     noise = {"position_noise_m": 0.01, "heading_noise_deg": 2.0}
     assert exact_start(3, **noise) == exact_start(3, **noise)
     assert exact_start(3, **noise) != exact_start(3, **noise, seed=2)
@@ -639,8 +617,6 @@ def test_the_same_seed_and_index_put_the_robot_down_alike_and_others_elsewhere()
     first, second = (start_pose(twice, index, seed=1, **noise) for index in (0, 1))
     assert all(one != other for one, other in zip(first, second, strict=True))
 
-
-def test_placement_noise_has_the_spread_it_was_given():
     noise = {"position_noise_m": 0.02, "heading_noise_deg": 3.0}
     x, y, degrees = ROAD.starts[5]
     errors = np.array([exact_start(5, **noise, seed=seed) for seed in range(500)]) - (x, y, math.radians(degrees))

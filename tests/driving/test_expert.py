@@ -97,50 +97,40 @@ def test_off_the_centre_line_it_turns_back_to_it(outer, left):
     assert (command[1] - command[0]) * left < 0
 
 
-def test_on_a_straight_it_drives_straight_on_at_its_speed():
+def test_it_steers_along_the_circle_through_the_point_pursued_and_straight_on_a_straight():
     here = lane_point(ROAD, True, 0.1)
     command = shown(expert(), [np.array((*here, np.pi / 2))])[0][0]
     assert command == pytest.approx(np.full(2, SPEED / ROBOT.figures["full_speed"]))
-
-
-def test_it_steers_along_the_circle_through_the_point_pursued():
-    here = lane_point(ROAD, True, 0.1)
     pose = np.array((*here, np.pi / 2 + 0.2))
     left, right = shown(expert(), [pose])[0][0] * ROBOT.figures["full_speed"]
     radius = SPEED * ROBOT.figures["effective_baseline"] / (right - left)
     middle = here + radius * np.array((-np.sin(pose[2]), np.cos(pose[2])))
     assert np.hypot(*(lane_point(ROAD, True, 0.1 + LOOK_AHEAD) - middle)) == pytest.approx(abs(radius))
     assert (left + right) / 2 == pytest.approx(SPEED)
-
-
-def test_the_gain_multiplies_the_turn_alone():
     once, twice = (shown(expert(gain=gain), STEPS[:30])[0] for gain in (1.0, 1.5))
     assert np.diff(twice) == pytest.approx(1.5 * np.diff(once))
     assert twice.sum(axis=1) == pytest.approx(once.sum(axis=1))
 
 
-def test_what_is_shown_is_the_undisturbed_command_and_what_is_driven_is_not():
+def test_a_push_turns_the_robot_without_speeding_it_up_and_is_not_shown():
     calm, calm_memory = shown(expert())
     pushed, pushed_memory = shown(expert(disturbance=DISTURBANCE))
     np.testing.assert_array_equal(calm_memory.commands, pushed_memory.commands)
     np.testing.assert_array_equal(calm, calm_memory.commands)
     assert (pushed != calm).all()
-
-
-def test_a_push_turns_the_robot_and_does_not_speed_it_up():
     left, right = pushes(0).T
     assert left == pytest.approx(-right)
     assert np.abs(right).min() > 0
+    driven, memory = shown(expert(disturbance=5.0))
+    assert np.abs(driven).max() == 1.0
+    assert np.abs(memory.commands).max() < 1.0
 
 
-def test_the_disturbance_is_a_function_of_seed_and_step_alone():
+def test_the_disturbance_is_a_function_of_seed_and_step_of_the_size_it_was_given():
     driven, memory = shown(expert(3, disturbance=DISTURBANCE))
     np.testing.assert_allclose(driven - np.array(memory.commands), pushes(3), atol=1e-12)
     np.testing.assert_array_equal(pushes(3, 20), pushes(3)[:20])
     assert (pushes(3) != pushes(4)).all()
-
-
-def test_the_disturbance_has_the_standard_deviation_it_was_given_and_lasts_for_half_a_second():
     right = pushes(1, 2000)[:, 1]
     assert right.std() == pytest.approx(DISTURBANCE, rel=0.1)
     assert right.mean() == pytest.approx(0.0, abs=0.2 * DISTURBANCE)
@@ -148,12 +138,6 @@ def test_the_disturbance_has_the_standard_deviation_it_was_given_and_lasts_for_h
     for lag in (1, 2, 5, half_a_second):
         assert np.corrcoef(right[:-lag], right[lag:])[0, 1] == pytest.approx(MEMORY**lag, abs=0.1), lag
     assert MEMORY**half_a_second == pytest.approx(np.exp(-1), abs=0.03)
-
-
-def test_driven_commands_are_duties_however_hard_it_is_pushed():
-    driven, memory = shown(expert(disturbance=5.0))
-    assert np.abs(driven).max() == 1.0
-    assert np.abs(memory.commands).max() < 1.0
 
 
 def test_a_picture_a_shown_command_and_whether_on_the_road_belong_to_every_step():
@@ -170,15 +154,6 @@ def test_the_road_ends_with_the_outer_edges_of_its_two_lanes(heading, side):
     aside = (0.0, edge - 0.001, edge + 0.001)
     poses = [np.array((middle + side * way, ROAD.size[0] / 2, heading)) for way in aside]
     assert shown(expert(), poses)[1].on_road == (True, True, False)
-
-
-def test_a_lesson_that_leaves_the_road_says_at_which_steps():
-    driven = lesson(1, (("trim", 0.5),))
-    middles = driven.poses[:-1:3, :2]
-    inside = np.abs(middles - ROAD.size[0] / 2).max(axis=1)
-    assert len(driven.memory.on_road) == len(driven.commands)
-    assert not all(driven.memory.on_road)
-    assert not any(driven.memory.on_road[step] for step in np.flatnonzero(inside < 0.2))
 
 
 RATE = int(ROBOT.figures["control_rate"])
@@ -243,13 +218,19 @@ def test_the_same_lesson_shows_the_same_samples_to_the_last_bit(plant):
     np.testing.assert_array_equal(first.commands, again.commands)
 
 
-def test_another_seed_start_or_theta_shows_other_samples():
+def test_another_seed_start_or_theta_shows_other_samples_and_a_lesson_off_the_road_says_where():
     room = classroom(plant="planar")
     lessons = [episode(), episode(seed=6), episode(start=4), episode(trim=0.1)]
     shown = [room.demonstrate(one, 1.0)[0] for one in lessons]
     for other in shown[1:]:
         assert (other.commands != shown[0].commands).any()
         assert (other.observations != shown[0].observations).any()
+    driven = lesson(1, (("trim", 0.5),))
+    middles = driven.poses[:-1:3, :2]
+    inside = np.abs(middles - ROAD.size[0] / 2).max(axis=1)
+    assert len(driven.memory.on_road) == len(driven.commands)
+    assert not all(driven.memory.on_road)
+    assert not any(driven.memory.on_road[step] for step in np.flatnonzero(inside < 0.2))
 
 
 @both_plants
@@ -286,7 +267,7 @@ def test_a_guided_policy_drives_as_it_does_alone_and_sees_what_it_sees_then(plan
     np.testing.assert_array_equal(samples.observations, room.replay(episode(), driven.commands).pictures)
 
 
-def test_a_guided_policys_steps_are_labelled_with_what_the_expert_would_do_there():
+def test_a_guided_policys_steps_are_labelled_by_the_expert_on_the_road_alone():
     room = classroom(plant="planar")
     samples, _ = room.guide(episode(), lean, 1.0)
     poses = only(room._drive([episode()], [Pupil(lean)], 1.0)).poses[:: TICK_HZ // RATE]
@@ -294,9 +275,6 @@ def test_a_guided_policys_steps_are_labelled_with_what_the_expert_would_do_there
     asked = [expert.act(Sight(None, pose), expert.begin(ROBOT))[1].commands[0] for pose in poses[:RATE]]
     np.testing.assert_array_equal(samples.commands, asked)
     assert np.abs(samples.commands - [lean(picture) for picture in samples.observations]).max() > 0.05
-
-
-def test_where_a_guided_policy_is_off_the_road_nothing_is_labelled():
     room, straight = classroom(plant="planar"), lambda picture: np.array((0.5, 0.5))
     samples, asked = room.guide(episode(start=1), straight, 12.0)
     driven = only(room._drive([episode(start=1)], [Pupil(straight)], 12.0))

@@ -76,18 +76,12 @@ def mounted(theta):
     return mounted_camera(ROBOT, effects_from(theta, ROBOT.figures))
 
 
-def test_the_camera_is_nominal_without_effects_and_with_those_on_motion_and_on_pictures():
+def test_a_camera_is_nominal_without_effects_and_refused_where_there_is_none_or_none_can_be():
     assert mounted({}) == NOMINAL
     assert mounted({"trim": 0.1, "blur": 0.05, "camera_latency": 0.1}) == NOMINAL
-
-
-def test_a_robot_without_a_camera_is_refused():
     geometry = {"wheel_radius": 0.03, "effective_baseline": 0.16, "full_speed": 0.6}
     with pytest.raises(SettingsError, match="camera"):
         mounted_camera(robot_from_geometry("cart", geometry, 20.0), ())
-
-
-def test_figures_that_no_camera_can_have_are_refused():
     with pytest.raises(SettingsError, match="height_m must be above 0 m"):
         mounted_camera(ROBOT, [_Sunk()])
 

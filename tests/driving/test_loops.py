@@ -91,11 +91,13 @@ def test_an_episode_is_the_same_without_numba(compiled, tmp_path, monkeypatch, p
     np.testing.assert_array_equal(*driven)
 
 
-def test_numpy_does_it_where_numba_is_told_not_to_compile():
+def test_numpy_does_it_where_told_so_and_numba_is_loaded_once_that_pays_off(compiled, monkeypatch):
     code = "from proxytune.driving.loops import by_numba; print(by_numba().__name__)"
     off = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
     told = subprocess.check_output([sys.executable, "-c", code], env=off, text=True)
     assert told == "proxytune.driving.loops\n"
+    monkeypatch.setattr(loops, "_used", [loops.PAYS_OFF - 20])
+    assert [loops.fastest(10) for _ in range(4)] == [loops, loops, compiled, compiled]
 
 
 @pytest.mark.parametrize("at_hand", [True, False])
@@ -104,8 +106,3 @@ def test_numpy_does_it_where_numba_does_not_work(compiled, monkeypatch, at_hand)
         monkeypatch.delattr("proxytune.driving.compiled")
         monkeypatch.setitem(sys.modules, "proxytune.driving.compiled", None)
     assert loops.by_numba.__wrapped__() is (compiled if at_hand else loops)
-
-
-def test_numba_is_loaded_once_that_pays_off(compiled, monkeypatch):
-    monkeypatch.setattr(loops, "_used", [loops.PAYS_OFF - 20])
-    assert [loops.fastest(10) for _ in range(4)] == [loops, loops, compiled, compiled]

@@ -70,38 +70,32 @@ def test_the_middle_of_the_picture_looks_down_at_the_pitch(pitch, height):
     assert y == pytest.approx(0.0, abs=1e-12)
 
 
-def test_rows_reach_over_the_field_of_view():
+def test_rows_and_columns_reach_over_the_field_of_view():
     points = ground_points(replace(NOMINAL, columns=1, rows=4801, height_m=1.0, forward_m=0.0))
     depression = np.degrees(np.arctan2(1.0, points[-1, 0, 0]))
     assert depression == pytest.approx(19.15 + 37.5, abs=0.02)
-
-
-def test_pixels_are_square_and_the_left_half_looks_left():
     points = ground_points(replace(NOMINAL, pitch_deg=90.0, forward_m=0.0))
     assert np.allclose(np.diff(points[..., 1], axis=1), np.diff(points[..., 0], axis=0)[0, 0])
     assert (points[:, :32, 1] > 0).all()
     assert (points[:24, :, 0] > 0).all()
-
-
-def test_nothing_is_on_the_floor_above_the_horizon():
     points = ground_points(NOMINAL)
     horizon = 24 - 24 * math.tan(math.radians(19.15)) / math.tan(math.radians(37.5))
     assert np.isnan(points[: math.floor(horizon)]).all()
     assert np.isfinite(points[math.ceil(horizon) :]).all()
 
 
-def test_yaw_turns_the_view_to_the_left():
+def test_a_camera_turns_its_view_by_yaw_roll_and_place():
     straight, turned = ground_points(NOMINAL), ground_points(replace(NOMINAL, yaw_deg=10.0))
     lens = np.array([0.066, 0.0])
     cos, sin = math.cos(math.radians(10)), math.sin(math.radians(10))
     expected = (straight - lens) @ np.array([[cos, sin], [-sin, cos]]) + lens
     np.testing.assert_allclose(turned, expected, atol=1e-9)
-
-
-def test_roll_lowers_the_right_side_in_the_drivers_view():
     points = ground_points(replace(NOMINAL, roll_deg=8.0))
     sky = np.isnan(points[..., 0]).sum(axis=0)
     assert sky[0] > sky[-1] + 4  # the right of the picture looks further down
+    ahead = ground_points(replace(NOMINAL, forward_m=0.166)) - ground_points(NOMINAL)
+    seen = np.isfinite(ahead[..., 0])
+    np.testing.assert_allclose(ahead[seen], np.broadcast_to((0.1, 0.0), (seen.sum(), 2)), atol=1e-9)
 
 
 @pytest.mark.parametrize("k1", [0.02, -0.02])
@@ -118,12 +112,6 @@ def test_any_distortion_keeps_the_order_of_pixels(k1):
     points = ground_points(replace(NOMINAL, pitch_deg=90.0, k1=k1))
     assert (np.diff(points[..., 1], axis=1) < 0).all()
     assert (np.diff(points[..., 0], axis=0) < 0).all()
-
-
-def test_a_lens_further_ahead_sees_the_floor_further_ahead():
-    ahead = ground_points(replace(NOMINAL, forward_m=0.166)) - ground_points(NOMINAL)
-    seen = np.isfinite(ahead[..., 0])
-    np.testing.assert_allclose(ahead[seen], np.broadcast_to((0.1, 0.0), (seen.sum(), 2)), atol=1e-9)
 
 
 @given(st.floats(-0.25, 0.25), st.floats(-0.25, 0.25), st.floats(0.7, 1.4), st.floats(-0.4, 0.2))
@@ -158,13 +146,10 @@ def test_a_pixel_shows_the_place_that_it_looks_at(pose):
     np.testing.assert_allclose(picture[inside][:, :2], expected[inside], atol=3.0)
 
 
-def test_sky_is_above_the_horizon_and_nowhere_else():
+def test_sky_is_above_the_horizon_and_far_from_the_map_there_is_nothing():
     pictures = GroundPlaneCamera(replace(NOMINAL, roll_deg=5.0), FLOOR).render(loop_poses(4))
     sky = (pictures == SKY).all(axis=-1)
     assert (sky == np.isnan(ground_points(replace(NOMINAL, roll_deg=5.0))[..., 0])).all()
-
-
-def test_far_from_the_map_there_is_nothing():
     pictures = GroundPlaneCamera(NOMINAL, FLOOR).render(np.array([[30.0, -20.0, 0.3], [-2.0, 0.5, 3.1]]))
     assert np.abs(pictures[:, 14:] - np.array(COLOURS["off_map"], dtype=float)).max() <= 3.0
 

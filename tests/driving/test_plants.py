@@ -34,13 +34,10 @@ def test_the_duckiebots_wheels_mass_and_camera_are_read():
     assert math.degrees(math.asin(-body.camera[2, 0])) == pytest.approx(ROBOT.figures["camera_pitch"], abs=1e-4)
 
 
-def test_turned_wheel_joints_and_fixed_joints_between_are_followed():
+def test_wheels_are_read_turned_fixed_and_by_their_names_where_there_are_more():
     turned = TEXT.replace('xyz="0 0.05 0.0318"', 'xyz="0 0.05 0.0318" rpy="-1.5707963 0 0"')
     turned = turned.replace('<axis xyz="0 1 0"/>', '<axis xyz="0 0 1"/>', 1)
     assert body_of(turned).left.axis == pytest.approx((0.0, 1.0, 0.0), abs=1e-6)
-
-
-def test_of_more_wheels_those_called_axles_are_driven():
     third = '<link name="w"/><joint name="rear" type="continuous"><parent link="chassis"/><child link="w"/>'
     third += '<axis xyz="0 1 0"/></joint></robot>'
     assert body_of(TEXT.replace("</robot>", third)).left.joint == "axle_left"
@@ -65,9 +62,14 @@ def test_what_is_no_urdf_is_refused_in_a_line(tmp_path, case):
     assert expected in complaint_of(parse_urdf, path)
 
 
-def test_words_for_numbers_are_refused_in_a_line():
+def test_a_robot_with_words_for_numbers_or_without_its_mesh_is_refused(tmp_path):
     with pytest.raises(SettingsError, match="is no sound URDF .*'wide'"):
         body_of(TEXT.replace("0 0.05 0.0318", "0 wide 0.0318"))
+    path = tmp_path / "robot.urdf"
+    mesh = '<collision><geometry><mesh filename="m.stl"/></geometry></collision>'
+    path.write_text(TEXT.replace("</link>", f"{mesh}</link>", 1))
+    with pytest.raises(SettingsError, match=r"names m.stl, which is not there; add it beside the URDF"):
+        check_body(replace(ROBOT, urdf=path))
 
 
 CHANGES = {
@@ -97,14 +99,6 @@ def test_what_a_urdf_names_must_be_a_file(tmp_path, named):
     mesh = f'<visual><geometry><mesh filename="{named}"/></geometry></visual>'
     path.write_text(TEXT.replace("</link>", f"{mesh}</link>", 1))
     with pytest.raises(SettingsError, match=r"robot.urdf: names .*which is a folder, a device or a pipe"):
-        check_body(replace(ROBOT, urdf=path))
-
-
-def test_a_mesh_that_robots_collide_as_must_be_there(tmp_path):
-    path = tmp_path / "robot.urdf"
-    mesh = '<collision><geometry><mesh filename="m.stl"/></geometry></collision>'
-    path.write_text(TEXT.replace("</link>", f"{mesh}</link>", 1))
-    with pytest.raises(SettingsError, match=r"names m.stl, which is not there; add it beside the URDF"):
         check_body(replace(ROBOT, urdf=path))
 
 

@@ -149,17 +149,11 @@ def test_a_road_that_is_no_simple_loop_is_refused(tmp_path, text, says):
     assert refusal(tmp_path, text).startswith(f"road.segments: the road {says}")
 
 
-def test_a_map_without_starts_is_refused(tmp_path):
+def test_a_map_file_that_is_not_there_or_has_no_starts_is_refused(tmp_path):
     empty = re.sub(r"starts = \[\n.*?\n\]", "starts = []", LOOP, flags=re.DOTALL)
     assert refusal(tmp_path, empty) == "starts: must be a list with something in it, got []"
-
-
-def test_a_map_file_that_is_not_there_is_one_line(tmp_path):
     with pytest.raises(SettingsError, match=r"gone\.toml: no such file; check the path"):
         family(tmp_path, "gone.toml")
-
-
-def test_a_map_by_an_unknown_name_is_told_of_both_kinds():
     told = complaint_of(family, Path(), "horse")
     assert "domain.map: unknown value 'horse'; did you mean 'horseshoe'?" in told
     assert "ends in .toml" in told

@@ -183,7 +183,7 @@ def metres(profile):
     return profile.sum() / FLOOR.pixels_per_metre
 
 
-def test_white_lines_are_as_wide_as_stated_and_end_with_their_tile():
+def test_lines_are_as_wide_as_stated_and_dashes_even():
     row = cover(FLOOR, "white")[texel(FLOOR, 1.5 * TILE)]
     inner = row[texel(FLOOR, 1.9 * TILE) : texel(FLOOR, 2.5 * TILE)]
     first = texel(FLOOR, 1.9 * TILE) + np.flatnonzero(inner > 0.5)[0]
@@ -191,16 +191,12 @@ def test_white_lines_are_as_wide_as_stated_and_end_with_their_tile():
     assert FLOOR.origin + first / FLOOR.pixels_per_metre == pytest.approx(2 * TILE, abs=0.0026)
     assert metres(row) == pytest.approx(4 * ROAD.paint.white_width, abs=0.003)
 
-
-def test_the_yellow_line_is_as_wide_as_stated_and_in_the_middle_of_the_road():
     across = cover(FLOOR, "yellow")[texel(FLOOR, 1.5 * TILE)]
     right = np.arange(across.size) > across.size // 2
     places = FLOOR.origin + (np.arange(across.size) + 0.5) / FLOOR.pixels_per_metre
     assert metres(across[right]) == pytest.approx(ROAD.paint.yellow_width, abs=0.001)
     assert np.average(places[right], weights=across[right]) == pytest.approx(2.5 * TILE, abs=0.0005)
 
-
-def test_a_straight_tile_has_its_dashes_evenly_and_a_gap_at_either_end():
     column = cover(FLOOR, "yellow")[texel(FLOOR, TILE) : texel(FLOOR, 2 * TILE), texel(FLOOR, 2.5 * TILE)]
     painted = column > 0.5
     starts = np.flatnonzero(~painted[:-1] & painted[1:])

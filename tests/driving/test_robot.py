@@ -130,13 +130,6 @@ def test_a_robot_with_camera_but_without_body_may_be_studied_on_the_planar_plant
         lane_following(Section(path, "domain.", {"plant": "bullet"}), model=None)
 
 
-def test_a_body_without_its_figures_is_refused(tmp_path, monkeypatch):
-    folder = copy_duckiebot(tmp_path, "wheel_torque = {", "# wheel_torque = {")
-    monkeypatch.setattr(module, "shipped", lambda kind: tmp_path)
-    with pytest.raises(SettingsError, match=r"has no body: its robot.toml states no wheel_torque; use plant"):
-        read_robot.__wrapped__(folder.name).body()
-
-
 GEOMETRY = {"wheel_radius": 0.05, "effective_baseline": 0.3, "full_speed": 1.5}
 
 
@@ -159,19 +152,19 @@ def test_a_log_that_leaves_out_a_figure_of_its_robot_is_told_which(figure):
         robot_from_geometry("tractor", known, 25.0)
 
 
-def test_every_link_has_inertia():
+def test_links_have_inertia_and_nominal_effects_agree_with_the_figures():
     assert all(link.find("inertial/inertia") is not None for link in BODY.iter("link"))
-
-
-def test_nominal_effects_agree_with_the_figures():
     lag = next(effect for effect in effects_from(ROBOT.theta, ROBOT.figures) if effect.name == "motor_lag")
     assert lag.time_constant == ROBOT.figures["motor_time_constant"]
     assert ROBOT.theta["camera_pitch"] == ROBOT.figures["camera_pitch"]
 
 
-def test_an_unknown_robot_is_told_with_the_nearest():
+def test_a_robot_by_an_unknown_or_another_name_is_refused(tmp_path):
     with pytest.raises(SettingsError, match="robot 'duckybot' is unknown .*; did you mean 'duckiebot'"):
         read_robot("duckybot")
+    shutil.copytree(shipped("robots") / "husky", tmp_path / "wolf")
+    with pytest.raises(SettingsError, match="name: unknown value 'husky'; known are: wolf"):
+        read_robot("wolf", tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -193,12 +186,16 @@ def test_a_mistake_in_robot_toml_is_one_line(tmp_path, monkeypatch, before, afte
     assert says in complaint_of(read_robot.__wrapped__, "duckiebot")
 
 
-def test_a_robot_that_does_not_state_its_wheels_distance_cannot_be_examined():
+def test_a_robot_is_examined_only_with_its_wheels_distance_and_a_body_of_its_figures(tmp_path, monkeypatch):
     robot = read_robot("duckiebot")
     assert robot.wheel_distance() == robot.figures["wheel_distance"]
     figures = {name: value for name, value in robot.figures.items() if name != "wheel_distance"}
     with pytest.raises(SettingsError, match="states no wheel_distance; add it"):
         replace(robot, figures=figures).wheel_distance()
+    folder = copy_duckiebot(tmp_path, "wheel_torque = {", "# wheel_torque = {")
+    monkeypatch.setattr(module, "shipped", lambda kind: tmp_path)
+    with pytest.raises(SettingsError, match=r"has no body: its robot.toml states no wheel_torque; use plant"):
+        read_robot.__wrapped__(folder.name).body()
 
 
 def test_a_robot_beside_the_study_comes_before_a_shipped_one(tmp_path):
@@ -213,12 +210,6 @@ def test_a_robot_beside_the_study_comes_before_a_shipped_one(tmp_path):
         assert family.instance({}).robot.urdf == home / "duckiebot.urdf"
     assert read_robot("duckiebot").figures["wheel_radius"] == 0.0318
     assert robot_names(tmp_path) == ("car", "dart", "duckiebot", "husky", "irobot_create", "my_robot")
-
-
-def test_a_robot_whose_toml_has_another_name_than_its_folder_is_refused(tmp_path):
-    shutil.copytree(shipped("robots") / "husky", tmp_path / "wolf")
-    with pytest.raises(SettingsError, match="name: unknown value 'husky'; known are: wolf"):
-        read_robot("wolf", tmp_path)
 
 
 def test_a_plugin_s_robot_is_read_from_the_folder_that_it_names(tmp_path, monkeypatch):

@@ -43,14 +43,13 @@ def wheels(theta, duty):
     return chain.apply(np.full((600, 2), duty), memory)[0][-1]
 
 
-def test_the_signal_meets_the_effects_in_this_order():
+def test_effects_come_in_the_order_in_which_the_signal_meets_them():
     assert tuple(CATALOGUE) == ORDER
-
-
-def test_effects_come_in_the_order_of_the_catalogue_however_they_are_named():
     theta = {"motor_lag.time_constant": 0.1, "trim": 0.1, "dead_band.width": 0.1, "driver_map": 0.2, "delay": 0.1}
     names = [effect.name for effect in effects_from(theta, ROBOT.figures)]
     assert names == ["delay", "driver_map", "dead_band", "trim", "motor_lag"]
+    with pytest.raises(TypeError, match="positional"):
+        Parameter("trim", "", -0.5, 0.5, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -147,11 +146,6 @@ def test_an_effect_that_draws_tells_how_late_commands_are_about_their_mean(name)
     assert weights @ late.commands == pytest.approx(0.0, abs=1e-3)
 
 
-def test_parameters_are_given_by_keyword():
-    with pytest.raises(TypeError, match="positional"):
-        Parameter("trim", "", -0.5, 0.5, 0.0)
-
-
 def run(effect, signal, rest=0.0, rate_hz=10.0):
     return filtered(effect, signal, rate_hz=rate_hz, rest=rest, nominal={})
 
@@ -165,36 +159,33 @@ def test_delay_is_exact_for_whole_samples_and_splits_one_between_them(seconds, e
     np.testing.assert_allclose(run(Delay(seconds), step(3))[:, 0], expected, atol=1e-12)
 
 
-def test_delay_is_continuous_in_its_value():
+def test_delay_and_blur_are_continuous_in_their_values():
     signal = np.random.default_rng(0).uniform(-1, 1, (50, 2))
     values = np.linspace(0.0, 0.3, 301)
     outputs = np.array([run(Delay(value), signal) for value in values])
     assert np.abs(np.diff(outputs, axis=0)).max() < 2 * 0.001 * 10.0 + 1e-9
+    scene = np.random.default_rng(1).uniform(0, 255, (20, 4))
+    outputs = np.array([run(Blur(value), scene)[10:] for value in np.linspace(0.01, 0.4, 800)])
+    assert np.abs(np.diff(outputs, axis=0)).max() < 15.0
 
 
-def test_driver_map_jumps_by_its_offset_and_is_odd():
+def test_commands_and_motors_answer_by_their_formulas():
     duty = np.array([[0.0, 0.005], [0.01, 1.0], [-0.5, 0.5]])
     offset = 60 / 255
     low, half = offset + 0.01 * (1 - offset), offset + 0.5 * (1 - offset)
     expected = [[0.0, 0.0], [low, 1.0], [-half, half]]
     np.testing.assert_allclose(run(DriverMap(offset), duty), expected)
 
-
-def test_motor_lag_gives_the_mean_of_the_exact_step_response():
     time_constant, rate_hz = 0.2, 10.0
     edges = np.arange(21) / rate_hz
     travelled = edges + time_constant * np.exp(-edges / time_constant)  # integral of 1 - exp(-t/tau), plus a constant
     lagging = run(MotorLag(time_constant, 0.0), step())[:, 0]
     np.testing.assert_allclose(lagging, np.diff(travelled) * rate_hz, atol=1e-12)
 
-
-def test_an_imbalance_lags_each_wheel_by_its_share():
     uneven = run(MotorLag(0.2, -0.5), step())
     np.testing.assert_allclose(uneven[:, 0], run(MotorLag(0.3, 0.0), step())[:, 0], atol=1e-12)
     np.testing.assert_allclose(uneven[:, 1], run(MotorLag(0.1, 0.0), step())[:, 1], atol=1e-12)
 
-
-def test_commands_are_rounded_to_multiples_of_the_step():
     duties = np.array([[0.0, 0.09], [0.11, 0.31], [-0.34, 1.0]])
     expected = [[0.0, 0.0], [0.2, 0.4], [-0.4, 1.0]]
     np.testing.assert_allclose(run(CommandQuantisation(0.2), duties), expected)
@@ -216,9 +207,3 @@ def test_blur_adds_8_bit_pictures_exactly_in_any_order(samples):
     assert weights.sum() == 1.0
     exact = [weights @ pictures[row - len(weights) + 1 : row + 1].astype(np.float64) for row in range(13, 20)]
     np.testing.assert_array_equal(effect.apply(pictures, memory)[0][13:], exact)
-
-
-def test_blur_is_continuous_in_its_value():
-    scene = np.random.default_rng(1).uniform(0, 255, (20, 4))
-    outputs = np.array([run(Blur(value), scene)[10:] for value in np.linspace(0.01, 0.4, 800)])
-    assert np.abs(np.diff(outputs, axis=0)).max() < 15.0

@@ -38,10 +38,12 @@ def test_a_message_starts_with_the_first_sample_that_belongs_to_it(per_sample):
     np.testing.assert_array_equal(sent.starts(np.arange(len(firsts))), firsts)
 
 
-def test_draws_do_not_depend_on_where_one_begins_to_look():
+def test_draws_do_not_depend_on_where_one_looks_or_how_often():
     sent = Messages(1.0, SEED)
     np.testing.assert_array_equal(sent.draws(0, 1000)[200:900], sent.draws(200, 900))
     assert np.abs(np.sort(sent.draws(0, 1000)) - np.linspace(0, 1, 1000)).max() < 0.05
+    coarse = run(DroppedCommands(0.4), numbered(200, 1), rate_hz=NOMINAL["control_rate"])
+    np.testing.assert_array_equal(run(DroppedCommands(0.4), numbered(200))[::EVERY], coarse)
 
 
 def by_hand(spread_s, count, fine=200):
@@ -73,8 +75,3 @@ def test_a_lost_command_leaves_the_one_before_in_force():
         said = said if draw < probability else float(number)
         expected += [said] * EVERY
     np.testing.assert_array_equal(run(DroppedCommands(probability), numbered(300))[:, 1], expected)
-
-
-def test_the_same_commands_are_lost_at_another_sample_rate():
-    coarse = run(DroppedCommands(0.4), numbered(200, 1), rate_hz=NOMINAL["control_rate"])
-    np.testing.assert_array_equal(run(DroppedCommands(0.4), numbered(200))[::EVERY], coarse)

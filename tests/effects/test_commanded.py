@@ -90,24 +90,19 @@ def test_features_times_weights_are_what_is_added(effect):
     np.testing.assert_allclose(effect.apply(signal, memory)[0] - signal, total, rtol=0, atol=1e-12)
 
 
-def test_the_size_of_a_command_counts_alike_both_ways():
+def test_commands_count_by_size_together_or_alone():
     curve = LearntCurve("duty", "duty", (0.4, 0.8), (0.1, -0.1))
     np.testing.assert_allclose(added(curve, np.array([[0.4, -0.4], [0.2, -0.8]])), [[0.1, -0.1], [0.05, 0.1]])
-
-
-def test_what_both_wheels_draw_together_counts_for_either():
     curve = LearntCurve("drawn", "duty", (1.0,), (-0.5,))
     np.testing.assert_allclose(added(curve, np.array([[0.6, 0.4], [0.5, 0.0]])), [[-0.3, -0.2], [-0.125, 0.0]])
 
 
-def test_a_watchdog_counts_from_the_last_change_of_either_wheel():
+def test_times_of_commands_count_from_changes_starts_and_turns():
     signal = np.tile((0.5, 0.2), (20, 1))
     signal[6:, 1] = 0.3
     stopped = added(LearntCurve("held", "duty", (0.25,), (-1.0,)), signal)[:, 0] != 0.0
     np.testing.assert_array_equal(np.flatnonzero(stopped), [5, *range(11, 20)])
 
-
-def test_a_kick_lasts_so_long_after_a_wheel_began():
     signal = np.repeat([[0.0, 0.5], [-0.3, 0.5], [0.0, 0.5]], 10, axis=0)
     kicked = added(LearntCurve("begun", "push", (0.2,), (0.6,)), signal)
     np.testing.assert_allclose(kicked[10:13, 0], -0.6)
@@ -115,13 +110,17 @@ def test_a_kick_lasts_so_long_after_a_wheel_began():
     assert kicked[0, 1] == pytest.approx(0.6)
     assert not kicked[5:, 1].any()
 
-
-def test_a_brake_counts_from_the_change_of_sign_though_the_wheel_rested_between():
     signal = np.repeat([[0.5, 0.5], [0.0, 0.4], [-0.5, 0.3]], 8, axis=0)
     braked = added(LearntCurve("turned", "duty", (0.2,), (-1.0,)), signal)
     np.testing.assert_allclose(braked[16:20, 0], 0.5)
     assert not braked[20:].any()
     assert not braked[:, 1].any()
+
+    signal = np.repeat([[0.5, 0.5], [0.0, 0.5]], 40, axis=0)
+    rolling = added(LearntCurve("ended", "duty", (0.5,), (1.0,)), signal)
+    assert not rolling[:40].any()
+    assert not rolling[:, 1].any()
+    np.testing.assert_allclose(rolling[50, 0] / rolling[40, 0], np.exp(-1.0), rtol=1e-9)
 
 
 def test_a_sticky_throttle_is_dragged_along_and_leaves_a_robot_creeping():
@@ -129,14 +128,6 @@ def test_a_sticky_throttle_is_dragged_along_and_leaves_a_robot_creeping():
     stuck = added(LearntCurve("dragged", "duty", (0.1,), (1.0,)), signal)
     np.testing.assert_allclose(stuck[:, 0], [-0.1] * 5 + [0.1] * 5)
     assert not stuck[:, 1].any()
-
-
-def test_a_wheel_rolls_on_for_a_while_after_its_command_ended():
-    signal = np.repeat([[0.5, 0.5], [0.0, 0.5]], 40, axis=0)
-    rolling = added(LearntCurve("ended", "duty", (0.5,), (1.0,)), signal)
-    assert not rolling[:40].any()
-    assert not rolling[:, 1].any()
-    np.testing.assert_allclose(rolling[50, 0] / rolling[40, 0], np.exp(-1.0), rtol=1e-9)
 
 
 def test_a_command_grows_and_shrinks_no_faster_than_its_ramp():

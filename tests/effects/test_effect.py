@@ -22,19 +22,13 @@ def test_beyond_what_is_known_the_rates_lead_on_in_chunks_as_in_one():
     np.testing.assert_allclose(np.concatenate((first, reckon(np.full(1, 2.0), later)[0])), whole)
 
 
-def test_every_member_of_a_batch_has_the_values_unless_it_has_its_own():
+def test_low_passes_follow_by_their_time_constant_for_each_of_a_batch():
     shared = start_reckoning(np.array([1.0]), FilterContext(2.0, np.zeros((3, 2)), {}))
     assert shared.values.shape == (3, 1)
-
-
-def test_no_time_constant_follows_at_once():
     signal = np.array([[1.0], [-2.0]])
     mean, end = low_pass(signal, low_pass_at(np.array([5.0]), 0.0))
     np.testing.assert_array_equal(mean, signal)
     np.testing.assert_array_equal(end.value, [-2.0])
-
-
-def test_after_one_time_constant_63_percent_of_a_step_are_done():
     mean, end = low_pass(np.ones((10, 1)), low_pass_at(np.zeros(1), 10.0))
     assert end.value[0] == pytest.approx(1.0 - np.exp(-1.0))
     assert mean.sum() == pytest.approx(10.0 - 10.0 * (1.0 - np.exp(-1.0)))

@@ -11,10 +11,11 @@ from proxytune.effects import GROUPS
 from proxytune.effects.features import hats, low_passes, moved_since, play, rings, rolled_since
 
 
-def test_a_hat_is_one_at_its_own_knot_and_nothing_at_the_others_and_at_rest():
+def test_a_hat_is_one_at_its_knot_and_level_beyond_the_last():
     knots = (-2.0, -0.5, 1.0)
     np.testing.assert_array_equal(hats(np.array(knots), knots), np.eye(3))
     np.testing.assert_array_equal(hats(np.zeros(1), knots), np.zeros((1, 3)))
+    np.testing.assert_array_equal(hats(np.array([5.0, 50.0]), (1.0, 5.0)), [[0.0, 1.0], [0.0, 1.0]])
 
 
 @given(value=st.floats(-1e6, 1e6))
@@ -22,10 +23,6 @@ def test_a_hat_is_one_at_its_own_knot_and_nothing_at_the_others_and_at_rest():
 def test_hats_never_add_up_to_more_than_one(value):
     row = hats(np.array([value]), (-2.0, -0.5, 1.0, 4.0))
     assert 0.0 <= row.min() <= row.sum() <= 1.0 + 1e-12
-
-
-def test_beyond_the_last_knot_a_hat_is_level():
-    np.testing.assert_array_equal(hats(np.array([5.0, 50.0]), (1.0, 5.0)), [[0.0, 1.0], [0.0, 1.0]])
 
 
 def test_every_group_and_channel_has_a_unit():
@@ -41,17 +38,11 @@ def test_a_low_pass_goes_most_of_the_way_in_its_time_constant():
     assert slow[-1, 0] == pytest.approx(1.0 - np.exp(-1.0))
 
 
-def test_the_way_is_counted_from_where_a_wheel_turns_the_other_way():
+def test_ways_and_times_count_from_where_a_wheel_turns_or_stood():
     speed = np.array([1.0, 1.0, 0.0, 1.0, -2.0, -2.0, 0.0, -2.0, 1.0])
     way = rolled_since(speed, np.array(5.0), RATE_HZ)
     np.testing.assert_allclose(way, [5.1, 5.2, 5.2, 5.3, -0.2, -0.4, -0.4, -0.6, 0.1])
-
-
-def test_a_start_is_no_reversal_and_creeping_is_none():
     assert np.all(np.abs(rolled_since(np.array([1.0, -0.01, 1.0]), np.zeros(()), RATE_HZ)) >= 10.0)
-
-
-def test_the_time_is_counted_from_where_a_wheel_stood():
     speed = np.array([0.0, 1.0, 1.0, 0.01, -1.0, 1.0])
     np.testing.assert_allclose(moved_since(speed, np.zeros(()), 0.02, RATE_HZ), [0.0, 0.1, 0.2, 0.0, 0.1, 0.2])
     np.testing.assert_allclose(moved_since(np.ones(2), np.array(0.5), 0.02, RATE_HZ), [0.6, 0.7])

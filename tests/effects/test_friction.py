@@ -20,12 +20,9 @@ def run(effect, left, right=None, rest=0.0):
     return filtered(effect, signal, rate_hz=RATE_HZ, rest=rest, nominal=NOMINAL)
 
 
-def test_a_dead_band_swallows_small_duties_and_shortens_larger_ones():
+def test_a_dead_band_swallows_small_duties_of_both_wheels_or_one():
     duties = [0.0, 0.05, 0.1, 0.3, -0.05, -0.1, -1.0]
     np.testing.assert_allclose(run(DeadBand(0.1, 0.0), duties)[:, 0], [0, 0, 0, 0.2, 0, 0, -0.9], atol=1e-12)
-
-
-def test_a_dead_band_of_one_wheel_is_its_share():
     np.testing.assert_allclose(run(DeadBand(0.1, -0.5), [0.5]), [[0.35, 0.45]])
 
 
@@ -123,19 +120,13 @@ def wheels(effect, forward, samples, angles=((0.0, 0.0),)):
     return np.stack((moved[:, 0] - turn, moved[:, 0] + turn), axis=-1)
 
 
-def test_one_wheel_ripples_by_its_angle_and_the_other_rolls_on():
+def test_one_wheel_ripples_by_its_angle_and_rolls_as_far_as_a_round_one():
     left, right = wheels(WheelRipple(0.2, 0.1, 0.0, 0.0), 0.3, 600).T
     angle = (np.arange(600) + 0.5) * 0.3 / RADIUS / RIPPLE_RATE_HZ
     np.testing.assert_allclose(left, 0.3 * (1.0 + 0.2 * np.sin(angle) + 0.1 * np.cos(angle)))
     np.testing.assert_allclose(right, 0.3)
-
-
-def test_a_whole_turn_of_the_wheel_rolls_as_far_as_a_round_one():
     turn = round(2.0 * np.pi * RADIUS / 0.3 * RIPPLE_RATE_HZ)
     rolled = wheels(WheelRipple(0.0, 0.0, 0.3, 0.2), 0.3, turn)[:, 1].sum() / RIPPLE_RATE_HZ
     assert rolled == pytest.approx(2.0 * np.pi * RADIUS, rel=0.005)
-
-
-def test_angles_known_beforehand_say_where_the_wheel_is():
     ahead = wheels(WheelRipple(0.2, 0.0, 0.2, 0.0), 1e-9, 1, angles=((np.pi / 2, -np.pi / 2),))[0] / 1e-9
     np.testing.assert_allclose(ahead, (1.2, 0.8), atol=1e-6)

@@ -115,10 +115,13 @@ def test_rows_are_the_older_the_higher_they_are_and_the_picture_by_half_the_read
     assert found.mean() == pytest.approx(readout / 2.0, abs=1e-5)
 
 
-def test_blur_looks_like_a_latency_of_half_of_it_and_a_latency_adds_to_that():
+def test_blur_is_a_latency_of_half_of_it_and_alone_a_mean():
     np.testing.assert_allclose(ages(Blur(0.2)), 0.1, atol=1e-5)
     late = shown(CameraLatency(0.13), shown(Blur(0.2), RAMP))
     np.testing.assert_allclose(RAMP[-1] - late[-1], (0.1 + 0.13) * RATE_HZ, atol=1e-4)
+    assert Chain(()).mean_weights(RATE_HZ).tolist() == [1.0]
+    for effects in ((CameraLatency(0.1),), (Blur(0.1), Blur(0.1)), (CameraLatency(0.1), Blur(0.1))):
+        assert Chain(effects).mean_weights(RATE_HZ) is None
 
 
 @given(SECONDS, st.floats(0.0, 0.1), st.floats(0.0, 0.2))
@@ -144,9 +147,3 @@ def test_the_mean_of_the_last_pictures_is_the_newest_blurred_one_to_the_last_bit
 @pytest.mark.parametrize(("blur", "expected"), [(0.0, 1), (0.1, 2), (0.15, 3), (0.3, 4)])
 def test_a_mean_takes_no_picture_that_does_not_count(blur, expected):
     assert len(Chain((Blur(blur),)).mean_weights(RATE_HZ)) == expected
-
-
-def test_blur_alone_is_a_mean_and_no_effect_at_all_the_mean_of_one_picture():
-    assert Chain(()).mean_weights(RATE_HZ).tolist() == [1.0]
-    for effects in ((CameraLatency(0.1),), (Blur(0.1), Blur(0.1)), (CameraLatency(0.1), Blur(0.1))):
-        assert Chain(effects).mean_weights(RATE_HZ) is None

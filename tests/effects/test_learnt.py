@@ -172,23 +172,17 @@ def test_a_window_amid_a_drive_goes_on_as_the_drive_does(effect, sample):
     np.testing.assert_allclose(moved, np.stack([whole[r][sample:] for r in row]), rtol=0, atol=1e-9)
 
 
-def test_a_curve_over_wheel_speed_adds_to_that_wheel():
+def test_curves_add_to_their_wheels_and_fade_after_named_effects():
     baseline = ROBOT.figures["effective_baseline"]
     effect = Learnt(SEEN, (LearntCurve("wheel_speed", "right", (0.2, 0.4), (0.05, 0.01)),))
     straight = np.tile((0.3, 0.0, 0.0), (5, 1))
     added = run(effect, straight) - straight
     np.testing.assert_allclose(added[-1], (0.015, 0.0, 0.03 / baseline))
-
-
-def test_a_transient_fades_with_its_time_constant():
     effect = Learnt(SEEN, tuple(LearntCurve("transients", side, (0.5,), (1.0,)) for side in ("left", "right")))
     step = np.tile((0.2, 0.0, 0.0), (120, 1))
     added = (run(effect, step) - step)[:, 0]
     np.testing.assert_allclose(added, 0.2 * np.exp(-np.arange(1, 121) / (0.5 * RATE_HZ)), rtol=1e-9)
     assert all(later < earlier for earlier, later in pairwise(added))
-
-
-def test_a_learnt_effect_comes_after_all_named_ones():
     names = [effect.name for effect in effects_from({**WHOLE, "floor_slope.x": 0.1, "trim": 0.0}, ROBOT.figures)]
     assert names == ["trim", "floor_slope", "learnt"]
 
@@ -227,16 +221,13 @@ def write(folder, text):
     return path
 
 
-def test_weights_are_read_by_their_names_in_theta(tmp_path):
+def test_weights_are_read_by_their_names_and_labelled_as_no_physics(tmp_path):
     theta = read_model(write(tmp_path, GOOD)).theta
     assert theta["learnt.turn_rate.yaw@-1.25"] == 0.1
     assert theta["learnt.speed_and_turn.sideways@0.2,-1.0"] == 0.02
     assert theta["learnt.range.yaw@high"] == 3.5
     assert len(theta) == 4 + 8 + 2 + 2
     assert [effect.name for effect in effects_from(theta, read_robot("duckiebot").figures)] == ["learnt"]
-
-
-def test_what_was_learnt_is_labelled_as_no_physics(tmp_path):
     text = model_text(read_model(write(tmp_path, GOOD)))
     assert f"# {LABEL}" in text
     assert "not physics" in LABEL

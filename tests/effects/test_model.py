@@ -24,15 +24,11 @@ def write(folder, text):
     return path
 
 
-def test_values_and_intervals_are_read_by_their_names_in_theta(tmp_path):
+def test_what_is_written_reads_back_by_its_names_in_theta(tmp_path):
     model = read_model(write(tmp_path, GOOD))
     assert model.theta == {"trim": 0.05, "driver_map": 0.12, "wheel_gain.left": 0.9}
     assert model.intervals == {"driver_map": (0.1, 0.14)}
     assert (model.robot, model.plant) == ("duckiebot", None)
-
-
-def test_what_is_written_reads_back(tmp_path):
-    model = read_model(write(tmp_path, GOOD))
     text = 'format = 1\nrobot = "duckiebot"\n' + effects_table(model.theta, model.intervals)
     again = read_model(write(tmp_path, text))
     assert again == model

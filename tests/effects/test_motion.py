@@ -37,10 +37,14 @@ def test_a_robot_that_drives_over_a_patch_finds_it_by_its_own_motion(cut):
     assert moved[-1] == 0.5
 
 
-def test_poses_known_beforehand_say_where_the_robot_is_whatever_it_was_asked():
+def test_a_robot_finds_its_place_and_heading_by_what_is_known_beforehand():
     places = [(0.0, 0.0)] * 3 + [(1.0, 0.0)] * 3
     moved = filtered(PATCH, np.tile((0.1, 0.0, 0.0), (6, 1)), places=places, headings=[0.0] * 6, cut=4)
     np.testing.assert_allclose(moved[:, 0], [0.1] * 3 + [0.05] * 3)
+    batch = np.stack((TURNING, TURNING))
+    slowed = driven(FloorSlope(0.1, 0.0, 0.0), batch, headings=[[1.0, 1.1, 1.2], [0.0, 0.0, 0.0]])[..., 0]
+    expected = [LOST["some"], [0.0, 0.0, 0.0, 0.5, 1.0, 1.5]]
+    np.testing.assert_allclose(slowed, 0.3 - 0.1 * np.cos(expected), atol=1e-12)
 
 
 NOMINAL = {"effective_baseline": 0.16}
@@ -50,8 +54,9 @@ def driven(effect, signal, **known):
     return filtered(effect, signal, rate_hz=10.0, nominal=NOMINAL, **known)
 
 
-def test_a_baseline_twice_as_wide_halves_the_yaw_rate():
+def test_baselines_and_markers_turn_what_they_say_alone():
     np.testing.assert_allclose(driven(motion.YawScrub(0.32), [[0.5, 0.1, 2.0]]), [[0.5, 0.1, 1.0]])
+    np.testing.assert_allclose(driven(motion.HeadingOffset(-30.0), [[1.0, 2.0, 0.5]]), [[1.0, 2.0, 0.5 - np.pi / 6]])
 
 
 @pytest.mark.parametrize(("yaw", "forward"), [(0.0, 0.5), (2.0, 0.3), (-2.0, 0.3), (9.0, 0.0)])
@@ -93,20 +98,9 @@ def test_headings_known_beforehand_are_used_and_beyond_them_the_robot_turns_on(h
     np.testing.assert_allclose(slowed, 0.3 - 0.1 * np.cos(LOST[used]), atol=1e-12)
 
 
-def test_each_member_of_a_batch_has_headings_of_its_own():
-    batch = np.stack((TURNING, TURNING))
-    slowed = driven(FloorSlope(0.1, 0.0, 0.0), batch, headings=[[1.0, 1.1, 1.2], [0.0, 0.0, 0.0]])[..., 0]
-    expected = [LOST["some"], [0.0, 0.0, 0.0, 0.5, 1.0, 1.5]]
-    np.testing.assert_allclose(slowed, 0.3 - 0.1 * np.cos(expected), atol=1e-12)
-
-
 @pytest.mark.parametrize(("heading", "x", "y"), [(0.0, 1.1, 2.02), (np.pi / 2, 0.98, 2.1), (np.pi, 0.9, 1.98)])
 def test_the_tracked_point_lies_ahead_of_the_axle_and_to_its_left(heading, x, y):
     np.testing.assert_allclose(driven(motion.MarkerOffset(0.1, 0.02), [[1.0, 2.0, heading]]), [[x, y, heading]])
-
-
-def test_a_turned_marker_adds_to_the_heading_alone():
-    np.testing.assert_allclose(driven(motion.HeadingOffset(-30.0), [[1.0, 2.0, 0.5]]), [[1.0, 2.0, 0.5 - np.pi / 6]])
 
 
 @pytest.mark.parametrize("yaw", [2.0, -2.0])
@@ -116,18 +110,12 @@ def test_coupling_does_not_ask_which_way_the_robot_turns_or_drives(forward, yaw)
     np.testing.assert_allclose(moved, (forward + 0.04, 0.1, yaw + 0.2))
 
 
-def test_a_fast_robot_turns_less_and_a_robot_that_spins_turns_as_asked():
+def test_a_fast_robot_turns_less_and_goes_on_turning_late():
     moved = filtered(motion.Understeer(0.5), [[0.4, 0.1, 1.2], [-0.4, 0.1, 1.2], [0.0, 0.0, 1.2]])
     np.testing.assert_allclose(moved, [[0.4, 0.1, 1.0], [-0.4, 0.1, 1.0], [0.0, 0.0, 1.2]])
-
-
-def test_the_yaw_rate_comes_late_and_the_forward_speed_does_not():
     moved = filtered(motion.YawLag(0.2), np.tile((0.3, 0.0, 1.0), (60, 1)))
     np.testing.assert_array_equal(moved[:, :2], np.tile((0.3, 0.0), (60, 1)))
     assert moved[:12, 2].sum() / RATE_HZ == pytest.approx(0.2 * np.exp(-1.0), rel=1e-6)
     assert moved[-1, 2] == pytest.approx(1.0, abs=0.01)
-
-
-def test_a_robot_that_turns_already_goes_on_turning():
     turning = np.tile((0.0, 0.0, 1.0), (5, 1))
     np.testing.assert_allclose(filtered(motion.YawLag(0.2), turning, rest=turning[0]), turning)

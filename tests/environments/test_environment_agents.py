@@ -61,14 +61,11 @@ def test_an_answer_that_is_no_action_fails_the_episode(tmp_path, agent, line):
     assert line in str(failed.value)
 
 
-def test_a_discrete_answer_must_be_one_of_the_actions(tmp_path):
+def test_a_discrete_answer_must_be_an_action_and_a_box_answer_is_cut_off(tmp_path):
     space = Discrete(3, start=1)
     assert ask_agent(lambda seen: np.array(2), None, space, 0) == 2
     with pytest.raises(EpisodeError, match=r"answered 0 at step 4, which is not in Discrete"):
         ask_agent(lambda seen: 0, None, space, 4)
-
-
-def test_a_box_answer_beyond_the_bounds_is_cut_off():
     action = ask_agent(lambda seen: [[5.0, -0.5]], None, Box(-1.0, 1.0, (2,), np.float32), 0)
     assert action.tolist() == [1.0, -0.5]
 

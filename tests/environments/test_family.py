@@ -159,37 +159,28 @@ def test_pictures_and_the_effects_on_them_keep_every_promise(tmp_path):
     check_family(kin, agents=["toys:Brightness"])
 
 
-def test_the_same_start_is_the_same_state_in_every_instance_and_under_every_seed(tmp_path):
+def test_starts_are_the_same_states_and_chance_comes_from_the_seed(tmp_path):
     kin = family(tmp_path, CART.replace("12", "1"))
     first = run(kin, "zero", start=3)
     assert run(kin, "zero", start=3, seed=2) == first
     assert run(kin, "zero", start=3, **{"delay": 0.1}) == first
     assert run(kin, "zero", start=4) != first
-
-
-def test_what_is_random_within_an_episode_comes_from_its_seed(tmp_path):
     kin = family(tmp_path, CART + "[arguments]\nnoise = 1.0\n")
     assert run(kin, seed=1) == run(kin, seed=1)
     assert run(kin, seed=1) != run(kin, seed=2)
     assert run(kin, "random", seed=1) == run(kin, "random", seed=1)
 
 
-def test_a_model_gives_effects_and_values_of_the_environments_own(tmp_path):
+def test_a_model_gives_effects_and_values_before_those_of_the_table(tmp_path):
     named = family(tmp_path, PENDULUM, "[parameters]\nmass = 1.7\n[effects.delay]\ndelay = 0.1\n")
     plain, agent = family(tmp_path, PENDULUM), "toys:Wobble"
     assert run(named, agent) == run(plain, agent, mass=1.7, delay=0.1)
     assert run(named, agent, mass=1.0, delay=0.0) == run(plain, agent)
     assert run(named, agent) != run(plain, agent)
-
-
-def test_a_models_values_go_before_those_of_the_table(tmp_path):
     table = PENDULUM + "[effects.delay]\ndelay = 0.2\n"
     given = family(tmp_path, table, 'format = 1\nrobot = "any"\n[effects.delay]\ndelay = 0.1\n')
     assert dict(given.held) == {"delay": 0.1}
     assert dict(family(tmp_path, table).held) == {"delay": 0.2}
-
-
-def test_an_effect_that_vanishes_may_stand_in_a_model(tmp_path):
     kin = family(tmp_path, PENDULUM, "[effects.dead_band]\nwidth = 0.1\nimbalance = 0.0\n")
     assert run(kin, "toys:Wobble") == run(family(tmp_path, PENDULUM), "toys:Wobble", **{"dead_band.width": 0.1})
 
@@ -219,7 +210,7 @@ def test_effects_of_the_table_are_checked_too(tmp_path):
         family(tmp_path, PENDULUM + "[effects.blur]\nblur = 0.1\n")
 
 
-def test_environments_are_closed_after_episodes_that_fail_too(tmp_path):
+def test_environments_are_closed_whatever_fails(tmp_path):
     kin = family(tmp_path, CART)
     cart = load("toys:Cart", kind="environment", beside=tmp_path)
     run(kin)
@@ -227,9 +218,6 @@ def test_environments_are_closed_after_episodes_that_fail_too(tmp_path):
         run(kin, "toys:fails")
     kin.check_agent("zero")
     assert cart.open == 0
-
-
-def test_an_environment_that_cannot_be_made_with_a_value_fails_its_episode_alone(tmp_path):
     mass = 'mass = { argument = "mass", low = 0, high = 2, neutral = 1 }\n'
     kin = family(tmp_path, f'environment = "toys:heavy"\nsteps = 3\n[parameters]\n{mass}')
     with pytest.raises(EpisodeError, match="too heavy"):

@@ -107,7 +107,7 @@ def test_an_episode_is_terminated_off_the_map_and_truncated_when_time_is_over():
     assert len(steps) == 21
 
 
-def test_one_seed_makes_one_series_of_episodes():
+def test_options_hold_for_one_episode_of_a_series_by_seed():
     one, other = (make(theta={"trim": [-0.2, 0.2]}) for _ in range(2))
     for reset in ({"seed": 5}, {}, {}):
         for mine, its in zip(*(episode_of(env, [STRAIGHT] * 5, **reset) for env in (one, other)), strict=True):
@@ -115,28 +115,22 @@ def test_one_seed_makes_one_series_of_episodes():
             np.testing.assert_array_equal(mine[1]["pose"], its[1]["pose"])
     first, second = one.reset(seed=5)[1], one.reset()[1]
     assert (first["episode_seed"], first["theta"]) != (second["episode_seed"], second["theta"])
-
-
-def test_theta_is_drawn_within_its_bounds_and_everything_fixed_stays():
-    env = make(theta={"trim": [-0.1, 0.1], "delay": 0.05})
-    thetas = [env.reset(seed=0 if not number else None)[1]["theta"] for number in range(30)]
-    trims = [theta["trim"] for theta in thetas]
-    assert -0.1 <= min(trims) < -0.05 < 0.05 < max(trims) <= 0.1
-    assert {theta["delay"] for theta in thetas} == {0.05}
-
-
-def test_the_order_in_which_theta_is_written_makes_no_difference():
-    bounds = {"trim": [-0.1, 0.1], "delay": [0.0, 0.2]}
-    drawn = [make(theta=theta).reset(seed=0)[1]["theta"] for theta in (bounds, dict(reversed(bounds.items())))]
-    assert drawn[0] == drawn[1]
-
-
-def test_options_hold_for_one_episode():
     env = make(theta={"trim": 0.1, "delay": 0.05}, start=2)
     told = env.reset(seed=0, options={"theta": {"trim": -0.2}, "start": 7, "episode_seed": 42})[1]
     assert (told["theta"], told["start"], told["episode_seed"]) == ({"trim": -0.2, "delay": 0.05}, 7, 42)
     after = env.reset()[1]
     assert (after["theta"], after["start"]) == ({"trim": 0.1, "delay": 0.05}, 2)
+
+
+def test_theta_is_drawn_within_its_bounds_in_whatever_order_it_is_written():
+    env = make(theta={"trim": [-0.1, 0.1], "delay": 0.05})
+    thetas = [env.reset(seed=0 if not number else None)[1]["theta"] for number in range(30)]
+    trims = [theta["trim"] for theta in thetas]
+    assert -0.1 <= min(trims) < -0.05 < 0.05 < max(trims) <= 0.1
+    assert {theta["delay"] for theta in thetas} == {0.05}
+    bounds = {"trim": [-0.1, 0.1], "delay": [0.0, 0.2]}
+    drawn = [make(theta=theta).reset(seed=0)[1]["theta"] for theta in (bounds, dict(reversed(bounds.items())))]
+    assert drawn[0] == drawn[1]
 
 
 def test_a_model_makes_it_the_target(tmp_path):
@@ -196,7 +190,7 @@ class Half:
 """
 
 
-def test_a_rendering_shows_the_picture_beside_the_map_with_the_way():
+def test_one_picture_and_one_way_are_drawn_where_the_robot_is():
     env = make(render_mode="rgb_array", start=1)
     picture, _ = env.reset(seed=0)
     before = env.render()
@@ -208,6 +202,11 @@ def test_a_rendering_shows_the_picture_beside_the_map_with_the_way():
     assert 0 < (before[:, 640:] != after[:, 640:]).any(axis=-1).mean() < 0.02
     assert make().render() is None
 
+    x, y, _ = env.reset(seed=0)[1]["pose"]
+    above, per_metre = env.render()[:, 640:], 480 / 1.755
+    assert tuple(above[round(480 - y * per_metre), round(x * per_metre)]) == (70, 160, 255)
+    assert env.metadata["render_fps"] == 20
+
 
 @pytest.mark.slow
 def test_the_map_is_drawn_with_y_upwards(tmp_path):
@@ -218,14 +217,6 @@ def test_the_map_is_drawn_with_y_upwards(tmp_path):
     white = (env.render()[:, 640:] > 150).all(axis=-1).any(axis=1)
     assert not white[:120].any()
     assert white[-30:].any()
-
-
-def test_the_robot_is_drawn_where_it_is():
-    env = make(render_mode="rgb_array", start=1)
-    x, y, _ = env.reset(seed=0)[1]["pose"]
-    above, per_metre = env.render()[:, 640:], 480 / 1.755
-    assert tuple(above[round(480 - y * per_metre), round(x * per_metre)]) == (70, 160, 255)
-    assert env.metadata["render_fps"] == 20
 
 
 @pytest.mark.parametrize("vector", [SyncVectorEnv, AsyncVectorEnv])
@@ -309,16 +300,13 @@ def test_an_action_that_is_no_command_is_refused_with_its_time():
         env.step((0.1, 0.1, 0.1))
 
 
-def test_stepping_needs_an_episode_under_way():
+def test_stepping_needs_an_episode_whose_pictures_differ():
     env = make(seconds=1.0)
     with pytest.raises(InputError, match="call reset"):
         env.step((0.1, 0.1))
     episode_of(env, [(0.0, 0.0)] * 30, seed=0)
     with pytest.raises(InputError, match="the episode is over"):
         env.step((0.1, 0.1))
-
-
-def test_two_steps_never_share_a_picture():
     steps = episode_of(make(), [(0.2, 0.2)] * 8, seed=0)
     for number, (picture, *_) in enumerate(steps):
         picture[:] = number
@@ -342,13 +330,10 @@ def test_gymnasium_makes_it(code):
     assert printed(code)[0] == "proxytune/LaneFollowing-v0"
 
 
-def test_without_gymnasium_it_says_what_to_install():
+def test_without_gymnasium_it_says_what_to_install_and_nothing_imports_it():
     _, errors = printed("import sys; sys.modules['gymnasium'] = None; import proxytune.environments")
     remedy = 'pip install ".[gym]" in the checkout of proxytune'
     assert errors.splitlines()[-1].endswith(f"gymnasium is not installed; {remedy}")
-
-
-def test_importing_proxytune_does_not_import_gymnasium():
     assert printed("import sys, proxytune; print('gymnasium' in sys.modules)")[0] == "False"
 
 

@@ -85,10 +85,6 @@ def test_an_environment_with_an_unknown_attribute_is_closed(tmp_path):
     assert load("toys:Cart", kind="environment", beside=tmp_path).open == 0
 
 
-def test_without_a_table_of_metrics_there_are_return_and_length(tmp_path):
-    assert dict(family(tmp_path, CART).metrics) == {"return": "", "length": "steps"}
-
-
 def test_arguments_and_attributes_have_their_values_and_are_neutral_where_not_named(tmp_path):
     text = CART + (
         "[arguments]\nnoise = 0.5\n[parameters]\n"
@@ -102,16 +98,14 @@ def test_arguments_and_attributes_have_their_values_and_are_neutral_where_not_na
     assert make_environment(settings, {"m": 1.5}).mass == 1.5
 
 
-def test_a_rate_is_the_tables_or_that_of_the_environments_steps(tmp_path):
+def test_a_rate_and_a_limit_are_the_tables_or_the_environments(tmp_path):
     assert family(tmp_path, CART).spaces.rate_hz == 10.0
     assert family(tmp_path, CART.replace("rate_hz = 10.0", "")).spaces.rate_hz is None
     assert family(tmp_path, PENDULUM).spaces.rate_hz == pytest.approx(20.0)
     assert family(tmp_path, PENDULUM.replace("steps", "rate_hz = 5.0\nsteps")).spaces.rate_hz == 5.0
-
-
-def test_a_registered_environment_states_its_own_limit(tmp_path):
     assert family(tmp_path, 'environment = "toys:toys/Cart-v0"').spaces.steps == 12
     assert family(tmp_path, 'environment = "toys:toys/Cart-v0"\nsteps = 4').spaces.steps == 4
+    assert dict(family(tmp_path, CART).metrics) == {"return": "", "length": "steps"}
 
 
 def spaces(low=(-1.0, -1.0), high=(1.0, 1.0), picture=None):
@@ -149,21 +143,15 @@ def test_of_two_actions_the_first_is_the_left_wheel_s():
     assert bent == pytest.approx(np.array([[0.5 * 0.9, 0.3 * 1.1]]))
 
 
-def test_actions_keep_their_type_and_bounds():
+def test_effects_leave_type_and_bounds_of_actions():
     bent = passed_on(spaces(), {"wheel_gain.left": 1.5}, [[1.0, 0.2]], np.float32)
     assert bent.dtype == np.float32
     assert bent.tolist() == [[1.0, np.float32(0.2)]]
-
-
-def test_whole_actions_are_rounded_to_the_nearest_ones():
     known = spaces(low=(-10, -10), high=(10, 10))
     bent = passed_on(known, {"trim": 0.04}, [np.array([10, 10]), np.array([-7, -7])], np.int64)
     exact = passed_on(known, {"trim": 0.04}, [np.array([10, 10]), np.array([-7, -7])])
     assert np.array_equal(bent, np.rint(exact))
     assert not np.array_equal(bent, np.trunc(exact))
-
-
-def test_without_effects_an_action_goes_through_untouched():
     action = np.array([0.1, 0.2], np.float32)
     assert Actuators((), spaces(), 1).pass_on(action) is action
 

@@ -38,14 +38,11 @@ def speeds(duty, seconds=3.0, **motors):
     return steps[:, 0] * np.cos(headings) + steps[:, 1] * np.sin(headings), steps[:, 2]
 
 
-def test_at_full_duty_it_drives_as_fast_as_robot_toml_says_and_gets_there_as_fast():
+def test_it_drives_and_turns_as_robot_toml_says():
     forward, yaw = speeds((1.0, 1.0))
     assert forward[-1] == pytest.approx(FIGURES["full_speed"], rel=0.02)
     assert np.argmax(forward > 0.632 * forward[-1]) / 60.0 == pytest.approx(FIGURES["motor_time_constant"], abs=0.02)
     assert np.abs(yaw).max() < 1e-6
-
-
-def test_with_one_wheel_it_turns_about_as_fast_as_the_effective_baseline_says():
     _, yaw = speeds((0.0, 1.0))
     assert yaw[-1] == pytest.approx(FIGURES["full_speed"] / FIGURES["effective_baseline"], rel=0.08)
 

@@ -40,25 +40,16 @@ def test_what_cannot_wrap_an_environment_says_why(tmp_path, text, name, reason):
     assert name not in list(known)
 
 
-def test_an_unknown_name_is_no_parameter(tmp_path):
-    assert family(tmp_path, CART).parameters.get("dely") is None
-
-
-def test_effects_that_need_no_time_wrap_an_environment_whose_rate_is_not_known(tmp_path):
+def test_effects_wrap_an_environment_by_its_actions_and_rate(tmp_path):
     names = {effect_of(name) for name in family(tmp_path, TIMELESS).parameters}
     assert {"dead_band", "stiction", "saturation", "trim", "dropped_commands"} <= names
-
-
-def test_two_actions_may_have_all_effects_on_commands_and_motors_but_backlash(tmp_path):
     expected = {name for name in PARAMETERS if CATALOGUE[effect_of(name)].stage in ("command", "actuation")}
     assert set(family(tmp_path, CART).parameters) == expected - {"backlash.gap", "backlash.imbalance"}
-
-
-def test_the_parameters_of_the_environment_come_first(tmp_path):
     known = family(tmp_path, PENDULUM).parameters
     assert list(known)[:2] == ["gravity", "mass"]
     assert (known["gravity"].low, known["gravity"].unit) == (8.0, "m/s²")
     assert len(known) == len(list(known))
+    assert family(tmp_path, CART).parameters.get("dely") is None
 
 
 OWN = """

@@ -1,13 +1,15 @@
-"""The family that is a formula, with agents that end their process, never end, or meet the limits of the machine."""
+"""The family that is a formula, whose agents end their process, never end, remember, or meet the machine's limits."""
 
 import ctypes
 import os
+import random
 import signal
 import sys
 import time
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
 from wobbly import Wobbly, wobbly
 
 from proxytune.domain import Episode
@@ -58,7 +60,13 @@ ENDINGS = {
     "is killed": lambda: os.kill(os.getpid(), signal.SIGKILL),
     "memory": _short_of_memory,
     "files": _short_of_files,
+    "remembers": lambda: DRIVEN.append(1) or len(DRIVEN),
+    "draws": lambda: np.random.default_rng().normal(),
+    "draws by NumPy": lambda: np.random.normal(),
+    "draws by Python": random.random,
 }
+"""What they do; what agents remember, or draw from what no episode seeds, moves their scores a little."""
+DRIVEN: list[int] = []
 
 
 class Deadly(Wobbly):
@@ -66,10 +74,8 @@ class Deadly(Wobbly):
 
     def run(self, episode: Episode) -> Mapping[str, float]:
         scores = super().run(episode)
-        for agent, start, fault in (one.split(":") for one in self.faults):
-            if agent == episode.agent and start in ("*", str(episode.start)):
-                ENDINGS[fault]()
-        return scores
+        moved = [ENDINGS[one.split(":")[2]]() or 0.0 for one in self.faults if self._hits(one, episode)]
+        return {**scores, "distance": scores["distance"] + 0.01 * sum(moved)}
 
 
 def deadly(section: Section, *, model: Path | None) -> Deadly:

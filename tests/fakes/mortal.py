@@ -80,8 +80,7 @@ def mortal_tightrope(section: Section, *, model: Path | None) -> Mortal:
     return Mortal(tightrope(section, model=model))
 
 
-@dataclass(frozen=True)
-class MortalMatrix(Matrix):
+class Training:
     """Its trainings are moments."""
 
     def train(self, samples: Demonstration, start: Weights | None, seed: int) -> Weights:
@@ -90,12 +89,13 @@ class MortalMatrix(Matrix):
 
 
 @dataclass(frozen=True)
-class MortalCells(Cells):
-    """Its trainings are moments."""
+class MortalMatrix(Training, Matrix):
+    """Fits the matrix."""
 
-    def train(self, samples: Demonstration, start: Weights | None, seed: int) -> Weights:
-        meet("training")
-        return super().train(samples, start, seed)
+
+@dataclass(frozen=True)
+class MortalCells(Training, Cells):
+    """Answers by cells."""
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """A domain family with one parameter that matters, one that moves no more than noise does, and a dead one."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -44,12 +44,6 @@ class PartlyDead:
         return {"distance": float(good - moved + draw[0]), "survival_time": float(10.0 - number + draw[1])}
 
 
-def partly_dead(section: Section, *, model: Path | None) -> PartlyDead:
-    """The family."""
-    section.only(())
-    return PartlyDead()
-
-
 @dataclass(frozen=True)
 class Ordered(PartlyDead):
     """Agents that the target ranks by number, and this family less and less so away from the middle of the box."""
@@ -69,12 +63,6 @@ class Ordered(PartlyDead):
         return {"distance": float(good + draw[0]), "survival_time": float(2.0 * good + draw[1])}
 
 
-def ordered(section: Section, *, model: Path | None) -> Ordered:
-    """The family."""
-    section.only(())
-    return Ordered()
-
-
 class OrderedFleet(Ordered):
     """Ordered, several episodes at once."""
 
@@ -82,10 +70,17 @@ class OrderedFleet(Ordered):
         return [self.run(episode) for episode in episodes]
 
 
-def ordered_fleet(section: Section, *, model: Path | None) -> OrderedFleet:
-    """The family."""
-    section.only(())
-    return OrderedFleet()
+def made(kind: type[PartlyDead]) -> Callable[..., PartlyDead]:
+    """The factory of such a family."""
+
+    def make(section: Section, *, model: Path | None) -> PartlyDead:
+        section.only(())
+        return kind()
+
+    return make
+
+
+partly_dead, ordered, ordered_fleet = map(made, (PartlyDead, Ordered, OrderedFleet))
 
 
 def ordered_study(make, called="cutting", **changes):

@@ -36,19 +36,16 @@ def test_gym_duckietown_s_arrays_are_duties_and_poses(tmp_path):
     assert "top left corner" in source.notes[1]
 
 
-def test_a_map_s_height_puts_the_origin_at_the_bottom(tmp_path):
+def test_arrays_of_the_simulator_are_known_by_their_names_and_a_map_s_height_puts_the_origin_at_the_bottom(tmp_path):
     source = read(write_arrays(tmp_path, map_height=np.array(3.0)))
     np.testing.assert_allclose(source.drives[0].poses.places[:, 1], PLACES[:, 1] + 3.0)
     assert "bottom left corner" in source.notes[1]
-
-
-def test_the_simulator_s_attribute_names_are_known_too(tmp_path):
     positions = np.column_stack((PLACES[:, 0], np.zeros(ROWS), -PLACES[:, 1]))
     changes = {"positions": None, "angles": None, "cur_pos": positions, "cur_angle": HEADINGS[:, None]}
     np.testing.assert_array_equal(read(write_arrays(tmp_path, **changes)).drives[0].poses.headings, HEADINGS)
 
 
-def test_frames_are_read_with_their_times(tmp_path):
+def test_frames_are_read_with_their_times_and_left_out_without(tmp_path):
     source = read(write_arrays(tmp_path, observations=FRAMES))
     pictures = source.drives[0].pictures
     np.testing.assert_array_equal(pictures.times, TIMES)
@@ -56,6 +53,13 @@ def test_frames_are_read_with_their_times(tmp_path):
     np.testing.assert_array_equal(np.stack(list(pictures.read())), FRAMES)
     assert source.channels[-1].role == "frames"
     assert read(tmp_path / "run1.npz", frames="none").drives[0].pictures is None
+
+    unknown = np.arange(ROWS) == 2
+    arrays = {"timestamps": np.where(unknown, np.nan, TIMES), "observations": FRAMES}
+    arrays |= {"positions": np.where(unknown[:, None], np.nan, 1.0) * np.ones(3), "actions": None}
+    path = write_arrays(tmp_path, **arrays, angles=np.where(unknown, np.nan, HEADINGS))
+    pictures = read(path, commands="none").drives[0].pictures
+    np.testing.assert_array_equal(np.stack(list(pictures.read())), FRAMES[~unknown])
 
 
 def test_frames_of_another_form_are_left_out_or_refused_when_asked_for(tmp_path):
@@ -67,7 +71,7 @@ def test_frames_of_another_form_are_left_out_or_refused_when_asked_for(tmp_path)
     assert "has no array 'pictures'" in complaint(path, frames="pictures")
 
 
-def test_a_column_map_names_columns_of_arrays_with_units(tmp_path):
+def test_places_of_a_column_map_are_in_the_user_s_own_frame_with_units(tmp_path):
     arrays = {**OWN, "timestamps": None, "clock": TIMES * 1e3, "wheels": SPEEDS * 60.0}
     columns = {**POSE_MAP, "time": "clock:ms"}
     columns |= {f"wheel_command_{side}": f"wheels[{place}]:rpm" for place, side in enumerate(("left", "right"))}
@@ -76,22 +80,10 @@ def test_a_column_map_names_columns_of_arrays_with_units(tmp_path):
     np.testing.assert_array_equal(drive.poses.places[:, :2], PLACES)
     assert drive.commands.kind == "wheel_speed"
     np.testing.assert_allclose(drive.commands.values, SPEEDS * 2 * np.pi)
-
-
-def test_places_of_a_column_map_are_in_the_user_s_own_frame(tmp_path):
     columns = {"x": "positions[0]", "y": "positions[2]", "heading": "angles", "left": "actions[0]"}
     source = read(write_arrays(tmp_path), columns={**columns, "right": "actions[1]"})
     np.testing.assert_array_equal(source.drives[0].poses.places[:, 1], -PLACES[:, 1])
     assert len(source.notes) == 1
-
-
-def test_frames_without_a_time_are_left_out(tmp_path):
-    unknown = np.arange(ROWS) == 2
-    arrays = {"timestamps": np.where(unknown, np.nan, TIMES), "observations": FRAMES}
-    arrays |= {"positions": np.where(unknown[:, None], np.nan, 1.0) * np.ones(3), "actions": None}
-    path = write_arrays(tmp_path, **arrays, angles=np.where(unknown, np.nan, HEADINGS))
-    pictures = read(path, commands="none").drives[0].pictures
-    np.testing.assert_array_equal(np.stack(list(pictures.read())), FRAMES[~unknown])
 
 
 def test_our_own_names_and_several_drives_need_no_map(tmp_path):
@@ -103,19 +95,16 @@ def test_our_own_names_and_several_drives_need_no_map(tmp_path):
     np.testing.assert_array_equal(np.stack(list(second.pictures.read())), FRAMES[ROWS // 2 :])
 
 
-def test_no_action_need_follow_the_last_pose(tmp_path):
-    (drive,) = read(write_arrays(tmp_path, actions=SPEEDS[:-1])).drives
-    np.testing.assert_array_equal(drive.commands.times, TIMES[:-1])
-    assert len(drive.poses.times) == ROWS
-
-
-def test_without_commands_only_if_asked_for(tmp_path):
+def test_commands_are_left_out_only_if_asked_for_and_none_need_follow_the_last_pose(tmp_path):
     path = write_arrays(tmp_path, actions=None)
     assert "no column found for left, right" in complaint(path, kind="duty")
     assert "no column found for commands" in complaint(path)
     assert read(path, commands="none").drives[0].commands is None
     other = write_arrays(tmp_path, actions=SPEEDS[:7])
     assert read(other, commands="none").drives[0].commands is None
+    (drive,) = read(write_arrays(tmp_path, actions=SPEEDS[:-1])).drives
+    np.testing.assert_array_equal(drive.commands.times, TIMES[:-1])
+    assert len(drive.poses.times) == ROWS
 
 
 @pytest.mark.parametrize(

@@ -39,11 +39,15 @@ def test_a_bag_is_known_by_its_file_or_folder(tmp_path, storage):
     assert bag_module.form_of(bag) == {"ros1": "ROS 1 bag"}.get(storage, f"ROS 2 bag ({storage})")
 
 
-def test_other_files_and_folders_are_no_bags(tmp_path):
+def test_other_files_and_missing_ones_are_no_bags(tmp_path):
     (tmp_path / "log.csv").write_text("time,x\n")
     assert not is_bag(tmp_path)
     assert not is_bag(tmp_path / "log.csv")
     assert not is_bag(tmp_path / "missing.bag")
+    with pytest.raises(LogError, match=r"missing.bag: no such file; check the path"):
+        bags_in(tmp_path / "missing.bag")
+    with pytest.raises(LogError, match="holds no bag"):
+        bags_in(tmp_path)
 
 
 def test_drives_of_a_folder_are_named_by_their_bags(tmp_path):
@@ -59,13 +63,6 @@ def test_topics_have_types_and_counts(tmp_path, storage):
     with open_bag(bags.write_bag(tmp_path / "run.bag", storage, *DRIVE)) as bag:
         listed = [(topic.name, topic.kind, topic.count, topic.known) for topic in bag.topics]
     assert listed == [("/cmd_vel", bags.TWIST, 30, True), ("/pose", bags.POSE, 30, True)]
-
-
-def test_a_missing_bag_is_told(tmp_path):
-    with pytest.raises(LogError, match=r"missing.bag: no such file; check the path"):
-        bags_in(tmp_path / "missing.bag")
-    with pytest.raises(LogError, match="holds no bag"):
-        bags_in(tmp_path)
 
 
 @pytest.mark.parametrize("name", ["run.bag", "run.db3", "run.mcap"])
@@ -248,7 +245,7 @@ def test_seconds_keep_the_microsecond(whole, rest):
     assert abs(seconds(np.array([whole * 10**9 + rest]))[0] - whole - rest * 1e-9) < 5e-7
 
 
-def test_headers_count_unless_the_bags_times_are_asked_for():
+def test_headers_count_unless_the_bags_times_are_asked_for_or_both_count_otherwise():
     stamps = both(-0.01)
     header, notes = choose_times(stamps, "header", "/pose")
     received, said = choose_times(stamps, "receive", "/pose")
@@ -256,26 +253,25 @@ def test_headers_count_unless_the_bags_times_are_asked_for():
     assert notes == ()
     assert "as asked" in said[0]
 
+    header = np.arange(1, 101) * 10**7
+    times, notes = choose_times(Stamps(header, header + 10**6), "header", "/pose")
+    assert np.array_equal(times, seconds(header))
+    assert notes == ()
+
+    header = RECEIVE.copy()
+    header[6] = 0
+    with pytest.raises(LogError, match="/pose: the header of message 7 has no time stamp; take --stamps receive"):
+        choose_times(Stamps(header, RECEIVE), "header", "/pose")
+
+    with pytest.raises(LogError, match="/pose: unknown stamps 'headers'; did you mean 'header'"):
+        choose_times(both(0), "headers", "/pose")
+
 
 @pytest.mark.parametrize("header", [np.zeros(100, dtype=np.int64), np.arange(100) * 10**7], ids=["zero", "1970"])
 def test_headers_without_a_date_give_way_to_the_bags_times(header):
     times, notes = choose_times(Stamps(header, RECEIVE), "header", "/pose")
     assert np.array_equal(times, seconds(RECEIVE))
     assert notes == ("Headers of /pose hold no date: its times are when the bag received each message.",)
-
-
-def test_simulated_time_stays_where_the_bag_counts_it_too():
-    header = np.arange(1, 101) * 10**7
-    times, notes = choose_times(Stamps(header, header + 10**6), "header", "/pose")
-    assert np.array_equal(times, seconds(header))
-    assert notes == ()
-
-
-def test_a_header_without_a_stamp_among_others_is_told_by_number():
-    header = RECEIVE.copy()
-    header[6] = 0
-    with pytest.raises(LogError, match="/pose: the header of message 7 has no time stamp; take --stamps receive"):
-        choose_times(Stamps(header, RECEIVE), "header", "/pose")
 
 
 @pytest.mark.parametrize(
@@ -291,8 +287,3 @@ def test_clocks_that_differ_are_told(header_s, words):
 def test_clocks_that_drift_are_told(drift):
     (note,) = choose_times(both(np.linspace(0, drift, 100)), "header", "/pose")[1]
     assert f"drifts by {0.9e3 * drift:+.0f} ms" in note
-
-
-def test_unknown_stamps_are_refused():
-    with pytest.raises(LogError, match="/pose: unknown stamps 'headers'; did you mean 'header'"):
-        choose_times(both(0), "headers", "/pose")

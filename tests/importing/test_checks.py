@@ -17,15 +17,12 @@ from proxytune.importing.checks import check_units, checked_drive, lag_of
 GRID = np.arange(0.0, 10.0, 0.05)
 
 
-def test_stamps_in_order_are_kept_without_a_word():
+def test_stamps_in_order_are_kept_and_others_sorted():
     given = drive(GRID, GRID)
     kept, notes = checked_drive(given, "bag")
     assert notes == []
     np.testing.assert_array_equal(kept.poses.times, GRID)
     np.testing.assert_array_equal(kept.commands.times, GRID)
-
-
-def test_messages_that_came_out_of_order_are_sorted():
     times = GRID.copy()
     times[[40, 41]] = times[[41, 40]]
     kept, notes = checked_drive(drive(times, GRID), "bag")
@@ -80,9 +77,15 @@ def test_a_clock_that_was_never_set_is_told():
     assert any("before the year 2000" in note for note in notes)
 
 
-def test_a_drive_along_a_wall_on_a_flat_floor_is_not_taken_for_another_axis():
+def test_what_is_plausible_is_left_alone():
     flat = posed(places=np.column_stack((GRID, np.zeros(len(GRID)), 0.01 * np.sin(GRID))))
     assert checked_drive(flat, "bag")[1] == []
+    check_units(slow(), "table")
+    check_units(turning(0.1), "table")
+    check_units(replace(slow(), commands=None), "table")
+    one = slow()
+    stuck = replace(one, poses=replace(one.poses, places=np.zeros_like(one.poses.places)))
+    check_units(stuck, "table")
 
 
 def test_a_few_poses_without_a_number_are_drop_outs():
@@ -111,12 +114,6 @@ def slow():
     return replace(one, commands=replace(one.commands, values=np.full((len(TIMES), 2), 0.3)))
 
 
-def test_a_plausible_drive_is_left_alone():
-    check_units(slow(), "table")
-    check_units(turning(0.1), "table")
-    check_units(replace(slow(), commands=None), "table")
-
-
 RACING = replace(slow().commands, kind="wheel_speed", values=np.full((len(TIMES), 2), 9000.0))
 WILD = replace(slow().poses, times=np.append(TIMES[:-1], 1.7e9))
 
@@ -135,12 +132,6 @@ WILD = replace(slow().poses, times=np.append(TIMES[:-1], 1.7e9))
 )
 def test_a_unit_that_cannot_be_is_refused_in_one_line(given, says):
     assert says in complaint_of(check_units, given, "table")
-
-
-def test_a_robot_that_stands_still_whatever_it_is_told_is_no_matter_of_units():
-    one = slow()
-    stuck = replace(one, poses=replace(one.poses, places=np.zeros_like(one.poses.places)))
-    check_units(stuck, "table")
 
 
 @settings(max_examples=25)

@@ -57,12 +57,9 @@ def test_every_form_gives_the_same_drives(forms, recordings, form):
     assert any("after its commands" in note for note in notes)
 
 
-def test_a_logs_own_folder_is_opened_as_it_is(tmp_path, recordings):
+def test_a_logs_own_folder_is_opened_and_what_is_imported_is_there_only_as_long(tmp_path, recordings, forms):
     log, notes = opened(foreign_robot.write_own_times(tmp_path, recordings))
     assert (len(log.episodes), notes) == (2, ())
-
-
-def test_what_is_imported_is_there_only_while_the_log_is_open(forms):
     with open_log(forms["csv"], facts=FACTS):
         assert list(forms["csv"].parent.glob("**/log.toml")) == []
 
@@ -135,13 +132,15 @@ def test_commands_in_the_rows_of_poses_are_said_to_be_late():
     assert rows_notes([replace(drive, commands=None)]) == []
 
 
-def test_what_was_found_of_stamps_and_clocks_joins_the_notes(monkeypatch, tmp_path):
+def test_what_was_found_joins_the_notes_and_without_commands_nothing_is_said_of_clocks(monkeypatch, tmp_path):
     times = np.append(TIMES, TIMES[-1])
     found = read_as(monkeypatch, tmp_path, drive(times, TIMES))
     assert found.notes[0] == "taken as it is"
     assert "repeat a stamp" in found.notes[1]
     assert found.notes[2].startswith("no drive turns enough")
     assert len(found.drives[0].poses.times) == len(TIMES)
+    found = read_as(monkeypatch, tmp_path, replace(drive(TIMES, TIMES), commands=None))
+    assert found.notes == ("taken as it is",)
 
 
 def test_drives_with_several_kinds_of_commands_are_refused(monkeypatch, tmp_path):
@@ -151,25 +150,18 @@ def test_drives_with_several_kinds_of_commands_are_refused(monkeypatch, tmp_path
         read_as(monkeypatch, tmp_path, one, other)
 
 
-def test_a_log_without_commands_says_nothing_of_clocks(monkeypatch, tmp_path):
-    found = read_as(monkeypatch, tmp_path, replace(drive(TIMES, TIMES), commands=None))
-    assert found.notes == ("taken as it is",)
-
-
 def test_a_pipe_or_a_device_is_refused_and_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "run.csv")
     for path in (tmp_path / "run.csv", Path("/dev/zero")):
         assert "is a device or a pipe; copy" in complaint_of(read_source, path, Wanted())
 
 
-def test_a_regular_drive_loses_nothing():
+def test_drop_outs_are_counted_apart_from_gaps_and_jitter_is_the_scatter_of_intervals():
     one = survey(drive(np.arange(200) * 0.05, np.arange(100) * 0.1))
     assert (one.poses, one.commands, one.frames, one.gaps) == (200, 100, 0, 0)
     assert (one.seconds, one.poses_hz) == pytest.approx((9.95, 20.0))
     assert (one.lost, one.jitter_s) == pytest.approx((0.0, 0.0), abs=1e-9)
 
-
-def test_drop_outs_are_counted_apart_from_gaps():
     times = np.delete(np.arange(400) * 0.05, [*range(50, 60), *range(200, 300)])
     one = survey(drive(times, np.arange(200) * 0.1))
     assert (one.gaps, one.longest_gap_s) == (2, pytest.approx(5.05))
@@ -178,25 +170,17 @@ def test_drop_outs_are_counted_apart_from_gaps():
     assert one.gaps == 0
     assert one.lost == pytest.approx(4 / 400, abs=1e-4)
 
-
-def test_jitter_is_the_scatter_of_intervals():
     random = np.random.default_rng(1)
     times = np.arange(2000) * 0.05 + random.normal(0.0, 0.002, 2000)
     one = survey(drive(times, np.arange(200) * 0.1))
     assert one.jitter_s == pytest.approx(0.002 * np.sqrt(2.0), rel=0.1)
 
 
-def test_turning_before_the_command_is_told_as_two_clocks():
+def test_turning_before_or_after_the_command_is_told_and_a_drive_that_does_not_turn_says_nothing():
     (note,) = clock_notes([survey(turning(-0.25)), survey(turning(0.1))])
     assert note.startswith("1 of 2 drives turn before they are told to (up to 0.25 s, run): two clocks")
-
-
-def test_turning_after_the_command_is_told_as_a_sum_that_cannot_be_split():
     (note,) = clock_notes([survey(turning(0.1))])
     assert note.startswith("it turns 0.10 s after its commands: delay, lag and an offset")
-
-
-def test_a_drive_that_does_not_turn_says_nothing_of_clocks():
     straight = replace(turning(0.1), poses=poses(np.arange(0.0, 40.0, 0.02)))
     assert survey(straight).lag_s is None
     assert clock_notes([survey(straight)]) == ["no drive turns enough to tell whether commands and poses share a clock"]

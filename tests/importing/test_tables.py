@@ -30,16 +30,13 @@ def complaint(path, reader=read_csv_tables, **wanted):
     return complaint_of(reader, path, Wanted(**wanted))
 
 
-def test_a_file_in_ns_mm_and_degrees_is_read_by_its_names(tmp_path):
+def test_columns_are_read_by_their_names_and_what_was_taken_for_what_is_told(tmp_path):
     (drive,) = read(write_csv(tmp_path)).drives
     assert (drive.name, drive.commands.kind) == ("run1", "twist")
     np.testing.assert_allclose(drive.poses.times, TIMES, atol=1e-6)
     np.testing.assert_allclose(drive.poses.places[:, :2], PLACES, atol=1e-9)
     np.testing.assert_allclose(drive.poses.headings, HEADINGS, atol=1e-9)
     np.testing.assert_allclose(drive.commands.values, SPEEDS, atol=1e-9)
-
-
-def test_what_was_taken_for_what_is_told(tmp_path):
     source = read(write_csv(tmp_path))
     assert source.form == "CSV table"
     assert "time from 'stamp_ns' (ns, by its name), x from 'pos_x_mm' (mm, by its name)" in source.notes[0]
@@ -64,39 +61,39 @@ TWICE = (
 )
 
 
-def test_a_column_that_changes_where_stamps_go_back_names_the_drives(file):
+def test_drives_are_told_apart_by_a_column_or_by_stamps_that_go_back(file):
     source = read(file(TWICE))
     assert [drive.name for drive in source.drives] == ["7", "8"]
     assert "episode from 'run_no'" in source.notes[0]
-
-
-def test_drives_that_no_column_or_several_tell_apart_are_asked_for(file):
     told = complaint(file(TWICE.replace("8,1,0,0,0,0", "7,1,0,0,0,0").replace("8,1,1", "7,1,1")))
     assert "line 5, column 'time': stamps go back, as where another drive begins; add a column" in told
     told = complaint(file(TWICE.replace("8,1,0,0", "8,2,0,0").replace("8,1,1", "8,2,1")))
     assert "take run_no or lap, as in --columns episode=run_no" in told
+    text = "run,time,x,y,yaw,v,omega\na,0,0,0,0,1,0\na,1,1,0,0,1,0\nb,0,0,0,0,2,0\nb,1,2,0,0,2,0\n"
+    first, second = read(file(text)).drives
+    assert (first.name, second.name) == ("a", "b")
+    np.testing.assert_array_equal(second.commands.values[:, 0], [2.0, 2.0])
 
 
-def test_commands_may_have_a_second_clock_in_the_same_table(file):
+def test_commands_may_have_a_second_clock_in_the_same_table_alone(file):
     text = "stamp,cmd_stamp,x,y,heading,v,omega\n"
     text += "0,5.01,0,0,0,0.5,0\n0.1,5.01,0.1,0,0.1,0.5,0\n0.2,5.15,0.2,0,0.1,0.6,0.1\n0.3,5.15,0.3,0,0.1,0.6,0.1\n"
     (drive,) = read(file(text), columns={"command_time": "cmd_stamp:s"}).drives
     np.testing.assert_array_equal(drive.poses.times, [0.0, 0.1, 0.2, 0.3])
     np.testing.assert_array_equal(drive.commands.times, [5.01, 5.15])
     np.testing.assert_array_equal(drive.commands.values, [[0.5, 0.0], [0.6, 0.1]])
-
-
-def test_a_clock_of_commands_that_are_in_another_file_is_refused(file):
     file(COMMANDS, "run1_commands.csv")
     told = complaint(file(POSES), columns={"command_time": "time"})
     assert "command_time is the clock of commands in the same table" in told
 
 
-def test_rows_may_hold_commands_or_poses_alone(file):
+def test_rows_may_hold_commands_or_poses_alone_and_stamps_go_backward(file):
     (drive,) = read(file(BOTH)).drives
     np.testing.assert_array_equal(drive.poses.times, [0.0, 0.1, 0.3])
     np.testing.assert_array_equal(drive.commands.times, [0.0, 0.2, 0.3])
     np.testing.assert_array_equal(drive.commands.values, [[0.5, 0.0], [0.6, 0.1], [0.6, 0.1]])
+    text = POSES + "0.2,0.2,0,0.2\n0.15,0.3,0,0.3\n"
+    np.testing.assert_array_equal(read(file(text), commands="none").drives[0].poses.times, [0, 0.1, 0.2, 0.2, 0.15])
 
 
 @pytest.mark.parametrize("separator", [";", "\t", " ", ", "])
@@ -106,19 +103,16 @@ def test_separators_are_seen(file, separator):
     np.testing.assert_array_equal(drive.poses.places[:, 0], [0.0, 0.1, 0.2])
 
 
-def test_decimal_commas_a_byte_order_mark_and_comments_are_read(file):
+def test_decimal_commas_comments_and_a_byte_order_mark_are_read(file):
     text = "\ufeff# recorded on Monday\ntime;x;y;heading\n0,0;0;0;0\n# half way\n0,1;0,25;0;0,5\n;;;\n"
     (drive,) = read(file(text), commands="none").drives
     np.testing.assert_array_equal(drive.poses.places[:, 0], [0.0, 0.25])
     np.testing.assert_array_equal(drive.poses.headings, [0.0, 0.5])
-
-
-def test_the_last_comment_may_name_the_columns(file):
     text = "# by numpy\n# time,x,y,heading\n0,0,0,0\n1,1,0,0\n"
     np.testing.assert_array_equal(read(file(text), commands="none").drives[0].poses.times, [0.0, 1.0])
 
 
-def test_a_column_map_goes_before_names(file):
+def test_a_column_map_goes_before_names_and_what_is_mapped_is_nothing_else(file):
     columns = {"time": "clock:ms", "x": "a:cm", "y": "b:cm", "heading": "c:deg", "v": "d:km/h", "omega": "e:deg/s"}
     text = "clock,a,b,c,d,e,left,right\n0,0,0,90,3.6,90,0,0\n100,10,0,90,3.6,90,0,0\n"
     (drive,) = read(file(text), columns=columns).drives
@@ -126,11 +120,8 @@ def test_a_column_map_goes_before_names(file):
     np.testing.assert_allclose(drive.poses.places[1], [0.1, 0.0, 0.0])
     np.testing.assert_allclose(drive.poses.headings, np.pi / 2)
     np.testing.assert_allclose(drive.commands.values, [[1.0, np.pi / 2]] * 2)
-
-
-def test_duplicate_and_backward_stamps_are_kept(file):
-    text = POSES + "0.2,0.2,0,0.2\n0.15,0.3,0,0.3\n"
-    np.testing.assert_array_equal(read(file(text), commands="none").drives[0].poses.times, [0, 0.1, 0.2, 0.2, 0.15])
+    source = read(file(BOTH), columns={"left": "v", "right": "omega"})
+    assert source.drives[0].commands.kind == "duty"
 
 
 def test_quaternions_give_headings_and_tilts(file):
@@ -154,23 +145,11 @@ def test_a_quaternion_goes_before_a_heading_but_not_before_one_that_is_mapped(fi
     assert [channel.role for channel in source.channels][3:] == roles
 
 
-def test_a_column_that_is_mapped_is_nothing_else(file):
-    source = read(file(BOTH), columns={"left": "v", "right": "omega"})
-    assert source.drives[0].commands.kind == "duty"
-
-
 def test_stamps_since_1970_are_taken_by_their_size(file):
     text = "stamp,x,y,yaw\n1700000000000000000,0,0,0\n1700000000100000000,1,0,0\n"
     source = read(file(text), commands="none")
     np.testing.assert_allclose(source.drives[0].poses.times, [1.7e9, 1.7e9 + 0.1], atol=1e-6)
     assert "(ns, by its size)" in source.notes[0]
-
-
-def test_a_column_of_drives_makes_drives(file):
-    text = "run,time,x,y,yaw,v,omega\na,0,0,0,0,1,0\na,1,1,0,0,1,0\nb,0,0,0,0,2,0\nb,1,2,0,0,2,0\n"
-    first, second = read(file(text)).drives
-    assert (first.name, second.name) == ("a", "b")
-    np.testing.assert_array_equal(second.commands.values[:, 0], [2.0, 2.0])
 
 
 def test_each_file_of_a_folder_is_a_drive(tmp_path, file):
@@ -190,13 +169,10 @@ def test_commands_beside_the_poses_are_joined(file, name):
     assert any(note.startswith(f"Commands of {name}: ") for note in source.notes)
 
 
-def test_a_named_file_of_commands_goes_before_columns(file):
+def test_files_of_commands_are_named_with_columns_of_their_own(file):
     file(COMMANDS, "joystick.txt")
     (drive,) = read(file(BOTH), commands="joystick.txt").drives
     np.testing.assert_array_equal(drive.commands.times, [0.01, 0.15])
-
-
-def test_each_file_s_own_columns_may_be_mapped(file):
     file("at;lin;ang\n10;0.5;0\n150;0.6;0.1\n", "commands.csv")
     path = file(POSES.replace("time", "clock"))
     columns = {"time": "clock", "v": "lin", "omega": "ang"}
@@ -205,16 +181,13 @@ def test_each_file_s_own_columns_may_be_mapped(file):
     np.testing.assert_allclose(read(path, columns=columns).drives[0].commands.times, [0.01, 0.15])
 
 
-def test_drives_of_one_clock_share_a_file_of_commands_by_time(tmp_path, file):
+def test_drives_share_a_file_of_commands_by_time_where_they_do_not_overlap(tmp_path, file):
     file(POSES, "a.csv")
     file(POSES.replace("\n0", "\n10"), "b.csv")
     file("time,v,omega\n-1,0.1,0\n0.1,0.2,0\n0.5,0.3,0\n10.1,0.4,0\n", "commands.csv")
     first, second = read(tmp_path).drives
     np.testing.assert_array_equal(first.commands.values[:, 0], [0.1, 0.2])
     np.testing.assert_array_equal(second.commands.values[:, 0], [0.3, 0.4])
-
-
-def test_drives_that_overlap_cannot_share_commands_by_time(tmp_path, file):
     file(POSES, "a.csv"), file(POSES, "b.csv"), file(COMMANDS, "commands.csv")
     assert "add a column 'episode'" in complaint(tmp_path)
     file("episode,time,v,omega\nb,0,1,0\nb,0.1,1,0\na,0.1,2,0\n", "commands.csv")
@@ -301,10 +274,13 @@ def test_a_bad_column_map_is_refused(file, columns, where):
     assert where in complaint(file(POSES), columns=columns)
 
 
-def test_missing_files_are_told(tmp_path, file):
+def test_missing_files_and_folders_without_any_are_told(tmp_path, file):
     assert "no such file" in complaint(tmp_path / "none.csv")
     assert "no such file of commands" in complaint(file(POSES), commands="other.csv")
     assert "has no CSV file with poses" in complaint(tmp_path, commands="run1.csv")
+    assert not is_mrclam(tmp_path)
+    assert not is_mrclam(tmp_path / "Robot1_Odometry.dat")
+    assert "has no file such as Robot1_Groundtruth.dat" in complaint(tmp_path, read_mrclam)
 
 
 def test_tables_are_known_by_content(tmp_path, file):
@@ -338,24 +314,15 @@ def test_either_file_or_a_folder_of_one_robot_will_do(tmp_path):
         assert read_mrclam(path, Wanted()).drives[0].name == "Robot3"
 
 
-def test_of_several_robots_one_must_be_chosen(tmp_path):
+def test_several_robots_are_chosen_from_and_commands_left_out(tmp_path):
     write_mrclam(tmp_path, "Robot1"), write_mrclam(tmp_path, "Robot3")
     assert "several robots: Robot1, Robot3; choose one, as in --poses Robot1" in complaint(tmp_path, read_mrclam)
     assert "has no robot 'Robot4'; did you mean" in complaint(tmp_path, read_mrclam, poses="Robot4")
     assert read_mrclam(tmp_path, Wanted(poses="Robot3")).drives[0].name == "Robot3"
-
-
-def test_commands_may_be_left_out(tmp_path):
     path = write_mrclam(tmp_path)
     (tmp_path / "Robot1_Odometry.dat").unlink()
     assert "Robot1_Odometry.dat: no such file" in complaint(path, read_mrclam)
     assert read_mrclam(path, Wanted(commands="none")).drives[0].commands is None
-
-
-def test_a_folder_without_such_files_is_refused(tmp_path):
-    assert not is_mrclam(tmp_path)
-    assert not is_mrclam(tmp_path / "Robot1_Odometry.dat")
-    assert "has no file such as Robot1_Groundtruth.dat" in complaint(tmp_path, read_mrclam)
 
 
 LINES = "# tracked at 20 Hz\n0 1 2 0 0 0 0 1\n0.05 1 2 0 0 0 0.6 0.8\n"
@@ -419,20 +386,14 @@ CAR = "time,x,y,heading,gas,servo,switch\n0,0,0,0,0.3,0.5,1\n0.1,0.1,0,0.1,0.3,-
 CAR_MAP = {"throttle": "gas", "steering": "servo", "enabled": "switch"}
 
 
-def test_throttle_steering_and_the_switch_are_a_cars_commands(file):
+def test_a_cars_commands_are_throttle_and_steering_or_speed_and_wheel_angle(file):
     (drive,) = read(file(CAR), columns=CAR_MAP).drives
     assert drive.commands.kind == "ackermann"
     np.testing.assert_array_equal(drive.commands.values, [[0.3, 0.5, 1.0], [0.3, -0.5, 0.0], [0.2, 0.0, 1.0]])
-
-
-def test_speed_and_wheel_angle_are_a_cars_commands_too(file):
     text = CAR.replace("gas,servo,switch", "speed,steering_angle_deg,switch").replace("0.5", "20")
     (drive,) = read(file(text)).drives
     assert drive.commands.kind == "speed_steering"
     np.testing.assert_allclose(drive.commands.values[0], [0.3, np.radians(20.0)])
-
-
-def test_a_car_is_shown_how_its_own_columns_are_named(file):
     said = complaint(file(CAR), columns={"throttle": "gas"})
     assert "no column found for steering" in said
     assert said.endswith("throttle=gas,steering=wheel")

@@ -72,11 +72,17 @@ def test_poses_go_by_name_then_type_and_a_goal_is_no_pose(rows, name):
     assert chosen(*rows, ("/cmd_vel", "Twist", 5)).poses.name == name
 
 
-def test_a_depth_picture_is_no_picture_and_raw_goes_before_compressed():
+def test_a_depth_picture_joints_and_topics_of_other_kinds_are_not_taken():
     rows = (*DRIVE, ("/depth/image", "Image", 900), ("/b", "Compressed", 50), ("/c", "Image", 10))
     assert chosen(*rows).pictures.name == "/c"
     assert chosen(*rows[:3]).pictures is None
     assert chosen(*rows, frames="none").pictures is None
+    rows = (*DRIVE, ("/wheels", "Array", 5))
+    assert chosen(*rows, kind="duty").commands.name == "/wheels"
+    rows = (("/joint_states", "Joints", 5), DRIVE[1])
+    assert chosen(*rows, commands="/joint_states").kind == "wheel_speed"
+    with pytest.raises(LogError, match="no topic is plainly commands; name one of /joint_states by --commands, or"):
+        chosen(*rows)
 
 
 @pytest.mark.parametrize("name", ["/c", "c"])
@@ -100,18 +106,6 @@ def test_the_kind_of_commands_is_what_their_type_says_else_what_is_wanted(kind, 
     assert chosen(("/c", kind, 1), DRIVE[1], kind=wanted).kind == expected
 
 
-def test_a_wanted_kind_leaves_topics_of_other_kinds_out():
-    rows = (*DRIVE, ("/wheels", "Array", 5))
-    assert chosen(*rows, kind="duty").commands.name == "/wheels"
-
-
-def test_joints_are_commands_only_where_they_are_named():
-    rows = (("/joint_states", "Joints", 5), DRIVE[1])
-    assert chosen(*rows, commands="/joint_states").kind == "wheel_speed"
-    with pytest.raises(LogError, match="no topic is plainly commands; name one of /joint_states by --commands, or"):
-        chosen(*rows)
-
-
 @pytest.mark.parametrize(
     ("rows", "wanted", "words"),
     [
@@ -132,14 +126,11 @@ def test_what_cannot_be_taken_is_refused_with_a_remedy(rows, wanted, words):
         chosen(*rows, **wanted)
 
 
-def test_a_type_without_definition_is_not_taken():
+def test_topics_without_a_definition_or_lacking_in_a_bag_are_not_taken():
     rows = (*topics(*DRIVE), Topic("/mocap", KINDS["Pose"], 9, known=False))
     choice = choose(rows, Wanted(), "run.bag")
     assert choice.poses.name == "/odom"
     assert "does not define" in channels_of(rows, choice)[2].role
-
-
-def test_a_topic_that_one_of_several_bags_lacks_is_not_taken():
     rows = (*topics(*DRIVE), Topic("/mocap", KINDS["Pose"], 9, lacking=1))
     choice = choose(rows, Wanted(), "runs")
     assert choice.poses.name == "/odom"

@@ -66,11 +66,13 @@ def test_starting_from_weights_it_follows_samples_that_say_otherwise(learner):
     assert error(learner, learner.train(turned, start, 1), turned) < 0.3 * error(learner, start, turned)
 
 
-def test_training_leaves_the_weights_it_started_from_as_they_were():
+def test_training_leaves_what_it_started_from_and_one_sample_is_enough():
     start = SMALL.train(pictures(60, 1), None, 1)
     before = {name: values.copy() for name, values in start.items()}
     SMALL.train(pictures(60, 2), start, 1)
     assert all(np.array_equal(start[name], before[name]) for name in before)
+    weights = SMALL.train(pictures(1, 1), None, 1)
+    assert np.isfinite(SMALL.act(weights, pictures(1, 1).observations[0])).all()
 
 
 @each
@@ -91,11 +93,6 @@ def test_weights_of_another_network_or_other_features_are_refused_with_both_shap
         learner.train(pictures(30, 1), other.train(pictures(30, 1), None, 1), 1)
 
 
-def test_one_sample_can_be_learnt_from():
-    weights = SMALL.train(pictures(1, 1), None, 1)
-    assert np.isfinite(SMALL.act(weights, pictures(1, 1).observations[0])).all()
-
-
 @pytest.mark.parametrize("learner", [SMALL, replace(SMALL, hidden=(7, 5)), replace(SMALL, rows=5, columns=7)])
 def test_many_pictures_are_answered_to_the_bit_as_each_by_itself(learner):
     samples = pictures(33, 4)
@@ -106,16 +103,13 @@ def test_many_pictures_are_answered_to_the_bit_as_each_by_itself(learner):
         np.testing.assert_array_equal(answered, alone[:count])
 
 
-def test_a_cell_is_the_mean_grey_of_its_pixels_and_the_top_is_not_looked_at():
+def test_cells_are_means_of_grey_also_of_unequal_size():
     picture = np.zeros((1, 12, 16, 3), dtype=np.uint8)
     picture[0, :3] = 255
     picture[0, 3:6, :4] = (255, 0, 0)
     cells = grey_cells(picture, top=0.25, rows=3, columns=4)[0].reshape(3, 4)
     assert cells[0, 0] == pytest.approx(1 / 3 - 0.5)
     assert (np.delete(cells.ravel(), 0) == -0.5).all()
-
-
-def test_cells_may_be_of_unequal_size():
     picture = np.zeros((1, 5, 3, 3), dtype=np.uint8)
     picture[0, :2, :2] = 255
     assert grey_cells(picture, top=0.0, rows=2, columns=2)[0] == pytest.approx([0.5, -0.5, -0.5, -0.5])

@@ -172,16 +172,13 @@ def test_no_samples_the_first_count_and_each_doubling_are_about_one_apart_and_tu
     assert counts_at(doublings(counts, 50.0), 50.0) == pytest.approx(counts)
 
 
-def test_the_mean_curves_are_where_the_scores_are_and_surer_there_than_between_curves():
+def test_scores_are_surer_where_they_are_and_differ_more_where_they_do():
     model = fit_curve_model(marks(np.full(6, 2.0)))
     mean, covariance = model.mean_curves(np.array([0, 0, 1]), np.array([0.0, 5.0, 2.5]))
     assert mean == pytest.approx([10.3, 49.7, 30.0], abs=2.5)
     assert np.sqrt(np.diag(covariance)).max() < 2.0
     _, far = model.mean_curves(np.array([0]), np.array([9.0]))
     assert far[0, 0] > 4.0 * covariance.diagonal().max()
-
-
-def test_one_more_score_is_expected_to_differ_more_where_scores_do():
     model = fit_curve_model(marks([0.5, 0.5, 8.0, 8.0, 0.5, 0.5]))
     quiet, loud = model.noise_at(np.array([0, 0]), np.array([0.0, 2.5]))
     assert loud > 4.0 * quiet
@@ -258,23 +255,14 @@ def crossed(*scores, threshold=45.0):
     return float(crossing(COUNTS, np.array([scores], dtype=float), np.array([threshold]), first=100.0)[0])
 
 
-def test_samples_are_needed_up_to_where_the_curve_comes_to_stay_above_the_threshold():
+def test_samples_are_needed_up_to_where_a_curve_stays_above_the_threshold():
     assert crossed(0, 20, 40, 50) == 300.0
     assert crossed(0, 46, 30, 60) == 300.0
     assert crossed(45, 45, 45, 45) == 0.0
     assert crossed(0, 45, 50, 50) == 100.0
-
-
-def test_what_is_not_reached_is_infinite_and_never_extrapolated():
     assert crossed(0, 10, 20, 44.9) == np.inf
     assert crossed(50, 50, 50, 44.9) == np.inf
-
-
-def test_without_any_sample_there_is_no_learner_so_none_are_not_enough():
     assert crossed(np.nan, 50, 50, 50) == 100.0
-
-
-def test_the_first_count_is_enough_though_the_next_place_drawn_lies_beyond_it():
     scores = np.array([[np.nan, np.nan, 50.0, 50.0], [np.nan, np.nan, 40.0, 50.0]])
     needed = crossing(np.array([0.0, 60.0, 120.0, 200.0]), scores, np.array([45.0, 45.0]), first=100.0)
     assert needed.tolist() == [100.0, 160.0]
@@ -292,19 +280,13 @@ def test_draws_keep_within_the_scores_there_can_be():
     assert drawn.shape[0] == 2000
 
 
-def test_a_curve_rises_in_every_draw_unless_the_scores_show_a_fall():
+def test_mean_curves_go_where_scores_are_and_fall_only_beyond_noise():
     curves = {"rising": curve(10, 20, 40, 50, 50), "dipping": curve(40, 10, 20, 45, 50)}
     draws = draw_curves(curves, (-60.0, 60.0))
     assert draws.monotone == {"rising": True, "dipping": False}
     assert (np.diff(draws.scores["rising"], axis=1) >= -1e-9).all()
     assert np.mean(draws.scores["dipping"], axis=0).min() < 20.0
-
-
-def test_a_fall_within_the_noise_does_not_count_as_one():
     assert draw_curves({"noisy": curve(30, 29, 31, 30, 30, wobble=6.0)}, (-60.0, 60.0)).monotone["noisy"]
-
-
-def test_means_of_draws_are_where_many_scores_are_and_rising_ones_are_not_lifted_by_an_overshoot():
     draws = draw_curves({"steep": curve(0, 10, 20, 50, 50, wobble=0.3)}, (-60.0, 60.0))
     ends = [float(draws.scores["steep"][:, place].mean()) for place in (0, -1)]
     assert ends == pytest.approx([0.0, 50.0], abs=1.0)

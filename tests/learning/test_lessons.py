@@ -43,23 +43,23 @@ def test_arrays_are_made_once_and_read_back_to_the_last_bit(tmp_path):
     assert np.array_equal(first["values"], np.random.default_rng(3).normal(size=(4, 2)))
 
 
-def test_other_facts_are_other_arrays_and_the_order_of_facts_is_none():
+def test_facts_determine_arrays_and_are_told_in_the_file(tmp_path):
     assert facts_digest({"a": 1, "b": 2.0}) == facts_digest({"b": 2.0, "a": 1})
     assert len({facts_digest({"a": value}) for value in (1, 2, 1.5, "1", None)}) == 5
-
-
-def test_the_file_says_what_determines_it(tmp_path):
     cache = Cache(tmp_path)
     cache.get("exam", {"seed": 7, "theta": {"trim": 0.1}}, lambda: {"scores": np.zeros(2)})
     with np.load(cache.path("exam", {"theta": {"trim": 0.1}, "seed": 7})) as file:
         assert str(file["facts"]) == '{"seed": 7, "theta": {"trim": 0.1}}'
 
 
-def test_what_failed_while_being_made_is_not_there(tmp_path):
+def test_what_failed_is_not_there_and_a_closed_folder_is_told(tmp_path):
     cache = Cache(tmp_path)
     with pytest.raises(ZeroDivisionError):
         cache.get("exam", {"seed": 1}, lambda: 1 / 0)
     assert not cache.has("exam", {"seed": 1})
+    (tmp_path / "kept").write_text("a file, where the folder should be")
+    with pytest.raises(StoreError, match="cannot be written"):
+        Cache(tmp_path / "kept").get("exam", {}, lambda: {"scores": np.zeros(1)})
 
 
 @pytest.mark.parametrize("keep", [0, 10, 200])
@@ -70,12 +70,6 @@ def test_a_damaged_file_is_one_line_with_a_remedy(tmp_path, keep):
     path.write_bytes(path.read_bytes()[:keep])
     with pytest.raises(StoreError, match="is damaged .*delete it, and run again"):
         cache.get("exam", facts, dict)
-
-
-def test_a_folder_that_cannot_be_written_is_one_line(tmp_path):
-    (tmp_path / "kept").write_text("a file, where the folder should be")
-    with pytest.raises(StoreError, match="cannot be written"):
-        Cache(tmp_path / "kept").get("exam", {}, lambda: {"scores": np.zeros(1)})
 
 
 @pytest.mark.parametrize("place", [0.3, 0.5, 0.7, 0.9])
@@ -113,21 +107,18 @@ def test_on_policy_and_off_policy_samples_are_all_there_are(count, expert_drives
     assert on + off == count or abs(on + off - count) < 1e-9 * count
 
 
-def test_the_expert_drives_for_the_first_samples():
+def test_costs_are_told_by_who_drove_and_how_many_samples_it_takes():
     on, off = split_samples(np.array([0.0, 10.0, 25.0]), 10.0)
     assert (on.tolist(), off.tolist()) == ([0.0, 0.0, 15.0], [0.0, 10.0, 10.0])
-
-
-def test_what_is_never_reached_costs_without_end():
     assert split_samples(np.inf, np.inf) == (0.0, np.inf)
     never, off_policy = split_samples(np.inf, 10.0), split_samples(np.array([np.inf, 4.0]), np.inf)
     assert cost_saved(COSTS, without=off_policy, with_proxy=(0.0, 0.0)).tolist() == [np.inf, 13.0]
     assert cost_saved(COSTS, without=never, with_proxy=(0.0, 0.0)) == np.inf
-
-
-def test_what_costs_nothing_adds_nothing_however_many_samples_it_takes():
     free = Costs(off_policy=2.0, on_policy=0.0)
     assert cost_saved(free, without=split_samples(np.inf, 10.0), with_proxy=split_samples(5.0, 0.0)) == 20.0
+    assert cost_saved(COSTS, without=split_samples(25.0, 10.0), with_proxy=(0.0, 0.0)) == 10 * 3.25 + 15 * 0.75
+    saved = cost_saved(COSTS, without=(np.array(50.0), np.array(400.0)), with_proxy=(np.array(10.0), np.array(100.0)))
+    assert saved == 40 * 0.75 + 300 * 3.25
 
 
 @given(counts, counts, st.floats(0.0, 1e3))
@@ -136,19 +127,10 @@ def test_more_samples_never_cost_less(count, more, expert_drives):
     assert cost_saved(COSTS, without=splits[0], with_proxy=splits[1]) >= 0.0
 
 
-def test_a_sample_costs_its_driving_and_its_label():
-    assert cost_saved(COSTS, without=split_samples(25.0, 10.0), with_proxy=(0.0, 0.0)) == 10 * 3.25 + 15 * 0.75
-
-
 @given(counts, counts)
 def test_at_equal_costs_without_labels_the_saving_is_plv_itself(without, needed):
     splits = {"without": split_samples(without, 50.0), "with_proxy": split_samples(needed, 0.0)}
     assert abs(cost_saved(Costs(), **splits) - plv(without=without, with_proxy=needed)) < 1e-6
-
-
-def test_the_saving_is_told_apart_by_who_drove():
-    saved = cost_saved(COSTS, without=(np.array(50.0), np.array(400.0)), with_proxy=(np.array(10.0), np.array(100.0)))
-    assert saved == 40 * 0.75 + 300 * 3.25
 
 
 EPISODES = [make_episode({}, agent="pupil", start=start, seed=7) for start in range(4)]
@@ -171,14 +153,16 @@ class Manifold(Matrix):
         return observations @ weights["matrix"]
 
 
-def test_a_classroom_is_asked_for_all_episodes_at_once_if_it_can_and_else_for_each():
+def test_classrooms_and_policies_are_asked_for_many_at_once_only_if_they_can():
     policy = policy_of(Matrix(), WEIGHTS)
     alone = [Schoolroom(Wobbly()).examine(episode, policy) for episode in EPISODES]
     assert examine_policy(Schoolroom(Wobbly()), EPISODES, policy) == alone
     assert examine_policy(Together(Wobbly()), EPISODES, policy) == [score + 1.0 for score in alone]
-
-
-def test_missing_scores_are_told_in_one_line():
+    seen = np.arange(12.0).reshape(4, 3)
+    one, many = policy_of(Matrix(), WEIGHTS), policy_of(Manifold(), WEIGHTS)
+    assert not hasattr(one, "act_many")
+    np.testing.assert_array_equal(many.act_many(seen), [one(row) for row in seen])
+    np.testing.assert_array_equal(many(seen[0]), one(seen[0]))
     with pytest.raises(EpisodeError, match="examine_together gave 3 scores for 4 episodes; give each its own"):
         examine_policy(Together(Wobbly(), lost=1), EPISODES, policy_of(Matrix(), WEIGHTS))
 
@@ -188,14 +172,6 @@ def test_a_score_that_is_no_finite_number_is_told_with_its_start(score):
     with pytest.raises(EpisodeError, match=r"the examination from start 2 gave -?(nan|inf); give a finite score"):
         unfinished = SimpleNamespace(examine=lambda episode, policy: score if episode.start == 2 else 1.0)
         examine_policy(unfinished, EPISODES, policy_of(Matrix(), WEIGHTS))
-
-
-def test_a_policy_answers_many_observations_at_once_only_if_its_learner_does():
-    seen = np.arange(12.0).reshape(4, 3)
-    one, many = policy_of(Matrix(), WEIGHTS), policy_of(Manifold(), WEIGHTS)
-    assert not hasattr(one, "act_many")
-    np.testing.assert_array_equal(many.act_many(seen), [one(row) for row in seen])
-    np.testing.assert_array_equal(many(seen[0]), one(seen[0]))
 
 
 MINE = """
@@ -228,12 +204,9 @@ def identity(tmp_path, monkeypatch):
         sys.modules.pop(name, None)
 
 
-def test_it_is_another_by_other_settings_other_code_or_other_code_beside_it(identity):
+def test_a_learner_is_another_by_settings_or_code_but_not_by_comments(identity):
     others = [identity(size=4), identity(mine=MINE + "    more: int = 1\n"), identity(cells="def cells(): return 2")]
     assert len({identity(), *others}) == 4
-
-
-def test_comments_and_time_do_not_change_it(identity):
     assert identity() == identity(mine=MINE + "\n# a remark\n") == identity(cells="def cells(): return 1  # one")
 
 
@@ -249,20 +222,17 @@ ROOM = Schoolroom(Wobbly())
 WIDE = Distribution({"delay": (0.0, 0.3), "trim": (0.1, 0.1)})
 
 
-def test_a_longer_answer_begins_with_every_shorter_one():
+def test_lessons_of_more_begin_with_those_of_fewer_and_others_are_of_another_seed():
     short, long = (collect_samples(ROOM, WIDE, count=count, seed=4, lesson_s=1.0) for count in (17, 60))
     assert len(short.commands) == len(short.observations) == 17
     assert len(long.commands) == 60
     assert np.array_equal(long.observations[:17], short.observations)
     assert np.array_equal(long.commands[:17], short.commands)
-
-
-def test_another_seed_is_taught_by_other_lessons():
     one, other = (collect_samples(ROOM, WIDE, count=20, seed=seed, lesson_s=1.0) for seed in (1, 2))
     assert not np.array_equal(one.commands, other.commands)
 
 
-def test_theta_is_drawn_anew_for_every_lesson_and_only_where_it_is_free(tmp_path):
+def test_thetas_are_drawn_for_every_lesson_where_they_are_free(tmp_path):
     thetas = []
 
     class Spying(Schoolroom):
@@ -276,8 +246,6 @@ def test_theta_is_drawn_anew_for_every_lesson_and_only_where_it_is_free(tmp_path
     assert len(set(delays)) == len(delays) == 20
     assert 0.0 <= min(delays) < 0.1 < 0.2 < max(delays) <= 0.3
 
-
-def test_a_distribution_without_width_is_one_theta():
     fixed = Distribution({"trim": (0.1, 0.1)})
     assert fixed.fixed
     assert not WIDE.fixed

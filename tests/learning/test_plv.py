@@ -28,7 +28,7 @@ def worth(proxy, level=None):
     return teaching_value(judged(proxy=proxy, level=level), "proxy")
 
 
-def test_a_proxy_that_helps_has_a_plv_above_zero_and_one_that_harms_below():
+def test_a_proxy_is_worth_the_samples_between_crossings():
     helped, harmed = worth(curve(20, 48, 50, 50, 50)), worth(curve(-9, -9, 10, 20, 50))
     assert 0.0 < helped.plv.low < helped.plv.value < helped.plv.high
     assert helped.factor.low > 1.0
@@ -36,41 +36,35 @@ def test_a_proxy_that_helps_has_a_plv_above_zero_and_one_that_harms_below():
     assert harmed.plv.low < harmed.plv.value < harmed.plv.high < 0.0
     assert harmed.factor.high < 1.0
     assert harmed.reduction.high < 0.0
-
-
-def test_the_samples_needed_lie_between_the_counts_where_the_curve_crosses():
     found = worth(curve(0, 40, 47, 50, 50))
     assert 100.0 < found.needed.low < found.needed.value < found.needed.high < 200.0
     assert 200.0 < found.without.low < found.without.value < found.without.high < 400.0
 
 
-def test_where_the_target_needs_no_sample_at_all_the_reduction_is_whole_and_the_factor_unbounded():
+def test_where_no_or_all_samples_are_needed_plv_has_a_bound():
     found = worth(curve(50, 50, 50, 50, 50))
     assert (found.needed.value, found.reduction.value, found.factor.value) == (0.0, 1.0, None)
 
-
-def test_a_proxy_with_which_the_learner_never_converges_has_no_plv_but_a_bound_of_it():
     found = worth(curve(0, 0, 0, 0, 0))
     assert (found.needed.value, found.needed.low, found.needed.high) == (None, pytest.approx(800.0), None)
     assert (found.plv.value, found.plv.low, found.factor.value) == (None, None, None)
     assert found.plv.high < 0.0
     assert found.plv.high == pytest.approx(found.without.high - 800.0)
 
-
-def test_a_level_that_the_learner_without_a_proxy_does_not_reach_leaves_plv_unknown():
     found = worth(curve(55, 58, 59, 59, 59), level=59.0)
     assert found.without.value is None
     assert found.plv.value is None
     assert found.plv.low > 0.0
 
+    found = worth(curve(40, 50, 58, 59, 59), level=59.0).reduction
+    assert found.value is None
+    assert 0.0 < found.low < found.high == 1.0
 
-def test_a_learner_counts_as_settled_where_the_last_doubling_gains_no_more_than_the_tolerance():
+
+def test_a_grid_is_settled_by_its_last_doubling_alone():
     rising = curve(np.nan, 10, 20, 30, 50)
     assert judged(proxy=curve(0, 10, 20, 30, 40)).settled
     assert not sample_needs({"none": rising}, best_score=60.0, tolerance=5.0).settled
-
-
-def test_a_grid_whose_first_count_is_beyond_half_its_last_tells_no_gain():
     alone = LearningCurve((0, 500, 800), np.array([[np.nan, 50.0, 50.0], [np.nan, 49.0, 51.0]]))
     needs = sample_needs({"none": alone}, best_score=60.0, tolerance=5.0)
     assert (needs.gain, needs.settled) == (None, False)
@@ -83,31 +77,24 @@ def test_a_grid_that_begins_at_half_its_last_tells_the_gain(grid):
     assert 20.0 < needs.gain < 35.0
 
 
-def test_what_is_needed_without_a_proxy_does_not_depend_on_which_proxy_it_is_held_against():
+def test_proxies_are_compared_by_what_they_need_whatever_beside():
     needs = judged(good=curve(20, 48, 50, 50, 50), never=curve(0, 0, 0, 0, 0))
     good, never = (teaching_value(needs, name) for name in ("good", "never"))
     assert good.without == never.without
     assert good.without.low > 200.0
-
-
-def test_a_reduction_is_bounded_but_not_known_where_the_learner_without_a_proxy_does_not_get_there():
-    found = worth(curve(40, 50, 58, 59, 59), level=59.0).reduction
-    assert found.value is None
-    assert 0.0 < found.low < found.high == 1.0
-
-
-def test_scores_beyond_the_best_and_its_negative_are_no_other_scores():
-    lower = {"none": curve(np.nan, -900, -600, -200, -190), "proxy": curve(-500, -200, -190, -190, -190)}
-    needs = sample_needs(lower, best_score=0.0, tolerance=20.0)
-    assert -195.0 < needs.when.level < -185.0
-    assert 200.0 < teaching_value(needs, "proxy").without.value < 800.0
-
-
-def test_two_proxies_are_compared_by_what_the_one_needs_more_than_the_other():
     needs = judged(good=curve(20, 48, 50, 50, 50), poor=curve(0, 10, 20, 48, 50))
     more = more_needed(needs, more="poor", less="good")
     assert 0.0 < more.low < more.value < more.high
     assert more_needed(needs, more="good", less="good").value == 0.0
+
+
+def test_scores_beyond_the_best_are_no_others_and_unit_costs_are_plv():
+    lower = {"none": curve(np.nan, -900, -600, -200, -190), "proxy": curve(-500, -200, -190, -190, -190)}
+    needs = sample_needs(lower, best_score=0.0, tolerance=20.0)
+    assert -195.0 < needs.when.level < -185.0
+    assert 200.0 < teaching_value(needs, proxy="proxy").without.value < 800.0
+    assert general_plv(without=(0.0, 900.0), with_proxy=(0.0, 100.0)) == plv(without=900.0, with_proxy=100.0) == 800.0
+    assert general_plv(without=(10.0, 5.0), with_proxy=(4.0, 1.0), cost_on=2.0, cost_off=3.0) == 24.0
 
 
 def test_the_mean_score_before_any_target_sample_has_an_interval_and_without_a_proxy_there_is_none():
@@ -116,11 +103,6 @@ def test_the_mean_score_before_any_target_sample_has_an_interval_and_without_a_p
     assert found.low < 20.0 < found.high
     assert found.high - found.low < 5.0
     assert mean_score(needs, "none", 0).value is None
-
-
-def test_general_plv_with_unit_costs_and_an_expert_only_is_plv():
-    assert general_plv(without=(0.0, 900.0), with_proxy=(0.0, 100.0)) == plv(without=900.0, with_proxy=100.0) == 800.0
-    assert general_plv(without=(10.0, 5.0), with_proxy=(4.0, 1.0), cost_on=2.0, cost_off=3.0) == 24.0
 
 
 SPENDING_GRID = (0, 100, 200, 400, 800, 1600)
@@ -155,26 +137,19 @@ def test_the_first_examinations_span_the_grid_in_two_repetitions_and_none_is_of_
     assert len(first) == len(set(first)) == 2 * (4 + 4)
 
 
-def test_a_proxy_whose_crossing_is_sure_is_examined_less_than_one_whose_is_open():
+def test_examinations_go_where_they_tell_most_and_nothing_twice():
     chosen = next_examinations(needs(), list(CURVES), SPENDING)
     often = {name: sum(one.curve == name for one in chosen) for name in CURVES}
     assert len(chosen) == SPENDING.batch
     assert often["sure"] < min(often["open"], often["none"])
 
-
-def test_nothing_is_examined_twice_and_new_repetitions_come_first():
-    chosen = next_examinations(needs(), list(CURVES), SPENDING)
     done = {Examination(name, int(r), SPENDING_GRID[c]) for name, one in CURVES.items() for r, c in one.examined}
     assert len(set(chosen)) == len(chosen)
     assert not set(chosen) & done
     assert chosen[0].repetition == 2
 
-
-def test_only_curves_that_are_asked_for_are_examined():
     assert {one.curve for one in next_examinations(needs(), ["open"], SPENDING)} == {"open"}
 
-
-def test_the_learner_without_a_proxy_alone_is_examined_for_how_many_samples_it_needs():
     alone = {"none": CURVES["none"]}
     chosen = next_examinations(needs(alone), ["none"], SPENDING)
     assert len(chosen) == SPENDING.batch

@@ -11,15 +11,12 @@ from proxytune.learning.ridge import RandomFeatures
 SMALL = RandomFeatures(rows=3, columns=4, features=200)
 
 
-def test_its_weights_are_the_least_of_squared_errors_and_penalty():
+def test_weights_and_features_are_those_of_their_formulas():
     samples = pictures(80, 1)
     weights = SMALL.train(samples, None, 1)
     waves = SMALL._waves(weights, samples.observations)
     left = samples.commands - weights["centre"] - waves @ weights["slopes"]
     np.testing.assert_allclose(waves.T @ left, SMALL.penalty * weights["slopes"], atol=1e-10)
-
-
-def test_its_features_are_those_of_a_gaussian_kernel():
     many = RandomFeatures(rows=3, columns=4, features=20_000, reach=0.2)
     seen = pictures(2, 1).observations
     first, second = many._waves({"seed": np.array(3)}, seen)
@@ -28,7 +25,7 @@ def test_its_features_are_those_of_a_gaussian_kernel():
     assert 0.1 < first @ second < 0.9
 
 
-def test_starting_from_weights_few_samples_leave_the_answer_to_other_pictures_as_it_was():
+def test_what_it_starts_from_is_kept_with_its_features():
     start = SMALL.train(pictures(400, 1), None, 1)
     fresh = pictures(200, 2)
     right, left = (np.flatnonzero(side)[:20] for side in (fresh.commands[:, 1] > 0.37, fresh.commands[:, 1] < 0.23))
@@ -38,8 +35,6 @@ def test_starting_from_weights_few_samples_leave_the_answer_to_other_pictures_as
     assert error(SMALL, tuned, few) < 0.1 * error(SMALL, start, few)
     assert error(SMALL, tuned, others) < 0.1 * error(SMALL, start, few)
 
-
-def test_it_goes_on_with_the_features_of_the_weights_it_starts_from_whatever_the_seed():
     start = SMALL.train(pictures(60, 1), None, 1)
     before = {name: values.copy() for name, values in start.items()}
     one, other = (SMALL.train(pictures(60, 2), start, seed) for seed in (1, 2))

@@ -16,8 +16,14 @@ def read(tmp_path, **changes):
     return read_teaching(Section(tmp_path / "study.toml", "teaching.", values))
 
 
-def test_without_the_table_nothing_is_taught(tmp_path):
+def test_without_a_word_nothing_is_taught_rehearsed_or_costs_more_than_one(tmp_path):
     assert read_teaching(Section(tmp_path / "study.toml", "teaching.", {})) is None
+    assert read(tmp_path).rehearsal == 0.0
+    assert read(tmp_path).later_keys == {}
+    assert read(tmp_path, rehearsal=0.5).later_keys == {"rehearsal": 0.5}
+    plain, other = read(tmp_path), read(tmp_path, proxy_lessons="learner", costs={"label": 2})
+    assert (plain.proxy_lessons, plain.target_lessons, plain.costs) == ("expert", "expert", Costs(1.0, 1.0, 0.0))
+    assert (other.later_keys, other.costs) == ({"proxy_lessons": "learner"}, Costs(1.0, 1.0, 2.0))
 
 
 def test_a_number_is_one_theta_and_a_pair_is_drawn_from(tmp_path):
@@ -25,18 +31,6 @@ def test_a_number_is_one_theta_and_a_pair_is_drawn_from(tmp_path):
     read_proxies = read(tmp_path, proxies=proxies).proxies
     assert dict(read_proxies["mixed"].bounds) == {"delay": (0.0, 0.2), "trim": (0.1, 0.1)}
     assert dict(read_proxies["nominal"].bounds) == {}
-
-
-def test_nothing_is_rehearsed_unless_it_is_asked_for(tmp_path):
-    assert read(tmp_path).rehearsal == 0.0
-    assert read(tmp_path).later_keys == {}
-    assert read(tmp_path, rehearsal=0.5).later_keys == {"rehearsal": 0.5}
-
-
-def test_the_expert_drives_and_a_sample_costs_one_unless_it_is_said_otherwise(tmp_path):
-    plain, other = read(tmp_path), read(tmp_path, proxy_lessons="learner", costs={"label": 2})
-    assert (plain.proxy_lessons, plain.target_lessons, plain.costs) == ("expert", "expert", Costs(1.0, 1.0, 0.0))
-    assert (other.later_keys, other.costs) == ({"proxy_lessons": "learner"}, Costs(1.0, 1.0, 2.0))
 
 
 @pytest.mark.parametrize("with_proxy", [False, True])

@@ -100,12 +100,9 @@ def test_what_a_diagnosis_is_for_draws_no_caution(case):
     assert cautions(make_log(case, episodes=3, seconds=40.0)) == ()
 
 
-def test_a_wheel_of_a_few_hundredths_of_a_millimetre_is_told():
+def test_thin_wheels_are_told_and_nothing_without_poses_or_figures():
     (line,) = figure_cautions({"wheel_radius": 3e-5, "full_speed": 0.6}, "robot mine")
     assert line.startswith("robot mine: its wheel_radius is 3e-05 m, and robots have 0.002 to 1.5 m")
-
-
-def test_without_poses_or_figures_nothing_is_said():
     lost = changed(lambda episode: replace(episode, poses=np.full_like(episode.poses, np.nan)))
     assert cautions(lost) == ()
     assert log_cautions(commanded(0.5), {}) == ()

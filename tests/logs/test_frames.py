@@ -45,12 +45,16 @@ def test_frames_have_their_own_times_and_numbers(folder):
     assert (frames.rectified, frames.readout_s, frames.fixed_exposure) == (False, None, False)
 
 
-def test_what_is_stated_of_the_camera_is_kept(folder):
+def test_what_is_stated_of_the_camera_and_its_map_is_kept(folder):
     stated = 'poses = { position_m = 0.005, heading_deg = 1.0 }\nexposure = "fixed"\nrectified = true\n'
     frames = read_log(folder(description=TOML + stated + 'shutter = "rolling"\nreadout_s = 0.02\n')).frames
     assert (frames.position_m, frames.heading_deg, frames.readout_s) == (0.005, 1.0, 0.02)
     assert frames.rectified
     assert frames.fixed_exposure
+    home = folder(description=TOML.replace("small_loop", "yard.toml"))
+    assert complaint(home) == "/log.toml: map: no such file: yard.toml; add it beside log.toml"
+    (home / "yard.toml").touch()
+    assert read_log(home).frames.road == str((home / "yard.toml").resolve())
 
 
 @pytest.mark.parametrize(
@@ -61,11 +65,18 @@ def test_a_global_shutter_takes_no_time_and_an_unstated_one_is_not_known(folder,
     assert read_log(folder(description=TOML + stated)).frames.readout_s == readout
 
 
-def test_frames_before_the_first_pose_and_after_the_last_are_left_out(folder):
+def test_frames_out_of_the_poses_time_are_left_out_or_refused(folder):
     listed = HEADER + "7,a,4.9\n8,a,5.0\n9,a,5.4\n10,b,0.0\n11,b,0.1\n12,b,9\n"
     frames = read_log(folder(listed, pictures=(8, 11))).frames
     assert [path.name for path in frames.paths] == ["0008.jpg", "0011.jpg"]
     assert frames.times.tolist() == [5.0, 0.1]
+    says = complaint(folder(HEADER + "7,a,1700000000\n8,a,1700000001\n"))
+    assert says.startswith("/frames.csv: line 2, column 'time': no frame lies within its episode's poses: ")
+    assert "the first of 'a' is at 1700000000 s, its poses between 5 and 5.3 s; write both in seconds" in says
+    nowhere = "episode,time,v,omega,x,y,heading\na,5,0,0,,,\na,5.1,0,0,,,\nb,0,0,0,,,\nb,0.1,0,0,,,\n"
+    assert "the first of 'a' is at 5.013 s, it has no pose" in complaint(folder(samples=nowhere))
+    (home := folder(samples=nowhere)).joinpath("frames.csv").unlink()
+    assert complaint(home).startswith("/samples.csv: no row has a pose; frames need the poses")
 
 
 @pytest.mark.parametrize("description", [BASE + 'frames = "frames/%04d.png"\nmap = "small_loop"\n', None])
@@ -90,22 +101,15 @@ def test_the_key_at_the_top_goes_with_a_list_and_with_what_else_is_stated(folder
     assert frames.rectified
 
 
-def test_a_log_that_was_passed_on_without_the_pictures_that_its_old_key_names_is_one_without_frames(folder):
+def test_a_log_without_pictures_or_from_tables_has_no_frames(folder):
     old = BASE + 'frames = "frames/%04d.png"\nmap = "small_loop"\n'
     assert read_log(folder(None, old, pictures=())).frames is None
     assert "no such picture, 5 of 6 are missing" in complaint(folder(None, old, pictures=(0,), ending="png"))
-
-
-def test_a_log_without_pictures_has_no_frames_whatever_its_map(folder):
     assert read_log(folder(description=BASE)).frames is None
     assert read_log(folder(description=BASE + 'map = "a yard of ours"\n')).frames is None
-
-
-def test_a_map_file_beside_the_log_is_kept_as_its_path(folder):
-    home = folder(description=TOML.replace("small_loop", "yard.toml"))
-    assert complaint(home) == "/log.toml: map: no such file: yard.toml; add it beside log.toml"
-    (home / "yard.toml").touch()
-    assert read_log(home).frames.road == str((home / "yard.toml").resolve())
+    table = pd.DataFrame({"episode": "a", "time": [0.0, 0.1], "x": 0.0, "y": 0.0, "heading": 0.0})
+    description = {"robot": "tractor", "command": "none", "map": "small_loop", "frames": "frames/%d.png"}
+    assert log_of(table, description).frames is None
 
 
 @pytest.mark.parametrize(
@@ -159,30 +163,6 @@ def test_a_mistake_in_frames_csv_is_one_line_with_file_line_and_column(folder, f
     assert complaint(folder(frames)).startswith(f"/frames.csv{says}")
 
 
-def test_frames_of_another_clock_are_refused_with_both_times(folder):
-    says = complaint(folder(HEADER + "7,a,1700000000\n8,a,1700000001\n"))
-    assert says.startswith("/frames.csv: line 2, column 'time': no frame lies within its episode's poses: ")
-    assert "the first of 'a' is at 1700000000 s, its poses between 5 and 5.3 s; write both in seconds" in says
-
-
-def test_frames_without_any_pose_are_refused(folder):
-    nowhere = "episode,time,v,omega,x,y,heading\na,5,0,0,,,\na,5.1,0,0,,,\nb,0,0,0,,,\nb,0.1,0,0,,,\n"
-    assert "the first of 'a' is at 5.013 s, it has no pose" in complaint(folder(samples=nowhere))
-    (home := folder(samples=nowhere)).joinpath("frames.csv").unlink()
-    assert complaint(home).startswith("/samples.csv: no row has a pose; frames need the poses")
-
-
-def test_missing_pictures_are_counted_and_the_first_is_named(folder):
-    remedy = "add them, or name those that there are in frames.csv"
-    assert complaint(folder(pictures=(7,))) == f"/frames/0009.jpg: no such picture, 2 of 3 are missing; {remedy}"
-
-
-def test_a_log_from_tables_has_no_frames():
-    table = pd.DataFrame({"episode": "a", "time": [0.0, 0.1], "x": 0.0, "y": 0.0, "heading": 0.0})
-    description = {"robot": "tractor", "command": "none", "map": "small_loop", "frames": "frames/%d.png"}
-    assert log_of(table, description).frames is None
-
-
 SMOOTH = np.stack(np.meshgrid(np.linspace(20, 230, 640), np.linspace(40, 200, 480)), axis=-1).astype(np.uint8)
 LARGE = np.concatenate((SMOOTH, 255 - SMOOTH[..., :1]), axis=-1)
 
@@ -202,14 +182,11 @@ def noise(rows, columns, seed=5):
     return np.random.default_rng((seed, rows, columns)).integers(0, 256, (rows, columns, 3), dtype=np.uint8)
 
 
-def test_a_picture_that_is_not_too_wide_stays_as_it_is(frames_of):
+def test_wider_pictures_are_averaged_and_others_stay(frames_of):
     picture = noise(90, 120)
     pictures = read_pictures(frames_of(picture), [0])
     assert pictures.dtype == np.uint8
     np.testing.assert_array_equal(pictures, picture[None])
-
-
-def test_every_pixel_of_a_wider_picture_counts_alike(frames_of):
     picture = noise(480, 640)
     mean = picture.reshape(120, 4, 160, 4, 3).mean(axis=(1, 3))
     np.testing.assert_allclose(read_pictures(frames_of(picture), [0])[0], mean, atol=1.01)
@@ -249,20 +226,16 @@ def test_some_of_the_pictures_are_read_in_the_order_asked_for(frames_of):
     assert len(read_pictures(frames, [])) == 0
 
 
-def test_pictures_of_two_sizes_are_refused_with_both(frames_of):
+def test_pictures_of_two_sizes_of_sixteen_bits_or_gone_are_refused(frames_of, folder):
     says = complaint_of(read_pictures, frames_of(noise(12, 16), noise(12, 16), noise(12, 20)), [0, 1, 2])
     assert says.endswith("2.png: is 20 × 12, but 0.png is 16 × 12; give all pictures one size")
-
-
-def test_sixteen_bits_a_pixel_are_refused(frames_of):
     deep = frames_of(Image.fromarray(np.full((12, 16), 40000, dtype=np.uint16)))
     assert "more than 8 bits a pixel" in complaint_of(read_pictures, deep, [0])
-
-
-def test_a_picture_that_is_gone_is_named(frames_of):
     frames = frames_of(noise(12, 16))
     frames.paths[0].unlink()
     assert complaint_of(read_pictures, frames, [0]) == f"{frames.paths[0]}: no such file; add the picture"
+    remedy = "add them, or name those that there are in frames.csv"
+    assert complaint(folder(pictures=(7,))) == f"/frames/0009.jpg: no such picture, 2 of 3 are missing; {remedy}"
 
 
 @pytest.mark.parametrize("ending", ["png", "jpg"])

@@ -39,12 +39,11 @@ def test_a_drive_without_such_is_itself(case):
         assert without_outliers(drive) is drive
 
 
-def test_a_robot_that_was_carried_elsewhere_is_not_off():
+def test_a_robot_that_was_carried_a_gap_or_few_poses_are_left_alone():
     assert not outliers(moved(np.arange(300, 600), (2.0, 0.0, 0.0))).any()
-
-
-def test_a_pose_beside_a_gap_is_not_off():
     assert not any(outliers(drive).any() for drive in false_names.make_log("bursts missing", "heavy", 5).episodes)
+    few = LogEpisode("few", DRIVE.times[:4], DRIVE.commands[:4], DRIVE.poses[:4], None)
+    assert without_outliers(few) is few
 
 
 def test_headings_that_were_unwrapped_along_a_wrong_one_are_unwrapped_anew():
@@ -70,8 +69,3 @@ def test_they_are_told_and_no_motion_is_learnt_from_them():
     (line,) = log_cautions(log, robot.figures)
     assert line.startswith("2 poses lie off the way for a sample or two (most in drive '00', 2)")
     assert np.abs(gather(log, robot, log.episodes).measured[:, :2]).max() < 0.1
-
-
-def test_a_drive_of_few_poses_is_left_alone():
-    few = LogEpisode("few", DRIVE.times[:4], DRIVE.commands[:4], DRIVE.poses[:4], None)
-    assert without_outliers(few) is few

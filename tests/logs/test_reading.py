@@ -46,17 +46,13 @@ def written(tmp_path):
     return write
 
 
-def test_commands_keep_their_own_times_and_poses_their_grid(folder):
+def test_the_command_in_force_is_the_newest_at_times_of_its_own(folder):
     first, second = read_log(folder()).episodes
     np.testing.assert_array_equal(first.issued, [5.013, 5.127, 9.5])
     np.testing.assert_array_equal(first.commands, [[0.5, 0.1], [0.6, 0.2], [0.7, 0.3]])
     np.testing.assert_allclose(first.times, [5.0, 5.1, 5.2, 5.3])
     assert np.isnan(first.poses[:, 0]).tolist() == [False, False, True, False]
     np.testing.assert_array_equal(second.issued, [0.0])
-
-
-def test_the_command_in_force_at_a_sample_is_the_newest_and_none_is_zero(folder):
-    first, second = read_log(folder()).episodes
     np.testing.assert_array_equal(first.held, [[0, 0], [0.5, 0.1], [0.6, 0.2], [0.6, 0.2]])
     np.testing.assert_array_equal(second.held, [[0.1, 0.2]] * 2)
 
@@ -82,17 +78,11 @@ def test_a_mistake_in_commands_is_one_line_with_file_line_and_column(folder, com
     assert complaint(folder(commands)).startswith(says)
 
 
-def test_commands_of_another_clock_are_refused_with_both_times(folder):
+def test_commands_of_another_clock_or_in_both_files_are_refused(folder):
     says = complaint(folder(GOOD.replace("a,5.013", "a,1.013").replace("a,5.127", "a,1.2").replace("a,9.5", "a,1.3")))
     assert "lie between 1.013 and 1.3 s, its poses between 5 and 5.3 s; write both in seconds of one clock" in says
-
-
-def test_commands_in_both_files_are_refused(folder):
     samples = "episode,time,v,omega,x,y,heading\na,5.0,0,0,1,2,0\na,5.1,0,0,1,2,0\n"
     assert complaint(folder(samples=samples)).startswith("/samples.csv: line 1: unknown column 'v'")
-
-
-def test_duties_beyond_full_are_refused_and_so_are_commands_of_still_frames(folder):
     duty = TOML.replace("twist", "duty")
     says = complaint(folder(GOOD.replace("v,omega", "left,right").replace("0.7,0.3", "0.7,1.3"), description=duty))
     assert says.startswith("/commands.csv: line 5, column 'right': a duty must be between -1 and 1, got 1.3")
@@ -164,7 +154,7 @@ def driven(*, degrees=False, wrapped=False, seconds=60.0, turn=0.5, backwards=Fa
     return pd.DataFrame(rows).to_csv(index=False)
 
 
-def test_commands_poses_and_times_are_read_as_written(written):
+def test_what_is_written_is_read_with_the_geometry_of_the_log(written):
     log = read_log(written())
     assert (log.name, log.robot, log.command, log.rate_hz, log.geometry) == ("yard", "tractor", "twist", 10.0, {})
     first, second = log.episodes
@@ -173,9 +163,6 @@ def test_commands_poses_and_times_are_read_as_written(written):
     np.testing.assert_array_equal(first.poses, [[1, 2, 0.5], [1.05, 2, 0.51]])
     np.testing.assert_allclose(second.times, [3.0, 3.1])
     assert first.wheels is None
-
-
-def test_geometry_of_the_log_is_in_the_figures_of_a_robot(written):
     text = TOML + "wheel_radius_m = 0.05\nbaseline_m = 0.3\nfull_speed_m_s = 1.5\n"
     figures = {"wheel_radius": 0.05, "effective_baseline": 0.3, "full_speed": 1.5}
     assert read_log(written(description=text)).geometry == figures
@@ -189,12 +176,7 @@ def test_each_kind_of_command_has_columns_of_its_own(written, command):
     np.testing.assert_array_equal(log.episodes[0].commands, [[0.5, 0.1], [0.6, 0.2]])
 
 
-def test_measured_wheel_speeds_are_read_and_may_be_empty(written):
-    (episode,) = read_log(written(WHEELS + "a,0,0,0,0,0,0,3,4\na,0.1,0,0,0,0,0,,\n")).episodes
-    np.testing.assert_array_equal(episode.wheels, [[3, 4], [np.nan, np.nan]])
-
-
-def test_still_frames_need_no_rate_and_no_commands(written):
+def test_still_frames_need_no_rate_and_no_commands_and_headings_no_course(written):
     description = 'format = 1\nrobot = "duckiebot"\ncommand = "none"\nframes = "frames/%04d.png"\nmap = "small_loop"\n'
     samples = "episode,time,x,y,heading\n0,0,0.8,1.5,3.2\n0,1.7,1.5,0.5,-1.3\n"
     log = read_log(written(samples, description))
@@ -203,9 +185,6 @@ def test_still_frames_need_no_rate_and_no_commands(written):
     assert episode.commands.shape == (2, 0)
     np.testing.assert_array_equal(episode.times, [0, 1.7])
     np.testing.assert_allclose(np.cos(episode.poses[:, 2]), np.cos([3.2, -1.3]))
-
-
-def test_headings_of_still_frames_are_not_compared_with_a_course(written):
     rows = pd.read_csv(io.StringIO(driven(degrees=True))).drop(columns=["v", "omega"])
     log = read_log(written(rows.to_csv(index=False), TOML.replace("twist", "none")))
     assert len(log.episodes[0].poses) == len(rows)
@@ -323,12 +302,14 @@ def test_a_mistake_in_samples_is_one_line_with_file_line_and_column(written, sam
     assert complaint(written(samples)).startswith(f"/samples.csv{says}")
 
 
-def test_duties_lie_between_full_backwards_and_full_ahead(written):
+def test_duties_and_wheel_speeds_are_read_within_what_they_can_be(written):
     duty = TOML.replace("twist", "duty")
     samples = ROWS.replace("v,omega", "left,right")
     read_log(written(samples.replace("0.6,0.2", "-1,1.0000001"), duty))
     says = complaint(written(samples.replace("0.6,0.2", "0.6,-1.01"), duty))
     assert says.startswith("/samples.csv: line 3, column 'right': a duty must be between -1 and 1, got -1.01")
+    (episode,) = read_log(written(WHEELS + "a,0,0,0,0,0,0,3,4\na,0.1,0,0,0,0,0,,\n")).episodes
+    np.testing.assert_array_equal(episode.wheels, [[3, 4], [np.nan, np.nan]])
 
 
 def test_rows_within_a_quarter_of_a_sample_are_on_the_grid(written):
@@ -354,17 +335,11 @@ def test_degrees_of_a_drive_that_hardly_turns_are_found_out(written, turn, start
     assert "look like degrees" in complaint(written(driven(turn=turn, start=start, degrees=True)))
 
 
-def test_turns_counted_through_one_episode_but_not_the_next_are_no_degrees(written):
+def test_degrees_are_told_from_counted_turns_and_headings_askew(written):
     samples = BESIDE + "a,0,0,1,1,1,365\na,0.1,0,1,1,1,365.1\nb,0,0,1,1,1,5\nb,0.1,0,1,1,1,5.1\n"
     np.testing.assert_allclose(read_log(written(samples)).episodes[1].poses[:, 2], [5, 5.1])
-
-
-def test_degrees_of_a_robot_that_turns_on_the_spot_are_found_out_where_they_wrap(written):
     rows = [f"a,{k / 10},0,1,1,1,{(k * 15 + 180) % 360 - 180}" for k in range(60)]
     assert "look like degrees" in complaint(written(BESIDE + "\n".join(rows) + "\n"))
-
-
-def test_a_heading_that_is_measured_askew_is_not_taken_for_degrees(written):
     table = pd.read_csv(io.StringIO(driven(turn=1.0)))
     for askew in (0.5, np.pi / 2, -2.0):
         read_log(written(table.assign(heading=table["heading"] + askew).to_csv(index=False)))

@@ -61,19 +61,13 @@ def test_a_robot_that_stands_has_its_pose_every_fifth_of_a_second(rows):
     assert found == [*range(21), *range(24, 20 + rows, 4), *range(20 + rows, ROWS)]
 
 
-def test_in_slow_rows_a_single_repeat_is_told_from_a_stand():
+def test_a_single_repeat_in_slow_rows_the_last_pose_and_rounding_are_no_stand():
     assert rows_in(log(held(STRAIGHT, 20, 2), rate_hz=5.0)) == [[*range(21), *range(22, ROWS)]]
     assert rows_in(log(stood(20, 2), rate_hz=5.0)) == [[*range(ROWS)]]
-
-
-def test_the_last_pose_of_a_log_that_repeats_its_poses_is_no_stand_either():
     every_second = STRAIGHT[::2].repeat(2)
     assert rows_in(log(held(every_second, 50, 10))) == [[*range(0, 51, 2)]]
     # Of a log whose poses are its own it is one: it may have stopped.
     assert rows_in(log(held(STRAIGHT, 50, 10))) == [[*range(51), 54, 58]]
-
-
-def test_steps_of_rounding_are_no_motion():
     rounded = np.round(1e-4 * np.random.default_rng(1).standard_normal(ROWS).cumsum(), 4).repeat(6)
     (found,) = rows_in(log(rounded))
     assert np.diff(found).max() <= 4

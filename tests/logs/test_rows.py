@@ -40,19 +40,10 @@ def test_rows_are_the_same_however_many_are_read_at_a_time(folder, end):
         np.testing.assert_allclose(episode.times, [0.0, 0.1, 0.2, 0.3, 0.4])
 
 
-def test_the_first_wrong_cell_of_the_first_wrong_column_is_told_from_however_far_down(folder):
+def test_mistakes_far_down_are_told_as_those_at_the_top(folder):
     wrong = {1: (",2,0.5", ",far,0.5"), 9: ("0.5,5", "fast,5"), 12: ("0.5,3", "slow,3")}
     assert "line 11, column 'v': must be a finite number, got 'fast'" in complaint(folder(changed(wrong)))
-
-
-def test_a_row_with_a_cell_too_many_is_told_by_its_line(folder):
     assert "line 9: has 8 cells, but the first line names 7" in complaint(folder(changed({7: (",2,", ",2,1,")})))
-
-
-def test_an_episode_that_comes_back_is_told_though_it_was_read_long_before(folder):
     again = [*ROWS, "a,0.9,0,0,0,0,0", "a,1.0,0,0,0,0,0"]
     assert "line 17, column 'episode': 'a' comes back" in complaint(folder(again))
-
-
-def test_what_is_no_csv_far_down_is_told(folder):
     assert "is not a CSV file" in complaint(folder([*ROWS, 'c,0.5,0,0,0,0,"0']))

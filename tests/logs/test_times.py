@@ -42,11 +42,22 @@ def jittered(seed=1, count=200, usual=0.05, by=0.01):
     return 3.0 + np.arange(count) * usual + random.uniform(-by, by, count)
 
 
-def test_poses_and_their_times_are_kept_as_measured(folder):
+def test_poses_keep_their_times_and_rate_and_gaps_stay_gaps(folder):
     times = jittered()
     (episode,) = read_log(folder(rows(times, circle(times)))).episodes
     np.testing.assert_array_equal(episode.measured.times, times)
     np.testing.assert_array_equal(episode.measured.poses, circle(times))
+
+    times = jittered(by=0.002)
+    log = read_log(folder(rows(times, circle(times))))
+    assert log.poses_hz == pytest.approx(20.0, rel=0.02)
+    assert log.rate_hz == pytest.approx(60.0, rel=0.02)
+
+    times = np.concatenate((jittered(count=50), jittered(count=50) + 4.0))
+    (episode,) = read_log(folder(rows(times, circle(times)))).episodes
+    inside = (episode.times > times[49] + 0.05) & (episode.times < times[50] - 0.05)
+    assert inside.sum() > 60
+    assert np.isnan(episode.poses[inside]).all()
 
 
 def test_the_grid_has_each_pose_where_the_robot_was_at_that_step(folder):
@@ -61,31 +72,13 @@ def test_the_grid_has_each_pose_where_the_robot_was_at_that_step(folder):
     assert unmoved > 2e-3, "the poses as they are would be off by far more"
 
 
-def test_the_rate_told_of_poses_is_theirs_and_not_the_grids(folder):
-    times = jittered(by=0.002)
-    log = read_log(folder(rows(times, circle(times))))
-    assert log.poses_hz == pytest.approx(20.0, rel=0.02)
-    assert log.rate_hz == pytest.approx(60.0, rel=0.02)
-
-
-def test_a_gap_stays_a_gap(folder):
-    times = np.concatenate((jittered(count=50), jittered(count=50) + 4.0))
-    (episode,) = read_log(folder(rows(times, circle(times)))).episodes
-    inside = (episode.times > times[49] + 0.05) & (episode.times < times[50] - 0.05)
-    assert inside.sum() > 60
-    assert np.isnan(episode.poses[inside]).all()
-
-
-def test_of_two_poses_at_one_step_the_later_takes_the_next(folder):
+def test_of_poses_near_one_step_those_are_kept_that_find_a_free_one(folder):
     times = 3.47 + np.array([0.0, 0.01, 0.02, 0.029, 0.031, 0.04, 0.05])
     (episode,) = read_log(folder(rows(times, circle(times)))).episodes
     np.testing.assert_array_equal(episode.measured.times, times)
     assert (np.diff(episode.measured.rows) > 0).all()
     known = episode.measured.rows
     np.testing.assert_allclose(episode.poses[known], circle(episode.times[known]), atol=1e-4)
-
-
-def test_poses_more_than_a_step_from_a_free_one_are_left_out(folder):
     times = 3.0 + np.sort(np.append(np.arange(100) * 0.02, 1.0 + np.arange(1, 9) * 1e-4))
     (episode,) = read_log(folder(rows(times, circle(times)))).episodes
     assert len(times) - 16 <= len(episode.measured.times) < len(times)

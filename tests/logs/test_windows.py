@@ -56,14 +56,12 @@ def assert_same(joined):
         np.testing.assert_allclose(one.poses, other.poses, atol=1e-9)
 
 
-def test_windows_of_a_drive_are_the_drive():
+def test_windows_of_a_drive_are_the_drive_also_by_whole_turns():
     joined = join_windows(windows())
     assert_same(joined)
     assert joined.episodes[0].name == f"{WHOLE.episodes[0].name} 0 to {WHOLE.episodes[0].name} 9"
-
-
-def test_headings_may_differ_by_whole_turns():
     assert_same(join_windows(windows(turned)))
+    assert join_windows(WHOLE) is WHOLE
 
 
 @pytest.mark.parametrize("change", [begun_anew, in_own_frame, apart])
@@ -71,10 +69,6 @@ def test_what_does_not_go_on_stays_as_it_is(change):
     log = windows(change)
     assert join_windows(log) is log
     assert not [line for line in log_cautions(log, {}) if "windows of" in line]
-
-
-def test_whole_drives_stay_as_they_are():
-    assert join_windows(WHOLE) is WHOLE
 
 
 def test_one_line_says_that_they_are_joined():

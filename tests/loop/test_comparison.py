@@ -43,12 +43,13 @@ def test_a_fall_is_claimed_where_the_intervals_are_apart(before, after, says):
     assert told == f"The simulator lacked: dead band (verdict: explained). With it, PRPV of the agents tuned on {says}."
 
 
-def test_what_has_no_name_is_not_given_one():
+def test_what_has_no_name_or_was_not_measured_is_told_as_that():
     curves = {**DIAGNOSIS, "effects": [], "verdict": "unexplained"}
     assert "what no named effect explains (verdict: unexplained)" in answer(curves, [prpv(HIGH, LOW)])
+    assert [row.key for row in compare_errors({**DIAGNOSIS, "camera": CAMERA})] == ["error", "markings_error"]
 
 
-def test_motion_and_camera_are_told_together():
+def test_motion_and_camera_are_told_together_above_a_floor():
     both = {**DIAGNOSIS, "camera": CAMERA}
     told = answer(both, [prpv(HIGH, LOW), *compare_errors(both)])
     assert "The simulator lacked: dead band and field of view" in told
@@ -56,13 +57,6 @@ def test_motion_and_camera_are_told_together():
     assert "displacement of markings falls from 2.94 px (2.8 to 3.07) to 0.23 px (0.21 to 0.26)" in told
     unchanged = {**both, "camera": {**CAMERA, "effects": []}}
     assert "markings" not in answer(unchanged, [prpv(HIGH, LOW), *compare_errors(unchanged)])
-
-
-def test_an_error_that_was_not_measured_has_no_row():
-    assert [row.key for row in compare_errors({**DIAGNOSIS, "camera": CAMERA})] == ["error", "markings_error"]
-
-
-def test_a_floor_is_a_value_with_an_interval_or_a_bracket():
     position, markings = compare_errors({**DIAGNOSIS, "camera": CAMERA})
     assert floor_text(position.before, position.unit) == "3.9 to 4.2 mm"
     assert floor_text(markings.before, markings.unit) == "0.23 px"
@@ -70,21 +64,15 @@ def test_a_floor_is_a_value_with_an_interval_or_a_bracket():
     assert (floor_text(LOW, ""), level_text(None, "")) == ("–", "–")
 
 
-def test_what_is_next_is_the_model_and_what_the_log_did_not_show():
+def test_what_is_next_follows_from_what_was_found():
     told = following(DIAGNOSIS, STUDIED, "loop/model.toml", {"trim": 0.01, "blur": 0.05})
     assert "Run your simulator with loop/model.toml" in told
     assert "from scores alone: blur 0.05" in told
     assert "trim" not in told
-
-
-def test_what_is_next_is_the_drive_that_tells_where_more_is_to_be_found():
     drive = {"name": "spins", "description": "turns on the spot"}
     partly = {**DIAGNOSIS, "verdict": "partly explained", "next_manoeuvre": drive}
     told = following(partly, STUDIED, "model.toml", {})
     assert told == "Log spins (turns on the spot), and close the loop with that log."
-
-
-def test_where_nothing_was_found_the_studys_own_next_step_is_told_unless_it_is_to_diagnose():
     assert following(DIAGNOSIS, STUDIED, "", {}) == "Raise budget from 20 to 40, to get closer."
     misfit = "No θ fits. Next: log drives and run `python -m proxytune diagnose LOG`."
     assert "log drives that can show saturation" in following(DIAGNOSIS, misfit, "", {})

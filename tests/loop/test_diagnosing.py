@@ -21,7 +21,7 @@ def extended(tmp_path, *changes):
     return settings, read_study_settings(study / "loop" / "extended")
 
 
-def test_the_extended_study_differs_by_its_name_and_proxy_alone(tmp_path):
+def test_the_extended_study_differs_by_name_proxy_and_effects_diagnosed(tmp_path):
     before, after = extended(tmp_path)
     assert (after.name, after.proxy.resolve()) == ("tiny_extended", (before.folder / "found.toml").resolve())
     assert [path.resolve() for path in after.targets] == [path.resolve() for path in before.targets]
@@ -31,8 +31,6 @@ def test_the_extended_study_differs_by_its_name_and_proxy_alone(tmp_path):
     assert dict(after.domain) == dict(before.domain)
     assert dict(load_family(after, after.proxy).effects)["dead_band.width"] == 0.149
 
-
-def test_effects_of_the_studys_proxy_stay_unless_the_diagnosis_has_them(tmp_path):
     proxy = ('truth = "twin.toml"', 'truth = "twin.toml"\nproxy = "proxy.toml"')
     effects = ('plant = "planar"\n', 'plant = "planar"\neffects = { delay = { delay = 0.1 } }\n')
     folder = write_tiny(tmp_path / "tiny")

@@ -44,11 +44,8 @@ def test_the_start_is_shown_in_which_the_proxy_before_is_furthest_from_the_targe
     assert mean_gap_m(after) < mean_gap_m(before)
 
 
-def test_an_agent_that_fails_from_every_start_is_not_shown(closed):
+def test_without_a_twin_or_from_failing_starts_nothing_is_shown(closed):
     assert drive_both(closed, "nobody") is None
-
-
-def test_without_a_twin_nothing_is_driven(closed):
     assert drive_both(replace(closed, loop=replace(closed.loop, twin=None)), "crawler") is None
 
 

@@ -86,22 +86,18 @@ def test_a_folder_without_permission_is_refused(tmp_path, refused):
         folder.chmod(0o700)
 
 
-def test_without_names_the_shipped_agents_that_no_tuning_sees_are_held_out(tmp_path):
+def test_agents_that_no_tuning_sees_are_held_out_whatever_they_are_called(tmp_path):
     folder = write_tiny(tmp_path / "tiny", NOBODY_HELD_OUT)
     held_out = open_loop(folder).held_out
     assert {"crawler", "edges", "wary"} <= set(held_out)
     assert not {"steady", "brisk", "daredevil"} & set(held_out)
 
-
-def test_shipped_agents_are_held_out_of_a_study_that_names_its_agents_otherwise(tmp_path):
     table = '[agents]\nslow = "steady"\nfast = "brisk"\nwild = "daredevil"\n\n[parameters]'
     changes = (NOBODY_HELD_OUT, ('agents = ["steady", "brisk", "daredevil"]\n', ""), ("[parameters]", table))
     held_out = open_loop(write_tiny(tmp_path / "tiny", *changes)).held_out
     assert {"crawler", "edges", "wary"} <= set(held_out)
     assert not {"steady", "brisk", "daredevil", "slow", "fast", "wild"} & set(held_out)
 
-
-def test_of_a_table_those_agents_are_held_out_that_it_has_beside_the_studys(tmp_path):
     folder = write_tiny(tmp_path / "tiny", NO_TRUTH, NOBODY_HELD_OUT)
     log = a_log(tmp_path / "log", LOG.replace("husky", "duckiebot"))
     (folder / "target.csv").write_text(TABLE)
@@ -141,7 +137,7 @@ def step(folder, inputs="a", name="log"):
     return (name, inputs, folder / name), (name, inputs, do), done
 
 
-def test_a_step_is_known_after_it_was_done_and_not_with_other_inputs(tmp_path):
+def test_a_step_is_done_as_long_as_inputs_and_output_are_there(tmp_path):
     first, doing, done = step(tmp_path)
     assert not Kept(tmp_path).has(*first)
     Kept(tmp_path).run(*doing)
@@ -149,16 +145,11 @@ def test_a_step_is_known_after_it_was_done_and_not_with_other_inputs(tmp_path):
     assert Kept(tmp_path).has(*first)
     assert not Kept(tmp_path).has(*step(tmp_path, "b")[0])
 
-
-def test_a_step_whose_output_is_gone_is_not_done(tmp_path):
     first, doing, _ = step(tmp_path)
+
     Kept(tmp_path).run(*doing)
     (tmp_path / "log").unlink()
     assert not Kept(tmp_path).has(*first)
-
-
-def test_a_step_that_was_broken_off_is_not_done_though_its_old_output_is_there(tmp_path):
-    first, doing, _ = step(tmp_path)
     Kept(tmp_path).run(*doing)
 
     def interrupted():
@@ -170,8 +161,6 @@ def test_a_step_that_was_broken_off_is_not_done_though_its_old_output_is_there(t
     assert not Kept(tmp_path).has(*first)
     assert not Kept(tmp_path).has(*step(tmp_path, "b")[0])
 
-
-def test_steps_do_not_forget_each_other(tmp_path):
     kept, steps = Kept(tmp_path), [step(tmp_path), step(tmp_path, name="diagnosis")]
     for _, doing, _ in steps:
         kept.run(*doing)
@@ -185,7 +174,7 @@ def test_a_broken_file_is_one_line_with_a_remedy(tmp_path, text):
         Kept(tmp_path)
 
 
-def test_a_digest_of_files_changes_with_content_and_names_and_not_with_hidden_or_compiled_files(tmp_path):
+def test_a_digest_of_files_changes_with_content_names_and_a_single_hidden_file(tmp_path):
     (tmp_path / "__pycache__").mkdir()
     (tmp_path / "one").write_text("1")
     before = digest_of_files(tmp_path)
@@ -197,8 +186,6 @@ def test_a_digest_of_files_changes_with_content_and_names_and_not_with_hidden_or
     (tmp_path / "one").rename(tmp_path / "two")
     assert len({before, changed, digest_of_files(tmp_path)}) == 3
 
-
-def test_a_digest_of_a_single_hidden_file_changes_with_its_content(tmp_path):
     model = tmp_path / ".model.toml"
     model.write_text("1")
     before = digest_of_files(model)

@@ -94,12 +94,9 @@ def test_brightness_has_no_floor_where_none_is_known(diagnosis):
     assert 0.0 < document["error"]["noise_floor"] <= document["error"]["after"]
 
 
-def test_there_are_four_figures_for_a_column(figures):
+def test_four_figures_for_a_column_say_what_they_show_in_which_unit(figures):
     assert set(figures) == {"camera_markings", "camera_displacement", "camera_ranking", "camera_error"}
     assert_readable(*figures.values())
-
-
-def test_axes_say_what_they_show_in_which_unit(figures):
     for name in ("camera_markings", "camera_displacement"):
         labels = {(axes.get_xlabel(), axes.get_ylabel()) for axes in figures[name].axes}
         assert {"column [px]", "row [px]"} <= {label for pair in labels for label in pair}
@@ -117,7 +114,7 @@ def test_the_markings_are_drawn_before_and_after_on_two_frames(figures, clean):
     assert len(camera_figures(clean)["camera_markings"].axes) == 2
 
 
-def test_outlines_of_the_fitted_camera_lie_on_the_edges_of_the_picture(diagnosis):
+def test_outlines_lie_on_the_edges_and_displaced_edges_are_drawn_where_they_went(diagnosis):
     edges, distances = diagnosis.named.full.views.edges, {}
     for name, fit in camera_models(diagnosis).items():
         own = (edges.frame == 4) & ~edges.white
@@ -125,9 +122,6 @@ def test_outlines_of_the_fitted_camera_lie_on_the_edges_of_the_picture(diagnosis
         at = np.abs(field[edges.row[own].astype(int), edges.column[own].astype(int)])
         distances[name] = np.nanmedian(at)
     assert 4.0 * distances[AFTER] < 2.0 < distances[DECLARED_MODEL]
-
-
-def test_displaced_edges_are_drawn_where_they_went(diagnosis):
     fit = diagnosis.named.model
     edges = fit.views.edges
     moved = replace(fit, views=replace(fit.views, edges=edges._replace(row=edges.row + 0.5)))
@@ -135,16 +129,13 @@ def test_displaced_edges_are_drawn_where_they_went(diagnosis):
     assert there - here == pytest.approx((0.0, 0.5), abs=0.2)
 
 
-def test_what_is_fixed_to_the_camera_points_as_the_measured_edges_do(diagnosis):
-    measured, _, fixed, _ = (axes.collections[0] for axes in displacement_figure(diagnosis).axes)
-    agreement = (measured.U * fixed.U + measured.V * fixed.V).sum()
-    assert agreement > 0.3 * np.hypot(measured.U, measured.V) @ np.hypot(fixed.U, fixed.V)
-
-
-def test_arrows_after_are_shorter_on_the_same_scale(diagnosis):
+def test_arrows_after_are_shorter_on_the_same_scale_and_what_is_fixed_to_the_camera_points_as_they_do(diagnosis):
     before, after, *_ = (axes.collections[0] for axes in displacement_figure(diagnosis).axes)
     assert before.scale == after.scale
     assert np.hypot(after.U, after.V).mean() < 0.3 * np.hypot(before.U, before.V).mean()
+    measured, _, fixed, _ = (axes.collections[0] for axes in displacement_figure(diagnosis).axes)
+    agreement = (measured.U * fixed.U + measured.V * fixed.V).sum()
+    assert agreement > 0.3 * np.hypot(measured.U, measured.V) @ np.hypot(fixed.U, fixed.V)
 
 
 def test_the_ranking_holds_every_loss_against_that_of_nothing_added(diagnosis, figures):
@@ -168,7 +159,7 @@ def test_every_frame_kept_aside_is_in_the_figure_of_errors(diagnosis, figures, c
     assert [line.get_marker() for line in axes.get_lines()].count(".") == 1
 
 
-def test_a_line_beside_its_place_is_told_in_millimetres_and_by_side(diagnosis):
+def test_what_was_found_is_told_with_its_place_its_size_and_what_fits_as_well(diagnosis):
     lines = (LaidLine("yellow line", 3, -0.006, (-0.008, -0.004)), LaidLine("yellow dashes", 1, 0.004, (0.002, 0.006)))
     none = Estimate(0.0, (-0.001, 0.001), "m")
     turned = Estimate(0.5, (0.4, 0.6), "deg")
@@ -181,25 +172,15 @@ def test_a_line_beside_its_place_is_told_in_millimetres_and_by_side(diagnosis):
     assert "white lines are 3.0 mm narrower than on the map" in told
     assert "the whole map lies off by 0.50° in heading" in told
 
-
-def test_what_covers_the_lens_is_told_with_its_place(diagnosis):
     told = camera_notes(replace(diagnosis, blemishes=(Blemish((60, 95), (60, 71), 0.0, 0.05),)))
     assert "something covers the lower right of the picture: columns 60 to 95, rows 60 to 71 of 96 × 72" in told
 
-
-def test_the_headline_says_what_a_verdict_means(clean):
-    assert camera_headline("mine", clean) == "mine: camera: nothing missing: the declared camera explains the frames"
-
-
-def test_something_left_over_is_told_in_pixels(diagnosis):
     gate = replace(diagnosis.residual_fields[0], nats=100.0, share=0.2)
     still_open = replace(diagnosis, residual_fields=(gate, gate))
     (note,) = [line for line in camera_notes(still_open) if line.startswith("left over")]
     assert f"{diagnosis.residual_fields[0].rms_px:.2f} px" in note
     assert "no physics yet" in note
 
-
-def test_each_effect_on_the_look_is_told_with_its_own_worth(diagnosis):
     sizes = {"defocus": 1.25, "vignetting": 1.5, "image_noise": None}
     looks = tuple(CameraEffect(name, (name,), None, size, ()) for name, size in sizes.items())
     told = camera_notes(replace(diagnosis, effects=(*diagnosis.effects, *looks)))
@@ -207,8 +188,10 @@ def test_each_effect_on_the_look_is_told_with_its_own_worth(diagnosis):
     assert "added vignetting: without it the error in brightness grows by 50 %" in told
     assert "added image_noise, which no model can predict pixel by pixel" in told
 
-
-def test_rivals_are_told_with_what_was_added(diagnosis):
     (roll,) = diagnosis.effects
     told = camera_notes(replace(diagnosis, effects=(replace(roll, rivals=("camera_yaw", "heading_offset")),)))
     assert told[0].endswith("; these frames fit camera_yaw, heading_offset as well")
+
+
+def test_the_headline_says_what_a_verdict_means(clean):
+    assert camera_headline("mine", clean) == "mine: camera: nothing missing: the declared camera explains the frames"

@@ -97,15 +97,9 @@ def values(axes, label):
     return np.asarray(drawn.get_xdata()), np.asarray(drawn.get_ydata())
 
 
-def test_every_figure_is_drawn_without_a_warning(figures):
+def test_every_figure_is_drawn_without_a_warning_for_a_column_and_says_what_it_shows_in_which_unit(figures):
     assert set(figures) == {"residual_over_time", "residual_map", "ranking", "effect_curve", "error"}
-
-
-def test_figures_can_be_read_in_a_column(figures):
     assert_readable(*figures.values())
-
-
-def test_axes_say_what_they_show_in_which_unit(figures):
     labels = {name: [(a.get_xlabel(), a.get_ylabel()) for a in figure.axes] for name, figure in figures.items()}
     assert labels["residual_over_time"] == [("time in the episode [s]", "distance to prediction\nin 2-s windows [mm]")]
     assert labels["residual_map"][-1][0] == "distance to prediction in 2-s windows [mm]"
@@ -116,7 +110,7 @@ def test_axes_say_what_they_show_in_which_unit(figures):
     assert [x for x, _ in labels["effect_curve"]][2:] == ["command [duty]"] * 2
 
 
-def test_the_error_figure_holds_the_errors_in_millimetres_and_degrees(diagnosis, figures):
+def test_the_error_figure_holds_the_errors_on_logarithmic_axes_with_the_floor_off_their_ends(diagnosis, figures):
     place, heading = figures["error"].axes
     for axes, factor, kinds in (
         (place, 1e3, ("before", "after")),
@@ -135,6 +129,14 @@ def test_the_error_figure_holds_the_errors_in_millimetres_and_degrees(diagnosis,
     assert np.ravel(bars) == pytest.approx(
         np.ravel([(1e3 * error.floor.lower, 1e3 * error.floor.upper) for error in diagnosis.errors])
     )
+
+    for axes, floors in zip(
+        figures["error"].axes,
+        ([1e3 * e.floor.lower for e in diagnosis.errors], [np.degrees(e.heading_floor) for e in diagnosis.errors]),
+        strict=True,
+    ):
+        assert axes.get_yscale() == "log"
+        assert axes.get_ylim()[0] < 0.95 * min(floors)
 
 
 def test_an_interval_without_end_is_not_drawn(diagnosis):
@@ -166,7 +168,7 @@ def test_many_episodes_become_a_median_with_a_band(diagnosis):
     assert len(bands) == 2
 
 
-def test_the_maps_share_one_scale_and_equal_axes(diagnosis, figures):
+def test_paths_on_the_maps_are_where_windows_were_measured_in_one_scale_and_equal_axes(diagnosis, figures):
     before, after, _ = figures["residual_map"].axes
     one, other = before.collections[0], after.collections[0]
     assert one.norm is other.norm
@@ -176,6 +178,13 @@ def test_the_maps_share_one_scale_and_equal_axes(diagnosis, figures):
     assert list(one.get_array()) == pytest.approx(both[DECLARED_MODEL].rms)
     assert list(other.get_array()) == pytest.approx(both[AFTER].rms)
 
+    drives = diagnosis.parts.tested
+    windows = cut(drives, 2.0)
+    path = figures["residual_map"].axes[0].collections[0].get_segments()[3]
+    rows = windows.increment[windows.window == 3]
+    assert path[0] == pytest.approx(drives.poses[windows.begin[3], 0, :2])
+    assert path[1:] == pytest.approx(drives.poses[rows, 1, :2])
+
 
 def test_an_axis_that_begins_late_says_why(diagnosis, figures):
     drives = diagnosis.parts.tested
@@ -184,25 +193,6 @@ def test_an_axis_that_begins_late_says_why(diagnosis, figures):
     late = drives.only(drives.first >= half)
     both = strayed(replace(diagnosis, parts=diagnosis.parts._replace(tested=late)))
     assert "the first was fitted" in residual_over_time(late, both).axes[0].get_xlabel()
-
-
-def test_errors_are_on_logarithmic_axes_with_the_floor_off_their_ends(diagnosis, figures):
-    for axes, floors in zip(
-        figures["error"].axes,
-        ([1e3 * e.floor.lower for e in diagnosis.errors], [np.degrees(e.heading_floor) for e in diagnosis.errors]),
-        strict=True,
-    ):
-        assert axes.get_yscale() == "log"
-        assert axes.get_ylim()[0] < 0.95 * min(floors)
-
-
-def test_a_path_on_the_map_is_where_the_window_was_measured(diagnosis, figures):
-    drives = diagnosis.parts.tested
-    windows = cut(drives, 2.0)
-    path = figures["residual_map"].axes[0].collections[0].get_segments()[3]
-    rows = windows.increment[windows.window == 3]
-    assert path[0] == pytest.approx(drives.poses[windows.begin[3], 0, :2])
-    assert path[1:] == pytest.approx(drives.poses[rows, 1, :2])
 
 
 def test_more_paths_than_can_be_told_apart_become_means_by_place(diagnosis, monkeypatch):
@@ -242,14 +232,12 @@ def test_every_effect_that_was_added_is_on_top_in_the_order_of_adding(diagnosis)
     assert {dot.get_label() for dot in dots(top)} == {"added"}
 
 
-def test_the_ranking_draws_the_threshold_of_the_rules_that_it_is_given(diagnosis):
+def test_the_ranking_says_what_was_added_and_the_threshold_and_is_not_drawn_without_a_candidate(diagnosis, clean):
     axes = ranking_figure(diagnosis.found, replace(diagnosis.rules, least_gain_nats=40.0)).axes[0]
     assert "least to be added: 40 nats" in axes.get_legend_handles_labels()[1]
-
-
-def test_with_nothing_added_the_ranking_begins_with_what_was_tried(clean):
     figure = ranking_figure(clean.found, clean.rules)
     assert [axes.get_title(loc="left") for axes in figure.axes] == ["tried alone", "any curve over"]
+    assert "ranking" not in motion_figures(replace(diagnosis, found=replace(diagnosis.found, tried=())))
 
 
 def test_rivals_are_marked_in_the_ranking(diagnosis):
@@ -314,12 +302,13 @@ def test_declared_parameters_give_way_to_the_curve_that_was_fitted_with_them(dia
     assert refit_beside_curve(declared, idle) == pytest.approx(dict(declared.theta), abs=0.02)
 
 
-def test_means_are_drawn_over_a_signal_that_has_a_figure_of_its_own():
+def test_panels_have_a_signal_of_their_own_and_every_motion_a_name():
     forms = [(CATALOGUE[name].trace, form.form) for name in MOTION_EFFECTS for form in EVERY if form.effect == name]
     shown = [trace.shown_in(form) for trace, form in forms]
     means = [one for one in shown if isinstance(one, Means)]
     assert len(means) >= 6
     assert all(one.cue in CUE_PANELS and one.panels for one in means)
+    assert set(MOTIONS) == set(NAMES)
 
 
 EVERY = candidates(ROBOT, {}, ("trim", "delay"))
@@ -387,10 +376,6 @@ def test_a_curve_that_says_nothing_is_not_drawn(diagnosis):
         assert all(line.get_label() != ANY for axes in effect_curve(one).axes for line in axes.get_lines())
 
 
-def test_without_a_candidate_there_is_no_ranking(diagnosis):
-    assert "ranking" not in motion_figures(replace(diagnosis, found=replace(diagnosis.found, tried=())))
-
-
 KNOTS = {"speed_and_turn": ((-0.2, -1.0), (0.2, 1.0)), "direction": (-1.0,), "heading": (1.0, 2.0)}
 KNOTS["place"] = ((-0.25, 0.25), (0.25, -0.25), (0.25, 0.25))
 KNOTS["ramped"] = ((0.0, 0.5), (0.5, 0.0), (0.5, 0.5))
@@ -422,11 +407,12 @@ def test_every_group_is_drawn_without_a_warning_and_every_panel_has_units():
     assert len({axes.get_xlabel() for axes in shown if axes.get_xlabel()}) == len(GROUPS) - 1  # the level is no curve
 
 
-def test_a_curve_is_drawn_through_its_weights_and_through_nothing_at_rest():
+def test_what_is_learnt_is_drawn_through_its_weights_and_nothing_where_nothing_is_used():
     figure = learnt_figure(learning("turn_rate"))
     line = figure.axes[2].get_lines()[0]
     np.testing.assert_allclose(line.get_xdata(), (0.0, 0.5, 1.0, 2.0))
     np.testing.assert_allclose(line.get_ydata(), np.degrees((0.0, 0.01, 0.02, 0.03)))
+    assert learnt_figure(Learning(Discrepancy({"learnt.turn_rate.yaw@1.0": 0.1}), (), False)) is None
 
 
 def test_harmonics_of_the_heading_are_drawn_as_what_they_add_up_to():
@@ -437,10 +423,6 @@ def test_harmonics_of_the_heading_are_drawn_as_what_they_add_up_to():
     np.testing.assert_allclose(forward.get_ydata(), expected, atol=1e-9)
 
 
-def test_nothing_is_drawn_where_nothing_is_used():
-    assert learnt_figure(Learning(Discrepancy({"learnt.turn_rate.yaw@1.0": 0.1}), (), False)) is None
-
-
 DRIVES = planted_drives(TRUTH, episodes=1, seconds=10.0)
 
 
@@ -448,10 +430,6 @@ DRIVES = planted_drives(TRUTH, episodes=1, seconds=10.0)
 def test_every_signal_of_a_panel_is_known_at_each_increment(signal):
     rates = Rates(dict.fromkeys(MOTIONS, np.ones(len(DRIVES.measured))), {})
     assert np.isfinite(_signal(DRIVES, rates, None, Panel(signal, "", "forward"))).sum() == len(DRIVES.measured)
-
-
-def test_every_motion_of_a_panel_has_a_name():
-    assert set(MOTIONS) == set(NAMES)
 
 
 FIGURES = Path(proxytune.__file__).parent / "report" / "diagnosis"

@@ -70,30 +70,28 @@ def test_what_was_fitted_stands_beside_what_was_found_before_the_verdict():
     assert nothing == "run: nothing missing, with trim 0.043: only noise is left"
 
 
-def test_an_effect_that_was_added_says_what_the_error_is_without_it():
+def test_an_effect_that_was_added_says_its_worth_and_windows_what_they_did():
     (note,) = motion_notes(diagnosis(effects=(BAND,), effect_sizes={"dead_band": MUCH}))
     assert note == (
         "added dead_band (left wheel): log-likelihood gain 900 nats, p = 0.002; "
         "without it the error grows by 34 % (20 to 50) at 2 s"
     )
+    polish = MultistepFit(2.0, {1.0: Ratio(0.95, (0.9, 1.0)), 2.0: Ratio(0.8, (0.7, 0.9))}, {})
+    (note,) = motion_notes(diagnosis(multistep=polish))
+    assert "fitted to windows of 2 s" in note
+    assert "1 s: 0.95, 2 s: 0.80" in note
 
 
-def test_an_effect_that_is_shown_not_to_matter_is_called_immaterial():
+def test_an_effect_is_immaterial_only_where_that_is_shown():
     (note,) = motion_notes(diagnosis(negligible=(SLIP,), effect_sizes={"lateral_slip": SURE}))
     assert note == (
         "detectable but immaterial: lateral_slip 0.0024 s, log-likelihood gain 75 nats, "
         "changes the error at 5 s by 1.0 % (−1.0 to +3.0)"
     )
-
-
-def test_an_effect_that_may_matter_is_not_called_immaterial():
     (note,) = motion_notes(diagnosis(negligible=(SLIP,), effect_sizes={"lateral_slip": LITTLE}))
     assert note.startswith(
         "not shown to matter: lateral_slip 0.0024 s, log-likelihood gain 75 nats, changes the error at 5 s by 1.0 % "
     )
-
-
-def test_an_effect_that_could_not_be_weighed_is_not_shown_to_matter():
     assert motion_notes(diagnosis(negligible=(SLIP,))) == [
         "not shown to matter: lateral_slip, log-likelihood gain 75 nats"
     ]
@@ -111,13 +109,6 @@ def test_the_next_drive_is_told_with_what_it_tells_and_how_often_to_drive_it():
     assert told(50.0, "a", "b", verdict="cannot be told")[1] == "the same drives tell noise from what is missing"
 
 
-def test_parameters_fitted_to_windows_are_told_with_what_that_did():
-    polish = MultistepFit(2.0, {1.0: Ratio(0.95, (0.9, 1.0)), 2.0: Ratio(0.8, (0.7, 0.9))}, {})
-    (note,) = motion_notes(diagnosis(multistep=polish))
-    assert "fitted to windows of 2 s" in note
-    assert "1 s: 0.95, 2 s: 0.80" in note
-
-
 def test_a_ratio_is_told_as_what_it_adds():
     value, ends = per_cent(Ratio(1.25, (0.9, 2.0)))
     assert (value, *ends) == pytest.approx((25.0, -10.0, 100.0))
@@ -126,12 +117,9 @@ def test_a_ratio_is_told_as_what_it_adds():
     assert not may_matter(SURE, RULES.material_factor)
 
 
-def test_a_value_at_the_end_of_its_range_is_no_physics():
+def test_the_headline_warns_of_values_at_an_end_and_of_false_names():
     ends = diagnosis(effects=(BAND,), edges=BAND.names, verdict="partly explained")
     assert "dead_band.width at the end of the range stands for something else" in motion_headline(ends)
-
-
-def test_a_name_is_told_with_how_many_false_ones_chance_adds():
     assert "expected false names: at most 0.02" in motion_headline(diagnosis(effects=(BAND,)))
     assert "false names" not in motion_headline(diagnosis())
 
@@ -162,10 +150,14 @@ def test_the_document_has_what_was_promised_and_can_be_written():
     assert clocks_document((found, clocks()))["test"]["offset_s"] == 0.0
 
 
-def test_one_clock_is_no_news_but_a_delay_is_said_to_be_one_number_with_an_offset():
+def test_one_clock_is_no_news_and_a_declared_offset_is_told_instead_of_a_doubt():
     assert clocks_notes("yard", (clocks(),), {}) == []
     (note,) = clocks_notes("yard", (clocks(),), {"delay": 0.1})
     assert "one number" in note
+    declared = replace(clocks(), declared_s=-0.25)
+    assert clocks_document((declared,))["declared_offset_s"] == -0.25
+    (note,) = clocks_notes("yard", (declared,), {"delay": 0.1})
+    assert note == "poses of yard are stamped -0.25 s later than commands, as it declares; that was taken out"
 
 
 @pytest.mark.parametrize(
@@ -190,13 +182,6 @@ def test_what_is_wrong_is_one_sentence_with_what_to_do(found, says):
     assert any(word in note for word in ("Stamp both", "Check how", "Keep clocks"))
 
 
-def test_an_offset_that_the_log_declares_is_told_instead_of_a_doubt():
-    declared = replace(clocks(), declared_s=-0.25)
-    assert clocks_document((declared,))["declared_offset_s"] == -0.25
-    (note,) = clocks_notes("yard", (declared,), {"delay": 0.1})
-    assert note == "poses of yard are stamped -0.25 s later than commands, as it declares; that was taken out"
-
-
 RATIO = Ratio(0.5, (0.4, 0.6))
 ERROR = LearntError(2.0, Rmse(0.01, (0.009, 0.011)), Rmse(0.02, (0.01, 0.03)), RATIO)
 THETA = {"learnt.turn_rate.yaw@1.0": 0.1}
@@ -205,42 +190,30 @@ USED = Learning(Discrepancy(THETA, SHARE, {2.0: RATIO}, True), (ERROR,), False)
 REFUSED = Learning(Discrepancy(THETA, SHARE, {2.0: RATIO}, False), (), False)
 
 
-def test_the_document_has_groups_shares_and_ratios_by_horizon():
+def test_the_document_has_groups_shares_and_ratios_and_of_what_is_refused_its_guard():
     told = json.loads(json.dumps(learnt_document(USED)))
     assert told["used"] is True
     assert told["groups"] == ["turn rate", "heading"]
     assert told["share"] == SHARE
     assert told["ratio"] == {"2": {"value": 0.5, "interval": [0.4, 0.6]}}
     assert told["errors"][0]["after"] == 0.01
-
-
-def test_what_is_refused_has_no_groups_but_its_guard_is_told():
     told = learnt_document(REFUSED)
     assert (told["used"], told["groups"], told["share"], told["ratio"]) == (False, [], {}, {})
     assert told["guard"]["2"]["value"] == 0.5
 
 
-def test_a_note_says_what_it_is_worth_and_that_it_is_no_physics():
+def test_what_is_learnt_is_told_with_its_worth_as_no_physics_and_doubtful_names_are_warned_of():
     (note,) = learnt_notes(USED)
     assert "not physics" in note
     assert "turn rate (75 %)" in note
     assert "2 s: 10.0 mm, 0.50 (0.40 … 0.60)" in note
-
-
-def test_what_was_tried_and_left_out_is_told():
-    (note,) = learnt_notes(REFUSED)
-    assert "left out" in note
-
-
-def test_doubtful_names_are_warned_of_and_values_that_moved_with_the_curves_are_told():
+    (refused,) = learnt_notes(REFUSED)
+    assert "left out" in refused
     moved = replace(USED, discrepancy=replace(USED.discrepancy, theta={**THETA, "delay": 0.1}), names_doubtful=True)
     _, own, warning = learnt_notes(moved)
     assert own == "fitted along with the curves: delay 0.1"
     assert "names are likely wrong" in warning
     assert learnt_document(moved)["names_doubtful"] is True
-
-
-def test_nothing_is_said_where_nothing_was_found():
     assert learnt_notes(Learning(Discrepancy(), (), False)) == []
 
 
@@ -255,7 +228,7 @@ FOUND = RobotClusters("left", (0.88, 1.02), ((0, 2), (1, 3)))
 NAMES = ("a", "b", "c", "d")
 
 
-def test_both_groups_are_told_with_their_gains():
+def test_groups_of_drives_are_told_with_their_gains_and_only_where_they_differ():
     told = json.loads(json.dumps(unlike_document(FOUND, NAMES)))
     assert told == {
         "wheel": "left",
@@ -264,9 +237,6 @@ def test_both_groups_are_told_with_their_gains():
     (note,) = unlike_notes(FOUND, NAMES)
     assert "0.88 in a, c but 1.02 in b, d" in note
     assert "diagnose each group alone" in note
-
-
-def test_drives_that_are_alike_are_no_news():
     assert unlike_document(None, NAMES) is None
     assert unlike_notes(None, NAMES) == []
 

@@ -55,24 +55,24 @@ def test_it_is_one_column_wide_with_map_commands_and_pictures_of_both(pair):
     assert len(pictures) == 8
 
 
-def test_both_are_named_in_their_colours_with_what_they_scored(pair):
+def test_both_are_named_in_their_colours_with_scores_and_the_time_at_which_they_part(pair):
     ways = axes_of(episode_figure(pair, ["distance"]))[0]
     for side, words in (("proxy", "proxy: distance 1 m"), ("target", "target: distance 0.2 m")):
         (text,) = (text for text in ways.texts if text.get_text() == words)
         assert text.get_color() == COLOURS[side]
         assert f"{side} ends" in texts(ways)
     assert "start" in texts(ways)
-
-
-def test_the_time_at_which_they_part_stands_over_the_commands(pair):
     assert "5 cm apart at 0.2 s (ring on the map)" in texts(axes_of(episode_figure(pair, []))[1])
     assert say_parting(pair) == "Their places are first more than 5 cm apart at 0.2 s."
 
 
-def test_an_episode_alone_has_nothing_of_a_target():
+def test_an_episode_alone_and_one_that_stands_still_can_be_drawn():
     ways, commands = axes_of(episode_figure(paired(recorded(lambda time: 0.5 * time)), []))
     assert texts(ways) == ["start", "proxy ends", "proxy: "]
     assert texts(commands) == []
+    figure = episode_figure(paired(recorded(lambda time: 0.0 * time)), [])
+    figure.draw_without_rendering()
+    assert len(axes_of(figure)[0].lines) == 3, "path, start and end; no arrow"
 
 
 def test_on_a_road_the_whole_map_is_shown_and_commands_are_duties(pair):
@@ -81,12 +81,6 @@ def test_on_a_road_the_whole_map_is_shown_and_commands_are_duties(pair):
     assert ways.get_xlim() == (0.0, on_road.road.size[0])
     assert len(ways.images) == 1
     assert commands.get_ylabel() == "push\n[duty]"
-
-
-def test_a_robot_that_stands_still_can_be_drawn():
-    figure = episode_figure(paired(recorded(lambda time: 0.0 * time)), [])
-    figure.draw_without_rendering()
-    assert len(axes_of(figure)[0].lines) == 3, "path, start and end; no arrow"
 
 
 @given(st.floats(0.1, 30.0), st.integers(2, 400))
@@ -107,8 +101,11 @@ def centres(marks, corners):
     return np.array(marks) + np.array(corners) * (SIZE / 2.0 + GAP) * 2.0
 
 
-def test_a_label_alone_stands_to_the_right_and_above():
+def test_labels_stand_apart_and_hide_no_path():
     assert corners_of(np.array([(1.0, 1.0)]), NOTHING, LOW, HIGH) == [(1, 1)]
+    path = np.column_stack((np.linspace(1.0, 2.0, 50), np.linspace(1.0, 1.3, 50)))
+    (corner,) = corners_of(np.array([(1.0, 1.0)]), path, LOW, HIGH)
+    assert corner == tuple(CORNERS[1])
 
 
 @given(st.floats(0.0, 2.0), st.floats(0.0, 2.0))
@@ -124,12 +121,6 @@ def test_two_marks_close_by_have_labels_apart(x, y):
     marks = np.array([(1.0, 1.0), (1.0 + x, 1.0 + y)])
     one, two = centres(marks, corners_of(marks, NOTHING, LOW, HIGH))
     assert (np.abs(one - two) >= 2.0 * SIZE - 1e-9).any()
-
-
-def test_a_path_is_not_hidden_where_there_is_room_beside_it():
-    path = np.column_stack((np.linspace(1.0, 2.0, 50), np.linspace(1.0, 1.3, 50)))
-    (corner,) = corners_of(np.array([(1.0, 1.0)]), path, LOW, HIGH)
-    assert corner == tuple(CORNERS[1])
 
 
 ENCODER = """#!{python}
@@ -170,25 +161,19 @@ def halves(frame):
     return frame[:, :middle], frame[:, middle:]
 
 
-def test_it_has_ten_frames_a_second_to_the_end_of_the_longer_and_lingers(animation):
+def test_frames_of_even_size_come_ten_a_second_to_the_end_of_the_longer_which_lingers(animation):
     times = np.array(animation.times)
     assert np.allclose(times[:21], np.arange(21) / FRAME_HZ)
     assert len(times) == 21 + LINGER_S * FRAME_HZ
     assert (times[20:] == times[20]).all()
-
-
-def test_frames_are_of_even_size_as_encoders_ask_for(animation):
     rows, columns, colours = animation.frame(0.0).shape
     assert (rows % 2, columns % 2, colours) == (0, 0, 3)
 
 
-def test_a_frame_depends_on_its_time_alone(animation):
+def test_a_frame_depends_on_its_time_alone_and_a_side_that_has_ended_stays(animation):
     first = animation.frame(0.3)
     assert not np.array_equal(animation.frame(1.2), first)
     assert np.array_equal(animation.frame(0.3), first)
-
-
-def test_a_side_that_has_ended_stays_as_it_was_while_the_other_goes_on(animation):
     (proxy, target), (proxy_later, target_later) = halves(animation.frame(1.0)), halves(animation.frame(1.7))
     assert np.array_equal(target, target_later)
     assert not np.array_equal(proxy, proxy_later)

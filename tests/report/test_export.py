@@ -160,13 +160,10 @@ def with_urdf(folder, *changes):
     return replace(ROBOT, urdf=folder / "changed.urdf")
 
 
-def test_a_link_may_have_a_quote_in_its_name(tmp_path):
+def test_names_with_quotes_and_numbers_that_are_none_are_told_or_taken(tmp_path):
     robot = with_urdf(tmp_path, ('"wheel_left"', '"wheel\'s"'))
     root = ET.fromstring(urdf_text(instance(robot, wheel_gain__left=0.9)))
     assert read_body(root, Path("exported.urdf")).left.radius_m == pytest.approx(0.0318 * 0.9)
-
-
-def test_a_urdf_with_a_number_that_is_none_is_one_line(tmp_path):
     joint = (
         '<joint name="spot" type="fixed"><parent link="p"/><child link="tracked_point"/><origin xyz="a b c"/></joint>'
     )
@@ -200,11 +197,6 @@ def parameters():
         yield from ((effect.name, name, one) for name, one in zip(theta_names(effect), effect.parameters, strict=True))
 
 
-def test_every_place_is_of_an_effect_of_the_catalogue():
-    assert set(PLACES["differential"]) <= set(CATALOGUE)
-    assert set(PLACES["ackermann"]) <= set(CAR_CATALOGUE)
-
-
 @pytest.mark.parametrize("form", FORMATS)
 @pytest.mark.parametrize(("effect", "name", "parameter"), list(parameters()), ids=lambda value: str(value)[:30])
 def test_a_value_changes_the_file_where_it_has_a_place_and_nowhere_else(form, effect, name, parameter):
@@ -219,13 +211,12 @@ def test_a_value_changes_the_file_where_it_has_a_place_and_nowhere_else(form, ef
     assert (texts[0] != texts[1]) == bool(place_of(effect, form))
 
 
-def test_neutral_values_that_have_no_place_are_not_told():
+def test_values_without_a_place_are_not_told_where_neutral():
     names = [line.name for line in export_lines(instance(dead_band__width=0.0, turn_slip=0.0), "urdf")]
     assert not {"dead_band.width", "turn_slip"} & set(names)
-
-
-def test_what_was_learnt_and_a_users_own_have_no_place():
     assert [place_of(name, form) for name in ("learnt", "weak_reverse:WeakReverse") for form in FORMATS] == [""] * 6
+    assert set(PLACES["differential"]) <= set(CATALOGUE)
+    assert set(PLACES["ackermann"]) <= set(CAR_CATALOGUE)
 
 
 @pytest.mark.parametrize("name", CATALOGUE)

@@ -24,38 +24,29 @@ def test_a_clear_winner_is_said_to_predict_best_and_to_be_used():
     assert families_next_step(found) == "use bullet to predict; its page: study/families/bullet/report.html."
 
 
-def test_of_those_that_cannot_be_told_apart_the_one_that_costs_least_is_to_be_used():
+def test_of_those_alike_the_cheapest_is_used_and_else_what_would_tell_them_apart_is_said():
     found = compared(*BOTH)
     assert "; cannot be told from it: planar +0 (" in families_answer(found)
     assert families_next_step(found).startswith(
         "use planar to predict, which costs least of those; to tell them apart, "
     )
-
-
-def test_where_they_cost_alike_too_what_would_tell_them_apart_is_said():
     found = compared(family("a", 0, CHEAP, noise=8.0), family("b", 0, CHEAP, noise=8.0))
     assert families_next_step(found) == "to tell a and b apart, raise starts and measure the target from them too."
     assert "cannot be told from it: b 1 (1 to 1)." in families_answer(found)
 
 
-def test_a_ratio_of_hundreds_is_written_out():
-    found = compared(family("a", 0, CHEAP), family("b", 1, tuple(131.0 * one for one in CHEAP)))
-    assert "times as long: b 130 (130 to 130)." in families_answer(found)
-
-
-def test_no_better_than_chance_is_said():
+def test_nothing_is_claimed_of_chance_or_without_fresh_episodes():
     found = compared(family("a", 4, noise=0.1), family("b", 4, noise=0.1))
     for one in found.families:
         object.__setattr__(one.fresh.chance, "p_value", 0.4)
     assert found.families[0].fresh.chance.explains
     assert "To predict: none is shown to be better than chance; lowest is a, fresh PRPV" in families_answer(found)
     assert families_next_step(found).startswith("raise stop.wall_time_s (now 60)")
-
-
-def test_without_fresh_episodes_nothing_is_claimed():
     found = compared(family("a", fresh=False), family("b", fresh=False))
     assert "To predict: not known, since no family has fresh episodes." in families_answer(found)
     assert families_next_step(found).startswith("run the study again")
+    found = compared(family("a", 0, CHEAP), family("b", 1, tuple(131.0 * one for one in CHEAP)))
+    assert "times as long: b 130 (130 to 130)." in families_answer(found)
 
 
 @pytest.mark.parametrize(
@@ -96,13 +87,10 @@ def test_the_figure_has_a_panel_per_use_and_tells_best_alike_and_worse_apart():
     assert_readable(figure)
 
 
-def test_an_interval_of_which_one_end_is_not_known_is_drawn_to_the_other():
+def test_the_figure_draws_open_intervals_and_has_no_panel_of_teaching_without_it():
     lessons = {"a": lesson(-20.0), "b": replace(lesson(-30.0), plv=LearningEstimate(-30.0, None, 5.0))}
     plv = families_figure(compared(family("a"), family("b"), lessons=lessons)).axes[1]
     assert [-30.0, 5.0] in [list(line.get_xdata()) for line in plv.lines]
-
-
-def test_without_teaching_the_figure_has_no_panel_of_it_and_a_long_name_is_shortened():
     figure = families_figure(compared(family("a" * 40), family("b", 2)))
     assert len(figure.axes) == 2
     assert figure.axes[0].get_yticklabels()[0].get_text() == f"{'a' * 15}…"

@@ -31,15 +31,12 @@ def test_a_name_stands_right_of_the_panel_at_the_end_of_its_line_in_its_colour()
     assert all(text.get_position()[0] > 1.0 for text in axes.texts)
 
 
-def test_places_are_moved_as_little_as_it_takes_and_keep_their_order():
+def test_places_are_moved_as_little_as_it_takes_in_their_order_within_the_panel_where_they_fit():
     assert spread_places([0.9, 0.1], 0.1) == [0.9, 0.1]
     np.testing.assert_allclose(spread_places([0.5, 0.5, 0.9], 0.1), [0.45, 0.55, 0.9])
     found = spread_places([0.0, 0.01, 0.0], 0.1)
     assert min(found) == 0.0
     assert sorted(found) == [found[0], found[2], found[1]]
-
-
-def test_places_stay_within_the_panel_where_they_fit():
     np.testing.assert_allclose(spread_places([1.0, 1.0, 1.0], 0.1), [0.8, 0.9, 1.0])
     np.testing.assert_allclose(spread_places([0.0, 1.0, 1.0], 0.4), [0.0, 0.6, 1.0])
     assert max(spread_places([0.3] * 5, 0.25)) == 1.0

@@ -106,14 +106,11 @@ def test_nothing_is_loaded_from_elsewhere_and_no_script_may_run():
     assert "script-src" not in policy
 
 
-def test_headings_come_in_order_one_of_them_the_first():
+def test_headings_come_in_order_and_tables_have_scopes_captions_and_regions_that_the_keyboard_reaches():
     tags = [tag for tag, _ in Reader(html_of(VIEW)).elements if re.fullmatch(r"h\d", tag)]
     assert tags[0] == "h1"
     assert tags.count("h1") == 1
     assert set(tags[1:]) == {"h2"}
-
-
-def test_tables_have_scopes_and_captions_and_scroll_in_a_region_that_the_keyboard_reaches():
     elements = Reader(html_of(VIEW))
     assert {attrs.get("scope") for attrs in elements.all("th")} == {"row", "col"}
     assert len(elements.all("caption")) == len(elements.all("table")) == 2
@@ -123,15 +120,12 @@ def test_tables_have_scopes_and_captions_and_scroll_in_a_region_that_the_keyboar
     assert all(one["tabindex"] == "0" and one["role"] == "region" and one["aria-labelledby"] in ids for one in regions)
 
 
-def test_columns_of_numbers_end_together_and_texts_begin_together():
+def test_columns_of_numbers_end_together_texts_begin_together_and_long_cells_are_wrapped():
     columns = (Column("value", numbers=True), Column("text"))
     text = html_of(replace(VIEW, parts=(replace(TABLE, columns=columns, rows=(("1", "2"), ("2", "x"))),)))
     assert '<th scope="col" class="number">value</th><th scope="col">text</th>' in text
     assert '<th scope="row" class="number">1</th><td>2</td>' in text
     assert '<td class="number">−2 (−3 to 1)</td>' in html_of(VIEW)
-
-
-def test_a_long_cell_is_wrapped_also_among_numbers_and_a_head_is_one_line():
     columns = columns_of(("a\nb",), ("value",))
     text = html_of(replace(VIEW, parts=(replace(TABLE, columns=columns, rows=(("x", "w" * 29),)),)))
     assert '<td class="prose">www' in text
@@ -147,38 +141,28 @@ def test_a_table_of_contents_is_there_only_for_many_parts_and_leads_to_each():
     assert {link.removeprefix("#") for link in links} <= ids
 
 
-def test_only_a_page_under_way_renews_itself():
+def test_only_a_page_under_way_renews_itself_and_only_one_with_a_next_step_says_it():
     assert 'http-equiv="refresh"' not in html_of(VIEW)
     text = page_html(VIEW, FOOT, 7)
     assert '<meta http-equiv="refresh" content="7">' in text
     assert "loads itself again every 7 s" in text
-
-
-def test_without_anything_to_do_next_nothing_is_said():
     assert "Next:" in html_of(VIEW)
     assert "Next:" not in html_of(replace(VIEW, next_step=""))
 
 
-def test_commands_between_backticks_are_code():
+def test_commands_between_backticks_are_code_whose_options_are_broken_nowhere():
     text = html_of(replace(VIEW, next_step="run `a < b`"))
     assert "run <code>a &lt; b</code>" in text
     assert "a `b" in html_of(replace(VIEW, next_step="a `b"))
-
-
-def test_an_option_that_is_to_be_typed_is_broken_nowhere():
-    """Browsers break lines after hyphens."""
     text = html_of(replace(VIEW, next_step="run `python -m proxytune study a --budget 2`"))
     assert "python -m proxytune study a <span>--budget</span> 2</code>" in text
 
 
-def test_the_page_fits_phones_paper_and_the_dark():
+def test_a_page_fits_every_screen_and_its_foot_says_how_to_come_by_it():
     text = html_of(VIEW)
     assert 'name="viewport" content="width=device-width' in text
     for words in ("@media print", "@media (prefers-color-scheme: dark)", ".card { display: block;", "background: #fff"):
         assert words in text
-
-
-def test_the_foot_says_how_to_come_by_it_again():
     foot = html_of(VIEW).split("<footer>")[1]
     for words in ("python -m proxytune study a", "seed", "numpy 2", "Written 2026-01-01"):
         assert words in foot
@@ -199,12 +183,9 @@ def test_pictures_are_data_of_their_own_kind(kind):
     assert f'src="data:image/{kind};base64,' in html_of(replace(VIEW, parts=(Picture("P", png(form=kind), "C"),)))
 
 
-def test_what_is_no_picture_is_refused():
+def test_what_is_no_picture_is_refused_and_a_page_written_as_it_is_shown(tmp_path):
     with pytest.raises(ValueError, match="no PNG, GIF or SVG"):
         html_of(replace(VIEW, parts=(Picture("P", b"MZ", "C"),)))
-
-
-def test_a_page_is_written_as_it_is_shown(tmp_path):
     write_page(tmp_path / "new" / "report.html", VIEW, FOOT)
     assert (tmp_path / "new" / "report.html").read_text(encoding="utf-8") == html_of(VIEW)
 
@@ -227,17 +208,13 @@ def test_a_figure_is_part_of_the_page_and_its_markers_say_their_values():
     assert 'role="img"' in page
 
 
-def test_two_figures_on_a_page_share_no_names():
+def test_figures_share_no_names_and_names_in_them_are_text():
     """Whatever a figure refers to is its own, so that no figure changes another."""
     page = html_of(replace(VIEW, parts=(Picture("P", drawn(), "C"), Picture("Q", drawn(), "C"))))
     names = re.findall(r' id="([^"]+)"', page)
     assert len(names) == len(set(names))
     wanted = set(re.findall(r'(?:href="#|url\(#)([^")]+)', page))
     assert wanted <= set(names)
-
-
-def test_a_name_in_a_figure_is_text_and_nothing_else():
-    """What a user calls an agent or a metric cannot become a tag."""
     page = html_of(replace(VIEW, parts=(Picture("P", drawn("<script>x</script>--><b>", "<i>&"), "C"),)))
     assert "<script" not in page
     assert "<b>" not in page

@@ -42,7 +42,7 @@ def test_every_effect_says_in_a_clause_what_it_does(drive, name):
     assert "`" not in said
 
 
-def test_a_finding_has_name_meaning_size_with_interval_and_unit_and_what_it_is_worth():
+def test_a_finding_has_name_meaning_size_and_the_worth_that_was_shown_and_an_own_effect_its_own_names():
     assert finding(BAND) == (
         "dead band: wheels stand still below a duty of 0.150 (0.149 to 0.151); "
         "without it predictions over 2 s are 20 times as far off (18 to 23)"
@@ -52,6 +52,13 @@ def test_a_finding_has_name_meaning_size_with_interval_and_unit_and_what_it_is_w
         "without it predictions over 2 s are 13 % worse (8 to 19)"
     )
     assert findings([BAND, SLIP]) == f"{finding(BAND)}; {finding(SLIP)}"
+
+    doubtful = {**SLIP, "worth": {"2": {"value": 0.0, "interval": [-2.0, 2.0], "unit": "%"}}}
+    assert "without it" not in finding(doubtful)
+    assert findings([{"name": "dead_band"}, {"name": "trim"}]) == "dead band and trim"
+
+    own = {"name": "gone:Wheel", "parameters": {"shrink": {"value": 0.25, "interval": [0.25, 0.25], "unit": "m"}}}
+    assert finding(own) == "gone:Wheel: shrink 0.25 m"
 
 
 def test_what_was_declared_is_told_with_its_value_and_of_many_a_few():
@@ -64,17 +71,6 @@ def test_what_was_declared_is_told_with_its_value_and_of_many_a_few():
     many = fitted((f"wheel_gain.{side}" for side in "abcdef"), {f"wheel_gain.{side}": trim for side in "abcdef"})
     assert many.startswith(", with wheel gain a 0.043")
     assert many.endswith(" and 2 more")
-
-
-def test_no_worth_is_claimed_where_none_was_shown():
-    doubtful = {**SLIP, "worth": {"2": {"value": 0.0, "interval": [-2.0, 2.0], "unit": "%"}}}
-    assert "without it" not in finding(doubtful)
-    assert findings([{"name": "dead_band"}, {"name": "trim"}]) == "dead band and trim"
-
-
-def test_a_users_own_effect_is_told_by_its_own_names():
-    own = {"name": "gone:Wheel", "parameters": {"shrink": {"value": 0.25, "interval": [0.25, 0.25], "unit": "m"}}}
-    assert finding(own) == "gone:Wheel: shrink 0.25 m"
 
 
 def test_effects_are_a_row_each_within_80_columns_and_no_name_is_broken(monkeypatch, capsys):

@@ -208,11 +208,9 @@ def test_a_file_that_cannot_be_patched_is_refused_in_one_line_and_nothing_is_wri
     assert not (tmp_path / "out").exists()
 
 
-def test_wheels_may_be_named(patched):
+def test_wheels_may_be_named_and_those_called_l_and_r_are_found(patched):
     patched("mine.urdf", URDF.replace("left_wheel_joint", "port"), wheels=("port", "right_wheel_joint"))
 
-
-def test_wheels_called_l_and_r_are_found(patched):
     def renamed(text):
         return text.replace("left_wheel_joint", "wheel_l").replace("right_wheel_joint", "wheel_r")
 
@@ -220,18 +218,16 @@ def test_wheels_called_l_and_r_are_found(patched):
     assert short == renamed(mine)
 
 
-def test_what_a_diagnosis_wrote_is_named_where_its_folder_is_given(model, tmp_path):
+def test_what_would_overwrite_or_misread_the_users_own_is_refused(model, tmp_path):
     (tmp_path / "found").mkdir()
     (tmp_path / "found" / "model.toml").write_text(model.read_text())
     (tmp_path / "mine.urdf").write_text(URDF)
     told = complaint_of(export, tmp_path / "found", tmp_path / "out.urdf", into=tmp_path / "mine.urdf")
     assert re.search("is no study's folder; give what was diagnosed, .*found/model.toml", told)
-
-
-def test_the_users_own_file_is_never_overwritten(model, tmp_path):
     (tmp_path / "mine.urdf").write_text(URDF)
     told = complaint_of(export, model, tmp_path / "mine.urdf", into=tmp_path / "mine.urdf")
     assert "give another name, so that yours is kept" in told
+    assert "two finite numbers" in complaint_of(CommandFilter(model, rate_hz=HZ).step, (np.nan, 0.0))
 
 
 @pytest.mark.parametrize("stamped", [False, True])
@@ -320,10 +316,6 @@ def test_a_users_own_car_is_patched_at_its_rear_wheels_and_has_their_gain():
 )
 def test_a_wrong_argument_of_the_filter_is_one_line(model, arguments, said):
     assert said in complaint_of(CommandFilter, model, **{"rate_hz": HZ, **arguments})
-
-
-def test_a_command_that_is_no_number_is_refused(model):
-    assert "two finite numbers" in complaint_of(CommandFilter(model, rate_hz=HZ).step, (np.nan, 0.0))
 
 
 def test_the_python_of_the_page_runs(tmp_path, monkeypatch):

@@ -93,7 +93,7 @@ def assessment():
     return assess(proxy=drawn_at_random(4), target=drawn_at_random(5), metrics=BOTH, resamples=100)
 
 
-def test_the_scatter_has_a_panel_per_metric_with_every_agent_named(assessment):
+def test_points_names_and_bars_of_a_scatter_are_those_of_the_scores(assessment):
     panels = scatter_figure(assessment).axes
     assert [axes.get_xlabel() for axes in panels] == ["distance on the target", "time on the target"]
     for column, axes in enumerate(panels):
@@ -101,6 +101,19 @@ def test_the_scatter_has_a_panel_per_metric_with_every_agent_named(assessment):
         np.testing.assert_array_equal(points.get_xdata(), assessment.inputs.target.means[:, column])
         np.testing.assert_array_equal(points.get_ydata(), assessment.inputs.proxy.means[:, column])
         assert sorted(text.get_text() for text in axes.texts) == sorted(assessment.inputs.agents)
+
+    axes = scatter_figure(assessment).axes[0]
+    means = assessment.inputs.proxy.means[:, 0]
+    top_down = sorted(axes.texts, key=lambda text: -text.get_position()[1])
+    assert [text.get_text() for text in top_down] == [f"A{row}" for row in np.argsort(-means)]
+    for text in axes.texts:
+        row = int(text.get_text()[1:])
+        assert text.xy == (assessment.inputs.target.means[row, 0], means[row])
+
+    bars = axes.collections[0].get_segments()
+    values = assessment.inputs.target.values[0, :, 0]
+    half = np.ptp(bars[0][:, 0]) / 2
+    assert half == pytest.approx(values.std(ddof=1) / np.sqrt(len(values)))
 
 
 @pytest.mark.parametrize("agents", [pytest.param(6, marks=pytest.mark.slow), MOST])
@@ -118,16 +131,6 @@ def test_no_two_names_overlap_and_none_is_cut_at_85_millimetres(agents):
         assert max(text.get_window_extent().x1 for text in axes.texts) <= figure.bbox.x1
 
 
-def test_names_are_in_the_proxys_order_each_tied_to_its_point(assessment):
-    axes = scatter_figure(assessment).axes[0]
-    means = assessment.inputs.proxy.means[:, 0]
-    top_down = sorted(axes.texts, key=lambda text: -text.get_position()[1])
-    assert [text.get_text() for text in top_down] == [f"A{row}" for row in np.argsort(-means)]
-    for text in axes.texts:
-        row = int(text.get_text()[1:])
-        assert text.xy == (assessment.inputs.target.means[row, 0], means[row])
-
-
 def test_of_many_agents_those_are_named_whose_rank_differs_most():
     scores = np.arange(40.0)[:, None, None]
     moved = scores.copy()
@@ -139,14 +142,6 @@ def test_of_many_agents_those_are_named_whose_rank_differs_most():
     assert len(named) == MOST
     assert {name.rsplit(":", 1)[1] for name in named} >= {"agent3", "agent36"}
     assert max(map(len, named)) == LONGEST
-
-
-def test_error_bars_are_standard_errors(assessment):
-    axes = scatter_figure(assessment).axes[0]
-    bars = axes.collections[0].get_segments()
-    values = assessment.inputs.target.values[0, :, 0]
-    half = np.ptp(bars[0][:, 0]) / 2
-    assert half == pytest.approx(values.std(ddof=1) / np.sqrt(len(values)))
 
 
 def test_the_map_colours_each_pair_once_and_counts_them(assessment):

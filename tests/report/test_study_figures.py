@@ -35,23 +35,6 @@ def test_it_shows_every_trial_the_floor_by_its_kind_and_chance(result):
     assert drawn[f"chance {chance.mean:.1f}"].get_ydata()[0] == chance.mean
 
 
-def test_a_floor_of_the_same_starts_is_called_so_and_is_that_of_the_fresh_episodes(result):
-    figure = convergence_figure(confirmed(result, kind="same starts", value=5.0, low=1.0, high=9.0))
-    assert lines(figure)["noise floor 5.0"].get_ydata()[0] == 5.0
-    (band,) = [patch for patch in figure.axes[0].patches if patch.get_height() == 8.0]
-    assert band.get_y() == 1.0
-
-
-def test_the_line_is_the_answer_so_far_and_not_the_luckiest_trial(result):
-    first, second, third, *rest = result.trials
-    answers = (None, second, second, third, third, third, second)
-    told = replace(result, answers=answers, best=replace(result.best, trial=third))
-    line = lines(convergence_figure(told))["answer so far"]
-    assert list(line.get_xdata()) == [2, 3, 4, 5, 6, 7, 8]
-    assert list(line.get_ydata()) == [answer.prpv for answer in (*answers[1:], third)]
-    assert {first.prpv, *(one.prpv for one in rest)} != set(line.get_ydata())
-
-
 def test_the_answer_s_fresh_score_stands_after_the_last_trial_with_its_interval(result):
     assert not convergence_figure(result).axes[0].containers
     (bar,) = convergence_figure(confirmed(result)).axes[0].containers
@@ -61,8 +44,13 @@ def test_the_answer_s_fresh_score_stands_after_the_last_trial_with_its_interval(
     assert bar.get_label() == "answer, fresh episodes"
 
 
-def test_lines_are_named_at_their_ends_and_not_in_the_legend(result):
+def test_the_convergence_names_its_axes_its_floor_by_its_kind_and_its_lines_at_their_ends(result):
+    (axes,) = convergence_figure(result).axes
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("trial", "PRPV [ordered pairs]")
     figure = convergence_figure(confirmed(result, kind="same starts", value=5.0, low=1.0, high=9.0))
+    assert lines(figure)["noise floor 5.0"].get_ydata()[0] == 5.0
+    (band,) = [patch for patch in figure.axes[0].patches if patch.get_height() == 8.0]
+    assert band.get_y() == 1.0
     (axes,) = figure.axes
     chance = f"chance\n{result.judged.chance.mean:.1f}"
     assert [text.get_text() for text in axes.texts] == ["answer\nso far", chance, "noise floor\n5.0"]
@@ -70,12 +58,7 @@ def test_lines_are_named_at_their_ends_and_not_in_the_legend(result):
     assert told == ["design", "proposed", "answer, fresh episodes"]
 
 
-def test_axes_are_named_with_units(result):
-    (axes,) = convergence_figure(result).axes
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("trial", "PRPV [ordered pairs]")
-
-
-def test_failed_trials_are_crosses(result):
+def test_failed_trials_are_crosses_and_those_cut_off_stand_at_what_they_cannot_be_below(result):
     failed = replace(
         result,
         trials=(*result.trials, TrialRecord(8, result.trials[0].theta, "failed")),
@@ -84,8 +67,6 @@ def test_failed_trials_are_crosses(result):
     assert list(lines(convergence_figure(failed))["failed"].get_xdata()) == [8]
     assert "failed" not in lines(convergence_figure(result))
 
-
-def test_trials_that_were_cut_off_are_shown_at_what_they_cannot_be_below(result):
     cut = TrialRecord(8, result.trials[0].theta, "cut", decided=("agent0", "agent1"), bound=14.0, score=20.0)
     told = replace(result, trials=(*result.trials, cut), answers=(*result.answers, result.answers[-1]))
     drawn = lines(convergence_figure(told))
@@ -94,11 +75,18 @@ def test_trials_that_were_cut_off_are_shown_at_what_they_cannot_be_below(result)
     assert "stopped early, at least" not in lines(convergence_figure(result))
 
 
-def test_without_a_noise_floor_none_is_drawn(result):
+def test_without_a_floor_none_is_drawn_and_the_line_is_the_answer_so_far(result):
     assessment = result.best.assessment
     silent = replace(assessment, noise_floor=replace(assessment.noise_floor, value=None, low=None, high=None))
     drawn = lines(convergence_figure(replace(result, best=replace(result.best, assessment=silent))))
     assert not [label for label in drawn if label.startswith(("noise floor", "target's halves"))]
+    first, second, third, *rest = result.trials
+    answers = (None, second, second, third, third, third, second)
+    told = replace(result, answers=answers, best=replace(result.best, trial=third))
+    line = lines(convergence_figure(told))["answer so far"]
+    assert list(line.get_xdata()) == [2, 3, 4, 5, 6, 7, 8]
+    assert list(line.get_ydata()) == [answer.prpv for answer in (*answers[1:], third)]
+    assert {first.prpv, *(one.prpv for one in rest)} != set(line.get_ydata())
 
 
 @pytest.fixture(scope="module")
@@ -107,14 +95,11 @@ def learnt(result):
     return planted(result)
 
 
-def test_the_density_is_highest_where_theta_is_known_to_be_and_adds_up_to_one(learnt):
+def test_the_density_is_highest_where_theta_is_known_to_be_adds_up_to_one_and_stays_in_the_box(learnt):
     for place, centre in enumerate((0.12, 0.1)):
         values, density = density_of(learnt, place)
         assert values[np.argmax(density)] == pytest.approx(centre, abs=0.01)
         assert np.trapezoid(density, values) == pytest.approx(1.0, abs=0.02)
-
-
-def test_nothing_leaks_out_of_the_box(learnt):
     at_the_end = planted(learnt, centre=(0.0, 0.5), deviation=(0.05, 0.05))
     values, density = density_of(at_the_end, 0)
     assert values[0] == 0.0
@@ -160,7 +145,7 @@ def shadow(learnt):
     return lambda *points: [any(path.contains_point(point) for path in region.get_paths()) for point in points]
 
 
-def test_the_pair_has_every_trial_the_answer_the_failed_ones_and_the_truth(learnt):
+def test_the_pair_has_a_point_for_every_trial_and_its_key_the_region_and_the_answer(learnt):
     failed = replace(learnt, trials=(*learnt.trials, TrialRecord(8, {"trim": 0.3, "delay": 0.3}, "failed")))
     pair = evaluations_figure(replace(failed, truth={"trim": 0.1, "delay": 0.12})).axes[0]
     assert (pair.get_xlabel(), pair.get_ylabel()) == ("delay [s]", "trim")
@@ -175,6 +160,9 @@ def test_the_pair_has_every_trial_the_answer_the_failed_ones_and_the_truth(learn
     assert marks == {"answer": (theta["delay"], theta["trim"]), "truth": (0.12, 0.1)}
     assert "truth" not in [line.get_label() for line in evaluations_figure(learnt).axes[0].get_lines()]
 
+    key = evaluations_figure(learnt).axes[1]
+    assert [text.get_text() for text in key.get_legend().get_texts()] == ["95 % region", "answer"]
+
 
 def test_a_trial_that_was_cut_off_is_an_open_point(learnt):
     cut = TrialRecord(8, {"trim": 0.2, "delay": 0.25}, "cut", bound=14.0, score=20.0)
@@ -186,14 +174,11 @@ def test_a_trial_that_was_cut_off_is_an_open_point(learnt):
     assert "stopped early" not in [one.get_label() for one in whole.collections]
 
 
-def test_the_shadow_is_the_region_and_no_more(learnt):
+def test_the_shadow_is_the_region_and_slants_where_a_pair_trades(learnt):
     holds = shadow(learnt)
     # Two deviations of 0.05 and 0.02 of the box are inside, four are not.
     assert holds((0.12, 0.1), (0.146, 0.1), (0.12, 0.12)) == [True, True, True]
     assert holds((0.18, 0.1), (0.12, 0.15), (0.03, -0.2)) == [False, False, False]
-
-
-def test_a_pair_that_trades_casts_a_slanting_shadow(learnt):
     holds = shadow(planted(learnt, centre=(0.5, 0.5), deviation=(0.15, 0.15), correlation=-0.95))
     assert holds((0.09, 0.12), (0.21, -0.12)) == [True, True]
     assert holds((0.09, -0.12), (0.21, 0.12)) == [False, False]
@@ -209,11 +194,6 @@ def test_one_parameter_alone_can_be_drawn(learnt):
     assert len(profiles_figure(alone).axes) == 1
     axes = evaluations_figure(alone).axes[0]
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("delay [s]", "PRPV [ordered pairs]")
-
-
-def test_the_key_of_trials_names_the_region_and_the_answer(learnt):
-    key = evaluations_figure(learnt).axes[1]
-    assert [text.get_text() for text in key.get_legend().get_texts()] == ["95 % region", "answer"]
 
 
 @pytest.fixture(scope="module")

@@ -21,15 +21,11 @@ def figures(result):
     return {"convergence": svg_of(convergence_figure(result))}
 
 
-def test_the_page_needs_nothing_else_and_is_small(result, figures):
+def test_the_page_needs_nothing_else_and_begins_with_the_sentence(result, figures):
     text = text_of(result, figures)
     assert not re.search(r"(src|href)=\"(?!data:|#)|https?://|<script|@import", text)
     assert "<svg" in text
     assert len(text) < 300_000
-
-
-def test_it_begins_with_the_answer_and_the_next_step_which_are_the_sentence(result, figures):
-    text = text_of(result, figures)
     first, after = html.escape(say_answer(result)), html.escape(say_next_step(result)).split("`")[0]
     heads = (f'class="answer">{first}</p>', after, ">95 % interval</th>", "<svg ", ">Trials</h2>")
     places = [text.index(one) for one in heads]
@@ -47,15 +43,12 @@ def test_every_figure_has_a_caption_and_an_alternative_text_that_says_what_to_se
     assert text.count("<figcaption") == len(CAPTIONS["study"])
 
 
-def test_it_has_a_row_for_every_trial_and_the_best_theta(result):
+def test_it_has_every_trial_the_best_theta_and_at_its_foot_how_to_come_by_it_again(result):
     text = text_of(result)
     for trial in result.trials:
         assert f'<tr><th scope="row" class="number">{trial.number}</th>' in text
     assert f"{result.best.trial.theta['trim']:.4g}</td>" in text
     assert f'<tr><th scope="row">PRPV</th><td class="number">{result.best.assessment.prpv.value}</td>' in text
-
-
-def test_its_foot_has_the_command_the_settings_the_versions_and_the_date(result):
     foot = text_of(result).split("<footer>")[1]
     folder = result.study.settings.folder
     assert f"python -m proxytune study {folder}</code>" in foot

@@ -88,7 +88,7 @@ def test_pairs_that_may_be_worse_are_counted_where_there_may_be_any(high, told):
     assert told in said(excess=Estimate(-8.0, -15.0, high))
 
 
-def test_a_score_above_the_floor_is_not_called_found():
+def test_a_score_above_the_floor_or_excluded_by_others_is_not_called_found():
     text = said(**ABOVE)
     assert text.startswith("θ narrowed down to 0.16 % of the box: trim 0.121 ")
     assert (
@@ -96,6 +96,11 @@ def test_a_score_above_the_floor_is_not_called_found():
     )
     assert "by 4 to 18." in text
     assert "found" not in text
+    text = said(perfect=False, inside=False)
+    assert text.startswith("θ narrowed down to 0.16 % of the box: ")
+    assert "at most 8 pairs worse, but other scores of the agents differ from the target's." in text
+    assert "no difference" not in text
+    assert text.endswith("Next: raise budget from 24 to 48, to get closer.")
 
 
 @pytest.mark.parametrize(
@@ -111,19 +116,12 @@ def test_the_next_step_is_what_keeps_more_from_being_told(limit, inside, step):
     assert text.endswith(f" Next: {step}, to get closer.")
 
 
-def test_where_a_rule_ended_the_search_a_larger_budget_would_not_help():
+def test_the_next_step_asks_for_no_more_trials_or_starts_than_help():
     text = said(**ABOVE, inside=False, trials=range(20))
     assert text.endswith("Next: loosen the rule under [stop] that ended the search, to get closer.")
     assert said(**ABOVE, inside=False).endswith("Next: raise budget from 24 to 48, to get closer.")
-
-
-def test_no_more_starts_are_asked_for_than_there_are():
     assert "raise starts from 4 to 5 " in said(**ABOVE, most_starts=5)
     assert "add agents or metrics: all 4 starts are driven" in said(**ABOVE, most_starts=4)
-
-
-def test_who_learns_from_earlier_studies_is_not_sent_beyond_their_starts():
-    """A bank of fewer starts than a study asks for is refused, so trials of its own are what brings more."""
     told = said(**ABOVE, learn_from=("bank",), budget=0, trials=())
     assert "raise budget from 0 to 8" in told
     assert "raise starts" not in told
@@ -163,15 +161,12 @@ def test_without_fresh_episodes_luck_is_named_and_they_are_the_next_step():
     assert "perfect" not in unconfirmed
 
 
-def test_the_simulator_as_it_is_stands_beside_the_best():
-    text = said(nominal=Estimate(31.0, 24.5, 37.2))
-    assert "8 pairs worse. The simulator as it is scores 31 (24 to 38). Next: " in text
-
-
-def test_where_noise_is_not_known_nothing_is_said_of_a_perfect_proxy():
+def test_where_noise_is_not_known_nothing_is_said_of_a_perfect_proxy_and_the_nominal_stands_beside():
     text = said(**ABOVE | {"excess": None})
     assert "better than chance; what a perfect proxy scores is not known." in text
     assert "(1 to 9)" not in text
+    text = said(nominal=Estimate(31.0, 24.5, 37.2))
+    assert "8 pairs worse. The simulator as it is scores 31 (24 to 38). Next: " in text
 
 
 def test_a_study_under_way_says_so_and_how_to_go_on():
@@ -180,20 +175,19 @@ def test_a_study_under_way_says_so_and_how_to_go_on():
     assert text.endswith("Next: run the study again for the 10 trials that are left.")
 
 
-def test_unidentified_parameters_are_named_without_an_interval_and_with_who_tells_of_them():
+def test_unidentified_parameters_have_no_interval_and_only_who_tells_of_them_is_named():
     text = said((TRIM, DELAY), **ABOVE, information=TOLD)
     assert "trim 0.121 (0.108 to 0.146); delay is unidentified." in text
     assert "add an agent or a metric whose scores change with delay (so far agent4's do most), or a log" in text
     nothing = said((DELAY, replace(DELAY, name="blur")), **ABOVE, information=())
     assert nothing.startswith("θ is unknown: delay and blur are unidentified.")
+    silent = replace(TOLD[0], agents=(("agent0", 0.0),))
+    assert "so far" not in said((TRIM, DELAY), **ABOVE, information=(silent, TOLD[1]))
 
 
-def test_a_best_value_outside_its_interval_is_not_shown_as_if_it_were_inside():
+def test_values_outside_their_intervals_and_of_many_only_some_are_told():
     text = said((replace(TRIM, best=0.2), PITCH), **ABOVE)
     assert "trim 0.200 (95 % region: 0.108 to 0.146)" in text
-
-
-def test_of_many_parameters_only_some_are_named():
     many = tuple(replace(TRIM, name=f"gain{number}") for number in range(7))
     text = said(many)
     assert "gain4 0.121 (0.108 to 0.146) and 2 more." in text
@@ -216,16 +210,3 @@ def test_what_is_told_of_a_parameter_is_what_the_study_knows(result):
     assert trim.share == pytest.approx(4 * 0.0098, rel=0.1)
     assert say_answer(known).startswith("The proxy lacks something: no θ explains the target's scores (p = 0.002). ")
     assert study_sentence(replace(result, stopped="", trials=result.trials[:3])).startswith("3 of 7 trials so far. ")
-
-
-def test_who_tells_nothing_of_the_least_known_parameter_is_not_named():
-    silent = replace(TOLD[0], agents=(("agent0", 0.0),))
-    assert "so far" not in said((TRIM, DELAY), **ABOVE, information=(silent, TOLD[1]))
-
-
-def test_a_score_at_the_floor_of_a_theta_that_other_scores_exclude_is_not_called_perfect():
-    text = said(perfect=False, inside=False)
-    assert text.startswith("θ narrowed down to 0.16 % of the box: ")
-    assert "at most 8 pairs worse, but other scores of the agents differ from the target's." in text
-    assert "no difference" not in text
-    assert text.endswith("Next: raise budget from 24 to 48, to get closer.")

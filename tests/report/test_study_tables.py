@@ -32,7 +32,7 @@ def row_of(table, name):
     return next((row for row in table.rows if row[0] == name), None)
 
 
-def test_the_document_has_the_promised_keys_and_is_plain_json(result):
+def test_the_document_has_the_promised_keys_in_json_s_own_types(result):
     document = json.loads(json.dumps(study_document(result), allow_nan=False))
     best = result.best
     assert document["best"]["theta"] == dict(best.trial.theta)
@@ -49,6 +49,9 @@ def test_the_document_has_the_promised_keys_and_is_plain_json(result):
     }
     assert document["settings"]["parameters"] == {"delay": [0.0, 0.3], "trim": [-0.3, 0.3]}
 
+    assert of_plain_types(study_document(result))
+    assert not of_plain_types({"share": np.float64(0.5)})
+
 
 def of_plain_types(value):
     """Whether JSON's own types are all there is: numpy's would print, and differ by version."""
@@ -57,11 +60,6 @@ def of_plain_types(value):
     if isinstance(value, list):
         return all(map(of_plain_types, value))
     return type(value) in (str, int, float, bool, type(None))
-
-
-def test_every_value_is_of_json_s_own_types(result):
-    assert of_plain_types(study_document(result))
-    assert not of_plain_types({"share": np.float64(0.5)})
 
 
 def test_what_is_known_of_theta_is_in_the_document(result):
@@ -84,14 +82,11 @@ def test_what_is_known_of_theta_is_in_the_document(result):
     assert study_document(planted(result, misfit=UNTOLD))["misfit"]["fits"] is None
 
 
-def test_pairs_that_trade_are_in_the_document(result):
+def test_the_document_tells_floor_pairs_that_trade_and_whether_it_is_perfect(result):
     (trade,) = study_document(planted(result, (0.5, 0.5), (0.1, 0.1), correlation=-0.9))["trades"]
     assert trade[:2] == ["delay", "trim"]
     assert trade[2] == pytest.approx(-0.9, abs=0.05)
     assert study_document(planted(result))["trades"] == []
-
-
-def test_the_document_tells_the_floor_s_kind_and_whether_the_proxy_is_as_good_as_perfect(result):
     document = study_document(result)
     floor = result.floor
     assert (document["noise_floor_kind"], document["cannot_be_told_from_perfect"]) == ("halves", False)
@@ -115,9 +110,11 @@ def test_the_first_line_is_the_sentence_that_json_has_too_then_the_table(result)
     assert others[-1].rstrip() == "figure: convergence.png"
 
 
-def test_names_are_shown_as_they_are_and_not_taken_for_markup(result):
+def test_names_and_values_are_shown_as_they_are(result):
     told = (replace(TOLD[0], agents=(("[red]agent", 1.0),)), TOLD[1])
     assert "[red]agent 100 %" in shown(planted(result, information=told))
+    assert any("--unpaired" in note for note in result.judged.notes)
+    assert not any("--unpaired" in note for note in usefulness_table(result).notes)
 
 
 def test_people_see_what_the_proxy_is_worth(result):
@@ -161,11 +158,6 @@ def test_a_confirmed_study_tells_what_is_expected_a_perfect_proxy_s_score_and_th
     assert study_document(result)["best"]["expected_prpv"] is study_document(result)["excess"] is None
 
 
-def test_notes_give_no_advice_that_study_cannot_follow(result):
-    assert any("--unpaired" in note for note in result.judged.notes)
-    assert not any("--unpaired" in note for note in usefulness_table(result).notes)
-
-
 def test_it_is_said_whether_any_theta_explains_the_target(result):
     row = row_of(usefulness_table(planted(result)), "misfit (p)")
     assert row == ("misfit (p)", "0.4", "", "some θ may explain the target's scores")
@@ -174,15 +166,12 @@ def test_it_is_said_whether_any_theta_explains_the_target(result):
     assert "too few" in row_of(usefulness_table(planted(result, misfit=UNTOLD)), "misfit (p)")[3]
 
 
-def test_how_a_study_came_to_its_end_is_said_and_a_study_under_way_says_nothing(result):
+def test_how_a_study_came_to_its_end_is_said_and_more_trials_than_the_budget_are_no_share(result):
     assert study_document(result)["stopped"] == "the budget of 7 trials is spent"
     assert search_table(result).rows[0][1].endswith("; ended: the budget of 7 trials is spent")
     under_way = replace(result, stopped="")
     assert study_document(under_way)["stopped"] is None
     assert "ended" not in search_table(under_way).rows[0][1]
-
-
-def test_more_trials_than_the_budget_are_not_written_as_a_share_of_it(result):
     settings = replace(result.study.settings, budget=5)
     lowered = replace(result, study=replace(result.study, settings=settings))
     assert search_table(lowered).rows[0][1].startswith("7 (budget 5); best: trial ")
@@ -262,14 +251,11 @@ def test_the_truth_has_a_column_only_where_it_is_known_and_is_marked_outside_the
     assert [row[3] for row in theta_table(replace(known, truth={"trim": 0.1})).rows] == ["", "0.1", ""]
 
 
-def test_a_parameter_with_an_interval_of_nearly_its_range_is_unidentified(known):
+def test_a_parameter_without_an_interval_is_unidentified_and_pairs_that_trade_are_named(known):
     vague = planted(known, deviation=(3.0, 0.02))
     assert theta_table(vague).rows[0][2] == "unidentified"
     assert theta_table(vague).notes[0].startswith("7 trials exclude almost no value of delay; unidentified")
     assert not [line for line in theta_table(known).notes if "unidentified" in line]
-
-
-def test_pairs_that_trade_are_named_with_their_correlation(known):
     trading = planted(known, centre=(0.5, 0.5), deviation=(0.1, 0.1), correlation=-0.9)
     assert any("delay and trim trade off" in note and "correlation −0.9" in note for note in theta_table(trading).notes)
     assert not [line for line in theta_table(known).notes if "trade off" in line]
@@ -290,13 +276,10 @@ def test_what_the_target_s_table_does_not_allow_is_a_note(known):
     assert "no shared starts" in theta_table(replace(known, cautions=("no shared starts",))).notes
 
 
-def test_per_parameter_the_most_informative_are_named_with_what_limits_them(known):
+def test_per_parameter_what_informs_it_most_is_named_with_what_limits_it_and_nothing_else(known):
     assert information_table(known).rows == (
         ("delay", "agent4 46 %, agent0 30 %", "speed 100 %", "starts"),
         ("trim", "agent1 100 %", "distance 75 %", "trials"),
     )
-
-
-def test_a_parameter_that_nothing_informs_has_no_row(known):
     silent = replace(TOLD[0], agents=(("agent0", 0.0), ("agent1", 0.0)))
     assert [row[0] for row in information_table(planted(known, information=(silent, TOLD[1]))).rows] == ["trim"]

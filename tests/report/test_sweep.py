@@ -68,23 +68,24 @@ def test_the_document_is_plain_json_with_a_point_per_value(swept):
     assert document["noise_floor_kind"] == "halves"
 
 
-def test_the_csv_says_the_same_and_reads_back(swept):
+def test_the_csv_says_what_the_document_says_and_without_a_target_model_how_to_get_pod(swept):
     rows = list(csv.DictReader(io.StringIO(curve_csv(swept))))
     points = curve_document(swept)["points"]
     assert [float(row["trim"]) for row in rows] == [point["value"] for point in points]
     assert [int(row["prpv"]) for row in rows] == [point["prpv"] for point in points]
     assert [float(row["ppv"]) for row in rows] == [point["ppv"] for point in points]
+    document = curve_document(swept)
+    assert document["points"][0]["pod"] is None
+    assert "--target-model" in document["notes"][0]
+    assert not any("pod" in column for column in curve_csv(swept).splitlines()[0].split(","))
 
 
-def test_the_name_is_short_and_other_where_the_others_are_held_elsewhere(swept):
+def test_the_name_is_short_and_has_one_mark_of_held_values_in_any_order(swept):
     names = [curve_name(replace(swept, base=base)) for base in (TRUTH, {**TRUTH, "delay": 0.2}, {"trim": 0.1}, {})]
     assert names[0] == "sweep_trim_4e3f5b"
     assert len(names[1]) == len(names[0])
     assert names[1] != names[0]
     assert names[2:] == ["sweep_trim", "sweep_trim"]
-
-
-def test_values_have_one_mark_in_any_order_and_as_any_number():
     assert held_mark({"trim": 1, "delay": 0.12}) == held_mark({"delay": 0.12, "trim": 1.0})
     assert held_mark({"trim": 1.0}) != held_mark({"trim": 0.1})
 
@@ -122,7 +123,7 @@ def test_the_figure_shows_every_point_of_every_curve_within_its_axes(curves):
     assert [panel.get_title() for panel in panels[0]] == ["PRPV [ordered pairs]", "PPV"]
 
 
-def test_every_measure_is_in_the_document_with_its_interval(with_pod):
+def test_every_measure_is_in_document_csv_and_lines_with_its_interval(with_pod):
     document = curve_document(with_pod)
     point = document["points"][2]
     for measure in ("srcc", "kendall_tau", "mmrv"):
@@ -134,29 +135,18 @@ def test_every_measure_is_in_the_document_with_its_interval(with_pod):
     assert document["shapes"]["pod_pose"]["worsens_on_both_sides"] is True
     assert curve_name(with_pod) == "sweep_trim_4e3f5b_pod"
 
-
-def test_without_a_target_model_the_document_says_how_to_get_pod(swept):
-    document = curve_document(swept)
-    assert document["points"][0]["pod"] is None
-    assert "--target-model" in document["notes"][0]
-    assert not any("pod" in column for column in curve_csv(swept).splitlines()[0].split(","))
-
-
-def test_the_csv_has_every_measure_with_both_ends(with_pod):
     rows = list(csv.DictReader(io.StringIO(curve_csv(with_pod))))
     for key in ("prpv", "ppv", "srcc_distance", "kendall_tau_distance", "mmrv_survival_time", "pod_pose", "pod_image"):
         assert all(float(row[f"{key}_low"]) <= float(row[f"{key}_high"]) for row in rows if row[f"{key}_low"])
         assert all(row[key] for row in rows)
 
-
-def test_a_line_per_measure_says_what_the_curve_shows(with_pod):
     lines = curve_lines(with_pod)
     assert len(lines) == 2 + 3 * 2 + 2
     assert lines[0].startswith("trim: PRPV: lowest (0) at 0.1")
     assert "worsens" in next(line for line in lines if "POD pose" in line)
 
 
-def test_the_panels_show_prpv_ppv_srcc_and_both_pods_each_on_an_axis_of_its_own(with_pod):
+def test_panels_show_each_measure_on_an_axis_of_its_own_and_pod_where_there_is_a_target_model(with_pod, swept):
     figure = panels_figure(with_pod)
     *panels, key, pose, image = figure.axes
     titles = ["PRPV [ordered pairs]", "PPV", "SRCC", "POD, pose [m]", "POD, image [full scale]"]
@@ -168,9 +158,6 @@ def test_the_panels_show_prpv_ppv_srcc_and_both_pods_each_on_an_axis_of_its_own(
     assert not key.axison
     places = [axes.get_position().bounds for axes in figure.axes]
     assert len(set(places)) == len(places), "no second axis stands on another"
-
-
-def test_without_pod_there_are_three_panels_and_the_key(swept):
     assert [axes.axison for axes in panels_figure(swept).axes] == [True, True, True, False]
 
 
@@ -213,14 +200,6 @@ def test_every_line_band_and_bar_is_explained_once(with_pod, curves):
     assert sorted(legend(bars_figure(curves))) == sorted([*lines, "lower and higher value"])
 
 
-def test_only_a_level_of_the_same_starts_is_called_the_noise_floor(swept):
-    first = swept.points[0].assessment
-    known = replace(first, noise_floor=replace(first.noise_floor, kind="same starts"))
-    told = replace(swept, points=(replace(swept.points[0], assessment=known), *swept.points[1:]))
-    assert legend(sweep_figure([told]))[0] == "noise floor"
-    assert curve_document(told)["noise_floor_kind"] == "same starts"
-
-
 def test_nothing_of_a_figure_is_clipped(with_pod, make_study):
     for figure in (panels_figure(with_pod), bars_figure([with_pod]), sweep_figure([with_pod])):
         figure.draw_without_rendering()
@@ -231,12 +210,17 @@ def test_nothing_of_a_figure_is_clipped(with_pod, make_study):
         assert inner.y1 <= outer.y1
 
 
-def test_axes_name_parameters_in_words_and_bars_write_a_true_minus(swept):
+def test_figures_name_parameters_in_words_and_the_noise_floor_only_what_is_one(swept):
     assert (
         sweep_figure([replace(swept, parameter="camera_pitch", unit="deg")]).axes[1].get_xlabel()
         == "camera pitch [deg]"
     )
     assert [text.get_text() for text in bars_figure([swept]).axes[0].get_xticklabels()] == ["−0.1", "0.1", "0.3"]
+    first = swept.points[0].assessment
+    known = replace(first, noise_floor=replace(first.noise_floor, kind="same starts"))
+    told = replace(swept, points=(replace(swept.points[0], assessment=known), *swept.points[1:]))
+    assert legend(sweep_figure([told]))[0] == "noise floor"
+    assert curve_document(told)["noise_floor_kind"] == "same starts"
 
 
 @pytest.fixture(scope="module")
@@ -252,13 +236,10 @@ def view_of(curves):
     return sweep_view("s", curves, figures, "The others are nominal")
 
 
-def test_the_answer_says_where_prpv_is_lowest_and_what_the_others_are_held_at(curves):
+def test_the_answer_says_where_prpv_is_lowest_and_figures_of_all_come_first(curves):
     answer = view_of(curves).sentence
     assert "trim: PRPV is lowest (0) at 0.1, and worse beyond noise at" in answer
     assert answer.endswith("The others are nominal.")
-
-
-def test_figures_of_all_come_first_then_each_parameter_with_its_tables(curves):
     titles = [part.title for part in view_of(curves).parts]
     assert titles[:3] == ["All parameters", "How much each parameter matters", "Usefulness along trim"]
     assert titles[3] == "Along trim: the paper's measures"

@@ -53,14 +53,11 @@ def experiment(lessons=LESSONS, gain=1.0, published=NOBODY, examinations=None, c
     return Experiment(settings, 60.0, replace(needs, gain=gain), lessons)
 
 
-def test_a_proxy_saves_samples_only_if_its_whole_interval_says_so():
+def test_a_proxy_saves_samples_only_if_its_whole_interval_says_so_and_is_named_there():
     saves, none, unknown = sorted_by_worth(LESSONS)
     assert [one.name for one in saves] == ["sure", "far"]
     assert [one.name for one in none] == ["harmful", EVIL]
     assert [one.name for one in unknown] == ["wide", "reaching"]
-
-
-def test_the_answer_names_each_proxy_with_its_interval_where_it_belongs():
     answer = teach_answer(experiment())
     shown, rest = answer.split(" None saved: ")
     assert "sure: 300 (100 to 350)" in shown
@@ -86,16 +83,14 @@ def test_the_next_step_is_more_seeds_while_something_is_open():
     assert "train without these proxies" in teach_next_step(experiment(LESSONS[1:2]))
 
 
-def test_without_convergence_plv_is_unknown_and_more_samples_are_next():
+def test_without_convergence_or_a_rise_at_the_end_plv_is_unknown_and_the_next_step_says_why():
     rising = experiment(gain=5.1)
     assert "is unknown: without a proxy the score still rises by more than 5" in teach_answer(rising)
     assert teach_next_step(rising).startswith("raise teaching.target_samples: ")
-
-
-def test_a_grid_that_shows_no_rise_at_its_end_is_not_said_to_rise():
     coarse = experiment(gain=None)
     assert "is unknown: teaching.target_samples has no number from 1 to half of 400" in teach_answer(coarse)
     assert "add numbers between 0 and 400" in teach_next_step(coarse)
+    assert "raise teaching.examinations from 20 to 40" in teach_next_step(experiment(examinations=20))
 
 
 def test_plv_in_cost_is_a_column_where_costs_are_stated_and_only_there():
@@ -129,11 +124,7 @@ def test_where_the_finalists_cannot_be_judged_the_next_step_says_why():
     assert plv_next_step(study).startswith("raise teaching.target_samples: without a proxy the score still rises")
 
 
-def test_where_examinations_are_chosen_more_of_them_are_next():
-    assert "raise teaching.examinations from 20 to 40" in teach_next_step(experiment(examinations=20))
-
-
-def test_each_proxy_has_a_panel_of_its_own_against_no_proxy_with_what_each_needs():
+def test_each_proxy_has_a_panel_of_its_own_in_a_figure_that_fits_a_column():
     drawn = experiment()
     panels = [axes for axes in teach_figure(drawn).axes if axes.get_visible()]
     assert [axes.get_title() for axes in panels] == [one.name for one in LESSONS]
@@ -147,8 +138,6 @@ def test_each_proxy_has_a_panel_of_its_own_against_no_proxy_with_what_each_needs
         ends = [path.vertices[:, 0].tolist() for bars in axes.collections[2:] for path in bars.get_paths()]
         assert ends[-1][0] < ends[-1][1]
 
-
-def test_the_figure_fits_a_column():
     assert teach_figure(experiment()).get_figwidth() * 25.4 <= 86.0
 
 

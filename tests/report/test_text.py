@@ -32,9 +32,6 @@ def test_in_a_section_numbers_begin_together_below_a_free_line_and_notes_follow(
     assert rest == ["  [bold]  1", "c         12", "note: [i]"]
 
 
-def test_columns_without_names_have_no_head():
+def test_columns_without_names_have_no_head_and_files_are_told_by_what_they_are():
     assert printed(table_text(Table("", (Column(""), Column("")), (("trials", "7"),)))) == ["trials  7"]
-
-
-def test_files_are_told_by_what_they_are():
     assert printed("as [it] is", *file_texts({"report": "a.html"})) == ["as [it] is", "report: a.html"]

@@ -3,22 +3,13 @@
 from proxytune.report.wording import digits, fixed, listed, percent, probability, span
 
 
-def test_decimals_give_the_width_of_an_interval_two_figures():
+def test_numbers_are_written_with_a_true_minus_and_as_many_figures_as_their_width_allows():
     assert [digits(ends) for ends in ((0.108, 0.146), (11.1, 14.4), (3.0, 35.0), (1.0, 1.0))] == [3, 1, 0, 3]
-
-
-def test_a_minus_is_one_and_zero_has_none():
     assert fixed(-0.12, 2) == "−0.12"
     assert fixed(-0.0001, 2) == "0.00"
     assert span((-0.012, 0.03)) == "−0.012 to 0.030"
-
-
-def test_shares_of_the_box_have_two_figures_however_small():
     shares = [percent(share) for share in (1.0, 0.3141, 0.00162, 0.0000123, 1e-9, 0.0)]
     assert shares == ["100 %", "31 %", "0.16 %", "0.0012 %", "under 0.001 %", "0 %"]
-
-
-def test_small_probabilities_are_only_bounded():
     assert [probability(value) for value in (0.364, 0.0042, 0.0002)] == ["p = 0.36", "p = 0.0042", "p < 0.001"]
 
 

@@ -48,13 +48,17 @@ def test_the_same_figure_is_the_same_file_in_every_format_and_a_pdf_has_fonts_th
 PICTURE = np.random.default_rng(1).integers(0, 256, (6, 8, 3), dtype=np.uint8)
 
 
-def test_a_text_and_a_picture_are_written_as_they_are_with_their_folder_and_nothing_beside_them(tmp_path):
+def test_texts_and_pictures_are_on_disk_as_they_are_before_they_have_their_names(tmp_path, monkeypatch):
     write_text(tmp_path / "new" / "report.html", "θ\n")
     write_picture(tmp_path / "new" / "000001.png", PICTURE)
     assert (tmp_path / "new" / "report.html").read_bytes() == "θ\n".encode()
     with Image.open(tmp_path / "new" / "000001.png") as written:
         np.testing.assert_array_equal(np.asarray(written), PICTURE)
     assert {path.name for path in (tmp_path / "new").iterdir()} == {"report.html", "000001.png"}
+    path, steps = tmp_path / "page.html", []
+    monkeypatch.setattr(os, "fsync", lambda descriptor: steps.append((os.fstat(descriptor).st_size, path.exists())))
+    write_text(path, "new")
+    assert steps == [(3, False)]
 
 
 WRITTEN = {
@@ -77,13 +81,6 @@ def test_a_failed_write_keeps_the_old_file_and_is_told_in_one_line(figure, tmp_p
         WRITTEN[what](path, figure)
     assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]
-
-
-def test_a_file_is_on_disk_before_it_has_its_name(tmp_path, monkeypatch):
-    path, steps = tmp_path / "page.html", []
-    monkeypatch.setattr(os, "fsync", lambda descriptor: steps.append((os.fstat(descriptor).st_size, path.exists())))
-    write_text(path, "new")
-    assert steps == [(3, False)]
 
 
 def test_powers_of_ten_at_an_axis_are_formulas_and_a_dollar_in_a_name_is_none():

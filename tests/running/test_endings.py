@@ -105,12 +105,17 @@ def test_an_episode_during_which_an_earlier_process_ended_does_not_end_this_one(
     assert begun == [(episode,) for episode in EPISODES[:-1]]
 
 
-def test_a_suspect_that_cannot_be_sent_to_another_process_is_run_in_this_one():
+def test_nobody_waits_for_what_is_suspect_or_left(soon):
     class Local(Deadly):
         pass
 
     with running(Local(), EPISODES, 1, watch=Watch(suspect=lambda _: True)) as outcomes:
         assert [one.metrics is not None for (one,) in outcomes] == [True] * len(EPISODES)
+    said = []
+    with pytest.raises(KeyboardInterrupt), running(Deadly(), FEW, 1, watch=Watch(waits=said.append)):
+        raise KeyboardInterrupt
+    assert MONITOR not in [thread.name for thread in threading.enumerate()]
+    assert said == []
 
 
 PARENT = """
@@ -192,11 +197,3 @@ def test_where_every_episode_is_short_nothing_is_told():
 @pytest.mark.slow
 def test_where_a_limit_ends_them_nothing_is_told(soon):
     assert told_of("agent1:0:lingers", timeout_s=60.0) == []
-
-
-def test_nobody_waits_any_longer_once_the_episodes_are_left(soon):
-    said = []
-    with pytest.raises(KeyboardInterrupt), running(Deadly(), FEW, 1, watch=Watch(waits=said.append)):
-        raise KeyboardInterrupt
-    assert MONITOR not in [thread.name for thread in threading.enumerate()]
-    assert said == []

@@ -18,10 +18,11 @@ def run_all(family, jobs, episodes=EPISODES):
         return {one.episode: (one.metrics, one.failure) for one in itertools.chain.from_iterable(outcomes)}
 
 
-def test_two_processes_find_what_one_finds():
+def test_two_processes_find_what_one_finds_and_none_is_fine():
     faulty = Wobbly(faults=("agent1:2:raises",))
     assert run_all(faulty, 2) == run_all(faulty, 1)
     assert set(run_all(faulty, 1)) == set(EPISODES)
+    assert run_all(Wobbly(), 2, []) == {}
 
 
 def test_one_job_stays_in_this_process_and_two_do_not(tmp_path):
@@ -98,10 +99,6 @@ def test_whether_an_episode_is_left_out_is_asked_when_it_is_about_to_begin(jobs,
         given = [outcome.episode for (outcome,) in outcomes]
     assert "agent1" not in {episode.agent for episode in given}
     assert 3 <= len(given) <= 3 + 2 * jobs
-
-
-def test_no_episode_at_all_is_fine():
-    assert run_all(Wobbly(), 2, []) == {}
 
 
 @pytest.mark.parametrize("value", [float("nan"), None, "far", float("inf")])

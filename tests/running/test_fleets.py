@@ -90,14 +90,11 @@ def test_a_fleet_is_expected_to_take_a_good_deal_less_than_an_episode_may():
     assert run_all(timeout_s=3.0, known=dict.fromkeys(KNOWN, 0.5)) == (by_itself(), [2] * 6)
 
 
-def test_what_draws_from_the_process_s_generators_is_run_by_itself():
+def test_what_draws_or_is_to_be_alone_is_run_by_itself():
     faults = ("agent1:*:draws",)
     assert run_together(Convoy(faults=faults), EPISODES) is None
     assert run_together(Convoy(), EPISODES) is not None
     assert told(run_fleet(Convoy(faults=faults), EPISODES)) == by_itself(faults)
-
-
-def test_an_agent_that_is_to_be_alone_is_beside_nobody():
     _, sizes = run_all(alone=["agent1"])
     assert sizes == [1, 1, 1, 9]
 
@@ -135,10 +132,13 @@ def test_an_episode_without_a_metric_fails_in_a_fleet_as_by_itself():
     assert set(found.values()) == {f"agent '{one.agent}': {lacks}" for one in EPISODES}
 
 
-def test_the_time_of_a_fleet_is_shared_by_its_episodes(monkeypatch):
+def test_fleets_share_their_time_and_are_told_as_a_whole(monkeypatch):
     clock = SimpleNamespace(seconds=lambda: 0.6)
     monkeypatch.setattr("proxytune.running.fleets.awake", lambda: nullcontext(clock))
     assert [one.seconds for one in run_fleet(Convoy(), EPISODES[:6])] == [pytest.approx(0.1)] * 6
+    begun = []
+    run_all(begins=begun.append)
+    assert [len(fleet) for fleet in begun] == [12]
 
 
 def sizes(count, jobs, seconds=None, most_s=MOST_S):
@@ -149,7 +149,7 @@ def sizes(count, jobs, seconds=None, most_s=MOST_S):
     return [len(fleet) for fleet in cut]
 
 
-def test_fleets_are_as_large_as_seconds_and_processes_allow():
+def test_fleets_are_as_large_as_seconds_and_processes_allow_and_small_at_first():
     assert sizes(48, 1, 0.1) == [MOST]
     assert sizes(48, 2, 0.1) == [24, 24]
     assert sizes(200, 2, 0.1) == [34, 34, 33, 33, 33, 33]
@@ -158,9 +158,6 @@ def test_fleets_are_as_large_as_seconds_and_processes_allow():
     assert sizes(5, 1, 100.0) == [1] * 5
     assert sizes(6, 100, 0.1) == [1] * 6
     assert sizes(0, 2, 0.1) == []
-
-
-def test_as_long_as_nothing_is_known_fleets_are_small():
     assert sizes(10, 2) == [UNKNOWN, UNKNOWN, 2]
 
 
@@ -171,9 +168,3 @@ def test_what_is_not_needed_any_more_is_cut_before_its_fleet_begins():
     assert [one.seed for one in next(fleets)] == [0, 2, 4, 6]
     cut.update((1, 3, 5))
     assert [[one.seed for one in fleet] for fleet in fleets] == [[7]]
-
-
-def test_a_fleet_that_begins_in_this_process_is_told_as_a_whole():
-    begun = []
-    run_all(begins=begun.append)
-    assert [len(fleet) for fleet in begun] == [12]

@@ -59,20 +59,22 @@ def test_on_a_narrow_terminal_the_bar_goes_first(monkeypatch, width, bar, unit):
     assert ("1250/1600 episodes" in text) == unit
 
 
-def test_anything_else_sees_a_plain_line_for_what_is_finished(monkeypatch):
+def test_lines_are_plain_unbroken_and_of_what_is_finished(monkeypatch):
     lines = shown(False, monkeypatch).splitlines()
     assert [line.partition(" s: ")[2] for line in lines] == ["trial 2 of 2: PRPV 4; 1250 of at most 1600 episodes"]
-
-
-def test_a_line_is_never_broken_and_no_brackets_are_taken_for_markup(monkeypatch):
     what = (f"trial 1 of 2 [red]{'x' * 100}", "episodes", None)
     assert f"[red]{'x' * 100}: PRPV 4; 1250" in shown(False, monkeypatch, 44, what=what)
 
 
-def test_no_color_leaves_the_bar_without_colours(monkeypatch):
+def test_bars_have_no_colours_where_asked_and_begin_at_once(monkeypatch):
     assert "\x1b[3" in shown(True, monkeypatch, colours="standard")
     monkeypatch.setenv("NO_COLOR", "1")
     assert "\x1b[3" not in shown(True, monkeypatch, colours="standard")
+    text = written(monkeypatch)
+    with Bars(432) as bars:
+        bars.begin("pre-flight 1 of 2", 0)
+        bars.begin("pre-flight 2 of 2", 0)
+    assert text.getvalue() == "0 s: pre-flight 1 of 2 begins; at most 432 episodes\n"
 
 
 @pytest.mark.parametrize("terminal", [True, False])
@@ -86,11 +88,3 @@ def test_an_episode_that_waits_is_told_of_ever_more_rarely_on_a_terminal_too(mon
     told = [f"agent 'one' from start 3 has been under way for {minutes} min" for minutes in (1, 2, 4)]
     assert [line.partition(" s: ")[2].partition(";")[0] for line in lines] == told
     assert all(line.endswith("; episode_timeout_s in study.toml would end it") for line in lines)
-
-
-def test_a_run_of_which_nothing_is_known_says_at_once_that_it_has_begun(monkeypatch):
-    text = written(monkeypatch)
-    with Bars(432) as bars:
-        bars.begin("pre-flight 1 of 2", 0)
-        bars.begin("pre-flight 2 of 2", 0)
-    assert text.getvalue() == "0 s: pre-flight 1 of 2 begins; at most 432 episodes\n"

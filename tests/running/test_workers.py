@@ -58,20 +58,17 @@ def _in_time(piece):
     return "done"
 
 
-def test_in_a_thread_of_somebody_elses_process_there_is_no_limit(tmp_path):
+def test_outside_a_piece_or_in_somebody_elses_thread_there_is_no_limit(tmp_path):
     with ThreadPoolExecutor(1) as pool:
         assert pool.submit(TracedTask(_too_slow, tmp_path), "piece").result() == "done"
+    with limited("anything", 0.01):
+        time.sleep(0.05)
 
 
 def _too_slow(piece):
     with limited("anything", 0.01):
         time.sleep(0.05)
     return "done"
-
-
-def test_outside_a_piece_there_is_no_limit():
-    with limited("anything", 0.01):
-        time.sleep(0.05)
 
 
 def test_pieces_that_may_end_their_process_are_never_done_in_this_one():

@@ -79,14 +79,11 @@ def test_what_is_probably_not_meant_is_told_in_a_sentence(case):
     assert any(re.search(expected, line) for line in cautions(proxy, target, metrics))
 
 
-def test_a_poor_proxy_draws_no_caution():
+def test_poor_or_coarse_scores_draw_no_caution():
     assert cautions(table(PROXY), table(TRUE)) == ()
     shuffled = RANDOM.permutation(PROXY) * RANDOM.lognormal(0.0, 1.0, (8, 1, 1))
     shuffled[..., 1] = np.minimum(shuffled[..., 1], 60.0)
     assert cautions(table(shuffled), table(TRUE)) == ()
-
-
-def test_coarse_scores_are_no_copies_and_rates_no_other_unit():
     hits, few = (RANDOM.random((8, 6, 2)) < share for share in (0.9, 0.05))
     successes = (Metric("success"), Metric("lift"))
     one, other = (ScoreTable(AGENTS, tuple("012345"), ("success", "lift"), hit.astype(float)) for hit in (hits, few))

@@ -22,20 +22,17 @@ def test_a_table_keeps_episodes_counts_and_means(csv):
     assert not table.complete
 
 
-def test_only_the_metrics_asked_for_are_read(csv):
+def test_only_the_metrics_asked_for_are_read_of_domains_apart(csv):
     table = read_scores(csv("agent,comment,distance\nA,fine,1\nB,,2\n"), ["distance"])
     assert table.means[:, 0].tolist() == [1.0, 2.0]
+    path = csv("domain,agent,distance\nsim,A,1\nreal,A,2\n")
+    assert list(read_domains(path, ["distance"])) == ["sim", "real"]
+    assert read_scores(path, ["distance"], "real").means[0, 0] == 2.0
 
 
 def test_spreadsheets_marks_are_understood(csv):
     table = read_scores(csv(b"\xef\xbb\xbfagent, episode ,distance\r\nA,1, 1.5\r\n\r\nB,1,2\r\n"), ["distance"])
     assert table.means[:, 0].tolist() == [1.5, 2.0]
-
-
-def test_domains_are_read_apart(csv):
-    path = csv("domain,agent,distance\nsim,A,1\nreal,A,2\n")
-    assert list(read_domains(path, ["distance"])) == ["sim", "real"]
-    assert read_scores(path, ["distance"], "real").means[0, 0] == 2.0
 
 
 @pytest.mark.parametrize(

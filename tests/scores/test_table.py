@@ -32,26 +32,27 @@ def test_a_malformed_metric_is_refused_by_name(text):
         Metric.parse(text)
 
 
-def test_a_percentage_is_of_the_largest_value_of_each_table():
+def test_percentages_merits_and_rounding_are_of_each_table():
     merits, tie = Metric.parse("a:max:10%").merits(np.array([[1.0, 4.0], [10.0, 20.0]]))
     np.testing.assert_allclose(merits, [[0.25, 1.0], [0.5, 1.0]])
     np.testing.assert_allclose(tie, [[0.1], [0.1]])
-
-
-def test_where_less_is_better_merits_are_reversed():
     for text in ("a:min", "a:min:10%"):
         merits, _ = Metric.parse(text).merits(np.array([1.0, 4.0]))
         assert merits[0] > merits[1]
-
-
-def test_rounding_is_no_variation():
     assert varies(np.array([[0.3, 1.0], [0.1 + 0.2, 2.0]])).tolist() == [False, True]
 
 
-def test_a_table_is_built_from_finished_episodes():
+def test_tables_are_built_and_arranged_with_their_names():
     table = ScoreTable.from_episodes({("A", 1): {"m": 1.0}, ("B", 1): {"m": 2.0}, ("A", 2): {"m": 3.0}})
     assert table.means[:, 0].tolist() == [2.0, 2.0]
     assert table.driven.tolist() == [[True, True], [True, False]]
+    table = ScoreTable.from_episodes({(a, e): {"m": 10.0 * i + e} for i, a in enumerate("AB") for e in (1, 2)})
+    moved = table.arrange(agents=("B", "A"), episodes=("2", "1"))
+    assert moved.values[:, :, 0].tolist() == [[12.0, 11.0], [2.0, 1.0]]
+    table = ScoreTable.from_episodes({("A", 1): {"m": 1.0}, ("A", 2): {"m": 4.0}, ("B", 1): {"m": 2.0}})
+    loose = table.unpaired()
+    assert loose.driven.sum(axis=0).tolist() == [1, 1, 1]
+    np.testing.assert_array_equal(loose.means, table.means)
 
 
 @pytest.mark.parametrize(
@@ -66,19 +67,6 @@ def test_an_unknown_metric_is_refused_with_the_nearest_name():
     table = ScoreTable.from_episodes({("A", 1): {"distance": 1.0}})
     with pytest.raises(ScoresError, match="no metric 'distanz' in the scores; did you mean 'distance'"):
         table.select(["distanz"])
-
-
-def test_unpaired_episodes_share_no_label_and_keep_the_means():
-    table = ScoreTable.from_episodes({("A", 1): {"m": 1.0}, ("A", 2): {"m": 4.0}, ("B", 1): {"m": 2.0}})
-    loose = table.unpaired()
-    assert loose.driven.sum(axis=0).tolist() == [1, 1, 1]
-    np.testing.assert_array_equal(loose.means, table.means)
-
-
-def test_arranging_moves_values_with_their_names():
-    table = ScoreTable.from_episodes({(a, e): {"m": 10.0 * i + e} for i, a in enumerate("AB") for e in (1, 2)})
-    moved = table.arrange(agents=("B", "A"), episodes=("2", "1"))
-    assert moved.values[:, :, 0].tolist() == [[12.0, 11.0], [2.0, 1.0]]
 
 
 def test_agents_with_too_many_episodes_of_their_own_are_refused_before_they_fill_the_memory():

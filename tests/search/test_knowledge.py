@@ -21,18 +21,25 @@ def planted(values):
     return 20.0 * values[0] + 5.0 * values[1]
 
 
-def test_the_shares_of_a_sum_are_those_of_its_terms_variances():
+def test_shares_are_those_of_terms_or_of_parameters_together():
     for importance, share in zip(found(planted, 60), (0.8, 0.2, 0.0), strict=True):
         assert importance.share == pytest.approx(share, abs=0.02)
         assert importance.alone == pytest.approx(importance.share, abs=0.02)
+    strong, weak, dead = found(lambda values: 30.0 * (values[0] - 0.5) * values[1], 60)
+    assert min(strong.share, weak.share) > 0.9
+    assert max(strong.alone, weak.alone) < 0.1
+    assert dead.share < 0.05
 
 
-def test_a_dead_parameter_has_next_to_nothing_also_under_noise():
+def test_a_dead_parameter_or_a_constant_score_has_next_to_no_share():
     noise = np.random.default_rng(1)
     strong, weak, dead = found(lambda values: planted(values) + noise.normal(0.0, 2.0), 60)
     assert dead.share < 0.05
     assert dead.interval[1] < 0.15
     assert dead.interval[1] < weak.interval[0] < weak.interval[1] < strong.interval[0]
+    for importance in found(lambda values: 4.0, 8):
+        assert importance.share == importance.alone == 0.0
+        assert importance.interval[1] > 0.5
 
 
 def test_the_interval_holds_the_planted_share_and_narrows_with_trials():
@@ -42,19 +49,6 @@ def test_the_interval_holds_the_planted_share_and_narrows_with_trials():
         assert importance.interval[0] <= share <= importance.interval[1]
     for wide, narrow in zip(few, many, strict=True):
         assert np.diff(narrow.interval) < np.diff(wide.interval)
-
-
-def test_parameters_that_count_only_together_have_all_the_share_and_none_alone():
-    strong, weak, dead = found(lambda values: 30.0 * (values[0] - 0.5) * values[1], 60)
-    assert min(strong.share, weak.share) > 0.9
-    assert max(strong.alone, weak.alone) < 0.1
-    assert dead.share < 0.05
-
-
-def test_a_constant_score_gives_no_parameter_a_share_and_says_that_little_is_known():
-    for importance in found(lambda values: 4.0, 8):
-        assert importance.share == importance.alone == 0.0
-        assert importance.interval[1] > 0.5
 
 
 @pytest.mark.parametrize("count", [1, 2, 5])

@@ -28,22 +28,19 @@ def likelihood(values=None, noise=1e-4):
     return Likelihood(fit_outputs(SPACE, trials), goal(whole, outputs(TRUTH) if values is None else values, noise))
 
 
-def test_it_is_highest_near_the_truth():
+def test_outputs_count_by_what_they_tell_of_the_truth():
     grid = np.stack(np.meshgrid(np.linspace(0, 1, 41), np.linspace(0, 1, 41)), axis=-1).reshape(-1, 2)
     best = grid[np.argmax(likelihood().log(grid))]
     assert best == pytest.approx(to_unit(SPACE, TRUTH), abs=0.05)
-
-
-def test_outputs_that_the_target_lacks_say_nothing():
     part = (*outputs(TRUTH)[:2], np.nan, np.nan)
     assert likelihood(part).columns.tolist() == [0, 1]
     assert np.isfinite(likelihood(part).log(np.array([[0.5, 0.5]]))).all()
-
-
-def test_more_noise_makes_it_flatter():
     points = np.array([to_unit(SPACE, TRUTH), [0.9, 0.1]])
     sharp, flat = (np.ptp(likelihood(noise=noise).log(points)) for noise in (1e-4, 1.0))
     assert sharp > 5.0 * flat
+    found = [temper(np.random.default_rng(seed).normal(size=(24, 40))) for seed in range(20)]
+    assert max(found) < 1.6
+    assert np.mean(found) < 1.3
 
 
 @settings(max_examples=20)
@@ -53,24 +50,25 @@ def test_copies_of_one_output_count_as_one(copies, seed):
     assert temper(np.repeat(errors, copies, axis=1)) == pytest.approx(copies, rel=0.01)
 
 
-def test_independent_outputs_count_each():
-    found = [temper(np.random.default_rng(seed).normal(size=(24, 40))) for seed in range(20)]
-    assert max(found) < 1.6
-    assert np.mean(found) < 1.3
-
-
-def test_holes_change_little():
+def test_holes_and_outputs_far_off_or_still_change_little():
     base = np.random.default_rng(0).normal(size=(60, 3))
     errors = np.repeat(base, 4, axis=1)
     holes = np.where(np.random.default_rng(1).random(errors.shape) < 0.3, np.nan, errors)
     assert temper(errors) == pytest.approx(4.0, abs=0.3)
     assert temper(holes) == pytest.approx(4.0, abs=0.6)
 
-
-def test_an_output_that_is_far_off_counts_for_less_than_a_normal_s_would():
     assert deviance(np.array([0.0]))[0] == 0.0
     assert deviance(np.array([1.0]))[0] == pytest.approx(0.5, abs=0.1)
     assert deviance(np.array([10.0]))[0] < 10.0
+
+    model = fit_outputs(SPACE, [Trial(design_point(SPACE, index, 1), 1.0, (7.0,)) for index in range(6)])
+    assert model.modelled.size == 0
+    assert np.isnan(model.predict(np.array([[0.5, 0.5]]))[0]).all()
+
+    forwards, backwards = fit_outputs(SPACE, trials(12)), fit_outputs(SPACE, trials(12)[::-1])
+    points = unit_array(SPACE, HELD_OUT)
+    for one, other in zip(forwards.predict(points), backwards.predict(points), strict=True):
+        assert np.array_equal(one, other, equal_nan=True)
 
 
 def five_outputs(values):
@@ -123,19 +121,6 @@ def test_trials_that_know_some_outputs_alone_tell_of_these():
     assert np.median(model.predict(points)[1][:, 0]) < np.median(half.predict(points)[1][:, 0])
     assert np.allclose(model.predict(points)[0][:, 1], half.predict(points)[0][:, 1])
     assert np.isnan(model.left_out).sum(axis=0)[:2].tolist() == [0, 12]
-
-
-def test_the_order_of_trials_changes_no_bit():
-    forwards, backwards = fit_outputs(SPACE, trials(12)), fit_outputs(SPACE, trials(12)[::-1])
-    points = unit_array(SPACE, HELD_OUT)
-    for one, other in zip(forwards.predict(points), backwards.predict(points), strict=True):
-        assert np.array_equal(one, other, equal_nan=True)
-
-
-def test_outputs_that_never_change_are_not_modelled_and_stop_nothing():
-    model = fit_outputs(SPACE, [Trial(design_point(SPACE, index, 1), 1.0, (7.0,)) for index in range(6)])
-    assert model.modelled.size == 0
-    assert np.isnan(model.predict(np.array([[0.5, 0.5]]))[0]).all()
 
 
 def cheaper(values):

@@ -22,9 +22,11 @@ def test_batches_are_whole_but_for_the_last_of_the_design_and_none_is_of_both(in
     assert batch.start == 0 or batch_at(batch.start - 1, size, initial).stop == batch.start
 
 
-def test_the_design_makes_batches_of_its_own():
+def test_the_design_makes_batches_of_its_own_and_pending_trials_have_not_failed():
     assert [list(batch_at(index, 3, 5)) for index in (0, 4, 5, 8)] == [[0, 1, 2], [3, 4], [5, 6, 7], [8, 9, 10]]
     assert [list(batch_at(index, 1, 5)) for index in range(7)] == [[index] for index in range(7)]
+    trials = [Trial((0.1, 0.0), 3.0), Trial((0.2, 0.0), None), Trial((0.3, 0.0), None, pending=True)]
+    assert [trial.score for trial in with_failures_as_worst(trials)] == [3.0, 3.0, None]
 
 
 @pytest.mark.parametrize("engine", HERE)
@@ -54,11 +56,6 @@ def test_an_engine_that_says_the_same_again_has_the_design_go_on_in_its_place():
     assert batch == ((0.1, 0.1), design_point(SPACE, 2, 3), design_point(SPACE, 3, 3))
     visited = [Trial((0.1, 0.1), 1.0)]
     assert propose_batch(AfterDesign(Stubborn(), 1), SPACE, visited, 3, 1) == ((0.1, 0.1),), "what is finished may be"
-
-
-def test_a_pending_trial_is_not_taken_for_a_failed_one():
-    trials = [Trial((0.1, 0.0), 3.0), Trial((0.2, 0.0), None), Trial((0.3, 0.0), None, pending=True)]
-    assert [trial.score for trial in with_failures_as_worst(trials)] == [3.0, 3.0, None]
 
 
 @pytest.mark.parametrize("engine", [name for name in ("gp", "tpe") if name in HERE])

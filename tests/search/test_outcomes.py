@@ -30,10 +30,14 @@ def test_it_finds_at_once_what_the_score_alone_does_not_show():
         assert min(trial.score for trial in trials) == 0.0
 
 
-def test_a_failed_trial_counts_as_the_outcome_of_the_worst_score():
+def test_failed_trials_and_outputs_that_never_change_do_no_harm():
     trials = [Trial((0.1, 0.0), 3.0, (1.0,)), Trial((0.2, 0.0), None), Trial((0.3, 0.0), 8.0, (2.0,))]
     counted = [(trial.score, trial.outcome) for trial in with_failures_as_worst(trials)]
     assert counted == [(3.0, (1.0,)), (8.0, (2.0,)), (8.0, (2.0,))]
+    trials = search(make_proposer("sobol", 6), 6, 1)
+    more = [Trial(trial.values, trial.score, (*trial.outcome, 60.0)) for trial in trials]
+    plain, with_constant = Composite(WHOLE), Composite(goal(whole, (0.0, 60.0)))
+    assert with_constant.propose(SPACE, more, 1) == pytest.approx(plain.propose(SPACE, trials, 1), abs=0.1)
 
 
 def test_draws_agree_with_the_outcomes_at_visited_points_and_spread_elsewhere():
@@ -44,13 +48,6 @@ def test_draws_agree_with_the_outcomes_at_visited_points_and_spread_elsewhere():
     assert np.allclose(scores(visited).mean(axis=0), 100.0 + visited[:, 0], atol=0.02)
     near, far = scores(np.array([[0.2, 0.2], [1.0, 1.0]])).std(axis=0)
     assert 5 * near < far
-
-
-def test_an_output_that_never_changes_does_no_harm():
-    trials = search(make_proposer("sobol", 6), 6, 1)
-    more = [Trial(trial.values, trial.score, (*trial.outcome, 60.0)) for trial in trials]
-    plain, with_constant = Composite(WHOLE), Composite(goal(whole, (0.0, 60.0)))
-    assert with_constant.propose(SPACE, more, 1) == pytest.approx(plain.propose(SPACE, trials, 1), abs=0.1)
 
 
 AGENTS = np.random.default_rng(3).uniform(1.0, 5.0, (10, 2))

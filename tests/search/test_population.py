@@ -53,7 +53,7 @@ def test_robots_that_are_alike_have_no_spread_of_their_measurements(planted):
     assert high < MEASURED
 
 
-def test_the_fleet_makes_each_robot_better_known(planted):
+def test_robots_know_themselves_better_by_the_fleet_and_the_next_is_where_they_are(planted):
     """Errors are smaller than each robot's own, far smaller where robots are alike; intervals hold 95 % of truths."""
     theta, measured, found = planted
     low, middle, high = summary_of(found.robots)
@@ -61,10 +61,6 @@ def test_the_fleet_makes_each_robot_better_known(planted):
     assert shared[0] < own[0]
     assert shared[1] < 0.5 * own[1]
     assert ((low <= theta) & (theta <= high)).mean() > 0.88
-
-
-def test_the_next_robot_is_where_robots_are(planted):
-    """Its interval is somewhat wider than that of the planted distribution, since mean and spread are not known."""
     low, _, high = summary_of(planted[2].next_robot)[:, 0]
     assert 2 * 1.96 * 0.075 < high - low < 2 * 1.96 * 0.15
 

@@ -33,15 +33,12 @@ def left_out(told, values=(0.5,) * 12):
     return leave_out(fit_outputs(SPACE, told), told, goal(whole, values, 1e-4), 1)
 
 
-def test_each_trial_is_told_how_probable_its_own_theta_is():
+def test_theta_of_each_trial_is_told_but_for_other_placements():
     found = left_out(trials(20))
     assert found.deviances.shape == (20,)
     assert found.above.shape == (20, len(WIDENINGS))
     assert (found.above >= 0.0).all()
     assert (found.above <= 1.0 + 1e-9).all()
-
-
-def test_what_was_driven_under_another_placement_is_left_out_with_a_trial():
     told = trials(8)
     told += [replace(one, outcome=tuple(value + 0.01 for value in one.outcome), placement=-1) for one in told[:3]]
     for one in as_targets(fit_outputs(SPACE, told), told, goal(whole, (0.5,) * 12, 1e-4), 1):
@@ -68,16 +65,15 @@ def test_the_region_is_widened_until_it_holds_nine_of_ten():
     assert planted(20, len(WIDENINGS) - 1).widening == MARGIN * WIDENINGS[-1]
 
 
-def test_few_of_them_widen_nothing_beyond_the_margin_and_a_single_one_is_not_left_out():
+def test_few_trials_or_those_without_outputs_widen_nothing_beyond_the_margin():
     few = left_out(trials(FEWEST - 1))
     assert (few.enough, few.widening) == (False, MARGIN)
     assert left_out(trials(1)).widening == MARGIN
-
-
-def test_trials_that_lack_outputs_are_not_left_out_but_are_learnt_from():
     told = trials(12)
     told[::3] = [replace(trial, outcome=(*trial.outcome[:6], *[np.nan] * 6)) for trial in told[::3]]
     assert left_out(told).deviances.shape == (8,)
+    low = [replace(trial, score=None, low_fidelity=True) for trial in trials(40)[8:]]
+    assert left_out([*low, *trials(8)]).deviances.shape == (8,)
 
 
 SPREAD = 0.03
@@ -116,7 +112,7 @@ def test_targets_beyond_it_are_found():
     assert max(p_value(seed, 0.6) for seed in range(6)) < 0.05
 
 
-def test_where_no_theta_explains_the_target_the_density_is_wider_by_how_much_farther_off_it_is():
+def test_the_density_is_wider_only_where_no_theta_explains_the_target():
     """The log density is divided by the dispersion, and the region takes more of the box."""
     found = learnt(0, 0.6)
     dispersion = found.misfit.deviance / found.misfit.expected
@@ -128,11 +124,8 @@ def test_where_no_theta_explains_the_target_the_density_is_wider_by_how_much_far
     as_if_it_fits = posterior_of(lambda some: found.log(some) * dispersion, 2)
     assert found.posterior.share > 1.5 * as_if_it_fits.share
 
-
-def test_where_some_theta_may_explain_it_the_density_stays():
     found = learnt(0, 0.0)
     assert found.misfit.fits is True
-    points = np.array([[0.3, 0.4], [0.7, 0.5]])
     assert found.log(points).tolist() == (found.likelihood.log(points) / found.left_out.widening).tolist()
 
 
@@ -189,20 +182,14 @@ def test_a_small_region_in_four_dimensions_is_found_and_measured():
     assert np.diff(found.intervals, axis=1)[:, 0] == pytest.approx(3.92 * widths, rel=0.25)
 
 
-def test_where_nothing_is_known_the_region_is_the_box_and_no_parameter_is_identified():
+def test_parameters_are_identified_or_not_or_make_up_for_each_other():
     found = posterior_of(lambda points: np.zeros(len(points)), 3)
     assert found.share == pytest.approx(1.0, abs=0.06)
     assert found.unidentified.all()
     assert found.trades == ()
-
-
-def test_a_parameter_that_is_pinned_down_is_identified_beside_one_that_is_not():
     found = posterior_of(lambda points: -0.5 * ((points[:, 0] - 0.5) / 0.02) ** 2, 2)
     assert found.unidentified.tolist() == [False, True]
     assert found.share == pytest.approx(0.02 * 3.92, rel=0.15)
-
-
-def test_parameters_that_make_up_for_each_other_are_named_with_their_correlation():
     ((first, second, correlation),) = posterior_of(normal(np.full(2, 0.5), np.full(2, 0.05), -0.9), 2).trades
     assert (first, second) == (0, 1)
     assert correlation == pytest.approx(-0.9, abs=0.05)
@@ -217,9 +204,3 @@ def test_draws_are_those_of_the_density_and_in_the_box():
     assert draws[:, 1].std() == pytest.approx(0.1, abs=0.015)
     assert len({tuple(draw) for draw in draws}) == 400
     assert np.array_equal(found.draw(3), found.draw(3))
-
-
-def test_trials_of_a_cheaper_proxy_are_no_targets():
-    """They tell of those that are left out, and are not what a target looks like."""
-    low = [replace(trial, score=None, low_fidelity=True) for trial in trials(40)[8:]]
-    assert left_out([*low, *trials(8)]).deviances.shape == (8,)

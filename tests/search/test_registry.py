@@ -154,10 +154,12 @@ def test_an_engine_is_told_of_a_failed_trial_as_the_worst_and_only_after_the_des
     assert inner.told == [3.0, 8.0, 8.0]
 
 
-def test_random_and_sobol_learn_nothing():
+def test_random_and_sobol_learn_nothing_and_unknown_ones_are_refused():
     for engine in ("random", "sobol"):
         low, high = (search(made(engine, 2), 6, 1, score) for score in (steps, lambda values: 100.0))
         assert [trial.values for trial in low] == [trial.values for trial in high]
+    told = complaint_of(make_proposer, "sobool", 3)
+    assert "unknown engine 'sobool' (your own is written module:attribute); did you mean 'sobol'" in told
 
 
 @pytest.mark.skipif(not HAS_OPTUNA, reason="Optuna is not installed")
@@ -199,11 +201,6 @@ def test_every_engine_that_is_not_refused_can_be_made_and_its_code_has_a_name_of
     for engine in ENGINE_NAMES:
         if not why_not(engine, composed=True):
             assert made(engine, 3).initial == 3
-
-
-def test_an_unknown_engine_is_refused_with_the_nearest_name():
-    told = complaint_of(make_proposer, "sobool", 3)
-    assert "unknown engine 'sobool' (your own is written module:attribute); did you mean 'sobol'" in told
 
 
 def test_an_engine_in_a_file_of_ones_own_is_found_beside_and_goes_by_the_name_it_was_asked_for(tmp_path):

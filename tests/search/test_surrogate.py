@@ -39,7 +39,7 @@ def test_the_posterior_is_the_same_to_the_last_bit_in_whatever_order_trials_are_
     assert np.array_equal(there.predict(np.eye(2)), back.predict(np.eye(2)))
 
 
-def test_the_incumbent_is_not_the_luckiest_score():
+def test_the_incumbent_is_not_the_luckiest_and_points_are_of_the_unit_cube():
     """One freak zero among high scores does not win over a valley of low ones."""
     trials = visited(40)
     far = max(trials, key=lambda trial: trial.score)
@@ -48,11 +48,18 @@ def test_the_incumbent_is_not_the_luckiest_score():
     assert values != lucky.values
     assert steps(values) <= 3
     assert mean < 5
+    assert np.allclose(unit_array(SPACE, [(0.0, -0.3), (0.3, 0.0)]), [[0.0, 0.0], [1.0, 0.5]])
+    assert unit_array(SPACE, []).shape == (0, 2)
 
 
-def test_the_noise_never_vanishes_even_on_scores_without_any():
+def test_noise_never_vanishes_and_the_posterior_is_surer_where_trials_are():
     surrogate = fit_surrogate(SPACE, visited(30, lambda values: 10 * values[0]))
     assert surrogate.model.noise_ > 0.0099
+    trials = [trial for trial in visited(30) if trial.values[0] < 0.15]
+    surrogate = fit_surrogate(SPACE, trials)
+    _, at_trials = surrogate.at_visited()
+    _, elsewhere = surrogate.predict(np.array([[1.0, 0.0], [1.0, 1.0]]))
+    assert at_trials.max() < elsewhere.min()
 
 
 def test_a_few_trials_do_not_send_the_length_scales_to_their_bounds():
@@ -64,14 +71,6 @@ def test_a_few_trials_do_not_send_the_length_scales_to_their_bounds():
         assert 0.1 < min(scales) <= max(scales) < 1.6
 
 
-def test_the_posterior_is_surer_where_trials_are():
-    trials = [trial for trial in visited(30) if trial.values[0] < 0.15]
-    surrogate = fit_surrogate(SPACE, trials)
-    _, at_trials = surrogate.at_visited()
-    _, elsewhere = surrogate.predict(np.array([[1.0, 0.0], [1.0, 1.0]]))
-    assert at_trials.max() < elsewhere.min()
-
-
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_a_few_trials_or_equal_scores_still_give_finite_predictions(count):
     for score in (steps, lambda values: 4.0):
@@ -80,16 +79,8 @@ def test_a_few_trials_or_equal_scores_still_give_finite_predictions(count):
         assert np.isfinite(deviation).all()
 
 
-def test_failed_trials_are_left_out():
+def test_failed_trials_are_left_out_and_without_a_score_it_says_so():
     trials = visited(9)
     assert len(fit_surrogate(SPACE, [*trials, Trial((0.1, 0.1), None)]).visited) == 9
-
-
-def test_without_a_single_score_it_says_so():
     with pytest.raises(RunError, match="no trial has a score"):
         fit_surrogate(SPACE, [Trial((0.1, 0.1), None)])
-
-
-def test_points_become_rows_of_the_unit_cube():
-    assert np.allclose(unit_array(SPACE, [(0.0, -0.3), (0.3, 0.0)]), [[0.0, 0.0], [1.0, 0.5]])
-    assert unit_array(SPACE, []).shape == (0, 2)

@@ -66,16 +66,13 @@ def test_wheels_mass_and_camera_are_read_and_the_bullet_plant_drives_it_ahead(tm
     assert poses[-1, 0] == pytest.approx(0.4, abs=0.02)
 
 
-def test_only_what_a_urdf_cannot_know_is_to_be_edited(tmp_path):
+def test_what_was_read_is_said_and_what_a_urdf_cannot_know_is_to_be_edited(tmp_path):
     lines = robot_from_urdf("rover", urdf(tmp_path), {"full_speed": 0.4}).files["robot.toml"].splitlines()
     figures = {line.split(" = ")[0]: line for line in lines if " = { value" in line}
     assert "read from turtle.urdf" in figures["wheel_radius"]
     assert "given to" in figures["full_speed"]
     assert not [n for n in ("wheel_radius", "wheel_distance", "mass", "camera_height") if "EDIT" in figures[n]]
     assert "# EDIT" in figures["motor_time_constant"]
-
-
-def test_it_says_what_was_read_and_what_was_changed(tmp_path):
     notes = robot_from_urdf("rover", urdf(tmp_path), {}).notes
     assert notes[0].startswith("read from turtle.urdf: wheel_radius 0.033, wheel_distance 0.16, mass 0.91")
     for said in ("wheel_left_joint is now called axle_left", "moved by 0.01 0 -0.01 m", "1 meshes of its looks"):
@@ -88,12 +85,14 @@ def test_the_origin_is_the_middle_of_the_axle_on_the_floor(tmp_path):
     assert left.centre == pytest.approx((0.0, 0.08, 0.033))
 
 
-def test_wheels_that_are_meshes_need_their_radius(tmp_path):
+def test_wheels_that_are_meshes_need_their_radius_and_two_are_no_car(tmp_path):
     path = urdf(tmp_path, shape='<mesh filename="wheel.stl"/>')
     with pytest.raises(InputError, match="its wheels are meshes; state their radius: --figures wheel_radius=METRES"):
         robot_from_urdf("rover", path, {})
     described = robot_from_urdf("rover", path, {"wheel_radius": 0.04}).files["robot.toml"]
     assert "wheel_radius = { value = 0.04," in described
+    with pytest.raises(InputError, match="a car needs two joints that steer, found none; call them steer_left and"):
+        robot_from_urdf("mine", urdf(tmp_path), {}, "ackermann")
 
 
 def test_what_is_stated_goes_before_the_urdf_save_for_the_wheels(tmp_path):
@@ -138,8 +137,3 @@ def test_the_joints_of_a_car_are_found_and_named_and_its_wheelbase_is_read(tmp_p
     check_body(robot)
     assert robot.figures["wheelbase"] == pytest.approx(0.31)
     assert "joint hinge_left is now called steer_left" in skeleton.notes
-
-
-def test_a_urdf_of_two_wheels_is_no_car(tmp_path):
-    with pytest.raises(InputError, match="a car needs two joints that steer, found none; call them steer_left and"):
-        robot_from_urdf("mine", urdf(tmp_path), {}, "ackermann")

@@ -43,15 +43,12 @@ def add_fact(connection, key, value):
     write_row(connection, "facts", {"key": key, "value": value})
 
 
-def test_a_database_is_made_with_its_format_and_plain_tables(tmp_path):
+def test_a_database_is_made_and_left_clean_as_one_file(tmp_path):
     path = made(tmp_path / "study.db")
     with sqlite3.connect(path) as plain:
         assert plain.execute("PRAGMA user_version").fetchone() == (FORMAT,)
         names = {name for (name,) in plain.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
     assert names == {"facts", "instances", "trials", "episodes", "sweeps", "under_way", "counts"}
-
-
-def test_a_clean_end_leaves_the_one_file(tmp_path):
     connection = connect(tmp_path / "study.db", writable=True)
     add_fact(connection, "seed", "1")
     disconnect(connection)
@@ -186,9 +183,12 @@ def filled(path):
     return path
 
 
-def test_a_folder_that_cannot_be_written_is_told(tmp_path):
+def test_folders_and_what_cannot_be_written_are_told(tmp_path):
     with pytest.raises(StoreError, match=r"cannot be written \(unable to open database file\)"):
         connect(tmp_path / "nowhere" / "study.db", writable=True)
+    (tmp_path / "study.db").mkdir()
+    with pytest.raises(StoreError, match=r"study\.db: is a folder, so no study's database; move it away"):
+        connect(tmp_path / "study.db", writable=True)
 
 
 def test_a_full_disk_is_told_and_what_was_committed_stays(tmp_path):
@@ -238,12 +238,6 @@ def test_a_part_of_a_page_is_refused_but_not_beside_the_log_that_has_the_whole_o
     assert reader.execute("SELECT count(*) FROM instances").fetchall() == [(3000,)]
     reader.close()
     writer.close()
-
-
-def test_a_folder_is_refused(tmp_path):
-    (tmp_path / "study.db").mkdir()
-    with pytest.raises(StoreError, match=r"study\.db: is a folder, so no study's database; move it away"):
-        connect(tmp_path / "study.db", writable=True)
 
 
 def test_a_stranger_s_schema_may_not_call_our_functions(tmp_path):

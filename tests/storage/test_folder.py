@@ -30,15 +30,12 @@ def test_a_second_process_is_told_the_first_one_s_id(tmp_path, holder):
         locked(tmp_path).__enter__()
 
 
-def test_the_lock_of_a_killed_process_does_not_stand_in_the_way(tmp_path, holder):
+def test_locks_of_killed_processes_do_not_stand_in_the_way_and_nothing_is_left(tmp_path, holder):
     holder.send_signal(signal.SIGKILL)
     holder.wait()
     assert (tmp_path / "study.lock").exists()
     with locked(tmp_path):
         assert int((tmp_path / "study.lock").read_text()) == os.getpid()
-
-
-def test_nothing_is_left_of_it_afterwards(tmp_path):
     with locked(tmp_path):
         pass
     assert list(tmp_path.iterdir()) == []

@@ -19,29 +19,30 @@ def test_theta_is_stored_in_one_form_with_every_digit():
     assert theta_json(THETA) == '{"delay": 0.3333333333333333, "trim": 0.1}'
 
 
-def test_an_outcome_comes_back_to_the_last_bit(tmp_path):
+def test_an_outcome_comes_back_to_the_last_bit_and_is_there_for_others_at_once(tmp_path):
     with Store.open(tmp_path) as store:
         store.save_outcome("identity", WORKED)
     with Store.read(tmp_path) as store:
         assert store.outcomes("identity", THETA) == {EPISODE: WORKED}
         assert store.outcomes("another identity", THETA) == {}
         assert store.outcomes("identity", {"trim": 0.1}) == {}
-
-
-def test_an_outcome_is_there_for_others_at_once(tmp_path):
     with Store.open(tmp_path) as store:
         store.save_outcome("identity", WORKED)
         with sqlite3.connect(tmp_path / "study.db") as plain:
             assert plain.execute("SELECT agent, start, seed FROM episodes").fetchall() == [("agent1", 2, 11)]
 
 
-def test_a_failure_is_kept_until_the_episode_works(tmp_path):
+def test_failures_are_kept_until_episodes_work_and_agents_known_by_them(tmp_path):
     failed = Outcome(EPISODE, None, "it lost its way", 0.5)
     with Store.open(tmp_path) as store:
         store.save_outcome("identity", failed)
         assert store.outcomes("identity", THETA) == {EPISODE: failed}
         store.save_outcome("identity", WORKED)
         assert store.outcomes("identity", THETA) == {EPISODE: WORKED}
+    with Store.open(tmp_path) as store:
+        for agent, failure in (("a", "it ended its process"), ("b", "raised it ended"), ("c", "it took long")):
+            store.save_outcome("one", Outcome(replace(EPISODE, agent=agent), None, failure, 1.0))
+        assert store.agents_that_failed("it ended", "it took") == {"a", "c"}
 
 
 def test_failures_are_those_of_other_code_once_the_code_has_changed_or_all_are_to_be_tried_again(tmp_path):
@@ -58,7 +59,7 @@ def test_failures_are_those_of_other_code_once_the_code_has_changed_or_all_are_t
         assert store.failed_in_other_code("identity", code="code 1") == {EPISODE}, "of some the code is not known"
 
 
-def test_trials_come_back_in_order_and_the_last_word_counts(tmp_path):
+def test_trials_come_back_in_order_and_searches_are_kept_apart(tmp_path):
     finished = TrialRecord(1, THETA, "finished", 4.0, {"prpv": 4.0, "ppv": 1 / 3}, 1, "")
     with Store.open(tmp_path) as store:
         store.save_trial("identity", TrialRecord(2, {"trim": 0.2, "delay": 0.0}))
@@ -66,8 +67,6 @@ def test_trials_come_back_in_order_and_the_last_word_counts(tmp_path):
         store.save_trial("identity", finished)
         assert store.trials() == [finished, TrialRecord(2, {"trim": 0.2, "delay": 0.0})]
 
-
-def test_the_trials_of_two_searches_in_one_study_are_kept_apart(tmp_path):
     of_plv = TrialRecord(1, {"trim": 0.2}, "finished", -400.0, {"plv": 400.0, "zero_shot": None}, seconds=2.5)
     with Store.open(tmp_path) as store:
         store.save_trial("identity", TrialRecord(1, THETA))
@@ -89,7 +88,7 @@ def test_what_has_been_read_is_kept_up_with_what_is_written(tmp_path):
         assert store.seconds() == {("agent1", 2): 1.0}
 
 
-def test_beginning_afresh_drops_trials_but_no_episode(tmp_path):
+def test_facts_are_added_and_beginning_afresh_drops_trials_alone(tmp_path):
     with Store.open(tmp_path) as store:
         store.save_trial("identity", TrialRecord(1, THETA))
         store.save_outcome("identity", WORKED)
@@ -98,16 +97,22 @@ def test_beginning_afresh_drops_trials_but_no_episode(tmp_path):
         assert store.facts() == {"seed": 2, "parameters.trim": [-0.3, 0.3]}
         assert store.outcomes("identity", THETA) == {EPISODE: WORKED}
 
+    with Store.open(tmp_path) as store:
+        store.begin({"seed": 2})
+        store.save_trial("identity", TrialRecord(1, THETA))
+        store.save_fact("versions", {"numpy": "2.0"})
+        store.save_fact("versions", {"numpy": "2.1"})
+        assert store.facts() == {"seed": 2, "versions": {"numpy": "2.1"}}
+        assert store.trials() == [TrialRecord(1, THETA)]
 
-def test_seconds_are_averaged_over_domain_instances(tmp_path):
+
+def test_seconds_are_averaged_over_instances_and_trials_have_those_of_their_own(tmp_path):
     with Store.open(tmp_path) as store:
         store.save_outcome("identity", WORKED)
         elsewhere = make_episode({"trim": 0.2}, agent="agent1", start=2, seed=11)
         store.save_outcome("identity", Outcome(elsewhere, {"distance": 1.0}, "", 0.5))
         assert store.seconds() == {("agent1", 2): 1.0}
 
-
-def test_the_time_of_trials_is_that_of_their_own_episodes(tmp_path):
     elsewhere = make_episode({"trim": 0.2}, agent="agent1", start=2, seed=11)
     with Store.open(tmp_path) as store:
         assert store.seconds_of_trials("prpv", 9, {11}) == 0.0
@@ -148,7 +153,7 @@ def test_a_sweep_keeps_the_target_model_of_its_pod_beside_the_same_without(tmp_p
         assert store.sweeps() == [("identity", against), ("identity", SWEEP)]
 
 
-def test_what_cannot_be_written_leaves_everything_as_it_was(tmp_path):
+def test_what_cannot_be_written_leaves_everything_and_reading_cannot_write(tmp_path):
     with Store.open(tmp_path) as store:
         store.save_outcome("identity", WORKED)
         with pytest.raises(ValueError, match="not JSON compliant"):
@@ -157,23 +162,10 @@ def test_what_cannot_be_written_leaves_everything_as_it_was(tmp_path):
             store.save_outcome("identity", Outcome(EPISODE, {"distance": float("nan")}, "", 1.0))
         assert store.outcomes("identity", THETA) == {EPISODE: WORKED}
         store.save_trial("identity", TrialRecord(1, THETA))
-
-
-def test_reading_cannot_write(tmp_path):
     with Store.open(tmp_path) as store:
         store.save_outcome("identity", WORKED)
     with Store.read(tmp_path) as store, pytest.raises(StoreError, match="cannot be written"):
         store.save_outcome("identity", WORKED)
-
-
-def test_a_fact_is_added_and_written_over_without_a_trial_lost(tmp_path):
-    with Store.open(tmp_path) as store:
-        store.begin({"seed": 2})
-        store.save_trial("identity", TrialRecord(1, THETA))
-        store.save_fact("versions", {"numpy": "2.0"})
-        store.save_fact("versions", {"numpy": "2.1"})
-        assert store.facts() == {"seed": 2, "versions": {"numpy": "2.1"}}
-        assert store.trials() == [TrialRecord(1, THETA)]
 
 
 RUNNING = [replace(EPISODE, start=start) for start in (0, 1)]
@@ -190,10 +182,3 @@ def test_the_last_episode_that_began_is_known_to_the_next_process_of_the_same_fa
         assert store.under_way("one") == RUNNING, "all that run at once"
         store.end_episodes()
         assert store.under_way("one") == []
-
-
-def test_agents_are_known_by_how_an_episode_of_theirs_failed(tmp_path):
-    with Store.open(tmp_path) as store:
-        for agent, failure in (("a", "it ended its process"), ("b", "raised it ended"), ("c", "it took long")):
-            store.save_outcome("one", Outcome(replace(EPISODE, agent=agent), None, failure, 1.0))
-        assert store.agents_that_failed("it ended", "it took") == {"a", "c"}

@@ -1,4 +1,4 @@
-"""Earlier studies count before the first trial, or are refused in one line that names them."""
+"""A bank says what a target would tell; earlier studies count before the first trial, or are refused by their names."""
 
 import json
 import re
@@ -13,10 +13,42 @@ from proxytune.cli.main import main
 from proxytune.errors import ProxytuneError
 from proxytune.storage import Store
 from proxytune.study import StudyRun, open_study, read_study_settings
+from proxytune.study.bank import _starts_needed
 from proxytune.study.earlier import BANK_FILE, earlier_trials, learn
 
 BANK = {"target": None, "preflight": "true", "budget": "10", "engine": None}
 LEARNS = {"learn_from": '["../bank"]', "budget": "0", "engine": None, "confirm": "1"}
+
+
+@pytest.mark.slow
+def test_a_bank_says_what_a_target_would_tell(make_study, answered):
+    """Its document has trials, widths, agents and starts in place of an answer, its folder a page and a table."""
+    folder = make_study(**BANK)
+    found = answered("study", folder)
+    bank = found["bank"]
+    assert "best" not in found
+    assert (bank["trials"], bank["starts"]) == (10, 3)
+    assert set(bank["agents"]) == {f"agent{number}" for number in range(6)}
+    assert 0.0 < bank["expected_interval"]["trim"] < 0.6
+    assert Path(found["table"]).stat().st_size < 2**20
+    assert "trim" in Path(found["report"]).read_text()
+    again = answered("study", folder)
+    assert again["episodes"]["run"] == 0
+    assert again["bank"] == bank
+
+
+def test_more_trials_are_the_same_design_gone_on_with(make_study, answered):
+    """A budget that is raised keeps what is there."""
+    folder = make_study(**{**BANK, "budget": "6"})
+    answered("study", folder)
+    make_study(**{**BANK, "budget": "9"})
+    assert answered("study", folder)["episodes"]["run"] == 3 * 6 * 3
+
+
+def test_starts_needed_follow_from_two_numbers_of_starts():
+    """What trials leave unknown no start makes less."""
+    assert _starts_needed({1: 0.1, 4: 0.05}, 20) == 10
+    assert _starts_needed({1: 0.1, 4: 0.1}, 20) is None
 
 
 @pytest.fixture(scope="module")
@@ -168,14 +200,10 @@ def test_a_source_that_is_none_is_refused(case, tmp_path, bank, make_study):
     assert "bank" in str(refused.value)
 
 
-def test_a_name_longer_than_a_path_is_refused(make_study):
+def test_a_source_that_is_none_a_bank_without_a_target_and_a_circle_are_refused(make_study):
     """No system has such a path: one line, as of any that is not there."""
     with pytest.raises(ProxytuneError, match="no such study or table of trials"):
         run_study(make_study(**{**LEARNS, "learn_from": json.dumps(["a" * 5000])}))
-
-
-def test_a_study_learns_neither_from_itself_nor_in_a_circle(make_study):
-    """Both are refused by name."""
     folder = make_study(**{**LEARNS, "learn_from": '["../study"]'})
     with pytest.raises(ProxytuneError, match="is this very study"):
         run_study(folder)

@@ -19,11 +19,14 @@ def load(folder):
     return load_family(settings, settings.proxy)
 
 
-def test_a_factory_gets_the_domain_table_and_the_model(make_study):
+def test_facts_and_factories_get_what_study_toml_says(make_study):
     folder = make_study(domain={"version": '"7"'}, proxy='"model.toml"')
     (folder / "model.toml").write_text("trim = 0.2\n")
     family = load(folder)
     assert (family.version, family.theta) == ("7", (("trim", 0.2),))
+    known = study_facts(open_study(make_study()))
+    assert known["agents"] == [f"agent{number}" for number in range(6)]
+    assert not any(key.startswith("agents.") for key in known)
 
 
 BAD = {
@@ -121,24 +124,25 @@ def test_what_a_member_raises_whenever_it_is_asked_is_one_line_with_its_name_and
         getattr(family, member)
 
 
-def test_what_the_check_of_an_agent_raises_is_one_line():
+def test_what_a_member_raises_is_one_line_and_one_that_is_not_there_is_not_there():
     with pytest.raises(
         ExtensionError, match=r"check_agent\('agent0'\) of sim:make raised OSError: no weights .*correct"
     ):
         UserFamily(Faulty(), "sim:make", ALIASES).check_agent("good")
-
-
-def test_a_member_that_is_not_there_is_not_there():
     family = UserFamily(Wobbly(), "sim:make")
     assert not hasattr(family, "versions")
     assert (family.identity, family.starts) == (Wobbly().identity, 5)
 
 
-def test_an_alias_drives_as_what_it_stands_for_and_other_agents_behind_it_are_another_family():
+def test_an_alias_drives_as_what_it_stands_for_also_among_several():
     family = UserFamily(Wobbly(), "sim:make", ALIASES)
     episode = make_episode({}, agent="good", start=0, seed=1)
     assert family.run(episode) == Wobbly().run(make_episode({}, agent="agent0", start=0, seed=1))
     assert len({family.identity, Wobbly().identity, UserFamily(Wobbly(), "sim:make", ALIASES[:1]).identity}) == 3
+    episodes = [make_episode({}, agent=agent, start=0, seed=1) for agent in ("good", "pupil")]
+    assert UserFamily(Examiner(), "sim:make", ALIASES).examine_together(episodes, 3) == [("agent0", 3), ("pupil", 3)]
+    assert UserFamily(Examiner(), "sim:make").examine_together(episodes, 3) == [("good", 3), ("pupil", 3)]
+    assert not hasattr(UserFamily(Wobbly(), "sim:make", ALIASES), "examine_together")
 
 
 class Agents:
@@ -160,13 +164,6 @@ def test_whatever_is_asked_of_an_episode_is_passed_on_by_the_name_that_the_famil
 class Examiner(Wobbly):
     def examine_together(self, episodes, policy):
         return [(episode.agent, policy) for episode in episodes]
-
-
-def test_several_episodes_are_examined_under_the_names_that_the_family_loads():
-    episodes = [make_episode({}, agent=agent, start=0, seed=1) for agent in ("good", "pupil")]
-    assert UserFamily(Examiner(), "sim:make", ALIASES).examine_together(episodes, 3) == [("agent0", 3), ("pupil", 3)]
-    assert UserFamily(Examiner(), "sim:make").examine_together(episodes, 3) == [("good", 3), ("pupil", 3)]
-    assert not hasattr(UserFamily(Wobbly(), "sim:make", ALIASES), "examine_together")
 
 
 @pytest.fixture
@@ -200,12 +197,6 @@ def test_another_agent_behind_an_alias_is_another_study(aliased):
     changed = aliased(TABLE.replace('a5 = "agent5"', 'a5 = "agent0"'), budget="5")
     with pytest.raises(SettingsError, match=r'changed since the first trial: agents.a5 \(was "agent5"\); put it back'):
         run_study(changed)
-
-
-def test_facts_of_a_study_without_aliases_are_what_they_were(make_study):
-    known = study_facts(open_study(make_study()))
-    assert known["agents"] == [f"agent{number}" for number in range(6)]
-    assert not any(key.startswith("agents.") for key in known)
 
 
 def test_an_unknown_agent_behind_an_alias_is_told_with_its_key(aliased):

@@ -159,16 +159,6 @@ def test_a_target_that_does_not_fit_is_refused_in_one_line(make_study, case):
     assert expected in complaint_of(open_study, target.parent)
 
 
-def test_agents_of_the_target_that_are_not_in_the_study_do_not_count(make_study):
-    folder = make_study(agents='["agent5", "agent1"]')
-    with open(folder / "target.csv", "a") as target:
-        target.write("agent77,only_its_own,1.0,2.0\n")
-    study = open_study(folder)
-    assert study.target.agents == ("agent5", "agent1")
-    assert study.target.episodes == ("0", "1", "2")
-    assert study.target.complete
-
-
 def test_the_engine_is_a_fact_but_that_of_before_there_was_a_choice_goes_without_saying(make_study):
     """Trials of then stay valid."""
     before, other = study_facts(open_study(make_study())), study_facts(open_study(make_study(engine=None)))
@@ -190,27 +180,15 @@ def test_what_the_search_learns_from_is_a_fact(make_study):
     assert study_facts(open_study(make_study(**by_score))) == score
 
 
-def test_rules_to_stop_are_no_facts(make_study):
+def test_rules_to_stop_and_the_order_of_agents_and_metrics_are_no_facts(make_study):
     plain = study_facts(open_study(make_study()))
     assert study_facts(open_study(make_study(stop="{ wall_time_s = 5, no_improvement = 0.1 }"))) == plain
-
-
-def test_the_order_of_agents_and_lines_is_no_fact(make_study):
     one = study_facts(open_study(make_study()))
     agents = '["agent5", "agent4", "agent3", "agent2", "agent1", "agent0"]'
     metrics = '["survival_time:max", "distance:max"]'
     other = study_facts(open_study(make_study(agents=agents, metrics=metrics)))
     assert one == other
     assert changes(one, other) == []
-
-
-def test_agents_that_the_target_lacks_are_left_out_and_named(finished):
-    target = finished / "target.csv"
-    kept = [line for line in target.read_text().splitlines() if not line.startswith(("agent4", "agent5"))]
-    target.write_text("\n".join(kept) + "\n")
-    study = open_study(finished)
-    assert study.settings.agents == study.target.agents == ("agent0", "agent1", "agent2", "agent3")
-    assert "the target has no scores of agent4, agent5: left out" in looked_at(study).cautions
 
 
 def test_the_truth_is_read_but_nothing_depends_on_it(make_study):
@@ -223,13 +201,19 @@ def test_the_truth_is_read_but_nothing_depends_on_it(make_study):
         open_study(make_study(truth='"untruth.toml"'))
 
 
-def test_of_a_target_with_more_starts_the_study_s_own_are_compared(make_study):
+def test_starts_of_both_sides_are_compared_and_others_left_out(make_study, rows):
     """So that both sides drive from the same starts; where it lacks one of them, all its episodes count."""
     whole = open_study(make_study())
     fewer = open_study(make_study(starts="2"))
     assert (whole.target.episodes, fewer.target.episodes) == (("0", "1", "2"), ("0", "1"))
     assert fewer.target.means.tolist() == whole.target.values[:, :2].mean(axis=1).tolist()
     assert open_study(make_study(starts="5")).target.episodes == ("0", "1", "2")
+    folder = make_study(target='"real.csv"')
+    write(folder, real=[HEAD, *rows, *(f"agent{number},17,1,2" for number in range(6))])
+    study = open_study(folder)
+    assert "17" not in study.target.episodes
+    (line,) = [one for one in study.cautions if "taken for this study's starts" in one]
+    assert "and 1 of others are left out; raise starts to use them" in line
 
 
 HEAD = "agent,episode,distance,survival_time"
@@ -246,15 +230,11 @@ def write(folder, **files):
         (folder / f"{name}.csv").write_text("\n".join(lines) + "\n")
 
 
-def test_a_target_in_several_files_is_the_one_that_it_would_be_in_one(make_study, rows):
+def test_targets_of_several_files_and_names_are_as_one(make_study, rows):
     whole = open_study(make_study())
     folder = make_study(target='["monday.csv", "tuesday.csv"]')
     write(folder, monday=[HEAD, *rows[:7]], tuesday=[HEAD, *rows[7:]])
     assert study_facts(open_study(folder)) == study_facts(whole)
-
-
-def test_columns_have_the_target_s_own_names(make_study, rows):
-    whole = open_study(make_study())
     columns = '{ agent = "policy", episode = "trial", distance = "dist_m" }'
     folder = make_study(target='"real.csv"', target_columns=columns)
     european = [row.replace(",", ";").replace(".", ",") for row in rows]
@@ -278,7 +258,7 @@ def test_a_target_of_another_kind_or_none_is_refused(make_study, target, says):
     assert says in complaint_of(open_study, make_study(target=target))
 
 
-def test_agents_that_are_on_one_side_only_are_named_on_either(make_study, rows):
+def test_only_what_both_sides_have_is_compared_and_what_is_left_out_is_named(make_study, rows):
     folder = make_study(target='"real.csv"')
     write(folder, real=[HEAD, *(row for row in rows if "agent5" not in row), "human,0,1,2", "human,1,1,2"])
     study = open_study(folder)
@@ -288,18 +268,17 @@ def test_agents_that_are_on_one_side_only_are_named_on_either(make_study, rows):
         "the target has scores of human, no agents of this study: left out",
     )
 
+    folder = make_study(agents='["agent5", "agent1"]')
+    with open(folder / "target.csv", "a") as target:
+        target.write("agent77,only_its_own,1.0,2.0\n")
+    study = open_study(folder)
+    assert study.target.agents == ("agent5", "agent1")
+    assert study.target.episodes == ("0", "1", "2")
+    assert study.target.complete
+
 
 def test_where_no_name_agrees_a_table_of_names_is_the_remedy(make_study, rows):
     folder = make_study(target='"real.csv"')
     write(folder, real=[HEAD, *(row.replace("agent", "a") for row in rows)])
     with pytest.raises(InputError, match=r"its agents are a0, a1.*by a table \[agents\] in study.toml: a0 = 'agent0'"):
         open_study(folder)
-
-
-def test_episodes_that_are_no_starts_of_the_study_are_left_out_and_that_is_said(make_study, rows):
-    folder = make_study(target='"real.csv"')
-    write(folder, real=[HEAD, *rows, *(f"agent{number},17,1,2" for number in range(6))])
-    study = open_study(folder)
-    assert "17" not in study.target.episodes
-    (line,) = [one for one in study.cautions if "taken for this study's starts" in one]
-    assert "and 1 of others are left out; raise starts to use them" in line

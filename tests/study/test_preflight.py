@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from moody import Moody
+from deadly import Deadly
 from searched import changed, looked_at, running, searched
 from stopping import Stopping
 
@@ -78,7 +78,7 @@ def with_holes(rows):
     return [row for row in rows if not row.startswith("agent2,1,")]
 
 
-def test_with_shared_starts_noise_is_what_another_placement_changes(make_study):
+def test_noise_is_that_of_placement_and_less_with_repeats(make_study):
     with running(make_study(preflight="true")) as study_run:
         run_preflight(study_run)
         found, pairs = noise_of(study_run), placement_pairs(study_run)
@@ -88,8 +88,6 @@ def test_with_shared_starts_noise_is_what_another_placement_changes(make_study):
     assert np.median(found.variance) == pytest.approx(2 * 0.15**2 / 3, rel=0.8)
     assert (found.variance > 0.0).all()
 
-
-def test_repeats_of_a_start_on_the_target_make_its_noise_less(make_study):
     folder = make_study(preflight="true")
     with running(folder) as study_run:
         run_preflight(study_run)
@@ -99,6 +97,13 @@ def test_repeats_of_a_start_on_the_target_make_its_noise_less(make_study):
         assert shares_starts(study)
         again = noise_of(StudyRun(study, study_run.store))
     assert again.variance == pytest.approx(0.75 * once.variance)
+
+    with running(make_study(preflight="true")) as study_run:
+        run_preflight(study_run)
+        known = noise_of(study_run)
+        unknown = noise_of(StudyRun(open_study(make_study(preflight="false")), study_run.store))
+    assert known.caution == ""
+    assert unknown.caution.startswith("noise is estimated from the spread between the target's episodes")
 
 
 def twice(rows):
@@ -121,21 +126,14 @@ def test_any_other_table_works_and_says_what_it_loses(finished, edit):
         assert low < high
 
 
-def test_the_spread_between_starts_is_taken_for_noise_only_where_nothing_better_is_known(make_study):
-    with running(make_study(preflight="true")) as study_run:
-        run_preflight(study_run)
-        known = noise_of(study_run)
-        unknown = noise_of(StudyRun(open_study(make_study(preflight="false")), study_run.store))
-    assert known.caution == ""
-    assert unknown.caution.startswith("noise is estimated from the spread between the target's episodes")
-
-
-def test_failed_episodes_of_the_pre_flight_are_left_out(make_study):
+def test_failed_episodes_are_left_out_of_noise_and_comparison(make_study):
     with running(make_study(domain={"faults": '["agent3:1:raises"]'}, preflight="true")) as study_run:
         run_preflight(study_run)
         found = noise_of(study_run)
         assert np.array_equal(goal_of(study_run).noise, found.variance.ravel())
     assert np.isfinite(found.variance).all()
+    found = told(make_study(preflight="true", domain={"faults": '["agent3:1:raises"]'}))
+    assert {movement.pairs for movement in found.values()} <= {PAIRS // LOOKS - 1, PAIRS - 2}
 
 
 def run(folder, **changes):
@@ -198,21 +196,13 @@ def test_what_need_not_be_run_is_taken_off_the_bar(planted):
     assert spent.episodes + watcher.off == most_preflight_episodes(study.settings)
 
 
-def test_the_trials_are_those_of_a_study_without_it(make_study, finished):
+def test_the_trials_are_those_of_a_study_without_it_also_where_they_have_begun(make_study, finished):
     folder = make_study("checked", preflight="true")
     assert run(folder)[0].episodes > 0
     assert searched(open_study(folder))[1] == searched(open_study(finished))[1]
-
-
-def test_a_study_whose_trials_have_begun_goes_on_without(finished, make_study):
     make_study(preflight="true")
     spent, found = run(finished)
     assert (spent.episodes, found) == (0, None)
-
-
-def test_failed_episodes_are_left_out_of_the_comparison(make_study):
-    found = told(make_study(preflight="true", domain={"faults": '["agent3:1:raises"]'}))
-    assert {movement.pairs for movement in found.values()} <= {PAIRS // LOOKS - 1, PAIRS - 2}
 
 
 def test_where_every_agent_fails_everywhere_it_says_so_once_and_of_what(make_study):
@@ -235,11 +225,16 @@ def test_where_failures_stop_the_study_they_stop_it_here(make_study):
         run(make_study(preflight="true", domain={"faults": '["agent3:1:raises"]'}, on_failure='"stop"'))
 
 
-def test_what_is_wrong_with_a_parameter_and_what_to_do_is_one_line(planted):
+def test_one_line_says_what_is_wrong_with_a_parameter_and_one_metric_that_moves_is_enough(planted):
     _, found = run(planted())
     dead, noise_sized = found.warnings
     assert dead.startswith("pre-flight: 'dead' changes nothing at all across [0, 1]; remove it from")
     assert noise_sized.startswith("pre-flight: 'noise_sized' is not shown to change a metric across [0, 1]")
+    values = np.random.default_rng(1).normal(size=(PAIRS, 4, 2))
+    values[:, 3, 1] += 10.0
+    found = judge(Interval("blur", 0.0, 1.0), ["a", "b"], values)
+    assert found.moves
+    assert found.metric == "b"
 
 
 @pytest.mark.slow
@@ -250,21 +245,17 @@ def test_a_parameter_that_is_only_one_more_source_of_noise_is_said_to_matter_in_
     assert 0 < sum(movement.moves for movement in found) * LOOKS <= 400 * LEVEL + 9
 
 
-def test_one_metric_that_a_parameter_moves_is_enough_and_it_is_named():
-    values = np.random.default_rng(1).normal(size=(PAIRS, 4, 2))
-    values[:, 3, 1] += 10.0
-    found = judge(Interval("blur", 0.0, 1.0), ["a", "b"], values)
-    assert found.moves
-    assert found.metric == "b"
-
-
+MOODY = Deadly(
+    faults=("agent1:*:remembers", "agent2:*:draws by NumPy", "agent3:*:draws", "agent4:*:draws by Python"),
+)
 EPISODE = make_episode({}, agent="agent2", start=0, seed=2**40 + 3)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_agents_that_remember_or_draw_unseeded_are_named_at_once_and_for_good(make_study, capsys, jobs):
-    folder = make_study(family='"moody:moody"', preflight="true", jobs=jobs, budget="3", initial="3")
+    domain = {"faults": str(list(MOODY.faults))}
+    folder = make_study(family='"deadly:deadly"', domain=domain, preflight="true", jobs=jobs, budget="3", initial="3")
     named = [
         f"pre-flight: agent '{agent}' scores otherwise in the same episode; {REMEDY}" for agent in ("agent1", "agent3")
     ]
@@ -285,10 +276,10 @@ def test_agents_that_remember_or_draw_unseeded_are_named_at_once_and_for_good(ma
 def test_draws_from_the_generators_of_the_process_follow_from_the_episode_s_seed(agent):
     episode, another = (make_episode({}, agent=agent, start=0, seed=seed) for seed in (2**40 + 3, 5))
     np.random.seed(1)
-    first, other = run_episode(Moody(), episode).metrics, run_episode(Moody(), another).metrics
+    first, other = run_episode(MOODY, episode).metrics, run_episode(MOODY, another).metrics
     np.random.seed(2)
     random.seed(2)
-    assert run_episode(Moody(), episode).metrics == first != other
+    assert run_episode(MOODY, episode).metrics == first != other
 
 
 def test_the_generators_of_the_process_go_on_as_if_no_episode_had_been_driven():
@@ -297,5 +288,5 @@ def test_the_generators_of_the_process_go_on_as_if_no_episode_had_been_driven():
     expected = np.random.normal(), random.random()
     np.random.seed(1)
     random.seed(1)
-    run_episode(Moody(), EPISODE)
+    run_episode(MOODY, EPISODE)
     assert (np.random.normal(), random.random()) == expected

@@ -69,11 +69,18 @@ def test_a_trial_that_was_cut_off_would_have_scored_no_less_than_its_bound_and_a
                 assert trial.estimate >= trial.bound
 
 
-def test_the_search_is_told_the_estimate_of_a_trial_that_was_cut_off(done):
+def test_a_cut_trial_is_told_by_its_estimate_in_the_search_and_in_plain_sql(done):
     _, trials, found = done
     told = score_trials(found.study.settings.space, trials)
     assert [one.score for one in told] == [t.estimate if t.state == "cut" else t.prpv for t in trials]
     assert found.best.trial.state == "finished"
+    with sqlite3.connect(found.study.settings.folder / "study.db") as plain:
+        rows = plain.execute(
+            "SELECT number, measures, decided, bound, score FROM trials WHERE state = 'cut'"
+        ).fetchall()
+    assert [(row[0], row[1], tuple(json.loads(row[2])), *row[3:]) for row in rows] == [
+        (trial.number, "{}", trial.decided, trial.bound, trial.estimate) for trial in trials if trial.state == "cut"
+    ]
 
 
 @pytest.mark.parametrize("engine", [pytest.param(name, marks=pytest.mark.slow) for name in ("gp", "random", "sobol")])
@@ -135,7 +142,14 @@ def test_the_agents_that_tell_most_come_first_and_the_limit_is_a_noise_above_the
     assert against.limit > lowest
 
 
-def test_what_was_spared_is_the_time_of_the_like_of_what_was_not_driven(done):
+def test_trials_stand_on_decided_agents_and_what_was_spared_is_counted(done):
+    _, _, found = done
+    trial = TrialRecord(1, {"first": 0.0, "second": 0.0}, "cut", decided=("agent2", "agent5"), bound=1.0, score=2.0)
+    driven = StudyRun(found.study, None).episodes_of(trial)
+    assert {episode.agent for episode in driven} == {"agent2", "agent5"}
+    assert len(driven) == 6
+    assert len(StudyRun(found.study, None).episodes_of(replace(trial, state="finished", decided=()))) == ALL
+
     _, trials, found = done
     with Store.open(found.study.settings.folder) as store:
         seconds = store.seconds()
@@ -149,26 +163,6 @@ def test_what_was_spared_is_the_time_of_the_like_of_what_was_not_driven(done):
     ]
     assert episodes == len(missing)
     assert spared_seconds == pytest.approx(sum(missing))
-
-
-def test_a_cut_trial_is_told_in_the_database_in_plain_sql(done):
-    _, trials, found = done
-    with sqlite3.connect(found.study.settings.folder / "study.db") as plain:
-        rows = plain.execute(
-            "SELECT number, measures, decided, bound, score FROM trials WHERE state = 'cut'"
-        ).fetchall()
-    assert [(row[0], row[1], tuple(json.loads(row[2])), *row[3:]) for row in rows] == [
-        (trial.number, "{}", trial.decided, trial.bound, trial.estimate) for trial in trials if trial.state == "cut"
-    ]
-
-
-def test_a_trial_stands_on_the_episodes_of_its_decided_agents(done):
-    _, _, found = done
-    trial = TrialRecord(1, {"first": 0.0, "second": 0.0}, "cut", decided=("agent2", "agent5"), bound=1.0, score=2.0)
-    driven = StudyRun(found.study, None).episodes_of(trial)
-    assert {episode.agent for episode in driven} == {"agent2", "agent5"}
-    assert len(driven) == 6
-    assert len(StudyRun(found.study, None).episodes_of(replace(trial, state="finished", decided=()))) == ALL
 
 
 def test_of_a_trial_that_was_cut_off_the_search_has_the_decided_agents_outputs_even_where_all_episodes_are_known(done):
@@ -233,7 +227,7 @@ def test_a_study_under_way_is_not_stopped_by_a_rule_that_does_not_hold(finished,
         assert stopped(StudyRun(ruled(finished, **rules), store), store.trials()[:6]) == ""
 
 
-def test_time_counts_over_all_runs_and_is_shared_among_jobs(finished):
+def test_rules_to_stop_hold_over_all_runs_and_jobs_and_not_without_a_trial(finished):
     study = ruled(finished)
     with Store.read(finished) as store:
         trials = store.trials()[:6]
@@ -243,9 +237,6 @@ def test_time_counts_over_all_runs_and_is_shared_among_jobs(finished):
         assert not stopped(StudyRun(ruled(finished, wall_time_s=1.1 * taken), store), trials)
         twice = changed(finished, stop=StopRules(wall_time_s=0.9 * taken), jobs=2)
         assert not stopped(StudyRun(twice, store), trials)
-
-
-def test_where_all_trials_failed_nothing_is_said_of_a_gain(finished):
     failed = [TrialRecord(number, {"trim": 0.0, "delay": 0.0}, "failed") for number in range(1, 7)]
     with Store.read(finished) as store:
         assert stopped(StudyRun(ruled(finished, no_improvement=ALWAYS), store), failed) == ""

@@ -111,20 +111,17 @@ def test_the_folder_of_a_family_names_its_study_before_and_after_it_is_made(make
         read_study_settings(folder / "families" / "rong")
 
 
-def test_a_study_in_a_folder_of_that_name_is_a_study_of_its_own(make_study, tmp_path):
+def test_a_study_is_given_as_its_folder_or_its_file_also_in_one_of_a_family_s_name(make_study, tmp_path):
     make_several(make_study)
     (tmp_path / "study" / "families").mkdir()
     inner = make_study("study/families/right")
     assert read_study_settings(inner).family_name == ""
     assert read_study_settings(inner).home == inner
-
-
-def test_a_study_is_given_as_its_folder_or_its_file(make_study):
     folder = make_study()
     assert read_study_settings(folder) == read_study_settings(folder / "study.toml")
 
 
-def test_what_is_written_is_what_is_read(make_study):
+def test_what_is_written_is_what_is_read_and_rules_to_stop_each_on_their_own(make_study):
     settings = read_study_settings(make_study(jobs="2", batch="9", on_failure='"stop"', proxy='"m.toml"'))
     assert (settings.name, settings.starts, settings.budget, settings.initial) == ("wobbly", 3, 7, 5)
     assert (settings.seed, settings.jobs, settings.stop_on_failure) == (1, 2, True)
@@ -136,6 +133,12 @@ def test_what_is_written_is_what_is_read(make_study):
     assert settings_document(settings)["preflight"] is settings.preflight is False
     assert settings.stop == StopRules()
 
+    settings = read_study_settings(make_study(stop="{ wall_time_s = 60 }"))
+    assert settings.stop == StopRules(wall_time_s=60.0)
+    settings = read_study_settings(make_study(stop="{ no_improvement = 0.2 }"))
+    assert settings.stop == StopRules(no_improvement=0.2)
+    assert settings_document(settings)["stop"] == {"no_improvement": 0.2}
+
 
 def test_what_may_be_left_out_has_a_default(make_study):
     left_out = dict.fromkeys(
@@ -146,29 +149,7 @@ def test_what_may_be_left_out_has_a_default(make_study):
     assert settings.batch == 1
     assert (settings.initial, settings.seed, settings.jobs, settings.stop_on_failure) == (8, 1, 1, False)
     assert (settings.engine, settings.preflight, settings.confirm, settings.cut_off) == ("outcomes", True, 1, True)
-
-
-def test_of_learning_value_nothing_is_known_but_the_score_so_its_default_engine_is_that_of_scores(make_study):
     assert read_study_settings(make_study("plv", objective='"plv"', engine=None)).engine == "gp"
-
-
-def test_rules_to_stop_are_read_each_on_its_own(make_study):
-    settings = read_study_settings(make_study(stop="{ wall_time_s = 60 }"))
-    assert settings.stop == StopRules(wall_time_s=60.0)
-    settings = read_study_settings(make_study(stop="{ no_improvement = 0.2 }"))
-    assert settings.stop == StopRules(no_improvement=0.2)
-    assert settings_document(settings)["stop"] == {"no_improvement": 0.2}
-
-
-@pytest.mark.parametrize("engine", ["gp", "composite", "random", "sobol", "tpe"])
-def test_a_study_names_its_engine(make_study, engine):
-    assert settings_document(read_study_settings(make_study(engine=f'"{engine}"')))["engine"] == engine
-
-
-def test_the_box_does_not_depend_on_the_order_of_its_lines(make_study):
-    one = read_study_settings(make_study(parameters={"trim": "[-0.3, 0.3]", "delay": "[0, 0.3]"}))
-    other = read_study_settings(make_study(parameters={"delay": "[0, 0.3]", "trim": "[-0.3, 0.3]"}))
-    assert one.space == other.space
 
 
 BAD = {
@@ -222,12 +203,14 @@ def put(folder, *names):
         (folder / name).write_bytes(b"1")
 
 
-def test_weights_beside_modules_are_named_in_one_line(make_study):
+def test_weights_beside_modules_are_named_in_one_line_and_of_many_some(make_study, tmp_path):
     folder = make_study()
     put(folder, "mine.py", "net.ONNX", "pack/weights.npz")
     (caution,) = open_study(folder).cautions
     assert caution.startswith("net.ONNX, pack/weights.npz: if agents read this, a change in it is not noticed; ")
     assert "\n" not in caution
+    put(tmp_path, "mine.py", *(f"net{number}.pt" for number in range(5)))
+    assert unnoticed(tmp_path)[0].startswith("net0.pt, net1.pt, net2.pt and 2 more: ")
 
 
 @pytest.mark.parametrize(
@@ -242,8 +225,3 @@ def test_weights_beside_modules_are_named_in_one_line(make_study):
 def test_nothing_is_said_where_no_module_could_read_weights_or_there_are_none(tmp_path, names):
     put(tmp_path, *names)
     assert unnoticed(tmp_path) == ()
-
-
-def test_of_many_files_only_some_are_named(tmp_path):
-    put(tmp_path, "mine.py", *(f"net{number}.pt" for number in range(5)))
-    assert unnoticed(tmp_path)[0].startswith("net0.pt, net1.pt, net2.pt and 2 more: ")

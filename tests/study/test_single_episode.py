@@ -39,15 +39,12 @@ def side_by_side(folder, theta, tmp_path):
     return drive_side_by_side(proxy, target, make_episode(theta, agent="steady", start=1, seed=5))
 
 
-def test_a_proxy_like_its_target_drives_the_very_same_episode(lane, tmp_path):
+def test_a_proxy_starts_where_its_target_does_and_parts_from_one_unlike_it(lane, tmp_path):
     pair = side_by_side(lane, {"trim": 0.2}, tmp_path)
     assert pair.proxy.metrics == pair.target.metrics
     assert np.array_equal(pair.proxy.places, pair.target.places)
     assert pair.parted_s is None
     assert (pair.road.name, pair.command_unit) == ("small_loop", "duty")
-
-
-def test_another_proxy_starts_at_the_same_place_and_parts_later(lane, tmp_path):
     pair = side_by_side(lane, {"trim": -0.2}, tmp_path)
     assert np.array_equal(pair.proxy.places[0], pair.target.places[0])
     row = round(60 * pair.parted_s)
@@ -79,12 +76,9 @@ def test_they_part_at_the_first_time_that_is_further_apart_than_the_limit(speed)
     assert pair.parted_s == pytest.approx(later[0])
 
 
-def test_what_happens_after_one_has_ended_does_not_count():
+def test_places_are_compared_at_the_same_time_until_one_has_ended():
     pair = paired(recorded(lambda time: 0.04 * time), recorded(lambda time: 0.0 * time, seconds=1.0))
     assert pair.parted_s is None
-
-
-def test_places_are_compared_at_the_same_time_whatever_the_rates():
     fast, slow = recorded(lambda time: 0.5 * time), recorded(lambda time: 0.5 * time)
     thinned = {name: column[::4] for name, column in slow.poses.items()}
     assert paired(fast, type(slow)(slow.metrics, thinned, slow.commands)).parted_s is None
@@ -119,14 +113,11 @@ def test_pictures_are_those_that_the_agent_saw_before_each_command(lane):
     assert len(set(kept.commands["left"])) > 5, "the picture changes while it drives"
 
 
-def test_nobody_who_does_not_ask_waits_for_pictures(lane):
+def test_pictures_are_kept_only_for_who_asks_and_where_there_is_a_camera(lane, make_study):
     kept = record_episode(family_of(lane), make_episode({}, agent="steady", start=0, seed=3))
     assert kept.pictures is None
     assert kept.channels == ("left", "right")
     assert kept.seconds == pytest.approx(2.0)
-
-
-def test_a_family_without_a_camera_gives_places_and_commands(make_study):
     folder = make_study(family='"walking:walking"')
     kept = record_episode(family_of(folder), make_episode({"trim": 0.1}, agent="agent0", start=0, seed=3), filmed=True)
     assert kept.places[-1, 0] == pytest.approx(0.6)

@@ -132,11 +132,6 @@ def test_with_every_engine_an_interrupted_batch_goes_on_to_the_same_trials(make_
     assert run(make_study("stopped", **keys))[1] == whole
 
 
-def test_a_batch_beyond_the_budget_is_cut_short_by_it(make_study):
-    _, trials = run(make_study(batch="100"))
-    assert [trial.state for trial in trials] == ["finished"] * 7
-
-
 def test_rules_to_stop_are_asked_where_a_batch_has_ended(make_study):
     """The same rule stops a study by one trial at a time after its first."""
     folder = make_study(batch=str(BATCH))
@@ -197,16 +192,13 @@ def test_the_score_is_what_the_usefulness_room_says_of_the_tables(make_study):
     assert found.failures == ()
 
 
-def test_a_failed_episode_is_left_out_and_none_is_made_up_for_it(make_study):
+def test_a_failure_is_left_out_and_an_agent_without_any_episode_that_worked_fails_the_trial_by_name(make_study):
     _, found = simulated(make_study(domain={"faults": '["agent3:1:raises", "agent4:0:nan"]'}))
     assert [(f.episode.agent, f.episode.start) for f in found.failures] == [("agent3", 1), ("agent4", 0)]
     assert found.prpv is not None
     row = found.proxy.agents.index("agent3")
     assert found.proxy.counts[row] == 2
-
-
-def test_an_agent_without_any_episode_that_worked_fails_the_trial_by_name(make_study):
-    _, found = simulated(make_study(domain={"faults": '["agent3:*:raises"]'}))
+    _, found = simulated(make_study("other", domain={"faults": '["agent3:*:raises"]'}))
     assert (found.prpv, found.score, found.proxy) == (None, None, None)
     assert found.failure.startswith("agent 'agent3' failed from every start, first with: agent 'agent3' raised")
 
@@ -220,13 +212,6 @@ def test_where_failures_stop_the_study_the_first_does_and_is_tried_again_later(m
     lines = (tmp_path / "journal").read_text().splitlines()
     assert sum(line.startswith("agent3 1") for line in lines) == 2
     assert max(lines.count(line) for line in lines if not line.startswith("agent3 1")) == 1
-
-
-def test_where_they_do_not_a_failure_is_final(make_study, tmp_path):
-    domain = {"faults": '["agent3:1:raises"]', "journal": f'"{tmp_path / "journal"}"'}
-    folder = make_study(domain=domain)
-    simulated(folder)
-    assert simulated(folder)[0].episodes == 0
 
 
 def test_the_longest_episodes_begin_first_and_unknown_ones_before_them(make_study):
@@ -304,19 +289,19 @@ def model(tmp_path):
     return path
 
 
-def test_a_table_has_every_agent_start_and_metric_in_the_study_s_order(make_study, model):
+def test_a_table_has_every_agent_start_and_metric_without_a_target_and_each_agent_is_told_of(make_study, model):
     settings = read_study_settings(make_study(metrics='["distance:max"]'))
     table = measure_agents(settings, model, 1001, Silent())
     assert table.agents == settings.agents
     assert table.episodes == ("0", "1", "2")
     assert table.metrics == ("distance", "survival_time")
     assert table.complete
-
-
-def test_every_agent_is_told_of_once_it_is_measured(make_study, model):
     watcher = Telling()
     measure_agents(read_study_settings(make_study(agents='["agent1", "agent0"]')), model, 1001, watcher)
     assert sorted(watcher.lines) == ["agent agent0 measured", "agent agent1 measured"]
+    folder = make_study()
+    (folder / "target.csv").unlink()
+    assert measure_agents(read_study_settings(folder), model, 1, Silent()).complete
 
 
 @pytest.mark.slow
@@ -332,20 +317,11 @@ def test_the_number_of_jobs_changes_nothing_and_the_seed_and_the_model_do(make_s
     assert (measure_agents(one, model, 1001, Silent()).values != table.values).any()
 
 
-def test_a_target_of_repeats_has_a_floor_of_the_same_starts(make_study, model):
+def test_a_target_of_repeats_has_a_floor_and_a_failing_episode_leaves_no_table(make_study, model):
     settings = read_study_settings(make_study())
     once, twice = (measure_agents(settings, model, 1001, Silent(), repeats) for repeats in (1, 2))
     assert noise_floor(target=twice, metrics=settings.metrics).kind == "same starts"
     assert noise_floor(target=once, metrics=settings.metrics).kind == "halves"
-
-
-def test_the_study_needs_no_target_yet(make_study, model):
-    folder = make_study()
-    (folder / "target.csv").unlink()
-    assert measure_agents(read_study_settings(folder), model, 1, Silent()).complete
-
-
-def test_a_failing_episode_leaves_no_table(make_study, model):
     settings = read_study_settings(make_study(domain={"faults": '["agent3:1:raises"]'}))
     with pytest.raises(EpisodeError, match="agent 'agent3' failed from start 1"):
         measure_agents(settings, model, 1, Silent())
@@ -364,17 +340,14 @@ def test_an_outcome_has_the_study_s_metrics_in_their_order_and_the_target_s_agen
     assert len(set(composed)) > 1
 
 
-def test_a_trial_whose_agent_has_no_episode_lacks_that_agent_s_outputs_alone(make_study):
+def test_outputs_of_agents_without_an_episode_are_lacking_and_without_any_there_is_no_outcome(make_study):
     with running(make_study(domain={"faults": '["agent3:*:raises"]'})) as study_run:
         study_run.evaluate(THETA, "")
         told = study_run.search_trial(TrialRecord(1, THETA, "failed"))
     known = ~np.isnan(told.outcome).reshape(6, 2)
     assert told.score is None
     assert known.all(axis=1).tolist() == [True, True, True, False, True, True]
-
-
-def test_a_trial_without_any_episode_that_worked_has_no_outcome(make_study):
-    with running(make_study(domain={"faults": str([f"agent{n}:*:raises" for n in range(6)])})) as study_run:
+    with running(make_study("other", domain={"faults": str([f"agent{n}:*:raises" for n in range(6)])})) as study_run:
         study_run.evaluate(THETA, "")
         assert study_run.search_trial(TrialRecord(1, THETA, "failed")).outcome is None
 
@@ -398,16 +371,13 @@ def test_the_search_is_told_every_metric_that_both_sides_have_and_prpv_counts_th
     assert open_study(folder).target.metrics == ("survival_time",)
 
 
-def test_only_what_is_given_changes_and_no_trial_depends_on_it(make_study):
+def test_budget_and_jobs_alone_change_and_learning_value_has_its_budget_elsewhere(make_study):
     study = open_study(make_study())
     assert with_spending(study) == study
     other = with_spending(study, budget=40, jobs=3)
     assert (other.settings.budget, other.settings.jobs) == (40, 3)
     assert replace(other.settings, budget=7, jobs=1) == study.settings
     assert study_facts(other) == study_facts(study)
-
-
-def test_a_search_for_learning_value_has_its_budget_elsewhere(make_study):
     study = open_study(make_taught(make_study, objective='"plv"', engine='"gp"'))
     with pytest.raises(InputError, match=r"study.toml: budget: .*set teaching.budget in this file instead"):
         with_spending(study, budget=4)

@@ -60,13 +60,22 @@ def test_an_episode_takes_no_time_while_the_machine_pauses(monkeypatch):
     assert run_episode(Paused(), make_episode({}, agent="agent1", start=0, seed=1)).seconds < NAP_S + 1.0
 
 
-def test_an_episode_that_works_without_a_word_takes_its_time(monkeypatch):
+def test_a_clock_counts_work_without_a_word_and_no_pause(monkeypatch):
     now, worked = [0.0], [0.0]
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
     monkeypatch.setattr(time, "process_time", lambda: worked[0])
     with awake() as clock:
         now[0], worked[0] = 60.0, 59.5
     assert clock.seconds() == 60.0
+
+    now = [0.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(time, "process_time", lambda: 0.0)
+    clock = AwakeClock()
+    for step in (0.25, 0.25, 3600.0, 0.25):
+        now[0] += step
+        seconds = clock.seconds()
+    assert seconds == 0.75 + NAP_S
 
 
 def test_clocks_in_use_are_asked_meanwhile_by_one_thread_for_all(monkeypatch):
@@ -88,17 +97,6 @@ def test_clocks_in_use_are_asked_meanwhile_by_one_thread_for_all(monkeypatch):
 
 def left(folder):
     return int((folder / "slow_times").read_text())
-
-
-def test_a_clock_counts_no_pause(monkeypatch):
-    now = [0.0]
-    monkeypatch.setattr(time, "monotonic", lambda: now[0])
-    monkeypatch.setattr(time, "process_time", lambda: 0.0)
-    clock = AwakeClock()
-    for step in (0.25, 0.25, 3600.0, 0.25):
-        now[0] += step
-        seconds = clock.seconds()
-    assert seconds == 0.75 + NAP_S
 
 
 @pytest.mark.slow

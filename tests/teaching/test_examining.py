@@ -102,12 +102,9 @@ def test_scores_become_curves_over_the_grid_and_what_lies_between():
     assert len(curve.examined) == 2
 
 
-def test_fewer_examinations_than_are_made_before_any_is_chosen_are_refused(make_study):
+def test_fewer_examinations_than_at_first_are_refused_and_a_run_is_known_before_it(make_study):
     with pytest.raises(SettingsError, match=r"teaching\.examinations: must be between 8"):
         read_study_settings(make_taught(make_study, more="examinations = 7"))
-
-
-def test_what_a_run_takes_is_known_before_it(make_study):
     taught = load_setup(read_study_settings(make_taught(make_study, more=CHOSEN))).settings
     assert count_examinations(taught, 4) == 56
     whole = load_setup(read_study_settings(make_taught(make_study, called="whole"))).settings

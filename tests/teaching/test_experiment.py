@@ -33,31 +33,23 @@ def noisy(spread, seed):
     return SURE + spread * np.random.default_rng(seed).normal(size=SURE.shape)
 
 
-def test_the_same_ranking_is_1_and_its_reverse_minus_1():
+def test_orders_are_compared_pair_by_pair_unless_tied_or_open():
     assert agreement(NAMES, SURE, 10.0 * SURE).tau == 1.0
     assert agreement(NAMES, SURE, -SURE).tau == -1.0
 
-
-def test_a_pair_of_contrary_order_is_named_with_who_is_ahead_by_the_second_figure_first():
     found = agreement(NAMES, SURE, np.tile([1.0, 3.0, 2.0], (200, 1)))
     assert found.reversed == (("middle", "high"),)
     assert found.tau == pytest.approx(1.0 / 3.0)
 
-
-def test_where_an_order_is_open_no_pair_is_contrary_and_the_interval_is_wide():
     found = agreement(NAMES, noisy(3.0, 1), -noisy(3.0, 2))
     assert found.reversed == ()
     assert found.low < found.tau < found.high
     assert found.high - found.low > 1.0
 
-
-def test_tied_proxies_count_for_neither_order():
     found = agreement(NAMES, SURE, np.tile([1.0, 2.0, 2.0], (200, 1)))
     assert found.tau == pytest.approx(2.0 / np.sqrt(3.0 * 2.0))
     assert agreement(NAMES, SURE, np.full_like(SURE, -np.inf)).tau == 0.0
 
-
-def test_what_was_not_reached_is_behind_all_that_was():
     unreached = SURE.copy()
     unreached[:, 2] = -np.inf
     assert agreement(NAMES, SURE, unreached).reversed == (("low", "high"), ("middle", "high"))
@@ -148,12 +140,9 @@ def test_a_policy_that_gives_no_command_stops_the_run_and_keeps_the_rest(make_st
     assert list((folder / "teaching").glob("samples-*.npz"))
 
 
-def test_a_study_without_the_table_cannot_teach(make_study):
+def test_a_study_without_teaching_or_proxies_is_refused(make_study):
     with pytest.raises(SettingsError, match="teaching: is missing; add the table"):
         load_setup(read_study_settings(make_study()))
-
-
-def test_a_study_without_proxies_has_nothing_to_compare(make_study):
     folder = make_taught(make_study)
     path = folder / "study.toml"
     path.write_text(path.read_text().split("[teaching.proxies")[0])
@@ -283,7 +272,7 @@ def test_a_proxy_that_starts_lower_and_saves_more_shows_that_a_zero_shot_score_d
     assert "shown here, since slow starter saves more than early bird though it starts lower (0.2 for 30.0)" in first
 
 
-def test_a_proxy_that_saves_though_chance_predicts_as_well_shows_that_a_bad_predictor_can_teach():
+def test_what_contradicts_a_figure_is_told_only_where_it_is_shown():
     found = observe(experiment(), predicting(GOOD, poor=("slow starter",)))
     assert found.poor_predictors == ("slow starter",)
     assert found.prpv.tau == pytest.approx(1.0 / 3.0)
@@ -291,13 +280,9 @@ def test_a_proxy_that_saves_though_chance_predicts_as_well_shows_that_a_bad_pred
     assert "slow starter saves samples though a random ranking would predict as well" in second
     assert "Kendall's τ between PRPV and PLV is 0.33" in second
 
-
-def test_where_no_proxy_shows_it_that_is_said():
     found = observe(experiment(), predicting(GOOD))
     assert "none of these proxies shows it" in observation_lines(found, experiment())[1]
 
-
-def test_a_single_proxy_is_not_ranked_but_may_teach_though_it_predicts_badly():
     alone = experiment(names=["slow starter"])
     found = observe(alone, predicting(GOOD, poor=("slow starter",)))
     assert (found.zero_shot, found.prpv, found.poor_predictors) == (None, None, ("slow starter",))

@@ -192,11 +192,15 @@ def test_more_samples_begin_with_the_same_ones_whatever_the_count(tmp_path, by, 
     np.testing.assert_array_equal(first.commands, whole.commands[:count])
 
 
-def test_no_samples_are_those_of_no_round(tmp_path):
+def test_a_proxy_is_asked_once_and_rounds_have_lessons_of_their_own(tmp_path):
     made = staged(tmp_path, target_lessons="learner")
     assert np.isnan(made.score(CurvePoint("none", None, 0, 0)))
     assert made.score(CurvePoint("near", NEAR, 0, 0)) > 0.0
     assert not any(line.startswith("guided") for line in (tmp_path / "journal").read_text().splitlines())
+    samples(staged(tmp_path, target_lessons="learner"), 640)
+    seeds = [line.split()[1] for line in (tmp_path / "journal").read_text().splitlines()]
+    assert len(seeds) > 30
+    assert len(set(seeds)) == len(seeds)
 
 
 @pytest.mark.parametrize(("proxy", "first"), [(None, "lesson"), (NEAR, "guided")])
@@ -207,13 +211,6 @@ def test_the_expert_drives_where_nothing_has_been_learnt_and_the_learner_ever_af
         journal = (tmp_path / "journal").read_text().splitlines()
         assert {line.split()[0] for line in journal} == {kind}
         (tmp_path / "journal").unlink()
-
-
-def test_each_round_has_lessons_of_its_own(tmp_path):
-    samples(staged(tmp_path, target_lessons="learner"), 640)
-    seeds = [line.split()[1] for line in (tmp_path / "journal").read_text().splitlines()]
-    assert len(seeds) > 30
-    assert len(set(seeds)) == len(seeds)
 
 
 def test_a_round_is_another_by_another_learner_proxy_or_repetition_and_not_by_what_comes_after_it(tmp_path):

@@ -5,7 +5,6 @@ A study of learning value looks where asked, finds the proxy that teaches, and g
 
 import re
 from dataclasses import replace
-from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -102,12 +101,12 @@ def test_a_finalist_whose_expert_cannot_drive_is_left_out_with_the_reason(make_s
 BOXED = {"trim": "[-0.3, 0.3]"}
 
 
-def run(folder, left=None, watcher=None):
+def run(folder):
     settings = read_study_settings(folder)
     setup = load_setup(settings)
-    space = search_space(settings, setup.settings.widths, left or {})
+    space = search_space(settings, setup.settings.widths, {})
     with Store.open(folder) as store:
-        search = PlvSearch(settings, setup, store, space, watcher or Silent())
+        search = PlvSearch(settings, setup, store, space, Silent())
         return search.run(make_proposer("gp", settings.initial))
 
 
@@ -118,21 +117,6 @@ def test_it_prefers_a_proxy_from_which_the_target_is_learnt_with_fewest_samples(
     assert found.best.worth.plv.value == max(trial.worth.plv.value for trial in found.trials)
     assert found.best.worth.plv.value > min(trial.worth.plv.value for trial in found.trials)
     assert abs(found.best.theta["trim"] - 0.12) < 0.15
-
-
-@pytest.mark.slow
-def test_what_a_run_that_goes_on_has_done_before_is_known_at_once(make_study):
-    class Known(Silent):
-        known: ClassVar = []
-
-        def begin(self, what, known):
-            self.known.append(known)
-
-    folder = make_taught(make_study, parameters=BOXED, more="budget = 2", initial="2", grid=[0, 40, 80, 160, 320])
-    run(folder)
-    run(folder, watcher=Known())
-    # After those of the learner without a proxy: both trials, each of three repetitions at five counts
-    assert Known.known[:3] == [3 * 5, 0, 2 * 3 * 5]
 
 
 @pytest.mark.slow
@@ -237,10 +221,14 @@ def test_it_searches_only_what_prpv_has_left(make_study):
     assert pinned.intervals[0].high - pinned.intervals[0].low == pytest.approx(0.04)
 
 
-def test_a_width_without_its_parameter_is_one_line(make_study):
+def test_widths_without_a_parameter_or_plv_without_a_target_are_refused(make_study):
     settings = read_study_settings(make_taught(make_study, parameters=BOXED))
     with pytest.raises(SettingsError, match=r"teaching\.width\.delay: is not among \[parameters\]"):
         search_space(settings, {"delay": (0.0, 0.1)}, {})
+    with pytest.raises(RunError, match=r"still rises by more than 6 .* PLV is not known; raise teaching\.target"):
+        run(make_taught(make_study, parameters=BOXED, grid=[0, 3, 6]))
+    with pytest.raises(RunError, match=r"does not come to 64 within 640 samples, .* lower teaching\.level"):
+        run(make_taught(make_study, parameters=BOXED, more="level = 70.0"))
 
 
 @pytest.mark.parametrize(("widest", "wide"), [(0.2001, "0.2001"), (600.0, "600")])
@@ -250,13 +238,3 @@ def test_a_width_beyond_the_parameters_box_is_one_line(make_study, widest, wide)
     told = complaint_of(search_space, settings, {"trim": (0.0, widest)}, {})
     assert told == f"{path}: teaching.width.trim: {says}"
     assert search_space(settings, {"trim": (0.0, 0.2)}, {}).names == ("trim", "trim width")
-
-
-def test_where_the_target_alone_is_not_learnt_there_is_no_plv_to_search_for(make_study):
-    with pytest.raises(RunError, match=r"still rises by more than 6 .* PLV is not known; raise teaching\.target"):
-        run(make_taught(make_study, parameters=BOXED, grid=[0, 3, 6]))
-
-
-def test_a_level_that_is_not_reached_without_a_proxy_is_told_before_any_proxy_is_tried(make_study):
-    with pytest.raises(RunError, match=r"does not come to 64 within 640 samples, .* lower teaching\.level"):
-        run(make_taught(make_study, parameters=BOXED, more="level = 70.0"))

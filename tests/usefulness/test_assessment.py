@@ -13,16 +13,13 @@ from proxytune.usefulness.predictivity import kendall_tau, mmrv, ppv, srcc
 M = (Metric("m"), Metric("n", "min"))
 
 
-def test_it_gathers_the_single_measures():
+def test_it_gathers_measures_each_with_an_interval():
     sides = {"proxy": ordered(1), "target": ordered(2), "metrics": M}
     found = assess(**sides)
     assert found.prpv.value == prpv(compare(**sides)).value == found.prpv_interval.value
     assert found.ppv.value == ppv(compare(**sides)).value
     for name, measure in (("srcc", srcc), ("kendall_tau", kendall_tau), ("mmrv", mmrv)):
         assert getattr(found, name).value == measure(compare(**sides)).value
-
-
-def test_every_measure_has_an_interval_around_it():
     found = assess(proxy=ordered(1, 20), target=ordered(2, 20), metrics=M)
     assert found.intervals.ppv[0] < found.ppv.value < found.intervals.ppv[1]
     for name in ("srcc", "kendall_tau", "mmrv"):
@@ -40,16 +37,13 @@ def test_episodes_are_drawn_once_for_all_intervals_though_one_is_missing(monkeyp
     assert found.prpv_interval == bootstrap_prpv(**sides, resamples=200, seed=5)
 
 
-def test_a_constant_metric_has_no_interval_and_a_note():
+def test_constant_metrics_and_single_episodes_have_no_interval_and_a_note():
     flat = ordered(1).values.copy()
     flat[:, :, 0] = 3.0
     found = assess(proxy=table_of(flat), target=ordered(2), metrics=M)
     assert found.srcc.value["m"] is found.intervals.srcc["m"] is found.intervals.kendall_tau["m"] is None
     assert found.intervals.srcc["n"] is not None
     assert any("m: SRCC is undefined" in note for note in found.notes)
-
-
-def test_single_episodes_have_no_interval_nor_floor_and_two_notes():
     found = assess(proxy=ordered(1, 1), target=ordered(2, 1), metrics=M)
     assert found.intervals is found.at_noise_floor is found.prpv_interval.low is found.noise_floor.value is None
     assert [note.split(":")[0] for note in found.notes] == ["no interval", "no noise floor"]
@@ -66,17 +60,13 @@ def again(one, noise=0.1, seed=9):
     return ScoreTable(one.agents, one.episodes, one.metrics, values)
 
 
-def test_a_proxy_within_the_noise_of_the_same_starts_is_said_to_be():
+def test_a_proxy_within_the_noise_of_the_same_starts_is_said_to_be_and_one_above_is_not():
     target = ordered(2, agents=8)
     floor = floor_of_repeats(domain=target, again=again(target), metrics=CLEAR)
     found = assess(proxy=target, target=target, metrics=CLEAR, floor=floor)
     assert found.noise_floor is floor
     assert found.at_noise_floor is True
     assert any(PERFECT in note for note in found.notes)
-
-
-def test_a_proxy_above_the_floor_is_not():
-    target = ordered(2, agents=8)
     floor = floor_of_repeats(domain=target, again=target, metrics=CLEAR)
     found = assess(proxy=ordered(3, agents=8), target=target, metrics=CLEAR, floor=floor)
     assert found.prpv.value > floor.high
@@ -148,7 +138,7 @@ def test_a_good_proxy_beats_a_bad_one_beyond_noise_but_not_its_twin():
     assert next(value for pair, value in beyond.items() if set(pair) == {"good", "twin"}) is False
 
 
-def test_the_ranking_is_by_prpv_and_differences_are_of_prpv():
+def test_differences_are_of_prpv_and_none_of_a_proxy_with_itself():
     proxies = {name: noisy(TRUTH, seed, noise=4.0) for seed, name in enumerate("abcd", 10)}
     selection = select_proxy(proxies=proxies, target=TARGET, metrics=CLEAR)
     own = {name: prpv(compare(proxy=proxy, target=TARGET, metrics=CLEAR)).value for name, proxy in proxies.items()}
@@ -159,23 +149,18 @@ def test_the_ranking_is_by_prpv_and_differences_are_of_prpv():
         assert pair.value == own[pair.worse] - own[pair.better] >= 0
         assert pair.low <= pair.value <= pair.high
 
-
-def test_a_proxy_against_itself_differs_by_nothing():
     same = noisy(TRUTH, 5, noise=3.0)
     selection = select_proxy(proxies={"a": same, "b": same}, target=TARGET, metrics=CLEAR)
     assert (selection.differences[0].low, selection.differences[0].high) == (0.0, 0.0)
     assert selection.differences[0].beyond_noise is False
 
 
-def test_one_episode_gives_a_ranking_without_intervals_and_says_why():
+def test_one_episode_gives_a_ranking_without_intervals_and_no_proxy_is_refused():
     proxies = {"a": noisy(TRUTH, 1, episodes=1), "b": noisy(-TRUTH, 2, episodes=1)}
     selection = select_proxy(proxies=proxies, target=TARGET, metrics=CLEAR)
     assert [name for name, _ in selection.ranking] == ["a", "b"]
     assert selection.differences[0].beyond_noise is None
     assert "one episode in the proxy" in selection.reason
-
-
-def test_no_proxy_is_refused():
     with pytest.raises(ScoresError, match="no proxy"):
         select_proxy(proxies={}, target=TARGET, metrics=CLEAR)
 

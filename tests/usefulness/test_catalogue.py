@@ -61,10 +61,11 @@ def weighted_as_before(proxy, target, metrics):
     return (np.abs(proxy - target) * weights).sum(axis=-1).mean(axis=-1)
 
 
-def test_an_undefined_value_is_none():
+def test_an_undefined_value_is_none_also_on_means():
     values = ordered(1).values.copy()
     values[0] = 0.0
     assert LARGEST.measured(assess(proxy=table_of(values), target=ordered(2), metrics=M)) == {ALL: (None, None)}
+    assert np.isnan(PPV.of_means(proxy=np.eye(3), target=np.ones((3, 3)), metrics=M))
 
 
 @pytest.mark.parametrize("measure", [PRPV, PPV])
@@ -73,10 +74,6 @@ def test_on_means_alone_a_measure_is_what_is_reported(measure, seed):
     found = assess(proxy=ordered(seed), target=ordered(seed + 100), metrics=M)
     proxy, target = found.inputs.means
     assert measure.of_means(proxy=proxy, target=target, metrics=M) == measure.measured(found)[ALL].value
-
-
-def test_ppv_of_a_target_without_spread_is_undefined_on_means_too():
-    assert np.isnan(PPV.of_means(proxy=np.eye(3), target=np.ones((3, 3)), metrics=M))
 
 
 @pytest.mark.parametrize("measure", [SRCC, BIAS, *PODS], ids=lambda measure: measure.key)

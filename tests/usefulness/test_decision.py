@@ -30,7 +30,7 @@ def decided(proxy, target, metrics=SUCCESS, **asked):
     return decide(compare(proxy=proxy, target=target, metrics=metrics), Asked(**asked), None, 1)
 
 
-def test_of_two_agents_the_probability_is_that_of_two_betas():
+def test_the_best_of_agents_is_told_with_its_probability():
     found = decided(counted([5, 9], 10), counted([5, 9], 10))
     rng = np.random.default_rng(0)
     one, other = rng.beta(6, 6, 400_000), rng.beta(10, 2, 400_000)
@@ -38,9 +38,6 @@ def test_of_two_agents_the_probability_is_that_of_two_betas():
     assert found.probability_best == pytest.approx((other > one).mean(), abs=0.01)
     assert found.expected_regret["agent 1"] == pytest.approx(np.maximum(one - other, 0).mean(), abs=0.003)
     assert found.expected_regret["agent 0"] == pytest.approx(np.maximum(other - one, 0).mean(), abs=0.005)
-
-
-def test_the_agents_to_keep_hold_the_best_with_95_percent_and_no_more():
     found = decided(counted([1, 20, 21, 22], 25), counted([1, 20, 21, 22], 25))
     kept = {found.winner, *found.not_told_apart}
     assert kept == {"agent 1", "agent 2", "agent 3"}
@@ -57,13 +54,17 @@ def test_means_without_rollouts_give_no_probability_but_the_observed_regret():
     assert decided(proxy, target, rollouts=100).probability_best > 0.99
 
 
-def test_less_is_better_of_a_metric_to_be_small():
+def test_less_may_be_better_and_a_tie_costs_what_the_worse_does():
     proxy = means(["seconds"], a=(1.0,), b=(2.0,))
     found = decided(proxy, means(["seconds"], a=(5.0,), b=(4.0,)), [Metric("seconds", "min")])
     assert (found.winner, found.observed.proxy_winners, found.observed.regret) == ("b", ("a",), 1.0)
+    proxy, target = means(["success"], a=(0.9,), b=(0.9,), c=(0.1,)), means(["success"], a=(0.5,), b=(0.7,), c=(0.1,))
+    observed = decided(proxy, target).observed
+    assert observed.agrees is None
+    assert observed.regret == pytest.approx(0.2)
 
 
-def test_tasks_are_averaged_and_left_out_one_at_a_time():
+def test_tasks_are_averaged_and_left_out_one_at_a_time_each_with_a_regret():
     proxy = means(["x", "y", "z"], a=(0.9, 0.1, 0.1), b=(0.2, 0.3, 0.3))
     target = means(["x", "y", "z"], a=(0.9, 0.0, 0.1), b=(0.1, 0.3, 0.3))
     found = decided(proxy, target, [Metric(name) for name in "xyz"])
@@ -71,10 +72,6 @@ def test_tasks_are_averaged_and_left_out_one_at_a_time():
     assert [panel.agrees for panel in found.tasks] == [True, True, True]
     assert [panel.proxy_winners for panel in found.without] == [("b",), ("a",), ("a",)]
     assert decided(proxy, target, [Metric(name) for name in "xyz"], decide_on="y").winner == "b"
-
-
-def test_each_task_and_all_but_each_have_a_regret_of_their_own_where_rollouts_are_known():
-    target = means(["x", "y", "z"], a=(0.9, 0.0, 0.1), b=(0.1, 0.3, 0.3))
     metrics = [Metric(name) for name in "xyz"]
     found = decided(target, target, metrics, rollouts=50)
     assert found.tasks[0].expected_regret["b"] == pytest.approx(0.77, abs=0.02)
@@ -117,20 +114,10 @@ def test_the_regret_of_an_agent_that_never_succeeded_may_be_all_that_there_is(di
     assert found.regret_interval["agent 2"][1] < 0.9
 
 
-def test_a_tie_in_the_proxy_is_told_and_costs_what_the_worse_costs():
-    proxy, target = means(["success"], a=(0.9,), b=(0.9,), c=(0.1,)), means(["success"], a=(0.5,), b=(0.7,), c=(0.1,))
-    observed = decided(proxy, target).observed
-    assert observed.agrees is None
-    assert observed.regret == pytest.approx(0.2)
-
-
-def test_published_standard_errors_are_taken():
+def test_standard_errors_are_those_published_or_shared():
     target = ScoreTable(("a", "b"), ("1",), ("success",), np.array([[[0.5]], [[0.7]]]), np.array([[0.1], [0.1]]))
     found = decided(means(["success"], a=(0.5,), b=(0.7,)), target)
     assert found.probability_best == pytest.approx(0.921, abs=0.01)  # Φ(0.2 / (0.1 √2))
-
-
-def test_means_of_few_episodes_share_their_spread():
     rng = np.random.default_rng(3)
     values = np.array([0.0, 0.0, 3.0])[:, None, None] + rng.normal(size=(3, 2, 1))
     target = ScoreTable(("a", "b", "c"), ("1", "2"), ("success",), values).unpaired()

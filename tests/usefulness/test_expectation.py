@@ -57,10 +57,13 @@ def test_a_cell_is_moved_by_a_difference_and_stays_within_what_was_seen():
     assert (again != first[0]).any(axis=(1, 2)).all()
 
 
-def test_a_pair_of_which_one_failed_is_none():
+def test_where_a_pair_failed_or_neither_side_was_driven_twice_no_floor_is_made_up():
     pair = np.ones((2, 3, 1))
     pair[1, 0] = np.nan
     assert len(donors_of([pair], 1).first) == 4
+    mean = still(lambda truth: truth.mean(axis=1, keepdims=True))
+    assert mean.prpv.floor is mean.prpv.excess is mean.floor.value is None
+    assert (mean.floor.kind, mean.floor.reason != "") == ("none", True)
 
 
 def studied(seed, away=0.0, sign=1.0, noise=0.01, repetitions=5):
@@ -107,12 +110,6 @@ def test_the_true_theta_of_a_simulator_that_draws_nothing_is_never_called_imperf
         ):
             assert found.prpv.value.low == found.prpv.value.value == found.prpv.value.high
             assert found.prpv.excess.low <= 0.0
-
-
-def test_where_neither_side_was_driven_twice_no_floor_is_made_up():
-    mean = still(lambda truth: truth.mean(axis=1, keepdims=True))
-    assert mean.prpv.floor is mean.prpv.excess is mean.floor.value is None
-    assert (mean.floor.kind, mean.floor.reason != "") == ("none", True)
 
 
 def test_same_seed_same_figures():

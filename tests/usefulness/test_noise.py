@@ -20,16 +20,13 @@ FIRST = M[:1]
 SCORES = Path(__file__).parents[2] / "../shared/data/scores"
 
 
-def test_it_agrees_with_all_permutations_of_five_agents():
+def test_chance_agrees_with_all_permutations_and_tells_perfect_from_useless():
     proxy, target = np.random.default_rng(0).normal(size=(2, 5, 2))
     every = np.array([prpv_of_means(proxy[list(order)], target, M) for order in permutations(range(5))])
     result = chance(compare(proxy=of_means(*proxy), target=of_means(*target), metrics=M), permutations=4000)
     assert result.mean == pytest.approx(every.mean(), abs=0.2)
     assert result.deviation == pytest.approx(every.std(), abs=0.2)
     assert result.p_value == pytest.approx((every <= prpv_of_means(proxy, target, M)).mean(), abs=0.03)
-
-
-def test_a_perfect_proxy_is_hardly_by_chance_and_a_useless_one_is():
     target = np.random.default_rng(2).normal(size=(8, 1)).repeat(2, axis=1)
     right, wrong = (compare(proxy=of_means(*one), target=of_means(*target), metrics=M) for one in (target, -target))
     assert chance(right).p_value == pytest.approx(1 / 1001, abs=2e-3)
@@ -52,7 +49,7 @@ def interleaved(one, two):
     return np.stack([one, two], axis=2).reshape(len(one), -1)
 
 
-def test_halves_are_disjoint_and_take_all_episodes_of_each_agent():
+def test_halves_are_disjoint_and_agents_with_the_same_episodes_split_alike():
     values = np.zeros((3, 5))
     values[0, 4], values[1, :2] = np.nan, np.nan
     uneven = table_of(values)
@@ -62,18 +59,17 @@ def test_halves_are_disjoint_and_take_all_episodes_of_each_agent():
     assert not first[0, :, 4].any()
     assert not first[1, :, :2].any()
     assert len(np.unique(first[2], axis=0)) > 1
-
-
-def test_agents_with_the_same_episodes_are_split_alike():
-    """Scores that depend on the start alone leave the order as it is in both halves."""
     starts = np.random.default_rng(0).normal(size=(1, 4))
     assert noise_floor(target=table_of(starts + np.arange(3.0)[:, None]), metrics=FIRST).high == 0.0
 
 
-def test_one_episode_gives_no_floor_and_says_why():
+def test_without_a_second_episode_or_a_start_in_common_there_is_no_floor():
     result = noise_floor(target=table_of(np.arange(3.0)[:, None]), metrics=FIRST)
     assert (result.value, result.kind) == (None, "none")
     assert "each agent has one episode on the target" in result.reason
+    (one, two), _ = planted(5)
+    other = table_of(two, "abcdef")
+    assert "both times" in floor_of_repeats(domain=table_of(one), again=other, metrics=FIRST).reason
 
 
 @given(seed=st.integers(0, 10_000), starts=st.integers(2, 5), repeats=st.integers(2, 5))
@@ -111,7 +107,7 @@ def test_the_floor_is_what_a_perfect_proxy_scores():
     assert np.mean(within) >= 0.93
 
 
-def test_starts_are_paired_by_their_label_and_those_not_driven_both_times_left_out():
+def test_starts_are_paired_by_their_label_on_both_sides():
     (one, _), rng = planted(2)
     again = table_of(one).arrange(agents=table_of(one).agents, episodes=tuple("543210"))
     holes = again.values.copy()
@@ -121,9 +117,6 @@ def test_starts_are_paired_by_their_label_and_those_not_driven_both_times_left_o
     assert (found.value, found.low, found.high) == (0.0, 0.0, 0.0)
     loud = ScoreTable(again.agents, again.episodes, again.metrics, holes + rng.normal(size=holes.shape))
     assert floor_of_repeats(domain=table_of(one), again=loud, metrics=FIRST).value > 0.0
-
-
-def test_both_sides_may_have_repeats():
     (one, _), _ = planted(3)
     domain, again = repeated(one.repeat(2, axis=1), 2), repeated(one.repeat(3, axis=1), 3)
     assert floor_of_repeats(domain=domain, again=again, metrics=FIRST).high == 0.0
@@ -139,12 +132,6 @@ def test_an_agent_with_less_than_two_starts_driven_both_times_gives_no_floor_but
     found = floor_of_repeats(domain=table_of(one), again=table_of(two), metrics=FIRST)
     assert (found.kind, found.value, found.high) == ("none", None, None)
     assert told in found.reason
-
-
-def test_tables_without_a_start_in_common_give_no_floor():
-    (one, two), _ = planted(5)
-    other = table_of(two, "abcdef")
-    assert "both times" in floor_of_repeats(domain=table_of(one), again=other, metrics=FIRST).reason
 
 
 @pytest.mark.skipif(not SCORES.is_dir(), reason="the measured scores of ../shared/data are not here")

@@ -26,14 +26,11 @@ def table(agents, episodes=(1,)):
     return ScoreTable.from_episodes({(a, e): {"m": ord(a) + e / 10, "n": 0.0} for a in agents for e in episodes})
 
 
-def test_the_proxy_is_put_in_the_targets_order():
+def test_tables_are_put_in_one_order_and_different_episodes_not_paired():
     inputs = compare(proxy=table("CAB", (2, 1)), target=table("ABC", (1, 2)), metrics=M)
     assert inputs.agents == inputs.proxy.agents == ("A", "B", "C")
     assert inputs.paired
     assert (inputs.proxy.values == inputs.target.values).all()
-
-
-def test_different_episodes_are_not_paired():
     assert not compare(proxy=table("AB", (1, 2)), target=table("AB", (1, 3)), metrics=M).paired
     inputs = compare(proxy=table("AB", (1, 2, 3)), target=table("AB"), metrics=M)
     assert (inputs.proxy_episodes, inputs.target_episodes) == ((3, 3), (1, 1))
@@ -100,11 +97,18 @@ def test_sorting_gives_what_comparing_every_pair_gives(measure, kind, seed, agen
         np.testing.assert_array_equal(MEASURES[measure](proxy, target, metrics), pairwise)
 
 
-def test_a_tolerance_that_differences_only_just_reach_is_a_tie_as_rounded():
+def test_differences_up_to_the_tolerance_or_by_rounding_are_ties():
     """0.8 − 0.3 is 0.5 in floating point, though 0.8 − 0.5 is more than 0.3."""
     found = stand(np.array([0.8, 0.3, 0.1]), 0.5)
     assert found.below.tolist() == [1, 0, 0]
     assert found.reach.tolist() == [3, 3, 2]
+    scores = np.array([[1.0], [1.5], [2.0]])
+    assert dominance(scores, [Metric("m", "max", 0.5)])[:, 0].tolist() == [0.5, 0.5, 1.0]
+    assert dominance(scores, [Metric("m", "max", 25.0, percent=True)])[:, 0].tolist() == [0.5, 0.5, 1.0]
+    assert dominance(scores, [Metric("m", "min", 0.5)])[:, 0].tolist() == [0.5, 0.5, 0.0]
+    one = ScoreTable.from_episodes({("A", e): {"m": 0.1} for e in range(10)} | {("B", 0): {"m": 0.1}})
+    assert dominance(one.means, [Metric("m")]).tolist() == [[0.5, 0.5], [0.5, 0.5]]
+    assert dominance(np.array([[0.1 + 0.2], [0.3]]), [Metric("m")]).tolist() == [[0.5, 0.5], [0.5, 0.5]]
 
 
 @pytest.mark.slow
@@ -134,15 +138,12 @@ def pairs_of_means(draw):
     return np.array(draw(scores), dtype=float).reshape(2, agents, 2)
 
 
-def test_three_agents_by_hand():
+def test_prpv_of_a_few_agents_is_that_by_hand():
     """Target A > B > C; proxy C > A > B: A–C and B–C are reversed, two each."""
     result = prpv(compare(proxy=of_means(2, 1, 3), target=of_means(3, 2, 1), metrics=M))
     assert result.value == 4
     assert result.pairs == (FlippedPair("A", "C", "reversed"), FlippedPair("B", "C", "reversed"))
 
-
-def test_four_agents_and_two_metrics_by_hand():
-    """Target: A dominates all, B and C incomparable, both dominate D; proxy: as worked out pair by pair."""
     target = of_means((4, 4), (3, 2), (2, 3), (1, 1))
     proxy = of_means((4, 1), (3, 3), (2, 2), (1, 4))
     result = prpv(compare(proxy=proxy, target=target, metrics=M2))
@@ -157,8 +158,6 @@ def test_four_agents_and_two_metrics_by_hand():
     assert result.value == 6
     assert result.normalised == 0.5
 
-
-def test_a_result_carries_inputs_direction_and_range():
     result = prpv(compare(proxy=of_means((1, 1), (2, 2)), target=of_means((2, 2), (1, 1)), metrics=M2))
     assert (result.value, result.range, result.better) == (2, (0, 2), "lower")
     assert (result.inputs.agents, result.inputs.target_episodes) == (("A", "B"), (1, 1))
@@ -198,19 +197,6 @@ def test_an_increasing_rescaling_of_a_metric_changes_nothing(means):
 def test_turning_a_metric_and_its_direction_changes_nothing(means):
     turned = (Metric("m", "min"), Metric("n"))
     assert prpv_of_means(*(means * [-1, 1]), turned) == prpv_of_means(*means, M2)
-
-
-def test_differences_up_to_the_tolerance_are_ties():
-    scores = np.array([[1.0], [1.5], [2.0]])
-    assert dominance(scores, [Metric("m", "max", 0.5)])[:, 0].tolist() == [0.5, 0.5, 1.0]
-    assert dominance(scores, [Metric("m", "max", 25.0, percent=True)])[:, 0].tolist() == [0.5, 0.5, 1.0]
-    assert dominance(scores, [Metric("m", "min", 0.5)])[:, 0].tolist() == [0.5, 0.5, 0.0]
-
-
-def test_rounding_of_a_mean_is_a_tie():
-    one = ScoreTable.from_episodes({("A", e): {"m": 0.1} for e in range(10)} | {("B", 0): {"m": 0.1}})
-    assert dominance(one.means, [Metric("m")]).tolist() == [[0.5, 0.5], [0.5, 0.5]]
-    assert dominance(np.array([[0.1 + 0.2], [0.3]]), [Metric("m")]).tolist() == [[0.5, 0.5], [0.5, 0.5]]
 
 
 def test_unrelated_tables_of_ten_agents_and_two_metrics_average_33_9():
@@ -266,12 +252,15 @@ def test_both_sets_hold_every_start_equally_often_and_share_no_episode():
     assert len(np.unique(first[1], axis=0)) > 5
 
 
-def test_an_agent_that_lost_a_repeat_is_split_over_its_other_starts():
+def test_an_agent_that_lost_a_repeat_is_split_over_its_other_starts_and_has_the_mean_of_the_others():
     values = np.zeros((2, 4))
     values[0, 3] = np.nan
     first, second = split(table_of(values, labelled(2, 2)), 10)
     assert (first[0] ^ second[0] == [True, True, False, False]).all()
     assert (first[1] ^ second[1]).all()
+    found = by_start(table_of([[1.0, 3.0, np.nan, 5.0], [1.0, 1.0, np.nan, np.nan]], labelled(2, 2)))
+    assert found.episodes == ("0", "1")
+    np.testing.assert_array_equal(found.values[:, :, 0], [[2.0, 5.0], [1.0, np.nan]])
 
 
 @pytest.mark.parametrize(
@@ -293,20 +282,11 @@ def test_labels_of_an_agent_s_own_are_no_starts_and_an_agent_without_any_start_t
     assert not is_repeated(table_of(values, labels.split()))
 
 
-def test_by_start_takes_the_mean_over_the_repeats_that_were_driven():
-    found = by_start(table_of([[1.0, 3.0, np.nan, 5.0], [1.0, 1.0, np.nan, np.nan]], labelled(2, 2)))
-    assert found.episodes == ("0", "1")
-    np.testing.assert_array_equal(found.values[:, :, 0], [[2.0, 5.0], [1.0, np.nan]])
-
-
-def test_repeats_of_a_start_are_drawn_together_and_plain_episodes_as_ever():
+def test_repeats_of_a_start_are_drawn_together_also_of_one_start_alone():
     repeated, plain = table_of(np.zeros((2, 6)), labelled(3, 2)), table_of(np.zeros((2, 3)), "012")
     counts = draw_counts(repeated, np.random.default_rng(0), 30)
     assert (counts[..., ::2] == counts[..., 1::2]).all()
     np.testing.assert_array_equal(counts[..., ::2], draw_counts(plain, np.random.default_rng(0), 30))
-
-
-def test_of_one_start_alone_the_repeats_are_drawn_and_that_is_said():
     values = np.random.default_rng(0).normal(size=(4, 6))
     target = table_of(values, labelled(1, 6))
     assert len(np.unique(draw_counts(target, np.random.default_rng(0), 30)[0], axis=0)) > 10

@@ -17,7 +17,7 @@ SCORES = Path(__file__).parents[2] / "../shared/data/scores"
 M = [Metric("m"), Metric("n")]
 
 
-def test_both_agree_with_scipy_also_where_there_are_ties():
+def test_correlations_agree_with_scipy_and_are_undefined_of_constants():
     rng = np.random.default_rng(1)
     proxy, target = rng.integers(0, 4, size=(2, 50, 8, 2)).astype(float)
     pearson, kendall = pearson_of_means(proxy, target), kendall_of_means(proxy, target)
@@ -26,8 +26,6 @@ def test_both_agree_with_scipy_also_where_there_are_ties():
         assert pearson[i, column] == pytest.approx(stats.pearsonr(one, other).statistic, abs=1e-7)
         assert kendall[i, column] == pytest.approx(stats.kendalltau(one, other).statistic, abs=1e-12)
 
-
-def test_a_constant_metric_is_undefined_and_said_so():
     proxy, target = of_means((1, 5), (2, 5), (3, 5)), of_means((1, 1), (2, 2), (2, 3))
     for measure in (srcc, predictivity.kendall_tau):
         result = measure(compare(proxy=proxy, target=target, metrics=M))
@@ -36,8 +34,6 @@ def test_a_constant_metric_is_undefined_and_said_so():
         assert [note for note in result.notes if "n: " in note and "alike in the proxy" in note]
         assert (result.better, result.range) == ("higher", (-1, 1))
 
-
-def test_two_agents_correlate_perfectly_which_means_nothing():
     result = srcc(compare(proxy=of_means((1, 1), (2, 2)), target=of_means((1, 2), (2, 1)), metrics=M))
     assert result.value == {"m": pytest.approx(1.0), "n": pytest.approx(-1.0)}
     assert "of two agents" in result.notes[0]
@@ -60,12 +56,24 @@ def test_simplers_own_figures_come_out():
         assert srcc(both).value["success"] == pytest.approx(float(task["pearson"]), abs=1e-9)
 
 
-def test_three_agents_by_hand():
+def test_simplers_figures_come_out_by_its_double_loop():
     """B and C change places: that costs each of them 0.3, and A nothing."""
     result = mmrv(compare(proxy=of_means(0.9, 0.4, 0.6), target=of_means(0.8, 0.5, 0.2), metrics=[Metric("m")]))
     assert result.value["m"] == pytest.approx((0 + 0.3 + 0.3) / 3)
     assert result.range["m"] == (0.0, pytest.approx(0.6))
     assert result.better == "lower"
+
+    rng = np.random.default_rng(0)
+    proxy, target = rng.integers(0, 4, size=(2, 40, 5, 1)).astype(float)
+    for direction, sign in (("max", 1), ("min", -1)):
+        values = mmrv_of_means(proxy, target, [Metric("m", direction)])[:, 0]
+        expected = [simplers_loop(sign * p[:, 0], sign * t[:, 0]) for p, t in zip(proxy, target, strict=True)]
+        np.testing.assert_allclose(values, expected, atol=1e-12)
+
+    tied, target = of_means(0.5, 0.5, 0.5), of_means(0.1, 0.4, 0.9)
+    higher, lower = (compare(proxy=tied, target=target, metrics=[Metric("m", way)]) for way in ("max", "min"))
+    assert mmrv(higher).value["m"] == pytest.approx((0 + 0.3 + 0.8) / 3)
+    assert mmrv(lower).value["m"] == pytest.approx((0.8 + 0.5 + 0) / 3)
 
 
 def simplers_loop(proxy, target):
@@ -74,32 +82,13 @@ def simplers_loop(proxy, target):
     return np.mean([max(abs(t - u) * ((p > q) != (t > u)) for q, u in both) for p, t in both])
 
 
-def test_it_is_simplers_double_loop_also_where_there_are_ties():
-    rng = np.random.default_rng(0)
-    proxy, target = rng.integers(0, 4, size=(2, 40, 5, 1)).astype(float)
-    for direction, sign in (("max", 1), ("min", -1)):
-        values = mmrv_of_means(proxy, target, [Metric("m", direction)])[:, 0]
-        expected = [simplers_loop(sign * p[:, 0], sign * t[:, 0]) for p, t in zip(proxy, target, strict=True)]
-        np.testing.assert_allclose(values, expected, atol=1e-12)
-
-
-def test_a_proxy_that_ties_everything_is_charged_for_the_better_agents():
-    tied, target = of_means(0.5, 0.5, 0.5), of_means(0.1, 0.4, 0.9)
-    higher, lower = (compare(proxy=tied, target=target, metrics=[Metric("m", way)]) for way in ("max", "min"))
-    assert mmrv(higher).value["m"] == pytest.approx((0 + 0.3 + 0.8) / 3)
-    assert mmrv(lower).value["m"] == pytest.approx((0.8 + 0.5 + 0) / 3)
-
-
 STILL = np.zeros((4, 3))
 APART = STILL + np.array([3.0, 4.0, 0.0])
 
 
-def test_poses_apart_by_three_and_four_are_five_apart_whatever_their_headings():
+def test_images_and_poses_differ_by_what_is_seen():
     assert pod_of_poses(proxy=APART, target=STILL) == 5.0
     assert pod_of_poses(proxy=STILL + np.array([0.0, 0.0, 0.5]), target=STILL) == 0.0
-
-
-def test_images_differ_by_a_fraction_of_full_scale_whatever_their_type_and_size():
     dark, bright = np.zeros((2, 3, 4, 3), dtype=np.uint8), np.full((2, 3, 4, 3), 51, dtype=np.uint8)
     assert pod_of_images(proxy=bright, target=dark) == pytest.approx(0.2)
     assert pod_of_images(proxy=bright / 255, target=dark / 255) == pytest.approx(0.2)
@@ -127,21 +116,17 @@ def test_observations_that_cannot_be_compared_are_refused(measure, proxy, target
 TARGET = of_means((1.0, 10.0), (2.0, 20.0), (3.0, 30.0))
 
 
-def test_given_weights_by_hand():
+def test_without_weights_a_metric_counts_in_its_spread_on_the_target():
     proxy = of_means((2.0, 10.0), (2.0, 20.0), (1.0, 36.0))
     result = ppv(compare(proxy=proxy, target=TARGET, metrics=M), beta={"m": 1.0, "n": 0.5})
     assert result.value == pytest.approx((1 + 0 + 2 + 0.5 * 6) / 3)
     assert result.better == "lower"
 
-
-def test_without_weights_a_metric_counts_in_its_spread_on_the_target():
     proxy = of_means((2.0, 20.0), (3.0, 30.0), (4.0, 40.0))
     result = ppv(compare(proxy=proxy, target=TARGET, metrics=M))
     assert result.beta == {"m": pytest.approx(1.0), "n": pytest.approx(0.1)}
     assert result.value == pytest.approx(2.0)
 
-
-def test_a_metric_constant_on_the_target_is_left_out_and_said_so():
     flat = of_means((1.0, 5.0), (2.0, 5.0), (3.0, 5.0))
     result = ppv(compare(proxy=TARGET, target=flat, metrics=M))
     assert (result.value, result.beta["n"]) == (0.0, None)

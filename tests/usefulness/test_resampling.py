@@ -39,14 +39,11 @@ def test_the_interval_holds_the_value_even_where_noise_flips_pairs_in_every_resa
     assert result.expected > 5
 
 
-def test_the_same_seed_gives_the_same_interval_and_another_seed_another():
+def test_the_interval_follows_from_the_seed_and_is_a_point_without_noise():
     sides = {"proxy": noisy(1, episodes=9), "target": noisy(2, episodes=9), "metrics": M}
     first, again, other = (bootstrap_prpv(**sides, seed=seed) for seed in (1, 1, 2))
     assert (first.expected, first.low, first.high) == (again.expected, again.low, again.high)
     assert first.expected != other.expected
-
-
-def test_without_noise_the_interval_is_a_point():
     still = {"proxy": noisy(1, noise=0.0), "target": noisy(2, noise=0.0)}
     result = bootstrap_prpv(**still, metrics=M)
     assert result.low == result.high == result.value == result.expected

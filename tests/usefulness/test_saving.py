@@ -25,17 +25,17 @@ def test_paired_rollouts_that_correlate_are_worth_real_ones():
         assert high - low < found.alone[agent][1][1] - found.alone[agent][1][0]
 
 
-def test_a_proxy_that_does_not_correlate_is_left_out_and_that_is_said():
+def test_a_proxy_saves_by_correlation_of_pairs_alone():
     found = saved(0.0)
     assert (found.real_rollouts_worth, found.rectified) == (0.0, {})
     assert "beyond noise" in found.reason
-
-
-def test_the_same_starts_alone_save_nothing():
     assert "simulate more" in saved(0.7, simulated=25).reason
+    values = np.array([[1.0] * done + [0.0] * (20 - done) for done in (5, 10, 15, 8)])[..., None]
+    table = ScoreTable(tuple("abcd"), tuple(map(str, range(20))), ("success",), values)
+    assert saving_of(compare(proxy=table, target=table, metrics=SUCCESS)).kind == "policies"
 
 
-def test_the_rectified_mean_is_the_control_variate():
+def test_rectified_means_use_one_proxy_or_two():
     rng = np.random.default_rng(4)
     x = rng.normal(size=(2, 40))
     y = x[:, :10] + 0.3 * rng.normal(size=(2, 10))
@@ -47,6 +47,12 @@ def test_the_rectified_mean_is_the_control_variate():
     slope = (dx * dy).sum() / (dx**2).sum()
     assert means == pytest.approx(y.mean(1) - slope * (x[:, :10].mean(1) - x.mean(1)))
 
+    one, other = two_halves()
+    alone, both = saving_of(one), saving_of(one, 0, other)
+    assert both.real_rollouts_worth > 2.0 * max(alone.real_rollouts_worth, saving_of(other).real_rollouts_worth)
+    assert both.correlation == pytest.approx(0.99, abs=0.01)
+    assert saving_of(one, 0, one).rectified["success"][0] == pytest.approx(alone.rectified["success"][0])
+
 
 def two_halves(real=25, simulated=200, seed=3):
     """Two proxies that each know another half of what decides on the target."""
@@ -57,14 +63,6 @@ def two_halves(real=25, simulated=200, seed=3):
     target = ScoreTable(agents, labels[:real], ("success",), whole[..., None])
     proxies = [ScoreTable(agents, labels, ("success",), half[..., None]) for half in halves]
     return [compare(proxy=proxy, target=target, metrics=SUCCESS) for proxy in proxies]
-
-
-def test_two_proxies_rectify_more_than_either_and_one_twice_no_more_than_once():
-    one, other = two_halves()
-    alone, both = saving_of(one), saving_of(one, 0, other)
-    assert both.real_rollouts_worth > 2.0 * max(alone.real_rollouts_worth, saving_of(other).real_rollouts_worth)
-    assert both.correlation == pytest.approx(0.99, abs=0.01)
-    assert saving_of(one, 0, one).rectified["success"][0] == pytest.approx(alone.rectified["success"][0])
 
 
 def test_two_proxies_that_know_nothing_are_hardly_ever_used():
@@ -94,12 +92,6 @@ def test_without_pairs_a_model_over_agents_says_so():
     assert found.real_rollouts_worth > 1.0
     few = [side.arrange(agents=side.agents[:3]).unpaired() for side in (proxy, target)]
     assert "fewer than 4" in saving_of(compare(proxy=few[0], target=few[1], metrics=SUCCESS)).reason
-
-
-def test_sorted_outcomes_are_no_pairs():
-    values = np.array([[1.0] * done + [0.0] * (20 - done) for done in (5, 10, 15, 8)])[..., None]
-    table = ScoreTable(tuple("abcd"), tuple(map(str, range(20))), ("success",), values)
-    assert saving_of(compare(proxy=table, target=table, metrics=SUCCESS)).kind == "policies"
 
 
 @pytest.mark.slow

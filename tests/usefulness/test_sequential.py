@@ -22,16 +22,13 @@ def looked_at(target, proxy):
     return sequential_test(compare(proxy=proxy, target=target, metrics=SUCCESS))
 
 
-def test_a_clear_winner_is_shown_before_the_end_and_a_tie_is_not():
+def test_a_winner_is_shown_before_the_end_and_sooner_with_a_proxy():
     target = rolled([0.9, 0.3], 60)
     found = looked_at(target, target)
     assert found.winner == "A0"
     assert 5 < found.decided_at < 60
     target = rolled([0.5, 0.5], 60)
     assert looked_at(target, target).winner is None
-
-
-def test_what_would_decide_sooner_is_expected_with_a_proxy_that_is_right():
     found = looked_at(rolled([0.7, 0.5, 0.3], 20), rolled([0.7, 0.5, 0.3], 500, seed=9))
     assert found.expected_rounds["with proxy"] <= found.expected_rounds["without proxy"]
 
@@ -63,9 +60,6 @@ def test_a_plan_asks_for_the_agents_that_may_be_best_and_for_none_when_it_is_dec
     assert not planned([2, 25, 3, 3], 25, 0.05).rollouts
 
 
-def test_a_smaller_bound_takes_more_rollouts():
+def test_a_smaller_bound_takes_more_rollouts_and_agents_too_much_alike_are_told():
     assert planned([11, 14], 25, 0.02).total > planned([11, 14], 25, 0.05).total > 0
-
-
-def test_agents_too_much_alike_are_told():
     assert "too much alike" in planned([2500, 2500], 5000, 1e-6).reason

@@ -40,7 +40,7 @@ def test_texture_is_no_noise_and_the_bound_holds_the_noise_on_it():
         assert fit_grain(logged(seen[:30], noise=noise), model[:30], floor()).noise.interval[1] >= noise
 
 
-def test_standing_still_tells_noise_from_texture_whatever_the_exposure_does():
+def test_noise_is_told_from_texture_only_where_frames_are_another_each():
     poses = on_the_road(6)
     poses[1:4] = poses[0]
     seen = drawn(poses, picture=None), photographed(poses)
@@ -51,16 +51,12 @@ def test_standing_still_tells_noise_from_texture_whatever_the_exposure_does():
     assert grain.noise.identified
     assert grain.noise.value == pytest.approx(2.0, rel=0.05)
 
-
-def test_the_same_frame_logged_twice_is_no_proof_of_a_camera_without_noise():
     model, seen = scene()
     twice = np.repeat(np.arange(10), 2)
     grain = fit_grain(logged(seen, noise=3.0)[twice], model[twice], floor())
     assert grain.still_pairs == 0
     assert grain.noise.interval[1] >= 3.0
 
-
-def test_frames_without_floor_tell_nothing():
     sky = np.full((5, 120, 160, 3), 200.0, dtype=np.float32)
     sky += np.arange(5, dtype=np.float32)[:, None, None, None]
     found = fit_grain(logged(sky, noise=3.0), sky, floor()).noise
@@ -118,17 +114,17 @@ def test_blur_and_defocus_come_out(blur, defocus):
     assert fitted.defocus.identified
 
 
-def test_still_frames_tell_defocus_but_not_blur():
+def test_blur_is_told_by_edges_in_motion_alone():
     fitted = fit_sharpness(seen(0.08, 0.02, still=True), edges(still=True), functools.partial(bars, still=True))
     assert not fitted.blur.identified
     assert fitted.blur.interval == (0.0, np.inf)
     assert fitted.defocus.value == pytest.approx(0.02, abs=HALF_A_PIXEL)
-
-
-def test_edges_that_are_drawn_pixels_off_are_as_sharp():
-    """Tape and poses are never exactly as drawn."""
     fitted = fit_sharpness(seen(0.06, 0.0, shift=2.3), edges(), bars)
     assert fitted.blur.value == pytest.approx(0.06, abs=0.01)
+    none = MovingEdges(np.zeros(0, dtype=int), np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0))
+    fitted = fit_sharpness(seen(), none, bars)
+    assert not fitted.blur.identified
+    assert not fitted.defocus.identified
 
 
 def test_intervals_hold_the_truth():
@@ -137,10 +133,3 @@ def test_intervals_hold_the_truth():
     assert sum(fit.blur.interval[0] <= 0.06 <= fit.blur.interval[1] for fit in fits) >= 8
     assert sum(fit.defocus.interval[0] <= 0.02 <= fit.defocus.interval[1] for fit in fits) >= 8
     assert all(np.ptp(fit.blur.interval) < 0.02 for fit in fits)
-
-
-def test_no_edges_tell_nothing():
-    none = MovingEdges(np.zeros(0, dtype=int), np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0))
-    fitted = fit_sharpness(seen(), none, bars)
-    assert not fitted.blur.identified
-    assert not fitted.defocus.identified

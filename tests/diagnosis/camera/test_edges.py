@@ -80,7 +80,7 @@ def test_normals_are_unit_vectors_from_the_floor_into_the_marking(angle, offset,
     assert (-np.sign(away) * outward > np.cos(np.radians(8.0))).all()
 
 
-def test_a_yellow_stripe_has_yellow_edges_as_far_out_on_either_side():
+def test_yellow_edges_are_told_by_their_colour_on_either_side():
     """Strong yellow is not clipped, which would move its edges outwards by 0.2 pixels and make the tape look wider."""
     edges = find_edges(yellow_striped(0.3, 1.0))
     yellow = edges.only(~edges.white)
@@ -90,48 +90,6 @@ def test_a_yellow_stripe_has_yellow_edges_as_far_out_on_either_side():
     assert sides == pytest.approx([0.0, 0.0], abs=0.03)
     assert sides[0] == pytest.approx(sides[1], abs=0.03)
 
-
-@pytest.mark.parametrize("colour", [0, 20, 128, 255, SKY], ids=str)
-def test_nothing_is_found_in_a_flat_picture_nor_in_one_of_nothing_but_sky(colour):
-    edges = find_edges(np.full((2, ROWS, COLUMNS, 3), colour, dtype=np.uint8))
-    assert [len(field) for field in edges] == [0] * 5
-
-
-def test_faint_noise_is_no_edge():
-    noise = np.random.default_rng(1).normal(0.0, 2.0, (1, ROWS, COLUMNS, 3))
-    shown = np.clip(striped(0.3, 0.0) + noise, 0, 255).astype(np.uint8)
-    away, _ = along_normal(find_edges(shown), 0.3, 0.0)
-    assert np.abs(np.abs(away) - 6.0).max() < 0.4
-
-
-def test_edges_of_the_sky_are_left_out():
-    shown = striped(0.0, 0.0)
-    shown[:, :20] = SKY
-    edges = find_edges(shown)
-    assert len(edges.row) > 60
-    assert edges.row.min() > 20 + gathering.SKY_MARGIN
-    away, outward = along_normal(edges, 0.0, 0.0)
-    assert np.abs(np.abs(away) - 6.0).max() < 0.1
-    assert (np.abs(outward) > 0.99).all()
-
-
-def test_edges_at_the_picture_s_border_are_left_out():
-    edges = find_edges(striped(np.pi / 2.0, -27.0, half_width=2.5))
-    assert edges.row.min() >= gathering.BORDER
-    assert len(find_edges(striped(0.0, -COLUMNS / 2.0, half_width=1.0)).row) == 0
-
-
-def test_points_are_sorted_by_picture_and_each_picture_counts_for_itself():
-    shown = pictures({}, lane_poses(4), columns=96)
-    edges = find_edges(shown)
-    assert (np.diff(edges.frame) >= 0).all()
-    assert set(edges.frame) == {0, 1, 2, 3}
-    alone, own = find_edges(shown[2:3]), edges.only(edges.frame == 2)
-    np.testing.assert_array_equal(alone.column, own.column)
-    np.testing.assert_array_equal(alone.white, own.white)
-
-
-def test_pictures_with_red_and_blue_swapped_keep_the_white_edges_and_lose_the_yellow_ones():
     shown = pictures({}, lane_poses(6))
     right, swapped = find_edges(shown), find_edges(np.ascontiguousarray(shown[..., ::-1]))
     floor_only = swapped.only(swapped.row > 50)
@@ -143,7 +101,40 @@ def test_pictures_with_red_and_blue_swapped_keep_the_white_edges_and_lose_the_ye
     assert len(known & again) > 0.6 * len(known)
 
 
-def test_brightness_does_not_move_edges():
+@pytest.mark.parametrize("colour", [0, 20, 128, 255, SKY], ids=str)
+def test_nothing_is_found_in_a_flat_picture_nor_in_one_of_nothing_but_sky(colour):
+    edges = find_edges(np.full((2, ROWS, COLUMNS, 3), colour, dtype=np.uint8))
+    assert [len(field) for field in edges] == [0] * 5
+
+
+def test_noise_the_sky_and_the_picture_s_border_have_no_edges():
+    noise = np.random.default_rng(1).normal(0.0, 2.0, (1, ROWS, COLUMNS, 3))
+    shown = np.clip(striped(0.3, 0.0) + noise, 0, 255).astype(np.uint8)
+    away, _ = along_normal(find_edges(shown), 0.3, 0.0)
+    assert np.abs(np.abs(away) - 6.0).max() < 0.4
+
+    shown = striped(0.0, 0.0)
+    shown[:, :20] = SKY
+    edges = find_edges(shown)
+    assert len(edges.row) > 60
+    assert edges.row.min() > 20 + gathering.SKY_MARGIN
+    away, outward = along_normal(edges, 0.0, 0.0)
+    assert np.abs(np.abs(away) - 6.0).max() < 0.1
+    assert (np.abs(outward) > 0.99).all()
+
+    edges = find_edges(striped(np.pi / 2.0, -27.0, half_width=2.5))
+    assert edges.row.min() >= gathering.BORDER
+    assert len(find_edges(striped(0.0, -COLUMNS / 2.0, half_width=1.0)).row) == 0
+
+
+def test_points_are_sorted_by_picture_and_brightness_does_not_move_them():
+    shown = pictures({}, lane_poses(4), columns=96)
+    edges = find_edges(shown)
+    assert (np.diff(edges.frame) >= 0).all()
+    assert set(edges.frame) == {0, 1, 2, 3}
+    alone, own = find_edges(shown[2:3]), edges.only(edges.frame == 2)
+    np.testing.assert_array_equal(alone.column, own.column)
+    np.testing.assert_array_equal(alone.white, own.white)
     shown = striped(0.4, 1.0)
     dark = (shown * 0.4).astype(np.uint8)
     away, _ = along_normal(find_edges(dark), 0.4, 1.0)
@@ -174,7 +165,7 @@ def frames_at(times, drives=None):
     return Frames((), np.zeros(len(times), dtype=int) if drives is None else np.array(drives), times, "small_loop")
 
 
-def test_a_drive_round_a_circle_has_its_poses_and_rates():
+def test_a_drive_is_looked_up_smoothed_at_its_latency():
     times = np.linspace(1.0, 8.0, 30)
     tracks, numbers = track_frames(log_of(episode()), frames_at(times))
     poses, rates = tracks.at(0.0)
@@ -185,8 +176,6 @@ def test_a_drive_round_a_circle_has_its_poses_and_rates():
     np.testing.assert_allclose(rates, course, atol=2e-3)
     assert tracks.moving
 
-
-def test_smoothing_leaves_the_share_of_the_scatter_that_it_says():
     times = np.arange(1.0, 9.0, 0.5)
     drives = (log_of(episode(noise=0.01, seed=seed)) for seed in range(40))
     errors = [track_frames(drive, frames_at(times))[0].at(0.0)[0] - circle(times) for drive in drives]
@@ -194,8 +183,6 @@ def test_smoothing_leaves_the_share_of_the_scatter_that_it_says():
     assert share < 0.6
     assert np.std(errors) == pytest.approx(0.01 * share, rel=0.1)
 
-
-def test_a_latency_looks_up_the_pose_of_so_long_before():
     times = np.linspace(2.0, 8.0, 20)
     tracks, _ = track_frames(log_of(episode()), frames_at(times))
     np.testing.assert_allclose(tracks.at(0.13)[0], circle(times - 0.13), atol=6e-4)
@@ -203,7 +190,7 @@ def test_a_latency_looks_up_the_pose_of_so_long_before():
     np.testing.assert_allclose(np.linalg.norm((now - late)[:, :2], axis=1), SPEED * 0.13, rtol=0.02)
 
 
-def test_frames_standing_still_keep_their_poses_to_the_last_digit():
+def test_frames_standing_still_keep_their_poses_and_those_between_two_or_in_a_long_gap_are_left_out():
     times = np.arange(25.0)
     poses = np.random.default_rng(3).normal(size=(25, 3))
     still = LogEpisode("stills", times, np.zeros((25, 0)), poses, None)
@@ -211,16 +198,11 @@ def test_frames_standing_still_keep_their_poses_to_the_last_digit():
     np.testing.assert_array_equal(tracks.at(0.0)[0], poses[::2])
     assert (tracks.share, tracks.moving, len(numbers)) == (1.0, False, 13)
 
-
-def test_frames_standing_still_between_two_poses_are_left_out():
-    """However close they are in time: the robot was moved in between."""
     times = 0.1 * np.arange(25.0)
     still = LogEpisode("stills", times, np.zeros((25, 0)), circle(times), None)
     _, numbers = track_frames(log_of(still, rate=0.0), frames_at([0.3, 0.35, 0.4]))
     np.testing.assert_array_equal(numbers, [0, 2])
 
-
-def test_frames_within_a_long_gap_between_poses_are_left_out():
     drive = episode()
     gap = (drive.times > 4.0) & (drive.times < 4.0 + 2.0 * gathering.LONGEST_GAP_S)
     drive.poses[gap] = np.nan
@@ -228,21 +210,17 @@ def test_frames_within_a_long_gap_between_poses_are_left_out():
     np.testing.assert_array_equal(numbers, [0, 3])
 
 
-def test_a_missing_pose_is_bridged():
+def test_a_missing_pose_is_bridged_and_each_frame_looked_up_in_its_own_drive():
     drive = episode()
     drive.poses[80] = np.nan
     tracks, numbers = track_frames(log_of(drive), frames_at([4.0]))
     assert len(numbers) == 1
     np.testing.assert_allclose(tracks.at(0.0)[0], circle([4.0]), atol=1e-3)
 
-
-def test_each_frame_is_looked_up_in_its_own_drive():
     first, second = episode(), episode(begin=100.0)
     tracks, _ = track_frames(log_of(first, second), frames_at([5.0, 105.0, 5.5], [0, 1, 0]))
     np.testing.assert_allclose(tracks.at(0.0)[0], circle([5.0, 105.0, 5.5]), atol=1e-3)
 
-
-def test_a_drive_without_a_pose_is_passed_over():
     empty = episode()
     empty.poses[:] = np.nan
     tracks, numbers = track_frames(log_of(empty, episode()), frames_at([5.0, 5.0], [0, 1]))
@@ -334,7 +312,7 @@ def log(folder):
     return read_log(folder)
 
 
-def test_views_hold_what_the_log_says(log):
+def test_what_a_log_says_of_its_tracker_is_held_and_else_assumed(log):
     gathered = gather_views(log, log.frames, ROBOT)
     views = gathered.views
     np.testing.assert_array_equal(gathered.numbers, np.arange(COUNT))
@@ -343,9 +321,6 @@ def test_views_hold_what_the_log_says(log):
     assert (views.optics.rows, views.optics.columns) == (72, 96)
     assert (views.position_m, views.heading_rad) == pytest.approx((0.002, np.radians(0.3)))
     assert views.tape_m == views.markings.road.paint.tape_m == 0.005
-
-
-def test_a_tracker_that_states_nothing_is_assumed_to_scatter_by_millimetres(log):
     frames = replace(log.frames, position_m=None, heading_deg=None)
     views = gather_views(log, frames, ROBOT).views
     assert (views.position_m, views.heading_rad) == pytest.approx((0.005, np.radians(1.0)))

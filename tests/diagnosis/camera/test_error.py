@@ -159,7 +159,7 @@ def test_poses_of_frames_left_out_are_fitted_and_all_others_held():
     assert (after[:, :2].std() < 0.9 * before[:, :2].std()).all()
 
 
-def test_cameras_are_compared_on_the_same_points():
+def test_cameras_are_compared_on_the_same_points_of_frames_with_markings():
     """A point that one camera brings to a marking counts for the other with the cap."""
     views = stood(count=COUNT)
     size = len(views.edges.row)
@@ -169,6 +169,9 @@ def test_cameras_are_compared_on_the_same_points():
     alone = pixel_errors(views, [blind, blind], 1)[0]
     assert alone.value == 0.0
     assert np.isnan(alone.frames).all()
+    error = error_over(np.array([10.0, 0.0, 30.0]), np.array([10.0, 0.0, 10.0]), 1)
+    assert error.value == 2.0
+    np.testing.assert_array_equal(error.frames, [1.0, np.nan, 3.0])
 
 
 SUMS = st.lists(st.tuples(st.floats(0.0, 4.0), st.integers(1, 500)), min_size=4, max_size=60)
@@ -194,9 +197,3 @@ def test_the_interval_of_many_frames_holds_the_value_and_narrows_as_the_root_of_
         assert error.interval[0] < error.value < error.interval[1]
     ratio = (wide.interval[1] - wide.interval[0]) / (narrow.interval[1] - narrow.interval[0])
     assert ratio == pytest.approx(10.0, rel=0.4)
-
-
-def test_frames_without_markings_count_for_nothing():
-    error = error_over(np.array([10.0, 0.0, 30.0]), np.array([10.0, 0.0, 10.0]), 1)
-    assert error.value == 2.0
-    np.testing.assert_array_equal(error.frames, [1.0, np.nan, 3.0])

@@ -91,7 +91,7 @@ def test_one_colour_s_lines_that_lie_beside_their_places_are_taken_up_by_the_tap
     assert np.abs(fit.state.tape).max() > 0.001
 
 
-def test_only_the_frames_that_count_are_fitted():
+def test_only_named_values_are_fitted_to_the_frames_that_count():
     views = stood({"camera_roll": 4.0}, count=30)
     first = np.arange(30) < 20
     fit = fit_camera(views, at_truth(views), ["camera_roll"], NEAR, first)
@@ -101,6 +101,14 @@ def test_only_the_frames_that_count_are_fitted():
     assert fit.theta == again.theta
     assert fit.theta != fit_camera(spoilt, at_truth(spoilt), ["camera_roll"], NEAR).theta
     np.testing.assert_array_equal(fit.state.poses[~first], 0.0)
+
+    views = stood({"camera_roll": 4.0}, count=20)
+    fit = fit_camera(views, at_truth(views, {"camera_height": 0.11}), ["camera_roll"], NEAR)
+    assert {**fit.theta, "camera_roll": 0.0} == {**NEUTRAL, "camera_height": 0.11, "camera_roll": 0.0}
+
+    views = stood(count=20)
+    fit = fit_everything(views, OPTICS.mounting, {}, learn_scatter=False)
+    assert (fit.views.position_m, fit.views.heading_rad) == (views.position_m, views.heading_rad)
 
 
 @pytest.mark.parametrize("way", [-1.0, 1.0])
@@ -112,12 +120,6 @@ def test_values_end_at_their_bounds_and_not_beyond(way):
         parameter = OPTICS.robot.catalogue.parameters[name]
         assert parameter.low <= value <= parameter.high
     assert fit.theta["camera_yaw"] == 15.0 * way
-
-
-def test_what_is_not_named_stays_where_it_was():
-    views = stood({"camera_roll": 4.0}, count=20)
-    fit = fit_camera(views, at_truth(views, {"camera_height": 0.11}), ["camera_roll"], NEAR)
-    assert {**fit.theta, "camera_roll": 0.0} == {**NEUTRAL, "camera_height": 0.11, "camera_roll": 0.0}
 
 
 def test_a_fit_with_eliminated_poses_is_the_full_one():
@@ -158,9 +160,3 @@ def test_a_scatter_that_nobody_states_is_learnt(place, turn):
     fit = fit_everything(views, OPTICS.mounting, {}, learn_scatter=True)
     assert pose_scatter(fit) == pytest.approx(truth, rel=0.6)
     assert (fit.views.position_m, fit.views.heading_rad) == pytest.approx(truth, rel=1.0)
-
-
-def test_a_scatter_that_is_stated_is_kept():
-    views = stood(count=20)
-    fit = fit_everything(views, OPTICS.mounting, {}, learn_scatter=False)
-    assert (fit.views.position_m, fit.views.heading_rad) == (views.position_m, views.heading_rad)

@@ -51,29 +51,20 @@ def test_without_effects_pictures_are_those_of_the_domain_s_camera(tmp_path):
     assert make_episode(theta, agent="none", start=0, seed=1).theta
 
 
-def test_what_is_added_to_a_tracked_pose_moves_the_camera():
+def test_frames_are_drawn_in_the_order_asked_for_from_where_the_camera_was():
     views, by = scenes()[0], np.array((0.01, -0.02, 0.05))
     state = replace(at_truth(views), poses=np.tile(by, (4, 1)))
     np.testing.assert_array_equal(draw_pictures(views, state, {}, FRAMES), pictures({}, lane_poses(4) + by))
-
-
-def test_frames_are_drawn_in_the_order_asked_for():
     np.testing.assert_array_equal(drawn(frames=np.array([2, 0])), drawn()[[2, 0]])
-
-
-def test_effects_of_time_leave_frames_standing_still_alone():
     np.testing.assert_array_equal(drawn(look={"blur": 0.1, "rolling_shutter": 0.03}), drawn())
 
 
-def test_a_latency_shows_what_was_there_so_long_before():
+def test_a_latency_shows_what_was_there_before_and_blur_shifts_nothing():
     views = scenes()[True]
     before = replace(views, tracks=replace(views.tracks, instants=views.tracks.instants - 0.2))
     late = drawn(True, theta={"camera_latency": 0.2})
     np.testing.assert_array_equal(late, draw_pictures(before, at_truth(before), {}, FRAMES))
     assert np.abs(late - drawn(True)).mean() > 1.0
-
-
-def test_blur_softens_a_drive_s_pictures_and_does_not_shift_them():
     sharp, soft, softer = (drawn(True, {"blur": seconds}) for seconds in (0.0, 0.05, 0.15))
     assert sharpness(sharp) > sharpness(soft) > sharpness(softer)
     assert soft.mean() == pytest.approx(sharp.mean(), rel=0.01)
@@ -81,44 +72,33 @@ def test_blur_softens_a_drive_s_pictures_and_does_not_shift_them():
     assert offsets[1] == min(offsets)
 
 
-def test_a_rolling_shutter_shows_each_row_at_its_own_time():
+def test_each_row_is_shown_at_its_own_time_by_the_readout_of_camera_or_look():
     """The middle row is on time; the last is half the readout late, the first as early."""
     rolled = drawn(True, {"rolling_shutter": 0.1})
     late, now = (drawn(True, theta={"camera_latency": by}) for by in (-0.05, 0.0))
     last, middle = slice(116, 120), slice(59, 61)
     assert np.abs(rolled - late)[:, last].mean() < 0.3 * np.abs(rolled - now)[:, last].mean()
     assert np.abs(rolled - now)[:, middle].mean() < 0.2 * np.abs(now - late)[:, middle].mean()
-
-
-def test_a_readout_of_the_camera_counts_where_the_look_has_none():
     slow, at_once = {"rolling_shutter": 0.1}, {"rolling_shutter": 0.0}
     np.testing.assert_array_equal(drawn(True, theta=slow), drawn(True, slow))
     np.testing.assert_array_equal(drawn(True, at_once, slow), drawn(True, at_once))
 
 
-def test_defocus_softens_all_over_and_keeps_the_brightness():
+def test_effects_on_pictures_change_sharpness_corners_and_brightness_within_0_and_255():
     sharp, soft = drawn(), drawn(look={"defocus": 0.02})
     assert sharpness(soft) < 0.7 * sharpness(sharp)
     assert soft.mean() == pytest.approx(sharp.mean(), rel=0.02)
 
-
-def test_vignetting_darkens_the_corners_by_its_strength_and_not_the_middle():
     ratio = (drawn(look={"vignetting": 0.4}) / np.maximum(drawn(), 1.0)).mean(axis=(0, 3))
     assert ratio[-1, 0] == pytest.approx(0.6, abs=0.02)
     assert ratio[59:61, 79:81].mean() == pytest.approx(1.0, abs=0.01)
 
-
-def test_exposure_brightens_by_gain_and_bends_by_gamma():
     before = drawn()
     after = drawn(look={"exposure.gain": 1.2, "exposure.gamma": 1.5})
     np.testing.assert_allclose(after, np.clip(255.0 * 1.2 * (before / 255.0) ** 1.5, 0.0, 255.0), atol=0.01)
 
-
-def test_noise_is_left_out():
     np.testing.assert_array_equal(drawn(look={"image_noise": 10.0}), drawn())
 
-
-def test_pictures_stay_within_0_and_255():
     bright = drawn(look={"exposure.gain": 4.0, "exposure.gamma": 1.0})
     assert bright.max() == 255.0
     assert bright.dtype == np.float32
@@ -222,17 +202,13 @@ def test_a_drive_s_residuals_vanish_at_its_latency_and_readout():
     assert medians[2] > 1.05 * medians[0]
 
 
-def test_what_lies_above_the_horizon_is_never_near():
+def test_edges_of_the_other_polarity_or_above_the_horizon_do_not_count():
     views = stood(count=6, noisy=False)
     sky = views.edges._replace(row=np.full_like(views.edges.row, 5.0))
     there = project(replace(views, edges=sky), at_truth(views))
     assert not there.near.any()
     assert np.isfinite(there.residual).all()
     assert np.isfinite(there.slope).all()
-
-
-def test_an_edge_of_the_other_polarity_is_not_valid():
-    views = stood(count=6, noisy=False)
     flipped = replace(views, edges=views.edges._replace(normal=-views.edges.normal))
     right, wrong = project(views, at_truth(views)), project(flipped, at_truth(views))
     close = right.valid & (np.abs(right.residual) < 0.5)

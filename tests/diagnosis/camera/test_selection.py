@@ -84,14 +84,10 @@ def test_poses_three_centimetres_off_are_told():
     assert note.endswith("% of the markings' edges match (60 % or more is usual): poses or map are off by centimetres")
 
 
-def test_nothing_is_said_of_frames_that_belong_to_their_poses():
+def test_frames_that_belong_to_their_poses_match_by_edges_near_markings():
     full = everything(ROLLED)
     assert selection.check_match("log", full) == ()
     assert selection.matched_share(full) > selection.USUAL_MATCHED
-
-
-def test_the_share_counts_edges_near_markings_only():
-    full = everything(ROLLED)
     edges = full.views.edges
     above = edges._replace(row=np.where(edges.frame == 0, 3.0, edges.row))
     less = replace(full, views=replace(full.views, edges=above))
@@ -142,12 +138,9 @@ def test_what_is_declared_is_never_dropped_nor_named(size):
     assert len({one.effects for one in sets}) == len(sets) == (1, 3, 3, 1)[size]
 
 
-def test_parameters_of_one_effect_stay_together():
+def test_sets_keep_parameters_of_one_effect_together_and_all_effects_lose_nothing():
     chosen = {effect for one in rank_subsets(linear(0)[0], (), 2) for effect in one.effects}
     assert chosen == set(EFFECTS)
-
-
-def test_all_effects_together_lose_nothing_and_more_than_there_are_make_no_set():
     assert rank_subsets(linear(3)[0], (), len(EFFECTS))[0].loss == 0.0
     assert rank_subsets(linear(3)[0], (), len(EFFECTS) + 1) == []
 
@@ -276,10 +269,16 @@ def test_an_effect_is_named_on_another_map():
     assert select_camera_effects(full, DECLARED).effects == ("camera_roll",)
 
 
-def test_a_declared_effect_is_tuned_and_not_named():
+def test_what_is_declared_is_tuned_and_what_is_known_held():
     named = select_camera_effects(everything(ROLLED), ("camera_pitch", "camera_roll"))
     assert named.effects == ()
     assert named.declared.theta["camera_roll"] == pytest.approx(4.0, abs=0.3)
+    views = on("small_loop", {}, count=20)
+    names = [name for name in OPTICS.mounting if name != "lens_distortion"]
+    full = fit_everything(views, names, {"rolling_shutter": 0.03, "lens_distortion": -0.01}, learn_scatter=False)
+    assert (full.theta["rolling_shutter"], full.theta["lens_distortion"]) == (0.03, -0.01)
+    held = fit_set(full, DECLARED)
+    assert (held.theta["rolling_shutter"], held.theta["lens_distortion"]) == (0.03, -0.01)
 
 
 @pytest.mark.slow
@@ -298,23 +297,11 @@ def test_an_effect_is_named_by_a_tracker_that_states_no_scatter():
     assert select_camera_effects(full, DECLARED).effects == ("camera_roll",)
 
 
-def test_what_is_known_is_held():
-    views = on("small_loop", {}, count=20)
-    names = [name for name in OPTICS.mounting if name != "lens_distortion"]
-    full = fit_everything(views, names, {"rolling_shutter": 0.03, "lens_distortion": -0.01}, learn_scatter=False)
-    assert (full.theta["rolling_shutter"], full.theta["lens_distortion"]) == (0.03, -0.01)
-    held = fit_set(full, DECLARED)
-    assert (held.theta["rolling_shutter"], held.theta["lens_distortion"]) == (0.03, -0.01)
-
-
-def test_a_set_of_effects_leaves_all_others_neutral():
+def test_costs_are_least_with_everything_free_and_others_stay_neutral():
     fit = fit_set(everything(ROLLED), ("camera_pitch", "lens_centre"))
     assert fit.names == ("camera_pitch", "lens_centre.right", "lens_centre.down")
     assert fit.theta["camera_roll"] == 0.0
     assert fit.theta["camera_height"] == ROBOT.camera_figures().height_m
-
-
-def test_the_cost_is_least_with_everything_free():
     full = everything(ROLLED)
     none, right = (fit_set(full, (*DECLARED, *named)) for named in ((), ROLLED))
     assert selection.cost_of(full) < selection.cost_of(none)
@@ -328,10 +315,19 @@ def only(views, chosen):
     return replace(views, edges=views.edges.only(chosen))
 
 
-def test_frames_standing_still_hide_latency_and_shutter():
+def test_frames_standing_still_or_without_edges_hide_effects_that_the_model_has_not():
     hidden = hidden_effects(everything(), ("camera_pitch",))
     assert set(MOTION) <= set(hidden)
     assert not {"camera_pitch", "camera_roll", "camera_yaw", "lens_distortion"} & set(hidden)
+    views = stood(count=3)
+    full = fit_everything(only(views, np.zeros(len(views.edges.row), bool)), OPTICS.mounting, {}, learn_scatter=False)
+    effects = {name.split(".")[0] for name in (*OPTICS.mounting, *MOTION)}
+    assert set(hidden_effects(full, ())) == effects
+    full = everything()
+    model = ("camera_pitch", "field_of_view", "camera_height")
+    assert not set(model) & set(hidden_effects(full, model))
+    assert selection.next_views((), repeated=False) == ()
+    assert selection.next_views(("image_noise",), repeated=True) == ()
 
 
 @pytest.mark.slow
@@ -358,19 +354,6 @@ def test_markings_far_away_alone_hide_where_the_lens_is():
     assert not {"camera_height", "camera_forward"} & set(shown)
 
 
-def test_no_edges_hide_everything():
-    views = stood(count=3)
-    full = fit_everything(only(views, np.zeros(len(views.edges.row), bool)), OPTICS.mounting, {}, learn_scatter=False)
-    effects = {name.split(".")[0] for name in (*OPTICS.mounting, *MOTION)}
-    assert set(hidden_effects(full, ())) == effects
-
-
-def test_effects_of_the_model_are_not_hidden():
-    full = everything()
-    model = ("camera_pitch", "field_of_view", "camera_height")
-    assert not set(model) & set(hidden_effects(full, model))
-
-
 @pytest.mark.parametrize(
     ("hidden", "words"),
     [
@@ -384,8 +367,3 @@ def test_effects_of_the_model_are_not_hidden():
 def test_the_next_views_are_those_that_show_what_was_hidden(hidden, words):
     (view,) = selection.next_views((hidden,), repeated=False)
     assert words in view
-
-
-def test_there_is_nothing_to_take_where_nothing_was_hidden():
-    assert selection.next_views((), repeated=False) == ()
-    assert selection.next_views(("image_noise",), repeated=True) == ()

@@ -144,23 +144,17 @@ def test_clocks_that_run_at_different_rates_are_told_with_the_rate_and_nothing_e
     assert (found.offset.value, found.drives, found.jumps) == (0.0, {}, ())
 
 
-def test_drift_of_drives_that_follow_each_other_is_one_line_through_all():
+def test_drift_is_one_line_through_drives_and_none_of_one_drive_that_grows_late():
     log = hidden.make_log(CASE, late_s=0.001 * (DRIFTING + 60.0 * np.arange(6)[:, None]), **SHORT)
     following = (replace(episode, times=episode.times + 60.0 * e) for e, episode in enumerate(log.episodes))
     found = read_clocks(replace(log, episodes=tuple(following)), ROBOT)
     assert found.drift.value == pytest.approx(0.001, abs=1e-4)
     assert found.drives == {}
-
-
-def test_without_drift_commands_are_when_poses_show_them():
+    assert clocks(0.003 * DRIFTING * (np.arange(6) == 3)[:, None]).drift.value == 0.0
     rate = 0.003
     log = timing.without_drift(hidden.make_log(CASE, late_s=rate * DRIFTING, **SHORT), rate)
     np.testing.assert_allclose(log.episodes[0].issued, (1.0 + rate) * log.episodes[0].times)
     assert not read_clocks(log, ROBOT).differ
-
-
-def test_one_drive_that_grows_late_is_no_drift_of_the_clock():
-    assert clocks(0.003 * DRIFTING * (np.arange(6) == 3)[:, None]).drift.value == 0.0
 
 
 @pytest.mark.parametrize(
@@ -181,14 +175,12 @@ def test_a_slow_or_late_robot_is_no_clock_problem(theta):
     assert not read_clocks(planted_log({"trim": 0.03, **theta}, episodes=4, seconds=40.0), ROBOT).differ
 
 
-def test_a_drive_that_repeats_itself_is_no_clock_problem():
+def test_a_robot_that_repeats_itself_is_stuck_or_rests_is_no_clock_problem():
     times = np.arange(1200) / 20.0
     turn = 0.2 * np.sin(2.0 * np.pi * times / 6.0)
     duties = np.tile(np.stack((0.5 - turn, 0.5 + turn), axis=1), (4, 1, 1))
     assert not read_clocks(driven_log({}, duties, np.zeros((4, 3))), ROBOT).differ
 
-
-def test_a_robot_that_is_stuck_at_first_is_no_clock_problem():
     latencies = np.arange(-40, 41) * 0.25
     moving = np.minimum((latencies - 0.25) ** 2, 4.0)
     stuck = np.minimum((10.0 - latencies) ** 2, 1.0) * 4.0
@@ -197,21 +189,17 @@ def test_a_robot_that_is_stuck_at_first_is_no_clock_problem():
     blocks = Blocks(np.zeros(30, dtype=int), np.arange(30), squares)
     assert stretches(log, blocks, latencies) == ([(0.0, np.inf)], ())
 
-
-def test_one_block_of_a_robot_at_rest_is_no_proof_of_another_clock():
-    latencies = np.arange(-40, 41) * 0.25
     own = 0.25 + 0.05 * np.sin(np.arange(24.0))
     moving = 9.0 + np.minimum(50.0 * (latencies - own[:, None]) ** 2, 900.0)
     # The map is put right while the robot rests, and long after there was a command that it looks like.
     put_right = 9.0 + np.minimum(50.0 * (latencies + 9.52) ** 2, 180.0)
     resting = 9.0 + 0.01 * (latencies + 9.5) ** 2 * np.ones((5, 1))
-    log = planted_log({}, episodes=1, seconds=60.0)
     squares = np.concatenate((moving, put_right[None], resting))
     blocks = Blocks(np.zeros(30, dtype=int), np.arange(30), squares)
     assert stretches(log, blocks, latencies) == ([(0.0, np.inf)], ())
 
 
-def test_commands_put_on_the_poses_clock_are_those_of_one_clock():
+def test_one_clock_is_left_and_commands_are_put_on_that_of_the_poses():
     late = in_one_drive(-0.3)
     apart, right = (hidden.make_log(CASE, late_s=late_s, noiseless=True, **SHORT) for late_s in (late, 0.0))
     corrected, found = timing.on_one_clock(apart, ROBOT)
@@ -225,8 +213,6 @@ def test_commands_put_on_the_poses_clock_are_those_of_one_clock():
     np.testing.assert_allclose(moved.duties[0], drives.duties[0])
     np.testing.assert_array_equal(corrected.episodes[3].poses, apart.episodes[3].poses)
 
-
-def test_a_log_of_one_clock_is_left_as_it_is():
     log = hidden.make_log(CASE, **SHORT)
     assert timing.on_one_clock(log, ROBOT)[0] is log
 
@@ -281,7 +267,7 @@ def log(*told, rows=4000, **more):
     return Log("yard", "duckiebot", "duty", 20.0, {}, (LogEpisode("a", times, commands, poses, commands, **more),))
 
 
-def test_each_stretch_between_long_rests_is_a_drive_of_its_own():
+def test_each_stretch_between_long_rests_is_a_drive_with_its_commands_and_poses():
     whole = log((30.0, 50.0), (60.0, 70.0), (120.0, 150.0))
     first, second = cut_out_long_rests(whole).episodes
     assert (first.name, second.name) == ("a from 34 s", "a from 124 s")
@@ -291,19 +277,9 @@ def test_each_stretch_between_long_rests_is_a_drive_of_its_own():
     np.testing.assert_array_equal(second.commands, second.wheels)
     np.testing.assert_array_equal(second.commands, whole.episodes[0].commands[2380:3060])
 
-
-def test_short_rests_are_kept():
     whole = log((10.0, 80.0), (95.0, 190.0))
     assert cut_out_long_rests(whole) is whole
 
-
-def test_drives_without_commands_to_move_or_without_any_are_left_to_others():
-    still, frames = log(), replace(log(), command="none")
-    assert cut_out_long_rests(still) is still
-    assert cut_out_long_rests(frames) is frames
-
-
-def test_commands_at_times_of_their_own_go_with_their_stretch():
     whole = log()
     issued = np.array([0.0, 50.0, 60.0, 150.0, 170.0])
     commands = np.array([[0, 0], [0.5, 0.5], [0, 0], [0.2, 0.2], [0, 0]])
@@ -314,8 +290,6 @@ def test_commands_at_times_of_their_own_go_with_their_stretch():
     np.testing.assert_array_equal(second.held[[0, -1]], [[0, 0], [0, 0]])
     np.testing.assert_array_equal(second.commands, commands[2:])
 
-
-def test_poses_at_times_of_their_own_go_with_their_stretch():
     whole = log((30.0, 50.0), (60.0, 70.0), (120.0, 150.0))
     (episode,) = whole.episodes
     rows = np.arange(0, 4000, 3)
@@ -326,7 +300,13 @@ def test_poses_at_times_of_their_own_go_with_their_stretch():
         assert len(piece.measured.times) == pytest.approx(len(piece.times) / 3, abs=1)
 
 
-def test_every_third_of_many_episodes_is_tested_and_not_fitted():
+def test_drives_without_commands_to_move_or_without_any_are_left_to_others():
+    still, frames = log(), replace(log(), command="none")
+    assert cut_out_long_rests(still) is still
+    assert cut_out_long_rests(frames) is frames
+
+
+def test_drives_are_split_by_motion_and_another_log_may_be_tested_on():
     log = planted_log(TRUTH, episodes=7, seconds=15.0)
     fitted, tested = split(log, ROBOT, None)
     assert fitted.duties.shape[0] == 5
@@ -334,6 +314,20 @@ def test_every_third_of_many_episodes_is_tested_and_not_fitted():
     np.testing.assert_array_equal(tested.duties[0, ::3], log.episodes[2].commands)
     for row, episode in enumerate((0, 1, 3, 4, 6)):
         np.testing.assert_array_equal(fitted.duties[row, ::3], log.episodes[episode].commands)
+
+    log, other = (planted_log(TRUTH, seed=seed, episodes=2, seconds=15.0) for seed in (1, 2))
+    fitted, tested = split(log, ROBOT, other)
+    assert (fitted.duties.shape[0], tested.duties.shape[0]) == (2, 2)
+    np.testing.assert_array_equal(tested.duties[1, ::3], other.episodes[1].commands)
+
+    def lost(poses):
+        poses = poses.copy()
+        poses[400:1400] = np.nan
+        return poses
+
+    fitted, tested = split(with_poses(planted_log(TRUTH, episodes=1, seconds=120.0), lost), ROBOT, None)
+    assert fitted.seconds == pytest.approx(tested.seconds, abs=0.2)
+    assert len(np.unique(fitted.block)) >= 6
 
 
 @pytest.mark.parametrize("episodes", [1, 2, 5])
@@ -343,13 +337,6 @@ def test_few_episodes_are_split_by_time(episodes):
     for episode in range(episodes):
         assert fitted.last[fitted.episode == episode].max() <= tested.first[tested.episode == episode].min()
         assert not tested.linked[tested.episode == episode][0]
-
-
-def test_another_log_may_be_tested_on():
-    log, other = (planted_log(TRUTH, seed=seed, episodes=2, seconds=15.0) for seed in (1, 2))
-    fitted, tested = split(log, ROBOT, other)
-    assert (fitted.duties.shape[0], tested.duties.shape[0]) == (2, 2)
-    np.testing.assert_array_equal(tested.duties[1, ::3], other.episodes[1].commands)
 
 
 @pytest.mark.parametrize(("episodes", "seconds"), [(1, 30.0), (3, 10.0), (6, 6.0)])
@@ -371,17 +358,6 @@ def test_there_are_enough_blocks_to_leave_out_and_none_is_tiny(episodes, seconds
             assert not drives.linked[own][0]
 
 
-def test_half_of_the_measured_motion_not_of_the_time_is_fitted():
-    def lost(poses):
-        poses = poses.copy()
-        poses[400:1400] = np.nan
-        return poses
-
-    fitted, tested = split(with_poses(planted_log(TRUTH, episodes=1, seconds=120.0), lost), ROBOT, None)
-    assert fitted.seconds == pytest.approx(tested.seconds, abs=0.2)
-    assert len(np.unique(fitted.block)) >= 6
-
-
 def test_of_very_many_drives_no_more_are_tested_on_than_needed_spread_over_all(monkeypatch):
     log = planted_log(TRUTH, episodes=36, seconds=10.0)
     whole = split(log, ROBOT, None).tested
@@ -397,9 +373,13 @@ def drives():
     return cut_into_blocks(planted_drives(TRUTH, episodes=4, seconds=20.0, noise=None))
 
 
-def test_short_drives_stay_as_they_are(drives):
+def test_short_drives_stay_as_they_are_and_missing_poses_missing(drives):
     assert thin(drives) is drives
     assert timing.join_increments(drives, 1) is drives
+    gaps = drives.only(np.arange(len(drives.episode)) % 50 > 4)
+    few = timing.join_increments(gaps, 4)
+    assert (few.last - few.first).max() <= 4 * (drives.last - drives.first).max()
+    assert np.abs(few.measured - increments(few, TRUTH)).max() < 1e-9
 
 
 @pytest.mark.parametrize("times", [2, 3, 7])
@@ -436,10 +416,3 @@ def test_drives_of_two_seconds_stay_whole_and_fewer_are_taken(monkeypatch):
     few = thin(drives)
     assert timing.FEWEST_BLOCKS <= len(set(few.block)) < 60
     assert len(cut(few, 2.0).begin) == len(set(few.block))
-
-
-def test_poses_that_are_missing_stay_missing(drives):
-    gaps = drives.only(np.arange(len(drives.episode)) % 50 > 4)
-    few = timing.join_increments(gaps, 4)
-    assert (few.last - few.first).max() <= 4 * (drives.last - drives.first).max()
-    assert np.abs(few.measured - increments(few, TRUTH)).max() < 1e-9

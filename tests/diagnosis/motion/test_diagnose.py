@@ -33,13 +33,23 @@ def diagnosis():
     return diagnose(scrubbing_log(), ROBOT, ("trim", "delay"))
 
 
-def test_the_planted_effect_is_found_with_its_value(diagnosis):
+def test_the_planted_effect_is_found_with_its_value_and_its_worth_first_of_all_candidates(diagnosis):
     assert diagnosis.verdict == "explained"
     assert [effect.effect for effect in diagnosis.effects] == ["yaw_scrub"]
     estimate = diagnosis.theta["yaw_scrub"]
     assert abs(estimate.value - 0.12) < np.ptp(estimate.interval)
     assert estimate.unit == "m"
     assert np.ptp(estimate.interval) < 0.02
+
+    gains = [tried.gain for tried in diagnosis.found.tried]
+    assert gains == sorted(gains, reverse=True)
+    assert diagnosis.found.tried[0].effect == "yaw_scrub"
+    assert 0.0 < diagnosis.found.tried[0].p_value <= 0.01
+
+    assert set(diagnosis.effect_sizes) == {"yaw_scrub"}
+    assert set(diagnosis.effect_sizes["yaw_scrub"]) == set(HORIZONS_S)
+    assert diagnosis.effect_sizes["yaw_scrub"][2.0].interval[0] > 1.5
+    assert (diagnosis.negligible, diagnosis.dropped_values) == ((), {})
 
 
 @pytest.mark.slow
@@ -74,24 +84,14 @@ def test_errors_are_told_at_every_horizon_and_fall_to_the_floor(diagnosis):
     assert error.heading_after.value < error.heading_before.value
 
 
-def test_nothing_removable_is_left_to_speak_of_where_nothing_was(diagnosis):
+def test_drives_are_not_fitted_and_nothing_removable_is_left_where_nothing_was(diagnosis):
     error = diagnosis.errors[1]
     at_floor = error.before._replace(value=error.floor.lower)
     assert replace(error, before=at_floor).removable_left is None
     assert replace(error, after=error.before).removable_left == 1.0
-
-
-def test_the_test_drives_are_not_fitted(diagnosis):
     assert diagnosis.parts.fitted.duties.shape[0] == 4
     assert diagnosis.parts.tested.duties.shape[0] == 2
     assert diagnosis.found.model.drives is diagnosis.parts.fitted
-
-
-def test_the_best_candidate_is_the_one_adopted(diagnosis):
-    gains = [tried.gain for tried in diagnosis.found.tried]
-    assert gains == sorted(gains, reverse=True)
-    assert diagnosis.found.tried[0].effect == "yaw_scrub"
-    assert 0.0 < diagnosis.found.tried[0].p_value <= 0.01
 
 
 @pytest.mark.parametrize(("robot", "effects"), [("duckiebot", ("trim", "delay")), ("husky", ()), ("irobot_create", ())])
@@ -118,13 +118,6 @@ def test_the_same_seed_gives_the_same_diagnosis(diagnosis):
     assert again.found.tried == diagnosis.found.tried
     assert again.errors == diagnosis.errors
     assert again.effect_sizes == diagnosis.effect_sizes
-
-
-def test_every_effect_says_what_it_is_worth_on_drives_that_were_not_fitted(diagnosis):
-    assert set(diagnosis.effect_sizes) == {"yaw_scrub"}
-    assert set(diagnosis.effect_sizes["yaw_scrub"]) == set(HORIZONS_S)
-    assert diagnosis.effect_sizes["yaw_scrub"][2.0].interval[0] > 1.5
-    assert (diagnosis.negligible, diagnosis.dropped_values) == ((), {})
 
 
 @pytest.mark.parametrize("level", [1e-6, 0.002])

@@ -29,14 +29,12 @@ def drives():
     return planted_drives(TRUTH, episodes=3, seconds=20.0, noise=None)
 
 
-def test_every_group_is_offered_in_the_order_of_its_weights_and_makes_an_effect(drives):
+def test_groups_are_offered_in_their_order_with_knots_within_what_was_driven(drives):
     offer = discrepancy.offer_curves(drives, TRUTH)
     assert {curve.group for curve in offer.curves} == set(GROUPS)
     assert learnt_effect(learnt_theta(offer)) == offer
     assert not any(any(curve.weights) for curve in offer.curves)
 
-
-def test_knots_lie_within_what_was_seen(drives):
     offer, asked = discrepancy.offer_curves(drives, TRUTH), twists_of(drives, TRUTH)
     for bounds, signal in zip(offer.seen, (asked[..., 0], asked[..., 2]), strict=True):
         assert signal.min() <= bounds[0] < 0.0 < bounds[1] <= 1.01 * signal.max()
@@ -44,8 +42,6 @@ def test_knots_lie_within_what_was_seen(drives):
     assert offer.seen.yaw[0] <= knots["turn_rate"].min() < 0.0 < knots["turn_rate"].max() <= offer.seen.yaw[1]
     assert knots["time"].max() <= 20.1
 
-
-def test_what_was_never_driven_is_not_offered(drives):
     ahead = replace(drives, duties=np.abs(drives.duties[..., :1]).repeat(2, axis=-1))
     groups = {curve.group for curve in discrepancy.offer_curves(ahead, {**TRUTH, "trim": 0.0}).curves}
     assert "direction" not in groups
@@ -73,10 +69,14 @@ def found(bent):
     return bent, fit_discrepancy(bent, TRUTH)
 
 
-def test_drives_too_short_for_a_window_teach_nothing():
+def test_too_few_blocks_or_windows_teach_nothing():
     drives = planted_drives(TRUTH, episodes=8, seconds=1.5)
     learnt = fit_discrepancy(drives, TRUTH)
     assert (learnt.used, dict(learnt.theta), len(learnt.held_out)) == (False, {}, 0)
+    drives = planted_drives({**TRUTH, **TURNING}, episodes=1, seconds=12.0)
+    learnt = fit_discrepancy(drives, TRUTH)
+    assert (dict(learnt.theta), learnt.used) == ({}, False)
+    assert len(learnt.held_out)
 
 
 def test_a_hidden_curve_is_learnt_by_its_signal_and_lowers_the_error_of_other_drives(found, tested):
@@ -89,11 +89,17 @@ def test_a_hidden_curve_is_learnt_by_its_signal_and_lowers_the_error_of_other_dr
     assert after < 1.5 * squares(tested, {**TRUTH, **TURNING})
 
 
-def test_the_guard_and_the_held_out_errors_tell_of_blocks_that_were_not_fitted(found):
+def test_the_guard_tells_of_blocks_that_were_not_fitted_and_wants_a_sure_gain(found):
     drives, learnt = found
     assert set(learnt.guard) == {1.0, 2.0, 5.0}
     assert np.sqrt(learnt.held_out.mean() / squares(drives, TRUTH)) == pytest.approx(learnt.guard[2.0].value)
     assert squares(drives, {**TRUTH, **learnt.theta}) < learnt.held_out.mean()
+    assert DULL.value < RULES.discrepancy_harms < BAD.value
+    assert GOOD.value < RULES.discrepancy_helps < DULL.value
+    assert discrepancy._helps({1.0: GOOD, 2.0: DULL}, RULES)
+    for guard in ((GOOD, BAD), (DULL, DULL), (UNSURE, DULL), ()):
+        assert not discrepancy._helps(dict(enumerate(guard)), RULES), guard
+    assert not Discrepancy().used
 
 
 @pytest.mark.slow
@@ -142,24 +148,8 @@ def test_a_delay_that_stood_for_slow_commands_gives_way_to_them():
     assert along.held_out.mean() < 0.5 * alone.held_out.mean()
 
 
-def test_too_few_blocks_teach_nothing():
-    drives = planted_drives({**TRUTH, **TURNING}, episodes=1, seconds=12.0)
-    learnt = fit_discrepancy(drives, TRUTH)
-    assert (dict(learnt.theta), learnt.used) == ({}, False)
-    assert len(learnt.held_out)
-
-
 GOOD, DULL = Ratio(0.8, (0.7, 0.9)), Ratio(1.0, (0.9, 1.1))
 BAD, UNSURE = Ratio(1.1, (0.9, 1.3)), Ratio(0.8, (0.6, 1.01))
-
-
-def test_the_guard_wants_a_sure_gain_somewhere_and_a_loss_nowhere():
-    assert DULL.value < RULES.discrepancy_harms < BAD.value
-    assert GOOD.value < RULES.discrepancy_helps < DULL.value
-    assert discrepancy._helps({1.0: GOOD, 2.0: DULL}, RULES)
-    for guard in ((GOOD, BAD), (DULL, DULL), (UNSURE, DULL), ()):
-        assert not discrepancy._helps(dict(enumerate(guard)), RULES), guard
-    assert not Discrepancy().used
 
 
 WRONG = AdoptedEffect("saturation", "", ("saturation.limit",), (), 100.0, 0.001, ())
@@ -217,22 +207,16 @@ def perfect(drives, theta):
     return Discrepancy({}, {}, {}, True, pose_errors(drives, theta, cut(drives, 2.0))[:, 0] ** 2)
 
 
-def test_curves_that_do_what_turn_slip_does_are_turn_slip_with_its_value():
+def test_curves_are_named_only_where_they_do_what_an_effect_does():
     truth = {**TRUTH, "turn_slip": 0.13}
     drives = planted_drives(truth, episodes=2, seconds=12.0)
     found = match_named_effect(drives, TRUTH, perfect(drives, truth), TAKEN)
     assert (found.effect, found.form) == ("turn_slip", "")
     assert found.theta["turn_slip"] == pytest.approx(0.13, abs=0.02)
     assert found.share > 0.9
-
-
-def test_curves_that_no_name_describes_have_none():
     truth = {**TRUTH, **VEERING}
     drives = planted_drives(truth, episodes=2, seconds=12.0)
     assert match_named_effect(drives, TRUTH, perfect(drives, truth), TAKEN) is None
-
-
-def test_curves_that_gain_nothing_look_like_nothing():
     drives = planted_drives(TRUTH, episodes=2, seconds=12.0)
     worse = replace(perfect(drives, TRUTH), held_out=np.ones(3))
     assert match_named_effect(drives, TRUTH, worse, TAKEN) is None

@@ -26,10 +26,14 @@ def test_they_are_those_of_numpy_for_any_angle(reach):
     np.testing.assert_allclose(cosine_and_sine(angle), (np.cos(angle), np.sin(angle)), rtol=0.0, atol=1e-14)
 
 
-def test_of_right_angles_and_of_zero_they_are_exact():
+def test_right_angles_are_exact_and_ticks_at_least_60_per_second():
     cosine, sine = cosine_and_sine(np.arange(-6, 7) * np.pi / 2.0)
     np.testing.assert_allclose(cosine + 1j * sine, 1j ** np.arange(-6, 7), rtol=0.0, atol=1e-14)
     assert [part.item() for part in cosine_and_sine(np.zeros(()))] == [1.0, 0.0]
+    drives = gathered(episode([0.0, 0.1, 0.2]))
+    assert (drives.tick_hz, drives.rate_hz) == (60.0, 20.0)
+    slow = replace(log(episode([0.0, 0.1, 0.2])), rate_hz=7.0)
+    assert gather(slow, ROBOT, slow.episodes).tick_hz == 63.0
 
 
 SPEED_PER_RAD = 0.0318 / 0.6
@@ -57,38 +61,18 @@ def rows_of(drives):
     return [(int(a), int(b)) for a, b in zip(drives.first // 3, drives.last // 3, strict=True)]
 
 
-def test_a_pose_that_repeats_is_an_older_one_shown_again():
+def test_poses_that_repeat_are_older_ones_and_a_robot_that_stands_shows_one_every_fifth_of_a_second():
     assert rows_of(gathered(episode([0.0, 0.1, 0.1, 0.2]))) == [(0, 1), (1, 3)]
-
-
-def test_a_robot_that_stands_shows_a_pose_of_its_own_every_fifth_of_a_second():
     assert rows_of(gathered(episode([0.0] * 10))) == [(0, 4), (4, 8)]
 
 
-def test_ticks_are_at_least_60_per_second():
-    drives = gathered(episode([0.0, 0.1, 0.2]))
-    assert (drives.tick_hz, drives.rate_hz) == (60.0, 20.0)
-    slow = replace(log(episode([0.0, 0.1, 0.2])), rate_hz=7.0)
-    assert gather(slow, ROBOT, slow.episodes).tick_hz == 63.0
-
-
-def test_an_increment_spans_missing_poses_up_to_a_second_and_no_longer():
+def test_increments_span_missing_poses_and_break_where_left_out():
     second = [0.0, *[None] * 19, 1.0, 1.1]
     assert rows_of(gathered(episode(second))) == [(0, 20), (20, 21)]
     longer = [0.0, 0.1, *[None] * 20, 1.0, 1.1]
     drives = gathered(episode(longer))
     assert rows_of(drives) == [(0, 1), (22, 23)]
     assert drives.linked.tolist() == [False, False]
-
-
-def test_increments_are_linked_within_an_episode_and_not_across():
-    drives = gathered(episode([0.0, 0.1, 0.2]), episode([5.0, 5.1, 5.2], name="b"))
-    assert drives.linked.tolist() == [False, True, False, True]
-    assert drives.episode.tolist() == [0, 0, 1, 1]
-    assert drives.block.tolist() == [0, 0, 1, 1]
-
-
-def test_leaving_increments_out_breaks_the_links_over_them_and_renumbers_blocks():
     drives = gathered(episode([0.0, 0.1, 0.2, 0.3, 0.4]), episode([0.0, 0.1, 0.2], name="b"))
     some = drives.only(np.array([True, True, False, True, False, True]))
     assert some.linked.tolist() == [False, True, False, False]
@@ -97,22 +81,35 @@ def test_leaving_increments_out_breaks_the_links_over_them_and_renumbers_blocks(
     assert drives.only(drives.episode == 1).block.tolist() == [0, 0]
 
 
-def test_episodes_of_different_length_go_on_with_their_last_command():
+def test_increments_are_linked_within_an_episode_and_need_two_poses_and_commands():
+    drives = gathered(episode([0.0, 0.1, 0.2]), episode([5.0, 5.1, 5.2], name="b"))
+    assert drives.linked.tolist() == [False, True, False, True]
+    assert drives.episode.tolist() == [0, 0, 1, 1]
+    assert drives.block.tolist() == [0, 0, 1, 1]
+    drives = gathered(episode([None, None, None]), episode([0.0, 0.1, 0.2], name="b"))
+    assert drives.episode.tolist() == [1, 1]
+    seen = relative(np.array([1.0, 2.0, np.pi / 2]), np.array([0.5, 5.0, 3.0]))
+    np.testing.assert_allclose(seen, [3.0, 0.5, 3.0 - np.pi / 2], atol=1e-12)
+
+
+def test_episodes_of_different_length_and_headings_between_are_filled():
     long = episode([0.0, 0.1, 0.2], commands=[[0.1, 0.2]] * 3)
     short = episode([0.0, 0.1], commands=[[0.3, 0.4], [0.5, 0.6]], name="b")
     duties = gathered(long, short).duties
     assert duties.shape == (2, 9, 2)
     np.testing.assert_array_equal(duties[1, ::3], [[0.3, 0.4], [0.5, 0.6], [0.5, 0.6]])
+    one = episode([0.0, None, 0.2])
+    poses = one.poses.copy()
+    poses[[0, 2], 2] = (1.0, 2.0)
+    drives = gathered(replace(one, poses=poses))
+    np.testing.assert_allclose(drives.headings[0, :7], 1.0 + np.arange(7) / 6.0)
 
 
-def test_an_episode_without_poses_adds_no_increment():
-    drives = gathered(episode([None, None, None]), episode([0.0, 0.1, 0.2], name="b"))
-    assert drives.episode.tolist() == [1, 1]
-
-
-def test_a_log_without_two_poses_in_a_row_is_refused():
+def test_logs_without_two_poses_in_a_row_or_commands_are_refused():
     with pytest.raises(LogError, match="yard: no two measured poses"):
         gathered(episode([0.0, None, None]))
+    with pytest.raises(LogError, match="yard: has no commands"):
+        duties_of(log(command="none"), ROBOT, np.empty((3, 0)))
 
 
 @pytest.mark.parametrize(
@@ -135,12 +132,15 @@ def test_more_than_full_speed_is_refused_with_what_to_state(command, given):
         duties_of(log(command=command), ROBOT, np.array([given]))
 
 
-def test_a_log_without_commands_is_refused():
-    with pytest.raises(LogError, match="yard: has no commands"):
-        duties_of(log(command="none"), ROBOT, np.empty((3, 0)))
+def test_wheel_speeds_are_used_where_all_episodes_have_them_without_a_gap():
+    gap = episode([0.0, 0.1, 0.2], wheels=[[3.0, 4.0], [np.nan, np.nan], [5.0, 6.0]])
+    drives = gathered(gap)
+    assert drives.wheels is None
+    assert drives.rest[0, 0] == pytest.approx(3.0 * SPEED_PER_RAD)
+    assert gathered(episode([0.0, 0.1], wheels=[[np.nan, np.nan], [5.0, 6.0]])).rest.tolist() == [[0.0, 0.0]]
 
+    assert gathered(episode([0.0, 0.1], wheels=np.ones((2, 2))), episode([0.0, 0.1], name="b")).wheels is None
 
-def test_a_drive_begins_at_rest_or_at_the_measured_wheel_speeds():
     still = episode([0.0, 0.1])
     turning = episode([0.0, 0.1], wheels=[[3.0, 4.0], [5.0, 6.0]])
     np.testing.assert_array_equal(gathered(still).rest, [[0.0, 0.0]])
@@ -148,36 +148,9 @@ def test_a_drive_begins_at_rest_or_at_the_measured_wheel_speeds():
     np.testing.assert_allclose(drives.rest, [[3.0 * SPEED_PER_RAD, 4.0 * SPEED_PER_RAD]])
     np.testing.assert_allclose(drives.wheels[0, 3:, 1], 6.0 * SPEED_PER_RAD)
 
-
-def test_a_drive_that_begins_in_motion_has_its_first_speed_behind_it():
     steady = gathered(episode(0.01 * np.arange(40)))
     np.testing.assert_allclose(steady.rest[0], 0.2 / ROBOT.figures["full_speed"])
     np.testing.assert_array_equal(gathered(episode(0.004 * np.arange(40) ** 2 / 40)).rest[0], 0.0)
-
-
-def test_wheel_speeds_with_a_gap_are_not_used_but_where_they_begin():
-    gap = episode([0.0, 0.1, 0.2], wheels=[[3.0, 4.0], [np.nan, np.nan], [5.0, 6.0]])
-    drives = gathered(gap)
-    assert drives.wheels is None
-    assert drives.rest[0, 0] == pytest.approx(3.0 * SPEED_PER_RAD)
-    assert gathered(episode([0.0, 0.1], wheels=[[np.nan, np.nan], [5.0, 6.0]])).rest.tolist() == [[0.0, 0.0]]
-
-
-def test_wheel_speeds_of_some_episodes_only_are_not_used():
-    assert gathered(episode([0.0, 0.1], wheels=np.ones((2, 2))), episode([0.0, 0.1], name="b")).wheels is None
-
-
-def test_headings_between_measured_ones_are_interpolated():
-    one = episode([0.0, None, 0.2])
-    poses = one.poses.copy()
-    poses[[0, 2], 2] = (1.0, 2.0)
-    drives = gathered(replace(one, poses=poses))
-    np.testing.assert_allclose(drives.headings[0, :7], 1.0 + np.arange(7) / 6.0)
-
-
-def test_an_increment_is_seen_from_its_first_pose():
-    seen = relative(np.array([1.0, 2.0, np.pi / 2]), np.array([0.5, 5.0, 3.0]))
-    np.testing.assert_allclose(seen, [3.0, 0.5, 3.0 - np.pi / 2], atol=1e-12)
 
 
 def test_travel_is_the_way_without_what_noise_adds():
@@ -189,13 +162,10 @@ def test_travel_is_the_way_without_what_noise_adds():
     np.testing.assert_allclose(gathered(episode(x)).travel[:, 0], 0.01, rtol=1e-9)
 
 
-def test_sums_by_label_are_weighted():
+def test_sums_and_runs_go_by_labels_in_order():
     weights = np.array([2.0, 1.0, 5.0, -1.0])
     sums = sum_by(np.array([0, 2, -1, 2]), np.arange(8.0).reshape(4, 2), 3, weights)
     np.testing.assert_array_equal(sums, [[0, 2], [0, 0], [-4, -4]])
-
-
-def test_runs_of_labels_are_numbered_in_order():
     assert number_of(np.array([4, 4, 1, 7, 7])).tolist() == [0, 0, 1, 2, 2]
 
 
@@ -204,21 +174,17 @@ def at_own_times(issued, commands, rows=4, wheels=None):
     return gathered(replace(drive, issued=np.array(issued)))
 
 
-def test_a_command_is_held_from_its_own_time_as_the_mean_over_each_tick():
+def test_commands_are_held_from_their_own_times_also_from_before_the_first_sample():
     drives = at_own_times([0.025, 0.1], [[0.6, 0.3], [0.0, 0.2]])
     np.testing.assert_allclose(drives.duties[0, :8, 0], [0, 0.3, 0.6, 0.6, 0.6, 0.6, 0, 0], atol=1e-12)
     assert np.flatnonzero(drives.issued[0]).tolist() == [1, 6]
     assert drives.rate_hz == pytest.approx(1.0 / 0.075)
 
-
-def test_a_command_from_before_the_first_sample_is_in_force_already():
     drives = at_own_times([-0.4, -0.2, 0.05], [[0.9, 0.9], [0.6, 0.3], [0.0, 0.2]])
     np.testing.assert_allclose(drives.rest, [[0.6, 0.3]])
     np.testing.assert_allclose(drives.duties[0, :4, 1], [0.3, 0.3, 0.3, 0.2])
     assert np.flatnonzero(drives.issued[0]).tolist() == [3]
 
-
-def test_commands_at_the_samples_times_are_the_commands_of_the_samples():
     rows = [[0.1, 0.2], [0.3, 0.1], [0.0, 0.0], [0.5, 0.5]]
     plain = gathered(episode([0.0, 0.1, 0.2, 0.3], commands=rows))
     own = at_own_times([0.0, 0.05, 0.1, 0.15], rows)
@@ -247,13 +213,15 @@ def with_commands(vehicle, kind, commands, geometry=OWN):
     return replace(vehicle, robot="tractor", command=kind, geometry=dict(geometry), episodes=episodes)
 
 
-def test_a_robot_with_a_folder_is_read_from_it(vehicle):
+def test_a_robot_is_read_from_its_folder_or_named_or_has_the_geometry_of_its_log(vehicle):
     assert robot_of(vehicle) == read_robot("duckiebot")
-
-
-def test_another_robot_can_be_named(vehicle):
     assert robot_of(vehicle, "husky") == read_robot("husky")
     assert robot_of(replace(vehicle, robot="tractor"), "duckiebot") == read_robot("duckiebot")
+    own = replace(vehicle, robot="tractor", geometry={**OWN, "full_speed": 1.5})
+    assert robot_of(own, "tractor") == robot_of(own)
+    robot = robot_of(replace(vehicle, robot="tractor", geometry={**OWN, "full_speed": 1.5}))
+    assert (robot.name, robot.theta, robot.urdf) == ("tractor", {}, None)
+    assert dict(robot.figures) == {**OWN, "full_speed": 1.5, "motor_time_constant": 0.0, "control_rate": 20.0}
 
 
 @pytest.mark.parametrize(
@@ -267,17 +235,6 @@ def test_another_robot_can_be_named(vehicle):
 def test_an_unknown_robot_needs_its_geometry(vehicle, geometry, missing):
     with pytest.raises(LogError, match=f"robot 'tractor' is unknown .* does not state {missing};"):
         robot_of(replace(vehicle, robot="tractor", geometry=geometry))
-
-
-def test_an_unknown_robot_has_the_geometry_of_its_log_and_obeys_at_once(vehicle):
-    robot = robot_of(replace(vehicle, robot="tractor", geometry={**OWN, "full_speed": 1.5}))
-    assert (robot.name, robot.theta, robot.urdf) == ("tractor", {}, None)
-    assert dict(robot.figures) == {**OWN, "full_speed": 1.5, "motor_time_constant": 0.0, "control_rate": 20.0}
-
-
-def test_a_robot_of_the_logs_own_figures_may_be_named_as_the_log_names_it(vehicle):
-    own = replace(vehicle, robot="tractor", geometry={**OWN, "full_speed": 1.5})
-    assert robot_of(own, "tractor") == robot_of(own)
 
 
 @pytest.mark.parametrize(
@@ -307,7 +264,7 @@ def test_full_speed_of_a_robot_that_never_moved_is_still_positive(vehicle):
 CAR = read_robot("car")
 
 
-def test_what_a_car_is_asked_for_is_throttle_and_steering_in_any_kind():
+def test_a_car_is_asked_for_no_more_than_its_full_speed_in_any_kind():
     """0.5 m/s at half lock: as shares, as speed and wheel angle, as speed and yaw rate."""
     angle, figures = np.radians(CAR.figures["wheel_angle"]) / 2.0, CAR.figures
     wanted = np.array([[0.5 / figures["full_speed"], 0.5]])
@@ -315,17 +272,14 @@ def test_what_a_car_is_asked_for_is_throttle_and_steering_in_any_kind():
     for command, asked in (("ackermann", wanted[0]), ("speed_steering", (0.5, angle)), ("twist", (0.5, turn))):
         log = Log("log", "car", command, 20.0, {}, ())
         np.testing.assert_allclose(duties_of(log, CAR, np.array([asked])), wanted, err_msg=command)
+    with pytest.raises(LogError, match="more than the full speed"):
+        duties_of(Log("log", "car", "speed_steering", 20.0, {}, ()), CAR, np.array([[99.0, 0.0]]))
 
 
 @pytest.mark.parametrize(("robot", "command"), [("car", "duty"), ("car", "wheel_speed"), ("duckiebot", "ackermann")])
 def test_commands_of_the_other_kind_of_drive_are_refused_in_one_line(robot, command):
     told = complaint_of(duties_of, Log("log", robot, command, 20.0, {}, ()), read_robot(robot), np.zeros((2, 2)))
     assert f"commands of kind '{command}' are not for robot '{robot}'" in told
-
-
-def test_a_car_asked_for_more_than_its_full_speed_is_refused():
-    with pytest.raises(LogError, match="more than the full speed"):
-        duties_of(Log("log", "car", "speed_steering", 20.0, {}, ()), CAR, np.array([[99.0, 0.0]]))
 
 
 @pytest.mark.parametrize(("robot", "command", "ticks"), [("car", "ackermann", 1), ("duckiebot", "duty", 2)])

@@ -64,11 +64,8 @@ def test_drives_on_two_floors_fall_in_two_groups_too():
     assert sorted(found.gains) == pytest.approx([0.8, 1.0], abs=0.03)
 
 
-def test_a_single_drive_of_another_kind_is_no_second_robot():
+def test_one_drive_of_another_kind_or_three_drives_make_no_second_robot():
     assert unlike(mixed({"trim": -0.06}, of=(1,))) is None
-
-
-def test_three_drives_are_too_few_to_tell():
     log = mixed({"trim": -0.06})
     assert unlike(replace(log, episodes=log.episodes[:3])) is None
 
@@ -112,9 +109,12 @@ def test_what_matters_is_kept_and_the_model_is_fitted_again_without_what_does_no
     assert weighed.negligible[0].beside.theta["lateral_slip"] == 0.002
 
 
-def test_where_everything_matters_nothing_changes(drives):
+def test_where_everything_matters_or_windows_are_too_short_nothing_is_dropped(drives):
     whole = found(drives, MIXED, adopted("yaw_scrub", SCRUB))
     assert drop_negligible(whole, 1) is whole
+    few = planted_drives(MIXED, episodes=2, seconds=4.0)
+    short = found(few, MIXED, adopted("lateral_slip", SLIP))
+    assert drop_negligible(short, 1) is short
 
 
 @pytest.mark.slow
@@ -122,12 +122,6 @@ def test_of_two_effects_that_stand_for_one_another_one_is_kept(drives):
     twins = (adopted("yaw_scrub", SCRUB), adopted("wheel_gain", (("wheel_gain.left", "wheel_gain.right"),)))
     theta = {**TRUTH, "yaw_scrub": 0.13, "wheel_gain.left": 1.0, "wheel_gain.right": 1.0}
     assert [one.effect for one in drop_negligible(found(drives, theta, *twins), 1).adopted] == ["yaw_scrub"]
-
-
-def test_drives_too_short_for_windows_drop_nothing():
-    few = planted_drives(MIXED, episodes=2, seconds=4.0)
-    short = found(few, MIXED, adopted("lateral_slip", SLIP))
-    assert drop_negligible(short, 1) is short
 
 
 def test_worth_is_told_on_drives_that_were_not_fitted(drives):
@@ -157,14 +151,11 @@ def without(*ratios):
     return likeness.WeighedEffect(adopted("lateral_slip", SLIP), told)
 
 
-def test_an_effect_matters_if_at_some_horizon_the_error_without_it_is_clearly_larger():
+def test_an_effect_matters_or_does_harm_where_the_error_is_clearly_another():
     assert without((1.2, 1.1, 1.3)).material
     assert without((1.0, 0.9, 1.1), (1.06, 1.01, 1.1)).material
     assert not any(without(one).material for one in ((1.2, 0.9, 1.6), (1.04, 1.02, 1.06), (0.8, 0.7, 0.9)))
     assert RULES.material_factor == 1.05
-
-
-def test_an_effect_does_harm_only_where_predictions_are_shown_to_be_better_without_it():
     assert without((0.9, 0.85, 0.96)).harmful
     assert not any(without(one).harmful for one in ((0.9, 0.75, 1.02), (0.97, 0.95, 0.99), (1.2, 1.1, 1.3)))
 
@@ -204,28 +195,19 @@ def slow():
     return invisible_effects(swinging(0.15, 0.03), VISIBILITY_DECLARED)
 
 
-def test_slow_drives_cannot_show_saturation_and_fast_ones_can(slow):
+def test_effects_of_motion_are_unseen_in_the_catalogues_order_unless_declared_or_shown(slow):
     assert "saturation" in slow
     assert "saturation" not in invisible_effects(swinging(0.9, 0.1), VISIBILITY_DECLARED)
-
-
-def test_straight_drives_cannot_show_what_turning_costs():
     assert "turn_slip" in invisible_effects(swinging(0.3, 0.0), VISIBILITY_DECLARED)
+    assert not VISIBILITY_DECLARED & set(slow)
+    assert "saturation" not in invisible_effects(swinging(0.15, 0.03), {*VISIBILITY_DECLARED, "saturation"})
+    assert slow == tuple(name for name in MOTION_EFFECTS if name in slow)
 
 
 @pytest.mark.slow
 def test_rich_drives_show_nearly_everything():
     hidden = invisible_effects(fitted(planted_drives(TRUTH, episodes=6, seconds=30.0)), VISIBILITY_DECLARED)
     assert len(hidden) <= 3
-
-
-def test_what_is_declared_or_adopted_is_not_told_as_unseen(slow):
-    assert not VISIBILITY_DECLARED & set(slow)
-    assert "saturation" not in invisible_effects(swinging(0.15, 0.03), {*VISIBILITY_DECLARED, "saturation"})
-
-
-def test_unseen_effects_are_effects_of_motion_in_the_catalogues_order(slow):
-    assert slow == tuple(name for name in MOTION_EFFECTS if name in slow)
 
 
 @pytest.mark.slow

@@ -111,12 +111,9 @@ def test_a_manoeuvre_that_is_worth_as_much_is_taken(drives, quick, monkeypatch):
     assert drive.nats_per_minute == drive.manoeuvre[1]
 
 
-def test_one_seed_is_one_drive(drives, designed, quick):
+def test_one_seed_is_one_drive_also_without_a_room(drives, designed, quick):
     again = design_drive(found(drives, "lateral_slip", "marker_offset"), limits=ROOM)
     np.testing.assert_array_equal(again.commands, designed.commands)
-
-
-def test_without_a_room_the_drive_keeps_to_where_the_log_was(drives):
     course = course_of(drives, Limits())
     ends = drives.poses[:, 1, :2]
     assert course.room == pytest.approx(sorted(np.ptp(ends, axis=0), reverse=True))
@@ -124,7 +121,7 @@ def test_without_a_room_the_drive_keeps_to_where_the_log_was(drives):
     assert course.start[2] in (0.0, pytest.approx(np.pi / 2.0))
 
 
-def test_a_path_is_beyond_the_room_by_as_much_as_it_leaves_it(drives):
+def test_drives_are_imagined_from_the_middle_of_the_room_and_paths_beyond_it_measured(drives):
     course = course_of(drives, Limits((2.0, 2.0), seconds=5.0))
     still, straight = np.zeros((100, 2)), np.full((100, 2), 0.6)
     batch = course.imagine(np.stack((still, straight)), TRUTH)
@@ -134,8 +131,6 @@ def test_a_path_is_beyond_the_room_by_as_much_as_it_leaves_it(drives):
     assert beyond[1] == pytest.approx(reach - 0.9)
     assert course.beyond(batch, 0.1)[1] > beyond[1] + 0.05, "drift counts"
 
-
-def test_imagined_drives_are_those_of_the_model_from_the_middle_of_the_room(drives):
     course = course_of(drives, ROOM)
     commands = course.library[:2]
     batch = course.imagine(commands, TRUTH)

@@ -45,12 +45,9 @@ def test_intervals_cover_the_truth_most_of_the_time():
     assert sum(covered) >= 12
 
 
-def test_the_noise_is_found_with_the_parameters(found):
+def test_the_noise_is_found_with_the_parameters_and_nothing_free_leaves_them_alone(found, drives):
     np.testing.assert_allclose(found.noise.drive, NOISE.drive, rtol=0.3)
     np.testing.assert_allclose(found.noise.pose, NOISE.pose, rtol=0.15)
-
-
-def test_nothing_free_leaves_the_parameters_alone(drives):
     assert fit(drives, TRUTH, ()).theta == TRUTH
 
 
@@ -78,7 +75,7 @@ def test_of_steps_that_are_as_good_a_round_one_is_taken(drives, monkeypatch):
     assert fitting._scan(drives, theta, ((name,),), None, np.array([0.9, 1.1]))[name] == 0.25
 
 
-def test_a_step_is_found_with_an_interval_round_it():
+def test_steps_and_thresholds_are_found_with_intervals():
     truth = {**TRUTH, "command_quantisation": 0.25}
     free = (*DECLARED, ("command_quantisation",))
     found = fit(planted_drives(truth), {**truth, "command_quantisation": 0.2503}, free)
@@ -86,9 +83,6 @@ def test_a_step_is_found_with_an_interval_round_it():
     assert not found.slopes[:, 2].any()
     low, high = intervals(found)["command_quantisation"]
     assert 0.24 < low < 0.25 < high < 0.26
-
-
-def test_the_threshold_of_stiction_lies_in_its_interval():
     truth = {**TRUTH, "stiction.breakaway": 0.141, "stiction.imbalance": 0.0}
     found = fit(planted_drives(truth), {**truth, "stiction.breakaway": 0.15}, (*DECLARED, ("stiction.breakaway",)))
     low, high = intervals(found)["stiction.breakaway"]
@@ -103,23 +97,19 @@ def test_values_stay_within_their_bounds(drives):
     assert known["delay"] == pytest.approx(high, abs=1e-3)
 
 
-def test_slopes_foretell_a_small_change(found):
+def test_slopes_foretell_a_small_change_also_backwards_and_the_fitted_model_loses_least(found, drives):
     low, high = span(("trim",), found.drives)
     moved = theta_at(found.theta, (("trim",),), np.array([found.theta["trim"] + 1e-4 * (high - low)]))
     there = found.whiten.whiten(found.drives.measured - increments(found.drives, moved))
     change = found.slopes[:, 0] * 1e-4
     assert np.linalg.norm(there - found.innovations - change) < 0.01 * np.linalg.norm(change)
 
-
-def test_slopes_at_the_highest_value_step_backwards(drives):
     whiten = whitener(drives, NOISE)
     high = span(("delay",), drives)[1]
     edge = slopes(drives, {"trim": 0.0, "delay": high}, (("delay",),), whiten)
     inside = slopes(drives, {"trim": 0.0, "delay": high - 0.001}, (("delay",),), whiten)
     assert np.corrcoef(edge[:, 0], inside[:, 0])[0, 1] > 0.9
 
-
-def test_the_fitted_model_loses_least(found):
     here = loss_of(found.drives, found.theta, found.whiten)
     for name, step in (("trim", 0.01), ("delay", 0.01)):
         for sign in (-1.0, 1.0):
@@ -139,7 +129,7 @@ def linear(drives, columns=2, seed=4):
     return Fit(drives, {}, free, NOISE, Whitener(factor), z, slope)
 
 
-def test_a_block_is_foretold_as_if_the_others_alone_had_been_fitted(drives):
+def test_blocks_are_foretold_and_useless_parameters_cost(drives):
     few = drives.only(np.isin(drives.block, (0, 3, 4, 7)) & (np.arange(len(drives.block)) % 5 == 0))
     model = linear(few)
     told = held_out_log_likelihood(model)
@@ -151,6 +141,11 @@ def test_a_block_is_foretold_as_if_the_others_alone_had_been_fitted(drives):
         surprise = 0.5 * left @ left + np.log(model.whiten.factor[0][own]).sum()
         assert told[block] == pytest.approx(-surprise, rel=1e-5)
 
+    model = linear(drives, columns=3)
+    assert gain(model) < 2.0
+    needed = replace(model, innovations=model.innovations + 0.2 * model.slopes[:, 1])
+    assert gain(needed) == pytest.approx(0.5 * 0.04 * (model.slopes[:, 1] ** 2).sum(), rel=0.3)
+
 
 def gain(model):
     """What all parameters but the first are worth."""
@@ -158,24 +153,14 @@ def gain(model):
     return float(held_out_log_likelihood(model).sum() - held_out_log_likelihood(alone).sum())
 
 
-def test_a_useless_parameter_costs_and_a_needed_one_pays(drives):
-    model = linear(drives, columns=3)
-    assert gain(model) < 2.0
-    needed = replace(model, innovations=model.innovations + 0.2 * model.slopes[:, 1])
-    assert gain(needed) == pytest.approx(0.5 * 0.04 * (model.slopes[:, 1] ** 2).sum(), rel=0.3)
-
-
 @pytest.fixture(scope="module")
 def log():
     return planted_log({"trim": 0.03, "delay": 0.12}, episodes=4, seconds=40.0)
 
 
-def test_an_honest_log_is_let_through(log):
+def test_a_robot_that_is_never_told_to_move_is_refused_and_an_honest_log_is_not(log):
     fitting.check_motion("yard", drives_of(log))
     fitting.check_units("yard", drives_of(log), {"trim": 0.0, "delay": 0.15})
-
-
-def test_a_robot_that_is_never_told_to_move_is_refused(log):
     drives = drives_of(log)
     with pytest.raises(LogError, match="^yard: every command is zero"):
         fitting.check_motion("yard", replace(drives, duties=0.0 * drives.duties))

@@ -66,12 +66,22 @@ def test_the_banded_covariance_is_that_of_noisy_poses_and_noisy_driving(few, noi
     assert np.abs(wanted[3:6, :3]).max() > 0.1 * noise.pose[0] ** 2
 
 
-def test_the_log_likelihood_is_the_gaussian_one_where_nothing_is_an_outlier(few):
+def test_innovations_of_a_right_model_are_white_gaussian_and_outliers_count_linearly(few):
     whiten, covariance = whitener(few, NOISE), dense(few, NOISE)
     errors = 0.3 * whiten.colour(np.random.default_rng(2).standard_normal(3 * len(few.episode)))
     flat = errors.ravel()
     wanted = -0.5 * flat @ np.linalg.solve(covariance, flat) - 0.5 * np.linalg.slogdet(covariance)[1]
     assert innovations.log_likelihood(errors, whiten) == pytest.approx(wanted, rel=1e-5)
+
+    drives = planted_drives({"trim": 0.03}, episodes=6, seconds=20.0)
+    z = whitener(drives, NOISE).whiten(drives.measured - increments(drives, {"trim": 0.03})).reshape(-1, 3)
+    np.testing.assert_allclose(z.std(axis=0), 1.0, atol=0.1)
+    assert np.abs(np.mean(z[1:] * z[:-1], axis=0)).max() < 0.08
+
+    z = np.linspace(-8.0, 8.0, 1601)
+    slope = np.gradient(innovations.huber(z), z)
+    np.testing.assert_allclose(slope[1:-1], innovations.clip_outliers(z)[1:-1], atol=0.01)
+    assert np.diff(innovations.huber(np.array([HUBER, 5.0, 6.0, 7.0])))[1:].tolist() == [HUBER, HUBER]
 
 
 @pytest.mark.parametrize(
@@ -83,20 +93,6 @@ def test_planted_noise_is_found_again_from_a_start_ten_times_too_large_as_well(d
     found = fit_noise(drives, whitener(drives, Noise(drive, pose)).colour(z), start)
     np.testing.assert_allclose(found.drive, drive, rtol=0.25)
     np.testing.assert_allclose(found.pose, pose, rtol=0.1)
-
-
-def test_the_innovations_of_a_model_that_is_right_are_white():
-    drives = planted_drives({"trim": 0.03}, episodes=6, seconds=20.0)
-    z = whitener(drives, NOISE).whiten(drives.measured - increments(drives, {"trim": 0.03})).reshape(-1, 3)
-    np.testing.assert_allclose(z.std(axis=0), 1.0, atol=0.1)
-    assert np.abs(np.mean(z[1:] * z[:-1], axis=0)).max() < 0.08
-
-
-def test_outliers_count_linearly_and_their_slope_is_cut():
-    z = np.linspace(-8.0, 8.0, 1601)
-    slope = np.gradient(innovations.huber(z), z)
-    np.testing.assert_allclose(slope[1:-1], innovations.clip_outliers(z)[1:-1], atol=0.01)
-    assert np.diff(innovations.huber(np.array([HUBER, 5.0, 6.0, 7.0])))[1:].tolist() == [HUBER, HUBER]
 
 
 RICH = {
@@ -127,8 +123,16 @@ def test_increments_are_the_differences_of_paths(replayed, theta):
     np.testing.assert_array_equal(increments(replayed, theta), innovations.increments_along(replayed, walked))
 
 
-def test_the_model_that_drove_says_what_was_measured(replayed):
+def test_motion_is_replayed_as_it_was_driven_with_what_is_added(replayed):
     np.testing.assert_allclose(increments(replayed, TRUTH), replayed.measured, atol=1e-9)
+    extra = np.zeros((*replayed.duties.shape[:2], 3))
+    np.testing.assert_allclose(disturbed_increments(replayed, TRUTH, extra), increments(replayed, TRUTH), atol=1e-12)
+    extra[..., 2] = 0.6
+    turned = disturbed_increments(replayed, TRUTH, extra)[:, 2] - increments(replayed, TRUTH)[:, 2]
+    np.testing.assert_allclose(turned, 0.6 * (replayed.last - replayed.first) / 60.0, atol=1e-9)
+    arrived, late = (innovations.arrived_commands(replayed, theta) for theta in (RICH, {"delay": 0.2}))
+    assert wheel_speeds(replayed, RICH).shape == arrived.shape == replayed.duties.shape
+    np.testing.assert_allclose(late[:, 12:], replayed.duties[:, :-12], atol=1e-9)
 
 
 @pytest.mark.parametrize("theta", [TRUTH, RICH], ids=["declared", "rich"])
@@ -168,15 +172,12 @@ def test_what_models_share_is_kept_and_what_differs_is_not(replayed):
         found[0][1][:] = 0.0
 
 
-def test_a_window_past_the_end_goes_on_with_the_last_command(replayed):
+def test_windows_go_on_with_the_last_command_and_what_is_measured_later_changes_nothing(replayed):
     last = np.array([np.flatnonzero(replayed.episode == 0)[-1]])
     walked = window_paths(replayed, TRUTH, last, 200)
     steps = np.diff(walked[0], axis=0)
     np.testing.assert_allclose(np.hypot(*steps[-1, :2]), np.hypot(*steps[-50, :2]), rtol=0.2)
     assert np.isfinite(walked).all()
-
-
-def test_nothing_measured_after_a_windows_start_changes_it(replayed):
     poses = replayed.poses.copy()
     poses[60:] += 5.0
     sloped = {**TRUTH, "floor_slope.x": 0.05}
@@ -199,7 +200,7 @@ def test_random_effects_make_commands_late_by_their_mean(theta, late):
     assert calm == pytest.approx({"trim": 0.02, "delay": 0.1 + late})
 
 
-def test_the_mean_lateness_is_that_of_drawn_drives():
+def test_random_effects_are_late_by_their_mean_beside_a_declared_delay():
     drawn = planted_drives({**TRUTH, "dropped_commands": 0.3}, episodes=6, seconds=30.0, noise=None)
 
     def strays(delay):
@@ -207,24 +208,7 @@ def test_the_mean_lateness_is_that_of_drawn_drives():
 
     best = min(np.arange(0.1, 0.18, 0.004), key=strays)
     assert best == pytest.approx(TRUTH["delay"] + innovations.lateness({"dropped_commands": 0.3}, 20.0), abs=0.012)
-
-
-def test_a_random_effect_without_a_declared_delay_is_late_from_nothing():
     assert innovations.expected_theta({"delay_jitter": 0.1}, 20.0) == {"delay": 0.05}
-
-
-def test_what_is_added_to_the_twists_moves_the_robot(replayed):
-    extra = np.zeros((*replayed.duties.shape[:2], 3))
-    np.testing.assert_allclose(disturbed_increments(replayed, TRUTH, extra), increments(replayed, TRUTH), atol=1e-12)
-    extra[..., 2] = 0.6
-    turned = disturbed_increments(replayed, TRUTH, extra)[:, 2] - increments(replayed, TRUTH)[:, 2]
-    np.testing.assert_allclose(turned, 0.6 * (replayed.last - replayed.first) / 60.0, atol=1e-9)
-
-
-def test_wheels_and_arrived_commands_have_the_shape_of_duties(replayed):
-    arrived, late = (innovations.arrived_commands(replayed, theta) for theta in (RICH, {"delay": 0.2}))
-    assert wheel_speeds(replayed, RICH).shape == arrived.shape == replayed.duties.shape
-    np.testing.assert_allclose(late[:, 12:], replayed.duties[:, :-12], atol=1e-9)
 
 
 def test_windows_with_measured_wheels_are_told_where_they_point(replayed):

@@ -20,17 +20,11 @@ def test_a_slow_motor_is_told_from_latency(delay, lag):
     assert found.time_constant_s == pytest.approx(lag, abs=0.02 + 0.05 * lag)
 
 
-def test_motion_before_its_command_has_a_latency_below_none():
+def test_latency_may_be_below_none_and_gains_are_what_the_robot_makes_of_commands():
     found = answered({"delay": 0.1}, lambda poses: np.concatenate((poses[5:], np.full((5, 3), np.nan))))
     assert found.latency_s == pytest.approx(0.1 - 0.25, abs=0.02)
-
-
-def test_gains_are_what_the_robot_makes_of_its_commands():
     gains = answered({"wheel_gain.left": 0.9, "wheel_gain.right": 0.9}).gains
     np.testing.assert_allclose(np.diag(gains), 0.9, atol=0.02)
-
-
-def test_a_given_latency_is_kept_and_leaves_more():
     drives = drives_of(planted_log({"delay": 0.2}, episodes=3, seconds=30.0))
     speeds = measured_speeds(drives)
     late, best = reaction_at(drives, speeds, 0.0), reaction(drives, speeds, 1.0)
@@ -46,15 +40,12 @@ def test_speeds_are_taken_within_unbroken_runs_of_poses():
     assert np.all(speeds.last > speeds.first)
 
 
-def test_the_vertex_between_steps_is_found_with_its_deviation():
+def test_the_vertex_between_steps_is_found_where_there_is_one():
     latencies = np.arange(-10, 11) * 0.05
     truths = np.array([0.11, 0.13, 0.12, 0.12])
     found = likeliest_latency((latencies - truths[:, None]) ** 2, latencies)
     assert found.value == pytest.approx(0.12)
     assert found.deviation == pytest.approx(np.sqrt((np.array([0.01, 0.01, 0, 0]) ** 2).sum()) / 4.0)
-
-
-def test_squares_that_do_not_depend_on_the_latency_or_fall_to_the_end_of_what_was_tried_tell_none():
     assert likeliest_latency(np.ones((4, 9)), np.arange(9.0)).deviation == np.inf
     latencies = np.arange(-4, 5) * 0.5
     for end in (-2.0, 2.0, 7.0):

@@ -29,30 +29,21 @@ def test_the_noise_of_poses_is_found_within_a_few_percent(drives):
     assert found.turn == pytest.approx(0.008, rel=0.04)
 
 
-def test_noise_of_the_drive_does_not_pass_for_noise_of_poses():
+def test_noise_of_the_drive_missing_effects_and_outliers_do_not_pass_for_noise_of_poses(drives):
     found = pose_noise(planted_drives(TRUTH, episodes=6, seconds=60.0), TRUTH)
     assert found.place == pytest.approx(NOISE.pose[0], rel=0.08)
     assert found.turn == pytest.approx(NOISE.pose[1], rel=0.15)
-
-
-def test_a_missing_effect_does_not_pass_for_noise_of_poses(drives):
     wrong = pose_noise(drives, {**TRUTH, "trim": 0.1, "yaw_scrub": 0.12})
     assert wrong.place == pytest.approx(0.003, rel=0.1)
-
-
-def test_outliers_do_not_pass_for_noise():
     log = planted_log(TRUTH, episodes=6, seconds=60.0, noise=STILL)
     jumping = with_poses(log, lambda poses: poses + np.outer(np.arange(1200) % 100 == 0, (0.5, 0.5, 0.0)))
     jumped = pose_noise(drives_of(jumping), TRUTH)
     assert jumped.place == pytest.approx(0.003, rel=0.25)
 
 
-def test_poses_without_noise_have_none():
+def test_poses_without_noise_have_none_and_short_drives_tell_none():
     quiet = planted_drives(TRUTH, episodes=2, seconds=20.0, noise=None)
     assert max(pose_noise(quiet, TRUTH)) < 1e-6
-
-
-def test_drives_too_short_for_third_differences_tell_no_noise():
     few = planted_drives(TRUTH, episodes=1, seconds=0.3)
     assert pose_noise(few, TRUTH) == PoseNoise(0.0, 0.0)
 
@@ -88,23 +79,23 @@ def squares(driven, theta, horizon_s=2.0):
     return pose_errors(driven, theta, cut(driven, horizon_s))[:, 0] ** 2
 
 
-def test_windows_lead_back_to_the_values_that_drove():
+def test_windows_lead_back_to_the_values_that_drove_whatever_a_few_poses_do(driven):
     quiet = planted_drives(TRUTH, episodes=2, seconds=20.0, noise=None)
     found = fit_windows(quiet, {"trim": 0.0, "delay": 0.18}, DECLARED, cut(quiet, 2.0))
     assert found["trim"] == pytest.approx(TRUTH["trim"], abs=2e-4)
     assert found["delay"] == pytest.approx(TRUTH["delay"], abs=2e-3)
-
-
-def test_without_a_free_parameter_or_a_window_nothing_is_fitted(driven):
-    assert fit_windows(driven, TRUTH, (), cut(driven, 2.0)) == TRUTH
-    assert fit_windows(driven, {"trim": 0.0, "delay": 0.1}, DECLARED, cut(driven, 100.0)) == {"trim": 0.0, "delay": 0.1}
-
-
-def test_a_few_wild_poses_do_not_bend_the_parameters(driven):
     poses = driven.poses.copy()
     poses[300:306] += (3.0, -2.0, 1.0)
     found = fit_windows(replace(driven, poses=poses), TRUTH, DECLARED, cut(driven, 2.0))
     assert found["trim"] == pytest.approx(TRUTH["trim"], abs=0.01)
+
+
+def test_without_a_free_parameter_or_windows_enough_nothing_is_fitted(driven):
+    assert fit_windows(driven, TRUTH, (), cut(driven, 2.0)) == TRUTH
+    assert fit_windows(driven, {"trim": 0.0, "delay": 0.1}, DECLARED, cut(driven, 100.0)) == {"trim": 0.0, "delay": 0.1}
+    few = model(planted_drives(TRUTH, episodes=2, seconds=4.0), trim=0.08)
+    assert multistep_fit.horizons(few.drives) == ()
+    assert fit_multistep(few) == (few, None)
 
 
 def without_predictions(patch):
@@ -137,7 +128,7 @@ def test_what_was_fitted_is_not_fitted_again_but_other_windows_and_starts_are(mo
         assert asked
 
 
-def test_no_pose_is_predicted_by_what_was_fitted_to_it(driven):
+def test_what_predicts_poorly_is_fitted_again_by_poses_not_fitted_to(driven):
     poses = driven.poses.copy()
     own = driven.block % 4 == 0
     poses[own, :, 2] += np.linspace(0.0, 2.0, own.sum())[:, None]
@@ -148,8 +139,6 @@ def test_no_pose_is_predicted_by_what_was_fitted_to_it(driven):
     assert apart[2.0][others].mean() > together[others].mean()
     assert set(apart) == set(multistep_fit.horizons(driven)) == {1.0, 2.0, 5.0}
 
-
-def test_values_that_predict_poorly_are_fitted_again(driven):
     poor = model(driven, trim=0.08, delay=0.2)
     better, polish = fit_multistep(poor)
     assert squares(driven, better.theta).mean() < 0.5 * squares(driven, poor.theta).mean()
@@ -161,18 +150,9 @@ def test_values_that_predict_poorly_are_fitted_again(driven):
         assert low - 0.5 * (high - low) < true < high + 0.5 * (high - low)
 
 
-def test_values_that_windows_do_not_mend_are_kept(driven):
+def test_values_are_kept_where_windows_mend_nothing_or_would_do_harm(driven):
     right = model(driven)
     assert fit_multistep(right) == (right, None)
-
-
-def test_values_that_would_do_harm_at_some_horizon_are_not_taken(driven):
     strict = replace(driven, rules=replace(RULES, multistep_harms=0.01))
     poor = model(strict, trim=0.08, delay=0.2)
     assert fit_multistep(poor) == (poor, None)
-
-
-def test_drives_too_short_for_windows_in_three_blocks_are_not_fitted_to():
-    few = model(planted_drives(TRUTH, episodes=2, seconds=4.0), trim=0.08)
-    assert multistep_fit.horizons(few.drives) == ()
-    assert fit_multistep(few) == (few, None)

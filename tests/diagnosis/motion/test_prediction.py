@@ -40,7 +40,7 @@ def without_poses(log, *rows):
     return replace(log, episodes=(replace(first, poses=poses), *log.episodes[1:]))
 
 
-def test_windows_follow_one_another_and_cover_every_row(log):
+def test_windows_cover_every_row_and_headings_go_on(log):
     table = predict(log, ROBOT, TRUTH, 2.0)
     assert list(table.columns) == COLUMNS
     for name, own in table.groupby("episode"):
@@ -49,12 +49,36 @@ def test_windows_follow_one_another_and_cover_every_row(log):
         assert sorted(own.time.unique()) == pytest.approx(np.arange(200) / 20.0)
         assert (own.groupby("start_time").time.count() <= 41).all()
 
+    table = predict(log, ROBOT, TRUTH, 5.0)
+    for _, window in table.groupby(["episode", "start_time"]):
+        assert np.abs(np.diff(window.heading)).max() < 0.5
+    far = planted_log(TRUTH, episodes=1, seconds=10.0, noise=None)
+    turned = with_poses(far, lambda poses: poses + (0.0, 0.0, 40.0))
+    assert predict(turned, ROBOT, TRUTH, 5.0).heading.iloc[0] == pytest.approx(turned.episodes[0].poses[0, 2])
 
-def test_a_model_agrees_with_its_own_noiseless_log(log):
+
+def test_exact_models_predict_noiseless_logs_slopes_and_markers(log):
     found = agreement(predict(log, ROBOT, TRUTH, 2.0), log, 2.0)
     assert found.place < 1e-9
     assert found.turn < 1e-9
     assert (found.poses, found.windows) == (2 * 199, 10)
+
+    theta = {**TRUTH, "floor_slope.x": 0.04, "floor_slope.y": -0.02}
+    log = planted_log(theta, episodes=3, seconds=10.0, noise=None)
+    assert agreement(predict(log, ROBOT, theta, 2.0), log, 2.0).place < 1e-6
+    assert agreement(predict(log, ROBOT, TRUTH, 2.0), log, 2.0).place > 0.01
+
+    theta = {**TRUTH, "marker_offset.forward": 0.05, "heading_offset": 3.0}
+    plain = planted_log(TRUTH, episodes=2, seconds=10.0, noise=None)
+
+    def seen(poses):
+        out = poses.copy()
+        out[:, :2] += 0.05 * np.stack((np.cos(poses[:, 2]), np.sin(poses[:, 2])), axis=1)
+        out[:, 2] += np.radians(3.0)
+        return out
+
+    log = with_poses(plain, seen)
+    assert agreement(predict(log, ROBOT, theta, 2.0), log, 2.0).place < 1e-6
 
 
 def test_a_stub_at_a_drives_end_is_not_counted_as_a_window(log):
@@ -77,52 +101,16 @@ def test_learnt_motion_is_predicted_with_its_past_before_each_window(log, extra)
     assert found.turn < 1e-9
 
 
-def test_each_window_starts_from_the_measured_pose(log):
+def test_windows_begin_at_measured_poses_and_others_are_not_compared(log):
+    table = predict(without_poses(log, slice(7), slice(44, 60)), ROBOT, TRUTH, 2.0)
+    assert list(table[table.episode == "00"].start_time.unique()) == pytest.approx([0.35, 3.0, 5.0, 7.0, 9.0])
+    broken = without_poses(log, slice(50, 60))
+    assert agreement(predict(broken, ROBOT, TRUTH, 2.0), broken, 2.0).poses < 2 * 199 - 9
     table = predict(log, ROBOT, {**TRUTH, "trim": 0.1}, 1.0)
     starts = table[table.time == table.start_time]
     measured = {(e.name, time): pose for e in log.episodes for time, pose in zip(e.times, e.poses, strict=True)}
     for row in starts.itertuples():
         np.testing.assert_allclose((row.x, row.y, row.heading), measured[row.episode, row.time], atol=1e-12)
-
-
-def test_headings_go_on_over_a_whole_turn(log):
-    table = predict(log, ROBOT, TRUTH, 5.0)
-    for _, window in table.groupby(["episode", "start_time"]):
-        assert np.abs(np.diff(window.heading)).max() < 0.5
-    far = planted_log(TRUTH, episodes=1, seconds=10.0, noise=None)
-    turned = with_poses(far, lambda poses: poses + (0.0, 0.0, 40.0))
-    assert predict(turned, ROBOT, TRUTH, 5.0).heading.iloc[0] == pytest.approx(turned.episodes[0].poses[0, 2])
-
-
-def test_a_slope_is_predicted_exactly_whatever_the_heading():
-    theta = {**TRUTH, "floor_slope.x": 0.04, "floor_slope.y": -0.02}
-    log = planted_log(theta, episodes=3, seconds=10.0, noise=None)
-    assert agreement(predict(log, ROBOT, theta, 2.0), log, 2.0).place < 1e-6
-    assert agreement(predict(log, ROBOT, TRUTH, 2.0), log, 2.0).place > 0.01
-
-
-def test_a_marker_is_predicted_exactly():
-    theta = {**TRUTH, "marker_offset.forward": 0.05, "heading_offset": 3.0}
-    plain = planted_log(TRUTH, episodes=2, seconds=10.0, noise=None)
-
-    def seen(poses):
-        out = poses.copy()
-        out[:, :2] += 0.05 * np.stack((np.cos(poses[:, 2]), np.sin(poses[:, 2])), axis=1)
-        out[:, 2] += np.radians(3.0)
-        return out
-
-    log = with_poses(plain, seen)
-    assert agreement(predict(log, ROBOT, theta, 2.0), log, 2.0).place < 1e-6
-
-
-def test_a_window_begins_at_the_first_measured_pose_after_the_one_before(log):
-    table = predict(without_poses(log, slice(7), slice(44, 60)), ROBOT, TRUTH, 2.0)
-    assert list(table[table.episode == "00"].start_time.unique()) == pytest.approx([0.35, 3.0, 5.0, 7.0, 9.0])
-
-
-def test_poses_that_were_not_measured_are_not_compared(log):
-    broken = without_poses(log, slice(50, 60))
-    assert agreement(predict(broken, ROBOT, TRUTH, 2.0), broken, 2.0).poses < 2 * 199 - 9
 
 
 @pytest.mark.parametrize("horizon", [0.0, 0.04, -1.0, float("nan")])
@@ -131,14 +119,10 @@ def test_a_horizon_shorter_than_a_sample_is_refused(log, horizon):
         predict(log, ROBOT, TRUTH, horizon)
 
 
-def test_a_log_without_poses_is_refused(log):
+def test_a_log_needs_a_pose_and_a_first_one_is_enough(log):
     blind = with_poses(log, lambda poses: np.full_like(poses, np.nan))
     with pytest.raises(LogError, match="no measured pose to start a window from"):
         predict(blind, ROBOT, TRUTH, 2.0)
-
-
-def test_a_first_pose_and_commands_are_enough_for_a_whole_drive(log):
-    """The poses of each drive are what they are with all poses known; there is nothing to compare them with."""
     alone = with_poses(log, lambda poses: np.where(np.arange(len(poses))[:, None] > 0, np.nan, poses))
     told = predict(alone, ROBOT, TRUTH, 100.0)
     np.testing.assert_allclose(told[["x", "y", "heading"]], predict(log, ROBOT, TRUTH, 100.0)[["x", "y", "heading"]])
@@ -193,13 +177,10 @@ def test_a_model_that_is_right_misses_only_what_is_not_repeated(times, horizon_s
     assert found.interval[0] < 1.0 < found.interval[1] + 0.1
 
 
-def test_a_model_that_lacks_something_misses_more_than_is_not_repeated():
+def test_repeats_show_what_a_model_lacks_as_far_as_drives_go():
     found = compare_repeats(again(3, theta={**TRUTH, "yaw_scrub": 0.12}), TRUTH, 2.0).share
     assert found.value < 0.7
     assert found.interval[1] < 0.9
-
-
-def test_drives_that_end_earlier_are_repeats_as_far_as_they_go():
     duties, starts = make_drives(3, 1, 600)
     log = driven_log(TRUTH, np.repeat(duties, 2, axis=0), np.repeat(starts, 2, axis=0))
     one, other = log.episodes
@@ -209,32 +190,23 @@ def test_drives_that_end_earlier_are_repeats_as_far_as_they_go():
     assert compare_repeats(repeated_drives(replace(log, episodes=(one, stub))), TRUTH, 1.0) is None
 
 
-def test_standing_before_the_first_command_is_no_repeat():
-    duties, starts = make_drives(4, 6, 400)
-    duties[:, :200] = 0.0
-    assert compare_repeats(repeated_drives(driven_log(TRUTH, duties[:5], starts[:5])), TRUTH, 2.0) is None
-
-
 @pytest.mark.parametrize(("times", "seconds"), [(1, 30.0), (2, 6.0)])
 def test_of_drives_that_are_hardly_repeated_nothing_is_said(times, seconds):
     assert compare_repeats(again(times, seconds=seconds), TRUTH, 2.0) is None
 
 
-def test_copies_to_the_last_digit_say_nothing_of_what_is_not_repeated():
+def test_what_repeats_tell_stands_only_where_drives_are_repeated():
+    assert compare_repeats(again(2, seconds=3.0), TRUTH, 5.0) is None
+    duties, starts = make_drives(3, 2, 600)
+    duties, starts = np.concatenate((duties, duties[:1])), np.concatenate((starts, starts[:1]))
+    assert 0.3 < compare_repeats(repeated_drives(driven_log(TRUTH, duties, starts)), TRUTH, 1.0).part < 0.9
     duties, starts = make_drives(3, 2, 600)
     log = driven_log(TRUTH, duties, starts)
     twice = repeated_drives(replace(log, episodes=(*log.episodes, *log.episodes)))
     assert compare_repeats(twice, TRUTH, 1.0) is None
-
-
-def test_of_a_horizon_without_windows_nothing_is_said():
-    assert compare_repeats(again(2, seconds=3.0), TRUTH, 5.0) is None
-
-
-def test_drives_without_repeats_leave_windows_without_repeats():
-    duties, starts = make_drives(3, 2, 600)
-    duties, starts = np.concatenate((duties, duties[:1])), np.concatenate((starts, starts[:1]))
-    assert 0.3 < compare_repeats(repeated_drives(driven_log(TRUTH, duties, starts)), TRUTH, 1.0).part < 0.9
+    duties, starts = make_drives(4, 6, 400)
+    duties[:, :200] = 0.0
+    assert compare_repeats(repeated_drives(driven_log(TRUTH, duties[:5], starts[:5])), TRUTH, 2.0) is None
 
 
 SIZE = 1e-4
@@ -274,17 +246,22 @@ def test_the_change_per_share_of_a_coordinates_range_is_that_of_replays(drives):
         np.testing.assert_allclose(still.columns[..., column], seen, rtol=0, atol=0.1 * np.abs(seen).max())
 
 
-def test_a_model_that_is_right_leaves_nothing(drives):
+def test_a_right_model_leaves_nothing_and_does_not_stray_from_noiseless_drives(drives):
     assert np.abs(slopes_of(drives, TRUTH, learnt_effect(TURNING)).residuals).max() < 1e-9
+    quiet = planted_drives(TRUTH, episodes=2, seconds=20.0, noise=None)
+    assert pose_errors(quiet, TRUTH, cut(quiet, 2.0)).max() < 1e-9
+    assert pose_errors(quiet, {**TRUTH, "trim": 0.1}, cut(quiet, 2.0))[:, 0].max() > 0.01
 
 
-def test_windows_are_thinned_to_a_few_poses_that_reach_their_end(drives):
+def test_windows_are_thinned_and_short_runs_have_none(drives):
     windows = windows_module.choose_windows(drives)
     counts = np.bincount(windows.window)
     assert counts.max() == windows_module.POSES
     lasts = (drives.last[windows.increment] - drives.first[windows.begin][windows.window]) / drives.tick_hz
     assert lasts.max() == windows_module.FITTED_S
     assert np.all(np.diff(lasts)[np.diff(windows.window) == 0] > 0.0)
+    few = planted_drives(TRUTH, episodes=2, seconds=4.0)
+    assert len(cut(few, 10.0).begin) == 0
 
 
 @pytest.fixture(scope="module")
@@ -326,17 +303,6 @@ def test_no_window_crosses_a_gap_a_block_or_an_episode(rows, horizon_s):
         assert windows_module.SHORTEST * horizon_s <= lasts <= horizon_s + 1e-9
 
 
-def test_runs_shorter_than_most_of_the_horizon_have_no_window():
-    few = planted_drives(TRUTH, episodes=2, seconds=4.0)
-    assert len(cut(few, 10.0).begin) == 0
-
-
-def test_a_model_does_not_stray_from_its_own_noiseless_drives():
-    quiet = planted_drives(TRUTH, episodes=2, seconds=20.0, noise=None)
-    assert pose_errors(quiet, TRUTH, cut(quiet, 2.0)).max() < 1e-9
-    assert pose_errors(quiet, {**TRUTH, "trim": 0.1}, cut(quiet, 2.0))[:, 0].max() > 0.01
-
-
 def test_intervals_cover_the_true_error_about_as_often_as_they_say():
     random = np.random.default_rng(2)
     blocks = np.repeat(np.arange(12), 20)
@@ -348,7 +314,7 @@ def test_intervals_cover_the_true_error_about_as_often_as_they_say():
     assert 170 <= covered <= 199
 
 
-def test_a_ratio_is_surer_than_its_parts_where_both_vary_together():
+def test_ratios_are_shown_by_many_blocks_and_not_by_few():
     random = np.random.default_rng(3)
     blocks = np.repeat(np.arange(10), 30)
     before = random.chisquare(1, 300) * np.repeat(random.uniform(0.2, 3.0, 10), 30)
@@ -357,11 +323,14 @@ def test_a_ratio_is_surer_than_its_parts_where_both_vary_together():
     assert found.interval[0] < 0.5 < found.interval[1]
     assert np.ptp(found.interval) < 0.1 * np.ptp(rmse(before, blocks).interval)
 
-
-def test_a_single_block_says_nothing_of_its_uncertainty():
     found = rmse(np.ones(5), np.zeros(5, dtype=int))
     assert found.value == 1.0
     assert not np.isfinite(found.interval[1])
+
+    squares, blocks = np.arange(1.0, 9.0), np.arange(8)
+    assert not ratio(squares, squares, blocks).above
+    assert not ratio(np.append(squares, 0.0), np.append(squares, 0.0), np.arange(9)).below
+    assert not ratio(np.array([4.0, 9.0, 1.0]), np.array([1.0, 1.0, 0.9]), np.arange(3)).above
 
 
 def test_a_ratio_is_shown_by_many_blocks_on_one_side_though_a_few_weigh_most():
@@ -376,14 +345,7 @@ def test_a_ratio_is_shown_by_many_blocks_on_one_side_though_a_few_weigh_most():
     assert not smaller.above
 
 
-def test_a_ratio_of_few_blocks_or_of_errors_that_are_the_same_shows_nothing():
-    squares, blocks = np.arange(1.0, 9.0), np.arange(8)
-    assert not ratio(squares, squares, blocks).above
-    assert not ratio(np.append(squares, 0.0), np.append(squares, 0.0), np.arange(9)).below
-    assert not ratio(np.array([4.0, 9.0, 1.0]), np.array([1.0, 1.0, 0.9]), np.arange(3)).above
-
-
-def test_windows_of_a_few_episodes_at_a_time_have_the_same_errors_to_the_bit(long, monkeypatch):
+def test_errors_are_the_same_however_few_episodes_are_replayed_at_a_time(long, monkeypatch):
     theta = {**TRUTH, "dead_band.width": 0.1, "floor_slope.y": 0.02, "motor_lag.time_constant": 0.3}
     gone = long.only((long.episode != 3) & (np.arange(len(long.episode)) != 150))
     windows = cut(gone, 2.0)
@@ -392,8 +354,6 @@ def test_windows_of_a_few_episodes_at_a_time_have_the_same_errors_to_the_bit(lon
     monkeypatch.setattr(windows_module, "AT_ONCE", gone.duties.shape[1])
     assert np.array_equal(pose_errors(gone, theta, every_other), whole)
 
-
-def test_no_more_episodes_are_replayed_at_a_time_than_memory_is_to_take(long, monkeypatch):
     sizes, replay = [], windows_module.window_paths
     monkeypatch.setattr(
         windows_module, "window_paths", lambda some, *rest: sizes.append(len(some.duties)) or replay(some, *rest)

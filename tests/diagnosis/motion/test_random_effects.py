@@ -38,19 +38,18 @@ def late():
     return weighed({"delay_jitter": 0.15})
 
 
-def test_lost_commands_are_found_with_their_probability(lost):
+def test_lost_and_late_commands_are_found_with_their_sizes(lost, late):
     found = lost["dropped_commands"]
     assert found.gain > 30.0
     assert found.p_value <= 0.01
     assert found.gain > lost["delay_jitter"].gain
     assert 0.1 < found.value < 0.5
-
-
-def test_jittering_commands_are_found_with_their_spread(late):
     found = late["delay_jitter"]
     assert found.gain > 15.0
     assert found.p_value <= 0.01
     assert 0.07 < found.value < 0.3
+    assert lost["dropped_commands"].left < 1.5
+    assert late["delay_jitter"].left < 1.5
 
 
 @pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.slow)])
@@ -63,13 +62,10 @@ def answers(base):
     return responses(base, np.random.default_rng(1).standard_normal((len(base.innovations), 1)))
 
 
-def test_a_model_that_explains_everything_is_pulled_nowhere():
+def test_commands_that_never_change_or_a_model_that_explains_all_show_no_random_effect():
     base = fitted(planted_drives(TRUTH, episodes=2, seconds=10.0, noise=None))
     found = answers(base)
     assert np.median(np.abs(found.gradient) / found.size) < 0.1
-
-
-def test_a_robot_whose_command_never_changes_has_no_responses():
     drives = planted_drives(TRUTH, episodes=2, seconds=10.0)
     still = replace(drives, duties=np.full_like(drives.duties, 0.4), rest=np.full_like(drives.rest, 0.4))
     base = fitted(still)
@@ -140,11 +136,6 @@ def test_the_size_is_that_of_which_drives_say_what_is_measured():
     value, low, high = drawing._invert(sizes, said, float(np.log(0.1)))
     assert value == pytest.approx(0.2)
     assert 0.1 < low < 0.2 < high < 0.4
-
-
-def test_lateness_that_is_all_there_is_leaves_noise_alone(lost, late):
-    assert lost["dropped_commands"].left < 1.5
-    assert late["delay_jitter"].left < 1.5
 
 
 def test_what_pulls_commands_early_as_well_as_late_is_left_over():

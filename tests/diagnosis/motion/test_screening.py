@@ -27,13 +27,10 @@ def forms(effect, theta=TRUTH, taken=()):
     return {form.form: form for form in candidates(ROBOT, theta, taken) if form.effect == effect}
 
 
-def test_motion_can_show_every_effect_but_those_of_the_camera_and_its_pictures():
+def test_every_effect_of_motion_can_be_shown_in_a_form_unless_it_draws():
     unseen = {name for name, kind in CATALOGUE.items() if kind.stage in (Stage.CAMERA, Stage.IMAGE)}
     assert list(MOTION_EFFECTS) == [name for name in CATALOGUE if name not in unseen]
     assert {"camera_pitch", "blur"} <= unseen
-
-
-def test_every_effect_of_motion_that_does_not_draw_has_a_form():
     known = {form.effect for form in candidates(ROBOT, {}, ())}
     assert known == set(MOTION_EFFECTS) - set(RANDOM_EFFECTS)
 
@@ -55,17 +52,11 @@ def test_an_effect_of_wheels_may_be_on_one_of_them_alone(effect):
     assert known[""].label == effect
 
 
-def test_an_effect_of_wheels_that_the_model_has_may_be_uneven():
+def test_wheels_may_be_uneven_alone_or_together():
     known = forms("dead_band", {**TRUTH, "dead_band.width": 0.1, "dead_band.imbalance": 0.0})
     assert set(known) == {"", "uneven wheels"}
     assert known["uneven wheels"].free == (("dead_band.width",), ("dead_band.imbalance",))
-
-
-def test_a_lag_that_every_robot_has_may_be_uneven():
     assert set(forms("motor_lag")) == {"", "uneven wheels"}
-
-
-def test_a_gain_is_of_both_wheels_together_or_of_one():
     known = forms("wheel_gain")
     assert known[""].free == (("wheel_gain.left", "wheel_gain.right"),)
     assert known["left wheel"].free == (("wheel_gain.left",),)
@@ -191,7 +182,7 @@ def test_a_mirror_swaps_left_and_right_and_nothing_else():
         assert twin == pytest.approx(lead.gain, rel=0.03, abs=1.0)
 
 
-def test_what_free_parameters_can_do_is_projected_out():
+def test_free_parameters_are_projected_out_of_stretches_within_episodes():
     random = np.random.default_rng(1)
     slopes, columns, weight = random.random((60, 2)), random.random((60, 3)), random.random(60) > 0.3
     left = project_out(slopes, columns, weight)
@@ -199,8 +190,6 @@ def test_what_free_parameters_can_do_is_projected_out():
     np.testing.assert_allclose(project_out(slopes, slopes @ random.random((2, 1)), weight), 0.0, atol=1e-9)
     assert project_out(np.empty((60, 0)), columns, weight) is columns
 
-
-def test_stretches_last_a_second_and_never_cross_episodes():
     drives = planted_drives(TRUTH, episodes=2, seconds=5.0)
     number = screening.number_stretches(drives)
     assert len(np.unique(number)) == 10

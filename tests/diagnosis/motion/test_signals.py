@@ -28,12 +28,9 @@ def test_hats_sum_to_one_and_are_never_negative(signal, knots):
     assert columns.shape[-1] <= knots
 
 
-def test_hats_reach_from_the_least_value_of_a_signal_to_its_greatest():
+def test_hats_reach_from_least_to_greatest_and_are_one_where_a_signal_stands_still():
     columns = hats(np.linspace(-2.0, 3.0, 101), 6)
     np.testing.assert_allclose(columns[[0, 20, 100]], np.eye(6)[[0, 1, 5]], atol=1e-9)
-
-
-def test_hats_over_a_signal_that_stands_still_are_one_constant():
     np.testing.assert_array_equal(hats(np.full((2, 5), 3.0)), np.ones((2, 5, 1)))
 
 
@@ -51,8 +48,10 @@ def test_every_signal_of_two_wheels_has_motion_on_every_tick(clean):
         assert group.signal.shape == clean.drives.duties.shape[:2]
 
 
-def test_no_curve_gains_much_where_nothing_is_missing(clean):
+def test_no_curve_gains_much_where_nothing_is_missing_and_the_best_comes_first(clean):
     assert fit_curves(clean)[0].gain < RULES.least_gain_nats
+    gains = [curve.gain for curve in fit_curves(clean)]
+    assert gains == sorted(gains, reverse=True)
 
 
 SLOW = {"marks": pytest.mark.slow}
@@ -73,11 +72,6 @@ def test_the_signal_that_the_motion_depends_on_leads(effect, figures, signals):
     assert found[0].group.name in signals
     assert found[0].gain > RULES.least_gain_nats
     assert found[0].weights.shape == (found[0].group.twists.shape[-1],)
-
-
-def test_curves_come_best_first(clean):
-    gains = [curve.gain for curve in fit_curves(clean)]
-    assert gains == sorted(gains, reverse=True)
 
 
 def test_a_wheel_has_turned_as_far_as_it_rolled():

@@ -99,7 +99,7 @@ class MortalCells(Training, Cells):
 
 
 if __name__ == "__main__":
-    from proxytune.teaching import examining
+    from proxytune import learning
 
-    examining.next_examinations = meeting("rule", examining.next_examinations)
+    learning.next_examinations = meeting("rule", learning.next_examinations)
     runpy.run_module("launcher", run_name="__main__")

@@ -69,8 +69,9 @@ def folder(tmp_path_factory, make_studies):
     with (effects / "motion.py").open("a", encoding="utf-8") as motion:
         motion.write(EFFECT)
     text = (effects / "catalogue.py").read_text(encoding="utf-8")
-    assert text.count("FloorSlope,") == 3  # imported, listed for two wheels, and listed for cars
-    (effects / "catalogue.py").write_text(text.replace("FloorSlope,", "WeakReverse, FloorSlope,", 2), encoding="utf-8")
+    slope = "motion.FloorSlope,"
+    assert text.count(slope) == 2  # listed for two wheels, and for cars
+    (effects / "catalogue.py").write_text(text.replace(slope, f"motion.WeakReverse, {slope}", 1), encoding="utf-8")
     (search / "again.py").write_text(ENGINE, encoding="utf-8")
     insert(search / "registry.py", "from proxytune.search.surrogate import", "from proxytune.search.again import AGAIN")
     insert(search / "registry.py", "    SOBOL,\n", "    AGAIN,")

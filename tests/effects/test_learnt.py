@@ -240,10 +240,9 @@ NUMBERS = st.floats(-99.0, 99.0)
 def learnt(draw):
     curves = []
     for group, kind in GROUPS.items():
-        pairs = group in ("speed_and_turn", "place")
         low = kind.low if kind.low is not None else -20.0
         number = st.floats(low, 30.0).filter(bool)
-        knot = st.tuples(NUMBERS, number) if pairs else number
+        knot = st.tuples(NUMBERS if kind.low is None else number, number) if "," in kind.unit else number
         drawn = tuple(sorted(draw(st.sets(knot, max_size=4))))
         knots = next((one.knots for one in curves if (one.group, group) == ("transients", "changes")), drawn)
         channels = draw(st.sets(st.sampled_from(sorted(kind.channels)))) if knots else ()

@@ -17,7 +17,7 @@ class WeakReverse(ShippedEffect):
     """The robot is slower backwards than forwards."""
 
     loss: float = parameter("", 0.0, 0.9, probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8), source="made up")
-    trace: ClassVar[Trace | None] = Trace(
+    trace = Trace(
         cues=(Cue.DIRECTION,), shown=Means(Cue.DIRECTION, (Panel("forward", "forward speed [m/s]", "forward"),))
     )
 

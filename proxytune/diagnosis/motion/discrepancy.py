@@ -266,6 +266,7 @@ def fit_discrepancy(
     # Maps have the most weights by far: where the guard refuses curves with them, they are fitted without.
     if not found.used and _has(found, OF_PLACE):
         found = fitted(OF_PLACE)
+    # The model's own values are weights more: where the guard refuses that, they stay.
     if found.guard and not found.used and moving:
         found = fitted(moves=False)
     # What was learnt and promises nothing to who asks is not tried again.

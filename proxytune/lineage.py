@@ -54,6 +54,7 @@ SAME_CODE = {
         "d1c60aa93bdd77976fa65112071f591f3da28059d51ac2212d6e214e993ff820",
         "dc47375fd36dc4589301ccaf4a331ee5a1b35a76593fbed672df4954e55f1a4e",
         "4d7475f410334f3a96d92c4141cf81304858b531b86b58dc8a6ed921757c397a",
+        "c7f99e82aa0f59dc2ba40846c46547b51815fc2a445ca38e20cf05ceb776ff4a",
     ),
     "environments": (
         "f5b9c2c9586c29cd4dc2d6e27f44fd2731ecc2d27bf96a80c745aecd5a3ddb50",
@@ -65,6 +66,7 @@ SAME_CODE = {
         "3347db8c725fed99a9dab5513285b83255ba9d0d595e4b395fe48d69a8408fc7",
         "c5523b5296a6a48b0e23a40895df9c52c004cedb3bdc378686ace873eaa8c948",
         "54a8fd61c63643c8c438e427102c873b84f56fd1f0b4888e779d7e150bb5f8dc",
+        "7018647b4590bd6de0ad919cafea716c33f6dd361c083b4182f8dcae19b3acc4",
     ),
     "engine outcomes": ("94c0ba12f9bf", *ON_OUTPUTS),
     "engine composite": ("82865583b592", *ON_OUTPUTS),

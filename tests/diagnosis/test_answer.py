@@ -46,7 +46,7 @@ def test_before_is_the_declared_model_where_blocks_enough_have_a_window(drives):
 
 
 @pytest.mark.parametrize("how", [{"dropped": [DroppedEffect(SCRUB, Variant(SCRUBBED, DECLARED))]},
-                                 {"learnt": {"yaw_scrub": 0.13}}])  # fmt: skip
+                                 {"learnt": SCRUBBED}])  # fmt: skip
 def test_what_a_dropped_effect_or_learnt_curves_reached_lowers_the_floor(drives, how):
     plain, lower = error(drives), error(drives, **how)
     assert plain.floor.reached == plain.after.value == lower.after.value

@@ -5,7 +5,7 @@ weights of the groups that pay. Nothing is replayed here: leaving a part out is 
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -75,7 +75,7 @@ def choose_groups(given: Sums, groups: Mapping[str, slice], rules: Rules, *, rar
         return bool((sure or much) and after.sum() < (1.0 - rules.group_share) * before.sum())
 
     always = {LEVEL: FREE * unit.get(LEVEL, 0.0), MODEL: MODEL_PULL * mean[groups.get(MODEL, slice(0))]}
-    pulls: dict[str, Any] = {name: pull + 1e-9 for name, pull in always.items() if name in groups}
+    pulls: dict[str, float | Floats] = {name: pull + 1e-9 for name, pull in always.items() if name in groups}
     gains: dict[str, float] = {}
     held = _hold(given, groups, pulls)
     (losses,) = _held_out_losses(given, held, slice(0), np.zeros(1))
@@ -105,7 +105,7 @@ class _Held(NamedTuple):
     answer: Floats
 
 
-def _hold(given: Sums, groups: Mapping[str, slice], pulls: Mapping[str, Any]) -> _Held:
+def _hold(given: Sums, groups: Mapping[str, slice], pulls: Mapping[str, float | Floats]) -> _Held:
     """Hold the groups that have a pull, or one for each column: they are solved for once, for all that may come."""
     pulled = np.zeros(given.gradient.shape[1])
     for name, pull in pulls.items():

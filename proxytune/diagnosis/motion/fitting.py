@@ -29,6 +29,7 @@ from proxytune.diagnosis.motion.innovations import (
     huber,
     increments,
     is_stepwise,
+    nudged,
     smooth_coordinates,
     span,
     spans,
@@ -154,9 +155,7 @@ def slopes(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], whiten: W
         if is_stepwise(coordinate, drives.robot):
             columns.append(np.zeros_like(here))
             continue
-        low, high = span(coordinate, drives)
-        step = STEP if theta[coordinate[0]] + STEP * (high - low) <= high else -STEP
-        there = theta_at(theta, (coordinate,), np.array([theta[coordinate[0]] + step * (high - low)]))
+        there, step = nudged(drives, theta, coordinate, STEP)
         columns.append((here - increments(drives, there)) / step)
     return whiten.whiten(np.stack(columns, axis=-1))
 

@@ -506,6 +506,13 @@ def theta_at(theta: Theta, free: Sequence[Coordinate], values: Floats) -> dict[s
     return {**theta, **given}
 
 
+def nudged(drives: Drives, theta: Theta, coordinate: Coordinate, share: float) -> tuple[dict[str, float], float]:
+    """θ with a coordinate moved by a share of its range, and that share: downwards where the range ends."""
+    here, (low, high) = theta[coordinate[0]], span(coordinate, drives)
+    step = share if here + share * (high - low) <= high else -share
+    return theta_at(theta, (coordinate,), np.array([here + step * (high - low)])), step
+
+
 def at_edge(name: str, value: float, drives: Drives) -> bool:
     """Tell whether a value lies at an end of its parameter's range that is not neutral."""
     low, high = span((name,), drives)

@@ -32,8 +32,7 @@ from proxytune.diagnosis.motion.innovations import (
     Coordinate,
     LearntMotion,
     integrate_twists,
-    spans,
-    theta_at,
+    nudged,
     tracked_paths,
     window_command_features,
     window_features,
@@ -384,12 +383,7 @@ def choose_windows(drives: Drives) -> Windows:
     return Windows(windows.begin, windows.window[last], windows.increment[last])
 
 
-def slopes_of(
-    drives: Drives,
-    theta: Theta,
-    offered: Learnt,
-    free: Sequence[Coordinate] = (),
-) -> Slopes:
+def slopes_of(drives: Drives, theta: Theta, offered: Learnt, free: Sequence[Coordinate] = ()) -> Slopes:
     """Linearise windows in the weights of the curves offered, around a model that may have a learnt effect itself.
 
     Columns of free coordinates come last, by the share of their range.
@@ -418,11 +412,9 @@ def slopes_of(
     x = cosine * changes[:, 0] - sine * changes[:, 1]
     y = sine * changes[:, 0] + cosine * changes[:, 1]
     columns, scale = [np.stack((x, y, way * changes[:, 2]), axis=1)], (1.0, 1.0, way)
-    for coordinate, low, high in zip(free, *spans(free, drives), strict=True):
-        here = theta[coordinate[0]]
-        step = STEP * (high - low) if here + STEP * (high - low) <= high else -STEP * (high - low)
-        moved = walk(theta_at(theta, (coordinate,), np.array([here + step])))[2]
-        columns.append(((moved - predicted) * scale * ((high - low) / step))[..., None])
+    for coordinate in free:
+        there, step = nudged(drives, theta, coordinate, STEP)
+        columns.append(((walk(there)[2] - predicted) * scale / step)[..., None])
     return Slopes((measured - predicted) * scale, np.concatenate(columns, axis=2), drives.block[begin[window]])
 
 

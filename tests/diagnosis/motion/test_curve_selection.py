@@ -95,22 +95,14 @@ def test_no_rare_moment_is_chosen_of_noise(seed):
     assert not choose_groups(summed(slopes(np.zeros(15), seed=seed)), COLUMNS, RULES, rare=True).gains
 
 
-def test_the_models_own_values_move_along_and_are_no_group():
-    groups = {"model": COLUMNS["one"], "other": COLUMNS["other"]}
+@pytest.mark.parametrize(("always", "alone"), [("level", ["level"]), ("model", [])])
+def test_the_level_and_the_model_are_always_there_and_the_level_is_a_gain_where_no_group_is(always, alone):
+    groups = {always: COLUMNS["one"], "other": COLUMNS["other"]}
     truth = WEIGHTS + np.concatenate(((0.6, -0.4, 0.5), np.zeros(12)))
     chosen = choose_groups(summed(slopes(truth)), groups, RULES)
     assert list(chosen.gains) == ["other"]
     np.testing.assert_allclose(chosen.weights[:7], truth[:7], atol=0.02)
-    assert not choose_groups(summed(slopes(truth - WEIGHTS)), groups, RULES).gains
-
-
-def test_the_level_is_always_there_and_a_gain_only_where_no_group_is():
-    groups = {"level": COLUMNS["one"], "other": COLUMNS["other"]}
-    truth = WEIGHTS + np.concatenate(((0.6, -0.4, 0.5), np.zeros(12)))
-    chosen = choose_groups(summed(slopes(truth)), groups, RULES)
-    assert list(chosen.gains) == ["other"]
-    np.testing.assert_allclose(chosen.weights[:7], truth[:7], atol=0.02)
-    alone = choose_groups(summed(slopes(truth - WEIGHTS)), groups, RULES)
-    assert list(alone.gains) == ["level"]
-    np.testing.assert_allclose(alone.weights[:7], (truth - WEIGHTS)[:7], atol=0.02)
+    left = choose_groups(summed(slopes(truth - WEIGHTS)), groups, RULES)
+    assert list(left.gains) == alone
+    np.testing.assert_allclose(left.weights[:7], (truth - WEIGHTS)[:7], atol=0.02)
     assert not choose_groups(summed(slopes(np.zeros(15))), groups, RULES).gains

@@ -37,6 +37,10 @@ class Sums(NamedTuple):
         """Some of the parts."""
         return Sums([self.hessian[number] for number in chosen], self.gradient[chosen], self.size[chosen])
 
+    def of(self, columns: Whole) -> "Sums":
+        """Some of the columns."""
+        return Sums([one[np.ix_(columns, columns)] for one in self.hessian], self.gradient[:, columns], self.size)
+
 
 class ChosenGroups(NamedTuple):
     """The weights of all columns, 0 where a group was not chosen, and the squared error that each group took away."""

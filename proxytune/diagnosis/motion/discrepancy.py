@@ -19,7 +19,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from proxytune.diagnosis.answer import Rules
-from proxytune.diagnosis.motion.curve_selection import MODEL, ChosenGroups, choose_groups, sum_squares
+from proxytune.diagnosis.motion.curve_selection import MODEL, ChosenGroups, Sums, choose_groups, sum_squares
 from proxytune.diagnosis.motion.drives import Drives, Floats
 from proxytune.diagnosis.motion.evidence import Findings
 from proxytune.diagnosis.motion.innovations import Coordinate, smooth_coordinates, spans, theta_at, twists_of
@@ -231,15 +231,61 @@ class Discrepancy:
     held_out: Floats = field(default_factory=lambda: np.empty(0))
 
 
+class _Task(NamedTuple):
+    """What curves are fitted to, and what they begin with.
+
+    Attributes:
+        drives: The drives.
+        theta: The model that they are added to.
+        offer: All curves.
+        moving: The model's own values that move along.
+        windows: All windows of FITTED_S.
+        before: Squared distance at their poses without curves (M,) [m²].
+        rival: The same of what curves have to better clearly to be of use, or None.
+        given: Squares by part of the first linearisation.
+        errors: Its errors (M, 3) [m].
+    """
+
+    drives: Drives
+    theta: Theta
+    offer: Learnt
+    moving: Sequence[Coordinate]
+    windows: Windows
+    before: Floats
+    rival: Floats | None
+    given: Sums
+    errors: Floats
+
+    @property
+    def aim(self) -> float:
+        """The error that would do [m]."""
+        return np.inf if self.rival is None else self.drives.rules.doubtful_names * float(np.sqrt(self.rival.mean()))
+
+    def does_better(self, squares: Floats) -> bool:
+        """Tell whether held-out squares are clearly less than the rival's."""
+        if self.rival is None:
+            return True
+        rules, blocks = self.drives.rules, blocks_of(self.drives, self.windows)
+        compared = ratio(squares, self.rival, blocks, rules.ratio_p_value)
+        return compared.value < rules.doubtful_names and compared.below
+
+    def without(self, left_out: Iterable[str], *, moves: bool) -> "_Task":
+        """The same without the curves of some groups, and the model's own values as they are unless these move."""
+        kept = [name not in left_out and (moves or name != MODEL) for name in _column_groups(self.offer, self.moving)]
+        curves = tuple(curve for curve in self.offer.curves if curve.group not in left_out)
+        return self._replace(
+            offer=replace(self.offer, curves=curves),
+            moving=self.moving if moves else (),
+            given=self.given.of(np.flatnonzero(kept)),
+        )
+
+
 def fit_discrepancy(
-    drives: Drives,
-    theta: Theta,
-    free: Sequence[Coordinate] = (),
-    promises: Callable[[Floats], bool] = lambda _: True,
+    drives: Drives, theta: Theta, free: Sequence[Coordinate] = (), rival: Floats | None = None
 ) -> Discrepancy:
     """Fit the discrepancy of a model over windows, and say whether that helps; its free coordinates move along.
 
-    Curves whose held-out squares (M,) promise nothing to who asks are not guarded and not used.
+    Curves that are not clearly better than a rival, by its held-out squares (M,), are neither guarded nor used.
     """
     windows = cut(drives, FITTED_S)
     blocks = len(np.unique(drives.block[windows.begin]))
@@ -247,36 +293,23 @@ def fit_discrepancy(
     if blocks < drives.rules.discrepancy_blocks:
         return Discrepancy(held_out=before)
     offer, moving = offer_curves(drives, theta), smooth_coordinates(free, drives.robot)
-
-    def fitted(left_out: Iterable[str] = (), *, moves: bool = True, patient: bool = False) -> Discrepancy:
-        curves = tuple(curve for curve in offer.curves if curve.group not in left_out)
-        own = moving if moves else ()
-        learnt, gains, folds = _fit_curves(drives, theta, replace(offer, curves=curves), own, patient)
-        if not gains:
-            return Discrepancy(held_out=before)
-        after = _cross_validate(drives, theta, folds, windows)
-        if not promises(after):
-            return Discrepancy(held_out=after)
-        guard = _guard(drives, theta, folds, {FITTED_S: (before, after)})
-        total = sum(gains.values())
-        share = {GROUPS[group].title: gain / total for group, gain in gains.items()}
-        return Discrepancy(learnt, share, guard, _helps(guard, drives.rules), after)
-
-    found = fitted()
+    task = _Task(drives, theta, offer, moving, windows, before, rival, *_linearise(drives, theta, offer, moving))
+    found = _fitted(task)
     # Maps have the most weights by far: where the guard refuses curves with them, they are fitted without.
     if not found.used and _has(found, OF_PLACE):
-        found = fitted(OF_PLACE)
+        found = _fitted(task, OF_PLACE)
     # The model's own values are weights more: where the guard refuses that, they stay.
     if found.guard and not found.used and moving:
-        found = fitted(moves=False)
-    # What was learnt and promises nothing to who asks is not tried again.
+        found = _fitted(task, moves=False)
+    # What was learnt and does not better its rival is not tried again.
     if (found.guard and not found.used) or found.held_out is before:
-        found = fitted(patient=True)
+        found = _fitted(task, patient=True)
     # Curves over motion were linearised without those over commands, and may get in each other's way.
     if _has(found, COMMAND_GROUPS):
-        alone, of = fitted(COMMAND_GROUPS), blocks_of(drives, windows)
-        surely = found.used and ratio(found.held_out, alone.held_out, of, drives.rules.ratio_p_value).below
-        if alone.used and not surely:
+        alone, of = _fitted(task, COMMAND_GROUPS), blocks_of(drives, windows)
+        if alone.used and not (
+            found.used and ratio(found.held_out, alone.held_out, of, drives.rules.ratio_p_value).below
+        ):
             found = alone
     return found
 
@@ -285,41 +318,74 @@ def _has(found: Discrepancy, groups: Iterable[str]) -> bool:
     return not {GROUPS[group].title for group in groups}.isdisjoint(found.share)
 
 
-def _fit_curves(
-    drives: Drives, theta: Theta, offer: Learnt, moving: Sequence[Coordinate], patient: bool
-) -> tuple[Theta, Mapping[str, float], Sequence[Theta]]:
+def _fitted(whole: _Task, left_out: Iterable[str] = (), *, moves: bool = True, patient: bool = False) -> Discrepancy:
+    task = whole.without(left_out, moves=moves)
+    learnt, gains, folds = _fit_curves(task, patient)
+    if not gains:
+        return Discrepancy(held_out=task.before)
+    if not folds:
+        return Discrepancy()
+    after = _cross_validate(task.drives, task.theta, folds, task.windows)
+    if not task.does_better(after):
+        return Discrepancy(held_out=after)
+    guard = _guard(task.drives, task.theta, folds, {FITTED_S: (task.before, after)})
+    total = sum(gains.values())
+    share = {GROUPS[group].title: gain / total for group, gain in gains.items()}
+    return Discrepancy(learnt, share, guard, _helps(guard, task.drives.rules), after)
+
+
+def _column_groups(offer: Learnt, moving: Sequence[Coordinate]) -> list[str]:
+    """The group of each column of a linearisation."""
+    return [curve.group for curve in offer.curves for _ in curve.knots] + [MODEL] * len(moving)
+
+
+def _linearise(
+    drives: Drives, theta: Theta, offer: Learnt, moving: Sequence[Coordinate], weights: Floats | float = 0.0
+) -> tuple[Sums, Floats]:
+    """Squares by part, linearised round a model that has these weights already, and its errors (M, 3) [m]."""
+    slopes, parts = slopes_of(drives, theta, offer, moving), _parts(drives)
+    known = np.broadcast_to(weights, slopes.columns.shape[2:])
+    return sum_squares(slopes, known, slopes.block % parts, parts), slopes.residuals
+
+
+def _fit_curves(task: _Task, patient: bool) -> tuple[Theta, Mapping[str, float], Sequence[Theta]]:
     """Fit the curves to all parts, with what each group gained, and without each fold in turn; by names in θ.
 
-    The moving coordinates of the model are fitted along. A patient fit looks for what matters in few parts.
+    The moving coordinates of the model are fitted along. A patient fit looks for what matters in few parts. There are
+    no folds where errors do not come near what would do.
     """
-    parts = _parts(drives)
-    names = [curve.group for curve in offer.curves for _ in curve.knots] + [MODEL] * len(moving)
+    drives, offer, moving, rules = task.drives, task.offer, task.moving, task.drives.rules
+    names = _column_groups(offer, moving)
     groups = {name: slice(names.index(name), names.index(name) + names.count(name)) for name in dict.fromkeys(names)}
-    weights, own, (low, high) = np.zeros(len(names)), groups.get(MODEL, slice(0)), spans(moving, drives)
-    now, left = dict[str, float](), list[float]()
+    own, (low, high) = groups.get(MODEL, slice(0)), spans(moving, drives)
+    given, errors = task.given, task.errors
+    now, left, apart = dict[str, float](), list[float](), list[float]()
 
     def stepped(chosen: ChosenGroups) -> dict[str, float]:
         """The chosen curves, and the moving coordinates a step further."""
         if not chosen.gains:
             return {}
-        here = np.array([{**theta, **now}[coordinate[0]] for coordinate in moving])
+        here = np.array([{**task.theta, **now}[coordinate[0]] for coordinate in moving])
         step = np.clip(chosen.weights[own], -FARTHEST, FARTHEST) * (high - low)
         return {**theta_at({}, moving, np.clip(here + step, low, high)), **_theta(offer, chosen)}
 
-    for number in range(ROUNDS):
-        slopes = slopes_of(drives, {**theta, **now}, offer, moving)
-        weights[own] = 0.0
-        given = sum_squares(slopes, weights, slopes.block % parts, parts)
-        chosen = choose_groups(given, groups, drives.rules, rare=patient)
+    while True:
+        chosen = choose_groups(given, groups, rules, rare=patient)
         if not chosen.gains:
             return {}, {}, ()
-        left.append(float(np.linalg.norm(slopes.residuals, axis=1).mean()))
-        if number == ROUNDS - 1 or min(left[-2:]) > SETTLED * min(left[:-2], default=np.inf):
+        left.append(float(np.linalg.norm(errors, axis=1).mean()))
+        apart.append(float(np.sqrt((errors[:, :2] ** 2).sum(axis=1).mean())))
+        # At the pace of the last step another would not do.
+        if len(left) > 2 and apart[-1] - task.aim > apart[-2] - apart[-1]:
+            return {}, chosen.gains, ()
+        if len(left) == ROUNDS or min(left[-2:]) > SETTLED * min(left[:-2], default=np.inf):
             break
-        weights, now = chosen.weights, stepped(chosen)
-    fold = np.arange(parts) % FOLDS
+        now = stepped(chosen)
+        chosen.weights[own] = 0.0
+        given, errors = _linearise(drives, {**task.theta, **now}, offer, moving, chosen.weights)
+    fold = np.arange(_parts(drives)) % FOLDS
     without = [given.only(np.flatnonzero(fold != one)) for one in range(FOLDS)]
-    folds = [stepped(choose_groups(some, groups, drives.rules, rare=patient)) for some in without]
+    folds = [stepped(choose_groups(some, groups, rules, rare=patient)) for some in without]
     return stepped(chosen), chosen.gains, folds
 
 
@@ -502,12 +568,5 @@ def _beside_declared(found: Findings, beside: Discrepancy) -> Discrepancy | None
     """Curves beside what is declared alone, if there are names and these predict clearly better without them."""
     if not found.adopted or not len(beside.held_out):
         return None
-    drives = found.model.drives
-    blocks = blocks_of(drives, cut(drives, FITTED_S))
-
-    def does_better(alone: Floats) -> bool:
-        compared = ratio(alone, beside.held_out, blocks, drives.rules.ratio_p_value)
-        return compared.value < drives.rules.doubtful_names and compared.below
-
-    alone = fit_discrepancy(drives, found.declared.theta, found.declared.free, does_better)
+    alone = fit_discrepancy(found.model.drives, found.declared.theta, found.declared.free, beside.held_out)
     return alone if alone.used else None

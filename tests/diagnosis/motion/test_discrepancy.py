@@ -12,7 +12,7 @@ from manoeuvres import make_drives
 from planted import TRUTH, driven_log, drives_of, planted_drives, planted_log, with_poses
 
 from proxytune.diagnosis import RULES, AdoptedEffect, Findings, Learning, Ratio, cut, pose_errors
-from proxytune.diagnosis.motion import discrepancy
+from proxytune.diagnosis.motion import discrepancy, prediction
 from proxytune.diagnosis.motion.discrepancy import Discrepancy, fit_discrepancy, match_named_effect
 from proxytune.diagnosis.motion.fitting import evaluate
 from proxytune.diagnosis.motion.innovations import FIRST_GUESS, twists_of
@@ -103,13 +103,26 @@ def test_the_guard_tells_of_blocks_that_were_not_fitted_and_wants_a_sure_gain(fo
 
 
 @pytest.mark.slow
-def test_curves_that_promise_nothing_to_who_asks_are_not_used(found):
+def test_curves_that_do_not_clearly_better_a_rival_are_not_used(found):
     drives, learnt = found
-    asked = []
-    refused = fit_discrepancy(drives, TRUTH, (), lambda held_out: asked.append(held_out))
+    refused = fit_discrepancy(drives, TRUTH, (), learnt.held_out)
     assert (refused.used, dict(refused.guard), dict(refused.theta)) == (False, {}, {})
-    np.testing.assert_array_equal(asked, [learnt.held_out])
-    np.testing.assert_array_equal(refused.held_out, learnt.held_out)
+    beaten = fit_discrepancy(drives, TRUTH, (), 1.5 * learnt.held_out)
+    assert (beaten.used, beaten.theta) == (True, learnt.theta)
+
+
+@pytest.mark.slow
+def test_curves_that_come_nowhere_near_a_rival_are_given_up_after_three_linearisations(found, monkeypatch):
+    drives, learnt = found
+    linearised = []
+
+    def slopes_of(*given):
+        linearised.append(prediction.slopes_of(*given))
+        return linearised[-1]
+
+    monkeypatch.setattr(discrepancy, "slopes_of", slopes_of)
+    given_up = fit_discrepancy(drives, TRUTH, (), 1e-4 * learnt.held_out)
+    assert (given_up.used, len(given_up.held_out), len(linearised)) == (False, 0, 3)
 
 
 @pytest.mark.parametrize("seed", [1, 2])
@@ -253,8 +266,8 @@ def test_what_a_tracker_does_to_places_and_headings_is_learnt_as_its_own(tracked
 
 @pytest.mark.parametrize(("alone", "chosen"), [(1.0, "turn rate"), (2.0, "time since a command changed")])
 def test_curves_over_commands_are_left_out_where_motion_alone_predicts_as_well(drives, monkeypatch, alone, chosen):
-    def fit_curves(drives, theta, offer, commanded, patient):
-        group = "held" if any(curve.group == "held" for curve in offer.curves) else "turn_rate"
+    def fit_curves(task, patient):
+        group = "held" if any(curve.group == "held" for curve in task.offer.curves) else "turn_rate"
         return {group: 1.0}, {group: 1.0}, [{group: 1.0}]
 
     def cross_validate(drives, theta, folds, windows):

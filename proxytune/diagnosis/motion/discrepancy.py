@@ -4,7 +4,8 @@
 
 with e the errors of poses over windows, linearised in the weights w of curves φ; the model's own values move along,
 since a curve can add latency but not take away what was fitted without it. `offer_curves` lays knots where the
-drives have been; `curve_selection.choose_groups` adds groups of curves by forward selection with a ridge Λ of one
+drives have been; over sizes, times and places weights are a Gaussian process, so that knots may be as near as a jump or
+the edge of a puddle asks. `curve_selection.choose_groups` adds groups of curves by forward selection with a ridge Λ of one
 scale a group, on parts that are left out; `fit_discrepancy` guards the whole by held-out windows (after Kennedy and
 O'Hagan's model discrepancy). `match_named_effect` reads what was learnt back into a name, and `learn` tells what the
 curves are worth on drives that were not fitted, and whether the names do worse than curves alone.
@@ -56,7 +57,7 @@ from proxytune.space import Theta
 
 RARE = 0.002
 """The range that was seen leaves out so much of the time at either end."""
-WHEEL_KNOTS, TURN_KNOTS, USE_KNOTS = 9, 8, 6
+WHEEL_KNOTS, TURN_KNOTS, USE_KNOTS = 9, 8, 24
 GRID = (4, 6)
 """Knots of a curve over a wheel's speed, over the yaw rate, over use, and over speed and yaw rate together."""
 TIME_STEP_S, TIME_KNOTS = 2.0, 40
@@ -64,7 +65,7 @@ TIME_STEP_S, TIME_KNOTS = 2.0, 40
 OTHER_KNOTS = 5
 """Knots of a curve over the other wheel's speed."""
 MESHES_M = (0.25, 0.5, 1.0, 2.0)
-MOST_CORNERS, MOST_ON_AXIS, MOST_OF_TRACKER = 64, 16, 40
+MOST_CORNERS, MOST_ON_AXIS, MOST_OF_TRACKER = 100, 16, 40
 """Meshes of the lattices of a map of the floor, of curves over x or y, and of a tracker's map; their most corners."""
 SAME_PLACE_M = 1e-3
 """Drives that begin in motion so near to each other did not begin at one place: their frames begin there."""
@@ -88,6 +89,8 @@ ENDED_S = (0.1, 0.25, 0.63, 1.6)
 RAMPS_S = (0.0, 0.1, 0.18, 0.32, 0.56, 1.0, 1.8)
 """Of commands: how long they are held, since they began or turned round, half widths of plays, time constants, and how
 long growing from 0 to 1 and shrinking back takes."""
+CORRELATED = {"duty": 0.3, "drawn": 0.3, "time": 0.3, "use": 0.3, PLACE: 0.5}
+"""Weights of these groups are correlated: over such a share of the knots' range it falls to 1/e."""
 APART = 0.02
 """Knots nearer to each other or to 0 than this share of the range are one."""
 
@@ -119,7 +122,7 @@ def offer_curves(drives: Drives, theta: Theta) -> Learnt:
         "reversal": REVERSALS_M,
         "direction": (-1.0,) if float((forward < -0.01 * drives.robot.figures["full_speed"]).mean()) > RARE else (),
         "time": _steps(seconds, min(TIME_KNOTS, int(seconds / TIME_STEP_S))),
-        "use": _steps(float(effort.mean()) * seconds / 60.0, USE_KNOTS),
+        "use": _steps(float(np.bincount(np.nonzero(used)[0], effort).max()) / 60.0 / drives.tick_hz, USE_KNOTS),
         "load": LOADS_S,
         "heading": (1.0, 2.0),
     }
@@ -344,6 +347,9 @@ def _linearise(
 ) -> tuple[Sums, Floats]:
     """Squares by part, linearised round a model that has these weights already, and its errors (M, 3) [m]."""
     slopes, parts = slopes_of(drives, theta, offer, moving), _parts(drives)
+    for curve, columns in zip(offer.curves, _by_curve(offer, slopes.columns), strict=True):
+        if curve.group in CORRELATED:
+            columns[:] = columns @ _prior_root(curve)
     known = np.broadcast_to(weights, slopes.columns.shape[2:])
     return sum_squares(slopes, known, slopes.block % parts, parts), slopes.residuals
 
@@ -389,13 +395,26 @@ def _fit_curves(task: _Task, patient: bool) -> tuple[Theta, Mapping[str, float],
     return stepped(chosen), chosen.gains, folds
 
 
+def _by_curve(offer: Learnt, columns: Floats) -> list[Floats]:
+    """Views of the columns (…, weights) of each curve."""
+    return np.split(columns, np.cumsum([len(curve.knots) for curve in offer.curves]), axis=-1)[:-1]
+
+
+def _prior_root(curve: LearntCurve) -> Floats:
+    """Root of the prior covariance of a curve's weights (knots, knots), an Ornstein-Uhlenbeck process; else of 1."""
+    share, knots = CORRELATED.get(curve.group, 0.0), np.reshape(curve.knots, (len(curve.knots), -1))
+    length = share * float(np.ptp(knots, axis=0).max())
+    if length == 0.0:
+        return np.eye(len(knots))
+    apart = np.linalg.norm(knots[:, None] - knots, axis=-1)
+    return np.asarray(np.linalg.cholesky(np.exp(-apart / length)))
+
+
 def _theta(offer: Learnt, choice: ChosenGroups) -> dict[str, float]:
     """The chosen groups with their weights, by their names in θ."""
-    ends = np.cumsum([len(curve.knots) for curve in offer.curves])
-    parts = zip(offer.curves, np.split(choice.weights, ends)[:-1], strict=True)
     curves = tuple(
-        curve._replace(weights=tuple(weights.tolist()))
-        for curve, weights in parts
+        curve._replace(weights=tuple((_prior_root(curve) @ weights).tolist()))
+        for curve, weights in zip(offer.curves, _by_curve(offer, choice.weights), strict=True)
         if curve.group in choice.gains or curve.group == LEVEL
     )
     return learnt_theta(Learnt(offer.seen, curves))

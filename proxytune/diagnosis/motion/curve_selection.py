@@ -10,14 +10,17 @@ from typing import NamedTuple
 import numpy as np
 
 from proxytune.diagnosis.answer import Rules
+from proxytune.diagnosis.motion.curve_offer import CORRELATED
 from proxytune.diagnosis.motion.drives import Floats, Whole, sum_by
 from proxytune.diagnosis.motion.prediction import Slopes
-from proxytune.effects import LEVEL, PLACE
+from proxytune.effects import LEVEL
 
 RIDGES = (1e-3, 1e-2, 1e-1, 1.0)
 """Pulls towards no curve that are tried, as shares of what an average weight of the group is held by."""
-FIRMEST_ONLY = {"speed_and_turn": 0.1, PLACE: 0.01}
+FIRMEST_ONLY = {"speed_and_turn": 0.1}
 """Curves over two signals are never pulled less than this: most of their knots are seldom visited."""
+CORRELATED_PULL = 0.03
+"""Weights that are correlated hold each other, and are pulled so much less."""
 FREE, MODEL_PULL = 1e-6, 1e-2
 """The level is hardly pulled; the model's own values are, so that the level takes what both could."""
 MODEL = "model"
@@ -69,7 +72,9 @@ def choose_groups(given: Sums, groups: Mapping[str, slice], rules: Rules, *, rar
     A group pays if it surely makes the errors of most parts less; one of rare moments, if it takes much of all error.
     """
     mean, nothing = np.sum([hessian.diagonal() for hessian in given.hessian], axis=0), 1e-12 * given.size.mean()
-    unit = {name: float(mean[own].mean()) for name, own in groups.items()}
+    unit = {
+        name: float(mean[own].mean()) * (CORRELATED_PULL if name in CORRELATED else 1.0) for name, own in groups.items()
+    }
 
     def pays(before: Floats, after: Floats) -> bool:
         # Errors of parts differ by orders of magnitude: each counts by its ratio.

@@ -1,6 +1,6 @@
-"""What may be learnt has its knots where the drives have been.
-What has no name is learnt, and used only where it is shown to help. It is tested on other drives, and says when names
-are in its way; curves that do what a named effect does are read back into its name.
+"""What has no name is learnt, and used only where it is shown to help.
+It is tested on other drives, and says when names are in its way; curves that do what a named effect does are read back
+into its name.
 """
 
 from dataclasses import replace
@@ -8,17 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from learnt_truth import TURNING, VEERING
-from manoeuvres import make_drives
-from planted import TRUTH, driven_log, drives_of, planted_drives, planted_log, with_poses
+from planted import TRUTH, drives_of, planted_drives, planted_log, with_poses
 
 from proxytune.diagnosis import RULES, AdoptedEffect, Findings, Learning, Ratio, cut, pose_errors
 from proxytune.diagnosis.motion import discrepancy, prediction
 from proxytune.diagnosis.motion.discrepancy import Discrepancy, fit_discrepancy, match_named_effect
 from proxytune.diagnosis.motion.fitting import evaluate
-from proxytune.diagnosis.motion.innovations import FIRST_GUESS, twists_of
+from proxytune.diagnosis.motion.innovations import FIRST_GUESS
 from proxytune.diagnosis.motion.screening import candidates
 from proxytune.driving import read_robot
-from proxytune.effects import GROUPS, FittedRange, Learnt, LearntCurve, learnt_effect, learnt_theta
+from proxytune.effects import GROUPS, FittedRange, Learnt, LearntCurve, learnt_theta
 
 RAMP = (0.7, 0.7)
 """Seconds in which a command grows from 0 to 1, and shrinks back."""
@@ -27,26 +26,6 @@ RAMP = (0.7, 0.7)
 @pytest.fixture(scope="module")
 def drives():
     return planted_drives(TRUTH, episodes=3, seconds=20.0, noise=None)
-
-
-def test_groups_are_offered_in_their_order_with_knots_within_what_was_driven(drives):
-    offer = discrepancy.offer_curves(drives, TRUTH)
-    assert {curve.group for curve in offer.curves} == set(GROUPS)
-    assert learnt_effect(learnt_theta(offer)) == offer
-    assert not any(any(curve.weights) for curve in offer.curves)
-
-    offer, asked = discrepancy.offer_curves(drives, TRUTH), twists_of(drives, TRUTH)
-    for bounds, signal in zip(offer.seen, (asked[..., 0], asked[..., 2]), strict=True):
-        assert signal.min() <= bounds[0] < 0.0 < bounds[1] <= 1.01 * signal.max()
-    knots = {curve.group: np.array(curve.knots) for curve in offer.curves}
-    assert offer.seen.yaw[0] <= knots["turn_rate"].min() < 0.0 < knots["turn_rate"].max() <= offer.seen.yaw[1]
-    assert knots["time"].max() <= 20.1
-
-    ahead = replace(drives, duties=np.abs(drives.duties[..., :1]).repeat(2, axis=-1))
-    groups = {curve.group for curve in discrepancy.offer_curves(ahead, {**TRUTH, "trim": 0.0}).curves}
-    assert "direction" not in groups
-    assert "turn_rate" not in groups
-    assert "wheel_speed" in groups
 
 
 @pytest.fixture(scope="module")
@@ -233,19 +212,6 @@ def test_curves_are_named_only_where_they_do_what_an_effect_does():
     drives = planted_drives(TRUTH, episodes=2, seconds=12.0)
     worse = replace(perfect(drives, TRUTH), held_out=np.ones(3))
     assert match_named_effect(drives, TRUTH, worse, TAKEN) is None
-
-
-def test_windows_cut_from_a_drive_each_in_a_frame_of_its_own_get_no_map_of_the_floor():
-    drives, moving = make_drives(1, 4, 200), np.full((4, 2), 0.3)
-    at_one_place = drives_of(driven_log(TRUTH, drives.duties, np.zeros((4, 3)), noise=None))
-    apart = drives_of(driven_log(TRUTH, drives.duties, drives.starts + 0.1 * np.arange(4)[:, None], noise=None))
-
-    def is_mapped(some):
-        return any(curve.group == "place" for curve in discrepancy.offer_curves(some, TRUTH).curves)
-
-    assert is_mapped(at_one_place)
-    assert is_mapped(replace(apart, rest=moving))
-    assert not is_mapped(replace(at_one_place, rest=moving))
 
 
 @pytest.mark.parametrize(

@@ -112,12 +112,9 @@ class Assessment:
         columns, _ = chosen(self.inputs, self.asked.decide_on)
         means = self.inputs.target.means[:, columns].mean(axis=1)
         scale = 1.0 if means.min() >= 0.0 and means.max() <= 1.0 else float(np.ptp(means)) or 1.0
-        made = (
-            np.full(len(means), float(self.asked.rollouts or 0))
-            if self.inputs.target.counts.max() < 2
-            else self.inputs.target.counts
-        )
-        return plan(self.decision, bound=self.asked.bound, made=np.asarray(made, dtype=np.float64), scale=scale)
+        counts, stated = self.inputs.target.counts.astype(np.float64), float(self.asked.rollouts or 0)
+        made = np.full(len(means), stated) if counts.max() < 2 else counts
+        return plan(self.decision, bound=self.asked.bound, made=made, scale=scale)
 
     def table(self) -> "pd.DataFrame":
         """One row per measure and metric: value, and the ends of its 95 % interval."""
@@ -167,7 +164,9 @@ class Assessment:
             lines.append(f"no interval: {self.prpv_interval.reason}")
         if floor.reason:
             lines.append(f"no noise floor: {floor.reason}")
-        lines += [*(rates.note for rates in self.success_rates if rates.note), *_scope(self)]
+        lines += [rates.note for rates in self.success_rates if rates.note]
+        if self.intervals is not None:
+            lines += [ONE_START] if self.inputs.fewest_starts == 1 else [LEFT_OUT] + [PAIRED] * self.inputs.paired
         if random.explains:
             lines.append(f"PRPV is no better than chance: a random ranking scores as low with p = {random.p_value:.2g}")
         if self.at_noise_floor:
@@ -222,15 +221,6 @@ def assess(
         seed=seed,
         asked=asked,
     )
-
-
-def _scope(assessment: Assessment) -> list[str]:
-    """What the intervals leave out, where there are any, and that equal labels were paired."""
-    if assessment.intervals is None:
-        return []
-    if assessment.inputs.fewest_starts == 1:
-        return [ONE_START]
-    return [LEFT_OUT, PAIRED] if assessment.inputs.paired else [LEFT_OUT]
 
 
 @dataclass(frozen=True)

@@ -208,7 +208,9 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
         probability_best=float(best[place]),
         expected_regret=dict(zip(agents, map(float, expected), strict=True)),
         regret_interval={
-            agent: _regret_ends(regret[:, row], best[row], len(agents), most[row]) for row, agent in enumerate(agents)
+            # No regret at all belongs to it unless the agent is very unlikely to be the best.
+            agent: (0.0 if best[row] > BARELY_BEST / len(agents) ** 3 else low, max(high, most[row]))
+            for row, (agent, (low, high)) in enumerate(zip(agents, map(interval, regret.T), strict=True))
         },
         best_probabilities=dict(zip(agents, map(float, best), strict=True)),
         not_told_apart=tuple(agents[row] for row in held if row != place),
@@ -222,12 +224,6 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
         draws=draws,
         counts=tuple(map(float, counts)),
     )
-
-
-def _regret_ends(regret: Floats, best: float, agents: int, most: float) -> Ends:
-    """An agent's 95 % interval: none at all belongs to it unless the agent is very unlikely to be the best."""
-    low, high = interval(regret)
-    return (0.0 if best > BARELY_BEST / agents**3 else low), max(high, most)
 
 
 def _most_regrets(centre: Floats, ends: Floats, rates: Floats) -> Floats:
@@ -249,7 +245,8 @@ def chosen(inputs: Comparison, decide_on: str) -> tuple[list[int], str]:
     """
     names = [metric.name for metric in inputs.metrics]
     alike = len({metric.direction for metric in inputs.metrics}) == 1
-    shares = all(_within_one(side) for side in (inputs.proxy, inputs.target))
+    driven = np.concatenate([side.values[side.driven].ravel() for side in (inputs.proxy, inputs.target)])
+    shares = bool(driven.min() >= 0.0 and driven.max() <= 1.0)
     if decide_on in names:
         return [names.index(decide_on)], decide_on
     if decide_on not in ("", "mean"):
@@ -260,11 +257,6 @@ def chosen(inputs: Comparison, decide_on: str) -> tuple[list[int], str]:
         told = ", ".join(names) if len(names) <= FEW_TASKS else f"{len(names)} metrics"
         return list(range(len(names))), f"mean of {told}"
     return [0], names[0]
-
-
-def _within_one(table: ScoreTable) -> bool:
-    driven = table.values[table.driven]
-    return bool(driven.min() >= 0.0 and driven.max() <= 1.0)
 
 
 def _panel(name: str, agents: Sequence[str], proxy: Floats, target: Floats) -> Panel:

@@ -16,7 +16,7 @@ which overstate noise: then a proxy is not called imperfect for that.
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -177,23 +177,17 @@ def expect(
     weights = ppv(sides[0]).beta
     beta = np.array([weights[metric.name] or 0.0 for metric in metrics])
 
-    def prpv_of(tables: Floats) -> Floats:
-        return prpv_in_blocks(tables, np.broadcast_to(means, tables.shape), metrics)
-
-    def ppv_of(tables: Floats) -> Floats:
-        return ppv_of_means(tables, means, beta)
-
-    most = float(len(means) * (len(means) - 1))
-    counted, deviation = _expected(prpv_of, proxies, draws, perfect, most)
+    most, all_of = float(len(means) * (len(means) - 1)), partial(_expected, proxies, draws, perfect)
+    counted, deviation = all_of(lambda it: prpv_in_blocks(it, np.broadcast_to(means, it.shape), metrics), most)
     level = counted.floor
     unknown = NoiseFloor("none", reason="noise is not known: nothing was driven twice")
     floor = NoiseFloor("same starts", *level) if level else unknown
-    error = _expected(ppv_of, proxies, draws, perfect, np.inf)[0] if beta.any() else None
+    error = all_of(lambda it: ppv_of_means(it, means, beta), np.inf)[0] if beta.any() else None
     return Expectation(counted, error, len(fresh), deviation, floor)
 
 
 def _expected(
-    measure: Callable[[Floats], Floats], proxies: Floats, draws: Sequence[Floats], perfect: Floats | None, most: float
+    proxies: Floats, draws: Sequence[Floats], perfect: Floats | None, measure: Callable[[Floats], Floats], most: float
 ) -> tuple[Expected, float]:
     """A measure of fresh tables (m, agents, metrics), and its standard deviation from one to the next."""
     # Loading scipy.stats takes longer than all else of most commands.

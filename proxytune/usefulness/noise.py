@@ -186,7 +186,8 @@ def success_rates(inputs: Comparison) -> tuple[SuccessRates, ...]:
         known = [np.unique(side.values[side.driven][:, column]) for side in sides]
         if np.array_equal(np.union1d(*known), (0.0, 1.0)):
             proxy, target = (_rates(side, column) for side in sides)
-            ordered = [_ordered_pairs(side.means[:, column], metric) for side in sides]
+            merits = [metric.merits(side.means[:, column]) for side in sides]
+            ordered = [int(stand(own, float(tie[0])).below.sum()) for own, tie in merits]
             found.append(SuccessRates(metric.name, proxy, target, (pairs - ordered[0], pairs - ordered[1]), pairs))
     return tuple(found)
 
@@ -204,11 +205,6 @@ def _rates(table: ScoreTable, column: int) -> dict[str, Rate]:
     return rates
 
 
-def _ordered_pairs(means: Floats, metric: Metric) -> int:
-    merits, tie = metric.merits(means)
-    return int(stand(merits, float(tie[0])).below.sum())
-
-
 MOST_ENUMERATED = 7
 """Agents of which all orders are looked at: 5040."""
 LEVEL = 0.05
@@ -224,7 +220,6 @@ class Chance:
         deviation: Standard deviation over permutations.
         p_value: How probable a PRPV as low as the proxy's is by chance, the proxy's own order counted as one.
         permutations: How many were drawn, or all.
-        inputs: What was compared, with its sample sizes.
         exact: Whether all orders were looked at.
     """
 
@@ -232,7 +227,6 @@ class Chance:
     deviation: float
     p_value: float
     permutations: int
-    inputs: Comparison
     exact: bool = False
 
     @property
@@ -258,4 +252,4 @@ def chance(inputs: Comparison, *, permutations: int = 1000, seed: int = 0) -> Ch
     as_low = (values <= prpv_of_means(in_proxy, on_target, inputs.metrics)).sum()
     # The proxy's own order is one of all, and is counted with those that are drawn.
     p_value = float(as_low / len(orders) if exact else (1 + as_low) / (1 + len(orders)))
-    return Chance(float(values.mean()), float(values.std(ddof=not exact)), p_value, len(orders), inputs, exact)
+    return Chance(float(values.mean()), float(values.std(ddof=not exact)), p_value, len(orders), exact)

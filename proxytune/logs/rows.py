@@ -139,10 +139,21 @@ def read_rows(path: Path, layout: Layout) -> Rows:
     names = tuple(str(label) for label in labels[changes])
     rows = Rows(path, np.concatenate([part.lines for part in parts]), names, changes, {})
     _check_episodes(rows, layout.fewest)
-    _check_numbers(path, parts, layout)
+    for name in parts[0].values:
+        # The first cell of the first column that has any which is no number
+        wrong = next((part.wrong[name] for part in parts if name in part.wrong), None)
+        if wrong:
+            allowed = ", or empty where nothing was measured" if name in layout.may_lack else ""
+            line, text = wrong
+            raise LogError(f"{path}: line {line}, column '{name}': must be a finite number{allowed}, got '{text}'")
     values = {name: np.concatenate([part.values[name] for part in parts]) for name in parts[0].values}
     rows = replace(rows, values=values)
-    _check_times(rows)
+    time = values["time"]
+    stuck = rows.follows & (np.diff(time) <= 0)
+    if stuck.any():
+        row = int(np.argmax(stuck)) + 1
+        late = f"{time[row]:.12g} s does not come after {time[row - 1]:.12g} s"
+        raise rows.error(row, "time", f"{late} of the row before; sort the rows by time")
     return rows
 
 
@@ -216,24 +227,3 @@ def _check_episodes(samples: Rows, fewest: int) -> None:
         single = int(np.argmax(lengths < fewest))
         problem = f"'{samples.names[single]}' has a single row; a drive needs two or more, so leave it out"
         raise samples.error(int(samples.firsts[single]), "episode", problem)
-
-
-def _check_numbers(path: Path, parts: Sequence[_Part], layout: Layout) -> None:
-    """Refuse a cell that is no number, the first of the first column that has any."""
-    for name in parts[0].values:
-        wrong = next((part.wrong[name] for part in parts if name in part.wrong), None)
-        if wrong:
-            allowed = ", or empty where nothing was measured" if name in layout.may_lack else ""
-            line, text = wrong
-            raise LogError(f"{path}: line {line}, column '{name}': must be a finite number{allowed}, got '{text}'")
-
-
-def _check_times(rows: Rows) -> None:
-    time = rows.values["time"]
-    stuck = rows.follows & (np.diff(time) <= 0)
-    if stuck.any():
-        row = int(np.argmax(stuck)) + 1
-        problem = (
-            f"{time[row]:.12g} s does not come after {time[row - 1]:.12g} s of the row before; sort the rows by time"
-        )
-        raise rows.error(row, "time", problem)

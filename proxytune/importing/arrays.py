@@ -151,7 +151,11 @@ def read_arrays(path: Path, wanted: Wanted) -> Source:
     table = as_table(path, arrays, wanted.columns.get("time", ""))
     _check_wanted(table, arrays, wanted)
     table, gym, notes = _gym_duckietown(table, arrays, wanted)
-    columns, kind = _columns(table, gym | dict(wanted.columns), wanted)
+    none = "none" in (wanted.commands, wanted.kind)
+    fields = ("time", "episode", *POSE, *(() if none else ("command_time", *COMMAND_FIELDS)))
+    stated = {field: entry for field, entry in (gym | dict(wanted.columns)).items() if field in fields}
+    columns: Columns = choose_columns(table, stated, fields)
+    columns, kind = (columns, "none") if none else with_commands(columns, wanted.kind, table)
     frames = find_frames(path, arrays, wanted.frames, len(table.cells))
     drives = _drives(table, columns, kind, arrays[frames] if frames else None)
     channels = (*channels_of(table, columns), *_other_channels(table, arrays, frames))
@@ -197,14 +201,6 @@ def _gym_duckietown(table: Table, arrays: Arrays, wanted: Wanted) -> tuple[Table
         "headings stay"
     )
     return table, stated, [note]
-
-
-def _columns(table: Table, stated: Mapping[str, str], wanted: Wanted) -> tuple[Columns, str]:
-    """The columns that are used, and the kind of the commands; "none" where none are wanted."""
-    none = "none" in (wanted.commands, wanted.kind)
-    fields = ("time", "episode", *POSE, *(() if none else ("command_time", *COMMAND_FIELDS)))
-    columns = choose_columns(table, {field: entry for field, entry in stated.items() if field in fields}, fields)
-    return (columns, "none") if none else with_commands(columns, wanted.kind, table)
 
 
 def _drives(table: Table, columns: Columns, kind: str, frames: NDArray[np.uint8] | None) -> list[Drive]:

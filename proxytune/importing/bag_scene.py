@@ -85,23 +85,17 @@ def choose_transform(transforms: dict[str, Transform], where: str) -> str:
     raise LogError(f"{where}: no transform is plainly the robot's pose; {_remedy(transforms)}")
 
 
-def chain_of(transforms: dict[str, Transform], name: str, where: str) -> list[Transform]:
-    """The transforms that lead from a parent down to a child, as in "map>base_link"."""
+def read_chain(transforms: dict[str, Transform], name: str, stamps: str, where: str) -> tuple[Poses, tuple[str, ...]]:
+    """Poses of a child in a parent ("map>base_link"), at the times of the transform between them that comes most often.
+
+    Other moving transforms are interpolated to these times; poses outside of what they cover are left out.
+    """
     parent, _, child = name.partition(">")
     chain = _chain(transforms, parent, child)
     if not chain:
         raise LogError(f"{where}: no transforms lead from '{parent}' to '{child}'; {_remedy(transforms)}")
     if not any(transform.moves for transform in chain):
         raise LogError(f"{where}: {name} never moves; {_remedy(transforms)}")
-    return chain
-
-
-def read_chain(transforms: dict[str, Transform], name: str, stamps: str, where: str) -> tuple[Poses, tuple[str, ...]]:
-    """Poses of a child in a parent ("map>base_link"), at the times of the transform between them that comes most often.
-
-    Other moving transforms are interpolated to these times; poses outside of what they cover are left out.
-    """
-    chain = chain_of(transforms, name, where)
     for transform in chain:
         _check_numbers(transform, where)
     choices = {each.name: choose_times(each.stamps, stamps, each.name) for each in chain if each.moves}
@@ -117,7 +111,6 @@ def read_chain(transforms: dict[str, Transform], name: str, stamps: str, where: 
         place, turn = place + turn.apply(step), turn * rotation
     said = (note for _, notes in choices.values() for note in notes)
     poses = Poses(common, place, *headings_and_tilts(turn.as_quat(), f"{where}: {name}"))
-    parent, _, child = name.partition(">")
     names, left_out = ", ".join(transform.name for transform in chain), len(most) - len(common)
     outside = f"; {left_out} outside of what all of them cover are left out" if left_out else ""
     return poses, (f"Poses of {child} in {parent} are composed of {names}{outside}.", *said)

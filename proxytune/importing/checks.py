@@ -149,7 +149,13 @@ def checked_drive(drive: Drive, where: str, offset_s: float = 0.0) -> tuple[Driv
         kept, more = _order(commands.times, "commands", about, last=True)
         commands = replace(commands, times=commands.times[kept], values=commands.values[kept])
         notes += more
-        _check_overlap(commands.times + offset_s, poses.times, about)
+        first, last = (float(end + offset_s) for end in commands.times[[0, -1]])
+        begin, end = poses.times[0], poses.times[-1]
+        if first >= end or last < begin:
+            raise LogError(
+                f"{about}: commands lie between {first:.3f} and {last:.3f} s, poses between {begin:.3f} and {end:.3f} "
+                "s: two clocks; use --stamps receive, or say how far apart they are by --clock-offset"
+            )
     return replace(drive, poses=poses, commands=commands), [f"drive {drive.name}: {note}" for note in notes]
 
 
@@ -224,15 +230,6 @@ def _check_upright(poses: Poses, about: str) -> None:
         raise LogError(
             f"{about}: z varies by {spans[2]:.2f} m, {'xy'[int(spans[:2].argmin())]} only by {spans[:2].min():.2f} m: "
             "the world is not z-up; export poses with z upwards"
-        )
-
-
-def _check_overlap(commands: Floats, poses: Floats, about: str) -> None:
-    """Refuse commands and poses of different times."""
-    if commands[0] >= poses[-1] or commands[-1] < poses[0]:
-        raise LogError(
-            f"{about}: commands lie between {commands[0]:.3f} and {commands[-1]:.3f} s, poses between {poses[0]:.3f} "
-            f"and {poses[-1]:.3f} s: two clocks; use --stamps receive, or say how far apart they are by --clock-offset"
         )
 
 

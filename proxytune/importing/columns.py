@@ -115,7 +115,12 @@ def contradiction(unit: Unit, values: Floats) -> str:
         return ""
     with np.errstate(over="ignore"):
         if unit.quantity == "time":
-            return _time_contradiction(seen * unit.factor)
+            times = seen * unit.factor
+            steps = np.diff(times)
+            step = np.median(steps[steps > 0]) if (steps > 0).any() else 1.0
+            if step < SHORTEST_STEP_S or step > LONGEST_STEP_S:
+                return f"rows would be {step:.2g} s apart"
+            return "stamps would lie after the year 5000" if np.abs(times).max() > 1e11 else ""
         if unit.quantity == "angle":
             return _angle_contradiction(unit, seen)
         size = np.ptp(seen) if unit.quantity == "length" else np.abs(seen).max()
@@ -125,14 +130,6 @@ def contradiction(unit: Unit, values: Floats) -> str:
     if size * unit.factor > LARGEST.get(unit.quantity, np.inf):
         return f"{size:g} {unit.name} {'from end to end ' if unit.quantity == 'length' else ''}is much for a robot"
     return ""
-
-
-def _time_contradiction(times: Floats) -> str:
-    steps = np.diff(times)
-    step = np.median(steps[steps > 0]) if (steps > 0).any() else 1.0
-    if step < SHORTEST_STEP_S or step > LONGEST_STEP_S:
-        return f"rows would be {step:.2g} s apart"
-    return "stamps would lie after the year 5000" if np.abs(times).max() > 1e11 else ""
 
 
 def _angle_contradiction(unit: Unit, values: Floats) -> str:

@@ -168,7 +168,13 @@ def fill_log(folder: Path, source: Source, facts: Facts, name: str, origin: str)
         if drive.commands is not None:
             names = ("time", *COMMANDS[drive.commands.kind], ENABLED)[: 1 + drive.commands.values.shape[1]]
             commands.append(_named(drive.name, (drive.commands.times, drive.commands.values), names))
-    if commands and _beside(source):
+    # Where every command of a car was written down with a pose, both stand in one table.
+    if commands and all(
+        drive.commands is not None
+        and drive.commands.kind in CAR_COMMANDS
+        and np.array_equal(drive.commands.times, drive.poses.times)
+        for drive in source.drives
+    ):
         issued = (own.drop(columns=["episode", "time"]) for own in commands)
         samples = [pd.concat(both, axis=1) for both in zip(samples, issued, strict=True)]
         commands = []
@@ -180,16 +186,6 @@ def fill_log(folder: Path, source: Source, facts: Facts, name: str, origin: str)
         _write_pictures(folder, pictures)
     text = _description(source, name, facts, origin, with_pictures=bool(pictures))
     (folder / "log.toml").write_text(text, encoding="utf-8")
-
-
-def _beside(source: Source) -> bool:
-    """True where every command of a car was written down with a pose."""
-    return all(
-        drive.commands is not None
-        and drive.commands.kind in CAR_COMMANDS
-        and np.array_equal(drive.commands.times, drive.poses.times)
-        for drive in source.drives
-    )
 
 
 def read_as(folder: Path, shown: Path) -> Log:

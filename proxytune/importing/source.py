@@ -5,7 +5,7 @@ A source has drives with commands, poses and pictures, each at times of their ow
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -117,11 +117,6 @@ class Survey:
     commands: int
     frames: int
     lag_s: float | None
-
-    @property
-    def facts(self) -> dict[str, Any]:
-        """The statements of a JSON document on it."""
-        return asdict(self)
 
 
 @dataclass(frozen=True)

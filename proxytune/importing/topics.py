@@ -242,17 +242,13 @@ def _list(path: Path, bags: dict[str, Path]) -> tuple[tuple[Topic, ...], list[st
             if not bag.defines_types:
                 notes.append(f"{bag_path.name} does not define its types of message: those of ROS 2 Humble were taken.")
     names = sorted({name for topics in listed for name in topics})
-    merged = (_merge([topics[name] for topics in listed if name in topics], len(bags)) for name in names)
+    merged = []
+    for name in names:
+        own = [topics[name] for topics in listed if name in topics]
+        kind = own[0].kind if len({topic.kind for topic in own}) == 1 else "several types"
+        known, lacking = all(topic.known for topic in own), len(bags) - sum(topic.count > 0 for topic in own)
+        merged.append(Topic(name, kind, sum(topic.count for topic in own), known, lacking))
     return pair_topics(tuple(merged)), notes
-
-
-def _merge(topics: list[Topic], bags: int) -> Topic:
-    """A topic of several bags as one."""
-    one = topics[0]
-    lacking = bags - sum(topic.count > 0 for topic in topics)
-    kind = one.kind if len({topic.kind for topic in topics}) == 1 else "several types"
-    known = all(topic.known for topic in topics)
-    return Topic(one.name, kind, sum(topic.count for topic in topics), known, lacking)
 
 
 def _read_drive(name: str, path: Path, choice: Choice, wanted: Wanted) -> tuple[Drive, list[str]]:

@@ -12,7 +12,7 @@ import fnmatch
 import json
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -224,12 +224,6 @@ def counted(value: float, rollouts: str, where: str) -> tuple[int, int]:
     if not math.isclose(done, round(done), abs_tol=0.05 + 0.005 * of):
         raise ScoresError(f"{where}: {value:g} of {of} rollouts is no whole number of successes; check both columns")
     return round(done), of
-
-
-def spread_out(done: Iterable[tuple[int, int]]) -> list[list[str]]:
-    """Rows of rollouts, successes first: as many as there were, a cell for each metric."""
-    columns = [["1"] * successes + ["0"] * (of - successes) for successes, of in done]
-    return [list(row) for row in zip(*columns, strict=True)]
 
 
 def expand(metrics: Sequence[str], header: Sequence[str]) -> list[str]:

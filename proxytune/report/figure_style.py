@@ -120,6 +120,24 @@ ONE_LINE = 0.05
 """Least distance between names of one line, as a share of the panel's height; two lines take more."""
 
 
+class Role(NamedTuple):
+    """Meaning of a dot: its name in a legend, its colour, and that of its face where it is another."""
+
+    name: str
+    colour: str
+    face: str | None = None
+
+
+def draw_ranked(axes: Axes, rows: Sequence[tuple[str, float, Role]], start: float = 0.0) -> None:
+    """Draw names with values as dots, the first on top, each with a thin line to it from where they start."""
+    for place, (_, value, role) in enumerate(rows):
+        axes.plot([start, value], [place, place], "-", color=role.colour, lw=0.9, alpha=0.6)
+        axes.plot([value], [place], "o", color=role.colour, mfc=role.face or role.colour, ms=4, label=role.name)
+    axes.set_yticks(range(len(rows)), [name for name, _, _ in rows])
+    axes.set_ylim(len(rows) - 0.4, -0.6)
+    dress(axes)
+
+
 class LineName(NamedTuple):
     """The name of a line, its colour, and the value at which the line ends."""
 

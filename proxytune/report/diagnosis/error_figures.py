@@ -149,7 +149,10 @@ def residual_over_time(drives: Drives, both: Mapping[str, Strayed]) -> Figure:
 def _lines(axes: Axes, drives: Drives, strayed: Strayed, colour: str) -> list[tuple[Floats, Floats]]:
     """Times and distances: the median after its band is drawn, or those of each episode."""
     times, distance, episode = _in_time(drives, strayed)
-    edges = _edges(times, strayed.horizon_s)
+    # Steps of a window's length, longer where that were too many, shorter where all is within two windows
+    span = float(np.ptp(times))
+    step = max(strayed.horizon_s, span / TIMES) if span > 2.0 * strayed.horizon_s else max(span / SHORT_TIMES, 1e-3)
+    edges = np.arange(times.min() - step / 2.0, times.max() + step, step)
     place = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, len(edges) - 2)
     if np.median(np.bincount(place)) < FEW_WINDOWS:
         return [(times[episode == own], distance[episode == own]) for own in np.unique(episode)]
@@ -170,13 +173,6 @@ def _in_time(drives: Drives, strayed: Strayed) -> tuple[Floats, Floats, Whole]:
     first = np.flatnonzero(np.diff(strayed.window, prepend=-1))
     middle = (drives.first[strayed.increment][first] / drives.tick_hz + np.maximum.reduceat(ends, first)) / 2.0
     return middle, strayed.rms, drives.episode[strayed.increment][first]
-
-
-def _edges(times: Floats, horizon_s: float) -> Floats:
-    """Steps of time of a window's length, longer where that were too many, shorter where all is within two windows."""
-    span = float(np.ptp(times))
-    step = max(horizon_s, span / TIMES) if span > 2.0 * horizon_s else max(span / SHORT_TIMES, 1e-3)
-    return np.arange(times.min() - step / 2.0, times.max() + step, step)
 
 
 def residual_map(drives: Drives, both: Mapping[str, Strayed]) -> Figure:

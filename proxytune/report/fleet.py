@@ -66,7 +66,9 @@ def fleet_tables(fleet: Fleet) -> tuple[Table, ...]:
     own = []
     for robot in fleet.robots:
         learnt = robot.knowledge
-        fit, share = _fit(learnt.misfit.p_value, robot.fits), percent(learnt.posterior.share)
+        fit, share = "too few trials to tell", percent(learnt.posterior.share)
+        if (p_value := learnt.misfit.p_value) is not None:
+            fit = f"{'fits' if robot.fits else 'misfit'}, {probability(p_value)}"
         own.append((robot.name, fit, share, *map(span, learnt.intervals.values())))
     by_robot = Table(OWN, columns_of(("robot", "proxy"), ("region", *heads.values())), tuple(own), fleet_notes(fleet))
     if fleet.population is None:
@@ -80,11 +82,6 @@ def fleet_tables(fleet: Fleet) -> tuple[Table, ...]:
     population = Table(title, columns_of(("parameter",), columns), tuple(rows), (ABOUT["fleet"],))
     given = tuple((name, *map(_told, theta.values())) for name, theta in fleet.given.items())
     return population, by_robot, Table(GIVEN, columns_of(("robot",), [*heads.values()]), given)
-
-
-def _fit(p_value: float | None, fits: bool) -> str:
-    told = "" if p_value is None else f", {probability(p_value)}"
-    return f"{'fits' if fits else 'misfit'}{told}" if told else "too few trials to tell"
 
 
 def fleet_view(fleet: Fleet, figure: Drawn) -> View:

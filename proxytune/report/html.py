@@ -85,6 +85,10 @@ def page_html(view: View, foot: Foot, renew_s: int = 0) -> str:
     following = f'<p class="following"><strong>Next:</strong> {_text(view.next_step)}</p>\n'
     stated, parts = dict(foot.settings), _parts(view)
     about = [*(f"{name} {stated[name]}" for name in ABOUT if stated.get(name)), foot.date]
+    titles = (html.escape(one.title) for one in view.parts)
+    items = "".join(f'<li><a href="#part-{n}">{title}</a></li>' for n, title in enumerate(titles, start=1))
+    said = re.sub(r"<svg.*?</svg>|<[^>]*>", " ", parts + _text(view.sentence), flags=re.DOTALL)
+    used = {word: means for word, means in WORDS.items() if re.search(rf"\b{word}", said)}
     return fill(
         "page.html.txt",
         title=html.escape(view.title),
@@ -94,15 +98,10 @@ def page_html(view: View, foot: Foot, renew_s: int = 0) -> str:
         under_way=f'<p class="under-way" role="status">{renews}</p>\n' if renew_s else "",
         answer=_text(view.sentence),
         following=following if view.next_step else "",
-        contents=_contents(view) if len(view.parts) > MANY else "",
+        contents=f'<nav aria-label="Contents"><ol>{items}</ol></nav>\n' if len(view.parts) > MANY else "",
         parts=parts,
-        foot=_foot(foot, _words(parts + _text(view.sentence))),
+        foot=_foot(foot, "".join(f"<dt>{word}</dt><dd>{means}</dd>" for word, means in used.items())),
     )
-
-
-def _contents(view: View) -> str:
-    items = (f'<li><a href="#part-{n}">{html.escape(one.title)}</a></li>' for n, one in enumerate(view.parts, start=1))
-    return f'<nav aria-label="Contents"><ol>{"".join(items)}</ol></nav>\n'
 
 
 def _parts(view: View) -> str:
@@ -204,12 +203,6 @@ def _foot(foot: Foot, words: str) -> str:
     written = [f"Written {foot.date}"] * bool(foot.date) + [f"with {versions}"] * bool(versions)
     parts += [f'<section><h2 id="words">Words on this page</h2><dl>{words}</dl></section>'] if words else []
     return "\n".join([*parts, f"<p>{html.escape(' '.join(written))}.</p>" if written else ""])
-
-
-def _words(page: str) -> str:
-    """The words of WORDS that a page uses, each with what it means."""
-    said = re.sub(r"<svg.*?</svg>|<[^>]*>", " ", page, flags=re.DOTALL)
-    return "".join(f"<dt>{word}</dt><dd>{means}</dd>" for word, means in WORDS.items() if re.search(rf"\b{word}", said))
 
 
 def _text(text: str) -> str:

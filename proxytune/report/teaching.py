@@ -165,26 +165,21 @@ def observation_lines(found: teaching.Observations | None, experiment: teaching.
     """Both observations, each with its evidence; none where PLV is unknown, and the first of several proxies only."""
     if found is None:
         return ()
-    starts = {one.name: f"{one.zero_shot.value:.1f}" for one in experiment.teachers if one.zero_shot.value is not None}
-    first = [f"{FIRST}: {_first(found.zero_shot, starts)}."] if found.zero_shot else []
-    return (*first, f"{SECOND}: {_second(found)}.")
-
-
-def _first(found: teaching.RankAgreement, starts: Mapping[str, str]) -> str:
-    pairs = [
-        f"{ahead} saves more than {behind} though it starts lower ({starts[ahead]} for {starts[behind]})"
-        for ahead, behind in found.reversed
-    ]
-    shown = f"shown here, since {listed(pairs)}" if pairs else "no pair of these proxies shows it"
-    return f"{shown}; {_tau(found, 'zero-shot score')}"
-
-
-def _second(found: teaching.Observations) -> str:
+    lines = []
+    if found.zero_shot:
+        starts = {one.name: one.zero_shot.value or 0.0 for one in experiment.teachers}
+        pairs = [
+            f"{ahead} saves more than {behind} though it starts lower ({starts[ahead]:.1f} for {starts[behind]:.1f})"
+            for ahead, behind in found.zero_shot.reversed
+        ]
+        shown = f"shown here, since {listed(pairs)}" if pairs else "no pair of these proxies shows it"
+        lines.append(f"{FIRST}: {shown}; {_tau(found.zero_shot, 'zero-shot score')}.")
     poor, shown = list(found.poor_predictors), "none of these proxies shows it"
     if poor:
         save = f"{listed(poor)} {'saves' if len(poor) == 1 else 'save'} samples"
         shown = f"shown here, since {save} though a random ranking would predict as well"
-    return shown if found.prpv is None else f"{shown}; {_tau(found.prpv, 'PRPV')}"
+    shown += f"; {_tau(found.prpv, 'PRPV')}" if found.prpv else ""
+    return (*lines, f"{SECOND}: {shown}.")
 
 
 def _tau(found: teaching.RankAgreement, figure: str) -> str:

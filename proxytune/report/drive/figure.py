@@ -73,7 +73,9 @@ def episode_figure(pair: SideBySide, metrics: Sequence[str]) -> Figure:
         pair: The episode; places are known of every side.
         metrics: Those that stand above the map.
     """
-    aspect = map_aspect(pair.road, [episode.places for episode in pair.sides.values()])
+    paths = [episode.places for episode in pair.sides.values()]
+    width, height = pair.road.size if pair.road is not None else np.subtract(*_bounds(paths)[::-1])
+    aspect = float(np.clip(height / width, 0.4, 2.0))
     parts: list[tuple[float, Callable[[SubFigure], None]]] = [
         (0.85 * style.COLUMN * aspect + 0.35 + 2 * LINE_INCH, functools.partial(_draw_map, pair, metrics))
     ]
@@ -93,7 +95,9 @@ def _draw_map(pair: SideBySide, metrics: Sequence[str], figure: SubFigure) -> No
     axes = figure.subplots()
     draw_map(axes, pair.road, [episode.places for episode in pair.sides.values()])
     draw_paths(axes, pair)
-    draw_parting(axes, pair)
+    if pair.parted_s is not None:
+        place = pair.proxy.places[np.searchsorted(pair.proxy.poses["time"], pair.parted_s)]
+        axes.plot(*place, "o", color="black", markersize=9, fillstyle="none", markeredgewidth=0.9)
     for line, (side, episode) in enumerate(reversed(pair.sides.items())):
         values = [f"{plain(name)} {short(episode.metrics[name])} {pair.units[name]}".strip() for name in metrics]
         axes.annotate(
@@ -179,12 +183,6 @@ def draw_map(axes: Axes, road: Road | None, paths: Iterable[Floats]) -> None:
     axes.set_ylabel("y [m]", fontsize=7)
 
 
-def map_aspect(road: Road | None, paths: Iterable[Floats]) -> float:
-    """Height of the map over its width."""
-    width, height = road.size if road is not None else np.subtract(*_bounds(paths)[::-1])
-    return float(np.clip(height / width, 0.4, 2.0))
-
-
 def _bounds(paths: Iterable[Floats]) -> tuple[Floats, Floats]:
     places = np.concatenate(list(paths))
     return places.min(axis=0) - MARGIN_M, places.max(axis=0) + MARGIN_M
@@ -217,15 +215,11 @@ def draw_paths(axes: Axes, pair: SideBySide) -> None:
     paths = np.concatenate([episode.places[::EVERY] for episode in pair.sides.values()])
     low, high = np.transpose([axes.get_xlim(), axes.get_ylim()])
     corners = corners_of(np.array([place for _, place in marks.values()]), paths, low, high)
-    for (text, (colour, place)), corner in zip(marks.items(), corners, strict=True):
-        _write(axes, place, text, colour, corner)
-
-
-def draw_parting(axes: Axes, pair: SideBySide) -> None:
-    """Ring the place at which proxy and target are first APART_M apart."""
-    if pair.parted_s is not None:
-        place = pair.proxy.places[np.searchsorted(pair.proxy.poses["time"], pair.parted_s)]
-        axes.plot(*place, "o", color="black", markersize=9, fillstyle="none", markeredgewidth=0.9)
+    for (text, (colour, place)), (right, up) in zip(marks.items(), corners, strict=True):
+        look: dict[str, Any] = {"color": colour, "fontsize": 7, "path_effects": HALO, "annotation_clip": False}
+        look |= {"ha": "left" if right > 0 else "right", "va": "bottom" if up > 0 else "top"}
+        spot, shift = (float(place[0]), float(place[1])), (5 * right, 4 * up)
+        axes.annotate(text, spot, xytext=shift, textcoords="offset points", **look)
 
 
 def _draw_path(axes: Axes, places: Floats, side: str) -> None:
@@ -252,13 +246,6 @@ def draw_start(axes: Axes, places: Floats) -> None:
     """Mark where a path (times, 2) starts."""
     edge: dict[str, Any] = {"markeredgecolor": "black", "markeredgewidth": 1.0, "zorder": 4}
     axes.plot(*places[0], "o", color="white", markersize=6, **edge)
-
-
-def _write(axes: Axes, place: Floats, text: str, colour: str, corner: tuple[int, int]) -> None:
-    aligned: dict[str, Any] = {"ha": "left" if corner[0] > 0 else "right", "va": "bottom" if corner[1] > 0 else "top"}
-    look: dict[str, Any] = {"color": colour, "fontsize": 7, "path_effects": HALO, "annotation_clip": False}
-    spot, shift = (float(place[0]), float(place[1])), (5 * corner[0], 4 * corner[1])
-    axes.annotate(text, spot, xytext=shift, textcoords="offset points", **aligned, **look)
 
 
 SIZE = np.array((0.24, 0.06))

@@ -214,7 +214,10 @@ class _Sdf:
     def pose_of(self, element: ET.Element) -> Floats:
         """The pose of a link, joint or frame in the model's frame."""
         found = element.find("pose")
-        above = (found.get("relative_to") if found is not None else None) or _above(element)
+        above = found.get("relative_to") if found is not None else None
+        if not above:  # In whose frame it stands where it does not say so
+            of_joint = (element.findtext("child") or "").strip() if element.tag == "joint" else ""
+            above = element.get("attached_to", "") if element.tag == "frame" else of_joint
         pose = _six(found)
         return pose if above in ("", "__model__") else np.asarray(self.pose_of(self.named[above]) @ pose)
 
@@ -265,13 +268,6 @@ def _sdf(xml: XmlPatch, left: ET.Element, right: ET.Element) -> OwnFile:
             xml.set_text(across, _numbers([angle]))
 
     return OwnFile(wheels, aim, widen if across is not None else None)
-
-
-def _above(element: ET.Element) -> str:
-    """In whose frame an element of SDF stands, where it does not say so."""
-    if element.tag == "joint":
-        return (element.findtext("child") or "").strip()
-    return element.get("attached_to", "") if element.tag == "frame" else ""
 
 
 def _six(pose: ET.Element | None) -> Floats:

@@ -6,7 +6,7 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
-from proxytune.driving import CameraFigures, orientation
+from proxytune.driving import orientation
 from proxytune.report.export.instance import Instance, xml_comment
 from proxytune.report.writing import fill
 
@@ -71,22 +71,18 @@ def _parts(instance: Instance) -> list[str]:
     """The camera and the tracked point, where there are such."""
     parts = []
     if (camera := instance.camera) is not None:
-        parts.append(_camera(camera))
+        # It looks along its −z axis; its x axis is the picture's right, its y axis the picture's top.
+        turned = orientation(camera)
+        sides = np.concatenate((-turned[:, 1], turned[:, 2])).tolist()
+        axes = " ".join(f"{round(value, 12) + 0.0:.9g}" for value in sides)
+        place, size = f"{camera.forward_m:.9g} 0 {camera.height_m:.9g}", f"{camera.columns} {camera.rows}"
+        looks = f'xyaxes="{axes}" fovy="{camera.field_of_view_deg:.9g}" resolution="{size}"'
+        parts.append(f'<camera name="camera" pos="{place}" {looks}/>')
     if (tracked := instance.tracked_point) is not None:
         forward, left, angle = tracked
-        turned = f"{math.cos(angle / 2.0):.9g} 0 0 {math.sin(angle / 2.0):.9g}"
-        parts.append(f'<site name="tracked_point" pos="{forward:.9g} {left:.9g} 0" quat="{turned}"/>')
+        turn = f"{math.cos(angle / 2.0):.9g} 0 0 {math.sin(angle / 2.0):.9g}"
+        parts.append(f'<site name="tracked_point" pos="{forward:.9g} {left:.9g} 0" quat="{turn}"/>')
     return [f"      {part}" for part in parts]
-
-
-def _camera(figures: CameraFigures) -> str:
-    """MuJoCo's camera looks along its −z axis; its x axis is the picture's right, its y axis the picture's top."""
-    turned = orientation(figures)
-    axes = " ".join(f"{round(value, 12) + 0.0:.9g}" for value in np.concatenate((-turned[:, 1], turned[:, 2])).tolist())
-    place = f"{figures.forward_m:.9g} 0 {figures.height_m:.9g}"
-    size = f"{figures.columns} {figures.rows}"
-    fovy = f"{figures.field_of_view_deg:.9g}"
-    return f'<camera name="camera" pos="{place}" xyaxes="{axes}" fovy="{fovy}" resolution="{size}"/>'
 
 
 def _speed_servo(instance: Instance, place: str, side: int, wheels: int) -> str:

@@ -33,11 +33,23 @@ def convergence_figure(result: StudyResult) -> Figure:
     """
     figure, axes = style.one_panel(2.9)
     _draw_trials(axes, result)
-    named, label = [_draw_answer(axes, result)], result.study.objective.label
+    pairs = zip(result.trials, result.answers, strict=True)
+    answers = [(trial.number, result.value_of(answer)) for trial, answer in pairs if answer is not None]
+    # Where fresh episodes chose another answer in the end, the line ends at that one's.
+    ends = [*answers, (result.trials[-1].number + 1, result.value_of(result.best.trial))]
+    named, label = (
+        [style.LineName("answer\nso far", style.VERMILLION, ends[-1][1] or 0.0)],
+        result.study.objective.label,
+    )
+    axes.step(*zip(*ends, strict=True), where="post", color=style.VERMILLION, linewidth=1.5, label=named[0].words)
     if result.study.objective == PRPV:
         label = "PRPV [ordered pairs]"
         _draw_fresh(axes, result)
-        named += _draw_levels(axes, result)
+        chance, floor = result.judged.chance, result.floor
+        named.append(style.LineName(f"chance\n{chance.mean:.1f}", style.GREY, chance.mean))
+        axes.axhline(chance.mean, color=style.GREY, linewidth=1.0, linestyle=":", label=named[-1].words)
+        level = style.LineName(f"{style.floor_name(floor)}\n{floor.value or 0.0:.1f}", style.GREEN, floor.value or 0.0)
+        named += [level] if style.draw_noise_floor(axes, floor, level.words) else []
         axes.set_ylim(bottom=min(-0.4, -0.02 * axes.get_ylim()[1]))
         axes.yaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
@@ -45,15 +57,6 @@ def convergence_figure(result: StudyResult) -> Figure:
     style.name_lines(axes, named, TWO_LINES)
     style.legend_below(figure, axes, without=[name.words for name in named])
     return figure
-
-
-def _draw_levels(axes: Axes, result: StudyResult) -> list[style.LineName]:
-    """Chance, and the noise floor that a perfect proxy would score; with their names."""
-    chance, floor = result.judged.chance, result.floor
-    named = [style.LineName(f"chance\n{chance.mean:.1f}", style.GREY, chance.mean)]
-    axes.axhline(chance.mean, color=style.GREY, linewidth=1.0, linestyle=":", label=named[0].words)
-    known = style.LineName(f"{style.floor_name(floor)}\n{floor.value or 0.0:.1f}", style.GREEN, floor.value or 0.0)
-    return [*named, known] if style.draw_noise_floor(axes, floor, known.words) else named
 
 
 def _draw_trials(axes: Axes, result: StudyResult) -> None:
@@ -73,20 +76,6 @@ def _draw_points(axes: Axes, points: list[tuple[int, float]], face: str, label: 
     if points:
         numbers, scores = zip(*points, strict=True)
         axes.plot(numbers, scores, "o", color=style.BLUE, markerfacecolor=face, markersize=4, zorder=3, label=label)
-
-
-def _draw_answer(axes: Axes, result: StudyResult) -> style.LineName:
-    """PRPV of the answer so far; where fresh episodes chose another in the end, the line ends at that one's.
-
-    Returns:
-        The line's name.
-    """
-    pairs = zip(result.trials, result.answers, strict=True)
-    answers = [(trial.number, result.value_of(answer)) for trial, answer in pairs if answer is not None]
-    ends = [*answers, (result.trials[-1].number + 1, result.value_of(result.best.trial))]
-    named = style.LineName("answer\nso far", style.VERMILLION, ends[-1][1] or 0.0)
-    axes.step(*zip(*ends, strict=True), where="post", color=style.VERMILLION, linewidth=1.5, label=named.words)
-    return named
 
 
 def _draw_fresh(axes: Axes, result: StudyResult) -> None:

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from rich.console import Group
 
@@ -243,14 +242,13 @@ def write_study_tables(result: StudyResult, trials: pd.DataFrame, folder: Path) 
     Raises:
         RunError: If one cannot be written.
     """
-    write_text(folder / "trials.csv", trials.to_csv(lineterminator="\n"))
-    for name, table, width in (
-        ("parameters.tex", theta_table(result), None),
-        ("usefulness.tex", usefulness_table(result), 3),
-    ):
+    texts = {"trials.csv": trials.to_csv(lineterminator="\n")}
+    for name, table, width in (("parameters", theta_table(result), None), ("usefulness", usefulness_table(result), 3)):
         heads = [one.name for one in table.columns]
-        write_text(folder / name, latex_text(heads[:width], [row[:width] for row in table.rows]))
-    return [folder / name for name in ("trials.csv", "parameters.tex", "usefulness.tex")]
+        texts[f"{name}.tex"] = latex_text(heads[:width], [row[:width] for row in table.rows])
+    for name, text in texts.items():
+        write_text(folder / name, text)
+    return [folder / name for name in texts]
 
 
 RENEW_S = 5
@@ -340,7 +338,13 @@ def live_view(settings: StudySettings, objective: str, trials: Sequence[TrialRec
     shown: tuple[Part, ...] = ()
     if trials:
         measures = tuple(dict.fromkeys((objective, *(MEASURES if objective != LEARNING else ()))))
-        picture = picture_of("live", "trials", _trials_figure(trials, objective), measure=objective.upper())
+        figure, axes = style.one_panel(2.2)
+        points = [(one.number, value) for one in trials if (value := one.measures.get(objective)) is not None]
+        axes.plot([number for number, _ in points], [value for _, value in points], "o", color=style.BLUE, markersize=4)
+        axes.set_xlim(0.5, len(trials) + 0.5)
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+        style.dress(axes, "trial", objective.upper())
+        picture = picture_of("live", "trials", figure, measure=objective.upper())
         shown = (picture, trials_table(trials, tuple(trials[0].theta), measures))
     sentence = f"{f'Under way: {doing}.' if doing else 'Stopped before its end.'} {_say_best(trials, objective)}"
     return View(f"{settings.name}: which θ makes the simulator useful?", sentence, WAIT if doing else CONTINUE, shown)
@@ -355,13 +359,3 @@ def _say_best(trials: Sequence[TrialRecord], measure: str) -> str:
     value = best.measures.get(measure)
     score = "" if value is None else f", {measure.upper()} {short(value)}, which may be partly luck"
     return f"Best of {len(trials)} trials so far: trial {best.number}{score}."
-
-
-def _trials_figure(trials: Sequence[TrialRecord], measure: str) -> Figure:
-    figure, axes = style.one_panel(2.2)
-    points = [(trial.number, value) for trial in trials if (value := trial.measures.get(measure)) is not None]
-    axes.plot([number for number, _ in points], [value for _, value in points], "o", color=style.BLUE, markersize=4)
-    axes.set_xlim(0.5, len(trials) + 0.5)
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    style.dress(axes, "trial", measure.upper())
-    return figure

@@ -155,7 +155,12 @@ def run_opened_families(
             say(f"family {number} of {len(studies)}: {name}")
             reports[name] = _tune(name, study, say, tuning(study), retry_failed)
         families = tuple(map(_tuned, reports.values()))
-        lessons = _teach(settings, families, jobs, say, progress)
+        lessons: dict[str, Lesson] = {}
+        if settings.teaching is not None:
+            say("teaching by each at its best θ")
+            own, thetas = replace(settings, jobs=jobs or settings.jobs), {one.name: one.theta for one in families}
+            lessons = teach_families(own, thetas, lambda points: watching(progress, points, CURVE_POINTS))
+            save_lessons(settings, lessons)
     spent = sum((one.spent for one in reports.values()), Spent())
     return FamiliesReport(ComparedFamilies(settings, families, lessons), spent)
 
@@ -179,15 +184,3 @@ def _tuned(tuned: StudyReport) -> TunedFamily:
     study = tuned.result.study
     with Store.read(study.settings.home) as store:
         return tuned_family(StudyRun(study, store), tuned.result)
-
-
-def _teach(
-    settings: StudySettings, families: tuple[TunedFamily, ...], jobs: int | None, say: Say, progress: bool
-) -> dict[str, Lesson]:
-    if settings.teaching is None:
-        return {}
-    say("teaching by each at its best θ")
-    own, thetas = replace(settings, jobs=jobs or settings.jobs), {one.name: one.theta for one in families}
-    lessons = teach_families(own, thetas, lambda points: watching(progress, points, CURVE_POINTS))
-    save_lessons(settings, lessons)
-    return lessons

@@ -101,12 +101,6 @@ def _read_through(document: Mapping[str, Any]) -> None:
         following(document, studied, model, {})
 
 
-def adds_something(document: Mapping[str, Any]) -> bool:
-    """True if a diagnosis found anything to extend the proxy by: named effects, or curves."""
-    camera = document["camera"] or {}
-    return bool(document["effects"] or camera.get("effects") or document.get("learnt", {}).get("used"))
-
-
 def declared_names(loop: Loop) -> tuple[str, ...]:
     """The effects of the study's box, then those that its proxy has."""
     names = [*loop.settings.space.names, *dict(getattr(loop.family, "effects", ()))]

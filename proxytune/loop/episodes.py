@@ -50,20 +50,15 @@ def righted(closed: Closed) -> dict[str, Any] | None:
     if closed.after is None:
         return None
     both = closed.held_out or (closed.before.result.judged, closed.after.result.judged)
-    before, after = map(wrong_pairs, both)
-    agents = both[0].inputs.agents
-    gains = [before[agent] - after[agent] for agent in agents]
-    if max(gains) <= 0.0:
+    # Pairs with each agent that proxy and target order differently; a tie of one side alone counts half.
+    orders = ([dominance(means, one.inputs.metrics) for means in one.inputs.means] for one in both)
+    before, after = (np.abs(proxy - target).sum(axis=1).tolist() for proxy, target in orders)
+    gains = np.subtract(before, after)
+    if gains.max() <= 0.0:
         return None
-    agent = agents[int(np.argmax(gains))]
-    return {"agent": agent, "wrong_pairs_before": before[agent], "wrong_pairs_after": after[agent]}
-
-
-def wrong_pairs(assessment: Assessment) -> dict[str, float]:
-    """Count the pairs with each agent that proxy and target order differently; a tie of one side alone counts half."""
-    inputs = assessment.inputs
-    proxy, target = (dominance(means, inputs.metrics) for means in inputs.means)
-    return dict(zip(inputs.agents, np.abs(proxy - target).sum(axis=1).tolist(), strict=True))
+    most = int(gains.argmax())
+    agent = both[0].inputs.agents[most]
+    return {"agent": agent, "wrong_pairs_before": before[most], "wrong_pairs_after": after[most]}
 
 
 MOST_STARTS = 4

@@ -60,8 +60,8 @@ class _Closing:
         self._measure_target()
         before = self._tune("study", open_study(self.settings.path))
         diagnosis = self._diagnose()
-        after, held_out = None, None
-        if diagnosing.adds_something(diagnosis):
+        after, held_out, camera = None, None, diagnosis["camera"] or {}
+        if diagnosis["effects"] or camera.get("effects") or diagnosis.get("learnt", {}).get("used"):
             after = self._tune("extended study", self._extend())
             held_out = self._held_out(before, after)
         closed = Closed(self.loop, before, diagnosis, after, held_out, (), self.episodes)
@@ -358,7 +358,7 @@ def _table(closed: Closed, rows: list[comparison.Compared]) -> report.Table:
         cells.append((title, *shown))
         for name, texts in (
             ("noise floor", [comparison.floor_text(one, row.unit) for one in sides]),
-            ("chance", list(map(comparison.chance_text, sides))),
+            ("chance", ["{:.1f} ± {:.1f}".format(*one.chance) if one and one.chance else "–" for one in sides]),
         ):
             if set(texts) != {"–"}:
                 cells.append((f"  {name}", *texts))

@@ -35,7 +35,16 @@ def scatter_figure(assessment: Assessment) -> Figure:
     height = max(PANEL, LINE * min(MOST, len(agents)) + 0.6)
     figure, panels = style.grid_of(height * len(metrics), len(metrics), 1)
     for column, axes in enumerate(panels.flat):
-        _scatter_panel(axes, assessment.inputs, column)
+        proxy, target = (means[:, column] for means in assessment.inputs.means)
+        up, across = (_standard_errors(one)[:, column] for one in (assessment.inputs.proxy, assessment.inputs.target))
+        axes.errorbar(target, proxy, xerr=across, yerr=up, fmt="none", ecolor=style.GREY, lw=0.8, zorder=1)
+        axes.plot(target, proxy, "o", color=style.BLUE, markersize=4, zorder=2)
+        axes.margins(0.1)
+        limits = axes.axis()
+        axes.axline((0, 0), slope=1, color=style.GREY, linewidth=0.8, linestyle="--", zorder=0)
+        axes.axis(limits)
+        name = plain(metrics[column].name)
+        style.dress(axes, f"{name} on the target", f"{name} in the proxy")
         _name_points(axes, assessment.inputs, column, LINE / (height - 0.6))
         r = assessment.srcc.value[metrics[column].name]
         axes.set_title("SRCC undefined" if r is None else f"SRCC {r:.2f}".replace("-", "−"), fontsize=8)
@@ -79,19 +88,6 @@ def flipped_pairs_figure(prpv: Prpv) -> Figure:
     patches = [Patch(color=colour, label=f"{kind}: {counts[kind]}") for kind, colour in FLIP_COLOURS.items()]
     axes.legend(handles=patches, loc="upper right", fontsize=7, frameon=False)
     return figure
-
-
-def _scatter_panel(axes: Axes, inputs: Comparison, column: int) -> None:
-    proxy, target = (means[:, column] for means in inputs.means)
-    up, across = (_standard_errors(table)[:, column] for table in (inputs.proxy, inputs.target))
-    axes.errorbar(target, proxy, xerr=across, yerr=up, fmt="none", ecolor=style.GREY, lw=0.8, zorder=1)
-    axes.plot(target, proxy, "o", color=style.BLUE, markersize=4, zorder=2)
-    axes.margins(0.1)
-    limits = axes.axis()
-    axes.axline((0, 0), slope=1, color=style.GREY, linewidth=0.8, linestyle="--", zorder=0)
-    axes.axis(limits)
-    name = plain(inputs.metrics[column].name)
-    style.dress(axes, f"{name} on the target", f"{name} in the proxy")
 
 
 def _standard_errors(table: ScoreTable) -> Floats:

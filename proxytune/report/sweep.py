@@ -89,14 +89,7 @@ def curve_csv(curve: SweepCurve) -> str:
 
 
 def sweep_text(curves: Sequence[SweepCurve], episodes: int, files: Sequence[Path], held: str) -> Group:
-    """Curves as `sweep` prints them: the paper's measures, then the others, and what each shows.
-
-    Args:
-        curves: What was swept.
-        episodes: How many episodes were run for it.
-        files: What was written.
-        held: What the other parameters are held at, in words.
-    """
+    """Curves as `sweep` prints them: the paper's measures, the others, what each shows; episodes run, files written."""
     parts: list[RenderableType] = []
     for curve in curves:
         title = " ".join([curve.parameter, *held_texts(curve)])
@@ -183,14 +176,7 @@ def _cell(series: Series, row: int) -> str:
 
 
 def sweep_view(study: str, curves: Sequence[SweepCurve], figures: Mapping[str, Drawn], held: str) -> View:
-    """Curves: the figures of all, then of each its figure and tables.
-
-    Args:
-        study: The study's name.
-        curves: What was swept, at least one.
-        figures: By name.
-        held: What the other parameters are held at, in a sentence.
-    """
+    """One curve or more: the figures of all, then of each its figure and tables; `held` is a sentence on the others."""
     own = {curve_name(curve): curve for curve in curves}
     parts: list[Part] = [
         picture_of("sweep", "bars" if name.startswith("sweep_bars") else "all", image)
@@ -206,7 +192,11 @@ def sweep_view(study: str, curves: Sequence[SweepCurve], figures: Mapping[str, D
     parts += [Paragraphs("What failed", tuple(wrong))] if wrong else []
     names, answer = listed([curve.parameter for curve in curves]), " ".join(f"{_lowest(curve)}." for curve in curves)
     title = f"{study}: how does usefulness depend on {names}?"
-    return View(title, f"{answer} {held}.", _next_step(curves), tuple(parts))
+    step = "search all parameters at once with `python -m proxytune study`."
+    flat = [one.parameter for one in curves if len(shape_of(series_of(one)[0], None).near_best) == len(one.points)]
+    if flat:
+        step = f"raise starts, or add agents whose scores change with {' or '.join(flat)}: noise hides a difference."
+    return View(title, f"{answer} {held}.", step, tuple(parts))
 
 
 def _lowest(curve: SweepCurve) -> str:
@@ -219,13 +209,6 @@ def _lowest(curve: SweepCurve) -> str:
     worse = points - len(shape.near_best)
     beyond = f"worse beyond noise at {worse} of {points} values" if worse else "at no other value worse beyond noise"
     return f"{curve.parameter}: {prpv.name} is lowest ({shape.score:.3g}) at {best}, and {beyond}"
-
-
-def _next_step(curves: Sequence[SweepCurve]) -> str:
-    flat = [one.parameter for one in curves if len(shape_of(series_of(one)[0], None).near_best) == len(one.points)]
-    if flat:
-        return f"raise starts, or add agents whose scores change with {' or '.join(flat)}: noise hides a difference."
-    return "search all parameters at once with `python -m proxytune study`."
 
 
 def figures_of_sweep(curves: Sequence[SweepCurve], truth: Theta | None) -> dict[str, Figure]:
@@ -349,7 +332,12 @@ def panels_figure(curve: SweepCurve, truth: Theta | None = None) -> Figure:
     for axes in (prpv, ppv, *pod):
         axes.set_ylim(bottom=min(0.0, -0.03 * axes.get_ylim()[1]))
     figure.supxlabel(label_of(curve), fontsize=8)
-    explain(key, prpv, srcc)
+    # The empty panel has the key of the others; the measure itself is left to its axis.
+    key.set_axis_off()
+    named = style.named_handles((prpv, srcc))
+    named.pop("PRPV", None)
+    names = [fill(name, WIDEST) for name in named]
+    key.legend(list(named.values()), names, loc="center", fontsize=7, frameon=False)
     return figure
 
 
@@ -375,7 +363,16 @@ def bars_figure(curves: Sequence[SweepCurve]) -> Figure:
         chosen = [curve.points[index] for index in indices]
         spots = [place * APART + offset for offset in range(len(chosen))]
         ticks += [(spot, short(point.value)) for spot, point in zip(spots, chosen, strict=True)]
-        _draw_bars(axes, spots, chosen, curve.points[held])
+        for spot, point in zip(spots, chosen, strict=True):
+            if point.assessment is None:
+                axes.annotate("failed", (spot, 0), rotation=90, ha="center", va="bottom", fontsize=7)
+                continue
+            inner, score = point.assessment.prpv_interval, point.assessment.prpv.value
+            colour, label = (style.BLUE, HELD) if point is curve.points[held] else (style.LIGHT_BLUE, BESIDE)
+            axes.bar(spot, score, width=0.85, color=colour, label=label)
+            if inner.low is not None and inner.high is not None:
+                ends = [[score - inner.low], [inner.high - score]]
+                axes.errorbar([spot], [score], yerr=ends, fmt="none", ecolor="0.2", lw=1.0, capsize=2, label=INTERVAL)
         name = fill(label_of(curve), max(5, CHARACTERS // len(curves)))
         axes.text(
             (spots[0] + spots[-1]) / 2, 1.02, name, transform=axes.get_xaxis_transform(),
@@ -405,19 +402,6 @@ def bar_points(curve: SweepCurve) -> tuple[list[int], int]:
         for indices, goal in ((below, wanted[0]), (above, wanted[1]))
     ]
     return [*sides[0], middle, *sides[1]], middle
-
-
-def _draw_bars(axes: Axes, spots: Sequence[float], chosen: Sequence[SweepPoint], held: SweepPoint) -> None:
-    for spot, point in zip(spots, chosen, strict=True):
-        if point.assessment is None:
-            axes.annotate("failed", (spot, 0), rotation=90, ha="center", va="bottom", fontsize=7)
-            continue
-        inner, score = point.assessment.prpv_interval, point.assessment.prpv.value
-        colour, label = (style.BLUE, HELD) if point is held else (style.LIGHT_BLUE, BESIDE)
-        axes.bar(spot, score, width=0.85, color=colour, label=label)
-        if inner.low is not None and inner.high is not None:
-            ends = [[score - inner.low], [inner.high - score]]
-            axes.errorbar([spot], [score], yerr=ends, fmt="none", ecolor="0.2", lw=1.0, capsize=2, label=INTERVAL)
 
 
 HELD, INTERVAL = "held value", "95 % interval"
@@ -459,15 +443,6 @@ def mark_values(axes: Axes, curve: SweepCurve, truth: Theta | None) -> None:
     if truth is not None and curve.parameter in truth:
         style.mark_truth(axes, truth[curve.parameter])
     style.dress(axes)
-
-
-def explain(axes: Axes, *panels: Axes) -> None:
-    """Fill an empty panel with the key of others: each name once, the measure itself left to its axis."""
-    axes.set_axis_off()
-    named = style.named_handles(panels)
-    named.pop("PRPV", None)
-    names = [fill(name, WIDEST) for name in named]
-    axes.legend(list(named.values()), names, loc="center", fontsize=7, frameon=False)
 
 
 def axis_of(measure: Measure) -> str:

@@ -87,13 +87,7 @@ def say_more(experiment: teaching.Experiment) -> str:
 
 
 def teach_text(experiment: teaching.Experiment, prpv: Predictivities, files: Mapping[str, Any]) -> Group:
-    """The result of a learning experiment as `teach` prints it.
-
-    Args:
-        experiment: What was taught.
-        prpv: How well each proxy predicts.
-        files: What was written.
-    """
+    """The result of a learning experiment as `teach` prints it, with how well each proxy predicts."""
     table = teach_table(experiment, prpv)
     observations = observation_lines(teaching.observe(experiment, prpv), experiment)
     sentence = f"{teach_answer(experiment)}\n"
@@ -113,8 +107,16 @@ def teach_table(experiment: teaching.Experiment, prpv: Predictivities) -> Table:
         saved = [_with_ends(one.cost, UNKNOWN, short) if one.cost else "" for one in experiment.teachers]
         rows = [(*row, cost) for row, cost in zip(rows, ("", *saved), strict=True)]
         heads, notes = (*HEADS, COST), [PLV_MEANING, COST_MEANING.format(*astuple(costs))]
+    notes.append(CONVERGED.format(f"{experiment.when.threshold:.1f} of {experiment.best_score:g}"))
+    if unknown := teaching.why_unknown(experiment.needs):
+        notes.append(f"{unknown.reason}, so PLV is not known; {unknown.remedy}")
+    for lesson in experiment.teachers:
+        factor = lesson.worth.factor if lesson.worth else None
+        if factor is not None and factor.value is not None:
+            text = _with_ends(replace(factor, low=factor.low or 0.0), "", "{:.2g}".format)
+            notes.append(f"{lesson.name}: samples needed without the proxy / with it = {text}")
     title = "PLV of each proxy (the paper's table 1)"
-    return Table(title, columns_of(("proxy",), heads), tuple(rows), (*notes, *_convergence_notes(experiment)))
+    return Table(title, columns_of(("proxy",), heads), tuple(rows), tuple(notes))
 
 
 def _row(lesson: teaching.TeacherResult, prpv: teaching.Predictivity | None) -> tuple[str, ...]:
@@ -124,21 +126,6 @@ def _row(lesson: teaching.TeacherResult, prpv: teaching.Predictivity | None) -> 
         return (lesson.name, predicts, zero_shot, "", "", "")
     reduction = "" if worth.reduction.value is None else percent(worth.reduction.value)
     return (lesson.name, predicts, zero_shot, count(worth.needed), count(worth.plv, UNKNOWN), reduction)
-
-
-def _convergence_notes(experiment: teaching.Experiment) -> list[str]:
-    """Notes on what counts as converged, and by what each proxy divides the samples."""
-    notes = [CONVERGED.format(f"{experiment.when.threshold:.1f} of {experiment.best_score:g}")]
-    if unknown := teaching.why_unknown(experiment.needs):
-        notes.append(f"{unknown.reason}, so PLV is not known; {unknown.remedy}")
-    for lesson in experiment.teachers:
-        factor = lesson.worth.factor if lesson.worth else None
-        if factor is not None and factor.value is not None:
-            low, high = factor.low or 0.0, factor.high
-            ends = f"{low:.2g} or more" if high is None else f"{low:.2g} to {high:.2g}"
-            text = f"{factor.value:.2g} ({ends})"
-            notes.append(f"{lesson.name}: samples needed without the proxy / with it = {text}")
-    return notes
 
 
 def count(figure: LearningEstimate, missing: str = NOT_REACHED) -> str:
@@ -307,10 +294,23 @@ def teach_figure(experiment: teaching.Experiment) -> Figure:
 
     Above the dotted line a learner counts as converged; the bar on it says how many samples that takes.
     """
-    lessons = experiment.teachers
+    lessons, grid = experiment.teachers, teaching.teaching_settings(experiment.settings).target_samples
+    shown = [grid[place] for place in sorted({0, 1, (len(grid) + 1) // 2, len(grid) - 1})]
     figure, panels = style.panel_grid(len(lessons), 1.25, 0.6, sharex=True, sharey=True)
     for axes, lesson in zip(panels, lessons, strict=True):
-        _draw_panel(axes, experiment, lesson)
+        for name, look, height in ((NONE, WITHOUT, -1.2), (lesson.name, WITH, 1.2)):
+            _draw_curve(axes, experiment, name, look)
+            if lesson.worth is not None:
+                needed = lesson.worth.without if name == NONE else lesson.worth.needed
+                if needed.low is not None:
+                    # The interval of the samples needed, off the line of convergence so that two bars stay apart
+                    ends = np.array([needed.low, experiment.needs.last if needed.high is None else needed.high])
+                    level, places = experiment.when.threshold + height, _places(experiment, ends)
+                    axes.hlines(level, *places, color=look.colour, linewidth=2.5)
+        axes.axhline(experiment.when.threshold, color="0.3", linewidth=0.8, linestyle=":", label="converged")
+        axes.set_xticks(_places(experiment, np.array(shown, dtype=float)), [f"{count:g}" for count in shown])
+        axes.set_title(lesson.name, fontsize=8)
+        style.dress(axes)
     for axes in panels[-2:]:
         # Also where the panel below, which would have them, is empty.
         axes.tick_params(labelbottom=True)
@@ -319,24 +319,6 @@ def teach_figure(experiment: teaching.Experiment) -> Figure:
         axes.set_ylabel("score [s]", fontsize=8)
     style.legend_below(figure, *panels)
     return figure
-
-
-def _draw_panel(axes: Axes, experiment: teaching.Experiment, lesson: teaching.TeacherResult) -> None:
-    for name, look, height in ((NONE, WITHOUT, -1.2), (lesson.name, WITH, 1.2)):
-        _draw_curve(axes, experiment, name, look)
-        if lesson.worth is not None:
-            needed = lesson.worth.without if name == NONE else lesson.worth.needed
-            if needed.low is not None:
-                # The interval of the samples needed, off the line of convergence so that two bars stay apart
-                ends = np.array([needed.low, experiment.needs.last if needed.high is None else needed.high])
-                level, places = experiment.when.threshold + height, _places(experiment, ends)
-                axes.hlines(level, *places, color=look.colour, linewidth=2.5)
-    axes.axhline(experiment.when.threshold, color="0.3", linewidth=0.8, linestyle=":", label="converged")
-    grid = teaching.teaching_settings(experiment.settings).target_samples
-    shown = [grid[place] for place in sorted({0, 1, (len(grid) + 1) // 2, len(grid) - 1})]
-    axes.set_xticks(_places(experiment, np.array(shown, dtype=float)), [f"{count:g}" for count in shown])
-    axes.set_title(lesson.name, fontsize=8)
-    style.dress(axes)
 
 
 def _places(experiment: teaching.Experiment, counts: Floats) -> Floats:

@@ -118,15 +118,6 @@ def donors_of(pairs: Iterable[Floats], metrics: int) -> Donors:
     return Donors(np.concatenate([both[0], both[1]]), np.concatenate([both[1], both[0]]))
 
 
-def _target_donors(target: ScoreTable) -> Donors:
-    """Repeats of the target's starts, or where there are none its episodes from different starts."""
-    places, (_, episodes, metrics) = start_places(target), target.values.shape
-    two = np.array([(a, b) for a in range(episodes) for b in range(a)], dtype=np.intp).reshape(-1, 2)
-    alike = two[places[two[:, 0]] == places[two[:, 1]]]
-    chosen = (alike if len(alike) else two).T
-    return donors_of([np.moveaxis(target.values[:, chosen], 1, 0)], metrics)
-
-
 @dataclass(frozen=True)
 class Expected:
     """One measure in more episodes: what is expected of fresh ones, and what a perfect proxy scores on this target.
@@ -172,7 +163,13 @@ def expect(
     means, known = sides[0].target.means, len(donors.first) > 0
     proxies = np.stack([side.proxy.means for side in sides])
     draws = [_again(one.proxy, donors, rng, np.arange(len(one.proxy.episodes))[None]) for one in sides] if known else []
-    of_target = _target_donors(sides[0].target) if donors.still else donors
+    of_target = donors
+    if donors.still:  # The target's starts driven twice, or where there are none its episodes from different starts
+        scored, places = sides[0].target.values, start_places(sides[0].target)
+        two = np.array([(a, b) for a in range(len(places)) for b in range(a)], dtype=np.intp).reshape(-1, 2)
+        alike = two[places[two[:, 0]] == places[two[:, 1]]]
+        chosen = (alike if len(alike) else two).T
+        of_target = donors_of([np.moveaxis(scored[:, chosen], 1, 0)], scored.shape[-1])
     perfect = _perfect(sides[0], of_target, rng) if len(of_target.first) else None
     weights = ppv(sides[0]).beta
     beta = np.array([weights[metric.name] or 0.0 for metric in metrics])

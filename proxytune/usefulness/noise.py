@@ -93,7 +93,11 @@ def floor_of_repeats(
         ScoresError: As in prpv.
     """
     inputs = compare(proxy=again, target=domain, metrics=metrics)
-    one, other = _shared_starts(inputs)
+    one, other = by_start(inputs.target), by_start(inputs.proxy)
+    shared = [start for start in one.episodes if start in other.episodes]
+    one, other = (table.arrange(agents=inputs.agents, episodes=shared) for table in (one, other))
+    both = (one.driven & other.driven)[..., None]
+    one, other = (replace(table, values=np.where(both, table.values, np.nan)) for table in (one, other))
     absent = [agent for agent, count in zip(one.agents, one.counts, strict=True) if not count]
     reason = (
         f"agent '{absent[0]}' drove no start both times"
@@ -126,16 +130,6 @@ def split_halves(driven: Flags, rng: np.random.Generator, splits: int) -> tuple[
     half = (driven.sum(axis=1) // 2)[:, None, None]
     first = order < np.take_along_axis(np.sort(order, axis=-1), half, axis=-1)
     return first, driven[:, None, :] & ~first
-
-
-def _shared_starts(inputs: Comparison) -> tuple[ScoreTable, ScoreTable]:
-    """Both tables by start, each agent with those starts only that it drove on both sides."""
-    one, other = by_start(inputs.target), by_start(inputs.proxy)
-    shared = [start for start in one.episodes if start in other.episodes]
-    one, other = (table.arrange(agents=inputs.agents, episodes=shared) for table in (one, other))
-    both = (one.driven & other.driven)[..., None]
-    first, second = (replace(table, values=np.where(both, table.values, np.nan)) for table in (one, other))
-    return first, second
 
 
 @dataclass(frozen=True)

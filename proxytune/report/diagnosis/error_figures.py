@@ -11,7 +11,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from scipy.stats import binned_statistic_2d
 
-from proxytune.diagnosis import Diagnosis, Drives, Floats, Rmse, Whole, cut, pose_errors
+from proxytune.diagnosis import Diagnosis, Drives, Floats, Whole, cut, pose_errors
 from proxytune.report import figure_style as style
 from proxytune.report.wording import plain
 
@@ -42,7 +42,13 @@ def error_figure(diagnosis: Diagnosis) -> Figure:
     models = [(DECLARED_MODEL, style.VERMILLION, "o", -0.1), (extended_name(diagnosis), style.BLUE, "s", 0.1)]
     for axes, factor, both, floors in ((place, 1e3, positions, brackets), (heading, 180.0 / np.pi, headings, level)):
         for rms_errors, model in zip(both, models[: 2 if diagnosis.effects else 1], strict=False):
-            _draw_errors(axes, rms_errors, factor, model)
+            name, colour, marker, shift = model
+            values = factor * np.array([one.value for one in rms_errors])
+            ends = factor * np.array([one.interval for one in rms_errors])
+            ends = np.where(np.isfinite(ends).all(axis=1, keepdims=True), ends, values[:, None])
+            arms = np.maximum(0.0, np.stack((values - ends[:, 0], ends[:, 1] - values)))
+            look: dict[str, Any] = {"fmt": marker, "color": colour, "ms": 4, "capsize": 2, "lw": 1.0}
+            axes.errorbar(spots + shift, values, yerr=arms, label=name, **look)
         # A bar from the lower to the upper end, a line at the lower.
         lower, heights = [low for low, _ in floors], [high - low for low, high in floors]
         axes.bar(spots, heights, 0.5, lower, color=style.GREEN, alpha=0.2, zorder=0)
@@ -60,17 +66,6 @@ def error_figure(diagnosis: Diagnosis) -> Figure:
     heading.set_ylabel("heading error, RMS [deg]", fontsize=8)
     style.legend_below(figure, place)
     return figure
-
-
-def _draw_errors(axes: Axes, rms_errors: Sequence[Rmse], factor: float, model: tuple[str, str, str, float]) -> None:
-    """Values with their intervals, where those are finite, in the name, colour, marker and place of a model."""
-    name, colour, marker, shift = model
-    values = factor * np.array([one.value for one in rms_errors])
-    ends = factor * np.array([one.interval for one in rms_errors])
-    ends = np.where(np.isfinite(ends).all(axis=1, keepdims=True), ends, values[:, None])
-    arms = np.maximum(0.0, np.stack((values - ends[:, 0], ends[:, 1] - values)))
-    look: dict[str, Any] = {"fmt": marker, "color": colour, "ms": 4, "capsize": 2, "lw": 1.0}
-    axes.errorbar(np.arange(len(rms_errors)) + shift, values, yerr=arms, label=name, **look)
 
 
 HORIZON_S = 2.0
@@ -147,8 +142,16 @@ def residual_over_time(drives: Drives, both: Mapping[str, Strayed]) -> Figure:
 
 
 def _lines(axes: Axes, drives: Drives, strayed: Strayed, colour: str) -> list[tuple[Floats, Floats]]:
-    """Times and distances: the median after its band is drawn, or those of each episode."""
-    times, distance, episode = _in_time(drives, strayed)
+    """Times [s] and distances [mm]: the median after its band is drawn, or those of each episode.
+
+    They are of windows, or of poses where episodes last hardly longer than a window.
+    """
+    times, distance = drives.last[strayed.increment] / drives.tick_hz, strayed.distance
+    episode = drives.episode[strayed.increment]
+    if times.max() >= 2.0 * strayed.horizon_s:
+        first = np.flatnonzero(np.diff(strayed.window, prepend=-1))
+        begins, ends = drives.first[strayed.increment][first] / drives.tick_hz, np.maximum.reduceat(times, first)
+        times, distance, episode = (begins + ends) / 2.0, strayed.rms, episode[first]
     # Steps of a window's length, longer where that were too many, shorter where all is within two windows
     span = float(np.ptp(times))
     step = max(strayed.horizon_s, span / TIMES) if span > 2.0 * strayed.horizon_s else max(span / SHORT_TIMES, 1e-3)
@@ -163,16 +166,6 @@ def _lines(axes: Axes, drives: Drives, strayed: Strayed, colour: str) -> list[tu
     if not axes.get_legend_handles_labels()[1]:
         axes.fill_between([], [], color=style.LIGHT_GREY, linewidth=0, label="10 to 90 % round the median")
     return [(centres, middle)]
-
-
-def _in_time(drives: Drives, strayed: Strayed) -> tuple[Floats, Floats, Whole]:
-    """Time [s], distance [mm] and episode: of windows, or of poses where episodes last hardly longer than a window."""
-    ends = drives.last[strayed.increment] / drives.tick_hz
-    if ends.max() < 2.0 * strayed.horizon_s:
-        return ends, strayed.distance, drives.episode[strayed.increment]
-    first = np.flatnonzero(np.diff(strayed.window, prepend=-1))
-    middle = (drives.first[strayed.increment][first] / drives.tick_hz + np.maximum.reduceat(ends, first)) / 2.0
-    return middle, strayed.rms, drives.episode[strayed.increment][first]
 
 
 def residual_map(drives: Drives, both: Mapping[str, Strayed]) -> Figure:

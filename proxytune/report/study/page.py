@@ -36,22 +36,14 @@ MEASURES = ("prpv", "ppv")
 def study_text(result: StudyResult, spent: str, files: Mapping[str, Any]) -> Group:
     """The result of a study as `study` prints it: one sentence, then one table per subject, a fact a row.
 
-    Args:
-        result: What it has found.
-        spent: Episodes and seconds of this run.
-        files: What was written.
+    Episodes and seconds of this run are its last fact, and below all stand the files that were written.
     """
     sections = [part for table in study_tables(result, spent).values() for part in section_text(table)]
     return group_texts(study_sentence(result), *sections, *file_texts(files))
 
 
 def study_tables(result: StudyResult, spent: str = "") -> dict[str, Table]:
-    """Tables by title: what is known of θ, how useful the proxy is there, what informs each parameter, the search.
-
-    Args:
-        result: What the study has found.
-        spent: Episodes and seconds of this run, if it is told.
-    """
+    """Tables by title: what is known of θ, how useful the proxy is there, what informs each parameter, the search."""
     informed = information_table(result)
     tables = (theta_table(result), usefulness_table(result), informed, search_table(result, spent))
     return {table.title: table for table in tables if table.rows}
@@ -232,12 +224,7 @@ def trials_table(trials: Sequence[TrialRecord], names: Sequence[str], measures: 
 
 
 def write_study_tables(result: StudyResult, trials: pd.DataFrame, folder: Path) -> list[Path]:
-    """Write trials.csv, and as LaTeX parameters.tex and usefulness.tex; their paths.
-
-    Args:
-        result: What the study has found.
-        trials: One row per trial.
-        folder: Where to.
+    """Write trials.csv, a row per trial, and as LaTeX parameters.tex and usefulness.tex; their paths.
 
     Raises:
         RunError: If one cannot be written.
@@ -257,12 +244,7 @@ CONTINUE = "run the same command to continue: everything finished is kept."
 
 
 def study_view(result: StudyResult, figures: Mapping[str, Drawn]) -> View:
-    """A study: its tables, with the figures beside what they are of.
-
-    Args:
-        result: What it has found.
-        figures: PNG files by the name of the figure, those that there are.
-    """
+    """A study: its tables, with the figures, those that there are by name, beside what they are of."""
     settings = result.study.settings
     drawn, tables = study_pictures(result, figures), study_tables(result)
     parts = (

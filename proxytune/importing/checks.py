@@ -131,13 +131,7 @@ PLAUSIBLE_S = 946684800.0
 
 
 def checked_drive(drive: Drive, where: str, offset_s: float = 0.0) -> tuple[Drive, list[str]]:
-    """A drive with stamps in order and without repeats, and what was found, a sentence each.
-
-    Args:
-        drive: As an importer has read it.
-        where: The source, as a complaint names it.
-        offset_s: How much later poses are stamped than commands, as far as that is known [s].
-    """
+    """A drive with stamps in order and without repeats, and what was found; poses are known to be stamped so late."""
     about = f"{where}: drive {drive.name}"
     _check_sizes((drive.poses.times, drive.poses.places), "poses", about)
     poses, notes = _ordered_poses(drive.poses, about)

@@ -100,10 +100,7 @@ KNOWN = "a ROS bag (.bag, .db3, .mcap or a folder of them), CSV, TUM or MRCLAM f
 def read_source(path: Path, wanted: Wanted, offset_s: float = 0.0) -> Source:
     """Read a source: its drives with stamps in order, and notes on what was taken and what is odd.
 
-    Args:
-        path: The source.
-        wanted: What to take from it.
-        offset_s: How much later its poses are stamped than its commands, as far as that is known [s].
+    Its poses are stamped later than its commands by `offset_s`, as far as that is known [s].
 
     Raises:
         LogError: If it is none of the known forms, or lacks what a log needs.
@@ -137,16 +134,9 @@ PICTURES = "frames/%06d.png"
 
 
 def write_log(source: Source, folder: Path, facts: Facts, origin: str) -> Log:
-    """Write log.toml, samples.csv, commands.csv and pictures.
+    """Write log.toml with where it came from, samples.csv, commands.csv and pictures; gives the log that it reads as.
 
-    Args:
-        source: What was read and checked.
-        folder: The log's folder, which must not exist or be empty, or else be this very log.
-        facts: What only the user knows.
-        origin: Where it came from, for log.toml.
-
-    Returns:
-        The log that it reads as.
+    The folder must not exist or be empty, or else be this very log.
 
     Raises:
         InputError: If the folder is not free.
@@ -263,12 +253,7 @@ def open_log(path: Path, wanted: Wanted = NOTHING, facts: Facts = NO_FACTS) -> I
 
 @contextmanager
 def as_log(source: Source, facts: Facts, path: Path) -> Iterator[Log]:
-    """The log that a source makes, in a temporary folder for as long as it is open.
-
-    Args:
-        source: What was read and checked.
-        facts: What only the user knows.
-        path: Where it was read.
+    """The log that a source makes, read at a path, in a temporary folder for as long as it is open.
 
     Raises:
         LogError: If it makes none.

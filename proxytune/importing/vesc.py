@@ -43,10 +43,7 @@ def pair_topics(topics: tuple[Topic, ...]) -> tuple[Topic, ...]:
 def read_vesc(bag: Bag, motor: str, gains: Path | None) -> tuple[Commands, tuple[str, ...]]:
     """Speed [m/s] and wheel angle [rad] of the commands to a VESC, at the times when the bag received them.
 
-    Args:
-        bag: The bag, open.
-        motor: Topic of the motor's speed [electrical revolutions per minute].
-        gains: The car's vesc.yaml.
+    The motor's topic has electrical revolutions per minute; the gains are the car's vesc.yaml.
 
     Raises:
         LogError: If there is no such file, or it lacks a gain.

@@ -51,12 +51,7 @@ ENOUGH = 20
 
 
 def log_cautions(log: Log, figures: Figures) -> tuple[str, ...]:
-    """Sentences on what is probably not meant in a log.
-
-    Args:
-        log: The log.
-        figures: Of the robot that drove it; without them nothing is said of how far its commands should take it.
-    """
+    """Sentences on what is probably not meant in a log; figures of its robot tell how far commands should take it."""
     chords = [_chords(without_outliers(episode)) for episode in log.episodes]
     names = alike_caution("drives", (episode.name for episode in log.episodes))
     found = [

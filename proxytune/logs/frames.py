@@ -190,15 +190,9 @@ BROKEN = (OSError, SyntaxError, ValueError, EOFError, struct.error, zlib.error, 
 
 
 def read_pictures(frames: Frames, numbers: Sequence[int], columns: int = 160) -> Pictures:
-    """Read some of a log's pictures, one after another, wider ones averaged down.
+    """Read n of a log's pictures by their places in `frames`: red, green and blue (n, rows, columns, 3), 0 to 255.
 
-    Args:
-        frames: All of them.
-        numbers: Which, by their places in `frames`, n of them.
-        columns: How wide a picture is at most; its rows are in proportion.
-
-    Returns:
-        Red, green and blue (n, rows, columns, 3), 0 to 255.
+    Wider ones are averaged down to so many columns.
 
     Raises:
         LogError: If a file cannot be read, or is of another size than the first.

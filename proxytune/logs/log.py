@@ -32,13 +32,7 @@ WHEELS = ("wheel_left", "wheel_right")
 
 
 def check_kind(command: str, robot: str, drive: str, where: str) -> None:
-    """Refuse commands of another kind than a robot takes; a twist is for any.
-
-    Args:
-        command: Of COMMANDS.
-        robot: The robot's name.
-        drive: "differential" or "ackermann".
-        where: The log or file.
+    """Refuse commands of another kind than a robot takes that drives as this; a twist is for any.
 
     Raises:
         LogError: If they are a car's and the robot is none, or the other way about.

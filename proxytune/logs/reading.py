@@ -126,13 +126,7 @@ def read_log(path: str | Path) -> Log:
 
 
 def read_commands(path: Path) -> tuple[str, dict[str, tuple[Floats, Floats]]]:
-    """Read a table of commands alone, whose columns tell their kind.
-
-    Args:
-        path: A CSV file as a log's commands.csv.
-
-    Returns:
-        Kind of the commands, and each episode's times (M,) [s] and commands (M, 2).
+    """Read a table as a log's commands.csv, whose columns tell their kind: that, and each episode's times and commands.
 
     Raises:
         LogError: If it is not such a table.

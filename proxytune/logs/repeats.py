@@ -81,13 +81,9 @@ def _share(every: Sequence[Runs], least_m_s: float) -> float:
 
 
 def rows_of_poses(log: Log, episodes: Sequence[LogEpisode]) -> list[Whole]:
-    """Rows of these drives that have a measured pose of their own.
+    """Rows of these drives of a log, or pieces of them, that have a measured pose of their own.
 
     Repeats have none while the robot moves; while it stands one each HELD_S has.
-
-    Args:
-        log: What says how fast the robot moves, and whether its poses repeat.
-        episodes: Drives of it, or pieces of them.
     """
     every = [runs_of(episode) for episode in log.episodes]
     least = _least_speed(every)

@@ -101,13 +101,7 @@ def named_handles(panels: Iterable[Axes]) -> dict[str, Any]:
 
 
 def legend_below(figure: Figure, *panels: Axes, without: Collection[str] = ()) -> None:
-    """One legend under the figure with everything that has a name, each name once, in the columns that fit.
-
-    Args:
-        figure: What it goes under.
-        panels: Whose names are listed.
-        without: Names that stand beside their lines already.
-    """
+    """One legend under the figure with every name in its panels once, but for those beside their lines already."""
     named = {label: handle for label, handle in named_handles(panels).items() if label not in without}
     longest = max((len(name) for name in named), default=0) + HANDLE
     columns = max(1, min(3, int(figure.get_figwidth() * CHARACTERS_PER_INCH / longest)))

@@ -32,13 +32,7 @@ STYLE = fill("page.css")
 
 
 def write_page(path: Path, view: View, foot: Foot, renew_s: int = 0) -> None:
-    """Write a view as a page.
-
-    Args:
-        path: The file.
-        view: What is shown.
-        foot: How to come by it again.
-        renew_s: The page loads itself again so often while the work is under way [s]; 0 once it has ended.
+    """Write a view as a page, which loads itself again so often while the work is under way [s]; 0 once it has ended.
 
     Raises:
         RunError: If it cannot be written.

@@ -72,14 +72,7 @@ def score_next_step(assessments: Assessments, selection: Selection | None) -> st
 def score_text(
     assessments: Assessments, selection: Selection | None, left_out: Sequence[str] = (), *, target: str
 ) -> Group:
-    """The scores as `score` prints them: the sentence, every measure of one proxy or several ranked, and notes.
-
-    Args:
-        assessments: Of each proxy, by name.
-        selection: The proxies ranked; None where there is one.
-        left_out: Notes on agents that were left out.
-        target: Name of the target.
-    """
+    """The scores as `score` prints them: the sentence, every measure of one proxy or several ranked, and notes."""
     notes = _remarks(assessments, "note")
     if selection is None:
         ((_, assessment),) = assessments.items()
@@ -112,14 +105,7 @@ def _remarks(assessments: Assessments, note: str = "") -> list[str]:
 def score_view(
     assessments: Assessments, selection: Selection | None, figures: Sequence[Picture] = (), *, target: str
 ) -> View:
-    """One proxy, or several ranked.
-
-    Args:
-        assessments: Of each proxy, by name.
-        selection: The proxies ranked; None where there is one.
-        figures: What was drawn; all figures are, where none is given.
-        target: Name of the target.
-    """
+    """One proxy, or several ranked, with what was drawn; all figures are, where none is given."""
     figures = figures or [picture for *_, picture in _all_drawn(assessments, selection)]
     tables = _tables(assessments, selection, target)
     said = score_sentence(assessments, selection, target=target), score_next_step(assessments, selection)

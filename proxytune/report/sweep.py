@@ -240,16 +240,7 @@ def write_sweep_page(
     held: str,
     command: str,
 ) -> Path:
-    """Write the page of curves that hold the same values beside their figures; return its path.
-
-    Args:
-        settings: The study's.
-        curves: At least one.
-        figures: Theirs, by name, as `figures_of_sweep` has them; others may be among them.
-        folder: Where the page goes.
-        held: What the other parameters are held at, in words.
-        command: The command that makes the page, as typed in a shell.
-    """
+    """Write the page of curves that hold the same values beside their figures, of `figures_of_sweep`; its path."""
     names = [*_names_together(curves), *map(curve_name, curves)]
     drawn = {name: figures[name] for name in names}
     view = sweep_view(settings.name, curves, drawn, f"{held[0].upper()}{held[1:]}")

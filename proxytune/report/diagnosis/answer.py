@@ -32,11 +32,6 @@ MOST_TRIED = 8
 def write_diagnosis(found: LogDiagnosis, folder: Path, command: str = "") -> list[Path]:
     """Write diagnosis.json, model.toml, next/commands.csv with a ROS 2 node that plays it, figures and page; paths.
 
-    Args:
-        found: What the log says.
-        folder: Where to.
-        command: What the page's foot says makes it again.
-
     Raises:
         RunError: If a file cannot be written.
     """

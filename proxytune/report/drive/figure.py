@@ -19,12 +19,7 @@ from proxytune.study import APART_M, SideBySide
 
 
 def episode_document(pair: SideBySide, study_seed: int) -> dict[str, Any]:
-    """Scores as plain numbers.
-
-    Args:
-        pair: The episode.
-        study_seed: From which its own is derived, as study.toml and `--seed` have it.
-    """
+    """Scores as plain numbers, and the seed that the episode's own is derived from, as study.toml and `--seed` say."""
     return {
         "agent": pair.episode.agent,
         "start": pair.episode.start,
@@ -67,12 +62,7 @@ INSTANTS = 4
 
 
 def episode_figure(pair: SideBySide, metrics: Sequence[str]) -> Figure:
-    """Draw an episode for one column of a paper.
-
-    Args:
-        pair: The episode; places are known of every side.
-        metrics: Those that stand above the map.
-    """
+    """Draw an episode, of which places are known on every side, with these metrics above the map."""
     paths = [episode.places for episode in pair.sides.values()]
     width, height = pair.road.size if pair.road is not None else np.subtract(*_bounds(paths)[::-1])
     aspect = float(np.clip(height / width, 0.4, 2.0))
@@ -159,13 +149,7 @@ HALO = (withStroke(linewidth=2.0, foreground="white"),)
 
 
 def draw_map(axes: Axes, road: Road | None, paths: Iterable[Floats]) -> None:
-    """Draw the floor that the camera sees, from above, with axes in metres; without a road only the axes.
-
-    Args:
-        axes: Where.
-        road: The map, if there is one.
-        paths: All that is going to be drawn on it, each (times, 2): x, y [m].
-    """
+    """Draw the floor that the camera sees, from above; without a road only axes round the paths (times, 2) [m]."""
     if road is not None:
         floor = draw_floor(road)
         end = floor.origin + len(floor.pixels) / floor.pixels_per_metre
@@ -259,16 +243,9 @@ OUTSIDE, HIDES = 1000, 100
 
 
 def corners_of(marks: Floats, paths: Floats, low: Floats, high: Floats) -> list[tuple[int, int]]:
-    """The corner of each mark at which its label stands, the first of those that hide least.
+    """The corner of each mark (marks, 2) at which its label stands, the first of those that hide least of the paths.
 
-    Args:
-        marks: What has a label, (marks, 2), in the map's unit.
-        paths: Points of what is not to be hidden if that can be avoided, (points, 2).
-        low: The map's lower left corner (2,).
-        high: Its upper right corner (2,).
-
-    Returns:
-        For each mark 1 or −1 for right or left, and for above or below.
+    It is 1 or −1 for right or left, and for above or below. The map reaches from its corner `low` to `high` (2,).
     """
     width = high[0] - low[0]
     half = SIZE * width / 2.0

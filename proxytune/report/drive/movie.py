@@ -176,12 +176,7 @@ def check_episode_file(path: Path) -> None:
 
 
 def write_episode(pair: SideBySide, metrics: Sequence[str], path: Path) -> None:
-    """Write a still picture, or an animation whose frames are counted on standard error.
-
-    Args:
-        pair: The episode.
-        metrics: Those that a still picture shows.
-        path: Where to; its ending says as what.
+    """Write a still picture with these metrics, or an animation whose frames are counted, as the path's ending says.
 
     Raises:
         InputError: If it is not known where the robots were.
@@ -209,13 +204,7 @@ def _count_frames(animation: Animation, watcher: Watcher) -> Iterator[Frame]:
 
 
 def write_gif(path: Path, frames: Iterable[Frame], samples: Sequence[Frame], frame_hz: float) -> None:
-    """Write a GIF that plays for ever.
-
-    Args:
-        path: The file.
-        frames: Each (rows, columns, 3).
-        samples: Some of them, from which the palette is made.
-        frame_hz: Frames a second.
+    """Write a GIF of frames (rows, columns, 3) that plays for ever; its palette is made from the samples.
 
     Raises:
         RunError: If it cannot be written.

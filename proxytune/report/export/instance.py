@@ -149,13 +149,7 @@ class ExportLine:
 
 
 def export_lines(instance: Instance, form: str, has: Container[str] = ()) -> list[ExportLine]:
-    """Values with what becomes of each; those that are neutral need no place.
-
-    Args:
-        instance: What is written.
-        form: The format.
-        has: Effects that a patched file has, or the simulator behind a filter.
-    """
+    """Values with what becomes of each in a format, or in what has it already; those that are neutral need no place."""
     parameters = instance.robot.catalogue.parameters
     lines = []
     for name, value in sorted(instance.theta.items()):
@@ -182,13 +176,7 @@ def header(instance: Instance, form: str, has: Container[str] = ()) -> list[str]
 
 
 def xml_comment(instance: Instance, form: str, columns: int) -> str:
-    """The head of a file as an XML comment, in which no two hyphens may stand side by side.
-
-    Args:
-        instance: What is written.
-        form: The format.
-        columns: By how many its lines are indented.
-    """
+    """The head of a file as an XML comment, indented so, in which no two hyphens may stand side by side."""
     return re.sub("-(?=-)", "- ", ("\n" + columns * " ").join(header(instance, form)))
 
 

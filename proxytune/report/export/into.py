@@ -74,13 +74,9 @@ class Patched:
 
 
 def patch(instance: Instance, path: Path, output: Path, wheels: Sequence[str] = ()) -> Patched:
-    """A file of a user's own with what was found.
+    """A user's own file (.urdf, .sdf, or .xml of MuJoCo) with what was found; the diff calls it as the output.
 
-    Args:
-        instance: What was found.
-        path: The file: .urdf, .sdf, or .xml of MuJoCo.
-        output: What the diff calls the patched one.
-        wheels: Names of the joints of the left and the right wheel; found where they are not given.
+    The joints of the left and the right wheel are found where they are not given.
 
     Raises:
         InputError: If its wheels cannot be told, or something in it is beyond what is understood here.

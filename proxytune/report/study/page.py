@@ -301,12 +301,7 @@ def write_live_page(
 ) -> None:
     """Write the page of a study that has not ended, which loads itself again while something is being done.
 
-    Args:
-        path: The file.
-        settings: The study's.
-        objective: The measure that its trials are searched by.
-        trials: Those that have ended, in order.
-        doing: What is being done; "" once the study was stopped.
+    The trials are those that have ended, in order; what is being done is "" once the study was stopped.
 
     Raises:
         RunError: If it cannot be written.

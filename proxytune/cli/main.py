@@ -65,10 +65,7 @@ def parser(words: Sequence[str] | None = None, prog: str = "") -> argparse.Argum
         )
         if words is None or name == asked:
             add_options(command, name, *known.shares)
-        if known.draws:
-            also = "figures also as SVG or PDF [PNG alone]"
-            command.add_argument("--format", type=formats, default=(), metavar="svg,pdf", help=also)
-        command.add_argument("--json", action="store_true", help="print one JSON document instead of text")
+        add_shared_options(command, draws=known.draws)
         command.set_defaults(parser=command)
     return top
 
@@ -83,6 +80,14 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     if unknown:
         arguments.parser.error(f"unrecognized arguments: {' '.join(unknown)}")
     return arguments
+
+
+def add_shared_options(parser: argparse.ArgumentParser, *, draws: bool) -> None:
+    """Add the options that commands have in common; figures have formats."""
+    if draws:
+        also = "figures also as SVG or PDF [PNG alone]"
+        parser.add_argument("--format", type=formats, default=(), metavar="svg,pdf", help=also)
+    parser.add_argument("--json", action="store_true", help="print one JSON document instead of text")
 
 
 def formats(text: str) -> tuple[str, ...]:

@@ -30,14 +30,9 @@ REPAIR = {"ROS 1 bag": "rosbag reindex", "ROS 2 bag (mcap)": "mcap recover", "RO
 
 @dataclass(frozen=True)
 class Topic:
-    """A topic of a bag, or of several bags together.
+    """A topic of a bag, or of several bags together, so many of which are `lacking` messages of it.
 
-    Attributes:
-        name: Its name, as in /cmd_vel.
-        kind: Type of its messages, as in geometry_msgs/msg/Twist.
-        count: How many messages it has.
-        known: Whether the type is defined, so that messages can be read.
-        lacking: How many of the bags have no messages of it.
+    Messages can be read where their type, as geometry_msgs/msg/Twist, is `known`.
     """
 
     name: str
@@ -49,12 +44,7 @@ class Topic:
 
 @dataclass(frozen=True)
 class Bag:
-    """A bag that is open.
-
-    Attributes:
-        path: The file, or the folder of a ROS 2 bag.
-        reader: The library's reader of it.
-    """
+    """A bag that is open: the file, or the folder of a ROS 2 bag, and the library's reader of it."""
 
     path: Path
     reader: Any

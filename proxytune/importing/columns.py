@@ -143,13 +143,9 @@ def _angle_contradiction(unit: Unit, values: Floats) -> str:
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table and what it is taken for.
+    """A column by the package's name of it (`field`) and the table's, and its unit.
 
-    Attributes:
-        field: The package's name of it.
-        name: The table's name of it.
-        unit: The unit of its values.
-        known_by: How the unit is known: "stated", "by its name", "by its size" or "assumed".
+    That is known as it is "stated", "by its name", "by its size", or "assumed".
     """
 
     field: str

@@ -73,14 +73,7 @@ class Drive:
 
 @dataclass(frozen=True)
 class Channel:
-    """Something that a source holds: a topic, a column or an array.
-
-    Attributes:
-        name: What the source calls it.
-        kind: Its type, as in geometry_msgs/msg/Twist.
-        count: How many messages or rows it has.
-        role: What it is taken for, as in "commands", or why it is left out.
-    """
+    """A topic, column or array of a source: its type, how many messages or rows, and its role, or why it has none."""
 
     name: str
     kind: str

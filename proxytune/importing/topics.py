@@ -94,14 +94,9 @@ PICTURE_ROLE = Role("pictures", "--pictures", {"Image": 0, "CompressedImage": 1}
 
 @dataclass(frozen=True)
 class Choice:
-    """The topics that are taken from a bag.
+    """The topics that are taken from a bag, and the kind of its commands.
 
-    Attributes:
-        commands: Topic of the commands, or None.
-        kind: Kind of the commands.
-        poses: Topic of the poses.
-        transform: Parent and child as "map>base_link" where poses come of transforms; "" until it is chosen.
-        pictures: Topic of the pictures, or None.
+    Where poses come of transforms, `transform` is parent and child as "map>base_link"; "" until it is chosen.
     """
 
     commands: Topic | None

@@ -31,12 +31,9 @@ MOST_FRAMES = 2**53
 
 
 class Camera(NamedTuple):
-    """The camera that log.toml states.
+    """The camera that log.toml states: where its pictures lie, as "frames/%06d.png", and frames of no picture yet.
 
-    Attributes:
-        pattern: Where the pictures lie, as "frames/%06d.png".
-        own_table: Whether [camera] states them; a key of the top level may name pictures that were not passed on.
-        stated: Frames of no picture yet.
+    Where [camera] states them, `own_table`; a key of the top level may name pictures that were not passed on.
     """
 
     pattern: str

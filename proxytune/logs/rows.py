@@ -108,15 +108,9 @@ class Rows:
 
 @dataclass(frozen=True)
 class Layout:
-    """The columns and rows that a table must hold.
+    """The columns that a table must hold besides `episode` and `time`, and the fewest rows of an episode.
 
-    Attributes:
-        needed: Its columns besides `episode` and `time`.
-        together: Columns that are there all or none.
-        may_lack: Columns whose cells may be empty.
-        optional: Columns that may be left out.
-        fewest: Rows that an episode has at least.
-        why: What needs the columns, for a complaint.
+    Some are there all or none, may have empty cells, or may be left out; `why` is what needs them, for a complaint.
     """
 
     needed: tuple[str, ...]

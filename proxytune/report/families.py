@@ -296,14 +296,7 @@ def _lesson_document(lesson: Lesson | None) -> dict[str, Any]:
 
 
 class Panel(NamedTuple):
-    """One of the figure's panels.
-
-    Attributes:
-        title: What its axis says.
-        values: Of each family that has one, the value and the ends of its interval; None where an end is not known.
-        choice: Which is best.
-        ratios: Whether ratios count, not differences.
-    """
+    """One of the figure's panels: what its axis says, values of families that have one, and whether ratios count."""
 
     title: str
     values: Mapping[str, Spread]

@@ -22,11 +22,7 @@ GAP = 2
 
 @dataclass(frozen=True)
 class WholeWords:
-    """A table in which names, paths and topics stay whole, to be typed; it is wider than the terminal if it has to be.
-
-    Attributes:
-        table: The table; its cells are broken at blanks alone.
-    """
+    """A table broken at blanks alone: names and paths stay whole, to be typed, wider than the terminal if need be."""
 
     table: TerminalTable
 

@@ -39,11 +39,7 @@ LINGER_S = 1.0
 
 
 class Animation:
-    """An episode as frames: what never moves is drawn once.
-
-    Attributes:
-        times: Of each frame [s].
-    """
+    """An episode as frames at `times` [s]: what never moves is drawn once."""
 
     def __init__(self, pair: SideBySide) -> None:
         ends = [episode.seconds for episode in pair.sides.values()]

@@ -126,15 +126,7 @@ def _pose(turned: Floats, place: tuple[float, float, float]) -> Floats:
 
 @dataclass(frozen=True)
 class ExportLine:
-    """One value and what becomes of it.
-
-    Attributes:
-        name: Its name in θ.
-        value: The value.
-        interval: Its interval, if it has one.
-        unit: Its unit.
-        place: Where it went; empty where it has no place.
-    """
+    """One value by its name in θ, with its interval if it has one, and the place where it went; empty: none."""
 
     name: str
     value: float

@@ -8,7 +8,7 @@ import math
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -60,17 +60,11 @@ class OwnFile:
 
 @dataclass(frozen=True)
 class Patched:
-    """A patched file.
-
-    Attributes:
-        text: All of it.
-        diff: What changed, as `diff -u` shows it.
-        has: The effects that the file has now: wheels', and the camera's.
-    """
+    """A patched file: its text, what changed as `diff -u` shows it, and the effects of wheels and camera it has now."""
 
     text: str
     diff: str
-    has: frozenset[str] = field(default_factory=frozenset)
+    has: frozenset[str]
 
 
 def patch(instance: Instance, path: Path, output: Path, wheels: Sequence[str] = ()) -> Patched:

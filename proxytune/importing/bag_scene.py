@@ -97,7 +97,12 @@ def read_chain(transforms: dict[str, Transform], name: str, stamps: str, where: 
     if not any(transform.moves for transform in chain):
         raise LogError(f"{where}: {name} never moves; {_remedy(transforms)}")
     for transform in chain:
-        _check_numbers(transform, where)
+        finite, about = np.isfinite(transform.values).all(axis=1), f"{where}: transform {transform.name}"
+        if not finite.all():
+            raise LogError(f"{about}: number {int(np.argmin(finite)) + 1} is not finite; name another by --poses")
+        wrong = no_rotation(transform.values[:, 3:])
+        if wrong.any():
+            raise complaint(transform.values[:, 3:], wrong, about)
     choices = {each.name: choose_times(each.stamps, stamps, each.name) for each in chain if each.moves}
     times = {moving: of_it for moving, (of_it, _) in choices.items()}
     most = max(times.values(), key=len)
@@ -114,17 +119,6 @@ def read_chain(transforms: dict[str, Transform], name: str, stamps: str, where: 
     names, left_out = ", ".join(transform.name for transform in chain), len(most) - len(common)
     outside = f"; {left_out} outside of what all of them cover are left out" if left_out else ""
     return poses, (f"Poses of {child} in {parent} are composed of {names}{outside}.", *said)
-
-
-def _check_numbers(transform: Transform, where: str) -> None:
-    """Refuse numbers that are not finite and quaternions that are no rotation."""
-    finite = np.isfinite(transform.values).all(axis=1)
-    if not finite.all():
-        number = int(np.argmin(finite)) + 1
-        raise LogError(f"{where}: transform {transform.name}: number {number} is not finite; name another by --poses")
-    wrong = no_rotation(transform.values[:, 3:])
-    if wrong.any():
-        raise complaint(transform.values[:, 3:], wrong, f"{where}: transform {transform.name}")
 
 
 def _at(values: Floats, times: Floats | None, wanted: Floats) -> tuple[Floats, Rotation]:

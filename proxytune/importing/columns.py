@@ -357,7 +357,14 @@ def poses_by_drive(table: Table, columns: Columns, *, gaps: bool = False) -> dic
         raise LogError(f"{table.path}: has no row with a pose; give the file that the poses were written to")
     by_field = dict(zip(fields, values.T, strict=True))
     places = np.stack([by_field.get(axis, np.zeros(len(times))) for axis in PLACE], axis=1)
-    _check_extent(table, columns, places)
+    extent = np.ptp(places[:, :2], axis=0).max()
+    for column in (columns[axis] for axis in ("x", "y") if columns[axis].known_by == "by its name"):
+        # Metres in columns whose names end in mm or cm: the robot would hardly have moved
+        if column.unit.factor < 1.0 and 0.0 < extent < LEAST_EXTENT_M:
+            raise LogError(
+                f"{table.path}: column '{column.name}' in {column.unit.name}, as its name ends: the robot moved "
+                f"{extent * 1e3:.2g} mm in all; state its unit, as in --columns {column.field}={column.name}:m"
+            )
     headings, tilts = by_field.get("heading"), np.zeros(len(times))
     if headings is None:
         headings, tilts = headings_and_tilts(values[:, -4:], str(table.path))
@@ -416,18 +423,6 @@ def _filled_rows(
 def _check_clock(times: Floats, where: str) -> None:
     if len(times) > 1 and np.ptp(times) == 0.0:
         raise LogError(f"{where}: all {len(times)} stamps are {times[0]:.12g} s; record with a clock that runs")
-
-
-def _check_extent(table: Table, columns: Columns, places: Floats) -> None:
-    """Refuse metres in columns whose names end in mm or cm: the robot would hardly have moved."""
-    guessed = [columns[axis] for axis in ("x", "y") if columns[axis].known_by == "by its name"]
-    extent = np.ptp(places[:, :2], axis=0).max()
-    for column in guessed:
-        if column.unit.factor < 1.0 and 0.0 < extent < LEAST_EXTENT_M:
-            raise LogError(
-                f"{table.path}: column '{column.name}' in {column.unit.name}, as its name ends: the robot moved "
-                f"{extent * 1e3:.2g} mm in all; state its unit, as in --columns {column.field}={column.name}:m"
-            )
 
 
 def _where(table: Table, name: str) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -172,10 +173,15 @@ def fill_log(folder: Path, source: Source, facts: Facts, name: str, origin: str)
         if tables:
             pd.concat(tables).to_csv(folder / name_of_file, index=False, lineterminator="\n")
     pictures = [(drive.name, drive.pictures) for drive in source.drives if drive.pictures is not None]
+    kinds = {drive.commands.kind for drive in source.drives if drive.commands is not None}
+    stated: dict[str, Any] = {"format": 1, "name": name, "robot": facts.robot or name}
+    stated |= {"command": next(iter(kinds), "none"), "source": f"{origin}, {source.form}"} | dict(facts.figures)
+    if facts.clock_offset:
+        stated["clock_offset_s"] = facts.clock_offset if facts.clock_offset == "fit" else float(facts.clock_offset)
     if pictures:
         _write_pictures(folder, pictures)
-    text = _description(source, name, facts, origin, with_pictures=bool(pictures))
-    (folder / "log.toml").write_text(text, encoding="utf-8")
+        stated |= {"map": facts.road, "camera": {"frames": PICTURES}}
+    (folder / "log.toml").write_text(tomlkit.dumps(stated), encoding="utf-8")
 
 
 def read_as(folder: Path, shown: Path) -> Log:
@@ -217,17 +223,6 @@ def _write_pictures(folder: Path, drives: list[tuple[str, Pictures]]) -> None:
             Image.fromarray(picture).save(folder / (PICTURES % len(rows)))
             rows.append((len(rows), name, time))
     pd.DataFrame(rows, columns=["frame", "episode", "time"]).to_csv(folder / "frames.csv", index=False)
-
-
-def _description(source: Source, name: str, facts: Facts, origin: str, *, with_pictures: bool) -> str:
-    kinds = {drive.commands.kind for drive in source.drives if drive.commands is not None}
-    stated = {"format": 1, "name": name, "robot": facts.robot or name, "command": next(iter(kinds), "none")}
-    stated |= {"source": f"{origin}, {source.form}"} | dict(facts.figures)
-    if facts.clock_offset:
-        stated["clock_offset_s"] = facts.clock_offset if facts.clock_offset == "fit" else float(facts.clock_offset)
-    if with_pictures:
-        stated["map"] = facts.road
-    return tomlkit.dumps(stated | ({"camera": {"frames": PICTURES}} if with_pictures else {}))
 
 
 NOTHING = Wanted()

@@ -21,6 +21,7 @@ from proxytune.logs.times import places_on_grid
 from proxytune.settings import Section
 from proxytune.unpacking import ARRAYS_MB, check_unpacked, open_picture
 
+POSES = (("position_m", 10.0), ("heading_deg", 180.0))
 KEYS = ("frames", "poses", "exposure", "rectified", "shutter", "readout_s")
 LISTED = "frames.csv"
 PATTERN = re.compile(r"[^%]*%(0[1-9])?d[^%]*\.(png|jpe?g)", re.IGNORECASE)
@@ -65,16 +66,21 @@ def read_camera(settings: Section) -> Camera | None:
         rule = "must have the picture's number once, as %d or %06d, and end in .png, .jpg or .jpeg"
         raise section.error("frames", f"{rule}, got '{pattern}'")
     poses = table.section("poses")
-    poses.only(("position_m", "heading_deg"))
+    poses.only([name for name, _ in POSES])
+    road, position_m, heading_deg = _road(settings), *(_figure(poses, *one) for one in POSES)
+    rectified, readout_s = table.flag("rectified", False), _figure(table, "readout_s", 1.0)
+    shutter = table.text("shutter", choices=("rolling", "global")) if "shutter" in table else "rolling"
+    if shutter == "global" and readout_s:
+        raise table.error("readout_s", "a global shutter exposes all rows at once; take one of the two out")
     stated = Frames(
         paths=(),
         drives=np.empty(0, dtype=np.int64),
         times=np.empty(0),
-        road=_road(settings),
-        position_m=_figure(poses, "position_m", 10.0),
-        heading_deg=_figure(poses, "heading_deg", 180.0),
-        rectified=table.flag("rectified", False),
-        readout_s=_readout(table),
+        road=road,
+        position_m=position_m,
+        heading_deg=heading_deg,
+        rectified=rectified,
+        readout_s=0.0 if shutter == "global" else readout_s,
         fixed_exposure=table.text("exposure", "auto", choices=("auto", "fixed")) == "fixed",
     )
     return Camera(pattern, "frames" in table, stated)
@@ -96,15 +102,6 @@ def _road(settings: Section) -> str:
 
 def _figure(section: Section, key: str, high: float) -> float | None:
     return section.number(key, low=0.0, high=high) if key in section else None
-
-
-def _readout(table: Section) -> float | None:
-    """Seconds from the first row to the last, None where that is not known."""
-    readout = _figure(table, "readout_s", 1.0)
-    shutter = table.text("shutter", choices=("rolling", "global")) if "shutter" in table else "rolling"
-    if shutter == "global" and readout:
-        raise table.error("readout_s", "a global shutter exposes all rows at once; take one of the two out")
-    return 0.0 if shutter == "global" else readout
 
 
 def read_frames(

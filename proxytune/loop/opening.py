@@ -232,28 +232,30 @@ class Kept:
 
     def __init__(self, folder: Path) -> None:
         """Read what is known."""
-        self._path = folder / FILE_NAME
-        self._inputs: dict[str, str] = _read(self._path)
-
-    def inputs_of(self, name: str) -> str | None:
-        """The digest of the inputs that a step's output was made of; None where it was never done."""
-        return self._inputs.get(name)
+        self._path, self.inputs = folder / FILE_NAME, dict[str, str]()
+        try:
+            steps = json.loads(self._path.read_text(encoding="utf-8"))["steps"]
+            self.inputs |= {str(name): str(inputs) for name, inputs in steps.items()}
+        except FileNotFoundError:
+            pass
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+            raise StoreError(f"{self._path}: cannot be read; remove it to do every step again") from None
 
     def has(self, name: str, inputs: str, output: Path) -> bool:
         """True if a step is done: its output is there, and made of inputs of this digest."""
-        return self._inputs.get(name) == inputs and output.exists()
+        return self.inputs.get(name) == inputs and output.exists()
 
     def run(self, name: str, inputs: str, do: Callable[[], object]) -> None:
         """Do a step, which makes its output of inputs of this digest."""
-        self._write({known: digest for known, digest in self._inputs.items() if known != name})
+        self._write({known: digest for known, digest in self.inputs.items() if known != name})
         do()
-        self._write({**self._inputs, name: inputs})
+        self._write({**self.inputs, name: inputs})
 
     def _write(self, inputs: dict[str, str]) -> None:
         # Until a step has been done again, what is left of its old output counts as none.
-        if inputs != self._inputs:
+        if inputs != self.inputs:
             write_text(self._path, json.dumps({"format": 1, "steps": inputs}, indent=2) + "\n")
-        self._inputs = inputs
+        self.inputs = inputs
 
 
 def digest(*parts: Any) -> str:
@@ -268,13 +270,3 @@ def digest_of_files(path: Path) -> str:
         found = sorted(one for one in path.rglob("*") if one.is_file())
         files = [one for one in found if not one.name.startswith(".") and one.parent.name != "__pycache__"]
     return digest([(str(one.relative_to(path)), hashlib.sha256(one.read_bytes()).hexdigest()) for one in files])
-
-
-def _read(path: Path) -> dict[str, str]:
-    try:
-        steps = json.loads(path.read_text(encoding="utf-8"))["steps"]
-        return {str(name): str(inputs) for name, inputs in steps.items()}
-    except FileNotFoundError:
-        return {}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        raise StoreError(f"{path}: cannot be read; remove it to do every step again") from None

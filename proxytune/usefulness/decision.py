@@ -202,7 +202,13 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
     most = np.zeros(len(agents))
     if len(columns) == 1 and is_rate(inputs.target, columns[0]):
         ends = rate_intervals(middle, counts)
-        most = _most_regrets(centre, np.sort(sign * np.array(ends), axis=1), middle)
+        # Of agents that, or whose best rival, always or never succeeded: there the prior pulls draws away from rates
+        # at the end of what can be. The ends of their regrets follow from those of both rates (Zou and Donner, 2008,
+        # "Construction of confidence limits about effect measures").
+        low_high = np.sort(sign * np.array(ends), axis=1)
+        best_rival, settled = int(centre.argmax()), (middle <= 0.0) | (middle >= 1.0)
+        reach = np.hypot(low_high[best_rival, 1] - centre[best_rival], centre - low_high[:, 0])
+        most = np.where(settled | settled[best_rival], centre[best_rival] - centre + reach, 0.0)
     return Decision(
         winner=agents[place],
         probability_best=float(best[place]),
@@ -224,17 +230,6 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
         draws=draws,
         counts=tuple(map(float, counts)),
     )
-
-
-def _most_regrets(centre: Floats, ends: Floats, rates: Floats) -> Floats:
-    """The upper ends of regrets of agents that, or whose best rival, always or never succeeded; 0 of all others.
-
-    There the prior pulls draws away from rates that are at the end of what can be. The ends follow from those of both
-    rates (Zou and Donner, 2008, "Construction of confidence limits about effect measures").
-    """
-    best, settled = int(centre.argmax()), (rates <= 0.0) | (rates >= 1.0)
-    reach = np.hypot(ends[best, 1] - centre[best], centre - ends[:, 0])
-    return np.asarray(np.where(settled | settled[best], centre[best] - centre + reach, 0.0))
 
 
 def chosen(inputs: Comparison, decide_on: str) -> tuple[list[int], str]:

@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from proxytune.arrays import Flags, Floats
+from proxytune.arrays import Flags
 from proxytune.scores import Metric, ScoreTable
 from proxytune.usefulness import resampling
 from proxytune.usefulness.comparison import Comparison, by_start, compare, is_repeated, split_repeats, start_places
@@ -74,7 +74,14 @@ def noise_floor(*, target: ScoreTable, metrics: Sequence[Metric], splits: int = 
     if reason:
         return NoiseFloor("none", reason=reason)
     same_starts = is_repeated(chosen)
-    values = resampling.prpv_in_blocks(*_split_means(chosen, np.random.default_rng(seed), splits, same_starts), metrics)
+    rng, places = np.random.default_rng(seed), start_places(chosen)
+    keys = rng.random((splits, len(chosen.episodes))) if same_starts else None
+    means = []
+    for rows, driven in resampling.agent_blocks(chosen, splits):
+        sets = split_halves(driven, rng, splits) if keys is None else split_repeats(driven, places, keys)
+        means.append([resampling.counted_means(chosen.values[rows], own) for own in sets])
+    first, second = (np.concatenate(parts, axis=1) for parts in zip(*means, strict=True))
+    values = resampling.prpv_in_blocks(first, second, metrics)
     kind: FloorKind = "same starts" if same_starts else "halves"
     return NoiseFloor(kind, float(values.mean()), *resampling.interval(values))
 
@@ -111,17 +118,6 @@ def floor_of_repeats(
     means = resampling.counted_means(one.values, counts), resampling.counted_means(other.values, counts)
     low, high = resampling.interval(resampling.prpv_in_blocks(*means, metrics))
     return NoiseFloor("same starts", value, min(low, value), max(high, value))
-
-
-def _split_means(table: ScoreTable, rng: np.random.Generator, splits: int, same_starts: bool) -> tuple[Floats, Floats]:
-    """Mean scores of two sets of each agent's episodes, each of shape (splits, agents, metrics)."""
-    places, keys = start_places(table), rng.random((splits, len(table.episodes))) if same_starts else None
-    means = []
-    for rows, driven in resampling.agent_blocks(table, splits):
-        sets = split_halves(driven, rng, splits) if keys is None else split_repeats(driven, places, keys)
-        means.append([resampling.counted_means(table.values[rows], chosen) for chosen in sets])
-    first, second = (np.concatenate(parts, axis=1) for parts in zip(*means, strict=True))
-    return first, second
 
 
 def split_halves(driven: Flags, rng: np.random.Generator, splits: int) -> tuple[Flags, Flags]:

@@ -63,7 +63,17 @@ def ppv(inputs: Comparison, beta: Mapping[str, float] | None = None) -> Ppv:
     Raises:
         InputError: If a weight is missing, unknown, negative or not finite.
     """
-    weights = _given(inputs, beta) if beta is not None else weights_of_spread(inputs.target.means)
+    weights = weights_of_spread(inputs.target.means)
+    if beta is not None:
+        names = [metric.name for metric in inputs.metrics]
+        for name, weight in beta.items():
+            if name not in names:
+                raise InputError(f"weight of '{name}': no such metric; {nearest(name, names)}")
+            if not (np.isfinite(weight) and weight >= 0):
+                raise InputError(f"weight of '{name}': must be zero or more, got {weight}")
+        if missing := [name for name in names if name not in beta]:
+            raise InputError(f"no weight is given for {', '.join(missing)}; give one for every metric or none at all")
+        weights = np.array([beta[name] for name in names])
     each = zip(inputs.metrics, weights, strict=True)
     named = {metric.name: float(weight) if weight > 0 or beta else None for metric, weight in each}
     value = float(ppv_of_means(*inputs.means, weights)) if any(w is not None for w in named.values()) else None
@@ -78,19 +88,6 @@ def weights_of_spread(target: Floats) -> Floats:
     spreads = target.std(axis=-2, ddof=1)
     varied = varies(target) & (spreads > SMALLEST_SPREAD)
     return np.where(varied, 1.0 / np.where(varied, spreads, 1.0), 0.0)
-
-
-def _given(inputs: Comparison, beta: Mapping[str, float]) -> Floats:
-    names = [metric.name for metric in inputs.metrics]
-    for name, weight in beta.items():
-        if name not in names:
-            raise InputError(f"weight of '{name}': no such metric; {nearest(name, names)}")
-        if not (np.isfinite(weight) and weight >= 0):
-            raise InputError(f"weight of '{name}': must be zero or more, got {weight}")
-    missing = [name for name in names if name not in beta]
-    if missing:
-        raise InputError(f"no weight is given for {', '.join(missing)}; give one for every metric or none at all")
-    return np.array([beta[name] for name in names])
 
 
 @dataclass(frozen=True)

@@ -37,14 +37,18 @@ def convergence_figure(result: StudyResult) -> Figure:
     answers = [(trial.number, result.value_of(answer)) for trial, answer in pairs if answer is not None]
     # Where fresh episodes chose another answer in the end, the line ends at that one's.
     ends = [*answers, (result.trials[-1].number + 1, result.value_of(result.best.trial))]
-    named, label = (
-        [style.LineName("answer\nso far", style.VERMILLION, ends[-1][1] or 0.0)],
-        result.study.objective.label,
-    )
+    label = result.study.objective.label
+    named = [style.LineName("answer\nso far", style.VERMILLION, ends[-1][1] or 0.0)]
     axes.step(*zip(*ends, strict=True), where="post", color=style.VERMILLION, linewidth=1.5, label=named[0].words)
     if result.study.objective == PRPV:
         label = "PRPV [ordered pairs]"
-        _draw_fresh(axes, result)
+        fresh, nominal = result.expected, result.nominal.expected if result.nominal else None
+        told = [(ends[-1][0], fresh, style.VERMILLION, "D", "answer, fresh episodes")] if fresh else []
+        told += [(0, nominal, "black", "s", "simulator as it is")] if nominal else []
+        for place, expected, colour, mark, name in told:
+            value, low, high = expected.prpv.value
+            look: dict[str, Any] = {"fmt": mark, "color": colour, "label": name, "ms": 5, "capsize": 2, "zorder": 4}
+            axes.errorbar([place], [value], yerr=[[max(0.0, value - low)], [max(0.0, high - value)]], **look)
         chance, floor = result.judged.chance, result.floor
         named.append(style.LineName(f"chance\n{chance.mean:.1f}", style.GREY, chance.mean))
         axes.axhline(chance.mean, color=style.GREY, linewidth=1.0, linestyle=":", label=named[-1].words)
@@ -76,17 +80,6 @@ def _draw_points(axes: Axes, points: list[tuple[int, float]], face: str, label: 
     if points:
         numbers, scores = zip(*points, strict=True)
         axes.plot(numbers, scores, "o", color=style.BLUE, markerfacecolor=face, markersize=4, zorder=3, label=label)
-
-
-def _draw_fresh(axes: Axes, result: StudyResult) -> None:
-    last = result.trials[-1].number + 1
-    told = [(last, result.expected, style.VERMILLION, "D", "answer, fresh episodes")] if result.expected else []
-    told += [(0, result.nominal.expected, "black", "s", "simulator as it is")] if result.nominal else []
-    for place, expected, colour, mark, label in told:
-        value, low, high = expected.prpv.value
-        reach = [[max(0.0, value - low)], [max(0.0, high - value)]]
-        look: dict[str, Any] = {"markersize": 5, "capsize": 2, "zorder": 4}
-        axes.errorbar([place], [value], yerr=reach, fmt=mark, color=colour, label=label, **look)
 
 
 BINS = 60

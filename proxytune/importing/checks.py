@@ -135,7 +135,17 @@ def checked_drive(drive: Drive, where: str, offset_s: float = 0.0) -> tuple[Driv
     about = f"{where}: drive {drive.name}"
     _check_sizes((drive.poses.times, drive.poses.places), "poses", about)
     poses, notes = _ordered_poses(drive.poses, about)
-    _check_upright(poses, about)
+    tilt, spans = math.degrees(float(np.median(poses.tilts))), np.ptp(poses.places, axis=0)
+    if tilt > TILT_DEG:
+        raise LogError(
+            f"{about}: the robot's z axis lies {tilt:.0f}° from the world's for half of the drive; poses must be z-up "
+            "(x forward, y left): turn the rigid body or the world in the tracker, and export again"
+        )
+    if spans[2] > FLAT_M and spans[2] > spans[:2].min():
+        raise LogError(
+            f"{about}: z varies by {spans[2]:.2f} m, {'xy'[int(spans[:2].argmin())]} only by {spans[:2].min():.2f} m: "
+            "the world is not z-up; export poses with z upwards"
+        )
     commands = drive.commands
     if commands is not None:
         _check_sizes((commands.times, commands.values), "commands", about)
@@ -209,22 +219,6 @@ def _order(times: Floats, what: str, about: str, *, last: bool) -> tuple[np.ndar
     if sorted_times[-1] > 86400.0 and sorted_times[0] < PLAUSIBLE_S:
         notes.append(f"the stamps of its {what} lie before the year 2000: their clock was not set")
     return kept, notes
-
-
-def _check_upright(poses: Poses, about: str) -> None:
-    """Refuse poses whose upward axis is not z."""
-    tilt = math.degrees(float(np.median(poses.tilts)))
-    if tilt > TILT_DEG:
-        raise LogError(
-            f"{about}: the robot's z axis lies {tilt:.0f}° from the world's for half of the drive; poses must be z-up "
-            "(x forward, y left): turn the rigid body or the world in the tracker, and export again"
-        )
-    spans = np.ptp(poses.places, axis=0)
-    if spans[2] > FLAT_M and spans[2] > spans[:2].min():
-        raise LogError(
-            f"{about}: z varies by {spans[2]:.2f} m, {'xy'[int(spans[:2].argmin())]} only by {spans[:2].min():.2f} m: "
-            "the world is not z-up; export poses with z upwards"
-        )
 
 
 STEP_S = 0.01

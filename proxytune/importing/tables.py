@@ -257,7 +257,17 @@ def read_mrclam(path: Path, wanted: Wanted) -> Source:
     The path is one of the two files, or the folder; of a folder with several robots `wanted.poses` chooses.
     """
     match = FILE.fullmatch(path.name)
-    folder, robot = (path.parent, match[1]) if match and not path.is_dir() else (path, _choose(path, wanted.poses))
+    folder, robot = (path.parent, match[1]) if match and not path.is_dir() else (path, wanted.poses)
+    if folder == path:
+        robots = _robots(folder)
+        if not robots:
+            raise LogError(f"{path}: has no file such as Robot1_Groundtruth.dat; give a folder of the MRCLAM data set")
+        if robot and robot not in robots:
+            raise LogError(f"{path}: has no robot '{robot}'; {nearest(robot, robots)}")
+        if not robot and len(robots) > 1:
+            names = ", ".join(robots)
+            raise LogError(f"{path}: has several robots: {names}; choose one, as in --poses {robots[0]}")
+        robot = robot or robots[0]
     table, columns = read_text_table(folder / f"{robot}_Groundtruth.dat", MRCLAM_POSES), own_columns(MRCLAM_POSES)
     poses = poses_by_drive(table, columns)[""]
     channels = _channels(table, MRCLAM_POSES, "poses")
@@ -277,18 +287,6 @@ def _robots(folder: Path) -> list[str]:
         return []
     matches = (FILE.fullmatch(file.name) for file in sorted(folder.iterdir()))
     return list(dict.fromkeys(match[1] for match in matches if match))
-
-
-def _choose(folder: Path, robot: str) -> str:
-    robots = _robots(folder)
-    if not robots:
-        raise LogError(f"{folder}: has no file such as Robot1_Groundtruth.dat; give a folder of the MRCLAM data set")
-    if robot and robot not in robots:
-        raise LogError(f"{folder}: has no robot '{robot}'; {nearest(robot, robots)}")
-    if not robot and len(robots) > 1:
-        names = ", ".join(robots)
-        raise LogError(f"{folder}: has several robots: {names}; choose one, as in --poses {robots[0]}")
-    return robot or robots[0]
 
 
 def _channels(table: Table, fields: tuple[str, ...], role: str) -> list[Channel]:

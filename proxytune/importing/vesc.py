@@ -48,7 +48,9 @@ def read_vesc(bag: Bag, motor: str, gains: Path | None) -> tuple[Commands, tuple
     Raises:
         LogError: If there is no such file, or it lacks a gain.
     """
-    speed_gain, speed_offset, servo_gain, servo_offset = _read_gains(gains, f"{bag.path}: {motor}")
+    if gains is None:
+        raise LogError(f"{bag.path}: {motor}: has a VESC's units; give the car's gains by --vesc vesc.yaml")
+    speed_gain, speed_offset, servo_gain, servo_offset = _read_gains(gains)
     times, held = [], []
     for topic in (motor, servo_of(motor)):
         stamps, values = collect(bag, topic, lambda message: (message.data,))
@@ -68,9 +70,7 @@ def read_vesc(bag: Bag, motor: str, gains: Path | None) -> tuple[Commands, tuple
     return Commands("speed_steering", union, np.column_stack(columns)), (note,)
 
 
-def _read_gains(path: Path | None, where: str) -> tuple[float, ...]:
-    if path is None:
-        raise LogError(f"{where}: has a VESC's units; give the car's gains by --vesc vesc.yaml")
+def _read_gains(path: Path) -> tuple[float, ...]:
     if not path.is_file():
         raise LogError(f"{path}: no such file; give the car's vesc.yaml")
     try:

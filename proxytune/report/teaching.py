@@ -5,7 +5,6 @@ from dataclasses import asdict, astuple, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from rich.console import Group
 
@@ -37,6 +36,9 @@ PUBLISHED = tuple(
     head for name in ("zero-shot score", "samples needed", "reduction") for head in (f"{name}, published", "here")
 )
 SEARCH = '`study` with objective = "plv" looks for'
+LESSONS = ("rehearsal", "proxy_lessons", "target_lessons")
+PLAIN = ("learner", "proxy_samples", "seeds", "lesson_s", "level", "tolerance", "examinations", *LESSONS)
+"""Settings that JSON has as they are."""
 
 
 def teach_answer(experiment: teaching.Experiment) -> str:
@@ -210,7 +212,7 @@ def _published(experiment: teaching.Experiment, rows: Sequence[tuple[str, ...]])
 
 def teach_document(experiment: teaching.Experiment, prpv: Predictivities) -> dict[str, Any]:
     """A learning experiment as plain JSON; None where a figure is undefined or was not reached."""
-    found = teaching.observe(experiment, prpv)
+    found, taught = teaching.observe(experiment, prpv), teaching.teaching_settings(experiment.settings)
     return {
         "name": experiment.settings.name,
         "best_score": experiment.best_score,
@@ -227,7 +229,17 @@ def teach_document(experiment: teaching.Experiment, prpv: Predictivities) -> dic
             "prpv": _agreement_document(found.prpv if found else None),
         },
         "saves_though_it_predicts_by_chance": list(found.poor_predictors) if found else [],
-        "settings": {**settings_document(experiment.settings), "teaching": _settings_document(experiment)},
+        "settings": {
+            **settings_document(experiment.settings),
+            "teaching": {
+                "target": str(taught.target),
+                "target_samples": list(taught.target_samples),
+                **{name: getattr(taught, name) for name in PLAIN},
+                "costs": asdict(taught.costs),
+                "published": {name: asdict(row) for name, row in taught.published.items()},
+                "published_in": taught.published_in,
+            },
+        },
     }
 
 
@@ -265,20 +277,6 @@ def _curve_document(curve: LearningCurve) -> dict[str, Any]:
     return {"target_samples": list(curve.counts), "scores": scores, "examinations": len(curve.examined)}
 
 
-def _settings_document(experiment: teaching.Experiment) -> dict[str, Any]:
-    taught = teaching.teaching_settings(experiment.settings)
-    names = ("learner", "proxy_samples", "seeds", "lesson_s", "level", "tolerance", "examinations")
-    lessons = ("rehearsal", "proxy_lessons", "target_lessons")
-    return {
-        "target": str(taught.target),
-        "target_samples": list(taught.target_samples),
-        **{name: getattr(taught, name) for name in (*names, *lessons)},
-        "costs": asdict(taught.costs),
-        "published": {name: asdict(row) for name, row in taught.published.items()},
-        "published_in": taught.published_in,
-    }
-
-
 class _Look(NamedTuple):
     label: str
     colour: str
@@ -299,7 +297,14 @@ def teach_figure(experiment: teaching.Experiment) -> Figure:
     figure, panels = style.panel_grid(len(lessons), 1.25, 0.6, sharex=True, sharey=True)
     for axes, lesson in zip(panels, lessons, strict=True):
         for name, look, height in ((NONE, WITHOUT, -1.2), (lesson.name, WITH, 1.2)):
-            _draw_curve(axes, experiment, name, look)
+            draws, curve = experiment.needs.draws, experiment.needs.curves[name]
+            at, scores, examined = _places(experiment, draws.counts), draws.scores[name], curve.examined
+            low, high = np.quantile(scores, LEVELS, axis=0)
+            axes.fill_between(at, low, high, color=look.colour, alpha=0.18, linewidth=0)
+            axes.plot(at, scores.mean(axis=0), look.style, color=look.colour, linewidth=1.2, label=look.label)
+            seen = _places(experiment, np.array(curve.counts, dtype=float))[examined[:, 1]]
+            marks = curve.scores[tuple(examined.T)]
+            axes.plot(seen, marks, look.mark, color=look.colour, markersize=2, alpha=0.35)
             if lesson.worth is not None:
                 needed = lesson.worth.without if name == NONE else lesson.worth.needed
                 if needed.low is not None:
@@ -324,14 +329,3 @@ def teach_figure(experiment: teaching.Experiment) -> Figure:
 def _places(experiment: teaching.Experiment, counts: Floats) -> Floats:
     """Places of counts on the axis: as doublings, none at 0."""
     return doublings(counts, experiment.needs.draws.first)
-
-
-def _draw_curve(axes: Axes, experiment: teaching.Experiment, name: str, look: _Look) -> None:
-    draws, curve = experiment.needs.draws, experiment.needs.curves[name]
-    at, scores = _places(experiment, draws.counts), draws.scores[name]
-    low, high = np.quantile(scores, LEVELS, axis=0)
-    axes.fill_between(at, low, high, color=look.colour, alpha=0.18, linewidth=0)
-    axes.plot(at, scores.mean(axis=0), look.style, color=look.colour, linewidth=1.2, label=look.label)
-    examined = curve.examined
-    places_ = _places(experiment, np.array(curve.counts, dtype=float))[examined[:, 1]]
-    axes.plot(places_, curve.scores[tuple(examined.T)], look.mark, color=look.colour, markersize=2, alpha=0.35)

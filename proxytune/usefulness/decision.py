@@ -18,7 +18,7 @@ import numpy as np
 
 from proxytune.arrays import Floats
 from proxytune.errors import InputError
-from proxytune.scores import ROUNDING, Metric, ScoreTable
+from proxytune.scores import ROUNDING, ScoreTable
 from proxytune.settings import nearest
 from proxytune.usefulness.comparison import Comparison, by_start, start_of
 from proxytune.usefulness.resampling import CONFIDENCE, Ends, interval
@@ -463,20 +463,17 @@ def mmrv_conventions(inputs: Comparison) -> dict[str, dict[str, float]]:
     """
     if len(inputs.agents) > MOST_COMPARED:
         return {}
-    return {metric.name: _conventions(inputs, metric, column) for column, metric in enumerate(inputs.metrics)}
-
-
-def _conventions(inputs: Comparison, metric: Metric, column: int) -> dict[str, float]:
-    sign = 1.0 if metric.direction == "max" else -1.0
-    gaps, orders = [], []
-    for means in inputs.means:
-        merits = sign * means[:, column]
-        gap = merits[:, None] - merits
-        gaps.append(np.abs(gap))
-        orders.append(np.where(np.abs(gap) > ROUNDING * np.abs(merits).max(), np.sign(gap), 0.0))
-    (ours, theirs), (one, other) = gaps, orders
-    violated = {"simpler": (one > 0) != (other > 0), "strictly_less": (one < 0) != (other < 0)}
-    found = {name: float((theirs * wrong).max(axis=1).mean()) for name, wrong in violated.items()}
-    found["sign_product"] = float((theirs * (one * other < 0)).max(axis=1).mean())
-    found["proxy_gap"] = float((ours * violated["simpler"]).max(axis=1).mean())
+    found = {}
+    for column, metric in enumerate(inputs.metrics):
+        gaps, orders = [], []
+        for means in inputs.means:
+            merits = (1.0 if metric.direction == "max" else -1.0) * means[:, column]
+            gap = merits[:, None] - merits
+            gaps.append(np.abs(gap))
+            orders.append(np.where(np.abs(gap) > ROUNDING * np.abs(merits).max(), np.sign(gap), 0.0))
+        (ours, theirs), (one, other) = gaps, orders
+        simpler = (one > 0) != (other > 0)
+        costs = {"simpler": theirs * simpler, "strictly_less": theirs * ((one < 0) != (other < 0))}
+        costs |= {"sign_product": theirs * (one * other < 0), "proxy_gap": ours * simpler}
+        found[metric.name] = {name: float(cost.max(axis=1).mean()) for name, cost in costs.items()}
     return found

@@ -175,7 +175,16 @@ def residual_map(drives: Drives, both: Mapping[str, Strayed]) -> Figure:
     """
     before = next(iter(both.values()))
     extent = np.ptp(drives.poses[before.increment, 1, :2], axis=0)
-    figure, panels = _panels(len(both), extent)
+    # Maps stand above each other, where the floor is long, or side by side.
+    across = 1 if len(both) > 1 and extent[0] > WIDE * extent[1] else len(both)
+    tall = float(np.clip(extent[1] / max(extent[0], 1e-9), 0.4, 1.6)) * (style.COLUMN - 0.5) / across
+    down = len(both) // across
+    figure, grid = style.grid_of(min(tall, TALLEST) * down + 1.2, down, across, sharex=True, sharey=True)
+    panels = list(grid.ravel())
+    for axes in grid[:, 0]:
+        axes.set_ylabel("y [m]", fontsize=8)
+    for axes in grid[-1]:
+        axes.set_xlabel("x [m]", fontsize=8)
     # From the smallest distances of any model to the largest of all, but for a few; at least a factor of ten
     low, high = np.quantile(np.concatenate([one.rms for one in both.values()]), (0.02, 0.98))
     high = max(float(high), TINIEST_MM)
@@ -192,32 +201,13 @@ def residual_map(drives: Drives, both: Mapping[str, Strayed]) -> Figure:
     return figure
 
 
-def _panels(count: int, extent: Floats) -> tuple[Figure, list[Axes]]:
-    """Maps above each other, where the floor is long, or side by side."""
-    stacked = count > 1 and extent[0] > WIDE * extent[1]
-    across = 1 if stacked else count
-    tall = float(np.clip(extent[1] / max(extent[0], 1e-9), 0.4, 1.6)) * (style.COLUMN - 0.5) / across
-    down = count // across
-    figure, grid = style.grid_of(min(tall, TALLEST) * down + 1.2, down, across, sharex=True, sharey=True)
-    for axes in grid[:, 0]:
-        axes.set_ylabel("y [m]", fontsize=8)
-    for axes in grid[-1]:
-        axes.set_xlabel("x [m]", fontsize=8)
-    return figure, list(grid.ravel())
-
-
 def _paths(axes: Axes, drives: Drives, strayed: Strayed, scale: LogNorm) -> LineCollection:
     rows = np.split(strayed.increment, np.flatnonzero(np.diff(strayed.window)) + 1)
     lines = [np.concatenate((drives.poses[own[:1], 0, :2], drives.poses[own, 1, :2])) for own in rows]
     paths = LineCollection(lines, array=strayed.rms, cmap=style.SHADES, norm=scale, linewidths=1.2, capstyle="round")
     axes.add_collection(paths)
     axes.autoscale_view()
-    _arrows(axes, lines)
-    return paths
-
-
-def _arrows(axes: Axes, lines: Sequence[Floats]) -> None:
-    """A small arrow at the end of every path that leads somewhere."""
+    # A small arrow at the end of every path that leads somewhere
     last = np.array([line[-1] for line in lines])
     along = np.array([line[-1] - line[max(0, len(line) - BEFORE_END)] for line in lines])
     length = np.hypot(*along.T)
@@ -227,6 +217,7 @@ def _arrows(axes: Axes, lines: Sequence[Floats]) -> None:
             *last.T, *ahead.T, pivot="mid", angles="xy", scale=40.0, width=0.004,
             headwidth=9.0, headlength=9.0, headaxislength=8.0, minlength=0.0, color="0.25", zorder=3,
         )  # fmt: skip
+    return paths
 
 
 def _floor(axes: Axes, drives: Drives, strayed: Strayed, scale: LogNorm) -> Collection:

@@ -53,28 +53,12 @@ def mjcf_text(instance: Instance) -> str:
     else:
         sides = enumerate(("left", "right"))
         actuators = [_speed_servo(instance, f'name="{one}" joint="axle_{one}"', side, 1) for side, one in sides]
-    return fill(
-        "mujoco.xml.txt",
-        **said,
-        name=name,
-        comment=xml_comment(instance, "mjcf", 7),
-        chassis_size=f"{length / 2.0:.6g} {0.35 * baseline:.6g} {height / 2.0:.6g}",
-        parts="\n".join([own["front_wheel" if wheelbase else "caster"], *_parts(instance)]),
-        control="throttle and steering (left is above 0)" if wheelbase else "duties of the left and right wheels",
-        excluded='    <exclude body1="$name" body2="wheel_front"/>\n'.replace("$name", name) if wheelbase else "",
-        tendons=own["open_differential"] if wheelbase else "",
-        actuators="\n".join(actuators),
-    )
-
-
-def _parts(instance: Instance) -> list[str]:
-    """The camera and the tracked point, where there are such."""
     parts = []
     if (camera := instance.camera) is not None:
         # It looks along its −z axis; its x axis is the picture's right, its y axis the picture's top.
         turned = orientation(camera)
-        sides = np.concatenate((-turned[:, 1], turned[:, 2])).tolist()
-        axes = " ".join(f"{round(value, 12) + 0.0:.9g}" for value in sides)
+        edges = np.concatenate((-turned[:, 1], turned[:, 2])).tolist()
+        axes = " ".join(f"{round(value, 12) + 0.0:.9g}" for value in edges)
         place, size = f"{camera.forward_m:.9g} 0 {camera.height_m:.9g}", f"{camera.columns} {camera.rows}"
         looks = f'xyaxes="{axes}" fovy="{camera.field_of_view_deg:.9g}" resolution="{size}"'
         parts.append(f'<camera name="camera" pos="{place}" {looks}/>')
@@ -82,7 +66,18 @@ def _parts(instance: Instance) -> list[str]:
         forward, left, angle = tracked
         turn = f"{math.cos(angle / 2.0):.9g} 0 0 {math.sin(angle / 2.0):.9g}"
         parts.append(f'<site name="tracked_point" pos="{forward:.9g} {left:.9g} 0" quat="{turn}"/>')
-    return [f"      {part}" for part in parts]
+    return fill(
+        "mujoco.xml.txt",
+        **said,
+        name=name,
+        comment=xml_comment(instance, "mjcf", 7),
+        chassis_size=f"{length / 2.0:.6g} {0.35 * baseline:.6g} {height / 2.0:.6g}",
+        parts="\n".join([own["front_wheel" if wheelbase else "caster"], *(f"      {part}" for part in parts)]),
+        control="throttle and steering (left is above 0)" if wheelbase else "duties of the left and right wheels",
+        excluded='    <exclude body1="$name" body2="wheel_front"/>\n'.replace("$name", name) if wheelbase else "",
+        tendons=own["open_differential"] if wheelbase else "",
+        actuators="\n".join(actuators),
+    )
 
 
 def _speed_servo(instance: Instance, place: str, side: int, wheels: int) -> str:

@@ -1,6 +1,5 @@
 """Figures of a study: how the answer improved, what is left of each parameter, where the trials were, what matters."""
 
-from collections.abc import Sequence
 from textwrap import fill
 from typing import Any
 
@@ -175,7 +174,16 @@ def evaluations_figure(result: StudyResult) -> Figure:
     if not pairs:
         _alone(figure.add_subplot(grid[0, 0]), result, norm)
     floor = "" if result.floor.value is None else f"\n{style.floor_name(result.floor)} {result.floor.value:.1f}"
-    _key(figure.add_subplot(grid[0, 1:]), figure.axes[: len(pairs) or 1], norm, f"PRPV [ordered pairs]{floor}")
+    # The colours of PRPV and what the marks are stand in the corner that the pairs leave free.
+    panels, key = figure.axes[: len(pairs) or 1], figure.add_subplot(grid[0, 1:])
+    key.set_axis_off()
+    place = key.inset_axes((0.15, 0.8, 0.8, 0.08))
+    bar = figure.colorbar(ScalarMappable(norm, style.SHADES), cax=place, orientation="horizontal")
+    bar.ax.set_title(f"PRPV [ordered pairs]{floor}", fontsize=7)
+    bar.ax.tick_params(labelsize=7)
+    named = style.named_handles(panels)
+    look: dict[str, Any] = {"loc": "upper center", "fontsize": 7, "frameon": False}
+    key.legend(list(named.values()), list(named), bbox_to_anchor=(0.55, 0.62), **look)
     return figure
 
 
@@ -194,7 +202,19 @@ def _pair(axes: Axes, result: StudyResult, places: tuple[int, int], norm: Normal
             axes.set_title(f"trade off: {fixed(correlation, 1)}", fontsize=7, pad=2)
     axes.set_xlim(across.low, across.high)
     axes.set_ylim(up.low, up.high)
-    _name(axes, result, places)
+    # Names and figures only at the left and the bottom; three figures a side, which is what fits
+    units = result.study.family.parameters
+    style.dress(axes)
+    axes.xaxis.set_major_locator(MaxNLocator(2))
+    axes.yaxis.set_major_locator(MaxNLocator(3))
+    if places[1] == len(intervals) - 1:
+        axes.set_xlabel(fill(with_unit(across.name, units[across.name].unit), WIDEST), fontsize=7)
+    else:
+        axes.set_xticklabels([])
+    if places[0] == 0:
+        axes.set_ylabel(fill(with_unit(up.name, units[up.name].unit), WIDEST), fontsize=7)
+    else:
+        axes.set_yticklabels([])
 
 
 def _alone(axes: Axes, result: StudyResult, norm: Normalize) -> None:
@@ -248,37 +268,6 @@ def _shadow(axes: Axes, result: StudyResult, places: tuple[int, int]) -> None:
     across, up = (np.concatenate([e[:1], 0.5 * (e[1:] + e[:-1]), e[-1:]]) for e in edges)
     axes.contourf(across, up, smooth.T, levels=[EDGE, 2.0], colors=[style.LIGHT_BLUE], alpha=0.35, zorder=0)
     axes.fill_between([], [], color=style.LIGHT_BLUE, alpha=0.35, linewidth=0, label=REGION)
-
-
-def _name(axes: Axes, result: StudyResult, places: tuple[int, int]) -> None:
-    """Names and figures only at the left and the bottom; three figures a side, which is what fits."""
-    intervals, units = result.study.settings.space.intervals, result.study.family.parameters
-    style.dress(axes)
-    axes.xaxis.set_major_locator(MaxNLocator(2))
-    axes.yaxis.set_major_locator(MaxNLocator(3))
-    if places[1] == len(intervals) - 1:
-        name = intervals[places[0]].name
-        axes.set_xlabel(fill(with_unit(name, units[name].unit), WIDEST), fontsize=7)
-    else:
-        axes.set_xticklabels([])
-    if places[0] == 0:
-        name = intervals[places[1]].name
-        axes.set_ylabel(fill(with_unit(name, units[name].unit), WIDEST), fontsize=7)
-    else:
-        axes.set_yticklabels([])
-
-
-def _key(axes: Axes, panels: Sequence[Axes], norm: Normalize, title: str) -> None:
-    """The colours of PRPV and what the marks are, in the corner that the pairs leave free."""
-    axes.set_axis_off()
-    bar = axes.figure.colorbar(
-        ScalarMappable(norm, style.SHADES), cax=axes.inset_axes((0.15, 0.8, 0.8, 0.08)), orientation="horizontal"
-    )
-    bar.ax.set_title(title, fontsize=7)
-    bar.ax.tick_params(labelsize=7)
-    named = style.named_handles(panels)
-    look: dict[str, Any] = {"loc": "upper center", "fontsize": 7, "frameon": False}
-    axes.legend(list(named.values()), list(named), bbox_to_anchor=(0.55, 0.62), **look)
 
 
 def importance_figure(result: StudyResult) -> Figure:

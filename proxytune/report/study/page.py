@@ -64,13 +64,7 @@ def theta_table(result: StudyResult) -> Table:
     left = percent(result.knowledge.posterior.share)
     rows.append(("share of the box", "", left, *(() if truth is None else ("",)), percent(share), ""))
     heads = ("best", "95 % interval", *(() if truth is None else ("truth",)), "by PRPV alone", "box")
-    return Table(THETA, columns_of(("parameter",), heads), tuple(rows), tuple(_theta_notes(result)))
-
-
-def _theta_notes(result: StudyResult) -> list[str]:
-    """Notes on what the table of θ does not hold, most needed first."""
-    space, learnt = result.study.settings.space, result.knowledge
-    notes = []
+    space, learnt, notes = result.study.settings.space, result.knowledge, list[str]()  # Most needed first
     if learnt.unidentified:
         few = f"{len(result.trials) + result.earlier} trials exclude almost no value of"
         names = listed(list(map(plain, learnt.unidentified)))
@@ -85,7 +79,7 @@ def _theta_notes(result: StudyResult) -> list[str]:
         f"(correlation {fixed(correlation, 1)})"
         for one, other, correlation in sorted(learnt.trades, key=lambda pair: -abs(pair[2]))
     ]
-    return [*notes, *result.cautions]
+    return Table(THETA, columns_of(("parameter",), heads), tuple(rows), (*notes, *result.cautions))
 
 
 def usefulness_table(result: StudyResult) -> Table:

@@ -29,19 +29,18 @@ def read_sides(
     for name, theirs in columns.items():
         if theirs not in found:
             raise InputError(f"--columns {name}={theirs}: no table has a column '{theirs}'; {nearest(theirs, found)}")
-    _check_other_column(arguments, metrics)
-    target = _read_target(arguments.target, metrics, columns, both=arguments.target == arguments.proxy)
-    return target, _read_proxies(arguments.proxy, arguments.target, metrics, columns)
-
-
-def _check_other_column(arguments: argparse.Namespace, metrics: Sequence[str]) -> None:
-    """Refuse to compare a column with itself."""
     for source in set(arguments.target) & set(arguments.proxy):
-        path, domain = split_source(source)
-        header = scores.column_names(path, domain)
-        if domain is None and "domain" in header:
-            continue
-        scores.check_sides(source, header, metrics)
+        header = scores.column_names(*split_source(source))
+        if split_source(source)[1] is not None or "domain" not in header:
+            scores.check_sides(source, header, metrics)
+    parts = [split_source(source) for source in arguments.target]
+    if len({domain for _, domain in parts}) > 1:
+        several = "several files make one table; give all of them one domain, or none"
+        raise InputError(f"--target {arguments.target[1]}: {several}")
+    paths, domain = [path for path, _ in parts], parts[0][1]
+    own = "real" if arguments.target == arguments.proxy else ", ".join(path.stem for path in paths)
+    target = scores.read_scores(paths, metrics, domain, _present(columns, paths), "target")
+    return (domain or own, target), _read_proxies(arguments.proxy, arguments.target, metrics, columns)
 
 
 def _metrics_given(arguments: argparse.Namespace) -> list[str]:
@@ -67,17 +66,6 @@ def split_source(source: str) -> tuple[Path, str | None]:
     if not colon or Path(source).exists() or not path:
         return Path(source), None
     return Path(path), domain
-
-
-def _read_target(
-    sources: Sequence[str], metrics: Sequence[str], columns: Mapping[str, str], *, both: bool
-) -> tuple[str, scores.ScoreTable]:
-    parts = [split_source(source) for source in sources]
-    if len({domain for _, domain in parts}) > 1:
-        raise InputError(f"--target {sources[1]}: several files make one table; give all of them one domain, or none")
-    paths, domain = [path for path, _ in parts], parts[0][1]
-    name = domain or ("real" if both else ", ".join(path.stem for path in paths))
-    return name, scores.read_scores(paths, metrics, domain, _present(columns, paths), "target")
 
 
 def _read_proxies(

@@ -97,7 +97,17 @@ def bags_in(path: Path) -> dict[str, Path]:
 def open_bag(path: Path) -> Iterator[Bag]:
     """Open a bag while it is read."""
     check_bag_size(path)
-    reader = _open_reader(path)
+    try:
+        from rosbags.highlevel import AnyReader
+        from rosbags.typesys import Stores, get_typestore
+    except ModuleNotFoundError:
+        raise LogError(f"{path}: reading bags needs rosbags; {to_install('ros')}") from None
+    with complaints(path, "cannot be read as a bag"):
+        # The library would take a ROS 2 folder named run.bag for a file of ROS 1.
+        inside = path.suffix == ROS1 and path.is_dir()
+        paths = sorted(file for file in path.glob("*") if file.suffix in ROS2) if inside else [path]
+        reader = AnyReader(paths, default_typestore=get_typestore(Stores.ROS2_HUMBLE))
+        reader.open()
     try:
         with complaints(path, "cannot be read as a bag"):
             check_messages_size(path, reader)
@@ -112,21 +122,6 @@ def form_of(path: Path) -> str:
         return "ROS 1 bag"
     files = [path] if path.is_file() else path.glob("*")
     return "ROS 2 bag (mcap)" if any(".mcap" in file.suffixes for file in files) else "ROS 2 bag (sqlite3)"
-
-
-def _open_reader(path: Path) -> Any:
-    try:
-        from rosbags.highlevel import AnyReader
-        from rosbags.typesys import Stores, get_typestore
-    except ModuleNotFoundError:
-        raise LogError(f"{path}: reading bags needs rosbags; {to_install('ros')}") from None
-    with complaints(path, "cannot be read as a bag"):
-        # The library would take a ROS 2 folder named run.bag for a file of ROS 1.
-        inside = path.suffix == ROS1 and path.is_dir()
-        paths = sorted(file for file in path.glob("*") if file.suffix in ROS2) if inside else [path]
-        reader = AnyReader(paths, default_typestore=get_typestore(Stores.ROS2_HUMBLE))
-        reader.open()
-    return reader
 
 
 @contextmanager

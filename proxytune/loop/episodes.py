@@ -84,11 +84,21 @@ def write_pictures(closed: Closed) -> None:
     texts = []
     if gain and both:
         metrics = [metric.name for metric in closed.loop.settings.metrics]
-        for name, pair, caption in zip(BothEpisodes._fields, both, _captions(closed, gain, both), strict=True):
+        agent, start, starts = gain["agent"], both.before.episode.start, _starts(closed)
+        pairs = f"{short(gain['wrong_pairs_before'])} before, {short(gain['wrong_pairs_after'])} after"
+        chosen = f", where of starts 0 to {starts[-1]} the two are furthest apart on average" if starts[1:] else ""
+        first = (
+            f"Wrongly ordered pairs with {agent}: {pairs}. Here it drives in the proxy tuned before and in the target, "
+            f"under the same seed from start {start}{chosen}."
+        )
+        before, after = (f"{say_parting(pair)} {_scores(pair, metrics)}" for pair in both)
+        rest = "This is one episode; the order of the agents counts every start, under other seeds."
+        captions = f"{first} {before}", f"The same start and seed in the extended proxy. {after} {rest}"
+        for name, pair, caption in zip(BothEpisodes._fields, both, captions, strict=True):
             drawn = episode_figure(pair, metrics)
             save_figure(drawn, path.with_name(f"{name}.png"))
             write_text(path.with_name(f"{name}.svg"), svg_of(drawn).decode("utf-8"))
-            title = f"{gain['agent']} beside the target, {name}"
+            title = f"{agent} beside the target, {name}"
             texts.append({"file": f"{name}.svg", "title": title, "caption": caption})
     write_text(path, json.dumps(texts, indent=2) + "\n")
 
@@ -149,20 +159,6 @@ def _drive(
 
 def _starts(closed: Closed) -> range:
     return range(min(MOST_STARTS, closed.loop.settings.starts))
-
-
-def _captions(closed: Closed, gain: dict[str, Any], both: BothEpisodes) -> tuple[str, str]:
-    agent, start, starts = gain["agent"], both.before.episode.start, _starts(closed)
-    pairs = f"{short(gain['wrong_pairs_before'])} before, {short(gain['wrong_pairs_after'])} after"
-    chosen = f", where of starts 0 to {starts[-1]} the two are furthest apart on average" if starts[1:] else ""
-    first = (
-        f"Wrongly ordered pairs with {agent}: {pairs}. Here it drives in the proxy tuned before and in the target, "
-        f"under the same seed from start {start}{chosen}."
-    )
-    metrics = [metric.name for metric in closed.loop.settings.metrics]
-    before, after = (f"{say_parting(pair)} {_scores(pair, metrics)}" for pair in both)
-    rest = "This is one episode; the order of the agents counts every start, under other seeds."
-    return f"{first} {before}", f"The same start and seed in the extended proxy. {after} {rest}"
 
 
 def _scores(pair: SideBySide, metrics: list[str]) -> str:

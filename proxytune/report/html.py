@@ -82,7 +82,15 @@ def page_html(view: View, foot: Foot, renew_s: int = 0) -> str:
     titles = (html.escape(one.title) for one in view.parts)
     items = "".join(f'<li><a href="#part-{n}">{title}</a></li>' for n, title in enumerate(titles, start=1))
     said = re.sub(r"<svg.*?</svg>|<[^>]*>", " ", parts + _text(view.sentence), flags=re.DOTALL)
-    used = {word: means for word, means in WORDS.items() if re.search(rf"\b{word}", said)}
+    used = [f"<dt>{word}</dt><dd>{means}</dd>" for word, means in WORDS.items() if re.search(rf"\b{word}", said)]
+    settings = Table("Settings", (Column(""), Column("")), foot.settings)
+    below = [_part(settings, "settings")] if foot.settings else []
+    if foot.command:
+        command = f"<pre><code>{html.escape(foot.command)}</code></pre>"
+        below.append(f'<section><h2 id="again">The command that makes this page</h2>{command}</section>')
+    below += [f'<section><h2 id="words">Words on this page</h2><dl>{"".join(used)}</dl></section>'] if used else []
+    versions = ", ".join(f"{name} {version}" for name, version in foot.versions)
+    written = [f"Written {foot.date}"] * bool(foot.date) + [f"with {versions}"] * bool(versions)
     return fill(
         "page.html.txt",
         title=html.escape(view.title),
@@ -94,7 +102,7 @@ def page_html(view: View, foot: Foot, renew_s: int = 0) -> str:
         following=following if view.next_step else "",
         contents=f'<nav aria-label="Contents"><ol>{items}</ol></nav>\n' if len(view.parts) > MANY else "",
         parts=parts,
-        foot=_foot(foot, "".join(f"<dt>{word}</dt><dd>{means}</dd>" for word, means in used.items())),
+        foot="\n".join([*below, f"<p>{html.escape(' '.join(written))}.</p>" if written else ""]),
     )
 
 
@@ -185,18 +193,6 @@ def _cell(text: str, column: Column) -> str:
 
 def _class(column: Column, length: int = 0) -> str:
     return ' class="prose"' if length > PROSE else ' class="number"' if column.numbers else ""
-
-
-def _foot(foot: Foot, words: str) -> str:
-    settings = Table("Settings", (Column(""), Column("")), foot.settings)
-    versions = ", ".join(f"{name} {version}" for name, version in foot.versions)
-    parts = [_part(settings, "settings")] if foot.settings else []
-    if foot.command:
-        command = f"<pre><code>{html.escape(foot.command)}</code></pre>"
-        parts.append(f'<section><h2 id="again">The command that makes this page</h2>{command}</section>')
-    written = [f"Written {foot.date}"] * bool(foot.date) + [f"with {versions}"] * bool(versions)
-    parts += [f'<section><h2 id="words">Words on this page</h2><dl>{words}</dl></section>'] if words else []
-    return "\n".join([*parts, f"<p>{html.escape(' '.join(written))}.</p>" if written else ""])
 
 
 def _text(text: str) -> str:

@@ -193,10 +193,9 @@ def _ranking(assessments: Assessments, selection: Selection, target: str, notes:
 
 def _sizes(assessment: Assessment) -> str:
     inputs = assessment.inputs
-    sides = (("proxy", inputs.proxy_episodes), ("target", inputs.target_episodes))
     counts = [
         f"{low if low == high else f'{low} to {high}'} {side} episode{'' if high == 1 else 's'}"
-        for side, (low, high) in sides
+        for side, (low, high) in zip(("proxy", "target"), inputs.episodes, strict=True)
     ]
     return f"{len(inputs.agents)} agents, {counts[0]} and {counts[1]} each"
 
@@ -284,8 +283,8 @@ def score_document(assessment: Assessment) -> dict[str, Any]:
         "agents": list(inputs.agents),
         "metrics": [str(metric) for metric in inputs.metrics],
         "episodes": {
-            "proxy": list(inputs.proxy_episodes),
-            "target": list(inputs.target_episodes),
+            "proxy": list(inputs.episodes[0]),
+            "target": list(inputs.episodes[1]),
             "paired": inputs.paired,
             "resamples": inner.resamples,
         },

@@ -26,7 +26,7 @@ from proxytune.report.writing import picture_of, write_text
 from proxytune.space import Theta
 from proxytune.study import StudySettings
 from proxytune.sweep import METRICS, OUTWARDS, Series, SweepCurve, SweepPoint, describe_shape, series_of, shape_of
-from proxytune.usefulness import MEASURES, POD_IMAGE, POD_POSE, PPV, PRPV, SRCC, Assessment, Measure
+from proxytune.usefulness import MEASURES, POD_IMAGE, POD_POSE, PPV, PRPV, SRCC, Assessment
 
 OF_PRPV = ("prpv", "prpv_interval", "prpv_normalised", "expected_prpv")
 KEYS = (*OF_PRPV, *(one.key for one in MEASURES if one is not PRPV), "intervals", "chance", "at_noise_floor")
@@ -113,14 +113,8 @@ def curve_tables(curve: SweepCurve) -> tuple[Table, Table]:
     heads = [[one.name.replace(" ", "\n").replace("_", "\n") for one in own] for own in sides]
     columns = [columns_of((), (curve.label, *own)) for own in heads]
     first, second = (f"Along {curve.parameter}: {kind} measures" for kind in ("the paper's", "other"))
-    lines = tuple(curve_lines(curve))
+    lines = tuple(f"{curve.parameter}: {describe_shape(one, curve.base.get(curve.parameter))}" for one in series)
     return Table(first, columns[0], tuple(rows[0]), lines), Table(second, columns[1], tuple(rows[1]))
-
-
-def curve_lines(curve: SweepCurve) -> list[str]:
-    """Say what the curve shows, a line per measure: where it is best, and whether it worsens on both sides."""
-    held_at = curve.base.get(curve.parameter)
-    return [f"{curve.parameter}: {describe_shape(series, held_at)}" for series in series_of(curve)]
 
 
 def shapes_note(curve: SweepCurve) -> str:
@@ -290,12 +284,12 @@ def sweep_figure(curves: Sequence[SweepCurve], truth: Theta | None = None) -> Fi
     for curve, row in zip(curves, panels, strict=True):
         draw_prpv_and_ppv(row[0], row[1], curve)
         for axes in row:
-            axes.set_xlabel(label_of(curve), fontsize=8)
+            axes.set_xlabel(plain(curve.label), fontsize=8)
             mark_values(axes, curve, truth)
     # Only now: a limit set earlier would hide what later rows of the shared axis hold.
     for axes, measure in zip(panels[0], (PRPV, PPV), strict=True):
         axes.set_ylim(bottom=-0.03 * axes.get_ylim()[1])
-        axes.set_title(axis_of(measure), fontsize=8)
+        axes.set_title(with_unit(measure.name, measure.unit), fontsize=8)
     style.legend_below(figure, *panels.ravel(), without=["PRPV"])
     return figure
 
@@ -315,14 +309,14 @@ def panels_figure(curve: SweepCurve, truth: Theta | None = None) -> Figure:
         draw_series(srcc, one, colour, marker, f"SRCC, {one.metric.replace('_', ' ')}")
     for axes, measure in zip(pod, POD_NAMES, strict=False):
         draw_series(axes, next(one for one in series if one.measure is measure), style.BLUE, "o", POD_NAMES[measure])
-    for axes, name in zip((prpv, ppv, srcc, *pod), (PRPV, PPV, SRCC, *POD_NAMES), strict=False):
-        axes.set_title(POD_NAMES.get(name) or axis_of(name), fontsize=8)
+    for axes, measure in zip((prpv, ppv, srcc, *pod), (PRPV, PPV, SRCC, *POD_NAMES), strict=False):
+        axes.set_title(POD_NAMES.get(measure) or with_unit(measure.name, measure.unit), fontsize=8)
         mark_values(axes, curve, truth)
         axes.set_xlim(prpv.get_xlim())
         axes.xaxis.set_major_locator(MaxNLocator(4))
     for axes in (prpv, ppv, *pod):
         axes.set_ylim(bottom=min(0.0, -0.03 * axes.get_ylim()[1]))
-    figure.supxlabel(label_of(curve), fontsize=8)
+    figure.supxlabel(plain(curve.label), fontsize=8)
     # The empty panel has the key of the others; the measure itself is left to its axis.
     key.set_axis_off()
     named = style.named_handles((prpv, srcc))
@@ -364,7 +358,7 @@ def bars_figure(curves: Sequence[SweepCurve]) -> Figure:
             if inner.low is not None and inner.high is not None:
                 ends = [[score - inner.low], [inner.high - score]]
                 axes.errorbar([spot], [score], yerr=ends, fmt="none", ecolor="0.2", lw=1.0, capsize=2, label=INTERVAL)
-        name = fill(label_of(curve), max(5, CHARACTERS // len(curves)))
+        name = fill(plain(curve.label), max(5, CHARACTERS // len(curves)))
         axes.text(
             (spots[0] + spots[-1]) / 2, 1.02, name, transform=axes.get_xaxis_transform(),
             ha="center", va="bottom", fontsize=7,
@@ -373,7 +367,7 @@ def bars_figure(curves: Sequence[SweepCurve]) -> Figure:
     if found:
         draw_levels(axes, found)
         style.legend_below(figure, axes)
-    style.dress(axes, up=axis_of(PRPV))
+    style.dress(axes, up=with_unit(PRPV.name, PRPV.unit))
     axes.set_xticks([spot for spot, _ in ticks], [text for _, text in ticks], rotation=90)
     return figure
 
@@ -434,13 +428,3 @@ def mark_values(axes: Axes, curve: SweepCurve, truth: Theta | None) -> None:
     if truth is not None and curve.parameter in truth:
         style.mark_truth(axes, truth[curve.parameter])
     style.dress(axes)
-
-
-def axis_of(measure: Measure) -> str:
-    """Name of a measure on an axis."""
-    return with_unit(measure.name, measure.unit)
-
-
-def label_of(curve: SweepCurve) -> str:
-    """Name of a curve's parameter on an axis."""
-    return curve.label.replace("_", " ")

@@ -30,7 +30,6 @@ from proxytune.usefulness.decision import (
     compare_choices,
     compare_savings,
     decide,
-    use_two,
 )
 from proxytune.usefulness.noise import Chance, NoiseFloor, SuccessRates, chance, noise_floor, success_rates
 from proxytune.usefulness.pairs import Prpv, prpv, prpv_of_means
@@ -268,10 +267,14 @@ def assess_each(
     if len(found) == 1:
         return found, None
     inputs, saves = {name: one.inputs for name, one in found.items()}, {name: one.saves for name, one in found.items()}
+    # The target rectified by the two proxies that save most
+    names = sorted(saves, key=lambda name: -(saves[name].real_rollouts_worth or 0.0))[:2]
+    one, other = (inputs[name] for name in names)
+    both = saving_of(one, chosen(one, asked.decide_on)[0][0], other)
     return found, replace(
         select_proxy(proxies=proxies, target=target, metrics=metrics, resamples=resamples, seed=seed),
         choices=(*compare_choices(inputs, asked, seed), *compare_savings(saves)),
-        together=use_two(inputs, saves, asked, seed),
+        together=Together((names[0], names[1]), both, decide(one, asked, both, seed)),
     )
 
 

@@ -56,14 +56,9 @@ class Comparison:
         return int(min((repeats(side) > 0).sum(axis=1).min() for side in (self.proxy, self.target)))
 
     @property
-    def proxy_episodes(self) -> tuple[int, int]:
-        """Fewest and most episodes of an agent in the proxy."""
-        return int(self.proxy.counts.min()), int(self.proxy.counts.max())
-
-    @property
-    def target_episodes(self) -> tuple[int, int]:
-        """Fewest and most episodes of an agent on the target."""
-        return int(self.target.counts.min()), int(self.target.counts.max())
+    def episodes(self) -> tuple[tuple[int, int], ...]:
+        """Fewest and most episodes of an agent, in the proxy and on the target."""
+        return tuple((int(side.counts.min()), int(side.counts.max())) for side in (self.proxy, self.target))
 
 
 def compare(*, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -> Comparison:

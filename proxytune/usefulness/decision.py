@@ -22,7 +22,7 @@ from proxytune.scores import ROUNDING, ScoreTable
 from proxytune.settings import nearest
 from proxytune.usefulness.comparison import Comparison, by_start, start_of
 from proxytune.usefulness.resampling import CONFIDENCE, Ends, interval
-from proxytune.usefulness.saving import Saving, effective, is_rate, rate_intervals, saving_of
+from proxytune.usefulness.saving import Saving, effective, is_rate, rate_intervals
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -444,14 +444,6 @@ class Together:
     proxies: tuple[str, str]
     saves: Saving
     decision: Decision
-
-
-def use_two(inputs: Mapping[str, Comparison], savings: Mapping[str, Saving], asked: Asked, seed: int = 0) -> Together:
-    """Rectify the target by the two proxies that save most."""
-    names = sorted(savings, key=lambda name: -(savings[name].real_rollouts_worth or 0.0))[:2]
-    one, other = (inputs[name] for name in names)
-    saves = saving_of(one, chosen(one, asked.decide_on)[0][0], other)
-    return Together((names[0], names[1]), saves, decide(one, asked, saves, seed))
 
 
 def mmrv_conventions(inputs: Comparison) -> dict[str, dict[str, float]]:

@@ -253,18 +253,13 @@ def corners_of(marks: Floats, paths: Floats, low: Floats, high: Floats) -> list[
     labels: list[Floats] = []
     for mark in marks:
         centres = mark + CORNERS * (half + GAP * width)
-        costs = [_cost(centre, half, (marks, np.array(labels), paths), (low, high)) for centre in centres]
-        best = int(np.argmin(costs))
+        outside = ((centres - half < low) | (centres + half > high)).any(axis=1)
+        hidden = [_within(marks, at, half) + _within(np.array(labels), at, 2.0 * half) for at in centres]
+        on_paths = [_within(paths, at, half) for at in centres]
+        best = int(np.argmin(OUTSIDE * outside + HIDES * np.array(hidden) + on_paths))
         labels.append(centres[best])
         chosen.append((int(CORNERS[best, 0]), int(CORNERS[best, 1])))
     return chosen
-
-
-def _cost(centre: Floats, half: Floats, others: tuple[Floats, Floats, Floats], box: tuple[Floats, Floats]) -> int:
-    marks, labels, paths = others
-    outside = bool((centre - half < box[0]).any() or (centre + half > box[1]).any())
-    hidden = _within(marks, centre, half) + _within(labels, centre, 2.0 * half)
-    return OUTSIDE * outside + HIDES * hidden + _within(paths, centre, half)
 
 
 def _within(places: Floats, centre: Floats, half: Floats) -> int:

@@ -54,10 +54,6 @@ class Animation:
         self._canvas.draw()
         self._still = self._canvas.copy_from_bbox(figure.bbox)
 
-    def samples(self) -> list[NDArray[np.uint8]]:
-        """Three frames that show every colour: of the beginning, the middle and the end."""
-        return [self.frame(self.times[place]) for place in (0, len(self.times) // 2, -1)]
-
     def frame(self, time: float) -> NDArray[np.uint8]:
         """Frame of a time [s], (rows, columns, 3)."""
         self._canvas.restore_region(self._still)
@@ -190,7 +186,9 @@ def write_episode(pair: SideBySide, metrics: Sequence[str], path: Path) -> None:
         if path.suffix.lower() == MP4:
             write_mp4(path, frames, FRAME_HZ)
         else:
-            write_gif(path, frames, animation.samples(), FRAME_HZ)
+            # Three frames that show every colour: of the beginning, the middle and the end
+            shown = (animation.times[place] for place in (0, len(animation.times) // 2, -1))
+            write_gif(path, frames, [*map(animation.frame, shown)], FRAME_HZ)
 
 
 def _count_frames(animation: Animation, watcher: Watcher) -> Iterator[Frame]:

@@ -19,12 +19,9 @@ from proxytune.settings import GEOMETRY
 
 @dataclass(frozen=True)
 class Commands:
-    """Commands as they were issued, M of them.
+    """Commands (M, 2) as they were issued at times (M,) [s], as stamped; `proxytune.logs.COMMANDS` has their kinds.
 
-    Attributes:
-        kind: One of `proxytune.logs.COMMANDS`, which says what the two columns are.
-        times: When each was issued (M,) [s], as stamped.
-        values: What was commanded (M, 2); a third column is `enabled`, where the source has it.
+    A third column is `enabled`, where the source has it.
     """
 
     kind: str

@@ -25,15 +25,10 @@ def short(kind: str) -> str:
 
 @dataclass(frozen=True)
 class Role:
-    """Something that a log needs of a bag, and how its topic is found.
+    """Something that a log needs of a bag, the option that names its topic, and types of message by their ranks.
 
-    Attributes:
-        name: What the topic is taken for.
-        option: The option that names the topic.
-        ranks: Types of message that can be it, without their package; the lowest rank goes first.
-        first: Parts of names that go first, the foremost first.
-        never: Parts of names that are something else, whatever their type.
-        asked: Types that are taken only where the topic is named.
+    Names with parts that go first are taken before others, those with parts of something else never; some types are
+    taken only where the topic is asked for by name.
     """
 
     name: str

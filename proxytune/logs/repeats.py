@@ -27,13 +27,9 @@ USUAL = 0.05
 
 
 class Runs(NamedTuple):
-    """The poses of a drive without their repeats, N of them.
+    """The poses of a drive without their repeats: how many rows show each (N,), and speeds between (N − 1,) [m/s].
 
-    Attributes:
-        known: Rows with a pose (rows,).
-        fresh: Which of these have another pose than the one before (rows,).
-        counts: How many rows show each pose (N,).
-        speeds: From each to the next (N − 1,) [m/s], turns counted as ways.
+    Turns count as ways. Of the rows with a pose (rows,), those are fresh that have another than the one before.
     """
 
     known: Whole

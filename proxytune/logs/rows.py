@@ -159,13 +159,9 @@ def check_known_episodes(rows: Rows, names: Sequence[str]) -> None:
 
 
 class _Part(NamedTuple):
-    """Some of the rows.
+    """Some of the rows, all (N,): line in the file, episode, and columns by name, NaN where a cell is no number.
 
-    Attributes:
-        lines: Line of each row in the file (N,).
-        labels: Its episode (N,), texts.
-        values: Columns by name (N,), NaN where a cell is empty or no number.
-        wrong: Line and text of the first cell of a column that is neither a number nor may be empty.
+    Of each column `wrong` has line and text of the first cell that is neither a number nor may be empty.
     """
 
     lines: Whole

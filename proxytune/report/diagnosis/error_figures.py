@@ -93,14 +93,9 @@ SQUARES = 60
 
 
 class Strayed(NamedTuple):
-    """Distances of predictions in windows (W,) and at the poses (M,) in them.
+    """Distances of predicted poses (M,) from the measured ones, and their root mean square over each window (W,) [mm].
 
-    Attributes:
-        horizon_s: How long the windows are [s].
-        window: The window of each pose (M,).
-        increment: The increment that ends with it (M,).
-        distance: From the predicted pose to the measured one (M,) [mm].
-        rms: Its root mean square over each window (W,) [mm].
+    Each pose is in a window of so many seconds, and ends an increment (M,).
     """
 
     horizon_s: float

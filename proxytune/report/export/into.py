@@ -26,14 +26,9 @@ XACRO = "is a program that makes a URDF: run `xacro {0} > {1}`, patch {1}, and c
 
 @dataclass(frozen=True)
 class Wheel:
-    """A driven wheel in a file.
+    """A driven wheel in a file, by its joint: its centre in the frame that wheels and camera share (3,) [m].
 
-    Attributes:
-        joint: Name of its joint.
-        centre: Where it is in the frame that wheels and camera share (3,) [m].
-        radius_m: Its radius [m]; None where it is a mesh.
-        move: Moves it by so much in that frame (3,) [m].
-        grow: Multiplies its radius.
+    It is moved by so much in that frame (3,) [m], or its radius multiplied, which is None of a mesh.
     """
 
     joint: str
@@ -45,12 +40,9 @@ class Wheel:
 
 @dataclass(frozen=True)
 class OwnFile:
-    """What a file of another simulator has that may be changed.
+    """What a file of another simulator has that may be changed: the left and right wheel, and its only camera.
 
-    Attributes:
-        wheels: The left and right wheel.
-        aim: Gives the camera a pose (4, 4) in the frame of the wheels; None where there is not exactly one camera.
-        widen: Gives the camera a vertical field of view [deg], for pictures of this aspect; None where it has none.
+    That is given a pose (4, 4) in the frame of the wheels, and a vertical field of view [deg] where it has one.
     """
 
     wheels: tuple[Wheel, Wheel]

@@ -158,7 +158,14 @@ def read_arrays(path: Path, wanted: Wanted) -> Source:
     columns, kind = (columns, "none") if none else with_commands(columns, wanted.kind, table)
     frames = find_frames(path, arrays, wanted.frames, len(table.cells))
     drives = _drives(table, columns, kind, arrays[frames] if frames else None)
-    channels = (*channels_of(table, columns), *_other_channels(table, arrays, frames))
+    known, role = {name.split("[")[0] for name in table.names}, dict.fromkeys(filter(None, [frames]), "frames")
+    out = "left out: not one number, or short row of numbers, for each time"
+    others = (
+        Channel(name, f"{array.dtype} {array.shape}", len(array) if array.ndim else 1, role.get(name, out))
+        for name, array in arrays.items()
+        if name not in known
+    )
+    channels = (*channels_of(table, columns), *others)
     return Source("numpy arrays", tuple(drives), channels, (f"Columns: {described(columns)}.", *notes))
 
 
@@ -218,16 +225,3 @@ def _drives(table: Table, columns: Columns, kind: str, frames: NDArray[np.uint8]
 
     pictures = [Pictures(times[numbers], partial(read, numbers)) for numbers in rows]
     return [replace(drive, pictures=each) for drive, each in zip(drives, pictures, strict=True)]
-
-
-def _other_channels(table: Table, arrays: Arrays, frames: str) -> list[Channel]:
-    """Arrays that are no columns: frames, and those left out."""
-    columns = {name.split("[")[0] for name in table.names}
-    others = {name: array for name, array in arrays.items() if name not in columns}
-    out = "left out: not one number, or short row of numbers, for each time"
-    return [
-        Channel(
-            name, f"{array.dtype} {array.shape}", len(array) if array.ndim else 1, "frames" if name == frames else out
-        )
-        for name, array in others.items()
-    ]

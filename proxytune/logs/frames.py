@@ -141,7 +141,16 @@ def _read_instants(path: Path, samples: Rows, episodes: Sequence[LogEpisode]) ->
     """The rows of frames.csv that lie within the poses of their drive."""
     rows = read_rows(path, Layout(("frame",), (), (), (), 1, "frames"))
     check_known_episodes(rows, samples.names)
-    _check_numbers(rows)
+    numbers = rows.values["frame"]
+    wrong = (numbers != np.rint(numbers)) | (numbers < 0) | (numbers > MOST_FRAMES)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise rows.error(row, "frame", f"must be a whole number from 0 on, got {numbers[row]:.12g}")
+    again = pd.Series(numbers).duplicated().to_numpy()
+    if again.any():
+        row = int(np.argmax(again))
+        problem = f"{numbers[row]:.0f} comes twice; number the pictures through all episodes"
+        raise rows.error(row, "frame", problem)
     order = {name: number for number, name in enumerate(samples.names)}
     drives = np.array([order[name] for name in rows.names])[rows.episode]
     times, spans = rows.values["time"], np.full((len(episodes), 2), np.nan)
@@ -160,21 +169,7 @@ def _read_instants(path: Path, samples: Rows, episodes: Sequence[LogEpisode]) ->
             "write both in seconds of one clock"
         )
         raise rows.error(0, "time", problem)
-    return rows.values["frame"].astype(np.int64)[within], drives[within], times[within]
-
-
-def _check_numbers(rows: Rows) -> None:
-    """Refuse what is no number of a picture, and two rows of one picture."""
-    numbers = rows.values["frame"]
-    wrong = (numbers != np.rint(numbers)) | (numbers < 0) | (numbers > MOST_FRAMES)
-    if wrong.any():
-        row = int(np.argmax(wrong))
-        raise rows.error(row, "frame", f"must be a whole number from 0 on, got {numbers[row]:.12g}")
-    again = pd.Series(numbers).duplicated().to_numpy()
-    if again.any():
-        row = int(np.argmax(again))
-        problem = f"{numbers[row]:.0f} comes twice; number the pictures through all episodes"
-        raise rows.error(row, "frame", problem)
+    return numbers.astype(np.int64)[within], drives[within], times[within]
 
 
 Pictures = NDArray[np.uint8]

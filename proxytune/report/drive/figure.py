@@ -182,8 +182,17 @@ WIDTHS = {"proxy": 1.0, "target": 2.2}
 
 def draw_paths(axes: Axes, pair: SideBySide) -> None:
     """Draw every side's path, the common start, and where each ends."""
-    for side in reversed(pair.sides):
-        _draw_path(axes, pair.sides[side].places, side)
+    for side, episode in reversed(pair.sides.items()):
+        places, thin = episode.places, {"markeredgecolor": "white", "markeredgewidth": 0.5}
+        (line,) = axes.plot(*places.T, color=COLOURS[side], linewidth=WIDTHS[side], solid_capstyle="round")
+        if side == "target":
+            line.set_path_effects(list(CASING))
+        for row in arrow_rows(places):
+            # Along the path, not along the heading: a robot may drive backwards
+            step = places[row] - places[row - 1]
+            turned = float(np.degrees(np.arctan2(step[1], step[0]))) - 90.0
+            mark: dict[str, Any] = {"marker": (3, 0, turned), "color": COLOURS[side], "markersize": 5.5, **thin}
+            axes.plot(*places[row], **mark)
     draw_start(axes, pair.proxy.places)
     edge: dict[str, Any] = {"markeredgecolor": "white", "markeredgewidth": 0.7, "clip_on": False, "zorder": 4}
     marks = {"start": ("black", pair.proxy.places[0])}
@@ -204,18 +213,6 @@ def draw_paths(axes: Axes, pair: SideBySide) -> None:
         look |= {"ha": "left" if right > 0 else "right", "va": "bottom" if up > 0 else "top"}
         spot, shift = (float(place[0]), float(place[1])), (5 * right, 4 * up)
         axes.annotate(text, spot, xytext=shift, textcoords="offset points", **look)
-
-
-def _draw_path(axes: Axes, places: Floats, side: str) -> None:
-    (line,) = axes.plot(*places.T, color=COLOURS[side], linewidth=WIDTHS[side], solid_capstyle="round")
-    if side == "target":
-        line.set_path_effects(list(CASING))
-    edge: dict[str, Any] = {"markeredgecolor": "white", "markeredgewidth": 0.5}
-    for row in arrow_rows(places):
-        # Along the path, not along the heading: a robot may drive backwards
-        step = places[row] - places[row - 1]
-        turned = float(np.degrees(np.arctan2(step[1], step[0]))) - 90.0
-        axes.plot(*places[row], marker=(3, 0, turned), color=COLOURS[side], markersize=5.5, **edge)
 
 
 def arrow_rows(places: Floats) -> list[int]:

@@ -14,6 +14,8 @@ TIMESTEP_S = 0.0005
 """Short, and integrated explicitly: MuJoCo's implicit integrators push a robot with stiffly driven light wheels."""
 SERVO_S = 0.01
 """Time constant of the wheels' servos, with which the robot's mass follows [s]; part of the motors' lag."""
+STEERS_HZ = 400.0
+"""Natural frequency of the servo that holds the front wheel [rad/s]; it is damped so that it does not swing."""
 
 
 def mjcf_text(instance: Instance) -> str:
@@ -29,7 +31,8 @@ def mjcf_text(instance: Instance) -> str:
     """
     radius, mass, baseline = instance.figure("wheel_radius"), instance.figure("mass"), instance.baseline_m
     wheelbase = instance.figure("wheelbase") if instance.steers else 0.0
-    length, height, armature = 1.2 * (wheelbase or baseline), 1.2 * radius, _armature(instance)
+    # Inertia of a car's steering [kg m²], large beside that of its wheel
+    length, height, armature = 1.2 * (wheelbase or baseline), 1.2 * radius, 0.1 * mass * radius**2
     numbers = {
         "timestep": TIMESTEP_S,
         "radius": radius,
@@ -49,7 +52,18 @@ def mjcf_text(instance: Instance) -> str:
     said = {key: f"{number:.9g}" for key, number in numbers.items()}
     own = tomllib.loads(fill("mujoco_parts.toml", **said))
     if wheelbase:  # A servo of the mean speed of the rear wheels, and one of the front wheel's angle
-        actuators = [_speed_servo(instance, 'name="throttle" tendon="rear"', 0, 2), _steering(instance)]
+        # Its torque = stiffness · (full angle · (gain · command + offset) − angle).
+        stiffness = armature * STEERS_HZ**2
+        full = stiffness * math.radians(instance.figure("wheel_angle"))
+        limit = instance.value("steering_saturation", "limit", 1.0)
+        offset, gain = instance.value("steering_offset", "offset", 0.0), instance.value("steering_gain", "gain", 1.0)
+        words = [
+            f'    <general name="steering" joint="steering" gainprm="{full * gain:.9g}" biastype="affine"',
+            f'biasprm="{full * offset:.9g} {-stiffness:.9g} 0" ctrllimited="true" ctrlrange="{-limit:.9g} {limit:.9g}"',
+            *_follows(instance, instance.value("steering_lag", "time_constant", 0.0) - 2.0 / STEERS_HZ),
+        ]
+        throttle = _speed_servo(instance, 'name="throttle" tendon="rear"', 0, 2)
+        actuators = [throttle, " ".join(words) + "/>"]
     else:
         sides = enumerate(("left", "right"))
         actuators = [_speed_servo(instance, f'name="{one}" joint="axle_{one}"', side, 1) for side, one in sides]
@@ -92,29 +106,6 @@ def _speed_servo(instance: Instance, place: str, side: int, wheels: int) -> str:
         f'ctrllimited="true" ctrlrange="{least:.9g} {limit:.9g}"',
         f'forcelimited="true" forcerange="{-torque:.9g} {torque:.9g}"',
         *_follows(instance, instance.lags_s[side] - SERVO_S),
-    ]
-    return "    " + " ".join(words) + "/>"
-
-
-STEERS_HZ = 400.0
-"""Natural frequency of the servo that holds the front wheel [rad/s]; it is damped so that it does not swing."""
-
-
-def _armature(instance: Instance) -> float:
-    """Inertia of a car's steering [kg m²], large beside that of its wheel."""
-    return 0.1 * instance.figure("mass") * instance.figure("wheel_radius") ** 2
-
-
-def _steering(instance: Instance) -> str:
-    """A servo of the front wheel's angle: torque = stiffness · (full angle · (gain · command + offset) − angle)."""
-    stiffness = _armature(instance) * STEERS_HZ**2
-    full = stiffness * math.radians(instance.figure("wheel_angle"))
-    offset, gain = instance.value("steering_offset", "offset", 0.0), instance.value("steering_gain", "gain", 1.0)
-    limit = instance.value("steering_saturation", "limit", 1.0)
-    words = [
-        f'<general name="steering" joint="steering" gainprm="{full * gain:.9g}" biastype="affine"',
-        f'biasprm="{full * offset:.9g} {-stiffness:.9g} 0" ctrllimited="true" ctrlrange="{-limit:.9g} {limit:.9g}"',
-        *_follows(instance, instance.value("steering_lag", "time_constant", 0.0) - 2.0 / STEERS_HZ),
     ]
     return "    " + " ".join(words) + "/>"
 

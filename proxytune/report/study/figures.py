@@ -171,8 +171,17 @@ def evaluations_figure(result: StudyResult) -> Figure:
     pairs = [(column, row) for row in range(1, count) for column in range(row)]
     for column, row in pairs:
         _pair(figure.add_subplot(grid[row - 1, column]), result, (column, row), norm)
-    if not pairs:
-        _alone(figure.add_subplot(grid[0, 0]), result, norm)
+    if not pairs:  # PRPV over the range of a single parameter, on its 95 % interval
+        axes, (box,) = figure.add_subplot(grid[0, 0]), result.study.settings.space.intervals
+        look: dict[str, Any] = {"color": style.LIGHT_BLUE, "alpha": 0.35, "linewidth": 0, "label": REGION}
+        axes.axvspan(*result.knowledge.intervals[box.name], **look)
+        points = np.array([[trial.theta[box.name], trial.score or 0.0] for trial in result.trials])
+        _scatter_trials(axes, result, points, norm)
+        _mark(axes, [result.best.trial.theta[box.name], result.best.assessment.prpv.value], "answer")
+        if result.truth is not None and box.name in result.truth:
+            _mark(axes, [result.truth[box.name], 0.0], "truth")
+        axes.set_xlim(box.low, box.high)
+        style.dress(axes, with_unit(box.name, result.study.family.parameters[box.name].unit), "PRPV [ordered pairs]")
     floor = "" if result.floor.value is None else f"\n{style.floor_name(result.floor)} {result.floor.value:.1f}"
     # The colours of PRPV and what the marks are stand in the corner that the pairs leave free.
     panels, key = figure.axes[: len(pairs) or 1], figure.add_subplot(grid[0, 1:])
@@ -182,7 +191,7 @@ def evaluations_figure(result: StudyResult) -> Figure:
     bar.ax.set_title(f"PRPV [ordered pairs]{floor}", fontsize=7)
     bar.ax.tick_params(labelsize=7)
     named = style.named_handles(panels)
-    look: dict[str, Any] = {"loc": "upper center", "fontsize": 7, "frameon": False}
+    look = {"loc": "upper center", "fontsize": 7, "frameon": False}
     key.legend(list(named.values()), list(named), bbox_to_anchor=(0.55, 0.62), **look)
     return figure
 
@@ -215,19 +224,6 @@ def _pair(axes: Axes, result: StudyResult, places: tuple[int, int], norm: Normal
         axes.set_ylabel(fill(with_unit(up.name, units[up.name].unit), WIDEST), fontsize=7)
     else:
         axes.set_yticklabels([])
-
-
-def _alone(axes: Axes, result: StudyResult, norm: Normalize) -> None:
-    """PRPV of the trials over the range of a single parameter, on its 95 % interval."""
-    (box,) = result.study.settings.space.intervals
-    axes.axvspan(*result.knowledge.intervals[box.name], color=style.LIGHT_BLUE, alpha=0.35, linewidth=0, label=REGION)
-    points = np.array([[trial.theta[box.name], trial.score or 0.0] for trial in result.trials])
-    _scatter_trials(axes, result, points, norm)
-    _mark(axes, [result.best.trial.theta[box.name], result.best.assessment.prpv.value], "answer")
-    if result.truth is not None and box.name in result.truth:
-        _mark(axes, [result.truth[box.name], 0.0], "truth")
-    axes.set_xlim(box.low, box.high)
-    style.dress(axes, with_unit(box.name, result.study.family.parameters[box.name].unit), "PRPV [ordered pairs]")
 
 
 def _scatter_trials(axes: Axes, result: StudyResult, points: Floats, norm: Normalize) -> None:

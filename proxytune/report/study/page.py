@@ -13,7 +13,7 @@ from proxytune.report import figure_style as style
 from proxytune.report.html import write_page
 from proxytune.report.study.sentence import known_parameters, say_answer, say_next_step, study_sentence
 from proxytune.report.text import file_texts, group_texts, latex_text, section_text
-from proxytune.report.view import Column, Drawn, Foot, Paragraphs, Part, Picture, Table, View, columns_of, foot_of
+from proxytune.report.view import Column, Drawn, Foot, Paragraphs, Part, Table, View, columns_of, foot_of
 from proxytune.report.wording import fixed, listed, pairs_span, percent, plain, probability, short, span, with_span
 from proxytune.report.writing import ABOUT, picture_of, write_text
 from proxytune.storage import TrialRecord
@@ -239,8 +239,19 @@ CONTINUE = "run the same command to continue: everything finished is kept."
 
 def study_view(result: StudyResult, figures: Mapping[str, Drawn]) -> View:
     """A study: its tables, with the figures, those that there are by name, beside what they are of."""
-    settings = result.study.settings
-    drawn, tables = study_pictures(result, figures), study_tables(result)
+    settings, tables = result.study.settings, study_tables(result)
+    nothing = " Where almost nothing is grey, the parameter is unidentified: these trials exclude almost no value."
+    fresh = " The diamond is the answer in episodes that the search has not seen: only that is free of luck."
+    hollow = "; open ones were stopped early, and theirs is an estimate"
+    words = {
+        "truth": " The triangle is the θ that made the target." if result.truth is not None else "",
+        "unidentified": nothing if result.knowledge.unidentified else "",
+        "fresh": fresh if result.expected else "",
+        "nominal": " The square is the simulator as it is, at its nominal θ." if result.nominal else "",
+        "floor": " What lies within the green band is within noise." if result.floor.value is not None else "",
+        "cut": hollow if any(trial.bound is not None for trial in result.trials) else "",
+    }
+    drawn = {name: picture_of("study", name, image, **words) for name, image in figures.items()}
     parts = (
         tables[THETA],
         drawn.get("profiles"),
@@ -272,22 +283,6 @@ def study_foot(settings: StudySettings, command: str | None = None) -> Foot:
     ]
     own = f"python -m proxytune study {shlex.quote(str(settings.home))}"
     return foot_of(own if command is None else command, [(name, value) for name, value in stated if value])
-
-
-def study_pictures(result: StudyResult, figures: Mapping[str, Drawn]) -> dict[str, Picture]:
-    """Each figure that there is, by its name, with its caption."""
-    nothing = " Where almost nothing is grey, the parameter is unidentified: these trials exclude almost no value."
-    fresh = " The diamond is the answer in episodes that the search has not seen: only that is free of luck."
-    hollow = "; open ones were stopped early, and theirs is an estimate"
-    words = {
-        "truth": " The triangle is the θ that made the target." if result.truth is not None else "",
-        "unidentified": nothing if result.knowledge.unidentified else "",
-        "fresh": fresh if result.expected else "",
-        "nominal": " The square is the simulator as it is, at its nominal θ." if result.nominal else "",
-        "floor": " What lies within the green band is within noise." if result.floor.value is not None else "",
-        "cut": hollow if any(trial.bound is not None for trial in result.trials) else "",
-    }
-    return {name: picture_of("study", name, image, **words) for name, image in figures.items()}
 
 
 def write_live_page(

@@ -131,7 +131,12 @@ def run_command(answer_of: Callable[[], Answer], arguments: argparse.Namespace, 
     UNDER_WAY[:] = program, left
     with signals_as_interruptions(), lasting_stderr():
         try:
-            with _figures(getattr(arguments, "format", ())):
+            drawn: AbstractContextManager[None] = nullcontext()
+            if named := getattr(arguments, "format", ()):  # What draws figures is loaded only for that
+                from proxytune.report import figures_also_as
+
+                drawn = figures_also_as(named)
+            with drawn:
                 with prints_to_stderr():
                     answer = answer_of()
                 print_answer(answer, as_json=arguments.json)
@@ -157,15 +162,6 @@ def _refused(problem: BaseException | None) -> MemoryError | OSError | None:
             return problem
         problem = problem.__cause__ or problem.__context__
     return None
-
-
-def _figures(named: Sequence[str]) -> AbstractContextManager[None]:
-    """Have figures written in other formats too; what draws them is loaded only for that."""
-    if not named:
-        return nullcontext()
-    from proxytune.report import figures_also_as
-
-    return figures_also_as(named)
 
 
 def _complain(program: str, line: str) -> None:

@@ -146,11 +146,7 @@ class Steps:
     """Shows each step as it begins; use as a context."""
 
     def __init__(self, shares: Mapping[str, float]) -> None:
-        """Begin with nothing done.
-
-        Args:
-            shares: By how a step's line begins, the share of the whole time that has usually passed by then.
-        """
+        """Begin with nothing done; of each beginning of a step's line is told what share of the time is over then."""
         self._shares, self._lines = shares, Lines()
         self._bar = progress_bar(self._lines.console, speed_estimate_period=3600.0)
         self._task = self._bar.add_task("", total=1.0)

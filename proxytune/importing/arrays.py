@@ -66,7 +66,15 @@ def as_table(path: Path, arrays: Arrays, times: str) -> Table:
     An array `actions` that is one shorter, as no action follows the last pose, ends with an empty row. The entry of a
     column map says which are the times, if it is not "".
     """
-    count = len(arrays[_times(path, arrays, times)])
+    named = [name for name in (times, times.rpartition(":")[0]) if name in arrays]
+    names = named if times else usual_names("time", list(arrays))
+    if len(names) != 1 or arrays[names[0]].ndim != 1:
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
+        raise LogError(
+            f"{path}: which array (N,) holds the times is not clear; its arrays are: {shapes}; "
+            "say it, as in --columns time=timestamps:s"
+        )
+    count = len(arrays[names[0]])
     if not count:
         raise LogError(f"{path}: its arrays are empty; record a drive")
     columns: dict[str, NDArray[Any]] = {}
@@ -75,20 +83,6 @@ def as_table(path: Path, arrays: Arrays, times: str) -> Table:
             array = np.vstack((array, np.full((1, array.shape[1]), np.nan)))
         columns |= _flattened(name, array, count)
     return Table(path, pd.DataFrame(columns, index=range(1, count + 1)), "row")
-
-
-def _times(path: Path, arrays: Arrays, stated: str) -> str:
-    if stated:
-        names = [name for name in (stated, stated.rpartition(":")[0]) if name in arrays]
-    else:
-        names = usual_names("time", list(arrays))
-    if len(names) != 1 or arrays[names[0]].ndim != 1:
-        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
-        raise LogError(
-            f"{path}: which array (N,) holds the times is not clear; its arrays are: {shapes}; "
-            "say it, as in --columns time=timestamps:s"
-        )
-    return names[0]
 
 
 def _flattened(name: str, array: NDArray[Any], count: int) -> dict[str, NDArray[Any]]:

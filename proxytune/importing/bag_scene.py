@@ -175,6 +175,8 @@ ENCODINGS: Mapping[str, tuple[int, tuple[int, int, int]]] = {
     "mono8": (1, (0, 0, 0)),
 }
 """Bytes of a pixel, and which of them are red, green and blue."""
+PACKED = ("PNG", "JPEG", "TIFF", "WEBP")
+"""As Pillow calls what ROS packs pictures as."""
 
 
 def read_pictures(bag: Bag, topic: str, stamps: str) -> tuple[Pictures, tuple[str, ...]]:
@@ -202,7 +204,15 @@ def iterate(path: Path, topic: str) -> Iterator[Picture]:
 def picture_of(message: Any) -> Picture:
     """Red, green and blue (rows, columns, 3) of an Image or a CompressedImage."""
     if not hasattr(message, "encoding"):
-        return _compressed(message)
+        try:
+            packed = BytesIO(np.asarray(message.data, dtype=np.uint8).tobytes())
+            with open_picture(packed, "it", PACKED) as image:
+                if image.mode.startswith(("I", "F")):
+                    raise LogError("has more than 8 bits a pixel; leave pictures out by --pictures none")
+                return np.array(image.convert("RGB"))
+        except BROKEN:
+            text = f"is no picture that can be read (format '{message.format}')"
+            raise LogError(f"{text}; record it again, or leave pictures out by --pictures none") from None
     _check(message)
     channels, order = ENCODINGS[message.encoding]
     rows = np.asarray(message.data, dtype=np.uint8)[: message.step * message.height].reshape(message.height, -1)
@@ -224,19 +234,3 @@ def _check(message: Any) -> tuple[float, ...]:
         size = f"{message.width} × {message.height} pixels in rows of {message.step} bytes"
         raise LogError(f"{len(message.data)} bytes do not hold {size}; record it again, or take --pictures none")
     return ()
-
-
-PACKED = ("PNG", "JPEG", "TIFF", "WEBP")
-"""As Pillow calls what ROS packs pictures as."""
-
-
-def _compressed(message: Any) -> Picture:
-    try:
-        packed = BytesIO(np.asarray(message.data, dtype=np.uint8).tobytes())
-        with open_picture(packed, "it", PACKED) as image:
-            if image.mode.startswith(("I", "F")):
-                raise LogError("has more than 8 bits a pixel; leave pictures out by --pictures none")
-            return np.array(image.convert("RGB"))
-    except BROKEN:
-        text = f"is no picture that can be read (format '{message.format}')"
-        raise LogError(f"{text}; record it again, or leave pictures out by --pictures none") from None

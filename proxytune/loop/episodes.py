@@ -24,16 +24,10 @@ from proxytune.usefulness import Assessment, dominance
 
 @dataclass(frozen=True)
 class Closed:
-    """A loop that has come to its end.
+    """A loop that has come to its end: the study, what `diagnose --json` prints of the log, and the extended study.
 
-    Attributes:
-        loop: Which one.
-        before: The study.
-        diagnosis: What `diagnose --json` prints of the log.
-        after: The extended study; None where nothing was found to extend the proxy by.
-        held_out: What held-out agents say of both tuned proxies; None where there are none, or nothing was found.
-        done: The steps that this run has done or gone on with.
-        episodes: How many episodes this run has driven.
+    That, and what held-out agents say of both tuned proxies, is None where nothing was found, or there are none. This
+    run has done or gone on with some steps, and driven so many episodes.
     """
 
     loop: Loop

@@ -65,7 +65,13 @@ class _Closing:
             after = self._tune("extended study", self._extend())
             held_out = self._held_out(before, after)
         closed = Closed(self.loop, before, diagnosis, after, held_out, (), self.episodes)
-        self._show_righted(closed)
+        if after:
+            name, twin, model = "righted agent", self.loop.twin, self.loop.home / "diagnosed" / "model.toml"
+            seen = twin and twin.read_text(encoding="utf-8"), opening.digest_of_files(model)
+            thetas = [dict(one.theta) for one in (before, after)]
+            metrics = [metric.name for metric in self.settings.metrics]
+            inputs = opening.digest(name, righted(closed), seen, thetas, metrics, self._agents(self.settings.agents))
+            self._keep(name, inputs, pictures_file(self.loop.home), partial(write_pictures, closed))
         return replace(closed, done=tuple(self.done))
 
     def _begin(self, name: str, how: str = "") -> None:
@@ -159,17 +165,6 @@ class _Closing:
         self.episodes += episodes
         self.done += [name] if episodes else []
         return driven[0][0], driven[1][0]
-
-    def _show_righted(self, closed: Closed) -> None:
-        """Draw the righted agent's episodes, where there is a proxy after."""
-        if closed.after is None:
-            return
-        name, twin, home = "righted agent", self.loop.twin, self.loop.home
-        seen = twin and twin.read_text(encoding="utf-8"), opening.digest_of_files(home / "diagnosed" / "model.toml")
-        thetas = [dict(one.theta) for one in (closed.before, closed.after)]
-        metrics = [metric.name for metric in self.settings.metrics]
-        inputs = opening.digest(name, righted(closed), seen, thetas, metrics, self._agents(self.settings.agents))
-        self._keep(name, inputs, pictures_file(home), partial(write_pictures, closed))
 
     def _held_out_target(self, names: tuple[str, ...]) -> Path | None:
         """The target's scores of held-out agents: a file of their own, or None where the study's table has them."""

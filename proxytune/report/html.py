@@ -129,7 +129,13 @@ def _picture(part: Picture, place: str) -> str:
     if b"<svg" in image[:1000]:
         drawing = _inline_svg(image.decode("utf-8"), place, alt)
     else:
-        source, width = _data_image(image)
+        kind = "png" if image.startswith(b"\x89PNG\r\n") else "gif" if image.startswith(b"GIF8") else ""
+        if not kind:
+            raise ValueError("the picture is no PNG, GIF or SVG")
+        source = f"data:image/{kind};base64,{base64.b64encode(image).decode('ascii')}"
+        with Image.open(BytesIO(image)) as opened:  # It is drawn so wide where there is room
+            dots = opened.info.get("dpi")
+            width = round(opened.width * ENLARGED / dots[0]) if dots and dots[0] else opened.width
         size = f' width="{width}" style="--wide:{width}px;min-width:{SMALLEST * width:.0f}px"' if width else ""
         drawing = f'<span class="card"><img alt="{alt}" src="{source}"{size}></span>'
     card = f'<div class="scroll" role="region" tabindex="0" aria-labelledby="{place}">{drawing}</div>'
@@ -152,18 +158,6 @@ def _inline_svg(svg: str, place: str, alt: str) -> str:
         f'{box[0]} style="--wide:{width:.0f}px;width:{width:.0f}px;min-width:{SMALLEST * width:.0f}px"' if box else ""
     )
     return f'<svg class="drawn" role="img" aria-label="{alt}" {size}>{rest}'
-
-
-def _data_image(image: bytes) -> tuple[str, int]:
-    """A picture as a data URI, and how wide it is drawn where there is room [pixel]; 0 as wide as it likes."""
-    data = base64.b64encode(image).decode("ascii")
-    kind = "png" if image.startswith(b"\x89PNG\r\n") else "gif" if image.startswith(b"GIF8") else ""
-    if not kind:
-        raise ValueError("the picture is no PNG, GIF or SVG")
-    with Image.open(BytesIO(image)) as opened:
-        dots = opened.info.get("dpi")
-        width = round(opened.width * ENLARGED / dots[0]) if dots and dots[0] else opened.width
-    return f"data:image/{kind};base64,{data}", width
 
 
 def _table(table: Table, label: str) -> str:

@@ -156,9 +156,22 @@ def _tables(assessments: Assessments, selection: Selection | None, target: str) 
     beside = [row for measure in BESIDE_PRPV for row in _rows(measure, assessment)]
     columns = (*columns_of(("measure",), ("value", "95 % interval")), *columns_of(("better", "what it says")))
     title = f"{proxy} as a proxy of {target}: {_sizes(assessment)}"
+    prpv, inner = assessment.prpv, assessment.prpv_interval
+    noise, random = assessment.noise_floor, assessment.chance
+    flips = [f"{sum(pair.flip == flip for pair in prpv.pairs)} {flip}" for flip in ("reversed", "lost", "invented")]
+    better, span = PRPV.better, short_span(inner.low, inner.high)
+    by_chance = f"as low by chance: p = {random.p_value:.2g}"
+    rows: list[Row] = [
+        (PRPV.name, str(prpv.value), span, better, f"{PRPV.meaning} to {prpv.range[1]}"),
+        ("  normalised", _number(prpv.normalised), "", better, "0 to 1"),
+        ("  flipped pairs", str(len(prpv.pairs)), "", better, ", ".join(flips)),
+        ("  expected", _number(inner.expected), "", better, "mean over resampled episodes"),
+        (f"  {noise.title}", _number(noise.value), short_span(noise.low, noise.high), "", noise.meaning),
+        ("  chance", _number(random.mean), f"± {random.deviation:.3g}", "", by_chance),
+    ]
     return [
         decision.decision_table(assessment, target),
-        Table(title, columns, (*_prpv_rows(assessment), *beside), notes),
+        Table(title, columns, (*rows, *beside), notes),
         *map(_rates, assessment.success_rates),
     ]
 
@@ -198,21 +211,6 @@ def _sizes(assessment: Assessment) -> str:
         for side, (low, high) in zip(("proxy", "target"), inputs.episodes, strict=True)
     ]
     return f"{len(inputs.agents)} agents, {counts[0]} and {counts[1]} each"
-
-
-def _prpv_rows(assessment: Assessment) -> list[Row]:
-    prpv, inner, noise = assessment.prpv, assessment.prpv_interval, assessment.noise_floor
-    flips = [f"{sum(pair.flip == flip for pair in prpv.pairs)} {flip}" for flip in ("reversed", "lost", "invented")]
-    random, better, span = assessment.chance, PRPV.better, short_span(inner.low, inner.high)
-    by_chance = f"as low by chance: p = {random.p_value:.2g}"
-    return [
-        (PRPV.name, str(prpv.value), span, better, f"{PRPV.meaning} to {prpv.range[1]}"),
-        ("  normalised", _number(prpv.normalised), "", better, "0 to 1"),
-        ("  flipped pairs", str(len(prpv.pairs)), "", better, ", ".join(flips)),
-        ("  expected", _number(inner.expected), "", better, "mean over resampled episodes"),
-        (f"  {noise.title}", _number(noise.value), short_span(noise.low, noise.high), "", noise.meaning),
-        ("  chance", _number(random.mean), f"± {random.deviation:.3g}", "", by_chance),
-    ]
 
 
 def _rows(measure: Measure, assessment: Assessment) -> list[Row]:

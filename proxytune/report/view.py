@@ -30,13 +30,9 @@ class Column:
 
 @dataclass(frozen=True)
 class Table:
-    """A table.
+    """A table as people read it, with a heading and sentences below; without a head its columns have no names.
 
-    Attributes:
-        title: Its heading.
-        columns: Its columns; of a table without a head they have no names.
-        rows: Its cells as people read them; the first names the row, and what it is indented by tells what it is of.
-        notes: Sentences below it.
+    The first cell of a row names it, and is indented where the row is part of the one above.
     """
 
     title: str
@@ -67,14 +63,7 @@ Part = Picture | Table | Paragraphs
 
 @dataclass(frozen=True)
 class View:
-    """Result of anything, for people.
-
-    Attributes:
-        title: What it is about.
-        sentence: What was found, in a sentence.
-        next_step: What to do next, in a sentence; "" where there is nothing to do.
-        parts: Pictures, tables and paragraphs, in their order.
-    """
+    """Result of anything, for people: what was found and what to do next ("": nothing), a sentence each, and parts."""
 
     title: str
     sentence: str

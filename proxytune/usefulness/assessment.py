@@ -19,7 +19,7 @@ import numpy as np
 from proxytune.errors import ScoresError
 from proxytune.scores import Metric, ScoreTable, score_cautions
 from proxytune.usefulness import resampling
-from proxytune.usefulness.comparison import Comparison, compare
+from proxytune.usefulness.comparison import Comparison, compare, repeats
 from proxytune.usefulness.decision import (
     ASKED,
     Asked,
@@ -165,7 +165,9 @@ class Assessment:
             lines.append(f"no noise floor: {floor.reason}")
         lines += [rates.note for rates in self.success_rates if rates.note]
         if self.intervals is not None:
-            lines += [ONE_START] if self.inputs.fewest_starts == 1 else [LEFT_OUT] + [PAIRED] * self.inputs.paired
+            sides = (self.inputs.proxy, self.inputs.target)
+            fewest = min((repeats(side) > 0).sum(axis=1).min() for side in sides)  # Repeats of a start count once
+            lines += [ONE_START] if fewest == 1 else [LEFT_OUT] + [PAIRED] * self.inputs.paired
         if random.explains:
             lines.append(f"PRPV is no better than chance: a random ranking scores as low with p = {random.p_value:.2g}")
         if self.at_noise_floor:

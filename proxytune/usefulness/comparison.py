@@ -51,11 +51,6 @@ class Comparison:
         return self.proxy.means, self.target.means
 
     @property
-    def fewest_starts(self) -> int:
-        """The fewest starts that an agent drove on either side; repeats of a start count once."""
-        return int(min((repeats(side) > 0).sum(axis=1).min() for side in (self.proxy, self.target)))
-
-    @property
     def episodes(self) -> tuple[tuple[int, int], ...]:
         """Fewest and most episodes of an agent, in the proxy and on the target."""
         return tuple((int(side.counts.min()), int(side.counts.max())) for side in (self.proxy, self.target))

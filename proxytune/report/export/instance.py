@@ -19,13 +19,9 @@ Pair = tuple[float, float]
 
 @dataclass(frozen=True)
 class Instance:
-    """A domain instance to be written.
+    """A domain instance to be written, and where its values come from.
 
-    Attributes:
-        robot: The robot.
-        theta: Every value that is not nominal by definition: the robot's own effects, and what was found.
-        intervals: Of those values that have one.
-        source: Where the values come from.
+    θ has every value that is not nominal by definition: the robot's own effects, and what was found.
     """
 
     robot: Robot

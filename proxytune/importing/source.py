@@ -31,13 +31,9 @@ class Commands:
 
 @dataclass(frozen=True)
 class Poses:
-    """Poses as they were measured, N of them.
+    """Poses as they were measured at times (N,) [s], as stamped: places x, y, z (N, 3) [m], and headings (N,) [rad].
 
-    Attributes:
-        times: When each was measured (N,) [s], as stamped.
-        places: Where the robot was (N, 3): x, y, z [m].
-        headings: How it was turned about the upward axis (N,) [rad].
-        tilts: Angle between its upward axis and the world's (N,) [rad]; 0 where the source has headings alone.
+    Tilts are of its upward axis from the world's (N,) [rad]; 0 where the source has headings alone.
     """
 
     times: Floats

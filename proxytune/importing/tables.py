@@ -52,12 +52,6 @@ class CommandFile:
     note: str
 
 
-def is_named_as_commands(path: Path) -> bool:
-    """True if a file's name says that it holds commands: commands.csv, cmd_vel.csv, run1_commands.csv and so on."""
-    named = any(path.stem == stem or path.stem.endswith(f"_{stem}") for stem in STEMS)
-    return named and path.suffix.lower() in COMMAND_SUFFIXES
-
-
 def find_commands(path: Path, wanted: Wanted) -> Path | None:
     """The file with the commands of a file of poses, or None.
 
@@ -190,7 +184,9 @@ def _files(path: Path, wanted: Wanted) -> list[Path]:
         return [path]
     tables = sorted(file for file in path.iterdir() if file.suffix.lower() in SUFFIXES and file.is_file())
     asked_for = {Path(wanted.commands).resolve(), (path / wanted.commands).resolve()} if wanted.commands else set()
-    files = [file for file in tables if file.resolve() not in asked_for and not is_named_as_commands(file)]
+    # A name says that a file holds commands: commands.csv, cmd_vel.csv, run1_commands.csv and so on.
+    named = [file for file in tables if any(file.stem == it or file.stem.endswith(f"_{it}") for it in STEMS)]
+    files = [file for file in tables if file.resolve() not in asked_for and file not in named]
     if not files:
         raise LogError(f"{path}: has no CSV file with poses; give the folder or the file that they were written to")
     return files

@@ -26,13 +26,9 @@ EMPTY = ("", "nan", "NaN", "NAN", "na", "NA", "n/a", "N/A", "null", "NULL", "non
 
 @dataclass(frozen=True)
 class Table:
-    """Columns of one length.
+    """Columns of one length by name, of numbers, or of texts without blanks around them.
 
-    Attributes:
-        path: The file.
-        cells: The columns by name, of numbers, or of texts without blanks around them; the index is the number of each
-            row in the file.
-        counted: What that number counts, "line" or "row".
+    The index is the number of each row in the file, which is `counted` as "line" or "row".
     """
 
     path: Path

@@ -46,12 +46,9 @@ def check_kind(command: str, robot: str, drive: str, where: str) -> None:
 
 
 class Measured(NamedTuple):
-    """Poses at times of their own, N of them, as they were measured.
+    """Poses at times of their own (N,) [s] as they were measured: x [m], y [m], heading [rad, unwrapped] (N, 3).
 
-    Attributes:
-        times: When each was measured (N,) [s].
-        poses: x [m], y [m], heading [rad, unwrapped] (N, 3).
-        rows: The sample of the regular grid that each is moved to (N,), the nearest free one.
+    Each is moved to a sample of the regular grid (N,), the nearest free one.
     """
 
     times: Floats

@@ -69,14 +69,9 @@ LARGEST = 1e50
 
 @dataclass(frozen=True)
 class Rows:
-    """The rows of samples.csv, commands.csv or frames.csv, N of them in E episodes.
+    """The rows of samples.csv, commands.csv or frames.csv, N of them in E episodes, and the line of each (N,).
 
-    Attributes:
-        path: The file.
-        lines: Line of each row in the file (N,).
-        names: Episodes in order (E,).
-        firsts: First row of each episode (E,).
-        values: Columns by name (N,), NaN where a cell is empty.
+    The first row of each episode is known (E,); columns are by name (N,), NaN where a cell is empty.
     """
 
     path: Path

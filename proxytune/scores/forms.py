@@ -207,11 +207,6 @@ def read_cell(text: str, decimal: str, in_percent: bool) -> Read | None:
     return None if mean is None else (mean, error, None)
 
 
-def percent_column(name: str, metric: str) -> bool:
-    """True of a column that another name than the metric's says to be in per cent."""
-    return name != metric and bool(re.search(r"%|\bpercent\b|_pct\b", name.lower()))
-
-
 def counted(value: float, rollouts: str, where: str) -> tuple[int, int]:
     """Successes of rollouts, from a share or a number of successes beside the number of rollouts."""
     try:

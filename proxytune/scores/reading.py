@@ -7,6 +7,7 @@
 import csv
 import io
 import math
+import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -110,7 +111,8 @@ def read_cells(
         lines, cells = [lines[row] for row in kept], {name: [own[row] for row in kept] for name, own in cells.items()}
     found = Cells(path, named, header, lines, cells)
     found = found if separator == "," else replace(found, decimal=_decimal(found, metrics))
-    in_percent = {name: forms.percent_column(whose.get(name) or name, name) for name in metrics}
+    # Of a column that another name than the metric's says to be in per cent
+    in_percent = {name: bool(re.search(r"%|\bpercent\b|_pct\b", (whose.get(name) or "").lower())) for name in metrics}
     return _plain_cells(found, metrics, more, in_percent)
 
 

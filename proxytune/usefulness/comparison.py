@@ -17,13 +17,7 @@ from proxytune.settings import alike_caution
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two score tables, of the proxy and of the target, with the same agents and metrics in the same order.
-
-    Attributes:
-        proxy: Scores in the proxy.
-        target: Scores on the target.
-        metrics: How agents are compared, in the order of both tables' columns.
-    """
+    """Two score tables, of the proxy and of the target, with the same agents and metrics in the same order."""
 
     proxy: ScoreTable
     target: ScoreTable

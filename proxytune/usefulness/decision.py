@@ -433,13 +433,7 @@ def compare_savings(savings: Mapping[str, Saving]) -> tuple[Difference, ...]:
 
 @dataclass(frozen=True)
 class Together:
-    """Two proxies of one target that are used at once.
-
-    Attributes:
-        proxies: Those two that save most by themselves.
-        saves: What both are worth in rollouts on the target.
-        decision: The agent to deploy, the target's means being rectified by both.
-    """
+    """Two proxies of one target, those that save most, used at once: what both are worth, and the agent to deploy."""
 
     proxies: tuple[str, str]
     saves: Saving

@@ -50,12 +50,7 @@ class Estimate(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Donors:
-    """Cells that were driven twice from the same start.
-
-    Attributes:
-        first: Metrics of one time, shape (pairs, metrics).
-        second: Metrics of the other; every pair is there both ways round.
-    """
+    """Cells (pairs, metrics) that were driven twice from the same start; every pair is there both ways round."""
 
     first: Floats
     second: Floats
@@ -132,14 +127,9 @@ class Expected:
 
 @dataclass(frozen=True, eq=False)
 class Expectation:
-    """What is expected of a proxy in more episodes.
+    """What is expected of a proxy in more episodes, from so many fresh tables; PPV is None where it is undefined.
 
-    Attributes:
-        prpv: Its PRPV.
-        ppv: Its PPV; None where that is undefined.
-        repetitions: From how many fresh tables.
-        deviation: Standard deviation of PRPV from one table to the next.
-        floor: The noise floor.
+    PRPV has this standard deviation from one table to the next.
     """
 
     prpv: Expected

@@ -143,15 +143,7 @@ class Rate:
 
 @dataclass(frozen=True)
 class SuccessRates:
-    """One metric of zeros and ones on both sides.
-
-    Attributes:
-        metric: Its name.
-        proxy: Rate of each agent in the proxy.
-        target: The same on the target.
-        ties: How many pairs of agents tie, in the proxy and on the target.
-        pairs: How many pairs there are.
-    """
+    """One metric of zeros and ones: rates of each agent, and how many pairs tie, in the proxy and on the target."""
 
     metric: str
     proxy: Mapping[str, Rate]

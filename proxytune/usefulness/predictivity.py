@@ -89,11 +89,7 @@ def weights_of_spread(target: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Mmrv:
-    """A mean maximum rank violation per metric.
-
-    Attributes:
-        value: Metric to violation, in the metric's unit: 0 (same order) up to the largest difference on the target.
-    """
+    """A mean maximum rank violation per metric, in its unit: 0 (same order) up to the target's largest difference."""
 
     value: Mapping[str, float]
 
@@ -125,12 +121,7 @@ out to every digit. Elsewhere it is below notice, as long as scores are not of t
 
 @dataclass(frozen=True)
 class Correlation:
-    """A correlation of proxy and target per metric.
-
-    Attributes:
-        value: Metric to coefficient, −1 to 1; None where it is undefined.
-        notes: Why it is undefined or means little, in one line each.
-    """
+    """A correlation of proxy and target per metric, −1 to 1, None where undefined; notes say why, or that it tells little."""
 
     value: Mapping[str, float | None]
     notes: tuple[str, ...]

@@ -40,7 +40,9 @@ def _ranking_figure(diagnosis: CameraDiagnosis) -> Figure | None:
     tried = diagnosis.candidates
     if not tried:
         return None
-    nothing = loss_of_nothing(diagnosis)
+    # With the declared effects alone, in the measure that the candidates are ranked by [nats]
+    named = diagnosis.named
+    nothing = rank_subsets(named.full, effects_of(named.declared.names), 0)[0].loss
     figure, axes = style.one_panel(1.3 + 0.16 * len(tried))
     added = {effect.effect for effect in diagnosis.effects}
     rivals = {rival for effect in diagnosis.effects for rival in effect.rivals}
@@ -56,12 +58,6 @@ def _ranking_figure(diagnosis: CameraDiagnosis) -> Figure | None:
     axes.set_xlabel(label, fontsize=8, loc="right")
     style.legend_below(figure, axes)
     return figure
-
-
-def loss_of_nothing(diagnosis: CameraDiagnosis) -> float:
-    """Loss with the declared effects alone, in the measure that the candidates are ranked by [nats]."""
-    named = diagnosis.named
-    return rank_subsets(named.full, effects_of(named.declared.names), 0)[0].loss
 
 
 def _errors_figure(diagnosis: CameraDiagnosis) -> Figure:

@@ -23,12 +23,9 @@ TWO_LINES = 0.14
 def convergence_figure(result: StudyResult) -> Figure:
     """Draw every trial's PRPV, that of the answer so far, and at its ends the nominal θ's and the answer's.
 
-    Where the objective is another measure, that is drawn in its place.
-
-    The answer so far is the visited θ of lowest expected PRPV, which need not be the luckiest trial. Filled points were
-    proposed by the surrogate, open ones come from the quasi-random design; crosses are trials that failed, triangles
-    what PRPV of those cut off cannot be below. The diamond with its 95 % interval, right of the last trial, is
-    the answer in episodes that nothing was chosen by; the square, left of the first, is the nominal θ.
+    Where the objective is another measure, that is drawn in its place. The answer so far is the visited θ of lowest
+    expected PRPV, which need not be the luckiest trial. Open points come from the quasi-random design, triangles are
+    what PRPV of trials that were cut off cannot be below, and the diamond is of episodes that nothing was chosen by.
     """
     figure, axes = style.one_panel(2.9)
     _draw_trials(axes, result)

@@ -88,7 +88,16 @@ def usefulness_table(result: StudyResult) -> Table:
     Its notes are not what the sentence says already, nor advice on the options of `score`.
     """
     own, chance, expected = result.best.assessment, result.judged.chance, result.expected
-    rows = [*_objective_rows(result), *_prpv_rows(result), *_level_rows(result)]
+    rows, floor = [*_objective_rows(result), *_prpv_rows(result)], result.floor
+    if floor.value is not None and floor.low is not None and floor.high is not None:
+        meaning = floor.meaning if expected is None else "what a perfect proxy scores against this target"
+        rows.append((f"  {floor.title}", fixed(floor.value, 0), pairs_span(floor.low, floor.high), meaning))
+    if excess := result.excess:
+        told = "more than a perfect proxy" if excess.low > 0.0 else "more than a perfect proxy; may be none"
+        rows.append(("  excess", fixed(excess.value, 0), pairs_span(*excess[1:]), told))
+    if result.nominal:
+        level = result.nominal.expected.prpv.value
+        rows.append(("  nominal", fixed(level.value, 0), pairs_span(*level[1:]), "the simulator as it is"))
     as_low = f"a random ranking; as low: {probability(chance.p_value)}"
     rows.append(("  chance", fixed(chance.mean, 1), f"± {fixed(chance.deviation, 1)}", as_low))
     meaning = "proxy predictivity value: error of the scores"
@@ -137,22 +146,6 @@ def _prpv_rows(result: StudyResult) -> Rows:
     count = f"in {expected.repetitions} more run{'s' if expected.repetitions > 1 else ''}"
     told = fixed(expected.prpv.value.value, 0), pairs_span(*expected.prpv.value[1:])
     return [("PRPV", *told, f"{pairs}; expected, {count}"), (IN_SEARCH, value, "", f"{luck}{rivals}")]
-
-
-def _level_rows(result: StudyResult) -> Rows:
-    """What a perfect proxy scores and how much more is expected of this one; what the simulator as it is scores."""
-    floor, excess, nominal = result.floor, result.excess, result.nominal
-    rows = Rows()
-    if floor.value is not None and floor.low is not None and floor.high is not None:
-        meaning = floor.meaning if result.expected is None else "what a perfect proxy scores against this target"
-        rows.append((f"  {floor.title}", fixed(floor.value, 0), pairs_span(floor.low, floor.high), meaning))
-    if excess:
-        told = "more than a perfect proxy" if excess.low > 0.0 else "more than a perfect proxy; may be none"
-        rows.append(("  excess", fixed(excess.value, 0), pairs_span(*excess[1:]), told))
-    if nominal:
-        level = nominal.expected.prpv.value
-        rows.append(("  nominal", fixed(level.value, 0), pairs_span(*level[1:]), "the simulator as it is"))
-    return rows
 
 
 def information_table(result: StudyResult) -> Table:

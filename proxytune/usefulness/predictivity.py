@@ -121,7 +121,7 @@ out to every digit. Elsewhere it is below notice, as long as scores are not of t
 
 @dataclass(frozen=True)
 class Correlation:
-    """A correlation of proxy and target per metric, −1 to 1, None where undefined; notes say why, or that it tells little."""
+    """A correlation of proxy and target per metric, −1 to 1, None where undefined; notes say why, or caution."""
 
     value: Mapping[str, float | None]
     notes: tuple[str, ...]

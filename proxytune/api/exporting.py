@@ -145,13 +145,21 @@ def _row(line: report.ExportLine) -> dict[str, Any]:
 
 
 def _instance_of(path: Path) -> tuple[report.Instance, tuple[str, ...]]:
-    if (model := path / "model.toml").is_file() and not (path / FILE_NAME).exists():
-        raise InputError(f"{path}: is no study's folder; give what was diagnosed, {model}")
-    return (_of_study(path), ()) if path.is_dir() else _of_model(path)
+    """A study's best θ with its 95 % intervals, or a model.toml and its cautions.
 
-
-def _of_model(path: Path) -> tuple[report.Instance, tuple[str, ...]]:
-    """A model.toml, and its cautions; its robot and its own effects are looked for in the current folder."""
+    A model's robot and its own effects are looked for in the current folder.
+    """
+    if (diagnosed := path / "model.toml").is_file() and not (path / FILE_NAME).exists():
+        raise InputError(f"{path}: is no study's folder; give what was diagnosed, {diagnosed}")
+    if path.is_dir():
+        result = read_study(path).result
+        settings, region = result.study.settings, result.knowledge
+        family = bare_family(settings, settings.proxy) if is_ours(settings.family) else None
+        if not isinstance(family, driving.LaneFollowing):
+            raise InputError(f"{path}: is a study of another simulator; only what drives here can be exported")
+        robot = driving.read_robot(family.robot, family.folder)
+        theta = {**robot.theta, **dict(family.effects), **result.best.trial.theta}
+        return report.Instance(robot, theta, dict(region.intervals), f"the best θ of the study {settings.name}"), ()
     model = driving.read_model_of(path, Path.cwd())
     catalogue = driving.catalogue_of(model.robot, Path.cwd())
     if model.robot in driving.robot_names(catalogue.folder):
@@ -163,18 +171,6 @@ def _of_model(path: Path) -> tuple[report.Instance, tuple[str, ...]]:
         raise InputError(f"{path}: its robot '{model.robot}' is unknown here; {remedy}")
     cautions = (*model.cautions, *figure_cautions(robot.figures, f"robot {robot.name}"))
     return report.Instance(robot, {**robot.theta, **model.theta}, model.intervals, str(path)), cautions
-
-
-def _of_study(folder: Path) -> report.Instance:
-    """The best θ of a study, with its 95 % intervals."""
-    result = read_study(folder).result
-    settings, region = result.study.settings, result.knowledge
-    family = bare_family(settings, settings.proxy) if is_ours(settings.family) else None
-    if not isinstance(family, driving.LaneFollowing):
-        raise InputError(f"{folder}: is a study of another simulator; only what drives here can be exported")
-    robot = driving.read_robot(family.robot, family.folder)
-    theta = {**robot.theta, **dict(family.effects), **result.best.trial.theta}
-    return report.Instance(robot, theta, dict(region.intervals), f"the best θ of the study {settings.name}")
 
 
 class CommandFilter:

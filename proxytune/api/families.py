@@ -9,30 +9,15 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure
 
-from proxytune import report
+from proxytune import report, study
 from proxytune.api.study import StudyReport, most_episodes, read_study, run_opened
 from proxytune.errors import RunError
 from proxytune.running import Watcher, watching
 from proxytune.storage import Store, locked
-from proxytune.study import (
-    ComparedFamilies,
-    Lesson,
-    Spent,
-    Study,
-    StudyRun,
-    StudySettings,
-    TunedFamily,
-    open_settings,
-    read_lessons,
-    read_study_settings,
-    save_lessons,
-    tuned_family,
-    with_spending,
-)
 from proxytune.teaching import classrooms, teach_families
 
 Say = Callable[[str], None]
-Tuning = Callable[[Study], AbstractContextManager[Watcher]]
+Tuning = Callable[[study.Study], AbstractContextManager[Watcher]]
 """Gives what hears of every episode of a family."""
 CURVE_POINTS = "points of learning curves"
 
@@ -46,8 +31,8 @@ class FamiliesReport(report.Shown):
         spent: What this call has simulated.
     """
 
-    compared: ComparedFamilies
-    spent: Spent
+    compared: study.ComparedFamilies
+    spent: study.Spent
 
     def __repr__(self) -> str:
         return f"FamiliesReport of '{self.compared.settings.name}': {self.sentence}"
@@ -72,7 +57,7 @@ class FamiliesReport(report.Shown):
     @property
     def studies(self) -> dict[str, StudyReport]:
         """Reports of each family's study, by name."""
-        return {one.name: StudyReport(one.result, Spent()) for one in self.compared.families}
+        return {one.name: StudyReport(one.result, study.Spent()) for one in self.compared.families}
 
     def document(self) -> dict[str, Any]:
         """The JSON document of `study --json`."""
@@ -106,10 +91,10 @@ def run_families(path: str | Path, *, progress: bool = False, jobs: int | None =
         InputError: If anything in the study cannot be used, or it is of one family.
         RunError: If no trial of a family works, or the machine fails; all that was finished is kept.
     """
-    settings = _several(read_study_settings(Path(path)))
+    settings = _several(study.read_study_settings(Path(path)))
 
-    def tuning(study: Study) -> AbstractContextManager[Watcher]:
-        return watching(progress, most_episodes(study.settings))
+    def tuning(opened: study.Study) -> AbstractContextManager[Watcher]:
+        return watching(progress, most_episodes(opened.settings))
 
     return run_opened_families(settings, lambda line: None, tuning, jobs=jobs, progress=progress)
 
@@ -124,16 +109,16 @@ def read_families(path: str | Path) -> FamiliesReport:
         InputError: If one of them has not been run, or was changed since.
         RunError: If no trial of one has a score yet.
     """
-    settings = _several(read_study_settings(Path(path)))
+    settings = _several(study.read_study_settings(Path(path)))
     families = tuple(_tuned(read_study(one.home)) for one in settings.families.values())
     thetas = {one.name: dict(one.theta) for one in families}
-    lessons = read_lessons(settings) if settings.teaching else {}
+    lessons = study.read_lessons(settings) if settings.teaching else {}
     still_so = {name: one for name, one in lessons.items() if dict(one.theta) == thetas.get(name)}
-    return FamiliesReport(ComparedFamilies(settings, families, still_so), Spent())
+    return FamiliesReport(study.ComparedFamilies(settings, families, still_so), study.Spent())
 
 
 def run_opened_families(
-    settings: StudySettings,
+    settings: study.StudySettings,
     say: Say,
     tuning: Tuning,
     *,
@@ -146,48 +131,43 @@ def run_opened_families(
 
     All of them are opened before the first is tuned, so that a mistake is told at once. Progress is of the teaching.
     """
-    opened = {name: open_settings(one) for name, one in settings.families.items()}
-    studies = {name: with_spending(study, budget=budget, jobs=jobs) for name, study in opened.items()}
+    every = {name: study.open_settings(one) for name, one in settings.families.items()}
+    studies = {name: study.with_spending(one, budget=budget, jobs=jobs) for name, one in every.items()}
     classrooms(settings)
     reports: dict[str, StudyReport] = {}
     with locked(settings.home):
-        for number, (name, study) in enumerate(studies.items(), start=1):
+        for number, (name, opened) in enumerate(studies.items(), start=1):
             say(f"family {number} of {len(studies)}: {name}")
-            reports[name] = _tune(name, study, say, tuning(study), retry_failed)
+            reports[name] = _tune(name, opened, say, tuning(opened), retry_failed)
         families = tuple(map(_tuned, reports.values()))
-        lessons = _teach(settings, families, jobs, say, progress)
-    spent = sum((one.spent for one in reports.values()), Spent())
-    return FamiliesReport(ComparedFamilies(settings, families, lessons), spent)
+        lessons: dict[str, study.Lesson] = {}
+        if settings.teaching is not None:
+            say("teaching by each at its best θ")
+            own, thetas = replace(settings, jobs=jobs or settings.jobs), {one.name: one.theta for one in families}
+            lessons = teach_families(own, thetas, lambda points: watching(progress, points, CURVE_POINTS))
+            study.save_lessons(settings, lessons)
+    spent = sum((one.spent for one in reports.values()), study.Spent())
+    return FamiliesReport(study.ComparedFamilies(settings, families, lessons), spent)
 
 
-def _several(settings: StudySettings) -> StudySettings:
+def _several(settings: study.StudySettings) -> study.StudySettings:
     if not settings.families:
         raise settings.error("families", "is missing; name two at least, as in [families.planar], or use run_study")
     return settings
 
 
-def _tune(name: str, study: Study, say: Say, bars: AbstractContextManager[Watcher], retry_failed: bool) -> StudyReport:
+def _tune(
+    name: str, opened: study.Study, say: Say, bars: AbstractContextManager[Watcher], retry_failed: bool
+) -> StudyReport:
     try:
-        tuned = run_opened(study, bars, lambda line: say(f"{name}: {line}"), retry_failed)
+        tuned = run_opened(opened, bars, lambda line: say(f"{name}: {line}"), retry_failed)
     except RunError as problem:
         raise type(problem)(f"families.{name}: {problem}") from problem
     tuned.write()
     return tuned
 
 
-def _tuned(tuned: StudyReport) -> TunedFamily:
-    study = tuned.result.study
-    with Store.read(study.settings.home) as store:
-        return tuned_family(StudyRun(study, store), tuned.result)
-
-
-def _teach(
-    settings: StudySettings, families: tuple[TunedFamily, ...], jobs: int | None, say: Say, progress: bool
-) -> dict[str, Lesson]:
-    if settings.teaching is None:
-        return {}
-    say("teaching by each at its best θ")
-    own, thetas = replace(settings, jobs=jobs or settings.jobs), {one.name: one.theta for one in families}
-    lessons = teach_families(own, thetas, lambda points: watching(progress, points, CURVE_POINTS))
-    save_lessons(settings, lessons)
-    return lessons
+def _tuned(tuned: StudyReport) -> study.TunedFamily:
+    opened = tuned.result.study
+    with Store.read(opened.settings.home) as store:
+        return study.tuned_family(study.StudyRun(opened, store), tuned.result)

@@ -48,7 +48,10 @@ def as_files(frames: Mapping[str, pd.DataFrame]) -> Iterator[Path]:
         try:
             yield folder
         except InputError as problem:
-            raise type(problem)(_in_rows(str(problem).replace(f"{folder}/", ""))) from None
+            told = str(problem).replace(f"{folder}/", "")  # Lines of a file are rows of a DataFrame
+            told = re.sub(r"^(\w+)\.csv: line (\d+)", lambda found: f"{found[1]}: row {int(found[2]) - 2}", told)
+            told = re.sub(r"\b(\w+)\.csv\b", r"\1", told.replace(": row -1:", ":"))
+            raise type(problem)(told) from None
 
 
 def column_table(title: str, frame: pd.DataFrame) -> pd.DataFrame:
@@ -56,12 +59,6 @@ def column_table(title: str, frame: pd.DataFrame) -> pd.DataFrame:
     if not isinstance(frame, pd.DataFrame):
         raise InputError(f"{title}: must be a DataFrame, got {type(frame).__name__}")
     return frame.reset_index([name for name in frame.index.names if name in LABELS and name not in frame.columns])
-
-
-def _in_rows(problem: str) -> str:
-    """A complaint about lines of a file as one about rows of a DataFrame."""
-    rows = re.sub(r"^(\w+)\.csv: line (\d+)", lambda found: f"{found[1]}: row {int(found[2]) - 2}", problem)
-    return re.sub(r"\b(\w+)\.csv\b", r"\1", rows.replace(": row -1:", ":"))
 
 
 Scores = pd.DataFrame | ScoreTable | str | Path

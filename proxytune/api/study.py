@@ -10,31 +10,13 @@ from typing import Any, NamedTuple
 import pandas as pd
 from matplotlib.figure import Figure
 
-from proxytune import report
+from proxytune import report, study
 from proxytune.domain import Outcome
 from proxytune.errors import InputError
 from proxytune.running import Watcher, watching
 from proxytune.search import History, optimize_result
 from proxytune.space import Theta
 from proxytune.storage import Store, locked
-from proxytune.study import (
-    LEARNING,
-    Best,
-    Spent,
-    Study,
-    StudyResult,
-    StudyRun,
-    StudySettings,
-    history_of,
-    most_confirmation_episodes,
-    most_preflight_episodes,
-    open_read_only,
-    open_study,
-    read_study_settings,
-    result_of,
-    run_stages,
-    with_spending,
-)
 
 
 class ReportFiles(NamedTuple):
@@ -53,8 +35,8 @@ class StudyReport(report.Shown):
         spent: What this call has simulated: `spent.episodes`, `spent.seconds`.
     """
 
-    result: StudyResult
-    spent: Spent
+    result: study.StudyResult
+    spent: study.Spent
 
     def __repr__(self) -> str:
         return f"StudyReport of '{self.result.study.settings.name}': {self.sentence}"
@@ -69,7 +51,7 @@ class StudyReport(report.Shown):
         return report.study_sentence(self.result)
 
     @property
-    def best(self) -> Best:
+    def best(self) -> study.Best:
         """The answer: its trial, the PRPV expected there, and how useful the proxy is by every measure."""
         return self.result.best
 
@@ -117,7 +99,7 @@ class StudyReport(report.Shown):
 
     def history(self) -> History:
         """Its trials as a search of any kind has them, for Optuna and scikit-optimize."""
-        return history_of(self.result)
+        return study.history_of(self.result)
 
     def optimize_result(self) -> Any:
         """scikit-optimize's OptimizeResult, as `skopt.plots` draws it: x, fun, x_iters, func_vals, space.
@@ -173,23 +155,23 @@ def run_study(
         InputError: If anything in the study cannot be used, with file, key and remedy.
         RunError: If no trial works, or the machine fails; all that was finished is kept.
     """
-    study = with_spending(open_study(Path(path)), budget=budget, jobs=jobs)
-    if study.settings.objective == LEARNING:
-        remedy = f"run it with: python -m proxytune study {study.settings.home}"
-        raise study.settings.error("objective", f"run_study has no search for '{LEARNING}'; {remedy}")
-    return run_quietly(study, progress, retry_failed=retry_failed)
+    opened = study.with_spending(study.open_study(Path(path)), budget=budget, jobs=jobs)
+    if opened.settings.objective == study.LEARNING:
+        remedy = f"run it with: python -m proxytune study {opened.settings.home}"
+        raise opened.settings.error("objective", f"run_study has no search for '{study.LEARNING}'; {remedy}")
+    return run_quietly(opened, progress, retry_failed=retry_failed)
 
 
 def run_quietly(
-    study: Study, progress: bool, known: Sequence[Outcome | Theta] = (), retry_failed: bool = False
+    opened: study.Study, progress: bool, known: Sequence[Outcome | Theta] = (), retry_failed: bool = False
 ) -> StudyReport:
     """Run a study that has been opened, as `run_study` does; what is to be known at once is a warning."""
-    bars = watching(progress, most_episodes(study.settings))
-    return run_opened(study, bars, lambda line: warnings.warn(line, stacklevel=6), retry_failed, known)
+    bars = watching(progress, most_episodes(opened.settings))
+    return run_opened(opened, bars, lambda line: warnings.warn(line, stacklevel=6), retry_failed, known)
 
 
 def run_opened(
-    study: Study,
+    opened: study.Study,
     bars: AbstractContextManager[Watcher],
     warn: Callable[[str], None] = lambda line: None,
     retry_failed: bool = False,
@@ -200,14 +182,14 @@ def run_opened(
     Of another search than before, and of parameters without effect, it warns before the first trial. Failed episodes
     are driven again where their code has changed, or all of them.
     """
-    settings = study.settings
+    settings = opened.settings
     with locked(settings.home), Store.open(settings.home) as store:
         if retry_failed:
             store.forget_failures()
         with bars as watcher:
-            under_way = StudyRun(study, store, watcher)
-            run_stages(under_way, warn, known)
-        return StudyReport(result_of(under_way), under_way.spent)
+            under_way = study.StudyRun(opened, store, watcher)
+            study.run_stages(under_way, warn, known)
+        return StudyReport(study.result_of(under_way), under_way.spent)
 
 
 def read_study(path: str | Path) -> StudyReport:
@@ -220,14 +202,14 @@ def read_study(path: str | Path) -> StudyReport:
         InputError: If the study has not been run, or was changed since.
         RunError: If no trial has a score yet.
     """
-    settings = read_study_settings(Path(path))
+    settings = study.read_study_settings(Path(path))
     settings.check_single()
     with Store.read(settings.home) as store:
-        return StudyReport(result_of(open_read_only(settings, store)), Spent())
+        return StudyReport(study.result_of(study.open_read_only(settings, store)), study.Spent())
 
 
-def most_episodes(settings: StudySettings) -> int:
+def most_episodes(settings: study.StudySettings) -> int:
     """Count the episodes that a study takes at most, from pre-flight to confirmation."""
     trials = settings.budget * len(settings.agents) * settings.starts
     nominal = len(settings.agents) * settings.starts
-    return trials + most_preflight_episodes(settings) + nominal + most_confirmation_episodes(settings)
+    return trials + study.most_preflight_episodes(settings) + nominal + study.most_confirmation_episodes(settings)

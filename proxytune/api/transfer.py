@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from contextlib import nullcontext, suppress
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -47,14 +47,14 @@ class ImportReport:
 
     def drives(self) -> pd.DataFrame:
         """One row per drive: its length, rates, gaps and reaction."""
-        return pd.DataFrame([one.facts for one in self.source.surveys])
+        return pd.DataFrame(list(map(asdict, self.source.surveys)))
 
     to_frame = drives
 
     def document(self) -> dict[str, Any]:
         """The JSON document of `import --json`."""
         written = None if self.log is None else str(self.log)
-        drives = [one.facts for one in self.source.surveys]
+        drives = [asdict(one) for one in self.source.surveys]
         return self.source.facts | {"log": written, "drives": drives, "cautions": list(self.cautions)}
 
 

@@ -25,7 +25,7 @@ from proxytune.identity import digest, meaning_of_code
 from proxytune.report import write_text
 from proxytune.scores import Metric, read_scores
 from proxytune.settings import nearest
-from proxytune.space import Parameter, Space, Theta
+from proxytune.space import Parameter, Theta
 from proxytune.study import FILE_NAME, GIVEN, Study, open_settings, plan_episodes, read_study_settings
 
 Simulate = Callable[..., float | Mapping[str, float]]
@@ -105,7 +105,11 @@ def tune(
     with temporary_folder() if folder is None else nullcontext(Path(folder)) as home, _written(home, scores) as target:
         table = read_scores(target, [Metric.parse(one).name for one in compared], columns=columns)
         names = tuple(agents) if agents else table.agents
-        simulate = _environment(simulator, space, agents, domain, home) if agents else simulator
+        simulate: Any = simulator
+        if agents:  # Gymnasium is loaded for environments alone
+            from proxytune.environments import played_environment
+
+            simulate = played_environment(simulator, space, agents, domain or {}, home / FILE_NAME)
         if not callable(simulate):
             raise InputError(f"simulator: {simulate!r} is no function; an environment needs agents={{name: policy}}")
         counted = int(table.counts.max()) if "start" in _arguments(simulate) else 1
@@ -197,10 +201,3 @@ def _arguments(simulate: Simulate) -> frozenset[str]:
         return frozenset(inspect.signature(simulate).parameters)
     except ValueError:
         return frozenset()
-
-
-def _environment(simulator: Any, space: Space, agents: Mapping[str, Any], domain: Any, home: Path) -> Simulate:
-    """An environment as a function; Gymnasium is loaded for it alone."""
-    from proxytune.environments import played_environment
-
-    return played_environment(simulator, space, agents, domain or {}, home / FILE_NAME)

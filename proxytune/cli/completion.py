@@ -9,13 +9,7 @@ from proxytune.errors import InputError, to_install
 
 
 def run(arguments: argparse.Namespace) -> Answer:
-    """Print the script."""
-    script = completion_script(arguments.shell)
-    return Answer({"shell": arguments.shell, "script": script}, script)
-
-
-def completion_script(shell: str) -> str:
-    """A script for a shell, made from the parser with every option that it has."""
+    """Print the script for a shell, made from the parser with every option that it has."""
     from proxytune.cli.main import parser
 
     try:
@@ -26,7 +20,8 @@ def completion_script(shell: str) -> str:
     for action in _actions(whole):
         if action.type is Path:
             action.complete = shtab.FILE  # type: ignore[attr-defined]
-    return str(shtab.complete(whole, shell))
+    script = str(shtab.complete(whole, arguments.shell))
+    return Answer({"shell": arguments.shell, "script": script}, script)
 
 
 def _actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:

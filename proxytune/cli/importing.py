@@ -1,8 +1,6 @@
 """`import`: a bag, a table or a trajectory, made a log."""
 
 import argparse
-from collections.abc import Sequence
-from pathlib import Path
 
 from rich.console import Group
 from rich.text import Text
@@ -11,7 +9,7 @@ from proxytune.api import import_log
 from proxytune.cli.options import facts_of, wanted_of
 from proxytune.cli.terminal import Answer, waiting
 from proxytune.files import check_place
-from proxytune.importing import Source, Survey
+from proxytune.importing import Survey
 from proxytune.report import Column, Table, columns_of, percent, table_text
 
 MEASURES = ("drive", "time", "poses", "rate", "jitter", "lost", "gaps", "commands", "answers after")
@@ -25,18 +23,15 @@ def run(arguments: argparse.Namespace) -> Answer:
     wanted, facts = wanted_of(arguments), facts_of(arguments)
     with waiting(f"reading {arguments.source}"):
         report = import_log(arguments.source, arguments.output, wanted=wanted, facts=facts)
-    return Answer(report.document(), _told(report.source, report.cautions, arguments.output))
-
-
-def _told(source: Source, cautions: Sequence[str], output: Path | None) -> Group:
+    source, output = report.source, arguments.output
     rows = tuple((one.name, one.kind, str(one.count), one.role) for one in source.channels)
     columns = (Column("what"), Column("type"), Column("count", numbers=True), Column("taken for"))
     channels = table_text(Table(source.form, columns, rows))
     drives = table_text(Table("Drives", columns_of(MEASURES[:1], MEASURES[1:]), tuple(map(_row, source.surveys))))
-    beware = (f"- beware: {line}" for line in cautions)
+    beware = (f"- beware: {line}" for line in report.cautions)
     notes = Text("\n".join((*beware, *(f"- {note}" for note in source.notes))))
     last = f"next: python -m proxytune diagnose {output}" if output else "give OUTPUT to write the log"
-    return Group(channels, Text(), drives, Text(), notes, Text(last))
+    return Answer(report.document(), Group(channels, Text(), drives, Text(), notes, Text(last)))
 
 
 def _row(one: Survey) -> tuple[str, ...]:

@@ -121,10 +121,6 @@ def _agents() -> list[Row]:
     return [{"name": name, "how_it_drives": str(agent)} for name, agent in {**AGENTS, **own}.items()]
 
 
-def _metrics() -> list[Row]:
-    return [{"name": name, "unit": unit} for name, unit in METRICS.items()]
-
-
 def _engines() -> list[Row]:
     own = [engine_of(name) for name in plugins("engine", ENGINE_NAMES)]
     return [
@@ -161,7 +157,7 @@ _KINDS: Mapping[str, Callable[[], list[Row]]] = {
     "maps": _maps,
     "effects": _effects,
     "agents": _agents,
-    "metrics": _metrics,
+    "metrics": lambda: [{"name": name, "unit": unit} for name, unit in METRICS.items()],
     "engines": _engines,
     "measures": _measures,
 }

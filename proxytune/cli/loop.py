@@ -5,14 +5,13 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from pathlib import Path
 
 from proxytune.cli.diagnose import shares
 from proxytune.cli.options import check_made, study_folder, typed
 from proxytune.cli.terminal import Answer, Steps
 from proxytune.files import check_place
 from proxytune.logs import Log
-from proxytune.loop import Closed, Teller, run_loop, text_of
+from proxytune.loop import Teller, run_loop, text_of
 from proxytune.running import Bars, Watcher
 
 
@@ -26,10 +25,14 @@ def run(arguments: argparse.Namespace) -> Answer:
     check_place(folder / "loop" / "report.html", ours=True)
     report = run_loop(folder, log=arguments.log, twin=arguments.twin, teller=Terminal())
     page = report.write(typed(arguments))
-    document = report.document()
-    document["files"] = {name: str(path) for name, path in _files(report.closed, page).items()}
+    closed, document = report.closed, report.document()
+    home = closed.loop.home
+    files = {"report": page, "log": closed.loop.log or home / "log", "model": home / "diagnosed" / "model.toml"}
+    files |= {"diagnosis": home / "diagnosed" / "diagnosis.json"}
+    files |= {"extended": home / "extended" / "study.toml"} if closed.after else {}
+    document["files"] = {name: str(path) for name, path in files.items()}
     document["this_run"]["seconds"] = time.perf_counter() - begun
-    return Answer(document, text_of(report.closed, page))
+    return Answer(document, text_of(closed, page))
 
 
 class Terminal(Teller):
@@ -46,10 +49,3 @@ class Terminal(Teller):
     def diagnosis(self, log: Log) -> AbstractContextManager[Callable[[str], None]]:
         """The steps of a diagnosis."""
         return Steps(shares(log))
-
-
-def _files(closed: Closed, page: Path) -> dict[str, Path]:
-    home = closed.loop.home
-    found = {"model": home / "diagnosed" / "model.toml", "diagnosis": home / "diagnosed" / "diagnosis.json"}
-    extended = {"extended": home / "extended" / "study.toml"} if closed.after else {}
-    return {"report": page, "log": closed.loop.log or home / "log", **found, **extended}

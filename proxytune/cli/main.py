@@ -85,9 +85,8 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
 def add_shared_options(parser: argparse.ArgumentParser, *, draws: bool) -> None:
     """Add the options that commands have in common; figures have formats."""
     if draws:
-        parser.add_argument(
-            "--format", type=formats, default=(), metavar="svg,pdf", help="figures also as SVG or PDF [PNG alone]"
-        )
+        also = "figures also as SVG or PDF [PNG alone]"
+        parser.add_argument("--format", type=formats, default=(), metavar="svg,pdf", help=also)
     parser.add_argument("--json", action="store_true", help="print one JSON document instead of text")
 
 
@@ -132,7 +131,12 @@ def run_command(answer_of: Callable[[], Answer], arguments: argparse.Namespace, 
     UNDER_WAY[:] = program, left
     with signals_as_interruptions(), lasting_stderr():
         try:
-            with _figures(getattr(arguments, "format", ())):
+            drawn: AbstractContextManager[None] = nullcontext()
+            if named := getattr(arguments, "format", ()):  # What draws figures is loaded only for that
+                from proxytune.report import figures_also_as
+
+                drawn = figures_also_as(named)
+            with drawn:
                 with prints_to_stderr():
                     answer = answer_of()
                 print_answer(answer, as_json=arguments.json)
@@ -158,15 +162,6 @@ def _refused(problem: BaseException | None) -> MemoryError | OSError | None:
             return problem
         problem = problem.__cause__ or problem.__context__
     return None
-
-
-def _figures(named: Sequence[str]) -> AbstractContextManager[None]:
-    """Have figures written in other formats too; what draws them is loaded only for that."""
-    if not named:
-        return nullcontext()
-    from proxytune.report import figures_also_as
-
-    return figures_also_as(named)
 
 
 def _complain(program: str, line: str) -> None:

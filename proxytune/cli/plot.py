@@ -2,7 +2,6 @@
 
 import argparse
 import re
-from collections.abc import Sequence
 from typing import Any
 
 from rich.console import Group, RenderableType
@@ -15,7 +14,7 @@ from proxytune.cli.study import families_answer
 from proxytune.cli.terminal import Answer
 from proxytune.scores import Metric
 from proxytune.storage import Store
-from proxytune.sweep import SweepCurve, all_curves
+from proxytune.sweep import all_curves
 
 RESCORED = "rescored"
 
@@ -29,7 +28,10 @@ def run(arguments: argparse.Namespace) -> Answer:
     settings.check_single()
     with Store.read(settings.home) as store:
         run = study.open_read_only(settings, store)
-        result, curves = _read(run, metrics)
+        curves = all_curves(run.of(study.with_metrics(run.study, metrics)) if metrics else run)
+        result = None
+        if not curves or store.trials(run.study.objective.name):  # Sweeps alone make no study
+            result = study.rescored(run, metrics) if metrics else study.result_of(run)
     names = [re.sub(r"[^\w.-]+", "_", str(metric).replace("%", "percent")) for metric in metrics]
     folder = settings.home / RESCORED / "+".join(names) if names else settings.home
     drawn = report.figures_of_sweep(curves, run.study.truth)
@@ -55,11 +57,3 @@ def run(arguments: argparse.Namespace) -> Answer:
         note = f"none run; scored with {named}; the trials are still those that the study's own metrics led to"
         text = Group(report.study_text(result, note, {}), text)
     return Answer({**document, "figures": paths, "pages": pages}, text)
-
-
-def _read(run: study.StudyRun, metrics: Sequence[Metric]) -> tuple[study.StudyResult | None, Sequence[SweepCurve]]:
-    """The study's result, if it has any trial or no sweep either, and its curves."""
-    curves = all_curves(run.of(study.with_metrics(run.study, metrics)) if metrics else run)
-    if curves and not run.store.trials(run.study.objective.name):
-        return None, curves
-    return study.rescored(run, metrics) if metrics else study.result_of(run), curves

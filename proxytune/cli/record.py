@@ -18,7 +18,11 @@ MOST_REPEATS = 10_000
 
 def run(arguments: argparse.Namespace) -> Answer:
     """Drive every manoeuvre, and lanes where pictures are wanted, and write the log."""
-    _check(arguments)
+    if not 1 <= arguments.repeats <= MOST_REPEATS or arguments.seed < 0 or not 5.0 <= arguments.seconds <= 600.0:
+        limits = f"--repeats must be between 1 and {MOST_REPEATS}, --seed at least 0 and --seconds between 5 and 600"
+        raise InputError(limits)
+    if not 0 <= arguments.frames <= MOST_FRAMES:
+        raise InputError(f"--frames must be between 0 and {MOST_FRAMES}, got {arguments.frames}")
     settings = read_study_settings(arguments.path)
     if not arguments.model.is_file():
         raise InputError(f"--model {arguments.model}: no such file; check the path")
@@ -32,11 +36,3 @@ def run(arguments: argparse.Namespace) -> Answer:
     text = f"{len(log.episodes)} drives, {rows} rows{pictures}\n{arguments.output}"
     lines = [*(f"beware: {line}" for line in cautions), text]
     return Answer({**document, "seed": arguments.seed, "cautions": list(cautions)}, Text("\n".join(lines)))
-
-
-def _check(arguments: argparse.Namespace) -> None:
-    if not 1 <= arguments.repeats <= MOST_REPEATS or arguments.seed < 0 or not 5.0 <= arguments.seconds <= 600.0:
-        limits = f"--repeats must be between 1 and {MOST_REPEATS}, --seed at least 0 and --seconds between 5 and 600"
-        raise InputError(limits)
-    if not 0 <= arguments.frames <= MOST_FRAMES:
-        raise InputError(f"--frames must be between 0 and {MOST_FRAMES}, got {arguments.frames}")

@@ -24,20 +24,23 @@ def read_sides(
         if not (name and equals and theirs):
             raise InputError(f"--columns {arguments.columns}: write NAME=COLUMN,..., as in agent=policy,episode=trial")
         columns[name] = theirs
-    _check_columns(columns, [split_source(source)[0] for source in (*arguments.target, *arguments.proxy)])
-    _check_other_column(arguments, metrics)
-    target = _read_target(arguments.target, metrics, columns, both=arguments.target == arguments.proxy)
-    return target, _read_proxies(arguments.proxy, arguments.target, metrics, columns)
-
-
-def _check_other_column(arguments: argparse.Namespace, metrics: Sequence[str]) -> None:
-    """Refuse to compare a column with itself."""
+    files = [split_source(source)[0] for source in (*arguments.target, *arguments.proxy)] if columns else []
+    found = list(dict.fromkeys(name for path in files for name in scores.column_names(path)))
+    for name, theirs in columns.items():
+        if theirs not in found:
+            raise InputError(f"--columns {name}={theirs}: no table has a column '{theirs}'; {nearest(theirs, found)}")
     for source in set(arguments.target) & set(arguments.proxy):
-        path, domain = split_source(source)
-        header = scores.column_names(path, domain)
-        if domain is None and "domain" in header:
-            continue
-        scores.check_sides(source, header, metrics)
+        header = scores.column_names(*split_source(source))
+        if split_source(source)[1] is not None or "domain" not in header:
+            scores.check_sides(source, header, metrics)
+    parts = [split_source(source) for source in arguments.target]
+    if len({domain for _, domain in parts}) > 1:
+        several = "several files make one table; give all of them one domain, or none"
+        raise InputError(f"--target {arguments.target[1]}: {several}")
+    paths, domain = [path for path, _ in parts], parts[0][1]
+    own = "real" if arguments.target == arguments.proxy else ", ".join(path.stem for path in paths)
+    target = scores.read_scores(paths, metrics, domain, _present(columns, paths), "target")
+    return (domain or own, target), _read_proxies(arguments.proxy, arguments.target, metrics, columns)
 
 
 def _metrics_given(arguments: argparse.Namespace) -> list[str]:
@@ -63,24 +66,6 @@ def split_source(source: str) -> tuple[Path, str | None]:
     if not colon or Path(source).exists() or not path:
         return Path(source), None
     return Path(path), domain
-
-
-def _check_columns(columns: Mapping[str, str], files: Sequence[Path]) -> None:
-    found = list(dict.fromkeys(name for path in files for name in scores.column_names(path))) if columns else []
-    for name, theirs in columns.items():
-        if theirs not in found:
-            raise InputError(f"--columns {name}={theirs}: no table has a column '{theirs}'; {nearest(theirs, found)}")
-
-
-def _read_target(
-    sources: Sequence[str], metrics: Sequence[str], columns: Mapping[str, str], *, both: bool
-) -> tuple[str, scores.ScoreTable]:
-    parts = [split_source(source) for source in sources]
-    if len({domain for _, domain in parts}) > 1:
-        raise InputError(f"--target {sources[1]}: several files make one table; give all of them one domain, or none")
-    paths, domain = [path for path, _ in parts], parts[0][1]
-    name = domain or ("real" if both else ", ".join(path.stem for path in paths))
-    return name, scores.read_scores(paths, metrics, domain, _present(columns, paths), "target")
 
 
 def _read_proxies(
@@ -160,14 +145,24 @@ def run(arguments: argparse.Namespace) -> Answer:
         seed=arguments.seed,
     )
     tested = _test(assessments, arguments) if arguments.sequential else None
-    written = _write(arguments, assessments, selection, target_name) if arguments.output else {"figures": []}
-    document = {"target": target_name, **written, "left_out": list(left_out)}
+    document: dict[str, Any] = {"target": target_name, "figures": []}
+    if arguments.output:
+        settings = [("metrics", ", ".join(arguments.metric)), ("resamples", str(arguments.resamples))]
+        foot = report.foot_of(typed(arguments), [*settings, ("seed", str(arguments.seed))])
+        drawn = report.write_score_report(assessments, selection, arguments.output, foot, target=target_name)
+        document |= {"figures": [str(path) for path in drawn[0]], "report": str(drawn[1])}
+    document["left_out"] = list(left_out)
     if arguments.table:
         report.write_score_table(assessments, arguments.table)
         document["table"] = str(arguments.table)
     if tested is not None:
         document["sequential"] = asdict(tested)
-    return _answer(document, assessments, selection, tested)
+    lines = [*left_out, *([f"sequential test: {report.sequential_sentence(tested)}"] if tested else ())]
+    shown = report.score_text(assessments, selection, lines, target=target_name)
+    if selection is not None:
+        return Answer(document | report.ranking_document(assessments, selection), shown)
+    ((name, assessment),) = assessments.items()
+    return Answer({"proxy": name, **document, **report.score_document(assessment)}, shown)
 
 
 def _test(assessments: Mapping[str, usefulness.Assessment], arguments: argparse.Namespace) -> usefulness.Sequential:
@@ -178,20 +173,6 @@ def _test(assessments: Mapping[str, usefulness.Assessment], arguments: argparse.
     if len(columns) > 1:
         raise InputError(f"--sequential: takes one metric, not the {name}; name it with --decide-on")
     return usefulness.sequential_test(assessment.inputs, columns[0], seed=arguments.seed)
-
-
-def _answer(
-    document: dict[str, Any],
-    assessments: Mapping[str, usefulness.Assessment],
-    selection: usefulness.Selection | None,
-    tested: usefulness.Sequential | None,
-) -> Answer:
-    lines = [*document["left_out"], *([f"sequential test: {report.sequential_sentence(tested)}"] if tested else ())]
-    shown = report.score_text(assessments, selection, lines, target=document["target"])
-    if selection is not None:
-        return Answer(document | report.ranking_document(assessments, selection), shown)
-    ((name, assessment),) = assessments.items()
-    return Answer({"proxy": name, **document, **report.score_document(assessment)}, shown)
 
 
 def _weights(texts: Sequence[str]) -> dict[str, float] | None:
@@ -205,15 +186,3 @@ def _weights(texts: Sequence[str]) -> dict[str, float] | None:
         if abs(weights[name]) > LARGEST_WEIGHT:
             raise InputError(f"--beta {text}: the weight must be at most {LARGEST_WEIGHT:g}")
     return weights or None
-
-
-def _write(
-    arguments: argparse.Namespace,
-    assessments: Mapping[str, usefulness.Assessment],
-    selection: usefulness.Selection | None,
-    target: str,
-) -> dict[str, Any]:
-    settings = [("metrics", ", ".join(arguments.metric)), ("resamples", str(arguments.resamples))]
-    foot = report.foot_of(typed(arguments), [*settings, ("seed", str(arguments.seed))])
-    figures, page = report.write_score_report(assessments, selection, arguments.output, foot, target=target)
-    return {"figures": [str(path) for path in figures], "report": str(page)}

@@ -8,7 +8,7 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from proxytune import report
+from proxytune import report, study
 from proxytune.api import FamiliesReport, most_episodes, run_opened, run_opened_families
 from proxytune.cli.options import check_made, on_its_cluster, study_folder
 from proxytune.cli.terminal import Answer
@@ -17,21 +17,6 @@ from proxytune.files import check_place
 from proxytune.running import Bars, Watcher
 from proxytune.search import make_proposer
 from proxytune.storage import Store, locked
-from proxytune.study import (
-    BANK_FILE,
-    LEARNING,
-    Study,
-    StudyResult,
-    StudyRun,
-    StudySettings,
-    bank_of,
-    open_bank,
-    open_settings,
-    read_study_settings,
-    run_bank,
-    with_spending,
-    write_table,
-)
 from proxytune.teaching import PlvSearch, load_setup, most_examinations, search_space
 
 MOST_ON_PAGE = 0.02
@@ -41,7 +26,7 @@ MOST_ON_PAGE = 0.02
 class LivePage:
     """Hears how a run goes, passes it on, and writes the study's page."""
 
-    def __init__(self, settings: StudySettings, objective: str, watcher: Watcher) -> None:
+    def __init__(self, settings: study.StudySettings, objective: str, watcher: Watcher) -> None:
         self._settings, self._objective, self._watcher = settings, objective, watcher
         self._path = settings.home / "report.html"
         self._doing, self._due = "", 0.0
@@ -76,7 +61,7 @@ class LivePage:
 
 @contextmanager
 def renewed_page(
-    settings: StudySettings, objective: str, watching: AbstractContextManager[Watcher]
+    settings: study.StudySettings, objective: str, watching: AbstractContextManager[Watcher]
 ) -> Iterator[Watcher]:
     """A watcher that keeps the study's page up to date; a run that is stopped leaves a page that says so."""
     with watching as watcher:
@@ -100,40 +85,40 @@ def _say(line: str) -> None:
     print(f"proxytune study: {line}", file=sys.stderr, flush=True)
 
 
-def _bars(study: Study) -> AbstractContextManager[Watcher]:
+def _bars(opened: study.Study) -> AbstractContextManager[Watcher]:
     """A bar of episodes, and the study's page while it is tuned."""
-    return renewed_page(study.settings, study.objective.name, Bars(most_episodes(study.settings)))
+    return renewed_page(opened.settings, opened.objective.name, Bars(most_episodes(opened.settings)))
 
 
-def search_by_plv(study: Study, folder: Path, by_prpv: Callable[[], StudyResult]) -> Answer:
+def search_by_plv(opened: study.Study, folder: Path, by_prpv: Callable[[], study.StudyResult]) -> Answer:
     """Run what is left of a search by PLV; first narrow the box by PRPV where the study asks for it."""
-    settings = study.settings
+    settings = opened.settings
     setup = load_setup(settings)
     widths = setup.settings.widths
     search_space(settings, widths, {})
     predictive = by_prpv() if setup.settings.narrow else None
     space = search_space(settings, widths, predictive.knowledge.as_good[1] if predictive else {})
     terminal = Bars(most_examinations(setup.settings), "points of learning curves")
-    watching = renewed_page(settings, LEARNING, terminal)
+    watching = renewed_page(settings, study.LEARNING, terminal)
     with locked(folder), Store.open(folder) as store, watching as bars:
         search = PlvSearch(settings, setup, store, space, bars)
         chosen = predictive.best.trial.theta if predictive else None
-        result = search.run(make_proposer(study.engine, settings.initial), chosen)
+        result = search.run(make_proposer(opened.engine, settings.initial), chosen)
     figure, page = report.write_plv_report(result, folder)
     document = {**report.plv_document(result), "figure": str(figure), "report": str(page)}
     return Answer(document, report.plv_text(result, {"figure": figure, "report": page}))
 
 
-def run_a_bank(settings: StudySettings, arguments: argparse.Namespace) -> Answer:
+def run_a_bank(settings: study.StudySettings, arguments: argparse.Namespace) -> Answer:
     """Run what is left of a bank, and write its table of trials and its page."""
-    check_place(settings.home / BANK_FILE, ours=True)
-    study = with_spending(open_bank(settings), budget=arguments.budget, jobs=arguments.jobs)
-    with locked(settings.home), Store.open(settings.home) as store, Bars(most_episodes(study.settings)) as bars:
+    check_place(settings.home / study.BANK_FILE, ours=True)
+    opened = study.with_spending(study.open_bank(settings), budget=arguments.budget, jobs=arguments.jobs)
+    with locked(settings.home), Store.open(settings.home) as store, Bars(most_episodes(opened.settings)) as bars:
         if arguments.retry_failed:
             store.forget_failures()
-        run = StudyRun(study, store, bars)
-        run_bank(run)
-        bank, table = bank_of(run), write_table(run)
+        run = study.StudyRun(opened, store, bars)
+        study.run_bank(run)
+        bank, table = study.bank_of(run), study.write_table(run)
     files = {"table": table, "report": report.write_bank_page(bank, table)}
     costs = {"episodes": {"run": run.spent.episodes}, "seconds": {"episodes": run.spent.seconds}}
     document = {**report.bank_document(bank), **costs, **{name: str(path) for name, path in files.items()}}
@@ -145,7 +130,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     """Run what is left of a study; a finished one is summed up again without simulating."""
     begun = time.perf_counter()
     folder = study_folder(arguments.path)
-    settings, again = read_study_settings(folder), arguments.retry_failed
+    settings, again = study.read_study_settings(folder), arguments.retry_failed
     check_made(folder)
     if settings.families:
         own = {"budget": arguments.budget, "jobs": arguments.jobs}
@@ -154,14 +139,14 @@ def run(arguments: argparse.Namespace) -> Answer:
         return families_answer(several, {"episodes": {"run": several.spent.episodes}, "seconds": seconds})
     if not settings.targets:
         return run_a_bank(settings, arguments)
-    study = with_spending(open_settings(settings), budget=arguments.budget, jobs=arguments.jobs)
-    if study.settings.objective == LEARNING:
-        return search_by_plv(study, folder, lambda: run_opened(study, _bars(study), _say, again).result)
-    found = run_opened(study, _bars(study), _say, again)
+    opened = study.with_spending(study.open_settings(settings), budget=arguments.budget, jobs=arguments.jobs)
+    if opened.settings.objective == study.LEARNING:
+        return search_by_plv(opened, folder, lambda: run_opened(opened, _bars(opened), _say, again).result)
+    found = run_opened(opened, _bars(opened), _say, again)
     figures, page = found.write(folder)
     result, spent, total = found.result, found.spent, time.perf_counter() - begun
     reused = result.episodes - (spent.episodes - spent.unused)
-    outside = max(0.0, total - spent.seconds / study.settings.jobs)  # Waiting included
+    outside = max(0.0, total - spent.seconds / opened.settings.jobs)  # Waiting included
     document = {
         **found.document(),
         "episodes": {"run": spent.episodes, "reused": reused, "failed": result.failed_episodes},

@@ -110,7 +110,12 @@ def print_answer(answer: Answer, *, as_json: bool) -> None:
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
         if as_json:
-            print(_json_text(answer.document))
+            text = json.dumps(answer.document, indent=2, allow_nan=False, ensure_ascii=False)
+            try:
+                text.encode(sys.stdout.encoding or "utf-8")
+            except UnicodeEncodeError:  # In ASCII, as JSON escapes what standard output cannot hold
+                text = json.dumps(answer.document, indent=2, allow_nan=False)
+            print(text)
         elif isinstance(answer.text, str):
             print(answer.text)
         else:
@@ -122,16 +127,6 @@ def print_answer(answer: Answer, *, as_json: bool) -> None:
         if problem.errno in (errno.EPIPE, errno.EIO):  # The reader, or the terminal, has gone
             return
         raise RunError(f"standard output: cannot be written ({problem.strerror}); make room and run again") from None
-
-
-def _json_text(document: dict[str, Any]) -> str:
-    """The document; in ASCII, as JSON escapes it, where standard output cannot hold its letters."""
-    text = json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False)
-    try:
-        text.encode(sys.stdout.encoding or "utf-8")
-    except UnicodeEncodeError:
-        return json.dumps(document, indent=2, allow_nan=False)
-    return text
 
 
 @contextmanager
@@ -151,11 +146,7 @@ class Steps:
     """Shows each step as it begins; use as a context."""
 
     def __init__(self, shares: Mapping[str, float]) -> None:
-        """Begin with nothing done.
-
-        Args:
-            shares: By how a step's line begins, the share of the whole time that has usually passed by then.
-        """
+        """Begin with nothing done; of each beginning of a step's line is told what share of the time is over then."""
         self._shares, self._lines = shares, Lines()
         self._bar = progress_bar(self._lines.console, speed_estimate_period=3600.0)
         self._task = self._bar.add_task("", total=1.0)

@@ -66,7 +66,15 @@ def as_table(path: Path, arrays: Arrays, times: str) -> Table:
     An array `actions` that is one shorter, as no action follows the last pose, ends with an empty row. The entry of a
     column map says which are the times, if it is not "".
     """
-    count = len(arrays[_times(path, arrays, times)])
+    named = [name for name in (times, times.rpartition(":")[0]) if name in arrays]
+    names = named if times else usual_names("time", list(arrays))
+    if len(names) != 1 or arrays[names[0]].ndim != 1:
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
+        raise LogError(
+            f"{path}: which array (N,) holds the times is not clear; its arrays are: {shapes}; "
+            "say it, as in --columns time=timestamps:s"
+        )
+    count = len(arrays[names[0]])
     if not count:
         raise LogError(f"{path}: its arrays are empty; record a drive")
     columns: dict[str, NDArray[Any]] = {}
@@ -75,20 +83,6 @@ def as_table(path: Path, arrays: Arrays, times: str) -> Table:
             array = np.vstack((array, np.full((1, array.shape[1]), np.nan)))
         columns |= _flattened(name, array, count)
     return Table(path, pd.DataFrame(columns, index=range(1, count + 1)), "row")
-
-
-def _times(path: Path, arrays: Arrays, stated: str) -> str:
-    if stated:
-        names = [name for name in (stated, stated.rpartition(":")[0]) if name in arrays]
-    else:
-        names = usual_names("time", list(arrays))
-    if len(names) != 1 or arrays[names[0]].ndim != 1:
-        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
-        raise LogError(
-            f"{path}: which array (N,) holds the times is not clear; its arrays are: {shapes}; "
-            "say it, as in --columns time=timestamps:s"
-        )
-    return names[0]
 
 
 def _flattened(name: str, array: NDArray[Any], count: int) -> dict[str, NDArray[Any]]:
@@ -151,10 +145,21 @@ def read_arrays(path: Path, wanted: Wanted) -> Source:
     table = as_table(path, arrays, wanted.columns.get("time", ""))
     _check_wanted(table, arrays, wanted)
     table, gym, notes = _gym_duckietown(table, arrays, wanted)
-    columns, kind = _columns(table, gym | dict(wanted.columns), wanted)
+    none = "none" in (wanted.commands, wanted.kind)
+    fields = ("time", "episode", *POSE, *(() if none else ("command_time", *COMMAND_FIELDS)))
+    stated = {field: entry for field, entry in (gym | dict(wanted.columns)).items() if field in fields}
+    columns: Columns = choose_columns(table, stated, fields)
+    columns, kind = (columns, "none") if none else with_commands(columns, wanted.kind, table)
     frames = find_frames(path, arrays, wanted.frames, len(table.cells))
     drives = _drives(table, columns, kind, arrays[frames] if frames else None)
-    channels = (*channels_of(table, columns), *_other_channels(table, arrays, frames))
+    known, role = {name.split("[")[0] for name in table.names}, dict.fromkeys(filter(None, [frames]), "frames")
+    out = "left out: not one number, or short row of numbers, for each time"
+    others = (
+        Channel(name, f"{array.dtype} {array.shape}", len(array) if array.ndim else 1, role.get(name, out))
+        for name, array in arrays.items()
+        if name not in known
+    )
+    channels = (*channels_of(table, columns), *others)
     return Source("numpy arrays", tuple(drives), channels, (f"Columns: {described(columns)}.", *notes))
 
 
@@ -199,14 +204,6 @@ def _gym_duckietown(table: Table, arrays: Arrays, wanted: Wanted) -> tuple[Table
     return table, stated, [note]
 
 
-def _columns(table: Table, stated: Mapping[str, str], wanted: Wanted) -> tuple[Columns, str]:
-    """The columns that are used, and the kind of the commands; "none" where none are wanted."""
-    none = "none" in (wanted.commands, wanted.kind)
-    fields = ("time", "episode", *POSE, *(() if none else ("command_time", *COMMAND_FIELDS)))
-    columns = choose_columns(table, {field: entry for field, entry in stated.items() if field in fields}, fields)
-    return (columns, "none") if none else with_commands(columns, wanted.kind, table)
-
-
 def _drives(table: Table, columns: Columns, kind: str, frames: NDArray[np.uint8] | None) -> list[Drive]:
     poses = poses_by_drive(table, columns)
     commands = commands_by_drive(table, columns, kind) if kind != "none" else {}
@@ -222,16 +219,3 @@ def _drives(table: Table, columns: Columns, kind: str, frames: NDArray[np.uint8]
 
     pictures = [Pictures(times[numbers], partial(read, numbers)) for numbers in rows]
     return [replace(drive, pictures=each) for drive, each in zip(drives, pictures, strict=True)]
-
-
-def _other_channels(table: Table, arrays: Arrays, frames: str) -> list[Channel]:
-    """Arrays that are no columns: frames, and those left out."""
-    columns = {name.split("[")[0] for name in table.names}
-    others = {name: array for name, array in arrays.items() if name not in columns}
-    out = "left out: not one number, or short row of numbers, for each time"
-    return [
-        Channel(
-            name, f"{array.dtype} {array.shape}", len(array) if array.ndim else 1, "frames" if name == frames else out
-        )
-        for name, array in others.items()
-    ]

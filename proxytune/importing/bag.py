@@ -30,14 +30,9 @@ REPAIR = {"ROS 1 bag": "rosbag reindex", "ROS 2 bag (mcap)": "mcap recover", "RO
 
 @dataclass(frozen=True)
 class Topic:
-    """A topic of a bag, or of several bags together.
+    """A topic of a bag, or of several bags together, so many of which are `lacking` messages of it.
 
-    Attributes:
-        name: Its name, as in /cmd_vel.
-        kind: Type of its messages, as in geometry_msgs/msg/Twist.
-        count: How many messages it has.
-        known: Whether the type is defined, so that messages can be read.
-        lacking: How many of the bags have no messages of it.
+    Messages can be read where their type, as geometry_msgs/msg/Twist, is `known`.
     """
 
     name: str
@@ -49,12 +44,7 @@ class Topic:
 
 @dataclass(frozen=True)
 class Bag:
-    """A bag that is open.
-
-    Attributes:
-        path: The file, or the folder of a ROS 2 bag.
-        reader: The library's reader of it.
-    """
+    """A bag that is open: the file, or the folder of a ROS 2 bag, and the library's reader of it."""
 
     path: Path
     reader: Any
@@ -107,7 +97,17 @@ def bags_in(path: Path) -> dict[str, Path]:
 def open_bag(path: Path) -> Iterator[Bag]:
     """Open a bag while it is read."""
     check_bag_size(path)
-    reader = _open_reader(path)
+    try:
+        from rosbags.highlevel import AnyReader
+        from rosbags.typesys import Stores, get_typestore
+    except ModuleNotFoundError:
+        raise LogError(f"{path}: reading bags needs rosbags; {to_install('ros')}") from None
+    with complaints(path, "cannot be read as a bag"):
+        # The library would take a ROS 2 folder named run.bag for a file of ROS 1.
+        inside = path.suffix == ROS1 and path.is_dir()
+        paths = sorted(file for file in path.glob("*") if file.suffix in ROS2) if inside else [path]
+        reader = AnyReader(paths, default_typestore=get_typestore(Stores.ROS2_HUMBLE))
+        reader.open()
     try:
         with complaints(path, "cannot be read as a bag"):
             check_messages_size(path, reader)
@@ -122,21 +122,6 @@ def form_of(path: Path) -> str:
         return "ROS 1 bag"
     files = [path] if path.is_file() else path.glob("*")
     return "ROS 2 bag (mcap)" if any(".mcap" in file.suffixes for file in files) else "ROS 2 bag (sqlite3)"
-
-
-def _open_reader(path: Path) -> Any:
-    try:
-        from rosbags.highlevel import AnyReader
-        from rosbags.typesys import Stores, get_typestore
-    except ModuleNotFoundError:
-        raise LogError(f"{path}: reading bags needs rosbags; {to_install('ros')}") from None
-    with complaints(path, "cannot be read as a bag"):
-        # The library would take a ROS 2 folder named run.bag for a file of ROS 1.
-        inside = path.suffix == ROS1 and path.is_dir()
-        paths = sorted(file for file in path.glob("*") if file.suffix in ROS2) if inside else [path]
-        reader = AnyReader(paths, default_typestore=get_typestore(Stores.ROS2_HUMBLE))
-        reader.open()
-    return reader
 
 
 @contextmanager

@@ -85,25 +85,24 @@ def choose_transform(transforms: dict[str, Transform], where: str) -> str:
     raise LogError(f"{where}: no transform is plainly the robot's pose; {_remedy(transforms)}")
 
 
-def chain_of(transforms: dict[str, Transform], name: str, where: str) -> list[Transform]:
-    """The transforms that lead from a parent down to a child, as in "map>base_link"."""
+def read_chain(transforms: dict[str, Transform], name: str, stamps: str, where: str) -> tuple[Poses, tuple[str, ...]]:
+    """Poses of a child in a parent ("map>base_link"), at the times of the transform between them that comes most often.
+
+    Other moving transforms are interpolated to these times; poses outside of what they cover are left out.
+    """
     parent, _, child = name.partition(">")
     chain = _chain(transforms, parent, child)
     if not chain:
         raise LogError(f"{where}: no transforms lead from '{parent}' to '{child}'; {_remedy(transforms)}")
     if not any(transform.moves for transform in chain):
         raise LogError(f"{where}: {name} never moves; {_remedy(transforms)}")
-    return chain
-
-
-def read_chain(transforms: dict[str, Transform], name: str, stamps: str, where: str) -> tuple[Poses, tuple[str, ...]]:
-    """Poses of a child in a parent ("map>base_link"), at the times of the transform between them that comes most often.
-
-    Other moving transforms are interpolated to these times; poses outside of what they cover are left out.
-    """
-    chain = chain_of(transforms, name, where)
     for transform in chain:
-        _check_numbers(transform, where)
+        finite, about = np.isfinite(transform.values).all(axis=1), f"{where}: transform {transform.name}"
+        if not finite.all():
+            raise LogError(f"{about}: number {int(np.argmin(finite)) + 1} is not finite; name another by --poses")
+        wrong = no_rotation(transform.values[:, 3:])
+        if wrong.any():
+            raise complaint(transform.values[:, 3:], wrong, about)
     choices = {each.name: choose_times(each.stamps, stamps, each.name) for each in chain if each.moves}
     times = {moving: of_it for moving, (of_it, _) in choices.items()}
     most = max(times.values(), key=len)
@@ -117,21 +116,9 @@ def read_chain(transforms: dict[str, Transform], name: str, stamps: str, where: 
         place, turn = place + turn.apply(step), turn * rotation
     said = (note for _, notes in choices.values() for note in notes)
     poses = Poses(common, place, *headings_and_tilts(turn.as_quat(), f"{where}: {name}"))
-    parent, _, child = name.partition(">")
     names, left_out = ", ".join(transform.name for transform in chain), len(most) - len(common)
     outside = f"; {left_out} outside of what all of them cover are left out" if left_out else ""
     return poses, (f"Poses of {child} in {parent} are composed of {names}{outside}.", *said)
-
-
-def _check_numbers(transform: Transform, where: str) -> None:
-    """Refuse numbers that are not finite and quaternions that are no rotation."""
-    finite = np.isfinite(transform.values).all(axis=1)
-    if not finite.all():
-        number = int(np.argmin(finite)) + 1
-        raise LogError(f"{where}: transform {transform.name}: number {number} is not finite; name another by --poses")
-    wrong = no_rotation(transform.values[:, 3:])
-    if wrong.any():
-        raise complaint(transform.values[:, 3:], wrong, f"{where}: transform {transform.name}")
 
 
 def _at(values: Floats, times: Floats | None, wanted: Floats) -> tuple[Floats, Rotation]:
@@ -188,6 +175,8 @@ ENCODINGS: Mapping[str, tuple[int, tuple[int, int, int]]] = {
     "mono8": (1, (0, 0, 0)),
 }
 """Bytes of a pixel, and which of them are red, green and blue."""
+PACKED = ("PNG", "JPEG", "TIFF", "WEBP")
+"""As Pillow calls what ROS packs pictures as."""
 
 
 def read_pictures(bag: Bag, topic: str, stamps: str) -> tuple[Pictures, tuple[str, ...]]:
@@ -215,7 +204,15 @@ def iterate(path: Path, topic: str) -> Iterator[Picture]:
 def picture_of(message: Any) -> Picture:
     """Red, green and blue (rows, columns, 3) of an Image or a CompressedImage."""
     if not hasattr(message, "encoding"):
-        return _compressed(message)
+        try:
+            packed = BytesIO(np.asarray(message.data, dtype=np.uint8).tobytes())
+            with open_picture(packed, "it", PACKED) as image:
+                if image.mode.startswith(("I", "F")):
+                    raise LogError("has more than 8 bits a pixel; leave pictures out by --pictures none")
+                return np.array(image.convert("RGB"))
+        except BROKEN:
+            text = f"is no picture that can be read (format '{message.format}')"
+            raise LogError(f"{text}; record it again, or leave pictures out by --pictures none") from None
     _check(message)
     channels, order = ENCODINGS[message.encoding]
     rows = np.asarray(message.data, dtype=np.uint8)[: message.step * message.height].reshape(message.height, -1)
@@ -237,19 +234,3 @@ def _check(message: Any) -> tuple[float, ...]:
         size = f"{message.width} × {message.height} pixels in rows of {message.step} bytes"
         raise LogError(f"{len(message.data)} bytes do not hold {size}; record it again, or take --pictures none")
     return ()
-
-
-PACKED = ("PNG", "JPEG", "TIFF", "WEBP")
-"""As Pillow calls what ROS packs pictures as."""
-
-
-def _compressed(message: Any) -> Picture:
-    try:
-        packed = BytesIO(np.asarray(message.data, dtype=np.uint8).tobytes())
-        with open_picture(packed, "it", PACKED) as image:
-            if image.mode.startswith(("I", "F")):
-                raise LogError("has more than 8 bits a pixel; leave pictures out by --pictures none")
-            return np.array(image.convert("RGB"))
-    except BROKEN:
-        text = f"is no picture that can be read (format '{message.format}')"
-        raise LogError(f"{text}; record it again, or leave pictures out by --pictures none") from None

@@ -131,17 +131,21 @@ PLAUSIBLE_S = 946684800.0
 
 
 def checked_drive(drive: Drive, where: str, offset_s: float = 0.0) -> tuple[Drive, list[str]]:
-    """A drive with stamps in order and without repeats, and what was found, a sentence each.
-
-    Args:
-        drive: As an importer has read it.
-        where: The source, as a complaint names it.
-        offset_s: How much later poses are stamped than commands, as far as that is known [s].
-    """
+    """A drive with stamps in order and without repeats, and what was found; poses are known to be stamped so late."""
     about = f"{where}: drive {drive.name}"
     _check_sizes((drive.poses.times, drive.poses.places), "poses", about)
     poses, notes = _ordered_poses(drive.poses, about)
-    _check_upright(poses, about)
+    tilt, spans = math.degrees(float(np.median(poses.tilts))), np.ptp(poses.places, axis=0)
+    if tilt > TILT_DEG:
+        raise LogError(
+            f"{about}: the robot's z axis lies {tilt:.0f}° from the world's for half of the drive; poses must be z-up "
+            "(x forward, y left): turn the rigid body or the world in the tracker, and export again"
+        )
+    if spans[2] > FLAT_M and spans[2] > spans[:2].min():
+        raise LogError(
+            f"{about}: z varies by {spans[2]:.2f} m, {'xy'[int(spans[:2].argmin())]} only by {spans[:2].min():.2f} m: "
+            "the world is not z-up; export poses with z upwards"
+        )
     commands = drive.commands
     if commands is not None:
         _check_sizes((commands.times, commands.values), "commands", about)
@@ -149,7 +153,13 @@ def checked_drive(drive: Drive, where: str, offset_s: float = 0.0) -> tuple[Driv
         kept, more = _order(commands.times, "commands", about, last=True)
         commands = replace(commands, times=commands.times[kept], values=commands.values[kept])
         notes += more
-        _check_overlap(commands.times + offset_s, poses.times, about)
+        first, last = (float(end + offset_s) for end in commands.times[[0, -1]])
+        begin, end = poses.times[0], poses.times[-1]
+        if first >= end or last < begin:
+            raise LogError(
+                f"{about}: commands lie between {first:.3f} and {last:.3f} s, poses between {begin:.3f} and {end:.3f} "
+                "s: two clocks; use --stamps receive, or say how far apart they are by --clock-offset"
+            )
     return replace(drive, poses=poses, commands=commands), [f"drive {drive.name}: {note}" for note in notes]
 
 
@@ -209,31 +219,6 @@ def _order(times: Floats, what: str, about: str, *, last: bool) -> tuple[np.ndar
     if sorted_times[-1] > 86400.0 and sorted_times[0] < PLAUSIBLE_S:
         notes.append(f"the stamps of its {what} lie before the year 2000: their clock was not set")
     return kept, notes
-
-
-def _check_upright(poses: Poses, about: str) -> None:
-    """Refuse poses whose upward axis is not z."""
-    tilt = math.degrees(float(np.median(poses.tilts)))
-    if tilt > TILT_DEG:
-        raise LogError(
-            f"{about}: the robot's z axis lies {tilt:.0f}° from the world's for half of the drive; poses must be z-up "
-            "(x forward, y left): turn the rigid body or the world in the tracker, and export again"
-        )
-    spans = np.ptp(poses.places, axis=0)
-    if spans[2] > FLAT_M and spans[2] > spans[:2].min():
-        raise LogError(
-            f"{about}: z varies by {spans[2]:.2f} m, {'xy'[int(spans[:2].argmin())]} only by {spans[:2].min():.2f} m: "
-            "the world is not z-up; export poses with z upwards"
-        )
-
-
-def _check_overlap(commands: Floats, poses: Floats, about: str) -> None:
-    """Refuse commands and poses of different times."""
-    if commands[0] >= poses[-1] or commands[-1] < poses[0]:
-        raise LogError(
-            f"{about}: commands lie between {commands[0]:.3f} and {commands[-1]:.3f} s, poses between {poses[0]:.3f} "
-            f"and {poses[-1]:.3f} s: two clocks; use --stamps receive, or say how far apart they are by --clock-offset"
-        )
 
 
 STEP_S = 0.01

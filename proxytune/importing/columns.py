@@ -115,7 +115,12 @@ def contradiction(unit: Unit, values: Floats) -> str:
         return ""
     with np.errstate(over="ignore"):
         if unit.quantity == "time":
-            return _time_contradiction(seen * unit.factor)
+            times = seen * unit.factor
+            steps = np.diff(times)
+            step = np.median(steps[steps > 0]) if (steps > 0).any() else 1.0
+            if step < SHORTEST_STEP_S or step > LONGEST_STEP_S:
+                return f"rows would be {step:.2g} s apart"
+            return "stamps would lie after the year 5000" if np.abs(times).max() > 1e11 else ""
         if unit.quantity == "angle":
             return _angle_contradiction(unit, seen)
         size = np.ptp(seen) if unit.quantity == "length" else np.abs(seen).max()
@@ -125,14 +130,6 @@ def contradiction(unit: Unit, values: Floats) -> str:
     if size * unit.factor > LARGEST.get(unit.quantity, np.inf):
         return f"{size:g} {unit.name} {'from end to end ' if unit.quantity == 'length' else ''}is much for a robot"
     return ""
-
-
-def _time_contradiction(times: Floats) -> str:
-    steps = np.diff(times)
-    step = np.median(steps[steps > 0]) if (steps > 0).any() else 1.0
-    if step < SHORTEST_STEP_S or step > LONGEST_STEP_S:
-        return f"rows would be {step:.2g} s apart"
-    return "stamps would lie after the year 5000" if np.abs(times).max() > 1e11 else ""
 
 
 def _angle_contradiction(unit: Unit, values: Floats) -> str:
@@ -146,13 +143,9 @@ def _angle_contradiction(unit: Unit, values: Floats) -> str:
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table and what it is taken for.
+    """A column by the package's name of it (`field`) and the table's, and its unit.
 
-    Attributes:
-        field: The package's name of it.
-        name: The table's name of it.
-        unit: The unit of its values.
-        known_by: How the unit is known: "stated", "by its name", "by its size" or "assumed".
+    That is known as it is "stated", "by its name", "by its size", or "assumed".
     """
 
     field: str
@@ -364,7 +357,14 @@ def poses_by_drive(table: Table, columns: Columns, *, gaps: bool = False) -> dic
         raise LogError(f"{table.path}: has no row with a pose; give the file that the poses were written to")
     by_field = dict(zip(fields, values.T, strict=True))
     places = np.stack([by_field.get(axis, np.zeros(len(times))) for axis in PLACE], axis=1)
-    _check_extent(table, columns, places)
+    extent = np.ptp(places[:, :2], axis=0).max()
+    for column in (columns[axis] for axis in ("x", "y") if columns[axis].known_by == "by its name"):
+        # Metres in columns whose names end in mm or cm: the robot would hardly have moved
+        if column.unit.factor < 1.0 and 0.0 < extent < LEAST_EXTENT_M:
+            raise LogError(
+                f"{table.path}: column '{column.name}' in {column.unit.name}, as its name ends: the robot moved "
+                f"{extent * 1e3:.2g} mm in all; state its unit, as in --columns {column.field}={column.name}:m"
+            )
     headings, tilts = by_field.get("heading"), np.zeros(len(times))
     if headings is None:
         headings, tilts = headings_and_tilts(values[:, -4:], str(table.path))
@@ -423,18 +423,6 @@ def _filled_rows(
 def _check_clock(times: Floats, where: str) -> None:
     if len(times) > 1 and np.ptp(times) == 0.0:
         raise LogError(f"{where}: all {len(times)} stamps are {times[0]:.12g} s; record with a clock that runs")
-
-
-def _check_extent(table: Table, columns: Columns, places: Floats) -> None:
-    """Refuse metres in columns whose names end in mm or cm: the robot would hardly have moved."""
-    guessed = [columns[axis] for axis in ("x", "y") if columns[axis].known_by == "by its name"]
-    extent = np.ptp(places[:, :2], axis=0).max()
-    for column in guessed:
-        if column.unit.factor < 1.0 and 0.0 < extent < LEAST_EXTENT_M:
-            raise LogError(
-                f"{table.path}: column '{column.name}' in {column.unit.name}, as its name ends: the robot moved "
-                f"{extent * 1e3:.2g} mm in all; state its unit, as in --columns {column.field}={column.name}:m"
-            )
 
 
 def _where(table: Table, name: str) -> str:

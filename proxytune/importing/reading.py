@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -100,10 +101,7 @@ KNOWN = "a ROS bag (.bag, .db3, .mcap or a folder of them), CSV, TUM or MRCLAM f
 def read_source(path: Path, wanted: Wanted, offset_s: float = 0.0) -> Source:
     """Read a source: its drives with stamps in order, and notes on what was taken and what is odd.
 
-    Args:
-        path: The source.
-        wanted: What to take from it.
-        offset_s: How much later its poses are stamped than its commands, as far as that is known [s].
+    Its poses are stamped later than its commands by `offset_s`, as far as that is known [s].
 
     Raises:
         LogError: If it is none of the known forms, or lacks what a log needs.
@@ -137,16 +135,9 @@ PICTURES = "frames/%06d.png"
 
 
 def write_log(source: Source, folder: Path, facts: Facts, origin: str) -> Log:
-    """Write log.toml, samples.csv, commands.csv and pictures.
+    """Write log.toml with where it came from, samples.csv, commands.csv and pictures; gives the log that it reads as.
 
-    Args:
-        source: What was read and checked.
-        folder: The log's folder, which must not exist or be empty, or else be this very log.
-        facts: What only the user knows.
-        origin: Where it came from, for log.toml.
-
-    Returns:
-        The log that it reads as.
+    The folder must not exist or be empty, or else be this very log.
 
     Raises:
         InputError: If the folder is not free.
@@ -168,7 +159,13 @@ def fill_log(folder: Path, source: Source, facts: Facts, name: str, origin: str)
         if drive.commands is not None:
             names = ("time", *COMMANDS[drive.commands.kind], ENABLED)[: 1 + drive.commands.values.shape[1]]
             commands.append(_named(drive.name, (drive.commands.times, drive.commands.values), names))
-    if commands and _beside(source):
+    # Where every command of a car was written down with a pose, both stand in one table.
+    if commands and all(
+        drive.commands is not None
+        and drive.commands.kind in CAR_COMMANDS
+        and np.array_equal(drive.commands.times, drive.poses.times)
+        for drive in source.drives
+    ):
         issued = (own.drop(columns=["episode", "time"]) for own in commands)
         samples = [pd.concat(both, axis=1) for both in zip(samples, issued, strict=True)]
         commands = []
@@ -176,20 +173,15 @@ def fill_log(folder: Path, source: Source, facts: Facts, name: str, origin: str)
         if tables:
             pd.concat(tables).to_csv(folder / name_of_file, index=False, lineterminator="\n")
     pictures = [(drive.name, drive.pictures) for drive in source.drives if drive.pictures is not None]
+    kinds = {drive.commands.kind for drive in source.drives if drive.commands is not None}
+    stated: dict[str, Any] = {"format": 1, "name": name, "robot": facts.robot or name}
+    stated |= {"command": next(iter(kinds), "none"), "source": f"{origin}, {source.form}"} | dict(facts.figures)
+    if facts.clock_offset:
+        stated["clock_offset_s"] = facts.clock_offset if facts.clock_offset == "fit" else float(facts.clock_offset)
     if pictures:
         _write_pictures(folder, pictures)
-    text = _description(source, name, facts, origin, with_pictures=bool(pictures))
-    (folder / "log.toml").write_text(text, encoding="utf-8")
-
-
-def _beside(source: Source) -> bool:
-    """True where every command of a car was written down with a pose."""
-    return all(
-        drive.commands is not None
-        and drive.commands.kind in CAR_COMMANDS
-        and np.array_equal(drive.commands.times, drive.poses.times)
-        for drive in source.drives
-    )
+        stated |= {"map": facts.road, "camera": {"frames": PICTURES}}
+    (folder / "log.toml").write_text(tomlkit.dumps(stated), encoding="utf-8")
 
 
 def read_as(folder: Path, shown: Path) -> Log:
@@ -233,17 +225,6 @@ def _write_pictures(folder: Path, drives: list[tuple[str, Pictures]]) -> None:
     pd.DataFrame(rows, columns=["frame", "episode", "time"]).to_csv(folder / "frames.csv", index=False)
 
 
-def _description(source: Source, name: str, facts: Facts, origin: str, *, with_pictures: bool) -> str:
-    kinds = {drive.commands.kind for drive in source.drives if drive.commands is not None}
-    stated = {"format": 1, "name": name, "robot": facts.robot or name, "command": next(iter(kinds), "none")}
-    stated |= {"source": f"{origin}, {source.form}"} | dict(facts.figures)
-    if facts.clock_offset:
-        stated["clock_offset_s"] = facts.clock_offset if facts.clock_offset == "fit" else float(facts.clock_offset)
-    if with_pictures:
-        stated["map"] = facts.road
-    return tomlkit.dumps(stated | ({"camera": {"frames": PICTURES}} if with_pictures else {}))
-
-
 NOTHING = Wanted()
 NO_FACTS = Facts()
 
@@ -267,12 +248,7 @@ def open_log(path: Path, wanted: Wanted = NOTHING, facts: Facts = NO_FACTS) -> I
 
 @contextmanager
 def as_log(source: Source, facts: Facts, path: Path) -> Iterator[Log]:
-    """The log that a source makes, in a temporary folder for as long as it is open.
-
-    Args:
-        source: What was read and checked.
-        facts: What only the user knows.
-        path: Where it was read.
+    """The log that a source makes, read at a path, in a temporary folder for as long as it is open.
 
     Raises:
         LogError: If it makes none.

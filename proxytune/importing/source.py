@@ -5,7 +5,7 @@ A source has drives with commands, poses and pictures, each at times of their ow
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +19,9 @@ from proxytune.settings import GEOMETRY
 
 @dataclass(frozen=True)
 class Commands:
-    """Commands as they were issued, M of them.
+    """Commands (M, 2) as they were issued at times (M,) [s], as stamped; `proxytune.logs.COMMANDS` has their kinds.
 
-    Attributes:
-        kind: One of `proxytune.logs.COMMANDS`, which says what the two columns are.
-        times: When each was issued (M,) [s], as stamped.
-        values: What was commanded (M, 2); a third column is `enabled`, where the source has it.
+    A third column is `enabled`, where the source has it.
     """
 
     kind: str
@@ -34,13 +31,9 @@ class Commands:
 
 @dataclass(frozen=True)
 class Poses:
-    """Poses as they were measured, N of them.
+    """Poses as they were measured at times (N,) [s], as stamped: places x, y, z (N, 3) [m], and headings (N,) [rad].
 
-    Attributes:
-        times: When each was measured (N,) [s], as stamped.
-        places: Where the robot was (N, 3): x, y, z [m].
-        headings: How it was turned about the upward axis (N,) [rad].
-        tilts: Angle between its upward axis and the world's (N,) [rad]; 0 where the source has headings alone.
+    Tilts are of its upward axis from the world's (N,) [rad]; 0 where the source has headings alone.
     """
 
     times: Floats
@@ -73,14 +66,7 @@ class Drive:
 
 @dataclass(frozen=True)
 class Channel:
-    """Something that a source holds: a topic, a column or an array.
-
-    Attributes:
-        name: What the source calls it.
-        kind: Its type, as in geometry_msgs/msg/Twist.
-        count: How many messages or rows it has.
-        role: What it is taken for, as in "commands", or why it is left out.
-    """
+    """A topic, column or array of a source: its type, how many messages or rows, and its role, or why it has none."""
 
     name: str
     kind: str
@@ -117,11 +103,6 @@ class Survey:
     commands: int
     frames: int
     lag_s: float | None
-
-    @property
-    def facts(self) -> dict[str, Any]:
-        """The statements of a JSON document on it."""
-        return asdict(self)
 
 
 @dataclass(frozen=True)

@@ -52,12 +52,6 @@ class CommandFile:
     note: str
 
 
-def is_named_as_commands(path: Path) -> bool:
-    """True if a file's name says that it holds commands: commands.csv, cmd_vel.csv, run1_commands.csv and so on."""
-    named = any(path.stem == stem or path.stem.endswith(f"_{stem}") for stem in STEMS)
-    return named and path.suffix.lower() in COMMAND_SUFFIXES
-
-
 def find_commands(path: Path, wanted: Wanted) -> Path | None:
     """The file with the commands of a file of poses, or None.
 
@@ -120,43 +114,24 @@ def _by_time(file: CommandFile, drives: Sequence[Drive]) -> list[Drive]:
             f"{file.path}: names no drives, and the drives overlap in time, so that commands cannot be shared out; "
             "add a column 'episode', or give each drive a file of commands"
         )
-    return [replace(drive, commands=_within(file, drive)) for drive in drives]
-
-
-def _within(file: CommandFile, drive: Drive) -> Commands:
-    commands, times = file.commands[""], drive.poses.times
-    during = (commands.times >= times.min()) & (commands.times <= times.max())
-    before = np.flatnonzero(commands.times < times.min())
-    if len(before):
-        during[before[np.argmax(commands.times[before])]] = True
-    if not during.any():
-        raise LogError(
-            f"{file.path}: has no command while '{drive.name}' was driven, {times.min():.12g} to {times.max():.12g} s; "
-            "check that both files have stamps of one clock"
-        )
-    return replace(commands, times=commands.times[during], values=commands.values[during])
+    commands, shared = file.commands[""], []
+    for drive in drives:
+        begin, end = drive.poses.times.min(), drive.poses.times.max()
+        during = (commands.times >= begin) & (commands.times <= end)
+        before = np.flatnonzero(commands.times < begin)
+        if len(before):
+            during[before[np.argmax(commands.times[before])]] = True
+        if not during.any():
+            raise LogError(
+                f"{file.path}: has no command while '{drive.name}' was driven, {begin:.12g} to {end:.12g} s; "
+                "check that both files have stamps of one clock"
+            )
+        own = replace(commands, times=commands.times[during], values=commands.values[during])
+        shared.append(replace(drive, commands=own))
+    return shared
 
 
 SUFFIXES = (".csv", ".tsv")
-
-
-@dataclass(frozen=True)
-class Recording:
-    """The contents of one file of poses.
-
-    Attributes:
-        drives: Its drives.
-        labels: What the file calls each; "" where it names none.
-        apart: The file that their commands are in; None where they have theirs, or need none.
-        channels: Its columns.
-        notes: What was taken for what, and what was left out.
-    """
-
-    drives: tuple[Drive, ...]
-    labels: tuple[str, ...]
-    apart: Path | None
-    channels: tuple[Channel, ...]
-    notes: tuple[str, ...]
 
 
 def is_csv_tables(path: Path) -> bool:
@@ -180,19 +155,28 @@ def read_csv_tables(path: Path, wanted: Wanted) -> Source:
     check_fields(wanted.columns, str(path))
     files = _files(path, wanted)
     recordings = [_read_recording(file, wanted, alone=len(files) == 1) for file in files]
-    drives, notes = [], [note for recording in recordings for note in recording.notes]
-    channels = list(summed([recording.channels for recording in recordings]))
-    for apart in dict.fromkeys(recording.apart for recording in recordings):
-        mine = [recording for recording in recordings if recording.apart == apart]
-        group = [drive for recording in mine for drive in recording.drives]
+    whole = _together("folder of CSV files" if path.is_dir() else "CSV table", [source for source, *_ in recordings])
+    drives, channels, notes = [], [*whole.channels], [*whole.notes]
+    for apart in dict.fromkeys(place for *_, place in recordings):
+        mine = [(source.drives, labels) for source, labels, place in recordings if place == apart]
+        group = [drive for own, _ in mine for drive in own]
         if apart:
             commands = read_commands(apart, wanted)
-            group = share_commands(commands, group, [label for recording in mine for label in recording.labels])
+            group = share_commands(commands, group, [label for _, labels in mine for label in labels])
             channels += commands.channels
             notes.append(commands.note)
         drives += group
-    form = "folder of CSV files" if path.is_dir() else "CSV table"
-    return Source(form, tuple(drives), tuple(channels), tuple(dict.fromkeys(notes)))
+    return replace(whole, drives=tuple(drives), channels=tuple(channels), notes=tuple(dict.fromkeys(notes)))
+
+
+def _together(form: str, parts: Sequence[Source]) -> Source:
+    """What several files hold, as one source of this form."""
+    return Source(
+        form,
+        tuple(drive for part in parts for drive in part.drives),
+        summed([part.channels for part in parts]),
+        tuple(dict.fromkeys(note for part in parts for note in part.notes)),
+    )
 
 
 def _files(path: Path, wanted: Wanted) -> list[Path]:
@@ -200,13 +184,16 @@ def _files(path: Path, wanted: Wanted) -> list[Path]:
         return [path]
     tables = sorted(file for file in path.iterdir() if file.suffix.lower() in SUFFIXES and file.is_file())
     asked_for = {Path(wanted.commands).resolve(), (path / wanted.commands).resolve()} if wanted.commands else set()
-    files = [file for file in tables if file.resolve() not in asked_for and not is_named_as_commands(file)]
+    # A name says that a file holds commands: commands.csv, cmd_vel.csv, run1_commands.csv and so on.
+    named = [file for file in tables if any(file.stem == it or file.stem.endswith(f"_{it}") for it in STEMS)]
+    files = [file for file in tables if file.resolve() not in asked_for and file not in named]
     if not files:
         raise LogError(f"{path}: has no CSV file with poses; give the folder or the file that they were written to")
     return files
 
 
-def _read_recording(file: Path, wanted: Wanted, *, alone: bool) -> Recording:
+def _read_recording(file: Path, wanted: Wanted, *, alone: bool) -> tuple[Source, tuple[str, ...], Path | None]:
+    """A file of poses, what it calls each drive ("": nothing), and the file of their commands, if these lie apart."""
     table = read_text_table(file)
     apart = find_commands(file, wanted)
     columns, kind = _columns(table, wanted, apart)
@@ -221,7 +208,7 @@ def _read_recording(file: Path, wanted: Wanted, *, alone: bool) -> Recording:
     names = [label if label and alone else "_".join(filter(None, (file.stem, label))) for label in poses]
     drives = tuple(Drive(name, commands.get(label), poses[label]) for name, label in zip(names, poses, strict=True))
     notes = (f"Columns: {described(columns)}.", *gaps_note(table, columns))
-    return Recording(drives, tuple(poses), apart, tuple(channels_of(table, columns)), notes)
+    return Source("", drives, tuple(channels_of(table, columns)), notes), tuple(poses), apart
 
 
 def _columns(table: Table, wanted: Wanted, apart: Path | None) -> tuple[Columns, str]:
@@ -266,7 +253,17 @@ def read_mrclam(path: Path, wanted: Wanted) -> Source:
     The path is one of the two files, or the folder; of a folder with several robots `wanted.poses` chooses.
     """
     match = FILE.fullmatch(path.name)
-    folder, robot = (path.parent, match[1]) if match and not path.is_dir() else (path, _choose(path, wanted.poses))
+    folder, robot = (path.parent, match[1]) if match and not path.is_dir() else (path, wanted.poses)
+    if folder == path:
+        robots = _robots(folder)
+        if not robots:
+            raise LogError(f"{path}: has no file such as Robot1_Groundtruth.dat; give a folder of the MRCLAM data set")
+        if robot and robot not in robots:
+            raise LogError(f"{path}: has no robot '{robot}'; {nearest(robot, robots)}")
+        if not robot and len(robots) > 1:
+            names = ", ".join(robots)
+            raise LogError(f"{path}: has several robots: {names}; choose one, as in --poses {robots[0]}")
+        robot = robot or robots[0]
     table, columns = read_text_table(folder / f"{robot}_Groundtruth.dat", MRCLAM_POSES), own_columns(MRCLAM_POSES)
     poses = poses_by_drive(table, columns)[""]
     channels = _channels(table, MRCLAM_POSES, "poses")
@@ -286,18 +283,6 @@ def _robots(folder: Path) -> list[str]:
         return []
     matches = (FILE.fullmatch(file.name) for file in sorted(folder.iterdir()))
     return list(dict.fromkeys(match[1] for match in matches if match))
-
-
-def _choose(folder: Path, robot: str) -> str:
-    robots = _robots(folder)
-    if not robots:
-        raise LogError(f"{folder}: has no file such as Robot1_Groundtruth.dat; give a folder of the MRCLAM data set")
-    if robot and robot not in robots:
-        raise LogError(f"{folder}: has no robot '{robot}'; {nearest(robot, robots)}")
-    if not robot and len(robots) > 1:
-        names = ", ".join(robots)
-        raise LogError(f"{folder}: has several robots: {names}; choose one, as in --poses {robots[0]}")
-    return robot or robots[0]
 
 
 def _channels(table: Table, fields: tuple[str, ...], role: str) -> list[Channel]:
@@ -327,13 +312,7 @@ def read_tum(path: Path, wanted: Wanted) -> Source:
     """Read TUM trajectories, a drive each, and the commands of each from a second file (`find_commands`)."""
     check_fields(wanted.columns, str(path))
     parts = [_read_one(file, wanted) for file in _trajectory_files(path)]
-    return replace(
-        parts[0],
-        form=f"{len(parts)} TUM trajectories" if len(parts) > 1 else parts[0].form,
-        drives=tuple(drive for part in parts for drive in part.drives),
-        channels=summed([part.channels for part in parts]),
-        notes=tuple(dict.fromkeys(note for part in parts for note in part.notes)),
-    )
+    return _together(f"{len(parts)} TUM trajectories" if len(parts) > 1 else "TUM trajectory", parts)
 
 
 def _read_one(path: Path, wanted: Wanted) -> Source:

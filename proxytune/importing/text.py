@@ -26,13 +26,9 @@ EMPTY = ("", "nan", "NaN", "NAN", "na", "NA", "n/a", "N/A", "null", "NULL", "non
 
 @dataclass(frozen=True)
 class Table:
-    """Columns of one length.
+    """Columns of one length by name, of numbers, or of texts without blanks around them.
 
-    Attributes:
-        path: The file.
-        cells: The columns by name, of numbers, or of texts without blanks around them; the index is the number of each
-            row in the file.
-        counted: What that number counts, "line" or "row".
+    The index is the number of each row in the file, which is `counted` as "line" or "row".
     """
 
     path: Path
@@ -84,7 +80,18 @@ Lines = list[tuple[int, str]]
 
 def read_text_table(path: Path, names: Sequence[str] = ()) -> Table:
     """Read a text file; where `names` are given it has none of its own, and blanks between its cells."""
-    comments, lines = _split_comments(_read_lines(path))
+    try:
+        check_end(path)
+        text = path.read_bytes().decode("utf-8-sig")
+    except FileNotFoundError:
+        raise LogError(f"{path}: no such file; check the path") from None
+    except OSError as problem:
+        raise LogError(f"{path}: cannot be read ({problem.strerror})") from None
+    except UnicodeDecodeError:
+        raise LogError(f"{path}: is not text in UTF-8; save it as a text table in that encoding") from None
+    if "\0" in text:
+        raise LogError(f"{path}: is a binary file; save it as a text table, such as CSV")
+    comments, lines = _split_comments(_numbered(text))
     if not lines:
         raise LogError(f"{path}: is empty; it needs a line of column names and a row for each sample")
     separator = ""
@@ -124,21 +131,6 @@ def is_number(cell: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _read_lines(path: Path) -> Lines:
-    try:
-        check_end(path)
-        text = path.read_bytes().decode("utf-8-sig")
-    except FileNotFoundError:
-        raise LogError(f"{path}: no such file; check the path") from None
-    except OSError as problem:
-        raise LogError(f"{path}: cannot be read ({problem.strerror})") from None
-    except UnicodeDecodeError:
-        raise LogError(f"{path}: is not text in UTF-8; save it as a text table in that encoding") from None
-    if "\0" in text:
-        raise LogError(f"{path}: is a binary file; save it as a text table, such as CSV")
-    return _numbered(text)
 
 
 def _numbered(text: str) -> Lines:

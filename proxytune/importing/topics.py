@@ -25,15 +25,10 @@ def short(kind: str) -> str:
 
 @dataclass(frozen=True)
 class Role:
-    """Something that a log needs of a bag, and how its topic is found.
+    """Something that a log needs of a bag, the option that names its topic, and types of message by their ranks.
 
-    Attributes:
-        name: What the topic is taken for.
-        option: The option that names the topic.
-        ranks: Types of message that can be it, without their package; the lowest rank goes first.
-        first: Parts of names that go first, the foremost first.
-        never: Parts of names that are something else, whatever their type.
-        asked: Types that are taken only where the topic is named.
+    Names with parts that go first are taken before others, those with parts of something else never; some types are
+    taken only where the topic is asked for by name.
     """
 
     name: str
@@ -94,14 +89,9 @@ PICTURE_ROLE = Role("pictures", "--pictures", {"Image": 0, "CompressedImage": 1}
 
 @dataclass(frozen=True)
 class Choice:
-    """The topics that are taken from a bag.
+    """The topics that are taken from a bag, and the kind of its commands.
 
-    Attributes:
-        commands: Topic of the commands, or None.
-        kind: Kind of the commands.
-        poses: Topic of the poses.
-        transform: Parent and child as "map>base_link" where poses come of transforms; "" until it is chosen.
-        pictures: Topic of the pictures, or None.
+    Where poses come of transforms, `transform` is parent and child as "map>base_link"; "" until it is chosen.
     """
 
     commands: Topic | None
@@ -242,17 +232,13 @@ def _list(path: Path, bags: dict[str, Path]) -> tuple[tuple[Topic, ...], list[st
             if not bag.defines_types:
                 notes.append(f"{bag_path.name} does not define its types of message: those of ROS 2 Humble were taken.")
     names = sorted({name for topics in listed for name in topics})
-    merged = (_merge([topics[name] for topics in listed if name in topics], len(bags)) for name in names)
+    merged = []
+    for name in names:
+        own = [topics[name] for topics in listed if name in topics]
+        kind = own[0].kind if len({topic.kind for topic in own}) == 1 else "several types"
+        known, lacking = all(topic.known for topic in own), len(bags) - sum(topic.count > 0 for topic in own)
+        merged.append(Topic(name, kind, sum(topic.count for topic in own), known, lacking))
     return pair_topics(tuple(merged)), notes
-
-
-def _merge(topics: list[Topic], bags: int) -> Topic:
-    """A topic of several bags as one."""
-    one = topics[0]
-    lacking = bags - sum(topic.count > 0 for topic in topics)
-    kind = one.kind if len({topic.kind for topic in topics}) == 1 else "several types"
-    known = all(topic.known for topic in topics)
-    return Topic(one.name, kind, sum(topic.count for topic in topics), known, lacking)
 
 
 def _read_drive(name: str, path: Path, choice: Choice, wanted: Wanted) -> tuple[Drive, list[str]]:

@@ -43,15 +43,14 @@ def pair_topics(topics: tuple[Topic, ...]) -> tuple[Topic, ...]:
 def read_vesc(bag: Bag, motor: str, gains: Path | None) -> tuple[Commands, tuple[str, ...]]:
     """Speed [m/s] and wheel angle [rad] of the commands to a VESC, at the times when the bag received them.
 
-    Args:
-        bag: The bag, open.
-        motor: Topic of the motor's speed [electrical revolutions per minute].
-        gains: The car's vesc.yaml.
+    The motor's topic has electrical revolutions per minute; the gains are the car's vesc.yaml.
 
     Raises:
         LogError: If there is no such file, or it lacks a gain.
     """
-    speed_gain, speed_offset, servo_gain, servo_offset = _read_gains(gains, f"{bag.path}: {motor}")
+    if gains is None:
+        raise LogError(f"{bag.path}: {motor}: has a VESC's units; give the car's gains by --vesc vesc.yaml")
+    speed_gain, speed_offset, servo_gain, servo_offset = _read_gains(gains)
     times, held = [], []
     for topic in (motor, servo_of(motor)):
         stamps, values = collect(bag, topic, lambda message: (message.data,))
@@ -71,9 +70,7 @@ def read_vesc(bag: Bag, motor: str, gains: Path | None) -> tuple[Commands, tuple
     return Commands("speed_steering", union, np.column_stack(columns)), (note,)
 
 
-def _read_gains(path: Path | None, where: str) -> tuple[float, ...]:
-    if path is None:
-        raise LogError(f"{where}: has a VESC's units; give the car's gains by --vesc vesc.yaml")
+def _read_gains(path: Path) -> tuple[float, ...]:
     if not path.is_file():
         raise LogError(f"{path}: no such file; give the car's vesc.yaml")
     try:

@@ -51,12 +51,7 @@ ENOUGH = 20
 
 
 def log_cautions(log: Log, figures: Figures) -> tuple[str, ...]:
-    """Sentences on what is probably not meant in a log.
-
-    Args:
-        log: The log.
-        figures: Of the robot that drove it; without them nothing is said of how far its commands should take it.
-    """
+    """Sentences on what is probably not meant in a log; figures of its robot tell how far commands should take it."""
     chords = [_chords(without_outliers(episode)) for episode in log.episodes]
     names = alike_caution("drives", (episode.name for episode in log.episodes))
     found = [
@@ -74,14 +69,9 @@ def log_cautions(log: Log, figures: Figures) -> tuple[str, ...]:
 
 
 class Chords(NamedTuple):
-    """Motion of a drive over CHORD_S each, N of them.
+    """Motion of a drive over CHORD_S each, all (N,): when it begins [s], its speed [m/s] and yaw rate [rad/s].
 
-    Attributes:
-        times: When each begins (N,) [s].
-        course: Where it leads (N,) [rad].
-        heading: Where the robot points in its middle (N,) [rad].
-        speed: Its length by its time (N,) [m/s].
-        turn: Yaw rate over it (N,) [rad/s].
+    The course is where it leads, the heading where the robot points in its middle [rad].
     """
 
     times: Floats

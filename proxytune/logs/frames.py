@@ -21,6 +21,7 @@ from proxytune.logs.times import places_on_grid
 from proxytune.settings import Section
 from proxytune.unpacking import ARRAYS_MB, check_unpacked, open_picture
 
+POSES = (("position_m", 10.0), ("heading_deg", 180.0))
 KEYS = ("frames", "poses", "exposure", "rectified", "shutter", "readout_s")
 LISTED = "frames.csv"
 PATTERN = re.compile(r"[^%]*%(0[1-9])?d[^%]*\.(png|jpe?g)", re.IGNORECASE)
@@ -31,12 +32,9 @@ MOST_FRAMES = 2**53
 
 
 class Camera(NamedTuple):
-    """The camera that log.toml states.
+    """The camera that log.toml states: where its pictures lie, as "frames/%06d.png", and frames of no picture yet.
 
-    Attributes:
-        pattern: Where the pictures lie, as "frames/%06d.png".
-        own_table: Whether [camera] states them; a key of the top level may name pictures that were not passed on.
-        stated: Frames of no picture yet.
+    Where [camera] states them, `own_table`; a key of the top level may name pictures that were not passed on.
     """
 
     pattern: str
@@ -68,16 +66,21 @@ def read_camera(settings: Section) -> Camera | None:
         rule = "must have the picture's number once, as %d or %06d, and end in .png, .jpg or .jpeg"
         raise section.error("frames", f"{rule}, got '{pattern}'")
     poses = table.section("poses")
-    poses.only(("position_m", "heading_deg"))
+    poses.only([name for name, _ in POSES])
+    road, position_m, heading_deg = _road(settings), *(_figure(poses, *one) for one in POSES)
+    rectified, readout_s = table.flag("rectified", False), _figure(table, "readout_s", 1.0)
+    shutter = table.text("shutter", choices=("rolling", "global")) if "shutter" in table else "rolling"
+    if shutter == "global" and readout_s:
+        raise table.error("readout_s", "a global shutter exposes all rows at once; take one of the two out")
     stated = Frames(
         paths=(),
         drives=np.empty(0, dtype=np.int64),
         times=np.empty(0),
-        road=_road(settings),
-        position_m=_figure(poses, "position_m", 10.0),
-        heading_deg=_figure(poses, "heading_deg", 180.0),
-        rectified=table.flag("rectified", False),
-        readout_s=_readout(table),
+        road=road,
+        position_m=position_m,
+        heading_deg=heading_deg,
+        rectified=rectified,
+        readout_s=0.0 if shutter == "global" else readout_s,
         fixed_exposure=table.text("exposure", "auto", choices=("auto", "fixed")) == "fixed",
     )
     return Camera(pattern, "frames" in table, stated)
@@ -99,15 +102,6 @@ def _road(settings: Section) -> str:
 
 def _figure(section: Section, key: str, high: float) -> float | None:
     return section.number(key, low=0.0, high=high) if key in section else None
-
-
-def _readout(table: Section) -> float | None:
-    """Seconds from the first row to the last, None where that is not known."""
-    readout = _figure(table, "readout_s", 1.0)
-    shutter = table.text("shutter", choices=("rolling", "global")) if "shutter" in table else "rolling"
-    if shutter == "global" and readout:
-        raise table.error("readout_s", "a global shutter exposes all rows at once; take one of the two out")
-    return 0.0 if shutter == "global" else readout
 
 
 def read_frames(
@@ -147,7 +141,16 @@ def _read_instants(path: Path, samples: Rows, episodes: Sequence[LogEpisode]) ->
     """The rows of frames.csv that lie within the poses of their drive."""
     rows = read_rows(path, Layout(("frame",), (), (), (), 1, "frames"))
     check_known_episodes(rows, samples.names)
-    _check_numbers(rows)
+    numbers = rows.values["frame"]
+    wrong = (numbers != np.rint(numbers)) | (numbers < 0) | (numbers > MOST_FRAMES)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise rows.error(row, "frame", f"must be a whole number from 0 on, got {numbers[row]:.12g}")
+    again = pd.Series(numbers).duplicated().to_numpy()
+    if again.any():
+        row = int(np.argmax(again))
+        problem = f"{numbers[row]:.0f} comes twice; number the pictures through all episodes"
+        raise rows.error(row, "frame", problem)
     order = {name: number for number, name in enumerate(samples.names)}
     drives = np.array([order[name] for name in rows.names])[rows.episode]
     times, spans = rows.values["time"], np.full((len(episodes), 2), np.nan)
@@ -166,21 +169,7 @@ def _read_instants(path: Path, samples: Rows, episodes: Sequence[LogEpisode]) ->
             "write both in seconds of one clock"
         )
         raise rows.error(0, "time", problem)
-    return rows.values["frame"].astype(np.int64)[within], drives[within], times[within]
-
-
-def _check_numbers(rows: Rows) -> None:
-    """Refuse what is no number of a picture, and two rows of one picture."""
-    numbers = rows.values["frame"]
-    wrong = (numbers != np.rint(numbers)) | (numbers < 0) | (numbers > MOST_FRAMES)
-    if wrong.any():
-        row = int(np.argmax(wrong))
-        raise rows.error(row, "frame", f"must be a whole number from 0 on, got {numbers[row]:.12g}")
-    again = pd.Series(numbers).duplicated().to_numpy()
-    if again.any():
-        row = int(np.argmax(again))
-        problem = f"{numbers[row]:.0f} comes twice; number the pictures through all episodes"
-        raise rows.error(row, "frame", problem)
+    return numbers.astype(np.int64)[within], drives[within], times[within]
 
 
 Pictures = NDArray[np.uint8]
@@ -190,15 +179,9 @@ BROKEN = (OSError, SyntaxError, ValueError, EOFError, struct.error, zlib.error, 
 
 
 def read_pictures(frames: Frames, numbers: Sequence[int], columns: int = 160) -> Pictures:
-    """Read some of a log's pictures, one after another, wider ones averaged down.
+    """Read n of a log's pictures by their places in `frames`: red, green and blue (n, rows, columns, 3), 0 to 255.
 
-    Args:
-        frames: All of them.
-        numbers: Which, by their places in `frames`, n of them.
-        columns: How wide a picture is at most; its rows are in proportion.
-
-    Returns:
-        Red, green and blue (n, rows, columns, 3), 0 to 255.
+    Wider ones are averaged down to so many columns.
 
     Raises:
         LogError: If a file cannot be read, or is of another size than the first.

@@ -32,13 +32,7 @@ WHEELS = ("wheel_left", "wheel_right")
 
 
 def check_kind(command: str, robot: str, drive: str, where: str) -> None:
-    """Refuse commands of another kind than a robot takes; a twist is for any.
-
-    Args:
-        command: Of COMMANDS.
-        robot: The robot's name.
-        drive: "differential" or "ackermann".
-        where: The log or file.
+    """Refuse commands of another kind than a robot takes that drives as this; a twist is for any.
 
     Raises:
         LogError: If they are a car's and the robot is none, or the other way about.
@@ -52,12 +46,9 @@ def check_kind(command: str, robot: str, drive: str, where: str) -> None:
 
 
 class Measured(NamedTuple):
-    """Poses at times of their own, N of them, as they were measured.
+    """Poses at times of their own (N,) [s] as they were measured: x [m], y [m], heading [rad, unwrapped] (N, 3).
 
-    Attributes:
-        times: When each was measured (N,) [s].
-        poses: x [m], y [m], heading [rad, unwrapped] (N, 3).
-        rows: The sample of the regular grid that each is moved to (N,), the nearest free one.
+    Each is moved to a sample of the regular grid (N,), the nearest free one.
     """
 
     times: Floats

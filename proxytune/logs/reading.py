@@ -4,14 +4,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
 from proxytune.arrays import Floats
 from proxytune.errors import LogError, SettingsError
 from proxytune.logs.frames import Camera, read_camera, read_frames
-from proxytune.logs.log import CAR_COMMANDS, COMMANDS, ENABLED, POSE, WHEELS, Log, LogEpisode
+from proxytune.logs.log import CAR_COMMANDS, COMMANDS, ENABLED, POSE, WHEELS, Log
 from proxytune.logs.rows import Layout, Rows, check_known_episodes, read_cells, read_rows
 from proxytune.logs.times import Issued, check_headings, episodes_at_own_times, episodes_on_grid, usual_rate
 from proxytune.settings import GEOMETRY, Section, read_settings
@@ -26,32 +26,8 @@ FURTHEST_S = 3600.0
 Value = TypeVar("Value")
 
 
-class Description(NamedTuple):
-    """The statements of log.toml.
-
-    Attributes:
-        name: What the log is called.
-        robot: Name of the robot.
-        command: Kind of the commands.
-        rate_hz: Samples per second; 0 where poses have times of their own.
-        geometry: Figures of the robot that it states.
-        clock_offset_s: How much later poses are stamped than commands [s], or None.
-        fit_clock_offset: Whether that is to be fitted.
-        camera: What it says of pictures, or None.
-    """
-
-    name: str
-    robot: str
-    command: str
-    rate_hz: float
-    geometry: dict[str, float]
-    clock_offset_s: float | None
-    fit_clock_offset: bool
-    camera: Camera | None
-
-
-def read_description(settings: Section) -> Description:
-    """Read log.toml.
+def read_description(settings: Section) -> tuple[Log, Camera | None]:
+    """Read log.toml: the log without a drive yet, 0 Hz where poses have times of their own, and its pictures.
 
     Raises:
         LogError: With everything that is wrong, in one line.
@@ -76,21 +52,22 @@ def read_description(settings: Section) -> Description:
         for name, key in stated.items()
     }
     offset = settings.get("clock_offset_s")
-    description = Description(
+    log = Log(
         name=read(lambda: settings.text("name", settings.path.resolve().parent.name), ""),
         robot=read(lambda: settings.text("robot"), ""),
         command=read(lambda: settings.text("command", choices=COMMANDS), ""),
         rate_hz=read(lambda: settings.number("rate_hz", low=0.01, high=10000.0) if "rate_hz" in settings else 0.0, 0.0),
         geometry=geometry,
+        episodes=(),
         clock_offset_s=None if offset in (None, FIT) else read(lambda: _offset(settings), None),
         fit_clock_offset=offset == FIT,
-        camera=read(lambda: read_camera(settings), None),
     )
+    camera = read(lambda: read_camera(settings), None)
     if wrong:
         different = list(dict.fromkeys(wrong))
         numbered = "; ".join(f"({number}) {problem}" for number, problem in enumerate(different, start=1))
         raise LogError(f"{settings.path}: {numbered if len(different) > 1 else different[0]}")
-    return description
+    return log, camera
 
 
 def _offset(settings: Section) -> float:
@@ -121,38 +98,35 @@ def read_log(path: str | Path) -> Log:
         problem = "is a file; give the folder that it lies in" if path.exists() else "no such folder; check the path"
         raise LogError(f"{path}: {problem}")
     try:
-        stated = read_description(read_settings(path / "log.toml"))
+        stated, camera = read_description(read_settings(path / "log.toml"))
     except SettingsError as problem:
         raise LogError(str(problem)) from None
     apart = (path / "commands.csv").exists()
     samples = _read_samples(path / "samples.csv", stated.command, apart=apart)
-    issued = _read_commands(path / "commands.csv", stated, samples) if apart else {}
-    episodes, rate_hz = _episodes(samples, stated, issued)
-    frames = read_frames(stated.camera, path, samples, stated.rate_hz, episodes) if stated.camera else None
+    issued: dict[str, Issued] = {}
+    if apart:
+        if stated.command == "none":
+            told = "log.toml states that there are no commands; state their kind, or take this file out"
+            raise LogError(f"{path / 'commands.csv'}: {told}")
+        rows, issued = _issued(path / "commands.csv", stated.command)
+        check_known_episodes(rows, samples.names)
+        _check_overlap(samples, rows, issued, stated.clock_offset_s or 0.0)
+    commands = samples.columns(()) if issued else _commands(samples, stated.command)
+    own_times, rate_hz = not stated.rate_hz and stated.command != "none", stated.rate_hz
+    check_headings(samples, stated.command, usual_rate(samples) if own_times else rate_hz)
+    if own_times:
+        episodes, rate_hz = episodes_at_own_times(samples, commands, issued)
+    else:
+        episodes = episodes_on_grid(samples, commands, issued, rate_hz)
+    frames = read_frames(camera, path, samples, stated.rate_hz, episodes) if camera else None
     if offset_s := stated.clock_offset_s:  # so much earlier the commands' clock is than that of the poses
         clocks = (one.times if one.issued is None else one.issued for one in episodes)
         episodes = tuple(replace(one, issued=own + offset_s) for one, own in zip(episodes, clocks, strict=True))
-    return Log(
-        name=stated.name,
-        robot=stated.robot,
-        command=stated.command,
-        rate_hz=rate_hz,
-        geometry=stated.geometry,
-        episodes=episodes,
-        frames=frames,
-        clock_offset_s=stated.clock_offset_s,
-        fit_clock_offset=stated.fit_clock_offset,
-    )
+    return replace(stated, rate_hz=rate_hz, episodes=episodes, frames=frames)
 
 
 def read_commands(path: Path) -> tuple[str, dict[str, tuple[Floats, Floats]]]:
-    """Read a table of commands alone, whose columns tell their kind.
-
-    Args:
-        path: A CSV file as a log's commands.csv.
-
-    Returns:
-        Kind of the commands, and each episode's times (M,) [s] and commands (M, 2).
+    """Read a table as a log's commands.csv, whose columns tell their kind: that, and each episode's times and commands.
 
     Raises:
         LogError: If it is not such a table.
@@ -163,16 +137,6 @@ def read_commands(path: Path) -> tuple[str, dict[str, tuple[Floats, Floats]]]:
         known = "; ".join(f"{kind}: {', '.join(columns)}" for kind, columns in COMMANDS.items() if columns)
         raise LogError(f"{path}: has no columns of commands; name them as a log does ({known})")
     return kind, _issued(path, kind)[1]
-
-
-def _episodes(samples: Rows, stated: Description, issued: Mapping[str, Issued]) -> tuple[tuple[LogEpisode, ...], float]:
-    """The drives, and their samples a second."""
-    commands = samples.columns(()) if issued else _commands(samples, stated.command)
-    own_times = not stated.rate_hz and stated.command != "none"
-    check_headings(samples, stated.command, usual_rate(samples) if own_times else stated.rate_hz)
-    if own_times:
-        return episodes_at_own_times(samples, commands, issued)
-    return episodes_on_grid(samples, commands, issued, stated.rate_hz), stated.rate_hz
 
 
 def _read_samples(path: Path, command: str, *, apart: bool) -> Rows:
@@ -199,17 +163,6 @@ def _commands(rows: Rows, command: str) -> Floats:
         driving = slice(1) if command in CAR_COMMANDS else slice(None)
         columns[:, driving] *= rows.values[ENABLED][:, None]
     return columns
-
-
-def _read_commands(path: Path, stated: Description, samples: Rows) -> dict[str, Issued]:
-    """Every episode's commands, each at its own time."""
-    command = stated.command
-    if command == "none":
-        raise LogError(f"{path}: log.toml states that there are no commands; state their kind, or take this file out")
-    rows, issued = _issued(path, command)
-    check_known_episodes(rows, samples.names)
-    _check_overlap(samples, rows, issued, stated.clock_offset_s or 0.0)
-    return issued
 
 
 def _issued(path: Path, command: str) -> tuple[Rows, dict[str, Issued]]:

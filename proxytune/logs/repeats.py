@@ -27,13 +27,9 @@ USUAL = 0.05
 
 
 class Runs(NamedTuple):
-    """The poses of a drive without their repeats, N of them.
+    """The poses of a drive without their repeats: how many rows show each (N,), and speeds between (N − 1,) [m/s].
 
-    Attributes:
-        known: Rows with a pose (rows,).
-        fresh: Which of these have another pose than the one before (rows,).
-        counts: How many rows show each pose (N,).
-        speeds: From each to the next (N − 1,) [m/s], turns counted as ways.
+    Turns count as ways. Of the rows with a pose (rows,), those are fresh that have another than the one before.
     """
 
     known: Whole
@@ -42,7 +38,8 @@ class Runs(NamedTuple):
     speeds: Floats
 
 
-def _runs(episode: LogEpisode) -> Runs:
+def runs_of(episode: LogEpisode) -> Runs:
+    """The poses of a drive without their repeats."""
     known = np.flatnonzero(np.isfinite(episode.poses).all(axis=1))
     poses = episode.poses[known]
     fresh = np.append(len(known) > 0, (np.diff(poses, axis=0) != 0.0).any(axis=1))[: len(known)]
@@ -54,11 +51,6 @@ def _runs(episode: LogEpisode) -> Runs:
 def ways(steps: Floats) -> Floats:
     """Lengths of steps of poses (N, 3), turns counted as ways (N,) [m]."""
     return np.asarray(np.hypot(steps[:, 0], steps[:, 1]) + LEVER_M * np.abs(steps[:, 2]))
-
-
-def speeds_between(episode: LogEpisode) -> Floats:
-    """Speeds from each pose of a drive to the next other one (N,) [m/s], turns counted as ways."""
-    return _runs(episode).speeds
 
 
 def _shown_again(runs: Runs, least_m_s: float, *, usual: bool) -> Flags:
@@ -85,20 +77,16 @@ def _share(every: Sequence[Runs], least_m_s: float) -> float:
 
 
 def rows_of_poses(log: Log, episodes: Sequence[LogEpisode]) -> list[Whole]:
-    """Rows of these drives that have a measured pose of their own.
+    """Rows of these drives of a log, or pieces of them, that have a measured pose of their own.
 
     Repeats have none while the robot moves; while it stands one each HELD_S has.
-
-    Args:
-        log: What says how fast the robot moves, and whether its poses repeat.
-        episodes: Drives of it, or pieces of them.
     """
-    every = [_runs(episode) for episode in log.episodes]
+    every = [runs_of(episode) for episode in log.episodes]
     least = _least_speed(every)
     usual = _share(every, least) >= USUAL
     hold = max(1, round(HELD_S * log.rate_hz))
     found = []
-    for runs in map(_runs, episodes):
+    for runs in map(runs_of, episodes):
         known, fresh = runs.known, runs.fresh
         newest = np.maximum.accumulate(np.where(fresh, np.arange(len(known)), 0)) if len(known) else known
         stands = ~np.repeat(_shown_again(runs, least, usual=usual), runs.counts)
@@ -108,7 +96,7 @@ def rows_of_poses(log: Log, episodes: Sequence[LogEpisode]) -> list[Whole]:
 
 def repeats_note(log: Log) -> Iterator[str]:
     """Tell of poses that repeat while the robot moves, a sentence at most."""
-    every = [_runs(episode) for episode in log.episodes]
+    every = [runs_of(episode) for episode in log.episodes]
     share = _share(every, _least_speed(every))
     if share >= USUAL:
         fresh = sum(len(runs.counts) for runs in every) / sum(len(runs.known) for runs in every)

@@ -69,14 +69,9 @@ LARGEST = 1e50
 
 @dataclass(frozen=True)
 class Rows:
-    """The rows of samples.csv, commands.csv or frames.csv, N of them in E episodes.
+    """The rows of samples.csv, commands.csv or frames.csv, N of them in E episodes, and the line of each (N,).
 
-    Attributes:
-        path: The file.
-        lines: Line of each row in the file (N,).
-        names: Episodes in order (E,).
-        firsts: First row of each episode (E,).
-        values: Columns by name (N,), NaN where a cell is empty.
+    The first row of each episode is known (E,); columns are by name (N,), NaN where a cell is empty.
     """
 
     path: Path
@@ -108,15 +103,9 @@ class Rows:
 
 @dataclass(frozen=True)
 class Layout:
-    """The columns and rows that a table must hold.
+    """The columns that a table must hold besides `episode` and `time`, and the fewest rows of an episode.
 
-    Attributes:
-        needed: Its columns besides `episode` and `time`.
-        together: Columns that are there all or none.
-        may_lack: Columns whose cells may be empty.
-        optional: Columns that may be left out.
-        fewest: Rows that an episode has at least.
-        why: What needs the columns, for a complaint.
+    Some are there all or none, may have empty cells, or may be left out; `why` is what needs them, for a complaint.
     """
 
     needed: tuple[str, ...]
@@ -139,10 +128,21 @@ def read_rows(path: Path, layout: Layout) -> Rows:
     names = tuple(str(label) for label in labels[changes])
     rows = Rows(path, np.concatenate([part.lines for part in parts]), names, changes, {})
     _check_episodes(rows, layout.fewest)
-    _check_numbers(path, parts, layout)
+    for name in parts[0].values:
+        # The first cell of the first column that has any which is no number
+        wrong = next((part.wrong[name] for part in parts if name in part.wrong), None)
+        if wrong:
+            allowed = ", or empty where nothing was measured" if name in layout.may_lack else ""
+            line, text = wrong
+            raise LogError(f"{path}: line {line}, column '{name}': must be a finite number{allowed}, got '{text}'")
     values = {name: np.concatenate([part.values[name] for part in parts]) for name in parts[0].values}
     rows = replace(rows, values=values)
-    _check_times(rows)
+    time = values["time"]
+    stuck = rows.follows & (np.diff(time) <= 0)
+    if stuck.any():
+        row = int(np.argmax(stuck)) + 1
+        late = f"{time[row]:.12g} s does not come after {time[row - 1]:.12g} s"
+        raise rows.error(row, "time", f"{late} of the row before; sort the rows by time")
     return rows
 
 
@@ -154,13 +154,9 @@ def check_known_episodes(rows: Rows, names: Sequence[str]) -> None:
 
 
 class _Part(NamedTuple):
-    """Some of the rows.
+    """Some of the rows, all (N,): line in the file, episode, and columns by name, NaN where a cell is no number.
 
-    Attributes:
-        lines: Line of each row in the file (N,).
-        labels: Its episode (N,), texts.
-        values: Columns by name (N,), NaN where a cell is empty or no number.
-        wrong: Line and text of the first cell of a column that is neither a number nor may be empty.
+    Of each column `wrong` has line and text of the first cell that is neither a number nor may be empty.
     """
 
     lines: Whole
@@ -216,24 +212,3 @@ def _check_episodes(samples: Rows, fewest: int) -> None:
         single = int(np.argmax(lengths < fewest))
         problem = f"'{samples.names[single]}' has a single row; a drive needs two or more, so leave it out"
         raise samples.error(int(samples.firsts[single]), "episode", problem)
-
-
-def _check_numbers(path: Path, parts: Sequence[_Part], layout: Layout) -> None:
-    """Refuse a cell that is no number, the first of the first column that has any."""
-    for name in parts[0].values:
-        wrong = next((part.wrong[name] for part in parts if name in part.wrong), None)
-        if wrong:
-            allowed = ", or empty where nothing was measured" if name in layout.may_lack else ""
-            line, text = wrong
-            raise LogError(f"{path}: line {line}, column '{name}': must be a finite number{allowed}, got '{text}'")
-
-
-def _check_times(rows: Rows) -> None:
-    time = rows.values["time"]
-    stuck = rows.follows & (np.diff(time) <= 0)
-    if stuck.any():
-        row = int(np.argmax(stuck)) + 1
-        problem = (
-            f"{time[row]:.12g} s does not come after {time[row - 1]:.12g} s of the row before; sort the rows by time"
-        )
-        raise rows.error(row, "time", problem)

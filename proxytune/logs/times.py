@@ -194,7 +194,12 @@ def on_own_grid(times: Floats, poses: Floats, rate_hz: float) -> tuple[Floats, F
         The grid's times (rows,) [s], poses on it (rows, 3), and those measured at times of their own.
     """
     steps = (times - times[0]) * rate_hz
-    known, rows = _free_steps(steps, np.flatnonzero(np.isfinite(poses[:, 0])))
+    known = np.flatnonzero(np.isfinite(poses[:, 0]))
+    # The nearest step to each pose that none before it has; poses that are a step off by that are left out.
+    order, nearest = np.arange(len(known)), np.rint(steps[known]).astype(np.int64)
+    rows = np.maximum.accumulate(nearest - order) + order if len(known) else nearest
+    near = np.abs(rows - steps[known]) <= 1.0
+    known, rows = known[near], rows[near]
     length = int(max(np.rint(steps[-1]), rows.max(initial=0))) + 1
     grid = times[0] + np.arange(length) / rate_hz
     measured = Measured(times[known], poses[known], rows)
@@ -214,15 +219,6 @@ def _check_density(samples: Rows, usual: float) -> None:
             f"of {gaps[longest]:g} s before this one; write seconds, or split the episode at its gaps"
         )
         raise samples.error(longest + 1, "time", problem)
-
-
-def _free_steps(steps: Floats, known: Whole) -> tuple[Whole, Whole]:
-    """The nearest step to each known pose that none before it has, and which poses are not a step off by that."""
-    order = np.arange(len(known))
-    nearest = np.rint(steps[known]).astype(np.int64)
-    rows = np.maximum.accumulate(nearest - order) + order if len(known) else nearest
-    near = np.abs(rows - steps[known]) <= 1.0
-    return known[near], rows[near]
 
 
 def moved(measured: Measured, times: Floats) -> Floats:

@@ -12,7 +12,7 @@ import numpy as np
 
 from proxytune.arrays import Floats
 from proxytune.logs.log import Log, LogEpisode
-from proxytune.logs.repeats import HELD_S, speeds_between, ways
+from proxytune.logs.repeats import HELD_S, runs_of, ways
 from proxytune.logs.times import on_own_grid
 
 APART = (0.5, 1.5)
@@ -68,7 +68,7 @@ def _goes_on_in_place(one: LogEpisode, other: LogEpisode) -> bool:
         return False
     ends = np.stack((one.poses[known[0][-1]], other.poses[known[1][0]]))
     way = float(ways(np.diff(_onwards(ends), axis=0))[0])
-    fastest = max(float(speeds_between(episode).max(initial=0.0)) for episode in (one, other))
+    fastest = max(float(runs_of(episode).speeds.max(initial=0.0)) for episode in (one, other))
     # A pose that is shown again may be as old as that.
     seconds = float(other.times[known[1][0]] - one.times[known[0][-1]]) + HELD_S
     return way <= FASTER * fastest * seconds

@@ -195,11 +195,6 @@ def floor_text(level: Level | None, unit: str) -> str:
     return report.with_span(f"{report.short(level.floor)}{unit and ' '}{unit}", *(level.floor_ends or (None, None)))
 
 
-def chance_text(level: Level | None) -> str:
-    """PRPV of a random ranking, with its deviation."""
-    return "–" if level is None or level.chance is None else f"{level.chance[0]:.1f} ± {level.chance[1]:.1f}"
-
-
 def _change(row: Compared) -> str:
     assert row.after is not None
     before, after = level_text(row.before, row.unit), level_text(row.after, row.unit)

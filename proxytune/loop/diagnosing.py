@@ -8,7 +8,6 @@ has what the diagnosis found.
 import json
 import os
 import shutil
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -81,30 +80,20 @@ def read_diagnosis(folder: Path) -> dict[str, Any]:
     path = folder / "diagnosis.json"
     try:
         document: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        _read_through(document)
+        # All that a loop reads is read, so that what is spoilt shows before anything is made of it.
+        json.dumps(document, allow_nan=False)
+        lacking(document), theta_table({}, {}, document)
+        for row in compare_errors(document):
+            for level in (row.before, row.after):
+                level_text(level, row.unit), floor_text(level, row.unit)
+        for told in (document, document["camera"] or document):
+            findings(told["effects"])
+            told["verdict"], told["effects"], told["extended"]
+        for studied, model in (("", "model.toml"), (f"{NEXT}diagnose", "")):
+            following(document, studied, model, {})
     except (OSError, ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError) as problem:
         raise RunError(f"{path}: cannot be read ({describe(problem)}); remove it and run again") from None
     return document
-
-
-def _read_through(document: Mapping[str, Any]) -> None:
-    """Read all that a loop reads, so that what is spoilt shows before anything is made of it."""
-    json.dumps(document, allow_nan=False)
-    lacking(document), theta_table({}, {}, document)
-    for row in compare_errors(document):
-        for level in (row.before, row.after):
-            level_text(level, row.unit), floor_text(level, row.unit)
-    for told in (document, document["camera"] or document):
-        findings(told["effects"])
-        told["verdict"], told["effects"], told["extended"]
-    for studied, model in (("", "model.toml"), (f"{NEXT}diagnose", "")):
-        following(document, studied, model, {})
-
-
-def adds_something(document: Mapping[str, Any]) -> bool:
-    """True if a diagnosis found anything to extend the proxy by: named effects, or curves."""
-    camera = document["camera"] or {}
-    return bool(document["effects"] or camera.get("effects") or document.get("learnt", {}).get("used"))
 
 
 def declared_names(loop: Loop) -> tuple[str, ...]:

@@ -24,16 +24,10 @@ from proxytune.usefulness import Assessment, dominance
 
 @dataclass(frozen=True)
 class Closed:
-    """A loop that has come to its end.
+    """A loop that has come to its end: the study, what `diagnose --json` prints of the log, and the extended study.
 
-    Attributes:
-        loop: Which one.
-        before: The study.
-        diagnosis: What `diagnose --json` prints of the log.
-        after: The extended study; None where nothing was found to extend the proxy by.
-        held_out: What held-out agents say of both tuned proxies; None where there are none, or nothing was found.
-        done: The steps that this run has done or gone on with.
-        episodes: How many episodes this run has driven.
+    That, and what held-out agents say of both tuned proxies, is None where nothing was found, or there are none. This
+    run has done or gone on with some steps, and driven so many episodes.
     """
 
     loop: Loop
@@ -50,20 +44,15 @@ def righted(closed: Closed) -> dict[str, Any] | None:
     if closed.after is None:
         return None
     both = closed.held_out or (closed.before.result.judged, closed.after.result.judged)
-    before, after = map(wrong_pairs, both)
-    agents = both[0].inputs.agents
-    gains = [before[agent] - after[agent] for agent in agents]
-    if max(gains) <= 0.0:
+    # Pairs with each agent that proxy and target order differently; a tie of one side alone counts half.
+    orders = ([dominance(means, one.inputs.metrics) for means in one.inputs.means] for one in both)
+    before, after = (np.abs(proxy - target).sum(axis=1).tolist() for proxy, target in orders)
+    gains = np.subtract(before, after)
+    if gains.max() <= 0.0:
         return None
-    agent = agents[int(np.argmax(gains))]
-    return {"agent": agent, "wrong_pairs_before": before[agent], "wrong_pairs_after": after[agent]}
-
-
-def wrong_pairs(assessment: Assessment) -> dict[str, float]:
-    """Count the pairs with each agent that proxy and target order differently; a tie of one side alone counts half."""
-    inputs = assessment.inputs
-    proxy, target = (dominance(means, inputs.metrics) for means in inputs.means)
-    return dict(zip(inputs.agents, np.abs(proxy - target).sum(axis=1).tolist(), strict=True))
+    most = int(gains.argmax())
+    agent = both[0].inputs.agents[most]
+    return {"agent": agent, "wrong_pairs_before": before[most], "wrong_pairs_after": after[most]}
 
 
 MOST_STARTS = 4
@@ -89,11 +78,21 @@ def write_pictures(closed: Closed) -> None:
     texts = []
     if gain and both:
         metrics = [metric.name for metric in closed.loop.settings.metrics]
-        for name, pair, caption in zip(BothEpisodes._fields, both, _captions(closed, gain, both), strict=True):
+        agent, start, starts = gain["agent"], both.before.episode.start, _starts(closed)
+        pairs = f"{short(gain['wrong_pairs_before'])} before, {short(gain['wrong_pairs_after'])} after"
+        chosen = f", where of starts 0 to {starts[-1]} the two are furthest apart on average" if starts[1:] else ""
+        first = (
+            f"Wrongly ordered pairs with {agent}: {pairs}. Here it drives in the proxy tuned before and in the target, "
+            f"under the same seed from start {start}{chosen}."
+        )
+        before, after = (f"{say_parting(pair)} {_scores(pair, metrics)}" for pair in both)
+        rest = "This is one episode; the order of the agents counts every start, under other seeds."
+        captions = f"{first} {before}", f"The same start and seed in the extended proxy. {after} {rest}"
+        for name, pair, caption in zip(BothEpisodes._fields, both, captions, strict=True):
             drawn = episode_figure(pair, metrics)
             save_figure(drawn, path.with_name(f"{name}.png"))
             write_text(path.with_name(f"{name}.svg"), svg_of(drawn).decode("utf-8"))
-            title = f"{gain['agent']} beside the target, {name}"
+            title = f"{agent} beside the target, {name}"
             texts.append({"file": f"{name}.svg", "title": title, "caption": caption})
     write_text(path, json.dumps(texts, indent=2) + "\n")
 
@@ -154,20 +153,6 @@ def _drive(
 
 def _starts(closed: Closed) -> range:
     return range(min(MOST_STARTS, closed.loop.settings.starts))
-
-
-def _captions(closed: Closed, gain: dict[str, Any], both: BothEpisodes) -> tuple[str, str]:
-    agent, start, starts = gain["agent"], both.before.episode.start, _starts(closed)
-    pairs = f"{short(gain['wrong_pairs_before'])} before, {short(gain['wrong_pairs_after'])} after"
-    chosen = f", where of starts 0 to {starts[-1]} the two are furthest apart on average" if starts[1:] else ""
-    first = (
-        f"Wrongly ordered pairs with {agent}: {pairs}. Here it drives in the proxy tuned before and in the target, "
-        f"under the same seed from start {start}{chosen}."
-    )
-    metrics = [metric.name for metric in closed.loop.settings.metrics]
-    before, after = (f"{say_parting(pair)} {_scores(pair, metrics)}" for pair in both)
-    rest = "This is one episode; the order of the agents counts every start, under other seeds."
-    return f"{first} {before}", f"The same start and seed in the extended proxy. {after} {rest}"
 
 
 def _scores(pair: SideBySide, metrics: list[str]) -> str:

@@ -14,6 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from proxytune import study
 from proxytune.api import recordable
 from proxytune.domain import DomainFamily, Episode
 from proxytune.driving import AGENTS, LaneFollowing
@@ -28,19 +29,6 @@ from proxytune.seeds import fresh_seed
 from proxytune.settings import read_settings
 from proxytune.space import Theta
 from proxytune.storage import Store, locked
-from proxytune.study import (
-    LEARNING,
-    Study,
-    StudyRun,
-    StudySettings,
-    bare_family,
-    failure_of,
-    load_family,
-    plan_episodes,
-    read_study_settings,
-    read_target,
-    score_table,
-)
 from proxytune.usefulness import Assessment, assess, floor_of_repeats
 
 KEY = "held_out"
@@ -48,7 +36,7 @@ FEWEST = 3
 """Of fewer agents PRPV says nothing."""
 
 
-def held_out_of(settings: StudySettings, family: DomainFamily, *, driven: bool) -> tuple[str, ...]:
+def held_out_of(settings: study.StudySettings, family: DomainFamily, *, driven: bool) -> tuple[str, ...]:
     """The agents that study.toml holds out, else shipped ones that it does not use; empty where they are too few.
 
     Where the target is not driven, only agents that its table has can be held out. One that study.toml names is refused
@@ -65,13 +53,13 @@ def held_out_of(settings: StudySettings, family: DomainFamily, *, driven: bool) 
     if named and len(named) < FEWEST:
         raise settings.error(KEY, f"names {len(named)} of at least {FEWEST} agents; add some, or take the key out")
     if driven:  # A family that names its agents otherwise is asked without its guard.
-        lane_following = isinstance(bare_family(settings, settings.proxy), LaneFollowing)
+        lane_following = isinstance(study.bare_family(settings, settings.proxy), LaneFollowing)
         scored = tuple(AGENTS) if lane_following else ()
     found = named or tuple(name for name in scored if name not in used and _is_known(family, name))
     return found if len(found) >= FEWEST else ()
 
 
-def scored_agents(settings: StudySettings) -> tuple[str, ...]:
+def scored_agents(settings: study.StudySettings) -> tuple[str, ...]:
     """The agents that the target's table has."""
     if not all(path.is_file() for path in settings.targets):
         return ()
@@ -87,34 +75,38 @@ def _is_known(family: DomainFamily, name: str) -> bool:
     return True
 
 
-def held_out_settings(settings: StudySettings, names: tuple[str, ...], target: Path | None = None) -> StudySettings:
+def held_out_settings(
+    settings: study.StudySettings, names: tuple[str, ...], target: Path | None = None
+) -> study.StudySettings:
     """The study with these agents instead, and the target's scores of them from another file if one is given."""
     known = replace(settings, agents=names)
     return known if target is None else replace(known, targets=(target,), target_columns={})
 
 
-def drive_held_out(study: Study, settings: StudySettings, theta: Theta, watcher: Watcher) -> tuple[Assessment, int]:
+def drive_held_out(
+    opened: study.Study, settings: study.StudySettings, theta: Theta, watcher: Watcher
+) -> tuple[Assessment, int]:
     """Drive held-out agents in the instance of a study's family, twice from each start, and assess it.
 
     Episodes are kept in the study's own database, and those that are there are not driven again. The second time is for
     the noise floor: what the instance scores against itself. Gives the assessment, and how many were driven now.
     """
-    held = replace(study, settings=settings, target=read_target(settings, study.family)[0])
+    held = replace(opened, settings=settings, target=study.read_target(settings, opened.family)[0])
     seeds = [fresh_seed(settings.seed, repetition) for repetition in (1, 2)]
-    with locked(study.settings.folder), Store.open(study.settings.folder) as store:
-        run = StudyRun(held, store, watcher)
-        once, again = (_scores(run, plan_episodes(settings, theta, seed)) for seed in seeds)
+    with locked(opened.settings.folder), Store.open(opened.settings.folder) as store:
+        run = study.StudyRun(held, store, watcher)
+        once, again = (_scores(run, study.plan_episodes(settings, theta, seed)) for seed in seeds)
     floor = floor_of_repeats(domain=once, again=again, metrics=settings.metrics)
     return assess(proxy=once, target=held.target, metrics=settings.metrics, floor=floor), run.spent.episodes
 
 
-def _scores(run: StudyRun, planned: list[Episode]) -> ScoreTable:
+def _scores(run: study.StudyRun, planned: list[Episode]) -> ScoreTable:
     outcomes = list(run.outcomes(planned, "held-out agents").values())
     worked = {outcome.episode.agent for outcome in outcomes if outcome.metrics is not None}
     for outcome in outcomes:
         if outcome.episode.agent not in worked:
-            raise RunError(f"held out: {failure_of(outcome)}; name other agents under {KEY} in study.toml")
-    return score_table(outcomes)
+            raise RunError(f"held out: {study.failure_of(outcome)}; name other agents under {KEY} in study.toml")
+    return study.score_table(outcomes)
 
 
 HOME = "loop"
@@ -125,7 +117,7 @@ HOME = "loop"
 class Loop:
     """A loop to be closed; the twin is a simulated target's model.toml, recorded where there is no log."""
 
-    settings: StudySettings
+    settings: study.StudySettings
     family: DomainFamily
     robot: str
     twin: Path | None
@@ -144,19 +136,19 @@ class Loop:
         return Facts(self.robot, road=str(self.settings.folder.resolve() / road) if road.endswith(".toml") else road)
 
 
-def open_loop(study: Path, twin: Path | None = None, log: Path | None = None) -> Loop:
+def open_loop(path: Path, twin: Path | None = None, log: Path | None = None) -> Loop:
     """Read a study and check it, its twin (its `truth` if not given), its log and its held-out agents.
 
     Raises:
         InputError: If any of them cannot be used.
         StoreError: If the loop's folder cannot be written.
     """
-    settings = read_study_settings(study)
+    settings = study.read_study_settings(path)
     if settings.families or settings.family_name:
         raise settings.error("families", "`loop` is of one family; give it a study without this table")
-    if settings.objective == LEARNING:
+    if settings.objective == study.LEARNING:
         raise settings.error("objective", "`loop` tunes by scores; give it a study with another objective than 'plv'")
-    family = load_family(settings, settings.proxy)
+    family = study.load_family(settings, settings.proxy)
     robot = getattr(family, "robot", None)
     if not isinstance(robot, str):
         raise settings.error("family", "`loop` diagnoses a robot's log, and this family names no robot")
@@ -177,7 +169,7 @@ def open_loop(study: Path, twin: Path | None = None, log: Path | None = None) ->
     return loop
 
 
-def _twin(settings: StudySettings, given: Path | None, robot: str) -> Path | None:
+def _twin(settings: study.StudySettings, given: Path | None, robot: str) -> Path | None:
     """The target's model, whose robot and equipment are the study's."""
     path, named = (given, f"--twin {given}") if given else (settings.truth, f"{settings.path}: truth")
     if path is None:
@@ -185,7 +177,7 @@ def _twin(settings: StudySettings, given: Path | None, robot: str) -> Path | Non
     if not path.is_file():
         raise InputError(f"{named}: no such file: {path}; check the path")
     try:
-        of_twin = getattr(load_family(settings, path), "robot", robot)
+        of_twin = getattr(study.load_family(settings, path), "robot", robot)
     except SettingsError as problem:
         raise SettingsError(f"{named}: {problem}") from None
     if of_twin != robot:
@@ -232,28 +224,30 @@ class Kept:
 
     def __init__(self, folder: Path) -> None:
         """Read what is known."""
-        self._path = folder / FILE_NAME
-        self._inputs: dict[str, str] = _read(self._path)
-
-    def inputs_of(self, name: str) -> str | None:
-        """The digest of the inputs that a step's output was made of; None where it was never done."""
-        return self._inputs.get(name)
+        self._path, self.inputs = folder / FILE_NAME, dict[str, str]()
+        try:
+            steps = json.loads(self._path.read_text(encoding="utf-8"))["steps"]
+            self.inputs |= {str(name): str(inputs) for name, inputs in steps.items()}
+        except FileNotFoundError:
+            pass
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+            raise StoreError(f"{self._path}: cannot be read; remove it to do every step again") from None
 
     def has(self, name: str, inputs: str, output: Path) -> bool:
         """True if a step is done: its output is there, and made of inputs of this digest."""
-        return self._inputs.get(name) == inputs and output.exists()
+        return self.inputs.get(name) == inputs and output.exists()
 
     def run(self, name: str, inputs: str, do: Callable[[], object]) -> None:
         """Do a step, which makes its output of inputs of this digest."""
-        self._write({known: digest for known, digest in self._inputs.items() if known != name})
+        self._write({known: digest for known, digest in self.inputs.items() if known != name})
         do()
-        self._write({**self._inputs, name: inputs})
+        self._write({**self.inputs, name: inputs})
 
     def _write(self, inputs: dict[str, str]) -> None:
         # Until a step has been done again, what is left of its old output counts as none.
-        if inputs != self._inputs:
+        if inputs != self.inputs:
             write_text(self._path, json.dumps({"format": 1, "steps": inputs}, indent=2) + "\n")
-        self._inputs = inputs
+        self.inputs = inputs
 
 
 def digest(*parts: Any) -> str:
@@ -268,13 +262,3 @@ def digest_of_files(path: Path) -> str:
         found = sorted(one for one in path.rglob("*") if one.is_file())
         files = [one for one in found if not one.name.startswith(".") and one.parent.name != "__pycache__"]
     return digest([(str(one.relative_to(path)), hashlib.sha256(one.read_bytes()).hexdigest()) for one in files])
-
-
-def _read(path: Path) -> dict[str, str]:
-    try:
-        steps = json.loads(path.read_text(encoding="utf-8"))["steps"]
-        return {str(name): str(inputs) for name, inputs in steps.items()}
-    except FileNotFoundError:
-        return {}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        raise StoreError(f"{path}: cannot be read; remove it to do every step again") from None

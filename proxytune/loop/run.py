@@ -60,12 +60,18 @@ class _Closing:
         self._measure_target()
         before = self._tune("study", open_study(self.settings.path))
         diagnosis = self._diagnose()
-        after, held_out = None, None
-        if diagnosing.adds_something(diagnosis):
+        after, held_out, camera = None, None, diagnosis["camera"] or {}
+        if diagnosis["effects"] or camera.get("effects") or diagnosis.get("learnt", {}).get("used"):
             after = self._tune("extended study", self._extend())
             held_out = self._held_out(before, after)
         closed = Closed(self.loop, before, diagnosis, after, held_out, (), self.episodes)
-        self._show_righted(closed)
+        if after:
+            name, twin, model = "righted agent", self.loop.twin, self.loop.home / "diagnosed" / "model.toml"
+            seen = twin and twin.read_text(encoding="utf-8"), opening.digest_of_files(model)
+            thetas = [dict(one.theta) for one in (before, after)]
+            metrics = [metric.name for metric in self.settings.metrics]
+            inputs = opening.digest(name, righted(closed), seen, thetas, metrics, self._agents(self.settings.agents))
+            self._keep(name, inputs, pictures_file(self.loop.home), partial(write_pictures, closed))
         return replace(closed, done=tuple(self.done))
 
     def _begin(self, name: str, how: str = "") -> None:
@@ -82,11 +88,11 @@ class _Closing:
     def _measure_target(self) -> None:
         """Measure the twin where the study has no scores of its target yet."""
         settings, twin, name = self.settings, self.loop.twin, "target"
-        if twin is None or (settings.target.exists() and self.kept.inputs_of(name) is None):
+        if twin is None or (settings.target.exists() and name not in self.kept.inputs):
             self._begin(name, "given")
             return
         inputs = opening.digest(name, twin.read_text(encoding="utf-8"), self._agents(settings.agents))
-        if settings.target.exists() and self.kept.inputs_of(name) != inputs:
+        if settings.target.exists() and self.kept.inputs[name] != inputs:
             raise InputError(
                 f"{settings.target}: was measured of another model, or of other agents, starts, seed, [domain] or "
                 "modules of your own; move it and study.db away to start again"
@@ -111,26 +117,23 @@ class _Closing:
         return tuned
 
     def _diagnose(self) -> Mapping[str, Any]:
-        loop, home = self.loop, self.loop.home / "diagnosed"
-        log, seen = self._record() if loop.log is None else (loop.log, opening.digest_of_files(loop.log))
-        if loop.log is not None:
+        loop, home, versions = self.loop, self.loop.home / "diagnosed", versions_of(["proxytune"])
+        if loop.log is None:
+            assert loop.twin is not None
+            log, wanted, twin = loop.home / "log", diagnosing.wanted_of(loop), loop.twin.read_text(encoding="utf-8")
+            made_of = (twin, self.settings.domain.values, vars(wanted), user_code(self.settings), versions)
+            seen = opening.digest("log", *made_of)
+            do = partial(record_log, self.settings, loop.twin, log, wanted, lambda line: None)
+            self._keep("log", seen, log / "log.toml", do)
+        else:
+            log, seen = loop.log, opening.digest_of_files(loop.log)
             self._begin("log", "given")
         robot = opening.digest_of_files(robot_home(loop.robot, self.settings.folder))
-        made_by = (robot, user_code(self.settings), versions_of(["proxytune"]))
+        made_by = (robot, user_code(self.settings), versions)
         inputs = opening.digest("diagnosis", seen, diagnosing.declared_names(loop), self.settings.seed, made_by)
-        do = partial(diagnosing.diagnose_target, loop, log, home, self.teller)
-        self._keep("diagnosis", inputs, home / "diagnosis.json", do)
+        diagnose = partial(diagnosing.diagnose_target, loop, log, home, self.teller)
+        self._keep("diagnosis", inputs, home / "diagnosis.json", diagnose)
         return diagnosing.read_diagnosis(home)
-
-    def _record(self) -> tuple[Path, str]:
-        """Record the twin; the log, and a digest of what it was made of."""
-        loop, folder, wanted = self.loop, self.loop.home / "log", diagnosing.wanted_of(self.loop)
-        assert loop.twin is not None
-        twin, domain = loop.twin.read_text(encoding="utf-8"), self.settings.domain.values
-        inputs = opening.digest("log", twin, domain, vars(wanted), user_code(self.settings), versions_of(["proxytune"]))
-        do = partial(record_log, self.settings, loop.twin, folder, wanted, lambda line: None)
-        self._keep("log", inputs, folder / "log.toml", do)
-        return folder, inputs
 
     def _extend(self) -> Study:
         settings, home = self.settings, self.loop.home
@@ -162,17 +165,6 @@ class _Closing:
         self.episodes += episodes
         self.done += [name] if episodes else []
         return driven[0][0], driven[1][0]
-
-    def _show_righted(self, closed: Closed) -> None:
-        """Draw the righted agent's episodes, where there is a proxy after."""
-        if closed.after is None:
-            return
-        name, twin, home = "righted agent", self.loop.twin, self.loop.home
-        seen = twin and twin.read_text(encoding="utf-8"), opening.digest_of_files(home / "diagnosed" / "model.toml")
-        thetas = [dict(one.theta) for one in (closed.before, closed.after)]
-        metrics = [metric.name for metric in self.settings.metrics]
-        inputs = opening.digest(name, righted(closed), seen, thetas, metrics, self._agents(self.settings.agents))
-        self._keep(name, inputs, pictures_file(home), partial(write_pictures, closed))
 
     def _held_out_target(self, names: tuple[str, ...]) -> Path | None:
         """The target's scores of held-out agents: a file of their own, or None where the study's table has them."""
@@ -358,7 +350,7 @@ def _table(closed: Closed, rows: list[comparison.Compared]) -> report.Table:
         cells.append((title, *shown))
         for name, texts in (
             ("noise floor", [comparison.floor_text(one, row.unit) for one in sides]),
-            ("chance", list(map(comparison.chance_text, sides))),
+            ("chance", ["{:.1f} ± {:.1f}".format(*one.chance) if one and one.chance else "–" for one in sides]),
         ):
             if set(texts) != {"–"}:
                 cells.append((f"  {name}", *texts))

@@ -46,7 +46,14 @@ def families_sentence(compared: ComparedFamilies) -> str:
 def families_answer(compared: ComparedFamilies) -> str:
     """Say what to use to predict, to teach and where time is short."""
     teach = [f"To teach: {_say_teaching(compared)}."] if compared.settings.teaching else []
-    return " ".join([f"To predict: {_say_predicting(compared)}.", *teach, f"Cheapest: {_say_cost(compared)}."])
+    choice, times = compared.cheapest, compared.seconds_per_episode()
+    assert choice.best is not None
+    more = {name: seconds_text(*one) for name, one in compared.times_cheapest(choice.best).items()}
+    alike = [f"{name} {more[name]}" for name in choice.alike]
+    worse = [f"{name} {time}" for name, time in more.items() if name not in (choice.best, *choice.alike)]
+    seconds = seconds_text(*times[choice.best], unit=" s per episode")
+    cost = _join_clauses(f"{choice.best}, {seconds}", "times as long", worse, alike)
+    return " ".join([f"To predict: {_say_predicting(compared)}.", *teach, f"Cheapest: {cost}."])
 
 
 def families_next_step(compared: ComparedFamilies) -> str:
@@ -61,10 +68,14 @@ def families_next_step(compared: ComparedFamilies) -> str:
     if not choice.alike:
         home = next(one.result.study.settings.home for one in compared.families if one.name == choice.best)
         return f"use {choice.best} to predict; its page: {home / 'report.html'}."
-    cheap = _cheaper(compared)
-    if cheap:
+    # Of those that predict alike, one whose episodes are shown to take the shortest
+    names = [choice.best or "", *choice.alike]
+    means = {name: one[0] for name, one in compared.seconds_per_episode().items() if name in names}
+    cheap = min(means, key=means.__getitem__)
+    others = [one for name, one in compared.times_cheapest(cheap).items() if name in names and name != cheap]
+    if all(low > 1.0 for _, low, _ in others):
         return f"use {cheap} to predict, which costs least of those; to tell them apart, {told}."
-    return f"to tell {listed([choice.best or '', *choice.alike])} apart, {told}."
+    return f"to tell {listed(names)} apart, {told}."
 
 
 def prpv_text(fresh: Assessment) -> str:
@@ -136,39 +147,14 @@ def _behind(lesson: Lesson) -> str:
     return "not converged" if lesson.more is None else f"{more_text(lesson)} more samples"
 
 
-def _say_cost(compared: ComparedFamilies) -> str:
-    choice = compared.cheapest
-    assert choice.best is not None
-    seconds = seconds_text(*compared.seconds_per_episode()[choice.best], unit=" s per episode")
-    times = {name: seconds_text(*one) for name, one in compared.times_cheapest(choice.best).items()}
-    alike = [f"{name} {times[name]}" for name in choice.alike]
-    worse = [f"{name} {time}" for name, time in times.items() if name not in (choice.best, *choice.alike)]
-    return _join_clauses(f"{choice.best}, {seconds}", "times as long", worse, alike)
-
-
 def _join_clauses(best: str, how: str, worse: list[str], alike: list[str]) -> str:
     """The best, how others are worse, and which cannot be told from it."""
     others = ((how, worse), (NOT_APART, alike))
     return "; ".join([best, *(f"{head}: {'; '.join(names)}" for head, names in others if names)])
 
 
-def _cheaper(compared: ComparedFamilies) -> str:
-    """Name of the one of those that predict alike whose episodes are shown to take the shortest; empty if none is."""
-    choice = compared.predicts
-    names = [choice.best or "", *choice.alike]
-    means = {name: one[0] for name, one in compared.seconds_per_episode().items() if name in names}
-    cheap = min(means, key=means.__getitem__)
-    others = [one for name, one in compared.times_cheapest(cheap).items() if name in names and name != cheap]
-    return cheap if all(low > 1.0 for _, low, _ in others) else ""
-
-
 def families_text(compared: ComparedFamilies, files: Mapping[str, Any]) -> Group:
-    """Several families as `study` prints them.
-
-    Args:
-        compared: The tuned families.
-        files: What was written.
-    """
+    """Several families as `study` prints them, and what was written."""
     uses, theta = families_tables(compared)
     tables = [*section_text(replace(uses, notes=())), *section_text(theta)]
     return group_texts(families_sentence(compared), *tables, *note_texts(uses.notes), *file_texts(files))
@@ -180,21 +166,13 @@ def families_tables(compared: ComparedFamilies) -> tuple[Table, Table]:
     known = [{one.name: one for one in known_parameters(family.result)} for family in compared.families]
     names = dict.fromkeys(name for one in known for name in one)
     theta = tuple((name, *(_theta_cell(one.get(name)) for one in known)) for name in names)
-    notes = ["PRPV is of fresh episodes at the best θ, from the same starts and under the same seeds in every family"]
-    notes += [f"{one.name}: {line}" for one in compared.families for line in _say_family(one)]
-    notes += [f"{name}: {one.failure}" for name, one in compared.lessons.items() if one.failure]
-    return Table(USES, columns, tuple(_use_rows(compared)), tuple(notes)), Table(THETA, columns, theta)
-
-
-def _use_rows(compared: ComparedFamilies) -> list[Row]:
-    """Rows of what each family predicts, teaches (where that was asked for) and costs, a fact a row."""
-    more, families = differences(compared), compared.families
-    lessons, costs = [compared.lessons.get(one.name) for one in families], compared.seconds_per_episode()
+    more, families, costs = differences(compared), compared.families, compared.seconds_per_episode()
+    lessons = [compared.lessons.get(one.name) for one in families]
     taught: list[Row] = []
     if compared.settings.teaching:
         behind = ["" if one is None or one.failure else more_text(one) for one in lessons]
         taught = [("PLV", *map(_plv_cell, lessons)), ("  more than highest", *behind)]
-    return [
+    rows: list[Row] = [
         ("fresh PRPV", *(prpv_text(one.fresh) if one.fresh else UNKNOWN for one in families)),
         ("  more than lowest", *(difference_text(more[one.name]) if one.name in more else "" for one in families)),
         *taught,
@@ -202,6 +180,10 @@ def _use_rows(compared: ComparedFamilies) -> list[Row]:
         ("seconds of tuning", *(short(one.seconds) for one in families)),
         ("trials", *(str(len(one.result.trials)) for one in families)),
     ]
+    notes = ["PRPV is of fresh episodes at the best θ, from the same starts and under the same seeds in every family"]
+    notes += [f"{one.name}: {line}" for one in compared.families for line in _say_family(one)]
+    notes += [f"{name}: {one.failure}" for name, one in compared.lessons.items() if one.failure]
+    return Table(USES, columns, tuple(rows), tuple(notes)), Table(THETA, columns, theta)
 
 
 def _plv_cell(lesson: Lesson | None) -> str:
@@ -230,12 +212,7 @@ def _say_family(one: TunedFamily) -> list[str]:
 
 
 def families_view(compared: ComparedFamilies, figure: Figure) -> View:
-    """Several families: the figure, both tables, and where each family's own page is.
-
-    Args:
-        compared: The tuned families.
-        figure: The PNG.
-    """
+    """Several families: the figure, both tables, and where each family's own page is."""
     settings = compared.settings
     told = ("tuned", "predicts", *(("teaches",) if settings.teaching else ()), "costs")
     seconds, agents = settings.stop.wall_time_s, len(settings.agents)
@@ -319,24 +296,28 @@ def _lesson_document(lesson: Lesson | None) -> dict[str, Any]:
 
 
 class Panel(NamedTuple):
-    """One of the figure's panels.
-
-    Attributes:
-        title: What its axis says.
-        values: Of each family the value and the ends of its interval; None where an end or all of it is not known.
-        choice: Which is best.
-        ratios: Whether ratios count, not differences.
-    """
+    """One of the figure's panels: what its axis says, values of families that have one, and whether ratios count."""
 
     title: str
-    values: Mapping[str, Spread | None]
+    values: Mapping[str, Spread]
     choice: BestFamilies
     ratios: bool = False
 
 
 def families_figure(compared: ComparedFamilies) -> Figure:
     """Draw each family's fresh PRPV, PLV where there is [teaching], and seconds per episode, with 95 % intervals."""
-    panels, names = _panels(compared), [one.name for one in compared.families]
+    names = [one.name for one in compared.families]
+    prpv: dict[str, Spread] = {
+        one.name: (one.fresh.prpv.value, one.fresh.prpv_interval.low, one.fresh.prpv_interval.high)
+        for one in compared.families
+        if one.fresh
+    }
+    known = {name: one.plv for name, one in compared.lessons.items() if one.plv and one.plv.value is not None}
+    plv: dict[str, Spread] = {name: (one.value or 0.0, one.low, one.high) for name, one in known.items()}
+    panels = [Panel("fresh PRPV\n[ordered pairs]", prpv, compared.predicts)]
+    panels += [Panel("PLV\n[samples saved]", plv, compared.teaches)] if compared.lessons else []
+    seconds = dict(compared.seconds_per_episode())
+    panels.append(Panel("time per\nepisode [s]", seconds, compared.cheapest, ratios=True))
     short_names = [name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…" for name in names]
     figure, (drawn,) = style.grid_of(1.0 + 0.24 * len(names), 1, len(panels), sharey=True)
     for axes, panel in zip(drawn, panels, strict=True):
@@ -349,20 +330,6 @@ def families_figure(compared: ComparedFamilies) -> Figure:
             drawn[0].plot([], [], marker, color=edge, markerfacecolor=face, markersize=4.5, label=label)
     style.legend_below(figure, *drawn)
     return figure
-
-
-def _panels(compared: ComparedFamilies) -> list[Panel]:
-    prpv: dict[str, Spread | None] = {
-        one.name: (one.fresh.prpv.value, one.fresh.prpv_interval.low, one.fresh.prpv_interval.high)
-        if one.fresh
-        else None
-        for one in compared.families
-    }
-    known = {name: one.plv for name, one in compared.lessons.items() if one.plv and one.plv.value is not None}
-    plv: dict[str, Spread | None] = {name: (one.value or 0.0, one.low, one.high) for name, one in known.items()}
-    taught = [Panel("PLV\n[samples saved]", plv, compared.teaches)] if compared.lessons else []
-    costs = Panel("time per\nepisode [s]", dict(compared.seconds_per_episode()), compared.cheapest, ratios=True)
-    return [Panel("fresh PRPV\n[ordered pairs]", prpv, compared.predicts), *taught, costs]
 
 
 DECADE = 10.0
@@ -395,7 +362,7 @@ def _draw(axes: Axes, panel: Panel, names: list[str]) -> None:
         axes.xaxis.set_minor_formatter(NullFormatter())
         return
     axes.xaxis.set_major_locator(MaxNLocator(3))
-    if not any(end is not None and end < 0.0 for value in panel.values.values() for end in value or ()):
+    if not any(end is not None and end < 0.0 for value in panel.values.values() for end in value):
         axes.set_xlim(left=0.0)
 
 

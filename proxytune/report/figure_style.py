@@ -101,13 +101,7 @@ def named_handles(panels: Iterable[Axes]) -> dict[str, Any]:
 
 
 def legend_below(figure: Figure, *panels: Axes, without: Collection[str] = ()) -> None:
-    """One legend under the figure with everything that has a name, each name once, in the columns that fit.
-
-    Args:
-        figure: What it goes under.
-        panels: Whose names are listed.
-        without: Names that stand beside their lines already.
-    """
+    """One legend under the figure with every name in its panels once, but for those beside their lines already."""
     named = {label: handle for label, handle in named_handles(panels).items() if label not in without}
     longest = max((len(name) for name in named), default=0) + HANDLE
     columns = max(1, min(3, int(figure.get_figwidth() * CHARACTERS_PER_INCH / longest)))
@@ -118,6 +112,24 @@ def legend_below(figure: Figure, *panels: Axes, without: Collection[str] = ()) -
 
 ONE_LINE = 0.05
 """Least distance between names of one line, as a share of the panel's height; two lines take more."""
+
+
+class Role(NamedTuple):
+    """Meaning of a dot: its name in a legend, its colour, and that of its face where it is another."""
+
+    name: str
+    colour: str
+    face: str | None = None
+
+
+def draw_ranked(axes: Axes, rows: Sequence[tuple[str, float, Role]], start: float = 0.0) -> None:
+    """Draw names with values as dots, the first on top, each with a thin line to it from where they start."""
+    for place, (_, value, role) in enumerate(rows):
+        axes.plot([start, value], [place, place], "-", color=role.colour, lw=0.9, alpha=0.6)
+        axes.plot([value], [place], "o", color=role.colour, mfc=role.face or role.colour, ms=4, label=role.name)
+    axes.set_yticks(range(len(rows)), [name for name, _, _ in rows])
+    axes.set_ylim(len(rows) - 0.4, -0.6)
+    dress(axes)
 
 
 class LineName(NamedTuple):

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from typing import Any
 
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from rich.console import Group
@@ -66,7 +65,9 @@ def fleet_tables(fleet: Fleet) -> tuple[Table, ...]:
     own = []
     for robot in fleet.robots:
         learnt = robot.knowledge
-        fit, share = _fit(learnt.misfit.p_value, robot.fits), percent(learnt.posterior.share)
+        fit, share = "too few trials to tell", percent(learnt.posterior.share)
+        if (p_value := learnt.misfit.p_value) is not None:
+            fit = f"{'fits' if robot.fits else 'misfit'}, {probability(p_value)}"
         own.append((robot.name, fit, share, *map(span, learnt.intervals.values())))
     by_robot = Table(OWN, columns_of(("robot", "proxy"), ("region", *heads.values())), tuple(own), fleet_notes(fleet))
     if fleet.population is None:
@@ -80,11 +81,6 @@ def fleet_tables(fleet: Fleet) -> tuple[Table, ...]:
     population = Table(title, columns_of(("parameter",), columns), tuple(rows), (ABOUT["fleet"],))
     given = tuple((name, *map(_told, theta.values())) for name, theta in fleet.given.items())
     return population, by_robot, Table(GIVEN, columns_of(("robot",), [*heads.values()]), given)
-
-
-def _fit(p_value: float | None, fits: bool) -> str:
-    told = "" if p_value is None else f", {probability(p_value)}"
-    return f"{'fits' if fits else 'misfit'}{told}" if told else "too few trials to tell"
 
 
 def fleet_view(fleet: Fleet, figure: Drawn) -> View:
@@ -156,29 +152,25 @@ def fleet_figure(fleet: Fleet) -> Figure:
     """Draw each robot's intervals and the population, a panel a parameter."""
     intervals, robots = fleet.settings.space.intervals, fleet.robots
     figure, panels = style.panel_grid(len(intervals), 0.7 + 0.1 * max(4, len(robots)), 0.3, sharey=True)
-    for row, axes in enumerate(panels):
-        _draw(axes, fleet, row)
+    for box, axes in zip(intervals, panels, strict=True):
+        if box.name in fleet.mean:
+            mean, reach = fleet.mean[box.name].value, 2.0 * fleet.deviation[box.name].value
+            look: dict[str, Any] = {"color": style.GREEN, "alpha": 0.15, "linewidth": 0, "label": "fleet: mean ± 2 SD"}
+            axes.axvspan(mean - reach, mean + reach, **look)
+            axes.axvline(mean, color=style.GREEN, linewidth=1.0, linestyle="--")
+        for place, robot in enumerate(robots):
+            label = "own scores (95 %)" if robot.fits else "misfit, left out"
+            colour = style.LIGHT_GREY if robot.fits else style.VERMILLION
+            ends = robot.knowledge.intervals[box.name]
+            axes.plot(ends, [place, place], color=colour, linewidth=1.6, solid_capstyle="butt", label=label)
+            if robot.name in fleet.given:
+                given = fleet.given[robot.name][box.name].value
+                axes.plot(given, place, "o", color=style.BLUE, markersize=2.5, label="given the fleet")
+        axes.set_xlim(box.low, box.high)
+        axes.xaxis.set_major_locator(MaxNLocator(3))
+        style.dress(axes, with_unit(box.name, fleet.units[box.name]))
     names = [robot.name if len(robot.name) <= NAME else f"{robot.name[: NAME - 1]}…" for robot in robots]
     panels[0].set_ylim(len(robots) - 0.5, -0.5)
     panels[0].set_yticks(range(len(robots)), names) if len(robots) <= MOST_NAMED else panels[0].set_yticks([])
     style.legend_below(figure, *panels)
     return figure
-
-
-def _draw(axes: Axes, fleet: Fleet, row: int) -> None:
-    box = fleet.settings.space.intervals[row]
-    if box.name in fleet.mean:
-        mean, reach = fleet.mean[box.name].value, 2.0 * fleet.deviation[box.name].value
-        axes.axvspan(mean - reach, mean + reach, color=style.GREEN, alpha=0.15, linewidth=0, label="fleet: mean ± 2 SD")
-        axes.axvline(mean, color=style.GREEN, linewidth=1.0, linestyle="--")
-    for place, robot in enumerate(fleet.robots):
-        label = "own scores (95 %)" if robot.fits else "misfit, left out"
-        colour = style.LIGHT_GREY if robot.fits else style.VERMILLION
-        ends = robot.knowledge.intervals[box.name]
-        axes.plot(ends, [place, place], color=colour, linewidth=1.6, solid_capstyle="butt", label=label)
-        if robot.name in fleet.given:
-            given = fleet.given[robot.name][box.name].value
-            axes.plot(given, place, "o", color=style.BLUE, markersize=2.5, label="given the fleet")
-    axes.set_xlim(box.low, box.high)
-    axes.xaxis.set_major_locator(MaxNLocator(3))
-    style.dress(axes, with_unit(box.name, fleet.units[box.name]))

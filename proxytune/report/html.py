@@ -32,13 +32,7 @@ STYLE = fill("page.css")
 
 
 def write_page(path: Path, view: View, foot: Foot, renew_s: int = 0) -> None:
-    """Write a view as a page.
-
-    Args:
-        path: The file.
-        view: What is shown.
-        foot: How to come by it again.
-        renew_s: The page loads itself again so often while the work is under way [s]; 0 once it has ended.
+    """Write a view as a page, which loads itself again so often while the work is under way [s]; 0 once it has ended.
 
     Raises:
         RunError: If it cannot be written.
@@ -85,6 +79,18 @@ def page_html(view: View, foot: Foot, renew_s: int = 0) -> str:
     following = f'<p class="following"><strong>Next:</strong> {_text(view.next_step)}</p>\n'
     stated, parts = dict(foot.settings), _parts(view)
     about = [*(f"{name} {stated[name]}" for name in ABOUT if stated.get(name)), foot.date]
+    titles = (html.escape(one.title) for one in view.parts)
+    items = "".join(f'<li><a href="#part-{n}">{title}</a></li>' for n, title in enumerate(titles, start=1))
+    said = re.sub(r"<svg.*?</svg>|<[^>]*>", " ", parts + _text(view.sentence), flags=re.DOTALL)
+    used = [f"<dt>{word}</dt><dd>{means}</dd>" for word, means in WORDS.items() if re.search(rf"\b{word}", said)]
+    settings = Table("Settings", (Column(""), Column("")), foot.settings)
+    below = [_part(settings, "settings")] if foot.settings else []
+    if foot.command:
+        command = f"<pre><code>{html.escape(foot.command)}</code></pre>"
+        below.append(f'<section><h2 id="again">The command that makes this page</h2>{command}</section>')
+    below += [f'<section><h2 id="words">Words on this page</h2><dl>{"".join(used)}</dl></section>'] if used else []
+    versions = ", ".join(f"{name} {version}" for name, version in foot.versions)
+    written = [f"Written {foot.date}"] * bool(foot.date) + [f"with {versions}"] * bool(versions)
     return fill(
         "page.html.txt",
         title=html.escape(view.title),
@@ -94,15 +100,10 @@ def page_html(view: View, foot: Foot, renew_s: int = 0) -> str:
         under_way=f'<p class="under-way" role="status">{renews}</p>\n' if renew_s else "",
         answer=_text(view.sentence),
         following=following if view.next_step else "",
-        contents=_contents(view) if len(view.parts) > MANY else "",
+        contents=f'<nav aria-label="Contents"><ol>{items}</ol></nav>\n' if len(view.parts) > MANY else "",
         parts=parts,
-        foot=_foot(foot, _words(parts + _text(view.sentence))),
+        foot="\n".join([*below, f"<p>{html.escape(' '.join(written))}.</p>" if written else ""]),
     )
-
-
-def _contents(view: View) -> str:
-    items = (f'<li><a href="#part-{n}">{html.escape(one.title)}</a></li>' for n, one in enumerate(view.parts, start=1))
-    return f'<nav aria-label="Contents"><ol>{"".join(items)}</ol></nav>\n'
 
 
 def _parts(view: View) -> str:
@@ -128,7 +129,13 @@ def _picture(part: Picture, place: str) -> str:
     if b"<svg" in image[:1000]:
         drawing = _inline_svg(image.decode("utf-8"), place, alt)
     else:
-        source, width = _data_image(image)
+        kind = "png" if image.startswith(b"\x89PNG\r\n") else "gif" if image.startswith(b"GIF8") else ""
+        if not kind:
+            raise ValueError("the picture is no PNG, GIF or SVG")
+        source = f"data:image/{kind};base64,{base64.b64encode(image).decode('ascii')}"
+        with Image.open(BytesIO(image)) as opened:  # It is drawn so wide where there is room
+            dots = opened.info.get("dpi")
+            width = round(opened.width * ENLARGED / dots[0]) if dots and dots[0] else opened.width
         size = f' width="{width}" style="--wide:{width}px;min-width:{SMALLEST * width:.0f}px"' if width else ""
         drawing = f'<span class="card"><img alt="{alt}" src="{source}"{size}></span>'
     card = f'<div class="scroll" role="region" tabindex="0" aria-labelledby="{place}">{drawing}</div>'
@@ -151,18 +158,6 @@ def _inline_svg(svg: str, place: str, alt: str) -> str:
         f'{box[0]} style="--wide:{width:.0f}px;width:{width:.0f}px;min-width:{SMALLEST * width:.0f}px"' if box else ""
     )
     return f'<svg class="drawn" role="img" aria-label="{alt}" {size}>{rest}'
-
-
-def _data_image(image: bytes) -> tuple[str, int]:
-    """A picture as a data URI, and how wide it is drawn where there is room [pixel]; 0 as wide as it likes."""
-    data = base64.b64encode(image).decode("ascii")
-    kind = "png" if image.startswith(b"\x89PNG\r\n") else "gif" if image.startswith(b"GIF8") else ""
-    if not kind:
-        raise ValueError("the picture is no PNG, GIF or SVG")
-    with Image.open(BytesIO(image)) as opened:
-        dots = opened.info.get("dpi")
-        width = round(opened.width * ENLARGED / dots[0]) if dots and dots[0] else opened.width
-    return f"data:image/{kind};base64,{data}", width
 
 
 def _table(table: Table, label: str) -> str:
@@ -192,24 +187,6 @@ def _cell(text: str, column: Column) -> str:
 
 def _class(column: Column, length: int = 0) -> str:
     return ' class="prose"' if length > PROSE else ' class="number"' if column.numbers else ""
-
-
-def _foot(foot: Foot, words: str) -> str:
-    settings = Table("Settings", (Column(""), Column("")), foot.settings)
-    versions = ", ".join(f"{name} {version}" for name, version in foot.versions)
-    parts = [_part(settings, "settings")] if foot.settings else []
-    if foot.command:
-        command = f"<pre><code>{html.escape(foot.command)}</code></pre>"
-        parts.append(f'<section><h2 id="again">The command that makes this page</h2>{command}</section>')
-    written = [f"Written {foot.date}"] * bool(foot.date) + [f"with {versions}"] * bool(versions)
-    parts += [f'<section><h2 id="words">Words on this page</h2><dl>{words}</dl></section>'] if words else []
-    return "\n".join([*parts, f"<p>{html.escape(' '.join(written))}.</p>" if written else ""])
-
-
-def _words(page: str) -> str:
-    """The words of WORDS that a page uses, each with what it means."""
-    said = re.sub(r"<svg.*?</svg>|<[^>]*>", " ", page, flags=re.DOTALL)
-    return "".join(f"<dt>{word}</dt><dd>{means}</dd>" for word, means in WORDS.items() if re.search(rf"\b{word}", said))
 
 
 def _text(text: str) -> str:

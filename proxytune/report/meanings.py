@@ -43,12 +43,7 @@ def clause_of(name: str, said: str) -> str:
 
 
 def finding(effect: Mapping[str, Any], catalogue: Catalogue = SHIPPED) -> str:
-    """An effect that was added, as `diagnose --json` has it, in a clause with its size, and what it is worth.
-
-    Args:
-        effect: One of the document's effects.
-        catalogue: Which knows the effect.
-    """
+    """An effect that was added, as `diagnose --json` has it, in a clause with its size, and what it is worth."""
     name, known = str(effect["name"]), effect.get("parameters") or {}
     try:
         own = dict(zip((it.name for it in catalogue.effect(name).parameters), catalogue.theta_names(name), strict=True))
@@ -67,12 +62,7 @@ def findings(effects: Iterable[Mapping[str, Any]], catalogue: Catalogue = SHIPPE
 
 
 def fitted(names: Iterable[str], theta: Mapping[str, Estimate]) -> str:
-    """Values that were fitted of what was declared, as ", with trim 0.043 (0.042 to 0.044)"; empty where none was.
-
-    Args:
-        names: Parameters that were declared, by name in θ.
-        theta: What was fitted.
-    """
+    """Values that were fitted of what was declared, as ", with trim 0.043 (0.042 to 0.044)"; empty where none was."""
     known = [name for name in names if name in theta and not name.endswith(".imbalance")]
     said = [f"{plain(name).replace('.', ' ')} {_size(asdict(theta[name]))}" for name in known[:MOST_FITTED]]
     said += [f"{len(known) - MOST_FITTED} more"] * (len(known) > MOST_FITTED)

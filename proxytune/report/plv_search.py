@@ -121,11 +121,28 @@ def _tables(study: teaching.PlvStudy) -> tuple[Table, Table]:
 
 def plv_document(study: teaching.PlvStudy) -> dict[str, Any]:
     """A search by PLV as plain JSON; its keys are promises."""
+    experiment, best = study.confirmed, teaching.best_teacher(study.confirmed)
+    more = [teaching.saves_more(experiment, best.name, it.name) if best else None for it in experiment.teachers]
     return {
         "name": study.settings.name,
         "objective": "plv",
         "best": _trial_document(study.best),
-        "confirmed": {**_confirmed_document(study.confirmed), "cannot_teach": dict(study.unable)},
+        "confirmed": {
+            "best": best.name if best else None,
+            "settled": experiment.settled,
+            "finalists": {
+                one.name: {
+                    "theta": theta_document(one.proxy),
+                    "zero_shot": one.zero_shot.value,
+                    "plv": estimate_document(one.worth.plv if one.worth else None),
+                    "plv_cost": estimate_document(one.cost),
+                    "needed": estimate_document(one.worth.needed if one.worth else None),
+                    "best_saves_more": estimate_document(saved),
+                }
+                for one, saved in zip(experiment.teachers, more, strict=True)
+            },
+            "cannot_teach": dict(study.unable),
+        },
         "trials": [_trial_document(trial) for trial in study.trials],
         "searched": {interval.name: [interval.low, interval.high] for interval in study.space.intervals},
         "narrowed_by_prpv": study.narrowed,
@@ -142,28 +159,6 @@ def _trial_document(trial: teaching.PlvTrial) -> dict[str, Any]:
         "plv": estimate_document(trial.worth.plv),
         "needed": estimate_document(trial.worth.needed),
         "zero_shot": trial.zero_shot.value,
-    }
-
-
-def _confirmed_document(experiment: teaching.Experiment) -> dict[str, Any]:
-    """The finalists, taught anew: what each is worth, and how much the best saves more than each."""
-    best = teaching.best_teacher(experiment)
-    return {
-        "best": best.name if best else None,
-        "settled": experiment.settled,
-        "finalists": {
-            one.name: {
-                "theta": theta_document(one.proxy),
-                "zero_shot": one.zero_shot.value,
-                "plv": estimate_document(one.worth.plv if one.worth else None),
-                "plv_cost": estimate_document(one.cost),
-                "needed": estimate_document(one.worth.needed if one.worth else None),
-                "best_saves_more": estimate_document(teaching.saves_more(experiment, best.name, one.name))
-                if best
-                else None,
-            }
-            for one in experiment.teachers
-        },
     }
 
 

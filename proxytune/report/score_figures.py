@@ -35,7 +35,16 @@ def scatter_figure(assessment: Assessment) -> Figure:
     height = max(PANEL, LINE * min(MOST, len(agents)) + 0.6)
     figure, panels = style.grid_of(height * len(metrics), len(metrics), 1)
     for column, axes in enumerate(panels.flat):
-        _scatter_panel(axes, assessment.inputs, column)
+        proxy, target = (means[:, column] for means in assessment.inputs.means)
+        up, across = (_standard_errors(one)[:, column] for one in (assessment.inputs.proxy, assessment.inputs.target))
+        axes.errorbar(target, proxy, xerr=across, yerr=up, fmt="none", ecolor=style.GREY, lw=0.8, zorder=1)
+        axes.plot(target, proxy, "o", color=style.BLUE, markersize=4, zorder=2)
+        axes.margins(0.1)
+        limits = axes.axis()
+        axes.axline((0, 0), slope=1, color=style.GREY, linewidth=0.8, linestyle="--", zorder=0)
+        axes.axis(limits)
+        name = plain(metrics[column].name)
+        style.dress(axes, f"{name} on the target", f"{name} in the proxy")
         _name_points(axes, assessment.inputs, column, LINE / (height - 0.6))
         r = assessment.srcc.value[metrics[column].name]
         axes.set_title("SRCC undefined" if r is None else f"SRCC {r:.2f}".replace("-", "−"), fontsize=8)
@@ -56,40 +65,29 @@ def flipped_pairs_figure(prpv: Prpv) -> Figure:
         high, low = sorted((place[pair.better], place[pair.worse]))
         cells[low, high] = kinds.index(pair.flip)
     figure, axes = style.one_panel(style.COLUMN)
-    _draw_pairs(axes, cells, named=len(order) <= MOST)
-    _name_agents(axes, [short_name(agent) for agent in order])
+    colours, ends = ListedColormap(list(FLIP_COLOURS.values())), (-0.5, len(FLIP_COLOURS) - 0.5)
+    if len(order) <= MOST:
+        axes.pcolormesh(cells, cmap=colours, vmin=ends[0], vmax=ends[1], edgecolor="white", linewidth=0.8)
+        ticks, names = np.arange(len(order)) + 0.5, [short_name(agent) for agent in order]
+        axes.set_xticks(ticks[:-1], names[:-1], rotation=90, fontsize=7)
+        axes.set_yticks(ticks[1:], names[1:], fontsize=7)
+    else:  # Colours are mixed where squares are smaller than a pixel: none is lost.
+        axes.imshow(
+            cells, cmap=colours, vmin=ends[0], vmax=ends[1], extent=(0, len(cells), 0, len(cells)), origin="lower",
+            interpolation="antialiased", interpolation_stage="rgba",
+        )  # fmt: skip
+    axes.invert_yaxis()
+    axes.set_aspect("equal")
+    axes.tick_params(length=0, labelsize=7)
+    axes.spines[:].set_visible(False)
+    axes.set_xlabel("agent (best on the target first)", fontsize=8)
+    axes.set_ylabel("agent", fontsize=8)
     axes.set_title(f"PRPV {prpv.value} of at most {prpv.range[1]}", fontsize=8)
     counts = {kind: sum(pair.flip == kind for pair in prpv.pairs) for kind in FLIP_COLOURS}
     counts["same"] = len(order) * (len(order) - 1) // 2 - len(prpv.pairs)
     patches = [Patch(color=colour, label=f"{kind}: {counts[kind]}") for kind, colour in FLIP_COLOURS.items()]
     axes.legend(handles=patches, loc="upper right", fontsize=7, frameon=False)
     return figure
-
-
-def _draw_pairs(axes: Axes, cells: Floats, *, named: bool) -> None:
-    """Squares with gaps between them, or a picture where there are more than can be named."""
-    colours, ends = ListedColormap(list(FLIP_COLOURS.values())), (-0.5, len(FLIP_COLOURS) - 0.5)
-    if named:
-        axes.pcolormesh(cells, cmap=colours, vmin=ends[0], vmax=ends[1], edgecolor="white", linewidth=0.8)
-        return
-    # Colours are mixed where squares are smaller than a pixel: none is lost.
-    axes.imshow(
-        cells, cmap=colours, vmin=ends[0], vmax=ends[1], extent=(0, len(cells), 0, len(cells)), origin="lower",
-        interpolation="antialiased", interpolation_stage="rgba",
-    )  # fmt: skip
-
-
-def _scatter_panel(axes: Axes, inputs: Comparison, column: int) -> None:
-    proxy, target = (means[:, column] for means in inputs.means)
-    errors = (_standard_errors(inputs.target)[:, column], _standard_errors(inputs.proxy)[:, column])
-    axes.errorbar(target, proxy, xerr=errors[0], yerr=errors[1], fmt="none", ecolor=style.GREY, lw=0.8, zorder=1)
-    axes.plot(target, proxy, "o", color=style.BLUE, markersize=4, zorder=2)
-    axes.margins(0.1)
-    limits = axes.axis()
-    axes.axline((0, 0), slope=1, color=style.GREY, linewidth=0.8, linestyle="--", zorder=0)
-    axes.axis(limits)
-    name = plain(inputs.metrics[column].name)
-    style.dress(axes, f"{name} on the target", f"{name} in the proxy")
 
 
 def _standard_errors(table: ScoreTable) -> Floats:
@@ -120,17 +118,3 @@ def _name_points(axes: Axes, inputs: Comparison, column: int, apart: float) -> N
 def short_name(agent: str) -> str:
     """An agent's name, of a long one its end."""
     return agent if len(agent) <= LONGEST else f"…{agent[1 - LONGEST :]}"
-
-
-def _name_agents(axes: Axes, order: list[str]) -> None:
-    """Names beside the pairs, or ranks on the target where they are too many."""
-    if len(order) <= MOST:
-        ticks = np.arange(len(order)) + 0.5
-        axes.set_xticks(ticks[:-1], order[:-1], rotation=90, fontsize=7)
-        axes.set_yticks(ticks[1:], order[1:], fontsize=7)
-    axes.invert_yaxis()
-    axes.set_aspect("equal")
-    axes.tick_params(length=0, labelsize=7)
-    axes.spines[:].set_visible(False)
-    axes.set_xlabel("agent (best on the target first)", fontsize=8)
-    axes.set_ylabel("agent", fontsize=8)

@@ -72,14 +72,7 @@ def score_next_step(assessments: Assessments, selection: Selection | None) -> st
 def score_text(
     assessments: Assessments, selection: Selection | None, left_out: Sequence[str] = (), *, target: str
 ) -> Group:
-    """The scores as `score` prints them: the sentence, every measure of one proxy or several ranked, and notes.
-
-    Args:
-        assessments: Of each proxy, by name.
-        selection: The proxies ranked; None where there is one.
-        left_out: Notes on agents that were left out.
-        target: Name of the target.
-    """
+    """The scores as `score` prints them: the sentence, every measure of one proxy or several ranked, and notes."""
     notes = _remarks(assessments, "note")
     if selection is None:
         ((_, assessment),) = assessments.items()
@@ -112,14 +105,7 @@ def _remarks(assessments: Assessments, note: str = "") -> list[str]:
 def score_view(
     assessments: Assessments, selection: Selection | None, figures: Sequence[Picture] = (), *, target: str
 ) -> View:
-    """One proxy, or several ranked.
-
-    Args:
-        assessments: Of each proxy, by name.
-        selection: The proxies ranked; None where there is one.
-        figures: What was drawn; all figures are, where none is given.
-        target: Name of the target.
-    """
+    """One proxy, or several ranked, with what was drawn; all figures are, where none is given."""
     figures = figures or [picture for *_, picture in _all_drawn(assessments, selection)]
     tables = _tables(assessments, selection, target)
     said = score_sentence(assessments, selection, target=target), score_next_step(assessments, selection)
@@ -170,9 +156,22 @@ def _tables(assessments: Assessments, selection: Selection | None, target: str) 
     beside = [row for measure in BESIDE_PRPV for row in _rows(measure, assessment)]
     columns = (*columns_of(("measure",), ("value", "95 % interval")), *columns_of(("better", "what it says")))
     title = f"{proxy} as a proxy of {target}: {_sizes(assessment)}"
+    prpv, inner = assessment.prpv, assessment.prpv_interval
+    noise, random = assessment.noise_floor, assessment.chance
+    flips = [f"{sum(pair.flip == flip for pair in prpv.pairs)} {flip}" for flip in ("reversed", "lost", "invented")]
+    better, span = PRPV.better, short_span(inner.low, inner.high)
+    by_chance = f"as low by chance: p = {random.p_value:.2g}"
+    rows: list[Row] = [
+        (PRPV.name, str(prpv.value), span, better, f"{PRPV.meaning} to {prpv.range[1]}"),
+        ("  normalised", _number(prpv.normalised), "", better, "0 to 1"),
+        ("  flipped pairs", str(len(prpv.pairs)), "", better, ", ".join(flips)),
+        ("  expected", _number(inner.expected), "", better, "mean over resampled episodes"),
+        (f"  {noise.title}", _number(noise.value), short_span(noise.low, noise.high), "", noise.meaning),
+        ("  chance", _number(random.mean), f"± {random.deviation:.3g}", "", by_chance),
+    ]
     return [
         decision.decision_table(assessment, target),
-        Table(title, columns, (*_prpv_rows(assessment), *beside), notes),
+        Table(title, columns, (*rows, *beside), notes),
         *map(_rates, assessment.success_rates),
     ]
 
@@ -207,27 +206,11 @@ def _ranking(assessments: Assessments, selection: Selection, target: str, notes:
 
 def _sizes(assessment: Assessment) -> str:
     inputs = assessment.inputs
-    sides = (("proxy", inputs.proxy_episodes), ("target", inputs.target_episodes))
     counts = [
         f"{low if low == high else f'{low} to {high}'} {side} episode{'' if high == 1 else 's'}"
-        for side, (low, high) in sides
+        for side, (low, high) in zip(("proxy", "target"), inputs.episodes, strict=True)
     ]
     return f"{len(inputs.agents)} agents, {counts[0]} and {counts[1]} each"
-
-
-def _prpv_rows(assessment: Assessment) -> list[Row]:
-    prpv, inner, noise = assessment.prpv, assessment.prpv_interval, assessment.noise_floor
-    flips = [f"{sum(pair.flip == flip for pair in prpv.pairs)} {flip}" for flip in ("reversed", "lost", "invented")]
-    random, better, span = assessment.chance, PRPV.better, short_span(inner.low, inner.high)
-    by_chance = f"as low by chance: p = {random.p_value:.2g}"
-    return [
-        (PRPV.name, str(prpv.value), span, better, f"{PRPV.meaning} to {prpv.range[1]}"),
-        ("  normalised", _number(prpv.normalised), "", better, "0 to 1"),
-        ("  flipped pairs", str(len(prpv.pairs)), "", better, ", ".join(flips)),
-        ("  expected", _number(inner.expected), "", better, "mean over resampled episodes"),
-        (f"  {noise.title}", _number(noise.value), short_span(noise.low, noise.high), "", noise.meaning),
-        ("  chance", _number(random.mean), f"± {random.deviation:.3g}", "", by_chance),
-    ]
 
 
 def _rows(measure: Measure, assessment: Assessment) -> list[Row]:
@@ -298,8 +281,8 @@ def score_document(assessment: Assessment) -> dict[str, Any]:
         "agents": list(inputs.agents),
         "metrics": [str(metric) for metric in inputs.metrics],
         "episodes": {
-            "proxy": list(inputs.proxy_episodes),
-            "target": list(inputs.target_episodes),
+            "proxy": list(inputs.episodes[0]),
+            "target": list(inputs.episodes[1]),
             "paired": inputs.paired,
             "resamples": inner.resamples,
         },

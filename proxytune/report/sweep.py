@@ -26,7 +26,7 @@ from proxytune.report.writing import picture_of, write_text
 from proxytune.space import Theta
 from proxytune.study import StudySettings
 from proxytune.sweep import METRICS, OUTWARDS, Series, SweepCurve, SweepPoint, describe_shape, series_of, shape_of
-from proxytune.usefulness import MEASURES, POD_IMAGE, POD_POSE, PPV, PRPV, SRCC, Assessment, Measure
+from proxytune.usefulness import MEASURES, POD_IMAGE, POD_POSE, PPV, PRPV, SRCC, Assessment
 
 OF_PRPV = ("prpv", "prpv_interval", "prpv_normalised", "expected_prpv")
 KEYS = (*OF_PRPV, *(one.key for one in MEASURES if one is not PRPV), "intervals", "chance", "at_noise_floor")
@@ -89,14 +89,7 @@ def curve_csv(curve: SweepCurve) -> str:
 
 
 def sweep_text(curves: Sequence[SweepCurve], episodes: int, files: Sequence[Path], held: str) -> Group:
-    """Curves as `sweep` prints them: the paper's measures, then the others, and what each shows.
-
-    Args:
-        curves: What was swept.
-        episodes: How many episodes were run for it.
-        files: What was written.
-        held: What the other parameters are held at, in words.
-    """
+    """Curves as `sweep` prints them: the paper's measures, the others, what each shows; episodes run, files written."""
     parts: list[RenderableType] = []
     for curve in curves:
         title = " ".join([curve.parameter, *held_texts(curve)])
@@ -120,14 +113,8 @@ def curve_tables(curve: SweepCurve) -> tuple[Table, Table]:
     heads = [[one.name.replace(" ", "\n").replace("_", "\n") for one in own] for own in sides]
     columns = [columns_of((), (curve.label, *own)) for own in heads]
     first, second = (f"Along {curve.parameter}: {kind} measures" for kind in ("the paper's", "other"))
-    lines = tuple(curve_lines(curve))
+    lines = tuple(f"{curve.parameter}: {describe_shape(one, curve.base.get(curve.parameter))}" for one in series)
     return Table(first, columns[0], tuple(rows[0]), lines), Table(second, columns[1], tuple(rows[1]))
-
-
-def curve_lines(curve: SweepCurve) -> list[str]:
-    """Say what the curve shows, a line per measure: where it is best, and whether it worsens on both sides."""
-    held_at = curve.base.get(curve.parameter)
-    return [f"{curve.parameter}: {describe_shape(series, held_at)}" for series in series_of(curve)]
 
 
 def shapes_note(curve: SweepCurve) -> str:
@@ -183,14 +170,7 @@ def _cell(series: Series, row: int) -> str:
 
 
 def sweep_view(study: str, curves: Sequence[SweepCurve], figures: Mapping[str, Drawn], held: str) -> View:
-    """Curves: the figures of all, then of each its figure and tables.
-
-    Args:
-        study: The study's name.
-        curves: What was swept, at least one.
-        figures: By name.
-        held: What the other parameters are held at, in a sentence.
-    """
+    """One curve or more: the figures of all, then of each its figure and tables; `held` is a sentence on the others."""
     own = {curve_name(curve): curve for curve in curves}
     parts: list[Part] = [
         picture_of("sweep", "bars" if name.startswith("sweep_bars") else "all", image)
@@ -206,7 +186,11 @@ def sweep_view(study: str, curves: Sequence[SweepCurve], figures: Mapping[str, D
     parts += [Paragraphs("What failed", tuple(wrong))] if wrong else []
     names, answer = listed([curve.parameter for curve in curves]), " ".join(f"{_lowest(curve)}." for curve in curves)
     title = f"{study}: how does usefulness depend on {names}?"
-    return View(title, f"{answer} {held}.", _next_step(curves), tuple(parts))
+    step = "search all parameters at once with `python -m proxytune study`."
+    flat = [one.parameter for one in curves if len(shape_of(series_of(one)[0], None).near_best) == len(one.points)]
+    if flat:
+        step = f"raise starts, or add agents whose scores change with {' or '.join(flat)}: noise hides a difference."
+    return View(title, f"{answer} {held}.", step, tuple(parts))
 
 
 def _lowest(curve: SweepCurve) -> str:
@@ -219,13 +203,6 @@ def _lowest(curve: SweepCurve) -> str:
     worse = points - len(shape.near_best)
     beyond = f"worse beyond noise at {worse} of {points} values" if worse else "at no other value worse beyond noise"
     return f"{curve.parameter}: {prpv.name} is lowest ({shape.score:.3g}) at {best}, and {beyond}"
-
-
-def _next_step(curves: Sequence[SweepCurve]) -> str:
-    flat = [one.parameter for one in curves if len(shape_of(series_of(one)[0], None).near_best) == len(one.points)]
-    if flat:
-        return f"raise starts, or add agents whose scores change with {' or '.join(flat)}: noise hides a difference."
-    return "search all parameters at once with `python -m proxytune study`."
 
 
 def figures_of_sweep(curves: Sequence[SweepCurve], truth: Theta | None) -> dict[str, Figure]:
@@ -257,16 +234,7 @@ def write_sweep_page(
     held: str,
     command: str,
 ) -> Path:
-    """Write the page of curves that hold the same values beside their figures; return its path.
-
-    Args:
-        settings: The study's.
-        curves: At least one.
-        figures: Theirs, by name, as `figures_of_sweep` has them; others may be among them.
-        folder: Where the page goes.
-        held: What the other parameters are held at, in words.
-        command: The command that makes the page, as typed in a shell.
-    """
+    """Write the page of curves that hold the same values beside their figures, of `figures_of_sweep`; its path."""
     names = [*_names_together(curves), *map(curve_name, curves)]
     drawn = {name: figures[name] for name in names}
     view = sweep_view(settings.name, curves, drawn, f"{held[0].upper()}{held[1:]}")
@@ -316,12 +284,12 @@ def sweep_figure(curves: Sequence[SweepCurve], truth: Theta | None = None) -> Fi
     for curve, row in zip(curves, panels, strict=True):
         draw_prpv_and_ppv(row[0], row[1], curve)
         for axes in row:
-            axes.set_xlabel(label_of(curve), fontsize=8)
+            axes.set_xlabel(plain(curve.label), fontsize=8)
             mark_values(axes, curve, truth)
     # Only now: a limit set earlier would hide what later rows of the shared axis hold.
     for axes, measure in zip(panels[0], (PRPV, PPV), strict=True):
         axes.set_ylim(bottom=-0.03 * axes.get_ylim()[1])
-        axes.set_title(axis_of(measure), fontsize=8)
+        axes.set_title(with_unit(measure.name, measure.unit), fontsize=8)
     style.legend_below(figure, *panels.ravel(), without=["PRPV"])
     return figure
 
@@ -341,15 +309,20 @@ def panels_figure(curve: SweepCurve, truth: Theta | None = None) -> Figure:
         draw_series(srcc, one, colour, marker, f"SRCC, {one.metric.replace('_', ' ')}")
     for axes, measure in zip(pod, POD_NAMES, strict=False):
         draw_series(axes, next(one for one in series if one.measure is measure), style.BLUE, "o", POD_NAMES[measure])
-    for axes, name in zip((prpv, ppv, srcc, *pod), (PRPV, PPV, SRCC, *POD_NAMES), strict=False):
-        axes.set_title(POD_NAMES.get(name) or axis_of(name), fontsize=8)
+    for axes, measure in zip((prpv, ppv, srcc, *pod), (PRPV, PPV, SRCC, *POD_NAMES), strict=False):
+        axes.set_title(POD_NAMES.get(measure) or with_unit(measure.name, measure.unit), fontsize=8)
         mark_values(axes, curve, truth)
         axes.set_xlim(prpv.get_xlim())
         axes.xaxis.set_major_locator(MaxNLocator(4))
     for axes in (prpv, ppv, *pod):
         axes.set_ylim(bottom=min(0.0, -0.03 * axes.get_ylim()[1]))
-    figure.supxlabel(label_of(curve), fontsize=8)
-    explain(key, prpv, srcc)
+    figure.supxlabel(plain(curve.label), fontsize=8)
+    # The empty panel has the key of the others; the measure itself is left to its axis.
+    key.set_axis_off()
+    named = style.named_handles((prpv, srcc))
+    named.pop("PRPV", None)
+    names = [fill(name, WIDEST) for name in named]
+    key.legend(list(named.values()), names, loc="center", fontsize=7, frameon=False)
     return figure
 
 
@@ -375,8 +348,17 @@ def bars_figure(curves: Sequence[SweepCurve]) -> Figure:
         chosen = [curve.points[index] for index in indices]
         spots = [place * APART + offset for offset in range(len(chosen))]
         ticks += [(spot, short(point.value)) for spot, point in zip(spots, chosen, strict=True)]
-        _draw_bars(axes, spots, chosen, curve.points[held])
-        name = fill(label_of(curve), max(5, CHARACTERS // len(curves)))
+        for spot, point in zip(spots, chosen, strict=True):
+            if point.assessment is None:
+                axes.annotate("failed", (spot, 0), rotation=90, ha="center", va="bottom", fontsize=7)
+                continue
+            inner, score = point.assessment.prpv_interval, point.assessment.prpv.value
+            colour, label = (style.BLUE, HELD) if point is curve.points[held] else (style.LIGHT_BLUE, BESIDE)
+            axes.bar(spot, score, width=0.85, color=colour, label=label)
+            if inner.low is not None and inner.high is not None:
+                ends = [[score - inner.low], [inner.high - score]]
+                axes.errorbar([spot], [score], yerr=ends, fmt="none", ecolor="0.2", lw=1.0, capsize=2, label=INTERVAL)
+        name = fill(plain(curve.label), max(5, CHARACTERS // len(curves)))
         axes.text(
             (spots[0] + spots[-1]) / 2, 1.02, name, transform=axes.get_xaxis_transform(),
             ha="center", va="bottom", fontsize=7,
@@ -385,7 +367,7 @@ def bars_figure(curves: Sequence[SweepCurve]) -> Figure:
     if found:
         draw_levels(axes, found)
         style.legend_below(figure, axes)
-    style.dress(axes, up=axis_of(PRPV))
+    style.dress(axes, up=with_unit(PRPV.name, PRPV.unit))
     axes.set_xticks([spot for spot, _ in ticks], [text for _, text in ticks], rotation=90)
     return figure
 
@@ -405,19 +387,6 @@ def bar_points(curve: SweepCurve) -> tuple[list[int], int]:
         for indices, goal in ((below, wanted[0]), (above, wanted[1]))
     ]
     return [*sides[0], middle, *sides[1]], middle
-
-
-def _draw_bars(axes: Axes, spots: Sequence[float], chosen: Sequence[SweepPoint], held: SweepPoint) -> None:
-    for spot, point in zip(spots, chosen, strict=True):
-        if point.assessment is None:
-            axes.annotate("failed", (spot, 0), rotation=90, ha="center", va="bottom", fontsize=7)
-            continue
-        inner, score = point.assessment.prpv_interval, point.assessment.prpv.value
-        colour, label = (style.BLUE, HELD) if point is held else (style.LIGHT_BLUE, BESIDE)
-        axes.bar(spot, score, width=0.85, color=colour, label=label)
-        if inner.low is not None and inner.high is not None:
-            ends = [[score - inner.low], [inner.high - score]]
-            axes.errorbar([spot], [score], yerr=ends, fmt="none", ecolor="0.2", lw=1.0, capsize=2, label=INTERVAL)
 
 
 HELD, INTERVAL = "held value", "95 % interval"
@@ -459,22 +428,3 @@ def mark_values(axes: Axes, curve: SweepCurve, truth: Theta | None) -> None:
     if truth is not None and curve.parameter in truth:
         style.mark_truth(axes, truth[curve.parameter])
     style.dress(axes)
-
-
-def explain(axes: Axes, *panels: Axes) -> None:
-    """Fill an empty panel with the key of others: each name once, the measure itself left to its axis."""
-    axes.set_axis_off()
-    named = style.named_handles(panels)
-    named.pop("PRPV", None)
-    names = [fill(name, WIDEST) for name in named]
-    axes.legend(list(named.values()), names, loc="center", fontsize=7, frameon=False)
-
-
-def axis_of(measure: Measure) -> str:
-    """Name of a measure on an axis."""
-    return with_unit(measure.name, measure.unit)
-
-
-def label_of(curve: SweepCurve) -> str:
-    """Name of a curve's parameter on an axis."""
-    return curve.label.replace("_", " ")

@@ -5,7 +5,6 @@ from dataclasses import asdict, astuple, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from rich.console import Group
 
@@ -37,6 +36,9 @@ PUBLISHED = tuple(
     head for name in ("zero-shot score", "samples needed", "reduction") for head in (f"{name}, published", "here")
 )
 SEARCH = '`study` with objective = "plv" looks for'
+LESSONS = ("rehearsal", "proxy_lessons", "target_lessons")
+PLAIN = ("learner", "proxy_samples", "seeds", "lesson_s", "level", "tolerance", "examinations", *LESSONS)
+"""Settings that JSON has as they are."""
 
 
 def teach_answer(experiment: teaching.Experiment) -> str:
@@ -87,13 +89,7 @@ def say_more(experiment: teaching.Experiment) -> str:
 
 
 def teach_text(experiment: teaching.Experiment, prpv: Predictivities, files: Mapping[str, Any]) -> Group:
-    """The result of a learning experiment as `teach` prints it.
-
-    Args:
-        experiment: What was taught.
-        prpv: How well each proxy predicts.
-        files: What was written.
-    """
+    """The result of a learning experiment as `teach` prints it, with how well each proxy predicts."""
     table = teach_table(experiment, prpv)
     observations = observation_lines(teaching.observe(experiment, prpv), experiment)
     sentence = f"{teach_answer(experiment)}\n"
@@ -113,8 +109,16 @@ def teach_table(experiment: teaching.Experiment, prpv: Predictivities) -> Table:
         saved = [_with_ends(one.cost, UNKNOWN, short) if one.cost else "" for one in experiment.teachers]
         rows = [(*row, cost) for row, cost in zip(rows, ("", *saved), strict=True)]
         heads, notes = (*HEADS, COST), [PLV_MEANING, COST_MEANING.format(*astuple(costs))]
+    notes.append(CONVERGED.format(f"{experiment.when.threshold:.1f} of {experiment.best_score:g}"))
+    if unknown := teaching.why_unknown(experiment.needs):
+        notes.append(f"{unknown.reason}, so PLV is not known; {unknown.remedy}")
+    for lesson in experiment.teachers:
+        factor = lesson.worth.factor if lesson.worth else None
+        if factor is not None and factor.value is not None:
+            text = _with_ends(replace(factor, low=factor.low or 0.0), "", "{:.2g}".format)
+            notes.append(f"{lesson.name}: samples needed without the proxy / with it = {text}")
     title = "PLV of each proxy (the paper's table 1)"
-    return Table(title, columns_of(("proxy",), heads), tuple(rows), (*notes, *_convergence_notes(experiment)))
+    return Table(title, columns_of(("proxy",), heads), tuple(rows), tuple(notes))
 
 
 def _row(lesson: teaching.TeacherResult, prpv: teaching.Predictivity | None) -> tuple[str, ...]:
@@ -124,21 +128,6 @@ def _row(lesson: teaching.TeacherResult, prpv: teaching.Predictivity | None) -> 
         return (lesson.name, predicts, zero_shot, "", "", "")
     reduction = "" if worth.reduction.value is None else percent(worth.reduction.value)
     return (lesson.name, predicts, zero_shot, count(worth.needed), count(worth.plv, UNKNOWN), reduction)
-
-
-def _convergence_notes(experiment: teaching.Experiment) -> list[str]:
-    """Notes on what counts as converged, and by what each proxy divides the samples."""
-    notes = [CONVERGED.format(f"{experiment.when.threshold:.1f} of {experiment.best_score:g}")]
-    if unknown := teaching.why_unknown(experiment.needs):
-        notes.append(f"{unknown.reason}, so PLV is not known; {unknown.remedy}")
-    for lesson in experiment.teachers:
-        factor = lesson.worth.factor if lesson.worth else None
-        if factor is not None and factor.value is not None:
-            low, high = factor.low or 0.0, factor.high
-            ends = f"{low:.2g} or more" if high is None else f"{low:.2g} to {high:.2g}"
-            text = f"{factor.value:.2g} ({ends})"
-            notes.append(f"{lesson.name}: samples needed without the proxy / with it = {text}")
-    return notes
 
 
 def count(figure: LearningEstimate, missing: str = NOT_REACHED) -> str:
@@ -165,26 +154,21 @@ def observation_lines(found: teaching.Observations | None, experiment: teaching.
     """Both observations, each with its evidence; none where PLV is unknown, and the first of several proxies only."""
     if found is None:
         return ()
-    starts = {one.name: f"{one.zero_shot.value:.1f}" for one in experiment.teachers if one.zero_shot.value is not None}
-    first = [f"{FIRST}: {_first(found.zero_shot, starts)}."] if found.zero_shot else []
-    return (*first, f"{SECOND}: {_second(found)}.")
-
-
-def _first(found: teaching.RankAgreement, starts: Mapping[str, str]) -> str:
-    pairs = [
-        f"{ahead} saves more than {behind} though it starts lower ({starts[ahead]} for {starts[behind]})"
-        for ahead, behind in found.reversed
-    ]
-    shown = f"shown here, since {listed(pairs)}" if pairs else "no pair of these proxies shows it"
-    return f"{shown}; {_tau(found, 'zero-shot score')}"
-
-
-def _second(found: teaching.Observations) -> str:
+    lines = []
+    if found.zero_shot:
+        starts = {one.name: one.zero_shot.value or 0.0 for one in experiment.teachers}
+        pairs = [
+            f"{ahead} saves more than {behind} though it starts lower ({starts[ahead]:.1f} for {starts[behind]:.1f})"
+            for ahead, behind in found.zero_shot.reversed
+        ]
+        shown = f"shown here, since {listed(pairs)}" if pairs else "no pair of these proxies shows it"
+        lines.append(f"{FIRST}: {shown}; {_tau(found.zero_shot, 'zero-shot score')}.")
     poor, shown = list(found.poor_predictors), "none of these proxies shows it"
     if poor:
         save = f"{listed(poor)} {'saves' if len(poor) == 1 else 'save'} samples"
         shown = f"shown here, since {save} though a random ranking would predict as well"
-    return shown if found.prpv is None else f"{shown}; {_tau(found.prpv, 'PRPV')}"
+    shown += f"; {_tau(found.prpv, 'PRPV')}" if found.prpv else ""
+    return (*lines, f"{SECOND}: {shown}.")
 
 
 def _tau(found: teaching.RankAgreement, figure: str) -> str:
@@ -228,7 +212,7 @@ def _published(experiment: teaching.Experiment, rows: Sequence[tuple[str, ...]])
 
 def teach_document(experiment: teaching.Experiment, prpv: Predictivities) -> dict[str, Any]:
     """A learning experiment as plain JSON; None where a figure is undefined or was not reached."""
-    found = teaching.observe(experiment, prpv)
+    found, taught = teaching.observe(experiment, prpv), teaching.teaching_settings(experiment.settings)
     return {
         "name": experiment.settings.name,
         "best_score": experiment.best_score,
@@ -245,7 +229,17 @@ def teach_document(experiment: teaching.Experiment, prpv: Predictivities) -> dic
             "prpv": _agreement_document(found.prpv if found else None),
         },
         "saves_though_it_predicts_by_chance": list(found.poor_predictors) if found else [],
-        "settings": {**settings_document(experiment.settings), "teaching": _settings_document(experiment)},
+        "settings": {
+            **settings_document(experiment.settings),
+            "teaching": {
+                "target": str(taught.target),
+                "target_samples": list(taught.target_samples),
+                **{name: getattr(taught, name) for name in PLAIN},
+                "costs": asdict(taught.costs),
+                "published": {name: asdict(row) for name, row in taught.published.items()},
+                "published_in": taught.published_in,
+            },
+        },
     }
 
 
@@ -283,20 +277,6 @@ def _curve_document(curve: LearningCurve) -> dict[str, Any]:
     return {"target_samples": list(curve.counts), "scores": scores, "examinations": len(curve.examined)}
 
 
-def _settings_document(experiment: teaching.Experiment) -> dict[str, Any]:
-    taught = teaching.teaching_settings(experiment.settings)
-    names = ("learner", "proxy_samples", "seeds", "lesson_s", "level", "tolerance", "examinations")
-    lessons = ("rehearsal", "proxy_lessons", "target_lessons")
-    return {
-        "target": str(taught.target),
-        "target_samples": list(taught.target_samples),
-        **{name: getattr(taught, name) for name in (*names, *lessons)},
-        "costs": asdict(taught.costs),
-        "published": {name: asdict(row) for name, row in taught.published.items()},
-        "published_in": taught.published_in,
-    }
-
-
 class _Look(NamedTuple):
     label: str
     colour: str
@@ -312,10 +292,30 @@ def teach_figure(experiment: teaching.Experiment) -> Figure:
 
     Above the dotted line a learner counts as converged; the bar on it says how many samples that takes.
     """
-    lessons = experiment.teachers
+    lessons, grid = experiment.teachers, teaching.teaching_settings(experiment.settings).target_samples
+    shown = [grid[place] for place in sorted({0, 1, (len(grid) + 1) // 2, len(grid) - 1})]
     figure, panels = style.panel_grid(len(lessons), 1.25, 0.6, sharex=True, sharey=True)
     for axes, lesson in zip(panels, lessons, strict=True):
-        _draw_panel(axes, experiment, lesson)
+        for name, look, height in ((NONE, WITHOUT, -1.2), (lesson.name, WITH, 1.2)):
+            draws, curve = experiment.needs.draws, experiment.needs.curves[name]
+            at, scores, examined = _places(experiment, draws.counts), draws.scores[name], curve.examined
+            low, high = np.quantile(scores, LEVELS, axis=0)
+            axes.fill_between(at, low, high, color=look.colour, alpha=0.18, linewidth=0)
+            axes.plot(at, scores.mean(axis=0), look.style, color=look.colour, linewidth=1.2, label=look.label)
+            seen = _places(experiment, np.array(curve.counts, dtype=float))[examined[:, 1]]
+            marks = curve.scores[tuple(examined.T)]
+            axes.plot(seen, marks, look.mark, color=look.colour, markersize=2, alpha=0.35)
+            if lesson.worth is not None:
+                needed = lesson.worth.without if name == NONE else lesson.worth.needed
+                if needed.low is not None:
+                    # The interval of the samples needed, off the line of convergence so that two bars stay apart
+                    ends = np.array([needed.low, experiment.needs.last if needed.high is None else needed.high])
+                    level, places = experiment.when.threshold + height, _places(experiment, ends)
+                    axes.hlines(level, *places, color=look.colour, linewidth=2.5)
+        axes.axhline(experiment.when.threshold, color="0.3", linewidth=0.8, linestyle=":", label="converged")
+        axes.set_xticks(_places(experiment, np.array(shown, dtype=float)), [f"{count:g}" for count in shown])
+        axes.set_title(lesson.name, fontsize=8)
+        style.dress(axes)
     for axes in panels[-2:]:
         # Also where the panel below, which would have them, is empty.
         axes.tick_params(labelbottom=True)
@@ -326,35 +326,6 @@ def teach_figure(experiment: teaching.Experiment) -> Figure:
     return figure
 
 
-def _draw_panel(axes: Axes, experiment: teaching.Experiment, lesson: teaching.TeacherResult) -> None:
-    for name, look, height in ((NONE, WITHOUT, -1.2), (lesson.name, WITH, 1.2)):
-        _draw_curve(axes, experiment, name, look)
-        if lesson.worth is not None:
-            needed = lesson.worth.without if name == NONE else lesson.worth.needed
-            if needed.low is not None:
-                # The interval of the samples needed, off the line of convergence so that two bars stay apart
-                ends = np.array([needed.low, experiment.needs.last if needed.high is None else needed.high])
-                level, places = experiment.when.threshold + height, _places(experiment, ends)
-                axes.hlines(level, *places, color=look.colour, linewidth=2.5)
-    axes.axhline(experiment.when.threshold, color="0.3", linewidth=0.8, linestyle=":", label="converged")
-    grid = teaching.teaching_settings(experiment.settings).target_samples
-    shown = [grid[place] for place in sorted({0, 1, (len(grid) + 1) // 2, len(grid) - 1})]
-    axes.set_xticks(_places(experiment, np.array(shown, dtype=float)), [f"{count:g}" for count in shown])
-    axes.set_title(lesson.name, fontsize=8)
-    style.dress(axes)
-
-
 def _places(experiment: teaching.Experiment, counts: Floats) -> Floats:
     """Places of counts on the axis: as doublings, none at 0."""
     return doublings(counts, experiment.needs.draws.first)
-
-
-def _draw_curve(axes: Axes, experiment: teaching.Experiment, name: str, look: _Look) -> None:
-    draws, curve = experiment.needs.draws, experiment.needs.curves[name]
-    at, scores = _places(experiment, draws.counts), draws.scores[name]
-    low, high = np.quantile(scores, LEVELS, axis=0)
-    axes.fill_between(at, low, high, color=look.colour, alpha=0.18, linewidth=0)
-    axes.plot(at, scores.mean(axis=0), look.style, color=look.colour, linewidth=1.2, label=look.label)
-    examined = curve.examined
-    places_ = _places(experiment, np.array(curve.counts, dtype=float))[examined[:, 1]]
-    axes.plot(places_, curve.scores[tuple(examined.T)], look.mark, color=look.colour, markersize=2, alpha=0.35)

@@ -22,11 +22,7 @@ GAP = 2
 
 @dataclass(frozen=True)
 class WholeWords:
-    """A table in which names, paths and topics stay whole, to be typed; it is wider than the terminal if it has to be.
-
-    Attributes:
-        table: The table; its cells are broken at blanks alone.
-    """
+    """A table broken at blanks alone: names and paths stay whole, to be typed, wider than the terminal if need be."""
 
     table: TerminalTable
 
@@ -49,12 +45,7 @@ class WholeWords:
 
 
 def table_text(table: Table, *, ragged: bool = False) -> WholeWords:
-    """A table without lines below its title; no word in it is broken, none is shortened.
-
-    Args:
-        table: The table; its notes are left out.
-        ragged: Whether numbers begin together, as texts do, instead of ending together.
-    """
+    """A table without lines and notes below its title, no word broken; ragged numbers begin together, as texts do."""
     names = [one.name for one in table.columns]
     look: dict[str, Any] = {"title_justify": "left", "title_style": "bold", "box": None, "pad_edge": False}
     shown = TerminalTable(title=escape(table.title) if table.title else None, show_header=any(names), **look)
@@ -85,11 +76,7 @@ def file_texts(files: Mapping[str, Any]) -> list[Text]:
 
 
 def group_texts(*parts: RenderableType) -> Group:
-    """Parts below each other.
-
-    Args:
-        parts: Tables and texts; a text is shown as it is, without markup.
-    """
+    """Tables and texts below each other; a text is shown as it is, without markup."""
     return Group(*(Text(part) if isinstance(part, str) else part for part in parts))
 
 

@@ -22,12 +22,7 @@ PACKAGES = ("proxytune", "numpy", "scipy", "pybullet")
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table.
-
-    Attributes:
-        name: Its head, with the unit; a line break is where the terminal breaks it.
-        numbers: Whether its cells are numbers, with or without intervals and units; else they are texts.
-    """
+    """A column by its head, which a terminal breaks where it has a line break, of texts or numbers with their units."""
 
     name: str
     numbers: bool = False
@@ -35,13 +30,9 @@ class Column:
 
 @dataclass(frozen=True)
 class Table:
-    """A table.
+    """A table as people read it, with a heading and sentences below; without a head its columns have no names.
 
-    Attributes:
-        title: Its heading.
-        columns: Its columns; of a table without a head they have no names.
-        rows: Its cells as people read them; the first names the row, and what it is indented by tells what it is of.
-        notes: Sentences below it.
+    The first cell of a row names it, and is indented where the row is part of the one above.
     """
 
     title: str
@@ -52,13 +43,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure with what to see in it.
-
-    Attributes:
-        title: What it is of, in a few words.
-        image: The figure, or the bytes of a PNG, GIF or SVG file.
-        caption: What to see in it, a sentence or two.
-    """
+    """A figure, or the bytes of a PNG, GIF or SVG file, with what it is of and what to see in it."""
 
     title: str
     image: Drawn
@@ -67,12 +52,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Paragraphs:
-    """A heading with paragraphs.
-
-    Attributes:
-        title: The heading.
-        paragraphs: Each a sentence or more.
-    """
+    """A heading with paragraphs of a sentence or more."""
 
     title: str
     paragraphs: tuple[str, ...]
@@ -83,14 +63,7 @@ Part = Picture | Table | Paragraphs
 
 @dataclass(frozen=True)
 class View:
-    """Result of anything, for people.
-
-    Attributes:
-        title: What it is about.
-        sentence: What was found, in a sentence.
-        next_step: What to do next, in a sentence; "" where there is nothing to do.
-        parts: Pictures, tables and paragraphs, in their order.
-    """
+    """Result of anything, for people: what was found and what to do next ("": nothing), a sentence each, and parts."""
 
     title: str
     sentence: str
@@ -100,14 +73,7 @@ class View:
 
 @dataclass(frozen=True)
 class Foot:
-    """Facts that it takes to come by a page again.
-
-    Attributes:
-        command: The command that makes it, as typed in a shell.
-        settings: Names and values.
-        versions: Packages and their versions.
-        date: When it was written.
-    """
+    """Facts that it takes to come by a page again: the command as typed, settings, versions of packages, the date."""
 
     command: str
     settings: tuple[tuple[str, str], ...]

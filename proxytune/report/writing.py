@@ -171,10 +171,7 @@ def write_picture(path: Path, picture: NDArray[np.uint8]) -> None:
 def write_whole(path: Path, what: str, write: Callable[[Path], object]) -> None:
     """Have a draft written, its folder made where missing, and put it in the file's place once it is whole.
 
-    Args:
-        path: The file.
-        what: What to call it where it cannot be written, with a space at its end; "" for its path alone.
-        write: Writes the draft.
+    A complaint has `what` it is, with a space at its end, after the path.
 
     Raises:
         RunError: If it cannot be written.

@@ -6,6 +6,7 @@ same. What is told here is plain: a poor proxy, a short table or a coarse score 
 
 import re
 from collections.abc import Iterator, Sequence
+from itertools import chain
 
 import numpy as np
 
@@ -27,6 +28,8 @@ CEILING = 0.1
 """A time limit is where at least this share of the episodes ends."""
 FEWEST_AT_CEILING = 3
 
+NAMED = ("agents", "episodes")
+SAME = "the proxy has the target's scores to the last digit; give another table, unless one is a copy on purpose"
 DISTINCT = 0.8
 """Copies of episodes are told from coarse scores, which agents share: so many rows belong to one agent alone."""
 
@@ -34,21 +37,18 @@ DISTINCT = 0.8
 def score_cautions(*, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -> tuple[str, ...]:
     """Sentences on what is probably not meant in two tables of the same agents, in the same order as the metrics."""
     sides = {"the proxy": proxy, "the target": target}
-    lines = [*_names(sides)]
+    alike = (alike_caution(what, chain(*(getattr(one, what) for one in sides.values()))) for what in NAMED)
+    lines = [line for line in alike if line]
     for side, table in sides.items():
         lines += _negative_times(table, metrics, side)
         lines += _copies(table, side)
         lines += _tolerances(table, metrics, side)
-    lines += [*_one_table(proxy, target), *_signs(proxy, target, metrics)]
+    rows = proxy.values[proxy.driven]
+    distinct = len(np.unique(rows, axis=0)) >= max(DISTINCT * len(rows), 4)
+    lines += [SAME] if distinct and np.array_equal(proxy.values, target.values, equal_nan=True) else []
+    lines += _signs(proxy, target, metrics)
     lengths = [*_lengths(proxy, target, metrics)]
     return (*lines, *lengths, *_units(proxy, target, metrics, alone=not lengths))
-
-
-def _names(sides: dict[str, ScoreTable]) -> Iterator[str]:
-    for what in ("agents", "episodes"):
-        line = alike_caution(what, (name for table in sides.values() for name in getattr(table, what)))
-        if line:
-            yield line
 
 
 def _negative_times(table: ScoreTable, metrics: Sequence[Metric], side: str) -> Iterator[str]:
@@ -76,13 +76,6 @@ def _copies(table: ScoreTable, side: str) -> Iterator[str]:
             f"of {table.counts.sum()} episodes of {side} only {kept} differ from one another: the others are copies to "
             "the last digit; give each once, or intervals come out too narrow"
         )
-
-
-def _one_table(proxy: ScoreTable, target: ScoreTable) -> Iterator[str]:
-    rows = proxy.values[proxy.driven]
-    distinct = len(np.unique(rows, axis=0)) >= max(DISTINCT * len(rows), 4)
-    if distinct and np.array_equal(proxy.values, target.values, equal_nan=True):
-        yield "the proxy has the target's scores to the last digit; give another table, unless one is a copy on purpose"
 
 
 def _signs(proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -> Iterator[str]:
@@ -113,8 +106,12 @@ def _lengths(proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -
     for place, metric in enumerate(metrics):
         if not _is_time(metric.name):
             continue
-        (most, limited), (other, other_limited) = (_longest(table, place) for table in (proxy, target))
-        shorter = limited if most < other else other_limited
+        both = [table.values[..., place][table.driven] for table in (proxy, target)]
+        most, other = (float(times.max()) for times in both)
+        # The shorter side's longest episodes were ended by a limit where others end with them.
+        times, longest = (both[0], most) if most < other else (both[1], other)
+        ended = int((times >= longest - 1e-3 * abs(longest)).sum())
+        shorter = ended >= max(FEWEST_AT_CEILING, CEILING * len(times))
         factor = max(most, other) / min(most, other) if min(most, other) > 0.0 else 1.0
         if (
             shorter
@@ -125,14 +122,6 @@ def _lengths(proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -
                 f"episodes last up to {most:.4g} in the proxy and up to {other:.4g} on the target by {metric.name}; "
                 "give both sides one time limit, or scores that grow with time cannot be compared"
             )
-
-
-def _longest(table: ScoreTable, place: int) -> tuple[float, bool]:
-    """The longest episode, and whether a limit ended it: others end with it."""
-    times = table.values[..., place][table.driven]
-    longest = float(times.max())
-    ended = int((times >= longest - 1e-3 * abs(longest)).sum())
-    return longest, ended >= max(FEWEST_AT_CEILING, CEILING * len(times))
 
 
 def _units(proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric], *, alone: bool) -> Iterator[str]:

@@ -12,7 +12,7 @@ import fnmatch
 import json
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -207,11 +207,6 @@ def read_cell(text: str, decimal: str, in_percent: bool) -> Read | None:
     return None if mean is None else (mean, error, None)
 
 
-def percent_column(name: str, metric: str) -> bool:
-    """True of a column that another name than the metric's says to be in per cent."""
-    return name != metric and bool(re.search(r"%|\bpercent\b|_pct\b", name.lower()))
-
-
 def counted(value: float, rollouts: str, where: str) -> tuple[int, int]:
     """Successes of rollouts, from a share or a number of successes beside the number of rollouts."""
     try:
@@ -224,12 +219,6 @@ def counted(value: float, rollouts: str, where: str) -> tuple[int, int]:
     if not math.isclose(done, round(done), abs_tol=0.05 + 0.005 * of):
         raise ScoresError(f"{where}: {value:g} of {of} rollouts is no whole number of successes; check both columns")
     return round(done), of
-
-
-def spread_out(done: Iterable[tuple[int, int]]) -> list[list[str]]:
-    """Rows of rollouts, successes first: as many as there were, a cell for each metric."""
-    columns = [["1"] * successes + ["0"] * (of - successes) for successes, of in done]
-    return [list(row) for row in zip(*columns, strict=True)]
 
 
 def expand(metrics: Sequence[str], header: Sequence[str]) -> list[str]:

@@ -7,6 +7,7 @@
 import csv
 import io
 import math
+import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -110,7 +111,8 @@ def read_cells(
         lines, cells = [lines[row] for row in kept], {name: [own[row] for row in kept] for name, own in cells.items()}
     found = Cells(path, named, header, lines, cells)
     found = found if separator == "," else replace(found, decimal=_decimal(found, metrics))
-    in_percent = {name: forms.percent_column(whose.get(name) or name, name) for name in metrics}
+    # Of a column that another name than the metric's says to be in per cent
+    in_percent = {name: bool(re.search(r"%|\bpercent\b|_pct\b", (whose.get(name) or "").lower())) for name in metrics}
     return _plain_cells(found, metrics, more, in_percent)
 
 
@@ -135,7 +137,9 @@ def _plain_cells(
         if done and (len(done) < len(metrics) or len({of for _, of in done}) > 1):
             where = f"{found.path}: line {line}: counts of rollouts"
             raise ScoresError(f"{where} must be one number an agent in every metric; give the metrics one by one")
-        for place, values in enumerate(forms.spread_out(done) or [[one[0] for one in read.values()]]):
+        # A row of each rollout, successes first
+        rollouts = zip(*(["1"] * successes + ["0"] * (of - successes) for successes, of in done), strict=True)
+        for place, values in enumerate(rollouts if done else [tuple(one[0] for one in read.values())]):
             lines.append(line)
             episode = f"{own['agent']} {label}#{place}" if done else label
             for name, value in (own | dict(zip(metrics, values, strict=True)) | {"episode": episode}).items():
@@ -339,7 +343,11 @@ def read_domains(
     """
     names = tuple(metrics)
     files = [read_cells(file, names, columns, side, part) for file in _files(path)]
-    _check_alike(files)
+    for label, cells in [(label, cells) for label in forms.LABELS for cells in files]:
+        # Where one file numbers its episodes, or names domains, others do too.
+        other = next((one for one in files if label in one.header), None)
+        if other and label not in cells.header:
+            raise ScoresError(f"{cells.path}: has no column '{label}', which {other.path} has; add it")
     for name, theirs in (columns or {}).items():
         if not any(theirs in cells.named for cells in files):
             raise ScoresError(f"{files[0].path}: no column '{theirs}' for '{name}'; {nearest(theirs, files[0].named)}")
@@ -367,14 +375,6 @@ def read_domains(
 def _files(path: Files) -> list[Path]:
     """The files, be it one or several."""
     return [Path(path)] if isinstance(path, str | Path) else [Path(one) for one in path]
-
-
-def _check_alike(files: Sequence[Cells]) -> None:
-    """Refuse files of which one numbers its episodes, or names domains, and another does not."""
-    for label, cells in [(label, cells) for label in forms.LABELS for cells in files]:
-        other = next((one for one in files if label in one.header), None)
-        if other and label not in cells.header:
-            raise ScoresError(f"{cells.path}: has no column '{label}', which {other.path} has; add it")
 
 
 def _check_single(files: Sequence[Cells], rows: Sequence[Row]) -> None:

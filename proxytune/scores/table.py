@@ -70,11 +70,7 @@ class Metric:
         A percentage divides each column by its largest absolute value (and takes that from 1 where less is
         better), as the paper's authors did in their pilot, so that their figures come out to the last pair.
 
-        Args:
-            columns: One value per agent on the last axis, any number of tables on the others.
-
-        Returns:
-            The merits, of the same shape, and the largest difference that is still a tie, shape (…, 1).
+        Agents are on the last axis (…, agents); the largest difference that is still a tie is of shape (…, 1).
         """
         largest = np.abs(columns).max(axis=-1, keepdims=True)
         if not self.percent:
@@ -135,13 +131,7 @@ class ScoreTable:
     def from_rows(
         cls, agents: Sequence[str], episodes: Sequence[str], metrics: Sequence[str], values: ArrayLike
     ) -> "ScoreTable":
-        """Build a table from the scores of each agent's each episode, given once.
-
-        Args:
-            agents: The agent of each row.
-            episodes: The episode of each row.
-            metrics: What was scored.
-            values: Finite, shape (rows, metrics).
+        """Build a table from the finite scores (rows, metrics) of each agent's each episode, given once.
 
         Raises:
             ScoresError: If agents have so many episodes of their own that the table would fill the memory.

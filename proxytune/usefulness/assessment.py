@@ -19,7 +19,7 @@ import numpy as np
 from proxytune.errors import ScoresError
 from proxytune.scores import Metric, ScoreTable, score_cautions
 from proxytune.usefulness import resampling
-from proxytune.usefulness.comparison import Comparison, compare
+from proxytune.usefulness.comparison import Comparison, compare, repeats
 from proxytune.usefulness.decision import (
     ASKED,
     Asked,
@@ -30,7 +30,6 @@ from proxytune.usefulness.decision import (
     compare_choices,
     compare_savings,
     decide,
-    use_two,
 )
 from proxytune.usefulness.noise import Chance, NoiseFloor, SuccessRates, chance, noise_floor, success_rates
 from proxytune.usefulness.pairs import Prpv, prpv, prpv_of_means
@@ -112,12 +111,9 @@ class Assessment:
         columns, _ = chosen(self.inputs, self.asked.decide_on)
         means = self.inputs.target.means[:, columns].mean(axis=1)
         scale = 1.0 if means.min() >= 0.0 and means.max() <= 1.0 else float(np.ptp(means)) or 1.0
-        made = (
-            np.full(len(means), float(self.asked.rollouts or 0))
-            if self.inputs.target.counts.max() < 2
-            else self.inputs.target.counts
-        )
-        return plan(self.decision, bound=self.asked.bound, made=np.asarray(made, dtype=np.float64), scale=scale)
+        counts, stated = self.inputs.target.counts.astype(np.float64), float(self.asked.rollouts or 0)
+        made = np.full(len(means), stated) if counts.max() < 2 else counts
+        return plan(self.decision, bound=self.asked.bound, made=made, scale=scale)
 
     def table(self) -> "pd.DataFrame":
         """One row per measure and metric: value, and the ends of its 95 % interval."""
@@ -167,7 +163,11 @@ class Assessment:
             lines.append(f"no interval: {self.prpv_interval.reason}")
         if floor.reason:
             lines.append(f"no noise floor: {floor.reason}")
-        lines += [*(rates.note for rates in self.success_rates if rates.note), *_scope(self)]
+        lines += [rates.note for rates in self.success_rates if rates.note]
+        if self.intervals is not None:
+            sides = (self.inputs.proxy, self.inputs.target)
+            fewest = min((repeats(side) > 0).sum(axis=1).min() for side in sides)  # Repeats of a start count once
+            lines += [ONE_START] if fewest == 1 else [LEFT_OUT] + [PAIRED] * self.inputs.paired
         if random.explains:
             lines.append(f"PRPV is no better than chance: a random ranking scores as low with p = {random.p_value:.2g}")
         if self.at_noise_floor:
@@ -224,15 +224,6 @@ def assess(
     )
 
 
-def _scope(assessment: Assessment) -> list[str]:
-    """What the intervals leave out, where there are any, and that equal labels were paired."""
-    if assessment.intervals is None:
-        return []
-    if assessment.inputs.fewest_starts == 1:
-        return [ONE_START]
-    return [LEFT_OUT, PAIRED] if assessment.inputs.paired else [LEFT_OUT]
-
-
 @dataclass(frozen=True)
 class Selection:
     """Proxies ranked by PRPV.
@@ -278,10 +269,14 @@ def assess_each(
     if len(found) == 1:
         return found, None
     inputs, saves = {name: one.inputs for name, one in found.items()}, {name: one.saves for name, one in found.items()}
+    # The target rectified by the two proxies that save most
+    names = sorted(saves, key=lambda name: -(saves[name].real_rollouts_worth or 0.0))[:2]
+    one, other = (inputs[name] for name in names)
+    both = saving_of(one, chosen(one, asked.decide_on)[0][0], other)
     return found, replace(
         select_proxy(proxies=proxies, target=target, metrics=metrics, resamples=resamples, seed=seed),
         choices=(*compare_choices(inputs, asked, seed), *compare_savings(saves)),
-        together=use_two(inputs, saves, asked, seed),
+        together=Together((names[0], names[1]), both, decide(one, asked, both, seed)),
     )
 
 

@@ -103,15 +103,7 @@ class Measure:
         return dict(zip(names, map(Measured, values, ends), strict=True))
 
     def of_means(self, *, proxy: Floats, target: Floats, metrics: Sequence[Metric]) -> float:
-        """Measure mean scores alone, as an objective of a search does.
-
-        Args:
-            proxy: Mean scores in the proxy, shape (agents, metrics).
-            target: Mean scores on the target, same shape.
-            metrics: How each of the metrics compares.
-
-        Returns:
-            NaN where the measure is undefined.
+        """Measure mean scores (agents, metrics) alone, as an objective of a search does; NaN where that is undefined.
 
         Raises:
             InputError: If the measure has no single value of mean scores.

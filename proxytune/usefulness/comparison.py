@@ -17,13 +17,7 @@ from proxytune.settings import alike_caution
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two score tables, of the proxy and of the target, with the same agents and metrics in the same order.
-
-    Attributes:
-        proxy: Scores in the proxy.
-        target: Scores on the target.
-        metrics: How agents are compared, in the order of both tables' columns.
-    """
+    """Two score tables, of the proxy and of the target, with the same agents and metrics in the same order."""
 
     proxy: ScoreTable
     target: ScoreTable
@@ -51,19 +45,9 @@ class Comparison:
         return self.proxy.means, self.target.means
 
     @property
-    def fewest_starts(self) -> int:
-        """The fewest starts that an agent drove on either side; repeats of a start count once."""
-        return int(min((repeats(side) > 0).sum(axis=1).min() for side in (self.proxy, self.target)))
-
-    @property
-    def proxy_episodes(self) -> tuple[int, int]:
-        """Fewest and most episodes of an agent in the proxy."""
-        return int(self.proxy.counts.min()), int(self.proxy.counts.max())
-
-    @property
-    def target_episodes(self) -> tuple[int, int]:
-        """Fewest and most episodes of an agent on the target."""
-        return int(self.target.counts.min()), int(self.target.counts.max())
+    def episodes(self) -> tuple[tuple[int, int], ...]:
+        """Fewest and most episodes of an agent, in the proxy and on the target."""
+        return tuple((int(side.counts.min()), int(side.counts.max())) for side in (self.proxy, self.target))
 
 
 def compare(*, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -> Comparison:

@@ -18,11 +18,11 @@ import numpy as np
 
 from proxytune.arrays import Floats
 from proxytune.errors import InputError
-from proxytune.scores import ROUNDING, Metric, ScoreTable
+from proxytune.scores import ROUNDING, ScoreTable
 from proxytune.settings import nearest
 from proxytune.usefulness.comparison import Comparison, by_start, start_of
 from proxytune.usefulness.resampling import CONFIDENCE, Ends, interval
-from proxytune.usefulness.saving import Saving, effective, is_rate, rate_intervals, saving_of
+from proxytune.usefulness.saving import Saving, effective, is_rate, rate_intervals
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -202,13 +202,21 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
     most = np.zeros(len(agents))
     if len(columns) == 1 and is_rate(inputs.target, columns[0]):
         ends = rate_intervals(middle, counts)
-        most = _most_regrets(centre, np.sort(sign * np.array(ends), axis=1), middle)
+        # Of agents that, or whose best rival, always or never succeeded: there the prior pulls draws away from rates
+        # at the end of what can be. The ends of their regrets follow from those of both rates (Zou and Donner, 2008,
+        # "Construction of confidence limits about effect measures").
+        low_high = np.sort(sign * np.array(ends), axis=1)
+        best_rival, settled = int(centre.argmax()), (middle <= 0.0) | (middle >= 1.0)
+        reach = np.hypot(low_high[best_rival, 1] - centre[best_rival], centre - low_high[:, 0])
+        most = np.where(settled | settled[best_rival], centre[best_rival] - centre + reach, 0.0)
     return Decision(
         winner=agents[place],
         probability_best=float(best[place]),
         expected_regret=dict(zip(agents, map(float, expected), strict=True)),
         regret_interval={
-            agent: _regret_ends(regret[:, row], best[row], len(agents), most[row]) for row, agent in enumerate(agents)
+            # No regret at all belongs to it unless the agent is very unlikely to be the best.
+            agent: (0.0 if best[row] > BARELY_BEST / len(agents) ** 3 else low, max(high, most[row]))
+            for row, (agent, (low, high)) in enumerate(zip(agents, map(interval, regret.T), strict=True))
         },
         best_probabilities=dict(zip(agents, map(float, best), strict=True)),
         not_told_apart=tuple(agents[row] for row in held if row != place),
@@ -224,23 +232,6 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
     )
 
 
-def _regret_ends(regret: Floats, best: float, agents: int, most: float) -> Ends:
-    """An agent's 95 % interval: none at all belongs to it unless the agent is very unlikely to be the best."""
-    low, high = interval(regret)
-    return (0.0 if best > BARELY_BEST / agents**3 else low), max(high, most)
-
-
-def _most_regrets(centre: Floats, ends: Floats, rates: Floats) -> Floats:
-    """The upper ends of regrets of agents that, or whose best rival, always or never succeeded; 0 of all others.
-
-    There the prior pulls draws away from rates that are at the end of what can be. The ends follow from those of both
-    rates (Zou and Donner, 2008, "Construction of confidence limits about effect measures").
-    """
-    best, settled = int(centre.argmax()), (rates <= 0.0) | (rates >= 1.0)
-    reach = np.hypot(ends[best, 1] - centre[best], centre - ends[:, 0])
-    return np.asarray(np.where(settled | settled[best], centre[best] - centre + reach, 0.0))
-
-
 def chosen(inputs: Comparison, decide_on: str) -> tuple[list[int], str]:
     """The metrics that a decision averages over, by column, and what that is called.
 
@@ -249,7 +240,8 @@ def chosen(inputs: Comparison, decide_on: str) -> tuple[list[int], str]:
     """
     names = [metric.name for metric in inputs.metrics]
     alike = len({metric.direction for metric in inputs.metrics}) == 1
-    shares = all(_within_one(side) for side in (inputs.proxy, inputs.target))
+    driven = np.concatenate([side.values[side.driven].ravel() for side in (inputs.proxy, inputs.target)])
+    shares = bool(driven.min() >= 0.0 and driven.max() <= 1.0)
     if decide_on in names:
         return [names.index(decide_on)], decide_on
     if decide_on not in ("", "mean"):
@@ -260,11 +252,6 @@ def chosen(inputs: Comparison, decide_on: str) -> tuple[list[int], str]:
         told = ", ".join(names) if len(names) <= FEW_TASKS else f"{len(names)} metrics"
         return list(range(len(names))), f"mean of {told}"
     return [0], names[0]
-
-
-def _within_one(table: ScoreTable) -> bool:
-    driven = table.values[table.driven]
-    return bool(driven.min() >= 0.0 and driven.max() <= 1.0)
 
 
 def _panel(name: str, agents: Sequence[str], proxy: Floats, target: Floats) -> Panel:
@@ -446,25 +433,11 @@ def compare_savings(savings: Mapping[str, Saving]) -> tuple[Difference, ...]:
 
 @dataclass(frozen=True)
 class Together:
-    """Two proxies of one target that are used at once.
-
-    Attributes:
-        proxies: Those two that save most by themselves.
-        saves: What both are worth in rollouts on the target.
-        decision: The agent to deploy, the target's means being rectified by both.
-    """
+    """Two proxies of one target, those that save most, used at once: what both are worth, and the agent to deploy."""
 
     proxies: tuple[str, str]
     saves: Saving
     decision: Decision
-
-
-def use_two(inputs: Mapping[str, Comparison], savings: Mapping[str, Saving], asked: Asked, seed: int = 0) -> Together:
-    """Rectify the target by the two proxies that save most."""
-    names = sorted(savings, key=lambda name: -(savings[name].real_rollouts_worth or 0.0))[:2]
-    one, other = (inputs[name] for name in names)
-    saves = saving_of(one, chosen(one, asked.decide_on)[0][0], other)
-    return Together((names[0], names[1]), saves, decide(one, asked, saves, seed))
 
 
 def mmrv_conventions(inputs: Comparison) -> dict[str, dict[str, float]]:
@@ -476,20 +449,17 @@ def mmrv_conventions(inputs: Comparison) -> dict[str, dict[str, float]]:
     """
     if len(inputs.agents) > MOST_COMPARED:
         return {}
-    return {metric.name: _conventions(inputs, metric, column) for column, metric in enumerate(inputs.metrics)}
-
-
-def _conventions(inputs: Comparison, metric: Metric, column: int) -> dict[str, float]:
-    sign = 1.0 if metric.direction == "max" else -1.0
-    gaps, orders = [], []
-    for means in inputs.means:
-        merits = sign * means[:, column]
-        gap = merits[:, None] - merits
-        gaps.append(np.abs(gap))
-        orders.append(np.where(np.abs(gap) > ROUNDING * np.abs(merits).max(), np.sign(gap), 0.0))
-    (ours, theirs), (one, other) = gaps, orders
-    violated = {"simpler": (one > 0) != (other > 0), "strictly_less": (one < 0) != (other < 0)}
-    found = {name: float((theirs * wrong).max(axis=1).mean()) for name, wrong in violated.items()}
-    found["sign_product"] = float((theirs * (one * other < 0)).max(axis=1).mean())
-    found["proxy_gap"] = float((ours * violated["simpler"]).max(axis=1).mean())
+    found = {}
+    for column, metric in enumerate(inputs.metrics):
+        gaps, orders = [], []
+        for means in inputs.means:
+            merits = (1.0 if metric.direction == "max" else -1.0) * means[:, column]
+            gap = merits[:, None] - merits
+            gaps.append(np.abs(gap))
+            orders.append(np.where(np.abs(gap) > ROUNDING * np.abs(merits).max(), np.sign(gap), 0.0))
+        (ours, theirs), (one, other) = gaps, orders
+        simpler = (one > 0) != (other > 0)
+        costs = {"simpler": theirs * simpler, "strictly_less": theirs * ((one < 0) != (other < 0))}
+        costs |= {"sign_product": theirs * (one * other < 0), "proxy_gap": ours * simpler}
+        found[metric.name] = {name: float(cost.max(axis=1).mean()) for name, cost in costs.items()}
     return found

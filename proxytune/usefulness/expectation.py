@@ -16,7 +16,7 @@ which overstate noise: then a proxy is not called imperfect for that.
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -50,12 +50,7 @@ class Estimate(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Donors:
-    """Cells that were driven twice from the same start.
-
-    Attributes:
-        first: Metrics of one time, shape (pairs, metrics).
-        second: Metrics of the other; every pair is there both ways round.
-    """
+    """Cells (pairs, metrics) that were driven twice from the same start; every pair is there both ways round."""
 
     first: Floats
     second: Floats
@@ -118,15 +113,6 @@ def donors_of(pairs: Iterable[Floats], metrics: int) -> Donors:
     return Donors(np.concatenate([both[0], both[1]]), np.concatenate([both[1], both[0]]))
 
 
-def _target_donors(target: ScoreTable) -> Donors:
-    """Repeats of the target's starts, or where there are none its episodes from different starts."""
-    places, (_, episodes, metrics) = start_places(target), target.values.shape
-    two = np.array([(a, b) for a in range(episodes) for b in range(a)], dtype=np.intp).reshape(-1, 2)
-    alike = two[places[two[:, 0]] == places[two[:, 1]]]
-    chosen = (alike if len(alike) else two).T
-    return donors_of([np.moveaxis(target.values[:, chosen], 1, 0)], metrics)
-
-
 @dataclass(frozen=True)
 class Expected:
     """One measure in more episodes: what is expected of fresh ones, and what a perfect proxy scores on this target.
@@ -141,14 +127,9 @@ class Expected:
 
 @dataclass(frozen=True, eq=False)
 class Expectation:
-    """What is expected of a proxy in more episodes.
+    """What is expected of a proxy in more episodes, from so many fresh tables; PPV is None where it is undefined.
 
-    Attributes:
-        prpv: Its PRPV.
-        ppv: Its PPV; None where that is undefined.
-        repetitions: From how many fresh tables.
-        deviation: Standard deviation of PRPV from one table to the next.
-        floor: The noise floor.
+    PRPV has this standard deviation from one table to the next.
     """
 
     prpv: Expected
@@ -172,28 +153,28 @@ def expect(
     means, known = sides[0].target.means, len(donors.first) > 0
     proxies = np.stack([side.proxy.means for side in sides])
     draws = [_again(one.proxy, donors, rng, np.arange(len(one.proxy.episodes))[None]) for one in sides] if known else []
-    of_target = _target_donors(sides[0].target) if donors.still else donors
+    of_target = donors
+    if donors.still:  # The target's starts driven twice, or where there are none its episodes from different starts
+        scored, places = sides[0].target.values, start_places(sides[0].target)
+        two = np.array([(a, b) for a in range(len(places)) for b in range(a)], dtype=np.intp).reshape(-1, 2)
+        alike = two[places[two[:, 0]] == places[two[:, 1]]]
+        chosen = (alike if len(alike) else two).T
+        of_target = donors_of([np.moveaxis(scored[:, chosen], 1, 0)], scored.shape[-1])
     perfect = _perfect(sides[0], of_target, rng) if len(of_target.first) else None
     weights = ppv(sides[0]).beta
     beta = np.array([weights[metric.name] or 0.0 for metric in metrics])
 
-    def prpv_of(tables: Floats) -> Floats:
-        return prpv_in_blocks(tables, np.broadcast_to(means, tables.shape), metrics)
-
-    def ppv_of(tables: Floats) -> Floats:
-        return ppv_of_means(tables, means, beta)
-
-    most = float(len(means) * (len(means) - 1))
-    counted, deviation = _expected(prpv_of, proxies, draws, perfect, most)
+    most, all_of = float(len(means) * (len(means) - 1)), partial(_expected, proxies, draws, perfect)
+    counted, deviation = all_of(lambda it: prpv_in_blocks(it, np.broadcast_to(means, it.shape), metrics), most)
     level = counted.floor
     unknown = NoiseFloor("none", reason="noise is not known: nothing was driven twice")
     floor = NoiseFloor("same starts", *level) if level else unknown
-    error = _expected(ppv_of, proxies, draws, perfect, np.inf)[0] if beta.any() else None
+    error = all_of(lambda it: ppv_of_means(it, means, beta), np.inf)[0] if beta.any() else None
     return Expectation(counted, error, len(fresh), deviation, floor)
 
 
 def _expected(
-    measure: Callable[[Floats], Floats], proxies: Floats, draws: Sequence[Floats], perfect: Floats | None, most: float
+    proxies: Floats, draws: Sequence[Floats], perfect: Floats | None, measure: Callable[[Floats], Floats], most: float
 ) -> tuple[Expected, float]:
     """A measure of fresh tables (m, agents, metrics), and its standard deviation from one to the next."""
     # Loading scipy.stats takes longer than all else of most commands.

@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from proxytune.arrays import Flags, Floats
+from proxytune.arrays import Flags
 from proxytune.scores import Metric, ScoreTable
 from proxytune.usefulness import resampling
 from proxytune.usefulness.comparison import Comparison, by_start, compare, is_repeated, split_repeats, start_places
@@ -74,7 +74,14 @@ def noise_floor(*, target: ScoreTable, metrics: Sequence[Metric], splits: int = 
     if reason:
         return NoiseFloor("none", reason=reason)
     same_starts = is_repeated(chosen)
-    values = resampling.prpv_in_blocks(*_split_means(chosen, np.random.default_rng(seed), splits, same_starts), metrics)
+    rng, places = np.random.default_rng(seed), start_places(chosen)
+    keys = rng.random((splits, len(chosen.episodes))) if same_starts else None
+    means = []
+    for rows, driven in resampling.agent_blocks(chosen, splits):
+        sets = split_halves(driven, rng, splits) if keys is None else split_repeats(driven, places, keys)
+        means.append([resampling.counted_means(chosen.values[rows], own) for own in sets])
+    first, second = (np.concatenate(parts, axis=1) for parts in zip(*means, strict=True))
+    values = resampling.prpv_in_blocks(first, second, metrics)
     kind: FloorKind = "same starts" if same_starts else "halves"
     return NoiseFloor(kind, float(values.mean()), *resampling.interval(values))
 
@@ -93,7 +100,11 @@ def floor_of_repeats(
         ScoresError: As in prpv.
     """
     inputs = compare(proxy=again, target=domain, metrics=metrics)
-    one, other = _shared_starts(inputs)
+    one, other = by_start(inputs.target), by_start(inputs.proxy)
+    shared = [start for start in one.episodes if start in other.episodes]
+    one, other = (table.arrange(agents=inputs.agents, episodes=shared) for table in (one, other))
+    both = (one.driven & other.driven)[..., None]
+    one, other = (replace(table, values=np.where(both, table.values, np.nan)) for table in (one, other))
     absent = [agent for agent, count in zip(one.agents, one.counts, strict=True) if not count]
     reason = (
         f"agent '{absent[0]}' drove no start both times"
@@ -109,33 +120,12 @@ def floor_of_repeats(
     return NoiseFloor("same starts", value, min(low, value), max(high, value))
 
 
-def _split_means(table: ScoreTable, rng: np.random.Generator, splits: int, same_starts: bool) -> tuple[Floats, Floats]:
-    """Mean scores of two sets of each agent's episodes, each of shape (splits, agents, metrics)."""
-    places, keys = start_places(table), rng.random((splits, len(table.episodes))) if same_starts else None
-    means = []
-    for rows, driven in resampling.agent_blocks(table, splits):
-        sets = split_halves(driven, rng, splits) if keys is None else split_repeats(driven, places, keys)
-        means.append([resampling.counted_means(table.values[rows], chosen) for chosen in sets])
-    first, second = (np.concatenate(parts, axis=1) for parts in zip(*means, strict=True))
-    return first, second
-
-
 def split_halves(driven: Flags, rng: np.random.Generator, splits: int) -> tuple[Flags, Flags]:
     """Halves of the episodes (agents, splits, episodes), the first and the second; agents are split by themselves."""
     order = np.where(driven[:, None, :], rng.random((len(driven), splits, driven.shape[1])), np.inf)
     half = (driven.sum(axis=1) // 2)[:, None, None]
     first = order < np.take_along_axis(np.sort(order, axis=-1), half, axis=-1)
     return first, driven[:, None, :] & ~first
-
-
-def _shared_starts(inputs: Comparison) -> tuple[ScoreTable, ScoreTable]:
-    """Both tables by start, each agent with those starts only that it drove on both sides."""
-    one, other = by_start(inputs.target), by_start(inputs.proxy)
-    shared = [start for start in one.episodes if start in other.episodes]
-    one, other = (table.arrange(agents=inputs.agents, episodes=shared) for table in (one, other))
-    both = (one.driven & other.driven)[..., None]
-    first, second = (replace(table, values=np.where(both, table.values, np.nan)) for table in (one, other))
-    return first, second
 
 
 @dataclass(frozen=True)
@@ -153,15 +143,7 @@ class Rate:
 
 @dataclass(frozen=True)
 class SuccessRates:
-    """One metric of zeros and ones on both sides.
-
-    Attributes:
-        metric: Its name.
-        proxy: Rate of each agent in the proxy.
-        target: The same on the target.
-        ties: How many pairs of agents tie, in the proxy and on the target.
-        pairs: How many pairs there are.
-    """
+    """One metric of zeros and ones: rates of each agent, and how many pairs tie, in the proxy and on the target."""
 
     metric: str
     proxy: Mapping[str, Rate]
@@ -186,7 +168,8 @@ def success_rates(inputs: Comparison) -> tuple[SuccessRates, ...]:
         known = [np.unique(side.values[side.driven][:, column]) for side in sides]
         if np.array_equal(np.union1d(*known), (0.0, 1.0)):
             proxy, target = (_rates(side, column) for side in sides)
-            ordered = [_ordered_pairs(side.means[:, column], metric) for side in sides]
+            merits = [metric.merits(side.means[:, column]) for side in sides]
+            ordered = [int(stand(own, float(tie[0])).below.sum()) for own, tie in merits]
             found.append(SuccessRates(metric.name, proxy, target, (pairs - ordered[0], pairs - ordered[1]), pairs))
     return tuple(found)
 
@@ -204,11 +187,6 @@ def _rates(table: ScoreTable, column: int) -> dict[str, Rate]:
     return rates
 
 
-def _ordered_pairs(means: Floats, metric: Metric) -> int:
-    merits, tie = metric.merits(means)
-    return int(stand(merits, float(tie[0])).below.sum())
-
-
 MOST_ENUMERATED = 7
 """Agents of which all orders are looked at: 5040."""
 LEVEL = 0.05
@@ -224,7 +202,6 @@ class Chance:
         deviation: Standard deviation over permutations.
         p_value: How probable a PRPV as low as the proxy's is by chance, the proxy's own order counted as one.
         permutations: How many were drawn, or all.
-        inputs: What was compared, with its sample sizes.
         exact: Whether all orders were looked at.
     """
 
@@ -232,7 +209,6 @@ class Chance:
     deviation: float
     p_value: float
     permutations: int
-    inputs: Comparison
     exact: bool = False
 
     @property
@@ -258,4 +234,4 @@ def chance(inputs: Comparison, *, permutations: int = 1000, seed: int = 0) -> Ch
     as_low = (values <= prpv_of_means(in_proxy, on_target, inputs.metrics)).sum()
     # The proxy's own order is one of all, and is counted with those that are drawn.
     p_value = float(as_low / len(orders) if exact else (1 + as_low) / (1 + len(orders)))
-    return Chance(float(values.mean()), float(values.std(ddof=not exact)), p_value, len(orders), inputs, exact)
+    return Chance(float(values.mean()), float(values.std(ddof=not exact)), p_value, len(orders), exact)

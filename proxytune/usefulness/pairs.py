@@ -11,7 +11,7 @@ MMRV of many agents use the same sorted columns.
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,7 +50,6 @@ class Prpv:
 
     value: int
     inputs: Comparison
-    better: ClassVar[str] = "lower"
 
     @property
     def range(self) -> tuple[int, int]:

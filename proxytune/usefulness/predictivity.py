@@ -9,7 +9,6 @@ Kendall's τ-b = Σ sign(proxy) sign(target) / √(pairs untied in proxy · on t
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,14 +30,10 @@ class Ppv:
     Attributes:
         value: Weighted error of an agent's scores, 0 (every score foretold) or more; None if no metric has a weight.
         beta: Weight of each metric; None where the target's agents all score alike, so that there is no spread.
-        inputs: What was compared, with its sample sizes.
     """
 
     value: float | None
     beta: Mapping[str, float | None]
-    inputs: Comparison
-    better: ClassVar[str] = "lower"
-    range: ClassVar[tuple[int, None]] = (0, None)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -60,19 +55,26 @@ def ppv(inputs: Comparison, beta: Mapping[str, float] | None = None) -> Ppv:
 
     The definition taken: Σ_m β_m |M_m(proxy) − M_m(target)|, averaged over the agents. Without β each metric weighs
     one over its spread on the target (standard deviation of the agents' means), so that PPV counts standard deviations.
-
-    Args:
-        inputs: Both sides; direction and tolerance of the metrics play no part.
-        beta: A weight for every metric, in one over its unit.
+    Direction and tolerance of the metrics play no part.
 
     Raises:
         InputError: If a weight is missing, unknown, negative or not finite.
     """
-    weights = _given(inputs, beta) if beta is not None else weights_of_spread(inputs.target.means)
+    weights = weights_of_spread(inputs.target.means)
+    if beta is not None:
+        names = [metric.name for metric in inputs.metrics]
+        for name, weight in beta.items():
+            if name not in names:
+                raise InputError(f"weight of '{name}': no such metric; {nearest(name, names)}")
+            if not (np.isfinite(weight) and weight >= 0):
+                raise InputError(f"weight of '{name}': must be zero or more, got {weight}")
+        if missing := [name for name in names if name not in beta]:
+            raise InputError(f"no weight is given for {', '.join(missing)}; give one for every metric or none at all")
+        weights = np.array([beta[name] for name in names])
     each = zip(inputs.metrics, weights, strict=True)
     named = {metric.name: float(weight) if weight > 0 or beta else None for metric, weight in each}
     value = float(ppv_of_means(*inputs.means, weights)) if any(w is not None for w in named.values()) else None
-    return Ppv(value, named, inputs)
+    return Ppv(value, named)
 
 
 def weights_of_spread(target: Floats) -> Floats:
@@ -85,37 +87,11 @@ def weights_of_spread(target: Floats) -> Floats:
     return np.where(varied, 1.0 / np.where(varied, spreads, 1.0), 0.0)
 
 
-def _given(inputs: Comparison, beta: Mapping[str, float]) -> Floats:
-    names = [metric.name for metric in inputs.metrics]
-    for name, weight in beta.items():
-        if name not in names:
-            raise InputError(f"weight of '{name}': no such metric; {nearest(name, names)}")
-        if not (np.isfinite(weight) and weight >= 0):
-            raise InputError(f"weight of '{name}': must be zero or more, got {weight}")
-    missing = [name for name in names if name not in beta]
-    if missing:
-        raise InputError(f"no weight is given for {', '.join(missing)}; give one for every metric or none at all")
-    return np.array([beta[name] for name in names])
-
-
 @dataclass(frozen=True)
 class Mmrv:
-    """A mean maximum rank violation per metric.
-
-    Attributes:
-        value: Metric to violation, in the metric's unit: 0 (same order) up to the largest difference on the target.
-        inputs: What was compared, with its sample sizes.
-    """
+    """A mean maximum rank violation per metric, in its unit: 0 (same order) up to the target's largest difference."""
 
     value: Mapping[str, float]
-    inputs: Comparison
-    better: ClassVar[str] = "lower"
-
-    @property
-    def range(self) -> Mapping[str, tuple[float, float]]:
-        """Smallest and largest possible value per metric."""
-        spreads = np.ptp(self.inputs.target.means, axis=0)
-        return {m.name: (0.0, float(spread)) for m, spread in zip(self.inputs.metrics, spreads, strict=True)}
 
 
 def mmrv_of_means(proxy: Floats, target: Floats, metrics: Sequence[Metric]) -> Floats:
@@ -135,7 +111,7 @@ def mmrv(inputs: Comparison) -> Mmrv:
     Source: Li et al., Evaluating Real-World Robot Manipulation Policies in Simulation (2024).
     """
     values = mmrv_of_means(*inputs.means, inputs.metrics)
-    return Mmrv({m.name: float(value) for m, value in zip(inputs.metrics, values, strict=True)}, inputs)
+    return Mmrv({m.name: float(value) for m, value in zip(inputs.metrics, values, strict=True)})
 
 
 SIMPLER_EPSILON = 1e-8
@@ -145,21 +121,10 @@ out to every digit. Elsewhere it is below notice, as long as scores are not of t
 
 @dataclass(frozen=True)
 class Correlation:
-    """A correlation of proxy and target per metric.
+    """A correlation of proxy and target per metric, −1 to 1, None where undefined; notes say why, or caution."""
 
-    Attributes:
-        name: Which correlation.
-        value: Metric to coefficient, −1 to 1; None where it is undefined.
-        notes: Why it is undefined or means little, in one line each.
-        inputs: What was compared, with its sample sizes.
-    """
-
-    name: str
     value: Mapping[str, float | None]
     notes: tuple[str, ...]
-    inputs: Comparison
-    better: ClassVar[str] = "higher"
-    range: ClassVar[tuple[int, int]] = (-1, 1)
 
 
 def pearson_of_means(proxy: Floats, target: Floats) -> Floats:
@@ -207,7 +172,7 @@ def _correlation(name: str, values: Floats, inputs: Comparison) -> Correlation:
                 notes.append(f"{metric.name}: {name} is undefined, since all agents score alike {where}")
     if len(inputs.agents) == 2:
         notes.append(f"{name} of two agents is always 1, −1 or undefined; score more agents")
-    return Correlation(name, named, tuple(notes), inputs)
+    return Correlation(named, tuple(notes))
 
 
 def pod_of_poses(*, proxy: ArrayLike, target: ArrayLike) -> float:

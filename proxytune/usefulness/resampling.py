@@ -36,7 +36,6 @@ class PrpvInterval:
         low: Lower end, at most the value; None if there is no interval.
         high: Upper end, at least the value; None if there is no interval.
         resamples: How many were drawn.
-        inputs: What was compared, with its sample sizes.
         reason: Why there is no interval, empty if there is one.
     """
 
@@ -45,7 +44,6 @@ class PrpvInterval:
     low: float | None
     high: float | None
     resamples: int
-    inputs: Comparison
     reason: str = ""
 
 
@@ -169,10 +167,10 @@ def prpv_interval(inputs: Comparison, means: Means | None) -> PrpvInterval:
     """The interval of PRPV from mean scores of resampled episodes; without one where there are none."""
     value = round(float(prpv_of_means(*inputs.means, inputs.metrics)))
     if means is None:
-        return PrpvInterval(value, None, None, None, 0, inputs, why_not_repeated(inputs))
+        return PrpvInterval(value, None, None, None, 0, why_not_repeated(inputs))
     values = prpv_in_blocks(*means, inputs.metrics)
     low, high = interval(values)
-    return PrpvInterval(value, float(values.mean()), min(low, value), max(high, value), len(values), inputs)
+    return PrpvInterval(value, float(values.mean()), min(low, value), max(high, value), len(values))
 
 
 Ends = tuple[float, float]

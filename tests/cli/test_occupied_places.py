@@ -32,7 +32,7 @@ OF_FOLDERS = ("predict of pictures", "record", "import", "score", "diagnose", "s
 IN_STUDIES = {
     "study": ("study tiny", "study.run_opened", {"figures": "a file", "report.html": "a folder"}),
     "study of families": ("study several", "study.run_opened_families", {"figures": "a file"}),
-    "study of a bank": ("study bank", "study.run_bank", {"bank.json": "a folder", "report.html": "a folder"}),
+    "study of a bank": ("study bank", "study.study.run_bank", {"bank.json": "a folder", "report.html": "a folder"}),
     "sweep": ("sweep tiny --parameter trim", "sweep.run_sweep", {"figures": "a file"}),
     "teach": ("teach tiny", "teach.teach", {"figures": "a file", "report.html": "a folder"}),
     "loop": ("loop tiny", "loop.run_loop", {"loop/diagnosed": "a file", "loop/report.html": "a folder"}),

@@ -105,7 +105,7 @@ def described(tmp_path):
     def read(text):
         path = tmp_path / "log.toml"
         path.write_text(text, encoding="utf-8")
-        return read_description(read_settings(path))
+        return read_description(read_settings(path))[0]
 
     return read
 

@@ -190,7 +190,7 @@ def test_the_camera_shows_the_picture_of_its_time(animation):
 def test_a_gif_has_every_frame_at_its_time_and_plays_for_ever(animation, tmp_path):
     path = tmp_path / "new" / "episode.gif"
     shown = animation.times[:21]
-    write_gif(path, map(animation.frame, shown), animation.samples(), FRAME_HZ)
+    write_gif(path, map(animation.frame, shown), [*map(animation.frame, shown[::10])], FRAME_HZ)
     with Image.open(path) as gif:
         assert (gif.n_frames, gif.info["duration"], gif.info["loop"]) == (21, 100, 0)
         gif.seek(12)

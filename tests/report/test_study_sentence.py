@@ -20,7 +20,7 @@ FLOOR = NoiseFloor("same starts", 5.0, 1.0, 9.0)
 PRPV = Estimate(6.2, 2.6, 9.9)
 EXCESS = Estimate(1.2, -5.3, 7.7)
 TOLD_BY_STARTS = Information("blur", (("daredevil", 0.6), ("wary", 0.4)), (("distance", 1.0),), "starts")
-CHANCE, EXPLAINING = (Chance(65.8, 13.7, p_value, 1000, None) for p_value in (0.001, 0.3))
+CHANCE, EXPLAINING = (Chance(65.8, 13.7, p_value, 1000) for p_value in (0.001, 0.3))
 
 
 def box_of(known):

@@ -17,7 +17,6 @@ from proxytune.report.sweep import (
     bars_figure,
     curve_csv,
     curve_document,
-    curve_lines,
     curve_name,
     curve_tables,
     held_mark,
@@ -140,7 +139,7 @@ def test_every_measure_is_in_document_csv_and_lines_with_its_interval(with_pod):
         assert all(float(row[f"{key}_low"]) <= float(row[f"{key}_high"]) for row in rows if row[f"{key}_low"])
         assert all(row[key] for row in rows)
 
-    lines = curve_lines(with_pod)
+    lines = curve_tables(with_pod)[0].notes
     assert len(lines) == 2 + 3 * 2 + 2
     assert lines[0].startswith("trim: PRPV: lowest (0) at 0.1")
     assert "worsens" in next(line for line in lines if "POD pose" in line)

@@ -1,8 +1,9 @@
 """Answer of a diagnosis, of motion and camera: headline, tables, notes, figures with captions, next step."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -23,17 +24,13 @@ from proxytune.report.view import Drawn, Paragraphs, Part, Picture, Table, View,
 from proxytune.report.wording import fixed, short, span
 from proxytune.report.writing import CAPTIONS, picture_of, save_figures, write_text
 
+Said = TypeVar("Said")
 MOST_TRIED = 8
 """So many effects that were tried are in the table."""
 
 
 def write_diagnosis(found: LogDiagnosis, folder: Path, command: str = "") -> list[Path]:
     """Write diagnosis.json, model.toml, next/commands.csv with a ROS 2 node that plays it, figures and page; paths.
-
-    Args:
-        found: What the log says.
-        folder: Where to.
-        command: What the page's foot says makes it again.
 
     Raises:
         RunError: If a file cannot be written.
@@ -70,11 +67,11 @@ def diagnosis_view(found: LogDiagnosis, figures: Mapping[str, Drawn]) -> View:
 
 def diagnosis_text(found: LogDiagnosis) -> Group:
     """The diagnosis as `diagnose` prints it: of motion, then of the camera, a verdict, tables and notes."""
-    parts: list[Group | Text] = []
+    parts = list[Group | Text]()
     for headline, tables, notes in _said(found):
         parts += [Text("")] if parts else []
         parts.append(group_texts(Text(headline, style="bold"), *map(table_text, tables), *notes))
-    return group_texts(*_say_cautions(found), *parts, *_say_refusals(found))
+    return group_texts(*_with_remarks(found, parts))
 
 
 def diagnosis_figures(found: LogDiagnosis) -> dict[str, Figure]:
@@ -91,8 +88,7 @@ def diagnosis_headline(found: LogDiagnosis) -> str:
 
 def diagnosis_notes(found: LogDiagnosis) -> list[str]:
     """Everything that the tables do not hold, a line each."""
-    notes = [note for _, _, own in _said(found) for note in own]
-    return [*_say_cautions(found), *notes, *_say_refusals(found)]
+    return _with_remarks(found, [note for _, _, own in _said(found) for note in own])
 
 
 def _said(found: LogDiagnosis) -> list[tuple[str, list[Table], list[str]]]:
@@ -108,14 +104,11 @@ def _said(found: LogDiagnosis) -> list[tuple[str, list[Table], list[str]]]:
     return said
 
 
-def _say_cautions(found: LogDiagnosis) -> list[str]:
-    return [f"beware: {line}" for line in found.cautions]
-
-
-def _say_refusals(found: LogDiagnosis) -> list[str]:
-    """Say why a part is missing, a line each."""
-    parts = (("motion", found.motion_refused), ("camera", found.camera_refused))
-    return [f"{part}: {why}" for part, why in parts if why]
+def _with_remarks(found: LogDiagnosis, said: Sequence[Said]) -> list[Said | str]:
+    """What is said, after cautions, a line each, and before why a part is missing, likewise."""
+    refused = {"motion": found.motion_refused, "camera": found.camera_refused}
+    missing = [f"{part}: {why}" for part, why in refused.items() if why]
+    return [*(f"beware: {line}" for line in found.cautions), *said, *missing]
 
 
 def diagnosis_pictures(figures: Mapping[str, Drawn]) -> list[Picture]:

@@ -1,6 +1,6 @@
 """Figures of a camera's diagnosis: markings, displacements, what each effect explains alone, errors by frame."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from itertools import product
 from textwrap import fill
@@ -19,6 +19,9 @@ from proxytune.report.wording import plain
 
 LEAST_LOSS = 1.0
 """Losses below this are all alike [nats]."""
+ADDED = style.Role("added", style.BLUE)
+RIVAL = style.Role("fits as well as what was added", style.LIGHT_BLUE)
+OTHER = style.Role("other effect", style.GREY)
 
 
 def camera_figures(diagnosis: CameraDiagnosis) -> Mapping[str, Figure]:
@@ -37,38 +40,24 @@ def _ranking_figure(diagnosis: CameraDiagnosis) -> Figure | None:
     tried = diagnosis.candidates
     if not tried:
         return None
-    nothing = loss_of_nothing(diagnosis)
+    # With the declared effects alone, in the measure that the candidates are ranked by [nats]
+    named = diagnosis.named
+    nothing = rank_subsets(named.full, effects_of(named.declared.names), 0)[0].loss
     figure, axes = style.one_panel(1.3 + 0.16 * len(tried))
-    for place, one in enumerate(tried):
-        name, colour = _role(diagnosis, one.effects)
-        loss = max(one.loss, 0.0)
-        axes.plot([loss, nothing], [place, place], "-", color=colour, lw=0.9, alpha=0.6)
-        axes.plot([loss], [place], "o", color=colour, ms=4, label=name)
+    added = {effect.effect for effect in diagnosis.effects}
+    rivals = {rival for effect in diagnosis.effects for rival in effect.rivals}
+    roles = [ADDED if own <= added else RIVAL if own <= rivals else OTHER for own in (set(o.effects) for o in tried)]
+    names = [" and ".join(map(plain, one.effects)) for one in tried]
+    losses = [max(one.loss, 0.0) for one in tried]
+    style.draw_ranked(axes, list(zip(names, losses, roles, strict=True)), nothing)
     axes.axvline(max(nothing, 0.0), color=style.VERMILLION, lw=1.0, ls=":", label="nothing added")
     axes.axvline(LEAST_NATS, color="0.45", lw=1.0, ls=":", label=f"least that counts, {LEAST_NATS:g} nats")
-    axes.set_yticks(range(len(tried)), [" and ".join(map(plain, one.effects)) for one in tried])
-    axes.set_ylim(len(tried) - 0.4, -0.6)
     axes.set_xscale("symlog", linthresh=10.0 * LEAST_LOSS, linscale=0.7)
     axes.set_xlim(-0.5, 1.5 * max(10.0 * LEAST_LOSS, nothing, *(one.loss for one in tried)))
     label = "evidence lost if only this effect is added [nats]\n0: none against all effects"
     axes.set_xlabel(label, fontsize=8, loc="right")
-    style.dress(axes)
     style.legend_below(figure, axes)
     return figure
-
-
-def loss_of_nothing(diagnosis: CameraDiagnosis) -> float:
-    """Loss with the declared effects alone, in the measure that the candidates are ranked by [nats]."""
-    named = diagnosis.named
-    return rank_subsets(named.full, effects_of(named.declared.names), 0)[0].loss
-
-
-def _role(diagnosis: CameraDiagnosis, effects: Sequence[str]) -> tuple[str, str]:
-    if set(effects) <= {effect.effect for effect in diagnosis.effects}:
-        return "added", style.BLUE
-    if set(effects) <= {rival for effect in diagnosis.effects for rival in effect.rivals}:
-        return "fits as well as what was added", style.LIGHT_BLUE
-    return "other effect", style.GREY
 
 
 def _errors_figure(diagnosis: CameraDiagnosis) -> Figure:
@@ -137,10 +126,15 @@ def displacement_figure(diagnosis: CameraDiagnosis) -> Figure:
     height = 0.45 + lines * (0.35 + 1.45 * (rows - top) / columns)
     figure, panels = style.grid_of(height, lines, 2, sharex=True, sharey=True)
     longest = max(float(np.hypot(*one.lengths.T).max(initial=0.0)) for one in arrows)
+    # The longest of all is as long as there is room, and one of a round length is their scale.
+    key = max((one for one in KEYS_PX if one <= longest), default=KEYS_PX[0])
+    look: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "width": 0.006, "pivot": "middle"}
+    look["scale"] = max(longest, KEYS_PX[0]) / (1.5 * columns / ACROSS)
     for number, (axes, one) in enumerate(zip(panels.ravel(), arrows, strict=True)):
         axes.set(xlim=(0, columns), ylim=(rows, top), aspect="equal")
         axes.set_title(names[number], fontsize=7)
-        _draw_arrows(axes, one, COLOURS[number % len(models)], longest, columns / ACROSS)
+        quiver = axes.quiver(*one.places.T, *one.lengths.T, color=COLOURS[number % len(models)], **look)
+        axes.quiverkey(quiver, 0.88, 0.93, key, f"{key:g} px", labelpos="S", fontproperties={"size": 7})
     label_places(panels)
     return figure
 
@@ -169,15 +163,6 @@ def _sums(cell: NDArray[np.intp], values: Floats) -> Floats:
     return np.stack([np.bincount(cell, column) for column in values.T], axis=-1)
 
 
-def _draw_arrows(axes: Axes, arrows: Arrows, colour: str, longest: float, room: float) -> None:
-    """Arrows with one of a round length as their scale; the longest of all panels is as long as there is room."""
-    key = max((one for one in KEYS_PX if one <= longest), default=KEYS_PX[0])
-    scale = max(longest, KEYS_PX[0]) / (1.5 * room)
-    look: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "width": 0.006, "pivot": "middle"}
-    quiver = axes.quiver(*arrows.places.T, *arrows.lengths.T, color=colour, scale=scale, **look)
-    axes.quiverkey(quiver, 0.88, 0.93, key, f"{key:g} px", labelpos="S", fontproperties={"size": 7})
-
-
 SHOWN = 2
 """Frames, one of each half of the log."""
 
@@ -192,7 +177,10 @@ def markings_figure(diagnosis: CameraDiagnosis) -> Figure:
     shown = product(frames, zip(models, COLOURS, strict=False))
     for axes, (frame, ((name, fit), colour)) in zip(panels.ravel(), shown, strict=True):
         style.show_photo(axes, pictures[frame], extent=(0, columns, rows, 0), interpolation="nearest")
-        draw_outlines(axes, fit, frame, colour)
+        for white in (True, False):
+            across_, up, distance = outline_field(fit, frame, white)
+            if np.isfinite(distance).any() and np.nanmin(distance) < 0.0 < np.nanmax(distance):
+                axes.contour(across_, up, distance, levels=[0.0], colors=colour, linewidths=0.9)
         axes.set_title(fill(f"{name}, frame {diagnosis.gathered.numbers[frame]}", TITLE), fontsize=7)
     label_places(panels)
     return figure
@@ -206,14 +194,6 @@ def telling_frames(diagnosis: CameraDiagnosis) -> list[int]:
     merit = np.where(points >= np.median(points), change * points, 0.0)
     halves = np.array_split(np.arange(views.count), SHOWN)
     return [int(half[np.argmax(merit[half])]) for half in halves]
-
-
-def draw_outlines(axes: Axes, fit: CameraFit, frame: int, colour: str) -> None:
-    """Draw where the model has the markings' edges, as far as edges are compared."""
-    for white in (True, False):
-        columns, rows, distance = outline_field(fit, frame, white)
-        if np.isfinite(distance).any() and np.nanmin(distance) < 0.0 < np.nanmax(distance):
-            axes.contour(columns, rows, distance, levels=[0.0], colors=colour, linewidths=0.9)
 
 
 def outline_field(fit: CameraFit, frame: int, white: bool) -> tuple[Floats, Floats, Floats]:

@@ -26,7 +26,10 @@ def camera_notes(diagnosis: CameraDiagnosis) -> list[str]:
     """Everything that the tables do not hold, a line each."""
     lines = [_say_added(effect) for effect in diagnosis.effects]
     lines += [_say_immaterial(effect, diagnosis.dropped) for effect in diagnosis.negligible]
-    lines += _say_left_over(diagnosis)
+    if (after := diagnosis.residual_fields[1]).significant:
+        field = f"markings lie {after.rms_px:.2f} px (RMS) from their places in the picture, wherever the robot stands"
+        lines.append(f"left over and fixed to the camera: {field}; no effect of the catalogue bends pictures so")
+        lines[-1] += "; values of added effects are no physics yet" if diagnosis.effects else ""
     rows, columns = diagnosis.gathered.pictures.shape[1:3]
     lines += [_say_blemish(blemish, rows, columns) for blemish in diagnosis.blemishes]
     lines += [RELATIVE] if any(name.startswith("exposure") for name in diagnosis.theta) else []
@@ -61,15 +64,6 @@ def _growth(effect: CameraEffect) -> str:
     if effect.error_without is None:
         return "an unknown number of"
     return fixed(100.0 * (effect.error_without - 1.0), 0 if effect.error_without > 1.1 else 1)
-
-
-def _say_left_over(diagnosis: CameraDiagnosis) -> list[str]:
-    _, after = diagnosis.residual_fields
-    if not after.significant:
-        return []
-    field = f"markings lie {after.rms_px:.2f} px (RMS) from their places in the picture, wherever the robot stands"
-    beware = "; values of added effects are no physics yet" if diagnosis.effects else ""
-    return [f"left over and fixed to the camera: {field}; no effect of the catalogue bends pictures so{beware}"]
 
 
 def _say_blemish(blemish: Blemish, rows: int, columns: int) -> str:

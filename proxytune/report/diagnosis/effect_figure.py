@@ -63,35 +63,26 @@ def _curve(curves: Sequence[SignalCurve], name: str) -> SignalCurve | None:
     return next((curve for curve in curves if curve.group.name == name), None)
 
 
-class Shown(NamedTuple):
-    """The part of a robot that an effect bends: its column, what 1 stands for there, and an axis' label."""
-
-    column: int
-    full: float
-    label: str
-
-
-def _shown(diagnosis: Diagnosis) -> Shown:
-    """The part that the first effect that was added bends."""
+def _shown(diagnosis: Diagnosis) -> tuple[int, float, str]:
+    """The part that the first effect that was added bends: its column, what 1 stands for there, an axis' label."""
     first, figures = diagnosis.found.adopted[0], diagnosis.robot.figures
     if diagnosis.robot.drive == "differential":
         column = int(first.form.startswith("right"))
-        return Shown(column, figures["full_speed"], f"speed of the {('left', 'right')[column]} wheel [m/s]")
+        return column, figures["full_speed"], f"speed of the {('left', 'right')[column]} wheel [m/s]"
     if first.effect.startswith("steering_"):
-        return Shown(1, figures["wheel_angle"], "angle of the wheels [deg]")
-    return Shown(0, figures["full_speed"], "speed [m/s]")
+        return 1, figures["wheel_angle"], "angle of the wheels [deg]"
+    return 0, figures["full_speed"], "speed [m/s]"
 
 
 def _car_figure(diagnosis: Diagnosis) -> Figure:
     """A car's steady speed against throttle, or its wheels' angle against steering."""
-    found, shown, drives = diagnosis.found, _shown(diagnosis), diagnosis.found.declared.drives
-    (figure, axes), given = style.one_panel(2.4), drives.duties[..., shown.column]
+    found, drives, (column, full, label) = diagnosis.found, diagnosis.found.declared.drives, _shown(diagnosis)
+    (figure, axes), given = style.one_panel(2.4), drives.duties[..., column]
     commands = np.linspace(float(given.min()), float(given.max()), COMMANDS)
-    pairs = np.stack([commands * (column == shown.column) for column in (0, 1)], axis=-1)
+    pairs = np.stack([commands * (side == column) for side in (0, 1)], axis=-1)
     models = {DECLARED_MODEL: found.declared.theta, extended_name(diagnosis): found.model.theta}
-    steady = {n: shown.full * _steady(drives, t, pairs)[:, shown.column] for n, t in models.items()}
-    _draw_steady(axes, commands, steady)
-    style.dress(axes, ("throttle", "steering [full lock]")[shown.column], shown.label)
+    _draw_steady(axes, commands, {n: full * _steady(drives, t, pairs)[:, column] for n, t in models.items()})
+    style.dress(axes, ("throttle", "steering [full lock]")[column], label)
     style.legend_below(figure, axes)
     return figure
 

@@ -11,7 +11,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from scipy.stats import binned_statistic_2d
 
-from proxytune.diagnosis import Diagnosis, Drives, Floats, Rmse, Whole, cut, pose_errors
+from proxytune.diagnosis import Diagnosis, Drives, Floats, Whole, cut, pose_errors
 from proxytune.report import figure_style as style
 from proxytune.report.wording import plain
 
@@ -42,7 +42,13 @@ def error_figure(diagnosis: Diagnosis) -> Figure:
     models = [(DECLARED_MODEL, style.VERMILLION, "o", -0.1), (extended_name(diagnosis), style.BLUE, "s", 0.1)]
     for axes, factor, both, floors in ((place, 1e3, positions, brackets), (heading, 180.0 / np.pi, headings, level)):
         for rms_errors, model in zip(both, models[: 2 if diagnosis.effects else 1], strict=False):
-            _draw_errors(axes, rms_errors, factor, model)
+            name, colour, marker, shift = model
+            values = factor * np.array([one.value for one in rms_errors])
+            ends = factor * np.array([one.interval for one in rms_errors])
+            ends = np.where(np.isfinite(ends).all(axis=1, keepdims=True), ends, values[:, None])
+            arms = np.maximum(0.0, np.stack((values - ends[:, 0], ends[:, 1] - values)))
+            look: dict[str, Any] = {"fmt": marker, "color": colour, "ms": 4, "capsize": 2, "lw": 1.0}
+            axes.errorbar(spots + shift, values, yerr=arms, label=name, **look)
         # A bar from the lower to the upper end, a line at the lower.
         lower, heights = [low for low, _ in floors], [high - low for low, high in floors]
         axes.bar(spots, heights, 0.5, lower, color=style.GREEN, alpha=0.2, zorder=0)
@@ -60,17 +66,6 @@ def error_figure(diagnosis: Diagnosis) -> Figure:
     heading.set_ylabel("heading error, RMS [deg]", fontsize=8)
     style.legend_below(figure, place)
     return figure
-
-
-def _draw_errors(axes: Axes, rms_errors: Sequence[Rmse], factor: float, model: tuple[str, str, str, float]) -> None:
-    """Values with their intervals, where those are finite, in the name, colour, marker and place of a model."""
-    name, colour, marker, shift = model
-    values = factor * np.array([one.value for one in rms_errors])
-    ends = factor * np.array([one.interval for one in rms_errors])
-    ends = np.where(np.isfinite(ends).all(axis=1, keepdims=True), ends, values[:, None])
-    arms = np.maximum(0.0, np.stack((values - ends[:, 0], ends[:, 1] - values)))
-    look: dict[str, Any] = {"fmt": marker, "color": colour, "ms": 4, "capsize": 2, "lw": 1.0}
-    axes.errorbar(np.arange(len(rms_errors)) + shift, values, yerr=arms, label=name, **look)
 
 
 HORIZON_S = 2.0
@@ -98,14 +93,9 @@ SQUARES = 60
 
 
 class Strayed(NamedTuple):
-    """Distances of predictions in windows (W,) and at the poses (M,) in them.
+    """Distances of predicted poses (M,) from the measured ones, and their root mean square over each window (W,) [mm].
 
-    Attributes:
-        horizon_s: How long the windows are [s].
-        window: The window of each pose (M,).
-        increment: The increment that ends with it (M,).
-        distance: From the predicted pose to the measured one (M,) [mm].
-        rms: Its root mean square over each window (W,) [mm].
+    Each pose is in a window of so many seconds, and ends an increment (M,).
     """
 
     horizon_s: float
@@ -147,9 +137,20 @@ def residual_over_time(drives: Drives, both: Mapping[str, Strayed]) -> Figure:
 
 
 def _lines(axes: Axes, drives: Drives, strayed: Strayed, colour: str) -> list[tuple[Floats, Floats]]:
-    """Times and distances: the median after its band is drawn, or those of each episode."""
-    times, distance, episode = _in_time(drives, strayed)
-    edges = _edges(times, strayed.horizon_s)
+    """Times [s] and distances [mm]: the median after its band is drawn, or those of each episode.
+
+    They are of windows, or of poses where episodes last hardly longer than a window.
+    """
+    times, distance = drives.last[strayed.increment] / drives.tick_hz, strayed.distance
+    episode = drives.episode[strayed.increment]
+    if times.max() >= 2.0 * strayed.horizon_s:
+        first = np.flatnonzero(np.diff(strayed.window, prepend=-1))
+        begins, ends = drives.first[strayed.increment][first] / drives.tick_hz, np.maximum.reduceat(times, first)
+        times, distance, episode = (begins + ends) / 2.0, strayed.rms, episode[first]
+    # Steps of a window's length, longer where that were too many, shorter where all is within two windows
+    span = float(np.ptp(times))
+    step = max(strayed.horizon_s, span / TIMES) if span > 2.0 * strayed.horizon_s else max(span / SHORT_TIMES, 1e-3)
+    edges = np.arange(times.min() - step / 2.0, times.max() + step, step)
     place = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, len(edges) - 2)
     if np.median(np.bincount(place)) < FEW_WINDOWS:
         return [(times[episode == own], distance[episode == own]) for own in np.unique(episode)]
@@ -162,23 +163,6 @@ def _lines(axes: Axes, drives: Drives, strayed: Strayed, colour: str) -> list[tu
     return [(centres, middle)]
 
 
-def _in_time(drives: Drives, strayed: Strayed) -> tuple[Floats, Floats, Whole]:
-    """Time [s], distance [mm] and episode: of windows, or of poses where episodes last hardly longer than a window."""
-    ends = drives.last[strayed.increment] / drives.tick_hz
-    if ends.max() < 2.0 * strayed.horizon_s:
-        return ends, strayed.distance, drives.episode[strayed.increment]
-    first = np.flatnonzero(np.diff(strayed.window, prepend=-1))
-    middle = (drives.first[strayed.increment][first] / drives.tick_hz + np.maximum.reduceat(ends, first)) / 2.0
-    return middle, strayed.rms, drives.episode[strayed.increment][first]
-
-
-def _edges(times: Floats, horizon_s: float) -> Floats:
-    """Steps of time of a window's length, longer where that were too many, shorter where all is within two windows."""
-    span = float(np.ptp(times))
-    step = max(horizon_s, span / TIMES) if span > 2.0 * horizon_s else max(span / SHORT_TIMES, 1e-3)
-    return np.arange(times.min() - step / 2.0, times.max() + step, step)
-
-
 def residual_map(drives: Drives, both: Mapping[str, Strayed]) -> Figure:
     """The measured paths in the colours of the distance, or its mean by place where too many paths would overlap.
 
@@ -186,7 +170,16 @@ def residual_map(drives: Drives, both: Mapping[str, Strayed]) -> Figure:
     """
     before = next(iter(both.values()))
     extent = np.ptp(drives.poses[before.increment, 1, :2], axis=0)
-    figure, panels = _panels(len(both), extent)
+    # Maps stand above each other, where the floor is long, or side by side.
+    across = 1 if len(both) > 1 and extent[0] > WIDE * extent[1] else len(both)
+    tall = float(np.clip(extent[1] / max(extent[0], 1e-9), 0.4, 1.6)) * (style.COLUMN - 0.5) / across
+    down = len(both) // across
+    figure, grid = style.grid_of(min(tall, TALLEST) * down + 1.2, down, across, sharex=True, sharey=True)
+    panels = list(grid.ravel())
+    for axes in grid[:, 0]:
+        axes.set_ylabel("y [m]", fontsize=8)
+    for axes in grid[-1]:
+        axes.set_xlabel("x [m]", fontsize=8)
     # From the smallest distances of any model to the largest of all, but for a few; at least a factor of ten
     low, high = np.quantile(np.concatenate([one.rms for one in both.values()]), (0.02, 0.98))
     high = max(float(high), TINIEST_MM)
@@ -203,32 +196,13 @@ def residual_map(drives: Drives, both: Mapping[str, Strayed]) -> Figure:
     return figure
 
 
-def _panels(count: int, extent: Floats) -> tuple[Figure, list[Axes]]:
-    """Maps above each other, where the floor is long, or side by side."""
-    stacked = count > 1 and extent[0] > WIDE * extent[1]
-    across = 1 if stacked else count
-    tall = float(np.clip(extent[1] / max(extent[0], 1e-9), 0.4, 1.6)) * (style.COLUMN - 0.5) / across
-    down = count // across
-    figure, grid = style.grid_of(min(tall, TALLEST) * down + 1.2, down, across, sharex=True, sharey=True)
-    for axes in grid[:, 0]:
-        axes.set_ylabel("y [m]", fontsize=8)
-    for axes in grid[-1]:
-        axes.set_xlabel("x [m]", fontsize=8)
-    return figure, list(grid.ravel())
-
-
 def _paths(axes: Axes, drives: Drives, strayed: Strayed, scale: LogNorm) -> LineCollection:
     rows = np.split(strayed.increment, np.flatnonzero(np.diff(strayed.window)) + 1)
     lines = [np.concatenate((drives.poses[own[:1], 0, :2], drives.poses[own, 1, :2])) for own in rows]
     paths = LineCollection(lines, array=strayed.rms, cmap=style.SHADES, norm=scale, linewidths=1.2, capstyle="round")
     axes.add_collection(paths)
     axes.autoscale_view()
-    _arrows(axes, lines)
-    return paths
-
-
-def _arrows(axes: Axes, lines: Sequence[Floats]) -> None:
-    """A small arrow at the end of every path that leads somewhere."""
+    # A small arrow at the end of every path that leads somewhere
     last = np.array([line[-1] for line in lines])
     along = np.array([line[-1] - line[max(0, len(line) - BEFORE_END)] for line in lines])
     length = np.hypot(*along.T)
@@ -238,6 +212,7 @@ def _arrows(axes: Axes, lines: Sequence[Floats]) -> None:
             *last.T, *ahead.T, pivot="mid", angles="xy", scale=40.0, width=0.004,
             headwidth=9.0, headlength=9.0, headaxislength=8.0, minlength=0.0, color="0.25", zorder=3,
         )  # fmt: skip
+    return paths
 
 
 def _floor(axes: Axes, drives: Drives, strayed: Strayed, scale: LogNorm) -> Collection:

@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from math import ceil
 from textwrap import fill
-from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -46,20 +45,10 @@ ROW, ELSE = 0.145, 0.95
 """Height of a row, and of all else [inch]."""
 
 
-class _Role(NamedTuple):
-    """Meaning of a dot."""
-
-    name: str
-    edge: str
-    face: str
-
-
-_Row = tuple[str, float, _Role]
-"""A name, its evidence [nats], and what its dot stands for."""
-ADDED = _Role("added", style.BLUE, style.BLUE)
-RIVAL = _Role("fits as well as one added", style.LIGHT_BLUE, style.LIGHT_BLUE)
-OTHER = _Role("not added", style.GREY, style.GREY)
-SIGNAL = _Role("free curve", style.PURPLE, style.PURPLE)
+ADDED = style.Role("added", style.BLUE)
+RIVAL = style.Role("fits as well as one added", style.LIGHT_BLUE)
+OTHER = style.Role("not added", style.GREY)
+SIGNAL = style.Role("free curve", style.PURPLE)
 
 
 def ranking_figure(found: Findings, rules: Rules) -> Figure | None:
@@ -68,14 +57,16 @@ def ranking_figure(found: Findings, rules: Rules) -> Figure | None:
     The evidence of those added is that when they were added; of the others, alone, in the first round. Nothing is
     drawn where nothing was tried.
     """
-    chance, least = _Role(f"not added, p > {rules.p_value:g}", style.GREY, "white"), rules.least_gain_nats
+    chance, least = style.Role(f"not added, p > {rules.p_value:g}", style.GREY, "white"), rules.least_gain_nats
     rivals = {rival.effect for one in found.adopted for rival in one.rivals}
     forms = {(one.effect, one.form) for one in found.adopted}
     others = [one for one in found.tried if (one.effect, one.form) not in forms][:SHOWN]
     added = [(_name(one.effect, one.form), one.gain, ADDED) for one in found.adopted]
     roles = [RIVAL if one.effect in rivals else OTHER if one.p_value <= rules.p_value else chance for one in others]
     tried = [(_name(one.effect, one.form), one.gain, role) for one, role in zip(others, roles, strict=True)]
-    signals: list[_Row] = [(curve.group.name, curve.gain, SIGNAL) for curve in found.curves[:JUDGES]]
+    signals: list[tuple[str, float, style.Role]] = [
+        (curve.group.name, curve.gain, SIGNAL) for curve in found.curves[:JUDGES]
+    ]
     if not tried or not signals:
         return None
     parts = {"added, in this order": added} if added else {}
@@ -84,7 +75,7 @@ def ranking_figure(found: Findings, rules: Rules) -> Figure | None:
     figure, grid = style.grid_of(ELSE + ROW * sum(heights), len(parts), 1, sharex=True, height_ratios=heights)
     panels = list(grid.flat)
     for axes, (title, rows) in zip(panels, parts.items(), strict=True):
-        _dots(axes, rows)
+        style.draw_ranked(axes, rows)
         axes.axvline(least, color="0.45", lw=1.0, ls=":", label=f"least to be added: {least:g} nats")
         axes.set_title(title, fontsize=7, loc="left", pad=2)
     _scale(panels[-1], [gain for rows in parts.values() for _, gain, _ in rows], least)
@@ -107,16 +98,6 @@ def _scale(axes: Axes, gains: Sequence[float], least: float) -> None:
     axes.set_xlim(1.3 * low, 1.5 * high)
     axes.set_xticks([0.0, *(10.0**power for power in range(2, 9) if 10.0**power <= 1.5 * high)])
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}".replace(",", "\u2009")))
-
-
-def _dots(axes: Axes, rows: Sequence[_Row]) -> None:
-    for place, (_, gain, role) in enumerate(rows):
-        axes.plot([0.0, gain], [place, place], "-", color=role.edge, lw=0.9, alpha=0.6)
-        axes.plot([gain], [place], "o", color=role.edge, mfc=role.face, ms=4, label=role.name)
-    axes.set_yticks(range(len(rows)), [name for name, _, _ in rows])
-    axes.set_ylim(len(rows) - 0.4, -0.6)
-    style.dress(axes)
-    axes.tick_params(axis="y", labelsize=7)
 
 
 SHOWN_AS = {"m/s": (1e3, "mm/s"), "rad/s": (180.0 / np.pi, "deg/s"), "rad/m": (180.0 / np.pi, "deg/m")}

@@ -42,7 +42,17 @@ def motion_notes(diagnosis: Diagnosis) -> list[str]:
     lines += [_say_added(diagnosis, effect) for effect in diagnosis.effects]
     lines += moves_from(diagnosis)
     lines += [_say_immaterial(effect, diagnosis) for effect in diagnosis.negligible]
-    lines += _cautions(diagnosis)
+    if diagnosis.verdict == "partly explained":
+        lines.append("beware: added effects may stand in for what is still unnamed: their values are no physics yet")
+    worse = [f"{error.horizon_s:g} s" for error in diagnosis.errors if error.ratio.interval[0] > 1.0]
+    if worse:
+        lines.append(f"beware: positions after {', '.join(worse)} are predicted worse than before; check the heading")
+    if diagnosis.multistep is not None:
+        ratios = ", ".join(f"{h:g} s: {one.value:.2f}" for h, one in diagnosis.multistep.ratios.items())
+        lines.append(
+            f"parameters were fitted to windows of {diagnosis.multistep.horizon_s:g} s instead of single steps; ratio "
+            f"of the errors on blocks left out: {ratios}"
+        )
     if diagnosis.residual_depends_on:
         lines.append(f"no named effect explains the rest, which depends on: {', '.join(diagnosis.residual_depends_on)}")
     if diagnosis.period is not None:
@@ -117,22 +127,6 @@ def _label(effect: AdoptedEffect) -> str:
 def _ends(one: Ratio, decimals: int) -> str:
     low, high = per_cent(one)[1]
     return f"{fixed(low, decimals)} to {'+' if low < 0.0 < high else ''}{fixed(high, decimals)}"
-
-
-def _cautions(diagnosis: Diagnosis) -> list[str]:
-    lines = []
-    if diagnosis.verdict == "partly explained":
-        lines.append("beware: added effects may stand in for what is still unnamed: their values are no physics yet")
-    worse = [f"{error.horizon_s:g} s" for error in diagnosis.errors if error.ratio.interval[0] > 1.0]
-    if worse:
-        lines.append(f"beware: positions after {', '.join(worse)} are predicted worse than before; check the heading")
-    if diagnosis.multistep is not None:
-        ratios = ", ".join(f"{h:g} s: {one.value:.2f}" for h, one in diagnosis.multistep.ratios.items())
-        lines.append(
-            f"parameters were fitted to windows of {diagnosis.multistep.horizon_s:g} s instead of single steps; ratio "
-            f"of the errors on blocks left out: {ratios}"
-        )
-    return lines
 
 
 def next_drives(diagnosis: Diagnosis) -> list[str]:

@@ -19,12 +19,7 @@ from proxytune.study import APART_M, SideBySide
 
 
 def episode_document(pair: SideBySide, study_seed: int) -> dict[str, Any]:
-    """Scores as plain numbers.
-
-    Args:
-        pair: The episode.
-        study_seed: From which its own is derived, as study.toml and `--seed` have it.
-    """
+    """Scores as plain numbers, and the seed that the episode's own is derived from, as study.toml and `--seed` say."""
     return {
         "agent": pair.episode.agent,
         "start": pair.episode.start,
@@ -67,13 +62,10 @@ INSTANTS = 4
 
 
 def episode_figure(pair: SideBySide, metrics: Sequence[str]) -> Figure:
-    """Draw an episode for one column of a paper.
-
-    Args:
-        pair: The episode; places are known of every side.
-        metrics: Those that stand above the map.
-    """
-    aspect = map_aspect(pair.road, [episode.places for episode in pair.sides.values()])
+    """Draw an episode, of which places are known on every side, with these metrics above the map."""
+    paths = [episode.places for episode in pair.sides.values()]
+    width, height = pair.road.size if pair.road is not None else np.subtract(*_bounds(paths)[::-1])
+    aspect = float(np.clip(height / width, 0.4, 2.0))
     parts: list[tuple[float, Callable[[SubFigure], None]]] = [
         (0.85 * style.COLUMN * aspect + 0.35 + 2 * LINE_INCH, functools.partial(_draw_map, pair, metrics))
     ]
@@ -93,7 +85,9 @@ def _draw_map(pair: SideBySide, metrics: Sequence[str], figure: SubFigure) -> No
     axes = figure.subplots()
     draw_map(axes, pair.road, [episode.places for episode in pair.sides.values()])
     draw_paths(axes, pair)
-    draw_parting(axes, pair)
+    if pair.parted_s is not None:
+        place = pair.proxy.places[np.searchsorted(pair.proxy.poses["time"], pair.parted_s)]
+        axes.plot(*place, "o", color="black", markersize=9, fillstyle="none", markeredgewidth=0.9)
     for line, (side, episode) in enumerate(reversed(pair.sides.items())):
         values = [f"{plain(name)} {short(episode.metrics[name])} {pair.units[name]}".strip() for name in metrics]
         axes.annotate(
@@ -155,13 +149,7 @@ HALO = (withStroke(linewidth=2.0, foreground="white"),)
 
 
 def draw_map(axes: Axes, road: Road | None, paths: Iterable[Floats]) -> None:
-    """Draw the floor that the camera sees, from above, with axes in metres; without a road only the axes.
-
-    Args:
-        axes: Where.
-        road: The map, if there is one.
-        paths: All that is going to be drawn on it, each (times, 2): x, y [m].
-    """
+    """Draw the floor that the camera sees, from above; without a road only axes round the paths (times, 2) [m]."""
     if road is not None:
         floor = draw_floor(road)
         end = floor.origin + len(floor.pixels) / floor.pixels_per_metre
@@ -179,12 +167,6 @@ def draw_map(axes: Axes, road: Road | None, paths: Iterable[Floats]) -> None:
     axes.set_ylabel("y [m]", fontsize=7)
 
 
-def map_aspect(road: Road | None, paths: Iterable[Floats]) -> float:
-    """Height of the map over its width."""
-    width, height = road.size if road is not None else np.subtract(*_bounds(paths)[::-1])
-    return float(np.clip(height / width, 0.4, 2.0))
-
-
 def _bounds(paths: Iterable[Floats]) -> tuple[Floats, Floats]:
     places = np.concatenate(list(paths))
     return places.min(axis=0) - MARGIN_M, places.max(axis=0) + MARGIN_M
@@ -200,8 +182,17 @@ WIDTHS = {"proxy": 1.0, "target": 2.2}
 
 def draw_paths(axes: Axes, pair: SideBySide) -> None:
     """Draw every side's path, the common start, and where each ends."""
-    for side in reversed(pair.sides):
-        _draw_path(axes, pair.sides[side].places, side)
+    for side, episode in reversed(pair.sides.items()):
+        places, thin = episode.places, {"markeredgecolor": "white", "markeredgewidth": 0.5}
+        (line,) = axes.plot(*places.T, color=COLOURS[side], linewidth=WIDTHS[side], solid_capstyle="round")
+        if side == "target":
+            line.set_path_effects(list(CASING))
+        for row in arrow_rows(places):
+            # Along the path, not along the heading: a robot may drive backwards
+            step = places[row] - places[row - 1]
+            turned = float(np.degrees(np.arctan2(step[1], step[0]))) - 90.0
+            mark: dict[str, Any] = {"marker": (3, 0, turned), "color": COLOURS[side], "markersize": 5.5, **thin}
+            axes.plot(*places[row], **mark)
     draw_start(axes, pair.proxy.places)
     edge: dict[str, Any] = {"markeredgecolor": "white", "markeredgewidth": 0.7, "clip_on": False, "zorder": 4}
     marks = {"start": ("black", pair.proxy.places[0])}
@@ -217,27 +208,11 @@ def draw_paths(axes: Axes, pair: SideBySide) -> None:
     paths = np.concatenate([episode.places[::EVERY] for episode in pair.sides.values()])
     low, high = np.transpose([axes.get_xlim(), axes.get_ylim()])
     corners = corners_of(np.array([place for _, place in marks.values()]), paths, low, high)
-    for (text, (colour, place)), corner in zip(marks.items(), corners, strict=True):
-        _write(axes, place, text, colour, corner)
-
-
-def draw_parting(axes: Axes, pair: SideBySide) -> None:
-    """Ring the place at which proxy and target are first APART_M apart."""
-    if pair.parted_s is not None:
-        place = pair.proxy.places[np.searchsorted(pair.proxy.poses["time"], pair.parted_s)]
-        axes.plot(*place, "o", color="black", markersize=9, fillstyle="none", markeredgewidth=0.9)
-
-
-def _draw_path(axes: Axes, places: Floats, side: str) -> None:
-    (line,) = axes.plot(*places.T, color=COLOURS[side], linewidth=WIDTHS[side], solid_capstyle="round")
-    if side == "target":
-        line.set_path_effects(list(CASING))
-    edge: dict[str, Any] = {"markeredgecolor": "white", "markeredgewidth": 0.5}
-    for row in arrow_rows(places):
-        # Along the path, not along the heading: a robot may drive backwards
-        step = places[row] - places[row - 1]
-        turned = float(np.degrees(np.arctan2(step[1], step[0]))) - 90.0
-        axes.plot(*places[row], marker=(3, 0, turned), color=COLOURS[side], markersize=5.5, **edge)
+    for (text, (colour, place)), (right, up) in zip(marks.items(), corners, strict=True):
+        look: dict[str, Any] = {"color": colour, "fontsize": 7, "path_effects": HALO, "annotation_clip": False}
+        look |= {"ha": "left" if right > 0 else "right", "va": "bottom" if up > 0 else "top"}
+        spot, shift = (float(place[0]), float(place[1])), (5 * right, 4 * up)
+        axes.annotate(text, spot, xytext=shift, textcoords="offset points", **look)
 
 
 def arrow_rows(places: Floats) -> list[int]:
@@ -254,13 +229,6 @@ def draw_start(axes: Axes, places: Floats) -> None:
     axes.plot(*places[0], "o", color="white", markersize=6, **edge)
 
 
-def _write(axes: Axes, place: Floats, text: str, colour: str, corner: tuple[int, int]) -> None:
-    aligned: dict[str, Any] = {"ha": "left" if corner[0] > 0 else "right", "va": "bottom" if corner[1] > 0 else "top"}
-    look: dict[str, Any] = {"color": colour, "fontsize": 7, "path_effects": HALO, "annotation_clip": False}
-    spot, shift = (float(place[0]), float(place[1])), (5 * corner[0], 4 * corner[1])
-    axes.annotate(text, spot, xytext=shift, textcoords="offset points", **aligned, **look)
-
-
 SIZE = np.array((0.24, 0.06))
 """Width and height that a label takes, as shares of the map's width."""
 GAP = 0.02
@@ -272,16 +240,9 @@ OUTSIDE, HIDES = 1000, 100
 
 
 def corners_of(marks: Floats, paths: Floats, low: Floats, high: Floats) -> list[tuple[int, int]]:
-    """The corner of each mark at which its label stands, the first of those that hide least.
+    """The corner of each mark (marks, 2) at which its label stands, the first of those that hide least of the paths.
 
-    Args:
-        marks: What has a label, (marks, 2), in the map's unit.
-        paths: Points of what is not to be hidden if that can be avoided, (points, 2).
-        low: The map's lower left corner (2,).
-        high: Its upper right corner (2,).
-
-    Returns:
-        For each mark 1 or −1 for right or left, and for above or below.
+    It is 1 or −1 for right or left, and for above or below. The map reaches from its corner `low` to `high` (2,).
     """
     width = high[0] - low[0]
     half = SIZE * width / 2.0
@@ -289,18 +250,13 @@ def corners_of(marks: Floats, paths: Floats, low: Floats, high: Floats) -> list[
     labels: list[Floats] = []
     for mark in marks:
         centres = mark + CORNERS * (half + GAP * width)
-        costs = [_cost(centre, half, (marks, np.array(labels), paths), (low, high)) for centre in centres]
-        best = int(np.argmin(costs))
+        outside = ((centres - half < low) | (centres + half > high)).any(axis=1)
+        hidden = [_within(marks, at, half) + _within(np.array(labels), at, 2.0 * half) for at in centres]
+        on_paths = [_within(paths, at, half) for at in centres]
+        best = int(np.argmin(OUTSIDE * outside + HIDES * np.array(hidden) + on_paths))
         labels.append(centres[best])
         chosen.append((int(CORNERS[best, 0]), int(CORNERS[best, 1])))
     return chosen
-
-
-def _cost(centre: Floats, half: Floats, others: tuple[Floats, Floats, Floats], box: tuple[Floats, Floats]) -> int:
-    marks, labels, paths = others
-    outside = bool((centre - half < box[0]).any() or (centre + half > box[1]).any())
-    hidden = _within(marks, centre, half) + _within(labels, centre, 2.0 * half)
-    return OUTSIDE * outside + HIDES * hidden + _within(paths, centre, half)
 
 
 def _within(places: Floats, centre: Floats, half: Floats) -> int:

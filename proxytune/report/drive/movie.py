@@ -39,11 +39,7 @@ LINGER_S = 1.0
 
 
 class Animation:
-    """An episode as frames: what never moves is drawn once.
-
-    Attributes:
-        times: Of each frame [s].
-    """
+    """An episode as frames at `times` [s]: what never moves is drawn once."""
 
     def __init__(self, pair: SideBySide) -> None:
         ends = [episode.seconds for episode in pair.sides.values()]
@@ -57,10 +53,6 @@ class Animation:
         self._views = [_View(panel, pair, side) for panel, side in zip(panels, pair.sides, strict=True)]
         self._canvas.draw()
         self._still = self._canvas.copy_from_bbox(figure.bbox)
-
-    def samples(self) -> list[NDArray[np.uint8]]:
-        """Three frames that show every colour: of the beginning, the middle and the end."""
-        return [self.frame(self.times[place]) for place in (0, len(self.times) // 2, -1)]
 
     def frame(self, time: float) -> NDArray[np.uint8]:
         """Frame of a time [s], (rows, columns, 3)."""
@@ -176,12 +168,7 @@ def check_episode_file(path: Path) -> None:
 
 
 def write_episode(pair: SideBySide, metrics: Sequence[str], path: Path) -> None:
-    """Write a still picture, or an animation whose frames are counted on standard error.
-
-    Args:
-        pair: The episode.
-        metrics: Those that a still picture shows.
-        path: Where to; its ending says as what.
+    """Write a still picture with these metrics, or an animation whose frames are counted, as the path's ending says.
 
     Raises:
         InputError: If it is not known where the robots were.
@@ -199,7 +186,9 @@ def write_episode(pair: SideBySide, metrics: Sequence[str], path: Path) -> None:
         if path.suffix.lower() == MP4:
             write_mp4(path, frames, FRAME_HZ)
         else:
-            write_gif(path, frames, animation.samples(), FRAME_HZ)
+            # Three frames that show every colour: of the beginning, the middle and the end
+            shown = (animation.times[place] for place in (0, len(animation.times) // 2, -1))
+            write_gif(path, frames, [*map(animation.frame, shown)], FRAME_HZ)
 
 
 def _count_frames(animation: Animation, watcher: Watcher) -> Iterator[Frame]:
@@ -209,13 +198,7 @@ def _count_frames(animation: Animation, watcher: Watcher) -> Iterator[Frame]:
 
 
 def write_gif(path: Path, frames: Iterable[Frame], samples: Sequence[Frame], frame_hz: float) -> None:
-    """Write a GIF that plays for ever.
-
-    Args:
-        path: The file.
-        frames: Each (rows, columns, 3).
-        samples: Some of them, from which the palette is made.
-        frame_hz: Frames a second.
+    """Write a GIF of frames (rows, columns, 3) that plays for ever; its palette is made from the samples.
 
     Raises:
         RunError: If it cannot be written.

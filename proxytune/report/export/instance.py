@@ -19,13 +19,9 @@ Pair = tuple[float, float]
 
 @dataclass(frozen=True)
 class Instance:
-    """A domain instance to be written.
+    """A domain instance to be written, and where its values come from.
 
-    Attributes:
-        robot: The robot.
-        theta: Every value that is not nominal by definition: the robot's own effects, and what was found.
-        intervals: Of those values that have one.
-        source: Where the values come from.
+    θ has every value that is not nominal by definition: the robot's own effects, and what was found.
     """
 
     robot: Robot
@@ -126,15 +122,7 @@ def _pose(turned: Floats, place: tuple[float, float, float]) -> Floats:
 
 @dataclass(frozen=True)
 class ExportLine:
-    """One value and what becomes of it.
-
-    Attributes:
-        name: Its name in θ.
-        value: The value.
-        interval: Its interval, if it has one.
-        unit: Its unit.
-        place: Where it went; empty where it has no place.
-    """
+    """One value by its name in θ, with its interval if it has one, and the place where it went; empty: none."""
 
     name: str
     value: float
@@ -149,13 +137,7 @@ class ExportLine:
 
 
 def export_lines(instance: Instance, form: str, has: Container[str] = ()) -> list[ExportLine]:
-    """Values with what becomes of each; those that are neutral need no place.
-
-    Args:
-        instance: What is written.
-        form: The format.
-        has: Effects that a patched file has, or the simulator behind a filter.
-    """
+    """Values with what becomes of each in a format, or in what has it already; those that are neutral need no place."""
     parameters = instance.robot.catalogue.parameters
     lines = []
     for name, value in sorted(instance.theta.items()):
@@ -182,13 +164,7 @@ def header(instance: Instance, form: str, has: Container[str] = ()) -> list[str]
 
 
 def xml_comment(instance: Instance, form: str, columns: int) -> str:
-    """The head of a file as an XML comment, in which no two hyphens may stand side by side.
-
-    Args:
-        instance: What is written.
-        form: The format.
-        columns: By how many its lines are indented.
-    """
+    """The head of a file as an XML comment, indented so, in which no two hyphens may stand side by side."""
     return re.sub("-(?=-)", "- ", ("\n" + columns * " ").join(header(instance, form)))
 
 

@@ -8,7 +8,7 @@ import math
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -26,14 +26,9 @@ XACRO = "is a program that makes a URDF: run `xacro {0} > {1}`, patch {1}, and c
 
 @dataclass(frozen=True)
 class Wheel:
-    """A driven wheel in a file.
+    """A driven wheel in a file, by its joint: its centre in the frame that wheels and camera share (3,) [m].
 
-    Attributes:
-        joint: Name of its joint.
-        centre: Where it is in the frame that wheels and camera share (3,) [m].
-        radius_m: Its radius [m]; None where it is a mesh.
-        move: Moves it by so much in that frame (3,) [m].
-        grow: Multiplies its radius.
+    It is moved by so much in that frame (3,) [m], or its radius multiplied, which is None of a mesh.
     """
 
     joint: str
@@ -45,12 +40,9 @@ class Wheel:
 
 @dataclass(frozen=True)
 class OwnFile:
-    """What a file of another simulator has that may be changed.
+    """What a file of another simulator has that may be changed: the left and right wheel, and its only camera.
 
-    Attributes:
-        wheels: The left and right wheel.
-        aim: Gives the camera a pose (4, 4) in the frame of the wheels; None where there is not exactly one camera.
-        widen: Gives the camera a vertical field of view [deg], for pictures of this aspect; None where it has none.
+    That is given a pose (4, 4) in the frame of the wheels, and a vertical field of view [deg] where it has one.
     """
 
     wheels: tuple[Wheel, Wheel]
@@ -60,27 +52,17 @@ class OwnFile:
 
 @dataclass(frozen=True)
 class Patched:
-    """A patched file.
-
-    Attributes:
-        text: All of it.
-        diff: What changed, as `diff -u` shows it.
-        has: The effects that the file has now: wheels', and the camera's.
-    """
+    """A patched file: its text, what changed as `diff -u` shows it, and the effects of wheels and camera it has now."""
 
     text: str
     diff: str
-    has: frozenset[str] = field(default_factory=frozenset)
+    has: frozenset[str]
 
 
 def patch(instance: Instance, path: Path, output: Path, wheels: Sequence[str] = ()) -> Patched:
-    """A file of a user's own with what was found.
+    """A user's own file (.urdf, .sdf, or .xml of MuJoCo) with what was found; the diff calls it as the output.
 
-    Args:
-        instance: What was found.
-        path: The file: .urdf, .sdf, or .xml of MuJoCo.
-        output: What the diff calls the patched one.
-        wheels: Names of the joints of the left and the right wheel; found where they are not given.
+    The joints of the left and the right wheel are found where they are not given.
 
     Raises:
         InputError: If its wheels cannot be told, or something in it is beyond what is understood here.
@@ -214,7 +196,10 @@ class _Sdf:
     def pose_of(self, element: ET.Element) -> Floats:
         """The pose of a link, joint or frame in the model's frame."""
         found = element.find("pose")
-        above = (found.get("relative_to") if found is not None else None) or _above(element)
+        above = found.get("relative_to") if found is not None else None
+        if not above:  # In whose frame it stands where it does not say so
+            of_joint = (element.findtext("child") or "").strip() if element.tag == "joint" else ""
+            above = element.get("attached_to", "") if element.tag == "frame" else of_joint
         pose = _six(found)
         return pose if above in ("", "__model__") else np.asarray(self.pose_of(self.named[above]) @ pose)
 
@@ -265,13 +250,6 @@ def _sdf(xml: XmlPatch, left: ET.Element, right: ET.Element) -> OwnFile:
             xml.set_text(across, _numbers([angle]))
 
     return OwnFile(wheels, aim, widen if across is not None else None)
-
-
-def _above(element: ET.Element) -> str:
-    """In whose frame an element of SDF stands, where it does not say so."""
-    if element.tag == "joint":
-        return (element.findtext("child") or "").strip()
-    return element.get("attached_to", "") if element.tag == "frame" else ""
 
 
 def _six(pose: ET.Element | None) -> Floats:

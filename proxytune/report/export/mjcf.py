@@ -6,7 +6,7 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
-from proxytune.driving import CameraFigures, orientation
+from proxytune.driving import orientation
 from proxytune.report.export.instance import Instance, xml_comment
 from proxytune.report.writing import fill
 
@@ -14,6 +14,8 @@ TIMESTEP_S = 0.0005
 """Short, and integrated explicitly: MuJoCo's implicit integrators push a robot with stiffly driven light wheels."""
 SERVO_S = 0.01
 """Time constant of the wheels' servos, with which the robot's mass follows [s]; part of the motors' lag."""
+STEERS_HZ = 400.0
+"""Natural frequency of the servo that holds the front wheel [rad/s]; it is damped so that it does not swing."""
 
 
 def mjcf_text(instance: Instance) -> str:
@@ -29,7 +31,8 @@ def mjcf_text(instance: Instance) -> str:
     """
     radius, mass, baseline = instance.figure("wheel_radius"), instance.figure("mass"), instance.baseline_m
     wheelbase = instance.figure("wheelbase") if instance.steers else 0.0
-    length, height, armature = 1.2 * (wheelbase or baseline), 1.2 * radius, _armature(instance)
+    # Inertia of a car's steering [kg m²], large beside that of its wheel
+    length, height, armature = 1.2 * (wheelbase or baseline), 1.2 * radius, 0.1 * mass * radius**2
     numbers = {
         "timestep": TIMESTEP_S,
         "radius": radius,
@@ -49,44 +52,46 @@ def mjcf_text(instance: Instance) -> str:
     said = {key: f"{number:.9g}" for key, number in numbers.items()}
     own = tomllib.loads(fill("mujoco_parts.toml", **said))
     if wheelbase:  # A servo of the mean speed of the rear wheels, and one of the front wheel's angle
-        actuators = [_speed_servo(instance, 'name="throttle" tendon="rear"', 0, 2), _steering(instance)]
+        # Its torque = stiffness · (full angle · (gain · command + offset) − angle).
+        stiffness = armature * STEERS_HZ**2
+        full = stiffness * math.radians(instance.figure("wheel_angle"))
+        limit = instance.value("steering_saturation", "limit", 1.0)
+        offset, gain = instance.value("steering_offset", "offset", 0.0), instance.value("steering_gain", "gain", 1.0)
+        words = [
+            f'    <general name="steering" joint="steering" gainprm="{full * gain:.9g}" biastype="affine"',
+            f'biasprm="{full * offset:.9g} {-stiffness:.9g} 0" ctrllimited="true" ctrlrange="{-limit:.9g} {limit:.9g}"',
+            *_follows(instance, instance.value("steering_lag", "time_constant", 0.0) - 2.0 / STEERS_HZ),
+        ]
+        throttle = _speed_servo(instance, 'name="throttle" tendon="rear"', 0, 2)
+        actuators = [throttle, " ".join(words) + "/>"]
     else:
         sides = enumerate(("left", "right"))
         actuators = [_speed_servo(instance, f'name="{one}" joint="axle_{one}"', side, 1) for side, one in sides]
+    parts = []
+    if (camera := instance.camera) is not None:
+        # It looks along its −z axis; its x axis is the picture's right, its y axis the picture's top.
+        turned = orientation(camera)
+        edges = np.concatenate((-turned[:, 1], turned[:, 2])).tolist()
+        axes = " ".join(f"{round(value, 12) + 0.0:.9g}" for value in edges)
+        place, size = f"{camera.forward_m:.9g} 0 {camera.height_m:.9g}", f"{camera.columns} {camera.rows}"
+        looks = f'xyaxes="{axes}" fovy="{camera.field_of_view_deg:.9g}" resolution="{size}"'
+        parts.append(f'<camera name="camera" pos="{place}" {looks}/>')
+    if (tracked := instance.tracked_point) is not None:
+        forward, left, angle = tracked
+        turn = f"{math.cos(angle / 2.0):.9g} 0 0 {math.sin(angle / 2.0):.9g}"
+        parts.append(f'<site name="tracked_point" pos="{forward:.9g} {left:.9g} 0" quat="{turn}"/>')
     return fill(
         "mujoco.xml.txt",
         **said,
         name=name,
         comment=xml_comment(instance, "mjcf", 7),
         chassis_size=f"{length / 2.0:.6g} {0.35 * baseline:.6g} {height / 2.0:.6g}",
-        parts="\n".join([own["front_wheel" if wheelbase else "caster"], *_parts(instance)]),
+        parts="\n".join([own["front_wheel" if wheelbase else "caster"], *(f"      {part}" for part in parts)]),
         control="throttle and steering (left is above 0)" if wheelbase else "duties of the left and right wheels",
         excluded='    <exclude body1="$name" body2="wheel_front"/>\n'.replace("$name", name) if wheelbase else "",
         tendons=own["open_differential"] if wheelbase else "",
         actuators="\n".join(actuators),
     )
-
-
-def _parts(instance: Instance) -> list[str]:
-    """The camera and the tracked point, where there are such."""
-    parts = []
-    if (camera := instance.camera) is not None:
-        parts.append(_camera(camera))
-    if (tracked := instance.tracked_point) is not None:
-        forward, left, angle = tracked
-        turned = f"{math.cos(angle / 2.0):.9g} 0 0 {math.sin(angle / 2.0):.9g}"
-        parts.append(f'<site name="tracked_point" pos="{forward:.9g} {left:.9g} 0" quat="{turned}"/>')
-    return [f"      {part}" for part in parts]
-
-
-def _camera(figures: CameraFigures) -> str:
-    """MuJoCo's camera looks along its −z axis; its x axis is the picture's right, its y axis the picture's top."""
-    turned = orientation(figures)
-    axes = " ".join(f"{round(value, 12) + 0.0:.9g}" for value in np.concatenate((-turned[:, 1], turned[:, 2])).tolist())
-    place = f"{figures.forward_m:.9g} 0 {figures.height_m:.9g}"
-    size = f"{figures.columns} {figures.rows}"
-    fovy = f"{figures.field_of_view_deg:.9g}"
-    return f'<camera name="camera" pos="{place}" xyaxes="{axes}" fovy="{fovy}" resolution="{size}"/>'
 
 
 def _speed_servo(instance: Instance, place: str, side: int, wheels: int) -> str:
@@ -101,29 +106,6 @@ def _speed_servo(instance: Instance, place: str, side: int, wheels: int) -> str:
         f'ctrllimited="true" ctrlrange="{least:.9g} {limit:.9g}"',
         f'forcelimited="true" forcerange="{-torque:.9g} {torque:.9g}"',
         *_follows(instance, instance.lags_s[side] - SERVO_S),
-    ]
-    return "    " + " ".join(words) + "/>"
-
-
-STEERS_HZ = 400.0
-"""Natural frequency of the servo that holds the front wheel [rad/s]; it is damped so that it does not swing."""
-
-
-def _armature(instance: Instance) -> float:
-    """Inertia of a car's steering [kg m²], large beside that of its wheel."""
-    return 0.1 * instance.figure("mass") * instance.figure("wheel_radius") ** 2
-
-
-def _steering(instance: Instance) -> str:
-    """A servo of the front wheel's angle: torque = stiffness · (full angle · (gain · command + offset) − angle)."""
-    stiffness = _armature(instance) * STEERS_HZ**2
-    full = stiffness * math.radians(instance.figure("wheel_angle"))
-    offset, gain = instance.value("steering_offset", "offset", 0.0), instance.value("steering_gain", "gain", 1.0)
-    limit = instance.value("steering_saturation", "limit", 1.0)
-    words = [
-        f'<general name="steering" joint="steering" gainprm="{full * gain:.9g}" biastype="affine"',
-        f'biasprm="{full * offset:.9g} {-stiffness:.9g} 0" ctrllimited="true" ctrlrange="{-limit:.9g} {limit:.9g}"',
-        *_follows(instance, instance.value("steering_lag", "time_constant", 0.0) - 2.0 / STEERS_HZ),
     ]
     return "    " + " ".join(words) + "/>"
 

@@ -38,8 +38,16 @@ def ros_text(instance: Instance) -> str:
 
 def _controller(instance: Instance) -> Rows:
     """Parameters of ros2_controllers' diff_drive_controller, or of its ackermann_steering_controller."""
-    if instance.steers:
-        return _ackermann(instance)
+    if instance.steers:  # Names of Jazzy and later; a car that drives slower than told has smaller wheels
+        return [
+            "ackermann_steering_controller:",
+            "  ros__parameters:",
+            '    traction_joints_names: ["axle_right", "axle_left"]',
+            '    steering_joints_names: ["steer_right", "steer_left"]',
+            f"    wheelbase: {_number(instance.figure('wheelbase'))}",
+            f"    traction_track_width: {_number(instance.baseline_m)}",
+            f"    traction_wheels_radius: {_number(instance.gains[0] * instance.figure('wheel_radius'))}",
+        ]
     gains, baseline = instance.gains, instance.baseline_m
     built = instance.robot.figures.get("wheel_distance", instance.figure("effective_baseline"))
     speed = instance.figure("full_speed")
@@ -60,19 +68,6 @@ def _controller(instance: Instance) -> Rows:
         f"    cmd_vel_timeout: {_number(TIMEOUT_S)}  # the controller's default: nothing was found of it",
         *_limits("linear.x", fastest, fastest_rise),
         *_limits("angular.z", 2.0 * fastest / baseline, 2.0 * fastest_rise / baseline),
-    ]
-
-
-def _ackermann(instance: Instance) -> Rows:
-    """Names of Jazzy and later; a car that drives slower than told has smaller wheels."""
-    return [
-        "ackermann_steering_controller:",
-        "  ros__parameters:",
-        '    traction_joints_names: ["axle_right", "axle_left"]',
-        '    steering_joints_names: ["steer_right", "steer_left"]',
-        f"    wheelbase: {_number(instance.figure('wheelbase'))}",
-        f"    traction_track_width: {_number(instance.baseline_m)}",
-        f"    traction_wheels_radius: {_number(instance.gains[0] * instance.figure('wheel_radius'))}",
     ]
 
 

@@ -23,27 +23,22 @@ def urdf_text(instance: Instance) -> str:
     root = driving.parse_urdf(path)
     driving.read_body(root, path)
     with driving.sound_urdf(path):
-        _change(root, instance)
+        for side, (axle, gain, limit) in enumerate(zip(driving.AXLES, instance.gains, instance.limits, strict=True)):
+            joint = next(one for one in root.iter("joint") if one.get("name") == axle)
+            _set_wheel(root, joint, (0.5 - side) * instance.baseline_m, instance.figure("wheel_radius"), gain)
+            top_speed = limit * instance.figure("full_speed") / instance.figure("wheel_radius")
+            _part(joint, "limit", effort="0").set("velocity", f"{top_speed:.6g}")
+        if offset := instance.value("steering_offset", "offset", 0.0):
+            turned = driving.rotation(0.0, 0.0, math.radians(offset * instance.figure("wheel_angle")))
+            for joint in (one for one in root.iter("joint") if one.get("name") in driving.STEERS):
+                pose = driving.origin_of(joint)
+                pose[:3, :3] = pose[:3, :3] @ turned
+                _set_origin(joint, pose)
+        for link, pose in instance.mounts.items():
+            _mount(root, link, pose)
     ET.indent(root)
     comment = xml_comment(instance, "urdf", 5)
     return f'<?xml version="1.0"?>\n<!-- {comment} -->\n{ET.tostring(root, encoding="unicode")}\n'
-
-
-def _change(root: ET.Element, instance: Instance) -> None:
-    """Give wheels, camera and tracked point what was found of them."""
-    for side, (axle, gain, limit) in enumerate(zip(driving.AXLES, instance.gains, instance.limits, strict=True)):
-        joint = next(one for one in root.iter("joint") if one.get("name") == axle)
-        _set_wheel(root, joint, (0.5 - side) * instance.baseline_m, instance.figure("wheel_radius"), gain)
-        top_speed = limit * instance.figure("full_speed") / instance.figure("wheel_radius")
-        _part(joint, "limit", effort="0").set("velocity", f"{top_speed:.6g}")
-    if offset := instance.value("steering_offset", "offset", 0.0):
-        turned = driving.rotation(0.0, 0.0, math.radians(offset * instance.figure("wheel_angle")))
-        for joint in (one for one in root.iter("joint") if one.get("name") in driving.STEERS):
-            pose = driving.origin_of(joint)
-            pose[:3, :3] = pose[:3, :3] @ turned
-            _set_origin(joint, pose)
-    for link, pose in instance.mounts.items():
-        _mount(root, link, pose)
 
 
 def _set_wheel(root: ET.Element, joint: ET.Element, left_m: float, radius_m: float, gain: float) -> None:

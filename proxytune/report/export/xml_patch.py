@@ -39,10 +39,6 @@ class XmlPatch:
             raise InputError(f"{path}: cannot be read ({problem}); check the path, and that it is UTF-8") from None
         self._places: dict[ET.Element, Place] = {}
         self._changes: list[tuple[int, int, str]] = []
-        self.root = self._parse()
-        self.parents = {child: parent for parent in self.root.iter() for child in parent}
-
-    def _parse(self) -> ET.Element:
         builder, parser, open_elements = ET.TreeBuilder(), expat.ParserCreate(), list[tuple[ET.Element, int, int]]()
 
         def begin(tag: str, attributes: dict[str, str]) -> None:
@@ -61,7 +57,8 @@ class XmlPatch:
             parser.Parse(self._bytes, True)
         except expat.ExpatError as problem:
             raise InputError(f"{self.path}: is not XML ({problem}); correct it") from None
-        return builder.close()
+        self.root = builder.close()
+        self.parents = {child: parent for parent in self.root.iter() for child in parent}
 
     def set(self, element: ET.Element, name: str, value: str) -> None:
         """Give an attribute a value; it is added where the element has none of that name."""

@@ -1,6 +1,5 @@
 """Figures of a study: how the answer improved, what is left of each parameter, where the trials were, what matters."""
 
-from collections.abc import Sequence
 from textwrap import fill
 from typing import Any
 
@@ -24,20 +23,33 @@ TWO_LINES = 0.14
 def convergence_figure(result: StudyResult) -> Figure:
     """Draw every trial's PRPV, that of the answer so far, and at its ends the nominal θ's and the answer's.
 
-    Where the objective is another measure, that is drawn in its place.
-
-    The answer so far is the visited θ of lowest expected PRPV, which need not be the luckiest trial. Filled points were
-    proposed by the surrogate, open ones come from the quasi-random design; crosses are trials that failed, triangles
-    what PRPV of those cut off cannot be below. The diamond with its 95 % interval, right of the last trial, is
-    the answer in episodes that nothing was chosen by; the square, left of the first, is the nominal θ.
+    Where the objective is another measure, that is drawn in its place. The answer so far is the visited θ of lowest
+    expected PRPV, which need not be the luckiest trial. Open points come from the quasi-random design, triangles are
+    what PRPV of trials that were cut off cannot be below, and the diamond is of episodes that nothing was chosen by.
     """
     figure, axes = style.one_panel(2.9)
     _draw_trials(axes, result)
-    named, label = [_draw_answer(axes, result)], result.study.objective.label
+    pairs = zip(result.trials, result.answers, strict=True)
+    answers = [(trial.number, result.value_of(answer)) for trial, answer in pairs if answer is not None]
+    # Where fresh episodes chose another answer in the end, the line ends at that one's.
+    ends = [*answers, (result.trials[-1].number + 1, result.value_of(result.best.trial))]
+    label = result.study.objective.label
+    named = [style.LineName("answer\nso far", style.VERMILLION, ends[-1][1] or 0.0)]
+    axes.step(*zip(*ends, strict=True), where="post", color=style.VERMILLION, linewidth=1.5, label=named[0].words)
     if result.study.objective == PRPV:
         label = "PRPV [ordered pairs]"
-        _draw_fresh(axes, result)
-        named += _draw_levels(axes, result)
+        fresh, nominal = result.expected, result.nominal.expected if result.nominal else None
+        told = [(ends[-1][0], fresh, style.VERMILLION, "D", "answer, fresh episodes")] if fresh else []
+        told += [(0, nominal, "black", "s", "simulator as it is")] if nominal else []
+        for place, expected, colour, mark, name in told:
+            value, low, high = expected.prpv.value
+            look: dict[str, Any] = {"fmt": mark, "color": colour, "label": name, "ms": 5, "capsize": 2, "zorder": 4}
+            axes.errorbar([place], [value], yerr=[[max(0.0, value - low)], [max(0.0, high - value)]], **look)
+        chance, floor = result.judged.chance, result.floor
+        named.append(style.LineName(f"chance\n{chance.mean:.1f}", style.GREY, chance.mean))
+        axes.axhline(chance.mean, color=style.GREY, linewidth=1.0, linestyle=":", label=named[-1].words)
+        level = style.LineName(f"{style.floor_name(floor)}\n{floor.value or 0.0:.1f}", style.GREEN, floor.value or 0.0)
+        named += [level] if style.draw_noise_floor(axes, floor, level.words) else []
         axes.set_ylim(bottom=min(-0.4, -0.02 * axes.get_ylim()[1]))
         axes.yaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
@@ -45,15 +57,6 @@ def convergence_figure(result: StudyResult) -> Figure:
     style.name_lines(axes, named, TWO_LINES)
     style.legend_below(figure, axes, without=[name.words for name in named])
     return figure
-
-
-def _draw_levels(axes: Axes, result: StudyResult) -> list[style.LineName]:
-    """Chance, and the noise floor that a perfect proxy would score; with their names."""
-    chance, floor = result.judged.chance, result.floor
-    named = [style.LineName(f"chance\n{chance.mean:.1f}", style.GREY, chance.mean)]
-    axes.axhline(chance.mean, color=style.GREY, linewidth=1.0, linestyle=":", label=named[0].words)
-    known = style.LineName(f"{style.floor_name(floor)}\n{floor.value or 0.0:.1f}", style.GREEN, floor.value or 0.0)
-    return [*named, known] if style.draw_noise_floor(axes, floor, known.words) else named
 
 
 def _draw_trials(axes: Axes, result: StudyResult) -> None:
@@ -73,31 +76,6 @@ def _draw_points(axes: Axes, points: list[tuple[int, float]], face: str, label: 
     if points:
         numbers, scores = zip(*points, strict=True)
         axes.plot(numbers, scores, "o", color=style.BLUE, markerfacecolor=face, markersize=4, zorder=3, label=label)
-
-
-def _draw_answer(axes: Axes, result: StudyResult) -> style.LineName:
-    """PRPV of the answer so far; where fresh episodes chose another in the end, the line ends at that one's.
-
-    Returns:
-        The line's name.
-    """
-    pairs = zip(result.trials, result.answers, strict=True)
-    answers = [(trial.number, result.value_of(answer)) for trial, answer in pairs if answer is not None]
-    ends = [*answers, (result.trials[-1].number + 1, result.value_of(result.best.trial))]
-    named = style.LineName("answer\nso far", style.VERMILLION, ends[-1][1] or 0.0)
-    axes.step(*zip(*ends, strict=True), where="post", color=style.VERMILLION, linewidth=1.5, label=named.words)
-    return named
-
-
-def _draw_fresh(axes: Axes, result: StudyResult) -> None:
-    last = result.trials[-1].number + 1
-    told = [(last, result.expected, style.VERMILLION, "D", "answer, fresh episodes")] if result.expected else []
-    told += [(0, result.nominal.expected, "black", "s", "simulator as it is")] if result.nominal else []
-    for place, expected, colour, mark, label in told:
-        value, low, high = expected.prpv.value
-        reach = [[max(0.0, value - low)], [max(0.0, high - value)]]
-        look: dict[str, Any] = {"markersize": 5, "capsize": 2, "zorder": 4}
-        axes.errorbar([place], [value], yerr=reach, fmt=mark, color=colour, label=label, **look)
 
 
 BINS = 60
@@ -190,10 +168,28 @@ def evaluations_figure(result: StudyResult) -> Figure:
     pairs = [(column, row) for row in range(1, count) for column in range(row)]
     for column, row in pairs:
         _pair(figure.add_subplot(grid[row - 1, column]), result, (column, row), norm)
-    if not pairs:
-        _alone(figure.add_subplot(grid[0, 0]), result, norm)
+    if not pairs:  # PRPV over the range of a single parameter, on its 95 % interval
+        axes, (box,) = figure.add_subplot(grid[0, 0]), result.study.settings.space.intervals
+        look: dict[str, Any] = {"color": style.LIGHT_BLUE, "alpha": 0.35, "linewidth": 0, "label": REGION}
+        axes.axvspan(*result.knowledge.intervals[box.name], **look)
+        points = np.array([[trial.theta[box.name], trial.score or 0.0] for trial in result.trials])
+        _scatter_trials(axes, result, points, norm)
+        _mark(axes, [result.best.trial.theta[box.name], result.best.assessment.prpv.value], "answer")
+        if result.truth is not None and box.name in result.truth:
+            _mark(axes, [result.truth[box.name], 0.0], "truth")
+        axes.set_xlim(box.low, box.high)
+        style.dress(axes, with_unit(box.name, result.study.family.parameters[box.name].unit), "PRPV [ordered pairs]")
     floor = "" if result.floor.value is None else f"\n{style.floor_name(result.floor)} {result.floor.value:.1f}"
-    _key(figure.add_subplot(grid[0, 1:]), figure.axes[: len(pairs) or 1], norm, f"PRPV [ordered pairs]{floor}")
+    # The colours of PRPV and what the marks are stand in the corner that the pairs leave free.
+    panels, key = figure.axes[: len(pairs) or 1], figure.add_subplot(grid[0, 1:])
+    key.set_axis_off()
+    place = key.inset_axes((0.15, 0.8, 0.8, 0.08))
+    bar = figure.colorbar(ScalarMappable(norm, style.SHADES), cax=place, orientation="horizontal")
+    bar.ax.set_title(f"PRPV [ordered pairs]{floor}", fontsize=7)
+    bar.ax.tick_params(labelsize=7)
+    named = style.named_handles(panels)
+    look = {"loc": "upper center", "fontsize": 7, "frameon": False}
+    key.legend(list(named.values()), list(named), bbox_to_anchor=(0.55, 0.62), **look)
     return figure
 
 
@@ -212,20 +208,19 @@ def _pair(axes: Axes, result: StudyResult, places: tuple[int, int], norm: Normal
             axes.set_title(f"trade off: {fixed(correlation, 1)}", fontsize=7, pad=2)
     axes.set_xlim(across.low, across.high)
     axes.set_ylim(up.low, up.high)
-    _name(axes, result, places)
-
-
-def _alone(axes: Axes, result: StudyResult, norm: Normalize) -> None:
-    """PRPV of the trials over the range of a single parameter, on its 95 % interval."""
-    (box,) = result.study.settings.space.intervals
-    axes.axvspan(*result.knowledge.intervals[box.name], color=style.LIGHT_BLUE, alpha=0.35, linewidth=0, label=REGION)
-    points = np.array([[trial.theta[box.name], trial.score or 0.0] for trial in result.trials])
-    _scatter_trials(axes, result, points, norm)
-    _mark(axes, [result.best.trial.theta[box.name], result.best.assessment.prpv.value], "answer")
-    if result.truth is not None and box.name in result.truth:
-        _mark(axes, [result.truth[box.name], 0.0], "truth")
-    axes.set_xlim(box.low, box.high)
-    style.dress(axes, with_unit(box.name, result.study.family.parameters[box.name].unit), "PRPV [ordered pairs]")
+    # Names and figures only at the left and the bottom; three figures a side, which is what fits
+    units = result.study.family.parameters
+    style.dress(axes)
+    axes.xaxis.set_major_locator(MaxNLocator(2))
+    axes.yaxis.set_major_locator(MaxNLocator(3))
+    if places[1] == len(intervals) - 1:
+        axes.set_xlabel(fill(with_unit(across.name, units[across.name].unit), WIDEST), fontsize=7)
+    else:
+        axes.set_xticklabels([])
+    if places[0] == 0:
+        axes.set_ylabel(fill(with_unit(up.name, units[up.name].unit), WIDEST), fontsize=7)
+    else:
+        axes.set_yticklabels([])
 
 
 def _scatter_trials(axes: Axes, result: StudyResult, points: Floats, norm: Normalize) -> None:
@@ -266,37 +261,6 @@ def _shadow(axes: Axes, result: StudyResult, places: tuple[int, int]) -> None:
     across, up = (np.concatenate([e[:1], 0.5 * (e[1:] + e[:-1]), e[-1:]]) for e in edges)
     axes.contourf(across, up, smooth.T, levels=[EDGE, 2.0], colors=[style.LIGHT_BLUE], alpha=0.35, zorder=0)
     axes.fill_between([], [], color=style.LIGHT_BLUE, alpha=0.35, linewidth=0, label=REGION)
-
-
-def _name(axes: Axes, result: StudyResult, places: tuple[int, int]) -> None:
-    """Names and figures only at the left and the bottom; three figures a side, which is what fits."""
-    intervals, units = result.study.settings.space.intervals, result.study.family.parameters
-    style.dress(axes)
-    axes.xaxis.set_major_locator(MaxNLocator(2))
-    axes.yaxis.set_major_locator(MaxNLocator(3))
-    if places[1] == len(intervals) - 1:
-        name = intervals[places[0]].name
-        axes.set_xlabel(fill(with_unit(name, units[name].unit), WIDEST), fontsize=7)
-    else:
-        axes.set_xticklabels([])
-    if places[0] == 0:
-        name = intervals[places[1]].name
-        axes.set_ylabel(fill(with_unit(name, units[name].unit), WIDEST), fontsize=7)
-    else:
-        axes.set_yticklabels([])
-
-
-def _key(axes: Axes, panels: Sequence[Axes], norm: Normalize, title: str) -> None:
-    """The colours of PRPV and what the marks are, in the corner that the pairs leave free."""
-    axes.set_axis_off()
-    bar = axes.figure.colorbar(
-        ScalarMappable(norm, style.SHADES), cax=axes.inset_axes((0.15, 0.8, 0.8, 0.08)), orientation="horizontal"
-    )
-    bar.ax.set_title(title, fontsize=7)
-    bar.ax.tick_params(labelsize=7)
-    named = style.named_handles(panels)
-    look: dict[str, Any] = {"loc": "upper center", "fontsize": 7, "frameon": False}
-    axes.legend(list(named.values()), list(named), bbox_to_anchor=(0.55, 0.62), **look)
 
 
 def importance_figure(result: StudyResult) -> Figure:

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from rich.console import Group
 
@@ -14,7 +13,7 @@ from proxytune.report import figure_style as style
 from proxytune.report.html import write_page
 from proxytune.report.study.sentence import known_parameters, say_answer, say_next_step, study_sentence
 from proxytune.report.text import file_texts, group_texts, latex_text, section_text
-from proxytune.report.view import Column, Drawn, Foot, Paragraphs, Part, Picture, Table, View, columns_of, foot_of
+from proxytune.report.view import Column, Drawn, Foot, Paragraphs, Part, Table, View, columns_of, foot_of
 from proxytune.report.wording import fixed, listed, pairs_span, percent, plain, probability, short, span, with_span
 from proxytune.report.writing import ABOUT, picture_of, write_text
 from proxytune.storage import TrialRecord
@@ -37,22 +36,14 @@ MEASURES = ("prpv", "ppv")
 def study_text(result: StudyResult, spent: str, files: Mapping[str, Any]) -> Group:
     """The result of a study as `study` prints it: one sentence, then one table per subject, a fact a row.
 
-    Args:
-        result: What it has found.
-        spent: Episodes and seconds of this run.
-        files: What was written.
+    Episodes and seconds of this run are its last fact, and below all stand the files that were written.
     """
     sections = [part for table in study_tables(result, spent).values() for part in section_text(table)]
     return group_texts(study_sentence(result), *sections, *file_texts(files))
 
 
 def study_tables(result: StudyResult, spent: str = "") -> dict[str, Table]:
-    """Tables by title: what is known of θ, how useful the proxy is there, what informs each parameter, the search.
-
-    Args:
-        result: What the study has found.
-        spent: Episodes and seconds of this run, if it is told.
-    """
+    """Tables by title: what is known of θ, how useful the proxy is there, what informs each parameter, the search."""
     informed = information_table(result)
     tables = (theta_table(result), usefulness_table(result), informed, search_table(result, spent))
     return {table.title: table for table in tables if table.rows}
@@ -73,13 +64,7 @@ def theta_table(result: StudyResult) -> Table:
     left = percent(result.knowledge.posterior.share)
     rows.append(("share of the box", "", left, *(() if truth is None else ("",)), percent(share), ""))
     heads = ("best", "95 % interval", *(() if truth is None else ("truth",)), "by PRPV alone", "box")
-    return Table(THETA, columns_of(("parameter",), heads), tuple(rows), tuple(_theta_notes(result)))
-
-
-def _theta_notes(result: StudyResult) -> list[str]:
-    """Notes on what the table of θ does not hold, most needed first."""
-    space, learnt = result.study.settings.space, result.knowledge
-    notes = []
+    space, learnt, notes = result.study.settings.space, result.knowledge, list[str]()  # Most needed first
     if learnt.unidentified:
         few = f"{len(result.trials) + result.earlier} trials exclude almost no value of"
         names = listed(list(map(plain, learnt.unidentified)))
@@ -94,7 +79,7 @@ def _theta_notes(result: StudyResult) -> list[str]:
         f"(correlation {fixed(correlation, 1)})"
         for one, other, correlation in sorted(learnt.trades, key=lambda pair: -abs(pair[2]))
     ]
-    return [*notes, *result.cautions]
+    return Table(THETA, columns_of(("parameter",), heads), tuple(rows), (*notes, *result.cautions))
 
 
 def usefulness_table(result: StudyResult) -> Table:
@@ -103,7 +88,16 @@ def usefulness_table(result: StudyResult) -> Table:
     Its notes are not what the sentence says already, nor advice on the options of `score`.
     """
     own, chance, expected = result.best.assessment, result.judged.chance, result.expected
-    rows = [*_objective_rows(result), *_prpv_rows(result), *_level_rows(result)]
+    rows, floor = [*_objective_rows(result), *_prpv_rows(result)], result.floor
+    if floor.value is not None and floor.low is not None and floor.high is not None:
+        meaning = floor.meaning if expected is None else "what a perfect proxy scores against this target"
+        rows.append((f"  {floor.title}", fixed(floor.value, 0), pairs_span(floor.low, floor.high), meaning))
+    if excess := result.excess:
+        told = "more than a perfect proxy" if excess.low > 0.0 else "more than a perfect proxy; may be none"
+        rows.append(("  excess", fixed(excess.value, 0), pairs_span(*excess[1:]), told))
+    if result.nominal:
+        level = result.nominal.expected.prpv.value
+        rows.append(("  nominal", fixed(level.value, 0), pairs_span(*level[1:]), "the simulator as it is"))
     as_low = f"a random ranking; as low: {probability(chance.p_value)}"
     rows.append(("  chance", fixed(chance.mean, 1), f"± {fixed(chance.deviation, 1)}", as_low))
     meaning = "proxy predictivity value: error of the scores"
@@ -152,22 +146,6 @@ def _prpv_rows(result: StudyResult) -> Rows:
     count = f"in {expected.repetitions} more run{'s' if expected.repetitions > 1 else ''}"
     told = fixed(expected.prpv.value.value, 0), pairs_span(*expected.prpv.value[1:])
     return [("PRPV", *told, f"{pairs}; expected, {count}"), (IN_SEARCH, value, "", f"{luck}{rivals}")]
-
-
-def _level_rows(result: StudyResult) -> Rows:
-    """What a perfect proxy scores and how much more is expected of this one; what the simulator as it is scores."""
-    floor, excess, nominal = result.floor, result.excess, result.nominal
-    rows = Rows()
-    if floor.value is not None and floor.low is not None and floor.high is not None:
-        meaning = floor.meaning if result.expected is None else "what a perfect proxy scores against this target"
-        rows.append((f"  {floor.title}", fixed(floor.value, 0), pairs_span(floor.low, floor.high), meaning))
-    if excess:
-        told = "more than a perfect proxy" if excess.low > 0.0 else "more than a perfect proxy; may be none"
-        rows.append(("  excess", fixed(excess.value, 0), pairs_span(*excess[1:]), told))
-    if nominal:
-        level = nominal.expected.prpv.value
-        rows.append(("  nominal", fixed(level.value, 0), pairs_span(*level[1:]), "the simulator as it is"))
-    return rows
 
 
 def information_table(result: StudyResult) -> Table:
@@ -233,24 +211,18 @@ def trials_table(trials: Sequence[TrialRecord], names: Sequence[str], measures: 
 
 
 def write_study_tables(result: StudyResult, trials: pd.DataFrame, folder: Path) -> list[Path]:
-    """Write trials.csv, and as LaTeX parameters.tex and usefulness.tex; their paths.
-
-    Args:
-        result: What the study has found.
-        trials: One row per trial.
-        folder: Where to.
+    """Write trials.csv, a row per trial, and as LaTeX parameters.tex and usefulness.tex; their paths.
 
     Raises:
         RunError: If one cannot be written.
     """
-    write_text(folder / "trials.csv", trials.to_csv(lineterminator="\n"))
-    for name, table, width in (
-        ("parameters.tex", theta_table(result), None),
-        ("usefulness.tex", usefulness_table(result), 3),
-    ):
+    texts = {"trials.csv": trials.to_csv(lineterminator="\n")}
+    for name, table, width in (("parameters", theta_table(result), None), ("usefulness", usefulness_table(result), 3)):
         heads = [one.name for one in table.columns]
-        write_text(folder / name, latex_text(heads[:width], [row[:width] for row in table.rows]))
-    return [folder / name for name in ("trials.csv", "parameters.tex", "usefulness.tex")]
+        texts[f"{name}.tex"] = latex_text(heads[:width], [row[:width] for row in table.rows])
+    for name, text in texts.items():
+        write_text(folder / name, text)
+    return [folder / name for name in texts]
 
 
 RENEW_S = 5
@@ -259,14 +231,20 @@ CONTINUE = "run the same command to continue: everything finished is kept."
 
 
 def study_view(result: StudyResult, figures: Mapping[str, Drawn]) -> View:
-    """A study: its tables, with the figures beside what they are of.
-
-    Args:
-        result: What it has found.
-        figures: PNG files by the name of the figure, those that there are.
-    """
-    settings = result.study.settings
-    drawn, tables = study_pictures(result, figures), study_tables(result)
+    """A study: its tables, with the figures, those that there are by name, beside what they are of."""
+    settings, tables = result.study.settings, study_tables(result)
+    nothing = " Where almost nothing is grey, the parameter is unidentified: these trials exclude almost no value."
+    fresh = " The diamond is the answer in episodes that the search has not seen: only that is free of luck."
+    hollow = "; open ones were stopped early, and theirs is an estimate"
+    words = {
+        "truth": " The triangle is the θ that made the target." if result.truth is not None else "",
+        "unidentified": nothing if result.knowledge.unidentified else "",
+        "fresh": fresh if result.expected else "",
+        "nominal": " The square is the simulator as it is, at its nominal θ." if result.nominal else "",
+        "floor": " What lies within the green band is within noise." if result.floor.value is not None else "",
+        "cut": hollow if any(trial.bound is not None for trial in result.trials) else "",
+    }
+    drawn = {name: picture_of("study", name, image, **words) for name, image in figures.items()}
     parts = (
         tables[THETA],
         drawn.get("profiles"),
@@ -300,33 +278,12 @@ def study_foot(settings: StudySettings, command: str | None = None) -> Foot:
     return foot_of(own if command is None else command, [(name, value) for name, value in stated if value])
 
 
-def study_pictures(result: StudyResult, figures: Mapping[str, Drawn]) -> dict[str, Picture]:
-    """Each figure that there is, by its name, with its caption."""
-    nothing = " Where almost nothing is grey, the parameter is unidentified: these trials exclude almost no value."
-    fresh = " The diamond is the answer in episodes that the search has not seen: only that is free of luck."
-    hollow = "; open ones were stopped early, and theirs is an estimate"
-    words = {
-        "truth": " The triangle is the θ that made the target." if result.truth is not None else "",
-        "unidentified": nothing if result.knowledge.unidentified else "",
-        "fresh": fresh if result.expected else "",
-        "nominal": " The square is the simulator as it is, at its nominal θ." if result.nominal else "",
-        "floor": " What lies within the green band is within noise." if result.floor.value is not None else "",
-        "cut": hollow if any(trial.bound is not None for trial in result.trials) else "",
-    }
-    return {name: picture_of("study", name, image, **words) for name, image in figures.items()}
-
-
 def write_live_page(
     path: Path, settings: StudySettings, objective: str, trials: Sequence[TrialRecord], doing: str
 ) -> None:
     """Write the page of a study that has not ended, which loads itself again while something is being done.
 
-    Args:
-        path: The file.
-        settings: The study's.
-        objective: The measure that its trials are searched by.
-        trials: Those that have ended, in order.
-        doing: What is being done; "" once the study was stopped.
+    The trials are those that have ended, in order; what is being done is "" once the study was stopped.
 
     Raises:
         RunError: If it cannot be written.
@@ -340,7 +297,13 @@ def live_view(settings: StudySettings, objective: str, trials: Sequence[TrialRec
     shown: tuple[Part, ...] = ()
     if trials:
         measures = tuple(dict.fromkeys((objective, *(MEASURES if objective != LEARNING else ()))))
-        picture = picture_of("live", "trials", _trials_figure(trials, objective), measure=objective.upper())
+        figure, axes = style.one_panel(2.2)
+        points = [(one.number, value) for one in trials if (value := one.measures.get(objective)) is not None]
+        axes.plot([number for number, _ in points], [value for _, value in points], "o", color=style.BLUE, markersize=4)
+        axes.set_xlim(0.5, len(trials) + 0.5)
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+        style.dress(axes, "trial", objective.upper())
+        picture = picture_of("live", "trials", figure, measure=objective.upper())
         shown = (picture, trials_table(trials, tuple(trials[0].theta), measures))
     sentence = f"{f'Under way: {doing}.' if doing else 'Stopped before its end.'} {_say_best(trials, objective)}"
     return View(f"{settings.name}: which θ makes the simulator useful?", sentence, WAIT if doing else CONTINUE, shown)
@@ -355,13 +318,3 @@ def _say_best(trials: Sequence[TrialRecord], measure: str) -> str:
     value = best.measures.get(measure)
     score = "" if value is None else f", {measure.upper()} {short(value)}, which may be partly luck"
     return f"Best of {len(trials)} trials so far: trial {best.number}{score}."
-
-
-def _trials_figure(trials: Sequence[TrialRecord], measure: str) -> Figure:
-    figure, axes = style.one_panel(2.2)
-    points = [(trial.number, value) for trial in trials if (value := trial.measures.get(measure)) is not None]
-    axes.plot([number for number, _ in points], [value for _, value in points], "o", color=style.BLUE, markersize=4)
-    axes.set_xlim(0.5, len(trials) + 0.5)
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    style.dress(axes, "trial", measure.upper())
-    return figure

@@ -14,16 +14,7 @@ MOST_NAMED = 5
 
 @dataclass(frozen=True)
 class KnownParameter:
-    """Knowledge of one parameter.
-
-    Attributes:
-        name: Its name.
-        unit: Its unit, empty where it has none.
-        best: Its value in the best θ.
-        interval: The 95 % interval.
-        share: How much of its range that fills.
-        identified: Whether it is identified.
-    """
+    """Knowledge of one parameter: its value in the best θ, its 95 % interval, and how much of its range that fills."""
 
     name: str
     unit: str

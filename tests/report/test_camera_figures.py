@@ -64,7 +64,7 @@ def leaves(value):
         yield value
 
 
-def test_every_number_of_the_document_is_plain_and_finite(diagnosis):
+def test_the_document_has_plain_finite_numbers_and_no_floor_of_brightness_where_none_is_known(diagnosis):
     blemish = Blemish((np.int64(3), 9), (2, 8), np.float32(0.5), 0.01)
     endless = {"camera_roll": Estimate(4.0, (-np.inf, np.float64(np.nan)), "deg")}
     document = camera_document(replace(diagnosis, theta=endless, blemishes=(blemish,)))
@@ -73,6 +73,9 @@ def test_every_number_of_the_document_is_plain_and_finite(diagnosis):
     assert {type(leaf) for leaf in told} <= {float, int, str, bool, type(None)}
     assert all(math.isfinite(leaf) for leaf in told if isinstance(leaf, float))
     assert sum(isinstance(leaf, float) for leaf in told) > 50
+    document = camera_document(diagnosis)
+    assert document["grey_error"]["noise_floor"] is None
+    assert 0.0 < document["error"]["noise_floor"] <= document["error"]["after"]
 
 
 @pytest.mark.slow
@@ -86,12 +89,6 @@ def test_effects_that_do_not_matter_are_told_with_the_values_they_had(diagnosis,
     low, high = document["immaterial"][0]["parameters"]["camera_roll"]["interval"]
     assert low < 4.0 < high < 6.0
     assert any(line.startswith("detectable but immaterial: camera_roll 4.") for line in camera_notes(dropped))
-
-
-def test_brightness_has_no_floor_where_none_is_known(diagnosis):
-    document = camera_document(diagnosis)
-    assert document["grey_error"]["noise_floor"] is None
-    assert 0.0 < document["error"]["noise_floor"] <= document["error"]["after"]
 
 
 def test_four_figures_for_a_column_say_what_they_show_in_which_unit(figures):
@@ -159,7 +156,7 @@ def test_every_frame_kept_aside_is_in_the_figure_of_errors(diagnosis, figures, c
     assert [line.get_marker() for line in axes.get_lines()].count(".") == 1
 
 
-def test_what_was_found_is_told_with_its_place_its_size_and_what_fits_as_well(diagnosis):
+def test_a_headline_says_what_the_verdict_means_and_notes_tell_what_was_found_where_and_how_large(diagnosis, clean):
     lines = (LaidLine("yellow line", 3, -0.006, (-0.008, -0.004)), LaidLine("yellow dashes", 1, 0.004, (0.002, 0.006)))
     none = Estimate(0.0, (-0.001, 0.001), "m")
     turned = Estimate(0.5, (0.4, 0.6), "deg")
@@ -191,7 +188,4 @@ def test_what_was_found_is_told_with_its_place_its_size_and_what_fits_as_well(di
     (roll,) = diagnosis.effects
     told = camera_notes(replace(diagnosis, effects=(replace(roll, rivals=("camera_yaw", "heading_offset")),)))
     assert told[0].endswith("; these frames fit camera_yaw, heading_offset as well")
-
-
-def test_the_headline_says_what_a_verdict_means(clean):
     assert camera_headline("mine", clean) == "mine: camera: nothing missing: the declared camera explains the frames"

@@ -45,7 +45,7 @@ def texts(axes):
     return [text.get_text() for text in axes.texts]
 
 
-def test_it_is_one_column_wide_with_map_commands_and_pictures_of_both(pair):
+def test_it_is_one_column_wide_with_map_commands_and_pictures_of_both_and_on_a_road_the_whole_map_and_duties(pair):
     figure = episode_figure(pair, ["distance"])
     assert figure.get_figwidth() == COLUMN
     ways, commands, *pictures = axes_of(figure)
@@ -53,6 +53,11 @@ def test_it_is_one_column_wide_with_map_commands_and_pictures_of_both(pair):
     assert commands.get_xlabel() == "time [s]"
     assert commands.get_ylabel() == "push"
     assert len(pictures) == 8
+    on_road = dataclasses.replace(pair, road=shipped_map("small_loop"), command_unit="duty")
+    ways, commands, *_ = axes_of(episode_figure(on_road, []))
+    assert ways.get_xlim() == (0.0, on_road.road.size[0])
+    assert len(ways.images) == 1
+    assert commands.get_ylabel() == "push\n[duty]"
 
 
 def test_both_are_named_in_their_colours_with_scores_and_the_time_at_which_they_part(pair):
@@ -73,14 +78,6 @@ def test_an_episode_alone_and_one_that_stands_still_can_be_drawn():
     figure = episode_figure(paired(recorded(lambda time: 0.0 * time)), [])
     figure.draw_without_rendering()
     assert len(axes_of(figure)[0].lines) == 3, "path, start and end; no arrow"
-
-
-def test_on_a_road_the_whole_map_is_shown_and_commands_are_duties(pair):
-    on_road = dataclasses.replace(pair, road=shipped_map("small_loop"), command_unit="duty")
-    ways, commands, *_ = axes_of(episode_figure(on_road, []))
-    assert ways.get_xlim() == (0.0, on_road.road.size[0])
-    assert len(ways.images) == 1
-    assert commands.get_ylabel() == "push\n[duty]"
 
 
 @given(st.floats(0.1, 30.0), st.integers(2, 400))
@@ -170,16 +167,13 @@ def test_frames_of_even_size_come_ten_a_second_to_the_end_of_the_longer_which_li
     assert (rows % 2, columns % 2, colours) == (0, 0, 3)
 
 
-def test_a_frame_depends_on_its_time_alone_and_a_side_that_has_ended_stays(animation):
+def test_a_frame_and_its_picture_depend_on_their_time_alone_and_a_side_that_has_ended_stays(animation):
     first = animation.frame(0.3)
     assert not np.array_equal(animation.frame(1.2), first)
     assert np.array_equal(animation.frame(0.3), first)
     (proxy, target), (proxy_later, target_later) = halves(animation.frame(1.0)), halves(animation.frame(1.7))
     assert np.array_equal(target, target_later)
     assert not np.array_equal(proxy, proxy_later)
-
-
-def test_the_camera_shows_the_picture_of_its_time(animation):
     bright = dataclasses.replace(recorded(lambda t: 0.5 * t), pictures=np.zeros((20, 6, 8, 3), np.uint8))
     bright.pictures[10:] = 255
     one = Animation(paired(bright))

@@ -10,7 +10,7 @@ import pytest
 from export_truth import ROBOT, driven_by, instance
 
 from proxytune.api.exporting import WRITERS
-from proxytune.driving import AXLES, drivetrain, orientation, read_body, read_robot
+from proxytune.driving import AXLES, drivetrain, orientation, parse_urdf, read_body, read_robot
 from proxytune.driving.plants import PlanarPlant
 from proxytune.effects import CAR_CATALOGUE, CATALOGUE, FilterContext, effects_from, theta_names
 from proxytune.errors import SettingsError
@@ -59,15 +59,6 @@ def test_mujoco_drives_the_exported_model_as_the_planar_plant_the_instance(robot
     assert abs(np.arctan2(*(f(poses[-1, 2] - expected[-1, 2]) for f in (np.sin, np.cos)))) < turned
 
 
-def test_an_exported_car_has_wheels_as_large_and_front_wheels_as_askew_as_was_found():
-    found = instance(CAR, wheel_gain=0.9, steering_offset=0.1)
-    root = ET.fromstring(urdf_text(found))
-    body = read_body(root, Path("exported.urdf"))
-    assert (body.left.radius_m, body.right.radius_m) == pytest.approx((0.045, 0.045))
-    askew = [joint.find("origin").get("rpy") for joint in root.iter("joint") if "steer" in joint.get("name")]
-    assert [float(turned.split()[2]) for turned in askew] == pytest.approx([np.radians(2.4)] * 2)
-
-
 @pytest.mark.parametrize("form", FORMATS)
 def test_what_a_car_has_a_place_for_changes_its_file_and_the_rest_is_named(form):
     for effect, kind in CAR_CATALOGUE.items():
@@ -95,7 +86,7 @@ def test_mujocos_camera_stands_and_looks_as_was_found():
     assert model.cam_fovy[0] == pytest.approx(80.0)
 
 
-def test_the_exported_urdf_has_wheels_that_turn_and_pull_as_was_found():
+def test_exported_wheels_turn_and_pull_as_was_found_those_of_a_car_are_askew_and_of_a_robot_as_it_is_its_own():
     found = instance(trim=0.1, wheel_gain__left=0.9, yaw_scrub=0.2)
     body = read_body(ET.fromstring(urdf_text(found)), Path("exported.urdf"))
     assert (body.left.joint, body.right.joint) == AXLES
@@ -104,6 +95,14 @@ def test_the_exported_urdf_has_wheels_that_turn_and_pull_as_was_found():
         [body.left.radius_m, body.right.radius_m]
     )
     assert body.wheel_distance == pytest.approx(0.2)
+    found = instance(CAR, wheel_gain=0.9, steering_offset=0.1)
+    root = ET.fromstring(urdf_text(found))
+    body = read_body(root, Path("exported.urdf"))
+    assert (body.left.radius_m, body.right.radius_m) == pytest.approx((0.045, 0.045))
+    askew = [joint.find("origin").get("rpy") for joint in root.iter("joint") if "steer" in joint.get("name")]
+    assert [float(turned.split()[2]) for turned in askew] == pytest.approx([np.radians(2.4)] * 2)
+    before = read_body(parse_urdf(ROBOT.urdf), ROBOT.urdf)
+    assert WRITERS["urdf"](instance()).count(f'radius="{before.left.radius_m:g}"') == 4
 
 
 def test_pybullet_loads_the_exported_urdf_and_finds_camera_and_tracked_point_where_they_are(tmp_path):
@@ -223,10 +222,3 @@ def test_values_without_a_place_are_not_told_where_neutral():
 def test_every_effect_is_in_the_table_of_the_page(name):
     row = f"| `{name}` | {' | '.join(place_of(name, form) or 'no place' for form in FORMATS)} |"
     assert row in PAGE.read_text(encoding="utf-8").splitlines()
-
-
-def test_the_duckiebot_as_it_is_keeps_its_wheels_and_camera():
-    from proxytune.driving import parse_urdf, read_body
-
-    before = read_body(parse_urdf(ROBOT.urdf), ROBOT.urdf)
-    assert WRITERS["urdf"](instance()).count(f'radius="{before.left.radius_m:g}"') == 4

@@ -75,7 +75,7 @@ def labels(figure):
     return {text for axes in figure.axes for text in axes.get_legend_handles_labels()[1]}
 
 
-def test_the_figure_has_a_panel_per_use_and_tells_best_alike_and_worse_apart():
+def test_a_panel_per_use_tells_best_alike_and_worse_apart_draws_open_intervals_and_has_no_teaching_without_it():
     families = (family("good", 0, DEAR), family("bad", 4, DEAR), family("poor", 3, CHEAP))
     lessons = {"good": lesson(-20.0), "bad": Lesson({}, failure="no"), "poor": lesson(-30.0, (10.0, -50.0, 30.0))}
     figure = families_figure(compared(*families, lessons=lessons))
@@ -85,9 +85,6 @@ def test_the_figure_has_a_panel_per_use_and_tells_best_alike_and_worse_apart():
     assert [text.get_text() for text in figure.axes[0].get_yticklabels()] == ["good", "bad", "poor"]
     assert figure.axes[1].get_xlim()[0] < -40.0
     assert_readable(figure)
-
-
-def test_the_figure_draws_open_intervals_and_has_no_panel_of_teaching_without_it():
     lessons = {"a": lesson(-20.0), "b": replace(lesson(-30.0), plv=LearningEstimate(-30.0, None, 5.0))}
     plv = families_figure(compared(family("a"), family("b"), lessons=lessons)).axes[1]
     assert [-30.0, 5.0] in [list(line.get_xdata()) for line in plv.lines]

@@ -171,16 +171,13 @@ def test_a_page_fits_every_screen_and_its_foot_says_how_to_come_by_it():
     assert re.match(r"\d{4}-\d\d-\d\d \d\d:\d\d", written.date)
 
 
-@pytest.mark.parametrize(("dpi", "width"), [(None, 400), ((200, 200), 320)])
-def test_pictures_are_drawn_at_160_pixels_to_the_inch(dpi, width):
-    image = png(400, **({"dpi": dpi} if dpi else {}))
-    (attrs,) = Reader(html_of(replace(VIEW, parts=(Picture("P", image, "C"),)))).all("img")
+@pytest.mark.parametrize(
+    ("kind", "more", "width"), [("png", {}, 400), ("png", {"dpi": (200, 200)}, 320), ("gif", {}, 400)]
+)
+def test_pictures_are_data_of_their_own_kind_drawn_at_160_pixels_to_the_inch(kind, more, width):
+    (attrs,) = Reader(html_of(replace(VIEW, parts=(Picture("P", png(400, kind, **more), "C"),)))).all("img")
     assert attrs["width"] == str(width)
-
-
-@pytest.mark.parametrize("kind", ["gif", "png"])
-def test_pictures_are_data_of_their_own_kind(kind):
-    assert f'src="data:image/{kind};base64,' in html_of(replace(VIEW, parts=(Picture("P", png(form=kind), "C"),)))
+    assert attrs["src"].startswith(f"data:image/{kind};base64,")
 
 
 def test_what_is_no_picture_is_refused_and_a_page_written_as_it_is_shown(tmp_path):
@@ -199,17 +196,14 @@ def drawn(label="design", xlabel="trial"):
     return svg_of(figure)
 
 
-def test_a_figure_is_part_of_the_page_and_its_markers_say_their_values():
+def test_a_figure_is_part_of_the_page_its_markers_say_their_values_and_its_names_are_text_and_its_own():
     """An SVG is drawn inline, 160 pixels to the inch, and hovering a marker tells what it stands for."""
     page = html_of(replace(VIEW, parts=(Picture("P", drawn(), "C"),)))
     assert "<title>design; trial 1; PRPV 3</title>" in page
     assert "<title>design; trial 2; PRPV 4.5</title>" in page
     assert "width:480px" in page
     assert 'role="img"' in page
-
-
-def test_figures_share_no_names_and_names_in_them_are_text():
-    """Whatever a figure refers to is its own, so that no figure changes another."""
+    # Whatever a figure refers to is its own, so that no figure changes another.
     page = html_of(replace(VIEW, parts=(Picture("P", drawn(), "C"), Picture("Q", drawn(), "C"))))
     names = re.findall(r' id="([^"]+)"', page)
     assert len(names) == len(set(names))

@@ -90,12 +90,9 @@ def nominal(twists):
     return PlanarPlant(np.zeros(3), 1.0 / HZ).move(np.array(twists))[0]
 
 
-def test_the_filter_before_the_nominal_simulator_moves_it_as_the_extended_one(model):
+def test_the_filter_before_the_nominal_simulator_moves_it_as_the_extended_one_but_for_what_wheels_have(model):
     bent = CommandFilter(model, rate_hz=HZ)
     assert nominal([bent.step(one) for one in TWISTS]) == pytest.approx(extended(), abs=1e-9)
-
-
-def test_what_a_patched_file_has_is_left_to_its_wheels(model):
     bent = CommandFilter(model, rate_hz=HZ, has=IN_WHEELS)
     asked = np.array([bent.step(one) for one in TWISTS])
     rims = np.stack((asked[:, 0] - 0.08 * asked[:, 2], asked[:, 0] + 0.08 * asked[:, 2]), axis=1)
@@ -162,7 +159,7 @@ def test_only_wheels_and_camera_of_a_file_change_and_the_diff_shows_them(patched
     assert (tmp_path / name).read_text() == FILES[name]
 
 
-def test_a_patched_urdf_has_wheels_and_camera_where_they_were_found(patched):
+def test_a_patched_urdf_or_sdf_has_wheels_and_camera_where_they_were_found(patched):
     root = parse_urdf(patched("mine.urdf", URDF).output)
     left, right, camera = (link_pose(root, name) for name in ("wheel_l", "wheel_r", "camera_link"))
     assert left[1, 3] - right[1, 3] == pytest.approx(0.16 * 0.2 / 0.16)
@@ -172,9 +169,6 @@ def test_a_patched_urdf_has_wheels_and_camera_where_they_were_found(patched):
     assert camera[:3, 3] == pytest.approx((0.02 + 0.066, 0.0, 0.108))
     assert np.degrees(np.arcsin(-camera[2, 0])) == pytest.approx(25.0)
     assert root.find("gazebo/plugin/wheel_separation").text == "0.16"
-
-
-def test_a_patched_sdf_has_wheels_and_camera_where_they_were_found(patched):
     root = ET.fromstring(patched("mine.sdf", SDF).output.read_text())
     places = [[float(v) for v in root.find(f".//link[@name='{name}']/pose").text.split()] for name in ("lw", "rw")]
     assert places[0][1] - places[1][1] == pytest.approx(0.2)

@@ -31,7 +31,7 @@ def assessed(proxy, **more):
     return assess(proxy=proxy, target=TARGET, metrics=M, resamples=100, **more)
 
 
-def test_the_answer_says_prpv_and_whether_chance_explains_it():
+def test_the_answer_says_prpv_and_whether_chance_explains_it_and_of_single_episodes_that_more_are_needed():
     good, bad = assessed(SAME), assessed(REVERSED)
     answer = score_sentence({"a": good}, None, target="t")
     assert answer.startswith(
@@ -40,9 +40,6 @@ def test_the_answer_says_prpv_and_whether_chance_explains_it():
     assert ": better than chance (" in answer
     assert "no better than chance (" in score_sentence({"b": bad}, None, target="t")
     assert "until chance can be excluded" in score_next_step({"b": bad}, None)
-
-
-def test_single_episodes_have_no_interval_and_the_next_step_is_more_of_them():
     single = assess(proxy=table(range(5), 1), target=table(range(5), 1), metrics=M, resamples=100)
     assert "of 0, of at most 20" in score_sentence({"a": single}, None, target="t")
     assert "at least two episodes" in score_next_step({"a": single}, None)
@@ -144,7 +141,7 @@ def test_of_many_agents_those_are_named_whose_rank_differs_most():
     assert max(map(len, named)) == LONGEST
 
 
-def test_the_map_colours_each_pair_once_and_counts_them(assessment):
+def test_the_map_colours_each_pair_once_and_counts_them_and_of_many_agents_is_a_picture_of_the_same_width(assessment):
     axes = flipped_pairs_figure(assessment.prpv).axes[0]
     cells = np.asarray(axes.collections[0].get_array().filled(np.nan))
     kinds = list(FLIP_COLOURS)
@@ -155,9 +152,6 @@ def test_the_map_colours_each_pair_once_and_counts_them(assessment):
     assert sum(drawn.values()) == 15
     assert np.isnan(cells[np.triu_indices(6)]).all()
     assert [text.get_text() for text in axes.get_legend().get_texts()] == [f"{k}: {n}" for k, n in drawn.items()]
-
-
-def test_pairs_of_more_agents_than_can_be_named_are_a_picture_over_ranks_of_the_same_width():
     big = assess(proxy=drawn_at_random(4, agents=300), target=drawn_at_random(5, agents=300), metrics=BOTH, resamples=2)
     few, many = (
         flipped_pairs_figure(one.prpv)

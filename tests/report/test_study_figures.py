@@ -25,7 +25,7 @@ def lines(figure):
     return {line.get_label(): line for line in figure.axes[0].get_lines()}
 
 
-def test_it_shows_every_trial_the_floor_by_its_kind_and_chance(result):
+def test_it_shows_every_trial_the_floor_by_its_kind_chance_and_the_answer_s_fresh_score_after_the_last(result):
     drawn = lines(convergence_figure(result))
     scores = [trial.prpv for trial in result.trials]
     assert list(drawn["design"].get_ydata()) == scores[:5]
@@ -33,9 +33,6 @@ def test_it_shows_every_trial_the_floor_by_its_kind_and_chance(result):
     floor, chance = result.floor, result.judged.chance
     assert drawn[f"target's halves {floor.value:.1f}"].get_ydata()[0] == floor.value
     assert drawn[f"chance {chance.mean:.1f}"].get_ydata()[0] == chance.mean
-
-
-def test_the_answer_s_fresh_score_stands_after_the_last_trial_with_its_interval(result):
     assert not convergence_figure(result).axes[0].containers
     (bar,) = convergence_figure(confirmed(result)).axes[0].containers
     marker, _, (reach,) = bar.lines
@@ -107,7 +104,7 @@ def test_the_density_is_highest_where_theta_is_known_to_be_adds_up_to_one_and_st
     assert np.trapezoid(density, values) == pytest.approx(1.0, abs=0.02)
 
 
-def test_what_the_interval_leaves_out_is_grey_and_the_axis_is_the_box_with_its_unit(learnt):
+def test_what_the_interval_leaves_out_is_grey_the_axis_is_the_box_and_what_remains_is_written_above(learnt):
     figure = profiles_figure(learnt)
     assert [axes.get_xlabel() for axes in figure.axes] == ["delay [s]", "trim"]
     for axes, box in zip(figure.axes, learnt.study.settings.space.intervals, strict=True):
@@ -115,6 +112,10 @@ def test_what_the_interval_leaves_out_is_grey_and_the_axis_is_the_box_with_its_u
         spans = [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in axes.patches]
         assert np.allclose(spans, [(box.low, low), (high, box.high)])
         assert axes.get_xlim() == (box.low, box.high)
+    vague = planted(learnt, deviation=(3.0, 0.02))
+    ends = [span(vague.knowledge.intervals[name]) for name in ("delay", "trim")]
+    titles = [axes.get_title() for axes in profiles_figure(vague).axes]
+    assert titles == [f"unidentified: {ends[0]}", f"{ends[1]} remain"]
 
 
 def test_the_answer_is_a_line_and_the_truth_a_mark_only_where_it_is_known(learnt):
@@ -124,13 +125,6 @@ def test_the_answer_is_a_line_and_the_truth_a_mark_only_where_it_is_known(learnt
     assert [mark["answer"] for mark in marks] == [theta["delay"], theta["trim"]]
     assert ["truth" in mark for mark in marks] == [False, True]
     assert marks[1]["truth"] == 0.11
-
-
-def test_what_remains_is_written_above_and_an_unidentified_parameter_is_called_so(learnt):
-    vague = planted(learnt, deviation=(3.0, 0.02))
-    ends = [span(vague.knowledge.intervals[name]) for name in ("delay", "trim")]
-    titles = [axes.get_title() for axes in profiles_figure(vague).axes]
-    assert titles == [f"unidentified: {ends[0]}", f"{ends[1]} remain"]
 
 
 @pytest.mark.parametrize("draw", [convergence_figure, profiles_figure, evaluations_figure])
@@ -145,7 +139,7 @@ def shadow(learnt):
     return lambda *points: [any(path.contains_point(point) for path in region.get_paths()) for point in points]
 
 
-def test_the_pair_has_a_point_for_every_trial_and_its_key_the_region_and_the_answer(learnt):
+def test_the_pair_has_a_point_for_every_trial_open_where_it_was_cut_off_and_its_key_the_region_and_the_answer(learnt):
     failed = replace(learnt, trials=(*learnt.trials, TrialRecord(8, {"trim": 0.3, "delay": 0.3}, "failed")))
     pair = evaluations_figure(replace(failed, truth={"trim": 0.1, "delay": 0.12})).axes[0]
     assert (pair.get_xlabel(), pair.get_ylabel()) == ("delay [s]", "trim")
@@ -162,9 +156,6 @@ def test_the_pair_has_a_point_for_every_trial_and_its_key_the_region_and_the_ans
 
     key = evaluations_figure(learnt).axes[1]
     assert [text.get_text() for text in key.get_legend().get_texts()] == ["95 % region", "answer"]
-
-
-def test_a_trial_that_was_cut_off_is_an_open_point(learnt):
     cut = TrialRecord(8, {"trim": 0.2, "delay": 0.25}, "cut", bound=14.0, score=20.0)
     pair = evaluations_figure(replace(learnt, trials=(*learnt.trials, cut))).axes[0]
     (holes,) = [one for one in pair.collections if one.get_zorder() == 3]
@@ -202,11 +193,8 @@ def weighed(result):
     return replace(result, importances=planted)
 
 
-def test_a_study_has_the_importance_of_each_of_its_parameters(result):
+def test_each_parameter_has_a_dot_for_its_share_a_stroke_for_what_is_alone_and_a_line_for_the_interval(result, weighed):
     assert [importance.name for importance in result.importances] == ["delay", "trim"]
-
-
-def test_a_dot_is_the_share_a_stroke_what_is_alone_and_a_line_the_interval_most_important_on_top(weighed):
     (axes,) = importance_figure(weighed).axes
     assert [label.get_text() for label in axes.get_yticklabels()] == ["delay", "trim"]
     drawn = {line.get_label(): line.get_xydata().tolist() for line in axes.get_lines()}

@@ -58,7 +58,9 @@ def test_it_has_every_trial_the_best_theta_and_at_its_foot_how_to_come_by_it_aga
     assert "plot &#x27;a b&#x27; --metric" in other
 
 
-def test_a_page_under_way_renews_itself_and_names_the_best_trial_as_possible_luck(result, tmp_path):
+def test_a_page_under_way_is_there_before_any_trial_renews_itself_calls_the_best_luck_and_tells_a_stop(
+    result, tmp_path
+):
     settings, path = result.study.settings, tmp_path / "report.html"
     write_live_page(path, settings, "prpv", result.trials[:4], "trial 5 of 7")
     text = path.read_text(encoding="utf-8")
@@ -67,10 +69,6 @@ def test_a_page_under_way_renews_itself_and_names_the_best_trial_as_possible_luc
     assert f"trial {best.number}, PRPV {best.prpv:g}, which may be partly luck" in text
     assert f'<meta http-equiv="refresh" content="{RENEW_S}">' in text
     assert text.count('<th scope="row" class="number">') == 4
-
-
-def test_a_page_under_way_is_there_before_any_trial_has_ended_and_says_when_a_study_was_stopped(result, tmp_path):
-    settings, path = result.study.settings, tmp_path / "report.html"
     first = live_view(settings, "prpv", (), "pre-flight")
     assert first.sentence == "Under way: pre-flight. No trial has a score yet."
     assert first.parts == ()

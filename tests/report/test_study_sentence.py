@@ -127,15 +127,12 @@ def test_the_next_step_asks_for_no_more_trials_or_starts_than_help():
     assert "raise starts" not in told
 
 
-def test_a_proxy_that_lacks_something_is_sent_to_diagnose():
+def test_a_proxy_that_lacks_something_is_sent_to_diagnose_and_another_simulator_only_where_its_robot_drives():
     text = said(**ABOVE, fits=False, p_value=0.0042)
     assert text.startswith("The proxy lacks something: no θ explains the target's scores (p = 0.0042). PRPV (")
     assert text.endswith("run `python -m proxytune diagnose LOG --declared trim,delay`.")
     assert "a perfect proxy scores lower" not in said(fits=False, perfect=False)
     assert said(**ABOVE, fits=False, names=("blur",)).endswith("run `python -m proxytune diagnose LOG`.")
-
-
-def test_of_another_simulator_no_log_is_asked_for_unless_its_robot_drives():
     lacking = said(**ABOVE, fits=False, family="other:family")
     assert lacking.startswith("The proxy lacks something: no θ explains the target's scores")
     assert lacking.endswith("widen the box; of a robot on wheels a log tells (`diagnose`).")

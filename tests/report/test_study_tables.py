@@ -100,7 +100,7 @@ def shown(result):
     return console.file.getvalue()
 
 
-def test_the_first_line_is_the_sentence_that_json_has_too_then_the_table(result):
+def test_the_first_line_is_the_sentence_that_json_has_too_then_tables_with_names_and_values_as_they_are(result):
     first, *others = shown(result).splitlines()
     assert first == study_sentence(result) == study_document(result)["sentence"]
     titles = [line for line in others if line in (THETA, USEFULNESS, INFORMATION, SEARCH)]
@@ -108,16 +108,13 @@ def test_the_first_line_is_the_sentence_that_json_has_too_then_the_table(result)
     assert others[2].split()[:2] == ["parameter", "best"]
     assert others[-2].split() == ["episodes", "none", "run"]
     assert others[-1].rstrip() == "figure: convergence.png"
-
-
-def test_names_and_values_are_shown_as_they_are(result):
     told = (replace(TOLD[0], agents=(("[red]agent", 1.0),)), TOLD[1])
     assert "[red]agent 100 %" in shown(planted(result, information=told))
     assert any("--unpaired" in note for note in result.judged.notes)
     assert not any("--unpaired" in note for note in usefulness_table(result).notes)
 
 
-def test_people_see_what_the_proxy_is_worth(result):
+def test_people_see_what_the_proxy_is_worth_and_halves_are_not_called_a_noise_floor(result):
     rows = {label.strip(): rest for label, *rest in usefulness_table(result).rows}
     assert list(rows) == ["PRPV", "halves", "chance", "PPV", "misfit (p)"]
     value, interval, meaning = rows["PRPV"]
@@ -128,21 +125,18 @@ def test_people_see_what_the_proxy_is_worth(result):
     assert not row_of(search_table(result), "failed")
     label, text = search_table(result).rows[0]
     assert (label, text.startswith("7 of 7; best: trial ")) == ("trials", True)
-
-
-def with_floor(result, **changes):
-    own = result.best.assessment
-    floor = replace(own.noise_floor, **changes)
-    return replace(result, best=replace(result.best, assessment=replace(own, noise_floor=floor)))
-
-
-def test_halves_are_not_called_a_noise_floor(result):
     assert "upper bound" in row_of(usefulness_table(result), "  halves")[3]
     known = with_floor(result, kind="same starts", value=5.0, low=1.0, high=9.0)
     row = row_of(usefulness_table(known), "  noise floor")
     assert row[1:3] == ("5", "1 to 9")
     assert row[3] == "target against itself from the same starts: what a perfect proxy scores"
     assert not row_of(usefulness_table(with_floor(result, value=None)), "  halves")
+
+
+def with_floor(result, **changes):
+    own = result.best.assessment
+    floor = replace(own.noise_floor, **changes)
+    return replace(result, best=replace(result.best, assessment=replace(own, noise_floor=floor)))
 
 
 def test_a_confirmed_study_tells_what_is_expected_a_perfect_proxy_s_score_and_the_excess(result):
@@ -232,7 +226,7 @@ def known(result):
     return planted(replace(result, cautions=()))
 
 
-def test_a_row_has_the_best_value_its_interval_what_is_as_good_and_the_box(known):
+def test_a_row_has_the_best_value_its_interval_what_is_as_good_and_the_box_and_a_caution_is_a_note(known):
     names = [one.name for one in theta_table(known).columns]
     assert names == ["parameter", "best", "95 % interval", "by PRPV alone", "box"]
     delay, trim, last = theta_table(known).rows
@@ -242,13 +236,7 @@ def test_a_row_has_the_best_value_its_interval_what_is_as_good_and_the_box(known
     assert last[0] == "share of the box"
     assert last[3:] == ("6.2 %", "")
     assert 0.3 < float(last[2].removesuffix(" %")) < 3.0
-
-
-def test_the_truth_has_a_column_only_where_it_is_known_and_is_marked_outside_the_interval(known):
-    known = replace(known, truth={"trim": 0.1, "delay": 0.29})
-    assert theta_table(known).columns[3].name == "truth"
-    assert [row[3] for row in theta_table(known).rows] == ["0.29 (outside)", "0.1", ""]
-    assert [row[3] for row in theta_table(replace(known, truth={"trim": 0.1})).rows] == ["", "0.1", ""]
+    assert "no shared starts" in theta_table(replace(known, cautions=("no shared starts",))).notes
 
 
 def test_a_parameter_without_an_interval_is_unidentified_and_pairs_that_trade_are_named(known):
@@ -261,7 +249,7 @@ def test_a_parameter_without_an_interval_is_unidentified_and_pairs_that_trade_ar
     assert not [line for line in theta_table(known).notes if "trade off" in line]
 
 
-def test_it_is_said_whether_the_region_holds_the_truth_and_the_best_theta(known):
+def test_it_is_said_whether_the_region_holds_the_best_theta_and_the_truth_which_has_a_column_where_it_is_known(known):
     best = dict(known.best.trial.theta)
     unit = (best["delay"] / 0.3, (best["trim"] + 0.3) / 0.6)
     inside = planted(known, centre=unit)
@@ -270,10 +258,10 @@ def test_it_is_said_whether_the_region_holds_the_truth_and_the_best_theta(known)
     first, second = theta_table(replace(outside, truth=best)).notes
     assert first.startswith("the best θ by PRPV is outside the 95 % region")
     assert second == "the 95 % region does not contain the truth"
-
-
-def test_what_the_target_s_table_does_not_allow_is_a_note(known):
-    assert "no shared starts" in theta_table(replace(known, cautions=("no shared starts",))).notes
+    known = replace(known, truth={"trim": 0.1, "delay": 0.29})
+    assert theta_table(known).columns[3].name == "truth"
+    assert [row[3] for row in theta_table(known).rows] == ["0.29 (outside)", "0.1", ""]
+    assert [row[3] for row in theta_table(replace(known, truth={"trim": 0.1})).rows] == ["", "0.1", ""]
 
 
 def test_per_parameter_what_informs_it_most_is_named_with_what_limits_it_and_nothing_else(known):

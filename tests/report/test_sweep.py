@@ -58,7 +58,7 @@ def swept(make_studies):
     return curve(make_studies())
 
 
-def test_the_document_is_plain_json_with_a_point_per_value(swept):
+def test_document_and_csv_have_a_point_per_value_and_without_a_target_model_say_how_to_get_pod(swept):
     document = json.loads(json.dumps(curve_document(swept), allow_nan=False))
     assert document["parameter"] == "trim"
     assert document["base"] == TRUTH
@@ -66,9 +66,6 @@ def test_the_document_is_plain_json_with_a_point_per_value(swept):
     assert document["points"][2]["prpv"] == 0
     assert document["noise_floor"] == swept.points[0].assessment.noise_floor.value
     assert document["noise_floor_kind"] == "halves"
-
-
-def test_the_csv_says_what_the_document_says_and_without_a_target_model_how_to_get_pod(swept):
     rows = list(csv.DictReader(io.StringIO(curve_csv(swept))))
     points = curve_document(swept)["points"]
     assert [float(row["trim"]) for row in rows] == [point["value"] for point in points]

@@ -77,13 +77,10 @@ def test_what_was_published_stands_beside_what_is_found_here_with_its_source():
     assert len(nobody.parts) == len(page.parts) - 1
 
 
-def test_the_next_step_is_more_seeds_while_something_is_open():
+def test_the_next_step_is_more_seeds_while_something_is_open_and_says_why_plv_is_unknown():
     assert "raise teaching.seeds from 3 to 6" in teach_next_step(experiment())
     assert "train in a proxy that saves" in teach_next_step(experiment(LESSONS[:2]))
     assert "train without these proxies" in teach_next_step(experiment(LESSONS[1:2]))
-
-
-def test_without_convergence_or_a_rise_at_the_end_plv_is_unknown_and_the_next_step_says_why():
     rising = experiment(gain=5.1)
     assert "is unknown: without a proxy the score still rises by more than 5" in teach_answer(rising)
     assert teach_next_step(rising).startswith("raise teaching.target_samples: ")

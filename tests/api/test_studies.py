@@ -37,8 +37,7 @@ def test_theta_is_drawn_from_the_posterior_as_the_answer_has_it(report):
         ends = drawn[box.name].quantile([0.025, 0.975])
         np.testing.assert_allclose(ends, learnt.intervals[box.name], atol=0.02 * (box.high - box.low))
         assert drawn[box.name].between(box.low, box.high).all()
-    weights = learnt.posterior.weights
-    exact = np.cov(learnt.values.T, aweights=weights, ddof=0)
+    exact = np.cov(learnt.values.T, aweights=learnt.posterior.weights, ddof=0)
     np.testing.assert_allclose(np.cov(drawn.to_numpy().T), exact, atol=0.05 * np.abs(exact).max())
     with pytest.raises(InputError, match="draws must be at least 1, got 0"):
         report.posterior(draws=0)

@@ -225,8 +225,7 @@ def test_drives_stay_near_their_lane_and_in_their_speeds(name):
     road = shipped_map(name)
     for drive in routes.drives(road, np.random.default_rng(2)):
         rows = drive.rows
-        lane = lane_pose(road, rows[:, :2], rows[:, 2])
-        assert np.abs(lane.deviation).max() < 0.2
+        assert np.abs(lane_pose(road, rows[:, :2], rows[:, 2]).deviation).max() < 0.2
         speeds = np.hypot(*np.diff(rows[:, :2], axis=0).T) * routes.ROWS_HZ
         assert (speeds.min() > 0.1, speeds.max() < 0.5) == (True, True)
         assert drive.frames[0] > 0.5

@@ -260,8 +260,7 @@ def test_noise_of_motion_has_its_size_and_correlation_and_is_three_percent_in_tw
     np.testing.assert_allclose(noise[:, 0].std(axis=0), noise.std(axis=(0, 1)), rtol=0.25)
     assert not hidden.disturbed(np.zeros((2, 240, 3)), PLAIN, 2.0).any()
     quiet, loud = (over_two_seconds(poses(CLEAN[0], noiseless=flag)) for flag in (True, False))
-    share = np.sqrt(np.mean((loud - quiet)[..., :2] ** 2) / np.mean(quiet[..., :2] ** 2))
-    assert 0.02 < share < 0.045
+    assert 0.02 < np.sqrt(np.mean((loud - quiet)[..., :2] ** 2) / np.mean(quiet[..., :2] ** 2)) < 0.045
 
 
 def test_paths_are_circles_of_their_radius_stepped_or_integrated():

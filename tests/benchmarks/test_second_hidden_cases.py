@@ -231,8 +231,7 @@ def test_a_pose_has_the_stated_noise(noise, kurtosis, kept):
 
 
 def test_a_drive_walks_at_random_with_the_root_of_its_way_and_not_at_rest():
-    steady = np.tile((0.4, 0.0, 0.0), (200, 4000, 1))
-    walked = second._walk(PLAIN, steady).sum(axis=1) / 400
+    walked = second._walk(PLAIN, np.tile((0.4, 0.0, 0.0), (200, 4000, 1))).sum(axis=1) / 400
     np.testing.assert_allclose(walked.std(axis=0), 2.0 * np.array(second.PER_METRE), rtol=0.15)
     assert not second._walk(PLAIN, np.zeros((2, 400, 3))).any()
 

@@ -120,8 +120,7 @@ def test_the_model_reads_back_with_what_was_found(document, home):
 
 def test_predicting_the_test_drives_with_the_model_reproduces_the_error(document, home, answered):
     log = small_log()
-    kept = replace(log, episodes=log.episodes[2::3])
-    folder = write_log(kept, home / "kept")
+    folder = write_log(replace(log, episodes=log.episodes[2::3]), home / "kept")
     output = home / "kept.csv"
     told = answered("predict", home / "out" / "model.toml", folder, "--output", output)
     assert told["error"]["value"] == pytest.approx(document["error"]["after"], rel=0.15)

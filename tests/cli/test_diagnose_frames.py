@@ -125,8 +125,7 @@ def test_an_unknown_effect_and_a_log_to_test_on_are_refused_in_one_line(stills, 
 
 @pytest.mark.slow
 def test_where_motion_is_refused_the_camera_still_comes_out(tmp_path, answered):
-    folder = short_drives(tmp_path / "log")
-    document = answered("diagnose", folder, "--output", tmp_path / "out")
+    document = answered("diagnose", short_drives(tmp_path / "log"), "--output", tmp_path / "out")
     assert "at least 20 s" in document["motion_refused"]
     assert [effect["name"] for effect in document["effects"]] == ["camera_roll"]
     assert not {"errors", "clocks"} & set(document)

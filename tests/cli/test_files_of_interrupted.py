@@ -97,8 +97,7 @@ def test_new_leaves_nothing(tmp_path, interrupted, monkeypatch):
 
 
 def test_import_leaves_nothing(tmp_path, interrupted, monkeypatch):
-    drives = [foreign_robot.drive(0, seconds=20.0)]
-    source = foreign_robot.write_form(tmp_path, "csv", drives)
+    source = foreign_robot.write_form(tmp_path, "csv", [foreign_robot.drive(0, seconds=20.0)])
     before = {path.name for path in tmp_path.iterdir()}
     monkeypatch.setattr("proxytune.importing.reading.read_log", lambda draft: signal.raise_signal(signal.SIGINT))
     figures = [word for key, value in foreign_robot.FIGURES.items() for word in ("--figure", f"{key}={value}")]

@@ -18,7 +18,6 @@ from proxytune.seeds import target_seed
 from proxytune.study import open_bank, plan_episodes, read_study_settings, score_table
 from tests.conftest import write_target
 
-BANK = {"target": None, "preflight": "true", "budget": "24", "engine": None}
 DELAY = 0.12
 
 
@@ -34,7 +33,7 @@ def _few_draws():
 @pytest.fixture(scope="module")
 def bank(make_studies):
     """A bank that has been run."""
-    folder = make_studies("bank", **BANK)
+    folder = make_studies("bank", **{"target": None, "preflight": "true", "budget": "24", "engine": None})
     assert main(["study", str(folder), "--json"]) == 0
     return folder
 

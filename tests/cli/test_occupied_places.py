@@ -27,7 +27,6 @@ COMMANDS = {
 TARGET = "agent,episode,distance,survival_time\n" + "".join(
     f"{agent},{start},{start},2\n" for agent in ("steady", "brisk", "daredevil") for start in (0, 1)
 )
-ENDINGS = {"drive": "there.png", "score's table": "there.csv"}
 OF_FOLDERS = ("predict of pictures", "record", "import", "score", "diagnose", "sweep")
 IN_STUDIES = {
     "study": ("study tiny", "study.run_opened", {"figures": "a file", "report.html": "a folder"}),
@@ -80,7 +79,7 @@ def put(path, what):
 
 def wanted(name):
     words, work = COMMANDS[name]
-    place = ENDINGS.get(name, "there")
+    place = {"drive": "there.png", "score's table": "there.csv"}.get(name, "there")
     return words.replace("there", place), work, place
 
 

@@ -14,8 +14,6 @@ from proxytune.effects import Model, model_text
 from proxytune.logs import read_log
 from proxytune.report import clocks_document
 
-COLUMNS = ["episode", "start_time", "time", "x", "y", "heading"]
-
 
 @pytest.fixture
 def folder(tmp_path):
@@ -35,7 +33,7 @@ def model(tmp_path):
 def test_every_window_is_written_and_the_error_is_that_of_the_written_poses(folder, model, tmp_path, answered):
     told = answered("predict", model(), folder, "--horizon", 2, "--output", tmp_path / "poses.csv")
     table = pd.read_csv(tmp_path / "poses.csv", dtype={"episode": str})
-    assert list(table.columns) == COLUMNS
+    assert list(table.columns) == ["episode", "start_time", "time", "x", "y", "heading"]
     assert told["rows"] == len(table)
     assert told["windows"] == len(table[["episode", "start_time"]].drop_duplicates()) == 10
     assert told["horizon_s"] == 2.0

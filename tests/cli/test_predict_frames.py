@@ -46,8 +46,7 @@ def test_the_true_model_draws_the_very_pictures_and_the_nominal_one_others(predi
 
 def test_the_pictures_read_as_the_frames_of_the_log(predicted, stills, tmp_path):
     predicted(ROLLED)
-    table = pd.read_csv(tmp_path / "out" / "frames.csv")
-    assert list(table.columns) == ["frame", "episode", "time"]
+    assert list(pd.read_csv(tmp_path / "out" / "frames.csv").columns) == ["frame", "episode", "time"]
     for name in ("log.toml", "samples.csv"):
         shutil.copy(stills / name, tmp_path / "out" / name)
     frames, own = read_log(tmp_path / "out").frames, read_log(stills).frames

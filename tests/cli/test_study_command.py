@@ -50,8 +50,7 @@ def test_a_parameter_that_does_nothing_is_said_before_the_study_and_recorded(mak
 
 @pytest.mark.slow
 def test_without_a_terminal_every_trial_is_a_plain_line_with_its_prpv_the_best_and_the_episodes(make_study, capsys):
-    folder = make_study(preflight="true", confirm="1", cut_off="true")
-    assert main(["study", str(folder), "--json"]) == 0
+    assert main(["study", str(make_study(preflight="true", confirm="1", cut_off="true")), "--json"]) == 0
     out, told = capsys.readouterr()
     lines = [line for line in told.splitlines() if "study: page: " not in line]
     assert "pre-flight 1 of 2 begins" in lines[0]
@@ -76,8 +75,7 @@ def test_a_budget_on_the_command_line_stands_over_study_toml(finished, capsys, a
 
 @pytest.mark.parametrize(("option", "value"), [("budget", "0"), ("jobs", "1025")])
 def test_a_budget_or_jobs_out_of_bounds_are_refused(make_study, refused, option, value):
-    line = refused("study", make_study(), f"--{option}={value}")
-    assert f"{option} must be between 1 and " in line
+    assert f"{option} must be between 1 and " in refused("study", make_study(), f"--{option}={value}")
 
 
 @pytest.fixture
@@ -111,5 +109,4 @@ def test_an_unknown_study_or_a_place_that_cannot_be_written_is_told(travelling, 
     )
     assert not (tmp_path / "quickstrat").exists()
     (tmp_path / "file").touch()
-    told = refused("study", tmp_path / "file" / "quickstart", status=1)
-    assert "cannot be written" in told
+    assert "cannot be written" in refused("study", tmp_path / "file" / "quickstart", status=1)

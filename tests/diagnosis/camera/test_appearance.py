@@ -27,8 +27,7 @@ def test_noise_on_a_plain_floor_is_told_outright(noise):
 @pytest.mark.slow
 def test_a_picture_without_noise_has_none():
     model, _ = scene()
-    found = fit_grain(logged(model), model, floor()).noise
-    assert found.value < 0.3
+    assert fit_grain(logged(model), model, floor()).noise.value < 0.3
 
 
 @pytest.mark.slow

@@ -209,15 +209,13 @@ def moved(line, by_m):
     there = project(views, at_truth(views))
     own = (there.marks.line == LINES.index(line)) & (there.marks.stretch == STRETCH)
     # The edge moves by side · by against the distance's slope; normals point into the marking, so with it
-    size = np.where(own & there.near, there.marks.side * by_m / there.metres, 0.0)
-    return pushed(views, size)
+    return pushed(views, np.where(own & there.near, there.marks.side * by_m / there.metres, 0.0))
 
 
 @pytest.mark.parametrize("line", ["left white line", "right white line", "yellow line"])
 @pytest.mark.parametrize("by_m", [0.01, -0.01])
 def test_a_line_ten_millimetres_beside_its_place_is_told_first(line, by_m):
-    laid = describe_map(fitted(moved(line, by_m)))
-    first = laid.lines[0]
+    first = describe_map(fitted(moved(line, by_m))).lines[0]
     assert (first.line, first.stretch) == (line, STRETCH)
     assert first.right_m == pytest.approx(by_m, abs=0.0035)
     low, high = first.interval

@@ -83,8 +83,7 @@ def test_normals_are_unit_vectors_from_the_floor_into_the_marking(angle, offset,
 def test_yellow_edges_are_told_by_their_colour_on_either_side():
     """Strong yellow is not clipped, which would move its edges outwards by 0.2 pixels and make the tape look wider."""
     edges = find_edges(yellow_striped(0.3, 1.0))
-    yellow = edges.only(~edges.white)
-    away, _ = along_normal(yellow, 0.3, 1.0)
+    away, _ = along_normal(edges.only(~edges.white), 0.3, 1.0)
     assert len(away) > 80
     sides = [np.abs(away[way * away > 0.0]).mean() - 6.0 for way in (-1.0, 1.0)]
     assert sides == pytest.approx([0.0, 0.0], abs=0.03)
@@ -136,8 +135,7 @@ def test_points_are_sorted_by_picture_and_brightness_does_not_move_them():
     np.testing.assert_array_equal(alone.column, own.column)
     np.testing.assert_array_equal(alone.white, own.white)
     shown = striped(0.4, 1.0)
-    dark = (shown * 0.4).astype(np.uint8)
-    away, _ = along_normal(find_edges(dark), 0.4, 1.0)
+    away, _ = along_normal(find_edges((shown * 0.4).astype(np.uint8)), 0.4, 1.0)
     assert len(away) > 80
     assert np.abs(np.abs(away) - 6.0).max() < 0.2
 
@@ -281,8 +279,7 @@ def test_every_error_of_the_tape_has_a_place_of_its_own(stretches):
     shifts = tape.shift(stretch, line)
     tilts = tape.tilt(stretch[line < gathering.TILTED], line[line < gathering.TILTED])
     white, yellow = np.array([True, False, False]), np.array([0, 2, 3])
-    widths = tape.width(white, yellow)
-    places = np.concatenate((shifts, tilts, widths))
+    places = np.concatenate((shifts, tilts, tape.width(white, yellow)))
     assert sorted(places.tolist()) == list(range(tape.size))
     # Both white lines have one width
     assert tape.width(np.array([True]), np.array([0])) == tape.width(np.array([True]), np.array([1]))
@@ -321,8 +318,7 @@ def test_what_a_log_says_of_its_tracker_is_held_and_else_assumed(log):
     assert (views.optics.rows, views.optics.columns) == (72, 96)
     assert (views.position_m, views.heading_rad) == pytest.approx((0.002, np.radians(0.3)))
     assert views.tape_m == views.markings.road.paint.tape_m == 0.005
-    frames = replace(log.frames, position_m=None, heading_deg=None)
-    views = gather_views(log, frames, ROBOT).views
+    views = gather_views(log, replace(log.frames, position_m=None, heading_deg=None), ROBOT).views
     assert (views.position_m, views.heading_rad) == pytest.approx((0.005, np.radians(1.0)))
 
 

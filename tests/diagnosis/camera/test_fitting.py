@@ -82,8 +82,7 @@ def test_poses_are_told_better_than_the_tracker_has_them():
 def test_one_colour_s_lines_that_lie_beside_their_places_are_taken_up_by_the_tape():
     """Not by the camera: a line shifted on every tile is a shift of every tile."""
     views = stood(noisy=False)
-    white = views.edges.white
-    moved = views.edges.row + np.where(white, 1.5, 0.0)
+    moved = views.edges.row + np.where(views.edges.white, 1.5, 0.0)
     shifted = replace(views, edges=views.edges._replace(row=moved), tape_m=0.01)
     fit = fit_camera(shifted, at_truth(shifted), ["camera_pitch"], NEAR)
     none = fit_camera(replace(shifted, tape_m=0.0), at_truth(shifted), ["camera_pitch"], NEAR)

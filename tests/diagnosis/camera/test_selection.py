@@ -139,8 +139,7 @@ def test_what_is_declared_is_never_dropped_nor_named(size):
 
 
 def test_sets_keep_parameters_of_one_effect_together_and_all_effects_lose_nothing():
-    chosen = {effect for one in rank_subsets(linear(0)[0], (), 2) for effect in one.effects}
-    assert chosen == set(EFFECTS)
+    assert {effect for one in rank_subsets(linear(0)[0], (), 2) for effect in one.effects} == set(EFFECTS)
     assert rank_subsets(linear(3)[0], (), len(EFFECTS))[0].loss == 0.0
     assert rank_subsets(linear(3)[0], (), len(EFFECTS) + 1) == []
 
@@ -156,8 +155,7 @@ def displaced(views, by):
 
 @pytest.mark.parametrize("theta", [{}, ROLLED, pytest.param({"lens_distortion": -0.25}, marks=pytest.mark.slow)])
 def test_nothing_is_left_over_of_the_right_camera(theta):
-    full = everything(theta)
-    leftover = selection.fit_residual_field(fit_set(full, ("camera_pitch", *theta)))
+    leftover = selection.fit_residual_field(fit_set(everything(theta), ("camera_pitch", *theta)))
     assert not leftover.significant
     assert leftover.share < 0.035
 
@@ -189,8 +187,7 @@ def test_the_field_says_how_far_markings_lie_from_where_the_model_has_them(axis)
     leftover = selection.fit_residual_field(fit)
     assert leftover.significant
     valid = project(moved, fit.state).valid
-    found = leftover.displacement(*places(moved))[valid, axis]
-    assert np.corrcoef(found, by[valid])[0, 1] > 0.9
+    assert np.corrcoef(leftover.displacement(*places(moved))[valid, axis], by[valid])[0, 1] > 0.9
     assert leftover.rms_px == pytest.approx(np.sqrt((by[valid] ** 2).mean()), rel=0.7)
 
 
@@ -201,8 +198,7 @@ def test_tape_beside_its_place_is_nothing_of_the_camera_s():
     shift = np.random.default_rng(1).normal(0.0, 0.005, (4, 40))
     there = project(views, at_truth(views))
     by = shift[there.marks.line, there.marks.stretch] * there.marks.side / there.metres
-    moved = pushed(views, by)
-    fit = fit_everything(moved, OPTICS.mounting, {}, learn_scatter=False)
+    fit = fit_everything(pushed(views, by), OPTICS.mounting, {}, learn_scatter=False)
     assert not selection.fit_residual_field(fit_set(fit, ("camera_pitch",))).significant
 
 
@@ -345,8 +341,7 @@ def test_a_readout_that_is_stated_is_not_hidden():
 @pytest.mark.slow
 def test_markings_far_away_alone_hide_where_the_lens_is():
     full = everything()
-    there = project(full.views, full.state)
-    far = only(full.views, np.linalg.norm(there.lever, axis=1) > 0.7)
+    far = only(full.views, np.linalg.norm(project(full.views, full.state).lever, axis=1) > 0.7)
     assert len(far.edges.row) > 300
     few = fit_everything(far, OPTICS.mounting, {}, learn_scatter=False)
     hidden, shown = hidden_effects(few, ("camera_pitch",)), hidden_effects(full, ("camera_pitch",))

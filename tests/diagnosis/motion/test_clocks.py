@@ -50,8 +50,7 @@ def test_motion_that_no_delay_accounts_for_is_told_with_its_offset_for_the_nomin
 
 
 def test_an_offset_that_a_log_asks_to_fit_is_what_the_latency_has_beside_the_nominal_delay():
-    log = replace(hidden.make_log(CASE, late_s=0.1, **SHORT), fit_clock_offset=True)
-    found = read_clocks(log, ROBOT)
+    found = read_clocks(replace(hidden.make_log(CASE, late_s=0.1, **SHORT), fit_clock_offset=True), ROBOT)
     assert found.offset.value == pytest.approx(CASE.delay + 0.1 - 0.15, abs=0.02)
     assert found.left_s == pytest.approx(0.15)
 
@@ -243,8 +242,7 @@ def test_of_poses_at_times_of_their_own_only_those_on_the_clock_are_kept():
 @pytest.mark.slow
 def test_another_log_of_the_same_robot_is_put_on_the_same_latency():
     one, other = (hidden.make_log(CASE, late_s=late, **SHORT) for late in (0.0, 0.2))
-    found = read_clocks(other, ROBOT, read_clocks(one, ROBOT))
-    assert found.offset.value == pytest.approx(0.2, abs=0.02)
+    assert read_clocks(other, ROBOT, read_clocks(one, ROBOT)).offset.value == pytest.approx(0.2, abs=0.02)
     assert not read_clocks(one, ROBOT, read_clocks(one, ROBOT)).differ
 
 
@@ -376,8 +374,7 @@ def drives():
 def test_short_drives_stay_as_they_are_and_missing_poses_missing(drives):
     assert thin(drives) is drives
     assert timing.join_increments(drives, 1) is drives
-    gaps = drives.only(np.arange(len(drives.episode)) % 50 > 4)
-    few = timing.join_increments(gaps, 4)
+    few = timing.join_increments(drives.only(np.arange(len(drives.episode)) % 50 > 4), 4)
     assert (few.last - few.first).max() <= 4 * (drives.last - drives.first).max()
     assert np.abs(few.measured - increments(few, TRUTH)).max() < 1e-9
 
@@ -412,7 +409,6 @@ def test_a_block_is_shortened_and_none_is_lost(drives, monkeypatch):
 
 def test_drives_of_two_seconds_stay_whole_and_fewer_are_taken(monkeypatch):
     monkeypatch.setattr(timing, "MOST", 300)
-    drives = cut_into_blocks(planted_drives(TRUTH, episodes=60, seconds=2.1, noise=None))
-    few = thin(drives)
+    few = thin(cut_into_blocks(planted_drives(TRUTH, episodes=60, seconds=2.1, noise=None)))
     assert timing.FEWEST_BLOCKS <= len(set(few.block)) < 60
     assert len(cut(few, 2.0).begin) == len(set(few.block))

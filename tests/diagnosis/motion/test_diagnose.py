@@ -86,8 +86,7 @@ def test_errors_are_told_at_every_horizon_and_fall_to_the_floor(diagnosis):
 
 def test_drives_are_not_fitted_and_nothing_removable_is_left_where_nothing_was(diagnosis):
     error = diagnosis.errors[1]
-    at_floor = error.before._replace(value=error.floor.lower)
-    assert replace(error, before=at_floor).removable_left is None
+    assert replace(error, before=error.before._replace(value=error.floor.lower)).removable_left is None
     assert replace(error, after=error.before).removable_left == 1.0
     assert diagnosis.parts.fitted.duties.shape[0] == 4
     assert diagnosis.parts.tested.duties.shape[0] == 2

@@ -114,8 +114,7 @@ def test_curves_that_promise_nothing_to_who_asks_are_not_used(found):
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_nothing_is_used_where_nothing_is_missing(seed):
-    drives = planted_drives(TRUTH, episodes=6, seconds=12.0, seed=seed)
-    assert not fit_discrepancy(drives, TRUTH).used
+    assert not fit_discrepancy(planted_drives(TRUTH, episodes=6, seconds=12.0, seed=seed), TRUTH).used
 
 
 def test_slow_wheels_are_learnt_without_any_other_curve():
@@ -130,8 +129,7 @@ def test_where_nothing_is_learnt_it_is_looked_once_more_for_what_matters_in_few_
     learnt = fit_discrepancy(drives, TRUTH)
     assert learnt.used
     assert learnt.guard[2.0].value < 0.7
-    strict = replace(drives, rules=replace(RULES, rare_group_share=0.9))
-    assert not fit_discrepancy(strict, TRUTH).used
+    assert not fit_discrepancy(replace(drives, rules=replace(RULES, rare_group_share=0.9)), TRUTH).used
 
 
 def test_a_delay_that_stood_for_slow_commands_gives_way_to_them():

@@ -67,10 +67,8 @@ def test_poses_that_repeat_are_older_ones_and_a_robot_that_stands_shows_one_ever
 
 
 def test_increments_span_missing_poses_and_break_where_left_out():
-    second = [0.0, *[None] * 19, 1.0, 1.1]
-    assert rows_of(gathered(episode(second))) == [(0, 20), (20, 21)]
-    longer = [0.0, 0.1, *[None] * 20, 1.0, 1.1]
-    drives = gathered(episode(longer))
+    assert rows_of(gathered(episode([0.0, *[None] * 19, 1.0, 1.1]))) == [(0, 20), (20, 21)]
+    drives = gathered(episode([0.0, 0.1, *[None] * 20, 1.0, 1.1]))
     assert rows_of(drives) == [(0, 1), (22, 23)]
     assert drives.linked.tolist() == [False, False]
     drives = gathered(episode([0.0, 0.1, 0.2, 0.3, 0.4]), episode([0.0, 0.1, 0.2], name="b"))
@@ -94,8 +92,7 @@ def test_increments_are_linked_within_an_episode_and_need_two_poses_and_commands
 
 def test_episodes_of_different_length_and_headings_between_are_filled():
     long = episode([0.0, 0.1, 0.2], commands=[[0.1, 0.2]] * 3)
-    short = episode([0.0, 0.1], commands=[[0.3, 0.4], [0.5, 0.6]], name="b")
-    duties = gathered(long, short).duties
+    duties = gathered(long, episode([0.0, 0.1], commands=[[0.3, 0.4], [0.5, 0.6]], name="b")).duties
     assert duties.shape == (2, 9, 2)
     np.testing.assert_array_equal(duties[1, ::3], [[0.3, 0.4], [0.5, 0.6], [0.5, 0.6]])
     one = episode([0.0, None, 0.2])
@@ -133,8 +130,7 @@ def test_more_than_full_speed_is_refused_with_what_to_state(command, given):
 
 
 def test_wheel_speeds_are_used_where_all_episodes_have_them_without_a_gap():
-    gap = episode([0.0, 0.1, 0.2], wheels=[[3.0, 4.0], [np.nan, np.nan], [5.0, 6.0]])
-    drives = gathered(gap)
+    drives = gathered(episode([0.0, 0.1, 0.2], wheels=[[3.0, 4.0], [np.nan, np.nan], [5.0, 6.0]]))
     assert drives.wheels is None
     assert drives.rest[0, 0] == pytest.approx(3.0 * SPEED_PER_RAD)
     assert gathered(episode([0.0, 0.1], wheels=[[np.nan, np.nan], [5.0, 6.0]])).rest.tolist() == [[0.0, 0.0]]
@@ -257,8 +253,7 @@ def test_full_speed_of_duties_is_how_fast_it_drove(rows):
 
 
 def test_full_speed_of_a_robot_that_never_moved_is_still_positive(vehicle):
-    still = with_commands(vehicle, "duty", np.zeros((200, 2)))
-    assert robot_of(still).figures["full_speed"] > 0.0
+    assert robot_of(with_commands(vehicle, "duty", np.zeros((200, 2)))).figures["full_speed"] > 0.0
 
 
 CAR = read_robot("car")

@@ -24,8 +24,7 @@ SHORT = {"episodes": 6, "seconds": 20.0}
 def mixed(theta, of=(1, 3, 4)):
     """A log some of whose drives are another robot's."""
     one, other = planted_log(TRUTH, **SHORT), planted_log({**TRUTH, **theta}, **SHORT)
-    chosen = [(other if e in of else one).episodes[e] for e in range(6)]
-    return replace(one, episodes=tuple(chosen))
+    return replace(one, episodes=tuple([(other if e in of else one).episodes[e] for e in range(6)]))
 
 
 CASES = {case.name: case for case in (*hidden.IN_FORM, *hidden.OTHER_FORM, *hidden.OUTSIDE)}
@@ -112,8 +111,7 @@ def test_what_matters_is_kept_and_the_model_is_fitted_again_without_what_does_no
 def test_where_everything_matters_or_windows_are_too_short_nothing_is_dropped(drives):
     whole = found(drives, MIXED, adopted("yaw_scrub", SCRUB))
     assert drop_negligible(whole, 1) is whole
-    few = planted_drives(MIXED, episodes=2, seconds=4.0)
-    short = found(few, MIXED, adopted("lateral_slip", SLIP))
+    short = found(planted_drives(MIXED, episodes=2, seconds=4.0), MIXED, adopted("lateral_slip", SLIP))
     assert drop_negligible(short, 1) is short
 
 

@@ -84,8 +84,7 @@ def test_rivals_are_told_apart_within_the_room_and_the_robots_limits(drives, qui
 @pytest.mark.slow
 def test_what_is_expected_is_the_evidence_that_fits_of_both_models_have(designed):
     theta, starts = {**TRUTH, **SIZES["lateral_slip"]}, np.zeros((3, 3))
-    log = driven_log(theta, np.repeat(designed.commands[None], 3, axis=0), starts, seed=5)
-    driven = drives_of(log)
+    driven = drives_of(driven_log(theta, np.repeat(designed.commands[None], 3, axis=0), starts, seed=5))
 
     def log_likelihood(form):
         start = {**TRUTH, **form.fixed, form.free[0][0]: 0.03, form.free[-1][0]: 0.03}

@@ -63,8 +63,7 @@ def test_parameters_that_share_a_coordinate_stay_equal():
 @pytest.mark.parametrize("start", [0.09, 0.2])
 def test_a_scan_finds_the_threshold_of_stiction(start):
     truth = {**TRUTH, "stiction.breakaway": 0.14, "stiction.imbalance": 0.0}
-    drives = planted_drives(truth)
-    found = fit(drives, {**truth, "stiction.breakaway": start}, (("stiction.breakaway",),))
+    found = fit(planted_drives(truth), {**truth, "stiction.breakaway": start}, (("stiction.breakaway",),))
     assert found.theta["stiction.breakaway"] == pytest.approx(0.14, rel=0.03)
 
 

@@ -145,15 +145,13 @@ def test_windows_from_an_episodes_start_are_its_path(replayed, theta):
 
 @pytest.mark.parametrize("theta", [TRUTH, RICH], ids=["declared", "rich"])
 def test_a_window_in_the_middle_knows_the_commands_before_it(replayed, theta):
-    begin = np.array([50])
-    walked = window_paths(replayed, theta, begin, 60)[0]
+    walked = window_paths(replayed, theta, np.array([50]), 60)[0]
     whole = paths(replayed, theta)[replayed.episode[50], replayed.first[50] : replayed.first[50] + 61]
     np.testing.assert_allclose(relative(walked[0], walked), relative(whole[0], whole), atol=1e-9)
 
 
 def test_a_window_starts_from_the_measured_wheel_speeds_where_there_are_any(replayed):
-    full = np.ones_like(replayed.duties)
-    turning = replace(replayed, wheels=full)
+    turning = replace(replayed, wheels=np.ones_like(replayed.duties))
     begin = np.array([50])
     moved = [window_paths(one, TRUTH, begin, 1)[0, 1, 0] for one in (replayed, turning)]
     assert moved[1] > moved[0]
@@ -173,8 +171,7 @@ def test_what_models_share_is_kept_and_what_differs_is_not(replayed):
 
 
 def test_windows_go_on_with_the_last_command_and_what_is_measured_later_changes_nothing(replayed):
-    last = np.array([np.flatnonzero(replayed.episode == 0)[-1]])
-    walked = window_paths(replayed, TRUTH, last, 200)
+    walked = window_paths(replayed, TRUTH, np.array([np.flatnonzero(replayed.episode == 0)[-1]]), 200)
     steps = np.diff(walked[0], axis=0)
     np.testing.assert_allclose(np.hypot(*steps[-1, :2]), np.hypot(*steps[-50, :2]), rtol=0.2)
     assert np.isfinite(walked).all()
@@ -218,8 +215,7 @@ def test_windows_with_measured_wheels_are_told_where_they_point(replayed):
     measured = replace(replayed, wheels=wheel_speeds(replayed, theta))
     plain, known = (window_paths(one, theta, begin, 60) for one in (replayed, measured))
     np.testing.assert_allclose(known, plain, atol=0.02)
-    level = window_paths(measured, TRUTH, begin, 60)
-    assert np.abs(level - known).max() > 0.02
+    assert np.abs(window_paths(measured, TRUTH, begin, 60) - known).max() > 0.02
 
 
 TICK_S = 1.0 / 60.0

@@ -37,15 +37,12 @@ def test_noise_of_the_drive_missing_effects_and_outliers_do_not_pass_for_noise_o
     assert wrong.place == pytest.approx(0.003, rel=0.1)
     log = planted_log(TRUTH, episodes=6, seconds=60.0, noise=STILL)
     jumping = with_poses(log, lambda poses: poses + np.outer(np.arange(1200) % 100 == 0, (0.5, 0.5, 0.0)))
-    jumped = pose_noise(drives_of(jumping), TRUTH)
-    assert jumped.place == pytest.approx(0.003, rel=0.25)
+    assert pose_noise(drives_of(jumping), TRUTH).place == pytest.approx(0.003, rel=0.25)
 
 
 def test_poses_without_noise_have_none_and_short_drives_tell_none():
-    quiet = planted_drives(TRUTH, episodes=2, seconds=20.0, noise=None)
-    assert max(pose_noise(quiet, TRUTH)) < 1e-6
-    few = planted_drives(TRUTH, episodes=1, seconds=0.3)
-    assert pose_noise(few, TRUTH) == PoseNoise(0.0, 0.0)
+    assert max(pose_noise(planted_drives(TRUTH, episodes=2, seconds=20.0, noise=None), TRUTH)) < 1e-6
+    assert pose_noise(planted_drives(TRUTH, episodes=1, seconds=0.3), TRUTH) == PoseNoise(0.0, 0.0)
 
 
 @pytest.mark.parametrize("horizon_s", [1.0, 2.0, 5.0])
@@ -153,6 +150,5 @@ def test_what_predicts_poorly_is_fitted_again_by_poses_not_fitted_to(driven):
 def test_values_are_kept_where_windows_mend_nothing_or_would_do_harm(driven):
     right = model(driven)
     assert fit_multistep(right) == (right, None)
-    strict = replace(driven, rules=replace(RULES, multistep_harms=0.01))
-    poor = model(strict, trim=0.08, delay=0.2)
+    poor = model(replace(driven, rules=replace(RULES, multistep_harms=0.01)), trim=0.08, delay=0.2)
     assert fit_multistep(poor) == (poor, None)

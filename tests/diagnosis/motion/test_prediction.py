@@ -23,8 +23,6 @@ from proxytune.effects import learnt_effect
 from proxytune.errors import LogError
 from proxytune.logs import read_log
 
-COLUMNS = ["episode", "start_time", "time", "x", "y", "heading"]
-
 
 @pytest.fixture(scope="module")
 def log():
@@ -42,7 +40,7 @@ def without_poses(log, *rows):
 
 def test_windows_cover_every_row_and_headings_go_on(log):
     table = predict(log, ROBOT, TRUTH, 2.0)
-    assert list(table.columns) == COLUMNS
+    assert list(table.columns) == ["episode", "start_time", "time", "x", "y", "heading"]
     for name, own in table.groupby("episode"):
         assert name in ("00", "01")
         assert sorted(own.start_time.unique()) == pytest.approx([0.0, 2.0, 4.0, 6.0, 8.0])
@@ -88,8 +86,7 @@ def test_a_stub_at_a_drives_end_is_not_counted_as_a_window(log):
     assert (ends.time - ends.start_time).min() < 0.5
     assert found.windows == 2 * 5
     assert found.poses == found.windows * 38
-    whole = table[table.start_time < 9.0]
-    assert agreement(whole, log, 1.9) == found
+    assert agreement(table[table.start_time < 9.0], log, 1.9) == found
 
 
 @pytest.mark.parametrize("extra", [TURNING, MANY], ids=["turning", "many"])
@@ -143,14 +140,12 @@ def test_random_effects_are_predicted_by_their_mean(log):
 
 @pytest.fixture(scope="module")
 def own_times(tmp_path_factory):
-    home = tmp_path_factory.mktemp("own_times")
-    return read_log(write_own_times(home, [drive(1, seconds=20.0)]))
+    return read_log(write_own_times(tmp_path_factory.mktemp("own_times"), [drive(1, seconds=20.0)]))
 
 
 def test_poses_at_times_of_their_own_are_predicted_at_those_times(own_times):
     (episode,) = own_times.episodes
-    robot = robot_of(own_times)
-    table = predict(own_times, robot, FOREIGN_TRUTH, 2.0)
+    table = predict(own_times, robot_of(own_times), FOREIGN_TRUTH, 2.0)
     assert set(table.time) == set(episode.measured.times[episode.measured.times >= table.time.min()])
     found = agreement(table, own_times, 2.0)
     assert found.place < 0.0035, "noise of 1 mm at the start and 3 mrad over up to 0.5 m"
@@ -255,13 +250,11 @@ def test_a_right_model_leaves_nothing_and_does_not_stray_from_noiseless_drives(d
 
 def test_windows_are_thinned_and_short_runs_have_none(drives):
     windows = windows_module.choose_windows(drives)
-    counts = np.bincount(windows.window)
-    assert counts.max() == windows_module.POSES
+    assert np.bincount(windows.window).max() == windows_module.POSES
     lasts = (drives.last[windows.increment] - drives.first[windows.begin][windows.window]) / drives.tick_hz
     assert lasts.max() == windows_module.FITTED_S
     assert np.all(np.diff(lasts)[np.diff(windows.window) == 0] > 0.0)
-    few = planted_drives(TRUTH, episodes=2, seconds=4.0)
-    assert len(cut(few, 10.0).begin) == 0
+    assert len(cut(planted_drives(TRUTH, episodes=2, seconds=4.0), 10.0).begin) == 0
 
 
 @pytest.fixture(scope="module")

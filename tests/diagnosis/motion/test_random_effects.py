@@ -19,8 +19,7 @@ SHORT = {"episodes": 4, "seconds": 25.0}
 
 def ratio(effect, size, pull, energy):
     """The log-likelihood ratio of each command, one command per second."""
-    late = RANDOM_EFFECTS[effect].lateness(size, 1.0)
-    return _mixture(late, pull, energy)
+    return _mixture(RANDOM_EFFECTS[effect].lateness(size, 1.0), pull, energy)
 
 
 def weighed(theta, seed=1):
@@ -78,8 +77,7 @@ def test_commands_that_never_change_or_a_model_that_explains_all_show_no_random_
     [("dropped_commands", 0.05), ("dropped_commands", 0.2), ("delay_jitter", 0.3), ("delay_jitter", 2.0)],
 )
 def test_mean_lateness_speaks_for_nothing_since_the_delay_has_it_already(effect, size):
-    pull = np.array([-1e-4, 0.0, 1e-4])
-    said = ratio(effect, size, pull, np.zeros(3))
+    said = ratio(effect, size, np.array([-1e-4, 0.0, 1e-4]), np.zeros(3))
     np.testing.assert_allclose(said - said[1], 0.0, atol=2e-6)
     assert said[1] == pytest.approx(0.0, abs=1e-3)
 

@@ -17,7 +17,6 @@ from proxytune.diagnosis.motion.screening import candidates, project_out, screen
 from proxytune.effects import CATALOGUE, PARAMETERS, SHIPPED, Stage, effects_from
 
 THETA = {**ROBOT.theta, **TRUTH}
-WHEELS = ("dead_band", "stiction", "backlash", "saturation")
 
 
 MOTION_EFFECTS = motion_effects(SHIPPED)
@@ -41,7 +40,7 @@ def test_what_is_declared_or_adopted_is_left_out(taken):
     assert known == set(MOTION_EFFECTS) - set(RANDOM_EFFECTS) - set(taken)
 
 
-@pytest.mark.parametrize("effect", WHEELS)
+@pytest.mark.parametrize("effect", ["dead_band", "stiction", "backlash", "saturation"])
 def test_an_effect_of_wheels_may_be_on_one_of_them_alone(effect):
     known = {form: one for form, one in forms(effect).items() if form != "runs through reversals"}
     assert set(known) == {"", "left wheel", "right wheel"}
@@ -106,12 +105,11 @@ def test_a_slippery_place_is_met_within_a_patch_width():
 
 
 FEW = {"episodes": 3, "seconds": 20.0}
-TAKEN = ("trim", "delay")
 
 
 def leads_of(theta, *, base=None, **more):
     base = base or fitted(planted_drives({**TRUTH, **theta}, **{**FEW, **more}))
-    return screen(base, candidates(ROBOT, base.theta, TAKEN), 1)
+    return screen(base, candidates(ROBOT, base.theta, ("trim", "delay")), 1)
 
 
 SLOWLY = {"turn_slip": 0.15, "motor_lag.time_constant": 0.4, "floor_slope.x": 0.04, "lateral_slip": 0.1}

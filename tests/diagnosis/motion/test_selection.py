@@ -335,8 +335,7 @@ def test_no_random_effect_stands_for_what_a_car_lacks_beside_it(monkeypatch, dri
     model = SimpleNamespace(drives=SimpleNamespace(rules=RULES, robot=SimpleNamespace(drive=drive)))
     monkeypatch.setattr(selection, "fit_random", lambda model, one: FittedCandidate(one.gain, model, random=one))
     monkeypatch.setattr(selection, "predicts_no_worse", lambda one, other: True)
-    best = choose_best(model, Evidence([], {}, (lost,), []), 15.0)
-    assert (best is not None) == chosen
+    assert (choose_best(model, Evidence([], {}, (lost,), []), 15.0) is not None) == chosen
 
 
 FAULTS = {"dead_band": 0.12, "steering_lag": 0.3, "steering_friction": 0.4, "marker_offset.forward": 0.1}

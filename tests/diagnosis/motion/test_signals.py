@@ -76,8 +76,7 @@ def test_the_signal_that_the_motion_depends_on_leads(effect, figures, signals):
 
 def test_a_wheel_has_turned_as_far_as_it_rolled():
     log = hidden.make_log(hidden.Case("plain", (), "normal", 5, 0.0, 0.0), episodes=2, seconds=10.0, noiseless=True)
-    drives = gather(log, ROBOT, log.episodes)
-    angles = drives.angles
+    angles = gather(log, ROBOT, log.episodes).angles
     way = np.stack([np.hypot(*np.diff(e.poses[:, :2], axis=0).T).sum() for e in log.episodes])
     rolled = np.abs(np.diff(angles, axis=1)).sum(axis=1).mean(axis=-1) * 0.0318
     assert (rolled > 0.9 * way).all()

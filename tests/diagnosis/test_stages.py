@@ -50,8 +50,7 @@ def test_a_stage_is_made_once_and_read_as_it_was(tmp_path):
 def test_things_that_are_known_are_not_copied(tmp_path):
     thing = {"large": np.zeros(1000)}
     for _ in range(2):
-        stages = Stages(tmp_path, "facts", thing=thing)
-        assert stages.keep("one", lambda: (thing, 1))[0] is thing
+        assert Stages(tmp_path, "facts", thing=thing).keep("one", lambda: (thing, 1))[0] is thing
     (path,) = tmp_path.rglob("*.pickle")
     assert path.stat().st_size < 200
 

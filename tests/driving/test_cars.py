@@ -137,8 +137,7 @@ def test_our_agents_keep_a_car_in_its_lane_and_repeat_themselves(tmp_path, agent
 
 
 def test_the_agent_at_the_wheel_asks_for_the_curvature_that_it_wants_of_two_wheels():
-    wanted = AtTheWheel(AGENTS["steady"])
-    _, scale, memory = wanted.begin(CAR)
+    _, scale, memory = AtTheWheel(AGENTS["steady"]).begin(CAR)
     assert scale == pytest.approx(2.25)
     assert memory.full_speed == pytest.approx(3.0 / 2.25)
     assert throttle_and_steering(CAR, 0.6, 1.0 / CAR.least_radius) == pytest.approx((0.2, 1.0))
@@ -151,8 +150,7 @@ def test_the_expert_keeps_all_wheels_of_a_car_in_its_lane(tmp_path):
     sample, steps = domain.demonstrate(make_episode({}, agent="-", start=2, seed=1), 6.0)
     assert len(sample.commands) == steps == 120
     assert np.abs(sample.commands).max() <= 1.0
-    robot = lesson_driver(domain.map, CAR, 1, None).begin(CAR).robot
-    assert robot.drive == "ackermann"
+    assert lesson_driver(domain.map, CAR, 1, None).begin(CAR).robot.drive == "ackermann"
     rows = np.array([domain.map.starts[0]] * 60) * (1.0, 1.0, np.pi / 180.0)
     whole = driving_score(domain.map, rows, wheel_distance=CAR.wheel_distance(), tick_s=0.1, seconds=6.0)
     assert whole == pytest.approx(5.9)

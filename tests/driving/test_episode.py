@@ -438,8 +438,7 @@ def test_a_drive_is_scored_by_every_metric_and_early_ones_by_its_first_seconds()
     early = {"early_distance": "m", "early_offset": "m", "speed": "m/s"}
     assert {"distance": "m", "survival_time": "s", "time_out_of_lane": "s", "deviation": "m"} | early == METRICS
     short = drive(moved_left(OUTER, 0.03), [(0.4, 0.0)])
-    still = np.repeat(short[-1:], 60 * 20, axis=0)
-    whole = np.concatenate((short, still))
+    whole = np.concatenate((short, np.repeat(short[-1:], 60 * 20, axis=0)))
     first = score(whole[: 5 * 60 + 1])
     result = score(whole)
     assert result["early_distance"] == first["distance"] == pytest.approx(0.4)
@@ -468,8 +467,7 @@ def test_the_wrong_way_round_counts_nothing_and_is_all_out_of_lane(start, outer)
 
 @both_lanes
 def test_driving_backwards_in_the_lane_counts_negative(start, outer):
-    backwards = [(-length, curvature) for length, curvature in reversed(lap(outer))]
-    result = score(drive(start, backwards))
+    result = score(drive(start, [(-length, curvature) for length, curvature in reversed(lap(outer))]))
     assert result["distance"] == pytest.approx(-lane_length(ROAD, outer), abs=0.001)
     assert result["time_out_of_lane"] == 0
 
@@ -548,8 +546,7 @@ def test_crossing_the_middle_of_the_map_counts_nothing_there(middle):
 @given(st.integers(0, 10**6), st.floats(0, 1))
 def test_the_parts_of_a_drive_add_up(seed, share):
     poses = wandering(seed)
-    survived = round(score(poses)["survival_time"] * 60)
-    cut = round(share * survived)
+    cut = round(share * round(score(poses)["survival_time"] * 60))
     whole, first, second = score(poses), score(poses[: cut + 1]), score(poses[cut:])
     for metric in ("distance", "survival_time", "time_out_of_lane"):
         assert first[metric] + second[metric] == pytest.approx(whole[metric], abs=1e-9), metric

@@ -226,8 +226,7 @@ def test_another_seed_start_or_theta_shows_other_samples_and_a_lesson_off_the_ro
         assert (other.commands != shown[0].commands).any()
         assert (other.observations != shown[0].observations).any()
     driven = lesson(1, (("trim", 0.5),))
-    middles = driven.poses[:-1:3, :2]
-    inside = np.abs(middles - ROAD.size[0] / 2).max(axis=1)
+    inside = np.abs(driven.poses[:-1:3, :2] - ROAD.size[0] / 2).max(axis=1)
     assert len(driven.memory.on_road) == len(driven.commands)
     assert not all(driven.memory.on_road)
     assert not any(driven.memory.on_road[step] for step in np.flatnonzero(inside < 0.2))

@@ -15,9 +15,7 @@ from proxytune.driving.road_picture import Floor
 
 NOMINAL = replace(CAMERA, columns=64, rows=48)
 ONE_PIXEL = replace(NOMINAL, columns=1, rows=1)
-SMALL_LOOP = shipped_map("small_loop")
-FLOOR = draw_floor(SMALL_LOOP)
-POSES = st.tuples(st.floats(0.2, 1.5), st.floats(0.2, 1.5), st.floats(-7.0, 7.0))
+FLOOR = draw_floor(shipped_map("small_loop"))
 
 
 def gradient_floor():
@@ -27,9 +25,6 @@ def gradient_floor():
     pixels = np.zeros((side, side, 3), dtype=np.uint8)
     pixels[..., 0], pixels[..., 1] = ramp[None, :], ramp[:, None]
     return Floor(pixels, 400.0, -0.4)
-
-
-GRADIENT = gradient_floor()
 
 
 def on_map(points, pose):
@@ -72,8 +67,7 @@ def test_the_middle_of_the_picture_looks_down_at_the_pitch(pitch, height):
 
 def test_rows_and_columns_reach_over_the_field_of_view():
     points = ground_points(replace(NOMINAL, columns=1, rows=4801, height_m=1.0, forward_m=0.0))
-    depression = np.degrees(np.arctan2(1.0, points[-1, 0, 0]))
-    assert depression == pytest.approx(19.15 + 37.5, abs=0.02)
+    assert np.degrees(np.arctan2(1.0, points[-1, 0, 0])) == pytest.approx(19.15 + 37.5, abs=0.02)
     points = ground_points(replace(NOMINAL, pitch_deg=90.0, forward_m=0.0))
     assert np.allclose(np.diff(points[..., 1], axis=1), np.diff(points[..., 0], axis=0)[0, 0])
     assert (points[:, :32, 1] > 0).all()
@@ -90,8 +84,7 @@ def test_a_camera_turns_its_view_by_yaw_roll_and_place():
     cos, sin = math.cos(math.radians(10)), math.sin(math.radians(10))
     expected = (straight - lens) @ np.array([[cos, sin], [-sin, cos]]) + lens
     np.testing.assert_allclose(turned, expected, atol=1e-9)
-    points = ground_points(replace(NOMINAL, roll_deg=8.0))
-    sky = np.isnan(points[..., 0]).sum(axis=0)
+    sky = np.isnan(ground_points(replace(NOMINAL, roll_deg=8.0))[..., 0]).sum(axis=0)
     assert sky[0] > sky[-1] + 4  # the right of the picture looks further down
     ahead = ground_points(replace(NOMINAL, forward_m=0.166)) - ground_points(NOMINAL)
     seen = np.isfinite(ahead[..., 0])
@@ -136,10 +129,10 @@ def test_things_look_wider_by_the_aspect_and_as_high_as_before(aspect):
 
 
 @pytest.mark.slow
-@given(POSES)
+@given(st.tuples(st.floats(0.2, 1.5), st.floats(0.2, 1.5), st.floats(-7.0, 7.0)))
 @settings(max_examples=25)
 def test_a_pixel_shows_the_place_that_it_looks_at(pose):
-    picture = GroundPlaneCamera(NOMINAL, GRADIENT).render(np.array([pose]))[0]
+    picture = GroundPlaneCamera(NOMINAL, gradient_floor()).render(np.array([pose]))[0]
     places = on_map(ground_points(NOMINAL), pose)
     inside = ((places > -0.3) & (places < 2.06)).all(axis=-1) & (np.arange(48)[:, None] > 20)
     expected = (places + 0.4) / 2.56 * 255.0

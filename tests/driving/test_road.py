@@ -183,7 +183,6 @@ both_lanes = pytest.mark.parametrize("outer", [True, False], ids=("outer", "inne
 quick = settings(max_examples=25)
 coordinates = st.floats(-0.5, 3.5)
 points = st.tuples(coordinates, coordinates)
-ways = st.floats(-12.0, 20.0)
 
 
 def lane(road, outer, spacing=0.002):
@@ -200,7 +199,7 @@ def test_the_road_closes(road):
 
 @every_road
 @quick
-@given(outer=st.booleans(), along=ways)
+@given(outer=st.booleans(), along=st.floats(-12.0, 20.0))
 def test_the_point_so_far_along_a_lane_is_seen_so_far_along_it(road, outer, along):
     behind, here, ahead = lane_point(road, outer, along + np.array([-1e-5, 0.0, 1e-5]))
     pose = lane_pose(road, here, np.arctan2(*(ahead - behind)[::-1]))
@@ -324,11 +323,8 @@ def test_the_expert_drives_a_lap_with_both_wheels_in_the_lane(road, outer, plant
     assert driving_score(road, poses, wheel_distance=robot.wheel_distance(), **figures) > seconds - 0.1
 
 
-ROAD = shipped_map("small_loop")
-
-
 def test_the_floor_is_drawn_as_it_was_to_the_last_byte():
-    floor = draw_floor(ROAD)
+    floor = draw_floor(shipped_map("small_loop"))
     digest = hashlib.sha256(floor.pixels.tobytes()).hexdigest()
     assert digest == "e347d735d4b196fd72756c4ccd6e92f0cd26dedf7df020c7f7af0014d9228700"
     assert (floor.pixels.shape, floor.origin) == ((832, 832, 3), -0.1625000000000001)

@@ -194,8 +194,7 @@ def test_commands_and_motors_answer_by_their_formulas():
 @pytest.mark.parametrize("samples", [0.4, 1.0, 2.0, 2.7, 5.3])
 def test_blur_is_the_mean_of_a_scene_that_changes_linearly(samples):
     ramp = np.arange(30.0)[:, None] * np.ones(3)
-    blurred = run(Blur(samples / 10.0), ramp)
-    np.testing.assert_allclose(blurred[10:], ramp[10:] - samples / 2.0, atol=1e-4)
+    np.testing.assert_allclose(run(Blur(samples / 10.0), ramp)[10:], ramp[10:] - samples / 2.0, atol=1e-4)
 
 
 @pytest.mark.parametrize("samples", [0.3, 1.0, 2.718, 6.0, 11.9])

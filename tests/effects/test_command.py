@@ -33,8 +33,7 @@ def test_samples_belong_to_the_message_that_was_sent_last(per_sample, expected):
 @pytest.mark.parametrize("per_sample", [1 / 3, 1 / 7, 1 / 49, 0.4, 20 / 66, 1.0])
 def test_a_message_starts_with_the_first_sample_that_belongs_to_it(per_sample):
     sent = Messages(per_sample, 0)
-    numbers = sent.numbers(np.arange(30000))
-    firsts = np.flatnonzero(np.diff(numbers, prepend=-1))
+    firsts = np.flatnonzero(np.diff(sent.numbers(np.arange(30000)), prepend=-1))
     np.testing.assert_array_equal(sent.starts(np.arange(len(firsts))), firsts)
 
 

@@ -38,8 +38,7 @@ EFFECTS.append(pytest.param(effect_of(*COMMAND_GROUPS), id="all"))
 
 def commands(seed, length=90):
     """Held, reversed, ended and begun again."""
-    random = np.random.default_rng(seed)
-    steps = random.choice((-0.7, -0.3, 0.0, 0.0, 0.4, 0.9), (length // 9, 2))
+    steps = np.random.default_rng(seed).choice((-0.7, -0.3, 0.0, 0.0, 0.4, 0.9), (length // 9, 2))
     return np.repeat(steps, 9, axis=0)
 
 
@@ -132,8 +131,7 @@ def test_a_sticky_throttle_is_dragged_along_and_leaves_a_robot_creeping():
 
 def test_a_command_grows_and_shrinks_no_faster_than_its_ramp():
     signal = np.repeat([[0.4, 0.4], [0.1, -0.3]], 12, axis=0)
-    curve = LearntCurve("ramped", "duty", ((0.5, 2.0),), (1.0,))
-    held = signal + added(curve, signal)
+    held = signal + added(LearntCurve("ramped", "duty", ((0.5, 2.0),), (1.0,)), signal)
     np.testing.assert_allclose(held[:5], np.outer([0.1, 0.2, 0.3, 0.4, 0.4], [1.0, 1.0]))
     np.testing.assert_allclose(held[12:17], np.stack((0.4 - 0.025 * np.arange(1, 6), [0.375, 0.35, 0.325, 0.3, 0.2])).T)
 

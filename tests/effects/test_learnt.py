@@ -63,8 +63,7 @@ EFFECTS = [pytest.param(effect_of(group), id=group) for group in MOTION_GROUPS] 
 
 
 def a_signal(seed, length=90):
-    random = np.random.default_rng(seed)
-    held = np.repeat(random.uniform(-1.0, 1.0, (length // 3, 3)), 3, axis=0)
+    held = np.repeat(np.random.default_rng(seed).uniform(-1.0, 1.0, (length // 3, 3)), 3, axis=0)
     return held * (0.6, 0.0, 5.0)
 
 
@@ -189,8 +188,7 @@ def test_curves_add_to_their_wheels_and_fade_after_named_effects():
 
 def test_a_veer_by_the_heading_follows_the_heading_that_it_leads_to():
     turning = Learnt(SEEN, (LearntCurve("heading", "veer_sin", (1.0,), (3.0,)),))
-    ahead = np.tile((0.4, 0.0, 0.0), (600, 1))
-    moved = run(turning, ahead)
+    moved = run(turning, np.tile((0.4, 0.0, 0.0), (600, 1)))
     heading = 0.4 + np.concatenate(((0.0,), np.cumsum(moved[:-1, 2]) / RATE_HZ))
     np.testing.assert_allclose(moved[:, 2], 3.0 * 0.4 * np.sin(heading), atol=1e-12)
     assert heading[-1] == pytest.approx(np.pi, abs=0.01)

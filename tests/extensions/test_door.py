@@ -57,8 +57,7 @@ def install(tmp_path, monkeypatch):
 
 
 def test_an_attribute_is_found_in_the_folder_before_the_installed_modules(write):
-    folder = write("study", json="here = 7\n")
-    assert load("json:here", kind="agent", beside=folder) == 7
+    assert load("json:here", kind="agent", beside=write("study", json="here = 7\n")) == 7
     assert load("json:loads", kind="agent")("3") == 3
     assert "here" not in vars(sys.modules["json"])
 
@@ -162,8 +161,7 @@ def test_a_keyboard_interrupt_of_a_users_code_is_told_on_the_command_line_and_el
 
 def test_a_class_or_factory_is_called_and_what_has_the_members_is_taken_as_it_is(write):
     mine = "class Mine:\n    size = 1\n    def __call__(self): return 5\n\n\nready = Mine()\n\n\n"
-    made = "def factory(): return Mine()\n\n\ndef broken(): return 1 / 0\n"
-    folder = write("study", mine=mine + made)
+    folder = write("study", mine=mine + "def factory(): return Mine()\n\n\ndef broken(): return 1 / 0\n")
     for name in ("mine:Mine", "mine:ready", "mine:factory"):
         assert load(name, kind="agent", beside=folder, needs=("size",), call=True).size == 1
     told = r"'mine:broken' raised ZeroDivisionError: division by zero \(mine.py, line 12\); correct"

@@ -9,9 +9,7 @@ from proxytune.importing import Wanted
 from proxytune.importing.arrays import is_arrays, read_arrays
 
 FRAMES = np.arange(ROWS * 2 * 3 * 3, dtype=np.uint64).astype(np.uint8).reshape(ROWS, 2, 3, 3)
-POSE_MAP = {"x": "state[0]", "y": "state[1]", "heading": "state[2]"}
-STATES = np.column_stack((PLACES, HEADINGS))
-OWN = {"positions": None, "angles": None, "actions": None, "state": STATES}
+OWN = {"positions": None, "angles": None, "actions": None, "state": np.column_stack((PLACES, HEADINGS))}
 
 
 def read(path, **wanted):
@@ -73,7 +71,7 @@ def test_frames_of_another_form_are_left_out_or_refused_when_asked_for(tmp_path)
 
 def test_places_of_a_column_map_are_in_the_user_s_own_frame_with_units(tmp_path):
     arrays = {**OWN, "timestamps": None, "clock": TIMES * 1e3, "wheels": SPEEDS * 60.0}
-    columns = {**POSE_MAP, "time": "clock:ms"}
+    columns = {**{"x": "state[0]", "y": "state[1]", "heading": "state[2]"}, "time": "clock:ms"}
     columns |= {f"wheel_command_{side}": f"wheels[{place}]:rpm" for place, side in enumerate(("left", "right"))}
     (drive,) = read(write_arrays(tmp_path, **arrays), columns=columns).drives
     np.testing.assert_allclose(drive.poses.times, TIMES)
@@ -100,8 +98,7 @@ def test_commands_are_left_out_only_if_asked_for_and_none_need_follow_the_last_p
     assert "no column found for left, right" in complaint(path, kind="duty")
     assert "no column found for commands" in complaint(path)
     assert read(path, commands="none").drives[0].commands is None
-    other = write_arrays(tmp_path, actions=SPEEDS[:7])
-    assert read(other, commands="none").drives[0].commands is None
+    assert read(write_arrays(tmp_path, actions=SPEEDS[:7]), commands="none").drives[0].commands is None
     (drive,) = read(write_arrays(tmp_path, actions=SPEEDS[:-1])).drives
     np.testing.assert_array_equal(drive.commands.times, TIMES[:-1])
     assert len(drive.poses.times) == ROWS

@@ -18,8 +18,7 @@ GRID = np.arange(0.0, 10.0, 0.05)
 
 
 def test_stamps_in_order_are_kept_and_others_sorted():
-    given = drive(GRID, GRID)
-    kept, notes = checked_drive(given, "bag")
+    kept, notes = checked_drive(drive(GRID, GRID), "bag")
     assert notes == []
     np.testing.assert_array_equal(kept.poses.times, GRID)
     np.testing.assert_array_equal(kept.commands.times, GRID)
@@ -84,8 +83,7 @@ def test_what_is_plausible_is_left_alone():
     check_units(turning(0.1), "table")
     check_units(replace(slow(), commands=None), "table")
     one = slow()
-    stuck = replace(one, poses=replace(one.poses, places=np.zeros_like(one.poses.places)))
-    check_units(stuck, "table")
+    check_units(replace(one, poses=replace(one.poses, places=np.zeros_like(one.poses.places))), "table")
 
 
 def test_a_few_poses_without_a_number_are_drop_outs():

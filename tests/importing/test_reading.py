@@ -133,8 +133,7 @@ def test_commands_in_the_rows_of_poses_are_said_to_be_late():
 
 
 def test_what_was_found_joins_the_notes_and_without_commands_nothing_is_said_of_clocks(monkeypatch, tmp_path):
-    times = np.append(TIMES, TIMES[-1])
-    found = read_as(monkeypatch, tmp_path, drive(times, TIMES))
+    found = read_as(monkeypatch, tmp_path, drive(np.append(TIMES, TIMES[-1]), TIMES))
     assert found.notes[0] == "taken as it is"
     assert "repeat a stamp" in found.notes[1]
     assert found.notes[2].startswith("no drive turns enough")

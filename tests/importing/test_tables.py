@@ -120,8 +120,7 @@ def test_a_column_map_goes_before_names_and_what_is_mapped_is_nothing_else(file)
     np.testing.assert_allclose(drive.poses.places[1], [0.1, 0.0, 0.0])
     np.testing.assert_allclose(drive.poses.headings, np.pi / 2)
     np.testing.assert_allclose(drive.commands.values, [[1.0, np.pi / 2]] * 2)
-    source = read(file(BOTH), columns={"left": "v", "right": "omega"})
-    assert source.drives[0].commands.kind == "duty"
+    assert read(file(BOTH), columns={"left": "v", "right": "omega"}).drives[0].commands.kind == "duty"
 
 
 def test_quaternions_give_headings_and_tilts(file):

@@ -73,8 +73,7 @@ def test_a_grid_is_settled_by_its_last_doubling_alone():
 @pytest.mark.parametrize("grid", [(0, 400, 800), (0, 3, 6), (0, 50, 100)])
 def test_a_grid_that_begins_at_half_its_last_tells_the_gain(grid):
     alone = LearningCurve(grid, np.array([[np.nan, 20.0, 50.0], [np.nan, 19.0, 51.0], [np.nan, 21.0, 50.5]]))
-    needs = sample_needs({"none": alone}, best_score=60.0, tolerance=5.0)
-    assert 20.0 < needs.gain < 35.0
+    assert 20.0 < sample_needs({"none": alone}, best_score=60.0, tolerance=5.0).gain < 35.0
 
 
 def test_proxies_are_compared_by_what_they_need_whatever_beside():
@@ -150,8 +149,7 @@ def test_examinations_go_where_they_tell_most_and_nothing_twice():
 
     assert {one.curve for one in next_examinations(needs(), ["open"], SPENDING)} == {"open"}
 
-    alone = {"none": CURVES["none"]}
-    chosen = next_examinations(needs(alone), ["none"], SPENDING)
+    chosen = next_examinations(needs({"none": CURVES["none"]}), ["none"], SPENDING)
     assert len(chosen) == SPENDING.batch
     # Between 400, where it is far below, and 1600, where it is converged.
     assert np.mean([one.samples > 300 for one in chosen]) > 0.5

@@ -11,12 +11,11 @@ from proxytune.driving import read_robot
 from proxytune.logs import log_cautions
 from proxytune.settings import figure_cautions
 
-FIGURES = read_robot("duckiebot").figures
 LOG = make_log(CLEAN[0], episodes=3, seconds=40.0)
 
 
 def cautions(log):
-    return log_cautions(log, FIGURES)
+    return log_cautions(log, read_robot("duckiebot").figures)
 
 
 def changed(change):

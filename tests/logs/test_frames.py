@@ -15,8 +15,7 @@ from proxytune.api import log_of
 from proxytune.logs import Frames, read_log, read_pictures
 
 BASE = 'format = 1\nrobot = "tractor"\ncommand = "twist"\nrate_hz = 10\n'
-CAMERA = '[camera]\nframes = "frames/%04d.jpg"\n'
-TOML = BASE + 'map = "small_loop"\n' + CAMERA
+TOML = BASE + 'map = "small_loop"\n' + '[camera]\nframes = "frames/%04d.jpg"\n'
 SAMPLES = "episode,time,v,omega,x,y,heading\n" + "".join(f"a,{5 + k / 10},0,0,{k},0,0\n" for k in range(4))
 SAMPLES += "b,0,0,0,,,\nb,0.1,0,0,0,0,0\nb,0.3,0,0,0,0,0\n"
 HEADER = "frame,episode,time\n"
@@ -197,8 +196,7 @@ def test_wider_pictures_are_averaged_and_others_stay(frames_of):
 def test_a_width_that_is_no_multiple_is_averaged_all_the_same(tmp_path_factory, rows, columns):
     path, picture = tmp_path_factory.mktemp("odd") / "0.png", noise(rows, columns)
     Image.fromarray(picture).save(path)
-    frames = Frames((path,), np.zeros(1, dtype=np.int64), np.zeros(1), "small_loop")
-    (small,) = read_pictures(frames, [0])
+    (small,) = read_pictures(Frames((path,), np.zeros(1, dtype=np.int64), np.zeros(1), "small_loop"), [0])
     assert small.shape == (max(1, round(rows * 160 / columns)), 160, 3)
     np.testing.assert_allclose(small.mean(axis=(0, 1)), picture.mean(axis=(0, 1)), atol=1.0)
 

@@ -27,14 +27,13 @@ from proxytune.report.diagnosis.document import camera_document
 from proxytune.report.diagnosis.error_figures import DECLARED_MODEL
 
 AFTER = "with camera roll"
-DECLARED = ("camera_pitch", "blur")
 
 
 @pytest.fixture(scope="module")
 def diagnosis(tmp_path_factory):
     theta = {"camera_pitch": 19.15, "camera_roll": 4.0}
     folder = write_still_frames(tmp_path_factory.mktemp("rolled") / "log", theta, lane_poses(30), columns=96)
-    found = diagnose_camera(read_log(folder), ROBOT, DECLARED)
+    found = diagnose_camera(read_log(folder), ROBOT, ("camera_pitch", "blur"))
     assert [effect.effect for effect in found.effects] == ["camera_roll"]
     return found
 

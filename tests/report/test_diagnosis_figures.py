@@ -152,8 +152,7 @@ def test_residuals_over_time_are_those_of_the_windows_on_an_axis_that_says_why_i
     drawn = [one.get_ydata() for one in axes.get_lines() if one.get_color() == line(axes, AFTER).get_color()]
     assert np.concatenate(drawn) == pytest.approx(expected)
     assert figures["residual_over_time"].axes[0].get_xlabel() == "time in the episode [s]"
-    half = int(drives.last.max() // 2)
-    late = drives.only(drives.first >= half)
+    late = drives.only(drives.first >= int(drives.last.max() // 2))
     both = strayed(replace(diagnosis, parts=diagnosis.parts._replace(tested=late)))
     assert "the first was fitted" in residual_over_time(late, both).axes[0].get_xlabel()
 
@@ -166,8 +165,7 @@ def test_many_episodes_become_a_median_with_a_band(diagnosis):
     first = np.unique(both[DECLARED_MODEL].window, return_index=True)[1]
     start = drives.first[both[DECLARED_MODEL].increment[first]] / drives.tick_hz
     assert middle[0] == pytest.approx(np.median(both[DECLARED_MODEL].rms[start < 1.0]))
-    bands = [band for band in axes.collections if band.get_paths()]
-    assert len(bands) == 2
+    assert len([band for band in axes.collections if band.get_paths()]) == 2
 
 
 def test_paths_on_the_maps_are_where_windows_were_measured_in_one_scale_and_equal_axes(diagnosis, figures):
@@ -191,8 +189,7 @@ def test_paths_on_the_maps_are_where_windows_were_measured_in_one_scale_and_equa
 def test_more_paths_than_can_be_told_apart_become_means_by_place(diagnosis, monkeypatch):
     monkeypatch.setattr("proxytune.report.diagnosis.error_figures.MANY_WINDOWS", 3)
     both = {DECLARED_MODEL: strayed(diagnosis)[DECLARED_MODEL]}
-    mesh = residual_map(diagnosis.parts.tested, both).axes[0].collections[0]
-    shown = mesh.get_array().compressed()
+    shown = residual_map(diagnosis.parts.tested, both).axes[0].collections[0].get_array().compressed()
     assert 0 < len(shown) <= len(both[DECLARED_MODEL].increment)
     rms, rounding = both[DECLARED_MODEL].rms, 1e-12
     assert rms.min() * (1.0 - rounding) <= shown.min() <= shown.max() <= rms.max() * (1.0 + rounding)
@@ -227,8 +224,7 @@ def test_every_effect_that_was_added_is_on_top_in_the_order_of_adding_and_rivals
     adopted = (replace(diagnosis.found.adopted[0], rivals=(rival,)),)
     figure = motion_figures(replace(diagnosis, found=replace(diagnosis.found, adopted=adopted)))["ranking"]
     upper = figure.axes[1]
-    names = [tick.get_text() for tick in upper.get_yticklabels()]
-    pairs = zip(names, dots(upper), strict=True)
+    pairs = zip([tick.get_text() for tick in upper.get_yticklabels()], dots(upper), strict=True)
     marked = {name.split(" (")[0] for name, dot in pairs if dot.get_label() == "fits as well as one added"}
     assert marked == {"stiction"}
 
@@ -246,8 +242,7 @@ def test_the_effect_curve_shows_the_dead_band_that_was_fitted_and_measured_means
     commands, speeds = values(upper, AFTER)
     width = diagnosis.theta["dead_band.width"].value
     assert width == pytest.approx(WIDTH, rel=0.1)
-    still = commands[np.abs(speeds) < 1e-9]
-    assert np.abs(still).max() == pytest.approx(width, abs=0.015)
+    assert np.abs(commands[np.abs(speeds) < 1e-9]).max() == pytest.approx(width, abs=0.015)
     trim = diagnosis.declared["trim"].value
     commands, speeds = values(upper, DECLARED_MODEL)
     assert speeds == pytest.approx(commands * 0.6 * (1.0 - trim), abs=1e-6)
@@ -288,8 +283,7 @@ def test_declared_parameters_give_way_to_the_curve_that_was_fitted_with_them(dia
 
 def test_panels_have_a_signal_of_their_own_and_every_motion_a_name():
     forms = [(CATALOGUE[name].trace, form.form) for name in MOTION_EFFECTS for form in EVERY if form.effect == name]
-    shown = [trace.shown_in(form) for trace, form in forms]
-    means = [one for one in shown if isinstance(one, Means)]
+    means = [one for one in [trace.shown_in(form) for trace, form in forms] if isinstance(one, Means)]
     assert len(means) >= 6
     assert all(one.cue in CUE_PANELS and one.panels for one in means)
     assert set(MOTIONS) == set(NAMES)
@@ -336,8 +330,7 @@ def test_with_nothing_added_there_is_one_model_and_no_effect_to_draw(clean):
 
 @pytest.mark.slow
 def test_an_unexplained_residual_is_drawn_over_each_signal_that_there_is(diagnosis):
-    names = {group.name for group in signal_groups(diagnosis.found.declared)}
-    assert names <= set(CUE_PANELS)
+    assert {group.name for group in signal_groups(diagnosis.found.declared)} <= set(CUE_PANELS)
     for curve in diagnosis.found.curves:
         figure = effect_curve(without_effects(diagnosis, (curve._replace(gain=50.0),)))
         figure.draw_without_rendering()

@@ -122,8 +122,7 @@ def test_a_ratio_is_told_as_what_it_adds():
 
 
 def test_values_beside_what_has_no_name_are_no_physics_yet_and_what_stops_the_robot_again_and_again_is_told():
-    lines = motion_notes(diagnosis(verdict="partly explained"))
-    assert any("no physics yet" in line for line in lines)
+    assert any("no physics yet" in line for line in motion_notes(diagnosis(verdict="partly explained")))
     assert motion_notes(diagnosis()) == []
     (note,) = motion_notes(diagnosis(period=Period(4.0, 0.3, 1e-9)))
     assert "as if it stood for 0.3 s every 4.0 s" in note

@@ -86,8 +86,7 @@ def test_arrows_are_few_and_evenly_spaced_along_the_path(length, rows):
     chosen = arrow_rows(places)
     assert len(chosen) <= ARROWS + 1
     assert all(0 < row < rows for row in chosen)
-    gaps = np.diff(places[chosen, 0])
-    assert (gaps >= LEAST_M - 2 * length / (rows - 1)).all()
+    assert (np.diff(places[chosen, 0]) >= LEAST_M - 2 * length / (rows - 1)).all()
 
 
 LOW, HIGH = np.array((0.0, 0.0)), np.array((2.0, 2.0))

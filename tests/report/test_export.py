@@ -52,8 +52,7 @@ def test_mujoco_drives_the_exported_model_as_the_planar_plant_the_instance(robot
     train = drivetrain(robot, effects_from(found.theta, robot.figures, robot.catalogue))
     twists, _ = train.apply(commands, train.begin(FilterContext(60.0, np.zeros(2), robot.figures)))
     expected = PlanarPlant(np.zeros(3), 1.0 / 60.0).move(twists)[0]
-    model = mujoco.MjModel.from_xml_string(mjcf_text(found))
-    poses = driven_by(mujoco, model, commands)
+    poses = driven_by(mujoco, mujoco.MjModel.from_xml_string(mjcf_text(found)), commands)
     driven = np.linalg.norm(np.diff(expected[:, :2], axis=0), axis=1).sum()
     assert np.linalg.norm(poses[:, :2] - expected[:, :2], axis=1).max() < share * driven
     assert abs(np.arctan2(*(f(poses[-1, 2] - expected[-1, 2]) for f in (np.sin, np.cos)))) < turned
@@ -173,8 +172,7 @@ def test_names_with_quotes_and_numbers_that_are_none_are_told_or_taken(tmp_path)
 
 @pytest.mark.parametrize("form", [urdf_text, mjcf_text])
 def test_names_with_signs_of_xml_give_a_file_that_can_be_read(form):
-    named = replace(instance(replace(ROBOT, name='R&D "<b>"')), source="a----b -")
-    root = ET.fromstring(form(named))
+    root = ET.fromstring(form(replace(instance(replace(ROBOT, name='R&D "<b>"')), source="a----b -")))
     assert root.tag in ("robot", "mujoco")
     assert form is urdf_text or root.get("model") == 'R&D "<b>"'
 

@@ -15,7 +15,6 @@ from proxytune.report.html import MANY, WORDS, Shown, page_html, write_page
 from proxytune.report.view import Column, Foot, Paragraphs, Picture, Table, View, columns_of, foot_of
 from proxytune.report.writing import svg_of
 
-VOID = {"meta", "link", "img", "br"}
 EVIL = "<script>alert('\"&')</script>"
 
 
@@ -49,7 +48,7 @@ class Reader(HTMLParser):
 
     def handle_starttag(self, tag, attrs):
         self.elements.append((tag, dict(attrs)))
-        if tag not in VOID:
+        if tag not in {"meta", "link", "img", "br"}:
             self.open.append(tag)
 
     def handle_endtag(self, tag):

@@ -113,8 +113,7 @@ def on_a_floor(mujoco, urdf):
     """A URDF as MuJoCo reads it, set free on a floor, with motors at its wheels: what a user of it adds."""
     spec = mujoco.MjSpec.from_string(urdf)
     spec.option.timestep = 0.0005
-    base = spec.body("base_footprint")
-    base.add_freejoint()
+    spec.body("base_footprint").add_freejoint()
     spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[9, 9, 0.1])
     for geom in (one for body in spec.bodies for one in body.geoms if one.name == "skid"):
         geom.condim, geom.priority = 1, 1
@@ -314,8 +313,7 @@ def test_a_wrong_argument_of_the_filter_is_one_line(model, arguments, said):
 
 def test_the_python_of_the_page_runs(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    page = PAGE.read_text(encoding="utf-8")
-    exec(page.split("```python")[1].split("```")[0], {})
+    exec(PAGE.read_text(encoding="utf-8").split("```python")[1].split("```")[0], {})
 
 
 def test_the_command_shows_the_diff_and_how_to_make_the_filter(model, tmp_path, capsys, refused):

@@ -97,8 +97,7 @@ def test_the_density_is_highest_where_theta_is_known_to_be_adds_up_to_one_and_st
         values, density = density_of(learnt, place)
         assert values[np.argmax(density)] == pytest.approx(centre, abs=0.01)
         assert np.trapezoid(density, values) == pytest.approx(1.0, abs=0.02)
-    at_the_end = planted(learnt, centre=(0.0, 0.5), deviation=(0.05, 0.05))
-    values, density = density_of(at_the_end, 0)
+    values, density = density_of(planted(learnt, centre=(0.0, 0.5), deviation=(0.05, 0.05)), 0)
     assert values[0] == 0.0
     assert density[1] > 0.9 * density.max()
     assert np.trapezoid(density, values) == pytest.approx(1.0, abs=0.02)
@@ -134,8 +133,7 @@ def test_a_figure_can_be_read_in_one_column_of_a_paper(learnt, draw):
 
 def shadow(learnt):
     """Whether the shadow of delay and trim holds points of the box."""
-    pair = evaluations_figure(learnt).axes[0]
-    (region,) = [one for one in pair.collections if one.get_zorder() == 0]
+    (region,) = [one for one in evaluations_figure(learnt).axes[0].collections if one.get_zorder() == 0]
     return lambda *points: [any(path.contains_point(point) for path in region.get_paths()) for point in points]
 
 

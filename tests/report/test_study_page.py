@@ -34,8 +34,7 @@ def test_the_page_needs_nothing_else_and_begins_with_the_sentence(result, figure
 
 
 def test_every_figure_has_a_caption_and_an_alternative_text_that_says_what_to_see(result, figures):
-    image = figures["convergence"]
-    text = text_of(result, dict.fromkeys(CAPTIONS["study"], image))
+    text = text_of(result, dict.fromkeys(CAPTIONS["study"], figures["convergence"]))
     for name, said in CAPTIONS["study"].items():
         title = said["title"]
         (alt,) = re.findall(f'aria-label="({re.escape(html.escape(title))}[^"]*)"', text)

@@ -185,8 +185,7 @@ def test_unidentified_parameters_have_no_interval_and_only_who_tells_of_them_is_
 def test_values_outside_their_intervals_and_of_many_only_some_are_told():
     text = said((replace(TRIM, best=0.2), PITCH), **ABOVE)
     assert "trim 0.200 (95 % region: 0.108 to 0.146)" in text
-    many = tuple(replace(TRIM, name=f"gain{number}") for number in range(7))
-    text = said(many)
+    text = said(tuple(replace(TRIM, name=f"gain{number}") for number in range(7)))
     assert "gain4 0.121 (0.108 to 0.146) and 2 more." in text
     assert "gain5" not in text
 

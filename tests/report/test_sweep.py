@@ -41,8 +41,7 @@ def curve(folder, parameter="trim", base=TRUTH, model=None):
     if discrepancy:
         plan = with_target(plan, model, discrepancy)
     with Store.open(folder) as store:
-        study_run = StudyRun(study, store)
-        run_sweep(study_run, plan, discrepancy)
+        run_sweep(StudyRun(study, store), plan, discrepancy)
         return curve_of(StudyRun(study, store), plan)
 
 
@@ -178,8 +177,7 @@ def test_the_bars_stand_at_the_held_value_and_a_third_of_the_range_beside(make_s
     values = [point.value for point in swept.points]
     indices, held = bar_points(swept)
     assert ([values[index] for index in indices], values[held]) == ([-0.1, 0.1, 0.3], 0.1)
-    at_the_end = curve(make_study("end"), base={"trim": -0.3})
-    assert bar_points(at_the_end) == ([0, 1], 0)
+    assert bar_points(curve(make_study("end"), base={"trim": -0.3})) == ([0, 1], 0)
     axes = bars_figure([swept]).axes[0]
     scores = [swept.points[index].assessment.prpv.value for index in indices]
     assert [patch.get_height() for patch in axes.patches if patch.get_width() == pytest.approx(0.85)] == scores
@@ -246,8 +244,7 @@ def test_the_answer_says_where_prpv_is_lowest_and_figures_of_all_come_first(curv
 def test_a_flat_curve_asks_for_more_starts_and_claims_no_optimum(curves):
     (trim, _) = curves
     point = trim.points[0]
-    flat = replace(trim, points=(point, replace(point, value=0.2)))
-    page = view_of([flat])
+    page = view_of([replace(trim, points=(point, replace(point, value=0.2)))])
     assert "and at no other value worse beyond noise" in page.sentence
     assert page.next_step.startswith("raise starts, or add agents whose scores change with trim")
     assert "search all parameters" in view_of(curves).next_step

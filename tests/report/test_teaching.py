@@ -48,8 +48,7 @@ def experiment(lessons=LESSONS, gain=1.0, published=NOBODY, examinations=None, c
     curves = {"none": without, **{one.name: one.curve for one in lessons}}
     needs = sample_needs(curves, best_score=60.0, tolerance=5.0, level=50.0, draws=60)
     taught = {"published": published, "published_in": "a paper", "examinations": examinations, "costs": costs}
-    teaching = SimpleNamespace(target_samples=COUNTS, **taught)
-    settings = SimpleNamespace(name=EVIL, teaching=teaching)
+    settings = SimpleNamespace(name=EVIL, teaching=SimpleNamespace(target_samples=COUNTS, **taught))
     return Experiment(settings, 60.0, replace(needs, gain=gain), lessons)
 
 
@@ -58,8 +57,7 @@ def test_a_proxy_saves_samples_only_if_its_whole_interval_says_so_and_is_named_t
     assert [one.name for one in saves] == ["sure", "far"]
     assert [one.name for one in none] == ["harmful", EVIL]
     assert [one.name for one in unknown] == ["wide", "reaching"]
-    answer = teach_answer(experiment())
-    shown, rest = answer.split(" None saved: ")
+    shown, rest = teach_answer(experiment()).split(" None saved: ")
     assert "sure: 300 (100 to 350)" in shown
     assert "wide" not in shown
     assert rest.index("harmful") < rest.index("Open, since") < rest.index("wide: 300 (−100 to 400)")
@@ -73,8 +71,7 @@ def test_what_was_published_stands_beside_what_is_found_here_with_its_source():
     assert [row[:2] for row in table.rows] == [("none", "0"), ("sure", "47.4")]
     assert table.rows[1][3:] == ("250", "100 (50 to 400)", "97 %", "")
     assert table.notes == ("a paper",)
-    nobody = teach_view(experiment(), {}, b"a picture")
-    assert len(nobody.parts) == len(page.parts) - 1
+    assert len(teach_view(experiment(), {}, b"a picture").parts) == len(page.parts) - 1
 
 
 def test_the_next_step_is_more_seeds_while_something_is_open_and_says_why_plv_is_unknown():

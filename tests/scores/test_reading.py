@@ -90,8 +90,7 @@ def test_the_domain_must_be_chosen_and_known(csv, tmp_path):
 
 
 def test_writing_gives_the_same_bytes_and_reading_the_same_values(csv, tmp_path):
-    table = read_scores(csv(GOOD.replace("1.5", "0.1")), ["distance", "time"])
-    write_scores(table, tmp_path / "one.csv")
+    write_scores(read_scores(csv(GOOD.replace("1.5", "0.1")), ["distance", "time"]), tmp_path / "one.csv")
     write_scores(read_scores(tmp_path / "one.csv", ["distance", "time"]), tmp_path / "two.csv")
     assert (tmp_path / "one.csv").read_bytes() == (tmp_path / "two.csv").read_bytes()
     written = "agent,episode,distance,time\nA,1,0.1,10.0\nA,2,2.5,20.0\nB,1,3.0,30.0\n"

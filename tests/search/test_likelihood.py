@@ -30,8 +30,7 @@ def likelihood(values=None, noise=1e-4):
 
 def test_outputs_count_by_what_they_tell_of_the_truth():
     grid = np.stack(np.meshgrid(np.linspace(0, 1, 41), np.linspace(0, 1, 41)), axis=-1).reshape(-1, 2)
-    best = grid[np.argmax(likelihood().log(grid))]
-    assert best == pytest.approx(to_unit(SPACE, TRUTH), abs=0.05)
+    assert grid[np.argmax(likelihood().log(grid))] == pytest.approx(to_unit(SPACE, TRUTH), abs=0.05)
     part = (*outputs(TRUTH)[:2], np.nan, np.nan)
     assert likelihood(part).columns.tolist() == [0, 1]
     assert np.isfinite(likelihood(part).log(np.array([[0.5, 0.5]]))).all()
@@ -51,8 +50,7 @@ def test_copies_of_one_output_count_as_one(copies, seed):
 
 
 def test_holes_and_outputs_far_off_or_still_change_little():
-    base = np.random.default_rng(0).normal(size=(60, 3))
-    errors = np.repeat(base, 4, axis=1)
+    errors = np.repeat(np.random.default_rng(0).normal(size=(60, 3)), 4, axis=1)
     holes = np.where(np.random.default_rng(1).random(errors.shape) < 0.3, np.nan, errors)
     assert temper(errors) == pytest.approx(4.0, abs=0.3)
     assert temper(holes) == pytest.approx(4.0, abs=0.6)

@@ -69,8 +69,7 @@ def ranks(values):
 
 def searched(engine, seed, budget=14):
     truth = from_unit(SPACE, np.random.default_rng(seed).uniform(0.2, 0.8, 2))
-    target = goal(flips(truth), outputs(truth), 1e-4)
-    proposer, trials = make_proposer(engine, 6, target), []
+    proposer, trials = make_proposer(engine, 6, goal(flips(truth), outputs(truth), 1e-4)), []
     for _ in range(budget):
         values = proposer.propose(SPACE, trials, seed)
         trials.append(Trial(values, float(flips(truth)(outputs(values))), tuple(outputs(values).tolist())))

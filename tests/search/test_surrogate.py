@@ -42,8 +42,7 @@ def test_the_posterior_is_the_same_to_the_last_bit_in_whatever_order_trials_are_
 def test_the_incumbent_is_not_the_luckiest_and_points_are_of_the_unit_cube():
     """One freak zero among high scores does not win over a valley of low ones."""
     trials = visited(40)
-    far = max(trials, key=lambda trial: trial.score)
-    lucky = Trial(tuple(value + 1e-3 for value in far.values), 0.0)
+    lucky = Trial(tuple(value + 1e-3 for value in max(trials, key=lambda trial: trial.score).values), 0.0)
     values, mean = fit_surrogate(SPACE, [*trials, lucky]).incumbent()
     assert values != lucky.values
     assert steps(values) <= 3
@@ -55,8 +54,7 @@ def test_the_incumbent_is_not_the_luckiest_and_points_are_of_the_unit_cube():
 def test_noise_never_vanishes_and_the_posterior_is_surer_where_trials_are():
     surrogate = fit_surrogate(SPACE, visited(30, lambda values: 10 * values[0]))
     assert surrogate.model.noise_ > 0.0099
-    trials = [trial for trial in visited(30) if trial.values[0] < 0.15]
-    surrogate = fit_surrogate(SPACE, trials)
+    surrogate = fit_surrogate(SPACE, [trial for trial in visited(30) if trial.values[0] < 0.15])
     _, at_trials = surrogate.at_visited()
     _, elsewhere = surrogate.predict(np.array([[1.0, 0.0], [1.0, 1.0]]))
     assert at_trials.max() < elsewhere.min()

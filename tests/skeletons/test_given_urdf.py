@@ -54,8 +54,7 @@ def write(folder, skeleton):
 
 @pytest.mark.parametrize("up", [1, -1])
 def test_wheels_mass_and_camera_are_read_and_the_bullet_plant_drives_it_ahead(tmp_path, up):
-    skeleton = robot_from_urdf("rover", urdf(tmp_path, up=up), {"full_speed": 0.4})
-    robot = write(tmp_path, skeleton)
+    robot = write(tmp_path, robot_from_urdf("rover", urdf(tmp_path, up=up), {"full_speed": 0.4}))
     check_body(robot)
     wanted = {"wheel_radius": 0.033, "wheel_distance": 0.16, "mass": 0.91, "full_speed": 0.4, "camera_pitch": 30.0}
     assert {name: robot.figures[name] for name in wanted} == pytest.approx(wanted, rel=1e-4)
@@ -81,8 +80,7 @@ def test_what_was_read_is_said_and_what_a_urdf_cannot_know_is_to_be_edited(tmp_p
 
 def test_the_origin_is_the_middle_of_the_axle_on_the_floor(tmp_path):
     robot = write(tmp_path, robot_from_urdf("rover", urdf(tmp_path), {}))
-    left = read_body(parse_urdf(robot.urdf), robot.urdf).left
-    assert left.centre == pytest.approx((0.0, 0.08, 0.033))
+    assert read_body(parse_urdf(robot.urdf), robot.urdf).left.centre == pytest.approx((0.0, 0.08, 0.033))
 
 
 def test_wheels_that_are_meshes_need_their_radius_and_two_are_no_car(tmp_path):

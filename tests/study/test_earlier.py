@@ -148,8 +148,7 @@ def _other_code(folder, shift):
 def test_other_code_that_plays_the_same_counts(beside, make_study):
     """Twelve episodes of a source of other code are driven again; where they come out alike it counts."""
     _other_code(beside, 0.0)
-    report = run_study(make_study(**LEARNS))
-    assert report.document()["earlier"] == 10
+    assert run_study(make_study(**LEARNS)).document()["earlier"] == 10
 
 
 BAD = {
@@ -268,8 +267,7 @@ def test_trials_of_a_cheaper_proxy_are_known_and_are_no_trials(beside, make_stud
 @pytest.mark.slow
 def test_a_study_with_a_cheaper_proxy_goes_on_as_if_it_had_not_stopped(beside, make_study):
     """Five trials and then three more are the same eight."""
-    folder = make_study(domain=OTHER, **{**CHEAPER, "budget": "5"})
-    run_study(folder)
+    run_study(make_study(domain=OTHER, **{**CHEAPER, "budget": "5"}))
     in_two = run_study(make_study(domain=OTHER, **{**CHEAPER, "budget": "8"})).document()
     at_once = run_study(make_study("at_once", domain=OTHER, **{**CHEAPER, "budget": "8"})).document()
     assert in_two["trials"] == at_once["trials"]

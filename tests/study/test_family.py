@@ -192,8 +192,7 @@ def test_a_study_with_aliases_is_the_study_without_but_for_the_names(aliased, ma
 
 @pytest.mark.slow
 def test_another_agent_behind_an_alias_is_another_study(aliased):
-    folder = aliased(budget="5")
-    run_study(folder)
+    run_study(aliased(budget="5"))
     changed = aliased(TABLE.replace('a5 = "agent5"', 'a5 = "agent0"'), budget="5")
     with pytest.raises(SettingsError, match=r'changed since the first trial: agents.a5 \(was "agent5"\); put it back'):
         run_study(changed)

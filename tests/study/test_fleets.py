@@ -98,8 +98,7 @@ def test_an_agent_that_keeps_something_outside_its_memory_is_found_driven_alone_
 @pytest.mark.slow
 def test_what_was_found_of_an_agent_is_known_when_the_study_goes_on(make_study, capsys):
     journal = make_study().parent / "journal"
-    domain = {"faults": '["agent2:*:hides"]', "journal": f'"{journal}"'}
-    first = {**FAMILY, **FEW, "domain": domain}
+    first = {**FAMILY, **FEW, "domain": {"faults": '["agent2:*:hides"]', "journal": f'"{journal}"'}}
     document(make_study(**first), capsys)
     journal.unlink()
     found = document(make_study(**{**first, "budget": "3"}), capsys)

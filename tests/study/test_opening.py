@@ -84,8 +84,7 @@ def test_ppv_is_an_objective_too(make_study):
 
 @pytest.mark.slow
 def test_no_trial_is_cut_off_by_another_objective_than_prpv(own):
-    result = run(own(cut_off="true", budget="9"))
-    assert {trial.state for trial in result.trials} == {"finished"}
+    assert {trial.state for trial in run(own(cut_off="true", budget="9")).trials} == {"finished"}
 
 
 def test_a_study_of_learning_value_is_narrowed_by_prpv(make_study):

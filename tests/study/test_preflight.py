@@ -66,8 +66,7 @@ def edited(folder, edit):
 
 def means_only(rows):
     """One row an agent, as papers print them."""
-    kept = {row.split(",")[0]: row for row in rows}
-    return list(kept.values())
+    return list({row.split(",")[0]: row for row in rows}.values())
 
 
 def other_starts(rows):
@@ -248,7 +247,6 @@ def test_a_parameter_that_is_only_one_more_source_of_noise_is_said_to_matter_in_
 MOODY = Deadly(
     faults=("agent1:*:remembers", "agent2:*:draws by NumPy", "agent3:*:draws", "agent4:*:draws by Python"),
 )
-EPISODE = make_episode({}, agent="agent2", start=0, seed=2**40 + 3)
 
 
 @pytest.mark.slow
@@ -288,5 +286,5 @@ def test_the_generators_of_the_process_go_on_as_if_no_episode_had_been_driven():
     expected = np.random.normal(), random.random()
     np.random.seed(1)
     random.seed(1)
-    run_episode(MOODY, EPISODE)
+    run_episode(MOODY, make_episode({}, agent="agent2", start=0, seed=2**40 + 3))
     assert (np.random.normal(), random.random()) == expected

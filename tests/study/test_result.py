@@ -255,8 +255,7 @@ def test_where_failures_stop_the_study_they_stop_it_here(finished):
     broken = opened(finished, stop_on_failure=True)
     broken = replace(broken, family=replace(broken.family.family, faults=("agent3:1:raises",)))
     with Store.open(finished) as store, pytest.raises(EpisodeError, match="agent 'agent3'"):
-        study_run = StudyRun(broken, store)
-        run_confirmation(study_run)
+        run_confirmation(StudyRun(broken, store))
 
 
 def test_how_much_was_luck_is_in_the_row_of_the_search(once):

@@ -196,8 +196,7 @@ def test_a_failure_is_left_out_and_an_agent_without_any_episode_that_worked_fail
     _, found = simulated(make_study(domain={"faults": '["agent3:1:raises", "agent4:0:nan"]'}))
     assert [(f.episode.agent, f.episode.start) for f in found.failures] == [("agent3", 1), ("agent4", 0)]
     assert found.prpv is not None
-    row = found.proxy.agents.index("agent3")
-    assert found.proxy.counts[row] == 2
+    assert found.proxy.counts[found.proxy.agents.index("agent3")] == 2
     _, found = simulated(make_study("other", domain={"faults": '["agent3:*:raises"]'}))
     assert (found.prpv, found.score, found.proxy) == (None, None, None)
     assert found.failure.startswith("agent 'agent3' failed from every start, first with: agent 'agent3' raised")
@@ -221,8 +220,7 @@ def test_the_longest_episodes_begin_first_and_unknown_ones_before_them(make_stud
 
 
 def test_scoring_does_not_depend_on_the_order_of_the_outcomes(make_study):
-    folder = make_study()
-    study = open_study(folder)
+    study = open_study(make_study())
     outcomes = [Outcome(e, study.family.run(e), "", 0.0) for e in plan_episodes(study.settings, THETA, 1)]
     forth, back = evaluate_outcomes(study, THETA, outcomes), evaluate_outcomes(study, THETA, outcomes[::-1])
     assert (forth.prpv, forth.measures["ppv"]) == (back.prpv, pytest.approx(back.measures["ppv"], abs=1e-12))

@@ -23,7 +23,6 @@ from proxytune.teaching.points import distribution
 from proxytune.teaching.search import BEST, BOX, BY_PRPV, OBJECTIVE, SINGLE, finalists, teach_finalists
 
 BOX_KEYS = {"parameters": {"trim": "[-0.3, 0.3]"}}
-WIDTH = "[teaching.width]\ntrim = [0.0, 0.4]\n"
 
 
 def searched(folder, score):
@@ -37,7 +36,7 @@ def searched(folder, score):
 
 
 def test_centre_and_width_are_those_of_highest_plv_and_the_single_theta_is_the_best_without_a_width(make_study):
-    folder = make_taught(make_study, more=WIDTH, **BOX_KEYS)
+    folder = make_taught(make_study, more="[teaching.width]\ntrim = [0.0, 0.4]\n", **BOX_KEYS)
     found = finalists(*searched(folder, lambda trim, width: (trim - 0.1) ** 2 + (width - 0.2) ** 2), None)
     low, high = found[BEST].bounds["trim"]
     assert (low + high) / 2 == pytest.approx(0.1, abs=0.04)
@@ -57,8 +56,7 @@ def test_what_prpv_chooses_is_no_finalist_where_it_is_the_best_theta_or_no_proxy
     parts = searched(make_taught(make_study, **BOX_KEYS), lambda trim: (trim + 0.1) ** 2)
     best = finalists(*parts, None)[SINGLE].centre
     assert finalists(*parts, best).keys() == {SINGLE}
-    unconverged = [replace(trial, score=None) for trial in parts[-1]]
-    assert finalists(*parts[:-1], unconverged, best) == {}
+    assert finalists(*parts[:-1], [replace(trial, score=None) for trial in parts[-1]], best) == {}
 
 
 @pytest.mark.slow
@@ -88,8 +86,7 @@ def test_what_a_search_takes_at_most_counts_finalists_twice_where_examinations_a
 
 
 def test_a_finalist_whose_expert_cannot_drive_is_left_out_with_the_reason(make_study):
-    folder = make_taught(make_study, **BOX_KEYS)
-    settings = read_study_settings(folder)
+    settings = read_study_settings(make_taught(make_study, **BOX_KEYS))
     setup = load_setup(settings)
     other = load_setup(read_study_settings(make_taught(make_study, called="blocked", domain={"blocked": "0.9"})))
     setup, right = replace(setup, proxy=other.proxy), Distribution({"trim": (0.12, 0.12)})

@@ -114,8 +114,7 @@ def test_a_doors_table_of_contents_has_its_modules_at_the_beginnings_of_lines(pa
     for line in ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))).splitlines():
         if entry := re.match(r"(\S.*?)  +\S", line.strip()):
             names = [name.rstrip("/") for name in entry[1].split(", ")]
-            parts = {part.stem for part in path.parent.iterdir()}
-            assert parts.issuperset(names), f"{path}: {line}"
+            assert {part.stem for part in path.parent.iterdir()}.issuperset(names), f"{path}: {line}"
 
 
 def handed_out(door):

@@ -61,7 +61,6 @@ COMMAND_LINES = sorted(
     }
 )
 DOTTED = re.compile(r"`(proxytune(?:\.\w+)+)`")
-IN_THE_PACKAGE = re.compile(r"`(proxytune/[\w/]+(?:\.py)?)`")
 
 
 def section(text, title):
@@ -286,7 +285,7 @@ def test_no_row_of_a_table_is_too_long_to_read(document):
 def test_every_module_and_file_of_the_package_that_is_named_is_there(document):
     for name in DOTTED.findall(DOCUMENTS[document]):
         assert resolved(name) is not None, f"{document}: {name}"
-    for path in IN_THE_PACKAGE.findall(DOCUMENTS[document]):
+    for path in re.compile(r"`(proxytune/[\w/]+(?:\.py)?)`").findall(DOCUMENTS[document]):
         assert (ROOT / path).exists() or (ROOT / f"{path}.py").exists(), f"{document}: {path}"
 
 

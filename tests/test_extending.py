@@ -21,7 +21,6 @@ from proxytune.study import open_study
 PAGE = (Path(__file__).resolve().parent.parent / "docs" / "how-to" / "extending.md").read_text(encoding="utf-8")
 INTRODUCTION, *CHAPTERS = re.split(r"^## ", PAGE, flags=re.MULTILINE)
 SECTIONS = {chapter.partition("\n")[0]: chapter for chapter in CHAPTERS}
-PLUGINS = "Plug-ins"
 COMMAND = "python -m proxytune "
 
 
@@ -120,8 +119,7 @@ def test_the_measure_is_the_objective_of_a_study(follow, tmp_path):
 
 @pytest.mark.slow
 def test_the_engine_runs_in_a_study(follow, tmp_path):
-    answers = follow("A search engine")
-    assert len(answers["study ."]["trials"]) == 4
+    assert len(follow("A search engine")["study ."]["trials"]) == 4
     assert open_study(tmp_path).engine.label == "Halton sequence"
 
 
@@ -162,7 +160,7 @@ def test_what_the_page_makes_keeps_the_promises_that_its_tests_check(everything)
 
 
 def test_the_entry_points_of_the_page_are_listed_as_plug_ins(everything, answered):
-    (block,) = blocks(SECTIONS[PLUGINS])
+    (block,) = blocks(SECTIONS["Plug-ins"])
     points = tomllib.loads(block.text)["project"]["entry-points"][GROUP]
     info = everything / "mine-1.0.dist-info"
     info.mkdir()

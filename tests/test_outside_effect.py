@@ -154,8 +154,7 @@ def test_one_parameter_has_the_effect_s_name_and_several_add_theirs(folder):
 
 
 def test_it_comes_after_the_shipped_effects_of_its_stage(folder):
-    theta = {NAME: 0.3, "turn_slip": 0.01, "trim": 0.1}
-    made = effects_from(theta, ROBOT.figures, Catalogue(folder))
+    made = effects_from({NAME: 0.3, "turn_slip": 0.01, "trim": 0.1}, ROBOT.figures, Catalogue(folder))
     assert [effect.name for effect in made] == ["trim", "turn_slip", "weak_reverse"]
     told = complaint_of(effects_from, {NAME: 1.0}, ROBOT.figures, Catalogue(folder))
     assert "must be between 0 and 0.9" in told
@@ -204,8 +203,7 @@ def test_a_plugin_s_effect_takes_part_by_itself_and_is_listed(installed, folder,
     catalogue, model = Catalogue(folder), Model("duckiebot", None, {"slow_back": 0.3}, {})
     assert "slow_back" in motion_effects(catalogue)
     assert "[effects.slow_back]" in model_text(model, catalogue=catalogue)
-    rows = answered("list", "effects")["effects"]
-    (row,) = [row for row in rows if row["effect"] == "slow_back"]
+    (row,) = [row for row in answered("list", "effects")["effects"] if row["effect"] == "slow_back"]
     assert (row["parameter"], row["stage"], row["high"]) == ("slow_back", "motion", 0.9)
 
 

@@ -48,8 +48,7 @@ def test_no_two_parts_share_what_is_kept_of_them():
 
 
 def test_a_command_that_ends_otherwise_than_it_should_is_a_failure_and_no_answer(tmp_path):
-    checkout = Path(same_results.__file__).parent.parent
-    place = same_results.Place(tmp_path, checkout, None)
+    place = same_results.Place(tmp_path, Path(same_results.__file__).parent.parent, None)
     with pytest.raises(same_results.CannotRunError, match="exit status 2"):
         place.run("no_such_command")
 
@@ -66,6 +65,5 @@ def test_what_a_checkout_computes_is_collected_and_the_same_again(tmp_path, caps
     assert answers["written"] == {"made.csv": ["x", "1.5"]}
     assert answers["printed"]["list measures --json"]["said"]["measures"]
     assert same_results.report(part, answers, answers)
-    changed = {**answers, "written": {"made.csv": ["x", "1.6"]}}
-    assert not same_results.report(part, answers, changed)
+    assert not same_results.report(part, answers, {**answers, "written": {"made.csv": ["x", "1.6"]}})
     assert "/written/made.csv/1" in capsys.readouterr().out

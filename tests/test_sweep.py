@@ -56,8 +56,7 @@ def swept(study, discrepancy, points=4, base=TRUTH, parameter="trim"):
     with Store.open(study.settings.folder) as store:
         study_run = StudyRun(study, store)
         run_sweep(study_run, plan, discrepancy)
-        spent = study_run.spent
-        return spent.episodes, curve_of(StudyRun(study, store), plan)
+        return study_run.spent.episodes, curve_of(StudyRun(study, store), plan)
 
 
 def test_pod_is_nothing_at_the_truth_and_something_beside_it(opened):
@@ -270,8 +269,7 @@ def series(scores, spread=0.0, higher=False):
         )
         for place, score in enumerate(scores)
     ]
-    measure = replace(PRPV, better="higher" if higher else "lower")
-    return Series(measure, ALL, tuple(found))
+    return Series(replace(PRPV, better="higher" if higher else "lower"), ALL, tuple(found))
 
 
 VALLEY = series([9.0, 4.0, 1.0, 3.0, 8.0])

@@ -145,8 +145,7 @@ def test_prpv_of_a_few_agents_is_that_by_hand():
     assert result.pairs == (FlippedPair("A", "C", "reversed"), FlippedPair("B", "C", "reversed"))
 
     target = of_means((4, 4), (3, 2), (2, 3), (1, 1))
-    proxy = of_means((4, 1), (3, 3), (2, 2), (1, 4))
-    result = prpv(compare(proxy=proxy, target=target, metrics=M2))
+    result = prpv(compare(proxy=of_means((4, 1), (3, 3), (2, 2), (1, 4)), target=target, metrics=M2))
     assert set(result.pairs) == {
         FlippedPair("A", "B", "lost"),
         FlippedPair("A", "C", "lost"),
@@ -200,8 +199,7 @@ def test_turning_a_metric_and_its_direction_changes_nothing(means):
 
 
 def test_unrelated_tables_of_ten_agents_and_two_metrics_average_33_9():
-    rng = np.random.default_rng(0)
-    values = prpv_of_means(*rng.normal(size=(2, 20_000, 10, 2)), M2)
+    values = prpv_of_means(*np.random.default_rng(0).normal(size=(2, 20_000, 10, 2)), M2)
     assert values.mean() == pytest.approx(33.75, abs=0.3)
     assert values.std() == pytest.approx(7.1, abs=0.3)
 

@@ -18,8 +18,7 @@ M = [Metric("m"), Metric("n")]
 
 
 def test_correlations_agree_with_scipy_and_are_undefined_of_constants():
-    rng = np.random.default_rng(1)
-    proxy, target = rng.integers(0, 4, size=(2, 50, 8, 2)).astype(float)
+    proxy, target = np.random.default_rng(1).integers(0, 4, size=(2, 50, 8, 2)).astype(float)
     pearson, kendall = pearson_of_means(proxy, target), kendall_of_means(proxy, target)
     for i, column in np.ndindex(50, 2):
         one, other = proxy[i, :, column], target[i, :, column]
@@ -63,8 +62,7 @@ def test_simplers_figures_come_out_by_its_double_loop():
     assert result.range["m"] == (0.0, pytest.approx(0.6))
     assert result.better == "lower"
 
-    rng = np.random.default_rng(0)
-    proxy, target = rng.integers(0, 4, size=(2, 40, 5, 1)).astype(float)
+    proxy, target = np.random.default_rng(0).integers(0, 4, size=(2, 40, 5, 1)).astype(float)
     for direction, sign in (("max", 1), ("min", -1)):
         values = mmrv_of_means(proxy, target, [Metric("m", direction)])[:, 0]
         expected = [simplers_loop(sign * p[:, 0], sign * t[:, 0]) for p, t in zip(proxy, target, strict=True)]

@@ -44,8 +44,7 @@ def test_the_interval_follows_from_the_seed_and_is_a_point_without_noise():
     first, again, other = (bootstrap_prpv(**sides, seed=seed) for seed in (1, 1, 2))
     assert (first.expected, first.low, first.high) == (again.expected, again.low, again.high)
     assert first.expected != other.expected
-    still = {"proxy": noisy(1, noise=0.0), "target": noisy(2, noise=0.0)}
-    result = bootstrap_prpv(**still, metrics=M)
+    result = bootstrap_prpv(**{"proxy": noisy(1, noise=0.0), "target": noisy(2, noise=0.0)}, metrics=M)
     assert result.low == result.high == result.value == result.expected
     assert result.value > 0
 

@@ -111,8 +111,7 @@ def test_made_up_evaluations_find_intervals_that_hold_regret_that_is_calibrated_
 
 
 def test_a_bet_does_not_grow_on_average_where_the_agent_is_no_better():
-    rng = np.random.default_rng(5)
-    outcomes = (rng.random((4000, 2, 30)) < 0.5).astype(float)
+    outcomes = (np.random.default_rng(5).random((4000, 2, 30)) < 0.5).astype(float)
     wealth = wealth_of(outcomes, np.array([0.9, 0.2]))[:, :, 0, 1]
     assert (wealth[:, [0, 9, 29]].mean(axis=0) <= 1.15).all()
     assert (wealth.max(axis=1) >= 20.0).mean() <= 0.05

@@ -64,7 +64,7 @@ def short_drives(folder):
     return add_frames(write_log(log, folder), log, ROLLED, every=6)
 
 
-def test_a_roll_that_nobody_declared_is_found_in_still_frames(found):
+def test_a_roll_that_nobody_declared_is_found_in_still_frames_and_the_document_s_top_is_the_camera_s(found):
     camera = found.document["camera"]
     assert set(camera) >= KEYS
     (effect,) = camera["effects"]
@@ -81,9 +81,6 @@ def test_a_roll_that_nobody_declared_is_found_in_still_frames(found):
     assert set(before) == {"nats", "share", "rms_px", "open"}
     assert before["rms_px"] > 2.0 * after["rms_px"]
     assert after["open"] is False
-
-
-def test_where_there_is_no_motion_the_top_of_the_document_is_the_camera_s(found):
     document = found.document
     for key in ("verdict", "declared", "effects", "could_not_be_seen"):
         assert document[key] == document["camera"][key]

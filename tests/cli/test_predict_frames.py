@@ -35,16 +35,13 @@ def model(folder, theta):
     return path
 
 
-def test_the_true_model_draws_the_very_pictures_and_the_nominal_one_others(predicted, tmp_path):
+def test_the_true_model_draws_the_very_pictures_the_nominal_others_and_both_read_as_frames(predicted, tmp_path, stills):
     told = predicted(ROLLED)
     assert told == {"frames": 65, "output": str(tmp_path / "out"), "grey_error": told["grey_error"]}
     assert told["grey_error"] < 0.1
     drawn = np.stack([np.asarray(Image.open(path)) for path in sorted((tmp_path / "out" / "frames").glob("*.png"))])
     assert np.array_equal(drawn, pictures(ROLLED, POSES, columns=80))
     assert predicted({})["grey_error"] > 5.0
-
-
-def test_the_pictures_read_as_the_frames_of_the_log(predicted, stills, tmp_path):
     predicted(ROLLED)
     assert list(pd.read_csv(tmp_path / "out" / "frames.csv").columns) == ["frame", "episode", "time"]
     for name in ("log.toml", "samples.csv"):

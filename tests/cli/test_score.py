@@ -53,7 +53,7 @@ METRIC = ("--metric", "distance:max", "--metric", "time:min")
 SIDES = ("--proxy", "sim.csv", "--target", "real.csv")
 
 
-def test_one_proxy_has_the_promised_keys_at_the_top_level(tables):
+def test_one_proxy_has_the_promised_keys_at_the_top_level_and_domains_of_one_file_can_be_either_side(tables):
     found = document(*SIDES, *METRIC)
     assert found.keys() >= PROMISED
     assert (found["proxy"], found["target"], found["prpv"]) == ("sim", "real", 2)
@@ -61,15 +61,12 @@ def test_one_proxy_has_the_promised_keys_at_the_top_level(tables):
     assert found["prpv_interval"][0] <= 2 <= found["prpv_interval"][1]
     assert found["pairs"] == [{"better": "C", "worse": "D", "flip": "reversed"}]
     assert found["srcc"].keys() == found["mmrv"].keys() == found["kendall_tau"].keys() == {"distance", "time"}
-
-
-def test_domains_of_one_file_can_be_either_side(tables):
     apart = document(*SIDES, *METRIC)
     assert apart == document("--proxy", "both.csv:sim", "--target", "both.csv:real", *METRIC)
     assert document("--proxy", "both.csv", "--target", "both.csv:real", *METRIC) == apart
 
 
-def test_several_proxies_are_ranked_with_their_differences(tables):
+def test_several_proxies_are_ranked_with_their_differences_and_told_apart_by_their_paths(tables):
     Path("worse.csv").write_text(SIM.replace("A,", "x,").replace("D,", "A,").replace("x,", "D,"))
     found = document("--proxy", "worse.csv", *SIDES, *METRIC)
     assert [(one["rank"], one["proxy"]) for one in found["proxies"]] == [(1, "sim"), (2, "worse")]
@@ -78,9 +75,6 @@ def test_several_proxies_are_ranked_with_their_differences(tables):
     assert (difference["better"], difference["worse"]) == ("sim", "worse")
     assert difference["difference"] == found["proxies"][1]["prpv"] - found["proxies"][0]["prpv"]
     assert difference["beyond_noise"] is (difference["interval"][0] > 0)
-
-
-def test_proxies_and_files_are_told_apart_by_their_paths(tables):
     Path("other").mkdir()
     Path("other/sim.csv").write_text(SIM)
     found = document("--proxy", "sim.csv", "--proxy", "other/sim.csv", "--target", "real.csv", *METRIC)
@@ -215,16 +209,13 @@ COLUMNS = ("--columns", "agent=policy,episode=trial,distance=dist_m")
 OWN = ("--proxy", "sim.csv", "--target", "monday.csv", "--target", "tuesday.csv")
 
 
-def test_a_target_as_people_keep_it_gives_the_figures_of_a_tidy_one(own):
+def test_a_target_as_people_keep_it_gives_the_figures_of_a_tidy_one_and_agents_of_one_side_are_named(own):
     found = document(*OWN, *COLUMNS, *METRIC)
     assert found.pop("target") == "monday, tuesday"
     tidy = document(*SIDES, *METRIC)
     assert tidy.pop("target") == "real"
     assert found == tidy
     assert found["left_out"] == []
-
-
-def test_agents_of_one_side_are_refused_by_name_or_left_out_and_said(own):
     words = (*OWN, "--target", "people.csv", *COLUMNS, *METRIC)
     assert re.search(r"the proxy lacks scores of human, .* \(score --common\)", complaint_of(run, *words))
     assert document(*words, "--common")["left_out"] == ["left out, since not all sides have them: human of the target"]
@@ -257,7 +248,7 @@ def test_success_rates_stand_in_table_and_document_and_ties_are_told(tables):
     assert "1 of 6 pairs of agents tie in the proxy, 1 on the target" in shown(*words)
 
 
-def test_all_measures_are_also_a_table_for_programs(tables):
+def test_all_measures_are_also_a_table_for_programs_or_latex_and_no_other_kind_is_written(tables):
     found = document(*SIDES, *METRIC, "--table", "new/t.csv")
     assert found["table"] == "new/t.csv"
     table = pd.read_csv("new/t.csv").set_index("measure")
@@ -265,18 +256,12 @@ def test_all_measures_are_also_a_table_for_programs(tables):
     assert table.value["prpv"] == found["prpv"]
     assert table.loc["prpv", ["low", "high"]].tolist() == found["prpv_interval"]
     assert table.value["srcc_distance"] == found["srcc"]["distance"]
-
-
-def test_several_proxies_are_columns_of_a_latex_table(tables):
     run("--proxy", "both.csv:sim", "--proxy", "both.csv:real", "--target", "real.csv", *METRIC, "--table", "t.tex")
     lines = Path("t.tex").read_text().splitlines()
     assert lines[2] == r"measure & sim & real \\"
     row = next(line for line in lines if line.startswith("PRPV"))
     assert re.fullmatch(r"PRPV & 2 \(\d+ to \d+\) & 0 \(\d+ to \d+\) \\\\", row)
     assert r"Kendall $\tau$ distance" in Path("t.tex").read_text()
-
-
-def test_a_table_of_another_kind_is_refused_before_anything_is_written(tables):
     words = (*SIDES, *METRIC, "--table", "t.xlsx", "--output", "out")
     assert "--table t.xlsx: a table is written as .csv or .tex" in complaint_of(run, *words)
     assert not Path("out").exists()

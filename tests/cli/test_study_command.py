@@ -25,6 +25,8 @@ def test_a_study_runs_and_prints_one_document_and_a_second_time_simulates_nothin
 def test_bad_input_is_one_line_and_exit_2(make_study, refused, tmp_path):
     assert "budget: must be between" in refused("study", make_study(budget="-1"))
     assert "agents: no agent 'agnet1'" in refused("study", make_study(agents='["agent0", "agnet1"]'))
+    for option, value in (("budget", "0"), ("jobs", "1025")):
+        assert f"{option} must be between 1 and " in refused("study", make_study(), f"--{option}={value}")
     assert not (make_study() / "study.db").exists()
     assert "has no study.toml; give the folder of a study" in refused("study", tmp_path)
 
@@ -71,11 +73,6 @@ def test_a_budget_on_the_command_line_stands_over_study_toml(finished, capsys, a
     assert main(["study", str(finished), "--budget", asked]) == 0
     assert f"trials {says}; best" in " ".join(capsys.readouterr().out.split())
     assert answered("study", finished)["settings"]["budget"] == 7, "study.toml stays as it is"
-
-
-@pytest.mark.parametrize(("option", "value"), [("budget", "0"), ("jobs", "1025")])
-def test_a_budget_or_jobs_out_of_bounds_are_refused(make_study, refused, option, value):
-    assert f"{option} must be between 1 and " in refused("study", make_study(), f"--{option}={value}")
 
 
 @pytest.fixture

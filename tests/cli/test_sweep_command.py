@@ -47,14 +47,10 @@ def test_a_target_model_adds_pod_and_keeps_its_own_files(make_study, tmp_path, a
 
 
 @pytest.mark.slow
-def test_trials_and_sweeps_share_episodes(finished, answered):
+def test_trials_and_sweeps_share_episodes_and_a_finished_study_is_swept_at_its_best_theta(finished, answered):
     theta = answered("study", finished)["trials"][0]["theta"]
     at = ",".join(f"{name}={value!r}" for name, value in theta.items())
     assert answered("sweep", finished, "--parameter", "trim", "--points", "2", "--at", at)["episodes"]["run"] == 2 * 18
-
-
-@pytest.mark.slow
-def test_a_finished_study_is_swept_at_its_best_theta_and_says_so(finished, answered):
     best = answered("study", finished)["best"]["theta"]
     arguments = ["sweep", str(finished), "--parameter", "trim", "--points", "2"]
     document = answered(*arguments)

@@ -50,7 +50,8 @@ def theirs():
 
 
 def ours(**figures):
-    return GroundPlaneCamera(replace(CAMERA, **figures), draw_floor(shipped_map("small_loop"))).render(poses()).astype(int)
+    floor = draw_floor(shipped_map("small_loop"))
+    return GroundPlaneCamera(replace(CAMERA, **figures), floor).render(poses()).astype(int)
 
 
 @functools.cache

@@ -27,7 +27,7 @@ def searched(count, score=bowl, **options):
     return box
 
 
-def test_the_optimum_of_a_toy_is_found_ten_times_better_than_by_the_design():
+def test_the_optimum_of_a_toy_is_found_ten_times_better_than_by_the_design_also_as_a_maximum():
     box = searched(18)
     design = box.trials().score[:8].min()
     theta, score = box.best()
@@ -35,21 +35,15 @@ def test_the_optimum_of_a_toy_is_found_ten_times_better_than_by_the_design():
     assert score == bowl(theta) == box.trials().score.min()
     assert theta["trim"] == pytest.approx(0.1, abs=0.05)
     assert theta["delay"] == pytest.approx(0.2, abs=0.025)
-
-
-def test_what_is_maximised_is_asked_as_its_negative_is_minimised():
     low, high = searched(12), searched(12, score=lambda theta: -bowl(theta), maximise=True)
     assert low.trials()[["delay", "trim"]].equals(high.trials()[["delay", "trim"]])
     assert high.best() == (low.best()[0], -low.best()[1])
     assert (high.trials().score == -low.trials().score).all()
 
 
-def test_the_same_seed_asks_the_same_and_another_one_does_not():
+def test_the_same_seed_asks_the_same_another_does_not_and_asks_before_a_tell_are_a_batch_of_different_theta():
     assert searched(11).trials().equals(searched(11).trials())
     assert not searched(11).trials().equals(searched(11, seed=2).trials())
-
-
-def test_several_asks_before_a_tell_are_a_batch_of_different_theta():
     box = searched(10)
     batch = [box.ask() for _ in range(4)]
     assert len({tuple(theta.values()) for theta in batch}) == 4
@@ -72,7 +66,7 @@ class Eavesdropper:
         return (0.01 * len(trials),)
 
 
-def test_an_engine_sees_what_was_told_in_the_order_of_asking_and_then_what_is_pending():
+def test_an_engine_of_one_s_own_sees_what_was_told_in_the_order_of_asking_then_what_is_pending_and_proposes():
     proposer = Eavesdropper()
     box = SearchBox({"x": (0.0, 1.0)}, engine=Engine("own", "", "", lambda: proposer), initial=1, maximise=True)
     asked = [box.ask() for _ in range(2)]
@@ -84,6 +78,8 @@ def test_an_engine_sees_what_was_told_in_the_order_of_asking_and_then_what_is_pe
     values = [tuple(theta.values()) for theta in asked]
     told = [(values[0], -5.0, False), (values[2], -6.0, False), (values[3], -7.0, False)]
     assert proposer.shown[-1] == [*told, (values[1], None, True), (values[4], None, True)]
+    own = Engine("own", "mine", "random, as mine is", RandomPoints)
+    assert searched(6, engine=own, initial=2).trials().equals(searched(6, engine="random", initial=2).trials())
 
 
 def test_a_failed_simulation_is_kept_and_the_search_goes_on_elsewhere():
@@ -103,11 +99,6 @@ def test_every_ask_lies_in_the_box(low, width, seed, initial):
         theta = box.ask()
         assert low <= theta["x"] <= low + width
         box.tell(theta, theta["x"])
-
-
-def test_an_engine_of_one_s_own_proposes():
-    own = Engine("own", "mine", "random, as mine is", RandomPoints)
-    assert searched(6, engine=own, initial=2).trials().equals(searched(6, engine="random", initial=2).trials())
 
 
 @pytest.mark.parametrize("engine", [one.name for one in ENGINES if one.learns_from == "outputs"])

@@ -55,13 +55,10 @@ def test_the_same_episode_is_the_same_and_start_seed_and_theta_change_it(lane, d
         assert not other.poses.equals(driven.poses)
 
 
-def test_an_episode_is_driven_before_there_are_scores_of_the_target(make_study):
+def test_an_episode_is_driven_before_there_are_scores_of_the_target_also_where_no_poses_are_kept(make_study):
     folder = make_study()
     (folder / "target.csv").unlink()
     assert set(drive(folder, "agent0").scores) == {"distance", "survival_time"}
-
-
-def test_a_family_that_keeps_no_poses_gives_scores_alone(make_study):
     driven = drive(make_study(), "agent0")
     assert driven.poses is driven.commands is None
     assert driven.scores["distance"] > 0.0

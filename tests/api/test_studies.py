@@ -43,7 +43,7 @@ def test_theta_is_drawn_from_the_posterior_as_the_answer_has_it(report):
         report.posterior(draws=0)
 
 
-def test_the_trials_are_a_table_and_the_best_theta_is_that_of_the_trial_that_it_names_or_of_none(report):
+def test_the_trials_are_a_table_and_an_optimize_result_and_the_best_theta_is_that_of_the_trial_it_names(report):
     trials = report.trials()
     assert list(trials.index) == [1, 2, 3, 4, 5, 6]
     assert trials.index.name == "trial"
@@ -54,16 +54,18 @@ def test_the_trials_are_a_table_and_the_best_theta_is_that_of_the_trial_that_it_
     visited = report.trials()[["delay", "trim"]].to_dict("index")
     number = report.document()["best"]["index"]
     assert [trial for trial, theta in visited.items() if theta == report.theta] == ([number] if number else [])
+    found, trials = report.optimize_result(), report.trials()
+    assert [one.name for one in found.space] == ["delay", "trim"]
+    assert found.func_vals.tolist() == trials.score.tolist()
+    assert found.x_iters == trials[["delay", "trim"]].to_numpy().tolist()
+    assert found.fun == trials.score[trials[["delay", "trim"]].to_numpy().tolist().index(list(found.x)) + 1]
 
 
-def test_a_report_has_the_document_and_the_words_of_the_command(report, folder, answered):
+def test_a_report_has_the_document_and_words_of_the_command_and_reading_simulates_nothing(report, folder, answered):
     assert repr(report) == f"StudyReport of 'wobbly': {report.document()['sentence']}"
     printed = answered("study", folder)
     document = json.loads(json.dumps(report.document()))
     assert {key: printed[key] for key in document} == document
-
-
-def test_reading_a_study_simulates_nothing_and_says_the_same(report, folder):
     seen = read_study(folder)
     assert seen.spent.episodes == 0
     assert seen.document() == report.document()
@@ -112,11 +114,3 @@ def test_progress_is_shown_only_when_asked_for(make_study, monkeypatch):
 )
 def test_what_cannot_be_used_is_one_line_with_the_key_and_what_to_do(make_study, changes, words):
     assert re.search(words, complaint_of(run_study, make_study("wrong", **changes)))
-
-
-def test_a_report_is_an_optimize_result_of_the_measured_trials(report):
-    found, trials = report.optimize_result(), report.trials()
-    assert [one.name for one in found.space] == ["delay", "trim"]
-    assert found.func_vals.tolist() == trials.score.tolist()
-    assert found.x_iters == trials[["delay", "trim"]].to_numpy().tolist()
-    assert found.fun == trials.score[trials[["delay", "trim"]].to_numpy().tolist().index(list(found.x)) + 1]

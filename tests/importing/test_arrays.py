@@ -22,7 +22,7 @@ def complaint(path, **wanted):
     return complaint
 
 
-def test_gym_duckietown_s_arrays_are_duties_and_poses(tmp_path):
+def test_arrays_of_gym_duckietown_and_its_simulator_are_duties_and_poses_in_a_map_s_frame(tmp_path):
     source = read(write_arrays(tmp_path))
     (drive,) = source.drives
     assert (source.form, drive.name, drive.commands.kind) == ("numpy arrays", "run1", "duty")
@@ -32,9 +32,6 @@ def test_gym_duckietown_s_arrays_are_duties_and_poses(tmp_path):
     np.testing.assert_array_equal(drive.commands.values, SPEEDS)
     assert "y is -positions[2]" in source.notes[1]
     assert "top left corner" in source.notes[1]
-
-
-def test_arrays_of_the_simulator_are_known_by_their_names_and_a_map_s_height_puts_the_origin_at_the_bottom(tmp_path):
     source = read(write_arrays(tmp_path, map_height=np.array(3.0)))
     np.testing.assert_allclose(source.drives[0].poses.places[:, 1], PLACES[:, 1] + 3.0)
     assert "bottom left corner" in source.notes[1]
@@ -43,7 +40,7 @@ def test_arrays_of_the_simulator_are_known_by_their_names_and_a_map_s_height_put
     np.testing.assert_array_equal(read(write_arrays(tmp_path, **changes)).drives[0].poses.headings, HEADINGS)
 
 
-def test_frames_are_read_with_their_times_and_left_out_without(tmp_path):
+def test_frames_are_read_with_their_times_left_out_without_and_in_another_form_refused_when_asked_for(tmp_path):
     source = read(write_arrays(tmp_path, observations=FRAMES))
     pictures = source.drives[0].pictures
     np.testing.assert_array_equal(pictures.times, TIMES)
@@ -58,9 +55,6 @@ def test_frames_are_read_with_their_times_and_left_out_without(tmp_path):
     path = write_arrays(tmp_path, **arrays, angles=np.where(unknown, np.nan, HEADINGS))
     pictures = read(path, commands="none").drives[0].pictures
     np.testing.assert_array_equal(np.stack(list(pictures.read())), FRAMES[~unknown])
-
-
-def test_frames_of_another_form_are_left_out_or_refused_when_asked_for(tmp_path):
     path = write_arrays(tmp_path, observations=FRAMES / 255.0)
     source = read(path)
     assert source.drives[0].pictures is None
@@ -127,7 +121,7 @@ def test_bad_arrays_are_refused(tmp_path, changes, wanted, where):
     assert where in complaint(write_arrays(tmp_path, **changes), **wanted)
 
 
-def test_pickles_and_what_is_no_npz_are_refused(tmp_path):
+def test_arrays_are_known_by_content_and_pickles_and_what_is_no_npz_are_refused(tmp_path):
     objects = write_arrays(tmp_path, extra=np.array([{"a": 1}], dtype=object))
     assert "holds pickled objects; save plain arrays" in complaint(objects)
     for name, content in (("a.npz", b"\x80\x04K\x01."), ("b.npz", b""), ("c.npz", b"PK\x03\x04 rubbish")):
@@ -137,9 +131,6 @@ def test_pickles_and_what_is_no_npz_are_refused(tmp_path):
     assert is_arrays(tmp_path / "one.npy")
     assert "no .npz file; save the arrays again" in complaint(tmp_path / "one.npy")
     assert "no such file" in complaint(tmp_path / "none.npz")
-
-
-def test_arrays_are_known_by_content(tmp_path):
     path = write_arrays(tmp_path)
     assert is_arrays(path)
     assert is_arrays(path.rename(tmp_path / "log.bin"))

@@ -17,7 +17,7 @@ from proxytune.importing.checks import check_units, checked_drive, lag_of
 GRID = np.arange(0.0, 10.0, 0.05)
 
 
-def test_stamps_in_order_are_kept_and_others_sorted():
+def test_stamps_in_order_are_kept_others_sorted_and_of_repeated_ones_the_first_pose_and_last_command_kept():
     kept, notes = checked_drive(drive(GRID, GRID), "bag")
     assert notes == []
     np.testing.assert_array_equal(kept.poses.times, GRID)
@@ -27,9 +27,6 @@ def test_stamps_in_order_are_kept_and_others_sorted():
     kept, notes = checked_drive(drive(times, GRID), "bag")
     np.testing.assert_array_equal(kept.poses.times, GRID)
     assert notes == ["drive run: 1 poses came after later ones (by up to 0.05 s); sorted"]
-
-
-def test_of_repeated_stamps_the_first_pose_and_the_last_command_are_kept():
     times = np.append(GRID, GRID[-1])
     given = drive(times, times)
     values = np.arange(2.0 * len(times)).reshape(-1, 2)
@@ -71,9 +68,14 @@ def test_what_cannot_be_mended_is_refused(case):
     assert says in complaint_of(checked_drive, given, "bag")
 
 
-def test_a_clock_that_was_never_set_is_told():
+def test_a_clock_that_was_never_set_and_a_few_poses_without_a_number_are_told():
     _, notes = checked_drive(drive(GRID + 2e5, GRID + 2e5), "bag")
     assert any("before the year 2000" in note for note in notes)
+    headings = np.zeros(len(GRID))
+    headings[[3, 50, 51]] = np.nan
+    kept, notes = checked_drive(posed(headings=headings), "bag")
+    assert len(kept.poses.times) == len(GRID) - 3
+    assert notes == ["drive run: 3 poses without a place or an orientation were left out"]
 
 
 def test_what_is_plausible_is_left_alone():
@@ -84,14 +86,6 @@ def test_what_is_plausible_is_left_alone():
     check_units(replace(slow(), commands=None), "table")
     one = slow()
     check_units(replace(one, poses=replace(one.poses, places=np.zeros_like(one.poses.places))), "table")
-
-
-def test_a_few_poses_without_a_number_are_drop_outs():
-    headings = np.zeros(len(GRID))
-    headings[[3, 50, 51]] = np.nan
-    kept, notes = checked_drive(posed(headings=headings), "bag")
-    assert len(kept.poses.times) == len(GRID) - 3
-    assert notes == ["drive run: 3 poses without a place or an orientation were left out"]
 
 
 TIMES = np.arange(0.0, 20.0, 0.05)

@@ -45,15 +45,6 @@ def test_columns_are_read_by_their_names_and_what_was_taken_for_what_is_told(tmp
     assert {channel.count for channel in source.channels} == {60}
 
 
-def test_a_row_that_lacks_part_of_its_pose_keeps_its_command_and_is_told(file):
-    source = read(file(BOTH.replace("0.1,0.1,0,0.1,,", "0.1,,0,0.1,0.4,0")))
-    (drive,) = source.drives
-    np.testing.assert_array_equal(drive.poses.times, [0.0, 0.3])
-    np.testing.assert_array_equal(drive.commands.times, [0.0, 0.1, 0.2, 0.3])
-    said = "run1.csv: 1 row lacks part of a pose (first: line 3, column 'x'); it is left out there, commands are kept."
-    assert source.notes[-1] == said
-
-
 TWICE = (
     "run_no,lap,time,x,y,heading,v,omega,battery\n"
     "7,1,0,0,0,0,0.5,0,9\n7,1,1,0.1,0,0.1,0.5,0,8\n7,1,2,0.2,0,0.1,0.5,0,8\n"
@@ -87,13 +78,19 @@ def test_commands_may_have_a_second_clock_in_the_same_table_alone(file):
     assert "command_time is the clock of commands in the same table" in told
 
 
-def test_rows_may_hold_commands_or_poses_alone_and_stamps_go_backward(file):
+def test_rows_may_hold_commands_or_poses_alone_and_stamps_go_backward_and_part_of_a_pose_is_told(file):
     (drive,) = read(file(BOTH)).drives
     np.testing.assert_array_equal(drive.poses.times, [0.0, 0.1, 0.3])
     np.testing.assert_array_equal(drive.commands.times, [0.0, 0.2, 0.3])
     np.testing.assert_array_equal(drive.commands.values, [[0.5, 0.0], [0.6, 0.1], [0.6, 0.1]])
     text = POSES + "0.2,0.2,0,0.2\n0.15,0.3,0,0.3\n"
     np.testing.assert_array_equal(read(file(text), commands="none").drives[0].poses.times, [0, 0.1, 0.2, 0.2, 0.15])
+    source = read(file(BOTH.replace("0.1,0.1,0,0.1,,", "0.1,,0,0.1,0.4,0")))
+    (drive,) = source.drives
+    np.testing.assert_array_equal(drive.poses.times, [0.0, 0.3])
+    np.testing.assert_array_equal(drive.commands.times, [0.0, 0.1, 0.2, 0.3])
+    said = "run1.csv: 1 row lacks part of a pose (first: line 3, column 'x'); it is left out there, commands are kept."
+    assert source.notes[-1] == said
 
 
 @pytest.mark.parametrize("separator", [";", "\t", " ", ", "])
@@ -180,7 +177,7 @@ def test_files_of_commands_are_named_with_columns_of_their_own(file):
     np.testing.assert_allclose(read(path, columns=columns).drives[0].commands.times, [0.01, 0.15])
 
 
-def test_drives_share_a_file_of_commands_by_time_where_they_do_not_overlap(tmp_path, file):
+def test_drives_share_a_file_of_commands_by_time_where_they_do_not_overlap_and_each_must_have_some(tmp_path, file):
     file(POSES, "a.csv")
     file(POSES.replace("\n0", "\n10"), "b.csv")
     file("time,v,omega\n-1,0.1,0\n0.1,0.2,0\n0.5,0.3,0\n10.1,0.4,0\n", "commands.csv")
@@ -193,9 +190,6 @@ def test_drives_share_a_file_of_commands_by_time_where_they_do_not_overlap(tmp_p
     assert [drive.commands.values[0, 0] for drive in read(tmp_path).drives] == [2.0, 1.0]
     file("episode,time,v,omega\nb,0,1,0\nc,0.1,1,0\n", "commands.csv")
     assert "drive 'c' has no poses" in complaint(tmp_path)
-
-
-def test_each_drive_must_have_commands(tmp_path, file):
     file(POSES, "a.csv")
     file(POSES.replace("\n0", "\n10"), "b.csv")
     commands = file("episode,time,v,omega\nb,0,1,0\nb,0.1,1,0\n", "commands.csv")
@@ -204,10 +198,15 @@ def test_each_drive_must_have_commands(tmp_path, file):
     assert "has no command while 'a' was driven, 0 to 0.2 s; check that" in complaint(tmp_path)
 
 
-def test_without_commands_only_if_asked_for(file):
+def test_tables_and_trajectories_go_without_commands_only_if_asked_for(file):
     assert "leave them out (--commands none)" in complaint(file(POSES))
     assert read(file(POSES), commands="none").drives[0].commands is None
     assert read(file(BOTH), kind="none").drives[0].commands is None
+    path = file(LINES)
+    said = complaint(path, read_tum)
+    assert "lay run1_commands.csv (time, v, omega) beside it" in said
+    assert "--commands none" in said
+    assert read_tum(path, Wanted(commands="none")).drives[0].commands is None
 
 
 @pytest.mark.parametrize(
@@ -282,13 +281,19 @@ def test_missing_files_and_folders_without_any_are_told(tmp_path, file):
     assert "has no file such as Robot1_Groundtruth.dat" in complaint(tmp_path, read_mrclam)
 
 
-def test_tables_are_known_by_content(tmp_path, file):
+def test_tables_and_trajectories_are_known_by_content(tmp_path, file):
     assert is_csv_tables(file(POSES, "poses.txt"))
     assert is_csv_tables(file("", "empty.csv"))
     assert is_csv_tables(tmp_path)
     assert not is_csv_tables(file("Dear reader,\nthis is prose, and long\n", "notes.txt"))
     assert not is_csv_tables(file(b"\x89PNG\0\0", "picture"))
     assert not is_csv_tables(tmp_path / "missing")
+    assert is_tum(file(LINES, "poses.txt"))
+    assert is_tum(file("", "empty.tum"))
+    assert not is_tum(file("time,x\n1,2\n", "a.csv"))
+    assert not is_tum(file("1 2 3\n", "b.txt"))
+    assert is_tum(tmp_path), "a folder with such a file"
+    assert not is_tum(tmp_path.parent)
 
 
 def holds_the_drive(source, form, name):
@@ -306,14 +311,11 @@ def test_a_robot_s_two_files_are_a_drive(tmp_path):
     assert source.channels[0].name == "Robot1_Groundtruth.dat: time"
 
 
-def test_either_file_or_a_folder_of_one_robot_will_do(tmp_path):
+def test_either_file_or_a_folder_of_one_robot_will_do_and_of_several_one_is_chosen(tmp_path):
     write_mrclam(tmp_path, "Robot3")
     for path in (tmp_path, tmp_path / "Robot3_Odometry.dat", tmp_path / "Robot3_Groundtruth.dat"):
         assert is_mrclam(path)
         assert read_mrclam(path, Wanted()).drives[0].name == "Robot3"
-
-
-def test_several_robots_are_chosen_from_and_commands_left_out(tmp_path):
     write_mrclam(tmp_path, "Robot1"), write_mrclam(tmp_path, "Robot3")
     assert "several robots: Robot1, Robot3; choose one, as in --poses Robot1" in complaint(tmp_path, read_mrclam)
     assert "has no robot 'Robot4'; did you mean" in complaint(tmp_path, read_mrclam, poses="Robot4")
@@ -327,13 +329,10 @@ def test_several_robots_are_chosen_from_and_commands_left_out(tmp_path):
 LINES = "# tracked at 20 Hz\n0 1 2 0 0 0 0 1\n0.05 1 2 0 0 0 0.6 0.8\n"
 
 
-def test_a_trajectory_and_its_commands_are_read(tmp_path):
+def test_a_trajectory_and_its_commands_are_read_also_by_names_with_columns_and_units(tmp_path, file):
     source = read_tum(write_tum(tmp_path), Wanted())
     holds_the_drive(source, "TUM trajectory", "run1")
     assert [channel.role for channel in source.channels][:4] == ["time", "x", "y", "z"]
-
-
-def test_commands_may_be_named_with_columns_and_units(file):
     path = file(LINES)
     file("stamp_ms;l;r\n10;50;-50\n", "joystick.txt")
     columns = {"left": "l:percent", "right": "r:percent"}
@@ -341,14 +340,6 @@ def test_commands_may_be_named_with_columns_and_units(file):
     assert drive.commands.kind == "duty"
     np.testing.assert_allclose(drive.commands.times, [0.01])
     np.testing.assert_allclose(drive.commands.values, [[0.5, -0.5]])
-
-
-def test_tum_without_commands_only_if_asked_for(file):
-    path = file(LINES)
-    said = complaint(path, read_tum)
-    assert "lay run1_commands.csv (time, v, omega) beside it" in said
-    assert "--commands none" in said
-    assert read_tum(path, Wanted(commands="none")).drives[0].commands is None
 
 
 @pytest.mark.parametrize(
@@ -370,15 +361,6 @@ def test_bad_files_of_a_fixed_form_are_refused(tmp_path, file, reader, text, whe
     said = complaint(path, reader, commands="none")
     assert said.startswith(str(path))
     assert where in said
-
-
-def test_trajectories_are_known_by_content(file, tmp_path):
-    assert is_tum(file(LINES, "poses.txt"))
-    assert is_tum(file("", "empty.tum"))
-    assert not is_tum(file("time,x\n1,2\n", "a.csv"))
-    assert not is_tum(file("1 2 3\n", "b.txt"))
-    assert is_tum(tmp_path), "a folder with such a file"
-    assert not is_tum(tmp_path.parent)
 
 
 CAR = "time,x,y,heading,gas,servo,switch\n0,0,0,0,0.3,0.5,1\n0.1,0.1,0,0.1,0.3,-0.5,0\n0.2,0.2,0,0.2,0.2,0,1\n"

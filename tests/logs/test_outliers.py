@@ -46,15 +46,12 @@ def test_a_robot_that_was_carried_a_gap_or_few_poses_are_left_alone():
     assert without_outliers(few) is few
 
 
-def test_headings_that_were_unwrapped_along_a_wrong_one_are_unwrapped_anew():
+def test_headings_unwrapped_along_a_wrong_one_are_unwrapped_anew_and_own_times_go_with_their_poses():
     wrong = DRIVE.poses.copy()
     wrong[200, 2] += 3.0
     wrong[201:, 2] += 2.0 * np.pi
     left = without_outliers(replace(DRIVE, poses=wrong)).poses
     np.testing.assert_allclose(np.delete(left, 200, 0), np.delete(DRIVE.poses, 200, 0), atol=1e-9)
-
-
-def test_poses_at_times_of_their_own_are_left_out_with_their_samples():
     rows = np.arange(len(DRIVE.times))
     off = moved([200], (0.4, 0.0, 0.0))
     own = without_outliers(replace(off, measured=Measured(off.times + 0.004, off.poses, rows))).measured

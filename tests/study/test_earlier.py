@@ -199,7 +199,7 @@ def test_a_source_that_is_none_is_refused(case, tmp_path, bank, make_study):
     assert "bank" in str(refused.value)
 
 
-def test_a_source_that_is_none_a_bank_without_a_target_and_a_circle_are_refused(make_study):
+def test_a_source_that_is_none_a_bank_without_a_target_also_alone_and_a_circle_are_refused(make_study, beside):
     """No system has such a path: one line, as of any that is not there."""
     with pytest.raises(ProxytuneError, match="no such study or table of trials"):
         run_study(make_study(**{**LEARNS, "learn_from": json.dumps(["a" * 5000])}))
@@ -210,6 +210,9 @@ def test_a_source_that_is_none_a_bank_without_a_target_and_a_circle_are_refused(
     make_study(**{**LEARNS, "learn_from": '["../monday"]'})
     with pytest.raises(ProxytuneError, match="monday: learns from this study in turn"):
         run_study(folder)
+    # Commands that need a target refuse it in one line.
+    with pytest.raises(ProxytuneError, match="target: is missing, so this is a bank"):
+        run_study(beside)
 
 
 SETTINGS = {
@@ -226,12 +229,6 @@ def test_settings_that_know_nothing_are_refused(case, make_study):
     """One line names the key and says what to do."""
     changes, words = SETTINGS[case]
     assert words in complaint_of(read_study_settings, make_study(**changes))
-
-
-def test_a_bank_is_for_study_alone(beside):
-    """Commands that need a target refuse it in one line."""
-    with pytest.raises(ProxytuneError, match="target: is missing, so this is a bank"):
-        run_study(beside)
 
 
 @pytest.mark.slow
@@ -292,15 +289,12 @@ def test_a_cheaper_proxy_that_is_none_is_refused(case, beside, make_study):
     assert re.search(words, complaint_of(run_study, make_study(domain=domain, **{**CHEAPER, **changes})))
 
 
-def test_a_cheaper_proxy_takes_the_place_of_half_a_design(make_study):
+def test_a_cheaper_proxy_takes_half_a_design_and_what_its_domain_has_otherwise_is_said_once(make_study, beside):
     """The default of initial is 4 then, and what is written counts."""
     written = [CHEAPER | {"initial": initial} for initial in (None, "6")]
     assert [read_study_settings(make_study(**one)).initial for one in written] == [4, 6]
     assert read_study_settings(make_study(initial=None)).initial == 8
-
-
-def test_what_the_domain_of_a_cheaper_proxy_has_otherwise_is_said_once(beside, make_study):
-    """One line when its trials are copied; then they are a fact."""
+    # One line when its trials are copied; then they are a fact.
     folder = make_study(domain=OTHER, **CHEAPER)
     with Store.open(folder) as store:
         run = StudyRun(open_study(folder), store)

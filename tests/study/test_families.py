@@ -6,7 +6,7 @@ from several_tuned import compared, family, lesson
 from proxytune.study import BestFamilies, Lesson
 
 
-def test_the_lowest_fresh_prpv_predicts_best_and_a_higher_one_beyond_noise_is_worse():
+def test_the_lowest_fresh_prpv_predicts_best_beyond_noise_and_what_has_no_fresh_episodes_is_left_out():
     found = compared(family("bad", 3), family("good", 0), family("middle", 1))
     assert found.predicts == BestFamilies("good", ())
     assert {(one.better, one.worse, one.value) for one in found.selection.differences} == {
@@ -14,15 +14,9 @@ def test_the_lowest_fresh_prpv_predicts_best_and_a_higher_one_beyond_noise_is_wo
         ("good", "bad", 6),
         ("middle", "bad", 4),
     }
-
-
-def test_a_family_whose_difference_may_be_noise_cannot_be_told_from_the_best():
     found = compared(family("good", 0, noise=8.0), family("noisy", 0, noise=9.0), family("bad", 4))
     assert found.predicts.best in ("good", "noisy")
     assert found.predicts.alike == tuple({"good", "noisy"} - {found.predicts.best})
-
-
-def test_a_family_without_fresh_episodes_is_left_out():
     assert compared(family("none", fresh=False), family("one", 2)).predicts == BestFamilies("one", ())
     assert compared(family("none", fresh=False), family("nor", fresh=False)).predicts == BestFamilies()
 

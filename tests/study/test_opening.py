@@ -77,13 +77,9 @@ def test_its_value_is_told_in_the_search_and_on_fresh_episodes(own):
 
 
 @pytest.mark.slow
-def test_ppv_is_an_objective_too(make_study):
+def test_ppv_is_an_objective_too_and_by_none_but_prpv_a_trial_is_cut_off(make_study, own):
     result = run(make_study(objective='"ppv"'))
     assert [trial.score for trial in result.trials] == [trial.ppv for trial in result.trials]
-
-
-@pytest.mark.slow
-def test_no_trial_is_cut_off_by_another_objective_than_prpv(own):
     assert {trial.state for trial in run(own(cut_off="true", budget="9")).trials} == {"finished"}
 
 
@@ -158,12 +154,20 @@ def test_a_target_that_does_not_fit_is_refused_in_one_line(make_study, case):
     assert expected in complaint_of(open_study, target.parent)
 
 
-def test_the_engine_is_a_fact_but_that_of_before_there_was_a_choice_goes_without_saying(make_study):
+def test_the_engine_is_a_fact_unless_there_was_no_choice_and_rules_to_stop_and_orders_are_none(make_study):
     """Trials of then stay valid."""
     before, other = study_facts(open_study(make_study())), study_facts(open_study(make_study(engine=None)))
     assert "engine" not in before
     assert changes(before, other) == ['engine (was "gp")']
     assert changes(other, before) == ['engine (was "outcomes")']
+    plain = study_facts(open_study(make_study()))
+    assert study_facts(open_study(make_study(stop="{ wall_time_s = 5, no_improvement = 0.1 }"))) == plain
+    one = study_facts(open_study(make_study()))
+    agents = '["agent5", "agent4", "agent3", "agent2", "agent1", "agent0"]'
+    metrics = '["survival_time:max", "distance:max"]'
+    other = study_facts(open_study(make_study(agents=agents, metrics=metrics)))
+    assert one == other
+    assert changes(one, other) == []
 
 
 def test_what_the_search_learns_from_is_a_fact(make_study):
@@ -177,17 +181,6 @@ def test_what_the_search_learns_from_is_a_fact(make_study):
     target.write_text(target.read_text().replace("agent2,1,", "agent2,1,9"))
     assert changes(plain, study_facts(open_study(make_study(**alone)))) == ["target (its contents)"]
     assert study_facts(open_study(make_study(**by_score))) == score
-
-
-def test_rules_to_stop_and_the_order_of_agents_and_metrics_are_no_facts(make_study):
-    plain = study_facts(open_study(make_study()))
-    assert study_facts(open_study(make_study(stop="{ wall_time_s = 5, no_improvement = 0.1 }"))) == plain
-    one = study_facts(open_study(make_study()))
-    agents = '["agent5", "agent4", "agent3", "agent2", "agent1", "agent0"]'
-    metrics = '["survival_time:max", "distance:max"]'
-    other = study_facts(open_study(make_study(agents=agents, metrics=metrics)))
-    assert one == other
-    assert changes(one, other) == []
 
 
 def test_the_truth_is_read_but_nothing_depends_on_it(make_study):

@@ -204,10 +204,12 @@ def test_the_trials_are_those_of_a_study_without_it_also_where_they_have_begun(m
     assert (spent.episodes, found) == (0, None)
 
 
-def test_where_every_agent_fails_everywhere_it_says_so_once_and_of_what(make_study):
+def test_where_every_agent_fails_everywhere_it_says_so_once_and_where_failures_stop_they_stop_it_here(make_study):
     faults = ", ".join(f'"agent{number}:*:raises"' for number in range(6))
     with pytest.raises(RunError, match="^agent 'agent0' raised ValueError.*; every agent fails so, in all 72 episodes"):
         run(make_study(preflight="true", domain={"faults": f"[{faults}]"}))
+    with pytest.raises(EpisodeError, match="agent 'agent3'"):
+        run(make_study(preflight="true", domain={"faults": '["agent3:1:raises"]'}, on_failure='"stop"'))
 
 
 def test_where_agents_fail_of_different_things_it_goes_on_and_says_so_once(make_study):
@@ -217,11 +219,6 @@ def test_where_agents_fail_of_different_things_it_goes_on_and_says_so_once(make_
     assert warning.startswith("pre-flight: every agent fails everywhere, first with: the domain family raised Zero")
     assert warning.endswith("; correct it")
     assert all(not movement.pairs and "cannot be tested" in movement.warning for movement in found.movements)
-
-
-def test_where_failures_stop_the_study_they_stop_it_here(make_study):
-    with pytest.raises(EpisodeError, match="agent 'agent3'"):
-        run(make_study(preflight="true", domain={"faults": '["agent3:1:raises"]'}, on_failure='"stop"'))
 
 
 def test_one_line_says_what_is_wrong_with_a_parameter_and_one_metric_that_moves_is_enough(planted):

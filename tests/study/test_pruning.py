@@ -47,7 +47,7 @@ def run(folder, **changes):
     return *searched(study), looked_at(study)
 
 
-def test_trials_are_cut_off_after_the_design_and_no_other_episode_is_run(done):
+def test_trials_are_cut_off_after_the_design_and_would_have_scored_no_less_than_their_bounds(done, cutting):
     spent, trials, found = done
     cut = [trial for trial in trials if trial.state == "cut"]
     assert cut
@@ -55,9 +55,6 @@ def test_trials_are_cut_off_after_the_design_and_no_other_episode_is_run(done):
     assert all(3 <= len(trial.decided) + 1 <= 8 and trial.prpv is None for trial in cut)
     assert spent.episodes == found.episodes == BUDGET * ALL - 3 * sum(8 - len(trial.decided) for trial in cut)
     assert found.spared[0] == BUDGET * ALL - spent.episodes
-
-
-def test_a_trial_that_was_cut_off_would_have_scored_no_less_than_its_bound_and_above_the_limit(cutting, done):
     _, trials, found = done
     with Store.open(found.study.settings.folder) as store:
         for trial in trials:
@@ -140,7 +137,7 @@ def test_the_agents_that_tell_most_come_first_and_the_limit_is_a_noise_above_the
     assert against.limit > min(trial.prpv for trial in trials if trial.prpv is not None)
 
 
-def test_trials_stand_on_decided_agents_and_what_was_spared_is_counted(done):
+def test_trials_and_the_search_stand_on_decided_agents_alone_and_what_was_spared_is_counted(done):
     _, _, found = done
     trial = TrialRecord(1, {"first": 0.0, "second": 0.0}, "cut", decided=("agent2", "agent5"), bound=1.0, score=2.0)
     driven = StudyRun(found.study, None).episodes_of(trial)
@@ -161,10 +158,6 @@ def test_trials_stand_on_decided_agents_and_what_was_spared_is_counted(done):
     ]
     assert episodes == len(missing)
     assert spared_seconds == pytest.approx(sum(missing))
-
-
-def test_of_a_trial_that_was_cut_off_the_search_has_the_decided_agents_outputs_even_where_all_episodes_are_known(done):
-    _, trials, found = done
     cut, study = next(trial for trial in trials if trial.state == "cut"), found.study
     with Store.open(found.study.settings.folder) as store:
         before = StudyRun(found.study, store).search_trial(cut)

@@ -258,9 +258,16 @@ def test_where_failures_stop_the_study_they_stop_it_here(finished):
         run_confirmation(StudyRun(broken, store))
 
 
-def test_how_much_was_luck_is_in_the_row_of_the_search(once):
+def test_the_document_has_the_answer_and_every_candidate_and_the_row_of_the_search_how_much_was_luck(once):
     *_, found = once
+    fresh = study_document(found)["best"]["fresh"]
     answer = found.confirmation.answer
+    inner = answer.assessment.prpv_interval
+    assert (fresh["prpv"], fresh["prpv_interval"]) == (answer.scores[0], [inner.low, inner.high])
+    assert fresh["optimism"] == answer.optimism
+    assert [one["index"] for one in fresh["candidates"]] == [
+        one.trial.number or None for one in found.confirmation.candidates
+    ]
     lucky = replace(answer, scores=(int(answer.trial.prpv) + 4,))
     luck = replace(found, confirmation=replace(found.confirmation, answer=lucky))
     fresh, searched = usefulness_table(luck).rows[:2]
@@ -272,18 +279,6 @@ def test_how_much_was_luck_is_in_the_row_of_the_search(once):
     none = replace(found, confirmation=replace(found.confirmation, answer=unlucky))
     searched = usefulness_table(none).rows[1]
     assert searched[3].startswith("no optimism")
-
-
-def test_the_document_has_the_answer_and_every_candidate(once):
-    *_, found = once
-    fresh = study_document(found)["best"]["fresh"]
-    answer = found.confirmation.answer
-    inner = answer.assessment.prpv_interval
-    assert (fresh["prpv"], fresh["prpv_interval"]) == (answer.scores[0], [inner.low, inner.high])
-    assert fresh["optimism"] == answer.optimism
-    assert [one["index"] for one in fresh["candidates"]] == [
-        one.trial.number or None for one in found.confirmation.candidates
-    ]
 
 
 @pytest.mark.slow

@@ -103,11 +103,19 @@ def test_four_figures_for_a_column_say_what_they_show_in_which_unit(figures):
     assert grey.get_ylabel() == "difference in brightness\n[grey levels]"
 
 
-def test_the_markings_are_drawn_before_and_after_on_two_frames(figures, clean):
+def test_the_markings_are_drawn_before_and_after_and_every_frame_kept_aside_has_its_errors(figures, clean, diagnosis):
     titles = [axes.get_title() for axes in figures["camera_markings"].axes]
     assert [title.split(",")[0] for title in titles] == [DECLARED_MODEL, AFTER] * 2
     assert all(axes.images and axes.collections for axes in figures["camera_markings"].axes)
     assert len(camera_figures(clean)["camera_markings"].axes) == 2
+    for axes, error in zip(figures["camera_error"].axes, (diagnosis.pixels, diagnosis.grey), strict=True):
+        before, after = (line for line in axes.get_lines() if line.get_marker() == ".")
+        known = np.isfinite(error.before.frames)
+        assert sorted(before.get_ydata()) == list(before.get_ydata())
+        assert sorted(before.get_ydata()) == pytest.approx(sorted(error.before.frames[known]))
+        assert sorted(after.get_ydata()) == pytest.approx(sorted(error.after.frames[known]))
+    (axes, _) = camera_figures(clean)["camera_error"].axes
+    assert [line.get_marker() for line in axes.get_lines()].count(".") == 1
 
 
 def test_outlines_lie_on_the_edges_and_displaced_edges_are_drawn_where_they_went(diagnosis):
@@ -142,17 +150,6 @@ def test_the_ranking_holds_every_loss_against_that_of_nothing_added(diagnosis, f
     assert nothing.get_xdata()[0] == loss_of_nothing(diagnosis) > 10.0 * diagnosis.candidates[0].loss
     assert axes.get_yticklabels()[0].get_text() == "camera roll"
     assert dots[0].get_label() == "added"
-
-
-def test_every_frame_kept_aside_is_in_the_figure_of_errors(diagnosis, figures, clean):
-    for axes, error in zip(figures["camera_error"].axes, (diagnosis.pixels, diagnosis.grey), strict=True):
-        before, after = (line for line in axes.get_lines() if line.get_marker() == ".")
-        known = np.isfinite(error.before.frames)
-        assert sorted(before.get_ydata()) == list(before.get_ydata())
-        assert sorted(before.get_ydata()) == pytest.approx(sorted(error.before.frames[known]))
-        assert sorted(after.get_ydata()) == pytest.approx(sorted(error.after.frames[known]))
-    (axes, _) = camera_figures(clean)["camera_error"].axes
-    assert [line.get_marker() for line in axes.get_lines()].count(".") == 1
 
 
 def test_a_headline_says_what_the_verdict_means_and_notes_tell_what_was_found_where_and_how_large(diagnosis, clean):

@@ -157,7 +157,7 @@ def test_residuals_over_time_are_those_of_the_windows_on_an_axis_that_says_why_i
     assert "the first was fitted" in residual_over_time(late, both).axes[0].get_xlabel()
 
 
-def test_many_episodes_become_a_median_with_a_band(diagnosis):
+def test_many_episodes_become_a_median_with_a_band_and_many_paths_means_by_place(diagnosis, monkeypatch):
     drives = diagnosis.parts.fitted
     both = strayed(replace(diagnosis, parts=diagnosis.parts._replace(tested=drives)))
     (axes,) = residual_over_time(drives, both).axes
@@ -166,6 +166,12 @@ def test_many_episodes_become_a_median_with_a_band(diagnosis):
     start = drives.first[both[DECLARED_MODEL].increment[first]] / drives.tick_hz
     assert middle[0] == pytest.approx(np.median(both[DECLARED_MODEL].rms[start < 1.0]))
     assert len([band for band in axes.collections if band.get_paths()]) == 2
+    monkeypatch.setattr("proxytune.report.diagnosis.error_figures.MANY_WINDOWS", 3)
+    both = {DECLARED_MODEL: strayed(diagnosis)[DECLARED_MODEL]}
+    shown = residual_map(diagnosis.parts.tested, both).axes[0].collections[0].get_array().compressed()
+    assert 0 < len(shown) <= len(both[DECLARED_MODEL].increment)
+    rms, rounding = both[DECLARED_MODEL].rms, 1e-12
+    assert rms.min() * (1.0 - rounding) <= shown.min() <= shown.max() <= rms.max() * (1.0 + rounding)
 
 
 def test_paths_on_the_maps_are_where_windows_were_measured_in_one_scale_and_equal_axes(diagnosis, figures):
@@ -184,15 +190,6 @@ def test_paths_on_the_maps_are_where_windows_were_measured_in_one_scale_and_equa
     rows = windows.increment[windows.window == 3]
     assert path[0] == pytest.approx(drives.poses[windows.begin[3], 0, :2])
     assert path[1:] == pytest.approx(drives.poses[rows, 1, :2])
-
-
-def test_more_paths_than_can_be_told_apart_become_means_by_place(diagnosis, monkeypatch):
-    monkeypatch.setattr("proxytune.report.diagnosis.error_figures.MANY_WINDOWS", 3)
-    both = {DECLARED_MODEL: strayed(diagnosis)[DECLARED_MODEL]}
-    shown = residual_map(diagnosis.parts.tested, both).axes[0].collections[0].get_array().compressed()
-    assert 0 < len(shown) <= len(both[DECLARED_MODEL].increment)
-    rms, rounding = both[DECLARED_MODEL].rms, 1e-12
-    assert rms.min() * (1.0 - rounding) <= shown.min() <= shown.max() <= rms.max() * (1.0 + rounding)
 
 
 def dots(axes):
@@ -320,12 +317,21 @@ def test_a_random_effect_shows_single_draws_that_differ(diagnosis, effect):
     assert max(np.abs(one - thin[0]).max() for one in thin) > 0.01
 
 
-def test_with_nothing_added_there_is_one_model_and_no_effect_to_draw(clean):
+def test_with_nothing_added_there_is_one_model_and_no_effect_and_idle_curves_are_not_drawn(clean, diagnosis):
     figures = motion_figures(clean)
     assert "effect_curve" not in figures
     assert len([one for one in figures["error"].axes[0].containers if isinstance(one, ErrorbarContainer)]) == 1
     assert len(figures["residual_map"].axes) == 2
     assert {one.get_color() for one in figures["residual_over_time"].axes[0].get_lines()} == {VERMILLION}
+    idle = tuple(curve._replace(gain=-1.0) for curve in diagnosis.found.curves)
+    slope = with_effect(
+        replace(diagnosis, found=replace(diagnosis.found, curves=idle)),
+        "floor_slope",
+        "",
+        {"floor_slope.x": 0.05, "floor_slope.y": 0.0},
+    )
+    for one in (slope, replace(diagnosis, found=replace(diagnosis.found, curves=idle))):
+        assert all(line.get_label() != ANY for axes in effect_curve(one).axes for line in axes.get_lines())
 
 
 @pytest.mark.slow
@@ -338,19 +344,6 @@ def test_an_unexplained_residual_is_drawn_over_each_signal_that_there_is(diagnos
             assert axes.get_xlabel() == panel.label
             assert np.isfinite(values(axes, ANY)[1]).all()
             assert {one.get_label() for one in axes.get_lines()} == {DECLARED_MODEL, MEASURED, ANY}
-
-
-def test_a_curve_that_says_nothing_is_not_drawn(diagnosis):
-    idle = tuple(curve._replace(gain=-1.0) for curve in diagnosis.found.curves)
-    slope = with_effect(
-        replace(diagnosis, found=replace(diagnosis.found, curves=idle)),
-        "floor_slope",
-        "",
-        {"floor_slope.x": 0.05, "floor_slope.y": 0.0},
-    )
-    band = replace(diagnosis, found=replace(diagnosis.found, curves=idle))
-    for one in (slope, band):
-        assert all(line.get_label() != ANY for axes in effect_curve(one).axes for line in axes.get_lines())
 
 
 KNOTS = {"speed_and_turn": ((-0.2, -1.0), (0.2, 1.0)), "direction": (-1.0,), "heading": (1.0, 2.0)}

@@ -86,21 +86,6 @@ def test_an_effect_that_was_added_says_its_worth_and_windows_what_they_did():
     assert "1 s: 0.95, 2 s: 0.80" in note
 
 
-def test_an_effect_is_immaterial_only_where_that_is_shown():
-    (note,) = motion_notes(diagnosis(negligible=(SLIP,), effect_sizes={"lateral_slip": SURE}))
-    assert note == (
-        "detectable but immaterial: lateral_slip 0.0024 s, log-likelihood gain 75 nats, "
-        "changes the error at 5 s by 1.0 % (−1.0 to +3.0)"
-    )
-    (note,) = motion_notes(diagnosis(negligible=(SLIP,), effect_sizes={"lateral_slip": LITTLE}))
-    assert note.startswith(
-        "not shown to matter: lateral_slip 0.0024 s, log-likelihood gain 75 nats, changes the error at 5 s by 1.0 % "
-    )
-    assert motion_notes(diagnosis(negligible=(SLIP,))) == [
-        "not shown to matter: lateral_slip, log-likelihood gain 75 nats"
-    ]
-
-
 def test_the_next_drive_is_told_with_what_it_tells_and_how_often_to_drive_it():
     def told(nats, *between, verdict="explained"):
         drive = NextDrive("the designed drive", "so", between, nats, np.zeros((2, 2)), 20.0, 10, (4.0, 3.0), None)
@@ -113,12 +98,24 @@ def test_the_next_drive_is_told_with_what_it_tells_and_how_often_to_drive_it():
     assert told(50.0, "a", "b", verdict="cannot be told")[1] == "the same drives tell noise from what is missing"
 
 
-def test_a_ratio_is_told_as_what_it_adds():
+def test_a_ratio_is_told_as_what_it_adds_and_an_effect_immaterial_only_where_that_is_shown():
     value, ends = per_cent(Ratio(1.25, (0.9, 2.0)))
     assert (value, *ends) == pytest.approx((25.0, -10.0, 100.0))
     assert decisive(LITTLE) == 5.0
     assert may_matter(LITTLE, RULES.material_factor)
     assert not may_matter(SURE, RULES.material_factor)
+    (note,) = motion_notes(diagnosis(negligible=(SLIP,), effect_sizes={"lateral_slip": SURE}))
+    assert note == (
+        "detectable but immaterial: lateral_slip 0.0024 s, log-likelihood gain 75 nats, "
+        "changes the error at 5 s by 1.0 % (−1.0 to +3.0)"
+    )
+    (note,) = motion_notes(diagnosis(negligible=(SLIP,), effect_sizes={"lateral_slip": LITTLE}))
+    assert note.startswith(
+        "not shown to matter: lateral_slip 0.0024 s, log-likelihood gain 75 nats, changes the error at 5 s by 1.0 % "
+    )
+    assert motion_notes(diagnosis(negligible=(SLIP,))) == [
+        "not shown to matter: lateral_slip, log-likelihood gain 75 nats"
+    ]
 
 
 def test_values_beside_what_has_no_name_are_no_physics_yet_and_what_stops_the_robot_again_and_again_is_told():
@@ -221,8 +218,7 @@ NAMES = ("a", "b", "c", "d")
 
 
 def test_groups_of_drives_are_told_with_their_gains_and_only_where_they_differ():
-    told = json.loads(json.dumps(unlike_document(FOUND, NAMES)))
-    assert told == {
+    assert json.loads(json.dumps(unlike_document(FOUND, NAMES))) == {
         "wheel": "left",
         "groups": [{"gain": 0.88, "drives": ["a", "c"]}, {"gain": 1.02, "drives": ["b", "d"]}],
     }

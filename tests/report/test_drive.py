@@ -71,13 +71,17 @@ def test_both_are_named_in_their_colours_with_scores_and_the_time_at_which_they_
     assert say_parting(pair) == "Their places are first more than 5 cm apart at 0.2 s."
 
 
-def test_an_episode_alone_and_one_that_stands_still_can_be_drawn():
+def test_an_episode_alone_or_standing_still_can_be_drawn_and_labels_stand_apart_and_hide_no_path():
     ways, commands = axes_of(episode_figure(paired(recorded(lambda time: 0.5 * time)), []))
     assert texts(ways) == ["start", "proxy ends", "proxy: "]
     assert texts(commands) == []
     figure = episode_figure(paired(recorded(lambda time: 0.0 * time)), [])
     figure.draw_without_rendering()
     assert len(axes_of(figure)[0].lines) == 3, "path, start and end; no arrow"
+    assert corners_of(np.array([(1.0, 1.0)]), NOTHING, LOW, HIGH) == [(1, 1)]
+    path = np.column_stack((np.linspace(1.0, 2.0, 50), np.linspace(1.0, 1.3, 50)))
+    (corner,) = corners_of(np.array([(1.0, 1.0)]), path, LOW, HIGH)
+    assert corner == tuple(CORNERS[1])
 
 
 @given(st.floats(0.1, 30.0), st.integers(2, 400))
@@ -95,13 +99,6 @@ NOTHING = np.empty((0, 2))
 
 def centres(marks, corners):
     return np.array(marks) + np.array(corners) * (SIZE / 2.0 + GAP) * 2.0
-
-
-def test_labels_stand_apart_and_hide_no_path():
-    assert corners_of(np.array([(1.0, 1.0)]), NOTHING, LOW, HIGH) == [(1, 1)]
-    path = np.column_stack((np.linspace(1.0, 2.0, 50), np.linspace(1.0, 1.3, 50)))
-    (corner,) = corners_of(np.array([(1.0, 1.0)]), path, LOW, HIGH)
-    assert corner == tuple(CORNERS[1])
 
 
 @given(st.floats(0.0, 2.0), st.floats(0.0, 2.0))

@@ -14,7 +14,7 @@ DEAR, CHEAP = (2.0, 2.2, 1.8, 2.0), (1.0, 1.1, 0.9, 1.0)
 BOTH = (family("bullet", 0, DEAR, noise=8.0), family("planar", 0, CHEAP, noise=8.0))
 
 
-def test_a_clear_winner_is_said_to_predict_best_and_to_be_used():
+def test_a_clear_winner_is_used_of_those_alike_the_cheapest_and_else_what_would_tell_them_apart_is_said():
     found = compared(family("bullet", 0, DEAR), family("planar", 4, CHEAP))
     answer = families_answer(found)
     assert answer.startswith("To predict: bullet, fresh PRPV (proxy relative predictivity value) 0 (0 to 0); worse: ")
@@ -22,9 +22,6 @@ def test_a_clear_winner_is_said_to_predict_best_and_to_be_used():
     assert answer.endswith("Cheapest: planar, 1 s per episode (0.93 to 1.1); times as long: bullet 2 (2 to 2).")
     assert "To teach" not in answer
     assert families_next_step(found) == "use bullet to predict; its page: study/families/bullet/report.html."
-
-
-def test_of_those_alike_the_cheapest_is_used_and_else_what_would_tell_them_apart_is_said():
     found = compared(*BOTH)
     assert "; cannot be told from it: planar +0 (" in families_answer(found)
     assert families_next_step(found).startswith(

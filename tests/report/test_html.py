@@ -105,7 +105,7 @@ def test_nothing_is_loaded_from_elsewhere_and_no_script_may_run():
     assert "script-src" not in policy
 
 
-def test_headings_come_in_order_and_tables_have_scopes_captions_and_regions_that_the_keyboard_reaches():
+def test_headings_and_contents_come_in_order_and_tables_have_scopes_captions_and_regions_for_the_keyboard():
     tags = [tag for tag, _ in Reader(html_of(VIEW)).elements if re.fullmatch(r"h\d", tag)]
     assert tags[0] == "h1"
     assert tags.count("h1") == 1
@@ -117,9 +117,15 @@ def test_headings_come_in_order_and_tables_have_scopes_captions_and_regions_that
     ids = {attrs["id"] for attrs in elements.all("h2")}
     assert len(regions) == 3
     assert all(one["tabindex"] == "0" and one["role"] == "region" and one["aria-labelledby"] in ids for one in regions)
+    assert "<nav" not in html_of(replace(VIEW, parts=(TABLE,) * MANY))
+    elements = Reader(html_of(replace(VIEW, parts=(TABLE,) * (MANY + 1))))
+    ids = {attrs["id"] for attrs in elements.all("h2")}
+    links = [attrs["href"] for attrs in elements.all("a")]
+    assert len(links) == MANY + 1
+    assert {link.removeprefix("#") for link in links} <= ids
 
 
-def test_columns_of_numbers_end_together_texts_begin_together_and_long_cells_are_wrapped():
+def test_numbers_end_together_with_a_minus_and_texts_begin_together_long_cells_wrapped_and_parts_indented():
     columns = (Column("value", numbers=True), Column("text"))
     text = html_of(replace(VIEW, parts=(replace(TABLE, columns=columns, rows=(("1", "2"), ("2", "x"))),)))
     assert '<th scope="col" class="number">value</th><th scope="col">text</th>' in text
@@ -129,35 +135,29 @@ def test_columns_of_numbers_end_together_texts_begin_together_and_long_cells_are
     text = html_of(replace(VIEW, parts=(replace(TABLE, columns=columns, rows=(("x", "w" * 29),)),)))
     assert '<td class="prose">www' in text
     assert '<th scope="col">a b</th>' in text
+    # A name with a hyphen keeps it; an indent holds where the name takes two lines.
+    columns = columns_of(("name",), ("value",))
+    page = html_of(replace(VIEW, parts=(Table("T", columns, (("  a-1", "-0.3 (-1 to 2)"),)),)))
+    assert '<th scope="row" class="part">a-1</th><td class="number">−0.3 (−1 to 2)</td>' in page
 
 
-def test_a_table_of_contents_is_there_only_for_many_parts_and_leads_to_each():
-    assert "<nav" not in html_of(replace(VIEW, parts=(TABLE,) * MANY))
-    elements = Reader(html_of(replace(VIEW, parts=(TABLE,) * (MANY + 1))))
-    ids = {attrs["id"] for attrs in elements.all("h2")}
-    links = [attrs["href"] for attrs in elements.all("a")]
-    assert len(links) == MANY + 1
-    assert {link.removeprefix("#") for link in links} <= ids
-
-
-def test_only_a_page_under_way_renews_itself_and_only_one_with_a_next_step_says_it():
-    assert 'http-equiv="refresh"' not in html_of(VIEW)
-    text = page_html(VIEW, FOOT, 7)
-    assert '<meta http-equiv="refresh" content="7">' in text
-    assert "loads itself again every 7 s" in text
-    assert "Next:" in html_of(VIEW)
-    assert "Next:" not in html_of(replace(VIEW, next_step=""))
-
-
-def test_commands_between_backticks_are_code_whose_options_are_broken_nowhere():
+def test_commands_are_code_words_are_explained_where_they_are_used_and_links_stay_beside_the_page():
     text = html_of(replace(VIEW, next_step="run `a < b`"))
     assert "run <code>a &lt; b</code>" in text
     assert "a `b" in html_of(replace(VIEW, next_step="a `b"))
     text = html_of(replace(VIEW, next_step="run `python -m proxytune study a --budget 2`"))
     assert "python -m proxytune study a <span>--budget</span> 2</code>" in text
+    # Jargon has a meaning at the foot; a link goes to a file near the page and never elsewhere.
+    said = Paragraphs(
+        "P", ("The noise floor. [here](diagnosed/report.html) [there](https://x.org) [up](../report.html)",)
+    )
+    page = html_of(replace(VIEW, parts=(said,)))
+    assert "<dt>noise floor</dt>" in page
+    assert "<dt>nats</dt>" not in page
+    assert re.findall(r'<a href="([^"#]+)', page) == ["diagnosed/report.html", "../report.html"]
 
 
-def test_a_page_fits_every_screen_and_its_foot_says_how_to_come_by_it():
+def test_a_page_fits_every_screen_says_how_to_come_by_it_and_renews_itself_only_under_way():
     text = html_of(VIEW)
     assert 'name="viewport" content="width=device-width' in text
     for words in ("@media print", "@media (prefers-color-scheme: dark)", ".card { display: block;", "background: #fff"):
@@ -168,6 +168,12 @@ def test_a_page_fits_every_screen_and_its_foot_says_how_to_come_by_it():
     written = foot_of("a command", [("seed", "1")])
     assert dict(written.versions).keys() >= {"Python", "numpy", "scipy"}
     assert re.match(r"\d{4}-\d\d-\d\d \d\d:\d\d", written.date)
+    assert 'http-equiv="refresh"' not in html_of(VIEW)
+    text = page_html(VIEW, FOOT, 7)
+    assert '<meta http-equiv="refresh" content="7">' in text
+    assert "loads itself again every 7 s" in text
+    assert "Next:" in html_of(VIEW)
+    assert "Next:" not in html_of(replace(VIEW, next_step=""))
 
 
 @pytest.mark.parametrize(
@@ -212,21 +218,3 @@ def test_a_figure_is_part_of_the_page_its_markers_say_their_values_and_its_names
     assert "<script" not in page
     assert "<b>" not in page
     assert "<i>" not in page
-
-
-def test_words_are_explained_where_they_are_used_and_links_stay_beside_the_page():
-    """Jargon has a meaning at the foot; a link goes to a file near the page and never elsewhere."""
-    said = Paragraphs(
-        "P", ("The noise floor. [here](diagnosed/report.html) [there](https://x.org) [up](../report.html)",)
-    )
-    page = html_of(replace(VIEW, parts=(said,)))
-    assert "<dt>noise floor</dt>" in page
-    assert "<dt>nats</dt>" not in page
-    assert re.findall(r'<a href="([^"#]+)', page) == ["diagnosed/report.html", "../report.html"]
-
-
-def test_numbers_have_a_minus_and_what_a_row_is_of_is_told_by_its_indent():
-    """A name with a hyphen keeps it; an indent holds where the name takes two lines."""
-    columns = columns_of(("name",), ("value",))
-    page = html_of(replace(VIEW, parts=(Table("T", columns, (("  a-1", "-0.3 (-1 to 2)"),)),)))
-    assert '<th scope="row" class="part">a-1</th><td class="number">−0.3 (−1 to 2)</td>' in page

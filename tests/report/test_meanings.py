@@ -73,7 +73,9 @@ def test_what_was_declared_is_told_with_its_value_and_of_many_a_few():
     assert many.endswith(" and 2 more")
 
 
-def test_effects_are_a_row_each_within_80_columns_and_no_name_is_broken(monkeypatch, capsys):
+def test_effects_are_a_row_each_within_80_columns_unbroken_and_an_unknown_one_is_asked_back(
+    monkeypatch, capsys, refused
+):
     monkeypatch.setenv("COLUMNS", "80")
     assert main(["list", "effects"]) == 0
     told = capsys.readouterr().out
@@ -81,6 +83,7 @@ def test_effects_are_a_row_each_within_80_columns_and_no_name_is_broken(monkeypa
     words = set(re.findall(r"\S+", told.replace("*", " ").replace(",", " ")))
     assert set(CATALOGUE) <= words
     assert {one.name for effect in CATALOGUE.values() for one in effect.parameters} <= words
+    assert "no 'ded_band'; did you mean 'dead_band'?" in refused("list", "effects", "ded_band")
 
 
 @pytest.mark.parametrize(
@@ -96,10 +99,6 @@ def test_effects_are_a_row_each_within_80_columns_and_no_name_is_broken(monkeypa
 def test_all_of_one_is_told(words, said, capsys):
     assert main(["list", *words]) == 0
     assert said in " ".join(capsys.readouterr().out.split())
-
-
-def test_an_unknown_one_is_asked_back(refused):
-    assert "no 'ded_band'; did you mean 'dead_band'?" in refused("list", "effects", "ded_band")
 
 
 @pytest.mark.parametrize("width", [30, 60, 80, 200])

@@ -194,9 +194,7 @@ def test_a_patched_urdf_or_sdf_has_wheels_and_camera_where_they_were_found(patch
         ("mine.xml", 'size="0.0318"', "", "states its own size"),
     ],
 )
-def test_a_file_that_cannot_be_patched_is_refused_in_one_line_and_nothing_is_written(
-    patched, tmp_path, name, before, after, said
-):
+def test_a_file_that_cannot_be_patched_is_one_line_and_nothing_is_written(patched, tmp_path, name, before, after, said):
     assert said in complaint_of(patched, name, FILES.get(name, URDF).replace(before, after))
     assert not (tmp_path / "out").exists()
 
@@ -224,7 +222,7 @@ def test_what_would_overwrite_or_misread_the_users_own_is_refused(model, tmp_pat
 
 
 @pytest.mark.parametrize("stamped", [False, True])
-def test_the_ros_node_tells_the_driver_what_the_python_class_answers_and_stops_after_silence(
+def test_the_ros_node_tells_what_the_python_class_answers_and_stops_after_silence(
     model, tmp_path, monkeypatch, stamped
 ):
     path = export(model, tmp_path / "bend.py", to="filter", has=("trim",)).output

@@ -128,7 +128,7 @@ def test_no_two_names_overlap_and_none_is_cut_at_85_millimetres(agents):
         assert max(text.get_window_extent().x1 for text in axes.texts) <= figure.bbox.x1
 
 
-def test_of_many_agents_those_are_named_whose_rank_differs_most():
+def test_of_many_agents_those_whose_rank_differs_most_are_named_and_constant_scores_of_two_drawn_too(tmp_path):
     scores = np.arange(40.0)[:, None, None]
     moved = scores.copy()
     moved[[3, 36]] = scores[[36, 3]]
@@ -139,6 +139,12 @@ def test_of_many_agents_those_are_named_whose_rank_differs_most():
     assert len(named) == MOST
     assert {name.rsplit(":", 1)[1] for name in named} >= {"agent3", "agent36"}
     assert max(map(len, named)) == LONGEST
+    flat = ScoreTable(("A", "B"), ("1",), ("distance", "time"), np.ones((2, 1, 2)))
+    found = assess(proxy=flat, target=flat, metrics=BOTH)
+    assert scatter_figure(found).axes[0].get_title() == "SRCC undefined"
+    for name, figure in (("one", scatter_figure(found)), ("two", flipped_pairs_figure(found.prpv))):
+        save_figure(figure, tmp_path / "new" / f"{name}.png")
+        assert (tmp_path / "new" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_the_map_colours_each_pair_once_and_counts_them_and_of_many_agents_is_a_picture_of_the_same_width(assessment):
@@ -164,12 +170,3 @@ def test_the_map_colours_each_pair_once_and_counts_them_and_of_many_agents_is_a_
     assert (picture.get_array() == reversed_).sum() == sum(pair.flip == "reversed" for pair in big.prpv.pairs) > 0
     many.draw_without_rendering()
     assert not any("A" in label.get_text() for label in many.axes[0].get_yticklabels())
-
-
-def test_constant_scores_and_two_agents_are_drawn_too(tmp_path):
-    flat = ScoreTable(("A", "B"), ("1",), ("distance", "time"), np.ones((2, 1, 2)))
-    found = assess(proxy=flat, target=flat, metrics=BOTH)
-    assert scatter_figure(found).axes[0].get_title() == "SRCC undefined"
-    for name, figure in (("one", scatter_figure(found)), ("two", flipped_pairs_figure(found.prpv))):
-        save_figure(figure, tmp_path / "new" / f"{name}.png")
-        assert (tmp_path / "new" / f"{name}.png").read_bytes().startswith(b"\x89PNG")

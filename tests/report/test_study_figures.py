@@ -55,7 +55,7 @@ def test_the_convergence_names_its_axes_its_floor_by_its_kind_and_its_lines_at_t
     assert told == ["design", "proposed", "answer, fresh episodes"]
 
 
-def test_failed_trials_are_crosses_and_those_cut_off_stand_at_what_they_cannot_be_below(result):
+def test_failed_trials_are_crosses_those_cut_off_at_their_bounds_and_the_line_is_the_answer_so_far(result):
     failed = replace(
         result,
         trials=(*result.trials, TrialRecord(8, result.trials[0].theta, "failed")),
@@ -70,9 +70,6 @@ def test_failed_trials_are_crosses_and_those_cut_off_stand_at_what_they_cannot_b
     assert drawn["stopped early, at least"].get_xydata().tolist() == [[8.0, 14.0]]
     assert "failed" not in drawn
     assert "stopped early, at least" not in lines(convergence_figure(result))
-
-
-def test_without_a_floor_none_is_drawn_and_the_line_is_the_answer_so_far(result):
     assessment = result.best.assessment
     silent = replace(assessment, noise_floor=replace(assessment.noise_floor, value=None, low=None, high=None))
     drawn = lines(convergence_figure(replace(result, best=replace(result.best, assessment=silent))))

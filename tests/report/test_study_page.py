@@ -57,9 +57,7 @@ def test_it_has_every_trial_the_best_theta_and_at_its_foot_how_to_come_by_it_aga
     assert "plot &#x27;a b&#x27; --metric" in other
 
 
-def test_a_page_under_way_is_there_before_any_trial_renews_itself_calls_the_best_luck_and_tells_a_stop(
-    result, tmp_path
-):
+def test_a_page_under_way_is_there_before_any_trial_renews_itself_calls_the_best_luck_and_tells_stops(result, tmp_path):
     settings, path = result.study.settings, tmp_path / "report.html"
     write_live_page(path, settings, "prpv", result.trials[:4], "trial 5 of 7")
     text = path.read_text(encoding="utf-8")

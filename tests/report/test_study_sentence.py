@@ -141,8 +141,7 @@ def test_a_proxy_that_lacks_something_is_sent_to_diagnose_and_another_simulator_
 
 
 def test_what_chance_explains_is_not_found_and_has_its_probability():
-    text = said(**BY_CHANCE)
-    assert text == (
+    assert said(**BY_CHANCE) == (
         "No θ found. PRPV (proxy relative predictivity value) is 58 (50 to 66), no better than chance "
         "(65.8 ± 13.7, p = 0.3). Next: raise budget from 24 to 48, or add agents whose scores differ more."
     )
@@ -150,12 +149,15 @@ def test_what_chance_explains_is_not_found_and_has_its_probability():
     assert "confirm" not in said(**BY_CHANCE, fresh=False, confirm=0)
 
 
-def test_without_fresh_episodes_luck_is_named_and_they_are_the_next_step():
+def test_without_fresh_episodes_or_before_its_end_a_study_says_so_and_how_to_go_on():
     unconfirmed = said(**ABOVE, fresh=False, confirm=0)
     assert "is 16 in the search's own episodes, which may be partly luck." in unconfirmed
     assert unconfirmed.endswith("Next: set confirm = 1 and run the study again, to drive the best θ afresh.")
     assert "set confirm" not in said(**ABOVE, fresh=False)
     assert "perfect" not in unconfirmed
+    text = said(**ABOVE, stopped="", trials=range(14))
+    assert text.startswith("14 of 24 trials so far. θ narrowed down")
+    assert text.endswith("Next: run the study again for the 10 trials that are left.")
 
 
 def test_where_noise_is_not_known_nothing_is_said_of_a_perfect_proxy_and_the_nominal_stands_beside():
@@ -166,13 +168,7 @@ def test_where_noise_is_not_known_nothing_is_said_of_a_perfect_proxy_and_the_nom
     assert "8 pairs worse. The simulator as it is scores 31 (24 to 38). Next: " in text
 
 
-def test_a_study_under_way_says_so_and_how_to_go_on():
-    text = said(**ABOVE, stopped="", trials=range(14))
-    assert text.startswith("14 of 24 trials so far. θ narrowed down")
-    assert text.endswith("Next: run the study again for the 10 trials that are left.")
-
-
-def test_unidentified_parameters_have_no_interval_and_only_who_tells_of_them_is_named():
+def test_unidentified_parameters_have_no_interval_values_outside_theirs_have_and_of_many_some_are_told():
     text = said((TRIM, DELAY), **ABOVE, information=TOLD)
     assert "trim 0.121 (0.108 to 0.146); delay is unidentified." in text
     assert "add an agent or a metric whose scores change with delay (so far agent4's do most), or a log" in text
@@ -180,9 +176,6 @@ def test_unidentified_parameters_have_no_interval_and_only_who_tells_of_them_is_
     assert nothing.startswith("θ is unknown: delay and blur are unidentified.")
     silent = replace(TOLD[0], agents=(("agent0", 0.0),))
     assert "so far" not in said((TRIM, DELAY), **ABOVE, information=(silent, TOLD[1]))
-
-
-def test_values_outside_their_intervals_and_of_many_only_some_are_told():
     text = said((replace(TRIM, best=0.2), PITCH), **ABOVE)
     assert "trim 0.200 (95 % region: 0.108 to 0.146)" in text
     text = said(tuple(replace(TRIM, name=f"gain{number}") for number in range(7)))

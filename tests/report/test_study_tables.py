@@ -139,7 +139,7 @@ def with_floor(result, **changes):
     return replace(result, best=replace(result.best, assessment=replace(own, noise_floor=floor)))
 
 
-def test_a_confirmed_study_tells_what_is_expected_a_perfect_proxy_s_score_and_the_excess(result):
+def test_what_is_expected_a_perfect_proxy_s_score_the_excess_and_whether_any_theta_explains_is_told(result):
     again = confirmed(result, kind="same starts", value=5.0, low=1.2, high=9.1)
     table = usefulness_table(again)
     assert row_of(table, "PRPV")[1:] == ("12", "8 to 20", "wrongly ordered pairs, 0 to 30; expected, in 5 more runs")
@@ -150,9 +150,6 @@ def test_a_confirmed_study_tells_what_is_expected_a_perfect_proxy_s_score_and_th
     assert document["excess"]["value"] == 7.0
     assert not row_of(usefulness_table(result), "  excess")
     assert study_document(result)["best"]["expected_prpv"] is study_document(result)["excess"] is None
-
-
-def test_it_is_said_whether_any_theta_explains_the_target(result):
     row = row_of(usefulness_table(planted(result)), "misfit (p)")
     assert row == ("misfit (p)", "0.4", "", "some θ may explain the target's scores")
     lacking = row_of(usefulness_table(planted(result, misfit=LACKS)), "misfit (p)")
@@ -160,7 +157,7 @@ def test_it_is_said_whether_any_theta_explains_the_target(result):
     assert "too few" in row_of(usefulness_table(planted(result, misfit=UNTOLD)), "misfit (p)")[3]
 
 
-def test_how_a_study_came_to_its_end_is_said_and_more_trials_than_the_budget_are_no_share(result):
+def test_how_a_study_came_to_its_end_what_matters_and_what_was_cut_off_and_saved_is_said(result):
     assert study_document(result)["stopped"] == "the budget of 7 trials is spent"
     assert search_table(result).rows[0][1].endswith("; ended: the budget of 7 trials is spent")
     under_way = replace(result, stopped="")
@@ -169,9 +166,6 @@ def test_how_a_study_came_to_its_end_is_said_and_more_trials_than_the_budget_are
     settings = replace(result.study.settings, budget=5)
     lowered = replace(result, study=replace(result.study, settings=settings))
     assert search_table(lowered).rows[0][1].startswith("7 (budget 5); best: trial ")
-
-
-def test_that_every_parameter_matters_is_said_too(result):
     moved = Movement(Interval("trim", -0.3, 0.3), 0.01, "distance", 2.0, 0.5, 12, False)
     flown = replace(result, preflight=Preflight({"trim": 0.0}, (moved,), 144))
     assert study_document(result)["preflight"] is None
@@ -188,9 +182,6 @@ def test_that_every_parameter_matters_is_said_too(result):
     label, warning = search_table(replace(flown, preflight=still)).rows[1]
     assert (label, warning.startswith("'trim' is not shown to change a metric")) == ("pre-flight", True)
     assert flown.episodes == result.episodes + 144
-
-
-def test_what_was_cut_off_and_saved_is_told(result):
     assert not row_of(search_table(result), "stopped early")
     assert study_document(result)["trials"][0]["cut_off"] is None
     first, *others = result.trials

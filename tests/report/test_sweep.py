@@ -188,14 +188,11 @@ def legend(figure):
     return [text.get_text() for text in told.get_texts()]
 
 
-def test_every_line_band_and_bar_is_explained_once(with_pod, curves):
+def test_every_line_band_and_bar_is_explained_once_and_nothing_of_a_figure_is_clipped(with_pod, curves, make_study):
     lines = ["target's halves", "chance", "95 % interval", "held value"]
     assert legend(sweep_figure(curves)) == lines
     assert legend(panels_figure(with_pod)) == [*lines, "SRCC, distance", "SRCC, survival time"]
     assert sorted(legend(bars_figure(curves))) == sorted([*lines, "lower and higher value"])
-
-
-def test_nothing_of_a_figure_is_clipped(with_pod, make_study):
     for figure in (panels_figure(with_pod), bars_figure([with_pod]), sweep_figure([with_pod])):
         figure.draw_without_rendering()
         outer, inner = figure.bbox, figure.get_tightbbox().transformed(figure.dpi_scale_trans)
@@ -231,7 +228,7 @@ def view_of(curves):
     return sweep_view("s", curves, figures, "The others are nominal")
 
 
-def test_the_answer_says_where_prpv_is_lowest_and_figures_of_all_come_first(curves):
+def test_the_answer_says_where_prpv_is_lowest_and_of_a_flat_curve_claims_no_optimum(curves):
     answer = view_of(curves).sentence
     assert "trim: PRPV is lowest (0) at 0.1, and worse beyond noise at" in answer
     assert answer.endswith("The others are nominal.")
@@ -239,9 +236,6 @@ def test_the_answer_says_where_prpv_is_lowest_and_figures_of_all_come_first(curv
     assert titles[:3] == ["All parameters", "How much each parameter matters", "Usefulness along trim"]
     assert titles[3] == "Along trim: the paper's measures"
     assert titles.index("Along trim: other measures") < titles.index("Usefulness along delay")
-
-
-def test_a_flat_curve_asks_for_more_starts_and_claims_no_optimum(curves):
     (trim, _) = curves
     point = trim.points[0]
     page = view_of([replace(trim, points=(point, replace(point, value=0.2)))])

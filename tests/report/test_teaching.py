@@ -64,7 +64,7 @@ def test_a_proxy_saves_samples_only_if_its_whole_interval_says_so_and_is_named_t
     assert "none is shown" in teach_answer(experiment(LESSONS[2:3]))
 
 
-def test_what_was_published_stands_beside_what_is_found_here_with_its_source():
+def test_what_was_published_stands_beside_what_is_found_and_plv_in_cost_where_costs_are_stated():
     theirs = {"none": Published(0.0, 9000, 0.0), "sure": Published(47.4, 250, 0.97)}
     page = teach_view(experiment(published=theirs), {}, b"a picture")
     table = next(part for part in page.parts if getattr(part, "title", "") == "Beside what was published")
@@ -72,6 +72,14 @@ def test_what_was_published_stands_beside_what_is_found_here_with_its_source():
     assert table.rows[1][3:] == ("250", "100 (50 to 400)", "97 %", "")
     assert table.notes == ("a paper",)
     assert len(teach_view(experiment(), {}, b"a picture").parts) == len(page.parts) - 1
+    stated = experiment(costs=Costs(2.5, 2.5, 0.0), published={"sure": Published(47.4, 250, 0.97)})
+    table, plain = (teach_view(one, {}, b"a picture").parts[0] for one in (stated, experiment()))
+    assert table.columns == (*plain.columns, Column("PLV in cost", numbers=True))
+    costs = {row[0]: row[-1] for row in table.rows}
+    assert costs["none"] == ""
+    assert costs["sure"] == "750 (250 to 875)"
+    assert costs["far"] == "unknown (300 or more)"
+    assert any("off_policy 2.5, on_policy 2.5, label 0" in note for note in table.notes)
 
 
 def test_the_next_step_is_more_seeds_while_something_is_open_and_says_why_plv_is_unknown():
@@ -85,17 +93,6 @@ def test_the_next_step_is_more_seeds_while_something_is_open_and_says_why_plv_is
     assert "is unknown: teaching.target_samples has no number from 1 to half of 400" in teach_answer(coarse)
     assert "add numbers between 0 and 400" in teach_next_step(coarse)
     assert "raise teaching.examinations from 20 to 40" in teach_next_step(experiment(examinations=20))
-
-
-def test_plv_in_cost_is_a_column_where_costs_are_stated_and_only_there():
-    stated = experiment(costs=Costs(2.5, 2.5, 0.0), published={"sure": Published(47.4, 250, 0.97)})
-    table, plain = (teach_view(one, {}, b"a picture").parts[0] for one in (stated, experiment()))
-    assert table.columns == (*plain.columns, Column("PLV in cost", numbers=True))
-    costs = {row[0]: row[-1] for row in table.rows}
-    assert costs["none"] == ""
-    assert costs["sure"] == "750 (250 to 875)"
-    assert costs["far"] == "unknown (300 or more)"
-    assert any("off_policy 2.5, on_policy 2.5, label 0" in note for note in table.notes)
 
 
 @pytest.mark.parametrize(

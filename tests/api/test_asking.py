@@ -82,13 +82,23 @@ def test_an_engine_of_one_s_own_sees_what_was_told_in_the_order_of_asking_then_w
     assert searched(6, engine=own, initial=2).trials().equals(searched(6, engine="random", initial=2).trials())
 
 
-def test_a_failed_simulation_is_kept_and_the_search_goes_on_elsewhere():
+def test_a_failed_simulation_is_kept_and_only_a_theta_that_was_asked_for_can_be_told_once():
     box = searched(9)
     failed = box.ask()
     box.tell(failed, None)
     assert math.isnan(box.trials().score.iloc[-1])
     assert box.ask() != failed
     assert box.best() == searched(9).best()
+    box = SearchBox(BOX)
+    assert "no score has been told; ask" in complaint_of(box.best)
+    theta = box.ask()
+    assert "was not asked for; tell what `ask` gave" in complaint_of(box.tell, {**theta, "trim": 0.0}, 1.0)
+    assert "θ names trim; the box has delay, trim" in complaint_of(box.tell, {"trim": 0.0}, 1.0)
+    for wrong in (math.nan, math.inf):
+        assert "a score must be a finite number, or None" in complaint_of(box.tell, theta, wrong)
+    box.tell(theta, 1.0)
+    assert "has a score already; ask for the next" in complaint_of(box.tell, theta, 1.0)
+    assert box.trials().score.tolist() == [1.0]
 
 
 @settings(max_examples=20)
@@ -118,20 +128,6 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("name", WRONG)
-def test_a_box_that_cannot_be_searched_is_refused(name):
-    changes, words = WRONG[name]
+@pytest.mark.parametrize(("changes", "words"), WRONG.values(), ids=WRONG)
+def test_a_box_that_cannot_be_searched_is_refused(changes, words):
     assert re.search(words, complaint_of(SearchBox, **{"box": BOX, **changes}))
-
-
-def test_only_a_theta_that_was_asked_for_can_be_told_and_only_once():
-    box = SearchBox(BOX)
-    assert "no score has been told; ask" in complaint_of(box.best)
-    theta = box.ask()
-    assert "was not asked for; tell what `ask` gave" in complaint_of(box.tell, {**theta, "trim": 0.0}, 1.0)
-    assert "θ names trim; the box has delay, trim" in complaint_of(box.tell, {"trim": 0.0}, 1.0)
-    for wrong in (math.nan, math.inf):
-        assert "a score must be a finite number, or None" in complaint_of(box.tell, theta, wrong)
-    box.tell(theta, 1.0)
-    assert "has a score already; ask for the next" in complaint_of(box.tell, theta, 1.0)
-    assert box.trials().score.tolist() == [1.0]

@@ -177,7 +177,6 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("name", WRONG)
-def test_what_is_no_log_is_one_line_with_row_and_column(samples, name):
-    spoil, keys, words = WRONG[name]
+@pytest.mark.parametrize(("spoil", "keys", "words"), WRONG.values(), ids=WRONG)
+def test_what_is_no_log_is_one_line_with_row_and_column(samples, spoil, keys, words):
     assert re.match(words, complaint_of(log_of, spoil(samples), {**DESCRIPTION, **keys}))

@@ -138,11 +138,6 @@ def test_what_cannot_be_used_is_one_line_with_the_side(name):
     assert ".csv" not in told or name == "no file"
 
 
-def test_the_target_is_named_where_it_is_the_target_that_lacks_something():
-    told = complaint_of(score, proxy=table(1), target=table(2).drop(columns="time"), metrics=METRICS)
-    assert re.match("target: no column 'time'; (did you mean|known are)", told)
-
-
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
@@ -176,3 +171,8 @@ def test_one_column_is_not_compared_with_itself_and_sides_are_given_whole():
     for sides in ({}, {"proxy": table}):
         assert "or one table of both sides" in complaint_of(score, **sides, metrics="success:max")
     assert "no metric is given" in complaint_of(score, proxy=table, target=table)
+
+
+def test_the_target_is_named_where_it_is_the_target_that_lacks_something():
+    told = complaint_of(score, proxy=table(1), target=table(2).drop(columns="time"), metrics=METRICS)
+    assert re.match("target: no column 'time'; (did you mean|known are)", told)

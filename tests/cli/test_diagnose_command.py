@@ -193,9 +193,8 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("case", BAD)
-def test_data_that_cannot_bear_an_answer_is_refused_in_one_line_and_nothing_is_written(case, tmp_path, refused):
-    make, says = BAD[case]
+@pytest.mark.parametrize(("make", "says"), BAD.values(), ids=BAD)
+def test_data_that_cannot_bear_an_answer_is_refused_in_one_line_and_nothing_is_written(make, says, tmp_path, refused):
     make(tmp_path / "log")
     line = refused("diagnose", tmp_path / "log", "--output", tmp_path / "out")
     assert line.startswith("proxytune diagnose: ")

@@ -89,7 +89,7 @@ def test_a_roll_that_nobody_declared_is_found_in_still_frames_and_the_document_s
     assert document["motion_refused"] is None
 
 
-def test_model_toml_holds_the_camera_and_figures_are_those_of_the_camera_alone(found):
+def test_model_toml_and_figures_are_the_camera_s_and_people_read_its_verdict_roll_and_errors(found):
     model = read_model(found.folder / "model.toml")
     told = found.document["camera"]["effects"][0]["parameters"]["camera_roll"]
     assert model.theta["camera_roll"] == pytest.approx(told["value"])
@@ -98,9 +98,6 @@ def test_model_toml_holds_the_camera_and_figures_are_those_of_the_camera_alone(f
     assert comment in (found.folder / "model.toml").read_text().splitlines()
     pictures = {path.name for path in found.folder.glob("*.png")}
     assert pictures == {f"camera_{name}.png" for name in ("markings", "displacement", "ranking", "error")}
-
-
-def test_people_read_the_verdict_the_roll_and_both_errors(found):
     words = " ".join(found.out.split())
     assert "pictured: camera: camera roll: the camera is tilted by 4." in words
     assert ". Explained: with the effects added, the camera explains the frames" in words

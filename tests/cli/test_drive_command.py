@@ -55,9 +55,7 @@ def test_people_see_which_episode_it_is_both_scores_and_when_they_part(lane, cap
     assert "brisk from start 0 under seed 1, as in no trial of this study" in capsys.readouterr().out
 
 
-def test_theta_is_nominal_before_a_trial_is_finished_then_the_best_unless_nominal_is_asked_for(
-    lane, answered, finished
-):
+def test_theta_is_nominal_before_a_trial_is_finished_then_best_unless_nominal_is_asked_for(lane, answered, finished):
     answer = answered("drive", lane, "--agent", "steady")
     assert (answer["theta_from"], answer["theta"]) == ("nominal", {})
     best = answered("drive", finished, "--agent", "agent0")
@@ -92,9 +90,7 @@ def test_another_simulator_s_robot_is_drawn_where_it_records_places(make_study, 
     assert (tmp_path / "walk.png").exists()
 
 
-def test_where_there_are_no_places_to_draw_metrics_are_told_before_anything_is_driven(
-    make_study, tmp_path, refused, answered
-):
+def test_where_there_are_no_places_to_draw_metrics_are_told_before_any_drive(make_study, tmp_path, refused, answered):
     folder = make_study(family='"walking:walking"', domain={"columns": '"z"'})
     assert answered("drive", folder, "--agent", "agent0")["proxy"]["metrics"]["distance"] > 0.0
     line = refused("drive", folder, "--agent", "agent0", "--output", tmp_path / "walk.png")
@@ -120,9 +116,8 @@ OF_ANOTHER = "{lane}/other.toml: is of the robot 'irobot_create'; give a model o
 BAD |= {option: ([option, "{lane}/other.toml"], f"{option} {OF_ANOTHER}") for option in ("--against", "--theta")}
 
 
-@pytest.mark.parametrize("fault", BAD)
-def test_bad_input_and_a_model_of_another_robot_are_told_in_one_line(lane, refused, fault):
-    words, line = BAD[fault]
+@pytest.mark.parametrize(("words", "line"), BAD.values(), ids=BAD)
+def test_bad_input_and_a_model_of_another_robot_are_told_in_one_line(lane, refused, words, line):
     words = (word.format(lane=lane) for word in words)
     assert line.format(lane=lane) in refused("drive", lane, "--agent", "steady", *words)
 

@@ -64,7 +64,7 @@ SHORT = {
 
 
 @pytest.mark.slow
-def test_the_best_theta_of_a_study_is_exported_with_its_intervals_whatever_its_agents_are_called(
+def test_the_best_theta_of_a_study_is_exported_with_intervals_whatever_agents_are_called(
     make_study, tmp_path, answered
 ):
     folder = make_study(agents=None, **SHORT)

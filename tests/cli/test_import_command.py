@@ -18,9 +18,7 @@ def table(tmp_path_factory):
     return foreign_robot.write_form(tmp_path_factory.mktemp("source"), "csv", drives)
 
 
-def test_importing_without_an_output_lists_what_there_is_and_writes_nothing(
-    answered, table, tmp_path, monkeypatch, capsys
-):
+def test_importing_without_output_lists_what_there_is_and_writes_none(answered, table, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     found = answered("import", table)
     assert found["log"] is None

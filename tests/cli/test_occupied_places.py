@@ -115,9 +115,8 @@ def test_a_closed_folder_is_told_beforehand(here, beforehand, monkeypatch, name)
     assert f"{place}: cannot be written there, as {here} is closed to you; choose another place" in told
 
 
-@pytest.mark.parametrize("name", IN_STUDIES)
-def test_what_is_in_the_way_in_a_folder_is_told_beforehand(here, beforehand, name):
-    words, work, places = IN_STUDIES[name]
+@pytest.mark.parametrize(("words", "work", "places"), IN_STUDIES.values(), ids=IN_STUDIES)
+def test_what_is_in_the_way_in_a_folder_is_told_beforehand(here, beforehand, words, work, places):
     folder = here / next(word for word in reversed(words.split()) if (here / word).is_dir())
     for place, what in places.items():
         put(folder / place, what)

@@ -46,9 +46,7 @@ def figures_of(folder):
 
 
 @pytest.mark.slow
-def test_pod_is_drawn_again_without_the_target_model_also_after_the_code_has_changed(
-    make_study, tmp_path, answered, monkeypatch
-):
+def test_pod_is_drawn_again_without_the_target_model_also_after_other_code(make_study, tmp_path, answered, monkeypatch):
     folder, model = make_study(family='"echo:echo"'), tmp_path / "truth.toml"
     model.write_text("trim = 0.1\ndelay = 0.12\n")
     base = ("--points", "2", "--at", "trim=0.1,delay=0.12")

@@ -83,7 +83,7 @@ def test_several_proxies_are_ranked_with_their_differences_and_told_apart_by_the
     assert document("--proxy", "run:1.csv", "--target", "real.csv", *METRIC)["proxy"] == "run:1"
 
 
-def test_the_table_shows_each_measure_its_interval_and_the_notes(tables):
+def test_the_table_shows_each_measure_its_interval_and_notes_and_calls_no_rate_a_rollout(tables):
     text = shown(*SIDES, *METRIC)
     for part in (
         "PRPV",
@@ -99,16 +99,13 @@ def test_the_table_shows_each_measure_its_interval_and_the_notes(tables):
         assert part in text
     assert "leave out that the same start may turn out otherwise" in " ".join(text.split())
     assert "sim as a proxy of real: 4 agents, 3 proxy episodes and 3 target episodes each" in text
-
-
-def test_a_rate_without_its_number_is_not_called_a_rollout(tables):
     Path("both.csv").write_text("Policy,Sim success (%),Real success (%),Real n\nA,48,40,20\nB,72,65,20\nC,81,45,20\n")
     text = " ".join(shown("both.csv").split())
     assert "or a mean of an unknown number, which says nothing about noise" in text
     assert "1 simulated rollouts" not in text
 
 
-def test_halves_are_called_halves_and_repeats_of_the_starts_a_noise_floor(tables):
+def test_halves_are_called_halves_repeats_of_starts_a_noise_floor_and_a_constant_metric_null(tables):
     base = ("--proxy", "sim.csv", "--target")
     halves = document(*base, "real.csv", *METRIC)
     assert (halves["noise_floor_kind"], halves["at_noise_floor"]) == ("halves", None)
@@ -124,9 +121,6 @@ def test_halves_are_called_halves_and_repeats_of_the_starts_a_noise_floor(tables
     assert "halves" not in text
     loose = document(*base, "twice.csv", *METRIC, "--unpaired")
     assert (loose["noise_floor_kind"], loose["at_noise_floor"]) == ("halves", None)
-
-
-def test_a_constant_metric_is_null_with_a_note(tables):
     for file in ("flat.csv", "again.csv"):
         Path(file).write_text("agent,distance\nA,1\nB,1\nC,1\n")
     found = document("--proxy", "again.csv", "--target", "flat.csv", "--metric", "distance:max")

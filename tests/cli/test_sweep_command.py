@@ -58,9 +58,7 @@ def test_trials_and_sweeps_share_episodes_and_a_finished_study_is_swept_at_its_b
     assert document["curves"][0]["base"] == best
 
 
-def test_nominal_holds_the_robots_own_values_in_a_finished_study_and_one_that_has_not_run(
-    finished, answered, make_study
-):
+def test_nominal_holds_the_robots_own_values_in_a_finished_study_and_one_not_yet_run(finished, answered, make_study):
     document = answered("sweep", finished, "--parameter", "trim", "--points", "2", "--at", "nominal")
     assert document["at"] == {"chosen": "nominal", "theta": {}}
     assert document["curves"][0]["base"] == {}
@@ -107,7 +105,6 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("case", BAD)
-def test_bad_input_is_one_line_and_exit_2(make_study, refused, case):
-    options, expected = BAD[case]
+@pytest.mark.parametrize(("options", "expected"), BAD.values(), ids=BAD)
+def test_bad_input_is_one_line_and_exit_2(make_study, refused, options, expected):
     assert expected in refused("sweep", make_study(), *options)

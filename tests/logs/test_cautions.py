@@ -84,9 +84,8 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
-def test_what_is_probably_not_meant_is_told_in_one_sentence(case):
-    log, expected = CASES[case]
+@pytest.mark.parametrize(("log", "expected"), CASES.values(), ids=CASES)
+def test_what_is_probably_not_meant_is_told_in_one_sentence(log, expected):
     (line,) = cautions(log)
     assert re.search(expected, line)
 

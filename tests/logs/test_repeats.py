@@ -72,16 +72,13 @@ def test_a_single_repeat_in_slow_rows_the_last_pose_and_rounding_are_no_stand():
     assert np.diff(found).max() <= 4
 
 
-def test_poses_of_half_the_rate_of_the_rows_are_told_in_one_line():
+def test_poses_of_half_the_rate_or_of_a_lidar_that_repeats_are_told_in_one_line():
     made = make_log(CLEAN[0], episodes=3, seconds=40.0)
     twice = [replace(one, poses=one.poses[::2].repeat(2, axis=0)[: len(one.poses)]) for one in made.episodes]
     assert log_cautions(made, {}) == ()
     (line,) = log_cautions(replace(made, episodes=tuple(twice)), {})
     assert line.endswith("(about 10 a second are measured): each is used once, where it first comes")
     assert 30 <= int(line.split()[0]) <= 50
-
-
-def test_a_skid_steer_robots_lidar_repeats_its_poses():
     if not HUSKY.is_dir():
         pytest.skip("the measured log drive_husky is not here: it is not part of the project")
     husky = read_log(HUSKY)

@@ -71,14 +71,12 @@ def test_what_does_not_go_on_stays_as_it_is(change):
     assert not [line for line in log_cautions(log, {}) if "windows of" in line]
 
 
-def test_one_line_says_that_they_are_joined():
+def test_that_windows_are_joined_is_said_in_one_line_and_measured_wheels_are_joined_too():
     (line,) = log_cautions(windows(), {})
     assert line.startswith("18 of its 20 drives go on a sample after the one before, where that ended")
     assert "they are windows" in line
     assert "of 2 drives" in line
 
-
-def test_measured_wheels_are_joined_too():
     def turning(number, window):
         return replace(window, wheels=np.full((len(window.times), 2), float(number)))
 

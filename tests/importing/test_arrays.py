@@ -63,7 +63,13 @@ def test_frames_are_read_with_their_times_left_out_without_and_in_another_form_r
     assert "has no array 'pictures'" in complaint(path, frames="pictures")
 
 
-def test_places_of_a_column_map_are_in_the_user_s_own_frame_with_units(tmp_path):
+def test_our_own_names_need_no_map_and_places_of_one_are_in_the_user_s_own_frame_with_units(tmp_path):
+    arrays = {**OWN, "state": None, "x": PLACES[:, 0], "y": PLACES[:, 1], "yaw": HEADINGS, "v": SPEEDS[:, 0]}
+    arrays |= {"omega": SPEEDS[:, 1], "episode": np.repeat(["a", "b"], ROWS // 2), "frames": FRAMES}
+    first, second = read(write_arrays(tmp_path, **arrays)).drives
+    assert (first.name, second.name) == ("a", "b")
+    np.testing.assert_array_equal(second.commands.values, SPEEDS[ROWS // 2 :])
+    np.testing.assert_array_equal(np.stack(list(second.pictures.read())), FRAMES[ROWS // 2 :])
     arrays = {**OWN, "timestamps": None, "clock": TIMES * 1e3, "wheels": SPEEDS * 60.0}
     columns = {**{"x": "state[0]", "y": "state[1]", "heading": "state[2]"}, "time": "clock:ms"}
     columns |= {f"wheel_command_{side}": f"wheels[{place}]:rpm" for place, side in enumerate(("left", "right"))}
@@ -76,15 +82,6 @@ def test_places_of_a_column_map_are_in_the_user_s_own_frame_with_units(tmp_path)
     source = read(write_arrays(tmp_path), columns={**columns, "right": "actions[1]"})
     np.testing.assert_array_equal(source.drives[0].poses.places[:, 1], -PLACES[:, 1])
     assert len(source.notes) == 1
-
-
-def test_our_own_names_and_several_drives_need_no_map(tmp_path):
-    arrays = {**OWN, "state": None, "x": PLACES[:, 0], "y": PLACES[:, 1], "yaw": HEADINGS, "v": SPEEDS[:, 0]}
-    arrays |= {"omega": SPEEDS[:, 1], "episode": np.repeat(["a", "b"], ROWS // 2), "frames": FRAMES}
-    first, second = read(write_arrays(tmp_path, **arrays)).drives
-    assert (first.name, second.name) == ("a", "b")
-    np.testing.assert_array_equal(second.commands.values, SPEEDS[ROWS // 2 :])
-    np.testing.assert_array_equal(np.stack(list(second.pictures.read())), FRAMES[ROWS // 2 :])
 
 
 def test_commands_are_left_out_only_if_asked_for_and_none_need_follow_the_last_pose(tmp_path):

@@ -206,9 +206,8 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("case", BAD)
-def test_a_message_that_cannot_be_used_is_told_by_number(tmp_path, case):
-    kind, fields, said = BAD[case]
+@pytest.mark.parametrize(("kind", "fields", "said"), BAD.values(), ids=BAD)
+def test_a_message_that_cannot_be_used_is_told_by_number(tmp_path, kind, fields, said):
     with written(tmp_path, kind, fields) as bag:
         read = (read_poses, bag, "/topic") if kind == bags.POSE else (read_commands, bag, "/topic", "duty")
         told = complaint_of(*read, "header")

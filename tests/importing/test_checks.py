@@ -62,9 +62,8 @@ BEYOND = {
 }
 
 
-@pytest.mark.parametrize("case", BEYOND)
-def test_what_cannot_be_mended_is_refused(case):
-    given, says = BEYOND[case]
+@pytest.mark.parametrize(("given", "says"), BEYOND.values(), ids=BEYOND)
+def test_what_cannot_be_mended_is_refused(given, says):
     assert says in complaint_of(checked_drive, given, "bag")
 
 

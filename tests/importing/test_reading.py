@@ -57,11 +57,15 @@ def test_every_form_gives_the_same_drives(forms, recordings, form):
     assert any("after its commands" in note for note in notes)
 
 
-def test_a_logs_own_folder_is_opened_and_what_is_imported_is_there_only_as_long(tmp_path, recordings, forms):
+def test_a_log_s_folder_or_a_place_within_a_source_is_opened_and_nothing_left(tmp_path, recordings, forms, monkeypatch):
     log, notes = opened(foreign_robot.write_own_times(tmp_path, recordings))
     assert (len(log.episodes), notes) == (2, ())
     with open_log(forms["csv"], facts=FACTS):
         assert list(forms["csv"].parent.glob("**/log.toml")) == []
+    (forms["csv"] / "inside").mkdir(exist_ok=True)
+    monkeypatch.chdir(forms["csv"] / "inside")
+    log, _ = opened(Path(".."))
+    assert (len(log.episodes), log.name) == (2, "csv")
 
 
 @pytest.mark.parametrize(
@@ -89,13 +93,6 @@ def test_a_clock_offset_given_with_it_is_declared_as_the_complaint_of_clocks_an_
         opened(table)
     with open_log(table, facts=Facts("nobodys", foreign_robot.FIGURES, clock_offset="3000")) as (log, _):
         np.testing.assert_allclose(log.episodes[0].issued, one.issued + 3000.0, rtol=0, atol=1e-5)
-
-
-def test_a_source_may_be_where_one_is(forms, monkeypatch):
-    (forms["csv"] / "inside").mkdir(exist_ok=True)
-    monkeypatch.chdir(forms["csv"] / "inside")
-    log, _ = opened(Path(".."))
-    assert (len(log.episodes), log.name) == (2, "csv")
 
 
 TIMES = np.arange(0.0, 20.0, 0.05)
@@ -139,20 +136,17 @@ def test_what_was_found_joins_the_notes_and_without_commands_nothing_is_said_of_
     assert found.notes == ("taken as it is",)
 
 
-def test_drives_with_several_kinds_of_commands_are_refused(monkeypatch, tmp_path):
+def test_drives_with_several_kinds_of_commands_and_a_pipe_or_a_device_are_refused(monkeypatch, tmp_path):
     one = drive(TIMES, TIMES)
     other = replace(one, name="other", commands=replace(one.commands, kind="duty"))
     with pytest.raises(LogError, match=r"commands of several kinds \(duty, twist\); import them apart"):
         read_as(monkeypatch, tmp_path, one, other)
-
-
-def test_a_pipe_or_a_device_is_refused_and_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "run.csv")
     for path in (tmp_path / "run.csv", Path("/dev/zero")):
         assert "is a device or a pipe; copy" in complaint_of(read_source, path, Wanted())
 
 
-def test_drop_outs_are_counted_apart_from_gaps_and_jitter_is_the_scatter_of_intervals():
+def test_drop_outs_are_counted_apart_from_gaps_and_turning_before_or_after_the_command_is_told():
     one = survey(drive(np.arange(200) * 0.05, np.arange(100) * 0.1))
     assert (one.poses, one.commands, one.frames, one.gaps) == (200, 100, 0, 0)
     assert (one.seconds, one.poses_hz) == pytest.approx((9.95, 20.0))
@@ -170,9 +164,6 @@ def test_drop_outs_are_counted_apart_from_gaps_and_jitter_is_the_scatter_of_inte
     times = np.arange(2000) * 0.05 + random.normal(0.0, 0.002, 2000)
     one = survey(drive(times, np.arange(200) * 0.1))
     assert one.jitter_s == pytest.approx(0.002 * np.sqrt(2.0), rel=0.1)
-
-
-def test_turning_before_or_after_the_command_is_told_and_a_drive_that_does_not_turn_says_nothing():
     (note,) = clock_notes([survey(turning(-0.25)), survey(turning(0.1))])
     assert note.startswith("1 of 2 drives turn before they are told to (up to 0.25 s, run): two clocks")
     (note,) = clock_notes([survey(turning(0.1))])

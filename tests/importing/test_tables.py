@@ -120,12 +120,16 @@ def test_a_column_map_goes_before_names_and_what_is_mapped_is_nothing_else(file)
     assert read(file(BOTH), columns={"left": "v", "right": "omega"}).drives[0].commands.kind == "duty"
 
 
-def test_quaternions_give_headings_and_tilts(file):
+def test_quaternions_give_headings_and_tilts_and_stamps_since_1970_are_taken_by_their_size(file):
     text = "t,x,y,z,qx,qy,qz,qw\n0,0,0,1,0,0,0,1\n1,1,0,1,0,0,1,1\n2,1,0,1,1,0,0,1\n"
     poses = read(file(text), commands="none").drives[0].poses
     np.testing.assert_allclose(poses.headings, [0.0, np.pi / 2, 0.0])
     np.testing.assert_allclose(poses.tilts, [0.0, 0.0, np.pi / 2], atol=1e-7)
     np.testing.assert_array_equal(poses.places[:, 2], 1.0)
+    text = "stamp,x,y,yaw\n1700000000000000000,0,0,0\n1700000000100000000,1,0,0\n"
+    source = read(file(text), commands="none")
+    np.testing.assert_allclose(source.drives[0].poses.times, [1.7e9, 1.7e9 + 0.1], atol=1e-6)
+    assert "(ns, by its size)" in source.notes[0]
 
 
 BOTH_TURNS = "t,x,y,yaw,qx,qy,qz,qw\n0,0,0,2,0,0,0,1\n1,1,0,2,0,0,0,1\n"
@@ -139,13 +143,6 @@ def test_a_quaternion_goes_before_a_heading_but_not_before_one_that_is_mapped(fi
     source = read(file(BOTH_TURNS), commands="none", columns=columns)
     np.testing.assert_array_equal(source.drives[0].poses.headings, heading)
     assert [channel.role for channel in source.channels][3:] == roles
-
-
-def test_stamps_since_1970_are_taken_by_their_size(file):
-    text = "stamp,x,y,yaw\n1700000000000000000,0,0,0\n1700000000100000000,1,0,0\n"
-    source = read(file(text), commands="none")
-    np.testing.assert_allclose(source.drives[0].poses.times, [1.7e9, 1.7e9 + 0.1], atol=1e-6)
-    assert "(ns, by its size)" in source.notes[0]
 
 
 def test_each_file_of_a_folder_is_a_drive(tmp_path, file):

@@ -126,18 +126,7 @@ def test_what_cannot_be_taken_is_refused_with_a_remedy(rows, wanted, words):
         chosen(*rows, **wanted)
 
 
-def test_topics_without_a_definition_or_lacking_in_a_bag_are_not_taken():
-    rows = (*topics(*DRIVE), Topic("/mocap", KINDS["Pose"], 9, known=False))
-    choice = choose(rows, Wanted(), "run.bag")
-    assert choice.poses.name == "/odom"
-    assert "does not define" in channels_of(rows, choice)[2].role
-    rows = (*topics(*DRIVE), Topic("/mocap", KINDS["Pose"], 9, lacking=1))
-    choice = choose(rows, Wanted(), "runs")
-    assert choice.poses.name == "/odom"
-    assert channels_of(rows, choice)[2].role == "left out: bags without messages of it: 1"
-
-
-def test_every_topic_has_a_role():
+def test_every_topic_has_a_role_and_those_without_a_definition_or_lacking_in_a_bag_are_not_taken():
     rows = topics(*DRIVE, ("/c", "Twist", 9), ("/scan", "Scan", 9), ("/joints", "Joints", 9), ("/e", "Pose", 0))
     choice = choose(rows, Wanted(), "run.bag")
     assert [channel.role for channel in channels_of(rows, choice)] == [
@@ -152,6 +141,14 @@ def test_every_topic_has_a_role():
         "Commands are 100 messages of /cmd_vel (Twist); /c could be as well (--commands).",
         "Poses are 500 messages of /odom (Odometry).",
     )
+    rows = (*topics(*DRIVE), Topic("/mocap", KINDS["Pose"], 9, known=False))
+    choice = choose(rows, Wanted(), "run.bag")
+    assert choice.poses.name == "/odom"
+    assert "does not define" in channels_of(rows, choice)[2].role
+    rows = (*topics(*DRIVE), Topic("/mocap", KINDS["Pose"], 9, lacking=1))
+    choice = choose(rows, Wanted(), "runs")
+    assert choice.poses.name == "/odom"
+    assert channels_of(rows, choice)[2].role == "left out: bags without messages of it: 1"
 
 
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])

@@ -119,7 +119,7 @@ class Unloadable(Wobbly):
         raise ModuleNotFoundError("No module named 'my_simulator'")
 
 
-def test_a_family_that_cannot_go_to_another_process_is_one_line():
+def test_a_family_that_no_module_has_goes_to_other_processes_and_one_that_cannot_is_one_line():
     class Held(Wobbly):
         held = threading.Lock()
 
@@ -129,8 +129,6 @@ def test_a_family_that_cannot_go_to_another_process_is_one_line():
     with pytest.raises(RunError, match=r"another process cannot load .*No module named 'my_simulator' \(test_ep"):
         run_all(Unloadable(), 2)
 
-
-def test_a_family_that_no_module_has_as_in_a_notebook_goes_to_other_processes():
     class Local(Wobbly):
         pass
 

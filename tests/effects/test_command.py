@@ -62,13 +62,10 @@ def test_a_jittered_command_holds_from_its_arrival_to_the_next_ones(spread):
     np.testing.assert_array_equal(jittered[:, 0], jittered[:, 1])
 
 
-def test_jitter_is_continuous_in_its_spread():
+def test_jitter_is_continuous_in_its_spread_and_a_lost_command_leaves_the_one_before_in_force():
     signal = np.repeat(np.random.default_rng(0).uniform(-1, 1, (40, 2)), EVERY, axis=0)
     outputs = np.array([run(DelayJitter(value), signal) for value in np.linspace(0.0, 0.3, 601)])
     assert np.abs(np.diff(outputs, axis=0)).max() < 2 * 0.0005 * RATE_HZ + 1e-9
-
-
-def test_a_lost_command_leaves_the_one_before_in_force():
     probability, said, expected = 0.4, -1.0, []
     for number, draw in enumerate(draws(300)):
         said = said if draw < probability else float(number)

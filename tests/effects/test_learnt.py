@@ -83,9 +83,12 @@ def run(effect, signal):
 
 
 @pytest.mark.parametrize("effect", EFFECTS)
-def test_every_group_changes_the_motion(effect):
+def test_every_group_changes_the_motion_but_not_of_a_robot_that_has_not_moved_or_stands_for_long(effect):
     signal = a_signal(2)
     assert np.abs(run(effect, signal) - signal).max() > 1e-3
+    signal = np.concatenate((a_signal(5), np.zeros((1800, 3))))
+    np.testing.assert_allclose(run(effect, signal)[-60:], 0.0, atol=1e-9)
+    np.testing.assert_array_equal(run(effect, np.zeros((600, 3))), 0.0)
 
 
 class Driven(Subject):
@@ -103,17 +106,6 @@ def test_it_is_a_filter_like_any_other(effect):
     subject = Driven(Learnt, ROBOT, "learnt")
     _claim_filter(subject, effect, "learnt")
     _claim_chunks(subject, effect, "learnt")
-
-
-@pytest.mark.parametrize("effect", EFFECTS)
-def test_a_robot_that_stands_for_long_enough_stays_where_it_is(effect):
-    signal = np.concatenate((a_signal(5), np.zeros((1800, 3))))
-    np.testing.assert_allclose(run(effect, signal)[-60:], 0.0, atol=1e-9)
-
-
-@pytest.mark.parametrize("effect", EFFECTS)
-def test_a_robot_that_has_not_moved_stays_where_it_is(effect):
-    np.testing.assert_array_equal(run(effect, np.zeros((600, 3))), 0.0)
 
 
 @pytest.mark.parametrize("group", [group for group in MOTION_GROUPS if group not in ("heading", *OF_PLACE)])
@@ -261,8 +253,10 @@ def test_a_learnt_effect_reads_back_from_a_model_file_exactly(effect, tmp_path_f
     assert learnt_effect(read_model(path).theta) == effect
 
 
-def test_a_theta_without_learnt_values_has_no_learnt_effect():
+def test_a_theta_without_learnt_values_has_no_learnt_effect_and_a_curve_without_a_range_is_refused():
     assert learnt_effect({"trim": 0.1}) is None
+    with pytest.raises(SettingsError, match=r"learnt.range.forward: must be finite"):
+        learnt_effect({"learnt.turn_rate.yaw@1.0": 0.1})
 
 
 @pytest.mark.parametrize(
@@ -315,8 +309,3 @@ WHOLE = learnt_theta(Learnt(FittedRange((-1.0, 1.0), (-1.0, 1.0)), (LearntCurve(
 )
 def test_a_wrong_name_in_theta_is_refused_in_one_line(changes, says):
     assert says in complaint_of(effects_from, {**WHOLE, **changes}, ROBOT.figures)
-
-
-def test_a_learnt_curve_without_a_range_is_refused():
-    with pytest.raises(SettingsError, match=r"learnt.range.forward: must be finite"):
-        learnt_effect({"learnt.turn_rate.yaw@1.0": 0.1})

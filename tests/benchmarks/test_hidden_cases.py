@@ -192,15 +192,17 @@ def test_floors_and_wheels_take_speed_where_they_say():
     assert yaw[-1] == pytest.approx(0.375)
 
 
-@pytest.mark.parametrize(("offset", "seen"), [({"forward": 0.05}, (1.0, 2.05)), ({"left": 0.03}, (0.97, 2.0))])
-def test_a_marker_is_seen_ahead_and_to_the_left_of_the_axle(offset, seen):
-    there = hidden.measured(np.array([[[1.0, 2.0, np.pi / 2]]]), robot(("marker_offset", offset)), 0.0)[0, 0]
-    np.testing.assert_allclose(there, (*seen, np.pi / 2), atol=1e-12)
-
-
-def test_a_heading_offset_turns_the_heading_and_leaves_the_place():
-    there = hidden.measured(np.array([[[1.0, 2.0, 0.5]]]), robot(("heading_offset", {"degrees": 6.0})), 0.0)[0, 0]
-    np.testing.assert_allclose(there, (1.0, 2.0, 0.5 + np.pi / 30), atol=1e-12)
+@pytest.mark.parametrize(
+    ("effect", "offset", "seen"),
+    [
+        ("marker_offset", {"forward": 0.05}, (1.0, 2.05, np.pi / 2)),
+        ("marker_offset", {"left": 0.03}, (0.97, 2.0, np.pi / 2)),
+        ("heading_offset", {"degrees": 6.0}, (1.0, 2.0, np.pi / 2 + np.pi / 30)),
+    ],
+)
+def test_a_marker_is_seen_ahead_and_to_the_left_of_the_axle_and_an_offset_turns_its_heading(effect, offset, seen):
+    there = hidden.measured(np.array([[[1.0, 2.0, np.pi / 2]]]), robot((effect, offset)), 0.0)[0, 0]
+    np.testing.assert_allclose(there, seen, atol=1e-12)
 
 
 @pytest.mark.slow
@@ -274,15 +276,12 @@ def test_paths_are_circles_of_their_radius_stepped_or_integrated():
     np.testing.assert_allclose(level, plain, atol=1e-12)
 
 
-def test_duties_stay_within_one_and_differ_between_episodes_but_for_those_driven_twice():
+def test_duties_stay_within_one_differ_between_episodes_and_stop_creep_reverse_and_spin_in_every_log():
     duties, starts = make_drives(7, 12, 1200)
     assert np.abs(duties).max() <= 1.0
     assert len(np.unique(duties[:10].reshape(10, -1), axis=0)) == 10
     np.testing.assert_array_equal(duties[10:], duties[:2])
     np.testing.assert_array_equal(starts[10:], starts[:2])
-
-
-def test_every_log_stops_creeps_reverses_spins_and_drives_at_nearly_full_duty():
     for seed in range(10):
         left, right = np.moveaxis(make_drives(seed, 6, 1200).duties, -1, 0)
         base, turn = (left + right) / 2.0, (right - left) / 2.0

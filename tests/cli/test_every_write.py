@@ -185,10 +185,13 @@ def but_for_times(document):
     return document
 
 
-def test_a_sweep_or_teaching_broken_off_at_any_write_comes_to_the_same_curve_or_table(broken_off, swept, taught):
+def test_a_sweep_broken_off_at_any_write_comes_to_the_same_curve(broken_off, swept):
     kept = [finished_episodes(folder) for folder in broken_off(swept, 4)]
     assert set(kept) & set(range(1, 6)), "between the first point and the last"
     assert kept[-1] == 6
+
+
+def test_teaching_broken_off_at_any_write_comes_to_the_same_table(broken_off, taught):
     found = [kinds(folder) for folder in broken_off(taught, 5)]
     assert [lessons for lessons, exams in found if lessons and not exams], "after a lesson and before examinations"
     assert [exams for _, exams in found if 0 < exams < 34], "between examinations"

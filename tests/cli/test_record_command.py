@@ -57,15 +57,7 @@ def test_frames_are_read_as_they_were_taken(words, capsys, tmp_path):
     assert not list(home.rglob(".*"))
 
 
-def test_an_interval_without_its_value_in_the_model_is_a_caution(words, answered, tmp_path, capsys):
-    assert answered(*words("good"))["cautions"] == []
-    odd = "[effects.trim]\ntrim = { value = 0.2, interval = [0.01, 0.05] }\n"
-    (tmp_path / "model.toml").write_text(MODEL + odd)
-    assert main([*map(str, words("odd"))]) == 0
-    assert capsys.readouterr().out.startswith("beware: ")
-
-
-def test_manoeuvres_are_the_same_with_frames_as_without(words, answered, recorded, tmp_path):
+def test_manoeuvres_are_the_same_with_frames_and_odd_intervals_a_caution(words, answered, recorded, tmp_path, capsys):
     plain, filmed = tmp_path / "plain", recorded("filmed", "--frames", "2")
     assert answered(*words("plain"))["frames"] == 0
     rows = (plain / "samples.csv").read_text()
@@ -73,6 +65,11 @@ def test_manoeuvres_are_the_same_with_frames_as_without(words, answered, recorde
     assert not (plain / "frames.csv").exists()
     assert "[camera]" not in (plain / "log.toml").read_text()
     assert read_log(plain).frames is None
+    assert answered(*words("good"))["cautions"] == []
+    odd = "[effects.trim]\ntrim = { value = 0.2, interval = [0.01, 0.05] }\n"
+    (tmp_path / "model.toml").write_text(MODEL + odd)
+    assert main([*map(str, words("odd"))]) == 0
+    assert capsys.readouterr().out.startswith("beware: ")
 
 
 @pytest.mark.slow

@@ -22,13 +22,21 @@ def test_a_study_runs_and_prints_one_document_and_a_second_time_simulates_nothin
     assert {path.name for path in folder.iterdir()} == set(names.split())
 
 
-def test_bad_input_is_one_line_and_exit_2(make_study, refused, tmp_path):
+def test_bad_input_unknown_studies_or_places_that_cannot_be_written_are_one_line(
+    make_study, refused, tmp_path, travelling
+):
     assert "budget: must be between" in refused("study", make_study(budget="-1"))
     assert "agents: no agent 'agnet1'" in refused("study", make_study(agents='["agent0", "agnet1"]'))
     for option, value in (("budget", "0"), ("jobs", "1025")):
         assert f"{option} must be between 1 and " in refused("study", make_study(), f"--{option}={value}")
     assert not (make_study() / "study.db").exists()
     assert "has no study.toml; give the folder of a study" in refused("study", tmp_path)
+    assert "no study of that name comes with proxytune; did you mean 'quickstart'?" in refused(
+        "study", tmp_path / "quickstrat"
+    )
+    assert not (tmp_path / "quickstrat").exists()
+    (tmp_path / "file").touch()
+    assert "cannot be written" in refused("study", tmp_path / "file" / "quickstart", status=1)
 
 
 @pytest.mark.slow
@@ -98,12 +106,3 @@ def test_a_study_that_comes_with_the_package_is_copied_and_that_is_said(travelli
     assert not list(folder.parent.glob(".*"))
     assert main(["study", str(folder / "study.toml"), "--json"]) == 0
     assert capsys.readouterr().err == ""
-
-
-def test_an_unknown_study_or_a_place_that_cannot_be_written_is_told(travelling, tmp_path, refused):
-    assert "no study of that name comes with proxytune; did you mean 'quickstart'?" in refused(
-        "study", tmp_path / "quickstrat"
-    )
-    assert not (tmp_path / "quickstrat").exists()
-    (tmp_path / "file").touch()
-    assert "cannot be written" in refused("study", tmp_path / "file" / "quickstart", status=1)

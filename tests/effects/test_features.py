@@ -36,7 +36,7 @@ def test_a_low_pass_follows_in_its_time_constant_and_a_play_drags_along_what_has
     np.testing.assert_allclose(dragged, [0.0, 0.2, 0.4, 0.4, 0.3, 0.0], atol=1e-12)
 
 
-def test_ways_and_times_count_from_where_a_wheel_turns_or_stood():
+def test_ways_and_times_count_from_where_a_wheel_turns_or_stood_and_a_change_sets_off_a_swing():
     speed = np.array([1.0, 1.0, 0.0, 1.0, -2.0, -2.0, 0.0, -2.0, 1.0])
     way = rolled_since(speed, np.array(5.0), RATE_HZ)
     np.testing.assert_allclose(way, [5.1, 5.2, 5.2, 5.3, -0.2, -0.4, -0.4, -0.6, 0.1])
@@ -44,9 +44,6 @@ def test_ways_and_times_count_from_where_a_wheel_turns_or_stood():
     speed = np.array([0.0, 1.0, 1.0, 0.01, -1.0, 1.0])
     np.testing.assert_allclose(moved_since(speed, np.zeros(()), 0.02, RATE_HZ), [0.0, 0.1, 0.2, 0.0, 0.1, 0.2])
     np.testing.assert_allclose(moved_since(np.ones(2), np.array(0.5), 0.02, RATE_HZ), [0.6, 0.7])
-
-
-def test_a_change_sets_off_a_swing_of_its_frequency_that_dies_away():
     change = np.zeros(400)
     change[10] = 0.3
     swing = rings(change, np.zeros(1, dtype=complex), (0.5,), RATE_HZ)[:, 0]

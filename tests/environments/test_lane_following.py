@@ -127,9 +127,8 @@ def test_options_hold_for_one_episode_of_a_series_by_seed_and_theta_is_drawn_wit
     assert drawn[0] == drawn[1]
 
 
-def test_a_model_makes_it_the_target(tmp_path):
-    model = tmp_path / "truth.toml"
-    model.write_text('format = 1\nrobot = "duckiebot"\nplant = "planar"\n[effects.trim]\ntrim = 0.2\n')
+def test_a_model_makes_it_the_target(write_file):
+    model = write_file('format = 1\nrobot = "duckiebot"\nplant = "planar"\n[effects.trim]\ntrim = 0.2\n', "truth.toml")
     modelled = LaneFollowingEnv(model=model, start=1, seconds=3.0)
     assert modelled.family.plant == "planar"
     both = (modelled, make(theta={"trim": 0.2}, start=1))

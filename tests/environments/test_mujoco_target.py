@@ -57,7 +57,7 @@ def test_friction_holds_wheels_under_small_duties_a_stronger_motor_turns_it_and_
     assert forward[13] > 1e-2
 
 
-def test_the_family_scores_an_episode_alike_again_and_refuses_what_its_model_must_not_hold(tmp_path):
+def test_the_family_scores_an_episode_alike_again_and_refuses_what_its_model_must_not_hold(write_file):
     pytest.importorskip("pybullet", reason="PyBullet is not installed")
     settings = read_study_settings(ROBOT)
     whole = bare_family(settings, ROBOT / "truth.toml")
@@ -65,8 +65,7 @@ def test_the_family_scores_an_episode_alike_again_and_refuses_what_its_model_mus
     episode = make_episode({"latency": 0.1}, agent="daredevil", start=1, seed=3)
     assert robot.run(episode) == robot.run(episode)
     assert robot.identity != load_family(settings, None).identity
-    wrong = tmp_path / "wrong.toml"
-    wrong.write_text("[parameters]\nlatncy = 0.1\n")
+    wrong = write_file("[parameters]\nlatncy = 0.1\n", "wrong.toml")
     assert "did you mean 'latency'" in complaint_of(load_family, settings, wrong)
 
 

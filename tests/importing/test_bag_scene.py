@@ -137,13 +137,10 @@ def test_no_plain_pose_is_told_with_what_there_is(tmp_path, poses, words):
         read(tmp_path, one, other, static, wanted=Wanted(commands="none", poses=poses))
 
 
-def test_transforms_in_a_circle_end(tmp_path):
+def test_transforms_in_a_circle_end_and_a_static_one_published_again_replaces_the_first(tmp_path):
     with pytest.raises(LogError, match="no transforms lead from 'c' to 'a'"):
         wanted = Wanted(commands="none", poses="c>a")
         read(tmp_path, moving("b", "a", circle()), moving("a", "b", circle()), wanted=wanted)
-
-
-def test_a_static_transform_published_again_replaces_the_first(tmp_path):
     world = moving("map", "odom", [(7.0, 0.0, 0.0), (10.0, 0.0, 0.0)], TIMES[[0, 30]], "/tf_static")
-    poses = read(tmp_path, world, moving("odom", "base_link", circle())).drives[0].poses
+    poses = read(tmp_path / "again", world, moving("odom", "base_link", circle())).drives[0].poses
     assert poses.places[:, 0] == pytest.approx(10.0 + circle()[:, 0])

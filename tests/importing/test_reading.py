@@ -182,7 +182,7 @@ def source(*drives):
     return Source("CSV file", drives, (), ())
 
 
-def test_what_is_written_reads_back_to_the_last_bit(tmp_path):
+def test_what_is_written_reads_back_to_the_last_bit_or_with_an_offset_to_be_fitted(tmp_path):
     write_log(source(drive(STAMPS, STAMPS[::7])), tmp_path / "log", OWN, "run.csv")
     log = read_log(tmp_path / "log")
     (episode,) = log.episodes
@@ -190,6 +190,8 @@ def test_what_is_written_reads_back_to_the_last_bit(tmp_path):
     np.testing.assert_array_equal(episode.issued, STAMPS[::7] - 0.25)
     assert (log.robot, log.command, log.clock_offset_s) == ("nobodys", "twist", -0.25)
     assert log.geometry == {"wheel_radius": 0.03, "effective_baseline": 0.16}
+    write_log(source(RUN), tmp_path / "again" / "log", replace(OWN, clock_offset="fit"), "bag")
+    assert read_log(tmp_path / "again" / "log").fit_clock_offset
 
 
 def test_pictures_are_written_with_their_times(tmp_path):
@@ -201,11 +203,6 @@ def test_pictures_are_written_with_their_times(tmp_path):
     np.testing.assert_array_equal(frames.times, STAMPS[[10, 20, 30]])
     assert frames.road == "small_loop"
     assert all(path.is_file() for path in frames.paths)
-
-
-def test_an_offset_may_be_asked_to_be_fitted(tmp_path):
-    write_log(source(RUN), tmp_path / "log", replace(OWN, clock_offset="fit"), "bag")
-    assert read_log(tmp_path / "log").fit_clock_offset
 
 
 def test_a_log_that_is_there_is_not_written_over(tmp_path):

@@ -100,16 +100,13 @@ def test_separators_are_seen(file, separator):
     np.testing.assert_array_equal(drive.poses.places[:, 0], [0.0, 0.1, 0.2])
 
 
-def test_decimal_commas_comments_and_a_byte_order_mark_are_read(file):
+def test_decimal_commas_comments_and_a_byte_order_mark_are_read_and_a_column_map_goes_before_names(file):
     text = "\ufeff# recorded on Monday\ntime;x;y;heading\n0,0;0;0;0\n# half way\n0,1;0,25;0;0,5\n;;;\n"
     (drive,) = read(file(text), commands="none").drives
     np.testing.assert_array_equal(drive.poses.places[:, 0], [0.0, 0.25])
     np.testing.assert_array_equal(drive.poses.headings, [0.0, 0.5])
     text = "# by numpy\n# time,x,y,heading\n0,0,0,0\n1,1,0,0\n"
     np.testing.assert_array_equal(read(file(text), commands="none").drives[0].poses.times, [0.0, 1.0])
-
-
-def test_a_column_map_goes_before_names_and_what_is_mapped_is_nothing_else(file):
     columns = {"time": "clock:ms", "x": "a:cm", "y": "b:cm", "heading": "c:deg", "v": "d:km/h", "omega": "e:deg/s"}
     text = "clock,a,b,c,d,e,left,right\n0,0,0,90,3.6,90,0,0\n100,10,0,90,3.6,90,0,0\n"
     (drive,) = read(file(text), columns=columns).drives

@@ -68,14 +68,11 @@ def test_a_servo_that_is_sent_at_its_own_times_holds_between_them(tmp_path):
     assert commands.values[:3] == pytest.approx(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 0.1]]), abs=1e-9)
 
 
-def test_an_ackermann_command_goes_first_and_needs_no_gains(tmp_path):
+def test_an_ackermann_command_goes_first_without_gains_and_a_motor_without_a_servo_is_none(tmp_path):
     twists = bags.twist_messages(ISSUED, np.column_stack((SPEED, ANGLE)))
     assert read(tmp_path, *sent(), *twists, gains=None).drives[0].commands.kind == "twist"
-
-
-def test_a_motor_without_a_servo_is_no_command(tmp_path):
     with pytest.raises(LogError, match="no topic has commands"):
-        read(tmp_path, *sent()[:5], gains=None)
+        read(tmp_path / "again", *sent()[:5], gains=None)
 
 
 @pytest.mark.parametrize(

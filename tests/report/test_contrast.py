@@ -77,14 +77,11 @@ def test_every_colour_of_a_figure_stands_out_on_paper_and_in_the_dark(name):
     assert contrast(turned_round(colour), schemes()["dark"]["paper"]) >= least
 
 
-def test_letters_of_a_figure_can_be_read_on_a_phone():
+def test_letters_can_be_read_on_a_phone_and_only_photographs_keep_their_colours_in_the_dark():
     """7 points, the smallest that figures have, are some 11 pixels where a figure is as small as it gets."""
     assert LEAST_PT / 72.0 * ENLARGED * SMALLEST >= LEAST_PX
     assert 2.0 * 0.8 * 16.0 + SMALLEST * figure_style.COLUMN * ENLARGED <= 390.0 + 2.0 * 0.4 * 16.0
-
-
-def test_only_photographs_keep_their_colours_in_the_dark():
-    """A bar of colours is turned round with the points that it explains; a camera's picture is not."""
+    # A bar of colours is turned round with the points that it explains; a camera's picture is not.
     figure = Figure()
     axes, shaded = figure.subplots(1, 2)
     show_photo(axes, np.zeros((2, 2, 3)))

@@ -104,11 +104,10 @@ def test_exported_wheels_turn_and_pull_as_was_found_those_of_a_car_are_askew_and
     assert WRITERS["urdf"](instance()).count(f'radius="{before.left.radius_m:g}"') == 4
 
 
-def test_pybullet_loads_the_exported_urdf_and_finds_camera_and_tracked_point_where_they_are(tmp_path):
+def test_pybullet_loads_the_exported_urdf_and_finds_camera_and_tracked_point_where_they_are(write_file):
     pybullet = pytest.importorskip("pybullet", reason="PyBullet is not installed")
     found = instance(camera_pitch=30.0, camera_yaw=5.0, marker_offset__forward=0.05, heading_offset=30.0)
-    path = tmp_path / "found.urdf"
-    path.write_text(urdf_text(found), encoding="utf-8")
+    path = write_file(urdf_text(found), "found.urdf")
     world = pybullet.connect(pybullet.DIRECT)
     try:
         body = pybullet.loadURDF(str(path), useFixedBase=True, physicsClientId=world)

@@ -42,7 +42,7 @@ def test_every_effect_says_in_a_clause_what_it_does(drive, name):
     assert "`" not in said
 
 
-def test_a_finding_has_name_meaning_size_and_the_worth_that_was_shown_and_an_own_effect_its_own_names():
+def test_what_was_found_or_declared_is_told_with_name_meaning_size_and_worth_and_of_many_a_few():
     assert finding(BAND) == (
         "dead band: wheels stand still below a duty of 0.150 (0.149 to 0.151); "
         "without it predictions over 2 s are 20 times as far off (18 to 23)"
@@ -59,10 +59,7 @@ def test_a_finding_has_name_meaning_size_and_the_worth_that_was_shown_and_an_own
 
     own = {"name": "gone:Wheel", "parameters": {"shrink": {"value": 0.25, "interval": [0.25, 0.25], "unit": "m"}}}
     assert finding(own) == "gone:Wheel: shrink 0.25 m"
-
-
-def test_what_was_declared_is_told_with_its_value_and_of_many_a_few():
-    """A declared trim that was found stands in the first sentence; what is in no θ and equal wheels are not told."""
+    # A declared trim that was found stands in the first sentence; what is in no θ and equal wheels are not told.
     trim, delay = Estimate(0.0433, (0.0421, 0.0446), ""), Estimate(0.12, (0.1, 0.14), "s")
     assert fitted(("trim", "delay"), {"delay": delay, "trim": trim}) == (
         ", with trim 0.043 (0.042 to 0.045) and delay 0.12 s (0.10 to 0.14)"

@@ -100,7 +100,7 @@ def test_the_density_is_highest_where_theta_is_known_to_be_adds_up_to_one_and_st
     assert np.trapezoid(density, values) == pytest.approx(1.0, abs=0.02)
 
 
-def test_what_the_interval_leaves_out_is_grey_the_axis_is_the_box_and_what_remains_is_written_above(learnt):
+def test_what_the_interval_leaves_out_is_grey_the_answer_a_line_and_the_truth_a_mark_where_it_is_known(learnt):
     figure = profiles_figure(learnt)
     assert [axes.get_xlabel() for axes in figure.axes] == ["delay [s]", "trim"]
     for axes, box in zip(figure.axes, learnt.study.settings.space.intervals, strict=True):
@@ -112,9 +112,6 @@ def test_what_the_interval_leaves_out_is_grey_the_axis_is_the_box_and_what_remai
     ends = [span(vague.knowledge.intervals[name]) for name in ("delay", "trim")]
     titles = [axes.get_title() for axes in profiles_figure(vague).axes]
     assert titles == [f"unidentified: {ends[0]}", f"{ends[1]} remain"]
-
-
-def test_the_answer_is_a_line_and_the_truth_a_mark_only_where_it_is_known(learnt):
     known = profiles_figure(replace(learnt, truth={"trim": 0.11})).axes
     marks = [{line.get_label(): line.get_xdata()[0] for line in axes.get_lines()} for axes in known]
     theta = learnt.best.trial.theta
@@ -160,7 +157,7 @@ def test_the_pair_has_a_point_for_every_trial_open_where_it_was_cut_off_and_its_
     assert "stopped early" not in [one.get_label() for one in whole.collections]
 
 
-def test_the_shadow_is_the_region_and_slants_where_a_pair_trades(learnt):
+def test_the_shadow_is_the_region_that_slants_where_a_pair_trades_and_one_parameter_is_drawn_alone(learnt):
     holds = shadow(learnt)
     # Two deviations of 0.05 and 0.02 of the box are inside, four are not.
     assert holds((0.12, 0.1), (0.146, 0.1), (0.12, 0.12)) == [True, True, True]
@@ -168,9 +165,6 @@ def test_the_shadow_is_the_region_and_slants_where_a_pair_trades(learnt):
     holds = shadow(planted(learnt, centre=(0.5, 0.5), deviation=(0.15, 0.15), correlation=-0.95))
     assert holds((0.09, 0.12), (0.21, -0.12)) == [True, True]
     assert holds((0.09, -0.12), (0.21, 0.12)) == [False, False]
-
-
-def test_one_parameter_alone_can_be_drawn(learnt):
     settings = learnt.study.settings
     space = replace(settings.space, intervals=settings.space.intervals[:1])
     study = replace(learnt.study, settings=replace(settings, space=space))

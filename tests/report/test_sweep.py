@@ -173,7 +173,7 @@ def test_figures_are_as_wide_as_a_column_with_type_of_six_points_and_more(with_p
     assert_readable(panels_figure(with_pod), panels_figure(swept), *many)
 
 
-def test_the_bars_stand_at_the_held_value_and_a_third_of_the_range_beside(make_study, swept):
+def test_the_bars_stand_at_the_held_value_and_beside_and_parameters_are_named_in_words(make_study, swept):
     values = [point.value for point in swept.points]
     indices, held = bar_points(swept)
     assert ([values[index] for index in indices], values[held]) == ([-0.1, 0.1, 0.3], 0.1)
@@ -181,6 +181,16 @@ def test_the_bars_stand_at_the_held_value_and_a_third_of_the_range_beside(make_s
     axes = bars_figure([swept]).axes[0]
     scores = [swept.points[index].assessment.prpv.value for index in indices]
     assert [patch.get_height() for patch in axes.patches if patch.get_width() == pytest.approx(0.85)] == scores
+    assert (
+        sweep_figure([replace(swept, parameter="camera_pitch", unit="deg")]).axes[1].get_xlabel()
+        == "camera pitch [deg]"
+    )
+    assert [text.get_text() for text in bars_figure([swept]).axes[0].get_xticklabels()] == ["−0.1", "0.1", "0.3"]
+    first = swept.points[0].assessment
+    known = replace(first, noise_floor=replace(first.noise_floor, kind="same starts"))
+    told = replace(swept, points=(replace(swept.points[0], assessment=known), *swept.points[1:]))
+    assert legend(sweep_figure([told]))[0] == "noise floor"
+    assert curve_document(told)["noise_floor_kind"] == "same starts"
 
 
 def legend(figure):
@@ -200,19 +210,6 @@ def test_every_line_band_and_bar_is_explained_once_and_nothing_of_a_figure_is_cl
         assert inner.x1 <= outer.x1
         assert outer.y0 <= inner.y0
         assert inner.y1 <= outer.y1
-
-
-def test_figures_name_parameters_in_words_and_the_noise_floor_only_what_is_one(swept):
-    assert (
-        sweep_figure([replace(swept, parameter="camera_pitch", unit="deg")]).axes[1].get_xlabel()
-        == "camera pitch [deg]"
-    )
-    assert [text.get_text() for text in bars_figure([swept]).axes[0].get_xticklabels()] == ["−0.1", "0.1", "0.3"]
-    first = swept.points[0].assessment
-    known = replace(first, noise_floor=replace(first.noise_floor, kind="same starts"))
-    told = replace(swept, points=(replace(swept.points[0], assessment=known), *swept.points[1:]))
-    assert legend(sweep_figure([told]))[0] == "noise floor"
-    assert curve_document(told)["noise_floor_kind"] == "same starts"
 
 
 @pytest.fixture(scope="module")

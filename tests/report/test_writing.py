@@ -66,9 +66,8 @@ WRITTEN = {
 
 
 @pytest.mark.parametrize("what", WRITTEN)
-def test_a_failed_write_keeps_the_old_file_and_is_told_in_one_line(figure, tmp_path, monkeypatch, what):
-    path = tmp_path / "file"
-    path.write_text("old")
+def test_a_failed_write_keeps_the_old_file_and_is_told_in_one_line(figure, tmp_path, write_file, monkeypatch, what):
+    path = write_file("old", "file")
 
     def full(descriptor):
         raise OSError(28, "No space left on device")

@@ -120,13 +120,10 @@ def test_where_a_fleet_as_a_whole_fails_its_episodes_are_run_one_by_one(family):
     assert run_all(family=family)[0] == by_itself()
 
 
-def test_an_episode_without_a_metric_fails_in_a_fleet_as_by_itself():
+def test_an_episode_without_a_metric_fails_in_a_fleet_as_by_itself_and_they_share_their_time(monkeypatch):
     found, _ = run_all(family=Unlike)
     lacks = "the domain family gave no finite 'survival_time'"
     assert set(found.values()) == {f"agent '{one.agent}': {lacks}" for one in EPISODES}
-
-
-def test_fleets_share_their_time_and_are_told_as_a_whole(monkeypatch):
     clock = SimpleNamespace(seconds=lambda: 0.6)
     monkeypatch.setattr("proxytune.running.fleets.awake", lambda: nullcontext(clock))
     assert [one.seconds for one in run_fleet(Convoy(), EPISODES[:6])] == [pytest.approx(0.1)] * 6

@@ -37,16 +37,13 @@ def test_a_bank_says_what_a_target_would_tell(make_study, answered):
     assert again["bank"] == bank
 
 
-def test_more_trials_are_the_same_design_gone_on_with(make_study, answered):
+def test_more_trials_are_the_same_design_gone_on_with_and_starts_needed_follow_from_two_numbers(make_study, answered):
     """A budget that is raised keeps what is there."""
     folder = make_study(**{**BANK, "budget": "6"})
     answered("study", folder)
     make_study(**{**BANK, "budget": "9"})
     assert answered("study", folder)["episodes"]["run"] == 3 * 6 * 3
-
-
-def test_starts_needed_follow_from_two_numbers_of_starts():
-    """What trials leave unknown no start makes less."""
+    # What trials leave unknown no start makes less.
     assert _starts_needed({1: 0.1, 4: 0.05}, 20) == 10
     assert _starts_needed({1: 0.1, 4: 0.1}, 20) is None
 
@@ -185,10 +182,9 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("case", BAD)
-def test_a_source_that_is_none_is_refused(case, tmp_path, bank, make_study):
+@pytest.mark.parametrize(("changes", "spoil", "words"), BAD.values(), ids=BAD)
+def test_a_source_that_is_none_is_refused(changes, spoil, words, tmp_path, bank, make_study):
     """One line names the study.toml or the file, the source, what is wrong and what to do."""
-    changes, spoil, words = BAD[case]
     if changes:
         main(["study", str(make_study("bank", **{**BANK, **changes})), "--json"])
     else:
@@ -224,10 +220,9 @@ SETTINGS = {
 }
 
 
-@pytest.mark.parametrize("case", SETTINGS)
-def test_settings_that_know_nothing_are_refused(case, make_study):
+@pytest.mark.parametrize(("changes", "words"), SETTINGS.values(), ids=SETTINGS)
+def test_settings_that_know_nothing_are_refused(changes, words, make_study):
     """One line names the key and says what to do."""
-    changes, words = SETTINGS[case]
     assert words in complaint_of(read_study_settings, make_study(**changes))
 
 
@@ -282,10 +277,9 @@ NO_CHEAPER = {
 }
 
 
-@pytest.mark.parametrize("case", NO_CHEAPER)
-def test_a_cheaper_proxy_that_is_none_is_refused(case, beside, make_study):
+@pytest.mark.parametrize(("changes", "domain", "words"), NO_CHEAPER.values(), ids=NO_CHEAPER)
+def test_a_cheaper_proxy_that_is_none_is_refused(changes, domain, words, beside, make_study):
     """One line names the key, what is wrong and what to do."""
-    changes, domain, words = NO_CHEAPER[case]
     assert re.search(words, complaint_of(run_study, make_study(domain=domain, **{**CHEAPER, **changes})))
 
 

@@ -21,7 +21,7 @@ def test_the_lowest_fresh_prpv_predicts_best_beyond_noise_and_what_has_no_fresh_
     assert compared(family("none", fresh=False), family("nor", fresh=False)).predicts == BestFamilies()
 
 
-def test_the_cheapest_is_told_apart_episode_by_episode():
+def test_the_cheapest_is_told_apart_episode_by_episode_and_the_highest_plv_teaches_best():
     hard, easy = (10.0, 1.0, 5.0, 0.1), (20.0, 2.0, 10.0, 0.2)
     found = compared(family("double", seconds=easy), family("single", seconds=hard), family("as long", seconds=hard))
     assert found.cheapest == BestFamilies("single", ("as long",))
@@ -30,9 +30,6 @@ def test_the_cheapest_is_told_apart_episode_by_episode():
     assert other < high
     assert found.times_cheapest("single")["double"] == pytest.approx((2.0, 2.0, 2.0))
     assert low < 4.025 < high
-
-
-def test_the_highest_plv_teaches_best_and_more_samples_beyond_noise_are_worse():
     lessons = {
         "worse": lesson(100.0, (200.0, 50.0, 300.0)),
         "best": lesson(300.0),

@@ -65,7 +65,7 @@ def test_trials_are_cut_off_after_the_design_and_would_have_scored_no_less_than_
                 assert trial.estimate >= trial.bound
 
 
-def test_a_cut_trial_is_told_by_its_estimate_in_the_search_and_in_plain_sql(done):
+def test_a_cut_trial_is_told_by_its_estimate_and_the_agents_that_tell_most_come_first(done):
     _, trials, found = done
     told = score_trials(found.study.settings.space, trials)
     assert [one.score for one in told] == [t.estimate if t.state == "cut" else t.prpv for t in trials]
@@ -77,6 +77,14 @@ def test_a_cut_trial_is_told_by_its_estimate_in_the_search_and_in_plain_sql(done
     assert [(row[0], row[1], tuple(json.loads(row[2])), *row[3:]) for row in rows] == [
         (trial.number, "{}", trial.decided, trial.bound, trial.estimate) for trial in trials if trial.state == "cut"
     ]
+    with Store.open(found.study.settings.folder) as store:
+        against = pruning_rule(StudyRun(found.study, store), trials)
+        assert pruning_rule(StudyRun(found.study, store), trials[:4]) is None
+    rows = against.disagreement
+    assert sorted(against.order) == sorted(found.study.settings.agents)
+    assert rows[0, 1] == rows.max()
+    assert all(rows[:k, k].sum() >= rows[:k, k + 1 :].sum(axis=0).max() for k in range(1, 7))
+    assert against.limit > min(trial.prpv for trial in trials if trial.prpv is not None)
 
 
 @pytest.mark.parametrize("engine", [pytest.param(name, marks=pytest.mark.slow) for name in ("gp", "random", "sobol")])
@@ -111,8 +119,7 @@ def test_where_a_tolerance_is_a_percentage_no_trial_is_cut_off(cutting):
 
 @pytest.mark.slow
 def test_an_agent_that_always_fails_is_a_failure_and_no_reason_to_cut_off(make_study):
-    folder = make_study(cut_off="true", domain={"faults": '["agent3:1:raises"]'}, budget="9")
-    _, trials, found = run(folder)
+    _, trials, found = run(make_study(cut_off="true", domain={"faults": '["agent3:1:raises"]'}, budget="9"))
     assert {trial.state for trial in trials} <= {"finished", "cut"}
     for trial in trials:
         assert trial.failed_episodes == (not trial.decided or "agent3" in trial.decided)
@@ -123,18 +130,6 @@ def test_an_agent_that_always_fails_is_a_failure_and_no_reason_to_cut_off(make_s
 def test_the_order_of_agents_in_the_settings_does_not_matter(cutting, done):
     folder = cutting("turned", agents="[" + ", ".join(f'"agent{number}"' for number in range(7, -1, -1)) + "]")
     assert run(folder)[1] == done[1]
-
-
-def test_the_agents_that_tell_most_come_first_and_the_limit_is_a_noise_above_the_incumbent(done):
-    _, trials, found = done
-    with Store.open(found.study.settings.folder) as store:
-        against = pruning_rule(StudyRun(found.study, store), trials)
-        assert pruning_rule(StudyRun(found.study, store), trials[:4]) is None
-    rows = against.disagreement
-    assert sorted(against.order) == sorted(found.study.settings.agents)
-    assert rows[0, 1] == rows.max()
-    assert all(rows[:k, k].sum() >= rows[:k, k + 1 :].sum(axis=0).max() for k in range(1, 7))
-    assert against.limit > min(trial.prpv for trial in trials if trial.prpv is not None)
 
 
 def test_trials_and_the_search_stand_on_decided_agents_alone_and_what_was_spared_is_counted(done):
@@ -198,9 +193,7 @@ RULES = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("rule", RULES)
-def test_a_rule_stops_a_study_also_when_it_is_run_again_and_without_it_the_trials_are_those_of_one_without(
-    make_study, finished, rule
-):
+def test_a_rule_stops_a_study_also_run_again_and_without_it_trials_are_those_of_one_without(make_study, finished, rule):
     """`no_improvement` waits for the end of the design."""
     rules, count, told = RULES[rule]
     whole, _ = run_of_stopping(ruled(finished))

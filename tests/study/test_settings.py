@@ -182,9 +182,8 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("case", BAD)
-def test_every_mistake_gets_one_line_with_file_and_key(make_study, case):
-    changes, expected = BAD[case]
+@pytest.mark.parametrize(("changes", "expected"), BAD.values(), ids=BAD)
+def test_every_mistake_gets_one_line_with_file_and_key(make_study, changes, expected):
     folder = make_study(**changes)
     told = complaint_of(read_study_settings, folder)
     assert told.startswith(f"{folder / 'study.toml'}: ")

@@ -313,9 +313,8 @@ MOMENTS = {
 }
 
 
-@pytest.mark.parametrize("moment", MOMENTS)
-def test_what_raises_is_named_with_its_start(tmp_path, moment):
-    changes, point, named = MOMENTS[moment]
+@pytest.mark.parametrize(("changes", "point", "named"), MOMENTS.values(), ids=MOMENTS)
+def test_what_raises_is_named_with_its_start(tmp_path, changes, point, named):
     with pytest.raises(EpisodeError) as told:
         setup(tmp_path, **changes).score(point)
     assert re.fullmatch(rf"{named} raised ValueError: of its own \(deadly\.py, line \d+\); correct it", str(told.value))

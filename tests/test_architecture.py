@@ -123,12 +123,9 @@ def handed_out(door):
     return {alias.name for node in tree.body if isinstance(node, ast.ImportFrom) for alias in node.names}
 
 
-def test_no_room_is_a_drawer():
+def test_no_room_is_a_drawer_and_the_package_imports_nothing_of_the_benchmarks():
     forbidden = {"utils", "common", "helpers", "misc", "base", "core"}
     assert not forbidden & {path.stem for path in MODULES} | forbidden & {path.parent.name for path in MODULES}
-
-
-def test_the_package_imports_nothing_of_the_benchmarks():
     benchmarks = {path.stem for path in (PACKAGE.parent / "benchmarks").iterdir()}
     assert "compare" in benchmarks
     for path in MODULES:

@@ -79,9 +79,7 @@ def test_the_study_of_the_introduction_reads(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_the_effect_is_found_by_diagnose_and_predict_and_a_study_read_what_it_wrote(
-    follow, tmp_path, monkeypatch, answered
-):
+def test_diagnose_finds_the_effect_and_predict_and_a_study_read_what_it_wrote(follow, tmp_path, monkeypatch, answered):
     look_for_few(monkeypatch)
     found = follow("An effect")["diagnose log --effects weak_reverse:WeakReverse --output found"]
     (effect,) = found["effects"]

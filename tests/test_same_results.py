@@ -33,16 +33,13 @@ def test_what_differs_by_nature_is_left_out_and_masked_and_nothing_else():
     assert not same_results.same("delay 0.107 s (0.092 s)", "delay 0.107 s (0.093 s)")
 
 
-def test_keys_of_a_study_are_set_in_their_own_table():
+def test_keys_of_a_study_are_set_in_their_own_table_and_no_two_parts_share_what_is_kept():
     text = same_results.edited(STUDY, {"budget": 2, "starts": 1, "domain__seconds": 3.0, "nowhere__seconds": 1.0})
     changed = {"format = 1": "starts = 1\nformat = 1", "budget = 9": "budget = 2", "seconds = 20.0": "seconds = 3.0"}
     expected = STUDY
     for before, after in changed.items():
         expected = expected.replace(before, after)
     assert text == expected
-
-
-def test_no_two_parts_share_what_is_kept_of_them():
     versions = [part.version for part in PARTS]
     assert len(set(versions)) == len(versions)
 

@@ -26,22 +26,7 @@ def report(folder):
     return run_study(folder)
 
 
-def test_theta_is_drawn_from_the_posterior_as_the_answer_has_it(report):
-    """Rows are whole θ: their margins are the answer's intervals, and their correlation is the posterior's own."""
-    drawn, learnt = report.posterior(draws=20_000, seed=3), report.result.knowledge
-    assert list(drawn.columns) == list(learnt.space.names)
-    assert drawn.equals(report.posterior(draws=20_000, seed=3))
-    assert not drawn.equals(report.posterior(draws=20_000, seed=4))
-    for box in learnt.space.intervals:
-        ends = drawn[box.name].quantile([0.025, 0.975])
-        np.testing.assert_allclose(ends, learnt.intervals[box.name], atol=0.02 * (box.high - box.low))
-        assert drawn[box.name].between(box.low, box.high).all()
-    exact = np.cov(learnt.values.T, aweights=learnt.posterior.weights, ddof=0)
-    np.testing.assert_allclose(np.cov(drawn.to_numpy().T), exact, atol=0.05 * np.abs(exact).max())
-    assert "draws must be at least 1, got 0" in complaint_of(report.posterior, draws=0)
-
-
-def test_the_trials_are_a_table_and_an_optimize_result_and_the_best_theta_is_that_of_the_trial_it_names(report):
+def test_the_trials_are_a_table_and_an_optimize_result_and_theta_is_drawn_from_the_posterior(report):
     trials = report.trials()
     assert list(trials.index) == [1, 2, 3, 4, 5, 6]
     assert trials.index.name == "trial"
@@ -57,6 +42,18 @@ def test_the_trials_are_a_table_and_an_optimize_result_and_the_best_theta_is_tha
     assert found.func_vals.tolist() == trials.score.tolist()
     assert found.x_iters == trials[["delay", "trim"]].to_numpy().tolist()
     assert found.fun == trials.score[trials[["delay", "trim"]].to_numpy().tolist().index(list(found.x)) + 1]
+    # Rows are whole θ: their margins are the answer's intervals, and their correlation is the posterior's own.
+    drawn, learnt = report.posterior(draws=20_000, seed=3), report.result.knowledge
+    assert list(drawn.columns) == list(learnt.space.names)
+    assert drawn.equals(report.posterior(draws=20_000, seed=3))
+    assert not drawn.equals(report.posterior(draws=20_000, seed=4))
+    for box in learnt.space.intervals:
+        ends = drawn[box.name].quantile([0.025, 0.975])
+        np.testing.assert_allclose(ends, learnt.intervals[box.name], atol=0.02 * (box.high - box.low))
+        assert drawn[box.name].between(box.low, box.high).all()
+    exact = np.cov(learnt.values.T, aweights=learnt.posterior.weights, ddof=0)
+    np.testing.assert_allclose(np.cov(drawn.to_numpy().T), exact, atol=0.05 * np.abs(exact).max())
+    assert "draws must be at least 1, got 0" in complaint_of(report.posterior, draws=0)
 
 
 def test_a_report_has_the_document_and_words_of_the_command_and_reading_simulates_nothing(report, folder, answered):

@@ -82,15 +82,7 @@ def test_a_picture_is_written_and_named(lane, tmp_path, answered, ending, frames
     assert list(path.parent.iterdir()) == [path]
 
 
-def test_another_simulator_s_robot_is_drawn_where_it_records_places(make_study, tmp_path, answered):
-    folder = make_study(family='"walking:walking"')
-    (tmp_path / "model.toml").write_text("trim = 0.2\n")
-    words = ["--agent", "agent0", "--against", tmp_path / "model.toml", "--output", tmp_path / "walk.png"]
-    assert answered("drive", folder, *words)["parted_s"] == pytest.approx(0.3)
-    assert (tmp_path / "walk.png").exists()
-
-
-def test_where_there_are_no_places_to_draw_metrics_are_told_before_any_drive(make_study, tmp_path, refused, answered):
+def test_where_there_are_no_places_metrics_are_told_and_else_a_robot_is_drawn(make_study, tmp_path, refused, answered):
     folder = make_study(family='"walking:walking"', domain={"columns": '"z"'})
     assert answered("drive", folder, "--agent", "agent0")["proxy"]["metrics"]["distance"] > 0.0
     line = refused("drive", folder, "--agent", "agent0", "--output", tmp_path / "walk.png")
@@ -101,6 +93,11 @@ def test_where_there_are_no_places_to_draw_metrics_are_told_before_any_drive(mak
     assert not (tmp_path / "journal").exists()
     answered("drive", folder, "--agent", "agent0")
     assert (tmp_path / "journal").exists()
+    folder = make_study(family='"walking:walking"')
+    (tmp_path / "model.toml").write_text("trim = 0.2\n")
+    words = ["--agent", "agent0", "--against", tmp_path / "model.toml", "--output", tmp_path / "walk.png"]
+    assert answered("drive", folder, *words)["parted_s"] == pytest.approx(0.3)
+    assert (tmp_path / "walk.png").exists()
 
 
 BAD = {

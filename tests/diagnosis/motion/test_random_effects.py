@@ -128,16 +128,13 @@ def test_intervals_hold_the_true_size(effect, size):
         assert one.interval[1] < 4.0 * one.interval[0]
 
 
-def test_the_size_is_that_of_which_drives_say_what_is_measured():
+def test_the_size_is_that_of_which_drives_say_what_is_measured_and_what_pulls_both_ways_is_left_over():
     sizes = np.array([0.1, 0.2, 0.4])
     said = np.log(0.5 * sizes) + np.array([[-0.05], [0.05]])
     value, low, high = drawing._invert(sizes, said, float(np.log(0.1)))
     assert value == pytest.approx(0.2)
     assert 0.1 < low < 0.2 < high < 0.4
-
-
-def test_what_pulls_commands_early_as_well_as_late_is_left_over():
-    """All lost once leaves nothing; pulls of as much to either side leave those that are early."""
+    # All lost once leaves nothing; pulls of as much to either side leave those that are early.
     late, energy = RANDOM_EFFECTS["dropped_commands"].lateness(0.3, 10.0), np.full(50, 100.0)
     lost_once = -late.commands[1] * energy
     assert drawing._left(late, lost_once, energy) == pytest.approx(0.0, abs=1e-9)

@@ -39,16 +39,13 @@ def clean():
     return fitted(planted_drives(TRUTH, **SHORT))
 
 
-def test_every_signal_of_two_wheels_has_motion_on_every_tick(clean):
+def test_every_signal_of_two_wheels_has_motion_and_no_curve_gains_much_where_nothing_is_missing(clean):
     groups = list(signal_groups(clean))
     assert {group.name for group in groups} == set(Cue) - {Cue.STEERING}
     for group in groups:
         assert group.twists.shape[:3] == (*clean.drives.duties.shape[:2], 3)
         assert np.isfinite(group.twists).all()
         assert group.signal.shape == clean.drives.duties.shape[:2]
-
-
-def test_no_curve_gains_much_where_nothing_is_missing_and_the_best_comes_first(clean):
     assert fit_curves(clean)[0].gain < RULES.least_gain_nats
     gains = [curve.gain for curve in fit_curves(clean)]
     assert gains == sorted(gains, reverse=True)

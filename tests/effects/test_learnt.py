@@ -163,7 +163,7 @@ def test_a_window_amid_a_drive_goes_on_as_the_drive_does(effect, sample):
     np.testing.assert_allclose(moved, np.stack([whole[r][sample:] for r in row]), rtol=0, atol=1e-9)
 
 
-def test_curves_add_to_their_wheels_and_fade_after_named_effects():
+def test_curves_add_to_their_wheels_and_fade_and_a_veer_follows_the_heading_it_leads_to():
     baseline = ROBOT.figures["effective_baseline"]
     effect = Learnt(SEEN, (LearntCurve("wheel_speed", "right", (0.2, 0.4), (0.05, 0.01)),))
     straight = np.tile((0.3, 0.0, 0.0), (5, 1))
@@ -176,9 +176,6 @@ def test_curves_add_to_their_wheels_and_fade_after_named_effects():
     assert all(later < earlier for earlier, later in pairwise(added))
     names = [effect.name for effect in effects_from({**WHOLE, "floor_slope.x": 0.1, "trim": 0.0}, ROBOT.figures)]
     assert names == ["trim", "floor_slope", "learnt"]
-
-
-def test_a_veer_by_the_heading_follows_the_heading_that_it_leads_to():
     turning = Learnt(SEEN, (LearntCurve("heading", "veer_sin", (1.0,), (3.0,)),))
     moved = run(turning, np.tile((0.4, 0.0, 0.0), (600, 1)))
     heading = 0.4 + np.concatenate(((0.0,), np.cumsum(moved[:-1, 2]) / RATE_HZ))

@@ -67,17 +67,7 @@ def test_what_cannot_be_mended_is_refused(given, says):
     assert says in complaint_of(checked_drive, given, "bag")
 
 
-def test_a_clock_that_was_never_set_and_a_few_poses_without_a_number_are_told():
-    _, notes = checked_drive(drive(GRID + 2e5, GRID + 2e5), "bag")
-    assert any("before the year 2000" in note for note in notes)
-    headings = np.zeros(len(GRID))
-    headings[[3, 50, 51]] = np.nan
-    kept, notes = checked_drive(posed(headings=headings), "bag")
-    assert len(kept.poses.times) == len(GRID) - 3
-    assert notes == ["drive run: 3 poses without a place or an orientation were left out"]
-
-
-def test_what_is_plausible_is_left_alone():
+def test_what_is_plausible_is_left_alone_and_what_was_never_set_or_has_no_number_is_told():
     flat = posed(places=np.column_stack((GRID, np.zeros(len(GRID)), 0.01 * np.sin(GRID))))
     assert checked_drive(flat, "bag")[1] == []
     check_units(slow(), "table")
@@ -85,6 +75,13 @@ def test_what_is_plausible_is_left_alone():
     check_units(replace(slow(), commands=None), "table")
     one = slow()
     check_units(replace(one, poses=replace(one.poses, places=np.zeros_like(one.poses.places))), "table")
+    _, notes = checked_drive(drive(GRID + 2e5, GRID + 2e5), "bag")
+    assert any("before the year 2000" in note for note in notes)
+    headings = np.zeros(len(GRID))
+    headings[[3, 50, 51]] = np.nan
+    kept, notes = checked_drive(posed(headings=headings), "bag")
+    assert len(kept.poses.times) == len(GRID) - 3
+    assert notes == ["drive run: 3 poses without a place or an orientation were left out"]
 
 
 TIMES = np.arange(0.0, 20.0, 0.05)

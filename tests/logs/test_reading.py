@@ -151,7 +151,7 @@ def driven(*, degrees=False, wrapped=False, seconds=60.0, turn=0.5, backwards=Fa
     return pd.DataFrame(rows).to_csv(index=False)
 
 
-def test_what_is_written_is_read_with_the_geometry_of_the_log(written):
+def test_what_is_written_is_read_with_its_geometry_missing_rows_hold_the_last_command_and_headings_go_on(written):
     log = read_log(written())
     assert (log.name, log.robot, log.command, log.rate_hz, log.geometry) == ("yard", "tractor", "twist", 10.0, {})
     first, second = log.episodes
@@ -163,6 +163,19 @@ def test_what_is_written_is_read_with_the_geometry_of_the_log(written):
     text = TOML + "wheel_radius_m = 0.05\nbaseline_m = 0.3\nfull_speed_m_s = 1.5\n"
     figures = {"wheel_radius": 0.05, "effective_baseline": 0.3, "full_speed": 1.5}
     assert read_log(written(description=text)).geometry == figures
+    rows = "a,5.0,0.5,0.1,1,2,0\na,5.3,0.6,0.2,1,2,0\na,5.4,0.7,0.3,1,2,0\nb,0,1,1,9,9,0\nb,0.2,2,2,9,9,0\n"
+    first, second = read_log(written(BESIDE + rows)).episodes
+    np.testing.assert_allclose(first.times, [5.0, 5.1, 5.2, 5.3, 5.4])
+    np.testing.assert_array_equal(first.commands[:, 0], [0.5, 0.5, 0.5, 0.6, 0.7])
+    assert np.isnan(first.poses[:, 0]).tolist() == [False, True, True, False, False]
+    np.testing.assert_array_equal(second.commands[:, 0], [1, 1, 2])
+    assert np.isnan(second.poses).all(axis=1).tolist() == [False, True, False]
+    pieces = ["a,0,0,0,0,0,3.0", "a,0.1,0,0,,,", "a,0.2,0,0,0,0,-3.0", "a,0.5,0,0,0,0,-2.5", "a,0.6,0,0,0,0,2.5"]
+    pieces += ["b,0,0,0,0,0,-3", "b,0.1,0,0,0,0,3"]
+    first, second = read_log(written(BESIDE + "\n".join(pieces) + "\n")).episodes
+    nan, turn = np.nan, 2 * np.pi
+    np.testing.assert_allclose(first.poses[:, 2], [3.0, nan, turn - 3.0, nan, nan, turn - 2.5, 2.5])
+    np.testing.assert_allclose(second.poses[:, 2], [-3.0, 3.0 - turn])
 
 
 @pytest.mark.parametrize("command", [kind for kind in COMMANDS if kind != "none"])
@@ -185,22 +198,6 @@ def test_still_frames_need_no_rate_and_no_commands_and_headings_no_course(writte
     rows = pd.read_csv(io.StringIO(driven(degrees=True))).drop(columns=["v", "omega"])
     log = read_log(written(rows.to_csv(index=False), TOML.replace("twist", "none")))
     assert len(log.episodes[0].poses) == len(rows)
-
-
-def test_missing_rows_hold_the_last_command_and_headings_are_unwrapped_across_gaps(written):
-    rows = "a,5.0,0.5,0.1,1,2,0\na,5.3,0.6,0.2,1,2,0\na,5.4,0.7,0.3,1,2,0\nb,0,1,1,9,9,0\nb,0.2,2,2,9,9,0\n"
-    first, second = read_log(written(BESIDE + rows)).episodes
-    np.testing.assert_allclose(first.times, [5.0, 5.1, 5.2, 5.3, 5.4])
-    np.testing.assert_array_equal(first.commands[:, 0], [0.5, 0.5, 0.5, 0.6, 0.7])
-    assert np.isnan(first.poses[:, 0]).tolist() == [False, True, True, False, False]
-    np.testing.assert_array_equal(second.commands[:, 0], [1, 1, 2])
-    assert np.isnan(second.poses).all(axis=1).tolist() == [False, True, False]
-    pieces = ["a,0,0,0,0,0,3.0", "a,0.1,0,0,,,", "a,0.2,0,0,0,0,-3.0", "a,0.5,0,0,0,0,-2.5", "a,0.6,0,0,0,0,2.5"]
-    pieces += ["b,0,0,0,0,0,-3", "b,0.1,0,0,0,0,3"]
-    first, second = read_log(written(BESIDE + "\n".join(pieces) + "\n")).episodes
-    nan, turn = np.nan, 2 * np.pi
-    np.testing.assert_allclose(first.poses[:, 2], [3.0, nan, turn - 3.0, nan, nan, turn - 2.5, 2.5])
-    np.testing.assert_allclose(second.poses[:, 2], [-3.0, 3.0 - turn])
 
 
 @settings(max_examples=30)

@@ -74,7 +74,7 @@ def test_the_headline_has_what_was_fitted_before_the_verdict_and_warns_of_ends_a
     assert "false names" not in motion_headline(diagnosis())
 
 
-def test_an_effect_that_was_added_says_its_worth_and_windows_what_they_did():
+def test_effects_that_were_added_or_are_immaterial_say_their_worth_where_that_is_shown():
     (note,) = motion_notes(diagnosis(effects=(BAND,), effect_sizes={"dead_band": MUCH}))
     assert note == (
         "added dead_band (left wheel): log-likelihood gain 900 nats, p = 0.002; "
@@ -84,21 +84,6 @@ def test_an_effect_that_was_added_says_its_worth_and_windows_what_they_did():
     (note,) = motion_notes(diagnosis(multistep=polish))
     assert "fitted to windows of 2 s" in note
     assert "1 s: 0.95, 2 s: 0.80" in note
-
-
-def test_the_next_drive_is_told_with_what_it_tells_and_how_often_to_drive_it():
-    def told(nats, *between, verdict="explained"):
-        drive = NextDrive("the designed drive", "so", between, nats, np.zeros((2, 2)), 20.0, 10, (4.0, 3.0), None)
-        return motion_notes(diagnosis(next_drive=drive, verdict=verdict))
-
-    often = "drive the designed drive 10 times from the same commands, and diagnose the log with these drives in it"
-    assert told(9.0, "noise", "what is missing") == [f"to tell noise from what is missing, {often}: so"]
-    assert told(50.0, "a", "b") == [f"to tell a from b, {often} (one minute is ample): so"]
-    assert told(3.0, "a", "b", "c") == [f"to tell a from b from c, {often} (expected gain 3 nats a minute): so"]
-    assert told(50.0, "a", "b", verdict="cannot be told")[1] == "the same drives tell noise from what is missing"
-
-
-def test_a_ratio_is_told_as_what_it_adds_and_an_effect_immaterial_only_where_that_is_shown():
     value, ends = per_cent(Ratio(1.25, (0.9, 2.0)))
     assert (value, *ends) == pytest.approx((25.0, -10.0, 100.0))
     assert decisive(LITTLE) == 5.0
@@ -118,7 +103,16 @@ def test_a_ratio_is_told_as_what_it_adds_and_an_effect_immaterial_only_where_tha
     ]
 
 
-def test_values_beside_what_has_no_name_are_no_physics_yet_and_what_stops_the_robot_again_and_again_is_told():
+def test_the_next_drive_is_told_with_what_it_tells_and_values_beside_what_has_no_name_as_no_physics():
+    def told(nats, *between, verdict="explained"):
+        drive = NextDrive("the designed drive", "so", between, nats, np.zeros((2, 2)), 20.0, 10, (4.0, 3.0), None)
+        return motion_notes(diagnosis(next_drive=drive, verdict=verdict))
+
+    often = "drive the designed drive 10 times from the same commands, and diagnose the log with these drives in it"
+    assert told(9.0, "noise", "what is missing") == [f"to tell noise from what is missing, {often}: so"]
+    assert told(50.0, "a", "b") == [f"to tell a from b, {often} (one minute is ample): so"]
+    assert told(3.0, "a", "b", "c") == [f"to tell a from b from c, {often} (expected gain 3 nats a minute): so"]
+    assert told(50.0, "a", "b", verdict="cannot be told")[1] == "the same drives tell noise from what is missing"
     assert any("no physics yet" in line for line in motion_notes(diagnosis(verdict="partly explained")))
     assert motion_notes(diagnosis()) == []
     (note,) = motion_notes(diagnosis(period=Period(4.0, 0.3, 1e-9)))

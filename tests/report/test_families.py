@@ -14,7 +14,7 @@ DEAR, CHEAP = (2.0, 2.2, 1.8, 2.0), (1.0, 1.1, 0.9, 1.0)
 BOTH = (family("bullet", 0, DEAR, noise=8.0), family("planar", 0, CHEAP, noise=8.0))
 
 
-def test_a_clear_winner_is_used_of_those_alike_the_cheapest_and_else_what_would_tell_them_apart_is_said():
+def test_nothing_is_claimed_of_chance_of_several_families_and_a_clear_winner_or_the_cheapest_used():
     found = compared(family("bullet", 0, DEAR), family("planar", 4, CHEAP))
     answer = families_answer(found)
     assert answer.startswith("To predict: bullet, fresh PRPV (proxy relative predictivity value) 0 (0 to 0); worse: ")
@@ -30,9 +30,6 @@ def test_a_clear_winner_is_used_of_those_alike_the_cheapest_and_else_what_would_
     found = compared(family("a", 0, CHEAP, noise=8.0), family("b", 0, CHEAP, noise=8.0))
     assert families_next_step(found) == "to tell a and b apart, raise starts and measure the target from them too."
     assert "cannot be told from it: b 1 (1 to 1)." in families_answer(found)
-
-
-def test_nothing_is_claimed_of_chance_or_without_fresh_episodes():
     found = compared(family("a", 4, noise=0.1), family("b", 4, noise=0.1))
     for one in found.families:
         object.__setattr__(one.fresh.chance, "p_value", 0.4)

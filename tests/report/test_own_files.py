@@ -58,10 +58,8 @@ BODY = """<robot name="mine">
 
 
 @pytest.fixture
-def model(tmp_path):
-    path = tmp_path / "model.toml"
-    path.write_text(model_text(Model("duckiebot", None, FOUND, {})))
-    return path
+def model(write_file):
+    return write_file(model_text(Model("duckiebot", None, FOUND, {})), "model.toml")
 
 
 @pytest.fixture
@@ -90,7 +88,7 @@ def nominal(twists):
     return PlanarPlant(np.zeros(3), 1.0 / HZ).move(np.array(twists))[0]
 
 
-def test_the_filter_before_the_nominal_simulator_moves_it_as_the_extended_one_but_for_what_wheels_have(model):
+def test_the_filter_moves_the_nominal_simulator_and_only_wheels_and_camera_of_a_car_are_patched(model):
     bent = CommandFilter(model, rate_hz=HZ)
     assert nominal([bent.step(one) for one in TWISTS]) == pytest.approx(extended(), abs=1e-9)
     bent = CommandFilter(model, rate_hz=HZ, has=IN_WHEELS)
@@ -99,6 +97,14 @@ def test_the_filter_before_the_nominal_simulator_moves_it_as_the_extended_one_bu
     rims *= (0.93 * 0.92, 1.08)
     moved = np.stack((rims.mean(axis=1), asked[:, 1], (rims[:, 1] - rims[:, 0]) / 0.2), axis=1)
     assert nominal(moved) == pytest.approx(extended(), abs=1e-9)
+    body = read_robot("car").body()
+    found = instance(CAR, wheel_gain=0.9, steering_offset=0.1)
+    told = complaint_of(patch, found, body, Path("mine.urdf"))
+    assert "--wheels LEFT,RIGHT of axle_left, steer_left" in told
+    patched = patch(found, body, Path("mine.urdf"), ("axle_left", "axle_right"))
+    assert {"wheel_gain", "yaw_scrub"} & patched.has == {"wheel_gain"}
+    assert patched.text.count('radius="0.045"') == 4
+    assert patched.text.count('radius="0.05"') == 4
 
 
 def driven(mujoco, text, commands):
@@ -248,9 +254,8 @@ DRIVES = np.repeat([[0.5, 0.3], [0.9, -0.2], [0.0, 0.1], [0.7, 0.4]], 60, axis=0
 
 
 @pytest.mark.parametrize("command", ["ackermann", "speed_steering", "twist"])
-def test_the_filter_moves_a_nominal_car_as_the_one_that_was_found(tmp_path, command):
-    path = tmp_path / "model.toml"
-    path.write_text(model_text(Model("car", None, FOUND_OF_CAR, {}), (), CAR.catalogue))
+def test_the_filter_moves_a_nominal_car_as_the_one_that_was_found(write_file, command):
+    path = write_file(model_text(Model("car", None, FOUND_OF_CAR, {}), (), CAR.catalogue), "model.toml")
     full, lock, wheelbase = 3.0, np.radians(24.0), 0.33
     train = drivetrain(CAR, effects_from({**CAR.theta, **FOUND_OF_CAR}, CAR.figures, CAR.catalogue))
     twists, _ = train.apply(DRIVES / (full, lock), train.begin(FilterContext(HZ, np.zeros(2), CAR.figures)))
@@ -267,9 +272,8 @@ def test_the_filter_moves_a_nominal_car_as_the_one_that_was_found(tmp_path, comm
     assert 0.9 * told == pytest.approx(twists, abs=1e-9)  # the simulator's own wheels are smaller
 
 
-def test_the_node_of_a_car_hears_and_tells_ackermann_drives(tmp_path, monkeypatch):
-    model = tmp_path / "model.toml"
-    model.write_text(model_text(Model("dart", None, {"steering_offset": 0.1}, {}), (), CAR.catalogue))
+def test_the_node_of_a_car_hears_and_tells_ackermann_drives(tmp_path, write_file, monkeypatch):
+    model = write_file(model_text(Model("dart", None, {"steering_offset": 0.1}, {}), (), CAR.catalogue), "model.toml")
     path = export(model, tmp_path / "bend.py", to="filter").output
     node, said = load_node(path, monkeypatch).AckermannFilter(), Ackermann()
     said.drive.speed, said.drive.steering_angle = 1.0, 0.1
@@ -284,17 +288,6 @@ def test_the_node_of_a_car_hears_and_tells_ackermann_drives(tmp_path, monkeypatc
     node.heard(said)
     node.tick()
     assert told[-1].drive.speed == pytest.approx(0.0)
-
-
-def test_a_users_own_car_is_patched_at_its_rear_wheels_and_has_their_gain():
-    body = read_robot("car").body()
-    found = instance(CAR, wheel_gain=0.9, steering_offset=0.1)
-    told = complaint_of(patch, found, body, Path("mine.urdf"))
-    assert "--wheels LEFT,RIGHT of axle_left, steer_left" in told
-    patched = patch(found, body, Path("mine.urdf"), ("axle_left", "axle_right"))
-    assert {"wheel_gain", "yaw_scrub"} & patched.has == {"wheel_gain"}
-    assert patched.text.count('radius="0.045"') == 4
-    assert patched.text.count('radius="0.05"') == 4
 
 
 @pytest.mark.parametrize(

@@ -31,7 +31,7 @@ def assessed(proxy, **more):
     return assess(proxy=proxy, target=TARGET, metrics=M, resamples=100, **more)
 
 
-def test_the_answer_says_prpv_and_whether_chance_explains_it_and_of_single_episodes_that_more_are_needed():
+def test_the_answer_says_prpv_and_chance_of_single_episodes_that_more_are_needed_and_of_several_the_best():
     good, bad = assessed(SAME), assessed(REVERSED)
     answer = score_sentence({"a": good}, None, target="t")
     assert answer.startswith(
@@ -43,9 +43,6 @@ def test_the_answer_says_prpv_and_whether_chance_explains_it_and_of_single_episo
     single = assess(proxy=table(range(5), 1), target=table(range(5), 1), metrics=M, resamples=100)
     assert "of 0, of at most 20" in score_sentence({"a": single}, None, target="t")
     assert "at least two episodes" in score_next_step({"a": single}, None)
-
-
-def test_of_several_the_best_is_called_better_only_beyond_noise():
     tables = {"good": SAME, "bad": REVERSED}
     found = {name: assessed(one) for name, one in tables.items()}
     selection = select_proxy(proxies=tables, target=TARGET, metrics=M, resamples=100)

@@ -21,7 +21,7 @@ def figures(result):
     return {"convergence": svg_of(convergence_figure(result))}
 
 
-def test_the_page_needs_nothing_else_and_begins_with_the_sentence(result, figures):
+def test_every_figure_has_a_caption_and_the_page_begins_with_the_sentence_and_needs_nothing_else(result, figures):
     text = text_of(result, figures)
     assert not re.search(r"(src|href)=\"(?!data:|#)|https?://|<script|@import", text)
     assert "<svg" in text
@@ -31,9 +31,6 @@ def test_the_page_needs_nothing_else_and_begins_with_the_sentence(result, figure
     places = [text.index(one) for one in heads]
     assert places == sorted(places)
     assert study_sentence(result) == f"{say_answer(result)} Next: {say_next_step(result)}."
-
-
-def test_every_figure_has_a_caption_and_an_alternative_text_that_says_what_to_see(result, figures):
     text = text_of(result, dict.fromkeys(CAPTIONS["study"], figures["convergence"]))
     for name, said in CAPTIONS["study"].items():
         title = said["title"]

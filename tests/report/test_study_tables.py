@@ -62,7 +62,7 @@ def of_plain_types(value):
     return type(value) in (str, int, float, bool, type(None))
 
 
-def test_what_is_known_of_theta_is_in_the_document(result):
+def test_the_document_has_the_promised_keys_what_is_known_of_theta_floor_and_pairs_that_trade(result):
     document = study_document(replace(planted(result, misfit=LACKS), truth={"trim": 0.1}, cautions=("few starts",)))
     best = document["best"]
     assert list(best["theta_interval"]) == ["delay", "trim"]
@@ -80,9 +80,6 @@ def test_what_is_known_of_theta_is_in_the_document(result):
     assert (document["truth"], document["cautions"]) == ({"trim": 0.1}, ["few starts"])
     assert study_document(result)["truth"] is None
     assert study_document(planted(result, misfit=UNTOLD))["misfit"]["fits"] is None
-
-
-def test_the_document_tells_floor_pairs_that_trade_and_whether_it_is_perfect(result):
     (trade,) = study_document(planted(result, (0.5, 0.5), (0.1, 0.1), correlation=-0.9))["trades"]
     assert trade[:2] == ["delay", "trim"]
     assert trade[2] == pytest.approx(-0.9, abs=0.05)

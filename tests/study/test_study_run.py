@@ -209,17 +209,6 @@ def test_a_failure_is_left_out_and_an_agent_without_any_episode_that_worked_fail
     assert found.failure.startswith("agent 'agent3' failed from every start, first with: agent 'agent3' raised")
 
 
-def test_where_failures_stop_the_study_the_first_does_and_is_tried_again_later(make_study, tmp_path):
-    domain = {"faults": '["agent3:1:raises"]', "journal": f'"{tmp_path / "journal"}"'}
-    folder = make_study(domain=domain, on_failure='"stop"')
-    for _ in range(2):
-        with pytest.raises(EpisodeError, match="agent 'agent3' failed from start 1: .*lost its way"):
-            simulated(folder)
-    lines = (tmp_path / "journal").read_text().splitlines()
-    assert sum(line.startswith("agent3 1") for line in lines) == 2
-    assert max(lines.count(line) for line in lines if not line.startswith("agent3 1")) == 1
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_after_enough_no_further_episode_begins_and_those_under_way_are_kept(make_study, jobs):
@@ -274,11 +263,20 @@ def test_where_failures_stop_the_study_an_old_failure_is_not_enough(make_study):
             )
 
 
+def test_where_failures_stop_the_study_the_first_does_and_is_tried_again_later(make_study, tmp_path):
+    domain = {"faults": '["agent3:1:raises"]', "journal": f'"{tmp_path / "journal"}"'}
+    folder = make_study(domain=domain, on_failure='"stop"')
+    for _ in range(2):
+        with pytest.raises(EpisodeError, match="agent 'agent3' failed from start 1: .*lost its way"):
+            simulated(folder)
+    lines = (tmp_path / "journal").read_text().splitlines()
+    assert sum(line.startswith("agent3 1") for line in lines) == 2
+    assert max(lines.count(line) for line in lines if not line.startswith("agent3 1")) == 1
+
+
 @pytest.fixture
-def model(tmp_path):
-    path = tmp_path / "model.toml"
-    path.write_text("trim = 0.2\n")
-    return path
+def model(write_file):
+    return write_file("trim = 0.2\n", "model.toml")
 
 
 def test_a_table_has_every_agent_start_and_metric_without_a_target_and_each_agent_is_told_of(make_study, model):

@@ -26,12 +26,16 @@ def loaded(code):
     return set(json.loads(done.stdout.splitlines()[-1]))
 
 
-def test_names_are_sorted_listed_and_unknown_ones_refused_with_the_nearest():
+def test_names_are_sorted_and_listed_and_the_package_is_typed_and_of_the_version_of_the_project():
     assert proxytune.__all__ == sorted(proxytune.__all__)
     assert dir(proxytune) == proxytune.__all__
     with pytest.raises(AttributeError, match=r"no attribute 'run_studdy'; did you mean 'run_study'\?"):
         _ = proxytune.run_studdy
     assert not hasattr(proxytune, "nothing_like_it")
+    assert (ROOT / "proxytune" / "py.typed").is_file()
+    included = PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["include"]
+    assert any(fnmatch.fnmatch("/proxytune/py.typed", f"{pattern}*") for pattern in included)
+    assert proxytune.__version__ == PROJECT["project"]["version"]
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -59,13 +63,6 @@ def test_every_function_is_typed_and_says_what_it_raises(name):
 @pytest.mark.parametrize("name", proxytune.__all__)
 def test_every_name_is_on_the_page_about_python(name):
     assert f"`{name}`" in (ROOT / "docs" / "how-to" / "python.md").read_text(encoding="utf-8")
-
-
-def test_the_package_is_typed_and_of_the_version_of_the_project():
-    assert (ROOT / "proxytune" / "py.typed").is_file()
-    included = PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["include"]
-    assert any(fnmatch.fnmatch("/proxytune/py.typed", f"{pattern}*") for pattern in included)
-    assert proxytune.__version__ == PROJECT["project"]["version"]
 
 
 def test_loading_the_package_or_the_help_loads_no_library():

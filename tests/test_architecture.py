@@ -114,8 +114,7 @@ def test_a_doors_table_of_contents_has_its_modules_at_the_beginnings_of_lines(pa
     for line in ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))).splitlines():
         if entry := re.match(r"(\S.*?)  +\S", line.strip()):
             names = [name.rstrip("/") for name in entry[1].split(", ")]
-            parts = {part.stem for part in path.parent.iterdir()}
-            assert parts.issuperset(names), f"{path}: {line}"
+            assert {part.stem for part in path.parent.iterdir()}.issuperset(names), f"{path}: {line}"
 
 
 def handed_out(door):
@@ -124,12 +123,9 @@ def handed_out(door):
     return {alias.name for node in tree.body if isinstance(node, ast.ImportFrom) for alias in node.names}
 
 
-def test_no_room_is_a_drawer():
+def test_no_room_is_a_drawer_and_the_package_imports_nothing_of_the_benchmarks():
     forbidden = {"utils", "common", "helpers", "misc", "base", "core"}
     assert not forbidden & {path.stem for path in MODULES} | forbidden & {path.parent.name for path in MODULES}
-
-
-def test_the_package_imports_nothing_of_the_benchmarks():
     benchmarks = {path.stem for path in (PACKAGE.parent / "benchmarks").iterdir()}
     assert "compare" in benchmarks
     for path in MODULES:

@@ -61,7 +61,6 @@ COMMAND_LINES = sorted(
     }
 )
 DOTTED = re.compile(r"`(proxytune(?:\.\w+)+)`")
-IN_THE_PACKAGE = re.compile(r"`(proxytune/[\w/]+(?:\.py)?)`")
 
 
 def section(text, title):
@@ -149,9 +148,8 @@ DOCUMENTED = {
 """What there is of each kind, and whether one is documented."""
 
 
-@pytest.mark.parametrize("kind", DOCUMENTED)
-def test_every_one_of_a_kind_is_documented(kind):
-    there, is_documented = DOCUMENTED[kind]
+@pytest.mark.parametrize(("there", "is_documented"), DOCUMENTED.values(), ids=DOCUMENTED)
+def test_every_one_of_a_kind_is_documented(there, is_documented):
     assert [one for one in there if not is_documented(one)] == []
 
 
@@ -163,7 +161,7 @@ def test_every_engine_is_documented_with_what_it_learns_from_and_what_installs_i
     assert engine.needs is None or f'pip install ".[{engine.needs.extra}]"' in cells[-1]
 
 
-def test_every_engine_is_listed_with_how_it_proposes(answered):
+def test_every_engine_and_agent_is_listed_with_how_it_proposes_or_drives(answered):
     listed = {row["name"]: row for row in answered("list", "engines")["engines"]}
     assert list(listed) == [engine.name for engine in ENGINES]
     for engine in ENGINES:
@@ -171,6 +169,9 @@ def test_every_engine_is_listed_with_how_it_proposes(answered):
         assert (row["label"], row["what_it_proposes"]) == (engine.label, engine.summary)
         assert row["label"]
         assert row["what_it_proposes"]
+    listed = {row["name"]: row["how_it_drives"] for row in answered("list", "agents")["agents"]}
+    assert set(listed) == set(AGENTS)
+    assert all("speed=" in how for how in listed.values())
 
 
 @pytest.mark.parametrize("measure", [*MEASURES, *PODS], ids=lambda measure: measure.key)
@@ -215,12 +216,6 @@ def test_every_map_and_its_keys_are_documented(name):
         assert f"`{key}`" in maps, key
 
 
-def test_every_agent_is_listed_with_how_it_drives(answered):
-    listed = {row["name"]: row["how_it_drives"] for row in answered("list", "agents")["agents"]}
-    assert set(listed) == set(AGENTS)
-    assert all("speed=" in how for how in listed.values())
-
-
 @pytest.mark.parametrize("measure", ["PRPV", "PPV", "SRCC", "MMRV", "POD", "PLV"])
 def test_every_measure_is_spelt_out_and_has_its_formula(measure):
     words = row_of("explanation/usefulness.md", measure).split("|")[2].replace("-", " ").split()
@@ -228,12 +223,14 @@ def test_every_measure_is_spelt_out_and_has_its_formula(measure):
     assert re.search(rf"^##+ .*\b{measure}\b", DOCS["method.md"], flags=re.MULTILINE)
 
 
-def test_every_room_is_on_the_page_about_architecture_in_reading_order():
+def test_every_room_is_on_the_page_about_architecture_in_order_and_every_name_on_that_of_the_api():
     listing = (path.name for path in (ROOT / "proxytune").iterdir())
     rooms = {name.removesuffix(".py") for name in listing if not name.startswith(("__", "py."))}
     named = re.findall(r"^\| `proxytune\.(\w+)", section(DOCS["architecture.md"], "The rooms"), flags=re.MULTILINE)
     assert rooms == set(named)
     assert [floor(room) for room in named] == sorted(floor(room) for room in named), "a room stands before one it needs"
+    named = re.findall(r"^::: proxytune\.(\w+)", DOCS["reference/api.md"], flags=re.MULTILINE)
+    assert sorted([*named, "__version__"]) == sorted(proxytune.__all__)
 
 
 def test_every_step_of_the_architecture_s_stories_names_what_its_module_defines():
@@ -245,14 +242,11 @@ def test_every_step_of_the_architecture_s_stories_names_what_its_module_defines(
             assert value.__module__ == module, f"{module}: {name} is of {value.__module__}"
 
 
-def test_the_readme_is_short_and_docs_readme_leads_to_every_page_of_docs():
+def test_the_readme_is_short_takes_two_commands_and_docs_readme_leads_to_every_page_of_docs():
     assert len(README.splitlines()) <= LONGEST_README
     assert "(docs/README.md)" in README
     for path in set(DOCS) - {"README.md"}:
         assert f"({path})" in DOCS["README.md"], f"docs/README.md does not lead to docs/{path}"
-
-
-def test_the_readme_takes_two_commands_on_a_fresh_machine():
     (block,) = re.findall(r"```sh\n(.*?)```", README, flags=re.DOTALL)
     lines = block.replace("\\\n", "").splitlines()
     assert len(lines) == 2
@@ -286,7 +280,7 @@ def test_no_row_of_a_table_is_too_long_to_read(document):
 def test_every_module_and_file_of_the_package_that_is_named_is_there(document):
     for name in DOTTED.findall(DOCUMENTS[document]):
         assert resolved(name) is not None, f"{document}: {name}"
-    for path in IN_THE_PACKAGE.findall(DOCUMENTS[document]):
+    for path in re.compile(r"`(proxytune/[\w/]+(?:\.py)?)`").findall(DOCUMENTS[document]):
         assert (ROOT / path).exists() or (ROOT / f"{path}.py").exists(), f"{document}: {path}"
 
 
@@ -294,11 +288,6 @@ def test_every_module_and_file_of_the_package_that_is_named_is_there(document):
 def test_every_formula_of_the_method_stands_beside_the_module_that_computes_it(title):
     for part in re.split(r"^### ", section(DOCS["method.md"], title), flags=re.MULTILINE):
         assert "```math" not in part or DOTTED.search(part), f"{title}: {part[:60]}"
-
-
-def test_every_name_of_the_package_is_on_the_page_of_the_api():
-    named = re.findall(r"^::: proxytune\.(\w+)", DOCS["reference/api.md"], flags=re.MULTILINE)
-    assert sorted([*named, "__version__"]) == sorted(proxytune.__all__)
 
 
 @pytest.mark.slow

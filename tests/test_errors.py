@@ -3,12 +3,9 @@
 from proxytune import errors
 
 
-def test_every_exception_is_in_the_drawing():
+def test_every_exception_is_in_the_drawing_and_bad_input_and_failed_runs_are_apart():
     names = {name for name, thing in vars(errors).items() if isinstance(thing, type)}
     assert all(name in (errors.__doc__ or "") for name in names)
-
-
-def test_bad_input_and_failed_runs_are_apart():
     assert issubclass(errors.ScoresError, errors.InputError)
     assert issubclass(errors.StoreError, errors.RunError)
     assert not issubclass(errors.RunError, errors.InputError)

@@ -21,7 +21,6 @@ from proxytune.study import open_study
 PAGE = (Path(__file__).resolve().parent.parent / "docs" / "how-to" / "extending.md").read_text(encoding="utf-8")
 INTRODUCTION, *CHAPTERS = re.split(r"^## ", PAGE, flags=re.MULTILINE)
 SECTIONS = {chapter.partition("\n")[0]: chapter for chapter in CHAPTERS}
-PLUGINS = "Plug-ins"
 COMMAND = "python -m proxytune "
 
 
@@ -80,9 +79,7 @@ def test_the_study_of_the_introduction_reads(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_the_effect_is_found_by_diagnose_and_predict_and_a_study_read_what_it_wrote(
-    follow, tmp_path, monkeypatch, answered
-):
+def test_diagnose_finds_the_effect_and_predict_and_a_study_read_what_it_wrote(follow, tmp_path, monkeypatch, answered):
     look_for_few(monkeypatch)
     found = follow("An effect")["diagnose log --effects weak_reverse:WeakReverse --output found"]
     (effect,) = found["effects"]
@@ -120,8 +117,7 @@ def test_the_measure_is_the_objective_of_a_study(follow, tmp_path):
 
 @pytest.mark.slow
 def test_the_engine_runs_in_a_study(follow, tmp_path):
-    answers = follow("A search engine")
-    assert len(answers["study ."]["trials"]) == 4
+    assert len(follow("A search engine")["study ."]["trials"]) == 4
     assert open_study(tmp_path).engine.label == "Halton sequence"
 
 
@@ -162,7 +158,7 @@ def test_what_the_page_makes_keeps_the_promises_that_its_tests_check(everything)
 
 
 def test_the_entry_points_of_the_page_are_listed_as_plug_ins(everything, answered):
-    (block,) = blocks(SECTIONS[PLUGINS])
+    (block,) = blocks(SECTIONS["Plug-ins"])
     points = tomllib.loads(block.text)["project"]["entry-points"][GROUP]
     info = everything / "mine-1.0.dist-info"
     info.mkdir()

@@ -63,27 +63,21 @@ def test_a_module_that_cannot_be_parsed_counts_by_its_bytes(tmp_path, text):
     assert one != meaning(tmp_path, a__py=(text if isinstance(text, bytes) else text.encode()) + b"\n# more")
 
 
-def test_an_escape_that_python_warns_of_is_no_warning_here(tmp_path, recwarn):
-    assert meaning(tmp_path, a__py='x = "\\d"\n') == meaning(tmp_path, a__py='x = "\\\\d"\n')
-    assert not recwarn.list
-
-
-def test_comments_of_toml_do_not_count_but_its_values_and_their_kind_do(tmp_path):
+def test_comments_of_toml_do_not_count_its_values_do_and_other_files_by_bytes_and_names(tmp_path):
     one = meaning(tmp_path, a__toml="[b]\nc = 1\nd = 2 # why\n")
     assert one == meaning(tmp_path, a__toml="b = { d = 2, c = 1 }\n")
     assert one != meaning(tmp_path, a__toml="b = { d = 2, c = 1.0 }\n")
-
-
-def test_other_files_count_by_their_bytes_and_names_in_any_order(tmp_path):
     assert meaning(tmp_path, a__urdf="<robot/>") != meaning(tmp_path, a__urdf="<robot/> ")
     one = meaning(tmp_path, a__py="x = 1", b_in_c__py="y = 2")
     assert one == meaning(tmp_path, b_in_c__py="y = 2", a__py="x = 1")
     assert one != meaning(tmp_path, a__py="y = 2", b_in_c__py="x = 1")
 
 
-def test_the_same_digest_was_found_on_another_day(tmp_path):
+def test_the_same_digest_was_found_on_another_day_and_an_escape_is_no_warning_here(tmp_path, recwarn):
     known = "ee21e0605f26a651f34c14d2402ce3607d7c9b3fd36a9b8ba723cddf9d18b9aa"
     assert meaning(tmp_path, a__py=PLAIN, b__toml="c = [1, 2.5]\n", d__txt="e") == known
+    assert meaning(tmp_path, a__py='x = "\\d"\n') == meaning(tmp_path, a__py='x = "\\\\d"\n')
+    assert not recwarn.list
 
 
 def test_modules_are_those_of_the_folder_and_of_what_can_be_a_package_within(tmp_path):

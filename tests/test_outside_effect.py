@@ -137,13 +137,7 @@ def installed(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(tmp_path / "site"))
 
 
-def test_the_effect_of_a_parameter_is_told_from_its_name():
-    assert effect_of("dead_band.width") == "dead_band"
-    assert effect_of("lab.motion.drift:Drift") == "lab.motion.drift:Drift"
-    assert effect_of("lab.motion.drift:Drift.rate") == "lab.motion.drift:Drift"
-
-
-def test_one_parameter_has_the_effect_s_name_and_several_add_theirs(folder):
+def test_the_effect_of_a_parameter_is_told_from_its_name_which_several_add_to_the_effect_s(folder):
     (folder / "two.py").write_text(TWO, encoding="utf-8")
     catalogue = Catalogue(folder)
     assert catalogue.theta_names(NAME) == (NAME,)
@@ -151,17 +145,16 @@ def test_one_parameter_has_the_effect_s_name_and_several_add_theirs(folder):
     assert catalogue.parameters["two:WeakReverse.bias"].unit == "m/s"
     assert "two:WeakReverse.lost" not in catalogue.parameters
     assert "two:WeakReverse" not in catalogue.parameters
+    assert effect_of("dead_band.width") == "dead_band"
+    assert effect_of("lab.motion.drift:Drift") == "lab.motion.drift:Drift"
+    assert effect_of("lab.motion.drift:Drift.rate") == "lab.motion.drift:Drift"
 
 
-def test_it_comes_after_the_shipped_effects_of_its_stage(folder):
-    theta = {NAME: 0.3, "turn_slip": 0.01, "trim": 0.1}
-    made = effects_from(theta, ROBOT.figures, Catalogue(folder))
+def test_two_folders_have_effects_of_one_name_each_its_own_after_the_shipped_ones_of_its_stage(folder, tmp_path):
+    made = effects_from({NAME: 0.3, "turn_slip": 0.01, "trim": 0.1}, ROBOT.figures, Catalogue(folder))
     assert [effect.name for effect in made] == ["trim", "turn_slip", "weak_reverse"]
     told = complaint_of(effects_from, {NAME: 1.0}, ROBOT.figures, Catalogue(folder))
     assert "must be between 0 and 0.9" in told
-
-
-def test_two_folders_have_effects_of_one_name_each_its_own(folder, tmp_path):
     other = tmp_path / "other"
     other.mkdir()
     (other / "weak_reverse.py").write_text(WEAK_REVERSE.replace("high=0.9", "high=0.85"), encoding="utf-8")
@@ -181,16 +174,15 @@ def test_model_toml_names_it_in_quotes_and_reads_back_the_same(folder):
     assert re.search("model.toml: effects.weak_revers:WeakReverse: effect .* no module 'weak_revers'", told)
 
 
-@pytest.mark.parametrize("case", WRONG)
-def test_an_effect_that_is_not_what_it_claims_is_refused_by_name(tmp_path, case):
-    old, new, expected = WRONG[case]
+@pytest.mark.parametrize(("old", "new", "expected"), WRONG.values(), ids=WRONG)
+def test_an_effect_that_is_not_what_it_claims_is_refused_by_name(tmp_path, old, new, expected):
     text = WEAK_REVERSE.replace(old, new)
     assert text != WEAK_REVERSE
     (tmp_path / "weak_reverse.py").write_text(text, encoding="utf-8")
     assert re.search(f"effect '{NAME}'.*{expected}", complaint_of(Catalogue(tmp_path).effect, NAME))
 
 
-def test_a_domain_takes_it_from_its_table_from_theta_and_from_a_model(folder):
+def test_a_domain_takes_it_from_its_table_theta_or_a_model_and_tells_how_to_name_an_unknown_one(folder):
     (folder / "model.toml").write_text(TABLE, encoding="utf-8")
     section = Section(folder / "study.toml", "domain.", {"plant": "planar", "seconds": 2.0})
     plain, given = (lane_following(section, model=model) for model in (None, folder / "model.toml"))
@@ -198,18 +190,14 @@ def test_a_domain_takes_it_from_its_table_from_theta_and_from_a_model(folder):
     assert given == lane_following(held, model=None) != plain
     assert plain.parameters[NAME].high == 0.9
     assert plain.instance({NAME: 0.3}).drivetrain == given.instance({}).drivetrain
+    (folder / "model.toml").write_text(TABLE.replace(f'"{NAME}"', "weak_revers"), encoding="utf-8")
+    told = complaint_of(read_model, folder / "model.toml", Catalogue(folder))
+    assert re.search("weak_revers: no such effect; .*your own is written module:Attribute", told)
 
 
 def test_a_plugin_s_effect_takes_part_by_itself_and_is_listed(installed, folder, answered):
     catalogue, model = Catalogue(folder), Model("duckiebot", None, {"slow_back": 0.3}, {})
     assert "slow_back" in motion_effects(catalogue)
     assert "[effects.slow_back]" in model_text(model, catalogue=catalogue)
-    rows = answered("list", "effects")["effects"]
-    (row,) = [row for row in rows if row["effect"] == "slow_back"]
+    (row,) = [row for row in answered("list", "effects")["effects"] if row["effect"] == "slow_back"]
     assert (row["parameter"], row["stage"], row["high"]) == ("slow_back", "motion", 0.9)
-
-
-def test_an_unknown_effect_is_told_with_the_way_to_name_one_s_own(folder):
-    (folder / "model.toml").write_text(TABLE.replace(f'"{NAME}"', "weak_revers"), encoding="utf-8")
-    told = complaint_of(read_model, folder / "model.toml", Catalogue(folder))
-    assert re.search("weak_revers: no such effect; .*your own is written module:Attribute", told)

@@ -106,10 +106,9 @@ def test_a_tutorial_followed_word_for_word_prints_what_it_shows(tutorial, tmp_pa
 
 @pytest.mark.parametrize("text", [page("python"), README], ids=["docs/how-to/python.md", "README.md"])
 def test_every_name_of_proxytune_that_the_documents_use_is_a_public_one(text):
-    trees = [ast.walk(ast.parse(code)) for code, _ in PYTHON.findall(text)]
     used = {
         node.attr
-        for nodes in trees
+        for nodes in [ast.walk(ast.parse(code)) for code, _ in PYTHON.findall(text)]
         for node in nodes
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "proxytune"
     }

@@ -33,23 +33,19 @@ def test_what_differs_by_nature_is_left_out_and_masked_and_nothing_else():
     assert not same_results.same("delay 0.107 s (0.092 s)", "delay 0.107 s (0.093 s)")
 
 
-def test_keys_of_a_study_are_set_in_their_own_table():
+def test_keys_of_a_study_are_set_in_their_own_table_and_no_two_parts_share_what_is_kept():
     text = same_results.edited(STUDY, {"budget": 2, "starts": 1, "domain__seconds": 3.0, "nowhere__seconds": 1.0})
     changed = {"format = 1": "starts = 1\nformat = 1", "budget = 9": "budget = 2", "seconds = 20.0": "seconds = 3.0"}
     expected = STUDY
     for before, after in changed.items():
         expected = expected.replace(before, after)
     assert text == expected
-
-
-def test_no_two_parts_share_what_is_kept_of_them():
     versions = [part.version for part in PARTS]
     assert len(set(versions)) == len(versions)
 
 
 def test_a_command_that_ends_otherwise_than_it_should_is_a_failure_and_no_answer(tmp_path):
-    checkout = Path(same_results.__file__).parent.parent
-    place = same_results.Place(tmp_path, checkout, None)
+    place = same_results.Place(tmp_path, Path(same_results.__file__).parent.parent, None)
     with pytest.raises(same_results.CannotRunError, match="exit status 2"):
         place.run("no_such_command")
 
@@ -66,6 +62,5 @@ def test_what_a_checkout_computes_is_collected_and_the_same_again(tmp_path, caps
     assert answers["written"] == {"made.csv": ["x", "1.5"]}
     assert answers["printed"]["list measures --json"]["said"]["measures"]
     assert same_results.report(part, answers, answers)
-    changed = {**answers, "written": {"made.csv": ["x", "1.6"]}}
-    assert not same_results.report(part, answers, changed)
+    assert not same_results.report(part, answers, {**answers, "written": {"made.csv": ["x", "1.6"]}})
     assert "/written/made.csv/1" in capsys.readouterr().out

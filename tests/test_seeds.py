@@ -27,9 +27,8 @@ GOLDEN = {
 }
 
 
-@pytest.mark.parametrize("purpose", GOLDEN)
-def test_a_seed_is_the_number_it_has_always_been(purpose):
-    derive, known = GOLDEN[purpose]
+@pytest.mark.parametrize(("derive", "known"), GOLDEN.values(), ids=GOLDEN)
+def test_a_seed_is_the_number_it_has_always_been(derive, known):
     assert {numbers: derive(*numbers) for numbers in known} == known
 
 

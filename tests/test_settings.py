@@ -53,6 +53,14 @@ def test_good_values_are_taken_as_they_are(tmp_path):
     assert (s.number("gone", 2.0), s.text("gone", "d"), s.texts("gone", ("e",))) == (2.0, "d", ("e",))
 
 
+def test_a_section_reads_like_a_mapping_of_plain_values():
+    section = Section(Path("study.toml"), "domain.", {"gain": 2.0, "body": {"mass": 1.0}})
+    assert dict(section) == {**section} == dict(section.items()) == section.values
+    assert (list(section), len(section), "gain" in section, "mass" in section) == (["gain", "body"], 2, True, False)
+    assert (section["body"], section.get("gain"), section.get("mass", 3)) == ({"mass": 1.0}, 2.0, 3)
+    assert "study.toml: domain.mass: is missing; add it" in complaint_of(section.__getitem__, "mass")
+
+
 @pytest.mark.parametrize(
     ("content", "says"), [(None, "no such file"), (b"a = [1", "is not valid TOML"), (b"\xff\xfe", "cannot be read")]
 )
@@ -63,24 +71,16 @@ def test_a_file_that_is_not_toml_is_one_line(tmp_path, content, says):
     assert says in complaint_of(read_settings, path)
 
 
-def test_a_file_is_looked_for_beside_and_a_folder_is_none(tmp_path):
+def test_a_file_is_looked_for_beside_the_nearest_name_suggested_and_long_rows_are_no_long_keys(tmp_path):
     assert "cannot be read" in complaint_of(read_settings, tmp_path)
     section = Section(Path("/some/study.toml"), "", {"target": "../target.csv"})
     assert section.file("target") == Path("/some/../target.csv")
     assert section.file("target", "other.csv") == Path("/some/other.csv")
-
-
-def test_the_nearest_name_is_suggested_and_otherwise_all():
     assert nearest("trimm", ["trim", "delay"]) == "did you mean 'trim'?"
     assert nearest("zzz", ["trim", "delay"]) == "known are: delay, trim"
-
-
-def test_a_section_reads_like_a_mapping_of_plain_values():
-    section = Section(Path("study.toml"), "domain.", {"gain": 2.0, "body": {"mass": 1.0}})
-    assert dict(section) == {**section} == dict(section.items()) == section.values
-    assert (list(section), len(section), "gain" in section, "mass" in section) == (["gain", "body"], 2, True, False)
-    assert (section["body"], section.get("gain"), section.get("mass", 3)) == ({"mass": 1.0}, 2.0, 3)
-    assert "study.toml: domain.mass: is missing; add it" in complaint_of(section.__getitem__, "mass")
+    path = tmp_path / "model.toml"
+    path.write_text(f"weights = [{', '.join(['0.25'] * 500)}]\nrows = [\n[{', '.join(['0.5'] * 500)}],\n]\n")
+    assert len(read_settings(path)["weights"]) == 500
 
 
 TRAPS = {
@@ -91,18 +91,10 @@ TRAPS = {
 }
 
 
-@pytest.mark.parametrize("trap", TRAPS)
-def test_a_trap_in_toml_is_one_line_at_once(tmp_path, trap):
-    text, says = TRAPS[trap]
-    path = tmp_path / "study.toml"
-    path.write_text(text)
+@pytest.mark.parametrize(("text", "says"), TRAPS.values(), ids=TRAPS)
+def test_a_trap_in_toml_is_one_line_at_once(write_file, text, says):
+    path = write_file(text, "study.toml")
     assert says in complaint_of(read_settings, path)
-
-
-def test_long_rows_of_numbers_are_no_long_keys(tmp_path):
-    path = tmp_path / "model.toml"
-    path.write_text(f"weights = [{', '.join(['0.25'] * 500)}]\nrows = [\n[{', '.join(['0.5'] * 500)}],\n]\n")
-    assert len(read_settings(path)["weights"]) == 500
 
 
 LONG = {"long": f"{'a' * 300}.csv", "far": "a/" * 4000}

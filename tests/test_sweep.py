@@ -37,10 +37,8 @@ TRUTH = {"trim": 0.1, "delay": 0.12}
 
 
 @pytest.fixture
-def truth(tmp_path):
-    path = tmp_path / "truth.toml"
-    path.write_text("trim = 0.1\ndelay = 0.12\n")
-    return path
+def truth(write_file):
+    return write_file("trim = 0.1\ndelay = 0.12\n", "truth.toml")
 
 
 @pytest.fixture
@@ -56,17 +54,21 @@ def swept(study, discrepancy, points=4, base=TRUTH, parameter="trim"):
     with Store.open(study.settings.folder) as store:
         study_run = StudyRun(study, store)
         run_sweep(study_run, plan, discrepancy)
-        spent = study_run.spent
-        return spent.episodes, curve_of(StudyRun(study, store), plan)
+        return study_run.spent.episodes, curve_of(StudyRun(study, store), plan)
 
 
-def test_pod_is_nothing_at_the_truth_and_something_beside_it(opened):
+def test_pod_is_nothing_at_the_truth_and_the_target_is_driven_once_per_start(opened):
     both = opened[1].family
     at = make_episode(TRUTH, agent="agent0", start=0, seed=3)
     assert both.run(at) == {"pod_pose": 0.0, "pod_image": 0.0}
     off = both.run(make_episode({"trim": -0.1}, agent="agent0", start=0, seed=3))
     assert off["pod_pose"] > 0
     assert off["pod_image"] == pytest.approx(20 / 255), "100 and 120 of 255 grey"
+    target = Mock(wraps=opened[1].family.target)
+    both = replace(opened[1].family, target=target)
+    for trim in (-0.1, 0.0, 0.1):
+        both.run(make_episode({"trim": trim}, agent="agent0", start=0, seed=3))
+    assert target.drive.mock_calls == [call(make_episode({}, agent="agent0", start=0, seed=3))]
 
 
 def test_replays_end_with_the_commands_or_the_episode_of_either_domain(opened):
@@ -80,20 +82,14 @@ def test_replays_end_with_the_commands_or_the_episode_of_either_domain(opened):
     assert np.isfinite(list(found.values())).all()
 
 
-def test_the_target_is_driven_once_per_start_however_many_points(opened):
-    target = Mock(wraps=opened[1].family.target)
-    both = replace(opened[1].family, target=target)
-    for trim in (-0.1, 0.0, 0.1):
-        both.run(make_episode({"trim": trim}, agent="agent0", start=0, seed=3))
-    assert target.drive.mock_calls == [call(make_episode({}, agent="agent0", start=0, seed=3))]
-
-
-def test_identity_tells_targets_and_proxies_apart_and_travels(opened, tmp_path):
+def test_identity_tells_targets_and_proxies_apart_and_travels_and_a_missing_model_is_refused(opened, tmp_path):
     study, discrepancy = opened
     other = tmp_path / "other.toml"
     other.write_text("trim = 0.2\n")
     assert discrepancy_study(study, other).identity != discrepancy.identity != study.identity
     assert pickle.loads(pickle.dumps(discrepancy.family)).identity == discrepancy.identity
+    path = tmp_path / "no.toml"
+    assert f"--target-model {path}: no such file" in complaint_of(discrepancy_study, opened[0], path)
 
 
 def test_a_curve_has_pod_at_every_point_kept_like_other_episodes(opened):
@@ -128,23 +124,15 @@ def test_several_processes_find_the_same(make_study, truth, opened):
     assert [point.pod for point in together.points] == [point.pod for point in alone.points]
 
 
-def test_starts_from_which_the_agent_fails_are_left_out_of_the_mean(make_study, truth):
+def test_starts_from_which_the_agent_fails_are_left_out_and_the_interval_holds_the_mean(make_study, truth):
     study = open_study(make_study(family='"echo:echo"', domain={"faults": '["agent0:1:raises"]'}))
     _, curve = swept(study, discrepancy_study(study, truth), points=2)
     assert {point.pod["pod_pose"].starts for point in curve.points} == {2}
-
-
-def test_the_interval_over_starts_holds_the_mean_and_one_start_has_none():
     found = pod_mean([0.1, 0.2, 0.4])
     assert found.value == pytest.approx(0.7 / 3)
     assert 0.0999 < found.interval[0] < found.value < found.interval[1] < 0.4001
     assert pod_mean([0.3]).interval is None
     assert pod_mean([0.0, 0.0]).interval == (0.0, 0.0)
-
-
-def test_a_missing_model_is_refused(opened, tmp_path):
-    path = tmp_path / "no.toml"
-    assert f"--target-model {path}: no such file" in complaint_of(discrepancy_study, opened[0], path)
 
 
 REAL = """format = 1
@@ -270,8 +258,7 @@ def series(scores, spread=0.0, higher=False):
         )
         for place, score in enumerate(scores)
     ]
-    measure = replace(PRPV, better="higher" if higher else "lower")
-    return Series(measure, ALL, tuple(found))
+    return Series(replace(PRPV, better="higher" if higher else "lower"), ALL, tuple(found))
 
 
 VALLEY = series([9.0, 4.0, 1.0, 3.0, 8.0])
@@ -298,9 +285,8 @@ SHAPES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("case", SHAPES)
-def test_a_curve_has_a_best_value_and_a_shape_on_either_side_of_the_held_one(case):
-    curve, held, best, below, above, monotone = SHAPES[case]
+@pytest.mark.parametrize(("curve", "held", "best", "below", "above", "monotone"), SHAPES.values(), ids=SHAPES)
+def test_a_curve_has_a_best_value_and_a_shape_on_either_side_of_the_held_one(curve, held, best, below, above, monotone):
     shape = shape_of(curve, held)
     assert (shape.best, shape.below, shape.above, shape.monotone) == (best, below, above, monotone)
 

@@ -27,7 +27,7 @@ def searched(count, score=bowl, **options):
     return box
 
 
-def test_the_optimum_of_a_toy_is_found_ten_times_better_than_by_the_design():
+def test_the_optimum_of_a_toy_is_found_ten_times_better_than_by_the_design_also_as_a_maximum():
     box = searched(18)
     design = box.trials().score[:8].min()
     theta, score = box.best()
@@ -35,21 +35,15 @@ def test_the_optimum_of_a_toy_is_found_ten_times_better_than_by_the_design():
     assert score == bowl(theta) == box.trials().score.min()
     assert theta["trim"] == pytest.approx(0.1, abs=0.05)
     assert theta["delay"] == pytest.approx(0.2, abs=0.025)
-
-
-def test_what_is_maximised_is_asked_as_its_negative_is_minimised():
     low, high = searched(12), searched(12, score=lambda theta: -bowl(theta), maximise=True)
     assert low.trials()[["delay", "trim"]].equals(high.trials()[["delay", "trim"]])
     assert high.best() == (low.best()[0], -low.best()[1])
     assert (high.trials().score == -low.trials().score).all()
 
 
-def test_the_same_seed_asks_the_same_and_another_one_does_not():
+def test_the_same_seed_asks_the_same_another_does_not_and_asks_before_a_tell_are_a_batch_of_different_theta():
     assert searched(11).trials().equals(searched(11).trials())
     assert not searched(11).trials().equals(searched(11, seed=2).trials())
-
-
-def test_several_asks_before_a_tell_are_a_batch_of_different_theta():
     box = searched(10)
     batch = [box.ask() for _ in range(4)]
     assert len({tuple(theta.values()) for theta in batch}) == 4
@@ -72,7 +66,7 @@ class Eavesdropper:
         return (0.01 * len(trials),)
 
 
-def test_an_engine_sees_what_was_told_in_the_order_of_asking_and_then_what_is_pending():
+def test_an_engine_of_one_s_own_sees_what_was_told_in_the_order_of_asking_then_what_is_pending_and_proposes():
     proposer = Eavesdropper()
     box = SearchBox({"x": (0.0, 1.0)}, engine=Engine("own", "", "", lambda: proposer), initial=1, maximise=True)
     asked = [box.ask() for _ in range(2)]
@@ -84,15 +78,27 @@ def test_an_engine_sees_what_was_told_in_the_order_of_asking_and_then_what_is_pe
     values = [tuple(theta.values()) for theta in asked]
     told = [(values[0], -5.0, False), (values[2], -6.0, False), (values[3], -7.0, False)]
     assert proposer.shown[-1] == [*told, (values[1], None, True), (values[4], None, True)]
+    own = Engine("own", "mine", "random, as mine is", RandomPoints)
+    assert searched(6, engine=own, initial=2).trials().equals(searched(6, engine="random", initial=2).trials())
 
 
-def test_a_failed_simulation_is_kept_and_the_search_goes_on_elsewhere():
+def test_a_failed_simulation_is_kept_and_only_a_theta_that_was_asked_for_can_be_told_once():
     box = searched(9)
     failed = box.ask()
     box.tell(failed, None)
     assert math.isnan(box.trials().score.iloc[-1])
     assert box.ask() != failed
     assert box.best() == searched(9).best()
+    box = SearchBox(BOX)
+    assert "no score has been told; ask" in complaint_of(box.best)
+    theta = box.ask()
+    assert "was not asked for; tell what `ask` gave" in complaint_of(box.tell, {**theta, "trim": 0.0}, 1.0)
+    assert "θ names trim; the box has delay, trim" in complaint_of(box.tell, {"trim": 0.0}, 1.0)
+    for wrong in (math.nan, math.inf):
+        assert "a score must be a finite number, or None" in complaint_of(box.tell, theta, wrong)
+    box.tell(theta, 1.0)
+    assert "has a score already; ask for the next" in complaint_of(box.tell, theta, 1.0)
+    assert box.trials().score.tolist() == [1.0]
 
 
 @settings(max_examples=20)
@@ -103,11 +109,6 @@ def test_every_ask_lies_in_the_box(low, width, seed, initial):
         theta = box.ask()
         assert low <= theta["x"] <= low + width
         box.tell(theta, theta["x"])
-
-
-def test_an_engine_of_one_s_own_proposes():
-    own = Engine("own", "mine", "random, as mine is", RandomPoints)
-    assert searched(6, engine=own, initial=2).trials().equals(searched(6, engine="random", initial=2).trials())
 
 
 @pytest.mark.parametrize("engine", [one.name for one in ENGINES if one.learns_from == "outputs"])
@@ -127,20 +128,6 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("name", WRONG)
-def test_a_box_that_cannot_be_searched_is_refused(name):
-    changes, words = WRONG[name]
+@pytest.mark.parametrize(("changes", "words"), WRONG.values(), ids=WRONG)
+def test_a_box_that_cannot_be_searched_is_refused(changes, words):
     assert re.search(words, complaint_of(SearchBox, **{"box": BOX, **changes}))
-
-
-def test_only_a_theta_that_was_asked_for_can_be_told_and_only_once():
-    box = SearchBox(BOX)
-    assert "no score has been told; ask" in complaint_of(box.best)
-    theta = box.ask()
-    assert "was not asked for; tell what `ask` gave" in complaint_of(box.tell, {**theta, "trim": 0.0}, 1.0)
-    assert "θ names trim; the box has delay, trim" in complaint_of(box.tell, {"trim": 0.0}, 1.0)
-    for wrong in (math.nan, math.inf):
-        assert "a score must be a finite number, or None" in complaint_of(box.tell, theta, wrong)
-    box.tell(theta, 1.0)
-    assert "has a score already; ask for the next" in complaint_of(box.tell, theta, 1.0)
-    assert box.trials().score.tolist() == [1.0]

@@ -41,7 +41,10 @@ def test_poses_and_commands_have_times_and_scores_are_of_the_same_drive(driven):
     assert driven.scores["speed"] == pytest.approx(steps.sum() / 2.0)
 
 
-def test_the_scores_are_those_of_a_trial_at_this_theta(make_study):
+def test_the_same_episode_is_the_same_start_seed_and_theta_change_it_and_a_trial_scores_alike(lane, driven, make_study):
+    pd.testing.assert_frame_equal(drive(lane / "study.toml", "steady", THETA, seed=1).poses, driven.poses)
+    for other in (drive(lane, "steady", THETA, start=1), drive(lane, "steady", THETA, seed=2), drive(lane, "steady")):
+        assert not other.poses.equals(driven.poses)
     folder = make_study(budget="1", initial="1")
     report = run_study(folder)
     distances = [drive(folder, "agent0", report.theta, start=start).scores["distance"] for start in range(3)]
@@ -49,19 +52,10 @@ def test_the_scores_are_those_of_a_trial_at_this_theta(make_study):
     assert np.mean(distances) == proxy.means[proxy.agents.index("agent0"), 0]
 
 
-def test_the_same_episode_is_the_same_and_start_seed_and_theta_change_it(lane, driven):
-    pd.testing.assert_frame_equal(drive(lane / "study.toml", "steady", THETA, seed=1).poses, driven.poses)
-    for other in (drive(lane, "steady", THETA, start=1), drive(lane, "steady", THETA, seed=2), drive(lane, "steady")):
-        assert not other.poses.equals(driven.poses)
-
-
-def test_an_episode_is_driven_before_there_are_scores_of_the_target(make_study):
+def test_an_episode_is_driven_before_there_are_scores_of_the_target_also_where_no_poses_are_kept(make_study):
     folder = make_study()
     (folder / "target.csv").unlink()
     assert set(drive(folder, "agent0").scores) == {"distance", "survival_time"}
-
-
-def test_a_family_that_keeps_no_poses_gives_scores_alone(make_study):
     driven = drive(make_study(), "agent0")
     assert driven.poses is driven.commands is None
     assert driven.scores["distance"] > 0.0

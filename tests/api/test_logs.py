@@ -70,13 +70,10 @@ def test_options_that_cannot_be_used_are_one_line_in_python_s_words(planted, opt
     assert "--" not in told
 
 
-def test_a_robot_that_nobody_knows_is_asked_for_by_its_argument(planted):
+def test_a_robot_that_nobody_knows_is_asked_for_by_its_argument_and_what_is_no_folder_refused(planted, tmp_path):
     told = complaint_of(diagnose, replace(planted, robot="unheard_of"))
     assert re.search("state wheel_radius_m and baseline_m.*or name a robot with robot=", told)
     assert "--robot" not in told
-
-
-def test_a_folder_that_is_no_log_is_refused(tmp_path):
     assert "no such folder; check the path" in complaint_of(diagnose, str(tmp_path / "nowhere"))
 
 
@@ -145,10 +142,16 @@ def test_a_log_of_dataframes_is_the_log_of_the_files_however_they_are_indexed(fo
     assert same(log_of(samples.set_index(["episode", "time"]), description), log_of(samples, DESCRIPTION))
 
 
-def test_commands_may_have_times_of_their_own(samples):
+def test_commands_may_have_times_of_their_own_and_their_faults_name_them(samples):
     poses, commands = samples.drop(columns=["left", "right"]), samples[["episode", "time", "left", "right"]]
     log = log_of(poses, DESCRIPTION, commands.assign(time=commands.time + 0.01))
     assert np.allclose(log.episodes[0].issued, log.episodes[0].times + 0.01)
+    commands = samples[["episode", "time", "left", "right"]]
+    poses = samples.drop(columns=["left", "right"])
+    told = complaint_of(log_of, poses, DESCRIPTION, spoilt(5, "left", 2.0)(commands))
+    assert told.startswith("commands: row 5, column 'left': a duty must be")
+    told = complaint_of(log_of, poses, DESCRIPTION, commands[commands.episode != "03"])
+    assert "'03' is not in commands; add its commands" in told
 
 
 def spoilt(row, column, value):
@@ -174,16 +177,6 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("name", WRONG)
-def test_what_is_no_log_is_one_line_with_row_and_column(samples, name):
-    spoil, keys, words = WRONG[name]
+@pytest.mark.parametrize(("spoil", "keys", "words"), WRONG.values(), ids=WRONG)
+def test_what_is_no_log_is_one_line_with_row_and_column(samples, spoil, keys, words):
     assert re.match(words, complaint_of(log_of, spoil(samples), {**DESCRIPTION, **keys}))
-
-
-def test_a_fault_of_the_commands_names_the_commands(samples):
-    commands = samples[["episode", "time", "left", "right"]]
-    poses = samples.drop(columns=["left", "right"])
-    told = complaint_of(log_of, poses, DESCRIPTION, spoilt(5, "left", 2.0)(commands))
-    assert told.startswith("commands: row 5, column 'left': a duty must be")
-    told = complaint_of(log_of, poses, DESCRIPTION, commands[commands.episode != "03"])
-    assert "'03' is not in commands; add its commands" in told

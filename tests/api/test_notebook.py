@@ -27,17 +27,7 @@ def test_every_report_can_show_itself_in_a_notebook(name):
     assert inspect.isfunction(getattr(proxytune, name)._repr_html_)
 
 
-def test_what_hangs_at_a_study_is_shown_in_a_line(finished):
-    """A prompt shows a line, not every score."""
-    report = proxytune.read_study(finished)
-    for one in (report.best, report.best.assessment, report.result):
-        assert len(repr(one)) < 300
-        assert "\n" not in repr(one)
-    assert all(f"{name}={value:.4g}" in repr(report.best) for name, value in report.theta.items())
-    assert f"PRPV {report.best.assessment.prpv.value}" in repr(report.best.assessment)
-
-
-def test_reports_show_their_sentence_tables_and_figures_in_a_notebook(finished):
+def test_reports_also_of_a_sweep_show_sentence_tables_and_figures_and_what_hangs_at_them_a_line(finished, make_study):
     report = proxytune.read_study(finished)
     page = report._repr_html_()
     assert report.sentence[:12] in page
@@ -47,9 +37,12 @@ def test_reports_show_their_sentence_tables_and_figures_in_a_notebook(finished):
     found = proxytune.score(proxy=table, target=table, metrics="way:max")
     assert found.table().loc["PRPV", "value"] == 0
     assert "<table" in found._repr_html_()
-
-
-def test_a_sweep_shows_its_curves_and_holds_them_as_tables(make_study):
+    # A prompt shows a line, not every score.
+    for one in (report.best, report.best.assessment, report.result):
+        assert len(repr(one)) < 300
+        assert "\n" not in repr(one)
+    assert all(f"{name}={value:.4g}" in repr(report.best) for name, value in report.theta.items())
+    assert f"PRPV {report.best.assessment.prpv.value}" in repr(report.best.assessment)
     report = proxytune.run_sweep(make_study(), "trim", points=3, at="nominal")
     assert list(report.tables()["trim"].index) == [-0.3, 0.0, 0.3]
     page = report._repr_html_()

@@ -13,7 +13,6 @@ from one_line import complaint_of
 
 from proxytune.api import read_study
 from proxytune.api.study import run_study
-from proxytune.errors import InputError
 from proxytune.running import Silent
 
 
@@ -27,24 +26,7 @@ def report(folder):
     return run_study(folder)
 
 
-def test_theta_is_drawn_from_the_posterior_as_the_answer_has_it(report):
-    """Rows are whole θ: their margins are the answer's intervals, and their correlation is the posterior's own."""
-    drawn, learnt = report.posterior(draws=20_000, seed=3), report.result.knowledge
-    assert list(drawn.columns) == list(learnt.space.names)
-    assert drawn.equals(report.posterior(draws=20_000, seed=3))
-    assert not drawn.equals(report.posterior(draws=20_000, seed=4))
-    for box in learnt.space.intervals:
-        ends = drawn[box.name].quantile([0.025, 0.975])
-        np.testing.assert_allclose(ends, learnt.intervals[box.name], atol=0.02 * (box.high - box.low))
-        assert drawn[box.name].between(box.low, box.high).all()
-    weights = learnt.posterior.weights
-    exact = np.cov(learnt.values.T, aweights=weights, ddof=0)
-    np.testing.assert_allclose(np.cov(drawn.to_numpy().T), exact, atol=0.05 * np.abs(exact).max())
-    with pytest.raises(InputError, match="draws must be at least 1, got 0"):
-        report.posterior(draws=0)
-
-
-def test_the_trials_are_a_table_and_the_best_theta_is_that_of_the_trial_that_it_names_or_of_none(report):
+def test_the_trials_are_a_table_and_an_optimize_result_and_theta_is_drawn_from_the_posterior(report):
     trials = report.trials()
     assert list(trials.index) == [1, 2, 3, 4, 5, 6]
     assert trials.index.name == "trial"
@@ -55,16 +37,30 @@ def test_the_trials_are_a_table_and_the_best_theta_is_that_of_the_trial_that_it_
     visited = report.trials()[["delay", "trim"]].to_dict("index")
     number = report.document()["best"]["index"]
     assert [trial for trial, theta in visited.items() if theta == report.theta] == ([number] if number else [])
+    found, trials = report.optimize_result(), report.trials()
+    assert [one.name for one in found.space] == ["delay", "trim"]
+    assert found.func_vals.tolist() == trials.score.tolist()
+    assert found.x_iters == trials[["delay", "trim"]].to_numpy().tolist()
+    assert found.fun == trials.score[trials[["delay", "trim"]].to_numpy().tolist().index(list(found.x)) + 1]
+    # Rows are whole θ: their margins are the answer's intervals, and their correlation is the posterior's own.
+    drawn, learnt = report.posterior(draws=20_000, seed=3), report.result.knowledge
+    assert list(drawn.columns) == list(learnt.space.names)
+    assert drawn.equals(report.posterior(draws=20_000, seed=3))
+    assert not drawn.equals(report.posterior(draws=20_000, seed=4))
+    for box in learnt.space.intervals:
+        ends = drawn[box.name].quantile([0.025, 0.975])
+        np.testing.assert_allclose(ends, learnt.intervals[box.name], atol=0.02 * (box.high - box.low))
+        assert drawn[box.name].between(box.low, box.high).all()
+    exact = np.cov(learnt.values.T, aweights=learnt.posterior.weights, ddof=0)
+    np.testing.assert_allclose(np.cov(drawn.to_numpy().T), exact, atol=0.05 * np.abs(exact).max())
+    assert "draws must be at least 1, got 0" in complaint_of(report.posterior, draws=0)
 
 
-def test_a_report_has_the_document_and_the_words_of_the_command(report, folder, answered):
+def test_a_report_has_the_document_and_words_of_the_command_and_reading_simulates_nothing(report, folder, answered):
     assert repr(report) == f"StudyReport of 'wobbly': {report.document()['sentence']}"
     printed = answered("study", folder)
     document = json.loads(json.dumps(report.document()))
     assert {key: printed[key] for key in document} == document
-
-
-def test_reading_a_study_simulates_nothing_and_says_the_same(report, folder):
     seen = read_study(folder)
     assert seen.spent.episodes == 0
     assert seen.document() == report.document()
@@ -113,11 +109,3 @@ def test_progress_is_shown_only_when_asked_for(make_study, monkeypatch):
 )
 def test_what_cannot_be_used_is_one_line_with_the_key_and_what_to_do(make_study, changes, words):
     assert re.search(words, complaint_of(run_study, make_study("wrong", **changes)))
-
-
-def test_a_report_is_an_optimize_result_of_the_measured_trials(report):
-    found, trials = report.optimize_result(), report.trials()
-    assert [one.name for one in found.space] == ["delay", "trim"]
-    assert found.func_vals.tolist() == trials.score.tolist()
-    assert found.x_iters == trials[["delay", "trim"]].to_numpy().tolist()
-    assert found.fun == trials.score[trials[["delay", "trim"]].to_numpy().tolist().index(list(found.x)) + 1]

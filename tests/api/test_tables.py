@@ -47,12 +47,16 @@ def by_command(tmp_path, capsys):
     return run
 
 
-def test_the_numbers_of_two_dataframes_are_those_of_the_command(by_command):
+def test_the_numbers_of_two_dataframes_are_those_of_the_command_also_with_weights_and_a_seed(by_command):
     proxy, target = table(1), table(2)
     printed, paths = by_command(proxy, target)
     found = documented(score(proxy=proxy, target=target, metrics=METRICS))
     assert found == {key: printed[key] for key in found}
     assert documented(score(proxy=str(paths[0]), target=paths[1], metrics=METRICS)) == found
+    printed, _ = by_command(proxy, target, "--beta", "distance:2", "--beta", "time:0.5", "--seed", "3")
+    found = documented(score(proxy=proxy, target=target, metrics=METRICS, beta={"distance": 2, "time": 0.5}, seed=3))
+    assert found == {key: printed[key] for key in found}
+    assert found != documented(score(proxy=proxy, target=target, metrics=METRICS))
 
 
 @pytest.mark.slow
@@ -72,14 +76,6 @@ def test_several_proxies_by_name_are_those_of_the_command(by_command, tmp_path, 
     assert "together: " in found._repr_html_()
     assert set(found.to_frame().index.get_level_values("proxy")) == {"sim", "other"}
     assert "two tables or more" in complaint_of(score, proxy={"sim": proxy}, target=target, metrics=METRICS)
-
-
-def test_weights_and_seed_are_those_of_the_command(by_command):
-    proxy, target = table(1), table(2)
-    printed, _ = by_command(proxy, target, "--beta", "distance:2", "--beta", "time:0.5", "--seed", "3")
-    found = documented(score(proxy=proxy, target=target, metrics=METRICS, beta={"distance": 2, "time": 0.5}, seed=3))
-    assert found == {key: printed[key] for key in found}
-    assert found != documented(score(proxy=proxy, target=target, metrics=METRICS))
 
 
 @settings(max_examples=20)
@@ -142,11 +138,6 @@ def test_what_cannot_be_used_is_one_line_with_the_side(name):
     assert ".csv" not in told or name == "no file"
 
 
-def test_the_target_is_named_where_it_is_the_target_that_lacks_something():
-    told = complaint_of(score, proxy=table(1), target=table(2).drop(columns="time"), metrics=METRICS)
-    assert re.match("target: no column 'time'; (did you mean|known are)", told)
-
-
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
@@ -180,3 +171,8 @@ def test_one_column_is_not_compared_with_itself_and_sides_are_given_whole():
     for sides in ({}, {"proxy": table}):
         assert "or one table of both sides" in complaint_of(score, **sides, metrics="success:max")
     assert "no metric is given" in complaint_of(score, proxy=table, target=table)
+
+
+def test_the_target_is_named_where_it_is_the_target_that_lacks_something():
+    told = complaint_of(score, proxy=table(1), target=table(2).drop(columns="time"), metrics=METRICS)
+    assert re.match("target: no column 'time'; (did you mean|known are)", told)

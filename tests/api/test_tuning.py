@@ -63,8 +63,7 @@ def test_known_points_come_first_and_known_scores_are_not_simulated():
         driven.append(theta)
         return simulate(theta, agent, start, seed)
 
-    report = tuned(counted, known=rows(near, 3, **near))
-    assert report.trials().loc[1, ["gain", "drag"]].to_dict() == near
+    assert tuned(counted, known=rows(near, 3, **near)).trials().loc[1, ["gain", "drag"]].to_dict() == near
     assert near not in driven
     assert driven
 

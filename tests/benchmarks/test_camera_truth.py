@@ -115,8 +115,7 @@ def test_what_moves_during_an_exposure_is_seen_from_where_the_robot_was():
 
 @given(latency=st.floats(0, 0.2), blur=st.floats(0.01, 0.12), readout=st.floats(0, 0.08))
 def test_rows_show_the_mean_over_the_blur_about_their_own_instant(latency, blur, readout):
-    sight = Sight(camera_latency=latency, blur=blur, rolling_shutter=readout)
-    times, weights = instants(sight, moves=True)
+    times, weights = instants(Sight(camera_latency=latency, blur=blur, rolling_shutter=readout), moves=True)
     instant = readout * ((np.arange(ROWS) + 0.5) / ROWS - 0.5) - latency
     assert np.allclose(weights.sum(axis=0), 1.0)
     assert np.allclose(times @ weights, instant, atol=5e-4)
@@ -225,8 +224,7 @@ def test_drives_stay_near_their_lane_and_in_their_speeds(name):
     road = shipped_map(name)
     for drive in routes.drives(road, np.random.default_rng(2)):
         rows = drive.rows
-        lane = lane_pose(road, rows[:, :2], rows[:, 2])
-        assert np.abs(lane.deviation).max() < 0.2
+        assert np.abs(lane_pose(road, rows[:, :2], rows[:, 2]).deviation).max() < 0.2
         speeds = np.hypot(*np.diff(rows[:, :2], axis=0).T) * routes.ROWS_HZ
         assert (speeds.min() > 0.1, speeds.max() < 0.5) == (True, True)
         assert drive.frames[0] > 0.5
@@ -250,16 +248,12 @@ def test_a_still_set_is_a_log_with_a_row_for_every_frame(few_frames, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_driven_set_tells_when_its_frames_were_taken(few_frames, tmp_path):
+def test_a_driven_set_tells_when_its_frames_were_taken_and_one_seed_writes_one_set_and_truth(few_frames, tmp_path):
     write_set(tmp_path / "set", "camera_latency plain", 1)
     frames, samples = (rows_of(tmp_path / "set" / name) for name in ("frames.csv", "samples.csv"))
     assert [int(row["frame"]) for row in frames] == list(range(4))
     assert {row["episode"] for row in frames} == {row["episode"] for row in samples}
     assert {"left", "right", "x", "y", "heading"} <= set(samples[0])
-
-
-@pytest.mark.slow
-def test_the_same_seed_writes_the_same_set_and_its_truth(few_frames, tmp_path):
     for name in ("one", "other"):
         write_truth(tmp_path / name / "truth.json", write_set(tmp_path / name, "dirt still small_loop", 4))
     files = [sorted(path for path in (tmp_path / name).rglob("*") if path.is_file()) for name in ("one", "other")]
@@ -292,7 +286,7 @@ def said(verdict, *names, declared=None, **parameters):
     return {"verdict": verdict, "declared": declared or {}, "effects": effects}
 
 
-def test_sets_are_counted_by_names_alarms_and_flags():
+def test_sets_are_counted_by_names_alarms_and_flags_and_coverage_is_of_their_own_truth():
     rival = said("explained", "camera_yaw")
     rival["effects"][0]["indistinguishable_from"] = ["camera_roll"]
     answers = [answer(camera=said("explained", name)) for name in ("camera_roll", "camera_yaw")]
@@ -314,9 +308,6 @@ def test_sets_are_counted_by_names_alarms_and_flags():
     counted = rates(answers)
     assert counted["outside: flagged"] == Rate(2, 3)
     assert counted["outside: called explained or nothing missing"] == Rate(1, 3)
-
-
-def test_coverage_holds_intervals_and_figures_against_their_own_truth():
     true = draw_case("lens_centre still", 1).sight.figures["lens_centre.right"]
     right = {"lens_centre.right": {"value": true, "interval": [true - 0.01, true + 0.01], "unit": ""}}
     pitch = {"camera_pitch": {"value": 25.0, "interval": [24.0, 26.0], "unit": "deg"}}

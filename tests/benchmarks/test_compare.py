@@ -69,8 +69,7 @@ def test_finished_runs_are_kept_and_a_line_cut_off_is_run_again(document, tmp_pa
     path = tmp_path / "out" / "runs.jsonl"
     lines = path.read_text().splitlines()
     assert len(lines) == len(read_runs(path)) == 4
-    kept = lines[0].replace('"error": ', '"error": 1000')
-    path.write_text("\n".join([kept, *lines[1:3], lines[3][:40]]))
+    path.write_text("\n".join([lines[0].replace('"error": ', '"error": 1000'), *lines[1:3], lines[3][:40]]))
     assert compare("analytic", *FEW, "--output", tmp_path / "out", "--json") == 0
     again = json.loads(capsys.readouterr().out)
     assert len(read_runs(path)) == 4
@@ -174,9 +173,8 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("case", BAD)
-def test_bad_input_is_one_line_and_exit_2(tmp_path, capsys, case):
-    options, expected = BAD[case]
+@pytest.mark.parametrize(("options", "expected"), BAD.values(), ids=BAD)
+def test_bad_input_is_one_line_and_exit_2(tmp_path, capsys, options, expected):
     engines_named = () if "--engines" in options else ("--engines", "sobol")
     assert compare("analytic", *engines_named, *options, "--output", tmp_path / "out") == 2
     out, told = capsys.readouterr()

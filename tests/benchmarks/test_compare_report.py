@@ -98,14 +98,11 @@ def test_the_tables_tell_how_good_how_soon_and_what_is_known():
         assert expected in told
 
 
-def test_a_verdict_needs_an_interval_clear_of_zero():
+def test_a_verdict_needs_an_interval_clear_of_zero_and_the_document_gives_every_engine_one():
     found = summarise(SOBOL, GP, 1.0)
     cases = ((0.5, 3.0, "needs significantly fewer"), (-3.0, -0.5, "significantly more"), (-0.5, 3.0, "no signific"))
     for low, high, expected in cases:
         assert expected in verdict(replace(found, saved=Estimate(1.0, low, high)))
-
-
-def test_the_document_names_the_default_and_gives_every_engine_a_verdict():
     summaries = [summarise(group, GP, 1.0) for group in (GP, SOBOL)]
     document = compare_document("analytic", summaries, 3, 1.0)
     assert document["default"] == "gp"

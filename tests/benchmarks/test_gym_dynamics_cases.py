@@ -34,12 +34,9 @@ def test_every_variant_drives_otherwise(case):
     assert np.hypot(*np.concatenate(away).T).max() > 2e-3
 
 
-def test_a_driver_adds_a_step_that_never_turns_a_wheel_against_its_duty():
+def test_a_driver_adds_a_step_that_turns_no_wheel_against_its_duty_and_changes_are_of_figures_there_are():
     told = gym._voltages(np.array([-0.5, -0.02, 0.0, 0.02, 0.5]), 0.9, 0.1)
     np.testing.assert_allclose(told, [-0.55, -0.118, 0.0, 0.118, 0.55])
     np.testing.assert_allclose(gym._voltages(np.array([-0.5, 0.02]), 1.0, -0.05), [-0.45, 0.0])
-
-
-def test_changes_are_of_figures_that_there_are_and_no_case_is_twice():
     assert all(set(changes) <= {*gym.OWN, *gym.DRIVER} for both in gym.CHANGES.values() for changes in both)
     assert len({case.name for case in gym.PHYSICS}) == len(gym.PHYSICS) == 19

@@ -192,15 +192,17 @@ def test_floors_and_wheels_take_speed_where_they_say():
     assert yaw[-1] == pytest.approx(0.375)
 
 
-@pytest.mark.parametrize(("offset", "seen"), [({"forward": 0.05}, (1.0, 2.05)), ({"left": 0.03}, (0.97, 2.0))])
-def test_a_marker_is_seen_ahead_and_to_the_left_of_the_axle(offset, seen):
-    there = hidden.measured(np.array([[[1.0, 2.0, np.pi / 2]]]), robot(("marker_offset", offset)), 0.0)[0, 0]
-    np.testing.assert_allclose(there, (*seen, np.pi / 2), atol=1e-12)
-
-
-def test_a_heading_offset_turns_the_heading_and_leaves_the_place():
-    there = hidden.measured(np.array([[[1.0, 2.0, 0.5]]]), robot(("heading_offset", {"degrees": 6.0})), 0.0)[0, 0]
-    np.testing.assert_allclose(there, (1.0, 2.0, 0.5 + np.pi / 30), atol=1e-12)
+@pytest.mark.parametrize(
+    ("effect", "offset", "seen"),
+    [
+        ("marker_offset", {"forward": 0.05}, (1.0, 2.05, np.pi / 2)),
+        ("marker_offset", {"left": 0.03}, (0.97, 2.0, np.pi / 2)),
+        ("heading_offset", {"degrees": 6.0}, (1.0, 2.0, np.pi / 2 + np.pi / 30)),
+    ],
+)
+def test_a_marker_is_seen_ahead_and_to_the_left_of_the_axle_and_an_offset_turns_its_heading(effect, offset, seen):
+    there = hidden.measured(np.array([[[1.0, 2.0, np.pi / 2]]]), robot((effect, offset)), 0.0)[0, 0]
+    np.testing.assert_allclose(there, seen, atol=1e-12)
 
 
 @pytest.mark.slow
@@ -260,8 +262,7 @@ def test_noise_of_motion_has_its_size_and_correlation_and_is_three_percent_in_tw
     np.testing.assert_allclose(noise[:, 0].std(axis=0), noise.std(axis=(0, 1)), rtol=0.25)
     assert not hidden.disturbed(np.zeros((2, 240, 3)), PLAIN, 2.0).any()
     quiet, loud = (over_two_seconds(poses(CLEAN[0], noiseless=flag)) for flag in (True, False))
-    share = np.sqrt(np.mean((loud - quiet)[..., :2] ** 2) / np.mean(quiet[..., :2] ** 2))
-    assert 0.02 < share < 0.045
+    assert 0.02 < np.sqrt(np.mean((loud - quiet)[..., :2] ** 2) / np.mean(quiet[..., :2] ** 2)) < 0.045
 
 
 def test_paths_are_circles_of_their_radius_stepped_or_integrated():
@@ -275,15 +276,12 @@ def test_paths_are_circles_of_their_radius_stepped_or_integrated():
     np.testing.assert_allclose(level, plain, atol=1e-12)
 
 
-def test_duties_stay_within_one_and_differ_between_episodes_but_for_those_driven_twice():
+def test_duties_stay_within_one_differ_between_episodes_and_stop_creep_reverse_and_spin_in_every_log():
     duties, starts = make_drives(7, 12, 1200)
     assert np.abs(duties).max() <= 1.0
     assert len(np.unique(duties[:10].reshape(10, -1), axis=0)) == 10
     np.testing.assert_array_equal(duties[10:], duties[:2])
     np.testing.assert_array_equal(starts[10:], starts[:2])
-
-
-def test_every_log_stops_creeps_reverses_spins_and_drives_at_nearly_full_duty():
     for seed in range(10):
         left, right = np.moveaxis(make_drives(seed, 6, 1200).duties, -1, 0)
         base, turn = (left + right) / 2.0, (right - left) / 2.0

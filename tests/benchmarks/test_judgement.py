@@ -30,16 +30,13 @@ def trials():
     return [Trial(values, OBJECTIVE.score(values, SEED), OBJECTIVE.outcome(values, SEED)) for values in VISITED]
 
 
-def test_the_answer_of_an_engine_is_what_a_study_reports_or_where_its_model_is_lowest(judged, trials):
+def test_the_answer_of_an_engine_is_what_a_study_reports_and_its_reading_whether_truth_is_held(judged, trials):
     known = learn_theta(OBJECTIVE.space, trials, OBJECTIVE.goal(SEED), SEED)
     assert judged.answer == known.answer
     assert judged.answer_score == OBJECTIVE.fresh_score(known.answer, SEED)
     found = judge(OBJECTIVE, VISITED, SEED, by_outputs=False)
     assert found.answer == fit_surrogate(OBJECTIVE.space, trials).incumbent()[0]
     assert found.reading == judged.reading, "what points tell does not depend on who chose them"
-
-
-def test_the_reading_says_whether_region_and_intervals_hold_the_truth(judged, trials):
     known, truth = learn_theta(OBJECTIVE.space, trials, OBJECTIVE.goal(SEED), SEED), OBJECTIVE.truth(SEED)
     assert judged.reading.holds == known.holds(truth)
     assert judged.reading.share == known.posterior.share
@@ -78,7 +75,12 @@ def test_without_parts_there_is_no_reading_and_without_a_truth_nothing_holds_it(
     assert 0.0 < reading.share < 1.0
 
 
-def test_an_objective_is_told_the_lowest_regret_so_far():
+def test_evaluations_are_counted_to_the_first_point_within_the_floor_of_an_objective_told_the_lowest():
+    found = Judgement((None, 9.0, 4.0, 8.0, 0.0), (0.0,), 0.0, 0.0, None, None, "")
+    assert found.best_regrets == (math.inf, 9.0, 4.0, 4.0, 0.0)
+    assert found.evaluations_to(4.0) == 3
+    assert found.evaluations_to(0.0) == 5
+    assert found.evaluations_to(-1.0) is None
     told = []
 
     class Listening(Analytic):
@@ -91,14 +93,6 @@ def test_an_objective_is_told_the_lowest_regret_so_far():
     assert told[len(VISITED) : 2 * len(VISITED)] == [min((math.inf, *regrets[:count])) for count in range(len(VISITED))]
 
 
-def test_evaluations_are_counted_to_the_first_point_within_the_floor():
-    found = Judgement((None, 9.0, 4.0, 8.0, 0.0), (0.0,), 0.0, 0.0, None, None, "")
-    assert found.best_regrets == (math.inf, 9.0, 4.0, 4.0, 0.0)
-    assert found.evaluations_to(4.0) == 3
-    assert found.evaluations_to(0.0) == 5
-    assert found.evaluations_to(-1.0) is None
-
-
 def test_judgements_and_runs_come_back_from_json_as_they_were(judged):
     for one in (judged, replace(judged, reading=None)):
         assert judgement_from(json.loads(json.dumps(asdict(one)))) == one
@@ -106,6 +100,13 @@ def test_judgements_and_runs_come_back_from_json_as_they_were(judged):
     runs = [replace(run_engine(Analytic(), KEY, SOBOL), seconds=0.0) for _ in range(2)]
     assert runs[0] == runs[1] == run_from(json.loads(json.dumps(run_document(runs[0]))))
     assert len(runs[0].visited) == len(runs[0].judgement.regrets) == 12
+
+
+def test_a_run_judged_again_proposes_nothing_and_forgets_the_old_judgement(monkeypatch):
+    run = run_engine(Analytic(), KEY, SOBOL)
+    stale = replace(run, judgement=replace(run.judgement, answer=(0.0,), code="old"))
+    monkeypatch.setattr("runs.make_proposer", None)
+    assert runs.judged_again(Analytic(), stale, SOBOL) == run
 
 
 SOBOL = engine_of("sobol")
@@ -126,13 +127,6 @@ def test_runs_of_one_seed_share_the_design_and_no_more(engine):
     assert one.visited != other.visited
 
 
-def test_a_run_judged_again_proposes_nothing_and_forgets_the_old_judgement(monkeypatch):
-    run = run_engine(Analytic(), KEY, SOBOL)
-    stale = replace(run, judgement=replace(run.judgement, answer=(0.0,), code="old"))
-    monkeypatch.setattr("runs.make_proposer", None)
-    assert runs.judged_again(Analytic(), stale, SOBOL) == run
-
-
 def test_the_saving_is_paired_by_seed_and_a_run_beyond_the_budget_counts_as_one_more():
     default = [made("gp", seed, [9.0, 0.0, 0.0]) for seed in (1, 2)]
     rival = [made("tpe", 1, [9.0, 9.0, 0.0], 2.0), made("tpe", 2, [9.0, 9.0, 9.0], 9.0)]
@@ -149,7 +143,7 @@ def test_the_saving_is_paired_by_seed_and_a_run_beyond_the_budget_counts_as_one_
     assert summarise(rival, default, 4.0, 960.0).simulated.value == 3.5 * 960.0
 
 
-def test_answers_are_measured_by_what_the_truth_scores_and_errors_of_theta_are_paired():
+def test_answers_are_measured_by_what_the_truth_scores_and_a_failed_one_as_the_worst_point():
     default = [made("gp", seed, [0.0], error=0.1) for seed in (1, 2)]
     rival = [made("tpe", 1, [0.0], 2.0, error=0.2), made("tpe", 2, [0.0], None, error=0.4)]
     found = summarise(rival, default, 4.0)
@@ -158,9 +152,6 @@ def test_answers_are_measured_by_what_the_truth_scores_and_errors_of_theta_are_p
     assert summarise(default, default, 4.0).error_difference is None
     unknown = [made("gp", seed, [0.0], error=None) for seed in (1, 2)]
     assert summarise(unknown, unknown, 4.0).of_truth is None
-
-
-def test_an_answer_that_failed_counts_as_the_worst_point_of_its_run():
     runs = [made("gp", 1, [9.0, None, 3.0], answer_regret=None)] * 2
     assert summarise(runs, runs, 4.0).regret.value == 9.0
 
@@ -177,22 +168,18 @@ def test_readings_are_counted_only_where_the_truth_is_known():
     assert (region.covered, region.misfits, region.intervals_covered) == (None, 0, None)
 
 
-def test_an_interval_covers_the_truth_about_as_often_as_it_says():
-    generator = np.random.default_rng(1)
-    found = [estimate(generator.normal(5.0, 2.0, 30), np.mean) for _ in range(100)]
-    assert 86 <= sum(one.low <= 5.0 <= one.high for one in found) < 100
-
-
-def test_the_curve_is_the_median_of_the_lowest_so_far_within_its_band():
+def test_the_curve_is_the_median_of_the_lowest_so_far_and_an_interval_covers_as_often_as_it_says():
     three = [made("gp", seed, regrets) for seed, regrets in enumerate([[9.0, 1.0], [7.0, 8.0], [5.0, 2.0]])]
     middle, low, high = runs.median_curve(three)
     assert middle.tolist() == [7.0, 2.0]
     assert (low <= middle).all()
     assert (middle <= high).all()
+    generator = np.random.default_rng(1)
+    found = [estimate(generator.normal(5.0, 2.0, 30), np.mean) for _ in range(100)]
+    assert 86 <= sum(one.low <= 5.0 <= one.high for one in found) < 100
 
 
 @pytest.mark.parametrize("line", [b"\xff\xfe", b"[" * 20_000, b"[]", b"3", b"{}"])
-def test_spoilt_lines_of_finished_runs_are_skipped(tmp_path, line):
-    path = tmp_path / "runs.jsonl"
-    path.write_bytes(line + b"\n")
+def test_spoilt_lines_of_finished_runs_are_skipped(write_file, line):
+    path = write_file(line + b"\n", "runs.jsonl")
     assert read_runs(path) == {}

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from calibrated import COMPARED, LONGEST, METRICS as OUTPUTS, Calibrated, course, replaced, simulated
 from hypothesis import given, settings, strategies as st
+from one_line import complaint_of
 from problems import AGENTS, CEILING, METRICS, NOISE, STEP, Analytic, Ranking
 from processes import ROOT
 from study_problems import TruthObjective, lacking_families
 
-from proxytune.errors import EpisodeError, InputError
+from proxytune.errors import EpisodeError
 from proxytune.running import Silent
 from proxytune.search import from_unit, to_unit
 from proxytune.search.engine import design_point
@@ -39,8 +40,7 @@ def opened(make_study, tmp_path):
     stores = []
 
     def make(models=(), **changes):
-        folder = make_study(domain={"journal": f'"{tmp_path / "journal"}"'}, **changes)
-        study = open_study(folder)
+        study = open_study(make_study(domain={"journal": f'"{tmp_path / "journal"}"'}, **changes))
         context = Store.open(tmp_path)
         stores.append(context)
         return TruthObjective(StudyRun(study, context.__enter__()), lacking_families(study, models))
@@ -72,13 +72,16 @@ def model(folder, text):
     return path
 
 
-def test_every_seed_has_a_truth_of_its_own_in_the_middle_of_the_box(opened):
+def test_every_seed_has_a_truth_of_its_own_and_error_is_the_mean_distance_in_widths_of_the_box(opened):
     objective = opened()
     truths = [objective.truth(seed) for seed in range(1, 40)]
     assert len(set(truths)) == 39
     unit = np.array([to_unit(objective.space, truth) for truth in truths])
     assert 0.1 <= unit.min() < 0.2
     assert 0.8 < unit.max() <= 0.9
+    delay, trim = objective.truth(1)
+    assert objective.error((delay, trim), 1) == 0.0
+    assert objective.error((delay + 0.03, trim), 1) == pytest.approx(0.05)
 
 
 def test_the_target_is_what_measure_makes_of_the_truth_under_seeds_that_the_study_does_not_use(opened, tmp_path):
@@ -152,20 +155,16 @@ def test_the_answer_is_held_against_the_truth_under_the_same_fresh_placements(op
     assert objective.fresh_regret(truth, 3) == 0.0
 
 
-def test_nothing_is_simulated_twice(opened, driven_so_far):
+def test_nothing_is_simulated_twice_and_an_evaluation_takes_the_time_of_its_episodes(opened, driven_so_far, tmp_path):
     objective = opened()
     for _ in range(2):
         objective.score(point(objective), 1)
         objective.outcome(point(objective), 1)
         objective.goal(1)
     assert driven_so_far() == 2 * 18
-
-
-def test_error_is_the_mean_distance_from_the_truth_in_widths_of_the_box(opened):
-    objective = opened()
-    delay, trim = objective.truth(1)
-    assert objective.error((delay, trim), 1) == 0.0
-    assert objective.error((delay + 0.03, trim), 1) == pytest.approx(0.05)
+    assert ANALYTIC.seconds is opened().seconds is None, "neither says how long it drives"
+    with Store.open(tmp_path) as store:
+        assert TruthObjective(StudyRun(open_study(ROOT / "benchmarks" / "truths"), store)).seconds == 12 * 4 * 20.0
 
 
 def test_targets_have_the_effects_that_the_proxy_lacks_by_turns(opened, tmp_path):
@@ -182,17 +181,10 @@ def test_targets_have_the_effects_that_the_proxy_lacks_by_turns(opened, tmp_path
 
 def test_a_target_with_a_hole_or_another_model_is_none(opened, tmp_path, make_study):
     proxy = model(tmp_path, "delay = 0.1\n")
-    with pytest.raises(InputError, match="proxy: is given, and a target cannot have two models"):
-        opened([proxy], proxy=f'"{proxy}"')
+    assert "proxy: is given, and a target cannot have two models" in complaint_of(opened, [proxy], proxy=f'"{proxy}"')
     study = open_study(make_study(domain={"faults": '["agent2:1:raises"]'}))
     with Store.open(tmp_path) as store, pytest.raises(EpisodeError, match="target of seed 1: agent 'agent2' failed"):
         TruthObjective(StudyRun(study, store)).score((0.1, 0.1), 1)
-
-
-def test_an_evaluation_takes_the_simulated_time_of_all_its_episodes(opened, tmp_path):
-    assert ANALYTIC.seconds is opened().seconds is None, "neither says how long it drives"
-    with Store.open(tmp_path) as store:
-        assert TruthObjective(StudyRun(open_study(ROOT / "benchmarks" / "truths"), store)).seconds == 12 * 4 * 20.0
 
 
 SEEDS = st.integers(0, 1000)
@@ -211,7 +203,7 @@ def test_the_score_is_a_whole_number_within_its_noise_of_the_regret_and_the_same
     assert regret % STEP == 0
 
 
-def test_noise_takes_all_its_values_anew_at_every_point_and_seed():
+def test_noise_takes_all_its_values_anew_at_every_point_and_few_points_lie_within_the_floor():
     points = [design_point(ANALYTIC.space, index, 5) for index in range(500)]
     noise = [ANALYTIC.score(point, 3) - ANALYTIC.regret(point, 3) - NOISE for point in points]
     counts = [noise.count(float(value)) for value in range(-NOISE, NOISE + 1)]
@@ -221,9 +213,6 @@ def test_noise_takes_all_its_values_anew_at_every_point_and_seed():
     noise = [RANKING.table(values, 1).means - RANKING.means(values, 1) for values in (one, other)]
     assert np.abs(noise[0] - noise[1]).min() > 0
     assert RANKING.truth(1) != RANKING.truth(2)
-
-
-def test_there_are_plateaus_and_few_points_within_the_floor():
     seed = 4
     blur, pitch, delay, trim = to_unit(ANALYTIC.space, ANALYTIC.truth(seed))
 
@@ -264,16 +253,13 @@ def test_the_score_is_what_its_outcome_is_composed_to_and_prpv_of_two_metrics(se
     assert CALIBRATED.score(values, seed) == goal.compose(outcome) == prpv_of_means(*means, COMPARED)
 
 
-def test_the_goal_has_every_agents_every_metric_with_the_noise_that_was_measured():
+def test_the_goal_has_every_agents_metrics_with_measured_noise_and_courses_pass_the_simulated_points():
     goal = CALIBRATED.goal(1)
     assert len(goal.outputs) == 12 * len(OUTPUTS) == len(CALIBRATED.outcome(BOX_POINTS[0], 1))
     assert goal.outputs[:2] == (("stroller", "distance"), ("stroller", "survival_time"))
     assert np.array_equal(goal.noise, (simulated().placements ** 2).mean(axis=0))
     assert (goal.noise >= 0.0).all()
     assert np.median(goal.noise) > 0.0
-
-
-def test_a_course_passes_the_simulated_points_as_closely_as_their_roughness_says():
     known = simulated()
     for seed in (1, 2):
         apart = [course(seed)(point) - row for point, row in zip(known.points, known.standardised, strict=True)]
@@ -285,18 +271,23 @@ def test_a_course_passes_the_simulated_points_as_closely_as_their_roughness_says
 @pytest.mark.slow
 def test_the_truth_scores_about_what_it_does_in_the_simulator_and_few_other_points_do():
     """There the proxy at 24 θ, against other placements of itself, scored 6.2 on average."""
-    scores = [CALIBRATED.score(CALIBRATED.truth(seed), seed) for seed in range(40)]
-    assert 4.0 < np.mean(scores) < 9.0
+    assert 4.0 < np.mean([CALIBRATED.score(CALIBRATED.truth(seed), seed) for seed in range(40)]) < 9.0
     regrets = [CALIBRATED.regret(values, seed) for seed in (1, 2) for values in BOX_POINTS]
     assert np.mean(np.array(regrets) <= CALIBRATED.tolerance) < 0.05
     assert np.median(regrets) > 20.0
 
 
-def test_as_many_agents_are_tied_at_the_end_as_in_the_simulator():
+def test_outcomes_follow_from_seed_and_point_with_as_many_agents_tied_as_in_the_simulator():
     survival = np.array([CALIBRATED.outcome(values, 1) for values in BOX_POINTS]).reshape(-1, 12, len(OUTPUTS))[:, :, 1]
     there = simulated().means.reshape(-1, 12, len(OUTPUTS))[:, :, 1]
     assert survival.max() == LONGEST
     assert abs((survival == LONGEST).mean() - (there == LONGEST).mean()) < 0.1
+    one, other = BOX_POINTS[:2]
+    assert CALIBRATED.outcome(one, 1) == Calibrated().outcome(one, 1)
+    assert CALIBRATED.fresh_score(one, 1) == Calibrated().fresh_score(one, 1)
+    assert CALIBRATED.outcome(one, 1) != CALIBRATED.outcome(one, 2)
+    assert CALIBRATED.outcome(one, 1) != CALIBRATED.outcome(other, 1)
+    assert CALIBRATED.truth(1) != CALIBRATED.truth(2)
 
 
 def test_another_placement_stops_nobody_who_is_not_stopped_and_changes_the_others_as_simulated():
@@ -307,12 +298,3 @@ def test_another_placement_stops_nobody_who_is_not_stopped_and_changes_the_other
     assert not tied.all()
     assert (fresh[:, tied, 1] == LONGEST).all()
     assert (fresh[:, ~tied, 1].std(axis=0) > 0.0).all()
-
-
-def test_everything_is_drawn_from_seed_and_point_alone():
-    one, other = BOX_POINTS[:2]
-    assert CALIBRATED.outcome(one, 1) == Calibrated().outcome(one, 1)
-    assert CALIBRATED.fresh_score(one, 1) == Calibrated().fresh_score(one, 1)
-    assert CALIBRATED.outcome(one, 1) != CALIBRATED.outcome(one, 2)
-    assert CALIBRATED.outcome(one, 1) != CALIBRATED.outcome(other, 1)
-    assert CALIBRATED.truth(1) != CALIBRATED.truth(2)

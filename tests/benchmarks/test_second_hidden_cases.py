@@ -118,7 +118,7 @@ def test_motor_lag_is_the_time_constant_of_its_wheels(tau, wheel, reached):
         assert np.flatnonzero(speed > 0.6 * (1.0 - np.exp(-1.0)))[0] / 400 == pytest.approx(seconds, abs=0.003)
 
 
-def test_motors_overshoot_and_coast_by_their_formulas():
+def test_motors_overshoot_and_coast_and_a_driver_brakes_before_reversing_and_kicks_after_a_rest():
     forward = twists(held(1.0, 1.0), ("overshooting_motor", {"hz": 0.9, "damping": 0.25}))[:, 0]
     share = np.exp(-np.pi * 0.25 / np.sqrt(1.0 - 0.25**2))
     assert forward.max() == pytest.approx(0.6 * (1.0 + share), abs=1e-4)
@@ -129,9 +129,6 @@ def test_motors_overshoot_and_coast_by_their_formulas():
     forward, _, yaw = twists(held(0.5, 0.5, 6.0), trim=0.1)[-1]
     assert yaw / forward == pytest.approx(1.25)
     assert np.flatnonzero(twists(held(0.5, 0.5), delay=0.135)[:, 0])[0] == 54
-
-
-def test_a_driver_brakes_before_reversing_and_kicks_after_a_rest():
     duties = held(0.5, 0.5, 8.0)
     duties[:, 80:] = -0.5
     plain, braked = (twists(duties, *effects)[:, 0] for effects in ([], [("brake_before_reversing", {"pause": 0.5})]))
@@ -175,16 +172,18 @@ def test_a_slope_takes_speed_uphill(heading, speed):
 @pytest.mark.parametrize("integration", ["exact", "coarse"])
 def test_going_step_by_step_leads_along_the_same_path(integration):
     course = second.plan(3, 2, 100)
-    level_floor = robot(("floor_slope", {"x": 0.0, "y": 0.0}), integration=integration)
-    level = second.driven(level_floor, course, 1.0)
+    level = second.driven(robot(("floor_slope", {"x": 0.0, "y": 0.0}), integration=integration), course, 1.0)
     np.testing.assert_allclose(level, second.driven(robot(integration=integration), course, 1.0), atol=1e-9)
 
 
-def test_wind_moves_a_robot_at_rest_and_a_tilt_turns_one_that_heads_north():
+def test_wind_moves_a_robot_at_rest_a_tilt_one_that_heads_north_and_noise_walks_with_the_way_alone():
     blown = moved(held(0.0, 0.0), ("gusts", {"speed": 0.04, "period": 8.0}), start=(0.0, 0.0, 2.0))
     np.testing.assert_allclose(blown[-1, :2], (0.04 * 8.0 / np.pi, 0.0), atol=1e-3)
     turned = moved(held(0.5, 0.5, 2.0), ("turning_tilt", {"gain": 0.01}), start=(0.0, 0.0, np.pi / 2))[-1]
     assert turned[2] - np.pi / 2 == pytest.approx(0.01 * turned[1], rel=1e-3)
+    walked = second._walk(PLAIN, np.tile((0.4, 0.0, 0.0), (200, 4000, 1))).sum(axis=1) / 400
+    np.testing.assert_allclose(walked.std(axis=0), 2.0 * np.array(second.PER_METRE), rtol=0.15)
+    assert not second._walk(PLAIN, np.zeros((2, 400, 3))).any()
 
 
 @pytest.mark.parametrize(
@@ -230,22 +229,12 @@ def test_a_pose_has_the_stated_noise(noise, kurtosis, kept):
     assert np.mean(unit[:, 1:] * unit[:, :-1]) == pytest.approx(kept, abs=0.02)
 
 
-def test_a_drive_walks_at_random_with_the_root_of_its_way_and_not_at_rest():
-    steady = np.tile((0.4, 0.0, 0.0), (200, 4000, 1))
-    walked = second._walk(PLAIN, steady).sum(axis=1) / 400
-    np.testing.assert_allclose(walked.std(axis=0), 2.0 * np.array(second.PER_METRE), rtol=0.15)
-    assert not second._walk(PLAIN, np.zeros((2, 400, 3))).any()
-
-
-def test_there_are_enough_cases_of_every_kind_and_every_effect_of_motion_is_hidden():
+def test_there_are_enough_cases_of_every_kind_hiding_every_effect_and_no_name_or_seed_is_twice():
     for cases, least in ((IN_FORM, 45), (OTHER_FORM, 10), (PAIRS, 10), (OUTSIDE, 20), (CLEAN, 12)):
         assert len(cases) >= least
     counts = {name: sum(name in case.right[0] for case in IN_FORM) for name in MOTION_EFFECTS}
     assert all(count >= 2 for count in counts.values()), counts
     assert sum("wheel" in dict(case.effects[0][1]) for case in IN_FORM) >= 6
-
-
-def test_no_two_cases_share_a_name_or_a_seed_nor_with_the_first_generator():
     cases = (*CASES.values(), *CLEAN)
     assert len({case.seed for case in cases}) == len({case.name for case in cases}) == len(cases)
     first = (*hidden.IN_FORM, *hidden.OTHER_FORM, *hidden.PAIRS, *hidden.OUTSIDE, *hidden.CLEAN)

@@ -53,7 +53,7 @@ def document(printed):
     return json.loads(printed)
 
 
-def test_the_document_has_what_the_design_promises(document):
+def test_the_document_has_what_the_design_promises_and_every_effect_tried_best_first(document):
     assert set(document) >= KEYS
     assert document["verdict"] == "explained"
     assert set(document["error"]) >= ERROR_KEYS
@@ -62,6 +62,11 @@ def test_the_document_has_what_the_design_promises(document):
     for estimate in document["declared"].values():
         assert set(estimate) >= {"value", "interval"}
         assert estimate["interval"][0] <= estimate["value"] <= estimate["interval"][1]
+    gains = [candidate["held_out_gain"] for candidate in document["candidates"]]
+    assert gains == sorted(gains, reverse=True)
+    assert all(set(candidate) >= {"name", "held_out_gain", "p_value"} for candidate in document["candidates"])
+    names = {candidate["name"] for candidate in document["candidates"]}
+    assert {"yaw_scrub", "dead_band", "stiction", "dropped_commands", "delay_jitter"} <= names <= set(CATALOGUE)
 
 
 def test_the_effect_is_named_with_its_parameter_interval_unit_and_worth(document):
@@ -82,15 +87,7 @@ def test_the_effect_is_named_with_its_parameter_interval_unit_and_worth(document
     assert document["immaterial"] == []
 
 
-def test_every_effect_tried_is_told_best_first(document):
-    gains = [candidate["held_out_gain"] for candidate in document["candidates"]]
-    assert gains == sorted(gains, reverse=True)
-    assert all(set(candidate) >= {"name", "held_out_gain", "p_value"} for candidate in document["candidates"])
-    names = {candidate["name"] for candidate in document["candidates"]}
-    assert {"yaw_scrub", "dead_band", "stiction", "dropped_commands", "delay_jitter"} <= names <= set(CATALOGUE)
-
-
-def test_what_is_printed_is_what_is_written(document, home):
+def test_what_is_printed_is_what_is_written_and_the_model_reads_back_with_what_was_found(document, home):
     written = json.loads((home / "out" / "diagnosis.json").read_text())
     files = document["files"]
     assert {key: value for key, value in document.items() if key != "files"} == written
@@ -107,9 +104,6 @@ def test_what_is_printed_is_what_is_written(document, home):
     assert page.count("<figure") == len(figures)
     assert "python -m proxytune diagnose " in page.split("<footer>")[1]
     assert "--json" not in page
-
-
-def test_the_model_reads_back_with_what_was_found(document, home):
     model = read_model(home / "out" / "model.toml")
     (parameter,) = document["effects"][0]["parameters"].values()
     assert model.robot == "duckiebot"
@@ -120,8 +114,7 @@ def test_the_model_reads_back_with_what_was_found(document, home):
 
 def test_predicting_the_test_drives_with_the_model_reproduces_the_error(document, home, answered):
     log = small_log()
-    kept = replace(log, episodes=log.episodes[2::3])
-    folder = write_log(kept, home / "kept")
+    folder = write_log(replace(log, episodes=log.episodes[2::3]), home / "kept")
     output = home / "kept.csv"
     told = answered("predict", home / "out" / "model.toml", folder, "--output", output)
     assert told["error"]["value"] == pytest.approx(document["error"]["after"], rel=0.15)
@@ -200,9 +193,8 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("case", BAD)
-def test_data_that_cannot_bear_an_answer_is_refused_in_one_line_and_nothing_is_written(case, tmp_path, refused):
-    make, says = BAD[case]
+@pytest.mark.parametrize(("make", "says"), BAD.values(), ids=BAD)
+def test_data_that_cannot_bear_an_answer_is_refused_in_one_line_and_nothing_is_written(make, says, tmp_path, refused):
     make(tmp_path / "log")
     line = refused("diagnose", tmp_path / "log", "--output", tmp_path / "out")
     assert line.startswith("proxytune diagnose: ")

@@ -64,7 +64,7 @@ def short_drives(folder):
     return add_frames(write_log(log, folder), log, ROLLED, every=6)
 
 
-def test_a_roll_that_nobody_declared_is_found_in_still_frames(found):
+def test_a_roll_that_nobody_declared_is_found_in_still_frames_and_the_document_s_top_is_the_camera_s(found):
     camera = found.document["camera"]
     assert set(camera) >= KEYS
     (effect,) = camera["effects"]
@@ -81,9 +81,6 @@ def test_a_roll_that_nobody_declared_is_found_in_still_frames(found):
     assert set(before) == {"nats", "share", "rms_px", "open"}
     assert before["rms_px"] > 2.0 * after["rms_px"]
     assert after["open"] is False
-
-
-def test_where_there_is_no_motion_the_top_of_the_document_is_the_camera_s(found):
     document = found.document
     for key in ("verdict", "declared", "effects", "could_not_be_seen"):
         assert document[key] == document["camera"][key]
@@ -92,7 +89,7 @@ def test_where_there_is_no_motion_the_top_of_the_document_is_the_camera_s(found)
     assert document["motion_refused"] is None
 
 
-def test_model_toml_holds_the_camera_and_figures_are_those_of_the_camera_alone(found):
+def test_model_toml_and_figures_are_the_camera_s_and_people_read_its_verdict_roll_and_errors(found):
     model = read_model(found.folder / "model.toml")
     told = found.document["camera"]["effects"][0]["parameters"]["camera_roll"]
     assert model.theta["camera_roll"] == pytest.approx(told["value"])
@@ -101,9 +98,6 @@ def test_model_toml_holds_the_camera_and_figures_are_those_of_the_camera_alone(f
     assert comment in (found.folder / "model.toml").read_text().splitlines()
     pictures = {path.name for path in found.folder.glob("*.png")}
     assert pictures == {f"camera_{name}.png" for name in ("markings", "displacement", "ranking", "error")}
-
-
-def test_people_read_the_verdict_the_roll_and_both_errors(found):
     words = " ".join(found.out.split())
     assert "pictured: camera: camera roll: the camera is tilted by 4." in words
     assert ". Explained: with the effects added, the camera explains the frames" in words
@@ -125,8 +119,7 @@ def test_an_unknown_effect_and_a_log_to_test_on_are_refused_in_one_line(stills, 
 
 @pytest.mark.slow
 def test_where_motion_is_refused_the_camera_still_comes_out(tmp_path, answered):
-    folder = short_drives(tmp_path / "log")
-    document = answered("diagnose", folder, "--output", tmp_path / "out")
+    document = answered("diagnose", short_drives(tmp_path / "log"), "--output", tmp_path / "out")
     assert "at least 20 s" in document["motion_refused"]
     assert [effect["name"] for effect in document["effects"]] == ["camera_roll"]
     assert not {"errors", "clocks"} & set(document)

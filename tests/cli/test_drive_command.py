@@ -21,7 +21,7 @@ def lane(make_studies):
     return folder
 
 
-def test_the_document_has_both_scores_and_when_they_part(lane, answered):
+def test_the_document_has_both_scores_and_when_they_part_which_they_do_not_at_the_target_s_own_values(lane, answered):
     answer = answered("drive", lane, "--agent", "steady", "--theta", "trim=-0.2")
     keys = "agent start seed theta proxy target parted_s theta_from against output cautions"
     assert list(answer) == keys.split()
@@ -30,6 +30,9 @@ def test_the_document_has_both_scores_and_when_they_part(lane, answered):
     assert 0.0 < answer["parted_s"] < 2.0
     assert (answer["theta_from"], answer["against"], answer["output"]) == ("given", str(lane / "truth.toml"), None)
     assert answer["cautions"] == []
+    answer = answered("drive", lane, "--agent", "steady", "--theta", lane / "truth.toml", "--start", "2", "--seed", "7")
+    assert answer["proxy"] == answer["target"]
+    assert (answer["parted_s"], answer["start"], answer["seed"]) == (None, 2, 7)
 
 
 def test_an_interval_without_its_value_in_the_target_s_model_is_a_caution(lane, capsys, answered):
@@ -39,12 +42,6 @@ def test_an_interval_without_its_value_in_the_target_s_model_is_a_caution(lane, 
     assert "the interval of trim, 0.01 to 0.05, does not hold its value 0.2" in line
     assert main(["drive", *map(str, words)]) == 0
     assert capsys.readouterr().out.startswith("beware: model of duckiebot: the interval of trim")
-
-
-def test_the_proxy_at_the_target_s_own_values_does_not_part_from_it(lane, answered):
-    answer = answered("drive", lane, "--agent", "steady", "--theta", lane / "truth.toml", "--start", "2", "--seed", "7")
-    assert answer["proxy"] == answer["target"]
-    assert (answer["parted_s"], answer["start"], answer["seed"]) == (None, 2, 7)
 
 
 def test_people_see_which_episode_it_is_both_scores_and_when_they_part(lane, capsys):
@@ -58,9 +55,7 @@ def test_people_see_which_episode_it_is_both_scores_and_when_they_part(lane, cap
     assert "brisk from start 0 under seed 1, as in no trial of this study" in capsys.readouterr().out
 
 
-def test_theta_is_nominal_before_a_trial_is_finished_then_the_best_unless_nominal_is_asked_for(
-    lane, answered, finished
-):
+def test_theta_is_nominal_before_a_trial_is_finished_then_best_unless_nominal_is_asked_for(lane, answered, finished):
     answer = answered("drive", lane, "--agent", "steady")
     assert (answer["theta_from"], answer["theta"]) == ("nominal", {})
     best = answered("drive", finished, "--agent", "agent0")
@@ -87,17 +82,7 @@ def test_a_picture_is_written_and_named(lane, tmp_path, answered, ending, frames
     assert list(path.parent.iterdir()) == [path]
 
 
-def test_another_simulator_s_robot_is_drawn_where_it_records_places(make_study, tmp_path, answered):
-    folder = make_study(family='"walking:walking"')
-    (tmp_path / "model.toml").write_text("trim = 0.2\n")
-    words = ["--agent", "agent0", "--against", tmp_path / "model.toml", "--output", tmp_path / "walk.png"]
-    assert answered("drive", folder, *words)["parted_s"] == pytest.approx(0.3)
-    assert (tmp_path / "walk.png").exists()
-
-
-def test_where_there_are_no_places_to_draw_metrics_are_told_before_anything_is_driven(
-    make_study, tmp_path, refused, answered
-):
+def test_where_there_are_no_places_metrics_are_told_and_else_a_robot_is_drawn(make_study, tmp_path, refused, answered):
     folder = make_study(family='"walking:walking"', domain={"columns": '"z"'})
     assert answered("drive", folder, "--agent", "agent0")["proxy"]["metrics"]["distance"] > 0.0
     line = refused("drive", folder, "--agent", "agent0", "--output", tmp_path / "walk.png")
@@ -108,6 +93,11 @@ def test_where_there_are_no_places_to_draw_metrics_are_told_before_anything_is_d
     assert not (tmp_path / "journal").exists()
     answered("drive", folder, "--agent", "agent0")
     assert (tmp_path / "journal").exists()
+    folder = make_study(family='"walking:walking"')
+    (tmp_path / "model.toml").write_text("trim = 0.2\n")
+    words = ["--agent", "agent0", "--against", tmp_path / "model.toml", "--output", tmp_path / "walk.png"]
+    assert answered("drive", folder, *words)["parted_s"] == pytest.approx(0.3)
+    assert (tmp_path / "walk.png").exists()
 
 
 BAD = {
@@ -119,18 +109,14 @@ BAD = {
     "a best θ before any trial": (["--theta", "best"], "has no finished trial; run it first"),
     "no such model": (["--against", "no.toml"], "--against no.toml: no such file; check the path"),
 }
+OF_ANOTHER = "{lane}/other.toml: is of the robot 'irobot_create'; give a model of 'duckiebot'"
+BAD |= {option: ([option, "{lane}/other.toml"], f"{option} {OF_ANOTHER}") for option in ("--against", "--theta")}
 
 
-@pytest.mark.parametrize("fault", BAD)
-def test_bad_input_is_told_in_one_line(lane, refused, fault):
-    words, line = BAD[fault]
-    assert line in refused("drive", lane, "--agent", "steady", *words)
-
-
-@pytest.mark.parametrize("option", ["--against", "--theta"])
-def test_a_model_of_another_robot_is_refused(lane, refused, option):
-    line = refused("drive", lane, "--agent", "steady", option, lane / "other.toml")
-    assert f"{option} {lane / 'other.toml'}: is of the robot 'irobot_create'; give a model of 'duckiebot'" in line
+@pytest.mark.parametrize(("words", "line"), BAD.values(), ids=BAD)
+def test_bad_input_and_a_model_of_another_robot_are_told_in_one_line(lane, refused, words, line):
+    words = (word.format(lane=lane) for word in words)
+    assert line.format(lane=lane) in refused("drive", lane, "--agent", "steady", *words)
 
 
 def test_a_movie_without_its_writer_is_refused_before_anything_is_driven(lane, tmp_path, refused, monkeypatch):

@@ -24,7 +24,6 @@ FEW = {"agents": '["agent0", "agent1"]', "metrics": '["distance:max"]', "starts"
 SMALL = {**FEW, "budget": "2", "initial": "1", "engine": '"sobol"'}
 EPISODES = 2 * 2
 TOLD = re.compile(r"proxytune \w+: .*(disk (is )?full|No space left|cannot be written).*\n")
-FILES = {"study.toml", "target.csv", "study.db", "report.html"}
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +99,7 @@ def goes_on(forker, folder, whole):
     """The next process ends well, with the same trials and no other file."""
     assert forker.run("study", folder)[0] == 0, forker.printed
     assert kept(folder) == whole
-    assert files(folder) == FILES
+    assert files(folder) == {"study.toml", "target.csv", "study.db", "report.html"}
 
 
 def test_a_study_killed_at_any_write_goes_on_to_the_same_trials(forker, small, driven, never_stopped):

@@ -25,10 +25,8 @@ left = 0.95
 
 
 @pytest.fixture
-def model(tmp_path):
-    path = tmp_path / "model.toml"
-    path.write_text(MODEL)
-    return path
+def model(write_file):
+    return write_file(MODEL, "model.toml")
 
 
 @pytest.mark.parametrize("form", ["urdf", "mjcf", "ros"])
@@ -64,7 +62,7 @@ SHORT = {
 
 
 @pytest.mark.slow
-def test_the_best_theta_of_a_study_is_exported_with_its_intervals_whatever_its_agents_are_called(
+def test_the_best_theta_of_a_study_is_exported_with_intervals_whatever_agents_are_called(
     make_study, tmp_path, answered
 ):
     folder = make_study(agents=None, **SHORT)
@@ -79,14 +77,20 @@ def test_the_best_theta_of_a_study_is_exported_with_its_intervals_whatever_its_a
     assert values["motor_lag.time_constant"]["value"] == 0.2
 
 
-def test_a_study_of_another_simulator_and_an_unknown_robot_are_refused(finished, tmp_path, refused):
+def test_trials_are_what_scikit_optimize_loads_and_other_simulators_refused(
+    finished, tmp_path, write_file, refused, capsys
+):
     line = refused("export", finished, "--to", "ros", "--output", tmp_path / "robot.yaml")
     assert "is a study of another simulator" in line
     assert not (tmp_path / "robot.yaml").exists()
-    path = tmp_path / "model.toml"
-    path.write_text('format = 1\nrobot = "rover"\n')
+    path = write_file('format = 1\nrobot = "rover"\n', "model.toml")
     line = refused("export", path, "--to", "ros", "--output", tmp_path / "out.yaml")
     assert "its robot 'rover' is unknown here; go to the folder that rover lies in" in line
+    assert main(["export", str(finished), "--to", "skopt", "--output", str(tmp_path / "trials.pkl")]) == 0
+    assert "7 trials of 'wobbly'" in capsys.readouterr().out
+    found, report = skopt.load(tmp_path / "trials.pkl"), read_study(finished)
+    assert dict(zip(("delay", "trim"), found.x, strict=True)) == report.theta
+    assert found.func_vals.tolist() == report.trials().score.tolist()
 
 
 def test_a_robot_without_a_folder_has_ros_parameters_but_no_body(tmp_path, answered, refused):
@@ -98,14 +102,6 @@ def test_a_robot_without_a_folder_has_ros_parameters_but_no_body(tmp_path, answe
     for form, expected in {"urdf": "has no body", "mjcf": "states no mass"}.items():
         assert expected in refused("export", path, "--to", form, "--output", output)
         assert not output.exists()
-
-
-def test_a_studys_trials_are_what_scikit_optimize_loads(finished, tmp_path, capsys):
-    assert main(["export", str(finished), "--to", "skopt", "--output", str(tmp_path / "trials.pkl")]) == 0
-    assert "7 trials of 'wobbly'" in capsys.readouterr().out
-    found, report = skopt.load(tmp_path / "trials.pkl"), read_study(finished)
-    assert dict(zip(("delay", "trim"), found.x, strict=True)) == report.theta
-    assert found.func_vals.tolist() == report.trials().score.tolist()
 
 
 @pytest.mark.slow

@@ -90,15 +90,17 @@ def test_measure_leaves_the_old_table(make_study, tmp_path, interrupted, monkeyp
     assert (tmp_path / "out.csv").read_text() == "old"
 
 
-def test_new_leaves_nothing(tmp_path, interrupted, monkeypatch):
+def test_new_and_list_leave_nothing(tmp_path, interrupted, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(Path, "replace", lambda self, target: signal.raise_signal(signal.SIGINT))
     assert interrupted(tmp_path, "new", "family", "rovers") == set()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("proxytune.cli.listing.robot_names", lambda here: signal.raise_signal(signal.SIGINT))
+    assert interrupted(tmp_path, "list", "robots") == set()
 
 
 def test_import_leaves_nothing(tmp_path, interrupted, monkeypatch):
-    drives = [foreign_robot.drive(0, seconds=20.0)]
-    source = foreign_robot.write_form(tmp_path, "csv", drives)
+    source = foreign_robot.write_form(tmp_path, "csv", [foreign_robot.drive(0, seconds=20.0)])
     before = {path.name for path in tmp_path.iterdir()}
     monkeypatch.setattr("proxytune.importing.reading.read_log", lambda draft: signal.raise_signal(signal.SIGINT))
     figures = [word for key, value in foreign_robot.FIGURES.items() for word in ("--figure", f"{key}={value}")]
@@ -126,9 +128,3 @@ def test_predict_leaves_no_table_but_pictures(tmp_path, interrupted, ctrl_c):
     files = interrupted(tmp_path, *words)
     assert "out/frames.csv" not in files
     assert len([name for name in files if name.startswith("out/frames/")]) == 12
-
-
-def test_list_leaves_nothing(tmp_path, interrupted, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("proxytune.cli.listing.robot_names", lambda here: signal.raise_signal(signal.SIGINT))
-    assert interrupted(tmp_path, "list", "robots") == set()

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from one_line import complaint_of
 
 import proxytune
 from proxytune.cli.main import main
-from proxytune.errors import InputError
 from proxytune.files import shipped
 from proxytune.running import run_together
 from proxytune.scores import write_scores
@@ -18,7 +18,6 @@ from proxytune.seeds import target_seed
 from proxytune.study import open_bank, plan_episodes, read_study_settings, score_table
 from tests.conftest import write_target
 
-BANK = {"target": None, "preflight": "true", "budget": "24", "engine": None}
 DELAY = 0.12
 
 
@@ -34,7 +33,7 @@ def _few_draws():
 @pytest.fixture(scope="module")
 def bank(make_studies):
     """A bank that has been run."""
-    folder = make_studies("bank", **BANK)
+    folder = make_studies("bank", **{"target": None, "preflight": "true", "budget": "24", "engine": None})
     assert main(["study", str(folder), "--json"]) == 0
     return folder
 
@@ -125,18 +124,19 @@ def test_the_table_of_a_bank_will_do(found, bank, robots, tmp_path):
     assert trim[0] == pytest.approx(trim[1], rel=0.1)
 
 
-def test_a_study_with_a_target_knows_trials_too(make_study, robots):
+def test_a_study_with_a_target_knows_trials_too_and_one_by_learning_value_tells_no_theta(make_study, robots):
     """What it has learnt from a bank counts, whatever its own target is."""
     folder = make_study(budget="12", initial="12", engine=None)
     proxytune.run_study(folder)
     told = proxytune.fleet(folder, robots[:2])
     assert len(told.result.robots[0].knowledge.trials) == 12
     assert told.result.robots[0].knowledge.goal.values[0] != told.result.robots[1].knowledge.goal.values[0]
+    # A study by PLV is refused, and so is one table in place of a list.
+    assert "'plv' is not searched by scores" in complaint_of(proxytune.fleet, make_study(objective='"plv"'), robots)
+    assert "give a list of tables" in complaint_of(proxytune.fleet, make_study(), str(robots[0]))
 
 
-def test_what_a_robot_says_depends_on_no_other_and_names_that_are_alike_have_their_folders(
-    found, bank, robots, tmp_path
-):
+def test_what_a_robot_says_depends_on_no_other_and_names_alike_have_their_folders(found, bank, robots, tmp_path):
     """Calibration is shared, so the first of the tables is told as any other."""
     few = proxytune.fleet(bank, [robots[3], robots[0]]).document()["robots"]
     all_of_them = found.document()["robots"]
@@ -178,22 +178,13 @@ def _edited(path, home, before, after):
     return edited
 
 
-@pytest.mark.parametrize("case", BAD)
-def test_what_cannot_be_used_is_refused_in_one_line(case, bank, robots, tmp_path, refused):
+@pytest.mark.parametrize(("spoil", "words"), BAD.values(), ids=BAD)
+def test_what_cannot_be_used_is_refused_in_one_line(spoil, words, bank, robots, tmp_path, refused):
     """The line names the file and what is wrong; the exit status is 2."""
     own = Path(shutil.copytree(bank, tmp_path / "bank"))
-    spoil, words = BAD[case]
     told = refused("fleet", own, *spoil(own, robots, tmp_path))
     assert words in told
     assert told.startswith("proxytune fleet: ")
-
-
-def test_learning_value_tells_no_theta(make_study, robots):
-    """A study by PLV is refused, and so is one table in place of a list."""
-    with pytest.raises(InputError, match="'plv' is not searched by scores"):
-        proxytune.fleet(make_study(objective='"plv"'), robots)
-    with pytest.raises(InputError, match="give a list of tables"):
-        proxytune.fleet(make_study(), str(robots[0]))
 
 
 @pytest.mark.slow

@@ -18,9 +18,7 @@ def table(tmp_path_factory):
     return foreign_robot.write_form(tmp_path_factory.mktemp("source"), "csv", drives)
 
 
-def test_importing_without_an_output_lists_what_there_is_and_writes_nothing(
-    answered, table, tmp_path, monkeypatch, capsys
-):
+def test_importing_without_output_lists_what_there_is_and_writes_none(answered, table, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     found = answered("import", table)
     assert found["log"] is None
@@ -34,11 +32,15 @@ def test_importing_without_an_output_lists_what_there_is_and_writes_nothing(
         assert part in text
 
 
-def test_the_log_reads_back_with_robot_figures_and_offset(answered, table, tmp_path):
+def test_the_log_reads_back_as_given_also_in_the_folder_that_one_is_in(answered, table, tmp_path, monkeypatch):
     words = (str(table), str(tmp_path / "log"), "--robot", "nobodys", *FIGURES, "--clock-offset", "-0.25")
     assert answered("import", *words)["log"] == str(tmp_path / "log")
     log = read_log(tmp_path / "log")
     assert (log.robot, log.command, log.clock_offset_s, len(log.episodes)) == ("nobodys", "twist", -0.25, 2)
+    (tmp_path / "empty").mkdir()
+    monkeypatch.chdir(tmp_path / "empty")
+    answered("import", table, ".", "--robot", "nobodys", *FIGURES)
+    assert read_log(tmp_path / "empty").name == "empty"
 
 
 @pytest.mark.parametrize(
@@ -87,8 +89,7 @@ def model(tmp_path):
 
 
 def test_predict_takes_a_table_as_it_is_at_its_poses_own_times(answered, model, tmp_path):
-    one = foreign_robot.drive(5, seconds=20.0)
-    home = foreign_robot.write_form(tmp_path, "csv", [one])
+    home = foreign_robot.write_form(tmp_path, "csv", [foreign_robot.drive(5, seconds=20.0)])
     told = answered("predict", model, home / "run0.csv", "--output", tmp_path / "poses.csv")
     assert told["error"]["value"] < 0.0035
 
@@ -104,13 +105,6 @@ def test_diagnose_takes_a_folder_of_tables_and_names_what_the_robot_has(answered
     assert {effect["name"] for effect in found["effects"]} <= {"dead_band", "wheel_gain", "motor_lag", "delay"}
     assert found["clocks"]["offset_s"] == pytest.approx(-0.24, abs=0.02)
     assert any("two clocks" in note for note in found["imported"])
-
-
-def test_the_folder_that_one_is_in_may_become_the_log(answered, table, tmp_path, monkeypatch):
-    (tmp_path / "empty").mkdir()
-    monkeypatch.chdir(tmp_path / "empty")
-    answered("import", table, ".", "--robot", "nobodys", *FIGURES)
-    assert read_log(tmp_path / "empty").name == "empty"
 
 
 @pytest.mark.slow

@@ -137,8 +137,7 @@ ENDINGS = {
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", ENDINGS)
 def test_a_study_whose_code_ends_the_process_has_not_ended_well(make_study, fault):
-    folder = make_study(domain={"faults": f'["agent3:1:{fault}"]'})
-    process = start("study", folder)
+    process = start("study", make_study(domain={"faults": f'["agent3:1:{fault}"]'}))
     out, told = process.communicate(timeout=60)
     status, line = ENDINGS[fault]
     assert (process.returncode, out) == (status, "")

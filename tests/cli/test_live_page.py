@@ -36,8 +36,7 @@ def test_the_page_is_there_after_the_first_episode_and_its_path_is_said_once(set
         assert "Under way: trial 8 of 9. Best of 7 trials so far" in path.read_text()
         clock.now += 60.0
         watcher.episode()
-    said = capsys.readouterr().err
-    assert said == f"proxytune study: page: {path} (renews itself while the study runs)\n"
+    assert capsys.readouterr().err == f"proxytune study: page: {path} (renews itself while the study runs)\n"
 
 
 def test_it_is_written_at_most_every_few_seconds_and_what_else_watches_hears_all(settings, monkeypatch):

@@ -1,9 +1,18 @@
-"""Every command answers in one document, and every mistake in one line with its exit status."""
+"""Every command answers in one document, and every mistake in one line with its exit status.
+
+Every command's help has examples, and each of them is one that the command understands.
+
+`completion` prints a script that the shell reads and that completes commands, options and files.
+
+Standard output is the answer alone, in whatever letters it can hold.
+"""
 
 import errno
 import json
 import os
 import re
+import shlex
+import shutil
 import subprocess
 import sys
 
@@ -12,10 +21,10 @@ import pytest
 import proxytune as proxytune_package
 from proxytune.api import TRIALS
 from proxytune.cli import listing, plot
-from proxytune.cli.commands import OPTIONS
+from proxytune.cli.commands import OPTIONS, epilog
 from proxytune.cli.diagnose import limits_of
-from proxytune.cli.main import BAD_INPUT, COMMANDS, DONE, FAILED, formats, main, parse
-from proxytune.cli.terminal import Answer
+from proxytune.cli.main import BAD_INPUT, COMMANDS, DONE, FAILED, formats, main, parse, parser
+from proxytune.cli.terminal import Answer, prints_to_stderr
 from proxytune.diagnosis import LIMITS
 from proxytune.errors import EpisodeError, ScoresError, SettingsError, StoreError
 from proxytune.extensions import Interrupted
@@ -70,13 +79,17 @@ def test_every_table_of_options_is_a_command_s_and_says_of_the_code_what_is_so()
     assert set(OPTIONS) == {*COMMANDS, *(name for one in COMMANDS.values() for name in one.shares)}
 
 
-def test_without_a_command_there_is_help_and_the_version_is_that_of_the_package(capsys):
+def test_without_a_command_there_is_help_the_version_is_the_package_s_and_an_unknown_format_wrong(capsys):
     assert main([]) == DONE
     assert "diagnose" in capsys.readouterr().out
     with pytest.raises(SystemExit) as caught:
         main(["--version"])
     assert caught.value.code == 0
     assert capsys.readouterr().out == f"proxytune {proxytune_package.__version__}\n"
+    with pytest.raises(SystemExit) as caught:
+        main(["plot", "study", "--format", "svg,gif"])
+    assert caught.value.code == 2
+    assert "'gif' is none of png, svg, pdf" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -134,10 +147,13 @@ def test_an_interruption_says_whether_the_same_command_goes_on(failing, refused,
     assert told in refused("list", "robots", status=130)
 
 
-def test_what_is_not_json_is_a_defect_and_not_printed(monkeypatch):
+def test_what_is_not_json_is_a_defect_and_not_printed_but_a_path_that_is_no_utf_8_is(monkeypatch, capsys):
     monkeypatch.setattr(listing, "run", lambda arguments: Answer({"value": float("nan")}, ""))
     with pytest.raises(ValueError, match="JSON"):
         main(["list", "robots", "--json"])
+    monkeypatch.setattr(listing, "run", lambda arguments: Answer({"path": "caf\udce9"}, ""))
+    assert main(["list", "maps", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out.encode("utf-8")) == {"path": "caf\udce9"}
 
 
 @pytest.mark.parametrize(
@@ -190,13 +206,6 @@ def test_formats_are_those_beside_png(text, also):
     assert formats(text) == also
 
 
-def test_an_unknown_format_is_wrong_usage(capsys):
-    with pytest.raises(SystemExit) as caught:
-        main(["plot", "study", "--format", "svg,gif"])
-    assert caught.value.code == 2
-    assert "'gif' is none of png, svg, pdf" in capsys.readouterr().err
-
-
 @pytest.mark.slow
 def test_a_closed_pipe_is_no_error(tmp_path):
     line = f"{sys.executable} -m proxytune list effects --json | head -c 1"
@@ -214,3 +223,101 @@ def test_bullet_starts_without_a_word(tmp_path):
     code = "import proxytune.driving.family"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert (done.stdout, done.stderr) == ("", "")
+
+
+def test_every_command_has_two_or_three_examples_and_no_other_has():
+    assert {2, 3} >= {len(command.examples) for command in COMMANDS.values()}
+
+
+@pytest.mark.parametrize("line", [line for command in COMMANDS.values() for line in command.examples])
+def test_every_example_is_understood(line):
+    words = shlex.split(line.partition(" > ")[0])
+    assert parser(words).parse_args(words).command == words[0]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_shows_the_examples_as_they_are_typed(command, capsys):
+    with pytest.raises(SystemExit) as end:
+        main([command, "--help"])
+    told = capsys.readouterr().out
+    assert end.value.code == 0
+    assert "--json" in told
+    assert epilog(command, "python -m proxytune") in told
+
+
+@pytest.mark.parametrize("shell", OPTIONS["completion"]["shell"]["choices"])
+def test_every_command_is_in_the_script_of_every_shell(shell, capsys, answered):
+    pytest.importorskip("shtab")
+    assert main(["completion", shell]) == 0
+    script = capsys.readouterr().out
+    assert all(command in script for command in COMMANDS)
+    assert "python -m" not in script, "it is for the program's own name"
+    assert answered("completion", shell) == {"shell": shell, "script": script.removesuffix("\n")}
+
+
+def test_bash_completes_a_command_an_option_and_a_file(tmp_path, capsys):
+    pytest.importorskip("shtab")
+    if not shutil.which("bash"):
+        pytest.skip("this system has no bash")
+    assert main(["completion", "bash"]) == 0
+    (tmp_path / "proxytune.sh").write_text(capsys.readouterr().out)
+    (tmp_path / "twin.toml").write_text("")
+    asked = {"dia": 1, "study --bud": 2, "measure x --model twi": 4, "completion z": 2}
+    lines = [
+        f"COMP_WORDS=(proxytune {words}); COMP_CWORD={place}; COMPREPLY=(); _shtab_proxytune; echo ${{COMPREPLY[@]}}"
+        for words, place in asked.items()
+    ]
+    script = "\n".join(["source ./proxytune.sh", *lines])
+    done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, cwd=tmp_path, check=False)
+    assert done.stdout.splitlines() == ["diagnose", "--budget", "twin.toml", "zsh"], done.stderr
+
+
+def test_without_shtab_there_is_one_line_on_what_to_install(monkeypatch, refused):
+    monkeypatch.setitem(sys.modules, "shtab", None)
+    told = refused("completion", "bash")
+    assert told.endswith('which is not installed; pip install ".[completion]" in the checkout of proxytune\n')
+
+
+CHATTER = """
+import os, subprocess, sys
+from proxytune.cli import listing
+from proxytune.cli.main import main
+answer = listing.run
+def chatty(arguments):
+    print("an agent")
+    os.write(1, b"its library\\n")
+    subprocess.run(["echo", "its process"], check=True)
+    return answer(arguments)
+listing.run = chatty
+sys.exit(main(["list", "maps", "--json"]))
+"""
+
+
+def run(code, **environment):
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, env={**os.environ, **environment})
+
+
+def test_what_an_agent_its_libraries_and_its_processes_print_goes_to_standard_error():
+    done = run(CHATTER)
+    assert json.loads(done.stdout)["maps"]
+    assert set(done.stderr.decode().splitlines()) == {"an agent", "its library", "its process"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp1252"])
+def test_a_standard_output_of_few_letters_gets_the_answer_with_the_others_escaped(encoding):
+    shown = "main(['list', 'effects']); print('cut', flush=True); main(['list', 'effects', '--json'])"
+    done = run(f"from proxytune.cli.main import main; {shown}", PYTHONIOENCODING=encoding)
+    assert (done.returncode, done.stderr) == (0, b"")
+    table, document = done.stdout.decode(encoding).split("\ncut\n")
+    assert "dead_band" in table
+    assert json.loads(document)["effects"]
+
+
+def test_standard_output_is_the_answer_alone_also_closed_or_after_an_error(capfd):
+    code = "import os; os.close(1); from proxytune.cli.terminal import prints_to_stderr as p\nwith p(): pass"
+    assert run(code).returncode == 0
+    with pytest.raises(ValueError, match="x"), prints_to_stderr():
+        raise ValueError("x")
+    os.write(1, b"here")
+    assert capfd.readouterr().out == "here"

@@ -22,7 +22,7 @@ def measured(words, answered, tmp_path):
     return run
 
 
-def test_a_target_is_made_byte_for_byte_the_same_named_with_its_seed_and_a_study_can_use_it(
+def test_a_target_is_the_same_byte_for_byte_named_by_its_seed_and_fit_for_a_study(
     measured, make_study, answered, words
 ):
     one, two = measured("one.csv"), measured("two.csv", "--seed", "1001")

@@ -27,7 +27,6 @@ COMMANDS = {
 TARGET = "agent,episode,distance,survival_time\n" + "".join(
     f"{agent},{start},{start},2\n" for agent in ("steady", "brisk", "daredevil") for start in (0, 1)
 )
-ENDINGS = {"drive": "there.png", "score's table": "there.csv"}
 OF_FOLDERS = ("predict of pictures", "record", "import", "score", "diagnose", "sweep")
 IN_STUDIES = {
     "study": ("study tiny", "study.run_opened", {"figures": "a file", "report.html": "a folder"}),
@@ -80,7 +79,7 @@ def put(path, what):
 
 def wanted(name):
     words, work = COMMANDS[name]
-    place = ENDINGS.get(name, "there")
+    place = {"drive": "there.png", "score's table": "there.csv"}.get(name, "there")
     return words.replace("there", place), work, place
 
 
@@ -116,9 +115,8 @@ def test_a_closed_folder_is_told_beforehand(here, beforehand, monkeypatch, name)
     assert f"{place}: cannot be written there, as {here} is closed to you; choose another place" in told
 
 
-@pytest.mark.parametrize("name", IN_STUDIES)
-def test_what_is_in_the_way_in_a_folder_is_told_beforehand(here, beforehand, name):
-    words, work, places = IN_STUDIES[name]
+@pytest.mark.parametrize(("words", "work", "places"), IN_STUDIES.values(), ids=IN_STUDIES)
+def test_what_is_in_the_way_in_a_folder_is_told_beforehand(here, beforehand, words, work, places):
     folder = here / next(word for word in reversed(words.split()) if (here / word).is_dir())
     for place, what in places.items():
         put(folder / place, what)

@@ -28,8 +28,10 @@ def test_every_figure_is_drawn_again_without_simulating(finished, answered):
     assert (finished / "study.db").read_bytes() == content
 
 
-def test_sweeps_are_drawn_also_where_the_study_itself_has_not_been_run(make_study, answered):
+def test_a_study_that_has_not_been_run_is_told_and_its_sweeps_are_drawn(make_study, refused, answered):
     folder = make_study()
+    hint = f"run the study first: python -m proxytune study {folder}"
+    assert refused("plot", folder) == f"proxytune plot: {folder / 'study.db'}: no such file; {hint}\n"
     answered("sweep", folder, "--parameter", "trim", "--points", "2")
     home = folder / "figures"
     drawn = {"figures": [str(home / "sweep_trim.png")], "pages": [str(home / "sweep_trim.html")]}
@@ -39,20 +41,12 @@ def test_sweeps_are_drawn_also_where_the_study_itself_has_not_been_run(make_stud
     assert "The others are nominal." in page
 
 
-def test_a_study_that_has_not_been_run_is_told(make_study, refused):
-    folder = make_study()
-    hint = f"run the study first: python -m proxytune study {folder}"
-    assert refused("plot", folder) == f"proxytune plot: {folder / 'study.db'}: no such file; {hint}\n"
-
-
 def figures_of(folder):
     return {path.name: path.read_bytes() for path in (folder / "figures").glob("*.png")}
 
 
 @pytest.mark.slow
-def test_pod_is_drawn_again_without_the_target_model_also_after_the_code_has_changed(
-    make_study, tmp_path, answered, monkeypatch
-):
+def test_pod_is_drawn_again_without_the_target_model_also_after_other_code(make_study, tmp_path, answered, monkeypatch):
     folder, model = make_study(family='"echo:echo"'), tmp_path / "truth.toml"
     model.write_text("trim = 0.1\ndelay = 0.12\n")
     base = ("--points", "2", "--at", "trim=0.1,delay=0.12")
@@ -67,15 +61,11 @@ def test_pod_is_drawn_again_without_the_target_model_also_after_the_code_has_cha
     assert figures_of(folder) == before
 
 
-def forbidden(self, episode):
-    raise AssertionError("simulated")
-
-
 @pytest.mark.slow
 def test_other_metrics_score_the_stored_episodes_anew_into_a_folder_of_their_own(finished, answered, monkeypatch):
     assert main(["study", str(finished), "--json"]) == 0
     assert main(["sweep", str(finished), "--parameter", "trim", "--points", "2"]) == 0
-    monkeypatch.setattr("wobbly.Wobbly.run", forbidden)
+    monkeypatch.setattr("wobbly.Wobbly.run", lambda *_: pytest.fail("simulated"))
     own = answered("plot", finished)
     before = {path: path.read_bytes() for path in finished.rglob("*") if path.is_file()}
     other = answered("plot", finished, "--metric", "distance:max:20%", "--metric", "survival_time:max")

@@ -14,8 +14,6 @@ from proxytune.effects import Model, model_text
 from proxytune.logs import read_log
 from proxytune.report import clocks_document
 
-COLUMNS = ["episode", "start_time", "time", "x", "y", "heading"]
-
 
 @pytest.fixture
 def folder(tmp_path):
@@ -32,10 +30,10 @@ def model(tmp_path):
     return write
 
 
-def test_every_window_is_written_and_the_error_is_that_of_the_written_poses(folder, model, tmp_path, answered):
+def test_every_window_is_written_and_the_error_told_is_that_of_its_poses(folder, model, tmp_path, answered, capsys):
     told = answered("predict", model(), folder, "--horizon", 2, "--output", tmp_path / "poses.csv")
     table = pd.read_csv(tmp_path / "poses.csv", dtype={"episode": str})
-    assert list(table.columns) == COLUMNS
+    assert list(table.columns) == ["episode", "start_time", "time", "x", "y", "heading"]
     assert told["rows"] == len(table)
     assert told["windows"] == len(table[["episode", "start_time"]].drop_duplicates()) == 10
     assert told["horizon_s"] == 2.0
@@ -50,9 +48,6 @@ def test_every_window_is_written_and_the_error_is_that_of_the_written_poses(fold
     apart = np.hypot(both.x - both.x_seen, both.y - both.y_seen)
     assert told["error"]["value"] == pytest.approx(np.sqrt(np.mean(apart**2)))
     assert told["error"]["value"] > 0.005
-
-
-def test_people_read_the_error_in_millimetres(folder, model, tmp_path, capsys):
     assert main(["predict", str(model()), str(folder), "--output", str(tmp_path / "p.csv")]) == 0
     assert "10 windows of 2 s: RMSE 0.0 mm" in capsys.readouterr().out
 
@@ -113,9 +108,8 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("case", BAD)
-def test_bad_input_is_one_line_and_nothing_is_written(case, folder, model, tmp_path, refused):
-    words, says = BAD[case]
+@pytest.mark.parametrize(("words", "says"), BAD.values(), ids=BAD)
+def test_bad_input_is_one_line_and_nothing_is_written(words, says, folder, model, tmp_path, refused):
     path = model()
     given = [word.format(home=tmp_path, log=folder, model=path) for word in words]
     line = refused("predict", *given, "--output", tmp_path / "p.csv")
@@ -124,7 +118,7 @@ def test_bad_input_is_one_line_and_nothing_is_written(case, folder, model, tmp_p
     assert not (tmp_path / "p.csv").exists()
 
 
-def test_an_interval_without_its_value_is_a_caution(folder, model, tmp_path, answered):
+def test_an_interval_without_its_value_is_a_caution_and_a_camera_no_matter_of_poses(folder, model, tmp_path, answered):
     path = model({"trim": 0.2, "delay": 0.12})
     good = answered("predict", path, folder, "--output", tmp_path / "poses.csv")
     assert good["cautions"] == []
@@ -134,9 +128,6 @@ def test_an_interval_without_its_value_is_a_caution(folder, model, tmp_path, ans
     assert "the interval of trim, 0.01 to 0.05, does not hold its value 0.2" in line
     assert told == {key: value for key, value in good.items() if key != "cautions"}
     assert answered("export", path, "--to", "urdf", "--output", tmp_path / "o.urdf")["cautions"] == [line]
-
-
-def test_a_camera_parameter_of_a_robot_without_a_folder_is_no_matter_of_its_poses(folder, model, tmp_path, answered):
     geometry = {"wheel_radius": 0.0318, "effective_baseline": 0.16, "full_speed": 0.6}
     path = model({"camera_pitch": 20.0}, robot="nobodys", geometry=geometry)
     assert answered("predict", path, folder, "--output", tmp_path / "poses.csv")["rows"]

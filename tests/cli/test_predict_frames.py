@@ -35,19 +35,15 @@ def model(folder, theta):
     return path
 
 
-def test_the_true_model_draws_the_very_pictures_and_the_nominal_one_others(predicted, tmp_path):
+def test_the_true_model_draws_the_very_pictures_the_nominal_others_and_both_read_as_frames(predicted, tmp_path, stills):
     told = predicted(ROLLED)
     assert told == {"frames": 65, "output": str(tmp_path / "out"), "grey_error": told["grey_error"]}
     assert told["grey_error"] < 0.1
     drawn = np.stack([np.asarray(Image.open(path)) for path in sorted((tmp_path / "out" / "frames").glob("*.png"))])
     assert np.array_equal(drawn, pictures(ROLLED, POSES, columns=80))
     assert predicted({})["grey_error"] > 5.0
-
-
-def test_the_pictures_read_as_the_frames_of_the_log(predicted, stills, tmp_path):
     predicted(ROLLED)
-    table = pd.read_csv(tmp_path / "out" / "frames.csv")
-    assert list(table.columns) == ["frame", "episode", "time"]
+    assert list(pd.read_csv(tmp_path / "out" / "frames.csv").columns) == ["frame", "episode", "time"]
     for name in ("log.toml", "samples.csv"):
         shutil.copy(stills / name, tmp_path / "out" / name)
     frames, own = read_log(tmp_path / "out").frames, read_log(stills).frames
@@ -55,13 +51,9 @@ def test_the_pictures_read_as_the_frames_of_the_log(predicted, stills, tmp_path)
     assert np.array_equal(frames.times, own.times)
 
 
-def test_people_read_the_difference_in_grey_levels(stills, tmp_path, capsys):
-    words = ["predict", model(tmp_path, ROLLED), stills, "--frames", "--output", tmp_path / "out"]
-    assert main([str(word) for word in words]) == 0
-    assert "65 frames: mean absolute difference on the floor 0.0 grey levels" in capsys.readouterr().out
-
-
-def test_a_log_without_frames_and_frames_without_commands_are_refused(tmp_path, refused, stills):
+def test_logs_without_frames_or_commands_are_refused_and_people_read_differences_in_grey(
+    tmp_path, refused, stills, capsys
+):
     folder = write_log(planted_log(TRUTH, episodes=1, seconds=5.0), tmp_path / "log")
     line = refused("predict", model(tmp_path, {}), folder, "--frames", "--output", tmp_path / "out")
     assert "has no frames to predict; add [camera] to log.toml, or leave --frames out" in line
@@ -69,3 +61,6 @@ def test_a_log_without_frames_and_frames_without_commands_are_refused(tmp_path, 
     line = refused("predict", model(tmp_path, {}), stills, "--output", tmp_path / "poses.csv")
     assert "has no commands to predict poses from; give a log of drives, or give --frames" in line
     assert not (tmp_path / "poses.csv").exists()
+    words = ["predict", model(tmp_path, ROLLED), stills, "--frames", "--output", tmp_path / "out"]
+    assert main([str(word) for word in words]) == 0
+    assert "65 frames: mean absolute difference on the floor 0.0 grey levels" in capsys.readouterr().out

@@ -50,26 +50,14 @@ def test_frames_are_read_as_they_were_taken(words, capsys, tmp_path):
     assert [path.name for path in frames.paths] == [f"{number:06d}.png" for number in range(12)]
     drives = [log.episodes[drive].name for drive in frames.drives]
     assert drives == [f"lane_{number}" for number in range(12)]
-    taken = list(filming.film(family_of(home), 12, 1))
+    taken = list(filming.film(load_family(read_study_settings(tmp_path), tmp_path / "model.toml"), 12, 1))
     np.testing.assert_array_equal(read_pictures(frames, range(12)), np.concatenate([drive.pictures for drive in taken]))
     np.testing.assert_allclose(frames.times, np.concatenate([drive.times for drive in taken]), atol=1e-6)
     np.testing.assert_allclose(log.episodes[-1].poses, taken[-1].episode.poses, atol=1e-4)
     assert not list(home.rglob(".*"))
 
 
-def test_an_interval_without_its_value_in_the_model_is_a_caution(words, answered, tmp_path, capsys):
-    assert answered(*words("good"))["cautions"] == []
-    odd = "[effects.trim]\ntrim = { value = 0.2, interval = [0.01, 0.05] }\n"
-    (tmp_path / "model.toml").write_text(MODEL + odd)
-    assert main([*map(str, words("odd"))]) == 0
-    assert capsys.readouterr().out.startswith("beware: ")
-
-
-def family_of(home):
-    return load_family(read_study_settings(home.parent), home.parent / "model.toml")
-
-
-def test_manoeuvres_are_the_same_with_frames_as_without(words, answered, recorded, tmp_path):
+def test_manoeuvres_are_the_same_with_frames_and_odd_intervals_a_caution(words, answered, recorded, tmp_path, capsys):
     plain, filmed = tmp_path / "plain", recorded("filmed", "--frames", "2")
     assert answered(*words("plain"))["frames"] == 0
     rows = (plain / "samples.csv").read_text()
@@ -77,6 +65,11 @@ def test_manoeuvres_are_the_same_with_frames_as_without(words, answered, recorde
     assert not (plain / "frames.csv").exists()
     assert "[camera]" not in (plain / "log.toml").read_text()
     assert read_log(plain).frames is None
+    assert answered(*words("good"))["cautions"] == []
+    odd = "[effects.trim]\ntrim = { value = 0.2, interval = [0.01, 0.05] }\n"
+    (tmp_path / "model.toml").write_text(MODEL + odd)
+    assert main([*map(str, words("odd"))]) == 0
+    assert capsys.readouterr().out.startswith("beware: ")
 
 
 @pytest.mark.slow

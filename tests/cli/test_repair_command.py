@@ -107,8 +107,7 @@ def test_a_spoilt_page_costs_what_is_on_it(finished, driven_again, answered):
     page = len(content) // 4096 // 2
     content[page * 4096 : (page + 1) * 4096] = b"?" * 4096
     (finished / "study.db").write_bytes(content)
-    found = answered("repair", finished)
-    assert found["kept"]["episodes"] > 0
+    assert answered("repair", finished)["kept"]["episodes"] > 0
     driven_again()
 
 

@@ -53,7 +53,7 @@ METRIC = ("--metric", "distance:max", "--metric", "time:min")
 SIDES = ("--proxy", "sim.csv", "--target", "real.csv")
 
 
-def test_one_proxy_has_the_promised_keys_at_the_top_level(tables):
+def test_one_proxy_has_the_promised_keys_at_the_top_level_and_domains_of_one_file_can_be_either_side(tables):
     found = document(*SIDES, *METRIC)
     assert found.keys() >= PROMISED
     assert (found["proxy"], found["target"], found["prpv"]) == ("sim", "real", 2)
@@ -61,16 +61,12 @@ def test_one_proxy_has_the_promised_keys_at_the_top_level(tables):
     assert found["prpv_interval"][0] <= 2 <= found["prpv_interval"][1]
     assert found["pairs"] == [{"better": "C", "worse": "D", "flip": "reversed"}]
     assert found["srcc"].keys() == found["mmrv"].keys() == found["kendall_tau"].keys() == {"distance", "time"}
-
-
-def test_domains_of_one_file_can_be_either_side(tables):
     apart = document(*SIDES, *METRIC)
-    together = document("--proxy", "both.csv:sim", "--target", "both.csv:real", *METRIC)
-    assert apart == together
+    assert apart == document("--proxy", "both.csv:sim", "--target", "both.csv:real", *METRIC)
     assert document("--proxy", "both.csv", "--target", "both.csv:real", *METRIC) == apart
 
 
-def test_several_proxies_are_ranked_with_their_differences(tables):
+def test_several_proxies_are_ranked_with_their_differences_and_told_apart_by_their_paths(tables):
     Path("worse.csv").write_text(SIM.replace("A,", "x,").replace("D,", "A,").replace("x,", "D,"))
     found = document("--proxy", "worse.csv", *SIDES, *METRIC)
     assert [(one["rank"], one["proxy"]) for one in found["proxies"]] == [(1, "sim"), (2, "worse")]
@@ -79,9 +75,6 @@ def test_several_proxies_are_ranked_with_their_differences(tables):
     assert (difference["better"], difference["worse"]) == ("sim", "worse")
     assert difference["difference"] == found["proxies"][1]["prpv"] - found["proxies"][0]["prpv"]
     assert difference["beyond_noise"] is (difference["interval"][0] > 0)
-
-
-def test_proxies_and_files_are_told_apart_by_their_paths(tables):
     Path("other").mkdir()
     Path("other/sim.csv").write_text(SIM)
     found = document("--proxy", "sim.csv", "--proxy", "other/sim.csv", "--target", "real.csv", *METRIC)
@@ -90,7 +83,7 @@ def test_proxies_and_files_are_told_apart_by_their_paths(tables):
     assert document("--proxy", "run:1.csv", "--target", "real.csv", *METRIC)["proxy"] == "run:1"
 
 
-def test_the_table_shows_each_measure_its_interval_and_the_notes(tables):
+def test_the_table_shows_each_measure_its_interval_and_notes_and_calls_no_rate_a_rollout(tables):
     text = shown(*SIDES, *METRIC)
     for part in (
         "PRPV",
@@ -106,16 +99,13 @@ def test_the_table_shows_each_measure_its_interval_and_the_notes(tables):
         assert part in text
     assert "leave out that the same start may turn out otherwise" in " ".join(text.split())
     assert "sim as a proxy of real: 4 agents, 3 proxy episodes and 3 target episodes each" in text
-
-
-def test_a_rate_without_its_number_is_not_called_a_rollout(tables):
     Path("both.csv").write_text("Policy,Sim success (%),Real success (%),Real n\nA,48,40,20\nB,72,65,20\nC,81,45,20\n")
     text = " ".join(shown("both.csv").split())
     assert "or a mean of an unknown number, which says nothing about noise" in text
     assert "1 simulated rollouts" not in text
 
 
-def test_halves_are_called_halves_and_repeats_of_the_starts_a_noise_floor(tables):
+def test_halves_are_called_halves_repeats_of_starts_a_noise_floor_and_a_constant_metric_null(tables):
     base = ("--proxy", "sim.csv", "--target")
     halves = document(*base, "real.csv", *METRIC)
     assert (halves["noise_floor_kind"], halves["at_noise_floor"]) == ("halves", None)
@@ -131,9 +121,6 @@ def test_halves_are_called_halves_and_repeats_of_the_starts_a_noise_floor(tables
     assert "halves" not in text
     loose = document(*base, "twice.csv", *METRIC, "--unpaired")
     assert (loose["noise_floor_kind"], loose["at_noise_floor"]) == ("halves", None)
-
-
-def test_a_constant_metric_is_null_with_a_note(tables):
     for file in ("flat.csv", "again.csv"):
         Path(file).write_text("agent,distance\nA,1\nB,1\nC,1\n")
     found = document("--proxy", "again.csv", "--target", "flat.csv", "--metric", "distance:max")
@@ -216,16 +203,13 @@ COLUMNS = ("--columns", "agent=policy,episode=trial,distance=dist_m")
 OWN = ("--proxy", "sim.csv", "--target", "monday.csv", "--target", "tuesday.csv")
 
 
-def test_a_target_as_people_keep_it_gives_the_figures_of_a_tidy_one(own):
+def test_a_target_as_people_keep_it_gives_the_figures_of_a_tidy_one_and_agents_of_one_side_are_named(own):
     found = document(*OWN, *COLUMNS, *METRIC)
     assert found.pop("target") == "monday, tuesday"
     tidy = document(*SIDES, *METRIC)
     assert tidy.pop("target") == "real"
     assert found == tidy
     assert found["left_out"] == []
-
-
-def test_agents_of_one_side_are_refused_by_name_or_left_out_and_said(own):
     words = (*OWN, "--target", "people.csv", *COLUMNS, *METRIC)
     assert re.search(r"the proxy lacks scores of human, .* \(score --common\)", complaint_of(run, *words))
     assert document(*words, "--common")["left_out"] == ["left out, since not all sides have them: human of the target"]
@@ -258,7 +242,7 @@ def test_success_rates_stand_in_table_and_document_and_ties_are_told(tables):
     assert "1 of 6 pairs of agents tie in the proxy, 1 on the target" in shown(*words)
 
 
-def test_all_measures_are_also_a_table_for_programs(tables):
+def test_all_measures_are_also_a_table_for_programs_or_latex_and_no_other_kind_is_written(tables):
     found = document(*SIDES, *METRIC, "--table", "new/t.csv")
     assert found["table"] == "new/t.csv"
     table = pd.read_csv("new/t.csv").set_index("measure")
@@ -266,18 +250,12 @@ def test_all_measures_are_also_a_table_for_programs(tables):
     assert table.value["prpv"] == found["prpv"]
     assert table.loc["prpv", ["low", "high"]].tolist() == found["prpv_interval"]
     assert table.value["srcc_distance"] == found["srcc"]["distance"]
-
-
-def test_several_proxies_are_columns_of_a_latex_table(tables):
     run("--proxy", "both.csv:sim", "--proxy", "both.csv:real", "--target", "real.csv", *METRIC, "--table", "t.tex")
     lines = Path("t.tex").read_text().splitlines()
     assert lines[2] == r"measure & sim & real \\"
     row = next(line for line in lines if line.startswith("PRPV"))
     assert re.fullmatch(r"PRPV & 2 \(\d+ to \d+\) & 0 \(\d+ to \d+\) \\\\", row)
     assert r"Kendall $\tau$ distance" in Path("t.tex").read_text()
-
-
-def test_a_table_of_another_kind_is_refused_before_anything_is_written(tables):
     words = (*SIDES, *METRIC, "--table", "t.xlsx", "--output", "out")
     assert "--table t.xlsx: a table is written as .csv or .tex" in complaint_of(run, *words)
     assert not Path("out").exists()

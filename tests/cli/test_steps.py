@@ -12,17 +12,11 @@ def told(capsys, *lines):
     return capsys.readouterr().err, completed
 
 
-def test_without_a_terminal_every_step_is_a_line_with_the_seconds_so_far(capsys):
+def test_a_terminal_has_a_bar_that_never_goes_back_and_else_every_step_is_a_line_with_its_seconds(capsys, monkeypatch):
     text, _ = told(capsys, "first", "second, round 2")
     assert text == "0 s: first\n0 s: second, round 2\n"
-
-
-def test_a_bar_never_goes_back(capsys):
     assert told(capsys, "second", "first")[1] == 0.6
     assert told(capsys, "something else")[1] == 0.0
-
-
-def test_a_terminal_has_a_bar_and_no_lines(capsys, monkeypatch):
     real = progress.Console
     monkeypatch.setattr(progress, "Console", lambda **known: real(**known, force_terminal=True, width=80))
     text, _ = told(capsys, "first")

@@ -115,8 +115,7 @@ def write(tmp_path):
 
     def written(stranger, **says):
         folder = tmp_path / "stranger"
-        known = {**PLAIN, **stranger.says, **says}
-        files = {**stranger.files, "study.toml": STUDY.format(**known)}
+        files = {**stranger.files, "study.toml": STUDY.format(**{**PLAIN, **stranger.says, **says})}
         files["target.csv"] = "agent,episode,distance\nsteady,0,1.0\ndaredevil,0,2.0\n"
         for name, text in files.items():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)

@@ -22,11 +22,21 @@ def test_a_study_runs_and_prints_one_document_and_a_second_time_simulates_nothin
     assert {path.name for path in folder.iterdir()} == set(names.split())
 
 
-def test_bad_input_is_one_line_and_exit_2(make_study, refused, tmp_path):
+def test_bad_input_unknown_studies_or_places_that_cannot_be_written_are_one_line(
+    make_study, refused, tmp_path, travelling
+):
     assert "budget: must be between" in refused("study", make_study(budget="-1"))
     assert "agents: no agent 'agnet1'" in refused("study", make_study(agents='["agent0", "agnet1"]'))
+    for option, value in (("budget", "0"), ("jobs", "1025")):
+        assert f"{option} must be between 1 and " in refused("study", make_study(), f"--{option}={value}")
     assert not (make_study() / "study.db").exists()
     assert "has no study.toml; give the folder of a study" in refused("study", tmp_path)
+    assert "no study of that name comes with proxytune; did you mean 'quickstart'?" in refused(
+        "study", tmp_path / "quickstrat"
+    )
+    assert not (tmp_path / "quickstrat").exists()
+    (tmp_path / "file").touch()
+    assert "cannot be written" in refused("study", tmp_path / "file" / "quickstart", status=1)
 
 
 @pytest.mark.slow
@@ -50,8 +60,7 @@ def test_a_parameter_that_does_nothing_is_said_before_the_study_and_recorded(mak
 
 @pytest.mark.slow
 def test_without_a_terminal_every_trial_is_a_plain_line_with_its_prpv_the_best_and_the_episodes(make_study, capsys):
-    folder = make_study(preflight="true", confirm="1", cut_off="true")
-    assert main(["study", str(folder), "--json"]) == 0
+    assert main(["study", str(make_study(preflight="true", confirm="1", cut_off="true")), "--json"]) == 0
     out, told = capsys.readouterr()
     lines = [line for line in told.splitlines() if "study: page: " not in line]
     assert "pre-flight 1 of 2 begins" in lines[0]
@@ -72,12 +81,6 @@ def test_a_budget_on_the_command_line_stands_over_study_toml(finished, capsys, a
     assert main(["study", str(finished), "--budget", asked]) == 0
     assert f"trials {says}; best" in " ".join(capsys.readouterr().out.split())
     assert answered("study", finished)["settings"]["budget"] == 7, "study.toml stays as it is"
-
-
-@pytest.mark.parametrize(("option", "value"), [("budget", "0"), ("jobs", "1025")])
-def test_a_budget_or_jobs_out_of_bounds_are_refused(make_study, refused, option, value):
-    line = refused("study", make_study(), f"--{option}={value}")
-    assert f"{option} must be between 1 and " in line
 
 
 @pytest.fixture
@@ -103,13 +106,3 @@ def test_a_study_that_comes_with_the_package_is_copied_and_that_is_said(travelli
     assert not list(folder.parent.glob(".*"))
     assert main(["study", str(folder / "study.toml"), "--json"]) == 0
     assert capsys.readouterr().err == ""
-
-
-def test_an_unknown_study_or_a_place_that_cannot_be_written_is_told(travelling, tmp_path, refused):
-    assert "no study of that name comes with proxytune; did you mean 'quickstart'?" in refused(
-        "study", tmp_path / "quickstrat"
-    )
-    assert not (tmp_path / "quickstrat").exists()
-    (tmp_path / "file").touch()
-    told = refused("study", tmp_path / "file" / "quickstart", status=1)
-    assert "cannot be written" in told

@@ -47,14 +47,10 @@ def test_a_target_model_adds_pod_and_keeps_its_own_files(make_study, tmp_path, a
 
 
 @pytest.mark.slow
-def test_trials_and_sweeps_share_episodes(finished, answered):
+def test_trials_and_sweeps_share_episodes_and_a_finished_study_is_swept_at_its_best_theta(finished, answered):
     theta = answered("study", finished)["trials"][0]["theta"]
     at = ",".join(f"{name}={value!r}" for name, value in theta.items())
     assert answered("sweep", finished, "--parameter", "trim", "--points", "2", "--at", at)["episodes"]["run"] == 2 * 18
-
-
-@pytest.mark.slow
-def test_a_finished_study_is_swept_at_its_best_theta_and_says_so(finished, answered):
     best = answered("study", finished)["best"]["theta"]
     arguments = ["sweep", str(finished), "--parameter", "trim", "--points", "2"]
     document = answered(*arguments)
@@ -62,9 +58,7 @@ def test_a_finished_study_is_swept_at_its_best_theta_and_says_so(finished, answe
     assert document["curves"][0]["base"] == best
 
 
-def test_nominal_holds_the_robots_own_values_in_a_finished_study_and_one_that_has_not_run(
-    finished, answered, make_study
-):
+def test_nominal_holds_the_robots_own_values_in_a_finished_study_and_one_not_yet_run(finished, answered, make_study):
     document = answered("sweep", finished, "--parameter", "trim", "--points", "2", "--at", "nominal")
     assert document["at"] == {"chosen": "nominal", "theta": {}}
     assert document["curves"][0]["base"] == {}
@@ -111,7 +105,6 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("case", BAD)
-def test_bad_input_is_one_line_and_exit_2(make_study, refused, case):
-    options, expected = BAD[case]
+@pytest.mark.parametrize(("options", "expected"), BAD.values(), ids=BAD)
+def test_bad_input_is_one_line_and_exit_2(make_study, refused, options, expected):
     assert expected in refused("sweep", make_study(), *options)

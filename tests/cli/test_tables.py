@@ -41,16 +41,13 @@ def test_lists_are_whole(kind):
     assert_whole(shown("list", kind))
 
 
-def test_the_scores_of_one_proxy_and_of_several_are_whole(tmp_path):
+def test_tables_of_the_scores_of_one_proxy_and_of_several_and_of_a_diagnosis_are_whole(tmp_path):
     (tmp_path / "all.csv").write_text(SCORES)
     metrics = ("--metric", "distance:max", "--metric", "lane_error_of_the_whole_drive:min")
     path = tmp_path / "all.csv"
     for proxies in ((f"{path}:another_simulator",), (path,)):
         words = [word for proxy in proxies for word in ("--proxy", proxy)]
         assert_whole(shown("score", *words, "--target", f"{path}:the_target", *metrics))
-
-
-def test_tables_of_a_diagnosis_are_whole():
     columns = columns_of(("effect",), ("held-out gain [nats]", "p", "value"))
     row = (LONG, "1234.5678", "0.001", "−0.123 to 0.456")
     assert_whole(table_text(Table("Candidates", columns, (row,))))

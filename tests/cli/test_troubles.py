@@ -61,8 +61,7 @@ def test_a_write_ahead_log_cut_off_by_a_crash_costs_only_what_was_cut_off(make_s
     with Store.open(folder) as store:
         with pytest.raises(KeyboardInterrupt):
             # Of twenty episodes all is in the log still: SQLite has moved nothing to study.db yet
-            study_run = StudyRun(study, store, Stopping(60 if share else 20))
-            run_trials(study_run, make_proposer("gp", 5))
+            run_trials(StudyRun(study, store, Stopping(60 if share else 20)), make_proposer("gp", 5))
         for name in ("study.db", "study.db-wal"):
             shutil.copy(folder / name, crashed / name)
     log = crashed / "study.db-wal"

@@ -32,7 +32,7 @@ def error(drives, *, model=TRUTH, dropped=(), learnt=None, horizon_s=2.0):
     return horizon_error(findings, kept, horizon_s, learnt or {})
 
 
-def test_before_is_the_declared_model_where_blocks_enough_have_a_window(drives):
+def test_before_is_the_declared_model_and_the_floor_lies_between_noise_and_what_was_reached(drives):
     told = error(drives, model=SCRUBBED)
     assert told.before.value > 3.0 * told.after.value
     assert told.ratio.value == pytest.approx(told.after.value / told.before.value)
@@ -43,6 +43,18 @@ def test_before_is_the_declared_model_where_blocks_enough_have_a_window(drives):
     short, long = planted_log(TRUTH, episodes=70, seconds=2.0), planted_log(TRUTH, episodes=1, seconds=9.0)
     longest = replace(long.episodes[0], name="long")
     assert error(drives_of(replace(short, episodes=(*short.episodes, longest))), horizon_s=5.0) is None
+    floor = bracket(0.004, 0.012, None)
+    assert floor.lower == 0.004
+    assert 0.012 < floor.upper < 0.0125
+    assert bracket(0.013, 0.012, None).lower == 0.012
+    alone = bracket(0.004, 0.012, None).upper
+    most = 0.006 * 0.6 / 0.5
+    assert bracket(0.004, 0.012, BEYOND._replace(part=1.0)).upper == pytest.approx(alone * most / 0.012)
+    half = ((0.012**2 + most**2) / 2.0) ** 0.5
+    assert bracket(0.004, 0.012, BEYOND._replace(part=0.5)).upper == pytest.approx(alone * half / 0.012)
+    assert bracket(0.004, 0.012, KNOWN).upper == alone
+    assert bracket(0.010, 0.012, BEYOND._replace(part=1.0)).upper == 0.010
+    assert bracket(0.004, 0.005, BEYOND._replace(part=1.0)).upper == bracket(0.004, 0.005, None).upper
 
 
 @pytest.mark.parametrize("how", [{"dropped": [DroppedEffect(SCRUB, Variant(SCRUBBED, DECLARED))]},
@@ -69,20 +81,19 @@ def test_an_error_at_the_noise_of_the_poses_is_explained(unnamed):
     assert said(0.0045, 0.004, unnamed=unnamed, named=False) == "nothing missing"
 
 
-def test_an_error_that_nothing_lowers_or_drives_do_not_repeat_is_explained():
+def test_an_error_that_nothing_lowers_is_explained_also_by_repeats_unless_few_or_unlike():
     assert said(0.0055, 0.004) == "explained"
     assert said(0.0065, 0.004) == "cannot be told"
     assert said(0.0055, 0.004, reached=0.005) == "cannot be told"
     assert said(0.012, 0.004, repeated=KNOWN) == "explained"
     assert said(0.012, 0.004, repeated=KNOWN, named=False) == "nothing missing"
-
-
-def test_few_or_unlike_repeats_explain_nothing_while_an_effect_is_missing():
     assert said(0.012, 0.0005, repeated=KNOWN._replace(part=0.03)) == "cannot be told"
     assert said(0.012, 0.0005, repeated=KNOWN) == "explained"
     assert said(0.029, 0.004, repeated=KNOWN) == "cannot be told"
     assert said(0.012, 0.004, repeated=KNOWN, reached=0.0105) == "cannot be told"
     assert said(0.0055, 0.004, repeated=BEYOND) == "partly explained"
+    assert said(0.012, 0.004) == "cannot be told"
+    assert said(0.012, 0.004, repeated=UNSURE) == "cannot be told"
 
 
 @pytest.mark.parametrize(("named", "answer"), [(True, "partly explained"), (False, "unexplained")])
@@ -90,23 +101,3 @@ def test_an_error_that_drives_repeat_or_a_signal_explains_is_not_explained(named
     assert said(0.012, 0.004, repeated=BEYOND, named=named) == answer
     assert said(0.012, 0.004, unnamed=True, named=named) == answer
     assert said(0.012, 0.004, repeated=KNOWN, unnamed=True, named=named) == answer
-
-
-def test_what_the_noise_is_cannot_be_told_from_few_repeats_or_none():
-    assert said(0.012, 0.004) == "cannot be told"
-    assert said(0.012, 0.004, repeated=UNSURE) == "cannot be told"
-
-
-def test_the_floor_lies_between_noise_and_what_a_model_reached_or_repeats():
-    floor = bracket(0.004, 0.012, None)
-    assert floor.lower == 0.004
-    assert 0.012 < floor.upper < 0.0125
-    assert bracket(0.013, 0.012, None).lower == 0.012
-    alone = bracket(0.004, 0.012, None).upper
-    most = 0.006 * 0.6 / 0.5
-    assert bracket(0.004, 0.012, BEYOND._replace(part=1.0)).upper == pytest.approx(alone * most / 0.012)
-    half = ((0.012**2 + most**2) / 2.0) ** 0.5
-    assert bracket(0.004, 0.012, BEYOND._replace(part=0.5)).upper == pytest.approx(alone * half / 0.012)
-    assert bracket(0.004, 0.012, KNOWN).upper == alone
-    assert bracket(0.010, 0.012, BEYOND._replace(part=1.0)).upper == 0.010
-    assert bracket(0.004, 0.005, BEYOND._replace(part=1.0)).upper == bracket(0.004, 0.005, None).upper

@@ -60,18 +60,24 @@ def test_every_start_is_driven_from_in_both_lanes(family, exact, monkeypatch, na
 def test_most_pictures_are_taken_in_the_lane_on_straights_and_in_bends(family, exact):
     drives = list(film(family, 60, 1))
     poses = np.array([pose_at(drive.episode, time) for drive in drives for time in drive.times])
-    bends = (np.floor(poses[:, :2] / (ROAD.size[0] / 3)) != 1).all(axis=1)
-    assert 0.2 < bends.mean() < 0.8
+    assert 0.2 < (np.floor(poses[:, :2] / (ROAD.size[0] / 3)) != 1).all(axis=1).mean() < 0.8
     assert (np.abs(lane_pose(ROAD, poses[:, :2], poses[:, 2]).deviation) < ROAD.lane_width / 2).mean() > 0.75
 
 
-def test_more_pictures_make_no_drive_longer_than_twenty_seconds(family, monkeypatch):
+def test_more_pictures_make_no_drive_longer_and_are_wider_than_an_agents_with_all_else_the_same(family, monkeypatch):
     monkeypatch.setattr(filming, "_film_drive", lambda family, instance, lap, seed: lap)
     for frames in (120, 800, 801, 10_000):
         laps = list(film(family, frames, 1))
         assert sum(lap.frames for lap in laps) == frames
         assert max(lap.frames for lap in laps) <= 40
         assert len({(lap.start, lap.turned) for lap in laps}) == 20
+    robot, wider = family.instance({}).robot, family.instance({}, columns=160).robot
+    assert (wider.camera_figures().columns, wider.camera_figures().rows) == (160, 120)
+    assert replace(wider, figures=robot.figures) == robot
+    assert robot.camera_figures().columns == 64
+    size = {"camera_columns", "camera_rows"}
+    assert {name for name in robot.figures if robot.figures[name] != wider.figures[name]} == size
+    assert with_columns(wider, 80) == wider
 
 
 def test_a_picture_is_the_one_that_an_agent_is_shown_when_it_is_finished(family, monkeypatch):
@@ -89,16 +95,6 @@ def test_a_picture_is_the_one_that_an_agent_is_shown_when_it_is_finished(family,
     assert (picture != ticks[tick]).mean() > 0.05
 
 
-def test_pictures_are_wider_than_an_agents_and_all_else_of_the_robot_is_the_same(family):
-    robot, wider = family.instance({}).robot, family.instance({}, columns=160).robot
-    assert (wider.camera_figures().columns, wider.camera_figures().rows) == (160, 120)
-    assert replace(wider, figures=robot.figures) == robot
-    assert robot.camera_figures().columns == 64
-    size = {"camera_columns", "camera_rows"}
-    assert {name for name in robot.figures if robot.figures[name] != wider.figures[name]} == size
-    assert with_columns(wider, 80) == wider
-
-
 def test_the_renderer_takes_pictures_too(family, monkeypatch):
     monkeypatch.setattr(filming, "SHORTEST_S", 0.5)
     monkeypatch.setattr(filming, "COLUMNS", 64)
@@ -108,14 +104,11 @@ def test_the_renderer_takes_pictures_too(family, monkeypatch):
     assert 0.0 < np.abs(rendered.pictures.astype(float) - plain.pictures).mean() < 8.0
 
 
-def test_the_same_seed_gives_the_same_drives_and_another_seed_others(family):
+def test_the_same_seed_gives_the_same_drives_and_a_drive_that_ends_early_is_told_with_its_start(family, monkeypatch):
     one, again, other = (next(film(family, 1, seed)) for seed in (3, 3, 4))
     np.testing.assert_array_equal(one.pictures, again.pictures)
     np.testing.assert_array_equal(one.episode.poses, again.episode.poses)
     assert (one.episode.commands != other.episode.commands).any()
-
-
-def test_a_drive_that_ends_before_its_pictures_are_taken_is_told_with_its_start(family, monkeypatch):
     monkeypatch.setattr(filming.driving, "off_map", lambda road, x, y: True)
     with pytest.raises(EpisodeError, match=r"^lane drive from start 0 ended after 0\.05 s with 0 of 1 pictures; "):
         list(film(family, 1, 1))

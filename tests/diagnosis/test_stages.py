@@ -50,13 +50,12 @@ def test_a_stage_is_made_once_and_read_as_it_was(tmp_path):
 def test_things_that_are_known_are_not_copied(tmp_path):
     thing = {"large": np.zeros(1000)}
     for _ in range(2):
-        stages = Stages(tmp_path, "facts", thing=thing)
-        assert stages.keep("one", lambda: (thing, 1))[0] is thing
+        assert Stages(tmp_path, "facts", thing=thing).keep("one", lambda: (thing, 1))[0] is thing
     (path,) = tmp_path.rglob("*.pickle")
     assert path.stat().st_size < 200
 
 
-def test_other_facts_and_spoilt_files_are_made_again_and_what_is_spoilt_is_told(tmp_path):
+def test_what_was_spoilt_or_is_of_other_facts_is_made_again_and_what_was_changed_is_no_result(tmp_path, monkeypatch):
     said = []
     assert Stages(tmp_path, "facts", said.append).keep("one", lambda: 1) == 1
     assert Stages(tmp_path, "others", said.append).keep("one", lambda: 2) == 2
@@ -68,9 +67,6 @@ def test_other_facts_and_spoilt_files_are_made_again_and_what_is_spoilt_is_told(
     assert said == [f"{path}: is damaged; it is made again"]
     forget_stages(tmp_path)
     assert not list(tmp_path.iterdir())
-
-
-def test_what_a_disk_or_a_stranger_has_changed_is_no_result(tmp_path, monkeypatch):
     Stages(tmp_path, "facts").keep("one", lambda: np.linspace(0.0, 1.0, 3))
     (path,) = tmp_path.rglob("*.pickle")
     content = path.read_bytes()
@@ -241,9 +237,7 @@ def other_code(log, patch):
         (as_it_was, {"declared": ["camera_pitch", "camera_roll"]}, OF_CAMERA[0]),
     ],
 )
-def test_a_stage_of_another_camera_log_other_options_or_code_is_made_again(
-    tmp_path, monkeypatch, change, options, next_made
-):
+def test_a_stage_of_another_log_other_options_or_code_is_made_again(tmp_path, monkeypatch, change, options, next_made):
     folder, stages = still_frames(tmp_path / "log"), []
     shutil.copy(shipped("robots") / "maps" / "small_loop.toml", folder / "own.toml")
     (folder / "log.toml").write_text((folder / "log.toml").read_text().replace('"small_loop"', '"own.toml"'))

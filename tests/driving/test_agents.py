@@ -45,15 +45,6 @@ def test_the_lane_is_found_where_it_lies(left, turned):
     assert lane.offset == pytest.approx(-left / np.cos(turned), abs=0.025)
 
 
-def test_the_lane_is_nowhere_without_markings_and_wary_slows_down_where_nothing_is_crisp():
-    look = Markings(open_eye(ROBOT), 60.0, 150.0)
-    assert find_lanes(Seen(parted(np.zeros_like(seen_from())[None])), (look,), (0,)) == [None]
-    wary = Wary(Fixed(0.5, 0.5), contrast=254.0, crisp=5.0, slowest=0.3)
-    np.testing.assert_allclose(commands(wary, 3)[:, 0], 0.15)
-    sure = Wary(Fixed(0.5, 0.5), contrast=30.0, crisp=5.0, slowest=0.3)
-    assert commands(sure, 60)[-1, 0] > 0.49
-
-
 MORE = {
     **AGENTS,
     "eager": LanePilot(speed=0.2, offset_gain=8.0, slope_gain=2.0, contrast=0.0, brightness=0.0, reach_m=0.9),
@@ -124,12 +115,17 @@ def test_lanes_of_many_pictures_are_those_of_one_picture_after_another(seed, con
     assert find_lanes(Seen(parted(pictures)), asked, range(len(pictures))) == expected
 
 
-def test_pictures_are_looked_at_once():
+def test_pictures_are_looked_at_once_and_without_markings_there_is_no_lane_and_wary_slows_down():
     agents, pictures = [AGENTS["wary"], AGENTS["braitenberg"], AGENTS["wary"]], scenes(1)[0][:3]
     seen, memories = Seen(parted(pictures)), [agent.begin(ROBOT) for agent in agents]
     once, _ = act_together(agents, seen, memories)
     pictures[:] = 0
     np.testing.assert_array_equal(act_together(agents, seen, memories)[0], once)
+    look = Markings(open_eye(ROBOT), 60.0, 150.0)
+    assert find_lanes(Seen(parted(np.zeros_like(seen_from())[None])), (look,), (0,)) == [None]
+    wary = Wary(Fixed(0.5, 0.5), contrast=254.0, crisp=5.0, slowest=0.3)
+    np.testing.assert_allclose(commands(wary, 3)[:, 0], 0.15)
+    assert commands(Wary(Fixed(0.5, 0.5), contrast=30.0, crisp=5.0, slowest=0.3), 60)[-1, 0] > 0.49
 
 
 @pytest.mark.parametrize("name", ["steady", "brisk", "pursuer_near", "white_only", "smooth"])
@@ -142,9 +138,18 @@ def test_off_centre_agents_turn_back_to_the_lane(name):
     assert turns[0] < 0 < turns[1]
 
 
-def test_duties_ask_for_the_twist_and_turn_first_where_a_wheel_saturates():
+def test_duties_ask_for_the_twist_pilots_of_one_marking_look_at_no_other_and_laggy_waits_its_steps():
     np.testing.assert_allclose(duties(0.3, 0.0, full_speed=0.6, baseline=0.16), [0.5, 0.5])
     np.testing.assert_allclose(duties(0.6, 3.75, full_speed=0.6, baseline=0.16), [0.0, 1.0])
+    yellow = LanePilot(speed=0.2, offset_gain=8.0, slope_gain=2.0, markings="yellow")
+    blind = LanePilot(speed=0.2, offset_gain=8.0, slope_gain=2.0, markings="yellow", contrast=254.0)
+    straight = duties(0.2, 0.0, full_speed=0.6, baseline=0.16)
+    scene = seen_from(0.06)
+    np.testing.assert_allclose(blind.act(scene, blind.begin(ROBOT))[0], straight)
+    assert np.abs(yellow.act(scene, yellow.begin(ROBOT))[0] - straight).max() > 0.05
+    np.testing.assert_allclose(commands(Laggy(Fixed(0.4, 0.5), steps=2), 4)[:, 0], [0.0, 0.0, 0.4, 0.4])
+    np.testing.assert_allclose(commands(Smoothed(Fixed(0.4, 0.4), share=0.5), 3)[:, 0], [0.2, 0.3, 0.35])
+    np.testing.assert_allclose(commands(Leaning(Fixed(0.4, 0.4), bias=0.1), 1), [[0.36, 0.44]])
 
 
 class Fixed:
@@ -168,12 +173,6 @@ def commands(agent: Agent, steps: int) -> np.ndarray:
     return np.array(out)
 
 
-def test_laggy_waits_its_steps_smoothed_goes_a_share_of_the_way_and_leaning_gives_the_right_wheel_more():
-    np.testing.assert_allclose(commands(Laggy(Fixed(0.4, 0.5), steps=2), 4)[:, 0], [0.0, 0.0, 0.4, 0.4])
-    np.testing.assert_allclose(commands(Smoothed(Fixed(0.4, 0.4), share=0.5), 3)[:, 0], [0.2, 0.3, 0.35])
-    np.testing.assert_allclose(commands(Leaning(Fixed(0.4, 0.4), bias=0.1), 1), [[0.36, 0.44]])
-
-
 def test_agents_are_loaded_by_their_names_or_from_a_folder(tmp_path):
     with pytest.raises(ExtensionError, match="agent 'stead' is unknown .*; did you mean 'steady'"):
         load_agent("stead", tmp_path)
@@ -189,12 +188,3 @@ def test_agents_are_loaded_by_their_names_or_from_a_folder(tmp_path):
     for name in ("mine_agents:gone", "no_such_module:x", "mine_agents:broken"):
         with pytest.raises(ExtensionError, match=f"agent '{name}'"):
             load_agent(name, tmp_path)
-
-
-def test_lane_pilots_of_one_marking_do_not_look_at_the_other():
-    yellow = LanePilot(speed=0.2, offset_gain=8.0, slope_gain=2.0, markings="yellow")
-    blind = LanePilot(speed=0.2, offset_gain=8.0, slope_gain=2.0, markings="yellow", contrast=254.0)
-    straight = duties(0.2, 0.0, full_speed=0.6, baseline=0.16)
-    scene = seen_from(0.06)
-    np.testing.assert_allclose(blind.act(scene, blind.begin(ROBOT))[0], straight)
-    assert np.abs(yellow.act(scene, yellow.begin(ROBOT))[0] - straight).max() > 0.05

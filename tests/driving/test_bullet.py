@@ -15,8 +15,7 @@ from proxytune.driving.road_picture import Floor
 pybullet = pytest.importorskip("pybullet", reason="PyBullet is not installed")
 
 NOMINAL = replace(CAMERA, columns=64, rows=48)
-SMALL_LOOP = shipped_map("small_loop")
-FLOOR = draw_floor(SMALL_LOOP)
+FLOOR = draw_floor(shipped_map("small_loop"))
 
 
 def markings(pictures):

@@ -34,7 +34,6 @@ from proxytune.effects.image import CameraLatency, Defocus, Exposure, ImageNoise
 from proxytune.settings import Section
 
 LOG = Path(__file__).resolve().parents[2] / "../shared/data/logs/gym_duckietown_frames"
-SMALL_LOOP = shipped_map("small_loop")
 
 
 @functools.cache
@@ -50,8 +49,9 @@ def theirs():
     return np.stack([np.rint(matplotlib.image.imread(file)[..., :3] * 255) for file in files]).astype(int)
 
 
-def ours(road=SMALL_LOOP, **figures):
-    return GroundPlaneCamera(replace(CAMERA, **figures), draw_floor(road)).render(poses()).astype(int)
+def ours(**figures):
+    floor = draw_floor(shipped_map("small_loop"))
+    return GroundPlaneCamera(replace(CAMERA, **figures), floor).render(poses()).astype(int)
 
 
 @functools.cache

@@ -42,7 +42,7 @@ def held(throttle, steering, ticks=300):
     return np.tile((throttle, steering), (ticks, 1))
 
 
-def test_a_car_drives_straight_at_full_speed_in_the_circle_of_its_wheels_and_throttle_begins_at_nothing():
+def test_a_car_drives_as_its_figures_say_and_its_loop_bends_one_and_a_half_times_as_wide():
     np.testing.assert_allclose(twists(CAR, held(1.0, 0.0))[-1], (3.0, 0.0, 0.0))
     forward, _, yaw = twists(CAR, held(0.5, 1.0))[-1]
     assert forward / yaw == pytest.approx(CAR.least_radius)
@@ -50,6 +50,16 @@ def test_a_car_drives_straight_at_full_speed_in_the_circle_of_its_wheels_and_thr
     assert twists(CAR, held(-0.5, 1.0))[-1, 2] == pytest.approx(-yaw)
     assert twists(DART, held(-1.0, 0.3))[-1, 0] == 0.0
     assert twists(CAR, held(-1.0, 0.3))[-1, 0] == -3.0
+    road, small = shipped_map("car_loop"), shipped_map("small_loop")
+    assert min(arc.radius for arc in road.segments if isinstance(arc, Arc)) - road.lane_offset >= 1.5 * CAR.least_radius
+    scale = CAR.figures["lane_width"] / small.lane_width
+    for one, other in ((road.width, small.width), (road.lane_offset, small.lane_offset),
+                       (road.paint.white_width, small.paint.white_width)):  # fmt: skip
+        assert one == pytest.approx(scale * other, rel=1e-3)
+    assert len(road.starts) == 10
+    poses = np.array(road.starts)
+    ways = lane_pose(road, poses[:, :2], np.radians(poses[:, 2])).counter_clockwise
+    assert {bool(way) for way in ways} == {True, False}
 
 
 @pytest.mark.skipif(not has_pybullet(), reason="PyBullet is not installed")
@@ -64,7 +74,7 @@ def test_bullet_drives_a_car_as_the_planar_plant_does(command):
     assert poses[-1, 2] == pytest.approx(expected[-1, 2], abs=0.03)
 
 
-def test_the_same_effect_bends_throttle_or_steering_and_leaves_the_other():
+def test_the_same_effect_bends_throttle_or_steering_with_a_delay_on_top_and_a_curve_of_its_own():
     drive = held(0.5, 0.5)
     plain = twists(DART, drive)[-1]
     assert twists(DART, drive, dead_band=0.1)[-1, 0] == pytest.approx(plain[0] * 0.8)
@@ -76,9 +86,6 @@ def test_the_same_effect_bends_throttle_or_steering_and_leaves_the_other():
     angle = np.arctan(step[:30, 2] / step[:30, 0] * 0.1735) / np.radians(25.0) / 0.5
     assert np.abs(angle - reached).max() < 0.1
     assert step[11, 0] == pytest.approx(plain[0] * (1.0 - np.exp(-1.0)), rel=0.05)
-
-
-def test_the_delay_of_the_steering_comes_on_top_and_its_curve_has_sides_of_its_own():
     moved = twists(CAR, held(0.2, 1.0), delay=0.1, steering_delay=0.2)
     assert np.flatnonzero(moved[:, 0])[0] == 6
     assert np.flatnonzero(moved[:, 2])[0] == 18
@@ -105,22 +112,25 @@ def test_a_car_with_mass_does_what_its_equation_says_and_slides_beyond_its_tyres
     assert sideways == pytest.approx(-0.01 * forward * forward * yaw)
 
 
-def test_car_loop_bends_one_and_a_half_times_as_wide_as_the_car_turns_and_is_the_paper_s_road_to_scale():
-    road, small = shipped_map("car_loop"), shipped_map("small_loop")
-    assert min(arc.radius for arc in road.segments if isinstance(arc, Arc)) - road.lane_offset >= 1.5 * CAR.least_radius
-    scale = CAR.figures["lane_width"] / small.lane_width
-    for one, other in ((road.width, small.width), (road.lane_offset, small.lane_offset),
-                       (road.paint.white_width, small.paint.white_width)):  # fmt: skip
-        assert one == pytest.approx(scale * other, rel=1e-3)
-    assert len(road.starts) == 10
-    poses = np.array(road.starts)
-    ways = lane_pose(road, poses[:, :2], np.radians(poses[:, 2])).counter_clockwise
-    assert {bool(way) for way in ways} == {True, False}
-
-
-def test_a_map_too_tight_for_the_car_is_refused_in_a_line(tmp_path):
+def test_a_map_too_tight_for_the_car_and_an_effect_of_another_drive_are_refused_in_a_line(tmp_path, write_file):
     with pytest.raises(SettingsError, match=r"small_loop bend at 0\.16 m, robot 'car' turns at 0\.74 m or more"):
         family(tmp_path, map="small_loop")
+    told = complaint_of(effects_from, {"trim": 0.1}, CAR.figures, CAR.catalogue)
+    assert 'only a robot with drive = "differential" has it, this one is "ackermann"' in told
+    told = complaint_of(effects_from, {"dead_band.width": 0.1}, CAR.figures, CAR.catalogue)
+    assert "did you mean 'dead_band'" in told
+
+    with pytest.raises(SettingsError, match='only a robot with drive = "ackermann" has it'):
+        effects_from({"steering_offset": 0.1}, read_robot("duckiebot").figures)
+    model = write_file('format = 1\nrobot = "duckiebot"\n[effects.steering_offset]\noffset = 0.1\n', "model.toml")
+    with pytest.raises(SettingsError, match=r"effects.steering_offset: no such effect; only a robot with drive"):
+        read_model_of(model, tmp_path)
+    model.write_text(model.read_text(encoding="utf-8").replace("duckiebot", "car"), encoding="utf-8")
+    assert read_model_of(model, tmp_path).theta == {"steering_offset": 0.1}
+    assert catalogue_of("car", tmp_path) == Catalogue(tmp_path, drive="ackermann")
+
+    assert parameter_hint("trim", family(tmp_path).parameters).startswith('only a robot with drive = "differential"')
+    assert parameter_hint("steering_ofset", family(tmp_path).parameters) == "did you mean 'steering_offset'?"
 
 
 @pytest.mark.slow
@@ -137,8 +147,7 @@ def test_our_agents_keep_a_car_in_its_lane_and_repeat_themselves(tmp_path, agent
 
 
 def test_the_agent_at_the_wheel_asks_for_the_curvature_that_it_wants_of_two_wheels():
-    wanted = AtTheWheel(AGENTS["steady"])
-    _, scale, memory = wanted.begin(CAR)
+    _, scale, memory = AtTheWheel(AGENTS["steady"]).begin(CAR)
     assert scale == pytest.approx(2.25)
     assert memory.full_speed == pytest.approx(3.0 / 2.25)
     assert throttle_and_steering(CAR, 0.6, 1.0 / CAR.least_radius) == pytest.approx((0.2, 1.0))
@@ -151,31 +160,10 @@ def test_the_expert_keeps_all_wheels_of_a_car_in_its_lane(tmp_path):
     sample, steps = domain.demonstrate(make_episode({}, agent="-", start=2, seed=1), 6.0)
     assert len(sample.commands) == steps == 120
     assert np.abs(sample.commands).max() <= 1.0
-    robot = lesson_driver(domain.map, CAR, 1, None).begin(CAR).robot
-    assert robot.drive == "ackermann"
+    assert lesson_driver(domain.map, CAR, 1, None).begin(CAR).robot.drive == "ackermann"
     rows = np.array([domain.map.starts[0]] * 60) * (1.0, 1.0, np.pi / 180.0)
     whole = driving_score(domain.map, rows, wheel_distance=CAR.wheel_distance(), tick_s=0.1, seconds=6.0)
     assert whole == pytest.approx(5.9)
-
-
-def test_an_effect_of_another_drive_is_refused_in_a_line(tmp_path):
-    told = complaint_of(effects_from, {"trim": 0.1}, CAR.figures, CAR.catalogue)
-    assert 'only a robot with drive = "differential" has it, this one is "ackermann"' in told
-    told = complaint_of(effects_from, {"dead_band.width": 0.1}, CAR.figures, CAR.catalogue)
-    assert "did you mean 'dead_band'" in told
-
-    with pytest.raises(SettingsError, match='only a robot with drive = "ackermann" has it'):
-        effects_from({"steering_offset": 0.1}, read_robot("duckiebot").figures)
-    model = tmp_path / "model.toml"
-    model.write_text('format = 1\nrobot = "duckiebot"\n[effects.steering_offset]\noffset = 0.1\n', encoding="utf-8")
-    with pytest.raises(SettingsError, match=r"effects.steering_offset: no such effect; only a robot with drive"):
-        read_model_of(model, tmp_path)
-    model.write_text(model.read_text(encoding="utf-8").replace("duckiebot", "car"), encoding="utf-8")
-    assert read_model_of(model, tmp_path).theta == {"steering_offset": 0.1}
-    assert catalogue_of("car", tmp_path) == Catalogue(tmp_path, drive="ackermann")
-
-    assert parameter_hint("trim", family(tmp_path).parameters).startswith('only a robot with drive = "differential"')
-    assert parameter_hint("steering_ofset", family(tmp_path).parameters) == "did you mean 'steering_offset'?"
 
 
 BAD = {
@@ -186,9 +174,8 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("case", BAD)
-def test_a_mistake_in_a_car_s_robot_toml_is_one_line(tmp_path, case):
-    before, after, says = BAD[case]
+@pytest.mark.parametrize(("before", "after", "says"), BAD.values(), ids=BAD)
+def test_a_mistake_in_a_car_s_robot_toml_is_one_line(tmp_path, before, after, says):
     text = (shipped("robots") / "dart" / "robot.toml").read_text(encoding="utf-8")
     assert before in text
     text = text.replace(before, after).replace('name = "dart"', 'name = "mine"')

@@ -143,16 +143,13 @@ def test_a_marker_moves_the_measured_poses_and_not_the_true_ones(tmp_path, plant
     np.testing.assert_allclose(shift[:, 2], np.radians(10.0))
 
 
-def test_a_slope_is_felt_along_the_heading_that_the_robot_starts_with(tmp_path):
+def test_a_slope_is_felt_along_the_first_heading_and_theta_goes_before_effects_of_section_and_model(tmp_path):
     domain = family(tmp_path, plant="planar", seconds=1.0, position_noise_m=0.0, heading_noise_deg=0.0)
     start = poses(domain)[0]
     uphill = {"floor_slope.x": 0.1 * np.cos(start[2]), "floor_slope.y": 0.1 * np.sin(start[2])}
     along = np.array((np.cos(start[2]), np.sin(start[2])))
     level, climbed = ((poses(domain, **theta)[-1] - start)[:2] @ along for theta in ({}, uphill))
     assert 0.05 < level - climbed < 0.1
-
-
-def test_naming_nominal_values_changes_nothing_and_theta_goes_before_effects_of_section_and_model(tmp_path):
     domain = family(tmp_path, plant="planar")
     nominal = {"trim": 0, "delay": 0.15, "blur": 0.05, "camera_pitch": 19.15, "wheel_gain.left": 1, "driver_map": 0}
     np.testing.assert_array_equal(poses(domain, **nominal), poses(domain))
@@ -166,7 +163,7 @@ def test_naming_nominal_values_changes_nothing_and_theta_goes_before_effects_of_
     assert values["motor_lag"].time_constant == 0.2
 
 
-def test_what_determines_a_result_determines_the_identity(tmp_path):
+def test_what_determines_a_result_determines_the_identity_and_a_model_s_plant_is_not_overruled(tmp_path, write_file):
     (tmp_path / "a").mkdir()
     (tmp_path / "b").mkdir()
     same = family(tmp_path / "a").identity
@@ -175,6 +172,10 @@ def test_what_determines_a_result_determines_the_identity(tmp_path):
     assert same != family(tmp_path / "a", effects={"trim": {"trim": 0.1}}).identity
     (tmp_path / "a" / "mine.py").write_text("x = 1", encoding="utf-8")
     assert same != family(tmp_path / "a").identity
+    model = write_file('robot = "duckiebot"\nplant = "planar"\n', "model.toml")
+    assert family(tmp_path, model=model).plant == "planar"
+    with pytest.raises(SettingsError, match="is 'bullet' but the model says 'planar'"):
+        family(tmp_path, model=model, plant="bullet")
 
 
 @pytest.mark.parametrize(
@@ -191,14 +192,6 @@ def test_what_determines_a_result_determines_the_identity(tmp_path):
 )
 def test_a_mistake_in_the_domain_table_is_one_line(tmp_path, domain, says):
     assert says in complaint_of(lambda: family(tmp_path, **domain))
-
-
-def test_a_model_of_another_plant_is_not_overruled_in_silence(tmp_path):
-    model = tmp_path / "model.toml"
-    model.write_text('robot = "duckiebot"\nplant = "planar"\n', encoding="utf-8")
-    assert family(tmp_path, model=model).plant == "planar"
-    with pytest.raises(SettingsError, match="is 'bullet' but the model says 'planar'"):
-        family(tmp_path, model=model, plant="bullet")
 
 
 @pytest.mark.parametrize("plant", ["bullet", "planar"])
@@ -233,9 +226,8 @@ left = [-0.05, -0.1]
 
 
 @pytest.mark.parametrize("plant", ["bullet", "planar"])
-def test_a_proxy_drives_what_its_model_has_learnt(tmp_path, plant):
-    model = tmp_path / "model.toml"
-    model.write_text(LEARNT)
+def test_a_proxy_drives_what_its_model_has_learnt(tmp_path, write_file, plant):
+    model = write_file(LEARNT, "model.toml")
     plain, learnt = (family(tmp_path, plant=plant, seconds=1.5, model=one) for one in (None, model))
     assert learnt.identity != plain.identity
     assert np.hypot(*(poses(learnt)[-1] - poses(plain)[-1])[:2]) > 0.01
@@ -438,8 +430,7 @@ def test_a_drive_is_scored_by_every_metric_and_early_ones_by_its_first_seconds()
     early = {"early_distance": "m", "early_offset": "m", "speed": "m/s"}
     assert {"distance": "m", "survival_time": "s", "time_out_of_lane": "s", "deviation": "m"} | early == METRICS
     short = drive(moved_left(OUTER, 0.03), [(0.4, 0.0)])
-    still = np.repeat(short[-1:], 60 * 20, axis=0)
-    whole = np.concatenate((short, still))
+    whole = np.concatenate((short, np.repeat(short[-1:], 60 * 20, axis=0)))
     first = score(whole[: 5 * 60 + 1])
     result = score(whole)
     assert result["early_distance"] == first["distance"] == pytest.approx(0.4)
@@ -458,23 +449,18 @@ def test_laps_count_the_centre_lines_length_to_a_millimetre_wherever_in_the_lane
 
 
 @both_lanes
-def test_the_wrong_way_round_counts_nothing_and_is_all_out_of_lane(start, outer):
+def test_the_wrong_way_round_counts_nothing_and_is_out_of_lane_and_backwards_in_it_counts_negative(start, outer):
     wrong = drive(start, lap(outer))[::-1] + (0, 0, pi)
     result = score(wrong)
     assert result["distance"] == 0
     assert result["time_out_of_lane"] == pytest.approx(result["survival_time"])
     assert result["deviation"] == pytest.approx(2 * OFFSET, abs=1e-6)
-
-
-@both_lanes
-def test_driving_backwards_in_the_lane_counts_negative(start, outer):
-    backwards = [(-length, curvature) for length, curvature in reversed(lap(outer))]
-    result = score(drive(start, backwards))
+    result = score(drive(start, [(-length, curvature) for length, curvature in reversed(lap(outer))]))
     assert result["distance"] == pytest.approx(-lane_length(ROAD, outer), abs=0.001)
     assert result["time_out_of_lane"] == 0
 
 
-def test_a_stopped_robot_survives_and_one_that_ends_at_once_does_not():
+def test_a_stopped_robot_survives_until_the_time_limit_and_one_that_ends_at_once_or_leaves_the_map_does_not():
     result = score(np.tile(moved_left(OUTER, 0.05), (3601, 1)))
     assert result == {
         "distance": 0,
@@ -489,9 +475,6 @@ def test_a_stopped_robot_survives_and_one_that_ends_at_once_does_not():
     result = score(np.array([moved_left(OUTER, 0.05)]))
     nothing = dict.fromkeys(("distance", "survival_time", "time_out_of_lane", "early_distance", "speed"), 0)
     assert result == nothing | {"deviation": pytest.approx(0.05), "early_offset": pytest.approx(0.05)}
-
-
-def test_survival_ends_off_the_map_or_at_the_time_limit():
     x, y, _ = OUTER
     out = drive((x, y, 0.0), [(3.0, 0.0)])
     first = next(k for k, pose in enumerate(out) if off_map(ROAD, pose[0], pose[1]))
@@ -548,8 +531,7 @@ def test_crossing_the_middle_of_the_map_counts_nothing_there(middle):
 @given(st.integers(0, 10**6), st.floats(0, 1))
 def test_the_parts_of_a_drive_add_up(seed, share):
     poses = wandering(seed)
-    survived = round(score(poses)["survival_time"] * 60)
-    cut = round(share * survived)
+    cut = round(share * round(score(poses)["survival_time"] * 60))
     whole, first, second = score(poses), score(poses[: cut + 1]), score(poses[cut:])
     for metric in ("distance", "survival_time", "time_out_of_lane"):
         assert first[metric] + second[metric] == pytest.approx(whole[metric], abs=1e-9), metric

@@ -82,11 +82,6 @@ def test_undisturbed_it_keeps_both_wheels_in_the_lane_from_all_ten_starts(theta)
     assert scores == pytest.approx([SECONDS] * 10)
 
 
-def test_looking_half_a_metre_ahead_cuts_the_corners_where_trim_and_delay_are_off():
-    assert score(lesson(0, SHIFTED, look_ahead=0.5)) < 0.6 * SECONDS
-    assert score(lesson(0, SHIFTED)) == pytest.approx(SECONDS)
-
-
 @pytest.mark.parametrize("outer", [True, False])
 @pytest.mark.parametrize("left", [-0.06, 0.06])
 def test_off_the_centre_line_it_turns_back_to_it(outer, left):
@@ -97,7 +92,7 @@ def test_off_the_centre_line_it_turns_back_to_it(outer, left):
     assert (command[1] - command[0]) * left < 0
 
 
-def test_it_steers_along_the_circle_through_the_point_pursued_and_straight_on_a_straight():
+def test_it_steers_along_the_circle_through_the_point_pursued_and_half_a_metre_ahead_cuts_corners():
     here = lane_point(ROAD, True, 0.1)
     command = shown(expert(), [np.array((*here, np.pi / 2))])[0][0]
     assert command == pytest.approx(np.full(2, SPEED / ROBOT.figures["full_speed"]))
@@ -110,9 +105,11 @@ def test_it_steers_along_the_circle_through_the_point_pursued_and_straight_on_a_
     once, twice = (shown(expert(gain=gain), STEPS[:30])[0] for gain in (1.0, 1.5))
     assert np.diff(twice) == pytest.approx(1.5 * np.diff(once))
     assert twice.sum(axis=1) == pytest.approx(once.sum(axis=1))
+    assert score(lesson(0, SHIFTED, look_ahead=0.5)) < 0.6 * SECONDS
+    assert score(lesson(0, SHIFTED)) == pytest.approx(SECONDS)
 
 
-def test_a_push_turns_the_robot_without_speeding_it_up_and_is_not_shown():
+def test_a_push_turns_the_robot_without_speeding_it_up_is_not_shown_and_follows_from_seed_and_step():
     calm, calm_memory = shown(expert())
     pushed, pushed_memory = shown(expert(disturbance=DISTURBANCE))
     np.testing.assert_array_equal(calm_memory.commands, pushed_memory.commands)
@@ -124,9 +121,6 @@ def test_a_push_turns_the_robot_without_speeding_it_up_and_is_not_shown():
     driven, memory = shown(expert(disturbance=5.0))
     assert np.abs(driven).max() == 1.0
     assert np.abs(memory.commands).max() < 1.0
-
-
-def test_the_disturbance_is_a_function_of_seed_and_step_of_the_size_it_was_given():
     driven, memory = shown(expert(3, disturbance=DISTURBANCE))
     np.testing.assert_allclose(driven - np.array(memory.commands), pushes(3), atol=1e-12)
     np.testing.assert_array_equal(pushes(3, 20), pushes(3)[:20])
@@ -211,11 +205,14 @@ def test_lane_following_has_every_member_of_a_classroom():
 
 
 @both_plants
-def test_the_same_lesson_shows_the_same_samples_to_the_last_bit(plant):
+def test_the_same_lesson_shows_the_same_samples_to_the_last_bit_with_the_pictures_of_an_agent(plant):
     room = classroom(plant=plant)
     first, again = (room.demonstrate(episode(), 1.0)[0] for _ in range(2))
     np.testing.assert_array_equal(first.observations, again.observations)
     np.testing.assert_array_equal(first.commands, again.commands)
+    samples, _ = room.demonstrate(episode(), 1.0)
+    seen = room.replay(episode(), lesson_of_teaching(room, episode(), 1.0).commands).pictures
+    np.testing.assert_array_equal(samples.observations, seen)
 
 
 def test_another_seed_start_or_theta_shows_other_samples_and_a_lesson_off_the_road_says_where():
@@ -226,19 +223,10 @@ def test_another_seed_start_or_theta_shows_other_samples_and_a_lesson_off_the_ro
         assert (other.commands != shown[0].commands).any()
         assert (other.observations != shown[0].observations).any()
     driven = lesson(1, (("trim", 0.5),))
-    middles = driven.poses[:-1:3, :2]
-    inside = np.abs(middles - ROAD.size[0] / 2).max(axis=1)
+    inside = np.abs(driven.poses[:-1:3, :2] - ROAD.size[0] / 2).max(axis=1)
     assert len(driven.memory.on_road) == len(driven.commands)
     assert not all(driven.memory.on_road)
     assert not any(driven.memory.on_road[step] for step in np.flatnonzero(inside < 0.2))
-
-
-@both_plants
-def test_the_pictures_are_those_that_an_agent_would_have_seen(plant):
-    room = classroom(plant=plant)
-    samples, _ = room.demonstrate(episode(), 1.0)
-    seen = room.replay(episode(), lesson_of_teaching(room, episode(), 1.0).commands).pictures
-    np.testing.assert_array_equal(samples.observations, seen)
 
 
 @pytest.mark.parametrize(
@@ -267,7 +255,7 @@ def test_a_guided_policy_drives_as_it_does_alone_and_sees_what_it_sees_then(plan
     np.testing.assert_array_equal(samples.observations, room.replay(episode(), driven.commands).pictures)
 
 
-def test_a_guided_policys_steps_are_labelled_by_the_expert_on_the_road_alone():
+def test_a_guided_policys_steps_are_labelled_by_the_expert_on_the_road_alone_and_failures_timed():
     room = classroom(plant="planar")
     samples, _ = room.guide(episode(), lean, 1.0)
     poses = only(room._drive([episode()], [Pupil(lean)], 1.0)).poses[:: TICK_HZ // RATE]
@@ -279,15 +267,12 @@ def test_a_guided_policys_steps_are_labelled_by_the_expert_on_the_road_alone():
     samples, asked = room.guide(episode(start=1), straight, 12.0)
     driven = only(room._drive([episode(start=1)], [Pupil(straight)], 12.0))
     assert 0 < len(samples.commands) == len(samples.observations) < len(driven.commands) < asked == 12 * RATE
+    with pytest.raises(EpisodeError, match=r"^raised ValueError at 0\.00 s: lost$"):
+        classroom(plant="planar").guide(episode(), lost, 1.0)
 
 
 def lost(picture):
     raise ValueError("lost")
-
-
-def test_a_guided_policy_that_fails_is_told_with_the_time_in_one_line():
-    with pytest.raises(EpisodeError, match=r"^raised ValueError at 0\.00 s: lost$"):
-        classroom(plant="planar").guide(episode(), lost, 1.0)
 
 
 @pytest.mark.parametrize("method", ["demonstrate", "guide"])

@@ -32,7 +32,7 @@ def test_a_robot_counts_by_what_its_files_mean(tmp_path):
     assert family(tmp_path).identity != before
 
 
-def test_a_user_s_modules_count_by_their_meaning_in_packages_too(tmp_path):
+def test_a_user_s_modules_count_by_their_meaning_in_packages_too_wherever_the_study_lies(tmp_path):
     (tmp_path / "pack").mkdir()
     path = tmp_path / "pack" / "mine.py"
     path.write_text("x = 1\n")
@@ -41,6 +41,10 @@ def test_a_user_s_modules_count_by_their_meaning_in_packages_too(tmp_path):
     assert family(tmp_path).identity == before
     path.write_text("x = 2\n")
     assert family(tmp_path).identity != before
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        Path(tmp_path / name / "mine.py").write_text("x = 1\n")
+    assert family(tmp_path / "a").identity == family(tmp_path / "b").identity
 
 
 @pytest.mark.parametrize(
@@ -59,13 +63,6 @@ def test_the_versions_of_what_simulates_count(tmp_path, monkeypatch, plant, came
         other = {**installed, package: "0.0"}
         monkeypatch.setattr("proxytune.driving.family.versions_of", lambda names, o=other: {n: o[n] for n in names})
         assert (domain.identity != before) == (package in packages)
-
-
-def test_an_identity_does_not_depend_on_where_the_study_lies(tmp_path):
-    for name in ("a", "b"):
-        (tmp_path / name).mkdir()
-        Path(tmp_path / name / "mine.py").write_text("x = 1\n")
-    assert family(tmp_path / "a").identity == family(tmp_path / "b").identity
 
 
 ROBOT = read_robot("duckiebot")

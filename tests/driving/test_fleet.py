@@ -124,10 +124,13 @@ def test_episodes_of_several_thetas_and_more_than_drive_at_once_score_as_each_do
         assert room.examine_together(what, lean) == [room.examine(one, lean) for one in what]
 
 
-def test_a_policy_is_asked_only_when_a_picture_is_new():
+def test_a_policy_is_asked_only_when_a_picture_is_new_and_a_robot_without_a_camera_is_refused_alike():
     room, asked = classroom(plant="planar", seconds=1.0), []
     room.examine_together(episodes(1), lambda picture: asked.append(picture) or np.full(2, 0.1))
     assert len(asked) == 15
+    room = dataclasses.replace(classroom(plant="planar"), robot="irobot_create")
+    alone = complaint_of(room.examine, episodes(1)[0], lean)
+    assert complaint_of(room.examine_together, episodes(2), lean) == alone
 
 
 def lost(picture):
@@ -156,12 +159,6 @@ def test_a_policy_that_fails_is_told_as_if_one_episode_followed_the_other(form, 
 def test_a_policy_that_cannot_answer_many_as_it_should_is_asked_one_by_one(many):
     room, what = classroom(plant="planar", seconds=1.0), episodes(2)
     assert room.examine_together(what, Taught(lean, many)) == [room.examine(one, lean) for one in what]
-
-
-def test_a_robot_that_cannot_be_examined_is_refused_in_the_same_line():
-    room = dataclasses.replace(classroom(plant="planar"), robot="irobot_create")
-    alone = complaint_of(room.examine, episodes(1)[0], lean)
-    assert complaint_of(room.examine_together, episodes(2), lean) == alone
 
 
 MIXED = (
@@ -248,7 +245,7 @@ def of_agents(*agents):
     return [make_episode({}, agent=agent, start=start, seed=start) for agent in agents for start in range(2)]
 
 
-def test_agents_that_fail_are_named_with_the_time_and_the_others_go_on(own):
+def test_agents_that_fail_are_named_with_the_time_and_the_others_go_on_if_there_are_any(own):
     what = of_agents("steady", "mine:Late", "mine:NoStart", "mine:NotFinite", "mine:ManyLate", "mine:Counting")
     told = own.run_many(what)
     assert [str(one) for one in told[2:10]] == [
@@ -261,9 +258,6 @@ def test_agents_that_fail_are_named_with_the_time_and_the_others_go_on(own):
     assert told[:2] + told[10:] == [own.run(one) for one in what[:2] + what[10:]]
     with pytest.raises(EpisodeError, match=r"raised ValueError at 1\.50 s: lost"):
         own.run(what[2])
-
-
-def test_a_fleet_in_which_everybody_fails_ends(own):
     assert all(isinstance(one, EpisodeError) for one in own.run_many(of_agents("mine:NoStart", "mine:Late")))
 
 

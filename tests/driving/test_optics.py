@@ -15,9 +15,7 @@ from proxytune.driving.road_picture import Floor
 
 NOMINAL = replace(CAMERA, columns=64, rows=48)
 ONE_PIXEL = replace(NOMINAL, columns=1, rows=1)
-SMALL_LOOP = shipped_map("small_loop")
-FLOOR = draw_floor(SMALL_LOOP)
-POSES = st.tuples(st.floats(0.2, 1.5), st.floats(0.2, 1.5), st.floats(-7.0, 7.0))
+FLOOR = draw_floor(shipped_map("small_loop"))
 
 
 def gradient_floor():
@@ -27,9 +25,6 @@ def gradient_floor():
     pixels = np.zeros((side, side, 3), dtype=np.uint8)
     pixels[..., 0], pixels[..., 1] = ramp[None, :], ramp[:, None]
     return Floor(pixels, 400.0, -0.4)
-
-
-GRADIENT = gradient_floor()
 
 
 def on_map(points, pose):
@@ -70,10 +65,9 @@ def test_the_middle_of_the_picture_looks_down_at_the_pitch(pitch, height):
     assert y == pytest.approx(0.0, abs=1e-12)
 
 
-def test_rows_and_columns_reach_over_the_field_of_view():
+def test_rows_and_columns_reach_over_the_field_of_view_which_yaw_roll_and_place_turn():
     points = ground_points(replace(NOMINAL, columns=1, rows=4801, height_m=1.0, forward_m=0.0))
-    depression = np.degrees(np.arctan2(1.0, points[-1, 0, 0]))
-    assert depression == pytest.approx(19.15 + 37.5, abs=0.02)
+    assert np.degrees(np.arctan2(1.0, points[-1, 0, 0])) == pytest.approx(19.15 + 37.5, abs=0.02)
     points = ground_points(replace(NOMINAL, pitch_deg=90.0, forward_m=0.0))
     assert np.allclose(np.diff(points[..., 1], axis=1), np.diff(points[..., 0], axis=0)[0, 0])
     assert (points[:, :32, 1] > 0).all()
@@ -82,16 +76,12 @@ def test_rows_and_columns_reach_over_the_field_of_view():
     horizon = 24 - 24 * math.tan(math.radians(19.15)) / math.tan(math.radians(37.5))
     assert np.isnan(points[: math.floor(horizon)]).all()
     assert np.isfinite(points[math.ceil(horizon) :]).all()
-
-
-def test_a_camera_turns_its_view_by_yaw_roll_and_place():
     straight, turned = ground_points(NOMINAL), ground_points(replace(NOMINAL, yaw_deg=10.0))
     lens = np.array([0.066, 0.0])
     cos, sin = math.cos(math.radians(10)), math.sin(math.radians(10))
     expected = (straight - lens) @ np.array([[cos, sin], [-sin, cos]]) + lens
     np.testing.assert_allclose(turned, expected, atol=1e-9)
-    points = ground_points(replace(NOMINAL, roll_deg=8.0))
-    sky = np.isnan(points[..., 0]).sum(axis=0)
+    sky = np.isnan(ground_points(replace(NOMINAL, roll_deg=8.0))[..., 0]).sum(axis=0)
     assert sky[0] > sky[-1] + 4  # the right of the picture looks further down
     ahead = ground_points(replace(NOMINAL, forward_m=0.166)) - ground_points(NOMINAL)
     seen = np.isfinite(ahead[..., 0])
@@ -120,8 +110,7 @@ def test_the_lens_looks_along_its_axis_through_its_centre_whatever_else_it_does(
     """From the picture's middle, its centre is shares of the height to the right and down: 64 × 48 pixels."""
     figures = replace(NOMINAL, centre_right=right, centre_down=down, aspect=aspect, k1=k1)
     centre = lens_rays(figures, np.array([32.0 + 48.0 * right]), np.array([24.0 + 48.0 * down]))[0]
-    middle = lens_rays(NOMINAL, np.array([32.0]), np.array([24.0]))[0]
-    np.testing.assert_allclose(centre, middle, atol=1e-9)
+    np.testing.assert_allclose(centre, lens_rays(NOMINAL, np.array([32.0]), np.array([24.0]))[0], atol=1e-9)
 
 
 @given(st.floats(0.7, 1.4))
@@ -136,25 +125,22 @@ def test_things_look_wider_by_the_aspect_and_as_high_as_before(aspect):
 
 
 @pytest.mark.slow
-@given(POSES)
+@given(st.tuples(st.floats(0.2, 1.5), st.floats(0.2, 1.5), st.floats(-7.0, 7.0)))
 @settings(max_examples=25)
 def test_a_pixel_shows_the_place_that_it_looks_at(pose):
-    picture = GroundPlaneCamera(NOMINAL, GRADIENT).render(np.array([pose]))[0]
+    picture = GroundPlaneCamera(NOMINAL, gradient_floor()).render(np.array([pose]))[0]
     places = on_map(ground_points(NOMINAL), pose)
     inside = ((places > -0.3) & (places < 2.06)).all(axis=-1) & (np.arange(48)[:, None] > 20)
     expected = (places + 0.4) / 2.56 * 255.0
     np.testing.assert_allclose(picture[inside][:, :2], expected[inside], atol=3.0)
 
 
-def test_sky_is_above_the_horizon_and_far_from_the_map_there_is_nothing():
+def test_sky_is_above_the_horizon_nothing_far_from_the_map_and_a_batch_is_as_one_after_another():
     pictures = GroundPlaneCamera(replace(NOMINAL, roll_deg=5.0), FLOOR).render(loop_poses(4))
     sky = (pictures == SKY).all(axis=-1)
     assert (sky == np.isnan(ground_points(replace(NOMINAL, roll_deg=5.0))[..., 0])).all()
     pictures = GroundPlaneCamera(NOMINAL, FLOOR).render(np.array([[30.0, -20.0, 0.3], [-2.0, 0.5, 3.1]]))
     assert np.abs(pictures[:, 14:] - np.array(COLOURS["off_map"], dtype=float)).max() <= 3.0
-
-
-def test_a_batch_of_poses_gives_the_pictures_of_one_after_another():
     camera, poses = GroundPlaneCamera(NOMINAL, FLOOR), loop_poses(7)
     singly = np.concatenate([camera.render(poses[i : i + 1]) for i in range(7)])
     pictures = camera.render(poses)

@@ -53,9 +53,8 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("case", BAD)
-def test_what_is_no_urdf_is_refused_in_a_line(tmp_path, case):
-    text, expected = BAD[case]
+@pytest.mark.parametrize(("text", "expected"), BAD.values(), ids=BAD)
+def test_what_is_no_urdf_is_refused_in_a_line(tmp_path, text, expected):
     path = tmp_path / "robot.urdf"
     if text is not None:
         path.write_text(text)
@@ -80,11 +79,9 @@ CHANGES = {
 }
 
 
-@pytest.mark.parametrize("case", CHANGES)
-def test_a_urdf_that_disagrees_with_robot_toml_is_refused(tmp_path, case):
-    before, after, expected = CHANGES[case]
-    path = tmp_path / "robot.urdf"
-    path.write_text(TEXT.replace(before, after))
+@pytest.mark.parametrize(("before", "after", "expected"), CHANGES.values(), ids=CHANGES)
+def test_a_urdf_that_disagrees_with_robot_toml_is_refused(write_file, before, after, expected):
+    path = write_file(TEXT.replace(before, after), "robot.urdf")
     with pytest.raises(SettingsError, match=expected):
         check_body(replace(ROBOT, urdf=path))
 

@@ -70,11 +70,6 @@ def overlapping():
     return before + down + bend + middle + bend + down + rest
 
 
-def test_maps_that_travel_along_are_no_robots():
-    assert set(map_names()) == {"car_loop", "horseshoe", "small_loop"}
-    assert "maps" not in robot_names()
-
-
 @pytest.mark.slow
 def test_a_map_beside_the_study_is_driven(tmp_path):
     written(tmp_path, HORSESHOE)
@@ -86,7 +81,7 @@ def test_a_map_beside_the_study_is_driven(tmp_path):
     assert mine.run(episode) != family(tmp_path, "small_loop").run(episode)
 
 
-def test_what_a_map_file_says_is_part_of_the_family(tmp_path):
+def test_what_a_map_file_says_is_part_of_the_family_and_shipped_maps_are_no_robots(tmp_path):
     written(tmp_path, HORSESHOE)
     before, same = family(tmp_path), family(tmp_path)
     assert before == same
@@ -94,6 +89,8 @@ def test_what_a_map_file_says_is_part_of_the_family(tmp_path):
     written(tmp_path, changed(HORSESHOE, "white_width = 0.048", "white_width = 0.047"))
     assert family(tmp_path) != before
     assert family(tmp_path).identity != before.identity
+    assert set(map_names()) == {"car_loop", "horseshoe", "small_loop"}
+    assert "maps" not in robot_names()
 
 
 def test_segments_are_read_in_their_order_and_bends_painted_on_their_own_radius_where_the_file_says_nothing(tmp_path):
@@ -183,7 +180,6 @@ both_lanes = pytest.mark.parametrize("outer", [True, False], ids=("outer", "inne
 quick = settings(max_examples=25)
 coordinates = st.floats(-0.5, 3.5)
 points = st.tuples(coordinates, coordinates)
-ways = st.floats(-12.0, 20.0)
 
 
 def lane(road, outer, spacing=0.002):
@@ -194,13 +190,16 @@ def lane(road, outer, spacing=0.002):
 
 
 @every_road
-def test_the_road_closes(road):
+def test_the_road_closes_and_its_lanes_are_longer_and_shorter_by_one_full_turn_of_their_offset(road):
     np.testing.assert_allclose(corners(road.begin, road.segments)[-1], road.begin[:2], atol=1e-12)
+    turn = 2 * pi * road.lane_offset
+    assert lane_length(road, True) == pytest.approx(length(road.segments) + turn)
+    assert lane_length(road, False) == pytest.approx(length(road.segments) - turn)
 
 
 @every_road
 @quick
-@given(outer=st.booleans(), along=ways)
+@given(outer=st.booleans(), along=st.floats(-12.0, 20.0))
 def test_the_point_so_far_along_a_lane_is_seen_so_far_along_it(road, outer, along):
     behind, here, ahead = lane_point(road, outer, along + np.array([-1e-5, 0.0, 1e-5]))
     pose = lane_pose(road, here, np.arctan2(*(ahead - behind)[::-1]))
@@ -229,13 +228,6 @@ def test_no_point_of_the_lane_is_nearer_than_the_deviation(road, point, heading)
     pose = lane_pose(road, np.array(point), np.array(heading))
     line, _ = lane(road, bool(pose.counter_clockwise))
     assert np.hypot(*(line - point).T).min() == pytest.approx(abs(pose.deviation), abs=0.002)
-
-
-@every_road
-def test_the_outer_lap_is_longer_and_the_inner_one_shorter_by_one_full_turn_of_the_lanes_offset(road):
-    turn = 2 * pi * road.lane_offset
-    assert lane_length(road, True) == pytest.approx(length(road.segments) + turn)
-    assert lane_length(road, False) == pytest.approx(length(road.segments) - turn)
 
 
 @every_road
@@ -324,11 +316,8 @@ def test_the_expert_drives_a_lap_with_both_wheels_in_the_lane(road, outer, plant
     assert driving_score(road, poses, wheel_distance=robot.wheel_distance(), **figures) > seconds - 0.1
 
 
-ROAD = shipped_map("small_loop")
-
-
 def test_the_floor_is_drawn_as_it_was_to_the_last_byte():
-    floor = draw_floor(ROAD)
+    floor = draw_floor(shipped_map("small_loop"))
     digest = hashlib.sha256(floor.pixels.tobytes()).hexdigest()
     assert digest == "e347d735d4b196fd72756c4ccd6e92f0cd26dedf7df020c7f7af0014d9228700"
     assert (floor.pixels.shape, floor.origin) == ((832, 832, 3), -0.1625000000000001)

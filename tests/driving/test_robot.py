@@ -41,10 +41,6 @@ def copy_duckiebot(folder, before, after):
     return home
 
 
-def test_the_robots_of_the_package_are_listed():
-    assert robot_names() == ("car", "dart", "duckiebot", "husky", "irobot_create")
-
-
 @pytest.mark.parametrize("name", robot_names())
 def test_every_figure_has_a_unit_and_a_source_and_is_not_negative(name):
     figures, required = stated(name)["figures"], REQUIRED[read_robot(name).drive]
@@ -95,8 +91,7 @@ DIFFERENTIAL = [name for name in robot_names() if read_robot(name).drive == "dif
 @pytest.mark.parametrize("name", DIFFERENTIAL)
 def test_every_robot_drives_straight_at_full_speed_and_turns_by_its_baseline_on_the_planar_plant(name):
     robot = read_robot(name)
-    start = np.array((0.2, -0.1, 0.4))
-    with PlanarPlant(start, 1 / 60) as plant:
+    with PlanarPlant(np.array((0.2, -0.1, 0.4)), 1 / 60) as plant:
         straight, _ = plant.move(twists(robot, np.tile((1.0, 1.0), (300, 1))))
         turning, _ = plant.move(twists(robot, np.tile((0.0, 1.0), (300, 1))))
     assert np.hypot(*(straight[-1] - straight[-61])[:2]) == pytest.approx(robot.figures["full_speed"], rel=1e-3)
@@ -159,12 +154,13 @@ def test_links_have_inertia_and_nominal_effects_agree_with_the_figures():
     assert ROBOT.theta["camera_pitch"] == ROBOT.figures["camera_pitch"]
 
 
-def test_a_robot_by_an_unknown_or_another_name_is_refused(tmp_path):
+def test_the_robots_of_the_package_are_listed_and_one_by_an_unknown_or_another_name_is_refused(tmp_path):
     with pytest.raises(SettingsError, match="robot 'duckybot' is unknown .*; did you mean 'duckiebot'"):
         read_robot("duckybot")
     shutil.copytree(shipped("robots") / "husky", tmp_path / "wolf")
     with pytest.raises(SettingsError, match="name: unknown value 'husky'; known are: wolf"):
         read_robot("wolf", tmp_path)
+    assert robot_names() == ("car", "dart", "duckiebot", "husky", "irobot_create")
 
 
 @pytest.mark.parametrize(

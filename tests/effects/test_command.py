@@ -33,17 +33,24 @@ def test_samples_belong_to_the_message_that_was_sent_last(per_sample, expected):
 @pytest.mark.parametrize("per_sample", [1 / 3, 1 / 7, 1 / 49, 0.4, 20 / 66, 1.0])
 def test_a_message_starts_with_the_first_sample_that_belongs_to_it(per_sample):
     sent = Messages(per_sample, 0)
-    numbers = sent.numbers(np.arange(30000))
-    firsts = np.flatnonzero(np.diff(numbers, prepend=-1))
+    firsts = np.flatnonzero(np.diff(sent.numbers(np.arange(30000)), prepend=-1))
     np.testing.assert_array_equal(sent.starts(np.arange(len(firsts))), firsts)
 
 
-def test_draws_do_not_depend_on_where_one_looks_or_how_often():
+def test_draws_do_not_depend_on_where_one_looks_jitter_is_continuous_and_a_lost_command_leaves_the_last():
     sent = Messages(1.0, SEED)
     np.testing.assert_array_equal(sent.draws(0, 1000)[200:900], sent.draws(200, 900))
     assert np.abs(np.sort(sent.draws(0, 1000)) - np.linspace(0, 1, 1000)).max() < 0.05
     coarse = run(DroppedCommands(0.4), numbered(200, 1), rate_hz=NOMINAL["control_rate"])
     np.testing.assert_array_equal(run(DroppedCommands(0.4), numbered(200))[::EVERY], coarse)
+    signal = np.repeat(np.random.default_rng(0).uniform(-1, 1, (40, 2)), EVERY, axis=0)
+    outputs = np.array([run(DelayJitter(value), signal) for value in np.linspace(0.0, 0.3, 601)])
+    assert np.abs(np.diff(outputs, axis=0)).max() < 2 * 0.0005 * RATE_HZ + 1e-9
+    probability, said, expected = 0.4, -1.0, []
+    for number, draw in enumerate(draws(300)):
+        said = said if draw < probability else float(number)
+        expected += [said] * EVERY
+    np.testing.assert_array_equal(run(DroppedCommands(probability), numbered(300))[:, 1], expected)
 
 
 def by_hand(spread_s, count, fine=200):
@@ -61,17 +68,3 @@ def test_a_jittered_command_holds_from_its_arrival_to_the_next_ones(spread):
     jittered = run(DelayJitter(spread), numbered(60))
     np.testing.assert_allclose(jittered[:, 0], by_hand(spread, 60), atol=0.05)
     np.testing.assert_array_equal(jittered[:, 0], jittered[:, 1])
-
-
-def test_jitter_is_continuous_in_its_spread():
-    signal = np.repeat(np.random.default_rng(0).uniform(-1, 1, (40, 2)), EVERY, axis=0)
-    outputs = np.array([run(DelayJitter(value), signal) for value in np.linspace(0.0, 0.3, 601)])
-    assert np.abs(np.diff(outputs, axis=0)).max() < 2 * 0.0005 * RATE_HZ + 1e-9
-
-
-def test_a_lost_command_leaves_the_one_before_in_force():
-    probability, said, expected = 0.4, -1.0, []
-    for number, draw in enumerate(draws(300)):
-        said = said if draw < probability else float(number)
-        expected += [said] * EVERY
-    np.testing.assert_array_equal(run(DroppedCommands(probability), numbered(300))[:, 1], expected)

@@ -38,8 +38,7 @@ EFFECTS.append(pytest.param(effect_of(*COMMAND_GROUPS), id="all"))
 
 def commands(seed, length=90):
     """Held, reversed, ended and begun again."""
-    random = np.random.default_rng(seed)
-    steps = random.choice((-0.7, -0.3, 0.0, 0.0, 0.4, 0.9), (length // 9, 2))
+    steps = np.random.default_rng(seed).choice((-0.7, -0.3, 0.0, 0.0, 0.4, 0.9), (length // 9, 2))
     return np.repeat(steps, 9, axis=0)
 
 
@@ -52,8 +51,9 @@ def added(curve, signal):
 
 
 @pytest.mark.parametrize("effect", EFFECTS)
-def test_every_group_changes_commands(effect):
+def test_every_group_changes_commands_but_leaves_a_robot_that_was_never_commanded_alone(effect):
     assert np.abs(run(effect, commands(1)) - commands(1)).max() > 1e-3
+    np.testing.assert_array_equal(run(effect, np.zeros((200, 2))), 0.0)
 
 
 class Commanded(Subject):
@@ -68,11 +68,6 @@ def test_it_is_a_filter_like_any_other(effect):
     subject = Commanded(LearntCommands, ROBOT, "learnt")
     _claim_filter(subject, effect, "learnt")
     _claim_chunks(subject, effect, "learnt")
-
-
-@pytest.mark.parametrize("effect", EFFECTS)
-def test_a_robot_that_was_never_commanded_is_left_alone(effect):
-    np.testing.assert_array_equal(run(effect, np.zeros((200, 2))), 0.0)
 
 
 @pytest.mark.parametrize("group", [group for group in COMMAND_GROUPS if group != "dragged"])
@@ -123,22 +118,16 @@ def test_times_of_commands_count_from_changes_starts_and_turns():
     np.testing.assert_allclose(rolling[50, 0] / rolling[40, 0], np.exp(-1.0), rtol=1e-9)
 
 
-def test_a_sticky_throttle_is_dragged_along_and_leaves_a_robot_creeping():
+def test_a_sticky_throttle_drags_along_a_command_grows_no_faster_than_its_ramp_and_one_sample_is_no_stop():
     signal = np.repeat([[0.5, 0.0], [0.0, 0.0]], 5, axis=0)
     stuck = added(LearntCurve("dragged", "duty", (0.1,), (1.0,)), signal)
     np.testing.assert_allclose(stuck[:, 0], [-0.1] * 5 + [0.1] * 5)
     assert not stuck[:, 1].any()
-
-
-def test_a_command_grows_and_shrinks_no_faster_than_its_ramp():
     signal = np.repeat([[0.4, 0.4], [0.1, -0.3]], 12, axis=0)
-    curve = LearntCurve("ramped", "duty", ((0.5, 2.0),), (1.0,))
-    held = signal + added(curve, signal)
+    held = signal + added(LearntCurve("ramped", "duty", ((0.5, 2.0),), (1.0,)), signal)
     np.testing.assert_allclose(held[:5], np.outer([0.1, 0.2, 0.3, 0.4, 0.4], [1.0, 1.0]))
     np.testing.assert_allclose(held[12:17], np.stack((0.4 - 0.025 * np.arange(1, 6), [0.375, 0.35, 0.325, 0.3, 0.2])).T)
 
-
-def test_one_sample_between_two_signs_is_no_stop():
     def pushed(between):
         signal = np.concatenate((np.full(9, 0.4), between, np.full(9, -0.4)))
         return added(LearntCurve("begun", "push", (0.3,), (1.0,)), np.stack((signal, signal), axis=1))[:, 0]

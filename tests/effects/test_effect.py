@@ -23,8 +23,7 @@ def test_beyond_what_is_known_the_rates_lead_on_in_chunks_as_in_one():
 
 
 def test_low_passes_follow_by_their_time_constant_for_each_of_a_batch():
-    shared = start_reckoning(np.array([1.0]), FilterContext(2.0, np.zeros((3, 2)), {}))
-    assert shared.values.shape == (3, 1)
+    assert start_reckoning(np.array([1.0]), FilterContext(2.0, np.zeros((3, 2)), {})).values.shape == (3, 1)
     signal = np.array([[1.0], [-2.0]])
     mean, end = low_pass(signal, low_pass_at(np.array([5.0]), 0.0))
     np.testing.assert_array_equal(mean, signal)

@@ -1,6 +1,10 @@
 """Dead band, stiction and backlash against what they should do by hand.
 
 A wheel that is not round rolls faster and slower once a turn.
+
+Motors that rise slowly and tire under load.
+
+Saturation and battery sag against what they should do by hand.
 """
 
 import numpy as np
@@ -9,6 +13,7 @@ from filtered import filtered
 
 from proxytune.effects import FilterContext, effect
 from proxytune.effects.friction import Backlash, DeadBand, Stiction, WheelRipple
+from proxytune.effects.motors import BatterySag, Saturation, SlewRate, ThermalFade
 
 NOMINAL = {"full_speed": 0.6, "wheel_radius": 0.03}
 FULL_RAD_S = 20.0
@@ -20,10 +25,13 @@ def run(effect, left, right=None, rest=0.0):
     return filtered(effect, signal, rate_hz=RATE_HZ, rest=rest, nominal=NOMINAL)
 
 
-def test_a_dead_band_swallows_small_duties_of_both_wheels_or_one():
+def test_a_dead_band_swallows_small_duties_and_stiction_is_the_trigger_written_as_a_loop():
     duties = [0.0, 0.05, 0.1, 0.3, -0.05, -0.1, -1.0]
     np.testing.assert_allclose(run(DeadBand(0.1, 0.0), duties)[:, 0], [0, 0, 0, 0.2, 0, 0, -0.9], atol=1e-12)
     np.testing.assert_allclose(run(DeadBand(0.1, -0.5), [0.5]), [[0.35, 0.45]])
+    duties = np.repeat(np.random.default_rng(3).normal(0.0, 0.3, (400, 2)), 2, axis=0)
+    expected = np.stack([schmitt(duties[:, side], width) for side, width in ((0, 0.12), (1, 0.36))], axis=-1)
+    np.testing.assert_array_equal(run(Stiction(0.24, 0.5, 0.5, 1.0), *duties.T), expected)
 
 
 @pytest.mark.parametrize(
@@ -60,12 +68,6 @@ def schmitt(duties, breakaway):
         out.append(duty if moving else 0.0)
         before = duty
     return out
-
-
-def test_stiction_is_the_trigger_written_as_a_loop():
-    duties = np.repeat(np.random.default_rng(3).normal(0.0, 0.3, (400, 2)), 2, axis=0)
-    expected = np.stack([schmitt(duties[:, side], width) for side, width in ((0, 0.12), (1, 0.36))], axis=-1)
-    np.testing.assert_array_equal(run(Stiction(0.24, 0.5, 0.5, 1.0), *duties.T), expected)
 
 
 @pytest.mark.parametrize("batch", [(), (3,), (2, 3)])
@@ -130,3 +132,38 @@ def test_one_wheel_ripples_by_its_angle_and_rolls_as_far_as_a_round_one():
     assert rolled == pytest.approx(2.0 * np.pi * RADIUS, rel=0.005)
     ahead = wheels(WheelRipple(0.2, 0.0, 0.2, 0.0), 1e-9, 1, angles=((np.pi / 2, -np.pi / 2),))[0] / 1e-9
     np.testing.assert_allclose(ahead, (1.2, 0.8), atol=1e-6)
+
+
+def test_a_duty_rises_at_its_rate_and_a_motor_loses_by_long_work_and_recovers_at_rest():
+    risen = filtered(SlewRate(0.5), np.ones((60, 2)))
+    np.testing.assert_allclose(risen[:30, 0], np.arange(1, 31) / 30.0)
+    np.testing.assert_array_equal(risen[30:], 1.0)
+    np.testing.assert_array_equal(filtered(SlewRate(0.5), [[0.03, -0.03]]), [[0.03, -0.03]])
+    np.testing.assert_allclose(filtered(SlewRate(1.0), [[1.0, 1.0]], rest=(0.5, -0.5)), [[0.5 + 1 / 60, -0.5 + 1 / 60]])
+    tired = filtered(ThermalFade(0.3, 2.0), np.tile((1.0, -1.0), (60 * 20, 1)))
+    np.testing.assert_allclose(tired[-1], (0.7, -0.7), atol=1e-3)
+    assert tired[0, 0] == pytest.approx(1.0, abs=0.01)
+    work, rest = np.ones((600, 2)), np.zeros((600, 2))
+    tired = filtered(ThermalFade(0.4, 2.0), np.concatenate((work, rest, work)))
+    assert tired[599, 0] == pytest.approx(0.6, abs=0.01)
+    assert tired[1200, 0] > 0.99
+
+
+@pytest.mark.parametrize(
+    ("limit", "imbalance", "left", "right"),
+    [(0.6, 0.0, 0.6, 0.6), (0.6, -1.0, 0.2, 1.0), (0.6, 0.5, 0.8, 0.4), (0.2, 1.0, 1.0, 0.05)],
+)
+def test_saturation_shares_the_lost_part_and_leaves_a_twentieth(limit, imbalance, left, right):
+    clipped = filtered(Saturation(limit, imbalance), [[1.0, 1.0], [-1.0, -1.0], [0.03, -0.04]], rate_hz=RATE_HZ)
+    np.testing.assert_allclose(clipped, [[left, right], [-left, -right], [0.03, -0.04]])
+
+
+def test_a_battery_slows_both_wheels_by_what_was_driven_and_turns_none_round():
+    np.testing.assert_allclose(filtered(BatterySag(0.2, 0.0, 0.0), [[1.0, -0.5]], rate_hz=RATE_HZ), [[0.85, -0.425]])
+    faded = filtered(BatterySag(0.0, 0.5, 0.0), np.full((1200, 2), (0.3, -0.5)), rate_hz=RATE_HZ)
+    np.testing.assert_allclose(faded[-1], np.array((0.3, -0.5)) * np.exp(-0.5 * 0.4 * 2.0), rtol=1e-3)
+    np.testing.assert_allclose(faded[0], (0.3, -0.5), rtol=1e-3)
+    coarse = filtered(BatterySag(0.0, 1.0, 0.0), np.full((600, 2), 0.8), rate_hz=10.0)
+    fine = filtered(BatterySag(0.0, 1.0, 0.0), np.full((6000, 2), 0.8), rate_hz=100.0)
+    np.testing.assert_allclose(coarse, fine.reshape(600, 10, 2).mean(axis=1), rtol=1e-6)
+    np.testing.assert_array_equal(filtered(BatterySag(0.8, 0.0, 0.0), [[2.0, 2.0]], rate_hz=RATE_HZ), [[0.0, 0.0]])

@@ -83,8 +83,7 @@ SECONDS = st.floats(0.0, 0.5)
 
 
 def shown(effect, pictures):
-    memory = effect.begin(FilterContext(RATE_HZ, pictures[0], NOMINAL))
-    return effect.apply(pictures, memory)[0]
+    return effect.apply(pictures, effect.begin(FilterContext(RATE_HZ, pictures[0], NOMINAL)))[0]
 
 
 def ages(effect):

@@ -63,8 +63,7 @@ EFFECTS = [pytest.param(effect_of(group), id=group) for group in MOTION_GROUPS] 
 
 
 def a_signal(seed, length=90):
-    random = np.random.default_rng(seed)
-    held = np.repeat(random.uniform(-1.0, 1.0, (length // 3, 3)), 3, axis=0)
+    held = np.repeat(np.random.default_rng(seed).uniform(-1.0, 1.0, (length // 3, 3)), 3, axis=0)
     return held * (0.6, 0.0, 5.0)
 
 
@@ -84,9 +83,12 @@ def run(effect, signal):
 
 
 @pytest.mark.parametrize("effect", EFFECTS)
-def test_every_group_changes_the_motion(effect):
+def test_every_group_changes_the_motion_but_not_of_a_robot_that_has_not_moved_or_stands_for_long(effect):
     signal = a_signal(2)
     assert np.abs(run(effect, signal) - signal).max() > 1e-3
+    signal = np.concatenate((a_signal(5), np.zeros((1800, 3))))
+    np.testing.assert_allclose(run(effect, signal)[-60:], 0.0, atol=1e-9)
+    np.testing.assert_array_equal(run(effect, np.zeros((600, 3))), 0.0)
 
 
 class Driven(Subject):
@@ -104,17 +106,6 @@ def test_it_is_a_filter_like_any_other(effect):
     subject = Driven(Learnt, ROBOT, "learnt")
     _claim_filter(subject, effect, "learnt")
     _claim_chunks(subject, effect, "learnt")
-
-
-@pytest.mark.parametrize("effect", EFFECTS)
-def test_a_robot_that_stands_for_long_enough_stays_where_it_is(effect):
-    signal = np.concatenate((a_signal(5), np.zeros((1800, 3))))
-    np.testing.assert_allclose(run(effect, signal)[-60:], 0.0, atol=1e-9)
-
-
-@pytest.mark.parametrize("effect", EFFECTS)
-def test_a_robot_that_has_not_moved_stays_where_it_is(effect):
-    np.testing.assert_array_equal(run(effect, np.zeros((600, 3))), 0.0)
 
 
 @pytest.mark.parametrize("group", [group for group in MOTION_GROUPS if group not in ("heading", *OF_PLACE)])
@@ -172,7 +163,7 @@ def test_a_window_amid_a_drive_goes_on_as_the_drive_does(effect, sample):
     np.testing.assert_allclose(moved, np.stack([whole[r][sample:] for r in row]), rtol=0, atol=1e-9)
 
 
-def test_curves_add_to_their_wheels_and_fade_after_named_effects():
+def test_curves_add_to_their_wheels_and_fade_and_a_veer_follows_the_heading_it_leads_to():
     baseline = ROBOT.figures["effective_baseline"]
     effect = Learnt(SEEN, (LearntCurve("wheel_speed", "right", (0.2, 0.4), (0.05, 0.01)),))
     straight = np.tile((0.3, 0.0, 0.0), (5, 1))
@@ -185,12 +176,8 @@ def test_curves_add_to_their_wheels_and_fade_after_named_effects():
     assert all(later < earlier for earlier, later in pairwise(added))
     names = [effect.name for effect in effects_from({**WHOLE, "floor_slope.x": 0.1, "trim": 0.0}, ROBOT.figures)]
     assert names == ["trim", "floor_slope", "learnt"]
-
-
-def test_a_veer_by_the_heading_follows_the_heading_that_it_leads_to():
     turning = Learnt(SEEN, (LearntCurve("heading", "veer_sin", (1.0,), (3.0,)),))
-    ahead = np.tile((0.4, 0.0, 0.0), (600, 1))
-    moved = run(turning, ahead)
+    moved = run(turning, np.tile((0.4, 0.0, 0.0), (600, 1)))
     heading = 0.4 + np.concatenate(((0.0,), np.cumsum(moved[:-1, 2]) / RATE_HZ))
     np.testing.assert_allclose(moved[:, 2], 3.0 * 0.4 * np.sin(heading), atol=1e-12)
     assert heading[-1] == pytest.approx(np.pi, abs=0.01)
@@ -263,8 +250,10 @@ def test_a_learnt_effect_reads_back_from_a_model_file_exactly(effect, tmp_path_f
     assert learnt_effect(read_model(path).theta) == effect
 
 
-def test_a_theta_without_learnt_values_has_no_learnt_effect():
+def test_a_theta_without_learnt_values_has_no_learnt_effect_and_a_curve_without_a_range_is_refused():
     assert learnt_effect({"trim": 0.1}) is None
+    with pytest.raises(SettingsError, match=r"learnt.range.forward: must be finite"):
+        learnt_effect({"learnt.turn_rate.yaw@1.0": 0.1})
 
 
 @pytest.mark.parametrize(
@@ -317,8 +306,3 @@ WHOLE = learnt_theta(Learnt(FittedRange((-1.0, 1.0), (-1.0, 1.0)), (LearntCurve(
 )
 def test_a_wrong_name_in_theta_is_refused_in_one_line(changes, says):
     assert says in complaint_of(effects_from, {**WHOLE, **changes}, ROBOT.figures)
-
-
-def test_a_learnt_curve_without_a_range_is_refused():
-    with pytest.raises(SettingsError, match=r"learnt.range.forward: must be finite"):
-        learnt_effect({"learnt.turn_rate.yaw@1.0": 0.1})

@@ -30,8 +30,7 @@ def test_what_is_written_reads_back_by_its_names_in_theta(tmp_path):
     assert model.intervals == {"driver_map": (0.1, 0.14)}
     assert (model.robot, model.plant) == ("duckiebot", None)
     text = 'format = 1\nrobot = "duckiebot"\n' + effects_table(model.theta, model.intervals)
-    again = read_model(write(tmp_path, text))
-    assert again == model
+    assert read_model(write(tmp_path, text)) == model
 
 
 @pytest.mark.parametrize(

@@ -54,9 +54,17 @@ def driven(effect, signal, **known):
     return filtered(effect, signal, rate_hz=10.0, nominal=NOMINAL, **known)
 
 
-def test_baselines_and_markers_turn_what_they_say_alone():
+def test_baselines_and_markers_turn_what_they_say_alone_and_a_fast_robot_turns_less_and_late():
     np.testing.assert_allclose(driven(motion.YawScrub(0.32), [[0.5, 0.1, 2.0]]), [[0.5, 0.1, 1.0]])
     np.testing.assert_allclose(driven(motion.HeadingOffset(-30.0), [[1.0, 2.0, 0.5]]), [[1.0, 2.0, 0.5 - np.pi / 6]])
+    moved = filtered(motion.Understeer(0.5), [[0.4, 0.1, 1.2], [-0.4, 0.1, 1.2], [0.0, 0.0, 1.2]])
+    np.testing.assert_allclose(moved, [[0.4, 0.1, 1.0], [-0.4, 0.1, 1.0], [0.0, 0.0, 1.2]])
+    moved = filtered(motion.YawLag(0.2), np.tile((0.3, 0.0, 1.0), (60, 1)))
+    np.testing.assert_array_equal(moved[:, :2], np.tile((0.3, 0.0), (60, 1)))
+    assert moved[:12, 2].sum() / RATE_HZ == pytest.approx(0.2 * np.exp(-1.0), rel=1e-6)
+    assert moved[-1, 2] == pytest.approx(1.0, abs=0.01)
+    turning = np.tile((0.0, 0.0, 1.0), (5, 1))
+    np.testing.assert_allclose(filtered(motion.YawLag(0.2), turning, rest=turning[0]), turning)
 
 
 @pytest.mark.parametrize(("yaw", "forward"), [(0.0, 0.5), (2.0, 0.3), (-2.0, 0.3), (9.0, 0.0)])
@@ -108,14 +116,3 @@ def test_the_tracked_point_lies_ahead_of_the_axle_and_to_its_left(heading, x, y)
 def test_coupling_does_not_ask_which_way_the_robot_turns_or_drives(forward, yaw):
     (moved,) = filtered(motion.CrossCoupling(0.01, 0.4), [[forward, 0.1, yaw]])
     np.testing.assert_allclose(moved, (forward + 0.04, 0.1, yaw + 0.2))
-
-
-def test_a_fast_robot_turns_less_and_goes_on_turning_late():
-    moved = filtered(motion.Understeer(0.5), [[0.4, 0.1, 1.2], [-0.4, 0.1, 1.2], [0.0, 0.0, 1.2]])
-    np.testing.assert_allclose(moved, [[0.4, 0.1, 1.0], [-0.4, 0.1, 1.0], [0.0, 0.0, 1.2]])
-    moved = filtered(motion.YawLag(0.2), np.tile((0.3, 0.0, 1.0), (60, 1)))
-    np.testing.assert_array_equal(moved[:, :2], np.tile((0.3, 0.0), (60, 1)))
-    assert moved[:12, 2].sum() / RATE_HZ == pytest.approx(0.2 * np.exp(-1.0), rel=1e-6)
-    assert moved[-1, 2] == pytest.approx(1.0, abs=0.01)
-    turning = np.tile((0.0, 0.0, 1.0), (5, 1))
-    np.testing.assert_allclose(filtered(motion.YawLag(0.2), turning, rest=turning[0]), turning)

@@ -8,7 +8,7 @@ from toy_families import CART, SCREEN, family
 
 from proxytune.domain import make_episode
 from proxytune.environments.family import ask_agent, load_agent
-from proxytune.errors import EpisodeError, InputError
+from proxytune.errors import EpisodeError
 
 pytest.importorskip("gymnasium")
 
@@ -27,10 +27,13 @@ def test_every_kind_of_agent_acts_and_acts_alike_again(tmp_path, agent):
     assert run(kin, agent) == run(kin, agent)
 
 
-def test_a_state_that_a_policy_answers_with_is_handed_back(tmp_path):
+def test_a_policy_s_state_is_handed_back_random_draws_follow_the_seed_and_some_spaces_lack_a_zero(tmp_path):
     family(tmp_path, CART)
     act = load_agent("toys:Recurrent", tmp_path, None, 0)
     assert [round(float(act(None)[0]), 1) for _ in range(3)] == [0.0, 0.1, 0.2]
+    assert "have no zero; take another" in complaint_of(load_agent, "zero", tmp_path, Dict({"a": Discrete(2)}), 0)
+    first, again, other = (load_agent("random", tmp_path, Discrete(1000), seed)(None) for seed in (5, 5, 6))
+    assert first == again != other
 
 
 @pytest.mark.parametrize(
@@ -61,13 +64,14 @@ def test_an_answer_that_is_no_action_fails_the_episode(tmp_path, agent, line):
     assert line in str(failed.value)
 
 
-def test_a_discrete_answer_must_be_an_action_and_a_box_answer_is_cut_off(tmp_path):
+def test_discrete_actions_run_and_an_answer_must_be_one_or_is_cut_off_in_a_box(tmp_path):
     space = Discrete(3, start=1)
     assert ask_agent(lambda seen: np.array(2), None, space, 0) == 2
     with pytest.raises(EpisodeError, match=r"answered 0 at step 4, which is not in Discrete"):
         ask_agent(lambda seen: 0, None, space, 4)
     action = ask_agent(lambda seen: [[5.0, -0.5]], None, Box(-1.0, 1.0, (2,), np.float32), 0)
     assert action.tolist() == [1.0, -0.5]
+    assert run(family(tmp_path, SCREEN), "toys:left_of_middle")["return"] >= 4.0
 
 
 @pytest.mark.parametrize(
@@ -86,16 +90,6 @@ def test_zero_is_the_least_action_that_a_space_has(tmp_path, space, zero):
     assert space.contains(action)
 
 
-def test_an_action_space_without_a_zero_has_no_such_agent(tmp_path):
-    with pytest.raises(InputError, match="have no zero; take another"):
-        load_agent("zero", tmp_path, Dict({"a": Discrete(2)}), 0)
-
-
-def test_a_random_agent_draws_from_its_seed_alone(tmp_path):
-    first, again, other = (load_agent("random", tmp_path, Discrete(1000), seed)(None) for seed in (5, 5, 6))
-    assert first == again != other
-
-
 @pytest.mark.slow
 def test_a_policy_of_stable_baselines3_acts(tmp_path):
     pytest.importorskip("stable_baselines3")
@@ -106,7 +100,3 @@ def test_a_policy_of_stable_baselines3_acts(tmp_path):
     kin = family(tmp_path, 'environment = "CartPole-v1"\nsteps = 20\n')
     assert run(kin, "trained:policy") == run(kin, "trained:policy")
     assert 1.0 <= run(kin, "trained:policy")["length"] <= 20.0
-
-
-def test_pictures_and_discrete_actions_run(tmp_path):
-    assert run(family(tmp_path, SCREEN), "toys:left_of_middle")["return"] >= 4.0

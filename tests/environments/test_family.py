@@ -171,7 +171,7 @@ def test_starts_are_the_same_states_and_chance_comes_from_the_seed(tmp_path):
     assert run(kin, "random", seed=1) == run(kin, "random", seed=1)
 
 
-def test_a_model_gives_effects_and_values_before_those_of_the_table(tmp_path):
+def test_a_model_gives_effects_and_values_before_those_of_the_table_which_are_checked_too(tmp_path):
     named = family(tmp_path, PENDULUM, "[parameters]\nmass = 1.7\n[effects.delay]\ndelay = 0.1\n")
     plain, agent = family(tmp_path, PENDULUM), "toys:Wobble"
     assert run(named, agent) == run(plain, agent, mass=1.7, delay=0.1)
@@ -183,6 +183,8 @@ def test_a_model_gives_effects_and_values_before_those_of_the_table(tmp_path):
     assert dict(family(tmp_path, table).held) == {"delay": 0.2}
     kin = family(tmp_path, PENDULUM, "[effects.dead_band]\nwidth = 0.1\nimbalance = 0.0\n")
     assert run(kin, "toys:Wobble") == run(family(tmp_path, PENDULUM), "toys:Wobble", **{"dead_band.width": 0.1})
+    with pytest.raises(InputError, match=r"study.toml: domain.effects.blur: effect 'blur' cannot wrap"):
+        family(tmp_path, PENDULUM + "[effects.blur]\nblur = 0.1\n")
 
 
 @pytest.mark.parametrize(
@@ -203,11 +205,6 @@ def test_a_model_that_the_environment_cannot_follow_is_refused(tmp_path, model, 
     told = complaint_of(family, tmp_path, PENDULUM, model)
     assert line in told
     assert "model.toml" in told
-
-
-def test_effects_of_the_table_are_checked_too(tmp_path):
-    with pytest.raises(InputError, match=r"study.toml: domain.effects.blur: effect 'blur' cannot wrap"):
-        family(tmp_path, PENDULUM + "[effects.blur]\nblur = 0.1\n")
 
 
 def test_environments_are_closed_whatever_fails(tmp_path):

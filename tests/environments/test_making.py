@@ -132,18 +132,12 @@ def test_effects_at_neutral_pass_actions_on(count, seed):
     assert passed_on(spaces((-2.0,) * count, (2.0,) * count), neutral, actions) == pytest.approx(actions)
 
 
-def test_a_dead_band_is_a_share_of_the_largest_action_each_by_itself():
+def test_effects_bend_each_action_by_its_own_largest_the_left_wheel_s_first_and_keep_type_and_bounds():
     known = spaces((-2.0, 0.0, -1.0), (2.0, 0.5, 4.0))
     bent = passed_on(known, {"dead_band.width": 0.1}, [[1.0, 0.04, -1.0], [-2.0, 0.5, 4.0]])
     assert bent == pytest.approx(np.array([[0.8, 0.0, -0.6], [-1.8, 0.45, 3.6]]))
-
-
-def test_of_two_actions_the_first_is_the_left_wheel_s():
     bent = passed_on(spaces(), {"trim": 0.1, "dead_band.width": 0.1, "dead_band.imbalance": 1.0}, [[0.5, 0.5]])
     assert bent == pytest.approx(np.array([[0.5 * 0.9, 0.3 * 1.1]]))
-
-
-def test_effects_leave_type_and_bounds_of_actions():
     bent = passed_on(spaces(), {"wheel_gain.left": 1.5}, [[1.0, 0.2]], np.float32)
     assert bent.dtype == np.float32
     assert bent.tolist() == [[1.0, np.float32(0.2)]]
@@ -156,7 +150,7 @@ def test_effects_leave_type_and_bounds_of_actions():
     assert Actuators((), spaces(), 1).pass_on(action) is action
 
 
-def test_a_picture_is_blurred_over_its_past_and_stays_a_picture():
+def test_a_picture_is_blurred_over_its_past_and_a_heading_offset_turns_the_stated_entry_of_a_copy():
     known = spaces(picture=(4, 5))
     sensors = Sensors(effects_from({"blur": 0.1}, figures(known)), known, None, 1)
     dark, light = np.zeros((4, 5, 3), np.uint8), np.full((4, 5, 3), 200, np.uint8)
@@ -165,9 +159,6 @@ def test_a_picture_is_blurred_over_its_past_and_stays_a_picture():
     assert seen.dtype == np.uint8
     assert (seen == 100).all()
     assert (sensors.show(light) == 200).all()
-
-
-def test_a_heading_offset_turns_the_stated_entry_alone_and_copies_the_observation():
     sensors = Sensors(effects_from({"heading_offset": 90.0 / 2}, {}), spaces(), (1, 2, 0), 1)
     observation = np.array([0.1, 2.0, 3.0, 7.0], np.float32)
     seen = sensors.show(observation)
@@ -176,7 +167,7 @@ def test_a_heading_offset_turns_the_stated_entry_alone_and_copies_the_observatio
     assert observation[0] == np.float32(0.1)
 
 
-def test_an_agent_sees_what_the_effects_make_of_a_picture(tmp_path):
+def test_effects_change_what_an_agent_sees_and_not_what_it_is_scored_on(tmp_path):
     kin = family(tmp_path, SCREEN)
 
     def score(**theta):
@@ -184,9 +175,6 @@ def test_an_agent_sees_what_the_effects_make_of_a_picture(tmp_path):
 
     assert score() >= 4.0
     assert score(camera_latency=0.3) < score(), "it steers by where the stripe was"
-
-
-def test_measurement_effects_change_what_the_agent_sees_and_not_what_it_is_scored_on(tmp_path):
     kin = family(tmp_path, CART + "[state]\nx = 1\ny = 2\nheading = 0\n")
 
     def score(agent, **theta):

@@ -67,30 +67,24 @@ def test_an_agent_of_a_policy_keeps_every_promise_of_an_agent(policy):
     check_agent(agent_of(policy))
 
 
-def test_a_policys_state_goes_from_picture_to_picture():
+def test_a_policys_state_goes_from_picture_to_picture_and_drawn_actions_keep_within_full_duty():
     agent, picture = agent_of(Brightness()), np.zeros((48, 64, 3), dtype=np.uint8)
     first, memory = agent.act(picture, agent.begin(None))
     second, memory = agent.act(picture, memory)
     assert memory == 2
     assert second[0] == pytest.approx(first[0] + 0.01)
-
-
-def test_an_agent_may_draw_its_actions_and_keeps_within_full_duty():
     command, _ = agent_of(Brightness(), deterministic=False).act(np.zeros((48, 64, 3), dtype=np.uint8), None)
     assert command[1] == 1.0
 
 
-def test_what_cannot_predict_is_refused():
-    with pytest.raises(ExtensionError, match=r"a dict has no predict\(observation, deterministic=…\)"):
-        agent_of({})
-
-
-def test_a_policy_beside_a_study_is_scored_as_an_agent(study):
+def test_a_policy_beside_a_study_is_scored_as_an_agent_and_what_cannot_predict_is_refused(study):
     code = "from proxytune.environments import agent_of\nclass P:\n    def predict(self, o, deterministic):\n"
     (study / "my_policy.py").write_text(f"{code}        return (0.4, 0.4), None\nagent = agent_of(P())\n")
     found = proxytune.score(proxy=scores(study), target=scores(study, trim=0.2), metrics="distance:max")
     assert load_agent("my_policy:agent", study).policy.predict(None, True) == ((0.4, 0.4), None)
     assert "my_policy:agent" in str(found.prpv)
+    with pytest.raises(ExtensionError, match=r"a dict has no predict\(observation, deterministic=…\)"):
+        agent_of({})
 
 
 @pytest.mark.slow

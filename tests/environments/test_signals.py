@@ -40,7 +40,7 @@ def test_what_cannot_wrap_an_environment_says_why(tmp_path, text, name, reason):
     assert name not in list(known)
 
 
-def test_effects_wrap_an_environment_by_its_actions_and_rate(tmp_path):
+def test_effects_wrap_an_environment_by_its_actions_and_rate_a_users_own_two_actions_alone(tmp_path):
     names = {effect_of(name) for name in family(tmp_path, TIMELESS).parameters}
     assert {"dead_band", "stiction", "saturation", "trim", "dropped_commands"} <= names
     expected = {name for name in PARAMETERS if CATALOGUE[effect_of(name)].stage in ("command", "actuation")}
@@ -50,6 +50,10 @@ def test_effects_wrap_an_environment_by_its_actions_and_rate(tmp_path):
     assert (known["gravity"].low, known["gravity"].unit) == (8.0, "m/s²")
     assert len(known) == len(list(known))
     assert family(tmp_path, CART).parameters.get("dely") is None
+    (tmp_path / "own.py").write_text(OWN)
+    assert family(tmp_path, CART).parameters["own:Mine"].name == "trim"
+    with pytest.raises(ExtensionError, match="made for two actions"):
+        family(tmp_path, PENDULUM).parameters.get("own:Mine")
 
 
 OWN = """
@@ -59,10 +63,3 @@ from proxytune.effects.motors import Trim
 class Mine(Trim):
     name = "mine"
 """
-
-
-def test_a_users_own_effect_wraps_two_actions_and_no_others(tmp_path):
-    (tmp_path / "own.py").write_text(OWN)
-    assert family(tmp_path, CART).parameters["own:Mine"].name == "trim"
-    with pytest.raises(ExtensionError, match="made for two actions"):
-        family(tmp_path, PENDULUM).parameters.get("own:Mine")

@@ -57,13 +57,12 @@ def install(tmp_path, monkeypatch):
 
 
 def test_an_attribute_is_found_in_the_folder_before_the_installed_modules(write):
-    folder = write("study", json="here = 7\n")
-    assert load("json:here", kind="agent", beside=folder) == 7
+    assert load("json:here", kind="agent", beside=write("study", json="here = 7\n")) == 7
     assert load("json:loads", kind="agent")("3") == 3
     assert "here" not in vars(sys.modules["json"])
 
 
-def test_what_runs_is_what_the_file_says_though_its_time_and_size_are_as_before(write, monkeypatch):
+def test_what_runs_is_what_the_file_says_as_old_and_large_as_it_is_whatever_bytecode_claims(write, monkeypatch):
     monkeypatch.setattr(sys, "dont_write_bytecode", False)
     for size in (1, 2):
         folder = write("study", family=f"size = {size}\n")
@@ -72,9 +71,6 @@ def test_what_runs_is_what_the_file_says_though_its_time_and_size_are_as_before(
         assert [path.name for path in folder.iterdir()] == ["family.py"]
         for name in [name for name in sys.modules if name.startswith("beside_study") and name.endswith(".family")]:
             del sys.modules[name]
-
-
-def test_bytecode_that_claims_to_need_no_check_is_not_run(write):
     folder = write("study", family="size = 2\n", other="size = 1\n")
     cached = Path(importlib.util.cache_from_source(str(folder / "family.py")))
     unchecked = py_compile.PycInvalidationMode.UNCHECKED_HASH
@@ -82,7 +78,7 @@ def test_bytecode_that_claims_to_need_no_check_is_not_run(write):
     assert load("family:size", kind="family", beside=folder) == 2
 
 
-def test_modules_of_one_name_in_two_folders_are_not_mixed_up(write):
+def test_modules_of_a_folder_import_one_another_and_those_of_one_name_in_two_are_not_mixed_up(write):
     family = "import helper\nfrom helper import size\ndef late():\n    import helper as again\n    return again.size\n"
     one, two = (write(name, helper=f"size = {n}\n", family=family) for n, name in ((1, "one"), (2, "two")))
     for folder, size in ((one, 1), (two, 2), (one, 1)):
@@ -90,9 +86,6 @@ def test_modules_of_one_name_in_two_folders_are_not_mixed_up(write):
         assert load("family:size", **module) == size
         assert load("family:helper", **module).size == size
         assert load("family:late", **module)() == size
-
-
-def test_packages_and_submodules_of_a_folder_import_one_another(write):
     folder = write("study", top="import tools.sharp\nfrom tools import sharp\nsame = tools.sharp is sharp\n")
     sharp = "from . import blunt\nimport tools.blunt as b\nedge = b.edge\n"
     assert write("study/tools", __init__="", sharp=sharp, blunt="edge = 3\n").is_dir()
@@ -135,8 +128,8 @@ MISTAKES = {
 }
 
 
-@pytest.mark.parametrize("case", MISTAKES)
-def test_what_cannot_be_used_is_told_in_one_line(write, case):
+@pytest.mark.parametrize(("name", "expected"), MISTAKES.values(), ids=MISTAKES)
+def test_what_cannot_be_used_is_told_in_one_line(write, name, expected):
     folder = write(
         "study",
         mine="class Mine:\n    def begin(self): ...\n",
@@ -145,7 +138,6 @@ def test_what_cannot_be_used_is_told_in_one_line(write, case):
         needy="import not_there\n",
         odd="def (\n",
     )
-    name, expected = MISTAKES[case]
     asked = partial(load, kind="agent", beside=folder, needs=("begin", "act", "end"), shipped=dict.fromkeys(SHIPPED))
     assert re.search(expected, complaint_of(asked, name))
 
@@ -162,8 +154,7 @@ def test_a_keyboard_interrupt_of_a_users_code_is_told_on_the_command_line_and_el
 
 def test_a_class_or_factory_is_called_and_what_has_the_members_is_taken_as_it_is(write):
     mine = "class Mine:\n    size = 1\n    def __call__(self): return 5\n\n\nready = Mine()\n\n\n"
-    made = "def factory(): return Mine()\n\n\ndef broken(): return 1 / 0\n"
-    folder = write("study", mine=mine + made)
+    folder = write("study", mine=mine + "def factory(): return Mine()\n\n\ndef broken(): return 1 / 0\n")
     for name in ("mine:Mine", "mine:ready", "mine:factory"):
         assert load(name, kind="agent", beside=folder, needs=("size",), call=True).size == 1
     told = r"'mine:broken' raised ZeroDivisionError: division by zero \(mine.py, line 12\); correct"
@@ -208,7 +199,7 @@ print(pickle.loads(work)(3))
 """
 
 
-def test_modules_and_what_they_import_are_found_where_their_folder_is_not(tmp_path):
+def test_modules_and_what_they_import_are_found_where_their_folder_is_not_by_the_same_bytes(tmp_path):
     home = tmp_path / "travels"
     (home / "deep").mkdir(parents=True)
     (home / "mine.py").write_text("from helper import TWO\n\n\ndef work(x):\n    return x * TWO\n")
@@ -223,9 +214,6 @@ def test_modules_and_what_they_import_are_found_where_their_folder_is_not(tmp_pa
     done = subprocess.run([sys.executable, "-c", ELSEWHERE], input=sent, capture_output=True, env=ENVIRONMENT)
     assert done.stdout.decode().strip() == "6", done.stderr.decode()
     assert b"stays" not in sent
-
-
-def test_the_same_modules_are_the_same_bytes(tmp_path):
     (tmp_path / "mine.py").write_text("ONE = 1\n")
     once = pack([str(tmp_path)])
     (tmp_path / "mine.py").touch()

@@ -32,8 +32,7 @@ def make(store, kind, fields):
     """A message of a type out of a table of its fields; what is left out is zero."""
     values = {}
     for name, (node, what) in store.fielddefs[kind][1]:
-        given = fields.get(name)
-        values[name] = _value(store, node, what, given)
+        values[name] = _value(store, node, what, fields.get(name))
     unknown = set(fields) - set(values) - {"seq"}
     assert not unknown, f"{kind} has no {unknown}"
     return store.types[kind](**values)

@@ -47,8 +47,7 @@ def planted_log(
     theta: Theta, *, seed: int = 1, episodes: int = 4, seconds: float = 20.0, noise: Noise | None = NOISE
 ) -> Log:
     """A Duckiebot with these effects, 20 rows per second, from rest."""
-    rows = round(seconds * RATE_HZ)
-    drives = make_drives(seed, episodes, rows)
+    drives = make_drives(seed, episodes, round(seconds * RATE_HZ))
     return driven_log(theta, drives.duties, drives.starts, seed=seed, noise=noise)
 
 

@@ -50,8 +50,7 @@ def _replace_value(content: bytes, random: np.random.Generator) -> bytes:
     if len(edges) < 2:
         return _insert(content, random)
     at = int(random.integers(len(edges) - 1))
-    token = TOKENS[int(random.integers(len(TOKENS)))]
-    return content[: edges[at] + 1] + token + content[edges[at + 1] :]
+    return content[: edges[at] + 1] + TOKENS[int(random.integers(len(TOKENS)))] + content[edges[at + 1] :]
 
 
 def _swap_lines(content: bytes, random: np.random.Generator) -> bytes:

@@ -9,9 +9,7 @@ from proxytune.importing import Wanted
 from proxytune.importing.arrays import is_arrays, read_arrays
 
 FRAMES = np.arange(ROWS * 2 * 3 * 3, dtype=np.uint64).astype(np.uint8).reshape(ROWS, 2, 3, 3)
-POSE_MAP = {"x": "state[0]", "y": "state[1]", "heading": "state[2]"}
-STATES = np.column_stack((PLACES, HEADINGS))
-OWN = {"positions": None, "angles": None, "actions": None, "state": STATES}
+OWN = {"positions": None, "angles": None, "actions": None, "state": np.column_stack((PLACES, HEADINGS))}
 
 
 def read(path, **wanted):
@@ -24,7 +22,7 @@ def complaint(path, **wanted):
     return complaint
 
 
-def test_gym_duckietown_s_arrays_are_duties_and_poses(tmp_path):
+def test_arrays_of_gym_duckietown_and_its_simulator_are_duties_and_poses_in_a_map_s_frame(tmp_path):
     source = read(write_arrays(tmp_path))
     (drive,) = source.drives
     assert (source.form, drive.name, drive.commands.kind) == ("numpy arrays", "run1", "duty")
@@ -34,9 +32,6 @@ def test_gym_duckietown_s_arrays_are_duties_and_poses(tmp_path):
     np.testing.assert_array_equal(drive.commands.values, SPEEDS)
     assert "y is -positions[2]" in source.notes[1]
     assert "top left corner" in source.notes[1]
-
-
-def test_arrays_of_the_simulator_are_known_by_their_names_and_a_map_s_height_puts_the_origin_at_the_bottom(tmp_path):
     source = read(write_arrays(tmp_path, map_height=np.array(3.0)))
     np.testing.assert_allclose(source.drives[0].poses.places[:, 1], PLACES[:, 1] + 3.0)
     assert "bottom left corner" in source.notes[1]
@@ -45,7 +40,7 @@ def test_arrays_of_the_simulator_are_known_by_their_names_and_a_map_s_height_put
     np.testing.assert_array_equal(read(write_arrays(tmp_path, **changes)).drives[0].poses.headings, HEADINGS)
 
 
-def test_frames_are_read_with_their_times_and_left_out_without(tmp_path):
+def test_frames_are_read_with_their_times_left_out_without_and_in_another_form_refused_when_asked_for(tmp_path):
     source = read(write_arrays(tmp_path, observations=FRAMES))
     pictures = source.drives[0].pictures
     np.testing.assert_array_equal(pictures.times, TIMES)
@@ -60,9 +55,6 @@ def test_frames_are_read_with_their_times_and_left_out_without(tmp_path):
     path = write_arrays(tmp_path, **arrays, angles=np.where(unknown, np.nan, HEADINGS))
     pictures = read(path, commands="none").drives[0].pictures
     np.testing.assert_array_equal(np.stack(list(pictures.read())), FRAMES[~unknown])
-
-
-def test_frames_of_another_form_are_left_out_or_refused_when_asked_for(tmp_path):
     path = write_arrays(tmp_path, observations=FRAMES / 255.0)
     source = read(path)
     assert source.drives[0].pictures is None
@@ -71,9 +63,15 @@ def test_frames_of_another_form_are_left_out_or_refused_when_asked_for(tmp_path)
     assert "has no array 'pictures'" in complaint(path, frames="pictures")
 
 
-def test_places_of_a_column_map_are_in_the_user_s_own_frame_with_units(tmp_path):
+def test_our_own_names_need_no_map_and_places_of_one_are_in_the_user_s_own_frame_with_units(tmp_path):
+    arrays = {**OWN, "state": None, "x": PLACES[:, 0], "y": PLACES[:, 1], "yaw": HEADINGS, "v": SPEEDS[:, 0]}
+    arrays |= {"omega": SPEEDS[:, 1], "episode": np.repeat(["a", "b"], ROWS // 2), "frames": FRAMES}
+    first, second = read(write_arrays(tmp_path, **arrays)).drives
+    assert (first.name, second.name) == ("a", "b")
+    np.testing.assert_array_equal(second.commands.values, SPEEDS[ROWS // 2 :])
+    np.testing.assert_array_equal(np.stack(list(second.pictures.read())), FRAMES[ROWS // 2 :])
     arrays = {**OWN, "timestamps": None, "clock": TIMES * 1e3, "wheels": SPEEDS * 60.0}
-    columns = {**POSE_MAP, "time": "clock:ms"}
+    columns = {**{"x": "state[0]", "y": "state[1]", "heading": "state[2]"}, "time": "clock:ms"}
     columns |= {f"wheel_command_{side}": f"wheels[{place}]:rpm" for place, side in enumerate(("left", "right"))}
     (drive,) = read(write_arrays(tmp_path, **arrays), columns=columns).drives
     np.testing.assert_allclose(drive.poses.times, TIMES)
@@ -86,22 +84,12 @@ def test_places_of_a_column_map_are_in_the_user_s_own_frame_with_units(tmp_path)
     assert len(source.notes) == 1
 
 
-def test_our_own_names_and_several_drives_need_no_map(tmp_path):
-    arrays = {**OWN, "state": None, "x": PLACES[:, 0], "y": PLACES[:, 1], "yaw": HEADINGS, "v": SPEEDS[:, 0]}
-    arrays |= {"omega": SPEEDS[:, 1], "episode": np.repeat(["a", "b"], ROWS // 2), "frames": FRAMES}
-    first, second = read(write_arrays(tmp_path, **arrays)).drives
-    assert (first.name, second.name) == ("a", "b")
-    np.testing.assert_array_equal(second.commands.values, SPEEDS[ROWS // 2 :])
-    np.testing.assert_array_equal(np.stack(list(second.pictures.read())), FRAMES[ROWS // 2 :])
-
-
 def test_commands_are_left_out_only_if_asked_for_and_none_need_follow_the_last_pose(tmp_path):
     path = write_arrays(tmp_path, actions=None)
     assert "no column found for left, right" in complaint(path, kind="duty")
     assert "no column found for commands" in complaint(path)
     assert read(path, commands="none").drives[0].commands is None
-    other = write_arrays(tmp_path, actions=SPEEDS[:7])
-    assert read(other, commands="none").drives[0].commands is None
+    assert read(write_arrays(tmp_path, actions=SPEEDS[:7]), commands="none").drives[0].commands is None
     (drive,) = read(write_arrays(tmp_path, actions=SPEEDS[:-1])).drives
     np.testing.assert_array_equal(drive.commands.times, TIMES[:-1])
     assert len(drive.poses.times) == ROWS
@@ -130,7 +118,7 @@ def test_bad_arrays_are_refused(tmp_path, changes, wanted, where):
     assert where in complaint(write_arrays(tmp_path, **changes), **wanted)
 
 
-def test_pickles_and_what_is_no_npz_are_refused(tmp_path):
+def test_arrays_are_known_by_content_and_pickles_and_what_is_no_npz_are_refused(tmp_path):
     objects = write_arrays(tmp_path, extra=np.array([{"a": 1}], dtype=object))
     assert "holds pickled objects; save plain arrays" in complaint(objects)
     for name, content in (("a.npz", b"\x80\x04K\x01."), ("b.npz", b""), ("c.npz", b"PK\x03\x04 rubbish")):
@@ -140,9 +128,6 @@ def test_pickles_and_what_is_no_npz_are_refused(tmp_path):
     assert is_arrays(tmp_path / "one.npy")
     assert "no .npz file; save the arrays again" in complaint(tmp_path / "one.npy")
     assert "no such file" in complaint(tmp_path / "none.npz")
-
-
-def test_arrays_are_known_by_content(tmp_path):
     path = write_arrays(tmp_path)
     assert is_arrays(path)
     assert is_arrays(path.rename(tmp_path / "log.bin"))

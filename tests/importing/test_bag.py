@@ -39,7 +39,7 @@ def test_a_bag_is_known_by_its_file_or_folder(tmp_path, storage):
     assert bag_module.form_of(bag) == {"ros1": "ROS 1 bag"}.get(storage, f"ROS 2 bag ({storage})")
 
 
-def test_other_files_and_missing_ones_are_no_bags(tmp_path):
+def test_other_files_and_missing_ones_are_no_bags_and_drives_of_a_folder_are_named_by_theirs(tmp_path):
     (tmp_path / "log.csv").write_text("time,x\n")
     assert not is_bag(tmp_path)
     assert not is_bag(tmp_path / "log.csv")
@@ -48,9 +48,6 @@ def test_other_files_and_missing_ones_are_no_bags(tmp_path):
         bags_in(tmp_path / "missing.bag")
     with pytest.raises(LogError, match="holds no bag"):
         bags_in(tmp_path)
-
-
-def test_drives_of_a_folder_are_named_by_their_bags(tmp_path):
     for name in ("one", "two"):
         stored(bags.write_bag(tmp_path / name, "mcap", *DRIVE)).parent.joinpath("metadata.yaml").unlink()
     bags.write_bag(tmp_path / "one.bag", "ros1", *DRIVE)
@@ -108,7 +105,7 @@ def test_a_message_that_is_not_its_type_is_told_by_number(tmp_path, monkeypatch)
             list(bag.messages("/pose"))
 
 
-def test_a_complaint_of_the_library_is_one_line_without_control_characters(tmp_path, monkeypatch):
+def test_a_library_that_complains_or_is_not_there_is_one_line_without_control_characters(tmp_path, monkeypatch):
     def open_badly(self):
         raise OSError("first line\n\x1b[31msecond line")
 
@@ -116,10 +113,6 @@ def test_a_complaint_of_the_library_is_one_line_without_control_characters(tmp_p
     monkeypatch.setattr("rosbags.highlevel.AnyReader.open", open_badly)
     with pytest.raises(LogError, match=r"cannot be read as a bag \(first line \[31msecond line\); copy it again"):
         read_bag(bag, Wanted())
-
-
-def test_without_the_library_one_line_says_what_to_install(tmp_path, monkeypatch):
-    bag = bags.write_bag(tmp_path / "run.bag", "ros1", *DRIVE)
     monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
     with pytest.raises(LogError, match=r'reading bags needs rosbags; pip install "\.\[ros\]"'):
         read_bag(bag, Wanted())
@@ -183,9 +176,16 @@ def test_every_type_of_pose_is_a_place_and_a_heading(tmp_path, kind, storage):
     assert poses.times == pytest.approx(SENT - 0.01, abs=1e-6)
 
 
-def test_a_tilt_stays_known(tmp_path):
+def test_a_tilt_stays_known_and_a_pose_that_is_not_finite_is_kept_for_the_checks(tmp_path):
     with written(tmp_path, bags.POSE, with_header(pose=TURN)) as bag:
         assert read_poses(bag, "/topic", "header")[0].tilts == pytest.approx(np.full(5, 0.2))
+
+    def fields(number):
+        return with_header(pose=bags.pose((np.nan if number == 2 else 0.0, 0.0, 0.0)))(number)
+
+    with written(tmp_path / "again", bags.POSE, fields) as bag:
+        poses, _ = read_poses(bag, "/topic", "header")
+    assert np.flatnonzero(np.isnan(poses.places[:, 0])).tolist() == [2]
 
 
 def third(x):
@@ -213,23 +213,13 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("case", BAD)
-def test_a_message_that_cannot_be_used_is_told_by_number(tmp_path, case):
-    kind, fields, said = BAD[case]
+@pytest.mark.parametrize(("kind", "fields", "said"), BAD.values(), ids=BAD)
+def test_a_message_that_cannot_be_used_is_told_by_number(tmp_path, kind, fields, said):
     with written(tmp_path, kind, fields) as bag:
         read = (read_poses, bag, "/topic") if kind == bags.POSE else (read_commands, bag, "/topic", "duty")
         told = complaint_of(*read, "header")
     assert "run.bag: /topic" in told
     assert said in told
-
-
-def test_a_pose_that_is_not_finite_is_kept_for_the_checks_to_leave_out(tmp_path):
-    def fields(number):
-        return with_header(pose=bags.pose((np.nan if number == 2 else 0.0, 0.0, 0.0)))(number)
-
-    with written(tmp_path, bags.POSE, fields) as bag:
-        poses, _ = read_poses(bag, "/topic", "header")
-    assert np.flatnonzero(np.isnan(poses.places[:, 0])).tolist() == [2]
 
 
 START_NS = 1_700_000_000 * 10**9
@@ -276,14 +266,12 @@ def test_headers_without_a_date_give_way_to_the_bags_times(header):
 
 @pytest.mark.parametrize(
     ("header_s", "words"),
-    [(-0.06, "0.060 s after their stamps"), (0.25, "0.250 s before their stamps, in the median: the clocks differ")],
+    [
+        (-0.06, "0.060 s after their stamps"),
+        (0.25, "0.250 s before their stamps, in the median: the clocks differ"),
+        *((np.linspace(0, drift, 100), f"drifts by {0.9e3 * drift:+.0f} ms") for drift in (0.04, -0.04)),
+    ],
 )
-def test_clocks_that_differ_are_told(header_s, words):
+def test_clocks_that_differ_or_drift_are_told(header_s, words):
     (note,) = choose_times(both(header_s), "header", "/pose")[1]
     assert words in note
-
-
-@pytest.mark.parametrize("drift", [0.04, -0.04])
-def test_clocks_that_drift_are_told(drift):
-    (note,) = choose_times(both(np.linspace(0, drift, 100)), "header", "/pose")[1]
-    assert f"drifts by {0.9e3 * drift:+.0f} ms" in note

@@ -107,15 +107,18 @@ def test_pictures_are_made_one_at_a_time_and_anew_each_time(tmp_path, monkeypatc
     assert len(list(read_back.read())) == 3
 
 
-def test_map_goes_before_odom_and_namespaces_do_not_matter(tmp_path):
-    both = moving("map", "r1/odom", [(5.0, 0.0, 0.0)], TIMES[:1], "/tf_static")
-    source = read(tmp_path, both, moving("r1/odom", "r1/base_link", circle()))
-    assert any(note.startswith("Poses of r1/base_link in map are") for note in source.notes)
-
-
-def test_a_transform_of_the_only_thing_that_moves_is_taken(tmp_path):
-    source = read(tmp_path, moving("stage", "robot7", circle()))
-    assert any(note.startswith("Poses of robot7 in stage are") for note in source.notes)
+@pytest.mark.parametrize(
+    ("fixed", "pair", "taken"),
+    [
+        (("map", "r1/odom", [(5.0, 0.0, 0.0)]), ("r1/odom", "r1/base_link"), "r1/base_link in map"),
+        (("map", "dock/base_link", [(1.0, 0.0, 0.0)]), ("odom", "base_link"), "base_link in odom"),
+        (None, ("stage", "robot7"), "robot7 in stage"),
+    ],
+)
+def test_a_pair_that_moves_is_taken_map_before_odom_in_any_namespace(tmp_path, fixed, pair, taken):
+    still = [moving(*fixed, TIMES[:1], "/tf_static")] if fixed else []
+    source = read(tmp_path, *still, moving(*pair, circle()))
+    assert any(note.startswith(f"Poses of {taken} are") for note in source.notes)
 
 
 @pytest.mark.parametrize(
@@ -134,19 +137,10 @@ def test_no_plain_pose_is_told_with_what_there_is(tmp_path, poses, words):
         read(tmp_path, one, other, static, wanted=Wanted(commands="none", poses=poses))
 
 
-def test_transforms_in_a_circle_end(tmp_path):
+def test_transforms_in_a_circle_end_and_a_static_one_published_again_replaces_the_first(tmp_path):
     with pytest.raises(LogError, match="no transforms lead from 'c' to 'a'"):
         wanted = Wanted(commands="none", poses="c>a")
         read(tmp_path, moving("b", "a", circle()), moving("a", "b", circle()), wanted=wanted)
-
-
-def test_a_static_transform_published_again_replaces_the_first(tmp_path):
     world = moving("map", "odom", [(7.0, 0.0, 0.0), (10.0, 0.0, 0.0)], TIMES[[0, 30]], "/tf_static")
-    poses = read(tmp_path, world, moving("odom", "base_link", circle())).drives[0].poses
+    poses = read(tmp_path / "again", world, moving("odom", "base_link", circle())).drives[0].poses
     assert poses.places[:, 0] == pytest.approx(10.0 + circle()[:, 0])
-
-
-def test_a_pair_that_never_moves_is_not_taken(tmp_path):
-    dock = moving("map", "dock/base_link", [(1.0, 0.0, 0.0)], TIMES[:1], "/tf_static")
-    source = read(tmp_path, dock, moving("odom", "base_link", circle()))
-    assert any(note.startswith("Poses of base_link in odom are") for note in source.notes)

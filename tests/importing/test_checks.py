@@ -17,9 +17,8 @@ from proxytune.importing.checks import check_units, checked_drive, lag_of
 GRID = np.arange(0.0, 10.0, 0.05)
 
 
-def test_stamps_in_order_are_kept_and_others_sorted():
-    given = drive(GRID, GRID)
-    kept, notes = checked_drive(given, "bag")
+def test_stamps_in_order_are_kept_others_sorted_and_of_repeated_ones_the_first_pose_and_last_command_kept():
+    kept, notes = checked_drive(drive(GRID, GRID), "bag")
     assert notes == []
     np.testing.assert_array_equal(kept.poses.times, GRID)
     np.testing.assert_array_equal(kept.commands.times, GRID)
@@ -28,9 +27,6 @@ def test_stamps_in_order_are_kept_and_others_sorted():
     kept, notes = checked_drive(drive(times, GRID), "bag")
     np.testing.assert_array_equal(kept.poses.times, GRID)
     assert notes == ["drive run: 1 poses came after later ones (by up to 0.05 s); sorted"]
-
-
-def test_of_repeated_stamps_the_first_pose_and_the_last_command_are_kept():
     times = np.append(GRID, GRID[-1])
     given = drive(times, times)
     values = np.arange(2.0 * len(times)).reshape(-1, 2)
@@ -66,29 +62,21 @@ BEYOND = {
 }
 
 
-@pytest.mark.parametrize("case", BEYOND)
-def test_what_cannot_be_mended_is_refused(case):
-    given, says = BEYOND[case]
+@pytest.mark.parametrize(("given", "says"), BEYOND.values(), ids=BEYOND)
+def test_what_cannot_be_mended_is_refused(given, says):
     assert says in complaint_of(checked_drive, given, "bag")
 
 
-def test_a_clock_that_was_never_set_is_told():
-    _, notes = checked_drive(drive(GRID + 2e5, GRID + 2e5), "bag")
-    assert any("before the year 2000" in note for note in notes)
-
-
-def test_what_is_plausible_is_left_alone():
+def test_what_is_plausible_is_left_alone_and_what_was_never_set_or_has_no_number_is_told():
     flat = posed(places=np.column_stack((GRID, np.zeros(len(GRID)), 0.01 * np.sin(GRID))))
     assert checked_drive(flat, "bag")[1] == []
     check_units(slow(), "table")
     check_units(turning(0.1), "table")
     check_units(replace(slow(), commands=None), "table")
     one = slow()
-    stuck = replace(one, poses=replace(one.poses, places=np.zeros_like(one.poses.places)))
-    check_units(stuck, "table")
-
-
-def test_a_few_poses_without_a_number_are_drop_outs():
+    check_units(replace(one, poses=replace(one.poses, places=np.zeros_like(one.poses.places))), "table")
+    _, notes = checked_drive(drive(GRID + 2e5, GRID + 2e5), "bag")
+    assert any("before the year 2000" in note for note in notes)
     headings = np.zeros(len(GRID))
     headings[[3, 50, 51]] = np.nan
     kept, notes = checked_drive(posed(headings=headings), "bag")

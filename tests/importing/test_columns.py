@@ -31,8 +31,10 @@ def test_a_stated_unit_is_converted_to_ours(unit, value, ours):
     assert value * found.factor == pytest.approx(ours, rel=1e-12)
 
 
-def test_the_package_s_own_units_change_nothing():
+def test_the_package_s_own_units_change_nothing_and_a_column_may_have_a_colon_in_its_name():
     assert [own_unit(unit.quantity).factor for unit in UNITS.values()] == [1.0] * len(UNITS)
+    assert split_unit("imu:x", "length", ["imu:x"], "here") == ("imu:x", None)
+    assert split_unit("imu:x:mm", "length", ["imu:x"], "here") == ("imu:x", UNITS["mm"])
 
 
 @pytest.mark.parametrize(
@@ -64,11 +66,6 @@ def test_a_name_s_ending_gives_a_unit_of_the_same_quantity_alone(name, quantity,
 def test_a_unit_that_does_not_go_with_the_quantity_is_refused(text, quantity, says):
     with pytest.raises(LogError, match=f"{says}$"):
         split_unit(text, quantity, [text[0]], "here")
-
-
-def test_a_column_may_have_a_colon_in_its_name():
-    assert split_unit("imu:x", "length", ["imu:x"], "here") == ("imu:x", None)
-    assert split_unit("imu:x:mm", "length", ["imu:x"], "here") == ("imu:x", UNITS["mm"])
 
 
 @pytest.mark.parametrize(("time", "unit"), [(1.7e18, "ns"), (1.7e15, "us"), (1.7e12, "ms"), (1.7e9, None), (5.0, None)])

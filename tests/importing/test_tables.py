@@ -45,15 +45,6 @@ def test_columns_are_read_by_their_names_and_what_was_taken_for_what_is_told(tmp
     assert {channel.count for channel in source.channels} == {60}
 
 
-def test_a_row_that_lacks_part_of_its_pose_keeps_its_command_and_is_told(file):
-    source = read(file(BOTH.replace("0.1,0.1,0,0.1,,", "0.1,,0,0.1,0.4,0")))
-    (drive,) = source.drives
-    np.testing.assert_array_equal(drive.poses.times, [0.0, 0.3])
-    np.testing.assert_array_equal(drive.commands.times, [0.0, 0.1, 0.2, 0.3])
-    said = "run1.csv: 1 row lacks part of a pose (first: line 3, column 'x'); it is left out there, commands are kept."
-    assert source.notes[-1] == said
-
-
 TWICE = (
     "run_no,lap,time,x,y,heading,v,omega,battery\n"
     "7,1,0,0,0,0,0.5,0,9\n7,1,1,0.1,0,0.1,0.5,0,8\n7,1,2,0.2,0,0.1,0.5,0,8\n"
@@ -87,13 +78,19 @@ def test_commands_may_have_a_second_clock_in_the_same_table_alone(file):
     assert "command_time is the clock of commands in the same table" in told
 
 
-def test_rows_may_hold_commands_or_poses_alone_and_stamps_go_backward(file):
+def test_rows_may_hold_commands_or_poses_alone_and_stamps_go_backward_and_part_of_a_pose_is_told(file):
     (drive,) = read(file(BOTH)).drives
     np.testing.assert_array_equal(drive.poses.times, [0.0, 0.1, 0.3])
     np.testing.assert_array_equal(drive.commands.times, [0.0, 0.2, 0.3])
     np.testing.assert_array_equal(drive.commands.values, [[0.5, 0.0], [0.6, 0.1], [0.6, 0.1]])
     text = POSES + "0.2,0.2,0,0.2\n0.15,0.3,0,0.3\n"
     np.testing.assert_array_equal(read(file(text), commands="none").drives[0].poses.times, [0, 0.1, 0.2, 0.2, 0.15])
+    source = read(file(BOTH.replace("0.1,0.1,0,0.1,,", "0.1,,0,0.1,0.4,0")))
+    (drive,) = source.drives
+    np.testing.assert_array_equal(drive.poses.times, [0.0, 0.3])
+    np.testing.assert_array_equal(drive.commands.times, [0.0, 0.1, 0.2, 0.3])
+    said = "run1.csv: 1 row lacks part of a pose (first: line 3, column 'x'); it is left out there, commands are kept."
+    assert source.notes[-1] == said
 
 
 @pytest.mark.parametrize("separator", [";", "\t", " ", ", "])
@@ -103,16 +100,13 @@ def test_separators_are_seen(file, separator):
     np.testing.assert_array_equal(drive.poses.places[:, 0], [0.0, 0.1, 0.2])
 
 
-def test_decimal_commas_comments_and_a_byte_order_mark_are_read(file):
+def test_decimal_commas_comments_and_a_byte_order_mark_are_read_and_a_column_map_goes_before_names(file):
     text = "\ufeff# recorded on Monday\ntime;x;y;heading\n0,0;0;0;0\n# half way\n0,1;0,25;0;0,5\n;;;\n"
     (drive,) = read(file(text), commands="none").drives
     np.testing.assert_array_equal(drive.poses.places[:, 0], [0.0, 0.25])
     np.testing.assert_array_equal(drive.poses.headings, [0.0, 0.5])
     text = "# by numpy\n# time,x,y,heading\n0,0,0,0\n1,1,0,0\n"
     np.testing.assert_array_equal(read(file(text), commands="none").drives[0].poses.times, [0.0, 1.0])
-
-
-def test_a_column_map_goes_before_names_and_what_is_mapped_is_nothing_else(file):
     columns = {"time": "clock:ms", "x": "a:cm", "y": "b:cm", "heading": "c:deg", "v": "d:km/h", "omega": "e:deg/s"}
     text = "clock,a,b,c,d,e,left,right\n0,0,0,90,3.6,90,0,0\n100,10,0,90,3.6,90,0,0\n"
     (drive,) = read(file(text), columns=columns).drives
@@ -120,16 +114,19 @@ def test_a_column_map_goes_before_names_and_what_is_mapped_is_nothing_else(file)
     np.testing.assert_allclose(drive.poses.places[1], [0.1, 0.0, 0.0])
     np.testing.assert_allclose(drive.poses.headings, np.pi / 2)
     np.testing.assert_allclose(drive.commands.values, [[1.0, np.pi / 2]] * 2)
-    source = read(file(BOTH), columns={"left": "v", "right": "omega"})
-    assert source.drives[0].commands.kind == "duty"
+    assert read(file(BOTH), columns={"left": "v", "right": "omega"}).drives[0].commands.kind == "duty"
 
 
-def test_quaternions_give_headings_and_tilts(file):
+def test_quaternions_give_headings_and_tilts_and_stamps_since_1970_are_taken_by_their_size(file):
     text = "t,x,y,z,qx,qy,qz,qw\n0,0,0,1,0,0,0,1\n1,1,0,1,0,0,1,1\n2,1,0,1,1,0,0,1\n"
     poses = read(file(text), commands="none").drives[0].poses
     np.testing.assert_allclose(poses.headings, [0.0, np.pi / 2, 0.0])
     np.testing.assert_allclose(poses.tilts, [0.0, 0.0, np.pi / 2], atol=1e-7)
     np.testing.assert_array_equal(poses.places[:, 2], 1.0)
+    text = "stamp,x,y,yaw\n1700000000000000000,0,0,0\n1700000000100000000,1,0,0\n"
+    source = read(file(text), commands="none")
+    np.testing.assert_allclose(source.drives[0].poses.times, [1.7e9, 1.7e9 + 0.1], atol=1e-6)
+    assert "(ns, by its size)" in source.notes[0]
 
 
 BOTH_TURNS = "t,x,y,yaw,qx,qy,qz,qw\n0,0,0,2,0,0,0,1\n1,1,0,2,0,0,0,1\n"
@@ -143,13 +140,6 @@ def test_a_quaternion_goes_before_a_heading_but_not_before_one_that_is_mapped(fi
     source = read(file(BOTH_TURNS), commands="none", columns=columns)
     np.testing.assert_array_equal(source.drives[0].poses.headings, heading)
     assert [channel.role for channel in source.channels][3:] == roles
-
-
-def test_stamps_since_1970_are_taken_by_their_size(file):
-    text = "stamp,x,y,yaw\n1700000000000000000,0,0,0\n1700000000100000000,1,0,0\n"
-    source = read(file(text), commands="none")
-    np.testing.assert_allclose(source.drives[0].poses.times, [1.7e9, 1.7e9 + 0.1], atol=1e-6)
-    assert "(ns, by its size)" in source.notes[0]
 
 
 def test_each_file_of_a_folder_is_a_drive(tmp_path, file):
@@ -181,7 +171,7 @@ def test_files_of_commands_are_named_with_columns_of_their_own(file):
     np.testing.assert_allclose(read(path, columns=columns).drives[0].commands.times, [0.01, 0.15])
 
 
-def test_drives_share_a_file_of_commands_by_time_where_they_do_not_overlap(tmp_path, file):
+def test_drives_share_a_file_of_commands_by_time_where_they_do_not_overlap_and_each_must_have_some(tmp_path, file):
     file(POSES, "a.csv")
     file(POSES.replace("\n0", "\n10"), "b.csv")
     file("time,v,omega\n-1,0.1,0\n0.1,0.2,0\n0.5,0.3,0\n10.1,0.4,0\n", "commands.csv")
@@ -194,9 +184,6 @@ def test_drives_share_a_file_of_commands_by_time_where_they_do_not_overlap(tmp_p
     assert [drive.commands.values[0, 0] for drive in read(tmp_path).drives] == [2.0, 1.0]
     file("episode,time,v,omega\nb,0,1,0\nc,0.1,1,0\n", "commands.csv")
     assert "drive 'c' has no poses" in complaint(tmp_path)
-
-
-def test_each_drive_must_have_commands(tmp_path, file):
     file(POSES, "a.csv")
     file(POSES.replace("\n0", "\n10"), "b.csv")
     commands = file("episode,time,v,omega\nb,0,1,0\nb,0.1,1,0\n", "commands.csv")
@@ -205,10 +192,15 @@ def test_each_drive_must_have_commands(tmp_path, file):
     assert "has no command while 'a' was driven, 0 to 0.2 s; check that" in complaint(tmp_path)
 
 
-def test_without_commands_only_if_asked_for(file):
+def test_tables_and_trajectories_go_without_commands_only_if_asked_for(file):
     assert "leave them out (--commands none)" in complaint(file(POSES))
     assert read(file(POSES), commands="none").drives[0].commands is None
     assert read(file(BOTH), kind="none").drives[0].commands is None
+    path = file(LINES)
+    said = complaint(path, read_tum)
+    assert "lay run1_commands.csv (time, v, omega) beside it" in said
+    assert "--commands none" in said
+    assert read_tum(path, Wanted(commands="none")).drives[0].commands is None
 
 
 @pytest.mark.parametrize(
@@ -283,13 +275,19 @@ def test_missing_files_and_folders_without_any_are_told(tmp_path, file):
     assert "has no file such as Robot1_Groundtruth.dat" in complaint(tmp_path, read_mrclam)
 
 
-def test_tables_are_known_by_content(tmp_path, file):
+def test_tables_and_trajectories_are_known_by_content(tmp_path, file):
     assert is_csv_tables(file(POSES, "poses.txt"))
     assert is_csv_tables(file("", "empty.csv"))
     assert is_csv_tables(tmp_path)
     assert not is_csv_tables(file("Dear reader,\nthis is prose, and long\n", "notes.txt"))
     assert not is_csv_tables(file(b"\x89PNG\0\0", "picture"))
     assert not is_csv_tables(tmp_path / "missing")
+    assert is_tum(file(LINES, "poses.txt"))
+    assert is_tum(file("", "empty.tum"))
+    assert not is_tum(file("time,x\n1,2\n", "a.csv"))
+    assert not is_tum(file("1 2 3\n", "b.txt"))
+    assert is_tum(tmp_path), "a folder with such a file"
+    assert not is_tum(tmp_path.parent)
 
 
 def holds_the_drive(source, form, name):
@@ -307,14 +305,11 @@ def test_a_robot_s_two_files_are_a_drive(tmp_path):
     assert source.channels[0].name == "Robot1_Groundtruth.dat: time"
 
 
-def test_either_file_or_a_folder_of_one_robot_will_do(tmp_path):
+def test_either_file_or_a_folder_of_one_robot_will_do_and_of_several_one_is_chosen(tmp_path):
     write_mrclam(tmp_path, "Robot3")
     for path in (tmp_path, tmp_path / "Robot3_Odometry.dat", tmp_path / "Robot3_Groundtruth.dat"):
         assert is_mrclam(path)
         assert read_mrclam(path, Wanted()).drives[0].name == "Robot3"
-
-
-def test_several_robots_are_chosen_from_and_commands_left_out(tmp_path):
     write_mrclam(tmp_path, "Robot1"), write_mrclam(tmp_path, "Robot3")
     assert "several robots: Robot1, Robot3; choose one, as in --poses Robot1" in complaint(tmp_path, read_mrclam)
     assert "has no robot 'Robot4'; did you mean" in complaint(tmp_path, read_mrclam, poses="Robot4")
@@ -328,13 +323,10 @@ def test_several_robots_are_chosen_from_and_commands_left_out(tmp_path):
 LINES = "# tracked at 20 Hz\n0 1 2 0 0 0 0 1\n0.05 1 2 0 0 0 0.6 0.8\n"
 
 
-def test_a_trajectory_and_its_commands_are_read(tmp_path):
+def test_a_trajectory_and_its_commands_are_read_also_by_names_with_columns_and_units(tmp_path, file):
     source = read_tum(write_tum(tmp_path), Wanted())
     holds_the_drive(source, "TUM trajectory", "run1")
     assert [channel.role for channel in source.channels][:4] == ["time", "x", "y", "z"]
-
-
-def test_commands_may_be_named_with_columns_and_units(file):
     path = file(LINES)
     file("stamp_ms;l;r\n10;50;-50\n", "joystick.txt")
     columns = {"left": "l:percent", "right": "r:percent"}
@@ -342,14 +334,6 @@ def test_commands_may_be_named_with_columns_and_units(file):
     assert drive.commands.kind == "duty"
     np.testing.assert_allclose(drive.commands.times, [0.01])
     np.testing.assert_allclose(drive.commands.values, [[0.5, -0.5]])
-
-
-def test_tum_without_commands_only_if_asked_for(file):
-    path = file(LINES)
-    said = complaint(path, read_tum)
-    assert "lay run1_commands.csv (time, v, omega) beside it" in said
-    assert "--commands none" in said
-    assert read_tum(path, Wanted(commands="none")).drives[0].commands is None
 
 
 @pytest.mark.parametrize(
@@ -371,15 +355,6 @@ def test_bad_files_of_a_fixed_form_are_refused(tmp_path, file, reader, text, whe
     said = complaint(path, reader, commands="none")
     assert said.startswith(str(path))
     assert where in said
-
-
-def test_trajectories_are_known_by_content(file, tmp_path):
-    assert is_tum(file(LINES, "poses.txt"))
-    assert is_tum(file("", "empty.tum"))
-    assert not is_tum(file("time,x\n1,2\n", "a.csv"))
-    assert not is_tum(file("1 2 3\n", "b.txt"))
-    assert is_tum(tmp_path), "a folder with such a file"
-    assert not is_tum(tmp_path.parent)
 
 
 CAR = "time,x,y,heading,gas,servo,switch\n0,0,0,0,0.3,0.5,1\n0.1,0.1,0,0.1,0.3,-0.5,0\n0.2,0.2,0,0.2,0.2,0,1\n"

@@ -126,18 +126,7 @@ def test_what_cannot_be_taken_is_refused_with_a_remedy(rows, wanted, words):
         chosen(*rows, **wanted)
 
 
-def test_topics_without_a_definition_or_lacking_in_a_bag_are_not_taken():
-    rows = (*topics(*DRIVE), Topic("/mocap", KINDS["Pose"], 9, known=False))
-    choice = choose(rows, Wanted(), "run.bag")
-    assert choice.poses.name == "/odom"
-    assert "does not define" in channels_of(rows, choice)[2].role
-    rows = (*topics(*DRIVE), Topic("/mocap", KINDS["Pose"], 9, lacking=1))
-    choice = choose(rows, Wanted(), "runs")
-    assert choice.poses.name == "/odom"
-    assert channels_of(rows, choice)[2].role == "left out: bags without messages of it: 1"
-
-
-def test_every_topic_has_a_role():
+def test_every_topic_has_a_role_and_those_without_a_definition_or_lacking_in_a_bag_are_not_taken():
     rows = topics(*DRIVE, ("/c", "Twist", 9), ("/scan", "Scan", 9), ("/joints", "Joints", 9), ("/e", "Pose", 0))
     choice = choose(rows, Wanted(), "run.bag")
     assert [channel.role for channel in channels_of(rows, choice)] == [
@@ -152,6 +141,14 @@ def test_every_topic_has_a_role():
         "Commands are 100 messages of /cmd_vel (Twist); /c could be as well (--commands).",
         "Poses are 500 messages of /odom (Odometry).",
     )
+    rows = (*topics(*DRIVE), Topic("/mocap", KINDS["Pose"], 9, known=False))
+    choice = choose(rows, Wanted(), "run.bag")
+    assert choice.poses.name == "/odom"
+    assert "does not define" in channels_of(rows, choice)[2].role
+    rows = (*topics(*DRIVE), Topic("/mocap", KINDS["Pose"], 9, lacking=1))
+    choice = choose(rows, Wanted(), "runs")
+    assert choice.poses.name == "/odom"
+    assert channels_of(rows, choice)[2].role == "left out: bags without messages of it: 1"
 
 
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
@@ -185,29 +182,29 @@ def test_a_slower_transform_is_interpolated_within_what_it_covers(tmp_path):
     assert poses.places[:, 0] == pytest.approx(circle()[6:41, 0] + 0.1 * (TIMES[6:41] - TIMES[0]), abs=1e-6)
 
 
-def test_a_turning_transform_is_interpolated_by_the_shortest_turn(tmp_path):
+def test_a_turning_transform_is_interpolated_by_the_shortest_turn_and_a_tilted_frame_has_a_tilt(tmp_path):
     slow = TIMES[[0, -1]]
     turning = [(0.0, 0.0, np.pi - 0.1), (0.0, 0.0, -np.pi + 0.1)]
     ahead = moving("odom", "base_link", circle() * [1, 1, 0])
     poses = read(tmp_path, moving("map", "odom", turning, slow), ahead).drives[0].poses
     turned = np.pi - 0.1 + 0.2 * (TIMES - TIMES[0]) / (TIMES[-1] - TIMES[0])
     assert np.unwrap(poses.headings) == pytest.approx(turned, abs=1e-5)
-
-
-def test_a_tilted_camera_frame_has_a_tilt(tmp_path):
     tilted = Rotation.from_euler("x", 0.3).as_quat()
     mount = moving("base_link", "mast", [(0.0, 0.0, 1.0, *tilted)], TIMES[:1], "/tf_static")
     wanted = Wanted(commands="none", poses="odom>mast")
-    poses = read(tmp_path, mount, moving("odom", "base_link", circle()), wanted=wanted).drives[0].poses
+    poses = read(tmp_path / "again", mount, moving("odom", "base_link", circle()), wanted=wanted).drives[0].poses
     assert poses.tilts == pytest.approx(np.full(50, 0.3))
     assert poses.places[:, 2] == pytest.approx(np.ones(50))
     assert np.unwrap(poses.headings) == pytest.approx(circle()[:, 2])
 
 
-def test_transforms_at_no_common_time_are_told(tmp_path):
+def test_transforms_at_no_common_time_are_told_and_a_bad_one_elsewhere_does_no_harm(tmp_path):
     late = moving("map", "odom", circle()[:9], TIMES[:9] + 100)
     with pytest.raises(LogError, match="the transforms of map>base_link share no time"):
         read(tmp_path, late, moving("odom", "base_link", circle()))
+    wheel = moving("base_link", "wheel", [(np.nan, 0.0, 0.0)] * 3, TIMES[:3])
+    poses = read(tmp_path / "again", wheel, moving("odom", "base_link", circle())).drives[0].poses
+    assert poses.places[:, :2] == pytest.approx(circle()[:, :2])
 
 
 @pytest.mark.parametrize(
@@ -217,12 +214,6 @@ def test_a_bad_transform_is_told_by_name_and_number(tmp_path, row, words):
     rows = [*circle()[:2], row]
     with pytest.raises(LogError, match=f"transform odom>base_link: {words}"):
         read(tmp_path, moving("odom", "base_link", rows, TIMES[:3]))
-
-
-def test_a_bad_transform_elsewhere_does_no_harm(tmp_path):
-    wheel = moving("base_link", "wheel", [(np.nan, 0.0, 0.0)] * 3, TIMES[:3])
-    poses = read(tmp_path, wheel, moving("odom", "base_link", circle())).drives[0].poses
-    assert poses.places[:, :2] == pytest.approx(circle()[:, :2])
 
 
 ISSUED = 1.7e9 + np.arange(20) * 0.1

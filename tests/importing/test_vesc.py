@@ -19,7 +19,6 @@ GAINS = {
     "steering_angle_to_servo_gain": -1.2135,
     "steering_angle_to_servo_offset": 0.5304,
 }
-NUMBER = "std_msgs/msg/Float64"
 
 
 def write_gains(path, indent="", **changes):
@@ -35,7 +34,7 @@ def sent(prefix="", servo_after_s=0.0003, motor=ISSUED, servo=ISSUED):
     places = GAINS["steering_angle_to_servo_gain"] * ANGLE + GAINS["steering_angle_to_servo_offset"]
     to = (("motor/speed", motor, erpm), ("servo/position", servo + servo_after_s, places))
     return [
-        (f"{prefix}/commands/{topic}", NUMBER, time, {"data": value})
+        (f"{prefix}/commands/{topic}", "std_msgs/msg/Float64", time, {"data": value})
         for topic, times, values in to
         for time, value in zip(times, values, strict=True)
     ]
@@ -69,15 +68,11 @@ def test_a_servo_that_is_sent_at_its_own_times_holds_between_them(tmp_path):
     assert commands.values[:3] == pytest.approx(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 0.1]]), abs=1e-9)
 
 
-def test_an_ackermann_command_goes_first_and_needs_no_gains(tmp_path):
+def test_an_ackermann_command_goes_first_without_gains_and_a_motor_without_a_servo_is_none(tmp_path):
     twists = bags.twist_messages(ISSUED, np.column_stack((SPEED, ANGLE)))
-    source = read(tmp_path, *sent(), *twists, gains=None)
-    assert source.drives[0].commands.kind == "twist"
-
-
-def test_a_motor_without_a_servo_is_no_command(tmp_path):
+    assert read(tmp_path, *sent(), *twists, gains=None).drives[0].commands.kind == "twist"
     with pytest.raises(LogError, match="no topic has commands"):
-        read(tmp_path, *sent()[:5], gains=None)
+        read(tmp_path / "again", *sent()[:5], gains=None)
 
 
 @pytest.mark.parametrize(

@@ -71,8 +71,7 @@ def test_training_leaves_what_it_started_from_and_one_sample_is_enough():
     before = {name: values.copy() for name, values in start.items()}
     SMALL.train(pictures(60, 2), start, 1)
     assert all(np.array_equal(start[name], before[name]) for name in before)
-    weights = SMALL.train(pictures(1, 1), None, 1)
-    assert np.isfinite(SMALL.act(weights, pictures(1, 1).observations[0])).all()
+    assert np.isfinite(SMALL.act(SMALL.train(pictures(1, 1), None, 1), pictures(1, 1).observations[0])).all()
 
 
 @each
@@ -99,8 +98,7 @@ def test_many_pictures_are_answered_to_the_bit_as_each_by_itself(learner):
     weights = learner.train(samples, None, 1)
     alone = np.array([learner.act(weights, picture) for picture in samples.observations])
     for count in (1, 2, 10, 33):
-        answered = learner.act_many(weights, samples.observations[:count])
-        np.testing.assert_array_equal(answered, alone[:count])
+        np.testing.assert_array_equal(learner.act_many(weights, samples.observations[:count]), alone[:count])
 
 
 def test_cells_are_means_of_grey_also_of_unequal_size():

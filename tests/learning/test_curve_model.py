@@ -81,9 +81,12 @@ class MadeUpLearners:
         return rise, slope, zero, depth, generator.uniform(5.0, 7.0)
 
 
-def test_mean_curves_are_as_smooth_as_a_process_of_matern_with_5_2():
+def test_mean_curves_are_as_smooth_as_matern_with_5_2_and_examinations_are_counted():
     apart = np.linspace(0.0, 9.0, 20)
     np.testing.assert_allclose(_matern(apart, 2.0), Matern(2.0, nu=2.5)(apart[:, None], [[0.0]])[:, 0])
+    curve = LearningCurve((0, 100, 200), np.array([[NAN, 1.0, NAN], [NAN, NAN, NAN], [2.0, 3.0, NAN]]))
+    assert curve.examined.tolist() == [[0, 1], [2, 0], [2, 1]]
+    assert curve.repetitions == 2
 
 
 REPETITIONS = 8
@@ -236,12 +239,6 @@ def test_a_curve_that_is_none_is_refused(counts, scores, says):
         LearningCurve(counts, scores)
 
 
-def test_examinations_and_the_repetitions_that_have_one_are_counted():
-    curve = LearningCurve((0, 100, 200), np.array([[NAN, 1.0, NAN], [NAN, NAN, NAN], [2.0, 3.0, NAN]]))
-    assert curve.examined.tolist() == [[0, 1], [2, 0], [2, 1]]
-    assert curve.repetitions == 2
-
-
 STEPS = (0, 100, 200, 400, 800)
 COUNTS = np.array([0.0, 100.0, 200.0, 400.0])
 
@@ -274,10 +271,14 @@ def test_better_scores_never_need_more_samples(scores, more):
     assert crossed(*(np.array(scores) + more)) <= crossed(*scores) + 1e-9
 
 
-def test_draws_keep_within_the_scores_there_can_be():
+def test_draws_keep_within_the_scores_there_can_be_and_before_any_learning_nothing_is_drawn():
     drawn = draw_curves({"high": curve(50, 58, 60, 60, 60, wobble=4.0)}, (-60.0, 60.0)).scores["high"]
     assert drawn.max() <= 60.0 + 1e-9
     assert drawn.shape[0] == 2000
+    draws = draw_curves({"none": curve(np.nan, 10, 20, 50, 50)}, (-60.0, 60.0))
+    early = draws.counts < 99.9
+    assert np.isnan(draws.scores["none"][:, early]).all()
+    assert np.isfinite(draws.scores["none"][:, ~early]).all()
 
 
 def test_mean_curves_go_where_scores_are_and_fall_only_beyond_noise():
@@ -290,10 +291,3 @@ def test_mean_curves_go_where_scores_are_and_fall_only_beyond_noise():
     draws = draw_curves({"steep": curve(0, 10, 20, 50, 50, wobble=0.3)}, (-60.0, 60.0))
     ends = [float(draws.scores["steep"][:, place].mean()) for place in (0, -1)]
     assert ends == pytest.approx([0.0, 50.0], abs=1.0)
-
-
-def test_before_anything_has_been_learnt_nothing_is_drawn():
-    draws = draw_curves({"none": curve(np.nan, 10, 20, 50, 50)}, (-60.0, 60.0))
-    early = draws.counts < 99.9
-    assert np.isnan(draws.scores["none"][:, early]).all()
-    assert np.isfinite(draws.scores["none"][:, ~early]).all()

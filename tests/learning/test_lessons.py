@@ -204,13 +204,10 @@ def identity(tmp_path, monkeypatch):
         sys.modules.pop(name, None)
 
 
-def test_a_learner_is_another_by_settings_or_code_but_not_by_comments(identity):
+def test_a_learner_is_another_by_settings_or_code_not_comments_and_a_shipped_one_by_its_eyes_too(identity, monkeypatch):
     others = [identity(size=4), identity(mine=MINE + "    more: int = 1\n"), identity(cells="def cells(): return 2")]
     assert len({identity(), *others}) == 4
     assert identity() == identity(mine=MINE + "\n# a remark\n") == identity(cells="def cells(): return 1  # one")
-
-
-def test_a_shipped_learner_is_known_by_what_it_sees_of_pictures_too(monkeypatch):
     files = []
     monkeypatch.setattr("proxytune.learning.lessons.meaning_of", lambda paths, root: files.extend(paths) or "")
     learner_identity(RandomFeatures())
@@ -222,7 +219,7 @@ ROOM = Schoolroom(Wobbly())
 WIDE = Distribution({"delay": (0.0, 0.3), "trim": (0.1, 0.1)})
 
 
-def test_lessons_of_more_begin_with_those_of_fewer_and_others_are_of_another_seed():
+def test_lessons_of_more_begin_with_those_of_fewer_and_thetas_are_drawn_for_each_where_free(tmp_path):
     short, long = (collect_samples(ROOM, WIDE, count=count, seed=4, lesson_s=1.0) for count in (17, 60))
     assert len(short.commands) == len(short.observations) == 17
     assert len(long.commands) == 60
@@ -230,9 +227,6 @@ def test_lessons_of_more_begin_with_those_of_fewer_and_others_are_of_another_see
     assert np.array_equal(long.commands[:17], short.commands)
     one, other = (collect_samples(ROOM, WIDE, count=20, seed=seed, lesson_s=1.0) for seed in (1, 2))
     assert not np.array_equal(one.commands, other.commands)
-
-
-def test_thetas_are_drawn_for_every_lesson_where_they_are_free(tmp_path):
     thetas = []
 
     class Spying(Schoolroom):

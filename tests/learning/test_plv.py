@@ -28,7 +28,7 @@ def worth(proxy, level=None):
     return teaching_value(judged(proxy=proxy, level=level), "proxy")
 
 
-def test_a_proxy_is_worth_the_samples_between_crossings():
+def test_a_proxy_is_worth_the_samples_between_crossings_with_a_bound_where_none_or_all_are_needed():
     helped, harmed = worth(curve(20, 48, 50, 50, 50)), worth(curve(-9, -9, 10, 20, 50))
     assert 0.0 < helped.plv.low < helped.plv.value < helped.plv.high
     assert helped.factor.low > 1.0
@@ -39,9 +39,6 @@ def test_a_proxy_is_worth_the_samples_between_crossings():
     found = worth(curve(0, 40, 47, 50, 50))
     assert 100.0 < found.needed.low < found.needed.value < found.needed.high < 200.0
     assert 200.0 < found.without.low < found.without.value < found.without.high < 400.0
-
-
-def test_where_no_or_all_samples_are_needed_plv_has_a_bound():
     found = worth(curve(50, 50, 50, 50, 50))
     assert (found.needed.value, found.reduction.value, found.factor.value) == (0.0, 1.0, None)
 
@@ -73,11 +70,10 @@ def test_a_grid_is_settled_by_its_last_doubling_alone():
 @pytest.mark.parametrize("grid", [(0, 400, 800), (0, 3, 6), (0, 50, 100)])
 def test_a_grid_that_begins_at_half_its_last_tells_the_gain(grid):
     alone = LearningCurve(grid, np.array([[np.nan, 20.0, 50.0], [np.nan, 19.0, 51.0], [np.nan, 21.0, 50.5]]))
-    needs = sample_needs({"none": alone}, best_score=60.0, tolerance=5.0)
-    assert 20.0 < needs.gain < 35.0
+    assert 20.0 < sample_needs({"none": alone}, best_score=60.0, tolerance=5.0).gain < 35.0
 
 
-def test_proxies_are_compared_by_what_they_need_whatever_beside():
+def test_proxies_are_compared_by_what_they_need_whatever_beside_and_their_first_score_has_an_interval():
     needs = judged(good=curve(20, 48, 50, 50, 50), never=curve(0, 0, 0, 0, 0))
     good, never = (teaching_value(needs, name) for name in ("good", "never"))
     assert good.without == never.without
@@ -86,6 +82,11 @@ def test_proxies_are_compared_by_what_they_need_whatever_beside():
     more = more_needed(needs, more="poor", less="good")
     assert 0.0 < more.low < more.value < more.high
     assert more_needed(needs, more="good", less="good").value == 0.0
+    needs = judged(proxy=curve(20, 48, 50, 50, 50))
+    found = mean_score(needs, "proxy", 0)
+    assert found.low < 20.0 < found.high
+    assert found.high - found.low < 5.0
+    assert mean_score(needs, "none", 0).value is None
 
 
 def test_scores_beyond_the_best_are_no_others_and_unit_costs_are_plv():
@@ -95,14 +96,6 @@ def test_scores_beyond_the_best_are_no_others_and_unit_costs_are_plv():
     assert 200.0 < teaching_value(needs, proxy="proxy").without.value < 800.0
     assert general_plv(without=(0.0, 900.0), with_proxy=(0.0, 100.0)) == plv(without=900.0, with_proxy=100.0) == 800.0
     assert general_plv(without=(10.0, 5.0), with_proxy=(4.0, 1.0), cost_on=2.0, cost_off=3.0) == 24.0
-
-
-def test_the_mean_score_before_any_target_sample_has_an_interval_and_without_a_proxy_there_is_none():
-    needs = judged(proxy=curve(20, 48, 50, 50, 50))
-    found = mean_score(needs, "proxy", 0)
-    assert found.low < 20.0 < found.high
-    assert found.high - found.low < 5.0
-    assert mean_score(needs, "none", 0).value is None
 
 
 SPENDING_GRID = (0, 100, 200, 400, 800, 1600)
@@ -137,7 +130,7 @@ def test_the_first_examinations_span_the_grid_in_two_repetitions_and_none_is_of_
     assert len(first) == len(set(first)) == 2 * (4 + 4)
 
 
-def test_examinations_go_where_they_tell_most_and_nothing_twice():
+def test_examinations_go_where_they_tell_most_nothing_twice_and_fewer_where_all_is_done():
     chosen = next_examinations(needs(), list(CURVES), SPENDING)
     often = {name: sum(one.curve == name for one in chosen) for name in CURVES}
     assert len(chosen) == SPENDING.batch
@@ -150,11 +143,14 @@ def test_examinations_go_where_they_tell_most_and_nothing_twice():
 
     assert {one.curve for one in next_examinations(needs(), ["open"], SPENDING)} == {"open"}
 
-    alone = {"none": CURVES["none"]}
-    chosen = next_examinations(needs(alone), ["none"], SPENDING)
+    chosen = next_examinations(needs({"none": CURVES["none"]}), ["none"], SPENDING)
     assert len(chosen) == SPENDING.batch
     # Between 400, where it is far below, and 1600, where it is converged.
     assert np.mean([one.samples > 300 for one in chosen]) > 0.5
+    one_repetition = AdaptiveDesign(SPENDING_GRID, 2, 500)
+    chosen = next_examinations(needs(), list(CURVES), one_repetition)
+    assert 0 < len(chosen) < 500
+    assert {one.repetition for one in chosen} == {0, 1}
 
 
 @pytest.mark.parametrize("first", [1, 2, 7])
@@ -169,10 +165,3 @@ def test_a_grid_from_few_samples_on_has_no_place_twice_and_none_before_the_first
     assert len(set(chosen)) == len(chosen) == spending.batch
     # The crossing lies between 8 and 512
     assert np.mean([one.samples >= 8 for one in chosen]) > 0.5
-
-
-def test_where_every_repetition_of_every_count_is_done_fewer_or_none_are_left():
-    one_repetition = AdaptiveDesign(SPENDING_GRID, 2, 500)
-    chosen = next_examinations(needs(), list(CURVES), one_repetition)
-    assert 0 < len(chosen) < 500
-    assert {one.repetition for one in chosen} == {0, 1}

@@ -11,7 +11,7 @@ from proxytune.learning.ridge import RandomFeatures
 SMALL = RandomFeatures(rows=3, columns=4, features=200)
 
 
-def test_weights_and_features_are_those_of_their_formulas():
+def test_weights_and_features_are_those_of_their_formulas_and_answers_within_what_a_command_can_be():
     samples = pictures(80, 1)
     weights = SMALL.train(samples, None, 1)
     waves = SMALL._waves(weights, samples.observations)
@@ -23,6 +23,8 @@ def test_weights_and_features_are_those_of_their_formulas():
     apart = np.diff(grey_cells(seen, top=0.25, rows=3, columns=4), axis=0)
     assert first @ second == pytest.approx(np.exp(-0.5 * np.mean(apart**2) / 0.2**2), abs=0.02)
     assert 0.1 < first @ second < 0.9
+    weights = {**SMALL.train(pictures(60, 1), None, 1), "centre": np.array((5.0, -5.0))}
+    assert SMALL.act(weights, pictures(1, 2).observations[0]).tolist() == [1.0, -1.0]
 
 
 def test_what_it_starts_from_is_kept_with_its_features():
@@ -40,8 +42,3 @@ def test_what_it_starts_from_is_kept_with_its_features():
     one, other = (SMALL.train(pictures(60, 2), start, seed) for seed in (1, 2))
     assert all(np.array_equal(one[name], other[name]) for name in one)
     assert all(np.array_equal(start[name], before[name]) for name in before)
-
-
-def test_its_answers_are_within_what_a_command_can_be():
-    weights = {**SMALL.train(pictures(60, 1), None, 1), "centre": np.array((5.0, -5.0))}
-    assert SMALL.act(weights, pictures(1, 2).observations[0]).tolist() == [1.0, -1.0]

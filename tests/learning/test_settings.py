@@ -16,7 +16,7 @@ def read(tmp_path, **changes):
     return read_teaching(Section(tmp_path / "study.toml", "teaching.", values))
 
 
-def test_without_a_word_nothing_is_taught_rehearsed_or_costs_more_than_one(tmp_path):
+def test_without_a_word_nothing_is_taught_a_number_is_one_theta_and_a_pair_is_drawn_from(tmp_path):
     assert read_teaching(Section(tmp_path / "study.toml", "teaching.", {})) is None
     assert read(tmp_path).rehearsal == 0.0
     assert read(tmp_path).later_keys == {}
@@ -24,9 +24,6 @@ def test_without_a_word_nothing_is_taught_rehearsed_or_costs_more_than_one(tmp_p
     plain, other = read(tmp_path), read(tmp_path, proxy_lessons="learner", costs={"label": 2})
     assert (plain.proxy_lessons, plain.target_lessons, plain.costs) == ("expert", "expert", Costs(1.0, 1.0, 0.0))
     assert (other.later_keys, other.costs) == ({"proxy_lessons": "learner"}, Costs(1.0, 1.0, 2.0))
-
-
-def test_a_number_is_one_theta_and_a_pair_is_drawn_from(tmp_path):
     proxies = {"nominal": {}, "mixed": {"trim": 0.1, "delay": [0.0, 0.2]}}
     read_proxies = read(tmp_path, proxies=proxies).proxies
     assert dict(read_proxies["mixed"].bounds) == {"delay": (0.0, 0.2), "trim": (0.1, 0.1)}
@@ -40,15 +37,11 @@ def test_where_the_expert_drives_all_target_samples_are_off_policy(tmp_path, wit
     assert abs(told.cost_saved(**counts)) == 90.0
 
 
-def test_where_the_learner_drives_the_first_round_without_a_proxy_is_the_experts(tmp_path):
+def test_where_the_learner_drives_the_first_round_is_the_experts_and_costs_have_any_shape(tmp_path):
     told = read(tmp_path, target_lessons="learner", costs={"off_policy": 2, "on_policy": 5, "label": 1})
     counts = np.array([0.0, 4.5, 10.0, 11.0, 40.0])
     assert told.cost_saved(without=counts, needed=0.0).tolist() == [0.0, 13.5, 30.0, 36.0, 210.0]
     assert told.cost_saved(without=0.0, needed=counts).tolist() == [0.0, -27.0, -60.0, -66.0, -240.0]
-
-
-def test_what_a_proxy_saves_in_cost_is_told_for_arrays_of_any_shape(tmp_path):
-    told = read(tmp_path, target_lessons="learner", costs={"off_policy": 2, "on_policy": 5, "label": 1})
     saved = told.cost_saved(without=np.array([0.0, 7.0, 500.0]), needed=np.array([[0.0], [12.0]]))
     assert saved.tolist() == [[0.0, 21.0, 2970.0], [-72.0, -51.0, 2898.0]]
     assert read(tmp_path).cost_saved(without=400.0, needed=100.0) == 300.0

@@ -11,12 +11,11 @@ from proxytune.driving import read_robot
 from proxytune.logs import log_cautions
 from proxytune.settings import figure_cautions
 
-FIGURES = read_robot("duckiebot").figures
 LOG = make_log(CLEAN[0], episodes=3, seconds=40.0)
 
 
 def cautions(log):
-    return log_cautions(log, FIGURES)
+    return log_cautions(log, read_robot("duckiebot").figures)
 
 
 def changed(change):
@@ -85,9 +84,8 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
-def test_what_is_probably_not_meant_is_told_in_one_sentence(case):
-    log, expected = CASES[case]
+@pytest.mark.parametrize(("log", "expected"), CASES.values(), ids=CASES)
+def test_what_is_probably_not_meant_is_told_in_one_sentence(log, expected):
     (line,) = cautions(log)
     assert re.search(expected, line)
 

@@ -15,8 +15,7 @@ from proxytune.api import log_of
 from proxytune.logs import Frames, read_log, read_pictures
 
 BASE = 'format = 1\nrobot = "tractor"\ncommand = "twist"\nrate_hz = 10\n'
-CAMERA = '[camera]\nframes = "frames/%04d.jpg"\n'
-TOML = BASE + 'map = "small_loop"\n' + CAMERA
+TOML = BASE + 'map = "small_loop"\n' + '[camera]\nframes = "frames/%04d.jpg"\n'
 SAMPLES = "episode,time,v,omega,x,y,heading\n" + "".join(f"a,{5 + k / 10},0,0,{k},0,0\n" for k in range(4))
 SAMPLES += "b,0,0,0,,,\nb,0.1,0,0,0,0,0\nb,0.3,0,0,0,0,0\n"
 HEADER = "frame,episode,time\n"
@@ -43,6 +42,12 @@ def test_frames_have_their_own_times_and_numbers(folder):
     assert frames.times.tolist() == [5.013, 5.3, 0.2]
     assert (frames.road, frames.position_m, frames.heading_deg) == ("small_loop", None, None)
     assert (frames.rectified, frames.readout_s, frames.fixed_exposure) == (False, None, False)
+
+
+def test_a_frame_of_a_row_has_the_time_at_which_the_pose_lies_on_the_grid(folder):
+    samples = SAMPLES.replace("a,5.1,", "a,5.12,")
+    log = read_log(folder(None, pictures=range(7), samples=samples))
+    assert log.frames.times[1] == log.episodes[0].times[1] == pytest.approx(5.1)
 
 
 def test_what_is_stated_of_the_camera_and_its_map_is_kept(folder):
@@ -86,12 +91,6 @@ def test_without_a_list_there_is_a_frame_at_each_row_with_a_pose(folder, descrip
     assert [int(path.stem) for path in frames.paths] == [0, 1, 2, 3, 5, 6]
     assert frames.drives.tolist() == [0, 0, 0, 0, 1, 1]
     np.testing.assert_allclose(frames.times, [5.0, 5.1, 5.2, 5.3, 0.1, 0.3])
-
-
-def test_a_frame_of_a_row_has_the_time_at_which_the_pose_lies_on_the_grid(folder):
-    samples = SAMPLES.replace("a,5.1,", "a,5.12,")
-    log = read_log(folder(None, pictures=range(7), samples=samples))
-    assert log.frames.times[1] == log.episodes[0].times[1] == pytest.approx(5.1)
 
 
 def test_the_key_at_the_top_goes_with_a_list_and_with_what_else_is_stated(folder):
@@ -182,16 +181,6 @@ def noise(rows, columns, seed=5):
     return np.random.default_rng((seed, rows, columns)).integers(0, 256, (rows, columns, 3), dtype=np.uint8)
 
 
-def test_wider_pictures_are_averaged_and_others_stay(frames_of):
-    picture = noise(90, 120)
-    pictures = read_pictures(frames_of(picture), [0])
-    assert pictures.dtype == np.uint8
-    np.testing.assert_array_equal(pictures, picture[None])
-    picture = noise(480, 640)
-    mean = picture.reshape(120, 4, 160, 4, 3).mean(axis=(1, 3))
-    np.testing.assert_allclose(read_pictures(frames_of(picture), [0])[0], mean, atol=1.01)
-
-
 @settings(max_examples=20)
 @given(rows=st.integers(1, 300), columns=st.integers(161, 500))
 def test_a_width_that_is_no_multiple_is_averaged_all_the_same(tmp_path_factory, rows, columns):
@@ -219,11 +208,18 @@ def test_pictures_of_other_kinds_become_red_green_and_blue(frames_of, mode, endi
     np.testing.assert_allclose(small, expected, atol=4.0)
 
 
-def test_some_of_the_pictures_are_read_in_the_order_asked_for(frames_of):
+def test_pictures_are_read_in_the_order_asked_for_wider_ones_averaged_and_others_as_they_are(frames_of):
     first, second, third = (noise(12, 16, seed) for seed in range(3))
     frames = frames_of(first, second, third)
     np.testing.assert_array_equal(read_pictures(frames, [2, 0]), [third, first])
     assert len(read_pictures(frames, [])) == 0
+    picture = noise(90, 120)
+    pictures = read_pictures(frames_of(picture), [0])
+    assert pictures.dtype == np.uint8
+    np.testing.assert_array_equal(pictures, picture[None])
+    picture = noise(480, 640)
+    mean = picture.reshape(120, 4, 160, 4, 3).mean(axis=(1, 3))
+    np.testing.assert_allclose(read_pictures(frames_of(picture), [0])[0], mean, atol=1.01)
 
 
 def test_pictures_of_two_sizes_of_sixteen_bits_or_gone_are_refused(frames_of, folder):

@@ -39,22 +39,12 @@ def test_a_drive_without_such_is_itself(case):
         assert without_outliers(drive) is drive
 
 
-def test_a_robot_that_was_carried_a_gap_or_few_poses_are_left_alone():
-    assert not outliers(moved(np.arange(300, 600), (2.0, 0.0, 0.0))).any()
-    assert not any(outliers(drive).any() for drive in false_names.make_log("bursts missing", "heavy", 5).episodes)
-    few = LogEpisode("few", DRIVE.times[:4], DRIVE.commands[:4], DRIVE.poses[:4], None)
-    assert without_outliers(few) is few
-
-
-def test_headings_that_were_unwrapped_along_a_wrong_one_are_unwrapped_anew():
+def test_headings_unwrapped_along_a_wrong_one_are_unwrapped_anew_and_own_times_go_with_their_poses():
     wrong = DRIVE.poses.copy()
     wrong[200, 2] += 3.0
     wrong[201:, 2] += 2.0 * np.pi
     left = without_outliers(replace(DRIVE, poses=wrong)).poses
     np.testing.assert_allclose(np.delete(left, 200, 0), np.delete(DRIVE.poses, 200, 0), atol=1e-9)
-
-
-def test_poses_at_times_of_their_own_are_left_out_with_their_samples():
     rows = np.arange(len(DRIVE.times))
     off = moved([200], (0.4, 0.0, 0.0))
     own = without_outliers(replace(off, measured=Measured(off.times + 0.004, off.poses, rows))).measured
@@ -63,9 +53,13 @@ def test_poses_at_times_of_their_own_are_left_out_with_their_samples():
     np.testing.assert_allclose(own.times, np.delete(off.times, 200) + 0.004)
 
 
-def test_they_are_told_and_no_motion_is_learnt_from_them():
+def test_outliers_are_told_and_nothing_learnt_from_them_but_who_was_carried_is_left_alone():
     log = replace(LOG, episodes=(moved([200, 400], (0.9, 0.0, 0.0)), LOG.episodes[1]))
     robot = robot_of(log)
     (line,) = log_cautions(log, robot.figures)
     assert line.startswith("2 poses lie off the way for a sample or two (most in drive '00', 2)")
     assert np.abs(gather(log, robot, log.episodes).measured[:, :2]).max() < 0.1
+    assert not outliers(moved(np.arange(300, 600), (2.0, 0.0, 0.0))).any()
+    assert not any(outliers(drive).any() for drive in false_names.make_log("bursts missing", "heavy", 5).episodes)
+    few = LogEpisode("few", DRIVE.times[:4], DRIVE.commands[:4], DRIVE.poses[:4], None)
+    assert without_outliers(few) is few

@@ -64,8 +64,7 @@ def test_a_robot_that_stands_has_its_pose_every_fifth_of_a_second(rows):
 def test_a_single_repeat_in_slow_rows_the_last_pose_and_rounding_are_no_stand():
     assert rows_in(log(held(STRAIGHT, 20, 2), rate_hz=5.0)) == [[*range(21), *range(22, ROWS)]]
     assert rows_in(log(stood(20, 2), rate_hz=5.0)) == [[*range(ROWS)]]
-    every_second = STRAIGHT[::2].repeat(2)
-    assert rows_in(log(held(every_second, 50, 10))) == [[*range(0, 51, 2)]]
+    assert rows_in(log(held(STRAIGHT[::2].repeat(2), 50, 10))) == [[*range(0, 51, 2)]]
     # Of a log whose poses are its own it is one: it may have stopped.
     assert rows_in(log(held(STRAIGHT, 50, 10))) == [[*range(51), 54, 58]]
     rounded = np.round(1e-4 * np.random.default_rng(1).standard_normal(ROWS).cumsum(), 4).repeat(6)
@@ -73,20 +72,16 @@ def test_a_single_repeat_in_slow_rows_the_last_pose_and_rounding_are_no_stand():
     assert np.diff(found).max() <= 4
 
 
-def test_poses_of_half_the_rate_of_the_rows_are_told_in_one_line():
+def test_poses_of_half_the_rate_or_of_a_lidar_that_repeats_are_told_in_one_line():
     made = make_log(CLEAN[0], episodes=3, seconds=40.0)
     twice = [replace(one, poses=one.poses[::2].repeat(2, axis=0)[: len(one.poses)]) for one in made.episodes]
     assert log_cautions(made, {}) == ()
     (line,) = log_cautions(replace(made, episodes=tuple(twice)), {})
     assert line.endswith("(about 10 a second are measured): each is used once, where it first comes")
     assert 30 <= int(line.split()[0]) <= 50
-
-
-def test_a_skid_steer_robots_lidar_repeats_its_poses():
     if not HUSKY.is_dir():
         pytest.skip("the measured log drive_husky is not here: it is not part of the project")
     husky = read_log(HUSKY)
     (line,) = [line for line in log_cautions(husky, {}) if "repeat" in line]
     assert "(about 9.8 a second are measured)" in line
-    found = rows_of_poses(husky, husky.episodes)
-    assert 2 < sum(map(len, found)) / 603 / 2.0 < 11
+    assert 2 < sum(map(len, rows_of_poses(husky, husky.episodes))) / 603 / 2.0 < 11

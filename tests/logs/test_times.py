@@ -84,26 +84,22 @@ def test_of_poses_near_one_step_those_are_kept_that_find_a_free_one(folder):
     assert len(times) - 16 <= len(episode.measured.times) < len(times)
 
 
-def test_commands_beside_the_poses_are_issued_at_the_times_of_their_rows(folder):
+def test_commands_are_issued_and_wheel_speeds_held_at_the_times_of_their_rows(folder):
     text = "episode,time,v,omega,x,y,heading\na,0.0,0.5,0,0,0,0\na,0.013,0.6,0,0,0,0\na,0.031,0.7,0,0,0,0\n"
     (episode,) = read_log(folder(text)).episodes
     np.testing.assert_array_equal(episode.issued, [0.0, 0.013, 0.031])
     np.testing.assert_array_equal(episode.commands[:, 0], [0.5, 0.6, 0.7])
+    lines = "a,3.45,0,0,0,1,2\na,3.5,0,0,0,,\na,3.55,0,0,0,3,4\n"
+    (episode,) = read_log(folder("episode,time,x,y,heading,wheel_left,wheel_right\n" + lines)).episodes
+    np.testing.assert_array_equal(episode.wheels[[0, 3, 5, 6]], [[1, 2], [1, 2], [1, 2], [3, 4]])
 
 
 def test_a_pose_shown_again_stays_a_repeat():
     times = np.array([0.0, 0.02, 0.05, 0.07, 0.1])
-    poses = circle(np.array([0.0, 0.0, 0.05, 0.05, 0.1]))
-    out = moved(Measured(times, poses, np.arange(5)), times + 0.004)
+    out = moved(Measured(times, circle(np.array([0.0, 0.0, 0.05, 0.05, 0.1])), np.arange(5)), times + 0.004)
     np.testing.assert_array_equal(out[0], out[1])
     np.testing.assert_array_equal(out[2], out[3])
     assert not np.array_equal(out[1], out[2])
-
-
-def test_measured_wheel_speeds_are_held_between_their_rows(folder):
-    lines = "a,3.45,0,0,0,1,2\na,3.5,0,0,0,,\na,3.55,0,0,0,3,4\n"
-    (episode,) = read_log(folder("episode,time,x,y,heading,wheel_left,wheel_right\n" + lines)).episodes
-    np.testing.assert_array_equal(episode.wheels[[0, 3, 5, 6]], [[1, 2], [1, 2], [1, 2], [3, 4]])
 
 
 @settings(max_examples=40)

@@ -56,12 +56,22 @@ def assert_same(joined):
         np.testing.assert_allclose(one.poses, other.poses, atol=1e-9)
 
 
-def test_windows_of_a_drive_are_the_drive_also_by_whole_turns():
+def test_windows_of_a_drive_are_the_drive_measured_wheels_too_and_that_they_are_joined_is_said():
     joined = join_windows(windows())
     assert_same(joined)
     assert joined.episodes[0].name == f"{WHOLE.episodes[0].name} 0 to {WHOLE.episodes[0].name} 9"
     assert_same(join_windows(windows(turned)))
     assert join_windows(WHOLE) is WHOLE
+    (line,) = log_cautions(windows(), {})
+    assert line.startswith("18 of its 20 drives go on a sample after the one before, where that ended")
+    assert "they are windows" in line
+    assert "of 2 drives" in line
+
+    def turning(number, window):
+        return replace(window, wheels=np.full((len(window.times), 2), float(number)))
+
+    (one, _) = join_windows(windows(turning)).episodes
+    np.testing.assert_array_equal(one.wheels[:, 0], np.arange(10).repeat(ROWS)[: len(one.wheels)])
 
 
 @pytest.mark.parametrize("change", [begun_anew, in_own_frame, apart])
@@ -69,21 +79,6 @@ def test_what_does_not_go_on_stays_as_it_is(change):
     log = windows(change)
     assert join_windows(log) is log
     assert not [line for line in log_cautions(log, {}) if "windows of" in line]
-
-
-def test_one_line_says_that_they_are_joined():
-    (line,) = log_cautions(windows(), {})
-    assert line.startswith("18 of its 20 drives go on a sample after the one before, where that ended")
-    assert "they are windows" in line
-    assert "of 2 drives" in line
-
-
-def test_measured_wheels_are_joined_too():
-    def turning(number, window):
-        return replace(window, wheels=np.full((len(window.times), 2), float(number)))
-
-    (one, _) = join_windows(windows(turning)).episodes
-    np.testing.assert_array_equal(one.wheels[:, 0], np.arange(10).repeat(ROWS)[: len(one.wheels)])
 
 
 def written(folder, names):

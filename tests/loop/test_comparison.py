@@ -43,13 +43,7 @@ def test_a_fall_is_claimed_where_the_intervals_are_apart(before, after, says):
     assert told == f"The simulator lacked: dead band (verdict: explained). With it, PRPV of the agents tuned on {says}."
 
 
-def test_what_has_no_name_or_was_not_measured_is_told_as_that():
-    curves = {**DIAGNOSIS, "effects": [], "verdict": "unexplained"}
-    assert "what no named effect explains (verdict: unexplained)" in answer(curves, [prpv(HIGH, LOW)])
-    assert [row.key for row in compare_errors({**DIAGNOSIS, "camera": CAMERA})] == ["error", "markings_error"]
-
-
-def test_motion_and_camera_are_told_together_above_a_floor():
+def test_motion_and_camera_are_told_together_and_what_has_no_name_or_was_not_measured_as_that():
     both = {**DIAGNOSIS, "camera": CAMERA}
     told = answer(both, [prpv(HIGH, LOW), *compare_errors(both)])
     assert "The simulator lacked: dead band and field of view" in told
@@ -62,6 +56,9 @@ def test_motion_and_camera_are_told_together_above_a_floor():
     assert floor_text(markings.before, markings.unit) == "0.23 px"
     assert floor_text(Level(8.0, None, 2.0, (0.0, 6.0)), "") == "2 (0 to 6)"
     assert (floor_text(LOW, ""), level_text(None, "")) == ("–", "–")
+    curves = {**DIAGNOSIS, "effects": [], "verdict": "unexplained"}
+    assert "what no named effect explains (verdict: unexplained)" in answer(curves, [prpv(HIGH, LOW)])
+    assert [row.key for row in compare_errors({**DIAGNOSIS, "camera": CAMERA})] == ["error", "markings_error"]
 
 
 def test_what_is_next_follows_from_what_was_found():

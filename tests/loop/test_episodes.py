@@ -31,7 +31,7 @@ def closed(tmp_path):
     return Closed(loop, before, {}, after, None, (), 0)
 
 
-def test_the_start_is_shown_in_which_the_proxy_before_is_furthest_from_the_target(closed):
+def test_the_start_furthest_from_the_target_is_shown_and_nothing_without_a_twin_or_of_failing_starts(closed):
     study, gaps = closed.before.result.study, []
     target = load_family(study.settings, closed.loop.twin)
     for start in range(4):
@@ -42,9 +42,6 @@ def test_the_start_is_shown_in_which_the_proxy_before_is_furthest_from_the_targe
     assert before.episode.seed == after.episode.seed
     assert np.array_equal(before.target.places, after.target.places)
     assert mean_gap_m(after) < mean_gap_m(before)
-
-
-def test_without_a_twin_or_from_failing_starts_nothing_is_shown(closed):
     assert drive_both(closed, "nobody") is None
     assert drive_both(replace(closed, loop=replace(closed.loop, twin=None)), "crawler") is None
 

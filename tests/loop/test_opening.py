@@ -174,7 +174,7 @@ def test_a_broken_file_is_one_line_with_a_remedy(tmp_path, text):
         Kept(tmp_path)
 
 
-def test_a_digest_of_files_changes_with_content_names_and_a_single_hidden_file(tmp_path):
+def test_a_digest_of_files_changes_with_content_names_and_a_single_hidden_file(tmp_path, write_file):
     (tmp_path / "__pycache__").mkdir()
     (tmp_path / "one").write_text("1")
     before = digest_of_files(tmp_path)
@@ -186,8 +186,7 @@ def test_a_digest_of_files_changes_with_content_names_and_a_single_hidden_file(t
     (tmp_path / "one").rename(tmp_path / "two")
     assert len({before, changed, digest_of_files(tmp_path)}) == 3
 
-    model = tmp_path / ".model.toml"
-    model.write_text("1")
+    model = write_file("1", ".model.toml")
     before = digest_of_files(model)
     model.write_text("2")
     assert digest_of_files(model) != before

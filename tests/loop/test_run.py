@@ -152,11 +152,16 @@ def test_kept_pictures_that_are_damaged_are_told_of_and_drawn_again_once_removed
     assert len(captions_of_episodes(righting[0])) == 2
 
 
-def test_what_is_done_is_not_done_again_and_comes_out_the_same(closed, closed_once, diagnosed, close):
+def test_what_is_done_is_not_done_again_and_a_target_of_another_twin_told(
+    closed, closed_once, diagnosed, close, refused
+):
     again = close(closed)
     assert (again["this_run"]["steps"], again["this_run"]["episodes"]) == ([], 0)
     assert diagnosed[0] == []
     assert but_for_times(again) == but_for_times(closed_once[1])
+    twin = closed / "twin.toml"
+    twin.write_text(twin.read_text().replace("0.15", "0.10"))
+    assert "target.csv: was measured of another model" in refused("loop", closed)
 
 
 @pytest.mark.slow
@@ -194,12 +199,6 @@ def test_where_nothing_is_missing_the_loop_says_so_and_ends(tmp_path, diagnosed,
     assert document["prpv"]["after"] is None
     assert document["errors"]["error"]["after"] is None
     assert not (tmp_path / "tiny" / "loop" / "extended").exists()
-
-
-def test_a_target_measured_of_another_twin_is_told_of(closed, refused):
-    twin = closed / "twin.toml"
-    twin.write_text(twin.read_text().replace("0.15", "0.10"))
-    assert "target.csv: was measured of another model" in refused("loop", closed)
 
 
 @pytest.mark.slow

@@ -26,14 +26,13 @@ from proxytune.report.diagnosis.document import camera_document
 from proxytune.report.diagnosis.error_figures import DECLARED_MODEL
 
 AFTER = "with camera roll"
-DECLARED = ("camera_pitch", "blur")
 
 
 @pytest.fixture(scope="module")
 def diagnosis(tmp_path_factory):
     theta = {"camera_pitch": 19.15, "camera_roll": 4.0}
     folder = write_still_frames(tmp_path_factory.mktemp("rolled") / "log", theta, lane_poses(30), columns=96)
-    found = diagnose_camera(read_log(folder), ROBOT, DECLARED)
+    found = diagnose_camera(read_log(folder), ROBOT, ("camera_pitch", "blur"))
     assert [effect.effect for effect in found.effects] == ["camera_roll"]
     return found
 
@@ -63,7 +62,7 @@ def leaves(value):
         yield value
 
 
-def test_every_number_of_the_document_is_plain_and_finite(diagnosis):
+def test_the_document_has_plain_finite_numbers_and_no_floor_of_brightness_where_none_is_known(diagnosis):
     blemish = Blemish((np.int64(3), 9), (2, 8), np.float32(0.5), 0.01)
     endless = {"camera_roll": Estimate(4.0, (-np.inf, np.float64(np.nan)), "deg")}
     document = camera_document(replace(diagnosis, theta=endless, blemishes=(blemish,)))
@@ -72,6 +71,9 @@ def test_every_number_of_the_document_is_plain_and_finite(diagnosis):
     assert {type(leaf) for leaf in told} <= {float, int, str, bool, type(None)}
     assert all(math.isfinite(leaf) for leaf in told if isinstance(leaf, float))
     assert sum(isinstance(leaf, float) for leaf in told) > 50
+    document = camera_document(diagnosis)
+    assert document["grey_error"]["noise_floor"] is None
+    assert 0.0 < document["error"]["noise_floor"] <= document["error"]["after"]
 
 
 @pytest.mark.slow
@@ -87,12 +89,6 @@ def test_effects_that_do_not_matter_are_told_with_the_values_they_had(diagnosis,
     assert any(line.startswith("detectable but immaterial: camera_roll 4.") for line in camera_notes(dropped))
 
 
-def test_brightness_has_no_floor_where_none_is_known(diagnosis):
-    document = camera_document(diagnosis)
-    assert document["grey_error"]["noise_floor"] is None
-    assert 0.0 < document["error"]["noise_floor"] <= document["error"]["after"]
-
-
 def test_four_figures_for_a_column_say_what_they_show_in_which_unit(figures):
     assert set(figures) == {"camera_markings", "camera_displacement", "camera_ranking", "camera_error"}
     assert_readable(*figures.values())
@@ -106,11 +102,19 @@ def test_four_figures_for_a_column_say_what_they_show_in_which_unit(figures):
     assert grey.get_ylabel() == "difference in brightness\n[grey levels]"
 
 
-def test_the_markings_are_drawn_before_and_after_on_two_frames(figures, clean):
+def test_the_markings_are_drawn_before_and_after_and_every_frame_kept_aside_has_its_errors(figures, clean, diagnosis):
     titles = [axes.get_title() for axes in figures["camera_markings"].axes]
     assert [title.split(",")[0] for title in titles] == [DECLARED_MODEL, AFTER] * 2
     assert all(axes.images and axes.collections for axes in figures["camera_markings"].axes)
     assert len(camera_figures(clean)["camera_markings"].axes) == 2
+    for axes, error in zip(figures["camera_error"].axes, (diagnosis.pixels, diagnosis.grey), strict=True):
+        before, after = (line for line in axes.get_lines() if line.get_marker() == ".")
+        known = np.isfinite(error.before.frames)
+        assert sorted(before.get_ydata()) == list(before.get_ydata())
+        assert sorted(before.get_ydata()) == pytest.approx(sorted(error.before.frames[known]))
+        assert sorted(after.get_ydata()) == pytest.approx(sorted(error.after.frames[known]))
+    (axes, _) = camera_figures(clean)["camera_error"].axes
+    assert [line.get_marker() for line in axes.get_lines()].count(".") == 1
 
 
 def test_outlines_lie_on_the_edges_and_displaced_edges_are_drawn_where_they_went(diagnosis):
@@ -147,18 +151,7 @@ def test_the_ranking_holds_every_loss_against_that_of_nothing_added(diagnosis, f
     assert dots[0].get_label() == "added"
 
 
-def test_every_frame_kept_aside_is_in_the_figure_of_errors(diagnosis, figures, clean):
-    for axes, error in zip(figures["camera_error"].axes, (diagnosis.pixels, diagnosis.grey), strict=True):
-        before, after = (line for line in axes.get_lines() if line.get_marker() == ".")
-        known = np.isfinite(error.before.frames)
-        assert sorted(before.get_ydata()) == list(before.get_ydata())
-        assert sorted(before.get_ydata()) == pytest.approx(sorted(error.before.frames[known]))
-        assert sorted(after.get_ydata()) == pytest.approx(sorted(error.after.frames[known]))
-    (axes, _) = camera_figures(clean)["camera_error"].axes
-    assert [line.get_marker() for line in axes.get_lines()].count(".") == 1
-
-
-def test_what_was_found_is_told_with_its_place_its_size_and_what_fits_as_well(diagnosis):
+def test_a_headline_says_what_the_verdict_means_and_notes_tell_what_was_found_where_and_how_large(diagnosis, clean):
     lines = (LaidLine("yellow line", 3, -0.006, (-0.008, -0.004)), LaidLine("yellow dashes", 1, 0.004, (0.002, 0.006)))
     none = Estimate(0.0, (-0.001, 0.001), "m")
     turned = Estimate(0.5, (0.4, 0.6), "deg")
@@ -190,7 +183,4 @@ def test_what_was_found_is_told_with_its_place_its_size_and_what_fits_as_well(di
     (roll,) = diagnosis.effects
     told = camera_notes(replace(diagnosis, effects=(replace(roll, rivals=("camera_yaw", "heading_offset")),)))
     assert told[0].endswith("; these frames fit camera_yaw, heading_offset as well")
-
-
-def test_the_headline_says_what_a_verdict_means(clean):
     assert camera_headline("mine", clean) == "mine: camera: nothing missing: the declared camera explains the frames"

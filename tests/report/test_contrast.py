@@ -44,10 +44,15 @@ def turned_round(colour):
     return tuple(np.clip(HALF_TURN @ (1.0 - np.array(to_rgb(colour))), 0.0, 1.0))
 
 
-def test_contrast_is_measured_as_defined():
+def test_contrast_is_measured_as_defined_and_shades_stand_out_at_both_ends_and_between():
     assert contrast("#000", "#fff") == pytest.approx(21.0)
     assert contrast("#777", "#fff") == pytest.approx(4.48, abs=0.01)
     assert turned_round("white") == (0.0, 0.0, 0.0)
+    dark = schemes()["dark"]["paper"]
+    for share in np.linspace(0.0, 1.0, 20):
+        colour = figure_style.SHADES(share)[:3]
+        assert contrast(colour, "white") >= DRAWN
+        assert contrast(turned_round(colour), dark) >= DRAWN
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark", "print"])
@@ -72,22 +77,11 @@ def test_every_colour_of_a_figure_stands_out_on_paper_and_in_the_dark(name):
     assert contrast(turned_round(colour), schemes()["dark"]["paper"]) >= least
 
 
-def test_shades_stand_out_at_both_ends_and_between():
-    dark = schemes()["dark"]["paper"]
-    for share in np.linspace(0.0, 1.0, 20):
-        colour = figure_style.SHADES(share)[:3]
-        assert contrast(colour, "white") >= DRAWN
-        assert contrast(turned_round(colour), dark) >= DRAWN
-
-
-def test_letters_of_a_figure_can_be_read_on_a_phone():
+def test_letters_can_be_read_on_a_phone_and_only_photographs_keep_their_colours_in_the_dark():
     """7 points, the smallest that figures have, are some 11 pixels where a figure is as small as it gets."""
     assert LEAST_PT / 72.0 * ENLARGED * SMALLEST >= LEAST_PX
     assert 2.0 * 0.8 * 16.0 + SMALLEST * figure_style.COLUMN * ENLARGED <= 390.0 + 2.0 * 0.4 * 16.0
-
-
-def test_only_photographs_keep_their_colours_in_the_dark():
-    """A bar of colours is turned round with the points that it explains; a camera's picture is not."""
+    # A bar of colours is turned round with the points that it explains; a camera's picture is not.
     figure = Figure()
     axes, shaded = figure.subplots(1, 2)
     show_photo(axes, np.zeros((2, 2, 3)))

@@ -110,7 +110,7 @@ def test_every_figure_is_drawn_without_a_warning_for_a_column_and_says_what_it_s
     assert [x for x, _ in labels["effect_curve"]][2:] == ["command [duty]"] * 2
 
 
-def test_the_error_figure_holds_the_errors_on_logarithmic_axes_with_the_floor_off_their_ends(diagnosis, figures):
+def test_the_error_figure_holds_errors_and_their_ends_on_logarithmic_axes_with_the_floor_off_theirs(diagnosis, figures):
     place, heading = figures["error"].axes
     for axes, factor, kinds in (
         (place, 1e3, ("before", "after")),
@@ -137,16 +137,13 @@ def test_the_error_figure_holds_the_errors_on_logarithmic_axes_with_the_floor_of
     ):
         assert axes.get_yscale() == "log"
         assert axes.get_ylim()[0] < 0.95 * min(floors)
-
-
-def test_an_interval_without_end_is_not_drawn(diagnosis):
     endless = [replace(e, before=e.before._replace(interval=(0.0, np.inf))) for e in diagnosis.errors]
     figure = motion_figures(replace(diagnosis, errors=tuple(endless)))["error"]
     _, _, (bars,) = next(one for one in figure.axes[0].containers if isinstance(one, ErrorbarContainer))
     assert all(np.ptp(segment[:, 1]) == 0.0 for segment in bars.get_segments())
 
 
-def test_residuals_over_time_are_the_root_mean_squares_of_the_windows(diagnosis, figures):
+def test_residuals_over_time_are_those_of_the_windows_on_an_axis_that_says_why_it_begins_late(diagnosis, figures):
     drives = diagnosis.parts.tested
     windows = cut(drives, 2.0)
     squares = pose_errors(drives, diagnosis.found.model.theta, windows)[:, 0] ** 2
@@ -154,9 +151,13 @@ def test_residuals_over_time_are_the_root_mean_squares_of_the_windows(diagnosis,
     (axes,) = figures["residual_over_time"].axes
     drawn = [one.get_ydata() for one in axes.get_lines() if one.get_color() == line(axes, AFTER).get_color()]
     assert np.concatenate(drawn) == pytest.approx(expected)
+    assert figures["residual_over_time"].axes[0].get_xlabel() == "time in the episode [s]"
+    late = drives.only(drives.first >= int(drives.last.max() // 2))
+    both = strayed(replace(diagnosis, parts=diagnosis.parts._replace(tested=late)))
+    assert "the first was fitted" in residual_over_time(late, both).axes[0].get_xlabel()
 
 
-def test_many_episodes_become_a_median_with_a_band(diagnosis):
+def test_many_episodes_become_a_median_with_a_band_and_many_paths_means_by_place(diagnosis, monkeypatch):
     drives = diagnosis.parts.fitted
     both = strayed(replace(diagnosis, parts=diagnosis.parts._replace(tested=drives)))
     (axes,) = residual_over_time(drives, both).axes
@@ -164,8 +165,13 @@ def test_many_episodes_become_a_median_with_a_band(diagnosis):
     first = np.unique(both[DECLARED_MODEL].window, return_index=True)[1]
     start = drives.first[both[DECLARED_MODEL].increment[first]] / drives.tick_hz
     assert middle[0] == pytest.approx(np.median(both[DECLARED_MODEL].rms[start < 1.0]))
-    bands = [band for band in axes.collections if band.get_paths()]
-    assert len(bands) == 2
+    assert len([band for band in axes.collections if band.get_paths()]) == 2
+    monkeypatch.setattr("proxytune.report.diagnosis.error_figures.MANY_WINDOWS", 3)
+    both = {DECLARED_MODEL: strayed(diagnosis)[DECLARED_MODEL]}
+    shown = residual_map(diagnosis.parts.tested, both).axes[0].collections[0].get_array().compressed()
+    assert 0 < len(shown) <= len(both[DECLARED_MODEL].increment)
+    rms, rounding = both[DECLARED_MODEL].rms, 1e-12
+    assert rms.min() * (1.0 - rounding) <= shown.min() <= shown.max() <= rms.max() * (1.0 + rounding)
 
 
 def test_paths_on_the_maps_are_where_windows_were_measured_in_one_scale_and_equal_axes(diagnosis, figures):
@@ -184,25 +190,6 @@ def test_paths_on_the_maps_are_where_windows_were_measured_in_one_scale_and_equa
     rows = windows.increment[windows.window == 3]
     assert path[0] == pytest.approx(drives.poses[windows.begin[3], 0, :2])
     assert path[1:] == pytest.approx(drives.poses[rows, 1, :2])
-
-
-def test_an_axis_that_begins_late_says_why(diagnosis, figures):
-    drives = diagnosis.parts.tested
-    assert figures["residual_over_time"].axes[0].get_xlabel() == "time in the episode [s]"
-    half = int(drives.last.max() // 2)
-    late = drives.only(drives.first >= half)
-    both = strayed(replace(diagnosis, parts=diagnosis.parts._replace(tested=late)))
-    assert "the first was fitted" in residual_over_time(late, both).axes[0].get_xlabel()
-
-
-def test_more_paths_than_can_be_told_apart_become_means_by_place(diagnosis, monkeypatch):
-    monkeypatch.setattr("proxytune.report.diagnosis.error_figures.MANY_WINDOWS", 3)
-    both = {DECLARED_MODEL: strayed(diagnosis)[DECLARED_MODEL]}
-    mesh = residual_map(diagnosis.parts.tested, both).axes[0].collections[0]
-    shown = mesh.get_array().compressed()
-    assert 0 < len(shown) <= len(both[DECLARED_MODEL].increment)
-    rms, rounding = both[DECLARED_MODEL].rms, 1e-12
-    assert rms.min() * (1.0 - rounding) <= shown.min() <= shown.max() <= rms.max() * (1.0 + rounding)
 
 
 def dots(axes):
@@ -224,12 +211,19 @@ def test_the_ranking_holds_those_added_then_every_other_gain_best_first(diagnosi
     assert list(threshold[0].get_xdata()) == [RULES.least_gain_nats, RULES.least_gain_nats]
 
 
-def test_every_effect_that_was_added_is_on_top_in_the_order_of_adding(diagnosis):
+def test_every_effect_that_was_added_is_on_top_in_the_order_of_adding_and_rivals_are_marked(diagnosis):
     (first,) = diagnosis.found.adopted
     added = (first, replace(first, effect="wheel_gain", form="left wheel", gain=40.0), replace(first, effect="new"))
     top = ranking_figure(replace(diagnosis.found, adopted=added), diagnosis.rules).axes[0]
     assert [tick.get_text() for tick in top.get_yticklabels()] == ["dead band", "wheel gain (left wheel)", "new"]
     assert {dot.get_label() for dot in dots(top)} == {"added"}
+    rival = next(c for c in candidates(diagnosis.robot, diagnosis.found.declared.theta, ()) if c.effect == "stiction")
+    adopted = (replace(diagnosis.found.adopted[0], rivals=(rival,)),)
+    figure = motion_figures(replace(diagnosis, found=replace(diagnosis.found, adopted=adopted)))["ranking"]
+    upper = figure.axes[1]
+    pairs = zip([tick.get_text() for tick in upper.get_yticklabels()], dots(upper), strict=True)
+    marked = {name.split(" (")[0] for name, dot in pairs if dot.get_label() == "fits as well as one added"}
+    assert marked == {"stiction"}
 
 
 def test_the_ranking_says_what_was_added_and_the_threshold_and_is_not_drawn_without_a_candidate(diagnosis, clean):
@@ -240,30 +234,15 @@ def test_the_ranking_says_what_was_added_and_the_threshold_and_is_not_drawn_with
     assert "ranking" not in motion_figures(replace(diagnosis, found=replace(diagnosis.found, tried=())))
 
 
-def test_rivals_are_marked_in_the_ranking(diagnosis):
-    rival = next(c for c in candidates(diagnosis.robot, diagnosis.found.declared.theta, ()) if c.effect == "stiction")
-    adopted = (replace(diagnosis.found.adopted[0], rivals=(rival,)),)
-    figure = motion_figures(replace(diagnosis, found=replace(diagnosis.found, adopted=adopted)))["ranking"]
-    upper = figure.axes[1]
-    names = [tick.get_text() for tick in upper.get_yticklabels()]
-    pairs = zip(names, dots(upper), strict=True)
-    marked = {name.split(" (")[0] for name, dot in pairs if dot.get_label() == "fits as well as one added"}
-    assert marked == {"stiction"}
-
-
-def test_the_effect_curve_shows_the_dead_band_that_was_fitted(diagnosis, figures):
+def test_the_effect_curve_shows_the_dead_band_that_was_fitted_and_measured_means_agree_with_it(diagnosis, figures):
     upper = figures["effect_curve"].axes[0]
     commands, speeds = values(upper, AFTER)
     width = diagnosis.theta["dead_band.width"].value
     assert width == pytest.approx(WIDTH, rel=0.1)
-    still = commands[np.abs(speeds) < 1e-9]
-    assert np.abs(still).max() == pytest.approx(width, abs=0.015)
+    assert np.abs(commands[np.abs(speeds) < 1e-9]).max() == pytest.approx(width, abs=0.015)
     trim = diagnosis.declared["trim"].value
     commands, speeds = values(upper, DECLARED_MODEL)
     assert speeds == pytest.approx(commands * 0.6 * (1.0 - trim), abs=1e-6)
-
-
-def test_the_curve_over_the_signal_and_the_measured_means_agree_with_the_effect(figures):
     lower = figures["effect_curve"].axes[2]
     _, effect = values(lower, AFTER)
     for label in (MEASURED, ANY):
@@ -271,7 +250,7 @@ def test_the_curve_over_the_signal_and_the_measured_means_agree_with_the_effect(
         assert np.abs(other - effect).max() < 0.35 * np.ptp(effect), label
 
 
-def test_an_effect_on_one_wheel_bends_the_curves_of_that_wheel_alone(diagnosis):
+def test_what_moves_one_wheel_named_or_over_a_signal_bends_the_curves_of_that_wheel_alone(diagnosis):
     weak = with_effect(diagnosis, "wheel_gain", "left wheel", {"wheel_gain.left": 0.8})
     upper_left, upper_right, left, right = effect_curve(weak).axes
     label = "with wheel gain"
@@ -279,9 +258,6 @@ def test_an_effect_on_one_wheel_bends_the_curves_of_that_wheel_alone(diagnosis):
     assert np.abs(values(right, label)[1]).max() < 5.0
     assert values(upper_left, label)[1] == pytest.approx(0.8 * values(upper_left, DECLARED_MODEL)[1], abs=1e-6)
     assert values(upper_right, label)[1] == pytest.approx(values(upper_right, DECLARED_MODEL)[1], abs=1e-6)
-
-
-def test_the_curve_over_the_signal_is_drawn_for_the_wheel_that_it_moves(diagnosis):
     curve = next(curve for curve in diagnosis.found.curves if curve.group.name == "wheel command")
     turns_right = curve.group.twists[:, :, 2].min(axis=(0, 1)) < 0.0
     pushed = curve._replace(weights=np.where(turns_right, 0.1, 0.0), gain=50.0)
@@ -304,8 +280,7 @@ def test_declared_parameters_give_way_to_the_curve_that_was_fitted_with_them(dia
 
 def test_panels_have_a_signal_of_their_own_and_every_motion_a_name():
     forms = [(CATALOGUE[name].trace, form.form) for name in MOTION_EFFECTS for form in EVERY if form.effect == name]
-    shown = [trace.shown_in(form) for trace, form in forms]
-    means = [one for one in shown if isinstance(one, Means)]
+    means = [one for one in [trace.shown_in(form) for trace, form in forms] if isinstance(one, Means)]
     assert len(means) >= 6
     assert all(one.cue in CUE_PANELS and one.panels for one in means)
     assert set(MOTIONS) == set(NAMES)
@@ -342,28 +317,12 @@ def test_a_random_effect_shows_single_draws_that_differ(diagnosis, effect):
     assert max(np.abs(one - thin[0]).max() for one in thin) > 0.01
 
 
-def test_with_nothing_added_there_is_one_model_and_no_effect_to_draw(clean):
+def test_with_nothing_added_there_is_one_model_and_no_effect_and_idle_curves_are_not_drawn(clean, diagnosis):
     figures = motion_figures(clean)
     assert "effect_curve" not in figures
     assert len([one for one in figures["error"].axes[0].containers if isinstance(one, ErrorbarContainer)]) == 1
     assert len(figures["residual_map"].axes) == 2
     assert {one.get_color() for one in figures["residual_over_time"].axes[0].get_lines()} == {VERMILLION}
-
-
-@pytest.mark.slow
-def test_an_unexplained_residual_is_drawn_over_each_signal_that_there_is(diagnosis):
-    names = {group.name for group in signal_groups(diagnosis.found.declared)}
-    assert names <= set(CUE_PANELS)
-    for curve in diagnosis.found.curves:
-        figure = effect_curve(without_effects(diagnosis, (curve._replace(gain=50.0),)))
-        figure.draw_without_rendering()
-        for axes, panel in zip(figure.axes, CUE_PANELS[curve.group.name], strict=True):
-            assert axes.get_xlabel() == panel.label
-            assert np.isfinite(values(axes, ANY)[1]).all()
-            assert {one.get_label() for one in axes.get_lines()} == {DECLARED_MODEL, MEASURED, ANY}
-
-
-def test_a_curve_that_says_nothing_is_not_drawn(diagnosis):
     idle = tuple(curve._replace(gain=-1.0) for curve in diagnosis.found.curves)
     slope = with_effect(
         replace(diagnosis, found=replace(diagnosis.found, curves=idle)),
@@ -371,9 +330,20 @@ def test_a_curve_that_says_nothing_is_not_drawn(diagnosis):
         "",
         {"floor_slope.x": 0.05, "floor_slope.y": 0.0},
     )
-    band = replace(diagnosis, found=replace(diagnosis.found, curves=idle))
-    for one in (slope, band):
+    for one in (slope, replace(diagnosis, found=replace(diagnosis.found, curves=idle))):
         assert all(line.get_label() != ANY for axes in effect_curve(one).axes for line in axes.get_lines())
+
+
+@pytest.mark.slow
+def test_an_unexplained_residual_is_drawn_over_each_signal_that_there_is(diagnosis):
+    assert {group.name for group in signal_groups(diagnosis.found.declared)} <= set(CUE_PANELS)
+    for curve in diagnosis.found.curves:
+        figure = effect_curve(without_effects(diagnosis, (curve._replace(gain=50.0),)))
+        figure.draw_without_rendering()
+        for axes, panel in zip(figure.axes, CUE_PANELS[curve.group.name], strict=True):
+            assert axes.get_xlabel() == panel.label
+            assert np.isfinite(values(axes, ANY)[1]).all()
+            assert {one.get_label() for one in axes.get_lines()} == {DECLARED_MODEL, MEASURED, ANY}
 
 
 KNOTS = {"speed_and_turn": ((-0.2, -1.0), (0.2, 1.0)), "direction": (-1.0,), "heading": (1.0, 2.0)}
@@ -407,15 +377,12 @@ def test_every_group_is_drawn_without_a_warning_and_every_panel_has_units():
     assert len({axes.get_xlabel() for axes in shown if axes.get_xlabel()}) == len(GROUPS) - 1  # the level is no curve
 
 
-def test_what_is_learnt_is_drawn_through_its_weights_and_nothing_where_nothing_is_used():
+def test_what_is_learnt_is_drawn_through_its_weights_harmonics_added_up_and_nothing_where_nothing_is_used():
     figure = learnt_figure(learning("turn_rate"))
     line = figure.axes[2].get_lines()[0]
     np.testing.assert_allclose(line.get_xdata(), (0.0, 0.5, 1.0, 2.0))
     np.testing.assert_allclose(line.get_ydata(), np.degrees((0.0, 0.01, 0.02, 0.03)))
     assert learnt_figure(Learning(Discrepancy({"learnt.turn_rate.yaw@1.0": 0.1}), (), False)) is None
-
-
-def test_harmonics_of_the_heading_are_drawn_as_what_they_add_up_to():
     figure = learnt_figure(learning("heading"))
     forward = figure.axes[0].get_lines()[0]
     around = np.radians(forward.get_xdata())
@@ -435,15 +402,12 @@ def test_every_signal_of_a_panel_is_known_at_each_increment(signal):
 FIGURES = Path(proxytune.__file__).parent / "report" / "diagnosis"
 
 
-def test_every_figure_that_is_drawn_has_a_title_and_a_caption():
+def test_every_figure_that_is_drawn_has_a_title_and_a_caption_and_they_come_in_one_order_an_unknown_one_last():
     texts = [(FIGURES / name).read_text(encoding="utf-8") for name in ("figures.py", "camera_figures.py")]
     drawn = {name for text in texts for name in re.findall(r'^        "(\w+)": \w+\(', text, flags=re.M)}
     assert len(drawn) >= 10
     captions = CAPTIONS["diagnosis"]
     assert drawn == captions.keys()
     assert all(one["title"] and len(one["caption"]) > 60 for one in captions.values())
-
-
-def test_figures_come_in_one_order_and_an_unknown_one_last():
     names = [one.title for one in diagnosis_pictures({"new": b"", "ranking": b"", "error": b""})]
     assert names == [*(CAPTIONS["diagnosis"][name]["title"] for name in ("error", "ranking")), "new"]

@@ -62,15 +62,19 @@ def test_every_verdict_is_told_with_its_meaning(verdict):
     assert motion_headline(diagnosis(verdict=verdict)) == f"run: {verdict}: {VERDICTS[verdict]['motion']}"
 
 
-def test_what_was_fitted_stands_beside_what_was_found_before_the_verdict():
+def test_the_headline_has_what_was_fitted_before_the_verdict_and_warns_of_ends_and_false_names():
     """Where nothing is missing the declared values are the answer, so the first sentence has them."""
     trim = ", with trim 0.043"
     assert motion_headline(diagnosis(), "dead band: 0.1", trim).startswith(f"run: dead band: 0.1{trim}. Explained: ")
     nothing = motion_headline(diagnosis(verdict="nothing missing"), "", trim)
     assert nothing == "run: nothing missing, with trim 0.043: only noise is left"
+    ends = diagnosis(effects=(BAND,), edges=BAND.names, verdict="partly explained")
+    assert "dead_band.width at the end of the range stands for something else" in motion_headline(ends)
+    assert "expected false names: at most 0.02" in motion_headline(diagnosis(effects=(BAND,)))
+    assert "false names" not in motion_headline(diagnosis())
 
 
-def test_an_effect_that_was_added_says_its_worth_and_windows_what_they_did():
+def test_effects_that_were_added_or_are_immaterial_say_their_worth_where_that_is_shown():
     (note,) = motion_notes(diagnosis(effects=(BAND,), effect_sizes={"dead_band": MUCH}))
     assert note == (
         "added dead_band (left wheel): log-likelihood gain 900 nats, p = 0.002; "
@@ -80,9 +84,11 @@ def test_an_effect_that_was_added_says_its_worth_and_windows_what_they_did():
     (note,) = motion_notes(diagnosis(multistep=polish))
     assert "fitted to windows of 2 s" in note
     assert "1 s: 0.95, 2 s: 0.80" in note
-
-
-def test_an_effect_is_immaterial_only_where_that_is_shown():
+    value, ends = per_cent(Ratio(1.25, (0.9, 2.0)))
+    assert (value, *ends) == pytest.approx((25.0, -10.0, 100.0))
+    assert decisive(LITTLE) == 5.0
+    assert may_matter(LITTLE, RULES.material_factor)
+    assert not may_matter(SURE, RULES.material_factor)
     (note,) = motion_notes(diagnosis(negligible=(SLIP,), effect_sizes={"lateral_slip": SURE}))
     assert note == (
         "detectable but immaterial: lateral_slip 0.0024 s, log-likelihood gain 75 nats, "
@@ -97,7 +103,7 @@ def test_an_effect_is_immaterial_only_where_that_is_shown():
     ]
 
 
-def test_the_next_drive_is_told_with_what_it_tells_and_how_often_to_drive_it():
+def test_the_next_drive_is_told_with_what_it_tells_and_values_beside_what_has_no_name_as_no_physics():
     def told(nats, *between, verdict="explained"):
         drive = NextDrive("the designed drive", "so", between, nats, np.zeros((2, 2)), 20.0, 10, (4.0, 3.0), None)
         return motion_notes(diagnosis(next_drive=drive, verdict=verdict))
@@ -107,27 +113,10 @@ def test_the_next_drive_is_told_with_what_it_tells_and_how_often_to_drive_it():
     assert told(50.0, "a", "b") == [f"to tell a from b, {often} (one minute is ample): so"]
     assert told(3.0, "a", "b", "c") == [f"to tell a from b from c, {often} (expected gain 3 nats a minute): so"]
     assert told(50.0, "a", "b", verdict="cannot be told")[1] == "the same drives tell noise from what is missing"
-
-
-def test_a_ratio_is_told_as_what_it_adds():
-    value, ends = per_cent(Ratio(1.25, (0.9, 2.0)))
-    assert (value, *ends) == pytest.approx((25.0, -10.0, 100.0))
-    assert decisive(LITTLE) == 5.0
-    assert may_matter(LITTLE, RULES.material_factor)
-    assert not may_matter(SURE, RULES.material_factor)
-
-
-def test_the_headline_warns_of_values_at_an_end_and_of_false_names():
-    ends = diagnosis(effects=(BAND,), edges=BAND.names, verdict="partly explained")
-    assert "dead_band.width at the end of the range stands for something else" in motion_headline(ends)
-    assert "expected false names: at most 0.02" in motion_headline(diagnosis(effects=(BAND,)))
-    assert "false names" not in motion_headline(diagnosis())
-
-
-def test_beside_what_has_no_name_values_are_no_physics_yet():
-    lines = motion_notes(diagnosis(verdict="partly explained"))
-    assert any("no physics yet" in line for line in lines)
+    assert any("no physics yet" in line for line in motion_notes(diagnosis(verdict="partly explained")))
     assert motion_notes(diagnosis()) == []
+    (note,) = motion_notes(diagnosis(period=Period(4.0, 0.3, 1e-9)))
+    assert "as if it stood for 0.3 s every 4.0 s" in note
 
 
 NONE = Offset(0.0, (0.0, 0.0))
@@ -139,7 +128,7 @@ def clocks(latency=0.14, offset=0.0, drives=None, jumps=()):
     return Clocks(measured, own, 0.15, drives or {}, tuple(jumps), np.zeros(2), np.zeros((2, 2)))
 
 
-def test_the_document_has_what_was_promised_and_can_be_written():
+def test_offsets_of_clocks_can_be_written_one_clock_is_no_news_and_a_declared_offset_is_told_instead_of_a_doubt():
     found = clocks(-0.11, -0.26, {"b": Offset(0.3, (0.28, 0.32))}, [Jump("a", 31.0, -0.2)])
     told = json.loads(json.dumps(clocks_document((found,)), allow_nan=False))
     assert (told["offset_s"], told["interval"]) == (-0.26, [-0.27, -0.25])
@@ -148,9 +137,6 @@ def test_the_document_has_what_was_promised_and_can_be_written():
     assert told["drift"] == {"rate": 0.0, "interval": [0.0, 0.0]}
     assert "test" not in told
     assert clocks_document((found, clocks()))["test"]["offset_s"] == 0.0
-
-
-def test_one_clock_is_no_news_and_a_declared_offset_is_told_instead_of_a_doubt():
     assert clocks_notes("yard", (clocks(),), {}) == []
     (note,) = clocks_notes("yard", (clocks(),), {"delay": 0.1})
     assert "one number" in note
@@ -202,7 +188,7 @@ def test_the_document_has_groups_shares_and_ratios_and_of_what_is_refused_its_gu
     assert told["guard"]["2"]["value"] == 0.5
 
 
-def test_what_is_learnt_is_told_with_its_worth_as_no_physics_and_doubtful_names_are_warned_of():
+def test_what_is_learnt_is_told_with_its_worth_as_no_physics_and_names_that_are_doubtful_or_would_do_as_well():
     (note,) = learnt_notes(USED)
     assert "not physics" in note
     assert "turn rate (75 %)" in note
@@ -215,9 +201,6 @@ def test_what_is_learnt_is_told_with_its_worth_as_no_physics_and_doubtful_names_
     assert "names are likely wrong" in warning
     assert learnt_document(moved)["names_doubtful"] is True
     assert learnt_notes(Learning(Discrepancy(), (), False)) == []
-
-
-def test_a_name_that_would_do_as_well_is_told():
     like = Learning(USED.discrepancy, USED.errors, False, MatchedEffect("turn_slip", "", {"turn_slip": 0.1}, 0.93))
     assert learnt_notes(like)[1] == "the curves look like turn_slip (turn_slip 0.1), which alone keeps 93 % of it"
     assert learnt_document(like)["looks_like"]["share"] == 0.93
@@ -229,8 +212,7 @@ NAMES = ("a", "b", "c", "d")
 
 
 def test_groups_of_drives_are_told_with_their_gains_and_only_where_they_differ():
-    told = json.loads(json.dumps(unlike_document(FOUND, NAMES)))
-    assert told == {
+    assert json.loads(json.dumps(unlike_document(FOUND, NAMES))) == {
         "wheel": "left",
         "groups": [{"gain": 0.88, "drives": ["a", "c"]}, {"gain": 1.02, "drives": ["b", "d"]}],
     }
@@ -239,11 +221,6 @@ def test_groups_of_drives_are_told_with_their_gains_and_only_where_they_differ()
     assert "diagnose each group alone" in note
     assert unlike_document(None, NAMES) is None
     assert unlike_notes(None, NAMES) == []
-
-
-def test_what_slows_the_robot_down_again_and_again_is_told():
-    (note,) = motion_notes(diagnosis(period=Period(4.0, 0.3, 1e-9)))
-    assert "as if it stood for 0.3 s every 4.0 s" in note
 
 
 @pytest.mark.parametrize(

@@ -45,7 +45,7 @@ def texts(axes):
     return [text.get_text() for text in axes.texts]
 
 
-def test_it_is_one_column_wide_with_map_commands_and_pictures_of_both(pair):
+def test_it_is_one_column_wide_with_map_commands_and_pictures_of_both_and_on_a_road_the_whole_map_and_duties(pair):
     figure = episode_figure(pair, ["distance"])
     assert figure.get_figwidth() == COLUMN
     ways, commands, *pictures = axes_of(figure)
@@ -53,6 +53,11 @@ def test_it_is_one_column_wide_with_map_commands_and_pictures_of_both(pair):
     assert commands.get_xlabel() == "time [s]"
     assert commands.get_ylabel() == "push"
     assert len(pictures) == 8
+    on_road = dataclasses.replace(pair, road=shipped_map("small_loop"), command_unit="duty")
+    ways, commands, *_ = axes_of(episode_figure(on_road, []))
+    assert ways.get_xlim() == (0.0, on_road.road.size[0])
+    assert len(ways.images) == 1
+    assert commands.get_ylabel() == "push\n[duty]"
 
 
 def test_both_are_named_in_their_colours_with_scores_and_the_time_at_which_they_part(pair):
@@ -66,21 +71,17 @@ def test_both_are_named_in_their_colours_with_scores_and_the_time_at_which_they_
     assert say_parting(pair) == "Their places are first more than 5 cm apart at 0.2 s."
 
 
-def test_an_episode_alone_and_one_that_stands_still_can_be_drawn():
+def test_an_episode_alone_or_standing_still_can_be_drawn_and_labels_stand_apart_and_hide_no_path():
     ways, commands = axes_of(episode_figure(paired(recorded(lambda time: 0.5 * time)), []))
     assert texts(ways) == ["start", "proxy ends", "proxy: "]
     assert texts(commands) == []
     figure = episode_figure(paired(recorded(lambda time: 0.0 * time)), [])
     figure.draw_without_rendering()
     assert len(axes_of(figure)[0].lines) == 3, "path, start and end; no arrow"
-
-
-def test_on_a_road_the_whole_map_is_shown_and_commands_are_duties(pair):
-    on_road = dataclasses.replace(pair, road=shipped_map("small_loop"), command_unit="duty")
-    ways, commands, *_ = axes_of(episode_figure(on_road, []))
-    assert ways.get_xlim() == (0.0, on_road.road.size[0])
-    assert len(ways.images) == 1
-    assert commands.get_ylabel() == "push\n[duty]"
+    assert corners_of(np.array([(1.0, 1.0)]), NOTHING, LOW, HIGH) == [(1, 1)]
+    path = np.column_stack((np.linspace(1.0, 2.0, 50), np.linspace(1.0, 1.3, 50)))
+    (corner,) = corners_of(np.array([(1.0, 1.0)]), path, LOW, HIGH)
+    assert corner == tuple(CORNERS[1])
 
 
 @given(st.floats(0.1, 30.0), st.integers(2, 400))
@@ -89,8 +90,7 @@ def test_arrows_are_few_and_evenly_spaced_along_the_path(length, rows):
     chosen = arrow_rows(places)
     assert len(chosen) <= ARROWS + 1
     assert all(0 < row < rows for row in chosen)
-    gaps = np.diff(places[chosen, 0])
-    assert (gaps >= LEAST_M - 2 * length / (rows - 1)).all()
+    assert (np.diff(places[chosen, 0]) >= LEAST_M - 2 * length / (rows - 1)).all()
 
 
 LOW, HIGH = np.array((0.0, 0.0)), np.array((2.0, 2.0))
@@ -99,13 +99,6 @@ NOTHING = np.empty((0, 2))
 
 def centres(marks, corners):
     return np.array(marks) + np.array(corners) * (SIZE / 2.0 + GAP) * 2.0
-
-
-def test_labels_stand_apart_and_hide_no_path():
-    assert corners_of(np.array([(1.0, 1.0)]), NOTHING, LOW, HIGH) == [(1, 1)]
-    path = np.column_stack((np.linspace(1.0, 2.0, 50), np.linspace(1.0, 1.3, 50)))
-    (corner,) = corners_of(np.array([(1.0, 1.0)]), path, LOW, HIGH)
-    assert corner == tuple(CORNERS[1])
 
 
 @given(st.floats(0.0, 2.0), st.floats(0.0, 2.0))
@@ -170,16 +163,13 @@ def test_frames_of_even_size_come_ten_a_second_to_the_end_of_the_longer_which_li
     assert (rows % 2, columns % 2, colours) == (0, 0, 3)
 
 
-def test_a_frame_depends_on_its_time_alone_and_a_side_that_has_ended_stays(animation):
+def test_a_frame_and_its_picture_depend_on_their_time_alone_and_a_side_that_has_ended_stays(animation):
     first = animation.frame(0.3)
     assert not np.array_equal(animation.frame(1.2), first)
     assert np.array_equal(animation.frame(0.3), first)
     (proxy, target), (proxy_later, target_later) = halves(animation.frame(1.0)), halves(animation.frame(1.7))
     assert np.array_equal(target, target_later)
     assert not np.array_equal(proxy, proxy_later)
-
-
-def test_the_camera_shows_the_picture_of_its_time(animation):
     bright = dataclasses.replace(recorded(lambda t: 0.5 * t), pictures=np.zeros((20, 6, 8, 3), np.uint8))
     bright.pictures[10:] = 255
     one = Animation(paired(bright))

@@ -10,7 +10,7 @@ import pytest
 from export_truth import ROBOT, driven_by, instance
 
 from proxytune.api.exporting import WRITERS
-from proxytune.driving import AXLES, drivetrain, orientation, read_body, read_robot
+from proxytune.driving import AXLES, drivetrain, orientation, parse_urdf, read_body, read_robot
 from proxytune.driving.plants import PlanarPlant
 from proxytune.effects import CAR_CATALOGUE, CATALOGUE, FilterContext, effects_from, theta_names
 from proxytune.errors import SettingsError
@@ -52,20 +52,10 @@ def test_mujoco_drives_the_exported_model_as_the_planar_plant_the_instance(robot
     train = drivetrain(robot, effects_from(found.theta, robot.figures, robot.catalogue))
     twists, _ = train.apply(commands, train.begin(FilterContext(60.0, np.zeros(2), robot.figures)))
     expected = PlanarPlant(np.zeros(3), 1.0 / 60.0).move(twists)[0]
-    model = mujoco.MjModel.from_xml_string(mjcf_text(found))
-    poses = driven_by(mujoco, model, commands)
+    poses = driven_by(mujoco, mujoco.MjModel.from_xml_string(mjcf_text(found)), commands)
     driven = np.linalg.norm(np.diff(expected[:, :2], axis=0), axis=1).sum()
     assert np.linalg.norm(poses[:, :2] - expected[:, :2], axis=1).max() < share * driven
     assert abs(np.arctan2(*(f(poses[-1, 2] - expected[-1, 2]) for f in (np.sin, np.cos)))) < turned
-
-
-def test_an_exported_car_has_wheels_as_large_and_front_wheels_as_askew_as_was_found():
-    found = instance(CAR, wheel_gain=0.9, steering_offset=0.1)
-    root = ET.fromstring(urdf_text(found))
-    body = read_body(root, Path("exported.urdf"))
-    assert (body.left.radius_m, body.right.radius_m) == pytest.approx((0.045, 0.045))
-    askew = [joint.find("origin").get("rpy") for joint in root.iter("joint") if "steer" in joint.get("name")]
-    assert [float(turned.split()[2]) for turned in askew] == pytest.approx([np.radians(2.4)] * 2)
 
 
 @pytest.mark.parametrize("form", FORMATS)
@@ -95,7 +85,7 @@ def test_mujocos_camera_stands_and_looks_as_was_found():
     assert model.cam_fovy[0] == pytest.approx(80.0)
 
 
-def test_the_exported_urdf_has_wheels_that_turn_and_pull_as_was_found():
+def test_exported_wheels_turn_and_pull_as_was_found_those_of_a_car_are_askew_and_of_a_robot_as_it_is_its_own():
     found = instance(trim=0.1, wheel_gain__left=0.9, yaw_scrub=0.2)
     body = read_body(ET.fromstring(urdf_text(found)), Path("exported.urdf"))
     assert (body.left.joint, body.right.joint) == AXLES
@@ -104,13 +94,20 @@ def test_the_exported_urdf_has_wheels_that_turn_and_pull_as_was_found():
         [body.left.radius_m, body.right.radius_m]
     )
     assert body.wheel_distance == pytest.approx(0.2)
+    found = instance(CAR, wheel_gain=0.9, steering_offset=0.1)
+    root = ET.fromstring(urdf_text(found))
+    body = read_body(root, Path("exported.urdf"))
+    assert (body.left.radius_m, body.right.radius_m) == pytest.approx((0.045, 0.045))
+    askew = [joint.find("origin").get("rpy") for joint in root.iter("joint") if "steer" in joint.get("name")]
+    assert [float(turned.split()[2]) for turned in askew] == pytest.approx([np.radians(2.4)] * 2)
+    before = read_body(parse_urdf(ROBOT.urdf), ROBOT.urdf)
+    assert WRITERS["urdf"](instance()).count(f'radius="{before.left.radius_m:g}"') == 4
 
 
-def test_pybullet_loads_the_exported_urdf_and_finds_camera_and_tracked_point_where_they_are(tmp_path):
+def test_pybullet_loads_the_exported_urdf_and_finds_camera_and_tracked_point_where_they_are(write_file):
     pybullet = pytest.importorskip("pybullet", reason="PyBullet is not installed")
     found = instance(camera_pitch=30.0, camera_yaw=5.0, marker_offset__forward=0.05, heading_offset=30.0)
-    path = tmp_path / "found.urdf"
-    path.write_text(urdf_text(found), encoding="utf-8")
+    path = write_file(urdf_text(found), "found.urdf")
     world = pybullet.connect(pybullet.DIRECT)
     try:
         body = pybullet.loadURDF(str(path), useFixedBase=True, physicsClientId=world)
@@ -174,8 +171,7 @@ def test_names_with_quotes_and_numbers_that_are_none_are_told_or_taken(tmp_path)
 
 @pytest.mark.parametrize("form", [urdf_text, mjcf_text])
 def test_names_with_signs_of_xml_give_a_file_that_can_be_read(form):
-    named = replace(instance(replace(ROBOT, name='R&D "<b>"')), source="a----b -")
-    root = ET.fromstring(form(named))
+    root = ET.fromstring(form(replace(instance(replace(ROBOT, name='R&D "<b>"')), source="a----b -")))
     assert root.tag in ("robot", "mujoco")
     assert form is urdf_text or root.get("model") == 'R&D "<b>"'
 
@@ -223,10 +219,3 @@ def test_values_without_a_place_are_not_told_where_neutral():
 def test_every_effect_is_in_the_table_of_the_page(name):
     row = f"| `{name}` | {' | '.join(place_of(name, form) or 'no place' for form in FORMATS)} |"
     assert row in PAGE.read_text(encoding="utf-8").splitlines()
-
-
-def test_the_duckiebot_as_it_is_keeps_its_wheels_and_camera():
-    from proxytune.driving import parse_urdf, read_body
-
-    before = read_body(parse_urdf(ROBOT.urdf), ROBOT.urdf)
-    assert WRITERS["urdf"](instance()).count(f'radius="{before.left.radius_m:g}"') == 4

@@ -14,7 +14,7 @@ DEAR, CHEAP = (2.0, 2.2, 1.8, 2.0), (1.0, 1.1, 0.9, 1.0)
 BOTH = (family("bullet", 0, DEAR, noise=8.0), family("planar", 0, CHEAP, noise=8.0))
 
 
-def test_a_clear_winner_is_said_to_predict_best_and_to_be_used():
+def test_nothing_is_claimed_of_chance_of_several_families_and_a_clear_winner_or_the_cheapest_used():
     found = compared(family("bullet", 0, DEAR), family("planar", 4, CHEAP))
     answer = families_answer(found)
     assert answer.startswith("To predict: bullet, fresh PRPV (proxy relative predictivity value) 0 (0 to 0); worse: ")
@@ -22,9 +22,6 @@ def test_a_clear_winner_is_said_to_predict_best_and_to_be_used():
     assert answer.endswith("Cheapest: planar, 1 s per episode (0.93 to 1.1); times as long: bullet 2 (2 to 2).")
     assert "To teach" not in answer
     assert families_next_step(found) == "use bullet to predict; its page: study/families/bullet/report.html."
-
-
-def test_of_those_alike_the_cheapest_is_used_and_else_what_would_tell_them_apart_is_said():
     found = compared(*BOTH)
     assert "; cannot be told from it: planar +0 (" in families_answer(found)
     assert families_next_step(found).startswith(
@@ -33,9 +30,6 @@ def test_of_those_alike_the_cheapest_is_used_and_else_what_would_tell_them_apart
     found = compared(family("a", 0, CHEAP, noise=8.0), family("b", 0, CHEAP, noise=8.0))
     assert families_next_step(found) == "to tell a and b apart, raise starts and measure the target from them too."
     assert "cannot be told from it: b 1 (1 to 1)." in families_answer(found)
-
-
-def test_nothing_is_claimed_of_chance_or_without_fresh_episodes():
     found = compared(family("a", 4, noise=0.1), family("b", 4, noise=0.1))
     for one in found.families:
         object.__setattr__(one.fresh.chance, "p_value", 0.4)
@@ -75,7 +69,7 @@ def labels(figure):
     return {text for axes in figure.axes for text in axes.get_legend_handles_labels()[1]}
 
 
-def test_the_figure_has_a_panel_per_use_and_tells_best_alike_and_worse_apart():
+def test_a_panel_per_use_tells_best_alike_and_worse_apart_draws_open_intervals_and_has_no_teaching_without_it():
     families = (family("good", 0, DEAR), family("bad", 4, DEAR), family("poor", 3, CHEAP))
     lessons = {"good": lesson(-20.0), "bad": Lesson({}, failure="no"), "poor": lesson(-30.0, (10.0, -50.0, 30.0))}
     figure = families_figure(compared(*families, lessons=lessons))
@@ -85,9 +79,6 @@ def test_the_figure_has_a_panel_per_use_and_tells_best_alike_and_worse_apart():
     assert [text.get_text() for text in figure.axes[0].get_yticklabels()] == ["good", "bad", "poor"]
     assert figure.axes[1].get_xlim()[0] < -40.0
     assert_readable(figure)
-
-
-def test_the_figure_draws_open_intervals_and_has_no_panel_of_teaching_without_it():
     lessons = {"a": lesson(-20.0), "b": replace(lesson(-30.0), plv=LearningEstimate(-30.0, None, 5.0))}
     plv = families_figure(compared(family("a"), family("b"), lessons=lessons)).axes[1]
     assert [-30.0, 5.0] in [list(line.get_xdata()) for line in plv.lines]

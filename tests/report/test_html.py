@@ -15,7 +15,6 @@ from proxytune.report.html import MANY, WORDS, Shown, page_html, write_page
 from proxytune.report.view import Column, Foot, Paragraphs, Picture, Table, View, columns_of, foot_of
 from proxytune.report.writing import svg_of
 
-VOID = {"meta", "link", "img", "br"}
 EVIL = "<script>alert('\"&')</script>"
 
 
@@ -49,7 +48,7 @@ class Reader(HTMLParser):
 
     def handle_starttag(self, tag, attrs):
         self.elements.append((tag, dict(attrs)))
-        if tag not in VOID:
+        if tag not in {"meta", "link", "img", "br"}:
             self.open.append(tag)
 
     def handle_endtag(self, tag):
@@ -59,7 +58,7 @@ class Reader(HTMLParser):
         return [attrs for tag, attrs in self.elements if tag in tags]
 
 
-def test_every_text_of_every_field_is_escaped():
+def test_every_text_of_every_field_is_escaped_nothing_loaded_from_elsewhere_and_no_script_may_run():
     evil = View(
         EVIL,
         EVIL,
@@ -79,6 +78,16 @@ def test_every_text_of_every_field_is_escaped():
         assert elements.all("script") == []
         assert text.count("alert(") >= 20
         assert all(EVIL in image["alt"] for image in elements.all("img"))
+    text = html_of(replace(VIEW, next_step="see https://example.org"))
+    elements = Reader(text)
+    for attrs in elements.all(*{tag for tag, _ in elements.elements}):
+        for key in {"src", "href", "srcset", "action", "data"} & attrs.keys():
+            assert attrs[key].startswith(("data:", "#"))
+    assert "url(" not in text
+    assert "@import" not in text
+    (policy,) = [one["content"] for one in elements.all("meta") if "Policy" in one.get("http-equiv", "")]
+    assert policy.startswith("default-src 'none'; img-src data:;")
+    assert "script-src" not in policy
 
 
 @functools.cache
@@ -93,20 +102,7 @@ def test_no_text_breaks_the_page(text):
     assert [tag for tag, _ in Reader(html_of(view)).elements] == _tags()
 
 
-def test_nothing_is_loaded_from_elsewhere_and_no_script_may_run():
-    text = html_of(replace(VIEW, next_step="see https://example.org"))
-    elements = Reader(text)
-    for attrs in elements.all(*{tag for tag, _ in elements.elements}):
-        for key in {"src", "href", "srcset", "action", "data"} & attrs.keys():
-            assert attrs[key].startswith(("data:", "#"))
-    assert "url(" not in text
-    assert "@import" not in text
-    (policy,) = [one["content"] for one in elements.all("meta") if "Policy" in one.get("http-equiv", "")]
-    assert policy.startswith("default-src 'none'; img-src data:;")
-    assert "script-src" not in policy
-
-
-def test_headings_come_in_order_and_tables_have_scopes_captions_and_regions_that_the_keyboard_reaches():
+def test_headings_and_contents_come_in_order_and_tables_have_scopes_captions_and_regions_for_the_keyboard():
     tags = [tag for tag, _ in Reader(html_of(VIEW)).elements if re.fullmatch(r"h\d", tag)]
     assert tags[0] == "h1"
     assert tags.count("h1") == 1
@@ -118,9 +114,15 @@ def test_headings_come_in_order_and_tables_have_scopes_captions_and_regions_that
     ids = {attrs["id"] for attrs in elements.all("h2")}
     assert len(regions) == 3
     assert all(one["tabindex"] == "0" and one["role"] == "region" and one["aria-labelledby"] in ids for one in regions)
+    assert "<nav" not in html_of(replace(VIEW, parts=(TABLE,) * MANY))
+    elements = Reader(html_of(replace(VIEW, parts=(TABLE,) * (MANY + 1))))
+    ids = {attrs["id"] for attrs in elements.all("h2")}
+    links = [attrs["href"] for attrs in elements.all("a")]
+    assert len(links) == MANY + 1
+    assert {link.removeprefix("#") for link in links} <= ids
 
 
-def test_columns_of_numbers_end_together_texts_begin_together_and_long_cells_are_wrapped():
+def test_numbers_end_together_with_a_minus_and_texts_begin_together_long_cells_wrapped_and_parts_indented():
     columns = (Column("value", numbers=True), Column("text"))
     text = html_of(replace(VIEW, parts=(replace(TABLE, columns=columns, rows=(("1", "2"), ("2", "x"))),)))
     assert '<th scope="col" class="number">value</th><th scope="col">text</th>' in text
@@ -130,35 +132,29 @@ def test_columns_of_numbers_end_together_texts_begin_together_and_long_cells_are
     text = html_of(replace(VIEW, parts=(replace(TABLE, columns=columns, rows=(("x", "w" * 29),)),)))
     assert '<td class="prose">www' in text
     assert '<th scope="col">a b</th>' in text
+    # A name with a hyphen keeps it; an indent holds where the name takes two lines.
+    columns = columns_of(("name",), ("value",))
+    page = html_of(replace(VIEW, parts=(Table("T", columns, (("  a-1", "-0.3 (-1 to 2)"),)),)))
+    assert '<th scope="row" class="part">a-1</th><td class="number">−0.3 (−1 to 2)</td>' in page
 
 
-def test_a_table_of_contents_is_there_only_for_many_parts_and_leads_to_each():
-    assert "<nav" not in html_of(replace(VIEW, parts=(TABLE,) * MANY))
-    elements = Reader(html_of(replace(VIEW, parts=(TABLE,) * (MANY + 1))))
-    ids = {attrs["id"] for attrs in elements.all("h2")}
-    links = [attrs["href"] for attrs in elements.all("a")]
-    assert len(links) == MANY + 1
-    assert {link.removeprefix("#") for link in links} <= ids
-
-
-def test_only_a_page_under_way_renews_itself_and_only_one_with_a_next_step_says_it():
-    assert 'http-equiv="refresh"' not in html_of(VIEW)
-    text = page_html(VIEW, FOOT, 7)
-    assert '<meta http-equiv="refresh" content="7">' in text
-    assert "loads itself again every 7 s" in text
-    assert "Next:" in html_of(VIEW)
-    assert "Next:" not in html_of(replace(VIEW, next_step=""))
-
-
-def test_commands_between_backticks_are_code_whose_options_are_broken_nowhere():
+def test_commands_are_code_words_are_explained_where_they_are_used_and_links_stay_beside_the_page():
     text = html_of(replace(VIEW, next_step="run `a < b`"))
     assert "run <code>a &lt; b</code>" in text
     assert "a `b" in html_of(replace(VIEW, next_step="a `b"))
     text = html_of(replace(VIEW, next_step="run `python -m proxytune study a --budget 2`"))
     assert "python -m proxytune study a <span>--budget</span> 2</code>" in text
+    # Jargon has a meaning at the foot; a link goes to a file near the page and never elsewhere.
+    said = Paragraphs(
+        "P", ("The noise floor. [here](diagnosed/report.html) [there](https://x.org) [up](../report.html)",)
+    )
+    page = html_of(replace(VIEW, parts=(said,)))
+    assert "<dt>noise floor</dt>" in page
+    assert "<dt>nats</dt>" not in page
+    assert re.findall(r'<a href="([^"#]+)', page) == ["diagnosed/report.html", "../report.html"]
 
 
-def test_a_page_fits_every_screen_and_its_foot_says_how_to_come_by_it():
+def test_a_page_fits_every_screen_says_how_to_come_by_it_and_renews_itself_only_under_way():
     text = html_of(VIEW)
     assert 'name="viewport" content="width=device-width' in text
     for words in ("@media print", "@media (prefers-color-scheme: dark)", ".card { display: block;", "background: #fff"):
@@ -169,18 +165,21 @@ def test_a_page_fits_every_screen_and_its_foot_says_how_to_come_by_it():
     written = foot_of("a command", [("seed", "1")])
     assert dict(written.versions).keys() >= {"Python", "numpy", "scipy"}
     assert re.match(r"\d{4}-\d\d-\d\d \d\d:\d\d", written.date)
+    assert 'http-equiv="refresh"' not in html_of(VIEW)
+    text = page_html(VIEW, FOOT, 7)
+    assert '<meta http-equiv="refresh" content="7">' in text
+    assert "loads itself again every 7 s" in text
+    assert "Next:" in html_of(VIEW)
+    assert "Next:" not in html_of(replace(VIEW, next_step=""))
 
 
-@pytest.mark.parametrize(("dpi", "width"), [(None, 400), ((200, 200), 320)])
-def test_pictures_are_drawn_at_160_pixels_to_the_inch(dpi, width):
-    image = png(400, **({"dpi": dpi} if dpi else {}))
-    (attrs,) = Reader(html_of(replace(VIEW, parts=(Picture("P", image, "C"),)))).all("img")
+@pytest.mark.parametrize(
+    ("kind", "more", "width"), [("png", {}, 400), ("png", {"dpi": (200, 200)}, 320), ("gif", {}, 400)]
+)
+def test_pictures_are_data_of_their_own_kind_drawn_at_160_pixels_to_the_inch(kind, more, width):
+    (attrs,) = Reader(html_of(replace(VIEW, parts=(Picture("P", png(400, kind, **more), "C"),)))).all("img")
     assert attrs["width"] == str(width)
-
-
-@pytest.mark.parametrize("kind", ["gif", "png"])
-def test_pictures_are_data_of_their_own_kind(kind):
-    assert f'src="data:image/{kind};base64,' in html_of(replace(VIEW, parts=(Picture("P", png(form=kind), "C"),)))
+    assert attrs["src"].startswith(f"data:image/{kind};base64,")
 
 
 def test_what_is_no_picture_is_refused_and_a_page_written_as_it_is_shown(tmp_path):
@@ -199,17 +198,14 @@ def drawn(label="design", xlabel="trial"):
     return svg_of(figure)
 
 
-def test_a_figure_is_part_of_the_page_and_its_markers_say_their_values():
+def test_a_figure_is_part_of_the_page_its_markers_say_their_values_and_its_names_are_text_and_its_own():
     """An SVG is drawn inline, 160 pixels to the inch, and hovering a marker tells what it stands for."""
     page = html_of(replace(VIEW, parts=(Picture("P", drawn(), "C"),)))
     assert "<title>design; trial 1; PRPV 3</title>" in page
     assert "<title>design; trial 2; PRPV 4.5</title>" in page
     assert "width:480px" in page
     assert 'role="img"' in page
-
-
-def test_figures_share_no_names_and_names_in_them_are_text():
-    """Whatever a figure refers to is its own, so that no figure changes another."""
+    # Whatever a figure refers to is its own, so that no figure changes another.
     page = html_of(replace(VIEW, parts=(Picture("P", drawn(), "C"), Picture("Q", drawn(), "C"))))
     names = re.findall(r' id="([^"]+)"', page)
     assert len(names) == len(set(names))
@@ -219,21 +215,3 @@ def test_figures_share_no_names_and_names_in_them_are_text():
     assert "<script" not in page
     assert "<b>" not in page
     assert "<i>" not in page
-
-
-def test_words_are_explained_where_they_are_used_and_links_stay_beside_the_page():
-    """Jargon has a meaning at the foot; a link goes to a file near the page and never elsewhere."""
-    said = Paragraphs(
-        "P", ("The noise floor. [here](diagnosed/report.html) [there](https://x.org) [up](../report.html)",)
-    )
-    page = html_of(replace(VIEW, parts=(said,)))
-    assert "<dt>noise floor</dt>" in page
-    assert "<dt>nats</dt>" not in page
-    assert re.findall(r'<a href="([^"#]+)', page) == ["diagnosed/report.html", "../report.html"]
-
-
-def test_numbers_have_a_minus_and_what_a_row_is_of_is_told_by_its_indent():
-    """A name with a hyphen keeps it; an indent holds where the name takes two lines."""
-    columns = columns_of(("name",), ("value",))
-    page = html_of(replace(VIEW, parts=(Table("T", columns, (("  a-1", "-0.3 (-1 to 2)"),)),)))
-    assert '<th scope="row" class="part">a-1</th><td class="number">−0.3 (−1 to 2)</td>' in page

@@ -42,7 +42,7 @@ def test_every_effect_says_in_a_clause_what_it_does(drive, name):
     assert "`" not in said
 
 
-def test_a_finding_has_name_meaning_size_and_the_worth_that_was_shown_and_an_own_effect_its_own_names():
+def test_what_was_found_or_declared_is_told_with_name_meaning_size_and_worth_and_of_many_a_few():
     assert finding(BAND) == (
         "dead band: wheels stand still below a duty of 0.150 (0.149 to 0.151); "
         "without it predictions over 2 s are 20 times as far off (18 to 23)"
@@ -59,10 +59,7 @@ def test_a_finding_has_name_meaning_size_and_the_worth_that_was_shown_and_an_own
 
     own = {"name": "gone:Wheel", "parameters": {"shrink": {"value": 0.25, "interval": [0.25, 0.25], "unit": "m"}}}
     assert finding(own) == "gone:Wheel: shrink 0.25 m"
-
-
-def test_what_was_declared_is_told_with_its_value_and_of_many_a_few():
-    """A declared trim that was found stands in the first sentence; what is in no θ and equal wheels are not told."""
+    # A declared trim that was found stands in the first sentence; what is in no θ and equal wheels are not told.
     trim, delay = Estimate(0.0433, (0.0421, 0.0446), ""), Estimate(0.12, (0.1, 0.14), "s")
     assert fitted(("trim", "delay"), {"delay": delay, "trim": trim}) == (
         ", with trim 0.043 (0.042 to 0.045) and delay 0.12 s (0.10 to 0.14)"
@@ -73,7 +70,9 @@ def test_what_was_declared_is_told_with_its_value_and_of_many_a_few():
     assert many.endswith(" and 2 more")
 
 
-def test_effects_are_a_row_each_within_80_columns_and_no_name_is_broken(monkeypatch, capsys):
+def test_effects_are_a_row_each_within_80_columns_unbroken_and_an_unknown_one_is_asked_back(
+    monkeypatch, capsys, refused
+):
     monkeypatch.setenv("COLUMNS", "80")
     assert main(["list", "effects"]) == 0
     told = capsys.readouterr().out
@@ -81,6 +80,7 @@ def test_effects_are_a_row_each_within_80_columns_and_no_name_is_broken(monkeypa
     words = set(re.findall(r"\S+", told.replace("*", " ").replace(",", " ")))
     assert set(CATALOGUE) <= words
     assert {one.name for effect in CATALOGUE.values() for one in effect.parameters} <= words
+    assert "no 'ded_band'; did you mean 'dead_band'?" in refused("list", "effects", "ded_band")
 
 
 @pytest.mark.parametrize(
@@ -96,10 +96,6 @@ def test_effects_are_a_row_each_within_80_columns_and_no_name_is_broken(monkeypa
 def test_all_of_one_is_told(words, said, capsys):
     assert main(["list", *words]) == 0
     assert said in " ".join(capsys.readouterr().out.split())
-
-
-def test_an_unknown_one_is_asked_back(refused):
-    assert "no 'ded_band'; did you mean 'dead_band'?" in refused("list", "effects", "ded_band")
 
 
 @pytest.mark.parametrize("width", [30, 60, 80, 200])

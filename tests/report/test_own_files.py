@@ -58,10 +58,8 @@ BODY = """<robot name="mine">
 
 
 @pytest.fixture
-def model(tmp_path):
-    path = tmp_path / "model.toml"
-    path.write_text(model_text(Model("duckiebot", None, FOUND, {})))
-    return path
+def model(write_file):
+    return write_file(model_text(Model("duckiebot", None, FOUND, {})), "model.toml")
 
 
 @pytest.fixture
@@ -90,18 +88,23 @@ def nominal(twists):
     return PlanarPlant(np.zeros(3), 1.0 / HZ).move(np.array(twists))[0]
 
 
-def test_the_filter_before_the_nominal_simulator_moves_it_as_the_extended_one(model):
+def test_the_filter_moves_the_nominal_simulator_and_only_wheels_and_camera_of_a_car_are_patched(model):
     bent = CommandFilter(model, rate_hz=HZ)
     assert nominal([bent.step(one) for one in TWISTS]) == pytest.approx(extended(), abs=1e-9)
-
-
-def test_what_a_patched_file_has_is_left_to_its_wheels(model):
     bent = CommandFilter(model, rate_hz=HZ, has=IN_WHEELS)
     asked = np.array([bent.step(one) for one in TWISTS])
     rims = np.stack((asked[:, 0] - 0.08 * asked[:, 2], asked[:, 0] + 0.08 * asked[:, 2]), axis=1)
     rims *= (0.93 * 0.92, 1.08)
     moved = np.stack((rims.mean(axis=1), asked[:, 1], (rims[:, 1] - rims[:, 0]) / 0.2), axis=1)
     assert nominal(moved) == pytest.approx(extended(), abs=1e-9)
+    body = read_robot("car").body()
+    found = instance(CAR, wheel_gain=0.9, steering_offset=0.1)
+    told = complaint_of(patch, found, body, Path("mine.urdf"))
+    assert "--wheels LEFT,RIGHT of axle_left, steer_left" in told
+    patched = patch(found, body, Path("mine.urdf"), ("axle_left", "axle_right"))
+    assert {"wheel_gain", "yaw_scrub"} & patched.has == {"wheel_gain"}
+    assert patched.text.count('radius="0.045"') == 4
+    assert patched.text.count('radius="0.05"') == 4
 
 
 def driven(mujoco, text, commands):
@@ -116,8 +119,7 @@ def on_a_floor(mujoco, urdf):
     """A URDF as MuJoCo reads it, set free on a floor, with motors at its wheels: what a user of it adds."""
     spec = mujoco.MjSpec.from_string(urdf)
     spec.option.timestep = 0.0005
-    base = spec.body("base_footprint")
-    base.add_freejoint()
+    spec.body("base_footprint").add_freejoint()
     spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[9, 9, 0.1])
     for geom in (one for body in spec.bodies for one in body.geoms if one.name == "skid"):
         geom.condim, geom.priority = 1, 1
@@ -162,7 +164,7 @@ def test_only_wheels_and_camera_of_a_file_change_and_the_diff_shows_them(patched
     assert (tmp_path / name).read_text() == FILES[name]
 
 
-def test_a_patched_urdf_has_wheels_and_camera_where_they_were_found(patched):
+def test_a_patched_urdf_or_sdf_has_wheels_and_camera_where_they_were_found(patched):
     root = parse_urdf(patched("mine.urdf", URDF).output)
     left, right, camera = (link_pose(root, name) for name in ("wheel_l", "wheel_r", "camera_link"))
     assert left[1, 3] - right[1, 3] == pytest.approx(0.16 * 0.2 / 0.16)
@@ -172,9 +174,6 @@ def test_a_patched_urdf_has_wheels_and_camera_where_they_were_found(patched):
     assert camera[:3, 3] == pytest.approx((0.02 + 0.066, 0.0, 0.108))
     assert np.degrees(np.arcsin(-camera[2, 0])) == pytest.approx(25.0)
     assert root.find("gazebo/plugin/wheel_separation").text == "0.16"
-
-
-def test_a_patched_sdf_has_wheels_and_camera_where_they_were_found(patched):
     root = ET.fromstring(patched("mine.sdf", SDF).output.read_text())
     places = [[float(v) for v in root.find(f".//link[@name='{name}']/pose").text.split()] for name in ("lw", "rw")]
     assert places[0][1] - places[1][1] == pytest.approx(0.2)
@@ -201,9 +200,7 @@ def test_a_patched_sdf_has_wheels_and_camera_where_they_were_found(patched):
         ("mine.xml", 'size="0.0318"', "", "states its own size"),
     ],
 )
-def test_a_file_that_cannot_be_patched_is_refused_in_one_line_and_nothing_is_written(
-    patched, tmp_path, name, before, after, said
-):
+def test_a_file_that_cannot_be_patched_is_one_line_and_nothing_is_written(patched, tmp_path, name, before, after, said):
     assert said in complaint_of(patched, name, FILES.get(name, URDF).replace(before, after))
     assert not (tmp_path / "out").exists()
 
@@ -231,7 +228,7 @@ def test_what_would_overwrite_or_misread_the_users_own_is_refused(model, tmp_pat
 
 
 @pytest.mark.parametrize("stamped", [False, True])
-def test_the_ros_node_tells_the_driver_what_the_python_class_answers_and_stops_after_silence(
+def test_the_ros_node_tells_what_the_python_class_answers_and_stops_after_silence(
     model, tmp_path, monkeypatch, stamped
 ):
     path = export(model, tmp_path / "bend.py", to="filter", has=("trim",)).output
@@ -257,9 +254,8 @@ DRIVES = np.repeat([[0.5, 0.3], [0.9, -0.2], [0.0, 0.1], [0.7, 0.4]], 60, axis=0
 
 
 @pytest.mark.parametrize("command", ["ackermann", "speed_steering", "twist"])
-def test_the_filter_moves_a_nominal_car_as_the_one_that_was_found(tmp_path, command):
-    path = tmp_path / "model.toml"
-    path.write_text(model_text(Model("car", None, FOUND_OF_CAR, {}), (), CAR.catalogue))
+def test_the_filter_moves_a_nominal_car_as_the_one_that_was_found(write_file, command):
+    path = write_file(model_text(Model("car", None, FOUND_OF_CAR, {}), (), CAR.catalogue), "model.toml")
     full, lock, wheelbase = 3.0, np.radians(24.0), 0.33
     train = drivetrain(CAR, effects_from({**CAR.theta, **FOUND_OF_CAR}, CAR.figures, CAR.catalogue))
     twists, _ = train.apply(DRIVES / (full, lock), train.begin(FilterContext(HZ, np.zeros(2), CAR.figures)))
@@ -276,9 +272,8 @@ def test_the_filter_moves_a_nominal_car_as_the_one_that_was_found(tmp_path, comm
     assert 0.9 * told == pytest.approx(twists, abs=1e-9)  # the simulator's own wheels are smaller
 
 
-def test_the_node_of_a_car_hears_and_tells_ackermann_drives(tmp_path, monkeypatch):
-    model = tmp_path / "model.toml"
-    model.write_text(model_text(Model("dart", None, {"steering_offset": 0.1}, {}), (), CAR.catalogue))
+def test_the_node_of_a_car_hears_and_tells_ackermann_drives(tmp_path, write_file, monkeypatch):
+    model = write_file(model_text(Model("dart", None, {"steering_offset": 0.1}, {}), (), CAR.catalogue), "model.toml")
     path = export(model, tmp_path / "bend.py", to="filter").output
     node, said = load_node(path, monkeypatch).AckermannFilter(), Ackermann()
     said.drive.speed, said.drive.steering_angle = 1.0, 0.1
@@ -295,17 +290,6 @@ def test_the_node_of_a_car_hears_and_tells_ackermann_drives(tmp_path, monkeypatc
     assert told[-1].drive.speed == pytest.approx(0.0)
 
 
-def test_a_users_own_car_is_patched_at_its_rear_wheels_and_has_their_gain():
-    body = read_robot("car").body()
-    found = instance(CAR, wheel_gain=0.9, steering_offset=0.1)
-    told = complaint_of(patch, found, body, Path("mine.urdf"))
-    assert "--wheels LEFT,RIGHT of axle_left, steer_left" in told
-    patched = patch(found, body, Path("mine.urdf"), ("axle_left", "axle_right"))
-    assert {"wheel_gain", "yaw_scrub"} & patched.has == {"wheel_gain"}
-    assert patched.text.count('radius="0.045"') == 4
-    assert patched.text.count('radius="0.05"') == 4
-
-
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -320,8 +304,7 @@ def test_a_wrong_argument_of_the_filter_is_one_line(model, arguments, said):
 
 def test_the_python_of_the_page_runs(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    page = PAGE.read_text(encoding="utf-8")
-    exec(page.split("```python")[1].split("```")[0], {})
+    exec(PAGE.read_text(encoding="utf-8").split("```python")[1].split("```")[0], {})
 
 
 def test_the_command_shows_the_diff_and_how_to_make_the_filter(model, tmp_path, capsys, refused):

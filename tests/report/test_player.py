@@ -19,8 +19,7 @@ def played(folder, monkeypatch, robot, kind, **parameters):
     diagnosis = types.SimpleNamespace(next_drive=drive, command=kind, robot=read_robot(robot))
     (folder / "commands.csv").write_text(commands_text(diagnosis))
     (folder / "play_commands.py").write_text(player_text(diagnosis))
-    module = load_node(folder / "play_commands.py", monkeypatch, **parameters)
-    player = module.Player()
+    player = load_node(folder / "play_commands.py", monkeypatch, **parameters).Player()
     while not player.done:
         player.tick()
     return player

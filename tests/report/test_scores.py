@@ -31,7 +31,7 @@ def assessed(proxy, **more):
     return assess(proxy=proxy, target=TARGET, metrics=M, resamples=100, **more)
 
 
-def test_the_answer_says_prpv_and_whether_chance_explains_it():
+def test_the_answer_says_prpv_and_chance_of_single_episodes_that_more_are_needed_and_of_several_the_best():
     good, bad = assessed(SAME), assessed(REVERSED)
     answer = score_sentence({"a": good}, None, target="t")
     assert answer.startswith(
@@ -40,15 +40,9 @@ def test_the_answer_says_prpv_and_whether_chance_explains_it():
     assert ": better than chance (" in answer
     assert "no better than chance (" in score_sentence({"b": bad}, None, target="t")
     assert "until chance can be excluded" in score_next_step({"b": bad}, None)
-
-
-def test_single_episodes_have_no_interval_and_the_next_step_is_more_of_them():
     single = assess(proxy=table(range(5), 1), target=table(range(5), 1), metrics=M, resamples=100)
     assert "of 0, of at most 20" in score_sentence({"a": single}, None, target="t")
     assert "at least two episodes" in score_next_step({"a": single}, None)
-
-
-def test_of_several_the_best_is_called_better_only_beyond_noise():
     tables = {"good": SAME, "bad": REVERSED}
     found = {name: assessed(one) for name, one in tables.items()}
     selection = select_proxy(proxies=tables, target=TARGET, metrics=M, resamples=100)
@@ -131,7 +125,7 @@ def test_no_two_names_overlap_and_none_is_cut_at_85_millimetres(agents):
         assert max(text.get_window_extent().x1 for text in axes.texts) <= figure.bbox.x1
 
 
-def test_of_many_agents_those_are_named_whose_rank_differs_most():
+def test_of_many_agents_those_whose_rank_differs_most_are_named_and_constant_scores_of_two_drawn_too(tmp_path):
     scores = np.arange(40.0)[:, None, None]
     moved = scores.copy()
     moved[[3, 36]] = scores[[36, 3]]
@@ -142,9 +136,15 @@ def test_of_many_agents_those_are_named_whose_rank_differs_most():
     assert len(named) == MOST
     assert {name.rsplit(":", 1)[1] for name in named} >= {"agent3", "agent36"}
     assert max(map(len, named)) == LONGEST
+    flat = ScoreTable(("A", "B"), ("1",), ("distance", "time"), np.ones((2, 1, 2)))
+    found = assess(proxy=flat, target=flat, metrics=BOTH)
+    assert scatter_figure(found).axes[0].get_title() == "SRCC undefined"
+    for name, figure in (("one", scatter_figure(found)), ("two", flipped_pairs_figure(found.prpv))):
+        save_figure(figure, tmp_path / "new" / f"{name}.png")
+        assert (tmp_path / "new" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_the_map_colours_each_pair_once_and_counts_them(assessment):
+def test_the_map_colours_each_pair_once_and_counts_them_and_of_many_agents_is_a_picture_of_the_same_width(assessment):
     axes = flipped_pairs_figure(assessment.prpv).axes[0]
     cells = np.asarray(axes.collections[0].get_array().filled(np.nan))
     kinds = list(FLIP_COLOURS)
@@ -155,9 +155,6 @@ def test_the_map_colours_each_pair_once_and_counts_them(assessment):
     assert sum(drawn.values()) == 15
     assert np.isnan(cells[np.triu_indices(6)]).all()
     assert [text.get_text() for text in axes.get_legend().get_texts()] == [f"{k}: {n}" for k, n in drawn.items()]
-
-
-def test_pairs_of_more_agents_than_can_be_named_are_a_picture_over_ranks_of_the_same_width():
     big = assess(proxy=drawn_at_random(4, agents=300), target=drawn_at_random(5, agents=300), metrics=BOTH, resamples=2)
     few, many = (
         flipped_pairs_figure(one.prpv)
@@ -170,12 +167,3 @@ def test_pairs_of_more_agents_than_can_be_named_are_a_picture_over_ranks_of_the_
     assert (picture.get_array() == reversed_).sum() == sum(pair.flip == "reversed" for pair in big.prpv.pairs) > 0
     many.draw_without_rendering()
     assert not any("A" in label.get_text() for label in many.axes[0].get_yticklabels())
-
-
-def test_constant_scores_and_two_agents_are_drawn_too(tmp_path):
-    flat = ScoreTable(("A", "B"), ("1",), ("distance", "time"), np.ones((2, 1, 2)))
-    found = assess(proxy=flat, target=flat, metrics=BOTH)
-    assert scatter_figure(found).axes[0].get_title() == "SRCC undefined"
-    for name, figure in (("one", scatter_figure(found)), ("two", flipped_pairs_figure(found.prpv))):
-        save_figure(figure, tmp_path / "new" / f"{name}.png")
-        assert (tmp_path / "new" / f"{name}.png").read_bytes().startswith(b"\x89PNG")

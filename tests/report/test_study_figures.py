@@ -25,7 +25,7 @@ def lines(figure):
     return {line.get_label(): line for line in figure.axes[0].get_lines()}
 
 
-def test_it_shows_every_trial_the_floor_by_its_kind_and_chance(result):
+def test_it_shows_every_trial_the_floor_by_its_kind_chance_and_the_answer_s_fresh_score_after_the_last(result):
     drawn = lines(convergence_figure(result))
     scores = [trial.prpv for trial in result.trials]
     assert list(drawn["design"].get_ydata()) == scores[:5]
@@ -33,9 +33,6 @@ def test_it_shows_every_trial_the_floor_by_its_kind_and_chance(result):
     floor, chance = result.floor, result.judged.chance
     assert drawn[f"target's halves {floor.value:.1f}"].get_ydata()[0] == floor.value
     assert drawn[f"chance {chance.mean:.1f}"].get_ydata()[0] == chance.mean
-
-
-def test_the_answer_s_fresh_score_stands_after_the_last_trial_with_its_interval(result):
     assert not convergence_figure(result).axes[0].containers
     (bar,) = convergence_figure(confirmed(result)).axes[0].containers
     marker, _, (reach,) = bar.lines
@@ -58,7 +55,7 @@ def test_the_convergence_names_its_axes_its_floor_by_its_kind_and_its_lines_at_t
     assert told == ["design", "proposed", "answer, fresh episodes"]
 
 
-def test_failed_trials_are_crosses_and_those_cut_off_stand_at_what_they_cannot_be_below(result):
+def test_failed_trials_are_crosses_those_cut_off_at_their_bounds_and_the_line_is_the_answer_so_far(result):
     failed = replace(
         result,
         trials=(*result.trials, TrialRecord(8, result.trials[0].theta, "failed")),
@@ -73,9 +70,6 @@ def test_failed_trials_are_crosses_and_those_cut_off_stand_at_what_they_cannot_b
     assert drawn["stopped early, at least"].get_xydata().tolist() == [[8.0, 14.0]]
     assert "failed" not in drawn
     assert "stopped early, at least" not in lines(convergence_figure(result))
-
-
-def test_without_a_floor_none_is_drawn_and_the_line_is_the_answer_so_far(result):
     assessment = result.best.assessment
     silent = replace(assessment, noise_floor=replace(assessment.noise_floor, value=None, low=None, high=None))
     drawn = lines(convergence_figure(replace(result, best=replace(result.best, assessment=silent))))
@@ -100,14 +94,13 @@ def test_the_density_is_highest_where_theta_is_known_to_be_adds_up_to_one_and_st
         values, density = density_of(learnt, place)
         assert values[np.argmax(density)] == pytest.approx(centre, abs=0.01)
         assert np.trapezoid(density, values) == pytest.approx(1.0, abs=0.02)
-    at_the_end = planted(learnt, centre=(0.0, 0.5), deviation=(0.05, 0.05))
-    values, density = density_of(at_the_end, 0)
+    values, density = density_of(planted(learnt, centre=(0.0, 0.5), deviation=(0.05, 0.05)), 0)
     assert values[0] == 0.0
     assert density[1] > 0.9 * density.max()
     assert np.trapezoid(density, values) == pytest.approx(1.0, abs=0.02)
 
 
-def test_what_the_interval_leaves_out_is_grey_and_the_axis_is_the_box_with_its_unit(learnt):
+def test_what_the_interval_leaves_out_is_grey_the_answer_a_line_and_the_truth_a_mark_where_it_is_known(learnt):
     figure = profiles_figure(learnt)
     assert [axes.get_xlabel() for axes in figure.axes] == ["delay [s]", "trim"]
     for axes, box in zip(figure.axes, learnt.study.settings.space.intervals, strict=True):
@@ -115,22 +108,16 @@ def test_what_the_interval_leaves_out_is_grey_and_the_axis_is_the_box_with_its_u
         spans = [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in axes.patches]
         assert np.allclose(spans, [(box.low, low), (high, box.high)])
         assert axes.get_xlim() == (box.low, box.high)
-
-
-def test_the_answer_is_a_line_and_the_truth_a_mark_only_where_it_is_known(learnt):
+    vague = planted(learnt, deviation=(3.0, 0.02))
+    ends = [span(vague.knowledge.intervals[name]) for name in ("delay", "trim")]
+    titles = [axes.get_title() for axes in profiles_figure(vague).axes]
+    assert titles == [f"unidentified: {ends[0]}", f"{ends[1]} remain"]
     known = profiles_figure(replace(learnt, truth={"trim": 0.11})).axes
     marks = [{line.get_label(): line.get_xdata()[0] for line in axes.get_lines()} for axes in known]
     theta = learnt.best.trial.theta
     assert [mark["answer"] for mark in marks] == [theta["delay"], theta["trim"]]
     assert ["truth" in mark for mark in marks] == [False, True]
     assert marks[1]["truth"] == 0.11
-
-
-def test_what_remains_is_written_above_and_an_unidentified_parameter_is_called_so(learnt):
-    vague = planted(learnt, deviation=(3.0, 0.02))
-    ends = [span(vague.knowledge.intervals[name]) for name in ("delay", "trim")]
-    titles = [axes.get_title() for axes in profiles_figure(vague).axes]
-    assert titles == [f"unidentified: {ends[0]}", f"{ends[1]} remain"]
 
 
 @pytest.mark.parametrize("draw", [convergence_figure, profiles_figure, evaluations_figure])
@@ -140,12 +127,11 @@ def test_a_figure_can_be_read_in_one_column_of_a_paper(learnt, draw):
 
 def shadow(learnt):
     """Whether the shadow of delay and trim holds points of the box."""
-    pair = evaluations_figure(learnt).axes[0]
-    (region,) = [one for one in pair.collections if one.get_zorder() == 0]
+    (region,) = [one for one in evaluations_figure(learnt).axes[0].collections if one.get_zorder() == 0]
     return lambda *points: [any(path.contains_point(point) for path in region.get_paths()) for point in points]
 
 
-def test_the_pair_has_a_point_for_every_trial_and_its_key_the_region_and_the_answer(learnt):
+def test_the_pair_has_a_point_for_every_trial_open_where_it_was_cut_off_and_its_key_the_region_and_the_answer(learnt):
     failed = replace(learnt, trials=(*learnt.trials, TrialRecord(8, {"trim": 0.3, "delay": 0.3}, "failed")))
     pair = evaluations_figure(replace(failed, truth={"trim": 0.1, "delay": 0.12})).axes[0]
     assert (pair.get_xlabel(), pair.get_ylabel()) == ("delay [s]", "trim")
@@ -162,9 +148,6 @@ def test_the_pair_has_a_point_for_every_trial_and_its_key_the_region_and_the_ans
 
     key = evaluations_figure(learnt).axes[1]
     assert [text.get_text() for text in key.get_legend().get_texts()] == ["95 % region", "answer"]
-
-
-def test_a_trial_that_was_cut_off_is_an_open_point(learnt):
     cut = TrialRecord(8, {"trim": 0.2, "delay": 0.25}, "cut", bound=14.0, score=20.0)
     pair = evaluations_figure(replace(learnt, trials=(*learnt.trials, cut))).axes[0]
     (holes,) = [one for one in pair.collections if one.get_zorder() == 3]
@@ -174,7 +157,7 @@ def test_a_trial_that_was_cut_off_is_an_open_point(learnt):
     assert "stopped early" not in [one.get_label() for one in whole.collections]
 
 
-def test_the_shadow_is_the_region_and_slants_where_a_pair_trades(learnt):
+def test_the_shadow_is_the_region_that_slants_where_a_pair_trades_and_one_parameter_is_drawn_alone(learnt):
     holds = shadow(learnt)
     # Two deviations of 0.05 and 0.02 of the box are inside, four are not.
     assert holds((0.12, 0.1), (0.146, 0.1), (0.12, 0.12)) == [True, True, True]
@@ -182,9 +165,6 @@ def test_the_shadow_is_the_region_and_slants_where_a_pair_trades(learnt):
     holds = shadow(planted(learnt, centre=(0.5, 0.5), deviation=(0.15, 0.15), correlation=-0.95))
     assert holds((0.09, 0.12), (0.21, -0.12)) == [True, True]
     assert holds((0.09, -0.12), (0.21, 0.12)) == [False, False]
-
-
-def test_one_parameter_alone_can_be_drawn(learnt):
     settings = learnt.study.settings
     space = replace(settings.space, intervals=settings.space.intervals[:1])
     study = replace(learnt.study, settings=replace(settings, space=space))
@@ -202,11 +182,8 @@ def weighed(result):
     return replace(result, importances=planted)
 
 
-def test_a_study_has_the_importance_of_each_of_its_parameters(result):
+def test_each_parameter_has_a_dot_for_its_share_a_stroke_for_what_is_alone_and_a_line_for_the_interval(result, weighed):
     assert [importance.name for importance in result.importances] == ["delay", "trim"]
-
-
-def test_a_dot_is_the_share_a_stroke_what_is_alone_and_a_line_the_interval_most_important_on_top(weighed):
     (axes,) = importance_figure(weighed).axes
     assert [label.get_text() for label in axes.get_yticklabels()] == ["delay", "trim"]
     drawn = {line.get_label(): line.get_xydata().tolist() for line in axes.get_lines()}

@@ -21,7 +21,7 @@ def figures(result):
     return {"convergence": svg_of(convergence_figure(result))}
 
 
-def test_the_page_needs_nothing_else_and_begins_with_the_sentence(result, figures):
+def test_every_figure_has_a_caption_and_the_page_begins_with_the_sentence_and_needs_nothing_else(result, figures):
     text = text_of(result, figures)
     assert not re.search(r"(src|href)=\"(?!data:|#)|https?://|<script|@import", text)
     assert "<svg" in text
@@ -31,11 +31,7 @@ def test_the_page_needs_nothing_else_and_begins_with_the_sentence(result, figure
     places = [text.index(one) for one in heads]
     assert places == sorted(places)
     assert study_sentence(result) == f"{say_answer(result)} Next: {say_next_step(result)}."
-
-
-def test_every_figure_has_a_caption_and_an_alternative_text_that_says_what_to_see(result, figures):
-    image = figures["convergence"]
-    text = text_of(result, dict.fromkeys(CAPTIONS["study"], image))
+    text = text_of(result, dict.fromkeys(CAPTIONS["study"], figures["convergence"]))
     for name, said in CAPTIONS["study"].items():
         title = said["title"]
         (alt,) = re.findall(f'aria-label="({re.escape(html.escape(title))}[^"]*)"', text)
@@ -58,7 +54,7 @@ def test_it_has_every_trial_the_best_theta_and_at_its_foot_how_to_come_by_it_aga
     assert "plot &#x27;a b&#x27; --metric" in other
 
 
-def test_a_page_under_way_renews_itself_and_names_the_best_trial_as_possible_luck(result, tmp_path):
+def test_a_page_under_way_is_there_before_any_trial_renews_itself_calls_the_best_luck_and_tells_stops(result, tmp_path):
     settings, path = result.study.settings, tmp_path / "report.html"
     write_live_page(path, settings, "prpv", result.trials[:4], "trial 5 of 7")
     text = path.read_text(encoding="utf-8")
@@ -67,10 +63,6 @@ def test_a_page_under_way_renews_itself_and_names_the_best_trial_as_possible_luc
     assert f"trial {best.number}, PRPV {best.prpv:g}, which may be partly luck" in text
     assert f'<meta http-equiv="refresh" content="{RENEW_S}">' in text
     assert text.count('<th scope="row" class="number">') == 4
-
-
-def test_a_page_under_way_is_there_before_any_trial_has_ended_and_says_when_a_study_was_stopped(result, tmp_path):
-    settings, path = result.study.settings, tmp_path / "report.html"
     first = live_view(settings, "prpv", (), "pre-flight")
     assert first.sentence == "Under way: pre-flight. No trial has a score yet."
     assert first.parts == ()

@@ -88,7 +88,7 @@ def test_pairs_that_may_be_worse_are_counted_where_there_may_be_any(high, told):
     assert told in said(excess=Estimate(-8.0, -15.0, high))
 
 
-def test_a_score_above_the_floor_or_excluded_by_others_is_not_called_found():
+def test_a_score_above_the_floor_is_not_called_found_and_what_chance_explains_has_its_probability():
     text = said(**ABOVE)
     assert text.startswith("θ narrowed down to 0.16 % of the box: trim 0.121 ")
     assert (
@@ -101,6 +101,12 @@ def test_a_score_above_the_floor_or_excluded_by_others_is_not_called_found():
     assert "at most 8 pairs worse, but other scores of the agents differ from the target's." in text
     assert "no difference" not in text
     assert text.endswith("Next: raise budget from 24 to 48, to get closer.")
+    assert said(**BY_CHANCE) == (
+        "No θ found. PRPV (proxy relative predictivity value) is 58 (50 to 66), no better than chance "
+        "(65.8 ± 13.7, p = 0.3). Next: raise budget from 24 to 48, or add agents whose scores differ more."
+    )
+    assert "diagnose LOG" in said(**BY_CHANCE, fits=False)
+    assert "confirm" not in said(**BY_CHANCE, fresh=False, confirm=0)
 
 
 @pytest.mark.parametrize(
@@ -127,38 +133,30 @@ def test_the_next_step_asks_for_no_more_trials_or_starts_than_help():
     assert "raise starts" not in told
 
 
-def test_a_proxy_that_lacks_something_is_sent_to_diagnose():
+def test_a_proxy_that_lacks_something_is_sent_to_diagnose_with_effects_on_motion_if_its_robot_drives():
     text = said(**ABOVE, fits=False, p_value=0.0042)
     assert text.startswith("The proxy lacks something: no θ explains the target's scores (p = 0.0042). PRPV (")
     assert text.endswith("run `python -m proxytune diagnose LOG --declared trim,delay`.")
     assert "a perfect proxy scores lower" not in said(fits=False, perfect=False)
     assert said(**ABOVE, fits=False, names=("blur",)).endswith("run `python -m proxytune diagnose LOG`.")
-
-
-def test_of_another_simulator_no_log_is_asked_for_unless_its_robot_drives():
     lacking = said(**ABOVE, fits=False, family="other:family")
     assert lacking.startswith("The proxy lacks something: no θ explains the target's scores")
     assert lacking.endswith("widen the box; of a robot on wheels a log tells (`diagnose`).")
     unknown = said((TRIM, DELAY), **ABOVE, information=TOLD, family="other:family")
     assert unknown.endswith("whose scores change with delay (so far agent4's do most), to get closer.")
+    names = ("blur", "trim", "motor_lag.time_constant", "camera_pitch", "wheel_gain.left", "wheel_gain.right")
+    assert declared_of(names) == ("trim", "motor_lag", "wheel_gain")
 
 
-def test_what_chance_explains_is_not_found_and_has_its_probability():
-    text = said(**BY_CHANCE)
-    assert text == (
-        "No θ found. PRPV (proxy relative predictivity value) is 58 (50 to 66), no better than chance "
-        "(65.8 ± 13.7, p = 0.3). Next: raise budget from 24 to 48, or add agents whose scores differ more."
-    )
-    assert "diagnose LOG" in said(**BY_CHANCE, fits=False)
-    assert "confirm" not in said(**BY_CHANCE, fresh=False, confirm=0)
-
-
-def test_without_fresh_episodes_luck_is_named_and_they_are_the_next_step():
+def test_without_fresh_episodes_or_before_its_end_a_study_says_so_and_how_to_go_on():
     unconfirmed = said(**ABOVE, fresh=False, confirm=0)
     assert "is 16 in the search's own episodes, which may be partly luck." in unconfirmed
     assert unconfirmed.endswith("Next: set confirm = 1 and run the study again, to drive the best θ afresh.")
     assert "set confirm" not in said(**ABOVE, fresh=False)
     assert "perfect" not in unconfirmed
+    text = said(**ABOVE, stopped="", trials=range(14))
+    assert text.startswith("14 of 24 trials so far. θ narrowed down")
+    assert text.endswith("Next: run the study again for the 10 trials that are left.")
 
 
 def test_where_noise_is_not_known_nothing_is_said_of_a_perfect_proxy_and_the_nominal_stands_beside():
@@ -169,13 +167,7 @@ def test_where_noise_is_not_known_nothing_is_said_of_a_perfect_proxy_and_the_nom
     assert "8 pairs worse. The simulator as it is scores 31 (24 to 38). Next: " in text
 
 
-def test_a_study_under_way_says_so_and_how_to_go_on():
-    text = said(**ABOVE, stopped="", trials=range(14))
-    assert text.startswith("14 of 24 trials so far. θ narrowed down")
-    assert text.endswith("Next: run the study again for the 10 trials that are left.")
-
-
-def test_unidentified_parameters_have_no_interval_and_only_who_tells_of_them_is_named():
+def test_unidentified_parameters_have_no_interval_values_outside_theirs_have_and_of_many_some_are_told():
     text = said((TRIM, DELAY), **ABOVE, information=TOLD)
     assert "trim 0.121 (0.108 to 0.146); delay is unidentified." in text
     assert "add an agent or a metric whose scores change with delay (so far agent4's do most), or a log" in text
@@ -183,20 +175,11 @@ def test_unidentified_parameters_have_no_interval_and_only_who_tells_of_them_is_
     assert nothing.startswith("θ is unknown: delay and blur are unidentified.")
     silent = replace(TOLD[0], agents=(("agent0", 0.0),))
     assert "so far" not in said((TRIM, DELAY), **ABOVE, information=(silent, TOLD[1]))
-
-
-def test_values_outside_their_intervals_and_of_many_only_some_are_told():
     text = said((replace(TRIM, best=0.2), PITCH), **ABOVE)
     assert "trim 0.200 (95 % region: 0.108 to 0.146)" in text
-    many = tuple(replace(TRIM, name=f"gain{number}") for number in range(7))
-    text = said(many)
+    text = said(tuple(replace(TRIM, name=f"gain{number}") for number in range(7)))
     assert "gain4 0.121 (0.108 to 0.146) and 2 more." in text
     assert "gain5" not in text
-
-
-def test_only_effects_on_motion_are_declared_to_diagnose_each_once():
-    names = ("blur", "trim", "motor_lag.time_constant", "camera_pitch", "wheel_gain.left", "wheel_gain.right")
-    assert declared_of(names) == ("trim", "motor_lag", "wheel_gain")
 
 
 def test_what_is_told_of_a_parameter_is_what_the_study_knows(result):

@@ -62,7 +62,7 @@ def of_plain_types(value):
     return type(value) in (str, int, float, bool, type(None))
 
 
-def test_what_is_known_of_theta_is_in_the_document(result):
+def test_the_document_has_the_promised_keys_what_is_known_of_theta_floor_and_pairs_that_trade(result):
     document = study_document(replace(planted(result, misfit=LACKS), truth={"trim": 0.1}, cautions=("few starts",)))
     best = document["best"]
     assert list(best["theta_interval"]) == ["delay", "trim"]
@@ -80,9 +80,6 @@ def test_what_is_known_of_theta_is_in_the_document(result):
     assert (document["truth"], document["cautions"]) == ({"trim": 0.1}, ["few starts"])
     assert study_document(result)["truth"] is None
     assert study_document(planted(result, misfit=UNTOLD))["misfit"]["fits"] is None
-
-
-def test_the_document_tells_floor_pairs_that_trade_and_whether_it_is_perfect(result):
     (trade,) = study_document(planted(result, (0.5, 0.5), (0.1, 0.1), correlation=-0.9))["trades"]
     assert trade[:2] == ["delay", "trim"]
     assert trade[2] == pytest.approx(-0.9, abs=0.05)
@@ -100,7 +97,7 @@ def shown(result):
     return console.file.getvalue()
 
 
-def test_the_first_line_is_the_sentence_that_json_has_too_then_the_table(result):
+def test_the_first_line_is_the_sentence_that_json_has_too_then_tables_with_names_and_values_as_they_are(result):
     first, *others = shown(result).splitlines()
     assert first == study_sentence(result) == study_document(result)["sentence"]
     titles = [line for line in others if line in (THETA, USEFULNESS, INFORMATION, SEARCH)]
@@ -108,16 +105,13 @@ def test_the_first_line_is_the_sentence_that_json_has_too_then_the_table(result)
     assert others[2].split()[:2] == ["parameter", "best"]
     assert others[-2].split() == ["episodes", "none", "run"]
     assert others[-1].rstrip() == "figure: convergence.png"
-
-
-def test_names_and_values_are_shown_as_they_are(result):
     told = (replace(TOLD[0], agents=(("[red]agent", 1.0),)), TOLD[1])
     assert "[red]agent 100 %" in shown(planted(result, information=told))
     assert any("--unpaired" in note for note in result.judged.notes)
     assert not any("--unpaired" in note for note in usefulness_table(result).notes)
 
 
-def test_people_see_what_the_proxy_is_worth(result):
+def test_people_see_what_the_proxy_is_worth_and_halves_are_not_called_a_noise_floor(result):
     rows = {label.strip(): rest for label, *rest in usefulness_table(result).rows}
     assert list(rows) == ["PRPV", "halves", "chance", "PPV", "misfit (p)"]
     value, interval, meaning = rows["PRPV"]
@@ -128,15 +122,6 @@ def test_people_see_what_the_proxy_is_worth(result):
     assert not row_of(search_table(result), "failed")
     label, text = search_table(result).rows[0]
     assert (label, text.startswith("7 of 7; best: trial ")) == ("trials", True)
-
-
-def with_floor(result, **changes):
-    own = result.best.assessment
-    floor = replace(own.noise_floor, **changes)
-    return replace(result, best=replace(result.best, assessment=replace(own, noise_floor=floor)))
-
-
-def test_halves_are_not_called_a_noise_floor(result):
     assert "upper bound" in row_of(usefulness_table(result), "  halves")[3]
     known = with_floor(result, kind="same starts", value=5.0, low=1.0, high=9.0)
     row = row_of(usefulness_table(known), "  noise floor")
@@ -145,7 +130,13 @@ def test_halves_are_not_called_a_noise_floor(result):
     assert not row_of(usefulness_table(with_floor(result, value=None)), "  halves")
 
 
-def test_a_confirmed_study_tells_what_is_expected_a_perfect_proxy_s_score_and_the_excess(result):
+def with_floor(result, **changes):
+    own = result.best.assessment
+    floor = replace(own.noise_floor, **changes)
+    return replace(result, best=replace(result.best, assessment=replace(own, noise_floor=floor)))
+
+
+def test_what_is_expected_a_perfect_proxy_s_score_the_excess_and_whether_any_theta_explains_is_told(result):
     again = confirmed(result, kind="same starts", value=5.0, low=1.2, high=9.1)
     table = usefulness_table(again)
     assert row_of(table, "PRPV")[1:] == ("12", "8 to 20", "wrongly ordered pairs, 0 to 30; expected, in 5 more runs")
@@ -156,9 +147,6 @@ def test_a_confirmed_study_tells_what_is_expected_a_perfect_proxy_s_score_and_th
     assert document["excess"]["value"] == 7.0
     assert not row_of(usefulness_table(result), "  excess")
     assert study_document(result)["best"]["expected_prpv"] is study_document(result)["excess"] is None
-
-
-def test_it_is_said_whether_any_theta_explains_the_target(result):
     row = row_of(usefulness_table(planted(result)), "misfit (p)")
     assert row == ("misfit (p)", "0.4", "", "some θ may explain the target's scores")
     lacking = row_of(usefulness_table(planted(result, misfit=LACKS)), "misfit (p)")
@@ -166,7 +154,7 @@ def test_it_is_said_whether_any_theta_explains_the_target(result):
     assert "too few" in row_of(usefulness_table(planted(result, misfit=UNTOLD)), "misfit (p)")[3]
 
 
-def test_how_a_study_came_to_its_end_is_said_and_more_trials_than_the_budget_are_no_share(result):
+def test_how_a_study_came_to_its_end_what_matters_and_what_was_cut_off_and_saved_is_said(result):
     assert study_document(result)["stopped"] == "the budget of 7 trials is spent"
     assert search_table(result).rows[0][1].endswith("; ended: the budget of 7 trials is spent")
     under_way = replace(result, stopped="")
@@ -175,9 +163,6 @@ def test_how_a_study_came_to_its_end_is_said_and_more_trials_than_the_budget_are
     settings = replace(result.study.settings, budget=5)
     lowered = replace(result, study=replace(result.study, settings=settings))
     assert search_table(lowered).rows[0][1].startswith("7 (budget 5); best: trial ")
-
-
-def test_that_every_parameter_matters_is_said_too(result):
     moved = Movement(Interval("trim", -0.3, 0.3), 0.01, "distance", 2.0, 0.5, 12, False)
     flown = replace(result, preflight=Preflight({"trim": 0.0}, (moved,), 144))
     assert study_document(result)["preflight"] is None
@@ -194,9 +179,6 @@ def test_that_every_parameter_matters_is_said_too(result):
     label, warning = search_table(replace(flown, preflight=still)).rows[1]
     assert (label, warning.startswith("'trim' is not shown to change a metric")) == ("pre-flight", True)
     assert flown.episodes == result.episodes + 144
-
-
-def test_what_was_cut_off_and_saved_is_told(result):
     assert not row_of(search_table(result), "stopped early")
     assert study_document(result)["trials"][0]["cut_off"] is None
     first, *others = result.trials
@@ -232,7 +214,7 @@ def known(result):
     return planted(replace(result, cautions=()))
 
 
-def test_a_row_has_the_best_value_its_interval_what_is_as_good_and_the_box(known):
+def test_a_row_has_the_best_value_its_interval_what_is_as_good_and_the_box_and_a_caution_is_a_note(known):
     names = [one.name for one in theta_table(known).columns]
     assert names == ["parameter", "best", "95 % interval", "by PRPV alone", "box"]
     delay, trim, last = theta_table(known).rows
@@ -242,13 +224,7 @@ def test_a_row_has_the_best_value_its_interval_what_is_as_good_and_the_box(known
     assert last[0] == "share of the box"
     assert last[3:] == ("6.2 %", "")
     assert 0.3 < float(last[2].removesuffix(" %")) < 3.0
-
-
-def test_the_truth_has_a_column_only_where_it_is_known_and_is_marked_outside_the_interval(known):
-    known = replace(known, truth={"trim": 0.1, "delay": 0.29})
-    assert theta_table(known).columns[3].name == "truth"
-    assert [row[3] for row in theta_table(known).rows] == ["0.29 (outside)", "0.1", ""]
-    assert [row[3] for row in theta_table(replace(known, truth={"trim": 0.1})).rows] == ["", "0.1", ""]
+    assert "no shared starts" in theta_table(replace(known, cautions=("no shared starts",))).notes
 
 
 def test_a_parameter_without_an_interval_is_unidentified_and_pairs_that_trade_are_named(known):
@@ -261,7 +237,7 @@ def test_a_parameter_without_an_interval_is_unidentified_and_pairs_that_trade_ar
     assert not [line for line in theta_table(known).notes if "trade off" in line]
 
 
-def test_it_is_said_whether_the_region_holds_the_truth_and_the_best_theta(known):
+def test_it_is_said_whether_the_region_holds_the_best_theta_and_the_truth_which_has_a_column_where_it_is_known(known):
     best = dict(known.best.trial.theta)
     unit = (best["delay"] / 0.3, (best["trim"] + 0.3) / 0.6)
     inside = planted(known, centre=unit)
@@ -270,10 +246,10 @@ def test_it_is_said_whether_the_region_holds_the_truth_and_the_best_theta(known)
     first, second = theta_table(replace(outside, truth=best)).notes
     assert first.startswith("the best θ by PRPV is outside the 95 % region")
     assert second == "the 95 % region does not contain the truth"
-
-
-def test_what_the_target_s_table_does_not_allow_is_a_note(known):
-    assert "no shared starts" in theta_table(replace(known, cautions=("no shared starts",))).notes
+    known = replace(known, truth={"trim": 0.1, "delay": 0.29})
+    assert theta_table(known).columns[3].name == "truth"
+    assert [row[3] for row in theta_table(known).rows] == ["0.29 (outside)", "0.1", ""]
+    assert [row[3] for row in theta_table(replace(known, truth={"trim": 0.1})).rows] == ["", "0.1", ""]
 
 
 def test_per_parameter_what_informs_it_most_is_named_with_what_limits_it_and_nothing_else(known):

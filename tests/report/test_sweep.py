@@ -40,8 +40,7 @@ def curve(folder, parameter="trim", base=TRUTH, model=None):
     if discrepancy:
         plan = with_target(plan, model, discrepancy)
     with Store.open(folder) as store:
-        study_run = StudyRun(study, store)
-        run_sweep(study_run, plan, discrepancy)
+        run_sweep(StudyRun(study, store), plan, discrepancy)
         return curve_of(StudyRun(study, store), plan)
 
 
@@ -57,7 +56,7 @@ def swept(make_studies):
     return curve(make_studies())
 
 
-def test_the_document_is_plain_json_with_a_point_per_value(swept):
+def test_document_and_csv_have_a_point_per_value_and_without_a_target_model_say_how_to_get_pod(swept):
     document = json.loads(json.dumps(curve_document(swept), allow_nan=False))
     assert document["parameter"] == "trim"
     assert document["base"] == TRUTH
@@ -65,9 +64,6 @@ def test_the_document_is_plain_json_with_a_point_per_value(swept):
     assert document["points"][2]["prpv"] == 0
     assert document["noise_floor"] == swept.points[0].assessment.noise_floor.value
     assert document["noise_floor_kind"] == "halves"
-
-
-def test_the_csv_says_what_the_document_says_and_without_a_target_model_how_to_get_pod(swept):
     rows = list(csv.DictReader(io.StringIO(curve_csv(swept))))
     points = curve_document(swept)["points"]
     assert [float(row["trim"]) for row in rows] == [point["value"] for point in points]
@@ -176,40 +172,14 @@ def test_figures_are_as_wide_as_a_column_with_type_of_six_points_and_more(with_p
     assert_readable(panels_figure(with_pod), panels_figure(swept), *many)
 
 
-def test_the_bars_stand_at_the_held_value_and_a_third_of_the_range_beside(make_study, swept):
+def test_the_bars_stand_at_the_held_value_and_beside_and_parameters_are_named_in_words(make_study, swept):
     values = [point.value for point in swept.points]
     indices, held = bar_points(swept)
     assert ([values[index] for index in indices], values[held]) == ([-0.1, 0.1, 0.3], 0.1)
-    at_the_end = curve(make_study("end"), base={"trim": -0.3})
-    assert bar_points(at_the_end) == ([0, 1], 0)
+    assert bar_points(curve(make_study("end"), base={"trim": -0.3})) == ([0, 1], 0)
     axes = bars_figure([swept]).axes[0]
     scores = [swept.points[index].assessment.prpv.value for index in indices]
     assert [patch.get_height() for patch in axes.patches if patch.get_width() == pytest.approx(0.85)] == scores
-
-
-def legend(figure):
-    (told,) = [*figure.legends, *(axes.get_legend() for axes in figure.axes if axes.get_legend())]
-    return [text.get_text() for text in told.get_texts()]
-
-
-def test_every_line_band_and_bar_is_explained_once(with_pod, curves):
-    lines = ["target's halves", "chance", "95 % interval", "held value"]
-    assert legend(sweep_figure(curves)) == lines
-    assert legend(panels_figure(with_pod)) == [*lines, "SRCC, distance", "SRCC, survival time"]
-    assert sorted(legend(bars_figure(curves))) == sorted([*lines, "lower and higher value"])
-
-
-def test_nothing_of_a_figure_is_clipped(with_pod, make_study):
-    for figure in (panels_figure(with_pod), bars_figure([with_pod]), sweep_figure([with_pod])):
-        figure.draw_without_rendering()
-        outer, inner = figure.bbox, figure.get_tightbbox().transformed(figure.dpi_scale_trans)
-        assert outer.x0 <= inner.x0
-        assert inner.x1 <= outer.x1
-        assert outer.y0 <= inner.y0
-        assert inner.y1 <= outer.y1
-
-
-def test_figures_name_parameters_in_words_and_the_noise_floor_only_what_is_one(swept):
     assert (
         sweep_figure([replace(swept, parameter="camera_pitch", unit="deg")]).axes[1].get_xlabel()
         == "camera pitch [deg]"
@@ -220,6 +190,25 @@ def test_figures_name_parameters_in_words_and_the_noise_floor_only_what_is_one(s
     told = replace(swept, points=(replace(swept.points[0], assessment=known), *swept.points[1:]))
     assert legend(sweep_figure([told]))[0] == "noise floor"
     assert curve_document(told)["noise_floor_kind"] == "same starts"
+
+
+def legend(figure):
+    (told,) = [*figure.legends, *(axes.get_legend() for axes in figure.axes if axes.get_legend())]
+    return [text.get_text() for text in told.get_texts()]
+
+
+def test_every_line_band_and_bar_is_explained_once_and_nothing_of_a_figure_is_clipped(with_pod, curves, make_study):
+    lines = ["target's halves", "chance", "95 % interval", "held value"]
+    assert legend(sweep_figure(curves)) == lines
+    assert legend(panels_figure(with_pod)) == [*lines, "SRCC, distance", "SRCC, survival time"]
+    assert sorted(legend(bars_figure(curves))) == sorted([*lines, "lower and higher value"])
+    for figure in (panels_figure(with_pod), bars_figure([with_pod]), sweep_figure([with_pod])):
+        figure.draw_without_rendering()
+        outer, inner = figure.bbox, figure.get_tightbbox().transformed(figure.dpi_scale_trans)
+        assert outer.x0 <= inner.x0
+        assert inner.x1 <= outer.x1
+        assert outer.y0 <= inner.y0
+        assert inner.y1 <= outer.y1
 
 
 @pytest.fixture(scope="module")
@@ -235,7 +224,7 @@ def view_of(curves):
     return sweep_view("s", curves, figures, "The others are nominal")
 
 
-def test_the_answer_says_where_prpv_is_lowest_and_figures_of_all_come_first(curves):
+def test_the_answer_says_where_prpv_is_lowest_and_of_a_flat_curve_claims_no_optimum(curves):
     answer = view_of(curves).sentence
     assert "trim: PRPV is lowest (0) at 0.1, and worse beyond noise at" in answer
     assert answer.endswith("The others are nominal.")
@@ -243,13 +232,9 @@ def test_the_answer_says_where_prpv_is_lowest_and_figures_of_all_come_first(curv
     assert titles[:3] == ["All parameters", "How much each parameter matters", "Usefulness along trim"]
     assert titles[3] == "Along trim: the paper's measures"
     assert titles.index("Along trim: other measures") < titles.index("Usefulness along delay")
-
-
-def test_a_flat_curve_asks_for_more_starts_and_claims_no_optimum(curves):
     (trim, _) = curves
     point = trim.points[0]
-    flat = replace(trim, points=(point, replace(point, value=0.2)))
-    page = view_of([flat])
+    page = view_of([replace(trim, points=(point, replace(point, value=0.2)))])
     assert "and at no other value worse beyond noise" in page.sentence
     assert page.next_step.startswith("raise starts, or add agents whose scores change with trim")
     assert "search all parameters" in view_of(curves).next_step

@@ -48,8 +48,7 @@ def experiment(lessons=LESSONS, gain=1.0, published=NOBODY, examinations=None, c
     curves = {"none": without, **{one.name: one.curve for one in lessons}}
     needs = sample_needs(curves, best_score=60.0, tolerance=5.0, level=50.0, draws=60)
     taught = {"published": published, "published_in": "a paper", "examinations": examinations, "costs": costs}
-    teaching = SimpleNamespace(target_samples=COUNTS, **taught)
-    settings = SimpleNamespace(name=EVIL, teaching=teaching)
+    settings = SimpleNamespace(name=EVIL, teaching=SimpleNamespace(target_samples=COUNTS, **taught))
     return Experiment(settings, 60.0, replace(needs, gain=gain), lessons)
 
 
@@ -58,42 +57,21 @@ def test_a_proxy_saves_samples_only_if_its_whole_interval_says_so_and_is_named_t
     assert [one.name for one in saves] == ["sure", "far"]
     assert [one.name for one in none] == ["harmful", EVIL]
     assert [one.name for one in unknown] == ["wide", "reaching"]
-    answer = teach_answer(experiment())
-    shown, rest = answer.split(" None saved: ")
+    shown, rest = teach_answer(experiment()).split(" None saved: ")
     assert "sure: 300 (100 to 350)" in shown
     assert "wide" not in shown
     assert rest.index("harmful") < rest.index("Open, since") < rest.index("wide: 300 (−100 to 400)")
     assert "none is shown" in teach_answer(experiment(LESSONS[2:3]))
 
 
-def test_what_was_published_stands_beside_what_is_found_here_with_its_source():
+def test_what_was_published_stands_beside_what_is_found_and_plv_in_cost_where_costs_are_stated():
     theirs = {"none": Published(0.0, 9000, 0.0), "sure": Published(47.4, 250, 0.97)}
     page = teach_view(experiment(published=theirs), {}, b"a picture")
     table = next(part for part in page.parts if getattr(part, "title", "") == "Beside what was published")
     assert [row[:2] for row in table.rows] == [("none", "0"), ("sure", "47.4")]
     assert table.rows[1][3:] == ("250", "100 (50 to 400)", "97 %", "")
     assert table.notes == ("a paper",)
-    nobody = teach_view(experiment(), {}, b"a picture")
-    assert len(nobody.parts) == len(page.parts) - 1
-
-
-def test_the_next_step_is_more_seeds_while_something_is_open():
-    assert "raise teaching.seeds from 3 to 6" in teach_next_step(experiment())
-    assert "train in a proxy that saves" in teach_next_step(experiment(LESSONS[:2]))
-    assert "train without these proxies" in teach_next_step(experiment(LESSONS[1:2]))
-
-
-def test_without_convergence_or_a_rise_at_the_end_plv_is_unknown_and_the_next_step_says_why():
-    rising = experiment(gain=5.1)
-    assert "is unknown: without a proxy the score still rises by more than 5" in teach_answer(rising)
-    assert teach_next_step(rising).startswith("raise teaching.target_samples: ")
-    coarse = experiment(gain=None)
-    assert "is unknown: teaching.target_samples has no number from 1 to half of 400" in teach_answer(coarse)
-    assert "add numbers between 0 and 400" in teach_next_step(coarse)
-    assert "raise teaching.examinations from 20 to 40" in teach_next_step(experiment(examinations=20))
-
-
-def test_plv_in_cost_is_a_column_where_costs_are_stated_and_only_there():
+    assert len(teach_view(experiment(), {}, b"a picture").parts) == len(page.parts) - 1
     stated = experiment(costs=Costs(2.5, 2.5, 0.0), published={"sure": Published(47.4, 250, 0.97)})
     table, plain = (teach_view(one, {}, b"a picture").parts[0] for one in (stated, experiment()))
     assert table.columns == (*plain.columns, Column("PLV in cost", numbers=True))
@@ -102,6 +80,19 @@ def test_plv_in_cost_is_a_column_where_costs_are_stated_and_only_there():
     assert costs["sure"] == "750 (250 to 875)"
     assert costs["far"] == "unknown (300 or more)"
     assert any("off_policy 2.5, on_policy 2.5, label 0" in note for note in table.notes)
+
+
+def test_the_next_step_is_more_seeds_while_something_is_open_and_says_why_plv_is_unknown():
+    assert "raise teaching.seeds from 3 to 6" in teach_next_step(experiment())
+    assert "train in a proxy that saves" in teach_next_step(experiment(LESSONS[:2]))
+    assert "train without these proxies" in teach_next_step(experiment(LESSONS[1:2]))
+    rising = experiment(gain=5.1)
+    assert "is unknown: without a proxy the score still rises by more than 5" in teach_answer(rising)
+    assert teach_next_step(rising).startswith("raise teaching.target_samples: ")
+    coarse = experiment(gain=None)
+    assert "is unknown: teaching.target_samples has no number from 1 to half of 400" in teach_answer(coarse)
+    assert "add numbers between 0 and 400" in teach_next_step(coarse)
+    assert "raise teaching.examinations from 20 to 40" in teach_next_step(experiment(examinations=20))
 
 
 @pytest.mark.parametrize(

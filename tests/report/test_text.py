@@ -15,7 +15,7 @@ def printed(*parts):
     return [line.rstrip() for line in capture.get().splitlines()]
 
 
-def test_numbers_end_together_below_the_title_and_nothing_is_taken_for_markup():
+def test_numbers_end_together_below_the_title_begin_together_in_a_section_and_nothing_is_markup():
     assert printed(table_text(TABLE)) == [
         "A [b]x[/b]",
         "            s per",
@@ -23,9 +23,6 @@ def test_numbers_end_together_below_the_title_and_nothing_is_taken_for_markup():
         "  [bold]        1",
         "c              12",
     ]
-
-
-def test_in_a_section_numbers_begin_together_below_a_free_line_and_notes_follow():
     title, head, first, *rest = printed(*section_text(TABLE))[1:]
     assert title == "A [b]x[/b]"
     assert (head.strip(), first) == ("s per", "agent     episode")

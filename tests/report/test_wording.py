@@ -3,7 +3,7 @@
 from proxytune.report.wording import digits, fixed, listed, percent, probability, span
 
 
-def test_numbers_are_written_with_a_true_minus_and_as_many_figures_as_their_width_allows():
+def test_numbers_have_a_true_minus_and_as_many_figures_as_their_width_allows_and_names_make_a_list():
     assert [digits(ends) for ends in ((0.108, 0.146), (11.1, 14.4), (3.0, 35.0), (1.0, 1.0))] == [3, 1, 0, 3]
     assert fixed(-0.12, 2) == "−0.12"
     assert fixed(-0.0001, 2) == "0.00"
@@ -11,7 +11,4 @@ def test_numbers_are_written_with_a_true_minus_and_as_many_figures_as_their_widt
     shares = [percent(share) for share in (1.0, 0.3141, 0.00162, 0.0000123, 1e-9, 0.0)]
     assert shares == ["100 %", "31 %", "0.16 %", "0.0012 %", "under 0.001 %", "0 %"]
     assert [probability(value) for value in (0.364, 0.0042, 0.0002)] == ["p = 0.36", "p = 0.0042", "p < 0.001"]
-
-
-def test_names_make_a_list_in_a_sentence():
     assert [listed(list(names)) for names in ("", "a", "ab", "abc")] == ["", "a", "a and b", "a, b and c"]

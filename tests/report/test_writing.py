@@ -19,7 +19,7 @@ def figure():
     return made
 
 
-def test_a_figure_is_a_png_and_beside_it_only_what_is_asked_for(figure, tmp_path):
+def test_a_figure_is_a_png_and_what_is_asked_for_the_same_each_time_with_fonts_that_journals_take(figure, tmp_path):
     save_figure(figure, tmp_path / "sweep_trim_delay=0.1.png")
     assert [path.name for path in tmp_path.iterdir()] == ["sweep_trim_delay=0.1.png"]
     plain = (tmp_path / "sweep_trim_delay=0.1.png").read_bytes()
@@ -33,9 +33,6 @@ def test_a_figure_is_a_png_and_beside_it_only_what_is_asked_for(figure, tmp_path
     (tmp_path / "other").mkdir()
     save_figure(figure, tmp_path / "other" / "plain.png")
     assert len(list((tmp_path / "other").iterdir())) == 1
-
-
-def test_the_same_figure_is_the_same_file_in_every_format_and_a_pdf_has_fonts_that_journals_take(figure, tmp_path):
     with figures_also_as(("svg", "pdf")):
         save_figure(figure, tmp_path / "one.png")
         save_figure(figure, tmp_path / "two.png")
@@ -69,9 +66,8 @@ WRITTEN = {
 
 
 @pytest.mark.parametrize("what", WRITTEN)
-def test_a_failed_write_keeps_the_old_file_and_is_told_in_one_line(figure, tmp_path, monkeypatch, what):
-    path = tmp_path / "file"
-    path.write_text("old")
+def test_a_failed_write_keeps_the_old_file_and_is_told_in_one_line(figure, tmp_path, write_file, monkeypatch, what):
+    path = write_file("old", "file")
 
     def full(descriptor):
         raise OSError(28, "No space left on device")

@@ -30,7 +30,6 @@ from wobbly import wobbly
 def family(domain, *, model):
     return shift(wobbly(domain, model=model))
 """
-HELPER = "def shift(family):\n    return family\n"
 
 
 @pytest.fixture(scope="module")
@@ -168,7 +167,7 @@ def test_a_study_with_its_own_modules_gives_the_same_trials_while_a_worker_joins
     for name, words in (("here", ()), ("there", ("--backend", "dask", "--address", cluster.scheduler_address))):
         folder = make_study(name, family='"mine:family"')
         (folder / "mine.py").write_text(OWN_FAMILY)
-        (folder / "helper.py").write_text(HELPER)
+        (folder / "helper.py").write_text("def shift(family):\n    return family\n")
         cluster.scale(3 if words else 2)
         answers.append(answered("study", folder, *words))
     here, there = answers

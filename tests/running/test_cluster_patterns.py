@@ -40,7 +40,6 @@ class Mine(Deadly):
 def family(domain, *, model):
     return Mine(**vars(deadly(domain, model=model)))
 """
-HELPER = "def same(scores):\n    return scores\n"
 SIGNALS = {"kill": signal.SIGKILL, "term": signal.SIGTERM, "stop": signal.SIGSTOP, "go": signal.SIGCONT}
 SIGNALS["interrupt"] = signal.SIGINT
 GONE = "no worker is there"
@@ -168,7 +167,7 @@ def own_study(make_study, called, sleep, told):
     limits = {LIMITS[word]: rest for word, rest in told if word in LIMITS}
     folder = make_study(called, family='"mine:family"', domain=domain, **{**SMALL, **limits})
     (folder / "mine.py").write_text(OWN_FAMILY)
-    (folder / "helper.py").write_text(HELPER)
+    (folder / "helper.py").write_text("def same(scores):\n    return scores\n")
     return folder
 
 

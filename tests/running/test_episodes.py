@@ -25,7 +25,7 @@ def test_two_processes_find_what_one_finds_and_none_is_fine():
     assert run_all(Wobbly(), 2, []) == {}
 
 
-def test_one_job_stays_in_this_process_and_two_do_not(tmp_path):
+def test_one_job_stays_in_this_process_two_do_not_and_leaving_early_drops_what_has_not_begun(tmp_path):
     journals = {jobs: tmp_path / f"journal{jobs}" for jobs in (1, 2)}
     for jobs, journal in journals.items():
         run_all(Wobbly(journal=str(journal), sleep=0.02), jobs)
@@ -33,6 +33,13 @@ def test_one_job_stays_in_this_process_and_two_do_not(tmp_path):
     assert pids[1] == {os.getpid()}
     assert os.getpid() not in pids[2]
     assert len(pids[2]) == 2
+    journal = tmp_path / "journal"
+    for jobs in (1, 2):
+        journal.unlink(missing_ok=True)
+        episodes = [make_episode({}, agent="agent0", start=0, seed=seed) for seed in range(400)]
+        with running(Wobbly(journal=str(journal), sleep=0.05), episodes, jobs) as outcomes:
+            next(outcomes)
+        assert len(journal.read_text().splitlines()) < 200
 
 
 def test_each_episode_runs_on_one_thread():
@@ -77,16 +84,6 @@ def test_a_full_disk_is_no_episode_s_doing(jobs):
         run_all(Wobbly(faults=("agent1:1:full",)), jobs)
 
 
-def test_leaving_early_drops_the_episodes_not_yet_begun(tmp_path):
-    journal = tmp_path / "journal"
-    for jobs in (1, 2):
-        journal.unlink(missing_ok=True)
-        episodes = [make_episode({}, agent="agent0", start=0, seed=seed) for seed in range(400)]
-        with running(Wobbly(journal=str(journal), sleep=0.05), episodes, jobs) as outcomes:
-            next(outcomes)
-        assert len(journal.read_text().splitlines()) < 200
-
-
 @pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_whether_an_episode_is_left_out_is_asked_when_it_is_about_to_begin(jobs, tmp_path):
     journal = tmp_path / "journal"
@@ -119,7 +116,7 @@ class Unloadable(Wobbly):
         raise ModuleNotFoundError("No module named 'my_simulator'")
 
 
-def test_a_family_that_cannot_go_to_another_process_is_one_line():
+def test_a_family_that_no_module_has_goes_to_other_processes_and_one_that_cannot_is_one_line():
     class Held(Wobbly):
         held = threading.Lock()
 
@@ -129,8 +126,6 @@ def test_a_family_that_cannot_go_to_another_process_is_one_line():
     with pytest.raises(RunError, match=r"another process cannot load .*No module named 'my_simulator' \(test_ep"):
         run_all(Unloadable(), 2)
 
-
-def test_a_family_that_no_module_has_as_in_a_notebook_goes_to_other_processes():
     class Local(Wobbly):
         pass
 

@@ -35,23 +35,20 @@ def but_last(found):
     return {episode: what for episode, what in found.items() if episode != LAST}
 
 
-def test_a_fleet_comes_to_what_its_episodes_come_to_one_by_one():
+def test_a_fleet_comes_to_what_its_episodes_come_to_one_by_one_also_where_one_raises(tmp_path):
     whole = by_itself()
     assert told(run_fleet(Convoy(), EPISODES)) == whole
     assert told(run_fleet(Convoy(), EPISODES[5:7])).items() <= whole.items()
-
-
-@pytest.mark.parametrize(("jobs", "sizes"), [(1, [12]), (2, [6, 6]), (3, [4, 4, 4])])
-def test_fleets_keep_every_process_busy_and_change_nothing(jobs, sizes):
-    assert run_all(jobs=jobs) == (by_itself(), sizes)
-
-
-def test_one_that_raises_fails_by_itself_and_where_it_arose_is_told(tmp_path):
     journal = tmp_path / "journal"
     found = told(run_fleet(Convoy(faults=("agent3:2:raises",), journal=str(journal)), EPISODES))
     assert but_last(found) == but_last(by_itself())
     assert found[LAST].startswith("agent 'agent3' raised ValueError at 7 s: no way (deadly.py, line ")
     assert len(journal.read_text().splitlines()) == 1, "the others were run once"
+
+
+@pytest.mark.parametrize(("jobs", "sizes"), [(1, [12]), (2, [6, 6]), (3, [4, 4, 4])])
+def test_fleets_keep_every_process_busy_and_change_nothing(jobs, sizes):
+    assert run_all(jobs=jobs) == (by_itself(), sizes)
 
 
 @pytest.mark.parametrize(("fault", "raised"), [("exits", "SystemExit: 0"), ("own error", "OwnError: of its own")])
@@ -90,16 +87,13 @@ def test_a_fleet_is_expected_to_take_a_good_deal_less_than_an_episode_may():
     assert run_all(timeout_s=3.0, known=dict.fromkeys(KNOWN, 0.5)) == (by_itself(), [2] * 6)
 
 
-def test_what_draws_or_is_to_be_alone_is_run_by_itself():
+def test_what_draws_is_run_by_itself_and_where_the_machine_fails_nobody_has():
     faults = ("agent1:*:draws",)
     assert run_together(Convoy(faults=faults), EPISODES) is None
     assert run_together(Convoy(), EPISODES) is not None
     assert told(run_fleet(Convoy(faults=faults), EPISODES)) == by_itself(faults)
     _, sizes = run_all(alone=["agent1"])
     assert sizes == [1, 1, 1, 9]
-
-
-def test_what_the_machine_lacks_is_no_failure_of_whoever_met_it():
     with pytest.raises(RunError, match=r"agent 'agent3' from start 2: the machine failed \(MemoryError"):
         run_all(("agent3:2:memory",))
 
@@ -126,13 +120,10 @@ def test_where_a_fleet_as_a_whole_fails_its_episodes_are_run_one_by_one(family):
     assert run_all(family=family)[0] == by_itself()
 
 
-def test_an_episode_without_a_metric_fails_in_a_fleet_as_by_itself():
+def test_an_episode_without_a_metric_fails_in_a_fleet_as_by_itself_and_they_share_their_time(monkeypatch):
     found, _ = run_all(family=Unlike)
     lacks = "the domain family gave no finite 'survival_time'"
     assert set(found.values()) == {f"agent '{one.agent}': {lacks}" for one in EPISODES}
-
-
-def test_fleets_share_their_time_and_are_told_as_a_whole(monkeypatch):
     clock = SimpleNamespace(seconds=lambda: 0.6)
     monkeypatch.setattr("proxytune.running.fleets.awake", lambda: nullcontext(clock))
     assert [one.seconds for one in run_fleet(Convoy(), EPISODES[:6])] == [pytest.approx(0.1)] * 6
@@ -149,7 +140,7 @@ def sizes(count, jobs, seconds=None, most_s=MOST_S):
     return [len(fleet) for fleet in cut]
 
 
-def test_fleets_are_as_large_as_seconds_and_processes_allow_and_small_at_first():
+def test_fleets_are_as_large_as_seconds_and_processes_allow_and_what_is_not_needed_is_cut():
     assert sizes(48, 1, 0.1) == [MOST]
     assert sizes(48, 2, 0.1) == [24, 24]
     assert sizes(200, 2, 0.1) == [34, 34, 33, 33, 33, 33]
@@ -159,9 +150,6 @@ def test_fleets_are_as_large_as_seconds_and_processes_allow_and_small_at_first()
     assert sizes(6, 100, 0.1) == [1] * 6
     assert sizes(0, 2, 0.1) == []
     assert sizes(10, 2) == [UNKNOWN, UNKNOWN, 2]
-
-
-def test_what_is_not_needed_any_more_is_cut_before_its_fleet_begins():
     cut = set()
     many = [make_episode({}, agent="agent0", start=0, seed=seed) for seed in range(8)]
     fleets = in_fleets(many, 2, lambda _: False, lambda one: one.seed in cut, {("agent0", 0): 0.1})

@@ -33,12 +33,20 @@ def shown(terminal, monkeypatch, width=120, colours=None, what=("trial 2 of 2", 
     return text.getvalue()
 
 
-def test_a_terminal_sees_trial_episodes_to_run_and_best(monkeypatch):
+def test_a_terminal_sees_trial_episodes_to_run_and_best_without_colours_where_asked(monkeypatch):
     text = shown(True, monkeypatch)
     assert "trial 2 of 2" in text
     assert "1250/1600 episodes" in text, "episodes known already are not counted: they need no time"
     assert "best 4" in text
     assert "PRPV" not in text, "the bar says it"
+    assert "\x1b[3" in shown(True, monkeypatch, colours="standard")
+    monkeypatch.setenv("NO_COLOR", "1")
+    assert "\x1b[3" not in shown(True, monkeypatch, colours="standard")
+    text = written(monkeypatch)
+    with Bars(432) as bars:
+        bars.begin("pre-flight 1 of 2", 0)
+        bars.begin("pre-flight 2 of 2", 0)
+    assert text.getvalue() == "0 s: pre-flight 1 of 2 begins; at most 432 episodes\n"
 
 
 @pytest.mark.parametrize("what", [STUDY, TEACHING], ids=["study", "teach"])
@@ -64,17 +72,6 @@ def test_lines_are_plain_unbroken_and_of_what_is_finished(monkeypatch):
     assert [line.partition(" s: ")[2] for line in lines] == ["trial 2 of 2: PRPV 4; 1250 of at most 1600 episodes"]
     what = (f"trial 1 of 2 [red]{'x' * 100}", "episodes", None)
     assert f"[red]{'x' * 100}: PRPV 4; 1250" in shown(False, monkeypatch, 44, what=what)
-
-
-def test_bars_have_no_colours_where_asked_and_begin_at_once(monkeypatch):
-    assert "\x1b[3" in shown(True, monkeypatch, colours="standard")
-    monkeypatch.setenv("NO_COLOR", "1")
-    assert "\x1b[3" not in shown(True, monkeypatch, colours="standard")
-    text = written(monkeypatch)
-    with Bars(432) as bars:
-        bars.begin("pre-flight 1 of 2", 0)
-        bars.begin("pre-flight 2 of 2", 0)
-    assert text.getvalue() == "0 s: pre-flight 1 of 2 begins; at most 432 episodes\n"
 
 
 @pytest.mark.parametrize("terminal", [True, False])

@@ -58,22 +58,19 @@ def _in_time(piece):
     return "done"
 
 
-def test_outside_a_piece_or_in_somebody_elses_thread_there_is_no_limit(tmp_path):
+def test_outside_a_piece_there_is_no_limit_and_pieces_that_may_end_their_process_are_done_elsewhere(tmp_path):
     with ThreadPoolExecutor(1) as pool:
         assert pool.submit(TracedTask(_too_slow, tmp_path), "piece").result() == "done"
     with limited("anything", 0.01):
         time.sleep(0.05)
+    with working(_where, [1], 1, rescue=Rescue(_lost, isolated=True)) as done:
+        assert list(done) != [os.getpid()]
 
 
 def _too_slow(piece):
     with limited("anything", 0.01):
         time.sleep(0.05)
     return "done"
-
-
-def test_pieces_that_may_end_their_process_are_never_done_in_this_one():
-    with working(_where, [1], 1, rescue=Rescue(_lost, isolated=True)) as done:
-        assert list(done) != [os.getpid()]
 
 
 def _where(piece):

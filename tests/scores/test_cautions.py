@@ -73,9 +73,8 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
-def test_what_is_probably_not_meant_is_told_in_a_sentence(case):
-    proxy, target, metrics, expected = CASES[case]
+@pytest.mark.parametrize(("proxy", "target", "metrics", "expected"), CASES.values(), ids=CASES)
+def test_what_is_probably_not_meant_is_told_in_a_sentence(proxy, target, metrics, expected):
     assert any(re.search(expected, line) for line in cautions(proxy, target, metrics))
 
 

@@ -29,10 +29,12 @@ def means(path, metric="success", **how):
 BOTH = "Policy,Sim success (%),Real success (%)\nACT,62,48\npi0,90,85\n"
 
 
-def test_one_table_of_both_sides_gives_each_its_own_column_as_a_share(file):
+def test_one_table_of_both_sides_gives_each_its_own_column_as_a_share_and_patterns_stand_for_columns(file):
     assert means(file(BOTH), side="proxy") == {"ACT": 0.62, "pi0": 0.9}
     assert means(file(BOTH), side="target") == {"ACT": 0.48, "pi0": 0.85}
     assert both_metrics(["Policy", "Sim success (%)", "Real success (%)", "Real n", "Sim n"]) == ["success"]
+    expanded = expand(["task_*:max", "time:min"], ["agent", "task_a", "task_b", "time"])
+    assert expanded == ["task_a:max", "task_b:max", "time:min"]
 
 
 @pytest.mark.parametrize("cell", ["120", "-20", "100.5%"])
@@ -58,14 +60,11 @@ def test_counts_become_a_row_a_rollout(file, text):
     assert not table.complete  # rollouts of two agents are no pairs
 
 
-def test_standard_errors_are_read_from_cells_and_from_a_column(file):
+def test_standard_errors_are_read_from_cells_or_a_column_and_a_lerobot_folder_is_a_row_a_rollout(file):
     for text in ("success\na,0.61 ± 0.05\nb,20 % +/- 4 %\n", "success,success se\na,0.61,0.05\nb,0.2,0.04\n"):
         table = read_scores(file(f"policy,{text}"), ["success"])
         assert np.allclose(table.means[:, 0], [0.61, 0.2])
         assert np.allclose(table.errors[:, 0], [0.05, 0.04])
-
-
-def test_a_folder_of_lerobot_files_is_a_row_a_rollout(file):
     episodes = [{"episode_ix": i, "sum_reward": 1.5, "success": i < 3, "seed": 7 + i} for i in range(4)]
     file({"per_episode": episodes, "aggregated": {"pc_success": 75.0}}, "evals/act/eval_info.json")
     tasks = [{"task_group": "t", "task_id": 0, "metrics": {"successes": [True, False], "sum_rewards": [1.0, 0.0]}}]
@@ -105,8 +104,3 @@ def test_dictionaries_in_a_python_file_are_read_and_nothing_is_run(file, tmp_pat
 )
 def test_what_is_wrong_is_one_line(file, name, text, complaint):
     assert complaint in complaint_of(read_scores, file(text, name), ["success"])
-
-
-def test_patterns_stand_for_columns():
-    expanded = expand(["task_*:max", "time:min"], ["agent", "task_a", "task_b", "time"])
-    assert expanded == ["task_a:max", "task_b:max", "time:min"]

@@ -22,15 +22,12 @@ def test_a_table_keeps_episodes_counts_and_means(csv):
     assert not table.complete
 
 
-def test_only_the_metrics_asked_for_are_read_of_domains_apart(csv):
+def test_only_the_metrics_asked_for_are_read_of_domains_apart_whatever_a_spreadsheet_marks(csv):
     table = read_scores(csv("agent,comment,distance\nA,fine,1\nB,,2\n"), ["distance"])
     assert table.means[:, 0].tolist() == [1.0, 2.0]
     path = csv("domain,agent,distance\nsim,A,1\nreal,A,2\n")
     assert list(read_domains(path, ["distance"])) == ["sim", "real"]
     assert read_scores(path, ["distance"], "real").means[0, 0] == 2.0
-
-
-def test_spreadsheets_marks_are_understood(csv):
     table = read_scores(csv(b"\xef\xbb\xbfagent, episode ,distance\r\nA,1, 1.5\r\n\r\nB,1,2\r\n"), ["distance"])
     assert table.means[:, 0].tolist() == [1.5, 2.0]
 
@@ -89,16 +86,7 @@ def test_the_domain_must_be_chosen_and_known(csv, tmp_path):
         read_scores(tmp_path, ["distance"])
 
 
-def test_writing_gives_the_same_bytes_and_reading_the_same_values(csv, tmp_path):
-    table = read_scores(csv(GOOD.replace("1.5", "0.1")), ["distance", "time"])
-    write_scores(table, tmp_path / "one.csv")
-    write_scores(read_scores(tmp_path / "one.csv", ["distance", "time"]), tmp_path / "two.csv")
-    assert (tmp_path / "one.csv").read_bytes() == (tmp_path / "two.csv").read_bytes()
-    written = "agent,episode,distance,time\nA,1,0.1,10.0\nA,2,2.5,20.0\nB,1,3.0,30.0\n"
-    assert (tmp_path / "one.csv").read_text() == written
-
-
-def test_a_table_that_cannot_be_written_leaves_nothing_behind(csv, tmp_path):
+def test_what_cannot_be_written_leaves_nothing_behind_and_else_bytes_and_values_are_the_same(csv, tmp_path):
     table = read_scores(csv(GOOD), ["distance"])
     (tmp_path / "folder").mkdir()
     with pytest.raises(ScoresError, match="cannot be written"):
@@ -106,6 +94,11 @@ def test_a_table_that_cannot_be_written_leaves_nothing_behind(csv, tmp_path):
     with pytest.raises(ScoresError, match="cannot be written"):
         write_scores(table, tmp_path / "folder")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["folder", "scores.csv"]
+    write_scores(read_scores(csv(GOOD.replace("1.5", "0.1")), ["distance", "time"]), tmp_path / "one.csv")
+    write_scores(read_scores(tmp_path / "one.csv", ["distance", "time"]), tmp_path / "two.csv")
+    assert (tmp_path / "one.csv").read_bytes() == (tmp_path / "two.csv").read_bytes()
+    written = "agent,episode,distance,time\nA,1,0.1,10.0\nA,2,2.5,20.0\nB,1,3.0,30.0\n"
+    assert (tmp_path / "one.csv").read_text() == written
 
 
 @pytest.mark.parametrize(
@@ -125,12 +118,7 @@ def test_separators_decimals_and_names_of_columns_are_the_user_s(csv, text):
     assert table.means[:, 0].tolist() == [2.0, 3.0]
 
 
-def test_a_name_in_a_column_map_that_no_file_has_is_refused(csv):
-    with pytest.raises(ScoresError, match="no column 'trail' for 'episode'; did you mean 'trial'"):
-        read_scores(csv("agent,trial,distance\nA,1,2\n"), ["distance"], columns={"episode": "trail"})
-
-
-def test_several_files_make_one_table(csv):
+def test_several_files_make_one_table_and_a_name_in_a_column_map_that_no_file_has_is_refused(csv):
     whole = read_scores(csv(GOOD), ["distance"])
     one, two = csv("agent,episode,distance\nA,1,1.5\n", "one.csv"), "agent;episode;distance\nA;2;2,5\nB;1;3\n"
     table = read_scores([one, csv(two, "two.csv")], ["distance"])
@@ -139,3 +127,5 @@ def test_several_files_make_one_table(csv):
         read_scores([one, csv("agent,episode,distance\nA,1,2\n", "two.csv")], ["distance"])
     with pytest.raises(ScoresError, match=r"two.csv: has no column 'episode', which .*one.csv has; add it"):
         read_scores([one, csv("agent,distance\nB,2\n", "two.csv")], ["distance"])
+    with pytest.raises(ScoresError, match="no column 'trail' for 'episode'; did you mean 'trial'"):
+        read_scores(csv("agent,trial,distance\nA,1,2\n"), ["distance"], columns={"episode": "trail"})

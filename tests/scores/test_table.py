@@ -5,8 +5,9 @@ A table is built from finished episodes, and keeps values with their names.
 
 import numpy as np
 import pytest
+from one_line import complaint_of
 
-from proxytune.errors import InputError, ScoresError
+from proxytune.errors import ScoresError
 from proxytune.scores import Metric, ScoreTable, varies
 
 
@@ -28,8 +29,7 @@ def test_a_metric_is_read_from_its_text_and_written_back(text, metric):
     "text", ["", "distance", "distance:up", "a:max:", "a:max:x", "a:max:5%%", "a:max:-1", "a:max:nan"]
 )
 def test_a_malformed_metric_is_refused_by_name(text):
-    with pytest.raises(InputError, match=r"metric '"):
-        Metric.parse(text)
+    assert "metric '" in complaint_of(Metric.parse, text)
 
 
 def test_percentages_merits_and_rounding_are_of_each_table():
@@ -42,7 +42,7 @@ def test_percentages_merits_and_rounding_are_of_each_table():
     assert varies(np.array([[0.3, 1.0], [0.1 + 0.2, 2.0]])).tolist() == [False, True]
 
 
-def test_tables_are_built_and_arranged_with_their_names():
+def test_tables_are_built_and_arranged_with_their_names_and_an_unknown_metric_is_refused():
     table = ScoreTable.from_episodes({("A", 1): {"m": 1.0}, ("B", 1): {"m": 2.0}, ("A", 2): {"m": 3.0}})
     assert table.means[:, 0].tolist() == [2.0, 2.0]
     assert table.driven.tolist() == [[True, True], [True, False]]
@@ -53,6 +53,9 @@ def test_tables_are_built_and_arranged_with_their_names():
     loose = table.unpaired()
     assert loose.driven.sum(axis=0).tolist() == [1, 1, 1]
     np.testing.assert_array_equal(loose.means, table.means)
+    table = ScoreTable.from_episodes({("A", 1): {"distance": 1.0}})
+    with pytest.raises(ScoresError, match="no metric 'distanz' in the scores; did you mean 'distance'"):
+        table.select(["distanz"])
 
 
 @pytest.mark.parametrize(
@@ -61,12 +64,6 @@ def test_tables_are_built_and_arranged_with_their_names():
 def test_episodes_without_a_finite_score_are_refused(scored):
     with pytest.raises(ScoresError):
         ScoreTable.from_episodes(scored)
-
-
-def test_an_unknown_metric_is_refused_with_the_nearest_name():
-    table = ScoreTable.from_episodes({("A", 1): {"distance": 1.0}})
-    with pytest.raises(ScoresError, match="no metric 'distanz' in the scores; did you mean 'distance'"):
-        table.select(["distanz"])
 
 
 def test_agents_with_too_many_episodes_of_their_own_are_refused_before_they_fill_the_memory():

@@ -21,7 +21,7 @@ def planted(values):
     return 20.0 * values[0] + 5.0 * values[1]
 
 
-def test_shares_are_those_of_terms_or_of_parameters_together():
+def test_shares_are_those_of_terms_or_of_parameters_together_and_next_to_none_of_a_dead_one():
     for importance, share in zip(found(planted, 60), (0.8, 0.2, 0.0), strict=True):
         assert importance.share == pytest.approx(share, abs=0.02)
         assert importance.alone == pytest.approx(importance.share, abs=0.02)
@@ -29,9 +29,6 @@ def test_shares_are_those_of_terms_or_of_parameters_together():
     assert min(strong.share, weak.share) > 0.9
     assert max(strong.alone, weak.alone) < 0.1
     assert dead.share < 0.05
-
-
-def test_a_dead_parameter_or_a_constant_score_has_next_to_no_share():
     noise = np.random.default_rng(1)
     strong, weak, dead = found(lambda values: planted(values) + noise.normal(0.0, 2.0), 60)
     assert dead.share < 0.05
@@ -93,7 +90,7 @@ def test_the_region_holds_the_truth_and_is_small():
         assert {name: low < high for name, (low, high) in one.intervals.items()} == {"delay": True, "trim": True}
 
 
-def test_the_answer_is_the_visited_theta_of_lowest_expected_score():
+def test_the_answer_has_the_lowest_expected_score_with_what_is_as_good_and_who_tells_of_a_parameter():
     one = known(3)
     visited = [trial.values for trial in one.trials]
     assert one.answer in visited
@@ -101,39 +98,25 @@ def test_the_answer_is_the_visited_theta_of_lowest_expected_score():
     halves = {t.values: (t.score + c) / 2 for t, c in zip(one.trials, composed, strict=True)}
     assert one.expected == pytest.approx(halves)
     assert one.answer == min(halves, key=halves.__getitem__)
-
-
-def test_what_cannot_be_told_from_the_answer_is_round_it_and_not_everything():
-    one = known(3)
     share, ends = one.as_good
     assert 0.0 < share < 0.5
     for name, value in zip(SPACE.names, one.answer, strict=True):
         assert ends[name][0] <= value <= ends[name][1]
-
-
-def test_who_is_sensitive_to_a_parameter_tells_of_it():
     delay, trim = known(3).information
     assert dict(delay.agents)["agent0"] > 0.3
     assert dict(delay.agents)["agent1"] < 0.02
     assert dict(trim.agents)["agent1"] > 0.3
     for one in (delay, trim):
         assert sum(share for _, share in one.agents) == pytest.approx(1.0)
-
-
-@pytest.mark.slow
-def test_a_parameter_of_which_no_output_tells_is_unidentified():
-    assert known(3, count=32, lost=(1, 2, 3)).unidentified == ("trim",)
-    assert known(3).unidentified == ()
-
-
-@pytest.mark.slow
-def test_few_trials_limit_what_is_told_and_with_many_it_is_noise():
-    assert {one.limit for one in known(3, count=5).information} == {"trials"}
-    assert {one.limit for one in known(3, count=48).information} == {"starts"}
-
-
-def test_fresh_scores_spread_round_what_is_expected():
     one = known(5)
     drawn = one.fresh_scores(one.answer)
     assert drawn.std() > 0.0
     assert np.percentile(drawn, 2.5) < one.expected[one.answer] < np.percentile(drawn, 97.5)
+
+
+@pytest.mark.slow
+def test_few_trials_limit_what_is_told_then_noise_and_without_any_output_it_is_unidentified():
+    assert {one.limit for one in known(3, count=5).information} == {"trials"}
+    assert {one.limit for one in known(3, count=48).information} == {"starts"}
+    assert known(3, count=32, lost=(1, 2, 3)).unidentified == ("trim",)
+    assert known(3).unidentified == ()

@@ -30,8 +30,7 @@ def likelihood(values=None, noise=1e-4):
 
 def test_outputs_count_by_what_they_tell_of_the_truth():
     grid = np.stack(np.meshgrid(np.linspace(0, 1, 41), np.linspace(0, 1, 41)), axis=-1).reshape(-1, 2)
-    best = grid[np.argmax(likelihood().log(grid))]
-    assert best == pytest.approx(to_unit(SPACE, TRUTH), abs=0.05)
+    assert grid[np.argmax(likelihood().log(grid))] == pytest.approx(to_unit(SPACE, TRUTH), abs=0.05)
     part = (*outputs(TRUTH)[:2], np.nan, np.nan)
     assert likelihood(part).columns.tolist() == [0, 1]
     assert np.isfinite(likelihood(part).log(np.array([[0.5, 0.5]]))).all()
@@ -51,8 +50,7 @@ def test_copies_of_one_output_count_as_one(copies, seed):
 
 
 def test_holes_and_outputs_far_off_or_still_change_little():
-    base = np.random.default_rng(0).normal(size=(60, 3))
-    errors = np.repeat(base, 4, axis=1)
+    errors = np.repeat(np.random.default_rng(0).normal(size=(60, 3)), 4, axis=1)
     holes = np.where(np.random.default_rng(1).random(errors.shape) < 0.3, np.nan, errors)
     assert temper(errors) == pytest.approx(4.0, abs=0.3)
     assert temper(holes) == pytest.approx(4.0, abs=0.6)
@@ -86,7 +84,7 @@ def trials(count, seed=1):
 HELD_OUT = [design_point(SPACE, index, 9) for index in range(64)]
 
 
-def test_smooth_outputs_are_predicted_where_no_trial_was_and_others_are_not_trusted():
+def test_smooth_outputs_are_predicted_with_errors_as_their_variance_says_and_others_not_trusted():
     model = fit_outputs(SPACE, trials(32))
     mean, _ = model.predict(unit_array(SPACE, HELD_OUT))
     truth = np.array([five_outputs(values) for values in HELD_OUT])
@@ -96,20 +94,11 @@ def test_smooth_outputs_are_predicted_where_no_trial_was_and_others_are_not_trus
     assert model.rough[2] > 10.0 * model.rough[0]
     assert np.isnan(mean[:, 3]).all()
     assert model.constant[3] == 60.0
-
-
-def test_each_output_s_errors_are_as_large_as_its_variance_says():
-    model = fit_outputs(SPACE, trials(32))
     mean, variance = model.predict(unit_array(SPACE, HELD_OUT))
-    truth = np.array([five_outputs(values) for values in HELD_OUT])
     squares = np.mean((truth - mean)[:, :3] ** 2 / (variance + model.rough)[:, :3], axis=0)
     assert (squares > 0.05).all()
     assert (squares < 5.0).all()
-
-
-def test_an_output_that_the_kernel_does_not_suit_gets_more_variance_than_one_that_it_does():
-    model = fit_outputs(SPACE, trials(32))
-    share = model.rough / np.nanvar([trial.outcome for trial in trials(32)], axis=0)
+    share = fit_outputs(SPACE, trials(32)).rough / np.nanvar([trial.outcome for trial in trials(32)], axis=0)
     assert share[2] > 3.0 * share[0]
 
 
@@ -135,7 +124,7 @@ def better(values):
     return tuple(value + 0.5 + 0.4 * first - 0.3 * second for value in cheaper(values))
 
 
-def test_few_trials_correct_a_cheaper_proxy():
+def test_few_trials_correct_a_cheaper_proxy_and_one_that_does_something_else_makes_no_promise():
     """Eight trials and what a cheaper proxy does predict better than eight alone, and say how well."""
     own = [Trial(values, 1.0, better(values)) for values in (design_point(SPACE, index, 1) for index in range(8))]
     points = [design_point(SPACE, index, 2) for index in range(64)]
@@ -146,10 +135,7 @@ def test_few_trials_correct_a_cheaper_proxy():
     assert np.abs(mean - truth).mean() < 0.2 * np.abs(alone - truth).mean()
     assert 0.1 < np.sqrt(((mean - truth) ** 2 / (variance + both.rough)).mean()) < 1.5
     assert both.visited.shape == (8, 2)
-
-
-def test_a_cheaper_proxy_that_does_something_else_makes_no_promise():
-    """What it says is not believed: errors are as large as the model says."""
+    # What it says is not believed: errors are as large as the model says.
     own = [Trial(values, 1.0, better(values)) for values in (design_point(SPACE, index, 1) for index in range(12))]
     draws = np.random.default_rng(1).normal(0.0, 2.0, (64, 2))
     points = [design_point(SPACE, index, 2) for index in range(64)]

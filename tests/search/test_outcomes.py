@@ -21,16 +21,13 @@ def told(values):
     return Trial(values, float(needle(np.array(values))), values)
 
 
-def test_it_finds_at_once_what_the_score_alone_does_not_show():
+def test_it_finds_what_the_score_alone_does_not_show_by_draws_that_agree_with_outcomes_and_failed_ones():
     for seed in range(3):
         trials = [told(design_point(SPACE, index, seed)) for index in range(10)]
         assert {trial.score for trial in trials} == {10.0}
         for _ in range(3):
             trials.append(told(Composite(goal(needle, (0.1, 0.1))).propose(SPACE, trials, seed)))
         assert min(trial.score for trial in trials) == 0.0
-
-
-def test_failed_trials_and_outputs_that_never_change_do_no_harm():
     trials = [Trial((0.1, 0.0), 3.0, (1.0,)), Trial((0.2, 0.0), None), Trial((0.3, 0.0), 8.0, (2.0,))]
     counted = [(trial.score, trial.outcome) for trial in with_failures_as_worst(trials)]
     assert counted == [(3.0, (1.0,)), (8.0, (2.0,)), (8.0, (2.0,))]
@@ -38,9 +35,6 @@ def test_failed_trials_and_outputs_that_never_change_do_no_harm():
     more = [Trial(trial.values, trial.score, (*trial.outcome, 60.0)) for trial in trials]
     plain, with_constant = Composite(WHOLE), Composite(goal(whole, (0.0, 60.0)))
     assert with_constant.propose(SPACE, more, 1) == pytest.approx(plain.propose(SPACE, trials, 1), abs=0.1)
-
-
-def test_draws_agree_with_the_outcomes_at_visited_points_and_spread_elsewhere():
     visited = np.random.default_rng(1).uniform(0.0, 0.4, (30, 2))
     box = Space((Interval("delay", 0.0, 1.0), Interval("trim", 0.0, 1.0)))
     known = [Trial((a, b), 0.0, (100.0 + a, b)) for a, b in visited.tolist()]
@@ -69,8 +63,7 @@ def ranks(values):
 
 def searched(engine, seed, budget=14):
     truth = from_unit(SPACE, np.random.default_rng(seed).uniform(0.2, 0.8, 2))
-    target = goal(flips(truth), outputs(truth), 1e-4)
-    proposer, trials = make_proposer(engine, 6, target), []
+    proposer, trials = make_proposer(engine, 6, goal(flips(truth), outputs(truth), 1e-4)), []
     for _ in range(budget):
         values = proposer.propose(SPACE, trials, seed)
         trials.append(Trial(values, float(flips(truth)(outputs(values))), tuple(outputs(values).tolist())))

@@ -34,17 +34,14 @@ def planted():
     return fleet(40, (0.1, 0.0))
 
 
-def test_mean_and_spread_are_told(planted):
+def test_mean_and_spread_are_told_and_robots_that_are_alike_have_none_of_their_measurements(planted):
     """The truth lies in both 95 % intervals, and the spread's middle is within a quarter of it."""
     _, _, found = planted
     mean, deviation = summary_of(found.mean), summary_of(found.deviation)
     assert np.all((mean[0] < 0.5) & (mean[2] > 0.5))
     assert deviation[0, 0] < 0.1 < deviation[2, 0]
     assert deviation[1, 0] == pytest.approx(0.1, rel=0.25)
-
-
-def test_robots_that_are_alike_have_no_spread_of_their_measurements(planted):
-    """Measured values spread by 0.05; between robots less than half of that is told, perhaps nothing."""
+    # Measured values spread by 0.05; between robots less than half of that is told, perhaps nothing.
     _, measured, found = planted
     low, middle, high = summary_of(found.deviation)[:, 1]
     assert measured[:, 1].std() > 0.04
@@ -78,7 +75,7 @@ def test_few_robots_have_intervals_that_hold_the_truth(monkeypatch):
     assert np.all(held >= 27)
 
 
-def test_parameters_that_go_together_are_told():
+def test_parameters_that_go_together_are_told_and_what_no_robot_tells_stays_open():
     """A planted correlation of 0.9 has an interval well above 0."""
     rng = np.random.default_rng(1)
     shared = rng.standard_normal((30, 1))
@@ -87,10 +84,7 @@ def test_parameters_that_go_together_are_told():
     low, middle, high = summary_of(found.correlation)[:, 0, 1]
     assert 0.4 < low < 0.9 < high
     assert middle == pytest.approx(0.9, abs=0.2)
-
-
-def test_what_no_robot_tells_stays_open():
-    """Where every value in the box explains each robot, the mean may be anywhere and the spread as well be large."""
+    # Where every value in the box explains each robot, the mean may be anywhere and the spread as well be large.
     found = population_of([posterior(np.array([0.4 + 0.05 * row, 0.5]), 2.0) for row in range(4)])
     low, _, high = summary_of(found.next_robot)[:, 1]
     assert high - low > 0.7

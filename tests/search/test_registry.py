@@ -82,9 +82,15 @@ def made(engine, initial):
 
 
 @pytest.mark.parametrize("engine", HERE)
-def test_every_engine_begins_with_the_same_design(engine):
+def test_every_engine_begins_with_the_same_design_and_proposes_what_is_new_by_its_seed(engine):
     trials = search(made(engine, 4), 4, seed=9)
     assert [trial.values for trial in trials] == [design_point(SPACE, index, 9) for index in range(4)]
+    # Also where the best is at a corner of the box.
+    trials = search(made(engine, 3), 8, seed=1, score=lambda values: -100 * values[0] - values[1])
+    assert len({trial.values for trial in trials}) == 8
+    told = [Trial(design_point(SPACE, index, 1), float(index), (float(index),)) for index in range(3)]
+    proposer = made(engine, 3)
+    assert proposer.propose(SPACE, told, 1) != proposer.propose(SPACE, told, 2)
 
 
 @pytest.mark.parametrize(
@@ -93,20 +99,6 @@ def test_every_engine_begins_with_the_same_design(engine):
 )
 def test_every_engine_keeps_what_engines_promise(engine):
     check_engine(engine_of(engine))
-
-
-@pytest.mark.parametrize("engine", HERE)
-def test_every_proposal_is_a_new_one(engine):
-    """Also where the best is at a corner of the box."""
-    trials = search(made(engine, 3), 8, seed=1, score=lambda values: -100 * values[0] - values[1])
-    assert len({trial.values for trial in trials}) == 8
-
-
-@pytest.mark.parametrize("engine", HERE)
-def test_another_seed_gives_another_search(engine):
-    told = [Trial(design_point(SPACE, index, 1), float(index), (float(index),)) for index in range(3)]
-    proposer = made(engine, 3)
-    assert proposer.propose(SPACE, told, 1) != proposer.propose(SPACE, told, 2)
 
 
 @pytest.mark.slow
@@ -154,14 +146,6 @@ def test_an_engine_is_told_of_a_failed_trial_as_the_worst_and_only_after_the_des
     assert inner.told == [3.0, 8.0, 8.0]
 
 
-def test_random_and_sobol_learn_nothing_and_unknown_ones_are_refused():
-    for engine in ("random", "sobol"):
-        low, high = (search(made(engine, 2), 6, 1, score) for score in (steps, lambda values: 100.0))
-        assert [trial.values for trial in low] == [trial.values for trial in high]
-    told = complaint_of(make_proposer, "sobool", 3)
-    assert "unknown engine 'sobool' (your own is written module:attribute); did you mean 'sobol'" in told
-
-
 @pytest.mark.skipif(not HAS_OPTUNA, reason="Optuna is not installed")
 def test_tpe_learns_from_the_scores_and_says_nothing(capfd):
     low, high = (search(make_proposer("tpe", 4), 12, 1, score) for score in (steps, lambda v: -steps(v)))
@@ -194,22 +178,25 @@ def test_no_other_engine_needs_these_libraries(monkeypatch):
             assert len(made(engine, 3).propose(SPACE, told, 1)) == 2
 
 
-def test_every_engine_that_is_not_refused_can_be_made_and_its_code_has_a_name_of_its_own():
+def test_every_engine_not_refused_can_be_made_by_code_of_its_own_and_random_and_sobol_learn_nothing():
     digests = [engine_code(engine) for engine in ENGINE_NAMES]
     assert len(set(digests)) == len(set(ENGINE_NAMES)) == len(ENGINES)
     assert [engine_of(name) for name in ENGINE_NAMES] == list(ENGINES)
     for engine in ENGINE_NAMES:
         if not why_not(engine, composed=True):
             assert made(engine, 3).initial == 3
+    for engine in ("random", "sobol"):
+        low, high = (search(made(engine, 2), 6, 1, score) for score in (steps, lambda values: 100.0))
+        assert [trial.values for trial in low] == [trial.values for trial in high]
+    told = complaint_of(make_proposer, "sobool", 3)
+    assert "unknown engine 'sobool' (your own is written module:attribute); did you mean 'sobol'" in told
 
 
 def test_an_engine_in_a_file_of_ones_own_is_found_beside_and_goes_by_the_name_it_was_asked_for(tmp_path):
     (tmp_path / "mine.py").write_text("from proxytune.search.engine import SOBOL as ENGINE\nNONE = 3\n")
     assert engine_of("mine:ENGINE", tmp_path) == replace(engine_of("sobol"), name="mine:ENGINE")
-    with pytest.raises(InputError, match="engine 'mine:NONE' is a int; make it a proxytune"):
-        engine_of("mine:NONE", tmp_path)
-    with pytest.raises(InputError, match="engine 'nowhere:ENGINE': no module 'nowhere' installed"):
-        engine_of("nowhere:ENGINE")
+    assert "engine 'mine:NONE' is a int; make it a proxytune" in complaint_of(engine_of, "mine:NONE", tmp_path)
+    assert "engine 'nowhere:ENGINE': no module 'nowhere' installed" in complaint_of(engine_of, "nowhere:ENGINE")
 
 
 def test_the_code_of_ones_own_engine_is_part_of_what_its_runs_depend_on(tmp_path):

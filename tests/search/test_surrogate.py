@@ -42,8 +42,7 @@ def test_the_posterior_is_the_same_to_the_last_bit_in_whatever_order_trials_are_
 def test_the_incumbent_is_not_the_luckiest_and_points_are_of_the_unit_cube():
     """One freak zero among high scores does not win over a valley of low ones."""
     trials = visited(40)
-    far = max(trials, key=lambda trial: trial.score)
-    lucky = Trial(tuple(value + 1e-3 for value in far.values), 0.0)
+    lucky = Trial(tuple(value + 1e-3 for value in max(trials, key=lambda trial: trial.score).values), 0.0)
     values, mean = fit_surrogate(SPACE, [*trials, lucky]).incumbent()
     assert values != lucky.values
     assert steps(values) <= 3
@@ -52,23 +51,23 @@ def test_the_incumbent_is_not_the_luckiest_and_points_are_of_the_unit_cube():
     assert unit_array(SPACE, []).shape == (0, 2)
 
 
-def test_noise_never_vanishes_and_the_posterior_is_surer_where_trials_are():
+def test_noise_never_vanishes_length_scales_keep_off_their_bounds_and_failed_trials_are_left_out():
     surrogate = fit_surrogate(SPACE, visited(30, lambda values: 10 * values[0]))
     assert surrogate.model.noise_ > 0.0099
-    trials = [trial for trial in visited(30) if trial.values[0] < 0.15]
-    surrogate = fit_surrogate(SPACE, trials)
+    surrogate = fit_surrogate(SPACE, [trial for trial in visited(30) if trial.values[0] < 0.15])
     _, at_trials = surrogate.at_visited()
     _, elsewhere = surrogate.predict(np.array([[1.0, 0.0], [1.0, 1.0]]))
     assert at_trials.max() < elsewhere.min()
-
-
-def test_a_few_trials_do_not_send_the_length_scales_to_their_bounds():
-    """Fitted without a prior, some of these are at 0.05 or at 20 widths of the box."""
+    # Fitted without a prior, some of these are at 0.05 or at 20 widths of the box.
     for seed in range(5):
         scores = np.random.default_rng(seed).integers(0, 30, 10).tolist()
         trials = [Trial(design_point(SPACE, index, seed), float(score)) for index, score in enumerate(scores)]
         scales = fit_surrogate(SPACE, trials).model.kernel_.k1.k2.length_scale
         assert 0.1 < min(scales) <= max(scales) < 1.6
+    trials = visited(9)
+    assert len(fit_surrogate(SPACE, [*trials, Trial((0.1, 0.1), None)]).visited) == 9
+    with pytest.raises(RunError, match="no trial has a score"):
+        fit_surrogate(SPACE, [Trial((0.1, 0.1), None)])
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
@@ -77,10 +76,3 @@ def test_a_few_trials_or_equal_scores_still_give_finite_predictions(count):
         mean, deviation = fit_surrogate(SPACE, visited(count, score)).predict(np.array([[0.3, 0.7]]))
         assert np.isfinite(mean).all()
         assert np.isfinite(deviation).all()
-
-
-def test_failed_trials_are_left_out_and_without_a_score_it_says_so():
-    trials = visited(9)
-    assert len(fit_surrogate(SPACE, [*trials, Trial((0.1, 0.1), None)]).visited) == 9
-    with pytest.raises(RunError, match="no trial has a score"):
-        fit_surrogate(SPACE, [Trial((0.1, 0.1), None)])

@@ -54,8 +54,7 @@ def write(folder, skeleton):
 
 @pytest.mark.parametrize("up", [1, -1])
 def test_wheels_mass_and_camera_are_read_and_the_bullet_plant_drives_it_ahead(tmp_path, up):
-    skeleton = robot_from_urdf("rover", urdf(tmp_path, up=up), {"full_speed": 0.4})
-    robot = write(tmp_path, skeleton)
+    robot = write(tmp_path, robot_from_urdf("rover", urdf(tmp_path, up=up), {"full_speed": 0.4}))
     check_body(robot)
     wanted = {"wheel_radius": 0.033, "wheel_distance": 0.16, "mass": 0.91, "full_speed": 0.4, "camera_pitch": 30.0}
     assert {name: robot.figures[name] for name in wanted} == pytest.approx(wanted, rel=1e-4)
@@ -81,11 +80,10 @@ def test_what_was_read_is_said_and_what_a_urdf_cannot_know_is_to_be_edited(tmp_p
 
 def test_the_origin_is_the_middle_of_the_axle_on_the_floor(tmp_path):
     robot = write(tmp_path, robot_from_urdf("rover", urdf(tmp_path), {}))
-    left = read_body(parse_urdf(robot.urdf), robot.urdf).left
-    assert left.centre == pytest.approx((0.0, 0.08, 0.033))
+    assert read_body(parse_urdf(robot.urdf), robot.urdf).left.centre == pytest.approx((0.0, 0.08, 0.033))
 
 
-def test_wheels_that_are_meshes_need_their_radius_and_two_are_no_car(tmp_path):
+def test_wheels_that_are_meshes_need_their_radius_and_two_no_car_and_a_link_may_have_a_quote(tmp_path):
     path = urdf(tmp_path, shape='<mesh filename="wheel.stl"/>')
     with pytest.raises(InputError, match="its wheels are meshes; state their radius: --figures wheel_radius=METRES"):
         robot_from_urdf("rover", path, {})
@@ -93,6 +91,10 @@ def test_wheels_that_are_meshes_need_their_radius_and_two_are_no_car(tmp_path):
     assert "wheel_radius = { value = 0.04," in described
     with pytest.raises(InputError, match="a car needs two joints that steer, found none; call them steer_left and"):
         robot_from_urdf("mine", urdf(tmp_path), {}, "ackermann")
+    path = urdf(tmp_path)
+    path.write_text(path.read_text().replace('"wheel_left"', '"wheel\'s left"'))
+    assert read_body(parse_urdf(path), path).left.radius_m == 0.033
+    assert "wheel's left" in robot_from_urdf("rover", path, {}).files["rover.urdf"]
 
 
 def test_what_is_stated_goes_before_the_urdf_save_for_the_wheels(tmp_path):
@@ -108,13 +110,6 @@ def test_what_is_stated_goes_before_the_urdf_save_for_the_wheels(tmp_path):
     assert "mass" not in skeleton.notes[0]
 
 
-def test_a_link_may_have_a_quote_in_its_name(tmp_path):
-    path = urdf(tmp_path)
-    path.write_text(path.read_text().replace('"wheel_left"', '"wheel\'s left"'))
-    assert read_body(parse_urdf(path), path).left.radius_m == 0.033
-    assert "wheel's left" in robot_from_urdf("rover", path, {}).files["rover.urdf"]
-
-
 @pytest.mark.parametrize("number", ["-0.02 0 0.03", "-0.03 0 0.07", "0 0 0.01"])
 @pytest.mark.parametrize("wrong", ["a b c", "1 2"])
 def test_a_number_that_is_none_is_one_line(tmp_path, number, wrong):
@@ -128,8 +123,7 @@ def test_a_number_that_is_none_is_one_line(tmp_path, number, wrong):
 
 def test_the_joints_of_a_car_are_found_and_named_and_its_wheelbase_is_read(tmp_path):
     text = robot_skeleton("other", {"wheelbase": 0.31, "wheel_distance": 0.2}, "ackermann").files["other.urdf"]
-    renamed = {"axle": "rear_wheel_joint", "steer": "hinge", "hub": "front_wheel_joint"}
-    for name, other in renamed.items():
+    for name, other in {"axle": "rear_wheel_joint", "steer": "hinge", "hub": "front_wheel_joint"}.items():
         text = text.replace(f'joint name="{name}_', f'joint name="{other}_')
     (tmp_path / "other.urdf").write_text(text, encoding="utf-8")
     skeleton = robot_from_urdf("rover", tmp_path / "other.urdf", {}, "ackermann")

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
+from one_line import complaint_of
 
 from proxytune.driving import UNITS, BulletPlant, drivetrain, read_robot
 from proxytune.driving.plants import PlanarPlant, check_body
@@ -62,12 +63,10 @@ def test_guesses_alone_are_marked_to_be_edited_and_the_six_figures_stand_first()
 
 
 def test_a_figure_that_it_does_not_have_is_refused():
-    with pytest.raises(InputError, match="no figure 'wheel'; did you mean"):
-        robot_skeleton("rover", {"wheel": 1.0})
+    assert "no figure 'wheel'; did you mean" in complaint_of(robot_skeleton, "rover", {"wheel": 1.0})
     with pytest.raises(InputError, match="camera_pitch must be at most 45 deg, got 50"):
         robot_skeleton("rover", {"camera_pitch": 50.0})
-    with pytest.raises(InputError, match="mass must be above 0 and finite, got 0"):
-        robot_skeleton("rover", {"mass": 0.0})
+    assert "mass must be above 0 and finite, got 0" in complaint_of(robot_skeleton, "rover", {"mass": 0.0})
 
 
 SMALL_CAR = {"wheelbase": 0.17, "wheel_distance": 0.12}

@@ -127,7 +127,7 @@ def facts_in(connection):
     return version, connection.execute("SELECT key, value, source FROM facts").fetchall()
 
 
-def test_the_next_format_reads_this_one_as_it_is_and_converts_it_when_it_writes(with_next_format):
+def test_the_next_format_reads_this_one_converts_it_when_it_writes_and_takes_nothing_damaged(with_next_format):
     before = with_next_format.read_bytes()
     connection = connect(with_next_format, writable=False)
     assert facts_in(connection) == (FORMAT + 1, [("seed", "1", "here")])
@@ -138,9 +138,6 @@ def test_the_next_format_reads_this_one_as_it_is_and_converts_it_when_it_writes(
     assert facts_in(connection) == (FORMAT + 1, [("seed", "1", "here")])
     connection.close()
     assert with_next_format.read_bytes() != before
-
-
-def test_the_next_format_takes_nothing_that_is_damaged_from_this_one(with_next_format):
     with sqlite3.connect(with_next_format) as plain:
         plain.execute("UPDATE facts SET value = '2'")
     for writable in (False, True):
@@ -166,9 +163,8 @@ NONE = {
 }
 
 
-@pytest.mark.parametrize("case", NONE)
-def test_what_is_no_whole_database_is_refused_and_not_begun_anew(tmp_path, case):
-    make, expected = NONE[case]
+@pytest.mark.parametrize(("make", "expected"), NONE.values(), ids=NONE)
+def test_what_is_no_whole_database_is_refused_and_not_begun_anew(tmp_path, make, expected):
     make(tmp_path / "study.db")
     refused(tmp_path / "study.db", expected)
 
@@ -274,10 +270,9 @@ def test_a_write_that_a_kill_broke_off_is_undone_also_by_who_only_looks_or_repai
 
 
 @pytest.mark.parametrize("writable", [True, False])
-def test_a_journal_that_would_have_another_file_deleted_is_refused(broken_off, tmp_path, writable):
+def test_a_journal_that_would_have_another_file_deleted_is_refused(broken_off, write_file, writable):
     """SQLite takes that for the journal of a write to several databases, and deletes it once all is undone."""
-    victim = tmp_path / "precious"
-    victim.write_text("mine")
+    victim = write_file("mine", "precious")
     name = str(victim).encode()
     numbers = [(1 << 30) // 4096 + 1, len(name), sum(name)]
     place, length, total = (number.to_bytes(4, "big") for number in numbers)
@@ -424,8 +419,7 @@ def test_sweeps_asked_for_again_are_not_missed(tmp_path):
     ],
 )
 def test_what_runs_by_itself_in_a_database_is_refused(tmp_path, statement, what, writable):
-    path = small_study(tmp_path)
-    with sqlite3.connect(path) as plain:
+    with sqlite3.connect(small_study(tmp_path)) as plain:
         plain.executescript(statement)
     with pytest.raises(StoreError, match=what):
         opened(tmp_path, writable)

@@ -25,12 +25,9 @@ def holder(tmp_path):
     process.communicate()
 
 
-def test_a_second_process_is_told_the_first_one_s_id(tmp_path, holder):
+def test_a_second_process_is_told_the_first_one_s_id_and_when_that_is_killed_nothing_is_left(tmp_path, holder):
     with pytest.raises(BusyError, match=rf"another process \(process {holder.pid}\) is running this study"):
         locked(tmp_path).__enter__()
-
-
-def test_locks_of_killed_processes_do_not_stand_in_the_way_and_nothing_is_left(tmp_path, holder):
     holder.send_signal(signal.SIGKILL)
     holder.wait()
     assert (tmp_path / "study.lock").exists()
@@ -43,12 +40,9 @@ def test_locks_of_killed_processes_do_not_stand_in_the_way_and_nothing_is_left(t
         pass
 
 
-def test_the_same_process_cannot_hold_it_twice(tmp_path):
+def test_the_same_process_cannot_hold_it_twice_and_a_folder_that_cannot_be_written_is_told(tmp_path):
     with locked(tmp_path), pytest.raises(BusyError):
         locked(tmp_path).__enter__()
-
-
-def test_a_folder_that_cannot_be_written_is_told(tmp_path):
     with pytest.raises(StoreError, match="cannot be written"):
         locked(tmp_path / "nowhere").__enter__()
 
@@ -61,9 +55,8 @@ def study(tmp_path):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_symbolic_link_in_place_of_what_is_written_to_is_refused_and_not_followed(study, tmp_path, name):
-    victim = tmp_path / "precious"
-    victim.write_text("mine")
+def test_a_symbolic_link_in_place_of_what_is_written_to_is_refused_and_not_followed(study, write_file, name):
+    victim = write_file("mine", "precious")
     (study / name).symlink_to(victim)
     for opening in (locked, Store.open):
         with pytest.raises(StoreError, match=f"{name}: is a symbolic link"), opening(study):
@@ -72,26 +65,29 @@ def test_a_symbolic_link_in_place_of_what_is_written_to_is_refused_and_not_follo
     assert [path.name for path in study.iterdir()] == [name]
 
 
-def test_a_dangling_link_makes_no_file_elsewhere(study, tmp_path):
-    (study / "study.db").symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(StoreError, match="is a symbolic link"), Store.open(study):
-        pass
-    assert not (tmp_path / "elsewhere").exists()
-
-
-def test_a_lock_with_another_name_elsewhere_is_refused(study, tmp_path):
-    victim = tmp_path / "precious"
-    victim.write_text("mine")
+def test_a_lock_with_another_name_elsewhere_is_refused(study, write_file):
+    victim = write_file("mine", "precious")
     os.link(victim, study / "study.lock")
     with pytest.raises(StoreError, match="has another name elsewhere"), locked(study):
         pass
     assert victim.read_text() == "mine"
 
 
-def test_a_lock_that_is_no_file_is_refused(study):
+def test_a_lock_or_database_that_is_no_file_is_refused_and_not_waited_for(study):
     os.mkfifo(study / "study.lock")
     with pytest.raises(StoreError, match="is no file"), locked(study):
         pass
+    os.mkfifo(study / "study.db")
+    for opening in (Store.open, Store.read):
+        with pytest.raises(StoreError, match="is no file"), opening(study):
+            pass
+
+
+def test_a_dangling_link_makes_no_file_elsewhere(study, tmp_path):
+    (study / "study.db").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(StoreError, match="is a symbolic link"), Store.open(study):
+        pass
+    assert not (tmp_path / "elsewhere").exists()
 
 
 def test_a_study_whose_folder_is_reached_by_a_link_is_fine(study, tmp_path):
@@ -116,10 +112,3 @@ def test_a_link_within_what_a_study_makes_is_refused(study, tmp_path, place):
     (study / place).symlink_to(tmp_path)
     with pytest.raises(StoreError, match=f"{place}: is a symbolic link"), Store.open(study):
         pass
-
-
-def test_a_pipe_in_place_of_the_database_is_refused_and_not_waited_for(study):
-    os.mkfifo(study / "study.db")
-    for opening in (Store.open, Store.read):
-        with pytest.raises(StoreError, match="is no file"), opening(study):
-            pass

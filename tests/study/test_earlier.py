@@ -37,16 +37,13 @@ def test_a_bank_says_what_a_target_would_tell(make_study, answered):
     assert again["bank"] == bank
 
 
-def test_more_trials_are_the_same_design_gone_on_with(make_study, answered):
+def test_more_trials_are_the_same_design_gone_on_with_and_starts_needed_follow_from_two_numbers(make_study, answered):
     """A budget that is raised keeps what is there."""
     folder = make_study(**{**BANK, "budget": "6"})
     answered("study", folder)
     make_study(**{**BANK, "budget": "9"})
     assert answered("study", folder)["episodes"]["run"] == 3 * 6 * 3
-
-
-def test_starts_needed_follow_from_two_numbers_of_starts():
-    """What trials leave unknown no start makes less."""
+    # What trials leave unknown no start makes less.
     assert _starts_needed({1: 0.1, 4: 0.05}, 20) == 10
     assert _starts_needed({1: 0.1, 4: 0.1}, 20) is None
 
@@ -148,8 +145,7 @@ def _other_code(folder, shift):
 def test_other_code_that_plays_the_same_counts(beside, make_study):
     """Twelve episodes of a source of other code are driven again; where they come out alike it counts."""
     _other_code(beside, 0.0)
-    report = run_study(make_study(**LEARNS))
-    assert report.document()["earlier"] == 10
+    assert run_study(make_study(**LEARNS)).document()["earlier"] == 10
 
 
 BAD = {
@@ -186,10 +182,9 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("case", BAD)
-def test_a_source_that_is_none_is_refused(case, tmp_path, bank, make_study):
+@pytest.mark.parametrize(("changes", "spoil", "words"), BAD.values(), ids=BAD)
+def test_a_source_that_is_none_is_refused(changes, spoil, words, tmp_path, bank, make_study):
     """One line names the study.toml or the file, the source, what is wrong and what to do."""
-    changes, spoil, words = BAD[case]
     if changes:
         main(["study", str(make_study("bank", **{**BANK, **changes})), "--json"])
     else:
@@ -200,7 +195,7 @@ def test_a_source_that_is_none_is_refused(case, tmp_path, bank, make_study):
     assert "bank" in str(refused.value)
 
 
-def test_a_source_that_is_none_a_bank_without_a_target_and_a_circle_are_refused(make_study):
+def test_a_source_that_is_none_a_bank_without_a_target_also_alone_and_a_circle_are_refused(make_study, beside):
     """No system has such a path: one line, as of any that is not there."""
     with pytest.raises(ProxytuneError, match="no such study or table of trials"):
         run_study(make_study(**{**LEARNS, "learn_from": json.dumps(["a" * 5000])}))
@@ -211,6 +206,9 @@ def test_a_source_that_is_none_a_bank_without_a_target_and_a_circle_are_refused(
     make_study(**{**LEARNS, "learn_from": '["../monday"]'})
     with pytest.raises(ProxytuneError, match="monday: learns from this study in turn"):
         run_study(folder)
+    # Commands that need a target refuse it in one line.
+    with pytest.raises(ProxytuneError, match="target: is missing, so this is a bank"):
+        run_study(beside)
 
 
 SETTINGS = {
@@ -222,17 +220,10 @@ SETTINGS = {
 }
 
 
-@pytest.mark.parametrize("case", SETTINGS)
-def test_settings_that_know_nothing_are_refused(case, make_study):
+@pytest.mark.parametrize(("changes", "words"), SETTINGS.values(), ids=SETTINGS)
+def test_settings_that_know_nothing_are_refused(changes, words, make_study):
     """One line names the key and says what to do."""
-    changes, words = SETTINGS[case]
     assert words in complaint_of(read_study_settings, make_study(**changes))
-
-
-def test_a_bank_is_for_study_alone(beside):
-    """Commands that need a target refuse it in one line."""
-    with pytest.raises(ProxytuneError, match="target: is missing, so this is a bank"):
-        run_study(beside)
 
 
 @pytest.mark.slow
@@ -268,8 +259,7 @@ def test_trials_of_a_cheaper_proxy_are_known_and_are_no_trials(beside, make_stud
 @pytest.mark.slow
 def test_a_study_with_a_cheaper_proxy_goes_on_as_if_it_had_not_stopped(beside, make_study):
     """Five trials and then three more are the same eight."""
-    folder = make_study(domain=OTHER, **{**CHEAPER, "budget": "5"})
-    run_study(folder)
+    run_study(make_study(domain=OTHER, **{**CHEAPER, "budget": "5"}))
     in_two = run_study(make_study(domain=OTHER, **{**CHEAPER, "budget": "8"})).document()
     at_once = run_study(make_study("at_once", domain=OTHER, **{**CHEAPER, "budget": "8"})).document()
     assert in_two["trials"] == at_once["trials"]
@@ -287,22 +277,18 @@ NO_CHEAPER = {
 }
 
 
-@pytest.mark.parametrize("case", NO_CHEAPER)
-def test_a_cheaper_proxy_that_is_none_is_refused(case, beside, make_study):
+@pytest.mark.parametrize(("changes", "domain", "words"), NO_CHEAPER.values(), ids=NO_CHEAPER)
+def test_a_cheaper_proxy_that_is_none_is_refused(changes, domain, words, beside, make_study):
     """One line names the key, what is wrong and what to do."""
-    changes, domain, words = NO_CHEAPER[case]
     assert re.search(words, complaint_of(run_study, make_study(domain=domain, **{**CHEAPER, **changes})))
 
 
-def test_a_cheaper_proxy_takes_the_place_of_half_a_design(make_study):
+def test_a_cheaper_proxy_takes_half_a_design_and_what_its_domain_has_otherwise_is_said_once(make_study, beside):
     """The default of initial is 4 then, and what is written counts."""
     written = [CHEAPER | {"initial": initial} for initial in (None, "6")]
     assert [read_study_settings(make_study(**one)).initial for one in written] == [4, 6]
     assert read_study_settings(make_study(initial=None)).initial == 8
-
-
-def test_what_the_domain_of_a_cheaper_proxy_has_otherwise_is_said_once(beside, make_study):
-    """One line when its trials are copied; then they are a fact."""
+    # One line when its trials are copied; then they are a fact.
     folder = make_study(domain=OTHER, **CHEAPER)
     with Store.open(folder) as store:
         run = StudyRun(open_study(folder), store)

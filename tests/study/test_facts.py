@@ -19,7 +19,7 @@ def versions(monkeypatch):
     monkeypatch.setattr("wobbly.Wobbly.versions", NOW, raising=False)
 
 
-def test_another_version_of_a_package_is_told_by_its_name(make_study, versions, monkeypatch):
+def test_another_version_of_a_package_is_told_by_its_name_unless_the_family_changed(make_study, versions, monkeypatch):
     folder = make_study()
     searched(changed(folder))
     monkeypatch.setattr("wobbly.Wobbly.identity", "wobbly, other PyBullet")
@@ -28,9 +28,6 @@ def test_another_version_of_a_package_is_told_by_its_name(make_study, versions, 
         searched(changed(folder))
     with Store.read(folder) as store:
         assert stored_run(open_study(folder), store).study.identity == "wobbly 1 ()"
-
-
-def test_versions_of_a_family_that_is_told_something_else_go_without_saying(make_study, versions, monkeypatch):
     before = study_facts(open_study(make_study()))
     monkeypatch.setattr("wobbly.Wobbly.versions", {"numpy": "2.0"})
     monkeypatch.setattr("wobbly.Wobbly.identity", "another")

@@ -6,7 +6,7 @@ from several_tuned import compared, family, lesson
 from proxytune.study import BestFamilies, Lesson
 
 
-def test_the_lowest_fresh_prpv_predicts_best_and_a_higher_one_beyond_noise_is_worse():
+def test_the_lowest_fresh_prpv_predicts_best_beyond_noise_and_what_has_no_fresh_episodes_is_left_out():
     found = compared(family("bad", 3), family("good", 0), family("middle", 1))
     assert found.predicts == BestFamilies("good", ())
     assert {(one.better, one.worse, one.value) for one in found.selection.differences} == {
@@ -14,20 +14,14 @@ def test_the_lowest_fresh_prpv_predicts_best_and_a_higher_one_beyond_noise_is_wo
         ("good", "bad", 6),
         ("middle", "bad", 4),
     }
-
-
-def test_a_family_whose_difference_may_be_noise_cannot_be_told_from_the_best():
     found = compared(family("good", 0, noise=8.0), family("noisy", 0, noise=9.0), family("bad", 4))
     assert found.predicts.best in ("good", "noisy")
     assert found.predicts.alike == tuple({"good", "noisy"} - {found.predicts.best})
-
-
-def test_a_family_without_fresh_episodes_is_left_out():
     assert compared(family("none", fresh=False), family("one", 2)).predicts == BestFamilies("one", ())
     assert compared(family("none", fresh=False), family("nor", fresh=False)).predicts == BestFamilies()
 
 
-def test_the_cheapest_is_told_apart_episode_by_episode():
+def test_the_cheapest_is_told_apart_episode_by_episode_and_the_highest_plv_teaches_best():
     hard, easy = (10.0, 1.0, 5.0, 0.1), (20.0, 2.0, 10.0, 0.2)
     found = compared(family("double", seconds=easy), family("single", seconds=hard), family("as long", seconds=hard))
     assert found.cheapest == BestFamilies("single", ("as long",))
@@ -36,9 +30,6 @@ def test_the_cheapest_is_told_apart_episode_by_episode():
     assert other < high
     assert found.times_cheapest("single")["double"] == pytest.approx((2.0, 2.0, 2.0))
     assert low < 4.025 < high
-
-
-def test_the_highest_plv_teaches_best_and_more_samples_beyond_noise_are_worse():
     lessons = {
         "worse": lesson(100.0, (200.0, 50.0, 300.0)),
         "best": lesson(300.0),

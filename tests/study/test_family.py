@@ -60,9 +60,8 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("case", BAD)
-def test_every_mistake_gets_one_line_with_file_and_key(make_study, case):
-    changes, expected = BAD[case]
+@pytest.mark.parametrize(("changes", "expected"), BAD.values(), ids=BAD)
+def test_every_mistake_gets_one_line_with_file_and_key(make_study, changes, expected):
     told = complaint_of(load, make_study(**changes))
     assert expected in told
     assert "study.toml: " in told
@@ -192,23 +191,19 @@ def test_a_study_with_aliases_is_the_study_without_but_for_the_names(aliased, ma
 
 @pytest.mark.slow
 def test_another_agent_behind_an_alias_is_another_study(aliased):
-    folder = aliased(budget="5")
-    run_study(folder)
+    run_study(aliased(budget="5"))
     changed = aliased(TABLE.replace('a5 = "agent5"', 'a5 = "agent0"'), budget="5")
     with pytest.raises(SettingsError, match=r'changed since the first trial: agents.a5 \(was "agent5"\); put it back'):
         run_study(changed)
 
 
-def test_an_unknown_agent_behind_an_alias_is_told_with_its_key(aliased):
-    with pytest.raises(InputError, match=r"study.toml: agents.a5: no agent 'agnet5'; did you mean 'agent5'"):
-        open_study(aliased(TABLE.replace('"agent5"', '"agnet5"')))
-    with pytest.raises(InputError, match=r"agents.a5: must be text in quotes, got 5"):
-        open_study(aliased(TABLE.replace('"agent5"', "5")))
-
-
-def test_measuring_and_driving_know_the_aliases(aliased, tmp_path, answered):
+def test_measuring_and_driving_know_the_aliases_and_an_unknown_agent_behind_one_is_told(aliased, tmp_path, answered):
     folder = aliased()
     (tmp_path / "model.toml").write_text("trim = 0.1\n")
     answered("measure", folder, "--model", tmp_path / "model.toml", "--output", tmp_path / "t.csv")
     assert (tmp_path / "t.csv").read_text().splitlines()[1].startswith("a0,0,")
     assert drive(folder, "a3").scores == drive(folder, "agent3").scores
+    with pytest.raises(InputError, match=r"study.toml: agents.a5: no agent 'agnet5'; did you mean 'agent5'"):
+        open_study(aliased(TABLE.replace('"agent5"', '"agnet5"')))
+    with pytest.raises(InputError, match=r"agents.a5: must be text in quotes, got 5"):
+        open_study(aliased(TABLE.replace('"agent5"', "5")))

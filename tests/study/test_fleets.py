@@ -62,7 +62,7 @@ def undisturbed(make_studies):
 @pytest.mark.parametrize(
     ("most", "jobs"), [(5, 1), *(pytest.param(*one, marks=pytest.mark.slow) for one in ((1, 2), (48, 3)))]
 )
-def test_fleets_of_any_size_and_any_number_of_jobs_give_the_same_document(
+def test_fleets_of_any_size_in_any_jobs_give_the_same_document(
     make_study, undisturbed, capsys, monkeypatch, most, jobs
 ):
     alone, whole = undisturbed(**PHASES)
@@ -98,8 +98,7 @@ def test_an_agent_that_keeps_something_outside_its_memory_is_found_driven_alone_
 @pytest.mark.slow
 def test_what_was_found_of_an_agent_is_known_when_the_study_goes_on(make_study, capsys):
     journal = make_study().parent / "journal"
-    domain = {"faults": '["agent2:*:hides"]', "journal": f'"{journal}"'}
-    first = {**FAMILY, **FEW, "domain": domain}
+    first = {**FAMILY, **FEW, "domain": {"faults": '["agent2:*:hides"]', "journal": f'"{journal}"'}}
     document(make_study(**first), capsys)
     journal.unlink()
     found = document(make_study(**{**first, "budget": "3"}), capsys)
@@ -142,7 +141,7 @@ FAULTS = {
 @pytest.mark.parametrize(
     ("fault", "jobs"), [("raises", "1"), ("exits", "2"), ("leaves", "1"), ("leaves", "2"), ("hangs", "1")]
 )
-def test_what_one_agent_does_wrong_is_said_of_it_alone_and_the_others_score_as_ever(
+def test_what_one_agent_does_wrong_is_said_of_it_alone_others_score_as_ever(
     make_study, undisturbed, launcher, fault, jobs
 ):
     """Of two jobs that hang, joblib's processes are given half a minute more; see tests/running/test_fleets.py."""
@@ -199,7 +198,7 @@ def one_by_one(make_studies):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("keys", "wave"), [({}, 1), ({}, 16), ({}, 1000), ({"batch": "3"}, 16), ({"jobs": "2"}, 16)])
-def test_waves_of_any_size_prune_the_trials_that_agent_by_agent_prunes_at_the_same_agents(
+def test_waves_of_any_size_prune_the_trials_that_agent_by_agent_are_pruned(
     make_study, one_by_one, monkeypatch, wave, keys
 ):
     """Those beside the last agent that was needed are driven in vain, and no trial stands on them."""

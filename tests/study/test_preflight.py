@@ -66,8 +66,7 @@ def edited(folder, edit):
 
 def means_only(rows):
     """One row an agent, as papers print them."""
-    kept = {row.split(",")[0]: row for row in rows}
-    return list(kept.values())
+    return list({row.split(",")[0]: row for row in rows}.values())
 
 
 def other_starts(rows):
@@ -205,10 +204,12 @@ def test_the_trials_are_those_of_a_study_without_it_also_where_they_have_begun(m
     assert (spent.episodes, found) == (0, None)
 
 
-def test_where_every_agent_fails_everywhere_it_says_so_once_and_of_what(make_study):
+def test_where_every_agent_fails_everywhere_it_says_so_once_and_where_failures_stop_they_stop_it_here(make_study):
     faults = ", ".join(f'"agent{number}:*:raises"' for number in range(6))
     with pytest.raises(RunError, match="^agent 'agent0' raised ValueError.*; every agent fails so, in all 72 episodes"):
         run(make_study(preflight="true", domain={"faults": f"[{faults}]"}))
+    with pytest.raises(EpisodeError, match="agent 'agent3'"):
+        run(make_study(preflight="true", domain={"faults": '["agent3:1:raises"]'}, on_failure='"stop"'))
 
 
 def test_where_agents_fail_of_different_things_it_goes_on_and_says_so_once(make_study):
@@ -218,11 +219,6 @@ def test_where_agents_fail_of_different_things_it_goes_on_and_says_so_once(make_
     assert warning.startswith("pre-flight: every agent fails everywhere, first with: the domain family raised Zero")
     assert warning.endswith("; correct it")
     assert all(not movement.pairs and "cannot be tested" in movement.warning for movement in found.movements)
-
-
-def test_where_failures_stop_the_study_they_stop_it_here(make_study):
-    with pytest.raises(EpisodeError, match="agent 'agent3'"):
-        run(make_study(preflight="true", domain={"faults": '["agent3:1:raises"]'}, on_failure='"stop"'))
 
 
 def test_one_line_says_what_is_wrong_with_a_parameter_and_one_metric_that_moves_is_enough(planted):
@@ -248,7 +244,6 @@ def test_a_parameter_that_is_only_one_more_source_of_noise_is_said_to_matter_in_
 MOODY = Deadly(
     faults=("agent1:*:remembers", "agent2:*:draws by NumPy", "agent3:*:draws", "agent4:*:draws by Python"),
 )
-EPISODE = make_episode({}, agent="agent2", start=0, seed=2**40 + 3)
 
 
 @pytest.mark.slow
@@ -288,5 +283,5 @@ def test_the_generators_of_the_process_go_on_as_if_no_episode_had_been_driven():
     expected = np.random.normal(), random.random()
     np.random.seed(1)
     random.seed(1)
-    run_episode(MOODY, EPISODE)
+    run_episode(MOODY, make_episode({}, agent="agent2", start=0, seed=2**40 + 3))
     assert (np.random.normal(), random.random()) == expected

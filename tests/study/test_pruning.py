@@ -47,7 +47,7 @@ def run(folder, **changes):
     return *searched(study), looked_at(study)
 
 
-def test_trials_are_cut_off_after_the_design_and_no_other_episode_is_run(done):
+def test_trials_are_cut_off_after_the_design_and_would_have_scored_no_less_than_their_bounds(done, cutting):
     spent, trials, found = done
     cut = [trial for trial in trials if trial.state == "cut"]
     assert cut
@@ -55,21 +55,17 @@ def test_trials_are_cut_off_after_the_design_and_no_other_episode_is_run(done):
     assert all(3 <= len(trial.decided) + 1 <= 8 and trial.prpv is None for trial in cut)
     assert spent.episodes == found.episodes == BUDGET * ALL - 3 * sum(8 - len(trial.decided) for trial in cut)
     assert found.spared[0] == BUDGET * ALL - spent.episodes
-
-
-def test_a_trial_that_was_cut_off_would_have_scored_no_less_than_its_bound_and_above_the_limit(cutting, done):
     _, trials, found = done
     with Store.open(found.study.settings.folder) as store:
         for trial in trials:
             if trial.state == "cut":
                 limit = pruning_rule(StudyRun(found.study, store), trials[: trial.number - 1]).limit
                 StudyRun(found.study, store).evaluate(trial.theta, "")
-                score = StudyRun(found.study, store).evaluation(trial.theta).prpv
-                assert score >= trial.bound > limit
+                assert StudyRun(found.study, store).evaluation(trial.theta).prpv >= trial.bound > limit
                 assert trial.estimate >= trial.bound
 
 
-def test_a_cut_trial_is_told_by_its_estimate_in_the_search_and_in_plain_sql(done):
+def test_a_cut_trial_is_told_by_its_estimate_and_the_agents_that_tell_most_come_first(done):
     _, trials, found = done
     told = score_trials(found.study.settings.space, trials)
     assert [one.score for one in told] == [t.estimate if t.state == "cut" else t.prpv for t in trials]
@@ -81,6 +77,14 @@ def test_a_cut_trial_is_told_by_its_estimate_in_the_search_and_in_plain_sql(done
     assert [(row[0], row[1], tuple(json.loads(row[2])), *row[3:]) for row in rows] == [
         (trial.number, "{}", trial.decided, trial.bound, trial.estimate) for trial in trials if trial.state == "cut"
     ]
+    with Store.open(found.study.settings.folder) as store:
+        against = pruning_rule(StudyRun(found.study, store), trials)
+        assert pruning_rule(StudyRun(found.study, store), trials[:4]) is None
+    rows = against.disagreement
+    assert sorted(against.order) == sorted(found.study.settings.agents)
+    assert rows[0, 1] == rows.max()
+    assert all(rows[:k, k].sum() >= rows[:k, k + 1 :].sum(axis=0).max() for k in range(1, 7))
+    assert against.limit > min(trial.prpv for trial in trials if trial.prpv is not None)
 
 
 @pytest.mark.parametrize("engine", [pytest.param(name, marks=pytest.mark.slow) for name in ("gp", "random", "sobol")])
@@ -115,8 +119,7 @@ def test_where_a_tolerance_is_a_percentage_no_trial_is_cut_off(cutting):
 
 @pytest.mark.slow
 def test_an_agent_that_always_fails_is_a_failure_and_no_reason_to_cut_off(make_study):
-    folder = make_study(cut_off="true", domain={"faults": '["agent3:1:raises"]'}, budget="9")
-    _, trials, found = run(folder)
+    _, trials, found = run(make_study(cut_off="true", domain={"faults": '["agent3:1:raises"]'}, budget="9"))
     assert {trial.state for trial in trials} <= {"finished", "cut"}
     for trial in trials:
         assert trial.failed_episodes == (not trial.decided or "agent3" in trial.decided)
@@ -129,20 +132,7 @@ def test_the_order_of_agents_in_the_settings_does_not_matter(cutting, done):
     assert run(folder)[1] == done[1]
 
 
-def test_the_agents_that_tell_most_come_first_and_the_limit_is_a_noise_above_the_incumbent(done):
-    _, trials, found = done
-    with Store.open(found.study.settings.folder) as store:
-        against = pruning_rule(StudyRun(found.study, store), trials)
-        assert pruning_rule(StudyRun(found.study, store), trials[:4]) is None
-    rows = against.disagreement
-    assert sorted(against.order) == sorted(found.study.settings.agents)
-    assert rows[0, 1] == rows.max()
-    assert all(rows[:k, k].sum() >= rows[:k, k + 1 :].sum(axis=0).max() for k in range(1, 7))
-    lowest = min(trial.prpv for trial in trials if trial.prpv is not None)
-    assert against.limit > lowest
-
-
-def test_trials_stand_on_decided_agents_and_what_was_spared_is_counted(done):
+def test_trials_and_the_search_stand_on_decided_agents_alone_and_what_was_spared_is_counted(done):
     _, _, found = done
     trial = TrialRecord(1, {"first": 0.0, "second": 0.0}, "cut", decided=("agent2", "agent5"), bound=1.0, score=2.0)
     driven = StudyRun(found.study, None).episodes_of(trial)
@@ -163,10 +153,6 @@ def test_trials_stand_on_decided_agents_and_what_was_spared_is_counted(done):
     ]
     assert episodes == len(missing)
     assert spared_seconds == pytest.approx(sum(missing))
-
-
-def test_of_a_trial_that_was_cut_off_the_search_has_the_decided_agents_outputs_even_where_all_episodes_are_known(done):
-    _, trials, found = done
     cut, study = next(trial for trial in trials if trial.state == "cut"), found.study
     with Store.open(found.study.settings.folder) as store:
         before = StudyRun(found.study, store).search_trial(cut)
@@ -207,9 +193,7 @@ RULES = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("rule", RULES)
-def test_a_rule_stops_a_study_also_when_it_is_run_again_and_without_it_the_trials_are_those_of_one_without(
-    make_study, finished, rule
-):
+def test_a_rule_stops_a_study_also_run_again_and_without_it_trials_are_those_of_one_without(make_study, finished, rule):
     """`no_improvement` waits for the end of the design."""
     rules, count, told = RULES[rule]
     whole, _ = run_of_stopping(ruled(finished))

@@ -71,7 +71,7 @@ def once(finished_once, tmp_path_factory):
     return watcher, *confirmed(folder, watcher)
 
 
-def test_the_answer_is_told_with_its_score_on_episodes_that_the_search_has_not_seen(once):
+def test_the_answer_is_told_by_episodes_not_seen_and_what_is_expected_by_those_it_was_not_chosen_by(once):
     watcher, spent, found = once
     answer = found.confirmation.answer
     assert found.best.trial == answer.trial
@@ -88,6 +88,21 @@ def test_the_answer_is_told_with_its_score_on_episodes_that_the_search_has_not_s
         more + (answer.trial in [one.trial for one in found.confirmation.candidates])
     )
     assert {e.seed for e in set(known) - set(seen)}.isdisjoint(e.seed for e in seen)
+    *_, found = once
+    answer, study, count = found.confirmation.answer, found.study, found.confirmation.repetitions
+    assert 0 < count <= MOST_REPETITIONS
+    scores = []
+    with Store.read(study.settings.folder) as store:
+        study_run = StudyRun(study, store)
+        for number in range(2, 2 + count):
+            planned = plan_episodes(study.settings, answer.trial.theta, fresh_seed(study.settings.seed, number))
+            proxy = score_table(list(study_run.known(planned).values()))
+            scores.append(prpv(compare(proxy=proxy, target=study.target, metrics=study.settings.metrics)).value)
+    value, low, high = found.expected.prpv.value
+    assert value == pytest.approx(sum(scores) / count)
+    assert low <= value <= high
+    assert (found.floor.kind, found.floor.value) == ("same starts", found.expected.prpv.floor.value)
+    assert found.excess.value == pytest.approx(value - found.floor.value)
 
 
 def test_candidates_are_the_lowest_expected_scores_within_the_noise_with_the_likeliest_and_few(finished):
@@ -153,24 +168,6 @@ def test_the_answer_is_the_mean_of_what_trials_and_finalists_tell_unless_prpv_sp
     assert len(twice.trials) == len(before.trials), "what is driven again without any noise tells nothing"
     worse = replace(mean, scores=(1e9,))
     assert _answer([*first, worse], learnt, found.knowledge).trial in [one.trial for one in first]
-
-
-def test_what_is_expected_of_the_answer_is_the_mean_of_repetitions_that_nothing_was_chosen_by(once):
-    *_, found = once
-    answer, study, count = found.confirmation.answer, found.study, found.confirmation.repetitions
-    assert 0 < count <= MOST_REPETITIONS
-    scores = []
-    with Store.read(study.settings.folder) as store:
-        study_run = StudyRun(study, store)
-        for number in range(2, 2 + count):
-            planned = plan_episodes(study.settings, answer.trial.theta, fresh_seed(study.settings.seed, number))
-            proxy = score_table(list(study_run.known(planned).values()))
-            scores.append(prpv(compare(proxy=proxy, target=study.target, metrics=study.settings.metrics)).value)
-    value, low, high = found.expected.prpv.value
-    assert value == pytest.approx(sum(scores) / count)
-    assert low <= value <= high
-    assert (found.floor.kind, found.floor.value) == ("same starts", found.expected.prpv.floor.value)
-    assert found.excess.value == pytest.approx(value - found.floor.value)
 
 
 @pytest.mark.slow
@@ -255,13 +252,19 @@ def test_where_failures_stop_the_study_they_stop_it_here(finished):
     broken = opened(finished, stop_on_failure=True)
     broken = replace(broken, family=replace(broken.family.family, faults=("agent3:1:raises",)))
     with Store.open(finished) as store, pytest.raises(EpisodeError, match="agent 'agent3'"):
-        study_run = StudyRun(broken, store)
-        run_confirmation(study_run)
+        run_confirmation(StudyRun(broken, store))
 
 
-def test_how_much_was_luck_is_in_the_row_of_the_search(once):
+def test_the_document_has_the_answer_and_every_candidate_and_the_row_of_the_search_how_much_was_luck(once):
     *_, found = once
+    fresh = study_document(found)["best"]["fresh"]
     answer = found.confirmation.answer
+    inner = answer.assessment.prpv_interval
+    assert (fresh["prpv"], fresh["prpv_interval"]) == (answer.scores[0], [inner.low, inner.high])
+    assert fresh["optimism"] == answer.optimism
+    assert [one["index"] for one in fresh["candidates"]] == [
+        one.trial.number or None for one in found.confirmation.candidates
+    ]
     lucky = replace(answer, scores=(int(answer.trial.prpv) + 4,))
     luck = replace(found, confirmation=replace(found.confirmation, answer=lucky))
     fresh, searched = usefulness_table(luck).rows[:2]
@@ -273,18 +276,6 @@ def test_how_much_was_luck_is_in_the_row_of_the_search(once):
     none = replace(found, confirmation=replace(found.confirmation, answer=unlucky))
     searched = usefulness_table(none).rows[1]
     assert searched[3].startswith("no optimism")
-
-
-def test_the_document_has_the_answer_and_every_candidate(once):
-    *_, found = once
-    fresh = study_document(found)["best"]["fresh"]
-    answer = found.confirmation.answer
-    inner = answer.assessment.prpv_interval
-    assert (fresh["prpv"], fresh["prpv_interval"]) == (answer.scores[0], [inner.low, inner.high])
-    assert fresh["optimism"] == answer.optimism
-    assert [one["index"] for one in fresh["candidates"]] == [
-        one.trial.number or None for one in found.confirmation.candidates
-    ]
 
 
 @pytest.mark.slow
@@ -305,9 +296,7 @@ def test_perfect_is_only_what_neither_prpv_nor_any_other_output_tells_from_the_t
 
 
 @pytest.mark.parametrize(("p_value", "warned"), [(0.01, True), (None, False)])
-def test_a_caution_says_that_theta_is_not_to_be_trusted_where_no_theta_explains_the_target(
-    finished, monkeypatch, p_value, warned
-):
+def test_a_caution_says_not_to_trust_theta_where_no_theta_explains_the_target(finished, monkeypatch, p_value, warned):
     monkeypatch.setattr(Knowledge, "misfit", Misfit(3.0, 1.0, p_value))
     cautions = looked_at(opened(finished)).cautions
     assert any("divided by 3.0); do not trust θ elsewhere" in line for line in cautions) is warned

@@ -15,7 +15,6 @@ pytestmark = pytest.mark.slow
 
 PER_TRIAL = 18
 EPISODES = 7 * PER_TRIAL
-TOLD = {signal.SIGINT: (130, "interrupted"), signal.SIGTERM: (143, "terminated")}
 STOPS = ((signal.SIGINT, os.killpg), (signal.SIGTERM, os.kill), (signal.SIGTERM, os.killpg), (signal.SIGKILL, os.kill))
 """As they come in life: Ctrl-C reaches a terminal's every process, SIGTERM one or, of a scheduler, its workers too."""
 
@@ -27,7 +26,7 @@ def stop(process, number, send=os.kill):
     if number == signal.SIGKILL:
         assert status == -signal.SIGKILL
     else:
-        expected, word = TOLD[number]
+        expected, word = {signal.SIGINT: (130, "interrupted"), signal.SIGTERM: (143, "terminated")}[number]
         line = f"proxytune study: {word}; {COMMANDS['study'].left}\n"
         assert (status, besides_progress(printed)) == (expected, line)
 

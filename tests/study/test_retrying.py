@@ -24,7 +24,6 @@ class Mine(Wobbly):
 def make(domain, *, model):
     return Mine(**vars(wobbly(domain, model=model)))
 """
-COUNT = "SELECT count(*), sum(failure IS NOT NULL) FROM episodes"
 
 
 @pytest.fixture
@@ -60,7 +59,7 @@ def test_all_failing_alike_stops_the_study_in_its_first_trial_and_once_corrected
         with pytest.raises(RunError, match=r"^the domain family raised KeyError: 'mass' \(mine_0.py, line 7\); every"):
             run_study(broken)
     with sqlite3.connect(broken / "study.db") as plain:
-        assert plain.execute(COUNT).fetchone() == (18, 18)
+        assert plain.execute("SELECT count(*), sum(failure IS NOT NULL) FROM episodes").fetchone() == (18, 18)
     report = run_study(edited("pass"))
     assert [trial.state for trial in report.result.trials] == ["finished"] * 5
     assert report.spent.episodes == 5 * 18
@@ -81,8 +80,7 @@ def test_failures_of_changed_code_are_driven_again_and_only_these(edited):
 
 @pytest.mark.slow
 def test_failures_of_the_same_code_are_remembered_until_all_are_to_be_retried(edited):
-    start1 = "if (episode.agent, episode.start) == ('agent3', 1): raise KeyError('mass')"
-    folder = edited(start1)
+    folder = edited("if (episode.agent, episode.start) == ('agent3', 1): raise KeyError('mass')")
     assert run_study(folder).spent.episodes == 5 * 18
     (folder / "mine.py").write_text((folder / "mine.py").read_text() + "# a comment changes nothing\n")
     assert run_study(folder).spent.episodes == 0

@@ -1,3 +1,4 @@
+import re
 import sqlite3
 from dataclasses import replace
 
@@ -7,7 +8,7 @@ from searched import changed, searched
 from stopping import Stopping
 from telling import Telling
 
-from proxytune.errors import EpisodeError, InputError, RunError, SettingsError
+from proxytune.errors import EpisodeError, RunError, SettingsError
 from proxytune.scores import Metric
 from proxytune.storage import Store, TrialRecord
 from proxytune.study import (
@@ -64,9 +65,8 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize("case", REFUSED)
-def test_a_metric_that_cannot_be_used_is_refused(finished, case):
-    texts, line = REFUSED[case]
+@pytest.mark.parametrize(("texts", "line"), REFUSED.values(), ids=REFUSED)
+def test_a_metric_that_cannot_be_used_is_refused(finished, texts, line):
     assert complaint_of(with_metrics, open_study(finished), [Metric.parse(text) for text in texts]) == line
 
 
@@ -74,8 +74,7 @@ def test_metrics_that_no_trial_or_target_has_are_refused(finished):
     rows = [line.rsplit(",", 1)[0] for line in (finished / "target.csv").read_text().splitlines()]
     (finished / "other.csv").write_text("\n".join(rows) + "\n")
     study = changed(finished, targets=(finished / "other.csv",))
-    with pytest.raises(InputError, match=r"other\.csv.*survival_time"):
-        with_metrics(study, COARSE)
+    assert re.search(r"other\.csv.*survival_time", complaint_of(with_metrics, study, COARSE))
     with Store.open(finished) as store:
         store.save_trial(
             open_study(finished).identity, TrialRecord(7, {"trim": 0.0, "delay": 0.1}, "finished", 3.0, {"prpv": 3.0})
@@ -185,16 +184,13 @@ def test_changed_code_of_the_family_is_refused_but_its_old_result_can_still_be_l
         assert store.trials() == trials
 
 
-def test_looking_at_an_edited_study_is_refused(finished, make_study):
-    make_study(seed="3")
-    with Store.read(finished) as store, pytest.raises(SettingsError, match=r"seed \(was 1\)"):
-        stored_run(open_study(finished), store)
-
-
-def test_budget_jobs_name_and_what_failures_do_may_change(finished, make_study):
+def test_budget_jobs_name_and_what_failures_do_may_change_and_another_edit_is_not_looked_at(finished, make_study):
     _, trials = run(finished)
     make_study(jobs="2", on_failure='"stop"', name='"renamed"', budget="8")
     assert run(finished)[1][:7] == trials
+    make_study(seed="3")
+    with Store.read(finished) as store, pytest.raises(SettingsError, match=r"seed \(was 1\)"):
+        stored_run(open_study(finished), store)
 
 
 @pytest.mark.slow
@@ -206,16 +202,13 @@ def test_before_the_first_finished_trial_everything_may_change(make_study):
     assert len(run(folder)[1]) == 7
 
 
-def test_the_search_sees_failed_trials_without_a_score(make_study):
+def test_the_search_sees_failed_trials_without_a_score_and_what_became_of_one_is_a_phrase(make_study):
     space = open_study(make_study()).settings.space
     done = [
         TrialRecord(1, {"trim": 0.1, "delay": 0.2}, "failed"),
         TrialRecord(2, {"trim": 0, "delay": 0}, "finished", 3),
     ]
     assert [(trial.values, trial.score) for trial in score_trials(space, done)] == [((0.2, 0.1), None), ((0.0, 0.0), 3)]
-
-
-def test_what_became_of_a_trial_is_one_phrase_whatever_the_objective():
     large = replace(PRPV, label="Kendall τ", maximise=True)
     trials = {
         "PRPV 12": (TrialRecord(1, {}, "finished", 12.0), PRPV),

@@ -11,7 +11,7 @@ from proxytune.study.settings import DEFAULT_FAMILY, StopRules, unnoticed
 OTHER = '[families.own]\n[families.other]\nfamily = "schoolroom:schoolroom"\n[families.other.domain]\nblocked = 0.1\n'
 
 
-def test_a_family_is_the_study_with_what_its_table_says(make_study):
+def test_a_family_is_the_study_with_what_its_table_says_and_of_another_kind_knows_not_its_domain(make_study):
     own = '[families.a]\n[families.b]\nproxy = "wrong.toml"\n[families.b.domain]\nsleep = 0.5\n'
     folder = make_several(
         make_study, families=own + "[families.b.parameters]\ndelay = [0.1, 0.2]\n", domain={"version": '"2"'}
@@ -25,9 +25,6 @@ def test_a_family_is_the_study_with_what_its_table_says(make_study):
     assert (a.space.names, b.space.names) == (("trim",), ("delay",))
     assert (a.proxy, b.proxy) == (None, folder / "wrong.toml")
     assert (a.seed, a.agents, a.targets, a.stop) == (study.seed, study.agents, study.targets, study.stop)
-
-
-def test_another_domain_family_knows_nothing_of_the_studys_domain_proxy_and_truth(make_study):
     changes = {"proxy": '"right.toml"', "truth": '"right.toml"', "domain": {"sleep": "0.0"}}
     study = read_study_settings(make_several(make_study, families=OTHER, **changes))
     own, other = study.families["own"], study.families["other"]
@@ -121,7 +118,7 @@ def test_a_study_is_given_as_its_folder_or_its_file_also_in_one_of_a_family_s_na
     assert read_study_settings(folder) == read_study_settings(folder / "study.toml")
 
 
-def test_what_is_written_is_what_is_read_and_rules_to_stop_each_on_their_own(make_study):
+def test_what_is_written_is_what_is_read_and_what_may_be_left_out_has_a_default(make_study):
     settings = read_study_settings(make_study(jobs="2", batch="9", on_failure='"stop"', proxy='"m.toml"'))
     assert (settings.name, settings.starts, settings.budget, settings.initial) == ("wobbly", 3, 7, 5)
     assert (settings.seed, settings.jobs, settings.stop_on_failure) == (1, 2, True)
@@ -138,9 +135,6 @@ def test_what_is_written_is_what_is_read_and_rules_to_stop_each_on_their_own(mak
     settings = read_study_settings(make_study(stop="{ no_improvement = 0.2 }"))
     assert settings.stop == StopRules(no_improvement=0.2)
     assert settings_document(settings)["stop"] == {"no_improvement": 0.2}
-
-
-def test_what_may_be_left_out_has_a_default(make_study):
     left_out = dict.fromkeys(
         ("name", "family", "initial", "batch", "engine", "seed", "jobs", "preflight", "confirm", "cut_off")
     )
@@ -188,9 +182,8 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("case", BAD)
-def test_every_mistake_gets_one_line_with_file_and_key(make_study, case):
-    changes, expected = BAD[case]
+@pytest.mark.parametrize(("changes", "expected"), BAD.values(), ids=BAD)
+def test_every_mistake_gets_one_line_with_file_and_key(make_study, changes, expected):
     folder = make_study(**changes)
     told = complaint_of(read_study_settings, folder)
     assert told.startswith(f"{folder / 'study.toml'}: ")

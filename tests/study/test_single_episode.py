@@ -104,16 +104,13 @@ def family_of(folder):
 """An agent whose left duty is the brightness of the picture that it sees."""
 
 
-def test_pictures_are_those_that_the_agent_saw_before_each_command(lane):
+def test_pictures_are_those_that_the_agent_saw_kept_only_for_who_asks_and_where_there_is_a_camera(lane, make_study):
     (lane / "watcher.py").write_text(WATCHER)
     watched = make_episode({"blur": 0.05}, agent="watcher:Watcher", start=1, seed=3)
     kept = record_episode(family_of(lane), watched, filmed=True)
     assert kept.pictures.shape[0] == len(kept.commands["time"]) > 20
     assert np.allclose(kept.commands["left"], kept.pictures.mean(axis=(1, 2, 3)) / 255.0)
     assert len(set(kept.commands["left"])) > 5, "the picture changes while it drives"
-
-
-def test_pictures_are_kept_only_for_who_asks_and_where_there_is_a_camera(lane, make_study):
     kept = record_episode(family_of(lane), make_episode({}, agent="steady", start=0, seed=3))
     assert kept.pictures is None
     assert kept.channels == ("left", "right")

@@ -103,8 +103,7 @@ def test_more_seeds_add_to_what_was_done(make_study, tmp_path):
     driven = len(journal.read_text().splitlines())
     path = folder / "study.toml"
     path.write_text(path.read_text().replace("seeds = 3", "seeds = 4"))
-    after = figures(run(folder))
-    assert {name: scores[:3] for name, scores in after.items()} == before
+    assert {name: scores[:3] for name, scores in figures(run(folder)).items()} == before
     assert len(journal.read_text().splitlines()) - driven < driven / 2
 
 

@@ -313,9 +313,8 @@ MOMENTS = {
 }
 
 
-@pytest.mark.parametrize("moment", MOMENTS)
-def test_what_raises_is_named_with_its_start(tmp_path, moment):
-    changes, point, named = MOMENTS[moment]
+@pytest.mark.parametrize(("changes", "point", "named"), MOMENTS.values(), ids=MOMENTS)
+def test_what_raises_is_named_with_its_start(tmp_path, changes, point, named):
     with pytest.raises(EpisodeError) as told:
         setup(tmp_path, **changes).score(point)
     assert re.fullmatch(rf"{named} raised ValueError: of its own \(deadly\.py, line \d+\); correct it", str(told.value))
@@ -386,8 +385,7 @@ def test_examinations_that_hang_only_side_by_side_come_to_the_same_one_after_the
 def test_a_limit_that_nothing_overruns_changes_no_score_and_is_none_for_trainings(tmp_path):
     points = [CurvePoint("near", PROXY, 0, count) for count in (0, 20, 40)]
     whole = make(setup(tmp_path / "whole"), points, jobs=1)
-    slow = setup(tmp_path / "slow", learner=trains("lingers"), timeout_s=1.0)
-    found = make(slow, points, jobs=2)
+    found = make(setup(tmp_path / "slow", learner=trains("lingers"), timeout_s=1.0), points, jobs=2)
     assert np.isfinite(found).all()
     assert found == whole
 

@@ -23,7 +23,6 @@ from proxytune.teaching.points import distribution
 from proxytune.teaching.search import BEST, BOX, BY_PRPV, OBJECTIVE, SINGLE, finalists, teach_finalists
 
 BOX_KEYS = {"parameters": {"trim": "[-0.3, 0.3]"}}
-WIDTH = "[teaching.width]\ntrim = [0.0, 0.4]\n"
 
 
 def searched(folder, score):
@@ -37,7 +36,7 @@ def searched(folder, score):
 
 
 def test_centre_and_width_are_those_of_highest_plv_and_the_single_theta_is_the_best_without_a_width(make_study):
-    folder = make_taught(make_study, more=WIDTH, **BOX_KEYS)
+    folder = make_taught(make_study, more="[teaching.width]\ntrim = [0.0, 0.4]\n", **BOX_KEYS)
     found = finalists(*searched(folder, lambda trim, width: (trim - 0.1) ** 2 + (width - 0.2) ** 2), None)
     low, high = found[BEST].bounds["trim"]
     assert (low + high) / 2 == pytest.approx(0.1, abs=0.04)
@@ -47,18 +46,13 @@ def test_centre_and_width_are_those_of_highest_plv_and_the_single_theta_is_the_b
     assert found[BOX].bounds == {"trim": (-0.3, 0.3)}
 
 
-def test_without_widths_there_is_one_theta_beside_the_one_that_prpv_chooses(make_study):
+def test_there_is_one_theta_without_widths_beside_the_one_that_prpv_chooses_if_that_is_another(make_study):
     parts = searched(make_taught(make_study, **BOX_KEYS), lambda trim: (trim + 0.1) ** 2)
     assert finalists(*parts, None).keys() == {SINGLE}
     assert finalists(*parts, {"trim": 0.2})[BY_PRPV].centre == {"trim": 0.2}
-
-
-def test_what_prpv_chooses_is_no_finalist_where_it_is_the_best_theta_or_no_proxy_converged(make_study):
-    parts = searched(make_taught(make_study, **BOX_KEYS), lambda trim: (trim + 0.1) ** 2)
     best = finalists(*parts, None)[SINGLE].centre
     assert finalists(*parts, best).keys() == {SINGLE}
-    unconverged = [replace(trial, score=None) for trial in parts[-1]]
-    assert finalists(*parts[:-1], unconverged, best) == {}
+    assert finalists(*parts[:-1], [replace(trial, score=None) for trial in parts[-1]], best) == {}
 
 
 @pytest.mark.slow
@@ -88,8 +82,7 @@ def test_what_a_search_takes_at_most_counts_finalists_twice_where_examinations_a
 
 
 def test_a_finalist_whose_expert_cannot_drive_is_left_out_with_the_reason(make_study):
-    folder = make_taught(make_study, **BOX_KEYS)
-    settings = read_study_settings(folder)
+    settings = read_study_settings(make_taught(make_study, **BOX_KEYS))
     setup = load_setup(settings)
     other = load_setup(read_study_settings(make_taught(make_study, called="blocked", domain={"blocked": "0.9"})))
     setup, right = replace(setup, proxy=other.proxy), Distribution({"trim": (0.12, 0.12)})
@@ -106,8 +99,7 @@ def run(folder):
     setup = load_setup(settings)
     space = search_space(settings, setup.settings.widths, {})
     with Store.open(folder) as store:
-        search = PlvSearch(settings, setup, store, space, Silent())
-        return search.run(make_proposer("gp", settings.initial))
+        return PlvSearch(settings, setup, store, space, Silent()).run(make_proposer("gp", settings.initial))
 
 
 @pytest.mark.slow
@@ -203,14 +195,11 @@ def test_the_width_of_a_parameter_is_searched_beside_its_centre(make_study):
         assert low < high
 
 
-def test_a_distribution_is_cut_off_at_what_a_parameter_can_be(make_study):
+def test_a_distribution_is_cut_off_at_what_a_parameter_can_be_and_the_search_at_what_prpv_has_left(make_study):
     setup = load_setup(read_study_settings(make_taught(make_study)))
     bounds = distribution(setup, {"trim": 0.25, "trim width": 0.2, "delay": 0.1}).bounds
     assert bounds["trim"] == pytest.approx((0.15, 0.3))
     assert bounds["delay"] == (0.1, 0.1)
-
-
-def test_it_searches_only_what_prpv_has_left(make_study):
     settings = read_study_settings(make_taught(make_study, parameters=BOXED))
     whole = search_space(settings, {}, {})
     left = search_space(settings, {}, {"trim": (0.04, 0.16)})

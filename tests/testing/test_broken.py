@@ -120,9 +120,12 @@ BROKEN_EFFECTS = {
 }
 
 
-def test_an_effect_that_keeps_every_promise_passes():
+def test_an_effect_agent_engine_or_measure_that_keeps_every_promise_passes():
     effect: type[Effect] = Slow
     assert check_effect(effect) is None
+    assert check_agent(Agent) is check_agent(AGENTS["steady"]) is None
+    assert check_engine(Engine("mine", "mine", "the design", Proposer)) is None
+    assert check_measure(measure(bias), perfect=0.0) is None
 
 
 @pytest.mark.parametrize("effect", BROKEN_EFFECTS, ids=lambda effect: effect.__name__)
@@ -206,10 +209,6 @@ BROKEN_AGENTS = {
 }
 
 
-def test_an_agent_that_keeps_every_promise_passes():
-    assert check_agent(Agent) is check_agent(AGENTS["steady"]) is None
-
-
 @pytest.mark.parametrize("agent", BROKEN_AGENTS, ids=lambda agent: agent.__name__)
 def test_an_agent_that_breaks_a_promise_is_refused(agent):
     refused(check_agent, agent, BROKEN_AGENTS[agent])
@@ -272,23 +271,21 @@ class Mixing(Convoy):
         return super().run_many(episodes)[::-1]
 
 
-def test_a_family_that_scores_episodes_otherwise_at_once_is_refused():
+def test_a_family_that_scores_episodes_otherwise_at_once_or_has_a_dead_parameter_is_told_so():
     assert check_family(Convoy(), agents=["agent0", "agent1"]) is None
     refused(check_family, Mixing(), "scores agent 'agent0', start 0 otherwise beside", agents=["agent0", "agent1"])
+
+    class Refusing(PartlyDead):
+        def check_agent(self, name):
+            AnyAgent.check_agent(self, name) if name.startswith("agent") else Wobbly().check_agent(name)
+
+    refused(check_family, Refusing(), "'dead' left out, 0 and 1; use it, or name it", agents=["agent1"])
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", BROKEN_FAMILIES)
 def test_a_family_that_breaks_a_promise_is_refused(case):
     refused(check_family, BROKEN_FAMILIES[case][0], BROKEN_FAMILIES[case][1], agents=["agent0"])
-
-
-def test_a_family_with_a_dead_parameter_is_told_so():
-    class Refusing(PartlyDead):
-        def check_agent(self, name):
-            AnyAgent.check_agent(self, name) if name.startswith("agent") else Wobbly().check_agent(name)
-
-    refused(check_family, Refusing(), "'dead' left out, 0 and 1; use it, or name it", agents=["agent1"])
 
 
 class Proposer:
@@ -330,10 +327,6 @@ BROKEN_PROPOSERS = {
 }
 
 
-def test_an_engine_that_keeps_every_promise_passes():
-    assert check_engine(Engine("mine", "mine", "the design", Proposer)) is None
-
-
 @pytest.mark.parametrize("proposer", BROKEN_PROPOSERS, ids=lambda proposer: proposer.__name__)
 def test_an_engine_that_breaks_a_promise_is_refused(proposer):
     refused(check_engine, Engine("mine", "mine", "wrong", proposer), BROKEN_PROPOSERS[proposer])
@@ -366,10 +359,6 @@ BROKEN_MEASURES = {
 
 def measure(on_means):
     return Measure("mine", "mine", "my measure", "lower", "any", ".2f", on_means=on_means)
-
-
-def test_a_measure_that_keeps_every_promise_passes():
-    assert check_measure(measure(bias), perfect=0.0) is None
 
 
 @pytest.mark.parametrize("case", BROKEN_MEASURES)

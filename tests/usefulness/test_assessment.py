@@ -13,7 +13,7 @@ from proxytune.usefulness.predictivity import kendall_tau, mmrv, ppv, srcc
 M = (Metric("m"), Metric("n", "min"))
 
 
-def test_it_gathers_measures_each_with_an_interval():
+def test_it_gathers_measures_each_with_an_interval_of_episodes_drawn_once_for_all(monkeypatch):
     sides = {"proxy": ordered(1), "target": ordered(2), "metrics": M}
     found = assess(**sides)
     assert found.prpv.value == prpv(compare(**sides)).value == found.prpv_interval.value
@@ -25,9 +25,6 @@ def test_it_gathers_measures_each_with_an_interval():
     for name in ("srcc", "kendall_tau", "mmrv"):
         for metric, (low, high) in getattr(found.intervals, name).items():
             assert low <= getattr(found, name).value[metric] <= high, (name, metric)
-
-
-def test_episodes_are_drawn_once_for_all_intervals_though_one_is_missing(monkeypatch):
     sides, drawn, draw = ({"proxy": ordered(1), "target": ordered(2), "metrics": M}, [], resampling._means_of_draws)
     sides["target"].values[3, 2] = np.nan
     monkeypatch.setattr(resampling, "_means_of_draws", lambda one, *rest: drawn.append(one) or draw(one, *rest))
@@ -85,16 +82,13 @@ def test_halves_never_show_that_a_proxy_is_perfect(seed):
     assert any("does not show that the proxy is perfect" in note for note in found.notes)
 
 
-def test_above_what_halves_score_nothing_is_said_of_them():
+def test_nothing_is_said_of_halves_above_what_they_score_nor_of_a_perfect_proxy_that_chance_explains():
     target, worst = ordered(2, agents=8), ordered(2, agents=8)
     worst = ScoreTable(worst.agents, worst.episodes, worst.metrics, -worst.values)
     found = assess(proxy=worst, target=target, metrics=CLEAR)
     assert found.prpv.value > found.noise_floor.high
     assert not any("halves" in note for note in found.notes)
-
-
-def test_what_chance_explains_is_no_perfect_proxy_and_is_said_to_be_chance():
-    """Of three agents every order comes by chance too often."""
+    # Of three agents every order comes by chance too often.
     target = ordered(2, agents=3)
     floor = floor_of_repeats(domain=target, again=again(target), metrics=CLEAR)
     found = assess(proxy=target, target=target, metrics=CLEAR, floor=floor)
@@ -129,13 +123,20 @@ def noisy(truth, seed, noise=0.3, episodes=8):
 TARGET = noisy(TRUTH, 0)
 
 
-def test_a_good_proxy_beats_a_bad_one_beyond_noise_but_not_its_twin():
+def test_a_good_proxy_beats_a_bad_one_beyond_noise_but_not_its_twin_and_one_episode_only_ranks():
     proxies = {"bad": noisy(-TRUTH, 1), "good": noisy(TRUTH, 2), "twin": noisy(TRUTH, 3)}
     selection = select_proxy(proxies=proxies, target=TARGET, metrics=CLEAR)
     assert [name for name, _ in selection.ranking][2] == "bad"
     beyond = {(pair.better, pair.worse): pair.beyond_noise for pair in selection.differences}
     assert beyond["good", "bad"] is beyond["twin", "bad"] is True
     assert next(value for pair, value in beyond.items() if set(pair) == {"good", "twin"}) is False
+    proxies = {"a": noisy(TRUTH, 1, episodes=1), "b": noisy(-TRUTH, 2, episodes=1)}
+    selection = select_proxy(proxies=proxies, target=TARGET, metrics=CLEAR)
+    assert [name for name, _ in selection.ranking] == ["a", "b"]
+    assert selection.differences[0].beyond_noise is None
+    assert "one episode in the proxy" in selection.reason
+    with pytest.raises(ScoresError, match="no proxy"):
+        select_proxy(proxies={}, target=TARGET, metrics=CLEAR)
 
 
 def test_differences_are_of_prpv_and_none_of_a_proxy_with_itself():
@@ -153,16 +154,6 @@ def test_differences_are_of_prpv_and_none_of_a_proxy_with_itself():
     selection = select_proxy(proxies={"a": same, "b": same}, target=TARGET, metrics=CLEAR)
     assert (selection.differences[0].low, selection.differences[0].high) == (0.0, 0.0)
     assert selection.differences[0].beyond_noise is False
-
-
-def test_one_episode_gives_a_ranking_without_intervals_and_no_proxy_is_refused():
-    proxies = {"a": noisy(TRUTH, 1, episodes=1), "b": noisy(-TRUTH, 2, episodes=1)}
-    selection = select_proxy(proxies=proxies, target=TARGET, metrics=CLEAR)
-    assert [name for name, _ in selection.ranking] == ["a", "b"]
-    assert selection.differences[0].beyond_noise is None
-    assert "one episode in the proxy" in selection.reason
-    with pytest.raises(ScoresError, match="no proxy"):
-        select_proxy(proxies={}, target=TARGET, metrics=CLEAR)
 
 
 @pytest.mark.slow

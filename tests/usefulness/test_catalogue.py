@@ -34,38 +34,31 @@ def test_every_measure_keeps_what_measures_promise_and_knows_a_perfect_proxy(mea
 
 
 @pytest.mark.parametrize("measure", [*MEASURES, BIAS, LARGEST], ids=lambda measure: measure.key)
-def test_every_measure_of_score_tables_has_a_value_within_its_interval_for_each_metric_or_for_all(measure):
+def test_every_measure_has_a_value_within_its_interval_for_each_metric_or_all_and_none_without_repeats(measure):
     found = measure.measured(FOUND)
     assert list(found) == (["m", "n"] if measure.per_metric else [ALL])
     for value, (low, high) in found.values():
         assert low <= value <= high
-
-
-@pytest.mark.parametrize("measure", [*MEASURES, BIAS, LARGEST], ids=lambda measure: measure.key)
-def test_without_repeats_a_measure_has_a_value_and_no_interval(measure):
     found = measure.measured(assess(proxy=ordered(1, 1), target=ordered(2, 1), metrics=M))
     assert [one.interval for one in found.values()] == [None] * len(found)
     assert None not in [one.value for one in found.values()]
 
 
-def test_a_measure_of_means_is_resampled_as_the_others_are():
+def test_a_measure_of_means_is_resampled_as_the_others_are_and_undefined_is_none():
     """What is declared by its function alone comes out as what PPV has of its own."""
     again = Measure("again", "again", "PPV of fixed weights", "lower", "", ".3g", on_means=weighted_as_before)
     (found,), (known,) = again.measured(FOUND).values(), PPV.measured(FOUND).values()
     assert found.value == pytest.approx(known.value, rel=1e-12)
     assert found.interval == pytest.approx(known.interval, rel=1e-12)
+    values = ordered(1).values.copy()
+    values[0] = 0.0
+    assert LARGEST.measured(assess(proxy=table_of(values), target=ordered(2), metrics=M)) == {ALL: (None, None)}
+    assert np.isnan(PPV.of_means(proxy=np.eye(3), target=np.ones((3, 3)), metrics=M))
 
 
 def weighted_as_before(proxy, target, metrics):
     weights = np.array([FOUND.ppv.beta[metric.name] for metric in metrics])
     return (np.abs(proxy - target) * weights).sum(axis=-1).mean(axis=-1)
-
-
-def test_an_undefined_value_is_none_also_on_means():
-    values = ordered(1).values.copy()
-    values[0] = 0.0
-    assert LARGEST.measured(assess(proxy=table_of(values), target=ordered(2), metrics=M)) == {ALL: (None, None)}
-    assert np.isnan(PPV.of_means(proxy=np.eye(3), target=np.ones((3, 3)), metrics=M))
 
 
 @pytest.mark.parametrize("measure", [PRPV, PPV])

@@ -1,12 +1,17 @@
-"""Which agent to deploy: probabilities and regrets are those of the posterior, and what is not known is not told."""
+"""Which agent to deploy: probabilities and regrets are those of the posterior, and what is not known is not told.
+
+The test after each rollout, and the plan of rollouts to come.
+"""
 
 import numpy as np
 import pytest
+from score_tables import table_of
 
-from proxytune.errors import InputError
+from proxytune.errors import InputError, ScoresError
 from proxytune.scores import Metric, ScoreTable
-from proxytune.usefulness import Asked, compare, decide, decision, mmrv_conventions
+from proxytune.usefulness import Asked, compare, decide, decision, mmrv_conventions, sequential_test
 from proxytune.usefulness.noise import chance
+from proxytune.usefulness.sequential import plan
 
 SUCCESS = [Metric("success")]
 
@@ -30,7 +35,7 @@ def decided(proxy, target, metrics=SUCCESS, **asked):
     return decide(compare(proxy=proxy, target=target, metrics=metrics), Asked(**asked), None, 1)
 
 
-def test_the_best_of_agents_is_told_with_its_probability():
+def test_the_best_of_agents_is_told_with_its_probability_and_standard_errors_published_or_shared():
     found = decided(counted([5, 9], 10), counted([5, 9], 10))
     rng = np.random.default_rng(0)
     one, other = rng.beta(6, 6, 400_000), rng.beta(10, 2, 400_000)
@@ -43,18 +48,22 @@ def test_the_best_of_agents_is_told_with_its_probability():
     assert kept == {"agent 1", "agent 2", "agent 3"}
     assert sum(found.best_probabilities[agent] for agent in kept) >= 0.95
     assert not decided(counted([1, 24], 25), counted([1, 24], 25)).not_told_apart
+    target = ScoreTable(("a", "b"), ("1",), ("success",), np.array([[[0.5]], [[0.7]]]), np.array([[0.1], [0.1]]))
+    found = decided(means(["success"], a=(0.5,), b=(0.7,)), target)
+    assert found.probability_best == pytest.approx(0.921, abs=0.01)  # Φ(0.2 / (0.1 √2))
+    rng = np.random.default_rng(3)
+    values = np.array([0.0, 0.0, 3.0])[:, None, None] + rng.normal(size=(3, 2, 1))
+    target = ScoreTable(("a", "b", "c"), ("1", "2"), ("success",), values).unpaired()
+    assert decided(target, target).winner == "c"
 
 
-def test_means_without_rollouts_give_no_probability_but_the_observed_regret():
+def test_means_without_rollouts_give_the_observed_regret_also_where_less_is_better_or_ties():
     proxy, target = means(["success"], a=(0.9,), b=(0.8,)), means(["success"], a=(0.5,), b=(0.75,))
     found = decided(proxy, target)
     assert (found.winner, found.probability_best, found.best_probabilities) == ("b", None, None)
     assert found.observed.regret == found.expected_regret["a"] == 0.25
     assert "number of rollouts" in found.notes[0]
     assert decided(proxy, target, rollouts=100).probability_best > 0.99
-
-
-def test_less_may_be_better_and_a_tie_costs_what_the_worse_does():
     proxy = means(["seconds"], a=(1.0,), b=(2.0,))
     found = decided(proxy, means(["seconds"], a=(5.0,), b=(4.0,)), [Metric("seconds", "min")])
     assert (found.winner, found.observed.proxy_winners, found.observed.regret) == ("b", ("a",), 1.0)
@@ -64,7 +73,7 @@ def test_less_may_be_better_and_a_tie_costs_what_the_worse_does():
     assert observed.regret == pytest.approx(0.2)
 
 
-def test_tasks_are_averaged_and_left_out_one_at_a_time_each_with_a_regret():
+def test_tasks_also_by_their_starts_are_averaged_and_left_out_one_at_a_time_each_with_a_regret():
     proxy = means(["x", "y", "z"], a=(0.9, 0.1, 0.1), b=(0.2, 0.3, 0.3))
     target = means(["x", "y", "z"], a=(0.9, 0.0, 0.1), b=(0.1, 0.3, 0.3))
     found = decided(proxy, target, [Metric(name) for name in "xyz"])
@@ -77,9 +86,6 @@ def test_tasks_are_averaged_and_left_out_one_at_a_time_each_with_a_regret():
     assert found.tasks[0].expected_regret["b"] == pytest.approx(0.77, abs=0.02)
     assert found.without[0].expected_regret["a"] == pytest.approx((0.31 + 0.19) / 2 - 0.01, abs=0.03)
     assert decided(target, target, metrics).tasks[0].expected_regret is None
-
-
-def test_tasks_by_their_starts_have_regrets_too():
     rows = {
         (agent, f"{task}/{place}"): {"success": float(place < done)}
         for agent, each in {"a": (9, 2), "b": (3, 5)}.items()
@@ -114,16 +120,6 @@ def test_the_regret_of_an_agent_that_never_succeeded_may_be_all_that_there_is(di
     assert found.regret_interval["agent 2"][1] < 0.9
 
 
-def test_standard_errors_are_those_published_or_shared():
-    target = ScoreTable(("a", "b"), ("1",), ("success",), np.array([[[0.5]], [[0.7]]]), np.array([[0.1], [0.1]]))
-    found = decided(means(["success"], a=(0.5,), b=(0.7,)), target)
-    assert found.probability_best == pytest.approx(0.921, abs=0.01)  # Φ(0.2 / (0.1 √2))
-    rng = np.random.default_rng(3)
-    values = np.array([0.0, 0.0, 3.0])[:, None, None] + rng.normal(size=(3, 2, 1))
-    target = ScoreTable(("a", "b", "c"), ("1", "2"), ("success",), values).unpaired()
-    assert decided(target, target).winner == "c"
-
-
 @pytest.mark.parametrize(
     ("asked", "complaint"),
     [({"rollouts": 0}, "rollouts must be"), ({"bound": 0.0}, "above 0"), ({"decide_on": "succes"}, "did you mean")],
@@ -148,3 +144,53 @@ def test_mmrv_has_every_published_convention():
     found = mmrv_conventions(compare(proxy=proxy, target=target, metrics=SUCCESS))["success"]
     thrice = {"simpler": 0.25 + 0.3, "strictly_less": 0.25 + 0.25 + 0.3, "sign_product": 0.25 + 0.25, "proxy_gap": 0.2}
     assert found == pytest.approx({name: value / 3 for name, value in thrice.items()})
+
+
+def rolled(rates, rollouts, seed=0):
+    rng = np.random.default_rng(seed)
+    values = (rng.random((len(rates), rollouts)) < np.array(rates)[:, None]).astype(float)
+    return table_of(values, metrics=("success",))
+
+
+def looked_at(target, proxy):
+    return sequential_test(compare(proxy=proxy, target=target, metrics=SUCCESS))
+
+
+def test_a_winner_is_shown_before_the_end_and_sooner_with_a_proxy():
+    target = rolled([0.9, 0.3], 60)
+    found = looked_at(target, target)
+    assert found.winner == "A0"
+    assert 5 < found.decided_at < 60
+    target = rolled([0.5, 0.5], 60)
+    assert looked_at(target, target).winner is None
+    found = looked_at(rolled([0.7, 0.5, 0.3], 20), rolled([0.7, 0.5, 0.3], 500, seed=9))
+    assert found.expected_rounds["with proxy"] <= found.expected_rounds["without proxy"]
+
+
+@pytest.mark.parametrize(
+    ("values", "complaint"),
+    [
+        ([[5.0, 1.0], [0.0, 1.0]], "goes beyond 0 and 1"),
+        ([[1.0], [0.0]], "row per rollout"),
+        ([[1.0, 1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]], "sorted by value"),
+    ],
+)
+def test_what_bears_no_test_is_refused(values, complaint):
+    table = table_of(values, metrics=("success",))
+    with pytest.raises(ScoresError, match=complaint):
+        looked_at(table, table)
+
+
+def planned(successes, of, bound):
+    target = table_of([[1.0] * done + [0.0] * (of - done) for done in successes], metrics=("success",))
+    found = decide(compare(proxy=target, target=target, metrics=SUCCESS), Asked(), None)
+    return plan(found, bound=bound, made=np.full(len(successes), float(of)), scale=1.0)
+
+
+def test_a_plan_asks_for_the_agents_that_may_be_best_more_for_a_smaller_bound_and_none_when_decided():
+    found = planned([2, 18, 20, 3], 25, 0.02)
+    assert set(found.rollouts) == {"A1", "A2"}
+    assert found.regret_bound > 0.02
+    assert not planned([2, 25, 3, 3], 25, 0.05).rollouts
+    assert planned([11, 14], 25, 0.02).total > planned([11, 14], 25, 0.05).total > 0
+    assert "too much alike" in planned([2500, 2500], 5000, 1e-6).reason

@@ -35,7 +35,7 @@ class Fleet:
         return np.stack([distance, time], axis=-1)
 
 
-def test_a_cell_at_the_limit_crashes_as_often_as_the_pairs_like_it():
+def test_a_cell_is_moved_by_a_difference_crashes_as_pairs_do_and_without_pairs_no_floor_is_made_up():
     before = np.column_stack([np.linspace(4.0, 6.0, 40), np.full(40, LIMIT)])
     after = before.copy()
     after[::4] = [1.0, 7.0]
@@ -46,18 +46,12 @@ def test_a_cell_at_the_limit_crashes_as_often_as_the_pairs_like_it():
     assert crashed.mean() == pytest.approx(1.0 / 7.0, abs=0.05), "10 of the 70 sides of pairs at the limit"
     assert (again[crashed] == [1.0, 7.0]).all()
     assert set(again[~crashed][:, 1]) == {LIMIT}
-
-
-def test_a_cell_is_moved_by_a_difference_and_stays_within_what_was_seen():
     first = np.random.default_rng(1).normal(size=(2, 60, 2))
     again = donors_of([first], 2).again(first[0], np.random.default_rng(2), 50)
     assert again.shape == (50, 60, 2)
     assert (again.min(axis=(0, 1)) >= first.min(axis=(0, 1))).all()
     assert (again.max(axis=(0, 1)) <= first.max(axis=(0, 1))).all()
     assert (again != first[0]).any(axis=(1, 2)).all()
-
-
-def test_where_a_pair_failed_or_neither_side_was_driven_twice_no_floor_is_made_up():
     pair = np.ones((2, 3, 1))
     pair[1, 0] = np.nan
     assert len(donors_of([pair], 1).first) == 4
@@ -100,7 +94,7 @@ def still(target, labels=None):
     return expect(fresh=[table(truth)], target=table(target(truth), labels), metrics=M, donors=nothing)
 
 
-def test_the_true_theta_of_a_simulator_that_draws_nothing_is_never_called_imperfect_by_a_noisy_target():
+def test_a_simulator_that_draws_nothing_has_the_same_figures_and_at_its_true_theta_is_never_imperfect():
     twice = [f"{start}/{repeat}" for start in range(STARTS) for repeat in range(2)]
     for seed in range(5):
         noise = np.random.default_rng(seed).normal(scale=0.5, size=(AGENTS, 2 * STARTS, 2))
@@ -110,8 +104,5 @@ def test_the_true_theta_of_a_simulator_that_draws_nothing_is_never_called_imperf
         ):
             assert found.prpv.value.low == found.prpv.value.value == found.prpv.value.high
             assert found.prpv.excess.low <= 0.0
-
-
-def test_same_seed_same_figures():
     assert still(lambda truth: truth + 1.0).prpv == still(lambda truth: truth + 1.0).prpv
     assert Donors(np.zeros((1, 1)), np.ones((1, 1))).still is False

@@ -49,7 +49,7 @@ def interleaved(one, two):
     return np.stack([one, two], axis=2).reshape(len(one), -1)
 
 
-def test_halves_are_disjoint_and_agents_with_the_same_episodes_split_alike():
+def test_halves_are_disjoint_for_agents_alike_and_without_a_second_episode_there_is_no_floor():
     values = np.zeros((3, 5))
     values[0, 4], values[1, :2] = np.nan, np.nan
     uneven = table_of(values)
@@ -61,9 +61,6 @@ def test_halves_are_disjoint_and_agents_with_the_same_episodes_split_alike():
     assert len(np.unique(first[2], axis=0)) > 1
     starts = np.random.default_rng(0).normal(size=(1, 4))
     assert noise_floor(target=table_of(starts + np.arange(3.0)[:, None]), metrics=FIRST).high == 0.0
-
-
-def test_without_a_second_episode_or_a_start_in_common_there_is_no_floor():
     result = noise_floor(target=table_of(np.arange(3.0)[:, None]), metrics=FIRST)
     assert (result.value, result.kind) == (None, "none")
     assert "each agent has one episode on the target" in result.reason
@@ -81,7 +78,7 @@ def test_without_placement_noise_a_domain_has_a_floor_of_zero(seed, starts, repe
     assert (same.kind, same.value, same.low, same.high) == ("same starts", 0.0, 0.0, 0.0)
 
 
-def test_with_strong_starts_and_little_noise_the_floor_lies_far_below_that_of_halves():
+def test_the_floor_lies_far_below_that_of_halves_with_strong_starts_and_is_what_a_perfect_proxy_scores():
     (one, two), _ = planted(1)
     halves = noise_floor(target=table_of(interleaved(one, two)), metrics=FIRST)
     floor = noise_floor(target=repeated(interleaved(one, two), 2), metrics=FIRST)
@@ -90,10 +87,7 @@ def test_with_strong_starts_and_little_noise_the_floor_lies_far_below_that_of_ha
     assert 0.0 < floor.value < 0.4 * halves.value
     assert again.high < 0.4 * halves.value
     assert again.low <= again.value <= again.high
-
-
-def test_the_floor_is_what_a_perfect_proxy_scores():
-    """Over 60 planted domains: a third measurement scores about the floor's value, and seldom more than its end."""
+    # Over 60 planted domains: a third measurement scores about the floor's value, and seldom more than its end.
     scored, values, within = [], [], []
     for seed in range(60):
         (one, two), rng = planted(seed, noise=1.0)
@@ -158,16 +152,13 @@ def table_of_rates(successes, episodes=10):
     )
 
 
-def test_a_rate_has_wilson_s_interval():
+def test_a_rate_has_wilson_s_interval_and_pairs_that_tie_are_counted_and_told_once():
     (rates,) = success_rates(compare(proxy=table_of_rates([8, 10]), target=table_of_rates([0, 10]), metrics=METRICS))
     one = rates.proxy["A"]
     assert (rates.metric, one.value, one.episodes) == ("success", 0.8, 10)
     assert (one.low, one.high) == pytest.approx((0.4902, 0.9433), abs=1e-4), "Brown, Cai, DasGupta (2001), eq. (4)"
     assert rates.target["A"].low == pytest.approx(0.0, abs=1e-12)
     assert 0.2 < rates.target["A"].high < 0.3, "no success in ten is no proof of none"
-
-
-def test_pairs_that_tie_are_counted_and_told_once():
     sides = {"target": table_of_rates([2, 4, 6]), "metrics": METRICS[:1], "resamples": 100}
     found = assess(proxy=table_of_rates([3, 3, 5]), **sides)
     told = [note for note in found.notes if "tie" in note]
@@ -175,8 +166,7 @@ def test_pairs_that_tie_are_counted_and_told_once():
     assert len(told) == 1
     assert told[0].startswith(expected)
     assert found.prpv.value == 1
-    untied = assess(proxy=table_of_rates([3, 4, 5]), **sides)
-    assert not [note for note in untied.notes if "tie" in note]
+    assert not [note for note in assess(proxy=table_of_rates([3, 4, 5]), **sides).notes if "tie" in note]
 
 
 @pytest.mark.parametrize("successes", [[10, 10], [0, 0]])

@@ -26,7 +26,7 @@ def table(agents, episodes=(1,)):
     return ScoreTable.from_episodes({(a, e): {"m": ord(a) + e / 10, "n": 0.0} for a in agents for e in episodes})
 
 
-def test_tables_are_put_in_one_order_and_different_episodes_not_paired():
+def test_tables_are_put_in_one_order_of_the_agents_that_all_have_and_others_named():
     inputs = compare(proxy=table("CAB", (2, 1)), target=table("ABC", (1, 2)), metrics=M)
     assert inputs.agents == inputs.proxy.agents == ("A", "B", "C")
     assert inputs.paired
@@ -34,6 +34,16 @@ def test_tables_are_put_in_one_order_and_different_episodes_not_paired():
     assert not compare(proxy=table("AB", (1, 2)), target=table("AB", (1, 3)), metrics=M).paired
     inputs = compare(proxy=table("AB", (1, 2, 3)), target=table("AB"), metrics=M)
     assert inputs.episodes == ((3, 3), (1, 1))
+    human = ScoreTable.from_episodes({(a, "day" if a == "H" else 1): {"m": 1.0} for a in "BHA"})
+    kept, lines = in_common({"the target": human, "the proxy sim": table("ABC")})
+    assert (kept["the target"].agents, kept["the proxy sim"].agents) == (("B", "A"), ("A", "B"))
+    assert kept["the target"].episodes == ("1",), "an episode that nobody is left of is none"
+    assert lines == (
+        "left out, since not all sides have them: H of the target",
+        "left out, since not all sides have them: C of the proxy sim",
+    )
+    with pytest.raises(ScoresError, match="at least two agents in common; one has A, B; other has C, D"):
+        in_common({"one": table("AB"), "other": table("CD")})
 
 
 @pytest.mark.parametrize(
@@ -53,19 +63,6 @@ def test_agents_that_do_not_match_are_named(proxy, target, complaint):
 def test_no_metric_a_metric_twice_or_an_unknown_one_is_refused(metrics):
     with pytest.raises(ScoresError):
         compare(proxy=table("AB"), target=table("AB"), metrics=metrics)
-
-
-def test_agents_that_all_sides_have_are_kept_and_the_others_named():
-    human = ScoreTable.from_episodes({(a, "day" if a == "H" else 1): {"m": 1.0} for a in "BHA"})
-    kept, lines = in_common({"the target": human, "the proxy sim": table("ABC")})
-    assert (kept["the target"].agents, kept["the proxy sim"].agents) == (("B", "A"), ("A", "B"))
-    assert kept["the target"].episodes == ("1",), "an episode that nobody is left of is none"
-    assert lines == (
-        "left out, since not all sides have them: H of the target",
-        "left out, since not all sides have them: C of the proxy sim",
-    )
-    with pytest.raises(ScoresError, match="at least two agents in common; one has A, B; other has C, D"):
-        in_common({"one": table("AB"), "other": table("CD")})
 
 
 MEASURES = {
@@ -138,15 +135,14 @@ def pairs_of_means(draw):
     return np.array(draw(scores), dtype=float).reshape(2, agents, 2)
 
 
-def test_prpv_of_a_few_agents_is_that_by_hand():
+def test_prpv_of_a_few_agents_is_that_by_hand_and_of_unrelated_tables_as_by_chance():
     """Target A > B > C; proxy C > A > B: A–C and B–C are reversed, two each."""
     result = prpv(compare(proxy=of_means(2, 1, 3), target=of_means(3, 2, 1), metrics=M))
     assert result.value == 4
     assert result.pairs == (FlippedPair("A", "C", "reversed"), FlippedPair("B", "C", "reversed"))
 
     target = of_means((4, 4), (3, 2), (2, 3), (1, 1))
-    proxy = of_means((4, 1), (3, 3), (2, 2), (1, 4))
-    result = prpv(compare(proxy=proxy, target=target, metrics=M2))
+    result = prpv(compare(proxy=of_means((4, 1), (3, 3), (2, 2), (1, 4)), target=target, metrics=M2))
     assert set(result.pairs) == {
         FlippedPair("A", "B", "lost"),
         FlippedPair("A", "C", "lost"),
@@ -161,6 +157,9 @@ def test_prpv_of_a_few_agents_is_that_by_hand():
     result = prpv(compare(proxy=of_means((1, 1), (2, 2)), target=of_means((2, 2), (1, 1)), metrics=M2))
     assert (result.value, result.range) == (2, (0, 2))
     assert (result.inputs.agents, result.inputs.episodes[1]) == (("A", "B"), (1, 1))
+    values = prpv_of_means(*np.random.default_rng(0).normal(size=(2, 20_000, 10, 2)), M2)
+    assert values.mean() == pytest.approx(33.75, abs=0.3)
+    assert values.std() == pytest.approx(7.1, abs=0.3)
 
 
 @few
@@ -173,7 +172,7 @@ def test_alpha_of_a_pair_and_its_mirror_add_up_to_one(means):
 
 @few
 @given(pairs_of_means())
-def test_it_is_a_whole_number_within_bounds_symmetric_and_zero_for_the_same(means):
+def test_it_is_a_whole_number_within_bounds_that_rescaling_or_turning_a_metric_does_not_change(means):
     proxy, target = means
     value = prpv_of_means(proxy, target, M2)
     agents = len(proxy)
@@ -181,29 +180,11 @@ def test_it_is_a_whole_number_within_bounds_symmetric_and_zero_for_the_same(mean
     assert 0 <= value <= agents * (agents - 1)
     assert value == prpv_of_means(target, proxy, M2)
     assert prpv_of_means(proxy, proxy, M2) == 0
-
-
-@few
-@given(pairs_of_means())
-def test_an_increasing_rescaling_of_a_metric_changes_nothing(means):
-    proxy, target = means
     bent = proxy.copy()
     bent[:, 0] = np.exp(proxy[:, 0] / 2) - 100.0
     assert prpv_of_means(bent, target, M2) == prpv_of_means(proxy, target, M2)
-
-
-@few
-@given(pairs_of_means())
-def test_turning_a_metric_and_its_direction_changes_nothing(means):
     turned = (Metric("m", "min"), Metric("n"))
     assert prpv_of_means(*(means * [-1, 1]), turned) == prpv_of_means(*means, M2)
-
-
-def test_unrelated_tables_of_ten_agents_and_two_metrics_average_33_9():
-    rng = np.random.default_rng(0)
-    values = prpv_of_means(*rng.normal(size=(2, 20_000, 10, 2)), M2)
-    assert values.mean() == pytest.approx(33.75, abs=0.3)
-    assert values.std() == pytest.approx(7.1, abs=0.3)
 
 
 needs_pilot = pytest.mark.skipif(not SCORES.is_dir(), reason="the measured scores of ../shared/data are not here")
@@ -234,12 +215,18 @@ def labelled(starts, repeats):
     return [f"{start}/{repeat}" for start in range(starts) for repeat in range(repeats)]
 
 
-def test_the_start_is_what_is_before_the_last_stroke():
+def test_the_start_is_what_is_before_the_last_stroke_and_more_repeats_of_it_make_no_interval_narrower():
     assert [start_of(label) for label in ("3", "3/0", "loop/3/1", "/1")] == ["3", "3", "loop/3", "/1"]
     assert starts_of(["1/0", "0/0", "1/1"]) == ("1", "0")
+    # Copies of every episode say nothing new.
+    rng = np.random.default_rng(3)
+    starts, proxy = rng.normal(size=(8, 4)), table_of(rng.normal(size=(8, 6)), "abcdef")
+    once = bootstrap_prpv(proxy=proxy, target=table_of(starts, "0123"), metrics=M)
+    copied = bootstrap_prpv(proxy=proxy, target=table_of(starts.repeat(5, axis=1), labelled(4, 5)), metrics=M)
+    assert (copied.low, copied.high) == (once.low, once.high)
 
 
-def test_both_sets_hold_every_start_equally_often_and_share_no_episode():
+def test_both_sets_hold_every_start_equally_often_and_lost_repeats_are_split_over_other_starts():
     values = np.zeros((3, 9))
     values[0, 4] = np.nan
     first, second = split(table_of(values, labelled(3, 3)), 40)
@@ -250,9 +237,6 @@ def test_both_sets_hold_every_start_equally_often_and_share_no_episode():
         assert (one.reshape(3, 40, 3, 3).sum(axis=-1) == 1).all()
     assert (first[1] == first[2]).all()
     assert len(np.unique(first[1], axis=0)) > 5
-
-
-def test_an_agent_that_lost_a_repeat_is_split_over_its_other_starts_and_has_the_mean_of_the_others():
     values = np.zeros((2, 4))
     values[0, 3] = np.nan
     first, second = split(table_of(values, labelled(2, 2)), 10)
@@ -276,13 +260,11 @@ ONCE = [[0.0, np.nan, 0.0, np.nan], [0.0] * 4]
 
 
 @pytest.mark.parametrize(("values", "labels"), [(OWN, "A0/0 A0/1 A1/0 A1/1"), (ONCE, "0/0 0/1 1/0 1/1")])
-def test_labels_of_an_agent_s_own_are_no_starts_and_an_agent_without_any_start_twice_leaves_none_to_split(
-    values, labels
-):
+def test_labels_of_an_agent_s_own_are_no_starts_and_an_agent_without_a_start_twice_leaves_none_to_split(values, labels):
     assert not is_repeated(table_of(values, labels.split()))
 
 
-def test_repeats_of_a_start_are_drawn_together_also_of_one_start_alone():
+def test_repeats_of_a_start_are_drawn_together_and_paired_by_start_with_a_proxy_of_plain_ones():
     repeated, plain = table_of(np.zeros((2, 6)), labelled(3, 2)), table_of(np.zeros((2, 3)), "012")
     counts = draw_counts(repeated, np.random.default_rng(0), 30)
     assert (counts[..., ::2] == counts[..., 1::2]).all()
@@ -293,10 +275,7 @@ def test_repeats_of_a_start_are_drawn_together_also_of_one_start_alone():
     assert not compare(proxy=table_of(values[:, :3], labelled(1, 3)), target=target, metrics=M).paired
     found = assess(proxy=table_of(values, "abcdef"), target=target, metrics=M)
     assert any("from one start" in note for note in found.notes)
-
-
-def test_a_proxy_of_plain_starts_is_paired_with_a_target_of_repeats_by_start():
-    """Scores that depend on the start alone stay equal in every resample, in whatever order the starts come."""
+    # Scores that depend on the start alone stay equal in every resample, in whatever order the starts come.
     starts = np.random.default_rng(0).normal(size=(1, 5)).repeat(3, axis=0)
     target = table_of(starts.repeat(2, axis=1), labelled(5, 2))
     inputs = compare(proxy=table_of(starts[:, ::-1], "43210"), target=target, metrics=M)
@@ -305,12 +284,3 @@ def test_a_proxy_of_plain_starts_is_paired_with_a_target_of_repeats_by_start():
     np.testing.assert_allclose(means[0], means[1], atol=1e-12)
     assert np.ptp(means[0], axis=0).min() > 0.0
     assert not compare(proxy=table_of(starts, "abcde"), target=target, metrics=M).paired
-
-
-def test_more_repeats_of_the_same_starts_make_no_interval_narrower():
-    """Copies of every episode say nothing new."""
-    rng = np.random.default_rng(3)
-    starts, proxy = rng.normal(size=(8, 4)), table_of(rng.normal(size=(8, 6)), "abcdef")
-    once = bootstrap_prpv(proxy=proxy, target=table_of(starts, "0123"), metrics=M)
-    copied = bootstrap_prpv(proxy=proxy, target=table_of(starts.repeat(5, axis=1), labelled(4, 5)), metrics=M)
-    assert (copied.low, copied.high) == (once.low, once.high)

@@ -17,9 +17,8 @@ SCORES = Path(__file__).parents[2] / "../shared/data/scores"
 M = [Metric("m"), Metric("n")]
 
 
-def test_correlations_agree_with_scipy_and_are_undefined_of_constants():
-    rng = np.random.default_rng(1)
-    proxy, target = rng.integers(0, 4, size=(2, 50, 8, 2)).astype(float)
+def test_correlations_agree_with_scipy_and_simplers_figures_come_out_by_its_double_loop():
+    proxy, target = np.random.default_rng(1).integers(0, 4, size=(2, 50, 8, 2)).astype(float)
     pearson, kendall = pearson_of_means(proxy, target), kendall_of_means(proxy, target)
     for i, column in np.ndindex(50, 2):
         one, other = proxy[i, :, column], target[i, :, column]
@@ -36,6 +35,20 @@ def test_correlations_agree_with_scipy_and_are_undefined_of_constants():
     result = srcc(compare(proxy=of_means((1, 1), (2, 2)), target=of_means((1, 2), (2, 1)), metrics=M))
     assert result.value == {"m": pytest.approx(1.0), "n": pytest.approx(-1.0)}
     assert "of two agents" in result.notes[0]
+    # B and C change places: that costs each of them 0.3, and A nothing.
+    result = mmrv(compare(proxy=of_means(0.9, 0.4, 0.6), target=of_means(0.8, 0.5, 0.2), metrics=[Metric("m")]))
+    assert result.value["m"] == pytest.approx((0 + 0.3 + 0.3) / 3)
+
+    proxy, target = np.random.default_rng(0).integers(0, 4, size=(2, 40, 5, 1)).astype(float)
+    for direction, sign in (("max", 1), ("min", -1)):
+        values = mmrv_of_means(proxy, target, [Metric("m", direction)])[:, 0]
+        expected = [simplers_loop(sign * p[:, 0], sign * t[:, 0]) for p, t in zip(proxy, target, strict=True)]
+        np.testing.assert_allclose(values, expected, atol=1e-12)
+
+    tied, target = of_means(0.5, 0.5, 0.5), of_means(0.1, 0.4, 0.9)
+    higher, lower = (compare(proxy=tied, target=target, metrics=[Metric("m", way)]) for way in ("max", "min"))
+    assert mmrv(higher).value["m"] == pytest.approx((0 + 0.3 + 0.8) / 3)
+    assert mmrv(lower).value["m"] == pytest.approx((0.8 + 0.5 + 0) / 3)
 
 
 @pytest.mark.skipif(not SCORES.is_dir(), reason="the measured scores of ../shared/data are not here")
@@ -53,24 +66,6 @@ def test_simplers_own_figures_come_out():
         both = compare(**sides, metrics=metric)
         assert mmrv(both).value["success"] == pytest.approx(float(task["mmrv"]), abs=1e-9)
         assert srcc(both).value["success"] == pytest.approx(float(task["pearson"]), abs=1e-9)
-
-
-def test_simplers_figures_come_out_by_its_double_loop():
-    """B and C change places: that costs each of them 0.3, and A nothing."""
-    result = mmrv(compare(proxy=of_means(0.9, 0.4, 0.6), target=of_means(0.8, 0.5, 0.2), metrics=[Metric("m")]))
-    assert result.value["m"] == pytest.approx((0 + 0.3 + 0.3) / 3)
-
-    rng = np.random.default_rng(0)
-    proxy, target = rng.integers(0, 4, size=(2, 40, 5, 1)).astype(float)
-    for direction, sign in (("max", 1), ("min", -1)):
-        values = mmrv_of_means(proxy, target, [Metric("m", direction)])[:, 0]
-        expected = [simplers_loop(sign * p[:, 0], sign * t[:, 0]) for p, t in zip(proxy, target, strict=True)]
-        np.testing.assert_allclose(values, expected, atol=1e-12)
-
-    tied, target = of_means(0.5, 0.5, 0.5), of_means(0.1, 0.4, 0.9)
-    higher, lower = (compare(proxy=tied, target=target, metrics=[Metric("m", way)]) for way in ("max", "min"))
-    assert mmrv(higher).value["m"] == pytest.approx((0 + 0.3 + 0.8) / 3)
-    assert mmrv(lower).value["m"] == pytest.approx((0.8 + 0.5 + 0) / 3)
 
 
 def simplers_loop(proxy, target):

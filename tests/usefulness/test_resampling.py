@@ -16,36 +16,28 @@ def noisy(seed, agents=6, episodes=5, noise=1.0):
     return table_of(rng.normal(size=(agents, 1, 2)) + noise * rng.normal(size=(agents, episodes, 2)))
 
 
-def test_paired_episodes_are_resampled_alike_for_all_agents_and_both_domains():
+def test_paired_episodes_are_resampled_alike_for_agents_and_domains_and_those_of_other_labels_apart():
     """Scores that depend on the start alone stay equal in every resample."""
     starts = np.random.default_rng(0).normal(size=(1, 5, 2)).repeat(4, axis=0)
     means = bootstrap_means(compare(proxy=table_of(starts), target=table_of(starts), metrics=M), resamples=50, seed=1)
     np.testing.assert_array_equal(means[0], means[1])
     assert np.ptp(means[0], axis=1).max() == 0.0
     assert np.ptp(means[0], axis=0).min() > 0.0
-
-
-def test_episodes_of_other_labels_are_resampled_apart():
-    starts = np.random.default_rng(0).normal(size=(1, 5, 2)).repeat(4, axis=0)
     inputs = compare(proxy=table_of(starts, "abcde"), target=table_of(starts), metrics=M)
     means = bootstrap_means(inputs, resamples=50, seed=1)
     assert np.abs(means[0] - means[1]).max() > 0.0
 
 
-def test_the_interval_holds_the_value_even_where_noise_flips_pairs_in_every_resample():
+def test_the_interval_holds_the_value_follows_from_the_seed_and_is_a_point_without_noise():
     same = noisy(1, agents=8, noise=3.0).unpaired()
     result = bootstrap_prpv(proxy=same, target=noisy(1, agents=8, noise=3.0), metrics=M)
     assert result.value == result.low == 0
     assert result.expected > 5
-
-
-def test_the_interval_follows_from_the_seed_and_is_a_point_without_noise():
     sides = {"proxy": noisy(1, episodes=9), "target": noisy(2, episodes=9), "metrics": M}
     first, again, other = (bootstrap_prpv(**sides, seed=seed) for seed in (1, 1, 2))
     assert (first.expected, first.low, first.high) == (again.expected, again.low, again.high)
     assert first.expected != other.expected
-    still = {"proxy": noisy(1, noise=0.0), "target": noisy(2, noise=0.0)}
-    result = bootstrap_prpv(**still, metrics=M)
+    result = bootstrap_prpv(**{"proxy": noisy(1, noise=0.0), "target": noisy(2, noise=0.0)}, metrics=M)
     assert result.low == result.high == result.value == result.expected
     assert result.value > 0
 

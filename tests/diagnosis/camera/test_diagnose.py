@@ -117,7 +117,7 @@ LOGS = {
 
 
 @pytest.mark.slow
-def test_nothing_is_missing_of_a_nominal_camera():
+def test_nothing_is_missing_of_a_nominal_camera_and_a_lens_outside_the_catalogue_is_not_explained():
     found = diagnosed_frames("nominal")
     assert (found.verdict, found.effects) == ("nothing missing", ())
     low, high = found.declared["camera_pitch"].interval
@@ -125,10 +125,6 @@ def test_nothing_is_missing_of_a_nominal_camera():
     assert set(found.declared) == set(found.theta) == {"camera_pitch"}
     assert found.matched > 0.9
     assert found.notes == ()
-
-
-@pytest.mark.slow
-def test_a_lens_that_the_catalogue_does_not_have_is_not_explained():
     found = diagnosed_frames("waved")
     assert found.verdict in ("partly explained", "unexplained")
     assert found.residual_fields[1].significant
@@ -209,15 +205,13 @@ def moved(line, by_m):
     there = project(views, at_truth(views))
     own = (there.marks.line == LINES.index(line)) & (there.marks.stretch == STRETCH)
     # The edge moves by side · by against the distance's slope; normals point into the marking, so with it
-    size = np.where(own & there.near, there.marks.side * by_m / there.metres, 0.0)
-    return pushed(views, size)
+    return pushed(views, np.where(own & there.near, there.marks.side * by_m / there.metres, 0.0))
 
 
 @pytest.mark.parametrize("line", ["left white line", "right white line", "yellow line"])
 @pytest.mark.parametrize("by_m", [0.01, -0.01])
 def test_a_line_ten_millimetres_beside_its_place_is_told_first(line, by_m):
-    laid = describe_map(fitted(moved(line, by_m)))
-    first = laid.lines[0]
+    first = describe_map(fitted(moved(line, by_m))).lines[0]
     assert (first.line, first.stretch) == (line, STRETCH)
     assert first.right_m == pytest.approx(by_m, abs=0.0035)
     low, high = first.interval
@@ -233,7 +227,7 @@ def test_little_is_told_of_a_map_that_lies_where_it_should():
         assert laid.offset[name].value == pytest.approx(0.0, abs=within)
 
 
-def test_a_whole_map_that_lies_off_and_wider_lines_are_told():
+def test_a_whole_map_that_lies_off_and_wider_lines_are_told_the_farthest_line_first():
     """Poses are those of a tracker whose frame has the map 15 mm to the right, 10 mm down and 1° turned."""
     views = stood()
     middle, by, turn = np.array(ROAD.size) / 2.0, np.array((0.015, -0.01)), np.radians(1.0)
@@ -254,9 +248,6 @@ def test_a_whole_map_that_lies_off_and_wider_lines_are_told():
     out = np.where(views.edges.white & there.near, -0.002 / there.metres, 0.0)
     before, after = (describe_map(fitted(each)).widths["white lines"].value for each in (views, pushed(views, out)))
     assert after - before == pytest.approx(0.004, abs=0.001)
-
-
-def test_the_farthest_line_comes_first():
     fit = everything()
     tape = np.zeros_like(fit.state.tape)
     tape[[0, 1, 2]] = 0.03, -0.06, 0.04

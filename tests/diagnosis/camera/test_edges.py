@@ -83,8 +83,7 @@ def test_normals_are_unit_vectors_from_the_floor_into_the_marking(angle, offset,
 def test_yellow_edges_are_told_by_their_colour_on_either_side():
     """Strong yellow is not clipped, which would move its edges outwards by 0.2 pixels and make the tape look wider."""
     edges = find_edges(yellow_striped(0.3, 1.0))
-    yellow = edges.only(~edges.white)
-    away, _ = along_normal(yellow, 0.3, 1.0)
+    away, _ = along_normal(edges.only(~edges.white), 0.3, 1.0)
     assert len(away) > 80
     sides = [np.abs(away[way * away > 0.0]).mean() - 6.0 for way in (-1.0, 1.0)]
     assert sides == pytest.approx([0.0, 0.0], abs=0.03)
@@ -107,7 +106,7 @@ def test_nothing_is_found_in_a_flat_picture_nor_in_one_of_nothing_but_sky(colour
     assert [len(field) for field in edges] == [0] * 5
 
 
-def test_noise_the_sky_and_the_picture_s_border_have_no_edges():
+def test_noise_sky_and_border_have_no_edges_and_points_are_sorted_by_picture_whatever_brightness():
     noise = np.random.default_rng(1).normal(0.0, 2.0, (1, ROWS, COLUMNS, 3))
     shown = np.clip(striped(0.3, 0.0) + noise, 0, 255).astype(np.uint8)
     away, _ = along_normal(find_edges(shown), 0.3, 0.0)
@@ -125,9 +124,6 @@ def test_noise_the_sky_and_the_picture_s_border_have_no_edges():
     edges = find_edges(striped(np.pi / 2.0, -27.0, half_width=2.5))
     assert edges.row.min() >= gathering.BORDER
     assert len(find_edges(striped(0.0, -COLUMNS / 2.0, half_width=1.0)).row) == 0
-
-
-def test_points_are_sorted_by_picture_and_brightness_does_not_move_them():
     shown = pictures({}, lane_poses(4), columns=96)
     edges = find_edges(shown)
     assert (np.diff(edges.frame) >= 0).all()
@@ -136,8 +132,7 @@ def test_points_are_sorted_by_picture_and_brightness_does_not_move_them():
     np.testing.assert_array_equal(alone.column, own.column)
     np.testing.assert_array_equal(alone.white, own.white)
     shown = striped(0.4, 1.0)
-    dark = (shown * 0.4).astype(np.uint8)
-    away, _ = along_normal(find_edges(dark), 0.4, 1.0)
+    away, _ = along_normal(find_edges((shown * 0.4).astype(np.uint8)), 0.4, 1.0)
     assert len(away) > 80
     assert np.abs(np.abs(away) - 6.0).max() < 0.2
 
@@ -165,7 +160,7 @@ def frames_at(times, drives=None):
     return Frames((), np.zeros(len(times), dtype=int) if drives is None else np.array(drives), times, "small_loop")
 
 
-def test_a_drive_is_looked_up_smoothed_at_its_latency():
+def test_a_drive_is_looked_up_smoothed_at_its_latency_each_frame_in_its_own_across_a_missing_pose():
     times = np.linspace(1.0, 8.0, 30)
     tracks, numbers = track_frames(log_of(episode()), frames_at(times))
     poses, rates = tracks.at(0.0)
@@ -188,29 +183,6 @@ def test_a_drive_is_looked_up_smoothed_at_its_latency():
     np.testing.assert_allclose(tracks.at(0.13)[0], circle(times - 0.13), atol=6e-4)
     late, now = tracks.at(0.13)[0], tracks.at(0.0)[0]
     np.testing.assert_allclose(np.linalg.norm((now - late)[:, :2], axis=1), SPEED * 0.13, rtol=0.02)
-
-
-def test_frames_standing_still_keep_their_poses_and_those_between_two_or_in_a_long_gap_are_left_out():
-    times = np.arange(25.0)
-    poses = np.random.default_rng(3).normal(size=(25, 3))
-    still = LogEpisode("stills", times, np.zeros((25, 0)), poses, None)
-    tracks, numbers = track_frames(log_of(still, rate=0.0), frames_at(times[::2]))
-    np.testing.assert_array_equal(tracks.at(0.0)[0], poses[::2])
-    assert (tracks.share, tracks.moving, len(numbers)) == (1.0, False, 13)
-
-    times = 0.1 * np.arange(25.0)
-    still = LogEpisode("stills", times, np.zeros((25, 0)), circle(times), None)
-    _, numbers = track_frames(log_of(still, rate=0.0), frames_at([0.3, 0.35, 0.4]))
-    np.testing.assert_array_equal(numbers, [0, 2])
-
-    drive = episode()
-    gap = (drive.times > 4.0) & (drive.times < 4.0 + 2.0 * gathering.LONGEST_GAP_S)
-    drive.poses[gap] = np.nan
-    _, numbers = track_frames(log_of(drive), frames_at([3.9, 4.2, 4.3, 4.6, -0.2, 12.0]))
-    np.testing.assert_array_equal(numbers, [0, 3])
-
-
-def test_a_missing_pose_is_bridged_and_each_frame_looked_up_in_its_own_drive():
     drive = episode()
     drive.poses[80] = np.nan
     tracks, numbers = track_frames(log_of(drive), frames_at([4.0]))
@@ -228,7 +200,24 @@ def test_a_missing_pose_is_bridged_and_each_frame_looked_up_in_its_own_drive():
     np.testing.assert_allclose(tracks.at(0.0)[0], circle([5.0]), atol=1e-3)
 
 
-def test_frames_of_another_clock_are_refused_in_one_line():
+def test_frames_standing_still_keep_their_poses_and_those_in_a_long_gap_or_of_another_clock_are_left_out():
+    times = np.arange(25.0)
+    poses = np.random.default_rng(3).normal(size=(25, 3))
+    still = LogEpisode("stills", times, np.zeros((25, 0)), poses, None)
+    tracks, numbers = track_frames(log_of(still, rate=0.0), frames_at(times[::2]))
+    np.testing.assert_array_equal(tracks.at(0.0)[0], poses[::2])
+    assert (tracks.share, tracks.moving, len(numbers)) == (1.0, False, 13)
+
+    times = 0.1 * np.arange(25.0)
+    still = LogEpisode("stills", times, np.zeros((25, 0)), circle(times), None)
+    _, numbers = track_frames(log_of(still, rate=0.0), frames_at([0.3, 0.35, 0.4]))
+    np.testing.assert_array_equal(numbers, [0, 2])
+
+    drive = episode()
+    gap = (drive.times > 4.0) & (drive.times < 4.0 + 2.0 * gathering.LONGEST_GAP_S)
+    drive.poses[gap] = np.nan
+    _, numbers = track_frames(log_of(drive), frames_at([3.9, 4.2, 4.3, 4.6, -0.2, 12.0]))
+    np.testing.assert_array_equal(numbers, [0, 3])
     with pytest.raises(LogError, match="no frame has a pose near its time; check that times are on the poses' clock"):
         track_frames(log_of(episode()), frames_at([1000.0, 1001.0]))
 
@@ -281,8 +270,7 @@ def test_every_error_of_the_tape_has_a_place_of_its_own(stretches):
     shifts = tape.shift(stretch, line)
     tilts = tape.tilt(stretch[line < gathering.TILTED], line[line < gathering.TILTED])
     white, yellow = np.array([True, False, False]), np.array([0, 2, 3])
-    widths = tape.width(white, yellow)
-    places = np.concatenate((shifts, tilts, widths))
+    places = np.concatenate((shifts, tilts, tape.width(white, yellow)))
     assert sorted(places.tolist()) == list(range(tape.size))
     # Both white lines have one width
     assert tape.width(np.array([True]), np.array([0])) == tape.width(np.array([True]), np.array([1]))
@@ -312,7 +300,15 @@ def log(folder):
     return read_log(folder)
 
 
-def test_what_a_log_says_of_its_tracker_is_held_and_else_assumed(log):
+def test_too_few_markings_are_refused_and_of_many_frames_some_spread_evenly_with_a_stated_scatter(
+    log, tmp_path, monkeypatch
+):
+    pictures = gather_views(log, log.frames, ROBOT).pictures.copy()
+    pictures[3:10] = 60
+    write_pictures(tmp_path, pictures)
+    frames = replace(log.frames, paths=tuple(tmp_path / (PICTURES % number) for number in range(COUNT)))
+    problem = "17 of 24 frames show markings; the camera needs 20: drive nearer to the lines, or check the map"
+    assert complaint_of(gather_views, log, frames, ROBOT) == f"{log.name}: frames: {problem}"
     gathered = gather_views(log, log.frames, ROBOT)
     views = gathered.views
     np.testing.assert_array_equal(gathered.numbers, np.arange(COUNT))
@@ -321,35 +317,19 @@ def test_what_a_log_says_of_its_tracker_is_held_and_else_assumed(log):
     assert (views.optics.rows, views.optics.columns) == (72, 96)
     assert (views.position_m, views.heading_rad) == pytest.approx((0.002, np.radians(0.3)))
     assert views.tape_m == views.markings.road.paint.tape_m == 0.005
-    frames = replace(log.frames, position_m=None, heading_deg=None)
-    views = gather_views(log, frames, ROBOT).views
+    views = gather_views(log, replace(log.frames, position_m=None, heading_deg=None), ROBOT).views
     assert (views.position_m, views.heading_rad) == pytest.approx((0.005, np.radians(1.0)))
-
-
-def test_of_a_long_log_frames_are_spread_evenly(log, monkeypatch):
     monkeypatch.setattr(gathering, "MOST_FRAMES", 21)
     numbers = gather_views(log, log.frames, ROBOT).numbers
     assert (len(numbers), numbers[0], numbers[-1]) == (21, 0, COUNT - 1)
     assert set(np.diff(numbers)) <= {1, 2}
 
 
-def test_too_few_markings_are_refused_in_one_line_with_the_count(log, tmp_path):
-    pictures = gather_views(log, log.frames, ROBOT).pictures.copy()
-    pictures[3:10] = 60
-    write_pictures(tmp_path, pictures)
-    frames = replace(log.frames, paths=tuple(tmp_path / (PICTURES % number) for number in range(COUNT)))
-    problem = "17 of 24 frames show markings; the camera needs 20: drive nearer to the lines, or check the map"
-    assert complaint_of(gather_views, log, frames, ROBOT) == f"{log.name}: frames: {problem}"
-
-
-def test_a_robot_without_a_camera_is_refused_before_pictures_are_read(log):
+def test_a_robot_without_a_camera_is_refused_beforehand_and_a_map_is_a_shipped_one_or_a_file(log):
     geometry = {"wheel_radius": 0.03, "effective_baseline": 0.16, "full_speed": 0.6}
     frames = replace(log.frames, paths=(Path("nowhere.png"),) * COUNT)
     with pytest.raises(SettingsError, match="camera"):
         gather_views(log, frames, robot_from_geometry("cart", geometry, 20.0))
-
-
-def test_a_map_is_one_of_the_package_s_or_a_file():
     file = shipped("robots") / "maps" / "horseshoe.toml"
     assert read_road(str(file)).segments == read_road("horseshoe").segments
     with pytest.raises(SettingsError):

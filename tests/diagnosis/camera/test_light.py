@@ -50,18 +50,15 @@ def test_a_bumper_leaves_no_contrast_where_markings_pass():
 
 
 @pytest.mark.slow
-def test_the_largest_blemish_comes_first():
+def test_the_largest_blemish_comes_first_and_a_clean_camera_has_none_whatever_light_or_lamps():
     model, seen = scene()
     spots = dirty(dirty(seen, 75, 40, diameter=12.0), 95, 110, diameter=26.0)
     first, second = blemishes(logged(spots), model)
     assert first.share > second.share
     assert first.columns[0] > 80 > second.columns[1]
-
-
-@pytest.mark.slow
-def test_a_clean_camera_has_no_blemishes_whatever_its_light():
-    model, seen = scene()
     assert blemishes(logged(seen, 0.8, 1.3, 0.3, drift=0.1, noise=3.0), model) == ()
+    model, _ = scene()
+    assert blemishes(logged(drawn(on_the_road(), unevenly_lit()), noise=2.0), model) == ()
 
 
 @functools.cache
@@ -72,12 +69,6 @@ def unevenly_lit():
     lamps = np.kron(1.0 + 0.15 * lamps / lamps.std(), np.ones((8, 8)))
     pixels = np.clip(plain.pixels * lamps[..., None], 0, 255).astype(np.uint8)
     return Floor(pixels, plain.pixels_per_metre, plain.origin)
-
-
-@pytest.mark.slow
-def test_lamps_over_the_floor_are_not_fixed_to_the_camera():
-    model, _ = scene()
-    assert blemishes(logged(drawn(on_the_road(), unevenly_lit()), noise=2.0), model) == ()
 
 
 def test_without_markings_or_floor_nothing_can_be_told():
@@ -125,12 +116,17 @@ def test_a_camera_without_faults_comes_out_neutral():
     np.testing.assert_array_equal(light.levels, 1.0)
 
 
-def test_each_frame_has_a_level_where_the_exposure_is_automatic():
+def test_each_frame_has_a_level_where_exposure_is_automatic_and_one_paint_tells_neither_gain_nor_gamma():
     model, seen = scene()
     seen = seen[:30].copy()
     half = fit_light(np.concatenate((logged(seen[:15]), logged(seen[15:], 0.5))), model[:30], floor())
     assert half.levels[:15].mean() / half.levels[15:].mean() == pytest.approx(2.0, rel=0.05)
     assert np.log(half.levels).mean() == pytest.approx(0.0, abs=1e-6)
+    plain = np.tile(PAINTS[0].astype(np.float32), (20, 120, 160, 1))
+    light = fit_light(logged(plain, vignetting=0.4, noise=2.0), plain, floor())
+    assert not light.gain.identified
+    assert not light.gamma.identified
+    assert light.vignetting.value == pytest.approx(0.4, abs=0.03)
 
 
 @pytest.mark.slow
@@ -145,24 +141,12 @@ def test_unknown_paint_leaves_exposure_open_but_not_vignetting():
     assert inside(light.vignetting, 0.3)
 
 
-def test_one_paint_tells_neither_gain_nor_gamma():
-    plain = np.tile(PAINTS[0].astype(np.float32), (20, 120, 160, 1))
-    light = fit_light(logged(plain, vignetting=0.4, noise=2.0), plain, floor())
-    assert not light.gain.identified
-    assert not light.gamma.identified
-    assert light.vignetting.value == pytest.approx(0.4, abs=0.03)
-
-
-def test_shining_the_fitted_light_gives_the_logged_brightness():
+def test_shining_the_fitted_light_gives_the_logged_brightness_on_flat_places_away_from_edges():
     model, seen = scene()
     model, frames = model[:40], logged(seen[:40], 0.8, 1.3, 0.3, drift=0.1)
     flat = flat_places(model, floor()) >= 0
-    lit = fit_light(frames, model, floor()).shine(model)
-    assert abs((lit - frames)[flat].mean()) < 2.0
+    assert abs((fit_light(frames, model, floor()).shine(model) - frames)[flat].mean()) < 2.0
     assert abs((model - frames)[flat].mean()) > 15.0
-
-
-def test_flat_places_keep_away_from_edges_and_horizon():
     model, _ = scene()
     flat = flat_places(model[:5], floor()) >= 0
     frame, row, column = np.nonzero(flat[:, 3:-3, 3:-3])

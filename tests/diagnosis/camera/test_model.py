@@ -36,7 +36,7 @@ def sharpness(shown):
     return (np.diff(shown[:, 70:], axis=2) ** 2).mean()
 
 
-def test_without_effects_pictures_are_those_of_the_domain_s_camera(tmp_path):
+def test_pictures_are_those_of_the_domain_s_camera_in_the_order_asked_for_from_where_it_was(tmp_path):
     """Of LaneFollowing, at exact poses, in the robot's own size."""
     family = LaneFollowing("duckiebot", "planar", "ground_plane", ROAD, 4.0, 0.0, 0.0, (), tmp_path)
     robot = read_robot("duckiebot")
@@ -49,9 +49,6 @@ def test_without_effects_pictures_are_those_of_the_domain_s_camera(tmp_path):
     mine = draw_pictures(views, at_truth(views, theta), {}, FRAMES)
     np.testing.assert_array_equal(mine, instance.camera.render(poses))
     assert make_episode(theta, agent="none", start=0, seed=1).theta
-
-
-def test_frames_are_drawn_in_the_order_asked_for_from_where_the_camera_was():
     views, by = scenes()[0], np.array((0.01, -0.02, 0.05))
     state = replace(at_truth(views), poses=np.tile(by, (4, 1)))
     np.testing.assert_array_equal(draw_pictures(views, state, {}, FRAMES), pictures({}, lane_poses(4) + by))
@@ -190,7 +187,7 @@ def test_residuals_vanish_at_the_truth_and_not_beside_it(theta):
     assert np.median(np.abs(wrong.residual[wrong.valid])) > 1.0
 
 
-def test_a_drive_s_residuals_vanish_at_its_latency_and_readout():
+def test_a_drive_s_residuals_vanish_at_its_latency_and_edges_of_other_polarity_do_not_count():
     truth = {"camera_latency": 0.12, "rolling_shutter": 0.04}
     views = driven(truth, count=12)
     medians = [
@@ -200,9 +197,6 @@ def test_a_drive_s_residuals_vanish_at_its_latency_and_readout():
     assert medians[0] < 0.2
     assert medians[1] > 3.0 * medians[0]
     assert medians[2] > 1.05 * medians[0]
-
-
-def test_edges_of_the_other_polarity_or_above_the_horizon_do_not_count():
     views = stood(count=6, noisy=False)
     sky = views.edges._replace(row=np.full_like(views.edges.row, 5.0))
     there = project(replace(views, edges=sky), at_truth(views))

@@ -71,14 +71,10 @@ def test_a_mistake_is_named_where_few_frames_match_a_little_by_chance():
 
 
 @pytest.mark.slow
-def test_frames_of_somewhere_else_are_refused_with_what_to_check():
+def test_frames_of_somewhere_else_are_refused_with_what_to_check_and_poses_centimetres_off_told():
     poses = np.random.default_rng(7).permutation(lane_poses(COUNT))
     with pytest.raises(LogError, match="check that frames and rows are the same instants, the map is the right one"):
         selection.check_match("log", fitted(poses, shown()))
-
-
-@pytest.mark.slow
-def test_poses_three_centimetres_off_are_told():
     off = np.random.default_rng(3).normal(0.0, (0.03, 0.03, 0.0), (COUNT, 3))
     (note,) = selection.check_match("log", fitted(lane_poses(COUNT) + off, shown()))
     assert note.endswith("% of the markings' edges match (60 % or more is usual): poses or map are off by centimetres")
@@ -139,8 +135,7 @@ def test_what_is_declared_is_never_dropped_nor_named(size):
 
 
 def test_sets_keep_parameters_of_one_effect_together_and_all_effects_lose_nothing():
-    chosen = {effect for one in rank_subsets(linear(0)[0], (), 2) for effect in one.effects}
-    assert chosen == set(EFFECTS)
+    assert {effect for one in rank_subsets(linear(0)[0], (), 2) for effect in one.effects} == set(EFFECTS)
     assert rank_subsets(linear(3)[0], (), len(EFFECTS))[0].loss == 0.0
     assert rank_subsets(linear(3)[0], (), len(EFFECTS) + 1) == []
 
@@ -156,20 +151,16 @@ def displaced(views, by):
 
 @pytest.mark.parametrize("theta", [{}, ROLLED, pytest.param({"lens_distortion": -0.25}, marks=pytest.mark.slow)])
 def test_nothing_is_left_over_of_the_right_camera(theta):
-    full = everything(theta)
-    leftover = selection.fit_residual_field(fit_set(full, ("camera_pitch", *theta)))
+    leftover = selection.fit_residual_field(fit_set(everything(theta), ("camera_pitch", *theta)))
     assert not leftover.significant
     assert leftover.share < 0.035
 
 
-def test_a_missing_effect_is_left_over():
+def test_a_missing_effect_is_left_over_and_a_bend_outside_the_catalogue_even_with_everything_free():
     leftover = selection.fit_residual_field(fit_set(everything(ROLLED), ("camera_pitch",)))
     assert leftover.significant
     assert leftover.share > 0.1
-
-
-def test_a_bend_that_the_catalogue_does_not_have_is_left_over_with_everything_free():
-    """A wave of 1.5 pixels up and down across the picture, as no lens of the catalogue has it."""
+    # A wave of 1.5 pixels up and down across the picture, as no lens of the catalogue has it.
     views = stood()
     right, _ = places(views)
     bent = displaced(views, (0.0 * right, 1.5 * np.sin(3.0 * right)))
@@ -189,8 +180,7 @@ def test_the_field_says_how_far_markings_lie_from_where_the_model_has_them(axis)
     leftover = selection.fit_residual_field(fit)
     assert leftover.significant
     valid = project(moved, fit.state).valid
-    found = leftover.displacement(*places(moved))[valid, axis]
-    assert np.corrcoef(found, by[valid])[0, 1] > 0.9
+    assert np.corrcoef(leftover.displacement(*places(moved))[valid, axis], by[valid])[0, 1] > 0.9
     assert leftover.rms_px == pytest.approx(np.sqrt((by[valid] ** 2).mean()), rel=0.7)
 
 
@@ -201,8 +191,7 @@ def test_tape_beside_its_place_is_nothing_of_the_camera_s():
     shift = np.random.default_rng(1).normal(0.0, 0.005, (4, 40))
     there = project(views, at_truth(views))
     by = shift[there.marks.line, there.marks.stretch] * there.marks.side / there.metres
-    moved = pushed(views, by)
-    fit = fit_everything(moved, OPTICS.mounting, {}, learn_scatter=False)
+    fit = fit_everything(pushed(views, by), OPTICS.mounting, {}, learn_scatter=False)
     assert not selection.fit_residual_field(fit_set(fit, ("camera_pitch",))).significant
 
 
@@ -248,28 +237,24 @@ def test_a_planted_effect_is_named(effect):
 
 
 @pytest.mark.slow
-def test_a_pair_is_named():
+def test_a_pair_an_effect_on_another_map_one_that_needs_motion_and_one_without_a_stated_scatter_are_named():
     named = select_camera_effects(everything({"camera_roll": -4.0, "lens_distortion": -0.25}), DECLARED)
     assert set(named.effects) == {"camera_roll", "lens_distortion"}
     assert [len(one.effects) for one in named.losses] == [0, 1, 2]
     assert named.losses[0].loss > named.losses[1].loss > named.losses[2].loss
-
-
-def test_nothing_is_named_of_a_nominal_camera():
-    full = fit_everything(on("small_loop", {}), OPTICS.mounting, {}, learn_scatter=False)
-    named = select_camera_effects(full, DECLARED)
-    assert named.effects == ()
-    assert named.model.theta["camera_pitch"] == pytest.approx(19.15, abs=0.3)
-    assert named.model.names == DECLARED
-
-
-@pytest.mark.slow
-def test_an_effect_is_named_on_another_map():
     full = fit_everything(on("horseshoe", {"camera_roll": 4.0}), OPTICS.mounting, {}, learn_scatter=False)
+    assert select_camera_effects(full, DECLARED).effects == ("camera_roll",)
+    named = select_camera_effects(everything({"camera_latency": 0.12}, count=40, moving=True), DECLARED)
+    assert named.effects == ("camera_latency",)
+    assert named.model.theta["camera_latency"] == pytest.approx(0.12, abs=0.01)
+    views = replace(on("small_loop", {"camera_roll": 4.0}), position_m=0.005, heading_rad=np.radians(1.0))
+    full = fit_everything(views, OPTICS.mounting, {}, learn_scatter=True)
+    assert full.views.position_m < 0.0045
+    assert full.views.heading_rad < np.radians(0.8)
     assert select_camera_effects(full, DECLARED).effects == ("camera_roll",)
 
 
-def test_what_is_declared_is_tuned_and_what_is_known_held():
+def test_what_is_declared_is_tuned_what_is_known_held_and_nothing_named_of_a_nominal_camera():
     named = select_camera_effects(everything(ROLLED), ("camera_pitch", "camera_roll"))
     assert named.effects == ()
     assert named.declared.theta["camera_roll"] == pytest.approx(4.0, abs=0.3)
@@ -279,22 +264,11 @@ def test_what_is_declared_is_tuned_and_what_is_known_held():
     assert (full.theta["rolling_shutter"], full.theta["lens_distortion"]) == (0.03, -0.01)
     held = fit_set(full, DECLARED)
     assert (held.theta["rolling_shutter"], held.theta["lens_distortion"]) == (0.03, -0.01)
-
-
-@pytest.mark.slow
-def test_an_effect_that_needs_motion_is_named_from_a_drive():
-    named = select_camera_effects(everything({"camera_latency": 0.12}, count=40, moving=True), DECLARED)
-    assert named.effects == ("camera_latency",)
-    assert named.model.theta["camera_latency"] == pytest.approx(0.12, abs=0.01)
-
-
-@pytest.mark.slow
-def test_an_effect_is_named_by_a_tracker_that_states_no_scatter():
-    views = replace(on("small_loop", {"camera_roll": 4.0}), position_m=0.005, heading_rad=np.radians(1.0))
-    full = fit_everything(views, OPTICS.mounting, {}, learn_scatter=True)
-    assert full.views.position_m < 0.0045
-    assert full.views.heading_rad < np.radians(0.8)
-    assert select_camera_effects(full, DECLARED).effects == ("camera_roll",)
+    full = fit_everything(on("small_loop", {}), OPTICS.mounting, {}, learn_scatter=False)
+    named = select_camera_effects(full, DECLARED)
+    assert named.effects == ()
+    assert named.model.theta["camera_pitch"] == pytest.approx(19.15, abs=0.3)
+    assert named.model.names == DECLARED
 
 
 def test_costs_are_least_with_everything_free_and_others_stay_neutral():
@@ -331,22 +305,13 @@ def test_frames_standing_still_or_without_edges_hide_effects_that_the_model_has_
 
 
 @pytest.mark.slow
-def test_a_drive_shows_latency():
+def test_a_drive_shows_latency_a_stated_readout_is_not_hidden_and_far_markings_hide_where_the_lens_is():
     assert "camera_latency" not in hidden_effects(everything(count=40, moving=True), ("camera_pitch",))
-
-
-@pytest.mark.slow
-def test_a_readout_that_is_stated_is_not_hidden():
     names, stated = (*OPTICS.mounting, "camera_latency"), {"rolling_shutter": 0.02}
     full = fit_everything(driven(), names, stated, learn_scatter=False)
     assert "rolling_shutter" not in hidden_effects(full, ("camera_pitch",))
-
-
-@pytest.mark.slow
-def test_markings_far_away_alone_hide_where_the_lens_is():
     full = everything()
-    there = project(full.views, full.state)
-    far = only(full.views, np.linalg.norm(there.lever, axis=1) > 0.7)
+    far = only(full.views, np.linalg.norm(project(full.views, full.state).lever, axis=1) > 0.7)
     assert len(far.edges.row) > 300
     few = fit_everything(far, OPTICS.mounting, {}, learn_scatter=False)
     hidden, shown = hidden_effects(few, ("camera_pitch",)), hidden_effects(full, ("camera_pitch",))

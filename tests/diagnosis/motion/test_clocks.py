@@ -50,8 +50,7 @@ def test_motion_that_no_delay_accounts_for_is_told_with_its_offset_for_the_nomin
 
 
 def test_an_offset_that_a_log_asks_to_fit_is_what_the_latency_has_beside_the_nominal_delay():
-    log = replace(hidden.make_log(CASE, late_s=0.1, **SHORT), fit_clock_offset=True)
-    found = read_clocks(log, ROBOT)
+    found = read_clocks(replace(hidden.make_log(CASE, late_s=0.1, **SHORT), fit_clock_offset=True), ROBOT)
     assert found.offset.value == pytest.approx(CASE.delay + 0.1 - 0.15, abs=0.02)
     assert found.left_s == pytest.approx(0.15)
 
@@ -90,7 +89,7 @@ def test_a_clock_that_jumps_is_named_with_its_time_and_the_longer_stretch_is_kep
     assert np.isinf(found.kept_s[[0, 1, 2, 4, 5], 1]).all()
 
 
-def test_a_clock_that_jumps_in_a_third_of_the_drives_is_told_where_poses_step():
+def test_clocks_that_jump_in_a_third_of_the_drives_are_told_where_poses_step_which_alone_is_no_jump():
     late = in_one_drive(-0.3, after=500) + in_one_drive(0.2, drive=1, after=300)
     found = clocks(late)
     assert [(jump.drive, jump.time_s) for jump in found.jumps] == [
@@ -101,6 +100,14 @@ def test_a_clock_that_jumps_in_a_third_of_the_drives_is_told_where_poses_step():
     # Of drive 01 the stretch after its jump is kept, on the clock of the others.
     assert found.kept_s[1, 0] > 15.0
     np.testing.assert_allclose(found.later_s, (0.0, -0.2, 0.0, 0.0, 0.0, 0.0), atol=0.02)
+    log = hidden.make_log(CASE, **SHORT)
+
+    def moved_on(poses):
+        heading = poses[300, 2]
+        return poses + (np.arange(800) >= 300)[:, None] * (0.08 * np.cos(heading), 0.08 * np.sin(heading), 0.0)
+
+    assert len(_steps(with_poses(log, moved_on))[0]) > len(_steps(log)[0])
+    assert not read_clocks(with_poses(log, moved_on), ROBOT).jumps
 
 
 @pytest.mark.slow
@@ -118,17 +125,6 @@ def test_a_jump_is_told_where_latencies_alone_show_too_little_and_where_it_leave
     assert jump.drive == f"{one.drive:02d}"
     assert jump.time_s == pytest.approx(one.at_s, abs=2.0 if number == 154 else 4.0)
     assert jump.by_s == pytest.approx(one.by_s, abs=0.015 if number == 154 else 0.02)
-
-
-def test_poses_that_step_alone_are_no_jump_of_the_clock():
-    log = hidden.make_log(CASE, **SHORT)
-
-    def moved_on(poses):
-        heading = poses[300, 2]
-        return poses + (np.arange(800) >= 300)[:, None] * (0.08 * np.cos(heading), 0.08 * np.sin(heading), 0.0)
-
-    assert len(_steps(with_poses(log, moved_on))[0]) > len(_steps(log)[0])
-    assert not read_clocks(with_poses(log, moved_on), ROBOT).jumps
 
 
 DRIFTING = np.broadcast_to(np.arange(800) / 20.0, SHAPE)
@@ -217,7 +213,7 @@ def test_one_clock_is_left_and_commands_are_put_on_that_of_the_poses():
     assert timing.on_one_clock(log, ROBOT)[0] is log
 
 
-def test_poses_before_the_first_command_are_left_out_and_so_is_what_lies_beyond_a_jump():
+def test_poses_before_the_first_command_or_beyond_a_jump_are_left_out_also_at_times_of_their_own():
     found = clocks(in_one_drive(0.5, after=500))
     log = hidden.make_log(CASE, late_s=in_one_drive(0.5, after=500), **SHORT)
     poses = [episode.poses for episode in timing.put_on_one_clock(log, found).episodes]
@@ -228,10 +224,6 @@ def test_poses_before_the_first_command_are_left_out_and_so_is_what_lies_beyond_
     for episode in timing.put_on_one_clock(hidden.make_log(CASE, **SHORT), late).episodes:
         assert np.isnan(episode.poses[:20]).all()
         assert np.isfinite(episode.poses[20]).all()
-
-
-def test_of_poses_at_times_of_their_own_only_those_on_the_clock_are_kept():
-    log = hidden.make_log(CASE, late_s=in_one_drive(0.5, after=500), **SHORT)
     found, drives = read_clocks(log, ROBOT), list(log.episodes)
     measured = Measured(drives[3].times[::2] + 0.01, drives[3].poses[::2], np.arange(0, 800, 2))
     drives[3] = replace(drives[3], measured=measured)
@@ -243,8 +235,7 @@ def test_of_poses_at_times_of_their_own_only_those_on_the_clock_are_kept():
 @pytest.mark.slow
 def test_another_log_of_the_same_robot_is_put_on_the_same_latency():
     one, other = (hidden.make_log(CASE, late_s=late, **SHORT) for late in (0.0, 0.2))
-    found = read_clocks(other, ROBOT, read_clocks(one, ROBOT))
-    assert found.offset.value == pytest.approx(0.2, abs=0.02)
+    assert read_clocks(other, ROBOT, read_clocks(one, ROBOT)).offset.value == pytest.approx(0.2, abs=0.02)
     assert not read_clocks(one, ROBOT, read_clocks(one, ROBOT)).differ
 
 
@@ -267,7 +258,7 @@ def log(*told, rows=4000, **more):
     return Log("yard", "duckiebot", "duty", 20.0, {}, (LogEpisode("a", times, commands, poses, commands, **more),))
 
 
-def test_each_stretch_between_long_rests_is_a_drive_with_its_commands_and_poses():
+def test_each_stretch_between_long_rests_is_a_drive_and_logs_without_any_are_left_to_others():
     whole = log((30.0, 50.0), (60.0, 70.0), (120.0, 150.0))
     first, second = cut_out_long_rests(whole).episodes
     assert (first.name, second.name) == ("a from 34 s", "a from 124 s")
@@ -298,9 +289,6 @@ def test_each_stretch_between_long_rests_is_a_drive_with_its_commands_and_poses(
     for piece in cut_out_long_rests(own).episodes:
         np.testing.assert_allclose(piece.times[piece.measured.rows] + 0.01, piece.measured.times)
         assert len(piece.measured.times) == pytest.approx(len(piece.times) / 3, abs=1)
-
-
-def test_drives_without_commands_to_move_or_without_any_are_left_to_others():
     still, frames = log(), replace(log(), command="none")
     assert cut_out_long_rests(still) is still
     assert cut_out_long_rests(frames) is frames
@@ -373,12 +361,13 @@ def drives():
     return cut_into_blocks(planted_drives(TRUTH, episodes=4, seconds=20.0, noise=None))
 
 
-def test_short_drives_stay_as_they_are_and_missing_poses_missing(drives):
+def test_a_right_model_predicts_joined_increments_too_missing_poses_stay_missing_and_short_drives_whole(drives):
     assert thin(drives) is drives
     assert timing.join_increments(drives, 1) is drives
-    gaps = drives.only(np.arange(len(drives.episode)) % 50 > 4)
-    few = timing.join_increments(gaps, 4)
+    few = timing.join_increments(drives.only(np.arange(len(drives.episode)) % 50 > 4), 4)
     assert (few.last - few.first).max() <= 4 * (drives.last - drives.first).max()
+    assert np.abs(few.measured - increments(few, TRUTH)).max() < 1e-9
+    few = timing.join_increments(drives, 3)
     assert np.abs(few.measured - increments(few, TRUTH)).max() < 1e-9
 
 
@@ -392,12 +381,11 @@ def test_joined_increments_lead_from_the_first_pose_to_the_last(drives, times):
     assert (~few.linked).sum() == (~drives.linked).sum()
 
 
-def test_a_right_model_predicts_joined_increments_too(drives):
-    few = timing.join_increments(drives, 3)
-    assert np.abs(few.measured - increments(few, TRUTH)).max() < 1e-9
-
-
-def test_a_block_is_shortened_and_none_is_lost(drives, monkeypatch):
+def test_of_drives_of_two_seconds_fewer_are_taken_whole_and_else_blocks_shortened_and_none_lost(monkeypatch, drives):
+    monkeypatch.setattr(timing, "MOST", 300)
+    few = thin(cut_into_blocks(planted_drives(TRUTH, episodes=60, seconds=2.1, noise=None)))
+    assert timing.FEWEST_BLOCKS <= len(set(few.block)) < 60
+    assert len(cut(few, 2.0).begin) == len(set(few.block))
     monkeypatch.setattr(timing, "MOST", 300)
     monkeypatch.setattr(timing, "STRETCH_S", 1.0)
     few = thin(drives)
@@ -408,11 +396,3 @@ def test_a_block_is_shortened_and_none_is_lost(drives, monkeypatch):
     sizes = np.bincount(few.block)
     assert sizes.max() <= 2 * sizes.min()
     assert len(set(few.first[~few.linked])) > 1, "not always a block's beginning"
-
-
-def test_drives_of_two_seconds_stay_whole_and_fewer_are_taken(monkeypatch):
-    monkeypatch.setattr(timing, "MOST", 300)
-    drives = cut_into_blocks(planted_drives(TRUTH, episodes=60, seconds=2.1, noise=None))
-    few = thin(drives)
-    assert timing.FEWEST_BLOCKS <= len(set(few.block)) < 60
-    assert len(cut(few, 2.0).begin) == len(set(few.block))

@@ -52,7 +52,7 @@ def test_what_walks_is_compiled_once_noise_was_fitted(monkeypatch, drives, error
     assert integrate_twists(np.zeros((1, 5, 3)), 0.02) == 0.02
 
 
-def test_the_loss_is_that_of_the_whitener_outliers_and_all(drives, errors):
+def test_the_loss_is_that_of_the_whitener_and_noise_the_same_without_numba(drives, errors, uncompiled, monkeypatch):
     errors = errors.copy()
     errors[::20] *= 8.0
     band = innovations._covariance(drives, np.square((*NOISE.drive, *NOISE.pose))).reshape(6, -1, 3)
@@ -60,9 +60,6 @@ def test_the_loss_is_that_of_the_whitener_outliers_and_all(drives, errors):
     assert not drives.linked.all()
     expected = -innovations.log_likelihood(errors, whitener(drives, NOISE))
     assert compiled.loss(band, errors, HUBER) == pytest.approx(expected, rel=1e-12)
-
-
-def test_noise_is_the_same_without_numba(uncompiled, monkeypatch, drives, errors):
     plain = fit_noise(drives, errors, FIRST_GUESS)
     monkeypatch.setattr(innovations, "_by_numba", lambda: compiled)
     fast = fit_noise(drives, errors, FIRST_GUESS)

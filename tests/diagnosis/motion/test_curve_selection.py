@@ -29,51 +29,42 @@ def summed(given, weights=None):
 WEIGHTS = np.concatenate((np.zeros(3), (0.5, -0.3, 0.2, 0.4), np.zeros(8)))
 
 
-def test_the_group_that_is_there_and_gains_most_is_chosen_first():
+def test_the_group_that_gains_most_is_chosen_first_and_curves_over_two_signals_pulled_firmly():
     chosen = choose_groups(summed(slopes(WEIGHTS)), COLUMNS, RULES)
     assert list(chosen.gains) == ["other"]
     np.testing.assert_allclose(chosen.weights, WEIGHTS, atol=0.02)
     chosen = choose_groups(summed(slopes(WEIGHTS + np.eye(15)[0] * 0.2)), COLUMNS, RULES)
     assert list(chosen.gains) == ["other", "one"]
     assert chosen.gains["other"] > chosen.gains["one"] > 0.0
+    assert min(RIDGES) < FIRMEST_ONLY["speed_and_turn"] <= max(RIDGES)
+    truth = np.concatenate((np.zeros(7), 0.3 * np.ones(8)))
+    weights = choose_groups(summed(slopes(truth, noise=0.0)), COLUMNS, RULES).weights
+    assert np.all(np.abs(weights[7:]) < 0.95 * 0.3)
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_nothing_is_chosen_of_noise(seed):
+def test_nothing_is_chosen_of_noise_nor_any_rare_moment(seed):
     chosen = choose_groups(summed(slopes(np.zeros(15), seed=seed)), COLUMNS, RULES)
     assert not chosen.gains
     assert not chosen.weights.any()
+    assert not choose_groups(summed(slopes(np.zeros(15), seed=seed)), COLUMNS, RULES, rare=True).gains
 
 
-def test_a_group_that_helps_every_part_is_chosen_however_uneven_their_errors_are():
+def test_the_group_that_gains_most_is_chosen_however_uneven_errors_are_and_few_wild_ones_hardly_count():
     scale = np.repeat([30.0, *np.ones(PARTS - 1)], 40)
     plain = slopes(WEIGHTS)
     loud = Slopes(plain.residuals * scale[:, None], plain.columns * scale[:, None, None], plain.block)
     given = summed(loud)
     assert given.size.max() > 10.0 * given.size.sum() / PARTS * 0.5
     assert list(choose_groups(given, COLUMNS, RULES).gains) == ["other"]
-
-
-def test_a_few_wild_errors_hardly_move_the_weights():
     np.testing.assert_allclose(
         choose_groups(summed(slopes(WEIGHTS, odd=12)), COLUMNS, RULES).weights, WEIGHTS, atol=0.05
     )
-
-
-def test_errors_are_counted_from_no_weights_wherever_they_were_linearised():
-    plain = slopes(WEIGHTS)
     moved = plain._replace(residuals=plain.residuals - plain.columns @ WEIGHTS)
     np.testing.assert_allclose(
         summed(moved, WEIGHTS).gradient / PARTS, summed(plain).gradient / PARTS, rtol=1.0, atol=8.0
     )
     np.testing.assert_allclose(choose_groups(summed(moved, WEIGHTS), COLUMNS, RULES).weights, WEIGHTS, atol=0.02)
-
-
-def test_curves_over_two_signals_are_always_pulled_firmly():
-    assert min(RIDGES) < FIRMEST_ONLY["speed_and_turn"] <= max(RIDGES)
-    truth = np.concatenate((np.zeros(7), 0.3 * np.ones(8)))
-    weights = choose_groups(summed(slopes(truth, noise=0.0)), COLUMNS, RULES).weights
-    assert np.all(np.abs(weights[7:]) < 0.95 * 0.3)
 
 
 def test_a_group_of_rare_moments_is_chosen_by_what_it_takes_of_all_error_where_that_is_asked():
@@ -88,11 +79,6 @@ def test_a_group_of_rare_moments_is_chosen_by_what_it_takes_of_all_error_where_t
     assert not choose_groups(given, COLUMNS, RULES).gains
     assert list(choose_groups(given, COLUMNS, RULES, rare=True).gains) == ["other"]
     assert not choose_groups(given, COLUMNS, replace(RULES, rare_group_share=0.99), rare=True).gains
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_no_rare_moment_is_chosen_of_noise(seed):
-    assert not choose_groups(summed(slopes(np.zeros(15), seed=seed)), COLUMNS, RULES, rare=True).gains
 
 
 @pytest.mark.parametrize(("always", "alone"), [("level", ["level"]), ("model", [])])

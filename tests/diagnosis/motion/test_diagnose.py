@@ -61,16 +61,13 @@ def test_what_another_rule_would_have_said_is_an_argument(diagnosis):
     assert (asked.rules, diagnosis.rules) == (strict, RULES)
 
 
-def test_declared_values_are_those_before_the_effect_and_all_values_those_after(diagnosis):
+def test_declared_values_are_those_before_the_effect_and_errors_at_every_horizon_fall_to_the_floor(diagnosis):
     assert set(diagnosis.declared) == {"trim", "delay"}
     assert set(diagnosis.theta) == {"trim", "delay", "yaw_scrub"}
     for name, true in TRUTH.items():
         estimate = diagnosis.theta[name]
         assert estimate.interval[0] < estimate.value < estimate.interval[1]
         assert abs(estimate.value - true) < np.ptp(estimate.interval)
-
-
-def test_errors_are_told_at_every_horizon_and_fall_to_the_floor(diagnosis):
     assert [error.horizon_s for error in diagnosis.errors] == list(HORIZONS_S)
     for error in diagnosis.errors:
         assert error.before.interval[0] < error.before.value < error.before.interval[1]
@@ -84,14 +81,19 @@ def test_errors_are_told_at_every_horizon_and_fall_to_the_floor(diagnosis):
     assert error.heading_after.value < error.heading_before.value
 
 
-def test_drives_are_not_fitted_and_nothing_removable_is_left_where_nothing_was(diagnosis):
+def test_drives_are_not_fitted_nothing_removable_is_left_and_a_value_at_its_range_s_end_is_told(diagnosis):
     error = diagnosis.errors[1]
-    at_floor = error.before._replace(value=error.floor.lower)
-    assert replace(error, before=at_floor).removable_left is None
+    assert replace(error, before=error.before._replace(value=error.floor.lower)).removable_left is None
     assert replace(error, after=error.before).removable_left == 1.0
     assert diagnosis.parts.fitted.duties.shape[0] == 4
     assert diagnosis.parts.tested.duties.shape[0] == 2
     assert diagnosis.found.model.drives is diagnosis.parts.fitted
+    jitter = AdoptedEffect("delay_jitter", "", ("delay_jitter",), (), 50.0, 0.01, ())
+    highest = Estimate(PARAMETERS["delay_jitter"].high, (0.2, 0.3), "s")
+    there = replace(diagnosis, theta={**diagnosis.theta, "delay_jitter": highest})
+    assert there.at_edge(jitter) == ("delay_jitter",)
+    inside = replace(diagnosis, theta={**diagnosis.theta, "delay_jitter": replace(highest, value=0.1)})
+    assert inside.at_edge(jitter) == ()
 
 
 @pytest.mark.parametrize(("robot", "effects"), [("duckiebot", ("trim", "delay")), ("husky", ()), ("irobot_create", ())])
@@ -130,15 +132,11 @@ def test_a_stationary_robot_gets_no_answer(level):
 
 
 @pytest.mark.slow
-def test_one_drive_is_enough_if_it_is_long(monkeypatch):
+def test_one_long_drive_or_several_that_begin_at_the_origin_with_stubs_among_them_give_a_result(monkeypatch):
     look_for_few(monkeypatch)
     found = diagnose(planted_log(SCRUBBING, episodes=1, seconds=70.0), ROBOT, ("trim", "delay"))
     assert [effect.effect for effect in found.effects] == ["yaw_scrub"]
     assert found.robot_clusters is None
-
-
-@pytest.mark.slow
-def test_drives_that_all_begin_at_the_origin_and_stubs_among_them_give_a_result(monkeypatch):
     look_for_few(monkeypatch)
     drives = planted_log(SCRUBBING, episodes=6, seconds=12.0).episodes
     at_origin = driven_log(SCRUBBING, np.stack([e.commands for e in drives]), np.zeros((6, 3)))
@@ -176,15 +174,6 @@ def test_what_no_usual_robot_has_is_found_with_its_value():
     estimate = found.theta["motor_lag.time_constant"]
     assert abs(estimate.value - 1.6) < np.ptp(estimate.interval) < 0.2
     assert found.edges == ()
-
-
-def test_a_value_at_the_end_of_its_range_is_told_of_effects_that_draw_too(diagnosis):
-    jitter = AdoptedEffect("delay_jitter", "", ("delay_jitter",), (), 50.0, 0.01, ())
-    highest = Estimate(PARAMETERS["delay_jitter"].high, (0.2, 0.3), "s")
-    there = replace(diagnosis, theta={**diagnosis.theta, "delay_jitter": highest})
-    assert there.at_edge(jitter) == ("delay_jitter",)
-    inside = replace(diagnosis, theta={**diagnosis.theta, "delay_jitter": replace(highest, value=0.1)})
-    assert inside.at_edge(jitter) == ()
 
 
 CASES = {case.name: case for case in hidden.IN_FORM}

@@ -58,7 +58,7 @@ def test_too_few_blocks_or_windows_teach_nothing():
     assert len(learnt.held_out)
 
 
-def test_a_hidden_curve_is_learnt_by_its_signal_and_lowers_the_error_of_other_drives(found, tested):
+def test_a_hidden_curve_is_learnt_by_its_signal_lowers_the_error_of_other_drives_and_passes_the_guard(found, tested):
     _, learnt = found
     assert learnt.used
     assert max(learnt.share, key=lambda title: learnt.share[title]) == "turn rate"
@@ -66,9 +66,6 @@ def test_a_hidden_curve_is_learnt_by_its_signal_and_lowers_the_error_of_other_dr
     after = squares(tested, {**TRUTH, **learnt.theta})
     assert after < 0.25 * squares(tested, TRUTH)
     assert after < 1.5 * squares(tested, {**TRUTH, **TURNING})
-
-
-def test_the_guard_tells_of_blocks_that_were_not_fitted_and_wants_a_sure_gain(found):
     drives, learnt = found
     assert set(learnt.guard) == {1.0, 2.0, 5.0}
     assert np.sqrt(learnt.held_out.mean() / squares(drives, TRUTH)) == pytest.approx(learnt.guard[2.0].value)
@@ -106,24 +103,19 @@ def test_curves_that_come_nowhere_near_a_rival_are_given_up_after_three_linearis
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_nothing_is_used_where_nothing_is_missing(seed):
-    drives = planted_drives(TRUTH, episodes=6, seconds=12.0, seed=seed)
-    assert not fit_discrepancy(drives, TRUTH).used
+    assert not fit_discrepancy(planted_drives(TRUTH, episodes=6, seconds=12.0, seed=seed), TRUTH).used
 
 
-def test_slow_wheels_are_learnt_without_any_other_curve():
+def test_slow_wheels_are_learnt_alone_and_else_what_matters_in_few_drives_is_looked_for():
     drives = planted_drives({**TRUTH, "wheel_gain.left": 0.9, "wheel_gain.right": 0.9}, episodes=6, seconds=12.0)
     learnt = fit_discrepancy(drives, TRUTH)
     assert learnt.used
     assert dict(learnt.share) == {"level": 1.0}
-
-
-def test_where_nothing_is_learnt_it_is_looked_once_more_for_what_matters_in_few_drives():
     drives = planted_drives({**TRUTH, "understeer": 0.8}, episodes=6, seconds=12.0)
     learnt = fit_discrepancy(drives, TRUTH)
     assert learnt.used
     assert learnt.guard[2.0].value < 0.7
-    strict = replace(drives, rules=replace(RULES, rare_group_share=0.9))
-    assert not fit_discrepancy(strict, TRUTH).used
+    assert not fit_discrepancy(replace(drives, rules=replace(RULES, rare_group_share=0.9)), TRUTH).used
 
 
 def test_a_delay_that_stood_for_slow_commands_gives_way_to_them():
@@ -173,13 +165,10 @@ def test_names_that_hide_what_curves_could_say_are_doubtful_and_left_out_of_the_
     assert error.ratio.value == pytest.approx(error.after.value / np.sqrt(squares(tested, {**TRUTH, **names})))
 
 
-def test_what_the_guard_refuses_is_neither_told_nor_driven():
+def test_what_the_guard_refuses_is_neither_told_nor_driven_and_used_signals_come_first_each_once():
     learning = Learning(Discrepancy({"learnt.turn_rate.yaw@1.0": 0.1}, {"turn rate": 1.0}), (), False)
     assert learning.theta == {}
     assert learning.depends_on(("heading",)) == ("heading",)
-
-
-def test_signals_of_used_curves_come_first_each_once():
     learning = Learning(Discrepancy({}, {"heading": 0.2, "turn rate": 0.8}, {}, True), (), False)
     assert learning.depends_on(("position", "heading")) == ("turn rate", "heading", "position")
 

@@ -26,7 +26,7 @@ def test_they_are_those_of_numpy_for_any_angle(reach):
     np.testing.assert_allclose(cosine_and_sine(angle), (np.cos(angle), np.sin(angle)), rtol=0.0, atol=1e-14)
 
 
-def test_right_angles_are_exact_and_ticks_at_least_60_per_second():
+def test_right_angles_are_exact_ticks_at_least_60_per_second_and_sums_and_runs_by_labels_in_order():
     cosine, sine = cosine_and_sine(np.arange(-6, 7) * np.pi / 2.0)
     np.testing.assert_allclose(cosine + 1j * sine, 1j ** np.arange(-6, 7), rtol=0.0, atol=1e-14)
     assert [part.item() for part in cosine_and_sine(np.zeros(()))] == [1.0, 0.0]
@@ -34,6 +34,10 @@ def test_right_angles_are_exact_and_ticks_at_least_60_per_second():
     assert (drives.tick_hz, drives.rate_hz) == (60.0, 20.0)
     slow = replace(log(episode([0.0, 0.1, 0.2])), rate_hz=7.0)
     assert gather(slow, ROBOT, slow.episodes).tick_hz == 63.0
+    weights = np.array([2.0, 1.0, 5.0, -1.0])
+    sums = sum_by(np.array([0, 2, -1, 2]), np.arange(8.0).reshape(4, 2), 3, weights)
+    np.testing.assert_array_equal(sums, [[0, 2], [0, 0], [-4, -4]])
+    assert number_of(np.array([4, 4, 1, 7, 7])).tolist() == [0, 0, 1, 2, 2]
 
 
 SPEED_PER_RAD = 0.0318 / 0.6
@@ -66,11 +70,9 @@ def test_poses_that_repeat_are_older_ones_and_a_robot_that_stands_shows_one_ever
     assert rows_of(gathered(episode([0.0] * 10))) == [(0, 4), (4, 8)]
 
 
-def test_increments_span_missing_poses_and_break_where_left_out():
-    second = [0.0, *[None] * 19, 1.0, 1.1]
-    assert rows_of(gathered(episode(second))) == [(0, 20), (20, 21)]
-    longer = [0.0, 0.1, *[None] * 20, 1.0, 1.1]
-    drives = gathered(episode(longer))
+def test_increments_are_linked_within_an_episode_span_missing_poses_and_break_where_left_out():
+    assert rows_of(gathered(episode([0.0, *[None] * 19, 1.0, 1.1]))) == [(0, 20), (20, 21)]
+    drives = gathered(episode([0.0, 0.1, *[None] * 20, 1.0, 1.1]))
     assert rows_of(drives) == [(0, 1), (22, 23)]
     assert drives.linked.tolist() == [False, False]
     drives = gathered(episode([0.0, 0.1, 0.2, 0.3, 0.4]), episode([0.0, 0.1, 0.2], name="b"))
@@ -79,9 +81,6 @@ def test_increments_span_missing_poses_and_break_where_left_out():
     assert some.block.tolist() == [0, 0, 0, 1]
     assert rows_of(some) == [(0, 1), (1, 2), (3, 4), (1, 2)]
     assert drives.only(drives.episode == 1).block.tolist() == [0, 0]
-
-
-def test_increments_are_linked_within_an_episode_and_need_two_poses_and_commands():
     drives = gathered(episode([0.0, 0.1, 0.2]), episode([5.0, 5.1, 5.2], name="b"))
     assert drives.linked.tolist() == [False, True, False, True]
     assert drives.episode.tolist() == [0, 0, 1, 1]
@@ -94,22 +93,26 @@ def test_increments_are_linked_within_an_episode_and_need_two_poses_and_commands
 
 def test_episodes_of_different_length_and_headings_between_are_filled():
     long = episode([0.0, 0.1, 0.2], commands=[[0.1, 0.2]] * 3)
-    short = episode([0.0, 0.1], commands=[[0.3, 0.4], [0.5, 0.6]], name="b")
-    duties = gathered(long, short).duties
+    duties = gathered(long, episode([0.0, 0.1], commands=[[0.3, 0.4], [0.5, 0.6]], name="b")).duties
     assert duties.shape == (2, 9, 2)
     np.testing.assert_array_equal(duties[1, ::3], [[0.3, 0.4], [0.5, 0.6], [0.5, 0.6]])
     one = episode([0.0, None, 0.2])
     poses = one.poses.copy()
     poses[[0, 2], 2] = (1.0, 2.0)
-    drives = gathered(replace(one, poses=poses))
-    np.testing.assert_allclose(drives.headings[0, :7], 1.0 + np.arange(7) / 6.0)
+    np.testing.assert_allclose(gathered(replace(one, poses=poses)).headings[0, :7], 1.0 + np.arange(7) / 6.0)
 
 
-def test_logs_without_two_poses_in_a_row_or_commands_are_refused():
+def test_logs_without_two_poses_in_a_row_or_commands_are_refused_and_travel_is_the_way_without_noise():
     with pytest.raises(LogError, match="yard: no two measured poses"):
         gathered(episode([0.0, None, None]))
     with pytest.raises(LogError, match="yard: has no commands"):
         duties_of(log(command="none"), ROBOT, np.empty((3, 0)))
+    random = np.random.default_rng(1)
+    x = 0.01 * np.arange(400)
+    noisy = gathered(episode(x + random.normal(0.0, 0.015, 400)))
+    assert np.abs(np.diff(noisy.poses[:, :, 0])).sum() > 5.0
+    assert noisy.travel[:, 0].sum() == pytest.approx(3.99, rel=0.03)
+    np.testing.assert_allclose(gathered(episode(x)).travel[:, 0], 0.01, rtol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -133,8 +136,7 @@ def test_more_than_full_speed_is_refused_with_what_to_state(command, given):
 
 
 def test_wheel_speeds_are_used_where_all_episodes_have_them_without_a_gap():
-    gap = episode([0.0, 0.1, 0.2], wheels=[[3.0, 4.0], [np.nan, np.nan], [5.0, 6.0]])
-    drives = gathered(gap)
+    drives = gathered(episode([0.0, 0.1, 0.2], wheels=[[3.0, 4.0], [np.nan, np.nan], [5.0, 6.0]]))
     assert drives.wheels is None
     assert drives.rest[0, 0] == pytest.approx(3.0 * SPEED_PER_RAD)
     assert gathered(episode([0.0, 0.1], wheels=[[np.nan, np.nan], [5.0, 6.0]])).rest.tolist() == [[0.0, 0.0]]
@@ -151,22 +153,6 @@ def test_wheel_speeds_are_used_where_all_episodes_have_them_without_a_gap():
     steady = gathered(episode(0.01 * np.arange(40)))
     np.testing.assert_allclose(steady.rest[0], 0.2 / ROBOT.figures["full_speed"])
     np.testing.assert_array_equal(gathered(episode(0.004 * np.arange(40) ** 2 / 40)).rest[0], 0.0)
-
-
-def test_travel_is_the_way_without_what_noise_adds():
-    random = np.random.default_rng(1)
-    x = 0.01 * np.arange(400)
-    noisy = gathered(episode(x + random.normal(0.0, 0.015, 400)))
-    assert np.abs(np.diff(noisy.poses[:, :, 0])).sum() > 5.0
-    assert noisy.travel[:, 0].sum() == pytest.approx(3.99, rel=0.03)
-    np.testing.assert_allclose(gathered(episode(x)).travel[:, 0], 0.01, rtol=1e-9)
-
-
-def test_sums_and_runs_go_by_labels_in_order():
-    weights = np.array([2.0, 1.0, 5.0, -1.0])
-    sums = sum_by(np.array([0, 2, -1, 2]), np.arange(8.0).reshape(4, 2), 3, weights)
-    np.testing.assert_array_equal(sums, [[0, 2], [0, 0], [-4, -4]])
-    assert number_of(np.array([4, 4, 1, 7, 7])).tolist() == [0, 0, 1, 2, 2]
 
 
 def at_own_times(issued, commands, rows=4, wheels=None):
@@ -213,7 +199,7 @@ def with_commands(vehicle, kind, commands, geometry=OWN):
     return replace(vehicle, robot="tractor", command=kind, geometry=dict(geometry), episodes=episodes)
 
 
-def test_a_robot_is_read_from_its_folder_or_named_or_has_the_geometry_of_its_log(vehicle):
+def test_a_robot_is_its_folder_s_the_named_one_or_the_log_s_geometry_and_its_speed_positive(vehicle):
     assert robot_of(vehicle) == read_robot("duckiebot")
     assert robot_of(vehicle, "husky") == read_robot("husky")
     assert robot_of(replace(vehicle, robot="tractor"), "duckiebot") == read_robot("duckiebot")
@@ -222,6 +208,7 @@ def test_a_robot_is_read_from_its_folder_or_named_or_has_the_geometry_of_its_log
     robot = robot_of(replace(vehicle, robot="tractor", geometry={**OWN, "full_speed": 1.5}))
     assert (robot.name, robot.theta, robot.urdf) == ("tractor", {}, None)
     assert dict(robot.figures) == {**OWN, "full_speed": 1.5, "motor_time_constant": 0.0, "control_rate": 20.0}
+    assert robot_of(with_commands(vehicle, "duty", np.zeros((200, 2)))).figures["full_speed"] > 0.0
 
 
 @pytest.mark.parametrize(
@@ -254,11 +241,6 @@ def test_full_speed_of_duties_is_how_fast_it_drove(rows):
     straight = driven_log(at_once, np.full((3, rows, 2), 0.5), np.zeros((3, 3)), noise=None)
     robot = robot_of(replace(straight, robot="tractor", geometry=dict(OWN)))
     assert robot.figures["full_speed"] == pytest.approx(0.6, rel=0.05)
-
-
-def test_full_speed_of_a_robot_that_never_moved_is_still_positive(vehicle):
-    still = with_commands(vehicle, "duty", np.zeros((200, 2)))
-    assert robot_of(still).figures["full_speed"] > 0.0
 
 
 CAR = read_robot("car")

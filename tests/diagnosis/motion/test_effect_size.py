@@ -24,8 +24,7 @@ SHORT = {"episodes": 6, "seconds": 20.0}
 def mixed(theta, of=(1, 3, 4)):
     """A log some of whose drives are another robot's."""
     one, other = planted_log(TRUTH, **SHORT), planted_log({**TRUTH, **theta}, **SHORT)
-    chosen = [(other if e in of else one).episodes[e] for e in range(6)]
-    return replace(one, episodes=tuple(chosen))
+    return replace(one, episodes=tuple([(other if e in of else one).episodes[e] for e in range(6)]))
 
 
 CASES = {case.name: case for case in (*hidden.IN_FORM, *hidden.OTHER_FORM, *hidden.OUTSIDE)}
@@ -64,13 +63,10 @@ def test_drives_on_two_floors_fall_in_two_groups_too():
     assert sorted(found.gains) == pytest.approx([0.8, 1.0], abs=0.03)
 
 
-def test_one_drive_of_another_kind_or_three_drives_make_no_second_robot():
+def test_one_drive_of_another_kind_makes_no_second_robot_and_few_at_a_time_give_the_same(monkeypatch):
     assert unlike(mixed({"trim": -0.06}, of=(1,))) is None
     log = mixed({"trim": -0.06})
     assert unlike(replace(log, episodes=log.episodes[:3])) is None
-
-
-def test_many_drives_are_looked_at_a_few_at_a_time_with_the_same_result(monkeypatch):
     drives = drives_of(mixed({"wheel_gain.left": 0.88}))
     model = fitted(drives)
     together = find_robot_clusters(drives, model)
@@ -112,8 +108,7 @@ def test_what_matters_is_kept_and_the_model_is_fitted_again_without_what_does_no
 def test_where_everything_matters_or_windows_are_too_short_nothing_is_dropped(drives):
     whole = found(drives, MIXED, adopted("yaw_scrub", SCRUB))
     assert drop_negligible(whole, 1) is whole
-    few = planted_drives(MIXED, episodes=2, seconds=4.0)
-    short = found(few, MIXED, adopted("lateral_slip", SLIP))
+    short = found(planted_drives(MIXED, episodes=2, seconds=4.0), MIXED, adopted("lateral_slip", SLIP))
     assert drop_negligible(short, 1) is short
 
 
@@ -151,13 +146,18 @@ def without(*ratios):
     return likeness.WeighedEffect(adopted("lateral_slip", SLIP), told)
 
 
-def test_an_effect_matters_or_does_harm_where_the_error_is_clearly_another():
+def test_an_effect_matters_or_does_harm_where_the_error_is_clearly_another_draws_at_several_horizons():
     assert without((1.2, 1.1, 1.3)).material
     assert without((1.0, 0.9, 1.1), (1.06, 1.01, 1.1)).material
     assert not any(without(one).material for one in ((1.2, 0.9, 1.6), (1.04, 1.02, 1.06), (0.8, 0.7, 0.9)))
     assert RULES.material_factor == 1.05
     assert without((0.9, 0.85, 0.96)).harmful
     assert not any(without(one).harmful for one in ((0.9, 0.75, 1.02), (0.97, 0.95, 0.99), (1.2, 1.1, 1.3)))
+    shown, hidden = Ratio(1.14, (1.03, 1.26)), Ratio(1.04, (1.0, 1.1))
+    lossy = adopted("dropped_commands", names=("dropped_commands",))
+    assert not likeness.WeighedEffect(lossy, {1.0: hidden, 2.0: hidden, 5.0: shown}).material
+    assert likeness.WeighedEffect(lossy, {1.0: hidden, 2.0: shown, 5.0: shown}).material
+    assert likeness.WeighedEffect(lossy, {2.0: shown}).material
 
 
 @pytest.mark.slow
@@ -170,14 +170,6 @@ def test_draws_do_not_matter_where_the_noise_of_poses_leaves_no_room_for_them():
     assert drawn > 0.4 * np.sqrt(np.mean(errors**2)), "by their size alone they would matter"
     kept = drop_negligible(found(calm, jittery.theta, adopted("delay_jitter", names=("delay_jitter",))), 1)
     assert kept.adopted == ()
-
-
-def test_draws_matter_only_where_more_than_one_horizon_shows_them():
-    shown, hidden = Ratio(1.14, (1.03, 1.26)), Ratio(1.04, (1.0, 1.1))
-    lossy = adopted("dropped_commands", names=("dropped_commands",))
-    assert not likeness.WeighedEffect(lossy, {1.0: hidden, 2.0: hidden, 5.0: shown}).material
-    assert likeness.WeighedEffect(lossy, {1.0: hidden, 2.0: shown, 5.0: shown}).material
-    assert likeness.WeighedEffect(lossy, {2.0: shown}).material
 
 
 VISIBILITY_DECLARED = {"trim", "delay"}
@@ -205,12 +197,8 @@ def test_effects_of_motion_are_unseen_in_the_catalogues_order_unless_declared_or
 
 
 @pytest.mark.slow
-def test_rich_drives_show_nearly_everything():
+def test_rich_drives_show_nearly_everything_and_commands_that_never_change_not_their_loss():
     hidden = invisible_effects(fitted(planted_drives(TRUTH, episodes=6, seconds=30.0)), VISIBILITY_DECLARED)
     assert len(hidden) <= 3
-
-
-@pytest.mark.slow
-def test_commands_that_never_change_cannot_show_their_loss():
     steady = fitted(drives_of(driven_log(TRUTH, np.full((3, 600, 2), 0.4), np.zeros((3, 3)))))
     assert {"dropped_commands", "delay_jitter"} <= set(invisible_effects(steady, VISIBILITY_DECLARED))

@@ -49,21 +49,17 @@ def found(drives, effect, *rivals):
     others = tuple(FORMS[name] for name in rivals)
     adopted = AdoptedEffect(effect, "", tuple(SIZES[effect]), own.free, 100.0, 0.002, others)
     declared = evaluate(drives, TRUTH, DECLARED, NOISE)
-    model = evaluate(drives, theta, (*DECLARED, *own.free), NOISE)
-    return Findings(declared, model, (adopted,), (), (), ())
+    return Findings(declared, evaluate(drives, theta, (*DECLARED, *own.free), NOISE), (adopted,), (), (), ())
 
 
-def test_without_rivals_there_is_nothing_to_tell_apart(drives):
-    assert design_drive(found(drives, "dead_band")) is None
-
-
-def test_where_noise_is_not_known_what_is_driven_is_driven_ten_times(drives, designed, quick):
+def test_where_noise_is_not_known_a_drive_is_driven_ten_times_and_without_rivals_nothing(drives, designed, quick):
     alone = design_drive(found(drives, "dead_band"), again=True, limits=ROOM, unseen=("saturation",))
     assert (alone.times, alone.between) == (10, ("noise", "what is missing"))
     assert alone.nats_per_minute >= alone.manoeuvre[1] > 0.0
     rivals = design_drive(found(drives, "lateral_slip", "marker_offset"), again=True, limits=ROOM)
     assert (rivals.times, rivals.between) == (10, ("lateral_slip", "marker_offset"))
     assert 3 <= designed.times < 10
+    assert design_drive(found(drives, "dead_band")) is None
 
 
 @pytest.mark.parametrize(
@@ -84,8 +80,7 @@ def test_rivals_are_told_apart_within_the_room_and_the_robots_limits(drives, qui
 @pytest.mark.slow
 def test_what_is_expected_is_the_evidence_that_fits_of_both_models_have(designed):
     theta, starts = {**TRUTH, **SIZES["lateral_slip"]}, np.zeros((3, 3))
-    log = driven_log(theta, np.repeat(designed.commands[None], 3, axis=0), starts, seed=5)
-    driven = drives_of(log)
+    driven = drives_of(driven_log(theta, np.repeat(designed.commands[None], 3, axis=0), starts, seed=5))
 
     def log_likelihood(form):
         start = {**TRUTH, **form.fixed, form.free[0][0]: 0.03, form.free[-1][0]: 0.03}
@@ -111,7 +106,7 @@ def test_a_manoeuvre_that_is_worth_as_much_is_taken(drives, quick, monkeypatch):
     assert drive.nats_per_minute == drive.manoeuvre[1]
 
 
-def test_one_seed_is_one_drive_also_without_a_room(drives, designed, quick):
+def test_one_seed_is_one_drive_imagined_from_the_middle_of_the_room_if_there_is_one(drives, designed, quick):
     again = design_drive(found(drives, "lateral_slip", "marker_offset"), limits=ROOM)
     np.testing.assert_array_equal(again.commands, designed.commands)
     course = course_of(drives, Limits())
@@ -119,9 +114,6 @@ def test_one_seed_is_one_drive_also_without_a_room(drives, designed, quick):
     assert course.room == pytest.approx(sorted(np.ptp(ends, axis=0), reverse=True))
     np.testing.assert_allclose(course.start[:2], (ends.min(axis=0) + ends.max(axis=0)) / 2.0)
     assert course.start[2] in (0.0, pytest.approx(np.pi / 2.0))
-
-
-def test_drives_are_imagined_from_the_middle_of_the_room_and_paths_beyond_it_measured(drives):
     course = course_of(drives, Limits((2.0, 2.0), seconds=5.0))
     still, straight = np.zeros((100, 2)), np.full((100, 2), 0.6)
     batch = course.imagine(np.stack((still, straight)), TRUTH)

@@ -26,7 +26,7 @@ def found(drives):
     return fitted(drives)
 
 
-def test_planted_trim_and_delay_lie_in_narrow_intervals(found):
+def test_trim_delay_and_noise_are_found_in_narrow_intervals_and_nothing_free_leaves_them_alone(found, drives):
     known = intervals(found)
     for name, true in TRUTH.items():
         low, high = known[name]
@@ -34,6 +34,9 @@ def test_planted_trim_and_delay_lie_in_narrow_intervals(found):
         assert low < found.theta[name] < high
     assert known["trim"][1] - known["trim"][0] < 0.02
     assert known["delay"][1] - known["delay"][0] < 0.03
+    np.testing.assert_allclose(found.noise.drive, NOISE.drive, rtol=0.3)
+    np.testing.assert_allclose(found.noise.pose, NOISE.pose, rtol=0.15)
+    assert fit(drives, TRUTH, ()).theta == TRUTH
 
 
 @pytest.mark.slow
@@ -45,37 +48,13 @@ def test_intervals_cover_the_truth_most_of_the_time():
     assert sum(covered) >= 12
 
 
-def test_the_noise_is_found_with_the_parameters_and_nothing_free_leaves_them_alone(found, drives):
-    np.testing.assert_allclose(found.noise.drive, NOISE.drive, rtol=0.3)
-    np.testing.assert_allclose(found.noise.pose, NOISE.pose, rtol=0.15)
-    assert fit(drives, TRUTH, ()).theta == TRUTH
-
-
-def test_parameters_that_share_a_coordinate_stay_equal():
+def test_parameters_that_share_a_coordinate_stay_equal_and_steps_and_thresholds_are_found():
     truth = {"wheel_gain.left": 0.9, "wheel_gain.right": 0.9, **TRUTH}
     drives = planted_drives(truth, episodes=3)
     both = (("wheel_gain.left", "wheel_gain.right"),)
     fit_of_gain = fit(drives, {**truth, "wheel_gain.left": 1.0, "wheel_gain.right": 1.0}, both)
     assert fit_of_gain.theta["wheel_gain.left"] == fit_of_gain.theta["wheel_gain.right"] == pytest.approx(0.9, abs=0.01)
     assert set(intervals(fit_of_gain)) == set(both[0])
-
-
-@pytest.mark.parametrize("start", [0.09, 0.2])
-def test_a_scan_finds_the_threshold_of_stiction(start):
-    truth = {**TRUTH, "stiction.breakaway": 0.14, "stiction.imbalance": 0.0}
-    drives = planted_drives(truth)
-    found = fit(drives, {**truth, "stiction.breakaway": start}, (("stiction.breakaway",),))
-    assert found.theta["stiction.breakaway"] == pytest.approx(0.14, rel=0.03)
-
-
-def test_of_steps_that_are_as_good_a_round_one_is_taken(drives, monkeypatch):
-    name = "command_quantisation"
-    monkeypatch.setattr(fitting, "loss_of", lambda drives, theta, whiten: round(abs(theta[name] - 0.25), 3))
-    theta = {**TRUTH, name: 0.2503}
-    assert fitting._scan(drives, theta, ((name,),), None, np.array([0.9, 1.1]))[name] == 0.25
-
-
-def test_steps_and_thresholds_are_found_with_intervals():
     truth = {**TRUTH, "command_quantisation": 0.25}
     free = (*DECLARED, ("command_quantisation",))
     found = fit(planted_drives(truth), {**truth, "command_quantisation": 0.2503}, free)
@@ -89,7 +68,18 @@ def test_steps_and_thresholds_are_found_with_intervals():
     assert low < 0.141 < high < low + 0.03
 
 
-def test_values_stay_within_their_bounds(drives):
+@pytest.mark.parametrize("start", [0.09, 0.2])
+def test_a_scan_finds_the_threshold_of_stiction(start):
+    truth = {**TRUTH, "stiction.breakaway": 0.14, "stiction.imbalance": 0.0}
+    found = fit(planted_drives(truth), {**truth, "stiction.breakaway": start}, (("stiction.breakaway",),))
+    assert found.theta["stiction.breakaway"] == pytest.approx(0.14, rel=0.03)
+
+
+def test_of_steps_as_good_a_round_one_is_taken_and_values_stay_within_their_bounds(drives, monkeypatch):
+    name = "command_quantisation"
+    monkeypatch.setattr(fitting, "loss_of", lambda drives, theta, whiten: round(abs(theta[name] - 0.25), 3))
+    theta = {**TRUTH, name: 0.2503}
+    assert fitting._scan(drives, theta, ((name,),), None, np.array([0.9, 1.1]))[name] == 0.25
     low, high = span(("delay",), drives)
     edge = planted_drives({"trim": 0.0, "delay": high, "motor_lag.time_constant": 0.3}, episodes=3)
     known = fit(edge, {"trim": 0.0, "delay": high - 0.02}, DECLARED).theta

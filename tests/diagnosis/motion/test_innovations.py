@@ -113,7 +113,7 @@ def replayed():
 
 
 @pytest.mark.parametrize("theta", [TRUTH, RICH], ids=["declared", "rich"])
-def test_increments_are_the_differences_of_paths(replayed, theta):
+def test_increments_are_differences_of_paths_of_which_windows_at_the_start_or_amid_them_are_parts(replayed, theta):
     walked = paths(replayed, theta)
     assert walked.shape == (3, replayed.duties.shape[1] + 1, 3)
     for index in (0, 7, 40, len(replayed.episode) - 1):
@@ -121,9 +121,16 @@ def test_increments_are_the_differences_of_paths(replayed, theta):
         step = relative(walked[episode, first], walked[episode, last])
         np.testing.assert_array_equal(increments(replayed, theta)[index], step)
     np.testing.assert_array_equal(increments(replayed, theta), innovations.increments_along(replayed, walked))
+    begins = np.unique(replayed.episode, return_index=True)[1]
+    assert replayed.first[begins].tolist() == [0, 0, 0]
+    walked = window_paths(replayed, theta, begins, 300)
+    np.testing.assert_allclose(walked, paths(replayed, theta)[replayed.episode[begins], :301], atol=1e-9)
+    walked = window_paths(replayed, theta, np.array([50]), 60)[0]
+    whole = paths(replayed, theta)[replayed.episode[50], replayed.first[50] : replayed.first[50] + 61]
+    np.testing.assert_allclose(relative(walked[0], walked), relative(whole[0], whole), atol=1e-9)
 
 
-def test_motion_is_replayed_as_it_was_driven_with_what_is_added(replayed):
+def test_motion_is_replayed_as_driven_with_what_is_added_and_windows_go_on_with_the_last_command(replayed):
     np.testing.assert_allclose(increments(replayed, TRUTH), replayed.measured, atol=1e-9)
     extra = np.zeros((*replayed.duties.shape[:2], 3))
     np.testing.assert_allclose(disturbed_increments(replayed, TRUTH, extra), increments(replayed, TRUTH), atol=1e-12)
@@ -133,34 +140,33 @@ def test_motion_is_replayed_as_it_was_driven_with_what_is_added(replayed):
     arrived, late = (innovations.arrived_commands(replayed, theta) for theta in (RICH, {"delay": 0.2}))
     assert wheel_speeds(replayed, RICH).shape == arrived.shape == replayed.duties.shape
     np.testing.assert_allclose(late[:, 12:], replayed.duties[:, :-12], atol=1e-9)
+    walked = window_paths(replayed, TRUTH, np.array([np.flatnonzero(replayed.episode == 0)[-1]]), 200)
+    steps = np.diff(walked[0], axis=0)
+    np.testing.assert_allclose(np.hypot(*steps[-1, :2]), np.hypot(*steps[-50, :2]), rtol=0.2)
+    assert np.isfinite(walked).all()
+    poses = replayed.poses.copy()
+    poses[60:] += 5.0
+    sloped = {**TRUTH, "floor_slope.x": 0.05}
+    moved, plain = (window_paths(e, sloped, np.array([50]), 90) for e in (replace(replayed, poses=poses), replayed))
+    np.testing.assert_array_equal(moved, plain)
 
 
-@pytest.mark.parametrize("theta", [TRUTH, RICH], ids=["declared", "rich"])
-def test_windows_from_an_episodes_start_are_its_path(replayed, theta):
-    begins = np.unique(replayed.episode, return_index=True)[1]
-    assert replayed.first[begins].tolist() == [0, 0, 0]
-    walked = window_paths(replayed, theta, begins, 300)
-    np.testing.assert_allclose(walked, paths(replayed, theta)[replayed.episode[begins], :301], atol=1e-9)
-
-
-@pytest.mark.parametrize("theta", [TRUTH, RICH], ids=["declared", "rich"])
-def test_a_window_in_the_middle_knows_the_commands_before_it(replayed, theta):
-    begin = np.array([50])
-    walked = window_paths(replayed, theta, begin, 60)[0]
-    whole = paths(replayed, theta)[replayed.episode[50], replayed.first[50] : replayed.first[50] + 61]
-    np.testing.assert_allclose(relative(walked[0], walked), relative(whole[0], whole), atol=1e-9)
-
-
-def test_a_window_starts_from_the_measured_wheel_speeds_where_there_are_any(replayed):
-    full = np.ones_like(replayed.duties)
-    turning = replace(replayed, wheels=full)
+def test_windows_start_from_measured_wheel_speeds_where_there_are_any_and_are_told_where_they_point(replayed):
+    turning = replace(replayed, wheels=np.ones_like(replayed.duties))
     begin = np.array([50])
     moved = [window_paths(one, TRUTH, begin, 1)[0, 1, 0] for one in (replayed, turning)]
     assert moved[1] > moved[0]
     assert moved[1] == pytest.approx(0.6 / 60.0, rel=0.1)
+    theta = {**TRUTH, "floor_slope.x": 0.05, "floor_slope.y": 0.02}
+    begin = np.flatnonzero(replayed.first % 60 == 0)[2:9]
+    assert len(begin) != len(replayed.duties)
+    measured = replace(replayed, wheels=wheel_speeds(replayed, theta))
+    plain, known = (window_paths(one, theta, begin, 60) for one in (replayed, measured))
+    np.testing.assert_allclose(known, plain, atol=0.02)
+    assert np.abs(window_paths(measured, TRUTH, begin, 60) - known).max() > 0.02
 
 
-def test_what_models_share_is_kept_and_what_differs_is_not(replayed):
+def test_what_models_share_is_kept_what_differs_is_not_and_learnt_commands_are_replayed_each(replayed, drives):
     kept = {"delay": 0.05, "trim": 0.05, "motor_lag.time_constant": 0.2}
     thetas = [kept, {**kept, "delay": 0.1}, {**kept, "trim": -0.05}, {**kept, "yaw_lag": 0.2}, kept]
     found = [(increments(replayed, theta), wheel_speeds(replayed, theta)) for theta in thetas]
@@ -170,19 +176,11 @@ def test_what_models_share_is_kept_and_what_differs_is_not(replayed):
     assert found[3][1] is found[0][1]
     with pytest.raises(ValueError, match="read-only"):
         found[0][1][:] = 0.0
-
-
-def test_windows_go_on_with_the_last_command_and_what_is_measured_later_changes_nothing(replayed):
-    last = np.array([np.flatnonzero(replayed.episode == 0)[-1]])
-    walked = window_paths(replayed, TRUTH, last, 200)
-    steps = np.diff(walked[0], axis=0)
-    np.testing.assert_allclose(np.hypot(*steps[-1, :2]), np.hypot(*steps[-50, :2]), rtol=0.2)
-    assert np.isfinite(walked).all()
-    poses = replayed.poses.copy()
-    poses[60:] += 5.0
-    sloped = {**TRUTH, "floor_slope.x": 0.05}
-    moved, plain = (window_paths(e, sloped, np.array([50]), 90) for e in (replace(replayed, poses=poses), replayed))
-    np.testing.assert_array_equal(moved, plain)
+    seen = {f"learnt.range.{of}@{end}": by for of in ("forward", "yaw") for end, by in (("low", -9.0), ("high", 9.0))}
+    weak, strong = ({**TRUTH, **seen, "learnt.duty.duty@1.0": weight} for weight in (-0.1, -0.3))
+    first, second = (wheel_speeds(drives, theta) for theta in (weak, strong))
+    np.testing.assert_allclose(second - first, 2.0 * (first - wheel_speeds(drives, TRUTH)), atol=1e-9)
+    assert np.abs(second - first).max() > 0.01
 
 
 @pytest.mark.parametrize(
@@ -211,17 +209,6 @@ def test_random_effects_are_late_by_their_mean_beside_a_declared_delay():
     assert innovations.expected_theta({"delay_jitter": 0.1}, 20.0) == {"delay": 0.05}
 
 
-def test_windows_with_measured_wheels_are_told_where_they_point(replayed):
-    theta = {**TRUTH, "floor_slope.x": 0.05, "floor_slope.y": 0.02}
-    begin = np.flatnonzero(replayed.first % 60 == 0)[2:9]
-    assert len(begin) != len(replayed.duties)
-    measured = replace(replayed, wheels=wheel_speeds(replayed, theta))
-    plain, known = (window_paths(one, theta, begin, 60) for one in (replayed, measured))
-    np.testing.assert_allclose(known, plain, atol=0.02)
-    level = window_paths(measured, TRUTH, begin, 60)
-    assert np.abs(level - known).max() > 0.02
-
-
 TICK_S = 1.0 / 60.0
 
 
@@ -233,11 +220,3 @@ def test_the_poses_are_those_of_the_planar_plant(turn, sideways):
     asked[:, 100:150, 2], asked[:, -50:] = 0.0, 0.0
     walked = integrate_twists(asked, TICK_S)
     np.testing.assert_allclose(walked[:, 1:], integrate(np.zeros((3, 3)), asked, TICK_S), rtol=0.0, atol=1e-12)
-
-
-def test_models_that_differ_in_learnt_commands_alone_are_replayed_each_by_itself(drives):
-    seen = {f"learnt.range.{of}@{end}": by for of in ("forward", "yaw") for end, by in (("low", -9.0), ("high", 9.0))}
-    weak, strong = ({**TRUTH, **seen, "learnt.duty.duty@1.0": weight} for weight in (-0.1, -0.3))
-    first, second = (wheel_speeds(drives, theta) for theta in (weak, strong))
-    np.testing.assert_allclose(second - first, 2.0 * (first - wheel_speeds(drives, TRUTH)), atol=1e-9)
-    assert np.abs(second - first).max() > 0.01

@@ -34,16 +34,14 @@ def test_latency_may_be_below_none_and_gains_are_what_the_robot_makes_of_command
 
 def test_speeds_are_taken_within_unbroken_runs_of_poses():
     drives = drives_of(planted_log({}, episodes=2, seconds=10.0))
-    hole = drives.only(np.arange(len(drives.first)) != 50)
-    speeds = measured_speeds(hole)
+    speeds = measured_speeds(drives.only(np.arange(len(drives.first)) != 50))
     assert not ((speeds.first <= drives.first[50]) & (speeds.last >= drives.last[50]) & (speeds.episode == 0)).any()
     assert np.all(speeds.last > speeds.first)
 
 
 def test_the_vertex_between_steps_is_found_where_there_is_one():
     latencies = np.arange(-10, 11) * 0.05
-    truths = np.array([0.11, 0.13, 0.12, 0.12])
-    found = likeliest_latency((latencies - truths[:, None]) ** 2, latencies)
+    found = likeliest_latency((latencies - np.array([0.11, 0.13, 0.12, 0.12])[:, None]) ** 2, latencies)
     assert found.value == pytest.approx(0.12)
     assert found.deviation == pytest.approx(np.sqrt((np.array([0.01, 0.01, 0, 0]) ** 2).sum()) / 4.0)
     assert likeliest_latency(np.ones((4, 9)), np.arange(9.0)).deviation == np.inf

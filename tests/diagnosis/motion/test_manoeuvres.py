@@ -19,7 +19,6 @@ def test_every_manoeuvre_is_described_and_stays_within_full_duty(name, text, sha
 
 
 def test_a_car_rolls_where_it_cannot_turn_on_the_spot():
-    spins = {name: shape for name, _, shape in LIBRARY}["spins"]
-    commands = commands_of(spins, TIMES, read_robot("car"))
+    commands = commands_of({name: shape for name, _, shape in LIBRARY}["spins"], TIMES, read_robot("car"))
     assert set(commands[:, 0]) == {0.4}
     assert np.ptp(commands[:, 1]) == 2.0

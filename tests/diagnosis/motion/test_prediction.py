@@ -23,8 +23,6 @@ from proxytune.effects import learnt_effect
 from proxytune.errors import LogError
 from proxytune.logs import read_log
 
-COLUMNS = ["episode", "start_time", "time", "x", "y", "heading"]
-
 
 @pytest.fixture(scope="module")
 def log():
@@ -40,9 +38,9 @@ def without_poses(log, *rows):
     return replace(log, episodes=(replace(first, poses=poses), *log.episodes[1:]))
 
 
-def test_windows_cover_every_row_and_headings_go_on(log):
+def test_windows_cover_every_row_headings_go_on_and_a_stub_at_the_end_is_not_counted(log):
     table = predict(log, ROBOT, TRUTH, 2.0)
-    assert list(table.columns) == COLUMNS
+    assert list(table.columns) == ["episode", "start_time", "time", "x", "y", "heading"]
     for name, own in table.groupby("episode"):
         assert name in ("00", "01")
         assert sorted(own.start_time.unique()) == pytest.approx([0.0, 2.0, 4.0, 6.0, 8.0])
@@ -55,9 +53,18 @@ def test_windows_cover_every_row_and_headings_go_on(log):
     far = planted_log(TRUTH, episodes=1, seconds=10.0, noise=None)
     turned = with_poses(far, lambda poses: poses + (0.0, 0.0, 40.0))
     assert predict(turned, ROBOT, TRUTH, 5.0).heading.iloc[0] == pytest.approx(turned.episodes[0].poses[0, 2])
+    table = predict(log, ROBOT, {**TRUTH, "trim": 0.1}, 1.9)
+    found = agreement(table, log, 1.9)
+    ends = table.groupby(["episode", "start_time"]).time.max().reset_index()
+    assert (ends.time - ends.start_time).min() < 0.5
+    assert found.windows == 2 * 5
+    assert found.poses == found.windows * 38
+    assert agreement(table[table.start_time < 9.0], log, 1.9) == found
 
 
-def test_exact_models_predict_noiseless_logs_slopes_and_markers(log):
+def test_exact_models_predict_random_effects_by_their_mean_and_noiseless_logs_slopes_and_markers(log):
+    late = predict(log, ROBOT, {"trim": 0.03, "delay": 0.07, "delay_jitter": 0.1}, 2.0)
+    assert agreement(late, log, 2.0).place < 1e-9
     found = agreement(predict(log, ROBOT, TRUTH, 2.0), log, 2.0)
     assert found.place < 1e-9
     assert found.turn < 1e-9
@@ -81,17 +88,6 @@ def test_exact_models_predict_noiseless_logs_slopes_and_markers(log):
     assert agreement(predict(log, ROBOT, theta, 2.0), log, 2.0).place < 1e-6
 
 
-def test_a_stub_at_a_drives_end_is_not_counted_as_a_window(log):
-    table = predict(log, ROBOT, {**TRUTH, "trim": 0.1}, 1.9)
-    found = agreement(table, log, 1.9)
-    ends = table.groupby(["episode", "start_time"]).time.max().reset_index()
-    assert (ends.time - ends.start_time).min() < 0.5
-    assert found.windows == 2 * 5
-    assert found.poses == found.windows * 38
-    whole = table[table.start_time < 9.0]
-    assert agreement(whole, log, 1.9) == found
-
-
 @pytest.mark.parametrize("extra", [TURNING, MANY], ids=["turning", "many"])
 def test_learnt_motion_is_predicted_with_its_past_before_each_window(log, extra):
     driven = planted_log({**TRUTH, **extra}, episodes=2, seconds=10.0, noise=None)
@@ -101,7 +97,7 @@ def test_learnt_motion_is_predicted_with_its_past_before_each_window(log, extra)
     assert found.turn < 1e-9
 
 
-def test_windows_begin_at_measured_poses_and_others_are_not_compared(log):
+def test_a_log_needs_a_pose_windows_begin_at_measured_ones_and_others_are_not_compared(log):
     table = predict(without_poses(log, slice(7), slice(44, 60)), ROBOT, TRUTH, 2.0)
     assert list(table[table.episode == "00"].start_time.unique()) == pytest.approx([0.35, 3.0, 5.0, 7.0, 9.0])
     broken = without_poses(log, slice(50, 60))
@@ -111,15 +107,6 @@ def test_windows_begin_at_measured_poses_and_others_are_not_compared(log):
     measured = {(e.name, time): pose for e in log.episodes for time, pose in zip(e.times, e.poses, strict=True)}
     for row in starts.itertuples():
         np.testing.assert_allclose((row.x, row.y, row.heading), measured[row.episode, row.time], atol=1e-12)
-
-
-@pytest.mark.parametrize("horizon", [0.0, 0.04, -1.0, float("nan")])
-def test_a_horizon_shorter_than_a_sample_is_refused(log, horizon):
-    with pytest.raises(LogError, match="shorter than a sample"):
-        predict(log, ROBOT, TRUTH, horizon)
-
-
-def test_a_log_needs_a_pose_and_a_first_one_is_enough(log):
     blind = with_poses(log, lambda poses: np.full_like(poses, np.nan))
     with pytest.raises(LogError, match="no measured pose to start a window from"):
         predict(blind, ROBOT, TRUTH, 2.0)
@@ -130,27 +117,26 @@ def test_a_log_needs_a_pose_and_a_first_one_is_enough(log):
     assert agreement(told, alone, 100.0).windows == 0
 
 
+@pytest.mark.parametrize("horizon", [0.0, 0.04, -1.0, float("nan")])
+def test_a_horizon_shorter_than_a_sample_is_refused(log, horizon):
+    with pytest.raises(LogError, match="shorter than a sample"):
+        predict(log, ROBOT, TRUTH, horizon)
+
+
 @pytest.mark.parametrize("known", [1, 2])
 def test_an_episode_with_a_pose_or_two_is_predicted_from_it(log, known):
     table = predict(without_poses(log, slice(known, None)), ROBOT, TRUTH, 2.0)
     assert len(table[table.episode == "00"]) == 41
 
 
-def test_random_effects_are_predicted_by_their_mean(log):
-    late = predict(log, ROBOT, {"trim": 0.03, "delay": 0.07, "delay_jitter": 0.1}, 2.0)
-    assert agreement(late, log, 2.0).place < 1e-9
-
-
 @pytest.fixture(scope="module")
 def own_times(tmp_path_factory):
-    home = tmp_path_factory.mktemp("own_times")
-    return read_log(write_own_times(home, [drive(1, seconds=20.0)]))
+    return read_log(write_own_times(tmp_path_factory.mktemp("own_times"), [drive(1, seconds=20.0)]))
 
 
 def test_poses_at_times_of_their_own_are_predicted_at_those_times(own_times):
     (episode,) = own_times.episodes
-    robot = robot_of(own_times)
-    table = predict(own_times, robot, FOREIGN_TRUTH, 2.0)
+    table = predict(own_times, robot_of(own_times), FOREIGN_TRUTH, 2.0)
     assert set(table.time) == set(episode.measured.times[episode.measured.times >= table.time.min()])
     found = agreement(table, own_times, 2.0)
     assert found.place < 0.0035, "noise of 1 mm at the start and 3 mrad over up to 0.5 m"
@@ -177,7 +163,7 @@ def test_a_model_that_is_right_misses_only_what_is_not_repeated(times, horizon_s
     assert found.interval[0] < 1.0 < found.interval[1] + 0.1
 
 
-def test_repeats_show_what_a_model_lacks_as_far_as_drives_go():
+def test_repeats_show_what_a_model_lacks_as_far_as_drives_go_and_are_repeated():
     found = compare_repeats(again(3, theta={**TRUTH, "yaw_scrub": 0.12}), TRUTH, 2.0).share
     assert found.value < 0.7
     assert found.interval[1] < 0.9
@@ -188,14 +174,6 @@ def test_repeats_show_what_a_model_lacks_as_far_as_drives_go():
     assert compare_repeats(repeated_drives(replace(log, episodes=(one, short))), TRUTH, 1.0) is not None
     stub = replace(other, times=other.times[:150], commands=other.commands[:150], poses=other.poses[:150])
     assert compare_repeats(repeated_drives(replace(log, episodes=(one, stub))), TRUTH, 1.0) is None
-
-
-@pytest.mark.parametrize(("times", "seconds"), [(1, 30.0), (2, 6.0)])
-def test_of_drives_that_are_hardly_repeated_nothing_is_said(times, seconds):
-    assert compare_repeats(again(times, seconds=seconds), TRUTH, 2.0) is None
-
-
-def test_what_repeats_tell_stands_only_where_drives_are_repeated():
     assert compare_repeats(again(2, seconds=3.0), TRUTH, 5.0) is None
     duties, starts = make_drives(3, 2, 600)
     duties, starts = np.concatenate((duties, duties[:1])), np.concatenate((starts, starts[:1]))
@@ -207,6 +185,11 @@ def test_what_repeats_tell_stands_only_where_drives_are_repeated():
     duties, starts = make_drives(4, 6, 400)
     duties[:, :200] = 0.0
     assert compare_repeats(repeated_drives(driven_log(TRUTH, duties[:5], starts[:5])), TRUTH, 2.0) is None
+
+
+@pytest.mark.parametrize(("times", "seconds"), [(1, 30.0), (2, 6.0)])
+def test_of_drives_that_are_hardly_repeated_nothing_is_said(times, seconds):
+    assert compare_repeats(again(times, seconds=seconds), TRUTH, 2.0) is None
 
 
 SIZE = 1e-4
@@ -233,7 +216,7 @@ def test_the_change_per_weight_is_that_of_replays(drives, extra, named):
         np.testing.assert_allclose(still.columns[..., column], seen, rtol=0, atol=2e-3 * np.abs(seen).max() + 1e-6)
 
 
-def test_the_change_per_share_of_a_coordinates_range_is_that_of_replays(drives):
+def test_the_change_per_share_is_that_of_replays_and_a_right_model_leaves_nothing(drives):
     offered, free = learnt_effect(TURNING), (("delay",), ("trim",))
     theta = {**TRUTH, **TURNING}
     still = slopes_of(drives, theta, offered, free)
@@ -244,9 +227,6 @@ def test_the_change_per_share_of_a_coordinates_range_is_that_of_replays(drives):
         moved = slopes_of(drives, {**theta, name: theta[name] + share * (high - low)}, offered)
         seen = (still.residuals - moved.residuals) / share
         np.testing.assert_allclose(still.columns[..., column], seen, rtol=0, atol=0.1 * np.abs(seen).max())
-
-
-def test_a_right_model_leaves_nothing_and_does_not_stray_from_noiseless_drives(drives):
     assert np.abs(slopes_of(drives, TRUTH, learnt_effect(TURNING)).residuals).max() < 1e-9
     quiet = planted_drives(TRUTH, episodes=2, seconds=20.0, noise=None)
     assert pose_errors(quiet, TRUTH, cut(quiet, 2.0)).max() < 1e-9
@@ -255,13 +235,11 @@ def test_a_right_model_leaves_nothing_and_does_not_stray_from_noiseless_drives(d
 
 def test_windows_are_thinned_and_short_runs_have_none(drives):
     windows = windows_module.choose_windows(drives)
-    counts = np.bincount(windows.window)
-    assert counts.max() == windows_module.POSES
+    assert np.bincount(windows.window).max() == windows_module.POSES
     lasts = (drives.last[windows.increment] - drives.first[windows.begin][windows.window]) / drives.tick_hz
     assert lasts.max() == windows_module.FITTED_S
     assert np.all(np.diff(lasts)[np.diff(windows.window) == 0] > 0.0)
-    few = planted_drives(TRUTH, episodes=2, seconds=4.0)
-    assert len(cut(few, 10.0).begin) == 0
+    assert len(cut(planted_drives(TRUTH, episodes=2, seconds=4.0), 10.0).begin) == 0
 
 
 @pytest.fixture(scope="module")
@@ -314,7 +292,7 @@ def test_intervals_cover_the_true_error_about_as_often_as_they_say():
     assert 170 <= covered <= 199
 
 
-def test_ratios_are_shown_by_many_blocks_and_not_by_few():
+def test_ratios_are_shown_by_many_blocks_also_where_few_weigh_most_and_not_by_few():
     random = np.random.default_rng(3)
     blocks = np.repeat(np.arange(10), 30)
     before = random.chisquare(1, 300) * np.repeat(random.uniform(0.2, 3.0, 10), 30)
@@ -331,9 +309,6 @@ def test_ratios_are_shown_by_many_blocks_and_not_by_few():
     assert not ratio(squares, squares, blocks).above
     assert not ratio(np.append(squares, 0.0), np.append(squares, 0.0), np.arange(9)).below
     assert not ratio(np.array([4.0, 9.0, 1.0]), np.array([1.0, 1.0, 0.9]), np.arange(3)).above
-
-
-def test_a_ratio_is_shown_by_many_blocks_on_one_side_though_a_few_weigh_most():
     blocks = np.repeat(np.arange(16), 20)
     before = np.exp(np.random.default_rng(1).normal(size=320))
     more = np.append(np.full(15, 1.05), 300.0)[blocks]

@@ -19,8 +19,7 @@ SHORT = {"episodes": 4, "seconds": 25.0}
 
 def ratio(effect, size, pull, energy):
     """The log-likelihood ratio of each command, one command per second."""
-    late = RANDOM_EFFECTS[effect].lateness(size, 1.0)
-    return _mixture(late, pull, energy)
+    return _mixture(RANDOM_EFFECTS[effect].lateness(size, 1.0), pull, energy)
 
 
 def weighed(theta, seed=1):
@@ -78,8 +77,7 @@ def test_commands_that_never_change_or_a_model_that_explains_all_show_no_random_
     [("dropped_commands", 0.05), ("dropped_commands", 0.2), ("delay_jitter", 0.3), ("delay_jitter", 2.0)],
 )
 def test_mean_lateness_speaks_for_nothing_since_the_delay_has_it_already(effect, size):
-    pull = np.array([-1e-4, 0.0, 1e-4])
-    said = ratio(effect, size, pull, np.zeros(3))
+    said = ratio(effect, size, np.array([-1e-4, 0.0, 1e-4]), np.zeros(3))
     np.testing.assert_allclose(said - said[1], 0.0, atol=2e-6)
     assert said[1] == pytest.approx(0.0, abs=1e-3)
 
@@ -130,16 +128,13 @@ def test_intervals_hold_the_true_size(effect, size):
         assert one.interval[1] < 4.0 * one.interval[0]
 
 
-def test_the_size_is_that_of_which_drives_say_what_is_measured():
+def test_the_size_is_that_of_which_drives_say_what_is_measured_and_what_pulls_both_ways_is_left_over():
     sizes = np.array([0.1, 0.2, 0.4])
     said = np.log(0.5 * sizes) + np.array([[-0.05], [0.05]])
     value, low, high = drawing._invert(sizes, said, float(np.log(0.1)))
     assert value == pytest.approx(0.2)
     assert 0.1 < low < 0.2 < high < 0.4
-
-
-def test_what_pulls_commands_early_as_well_as_late_is_left_over():
-    """All lost once leaves nothing; pulls of as much to either side leave those that are early."""
+    # All lost once leaves nothing; pulls of as much to either side leave those that are early.
     late, energy = RANDOM_EFFECTS["dropped_commands"].lateness(0.3, 10.0), np.full(50, 100.0)
     lost_once = -late.commands[1] * energy
     assert drawing._left(late, lost_once, energy) == pytest.approx(0.0, abs=1e-9)

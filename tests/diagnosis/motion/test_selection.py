@@ -62,19 +62,18 @@ def rivals(drives, gain, theta, column=ACROSS):
     return [rival.effect for rival in adopted.rivals]
 
 
-@pytest.mark.parametrize(("gain", "expected"), [(50.0, []), (65.0, []), (75.0, ["lateral_slip"])])
-def test_a_second_effect_is_a_rival_by_most_of_the_evidence_if_it_predicts_no_worse(drives, gain, expected):
-    assert rivals(drives, gain, AS_GOOD) == expected
-
-
-@pytest.mark.parametrize(("gain", "expected"), [(75.0, []), (96.0, []), (98.0, ["lateral_slip"])])
-def test_an_effect_that_predicts_worse_is_a_rival_only_within_three_nats(drives, gain, expected):
-    assert rivals(drives, gain, WORSE) == expected
-
-
-@pytest.mark.parametrize("gain", [None, 20.0])
-def test_an_effect_that_does_the_same_to_the_motion_is_a_rival_whatever_its_evidence(drives, gain):
-    assert rivals(drives, gain, AS_GOOD, ALONG) == ["lateral_slip"]
+@pytest.mark.parametrize(
+    ("gain", "theta", "column", "rival"),
+    [
+        *((gain, AS_GOOD, ACROSS, gain == 75.0) for gain in (50.0, 65.0, 75.0)),
+        *((gain, WORSE, ACROSS, gain == 98.0) for gain in (75.0, 96.0, 98.0)),
+        *((gain, AS_GOOD, ALONG, True) for gain in (None, 20.0)),
+    ],
+)
+def test_a_rival_has_most_of_the_evidence_nearly_all_if_it_predicts_worse_or_moves_alike(
+    drives, gain, theta, column, rival
+):
+    assert rivals(drives, gain, theta, column) == ["lateral_slip"] * rival
 
 
 @pytest.mark.parametrize(("gain", "expected"), [(50.0, []), (80.0, ["delay_jitter"])])
@@ -114,34 +113,32 @@ def patch(radius):
     return {f"slippery_patch.{name}": value for name, value in values.items()}
 
 
-def test_most_evidence_is_chosen_unless_it_predicts_worse(drives):
+def test_most_evidence_is_chosen_unless_it_predicts_worse_or_a_part_of_the_map_holds_all_drives(drives):
     slip, scrub = ("lateral_slip", {"lateral_slip": 1e-4}, 90.0), ("yaw_scrub", {"yaw_scrub": 0.1601}, 80.0)
     assert chosen(drives, slip, scrub) == "lateral_slip"
     assert chosen(drives, ("yaw_scrub", {"yaw_scrub": 0.1601}, 10.0)) is None
     worse, next_best = ("yaw_scrub", {"yaw_scrub": 0.12}, 500.0), ("lateral_slip", {"lateral_slip": 1e-4}, 90.0)
     assert chosen(drives, worse, next_best) == "lateral_slip"
+    scrub = ("yaw_scrub", {"yaw_scrub": 0.1601}, 50.0)
+    assert chosen(drives, ("slippery_patch", patch(0.1), 90.0), scrub) == "slippery_patch"
+    assert chosen(drives, ("slippery_patch", patch(5.0), 90.0), scrub) == "yaw_scrub"
 
 
-@pytest.mark.parametrize(("p_value", "wanted"), [(0.002, "yaw_scrub"), (0.01, "yaw_scrub"), (0.02, None), (0.1, None)])
-def test_what_chance_gains_more_than_once_in_a_hundred_logs_is_not_chosen(drives, p_value, wanted):
-    assert chosen(drives, ("yaw_scrub", {"yaw_scrub": 0.1601}, 500.0), p_value=p_value) == wanted
+@pytest.mark.parametrize(
+    ("scrub", "p_value", "wanted"),
+    [
+        *((0.1601, p_value, "yaw_scrub" if p_value < 0.015 else None) for p_value in (0.002, 0.01, 0.02, 0.1)),
+        *((scrub, 0.002, None) for scrub in (0.14, 0.12)),
+    ],
+)
+def test_what_chance_gains_once_in_a_hundred_logs_or_predicts_worse_is_not_chosen(drives, scrub, p_value, wanted):
+    assert chosen(drives, ("yaw_scrub", {"yaw_scrub": scrub}, 500.0), p_value=p_value) == wanted
 
 
 @pytest.mark.parametrize(("gain", "p_value"), [(500.0, 0.02), (25.0, 0.01)])
 def test_a_random_effect_needs_as_small_a_chance_and_twice_the_evidence(drives, gain, p_value):
     lost = RandomEffect("dropped_commands", "dropped_commands", 0.1, (0.05, 0.2), gain, p_value)
     assert chosen(drives, random=(lost,)) is None
-
-
-@pytest.mark.parametrize(("scrub", "wanted"), [(0.1601, "yaw_scrub"), (0.14, None), (0.12, None)])
-def test_an_effect_that_predicts_worse_is_not_chosen_whatever_its_evidence(drives, scrub, wanted):
-    assert chosen(drives, ("yaw_scrub", {"yaw_scrub": scrub}, 500.0)) == wanted
-
-
-def test_a_part_of_the_map_that_holds_all_drives_is_no_part(drives):
-    scrub = ("yaw_scrub", {"yaw_scrub": 0.1601}, 50.0)
-    assert chosen(drives, ("slippery_patch", patch(0.1), 90.0), scrub) == "slippery_patch"
-    assert chosen(drives, ("slippery_patch", patch(5.0), 90.0), scrub) == "yaw_scrub"
 
 
 @pytest.mark.parametrize(("gain", "wanted"), [(85.0, "dead_band"), (40.0, "dead_band (left wheel)")])
@@ -240,14 +237,10 @@ def test_an_effect_that_misled_is_left_out_of_a_second_search_and_still_told(bas
 
 
 @pytest.mark.slow
-def test_an_effect_that_does_no_harm_misled_nobody(base, monkeypatch):
+def test_an_effect_that_does_no_harm_or_was_found_last_and_does_not_matter_misled_nobody(base, monkeypatch):
     found, asked, _ = named(base, monkeypatch, SLIP, SCRUB, harmful=False)
     assert asked == [()]
     assert [effect.effect for effect in found.adopted] == ["yaw_scrub"]
-
-
-@pytest.mark.slow
-def test_an_effect_that_was_found_last_and_does_not_matter_misled_nobody(base, monkeypatch):
     found, asked, _ = named(base, monkeypatch, SCRUB, SLIP)
     assert asked == [()]
     assert [dropped.effect.effect for dropped in found.negligible] == ["lateral_slip"]
@@ -288,14 +281,13 @@ def adopted(clean, monkeypatch, *rounds):
     return [effect.gain for effect in found.adopted], [curve.gain for curve in found.unnamed_curves]
 
 
-@pytest.mark.parametrize(("gain", "expected"), [(10.0, []), (14.9, []), (15.1, [15.1])])
-def test_an_effect_needs_fifteen_nats(clean, monkeypatch, gain, expected):
-    assert adopted(clean, monkeypatch, (gain, 0.0)) == (expected, [])
-
-
-@pytest.mark.parametrize(("gain", "expected"), [(40.0, [5000.0]), (60.0, [5000.0, 60.0])])
-def test_after_much_evidence_a_hundredth_of_it_is_needed(clean, monkeypatch, gain, expected):
-    assert adopted(clean, monkeypatch, (5000.0, 0.0), (gain, 0.0)) == (expected, [])
+def test_an_effect_needs_fifteen_nats_a_hundredth_of_what_there_is_and_a_third_of_a_signal_s(clean, monkeypatch):
+    for gain, expected in ((10.0, []), (14.9, []), (15.1, [15.1])):
+        assert adopted(clean, monkeypatch, (gain, 0.0)) == (expected, [])
+    for gain, expected in ((40.0, [5000.0]), (60.0, [5000.0, 60.0])):
+        assert adopted(clean, monkeypatch, (5000.0, 0.0), (gain, 0.0)) == (expected, [])
+    for curve, expected in ((300.0, [500.0, 100.0]), (400.0, [500.0])):
+        assert adopted(clean, monkeypatch, (500.0, 0.0), (100.0, curve))[0] == expected
 
 
 def test_no_more_than_five_effects_are_added_and_none_first_where_a_signal_says_far_more(clean, monkeypatch):
@@ -303,11 +295,6 @@ def test_no_more_than_five_effects_are_added_and_none_first_where_a_signal_says_
     assert adopted(clean, monkeypatch, (100.0, 140.0)) == ([], [140.0])
     assert adopted(clean, monkeypatch, (100.0, 125.0))[0] == [100.0]
     assert adopted(clean, monkeypatch, (200.0, 238.0))[0] == [200.0]
-
-
-@pytest.mark.parametrize(("curve", "expected"), [(300.0, [500.0, 100.0]), (400.0, [500.0])])
-def test_a_later_effect_is_added_if_it_says_a_third_of_what_a_signal_does(clean, monkeypatch, curve, expected):
-    assert adopted(clean, monkeypatch, (500.0, 0.0), (100.0, curve))[0] == expected
 
 
 @pytest.mark.parametrize(
@@ -335,8 +322,7 @@ def test_no_random_effect_stands_for_what_a_car_lacks_beside_it(monkeypatch, dri
     model = SimpleNamespace(drives=SimpleNamespace(rules=RULES, robot=SimpleNamespace(drive=drive)))
     monkeypatch.setattr(selection, "fit_random", lambda model, one: FittedCandidate(one.gain, model, random=one))
     monkeypatch.setattr(selection, "predicts_no_worse", lambda one, other: True)
-    best = choose_best(model, Evidence([], {}, (lost,), []), 15.0)
-    assert (best is not None) == chosen
+    assert (choose_best(model, Evidence([], {}, (lost,), []), 15.0) is not None) == chosen
 
 
 FAULTS = {"dead_band": 0.12, "steering_lag": 0.3, "steering_friction": 0.4, "marker_offset.forward": 0.1}

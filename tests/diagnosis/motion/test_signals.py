@@ -39,16 +39,13 @@ def clean():
     return fitted(planted_drives(TRUTH, **SHORT))
 
 
-def test_every_signal_of_two_wheels_has_motion_on_every_tick(clean):
+def test_every_signal_of_two_wheels_has_motion_and_no_curve_gains_much_where_nothing_is_missing(clean):
     groups = list(signal_groups(clean))
     assert {group.name for group in groups} == set(Cue) - {Cue.STEERING}
     for group in groups:
         assert group.twists.shape[:3] == (*clean.drives.duties.shape[:2], 3)
         assert np.isfinite(group.twists).all()
         assert group.signal.shape == clean.drives.duties.shape[:2]
-
-
-def test_no_curve_gains_much_where_nothing_is_missing_and_the_best_comes_first(clean):
     assert fit_curves(clean)[0].gain < RULES.least_gain_nats
     gains = [curve.gain for curve in fit_curves(clean)]
     assert gains == sorted(gains, reverse=True)
@@ -76,8 +73,7 @@ def test_the_signal_that_the_motion_depends_on_leads(effect, figures, signals):
 
 def test_a_wheel_has_turned_as_far_as_it_rolled():
     log = hidden.make_log(hidden.Case("plain", (), "normal", 5, 0.0, 0.0), episodes=2, seconds=10.0, noiseless=True)
-    drives = gather(log, ROBOT, log.episodes)
-    angles = drives.angles
+    angles = gather(log, ROBOT, log.episodes).angles
     way = np.stack([np.hypot(*np.diff(e.poses[:, :2], axis=0).T).sum() for e in log.episodes])
     rolled = np.abs(np.diff(angles, axis=1)).sum(axis=1).mean(axis=-1) * 0.0318
     assert (rolled > 0.9 * way).all()

@@ -9,28 +9,11 @@ from one_line import complaint_of
 from stopping import Stopping
 from telling import Telling
 
+from proxytune import sweep
 from proxytune.domain import make_episode
 from proxytune.space import Interval
 from proxytune.storage import Store
 from proxytune.study import StudyRun, open_study
-from proxytune.sweep import (
-    COMMANDS,
-    METRICS,
-    Series,
-    SweepEstimate,
-    all_curves,
-    check_base,
-    curve_of,
-    describe_shape,
-    discrepancy_study,
-    plan_sweep,
-    pod_mean,
-    run_sweep,
-    series_of,
-    shape_of,
-    sweep_interval,
-    with_target,
-)
 from proxytune.usefulness import ALL, PRPV
 
 TRUTH = {"trim": 0.1, "delay": 0.12}
@@ -44,17 +27,17 @@ def truth(write_file):
 @pytest.fixture
 def opened(make_study, truth):
     study = open_study(make_study(family='"echo:echo"'))
-    return study, discrepancy_study(study, truth)
+    return study, sweep.discrepancy_study(study, truth)
 
 
 def swept(study, discrepancy, points=4, base=TRUTH, parameter="trim"):
-    plan = plan_sweep(sweep_interval(study, parameter), base, points)
+    plan = sweep.plan_sweep(sweep.sweep_interval(study, parameter), base, points)
     if discrepancy:
-        plan = with_target(plan, study.settings.folder.parent / "truth.toml", discrepancy)
+        plan = sweep.with_target(plan, study.settings.folder.parent / "truth.toml", discrepancy)
     with Store.open(study.settings.folder) as store:
         study_run = StudyRun(study, store)
-        run_sweep(study_run, plan, discrepancy)
-        return study_run.spent.episodes, curve_of(StudyRun(study, store), plan)
+        sweep.run_sweep(study_run, plan, discrepancy)
+        return study_run.spent.episodes, sweep.curve_of(StudyRun(study, store), plan)
 
 
 def test_pod_is_nothing_at_the_truth_and_the_target_is_driven_once_per_start(opened):
@@ -77,7 +60,7 @@ def test_replays_end_with_the_commands_or_the_episode_of_either_domain(opened):
     for start in (0, 2):
         replace(both, proxy=counting, target=counting).run(make_episode({}, agent="agent0", start=start, seed=3))
     counted = [len(one.args[1]) for one in counting.replay.mock_calls]
-    assert counted == [COMMANDS, COMMANDS, 3, 3], "target and proxy in turn"
+    assert counted == [sweep.COMMANDS, sweep.COMMANDS, 3, 3], "target and proxy in turn"
     found = both.run(make_episode({"trim": 0.3}, agent="agent0", start=0, seed=3))
     assert np.isfinite(list(found.values())).all()
 
@@ -86,10 +69,10 @@ def test_identity_tells_targets_and_proxies_apart_and_travels_and_a_missing_mode
     study, discrepancy = opened
     other = tmp_path / "other.toml"
     other.write_text("trim = 0.2\n")
-    assert discrepancy_study(study, other).identity != discrepancy.identity != study.identity
+    assert sweep.discrepancy_study(study, other).identity != discrepancy.identity != study.identity
     assert pickle.loads(pickle.dumps(discrepancy.family)).identity == discrepancy.identity
     path = tmp_path / "no.toml"
-    assert f"--target-model {path}: no such file" in complaint_of(discrepancy_study, opened[0], path)
+    assert f"--target-model {path}: no such file" in complaint_of(sweep.discrepancy_study, opened[0], path)
 
 
 def test_a_curve_has_pod_at_every_point_kept_like_other_episodes(opened):
@@ -100,19 +83,19 @@ def test_a_curve_has_pod_at_every_point_kept_like_other_episodes(opened):
     assert swept(opened[0], None)[0] == 0
     assert [point.pod["pod_pose"].value == 0 for point in curve.points] == [False, False, True, False]
     assert {point.pod["pod_image"].starts for point in curve.points} == {3}
-    assert {one.key for one in series_of(curve)} >= set(METRICS)
+    assert {one.key for one in sweep.series_of(curve)} >= set(sweep.METRICS)
 
 
 def test_a_sweep_stopped_before_its_last_replays_has_no_curve_yet(opened):
     study, discrepancy = opened
 
     model = study.settings.folder.parent / "truth.toml"
-    plan = with_target(plan_sweep(sweep_interval(study, "trim"), TRUTH, 4), model, discrepancy)
+    plan = sweep.with_target(sweep.plan_sweep(sweep.sweep_interval(study, "trim"), TRUTH, 4), model, discrepancy)
     with Store.open(study.settings.folder) as store:
         with pytest.raises(KeyboardInterrupt):
-            run_sweep(StudyRun(study, store, Stopping(before="POD, trim 4")), plan, discrepancy)
-        assert curve_of(StudyRun(study, store), plan) is None
-        assert curve_of(StudyRun(study, store), replace(plan, replays="")) is not None, "only POD is missing"
+            sweep.run_sweep(StudyRun(study, store, Stopping(before="POD, trim 4")), plan, discrepancy)
+        assert sweep.curve_of(StudyRun(study, store), plan) is None
+        assert sweep.curve_of(StudyRun(study, store), replace(plan, replays="")) is not None, "only POD is missing"
     assert swept(study, discrepancy)[0] == 3
 
 
@@ -120,19 +103,19 @@ def test_a_sweep_stopped_before_its_last_replays_has_no_curve_yet(opened):
 def test_several_processes_find_the_same(make_study, truth, opened):
     alone = swept(*opened)[1]
     study = open_study(make_study("other", family='"echo:echo"', jobs="2"))
-    together = swept(study, discrepancy_study(study, truth))[1]
+    together = swept(study, sweep.discrepancy_study(study, truth))[1]
     assert [point.pod for point in together.points] == [point.pod for point in alone.points]
 
 
 def test_starts_from_which_the_agent_fails_are_left_out_and_the_interval_holds_the_mean(make_study, truth):
     study = open_study(make_study(family='"echo:echo"', domain={"faults": '["agent0:1:raises"]'}))
-    _, curve = swept(study, discrepancy_study(study, truth), points=2)
+    _, curve = swept(study, sweep.discrepancy_study(study, truth), points=2)
     assert {point.pod["pod_pose"].starts for point in curve.points} == {2}
-    found = pod_mean([0.1, 0.2, 0.4])
+    found = sweep.pod_mean([0.1, 0.2, 0.4])
     assert found.value == pytest.approx(0.7 / 3)
     assert 0.0999 < found.interval[0] < found.value < found.interval[1] < 0.4001
-    assert pod_mean([0.3]).interval is None
-    assert pod_mean([0.0, 0.0]).interval == (0.0, 0.0)
+    assert sweep.pod_mean([0.3]).interval is None
+    assert sweep.pod_mean([0.0, 0.0]).interval == (0.0, 0.0)
 
 
 REAL = """format = 1
@@ -156,9 +139,9 @@ def test_a_lane_follower_s_pod_is_nothing_at_the_truth_and_grows_with_trim(tmp_p
     rows = [f"{agent},{start},{1 + start}.{n},2.0" for n, agent in enumerate(("steady", "drifter")) for start in (0, 1)]
     (tmp_path / "target.csv").write_text("\n".join(["agent,episode,distance,survival_time", *rows]) + "\n")
     (tmp_path / "truth.toml").write_text('format = 1\nrobot = "duckiebot"\n[effects.trim]\ntrim = 0.1\n')
-    both = discrepancy_study(open_study(tmp_path), tmp_path / "truth.toml").family
+    both = sweep.discrepancy_study(open_study(tmp_path), tmp_path / "truth.toml").family
     found = [both.run(make_episode({"trim": trim}, agent="steady", start=0, seed=5)) for trim in (0.1, 0.0, -0.2)]
-    poses, images = ([one[name] for one in found] for name in METRICS)
+    poses, images = ([one[name] for one in found] for name in sweep.METRICS)
     assert poses[0] == 0 == images[0]
     assert 0 < poses[1] < poses[2]
     assert 0 < images[1] < 1
@@ -169,12 +152,12 @@ def swept_of_sweep(folder, base=TRUTH, parameter="trim", points=5):
 
 
 def test_a_grid_has_both_ends_and_the_base_s_own_value_once():
-    plan = plan_sweep(Interval("trim", -0.3, 0.3), TRUTH, 13)
+    plan = sweep.plan_sweep(Interval("trim", -0.3, 0.3), TRUTH, 13)
     assert plan.points[0] == -0.3
     assert plan.points[-1] == 0.3
     assert len(plan.points) == 13, "0.1 is a point of the grid already"
-    assert plan_sweep(Interval("trim", -0.3, 0.3), {"trim": 0.12}, 3).points == (-0.3, 0.0, 0.12, 0.3)
-    assert plan_sweep(Interval("trim", -0.3, 0.3), {}, 3).points == (-0.3, 0.0, 0.3)
+    assert sweep.plan_sweep(Interval("trim", -0.3, 0.3), {"trim": 0.12}, 3).points == (-0.3, 0.0, 0.12, 0.3)
+    assert sweep.plan_sweep(Interval("trim", -0.3, 0.3), {}, 3).points == (-0.3, 0.0, 0.3)
 
 
 def test_the_others_are_nominal_unless_said_and_prpv_is_at_its_floor_at_the_truth(make_study):
@@ -197,8 +180,10 @@ def test_what_is_known_is_not_simulated_again_and_truth_is_shared_between_curves
 def test_every_point_is_told_with_its_place_value_and_prpv(make_study):
     study, telling = open_study(make_study()), Telling()
     with Store.open(study.settings.folder) as store:
-        run_sweep(StudyRun(study, store, telling), plan_sweep(sweep_interval(study, "trim"), TRUTH, 3))
-        curve = all_curves(StudyRun(study, store))[0]
+        sweep.run_sweep(
+            StudyRun(study, store, telling), sweep.plan_sweep(sweep.sweep_interval(study, "trim"), TRUTH, 3)
+        )
+        curve = sweep.all_curves(StudyRun(study, store))[0]
     scores = [point.assessment.prpv.value for point in curve.points]
     values = ["-0.3", "0", "0.1", "0.3"]
     expected = [(f"trim {n} of 4, at {v}: PRPV {s}") for n, (v, s) in enumerate(zip(values, scores, strict=True), 1)]
@@ -208,15 +193,15 @@ def test_every_point_is_told_with_its_place_value_and_prpv(make_study):
 def test_an_interrupted_sweep_goes_on_where_it_was(make_study):
     folder = make_study()
     study = open_study(folder)
-    plan = plan_sweep(sweep_interval(study, "trim"), TRUTH, 5)
+    plan = sweep.plan_sweep(sweep.sweep_interval(study, "trim"), TRUTH, 5)
     with Store.open(folder) as store:
         with pytest.raises(KeyboardInterrupt):
-            run_sweep(StudyRun(study, store, Stopping(before="trim 3")), plan)
-        assert curve_of(StudyRun(study, store), plan) is None
-        assert all_curves(StudyRun(study, store)) == []
+            sweep.run_sweep(StudyRun(study, store, Stopping(before="trim 3")), plan)
+        assert sweep.curve_of(StudyRun(study, store), plan) is None
+        assert sweep.all_curves(StudyRun(study, store)) == []
     assert swept_of_sweep(folder)[0] == 4 * 18
     with Store.read(folder) as store:
-        assert [curve.parameter for curve in all_curves(StudyRun(study, store))] == ["trim"]
+        assert [curve.parameter for curve in sweep.all_curves(StudyRun(study, store))] == ["trim"]
 
 
 @pytest.mark.slow
@@ -227,7 +212,7 @@ def test_sweeps_of_a_parameter_that_the_family_no_longer_has_are_left_out(make_s
     monkeypatch.setattr("wobbly.PARAMETERS", {"delay": open_study(folder).family.parameters["delay"]})
     study = open_study(make_study(parameters={"delay": "[0.0, 0.3]"}))
     with Store.read(folder) as store:
-        assert [curve.parameter for curve in all_curves(StudyRun(study, store))] == ["delay"]
+        assert [curve.parameter for curve in sweep.all_curves(StudyRun(study, store))] == ["delay"]
 
 
 def test_a_point_where_an_agent_fails_throughout_has_no_score_but_the_curve_stands(make_study):
@@ -238,9 +223,9 @@ def test_a_point_where_an_agent_fails_throughout_has_no_score_but_the_curve_stan
 
 def test_a_parameter_is_swept_over_the_study_s_box_or_else_over_all_it_may_be(make_study):
     study = open_study(make_study(parameters={"trim": "[-0.1, 0.2]"}))
-    assert sweep_interval(study, "trim") == Interval("trim", -0.1, 0.2)
-    assert sweep_interval(study, "delay") == Interval("delay", 0.0, 0.3)
-    assert "no parameter 'dely' in" in complaint_of(sweep_interval, study, "dely")
+    assert sweep.sweep_interval(study, "trim") == Interval("trim", -0.1, 0.2)
+    assert sweep.sweep_interval(study, "delay") == Interval("delay", 0.0, 0.3)
+    assert "no parameter 'dely' in" in complaint_of(sweep.sweep_interval, study, "dely")
 
 
 @pytest.mark.parametrize(
@@ -248,17 +233,17 @@ def test_a_parameter_is_swept_over_the_study_s_box_or_else_over_all_it_may_be(ma
     [({"trimm": 0.1}, "did you mean 'trim'"), ({"trim": 0.5}, "must lie within"), ({"trim": float("nan")}, "got nan")],
 )
 def test_a_base_that_the_family_cannot_take_is_refused(make_study, base, expected):
-    assert expected in complaint_of(check_base, open_study(make_study()), base)
+    assert expected in complaint_of(sweep.check_base, open_study(make_study()), base)
 
 
 def series(scores, spread=0.0, higher=False):
     found = [
-        SweepEstimate(
+        sweep.SweepEstimate(
             float(place), score, None if score is None or spread is None else (score - spread, score + spread)
         )
         for place, score in enumerate(scores)
     ]
-    return Series(replace(PRPV, better="higher" if higher else "lower"), ALL, tuple(found))
+    return sweep.Series(replace(PRPV, better="higher" if higher else "lower"), ALL, tuple(found))
 
 
 VALLEY = series([9.0, 4.0, 1.0, 3.0, 8.0])
@@ -287,27 +272,27 @@ SHAPES = {
 
 @pytest.mark.parametrize(("curve", "held", "best", "below", "above", "monotone"), SHAPES.values(), ids=SHAPES)
 def test_a_curve_has_a_best_value_and_a_shape_on_either_side_of_the_held_one(curve, held, best, below, above, monotone):
-    shape = shape_of(curve, held)
+    shape = sweep.shape_of(curve, held)
     assert (shape.best, shape.below, shape.above, shape.monotone) == (best, below, above, monotone)
 
 
 def test_the_score_of_a_shape_and_its_line_say_what_each_side_does():
-    assert (shape_of(VALLEY, 2.0).score, shape_of(VALLEY, 2.0).near_best) == (1.0, (2.0,))
-    assert shape_of(series([2.0, 1.5, 1.0, 1.5, 2.0], 0.6), 2.0).near_best == (0.0, 1.0, 2.0, 3.0, 4.0)
-    assert shape_of(series([0.2, 0.9, 0.1], higher=True), 1.0).score == 0.9
-    line = describe_shape(series([9.0, 4.0, 1.0, 6.0, 3.0]), 2.0)
+    assert (sweep.shape_of(VALLEY, 2.0).score, sweep.shape_of(VALLEY, 2.0).near_best) == (1.0, (2.0,))
+    assert sweep.shape_of(series([2.0, 1.5, 1.0, 1.5, 2.0], 0.6), 2.0).near_best == (0.0, 1.0, 2.0, 3.0, 4.0)
+    assert sweep.shape_of(series([0.2, 0.9, 0.1], higher=True), 1.0).score == 0.9
+    line = sweep.describe_shape(series([9.0, 4.0, 1.0, 6.0, 3.0]), 2.0)
     assert line.startswith("PRPV: lowest (1) at 2; not worse beyond noise: 2; from 2 downwards it worsens")
     assert "upwards it turns" in line
-    assert describe_shape(series([None, None]), 0.0) == "PRPV: undefined at every point"
-    assert "from" not in describe_shape(series([9.0, 4.0, 1.0]), None)
-    assert "not worse beyond noise: 0, 2" in describe_shape(series([1.0, 5.0, 1.0]), None)
+    assert sweep.describe_shape(series([None, None]), 0.0) == "PRPV: undefined at every point"
+    assert "from" not in sweep.describe_shape(series([9.0, 4.0, 1.0]), None)
+    assert "not worse beyond noise: 0, 2" in sweep.describe_shape(series([1.0, 5.0, 1.0]), None)
 
 
 @settings(max_examples=50)
 @given(st.lists(st.floats(-5, 5), min_size=3, max_size=9), st.data())
 def test_the_mirror_image_of_a_curve_has_mirrored_sides(scores, data):
     held = data.draw(st.integers(0, len(scores) - 1))
-    one = shape_of(series(scores, 0.5), float(held))
-    other = shape_of(series(scores[::-1], 0.5), float(len(scores) - 1 - held))
-    upside_down = shape_of(series([-score for score in scores], 0.5, higher=True), float(held))
+    one = sweep.shape_of(series(scores, 0.5), float(held))
+    other = sweep.shape_of(series(scores[::-1], 0.5), float(len(scores) - 1 - held))
+    upside_down = sweep.shape_of(series([-score for score in scores], 0.5, higher=True), float(held))
     assert (one.below, one.above) == (other.above, other.below) == (upside_down.below, upside_down.above)

@@ -11,17 +11,7 @@ from rich.console import Console
 from searched import looked_at, searched
 
 from proxytune.report import study_document, study_sentence, study_text
-from proxytune.report.study.page import (
-    INFORMATION,
-    SEARCH,
-    THETA,
-    USEFULNESS,
-    information_table,
-    search_table,
-    theta_table,
-    trials_table,
-    usefulness_table,
-)
+from proxytune.report.study import page
 from proxytune.space import Interval
 from proxytune.study import Preflight, open_study
 from proxytune.study.preflight import Movement
@@ -100,34 +90,34 @@ def shown(result):
 def test_the_first_line_is_the_sentence_that_json_has_too_then_tables_with_names_and_values_as_they_are(result):
     first, *others = shown(result).splitlines()
     assert first == study_sentence(result) == study_document(result)["sentence"]
-    titles = [line for line in others if line in (THETA, USEFULNESS, INFORMATION, SEARCH)]
-    assert titles == [THETA, USEFULNESS, INFORMATION, SEARCH]
+    titles = [line for line in others if line in (page.THETA, page.USEFULNESS, page.INFORMATION, page.SEARCH)]
+    assert titles == [page.THETA, page.USEFULNESS, page.INFORMATION, page.SEARCH]
     assert others[2].split()[:2] == ["parameter", "best"]
     assert others[-2].split() == ["episodes", "none", "run"]
     assert others[-1].rstrip() == "figure: convergence.png"
     told = (replace(TOLD[0], agents=(("[red]agent", 1.0),)), TOLD[1])
     assert "[red]agent 100 %" in shown(planted(result, information=told))
     assert any("--unpaired" in note for note in result.judged.notes)
-    assert not any("--unpaired" in note for note in usefulness_table(result).notes)
+    assert not any("--unpaired" in note for note in page.usefulness_table(result).notes)
 
 
 def test_people_see_what_the_proxy_is_worth_and_halves_are_not_called_a_noise_floor(result):
-    rows = {label.strip(): rest for label, *rest in usefulness_table(result).rows}
+    rows = {label.strip(): rest for label, *rest in page.usefulness_table(result).rows}
     assert list(rows) == ["PRPV", "halves", "chance", "PPV", "misfit (p)"]
     value, interval, meaning = rows["PRPV"]
     assert value == f"{result.best.trial.prpv:g}"
     assert interval == ""
     assert "0 to 30" in meaning
     assert rows["PPV"][2].startswith("proxy predictivity value")
-    assert not row_of(search_table(result), "failed")
-    label, text = search_table(result).rows[0]
+    assert not row_of(page.search_table(result), "failed")
+    label, text = page.search_table(result).rows[0]
     assert (label, text.startswith("7 of 7; best: trial ")) == ("trials", True)
-    assert "upper bound" in row_of(usefulness_table(result), "  halves")[3]
+    assert "upper bound" in row_of(page.usefulness_table(result), "  halves")[3]
     known = with_floor(result, kind="same starts", value=5.0, low=1.0, high=9.0)
-    row = row_of(usefulness_table(known), "  noise floor")
+    row = row_of(page.usefulness_table(known), "  noise floor")
     assert row[1:3] == ("5", "1 to 9")
     assert row[3] == "target against itself from the same starts: what a perfect proxy scores"
-    assert not row_of(usefulness_table(with_floor(result, value=None)), "  halves")
+    assert not row_of(page.usefulness_table(with_floor(result, value=None)), "  halves")
 
 
 def with_floor(result, **changes):
@@ -138,31 +128,31 @@ def with_floor(result, **changes):
 
 def test_what_is_expected_a_perfect_proxy_s_score_the_excess_and_whether_any_theta_explains_is_told(result):
     again = confirmed(result, kind="same starts", value=5.0, low=1.2, high=9.1)
-    table = usefulness_table(again)
+    table = page.usefulness_table(again)
     assert row_of(table, "PRPV")[1:] == ("12", "8 to 20", "wrongly ordered pairs, 0 to 30; expected, in 5 more runs")
     assert row_of(table, "  noise floor")[1:] == ("5", "1 to 10", "what a perfect proxy scores against this target")
     assert row_of(table, "  excess") == ("  excess", "7", "−2 to 19", "more than a perfect proxy; may be none")
     document = study_document(again)
     assert document["best"]["expected_prpv"] == {"value": 12, "interval": [8.0, 20.0]}
     assert document["excess"]["value"] == 7.0
-    assert not row_of(usefulness_table(result), "  excess")
+    assert not row_of(page.usefulness_table(result), "  excess")
     assert study_document(result)["best"]["expected_prpv"] is study_document(result)["excess"] is None
-    row = row_of(usefulness_table(planted(result)), "misfit (p)")
+    row = row_of(page.usefulness_table(planted(result)), "misfit (p)")
     assert row == ("misfit (p)", "0.4", "", "some θ may explain the target's scores")
-    lacking = row_of(usefulness_table(planted(result, misfit=LACKS)), "misfit (p)")
+    lacking = row_of(page.usefulness_table(planted(result, misfit=LACKS)), "misfit (p)")
     assert (lacking[1], lacking[3]) == ("0.002", "no θ explains the target's scores")
-    assert "too few" in row_of(usefulness_table(planted(result, misfit=UNTOLD)), "misfit (p)")[3]
+    assert "too few" in row_of(page.usefulness_table(planted(result, misfit=UNTOLD)), "misfit (p)")[3]
 
 
 def test_how_a_study_came_to_its_end_what_matters_and_what_was_cut_off_and_saved_is_said(result):
     assert study_document(result)["stopped"] == "the budget of 7 trials is spent"
-    assert search_table(result).rows[0][1].endswith("; ended: the budget of 7 trials is spent")
+    assert page.search_table(result).rows[0][1].endswith("; ended: the budget of 7 trials is spent")
     under_way = replace(result, stopped="")
     assert study_document(under_way)["stopped"] is None
-    assert "ended" not in search_table(under_way).rows[0][1]
+    assert "ended" not in page.search_table(under_way).rows[0][1]
     settings = replace(result.study.settings, budget=5)
     lowered = replace(result, study=replace(result.study, settings=settings))
-    assert search_table(lowered).rows[0][1].startswith("7 (budget 5); best: trial ")
+    assert page.search_table(lowered).rows[0][1].startswith("7 (budget 5); best: trial ")
     moved = Movement(Interval("trim", -0.3, 0.3), 0.01, "distance", 2.0, 0.5, 12, False)
     flown = replace(result, preflight=Preflight({"trim": 0.0}, (moved,), 144))
     assert study_document(result)["preflight"] is None
@@ -174,17 +164,17 @@ def test_how_a_study_came_to_its_end_what_matters_and_what_was_cut_off_and_saved
         "noise": 0.5,
         "pairs": 12,
     }
-    assert search_table(flown).rows[1] == ("pre-flight", "every parameter changes some metric beyond noise")
+    assert page.search_table(flown).rows[1] == ("pre-flight", "every parameter changes some metric beyond noise")
     still = replace(flown.preflight, movements=(replace(moved, p_value=0.5),))
-    label, warning = search_table(replace(flown, preflight=still)).rows[1]
+    label, warning = page.search_table(replace(flown, preflight=still)).rows[1]
     assert (label, warning.startswith("'trim' is not shown to change a metric")) == ("pre-flight", True)
     assert flown.episodes == result.episodes + 144
-    assert not row_of(search_table(result), "stopped early")
+    assert not row_of(page.search_table(result), "stopped early")
     assert study_document(result)["trials"][0]["cut_off"] is None
     first, *others = result.trials
     cut = replace(first, state="cut", score=17.5, measures={}, decided=("agent0", "agent2"), bound=12.0)
     found = replace(result, trials=(cut, *others), spared=(12, 3.456))
-    assert row_of(search_table(found), "stopped early") == (
+    assert row_of(page.search_table(found), "stopped early") == (
         "stopped early",
         "1 trial that could not be the best; saved 12 episodes (3.46 s)",
     )
@@ -193,7 +183,7 @@ def test_how_a_study_came_to_its_end_what_matters_and_what_was_cut_off_and_saved
     first = document["trials"][0]
     assert first["prpv"] is None
     assert first["cut_off"] == {"prpv_at_least": 12.0, "prpv_estimate": 17.5, "agents": ["agent0", "agent2"]}
-    assert trials_table(found.trials, ["trim"]).rows[0][2] == "stopped early, at least 12"
+    assert page.trials_table(found.trials, ["trim"]).rows[0][2] == "stopped early, at least 12"
     assert found.episodes == result.episodes - 12
 
 
@@ -202,7 +192,7 @@ def test_failed_episodes_are_told_with_the_first_of_them(make_study):
     study = open_study(make_study(domain={"faults": '["agent3:1:raises"]'}, budget="6"))
     searched(study)
     result = looked_at(study)
-    table = search_table(result)
+    table = page.search_table(result)
     head, first = row_of(table, "failed"), table.rows[table.rows.index(row_of(table, "failed")) + 1]
     assert head == ("failed", "6 of 108 episodes; the first:")
     assert first[1].startswith("trial 1: agent 'agent3' failed from start 1: ")
@@ -215,47 +205,49 @@ def known(result):
 
 
 def test_a_row_has_the_best_value_its_interval_what_is_as_good_and_the_box_and_a_caution_is_a_note(known):
-    names = [one.name for one in theta_table(known).columns]
+    names = [one.name for one in page.theta_table(known).columns]
     assert names == ["parameter", "best", "95 % interval", "by PRPV alone", "box"]
-    delay, trim, last = theta_table(known).rows
+    delay, trim, last = page.theta_table(known).rows
     assert delay[:2] == ("delay", f"{known.best.trial.theta['delay']:.4g} s")
     assert delay[2:] == ("0.091 to 0.149", "0.03 to 0.21", "0 to 0.3")
     assert trim[3:] == ("0.05 to 0.15", "−0.3 to 0.3")
     assert last[0] == "share of the box"
     assert last[3:] == ("6.2 %", "")
     assert 0.3 < float(last[2].removesuffix(" %")) < 3.0
-    assert "no shared starts" in theta_table(replace(known, cautions=("no shared starts",))).notes
+    assert "no shared starts" in page.theta_table(replace(known, cautions=("no shared starts",))).notes
 
 
 def test_a_parameter_without_an_interval_is_unidentified_and_pairs_that_trade_are_named(known):
     vague = planted(known, deviation=(3.0, 0.02))
-    assert theta_table(vague).rows[0][2] == "unidentified"
-    assert theta_table(vague).notes[0].startswith("7 trials exclude almost no value of delay; unidentified")
-    assert not [line for line in theta_table(known).notes if "unidentified" in line]
+    assert page.theta_table(vague).rows[0][2] == "unidentified"
+    assert page.theta_table(vague).notes[0].startswith("7 trials exclude almost no value of delay; unidentified")
+    assert not [line for line in page.theta_table(known).notes if "unidentified" in line]
     trading = planted(known, centre=(0.5, 0.5), deviation=(0.1, 0.1), correlation=-0.9)
-    assert any("delay and trim trade off" in note and "correlation −0.9" in note for note in theta_table(trading).notes)
-    assert not [line for line in theta_table(known).notes if "trade off" in line]
+    assert any(
+        "delay and trim trade off" in note and "correlation −0.9" in note for note in page.theta_table(trading).notes
+    )
+    assert not [line for line in page.theta_table(known).notes if "trade off" in line]
 
 
 def test_it_is_said_whether_the_region_holds_the_best_theta_and_the_truth_which_has_a_column_where_it_is_known(known):
     best = dict(known.best.trial.theta)
     unit = (best["delay"] / 0.3, (best["trim"] + 0.3) / 0.6)
     inside = planted(known, centre=unit)
-    assert theta_table(replace(inside, truth=best)).notes == ("the 95 % region contains the truth",)
+    assert page.theta_table(replace(inside, truth=best)).notes == ("the 95 % region contains the truth",)
     outside = planted(known, centre=tuple((place + 0.5) % 1.0 for place in unit))
-    first, second = theta_table(replace(outside, truth=best)).notes
+    first, second = page.theta_table(replace(outside, truth=best)).notes
     assert first.startswith("the best θ by PRPV is outside the 95 % region")
     assert second == "the 95 % region does not contain the truth"
     known = replace(known, truth={"trim": 0.1, "delay": 0.29})
-    assert theta_table(known).columns[3].name == "truth"
-    assert [row[3] for row in theta_table(known).rows] == ["0.29 (outside)", "0.1", ""]
-    assert [row[3] for row in theta_table(replace(known, truth={"trim": 0.1})).rows] == ["", "0.1", ""]
+    assert page.theta_table(known).columns[3].name == "truth"
+    assert [row[3] for row in page.theta_table(known).rows] == ["0.29 (outside)", "0.1", ""]
+    assert [row[3] for row in page.theta_table(replace(known, truth={"trim": 0.1})).rows] == ["", "0.1", ""]
 
 
 def test_per_parameter_what_informs_it_most_is_named_with_what_limits_it_and_nothing_else(known):
-    assert information_table(known).rows == (
+    assert page.information_table(known).rows == (
         ("delay", "agent4 46 %, agent0 30 %", "speed 100 %", "starts"),
         ("trim", "agent1 100 %", "distance 75 %", "trials"),
     )
     silent = replace(TOLD[0], agents=(("agent0", 0.0), ("agent1", 0.0)))
-    assert [row[0] for row in information_table(planted(known, information=(silent, TOLD[1]))).rows] == ["trim"]
+    assert [row[0] for row in page.information_table(planted(known, information=(silent, TOLD[1]))).rows] == ["trim"]

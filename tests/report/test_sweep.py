@@ -12,19 +12,7 @@ from PIL import Image
 from readable import assert_readable
 from rich.console import Console
 
-from proxytune.report.sweep import (
-    bar_points,
-    bars_figure,
-    curve_csv,
-    curve_document,
-    curve_name,
-    curve_tables,
-    held_mark,
-    panels_figure,
-    say_failures,
-    sweep_figure,
-    sweep_view,
-)
+from proxytune.report import sweep
 from proxytune.report.text import table_text
 from proxytune.storage import Store
 from proxytune.study import StudyRun, open_study
@@ -57,38 +45,40 @@ def swept(make_studies):
 
 
 def test_document_and_csv_have_a_point_per_value_and_without_a_target_model_say_how_to_get_pod(swept):
-    document = json.loads(json.dumps(curve_document(swept), allow_nan=False))
+    document = json.loads(json.dumps(sweep.curve_document(swept), allow_nan=False))
     assert document["parameter"] == "trim"
     assert document["base"] == TRUTH
     assert [point["value"] for point in document["points"]] == [-0.3, -0.1, 0.1, 0.3]
     assert document["points"][2]["prpv"] == 0
     assert document["noise_floor"] == swept.points[0].assessment.noise_floor.value
     assert document["noise_floor_kind"] == "halves"
-    rows = list(csv.DictReader(io.StringIO(curve_csv(swept))))
-    points = curve_document(swept)["points"]
+    rows = list(csv.DictReader(io.StringIO(sweep.curve_csv(swept))))
+    points = sweep.curve_document(swept)["points"]
     assert [float(row["trim"]) for row in rows] == [point["value"] for point in points]
     assert [int(row["prpv"]) for row in rows] == [point["prpv"] for point in points]
     assert [float(row["ppv"]) for row in rows] == [point["ppv"] for point in points]
-    document = curve_document(swept)
+    document = sweep.curve_document(swept)
     assert document["points"][0]["pod"] is None
     assert "--target-model" in document["notes"][0]
-    assert not any("pod" in column for column in curve_csv(swept).splitlines()[0].split(","))
+    assert not any("pod" in column for column in sweep.curve_csv(swept).splitlines()[0].split(","))
 
 
 def test_the_name_is_short_and_has_one_mark_of_held_values_in_any_order(swept):
-    names = [curve_name(replace(swept, base=base)) for base in (TRUTH, {**TRUTH, "delay": 0.2}, {"trim": 0.1}, {})]
+    names = [
+        sweep.curve_name(replace(swept, base=base)) for base in (TRUTH, {**TRUTH, "delay": 0.2}, {"trim": 0.1}, {})
+    ]
     assert names[0] == "sweep_trim_4e3f5b"
     assert len(names[1]) == len(names[0])
     assert names[1] != names[0]
     assert names[2:] == ["sweep_trim", "sweep_trim"]
-    assert held_mark({"trim": 1, "delay": 0.12}) == held_mark({"delay": 0.12, "trim": 1.0})
-    assert held_mark({"trim": 1.0}) != held_mark({"trim": 0.1})
+    assert sweep.held_mark({"trim": 1, "delay": 0.12}) == sweep.held_mark({"delay": 0.12, "trim": 1.0})
+    assert sweep.held_mark({"trim": 1.0}) != sweep.held_mark({"trim": 0.1})
 
 
 def test_people_see_a_row_per_value(swept):
     console = Console(width=80)
     with console.capture() as captured:
-        console.print(*map(table_text, curve_tables(swept)))
+        console.print(*map(table_text, sweep.curve_tables(swept)))
     shown = captured.get()
     rows = [line for line in shown.splitlines() if line.strip().startswith("0.1 ")]
     assert len(rows) == 2, "one row in each of the two tables"
@@ -99,15 +89,15 @@ def test_people_see_a_row_per_value(swept):
 
 def test_points_without_a_score_are_empty_and_told(make_study):
     broken = curve(make_study(domain={"faults": '["agent3:*:raises"]'}))
-    assert curve_document(broken)["points"][0]["prpv"] is None
-    assert curve_csv(broken).splitlines()[1] == "-0.3" + "," * (3 * 8) + ",3"
-    assert say_failures([broken])[0].startswith("trim -0.3: agent 'agent3' failed from every start")
-    for figure in (sweep_figure([broken]), panels_figure(broken), bars_figure([broken])):
+    assert sweep.curve_document(broken)["points"][0]["prpv"] is None
+    assert sweep.curve_csv(broken).splitlines()[1] == "-0.3" + "," * (3 * 8) + ",3"
+    assert sweep.say_failures([broken])[0].startswith("trim -0.3: agent 'agent3' failed from every start")
+    for figure in (sweep.sweep_figure([broken]), sweep.panels_figure(broken), sweep.bars_figure([broken])):
         figure.draw_without_rendering()
 
 
 def test_the_figure_shows_every_point_of_every_curve_within_its_axes(curves):
-    panels = np.reshape(sweep_figure(curves).axes, (2, 2))
+    panels = np.reshape(sweep.sweep_figure(curves).axes, (2, 2))
     for row, swept in enumerate(curves):
         line = next(line for line in panels[row, 0].get_lines() if line.get_label() == "PRPV")
         assert list(line.get_xdata()) == [point.value for point in swept.points]
@@ -119,7 +109,7 @@ def test_the_figure_shows_every_point_of_every_curve_within_its_axes(curves):
 
 
 def test_every_measure_is_in_document_csv_and_lines_with_its_interval(with_pod):
-    document = curve_document(with_pod)
+    document = sweep.curve_document(with_pod)
     point = document["points"][2]
     for measure in ("srcc", "kendall_tau", "mmrv"):
         assert set(point[measure]) == set(point["intervals"][measure]) == {"distance", "survival_time"}
@@ -128,21 +118,21 @@ def test_every_measure_is_in_document_csv_and_lines_with_its_interval(with_pod):
     assert document["notes"] == []
     assert document["shapes"]["pod_pose"]["best"] == (0.1,)
     assert document["shapes"]["pod_pose"]["worsens_on_both_sides"] is True
-    assert curve_name(with_pod) == "sweep_trim_4e3f5b_pod"
+    assert sweep.curve_name(with_pod) == "sweep_trim_4e3f5b_pod"
 
-    rows = list(csv.DictReader(io.StringIO(curve_csv(with_pod))))
+    rows = list(csv.DictReader(io.StringIO(sweep.curve_csv(with_pod))))
     for key in ("prpv", "ppv", "srcc_distance", "kendall_tau_distance", "mmrv_survival_time", "pod_pose", "pod_image"):
         assert all(float(row[f"{key}_low"]) <= float(row[f"{key}_high"]) for row in rows if row[f"{key}_low"])
         assert all(row[key] for row in rows)
 
-    lines = curve_tables(with_pod)[0].notes
+    lines = sweep.curve_tables(with_pod)[0].notes
     assert len(lines) == 2 + 3 * 2 + 2
     assert lines[0].startswith("trim: PRPV: lowest (0) at 0.1")
     assert "worsens" in next(line for line in lines if "POD pose" in line)
 
 
 def test_panels_show_each_measure_on_an_axis_of_its_own_and_pod_where_there_is_a_target_model(with_pod, swept):
-    figure = panels_figure(with_pod)
+    figure = sweep.panels_figure(with_pod)
     *panels, key, pose, image = figure.axes
     titles = ["PRPV [ordered pairs]", "PPV", "SRCC", "POD, pose [m]", "POD, image [full scale]"]
     assert [axes.get_title() for axes in (*panels, pose, image)] == titles
@@ -153,7 +143,7 @@ def test_panels_show_each_measure_on_an_axis_of_its_own_and_pod_where_there_is_a
     assert not key.axison
     places = [axes.get_position().bounds for axes in figure.axes]
     assert len(set(places)) == len(places), "no second axis stands on another"
-    assert [axes.axison for axes in panels_figure(swept).axes] == [True, True, True, False]
+    assert [axes.axison for axes in sweep.panels_figure(swept).axes] == [True, True, True, False]
 
 
 @pytest.mark.slow
@@ -161,35 +151,35 @@ def test_the_target_s_own_value_is_marked_only_where_it_is_known(swept):
     def marks(figure):
         return [line.get_xdata()[0] for axes in figure.axes for line in axes.get_lines() if line.get_label() == "truth"]
 
-    assert marks(panels_figure(swept, {"trim": 0.11})) == [0.11] * 3
-    assert marks(sweep_figure([swept], {"trim": 0.11})) == [0.11] * 2
-    assert marks(panels_figure(swept)) == marks(sweep_figure([swept], {"delay": 0.1})) == []
+    assert marks(sweep.panels_figure(swept, {"trim": 0.11})) == [0.11] * 3
+    assert marks(sweep.sweep_figure([swept], {"trim": 0.11})) == [0.11] * 2
+    assert marks(sweep.panels_figure(swept)) == marks(sweep.sweep_figure([swept], {"delay": 0.1})) == []
 
 
 @pytest.mark.slow
 def test_figures_are_as_wide_as_a_column_with_type_of_six_points_and_more(with_pod, swept):
-    many = sweep_figure([swept] * 4), bars_figure([swept] * 4)
-    assert_readable(panels_figure(with_pod), panels_figure(swept), *many)
+    many = sweep.sweep_figure([swept] * 4), sweep.bars_figure([swept] * 4)
+    assert_readable(sweep.panels_figure(with_pod), sweep.panels_figure(swept), *many)
 
 
 def test_the_bars_stand_at_the_held_value_and_beside_and_parameters_are_named_in_words(make_study, swept):
     values = [point.value for point in swept.points]
-    indices, held = bar_points(swept)
+    indices, held = sweep.bar_points(swept)
     assert ([values[index] for index in indices], values[held]) == ([-0.1, 0.1, 0.3], 0.1)
-    assert bar_points(curve(make_study("end"), base={"trim": -0.3})) == ([0, 1], 0)
-    axes = bars_figure([swept]).axes[0]
+    assert sweep.bar_points(curve(make_study("end"), base={"trim": -0.3})) == ([0, 1], 0)
+    axes = sweep.bars_figure([swept]).axes[0]
     scores = [swept.points[index].assessment.prpv.value for index in indices]
     assert [patch.get_height() for patch in axes.patches if patch.get_width() == pytest.approx(0.85)] == scores
     assert (
-        sweep_figure([replace(swept, parameter="camera_pitch", unit="deg")]).axes[1].get_xlabel()
+        sweep.sweep_figure([replace(swept, parameter="camera_pitch", unit="deg")]).axes[1].get_xlabel()
         == "camera pitch [deg]"
     )
-    assert [text.get_text() for text in bars_figure([swept]).axes[0].get_xticklabels()] == ["−0.1", "0.1", "0.3"]
+    assert [text.get_text() for text in sweep.bars_figure([swept]).axes[0].get_xticklabels()] == ["−0.1", "0.1", "0.3"]
     first = swept.points[0].assessment
     known = replace(first, noise_floor=replace(first.noise_floor, kind="same starts"))
     told = replace(swept, points=(replace(swept.points[0], assessment=known), *swept.points[1:]))
-    assert legend(sweep_figure([told]))[0] == "noise floor"
-    assert curve_document(told)["noise_floor_kind"] == "same starts"
+    assert legend(sweep.sweep_figure([told]))[0] == "noise floor"
+    assert sweep.curve_document(told)["noise_floor_kind"] == "same starts"
 
 
 def legend(figure):
@@ -199,10 +189,10 @@ def legend(figure):
 
 def test_every_line_band_and_bar_is_explained_once_and_nothing_of_a_figure_is_clipped(with_pod, curves, make_study):
     lines = ["target's halves", "chance", "95 % interval", "held value"]
-    assert legend(sweep_figure(curves)) == lines
-    assert legend(panels_figure(with_pod)) == [*lines, "SRCC, distance", "SRCC, survival time"]
-    assert sorted(legend(bars_figure(curves))) == sorted([*lines, "lower and higher value"])
-    for figure in (panels_figure(with_pod), bars_figure([with_pod]), sweep_figure([with_pod])):
+    assert legend(sweep.sweep_figure(curves)) == lines
+    assert legend(sweep.panels_figure(with_pod)) == [*lines, "SRCC, distance", "SRCC, survival time"]
+    assert sorted(legend(sweep.bars_figure(curves))) == sorted([*lines, "lower and higher value"])
+    for figure in (sweep.panels_figure(with_pod), sweep.bars_figure([with_pod]), sweep.sweep_figure([with_pod])):
         figure.draw_without_rendering()
         outer, inner = figure.bbox, figure.get_tightbbox().transformed(figure.dpi_scale_trans)
         assert outer.x0 <= inner.x0
@@ -220,8 +210,8 @@ def curves(make_studies):
 def view_of(curves):
     image = BytesIO()
     Image.fromarray(np.zeros((4, 4, 3), np.uint8)).save(image, format="png")
-    figures = {name: image.getvalue() for name in (*map(curve_name, curves), "sweep_all_x", "sweep_bars_x")}
-    return sweep_view("s", curves, figures, "The others are nominal")
+    figures = {name: image.getvalue() for name in (*map(sweep.curve_name, curves), "sweep_all_x", "sweep_bars_x")}
+    return sweep.sweep_view("s", curves, figures, "The others are nominal")
 
 
 def test_the_answer_says_where_prpv_is_lowest_and_of_a_flat_curve_claims_no_optimum(curves):

@@ -12,68 +12,56 @@ from hypothesis import given, settings, strategies as some
 from proxytune.domain import Outcome, make_episode
 from proxytune.errors import StoreError
 from proxytune.storage import Store, SweepRecord, TrialRecord, database, salvage
-from proxytune.storage.database import (
-    FORMAT,
-    OF_SEVERAL_FILES,
-    connect,
-    digest_of,
-    disconnect,
-    open_file,
-    seal,
-    sqlite_errors_as_store_errors,
-    transaction,
-    write_row,
-)
 
 
 @contextmanager
 def edited(path):
     """A connection to edit study.db with as a test needs it, with digests that fit, as if a study had been run so."""
-    with closing(open_file(path, writable=True)) as plain:
+    with closing(database.open_file(path, writable=True)) as plain:
         yield plain
-        seal(plain)
+        database.seal(plain)
 
 
 def made(path):
-    disconnect(connect(path, writable=True))
+    database.disconnect(database.connect(path, writable=True))
     return path
 
 
 def add_fact(connection, key, value):
-    write_row(connection, "facts", {"key": key, "value": value})
+    database.write_row(connection, "facts", {"key": key, "value": value})
 
 
 def test_a_database_is_made_and_left_clean_as_one_file(tmp_path):
     path = made(tmp_path / "study.db")
     with sqlite3.connect(path) as plain:
-        assert plain.execute("PRAGMA user_version").fetchone() == (FORMAT,)
+        assert plain.execute("PRAGMA user_version").fetchone() == (database.FORMAT,)
         names = {name for (name,) in plain.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
     assert names == {"facts", "instances", "trials", "episodes", "sweeps", "under_way", "counts"}
-    connection = connect(tmp_path / "study.db", writable=True)
+    connection = database.connect(tmp_path / "study.db", writable=True)
     add_fact(connection, "seed", "1")
-    disconnect(connection)
+    database.disconnect(connection)
     assert [path.name for path in tmp_path.iterdir()] == ["study.db"]
     with sqlite3.connect(tmp_path / "study.db") as plain:
         assert plain.execute("SELECT key, value FROM facts").fetchall() == [("seed", "1")]
 
 
 def test_it_can_be_read_while_it_is_written(tmp_path):
-    writer = connect(tmp_path / "study.db", writable=True)
+    writer = database.connect(tmp_path / "study.db", writable=True)
     add_fact(writer, "seed", "1")
     writer.execute("BEGIN IMMEDIATE")
     add_fact(writer, "starts", "3")
-    reader = connect(tmp_path / "study.db", writable=False)
+    reader = database.connect(tmp_path / "study.db", writable=False)
     assert reader.execute("SELECT key FROM facts").fetchall() == [("seed",)]
     reader.close()
     writer.execute("COMMIT")
-    disconnect(writer)
+    database.disconnect(writer)
 
 
 def test_an_empty_file_left_by_a_kill_says_to_run_the_study_and_becomes_a_database(tmp_path):
     (tmp_path / "study.db").touch()
     with pytest.raises(StoreError, match="is empty; run the study first"):
-        connect(tmp_path / "study.db", writable=False)
-    connection = connect(tmp_path / "study.db", writable=True)
+        database.connect(tmp_path / "study.db", writable=False)
+    connection = database.connect(tmp_path / "study.db", writable=True)
     assert connection.execute("SELECT count(*) FROM trials").fetchone() == (0,)
     connection.close()
 
@@ -81,7 +69,7 @@ def test_an_empty_file_left_by_a_kill_says_to_run_the_study_and_becomes_a_databa
 def refused(path, expected, writable=True):
     before = path.read_bytes()
     with pytest.raises(StoreError) as caught:
-        connect(path, writable=writable)
+        database.connect(path, writable=writable)
     told = str(caught.value)
     assert expected in told
     assert str(path) in told
@@ -92,8 +80,10 @@ def refused(path, expected, writable=True):
 def test_a_newer_format_is_refused(tmp_path):
     path = made(tmp_path / "study.db")
     with sqlite3.connect(path) as plain:
-        plain.execute(f"PRAGMA user_version = {FORMAT + 1}")
-    refused(path, f"has format {FORMAT + 1}, this proxytune reads up to {FORMAT}; install a newer one")
+        plain.execute(f"PRAGMA user_version = {database.FORMAT + 1}")
+    refused(
+        path, f"has format {database.FORMAT + 1}, this proxytune reads up to {database.FORMAT}; install a newer one"
+    )
 
 
 @pytest.mark.parametrize("version", range(1, 7))
@@ -118,7 +108,7 @@ def with_next_format(tmp_path, monkeypatch):
     with edited(path) as plain:
         plain.execute("INSERT INTO facts (key, value) VALUES ('seed', '1')")
     monkeypatch.setattr(database, "STEPS", (*database.STEPS, NEXT))
-    monkeypatch.setattr(database, "FORMAT", FORMAT + 1)
+    monkeypatch.setattr(database, "FORMAT", database.FORMAT + 1)
     return path
 
 
@@ -129,13 +119,13 @@ def facts_in(connection):
 
 def test_the_next_format_reads_this_one_converts_it_when_it_writes_and_takes_nothing_damaged(with_next_format):
     before = with_next_format.read_bytes()
-    connection = connect(with_next_format, writable=False)
-    assert facts_in(connection) == (FORMAT + 1, [("seed", "1", "here")])
+    connection = database.connect(with_next_format, writable=False)
+    assert facts_in(connection) == (database.FORMAT, [("seed", "1", "here")])
     connection.close()
     assert with_next_format.read_bytes() == before
-    disconnect(connect(with_next_format, writable=True))
-    connection = connect(with_next_format, writable=False)
-    assert facts_in(connection) == (FORMAT + 1, [("seed", "1", "here")])
+    database.disconnect(database.connect(with_next_format, writable=True))
+    connection = database.connect(with_next_format, writable=False)
+    assert facts_in(connection) == (database.FORMAT, [("seed", "1", "here")])
     connection.close()
     assert with_next_format.read_bytes() != before
     with sqlite3.connect(with_next_format) as plain:
@@ -170,39 +160,41 @@ def test_what_is_no_whole_database_is_refused_and_not_begun_anew(tmp_path, make,
 
 
 def filled(path):
-    connection = connect(path, writable=True)
+    connection = database.connect(path, writable=True)
     rows = [(f"identity {number}", "{}") for number in range(3000)]
-    with transaction(connection, path):
+    with database.transaction(connection, path):
         connection.executemany("INSERT INTO instances (identity, theta) VALUES (?, ?)", rows)
-        seal(connection)
-    disconnect(connection)
+        database.seal(connection)
+    database.disconnect(connection)
     return path
 
 
 def test_folders_and_what_cannot_be_written_are_told(tmp_path):
     with pytest.raises(StoreError, match=r"cannot be written \(unable to open database file\)"):
-        connect(tmp_path / "nowhere" / "study.db", writable=True)
+        database.connect(tmp_path / "nowhere" / "study.db", writable=True)
     (tmp_path / "study.db").mkdir()
     with pytest.raises(StoreError, match=r"study\.db: is a folder, so no study's database; move it away"):
-        connect(tmp_path / "study.db", writable=True)
+        database.connect(tmp_path / "study.db", writable=True)
 
 
 def test_a_full_disk_is_told_and_what_was_committed_stays(tmp_path):
     path = tmp_path / "study.db"
-    connection = connect(path, writable=True)
+    connection = database.connect(path, writable=True)
     (pages,) = connection.execute("PRAGMA page_count").fetchone()
     connection.execute(f"PRAGMA max_page_count = {pages + 2}")
     written = 0
     with (
         pytest.raises(StoreError, match="the disk is full; make room and run again"),
-        sqlite_errors_as_store_errors(path),
+        database.sqlite_errors_as_store_errors(path),
     ):
         for number in range(10_000):
-            with transaction(connection, path):
-                write_row(connection, "instances", {"id": number, "identity": f"identity {number}", "theta": "{}"})
+            with database.transaction(connection, path):
+                database.write_row(
+                    connection, "instances", {"id": number, "identity": f"identity {number}", "theta": "{}"}
+                )
             written += 1
     connection.close()
-    again = connect(path, writable=True)
+    again = database.connect(path, writable=True)
     assert again.execute("SELECT count(*) FROM instances").fetchone() == (written,)
     assert written > 10
     again.close()
@@ -214,7 +206,7 @@ def test_a_database_that_another_program_writes_to_is_told(tmp_path, monkeypatch
     other = sqlite3.connect(path, isolation_level=None)
     other.execute("BEGIN EXCLUSIVE")
     with pytest.raises(StoreError, match="another program holds it open"):
-        connect(path, writable=True)
+        database.connect(path, writable=True)
     other.close()
 
 
@@ -225,11 +217,11 @@ def test_a_part_of_a_page_is_refused_but_not_beside_the_log_that_has_the_whole_o
     path.write_bytes(content[:-1])
     refused(path, "is damaged (its end has been cut off)")
     path.write_bytes(content)
-    writer = connect(path, writable=True)
+    writer = database.connect(path, writable=True)
     add_fact(writer, "seed", "1")
     with path.open("ab") as main_file:
         main_file.write(b"?" * 100)
-    reader = connect(path, writable=False)
+    reader = database.connect(path, writable=False)
     assert reader.execute("SELECT key, value FROM facts").fetchall() == [("seed", "1")]
     assert reader.execute("SELECT count(*) FROM instances").fetchall() == [(3000,)]
     reader.close()
@@ -241,7 +233,7 @@ def test_a_stranger_s_schema_may_not_call_our_functions(tmp_path):
     with sqlite3.connect(path) as plain:
         plain.create_function("row_digest", -1, lambda *values: 0, deterministic=True)
         plain.execute("CREATE VIEW evil AS SELECT row_digest(key) FROM facts")
-    connection = open_file(path, writable=True)
+    connection = database.open_file(path, writable=True)
     with pytest.raises(sqlite3.OperationalError, match="unsafe use of row_digest"):
         connection.execute("SELECT * FROM evil").fetchall()
     connection.close()
@@ -263,7 +255,7 @@ def broken_off(tmp_path):
 @pytest.mark.parametrize("first", ["write", "look", "repair"])
 def test_a_write_that_a_kill_broke_off_is_undone_also_by_who_only_looks_or_repairs(broken_off, first):
     assert first != "repair" or salvage(broken_off.parent) is None
-    connection = connect(broken_off, writable=first == "write")
+    connection = database.connect(broken_off, writable=first == "write")
     assert connection.execute("SELECT count(*) FROM instances").fetchone() == (3000,)
     connection.close()
     assert salvage(broken_off.parent) is None, "nothing is damaged"
@@ -277,9 +269,9 @@ def test_a_journal_that_would_have_another_file_deleted_is_refused(broken_off, w
     numbers = [(1 << 30) // 4096 + 1, len(name), sum(name)]
     place, length, total = (number.to_bytes(4, "big") for number in numbers)
     with (broken_off.parent / "study.db-journal").open("ab") as journal:
-        journal.write(place + name + length + total + OF_SEVERAL_FILES)
+        journal.write(place + name + length + total + database.OF_SEVERAL_FILES)
     with pytest.raises(StoreError, match="study.db-journal: names another file"):
-        connect(broken_off, writable=writable)
+        database.connect(broken_off, writable=writable)
     assert victim.read_text() == "mine"
 
 
@@ -388,7 +380,7 @@ VALUES = some.lists(some.none() | some.integers() | some.floats() | some.text(),
 @settings(max_examples=100)
 @given(VALUES, VALUES)
 def test_other_values_have_another_digest(one, other):
-    assert (digest_of(*one) == digest_of(*other)) == (ascii(one) == ascii(other))
+    assert (database.digest_of(*one) == database.digest_of(*other)) == (ascii(one) == ascii(other))
 
 
 def test_sweeps_asked_for_again_are_not_missed(tmp_path):

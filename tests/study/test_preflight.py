@@ -19,19 +19,7 @@ from proxytune.errors import EpisodeError, RunError
 from proxytune.running import run_episode
 from proxytune.space import Interval
 from proxytune.storage import Store
-from proxytune.study import StudyRun, goal_of, most_preflight_episodes, open_study, run_preflight
-from proxytune.study.preflight import (
-    LEVEL,
-    LOOKS,
-    PAIRS,
-    REMEDY,
-    check_some_work,
-    judge,
-    noise_of,
-    placement_pairs,
-    preflight_of,
-    shares_starts,
-)
+from proxytune.study import StudyRun, goal_of, most_preflight_episodes, open_study, preflight, run_preflight
 
 
 def outcome(agent, failure=""):
@@ -44,7 +32,7 @@ ALIKE = [outcome(f"agent{n}", f"agent 'agent{n}' raised KeyError at 1.{n} s: 'ma
 def test_where_all_fail_alike_the_line_begins_with_the_failure_and_its_place():
     expected = r"^agent 'agent0' raised KeyError at 1.0 s: 'mass' \(sim.py, line 7\); every agent fails so, in all 2"
     with pytest.raises(RunError, match=expected) as told:
-        check_some_work(ALIKE, "trial 1 of 20")
+        preflight.check_some_work(ALIKE, "trial 1 of 20")
     assert str(told.value).endswith("of trial 1 of 20: correct it and run the same command again")
 
 
@@ -54,7 +42,7 @@ def test_where_all_fail_alike_the_line_begins_with_the_failure_and_its_place():
     ids=["none was driven", "one worked", "they fail of different things"],
 )
 def test_anything_else_goes_on(outcomes):
-    check_some_work(outcomes, "the pre-flight")
+    preflight.check_some_work(outcomes, "the pre-flight")
 
 
 def edited(folder, edit):
@@ -80,7 +68,7 @@ def with_holes(rows):
 def test_noise_is_that_of_placement_and_less_with_repeats(make_study):
     with running(make_study(preflight="true")) as study_run:
         run_preflight(study_run)
-        found, pairs = noise_of(study_run), placement_pairs(study_run)
+        found, pairs = preflight.noise_of(study_run), preflight.placement_pairs(study_run)
     assert found.caution == ""
     assert pairs.shape[1:] == (2, 6, 2)
     # Wobbly's scores wobble by 0.15, so a difference of two means over three starts has a variance of 2 · 0.15² / 3.
@@ -90,17 +78,17 @@ def test_noise_is_that_of_placement_and_less_with_repeats(make_study):
     folder = make_study(preflight="true")
     with running(folder) as study_run:
         run_preflight(study_run)
-        once = noise_of(study_run)
+        once = preflight.noise_of(study_run)
         edited(folder, twice)
         study = open_study(folder)
-        assert shares_starts(study)
-        again = noise_of(StudyRun(study, study_run.store))
+        assert preflight.shares_starts(study)
+        again = preflight.noise_of(StudyRun(study, study_run.store))
     assert again.variance == pytest.approx(0.75 * once.variance)
 
     with running(make_study(preflight="true")) as study_run:
         run_preflight(study_run)
-        known = noise_of(study_run)
-        unknown = noise_of(StudyRun(open_study(make_study(preflight="false")), study_run.store))
+        known = preflight.noise_of(study_run)
+        unknown = preflight.noise_of(StudyRun(open_study(make_study(preflight="false")), study_run.store))
     assert known.caution == ""
     assert unknown.caution.startswith("noise is estimated from the spread between the target's episodes")
 
@@ -116,7 +104,7 @@ def twice(rows):
 def test_any_other_table_works_and_says_what_it_loses(finished, edit):
     assert len(looked_at(open_study(finished)).cautions) == 1  # this study has no pre-flight
     found = looked_at(open_study(edited(finished, edit)))
-    assert not shares_starts(found.study)
+    assert not preflight.shares_starts(found.study)
     (caution,) = found.cautions
     assert caution.startswith("noise is ")
     assert "; to know θ better, measure the target" in caution
@@ -128,17 +116,20 @@ def test_any_other_table_works_and_says_what_it_loses(finished, edit):
 def test_failed_episodes_are_left_out_of_noise_and_comparison(make_study):
     with running(make_study(domain={"faults": '["agent3:1:raises"]'}, preflight="true")) as study_run:
         run_preflight(study_run)
-        found = noise_of(study_run)
+        found = preflight.noise_of(study_run)
         assert np.array_equal(goal_of(study_run).noise, found.variance.ravel())
     assert np.isfinite(found.variance).all()
     found = told(make_study(preflight="true", domain={"faults": '["agent3:1:raises"]'}))
-    assert {movement.pairs for movement in found.values()} <= {PAIRS // LOOKS - 1, PAIRS - 2}
+    assert {movement.pairs for movement in found.values()} <= {
+        preflight.PAIRS // preflight.LOOKS - 1,
+        preflight.PAIRS - 2,
+    }
 
 
 def run(folder, **changes):
     with running(changed(folder, **changes)) as study_run:
         run_preflight(study_run)
-        return study_run.spent, preflight_of(StudyRun(study_run.study, study_run.store))
+        return study_run.spent, preflight.preflight_of(StudyRun(study_run.study, study_run.store))
 
 
 def told(folder, **changes):
@@ -179,7 +170,11 @@ def test_of_the_planted_parameters_only_the_one_that_matters_moves_a_metric_beyo
 def test_a_parameter_that_matters_is_not_looked_at_twice_and_nothing_is_simulated_again(planted):
     folder = planted(jobs="2")
     spent, found = run(folder)
-    looked = {"base and noise": 2 * PAIRS, "matters": 2 * PAIRS // LOOKS, "the others": 4 * PAIRS}
+    looked = {
+        "base and noise": 2 * preflight.PAIRS,
+        "matters": 2 * preflight.PAIRS // preflight.LOOKS,
+        "the others": 4 * preflight.PAIRS,
+    }
     assert spent.episodes == found.episodes == sum(looked.values())
     assert spent.episodes < most_preflight_episodes(open_study(folder).settings)
     assert run(folder) == (replace(spent, episodes=0, seconds=0), found)
@@ -226,9 +221,9 @@ def test_one_line_says_what_is_wrong_with_a_parameter_and_one_metric_that_moves_
     dead, noise_sized = found.warnings
     assert dead.startswith("pre-flight: 'dead' changes nothing at all across [0, 1]; remove it from")
     assert noise_sized.startswith("pre-flight: 'noise_sized' is not shown to change a metric across [0, 1]")
-    values = np.random.default_rng(1).normal(size=(PAIRS, 4, 2))
+    values = np.random.default_rng(1).normal(size=(preflight.PAIRS, 4, 2))
     values[:, 3, 1] += 10.0
-    found = judge(Interval("blur", 0.0, 1.0), ["a", "b"], values)
+    found = preflight.judge(Interval("blur", 0.0, 1.0), ["a", "b"], values)
     assert found.moves
     assert found.metric == "b"
 
@@ -237,8 +232,8 @@ def test_one_line_says_what_is_wrong_with_a_parameter_and_one_metric_that_moves_
 def test_a_parameter_that_is_only_one_more_source_of_noise_is_said_to_matter_in_at_most_one_case_in_twenty():
     """Heavy tails too: whatever the noise, the test compares ranks."""
     rng, interval = np.random.default_rng(1), Interval("blur", 0.0, 1.0)
-    found = [judge(interval, ["a", "b"], rng.standard_t(2, (PAIRS, 4, 2))) for _ in range(400)]
-    assert 0 < sum(movement.moves for movement in found) * LOOKS <= 400 * LEVEL + 9
+    found = [preflight.judge(interval, ["a", "b"], rng.standard_t(2, (preflight.PAIRS, 4, 2))) for _ in range(400)]
+    assert 0 < sum(movement.moves for movement in found) * preflight.LOOKS <= 400 * preflight.LEVEL + 9
 
 
 MOODY = Deadly(
@@ -252,7 +247,8 @@ def test_agents_that_remember_or_draw_unseeded_are_named_at_once_and_for_good(ma
     domain = {"faults": str(list(MOODY.faults))}
     folder = make_study(family='"deadly:deadly"', domain=domain, preflight="true", jobs=jobs, budget="3", initial="3")
     named = [
-        f"pre-flight: agent '{agent}' scores otherwise in the same episode; {REMEDY}" for agent in ("agent1", "agent3")
+        f"pre-flight: agent '{agent}' scores otherwise in the same episode; {preflight.REMEDY}"
+        for agent in ("agent1", "agent3")
     ]
     assert main(["study", str(folder), "--json"]) == 0
     first = capsys.readouterr()

@@ -18,12 +18,10 @@ def drives():
 
 
 def test_groups_are_offered_in_their_order_with_knots_within_what_was_driven(drives):
-    offer = offer_curves(drives, TRUTH)
+    offer, asked = offer_curves(drives, TRUTH), twists_of(drives, TRUTH)
     assert {curve.group for curve in offer.curves} == set(GROUPS)
     assert learnt_effect(learnt_theta(offer)) == offer
     assert not any(any(curve.weights) for curve in offer.curves)
-
-    offer, asked = offer_curves(drives, TRUTH), twists_of(drives, TRUTH)
     for bounds, signal in zip(offer.seen, (asked[..., 0], asked[..., 2]), strict=True):
         assert signal.min() <= bounds[0] < 0.0 < bounds[1] <= 1.01 * signal.max()
     knots = {curve.group: np.array(curve.knots) for curve in offer.curves}

@@ -121,6 +121,8 @@ class _Task(NamedTuple):
     def without(self, left_out: Iterable[str], *, moves: bool) -> "_Task":
         """The same without the curves of some groups, and the model's own values as they are unless these move."""
         kept = [name not in left_out and (moves or name != MODEL) for name in _column_groups(self.offer, self.moving)]
+        if all(kept):
+            return self
         curves = tuple(curve for curve in self.offer.curves if curve.group not in left_out)
         return self._replace(
             offer=replace(self.offer, curves=curves),

@@ -81,16 +81,6 @@ def page_html(view: View, foot: Foot, renew_s: int = 0) -> str:
     about = [*(f"{name} {stated[name]}" for name in ABOUT if stated.get(name)), foot.date]
     titles = (html.escape(one.title) for one in view.parts)
     items = "".join(f'<li><a href="#part-{n}">{title}</a></li>' for n, title in enumerate(titles, start=1))
-    said = re.sub(r"<svg.*?</svg>|<[^>]*>", " ", parts + _text(view.sentence), flags=re.DOTALL)
-    used = [f"<dt>{word}</dt><dd>{means}</dd>" for word, means in WORDS.items() if re.search(rf"\b{word}", said)]
-    settings = Table("Settings", (Column(""), Column("")), foot.settings)
-    below = [_part(settings, "settings")] if foot.settings else []
-    if foot.command:
-        command = f"<pre><code>{html.escape(foot.command)}</code></pre>"
-        below.append(f'<section><h2 id="again">The command that makes this page</h2>{command}</section>')
-    below += [f'<section><h2 id="words">Words on this page</h2><dl>{"".join(used)}</dl></section>'] if used else []
-    versions = ", ".join(f"{name} {version}" for name, version in foot.versions)
-    written = [f"Written {foot.date}"] * bool(foot.date) + [f"with {versions}"] * bool(versions)
     return fill(
         "page.html.txt",
         title=html.escape(view.title),
@@ -102,8 +92,23 @@ def page_html(view: View, foot: Foot, renew_s: int = 0) -> str:
         following=following if view.next_step else "",
         contents=f'<nav aria-label="Contents"><ol>{items}</ol></nav>\n' if len(view.parts) > MANY else "",
         parts=parts,
-        foot="\n".join([*below, f"<p>{html.escape(' '.join(written))}.</p>" if written else ""]),
+        foot=_foot(foot, parts + _text(view.sentence)),
     )
+
+
+def _foot(foot: Foot, page: str) -> str:
+    """How to come by the page again, and what the words of WORDS mean that it uses."""
+    said = re.sub(r"<svg.*?</svg>|<[^>]*>", " ", page, flags=re.DOTALL)
+    used = [f"<dt>{word}</dt><dd>{means}</dd>" for word, means in WORDS.items() if re.search(rf"\b{word}", said)]
+    settings = Table("Settings", (Column(""), Column("")), foot.settings)
+    parts = [_part(settings, "settings")] if foot.settings else []
+    if foot.command:
+        command = f"<pre><code>{html.escape(foot.command)}</code></pre>"
+        parts.append(f'<section><h2 id="again">The command that makes this page</h2>{command}</section>')
+    parts += [f'<section><h2 id="words">Words on this page</h2><dl>{"".join(used)}</dl></section>'] if used else []
+    versions = ", ".join(f"{name} {version}" for name, version in foot.versions)
+    written = [f"Written {foot.date}"] * bool(foot.date) + [f"with {versions}"] * bool(versions)
+    return "\n".join([*parts, f"<p>{html.escape(' '.join(written))}.</p>" if written else ""])
 
 
 def _parts(view: View) -> str:

@@ -5,6 +5,7 @@ from dataclasses import asdict, astuple, replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from rich.console import Group
 
@@ -296,22 +297,9 @@ def teach_figure(experiment: teaching.Experiment) -> Figure:
     shown = [grid[place] for place in sorted({0, 1, (len(grid) + 1) // 2, len(grid) - 1})]
     figure, panels = style.panel_grid(len(lessons), 1.25, 0.6, sharex=True, sharey=True)
     for axes, lesson in zip(panels, lessons, strict=True):
-        for name, look, height in ((NONE, WITHOUT, -1.2), (lesson.name, WITH, 1.2)):
-            draws, curve = experiment.needs.draws, experiment.needs.curves[name]
-            at, scores, examined = _places(experiment, draws.counts), draws.scores[name], curve.examined
-            low, high = np.quantile(scores, LEVELS, axis=0)
-            axes.fill_between(at, low, high, color=look.colour, alpha=0.18, linewidth=0)
-            axes.plot(at, scores.mean(axis=0), look.style, color=look.colour, linewidth=1.2, label=look.label)
-            seen = _places(experiment, np.array(curve.counts, dtype=float))[examined[:, 1]]
-            marks = curve.scores[tuple(examined.T)]
-            axes.plot(seen, marks, look.mark, color=look.colour, markersize=2, alpha=0.35)
-            if lesson.worth is not None:
-                needed = lesson.worth.without if name == NONE else lesson.worth.needed
-                if needed.low is not None:
-                    # The interval of the samples needed, off the line of convergence so that two bars stay apart
-                    ends = np.array([needed.low, experiment.needs.last if needed.high is None else needed.high])
-                    level, places = experiment.when.threshold + height, _places(experiment, ends)
-                    axes.hlines(level, *places, color=look.colour, linewidth=2.5)
+        worth = lesson.worth
+        _draw_learner(axes, experiment, NONE, WITHOUT, worth.without if worth else None)
+        _draw_learner(axes, experiment, lesson.name, WITH, worth.needed if worth else None)
         axes.axhline(experiment.when.threshold, color="0.3", linewidth=0.8, linestyle=":", label="converged")
         axes.set_xticks(_places(experiment, np.array(shown, dtype=float)), [f"{count:g}" for count in shown])
         axes.set_title(lesson.name, fontsize=8)
@@ -324,6 +312,24 @@ def teach_figure(experiment: teaching.Experiment) -> Figure:
         axes.set_ylabel("score [s]", fontsize=8)
     style.legend_below(figure, *panels)
     return figure
+
+
+def _draw_learner(
+    axes: Axes, experiment: teaching.Experiment, name: str, look: _Look, needed: LearningEstimate | None
+) -> None:
+    """Draw a learner's curve with its band and examinations, and the interval of the samples that it needs."""
+    draws, curve = experiment.needs.draws, experiment.needs.curves[name]
+    at, scores, examined = _places(experiment, draws.counts), draws.scores[name], curve.examined
+    low, high = np.quantile(scores, LEVELS, axis=0)
+    axes.fill_between(at, low, high, color=look.colour, alpha=0.18, linewidth=0)
+    axes.plot(at, scores.mean(axis=0), look.style, color=look.colour, linewidth=1.2, label=look.label)
+    seen = _places(experiment, np.array(curve.counts, dtype=float))[examined[:, 1]]
+    axes.plot(seen, curve.scores[tuple(examined.T)], look.mark, color=look.colour, markersize=2, alpha=0.35)
+    if needed is not None and needed.low is not None:
+        # Off the line of convergence, so that the bars of both learners stay apart
+        level = experiment.when.threshold + (-1.2 if name == NONE else 1.2)
+        ends = np.array([needed.low, experiment.needs.last if needed.high is None else needed.high])
+        axes.hlines(level, *_places(experiment, ends), color=look.colour, linewidth=2.5)
 
 
 def _places(experiment: teaching.Experiment, counts: Floats) -> Floats:

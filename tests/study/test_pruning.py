@@ -55,7 +55,6 @@ def test_trials_are_cut_off_after_the_design_and_would_have_scored_no_less_than_
     assert all(3 <= len(trial.decided) + 1 <= 8 and trial.prpv is None for trial in cut)
     assert spent.episodes == found.episodes == BUDGET * ALL - 3 * sum(8 - len(trial.decided) for trial in cut)
     assert found.spared[0] == BUDGET * ALL - spent.episodes
-    _, trials, found = done
     with Store.open(found.study.settings.folder) as store:
         for trial in trials:
             if trial.state == "cut":

@@ -88,7 +88,6 @@ def test_the_answer_is_told_by_episodes_not_seen_and_what_is_expected_by_those_i
         more + (answer.trial in [one.trial for one in found.confirmation.candidates])
     )
     assert {e.seed for e in set(known) - set(seen)}.isdisjoint(e.seed for e in seen)
-    *_, found = once
     answer, study, count = found.confirmation.answer, found.study, found.confirmation.repetitions
     assert 0 < count <= MOST_REPETITIONS
     scores = []

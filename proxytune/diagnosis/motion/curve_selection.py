@@ -18,7 +18,7 @@ from proxytune.effects import LEVEL
 RIDGES = (1e-3, 1e-2, 1e-1, 1.0)
 """Pulls towards no curve that are tried, as shares of what an average weight of the group is held by."""
 FIRMEST_ONLY = {"speed_and_turn": 0.1}
-"""Curves over two signals are never pulled less than this: most of their knots are seldom visited."""
+"""Curves over two signals with independent weights are never pulled less: most of their knots are seldom visited."""
 CORRELATED_PULL = 0.03
 """Weights that are correlated hold each other, and are pulled so much less."""
 FREE, MODEL_PULL = 1e-6, 1e-2

@@ -26,9 +26,8 @@ def test_noise_on_a_plain_floor_is_told_outright(noise):
 
 @pytest.mark.slow
 def test_a_picture_without_noise_has_none_and_texture_is_none_whose_bound_holds_the_noise_on_it():
-    model, _ = scene()
-    assert fit_grain(logged(model), model, floor()).noise.value < 0.3
     model, seen = scene()
+    assert fit_grain(logged(model), model, floor()).noise.value < 0.3
     found = fit_grain(logged(seen), model, floor()).noise
     assert (found.identified, found.interval[0]) == (False, 0.0)
     for noise in (2.0, 5.0):

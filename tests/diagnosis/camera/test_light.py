@@ -57,7 +57,6 @@ def test_the_largest_blemish_comes_first_and_a_clean_camera_has_none_whatever_li
     assert first.share > second.share
     assert first.columns[0] > 80 > second.columns[1]
     assert blemishes(logged(seen, 0.8, 1.3, 0.3, drift=0.1, noise=3.0), model) == ()
-    model, _ = scene()
     assert blemishes(logged(drawn(on_the_road(), unevenly_lit()), noise=2.0), model) == ()
 
 

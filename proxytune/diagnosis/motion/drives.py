@@ -296,7 +296,10 @@ class Drives:
 
     @cached_property
     def angles(self) -> Floats:
-        """Angles by which each wheel has turned in its episode by the measured motion (E, T, 2) [rad], interpolated."""
+        """Angles by which each wheel has turned in its episode (E, T, 2) [rad], measured or by the measured motion."""
+        if self.wheels is not None:
+            steps = self.wheels * self.robot.figures["full_speed"] / self.robot.figures["wheel_radius"] / self.tick_hz
+            return np.asarray(np.cumsum(steps, axis=1) - steps)
         turn = self.measured[:, 2] * track_of(self.robot.figures) / 2.0
         forward = self.measured[:, 0]
         wheels = np.stack((forward - turn, forward + turn), axis=1) / self.robot.figures["wheel_radius"]

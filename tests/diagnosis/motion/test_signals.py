@@ -1,5 +1,7 @@
 """Curves over signals: the signal that something depends on leads, and nothing leads where nothing is missing."""
 
+from dataclasses import replace
+
 import hidden_cases as hidden
 import numpy as np
 import pytest
@@ -78,3 +80,6 @@ def test_a_wheel_has_turned_as_far_as_it_rolled():
     rolled = np.abs(np.diff(angles, axis=1)).sum(axis=1).mean(axis=-1) * 0.0318
     assert (rolled > 0.9 * way).all()
     np.testing.assert_array_equal(angles[0, 0], 0.0)
+    spun = tuple(replace(e, wheels=np.full_like(e.poses[:, :2], 3.0)) for e in log.episodes)
+    seconds = np.arange(angles.shape[1]) / gather(log, ROBOT, spun).tick_hz
+    np.testing.assert_allclose(gather(log, ROBOT, spun).angles[0, :, 0], 3.0 * seconds)

@@ -38,13 +38,13 @@ REVERSALS_M = (0.003, 0.01, 0.03, 0.1, 0.3)
 """Ways over which the memory of a reversal fades [m]."""
 LOADS_S = (1.0, 4.5, 20.0)
 """Time constants of the low-passes."""
-DUTY_KNOTS, DRAWN_KNOTS = 100, 16
+DUTY_KNOTS, DRAWN_KNOTS = 200, 16
 """Knots over the size of a command, and over the sum of both."""
 HELD_S = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0)
 SINCE_S = (0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 0.8, 1.2)
 DRAGS = (0.02, 0.05, 0.1, 0.2)
 ENDED_S = (0.1, 0.25, 0.63, 1.6)
-RAMPS_S = (0.0, 0.1, 0.18, 0.32, 0.56, 1.0, 1.8)
+RAMPS_S = (0.0, 0.1, 0.16, 0.25, 0.4, 0.63, 1.0, 1.6, 2.5)
 """Of commands: how long they are held, since they began or turned round, half widths of plays, time constants, and how
 long growing from 0 to 1 and shrinking back takes."""
 CORRELATED = {"duty": 0.3, "drawn": 0.3, "time": 0.3, "use": 0.3, PLACE: 0.5}

@@ -19,8 +19,8 @@ RIDGES = (1e-3, 1e-2, 1e-1, 1.0)
 """Pulls towards no curve that are tried, as shares of what an average weight of the group is held by."""
 FIRMEST_ONLY = {"speed_and_turn": 0.1}
 """Curves over two signals with independent weights are never pulled less: most of their knots are seldom visited."""
-CORRELATED_PULL = 0.03
-"""Weights that are correlated hold each other, and are pulled so much less."""
+CORRELATED_PULL = 3e-4
+"""Correlated weights hold each other: each is pulled by this share of what all of its group are held by."""
 FREE, MODEL_PULL = 1e-6, 1e-2
 """The level is hardly pulled; the model's own values are, so that the level takes what both could."""
 MODEL = "model"
@@ -70,10 +70,12 @@ def choose_groups(given: Sums, groups: Mapping[str, slice], rules: Rules, *, rar
     """Add groups one by one, the best first, while they pay on parts left out; level and model are always there.
 
     A group pays if it surely makes the errors of most parts less; one of rare moments, if it takes much of all error.
+    Of those within one standard error of the best, the one with the fewest effective weights is added.
     """
     mean, nothing = np.sum([hessian.diagonal() for hessian in given.hessian], axis=0), 1e-12 * given.size.mean()
     unit = {
-        name: float(mean[own].mean()) * (CORRELATED_PULL if name in CORRELATED else 1.0) for name, own in groups.items()
+        name: float(CORRELATED_PULL * mean[own].sum() if name in CORRELATED else mean[own].mean())
+        for name, own in groups.items()
     }
 
     def pays(before: Floats, after: Floats) -> bool:
@@ -94,7 +96,9 @@ def choose_groups(given: Sums, groups: Mapping[str, slice], rules: Rules, *, rar
         paying = {name: found for name, found in tried.items() if pays(losses, found[1])}
         if not paying:
             break
-        best = min(paying, key=lambda name: float(paying[name][1].sum()))
+        least = min((after for _, after in paying.values()), key=np.sum)
+        alike = (name for name, (_, after) in paying.items() if _does_as_well(after, least))
+        best = min(alike, key=lambda name: _count_effective(given, groups[name], paying[name][0]))
         pulls[best], after = paying[best]
         gains[best] = float((losses - after).sum())
         losses, held = after, _hold(given, groups, pulls)
@@ -136,12 +140,24 @@ def _try_group(given: Sums, held: _Held, own: slice, name: str, unit: float) -> 
     """The hardest pull of a group within one standard error of its best, and the losses of the parts with it."""
     pulls = np.array([ridge for ridge in RIDGES if ridge >= FIRMEST_ONLY.get(name, 0.0)]) * unit + 1e-9
     found = _held_out_losses(given, held, own, pulls)
-    best = min(found, key=lambda losses: float(losses.sum()))
-    for pull, losses in zip(pulls[::-1].tolist(), found[::-1], strict=True):
-        worse = losses - best
-        if worse.sum() <= np.sqrt(len(worse)) * worse.std(ddof=1):
-            return pull, losses
-    return float(pulls[-1]), found[-1]
+    best = min(found, key=np.sum)
+    return next(
+        (pull, losses)
+        for pull, losses in zip(pulls[::-1].tolist(), found[::-1], strict=True)
+        if _does_as_well(losses, best)
+    )
+
+
+def _does_as_well(losses: Floats, best: Floats) -> bool:
+    """Tell whether losses of parts (P,) are within one standard error of the best."""
+    worse = losses - best
+    return bool(worse.sum() <= np.sqrt(len(worse)) * worse.std(ddof=1))
+
+
+def _count_effective(given: Sums, own: slice, pull: float) -> float:
+    """Effective number of a group's weights under a pull: the trace of how far it lets them follow the errors."""
+    hessian = np.sum([one[own, own] for one in given.hessian], axis=0)
+    return float(np.trace(np.linalg.solve(hessian + pull * np.eye(len(hessian)), hessian)))
 
 
 def _held_out_losses(given: Sums, held: _Held, own: slice, pulls: Floats) -> Floats:

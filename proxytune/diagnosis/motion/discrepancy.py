@@ -53,7 +53,7 @@ PARTS = 16
 """No more parts are left out in turn."""
 FOLDS = 4
 """The whole fit, choice of groups included, is repeated so often for the guard, each time without one fold."""
-ROUNDS, SETTLED = 8, 0.99
+ROUNDS, SETTLED = 12, 0.998
 """It is linearised and its weights are made robust so often, or until two times leave more than this share of the
 error."""
 FARTHEST = 0.15

@@ -44,6 +44,15 @@ def test_the_group_that_gains_most_is_chosen_first_and_curves_over_two_signals_p
     assert 0.0 < np.abs(duty).max() < 0.1 * np.abs(load).max(), "correlated weights are pulled less"
 
 
+@pytest.mark.parametrize("seed", [0, 3, 4])
+def test_of_groups_that_do_alike_the_one_with_fewest_effective_weights_is_chosen(seed):
+    given = slopes(WEIGHTS, seed=seed)
+    given.columns[..., 7:11] = given.columns[..., 3:7]
+    given.columns[..., 3:7] += 0.005 * np.random.default_rng(seed).standard_normal(given.columns[..., 3:7].shape)
+    chosen = choose_groups(summed(given), {"many": slice(7, 15), "few": slice(3, 7)}, RULES)
+    assert list(chosen.gains) == ["few"], "not those with the least loss by a hair"
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_nothing_is_chosen_of_noise_nor_any_rare_moment(seed):
     chosen = choose_groups(summed(slopes(np.zeros(15), seed=seed)), COLUMNS, RULES)

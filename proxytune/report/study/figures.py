@@ -275,7 +275,7 @@ def importance_figure(result: StudyResult) -> Figure:
     reach = np.abs(np.array([one.interval for one in ordered]).T - shares)
     axes.errorbar(shares, places, xerr=reach, fmt="none", ecolor=style.BLUE, lw=1.0, capsize=2, label="95 % interval")
     axes.plot(shares, places, "o", color=style.BLUE, markersize=5, label="alone or with others")
-    axes.plot(alone, places, "|", color="black", markersize=7, markeredgewidth=1.4, label="alone")
+    axes.plot(alone, places, "|", color="black", markersize=5, markeredgewidth=1.4, label="alone")
     axes.set_yticks(places, [plain(one.name) for one in ordered])
     axes.set_xlim(0.0, 1.0)
     axes.set_ylim(-0.6, len(ordered) - 0.4)

@@ -13,7 +13,7 @@ from proxytune.diagnosis.answer import Rules
 from proxytune.diagnosis.motion.curve_offer import CORRELATED
 from proxytune.diagnosis.motion.drives import Floats, Whole, sum_by
 from proxytune.diagnosis.motion.prediction import Slopes
-from proxytune.effects import LEVEL
+from proxytune.effects import LEVEL, PLACE
 
 RIDGES = (1e-3, 1e-2, 1e-1, 1.0)
 """Pulls towards no curve that are tried, as shares of what an average weight of the group is held by."""
@@ -70,7 +70,7 @@ def choose_groups(given: Sums, groups: Mapping[str, slice], rules: Rules, *, rar
     """Add groups one by one, the best first, while they pay on parts left out; level and model are always there.
 
     A group pays if it surely makes the errors of most parts less; one of rare moments, if it takes much of all error.
-    Of those within one standard error of the best, the one with the fewest effective weights is added.
+    A map gives way to a curve over x or y, which is one too, if that is within one standard error of it.
     """
     mean, nothing = np.sum([hessian.diagonal() for hessian in given.hessian], axis=0), 1e-12 * given.size.mean()
     unit = {
@@ -96,9 +96,11 @@ def choose_groups(given: Sums, groups: Mapping[str, slice], rules: Rules, *, rar
         paying = {name: found for name, found in tried.items() if pays(losses, found[1])}
         if not paying:
             break
-        least = min((after for _, after in paying.values()), key=np.sum)
-        alike = (name for name, (_, after) in paying.items() if _does_as_well(after, least))
-        best = min(alike, key=lambda name: _count_effective(given, groups[name], paying[name][0]))
+        best = min(paying, key=lambda name: float(paying[name][1].sum()))
+        if best == PLACE:
+            nested = {name: paying[name][1] for name in "xy" if name in paying}
+            alike = [name for name, after in nested.items() if _does_as_well(after, paying[best][1])]
+            best = min(alike, key=lambda name: float(nested[name].sum()), default=best)
         pulls[best], after = paying[best]
         gains[best] = float((losses - after).sum())
         losses, held = after, _hold(given, groups, pulls)
@@ -152,12 +154,6 @@ def _does_as_well(losses: Floats, best: Floats) -> bool:
     """Tell whether losses of parts (P,) are within one standard error of the best."""
     worse = losses - best
     return bool(worse.sum() <= np.sqrt(len(worse)) * worse.std(ddof=1))
-
-
-def _count_effective(given: Sums, own: slice, pull: float) -> float:
-    """Effective number of a group's weights under a pull: the trace of how far it lets them follow the errors."""
-    hessian = np.sum([one[own, own] for one in given.hessian], axis=0)
-    return float(np.trace(np.linalg.solve(hessian + pull * np.eye(len(hessian)), hessian)))
 
 
 def _held_out_losses(given: Sums, held: _Held, own: slice, pulls: Floats) -> Floats:

@@ -8,6 +8,7 @@ import pytest
 from proxytune.diagnosis import RULES
 from proxytune.diagnosis.motion.curve_selection import FIRMEST_ONLY, RIDGES, choose_groups, sum_squares
 from proxytune.diagnosis.motion.prediction import Slopes
+from proxytune.effects import PLACE
 
 PARTS = 12
 COLUMNS = {"one": slice(0, 3), "other": slice(3, 7), "speed_and_turn": slice(7, 15)}
@@ -45,12 +46,13 @@ def test_the_group_that_gains_most_is_chosen_first_and_curves_over_two_signals_p
 
 
 @pytest.mark.parametrize("seed", [0, 3, 4])
-def test_of_groups_that_do_alike_the_one_with_fewest_effective_weights_is_chosen(seed):
+def test_a_map_gives_way_to_a_curve_over_x_or_y_that_does_as_well_and_other_groups_to_none(seed):
     given = slopes(WEIGHTS, seed=seed)
     given.columns[..., 7:11] = given.columns[..., 3:7]
     given.columns[..., 3:7] += 0.005 * np.random.default_rng(seed).standard_normal(given.columns[..., 3:7].shape)
-    chosen = choose_groups(summed(given), {"many": slice(7, 15), "few": slice(3, 7)}, RULES)
-    assert list(chosen.gains) == ["few"], "not those with the least loss by a hair"
+    for many, few, chosen in ((PLACE, "y", "y"), ("load", "y", "load")):
+        groups = {many: slice(7, 15), few: slice(3, 7)}
+        assert list(choose_groups(summed(given), groups, RULES).gains) == [chosen], "better by a hair alone"
 
 
 @pytest.mark.parametrize("seed", range(5))

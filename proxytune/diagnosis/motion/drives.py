@@ -22,7 +22,6 @@ from proxytune.effects import SHIPPED, Catalogue, track_of
 from proxytune.errors import LogError
 from proxytune.logs import Log, LogEpisode, check_kind, rows_of_poses, without_outliers
 from proxytune.settings import GEOMETRY, nearest
-from proxytune.space import Theta
 
 
 def cosine_and_sine(angle: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -270,24 +269,13 @@ class Drives:
         return relative(self.poses[:, 0], self.poses[:, 1])
 
     @cached_property
-    def replays(self) -> Recent[Floats]:
-        """The increments (N, 3) that models made of these drives lately."""
-        return Recent()
+    def _recent(self) -> dict[str, Recent[Any]]:
+        return {}
 
-    @cached_property
-    def arrivals(self) -> Recent[Floats]:
-        """The commands (E, T, 2) that reached the motors in models lately."""
-        return Recent()
-
-    @cached_property
-    def turns(self) -> Recent[Floats]:
-        """The wheel speeds (E, T, 2) that models made of these drives lately."""
-        return Recent()
-
-    @cached_property
-    def fits(self) -> Recent[Theta]:
-        """The values in θ that were fitted to windows of these drives lately."""
-        return Recent(SEVERAL)
+    def remember(self, kind: str, key: Hashable, make: Callable[[], Result], most: int = MOST) -> Result:
+        """What models made of these drives lately: the one of this kind and key, made if it is not kept."""
+        found: Result = self._recent.setdefault(kind, Recent(most)).get(key, make)
+        return found
 
     @cached_property
     def places(self) -> Floats:

@@ -24,14 +24,13 @@ from proxytune.logs import COMMANDS, Frames, Log, LogEpisode
 POSITION_NOISE_M = 0.002
 HEADING_NOISE_RAD = 0.005
 """White noise of a measured pose, as a tracker above the floor has it."""
-HEADING_NOISE_DEG = math.degrees(HEADING_NOISE_RAD)
 
 PICTURES = "frames/%06d.png"
 """Where a log's pictures lie in its folder."""
 CAMERA = {
     "frames": PICTURES,
     "exposure": "fixed",
-    "poses": {"position_m": POSITION_NOISE_M, "heading_deg": round(HEADING_NOISE_DEG, 4)},
+    "poses": {"position_m": POSITION_NOISE_M, "heading_deg": round(math.degrees(HEADING_NOISE_RAD), 4)},
 }
 """What log.toml states of the pictures: no effect adjusts the exposure from one to the next."""
 Table = tuple[str, Mapping[str, tuple[Floats, Floats]]]
@@ -214,11 +213,9 @@ def _instants(instance: driving.Instance, driven: driving.Drive, lap: _Lap) -> t
     finished = np.arange(len(driven.commands)) * hold // every * every
     fresh = np.flatnonzero(np.diff(finished, prepend=0) > 0)
     if len(fresh) < lap.frames:
-        seconds = len(driven.commands) * hold / driving.TICK_HZ
-        raise EpisodeError(
-            f"lane drive from start {lap.start} ended after {seconds:.2f} s with {len(fresh)} of {lap.frames} "
-            "pictures; record fewer frames, or correct the model"
-        )
+        ended = f"ended after {len(driven.commands) * hold / driving.TICK_HZ:.2f} s"
+        problem = f"lane drive from start {lap.start} {ended} with {len(fresh)} of {lap.frames} pictures"
+        raise EpisodeError(f"{problem}; record fewer frames, or correct the model")
     steps = fresh[(np.arange(lap.frames) + 1) * len(fresh) // lap.frames - 1]
     # The middle of a picture's exposure, that of its middle row, is half of both before it is finished.
     lasting = {Blur.name: "blur", RollingShutter.name: "readout"}

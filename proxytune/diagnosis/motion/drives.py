@@ -66,8 +66,7 @@ Floats = NDArray[Any]
 def duties_of(log: Log, robot: Robot, commands: Floats) -> Floats:
     """A log's commands (…, 2) as fractions of full wheel speed, left and right; of a car as throttle and steering.
 
-    Raises:
-        LogError: If the log has no commands, they are not of such a robot, or they ask for more than it can.
+    Refused if it has none, they are not of such a robot, or they ask for more than it can.
     """
     figures = robot.figures
     if log.command == "none":
@@ -83,12 +82,10 @@ def duties_of(log: Log, robot: Robot, commands: Floats) -> Floats:
     else:
         speeds = commands * figures["wheel_radius"]
     duties = speeds / figures["full_speed"]
-    fastest = float(np.abs(duties).max())
+    fastest, full = float(np.abs(duties).max()), figures["full_speed"]
     if fastest > 1.0 + 1e-9:
-        raise LogError(
-            f"{log.name}: asks a wheel for {fastest * figures['full_speed']:.2f} m/s, more than the robot's full speed "
-            f"{figures['full_speed']:g} m/s; state a higher full_speed_m_s in log.toml"
-        )
+        problem = f"asks a wheel for {fastest * full:.2f} m/s, more than the robot's full speed {full:g} m/s"
+        raise LogError(f"{log.name}: {problem}; state a higher full_speed_m_s in log.toml")
     return np.asarray(duties)
 
 
@@ -98,13 +95,11 @@ def _steered(log: Log, robot: Robot, commands: Floats) -> Floats:
     if log.command == "twist":
         with np.errstate(divide="ignore", invalid="ignore"):
             angles = np.arctan(np.where(commands[..., 1] == 0.0, 0.0, figures["wheelbase"] * commands[..., 1] / speeds))
-    fastest, widest = float(np.abs(speeds).max()), math.radians(figures["wheel_angle"])
-    if fastest > figures["full_speed"] * (1.0 + 1e-9):
-        raise LogError(
-            f"{log.name}: asks for {fastest:.2f} m/s, more than the full speed {figures['full_speed']:g} m/s of robot "
-            f"'{robot.name}'; state a higher full_speed in its robot.toml"
-        )
-    return np.stack((speeds / figures["full_speed"], np.clip(angles / widest, -1.0, 1.0)), axis=-1)
+    fastest, full, widest = float(np.abs(speeds).max()), figures["full_speed"], math.radians(figures["wheel_angle"])
+    if fastest > full * (1.0 + 1e-9):
+        problem = f"asks for {fastest:.2f} m/s, more than the full speed {full:g} m/s of robot '{robot.name}'"
+        raise LogError(f"{log.name}: {problem}; state a higher full_speed in its robot.toml")
+    return np.stack((speeds / full, np.clip(angles / widest, -1.0, 1.0)), axis=-1)
 
 
 def commands_as(kind: str, robot: Robot, duties: Floats) -> Floats:
@@ -476,10 +471,9 @@ def robot_of(log: Log, name: str | None = None, catalogue: Catalogue = SHIPPED) 
         return replace(robot, catalogue=replace(catalogue, drive=robot.drive))
     missing = [key for figure, key in NEEDED.items() if figure not in log.geometry]
     if missing:
-        raise LogError(
-            f"{log.name}: robot '{log.robot}' is unknown ({nearest(log.robot, names)}) and log.toml does not "
-            f"state {' and '.join(missing)}; state them, or name a robot with --robot"
-        )
+        unknown = f"{log.name}: robot '{log.robot}' is unknown ({nearest(log.robot, names)})"
+        lacks = f"log.toml does not state {' and '.join(missing)}"
+        raise LogError(f"{unknown} and {lacks}; state them, or name a robot with --robot")
     geometry = {**log.geometry}
     geometry.setdefault("full_speed", _full_speed(log))
     return replace(robot_from_geometry(log.robot, geometry, log.rate_hz), catalogue=catalogue)

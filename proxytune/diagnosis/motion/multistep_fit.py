@@ -162,10 +162,15 @@ def compare_errors(drives: Drives, one: Mapping[float, Floats], other: Mapping[f
     return {h: ratio(squares, other[h], blocks_of(drives, cut(drives, h)), shown_at) for h, squares in one.items()}
 
 
+def squared_errors(drives: Drives, theta: Theta) -> dict[float, Floats]:
+    """Squared distances of a model's poses from measured ones [m²], by horizon [s]."""
+    return {h: pose_errors(drives, theta, cut(drives, h))[:, 0] ** 2 for h in horizons(drives)}
+
+
 def fit_multistep(fitted: Fit) -> tuple[Fit, MultistepFit | None]:
     """Fit the parameters to windows, and keep that if held-out windows show that it helps and nowhere harms."""
     drives = fitted.drives
-    plain = {h: pose_errors(drives, fitted.theta, cut(drives, h))[:, 0] ** 2 for h in horizons(drives)}
+    plain = squared_errors(drives, fitted.theta)
     best: tuple[float, float, dict[float, Ratio]] | None = None
     for length in [s for s in FITTED_S if s in plain]:
         ratios = compare_errors(drives, held_out_squares(drives, fitted.theta, fitted.free, length), plain)

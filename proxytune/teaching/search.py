@@ -38,14 +38,9 @@ CLOSER = 2
 def finalists(
     setup: TeachingSetup, settings: StudySettings, space: Space, trials: Sequence[search.Trial], by_prpv: Theta | None
 ) -> dict[str, learning.Distribution]:
-    """The distributions that are worth a closer look, by name; none twice.
+    """The distributions that are worth a closer look after these trials, by name; none twice.
 
-    Args:
-        setup: Of the learning experiment.
-        settings: Of the study, whose whole box is one of the finalists where widths are searched.
-        space: What was searched.
-        trials: Those that have ended.
-        by_prpv: The θ of lowest PRPV, None where that is not known.
+    The θ of lowest PRPV is one where it is known, and the study's whole box where widths are searched.
     """
     if all(trial.score is None for trial in trials):
         return {}

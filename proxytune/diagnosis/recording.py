@@ -187,7 +187,10 @@ def _film_drive(family: driving.LaneFollowing, instance: driving.Instance, lap: 
     own = int(random.integers(2**32))
     noise = {"position_noise_m": family.position_noise_m, "heading_noise_deg": family.heading_noise_deg}
     start = np.array(driving.start_pose(family.map, lap.start, seed=own, **noise))
-    start = _in_other_lane(family.map, start) if lap.turned else start
+    if lap.turned:  # in the middle of the lane that it then looks along
+        heading = start[2] + math.pi
+        other = driving.lane_pose(family.map, start[:2], heading)
+        start = np.array((*driving.lane_point(family.map, other.counter_clockwise, other.along), heading))
     seconds = max(SHORTEST_S, lap.frames / FRAMES_HZ)
     course = driving.Course(start, seconds, own, functools.partial(driving.off_map, family.map))
     expert = driving.Expert(family.map, *instance.robot.expert_figures(), seed=own)
@@ -198,13 +201,6 @@ def _film_drive(family: driving.LaneFollowing, instance: driving.Instance, lap: 
     poses = tracked(driving.measured(instance, driven.poses, own)[:: round(driving.TICK_HZ / rate)][:rows], random)
     episode = LogEpisode(f"lane_{lap.number}", np.arange(rows) / rate, driven.commands, poses, None)
     return FilmedDrive(episode, times, np.stack([driven.memory.pictures[step] for step in steps]))
-
-
-def _in_other_lane(road: driving.Road, pose: Floats) -> Floats:
-    """The pose turned round, in the middle of the lane that it then looks along."""
-    heading = pose[2] + math.pi
-    other = driving.lane_pose(road, pose[:2], heading)
-    return np.array((*driving.lane_point(road, other.counter_clockwise, other.along), heading))
 
 
 def _instants(instance: driving.Instance, driven: driving.Drive, lap: _Lap) -> tuple[list[int], Floats]:

@@ -27,10 +27,10 @@ def grey_cells(pictures: NDArray[np.uint8], *, top: float, rows: int, columns: i
     height, width = pictures.shape[1:3] if pictures.ndim == 4 else (0, 0)
     first = round(top * height)
     if height - first < rows or width < columns:
-        problem = (
-            f"pictures have shape {pictures.shape[1:]}, and {rows} × {columns} cells below row {first} do not fit in"
+        raise LearnerError(
+            f"pictures have shape {pictures.shape[1:]}, and {rows} × {columns} cells below row {first} "
+            "do not fit in; give (rows, columns, 3) with more pixels, or take fewer cells"
         )
-        raise LearnerError(f"{problem}; give (rows, columns, 3) with more pixels, or take fewer cells")
     seen = pictures[:, first:]
     # Adding 16-bit channels is exact, and twice as fast as a mean over them
     grey = (seen[..., 0].astype(np.uint16) + seen[..., 1] + seen[..., 2]) / 3.0
@@ -140,8 +140,10 @@ def _settle(network: MLPRegressor, seen: Floats, wanted: Floats, start: Weights)
     for name, values in layers.items():
         if name not in start or start[name].shape != values.shape:
             was = start[name].shape if name in start else "missing"
-            problem = f"the weights to start from do not fit: {name} is {was} where these samples need {values.shape}"
-            raise LearnerError(f"{problem}; train the start on pictures and a network of the same size")
+            raise LearnerError(
+                f"the weights to start from do not fit: {name} is {was} where these samples need {values.shape}; "
+                "train the start on pictures and a network of the same size"
+            )
     network.coefs_ = [np.array(start[name]) for name in layers if name.startswith("weight")]
     network.intercepts_ = [np.array(start[name]) for name in layers if name.startswith("bias")]
 

@@ -50,10 +50,11 @@ class RandomFeatures:
             "slopes": np.zeros((self.features, samples.commands.shape[1])),
         }
         seen = self._waves(before, samples.observations)
-        was, needed = before["slopes"].shape, (seen.shape[1], samples.commands.shape[1])
-        if was != needed:
-            problem = f"the weights to start from do not fit: slopes is {was} where these samples need {needed}"
-            raise LearnerError(f"{problem}; train the start with as many features and commands")
+        if before["slopes"].shape != (seen.shape[1], samples.commands.shape[1]):
+            raise LearnerError(
+                f"the weights to start from do not fit: slopes is {before['slopes'].shape} where these samples need "
+                f"{(seen.shape[1], samples.commands.shape[1])}; train the start with as many features and commands"
+            )
         left = samples.commands - before["centre"] - seen @ before["slopes"]
         with threadpool_limits(limits=1):
             fitted = Ridge(alpha=self.penalty, fit_intercept=False, solver="cholesky").fit(seen, left)

@@ -100,13 +100,9 @@ def _edges_of(number: int, white: bool, share: Floats) -> Edges:
     top = (here >= ahead) & (here > behind) & (bend > 1e-9)
     shift = ((ahead - behind) / np.where(top, 2.0 * bend, 1.0))[top]
     column, row, step_right, step_down = column[top], row[top], step_right[top], step_down[top]
-    return Edges(
-        np.full(len(row), number),
-        np.full(len(row), white),
-        column + 0.5 + shift * step_right,
-        row + 0.5 + shift * step_down,
-        np.stack((step_right, step_down), axis=-1).astype(float),
-    )
+    place = column + 0.5 + shift * step_right, row + 0.5 + shift * step_down
+    normal = np.stack((step_right, step_down), axis=-1).astype(float)
+    return Edges(np.full(len(row), number), np.full(len(row), white), *place, normal)
 
 
 WINDOW_S = 0.5

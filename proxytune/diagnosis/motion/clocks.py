@@ -168,7 +168,11 @@ def put_on_one_clock(log: Log, clocks: Clocks) -> Log:
         if later_s:
             episode = replace(episode, issued=_issued(episode) - later_s)
         begin, end = episode.times[0] + np.maximum(kept_s, (-later_s, 0.0)) + (-1e-9, 1e-9)
-        return _measured_within(episode, begin, end)
+        known, measured = (begin <= episode.times) & (episode.times <= end), episode.measured
+        if measured is not None:
+            own = known[measured.rows]
+            measured = Measured(measured.times[own], measured.poses[own], measured.rows[own])
+        return replace(episode, poses=np.where(known[:, None], episode.poses, np.nan), measured=measured)
 
     episodes = without_drift(log, clocks.drift.value).episodes
     return replace(log, episodes=tuple(map(retime, episodes, clocks.later_s, clocks.kept_s)))
@@ -176,16 +180,6 @@ def put_on_one_clock(log: Log, clocks: Clocks) -> Log:
 
 def _issued(episode: LogEpisode) -> Floats:
     return episode.times if episode.issued is None else episode.issued
-
-
-def _measured_within(episode: LogEpisode, begin: float, end: float) -> LogEpisode:
-    """An episode of which no pose is known but those of these times [s]."""
-    known = (begin <= episode.times) & (episode.times <= end)
-    measured = episode.measured
-    if measured is not None:
-        own = known[measured.rows]
-        measured = Measured(measured.times[own], measured.poses[own], measured.rows[own])
-    return replace(episode, poses=np.where(known[:, None], episode.poses, np.nan), measured=measured)
 
 
 def without_drift(log: Log, rate: float) -> Log:

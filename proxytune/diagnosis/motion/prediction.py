@@ -234,7 +234,11 @@ def predict(log: Log, robot: Robot, theta: Theta, horizon_s: float) -> pd.DataFr
     if not any(len(rows) for rows in starts):
         raise LogError(f"{log.name}: no measured pose to start a window from")
     ticks = round(whole.tick_hz / log.rate_hz)
-    windows = _windows(whole, log.episodes, starts, ticks)
+    # Drives whose increments are the windows' beginnings alone.
+    first, number = np.concatenate(starts) * ticks, np.repeat(np.arange(len(starts)), [len(rows) for rows in starts])
+    begins = [as_measured(one)[0][rows] for one, rows in zip(log.episodes, starts, strict=True)]
+    both, block = np.repeat(np.concatenate(begins)[:, None], 2, axis=1), np.zeros_like(first)
+    windows = replace(whole, episode=number, first=first, last=first, poses=both, block=block)
     walked = innovations.window_paths(windows, theta, np.arange(len(windows.first)), reach * ticks)
     poses = _place_at(windows.poses[:, 0], *_at_samples(walked, log.episodes, starts, ticks))
     cuts = np.cumsum([len(rows) for rows in starts])[:-1]
@@ -280,15 +284,6 @@ def _starts(episode: LogEpisode, reach: int) -> Whole:
         starts.append(int(known[later]))
         at = starts[-1] + reach
     return np.array(starts, dtype=int)
-
-
-def _windows(whole: Drives, episodes: Sequence[LogEpisode], starts: Sequence[Whole], ticks: int) -> Drives:
-    """Drives whose increments are the windows' beginnings alone."""
-    poses = np.concatenate([as_measured(one)[0][rows] for one, rows in zip(episodes, starts, strict=True)])
-    first = np.concatenate(starts) * ticks
-    number = np.repeat(np.arange(len(episodes)), [len(rows) for rows in starts])
-    both = np.repeat(poses[:, None], 2, axis=1)
-    return replace(whole, episode=number, first=first, last=first, poses=both, block=np.zeros_like(first))
 
 
 def _place_at(start: Floats, walked: Floats, origin: Floats) -> Floats:

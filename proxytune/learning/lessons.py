@@ -218,10 +218,8 @@ def mix_samples(new: Demonstration, earlier: Demonstration, share: float) -> Dem
     """
     wanted = min(len(earlier.commands), round(len(new.commands) * share / (1.0 - share)))
     rows = np.linspace(0, len(earlier.commands) - 1, wanted).round().astype(int)
-    return Demonstration(
-        np.concatenate((new.observations, earlier.observations[rows])),
-        np.concatenate((new.commands, earlier.commands[rows])),
-    )
+    observations = np.concatenate((new.observations, earlier.observations[rows]))
+    return Demonstration(observations, np.concatenate((new.commands, earlier.commands[rows])))
 
 
 KEYS = ("off_policy", "on_policy", "label")

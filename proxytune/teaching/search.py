@@ -125,10 +125,8 @@ def why_unknown(needs: learning.SampleNeeds) -> PlvUnknown | None:
         reason = f"teaching.target_samples has no number from 1 to half of {last} that would show a rise towards it"
         return PlvUnknown(reason, f"add numbers between 0 and {last} to teaching.target_samples")
     if not needs.settled:
-        reason = (
-            f"without a proxy the score still rises by more than {tolerance} over the last doubling to {last} samples"
-        )
-        return PlvUnknown(reason, RAISE)
+        rises = f"the score still rises by more than {tolerance} over the last doubling to {last} samples"
+        return PlvUnknown(f"without a proxy {rises}", RAISE)
     if not np.isfinite(np.median(needs.needed[learning.NONE])):
         reason = f"without a proxy the score does not come to {needs.when.threshold:g} within {last} samples"
         return PlvUnknown(reason, f"lower teaching.level, or {RAISE}")

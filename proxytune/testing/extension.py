@@ -372,9 +372,8 @@ def _check_means(measure: Measure, what: str) -> None:
 
 
 def _table(seed: int, episodes: int) -> ScoreTable:
-    values = (
-        np.random.default_rng(seed).normal(size=(AGENTS, episodes, len(METRICS))) + np.arange(AGENTS)[:, None, None]
-    )
+    spread = np.random.default_rng(seed).normal(size=(AGENTS, episodes, len(METRICS)))
+    values = spread + np.arange(AGENTS)[:, None, None]
     names = (tuple(f"agent{i}" for i in range(AGENTS)), tuple(map(str, range(episodes))))
     return ScoreTable(*names, tuple(metric.name for metric in METRICS), values)
 

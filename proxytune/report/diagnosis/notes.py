@@ -69,10 +69,9 @@ def moves_from(diagnosis: Diagnosis) -> list[str]:
     if inertia is None or friction is None or not inertia.value * friction.value > 0.0 or "dead_band" in theta:
         return []
     least = inertia.value * friction.value / diagnosis.robot.figures["full_speed"]
-    alike = (
-        f"with this rolling a throttle up to {least:.2g} moves nothing: a dead band of as much looks nearly the same"
-    )
-    return [f"{alike}; to tell them apart, drive fast, then let the car roll without throttle"]
+    rests = f"with this rolling a throttle up to {least:.2g} moves nothing"
+    apart = "to tell them apart, drive fast, then let the car roll without throttle"
+    return [f"{rests}: a dead band of as much looks nearly the same; {apart}"]
 
 
 def per_cent(one: Ratio) -> tuple[float, tuple[float, float]]:
@@ -161,10 +160,9 @@ def _say_clocks(clocks: Clocks) -> Iterator[str]:
         side = "before its command, which no robot does" if latency.value < 0.0 else "after its command"
         lag = f"motion comes {abs(latency.value):.2f} s {side}"
         early = "early" if offset.value < 0.0 else "late"
-        yield (
-            f"{lag}; poses are stamped {abs(offset.value):.2f} s too {early} ({_ends_s(offset)}) if the robot's delay "
-            f"is {assumed:.2f} s; this was corrected. Stamp both with one clock, or move the poses yourself"
-        )
+        stamped = f"poses are stamped {abs(offset.value):.2f} s too {early} ({_ends_s(offset)})"
+        corrected = "this was corrected. Stamp both with one clock, or move the poses yourself"
+        yield f"{lag}; {stamped} if the robot's delay is {assumed:.2f} s; {corrected}"
     if clocks.drift.value:
         low, high = sorted(1e2 * abs(end) for end in clocks.drift.interval)
         yield (

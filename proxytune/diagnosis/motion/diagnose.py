@@ -22,6 +22,7 @@ from proxytune.diagnosis.motion.excitation import LIMITS, Limits, NextDrive, des
 from proxytune.diagnosis.motion.fitting import Fit, check_motion, check_units, intervals
 from proxytune.diagnosis.motion.innovations import Noise, at_edge
 from proxytune.diagnosis.motion.moments import Period, find_period
+from proxytune.diagnosis.motion.multistep_fit import has_body
 from proxytune.diagnosis.motion.screening import MOTION_EFFECTS, motion_effects
 from proxytune.diagnosis.motion.selection import fit_declared, select_effects
 from proxytune.diagnosis.stages import Stages, facts_of
@@ -331,7 +332,7 @@ def diagnose(
     model = found.model
     explained = explained and not any(_at_edge(model.theta, effect, model.drives) for effect in found.adopted)
     confirmed = None
-    if multistep_fit.has_body(parts.tested):
+    if has_body(parts.tested):
         report("confirming on the bullet plant")
         on_bullet = multistep_fit.bullet_pose_errors
         confirmed = keep("bullet", lambda: horizon_error(found, tested, CONFIRMED_S, {}, on_bullet))
